@@ -1,0 +1,18 @@
+//! Two motor-drive protocols, both ends of each, without I/O.
+//!
+//! * [`stmcp`]: ST's serial Motor Control Protocol as MCSDK 5.x drives speak it, master and slave.
+//! * [`rmd`]: the RMD motor control protocol over CAN, V1.62, host and drive.
+//!
+//! Nothing here reads a clock or touches a port. A caller hands in received bytes or frames together
+//! with the [`time::Instant`] at which they came, and takes out what is to be sent and how long to
+//! wait. The crate is `no_std`, allocates nothing, contains no `unsafe` and does not panic.
+#![no_std]
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
+
+#[macro_use]
+mod table;
+pub mod rmd;
+pub mod stmcp;
+pub mod time;
+pub mod units;

@@ -1,0 +1,228 @@
+//! The protocol's named numbers: frame codes, error codes, commands, states and flags.
+
+/// How a slave behaves, and what a master expects, where documents and shipped drives differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Profile {
+    /// The document as written.
+    #[default]
+    #[cfg_attr(feature = "serde", serde(rename = "spec"))]
+    Spec,
+    /// What firmware of MCSDK 5.4 does on the wire.
+    #[cfg_attr(feature = "serde", serde(rename = "mcsdk-5.4"))]
+    Mcsdk54,
+}
+
+impl Profile {
+    /// The profile's name as the command line spells it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Profile::Spec => "spec",
+            Profile::Mcsdk54 => "mcsdk-5.4",
+        }
+    }
+}
+
+/// Header of a positive acknowledge: the whole byte (4.2, SPEC-NOTES S1).
+pub const HEADER_ACK: u8 = 0xF0;
+/// Header of a negative acknowledge: the whole byte (4.3, SPEC-NOTES S1).
+pub const HEADER_NACK: u8 = 0xFF;
+/// Header of the identification that SDK 4.x sends unasked at start-up (SPEC-NOTES S9).
+pub const HEADER_ATR: u8 = 0xE0;
+
+/// Declares the frame codes with the profiles that know each.
+macro_rules! frame_codes {
+    ($( $value:literal $variant:ident $text:literal [$($profile:ident)+] $doc:literal; )+) => {
+        /// What a command frame asks for (table 1). One number may mean different things in
+        /// different profiles, so a number becomes a code only together with a [`Profile`].
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum FrameCode {
+            $( #[doc = concat!("`", $text, "` (", stringify!($value), "): ", $doc)] $variant, )+
+        }
+
+        impl FrameCode {
+            /// Every frame code, in the order of the table.
+            pub const ALL: &'static [FrameCode] = &[$( FrameCode::$variant, )+];
+
+            /// The code that `number` means in `profile`, if it knows one.
+            pub const fn from_number(number: u8, profile: Profile) -> Option<Self> {
+                match (number, profile) {
+                    $( ($value, $(Profile::$profile)|+) => Some(FrameCode::$variant), )+
+                    _ => None,
+                }
+            }
+
+            /// The five bits on the wire.
+            pub const fn number(self) -> u8 {
+                match self { $( FrameCode::$variant => $value, )+ }
+            }
+
+            /// The document's name.
+            pub const fn name(self) -> &'static str {
+                match self { $( FrameCode::$variant => $text, )+ }
+            }
+
+            /// What the frame asks for, in a sentence.
+            pub const fn doc(self) -> &'static str {
+                match self { $( FrameCode::$variant => $doc, )+ }
+            }
+        }
+    };
+}
+
+frame_codes! {
+    0x01 SetReg "SET_REG" [Spec Mcsdk54] "write a register (4.4)";
+    0x02 GetReg "GET_REG" [Spec Mcsdk54] "read a register (4.5)";
+    0x03 ExecuteCmd "EXECUTE_CMD" [Spec Mcsdk54] "execute a command (4.6)";
+    0x06 GetBoardInfo "GET_BOARD_INFO" [Spec Mcsdk54] "read the SDK's version and name (4.7)";
+    0x07 SetRamp "SET_RAMP" [Spec Mcsdk54] "program a speed ramp (4.8)";
+    0x08 GetRevupData "GET_REVUP_DATA" [Spec Mcsdk54] "read a rev-up phase (4.9)";
+    0x09 SetRevupData "SET_REVUP_DATA" [Spec Mcsdk54] "write a rev-up phase (4.10)";
+    0x0A SetCurrentRef "SET_CURRENT_REF" [Spec Mcsdk54] "set the Iq and Id references (4.11)";
+    0x0B GetMpInfo "GET_MP_INFO" [Mcsdk54] "list the registers of motor profiler steps";
+    0x0C GetFwVersion "GET_FW_VERSION" [Spec Mcsdk54] "read the firmware's version string (4.12)";
+    0x0D GetDataElement "GET_DATA_ELEMENT" [Spec] "read a data segment";
+    0x0D SetTorqueRamp "SET_TORQUE_RAMP" [Mcsdk54] "program a torque ramp";
+    0x0E ConfigDynStruct "CONFIG_DYN_STRUCT" [Spec] "choose the registers of a data segment";
+    0x12 SetPositionCmd "SET_POSITION_CMD" [Mcsdk54] "move to an angle in a given time";
+}
+
+named_numbers! {
+    /// Why a slave refused a command (table 2).
+    pub enum ErrorCode: u8 {
+        0x00 None "NONE" "not an error; never found in a NACK";
+        0x01 BadFrameId "BAD_FRAME_ID" "the drive does not know this frame code";
+        0x02 SetReadOnly "SET_READ_ONLY" "the register is read-only or does not exist";
+        0x03 GetWriteOnly "GET_WRITE_ONLY" "the register cannot be read or does not exist";
+        0x05 WrongSet "WRONG_SET" "the value is not valid";
+        0x07 WrongCmd "WRONG_CMD" "the command is unknown or not possible on this drive";
+        0x08 Overrun "OVERRUN" "bytes came faster than the drive could take them";
+        0x09 Timeout "TIMEOUT" "the drive did not receive the whole frame in time";
+        0x0A BadCrc "BAD_CRC" "the checksum did not match what the drive received";
+        0x0B BadMotorSelected "BAD_MOTOR_SELECTED" "the drive has no motor of this number";
+        0x0C MpNotEnabled "MP_NOT_ENABLED" "the drive is built without the motor profiler";
+    }
+}
+
+named_numbers! {
+    /// The commands of EXECUTE_CMD (table 4, and those of shipped firmware).
+    pub enum Command: u8 {
+        0x01 StartMotor "START_MOTOR" "start the motor; nothing happens when it runs or is in fault";
+        0x02 StopMotor "STOP_MOTOR" "stop the motor";
+        0x03 StopRamp "STOP_RAMP" "stop the ramp that is executing";
+        0x04 Reset "RESET" "acknowledged without effect (mcsdk-5.4 only)";
+        0x05 Ping "PING" "acknowledged without effect (mcsdk-5.4 only)";
+        0x06 StartStop "START_STOP" "start an idle motor, stop a spinning one";
+        0x07 FaultAck "FAULT_ACK" "acknowledge past faults whose cause is gone";
+        0x08 EncoderAlign "ENCODER_ALIGN" "align the encoder";
+        0x09 IqdrefClear "IQDREF_CLEAR" "set the current references to their defaults";
+        0x0A PfcEnable "PFC_ENABLE" "start the power factor correction";
+        0x0B PfcDisable "PFC_DISABLE" "stop the power factor correction";
+        0x0C PfcFaultAck "PFC_FAULT_ACK" "acknowledge past faults of the power factor correction";
+        0x0D ScStart "SC_START" "start the motor profiler (mcsdk-5.4 only)";
+        0x0E ScStop "SC_STOP" "stop the motor profiler; acts as STOP_MOTOR (mcsdk-5.4 only)";
+    }
+}
+
+named_numbers! {
+    /// States of the motor control state machine: the values of register STATUS (SPEC-NOTES S14).
+    pub enum Status: u8 {
+        0 Idle "IDLE" "at rest, ready to start";
+        1 IdleAlignment "IDLE_ALIGNMENT" "about to align the encoder";
+        2 Alignment "ALIGNMENT" "aligning the encoder";
+        3 IdleStart "IDLE_START" "about to start";
+        4 Start "START" "rev-up";
+        5 StartRun "START_RUN" "rev-up is over, about to run";
+        6 Run "RUN" "under closed-loop control";
+        7 AnyStop "ANY_STOP" "a stop was asked for";
+        8 Stop "STOP" "stopping";
+        9 StopIdle "STOP_IDLE" "stopped, about to be idle";
+        10 FaultNow "FAULT_NOW" "the cause of a fault is present";
+        11 FaultOver "FAULT_OVER" "a fault's cause is gone; it waits to be acknowledged";
+        12 IclWait "ICLWAIT" "waiting for the inrush current limiter";
+        13 AlignChargeBootCap "ALIGN_CHARGE_BOOT_CAP" "charging boot capacitors before alignment";
+        14 AlignOffsetCalib "ALIGN_OFFSET_CALIB" "calibrating current offsets before alignment";
+        15 AlignClear "ALIGN_CLEAR" "clearing controllers before alignment";
+        16 ChargeBootCap "CHARGE_BOOT_CAP" "charging the boot capacitors";
+        17 OffsetCalib "OFFSET_CALIB" "calibrating the current offsets";
+        18 Clear "CLEAR" "clearing the controllers";
+        19 SwitchOver "SWITCH_OVER" "changing from rev-up to the observer";
+        20 WaitStopMotor "WAIT_STOP_MOTOR" "waiting for the rotor to stand still";
+    }
+}
+
+named_numbers! {
+    /// Values of register CONTROL_MODE (SPEC-NOTES S15).
+    pub enum ControlMode: u8 {
+        0 Torque "TORQUE" "the Iq reference is commanded";
+        1 Speed "SPEED" "the speed reference is commanded";
+    }
+}
+
+/// Register FLAGS: faults that occurred since the last acknowledge in the low half, faults whose
+/// cause is present in the high half (SPEC-NOTES S14).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Flags(pub u32);
+
+macro_rules! faults {
+    ($( $bit:literal $name:ident $text:literal $doc:literal; )+) => {
+        impl Flags {
+            $( #[doc = $doc] pub const $name: u16 = $bit; )+
+
+            /// Every named fault: bit, name, meaning.
+            pub const NAMES: &'static [(u16, &'static str, &'static str)] =
+                &[$( ($bit, $text, $doc), )+];
+        }
+    };
+}
+
+faults! {
+    0x01 FOC_DURATION "FOC_DURATION" "the control loop took longer than its period";
+    0x02 OVER_VOLT "OVER_VOLT" "bus voltage too high";
+    0x04 UNDER_VOLT "UNDER_VOLT" "bus voltage too low";
+    0x08 OVER_TEMP "OVER_TEMP" "heatsink too hot";
+    0x10 START_UP "START_UP" "the motor did not start";
+    0x20 SPEED_FDBK "SPEED_FDBK" "speed feedback lost";
+    0x40 BREAK_IN "BREAK_IN" "over-current";
+    0x80 SW_ERROR "SW_ERROR" "software error";
+}
+
+impl Flags {
+    /// Flags from faults that `occurred` and faults `present` now.
+    pub const fn new(occurred: u16, present: u16) -> Self {
+        Flags(occurred as u32 | (present as u32) << 16)
+    }
+
+    /// Faults since the last acknowledge, one bit each.
+    pub const fn occurred(self) -> u16 {
+        self.0 as u16
+    }
+
+    /// Faults whose cause is present, one bit each.
+    pub const fn present(self) -> u16 {
+        (self.0 >> 16) as u16
+    }
+}
+
+impl core::fmt::Display for Flags {
+    /// `none`, or the names of the faults; one whose cause is still there is marked `(present)`.
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let all = self.occurred() | self.present();
+        if all == 0 {
+            return f.write_str("none");
+        }
+        let mut separator = "";
+        for bit in (0..16).map(|n| 1u16 << n).filter(|bit| all & bit != 0) {
+            f.write_str(separator)?;
+            match Self::NAMES.iter().find(|(known, ..)| *known == bit) {
+                Some((_, name, _)) => f.write_str(name)?,
+                None => write!(f, "{bit:#06x}")?,
+            }
+            if self.present() & bit != 0 {
+                f.write_str(" (present)")?;
+            }
+            separator = ", ";
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,100 @@
+//! What a drive is to the protocol.
+
+use super::{Command, CurrentReference, ErrorCode, Features, PositionMove, Ramp, RegisterId,
+            RevupPhase, TorqueRamp};
+
+/// A motor of the drive: 1 is the first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Motor(u8);
+
+impl Motor {
+    /// The current motor after power-on (3.2).
+    pub const FIRST: Motor = Motor(1);
+    /// The highest number that three bits can carry.
+    pub const MAX: u8 = 7;
+
+    /// The motor of this number, 1 to 7.
+    pub const fn new(number: u8) -> Option<Self> {
+        if number >= 1 && number <= Self::MAX { Some(Motor(number)) } else { None }
+    }
+
+    /// The number on the wire, 1 to 7.
+    pub const fn number(self) -> u8 {
+        self.0
+    }
+
+    /// Position in an array of motors: 0 is the first.
+    pub const fn index(self) -> usize {
+        self.0.saturating_sub(1) as usize
+    }
+}
+
+impl core::fmt::Display for Motor {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "motor {}", self.0)
+    }
+}
+
+/// The firmware's version, as GET_BOARD_INFO (4.7) and GET_FW_VERSION (4.12) tell it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Version<'a> {
+    /// Name of the SDK; cut where the reply's 32 bytes end.
+    pub name: &'a str,
+    /// Major version.
+    pub major: u8,
+    /// Minor version.
+    pub minor: u8,
+    /// Patch version.
+    pub patch: u8,
+    /// Type and number of a pre-release, such as `RC2`; empty for a release.
+    pub pre_release: &'a str,
+}
+
+/// A drive behind a [`Slave`](super::Slave). The slave has checked the frame, the motor, the
+/// register's existence and access, and every size before it calls.
+///
+/// Register values travel as 32 bits ([`register::Value`](super::register::Value)). FLUXWK_BUS and
+/// FLUXWK_BUS_MEAS are tenths of a percent here, whatever the profile.
+pub trait Drive {
+    /// What this motor's control is built with.
+    fn features(&self, motor: Motor) -> Features;
+
+    /// The firmware's version.
+    fn version(&self) -> Version<'_>;
+
+    /// The value of a register that exists with [`features`](Self::features). TARGET_MOTOR never
+    /// comes here: the slave keeps it.
+    fn read(&mut self, motor: Motor, register: RegisterId) -> i32;
+
+    /// Writes a register that may be written. A value that the register cannot take is
+    /// [`ErrorCode::WrongSet`].
+    fn write(&mut self, motor: Motor, register: RegisterId, value: i32) -> Result<(), ErrorCode>;
+
+    /// Executes a command. What the state does not allow has no effect (4.6).
+    fn execute(&mut self, motor: Motor, command: Command);
+
+    /// Programs a speed ramp: at once in RUN, else when RUN is reached (4.8).
+    fn ramp(&mut self, motor: Motor, ramp: Ramp);
+
+    /// The data of rev-up phase 0 to 4 (4.9).
+    fn revup(&mut self, motor: Motor, phase: u8) -> RevupPhase;
+
+    /// Sets the data of rev-up phase 0 to 4 (4.10).
+    fn set_revup(&mut self, motor: Motor, phase: u8, data: RevupPhase);
+
+    /// Sets the current references: at once in RUN, else when RUN is reached (4.11).
+    fn current_reference(&mut self, motor: Motor, reference: CurrentReference);
+
+    /// Programs a torque ramp (profile `mcsdk-5.4`): at once in RUN, else when RUN is reached.
+    fn torque_ramp(&mut self, motor: Motor, ramp: TorqueRamp);
+
+    /// Moves to an angle in a given time; only with
+    /// [`Feature::PositionControl`](super::Feature::PositionControl).
+    fn position(&mut self, motor: Motor, target: PositionMove);
+
+    /// Registers that a step of the motor profiler shows; only with
+    /// [`Feature::Profiler`](super::Feature::Profiler).
+    fn profiler_step(&self, _motor: Motor, _step: u8) -> &[u8] {
+        &[]
+    }
+}

@@ -1,0 +1,533 @@
+//! The master: one exchange at a time, and a line that is trusted only while it answers in step.
+
+use super::{
+    Bad, Command, ErrorCode, Frame, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME,
+    MAX_PAYLOAD, Parse, Profile, Request, RevupPhase, frame,
+};
+use crate::time::{Duration, Instant};
+
+/// How long a master waits for a reply (4.1).
+pub const TIMEOUT: Duration = Duration::from_millis(1_000);
+
+/// How a lost line comes back (SPEC-NOTES S16).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Recovery {
+    /// Not by itself: [`Master::reopened`] says that the caller opened it anew.
+    None,
+    /// Before the next request: wait until the line is silent, ask a question whose reply cannot be
+    /// taken for that of the lost request, and go on when it was answered and the line is silent
+    /// again. Replies that come late, in their order and by up to twice the timeout, are dropped.
+    #[default]
+    Drain,
+    /// As `Drain`, behind bytes that complete a frame which a 5.x drive may still be waiting for.
+    /// Where the lost request was more than a question, the padding may have completed it, so the
+    /// question follows a STOP_MOTOR.
+    Pad,
+}
+
+/// How a [`Master`] behaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Config {
+    /// How long to wait for a reply.
+    pub timeout: Duration,
+    /// How a lost line comes back.
+    pub recovery: Recovery,
+    /// The silence after which nothing more is expected to come.
+    pub quiet: Duration,
+}
+
+impl Default for Config {
+    /// The document's 1 s, `Drain`, 50 ms of silence.
+    fn default() -> Self {
+        Config {
+            timeout: TIMEOUT,
+            recovery: Recovery::default(),
+            quiet: Duration::from_millis(50),
+        }
+    }
+}
+
+/// Why an exchange did not end in a positive acknowledge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Error {
+    /// The drive said no.
+    Refused(ErrorCode),
+    /// There is no answer to trust: it is not known whether the drive did what was asked.
+    Failed(Failure),
+}
+
+/// How an exchange failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Failure {
+    /// Nothing came in time.
+    Timeout,
+    /// The beginning of a reply came, the rest did not come in time.
+    Incomplete {
+        /// Bytes that came.
+        received: u8,
+    },
+    /// A byte that begins no reply.
+    Header(u8),
+    /// A reply that is not a frame.
+    Damaged(Bad),
+    /// The line was lost before; nothing was sent.
+    Lost,
+    /// The line was lost before and did not fall silent; nothing was sent.
+    Noise,
+}
+
+/// Whether the line can be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Line {
+    /// The last exchange ended in step.
+    Up,
+    /// An exchange failed; the next one has to recover the line first.
+    Lost,
+}
+
+/// What the caller has to do next.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Output<'a> {
+    /// Send these bytes, then poll again.
+    Transmit(&'a [u8]),
+    /// The exchange is over: the payload of the positive acknowledge, or why there is none.
+    Done(Result<&'a [u8], Error>),
+    /// Hand in what comes until then; `None` while no exchange is under way.
+    Wait(Option<Instant>),
+}
+
+/// What came without being asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counters {
+    /// Bytes that belonged to no exchange.
+    pub unasked_bytes: u32,
+    /// Frames of identification (0xE0) that were skipped.
+    pub identifications: u32,
+    /// Times the line was lost.
+    pub losses: u32,
+}
+
+/// There is an exchange under way, or the request does not fit a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RequestError {
+    /// Poll until [`Output::Done`] first.
+    Busy,
+    /// The payload is over 128 bytes.
+    TooLong,
+}
+
+/// The master's end of the protocol.
+///
+/// [`request`](Self::request), then [`poll`](Self::poll) until it says [`Output::Done`], handing in
+/// with [`receive`](Self::receive) what comes meanwhile. The timer of an exchange starts with the
+/// poll that follows the transmission (4.1).
+#[derive(Debug, Clone)]
+pub struct Master {
+    config: Config,
+    line: Line,
+    state: State,
+    /// The request until it is sent, then the reply to it.
+    buffer: [u8; MAX_FRAME],
+    filled: u8,
+    request: Asked,
+    /// What was asked when the line was lost.
+    lost: Asked,
+    /// The frame that recovery sends.
+    probe: [u8; 4],
+    /// The question that recovery asked, and the questions that may still be answered late.
+    question: u8,
+    outstanding: u8,
+    scan: Scan,
+    counters: Counters,
+}
+
+/// What recovery has to know of a request.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    motor: u8,
+    read: bool,
+    /// Questions whose reply looks like this request's.
+    alike: u8,
+}
+
+/// The reply has 32 bytes, as that of GET_BOARD_INFO.
+const INFO: u8 = 1;
+/// The reply has 8 bytes, as that of GET_REVUP_DATA.
+const REVUP: u8 = 2;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Idle,
+    /// Recovery: padding is to be sent.
+    Pad,
+    /// Recovery: silence is to begin.
+    Settle(Then),
+    /// Recovery: silent until `until`, or noise at `limit`.
+    Quiet { until: Instant, limit: Instant, silence: Duration, then: Then },
+    /// Recovery: the question has been sent.
+    Probed,
+    /// Recovery: the answer is awaited.
+    Answer { deadline: Instant },
+    Send,
+    Sent,
+    Waiting { deadline: Instant },
+    Done(Result<u8, Error>),
+}
+
+/// What follows a silence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Then {
+    Stop,
+    Probe,
+    Send,
+}
+
+/// Completes any frame. 5.x firmware drops 0xFF 0xFF as header and length, so it is left in step or
+/// with one 0xFF as header: 0x00 0xFF is dropped by the one and a frame of motor 7, which has no
+/// meaning, to the other.
+static PADDING: [u8; MAX_FRAME + 1] = {
+    let mut bytes = [0xFF; MAX_FRAME + 1];
+    bytes[MAX_FRAME - 1] = 0x00;
+    bytes
+};
+
+impl Master {
+    /// A master on a line that is up.
+    pub const fn new(config: Config) -> Self {
+        let nothing = Asked { motor: 0, read: true, alike: 0 };
+        Master {
+            config,
+            line: Line::Up,
+            state: State::Idle,
+            buffer: [0; MAX_FRAME],
+            filled: 0,
+            request: nothing,
+            lost: nothing,
+            probe: [0; 4],
+            question: INFO,
+            outstanding: 0,
+            scan: Scan::NONE,
+            counters: Counters { unasked_bytes: 0, identifications: 0, losses: 0 },
+        }
+    }
+
+    /// Whether the line can be used.
+    pub const fn line(&self) -> Line {
+        self.line
+    }
+
+    /// What came without being asked for.
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// How the master behaves from the next request on.
+    pub const fn config_mut(&mut self) -> &mut Config {
+        &mut self.config
+    }
+
+    /// Begins an exchange: `request` for motor number `motor`, where 0 is the current motor (3.2).
+    pub fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), RequestError> {
+        if self.state != State::Idle {
+            return Err(RequestError::Busy);
+        }
+        let frame = request.encode(motor, &mut self.buffer).ok_or(RequestError::TooLong)?;
+        self.filled = frame.len() as u8;
+        self.begin(motor, Some(request.code()));
+        Ok(())
+    }
+
+    /// Begins an exchange with any header and payload, known to the document or not.
+    pub fn request_raw(&mut self, header: u8, payload: &[u8]) -> Result<(), RequestError> {
+        if self.state != State::Idle {
+            return Err(RequestError::Busy);
+        }
+        let frame = Frame { header, payload };
+        let (motor, code) = (frame.motor(), frame.code());
+        let bytes = frame.encode(&mut self.buffer).ok_or(RequestError::TooLong)?;
+        self.filled = bytes.len() as u8;
+        self.begin(motor, FrameCode::from_number(code, Profile::Spec));
+        Ok(())
+    }
+
+    fn begin(&mut self, motor: u8, code: Option<FrameCode>) {
+        let alike = match code {
+            Some(FrameCode::GetRevupData) => REVUP,
+            Some(FrameCode::GetBoardInfo | FrameCode::GetFwVersion) => INFO,
+            Some(FrameCode::GetDataElement) | None => INFO | REVUP,
+            Some(_) => 0,
+        };
+        self.request = Asked { motor, read: code.is_some_and(FrameCode::is_read), alike };
+        self.state = match (self.line, self.config.recovery) {
+            (Line::Up, _) => State::Send,
+            (Line::Lost, Recovery::None) => State::Done(Err(Error::Failed(Failure::Lost))),
+            (Line::Lost, Recovery::Drain) => State::Settle(Then::Probe),
+            (Line::Lost, Recovery::Pad) => State::Pad,
+        };
+    }
+
+    /// Gives up the exchange under way. Its reply may still come, so the line is lost.
+    pub fn abandon(&mut self) {
+        if self.state != State::Idle {
+            self.lose();
+            self.state = State::Idle;
+        }
+    }
+
+    /// Tells that the line was closed and opened again, with nothing left in it from before.
+    pub fn reopened(&mut self) {
+        self.reopen();
+        self.state = State::Idle;
+    }
+
+    fn reopen(&mut self) {
+        self.line = Line::Up;
+        self.outstanding = 0;
+    }
+
+    /// What to do next. Poll again after each [`Output::Transmit`], and when a wait is over.
+    pub fn poll(&mut self, now: Instant) -> Output<'_> {
+        match self.state {
+            State::Idle => Output::Wait(None),
+            State::Pad => {
+                let then = if self.lost.read { Then::Probe } else { Then::Stop };
+                self.state = State::Settle(then);
+                Output::Transmit(&PADDING)
+            }
+            State::Settle(then) => {
+                self.settle(now, self.config.quiet, then);
+                self.poll(now)
+            }
+            State::Quiet { until, limit, .. } if now < until && now < limit => {
+                Output::Wait(Some(until.min(limit)))
+            }
+            State::Quiet { until, .. } if now < until => self.fail(Failure::Noise),
+            State::Quiet { then: Then::Stop, .. } => {
+                self.state = State::Settle(Then::Probe);
+                let stop = Request::Execute(Command::StopMotor);
+                Output::Transmit(stop.encode(self.lost.motor, &mut self.probe).unwrap_or(&[]))
+            }
+            State::Quiet { then: Then::Probe, .. } => {
+                self.state = State::Probed;
+                Output::Transmit(self.probe())
+            }
+            State::Quiet { then: Then::Send, .. } => {
+                self.reopen();
+                self.send()
+            }
+            State::Probed => {
+                let deadline = now + self.config.timeout;
+                self.state = State::Answer { deadline };
+                Output::Wait(Some(deadline))
+            }
+            State::Send => self.send(),
+            State::Sent => {
+                let deadline = now + self.config.timeout;
+                self.state = State::Waiting { deadline };
+                Output::Wait(Some(deadline))
+            }
+            State::Answer { deadline } | State::Waiting { deadline } if now < deadline => {
+                Output::Wait(Some(deadline))
+            }
+            State::Answer { .. } => {
+                self.outstanding |= self.question;
+                self.fail(Failure::Lost)
+            }
+            State::Waiting { .. } => self.fail(match self.filled {
+                0 => Failure::Timeout,
+                received => Failure::Incomplete { received },
+            }),
+            State::Done(result) => {
+                self.state = State::Idle;
+                let [_, _, payload @ ..] = &self.buffer;
+                Output::Done(result.map(|size| payload.get(..usize::from(size)).unwrap_or(&[])))
+            }
+        }
+    }
+
+    /// Takes what came at `now`.
+    pub fn receive(&mut self, now: Instant, bytes: &[u8]) {
+        if bytes.is_empty() {
+            return;
+        }
+        match self.state {
+            State::Sent | State::Waiting { .. } => self.reply(bytes),
+            State::Answer { .. } => self.answer(now, bytes),
+            State::Quiet { limit, silence, then, .. } => {
+                self.unasked(bytes.len());
+                self.state = State::Quiet { until: now + silence, limit, silence, then };
+            }
+            _ => {
+                self.unasked(bytes.len());
+                self.lose();
+            }
+        }
+    }
+
+    fn send(&mut self) -> Output<'_> {
+        self.state = State::Sent;
+        let size = usize::from(core::mem::take(&mut self.filled));
+        Output::Transmit(self.buffer.get(..size).unwrap_or(&[]))
+    }
+
+    /// The question whose answer shows that the drive is in step again: one that is not
+    /// outstanding, if there is one.
+    fn probe(&mut self) -> &[u8] {
+        self.question = if self.outstanding & INFO == 0 || self.question != INFO { INFO } else { REVUP };
+        let request = if self.question == INFO { Request::BoardInfo } else { Request::RevupData(0) };
+        self.scan = Scan::NONE;
+        request.encode(0, &mut self.probe).unwrap_or(&[])
+    }
+
+    /// Looks for the reply to the question among late ones. Where the same question was asked
+    /// before and not answered, this may be the reply to that one, and the silence is longer.
+    fn answer(&mut self, now: Instant, bytes: &[u8]) {
+        let size = if self.question == INFO { 32 } else { RevupPhase::SIZE as u8 };
+        for &byte in bytes {
+            if self.scan.take(byte) == Some((HEADER_ACK, size)) {
+                let repeated = self.outstanding & self.question != 0;
+                let silence = if repeated { self.config.timeout } else { self.config.quiet };
+                self.settle(now, silence, Then::Send);
+            }
+        }
+    }
+
+    fn settle(&mut self, now: Instant, silence: Duration, then: Then) {
+        let (until, limit) = (now + silence, now + silence + self.config.timeout);
+        self.state = State::Quiet { until, limit, silence, then };
+    }
+
+    fn reply(&mut self, bytes: &[u8]) {
+        let filled = usize::from(self.filled);
+        let room = self.buffer.get_mut(filled..).unwrap_or(&mut []);
+        let taken = room.iter_mut().zip(bytes).map(|(slot, &byte)| *slot = byte).count();
+        self.filled = self.filled.saturating_add(taken as u8);
+        self.unasked(bytes.len() - taken);
+        while let Some(result) = self.understand() {
+            if let Some(result) = result {
+                self.state = State::Done(result);
+                return;
+            }
+        }
+    }
+
+    /// Looks at the reply so far: `None` while it is incomplete, `Some(None)` when a frame was
+    /// skipped.
+    fn understand(&mut self) -> Option<Option<Result<u8, Error>>> {
+        let received = self.buffer.get(..usize::from(self.filled))?;
+        let header = *received.first()?;
+        let failure = match Frame::parse(received) {
+            _ if !matches!(header, HEADER_ACK | HEADER_NACK | HEADER_ATR) => Failure::Header(header),
+            Parse::More => return None,
+            Parse::Bad(bad) => Failure::Damaged(bad),
+            Parse::Frame(frame, size) => {
+                let result = match (header, frame.payload) {
+                    (HEADER_NACK, [code, ..]) => Err(Error::Refused(ErrorCode::from(*code))),
+                    (HEADER_NACK, []) => Err(Error::Refused(ErrorCode::None)),
+                    _ => Ok(frame.payload.len() as u8),
+                };
+                let rest = self.filled.saturating_sub(size as u8);
+                if header == HEADER_ATR {
+                    self.counters.identifications = self.counters.identifications.wrapping_add(1);
+                    self.buffer.rotate_left(size);
+                    self.filled = rest;
+                    return Some(None);
+                }
+                if rest > 0 {
+                    self.unasked(usize::from(rest));
+                    self.lose();
+                }
+                return Some(Some(result));
+            }
+        };
+        self.lose();
+        Some(Some(Err(Error::Failed(failure))))
+    }
+
+    fn fail(&mut self, failure: Failure) -> Output<'_> {
+        self.lose();
+        self.state = State::Idle;
+        Output::Done(Err(Error::Failed(failure)))
+    }
+
+    fn lose(&mut self) {
+        if self.line == Line::Up {
+            self.line = Line::Lost;
+            self.lost = self.request;
+            self.outstanding |= self.request.alike;
+            self.counters.losses = self.counters.losses.wrapping_add(1);
+        }
+    }
+
+    fn unasked(&mut self, bytes: usize) {
+        self.counters.unasked_bytes = self.counters.unasked_bytes.wrapping_add(bytes as u32);
+    }
+}
+
+/// Finds frames in a stream without keeping them.
+#[derive(Debug, Clone, Copy)]
+struct Scan {
+    header: u8,
+    length: u8,
+    /// Bytes of the frame so far.
+    taken: u8,
+    sum: u16,
+}
+
+impl Scan {
+    const NONE: Scan = Scan { header: 0, length: 0, taken: 0, sum: 0 };
+
+    /// Takes a byte; gives header and length when it completes a frame.
+    fn take(&mut self, byte: u8) -> Option<(u8, u8)> {
+        let begins = matches!(byte, HEADER_ACK | HEADER_NACK | HEADER_ATR);
+        match self.taken {
+            0 if !begins => return None,
+            0 => self.header = byte,
+            1 if usize::from(byte) > MAX_PAYLOAD => {
+                *self = Scan::NONE;
+                return None;
+            }
+            1 => self.length = byte,
+            taken if taken == self.length.saturating_add(2) => {
+                let Scan { header, length, sum, .. } = core::mem::replace(self, Scan::NONE);
+                return (byte == frame::fold(sum)).then_some((header, length));
+            }
+            _ => {}
+        }
+        self.taken = self.taken.saturating_add(1);
+        self.sum = self.sum.wrapping_add(u16::from(byte));
+        None
+    }
+}
+
+impl core::fmt::Display for Error {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Error::Refused(code) => write!(f, "refused with {code}: {}", code.doc()),
+            Error::Failed(failure) => failure.fmt(f),
+        }
+    }
+}
+
+impl core::fmt::Display for Failure {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Failure::Timeout => f.write_str("no reply in time"),
+            Failure::Incomplete { received } => {
+                write!(f, "the reply stopped after {received} bytes")
+            }
+            Failure::Header(byte) => write!(f, "{byte:#04x} came where a reply begins"),
+            Failure::Damaged(Bad::Length(length)) => {
+                write!(f, "the reply says that it has {length} bytes, over 128")
+            }
+            Failure::Damaged(Bad::Checksum { expected, received }) => {
+                write!(f, "the reply's checksum is {received:#04x}, its bytes give {expected:#04x}")
+            }
+            Failure::Lost => f.write_str("the line is lost and the drive does not answer"),
+            Failure::Noise => f.write_str("the line does not fall silent"),
+        }
+    }
+}
+
+impl core::error::Error for Error {}

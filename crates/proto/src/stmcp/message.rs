@@ -1,0 +1,389 @@
+//! Messages: what a frame's payload says (chapter 4), both ways.
+
+use super::{Command, ErrorCode, Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Version, frame};
+
+/// Phases of the rev-up (4.10).
+pub const REVUP_PHASES: u8 = 5;
+
+/// SET_RAMP (4.8): go to a speed in a given time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ramp {
+    /// Speed at the end, rpm.
+    pub speed_rpm: i32,
+    /// Length of the ramp, ms; 0 is a step.
+    pub duration_ms: u16,
+}
+
+/// SET_TORQUE_RAMP (profile `mcsdk-5.4`, SPEC-NOTES S7): go to an Iq in a given time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TorqueRamp {
+    /// Iq at the end, s16A digits.
+    pub torque_s16a: i32,
+    /// Length of the ramp, ms; 0 is a step.
+    pub duration_ms: u16,
+}
+
+/// SET_CURRENT_REF (4.11).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CurrentReference {
+    /// Iq, s16A digits.
+    pub iq_s16a: i16,
+    /// Id, s16A digits.
+    pub id_s16a: i16,
+}
+
+/// A rev-up phase (4.9).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RevupPhase {
+    /// Mechanical speed at the end of the phase, rpm.
+    pub speed_rpm: i32,
+    /// Iq at the end of the phase, s16A digits.
+    pub torque_s16a: i16,
+    /// Length of the phase, ms.
+    pub duration_ms: u16,
+}
+
+/// SET_POSITION_CMD (profile `mcsdk-5.4`, SPEC-NOTES S8).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PositionMove {
+    /// Where to, rad.
+    pub angle_rad: f32,
+    /// Length of the move, s.
+    pub duration_s: f32,
+}
+
+/// A command message.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Request<'a> {
+    /// SET_REG (4.4): the value's bytes, little endian.
+    SetRegister {
+        /// Which register.
+        register: RegisterId,
+        /// The bytes; 1, 2 or 4 of them for a register of the table.
+        value: &'a [u8],
+    },
+    /// GET_REG (4.5).
+    GetRegister(RegisterId),
+    /// EXECUTE_CMD (4.6).
+    Execute(Command),
+    /// GET_BOARD_INFO (4.7).
+    BoardInfo,
+    /// SET_RAMP (4.8).
+    Ramp(Ramp),
+    /// GET_REVUP_DATA (4.9): the phase, 0 to 4.
+    RevupData(u8),
+    /// SET_REVUP_DATA (4.10): the phase, 0 to 4, and its data.
+    SetRevupData(u8, RevupPhase),
+    /// SET_CURRENT_REF (4.11).
+    CurrentReference(CurrentReference),
+    /// GET_MP_INFO (profile `mcsdk-5.4`): numbers of profiler steps.
+    ProfilerInfo(&'a [u8]),
+    /// GET_FW_VERSION (4.12).
+    FirmwareVersion,
+    /// GET_DATA_ELEMENT (profile `spec`): the segment.
+    DataElement(u8),
+    /// CONFIG_DYN_STRUCT (profile `spec`).
+    ConfigDynStruct {
+        /// Which segment.
+        segment: u8,
+        /// The ids of its registers, at most 32.
+        registers: &'a [u8],
+    },
+    /// SET_TORQUE_RAMP (profile `mcsdk-5.4`).
+    TorqueRamp(TorqueRamp),
+    /// SET_POSITION_CMD (profile `mcsdk-5.4`).
+    Position(PositionMove),
+}
+
+impl<'a> Request<'a> {
+    /// The frame code that carries the message.
+    pub const fn code(&self) -> FrameCode {
+        match self {
+            Request::SetRegister { .. } => FrameCode::SetReg,
+            Request::GetRegister(_) => FrameCode::GetReg,
+            Request::Execute(_) => FrameCode::ExecuteCmd,
+            Request::BoardInfo => FrameCode::GetBoardInfo,
+            Request::Ramp(_) => FrameCode::SetRamp,
+            Request::RevupData(_) => FrameCode::GetRevupData,
+            Request::SetRevupData(..) => FrameCode::SetRevupData,
+            Request::CurrentReference(_) => FrameCode::SetCurrentRef,
+            Request::ProfilerInfo(_) => FrameCode::GetMpInfo,
+            Request::FirmwareVersion => FrameCode::GetFwVersion,
+            Request::DataElement(_) => FrameCode::GetDataElement,
+            Request::ConfigDynStruct { .. } => FrameCode::ConfigDynStruct,
+            Request::TorqueRamp(_) => FrameCode::SetTorqueRamp,
+            Request::Position(_) => FrameCode::SetPositionCmd,
+        }
+    }
+
+    /// Writes the frame for motor number `motor` (0 to 7) into `out` and gives its bytes; `None`
+    /// when it does not fit a frame or `out`.
+    pub fn encode<'o>(&self, motor: u8, out: &'o mut [u8]) -> Option<&'o [u8]> {
+        let mut payload = Payload::new(out.get_mut(2..)?);
+        match *self {
+            Request::SetRegister { register, value } => payload.byte(register.0).bytes(value),
+            Request::GetRegister(register) => payload.byte(register.0),
+            Request::Execute(command) => payload.byte(command.into()),
+            Request::BoardInfo | Request::FirmwareVersion => &mut payload,
+            Request::Ramp(ramp) => payload
+                .bytes(&ramp.speed_rpm.to_le_bytes())
+                .bytes(&ramp.duration_ms.to_le_bytes()),
+            Request::TorqueRamp(ramp) => payload
+                .bytes(&ramp.torque_s16a.to_le_bytes())
+                .bytes(&ramp.duration_ms.to_le_bytes()),
+            Request::RevupData(phase) => payload.byte(phase),
+            Request::SetRevupData(phase, data) => payload.byte(phase).bytes(&data.to_bytes()),
+            Request::CurrentReference(reference) => payload
+                .bytes(&reference.iq_s16a.to_le_bytes())
+                .bytes(&reference.id_s16a.to_le_bytes()),
+            Request::ProfilerInfo(steps) => payload.bytes(steps),
+            Request::DataElement(segment) => payload.byte(segment),
+            Request::ConfigDynStruct { segment, registers } => {
+                payload.byte(segment).bytes(registers)
+            }
+            Request::Position(target) => payload
+                .bytes(&target.angle_rad.to_le_bytes())
+                .bytes(&target.duration_s.to_le_bytes()),
+        };
+        let size = payload.finish()?;
+        frame::seal(out, Frame::header(self.code().number(), motor), size)
+    }
+
+    /// Understands a command frame as a slave of `profile` does. Bytes behind the message are
+    /// ignored; a message that is too short is refused with the code given (SPEC-NOTES S18).
+    pub fn decode(profile: Profile, frame: &Frame<'a>) -> Result<Self, ErrorCode> {
+        let code = FrameCode::from_number(frame.code(), profile).ok_or(ErrorCode::BadFrameId)?;
+        let payload = frame.payload;
+        let too_short = match code {
+            FrameCode::GetReg => ErrorCode::GetWriteOnly,
+            FrameCode::ExecuteCmd => ErrorCode::WrongCmd,
+            _ => ErrorCode::WrongSet,
+        };
+        Self::fields(code, payload).ok_or(too_short)
+    }
+
+    fn fields(code: FrameCode, payload: &'a [u8]) -> Option<Self> {
+        Some(match (code, payload) {
+            (FrameCode::SetReg, [id, value @ ..]) => {
+                Request::SetRegister { register: RegisterId(*id), value }
+            }
+            (FrameCode::GetReg, [id, ..]) => Request::GetRegister(RegisterId(*id)),
+            (FrameCode::ExecuteCmd, [id, ..]) => Request::Execute(Command::from(*id)),
+            (FrameCode::GetBoardInfo, _) => Request::BoardInfo,
+            (FrameCode::GetFwVersion, _) => Request::FirmwareVersion,
+            (FrameCode::SetRamp, &[a, b, c, d, e, f, ..]) => Request::Ramp(Ramp {
+                speed_rpm: i32::from_le_bytes([a, b, c, d]),
+                duration_ms: u16::from_le_bytes([e, f]),
+            }),
+            (FrameCode::SetTorqueRamp, &[a, b, c, d, e, f, ..]) => {
+                Request::TorqueRamp(TorqueRamp {
+                    torque_s16a: i32::from_le_bytes([a, b, c, d]),
+                    duration_ms: u16::from_le_bytes([e, f]),
+                })
+            }
+            (FrameCode::GetRevupData, [phase, ..]) => Request::RevupData(*phase),
+            (FrameCode::SetRevupData, [phase, data @ ..]) => {
+                Request::SetRevupData(*phase, RevupPhase::decode(data)?)
+            }
+            (FrameCode::SetCurrentRef, &[a, b, c, d, ..]) => {
+                Request::CurrentReference(CurrentReference {
+                    iq_s16a: i16::from_le_bytes([a, b]),
+                    id_s16a: i16::from_le_bytes([c, d]),
+                })
+            }
+            (FrameCode::GetMpInfo, steps) => Request::ProfilerInfo(steps),
+            (FrameCode::GetDataElement, [segment, ..]) => Request::DataElement(*segment),
+            (FrameCode::ConfigDynStruct, [segment, registers @ ..]) => {
+                Request::ConfigDynStruct { segment: *segment, registers }
+            }
+            (FrameCode::SetPositionCmd, &[a, b, c, d, e, f, g, h, ..]) => {
+                Request::Position(PositionMove {
+                    angle_rad: f32::from_le_bytes([a, b, c, d]),
+                    duration_s: f32::from_le_bytes([e, f, g, h]),
+                })
+            }
+            _ => return None,
+        })
+    }
+
+    /// Whether the message only asks; anything else changes something in the drive.
+    pub const fn is_read(&self) -> bool {
+        self.code().is_read()
+    }
+}
+
+impl FrameCode {
+    /// Whether a frame of this code only asks; anything else changes something in the drive.
+    pub const fn is_read(self) -> bool {
+        matches!(
+            self,
+            FrameCode::GetReg
+                | FrameCode::GetBoardInfo
+                | FrameCode::GetRevupData
+                | FrameCode::GetFwVersion
+                | FrameCode::GetDataElement
+                | FrameCode::GetMpInfo
+        )
+    }
+}
+
+impl RevupPhase {
+    /// Bytes of a phase on the wire.
+    pub const SIZE: usize = 8;
+
+    /// The wire form: speed, torque, duration (figure 12).
+    pub const fn to_bytes(self) -> [u8; Self::SIZE] {
+        let [s0, s1, s2, s3] = self.speed_rpm.to_le_bytes();
+        let [t0, t1] = self.torque_s16a.to_le_bytes();
+        let [d0, d1] = self.duration_ms.to_le_bytes();
+        [s0, s1, s2, s3, t0, t1, d0, d1]
+    }
+
+    /// The phase in a payload; `None` when it is too short.
+    pub const fn decode(payload: &[u8]) -> Option<Self> {
+        let &[s0, s1, s2, s3, t0, t1, d0, d1, ..] = payload else { return None };
+        Some(RevupPhase {
+            speed_rpm: i32::from_le_bytes([s0, s1, s2, s3]),
+            torque_s16a: i16::from_le_bytes([t0, t1]),
+            duration_ms: u16::from_le_bytes([d0, d1]),
+        })
+    }
+}
+
+/// Bytes of the replies to GET_BOARD_INFO and GET_FW_VERSION.
+const VERSION_SIZE: usize = 32;
+
+/// Reply to GET_BOARD_INFO (4.7).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BoardInfo<'a> {
+    /// Major, minor, patch. Shipped firmware sends ASCII digits; they are taken as such.
+    pub version: [u8; 3],
+    /// Name of the SDK.
+    pub name: &'a str,
+}
+
+impl<'a> BoardInfo<'a> {
+    /// The reply in a payload; `None` when it has no three version bytes. A name that is not UTF-8
+    /// is cut where it stops being so.
+    pub fn decode(payload: &'a [u8]) -> Option<Self> {
+        let &[a, b, c, ref name @ ..] = payload else { return None };
+        let raw = [a, b, c];
+        let version = if raw.iter().all(u8::is_ascii_digit) { raw.map(|b| b & 0x0F) } else { raw };
+        Some(BoardInfo { version, name: text(name) })
+    }
+
+    /// The reply of a drive of `profile`: version bytes as integers, or as ASCII digits.
+    pub(super) fn encode(profile: Profile, version: &Version<'_>, out: &mut Payload<'_>) {
+        let digit = |n: u8| match profile {
+            Profile::Spec => n,
+            Profile::Mcsdk54 => b'0' | n & 0x0F,
+        };
+        out.byte(digit(version.major)).byte(digit(version.minor)).byte(digit(version.patch));
+        out.text(version.name, VERSION_SIZE);
+    }
+}
+
+/// Reply to GET_FW_VERSION (4.12).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FirmwareVersion<'a> {
+    /// Name of the firmware.
+    pub name: &'a str,
+    /// What stands behind the tab (or the NUL that older firmware sends), such as `Ver.5.4.4`.
+    pub version: &'a str,
+}
+
+impl<'a> FirmwareVersion<'a> {
+    /// The reply in a payload; empty where it is not UTF-8.
+    pub fn decode(payload: &'a [u8]) -> Self {
+        let split = payload.iter().position(|&byte| byte == b'\t' || byte == 0);
+        let (name, rest) = match split {
+            Some(at) => (payload.get(..at), payload.get(at.saturating_add(1)..)),
+            None => (Some(payload), None),
+        };
+        FirmwareVersion { name: text(name.unwrap_or(&[])), version: text(rest.unwrap_or(&[])) }
+    }
+
+    pub(super) fn encode(version: &Version<'_>, out: &mut Payload<'_>) {
+        out.bytes_up_to(version.name.as_bytes(), VERSION_SIZE - 17).bytes(b"\tVer.");
+        out.decimal(version.major).byte(b'.').decimal(version.minor).byte(b'.');
+        out.decimal(version.patch);
+        if !version.pre_release.is_empty() {
+            out.byte(b'-');
+        }
+        out.text(version.pre_release, VERSION_SIZE);
+    }
+}
+
+/// The text before the first NUL, as far as it is UTF-8.
+fn text(bytes: &[u8]) -> &str {
+    let end = bytes.iter().position(|&byte| byte == 0);
+    let bytes = end.and_then(|end| bytes.get(..end)).unwrap_or(bytes);
+    match core::str::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) => bytes
+            .get(..error.valid_up_to())
+            .and_then(|valid| core::str::from_utf8(valid).ok())
+            .unwrap_or(""),
+    }
+}
+
+/// Writes a payload at its place in a frame, behind header and length. What does not fit makes `finish` fail.
+pub(super) struct Payload<'o> {
+    room: &'o mut [u8],
+    len: usize,
+}
+
+impl<'o> Payload<'o> {
+    pub(super) fn new(room: &'o mut [u8]) -> Self {
+        Payload { room, len: 0 }
+    }
+
+    pub(super) fn byte(&mut self, byte: u8) -> &mut Self {
+        if let Some(slot) = self.room.get_mut(self.len) {
+            *slot = byte;
+        }
+        self.len = self.len.saturating_add(1);
+        self
+    }
+
+    pub(super) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
+        for &byte in bytes {
+            self.byte(byte);
+        }
+        self
+    }
+
+    /// The low `size` bytes of a register's value.
+    pub(super) fn value(&mut self, bits: i32, size: u8) -> &mut Self {
+        let bytes = bits.to_le_bytes();
+        self.bytes(bytes.get(..usize::from(size)).unwrap_or(&bytes))
+    }
+
+    fn bytes_up_to(&mut self, bytes: &[u8], most: usize) -> &mut Self {
+        self.bytes(bytes.get(..most).unwrap_or(bytes))
+    }
+
+    fn decimal(&mut self, number: u8) -> &mut Self {
+        if number >= 100 {
+            self.byte(b'0' + number / 100);
+        }
+        if number >= 10 {
+            self.byte(b'0' + number / 10 % 10);
+        }
+        self.byte(b'0' + number % 10)
+    }
+
+    /// Text, cut and padded with NUL so that the payload ends, NUL-terminated, at `end`.
+    fn text(&mut self, text: &str, end: usize) {
+        let most = end.saturating_sub(1).saturating_sub(self.len);
+        self.bytes_up_to(text.as_bytes(), most);
+        while self.len < end {
+            self.byte(0);
+        }
+    }
+
+    /// The payload's size; `None` when it did not fit.
+    pub(super) fn finish(self) -> Option<usize> {
+        (self.len <= self.room.len() && self.len <= MAX_PAYLOAD).then_some(self.len)
+    }
+}

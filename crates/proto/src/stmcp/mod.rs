@@ -1,0 +1,31 @@
+//! ST's serial Motor Control Protocol, both ends.
+//!
+//! Paragraph numbers are those of the document "Motor Control Protocol"; where it is silent or
+//! contradicts itself, `docs/SPEC-NOTES.md` has the reading (`S1`, `S2`, …).
+//!
+//! * [`Frame`] turns bytes into header, payload and checksum and back (chapter 3).
+//! * [`Request`] and the reply types of [`message`] are the messages (chapter 4).
+//! * [`register`] is table 3 as typed constants, [`RegisterId`] the same by number.
+//! * [`Master`] conducts one exchange at a time; [`Slave`] answers for a [`Drive`].
+
+mod code;
+mod drive;
+mod frame;
+mod master;
+pub mod message;
+pub mod register;
+mod slave;
+
+pub use code::{
+    Command, ControlMode, ErrorCode, Flags, FrameCode, Profile, Status, HEADER_ACK, HEADER_ATR,
+    HEADER_NACK,
+};
+pub use drive::{Drive, Motor, Version};
+pub use frame::{Bad, Frame, Parse, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, checksum};
+pub use master::{Config, Counters, Error, Failure, Line, Master, Output, Recovery, RequestError, TIMEOUT};
+pub use message::{
+    BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, Request,
+    RevupPhase, TorqueRamp,
+};
+pub use register::{Feature, Features, RegisterId};
+pub use slave::{RECEPTION_TIMEOUT, SEGMENTS, SEGMENT_REGISTERS, Slave};

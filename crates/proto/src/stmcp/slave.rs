@@ -1,0 +1,372 @@
+//! The slave: bytes in, replies out (4.1).
+
+use super::message::Payload;
+use super::register::{Shape, Type, Unit, Writing};
+use super::{
+    BoardInfo, Command, Drive, ErrorCode, Feature, Features, FirmwareVersion, Frame, HEADER_ACK,
+    HEADER_NACK, MAX_FRAME, MAX_PAYLOAD, Motor, Parse, Profile, REVUP_PHASES, RegisterId, Request,
+    frame,
+};
+use crate::time::{Duration, Instant};
+
+/// The time in which a whole command must have come (4.1).
+pub const RECEPTION_TIMEOUT: Duration = Duration::from_millis(25);
+/// Data segments that a slave keeps (profile `spec`, SPEC-NOTES S7).
+pub const SEGMENTS: usize = 4;
+/// The most registers in a data segment: their values always fit a reply.
+pub const SEGMENT_REGISTERS: usize = 32;
+
+/// The slave's end of the protocol: collects a command, checks checksum, motor and frame code in
+/// this order (4.1), lets the [`Drive`] work, answers.
+///
+/// The caller hands in every byte with the time at which it came, calls [`poll`](Self::poll) at
+/// [`deadline`](Self::deadline), and sends each returned reply before it hands in the next byte:
+/// real slaves do not listen while they answer.
+#[derive(Debug, Clone)]
+pub struct Slave {
+    profile: Profile,
+    motors: u8,
+    current: Motor,
+    /// The command so far, then the reply to it.
+    buffer: [u8; MAX_FRAME],
+    received: u8,
+    /// A length over 128 came: nothing is understood until the line was silent.
+    deaf: bool,
+    deadline: Option<Instant>,
+    segments: [Segment; SEGMENTS],
+}
+
+impl Slave {
+    /// A slave for a drive with motors 1 to `motors`. Motor 1 is the current one (3.2).
+    pub const fn new(profile: Profile, motors: Motor) -> Self {
+        Slave {
+            profile,
+            motors: motors.number(),
+            current: Motor::FIRST,
+            buffer: [0; MAX_FRAME],
+            received: 0,
+            deaf: false,
+            deadline: None,
+            segments: [Segment::EMPTY; SEGMENTS],
+        }
+    }
+
+    /// The profile that the slave follows.
+    pub const fn profile(&self) -> Profile {
+        self.profile
+    }
+
+    /// The motor that motor number 0 addresses (3.2).
+    pub const fn current_motor(&self) -> Motor {
+        self.current
+    }
+
+    /// When [`poll`](Self::poll) has to be called; `None` while no frame is under way, and always
+    /// in profile `mcsdk-5.4`, whose firmware never times out (SPEC-NOTES S11).
+    pub const fn deadline(&self) -> Option<Instant> {
+        self.deadline
+    }
+
+    /// Gives the NACK TIMEOUT for a command that did not come whole in time (4.1).
+    pub fn poll(&mut self, now: Instant) -> Option<&[u8]> {
+        if self.deadline.is_none_or(|deadline| now < deadline) {
+            return None;
+        }
+        self.restart();
+        Some(&TIMEOUT_REPLY)
+    }
+
+    /// Takes a byte that came at `now`; gives the reply when it completes a command. A byte that
+    /// comes after the deadline begins a new command, behind the NACK that the old one is owed.
+    pub fn receive(&mut self, now: Instant, byte: u8, drive: &mut impl Drive) -> Option<&[u8]> {
+        let expired = self.poll(now).is_some();
+        let size = self.take(now, byte);
+        if expired {
+            return Some(&TIMEOUT_REPLY);
+        }
+        let command = self.buffer;
+        let answer = match Frame::parse(command.get(..size?)?) {
+            Parse::Frame(frame, _) => self.process(&frame, drive),
+            _ => Err(ErrorCode::BadCrc),
+        };
+        self.restart();
+        Some(self.reply(answer))
+    }
+
+    /// Tells that the receiver lost bytes: drops the command under way and gives the NACK OVERRUN
+    /// (table 2).
+    pub fn overrun(&mut self) -> &[u8] {
+        self.restart();
+        self.reply(Err(ErrorCode::Overrun))
+    }
+
+    /// Stores a byte; the command's size when it is complete.
+    fn take(&mut self, now: Instant, byte: u8) -> Option<usize> {
+        let timed = self.profile == Profile::Spec;
+        if timed && (self.received == 0 || self.deaf) {
+            self.deadline = Some(now + RECEPTION_TIMEOUT);
+        }
+        if self.deaf {
+            return None;
+        }
+        *self.buffer.get_mut(usize::from(self.received))? = byte;
+        self.received = self.received.saturating_add(1);
+        let [_, length, ..] = self.buffer;
+        // Shipped firmware takes 127 bytes and looks for the next header at once.
+        let most = MAX_PAYLOAD - usize::from(!timed);
+        if self.received == 2 && usize::from(length) > most {
+            if timed {
+                self.deaf = true;
+                self.deadline = Some(now + RECEPTION_TIMEOUT);
+            } else {
+                self.received = 0;
+            }
+            return None;
+        }
+        let size = usize::from(length) + super::OVERHEAD;
+        (self.received >= 2 && usize::from(self.received) == size).then_some(size)
+    }
+
+    fn restart(&mut self) {
+        self.received = 0;
+        self.deaf = false;
+        self.deadline = None;
+    }
+
+    /// Motor, frame code, work: in this order (4.1). Gives the size of the ACK's payload, which
+    /// then stands in the buffer.
+    fn process(&mut self, frame: &Frame<'_>, drive: &mut impl Drive) -> Result<usize, ErrorCode> {
+        if frame.motor() != 0 {
+            self.select(frame.motor()).ok_or(ErrorCode::BadMotorSelected)?;
+        }
+        let motor = self.current;
+        let request = Request::decode(self.profile, frame)?;
+        let features = drive.features(motor);
+        let [_, _, room @ ..] = &mut self.buffer;
+        let mut out = Payload::new(room);
+        match request {
+            Request::SetRegister { register, value } => {
+                self.write(motor, register, value, drive)?;
+                return Ok(0);
+            }
+            Request::GetRegister(register) => {
+                let shape = register.shape().ok_or(ErrorCode::GetWriteOnly)?;
+                let size = shape.read_size(self.profile, features);
+                let size = size.ok_or(ErrorCode::GetWriteOnly)?;
+                out.value(read(self.profile, motor, register, shape, drive), size);
+            }
+            Request::Execute(command) => execute(self.profile, motor, command, features, drive)?,
+            Request::BoardInfo => BoardInfo::encode(self.profile, &drive.version(), &mut out),
+            Request::FirmwareVersion => FirmwareVersion::encode(&drive.version(), &mut out),
+            Request::Ramp(mut ramp) => {
+                ramp.speed_rpm = speed(self.profile, ramp.speed_rpm);
+                drive.ramp(motor, ramp);
+            }
+            Request::RevupData(phase) => {
+                let phase = revup_phase(phase)?;
+                let mut data = drive.revup(motor, phase);
+                data.speed_rpm = speed(self.profile, data.speed_rpm);
+                out.bytes(&data.to_bytes());
+            }
+            Request::SetRevupData(phase, mut data) => {
+                data.speed_rpm = speed(self.profile, data.speed_rpm);
+                drive.set_revup(motor, revup_phase(phase)?, data);
+            }
+            Request::CurrentReference(reference) => drive.current_reference(motor, reference),
+            Request::ProfilerInfo(steps) => {
+                if !features.has(Feature::Profiler) {
+                    return Err(ErrorCode::MpNotEnabled);
+                }
+                for &step in steps {
+                    let registers = drive.profiler_step(motor, step);
+                    out.byte(registers.len() as u8).bytes(registers);
+                }
+            }
+            Request::DataElement(segment) => {
+                let segment = self.segments.get(usize::from(segment)).ok_or(ErrorCode::WrongSet)?;
+                for register in segment.registers() {
+                    let shape = register.shape().ok_or(ErrorCode::GetWriteOnly)?;
+                    let size = shape.segment_size(features).ok_or(ErrorCode::GetWriteOnly)?;
+                    out.value(read(self.profile, motor, register, shape, drive), size);
+                }
+            }
+            Request::ConfigDynStruct { segment, registers } => {
+                let slot = self.segments.get_mut(usize::from(segment));
+                let fits = |&id: &u8| {
+                    RegisterId(id).shape().is_some_and(|shape| shape.segment_size(features).is_some())
+                };
+                let chosen = Segment::of(registers).filter(|_| registers.iter().all(fits));
+                *slot.ok_or(ErrorCode::WrongSet)? = chosen.ok_or(ErrorCode::WrongSet)?;
+            }
+            Request::TorqueRamp(ramp) => drive.torque_ramp(motor, ramp),
+            Request::Position(target) => {
+                if !features.has(Feature::PositionControl) {
+                    return Err(ErrorCode::BadFrameId);
+                }
+                drive.position(motor, target);
+            }
+        }
+        out.finish().ok_or(ErrorCode::WrongSet)
+    }
+
+    /// Makes a motor the current one, if it exists (3.2).
+    fn select(&mut self, number: u8) -> Option<()> {
+        let motor = Motor::new(number).filter(|motor| motor.number() <= self.motors)?;
+        self.current = motor;
+        Some(())
+    }
+
+    /// SET_REG (4.4): a longer value is cut to the register's size; bytes that a shorter one does
+    /// not carry keep what the register had in profile `spec` and refuse it in `mcsdk-5.4`.
+    fn write(
+        &mut self,
+        motor: Motor,
+        register: RegisterId,
+        value: &[u8],
+        drive: &mut impl Drive,
+    ) -> Result<(), ErrorCode> {
+        let shape = register.shape().ok_or(ErrorCode::SetReadOnly)?;
+        let features = drive.features(motor);
+        let size = match shape.writing(self.profile, features) {
+            Writing::Takes(size) => usize::from(size),
+            Writing::ReadOnly => return Err(ErrorCode::SetReadOnly),
+            Writing::Refused => return Err(ErrorCode::WrongSet),
+        };
+        let mut bytes = [0; 4];
+        if value.len() < size {
+            if self.profile == Profile::Mcsdk54 {
+                return Err(ErrorCode::WrongSet);
+            }
+            bytes = read(self.profile, motor, register, shape, drive).to_le_bytes();
+        }
+        for (slot, byte) in bytes.iter_mut().zip(value.iter().take(size)) {
+            *slot = *byte;
+        }
+        let bits = shape.ty.fit(i32::from_le_bytes(bytes));
+        match register {
+            RegisterId::TARGET_MOTOR => {
+                let number = (bits as u8).saturating_add(1);
+                self.select(number).ok_or(ErrorCode::WrongSet)
+            }
+            RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
+                let shown = RegisterId(bits as u8);
+                if shown.shape().is_some_and(|shape| shape.shows_on_dac(features)) {
+                    return drive.write(motor, register, bits);
+                }
+                // Firmware acknowledges what it cannot show; the document's slave says so.
+                match self.profile {
+                    Profile::Spec => Err(ErrorCode::WrongSet),
+                    Profile::Mcsdk54 => Ok(()),
+                }
+            }
+            _ => drive.write(motor, register, to_drive(self.profile, shape, bits)),
+        }
+    }
+
+    fn reply(&mut self, answer: Result<usize, ErrorCode>) -> &[u8] {
+        let (header, size) = match answer {
+            Ok(size) => (HEADER_ACK, size),
+            Err(code) => {
+                let [_, _, slot, ..] = &mut self.buffer;
+                *slot = code.into();
+                (HEADER_NACK, 1)
+            }
+        };
+        frame::seal(&mut self.buffer, header, size).unwrap_or(&[])
+    }
+}
+
+/// EXECUTE_CMD (4.6).
+fn execute(
+    profile: Profile,
+    motor: Motor,
+    command: Command,
+    features: Features,
+    drive: &mut impl Drive,
+) -> Result<(), ErrorCode> {
+    let firmware = profile == Profile::Mcsdk54;
+    let (possible, command) = match command {
+        Command::PfcEnable | Command::PfcDisable | Command::PfcFaultAck => {
+            (features.has(Feature::Pfc), command)
+        }
+        Command::ScStart => (firmware && features.has(Feature::Profiler), command),
+        Command::ScStop => (firmware, Command::StopMotor),
+        Command::Reset | Command::Ping if firmware => return Ok(()),
+        Command::Reset | Command::Ping | Command::Unknown(_) => (false, command),
+        _ => (true, command),
+    };
+    if !possible {
+        return Err(ErrorCode::WrongCmd);
+    }
+    drive.execute(motor, command);
+    Ok(())
+}
+
+/// A register's value as it goes on the wire.
+fn read(
+    profile: Profile,
+    motor: Motor,
+    register: RegisterId,
+    shape: &Shape,
+    drive: &mut impl Drive,
+) -> i32 {
+    if register == RegisterId::TARGET_MOTOR {
+        return i32::from(motor.number() - 1);
+    }
+    let bits = drive.read(motor, register);
+    match shape.unit {
+        Unit::Rpm if shape.ty != Type::F32 => speed(profile, bits),
+        Unit::Percent if profile == Profile::Spec => bits / 10,
+        _ => bits,
+    }
+}
+
+/// A value from the wire as the drive takes it.
+fn to_drive(profile: Profile, shape: &Shape, bits: i32) -> i32 {
+    match shape.unit {
+        Unit::Rpm if shape.ty != Type::F32 => speed(profile, bits),
+        Unit::Percent if profile == Profile::Spec => bits.saturating_mul(10),
+        _ => bits,
+    }
+}
+
+/// Shipped firmware keeps speeds in tenths of a hertz, 6 rpm each (SPEC-NOTES S12).
+fn speed(profile: Profile, rpm: i32) -> i32 {
+    match profile {
+        Profile::Spec => rpm,
+        Profile::Mcsdk54 => rpm / 6 * 6,
+    }
+}
+
+fn revup_phase(phase: u8) -> Result<u8, ErrorCode> {
+    if phase < REVUP_PHASES { Ok(phase) } else { Err(ErrorCode::WrongSet) }
+}
+
+/// A NACK frame. Header and length carry once into the high byte, so the checksum is the code
+/// plus one.
+const fn nack(code: u8) -> [u8; 4] {
+    [HEADER_NACK, 1, code, code.wrapping_add(1)]
+}
+
+static TIMEOUT_REPLY: [u8; 4] = nack(0x09);
+
+#[derive(Debug, Clone, Copy)]
+struct Segment {
+    len: u8,
+    registers: [u8; SEGMENT_REGISTERS],
+}
+
+impl Segment {
+    const EMPTY: Segment = Segment { len: 0, registers: [0; SEGMENT_REGISTERS] };
+
+    fn of(registers: &[u8]) -> Option<Self> {
+        let mut segment = Segment::EMPTY;
+        segment.registers.get_mut(..registers.len())?.copy_from_slice(registers);
+        segment.len = u8::try_from(registers.len()).ok()?;
+        Some(segment)
+    }
+
+    fn registers(&self) -> impl Iterator<Item = RegisterId> {
+        self.registers.iter().take(usize::from(self.len)).copied().map(RegisterId)
+    }
+}

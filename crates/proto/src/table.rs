@@ -1,0 +1,68 @@
+//! The macro behind every list of named numbers: each number is written once, and none is lost.
+
+/// Declares a set of named numbers: the enum, both conversions, the document's names and the list.
+/// A number without a name survives as `Unknown`.
+macro_rules! named_numbers {
+    (
+        $(#[$meta:meta])*
+        pub enum $name:ident: $repr:ty {
+            $( $value:literal $variant:ident $text:literal $doc:literal; )+
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum $name {
+            $( #[doc = concat!("`", $text, "` (", stringify!($value), "): ", $doc)] $variant, )+
+            /// A number that the document does not name.
+            Unknown($repr),
+        }
+
+        impl $name {
+            /// Every named value, in the order of the table.
+            pub const ALL: &'static [$name] = &[$( $name::$variant, )+];
+
+            /// The document's name; `None` for a number that it does not name.
+            pub const fn name(self) -> Option<&'static str> {
+                match self {
+                    $( $name::$variant => Some($text), )+
+                    $name::Unknown(_) => None,
+                }
+            }
+
+            /// What the value means, in a sentence; empty for an unnamed number.
+            pub const fn doc(self) -> &'static str {
+                match self {
+                    $( $name::$variant => $doc, )+
+                    $name::Unknown(_) => "",
+                }
+            }
+        }
+
+        impl From<$repr> for $name {
+            fn from(number: $repr) -> Self {
+                match number {
+                    $( $value => $name::$variant, )+
+                    other => $name::Unknown(other),
+                }
+            }
+        }
+
+        impl From<$name> for $repr {
+            fn from(value: $name) -> Self {
+                match value {
+                    $( $name::$variant => $value, )+
+                    $name::Unknown(other) => other,
+                }
+            }
+        }
+
+        impl core::fmt::Display for $name {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                match self.name() {
+                    Some(name) => f.write_str(name),
+                    None => write!(f, "{:#04x}", <$repr>::from(*self)),
+                }
+            }
+        }
+    };
+}

@@ -1,0 +1,130 @@
+//! A drive that keeps what it is told, and a slave that is fed whole frames.
+#![allow(dead_code)]
+
+use std::collections::HashMap;
+
+use motorlink_proto::stmcp::*;
+use motorlink_proto::time::Instant;
+
+/// Registers are plain memory; everything else is written down.
+#[derive(Default)]
+pub struct Memory {
+    pub features: Option<Features>,
+    pub registers: HashMap<(u8, u8), i32>,
+    pub revup: [RevupPhase; REVUP_PHASES as usize],
+    pub log: Vec<String>,
+}
+
+pub fn all_features() -> Features {
+    Feature::ALL.iter().fold(Features::NONE, |set, &feature| set.with(feature))
+}
+
+impl Memory {
+    pub fn with(features: Features) -> Self {
+        Memory { features: Some(features), ..Memory::default() }
+    }
+
+    /// Without the motor profiler and HFI, with everything else.
+    pub fn usual() -> Self {
+        let without = [Feature::Profiler, Feature::Hfi];
+        let wanted = Feature::ALL.iter().filter(|feature| !without.contains(feature));
+        Memory::with(wanted.fold(Features::NONE, |set, &feature| set.with(feature)))
+    }
+
+    pub fn set(&mut self, motor: u8, register: RegisterId, value: i32) {
+        self.registers.insert((motor, register.0), value);
+    }
+
+    pub fn value(&self, motor: u8, register: RegisterId) -> i32 {
+        self.registers.get(&(motor, register.0)).copied().unwrap_or(0)
+    }
+}
+
+impl Drive for Memory {
+    fn features(&self, _: Motor) -> Features {
+        self.features.unwrap_or_else(all_features)
+    }
+    fn version(&self) -> Version<'_> {
+        Version { name: "ST MC SDK", major: 5, minor: 4, patch: 3, pre_release: "" }
+    }
+    fn read(&mut self, motor: Motor, register: RegisterId) -> i32 {
+        self.value(motor.number(), register)
+    }
+    fn write(&mut self, motor: Motor, register: RegisterId, value: i32) -> Result<(), ErrorCode> {
+        self.set(motor.number(), register, value);
+        Ok(())
+    }
+    fn execute(&mut self, motor: Motor, command: Command) {
+        self.log.push(format!("{command} {}", motor.number()));
+    }
+    fn ramp(&mut self, motor: Motor, ramp: Ramp) {
+        self.log.push(format!("ramp {} {} {}", motor.number(), ramp.speed_rpm, ramp.duration_ms));
+    }
+    fn revup(&mut self, _: Motor, phase: u8) -> RevupPhase {
+        self.revup[usize::from(phase)]
+    }
+    fn set_revup(&mut self, _: Motor, phase: u8, data: RevupPhase) {
+        self.revup[usize::from(phase)] = data;
+    }
+    fn current_reference(&mut self, motor: Motor, r: CurrentReference) {
+        self.log.push(format!("current {} {} {}", motor.number(), r.iq_s16a, r.id_s16a));
+    }
+    fn torque_ramp(&mut self, motor: Motor, ramp: TorqueRamp) {
+        let TorqueRamp { torque_s16a, duration_ms } = ramp;
+        self.log.push(format!("torque ramp {} {torque_s16a} {duration_ms}", motor.number()));
+    }
+    fn position(&mut self, motor: Motor, target: PositionMove) {
+        let PositionMove { angle_rad, duration_s } = target;
+        self.log.push(format!("position {} {angle_rad} {duration_s}", motor.number()));
+    }
+    fn profiler_step(&self, _: Motor, step: u8) -> &[u8] {
+        if step == 1 { &[0x66, 0x67] } else { &[] }
+    }
+}
+
+/// A slave and its drive on a line where bytes take no time.
+pub struct Bench {
+    pub slave: Slave,
+    pub drive: Memory,
+    pub now: Instant,
+}
+
+impl Bench {
+    pub fn new(profile: Profile, motors: u8, drive: Memory) -> Self {
+        let slave = Slave::new(profile, Motor::new(motors).unwrap());
+        Bench { slave, drive, now: Instant(0) }
+    }
+
+    /// What the slave answers to bytes that come at once.
+    pub fn bytes(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let mut replies = Vec::new();
+        for &byte in bytes {
+            replies.extend(self.slave.receive(self.now, byte, &mut self.drive).unwrap_or(&[]));
+        }
+        replies
+    }
+
+    /// The answer to a raw frame: an ACK's payload or a NACK's code.
+    pub fn raw(&mut self, header: u8, payload: &[u8]) -> Result<Vec<u8>, ErrorCode> {
+        let mut out = [0; MAX_FRAME];
+        let frame = Frame { header, payload }.encode(&mut out).unwrap().to_vec();
+        answer(&self.bytes(&frame))
+    }
+
+    pub fn ask(&mut self, motor: u8, request: Request<'_>) -> Result<Vec<u8>, ErrorCode> {
+        let mut out = [0; MAX_FRAME];
+        let frame = request.encode(motor, &mut out).unwrap().to_vec();
+        answer(&self.bytes(&frame))
+    }
+}
+
+/// Takes a reply apart; panics when it is not exactly one.
+pub fn answer(bytes: &[u8]) -> Result<Vec<u8>, ErrorCode> {
+    let Parse::Frame(frame, size) = Frame::parse(bytes) else { panic!("no reply: {bytes:02x?}") };
+    assert_eq!(size, bytes.len(), "more than a reply: {bytes:02x?}");
+    match (frame.header, frame.payload) {
+        (HEADER_ACK, payload) => Ok(payload.to_vec()),
+        (HEADER_NACK, &[code]) => Err(ErrorCode::from(code)),
+        _ => panic!("no reply: {bytes:02x?}"),
+    }
+}

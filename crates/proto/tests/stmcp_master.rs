@@ -1,0 +1,321 @@
+//! The master alone and joined with a slave, on a virtual clock.
+
+mod common;
+
+use std::collections::VecDeque;
+
+use common::Memory;
+use motorlink_proto::stmcp::*;
+use motorlink_proto::time::{Duration, Instant};
+use proptest::prelude::*;
+
+const MS: u64 = 1_000;
+const STATUS: Request<'static> = Request::GetRegister(RegisterId::STATUS);
+
+fn master(recovery: Recovery) -> Master {
+    Master::new(Config { recovery, ..Config::default() })
+}
+
+/// Master and slave on a line whose replies come late by `delay`, in order.
+struct Pair {
+    master: Master,
+    slave: Slave,
+    drive: Memory,
+    now: Instant,
+    /// Replies under way: when they arrive and what they are.
+    line: VecDeque<(Instant, Vec<u8>)>,
+    delay: Duration,
+    /// How many bytes of the next transmission reach the slave.
+    cut: Option<usize>,
+    sent: Vec<Vec<u8>>,
+}
+
+impl Pair {
+    fn new(profile: Profile, recovery: Recovery) -> Self {
+        Pair {
+            master: master(recovery),
+            slave: Slave::new(profile, Motor::new(2).unwrap()),
+            drive: Memory::usual(),
+            now: Instant(0),
+            line: VecDeque::new(),
+            delay: Duration(0),
+            cut: None,
+            sent: Vec::new(),
+        }
+    }
+
+    fn exchange(&mut self, motor: u8, request: Request<'_>) -> Result<Vec<u8>, Error> {
+        self.master.request(motor, &request).unwrap();
+        loop {
+            let wait = match self.master.poll(self.now) {
+                Output::Transmit(bytes) => {
+                    let bytes = bytes.to_vec();
+                    self.deliver(&bytes);
+                    continue;
+                }
+                Output::Done(result) => return result.map(<[u8]>::to_vec),
+                Output::Wait(until) => until.expect("an exchange is under way"),
+            };
+            let events = [self.line.front().map(|(at, _)| *at), self.slave.deadline()];
+            let next = events.into_iter().flatten().min().filter(|at| *at <= wait).unwrap_or(wait);
+            self.now = self.now.max(next);
+            if let Some(reply) = self.slave.poll(self.now) {
+                self.line.push_back((self.now + self.delay, reply.to_vec()));
+            }
+            while self.line.front().is_some_and(|(at, _)| *at <= self.now) {
+                let (_, bytes) = self.line.pop_front().unwrap();
+                self.master.receive(self.now, &bytes);
+            }
+        }
+    }
+
+    fn deliver(&mut self, bytes: &[u8]) {
+        self.sent.push(bytes.to_vec());
+        let reach = self.cut.take().unwrap_or(bytes.len());
+        for &byte in bytes.iter().take(reach) {
+            if let Some(reply) = self.slave.receive(self.now, byte, &mut self.drive) {
+                let last = self.line.back().map_or(self.now, |(at, _)| *at);
+                self.line.push_back(((self.now + self.delay).max(last), reply.to_vec()));
+            }
+        }
+    }
+}
+
+#[test]
+fn an_exchange_is_sent_once_and_ends_with_the_payload() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::None);
+    pair.drive.set(2, RegisterId::STATUS, 6);
+    assert_eq!(pair.exchange(2, STATUS), Ok(vec![6]));
+    assert_eq!(pair.sent, [[0x42, 0x01, 0x02, 0x45]]);
+    assert_eq!(pair.master.line(), Line::Up);
+}
+
+#[test]
+fn a_refusal_keeps_its_code_and_the_line() {
+    let mut master = master(Recovery::None);
+    for code in 0..=255 {
+        master.request(0, &STATUS).unwrap();
+        assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+        let mut out = [0; 8];
+        let nack = Frame { header: HEADER_NACK, payload: &[code] }.encode(&mut out).unwrap();
+        master.receive(Instant(1), nack);
+        let refused = Error::Refused(ErrorCode::from(code));
+        assert_eq!(master.poll(Instant(1)), Output::Done(Err(refused)));
+        assert_eq!(u8::from(ErrorCode::from(code)), code);
+        assert_eq!(master.line(), Line::Up);
+    }
+}
+
+#[test]
+fn only_one_exchange_is_under_way() {
+    let mut master = master(Recovery::None);
+    master.request(0, &STATUS).unwrap();
+    assert_eq!(master.request(0, &STATUS), Err(RequestError::Busy));
+    assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+    assert_eq!(master.request(0, &STATUS), Err(RequestError::Busy));
+}
+
+#[test]
+fn the_timer_starts_when_the_request_is_out_and_lasts_a_second() {
+    let mut master = master(Recovery::None);
+    master.request(0, &STATUS).unwrap();
+    assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+    let sent = Instant(136 * MS);
+    assert_eq!(master.poll(sent), Output::Wait(Some(Instant(1136 * MS))));
+    assert_eq!(master.poll(Instant(1136 * MS - 1)), Output::Wait(Some(Instant(1136 * MS))));
+    let failed = Error::Failed(Failure::Timeout);
+    assert_eq!(master.poll(Instant(1136 * MS)), Output::Done(Err(failed)));
+    assert_eq!(master.line(), Line::Lost);
+}
+
+#[test]
+fn without_recovery_a_lost_line_sends_nothing_until_it_is_reopened() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::None);
+    pair.cut = Some(0);
+    assert_eq!(pair.exchange(0, STATUS), Err(Error::Failed(Failure::Timeout)));
+    let sent = pair.sent.len();
+    assert_eq!(pair.exchange(0, STATUS), Err(Error::Failed(Failure::Lost)));
+    assert_eq!(pair.sent.len(), sent, "nothing goes into a lost line");
+    pair.master.reopened();
+    assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+}
+
+#[test]
+fn a_lost_line_comes_back_behind_silence_and_a_question() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+    pair.cut = Some(0);
+    pair.exchange(0, STATUS).unwrap_err();
+    let lost = pair.now;
+    assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+    assert_eq!(pair.sent[1..], [vec![0x06, 0x00, 0x06], vec![0x02, 0x01, 0x02, 0x05]]);
+    assert_eq!(pair.now.since(lost), Duration(100 * MS), "two silences of 50 ms");
+    assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+    assert_eq!(pair.sent.len(), 4, "recovered once");
+}
+
+#[test]
+fn nothing_but_questions_go_into_a_line_that_does_not_answer() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+    pair.delay = Duration::from_millis(60_000);
+    let start = Request::Execute(Command::StartMotor);
+    assert_eq!(pair.exchange(1, STATUS), Err(Error::Failed(Failure::Timeout)));
+    for _ in 0..3 {
+        assert_eq!(pair.exchange(1, start), Err(Error::Failed(Failure::Lost)));
+    }
+    assert!(pair.drive.log.is_empty(), "START_MOTOR must not wait in the line");
+}
+
+#[test]
+fn a_line_that_never_falls_silent_is_given_up() {
+    let mut master = master(Recovery::Drain);
+    master.request(0, &STATUS).unwrap();
+    assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+    master.receive(Instant(0), &[0x55]);
+    assert_eq!(master.poll(Instant(0)), Output::Done(Err(Error::Failed(Failure::Header(0x55)))));
+    master.request(0, &STATUS).unwrap();
+    let mut now = Instant(0);
+    let result = loop {
+        match master.poll(now) {
+            Output::Wait(_) => {}
+            Output::Transmit(bytes) => panic!("sent {bytes:02x?} into the noise"),
+            Output::Done(result) => break result,
+        }
+        now += Duration::from_millis(10);
+        master.receive(now, &[0x55]);
+    };
+    assert_eq!(result, Err(Error::Failed(Failure::Noise)));
+    assert!(now <= Instant(1_100 * MS));
+}
+
+#[test]
+fn padding_brings_back_shipped_firmware_from_every_cut() {
+    let write = Request::SetRegister { register: RegisterId::SPEED_KP, value: &[0x10, 0x00] };
+    let start = Request::Execute(Command::StartMotor);
+    for (request, size) in [(STATUS, 4), (write, 6), (start, 4)] {
+        for cut in 0..size {
+            let mut pair = Pair::new(Profile::Mcsdk54, Recovery::Pad);
+            pair.cut = Some(cut);
+            pair.exchange(2, request).unwrap_err();
+            assert_eq!(pair.exchange(2, STATUS), Ok(vec![0]), "{request:?} cut at {cut}");
+            let stopped = pair.drive.log.last().is_some_and(|entry| entry == "STOP_MOTOR 2");
+            assert_eq!(stopped, request != STATUS, "a cut-off command is followed by a stop");
+        }
+    }
+}
+
+#[test]
+fn an_unasked_identification_is_skipped() {
+    let mut master = master(Recovery::Drain);
+    let mut out = [0; MAX_FRAME];
+    let ident = Frame { header: HEADER_ATR, payload: &[7; 13] }.encode(&mut out).unwrap().to_vec();
+    let ack = Frame { header: HEADER_ACK, payload: &[6] }.encode(&mut out).unwrap().to_vec();
+    for cut in 0..ident.len() {
+        master.request(0, &STATUS).unwrap();
+        assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+        master.receive(Instant(1), &ident[..cut]);
+        assert!(matches!(master.poll(Instant(1)), Output::Wait(_)));
+        master.receive(Instant(2), &[&ident[cut..], &ack].concat());
+        assert_eq!(master.poll(Instant(2)), Output::Done(Ok(&[6])));
+    }
+    assert_eq!(master.counters().identifications, ident.len() as u32);
+}
+
+#[test]
+fn every_prefix_of_a_reply_waits_for_more() {
+    let mut out = [0; MAX_FRAME];
+    let reply = Frame { header: HEADER_ACK, payload: &[1; 128] }.encode(&mut out).unwrap();
+    for cut in 1..reply.len() {
+        let mut master = master(Recovery::Drain);
+        master.request(0, &STATUS).unwrap();
+        assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+        master.receive(Instant(0), &reply[..cut]);
+        assert!(matches!(master.poll(Instant(0)), Output::Wait(Some(_))));
+        let failed = Error::Failed(Failure::Incomplete { received: cut as u8 });
+        assert_eq!(master.poll(Instant(1000 * MS)), Output::Done(Err(failed)));
+    }
+}
+
+#[test]
+fn bytes_behind_a_reply_lose_the_line_but_not_the_reply() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+    pair.master.request(0, &STATUS).unwrap();
+    assert!(matches!(pair.master.poll(pair.now), Output::Transmit(_)));
+    pair.master.receive(pair.now, &[0xF0, 0x01, 0x06, 0xF7, 0xF0, 0x01]);
+    assert_eq!(pair.master.poll(pair.now), Output::Done(Ok(&[6])));
+    assert_eq!(pair.master.line(), Line::Lost);
+    assert_eq!(pair.master.counters().unasked_bytes, 2);
+    assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+}
+
+proptest! {
+    #[test]
+    fn a_late_reply_is_never_taken_for_another_exchanges(
+        delays in proptest::collection::vec(0u32..2_000, 1..40),
+        pad in any::<bool>(),
+    ) {
+        let recovery = if pad { Recovery::Pad } else { Recovery::Drain };
+        let mut pair = Pair::new(Profile::Spec, recovery);
+        let registers = [RegisterId::SPEED_KP, RegisterId::SPEED_KI, RegisterId::TORQUE_KP,
+                         RegisterId::TORQUE_KI, RegisterId::FLUX_KP];
+        for register in registers {
+            pair.drive.set(1, register, i32::from(register.0));
+        }
+        for (n, delay) in delays.into_iter().enumerate() {
+            pair.delay = Duration::from_millis(delay);
+            let register = registers[n % registers.len()];
+            if let Ok(value) = pair.exchange(1, Request::GetRegister(register)) {
+                prop_assert_eq!(register.decode(&value), Some(i32::from(register.0)));
+            }
+        }
+    }
+
+    #[test]
+    fn a_drive_that_was_stopped_and_answers_everything_at_once_confuses_nobody(
+        stops in proptest::collection::vec(0u32..9_000, 1..10),
+    ) {
+        let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+        let registers = [RegisterId::SPEED_KP, RegisterId::SPEED_KI];
+        for register in registers {
+            pair.drive.set(1, register, i32::from(register.0));
+        }
+        for stop in stops {
+            let until = pair.now + Duration::from_millis(stop);
+            for n in 0..20 {
+                pair.delay = until.since(pair.now);
+                let register = registers[n % 2];
+                if let Ok(value) = pair.exchange(1, Request::GetRegister(register)) {
+                    prop_assert_eq!(register.decode(&value), Some(i32::from(register.0)));
+                }
+            }
+            prop_assert_eq!(pair.master.line(), Line::Up, "back within 20 tries");
+        }
+    }
+
+    #[test]
+    fn noise_never_panics_and_an_exchange_always_ends(
+        chunks in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..40), 1..60),
+        pad in any::<bool>(),
+    ) {
+        let mut master = master(if pad { Recovery::Pad } else { Recovery::Drain });
+        let mut chunks = chunks.into_iter();
+        let mut now = Instant(0);
+        for _ in 0..8 {
+            let begun = now;
+            master.request(1, &STATUS).unwrap();
+            loop {
+                match master.poll(now) {
+                    Output::Done(_) => break,
+                    Output::Transmit(_) => {}
+                    Output::Wait(until) => match chunks.next() {
+                        Some(noise) => {
+                            now += Duration::from_millis(7);
+                            master.receive(now, &noise);
+                        }
+                        None => now = until.unwrap(),
+                    },
+                }
+            }
+            prop_assert!(now.since(begun) <= Duration::from_millis(8_000));
+        }
+    }
+}
