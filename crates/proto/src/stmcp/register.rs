@@ -109,7 +109,7 @@ macro_rules! units {
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[repr(u8)]
         #[allow(missing_docs)]
-        pub enum Unit { $( #[doc = $symbol] $name, )+ }
+        pub enum Unit { $( #[doc = concat!("`", $symbol, "`")] $name, )+ }
 
         impl Unit {
             /// The symbol to print behind a value; empty when there is none.

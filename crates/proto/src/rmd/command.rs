@@ -1,0 +1,191 @@
+//! The command table: the one place where a command's number and name stand.
+
+use super::message::*;
+use super::payload::{Field, Payload};
+use super::reply::*;
+
+/// A request with its code and the type of its reply. A reply is `C::Reply::decode(&data)`.
+pub trait Command: Payload {
+    /// DATA\[0\] of the request.
+    const CODE: Code;
+    /// What the motor answers.
+    type Reply: Payload;
+
+    /// The eight bytes of the request.
+    fn encode(&self) -> [u8; 8] {
+        self.encode_as(Self::CODE)
+    }
+}
+
+/// One row of the command table.
+#[derive(Debug, Clone, Copy)]
+pub struct CommandInfo {
+    /// The code, with the name of chapter 2 and a description.
+    pub code: Code,
+    /// Heading of the paragraph in chapter 3 that describes the command.
+    pub paragraph: &'static str,
+    /// Whether the reply repeats the request byte for byte.
+    pub echo: bool,
+    /// Whether the drive writes to its ROM, which wears (docs/SPEC-NOTES.md R8, R9).
+    pub rom: bool,
+    /// Whether the motor may turn after it.
+    pub moves: bool,
+    /// Values of the request.
+    pub request: &'static [Field],
+    /// Values of the reply.
+    pub reply: &'static [Field],
+}
+
+impl CommandInfo {
+    const fn new<C: Command>(code: Code, paragraph: &'static str) -> Self {
+        let (request, reply) = (C::FIELDS, C::Reply::FIELDS);
+        CommandInfo { code, paragraph, echo: false, rom: false, moves: false, request, reply }
+    }
+}
+
+impl Code {
+    /// The row of the table; `None` for a code that the document does not name.
+    pub fn info(self) -> Option<&'static CommandInfo> {
+        COMMANDS.iter().find(|row| row.code == self)
+    }
+}
+
+/// `CODE Struct -> Reply [echo rom moves] "name in chapter 2", "heading in chapter 3", "what it does"`
+macro_rules! commands {
+    ($(
+        $code:literal $name:ident -> $reply:ident [$($flag:ident)*]
+        $text:literal, $paragraph:literal, $doc:literal;
+    )+) => {
+        named_numbers! {
+            /// DATA\[0\] of a request and its reply (chapter 2).
+            pub enum Code: u8 {
+                $( $code $name $text $doc; )+
+            }
+        }
+
+        $( impl Command for $name {
+            const CODE: Code = Code::$name;
+            type Reply = $reply;
+        } )+
+
+        /// Every command of the document, in the order of chapter 2.
+        pub static COMMANDS: [CommandInfo; Code::ALL.len()] = [
+            $( CommandInfo {
+                $( $flag: true, )*
+                ..CommandInfo::new::<$name>(Code::$name, $paragraph)
+            }, )+
+        ];
+    };
+}
+
+commands! {
+    0x30 ReadGains -> Gains []
+        "Read PID data command", "Read PID parameter command",
+        "reads the gains in RAM";
+    0x31 WriteGains -> WriteGains [echo]
+        "Write PID to RAM command", "Write PID to RAM parameter command",
+        "sets the gains until power-off";
+    0x32 WriteGainsToRom -> WriteGainsToRom [echo rom]
+        "Write PID to ROM command", "Write PID to ROM parameter command",
+        "sets the gains for good";
+    0x33 ReadAcceleration -> Acceleration []
+        "Read acceleration data command", "Read acceleration data command",
+        "reads the acceleration limit";
+    0x34 WriteAcceleration -> WriteAcceleration [echo]
+        "Write acceleration data to RAM command", "Write acceleration data to RAM command",
+        "sets the acceleration limit until power-off";
+    0x90 ReadEncoder -> Encoder []
+        "Read encoder data command", "Read encoder data command",
+        "reads encoder position, original position and offset";
+    0x91 WriteEncoderOffset -> EncoderOffset [rom]
+        "Write encoder offset command", "Write encoder offset command",
+        "sets the encoder offset, at once and for good";
+    0x19 WriteZeroToRom -> EncoderOffset [rom]
+        "Write current position to ROM as motor zero command",
+        "Write current position to ROM as motor zero position command",
+        "makes the current position the zero from the next power-on on";
+    0x92 ReadMultiTurnAngle -> MultiTurn []
+        "Read multi turns angle command", "Read multi turns angle command",
+        "reads the angle over all turns";
+    0x94 ReadCircleAngle -> Circle []
+        "Read single circle angle command", "Read single circle angle command",
+        "reads the angle within the turn";
+    0x9A ReadStatus1 -> Status1 []
+        "Read motor status 1 and error flag commands",
+        "Read motor status 1 and error flag commands",
+        "reads temperature, voltage and error flags";
+    0x9B ClearErrors -> Status1 []
+        "Clear motor error flag command", "Clear motor error flag command",
+        "clears the error flags whose cause is gone";
+    0x9C ReadStatus2 -> MotionStatus []
+        "Read motor status 2", "Read motor status 2",
+        "reads temperature, torque current, speed and encoder position";
+    0x9D ReadStatus3 -> PhaseCurrents []
+        "Read motor status 3", "Read motor status 3",
+        "reads the three phase currents";
+    0x80 Off -> Off [echo]
+        "Motor off command", "Motor off command",
+        "switches the motor off and forgets what it was doing";
+    0x81 Stop -> Stop [echo]
+        "Motor stop command", "Motor stop command",
+        "stops the motor and remembers what it was doing";
+    0x88 Run -> Run [echo moves]
+        "Motor running command", "Motor running command",
+        "resumes what the motor was doing before the stop";
+    0xA1 Torque -> MotionStatus [moves]
+        "Torque closed-loop command", "Torque current control command",
+        "holds a torque current";
+    0xA2 Speed -> MotionStatus [moves]
+        "Speed closed-loop command", "Speed control command",
+        "holds a speed";
+    0xA3 Position -> MotionStatus [moves]
+        "Position closed-loop command 1", "Position control command 1",
+        "turns to a multi-turn angle";
+    0xA4 PositionLimited -> MotionStatus [moves]
+        "Position closed-loop command 2", "Position control command 2",
+        "turns to a multi-turn angle no faster than a limit";
+    0xA5 CirclePosition -> MotionStatus [moves]
+        "Position closed-loop command 3", "Position control command 3",
+        "turns to an angle within the turn, in a given direction";
+    0xA6 CirclePositionLimited -> MotionStatus [moves]
+        "Position closed-loop command 4", "Position control command 4",
+        "turns to an angle within the turn, in a given direction, no faster than a limit";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_has_the_23_commands_once_each() {
+        assert_eq!(COMMANDS.len(), 23);
+        for row in &COMMANDS {
+            assert_eq!(row.code.info().map(|found| found.paragraph), Some(row.paragraph));
+            assert_eq!(Code::from(u8::from(row.code)), row.code);
+        }
+        assert!(Code::from(0x35).info().is_none());
+    }
+
+    #[test]
+    fn fields_stay_behind_the_code_and_do_not_overlap() {
+        for fields in COMMANDS.iter().flat_map(|row| [row.request, row.reply]) {
+            let mut free = [false, true, true, true, true, true, true, true];
+            for field in fields {
+                let (first, len) = (usize::from(field.offset), usize::from(field.len));
+                for slot in &mut free[first..first + len] {
+                    assert!(core::mem::take(slot), "{} overlaps", field.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_flags_follow_the_document() {
+        let with = |flag: fn(&CommandInfo) -> bool| {
+            COMMANDS.iter().filter(move |row| flag(row)).map(|row| u8::from(row.code))
+        };
+        assert!(with(|row| row.echo).eq([0x31, 0x32, 0x34, 0x80, 0x81, 0x88]));
+        assert!(with(|row| row.rom).eq([0x32, 0x91, 0x19]));
+        assert!(with(|row| row.moves).eq([0x88, 0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6]));
+    }
+}

@@ -1,0 +1,430 @@
+//! The drive: answers the host and tells the motor what to do, without I/O.
+
+use super::command::{Code, Command};
+use super::encoder::{EncoderBits, FULL_TURN};
+use super::frame::CanFrame;
+use super::message::*;
+use super::motor::{MotorId, MotorSet, TORQUE4_ID};
+use super::payload::Payload;
+use super::reply::*;
+use crate::time::{Duration, Instant};
+use crate::units::*;
+
+/// What the drive needs of its motor: the power stage, its control loops and its sensors. Angles
+/// are encoder counts; the drive alone knows where zero is.
+pub trait Motor {
+    /// Does `mode` from now on. Called once for each command that asks for it.
+    fn set_mode(&mut self, mode: Mode);
+
+    /// Uses these gains and this acceleration limit from now on.
+    fn configure(&mut self, settings: &Settings);
+
+    /// What the sensors read now.
+    fn sense(&mut self) -> Sense;
+
+    /// Keeps the settings that [`Drive::new`] gets after a power cycle. Wears a real ROM.
+    fn save(&mut self, rom: &Settings);
+}
+
+/// What the motor does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mode {
+    /// Without current (3, Motor off command).
+    #[default]
+    Off,
+    /// Brought to a stand and kept there (3, Motor stop command).
+    Stopped,
+    /// Holds a torque current within ±[`Torque::MAX`]; the drive's greatest torque current does
+    /// not limit it (3, Torque current control command).
+    Torque(TorqueCommand),
+    /// Holds a speed (3, Speed control command).
+    Speed(CentiDps),
+    /// Turns to a position and holds it (3, Position control command 1 to 4).
+    Position {
+        /// Encoder counts as in [`Sense::encoder`].
+        target: i64,
+        /// Greatest speed on the way; `None` leaves it to the drive's own.
+        max_speed: Option<SpeedLimit>,
+    },
+}
+
+/// What the sensors read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Sense {
+    /// Motor temperature.
+    pub temperature: Celsius,
+    /// Supply voltage.
+    pub voltage: DeciVolts,
+    /// Torque current.
+    pub iq: TorqueFeedback,
+    /// Speed, positive is clockwise.
+    pub speed: Dps,
+    /// Encoder counts in the encoder's own width, growing clockwise and counted on beyond each end
+    /// of the turn. Starts within the turn, 0 to 2^width - 1, at power-on.
+    pub encoder: i64,
+    /// Currents of the three phases.
+    pub phase_currents: PhaseCurrents,
+    /// Faults that are present now; the drive latches them.
+    pub faults: Errors,
+}
+
+/// What a host can set: once in RAM, which commands act on, and once in ROM, which power-on copies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Settings {
+    /// Gains of the three loops (0x30 to 0x32).
+    pub gains: Gains,
+    /// Acceleration limit (0x33, 0x34), 1 °/s² a digit. No command writes it to ROM. 0 and less are
+    /// no limit, as in the vendor's tool.
+    pub acceleration: DpsPerSecond,
+    /// Encoder value that is zero (0x90, 0x91, 0x19), as it travels: at most 16 bits.
+    pub encoder_offset: u16,
+}
+
+/// What the vendor's tool or a switch sets, not the bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Config {
+    /// The ID that the drive answers to.
+    pub id: MotorId,
+    /// Width of the encoder (docs/SPEC-NOTES.md R6).
+    pub encoder: EncoderBits,
+    /// Switches the motor off after this long without a command (docs/SPEC-NOTES.md R12).
+    pub shutdown: Option<Duration>,
+    /// Answers 0x9B with 0x9B, as relatives do, and not with 0x9A as printed (3, Clear motor error
+    /// flag command; docs/SPEC-NOTES.md R1).
+    pub clear_reply_0x9b: bool,
+}
+
+impl Config {
+    /// A drive as the document describes it: 14-bit encoder, no shutdown.
+    pub fn new(id: MotorId) -> Self {
+        let encoder = EncoderBits::default();
+        Config { id, encoder, shutdown: None, clear_reply_0x9b: false }
+    }
+}
+
+/// Frames for this drive that it did not answer; each count stays at its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Ignored {
+    /// Not standard data frames of eight bytes (docs/SPEC-NOTES.md R11).
+    pub malformed: u32,
+    /// Codes that the document does not name.
+    pub unknown: u32,
+}
+
+/// The drive's side of the protocol, for one motor.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    /// What the vendor's tool set; may change at any time.
+    pub config: Config,
+    ram: Settings,
+    rom: Settings,
+    mode: Mode,
+    stopped: bool,
+    /// The single-turn command behind `mode`.
+    circle: Option<CirclePosition>,
+    errors: Errors,
+    last_command: Instant,
+    ignored: Ignored,
+}
+
+impl Drive {
+    /// A drive with what its ROM holds. Not running before [`power_on`](Self::power_on).
+    pub fn new(config: Config, rom: Settings) -> Self {
+        Drive {
+            config,
+            ram: rom,
+            rom,
+            mode: Mode::Off,
+            stopped: false,
+            circle: None,
+            errors: Errors::NONE,
+            last_command: Instant(0),
+            ignored: Ignored::default(),
+        }
+    }
+
+    /// Starts, also after a power cycle: settings come from ROM, the motor is off, no error is
+    /// latched and nothing is left to resume.
+    pub fn power_on(&mut self, now: Instant, motor: &mut impl Motor) {
+        *self = Drive { last_command: now, ..Drive::new(self.config, self.rom) };
+        motor.configure(&self.ram);
+        motor.set_mode(Mode::Off);
+    }
+
+    /// Takes a frame from the bus and returns the reply. Frames for others get none, nor do
+    /// unknown codes and frames that are not eight bytes of standard data.
+    pub fn receive(
+        &mut self,
+        now: Instant,
+        frame: &CanFrame,
+        motor: &mut impl Motor,
+    ) -> Option<CanFrame> {
+        let id = self.config.id;
+        let own = u32::from(id.can_id());
+        let everyones = frame.id() == u32::from(TORQUE4_ID) && reached(id);
+        if frame.id() != own && !everyones {
+            return None;
+        }
+        let Some((_, data)) = frame.usable() else {
+            count(&mut self.ignored.malformed);
+            return None;
+        };
+        let sense = self.watch(now, motor);
+        let reply = if everyones {
+            // Carried out and answered as the single command (chapter 4).
+            let torque = Torque4::decode(data).of(id)?;
+            self.answer(&Torque { torque }.encode(), &sense, motor)?
+        } else {
+            self.answer(data, &sense, motor)?
+        };
+        self.last_command = now;
+        Some(CanFrame::new(id.can_id(), reply))
+    }
+
+    /// Latches faults and keeps the shutdown time. Call at [`deadline`](Self::deadline), and often
+    /// enough for a fault to switch the motor off in time.
+    pub fn poll(&mut self, now: Instant, motor: &mut impl Motor) {
+        self.watch(now, motor);
+    }
+
+    /// When the shutdown time will be over; `None` while the motor is off or has none.
+    pub fn deadline(&self) -> Option<Instant> {
+        let shutdown = self.config.shutdown?;
+        (self.mode != Mode::Off).then_some(self.last_command + shutdown)
+    }
+
+    /// What the motor was last told to do.
+    pub const fn mode(&self) -> Mode {
+        if self.stopped { Mode::Stopped } else { self.mode }
+    }
+
+    /// The latched errors.
+    pub const fn errors(&self) -> Errors {
+        self.errors
+    }
+
+    /// The settings in RAM, which commands act on.
+    pub const fn settings(&self) -> &Settings {
+        &self.ram
+    }
+
+    /// The settings in ROM, which the next power-on copies.
+    pub const fn rom(&self) -> &Settings {
+        &self.rom
+    }
+
+    /// Frames that were not answered since power-on.
+    pub const fn ignored(&self) -> &Ignored {
+        &self.ignored
+    }
+
+    fn answer(&mut self, data: &[u8; 8], sense: &Sense, motor: &mut impl Motor) -> Option<[u8; 8]> {
+        let [code, ..] = *data;
+        let code = Code::from(code);
+        let position = sense.encoder.wrapping_sub(self.zero());
+        Some(match code {
+            Code::ReadGains => self.ram.gains.encode_as(code),
+            Code::WriteGains | Code::WriteGainsToRom => {
+                self.ram.gains = Gains::decode(data);
+                motor.configure(&self.ram);
+                if code == Code::WriteGainsToRom {
+                    self.rom.gains = self.ram.gains;
+                    motor.save(&self.rom);
+                }
+                *data
+            }
+            Code::ReadAcceleration => {
+                Acceleration { acceleration: self.ram.acceleration }.encode_as(code)
+            }
+            Code::WriteAcceleration => {
+                self.ram.acceleration = Acceleration::decode(data).acceleration;
+                motor.configure(&self.ram);
+                *data
+            }
+            Code::ReadEncoder => {
+                let bits = self.config.encoder;
+                let (position, raw) = (bits.narrow(position), bits.narrow(sense.encoder));
+                Encoder { position, raw, offset: self.ram.encoder_offset }.encode_as(code)
+            }
+            Code::WriteEncoderOffset => {
+                let offset = self.config.encoder.cut(EncoderOffset::decode(data).offset);
+                self.ram.encoder_offset = offset;
+                self.circle = None;
+                self.store_offset(code, offset, motor)
+            }
+            Code::WriteZeroToRom => {
+                let offset = self.config.encoder.narrow(sense.encoder);
+                self.store_offset(code, offset, motor)
+            }
+            Code::ReadMultiTurnAngle => {
+                MultiTurn { angle: self.config.encoder.multi_turn(position) }.encode_as(code)
+            }
+            Code::ReadCircleAngle => {
+                Circle { angle: self.config.encoder.circle(position) }.encode_as(code)
+            }
+            Code::ReadStatus1 => self.status1(code, sense),
+            Code::ClearErrors => {
+                self.errors = self.errors.intersection(sense.faults);
+                let printed = if self.config.clear_reply_0x9b { code } else { Code::ReadStatus1 };
+                self.status1(printed, sense)
+            }
+            Code::ReadStatus2 => self.motion_status(code, sense),
+            Code::ReadStatus3 => sense.phase_currents.encode_as(code),
+            Code::Off => {
+                self.off(motor);
+                *data
+            }
+            Code::Stop => {
+                if self.mode != Mode::Off {
+                    self.stopped = true;
+                    motor.set_mode(Mode::Stopped);
+                }
+                *data
+            }
+            Code::Run => {
+                if self.stopped {
+                    self.stopped = false;
+                    motor.set_mode(self.mode);
+                }
+                *data
+            }
+            Code::Torque
+            | Code::Speed
+            | Code::Position
+            | Code::PositionLimited
+            | Code::CirclePosition
+            | Code::CirclePositionLimited => {
+                if let Some((mode, circle)) = self.asked(code, data, sense) {
+                    self.circle = circle;
+                    self.go(mode, motor);
+                }
+                self.motion_status(code, sense)
+            }
+            Code::Unknown(_) => {
+                count(&mut self.ignored.unknown);
+                return None;
+            }
+        })
+    }
+
+    /// The mode that a motion command asks for, with the command when it is a single-turn one;
+    /// `None` for one outside of the document's range, which is not carried out
+    /// (docs/SPEC-NOTES.md R15).
+    fn asked(
+        &self,
+        code: Code,
+        data: &[u8; 8],
+        sense: &Sense,
+    ) -> Option<(Mode, Option<CirclePosition>)> {
+        let max_speed = match code {
+            Code::PositionLimited | Code::CirclePositionLimited => {
+                Some(PositionLimited::decode(data).max_speed)
+            }
+            _ => None,
+        };
+        Some(match code {
+            Code::Torque => (Mode::Torque(saturated(Torque::decode(data).torque)), None),
+            Code::Speed => (Mode::Speed(Speed::decode(data).speed), None),
+            Code::Position | Code::PositionLimited => {
+                let target = self.counts(Position::decode(data).angle);
+                (Mode::Position { target, max_speed }, None)
+            }
+            _ => {
+                let command = CirclePosition::decode(data);
+                let target = match self.mode {
+                    // The same command again does not start another turn (R16).
+                    Mode::Position { target, .. } if self.circle == Some(command) => target,
+                    _ => self.circle_target(command, sense)?,
+                };
+                (Mode::Position { target, max_speed }, Some(command))
+            }
+        })
+    }
+
+    fn circle_target(&self, command: CirclePosition, sense: &Sense) -> Option<i64> {
+        let CirclePosition { direction, angle } = command;
+        if angle.0 >= FULL_TURN {
+            return None;
+        }
+        let way = self.counts(CentiDegrees(i32::from(angle.0))).wrapping_sub(sense.encoder);
+        let bits = self.config.encoder;
+        match direction {
+            Spin::Clockwise => Some(sense.encoder.wrapping_add(bits.within_turn(way))),
+            Spin::Counterclockwise => {
+                Some(sense.encoder.wrapping_sub(bits.within_turn(way.wrapping_neg())))
+            }
+            Spin::Unknown(_) => None,
+        }
+    }
+
+    /// Starts a mode, also out of a stop (docs/SPEC-NOTES.md R17); never while an error is latched
+    /// (R18).
+    fn go(&mut self, mode: Mode, motor: &mut impl Motor) {
+        if !self.errors.is_empty() {
+            return;
+        }
+        self.mode = mode;
+        self.stopped = false;
+        motor.set_mode(mode);
+    }
+
+    fn off(&mut self, motor: &mut impl Motor) {
+        self.mode = Mode::Off;
+        self.stopped = false;
+        self.circle = None;
+        motor.set_mode(Mode::Off);
+    }
+
+    fn watch(&mut self, now: Instant, motor: &mut impl Motor) -> Sense {
+        let sense = motor.sense();
+        self.errors = self.errors.union(sense.faults);
+        let silent = self.deadline().is_some_and(|deadline| now >= deadline);
+        if self.mode != Mode::Off && (silent || !self.errors.is_empty()) {
+            self.off(motor);
+        }
+        sense
+    }
+
+    fn store_offset(&mut self, code: Code, offset: u16, motor: &mut impl Motor) -> [u8; 8] {
+        self.rom.encoder_offset = offset;
+        motor.save(&self.rom);
+        EncoderOffset { offset }.encode_as(code)
+    }
+
+    fn status1(&self, code: Code, sense: &Sense) -> [u8; 8] {
+        let Sense { temperature, voltage, .. } = *sense;
+        Status1 { temperature, voltage, errors: self.errors }.encode_as(code)
+    }
+
+    fn motion_status(&self, code: Code, sense: &Sense) -> [u8; 8] {
+        let Sense { temperature, iq, speed, .. } = *sense;
+        let position = sense.encoder.wrapping_sub(self.zero());
+        let encoder = self.config.encoder.narrow(position);
+        MotionStatus { temperature, iq, speed, encoder }.encode_as(code)
+    }
+
+    /// Encoder counts at an angle from zero.
+    fn counts(&self, angle: CentiDegrees) -> i64 {
+        self.config.encoder.counts(angle).wrapping_add(self.zero())
+    }
+
+    /// Encoder counts at zero.
+    fn zero(&self) -> i64 {
+        self.config.encoder.widen(self.ram.encoder_offset)
+    }
+}
+
+/// Whether the frame 0x280 reaches this motor (chapter 4).
+fn reached(id: MotorId) -> bool {
+    MotorSet::TORQUE4.contains(id)
+}
+
+/// Held to the document's range (docs/SPEC-NOTES.md R3).
+fn saturated(torque: TorqueCommand) -> TorqueCommand {
+    let TorqueCommand(most) = Torque::MAX;
+    TorqueCommand(torque.0.min(most).max(most.wrapping_neg()))
+}
+
+fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
+}

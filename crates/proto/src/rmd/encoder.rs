@@ -1,0 +1,147 @@
+//! Encoder counts and angles. All arithmetic with the zero point is here, so that encoder position,
+//! single-turn and multi-turn angle agree.
+
+use crate::units::{CentiDegrees, CircleAngle, MultiTurnAngle};
+
+/// Digits of 0.01° in a turn.
+pub const FULL_TURN: u16 = 36_000;
+
+/// Width of an encoder: 12 to 18 bits a turn (chapter 4, note), 14 as the document's frames say.
+///
+/// A frame has 16 bits for a position. Of a wider encoder the upper 16 travel
+/// (docs/SPEC-NOTES.md R6).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct EncoderBits(u8);
+
+impl EncoderBits {
+    /// `None` unless `bits` is 12 to 18.
+    pub const fn new(bits: u8) -> Option<Self> {
+        if bits >= 12 && bits <= 18 { Some(EncoderBits(bits)) } else { None }
+    }
+
+    /// The width in bits.
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+
+    /// An encoder value of a frame as an angle in degrees, 0 to 360.
+    pub fn degrees(self, counts: u16) -> f64 {
+        f64::from(counts) * 360.0 / f64::from(1u32.wrapping_shl(u32::from(self.0.min(16))))
+    }
+
+    /// Cuts a value of a frame to what this encoder can read.
+    pub(super) fn cut(self, counts: u16) -> u16 {
+        self.narrow(self.widen(counts))
+    }
+
+    /// Counts over all turns as they travel: within the turn, at most 16 bits.
+    pub(super) fn narrow(self, counts: i64) -> u16 {
+        let unused = 16u32.saturating_sub(self.width());
+        let wire = counts.wrapping_shr(self.dropped()) as u16;
+        wire.wrapping_shl(unused).wrapping_shr(unused)
+    }
+
+    /// Counts of the encoder from a value of a frame.
+    pub(super) fn widen(self, counts: u16) -> i64 {
+        i64::from(counts).wrapping_shl(self.dropped())
+    }
+
+    /// Counts from zero as an angle; the digit below.
+    pub(super) fn multi_turn(self, counts: i64) -> MultiTurnAngle {
+        MultiTurnAngle(counts.wrapping_mul(i64::from(FULL_TURN)).wrapping_shr(self.width()))
+    }
+
+    /// Counts from zero as an angle within the turn; the digit below.
+    pub(super) fn circle(self, counts: i64) -> CircleAngle {
+        CircleAngle(self.multi_turn(self.within_turn(counts)).0 as u16)
+    }
+
+    /// The nearest counts from zero to an angle.
+    pub(super) fn counts(self, angle: CentiDegrees) -> i64 {
+        let turns = angle.0.div_euclid(i32::from(FULL_TURN));
+        let rest = angle.0.rem_euclid(i32::from(FULL_TURN)) as u32;
+        // 36000 is 1125 << 5; this way 18 bits of encoder fit 32 bits of arithmetic.
+        let scaled = rest.wrapping_shl(self.width().saturating_sub(5));
+        let within = scaled.wrapping_add(1125 / 2) / 1125;
+        i64::from(turns).wrapping_shl(self.width()).wrapping_add(i64::from(within))
+    }
+
+    /// Counts reduced to one turn.
+    pub(super) fn within_turn(self, counts: i64) -> i64 {
+        counts & 1i64.wrapping_shl(self.width()).wrapping_sub(1)
+    }
+
+    fn width(self) -> u32 {
+        u32::from(self.0)
+    }
+
+    /// Low bits that do not travel.
+    fn dropped(self) -> u32 {
+        self.width().saturating_sub(16)
+    }
+}
+
+impl Default for EncoderBits {
+    fn default() -> Self {
+        EncoderBits(14)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn widths() -> impl Iterator<Item = EncoderBits> {
+        (0..=255).filter_map(EncoderBits::new)
+    }
+
+    #[test]
+    fn there_are_seven_widths_and_14_is_the_default() {
+        assert!(widths().map(EncoderBits::bits).eq(12..=18));
+        assert_eq!(EncoderBits::default().bits(), 14);
+    }
+
+    #[test]
+    fn the_circle_angle_is_the_multi_turn_angle_modulo_a_turn() {
+        for bits in widths() {
+            for counts in (-3_000_000..3_000_000).step_by(9973) {
+                let multi = bits.multi_turn(counts).0.rem_euclid(36_000);
+                assert_eq!(i64::from(bits.circle(counts).0), multi);
+            }
+        }
+    }
+
+    #[test]
+    fn an_angle_turned_into_counts_and_back_is_off_by_no_more_than_a_count() {
+        for bits in widths() {
+            let count = 36_000 / (1 << bits.bits()) + 1;
+            for angle in (-100_000_000..100_000_000).step_by(77_777) {
+                let back = bits.multi_turn(bits.counts(CentiDegrees(angle))).0;
+                assert!((back - i64::from(angle)).abs() <= count, "{angle} became {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_ends_of_the_angle_do_not_overflow() {
+        for bits in widths() {
+            for angle in [i32::MIN, i32::MAX] {
+                let back = bits.multi_turn(bits.counts(CentiDegrees(angle))).0;
+                assert!((back - i64::from(angle)).abs() <= 9);
+            }
+        }
+    }
+
+    #[test]
+    fn of_a_wide_encoder_the_upper_16_bits_travel() {
+        let wide = EncoderBits::new(18).unwrap();
+        assert_eq!(wide.narrow(0x3FFFF), 0xFFFF);
+        assert_eq!(wide.narrow(-1), 0xFFFF);
+        assert_eq!(wide.widen(0x8000), 0x20000);
+        let narrow = EncoderBits::new(12).unwrap();
+        assert_eq!(narrow.narrow(0x1234), 0x234);
+        assert_eq!(narrow.cut(0xFFFF), 0xFFF);
+        assert_eq!(narrow.degrees(0x800), 180.0);
+        assert_eq!(wide.degrees(0x8000), 180.0);
+    }
+}

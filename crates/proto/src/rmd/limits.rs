@@ -1,0 +1,259 @@
+//! What the caller allows a motor to be told. Checked on the bytes that leave, so that a raw frame
+//! is held to it as well.
+
+use super::command::Code;
+use super::encoder::FULL_TURN;
+use super::message::*;
+use super::payload::Payload;
+use crate::units::{CentiDegrees, CentiDps, CircleAngle, SpeedLimit, TorqueCommand};
+use core::fmt;
+
+/// The most that may be commanded to a motor, either way round; `None` is no limit beyond the
+/// protocol's own ranges. A limit holds for what a frame carries: a torque command has no speed,
+/// and the drive's own settings bound the current of a speed or position command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Limits {
+    /// Greatest torque current of 0xA1 and 0x280, 0.016 A a digit.
+    pub current: Option<TorqueCommand>,
+    /// Greatest speed of 0xA2, 0xA4 and 0xA6, 1 °/s a digit. 0xA3 and 0xA5 carry no speed and are
+    /// refused while this is set (docs/SPEC-NOTES.md R14).
+    pub speed: Option<SpeedLimit>,
+    /// Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit.
+    pub angle: Option<CentiDegrees>,
+}
+
+/// Why a frame may not leave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Exceeded {
+    /// More torque current than `limit`, which is at most [`Torque::MAX`] (docs/SPEC-NOTES.md R3).
+    Current {
+        /// Torque current of the frame.
+        asked: TorqueCommand,
+        /// The limit.
+        limit: TorqueCommand,
+    },
+    /// More speed than `limit`.
+    Speed {
+        /// Speed of the frame.
+        asked: CentiDps,
+        /// The limit.
+        limit: SpeedLimit,
+    },
+    /// The command carries no speed, so that `limit` cannot be kept.
+    NoSpeed {
+        /// The limit.
+        limit: SpeedLimit,
+    },
+    /// Further from zero than `limit`.
+    Angle {
+        /// Angle of the frame.
+        asked: CentiDegrees,
+        /// The limit.
+        limit: CentiDegrees,
+    },
+    /// A single-turn angle beyond 359.99° (3, Position control command 3).
+    Circle(CircleAngle),
+    /// A direction that the document does not name (3, Position control command 3).
+    Direction(Spin),
+}
+
+impl Limits {
+    /// Whether the bytes of a request may leave. Commands that do not move the motor always may.
+    ///
+    /// # Errors
+    /// The limit that the frame exceeds.
+    pub fn check(&self, data: &[u8; 8]) -> Result<(), Exceeded> {
+        let [code, ..] = *data;
+        match Code::from(code) {
+            Code::Torque => self.current(Torque::decode(data).torque),
+            Code::Speed => self.speed(Speed::decode(data).speed),
+            Code::Position => {
+                self.no_speed()?;
+                self.angle(Position::decode(data).angle)
+            }
+            Code::PositionLimited => {
+                let command = PositionLimited::decode(data);
+                self.speed(centi(command.max_speed))?;
+                self.angle(command.angle)
+            }
+            Code::CirclePosition => {
+                let command = CirclePosition::decode(data);
+                self.no_speed()?;
+                circle(command.angle, command.direction)
+            }
+            Code::CirclePositionLimited => {
+                let command = CirclePositionLimited::decode(data);
+                self.speed(centi(command.max_speed))?;
+                circle(command.angle, command.direction)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a torque current may be commanded.
+    ///
+    /// # Errors
+    /// [`Exceeded::Current`].
+    pub fn current(&self, asked: TorqueCommand) -> Result<(), Exceeded> {
+        let limit = self.current.unwrap_or(Torque::MAX).min(Torque::MAX);
+        if i32::from(asked.0).abs() <= i32::from(limit.0) {
+            return Ok(());
+        }
+        Err(Exceeded::Current { asked, limit })
+    }
+
+    fn speed(&self, asked: CentiDps) -> Result<(), Exceeded> {
+        match self.speed {
+            Some(limit) if asked.0.unsigned_abs() > centi(limit).0.unsigned_abs() => {
+                Err(Exceeded::Speed { asked, limit })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn no_speed(&self) -> Result<(), Exceeded> {
+        self.speed.map_or(Ok(()), |limit| Err(Exceeded::NoSpeed { limit }))
+    }
+
+    fn angle(&self, asked: CentiDegrees) -> Result<(), Exceeded> {
+        match self.angle {
+            Some(limit) if i64::from(asked.0).abs() > i64::from(limit.0) => {
+                Err(Exceeded::Angle { asked, limit })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn centi(speed: SpeedLimit) -> CentiDps {
+    CentiDps(i32::from(speed.0).saturating_mul(100))
+}
+
+fn circle(angle: CircleAngle, direction: Spin) -> Result<(), Exceeded> {
+    if angle.0 >= FULL_TURN {
+        return Err(Exceeded::Circle(angle));
+    }
+    match direction {
+        Spin::Clockwise | Spin::Counterclockwise => Ok(()),
+        Spin::Unknown(_) => Err(Exceeded::Direction(direction)),
+    }
+}
+
+impl fmt::Display for Exceeded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Exceeded::Current { asked, limit } => write!(
+                f,
+                "torque current {:.3} A is beyond the limit of {:.3} A",
+                asked.amps(),
+                limit.amps()
+            ),
+            Exceeded::Speed { asked, limit } => {
+                write!(f, "speed {:.2} °/s is beyond the limit of {} °/s", asked.dps(), limit.0)
+            }
+            Exceeded::NoSpeed { limit } => write!(
+                f,
+                "this command carries no speed to hold to the limit of {} °/s; use 0xA4 or 0xA6",
+                limit.0
+            ),
+            Exceeded::Angle { asked, limit } => write!(
+                f,
+                "angle {:.2}° is beyond the limit of {:.2}°",
+                asked.degrees(),
+                limit.degrees()
+            ),
+            Exceeded::Circle(angle) => {
+                write!(f, "single-turn angle {:.2}° is not 0 to 359.99°", angle.degrees())
+            }
+            Exceeded::Direction(spin) => {
+                write!(f, "direction {spin} is neither 0 (clockwise) nor 1 (counterclockwise)")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Exceeded {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rmd::command::{COMMANDS, Command};
+
+    const LIMITS: Limits = Limits {
+        current: Some(TorqueCommand(100)),
+        speed: Some(SpeedLimit(360)),
+        angle: Some(CentiDegrees(9000)),
+    };
+
+    fn torque(digits: i16) -> [u8; 8] {
+        Torque { torque: TorqueCommand(digits) }.encode()
+    }
+
+    #[test]
+    fn torque_beyond_the_range_of_the_document_is_refused_without_any_limit() {
+        let none = Limits::default();
+        assert_eq!(none.check(&torque(2000)), Ok(()));
+        assert_eq!(none.check(&torque(-2000)), Ok(()));
+        for digits in [2001, -2001, i16::MIN, i16::MAX] {
+            let (asked, limit) = (TorqueCommand(digits), Torque::MAX);
+            assert_eq!(none.check(&torque(digits)), Err(Exceeded::Current { asked, limit }));
+        }
+    }
+
+    #[test]
+    fn a_limit_above_the_range_of_the_document_does_not_widen_it() {
+        let wide = Limits { current: Some(TorqueCommand(i16::MAX)), ..Limits::default() };
+        assert!(wide.check(&torque(2001)).is_err());
+    }
+
+    #[test]
+    fn each_limit_holds_both_ways_round() {
+        assert!(LIMITS.check(&torque(100)).is_ok());
+        assert!(LIMITS.check(&torque(-101)).is_err());
+        let speed = |digits| Speed { speed: CentiDps(digits) }.encode();
+        assert!(LIMITS.check(&speed(-36_000)).is_ok());
+        assert!(LIMITS.check(&speed(-36_001)).is_err());
+        assert!(LIMITS.check(&speed(i32::MIN)).is_err());
+        let turn = |max, angle| {
+            PositionLimited { max_speed: SpeedLimit(max), angle: CentiDegrees(angle) }.encode()
+        };
+        assert!(LIMITS.check(&turn(360, -9000)).is_ok());
+        assert!(matches!(LIMITS.check(&turn(361, 0)), Err(Exceeded::Speed { .. })));
+        assert!(matches!(LIMITS.check(&turn(1, -9001)), Err(Exceeded::Angle { .. })));
+        assert!(matches!(LIMITS.check(&turn(1, i32::MIN)), Err(Exceeded::Angle { .. })));
+    }
+
+    #[test]
+    fn a_command_without_a_speed_is_refused_while_speed_is_limited() {
+        let angle = CentiDegrees(0);
+        let limit = SpeedLimit(360);
+        assert_eq!(LIMITS.check(&Position { angle }.encode()), Err(Exceeded::NoSpeed { limit }));
+        let circle = CirclePosition::default().encode();
+        assert_eq!(LIMITS.check(&circle), Err(Exceeded::NoSpeed { limit }));
+        assert_eq!(Limits::default().check(&circle), Ok(()));
+    }
+
+    #[test]
+    fn a_single_turn_command_outside_the_range_of_the_document_is_refused() {
+        let turn = |direction, angle| {
+            let angle = CircleAngle(angle);
+            CirclePositionLimited { direction, max_speed: SpeedLimit(1), angle }.encode()
+        };
+        let none = Limits::default();
+        assert_eq!(none.check(&turn(Spin::Counterclockwise, 35_999)), Ok(()));
+        let beyond = none.check(&turn(Spin::Clockwise, 36_000));
+        assert_eq!(beyond, Err(Exceeded::Circle(CircleAngle(36_000))));
+        let unknown = none.check(&turn(Spin::Unknown(2), 0));
+        assert_eq!(unknown, Err(Exceeded::Direction(Spin::Unknown(2))));
+    }
+
+    #[test]
+    fn commands_that_do_not_move_the_motor_are_never_refused() {
+        for row in COMMANDS.iter().filter(|row| !row.moves) {
+            let mut data = [0xFF; 8];
+            data[0] = row.code.into();
+            assert_eq!(LIMITS.check(&data), Ok(()), "{}", row.code);
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! The replies, a type each (chapter 3).
+
+use super::payload::{Field, Payload, byte, payload, place, take};
+use crate::units::{
+    Celsius, CircleAngle, DeciVolts, Dps, DpsPerSecond, MultiTurnAngle, PhaseCurrent,
+    TorqueFeedback,
+};
+use core::fmt;
+
+payload! {
+    /// Gains of the three loops (3, Read PID parameter command). V3 and V4 use the reverse order.
+    pub struct Gains {
+        /// `anglePidKp`, no unit.
+        2 position_kp: u8,
+        /// `anglePidKi`, no unit.
+        3 position_ki: u8,
+        /// `speedPidKp`, no unit.
+        4 speed_kp: u8,
+        /// `speedPidKi`, no unit.
+        5 speed_ki: u8,
+        /// `iqPidKp`, no unit.
+        6 torque_kp: u8,
+        /// `iqPidKi`, no unit.
+        7 torque_ki: u8,
+    }
+}
+payload! {
+    /// Acceleration limit (3, Read acceleration data command; docs/SPEC-NOTES.md R5).
+    pub struct Acceleration {
+        /// 1 °/s² a digit.
+        4 acceleration: DpsPerSecond,
+    }
+}
+payload! {
+    /// What the encoder reads (3, Read encoder data command), in counts of its width, or of 16 bit
+    /// when it is wider (docs/SPEC-NOTES.md R6).
+    pub struct Encoder {
+        /// `raw` minus `offset`, modulo one turn.
+        2 position: u16,
+        /// The original position.
+        4 raw: u16,
+        /// The zero point.
+        6 offset: u16,
+    }
+}
+payload! {
+    /// The new zero point (3, Write encoder offset command).
+    pub struct EncoderOffset {
+        /// Encoder counts.
+        6 offset: u16,
+    }
+}
+payload! {
+    /// Angle over all turns (3, Read multi turns angle command).
+    pub struct MultiTurn {
+        /// 0.01° a digit, positive is clockwise; 56 bits travel (docs/SPEC-NOTES.md R2).
+        1 angle: MultiTurnAngle,
+    }
+}
+payload! {
+    /// Angle within the turn (3, Read single circle angle command).
+    pub struct Circle {
+        /// 0.01° a digit, 0 to 35999, growing clockwise from the encoder's zero.
+        6 angle: CircleAngle,
+    }
+}
+payload! {
+    /// Temperature, voltage and errors (3, Read motor status 1 and error flag commands).
+    pub struct Status1 {
+        /// 1 °C a digit.
+        1 temperature: Celsius,
+        /// 0.1 V a digit.
+        3 voltage: DeciVolts,
+        /// Which protections are active.
+        7 errors: Errors,
+    }
+}
+payload! {
+    /// Reply to 0x9C, to every motion command (3, Read motor status 2) and to 0x280.
+    pub struct MotionStatus {
+        /// 1 °C a digit.
+        1 temperature: Celsius,
+        /// Torque current, 33/2048 A a digit.
+        2 iq: TorqueFeedback,
+        /// 1 °/s a digit, positive is clockwise.
+        4 speed: Dps,
+        /// Encoder position in counts of its width, the upper 16 bits of a wider one.
+        6 encoder: u16,
+    }
+}
+payload! {
+    /// Phase currents (3, Read motor status 3).
+    pub struct PhaseCurrents {
+        /// Phase A, 1/64 A a digit.
+        2 phase_a: PhaseCurrent,
+        /// Phase B, 1/64 A a digit.
+        4 phase_b: PhaseCurrent,
+        /// Phase C, 1/64 A a digit.
+        6 phase_c: PhaseCurrent,
+    }
+}
+
+/// The error state byte: a bit a protection (3, Read motor status 1 and error flag commands). Bits
+/// that the document calls invalid are kept and shown.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Errors(pub u8);
+
+macro_rules! error_bits {
+    ($( $bit:literal $name:ident $text:literal; )+) => {
+        impl Errors {
+            $( #[doc = concat!("Bit ", $bit, ": ", $text, ".")]
+            pub const $name: Self = Errors(1 << $bit); )+
+
+            /// Each named bit with the document's words for it.
+            pub const NAMES: &'static [(Errors, &'static str)] = &[$( (Errors::$name, $text), )+];
+        }
+    };
+}
+error_bits! {
+    0 LOW_VOLTAGE "low voltage protection";
+    3 OVER_TEMPERATURE "over temperature protection";
+}
+
+impl Errors {
+    /// No error.
+    pub const NONE: Self = Errors(0);
+
+    /// Whether no bit is set.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether every bit of `other` is set.
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// The bits of either.
+    pub const fn union(self, other: Self) -> Self {
+        Errors(self.0 | other.0)
+    }
+
+    /// The bits that both have.
+    pub const fn intersection(self, other: Self) -> Self {
+        Errors(self.0 & other.0)
+    }
+}
+
+impl From<u8> for Errors {
+    fn from(bits: u8) -> Self {
+        Errors(bits)
+    }
+}
+
+impl From<Errors> for u8 {
+    fn from(errors: Errors) -> Self {
+        errors.0
+    }
+}
+byte!(Errors);
+
+impl fmt::Display for Errors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_empty() {
+            return f.write_str("no error");
+        }
+        let mut unnamed = self.0;
+        let mut separator = "";
+        for (bit, name) in Self::NAMES {
+            if self.contains(*bit) {
+                write!(f, "{separator}{name}")?;
+                separator = ", ";
+                unnamed &= !bit.0;
+            }
+        }
+        if unnamed == 0 {
+            return Ok(());
+        }
+        write!(f, "{separator}unnamed error bits {unnamed:#04x}")
+    }
+}
+
+impl fmt::Debug for Errors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Errors({:#04x}: {self})", self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::rmd::command::Code;
+    use std::string::ToString;
+
+    #[test]
+    fn unnamed_error_bits_are_kept_and_shown() {
+        assert_eq!(Errors::NONE.to_string(), "no error");
+        assert_eq!(Errors::LOW_VOLTAGE.to_string(), "low voltage protection");
+        let errors = Status1::decode(&[0x9A, 0, 0, 0, 0, 0, 0, 0x89]).errors;
+        assert_eq!(
+            errors.to_string(),
+            "low voltage protection, over temperature protection, unnamed error bits 0x80"
+        );
+    }
+
+    #[test]
+    fn a_multi_turn_angle_of_seven_bytes_has_its_sign_extended() {
+        let data = [0x92, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF];
+        let reply = MultiTurn::decode(&data);
+        assert_eq!(reply.angle, MultiTurnAngle(-1));
+        assert_eq!(reply.encode_as(Code::ReadMultiTurnAngle), data);
+        let least = MultiTurn::decode(&[0x92, 0, 0, 0, 0, 0, 0, 0x80]);
+        assert_eq!(least.angle, MultiTurnAngle(-(1 << 55)));
+    }
+
+    #[test]
+    fn every_reply_keeps_its_values_and_leaves_null_bytes_zero() {
+        fn check<P: Payload + PartialEq + fmt::Debug>(bits: u64) {
+            let value = P::unpack(bits);
+            assert_eq!(P::unpack(value.pack()), value);
+            let mask = P::FIELDS.iter().fold(0, |mask, field| {
+                mask | (u64::MAX >> (64 - 8 * field.len)) << (8 * field.offset)
+            });
+            assert_eq!(value.pack(), bits & mask);
+        }
+        for bits in [0, u64::MAX, 0xA5A5_A5A5_A5A5_A5A5, 0x8000_7F01_80FF_017F] {
+            check::<Gains>(bits);
+            check::<Acceleration>(bits);
+            check::<Encoder>(bits);
+            check::<EncoderOffset>(bits);
+            check::<MultiTurn>(bits);
+            check::<Circle>(bits);
+            check::<Status1>(bits);
+            check::<MotionStatus>(bits);
+            check::<PhaseCurrents>(bits);
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! A host and drives on one simulated bus and a virtual clock.
+#![allow(dead_code, reason = "each test file uses its part")]
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::units::*;
+
+pub fn motor(id: u8) -> MotorId {
+    MotorId::new(id).expect("the test names an ID of 1 to 32")
+}
+
+/// A motor that remembers what it was told and senses what the test says.
+#[derive(Debug, Clone, Default)]
+pub struct TestMotor {
+    pub sense: Sense,
+    pub mode: Mode,
+    pub modes_set: usize,
+    pub configured: Settings,
+    pub saved: Vec<Settings>,
+}
+
+impl Motor for TestMotor {
+    fn set_mode(&mut self, mode: Mode) {
+        self.mode = mode;
+        self.modes_set += 1;
+    }
+    fn configure(&mut self, settings: &Settings) {
+        self.configured = *settings;
+    }
+    fn sense(&mut self) -> Sense {
+        self.sense
+    }
+    fn save(&mut self, rom: &Settings) {
+        self.saved.push(*rom);
+    }
+}
+
+#[derive(Debug, Clone)]
+pub struct Node {
+    pub drive: Drive,
+    pub motor: TestMotor,
+    pub turnaround: Duration,
+}
+
+impl Node {
+    pub fn new(id: u8) -> Self {
+        let gains = Gains { position_kp: 100, position_ki: 100, ..Gains::default() };
+        let rom = Settings { gains, acceleration: DpsPerSecond(1000), encoder_offset: 0 };
+        let mut drive = Drive::new(Config::new(motor(id)), rom);
+        let mut motor = TestMotor::default();
+        motor.sense.temperature = Celsius(20 + id as i8);
+        drive.power_on(Instant(0), &mut motor);
+        Node { drive, motor, turnaround: Duration(800) }
+    }
+
+    pub fn receive(&mut self, now: Instant, frame: &CanFrame) -> Option<CanFrame> {
+        self.drive.receive(now, frame, &mut self.motor)
+    }
+
+    /// Sends a command and returns the reply.
+    pub fn ask<C: Command>(&mut self, command: C) -> C::Reply {
+        let reply = self.raw(command.encode()).expect("the drive knows the command");
+        C::Reply::decode(&reply)
+    }
+
+    /// Sends bytes to the drive and returns those of its reply.
+    pub fn raw(&mut self, data: [u8; 8]) -> Option<[u8; 8]> {
+        let id = self.drive.config.id.can_id();
+        let reply = self.receive(Instant(1), &CanFrame::new(id, data))?;
+        let (from, data) = reply.usable().expect("a reply is a standard frame of eight bytes");
+        assert_eq!(from, id);
+        Some(*data)
+    }
+
+    pub fn power_cycle(&mut self) {
+        self.drive.power_on(Instant(0), &mut self.motor);
+    }
+}
+
+pub type Outcome = (MotorId, Result<[u8; 8], Error>);
+
+/// A host and its drives. Fails the test on a request to a motor whose reply is still to come:
+/// both have the same identifier, and two nodes that send it at once is a bus error.
+pub struct Pair {
+    pub now: Instant,
+    pub host: Host,
+    pub nodes: Vec<Node>,
+    /// Identifiers of the frames that were on the bus.
+    pub log: Vec<u32>,
+    coming: Vec<(Instant, CanFrame)>,
+}
+
+impl Pair {
+    pub fn new(ids: &[u8]) -> Self {
+        let nodes = ids.iter().map(|id| Node::new(*id)).collect();
+        Pair { now: Instant(0), host: Host::new(), nodes, log: vec![], coming: vec![] }
+    }
+
+    pub fn request<C: Command>(&mut self, id: u8, command: C) -> Result<(), Refused> {
+        self.host.request(self.now, motor(id), command.encode())
+    }
+
+    /// Runs until every exchange is over.
+    pub fn run(&mut self) -> Vec<Outcome> {
+        let mut outcomes = vec![];
+        loop {
+            match self.host.poll(self.now) {
+                Output::Transmit(frame) => self.transmit(&frame),
+                Output::Done { id, result } => outcomes.push((id, result)),
+                Output::Wait(None) => return outcomes,
+                Output::Wait(Some(until)) => self.pass(until),
+            }
+        }
+    }
+
+    /// Lets time pass; what is on its way arrives.
+    pub fn wait(&mut self, span: Duration) {
+        let until = self.now + span;
+        while self.now < until {
+            self.pass(until);
+        }
+    }
+
+    fn transmit(&mut self, frame: &CanFrame) {
+        let taken = self.coming.iter().any(|(_, reply)| reply.id() == frame.id());
+        let urgent = matches!(frame.data(), [0x80 | 0x81, ..]);
+        assert!(urgent || !taken, "a request to a motor that is about to answer");
+        self.log.push(frame.id());
+        for node in &mut self.nodes {
+            let reply = node.drive.receive(self.now, frame, &mut node.motor);
+            self.coming.extend(reply.map(|reply| (self.now + node.turnaround, reply)));
+        }
+    }
+
+    fn pass(&mut self, until: Instant) {
+        let next = self.coming.iter().map(|(at, _)| *at).min().unwrap_or(until).min(until);
+        self.now = self.now.max(next);
+        let now = self.now;
+        for (_, frame) in self.coming.extract_if(.., |(at, _)| *at <= now) {
+            self.log.push(frame.id());
+            self.host.receive(&frame);
+        }
+    }
+}

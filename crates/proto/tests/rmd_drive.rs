@@ -1,0 +1,358 @@
+//! What a drive answers, keeps and does.
+
+mod rmd_bench;
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::units::*;
+use rmd_bench::{Node, motor};
+
+const SHIPPED: Gains = Gains {
+    position_kp: 100,
+    position_ki: 100,
+    speed_kp: 0,
+    speed_ki: 0,
+    torque_kp: 0,
+    torque_ki: 0,
+};
+const OTHER: Gains =
+    Gains { position_kp: 1, position_ki: 2, speed_kp: 3, speed_ki: 4, torque_kp: 5, torque_ki: 6 };
+
+fn torque(digits: i16) -> Torque {
+    Torque { torque: TorqueCommand(digits) }
+}
+
+fn circle(direction: Spin, degrees: f64) -> CirclePosition {
+    CirclePosition { direction, angle: CircleAngle::from_degrees(degrees) }
+}
+
+fn position(mode: Mode) -> i64 {
+    let Mode::Position { target, .. } = mode else { panic!("{mode:?} is no position") };
+    target
+}
+
+#[test]
+fn gains_in_ram_are_lost_at_power_off_and_those_in_rom_stay() {
+    let mut node = Node::new(1);
+    assert_eq!(node.ask(ReadGains), SHIPPED);
+    assert_eq!(node.ask(WriteGains(OTHER)), WriteGains(OTHER));
+    assert_eq!(node.motor.configured.gains, OTHER);
+    assert_eq!(node.ask(ReadGains), OTHER);
+    assert!(node.motor.saved.is_empty());
+    node.power_cycle();
+    assert_eq!(node.ask(ReadGains), SHIPPED);
+    assert_eq!(node.motor.configured.gains, SHIPPED);
+
+    node.ask(WriteGainsToRom(OTHER));
+    assert_eq!(node.ask(ReadGains), OTHER);
+    assert_eq!(node.motor.saved.last(), Some(node.drive.rom()));
+    node.power_cycle();
+    assert_eq!(node.ask(ReadGains), OTHER);
+}
+
+#[test]
+fn acceleration_is_kept_in_ram_only_and_read_back_as_written() {
+    let mut node = Node::new(1);
+    for digits in [20_000, 0, -1] {
+        let acceleration = Acceleration { acceleration: DpsPerSecond(digits) };
+        node.ask(WriteAcceleration(acceleration));
+        assert_eq!(node.ask(ReadAcceleration), acceleration);
+        assert_eq!(node.motor.configured.acceleration, DpsPerSecond(digits));
+    }
+    node.ask(WriteGainsToRom(OTHER));
+    node.power_cycle();
+    let acceleration = DpsPerSecond(1000);
+    assert_eq!(node.ask(ReadAcceleration), Acceleration { acceleration });
+}
+
+#[test]
+fn a_written_offset_holds_at_once_and_after_a_power_cycle() {
+    let mut node = Node::new(1);
+    node.motor.sense.encoder = 0x1000;
+    let offset = EncoderOffset { offset: 0x1800 };
+    assert_eq!(node.ask(WriteEncoderOffset(offset)), offset);
+    for _ in 0..2 {
+        let encoder = Encoder { position: 0x3800, raw: 0x1000, offset: 0x1800 };
+        assert_eq!(node.ask(ReadEncoder), encoder);
+        assert_eq!(node.ask(ReadStatus2).encoder, 0x3800);
+        assert_eq!(node.ask(ReadCircleAngle).angle, CircleAngle(31_500));
+        assert_eq!(node.ask(ReadMultiTurnAngle).angle, MultiTurnAngle(-4_500));
+        node.power_cycle();
+    }
+}
+
+#[test]
+fn an_offset_beyond_the_encoder_is_cut_and_the_reply_says_so() {
+    let mut node = Node::new(1);
+    let offset = EncoderOffset { offset: 0xFFFF };
+    assert_eq!(node.ask(WriteEncoderOffset(offset)), EncoderOffset { offset: 0x3FFF });
+}
+
+#[test]
+fn a_new_zero_is_in_the_reply_and_holds_from_the_next_power_on() {
+    let mut node = Node::new(1);
+    node.motor.sense.encoder = 0x1234;
+    assert_eq!(node.ask(WriteZeroToRom), EncoderOffset { offset: 0x1234 });
+    let before = Encoder { position: 0x1234, raw: 0x1234, offset: 0 };
+    assert_eq!(node.ask(ReadEncoder), before);
+    assert_eq!(node.motor.saved.len(), 1);
+    node.power_cycle();
+    let after = Encoder { position: 0, raw: 0x1234, offset: 0x1234 };
+    assert_eq!(node.ask(ReadEncoder), after);
+    assert_eq!(node.ask(ReadMultiTurnAngle).angle, MultiTurnAngle(0));
+}
+
+#[test]
+fn of_an_18_bit_encoder_the_upper_16_bits_travel_and_the_angle_has_them_all() {
+    let mut node = Node::new(1);
+    node.drive.config.encoder = EncoderBits::new(18).unwrap();
+    node.motor.sense.encoder = 0x1_0003;
+    let encoder = Encoder { position: 0x4000, raw: 0x4000, offset: 0 };
+    assert_eq!(node.ask(ReadEncoder), encoder);
+    node.motor.sense.encoder = (1 << 18) + 0x2_0000;
+    assert_eq!(node.ask(ReadMultiTurnAngle).angle, MultiTurnAngle(54_000));
+    node.ask(Position { angle: CentiDegrees(-9_000) });
+    assert_eq!(position(node.motor.mode), -0x1_0000);
+}
+
+#[test]
+fn status_carries_what_the_sensors_read() {
+    let mut node = Node::new(1);
+    let phase_currents = PhaseCurrents { phase_a: PhaseCurrent(64), ..PhaseCurrents::default() };
+    node.motor.sense = Sense {
+        temperature: Celsius(-7),
+        voltage: DeciVolts(240),
+        iq: TorqueFeedback(-2048),
+        speed: Dps(-360),
+        encoder: 77,
+        phase_currents,
+        faults: Errors::NONE,
+    };
+    let status =
+        Status1 { temperature: Celsius(-7), voltage: DeciVolts(240), errors: Errors::NONE };
+    assert_eq!(node.ask(ReadStatus1), status);
+    let motion = MotionStatus {
+        temperature: Celsius(-7),
+        iq: TorqueFeedback(-2048),
+        speed: Dps(-360),
+        encoder: 77,
+    };
+    assert_eq!(node.ask(ReadStatus2), motion);
+    assert_eq!(node.ask(torque(1)), motion);
+    assert_eq!(node.ask(ReadStatus3), phase_currents);
+}
+
+#[test]
+fn run_restores_what_stop_interrupted() {
+    let mut node = Node::new(1);
+    let speed = CentiDps(36_000);
+    node.ask(Speed { speed });
+    node.ask(Stop);
+    assert_eq!(node.motor.mode, Mode::Stopped);
+    assert_eq!(node.drive.mode(), Mode::Stopped);
+    node.ask(Stop);
+    node.ask(Run);
+    assert_eq!(node.motor.mode, Mode::Speed(speed));
+    assert_eq!(node.drive.mode(), Mode::Speed(speed));
+}
+
+#[test]
+fn run_without_a_stop_changes_nothing() {
+    let mut node = Node::new(1);
+    node.ask(torque(5));
+    let set = node.motor.modes_set;
+    node.ask(Run);
+    assert_eq!(node.motor.modes_set, set);
+}
+
+#[test]
+fn after_off_there_is_nothing_to_resume() {
+    let mut node = Node::new(1);
+    node.ask(torque(5));
+    node.ask(Stop);
+    node.ask(Off);
+    assert_eq!(node.motor.mode, Mode::Off);
+    node.ask(Run);
+    assert_eq!(node.motor.mode, Mode::Off);
+    node.ask(Stop);
+    assert_eq!(node.motor.mode, Mode::Off, "what is off stays off");
+}
+
+#[test]
+fn a_motion_command_ends_a_stop() {
+    let mut node = Node::new(1);
+    node.ask(torque(5));
+    node.ask(Stop);
+    node.ask(torque(6));
+    assert_eq!(node.motor.mode, Mode::Torque(TorqueCommand(6)));
+}
+
+#[test]
+fn torque_beyond_the_range_of_the_document_is_saturated() {
+    let mut node = Node::new(1);
+    for (asked, done) in [(2000, 2000), (2001, 2000), (i16::MAX, 2000), (i16::MIN, -2000)] {
+        node.ask(torque(asked));
+        assert_eq!(node.motor.mode, Mode::Torque(TorqueCommand(done)));
+    }
+}
+
+#[test]
+fn position_targets_are_counted_from_the_zero_point() {
+    let mut node = Node::new(1);
+    node.ask(WriteEncoderOffset(EncoderOffset { offset: 100 }));
+    node.ask(Position { angle: CentiDegrees(-36_000) });
+    assert_eq!(node.motor.mode, Mode::Position { target: 100 - 16_384, max_speed: None });
+    let max_speed = SpeedLimit(0);
+    node.ask(PositionLimited { angle: CentiDegrees(9_000), max_speed });
+    let limited = Mode::Position { target: 100 + 4_096, max_speed: Some(max_speed) };
+    assert_eq!(node.motor.mode, limited, "a greatest speed of 0 is taken at its word");
+}
+
+#[test]
+fn a_single_turn_command_turns_the_way_it_says() {
+    let mut node = Node::new(1);
+    node.motor.sense.encoder = 3 * 16_384 + 8_192;
+    node.ask(circle(Spin::Clockwise, 90.0));
+    assert_eq!(position(node.motor.mode), 4 * 16_384 + 4_096);
+    node.ask(circle(Spin::Counterclockwise, 90.0));
+    assert_eq!(position(node.motor.mode), 3 * 16_384 + 4_096);
+    node.ask(circle(Spin::Counterclockwise, 180.0));
+    assert_eq!(position(node.motor.mode), 3 * 16_384 + 8_192, "it is there already");
+}
+
+#[test]
+fn the_same_single_turn_command_again_does_not_start_another_turn() {
+    let mut node = Node::new(1);
+    let command = circle(Spin::Clockwise, 90.0);
+    node.ask(command);
+    node.motor.sense.encoder = 4_097;
+    node.ask(command);
+    assert_eq!(position(node.motor.mode), 4_096, "a count beyond is no reason for a turn");
+    let CirclePosition { direction, angle } = command;
+    let max_speed = SpeedLimit(7);
+    node.ask(CirclePositionLimited { direction, max_speed, angle });
+    assert_eq!(node.motor.mode, Mode::Position { target: 4_096, max_speed: Some(max_speed) });
+    node.ask(torque(0));
+    node.ask(command);
+    assert_eq!(position(node.motor.mode), 4_096 + 16_384, "after something else it is a new one");
+}
+
+#[test]
+fn a_single_turn_command_outside_the_range_of_the_document_is_answered_and_not_carried_out() {
+    let mut node = Node::new(1);
+    let known = circle(Spin::Clockwise, 90.0);
+    node.ask(known);
+    let set = node.motor.modes_set;
+    for command in [
+        CirclePosition { angle: CircleAngle(36_000), ..known },
+        CirclePosition { direction: Spin::Unknown(2), ..known },
+    ] {
+        for _ in 0..2 {
+            assert!(node.raw(command.encode()).is_some());
+            assert_eq!(node.motor.modes_set, set);
+        }
+    }
+}
+
+#[test]
+fn an_error_stays_until_it_is_cleared_after_its_cause_is_gone() {
+    let mut node = Node::new(1);
+    node.motor.sense.faults = Errors::LOW_VOLTAGE;
+    assert_eq!(node.ask(ReadStatus1).errors, Errors::LOW_VOLTAGE);
+    assert_eq!(node.ask(ClearErrors).errors, Errors::LOW_VOLTAGE, "the cause lasts");
+    node.motor.sense.faults = Errors::OVER_TEMPERATURE;
+    assert_eq!(node.ask(ClearErrors).errors, Errors::OVER_TEMPERATURE, "only one cause is gone");
+    node.motor.sense.faults = Errors::NONE;
+    assert_eq!(node.ask(ReadStatus1).errors, Errors::OVER_TEMPERATURE);
+    assert_eq!(node.ask(ClearErrors).errors, Errors::NONE);
+}
+
+#[test]
+fn while_an_error_is_latched_the_motor_is_off_and_motion_commands_are_only_answered() {
+    let mut node = Node::new(1);
+    node.ask(torque(100));
+    node.motor.sense.faults = Errors::OVER_TEMPERATURE;
+    node.drive.poll(Instant(5), &mut node.motor);
+    assert_eq!(node.motor.mode, Mode::Off);
+    node.motor.sense.faults = Errors::NONE;
+    node.ask(torque(100));
+    node.ask(Run);
+    assert!(node.receive(Instant(6), &CanFrame::new(0x280, [1; 8])).is_some());
+    assert_eq!(node.motor.mode, Mode::Off);
+    node.ask(ClearErrors);
+    node.ask(Run);
+    assert_eq!(node.motor.mode, Mode::Off, "protection forgot the command");
+    node.ask(torque(100));
+    assert_eq!(node.motor.mode, Mode::Torque(TorqueCommand(100)));
+}
+
+#[test]
+fn silence_for_the_shutdown_time_switches_the_motor_off() {
+    let mut node = Node::new(1);
+    assert_eq!(node.drive.deadline(), None);
+    node.drive.config.shutdown = Some(Duration(1_000));
+    assert_eq!(node.drive.deadline(), None, "an idle motor has nothing to switch off");
+    let send = |node: &mut Node, at, data| node.receive(Instant(at), &CanFrame::new(0x141, data));
+    send(&mut node, 100, torque(5).encode());
+    assert_eq!(node.drive.deadline(), Some(Instant(1_100)));
+    send(&mut node, 900, ReadStatus1.encode());
+    assert_eq!(node.drive.deadline(), Some(Instant(1_900)), "any command counts");
+    send(&mut node, 1_000, [0x60; 8]);
+    assert_eq!(node.drive.deadline(), Some(Instant(1_900)), "an unknown code does not");
+    node.drive.poll(Instant(1_899), &mut node.motor);
+    assert_eq!(node.motor.mode, Mode::Torque(TorqueCommand(5)));
+    node.drive.poll(Instant(1_900), &mut node.motor);
+    assert_eq!(node.motor.mode, Mode::Off);
+    send(&mut node, 1_950, Run.encode());
+    assert_eq!(node.motor.mode, Mode::Off, "there is nothing to resume");
+
+    send(&mut node, 2_000, torque(5).encode());
+    send(&mut node, 3_000, Run.encode());
+    assert_eq!(node.motor.mode, Mode::Off, "also when nobody polled in between");
+}
+
+#[test]
+fn an_echo_repeats_what_came_down_to_stale_null_bytes() {
+    let mut node = Node::new(1);
+    for code in COMMANDS.iter().filter(|row| row.echo).map(|row| u8::from(row.code)) {
+        let data = [code, 0xDE, 0xAD, 0xBE, 0xEF, 0x55, 0xAA, 0x33];
+        assert_eq!(node.raw(data), Some(data));
+    }
+}
+
+#[test]
+fn null_bytes_of_other_replies_are_zero() {
+    let mut node = Node::new(1);
+    for row in COMMANDS.iter().filter(|row| !row.echo) {
+        let reply = node.raw([row.code.into(), 1, 2, 3, 4, 5, 6, 7]).unwrap();
+        let used = |byte| {
+            row.reply.iter().any(|field| (field.offset..field.offset + field.len).contains(&byte))
+        };
+        for (index, byte) in (1..).zip(&reply[1..]) {
+            assert!(used(index) || *byte == 0, "{} DATA[{index}]", row.code);
+        }
+    }
+}
+
+#[test]
+fn frames_for_others_and_frames_of_other_kinds_get_no_answer() {
+    let mut node = Node::new(5);
+    let data = torque(7).encode();
+    for frame in
+        [CanFrame::new(0x141, data), CanFrame::new(0x280, data), CanFrame::new(0x245, data)]
+    {
+        assert_eq!(node.receive(Instant(1), &frame), None);
+    }
+    assert_eq!(*node.drive.ignored(), Ignored::default());
+    for frame in [
+        CanFrame::data_frame(0x145, false, &data[..7]),
+        CanFrame::data_frame(0x145, true, &data),
+        CanFrame::remote_frame(0x145, false, 8),
+    ] {
+        assert_eq!(node.receive(Instant(1), &frame), None);
+    }
+    assert_eq!(node.raw([0x60, 0, 0, 0, 0, 0, 0, 0]), None);
+    assert_eq!(*node.drive.ignored(), Ignored { malformed: 3, unknown: 1 });
+    assert_eq!(node.motor.mode, Mode::Off);
+    assert_eq!(node.drive.config.id, motor(5));
+}

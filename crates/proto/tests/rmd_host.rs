@@ -1,0 +1,286 @@
+//! The host against drives on a virtual clock.
+
+mod rmd_bench;
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::units::*;
+use rmd_bench::{Pair, motor};
+
+fn temperature(reply: &[u8; 8]) -> i8 {
+    MotionStatus::decode(reply).temperature.0
+}
+
+#[test]
+fn a_cycle_over_many_motors_takes_as_long_as_one_exchange() {
+    let ids: Vec<u8> = (1..=32).collect();
+    let mut pair = Pair::new(&ids);
+    for id in &ids {
+        pair.request(*id, ReadStatus2).unwrap();
+    }
+    let outcomes = pair.run();
+    assert_eq!(pair.now, Instant(800));
+    assert_eq!(outcomes.len(), 32);
+    for (id, result) in outcomes {
+        assert_eq!(temperature(&result.unwrap()), 20 + id.number() as i8);
+    }
+    assert!(pair.host.busy().is_empty());
+    assert_eq!(*pair.host.counters(), Counters::default());
+}
+
+#[test]
+fn four_torques_in_one_frame_reach_their_motors_and_all_answer() {
+    let mut pair = Pair::new(&[1, 2, 3, 4, 5]);
+    let torques = Torque4([100, -100, 0, 2000].map(TorqueCommand));
+    pair.host.torque4(pair.now, torques, MotorSet::TORQUE4).unwrap();
+    let outcomes = pair.run();
+    assert!(outcomes.iter().map(|(id, _)| id.number()).eq([1, 2, 3, 4]));
+    for (id, result) in outcomes {
+        let reply = result.unwrap();
+        assert_eq!(reply[0], 0xA1);
+        assert_eq!(temperature(&reply), 20 + id.number() as i8);
+    }
+    let modes = pair.nodes.iter().map(|node| node.motor.mode);
+    assert!(
+        modes.eq([100, -100, 0, 2000]
+            .map(|digits| Mode::Torque(TorqueCommand(digits)))
+            .into_iter()
+            .chain([Mode::Off]))
+    );
+    assert_eq!(pair.log, [0x280, 0x141, 0x142, 0x143, 0x144]);
+}
+
+#[test]
+fn four_torques_are_refused_as_a_whole() {
+    let mut host = Host::new();
+    let now = Instant(0);
+    let none = Torque4::default();
+    let beyond = host.torque4(now, none, MotorSet::from(motor(5)));
+    assert_eq!(beyond, Err(Refused::OutOfReach(motor(5))));
+
+    let current = Some(TorqueCommand(10));
+    host.set_limits(motor(3), Limits { current, ..Limits::default() });
+    let torques = Torque4([0, 0, 11, 0].map(TorqueCommand));
+    let limited = host.torque4(now, torques, MotorSet::TORQUE4);
+    assert!(matches!(limited, Err(Refused::Limit { id, .. }) if id == motor(3)));
+
+    host.request(now, motor(4), ReadStatus2.encode()).unwrap();
+    let busy = host.torque4(now, none, MotorSet::from(motor(1)));
+    assert_eq!(busy, Err(Refused::Busy(motor(4))));
+    assert_eq!(host.busy(), MotorSet::from(motor(4)));
+}
+
+#[test]
+fn while_four_torques_wait_to_be_sent_their_motors_are_busy() {
+    let mut host = Host::new();
+    host.torque4(Instant(0), Torque4::default(), MotorSet::from(motor(1))).unwrap();
+    assert_eq!(host.busy(), MotorSet::TORQUE4);
+    let data = ReadStatus2.encode();
+    assert_eq!(host.request(Instant(0), motor(2), data), Err(Refused::Busy(motor(2))));
+    assert_eq!(host.request(Instant(0), motor(5), data), Ok(()));
+}
+
+#[test]
+fn an_unexpected_answer_to_four_torques_is_not_taken_for_another_exchange() {
+    let mut pair = Pair::new(&[1, 2]);
+    pair.nodes[1].turnaround = Duration(2_000);
+    for _ in 0..2 {
+        pair.host.torque4(pair.now, Torque4::default(), MotorSet::from(motor(1))).unwrap();
+        assert_eq!(pair.run().len(), 1);
+    }
+    let torque = Torque { torque: TorqueCommand(1) };
+    assert!(matches!(pair.request(2, torque), Err(Refused::Quarantined { .. })));
+    pair.wait(Duration(5_000));
+    assert_eq!(pair.host.counters().late, 2);
+    assert_eq!(pair.request(2, Off), Ok(()), "a motor can be switched off all the same");
+}
+
+#[test]
+fn a_motor_has_one_exchange_at_a_time() {
+    let mut pair = Pair::new(&[1]);
+    pair.request(1, ReadStatus1).unwrap();
+    assert_eq!(pair.request(1, ReadStatus2), Err(Refused::Busy(motor(1))));
+    pair.run();
+    assert_eq!(pair.request(1, ReadStatus2), Ok(()));
+}
+
+#[test]
+fn the_time_for_a_reply_runs_from_the_moment_of_sending() {
+    let mut host = Host::new();
+    host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
+    let sent = Instant(1_000_000);
+    assert!(matches!(host.poll(sent), Output::Transmit(_)));
+    assert_eq!(host.poll(sent), Output::Wait(Some(sent + DEFAULT_TIMEOUT)));
+    let Output::Done { result, .. } = host.poll(sent + DEFAULT_TIMEOUT) else {
+        panic!("the time is over")
+    };
+    assert_eq!(result, Err(Error::Timeout));
+    assert_eq!(host.poll(sent + DEFAULT_TIMEOUT), Output::Wait(None));
+}
+
+#[test]
+fn each_request_may_have_its_own_timeout() {
+    let mut host = Host::new();
+    let (now, data) = (Instant(0), ReadStatus1.encode());
+    host.set_timeout(Duration(500));
+    host.request(now, motor(1), data).unwrap();
+    host.request_within(now, motor(2), data, Duration(200)).unwrap();
+    let mut failed = vec![];
+    let mut now = now;
+    loop {
+        match host.poll(now) {
+            Output::Transmit(_) => {}
+            Output::Done { id, .. } => failed.push((now.0, id.number())),
+            Output::Wait(Some(until)) => now = until,
+            Output::Wait(None) => break,
+        }
+    }
+    assert_eq!(failed, [(200, 2), (500, 1)]);
+}
+
+#[test]
+fn a_late_reply_is_counted_and_ends_the_quarantine() {
+    let mut pair = Pair::new(&[1]);
+    pair.nodes[0].turnaround = Duration::from_millis(60);
+    pair.request(1, ReadStatus2).unwrap();
+    assert_eq!(pair.run(), [(motor(1), Err(Error::Timeout))]);
+    let until = pair.now + DEFAULT_GUARD;
+    let refused = Err(Refused::Quarantined { id: motor(1), until });
+    assert_eq!(pair.request(1, ReadStatus2), refused);
+
+    pair.wait(Duration::from_millis(10));
+    assert_eq!(pair.host.counters().late, 1);
+    pair.nodes[0].turnaround = Duration(800);
+    pair.nodes[0].motor.sense.temperature = Celsius(77);
+    pair.request(1, ReadStatus2).unwrap();
+    assert_eq!(temperature(&pair.run()[0].1.unwrap()), 77);
+}
+
+#[test]
+fn a_quarantine_ends_with_its_guard_time_when_no_reply_comes() {
+    let mut pair = Pair::new(&[]);
+    pair.host.set_guard(Duration(300));
+    pair.request(1, ReadStatus2).unwrap();
+    pair.run();
+    pair.now += Duration(299);
+    assert!(pair.request(1, ReadStatus2).is_err());
+    pair.now += Duration(1);
+    assert_eq!(pair.request(1, ReadStatus2), Ok(()));
+    assert_eq!(pair.host.counters().late, 0);
+}
+
+#[test]
+fn off_passes_a_quarantine_and_the_late_reply_is_told_apart() {
+    let mut pair = Pair::new(&[1]);
+    pair.nodes[0].turnaround = Duration::from_millis(60);
+    pair.request(1, ReadStatus2).unwrap();
+    pair.run();
+    pair.request(1, Off).unwrap();
+    assert_eq!(pair.run(), [(motor(1), Err(Error::Timeout))]);
+    assert_eq!(pair.host.counters().late, 1);
+    assert!(pair.request(1, Off).is_err(), "its own late reply is awaited");
+    assert_eq!(pair.request(1, Stop), Ok(()));
+}
+
+#[test]
+fn a_cancelled_exchange_makes_way_for_off_at_once() {
+    let mut pair = Pair::new(&[1]);
+    pair.request(1, ReadStatus2).unwrap();
+    assert!(matches!(pair.host.poll(pair.now), Output::Transmit(_)));
+    pair.host.cancel(pair.now, motor(1));
+    assert!(pair.request(1, ReadStatus2).is_err());
+    pair.request(1, Off).unwrap();
+    assert_eq!(pair.run(), [(motor(1), Ok(Off.encode()))]);
+
+    pair.request(2, ReadStatus2).unwrap();
+    pair.host.cancel(pair.now, motor(2));
+    assert_eq!(pair.request(2, ReadStatus2), Ok(()), "nothing was sent, nothing is owed");
+}
+
+#[test]
+fn cancelling_one_motor_holds_back_the_four_torques_that_would_reach_it() {
+    let mut pair = Pair::new(&[1, 2]);
+    pair.host.torque4(pair.now, Torque4::default(), MotorSet::TORQUE4).unwrap();
+    pair.host.cancel(pair.now, motor(5));
+    assert_eq!(pair.host.busy(), MotorSet::TORQUE4);
+    pair.host.cancel(pair.now, motor(2));
+    pair.request(2, Off).unwrap();
+    assert_eq!(pair.run(), [(motor(2), Ok(Off.encode()))]);
+    assert_eq!(pair.log, [0x142, 0x142]);
+}
+
+#[test]
+fn the_reply_to_clear_errors_may_have_either_code() {
+    for clear_reply_0x9b in [false, true] {
+        let mut pair = Pair::new(&[1]);
+        pair.nodes[0].drive.config.clear_reply_0x9b = clear_reply_0x9b;
+        pair.request(1, ClearErrors).unwrap();
+        let reply = pair.run()[0].1.unwrap();
+        assert_eq!(reply[0], if clear_reply_0x9b { 0x9B } else { 0x9A });
+    }
+    let mut host = Host::new();
+    host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
+    assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
+    host.receive(&CanFrame::new(0x141, [0x9B; 8]));
+    assert_eq!(host.counters().unasked, 1, "0x9B does not answer 0x9A");
+}
+
+#[test]
+fn frames_that_answer_nothing_are_counted_and_dropped() {
+    let mut host = Host::new();
+    host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
+    assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
+    let data = ReadStatus1.encode();
+    host.receive(&CanFrame::new(0x142, data));
+    host.receive(&CanFrame::new(0x141, ReadStatus2.encode()));
+    host.receive(&CanFrame::data_frame(0x141, false, &data[..7]));
+    host.receive(&CanFrame::data_frame(0x141, true, &data));
+    host.receive(&CanFrame::remote_frame(0x141, false, 8));
+    host.receive(&CanFrame::new(0x7FF, data));
+    let Counters { unasked, malformed, late, .. } = *host.counters();
+    assert_eq!((unasked, malformed, late), (2, 3, 0));
+    assert!(matches!(host.poll(Instant(0)), Output::Wait(Some(_))));
+}
+
+#[test]
+fn a_motor_of_another_protocol_is_named_when_the_exchange_fails() {
+    for (base, dialect) in [(0x240, Dialect::V3), (0x180, Dialect::LkTech)] {
+        let mut host = Host::new();
+        host.request(Instant(0), motor(7), ReadStatus1.encode()).unwrap();
+        assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
+        host.receive(&CanFrame::new(base + 7, ReadStatus1.encode()));
+        let Output::Done { result, .. } = host.poll(Instant(0) + DEFAULT_TIMEOUT) else {
+            panic!("the time is over")
+        };
+        assert_eq!(result, Err(Error::Foreign(dialect)));
+        let Counters { foreign_v3, foreign_lk, last_foreign, .. } = *host.counters();
+        assert_eq!(foreign_v3 + foreign_lk, 1);
+        assert_eq!(last_foreign, Some((dialect, motor(7))));
+    }
+}
+
+#[test]
+fn limits_hold_for_raw_frames_of_their_motor_only() {
+    let mut pair = Pair::new(&[1, 2]);
+    let limits = Limits { current: Some(TorqueCommand(50)), ..Limits::default() };
+    pair.host.set_limits(motor(1), limits);
+    let raw = [0xA1, 0, 0, 0, 51, 0, 0, 0];
+    let refused = pair.host.request(pair.now, motor(1), raw);
+    let exceeded = Exceeded::Current { asked: TorqueCommand(51), limit: TorqueCommand(50) };
+    assert_eq!(refused, Err(Refused::Limit { id: motor(1), exceeded }));
+    assert_eq!(
+        refused.unwrap_err().to_string(),
+        "motor 1: torque current 0.816 A is beyond the limit of 0.800 A"
+    );
+    assert_eq!(pair.host.request(pair.now, motor(2), raw), Ok(()));
+    assert_eq!(pair.run().len(), 1);
+    assert_eq!(pair.log, [0x142, 0x142]);
+}
+
+#[test]
+fn a_code_that_nobody_knows_is_sent_and_answered_by_silence() {
+    let mut pair = Pair::new(&[1]);
+    pair.host.request(pair.now, motor(1), [0x60; 8]).unwrap();
+    assert_eq!(pair.run(), [(motor(1), Err(Error::Timeout))]);
+    assert_eq!(pair.nodes[0].drive.ignored().unknown, 1);
+}

@@ -1,0 +1,181 @@
+//! What holds for any frames in any order.
+
+mod rmd_bench;
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::{Duration, Instant};
+use proptest::prelude::*;
+use rmd_bench::{Node, motor};
+use std::collections::HashMap;
+
+fn any_frame() -> impl Strategy<Value = CanFrame> {
+    let id =
+        prop_oneof![0x13Eu32..0x164, Just(0x280), 0x17Eu32..0x1A4, 0x23Eu32..0x264, any::<u32>()];
+    let first = prop_oneof![prop::sample::select(Code::ALL).prop_map(u8::from), any::<u8>()];
+    (id, any::<[u8; 8]>(), first, prop_oneof![9 => Just(8), 1 => 0usize..8], 0u8..20).prop_map(
+        |(id, mut data, first, len, kind)| {
+            data[0] = first;
+            match kind {
+                0 => CanFrame::data_frame(id, true, &data[..len]),
+                1 => CanFrame::remote_frame(id, false, len as u8),
+                _ => CanFrame::data_frame(id, false, &data[..len]),
+            }
+        },
+    )
+}
+
+proptest! {
+    #[test]
+    fn a_drive_answers_only_its_own_frames_and_only_those_change_it(
+        id in 1u8..=32,
+        encoder in any::<i64>(),
+        bits in 12u8..=18,
+        frames in prop::collection::vec(any_frame(), 1..60),
+    ) {
+        let mut node = Node::new(id);
+        node.drive.config.encoder = EncoderBits::new(bits).unwrap();
+        node.motor.sense.encoder = encoder;
+        for (at, frame) in frames.iter().enumerate() {
+            let (set, ram, rom) =
+                (node.motor.modes_set, *node.drive.settings(), *node.drive.rom());
+            let own = frame.id() == 0x140 + u32::from(id) || (frame.id() == 0x280 && id <= 4);
+            match node.receive(Instant(at as u64), frame) {
+                Some(reply) => {
+                    prop_assert!(own && frame.usable().is_some());
+                    prop_assert_eq!(reply.id(), 0x140 + u32::from(id));
+                    let (asked, came) = (frame.data()[0], reply.data()[0]);
+                    prop_assert!(frame.id() == 0x280 && came == 0xA1
+                        || asked == came || (asked, came) == (0x9B, 0x9A));
+                }
+                None => {
+                    prop_assert_eq!(node.motor.modes_set, set);
+                    prop_assert_eq!(*node.drive.settings(), ram);
+                    prop_assert_eq!(*node.drive.rom(), rom);
+                }
+            }
+            if let Mode::Torque(torque) = node.motor.mode {
+                prop_assert!((-2000..=2000).contains(&torque.0));
+            }
+        }
+    }
+
+    #[test]
+    fn the_single_turn_angle_is_the_multi_turn_angle_within_the_turn(
+        encoder in -(1i64 << 50)..1 << 50,
+        offset in any::<u16>(),
+        bits in 12u8..=18,
+    ) {
+        let mut node = Node::new(1);
+        node.drive.config.encoder = EncoderBits::new(bits).unwrap();
+        node.motor.sense.encoder = encoder % (1 << 36);
+        node.ask(WriteEncoderOffset(EncoderOffset { offset }));
+        let multi = node.ask(ReadMultiTurnAngle).angle.0;
+        prop_assert_eq!(multi.rem_euclid(36_000), i64::from(node.ask(ReadCircleAngle).angle.0));
+        let Encoder { position, raw, offset } = node.ask(ReadEncoder);
+        let travels = u32::from(bits.min(16));
+        prop_assert_eq!(
+            u32::from(position),
+            u32::from(raw).wrapping_sub(u32::from(offset)) & ((1 << travels) - 1)
+        );
+        prop_assert_eq!(node.ask(ReadStatus2).encoder, position);
+    }
+
+    #[test]
+    fn every_frame_can_be_described(frame in any_frame()) {
+        for direction in [Direction::HostToDrive, Direction::DriveToHost] {
+            prop_assert!(!describe(frame, direction).to_string().is_empty());
+        }
+    }
+
+    #[test]
+    fn no_frame_ends_an_exchange_but_the_reply_to_it(
+        asked in prop::collection::vec((1u8..=32, any::<u8>()), 1..8),
+        frames in prop::collection::vec(any_frame(), 0..80),
+    ) {
+        let mut host = Host::new();
+        let mut open = HashMap::new();
+        for (id, code) in asked {
+            if host.request(Instant(0), motor(id), [code, 0, 0, 0, 0, 0, 0, 0]).is_ok() {
+                open.insert(id, code);
+            }
+        }
+        while let Output::Transmit(_) = host.poll(Instant(0)) {}
+        for frame in &frames {
+            host.receive(frame);
+            match host.poll(Instant(1)) {
+                Output::Done { id, result } => {
+                    let reply = result.unwrap();
+                    prop_assert_eq!(frame.data(), reply);
+                    prop_assert_eq!(frame.id(), u32::from(id.can_id()));
+                    let code = open.remove(&id.number()).expect("it was open");
+                    prop_assert!(reply[0] == code || (code, reply[0]) == (0x9B, 0x9A));
+                }
+                Output::Wait(until) => prop_assert_eq!(until.is_none(), open.is_empty()),
+                Output::Transmit(_) => prop_assert!(false, "nothing is left to send"),
+            }
+        }
+    }
+
+    /// Replies carry the number of their request; some take longer than the timeout.
+    #[test]
+    fn a_late_reply_is_never_taken_for_the_reply_to_another_exchange(
+        steps in prop::collection::vec((1u8..=4, 0u8..3, 1u64..140, any::<bool>(), 0u64..40), 1..150),
+    ) {
+        let mut host = Host::new();
+        host.set_timeout(Duration(50));
+        host.set_guard(Duration(100));
+        let mut now = Instant(0);
+        let mut coming: Vec<(Instant, CanFrame)> = vec![];
+        let mut last = HashMap::new();
+        for (number, (id, code, delay, lost, pause)) in (1u8..).zip(steps) {
+            let code = [0x9A, 0x80, 0x9C][usize::from(code)];
+            if host.request(now, motor(id), [code, number, 0, 0, 0, 0, 0, 0]).is_ok() {
+                last.insert(id, number);
+            }
+            let until = now + Duration(pause);
+            while now < until {
+                loop {
+                    match host.poll(now) {
+                        Output::Transmit(frame) if !lost => {
+                            coming.push((now + Duration(delay), frame));
+                        }
+                        Output::Transmit(_) => {}
+                        Output::Done { id, result: Ok(reply) } => {
+                            prop_assert_eq!(last.get(&id.number()), Some(&reply[1]));
+                        }
+                        Output::Done { .. } => {}
+                        Output::Wait(_) => break,
+                    }
+                }
+                now += Duration(1);
+                for (_, frame) in coming.extract_if(.., |(at, _)| *at <= now) {
+                    host.receive(&frame);
+                }
+            }
+        }
+    }
+
+    /// Each host sees the other's requests and the replies to them.
+    #[test]
+    fn two_hosts_that_talk_to_different_motors_do_not_mix(
+        steps in prop::collection::vec((1u8..=8, prop::sample::select(Code::ALL)), 1..60),
+    ) {
+        let mut hosts = [Host::new(), Host::new()];
+        let mut nodes: Vec<Node> = (1..=8).map(Node::new).collect();
+        for (id, code) in steps {
+            let (own, other) = (usize::from(id % 2), usize::from((id + 1) % 2));
+            let data = [u8::from(code), 0, 0, 0, 0, 0, 0, 0];
+            hosts[own].request(Instant(0), motor(id), data).unwrap();
+            let Output::Transmit(frame) = hosts[own].poll(Instant(0)) else { panic!("it is free") };
+            let node = &mut nodes[usize::from(id - 1)];
+            let reply = node.receive(Instant(0), &frame).expect("a known code");
+            hosts[other].receive(&frame);
+            hosts.iter_mut().for_each(|host| host.receive(&reply));
+            prop_assert_eq!(
+                hosts[own].poll(Instant(0)),
+                Output::Done { id: motor(id), result: Ok(*reply.usable().unwrap().1) }
+            );
+            prop_assert_eq!(hosts[other].poll(Instant(0)), Output::Wait(None));
+        }
+    }
+}
