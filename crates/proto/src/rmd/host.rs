@@ -55,7 +55,6 @@ pub enum Error {
 
 /// Why a request was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
 pub enum Refused {
     /// This motor's exchange is not over.
     Busy(MotorId),

@@ -1,0 +1,16 @@
+//! Motor drives from a program: ports, and the clients that talk through them.
+//!
+//! [`port`] opens serial lines and CAN buses by name; [`serve`] is the other side of them, for
+//! simulated drives; [`list`] says what this machine has; [`slcan`] is the language of serial CAN
+//! adapters.
+#![forbid(unsafe_code)]
+
+mod line;
+pub mod list;
+pub mod port;
+pub mod rmd;
+pub mod serve;
+pub mod slcan;
+pub mod stmcp;
+
+pub use line::{BackOff, LinkState, Opener};

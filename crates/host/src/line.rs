@@ -1,0 +1,127 @@
+//! A port that may go away and come back: explicit state, back-off with a cap, one clock.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use motorlink_proto::time::Instant as Moment;
+
+use crate::port::PortError;
+
+/// Opens the port, again and again if it must.
+pub type Opener<L> = Box<dyn FnMut() -> Result<L, PortError> + Send>;
+
+/// What a port is at the moment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LinkState {
+    /// Open.
+    Open,
+    /// Closed; the next call opens it, unless it comes before `retry_in` has passed.
+    Closed {
+        /// What is left of the back-off.
+        retry_in: Duration,
+    },
+}
+
+/// How long to wait between attempts to open a port that went away.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BackOff {
+    /// Wait after the first failed attempt; it doubles with each further one.
+    pub first: Duration,
+    /// The longest wait.
+    pub cap: Duration,
+}
+
+impl Default for BackOff {
+    /// 50 ms, doubling up to 2 s.
+    fn default() -> Self {
+        BackOff { first: Duration::from_millis(50), cap: Duration::from_secs(2) }
+    }
+}
+
+/// A link with the means to open it anew.
+pub(crate) struct Reopening<L> {
+    /// What messages call the port.
+    pub(crate) name: Arc<str>,
+    link: Option<L>,
+    open: Option<Opener<L>>,
+    back_off: BackOff,
+    wait: Duration,
+    not_before: Instant,
+    began: Instant,
+}
+
+impl<L> Reopening<L> {
+    /// Opens the port; the first attempt has to succeed.
+    pub(crate) fn open(
+        name: &str,
+        mut open: Opener<L>,
+        back_off: BackOff,
+    ) -> Result<Self, PortError> {
+        let link = open()?;
+        Ok(Reopening { open: Some(open), back_off, ..Self::over(name, link) })
+    }
+
+    /// A link that is not opened again when it closes.
+    pub(crate) fn over(name: &str, link: L) -> Self {
+        let now = Instant::now();
+        Reopening {
+            name: name.into(),
+            link: Some(link),
+            open: None,
+            back_off: BackOff::default(),
+            wait: Duration::ZERO,
+            not_before: now,
+            began: now,
+        }
+    }
+
+    /// The time for the sans-IO machines: microseconds since the port was first opened.
+    pub(crate) fn now(&self) -> Moment {
+        Moment(self.began.elapsed().as_micros() as u64)
+    }
+
+    pub(crate) fn state(&self) -> LinkState {
+        match self.link {
+            Some(_) => LinkState::Open,
+            None => {
+                let retry_in = self.not_before.saturating_duration_since(Instant::now());
+                LinkState::Closed { retry_in }
+            }
+        }
+    }
+
+    /// The open link, and whether this call had to open it.
+    pub(crate) fn link(&mut self) -> Result<(&mut L, bool), PortError> {
+        let mut reopened = false;
+        if self.link.is_none() {
+            let closed = || PortError::Closed { port: self.name.to_string() };
+            let open = self.open.as_mut().ok_or_else(closed)?;
+            if Instant::now() < self.not_before {
+                return Err(closed());
+            }
+            match open() {
+                Ok(link) => self.link = Some(link),
+                Err(error) => {
+                    self.postpone();
+                    return Err(error);
+                }
+            }
+            self.wait = Duration::ZERO;
+            reopened = true;
+        }
+        let name = &self.name;
+        let link = self.link.as_mut();
+        Ok((link.ok_or_else(|| PortError::Closed { port: name.to_string() })?, reopened))
+    }
+
+    /// Closes the link; the next call may open it at once.
+    pub(crate) fn close(&mut self) {
+        self.link = None;
+        self.not_before = Instant::now();
+    }
+
+    fn postpone(&mut self) {
+        self.wait = (self.wait * 2).clamp(self.back_off.first, self.back_off.cap);
+        self.not_before = Instant::now() + self.wait;
+    }
+}

@@ -1,0 +1,101 @@
+//! For adapters that send back what they transmit.
+
+use std::time::{Duration, Instant};
+
+use motorlink_proto::rmd::CanFrame;
+
+use super::{CanLink, Deadline, PortError};
+
+/// How many sent frames wait for their echo.
+const WAITING: usize = 8;
+/// An echo that has not come by then does not come; an equal frame is a motor's reply.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Leaves out the first received frame that is identical to each sent one.
+///
+/// RMD motors answer some requests with the same frame, so an adapter's echo looks like a motor.
+#[derive(Debug)]
+pub struct EchoCanceller<C> {
+    link: C,
+    expected: [Option<(CanFrame, Instant)>; WAITING],
+}
+
+impl<C: CanLink> EchoCanceller<C> {
+    /// Wraps `link`.
+    pub fn new(link: C) -> Self {
+        EchoCanceller { link, expected: [None; WAITING] }
+    }
+
+    /// Strikes `frame` off the expected echoes.
+    fn is_echo(&mut self, frame: &CanFrame) -> bool {
+        let now = Instant::now();
+        for slot in &mut self.expected {
+            match slot {
+                Some((_, sent)) if now.duration_since(*sent) > PATIENCE => *slot = None,
+                Some((expected, _)) if expected == frame => {
+                    *slot = None;
+                    return true;
+                }
+                _ => {}
+            }
+        }
+        false
+    }
+}
+
+impl<C: CanLink> CanLink for EchoCanceller<C> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.link.send(frame)?;
+        // A free place, or else the oldest: `None` is less than any `Some`.
+        if let Some(slot) = self.expected.iter_mut().min_by_key(|slot| slot.map(|(_, sent)| sent)) {
+            *slot = Some((*frame, Instant::now()));
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        let deadline = Deadline::after(timeout);
+        loop {
+            match self.link.receive(deadline.remaining())? {
+                Some(frame) if self.is_echo(&frame) => {}
+                other => return Ok(other),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+
+    /// A bus on which every sent frame comes back, twice when a motor echoes it too.
+    struct Mirror(VecDeque<CanFrame>, usize);
+
+    impl CanLink for Mirror {
+        fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+            self.0.extend(std::iter::repeat_n(*frame, self.1));
+            Ok(())
+        }
+        fn receive(&mut self, _: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+            Ok(self.0.pop_front())
+        }
+    }
+
+    #[test]
+    fn the_echo_goes_and_the_equal_reply_stays() -> Result<(), PortError> {
+        let frame = CanFrame::new(0x141, [0x88, 0, 0, 0, 0, 0, 0, 0]);
+        let mut silent = EchoCanceller::new(Mirror(VecDeque::new(), 1));
+        silent.send(&frame)?;
+        assert_eq!(silent.receive(Some(Duration::ZERO))?, None);
+
+        let mut answered = EchoCanceller::new(Mirror(VecDeque::new(), 2));
+        for _ in 0..2 * WAITING {
+            answered.send(&frame)?;
+            assert_eq!(answered.receive(Some(Duration::ZERO))?, Some(frame));
+            assert_eq!(answered.receive(Some(Duration::ZERO))?, None);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,97 @@
+//! A byte line on a file descriptor: serial device, pty, TCP connection, socket pair.
+
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use rustix::io::{Errno, read, write};
+
+use super::{ByteLink, Deadline, PortError};
+
+/// How long the far end may take no byte at all before a write fails.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// A [`ByteLink`] on a file descriptor.
+#[derive(Debug)]
+pub struct FdLink {
+    fd: OwnedFd,
+    port: String,
+}
+
+impl FdLink {
+    /// Makes a link of an open descriptor, which becomes non-blocking. `port` is for messages.
+    pub fn new(fd: impl Into<OwnedFd>, port: impl Into<String>) -> Result<Self, PortError> {
+        let (fd, port) = (fd.into(), port.into());
+        fcntl_getfl(&fd)
+            .and_then(|flags| fcntl_setfl(&fd, flags | OFlags::NONBLOCK))
+            .map_err(|errno| PortError::in_use(&port, errno))?;
+        Ok(FdLink { fd, port })
+    }
+
+    fn lost(&self, errno: Errno) -> PortError {
+        PortError::in_use(&self.port, errno)
+    }
+
+    fn wait(&self, event: PollFlags, deadline: Deadline) -> Result<bool, PortError> {
+        wait(self.fd.as_fd(), event, deadline).map_err(|errno| self.lost(errno))
+    }
+}
+
+impl ByteLink for FdLink {
+    fn write(&mut self, mut bytes: &[u8]) -> Result<(), PortError> {
+        while !bytes.is_empty() {
+            match write(&self.fd, bytes) {
+                Ok(written) => bytes = &bytes[written..],
+                Err(Errno::INTR) => {}
+                Err(Errno::AGAIN) => {
+                    if !self.wait(PollFlags::OUT, Deadline::after(Some(WRITE_TIMEOUT)))? {
+                        return Err(PortError::Stalled {
+                            port: self.port.clone(),
+                            hint: "the far end does not read; is the right program or device there?",
+                        });
+                    }
+                }
+                Err(errno) => return Err(self.lost(errno)),
+            }
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        if buffer.is_empty() {
+            return Ok(0);
+        }
+        let deadline = Deadline::after(timeout);
+        while self.wait(PollFlags::IN, deadline)? {
+            match read(&self.fd, &mut *buffer) {
+                Ok(0) => return Err(PortError::Closed { port: self.port.clone() }),
+                Ok(len) => return Ok(len),
+                Err(Errno::INTR | Errno::AGAIN) => {}
+                Err(errno) => return Err(self.lost(errno)),
+            }
+        }
+        Ok(0)
+    }
+}
+
+/// Waits for `event`, an error or a hang-up on `fd`; false when the time is over.
+pub(super) fn wait(
+    fd: BorrowedFd<'_>,
+    event: PollFlags,
+    deadline: Deadline,
+) -> Result<bool, Errno> {
+    loop {
+        let timeout = deadline.remaining().map(timespec);
+        match poll(&mut [PollFd::from_borrowed_fd(fd, event)], timeout.as_ref()) {
+            Ok(ready) => return Ok(ready > 0),
+            Err(Errno::INTR) => {}
+            Err(errno) => return Err(errno),
+        }
+    }
+}
+
+/// `span` as the kernel takes it; a span beyond its range is cut to half a million years.
+pub(crate) fn timespec(span: Duration) -> Timespec {
+    Timespec::try_from(span.min(Duration::from_secs(1 << 44))).unwrap_or_default()
+}

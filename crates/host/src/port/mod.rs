@@ -1,0 +1,147 @@
+//! Ports: a serial line or a CAN bus, opened by name.
+//!
+//! [`PortName::open_line`] and [`PortName::open_can`] give a [`ByteLink`] or a [`CanLink`]. Links
+//! start no thread, allocate nothing in an exchange, and make one system call to send, one to wait
+//! and one to receive.
+
+mod echo;
+mod error;
+mod fd;
+mod name;
+mod serial;
+mod slcan;
+mod socketcan;
+mod tap;
+mod tcp;
+
+use std::time::{Duration, Instant};
+
+use motorlink_proto::rmd::CanFrame;
+
+pub use echo::EchoCanceller;
+pub use error::PortError;
+pub use fd::FdLink;
+pub use name::{DEFAULT_BAUD, LineName, NameError, PortName, ServeName};
+pub use slcan::SlcanLink;
+pub use socketcan::SocketCanLink;
+pub use tap::{Direction, TapBytes, TapCan};
+
+pub(crate) use error::{owning_group, permission_hint};
+pub(crate) use fd::timespec;
+pub(crate) use socketcan::{is_up, up_hint};
+pub(crate) use tcp::unbracketed;
+
+/// A line that carries bytes both ways.
+pub trait ByteLink: Send {
+    /// Writes all of `bytes`, with one system call where the kernel takes them at once.
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError>;
+
+    /// Reads what is there, waiting at most `timeout` (`None`: without limit) for the first byte.
+    /// `Ok(0)` means that nothing came in time. A signal does not end the wait: who wants to look
+    /// at a flag now and then passes a short `timeout`.
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError>;
+}
+
+/// A CAN bus.
+pub trait CanLink: Send {
+    /// Hands `frame` to the bus.
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError>;
+
+    /// The next frame from the bus, waiting at most `timeout` (`None`: without limit). Frames that
+    /// this link sent are not among them.
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError>;
+}
+
+impl<B: ByteLink + ?Sized> ByteLink for Box<B> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        (**self).write(bytes)
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        (**self).read(buffer, timeout)
+    }
+}
+
+impl<C: CanLink + ?Sized> CanLink for Box<C> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        (**self).send(frame)
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        (**self).receive(timeout)
+    }
+}
+
+impl PortName {
+    /// Opens the port as a serial line. Simulated drives are not opened here.
+    pub fn open_line(&self) -> Result<Box<dyn ByteLink>, PortError> {
+        match self {
+            PortName::Line(line) => Ok(Box::new(line.open()?)),
+            PortName::Slcan { .. } | PortName::SocketCan(_) => Err(PortError::WrongKind {
+                port: self.to_string(),
+                wanted: "serial line",
+                usable: "a device path or tcp:HOST:PORT",
+            }),
+            PortName::Sim(_) => Err(PortError::Simulated { port: self.to_string() }),
+        }
+    }
+
+    /// Opens the port as a CAN bus. Simulated drives are not opened here.
+    pub fn open_can(&self) -> Result<Box<dyn CanLink>, PortError> {
+        match self {
+            PortName::Slcan { line, bitrate, echo } => {
+                let link = SlcanLink::open(line.open()?, line.label(), *bitrate)?;
+                Ok(if *echo { Box::new(EchoCanceller::new(link)) } else { Box::new(link) })
+            }
+            PortName::SocketCan(interface) => Ok(Box::new(SocketCanLink::open(interface)?)),
+            PortName::Line(_) => Err(PortError::WrongKind {
+                port: self.to_string(),
+                wanted: "CAN bus",
+                usable: "slcan:DEVICE, slcan:tcp:HOST:PORT or socketcan:INTERFACE",
+            }),
+            PortName::Sim(_) => Err(PortError::Simulated { port: self.to_string() }),
+        }
+    }
+}
+
+impl LineName {
+    /// Opens the line.
+    pub fn open(&self) -> Result<FdLink, PortError> {
+        match self {
+            LineName::Serial { path, baud } => serial::open(path, *baud),
+            LineName::Tcp { host, port } => tcp::open(host, *port, self.label()),
+        }
+    }
+
+    /// The same line at another baud rate, for a scan: drop the open one first. `None` when this
+    /// line has no baud rate.
+    pub fn with_baud(&self, baud: u32) -> Option<LineName> {
+        match self {
+            LineName::Serial { path, .. } => Some(LineName::Serial { path: path.clone(), baud }),
+            LineName::Tcp { .. } => None,
+        }
+    }
+
+    /// What messages call the line.
+    fn label(&self) -> String {
+        match self {
+            LineName::Serial { path, .. } => path.display().to_string(),
+            LineName::Tcp { .. } => self.to_string(),
+        }
+    }
+}
+
+/// The end of a wait that begins now.
+#[derive(Clone, Copy)]
+struct Deadline(Option<Instant>);
+
+impl Deadline {
+    fn after(timeout: Option<Duration>) -> Self {
+        Deadline(timeout.and_then(|timeout| Instant::now().checked_add(timeout)))
+    }
+
+    /// What is left: `None` is without limit, zero is over.
+    fn remaining(self) -> Option<Duration> {
+        self.0.map(|end| end.saturating_duration_since(Instant::now()))
+    }
+}

@@ -1,0 +1,105 @@
+use proptest::prelude::*;
+
+use super::*;
+
+fn port(name: &str) -> PortName {
+    name.parse().unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+fn refusal(name: &str) -> String {
+    match name.parse::<PortName>() {
+        Ok(port) => panic!("{name} was taken for {port:?}"),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn every_form_has_one_full_spelling() {
+    for (given, full) in [
+        ("/dev/ttyACM0", "serial:/dev/ttyACM0?baud=115200"),
+        ("ttyUSB1?baud=9600", "serial:/dev/ttyUSB1?baud=9600"),
+        ("./st0", "serial:./st0?baud=115200"),
+        ("serial:st0", "serial:st0?baud=115200"),
+        ("tcp:drive.local:4000", "tcp:drive.local:4000"),
+        ("tcp:[::1]:4000", "tcp:[::1]:4000"),
+        ("slcan:./can0", "slcan:./can0?bitrate=1000000&baud=115200"),
+        ("slcan:can0?baud=2000000", "slcan:can0?bitrate=1000000&baud=2000000"),
+        (
+            "slcan:serial:/dev/ttyACM0?bitrate=500000",
+            "slcan:/dev/ttyACM0?bitrate=500000&baud=115200",
+        ),
+        ("slcan:tcp:h:1?bitrate=250000&echo=1", "slcan:tcp:h:1?bitrate=250000&echo=1"),
+        ("socketcan:vcan0", "socketcan:vcan0"),
+        ("sim:", "sim:"),
+        ("sim:bench.toml", "sim:bench.toml"),
+    ] {
+        assert_eq!(port(given).to_string(), full);
+        assert_eq!(port(full), port(given));
+    }
+}
+
+#[test]
+fn a_name_that_is_wrong_says_how_it_is_right() {
+    for (name, says) in [
+        ("can0", "did you mean `socketcan:can0`?"),
+        ("can:can0", "did you mean `socketcan:can0`?"),
+        ("usb:/dev/ttyACM0", "did you mean `serial:/dev/ttyACM0`?"),
+        ("192.168.1.5:4000", "did you mean `tcp:192.168.1.5:4000`?"),
+        ("pty:./st0", "did you mean `serial:./st0`?"),
+        ("sim", "did you mean `sim:`?"),
+        ("st0", "did you mean `./st0`?"),
+        ("", "ports are /dev/ttyACM0"),
+        ("serial:", "lacks a device"),
+        ("socketcan:", "lacks an interface"),
+        ("tcp:host", "lacks a TCP port"),
+        ("tcp::4000", "lacks a host"),
+        ("tcp:host:70000", "lacks a TCP port from 0 to 65535"),
+        ("tcp:::1:4000", "lacks the brackets"),
+        ("tcp:host:0", "the port cannot be `0`"),
+        ("/dev/ttyACM0?baud=fast", "baud cannot be `fast`"),
+        ("/dev/ttyACM0?baud=0", "baud cannot be `0`"),
+        ("/dev/ttyACM0?boud=9600", "unknown option `boud`; there is baud"),
+        ("tcp:host:1?baud=9600", "unknown option `baud`"),
+        ("slcan:/dev/ttyACM0?bitrate=123", "bitrate cannot be `123`; use 10000, 20000"),
+        ("slcan:/dev/ttyACM0?echo=yes", "echo cannot be `yes`"),
+    ] {
+        let message = refusal(name);
+        assert!(message.contains(says), "{name:?} gave: {message}");
+    }
+    let message = "st0".parse::<ServeName>().expect_err("no scheme").to_string();
+    assert!(message.contains("did you mean `pty:st0`?"), "{message}");
+}
+
+fn lines() -> impl Strategy<Value = LineName> {
+    let path = prop_oneof!["/[a-zA-Z0-9_./?=&:-]{0,20}", "\\.[a-z/?]{0,9}"];
+    prop_oneof![
+        (path, 1..=4_000_000_u32)
+            .prop_map(|(path, baud)| LineName::Serial { path: path.into(), baud }),
+        ("[a-z0-9.-]{1,12}|\\[::1\\]", 1..=u16::MAX)
+            .prop_map(|(host, port)| LineName::Tcp { host, port }),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn a_printed_port_reads_back(line in lines(), index in 0..9_u8, echo: bool) {
+        let bitrate = Bitrate::from_index(index).expect("S0 to S8");
+        for name in [PortName::Line(line.clone()), PortName::Slcan { line, bitrate, echo }] {
+            prop_assert_eq!(name.to_string().parse(), Ok(name));
+        }
+    }
+
+    #[test]
+    fn a_printed_serve_name_reads_back(path in "[./a-z0-9:]{1,20}", port: u16) {
+        let listen = ServeName::TcpListen { host: "[::]".into(), port };
+        for name in [ServeName::Pty(path.clone().into()), ServeName::SlcanPty(path.into()), listen] {
+            prop_assert_eq!(name.to_string().parse(), Ok(name));
+        }
+    }
+
+    #[test]
+    fn any_text_is_taken_or_refused(text in "\\PC{0,40}") {
+        let _ = text.parse::<PortName>().map_err(|error| error.to_string());
+        let _ = text.parse::<ServeName>().map_err(|error| error.to_string());
+    }
+}

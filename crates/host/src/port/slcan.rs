@@ -1,0 +1,125 @@
+//! CAN adapters that speak slcan over a byte line.
+
+use std::time::Duration;
+
+use motorlink_proto::rmd::CanFrame;
+
+use super::{ByteLink, CanLink, Deadline, PortError};
+use crate::slcan::{Answer, Bitrate, HostCodec, LONGEST_FRAME, encode};
+
+/// How long an adapter may take to answer a command while it is opened. Many never answer some of
+/// them, so silence is no failure.
+const ANSWER_TIMEOUT: Duration = Duration::from_millis(60);
+
+/// A [`CanLink`] through an slcan adapter. The channel is closed when the link is dropped.
+///
+/// An adapter's refusal of a single frame is counted and does not end the line: the frame's sender
+/// notices that no motor answered.
+#[derive(Debug)]
+pub struct SlcanLink<B: ByteLink> {
+    line: B,
+    codec: HostCodec,
+    refused: u64,
+}
+
+/// What came back for the commands of one step.
+#[derive(Default)]
+struct Answers {
+    done: u32,
+    refused: u32,
+    garbage: bool,
+}
+
+impl<B: ByteLink> SlcanLink<B> {
+    /// Opens the CAN channel of the adapter on `line` at `bitrate`. `port` is for messages.
+    ///
+    /// The commands are `C`, `S` and `O`, after an empty line that ends whatever the adapter had
+    /// received of a former host.
+    pub fn open(line: B, port: impl Into<String>, bitrate: Bitrate) -> Result<Self, PortError> {
+        let mut link = SlcanLink { line, codec: HostCodec::default(), refused: 0 };
+        // A channel that was open still talks here, and may refuse the empty line.
+        let close = link.command(b"\rC\r", 2)?;
+        let select = link.command(&bitrate.command(), 1)?;
+        let open = link.command(b"O\r", 1)?;
+
+        let port = port.into();
+        if select.garbage || open.garbage {
+            return Err(PortError::NotSlcan { port, reason: "it sends something else" });
+        }
+        if close.garbage && close.done + select.done + open.done == 0 {
+            return Err(PortError::NotSlcan {
+                port,
+                reason: "it sends something else, then nothing",
+            });
+        }
+        if open.refused > 0 {
+            return Err(PortError::NotSlcan { port, reason: "it refuses to open its channel" });
+        }
+        if select.refused > 0 {
+            return Err(PortError::BitrateRefused { port, bitrate: bitrate.bits_per_second() });
+        }
+        Ok(link)
+    }
+
+    /// Sends `command` and gathers answers until `expected` of them came or none comes any more.
+    fn command(&mut self, command: &[u8], expected: u32) -> Result<Answers, PortError> {
+        let before = self.codec.garbage();
+        self.line.write(command)?;
+        let mut answers = Answers::default();
+        let deadline = Deadline::after(Some(ANSWER_TIMEOUT));
+        while answers.done + answers.refused < expected {
+            match self.codec.answer() {
+                Some(Answer::Done) => answers.done += 1,
+                Some(Answer::Refused) => answers.refused += 1,
+                Some(Answer::Frame(_) | Answer::Info) => {}
+                None if self.fill(deadline)? => {}
+                None => break,
+            }
+        }
+        answers.garbage = self.codec.garbage() > before || self.codec.is_mid_line();
+        Ok(answers)
+    }
+
+    /// Reads more bytes into the codec; false when none came in time.
+    fn fill(&mut self, deadline: Deadline) -> Result<bool, PortError> {
+        let len = self.line.read(self.codec.spare(), deadline.remaining())?;
+        self.codec.filled(len);
+        Ok(len > 0)
+    }
+
+    /// How many frames the adapter refused.
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// How many lines came that are not slcan.
+    pub fn garbage(&self) -> u64 {
+        self.codec.garbage()
+    }
+}
+
+impl<B: ByteLink> CanLink for SlcanLink<B> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.line.write(encode(frame, &mut [0; LONGEST_FRAME]))
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        let deadline = Deadline::after(timeout);
+        loop {
+            match self.codec.answer() {
+                Some(Answer::Frame(frame)) => return Ok(Some(frame)),
+                Some(Answer::Refused) => self.refused += 1,
+                Some(Answer::Done | Answer::Info) => {}
+                None if self.fill(deadline)? => {}
+                None => return Ok(None),
+            }
+        }
+    }
+}
+
+impl<B: ByteLink> Drop for SlcanLink<B> {
+    fn drop(&mut self) {
+        // The line may be gone already; then there is nobody to tell.
+        let _ = self.line.write(b"C\r");
+    }
+}

@@ -1,0 +1,161 @@
+//! Linux CAN.
+
+use std::os::fd::AsFd;
+use std::path::Path;
+use std::time::Duration;
+
+use motorlink_proto::rmd::CanFrame;
+use rustix::event::PollFlags;
+use rustix::io::Errno;
+use socketcan::{
+    CanDataFrame, CanRemoteFrame, CanSocket, EmbeddedFrame, ExtendedId, Id, Socket, SocketOptions,
+    StandardId,
+};
+
+use super::{CanLink, Deadline, PortError, fd::wait};
+
+/// The error class of a controller that left the bus, in the mask of the kernel's error frames.
+const BUS_OFF: u32 = 0x40;
+/// The interface flag of one that is up.
+const UP: u32 = 0x1;
+
+/// A [`CanLink`] on a CAN interface. Other programs on the same interface see the frames that it
+/// sends; it does not see them itself.
+#[derive(Debug)]
+pub struct SocketCanLink {
+    socket: CanSocket,
+    interface: String,
+}
+
+impl SocketCanLink {
+    /// Opens the CAN interface of this name, which must be up.
+    pub fn open(interface: &str) -> Result<Self, PortError> {
+        let port = interface.to_owned();
+        let opened = CanSocket::open(interface).and_then(|socket| {
+            socket.set_nonblocking(true)?;
+            socket.set_error_filter(BUS_OFF)?;
+            Ok(socket)
+        });
+        let socket = opened.map_err(|error| match Errno::from_io_error(&error) {
+            Some(Errno::AFNOSUPPORT) => PortError::NoCan,
+            Some(Errno::NODEV | Errno::NXIO | Errno::INVAL) => {
+                PortError::NoSuchInterface { port: port.clone() }
+            }
+            _ => PortError::in_use(&port, error),
+        })?;
+        if is_up(interface, Path::new("/sys")) == Some(false) {
+            return Err(PortError::InterfaceDown { port });
+        }
+        Ok(SocketCanLink { socket, interface: port })
+    }
+
+    fn lost(&self, error: impl Into<std::io::Error>) -> PortError {
+        PortError::in_use(&self.interface, error)
+    }
+
+    fn wait(&self, event: PollFlags, deadline: Deadline) -> Result<bool, PortError> {
+        wait(self.socket.as_fd(), event, deadline).map_err(|errno| self.lost(errno))
+    }
+}
+
+impl CanLink for SocketCanLink {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let frame = to_kernel(frame);
+        let deadline = Deadline::after(Some(Duration::from_secs(1)));
+        loop {
+            let error = match self.socket.write_frame(&frame) {
+                Ok(()) => return Ok(()),
+                Err(error) => error,
+            };
+            match Errno::from_io_error(&error) {
+                Some(Errno::INTR) => {}
+                Some(Errno::AGAIN) if self.wait(PollFlags::OUT, deadline)? => {}
+                Some(Errno::AGAIN) => return Err(self.lost(Errno::NOBUFS)),
+                _ => return Err(self.lost(error)),
+            }
+        }
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        let deadline = Deadline::after(timeout);
+        while self.wait(PollFlags::IN, deadline)? {
+            match self.socket.read_frame() {
+                Ok(socketcan::CanFrame::Error(_)) => {
+                    return Err(PortError::BusOff { port: self.interface.clone() });
+                }
+                Ok(frame) => return Ok(Some(from_kernel(&frame))),
+                Err(error) => match Errno::from_io_error(&error) {
+                    Some(Errno::INTR | Errno::AGAIN) => {}
+                    _ => return Err(self.lost(error)),
+                },
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn to_kernel(frame: &CanFrame) -> socketcan::CanFrame {
+    let id = if frame.is_extended() {
+        Id::Extended(ExtendedId::new(frame.id()).unwrap_or(ExtendedId::MAX))
+    } else {
+        Id::Standard(StandardId::new(frame.id() as u16).unwrap_or(StandardId::MAX))
+    };
+    if frame.is_remote() {
+        let remote = CanRemoteFrame::new_remote(id, frame.len().into());
+        remote.unwrap_or_default().into()
+    } else {
+        CanDataFrame::new(id, frame.data()).unwrap_or_default().into()
+    }
+}
+
+fn from_kernel(frame: &socketcan::CanFrame) -> CanFrame {
+    let (id, extended) = match frame.id() {
+        Id::Standard(id) => (id.as_raw().into(), false),
+        Id::Extended(id) => (id.as_raw(), true),
+    };
+    if frame.is_remote_frame() {
+        CanFrame::remote_frame(id, extended, frame.dlc() as u8)
+    } else {
+        CanFrame::data_frame(id, extended, frame.data())
+    }
+}
+
+/// Whether a network interface is up, from the kernel's file system at `sys`.
+pub(crate) fn is_up(interface: &str, sys: &Path) -> Option<bool> {
+    let flags =
+        std::fs::read_to_string(sys.join("class/net").join(interface).join("flags")).ok()?;
+    let flags = u32::from_str_radix(flags.trim().strip_prefix("0x")?, 16).ok()?;
+    Some(flags & UP != 0)
+}
+
+/// How a CAN interface is brought up; a virtual one has no bitrate.
+pub(crate) fn up_hint(interface: &str) -> String {
+    if interface.starts_with('v') {
+        format!("sudo ip link set {interface} up")
+    } else {
+        format!("sudo ip link set {interface} up type can bitrate 1000000")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_cross_to_the_kernel_and_back() {
+        for frame in [
+            CanFrame::new(0x141, [0x9C, 1, 2, 3, 4, 5, 6, 7]),
+            CanFrame::data_frame(0x1FFF_FFFF, true, &[1, 2]),
+            CanFrame::remote_frame(0x7FF, false, 8),
+            CanFrame::remote_frame(0, true, 0),
+        ] {
+            assert_eq!(from_kernel(&to_kernel(&frame)), frame);
+        }
+    }
+
+    #[test]
+    fn an_interface_that_is_not_there_is_named() {
+        let error = SocketCanLink::open("nocan9").expect_err("there is none");
+        assert!(matches!(error, PortError::NoSuchInterface { .. } | PortError::NoCan), "{error:?}");
+    }
+}

@@ -1,0 +1,36 @@
+//! Serial lines behind a TCP server.
+
+use std::io;
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::Duration;
+
+use super::{FdLink, PortError};
+
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// Connects to the first address of `host` that takes the connection.
+pub(super) fn open(host: &str, tcp_port: u16, port: String) -> Result<FdLink, PortError> {
+    let addresses = match (unbracketed(host), tcp_port).to_socket_addrs() {
+        Ok(addresses) => addresses,
+        Err(source) => return Err(PortError::UnknownHost { port, source }),
+    };
+    let mut failure = io::Error::from(io::ErrorKind::NotFound);
+    for address in addresses {
+        match TcpStream::connect_timeout(&address, CONNECT_TIMEOUT) {
+            Ok(stream) => {
+                stream.set_nodelay(true).map_err(|error| PortError::in_use(&port, error))?;
+                return FdLink::new(stream, port);
+            }
+            Err(error) => failure = error,
+        }
+    }
+    Err(match failure.kind() {
+        io::ErrorKind::ConnectionRefused => PortError::Refused { port },
+        _ => PortError::Unreachable { port, source: failure },
+    })
+}
+
+/// The address without the brackets that set an IPv6 address apart in a port's name.
+pub(crate) fn unbracketed(host: &str) -> &str {
+    host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(host)
+}

@@ -1,0 +1,323 @@
+//! The blocking client: many motors, one lock around one exchange or cycle, no thread, no
+//! allocation in an exchange.
+
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+use motorlink_proto::rmd::{
+    self as proto, Code, Command, Counters, Dialect, Host, Limits, MotionStatus, MotorId, MotorSet,
+    Output, Payload, ReadStatus1, Refused, Torque4,
+};
+use motorlink_proto::time::Instant;
+
+use super::{Error, Guard, MotorHandle, OnDrop};
+use crate::line::{BackOff, LinkState, Opener, Reopening};
+use crate::port::{CanLink, PortError, PortName};
+
+/// How a [`Bus`] behaves.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// How long a reply may take.
+    pub timeout: Duration,
+    /// How long after a timeout a late reply is awaited.
+    pub guard: Duration,
+    /// Attempts to open a port that went away.
+    pub back_off: BackOff,
+    /// What no request to any motor may exceed.
+    pub limits: Limits,
+}
+
+impl Default for Options {
+    /// 50 ms for a reply, 100 ms for a late one, no limits.
+    fn default() -> Self {
+        Options {
+            timeout: proto::DEFAULT_TIMEOUT.into(),
+            guard: proto::DEFAULT_GUARD.into(),
+            back_off: BackOff::default(),
+            limits: Limits::default(),
+        }
+    }
+}
+
+/// What a scan found under an ID.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Found {
+    /// A motor of this protocol, with its state.
+    Motor(MotorId, proto::Status1),
+    /// A motor of another protocol.
+    Foreign(MotorId, Dialect),
+}
+
+/// IDs that a scan asks at once.
+const SCAN_WIDTH: usize = 8;
+
+/// A CAN bus with RMD motors: shared by reference between threads.
+///
+/// A port that went away is opened again by the next call, behind a back-off; see
+/// [`link_state`](Self::link_state). Replies are matched on ID and command; a motor that did not
+/// answer in time is left alone until its late reply came or cannot come any more.
+pub struct Bus {
+    inner: Mutex<Inner>,
+}
+
+struct Inner {
+    port: Reopening<Box<dyn CanLink>>,
+    host: Host,
+    /// Motors that were given something to do by this bus and not switched off.
+    moving: MotorSet,
+}
+
+impl Bus {
+    /// Opens a port. No motor is asked anything.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened.
+    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        let name = port.clone();
+        Self::open_with(&port.to_string(), Box::new(move || name.open_can()), options)
+    }
+
+    /// As [`open`](Self::open), through a link of the caller's making: behind a tap, for example.
+    pub fn open_with(
+        name: &str,
+        open: Opener<Box<dyn CanLink>>,
+        options: Options,
+    ) -> Result<Self, Error> {
+        Ok(Self::on(Reopening::open(name, open, options.back_off)?, options))
+    }
+
+    /// Speaks through a link that is open already. It is not opened again when it closes.
+    pub fn over(name: &str, link: Box<dyn CanLink>, options: Options) -> Self {
+        Self::on(Reopening::over(name, link), options)
+    }
+
+    fn on(port: Reopening<Box<dyn CanLink>>, options: Options) -> Self {
+        let mut host = Host::new();
+        host.set_timeout(options.timeout.into());
+        host.set_guard(options.guard.into());
+        for id in MotorSet::ALL {
+            host.set_limits(id, options.limits);
+        }
+        Bus { inner: Mutex::new(Inner { port, host, moving: MotorSet::EMPTY }) }
+    }
+
+    /// Whether the port is open.
+    pub fn link_state(&self) -> LinkState {
+        self.lock().port.state()
+    }
+
+    /// Frames that belonged to no exchange.
+    pub fn counters(&self) -> Counters {
+        *self.lock().host.counters()
+    }
+
+    /// A motor of the bus, ID 1 to 32.
+    pub fn motor(&self, id: u8) -> Result<MotorHandle<'_>, Error> {
+        let id = MotorId::new(id).ok_or(Error::NoSuchMotor(id))?;
+        Ok(MotorHandle::new(self, id))
+    }
+
+    /// Switches off, when it goes out of scope, the motors that this bus was used to move.
+    pub fn guard(&self) -> Guard<'_> {
+        Guard::new(self, OnDrop::Off)
+    }
+
+    /// Motors that were given something to do and not switched off.
+    pub fn moving(&self) -> MotorSet {
+        self.lock().moving
+    }
+
+    /// Sets what a motor may be told; it holds for every call, raw frames included.
+    pub fn set_limits(&self, id: MotorId, limits: Limits) {
+        self.lock().host.set_limits(id, limits);
+    }
+
+    /// One exchange with one motor. A motor in quarantine is waited for.
+    pub fn ask<C: Command>(&self, id: MotorId, command: &C) -> Result<C::Reply, Error> {
+        self.raw(id, command.encode()).map(|reply| C::Reply::decode(&reply))
+    }
+
+    /// One exchange with any bytes, known command or not. A motor in quarantine is waited for.
+    pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
+        let mut inner = self.lock();
+        let mut outcome = None;
+        inner.ready()?;
+        if let Err(refused) = inner.request(id, request) {
+            let Refused::Quarantined { until, .. } = refused else {
+                return Err(inner.refused(refused));
+            };
+            inner.listen(until)?;
+            inner.request(id, request).map_err(|refused| inner.refused(refused))?;
+        }
+        inner.run(|_, result| outcome = Some(result))?;
+        let result = outcome.unwrap_or(Err(proto::Error::Timeout));
+        result.map_err(|error| inner.failed(id, request[0], error))
+    }
+
+    /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
+    /// is called once a request, in the order in which the outcomes come.
+    ///
+    /// # Errors
+    /// The port's. What fails for one motor is told to `each`.
+    pub fn cycle(
+        &self,
+        requests: &[(MotorId, [u8; 8])],
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<(), Error> {
+        let mut inner = self.lock();
+        inner.ready()?;
+        for &(id, request) in requests {
+            if let Err(refused) = inner.request(id, request) {
+                each(id, Err(inner.refused(refused)));
+            }
+        }
+        let name = Arc::clone(&inner.port.name);
+        let code = |of| requests.iter().find(|(id, _)| *id == of).map_or(0, |(_, data)| data[0]);
+        inner.run(|id, result| {
+            each(id, result.map_err(|error| failed(&name, id, code(id), error)));
+        })
+    }
+
+    /// Sends torques to motors 1 to 4 in one frame and gathers the replies of those in `expect`;
+    /// place n of the result is motor n + 1.
+    ///
+    /// # Errors
+    /// The port's, a limit's, [`Error::OutOfReach`], [`Error::Quarantined`]: nothing was sent then.
+    pub fn torque4(
+        &self,
+        torques: Torque4,
+        expect: MotorSet,
+    ) -> Result<[Option<Result<MotionStatus, Error>>; 4], Error> {
+        let mut inner = self.lock();
+        inner.ready()?;
+        let now = inner.port.now();
+        let begun = inner.host.torque4(now, torques, expect);
+        begun.map_err(|refused| inner.refused(refused))?;
+        inner.moving = inner.moving.union(MotorSet::TORQUE4);
+        let name = Arc::clone(&inner.port.name);
+        let mut replies = [const { None }; 4];
+        inner.run(|id, result| {
+            let reply = result
+                .map(|data| MotionStatus::decode(&data))
+                .map_err(|error| failed(&name, id, Code::Torque.into(), error));
+            if let Some(slot) = replies.get_mut(usize::from(id.number()) - 1) {
+                *slot = Some(reply);
+            }
+        })?;
+        Ok(replies)
+    }
+
+    /// Asks every ID in `ids` for its status, some at a time; calls `each` with what answered, and
+    /// `progress` with the number of IDs that are done.
+    pub fn scan(
+        &self,
+        ids: MotorSet,
+        mut each: impl FnMut(Found),
+        mut progress: impl FnMut(usize),
+    ) -> Result<(), Error> {
+        let mut left = ids;
+        let mut done = 0;
+        while !left.is_empty() {
+            let asked = left.by_ref().take(SCAN_WIDTH);
+            let requests: Vec<_> = asked.map(|id| (id, ReadStatus1.encode())).collect();
+            self.cycle(&requests, |id, outcome| match outcome {
+                Ok(reply) => each(Found::Motor(id, proto::Status1::decode(&reply))),
+                Err(Error::Foreign { dialect, .. }) => each(Found::Foreign(id, dialect)),
+                Err(_) => {}
+            })?;
+            done += requests.len();
+            progress(done);
+        }
+        Ok(())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+impl Inner {
+    fn ready(&mut self) -> Result<(), Error> {
+        self.port.link()?;
+        let now = self.port.now();
+        for id in self.host.busy() {
+            self.host.cancel(now, id);
+        }
+        Ok(())
+    }
+
+    fn request(&mut self, id: MotorId, data: [u8; 8]) -> Result<(), Refused> {
+        self.host.request(self.port.now(), id, data)?;
+        match Code::from(data[0]) {
+            Code::Off | Code::Stop => self.moving.remove(id),
+            code if code.info().is_some_and(|row| row.moves) => self.moving.insert(id),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Moves frames until no exchange is open.
+    fn run(
+        &mut self,
+        mut each: impl FnMut(MotorId, Result<[u8; 8], proto::Error>),
+    ) -> Result<(), Error> {
+        loop {
+            let now = self.port.now();
+            let moved = match self.host.poll(now) {
+                Output::Transmit(frame) => self.port.link().and_then(|(link, _)| link.send(&frame)),
+                Output::Done { id, result } => {
+                    each(id, result);
+                    Ok(())
+                }
+                Output::Wait(None) => return Ok(()),
+                Output::Wait(Some(until)) => self.hear(now, until),
+            };
+            moved.map_err(|error| self.closed(error))?;
+        }
+    }
+
+    /// Takes what comes until `until`.
+    fn listen(&mut self, until: Instant) -> Result<(), Error> {
+        while self.port.now() < until {
+            let now = self.port.now();
+            self.hear(now, until).map_err(|error| self.closed(error))?;
+        }
+        Ok(())
+    }
+
+    fn hear(&mut self, now: Instant, until: Instant) -> Result<(), PortError> {
+        let (link, _) = self.port.link()?;
+        if let Some(frame) = link.receive(Some(until.since(now).into()))? {
+            self.host.receive(&frame);
+        }
+        Ok(())
+    }
+
+    fn closed(&mut self, error: PortError) -> Error {
+        self.port.close();
+        error.into()
+    }
+
+    fn failed(&self, id: MotorId, code: u8, error: proto::Error) -> Error {
+        failed(&self.port.name, id, code, error)
+    }
+
+    fn refused(&self, refused: Refused) -> Error {
+        match refused {
+            Refused::Quarantined { id, .. } => {
+                Error::Quarantined { port: Arc::clone(&self.port.name), id }
+            }
+            Refused::Limit { id, exceeded } => Error::Limit { id, exceeded },
+            Refused::OutOfReach(id) => Error::OutOfReach(id),
+            Refused::Busy(id) => Error::Twice(id),
+        }
+    }
+}
+
+fn failed(name: &Arc<str>, id: MotorId, code: u8, error: proto::Error) -> Error {
+    let port = Arc::clone(name);
+    match error {
+        proto::Error::Foreign(dialect) => Error::Foreign { port, id, dialect },
+        _ => Error::Timeout { port, id, code: Code::from(code) },
+    }
+}

@@ -1,0 +1,88 @@
+//! What can go wrong between a program and RMD motors.
+
+use std::sync::Arc;
+
+use motorlink_proto::rmd::{Code, Dialect, Exceeded, MotorId};
+
+use crate::port::PortError;
+
+/// Why a call to a motor did not do what it says. This protocol has no refusal: a motor that does
+/// not know a command is silent.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// No reply in time; it is not known whether the motor did what was asked.
+    #[error(
+        "{port}: motor {id} does not answer {code}; is it powered, is its ID right and the bitrate \
+         1 Mbit/s? `motorlink rmd scan` lists the motors that answer"
+    )]
+    Timeout {
+        /// The port.
+        port: Arc<str>,
+        /// The motor.
+        id: MotorId,
+        /// What was asked for.
+        code: Code,
+    },
+    /// The motor answers in another protocol; it is not driven.
+    #[error(
+        "{port}: motor {id} answers as {dialect} motors do, on {:#05x}; it does not speak V1.62, \
+         where the same bytes mean something else, so it is not driven",
+        .dialect.reply_base() + u16::from(.id.number())
+    )]
+    Foreign {
+        /// The port.
+        port: Arc<str>,
+        /// The motor.
+        id: MotorId,
+        /// What it speaks.
+        dialect: Dialect,
+    },
+    /// The motor may still answer an exchange that timed out; nothing was sent.
+    #[error("{port}: motor {id} may still answer an earlier request; nothing was sent")]
+    Quarantined {
+        /// The port.
+        port: Arc<str>,
+        /// The motor.
+        id: MotorId,
+    },
+    /// Two requests of one cycle are for the same motor; the second was not sent.
+    #[error("motor {0} is asked twice in one cycle; the second request was not sent")]
+    Twice(MotorId),
+    /// A limit forbids it; nothing was sent.
+    #[error("motor {id}: {exceeded}; nothing was sent")]
+    Limit {
+        /// The motor.
+        id: MotorId,
+        /// The limit.
+        exceeded: Exceeded,
+    },
+    /// There is no such motor; nothing was sent.
+    #[error("motor {0} does not exist: motor IDs are 1 to 32")]
+    NoSuchMotor(u8),
+    /// The frame with four torques reaches motors 1 to 4 only; nothing was sent.
+    #[error("motor {0} is not reached by 0x280, which carries torques for motors 1 to 4")]
+    OutOfReach(MotorId),
+    /// The port.
+    #[error(transparent)]
+    Port(Arc<PortError>),
+}
+
+impl From<PortError> for Error {
+    fn from(error: PortError) -> Self {
+        Error::Port(Arc::new(error))
+    }
+}
+
+impl Error {
+    /// Whether nothing can be said about the motor because it, or the line, was silent.
+    pub fn is_line_failure(&self) -> bool {
+        matches!(
+            self,
+            Error::Timeout { .. }
+                | Error::Foreign { .. }
+                | Error::Quarantined { .. }
+                | Error::Port(_)
+        )
+    }
+}

@@ -1,0 +1,31 @@
+//! RMD motors on a CAN bus.
+//!
+//! ```no_run
+//! use motorlink::rmd::{Bus, Options, SpeedLimit, CentiDegrees};
+//!
+//! let bus = Bus::open(&"slcan:/dev/ttyACM0".parse()?, Options::default())?;
+//! let guard = bus.guard();                 // switches off what was set moving
+//! let motor = bus.motor(1)?;
+//! motor.move_to(CentiDegrees::from_degrees(90.0), Some(SpeedLimit(500)))?;
+//! println!("{} °/s", motor.status2()?.speed.dps());
+//! # drop(guard);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod bus;
+mod error;
+mod guard;
+mod motor;
+
+pub use motorlink_proto::rmd::{
+    Acceleration, CanFrame, Circle, CirclePosition, CirclePositionLimited, Code, Command,
+    CommandInfo, Counters, Dialect, Direction, Encoder, EncoderBits, EncoderOffset, Errors,
+    Exceeded, Gains, Limits, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, PhaseCurrents,
+    Spin, Status1, Torque4, describe,
+};
+pub use motorlink_proto::units::*;
+
+pub use bus::{Bus, Found, Options};
+pub use error::Error;
+pub use guard::{Guard, OnDrop, Stopped};
+pub use motor::MotorHandle;

@@ -1,0 +1,200 @@
+//! One served port: its door, its clients and its station.
+
+use std::net::TcpListener;
+use std::os::fd::OwnedFd;
+
+use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::time::Instant;
+use rustix::event::{PollFd, PollFlags};
+use rustix::io::{Errno, read, write};
+
+use super::pty::Pty;
+use super::{ByteStation, CanStation};
+use crate::slcan::Device;
+
+/// Bytes that are taken from a client at once.
+const CHUNK: usize = 4096;
+
+/// Where clients come from.
+pub(super) enum Door {
+    /// The one client is whoever holds the pty.
+    Pty(Pty),
+    /// Each connection is a client.
+    Listener(TcpListener),
+}
+
+pub(super) enum Station {
+    Bytes(Box<dyn ByteStation>),
+    Can(Box<dyn CanStation>),
+}
+
+/// Room that all endpoints use in turn.
+pub(super) struct Scratch {
+    chunk: [u8; CHUNK],
+    frames: Vec<CanFrame>,
+    /// Bytes that clients did not read in time.
+    pub(super) dropped: u64,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Scratch { chunk: [0; CHUNK], frames: Vec::new(), dropped: 0 }
+    }
+}
+
+pub(super) struct Endpoint {
+    door: Door,
+    clients: Vec<Client>,
+    station: Station,
+}
+
+struct Client {
+    line: OwnedFd,
+    /// Its adapter; idle on a serial line.
+    adapter: Device,
+    outgoing: Vec<u8>,
+    is_gone: bool,
+}
+
+impl Endpoint {
+    /// `line` is the client that is there from the start.
+    pub(super) fn new(door: Door, station: Station, line: Option<OwnedFd>) -> Self {
+        Endpoint { door, clients: line.into_iter().map(Client::new).collect(), station }
+    }
+
+    /// Appends what is to be polled: the clients, then the door. The door is
+    /// looked at last: when a client's bytes are seen, its coming is seen as well.
+    pub(super) fn watch<'a>(&'a self, fds: &mut Vec<PollFd<'a>>) {
+        fds.extend(self.clients.iter().map(|client| PollFd::new(&client.line, PollFlags::IN)));
+        fds.push(match &self.door {
+            Door::Pty(pty) => PollFd::new(pty.comings(), PollFlags::IN),
+            Door::Listener(listener) => PollFd::new(listener, PollFlags::IN),
+        });
+    }
+
+    /// How many descriptors [`watch`](Self::watch) appends.
+    pub(super) fn watched(&self) -> usize {
+        self.clients.len() + 1
+    }
+
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        match &self.station {
+            Station::Bytes(station) => station.deadline(),
+            Station::Can(station) => station.deadline(),
+        }
+    }
+
+    /// Does what is due. `ready` says which of the watched descriptors have something.
+    pub(super) fn serve(&mut self, now: Instant, ready: &[bool], scratch: &mut Scratch) {
+        let door_is_ready = ready.last() == Some(&true);
+        if door_is_ready && let Door::Pty(pty) = &self.door {
+            pty.forget_unread();
+        }
+        for (index, &is_ready) in ready.iter().take(self.clients.len()).enumerate() {
+            // Before someone new is let in, all that the others did is seen, and who left.
+            if is_ready || door_is_ready {
+                self.receive(now, index, scratch);
+            }
+        }
+        self.clients.retain(|client| !client.is_gone);
+        if door_is_ready {
+            self.admit();
+        }
+        if self.deadline().is_some_and(|deadline| deadline <= now) {
+            self.poll(now, &mut scratch.frames);
+        }
+        for client in &mut self.clients {
+            scratch.dropped += client.flush();
+        }
+    }
+
+    fn receive(&mut self, now: Instant, index: usize, scratch: &mut Scratch) {
+        let client = &mut self.clients[index];
+        let bytes = match read(&client.line, &mut scratch.chunk) {
+            Ok(len) if len > 0 => &scratch.chunk[..len],
+            Err(Errno::AGAIN | Errno::INTR) => return,
+            Ok(_) | Err(_) => {
+                client.is_gone = true;
+                return;
+            }
+        };
+        match &mut self.station {
+            Station::Bytes(station) => station.receive(now, bytes, &mut client.outgoing),
+            Station::Can(station) => {
+                for &byte in bytes {
+                    let Client { adapter, outgoing, .. } = &mut self.clients[index];
+                    let Some(frame) = adapter.receive(byte, outgoing) else { continue };
+                    for (other, client) in self.clients.iter_mut().enumerate() {
+                        if other != index {
+                            client.deliver(now, &frame);
+                        }
+                    }
+                    station.receive(now, &frame, &mut scratch.frames);
+                    deliver_all(now, &mut scratch.frames, &mut self.clients);
+                }
+            }
+        }
+    }
+
+    fn poll(&mut self, now: Instant, frames: &mut Vec<CanFrame>) {
+        match &mut self.station {
+            Station::Bytes(station) => {
+                let mut unheard = Vec::new();
+                let client = self.clients.first_mut();
+                station.poll(now, client.map_or(&mut unheard, |client| &mut client.outgoing));
+            }
+            Station::Can(station) => {
+                station.poll(now, frames);
+                deliver_all(now, frames, &mut self.clients);
+            }
+        }
+    }
+
+    /// Lets in who waits longest at the door. A serial line has one client; others are closed at
+    /// once. Only one a turn: one who comes in meanwhile may follow a client that is not yet seen to
+    /// have left.
+    fn admit(&mut self) {
+        let Door::Listener(listener) = &self.door else { return };
+        let Ok((stream, _)) = listener.accept() else { return };
+        let shared = matches!(self.station, Station::Can(_));
+        let usable = stream.set_nonblocking(true).and_then(|()| stream.set_nodelay(true));
+        if usable.is_ok() && (shared || self.clients.is_empty()) {
+            self.clients.push(Client::new(stream.into()));
+        }
+    }
+}
+
+/// Sends the frames of a station to all clients.
+fn deliver_all(now: Instant, frames: &mut Vec<CanFrame>, clients: &mut [Client]) {
+    for frame in frames.drain(..) {
+        for client in &mut *clients {
+            client.deliver(now, &frame);
+        }
+    }
+}
+
+impl Client {
+    fn new(line: OwnedFd) -> Self {
+        Client { line, adapter: Device::default(), outgoing: Vec::new(), is_gone: false }
+    }
+
+    fn deliver(&mut self, now: Instant, frame: &CanFrame) {
+        self.adapter.deliver(now, frame, &mut self.outgoing);
+    }
+
+    /// Writes what the line takes at once and returns how many bytes it did not take.
+    fn flush(&mut self) -> u64 {
+        let mut rest = self.outgoing.as_slice();
+        while !rest.is_empty() {
+            match write(&self.line, rest) {
+                Ok(written) => rest = &rest[written..],
+                Err(Errno::INTR) => {}
+                // Full, or gone; the next read tells which.
+                Err(_) => break,
+            }
+        }
+        let dropped = rest.len() as u64;
+        self.outgoing.clear();
+        dropped
+    }
+}

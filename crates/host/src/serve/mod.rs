@@ -1,0 +1,205 @@
+//! Served ports: the other side of a serial line or a CAN bus, for simulated drives.
+//!
+//! A [`Server`] owns ptys and TCP listeners and one station behind each. It has no thread: whoever
+//! runs it calls [`Server::turn`] again and again. It never waits for a client that does not read;
+//! what such a client misses is dropped and counted.
+//!
+//! A pty is a line with one client at a time; bytes that one left unread are not shown to the next.
+//! A served TCP port that is a serial line has one client too: while it is connected, others are
+//! closed at once. Behind a TCP port that is a CAN bus each client has an slcan adapter of its own
+//! on the same bus: it hears the station and the other clients.
+
+mod endpoint;
+mod pty;
+
+use std::net::{TcpListener, ToSocketAddrs};
+use std::os::fd::BorrowedFd;
+use std::time::Duration;
+
+use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::time::Instant;
+use rustix::event::{PollFd, PollFlags, poll};
+use rustix::io::Errno;
+
+use crate::port::{PortError, ServeName, timespec, unbracketed};
+use endpoint::{Door, Endpoint, Scratch, Station};
+use pty::Pty;
+
+/// What answers at the far end of a served serial line.
+pub trait ByteStation {
+    /// Takes received bytes; what is to be sent back is appended to `reply`.
+    fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>);
+    /// Called when the deadline has passed.
+    fn poll(&mut self, now: Instant, reply: &mut Vec<u8>);
+    /// When [`poll`](Self::poll) is to be called next, if at all.
+    fn deadline(&self) -> Option<Instant>;
+}
+
+/// What sits on a served CAN bus.
+pub trait CanStation {
+    /// Takes a frame from the bus; what is to be sent is appended to `replies`.
+    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>);
+    /// Called when the deadline has passed.
+    fn poll(&mut self, now: Instant, replies: &mut Vec<CanFrame>);
+    /// When [`poll`](Self::poll) is to be called next, if at all.
+    fn deadline(&self) -> Option<Instant>;
+}
+
+/// A port that can be opened now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Served {
+    /// The port as it was asked for.
+    pub port: String,
+    /// Where it is: the pty, or the address with the TCP port in use.
+    pub path: String,
+}
+
+/// What a turn of the server has seen besides its ports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Turn {
+    /// Whether the extra descriptor has something to read, its end included.
+    pub extra_is_ready: bool,
+}
+
+/// Serves ports until it is dropped.
+pub struct Server {
+    started: std::time::Instant,
+    endpoints: Vec<Endpoint>,
+    ready: Vec<bool>,
+    scratch: Scratch,
+}
+
+impl Default for Server {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Server {
+    /// A server without ports, whose time begins now.
+    pub fn new() -> Self {
+        Server {
+            started: std::time::Instant::now(),
+            endpoints: Vec::new(),
+            ready: Vec::new(),
+            scratch: Scratch::default(),
+        }
+    }
+
+    /// Serves a serial line with `station` at its far end.
+    pub fn serve_bytes(
+        &mut self,
+        name: &ServeName,
+        station: Box<dyn ByteStation>,
+    ) -> Result<Served, PortError> {
+        match name {
+            ServeName::Pty(_) | ServeName::TcpListen { .. } => {
+                self.serve(name, Station::Bytes(station))
+            }
+            ServeName::SlcanPty(_) => Err(PortError::WrongKind {
+                port: name.to_string(),
+                wanted: "serial line",
+                usable: "pty:PATH or tcp-listen:ADDR:PORT",
+            }),
+        }
+    }
+
+    /// Serves a CAN bus with `station` on it, through slcan.
+    pub fn serve_can(
+        &mut self,
+        name: &ServeName,
+        station: Box<dyn CanStation>,
+    ) -> Result<Served, PortError> {
+        match name {
+            ServeName::SlcanPty(_) | ServeName::TcpListen { .. } => {
+                self.serve(name, Station::Can(station))
+            }
+            ServeName::Pty(_) => Err(PortError::WrongKind {
+                port: name.to_string(),
+                wanted: "CAN bus",
+                usable: "slcan-pty:PATH or tcp-listen:ADDR:PORT",
+            }),
+        }
+    }
+
+    fn serve(&mut self, name: &ServeName, station: Station) -> Result<Served, PortError> {
+        let port = name.to_string();
+        let (path, endpoint) = match name {
+            ServeName::Pty(link) | ServeName::SlcanPty(link) => {
+                let (pty, master) = Pty::open(link)?;
+                let path = pty.path().display().to_string();
+                (path, Endpoint::new(Door::Pty(pty), station, Some(master)))
+            }
+            ServeName::TcpListen { host, port: tcp_port } => {
+                let (listener, path) = listen(host, *tcp_port, &port)?;
+                (path, Endpoint::new(Door::Listener(listener), station, None))
+            }
+        };
+        self.endpoints.push(endpoint);
+        Ok(Served { port, path })
+    }
+
+    /// The server's time: microseconds since it was made.
+    pub fn now(&self) -> Instant {
+        Instant(self.started.elapsed().as_micros() as u64)
+    }
+
+    /// How many bytes were dropped because a client did not read.
+    pub fn dropped(&self) -> u64 {
+        self.scratch.dropped
+    }
+
+    /// Waits until something is to be done, at most for `max_wait`, and does it. A signal ends the
+    /// wait. `extra` is a descriptor to watch as well, such as standard input.
+    pub fn turn(
+        &mut self,
+        max_wait: Duration,
+        extra: Option<BorrowedFd<'_>>,
+    ) -> Result<Turn, PortError> {
+        let wait = timespec(self.wait_time(max_wait));
+        let mut fds = Vec::with_capacity(self.ready.capacity());
+        for endpoint in &self.endpoints {
+            endpoint.watch(&mut fds);
+        }
+        fds.extend(extra.map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)));
+        match poll(&mut fds, Some(&wait)) {
+            Ok(_) => {}
+            Err(Errno::INTR) => return Ok(Turn { extra_is_ready: false }),
+            Err(errno) => return Err(PortError::in_use("the served ports", errno)),
+        }
+        self.ready.clear();
+        self.ready.extend(fds.iter().map(|fd| !fd.revents().is_empty()));
+
+        let now = self.now();
+        let mut ready = self.ready.as_slice();
+        for endpoint in &mut self.endpoints {
+            let (ours, others) = ready.split_at(endpoint.watched());
+            endpoint.serve(now, ours, &mut self.scratch);
+            ready = others;
+        }
+        Ok(Turn { extra_is_ready: ready.contains(&true) })
+    }
+
+    /// The time to the first deadline of a station.
+    fn wait_time(&self, max_wait: Duration) -> Duration {
+        let first = self.endpoints.iter().filter_map(Endpoint::deadline).min();
+        first.map_or(max_wait, |deadline| max_wait.min(deadline.since(self.now()).into()))
+    }
+}
+
+/// Listens at `host`; returns the address in use as well.
+fn listen(host: &str, tcp_port: u16, port: &str) -> Result<(TcpListener, String), PortError> {
+    let addresses = (unbracketed(host), tcp_port)
+        .to_socket_addrs()
+        .map_err(|source| PortError::UnknownHost { port: port.to_owned(), source })?;
+    let bound = TcpListener::bind(addresses.collect::<Vec<_>>().as_slice());
+    let listening = bound.and_then(|listener| {
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?.to_string();
+        Ok((listener, address))
+    });
+    listening.map_err(|source| match source.kind() {
+        std::io::ErrorKind::AddrInUse => PortError::AddressInUse { port: port.to_owned() },
+        _ => PortError::Io { port: port.to_owned(), source },
+    })
+}

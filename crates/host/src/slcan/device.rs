@@ -1,0 +1,109 @@
+//! The adapter's end of slcan: what a host asks for.
+
+use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::time::Instant;
+
+use super::{BEL, Bitrate, CR, LONGEST_FRAME, Line, decode, encode, hex_digit, is_hex};
+
+/// Timestamps count milliseconds and start again after a minute.
+const TIMESTAMP_PERIOD_MS: u64 = 60_000;
+
+/// A CAN adapter as a host sees it.
+///
+/// It takes every bitrate (nothing here depends on it) and lets every frame through: acceptance
+/// codes and masks are taken and have no effect.
+#[derive(Debug, Default)]
+pub struct Device {
+    line: Line,
+    channel: Channel,
+    timestamps: bool,
+}
+
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+enum Channel {
+    #[default]
+    Closed,
+    ListenOnly,
+    Open,
+}
+
+impl Device {
+    /// Takes a byte from the host. Answers are appended to `reply`; a frame that the host sends to
+    /// the bus is returned.
+    pub fn receive(&mut self, byte: u8, reply: &mut Vec<u8>) -> Option<CanFrame> {
+        match byte {
+            CR => {}
+            b'\n' => return None,
+            _ => {
+                self.line.push(byte);
+                return None;
+            }
+        }
+        let mut line = std::mem::take(&mut self.line);
+        let Some(Outcome { answer, frame }) = line.take().and_then(|line| self.obey(line)) else {
+            reply.push(BEL);
+            return None;
+        };
+        reply.extend_from_slice(answer);
+        reply.push(CR);
+        frame
+    }
+
+    /// Does what `line` says; nothing when it is refused.
+    fn obey(&mut self, line: &[u8]) -> Option<Outcome> {
+        let Some((&command, arguments)) = line.split_first() else { return Some(Outcome::DONE) };
+        let closed = self.channel == Channel::Closed;
+        match (command, arguments) {
+            (b't' | b'T' | b'r' | b'R', _) => {
+                let (frame, rest) = decode(line)?;
+                let sendable = self.channel == Channel::Open && rest.is_empty();
+                let answer: &[u8] = if command.is_ascii_lowercase() { b"z" } else { b"Z" };
+                return sendable.then_some(Outcome { answer, frame: Some(frame) });
+            }
+            (b'C', []) => self.channel = Channel::Closed,
+            // Some hosts open twice and expect no complaint.
+            (b'O', []) => self.channel = Channel::Open,
+            (b'L', []) => self.channel = Channel::ListenOnly,
+            (b'S', &[digit]) if closed => {
+                Bitrate::from_index(char::from(digit).to_digit(10)? as u8)?;
+            }
+            (b's', registers) if closed && is_hex(registers, 4) => {}
+            (b'M' | b'm', filter) if closed && is_hex(filter, 8) => {}
+            (b'X', b"0" | b"1") => {}
+            (b'Z', &[digit @ (b'0' | b'1')]) => self.timestamps = digit == b'1',
+            (b'V', []) => return Some(Outcome::info(b"V1010")),
+            (b'N', []) => return Some(Outcome::info(b"NML01")),
+            (b'F', []) if !closed => return Some(Outcome::info(b"F00")),
+            _ => return None,
+        }
+        Some(Outcome::DONE)
+    }
+
+    /// Appends a frame from the bus to `reply`, when the host has opened the channel.
+    pub fn deliver(&self, now: Instant, frame: &CanFrame, reply: &mut Vec<u8>) {
+        if self.channel == Channel::Closed {
+            return;
+        }
+        reply.extend_from_slice(encode(frame, &mut [0; LONGEST_FRAME]));
+        if self.timestamps {
+            reply.pop();
+            let ms = (now.0 / 1_000 % TIMESTAMP_PERIOD_MS) as u32;
+            reply.extend([12, 8, 4, 0].map(|shift| hex_digit(ms >> shift)));
+            reply.push(CR);
+        }
+    }
+}
+
+/// A line that is obeyed: what is said before the CR, and the frame for the bus.
+struct Outcome {
+    answer: &'static [u8],
+    frame: Option<CanFrame>,
+}
+
+impl Outcome {
+    const DONE: Outcome = Outcome { answer: b"", frame: None };
+
+    fn info(answer: &'static [u8]) -> Self {
+        Outcome { answer, frame: None }
+    }
+}

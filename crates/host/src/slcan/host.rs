@@ -1,0 +1,111 @@
+//! The host's end of slcan: what an adapter says.
+
+use motorlink_proto::rmd::CanFrame;
+
+use super::{BEL, CR, Line, decode, is_hex};
+
+/// Bytes of one read that wait to be looked at: some twenty frames.
+const BUFFERED: usize = 512;
+
+/// One thing that an adapter said.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Answer {
+    /// A frame came from the bus.
+    Frame(CanFrame),
+    /// A command or a frame was taken.
+    Done,
+    /// A command or a frame was refused.
+    Refused,
+    /// The answer to a question about version, serial number or status.
+    Info,
+}
+
+/// Takes an adapter's bytes apart, one answer at a time.
+///
+/// Bytes go in through [`spare`](Self::spare) and [`filled`](Self::filled), so that a port reads
+/// straight into the codec; nothing is allocated. A line that is no answer is counted and left out.
+#[derive(Debug)]
+pub struct HostCodec {
+    buffer: [u8; BUFFERED],
+    start: usize,
+    end: usize,
+    line: Line,
+    garbage: u64,
+}
+
+impl Default for HostCodec {
+    fn default() -> Self {
+        HostCodec { buffer: [0; BUFFERED], start: 0, end: 0, line: Line::default(), garbage: 0 }
+    }
+}
+
+impl HostCodec {
+    /// Room for received bytes; all of it once [`answer`](Self::answer) has returned `None`.
+    pub fn spare(&mut self) -> &mut [u8] {
+        if self.start == self.end {
+            (self.start, self.end) = (0, 0);
+        }
+        &mut self.buffer[self.end..]
+    }
+
+    /// Says that `len` bytes were put into the room.
+    pub fn filled(&mut self, len: usize) {
+        self.end = BUFFERED.min(self.end + len);
+    }
+
+    /// The next answer, or `None` when more bytes are needed.
+    pub fn answer(&mut self) -> Option<Answer> {
+        while self.start < self.end {
+            let byte = self.buffer[self.start];
+            self.start += 1;
+            if let Some(answer) = self.receive(byte) {
+                return Some(answer);
+            }
+        }
+        None
+    }
+
+    fn receive(&mut self, byte: u8) -> Option<Answer> {
+        match byte {
+            CR => {
+                let answer = self.line.take().and_then(parse);
+                self.garbage += u64::from(answer.is_none());
+                answer
+            }
+            BEL => {
+                self.garbage += u64::from(!self.line.is_empty());
+                self.line.take();
+                Some(Answer::Refused)
+            }
+            // Some adapters end their lines in CR LF.
+            b'\n' => None,
+            _ => {
+                self.line.push(byte);
+                None
+            }
+        }
+    }
+
+    /// How many lines were no answer.
+    pub fn garbage(&self) -> u64 {
+        self.garbage
+    }
+
+    /// Whether a line has begun and not ended.
+    pub fn is_mid_line(&self) -> bool {
+        !self.line.is_empty()
+    }
+}
+
+fn parse(line: &[u8]) -> Option<Answer> {
+    if let Some((frame, rest)) = decode(line) {
+        return (rest.is_empty() || is_hex(rest, 4)).then_some(Answer::Frame(frame));
+    }
+    match line {
+        [] | b"z" | b"Z" => Some(Answer::Done),
+        [b'V' | b'v' | b'N' | b'F', rest @ ..] if rest.iter().all(u8::is_ascii_graphic) => {
+            Some(Answer::Info)
+        }
+        _ => None,
+    }
+}

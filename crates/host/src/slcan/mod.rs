@@ -1,0 +1,174 @@
+//! slcan: CAN frames as lines of text, as serial CAN adapters speak it. Both ends, without I/O.
+//!
+//! A line ends in CR. `t1418...` is a standard data frame, `T` an extended one, `r` and `R` ask for
+//! one; an identifier has 3 or 8 hexadecimal digits, then come the length and the bytes. The other
+//! lines are commands of the host. An adapter answers with CR, with `z` or `Z` and CR after a
+//! frame, or with BEL when it refuses.
+
+mod device;
+mod host;
+
+pub use device::Device;
+pub use host::{Answer, HostCodec};
+
+use motorlink_proto::rmd::CanFrame;
+
+/// Ends each line.
+const CR: u8 = 0x0D;
+/// An adapter's no.
+const BEL: u8 = 0x07;
+/// The longest line: `T`, 8 digits of identifier, length, 16 of data, 4 of a timestamp.
+const LONGEST_LINE: usize = 30;
+/// The longest line that a host sends for a frame, with its CR.
+pub const LONGEST_FRAME: usize = LONGEST_LINE - 4 + 1;
+
+/// The bitrates that slcan knows, S0 to S8, in bits per second.
+const BITRATES: [u32; 9] =
+    [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
+
+/// A bitrate of the CAN bus that slcan can ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Bitrate(u8);
+
+impl Bitrate {
+    /// 1 Mbit/s, the bitrate of RMD motors.
+    pub const DEFAULT: Bitrate = Bitrate(8);
+
+    /// The bitrate with this number of bits per second, when slcan has it.
+    pub fn from_bits_per_second(rate: u32) -> Option<Self> {
+        BITRATES.iter().position(|&known| known == rate).map(|index| Bitrate(index as u8))
+    }
+
+    /// The bitrate of the command S0 to S8.
+    pub fn from_index(index: u8) -> Option<Self> {
+        (usize::from(index) < BITRATES.len()).then_some(Bitrate(index))
+    }
+
+    /// The bits per second.
+    pub fn bits_per_second(self) -> u32 {
+        BITRATES[usize::from(self.0)]
+    }
+
+    /// The command that selects it, with its CR.
+    pub(crate) fn command(self) -> [u8; 3] {
+        [b'S', b'0' + self.0, CR]
+    }
+
+    /// All of them, for a message.
+    pub(crate) fn list() -> String {
+        BITRATES.map(|rate| rate.to_string()).join(", ")
+    }
+}
+
+/// Writes the line of `frame` into `buffer` and returns it, CR included.
+pub fn encode<'a>(frame: &CanFrame, buffer: &'a mut [u8; LONGEST_FRAME]) -> &'a [u8] {
+    let (kind, digits) = match (frame.is_extended(), frame.is_remote()) {
+        (false, false) => (b't', 3),
+        (true, false) => (b'T', 8),
+        (false, true) => (b'r', 3),
+        (true, true) => (b'R', 8),
+    };
+    let mut line = Writer { buffer, len: 0 };
+    line.push(kind);
+    line.hex(frame.id(), digits);
+    line.hex(u32::from(frame.len()), 1);
+    for &byte in frame.data() {
+        line.hex(u32::from(byte), 2);
+    }
+    line.push(CR);
+    let Writer { buffer, len } = line;
+    &buffer[..len]
+}
+
+struct Writer<'a> {
+    buffer: &'a mut [u8],
+    len: usize,
+}
+
+impl Writer<'_> {
+    fn push(&mut self, byte: u8) {
+        self.buffer[self.len] = byte;
+        self.len += 1;
+    }
+
+    fn hex(&mut self, value: u32, digits: u32) {
+        for digit in (0..digits).rev() {
+            self.push(hex_digit(value >> (4 * digit)));
+        }
+    }
+}
+
+/// The lowest four bits as a digit.
+fn hex_digit(value: u32) -> u8 {
+    b"0123456789ABCDEF"[(value & 0xF) as usize]
+}
+
+/// The frame of a line without its CR, and what follows it in the line.
+fn decode(line: &[u8]) -> Option<(CanFrame, &[u8])> {
+    let (&kind, rest) = line.split_first()?;
+    let (extended, remote, digits, highest) = match kind {
+        b't' => (false, false, 3, 0x7FF),
+        b'T' => (true, false, 8, 0x1FFF_FFFF),
+        b'r' => (false, true, 3, 0x7FF),
+        b'R' => (true, true, 8, 0x1FFF_FFFF),
+        _ => return None,
+    };
+    let (id, rest) = hex(rest, digits)?;
+    let (len, mut rest) = hex(rest, 1)?;
+    if id > highest || len > 8 {
+        return None;
+    }
+    if remote {
+        return Some((CanFrame::remote_frame(id, extended, len as u8), rest));
+    }
+    let mut data = [0; 8];
+    let data = &mut data[..len as usize];
+    for byte in data.iter_mut() {
+        let (value, after) = hex(rest, 2)?;
+        *byte = value as u8;
+        rest = after;
+    }
+    Some((CanFrame::data_frame(id, extended, data), rest))
+}
+
+/// The value of the first `digits` digits (at most 8), and what follows them.
+fn hex(text: &[u8], digits: usize) -> Option<(u32, &[u8])> {
+    let (number, rest) = text.split_at_checked(digits)?;
+    let value = number
+        .iter()
+        .try_fold(0, |value, &digit| Some(value << 4 | char::from(digit).to_digit(16)?))?;
+    Some((value, rest))
+}
+
+/// Whether `text` is exactly `digits` hexadecimal digits.
+fn is_hex(text: &[u8], digits: usize) -> bool {
+    hex(text, digits).is_some_and(|(_, rest)| rest.is_empty())
+}
+
+/// A line that is being received. One that is too long is remembered as such and not kept.
+#[derive(Debug, Default)]
+struct Line {
+    bytes: [u8; LONGEST_LINE],
+    len: usize,
+}
+
+impl Line {
+    fn push(&mut self, byte: u8) {
+        if let Some(slot) = self.bytes.get_mut(self.len) {
+            *slot = byte;
+        }
+        self.len = self.len.saturating_add(1);
+    }
+
+    fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Ends the line: its bytes, or nothing when it was too long.
+    fn take(&mut self) -> Option<&[u8]> {
+        self.bytes.get(..std::mem::take(&mut self.len))
+    }
+}
+
+#[cfg(test)]
+mod tests;

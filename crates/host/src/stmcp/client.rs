@@ -1,0 +1,287 @@
+//! The blocking client: one lock around one exchange, no thread, no allocation in an exchange.
+
+use std::sync::{Mutex, MutexGuard};
+
+use motorlink_proto::stmcp as proto;
+use motorlink_proto::stmcp::{
+    BoardInfo, Command, Config, Counters, Frame, Line, MAX_FRAME, Master, Motor, Output, Parse,
+    Profile, Recovery, Request, RequestError,
+};
+
+use super::error::{Target, advice, hint};
+use super::{Error, Guard, Limits, MotorHandle};
+use crate::line::{BackOff, LinkState, Opener, Reopening};
+use crate::port::{ByteLink, PortError, PortName};
+
+/// How a [`Client`] behaves.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Options {
+    /// What the drive is expected to speak.
+    pub profile: Profile,
+    /// Timeout and recovery of the line.
+    pub line: Config,
+    /// Attempts to open a port that went away.
+    pub back_off: BackOff,
+    /// What no request may exceed.
+    pub limits: Limits,
+}
+
+/// What GET_BOARD_INFO tells (4.7).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Info {
+    /// Major, minor, patch.
+    pub version: [u8; 3],
+    /// Name of the SDK.
+    pub name: String,
+}
+
+/// What GET_FW_VERSION tells (4.12).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FirmwareVersion {
+    /// Name of the firmware.
+    pub name: String,
+    /// Its version, such as `Ver.5.4.4`.
+    pub version: String,
+}
+
+/// A master on a serial line: shared by reference between threads, one exchange at a time.
+///
+/// A port that went away is opened again by the next call, behind a back-off; see
+/// [`link_state`](Self::link_state). A failed exchange loses the line, which the next call recovers
+/// as [`Config::recovery`] says.
+pub struct Client {
+    inner: Mutex<Inner>,
+    profile: Profile,
+    limits: Limits,
+}
+
+struct Inner {
+    port: Reopening<Box<dyn ByteLink>>,
+    master: Master,
+    received: [u8; 256],
+    /// Bit n: motor n + 1 was started and not stopped by this client.
+    started: u8,
+}
+
+impl Client {
+    /// Opens a port and speaks to the drive behind it.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened. The drive is not asked anything.
+    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        let name = port.clone();
+        Self::open_with(&port.to_string(), Box::new(move || name.open_line()), options)
+    }
+
+    /// As [`open`](Self::open), through a link of the caller's making: behind a tap, for example.
+    pub fn open_with(
+        name: &str,
+        open: Opener<Box<dyn ByteLink>>,
+        options: Options,
+    ) -> Result<Self, Error> {
+        Ok(Self::on(Reopening::open(name, open, options.back_off)?, options))
+    }
+
+    /// Speaks through a link that is open already. It is not opened again when it closes.
+    pub fn over(name: &str, link: Box<dyn ByteLink>, options: Options) -> Self {
+        Self::on(Reopening::over(name, link), options)
+    }
+
+    fn on(port: Reopening<Box<dyn ByteLink>>, options: Options) -> Self {
+        let master = Master::new(options.line);
+        let inner = Inner { port, master, received: [0; 256], started: 0 };
+        Client { inner: Mutex::new(inner), profile: options.profile, limits: options.limits }
+    }
+
+    /// The profile that the drive is expected to follow.
+    pub fn profile(&self) -> Profile {
+        self.profile
+    }
+
+    /// Whether the port is open.
+    pub fn link_state(&self) -> LinkState {
+        self.lock().port.state()
+    }
+
+    /// Whether the last exchange ended in step.
+    pub fn line(&self) -> Line {
+        self.lock().master.line()
+    }
+
+    /// What came without being asked for.
+    pub fn counters(&self) -> Counters {
+        self.lock().master.counters()
+    }
+
+    /// A motor of the drive, 1 to 7.
+    pub fn motor(&self, number: u8) -> Result<MotorHandle<'_>, Error> {
+        let motor = Motor::new(number).ok_or(Error::NoSuchMotor(number))?;
+        Ok(MotorHandle::new(self, motor))
+    }
+
+    /// Stops, when it goes out of scope, the motors that this client started.
+    pub fn guard(&self) -> Guard<'_> {
+        Guard::new(self)
+    }
+
+    /// Motors that this client started and did not stop.
+    pub fn started(&self) -> impl Iterator<Item = Motor> + use<> {
+        let started = self.lock().started;
+        (1..=Motor::MAX).filter_map(Motor::new).filter(move |motor| started & bit(*motor) != 0)
+    }
+
+    /// Name and version of the SDK (4.7).
+    pub fn info(&self) -> Result<Info, Error> {
+        self.exchange(0, &Request::BoardInfo, |payload| {
+            let info = BoardInfo::decode(payload)?;
+            Some(Info { version: info.version, name: info.name.to_owned() })
+        })
+    }
+
+    /// Name and version of the firmware (4.12).
+    pub fn firmware_version(&self) -> Result<FirmwareVersion, Error> {
+        self.exchange(0, &Request::FirmwareVersion, |payload| {
+            let version = proto::FirmwareVersion::decode(payload);
+            Some(FirmwareVersion {
+                name: version.name.to_owned(),
+                version: version.version.to_owned(),
+            })
+        })
+    }
+
+    /// One exchange with motor number `motor`, where 0 is the drive's current motor. `reply` reads
+    /// the acknowledge's payload; `None` from it is [`Error::Reply`].
+    pub fn exchange<T>(
+        &self,
+        motor: u8,
+        request: &Request<'_>,
+        reply: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Result<T, Error> {
+        self.limits.check(request)?;
+        let mut inner = self.lock();
+        inner.ready()?;
+        let begun = inner.master.request(motor, request);
+        let what = || what(request);
+        let value = inner.conclude(begun, motor, what, reply)?;
+        inner.note(motor, request);
+        Ok(value)
+    }
+
+    /// One exchange with any frame code and payload; gives the acknowledge's payload.
+    pub fn raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Vec<u8>, Error> {
+        let header = Frame::header(code, motor);
+        let mut frame = [0; MAX_FRAME];
+        let what = || format!("frame code {code:#04x}");
+        let sent = Frame { header, payload }.encode(&mut frame).ok_or_else(|| Error::TooLong(what()))?;
+        let request = match Frame::parse(sent) {
+            Parse::Frame(frame, _) => Request::decode(self.profile, &frame).ok(),
+            _ => None,
+        };
+        if let Some(request) = &request {
+            self.limits.check(request)?;
+        }
+        let mut inner = self.lock();
+        inner.ready()?;
+        let begun = inner.master.request_raw(header, payload);
+        let reply = inner.conclude(begun, motor, what, |payload| Some(payload.to_vec()))?;
+        if let Some(request) = &request {
+            inner.note(motor, request);
+        }
+        Ok(reply)
+    }
+
+    /// A poisoned lock is taken all the same: an exchange that panicked left the master in a state
+    /// that its next request deals with.
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+impl Inner {
+    /// Makes sure that the port is open and no abandoned exchange is under way.
+    fn ready(&mut self) -> Result<(), PortError> {
+        let (_, reopened) = self.port.link()?;
+        if reopened && self.master.config_mut().recovery == Recovery::None {
+            self.master.reopened();
+        }
+        self.master.abandon();
+        Ok(())
+    }
+
+    fn conclude<T>(
+        &mut self,
+        begun: Result<(), RequestError>,
+        motor: u8,
+        what: impl Fn() -> String,
+        reply: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Result<T, Error> {
+        if begun.is_err() {
+            return Err(Error::TooLong(what()));
+        }
+        let (port, motor) = (self.port.name.clone(), Target(motor));
+        match self.run(reply) {
+            Ok(Ok((value, size))) => {
+                value.ok_or_else(|| Error::Reply { port, motor, what: what(), size })
+            }
+            Ok(Err(proto::Error::Refused(code))) => {
+                Err(Error::Refused { port, motor, what: what(), code, hint: hint(code) })
+            }
+            Ok(Err(proto::Error::Failed(failure))) => {
+                Err(Error::Failed { port, motor, what: what(), failure, hint: advice(failure) })
+            }
+            Err(error) => {
+                self.master.abandon();
+                self.port.close();
+                Err(error.into())
+            }
+        }
+    }
+
+    /// Moves bytes until the exchange is over; gives what `reply` made of the payload, and its size.
+    fn run<T>(
+        &mut self,
+        reply: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Result<Result<(Option<T>, usize), proto::Error>, PortError> {
+        loop {
+            let now = self.port.now();
+            match self.master.poll(now) {
+                Output::Transmit(bytes) => self.port.link()?.0.write(bytes)?,
+                Output::Wait(until) => {
+                    let wait = until.map(|until| until.since(now).into());
+                    let size = self.port.link()?.0.read(&mut self.received, wait)?;
+                    let now = self.port.now();
+                    self.master.receive(now, &self.received[..size]);
+                }
+                Output::Done(result) => {
+                    return Ok(result.map(|payload| (reply(payload), payload.len())));
+                }
+            }
+        }
+    }
+
+    /// Remembers which motors this client has started.
+    fn note(&mut self, motor: u8, request: &Request<'_>) {
+        let Some(motor) = Motor::new(motor) else { return };
+        match request {
+            Request::Execute(Command::StartMotor | Command::StartStop | Command::ScStart) => {
+                self.started |= bit(motor);
+            }
+            Request::Execute(Command::StopMotor | Command::ScStop) => self.started &= !bit(motor),
+            _ => {}
+        }
+    }
+}
+
+const fn bit(motor: Motor) -> u8 {
+    1 << motor.index()
+}
+
+/// A request in words, for messages.
+fn what(request: &Request<'_>) -> String {
+    match request {
+        Request::SetRegister { register, .. } => format!("writing {register}"),
+        Request::GetRegister(register) => format!("reading {register}"),
+        Request::Execute(command) => command.to_string(),
+        other => other.code().name().to_owned(),
+    }
+}
