@@ -10,6 +10,8 @@ pub mod list;
 pub mod port;
 pub mod rmd;
 pub mod serve;
+#[cfg(feature = "sim")]
+pub mod sim;
 pub mod slcan;
 pub mod stmcp;
 

@@ -140,13 +140,19 @@ pub enum PortError {
         /// The bitrate that was asked for.
         bitrate: u32,
     },
-    /// Simulated drives were asked for where only real ports are opened.
-    #[error(
-        "`{port}` names simulated drives, which are not opened here: start `motorlink sim` and use the port that it prints"
-    )]
+    /// This library was built without simulated drives.
+    #[error("`{port}` names simulated drives, which this build does not contain (feature `sim`)")]
     Simulated {
         /// The port.
         port: String,
+    },
+    /// The configuration of simulated drives is not taken.
+    #[error("`{port}`: {why}")]
+    Configuration {
+        /// The port.
+        port: String,
+        /// What is wrong with it.
+        why: String,
     },
     /// The link of a served pty would replace something that is not a link to a pty.
     #[error("`{port}` exists and is no link to a pty: remove it or choose another path")]

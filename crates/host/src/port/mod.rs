@@ -73,7 +73,7 @@ impl<C: CanLink + ?Sized> CanLink for Box<C> {
 }
 
 impl PortName {
-    /// Opens the port as a serial line. Simulated drives are not opened here.
+    /// Opens the port as a serial line.
     pub fn open_line(&self) -> Result<Box<dyn ByteLink>, PortError> {
         match self {
             PortName::Line(line) => Ok(Box::new(line.open()?)),
@@ -82,11 +82,14 @@ impl PortName {
                 wanted: "serial line",
                 usable: "a device path or tcp:HOST:PORT",
             }),
+            #[cfg(feature = "sim")]
+            PortName::Sim(config) => crate::sim::open_line(config.as_deref()),
+            #[cfg(not(feature = "sim"))]
             PortName::Sim(_) => Err(PortError::Simulated { port: self.to_string() }),
         }
     }
 
-    /// Opens the port as a CAN bus. Simulated drives are not opened here.
+    /// Opens the port as a CAN bus.
     pub fn open_can(&self) -> Result<Box<dyn CanLink>, PortError> {
         match self {
             PortName::Slcan { line, bitrate, echo } => {
@@ -99,6 +102,9 @@ impl PortName {
                 wanted: "CAN bus",
                 usable: "slcan:DEVICE, slcan:tcp:HOST:PORT or socketcan:INTERFACE",
             }),
+            #[cfg(feature = "sim")]
+            PortName::Sim(config) => crate::sim::open_can(config.as_deref()),
+            #[cfg(not(feature = "sim"))]
             PortName::Sim(_) => Err(PortError::Simulated { port: self.to_string() }),
         }
     }

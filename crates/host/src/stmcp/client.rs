@@ -172,7 +172,8 @@ impl Client {
         let header = Frame::header(code, motor);
         let mut frame = [0; MAX_FRAME];
         let what = || format!("frame code {code:#04x}");
-        let sent = Frame { header, payload }.encode(&mut frame).ok_or_else(|| Error::TooLong(what()))?;
+        let sent =
+            Frame { header, payload }.encode(&mut frame).ok_or_else(|| Error::TooLong(what()))?;
         let request = match Frame::parse(sent) {
             Parse::Frame(frame, _) => Request::decode(self.profile, &frame).ok(),
             _ => None,

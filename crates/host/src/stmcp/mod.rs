@@ -23,9 +23,9 @@ mod transcript;
 mod value;
 
 pub use motorlink_proto::stmcp::{
-    Command, Config, ControlMode, Counters, CurrentReference, ErrorCode, Failure, Feature, Features,
-    Flags, FrameCode, Line, Motor, PositionMove, Profile, REVUP_PHASES, Ramp, Recovery, RegisterId,
-    Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Status, TorqueRamp, register,
+    Command, Config, ControlMode, Counters, CurrentReference, ErrorCode, Failure, Feature,
+    Features, Flags, FrameCode, Line, Motor, PositionMove, Profile, REVUP_PHASES, Ramp, Recovery,
+    RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Status, TorqueRamp, register,
 };
 
 pub use client::{Client, FirmwareVersion, Info, Options};

@@ -109,7 +109,8 @@ impl Transcript {
                 Some(Reading { register, bits, profile: self.profile }.to_string())
             }
             Asked::BoardInfo => {
-                let BoardInfo { version: [major, minor, patch], name } = BoardInfo::decode(payload)?;
+                let BoardInfo { version: [major, minor, patch], name } =
+                    BoardInfo::decode(payload)?;
                 Some(format!("{name} {major}.{minor}.{patch}"))
             }
             Asked::Version => {
@@ -117,7 +118,8 @@ impl Transcript {
                 Some(format!("{} {}", version.name, version.version))
             }
             Asked::Revup => {
-                let RevupPhase { speed_rpm, torque_s16a, duration_ms } = RevupPhase::decode(payload)?;
+                let RevupPhase { speed_rpm, torque_s16a, duration_ms } =
+                    RevupPhase::decode(payload)?;
                 Some(format!("{speed_rpm} rpm, {torque_s16a} s16A, {duration_ms} ms"))
             }
         }

@@ -151,14 +151,13 @@ pub fn parse_value(
         return Ok(bits);
     }
     let ty = register.shape().map_or(Type::I32, |shape| shape.ty);
-    let not_a_value = || ValueError::NotAValue {
-        text: text.to_owned(),
-        register,
-        usable: usable(register),
-    };
+    let not_a_value =
+        || ValueError::NotAValue { text: text.to_owned(), register, usable: usable(register) };
     let value = match number(text) {
         Some(integer) => integer as f64,
-        None => text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(not_a_value)?,
+        None => {
+            text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(not_a_value)?
+        }
     };
     if ty == Type::F32 && !raw {
         return Ok((value as f32).to_bits() as i32);
@@ -207,9 +206,8 @@ fn usable(register: RegisterId) -> String {
     match register {
         RegisterId::CONTROL_MODE => "TORQUE and SPEED are".to_owned(),
         RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
-            let shown = RegisterId::all().filter(|id| {
-                id.shape().is_some_and(|shape| shape.access == Access::Dac)
-            });
+            let shown = RegisterId::all()
+                .filter(|id| id.shape().is_some_and(|shape| shape.access == Access::Dac));
             let names: Vec<String> = shown.map(|id| id.to_string()).collect();
             format!("it shows one of {}", names.join(", "))
         }

@@ -1,0 +1,105 @@
+//! The simulated drives of the demo: `motorlink sim` in a thread, on ptys in a folder of its own.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::Shutdown;
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::thread::JoinHandle;
+
+use motorlink::sim::{Bench, BenchConfig};
+use serde_json::{Value, json};
+
+use crate::failure::Failure;
+use crate::sim;
+
+pub struct Drives {
+    /// Port of the ST drive.
+    pub st: String,
+    /// Port of the RMD bus.
+    pub rmd: String,
+    served: [String; 2],
+    control: Mutex<Control>,
+    folder: PathBuf,
+    thread: Option<JoinHandle<()>>,
+}
+
+struct Control {
+    commands: UnixStream,
+    answers: BufReader<UnixStream>,
+}
+
+impl Drives {
+    /// Starts them; when this returns their ports can be opened.
+    pub fn start() -> Result<Self, Failure> {
+        let folder = std::env::temp_dir().join(format!("motorlink-demo-{}", std::process::id()));
+        std::fs::create_dir_all(&folder)?;
+        let (st, can) = (folder.join("st0"), folder.join("can0"));
+        let served = [format!("pty:{}", st.display()), format!("slcan-pty:{}", can.display())];
+        let (commands, theirs) = UnixStream::pair()?;
+        let ports = served.clone();
+        let thread = std::thread::spawn(move || {
+            if let Err(failure) = serve(&ports, &theirs) {
+                // The reader of the announcements tells the rest.
+                let _ = writeln!(&theirs, "{}", json!({ "error": format!("{failure:?}") }));
+            }
+        });
+        let answers = BufReader::new(commands.try_clone()?);
+        let mut control = Control { commands, answers };
+        for _ in &served {
+            control.answer()?;
+        }
+        Ok(Drives {
+            st: st.display().to_string(),
+            rmd: format!("slcan:{}", can.display()),
+            served,
+            control: Mutex::new(control),
+            folder,
+            thread: Some(thread),
+        })
+    }
+
+    /// Lets a fault of an ST motor happen, as `motorlink sim` obeys it on stdin.
+    pub fn st_fault(&self, motor: u8, fault: &str) -> Result<(), Failure> {
+        let command = json!({
+            "command": "fault", "port": self.served[0], "motor": motor, "fault": fault,
+        });
+        let mut control = self.control.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        writeln!(control.commands, "{command}")?;
+        control.answer().map(drop)
+    }
+}
+
+fn serve([st, rmd]: &[String; 2], stream: &UnixStream) -> Result<(), Failure> {
+    let mut bench = Bench::new();
+    let mut out = stream;
+    sim::serve(&mut bench, &BenchConfig::default(), &[st.clone()], &[rmd.clone()], &mut out)?;
+    sim::obey(&mut bench, stream, &mut out, true)
+}
+
+impl Control {
+    fn answer(&mut self) -> Result<Value, Failure> {
+        let mut line = String::new();
+        self.answers.read_line(&mut line)?;
+        let answer: Value = serde_json::from_str(&line).unwrap_or(Value::Null);
+        match answer.get("error") {
+            None if !answer.is_null() => Ok(answer),
+            error => Err(Failure::Line(format!(
+                "the simulated drives did not start or obey: {}",
+                error.unwrap_or(&Value::Null)
+            ))),
+        }
+    }
+}
+
+impl Drop for Drives {
+    fn drop(&mut self) {
+        let control = self.control.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
+        // The end of its input ends the thread, which takes its links away.
+        let _ = control.commands.shutdown(Shutdown::Write);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+        let _ = std::fs::remove_dir(&self.folder);
+    }
+}

@@ -1,0 +1,62 @@
+//! `motorlink demo`: simulated drives of both kinds, driven through real ports.
+
+mod bench;
+mod screen;
+mod story;
+
+use motorlink::rmd::{self, Bus};
+use motorlink::stmcp::{self, Client};
+
+use bench::Drives;
+use screen::Screen;
+use story::Story;
+
+use crate::failure::Failure;
+use crate::interrupt::interrupted;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Print plain lines even on a terminal
+    #[arg(long)]
+    plain: bool,
+}
+
+pub fn run(args: Args) -> Result<(), Failure> {
+    let drives = Drives::start()?;
+    let st = Client::open(&drives.st.parse()?, stmcp::Options::default())?;
+    let bus = Bus::open(
+        &drives.rmd.parse()?,
+        rmd::Options {
+            // A loaded machine may hold the simulator up for longer than a motor would take.
+            timeout: std::time::Duration::from_millis(500),
+            ..rmd::Options::default()
+        },
+    )?;
+    // Whatever happens below, these stop the motors.
+    let _st_guard = st.guard().reporting(|stopped| match &stopped.result {
+        Ok(()) => eprintln!("{} is stopped", stopped.motor),
+        Err(error) => eprintln!("{} may still turn: {error}", stopped.motor),
+    });
+    let _rmd_guard = bus.guard().reporting(|stopped| match &stopped.result {
+        Ok(()) => eprintln!("RMD motor {} is off", stopped.id),
+        Err(error) => eprintln!("RMD motor {} may still turn: {error}", stopped.id),
+    });
+    let mut screen = Screen::new(args.plain);
+    screen.title(&[
+        "Two ST motors on a serial line and four RMD motors on a CAN bus, simulated.",
+        &format!(
+            "This program talks to them through {} and {}, as to real drives.",
+            drives.st, drives.rmd
+        ),
+    ]);
+    let mut story = Story::new(&drives, &st, &bus, &mut screen);
+    let told = story.tell();
+    let summary = story.summary();
+    screen.end();
+    match told {
+        Err(Failure::Interrupted) => Err(Failure::Interrupted),
+        Err(_) if interrupted() => Err(Failure::Interrupted),
+        Err(failure) => Err(failure),
+        Ok(()) => summary.print(),
+    }
+}

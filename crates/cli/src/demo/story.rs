@@ -1,0 +1,285 @@
+//! What the demo does, step by step, reading everything back through the ports.
+
+use std::time::{Duration, Instant};
+
+use motorlink::rmd::{Bus, CentiDegrees, CentiDps, MotorId, SpeedLimit, Torque4, TorqueCommand};
+use motorlink::stmcp::{Client, MotorHandle, Status, register};
+
+use super::bench::Drives;
+use super::screen::{Row, Screen};
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::output::line;
+
+/// How often the table is read.
+const TICK: Duration = Duration::from_millis(50);
+/// When a step that is not reached is given up.
+const PATIENCE: Duration = Duration::from_secs(6);
+
+pub struct Story<'a> {
+    drives: &'a Drives,
+    st: &'a Client,
+    bus: &'a Bus,
+    screen: &'a mut Screen,
+    rows: Vec<Row>,
+    began: Instant,
+    exchanges: u64,
+    exchanging: Duration,
+    done: Vec<String>,
+}
+
+/// What the demo has shown.
+pub struct Summary {
+    lines: Vec<String>,
+}
+
+impl<'a> Story<'a> {
+    pub fn new(drives: &'a Drives, st: &'a Client, bus: &'a Bus, screen: &'a mut Screen) -> Self {
+        Story {
+            drives,
+            st,
+            bus,
+            screen,
+            rows: Vec::new(),
+            began: Instant::now(),
+            exchanges: 0,
+            exchanging: Duration::ZERO,
+            done: Vec::new(),
+        }
+    }
+
+    pub fn tell(&mut self) -> Result<(), Failure> {
+        self.meet()?;
+        self.spin()?;
+        self.reverse()?;
+        self.turn_rmd()?;
+        self.position()?;
+        self.break_and_mend()?;
+        self.rest()
+    }
+
+    pub fn summary(&self) -> Summary {
+        let rate = self.exchanges as f64 / self.exchanging.as_secs_f64().max(1e-9);
+        let (st, rmd) = (self.st.counters(), self.bus.counters());
+        let mut lines = vec![String::new(), "What you saw:".to_owned()];
+        lines.extend(self.done.iter().map(|done| format!("  - {done}")));
+        lines.push(format!(
+            "{} exchanges in {:.0} s, {:.0} µs each; {} lost, {} late, {} damaged.",
+            self.exchanges,
+            self.began.elapsed().as_secs_f64(),
+            1e6 / rate,
+            st.losses,
+            rmd.late,
+            rmd.malformed
+        ));
+        lines.push(String::new());
+        lines.push("Next: `motorlink sim &`, then `motorlink st -p ./st0 status`,".to_owned());
+        lines.push(
+            "`motorlink rmd -p slcan:./can0 scan`; `motorlink ports` for real drives.".to_owned(),
+        );
+        Summary { lines }
+    }
+
+    fn meet(&mut self) -> Result<(), Failure> {
+        let info = self.st.info()?;
+        let [major, minor, patch] = info.version;
+        let mut ids = Vec::new();
+        for id in 1..=4 {
+            self.bus.motor(id)?.status1()?;
+            ids.push(id.to_string());
+        }
+        self.screen.say(&format!(
+            "The ST drive is {} {major}.{minor}.{patch}; RMD motors {} answer.",
+            info.name,
+            ids.join(", ")
+        ));
+        self.watch(Duration::from_millis(300))
+    }
+
+    fn spin(&mut self) -> Result<(), Failure> {
+        self.screen.say("ST motor 1: START_MOTOR, then a ramp to 1500 rpm in 800 ms.");
+        let motor = self.st.motor(1)?;
+        motor.ramp(1500, 800)?;
+        motor.start()?;
+        self.until("ST motor 1 reaches 1500 rpm", |_| near(&motor, 1500))?;
+        self.screen.say("ST motor 2: the same, with its encoder aligned first.");
+        let second = self.st.motor(2)?;
+        second.ramp(1000, 800)?;
+        second.start()?;
+        self.until("ST motor 2 reaches 1000 rpm", |_| near(&second, 1000))?;
+        self.done
+            .push("two ST motors started through all their states and held their speed".into());
+        Ok(())
+    }
+
+    fn reverse(&mut self) -> Result<(), Failure> {
+        self.screen.say("ST motor 2 reverses: a ramp to -1000 rpm in 1 s.");
+        let motor = self.st.motor(2)?;
+        motor.ramp(-1000, 1000)?;
+        self.until("ST motor 2 reaches -1000 rpm", |_| near(&motor, -1000))?;
+        self.done.push("one of them reversed".into());
+        Ok(())
+    }
+
+    fn turn_rmd(&mut self) -> Result<(), Failure> {
+        self.screen.say("RMD motors 1 to 4: torque currents in one frame (0x280), then speeds.");
+        let torques = [0.5, -0.5, 0.4, -0.4].map(TorqueCommand::from_amps);
+        let all = (1..=4).filter_map(MotorId::new).collect();
+        for reply in self.bus.torque4(Torque4(torques), all)?.into_iter().flatten() {
+            reply?;
+        }
+        self.watch(Duration::from_millis(400))?;
+        for (id, dps) in [(1, 360.0), (2, -360.0), (3, 720.0), (4, -720.0)] {
+            self.bus.motor(id)?.speed(CentiDps::from_dps(dps))?;
+        }
+        let bus = self.bus;
+        self.until("RMD motor 3 turns with 720 °/s", |_| {
+            Ok((bus.motor(3)?.status2()?.speed.0 - 720).abs() <= 15)
+        })?;
+        self.done.push("four RMD motors held torque, then speed".into());
+        Ok(())
+    }
+
+    fn position(&mut self) -> Result<(), Failure> {
+        self.screen.say("RMD motor 1 turns to 90°, no faster than 300 °/s; the others switch off.");
+        let motor = self.bus.motor(1)?;
+        for id in 2..=4 {
+            self.bus.motor(id)?.off()?;
+        }
+        motor.stop()?;
+        let turns = (motor.multi_turn_angle()?.degrees() / 360.0).round();
+        let target = turns * 360.0 + 90.0;
+        motor.move_to(CentiDegrees::from_degrees(target), Some(SpeedLimit(300)))?;
+        let mut reached = 0.0;
+        self.until("RMD motor 1 reaches 90°", |_| {
+            reached = motor.multi_turn_angle()?.degrees();
+            Ok((reached - target).abs() < 0.2)
+        })?;
+        self.done
+            .push(format!("an RMD motor went to {:.2}° and stayed there", reached - turns * 360.0));
+        Ok(())
+    }
+
+    fn break_and_mend(&mut self) -> Result<(), Failure> {
+        self.screen.say("A fault: over-current in ST motor 1. Its drive stops it at once.");
+        let motor = self.st.motor(1)?;
+        self.drives.st_fault(1, "BREAK_IN")?;
+        self.until("ST motor 1 is in fault", |_| {
+            Ok(matches!(motor.status()?, Status::FaultNow | Status::FaultOver))
+        })?;
+        let faults = motor.faults()?;
+        self.watch(Duration::from_millis(500))?;
+        self.screen.say(&format!("Its FLAGS say {faults}. FAULT_ACK, and it starts again."));
+        self.until(
+            "ST motor 1 stands still",
+            |_| Ok(motor.read(register::SPEED_MEAS)?.abs() < 30),
+        )?;
+        motor.acknowledge_faults()?;
+        self.until("ST motor 1 is idle", |_| Ok(motor.status()? == Status::Idle))?;
+        motor.ramp(1200, 500)?;
+        motor.start()?;
+        self.until("ST motor 1 reaches 1200 rpm", |_| near(&motor, 1200))?;
+        self.done
+            .push(format!("a fault ({faults}) latched, was acknowledged, and the motor ran again"));
+        Ok(())
+    }
+
+    fn rest(&mut self) -> Result<(), Failure> {
+        self.screen.say("Everything stops.");
+        let st = self.st;
+        for number in 1..=2 {
+            st.motor(number)?.stop()?;
+        }
+        self.bus.motor(1)?.off()?;
+        self.until("the ST motors are idle", |_| {
+            Ok(st.motor(1)?.status()? == Status::Idle && st.motor(2)?.status()? == Status::Idle)
+        })
+    }
+
+    /// Shows the table until `reached` says so.
+    fn until(
+        &mut self,
+        what: &str,
+        mut reached: impl FnMut(&mut Self) -> Result<bool, Failure>,
+    ) -> Result<(), Failure> {
+        let begun = Instant::now();
+        while !reached(self)? {
+            if begun.elapsed() > PATIENCE {
+                return Err(Failure::Refused(format!("{what} was expected and did not happen")));
+            }
+            self.tick()?;
+        }
+        self.tick()
+    }
+
+    fn watch(&mut self, time: Duration) -> Result<(), Failure> {
+        let begun = Instant::now();
+        while begun.elapsed() < time {
+            self.tick()?;
+        }
+        Ok(())
+    }
+
+    fn tick(&mut self) -> Result<(), Failure> {
+        let begun = Instant::now();
+        self.rows.clear();
+        for number in 1..=2 {
+            let row = st_row(&self.st.motor(number)?)?;
+            self.rows.push(row);
+            self.exchanges += 6;
+        }
+        for id in 1..=4 {
+            let row = self.rmd_row(id)?;
+            self.rows.push(row);
+            self.exchanges += 2;
+        }
+        self.exchanging += begun.elapsed();
+        self.screen.show(&self.rows);
+        if interrupt::wait(TICK) { Ok(()) } else { Err(Failure::Interrupted) }
+    }
+
+    fn rmd_row(&self, id: u8) -> Result<Row, Failure> {
+        let motor = self.bus.motor(id)?;
+        let (state, motion) = (motor.status1()?, motor.status2()?);
+        let turning = motion.speed.0 != 0 || motion.iq.0 != 0;
+        let status = match (state.errors.is_empty(), turning) {
+            (false, _) => state.errors.to_string(),
+            (true, true) => "turning".to_owned(),
+            (true, false) => "at rest".to_owned(),
+        };
+        Ok(Row {
+            motor: format!("RMD {id}"),
+            state: status,
+            speed: format!("{} °/s", motion.speed.0),
+            current: format!("{:.2} A", motion.iq.amps()),
+            temperature: format!("{} °C", state.temperature.0),
+            voltage: format!("{:.1} V", state.voltage.volts()),
+            alarm: !state.errors.is_empty(),
+        })
+    }
+}
+
+fn st_row(motor: &MotorHandle<'_>) -> Result<Row, Failure> {
+    let (status, faults) = (motor.status()?, motor.faults()?);
+    let alarm = faults.occurred() != 0;
+    let state = if alarm { format!("{status} {faults}") } else { status.to_string() };
+    Ok(Row {
+        motor: format!("ST {}", motor.number().number()),
+        state,
+        speed: format!("{} rpm", motor.read(register::SPEED_MEAS)?),
+        current: format!("{} s16A", motor.read(register::TORQUE_MEAS)?),
+        temperature: format!("{} °C", motor.read(register::HEATS_TEMP)?),
+        voltage: format!("{} V", motor.read(register::BUS_VOLTAGE)?),
+        alarm,
+    })
+}
+
+fn near(motor: &MotorHandle<'_>, rpm: i32) -> Result<bool, Failure> {
+    Ok((motor.read(register::SPEED_MEAS)? - rpm).abs() <= 30)
+}
+
+impl Summary {
+    pub fn print(&self) -> Result<(), Failure> {
+        self.lines.iter().try_for_each(|text| line(text))
+    }
+}

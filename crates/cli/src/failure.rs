@@ -1,0 +1,91 @@
+//! How the program ends when it did not do what it was asked.
+
+use std::process::ExitCode;
+
+use motorlink::port::{NameError, PortError};
+use motorlink::{rmd, stmcp};
+
+/// Why, and with which exit code.
+#[derive(Debug)]
+pub enum Failure {
+    /// 1: the drive refused, or did not do it.
+    Refused(String),
+    /// 2: the command does not make sense.
+    Usage(String),
+    /// 3: the line failed.
+    Line(String),
+    /// 130: Ctrl-C.
+    Interrupted,
+    /// 0: whoever read the output has closed it.
+    OutputClosed,
+}
+
+impl Failure {
+    /// Says why on stderr; gives the exit code.
+    pub fn report(self) -> ExitCode {
+        let (code, message) = match self {
+            Failure::Refused(message) => (1, message),
+            Failure::Usage(message) => (2, message),
+            Failure::Line(message) => (3, message),
+            Failure::Interrupted => return ExitCode::from(130),
+            Failure::OutputClosed => return ExitCode::SUCCESS,
+        };
+        eprintln!("{} {message}", console::style("error:").red().bold().for_stderr());
+        ExitCode::from(code)
+    }
+}
+
+impl From<stmcp::Error> for Failure {
+    fn from(error: stmcp::Error) -> Self {
+        let message = error.to_string();
+        match error {
+            stmcp::Error::Refused { .. } => Failure::Refused(message),
+            stmcp::Error::Port(error) => error.into(),
+            error if error.is_line_failure() => Failure::Line(message),
+            _ => Failure::Usage(message),
+        }
+    }
+}
+
+impl From<rmd::Error> for Failure {
+    fn from(error: rmd::Error) -> Self {
+        let message = error.to_string();
+        if error.is_line_failure() { Failure::Line(message) } else { Failure::Usage(message) }
+    }
+}
+
+impl From<PortError> for Failure {
+    fn from(error: PortError) -> Self {
+        match error {
+            PortError::WrongKind { .. } => Failure::Usage(error.to_string()),
+            _ => Failure::Line(error.to_string()),
+        }
+    }
+}
+
+impl From<NameError> for Failure {
+    fn from(error: NameError) -> Self {
+        Failure::Usage(error.to_string())
+    }
+}
+
+impl From<stmcp::UnknownRegister> for Failure {
+    fn from(error: stmcp::UnknownRegister) -> Self {
+        Failure::Usage(error.to_string())
+    }
+}
+
+impl From<stmcp::ValueError> for Failure {
+    fn from(error: stmcp::ValueError) -> Self {
+        Failure::Usage(error.to_string())
+    }
+}
+
+impl From<std::io::Error> for Failure {
+    fn from(error: std::io::Error) -> Self {
+        match error.kind() {
+            std::io::ErrorKind::BrokenPipe => Failure::OutputClosed,
+            _ => Failure::Line(error.to_string()),
+        }
+    }
+}

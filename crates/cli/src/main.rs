@@ -1,0 +1,77 @@
+//! `motorlink`: command, watch and simulate motor drives from the shell.
+
+mod demo;
+mod failure;
+mod help;
+mod interrupt;
+mod output;
+mod ports;
+mod repeat;
+mod rmd;
+mod sim;
+mod st;
+mod trace;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser, Subcommand};
+
+/// Command, watch and simulate motor drives: ST's Motor Control Protocol over a serial line and the
+/// RMD protocol V1.62 over CAN.
+#[derive(Parser)]
+#[command(name = "motorlink", version, max_term_width = 100, after_help = help::EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Drive simulated motors of both kinds through real ports, and show what happens
+    Demo(demo::Args),
+    /// Serve simulated drives on ports of this machine
+    Sim(sim::Args),
+    /// List serial devices and CAN interfaces, and what could be wrong with them
+    Ports(ports::Args),
+    /// Talk to a drive that speaks ST's Motor Control Protocol
+    #[command(after_help = help::PORTS)]
+    St(st::Args),
+    /// Talk to RMD motors on a CAN bus
+    #[command(after_help = help::PORTS)]
+    Rmd(rmd::Args),
+    /// Print completions for a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages into a folder
+    Man {
+        /// The folder; it is made if it is not there
+        folder: std::path::PathBuf,
+    },
+}
+
+fn main() -> ExitCode {
+    interrupt::install();
+    let result = match Cli::parse().command {
+        Command::Demo(args) => demo::run(args),
+        Command::Sim(args) => sim::run(args),
+        Command::Ports(args) => ports::run(args),
+        Command::St(args) => st::run(args),
+        Command::Rmd(args) => rmd::run(args),
+        Command::Completions { shell } => {
+            clap_complete::generate(
+                shell,
+                &mut Cli::command(),
+                "motorlink",
+                &mut std::io::stdout(),
+            );
+            Ok(())
+        }
+        Command::Man { folder } => help::write_manual(Cli::command(), &folder),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}

@@ -1,0 +1,128 @@
+//! What people and programs read: aligned rows, or a JSON object a line.
+
+use std::io::{Write, stdout};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Map, Value};
+
+use crate::failure::Failure;
+
+/// Where results go.
+#[derive(Debug, Clone, Copy)]
+pub struct Output {
+    /// One JSON object a line instead of text.
+    pub json: bool,
+}
+
+impl Output {
+    /// Prints one result: `text` for people, or `object` as a line of JSON.
+    pub fn result(self, text: impl std::fmt::Display, object: Value) -> Result<(), Failure> {
+        if self.json { line(&object) } else { line(&text) }
+    }
+
+    /// Prints named values: a row each, or one object of all.
+    pub fn rows(self, rows: &[(&str, String, Value)]) -> Result<(), Failure> {
+        if self.json {
+            let object: Map<String, Value> =
+                rows.iter().map(|(name, _, value)| ((*name).to_owned(), value.clone())).collect();
+            return line(&Value::Object(object));
+        }
+        let width = rows.iter().map(|(name, ..)| name.chars().count()).max().unwrap_or(0);
+        for (name, text, _) in rows {
+            line(&format!("{:<width$}  {text}", name.replace('_', " ")))?;
+        }
+        Ok(())
+    }
+
+    /// Says that something without a result was done.
+    pub fn done(self, text: impl std::fmt::Display) -> Result<(), Failure> {
+        if self.json { line(&serde_json::json!({ "ok": true })) } else { line(&text) }
+    }
+}
+
+/// Prints a line at once; a reader that is gone ends the program quietly.
+pub fn line(text: &dyn std::fmt::Display) -> Result<(), Failure> {
+    let mut out = stdout().lock();
+    writeln!(out, "{text}")?;
+    out.flush()?;
+    Ok(())
+}
+
+/// A bar on stderr for a scan of `steps` steps; nothing where stderr is no terminal.
+pub fn progress(steps: usize) -> ProgressBar {
+    let bar = ProgressBar::new(steps as u64);
+    let style = ProgressStyle::with_template("{spinner} {bar:24} {pos}/{len} {msg}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}
+
+/// Bytes as people write them: `02 01 1e 21`.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+}
+
+/// Reads bytes as people write them, with or without spaces, colons and `0x`.
+pub fn parse_hex(words: &[String]) -> Result<Vec<u8>, Failure> {
+    let joined = words.join(" ").replace("0x", " ").replace([':', ',', '-'], " ");
+    let mut bytes = Vec::new();
+    for word in joined.split_whitespace() {
+        let word = if word.len() == 1 { format!("0{word}") } else { word.to_owned() };
+        let digits: Option<Vec<u8>> =
+            word.chars().map(|c| c.to_digit(16).map(|digit| digit as u8)).collect();
+        match digits {
+            Some(digits) if digits.len() % 2 == 0 => {
+                bytes.extend(digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]));
+            }
+            _ => {
+                return Err(Failure::Usage(format!(
+                    "`{word}` is not hexadecimal bytes; write them as `02 01 1e` or `02011e`"
+                )));
+            }
+        }
+    }
+    Ok(bytes)
+}
+
+/// Reads a time span such as `100ms`, `0.5s` or `2` (seconds).
+pub fn parse_span(text: &str) -> Result<Duration, String> {
+    let (number, unit) = match text.strip_suffix("ms") {
+        Some(number) => (number, 1e-3),
+        None => (text.strip_suffix('s').unwrap_or(text), 1.0),
+    };
+    let seconds = number.trim().parse::<f64>().map(|number| number * unit);
+    match seconds.map(Duration::try_from_secs_f64) {
+        Ok(Ok(span)) if !span.is_zero() => Ok(span),
+        _ => Err("write a time as 100ms or 0.5s".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bytes(text: &str) -> Option<Vec<u8>> {
+        parse_hex(&[text.to_owned()]).ok()
+    }
+
+    #[test]
+    fn hexadecimal_is_read_as_people_write_it() {
+        let expected = Some(vec![0x02, 0x01, 0x1E, 0x21]);
+        assert_eq!(bytes("02 01 1e 21"), expected);
+        assert_eq!(bytes("02011E21"), expected);
+        assert_eq!(bytes("0x02 0x01 0x1e 0x21"), expected);
+        assert_eq!(bytes("2 1 1e:21"), expected);
+        assert_eq!(bytes("021"), None);
+        assert_eq!(bytes("xy"), None);
+    }
+
+    #[test]
+    fn spans_need_a_unit_that_exists() {
+        assert_eq!(parse_span("100ms"), Ok(Duration::from_millis(100)));
+        assert_eq!(parse_span("0.5s"), Ok(Duration::from_millis(500)));
+        assert_eq!(parse_span("2"), Ok(Duration::from_secs(2)));
+        assert!(parse_span("-1s").is_err());
+        assert!(parse_span("0").is_err());
+        assert!(parse_span("soon").is_err());
+    }
+}

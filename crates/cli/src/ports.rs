@@ -1,0 +1,73 @@
+//! `motorlink ports`
+
+use motorlink::list::{self, PortInfo, PortKind};
+use motorlink::port::PortName;
+use serde_json::json;
+
+use crate::failure::Failure;
+use crate::output::{Output, line};
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Print a JSON object a port
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args) -> Result<(), Failure> {
+    let ports = list::ports();
+    if ports.is_empty() && !args.json {
+        line(&"No serial device and no CAN interface is connected.")?;
+        return line(&"Without hardware: `motorlink demo`, or `-p sim:` with any command.");
+    }
+    let width = ports.iter().map(|port| port.name.len()).max().unwrap_or(0);
+    for port in &ports {
+        Output { json: args.json }.result(text(port, width), object(port))?;
+    }
+    Ok(())
+}
+
+fn kind(port: &PortInfo) -> &'static str {
+    match port.kind {
+        PortKind::Serial => "serial",
+        PortKind::Can => "CAN",
+    }
+}
+
+fn text(port: &PortInfo, width: usize) -> String {
+    let description = port.description.as_deref().unwrap_or("");
+    let mut text = format!("{:<width$}  {:<6}  {description}", port.name, kind(port));
+    if let Some(path) = &port.stable_path {
+        text += &format!("\n{:width$}          always {}", "", path.display());
+    }
+    match &port.problem {
+        Some(problem) => {
+            let mark = console::style("!").yellow().bold();
+            text += &format!("\n{:width$}        {mark} {problem}", "");
+        }
+        None => text += &format!("  {}", console::style("ready").green()),
+    }
+    text
+}
+
+fn object(port: &PortInfo) -> serde_json::Value {
+    json!({
+        "port": port.name,
+        "kind": kind(port),
+        "description": port.description,
+        "stable_path": port.stable_path,
+        "problem": port.problem,
+    })
+}
+
+/// The port that -p or MOTORLINK_PORT names.
+pub fn named(name: Option<&str>) -> Result<PortName, Failure> {
+    match name {
+        Some(name) => Ok(name.parse()?),
+        None => Err(Failure::Usage(
+            "which port? give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is \
+             connected, and `-p sim:` needs no hardware"
+                .to_owned(),
+        )),
+    }
+}

@@ -1,0 +1,58 @@
+//! Reading again and again, through losses of the line.
+
+use std::time::{Duration, Instant};
+
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::output::parse_span;
+
+/// How often to read.
+#[derive(clap::Args, Clone, Copy)]
+pub struct Repeat {
+    /// Read again and again at this interval, such as 100ms, until Ctrl-C
+    #[arg(long, value_name = "TIME", value_parser = parse_span)]
+    pub every: Option<Duration>,
+    /// Stop after this many readings
+    #[arg(long, value_name = "N", requires = "every")]
+    pub count: Option<u64>,
+}
+
+/// Prints samples once, or again and again with the seconds since the first: then a line that fails
+/// is waited for.
+pub fn repeated<T>(
+    repeat: Repeat,
+    mut sample: impl FnMut() -> Result<Vec<T>, Failure>,
+    print: impl Fn(&[T], Option<f64>) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let Some(every) = repeat.every else { return print(&sample()?, None) };
+    let began = Instant::now();
+    let mut lost = false;
+    let mut left = repeat.count.unwrap_or(u64::MAX);
+    let mut due = began;
+    while left > 0 && !interrupt::interrupted() {
+        match sample() {
+            Ok(samples) => {
+                if std::mem::take(&mut lost) {
+                    eprintln!("the line is back");
+                }
+                print(&samples, Some(began.elapsed().as_secs_f64()))?;
+                left -= 1;
+            }
+            Err(Failure::Line(message)) => {
+                if !std::mem::replace(&mut lost, true) {
+                    eprintln!("the line is lost: {message}; trying again until Ctrl-C");
+                }
+            }
+            Err(other) => return Err(other),
+        }
+        // A slow line skips readings rather than falling behind.
+        let now = Instant::now();
+        while due <= now {
+            due += every;
+        }
+        if left > 0 {
+            interrupt::wait(due - now);
+        }
+    }
+    Ok(())
+}

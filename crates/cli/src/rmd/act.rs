@@ -1,0 +1,214 @@
+//! Commands that change something in a motor.
+
+use motorlink::rmd::{
+    CentiDegrees, CentiDps, CircleAngle, Code, DpsPerSecond, Gains, MotionStatus, MotorSet,
+    SpeedLimit, Spin, Torque4, TorqueCommand,
+};
+use serde_json::{Map, Value, json};
+
+use super::Session;
+use super::args::{Command, Direction};
+use super::read::{motion, status1, value};
+use crate::failure::Failure;
+use crate::output::{hex, line, parse_hex};
+
+pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
+    let motor = session.motor()?;
+    let id = motor.id();
+    let output = session.output;
+    match command {
+        Command::Pid { gains } => pid(session, &gains),
+        Command::Accel { dps_per_second: None } => {
+            let limit = motor.acceleration()?;
+            output.rows(&[value(
+                session,
+                "acceleration",
+                limit.0.into(),
+                limit.dps_per_second(),
+                0,
+                "°/s²",
+            )])
+        }
+        Command::Accel { dps_per_second: Some(limit) } => {
+            motor.write_acceleration(DpsPerSecond(limit))?;
+            output.done(format!("motor {id} accelerates with {limit} °/s² until power-off"))
+        }
+        Command::Encoder { offset } => encoder(session, offset),
+        Command::Zero => {
+            session.rom("setting the zero")?;
+            let offset = motor.write_zero_to_rom()?;
+            output.result(
+                format!("motor {id} has its zero here from the next power-on on (offset {offset})"),
+                json!({ "ok": true, "offset": offset }),
+            )
+        }
+        Command::Off => {
+            motor.off()?;
+            output.done(format!("motor {id} is off"))
+        }
+        Command::Stop => {
+            motor.stop()?;
+            output.done(format!("motor {id} is stopped; `run` resumes"))
+        }
+        Command::Run => {
+            motor.run()?;
+            output.done(format!("motor {id} runs again"))
+        }
+        Command::Torque { amps } => {
+            let torque = torque(session, amps)?;
+            output.rows(&motion(session, &motor.torque(torque)?))
+        }
+        Command::Speed { dps } => {
+            let speed = CentiDps(digits(session, dps, CentiDps::SCALE, "°/s")?);
+            output.rows(&motion(session, &motor.speed(speed)?))
+        }
+        Command::Move { degrees, max_speed, direction } => {
+            let status = go(session, degrees, max_speed, direction)?;
+            output.rows(&motion(session, &status))
+        }
+        Command::ClearError => {
+            let status = motor.clear_errors()?;
+            output.rows(&status1(session, &status))?;
+            if status.errors.is_empty() {
+                return Ok(());
+            }
+            Err(Failure::Refused(format!(
+                "motor {id} keeps its errors, their cause is still there: {}",
+                status.errors
+            )))
+        }
+        Command::Torque4 { amps } => torque4(session, &amps),
+        Command::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
+        Command::Scan { .. } | Command::Status { .. } | Command::Angle { .. } => Ok(()),
+    }
+}
+
+fn pid(session: &Session, gains: &[u8]) -> Result<(), Failure> {
+    let motor = session.motor()?;
+    if let &[position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki] = gains {
+        let gains = Gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki };
+        if session.write_rom {
+            motor.write_gains_to_rom(gains)?;
+            return session.output.done(format!("motor {} has these gains for good", motor.id()));
+        }
+        motor.write_gains(gains)?;
+        return session
+            .output
+            .done(format!("motor {} has these gains until power-off", motor.id()));
+    }
+    let gains = motor.gains()?;
+    let row = |name, gain: u8| (name, gain.to_string(), json!(gain));
+    session.output.rows(&[
+        row("position_kp", gains.position_kp),
+        row("position_ki", gains.position_ki),
+        row("speed_kp", gains.speed_kp),
+        row("speed_ki", gains.speed_ki),
+        row("torque_kp", gains.torque_kp),
+        row("torque_ki", gains.torque_ki),
+    ])
+}
+
+fn encoder(session: &Session, offset: Option<u16>) -> Result<(), Failure> {
+    let motor = session.motor()?;
+    if let Some(offset) = offset {
+        session.rom("setting the encoder offset")?;
+        let taken = motor.write_encoder_offset_to_rom(offset)?;
+        let text = format!("motor {} has the encoder offset {taken}", motor.id());
+        return session.output.result(text, json!({ "ok": true, "offset": taken }));
+    }
+    let encoder = motor.encoder()?;
+    let row = |name, counts: u16| (name, counts.to_string(), json!(counts));
+    session.output.rows(&[
+        row("position", encoder.position),
+        row("original", encoder.raw),
+        row("offset", encoder.offset),
+    ])
+}
+
+fn go(
+    session: &Session,
+    degrees: f64,
+    max_speed: Option<f64>,
+    direction: Option<Direction>,
+) -> Result<MotionStatus, Failure> {
+    let motor = session.motor()?;
+    let max_speed = match max_speed {
+        Some(dps) => Some(SpeedLimit(digits(session, dps, SpeedLimit::SCALE, "°/s")?)),
+        None => None,
+    };
+    let Some(direction) = direction else {
+        let angle = CentiDegrees(digits(session, degrees, CentiDegrees::SCALE, "°")?);
+        return Ok(motor.move_to(angle, max_speed)?);
+    };
+    let spin = match direction {
+        Direction::Cw => Spin::Clockwise,
+        Direction::Ccw => Spin::Counterclockwise,
+    };
+    let angle = CircleAngle(digits(session, degrees, CircleAngle::SCALE, "°")?);
+    Ok(motor.turn_to(angle, spin, max_speed)?)
+}
+
+fn torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
+    let mut torques = [TorqueCommand(0); 4];
+    for (slot, &amps) in torques.iter_mut().zip(amps) {
+        *slot = torque(session, amps)?;
+    }
+    let replies = session.bus.torque4(Torque4(torques), MotorSet::TORQUE4)?;
+    let mut silent = None;
+    for (reply, id) in replies.into_iter().zip(1..) {
+        match reply {
+            Some(Ok(status)) => {
+                let rows = motion(session, &status);
+                let values: Vec<&str> = rows.iter().map(|(_, text, _)| text.as_str()).collect();
+                let fields =
+                    rows.iter().map(|(name, _, value)| ((*name).to_owned(), value.clone()));
+                let object: Map<String, Value> =
+                    std::iter::once(("id".to_owned(), json!(id))).chain(fields).collect();
+                session
+                    .output
+                    .result(format!("motor {id}  {}", values.join("   ")), Value::Object(object))?;
+            }
+            Some(Err(error)) => {
+                silent.get_or_insert(error);
+            }
+            None => {}
+        }
+    }
+    silent.map_or(Ok(()), |error| Err(error.into()))
+}
+
+fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
+    let mut request = [0; 8];
+    let Some(room) = request.get_mut(..bytes.len()) else {
+        return Err(Failure::Usage(format!("a frame has 8 bytes, not {}", bytes.len())));
+    };
+    room.copy_from_slice(bytes);
+    if Code::from(request[0]).info().is_some_and(|row| row.rom) {
+        session.rom(&format!("{:#04x}", request[0]))?;
+    }
+    let reply = session.bus.raw(session.motor()?.id(), request)?;
+    if session.output.json {
+        return session.output.result("", json!({ "ok": true, "data": hex(&reply) }));
+    }
+    line(&hex(&reply))
+}
+
+fn torque(session: &Session, amps: f64) -> Result<TorqueCommand, Failure> {
+    Ok(TorqueCommand(digits(session, amps, TorqueCommand::SCALE, "A")?))
+}
+
+/// A value in the physical unit, or with --raw in digits, as the wire's integer. What does not fit
+/// is refused, never cut.
+fn digits<T: TryFrom<i64>>(
+    session: &Session,
+    value: f64,
+    scale: f64,
+    unit: &str,
+) -> Result<T, Failure> {
+    let digits = if session.raw { value } else { value / scale };
+    let fits = digits.is_finite().then(|| digits.round() as i64).and_then(|n| T::try_from(n).ok());
+    fits.ok_or_else(|| {
+        let unit = if session.raw { "digits" } else { unit };
+        Failure::Usage(format!("{value} {unit} does not fit the frame; nothing was sent"))
+    })
+}

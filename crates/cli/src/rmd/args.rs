@@ -1,0 +1,141 @@
+//! What `motorlink rmd` takes.
+
+use clap::Subcommand;
+use motorlink::port::PortName;
+
+use crate::failure::Failure;
+use crate::ports;
+use crate::repeat::Repeat;
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    pub connection: Connection,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(clap::Args)]
+pub struct Connection {
+    /// The bus: slcan:DEVICE, slcan:tcp:HOST:PORT, socketcan:INTERFACE or sim:
+    #[arg(short, long, env = "MOTORLINK_PORT", global = true)]
+    port: Option<String>,
+    /// The motor's ID, 1 to 32
+    #[arg(short, long, default_value_t = 1, global = true,
+          value_parser = clap::value_parser!(u8).range(1..=32))]
+    pub id: u8,
+    /// How long to wait for a reply, ms
+    #[arg(long, default_value_t = 50, global = true, value_name = "MS",
+          value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub timeout: u32,
+    /// Allow commands that write to the motor's ROM, which wears
+    #[arg(long, global = true)]
+    pub write_rom: bool,
+    /// Print JSON, an object a line
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Take and print values as digits of the protocol instead of physical units
+    #[arg(long, global = true)]
+    pub raw: bool,
+    /// Show every frame on stderr
+    #[arg(long, global = true)]
+    pub trace: bool,
+}
+
+impl Connection {
+    pub fn port(&self) -> Result<PortName, Failure> {
+        ports::named(self.port.as_deref())
+    }
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Find the motors that answer
+    Scan {
+        /// IDs to ask instead of 1 to 32
+        #[arg(value_name = "ID", value_parser = clap::value_parser!(u8).range(1..=32))]
+        ids: Vec<u8>,
+    },
+    /// Show temperature, voltage, errors, speed, torque current, phase currents, angles
+    Status {
+        #[command(flatten)]
+        repeat: Repeat,
+    },
+    /// Show the gains, or set them until power-off (for good with --write-rom)
+    Pid {
+        /// Position Kp, Ki, speed Kp, Ki, torque Kp, Ki: all six to set them
+        #[arg(num_args = 6, value_name = "GAIN")]
+        gains: Vec<u8>,
+    },
+    /// Show the acceleration limit, or set it until power-off
+    Accel {
+        /// °/s²; 0 is unlimited
+        #[arg(allow_negative_numbers = true)]
+        dps_per_second: Option<i32>,
+    },
+    /// Show the encoder, or set its offset for good (needs --write-rom)
+    Encoder {
+        /// The new offset
+        #[arg(long)]
+        offset: Option<u16>,
+    },
+    /// Make the current position the zero from the next power-on on (needs --write-rom)
+    Zero,
+    /// Show multi-turn and single-turn angle
+    Angle {
+        #[command(flatten)]
+        repeat: Repeat,
+    },
+    /// Switch the motor off and forget what it was doing
+    Off,
+    /// Stop the motor and remember what it was doing
+    Stop,
+    /// Resume what `stop` stopped
+    Run,
+    /// Hold a torque current
+    Torque {
+        /// A, within ±32
+        #[arg(allow_negative_numbers = true)]
+        amps: f64,
+    },
+    /// Hold a speed
+    Speed {
+        /// °/s, positive is clockwise
+        #[arg(allow_negative_numbers = true)]
+        dps: f64,
+    },
+    /// Turn to an angle
+    Move {
+        /// Degrees over all turns, positive is clockwise; 0 to 359.99 with --direction
+        #[arg(allow_negative_numbers = true)]
+        degrees: f64,
+        /// No faster than this, °/s
+        #[arg(long, value_name = "DPS")]
+        max_speed: Option<f64>,
+        /// Turn to an angle within the turn, this way round
+        #[arg(long, value_enum)]
+        direction: Option<Direction>,
+    },
+    /// Clear the errors whose cause is gone
+    ClearError,
+    /// Hold torque currents of motors 1 to 4, sent in one frame
+    Torque4 {
+        /// A for motors 1, 2, 3 and 4
+        #[arg(num_args = 4, required = true, allow_negative_numbers = true, value_name = "AMPS")]
+        amps: Vec<f64>,
+    },
+    /// Send any eight bytes
+    Raw {
+        /// Bytes in hexadecimal; zeros are added up to eight
+        #[arg(required = true, value_name = "HEX")]
+        bytes: Vec<String>,
+    },
+}
+
+#[derive(clap::ValueEnum, Clone, Copy)]
+pub enum Direction {
+    /// Clockwise
+    Cw,
+    /// Counterclockwise
+    Ccw,
+}

@@ -1,0 +1,69 @@
+//! `motorlink rmd`: RMD motors on a CAN bus.
+
+mod act;
+mod args;
+mod read;
+
+use std::time::Duration;
+
+use motorlink::port::TapCan;
+use motorlink::rmd::{Bus, MotorHandle, Options};
+
+pub use args::Args;
+use args::{Command, Connection};
+
+use crate::failure::Failure;
+use crate::output::Output;
+use crate::trace;
+
+/// An open bus, the motor that is meant, and how to show what it says.
+struct Session {
+    bus: Bus,
+    id: u8,
+    output: Output,
+    raw: bool,
+    write_rom: bool,
+}
+
+pub fn run(args: Args) -> Result<(), Failure> {
+    let Args { connection, command } = args;
+    let session = connect(&connection)?;
+    match command {
+        Command::Scan { ids } => read::scan(&session, ids),
+        Command::Status { repeat } => read::status(&session, repeat),
+        Command::Angle { repeat } => read::angle(&session, repeat),
+        other => act::run(&session, other),
+    }
+}
+
+fn connect(connection: &Connection) -> Result<Session, Failure> {
+    let port = connection.port()?;
+    let timeout = Duration::from_millis(connection.timeout.into());
+    let options = Options { timeout, ..Options::default() };
+    let bus = if connection.trace {
+        let name = port.clone();
+        let open = move || Ok(Box::new(TapCan::new(name.open_can()?, trace::frames())) as _);
+        Bus::open_with(&port.to_string(), Box::new(open), options)?
+    } else {
+        Bus::open(&port, options)?
+    };
+    let output = Output { json: connection.json };
+    let (raw, write_rom) = (connection.raw, connection.write_rom);
+    Ok(Session { bus, id: connection.id, output, raw, write_rom })
+}
+
+impl Session {
+    fn motor(&self) -> Result<MotorHandle<'_>, Failure> {
+        Ok(self.bus.motor(self.id)?)
+    }
+
+    /// What wears the ROM needs the explicit word.
+    fn rom(&self, what: &str) -> Result<(), Failure> {
+        if self.write_rom {
+            return Ok(());
+        }
+        Err(Failure::Usage(format!(
+            "{what} writes to the motor's ROM, which wears; add --write-rom if that is meant"
+        )))
+    }
+}

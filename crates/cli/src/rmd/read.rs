@@ -1,0 +1,170 @@
+//! Commands that read.
+
+use motorlink::rmd::{Errors, Found, MotionStatus, MotorId, MotorSet, PhaseCurrents, Status1};
+use serde_json::{Value, json};
+
+use super::Session;
+use crate::failure::Failure;
+use crate::interrupt::interrupted;
+use crate::output::{line, progress};
+use crate::repeat::{Repeat, repeated};
+
+/// One value: name, text for people, value for programs.
+pub type Row = (&'static str, String, Value);
+
+pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
+    let wanted: MotorSet = ids.iter().copied().filter_map(MotorId::new).collect();
+    let wanted = if wanted.is_empty() { MotorSet::ALL } else { wanted };
+    let bar = progress(wanted.len());
+    let mut found = Vec::new();
+    session.bus.scan(wanted, |motor| found.push(motor), |done| bar.set_position(done as u64))?;
+    bar.finish_and_clear();
+    if interrupted() {
+        return Err(Failure::Interrupted);
+    }
+    found.sort_by_key(|found| match found {
+        Found::Motor(id, _) | Found::Foreign(id, _) => *id,
+    });
+    for motor in &found {
+        match motor {
+            Found::Motor(id, status) => session.output.result(
+                format!(
+                    "motor {id:<2}  V1.62  {:>5.1} V  {:>3} °C  errors: {}",
+                    status.voltage.volts(),
+                    status.temperature.0,
+                    status.errors
+                ),
+                json!({
+                    "id": id.number(), "protocol": "V1.62",
+                    "voltage": rounded(status.voltage.volts(), 1),
+                    "temperature": status.temperature.0, "errors": names(status.errors),
+                }),
+            )?,
+            Found::Foreign(id, dialect) => session.output.result(
+                format!("motor {id:<2}  speaks {dialect}: it is not driven with this protocol"),
+                json!({ "id": id.number(), "protocol": dialect.to_string() }),
+            )?,
+        }
+    }
+    if found.is_empty() {
+        return Err(Failure::Line(
+            "no motor answered; is the supply on, the bus terminated, the bitrate 1 Mbit/s?".into(),
+        ));
+    }
+    Ok(())
+}
+
+pub fn status(session: &Session, repeat: Repeat) -> Result<(), Failure> {
+    show(session, repeat, |session| {
+        let motor = session.motor()?;
+        let mut rows = vec![("id", motor.id().to_string(), json!(motor.id().number()))];
+        rows.extend(status1(session, &motor.status1()?));
+        rows.extend(motion(session, &motor.status2()?).into_iter().skip(1));
+        rows.extend(phases(session, &motor.status3()?));
+        rows.extend(angles(session)?);
+        Ok(rows)
+    })
+}
+
+pub fn angle(session: &Session, repeat: Repeat) -> Result<(), Failure> {
+    show(session, repeat, angles)
+}
+
+fn show(
+    session: &Session,
+    repeat: Repeat,
+    mut sample: impl FnMut(&Session) -> Result<Vec<Row>, Failure>,
+) -> Result<(), Failure> {
+    repeated(
+        repeat,
+        || sample(session),
+        |rows, at| match at {
+            None => session.output.rows(rows),
+            Some(at) if session.output.json => {
+                let mut rows = rows.to_vec();
+                rows.insert(0, ("t", String::new(), json!(rounded(at, 6))));
+                session.output.rows(&rows)
+            }
+            Some(at) => {
+                let values: Vec<String> = rows
+                    .iter()
+                    .map(|(name, text, _)| format!("{} {text}", name.replace('_', " ")))
+                    .collect();
+                line(&format!("{at:>9.3} s  {}", values.join("   ")))
+            }
+        },
+    )
+}
+
+fn angles(session: &Session) -> Result<Vec<Row>, Failure> {
+    let motor = session.motor()?;
+    let (multi, circle) = (motor.multi_turn_angle()?, motor.circle_angle()?);
+    Ok(vec![
+        value(session, "angle", multi.0, multi.degrees(), 2, "°"),
+        value(session, "circle_angle", circle.0.into(), circle.degrees(), 2, "°"),
+    ])
+}
+
+pub fn status1(session: &Session, status: &Status1) -> Vec<Row> {
+    let errors = if session.raw { json!(status.errors.0) } else { names(status.errors) };
+    vec![
+        value(
+            session,
+            "temperature",
+            status.temperature.0.into(),
+            status.temperature.celsius(),
+            0,
+            "°C",
+        ),
+        value(session, "voltage", status.voltage.0.into(), status.voltage.volts(), 1, "V"),
+        ("errors", status.errors.to_string(), errors),
+    ]
+}
+
+pub fn motion(session: &Session, status: &MotionStatus) -> Vec<Row> {
+    vec![
+        value(
+            session,
+            "temperature",
+            status.temperature.0.into(),
+            status.temperature.celsius(),
+            0,
+            "°C",
+        ),
+        value(session, "torque_current", status.iq.0.into(), status.iq.amps(), 3, "A"),
+        value(session, "speed", status.speed.0.into(), status.speed.dps(), 0, "°/s"),
+        ("encoder", status.encoder.to_string(), json!(status.encoder)),
+    ]
+}
+
+fn phases(session: &Session, currents: &PhaseCurrents) -> Vec<Row> {
+    [("phase_a", currents.phase_a), ("phase_b", currents.phase_b), ("phase_c", currents.phase_c)]
+        .map(|(name, current)| value(session, name, current.0.into(), current.amps(), 3, "A"))
+        .into()
+}
+
+/// A wire integer as digits or in its physical unit.
+pub fn value(
+    session: &Session,
+    name: &'static str,
+    digits: i64,
+    physical: f64,
+    decimals: u8,
+    unit: &str,
+) -> Row {
+    if session.raw {
+        return (name, digits.to_string(), json!(digits));
+    }
+    let decimals_wide = usize::from(decimals);
+    let text = format!("{physical:.decimals_wide$} {unit}");
+    (name, text, json!(rounded(physical, decimals)))
+}
+
+fn rounded(value: f64, decimals: u8) -> f64 {
+    let scale = 10f64.powi(decimals.into());
+    (value * scale).round() / scale
+}
+
+fn names(errors: Errors) -> Value {
+    if errors.is_empty() { json!([]) } else { json!([errors.to_string()]) }
+}

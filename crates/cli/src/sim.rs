@@ -1,0 +1,170 @@
+//! `motorlink sim`: serves simulated drives and obeys commands on stdin.
+
+use std::io::{ErrorKind, Read, Write};
+use std::os::fd::AsFd;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use motorlink::port::ServeName;
+use motorlink::sim::{Bench, BenchConfig, ConfigError, ServeError};
+use motorlink::stmcp::Profile;
+use rustix::process::getpgrp;
+use rustix::termios::{isatty, tcgetpgrp};
+
+use crate::failure::Failure;
+use crate::interrupt::interrupted;
+
+/// How long the simulated time may fall behind while nobody talks.
+const IDLE: Duration = Duration::from_millis(20);
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Ports that are served: pty:PATH (a serial line), slcan-pty:PATH (a CAN adapter), \
+tcp-listen:ADDRESS:PORT (either).
+Without --st and --rmd: --st pty:./st0 --rmd slcan-pty:./can0.
+One JSON line a port on stdout says that it can be opened. JSON commands on stdin change the world \
+of the motors; docs/SIMULATOR.md lists them.")]
+pub struct Args {
+    /// What the drives are, in TOML; without it an ST drive with two motors and RMD motors 1 to 4
+    config: Option<PathBuf>,
+    /// Serve an ST drive here; may be given several times, for a drive each
+    #[arg(long, value_name = "PORT")]
+    st: Vec<String>,
+    /// Serve a bus of RMD motors here; may be given several times, for a bus each
+    #[arg(long, value_name = "PORT")]
+    rmd: Vec<String>,
+    /// What the ST drive speaks, instead of what the configuration says
+    #[arg(long, value_parser = crate::st::parse_profile)]
+    profile: Option<Profile>,
+    /// End when stdin does
+    #[arg(long)]
+    stdin: bool,
+}
+
+pub fn run(args: Args) -> Result<(), Failure> {
+    let mut config = match &args.config {
+        Some(path) => BenchConfig::read(path)?,
+        None => BenchConfig::default(),
+    };
+    if let Some(profile) = args.profile {
+        config.profile = profile;
+    }
+    let (st, rmd) = if args.st.is_empty() && args.rmd.is_empty() {
+        (vec!["pty:./st0".to_owned()], vec!["slcan-pty:./can0".to_owned()])
+    } else {
+        (args.st, args.rmd)
+    };
+    let mut bench = Bench::new();
+    let mut out = std::io::stdout();
+    serve(&mut bench, &config, &st, &rmd, &mut out)?;
+    obey(&mut bench, std::io::stdin(), &mut out, args.stdin)
+}
+
+/// Serves the ports and says so on `out`, a JSON line each.
+pub fn serve(
+    bench: &mut Bench,
+    config: &BenchConfig,
+    st: &[String],
+    rmd: &[String],
+    out: &mut impl Write,
+) -> Result<(), Failure> {
+    for port in st {
+        let announcement = bench.serve_st(&port.parse::<ServeName>()?, config)?;
+        writeln!(out, "{announcement}")?;
+    }
+    for port in rmd {
+        let announcement = bench.serve_rmd(&port.parse::<ServeName>()?, config)?;
+        writeln!(out, "{announcement}")?;
+    }
+    out.flush()?;
+    Ok(())
+}
+
+/// Serves until a signal comes, or until `input` ends if `until_end`. Each line of `input` is a
+/// command and is answered with a line on `out`.
+pub fn obey(
+    bench: &mut Bench,
+    mut input: impl Read + AsFd,
+    out: &mut impl Write,
+    until_end: bool,
+) -> Result<(), Failure> {
+    let mut lines = Lines::default();
+    while !interrupted() {
+        let listen = !lines.ended && may_read(&input);
+        let turn = bench.turn(IDLE, listen.then(|| input.as_fd()))?;
+        if !turn.extra_is_ready {
+            continue;
+        }
+        lines.read(&mut input)?;
+        while let Some(line) = lines.next() {
+            writeln!(out, "{}", bench.obey(&line))?;
+            out.flush()?;
+        }
+        if lines.ended && until_end {
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// A process in the background is stopped when it reads its terminal.
+fn may_read(input: &impl AsFd) -> bool {
+    !isatty(input) || tcgetpgrp(input).is_ok_and(|group| group == getpgrp())
+}
+
+/// Whole lines from something that gives bytes when it has them.
+#[derive(Default)]
+struct Lines {
+    bytes: Vec<u8>,
+    ended: bool,
+}
+
+/// The longest command; a longer line is answered as what it is, no command.
+const LONGEST: usize = 64 * 1024;
+
+impl Lines {
+    fn read(&mut self, input: &mut impl Read) -> Result<(), Failure> {
+        let mut chunk = [0; 4096];
+        match input.read(&mut chunk) {
+            Ok(0) => self.ended = true,
+            Ok(size) => self.bytes.extend_from_slice(&chunk[..size]),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+            Err(_) => self.ended = true,
+        }
+        Ok(())
+    }
+
+    fn next(&mut self) -> Option<String> {
+        loop {
+            let end = match self.bytes.iter().position(|&byte| byte == b'\n') {
+                Some(end) => end + 1,
+                None if self.bytes.len() > LONGEST || self.ended => self.bytes.len(),
+                None => return None,
+            };
+            if end == 0 {
+                return None;
+            }
+            let line: Vec<u8> = self.bytes.drain(..end).collect();
+            let line = String::from_utf8_lossy(&line).trim().to_owned();
+            if !line.is_empty() {
+                return Some(line);
+            }
+        }
+    }
+}
+
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        Failure::Usage(error.to_string())
+    }
+}
+
+impl From<ServeError> for Failure {
+    fn from(error: ServeError) -> Self {
+        match error {
+            ServeError::Port(error) => error.into(),
+            other => Failure::Usage(other.to_string()),
+        }
+    }
+}

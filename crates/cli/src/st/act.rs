@@ -1,0 +1,155 @@
+//! Commands that change something in the drive.
+
+use std::time::{Duration, Instant};
+
+use motorlink::stmcp::{
+    Command as Execute, Flags, REVUP_PHASES, RevupPhase, Status, find_register, parse_value,
+    register,
+};
+use serde_json::json;
+
+use super::Session;
+use super::args::{Command, Pfc};
+use super::read::explain;
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::output::{hex, parse_hex};
+
+pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
+    let motor = session.motor()?;
+    let output = session.output;
+    match command {
+        Command::Set { register, value } => set(session, &register, &value),
+        Command::Start => start(session),
+        Command::Stop => execute(session, Execute::StopMotor),
+        Command::StartStop => execute(session, Execute::StartStop),
+        Command::StopRamp => execute(session, Execute::StopRamp),
+        Command::FaultAck => acknowledge(session),
+        Command::EncoderAlign => execute(session, Execute::EncoderAlign),
+        Command::IqdrefClear => execute(session, Execute::IqdrefClear),
+        Command::Pfc { action: Pfc::Enable } => execute(session, Execute::PfcEnable),
+        Command::Pfc { action: Pfc::Disable } => execute(session, Execute::PfcDisable),
+        Command::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
+        Command::Ramp { rpm, ms } => {
+            motor.ramp(rpm, ms)?;
+            output.done(format!("{} goes to {rpm} rpm in {ms} ms", motor.number()))
+        }
+        Command::TorqueRamp { iq, ms } => {
+            motor.torque_ramp(iq, ms)?;
+            output.done(format!("{} goes to Iq {iq} in {ms} ms", motor.number()))
+        }
+        Command::Move { rad, seconds } => {
+            motor.move_to(rad, seconds)?;
+            output.done(format!("{} turns to {rad} rad in {seconds} s", motor.number()))
+        }
+        Command::Current { iq, id } => {
+            motor.current(iq, id)?;
+            output.done(format!("{}: references Iq {iq}, Id {id}", motor.number()))
+        }
+        Command::Revup { phase: None, .. } => revup(session),
+        Command::Revup { phase: Some(phase), rpm, torque, ms } => {
+            let data = RevupPhase {
+                speed_rpm: rpm.unwrap_or_default(),
+                torque_s16a: torque.unwrap_or_default(),
+                duration_ms: ms.unwrap_or_default(),
+            };
+            motor.set_revup(phase, data)?;
+            output.done(format!("{}: rev-up phase {phase} is set", motor.number()))
+        }
+        Command::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
+        Command::Info
+        | Command::Status
+        | Command::Registers
+        | Command::Get { .. }
+        | Command::Segment { .. }
+        | Command::Scan { .. } => Ok(()),
+    }
+}
+
+fn execute(session: &Session, command: Execute) -> Result<(), Failure> {
+    let motor = session.motor()?;
+    motor.execute(command)?;
+    session.output.done(format!("{}: {command} acknowledged", motor.number()))
+}
+
+/// A drive acknowledges a START that has no effect, so its state is read back.
+fn start(session: &Session) -> Result<(), Failure> {
+    let motor = session.motor()?;
+    motor.start()?;
+    let status = motor.status()?;
+    match status {
+        Status::FaultNow | Status::FaultOver => {
+            let faults = explain(motor.faults()?);
+            Err(Failure::Refused(format!(
+                "{} did not start, it is in {status}: {faults}\nclear it with \
+                 `motorlink st fault-ack` when the cause is gone",
+                motor.number()
+            )))
+        }
+        _ => {
+            let text = format!("{} starts: {status}", motor.number());
+            session.output.result(text, json!({ "ok": true, "STATUS": status.to_string() }))
+        }
+    }
+}
+
+/// As with START, an acknowledged FAULT_ACK may have had no effect. The state machine takes a
+/// moment to follow.
+fn acknowledge(session: &Session) -> Result<(), Failure> {
+    let motor = session.motor()?;
+    motor.acknowledge_faults()?;
+    let give_up = Instant::now() + Duration::from_millis(200);
+    loop {
+        let faults = motor.faults()?;
+        if faults == Flags::default() {
+            let text = format!("{}: no faults", motor.number());
+            return session.output.result(text, json!({ "ok": true, "FLAGS": 0 }));
+        }
+        if Instant::now() > give_up || !interrupt::wait(Duration::from_millis(10)) {
+            let why = explain(faults);
+            return Err(Failure::Refused(format!("{} keeps its faults: {why}", motor.number())));
+        }
+    }
+}
+
+fn set(session: &Session, name: &str, text: &str) -> Result<(), Failure> {
+    let register = find_register(name)?;
+    let bits = parse_value(register, text, session.client.profile(), session.raw)?;
+    let size = register.shape().map_or(4, |shape| shape.ty.size());
+    let wide = session.client.profile() == motorlink::stmcp::Profile::Mcsdk54
+        && [register::OBSERVER_C1.id(), register::OBSERVER_C2.id()].contains(&register);
+    let motor = session.motor()?;
+    motor.write_raw(register, bits, if wide { 4 } else { size })?;
+    session.output.done(format!("{}: {register} is written", motor.number()))
+}
+
+fn revup(session: &Session) -> Result<(), Failure> {
+    let motor = session.motor()?;
+    for phase in 0..REVUP_PHASES {
+        let RevupPhase { speed_rpm, torque_s16a, duration_ms } = motor.revup(phase)?;
+        session.output.result(
+            format!(
+                "phase {phase}  {speed_rpm:>6} rpm  {torque_s16a:>6} s16A  {duration_ms:>5} ms"
+            ),
+            json!({
+                "phase": phase, "speed_rpm": speed_rpm, "torque_s16a": torque_s16a,
+                "duration_ms": duration_ms,
+            }),
+        )?;
+    }
+    Ok(())
+}
+
+fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
+    let (code, payload) = match bytes {
+        [code @ 0..=0x1F, payload @ ..] => (*code, payload),
+        _ => {
+            return Err(Failure::Usage(
+                "the first byte is the frame code, 00 to 1f; --motor adds the motor".to_owned(),
+            ));
+        }
+    };
+    let reply = session.client.raw(session.motor, code, payload)?;
+    let text = if reply.is_empty() { "ACK".to_owned() } else { format!("ACK {}", hex(&reply)) };
+    session.output.result(text, json!({ "ok": true, "payload": hex(&reply) }))
+}

@@ -1,0 +1,183 @@
+//! What `motorlink st` takes.
+
+use clap::Subcommand;
+use motorlink::port::PortName;
+use motorlink::stmcp::Profile;
+
+use crate::failure::Failure;
+use crate::ports;
+use crate::repeat::Repeat;
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    pub connection: Connection,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(clap::Args)]
+pub struct Connection {
+    /// The serial line: a device path, serial:PATH?baud=RATE, tcp:HOST:PORT or sim:
+    #[arg(short, long, env = "MOTORLINK_PORT", global = true)]
+    port: Option<String>,
+    /// The motor, 1 to 7
+    #[arg(short, long, default_value_t = 1, global = true,
+          value_parser = clap::value_parser!(u8).range(1..=7))]
+    pub motor: u8,
+    /// What the drive speaks: the document as written, or what MCSDK 5.4 firmware does
+    #[arg(long, default_value = "spec", global = true, value_parser = parse_profile)]
+    pub profile: Profile,
+    /// How long to wait for a reply, ms
+    #[arg(long, default_value_t = 1000, global = true, value_name = "MS",
+          value_parser = clap::value_parser!(u32).range(1..=60_000))]
+    pub timeout: u32,
+    /// Free a 5.x drive that waits for the rest of a cut-off frame, when the line is lost
+    #[arg(long, global = true)]
+    pub pad: bool,
+    /// Print JSON, an object a line
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Take and print values as the drive's digits instead of physical units
+    #[arg(long, global = true)]
+    pub raw: bool,
+    /// Show every frame on stderr
+    #[arg(long, global = true)]
+    pub trace: bool,
+}
+
+impl Connection {
+    pub fn port(&self) -> Result<PortName, Failure> {
+        ports::named(self.port.as_deref())
+    }
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Show name and version of the drive's SDK and firmware
+    Info,
+    /// Show state, faults, speed, current, voltage and temperature
+    Status,
+    /// List the registers: id, name, type, unit, access
+    Registers,
+    /// Read registers
+    Get {
+        /// Names or numbers (0x1E)
+        #[arg(required = true, value_name = "REGISTER")]
+        registers: Vec<String>,
+        #[command(flatten)]
+        repeat: Repeat,
+    },
+    /// Write a register
+    Set {
+        /// Name or number
+        register: String,
+        /// A number in the register's unit, or a name (SPEED, I_ALPHA)
+        #[arg(allow_negative_numbers = true)]
+        value: String,
+    },
+    /// Start the motor
+    Start,
+    /// Stop the motor
+    Stop,
+    /// Start an idle motor, stop a spinning one
+    StartStop,
+    /// Stop the ramp that is executing
+    StopRamp,
+    /// Go to a speed
+    Ramp {
+        /// Speed at the end, rpm
+        #[arg(allow_negative_numbers = true)]
+        rpm: i32,
+        /// Length of the ramp, ms
+        ms: u16,
+    },
+    /// Show the rev-up phases, or set one
+    Revup {
+        /// The phase to set, 0 to 4
+        #[arg(requires = "rpm", value_parser = clap::value_parser!(u8).range(0..=4))]
+        phase: Option<u8>,
+        /// Speed at its end, rpm
+        #[arg(requires = "torque", allow_negative_numbers = true)]
+        rpm: Option<i32>,
+        /// Iq at its end, s16A digits
+        #[arg(requires = "ms", allow_negative_numbers = true)]
+        torque: Option<i16>,
+        /// Its length, ms
+        ms: Option<u16>,
+    },
+    /// Set the current references, s16A digits
+    Current {
+        /// Iq
+        #[arg(allow_negative_numbers = true)]
+        iq: i16,
+        /// Id
+        #[arg(allow_negative_numbers = true)]
+        id: i16,
+    },
+    /// Go to a torque (Iq); profile mcsdk-5.4 only
+    TorqueRamp {
+        /// Iq at the end, s16A digits
+        #[arg(allow_negative_numbers = true)]
+        iq: i32,
+        /// Length of the ramp, ms
+        ms: u16,
+    },
+    /// Turn to an angle in a given time; profile mcsdk-5.4 with position control only
+    Move {
+        /// Angle, rad
+        #[arg(allow_negative_numbers = true)]
+        rad: f32,
+        /// Length of the move, s
+        seconds: f32,
+    },
+    /// Acknowledge faults whose cause is gone
+    FaultAck,
+    /// Align the encoder
+    EncoderAlign,
+    /// Set the current references to their defaults
+    IqdrefClear,
+    /// Switch the power factor correction, or acknowledge its faults
+    Pfc {
+        /// What to do
+        #[arg(value_enum)]
+        action: Pfc,
+    },
+    /// Sample registers at one instant, in one exchange; profile spec only
+    Segment {
+        /// The segment of the drive to use, 0 to 3
+        #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=3))]
+        number: u8,
+        /// Names or numbers, at most 32; those of access D too
+        #[arg(required = true, value_name = "REGISTER")]
+        registers: Vec<String>,
+        #[command(flatten)]
+        repeat: Repeat,
+    },
+    /// Try the usual baud rates and tell silence, garbage and refusal apart
+    Scan {
+        /// Rates to try instead of the usual ones
+        #[arg(value_name = "RATE")]
+        rates: Vec<u32>,
+    },
+    /// Send any frame: its code, then its payload
+    Raw {
+        /// Bytes in hexadecimal; header, length and checksum are added
+        #[arg(required = true, value_name = "HEX")]
+        bytes: Vec<String>,
+    },
+}
+
+#[derive(clap::ValueEnum, Clone, Copy)]
+pub enum Pfc {
+    Enable,
+    Disable,
+    FaultAck,
+}
+
+pub fn parse_profile(text: &str) -> Result<Profile, String> {
+    [Profile::Spec, Profile::Mcsdk54]
+        .into_iter()
+        .find(|profile| profile.name() == text)
+        .ok_or_else(|| "the profiles are spec and mcsdk-5.4".to_owned())
+}

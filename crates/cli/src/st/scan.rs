@@ -1,0 +1,59 @@
+//! `motorlink st scan`
+
+use indicatif::ProgressBar;
+use motorlink::port::PortName;
+use motorlink::stmcp::{BAUD_RATES, Finding, scan_baud};
+use serde_json::json;
+
+use super::args::Connection;
+use crate::failure::Failure;
+use crate::interrupt::interrupted;
+use crate::output::Output;
+
+pub fn run(connection: &Connection, rates: &[u32]) -> Result<(), Failure> {
+    let port = connection.port()?;
+    let PortName::Line(line) = &port else {
+        return Err(Failure::Usage(format!("`{port}` has no baud rate to scan")));
+    };
+    let rates = if rates.is_empty() { &BAUD_RATES[..] } else { rates };
+    let rates = if line.with_baud(rates[0]).is_some() { rates } else { &rates[..1] };
+    let output = Output { json: connection.json };
+    let bar = crate::output::progress(rates.len());
+    let mut found = false;
+    for &rate in rates {
+        if interrupted() {
+            return Err(Failure::Interrupted);
+        }
+        bar.set_message(format!("{rate} baud"));
+        let finding = scan_baud(line, rate)?;
+        bar.inc(1);
+        found |= matches!(finding, Finding::Drive(_) | Finding::Refuses(_));
+        report(&bar, output, rate, &finding)?;
+    }
+    bar.finish_and_clear();
+    if found {
+        return Ok(());
+    }
+    Err(Failure::Line(format!(
+        "no drive answered on {port}; is it powered, are RX and TX crossed, does another program \
+         hold the port?"
+    )))
+}
+
+fn report(bar: &ProgressBar, output: Output, rate: u32, finding: &Finding) -> Result<(), Failure> {
+    let (word, text) = match finding {
+        Finding::Drive(info) => {
+            let [major, minor, patch] = info.version;
+            ("drive", format!("{} {major}.{minor}.{patch}", info.name))
+        }
+        Finding::Refuses(code) => ("refuses", format!("a drive that answers {code}")),
+        Finding::Garbage => ("garbage", "bytes that are no reply: another rate?".to_owned()),
+        Finding::Silence => ("silence", "silence".to_owned()),
+    };
+    bar.suspend(|| {
+        output.result(
+            format!("{rate:>8} baud  {text}"),
+            json!({ "baud": rate, "finding": word, "text": text }),
+        )
+    })
+}

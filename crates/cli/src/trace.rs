@@ -1,0 +1,39 @@
+//! `--trace`: every frame in both directions on stderr, in bytes and in words.
+
+use std::time::Duration;
+
+use motorlink::port::Direction;
+use motorlink::rmd::{self, CanFrame};
+use motorlink::stmcp::{Profile, Transcript};
+
+use crate::output::hex;
+
+/// Prints the bytes of a serial line, with what they mean.
+pub fn bytes(profile: Profile) -> impl FnMut(Direction, Duration, &[u8]) + Send {
+    let mut transcript = Transcript::new(profile);
+    move |direction, at, bytes| {
+        let sent = direction == Direction::Sent;
+        let meaning = transcript.note(sent, bytes);
+        eprintln!("{:>10.6} {} {:<24} {meaning}", at.as_secs_f64(), arrow(direction), hex(bytes));
+    }
+}
+
+/// Prints the frames of a CAN bus, with what they mean.
+pub fn frames() -> impl FnMut(Direction, Duration, &CanFrame) + Send {
+    move |direction, at, frame| {
+        let way = match direction {
+            Direction::Sent => rmd::Direction::HostToDrive,
+            Direction::Received => rmd::Direction::DriveToHost,
+        };
+        let (id, data) = (frame.id(), hex(frame.data()));
+        let meaning = rmd::describe(*frame, way);
+        eprintln!("{:>10.6} {} {id:03x}#{data:<24} {meaning}", at.as_secs_f64(), arrow(direction));
+    }
+}
+
+fn arrow(direction: Direction) -> &'static str {
+    match direction {
+        Direction::Sent => "->",
+        Direction::Received => "<-",
+    }
+}

@@ -1,0 +1,334 @@
+//! Drives on served ports, and the world around them.
+
+use std::cell::RefCell;
+use std::os::fd::BorrowedFd;
+use std::rc::Rc;
+use std::time::Duration;
+
+use motorlink_proto::rmd::{CanFrame, Errors, MotorId};
+use motorlink_proto::stmcp::{Flags, Motor};
+use motorlink_proto::time::{self, Instant};
+use motorlink_sim::rmd::{RmdBus, RmdNode};
+use motorlink_sim::st::{StMotor, StStation};
+use serde_json::{Value, json};
+
+use super::{BenchConfig, Command, ConfigError};
+use crate::port::{PortError, ServeName};
+use crate::serve::{ByteStation, CanStation, Served, Server, Turn};
+
+type Station = StStation<Vec<StMotor>>;
+type Bus = RmdBus<Vec<RmdNode>>;
+
+/// Simulated drives, each on a served port of its own, advanced to real time.
+#[derive(Default)]
+pub struct Bench {
+    server: Server,
+    places: Vec<Place>,
+}
+
+struct Place {
+    port: String,
+    drives: Drives,
+}
+
+enum Drives {
+    St(Rc<RefCell<Station>>),
+    Rmd(Rc<RefCell<Bus>>),
+}
+
+/// Why a port is not served.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ServeError {
+    /// The port.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// The configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+}
+
+impl Bench {
+    /// A bench without drives, whose time begins now.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Powers an ST drive on and serves it; gives what the port is, for programs to read.
+    pub fn serve_st(
+        &mut self,
+        port: &ServeName,
+        config: &BenchConfig,
+    ) -> Result<Value, ServeError> {
+        let station = Rc::new(RefCell::new(config.station(self.server.now())?));
+        let served = self.server.serve_bytes(port, Box::new(StLine(Rc::clone(&station))))?;
+        let motors = station.borrow().drive().motors().len();
+        let profile = config.profile.name();
+        let announcement = json!({
+            "port": served.port, "protocol": "stmcp", "path": served.path, "motors": motors,
+            "profile": profile,
+        });
+        self.places.push(Place::new(served, Drives::St(station)));
+        Ok(announcement)
+    }
+
+    /// Powers RMD motors on and serves their bus; gives what the port is, for programs to read.
+    pub fn serve_rmd(
+        &mut self,
+        port: &ServeName,
+        config: &BenchConfig,
+    ) -> Result<Value, ServeError> {
+        let bus = Rc::new(RefCell::new(config.bus(self.server.now())?));
+        let served = self.server.serve_can(port, Box::new(RmdLine(Rc::clone(&bus))))?;
+        let ids: Vec<u8> = bus.borrow().nodes().iter().map(|node| node.id().number()).collect();
+        let announcement = json!({
+            "port": served.port, "protocol": "rmd", "path": served.path, "motors": ids.len(),
+            "ids": ids,
+        });
+        self.places.push(Place::new(served, Drives::Rmd(bus)));
+        Ok(announcement)
+    }
+
+    /// Serves the ports once; waits at most `most` for something to do. `extra` is waited for too.
+    pub fn turn(
+        &mut self,
+        most: Duration,
+        extra: Option<BorrowedFd<'_>>,
+    ) -> Result<Turn, PortError> {
+        let turn = self.server.turn(most, extra)?;
+        let now = self.server.now();
+        for place in &self.places {
+            match &place.drives {
+                Drives::St(station) => station.borrow_mut().advance_to(now),
+                Drives::Rmd(bus) => bus.borrow_mut().advance_to(now),
+            }
+        }
+        Ok(turn)
+    }
+
+    /// Obeys a command written as JSON; gives the answer, one line of JSON.
+    pub fn obey(&mut self, line: &str) -> Value {
+        let done = serde_json::from_str::<Command>(line)
+            .map_err(|error| format!("not a command: {error}"))
+            .and_then(|command| self.execute(&command));
+        match done {
+            Ok(answer) => answer,
+            Err(why) => json!({ "ok": false, "error": why }),
+        }
+    }
+
+    /// Executes a command; gives the answer, or why nothing was done.
+    pub fn execute(&mut self, command: &Command) -> Result<Value, String> {
+        let now = self.server.now();
+        if let Command::State { port } = command {
+            let wanted = |place: &&Place| port.as_ref().is_none_or(|port| *port == place.port);
+            let states: Vec<Value> = self.places.iter().filter(wanted).map(Place::state).collect();
+            if states.is_empty() {
+                return Err(self.which_port(port.as_deref()));
+            }
+            return Ok(json!({ "ok": true, "time": now.0 as f64 / 1e6, "state": states }));
+        }
+        match &self.place(command)?.drives {
+            Drives::St(station) => st(&mut station.borrow_mut(), now, command)?,
+            Drives::Rmd(bus) => rmd(&mut bus.borrow_mut(), now, command)?,
+        }
+        Ok(json!({ "ok": true }))
+    }
+
+    fn place(&self, command: &Command) -> Result<&Place, String> {
+        let found = match (command.port(), &self.places[..]) {
+            (None, [only]) => Some(only),
+            (None, _) => None,
+            (Some(port), places) => places.iter().find(|place| place.port == port),
+        };
+        found.ok_or_else(|| self.which_port(command.port()))
+    }
+
+    fn which_port(&self, asked: Option<&str>) -> String {
+        let ports: Vec<&str> = self.places.iter().map(|place| place.port.as_str()).collect();
+        let ports = ports.join(", ");
+        match asked {
+            Some(port) => format!("`{port}` is not served; these are: {ports}"),
+            None => format!("which port? these are served: {ports}"),
+        }
+    }
+}
+
+impl Place {
+    fn new(served: Served, drives: Drives) -> Self {
+        Place { port: served.port, drives }
+    }
+
+    fn state(&self) -> Value {
+        let motors: Vec<Value> = match &self.drives {
+            Drives::St(station) => {
+                let station = station.borrow();
+                let motors = station.drive().motors().iter().zip(1..);
+                motors.map(|(motor, number)| st_state(motor, number)).collect()
+            }
+            Drives::Rmd(bus) => bus.borrow().nodes().iter().map(rmd_state).collect(),
+        };
+        json!({ "port": self.port, "motors": motors })
+    }
+}
+
+fn st_state(motor: &StMotor, number: u8) -> Value {
+    let truth = motor.truth();
+    json!({
+        "motor": number,
+        "status": truth.status.to_string(),
+        "faults": truth.flags.to_string(),
+        "speed_rpm": truth.speed_rpm,
+        "speed_reference_rpm": truth.speed_reference_rpm,
+        "angle_degrees": truth.angle_degrees,
+        "iq_amps": truth.iq,
+        "id_amps": truth.id,
+        "bus_volts": truth.bus_voltage,
+        "celsius": truth.temperature,
+        "load_newton_metres": truth.load_torque,
+        "locked": truth.locked,
+    })
+}
+
+fn rmd_state(node: &RmdNode) -> Value {
+    let truth = node.motor().truth();
+    json!({
+        "motor": node.id().number(),
+        "mode": format!("{:?}", truth.mode),
+        "errors": node.drive().errors().to_string(),
+        "speed_dps": truth.speed_dps,
+        "speed_reference_dps": truth.speed_reference_dps,
+        "angle_degrees": truth.angle_degrees,
+        "iq_amps": truth.iq,
+        "supply_volts": truth.supply_voltage,
+        "celsius": truth.temperature,
+        "load_newton_metres": truth.load_torque,
+        "locked": truth.locked,
+        "rom_writes": node.motor().rom_writes(),
+    })
+}
+
+fn st(station: &mut Station, now: Instant, command: &Command) -> Result<(), String> {
+    station.advance_to(now);
+    match command {
+        Command::PowerCycle { motor: Some(_), .. } => {
+            return Err("an ST drive has one supply: leave the motor out".to_owned());
+        }
+        Command::PowerCycle { motor: None, .. } => station.power_cycle(),
+        Command::Supply { motor: number, volts, .. } => {
+            st_motor(station, *number)?.set_bus_voltage(*volts)
+        }
+        Command::Temperature { motor: number, celsius, .. } => {
+            st_motor(station, *number)?.set_temperature(*celsius);
+        }
+        Command::Load { motor: number, newton_metres, .. } => {
+            st_motor(station, *number)?.set_load_torque(*newton_metres);
+        }
+        Command::LockRotor { motor: number, locked, .. } => {
+            st_motor(station, *number)?.lock_rotor(*locked)
+        }
+        Command::Fault { motor: number, fault, hold, .. } => {
+            let known = Flags::NAMES.iter().find(|(_, name, _)| name.eq_ignore_ascii_case(fault));
+            let names =
+                || Flags::NAMES.iter().map(|(_, name, _)| *name).collect::<Vec<_>>().join(", ");
+            let (bit, ..) =
+                known.ok_or_else(|| format!("there is no fault `{fault}`: {}", names()))?;
+            match hold {
+                None => st_motor(station, *number)?.inject(*bit),
+                Some(true) => st_motor(station, *number)?.hold_faults(*bit),
+                Some(false) => st_motor(station, *number)?.hold_faults(0),
+            }
+        }
+        Command::State { .. } => {}
+    }
+    Ok(())
+}
+
+fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), String> {
+    /// Long enough for a motor to notice a fault.
+    const MOMENT: time::Duration = time::Duration::from_millis(1);
+    bus.advance_to(now);
+    let ids: Vec<MotorId> = bus.nodes().iter().map(RmdNode::id).collect();
+    match command {
+        Command::PowerCycle { motor: Some(number), .. } => rmd_node(bus, *number)?.power_cycle(now),
+        Command::PowerCycle { motor: None, .. } => {
+            for id in ids {
+                rmd_node(bus, id.number())?.power_cycle(now);
+            }
+        }
+        Command::Supply { motor, volts, .. } => {
+            rmd_node(bus, *motor)?.motor_mut().set_supply_voltage(*volts);
+        }
+        Command::Temperature { motor, celsius, .. } => {
+            rmd_node(bus, *motor)?.motor_mut().set_temperature(*celsius);
+        }
+        Command::Load { motor, newton_metres, .. } => {
+            rmd_node(bus, *motor)?.motor_mut().set_load_torque(*newton_metres);
+        }
+        Command::LockRotor { motor, locked, .. } => {
+            rmd_node(bus, *motor)?.motor_mut().lock_rotor(*locked)
+        }
+        Command::Fault { motor, fault, hold, .. } => {
+            let errors = match fault.to_ascii_uppercase().as_str() {
+                "LOW_VOLTAGE" => Errors::LOW_VOLTAGE,
+                "OVER_TEMPERATURE" => Errors::OVER_TEMPERATURE,
+                _ => {
+                    return Err(format!(
+                        "there is no fault `{fault}`: LOW_VOLTAGE, OVER_TEMPERATURE"
+                    ));
+                }
+            };
+            let held = if *hold == Some(false) { Errors::NONE } else { errors };
+            rmd_node(bus, *motor)?.motor_mut().hold_faults(held);
+            if hold.is_none() {
+                bus.advance_to(now + MOMENT);
+                rmd_node(bus, *motor)?.motor_mut().hold_faults(Errors::NONE);
+            }
+        }
+        Command::State { .. } => {}
+    }
+    Ok(())
+}
+
+fn st_motor(station: &mut Station, number: u8) -> Result<&mut StMotor, String> {
+    let count = station.drive().motors().len();
+    Motor::new(number)
+        .and_then(|motor| station.drive_mut().motor_mut(motor))
+        .ok_or_else(|| format!("there is no motor {number}: this drive has {count}"))
+}
+
+fn rmd_node(bus: &mut Bus, number: u8) -> Result<&mut RmdNode, String> {
+    MotorId::new(number)
+        .and_then(|id| bus.node_mut(id))
+        .ok_or_else(|| format!("there is no motor {number} on this bus"))
+}
+
+struct StLine(Rc<RefCell<Station>>);
+
+impl ByteStation for StLine {
+    fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
+        self.0.borrow_mut().receive(now, bytes, |bytes| reply.extend_from_slice(bytes));
+    }
+
+    fn poll(&mut self, now: Instant, reply: &mut Vec<u8>) {
+        self.0.borrow_mut().poll(now, |bytes| reply.extend_from_slice(bytes));
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.0.borrow().deadline()
+    }
+}
+
+struct RmdLine(Rc<RefCell<Bus>>);
+
+impl CanStation for RmdLine {
+    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+        self.0.borrow_mut().receive(now, frame, |reply| replies.push(reply));
+    }
+
+    fn poll(&mut self, _now: Instant, _replies: &mut Vec<CanFrame>) {}
+
+    fn deadline(&self) -> Option<Instant> {
+        None
+    }
+}

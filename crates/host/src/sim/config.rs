@@ -1,0 +1,222 @@
+//! What a bench of simulated drives has, from a TOML file.
+
+use std::path::{Path, PathBuf};
+
+use motorlink_proto::stmcp::Profile;
+use motorlink_proto::time::Instant;
+use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
+use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use toml::{Table, Value};
+
+/// A serial line with an ST drive and a CAN bus with RMD motors. The default is one drive with two
+/// motors, and four motors with IDs 1 to 4.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct BenchConfig {
+    /// What the ST drive speaks.
+    pub profile: Profile,
+    /// The ST drive's motors.
+    pub st: StConfigs,
+    /// The motors on the CAN bus.
+    pub rmd: RmdConfigs,
+}
+
+/// The ST drive's motors, 1 to 7 of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StConfigs(Vec<MotorConfig>);
+
+/// The motors on the CAN bus, each with an ID of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RmdConfigs(Vec<RmdConfig>);
+
+impl Default for StConfigs {
+    fn default() -> Self {
+        StConfigs(vec![MotorConfig::default(), MotorConfig::servo()])
+    }
+}
+
+impl Default for RmdConfigs {
+    fn default() -> Self {
+        RmdConfigs((1..=4).map(RmdConfig::with_id).collect())
+    }
+}
+
+/// Why a configuration is not taken.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("cannot read `{}`: {error}", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
+    /// The text is not what is expected.
+    #[error("{0}")]
+    Text(String),
+    /// A motor that cannot be.
+    #[error("{0}")]
+    Impossible(String),
+}
+
+/// The file as it is written. A motor's table is read on top of its preset.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    profile: Profile,
+    st: Option<Motors>,
+    rmd: Option<Motors>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Motors {
+    motor: Vec<Table>,
+}
+
+impl BenchConfig {
+    /// Reads a file.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| ConfigError::Unreadable { path: path.to_owned(), error })?;
+        Self::parse(&text).map_err(|error| match error {
+            ConfigError::Text(why) => ConfigError::Text(format!("{}: {why}", path.display())),
+            other => other,
+        })
+    }
+
+    /// Reads the text of a file. What it does not say is as in the default.
+    pub fn parse(text: &str) -> Result<Self, ConfigError> {
+        let file: File =
+            toml::from_str(text).map_err(|error| ConfigError::Text(error.to_string()))?;
+        let st = match file.st {
+            None => StConfigs::default(),
+            Some(motors) => {
+                let read = |(n, table)| st_motor(table, &format!("st.motor {}", n + 1));
+                let configs: Result<Vec<_>, _> =
+                    motors.motor.into_iter().enumerate().map(read).collect();
+                StConfigs(configs?)
+            }
+        };
+        let rmd = match file.rmd {
+            None => RmdConfigs::default(),
+            Some(motors) => {
+                let read = |(n, table)| {
+                    overlay(RmdConfig::default(), table, &format!("rmd.motor {}", n + 1))
+                };
+                let configs: Result<Vec<_>, _> =
+                    motors.motor.into_iter().enumerate().map(read).collect();
+                RmdConfigs(configs?)
+            }
+        };
+        let config = BenchConfig { profile: file.profile, st, rmd };
+        config.station(Instant(0))?;
+        config.bus(Instant(0))?;
+        Ok(config)
+    }
+
+    /// The ST drive, powered on `now`.
+    pub(super) fn station(&self, now: Instant) -> Result<StStation<Vec<StMotor>>, ConfigError> {
+        let motors: Vec<StMotor> = self.st.0.iter().copied().map(StMotor::new).collect();
+        let drive = StDrive::new(now, motors).ok_or_else(|| {
+            ConfigError::Impossible(format!("a drive has 1 to 7 motors, not {}", self.st.0.len()))
+        })?;
+        Ok(StStation::new(self.profile, drive))
+    }
+
+    /// The CAN bus, powered on `now`.
+    pub(super) fn bus(&self, now: Instant) -> Result<RmdBus<Vec<RmdNode>>, ConfigError> {
+        let node = |config: &RmdConfig| {
+            RmdNode::new(now, *config, config.factory_rom()).ok_or_else(|| {
+                ConfigError::Impossible(format!(
+                    "motor {}: IDs are 1 to 32 and encoders have 12 to 18 bits, not {}",
+                    config.id, config.encoder_bits
+                ))
+            })
+        };
+        let nodes: Result<Vec<RmdNode>, ConfigError> = self.rmd.0.iter().map(node).collect();
+        RmdBus::new(now, nodes?)
+            .ok_or_else(|| ConfigError::Impossible("two motors have the same ID".to_owned()))
+    }
+}
+
+/// An ST motor: its preset (`mains` or `servo`) with what the table says on top.
+fn st_motor(mut table: Table, place: &str) -> Result<MotorConfig, ConfigError> {
+    let preset = match table.remove("preset") {
+        None => MotorConfig::default(),
+        Some(Value::String(name)) if name == "mains" => MotorConfig::default(),
+        Some(Value::String(name)) if name == "servo" => MotorConfig::servo(),
+        Some(other) => {
+            let why = format!("{place}: the presets are \"mains\" and \"servo\", not {other}");
+            return Err(ConfigError::Text(why));
+        }
+    };
+    overlay(preset, table, place)
+}
+
+/// `preset` with the values of `table`, at any depth.
+fn overlay<T: serde::Serialize + DeserializeOwned>(
+    preset: T,
+    table: Table,
+    place: &str,
+) -> Result<T, ConfigError> {
+    let error = |error: &dyn std::fmt::Display| ConfigError::Text(format!("{place}: {error}"));
+    let mut whole = Table::try_from(preset).map_err(|why| error(&why))?;
+    merge(&mut whole, table);
+    whole.try_into().map_err(|why| error(&why))
+}
+
+fn merge(whole: &mut Table, over: Table) {
+    for (key, value) in over {
+        match (whole.get_mut(&key), value) {
+            (Some(Value::Table(inner)), Value::Table(over)) => merge(inner, over),
+            (_, value) => {
+                whole.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_empty_file_is_the_default() {
+        assert_eq!(BenchConfig::parse("").unwrap(), BenchConfig::default());
+    }
+
+    #[test]
+    fn a_motor_is_its_preset_with_what_the_file_says() {
+        let text = "
+            profile = \"mcsdk-5.4\"
+            [[st.motor]]
+            preset = \"servo\"
+            bus_voltage = 36.0
+            machine.pole_pairs = 7
+            [[rmd.motor]]
+            id = 32
+        ";
+        let config = BenchConfig::parse(text).unwrap();
+        assert_eq!(config.profile, Profile::Mcsdk54);
+        let [motor] = &config.st.0[..] else { panic!("one motor is written") };
+        assert_eq!((motor.bus_voltage, motor.machine.pole_pairs), (36.0, 7));
+        assert_eq!(motor.machine.torque_constant, MotorConfig::servo().machine.torque_constant);
+        assert_eq!(config.rmd.0[0].id, 32);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_its_place() {
+        let why = |text: &str| BenchConfig::parse(text).unwrap_err().to_string();
+        assert!(why("[[rmd.motor]]\nidd = 3").contains("idd"));
+        assert!(why("[[rmd.motor]]\nid = 33").contains("1 to 32"));
+        assert!(why("[[rmd.motor]]\nid = 3\n[[rmd.motor]]\nid = 3").contains("same ID"));
+        assert!(why("[st]\nmotor = []").contains("1 to 7"));
+        assert!(why("[[st.motor]]\npreset = \"big\"").contains("servo"));
+        assert!(why("profile = \"v9\"").contains("v9"));
+    }
+}

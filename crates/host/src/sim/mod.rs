@@ -1,0 +1,14 @@
+//! Simulated drives behind ports: inside the process as `sim:`, or served to other programs.
+//!
+//! [`BenchConfig`] says what there is; [`Bench`] is the drives themselves, which [`Bench::obey`]
+//! lets a person or a test do things to that no protocol can: take power away, heat, load, break.
+
+mod bench;
+mod command;
+mod config;
+mod link;
+
+pub use bench::{Bench, ServeError};
+pub use command::Command;
+pub use config::{BenchConfig, ConfigError, RmdConfigs, StConfigs};
+pub(crate) use link::{open_can, open_line};

@@ -1,0 +1,24 @@
+//! Virtual time in steps of fixed length.
+
+use motorlink_proto::time::{Duration, Instant};
+
+/// Counts the steps that a moment completes.
+#[derive(Debug, Clone)]
+pub(crate) struct Clock {
+    step: Duration,
+    last: Instant,
+}
+
+impl Clock {
+    pub(crate) const fn new(step: Duration, start: Instant) -> Self {
+        Clock { step, last: start }
+    }
+
+    /// The ends of the steps that are over at `now` and were not given before.
+    pub(crate) fn steps_until(&mut self, now: Instant) -> impl Iterator<Item = Instant> + use<> {
+        let (start, step) = (self.last, self.step);
+        let count = now.since(start).0 / step.0;
+        self.last += Duration(count * step.0);
+        (1..=count).map(move |n| start + Duration(n * step.0))
+    }
+}

@@ -1,0 +1,68 @@
+//! Motors on one bus.
+
+use motorlink_proto::rmd::{CanFrame, MotorId};
+use motorlink_proto::time::Instant;
+
+use super::cascade::STEP;
+use super::{RmdConfig, RmdNode};
+use crate::clock::Clock;
+
+/// A CAN bus with RMD motors, kept in an array or a vector. A motor only speaks when it is asked,
+/// so there is nothing to poll: time that passed meanwhile is made up for.
+#[derive(Debug, Clone)]
+pub struct RmdBus<N> {
+    nodes: N,
+    clock: Clock,
+}
+
+impl RmdBus<[RmdNode; 4]> {
+    /// The motors of [`RmdConfig::demo`].
+    pub fn demo(now: Instant) -> Self {
+        let nodes = RmdConfig::demo().map(|config| {
+            RmdNode::new(now, config, config.factory_rom()).expect("IDs 1 to 4 exist")
+        });
+        RmdBus { nodes, clock: Clock::new(STEP, now) }
+    }
+}
+
+impl<N: AsRef<[RmdNode]> + AsMut<[RmdNode]>> RmdBus<N> {
+    /// A bus with these motors, whose time begins `now`; `None` when two have the same ID.
+    pub fn new(now: Instant, mut nodes: N) -> Option<Self> {
+        nodes.as_mut().sort_unstable_by_key(RmdNode::id);
+        let distinct = nodes.as_ref().is_sorted_by(|one, next| one.id() < next.id());
+        distinct.then(|| RmdBus { nodes, clock: Clock::new(STEP, now) })
+    }
+
+    /// Takes a frame from the bus at `now` and hands the replies to `reply`: the lowest ID first,
+    /// which is how arbitration orders them.
+    pub fn receive(&mut self, now: Instant, frame: &CanFrame, mut reply: impl FnMut(CanFrame)) {
+        self.advance_to(now);
+        for node in self.nodes.as_mut() {
+            if let Some(frame) = node.receive(now, frame) {
+                reply(frame);
+            }
+        }
+    }
+
+    /// Lets time pass until `now`.
+    pub fn advance_to(&mut self, now: Instant) {
+        for end in self.clock.steps_until(now) {
+            self.nodes.as_mut().iter_mut().for_each(|node| node.step(end));
+        }
+    }
+
+    /// The motors, lowest ID first.
+    pub const fn nodes(&self) -> &N {
+        &self.nodes
+    }
+
+    /// A motor by its ID, with its drive and ROM.
+    pub fn node(&self, id: MotorId) -> Option<&RmdNode> {
+        self.nodes.as_ref().iter().find(|node| node.id() == id)
+    }
+
+    /// A motor by its ID, to change the world around it or to cycle its power.
+    pub fn node_mut(&mut self, id: MotorId) -> Option<&mut RmdNode> {
+        self.nodes.as_mut().iter_mut().find(|node| node.id() == id)
+    }
+}

@@ -1,0 +1,316 @@
+//! References and regulators: from what was commanded to an Iq reference.
+
+use core::f32::consts::TAU;
+
+use motorlink_proto::stmcp::{ControlMode, CurrentReference, PositionMove, Ramp, TorqueRamp};
+
+use super::{MotorConfig, Registers};
+use crate::machine::{self, within};
+
+/// Speed of one s16speed digit, 0.1 Hz, in rpm.
+pub(super) const RPM_PER_DIGIT: f32 = 6.0;
+/// Turns rad/s into rpm.
+pub(super) const RPM: f32 = 60.0 / TAU;
+
+/// Time between two steps, s.
+const DT: f32 = 1e-3;
+/// Divisor of the position regulator's gains.
+const POSITION_DIVISOR: f32 = 16.0;
+
+/// What a command asks for in RUN.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Task {
+    Speed,
+    Torque,
+    Position,
+}
+
+/// What the regulators need to know of the motor.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Feedback {
+    pub(super) speed_rpm: f32,
+    /// From the aligned zero, 2^32 a turn.
+    pub(super) position: i64,
+    /// Iq that the drive can make now, s16A.
+    pub(super) iq_range: (f32, f32),
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Control {
+    mode: ControlMode,
+    /// What was commanded last; a start does it again, with the values below.
+    task: Task,
+    ramp: Ramp,
+    torque_ramp: TorqueRamp,
+    id: i16,
+    target: PositionMove,
+    /// Speed reference, rpm.
+    speed: Slope,
+    /// Iq reference, s16A.
+    iq: Slope,
+    path: Option<Path>,
+    regulator: Regulator,
+}
+
+impl Control {
+    pub(super) fn new(config: &MotorConfig) -> Self {
+        Control {
+            mode: ControlMode::Speed,
+            task: Task::Speed,
+            ramp: Ramp {
+                speed_rpm: config.target_speed_rpm,
+                duration_ms: config.target_duration_ms,
+            },
+            torque_ramp: step_to(0),
+            id: 0,
+            target: PositionMove { angle_rad: 0.0, duration_s: 0.0 },
+            speed: Slope::default(),
+            iq: Slope::default(),
+            path: None,
+            regulator: Regulator::default(),
+        }
+    }
+
+    pub(super) fn command_speed(&mut self, ramp: Ramp) {
+        (self.task, self.ramp) = (Task::Speed, ramp);
+    }
+
+    pub(super) fn command_torque(&mut self, ramp: TorqueRamp, id: i16) {
+        (self.task, self.torque_ramp, self.id) = (Task::Torque, ramp, id);
+    }
+
+    pub(super) fn command_position(&mut self, target: PositionMove) {
+        (self.task, self.target) = (Task::Position, target);
+    }
+
+    /// Begins to do what was commanded last.
+    pub(super) fn execute(&mut self, max_speed: i32, position: i64) {
+        self.path = None;
+        match self.task {
+            Task::Speed => {
+                self.mode = ControlMode::Speed;
+                let limit = max_speed.saturating_abs();
+                let target = self.ramp.speed_rpm.clamp(-limit, limit);
+                self.speed.go(target as f32, self.ramp.duration_ms);
+            }
+            Task::Torque => {
+                self.mode = ControlMode::Torque;
+                self.iq.go(self.torque_ramp.torque_s16a as f32, self.torque_ramp.duration_ms);
+            }
+            Task::Position => {
+                self.mode = ControlMode::Speed;
+                self.path = Some(Path::new(position, self.target));
+            }
+        }
+    }
+
+    /// One millisecond in RUN: the Iq reference, s16A.
+    pub(super) fn step(&mut self, feedback: &Feedback, registers: &Registers) -> f32 {
+        let Feedback { speed_rpm, position, iq_range: (least, most) } = *feedback;
+        if self.mode == ControlMode::Torque {
+            let iq = within(self.iq.step(), least, most);
+            self.preset(speed_rpm, iq);
+            return iq;
+        }
+        let reference = match &mut self.path {
+            Some(path) => {
+                let limit = registers.max_app_speed.saturating_abs() as f32;
+                let speed = within(path.step(position, registers) * RPM, -limit, limit);
+                self.speed.set(speed);
+                speed
+            }
+            None => self.speed.step(),
+        };
+        let error = (reference - speed_rpm) / RPM_PER_DIGIT;
+        let iq = self.regulator.step(error, registers, least, most);
+        self.iq.set(iq);
+        iq
+    }
+
+    /// Follows what something else does, so that taking over is smooth: speed in rpm, Iq in s16A.
+    pub(super) fn follow(&mut self, speed_rpm: f32, iq: f32) {
+        self.iq.set(iq);
+        self.preset(speed_rpm, iq);
+    }
+
+    fn preset(&mut self, speed_rpm: f32, iq: f32) {
+        self.speed.set(speed_rpm);
+        self.regulator = Regulator { integral: iq, last_error: 0.0 };
+    }
+
+    /// Writes CONTROL_MODE: what the motor does now goes on in the other mode. A value that is no
+    /// mode is ignored.
+    pub(super) fn set_mode(&mut self, mode: ControlMode) {
+        let task = match (mode, self.task) {
+            (ControlMode::Torque, _) => Task::Torque,
+            (ControlMode::Speed, Task::Position) => Task::Position,
+            (ControlMode::Speed, _) => Task::Speed,
+            (ControlMode::Unknown(_), _) => return,
+        };
+        if (mode, task) == (self.mode, self.task) {
+            return;
+        }
+        (self.mode, self.task, self.path) = (mode, task, None);
+        self.stop_ramp();
+    }
+
+    pub(super) fn mode(&self) -> ControlMode {
+        self.mode
+    }
+
+    pub(super) fn stop_ramp(&mut self) {
+        self.speed.hold();
+        self.iq.hold();
+    }
+
+    /// Speed reference, rpm.
+    pub(super) fn speed_reference(&self) -> f32 {
+        self.speed.value
+    }
+
+    /// Iq reference, s16A.
+    pub(super) fn iq_reference(&self) -> i32 {
+        libm::roundf(self.iq.value) as i32
+    }
+
+    /// The last speed command.
+    pub(super) fn ramp(&self) -> Ramp {
+        self.ramp
+    }
+
+    /// The current references that the next start applies; `None` in speed mode.
+    pub(super) fn commanded_currents(&self) -> Option<CurrentReference> {
+        let iq_s16a = self.torque_ramp.torque_s16a.clamp(i16::MIN.into(), i16::MAX.into()) as i16;
+        let currents = CurrentReference { iq_s16a, id_s16a: self.id };
+        (self.task == Task::Torque).then_some(currents)
+    }
+
+    /// Whether the motor shall turn backwards.
+    pub(super) fn backwards(&self) -> bool {
+        match self.task {
+            Task::Speed => self.ramp.speed_rpm < 0,
+            Task::Torque => self.torque_ramp.torque_s16a < 0,
+            Task::Position => false,
+        }
+    }
+
+    /// The position move under way.
+    pub(super) fn path(&self) -> Option<&Path> {
+        self.path.as_ref()
+    }
+}
+
+/// A torque ramp that is over at once.
+pub(super) fn step_to(torque_s16a: i32) -> TorqueRamp {
+    TorqueRamp { torque_s16a, duration_ms: 0 }
+}
+
+/// A value that goes to another in a straight line, a step a millisecond.
+#[derive(Debug, Clone, Copy, Default)]
+struct Slope {
+    value: f32,
+    target: f32,
+    left_ms: u16,
+}
+
+impl Slope {
+    fn go(&mut self, target: f32, duration_ms: u16) {
+        (self.target, self.left_ms) = (target, duration_ms);
+        if duration_ms == 0 {
+            self.value = target;
+        }
+    }
+
+    fn set(&mut self, value: f32) {
+        self.go(value, 0);
+    }
+
+    fn hold(&mut self) {
+        self.set(self.value);
+    }
+
+    fn step(&mut self) -> f32 {
+        if self.left_ms > 0 {
+            self.value += (self.target - self.value) / f32::from(self.left_ms);
+            self.left_ms -= 1;
+        }
+        self.value
+    }
+}
+
+/// The speed regulator: s16speed in, s16A out, gains as in the registers.
+#[derive(Debug, Clone, Default)]
+struct Regulator {
+    integral: f32,
+    last_error: f32,
+}
+
+impl Regulator {
+    fn step(&mut self, error: f32, registers: &Registers, least: f32, most: f32) -> f32 {
+        let fast = registers.speed_kp_div.max(1) as f32;
+        let slow = registers.speed_ki_div.max(1) as f32;
+        let proportional = registers.speed_kp as f32 / fast * error;
+        let derivative = registers.speed_kd as f32 / fast * (error - self.last_error);
+        self.last_error = error;
+        let integral = self.integral + registers.speed_ki as f32 / slow * error;
+        self.integral = within(integral, least, most);
+        within(proportional + self.integral + derivative, least, most)
+    }
+}
+
+/// A move to a position that begins and ends at rest, without a jerk.
+#[derive(Debug, Clone)]
+pub(super) struct Path {
+    start: i64,
+    target: i64,
+    duration: f32,
+    elapsed: f32,
+    integral: f32,
+    last_error: f32,
+}
+
+impl Path {
+    fn new(start: i64, target: PositionMove) -> Self {
+        let target_position = machine::position(target.angle_rad);
+        let duration = if target.duration_s > 0.0 { target.duration_s } else { 0.0 };
+        let (elapsed, integral, last_error) = (0.0, 0.0, 0.0);
+        Path { start, target: target_position, duration, elapsed, integral, last_error }
+    }
+
+    /// Target, rad.
+    pub(super) fn target(&self) -> f32 {
+        machine::radians(self.target)
+    }
+
+    /// Duration, s.
+    pub(super) fn duration(&self) -> f32 {
+        self.duration
+    }
+
+    /// One millisecond: the speed reference, rad/s.
+    fn step(&mut self, position: i64, registers: &Registers) -> f32 {
+        self.elapsed += DT;
+        let (share, rate) = self.progress();
+        let length = self.target.wrapping_sub(self.start);
+        let wanted = self.start.wrapping_add((length as f64 * f64::from(share)) as i64);
+        let error = machine::radians(wanted.wrapping_sub(position));
+        let slope = (error - self.last_error) / DT;
+        self.last_error = error;
+        self.integral += error * DT;
+        let correction = registers.position_kp as f32 * error
+            + registers.position_ki as f32 * self.integral
+            + registers.position_kd as f32 * slope;
+        machine::radians(length) * rate + correction / POSITION_DIVISOR
+    }
+
+    /// Share of the way that should be done by now, and its growth per second.
+    fn progress(&self) -> (f32, f32) {
+        let t = self.elapsed / self.duration;
+        if t < 1.0 {
+            let share = t * t * t * (10.0 + t * (6.0 * t - 15.0));
+            (share, 30.0 * t * t * (1.0 - t) * (1.0 - t) / self.duration)
+        } else {
+            (1.0, 0.0)
+        }
+    }
+}

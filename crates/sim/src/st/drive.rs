@@ -1,0 +1,122 @@
+//! The drive: motors behind one slave.
+
+use motorlink_proto::stmcp::{
+    Command, CurrentReference, Drive, ErrorCode, Features, Motor, PositionMove, Ramp, RegisterId,
+    RevupPhase, TorqueRamp, Version,
+};
+use motorlink_proto::time::{Duration, Instant};
+
+use super::{MotorConfig, StMotor};
+use crate::clock::Clock;
+
+/// Length of a step.
+const STEP: Duration = Duration::from_millis(1);
+
+/// An ST drive with its motors, kept in an array or a vector.
+#[derive(Debug, Clone)]
+pub struct StDrive<M> {
+    motors: M,
+    clock: Clock,
+}
+
+impl StDrive<[StMotor; 2]> {
+    /// The motors of [`MotorConfig::demo`].
+    pub fn demo(now: Instant) -> Self {
+        let motors = MotorConfig::demo().map(StMotor::new);
+        StDrive { motors, clock: Clock::new(STEP, now) }
+    }
+}
+
+impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
+    /// A drive that is powered on `now`; `None` unless it has 1 to 7 motors.
+    pub fn new(now: Instant, motors: M) -> Option<Self> {
+        let count = motors.as_ref().len();
+        let fits = (1..=usize::from(Motor::MAX)).contains(&count);
+        fits.then(|| StDrive { motors, clock: Clock::new(STEP, now) })
+    }
+
+    /// The last motor, whose number is how many there are.
+    pub fn last(&self) -> Motor {
+        let count = self.motors.as_ref().len();
+        u8::try_from(count).ok().and_then(Motor::new).expect("a drive has 1 to 7 motors")
+    }
+
+    /// The motors, motor 1 first.
+    pub const fn motors(&self) -> &M {
+        &self.motors
+    }
+
+    /// A motor, to change the world around it; `None` when the drive has none of this number.
+    pub fn motor_mut(&mut self, motor: Motor) -> Option<&mut StMotor> {
+        self.motors.as_mut().get_mut(motor.index())
+    }
+
+    /// Lets time pass until `now`.
+    pub fn advance_to(&mut self, now: Instant) {
+        for _ in self.clock.steps_until(now) {
+            self.motors.as_mut().iter_mut().for_each(StMotor::step);
+        }
+    }
+
+    /// Takes the drive's power away and gives it back; see [`StMotor::power_cycle`].
+    pub fn power_cycle(&mut self) {
+        self.motors.as_mut().iter_mut().for_each(StMotor::power_cycle);
+    }
+
+    fn motor(&mut self, motor: Motor) -> &mut StMotor {
+        self.motor_mut(motor).expect("the slave asks for motors that the drive has")
+    }
+}
+
+impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> Drive for StDrive<M> {
+    fn features(&self, motor: Motor) -> Features {
+        let motor = self.motors.as_ref().get(motor.index());
+        motor.map_or(Features::NONE, |motor| motor.config().build.features())
+    }
+
+    fn version(&self) -> Version<'_> {
+        Version { name: "ST MC SDK", major: 5, minor: 4, patch: 4, pre_release: "" }
+    }
+
+    fn read(&mut self, motor: Motor, register: RegisterId) -> i32 {
+        self.motor(motor).read(register)
+    }
+
+    fn write(&mut self, motor: Motor, register: RegisterId, value: i32) -> Result<(), ErrorCode> {
+        self.motor(motor).write(register, value)
+    }
+
+    fn execute(&mut self, motor: Motor, command: Command) {
+        self.motor(motor).execute(command);
+    }
+
+    fn ramp(&mut self, motor: Motor, ramp: Ramp) {
+        self.motor(motor).ramp(ramp);
+    }
+
+    fn revup(&mut self, motor: Motor, phase: u8) -> RevupPhase {
+        let phases = &self.motor(motor).firmware.revup;
+        phases.get(usize::from(phase)).copied().unwrap_or_default()
+    }
+
+    fn set_revup(&mut self, motor: Motor, phase: u8, data: RevupPhase) {
+        let phases = &mut self.motor(motor).firmware.revup;
+        if let Some(slot) = phases.get_mut(usize::from(phase)) {
+            *slot = data;
+        }
+    }
+
+    fn current_reference(&mut self, motor: Motor, reference: CurrentReference) {
+        self.motor(motor).currents(reference);
+    }
+
+    fn torque_ramp(&mut self, motor: Motor, ramp: TorqueRamp) {
+        let motor = self.motor(motor);
+        let id = motor.flux_reference() as i16;
+        motor.torque(ramp, id);
+    }
+
+    fn position(&mut self, motor: Motor, target: PositionMove) {
+        self.motor(motor).position(target);
+    }
+}

@@ -1,0 +1,11 @@
+//! Simulated drives through the wire, on virtual time.
+
+mod rmd_bench;
+mod rmd_motion;
+mod rmd_protocol;
+mod st_bench;
+mod st_control;
+mod st_faults;
+mod st_registers;
+mod st_states;
+mod time;

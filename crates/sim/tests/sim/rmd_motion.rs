@@ -1,0 +1,248 @@
+//! Torque, speed and position, and their limits.
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::units::*;
+use motorlink_sim::rmd::RmdConfig;
+
+use crate::rmd_bench::Bench;
+
+fn position(degrees: f64) -> Position {
+    Position { angle: CentiDegrees::from_degrees(degrees) }
+}
+
+fn speed(dps: f64) -> Speed {
+    Speed { speed: CentiDps::from_dps(dps) }
+}
+
+#[test]
+fn torque_accelerates_the_rotor() {
+    let mut bench = Bench::one();
+    bench.ask(Torque { torque: TorqueCommand::from_amps(1.6) });
+    bench.wait(50);
+    let status = bench.ask(ReadStatus2);
+    assert!((status.iq.amps() - 1.6).abs() < 0.02, "{} A", status.iq.amps());
+    // 0.15 Nm after friction on 5e-4 kg m² are 300 rad/s² for 50 ms.
+    assert!((820..=880).contains(&status.speed.0), "{}", status.speed);
+    bench.ask(Torque { torque: TorqueCommand::from_amps(-1.6) });
+    bench.wait(200);
+    assert!(bench.truth().speed_dps < -1000.0);
+}
+
+#[test]
+fn torque_is_not_limited_by_the_greatest_torque_current() {
+    let mut bench = Bench::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
+    bench.ask(Torque { torque: TorqueCommand::from_amps(10.0) });
+    assert!(bench.watch(20).current > 9.9);
+    bench.ask(speed(-3000.0));
+    bench.wait(20);
+    let current = bench.watch(500).current;
+    assert!((1.9..2.01).contains(&current), "{current} A");
+}
+
+#[test]
+fn a_speed_is_reached_without_error_and_held_against_a_load() {
+    let mut bench = Bench::one();
+    bench.ask(speed(1234.5));
+    let seen = bench.watch(1000);
+    assert!(seen.speed < 1234.5 * 1.02, "{} °/s on the way", seen.speed);
+    assert!((bench.truth().speed_dps - 1234.5).abs() < 0.5);
+    bench.world().set_load_torque(0.5);
+    let dip = bench.watch(10);
+    assert!(dip.current > 0.2, "{} A", dip.current);
+    bench.wait(1000);
+    assert!((bench.truth().speed_dps - 1234.5).abs() < 0.5, "{}", bench.truth().speed_dps);
+}
+
+#[test]
+fn the_acceleration_limit_makes_a_trapezoid() {
+    let mut bench = Bench::one();
+    bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(2000) }));
+    bench.ask(speed(1000.0));
+    let seen = bench.watch(400);
+    assert!(seen.acceleration < 2200.0, "{} °/s²", seen.acceleration);
+    let halfway = bench.truth().speed_dps;
+    assert!((halfway - 800.0).abs() < 20.0, "{halfway} °/s after 0.4 s");
+    bench.wait(500);
+    assert!((bench.truth().speed_dps - 1000.0).abs() < 1.0);
+}
+
+#[test]
+fn a_position_is_reached_within_a_tenth_of_a_degree_without_swinging() {
+    for bits in 12..=18 {
+        for degrees in [0.5, 90.0, -3600.0, 36_000.0] {
+            let config = RmdConfig { encoder_bits: bits, ..RmdConfig::default() };
+            let mut bench = Bench::new([config]);
+            bench.ask(position(degrees));
+            let seen = bench.watch(5000);
+            let end = bench.truth().angle_degrees;
+            let close = if bits < 14 { 0.2 } else { 0.1 };
+            assert!((end - degrees).abs() < close, "{end}° for {degrees}° with {bits} bits");
+            let over = (seen.greatest - degrees.max(0.0)).max(degrees.min(0.0) - seen.least);
+            assert!(over < 0.2, "{over}° too far for {degrees}° with {bits} bits");
+        }
+    }
+}
+
+#[test]
+fn a_limited_position_move_keeps_its_speed_and_acceleration() {
+    let mut bench = Bench::one();
+    bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(3000) }));
+    let angle = CentiDegrees::from_degrees(720.0);
+    bench.ask(PositionLimited { max_speed: SpeedLimit(360), angle });
+    let seen = bench.watch(2000);
+    assert!((355.0..365.0).contains(&seen.speed), "{} °/s", seen.speed);
+    assert!(seen.acceleration < 3500.0, "{} °/s²", seen.acceleration);
+    assert!(bench.angle() < 719.0, "two turns take more than two seconds");
+    bench.wait(800);
+    assert!((bench.angle() - 720.0).abs() < 0.1);
+}
+
+#[test]
+fn the_drives_own_limits_hold_a_position_command() {
+    let config = RmdConfig {
+        max_speed_dps: 500.0,
+        max_angle_degrees: 180.0,
+        max_torque_current: 3.0,
+        encoder_offset: 4096,
+        ..RmdConfig::default()
+    };
+    let mut bench = Bench::new([config]);
+    assert!((bench.angle() + 90.0).abs() < 0.1, "the offset is a quarter of a turn");
+    bench.ask(position(1000.0));
+    let seen = bench.watch(2000);
+    assert!(seen.speed < 505.0, "{} °/s", seen.speed);
+    assert!(seen.current < 3.01, "{} A", seen.current);
+    assert!((bench.angle() - 180.0).abs() < 0.1, "{}°", bench.angle());
+    bench.ask(position(-1000.0));
+    bench.wait(3000);
+    assert!((bench.angle() + 180.0).abs() < 0.1, "{}°", bench.angle());
+}
+
+#[test]
+fn a_single_turn_position_is_reached_in_the_direction_that_is_told() {
+    let mut bench = Bench::one();
+    let circle = |degrees, direction| CirclePosition {
+        direction,
+        angle: CircleAngle::from_degrees(degrees),
+    };
+    bench.ask(circle(90.0, Spin::Clockwise));
+    bench.wait(1500);
+    assert!((bench.angle() - 90.0).abs() < 0.1);
+    bench.ask(circle(45.0, Spin::Clockwise));
+    bench.wait(1500);
+    assert!((bench.angle() - 405.0).abs() < 0.1, "on beyond zero: {}°", bench.angle());
+    let slow = CirclePositionLimited {
+        direction: Spin::Counterclockwise,
+        max_speed: SpeedLimit(100),
+        angle: CircleAngle::from_degrees(50.0),
+    };
+    bench.ask(slow);
+    let seen = bench.watch(2000);
+    assert!((95.0..105.0).contains(&seen.speed), "{} °/s", seen.speed);
+    bench.wait(2500);
+    assert!((bench.angle() - 50.0).abs() < 0.1, "{}°", bench.angle());
+    assert!((bench.ask(ReadCircleAngle).angle.degrees() - 50.0).abs() < 0.1);
+}
+
+/// How a motor with these gains has followed a command after `ms`.
+fn follow(gains: Gains, ms: u32, command: impl FnOnce(&mut Bench)) -> (f64, f32, f32) {
+    let mut bench = Bench::one();
+    bench.ask(WriteGains(gains));
+    command(&mut bench);
+    bench.wait(ms);
+    let truth = bench.truth();
+    (truth.angle_degrees, truth.speed_dps, truth.iq)
+}
+
+#[test]
+fn each_gain_acts() {
+    let shipped = RmdConfig::default().factory_rom().gains;
+    let step = |gains| follow(gains, 60, |bench| _ = bench.ask(position(2.0))).0;
+    assert!(step(Gains { position_kp: 20, ..shipped }) < 0.7 * step(shipped));
+
+    let dip = |gains| {
+        let (_, speed, _) = follow(gains, 15, |bench| {
+            bench.ask(speed(1000.0));
+            bench.wait(1000);
+            bench.world().set_load_torque(0.5);
+        });
+        1000.0 - speed
+    };
+    assert!(dip(Gains { speed_kp: 25, ..shipped }) > 1.4 * dip(shipped));
+
+    let torque = TorqueCommand::from_amps(5.0);
+    let push = |gains| follow(gains, 1, |bench| _ = bench.ask(Torque { torque })).2;
+    assert!(push(Gains { torque_kp: 30, torque_ki: 30, ..shipped }) < 0.7 * push(shipped));
+
+    let loaded = |gains| {
+        follow(gains, 1000, |bench| {
+            bench.world().set_load_torque(0.5);
+            bench.ask(speed(2000.0));
+        })
+    };
+    let (_, with, _) = loaded(shipped);
+    let (_, without, _) = loaded(Gains { speed_ki: 0, ..shipped });
+    assert!((with - 2000.0).abs() < 2.0 && without < 1700.0, "{with} and {without} °/s");
+
+    let (.., current) = follow(Gains { torque_ki: 0, ..shipped }, 5, |bench| {
+        bench.world().lock_rotor(true);
+        bench.ask(Torque { torque });
+    });
+    assert!(current < 4.5, "{current} A without Ki");
+
+    let held = |position_ki| {
+        let gains = Gains { position_ki, speed_ki: 0, ..shipped };
+        follow(gains, 4000, |bench| _ = bench.ask(position(0.5))).0
+    };
+    assert!((held(255) - 0.5).abs() < (held(0) - 0.5).abs(), "{} and {}", held(255), held(0));
+
+    let no_speed_loop = Gains { speed_kp: 0, speed_ki: 0, ..shipped };
+    for dead in [Gains::default(), Gains { position_kp: 0, ..shipped }, no_speed_loop] {
+        let (angle, ..) = follow(dead, 500, |bench| _ = bench.ask(position(90.0)));
+        assert_eq!(angle, 0.0, "without gains nothing moves");
+    }
+}
+
+#[test]
+fn stop_brings_the_rotor_to_a_stand_and_off_lets_it_coast() {
+    let coasting = |stop: bool| {
+        let mut bench = Bench::one();
+        bench.ask(speed(3000.0));
+        bench.wait(500);
+        if stop {
+            bench.ask(Stop);
+        } else {
+            bench.ask(Off);
+        }
+        bench.wait(100);
+        (bench.truth().speed_dps, bench.truth().iq)
+    };
+    let (stopped, _) = coasting(true);
+    assert!(stopped.abs() < 30.0, "{stopped} °/s");
+    let (off, current) = coasting(false);
+    assert!(off > 2500.0, "{off} °/s");
+    assert_eq!(current, 0.0);
+}
+
+#[test]
+fn phase_currents_sum_to_zero_and_follow_the_electrical_angle() {
+    let mut bench = Bench::one();
+    bench.world().lock_rotor(true);
+    bench.ask(Torque { torque: TorqueCommand::from_amps(8.0) });
+    bench.wait(50);
+    let PhaseCurrents { phase_a, phase_b, phase_c } = bench.ask(ReadStatus3);
+    assert_eq!(phase_a.0 + phase_b.0 + phase_c.0, 0);
+    assert_eq!(phase_a.0, 0, "Iq at an electrical angle of zero leaves phase A alone");
+    assert!((phase_b.amps() - 8.0 * 0.75f64.sqrt()).abs() < 0.05, "{phase_b}");
+
+    bench.world().lock_rotor(false);
+    bench.ask(speed(77.0));
+    for _ in 0..100 {
+        bench.wait(7);
+        let PhaseCurrents { phase_a, phase_b, phase_c } = bench.ask(ReadStatus3);
+        assert_eq!(phase_a.0 + phase_b.0 + phase_c.0, 0);
+        let squares = phase_a.amps().powi(2) + phase_b.amps().powi(2) + phase_c.amps().powi(2);
+        let iq = f64::from(bench.truth().iq).abs();
+        assert!(((squares / 1.5).sqrt() - iq).abs() < 0.03, "{squares} for {iq} A");
+    }
+}

@@ -1,0 +1,179 @@
+//! What lasts, what is forgotten and what is refused.
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::Instant;
+use motorlink_proto::units::*;
+use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
+
+use crate::rmd_bench::Bench;
+
+#[test]
+fn gains_survive_a_power_cycle_only_in_rom() {
+    let mut bench = Bench::one();
+    let ram = Gains { position_kp: 1, position_ki: 2, ..bench.ask(ReadGains) };
+    let rom = Gains { speed_kp: 3, torque_ki: 4, ..ram };
+    bench.ask(WriteGains(ram));
+    assert_eq!(bench.ask(ReadGains), ram);
+    bench.power_cycle();
+    assert_eq!(bench.ask(ReadGains), RmdConfig::default().factory_rom().gains);
+
+    bench.ask(WriteGainsToRom(rom));
+    bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(700) }));
+    bench.power_cycle();
+    assert_eq!(bench.ask(ReadGains), rom);
+    assert_eq!(bench.ask(ReadAcceleration).acceleration, DpsPerSecond(0));
+    assert_eq!(bench.world().rom_writes(), 1);
+    assert_eq!(bench.node().drive().rom().gains, rom);
+}
+
+#[test]
+fn a_zero_position_takes_effect_with_the_next_power_on() {
+    let mut bench = Bench::one();
+    bench.ask(Position { angle: CentiDegrees::from_degrees(1000.0) });
+    bench.wait(3000);
+    let zero = bench.ask(WriteZeroToRom).offset;
+    assert!((bench.angle() - 1000.0).abs() < 0.1, "reads keep the old zero");
+    bench.power_cycle();
+    assert!(bench.angle().abs() < 0.1, "{}°", bench.angle());
+    let encoder = bench.ask(ReadEncoder);
+    assert_eq!((encoder.offset, encoder.raw), (zero, zero));
+}
+
+#[test]
+fn turns_are_counted_until_the_power_goes() {
+    let mut bench = Bench::one();
+    bench.ask(Position { angle: CentiDegrees::from_degrees(-2000.0) });
+    bench.wait(3000);
+    assert!((bench.angle() + 2000.0).abs() < 0.1);
+    bench.power_cycle();
+    assert!((bench.angle() - 160.0).abs() < 0.1, "-2000° are 160° in the turn");
+}
+
+#[test]
+fn stop_and_run_resume_what_off_forgets() {
+    let mut bench = Bench::one();
+    bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
+    bench.wait(300);
+    bench.ask(Stop);
+    bench.wait(300);
+    assert!(bench.truth().speed_dps.abs() < 1.0);
+    bench.ask(Run);
+    bench.wait(300);
+    assert!((bench.truth().speed_dps - 500.0).abs() < 5.0);
+    bench.ask(Off);
+    bench.ask(Run);
+    bench.wait(3000);
+    assert_eq!(bench.truth().speed_dps, 0.0);
+}
+
+#[test]
+fn protections_switch_off_and_stay_while_the_cause_lasts() {
+    let mut bench = Bench::one();
+    bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
+    bench.wait(300);
+    bench.world().set_supply_voltage(6.9);
+    bench.wait(1);
+    bench.world().set_supply_voltage(24.0);
+    assert_eq!(bench.ask(ReadStatus1).errors, Errors::LOW_VOLTAGE);
+    assert_eq!(bench.truth().mode, Mode::Off);
+
+    bench.world().set_temperature(Some(101.0));
+    bench.wait(1);
+    assert_eq!(bench.ask(ClearErrors).errors, Errors::OVER_TEMPERATURE);
+    bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
+    assert_eq!(bench.truth().mode, Mode::Off);
+    bench.world().set_temperature(Some(60.0));
+    let status = bench.ask(ClearErrors);
+    assert_eq!((status.errors, status.temperature), (Errors::NONE, Celsius(60)));
+    assert_eq!(status.voltage.volts(), 24.0);
+    bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
+    assert_ne!(bench.truth().mode, Mode::Off);
+}
+
+#[test]
+fn injected_faults_happen_once_or_last() {
+    let mut bench = Bench::one();
+    bench.world().inject(Errors::OVER_TEMPERATURE);
+    bench.wait(1);
+    assert_eq!(bench.ask(ReadStatus1).errors, Errors::OVER_TEMPERATURE);
+    assert_eq!(bench.ask(ClearErrors).errors, Errors::NONE);
+    bench.world().hold_faults(Errors::LOW_VOLTAGE);
+    bench.wait(1);
+    assert_eq!(bench.ask(ClearErrors).errors, Errors::LOW_VOLTAGE);
+    bench.world().hold_faults(Errors::NONE);
+    assert_eq!(bench.ask(ClearErrors).errors, Errors::NONE);
+}
+
+#[test]
+fn a_hard_working_motor_gets_too_hot() {
+    let mut bench = Bench::one();
+    bench.world().lock_rotor(true);
+    bench.ask(Torque { torque: TorqueCommand::from_amps(20.0) });
+    // 150 W at 1 K/W and 60 s: from 25 °C to 100 °C in 60 s ln 2, which is 42 s.
+    bench.wait(40_000);
+    assert!(bench.ask(ReadStatus1).errors.is_empty());
+    bench.wait(4_000);
+    assert_eq!(bench.ask(ReadStatus1).errors, Errors::OVER_TEMPERATURE);
+    assert_eq!(bench.truth().iq, 0.0);
+}
+
+#[test]
+fn silence_for_the_shutdown_time_switches_off() {
+    let mut bench = Bench::new([RmdConfig { shutdown_ms: 200, ..RmdConfig::default() }]);
+    bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
+    for _ in 0..5 {
+        bench.wait(150);
+        bench.ask(ReadStatus2);
+    }
+    assert_ne!(bench.truth().mode, Mode::Off);
+    bench.wait(200);
+    assert_eq!(bench.truth().mode, Mode::Off);
+}
+
+#[test]
+fn four_torques_are_answered_lowest_id_first() {
+    let mut bench = Bench::new([4, 2, 7, 1, 3].map(RmdConfig::with_id));
+    let torques = Torque4([100, -100, 200, -200].map(TorqueCommand));
+    bench.send(&CanFrame::new(0x280, torques.encode()));
+    bench.wait(50);
+    let replies = bench.send(&CanFrame::new(0x280, torques.encode()));
+    let ids: Vec<u32> = replies.iter().map(CanFrame::id).collect();
+    assert_eq!(ids, [0x141, 0x142, 0x143, 0x144]);
+    for (reply, torque) in replies.iter().zip(torques.0) {
+        assert_eq!(reply.data()[0], 0xA1);
+        let status = MotionStatus::decode(reply.data().try_into().unwrap());
+        assert!((status.iq.amps() - torque.amps()).abs() < 0.03, "{} {torque}", status.iq);
+    }
+}
+
+#[test]
+fn what_is_not_for_a_motor_gets_no_reply() {
+    let mut bench = Bench::one();
+    assert!(bench.send(&CanFrame::new(0x142, ReadStatus1.encode())).is_empty());
+    assert!(bench.send(&CanFrame::new(0x141, [0x77; 8])).is_empty());
+    assert!(bench.send(&CanFrame::data_frame(0x141, false, &[0x9A])).is_empty());
+}
+
+#[test]
+fn every_command_is_answered_with_its_code() {
+    let mut bench = Bench::one();
+    for command in COMMANDS {
+        let code = u8::from(command.code);
+        let reply = bench.raw([code, 0, 0, 0, 0, 0, 0, 0]);
+        let printed = if code == 0x9B { 0x9A } else { code };
+        assert_eq!(reply[0], printed, "{code:#04x}");
+    }
+}
+
+#[test]
+fn an_odd_configuration_is_refused() {
+    let rom = RmdConfig::default().factory_rom();
+    let odd = [
+        RmdConfig { id: 0, ..RmdConfig::default() },
+        RmdConfig { id: 33, ..RmdConfig::default() },
+        RmdConfig { encoder_bits: 19, ..RmdConfig::default() },
+    ];
+    assert!(odd.into_iter().all(|config| RmdNode::new(Instant(0), config, rom).is_none()));
+    let twins = [3, 3].map(|id| RmdNode::new(Instant(0), RmdConfig::with_id(id), rom).unwrap());
+    assert!(RmdBus::new(Instant(0), twins).is_none());
+}

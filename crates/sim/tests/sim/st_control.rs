@@ -1,0 +1,283 @@
+//! References, ramps and regulators.
+
+use motorlink_proto::stmcp::{
+    Command, ControlMode, CurrentReference, PositionMove, Request, RevupPhase, Status, TorqueRamp,
+    register::*,
+};
+
+use crate::st_bench::Line;
+
+fn currents(line: &mut Line, iq_s16a: i16, id_s16a: i16) {
+    let reference = CurrentReference { iq_s16a, id_s16a };
+    line.ask(0, Request::CurrentReference(reference)).unwrap();
+}
+
+fn mode(line: &mut Line) -> ControlMode {
+    ControlMode::from(line.get(CONTROL_MODE))
+}
+
+/// Iq of 1 A on the motor without sensor, s16A.
+const ONE_AMPERE: i16 = 1986;
+
+#[test]
+fn a_ramp_of_1000_rpm_in_500_ms_is_2_rpm_per_ms() {
+    let mut line = Line::sensorless();
+    line.ramp(1000, 0);
+    line.run();
+    line.wait(1000);
+    line.ramp(2000, 500);
+    for ms in (0..=500).step_by(50) {
+        assert_eq!(line.get(SPEED_REF), 1000 + 2 * ms);
+        line.wait(50);
+    }
+    assert_eq!(line.get(SPEED_REF), 2000);
+    line.wait(1000);
+    let speed = line.truth().speed_rpm;
+    assert!((speed - 2000.0).abs() < 1.0, "{speed} rpm: no steady error");
+}
+
+#[test]
+fn the_last_ramp_before_run_is_the_one_that_is_executed() {
+    let mut line = Line::sensorless();
+    line.ramp(900, 100);
+    line.execute(Command::StartMotor);
+    line.wait(100);
+    line.ramp(1800, 400);
+    line.until(Status::Run, 2000);
+    let (at_once, begin) = (line.get(SPEED_REF), line.now);
+    assert!((at_once - 1000).abs() <= 10, "{at_once} rpm: begins where the rev-up ended");
+    line.wait(400);
+    assert_eq!(line.get(SPEED_REF), 1800, "400 ms after {begin:?}");
+}
+
+#[test]
+fn current_references_given_before_run_wait_for_it() {
+    let mut line = Line::sensorless();
+    line.ramp(900, 100);
+    currents(&mut line, ONE_AMPERE, -500);
+    assert_eq!(mode(&mut line), ControlMode::Speed, "nothing happens before RUN");
+    line.run();
+    line.wait(20);
+    assert_eq!(mode(&mut line), ControlMode::Torque);
+    assert!((line.get(TORQUE_MEAS) - ONE_AMPERE).abs() <= 1);
+    assert!((line.get(FLUX_MEAS) + 500).abs() <= 1);
+}
+
+#[test]
+fn a_ramp_in_torque_mode_goes_on_from_the_present_speed() {
+    let mut line = Line::sensorless();
+    line.run();
+    currents(&mut line, ONE_AMPERE, 0);
+    line.wait(300);
+    let speed = line.truth().speed_rpm;
+    line.ramp(3000, 1000);
+    assert_eq!(mode(&mut line), ControlMode::Speed);
+    assert!((line.get(SPEED_REF) as f32 - speed).abs() < 20.0);
+    line.wait(2000);
+    assert!((line.truth().speed_rpm - 3000.0).abs() < 5.0);
+}
+
+#[test]
+fn writing_the_control_mode_keeps_what_the_motor_does() {
+    let mut line = Line::sensorless();
+    line.run();
+    line.wait(2500);
+    let iq = line.get(TORQUE_REF);
+    line.set(CONTROL_MODE, 0);
+    assert_eq!(mode(&mut line), ControlMode::Torque);
+    assert!((line.get(TORQUE_REF) - iq).abs() <= 2);
+    line.set(CONTROL_MODE, 7);
+    assert_eq!(mode(&mut line), ControlMode::Torque, "7 is no mode");
+    line.set(CONTROL_MODE, 1);
+    line.wait(500);
+    assert!((line.truth().speed_rpm - 1500.0).abs() < 15.0);
+}
+
+#[test]
+fn each_reference_can_be_written_alone() {
+    let mut line = Line::sensorless();
+    line.run();
+    line.set(FLUX_REF, -300);
+    line.set(TORQUE_REF, 400);
+    line.wait(20);
+    assert_eq!(mode(&mut line), ControlMode::Torque);
+    assert_eq!((line.get(TORQUE_REF), line.get(FLUX_REF)), (400, -300));
+    line.execute(Command::IqdrefClear);
+    line.wait(20);
+    assert_eq!((line.get(TORQUE_MEAS), line.get(FLUX_MEAS)), (0, 0));
+}
+
+#[test]
+fn the_id_reference_of_speed_mode_acts_in_speed_mode() {
+    let mut line = Line::sensorless();
+    line.run();
+    line.set(IQ_SPEEDMODE, -800);
+    line.wait(20);
+    assert_eq!(mode(&mut line), ControlMode::Speed);
+    assert!((line.get(FLUX_MEAS) + 800).abs() <= 1);
+}
+
+#[test]
+fn a_torque_ramp_is_linear() {
+    let mut line = Line::servo();
+    line.run();
+    line.world().lock_rotor(true);
+    line.wait(200);
+    let from = i32::from(line.get(TORQUE_REF));
+    let ramp = TorqueRamp { torque_s16a: from + 1000, duration_ms: 100 };
+    line.ask(0, Request::TorqueRamp(ramp)).unwrap();
+    for ms in (0..=100).step_by(20) {
+        assert!((i32::from(line.get(TORQUE_REF)) - from - 10 * ms).abs() <= 1);
+        line.wait(20);
+    }
+}
+
+#[test]
+fn stop_ramp_holds_what_was_reached() {
+    let mut line = Line::sensorless();
+    line.ramp(1000, 0);
+    line.run();
+    line.ramp(3000, 1000);
+    line.wait(300);
+    line.execute(Command::StopRamp);
+    let held = line.get(SPEED_REF);
+    assert!((held - 1600).abs() < 5, "{held} rpm");
+    line.wait(1000);
+    assert_eq!(line.get(SPEED_REF), held);
+}
+
+#[test]
+fn writing_the_final_speed_starts_a_ramp_of_the_last_duration() {
+    let mut line = Line::sensorless();
+    line.ramp(1000, 200);
+    line.run();
+    line.wait(500);
+    line.set(RAMP_FINAL_SPEED, 1400);
+    line.wait(100);
+    assert_eq!(line.get(SPEED_REF), 1200);
+    line.wait(100);
+    assert_eq!((line.get(SPEED_REF), line.get(RAMP_FINAL_SPEED)), (1400, 1400));
+}
+
+#[test]
+fn a_negative_ramp_starts_backwards_and_reverses_on_the_run() {
+    let mut line = Line::sensorless();
+    line.ramp(-1500, 500);
+    line.run();
+    line.wait(1500);
+    assert!((line.truth().speed_rpm + 1500.0).abs() < 5.0);
+    line.ramp(1500, 1000);
+    line.wait(2000);
+    assert!((line.truth().speed_rpm - 1500.0).abs() < 5.0);
+}
+
+#[test]
+fn a_ramp_beyond_the_highest_speed_ends_there() {
+    let mut line = Line::sensorless();
+    line.ramp(20_000, 2000);
+    line.run();
+    line.wait(4000);
+    assert_eq!(line.get(SPEED_REF), 6000);
+    assert_eq!(line.get(MAX_APP_SPEED), 6000);
+    assert!((line.truth().speed_rpm - 6000.0).abs() < 10.0);
+}
+
+/// Milliseconds from 1500 rpm to 90 % of a step to 2000 rpm.
+fn rise_time(kp: i16, ki: i16) -> u32 {
+    let mut line = Line::sensorless();
+    line.run();
+    line.wait(3000);
+    line.set(SPEED_KP, kp);
+    line.set(SPEED_KI, ki);
+    line.ramp(2000, 0);
+    (0..5000)
+        .find(|_| {
+            line.wait(1);
+            line.truth().speed_rpm >= 1950.0
+        })
+        .expect("the step is followed")
+}
+
+#[test]
+fn the_speed_gains_change_the_rise_time() {
+    let (shipped, faster, slower) = (rise_time(800, 100), rise_time(3200, 100), rise_time(200, 25));
+    assert!(faster * 2 < shipped, "{faster} ms with four times Kp, {shipped} ms as shipped");
+    assert!(slower > shipped * 2, "{slower} ms with a quarter, {shipped} ms as shipped");
+}
+
+#[test]
+fn without_ki_a_load_leaves_a_speed_error() {
+    let error = |ki| {
+        let mut line = Line::sensorless();
+        line.run();
+        line.wait(3000);
+        line.set(SPEED_KI, ki);
+        line.world().set_load_torque(0.3);
+        line.wait(3000);
+        (line.truth().speed_rpm - 1500.0).abs()
+    };
+    let (with, without) = (error(100), error(0));
+    assert!(with < 1.0, "{with} rpm");
+    assert!(without > 50.0, "{without} rpm");
+}
+
+#[test]
+fn a_position_move_takes_its_time_and_arrives() {
+    let mut line = Line::servo();
+    line.ramp(0, 0);
+    line.run();
+    let target = PositionMove { angle_rad: 25.0, duration_s: 0.5 };
+    line.ask(0, Request::Position(target)).unwrap();
+    let mut last = line.get(CURRENT_POSITION);
+    for _ in 0..50 {
+        line.wait(10);
+        let now = line.get(CURRENT_POSITION);
+        assert!(now >= last - 0.01, "no swinging: {now} rad after {last} rad");
+        last = now;
+    }
+    assert!((last - 25.0).abs() < 0.2, "{last} rad after half a second");
+    line.wait(500);
+    let end = line.get(CURRENT_POSITION);
+    assert!((end - 25.0).abs() < 0.01, "{end} rad");
+    assert_eq!((line.get(TARGET_POSITION), line.get(MOVE_DURATION)), (25.0, 0.5));
+}
+
+#[test]
+fn the_position_gain_changes_how_a_step_is_followed() {
+    let after_100_ms = |kp| {
+        let mut line = Line::servo();
+        line.ramp(0, 0);
+        line.run();
+        line.set(POSITION_KP, kp);
+        let step = PositionMove { angle_rad: 1.0, duration_s: 0.0 };
+        line.ask(0, Request::Position(step)).unwrap();
+        line.wait(100);
+        line.get(CURRENT_POSITION)
+    };
+    assert!(after_100_ms(320) > 0.7);
+    assert!(after_100_ms(40) < 0.4);
+}
+
+#[test]
+fn an_angle_that_is_no_number_is_not_gone_to() {
+    let mut line = Line::servo();
+    line.run();
+    for angle_rad in [f32::NAN, f32::INFINITY] {
+        let target = PositionMove { angle_rad, duration_s: f32::NAN };
+        line.ask(0, Request::Position(target)).unwrap();
+        assert_eq!(line.get(TARGET_POSITION), 0.0);
+    }
+}
+
+#[test]
+fn the_rev_up_table_sets_how_long_the_start_takes() {
+    let mut line = Line::sensorless();
+    let phase = line.ask(0, Request::RevupData(1)).unwrap();
+    let phase = RevupPhase::decode(&phase).unwrap();
+    assert_eq!((phase.speed_rpm, phase.duration_ms), (500, 250));
+    let slower = RevupPhase { duration_ms: 450, ..phase };
+    line.ask(0, Request::SetRevupData(1, slower)).unwrap();
+    line.execute(Command::StartMotor);
+    line.until(Status::Start, 100);
+    assert_eq!(line.until(Status::SwitchOver, 2000), 1000);
+}

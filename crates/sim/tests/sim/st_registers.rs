@@ -1,0 +1,150 @@
+//! Every register of the table, in both profiles, on a motor that has its feature and one that has
+//! not.
+
+use motorlink_proto::stmcp::register::{Features, Type, Writing};
+use motorlink_proto::stmcp::{Command, ErrorCode, Profile, RegisterId, Request, register::*};
+use motorlink_sim::st::{BuildConfig, MotorConfig};
+
+use crate::st_bench::Line;
+
+const BARE: BuildConfig = BuildConfig {
+    observer_pll: false,
+    observer_cordic: false,
+    position_sensor: false,
+    flux_weakening: false,
+    feed_forward: false,
+    pfc: false,
+    dac: false,
+    position_control: false,
+};
+
+fn lines() -> impl Iterator<Item = (Profile, Features, Line)> {
+    let bare = MotorConfig { build: BARE, ..MotorConfig::default() };
+    let motors = [MotorConfig::default(), MotorConfig::servo(), bare];
+    [Profile::Spec, Profile::Mcsdk54].into_iter().flat_map(move |profile| {
+        motors.map(|config| (profile, config.build.features(), Line::new(profile, [config])))
+    })
+}
+
+#[test]
+fn every_register_reads_in_its_size_or_is_refused() {
+    for (profile, features, mut line) in lines() {
+        for id in RegisterId::all() {
+            let size = id.shape().unwrap().read_size(profile, features);
+            let reply = line.ask(1, Request::GetRegister(id)).map(|payload| payload.len());
+            let expected = size.map(usize::from).ok_or(ErrorCode::GetWriteOnly.into());
+            assert_eq!(reply, expected, "{id} in {}", profile.name());
+        }
+        let unknown = line.get_id(1, RegisterId(0xFE));
+        assert_eq!(unknown, Err(ErrorCode::GetWriteOnly.into()));
+    }
+}
+
+#[test]
+fn every_register_that_can_be_written_keeps_its_value() {
+    for (profile, features, mut line) in lines() {
+        for id in RegisterId::all() {
+            let shape = id.shape().unwrap();
+            let size = match shape.writing(profile, features) {
+                Writing::Takes(size) => size,
+                refused => {
+                    let code = match refused {
+                        Writing::ReadOnly => ErrorCode::SetReadOnly,
+                        _ => ErrorCode::WrongSet,
+                    };
+                    assert_eq!(line.set_id(1, id, &[1, 0, 0, 0]), Err(code.into()), "{id}");
+                    continue;
+                }
+            };
+            let value: i32 = match id {
+                RegisterId::TARGET_MOTOR | RegisterId::CONTROL_MODE => 0,
+                RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => 0x27,
+                RegisterId::RAMP_FINAL_SPEED => -1200,
+                _ if shape.ty == Type::U16 => 90,
+                _ => -90,
+            };
+            line.set_id(1, id, &value.to_le_bytes()[..size.into()]).unwrap();
+            if shape.read_size(profile, features).is_some() {
+                assert_eq!(line.get_id(1, id), Ok(value), "{id} in {}", profile.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn commands_for_a_pfc_need_one() {
+    for command in [Command::PfcEnable, Command::PfcDisable, Command::PfcFaultAck] {
+        let mut line = Line::demo(Profile::Spec);
+        assert_eq!(line.ask(1, Request::Execute(command)), Ok(vec![]));
+        let refused = Err(ErrorCode::WrongCmd.into());
+        assert_eq!(line.ask(2, Request::Execute(command)), refused);
+    }
+}
+
+/// Registers at one instant, as a data segment gives them: those of access D too.
+fn sample<const N: usize>(line: &mut Line, registers: [RegisterId; N]) -> [i32; N] {
+    let ids = registers.map(|id| id.0);
+    line.ask(0, Request::ConfigDynStruct { segment: 0, registers: &ids }).unwrap();
+    let payload = line.ask(0, Request::DataElement(0)).unwrap();
+    let mut rest = &payload[..];
+    registers.map(|id| {
+        let (value, tail) = rest.split_at(id.shape().unwrap().ty.size().into());
+        rest = tail;
+        id.decode(value).unwrap()
+    })
+}
+
+#[test]
+fn the_signals_of_a_running_motor_belong_together() {
+    let mut line = Line::sensorless();
+    line.run();
+    line.wait(2000);
+    line.world().set_load_torque(0.6);
+    line.set(IQ_SPEEDMODE, -600);
+    line.wait(2000);
+    use RegisterId as R;
+    let [a, b, alpha, beta, q, d] =
+        sample(&mut line, [R::I_A, R::I_B, R::I_ALPHA, R::I_BETA, R::I_Q, R::I_D]);
+    assert_eq!(a, alpha);
+    let square = |x: i32, y: i32| f64::from(x * x + y * y).sqrt();
+    assert!((square(alpha, beta) - square(q, d)).abs() < 2.0, "the amplitude stays");
+    assert!((f64::from(a + 2 * b) / 3f64.sqrt() - f64::from(beta)).abs() < 2.0);
+    let iq = f64::from(q) * 16.5 / 32767.0;
+    assert!((iq - 0.63 / 0.3 - 0.1).abs() < 0.1, "{iq} A carry 0.6 Nm and friction at 0.3 Nm/A");
+
+    let [vq, vd, v_alpha, v_beta] = sample(&mut line, [R::V_Q, R::V_D, R::V_ALPHA, R::V_BETA]);
+    assert!((square(vq, vd) - square(v_alpha, v_beta)).abs() < 2.0);
+    let [emf_alpha, emf_beta] = sample(&mut line, [R::OBS_BEMF_ALPHA, R::OBS_BEMF_BETA]);
+    let emf = square(emf_alpha, emf_beta) / 32767.0 * 325.0 / 3f64.sqrt();
+    assert!((emf - 31.4).abs() < 0.2, "{emf} V at 1500 rpm and 0.2 V s/rad");
+    let [expected, observed] = sample(&mut line, [R::EST_BEMF_LEVEL, R::OBS_BEMF_LEVEL]);
+    assert_eq!(expected, observed);
+    let power = line.get(MOTOR_POWER);
+    assert!((100..130).contains(&power), "{power} W for 99 W of shaft power");
+    let [speed] = sample(&mut line, [R::OBS_ROT_SPEED]);
+    assert_eq!(speed, 250, "1500 rpm are 25.0 Hz");
+    let [vq, ff, pi] = sample(&mut line, [R::V_Q, R::FF_VQ, R::FF_VQ_PIOUT]);
+    assert_eq!(vq, ff + pi);
+}
+
+#[test]
+fn a_dac_channel_shows_the_register_that_was_chosen() {
+    let mut line = Line::sensorless();
+    line.set(DAC_OUT1, RegisterId::I_Q.0);
+    line.set(DAC_OUT2, RegisterId::DAC_USER2.0);
+    line.run();
+    line.wait(100);
+    let iq = i32::from(line.get(TORQUE_MEAS));
+    let motor = line.world();
+    assert_eq!((motor.dac(1), motor.dac(2)), (iq, 0x2000));
+    assert_ne!(iq, 0);
+}
+
+#[test]
+fn a_power_cycle_brings_every_register_back() {
+    let mut line = Line::sensorless();
+    line.set(SPEED_KP, 1);
+    line.ramp(-3000, 7);
+    line.station.power_cycle();
+    assert_eq!((line.get(SPEED_KP), line.get(RAMP_FINAL_SPEED)), (800, 1500));
+}

@@ -1,0 +1,120 @@
+//! The same commands at the same times give the same bytes, however finely time is cut.
+
+use motorlink_proto::rmd::{Command as _, Position, ReadEncoder, ReadStatus2, ReadStatus3, Speed};
+use motorlink_proto::stmcp::{Command, Profile, RegisterId, Request};
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::units::{CentiDegrees, CentiDps};
+use motorlink_sim::rmd::{RmdBus, RmdConfig};
+use motorlink_sim::st::{StDrive, StStation};
+
+use crate::rmd_bench::Bench;
+use crate::st_bench::Line;
+
+/// Lets `us` pass in pieces of at most `piece`.
+fn cut(now: &mut Instant, us: u64, piece: u64, mut advance: impl FnMut(Instant)) {
+    let end = *now + Duration(us);
+    while *now < end {
+        *now = Instant((now.0 + piece).min(end.0));
+        advance(*now);
+    }
+}
+
+/// Everything that two ST motors send in a run, and where they are at its end.
+fn st_run(piece: u64) -> (Vec<u8>, String) {
+    let mut line = Line::demo(Profile::Mcsdk54);
+    for motor in [1, 2] {
+        line.ask(motor, Request::Execute(Command::StartMotor)).unwrap();
+    }
+    for round in 0..40 {
+        let (mut now, station) = (line.now, &mut line.station);
+        cut(&mut now, 77_777, piece, |now| station.advance_to(now));
+        line.now = now;
+        line.world().set_load_torque(0.01 * round as f32);
+        for motor in [1, 2] {
+            for id in RegisterId::all() {
+                let _ = line.ask(motor, Request::GetRegister(id));
+            }
+        }
+    }
+    let motors = line.station.drive().motors();
+    (line.log, format!("{:?} {:?}", motors[0].truth(), motors[1].truth()))
+}
+
+/// Every frame that two RMD motors send in a run, and where motor 1 is at its end.
+fn rmd_run(piece: u64) -> (Vec<Vec<u8>>, String) {
+    let short = RmdConfig { shutdown_ms: 90, ..RmdConfig::with_id(2) };
+    let mut bench = Bench::new([RmdConfig::default(), short]);
+    for round in 0..40 {
+        let angle = CentiDegrees::from_degrees(f64::from(round * 37 % 100));
+        bench.raw(Position { angle }.encode());
+        let spin = Speed { speed: CentiDps(round * 1000) };
+        bench.send(&motorlink_proto::rmd::CanFrame::new(0x142, spin.encode()));
+        let (mut now, bus) = (bench.now, &mut bench.bus);
+        cut(&mut now, 93_333, piece, |now| bus.advance_to(now));
+        bench.now = now;
+        for request in [ReadStatus2.encode(), ReadStatus3.encode(), ReadEncoder.encode()] {
+            bench.raw(request);
+            bench.send(&motorlink_proto::rmd::CanFrame::new(0x142, request));
+        }
+    }
+    let end = format!("{:?}", bench.truth());
+    (bench.log.iter().map(|frame| frame.data().to_vec()).collect(), end)
+}
+
+#[test]
+fn an_st_drive_is_deterministic() {
+    let once = st_run(u64::MAX / 2);
+    assert_eq!(once, st_run(u64::MAX / 2));
+    assert_eq!(once, st_run(313), "in pieces of 313 µs");
+}
+
+#[test]
+fn an_rmd_bus_is_deterministic() {
+    let once = rmd_run(u64::MAX / 2);
+    assert_eq!(once, rmd_run(u64::MAX / 2));
+    assert_eq!(once, rmd_run(101), "in pieces of 101 µs");
+}
+
+#[test]
+fn a_cut_off_command_is_owed_a_nack_after_25_ms() {
+    let mut station = StStation::new(Profile::Spec, StDrive::demo(Instant(0)));
+    station.receive(Instant(1000), &[0x02, 0x01], |_| panic!("nothing to answer yet"));
+    assert_eq!(station.deadline(), Some(Instant(26_000)));
+    let mut reply = Vec::new();
+    station.poll(Instant(26_000), |bytes| reply.extend_from_slice(bytes));
+    assert_eq!(reply, [0xFF, 0x01, 0x09, 0x0A]);
+}
+
+/// Time of one motor's second, for whoever wants to know:
+/// `cargo test -p motorlink-sim --release -- --ignored --nocapture seconds`.
+#[test]
+#[ignore = "prints times"]
+fn seconds_are_cheap() {
+    let mut drive = StDrive::demo(Instant(0));
+    let mut bus = RmdBus::demo(Instant(0));
+    let minute = Instant(60_000_000);
+    let start = std::time::Instant::now();
+    drive.advance_to(minute);
+    println!("an ST motor's second: {:?}", start.elapsed() / 120);
+    let start = std::time::Instant::now();
+    bus.advance_to(minute);
+    println!("an RMD motor's second: {:?}", start.elapsed() / 240);
+}
+
+#[cfg(feature = "serde")]
+#[test]
+fn a_configuration_names_what_differs_from_the_default() {
+    use motorlink_sim::st::MotorConfig;
+
+    let motor: MotorConfig =
+        toml::from_str("bus_voltage = 300\n[registers]\nspeed_kp = 5").unwrap();
+    assert_eq!((motor.bus_voltage, motor.registers.speed_kp), (300.0, 5));
+    assert_eq!(motor.rated_current, MotorConfig::default().rated_current);
+    assert!(toml::from_str::<MotorConfig>("bus_volts = 300").is_err());
+    let written = toml::to_string(&MotorConfig::servo()).unwrap();
+    assert_eq!(toml::from_str::<MotorConfig>(&written).unwrap(), MotorConfig::servo());
+    let rmd: RmdConfig = toml::from_str("id = 9\ngains = [1, 2, 3, 4, 5, 6]").unwrap();
+    assert_eq!((rmd.id, rmd.factory_rom().gains.torque_ki), (9, 6));
+    let written = toml::to_string(&rmd).unwrap();
+    assert_eq!(toml::from_str::<RmdConfig>(&written).unwrap(), rmd);
+}
