@@ -46,7 +46,9 @@ impl From<core::time::Duration> for Duration {
     /// Saturates beyond half a million years.
     fn from(span: core::time::Duration) -> Self {
         Duration(
-            span.as_secs().saturating_mul(1_000_000).saturating_add(u64::from(span.subsec_micros())),
+            span.as_secs()
+                .saturating_mul(1_000_000)
+                .saturating_add(u64::from(span.subsec_micros())),
         )
     }
 }

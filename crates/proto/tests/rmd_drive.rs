@@ -31,6 +31,11 @@ fn position(mode: Mode) -> i64 {
     target
 }
 
+/// A target of position command 1 or 2.
+fn turn_to(target: i64, max_speed: Option<SpeedLimit>) -> Mode {
+    Mode::Position { target, max_speed, within_max_angle: true }
+}
+
 #[test]
 fn gains_in_ram_are_lost_at_power_off_and_those_in_rom_stay() {
     let mut node = Node::new(1);
@@ -201,11 +206,19 @@ fn position_targets_are_counted_from_the_zero_point() {
     let mut node = Node::new(1);
     node.ask(WriteEncoderOffset(EncoderOffset { offset: 100 }));
     node.ask(Position { angle: CentiDegrees(-36_000) });
-    assert_eq!(node.motor.mode, Mode::Position { target: 100 - 16_384, max_speed: None });
+    assert_eq!(node.motor.mode, turn_to(100 - 16_384, None));
     let max_speed = SpeedLimit(0);
     node.ask(PositionLimited { angle: CentiDegrees(9_000), max_speed });
-    let limited = Mode::Position { target: 100 + 4_096, max_speed: Some(max_speed) };
+    let limited = turn_to(100 + 4_096, Some(max_speed));
     assert_eq!(node.motor.mode, limited, "a greatest speed of 0 is taken at its word");
+}
+
+#[test]
+fn a_target_stays_in_its_place_when_the_zero_moves() {
+    let mut node = Node::new(1);
+    node.ask(Position { angle: CentiDegrees(9_000) });
+    node.ask(WriteEncoderOffset(EncoderOffset { offset: 1_000 }));
+    assert_eq!(node.motor.mode, turn_to(4_096, None));
 }
 
 #[test]
@@ -231,7 +244,10 @@ fn the_same_single_turn_command_again_does_not_start_another_turn() {
     let CirclePosition { direction, angle } = command;
     let max_speed = SpeedLimit(7);
     node.ask(CirclePositionLimited { direction, max_speed, angle });
-    assert_eq!(node.motor.mode, Mode::Position { target: 4_096, max_speed: Some(max_speed) });
+    assert_eq!(
+        node.motor.mode,
+        Mode::Position { target: 4_096, max_speed: Some(max_speed), within_max_angle: false }
+    );
     node.ask(torque(0));
     node.ask(command);
     assert_eq!(position(node.motor.mode), 4_096 + 16_384, "after something else it is a new one");

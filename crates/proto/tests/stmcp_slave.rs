@@ -162,7 +162,10 @@ fn shipped_firmware_refuses_a_missing_feature_with_3_and_5() {
     let measured = RegisterId::FLUXWK_BUS_MEAS;
     assert_eq!(bench.ask(0, set(measured, &[1, 0])), Err(ErrorCode::SetReadOnly));
     assert_eq!(bench.ask(0, set(RegisterId::DAC_OUT1, &[0x27])), Ok(vec![]));
-    assert_eq!(bench.ask(0, Request::GetRegister(RegisterId::DAC_OUT1)), Err(ErrorCode::GetWriteOnly));
+    assert_eq!(
+        bench.ask(0, Request::GetRegister(RegisterId::DAC_OUT1)),
+        Err(ErrorCode::GetWriteOnly)
+    );
 }
 
 #[test]
@@ -316,7 +319,11 @@ fn a_data_segment_samples_its_registers_in_one_exchange() {
     assert_eq!(bench.ask(1, Request::DataElement(3)), Ok(expected.clone()));
     for unfit in [&[0x02, 0x99][..], &[0x41], &[0x5C], &[0x02; 33]] {
         assert_eq!(bench.ask(1, choose(unfit)), Err(ErrorCode::WrongSet), "{unfit:?}");
-        assert_eq!(bench.ask(1, Request::DataElement(3)), Ok(expected.clone()), "the old one stays");
+        assert_eq!(
+            bench.ask(1, Request::DataElement(3)),
+            Ok(expected.clone()),
+            "the old one stays"
+        );
     }
     assert_eq!(bench.ask(1, choose(&[0x1E; 32])), Ok(vec![]));
     assert_eq!(bench.ask(1, Request::DataElement(3)).map(|values| values.len()), Ok(128));

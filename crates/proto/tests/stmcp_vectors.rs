@@ -26,7 +26,9 @@ fn request<'a>(vector: &Value, bytes: &'a [u8]) -> Request<'a> {
     let fields = &vector["fields"];
     let int = |name: &str| fields[name].as_i64().unwrap_or_else(|| panic!("no {name}: {vector}"));
     match vector["code"].as_str().unwrap() {
-        "SET_REG" => Request::SetRegister { register: RegisterId(int("register") as u8), value: bytes },
+        "SET_REG" => {
+            Request::SetRegister { register: RegisterId(int("register") as u8), value: bytes }
+        }
         "GET_REG" => Request::GetRegister(RegisterId(int("register") as u8)),
         "EXECUTE_CMD" => Request::Execute(Command::from(int("command") as u8)),
         "GET_BOARD_INFO" => Request::BoardInfo,
@@ -148,7 +150,10 @@ fn every_code_register_size_and_error_has_a_vector() {
     }
     let answers: Vec<&Value> = vectors.iter().filter_map(|vector| vector.get("answer")).collect();
     for code in &ErrorCode::ALL[1..] {
-        assert!(answers.iter().any(|answer| answer["error_name"] == code.name().unwrap()), "{code}");
+        assert!(
+            answers.iter().any(|answer| answer["error_name"] == code.name().unwrap()),
+            "{code}"
+        );
     }
     for command in Command::ALL {
         let name = command.name().unwrap();

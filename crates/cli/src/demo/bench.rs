@@ -4,6 +4,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
+use std::slice::from_ref;
 use std::sync::Mutex;
 use std::thread::JoinHandle;
 
@@ -73,7 +74,7 @@ impl Drives {
 fn serve([st, rmd]: &[String; 2], stream: &UnixStream) -> Result<(), Failure> {
     let mut bench = Bench::new();
     let mut out = stream;
-    sim::serve(&mut bench, &BenchConfig::default(), &[st.clone()], &[rmd.clone()], &mut out)?;
+    sim::serve(&mut bench, &BenchConfig::default(), from_ref(st), from_ref(rmd), &mut out)?;
     sim::obey(&mut bench, stream, &mut out, true)
 }
 

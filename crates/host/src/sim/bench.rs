@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use motorlink_proto::rmd::{CanFrame, Errors, MotorId};
 use motorlink_proto::stmcp::{Flags, Motor};
-use motorlink_proto::time::{self, Instant};
+use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::{RmdBus, RmdNode};
 use motorlink_sim::st::{StMotor, StStation};
 use serde_json::{Value, json};
@@ -245,8 +245,6 @@ fn st(station: &mut Station, now: Instant, command: &Command) -> Result<(), Stri
 }
 
 fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), String> {
-    /// Long enough for a motor to notice a fault.
-    const MOMENT: time::Duration = time::Duration::from_millis(1);
     bus.advance_to(now);
     let ids: Vec<MotorId> = bus.nodes().iter().map(RmdNode::id).collect();
     match command {
@@ -278,11 +276,11 @@ fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), String> {
                     ));
                 }
             };
-            let held = if *hold == Some(false) { Errors::NONE } else { errors };
-            rmd_node(bus, *motor)?.motor_mut().hold_faults(held);
-            if hold.is_none() {
-                bus.advance_to(now + MOMENT);
-                rmd_node(bus, *motor)?.motor_mut().hold_faults(Errors::NONE);
+            let motor = rmd_node(bus, *motor)?.motor_mut();
+            match hold {
+                None => motor.inject(errors),
+                Some(true) => motor.hold_faults(errors),
+                Some(false) => motor.hold_faults(Errors::NONE),
             }
         }
         Command::State { .. } => {}

@@ -45,6 +45,8 @@ pub enum Mode {
         target: i64,
         /// Greatest speed on the way; `None` leaves it to the drive's own.
         max_speed: Option<SpeedLimit>,
+        /// Whether the drive's Max Angle holds: for commands 1 and 2, not for 3 and 4.
+        within_max_angle: bool,
     },
 }
 
@@ -327,7 +329,7 @@ impl Drive {
             Code::Speed => (Mode::Speed(Speed::decode(data).speed), None),
             Code::Position | Code::PositionLimited => {
                 let target = self.counts(Position::decode(data).angle);
-                (Mode::Position { target, max_speed }, None)
+                (Mode::Position { target, max_speed, within_max_angle: true }, None)
             }
             _ => {
                 let command = CirclePosition::decode(data);
@@ -336,7 +338,7 @@ impl Drive {
                     Mode::Position { target, .. } if self.circle == Some(command) => target,
                     _ => self.circle_target(command, sense)?,
                 };
-                (Mode::Position { target, max_speed }, Some(command))
+                (Mode::Position { target, max_speed, within_max_angle: false }, Some(command))
             }
         })
     }

@@ -1,7 +1,9 @@
 //! What a drive is to the protocol.
 
-use super::{Command, CurrentReference, ErrorCode, Features, PositionMove, Ramp, RegisterId,
-            RevupPhase, TorqueRamp};
+use super::{
+    Command, CurrentReference, ErrorCode, Features, PositionMove, Ramp, RegisterId, RevupPhase,
+    TorqueRamp,
+};
 
 /// A motor of the drive: 1 is the first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

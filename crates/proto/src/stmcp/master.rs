@@ -39,11 +39,7 @@ pub struct Config {
 impl Default for Config {
     /// The document's 1 s, `Drain`, 50 ms of silence.
     fn default() -> Self {
-        Config {
-            timeout: TIMEOUT,
-            recovery: Recovery::default(),
-            quiet: Duration::from_millis(50),
-        }
+        Config { timeout: TIMEOUT, recovery: Recovery::default(), quiet: Duration::from_millis(50) }
     }
 }
 
@@ -164,14 +160,23 @@ enum State {
     /// Recovery: silence is to begin.
     Settle(Then),
     /// Recovery: silent until `until`, or noise at `limit`.
-    Quiet { until: Instant, limit: Instant, silence: Duration, then: Then },
+    Quiet {
+        until: Instant,
+        limit: Instant,
+        silence: Duration,
+        then: Then,
+    },
     /// Recovery: the question has been sent.
     Probed,
     /// Recovery: the answer is awaited.
-    Answer { deadline: Instant },
+    Answer {
+        deadline: Instant,
+    },
     Send,
     Sent,
-    Waiting { deadline: Instant },
+    Waiting {
+        deadline: Instant,
+    },
     Done(Result<u8, Error>),
 }
 
@@ -297,7 +302,7 @@ impl Master {
             }
             State::Settle(then) => {
                 self.settle(now, self.config.quiet, then);
-                self.poll(now)
+                Output::Wait(Some(now + self.config.quiet))
             }
             State::Quiet { until, limit, .. } if now < until && now < limit => {
                 Output::Wait(Some(until.min(limit)))
@@ -374,8 +379,10 @@ impl Master {
     /// The question whose answer shows that the drive is in step again: one that is not
     /// outstanding, if there is one.
     fn probe(&mut self) -> &[u8] {
-        self.question = if self.outstanding & INFO == 0 || self.question != INFO { INFO } else { REVUP };
-        let request = if self.question == INFO { Request::BoardInfo } else { Request::RevupData(0) };
+        self.question =
+            if self.outstanding & INFO == 0 || self.question != INFO { INFO } else { REVUP };
+        let request =
+            if self.question == INFO { Request::BoardInfo } else { Request::RevupData(0) };
         self.scan = Scan::NONE;
         request.encode(0, &mut self.probe).unwrap_or(&[])
     }
@@ -418,7 +425,9 @@ impl Master {
         let received = self.buffer.get(..usize::from(self.filled))?;
         let header = *received.first()?;
         let failure = match Frame::parse(received) {
-            _ if !matches!(header, HEADER_ACK | HEADER_NACK | HEADER_ATR) => Failure::Header(header),
+            _ if !matches!(header, HEADER_ACK | HEADER_NACK | HEADER_ATR) => {
+                Failure::Header(header)
+            }
             Parse::More => return None,
             Parse::Bad(bad) => Failure::Damaged(bad),
             Parse::Frame(frame, size) => {
@@ -430,7 +439,11 @@ impl Master {
                 let rest = self.filled.saturating_sub(size as u8);
                 if header == HEADER_ATR {
                     self.counters.identifications = self.counters.identifications.wrapping_add(1);
-                    self.buffer.rotate_left(size);
+                    let mut rest_first = [0; MAX_FRAME];
+                    for (slot, byte) in rest_first.iter_mut().zip(self.buffer.iter().skip(size)) {
+                        *slot = *byte;
+                    }
+                    self.buffer = rest_first;
                     self.filled = rest;
                     return Some(None);
                 }

@@ -1,6 +1,8 @@
 //! Messages: what a frame's payload says (chapter 4), both ways.
 
-use super::{Command, ErrorCode, Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Version, frame};
+use super::{
+    Command, ErrorCode, Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Version, frame,
+};
 
 /// Phases of the rev-up (4.10).
 pub const REVUP_PHASES: u8 = 5;
@@ -125,9 +127,9 @@ impl<'a> Request<'a> {
             Request::GetRegister(register) => payload.byte(register.0),
             Request::Execute(command) => payload.byte(command.into()),
             Request::BoardInfo | Request::FirmwareVersion => &mut payload,
-            Request::Ramp(ramp) => payload
-                .bytes(&ramp.speed_rpm.to_le_bytes())
-                .bytes(&ramp.duration_ms.to_le_bytes()),
+            Request::Ramp(ramp) => {
+                payload.bytes(&ramp.speed_rpm.to_le_bytes()).bytes(&ramp.duration_ms.to_le_bytes())
+            }
             Request::TorqueRamp(ramp) => payload
                 .bytes(&ramp.torque_s16a.to_le_bytes())
                 .bytes(&ramp.duration_ms.to_le_bytes()),

@@ -17,15 +17,17 @@ pub mod register;
 mod slave;
 
 pub use code::{
-    Command, ControlMode, ErrorCode, Flags, FrameCode, Profile, Status, HEADER_ACK, HEADER_ATR,
-    HEADER_NACK,
+    Command, ControlMode, ErrorCode, Flags, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
+    Profile, Status,
 };
 pub use drive::{Drive, Motor, Version};
-pub use frame::{Bad, Frame, Parse, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, checksum};
-pub use master::{Config, Counters, Error, Failure, Line, Master, Output, Recovery, RequestError, TIMEOUT};
+pub use frame::{Bad, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
+pub use master::{
+    Config, Counters, Error, Failure, Line, Master, Output, Recovery, RequestError, TIMEOUT,
+};
 pub use message::{
     BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, Request,
     RevupPhase, TorqueRamp,
 };
 pub use register::{Feature, Features, RegisterId};
-pub use slave::{RECEPTION_TIMEOUT, SEGMENTS, SEGMENT_REGISTERS, Slave};
+pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};

@@ -285,10 +285,7 @@ impl Shape {
         let bits = ty.size() * 8;
         let (mcsdk_get, mcsdk_set) = match mcsdk {
             Some(bits) => bits,
-            None => (
-                if access.reads() { bits } else { 0 },
-                if access.writes() { bits } else { 0 },
-            ),
+            None => (if access.reads() { bits } else { 0 }, if access.writes() { bits } else { 0 }),
         };
         Shape { ty, unit, access, feature, origin, mcsdk_get, mcsdk_set }
     }
@@ -487,8 +484,12 @@ macro_rules! registers {
 }
 
 macro_rules! optional_pair {
-    () => { None };
-    ($get:expr, $set:expr) => { Some(($get, $set)) };
+    () => {
+        None
+    };
+    ($get:expr, $set:expr) => {
+        Some(($get, $set))
+    };
 }
 
 #[path = "register_table.rs"]

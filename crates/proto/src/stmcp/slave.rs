@@ -193,7 +193,9 @@ impl Slave {
             Request::ConfigDynStruct { segment, registers } => {
                 let slot = self.segments.get_mut(usize::from(segment));
                 let fits = |&id: &u8| {
-                    RegisterId(id).shape().is_some_and(|shape| shape.segment_size(features).is_some())
+                    RegisterId(id)
+                        .shape()
+                        .is_some_and(|shape| shape.segment_size(features).is_some())
                 };
                 let chosen = Segment::of(registers).filter(|_| registers.iter().all(fits));
                 *slot.ok_or(ErrorCode::WrongSet)? = chosen.ok_or(ErrorCode::WrongSet)?;

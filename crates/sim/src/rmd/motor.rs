@@ -182,10 +182,11 @@ impl RmdMotor {
             Mode::Speed(speed) => {
                 reach(machine::within(speed.dps() as f32 * DEGREE, -reachable, reachable))
             }
-            Mode::Position { target, max_speed } => {
+            Mode::Position { target, max_speed, within_max_angle } => {
                 let own = limit(self.config.max_speed_dps);
                 let most_dps = max_speed.map(|limit| limit.dps() as f32).or(own);
-                let counts = self.within_max_angle(target).wrapping_sub(self.encoder());
+                let target = if within_max_angle { self.within_max_angle(target) } else { target };
+                let counts = target.wrapping_sub(self.encoder());
                 Task::Speed(Speed::Close {
                     distance: machine::radians(counts << self.unused_bits()),
                     top: most_dps.map_or(reachable, |dps| reachable.min(dps * DEGREE)),

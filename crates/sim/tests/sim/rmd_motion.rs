@@ -116,6 +116,10 @@ fn the_drives_own_limits_hold_a_position_command() {
     bench.ask(position(-1000.0));
     bench.wait(3000);
     assert!((bench.angle() + 180.0).abs() < 0.1, "{}°", bench.angle());
+    let (direction, angle) = (Spin::Counterclockwise, CircleAngle::from_degrees(90.0));
+    bench.ask(CirclePosition { direction, angle });
+    bench.wait(3000);
+    assert!((bench.angle() + 270.0).abs() < 0.1, "Max Angle is not for single-turn commands");
 }
 
 #[test]
