@@ -141,22 +141,21 @@ impl<'a> Story<'a> {
     }
 
     fn position(&mut self) -> Result<(), Failure> {
-        self.screen.say("RMD motor 1 turns to 90°, no faster than 300 °/s; the others switch off.");
+        self.screen
+            .say("RMD motor 1 turns to 810°, no faster than 500 °/s; the others switch off.");
         let motor = self.bus.motor(1)?;
         for id in 2..=4 {
             self.bus.motor(id)?.off()?;
         }
         motor.stop()?;
-        let turns = (motor.multi_turn_angle()?.degrees() / 360.0).round();
-        let target = turns * 360.0 + 90.0;
-        motor.move_to(CentiDegrees::from_degrees(target), Some(SpeedLimit(300)))?;
+        let target = CentiDegrees::from_degrees(810.0);
+        motor.move_to(target, Some(SpeedLimit(500)))?;
         let mut reached = 0.0;
-        self.until("RMD motor 1 reaches 90°", |_| {
+        self.until("RMD motor 1 reaches 810°", |_| {
             reached = motor.multi_turn_angle()?.degrees();
-            Ok((reached - target).abs() < 0.2)
+            Ok((reached - target.degrees()).abs() < 0.05 && motor.status2()?.speed.0 == 0)
         })?;
-        self.done
-            .push(format!("an RMD motor went to {:.2}° and stayed there", reached - turns * 360.0));
+        self.done.push(format!("an RMD motor went to {reached:.2}° and stayed there"));
         Ok(())
     }
 

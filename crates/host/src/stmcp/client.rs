@@ -191,6 +191,18 @@ impl Client {
         Ok(reply)
     }
 
+    /// Sends STOP_MOTOR without waiting for an answer: what is left when the drive's replies do not
+    /// come. Any other request would wait until the line has recovered.
+    pub fn stop_unheard(&self, motor: Motor) -> Result<(), Error> {
+        let mut frame = [0; MAX_FRAME];
+        let stop = Request::Execute(Command::StopMotor);
+        let frame = stop.encode(motor.number(), &mut frame).unwrap_or(&[]);
+        let mut inner = self.lock();
+        inner.master.lost();
+        inner.port.link()?.0.write(frame)?;
+        Ok(())
+    }
+
     /// A poisoned lock is taken all the same: an exchange that panicked left the master in a state
     /// that its next request deals with.
     fn lock(&self) -> MutexGuard<'_, Inner> {

@@ -4,7 +4,8 @@ use motorlink_proto::stmcp::Motor;
 
 use super::{Client, Error};
 
-/// How often a guard tries to stop a motor before it gives up.
+/// How often a guard tries to stop a motor before it gives up. Where the drive does not answer, it
+/// may still hear.
 const ATTEMPTS: u32 = 3;
 
 /// Stops the motors that a [`Client`] started when it is dropped: at the end of a scope, on an
@@ -48,7 +49,11 @@ impl Drop for Guard<'_> {
         }
         for motor in self.client.started() {
             let stop = || self.client.motor(motor.number())?.stop();
-            let result = (1..ATTEMPTS).fold(stop(), |result, _| result.or_else(|_| stop()));
+            let again = |_| {
+                self.client.stop_unheard(motor)?;
+                stop()
+            };
+            let result = (1..ATTEMPTS).fold(stop(), |result, _| result.or_else(again));
             (self.report)(&Stopped { motor, result });
         }
     }

@@ -275,9 +275,14 @@ impl Master {
     /// Gives up the exchange under way. Its reply may still come, so the line is lost.
     pub fn abandon(&mut self) {
         if self.state != State::Idle {
-            self.lose();
-            self.state = State::Idle;
+            self.lost();
         }
+    }
+
+    /// Tells that the line is out of step: something was sent or received beside the master.
+    pub fn lost(&mut self) {
+        self.lose();
+        self.state = State::Idle;
     }
 
     /// Tells that the line was closed and opened again, with nothing left in it from before.

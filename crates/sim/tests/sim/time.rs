@@ -85,22 +85,6 @@ fn a_cut_off_command_is_owed_a_nack_after_25_ms() {
     assert_eq!(reply, [0xFF, 0x01, 0x09, 0x0A]);
 }
 
-/// Time of one motor's second, for whoever wants to know:
-/// `cargo test -p motorlink-sim --release -- --ignored --nocapture seconds`.
-#[test]
-#[ignore = "prints times"]
-fn seconds_are_cheap() {
-    let mut drive = StDrive::demo(Instant(0));
-    let mut bus = RmdBus::demo(Instant(0));
-    let minute = Instant(60_000_000);
-    let start = std::time::Instant::now();
-    drive.advance_to(minute);
-    println!("an ST motor's second: {:?}", start.elapsed() / 120);
-    let start = std::time::Instant::now();
-    bus.advance_to(minute);
-    println!("an RMD motor's second: {:?}", start.elapsed() / 240);
-}
-
 #[cfg(feature = "serde")]
 #[test]
 fn a_configuration_names_what_differs_from_the_default() {

@@ -1,0 +1,54 @@
+# make demo   simulated drives, driven through real ports
+# make test   everything that is tested, with what it needs installed first
+# make bench  ratios and instruction counts, as in docs/BENCHMARKS.md
+
+CARGO ?= cargo
+PYTHON ?= python3
+VENV := .venv
+TARGET := thumbv7em-none-eabihf
+SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
+
+.PHONY: demo test lint unit probe e2e bench fmt clean
+
+demo:
+	$(CARGO) run --quiet --release --locked -p motorlink-cli -- demo
+
+test: lint unit probe e2e
+
+lint:
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked --quiet
+
+unit:
+	$(CARGO) test --workspace --all-features --locked
+
+# Both protocols link for a Cortex-M4 without a path that panics, within their RAM.
+probe:
+	rustup target list --installed | grep -qx $(TARGET) || rustup target add $(TARGET)
+	cd probe && $(CARGO) build --release --locked
+	$(CARGO) build -p motorlink-proto -p motorlink-sim --target $(TARGET) --locked
+
+# The built program against independent clients on ptys and loopback.
+e2e: $(VENV)/ready
+	$(CARGO) build -p motorlink-cli --locked
+	MOTORLINK_BIN=$$PWD/target/debug/motorlink $(VENV)/bin/python -m pytest -q tests/e2e
+
+bench:
+	command -v valgrind >/dev/null || $(SUDO) apt-get install -y --no-install-recommends valgrind || \
+		echo "valgrind cannot be installed: instructions are not counted"
+	$(CARGO) run --release --locked -p motorlink-bench -- all
+
+fmt:
+	$(CARGO) fmt --all
+
+clean:
+	$(CARGO) clean
+	rm -rf $(VENV) probe/target
+
+$(VENV)/ready: tests/e2e/requirements.txt
+	$(PYTHON) -m venv $(VENV) || { \
+		$(SUDO) apt-get update && $(SUDO) apt-get install -y --no-install-recommends python3-venv && \
+		$(PYTHON) -m venv $(VENV); }
+	$(VENV)/bin/python -m pip install --quiet -r $<
+	touch $@

@@ -1,0 +1,50 @@
+//! Exchanges and cycles allocate nothing, counted on real ports.
+
+mod served;
+
+use std::time::Duration;
+
+use allocation_counter::measure;
+use motorlink::rmd::{self, Bus, MotorId, MotorSet, Torque4};
+use motorlink::stmcp::{self, Client, RegisterId, register};
+use served::Served;
+
+#[test]
+fn an_exchange_with_an_st_drive_allocates_nothing() {
+    let drives = Served::new("alloc-stmcp");
+    let client = Client::open(&drives.st.parse().unwrap(), stmcp::Options::default()).unwrap();
+    let motor = client.motor(1).unwrap();
+    let segment = [RegisterId::STATUS, RegisterId::SPEED_MEAS, RegisterId::I_Q];
+    motor.configure_segment(0, &segment).unwrap();
+    let counted = measure(|| {
+        for n in 0..100 {
+            motor.read(register::SPEED_MEAS).unwrap();
+            motor.write(register::SPEED_KP, n).unwrap();
+            motor.ramp(1000, 10).unwrap();
+            let mut values = [0; 3];
+            motor.read_segment(0, &segment, &mut values).unwrap();
+        }
+    });
+    assert_eq!(counted.count_total, 0);
+}
+
+#[test]
+fn exchanges_and_cycles_on_a_bus_allocate_nothing() {
+    let drives = Served::new("alloc-rmd");
+    let options = rmd::Options { timeout: Duration::from_secs(2), ..rmd::Options::default() };
+    let bus = Bus::open(&drives.rmd.parse().unwrap(), options).unwrap();
+    let motor = bus.motor(1).unwrap();
+    let all: MotorSet = (1..=4).filter_map(MotorId::new).collect();
+    let status = [1, 2, 3, 4].map(|id| (MotorId::new(id).unwrap(), [0x9C, 0, 0, 0, 0, 0, 0, 0]));
+    let mut answered = 0;
+    let counted = measure(|| {
+        for _ in 0..100 {
+            motor.status2().unwrap();
+            bus.cycle(&status, |_, reply| answered += u32::from(reply.is_ok())).unwrap();
+            for reply in bus.torque4(Torque4::default(), all).unwrap().into_iter().flatten() {
+                reply.unwrap();
+            }
+        }
+    });
+    assert_eq!((counted.count_total, answered), (0, 400));
+}

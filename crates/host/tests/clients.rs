@@ -1,0 +1,200 @@
+//! What the blocking clients promise: stop on drop, limits, loss and return of the line, threads.
+
+mod served;
+
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::time::{Duration, Instant};
+
+use motorlink::port::{FdLink, PortError};
+use motorlink::rmd::{self, Bus, CentiDps, Code, MotorId, OnDrop, SpeedLimit, TorqueCommand};
+use motorlink::stmcp::{self, Client, Config, Failure, Limits, Line, Status, register};
+use motorlink::{BackOff, LinkState};
+use served::Served;
+
+fn until(what: &str, mut reached: impl FnMut() -> bool) {
+    let give_up = Instant::now() + Duration::from_secs(20);
+    while !reached() {
+        assert!(Instant::now() < give_up, "{what}");
+        std::thread::yield_now();
+    }
+}
+
+fn open_st(drives: &Served) -> Client {
+    Client::open(&drives.st.parse().unwrap(), stmcp::Options::default()).unwrap()
+}
+
+/// A loaded machine may hold the simulator up for longer than a motor would take.
+fn patient() -> rmd::Options {
+    rmd::Options { timeout: Duration::from_secs(5), ..rmd::Options::default() }
+}
+
+#[test]
+fn a_guard_stops_the_motors_that_its_client_started_even_in_a_panic() {
+    let drives = Served::new("guard-st");
+    let client = open_st(&drives);
+    let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+        let _guard = client.guard();
+        client.motor(1).unwrap().start().unwrap();
+        let motor = client.motor(2).unwrap();
+        motor.start().unwrap();
+        motor.stop().unwrap();
+        panic!("the program fails");
+    }));
+    assert!(panicked.is_err());
+    assert_eq!(client.started().count(), 0);
+    until("motor 1 comes to rest", || client.motor(1).unwrap().status().unwrap() == Status::Idle);
+}
+
+#[test]
+fn a_disarmed_guard_leaves_the_motor_running() {
+    let drives = Served::new("guard-disarmed");
+    let client = open_st(&drives);
+    let guard = client.guard();
+    let motor = client.motor(1).unwrap();
+    motor.start().unwrap();
+    guard.disarm();
+    until("the motor runs", || motor.status().unwrap() == Status::Run);
+}
+
+#[test]
+fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
+    let (ours, theirs) = UnixStream::pair().unwrap();
+    let line = Config { timeout: Duration::from_millis(100).into(), ..Config::default() };
+    let options = stmcp::Options { line, ..stmcp::Options::default() };
+    let client = Client::over("pair", Box::new(FdLink::new(ours, "pair").unwrap()), options);
+    let mut start = [0; 4];
+    let drive = std::thread::spawn(move || {
+        (&theirs).read_exact(&mut start).unwrap();
+        (&theirs).write_all(&[0xF0, 0x00, 0xF0]).unwrap();
+        let mut heard = Vec::new();
+        let _ = (&theirs).read_to_end(&mut heard);
+        heard
+    });
+    client.motor(1).unwrap().start().unwrap();
+    drop(client.guard());
+    drop(client);
+    let stops = drive.join().unwrap().windows(4).filter(|w| *w == [0x23, 0x01, 0x02, 0x26]).count();
+    assert!(stops >= 2, "{stops}");
+}
+
+#[test]
+fn a_guard_switches_off_what_a_bus_was_used_to_move() {
+    let drives = Served::new("guard-rmd");
+    let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
+    {
+        let _guard = bus.guard().with(OnDrop::Stop);
+        bus.motor(1).unwrap().speed(CentiDps(36_000)).unwrap();
+        bus.motor(2).unwrap().torque(TorqueCommand(50)).unwrap();
+        bus.motor(2).unwrap().off().unwrap();
+        assert!(bus.moving().map(MotorId::number).eq([1]));
+    }
+    assert!(bus.moving().is_empty());
+    until("motor 1 stands", || bus.motor(1).unwrap().status2().unwrap().speed.0 == 0);
+}
+
+#[test]
+fn limits_hold_for_typed_and_raw_requests() {
+    let drives = Served::new("limits");
+    let limits = Limits { speed_rpm: Some(1000), current_s16a: Some(2000) };
+    let options = stmcp::Options { limits, ..stmcp::Options::default() };
+    let client = Client::open(&drives.st.parse().unwrap(), options).unwrap();
+    let motor = client.motor(1).unwrap();
+    motor.ramp(1000, 0).unwrap();
+    let refused = |result: Result<(), stmcp::Error>| matches!(result, Err(stmcp::Error::Limit(_)));
+    assert!(refused(motor.ramp(-1001, 0)));
+    assert!(refused(motor.write(register::TORQUE_REF, 2001)));
+    assert!(refused(client.raw(1, 0x07, &[0xE9, 3, 0, 0, 0, 0]).map(drop)));
+
+    let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
+    let id = MotorId::new(1).unwrap();
+    bus.set_limits(id, rmd::Limits { speed: Some(SpeedLimit(100)), ..rmd::Limits::default() });
+    assert!(matches!(bus.motor(1).unwrap().speed(CentiDps(10_001)), Err(rmd::Error::Limit { .. })));
+    assert!(matches!(bus.raw(id, [0xA2, 0, 0, 0, 0, 0, 0, 1]), Err(rmd::Error::Limit { .. })));
+    bus.motor(1).unwrap().speed(CentiDps(10_000)).unwrap();
+    assert!(matches!(bus.motor(33), Err(rmd::Error::NoSuchMotor(33))));
+}
+
+#[test]
+fn a_port_that_goes_away_is_told_and_opened_again() {
+    let drives = Served::new("away");
+    let back_off = BackOff { first: Duration::from_millis(10), cap: Duration::from_millis(50) };
+    let options = stmcp::Options { back_off, ..stmcp::Options::default() };
+    let client = Client::open(&drives.st.parse().unwrap(), options).unwrap();
+    let motor = client.motor(1).unwrap();
+    motor.status().unwrap();
+    drop(drives);
+    let lost = motor.status().unwrap_err();
+    assert!(lost.is_line_failure(), "{lost}");
+    assert!(matches!(client.link_state(), LinkState::Closed { .. }));
+    assert!(motor.status().is_err(), "nobody serves it");
+    let _drives = Served::new("away");
+    until("the drive is back", || motor.status().is_ok());
+    assert_eq!((client.link_state(), client.line()), (LinkState::Open, Line::Up));
+}
+
+#[test]
+fn a_link_that_was_handed_in_is_not_opened_again() {
+    let (ours, theirs) = UnixStream::pair().unwrap();
+    let client = Client::over(
+        "pair",
+        Box::new(FdLink::new(ours, "pair").unwrap()),
+        stmcp::Options::default(),
+    );
+    drop(theirs);
+    for _ in 0..2 {
+        let closed = client.info().unwrap_err();
+        assert!(matches!(closed, stmcp::Error::Port(PortError::Closed { .. })), "{closed}");
+    }
+}
+
+#[test]
+fn a_silent_drive_is_a_failure_and_no_refusal() {
+    let (ours, _theirs) = UnixStream::pair().unwrap();
+    let line = Config { timeout: Duration::from_millis(20).into(), ..Config::default() };
+    let options = stmcp::Options { line, ..stmcp::Options::default() };
+    let client = Client::over("pair", Box::new(FdLink::new(ours, "pair").unwrap()), options);
+    let silent = client.info().unwrap_err();
+    assert!(matches!(silent, stmcp::Error::Failed { failure: Failure::Timeout, .. }), "{silent}");
+    let lost = client.info().unwrap_err();
+    assert!(matches!(lost, stmcp::Error::Failed { failure: Failure::Lost, .. }), "{lost}");
+}
+
+#[test]
+fn a_motor_that_is_not_there_is_told_with_what_it_was_asked() {
+    let drives = Served::new("silent-rmd");
+    let options = rmd::Options { timeout: Duration::from_millis(30), ..rmd::Options::default() };
+    let bus = Bus::open(&drives.rmd.parse().unwrap(), options).unwrap();
+    let error = bus.motor(9).unwrap().status1().unwrap_err();
+    assert!(matches!(error, rmd::Error::Timeout { code: Code::ReadStatus1, .. }), "{error}");
+    // The motor is in quarantine now; the next request waits for its end.
+    assert!(matches!(bus.motor(9).unwrap().status1(), Err(rmd::Error::Timeout { .. })));
+}
+
+#[test]
+fn threads_share_a_client_and_get_their_own_answers() {
+    let drives = Served::new("threads");
+    let client = open_st(&drives);
+    let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
+    std::thread::scope(|scope| {
+        for n in 0..8u8 {
+            let (client, bus) = (&client, &bus);
+            scope.spawn(move || {
+                let motor = client.motor(1 + n % 2).unwrap();
+                let numerators = [
+                    register::SPEED_KP,
+                    register::SPEED_KI,
+                    register::TORQUE_KP,
+                    register::TORQUE_KI,
+                ];
+                let own = numerators[usize::from(n / 2)];
+                for k in 0..50 {
+                    motor.write(own, k * 8 + i16::from(n)).unwrap();
+                    assert_eq!(motor.read(own).unwrap(), k * 8 + i16::from(n));
+                    let angle = bus.motor(1 + n % 4).unwrap().multi_turn_angle().unwrap();
+                    assert_eq!(angle.0, 0, "nothing moves");
+                }
+            });
+        }
+    });
+}
