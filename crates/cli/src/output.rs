@@ -30,7 +30,13 @@ impl Output {
         }
         let width = rows.iter().map(|(name, ..)| name.chars().count()).max().unwrap_or(0);
         for (name, text, _) in rows {
-            line(&format!("{:<width$}  {text}", name.replace('_', " ")))?;
+            // Registers keep the document's names.
+            let name = if name.starts_with(char::is_uppercase) {
+                (*name).to_owned()
+            } else {
+                name.replace('_', " ")
+            };
+            line(&format!("{name:<width$}  {text}"))?;
         }
         Ok(())
     }

@@ -43,11 +43,10 @@ pub fn run(args: Args) -> Result<(), Failure> {
     });
     let mut screen = Screen::new(args.plain);
     screen.title(&[
-        "Two ST motors on a serial line and four RMD motors on a CAN bus, simulated.",
-        &format!(
-            "This program talks to them through {} and {}, as to real drives.",
-            drives.st, drives.rmd
-        ),
+        "Two ST motors on a serial line and four RMD motors on a CAN bus, all simulated.",
+        "This program talks to them as to real drives, through these ports:",
+        &format!("  {}", drives.st),
+        &format!("  {}", drives.rmd),
     ]);
     let mut story = Story::new(&drives, &st, &bus, &mut screen);
     let told = story.tell();

@@ -236,19 +236,25 @@ impl FromStr for ServeName {
     }
 }
 
+/// As it would be written: options that have their default are left out.
 impl fmt::Display for PortName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             PortName::Line(line) => line.fmt(f),
             PortName::Slcan { line, bitrate, echo } => {
-                let bitrate = bitrate.bits_per_second();
+                let mut options = Vec::new();
+                if *bitrate != Bitrate::DEFAULT {
+                    options.push(format!("bitrate={}", bitrate.bits_per_second()));
+                }
                 match line {
                     LineName::Serial { path, baud } => {
-                        write!(f, "slcan:{}?bitrate={bitrate}&baud={baud}", path.display())?;
+                        write!(f, "slcan:{}", path.display())?;
+                        options.extend(baud_option(*baud));
                     }
-                    LineName::Tcp { .. } => write!(f, "slcan:{line}?bitrate={bitrate}")?,
+                    LineName::Tcp { .. } => write!(f, "slcan:{line}")?,
                 }
-                f.write_str(if *echo { "&echo=1" } else { "" })
+                options.extend(echo.then(|| "echo=1".to_owned()));
+                write_options(f, &options)
             }
             PortName::SocketCan(interface) => write!(f, "socketcan:{interface}"),
             PortName::Sim(None) => f.write_str("sim:"),
@@ -260,10 +266,24 @@ impl fmt::Display for PortName {
 impl fmt::Display for LineName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            LineName::Serial { path, baud } => write!(f, "serial:{}?baud={baud}", path.display()),
+            LineName::Serial { path, baud } => {
+                write!(f, "serial:{}", path.display())?;
+                write_options(f, &Vec::from_iter(baud_option(*baud)))
+            }
             LineName::Tcp { host, port } => write!(f, "tcp:{host}:{port}"),
         }
     }
+}
+
+fn baud_option(baud: u32) -> Option<String> {
+    (baud != DEFAULT_BAUD).then(|| format!("baud={baud}"))
+}
+
+fn write_options(f: &mut fmt::Formatter<'_>, options: &[String]) -> fmt::Result {
+    if options.is_empty() {
+        return Ok(());
+    }
+    write!(f, "?{}", options.join("&"))
 }
 
 impl fmt::Display for ServeName {

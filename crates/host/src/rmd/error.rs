@@ -13,8 +13,9 @@ use crate::port::PortError;
 pub enum Error {
     /// No reply in time; it is not known whether the motor did what was asked.
     #[error(
-        "{port}: motor {id} does not answer {code}; is it powered, is its ID right and the bitrate \
-         1 Mbit/s? `motorlink rmd scan` lists the motors that answer"
+        "{port}: motor {id} does not answer {:#04x} ({code}); is it powered, is its ID right and the \
+         bitrate 1 Mbit/s? `motorlink rmd scan` lists the motors that answer",
+        u8::from(*code)
     )]
     Timeout {
         /// The port.

@@ -4,7 +4,7 @@ use motorlink_proto::rmd::{Command as _, Position, ReadEncoder, ReadStatus2, Rea
 use motorlink_proto::stmcp::{Command, Profile, RegisterId, Request};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{CentiDegrees, CentiDps};
-use motorlink_sim::rmd::{RmdBus, RmdConfig};
+use motorlink_sim::rmd::RmdConfig;
 use motorlink_sim::st::{StDrive, StStation};
 
 use crate::rmd_bench::Bench;
