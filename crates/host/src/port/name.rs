@@ -14,7 +14,7 @@ pub const DEFAULT_BAUD: u32 = 115_200;
 /// ```
 /// use motorlink::port::PortName;
 /// let port: PortName = "/dev/ttyACM0".parse()?;
-/// assert_eq!(port.to_string(), "serial:/dev/ttyACM0?baud=115200");
+/// assert_eq!(port.to_string(), "serial:/dev/ttyACM0");
 /// # Ok::<(), motorlink::port::NameError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
