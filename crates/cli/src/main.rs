@@ -1,5 +1,6 @@
 //! `motorlink`: command, watch and simulate motor drives from the shell.
 
+mod connection;
 mod demo;
 mod failure;
 mod help;

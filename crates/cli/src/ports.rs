@@ -1,7 +1,6 @@
 //! `motorlink ports`
 
 use motorlink::list::{self, PortInfo, PortKind};
-use motorlink::port::PortName;
 use serde_json::json;
 
 use crate::failure::Failure;
@@ -58,16 +57,4 @@ fn object(port: &PortInfo) -> serde_json::Value {
         "stable_path": port.stable_path,
         "problem": port.problem,
     })
-}
-
-/// The port that -p or MOTORLINK_PORT names.
-pub fn named(name: Option<&str>) -> Result<PortName, Failure> {
-    match name {
-        Some(name) => Ok(name.parse()?),
-        None => Err(Failure::Usage(
-            "which port? give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is \
-             connected, and `-p sim:` needs no hardware"
-                .to_owned(),
-        )),
-    }
 }

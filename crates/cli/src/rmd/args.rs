@@ -1,25 +1,23 @@
 //! What `motorlink rmd` takes.
 
 use clap::Subcommand;
-use motorlink::port::PortName;
 
-use crate::failure::Failure;
-use crate::ports;
+use crate::connection::Connection;
 use crate::repeat::Repeat;
 
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     pub connection: Connection,
+    #[command(flatten)]
+    pub motor: Motor,
     #[command(subcommand)]
     pub command: Command,
 }
 
+/// Which motor, and how to speak to it.
 #[derive(clap::Args)]
-pub struct Connection {
-    /// The bus: slcan:DEVICE, slcan:tcp:HOST:PORT, socketcan:INTERFACE or sim:
-    #[arg(short, long, env = "MOTORLINK_PORT", global = true)]
-    port: Option<String>,
+pub struct Motor {
     /// The motor's ID, 1 to 32
     #[arg(short, long, default_value_t = 1, global = true,
           value_parser = clap::value_parser!(u8).range(1..=32))]
@@ -31,21 +29,6 @@ pub struct Connection {
     /// Allow commands that write to the motor's ROM, which wears
     #[arg(long, global = true)]
     pub write_rom: bool,
-    /// Print JSON, an object a line
-    #[arg(long, global = true)]
-    pub json: bool,
-    /// Take and print values as digits of the protocol instead of physical units
-    #[arg(long, global = true)]
-    pub raw: bool,
-    /// Show every frame on stderr
-    #[arg(long, global = true)]
-    pub trace: bool,
-}
-
-impl Connection {
-    pub fn port(&self) -> Result<PortName, Failure> {
-        ports::named(self.port.as_deref())
-    }
 }
 
 #[derive(Subcommand)]

@@ -10,8 +10,9 @@ use motorlink::port::TapCan;
 use motorlink::rmd::{Bus, MotorHandle, Options};
 
 pub use args::Args;
-use args::{Command, Connection};
+use args::{Command, Motor};
 
+use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::trace;
@@ -26,8 +27,8 @@ struct Session {
 }
 
 pub fn run(args: Args) -> Result<(), Failure> {
-    let Args { connection, command } = args;
-    let session = connect(&connection)?;
+    let Args { connection, motor, command } = args;
+    let session = connect(&connection, &motor)?;
     match command {
         Command::Scan { ids } => read::scan(&session, ids),
         Command::Status { repeat } => read::status(&session, repeat),
@@ -36,9 +37,9 @@ pub fn run(args: Args) -> Result<(), Failure> {
     }
 }
 
-fn connect(connection: &Connection) -> Result<Session, Failure> {
+fn connect(connection: &Connection, motor: &Motor) -> Result<Session, Failure> {
     let port = connection.port()?;
-    let timeout = Duration::from_millis(connection.timeout.into());
+    let timeout = Duration::from_millis(motor.timeout.into());
     let options = Options { timeout, ..Options::default() };
     let bus = if connection.trace {
         let name = port.clone();
@@ -47,9 +48,8 @@ fn connect(connection: &Connection) -> Result<Session, Failure> {
     } else {
         Bus::open(&port, options)?
     };
-    let output = Output { json: connection.json };
-    let (raw, write_rom) = (connection.raw, connection.write_rom);
-    Ok(Session { bus, id: connection.id, output, raw, write_rom })
+    let (output, raw) = (connection.output(), connection.raw);
+    Ok(Session { bus, id: motor.id, output, raw, write_rom: motor.write_rom })
 }
 
 impl Session {

@@ -1,6 +1,8 @@
 //! Commands that read.
 
-use motorlink::rmd::{Errors, Found, MotionStatus, MotorId, MotorSet, PhaseCurrents, Status1};
+use motorlink::rmd::{
+    Celsius, Errors, Found, MotionStatus, MotorId, MotorSet, PhaseCurrents, Status1,
+};
 use serde_json::{Value, json};
 
 use super::Session;
@@ -108,14 +110,7 @@ fn angles(session: &Session) -> Result<Vec<Row>, Failure> {
 pub fn status1(session: &Session, status: &Status1) -> Vec<Row> {
     let errors = if session.raw { json!(status.errors.0) } else { names(status.errors) };
     vec![
-        value(
-            session,
-            "temperature",
-            status.temperature.0.into(),
-            status.temperature.celsius(),
-            0,
-            "°C",
-        ),
+        temperature(session, status.temperature),
         value(session, "voltage", status.voltage.0.into(), status.voltage.volts(), 1, "V"),
         ("errors", status.errors.to_string(), errors),
     ]
@@ -123,18 +118,15 @@ pub fn status1(session: &Session, status: &Status1) -> Vec<Row> {
 
 pub fn motion(session: &Session, status: &MotionStatus) -> Vec<Row> {
     vec![
-        value(
-            session,
-            "temperature",
-            status.temperature.0.into(),
-            status.temperature.celsius(),
-            0,
-            "°C",
-        ),
+        temperature(session, status.temperature),
         value(session, "torque_current", status.iq.0.into(), status.iq.amps(), 3, "A"),
         value(session, "speed", status.speed.0.into(), status.speed.dps(), 0, "°/s"),
         ("encoder", status.encoder.to_string(), json!(status.encoder)),
     ]
+}
+
+fn temperature(session: &Session, temperature: Celsius) -> Row {
+    value(session, "temperature", temperature.0.into(), temperature.celsius(), 0, "°C")
 }
 
 fn phases(session: &Session, currents: &PhaseCurrents) -> Vec<Row> {

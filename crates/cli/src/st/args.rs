@@ -1,26 +1,24 @@
 //! What `motorlink st` takes.
 
 use clap::Subcommand;
-use motorlink::port::PortName;
 use motorlink::stmcp::Profile;
 
-use crate::failure::Failure;
-use crate::ports;
+use crate::connection::Connection;
 use crate::repeat::Repeat;
 
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     pub connection: Connection,
+    #[command(flatten)]
+    pub drive: Drive,
     #[command(subcommand)]
     pub command: Command,
 }
 
+/// Which drive, and how to speak to it.
 #[derive(clap::Args)]
-pub struct Connection {
-    /// The serial line: a device path, serial:PATH?baud=RATE, tcp:HOST:PORT or sim:
-    #[arg(short, long, env = "MOTORLINK_PORT", global = true)]
-    port: Option<String>,
+pub struct Drive {
     /// The motor, 1 to 7
     #[arg(short, long, default_value_t = 1, global = true,
           value_parser = clap::value_parser!(u8).range(1..=7))]
@@ -35,21 +33,6 @@ pub struct Connection {
     /// Free a 5.x drive that waits for the rest of a cut-off frame, when the line is lost
     #[arg(long, global = true)]
     pub pad: bool,
-    /// Print JSON, an object a line
-    #[arg(long, global = true)]
-    pub json: bool,
-    /// Take and print values as the drive's digits instead of physical units
-    #[arg(long, global = true)]
-    pub raw: bool,
-    /// Show every frame on stderr
-    #[arg(long, global = true)]
-    pub trace: bool,
-}
-
-impl Connection {
-    pub fn port(&self) -> Result<PortName, Failure> {
-        ports::named(self.port.as_deref())
-    }
 }
 
 #[derive(Subcommand)]

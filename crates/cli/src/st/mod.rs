@@ -7,12 +7,13 @@ mod scan;
 
 use std::time::Duration;
 
-use motorlink::port::{PortName, TapBytes};
+use motorlink::port::TapBytes;
 use motorlink::stmcp::{Client, Config, MotorHandle, Options, Recovery};
 
 pub use args::{Args, parse_profile};
-use args::{Command, Connection};
+use args::{Command, Drive};
 
+use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::trace;
@@ -26,41 +27,40 @@ struct Session {
 }
 
 pub fn run(args: Args) -> Result<(), Failure> {
-    let Args { connection, command } = args;
+    let Args { connection, drive, command } = args;
+    let connect = || connect(&connection, &drive);
     match command {
-        Command::Registers => read::registers(&connection),
+        Command::Registers => read::registers(connection.output()),
         Command::Scan { rates } => scan::run(&connection, &rates),
-        Command::Get { registers, repeat } => read::get(&connect(&connection)?, &registers, repeat),
+        Command::Get { registers, repeat } => read::get(&connect()?, &registers, repeat),
         Command::Segment { number, registers, repeat } => {
-            read::segment(&connect(&connection)?, number, &registers, repeat)
+            read::segment(&connect()?, number, &registers, repeat)
         }
-        Command::Info => read::info(&connect(&connection)?),
-        Command::Status => read::status(&connect(&connection)?),
-        other => act::run(&connect(&connection)?, other),
+        Command::Info => read::info(&connect()?),
+        Command::Status => read::status(&connect()?),
+        other => act::run(&connect()?, other),
     }
 }
 
-fn connect(connection: &Connection) -> Result<Session, Failure> {
+fn connect(connection: &Connection, drive: &Drive) -> Result<Session, Failure> {
     let port = connection.port()?;
-    let output = Output { json: connection.json };
-    let client = open(&port, connection)?;
-    Ok(Session { client, motor: connection.motor, output, raw: connection.raw })
-}
-
-fn open(port: &PortName, connection: &Connection) -> Result<Client, Failure> {
-    let timeout = Duration::from_millis(connection.timeout.into());
-    let recovery = if connection.pad { Recovery::Pad } else { Recovery::Drain };
+    let timeout = Duration::from_millis(drive.timeout.into());
+    let recovery = if drive.pad { Recovery::Pad } else { Recovery::Drain };
+    let profile = drive.profile;
     let options = Options {
-        profile: connection.profile,
+        profile,
         line: Config { timeout: timeout.into(), recovery, ..Config::default() },
         ..Options::default()
     };
-    if !connection.trace {
-        return Ok(Client::open(port, options)?);
-    }
-    let (name, profile) = (port.clone(), connection.profile);
-    let open = move || Ok(Box::new(TapBytes::new(name.open_line()?, trace::bytes(profile))) as _);
-    Ok(Client::open_with(&port.to_string(), Box::new(open), options)?)
+    let client = if connection.trace {
+        let name = port.clone();
+        let open =
+            move || Ok(Box::new(TapBytes::new(name.open_line()?, trace::bytes(profile))) as _);
+        Client::open_with(&port.to_string(), Box::new(open), options)?
+    } else {
+        Client::open(&port, options)?
+    };
+    Ok(Session { client, motor: drive.motor, output: connection.output(), raw: connection.raw })
 }
 
 impl Session {

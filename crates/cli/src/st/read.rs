@@ -4,13 +4,11 @@ use motorlink::stmcp::{Flags, Reading, RegisterId, Status, find_register, regist
 use serde_json::{Map, Value, json};
 
 use super::Session;
-use super::args::Connection;
 use crate::failure::Failure;
 use crate::output::{Output, line};
 use crate::repeat::{Repeat, repeated};
 
-pub fn registers(connection: &Connection) -> Result<(), Failure> {
-    let output = Output { json: connection.json };
+pub fn registers(output: Output) -> Result<(), Failure> {
     for id in RegisterId::all() {
         let (Some(shape), Some(text)) = (id.shape(), id.text()) else { continue };
         let origin = match shape.origin {

@@ -5,7 +5,7 @@ use motorlink::port::PortName;
 use motorlink::stmcp::{BAUD_RATES, Finding, scan_baud};
 use serde_json::json;
 
-use super::args::Connection;
+use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
 use crate::output::Output;
@@ -17,7 +17,7 @@ pub fn run(connection: &Connection, rates: &[u32]) -> Result<(), Failure> {
     };
     let rates = if rates.is_empty() { &BAUD_RATES[..] } else { rates };
     let rates = if line.with_baud(rates[0]).is_some() { rates } else { &rates[..1] };
-    let output = Output { json: connection.json };
+    let output = connection.output();
     let bar = crate::output::progress(rates.len());
     let mut found = false;
     for &rate in rates {

@@ -10,6 +10,7 @@
 
 mod code;
 mod drive;
+mod failure;
 mod frame;
 mod master;
 pub mod message;
@@ -21,10 +22,9 @@ pub use code::{
     Profile, Status,
 };
 pub use drive::{Drive, Motor, Version};
+pub use failure::{Error, Failure};
 pub use frame::{Bad, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
-pub use master::{
-    Config, Counters, Error, Failure, Line, Master, Output, Recovery, RequestError, TIMEOUT,
-};
+pub use master::{Config, Counters, Line, Master, Output, Recovery, RequestError, TIMEOUT};
 pub use message::{
     BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, Request,
     RevupPhase, TorqueRamp,

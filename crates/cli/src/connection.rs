@@ -1,0 +1,41 @@
+//! What every command that opens a port takes.
+
+use motorlink::port::PortName;
+
+use crate::failure::Failure;
+use crate::output::Output;
+
+#[derive(clap::Args)]
+pub struct Connection {
+    /// The port, in one of the forms below
+    #[arg(short, long, env = "MOTORLINK_PORT", global = true)]
+    port: Option<String>,
+    /// Print JSON, an object a line
+    #[arg(long, global = true)]
+    json: bool,
+    /// Take and print values as the digits that travel instead of physical units
+    #[arg(long, global = true)]
+    pub raw: bool,
+    /// Show every frame on stderr
+    #[arg(long, global = true)]
+    pub trace: bool,
+}
+
+impl Connection {
+    /// The port that -p or MOTORLINK_PORT names.
+    pub fn port(&self) -> Result<PortName, Failure> {
+        match &self.port {
+            Some(name) => Ok(name.parse()?),
+            None => Err(Failure::Usage(
+                "which port? give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is \
+                 connected, and `-p sim:` needs no hardware"
+                    .to_owned(),
+            )),
+        }
+    }
+
+    /// Where results go.
+    pub fn output(&self) -> Output {
+        Output { json: self.json }
+    }
+}

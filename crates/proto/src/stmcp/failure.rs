@@ -1,0 +1,64 @@
+//! Why an exchange did not end in a positive acknowledge.
+
+use super::{Bad, ErrorCode};
+
+/// Why an exchange did not end in a positive acknowledge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Error {
+    /// The drive said no.
+    Refused(ErrorCode),
+    /// There is no answer to trust: it is not known whether the drive did what was asked.
+    Failed(Failure),
+}
+
+/// How an exchange failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Failure {
+    /// Nothing came in time.
+    Timeout,
+    /// The beginning of a reply came, the rest did not come in time.
+    Incomplete {
+        /// Bytes that came.
+        received: u8,
+    },
+    /// A byte that begins no reply.
+    Header(u8),
+    /// A reply that is not a frame.
+    Damaged(Bad),
+    /// The line was lost before; nothing was sent.
+    Lost,
+    /// The line was lost before and did not fall silent; nothing was sent.
+    Noise,
+}
+
+impl core::fmt::Display for Error {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Error::Refused(code) => write!(f, "refused with {code}: {}", code.doc()),
+            Error::Failed(failure) => failure.fmt(f),
+        }
+    }
+}
+
+impl core::fmt::Display for Failure {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Failure::Timeout => f.write_str("no reply in time"),
+            Failure::Incomplete { received } => {
+                write!(f, "the reply stopped after {received} bytes")
+            }
+            Failure::Header(byte) => write!(f, "{byte:#04x} came where a reply begins"),
+            Failure::Damaged(Bad::Length(length)) => {
+                write!(f, "the reply says that it has {length} bytes, over 128")
+            }
+            Failure::Damaged(Bad::Checksum { expected, received }) => {
+                write!(f, "the reply's checksum is {received:#04x}, its bytes give {expected:#04x}")
+            }
+            Failure::Lost => f.write_str("the line is lost and the drive does not answer"),
+            Failure::Noise => f.write_str("the line does not fall silent"),
+        }
+    }
+}
+
+impl core::error::Error for Error {}
