@@ -7,7 +7,7 @@ use crate::output::Output;
 
 #[derive(clap::Args)]
 pub struct Connection {
-    /// The port, in one of the forms below
+    /// The port: /dev/ttyACM0, tcp:HOST:PORT, slcan:DEVICE, socketcan:can0, sim: and more
     #[arg(short, long, env = "MOTORLINK_PORT", global = true)]
     port: Option<String>,
     /// Print JSON, an object a line
