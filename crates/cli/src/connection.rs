@@ -24,9 +24,9 @@ pub struct Connection {
 impl Connection {
     /// The port that -p or MOTORLINK_PORT names.
     pub fn port(&self) -> Result<PortName, Failure> {
-        match &self.port {
-            Some(name) => Ok(name.parse()?),
-            None => Err(Failure::Usage(
+        match self.port.as_deref() {
+            Some(name) if !name.is_empty() => Ok(name.parse()?),
+            _ => Err(Failure::Usage(
                 "which port? give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is \
                  connected, and `-p sim:` needs no hardware"
                     .to_owned(),

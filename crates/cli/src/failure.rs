@@ -14,6 +14,8 @@ pub enum Failure {
     Usage(String),
     /// 3: the line failed.
     Line(String),
+    /// 3: one motor does not answer, which says nothing about the line.
+    Silent(String),
     /// 130: Ctrl-C.
     Interrupted,
     /// 0: whoever read the output has closed it.
@@ -26,7 +28,7 @@ impl Failure {
         let (code, message) = match self {
             Failure::Refused(message) => (1, message),
             Failure::Usage(message) => (2, message),
-            Failure::Line(message) => (3, message),
+            Failure::Line(message) | Failure::Silent(message) => (3, message),
             Failure::Interrupted => return ExitCode::from(130),
             Failure::OutputClosed => return ExitCode::SUCCESS,
         };
@@ -50,12 +52,22 @@ impl From<stmcp::Error> for Failure {
 impl From<rmd::Error> for Failure {
     fn from(error: rmd::Error) -> Self {
         let message = error.to_string();
-        if error.is_line_failure() { Failure::Line(message) } else { Failure::Usage(message) }
+        match &error {
+            rmd::Error::Port(error) => Failure::from(&**error),
+            error if error.is_line_failure() => Failure::Silent(message),
+            _ => Failure::Usage(message),
+        }
     }
 }
 
 impl From<PortError> for Failure {
     fn from(error: PortError) -> Self {
+        Failure::from(&error)
+    }
+}
+
+impl From<&PortError> for Failure {
+    fn from(error: &PortError) -> Self {
         match error {
             PortError::WrongKind { .. } => Failure::Usage(error.to_string()),
             _ => Failure::Line(error.to_string()),

@@ -11,15 +11,22 @@ pub const EXIT_CODES: &str = "\
 Exit codes: 0 done, 1 the drive refused, 2 the command does not make sense, 3 the line failed.
 `motorlink demo` needs no hardware; `motorlink ports` shows what is connected.";
 
-/// Behind the help of commands that open a port.
-pub const PORTS: &str = "\
+/// Behind `motorlink st --help`.
+pub const ST_PORTS: &str = "\
 Ports:
   /dev/ttyACM0, serial:/dev/ttyUSB0?baud=115200   a UART
   tcp:HOST:PORT                                   a serial line behind a TCP server
-  slcan:/dev/ttyACM0?bitrate=1000000              a CAN adapter that speaks slcan
-  slcan:tcp:HOST:PORT                             the same behind a TCP server
-  socketcan:can0                                  a CAN interface of Linux
   sim:, sim:bench.toml                            simulated drives inside this process
+MOTORLINK_PORT names the port where -p does not.";
+
+/// Behind `motorlink rmd --help`.
+pub const RMD_PORTS: &str = "\
+Ports:
+  slcan:/dev/ttyACM0?bitrate=1000000   a CAN adapter that speaks slcan
+  slcan:tcp:HOST:PORT                  the same behind a TCP server
+  socketcan:can0                       a CAN interface of Linux
+  sim:, sim:bench.toml                 simulated motors inside this process
+Behind slcan ports: baud=RATE for the adapter's own line, echo=1 if it sends back what it is sent.
 MOTORLINK_PORT names the port where -p does not.";
 
 /// Writes a manual page for the program and each of its commands.

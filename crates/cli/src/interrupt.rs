@@ -1,25 +1,37 @@
-//! Ctrl-C, SIGTERM and SIGHUP end the program in order: loops look at the flag, guards stop motors.
+//! Ctrl-C, SIGTERM and SIGHUP. A one-shot command ends at once and leaves the motor as told;
+//! whatever holds a line open takes the signals over, ends in order and stops its motors.
 
+use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
+/// Exit code of a program that a signal ended.
+const INTERRUPTED_CODE: i32 = 130;
+
+static TAKEN_OVER: AtomicBool = AtomicBool::new(false);
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static LOCK: Mutex<()> = Mutex::new(());
 static WAKE: Condvar = Condvar::new();
 
-/// Takes over the signals. A second one while the first is being obeyed ends the process at once.
+/// Handles the signals: they end the process at once until someone takes over.
 pub fn install() {
-    let taken = ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::SeqCst) {
-            std::process::exit(130);
+    let installed = ctrlc::set_handler(|| {
+        // A second signal while the first is being obeyed ends the process as well.
+        if !TAKEN_OVER.load(Ordering::SeqCst) || INTERRUPTED.swap(true, Ordering::SeqCst) {
+            exit(INTERRUPTED_CODE);
         }
         let _held = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
         WAKE.notify_all();
     });
-    if let Err(error) = taken {
+    if let Err(error) = installed {
         eprintln!("warning: Ctrl-C ends this program without stopping motors: {error}");
     }
+}
+
+/// From now on the caller looks at [`interrupted`] and ends in order.
+pub fn take_over() {
+    TAKEN_OVER.store(true, Ordering::SeqCst);
 }
 
 /// Whether a signal came.

@@ -35,10 +35,10 @@ enum Command {
     /// List serial devices and CAN interfaces, and what could be wrong with them
     Ports(ports::Args),
     /// Talk to a drive that speaks ST's Motor Control Protocol
-    #[command(after_help = help::PORTS)]
+    #[command(after_help = help::ST_PORTS)]
     St(st::Args),
     /// Talk to RMD motors on a CAN bus
-    #[command(after_help = help::PORTS)]
+    #[command(after_help = help::RMD_PORTS)]
     Rmd(rmd::Args),
     /// Print completions for a shell
     Completions {
@@ -61,13 +61,9 @@ fn main() -> ExitCode {
         Command::St(args) => st::run(args),
         Command::Rmd(args) => rmd::run(args),
         Command::Completions { shell } => {
-            clap_complete::generate(
-                shell,
-                &mut Cli::command(),
-                "motorlink",
-                &mut std::io::stdout(),
-            );
-            Ok(())
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "motorlink", &mut script);
+            output::line(&String::from_utf8_lossy(&script).trim_end())
         }
         Command::Man { folder } => help::write_manual(Cli::command(), &folder),
     };

@@ -26,6 +26,7 @@ pub fn repeated<T>(
 ) -> Result<(), Failure> {
     let Some(every) = repeat.every else { return print(&sample()?, None) };
     let began = Instant::now();
+    interrupt::take_over();
     let mut lost = false;
     let mut left = repeat.count.unwrap_or(u64::MAX);
     let mut due = began;
@@ -33,16 +34,15 @@ pub fn repeated<T>(
         match sample() {
             Ok(samples) => {
                 if std::mem::take(&mut lost) {
-                    eprintln!("the line is back");
+                    eprintln!("answers come again");
                 }
                 print(&samples, Some(began.elapsed().as_secs_f64()))?;
                 left -= 1;
             }
             Err(Failure::Line(message)) => {
-                if !std::mem::replace(&mut lost, true) {
-                    eprintln!("the line is lost: {message}; trying again until Ctrl-C");
-                }
+                tell_once(&mut lost, &format!("the line is lost: {message}"));
             }
+            Err(Failure::Silent(message)) => tell_once(&mut lost, &message),
             Err(other) => return Err(other),
         }
         // A slow line skips readings rather than falling behind.
@@ -55,4 +55,10 @@ pub fn repeated<T>(
         }
     }
     Ok(())
+}
+
+fn tell_once(told: &mut bool, message: &str) {
+    if !std::mem::replace(told, true) {
+        eprintln!("{message}; trying again until Ctrl-C");
+    }
 }

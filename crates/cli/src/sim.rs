@@ -12,7 +12,7 @@ use rustix::process::getpgrp;
 use rustix::termios::{isatty, tcgetpgrp};
 
 use crate::failure::Failure;
-use crate::interrupt::interrupted;
+use crate::interrupt::{self, interrupted};
 
 /// How long the simulated time may fall behind while nobody talks.
 const IDLE: Duration = Duration::from_millis(20);
@@ -42,6 +42,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<(), Failure> {
+    interrupt::take_over();
     let mut config = match &args.config {
         Some(path) => BenchConfig::read(path)?,
         None => BenchConfig::default(),

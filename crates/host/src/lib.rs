@@ -16,3 +16,4 @@ pub mod slcan;
 pub mod stmcp;
 
 pub use line::{BackOff, LinkState, Opener};
+pub use motorlink_proto::time;

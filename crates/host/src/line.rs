@@ -65,7 +65,8 @@ impl<L> Reopening<L> {
     pub(crate) fn over(name: &str, link: L) -> Self {
         let now = Instant::now();
         Reopening {
-            name: name.into(),
+            // `sim:` before a colon reads badly.
+            name: name.trim_end_matches(':').into(),
             link: Some(link),
             open: None,
             back_off: BackOff::default(),

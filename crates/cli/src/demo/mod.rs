@@ -12,7 +12,7 @@ use screen::Screen;
 use story::Story;
 
 use crate::failure::Failure;
-use crate::interrupt::interrupted;
+use crate::interrupt::{self, interrupted};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -22,6 +22,7 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<(), Failure> {
+    interrupt::take_over();
     let drives = Drives::start()?;
     let st = Client::open(&drives.st.parse()?, stmcp::Options::default())?;
     let bus = Bus::open(

@@ -2,7 +2,7 @@
 
 use motorlink::rmd::{
     CentiDegrees, CentiDps, CircleAngle, Code, DpsPerSecond, Gains, MotionStatus, MotorSet,
-    SpeedLimit, Spin, Torque4, TorqueCommand,
+    SpeedLimit, Spin, Torque, Torque4, TorqueCommand,
 };
 use serde_json::{Map, Value, json};
 
@@ -52,7 +52,7 @@ pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
         }
         Command::Run => {
             motor.run()?;
-            output.done(format!("motor {id} runs again"))
+            output.done(format!("motor {id} resumes what `stop` stopped, if anything"))
         }
         Command::Torque { amps } => {
             let torque = torque(session, amps)?;
@@ -113,6 +113,12 @@ fn encoder(session: &Session, offset: Option<u16>) -> Result<(), Failure> {
     if let Some(offset) = offset {
         session.rom("setting the encoder offset")?;
         let taken = motor.write_encoder_offset_to_rom(offset)?;
+        if taken != offset {
+            return Err(Failure::Refused(format!(
+                "motor {} took the offset {taken} instead of {offset}: its encoder is narrower",
+                motor.id()
+            )));
+        }
         let text = format!("motor {} has the encoder offset {taken}", motor.id());
         return session.output.result(text, json!({ "ok": true, "offset": taken }));
     }
@@ -194,7 +200,15 @@ fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
 }
 
 fn torque(session: &Session, amps: f64) -> Result<TorqueCommand, Failure> {
-    Ok(TorqueCommand(digits(session, amps, TorqueCommand::SCALE, "A")?))
+    let torque = TorqueCommand(digits(session, amps, TorqueCommand::SCALE, "A")?);
+    if torque.0.unsigned_abs() <= Torque::MAX.0.unsigned_abs() {
+        return Ok(torque);
+    }
+    let (most, unit) = match session.raw {
+        true => (f64::from(Torque::MAX.0), "digits"),
+        false => (Torque::MAX.amps(), "A"),
+    };
+    Err(Failure::Usage(format!("{amps} {unit} is beyond ±{most} {unit}; nothing was sent")))
 }
 
 /// A value in the physical unit, or with --raw in digits, as the wire's integer. What does not fit

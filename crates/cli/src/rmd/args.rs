@@ -47,13 +47,14 @@ pub enum Command {
     /// Show the gains, or set them until power-off (for good with --write-rom)
     Pid {
         /// Position Kp, Ki, speed Kp, Ki, torque Kp, Ki: all six to set them
-        #[arg(num_args = 6, value_name = "GAIN")]
+        #[arg(num_args = 6, value_names = ["POSITION_KP", "POSITION_KI", "SPEED_KP", "SPEED_KI",
+                                           "TORQUE_KP", "TORQUE_KI"])]
         gains: Vec<u8>,
     },
     /// Show the acceleration limit, or set it until power-off
     Accel {
         /// °/s²; 0 is unlimited
-        #[arg(allow_negative_numbers = true)]
+        #[arg(value_parser = clap::value_parser!(i32).range(0..))]
         dps_per_second: Option<i32>,
     },
     /// Show the encoder, or set its offset for good (needs --write-rom)

@@ -7,7 +7,6 @@ use serde_json::{Value, json};
 
 use super::Session;
 use crate::failure::Failure;
-use crate::interrupt::interrupted;
 use crate::output::{line, progress};
 use crate::repeat::{Repeat, repeated};
 
@@ -21,12 +20,16 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
     let mut found = Vec::new();
     session.bus.scan(wanted, |motor| found.push(motor), |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
-    if interrupted() {
-        return Err(Failure::Interrupted);
-    }
     found.sort_by_key(|found| match found {
-        Found::Motor(id, _) | Found::Foreign(id, _) => *id,
+        Found::Motor(id, _) | Found::Foreign(id, _) | Found::Echo(id) => *id,
     });
+    if found.iter().any(|found| matches!(found, Found::Echo(_))) {
+        return Err(Failure::Line(
+            "what was sent came back: the adapter echoes, which looks like motors that answer; add \
+             echo=1 to the port, as in slcan:/dev/ttyACM0?echo=1"
+                .to_owned(),
+        ));
+    }
     for motor in &found {
         match motor {
             Found::Motor(id, status) => session.output.result(
@@ -46,6 +49,7 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
                 format!("motor {id:<2}  speaks {dialect}: it is not driven with this protocol"),
                 json!({ "id": id.number(), "protocol": dialect.to_string() }),
             )?,
+            Found::Echo(_) => {}
         }
     }
     if found.is_empty() {
@@ -149,7 +153,11 @@ pub fn value(
     }
     let decimals_wide = usize::from(decimals);
     let text = format!("{physical:.decimals_wide$} {unit}");
-    (name, text, json!(rounded(physical, decimals)))
+    let number = match decimals {
+        0 => json!(physical.round() as i64),
+        _ => json!(rounded(physical, decimals)),
+    };
+    (name, text, number)
 }
 
 fn rounded(value: f64, decimals: u8) -> f64 {

@@ -26,10 +26,10 @@ pub struct Drive {
     /// What the drive speaks: the document as written, or what MCSDK 5.4 firmware does
     #[arg(long, default_value = "spec", global = true, value_parser = parse_profile)]
     pub profile: Profile,
-    /// How long to wait for a reply, ms
-    #[arg(long, default_value_t = 1000, global = true, value_name = "MS",
+    /// How long to wait for a reply, ms [default: 1000, in a scan 200]
+    #[arg(long, global = true, value_name = "MS",
           value_parser = clap::value_parser!(u32).range(1..=60_000))]
-    pub timeout: u32,
+    pub timeout: Option<u32>,
     /// Free a 5.x drive that waits for the rest of a cut-off frame, when the line is lost
     #[arg(long, global = true)]
     pub pad: bool,

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use motorlink::port::TapBytes;
 use motorlink::stmcp::{Client, Config, MotorHandle, Options, Recovery};
+use motorlink::time;
 
 pub use args::{Args, parse_profile};
 use args::{Command, Drive};
@@ -17,6 +18,9 @@ use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::trace;
+
+/// How long a drive has to answer a question of a scan unless told otherwise, ms.
+const SCAN_TIMEOUT: u32 = 200;
 
 /// An open drive, and how to show what it says.
 struct Session {
@@ -31,7 +35,10 @@ pub fn run(args: Args) -> Result<(), Failure> {
     let connect = || connect(&connection, &drive);
     match command {
         Command::Registers => read::registers(connection.output()),
-        Command::Scan { rates } => scan::run(&connection, &rates),
+        Command::Scan { rates } => {
+            let patience = drive.timeout.unwrap_or(SCAN_TIMEOUT);
+            scan::run(&connection, Duration::from_millis(patience.into()), &rates)
+        }
         Command::Get { registers, repeat } => read::get(&connect()?, &registers, repeat),
         Command::Segment { number, registers, repeat } => {
             read::segment(&connect()?, number, &registers, repeat)
@@ -44,12 +51,12 @@ pub fn run(args: Args) -> Result<(), Failure> {
 
 fn connect(connection: &Connection, drive: &Drive) -> Result<Session, Failure> {
     let port = connection.port()?;
-    let timeout = Duration::from_millis(drive.timeout.into());
+    let timeout = drive.timeout.map_or(Config::default().timeout, time::Duration::from_millis);
     let recovery = if drive.pad { Recovery::Pad } else { Recovery::Drain };
     let profile = drive.profile;
     let options = Options {
         profile,
-        line: Config { timeout: timeout.into(), recovery, ..Config::default() },
+        line: Config { timeout, recovery, ..Config::default() },
         ..Options::default()
     };
     let client = if connection.trace {

@@ -1,5 +1,7 @@
 //! `motorlink st scan`
 
+use std::time::Duration;
+
 use indicatif::ProgressBar;
 use motorlink::port::PortName;
 use motorlink::stmcp::{BAUD_RATES, Finding, scan_baud};
@@ -7,10 +9,9 @@ use serde_json::json;
 
 use crate::connection::Connection;
 use crate::failure::Failure;
-use crate::interrupt::interrupted;
 use crate::output::Output;
 
-pub fn run(connection: &Connection, rates: &[u32]) -> Result<(), Failure> {
+pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result<(), Failure> {
     let port = connection.port()?;
     let PortName::Line(line) = &port else {
         return Err(Failure::Usage(format!("`{port}` has no baud rate to scan")));
@@ -21,11 +22,8 @@ pub fn run(connection: &Connection, rates: &[u32]) -> Result<(), Failure> {
     let bar = crate::output::progress(rates.len());
     let mut found = false;
     for &rate in rates {
-        if interrupted() {
-            return Err(Failure::Interrupted);
-        }
         bar.set_message(format!("{rate} baud"));
-        let finding = scan_baud(line, rate)?;
+        let finding = scan_baud(line, rate, patience)?;
         bar.inc(1);
         found |= matches!(finding, Finding::Drive(_) | Finding::Refuses(_));
         report(&bar, output, rate, &finding)?;

@@ -46,6 +46,9 @@ pub enum Found {
     Motor(MotorId, proto::Status1),
     /// A motor of another protocol.
     Foreign(MotorId, Dialect),
+    /// The request itself came back: the adapter echoes what it sends, and nothing is known of a
+    /// motor. Option `echo=1` of an slcan port drops such echoes.
+    Echo(MotorId),
 }
 
 /// IDs that a scan asks at once.
@@ -221,6 +224,8 @@ impl Bus {
             let asked = left.by_ref().take(SCAN_WIDTH);
             let requests: Vec<_> = asked.map(|id| (id, ReadStatus1.encode())).collect();
             self.cycle(&requests, |id, outcome| match outcome {
+                // A motor's reply has a voltage.
+                Ok(reply) if reply == ReadStatus1.encode() => each(Found::Echo(id)),
                 Ok(reply) => each(Found::Motor(id, proto::Status1::decode(&reply))),
                 Err(Error::Foreign { dialect, .. }) => each(Found::Foreign(id, dialect)),
                 Err(_) => {}

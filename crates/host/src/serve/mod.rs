@@ -48,7 +48,7 @@ pub trait CanStation {
 /// A port that can be opened now.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Served {
-    /// The port as it was asked for.
+    /// The port as it was asked for, with the TCP port in use where any was asked for.
     pub port: String,
     /// Where it is: the pty, or the address with the TCP port in use.
     pub path: String,
@@ -123,7 +123,7 @@ impl Server {
     }
 
     fn serve(&mut self, name: &ServeName, station: Station) -> Result<Served, PortError> {
-        let port = name.to_string();
+        let mut port = name.to_string();
         let (path, endpoint) = match name {
             ServeName::Pty(link) | ServeName::SlcanPty(link) => {
                 let (pty, master) = Pty::open(link)?;
@@ -132,6 +132,9 @@ impl Server {
             }
             ServeName::TcpListen { host, port: tcp_port } => {
                 let (listener, path) = listen(host, *tcp_port, &port)?;
+                if *tcp_port == 0 {
+                    port = format!("tcp-listen:{path}");
+                }
                 (path, Endpoint::new(Door::Listener(listener), station, None))
             }
         };

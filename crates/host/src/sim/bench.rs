@@ -5,7 +5,7 @@ use std::os::fd::BorrowedFd;
 use std::rc::Rc;
 use std::time::Duration;
 
-use motorlink_proto::rmd::{CanFrame, Errors, MotorId};
+use motorlink_proto::rmd::{CanFrame, Errors, Mode, MotorId};
 use motorlink_proto::stmcp::{Flags, Motor};
 use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::{RmdBus, RmdNode};
@@ -128,6 +128,7 @@ impl Bench {
             }
             return Ok(json!({ "ok": true, "time": now.0 as f64 / 1e6, "state": states }));
         }
+        command.check()?;
         match &self.place(command)?.drives {
             Drives::St(station) => st(&mut station.borrow_mut(), now, command)?,
             Drives::Rmd(bus) => rmd(&mut bus.borrow_mut(), now, command)?,
@@ -194,7 +195,7 @@ fn rmd_state(node: &RmdNode) -> Value {
     let truth = node.motor().truth();
     json!({
         "motor": node.id().number(),
-        "mode": format!("{:?}", truth.mode),
+        "mode": mode(truth.mode),
         "errors": node.drive().errors().to_string(),
         "speed_dps": truth.speed_dps,
         "speed_reference_dps": truth.speed_reference_dps,
@@ -206,6 +207,16 @@ fn rmd_state(node: &RmdNode) -> Value {
         "locked": truth.locked,
         "rom_writes": node.motor().rom_writes(),
     })
+}
+
+fn mode(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Off => "off",
+        Mode::Stopped => "stopped",
+        Mode::Torque(_) => "torque",
+        Mode::Speed(_) => "speed",
+        Mode::Position { .. } => "position",
+    }
 }
 
 fn st(station: &mut Station, now: Instant, command: &Command) -> Result<(), String> {

@@ -80,4 +80,20 @@ impl Command {
             | Command::State { port } => port.as_deref(),
         }
     }
+
+    /// Whether its values can be.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let (name, value, range) = match *self {
+            Command::Supply { volts, .. } => ("volts", volts, 0.0..=1000.0),
+            Command::Temperature { celsius: Some(celsius), .. } => {
+                ("celsius", celsius, -100.0..=1000.0)
+            }
+            Command::Load { newton_metres, .. } => ("newton_metres", newton_metres, 0.0..=1000.0),
+            _ => return Ok(()),
+        };
+        if range.contains(&value) {
+            return Ok(());
+        }
+        Err(format!("{name} is {} to {}, not {value}", range.start(), range.end()))
+    }
 }

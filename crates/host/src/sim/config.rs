@@ -54,6 +54,14 @@ pub enum ConfigError {
         /// Why.
         error: std::io::Error,
     },
+    /// Something is wrong in a file.
+    #[error("{}: {error}", .path.display())]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        error: Box<ConfigError>,
+    },
     /// The text is not what is expected.
     #[error("{0}")]
     Text(String),
@@ -83,10 +91,8 @@ impl BenchConfig {
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let text = std::fs::read_to_string(path)
             .map_err(|error| ConfigError::Unreadable { path: path.to_owned(), error })?;
-        Self::parse(&text).map_err(|error| match error {
-            ConfigError::Text(why) => ConfigError::Text(format!("{}: {why}", path.display())),
-            other => other,
-        })
+        Self::parse(&text)
+            .map_err(|error| ConfigError::InFile { path: path.to_owned(), error: Box::new(error) })
     }
 
     /// Reads the text of a file. What it does not say is as in the default.
@@ -139,8 +145,11 @@ impl BenchConfig {
             })
         };
         let nodes: Result<Vec<RmdNode>, ConfigError> = self.rmd.0.iter().map(node).collect();
+        let mut ids: Vec<u8> = self.rmd.0.iter().map(|config| config.id).collect();
+        ids.sort_unstable();
+        let twice = ids.windows(2).find(|pair| pair[0] == pair[1]).map_or(0, |pair| pair[0]);
         RmdBus::new(now, nodes?)
-            .ok_or_else(|| ConfigError::Impossible("two motors have the same ID".to_owned()))
+            .ok_or_else(|| ConfigError::Impossible(format!("two motors have the same ID {twice}")))
     }
 }
 

@@ -11,9 +11,6 @@ use crate::port::{LineName, PortError, PortName};
 pub const BAUD_RATES: [u32; 9] =
     [115_200, 1_843_200, 921_600, 460_800, 230_400, 57_600, 38_400, 19_200, 9_600];
 
-/// How long a drive has to answer one question of a scan.
-const PATIENCE: Duration = Duration::from_millis(200);
-
 /// What a rate was answered with.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Finding {
@@ -27,13 +24,13 @@ pub enum Finding {
     Silence,
 }
 
-/// Asks for the board information at one rate.
+/// Asks for the board information at one rate, twice; waits `patience` for each answer.
 ///
 /// # Errors
 /// What keeps the port from being opened.
-pub fn scan_baud(line: &LineName, baud: u32) -> Result<Finding, PortError> {
+pub fn scan_baud(line: &LineName, baud: u32, patience: Duration) -> Result<Finding, PortError> {
     let port = PortName::Line(line.with_baud(baud).unwrap_or_else(|| line.clone()));
-    let link = Config { timeout: PATIENCE.into(), recovery: Recovery::Pad, ..Config::default() };
+    let link = Config { timeout: patience.into(), recovery: Recovery::Pad, ..Config::default() };
     let options = Options { profile: Profile::Spec, line: link, ..Options::default() };
     let client = match Client::open(&port, options) {
         Ok(client) => client,

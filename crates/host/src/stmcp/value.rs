@@ -38,6 +38,18 @@ pub enum ValueError {
         /// What it takes.
         usable: String,
     },
+    /// Between two digits of the register.
+    #[error("{text} falls between two values of {register}, which has steps of {step}{unit}")]
+    Between {
+        /// What was given.
+        text: String,
+        /// The register.
+        register: RegisterId,
+        /// One digit, in the physical unit.
+        step: f64,
+        /// A space and the unit, or nothing.
+        unit: String,
+    },
     /// Outside what the register's type can hold.
     #[error("{text} does not fit {register}: it takes {least} to {most}{unit}")]
     OutOfRange {
@@ -163,19 +175,21 @@ pub fn parse_value(
         return Ok((value as f32).to_bits() as i32);
     }
     let scale = if raw { 1.0 } else { scale(register, profile) };
-    let digits = (value / scale).round();
+    let digits = value / scale;
     let (least, most) = range(ty);
+    let unit = match unit(register) {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    let text = text.to_owned();
     if digits < least as f64 || digits > most as f64 {
-        let unit = unit(register);
-        return Err(ValueError::OutOfRange {
-            text: text.to_owned(),
-            register,
-            least: least as f64 * scale,
-            most: most as f64 * scale,
-            unit: if unit.is_empty() { String::new() } else { format!(" {unit}") },
-        });
+        let (least, most) = (least as f64 * scale, most as f64 * scale);
+        return Err(ValueError::OutOfRange { text, register, least, most, unit });
     }
-    Ok(digits as i64 as i32)
+    if (digits - digits.round()).abs() > 1e-6 {
+        return Err(ValueError::Between { text, register, step: scale, unit });
+    }
+    Ok(digits.round() as i64 as i32)
 }
 
 fn range(ty: Type) -> (i64, i64) {
@@ -262,6 +276,7 @@ mod tests {
         assert!(parse(RegisterId::SPEED_KP, "32768").is_err());
         assert!(parse(RegisterId::SPEED_KP, "fast").is_err());
         assert!(parse(RegisterId::SPEED_KP, "NaN").is_err());
+        assert!(matches!(parse(RegisterId::SPEED_KP, "3.7"), Err(ValueError::Between { .. })));
         assert_eq!(parse(RegisterId::CONTROL_MODE, "speed"), Ok(1));
         assert_eq!(parse(RegisterId::DAC_OUT2, "I_ALPHA"), Ok(0x25));
         let tenths = parse_value(RegisterId::FLUXWK_BUS, "98.5", Profile::Mcsdk54, false);

@@ -1,0 +1,93 @@
+"""The program under test, and simulated drives that it serves. `make e2e` does all of it:
+
+$ cargo build -p motorlink-cli
+$ pip install -r tests/e2e/requirements.txt
+$ MOTORLINK_BIN=target/debug/motorlink pytest tests/e2e
+"""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from program import Outcome, Running, Sim, environment
+
+REPOSITORY = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="session")
+def motorlink():
+    """Path of the program."""
+    path = Path(os.environ.get("MOTORLINK_BIN", REPOSITORY / "target/debug/motorlink"))
+    if not os.access(path, os.X_OK):
+        pytest.exit(f"{path} is not built: `cargo build -p motorlink-cli`, or set MOTORLINK_BIN", 2)
+    return str(path.resolve())
+
+
+@pytest.fixture(scope="session")
+def run(motorlink):
+    """Runs the program to its end: `run("st", "-p", port, "info")`."""
+
+    def run(*arguments, within=20, stdin="", **variables):
+        done = subprocess.run(
+            [motorlink, *map(str, arguments)],
+            input=stdin,
+            capture_output=True,
+            text=True,
+            timeout=within,
+            env=environment(variables),
+        )
+        return Outcome(done.returncode, done.stdout, done.stderr)
+
+    return run
+
+
+@pytest.fixture
+def start(motorlink):
+    """Starts the program and lets it run: `start("demo")`. It is ended after the test."""
+    started = []
+
+    def start(*arguments, **options):
+        process = Running([motorlink, *map(str, arguments)], **options)
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        process.end()
+
+
+def serving(motorlink, folder):
+    """Starts `motorlink sim`s on ports in `folder` and ends them."""
+    started = []
+
+    def sim(*arguments, st=("pty",), rmd=("slcan-pty",)):
+        """Serves a port of each kind: `pty` and `slcan-pty` are st0 and can0 in the folder."""
+        names = {"pty": f"pty:{folder}/st0", "slcan-pty": f"slcan-pty:{folder}/can0"}
+        names["tcp"] = "tcp-listen:127.0.0.1:0"
+        ports = [word for kind in st for word in ("--st", names.get(kind, kind))]
+        ports += [word for kind in rmd for word in ("--rmd", names.get(kind, kind))]
+        drives = Sim([motorlink, "sim", *map(str, arguments), *ports], len(ports) // 2)
+        started.append(drives)
+        return drives
+
+    yield sim
+    for drives in started:
+        drives.end()
+
+
+@pytest.fixture
+def sim(motorlink, tmp_path):
+    """`sim(...)`: simulated drives with arguments of the test's choice."""
+    yield from serving(motorlink, tmp_path)
+
+
+@pytest.fixture(scope="module")
+def drives(motorlink, tmp_path_factory):
+    """Drives on a port of every kind, shared by tests that do not mind what was done before."""
+    folder = tmp_path_factory.mktemp("drives")
+    for sim in serving(motorlink, folder):
+        yield sim(st=("pty", "tcp"), rmd=("slcan-pty", "tcp"))
+    shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,303 @@
+"""`motorlink rmd` as a person and a script use it."""
+
+import time
+
+import pytest
+
+from peers import device, noise, slcan_adapter
+from program import eventually
+
+PORTS = ["slcan", "slcan:tcp", "sim"]
+OK = {"ok": True}
+MOTION = {"temperature", "torque_current", "speed", "encoder"}
+GAINS = ["position_kp", "position_ki", "speed_kp", "speed_ki", "torque_kp", "torque_ki"]
+SHIPPED_GAINS = "100 100 100 100 100 100"
+
+
+@pytest.fixture
+def rmd(run, drives, request):
+    """Runs `motorlink rmd` on a port of the shared drives, a pty where the test does not choose."""
+    port = drives.port(getattr(request, "param", "slcan"))
+    # A machine under load may take longer than the 50 ms that a bus does.
+    return lambda *arguments: run("rmd", "-p", port, "--timeout", 500, *arguments)
+
+
+on_every_port = pytest.mark.parametrize("rmd", PORTS, indirect=True)
+
+
+# What reads.
+
+
+@on_every_port
+def test_scan_finds_the_motors(rmd):
+    found = rmd("--json", "scan", 1, 2, 3, 4).ended(0).lines
+    assert [motor["id"] for motor in found] == [1, 2, 3, 4]
+    assert set(found[0]) == {"id", "protocol", "voltage", "temperature", "errors"}
+    assert found[0]["protocol"] == "V1.62"
+    assert "motor 1 " in rmd("scan", 1).ended(0).out
+
+
+def test_scan_asks_all_32_ids(run, sim, tmp_path):
+    config = tmp_path / "bench.toml"
+    config.write_text("[[rmd.motor]]\nid = 7\n[[rmd.motor]]\nid = 32\n")
+    port = sim(config, st=()).port("slcan")
+    found = run("rmd", "-p", port, "--json", "scan").ended(0).lines
+    assert [motor["id"] for motor in found] == [7, 32]
+
+
+@on_every_port
+def test_status_tells_everything_about_a_motor(rmd):
+    status = rmd("-i", 4, "--json", "status").ended(0).json
+    assert set(status) == MOTION | {
+        *("id", "voltage", "errors", "phase_a", "phase_b", "phase_c", "angle", "circle_angle")
+    }
+    assert (status["id"], status["voltage"], status["errors"]) == (4, 24.0, [])
+    assert "24.0 V" in rmd("-i", 4, "status").ended(0).out
+
+
+def test_raw_values_are_digits(rmd):
+    assert rmd("-i", 4, "--json", "--raw", "status").ended(0).json["voltage"] == 240
+
+
+@on_every_port
+def test_what_is_read_has_its_keys(rmd):
+    assert list(rmd("-i", 4, "--json", "pid").ended(0).json) == GAINS
+    assert set(rmd("-i", 4, "--json", "accel").ended(0).json) == {"acceleration"}
+    assert set(rmd("-i", 4, "--json", "encoder").ended(0).json) == {
+        *("position", "original", "offset")
+    }
+    assert set(rmd("-i", 4, "--json", "angle").ended(0).json) == {"angle", "circle_angle"}
+    for command in ("pid", "accel", "encoder", "angle"):
+        assert rmd("-i", 4, command).ended(0).out
+
+
+def test_angle_reads_again_and_again(rmd):
+    readings = rmd("--json", "angle", "--every", "10ms", "--count", 4).ended(0).lines
+    assert [set(reading) for reading in readings] == [{"t", "angle", "circle_angle"}] * 4
+
+
+@on_every_port
+def test_raw_sends_eight_bytes(rmd):
+    answer = rmd("-i", 4, "--json", "raw", "9a").ended(0).json
+    assert answer == {"ok": True, "data": "9a 19 00 f0 00 00 00 00"}
+    assert rmd("-i", 4, "raw", "9A", "1", "2").ended(0).out == "9a 19 00 f0 00 00 00 00\n"
+
+
+def test_trace_shows_both_directions_on_stderr(rmd):
+    sent, received = rmd("-i", 4, "--trace", "raw", "9a").ended(0).err.splitlines()
+    assert "-> 144#9a 00 00 00 00 00 00 00" in sent
+    assert "<- 144#9a 19 00 f0 00 00 00 00" in received
+
+
+# What acts.
+
+
+@on_every_port
+@pytest.mark.parametrize("command", ["off", "stop", "run", f"pid {SHIPPED_GAINS}", "accel 9"])
+def test_what_is_done_is_said(rmd, command):
+    assert rmd("-i", 2, *command.split()).ended(0).out.startswith("motor 2")
+    assert rmd("-i", 2, "--json", *command.split()).ended(0).json == OK
+
+
+@on_every_port
+@pytest.mark.parametrize(
+    "command",
+    [
+        "torque 0.1",
+        "torque -0.1",
+        "speed 20",
+        "speed -20.5",
+        "move 10",
+        "move -10.25 --max-speed 200",
+        "move 45.5 --direction cw",
+        "move 359.99 --direction ccw --max-speed 100",
+    ],
+)
+def test_a_motion_command_answers_with_what_the_motor_does(rmd, command):
+    assert set(rmd("-i", 3, "--json", *command.split()).ended(0).json) == MOTION
+    assert "°/s" in rmd("-i", 3, *command.split()).ended(0).out
+    rmd("-i", 3, "off").ended(0)
+
+
+@on_every_port
+def test_torque4_answers_for_each_motor(rmd):
+    replies = rmd("--json", "torque4", 0, -0.1, 0.1, 0).ended(0).lines
+    assert [reply["id"] for reply in replies] == [1, 2, 3, 4]
+    assert set(replies[0]) == MOTION | {"id"}
+    assert len(rmd("torque4", 0, 0, 0, 0).ended(0).out.splitlines()) == 4
+
+
+@on_every_port
+def test_rom_is_written_only_on_an_explicit_word(rmd):
+    for command in ("zero", "encoder --offset 5", "raw 19", "raw 32", "raw 91"):
+        assert "--write-rom" in rmd(*command.split()).ended(2).err
+    assert set(rmd("--write-rom", "--json", "zero").ended(0).json) == {"ok", "offset"}
+    assert rmd("--write-rom", "--json", "encoder", "--offset", 5).ended(0).json["offset"] == 5
+    assert rmd("--write-rom", "pid", *SHIPPED_GAINS.split()).ended(0)
+    assert rmd("--write-rom", "encoder", "--offset", 0).ended(0)
+
+
+def test_a_motor_turns_stops_and_resumes(run, sim):
+    bus = sim(st=())
+
+    def rmd(*arguments):
+        return run("rmd", "-p", bus.port("slcan"), "--timeout", 500, *arguments).ended(0)
+
+    rmd("speed", 360)
+    eventually(lambda: bus.motor(1)["speed_dps"] > 350, "motor 1 turns")
+    rmd("stop")
+    eventually(lambda: abs(bus.motor(1)["speed_dps"]) < 1, "motor 1 stands")
+    rmd("run")
+    eventually(lambda: bus.motor(1)["speed_dps"] > 350, "motor 1 turns again")
+    rmd("move", 45, "--direction", "cw", "--max-speed", 1000)
+    eventually(lambda: abs(bus.motor(1)["angle_degrees"] % 360 - 45) < 0.5, "motor 1 is at 45°")
+    rmd("off")
+    assert bus.motor(1)["mode"] == "Off"
+
+
+def test_an_error_that_has_its_cause_stays_and_is_told(run, sim):
+    bus = sim(st=())
+    port = bus.port("slcan")
+    bus.do("supply", motor=1, volts=5.0)
+    eventually(lambda: bus.motor(1)["errors"] != "no error", "low voltage")
+    refused = run("rmd", "-p", port, "--json", "clear-error").ended(1)
+    assert refused.json["errors"] and "keeps its errors" in refused.err
+    bus.do("supply", motor=1, volts=24.0)
+    eventually(lambda: run("rmd", "-p", port, "clear-error").code == 0, "the error is cleared")
+    assert run("rmd", "-p", port, "--json", "clear-error").ended(0).json["errors"] == []
+
+
+# What a person gets wrong.
+
+
+@pytest.mark.parametrize("motor", [0, 33, -1, 255, 256])
+def test_a_motor_id_outside_1_to_32_is_a_usage_error(run, motor):
+    assert "1..=32" in run("rmd", "-p", "sim:", f"--id={motor}", "off").ended(2).err
+
+
+@pytest.mark.parametrize(
+    "command, told",
+    [
+        ("torque 33", "32.000 A"),
+        ("torque nan", "nothing was sent"),
+        ("move 360 --direction cw", "359.99"),
+        ("move -1 --direction cw", "nothing was sent"),
+        ("speed 1e9", "nothing was sent"),
+        ("torque4 0 0 0 99", "32.000 A"),
+        ("pid 1 2", "6 values"),
+        ("pid 1 2 3 4 5 256", "256"),
+        ("raw 1 2 3 4 5 6 7 8 9", "8 bytes"),
+        ("raw zz", "not hexadecimal"),
+    ],
+)
+def test_what_does_not_fit_is_not_sent(rmd, command, told):
+    refused = rmd("--trace", *command.split()).ended(2)
+    assert told in refused.err and "->" not in refused.err
+
+
+def test_a_serial_line_is_not_a_can_bus(run, drives):
+    told = run("rmd", "-p", drives.can, "scan").ended(2).err
+    assert "cannot be used as a CAN bus" in told and "slcan:" in told
+
+
+def test_a_bare_interface_name_is_met_with_the_right_one(run):
+    assert "did you mean `socketcan:can0`?" in run("rmd", "-p", "can0", "scan").ended(2).err
+
+
+# What goes wrong on the line.
+
+
+def test_a_motor_that_is_not_there_is_told(rmd):
+    told = rmd("-i", 9, "status").ended(3).err
+    assert "motor 9 does not answer" in told and "motorlink rmd scan" in told
+    assert "no motor answered" in rmd("scan", 9, 10).ended(3).err
+
+
+def test_an_unknown_command_is_a_silent_motor(rmd):
+    assert "does not answer 0x01" in rmd("raw", "01").ended(3).err
+
+
+def test_torque4_tells_what_answered_and_that_a_motor_did_not(run, sim, tmp_path):
+    config = tmp_path / "bench.toml"
+    config.write_text("[[rmd.motor]]\nid = 1\n[[rmd.motor]]\nid = 3\n")
+    port = sim(config, st=()).port("slcan")
+    partly = run("rmd", "-p", port, "--json", "torque4", 0, 0, 0, 0).ended(3)
+    assert [reply["id"] for reply in partly.lines] == [1, 3]
+    assert "motor 2" in partly.err
+
+
+def test_a_can_interface_that_is_absent_is_told(run):
+    told = run("rmd", "-p", "socketcan:nocan7", "scan").ended(3).err
+    assert "CAN" in told
+
+
+def test_a_device_that_does_not_exist_is_told(run, tmp_path):
+    assert "is it plugged in?" in run("rmd", "-p", f"slcan:{tmp_path}/tty", "scan").ended(3).err
+
+
+@pytest.mark.parametrize("answer", [noise, lambda received: received])
+def test_an_adapter_that_is_not_slcan_is_told(run, tmp_path, answer):
+    with device(tmp_path / "other", answer) as port:
+        told = run("rmd", "-p", f"slcan:{port}", "scan").ended(3).err
+    assert "does not answer like an slcan adapter" in told
+
+
+def test_an_st_drive_is_not_an_slcan_adapter(run, drives):
+    told = run("rmd", "-p", f"slcan:{drives.st}", "scan").ended(3).err
+    assert "does not answer like an slcan adapter" in told
+
+
+def test_a_silent_device_is_given_up_in_time(run, tmp_path):
+    with device(tmp_path / "silent") as port:
+        begun = time.monotonic()
+        run("rmd", "-p", f"slcan:{port}", "--timeout", 20, "status").ended(3)
+        assert time.monotonic() - begun < 4
+
+
+def test_an_adapter_that_is_unplugged_mid_exchange_is_told(run, tmp_path):
+    adapter = slcan_adapter(lambda frame: [])
+    with device(tmp_path / "can", lambda r: None if b"t" in r else adapter(r)) as port:
+        told = run("rmd", "-p", f"slcan:{port}", "status").ended(3).err
+    assert "was closed" in told or "unplugged" in told
+
+
+def test_a_motor_that_speaks_v3_is_named_and_not_driven(run, tmp_path):
+    heard = []
+
+    def v3_motor(frame):
+        heard.append(frame)
+        return ["t24189A19000100F00000"] if frame.startswith("t141") else []
+
+    with device(tmp_path / "can", slcan_adapter(v3_motor)) as link:
+        port = f"slcan:{link}"
+        told = run("rmd", "-p", port, "--timeout", 500, "status").ended(3).err
+        assert "V3" in told and "0x241" in told
+
+        found = run("rmd", "-p", port, "--timeout", 500, "--json", "scan", 1).ended(0).json
+        assert found["id"] == 1 and "V3" in found["protocol"]
+        scanned = run("rmd", "-p", port, "--timeout", 500, "scan", 1).ended(0).out
+        assert "it is not driven" in scanned
+
+
+def test_an_adapter_that_echoes_its_own_frames_is_not_a_motor(run, tmp_path):
+    with device(tmp_path / "can", slcan_adapter(lambda frame: [frame])) as link:
+        told = run("rmd", "-p", f"slcan:{link}?echo=1", "--timeout", 50, "off").ended(3).err
+    assert "does not answer" in told
+
+
+@pytest.mark.parametrize("kind", ["slcan", "slcan:tcp"])
+def test_a_loop_survives_a_bus_that_goes_and_comes_back(start, sim, kind):
+    serve = {"slcan": "slcan-pty", "slcan:tcp": "tcp"}[kind]
+    bus = sim(st=(), rmd=(serve,))
+    loop = start(
+        *("rmd", "-p", bus.port(kind), "--timeout", 500, "--json", "angle", "--every", "50ms")
+    )
+    loop.more_lines()
+    bus.kill()
+    loop.says("the line is lost")
+    again = serve if kind == "slcan" else f"tcp-listen:{bus.can_address}"
+    sim(st=(), rmd=(again,))
+    loop.says("the line is back")
+    loop.more_lines()
+    loop.interrupt()
+    assert loop.wait() == 0

@@ -1,0 +1,337 @@
+"""`motorlink st` as a person and a script use it."""
+
+import threading
+import time
+
+import pytest
+
+from peers import device, noise
+from program import eventually
+
+PORTS = ["pty", "tcp", "sim"]
+OK = {"ok": True}
+
+
+@pytest.fixture
+def st(run, drives, request):
+    """Runs `motorlink st` on a port of the shared drives, a pty where the test does not choose."""
+    port = drives.port(getattr(request, "param", "pty"))
+    return lambda *arguments, **options: run("st", "-p", port, *arguments, **options)
+
+
+on_every_port = pytest.mark.parametrize("st", PORTS, indirect=True)
+
+
+# What reads.
+
+
+@on_every_port
+def test_info_names_the_sdk_and_the_firmware(st):
+    assert st("--json", "info").ended(0).json == {
+        "sdk": "ST MC SDK",
+        "version": [5, 4, 4],
+        "firmware": "ST MC SDK Ver.5.4.4",
+    }
+    assert "5.4.4" in st("info").ended(0).out
+
+
+@on_every_port
+def test_status_has_a_value_and_its_unit_or_name(st):
+    status = st("--json", "status").ended(0).json
+    assert status["BUS_VOLTAGE"] == {"value": 325, "unit": "V"}
+    assert set(status["STATUS"]) == {"value", "name"}
+    assert "325 V" in st("status").ended(0).out
+
+
+@on_every_port
+def test_get_reads_registers_by_name_and_by_number(st):
+    values = st("--json", "get", "MIN_APP_SPEED", "0x3F").ended(0).json
+    assert values == {
+        "MIN_APP_SPEED": {"value": 600, "unit": "rpm"},
+        "MAX_APP_SPEED": {"value": 6000, "unit": "rpm"},
+    }
+    assert st("get", "min_app_speed").ended(0).out.split() == ["MIN_APP_SPEED", "600", "rpm"]
+    assert st("--json", "--raw", "get", "STATUS").ended(0).json["STATUS"] in range(21)
+
+
+def test_get_reads_again_and_again(st):
+    readings = st("--json", "get", "MIN_APP_SPEED", "--every", "10ms", "--count", 5).ended(0).lines
+    assert len(readings) == 5
+    times = [reading["t"] for reading in readings]
+    assert times == sorted(times) and times[-1] >= 0.035
+    assert "600 rpm" in st("get", "MIN_APP_SPEED", "--every", "10ms", "--count", 1).ended(0).out
+
+
+@on_every_port
+def test_segment_samples_registers_that_cannot_be_read_one_by_one(st):
+    sampled = st("--json", "segment", "MIN_APP_SPEED", "I_A", "I_B").ended(0).json
+    assert list(sampled) == ["MIN_APP_SPEED", "I_A", "I_B"]
+    assert st("segment", "--number", 3, "I_A").ended(0).out.startswith("I_A")
+
+
+@on_every_port
+def test_revup_shows_five_phases(st):
+    phases = st("--json", "revup").ended(0).lines
+    assert [phase["phase"] for phase in phases] == [0, 1, 2, 3, 4]
+    assert set(phases[0]) == {"phase", "speed_rpm", "torque_s16a", "duration_ms"}
+    assert len(st("revup").ended(0).out.splitlines()) == 5
+
+
+def test_registers_lists_the_table_without_a_port(run):
+    registers = {r["name"]: r for r in run("st", "--json", "registers").ended(0).lines}
+    assert registers["SPEED_MEAS"]["id"] == 0x1E
+    assert registers["SPEED_MEAS"]["access"] == "R"
+    assert "0x1e  SPEED_MEAS" in run("st", "registers").ended(0).out
+
+
+@pytest.mark.parametrize("st", ["pty", "tcp"], indirect=True)
+def test_scan_tells_at_which_rates_a_drive_answers(st):
+    findings = st("--json", "scan", 115200, 9600).ended(0).lines
+    assert findings[0] == {"baud": 115200, "finding": "drive", "text": "ST MC SDK 5.4.4"}
+    assert "115200 baud  ST MC SDK" in st("scan", 115200).ended(0).out
+
+
+@on_every_port
+def test_raw_sends_any_frame(st):
+    assert st("--json", "raw", "02", "40").ended(0).json == {"ok": True, "payload": "58 02 00 00"}
+    assert st("raw", "0x02,0x40").ended(0).out == "ACK 58 02 00 00\n"
+    assert st("raw", "0340").ended(1).err.count("WRONG_CMD") == 1
+
+
+def test_trace_shows_both_directions_on_stderr(st):
+    traced = st("--trace", "get", "MIN_APP_SPEED").ended(0)
+    sent, received = traced.err.splitlines()
+    assert "-> 22 01 40 63" in sent and "GET_REG MIN_APP_SPEED" in sent
+    assert "<- f0 04 58 02 00 00" in received and "600 rpm" in received
+    assert traced.out.split() == ["MIN_APP_SPEED", "600", "rpm"]
+
+
+# What acts.
+
+
+@on_every_port
+@pytest.mark.parametrize(
+    "command",
+    [
+        "set SPEED_KP 3",
+        "set SPEED_KP -3",
+        "set DAC_OUT1 I_ALPHA",
+        "set CONTROL_MODE SPEED",
+        "ramp 700 200",
+        "ramp -700 200",
+        "revup 1 500 200 250",
+        "current 100 -5",
+        "stop-ramp",
+        "stop",
+        "iqdref-clear",
+        "encoder-align",
+        "pfc enable",
+        "pfc disable",
+        "pfc fault-ack",
+    ],
+)
+def test_what_is_done_is_said(st, command):
+    assert st(*command.split()).ended(0).out.startswith("motor 1")
+    assert st("--json", *command.split()).ended(0).json == OK
+
+
+def test_mcsdk_commands_work_with_its_profile(run, sim, tmp_path):
+    config = tmp_path / "servo.toml"
+    config.write_text('profile = "mcsdk-5.4"\n[[st.motor]]\npreset = "servo"\n')
+    port = sim(config, rmd=()).port("pty")
+
+    def st(*arguments):
+        return run("st", "-p", port, "--profile", "mcsdk-5.4", *arguments)
+
+    assert st("--json", "torque-ramp", 100, 50).ended(0).json == OK
+    assert st("--json", "move", 1.5, 0.5).ended(0).json == OK
+    assert st("move", -1.5, 0.5).ended(0).out.startswith("motor 1 turns")
+    assert st("info").ended(0).out.count("5.4.4") == 2
+
+
+def test_a_motor_starts_turns_and_stops(run, sim):
+    drive = sim(rmd=())
+
+    def st(*arguments):
+        return run("st", "-p", drive.st, "-m", 2, *arguments)
+
+    st("ramp", 900, 100).ended(0)
+    started = st("--json", "start").ended(0).json
+    assert started["ok"] and started["STATUS"] != "IDLE"
+    eventually(lambda: drive.motor(2)["speed_rpm"] > 850, "motor 2 turns")
+    assert st("--json", "get", "STATUS").json["STATUS"]["name"] == "RUN"
+    st("start-stop").ended(0)
+    eventually(lambda: drive.motor(2)["status"] == "IDLE", "motor 2 is idle")
+    assert drive.motor(1)["status"] == "IDLE"
+
+
+def test_a_fault_keeps_the_motor_from_starting_until_it_is_acknowledged(run, sim):
+    drive = sim(rmd=())
+
+    def st(*arguments):
+        return run("st", "-p", drive.st, *arguments)
+
+    drive.do("fault", motor=1, fault="BREAK_IN", hold=True)
+    eventually(lambda: drive.motor(1)["status"].startswith("FAULT"), "the fault")
+    assert "BREAK_IN" in st("status").ended(0).out
+    refused = st("start").ended(1)
+    assert "BREAK_IN" in refused.err and "fault-ack" in refused.err
+    assert "BREAK_IN" in st("fault-ack").ended(1).err
+
+    drive.do("fault", motor=1, fault="BREAK_IN", hold=False)
+    eventually(lambda: drive.motor(1)["status"] == "FAULT_OVER", "the cause is gone")
+    assert st("--json", "fault-ack").ended(0).json == {"ok": True, "FLAGS": 0}
+    assert st("start").ended(0)
+
+
+# What a person gets wrong.
+
+
+def test_an_unknown_register_is_met_with_the_nearest(st):
+    assert "did you mean `SPEED_MEAS`?" in st("get", "SPEED_MES").ended(2).err
+    assert "did you mean `SPEED_KP`?" in st("set", "SPED_KP", 1).ended(2).err
+
+
+def test_a_value_out_of_range_is_not_sent(st):
+    told = st("--trace", "set", "SPEED_KP", 32768).ended(2)
+    assert "-32768 to 32767" in told.err and "->" not in told.err
+    st("set", "SPEED_KP", "fast").ended(2)
+    st("ramp", 1000, 65536).ended(2)
+    st("current", 40000, 0).ended(2)
+
+
+def test_the_drive_refuses_to_write_a_read_only_register(st):
+    told = st("set", "SPEED_MEAS", 3).ended(1).err
+    assert "motor 1 refused writing SPEED_MEAS: SET_READ_ONLY" in told
+
+
+def test_the_drive_refuses_to_read_a_register_of_access_d(st):
+    assert "GET_WRITE_ONLY" in st("get", "I_A").ended(1).err
+
+
+def test_a_motor_that_the_drive_lacks_is_refused_and_one_beyond_7_not_even_sent(st):
+    assert "BAD_MOTOR_SELECTED" in st("-m", 3, "start").ended(1).err
+    assert "1..=7" in st("-m", 8, "start").ended(2).err
+
+
+def test_hexadecimal_that_is_none_is_told(st):
+    assert "`xy` is not hexadecimal" in st("raw", "xy").ended(2).err
+    assert "frame code" in st("raw", "20").ended(2).err
+
+
+def test_without_a_port_the_ways_to_name_one_are_told(run):
+    told = run("st", "info").ended(2).err
+    assert "-p PORT" in told and "MOTORLINK_PORT" in told and "sim:" in told
+
+
+def test_the_port_may_come_from_the_environment(run, drives):
+    assert run("st", "info", MOTORLINK_PORT=drives.st).ended(0)
+
+
+@pytest.mark.parametrize("port", ["can0", "tcp:host", "tcp:host:70000", "/dev/x?speed=1"])
+def test_a_port_that_is_none_is_a_usage_error(run, port):
+    run("st", "-p", port, "info").ended(2)
+
+
+def test_a_can_port_is_not_a_serial_line(run, drives):
+    told = run("st", "-p", drives.port("slcan"), "info").ended(2).err
+    assert "cannot be used as a serial line" in told
+
+
+# What goes wrong on the line.
+
+
+def test_a_device_that_does_not_exist_is_told(run, tmp_path):
+    told = run("st", "-p", tmp_path / "ttyACM7", "info").ended(3).err
+    assert "is it plugged in?" in told and "motorlink ports" in told
+
+
+def test_a_file_is_not_a_serial_device(run, tmp_path):
+    (tmp_path / "notes").write_text("no device")
+    for path in (tmp_path / "notes", tmp_path):
+        assert "is not a serial device" in run("st", "-p", path, "info").ended(3).err
+
+
+def test_nobody_listening_is_told(run):
+    assert "refuses the connection" in run("st", "-p", "tcp:127.0.0.1:1", "info").ended(3).err
+
+
+def test_a_silent_device_is_given_up_in_time(run, tmp_path):
+    with device(tmp_path / "silent") as port:
+        begun = time.monotonic()
+        told = run("st", "-p", port, "--timeout", 100, "info").ended(3).err
+        assert time.monotonic() - begun < 4
+    assert "no reply in time" in told and "motorlink st scan" in told
+
+
+def test_scan_tells_silence_from_garbage(run, tmp_path):
+    with device(tmp_path / "silent") as port:
+        scanned = run("st", "-p", port, "--json", "scan", 115200).ended(3)
+        assert scanned.json["finding"] == "silence"
+    with device(tmp_path / "noisy", noise) as port:
+        scanned = run("st", "-p", port, "--json", "scan", 115200).ended(3)
+        assert scanned.json["finding"] == "garbage"
+
+
+@pytest.mark.parametrize("answer", [noise, lambda received: b"\0" * 40, lambda received: received])
+def test_garbage_is_told_and_ends_in_time(run, tmp_path, answer):
+    with device(tmp_path / "noisy", answer) as port:
+        begun = time.monotonic()
+        told = run("st", "-p", port, "--timeout", 200, "info").ended(3).err
+        assert time.monotonic() - begun < 5
+    assert "motorlink st scan" in told or "something else is sending" in told
+
+
+def test_a_device_that_is_unplugged_mid_exchange_is_told(run, tmp_path):
+    with device(tmp_path / "unplugged", lambda received: None) as port:
+        told = run("st", "-p", port, "info").ended(3).err
+    assert "was closed" in told or "unplugged" in told
+
+
+def test_a_loop_survives_a_drive_that_goes_and_comes_back(start, sim):
+    drive = sim(rmd=())
+    loop = start("st", "-p", drive.st, "--json", "get", "SPEED_MEAS", "--every", "50ms")
+    loop.more_lines()
+    drive.kill()
+    loop.says("the line is lost")
+    sim(rmd=())
+    loop.says("the line is back")
+    loop.more_lines()
+    loop.interrupt()
+    assert loop.wait() == 0
+
+
+def test_a_loop_survives_a_server_that_goes_and_comes_back(start, sim):
+    drive = sim(st=("tcp",), rmd=())
+    address = drive.st_address
+    loop = start("st", "-p", f"tcp:{address}", "get", "SPEED_MEAS", "--every", "50ms")
+    loop.more_lines()
+    drive.kill()
+    loop.says("the line is lost")
+    sim(st=(f"tcp-listen:{address}",), rmd=())
+    loop.says("the line is back")
+    loop.more_lines()
+    loop.interrupt()
+    assert loop.wait() == 0
+
+
+def test_ctrl_c_ends_a_loop_on_a_silent_line(start, tmp_path):
+    with device(tmp_path / "silent") as port:
+        loop = start("st", "-p", port, "--timeout", 200, "get", "STATUS", "--every", "50ms")
+        loop.says("the line is lost")
+        loop.interrupt()
+        assert loop.wait() == 0
+
+
+def test_ctrl_c_ends_an_exchange_that_has_long_to_wait(start, tmp_path):
+    asked = threading.Event()
+
+    def listen(received):
+        asked.set()
+        return b""
+
+    with device(tmp_path / "silent", listen) as port:
+        waiting = start("st", "-p", port, "--timeout", 60000, "info")
+        assert asked.wait(10)
+        waiting.interrupt()
+        assert waiting.wait(5) == 130

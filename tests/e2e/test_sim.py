@@ -1,0 +1,355 @@
+"""`motorlink sim`: its ports, its configuration, and the world that commands on stdin change."""
+
+import os
+import signal
+import socket
+from pathlib import Path
+
+import pytest
+
+from program import eventually
+from stmcp import Line, frame
+
+CONTROL_MODE = 0x03
+
+
+def test_each_port_is_announced_when_it_can_be_opened(sim, tmp_path):
+    drives = sim(st=("pty", "tcp"), rmd=("slcan-pty", "tcp"))
+    st, st_tcp, rmd, rmd_tcp = drives.ports
+    assert st["path"].startswith("/dev/pts/")
+    assert st == {
+        **{"port": f"pty:{tmp_path}/st0", "protocol": "stmcp", "motors": 2, "profile": "spec"},
+        "path": os.readlink(tmp_path / "st0"),
+    }
+    assert rmd == {
+        **{"port": f"slcan-pty:{tmp_path}/can0", "protocol": "rmd", "motors": 4},
+        **{"ids": [1, 2, 3, 4], "path": os.readlink(tmp_path / "can0")},
+    }
+    for port in (st_tcp, rmd_tcp):
+        host, _, number = port["path"].rpartition(":")
+        socket.create_connection((host, int(number)), timeout=5).close()
+
+
+def test_without_ports_it_serves_one_of_each_kind_here(start, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    drives = start("sim")
+    assert "pty:./st0" in drives.line(0) and "slcan-pty:./can0" in drives.line(1)
+    assert Path("st0").is_symlink() and Path("can0").is_symlink()
+
+
+def test_each_port_has_drives_of_its_own(sim, tmp_path):
+    ports = [f"pty:{tmp_path}/{name}" for name in ("a", "b")]
+    drives = sim(st=ports, rmd=())
+    with Line(f"{tmp_path}/a") as a, Line(f"{tmp_path}/b") as b:
+        a.set(CONTROL_MODE, 0, 1)
+        a.set(0x05, 77, 2)
+        assert (a.get(0x05), b.get(0x05) == 77) == (77, False)
+    drives.do("supply", port=ports[1], motor=2, volts=30)
+    assert drives.motor(2, ports[0])["bus_volts"] == 24
+    assert drives.motor(2, ports[1])["bus_volts"] == 30
+
+
+def test_a_serial_line_over_tcp_has_one_client_at_a_time(sim):
+    address = sim(st=("tcp",), rmd=()).st_address
+    url = f"socket://{address}"
+    with Line(url) as first:
+        assert first.get(CONTROL_MODE) == 1
+        host, _, port = address.rpartition(":")
+        with socket.create_connection((host, int(port)), timeout=5) as second:
+            assert second.recv(1) == b"", "the second is closed at once"
+        assert first.get(CONTROL_MODE) == 1
+    with Line(url) as third:
+        assert third.get(CONTROL_MODE) == 1
+
+
+def test_what_a_client_left_unread_is_not_shown_to_the_next(sim):
+    port = sim(rmd=()).st
+    with Line(port) as first:
+        first.send(frame(0x02, [CONTROL_MODE]) * 3)
+        eventually(lambda: first.port.in_waiting == 3 * 4, "three replies")
+    with Line(port) as second:
+        assert second.ask(frame(0x06))[1] == 32
+
+
+# Ends.
+
+
+def test_the_end_of_stdin_ends_it_and_removes_its_links(sim, tmp_path):
+    drives = sim("--stdin")
+    drives.process.stdin.close()
+    assert drives.wait() == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_and_removes_its_links(sim, tmp_path, number):
+    drives = sim()
+    drives.process.send_signal(number)
+    assert drives.wait() == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_stdin_it_outlives_its_input(sim):
+    drives = sim()
+    drives.process.stdin.close()
+    drives.process.stdin = None
+    with Line(drives.st) as line:
+        assert line.get(CONTROL_MODE) == 1
+    assert drives.process.poll() is None
+
+
+def test_a_stale_link_is_replaced(sim, tmp_path):
+    sim(rmd=()).kill()
+    assert (tmp_path / "st0").is_symlink()
+    with Line(sim(rmd=()).st) as line:
+        assert line.get(CONTROL_MODE) == 1
+
+
+def test_a_link_that_another_has_taken_over_is_left_alone(sim, tmp_path):
+    first = sim(rmd=())
+    second = sim(rmd=())
+    first.end()
+    with Line(second.st) as line:
+        assert line.get(CONTROL_MODE) == 1
+
+
+@pytest.mark.parametrize("kind", ["file", "folder", "link to a file"])
+def test_what_is_no_link_to_a_pty_is_not_overwritten(run, tmp_path, kind):
+    path = tmp_path / "st0"
+    (tmp_path / "precious").write_text("kept")
+    if kind == "file":
+        path.write_text("kept")
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to(tmp_path / "precious")
+    told = run("sim", "--stdin", "--st", f"pty:{path}").ended(3).err
+    assert "is no link to a pty" in told
+    assert path.is_dir() or path.read_text() == "kept"
+
+
+@pytest.mark.parametrize(
+    "arguments, told, code",
+    [
+        ("--st slcan-pty:x", "serial line", 2),
+        ("--rmd pty:x", "CAN bus", 2),
+        ("--st /dev/ttyUSB0", "pty:PATH", 2),
+        ("--st tcp-listen:127.0.0.1:port", "65535", 2),
+        ("--st pty:/no/such/folder/st0", "/no/such/folder", 3),
+        ("--profile v9", "spec and mcsdk-5.4", 2),
+        ("no-such.toml", "cannot read `no-such.toml`", 2),
+    ],
+)
+def test_what_cannot_be_served_is_told(run, tmp_path, monkeypatch, arguments, told, code):
+    monkeypatch.chdir(tmp_path)
+    assert told in run("sim", "--stdin", *arguments.split()).ended(code).err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_path_is_served_once(run, tmp_path):
+    port = f"pty:{tmp_path}/st0"
+    assert run("sim", "--stdin", "--st", port, "--st", port).code in (2, 3)
+
+
+def test_a_tcp_port_that_is_taken_is_told(run, sim):
+    address = sim(st=("tcp",), rmd=()).st_address
+    told = run("sim", "--stdin", "--st", f"tcp-listen:{address}").ended(3).err
+    assert "is taken by another program" in told
+
+
+# Configuration.
+
+
+def test_the_configuration_says_what_the_drives_are(sim, tmp_path):
+    config = tmp_path / "bench.toml"
+    config.write_text("""
+        profile = "mcsdk-5.4"
+        [[st.motor]]
+        preset = "servo"
+        bus_voltage = 36.0
+        registers.speed_kp = 1234
+        [[rmd.motor]]
+        id = 32
+        supply_voltage = 48.0
+        machine.pole_pairs = 7
+    """)
+    drives = sim(config)
+    st, rmd = drives.ports
+    assert (st["motors"], st["profile"], rmd["ids"]) == (1, "mcsdk-5.4", [32])
+    assert drives.motor(1, st["port"])["bus_volts"] == 36
+    assert drives.motor(32, rmd["port"])["supply_volts"] == 48
+    with Line(drives.st) as line:
+        assert line.get(0x05) == 1234
+
+
+def test_the_profile_of_the_command_line_goes_before_the_configurations(sim, tmp_path):
+    (tmp_path / "bench.toml").write_text('profile = "mcsdk-5.4"')
+    drives = sim(tmp_path / "bench.toml", "--profile", "spec", rmd=())
+    assert drives.ports[0]["profile"] == "spec"
+
+
+@pytest.mark.parametrize(
+    "text, place",
+    [
+        ("[[rmd.motor]]\nid = 1\n[[rmd.motor]]\nidd = 3", ["rmd.motor 2", "idd"]),
+        ("[[st.motor]]\nmachine.poles = 3", ["st.motor 1", "poles"]),
+        ('[[st.motor]]\npreset = "big"', ["st.motor 1", "servo"]),
+        ('[[st.motor]]\nbus_voltage = "high"', ["st.motor 1", "high"]),
+        ("[[rmd.motor]]\nid = 33", ["motor 33", "1 to 32"]),
+        ("[[rmd.motor]]\nid = 3\n[[rmd.motor]]\nid = 3", ["same ID"]),
+        ("[[st.motor]]\n" * 8, ["1 to 7 motors"]),
+        ("[st]\nmotor = []", ["1 to 7 motors"]),
+        ("profile = 'v9'", ["line 1", "v9"]),
+        ("profile = 'spec'\nst = [", ["line 2"]),
+        ("colour = 'red'", ["line 1", "colour"]),
+    ],
+)
+def test_a_configuration_error_names_its_place(run, tmp_path, text, place):
+    config = tmp_path / "bench.toml"
+    config.write_text(text)
+    told = run("sim", "--stdin", config, "--st", f"pty:{tmp_path}/st0").ended(2).err
+    assert "bench.toml" in told, told
+    assert all(word in told for word in place), told
+    assert not (tmp_path / "st0").exists()
+
+
+def test_a_simulated_port_takes_a_configuration_too(run, tmp_path):
+    config = tmp_path / "bench.toml"
+    config.write_text("[[rmd.motor]]\nid = 5\n")
+    found = run("rmd", "-p", f"sim:{config}", "--json", "scan").ended(0).json
+    assert found["id"] == 5
+    config.write_text("[[rmd.motor]]\nid = 50\n")
+    assert "1 to 32" in run("rmd", "-p", f"sim:{config}", "scan").ended(3).err
+
+
+# Commands on stdin.
+
+
+@pytest.fixture
+def st(sim):
+    return sim(rmd=())
+
+
+@pytest.fixture
+def rmd(sim):
+    return sim(st=())
+
+
+def test_state_tells_what_is_really_going_on(sim):
+    answer = sim().do("state")
+    assert answer["time"] > 0
+    st, rmd = answer["state"]
+    assert [motor["motor"] for motor in st["motors"]] == [1, 2]
+    assert set(st["motors"][0]) == {
+        *("motor", "status", "faults", "speed_rpm", "speed_reference_rpm", "angle_degrees"),
+        *("iq_amps", "id_amps", "bus_volts", "celsius", "load_newton_metres", "locked"),
+    }
+    assert [motor["motor"] for motor in rmd["motors"]] == [1, 2, 3, 4]
+    assert set(rmd["motors"][0]) == {
+        *("motor", "mode", "errors", "speed_dps", "speed_reference_dps", "angle_degrees"),
+        *("iq_amps", "supply_volts", "celsius", "load_newton_metres", "locked", "rom_writes"),
+    }
+
+
+def test_time_passes_while_nobody_talks(rmd):
+    begun = rmd.do("state")["time"]
+    eventually(lambda: rmd.do("state")["time"] > begun + 0.1, "time passes")
+
+
+def test_supply_sets_the_voltage(st, rmd):
+    st.do("supply", motor=1, volts=300)
+    assert st.motor(1)["bus_volts"] == 300
+    rmd.do("supply", motor=4, volts=12.5)
+    assert rmd.motor(4)["supply_volts"] == 12.5
+
+
+def test_temperature_is_shown_until_it_is_taken_back(st, rmd):
+    for drives in (st, rmd):
+        drives.do("temperature", motor=1, celsius=61)
+        assert drives.motor(1)["celsius"] == 61
+        drives.do("temperature", motor=1)
+        assert drives.motor(1)["celsius"] == 25
+        drives.do("temperature", motor=1, celsius=None)
+
+
+def test_load_and_lock_rotor_hold_the_motor(st, rmd):
+    for drives in (st, rmd):
+        drives.do("load", motor=2, newton_metres=0.5)
+        drives.do("lock-rotor", motor=2, locked=True)
+        assert (drives.motor(2)["load_newton_metres"], drives.motor(2)["locked"]) == (0.5, True)
+        drives.do("lock-rotor", motor=2, locked=False)
+        assert not drives.motor(2)["locked"]
+        assert drives.motor(1)["load_newton_metres"] == 0
+
+
+def test_a_fault_happens_once_or_is_held(st, rmd):
+    st.do("fault", motor=1, fault="BREAK_IN")
+    eventually(lambda: st.motor(1)["status"] == "FAULT_OVER", "the fault is over")
+    st.do("fault", motor=2, fault="over_temp", hold=True)
+    eventually(lambda: st.motor(2)["status"] == "FAULT_NOW", "the fault stays")
+    assert "OVER_TEMP" in st.motor(2)["faults"]
+    st.do("fault", motor=2, fault="OVER_TEMP", hold=False)
+    eventually(lambda: st.motor(2)["status"] == "FAULT_OVER", "the cause is gone")
+
+    rmd.do("fault", motor=1, fault="LOW_VOLTAGE")
+    rmd.do("fault", motor=2, fault="over_temperature")
+    eventually(lambda: "voltage" in rmd.motor(1)["errors"], "the low voltage flag")
+    eventually(lambda: "temperature" in rmd.motor(2)["errors"], "the temperature flag")
+
+
+def test_a_power_cycle_is_for_the_drive_or_for_a_motor_on_the_bus(st, rmd):
+    with Line(st.st) as line:
+        line.set(0x05, 77, 2)
+        st.do("power-cycle")
+        assert line.get(0x05) != 77
+    assert "one supply" in st.command("power-cycle", motor=1)["error"]
+    rmd.do("power-cycle")
+    rmd.do("power-cycle", motor=3)
+
+
+@pytest.mark.parametrize(
+    "line, why",
+    [
+        ("garbage", "not a command"),
+        ("{", "not a command"),
+        ("[]", "not a command"),
+        ("{}", "command"),
+        ('{"command": "explode"}', "unknown variant `explode`"),
+        ('{"command": "supply", "motor": 1}', "volts"),
+        ('{"command": "supply", "motor": 1, "volts": "high"}', "high"),
+        ('{"command": "supply", "motor": 1, "volts": 3, "amps": 1}', "amps"),
+        ('{"command": "supply", "motor": 300, "volts": 3}', "300"),
+        ('{"command": "supply", "volts": 3}', "motor"),
+        ('{"command": "supply", "motor": 9, "volts": 3}', "no motor 9"),
+        ('{"command": "supply", "motor": 0, "volts": 3}', "no motor 0"),
+        ('{"command": "power-cycle", "motor": 33}', "no motor 33"),
+        ('{"command": "fault", "motor": 1, "fault": "FIRE"}', "LOW_VOLTAGE, OVER_TEMPERATURE"),
+        ('{"command": "state", "port": "pty:nowhere"}', "`pty:nowhere` is not served"),
+    ],
+)
+def test_a_line_that_cannot_be_obeyed_says_why_and_changes_nothing(rmd, line, why):
+    answer = rmd.say(line)
+    assert not answer["ok"] and why in answer["error"]
+    assert rmd.motor(1)["supply_volts"] == 24
+
+
+def test_among_several_ports_the_one_meant_has_to_be_named(sim):
+    drives = sim()
+    asked = drives.command("supply", motor=1, volts=20)
+    assert not asked["ok"] and all(port["port"] in asked["error"] for port in drives.ports)
+    drives.do("supply", port=drives.ports[1]["port"], motor=1, volts=20)
+
+
+def test_two_ports_of_the_same_name_can_both_be_commanded(sim):
+    drives = sim(st=("tcp", "tcp"), rmd=())
+    for number, port in enumerate(drives.ports):
+        drives.do("supply", port=port["port"], motor=1, volts=300 + number)
+    volts = [bench["motors"][0]["bus_volts"] for bench in drives.do("state")["state"]]
+    assert volts == [300, 301]
+
+
+def test_several_commands_at_once_are_answered_in_order(rmd):
+    lines = ['{"command":"state"}', "garbage", "", '{"command":"power-cycle"}']
+    rmd.process.stdin.write("\n".join(lines[:-1]) + "\n")
+    assert rmd.say(lines[-1])["ok"]
+    assert not rmd.say("nothing either")["ok"]
