@@ -152,7 +152,7 @@ def test_a_motor_turns_stops_and_resumes(run, sim):
     rmd("move", 45, "--direction", "cw", "--max-speed", 1000)
     eventually(lambda: abs(bus.motor(1)["angle_degrees"] % 360 - 45) < 0.5, "motor 1 is at 45°")
     rmd("off")
-    assert bus.motor(1)["mode"] == "Off"
+    assert bus.motor(1)["mode"] == "off"
 
 
 def test_an_error_that_has_its_cause_stays_and_is_told(run, sim):
@@ -178,12 +178,12 @@ def test_a_motor_id_outside_1_to_32_is_a_usage_error(run, motor):
 @pytest.mark.parametrize(
     "command, told",
     [
-        ("torque 33", "32.000 A"),
+        ("torque 33", "±32 A"),
         ("torque nan", "nothing was sent"),
         ("move 360 --direction cw", "359.99"),
         ("move -1 --direction cw", "nothing was sent"),
         ("speed 1e9", "nothing was sent"),
-        ("torque4 0 0 0 99", "32.000 A"),
+        ("torque4 0 0 0 99", "±32 A"),
         ("pid 1 2", "6 values"),
         ("pid 1 2 3 4 5 256", "256"),
         ("raw 1 2 3 4 5 6 7 8 9", "8 bytes"),

@@ -359,7 +359,7 @@ def test_a_motor_that_hears_nothing_for_its_shutdown_time_is_off(sim, tmp_path):
     with Host(simulator.can) as host:
         host.ask(1, SPEED, null("3xi", 36000))
         eventually(lambda: host.speed(1) > 300, "motor 1 turns while it is asked")
-        eventually(lambda: simulator.motor(1)["mode"] == "Off", "motor 1 is off")
+        eventually(lambda: simulator.motor(1)["mode"] == "off", "motor 1 is off")
 
 
 def test_max_angle_and_max_speed_hold_a_position_command(sim, tmp_path):

@@ -105,11 +105,10 @@ def test_a_stale_link_is_replaced(sim, tmp_path):
         assert line.get(CONTROL_MODE) == 1
 
 
-def test_a_link_that_another_has_taken_over_is_left_alone(sim, tmp_path):
+def test_a_link_that_another_serves_is_left_alone(sim, run):
     first = sim(rmd=())
-    second = sim(rmd=())
-    first.end()
-    with Line(second.st) as line:
+    assert "served already" in run("sim", "--stdin", "--st", f"pty:{first.st}").ended(3).err
+    with Line(first.st) as line:
         assert line.get(CONTROL_MODE) == 1
 
 

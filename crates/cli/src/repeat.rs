@@ -27,22 +27,27 @@ pub fn repeated<T>(
     let Some(every) = repeat.every else { return print(&sample()?, None) };
     let began = Instant::now();
     interrupt::take_over();
-    let mut lost = false;
+    let mut trouble = None;
     let mut left = repeat.count.unwrap_or(u64::MAX);
     let mut due = began;
     while left > 0 && !interrupt::interrupted() {
         match sample() {
             Ok(samples) => {
-                if std::mem::take(&mut lost) {
-                    eprintln!("answers come again");
+                if let Some(over) = trouble.take() {
+                    eprintln!("{over}");
                 }
                 print(&samples, Some(began.elapsed().as_secs_f64()))?;
                 left -= 1;
             }
-            Err(Failure::Line(message)) => {
-                tell_once(&mut lost, &format!("the line is lost: {message}"));
+            Err(Failure::Line(message)) if trouble.is_none() => {
+                eprintln!("the line is lost: {message}; trying again until Ctrl-C");
+                trouble = Some("the line is back");
             }
-            Err(Failure::Silent(message)) => tell_once(&mut lost, &message),
+            Err(Failure::Silent(message)) if trouble.is_none() => {
+                eprintln!("{message}; trying again until Ctrl-C");
+                trouble = Some("it answers again");
+            }
+            Err(Failure::Line(_) | Failure::Silent(_)) => {}
             Err(other) => return Err(other),
         }
         // A slow line skips readings rather than falling behind.
@@ -55,10 +60,4 @@ pub fn repeated<T>(
         }
     }
     Ok(())
-}
-
-fn tell_once(told: &mut bool, message: &str) {
-    if !std::mem::replace(told, true) {
-        eprintln!("{message}; trying again until Ctrl-C");
-    }
 }

@@ -160,6 +160,14 @@ pub enum PortError {
         /// The path.
         port: String,
     },
+    /// The link of a served pty is another server's.
+    #[error(
+        "`{port}` is served already, perhaps by another simulator: end that or choose another path"
+    )]
+    PathServed {
+        /// The path.
+        port: String,
+    },
     /// The address to listen on is taken.
     #[error("`{port}` is taken by another program: choose another TCP port, or 0 for any free one")]
     AddressInUse {

@@ -86,6 +86,9 @@ fn watch_comings(path: &Path) -> rustix::io::Result<OwnedFd> {
 fn clear_link(link: &Path) -> Result<(), PortError> {
     let port = link.display().to_string();
     let is_ours = match std::fs::read_link(link) {
+        Ok(target) if link.exists() && target.starts_with("/dev/pts") => {
+            return Err(PortError::PathServed { port });
+        }
         Ok(_) => !link.exists(),
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         // Not a link at all.

@@ -84,8 +84,9 @@ impl Slave {
         if expired {
             return Some(&TIMEOUT_REPLY);
         }
+        let size = size?;
         let command = self.buffer;
-        let answer = match Frame::parse(command.get(..size?)?) {
+        let answer = match Frame::parse(command.get(..size)?) {
             Parse::Frame(frame, _) => self.process(&frame, drive),
             _ => Err(ErrorCode::BadCrc),
         };

@@ -1,0 +1,142 @@
+//! An ST exchange in user space: master and slave, without a line between them.
+
+use std::hint::black_box;
+
+use motorlink_proto::stmcp::{
+    Command, Config, CurrentReference, Drive, ErrorCode, Features, Master, Motor, Output,
+    PositionMove, Profile, Ramp, RegisterId, Request, RevupPhase, Slave, TorqueRamp, Version,
+};
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_sim::st::StDrive;
+
+use crate::Result;
+use crate::kernel::{Counter, Kernel};
+use crate::report::{Goal, Section};
+
+/// Instructions that an exchange has to stay below.
+const MOST: f64 = 1_500.0;
+/// Time between two exchanges, for the simulated drive.
+const PERIOD: Duration = Duration(100);
+
+pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
+    let counter = Counter::find();
+    let mut rows = Vec::new();
+    let mut counts = Vec::new();
+    for kernel in kernels() {
+        let name = kernel.name.clone();
+        let cost = kernel.cost(counter.as_ref())?;
+        rows.push([name].into_iter().chain(cost.show()).collect());
+        counts.push(cost.instructions);
+    }
+    let goal = Goal {
+        what: "instructions of a GET_REG exchange, master and slave".to_owned(),
+        wanted: format!("< {MOST}"),
+        reached: counts[0].map(|count| (format!("{count:.0}"), count < MOST)),
+    };
+    let section = Section {
+        title: "A GET_REG exchange, master and slave",
+        note: "SPEED_MEAS from request to value in user space, without I/O; the drive is memory, \
+               or simulated with 0.1 ms between exchanges, in which its motors turn."
+            .to_owned(),
+        columns: vec!["drive", "ns, least", "median", "instructions"],
+        rows,
+    };
+    Ok((vec![section], vec![goal]))
+}
+
+pub fn kernels() -> [Kernel; 2] {
+    let (mut master, mut slave) = (Master::new(Config::default()), slave(Motor::FIRST));
+    let mut memory = Memory { registers: [1_500; 256] };
+    let with_memory = Kernel::new("exchange with memory", move || {
+        black_box(exchange(Instant(0), &mut master, &mut slave, &mut memory));
+    });
+
+    let mut simulated = StDrive::demo(Instant(0));
+    simulated.execute(Motor::FIRST, Command::StartMotor);
+    let (mut master, mut slave) = (Master::new(Config::default()), self::slave(simulated.last()));
+    let mut now = Instant(0);
+    let with_simulation = Kernel::new("exchange with simulation", move || {
+        now += PERIOD;
+        simulated.advance_to(now);
+        black_box(exchange(now, &mut master, &mut slave, &mut simulated));
+    });
+    [with_memory, with_simulation]
+}
+
+fn slave(last: Motor) -> Slave {
+    Slave::new(Profile::Spec, last)
+}
+
+/// Reads SPEED_MEAS.
+fn exchange(
+    now: Instant,
+    master: &mut Master,
+    slave: &mut Slave,
+    drive: &mut impl Drive,
+) -> Option<i32> {
+    let register = RegisterId::SPEED_MEAS;
+    master.request(1, &Request::GetRegister(register)).ok()?;
+    let mut reply: &[u8] = &[];
+    loop {
+        match master.poll(now) {
+            Output::Transmit(bytes) => {
+                for &byte in bytes {
+                    reply = slave.receive(now, byte, drive).unwrap_or(&[]);
+                }
+            }
+            Output::Wait(_) => master.receive(now, reply),
+            Output::Done(result) => return register.decode(result.ok()?),
+        }
+    }
+}
+
+/// A drive that does nothing but keep registers.
+struct Memory {
+    registers: [i32; 256],
+}
+
+impl Drive for Memory {
+    fn features(&self, _: Motor) -> Features {
+        Features::NONE
+    }
+    fn version(&self) -> Version<'_> {
+        Version { name: "memory", major: 0, minor: 0, patch: 0, pre_release: "" }
+    }
+    fn read(&mut self, _: Motor, register: RegisterId) -> i32 {
+        self.registers[usize::from(register.0)]
+    }
+    fn write(
+        &mut self,
+        _: Motor,
+        register: RegisterId,
+        value: i32,
+    ) -> std::result::Result<(), ErrorCode> {
+        self.registers[usize::from(register.0)] = value;
+        Ok(())
+    }
+    fn execute(&mut self, _: Motor, _: Command) {}
+    fn ramp(&mut self, _: Motor, _: Ramp) {}
+    fn revup(&mut self, _: Motor, _: u8) -> RevupPhase {
+        RevupPhase::default()
+    }
+    fn set_revup(&mut self, _: Motor, _: u8, _: RevupPhase) {}
+    fn current_reference(&mut self, _: Motor, _: CurrentReference) {}
+    fn torque_ramp(&mut self, _: Motor, _: TorqueRamp) {}
+    fn position(&mut self, _: Motor, _: PositionMove) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exchange_reads_the_register_again_and_again() {
+        let (mut master, mut slave) = (Master::new(Config::default()), slave(Motor::FIRST));
+        let mut memory = Memory { registers: [0; 256] };
+        for value in [-1, 0, 1_500] {
+            memory.registers[usize::from(RegisterId::SPEED_MEAS.0)] = value;
+            let read = exchange(Instant(0), &mut master, &mut slave, &mut memory);
+            assert_eq!(read, Some(value));
+        }
+    }
+}

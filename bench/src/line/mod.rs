@@ -1,0 +1,126 @@
+//! Exchanges per second through real lines, against a raw loop that moves the same bytes.
+
+mod raw;
+mod sitting;
+mod transport;
+
+use std::env::current_exe;
+use std::process::{Command, Stdio};
+
+use crate::Result;
+use crate::report::{Goal, Section};
+use sitting::{Rates, sit};
+use transport::Transport;
+
+/// Processes that measure: where code and stacks come to lie in memory makes a tenth.
+const SITTINGS: usize = 20;
+/// Pairs of rounds in a sitting.
+const ROUNDS: usize = 80;
+/// Exchanges in a round.
+const EXCHANGES: u32 = 50;
+/// The share of the raw loop's rate that the client has to reach.
+const LEAST: f64 = 0.90;
+
+pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
+    let mut rows = Vec::new();
+    let mut goals = Vec::new();
+    for transport in Transport::ALL {
+        let rounds = rounds(transport)?;
+        let spread = |figure: fn(&Rates) -> f64| Spread::of(rounds.iter().map(figure).collect());
+        let (client, raw) = (spread(|rates| rates.client), spread(|rates| rates.raw));
+        let ratio = spread(|rates| rates.client / rates.raw);
+        let inlined = spread(|rates| rates.client / rates.inlined);
+        rows.push(vec![
+            transport.name().to_owned(),
+            format!("{:.0}", client.median),
+            format!("{:.0}", raw.median),
+            format!("{:.3}", ratio.median),
+            format!("{:.3}", ratio.least),
+            format!("{:.3}", ratio.most),
+            format!("{:.3}", inlined.median),
+        ]);
+        if transport.is_required() {
+            goals.push(Goal {
+                what: format!("ratio to the raw loop, {}", transport.name()),
+                wanted: format!(">= {LEAST:.2}"),
+                reached: Some((format!("{:.3}", ratio.median), ratio.median >= LEAST)),
+            });
+        }
+    }
+    let section = Section {
+        title: "Exchanges per second through a line",
+        note: format!(
+            "GET_REG SPEED_MEAS by the blocking client from a simulated drive in another thread, \
+             against a loop without a protocol that moves the same bytes with the same system \
+             calls, each a function as in libc. {ROUNDS} rounds of {EXCHANGES} exchanges of each in \
+             turn, all on one core, in each of {SITTINGS} processes. Rates are medians; the ratio is \
+             that of neighbouring rounds. The last column is the median ratio to a loop with inlined \
+             calls, for information: it has no return behind a switch between threads, which the \
+             processor would mispredict."
+        ),
+        columns: vec!["line", "client/s", "raw/s", "ratio, median", "least", "most", "inlined"],
+        rows,
+    };
+    Ok((vec![section], goals))
+}
+
+/// The rounds of all sittings.
+fn rounds(transport: Transport) -> Result<Vec<Rates>> {
+    let mut rounds = Vec::with_capacity(SITTINGS * ROUNDS);
+    for _ in 0..SITTINGS {
+        let sitting = Command::new(current_exe()?)
+            .args(["sitting", transport.name()])
+            .stdin(Stdio::null())
+            .stderr(Stdio::inherit())
+            .output()?;
+        if !sitting.status.success() {
+            return Err(format!("measuring the {} failed", transport.name()).into());
+        }
+        let lines = String::from_utf8(sitting.stdout)?;
+        for line in lines.lines() {
+            rounds.push(line.parse()?);
+        }
+    }
+    Ok(rounds)
+}
+
+/// A sitting in this process: prints a line for each pair of rounds.
+pub fn sitting(name: &str) -> Result<()> {
+    let transport = Transport::ALL.into_iter().find(|transport| transport.name() == name);
+    let transport = transport.ok_or_else(|| format!("no line is called {name}"))?;
+    for rates in sit(transport, ROUNDS, EXCHANGES)? {
+        println!("{rates}");
+    }
+    Ok(())
+}
+
+/// The middle and the ends of what was measured.
+#[derive(Debug, PartialEq)]
+struct Spread {
+    least: f64,
+    median: f64,
+    most: f64,
+}
+
+impl Spread {
+    fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let at = |place: usize| values.get(place).copied().unwrap_or(f64::NAN);
+        let last = values.len().saturating_sub(1);
+        let median = f64::midpoint(at(last / 2), at(last.div_ceil(2)));
+        Spread { least: at(0), median, most: at(last) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_in_the_middle_of_odd_and_even_numbers_of_values() {
+        let odd = Spread::of(vec![3.0, 1.0, 2.0]);
+        assert_eq!(odd, Spread { least: 1.0, median: 2.0, most: 3.0 });
+        let even = Spread::of(vec![4.0, 1.0, 2.0, 3.0]);
+        assert_eq!(even, Spread { least: 1.0, median: 2.5, most: 4.0 });
+    }
+}

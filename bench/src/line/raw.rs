@@ -1,0 +1,135 @@
+//! The same bytes by the same system calls, and nothing else: write, ppoll, read at the near end;
+//! ppoll, read, write at the far end.
+
+use std::os::fd::OwnedFd;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use rustix::io::{self, Errno};
+
+use crate::Result;
+
+/// GET_REG SPEED_MEAS to motor 1, and a speed of 0.
+const REQUEST: &[u8] = &[0x22, 0x01, 0x1E, 0x41];
+const REPLY: &[u8] = &[0xF0, 0x04, 0x00, 0x00, 0x00, 0x00, 0xF4];
+/// The client waits for a reply with this timeout, so the kernel has a timer to set here too.
+const TIMEOUT: Timespec = Timespec { tv_sec: 1, tv_nsec: 0 };
+
+/// How the loop calls the system.
+pub(super) trait Calls {
+    fn send(fd: &OwnedFd, bytes: &[u8]) -> io::Result<usize>;
+    fn wait(fd: &OwnedFd, timeout: Option<&Timespec>) -> io::Result<usize>;
+    fn take(fd: &OwnedFd, buffer: &mut [u8]) -> io::Result<usize>;
+}
+
+/// Each call is a function that returns, as in libc.
+pub(super) struct Functions;
+
+impl Calls for Functions {
+    #[inline(never)]
+    fn send(fd: &OwnedFd, bytes: &[u8]) -> io::Result<usize> {
+        Inlined::send(fd, bytes)
+    }
+
+    #[inline(never)]
+    fn wait(fd: &OwnedFd, timeout: Option<&Timespec>) -> io::Result<usize> {
+        Inlined::wait(fd, timeout)
+    }
+
+    #[inline(never)]
+    fn take(fd: &OwnedFd, buffer: &mut [u8]) -> io::Result<usize> {
+        Inlined::take(fd, buffer)
+    }
+}
+
+/// All is one function, which no program has: nothing returns behind a switch to another thread,
+/// where the processor mispredicts it.
+pub(super) struct Inlined;
+
+impl Calls for Inlined {
+    #[inline(always)]
+    fn send(fd: &OwnedFd, bytes: &[u8]) -> io::Result<usize> {
+        io::write(fd, bytes)
+    }
+
+    #[inline(always)]
+    fn wait(fd: &OwnedFd, timeout: Option<&Timespec>) -> io::Result<usize> {
+        poll(&mut [PollFd::new(fd, PollFlags::IN)], timeout)
+    }
+
+    #[inline(always)]
+    fn take(fd: &OwnedFd, buffer: &mut [u8]) -> io::Result<usize> {
+        io::read(fd, buffer)
+    }
+}
+
+/// The end that asks.
+pub(super) struct Near(OwnedFd);
+
+impl Near {
+    pub(super) fn new(fd: OwnedFd) -> Result<Self> {
+        nonblocking(fd).map(Near)
+    }
+
+    #[inline(always)]
+    pub(super) fn exchange<C: Calls>(&self) -> Result<()> {
+        C::send(&self.0, REQUEST)?;
+        Ok(receive::<C>(&self.0, REPLY.len(), Some(&TIMEOUT))?)
+    }
+}
+
+/// The end that answers.
+pub(super) struct Far(OwnedFd);
+
+impl Far {
+    pub(super) fn new(fd: OwnedFd) -> Result<Self> {
+        nonblocking(fd).map(Far)
+    }
+
+    /// Answers until the line is closed.
+    pub(super) fn serve<C: Calls>(self) {
+        while receive::<C>(&self.0, REQUEST.len(), None).is_ok() {
+            if C::send(&self.0, REPLY).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// Takes `size` bytes, which nearly always come at once.
+#[inline(always)]
+fn receive<C: Calls>(fd: &OwnedFd, size: usize, timeout: Option<&Timespec>) -> io::Result<()> {
+    let mut buffer = [0; 256];
+    let mut received = 0;
+    while received < size {
+        if C::wait(fd, timeout)? == 0 {
+            return Err(Errno::TIMEDOUT);
+        }
+        match C::take(fd, &mut buffer)? {
+            0 => return Err(Errno::PIPE),
+            more => received += more,
+        }
+    }
+    Ok(())
+}
+
+/// As the client's line is.
+fn nonblocking(fd: OwnedFd) -> Result<OwnedFd> {
+    fcntl_setfl(&fd, fcntl_getfl(&fd)? | OFlags::NONBLOCK)?;
+    Ok(fd)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use motorlink_proto::stmcp::{Frame, HEADER_ACK, RegisterId, Request};
+
+    #[test]
+    fn the_bytes_are_those_of_the_exchange() {
+        let mut room = [0; 16];
+        let request = Request::GetRegister(RegisterId::SPEED_MEAS);
+        assert_eq!(request.encode(1, &mut room), Some(REQUEST));
+        let reply = Frame { header: HEADER_ACK, payload: &[0; 4] };
+        assert_eq!(reply.encode(&mut room), Some(REPLY));
+    }
+}

@@ -1,0 +1,83 @@
+//! The benchmark: what encoding, exchanges and cycles cost, and how near they come to what the
+//! machine and the wire allow. `make bench` runs it.
+
+mod can;
+mod codec;
+mod exchange;
+mod kernel;
+mod line;
+mod machine;
+mod report;
+
+use std::error::Error;
+
+use clap::{Parser, Subcommand};
+
+use report::{Goal, Section, Style};
+
+type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
+
+/// Measures Motorlink on this machine. A goal that is missed is said so; the exit code stays 0.
+#[derive(Parser)]
+#[command(name = "motorlink-bench")]
+struct Args {
+    #[command(subcommand)]
+    what: What,
+    /// Print Markdown, with the command and the machine, as docs/BENCHMARKS.md has it
+    #[arg(long, global = true)]
+    markdown: bool,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// Everything below
+    All,
+    /// Time and instructions to encode and decode each message
+    Codec,
+    /// Exchanges per second through real lines, against a raw loop
+    Line,
+    /// Cycles on a simulated 1 Mbit/s CAN bus, against the wire's ceiling
+    Can,
+    /// Instructions of an ST exchange, master and slave together
+    Exchange,
+    /// Repeats one piece of work, to be counted from outside
+    #[command(hide = true)]
+    Kernel { name: String, count: u32 },
+    /// Measures one line for a while, in a process of its own
+    #[command(hide = true)]
+    Sitting { line: String },
+}
+
+/// One part of the benchmark: its tables, and what became of its goals.
+type Part = fn() -> Result<(Vec<Section>, Vec<Goal>)>;
+
+fn main() -> Result<()> {
+    let args = Args::parse();
+    let style = if args.markdown { Style::Markdown } else { Style::Plain };
+    let parts: &[Part] = match args.what {
+        What::All => &[codec::measure, line::measure, can::measure, exchange::measure],
+        What::Codec => &[codec::measure],
+        What::Line => &[line::measure],
+        What::Can => &[can::measure],
+        What::Exchange => &[exchange::measure],
+        What::Kernel { name, count } => return repeat(&name, count),
+        What::Sitting { line } => return line::sitting(&line),
+    };
+    machine::describe(style);
+    let mut goals = Vec::new();
+    for part in parts {
+        let (sections, outcomes) = part()?;
+        sections.iter().for_each(|section| section.print(style));
+        goals.extend(outcomes);
+    }
+    report::goals(&goals).print(style);
+    Ok(())
+}
+
+/// Runs under the instruction counter, see [`kernel::Counter`].
+fn repeat(name: &str, count: u32) -> Result<()> {
+    let kernels = codec::kernels().chain(exchange::kernels());
+    let mut found = kernels.into_iter().filter(|kernel| kernel.name == name);
+    found.next().ok_or_else(|| format!("no kernel is called {name}"))?.repeat(count);
+    Ok(())
+}

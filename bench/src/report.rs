@@ -1,0 +1,129 @@
+//! Tables for a terminal and for Markdown.
+
+/// How a report is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// Aligned columns.
+    Plain,
+    /// Markdown.
+    Markdown,
+}
+
+/// A table with a title, and a paragraph that says how to read it.
+pub struct Section {
+    pub title: &'static str,
+    pub note: String,
+    pub columns: Vec<&'static str>,
+    /// As many cells as there are columns.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Section {
+    pub fn print(&self, style: Style) {
+        print!("\n{}", self.text(style));
+    }
+
+    fn text(&self, style: Style) -> String {
+        let widths = self.widths();
+        let head = self.columns.iter().map(|name| (*name).to_owned()).collect();
+        let rule = widths.iter().enumerate().map(|(column, &width)| match (style, column) {
+            (Style::Plain, _) | (Style::Markdown, 0) => "-".repeat(width),
+            // Figures stand at the right.
+            (Style::Markdown, _) => format!("{}:", "-".repeat(width - 1)),
+        });
+        let mut text = match style {
+            Style::Plain => format!("{}\n{}\n\n", self.title, self.note),
+            Style::Markdown => format!("## {}\n\n{}\n\n", self.title, self.note),
+        };
+        for row in [&head, &rule.collect()].into_iter().chain(&self.rows) {
+            text.push_str(&line(row, &widths, style));
+        }
+        text
+    }
+
+    fn widths(&self) -> Vec<usize> {
+        let width = |column: usize| {
+            let cells = self.rows.iter().map(|row| row[column].chars().count());
+            cells.chain([self.columns[column].chars().count()]).max().unwrap_or(0)
+        };
+        (0..self.columns.len()).map(width).collect()
+    }
+}
+
+fn line(cells: &[String], widths: &[usize], style: Style) -> String {
+    let padded =
+        cells.iter().zip(widths).enumerate().map(|(column, (cell, &width))| match column {
+            0 => format!("{cell:<width$}"),
+            _ => format!("{cell:>width$}"),
+        });
+    let padded: Vec<String> = padded.collect();
+    match style {
+        Style::Plain => format!("  {}\n", padded.join("  ").trim_end()),
+        Style::Markdown => format!("| {} |\n", padded.join(" | ")),
+    }
+}
+
+/// A figure that is to be reached.
+pub struct Goal {
+    pub what: String,
+    pub wanted: String,
+    /// The figure and whether it is good enough; `None` when it could not be measured.
+    pub reached: Option<(String, bool)>,
+}
+
+/// The goals and what became of them.
+pub fn goals(goals: &[Goal]) -> Section {
+    let row = |goal: &Goal| {
+        let (figure, verdict) = match &goal.reached {
+            Some((figure, true)) => (figure.as_str(), "met"),
+            Some((figure, false)) => (figure.as_str(), "missed"),
+            None => ("-", "not measured"),
+        };
+        vec![goal.what.clone(), goal.wanted.clone(), figure.to_owned(), verdict.to_owned()]
+    };
+    Section {
+        title: "Goals",
+        note: "What issue 2 asks for.".to_owned(),
+        columns: vec!["figure", "wanted", "measured", "goal"],
+        rows: goals.iter().map(row).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example() -> Section {
+        goals(&[
+            Goal {
+                what: "ratio".into(),
+                wanted: ">= 0.90".into(),
+                reached: Some(("0.95".into(), true)),
+            },
+            Goal { what: "instructions".into(), wanted: "< 1500".into(), reached: None },
+        ])
+    }
+
+    #[test]
+    fn plain_columns_are_aligned() {
+        let text = example().text(Style::Plain);
+        let lines: Vec<&str> = text.lines().skip(3).collect();
+        assert_eq!(
+            lines,
+            [
+                "  figure         wanted  measured          goal",
+                "  ------------  -------  --------  ------------",
+                "  ratio         >= 0.90      0.95           met",
+                "  instructions   < 1500         -  not measured",
+            ]
+        );
+    }
+
+    #[test]
+    fn markdown_is_a_table_with_figures_at_the_right() {
+        let text = example().text(Style::Markdown);
+        assert!(text.starts_with("## Goals\n\n"));
+        assert!(text.contains("| ------------ | ------: | -------: | -----------: |\n"));
+        assert!(text.contains("| ratio        | >= 0.90 |     0.95 |          met |\n"));
+    }
+}
