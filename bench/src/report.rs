@@ -83,7 +83,7 @@ pub fn goals(goals: &[Goal]) -> Section {
     };
     Section {
         title: "Goals",
-        note: "What issue 2 asks for.".to_owned(),
+        note: "What the project holds itself to.".to_owned(),
         columns: vec!["figure", "wanted", "measured", "goal"],
         rows: goals.iter().map(row).collect(),
     }
