@@ -4,11 +4,16 @@ mod served;
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{FdLink, PortError};
-use motorlink::rmd::{self, Bus, CentiDps, Code, MotorId, OnDrop, SpeedLimit, TorqueCommand};
-use motorlink::stmcp::{self, Client, Config, Failure, Limits, Line, Status, register};
+use motorlink::port::{CanLink, FdLink, PortError};
+use motorlink::rmd::{
+    self, Bus, CanFrame, CentiDps, Code, MotorId, OnDrop, SpeedLimit, TorqueCommand,
+};
+use motorlink::stmcp::{
+    self, Client, Command, Config, Failure, Limits, Line, Request, Status, register,
+};
 use motorlink::{BackOff, LinkState};
 use served::Served;
 
@@ -76,6 +81,54 @@ fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
     drop(client);
     let stops = drive.join().unwrap().windows(4).filter(|w| *w == [0x23, 0x01, 0x02, 0x26]).count();
     assert!(stops >= 2, "{stops}");
+}
+
+#[test]
+fn a_motor_whose_start_was_not_answered_is_stopped_too() {
+    let (ours, theirs) = UnixStream::pair().unwrap();
+    let line = Config { timeout: Duration::from_millis(50).into(), ..Config::default() };
+    let options = stmcp::Options { line, ..stmcp::Options::default() };
+    let client = Client::over("pair", Box::new(FdLink::new(ours, "pair").unwrap()), options);
+    assert!(client.motor(3).unwrap().start().is_err());
+    assert!(client.exchange(0, &Request::Execute(Command::StartMotor), |_| Some(())).is_err());
+    assert!(client.started().map(stmcp::Motor::number).eq([1, 3]));
+    drop(client.guard());
+    drop(client);
+    let mut heard = Vec::new();
+    (&theirs).read_to_end(&mut heard).unwrap();
+    for motor in [1u8, 3] {
+        let stop = [motor << 5 | 3, 1, 2, (motor << 5 | 3) + 3];
+        assert!(heard.windows(4).any(|frame| frame == stop), "motor {motor}: {heard:02x?}");
+    }
+}
+
+/// A bus whose motors hear and are not heard.
+struct Deaf(Arc<Mutex<Vec<CanFrame>>>);
+
+impl CanLink for Deaf {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.0.lock().unwrap().push(*frame);
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        std::thread::sleep(timeout.unwrap_or_default());
+        Ok(None)
+    }
+}
+
+#[test]
+fn a_motor_that_does_not_answer_stays_one_that_moves() {
+    let sent = Arc::new(Mutex::new(Vec::new()));
+    let options = rmd::Options { timeout: Duration::from_millis(5), ..rmd::Options::default() };
+    let bus = Bus::over("deaf", Box::new(Deaf(Arc::clone(&sent))), options);
+    let motor = bus.motor(5).unwrap();
+    assert!(motor.speed(CentiDps(100)).is_err());
+    assert!(motor.off().is_err());
+    assert!(bus.moving().map(MotorId::number).eq([5]));
+    drop(bus.guard());
+    let offs = sent.lock().unwrap().iter().filter(|frame| frame.data()[0] == 0x80).count();
+    assert!(offs >= 3, "{offs}");
 }
 
 #[test]

@@ -253,10 +253,8 @@ impl Inner {
 
     fn request(&mut self, id: MotorId, data: [u8; 8]) -> Result<(), Refused> {
         self.host.request(self.port.now(), id, data)?;
-        match Code::from(data[0]) {
-            Code::Off | Code::Stop => self.moving.remove(id),
-            code if code.info().is_some_and(|row| row.moves) => self.moving.insert(id),
-            _ => {}
+        if Code::from(data[0]).info().is_some_and(|row| row.moves) {
+            self.moving.insert(id);
         }
         Ok(())
     }
@@ -271,6 +269,13 @@ impl Inner {
             let moved = match self.host.poll(now) {
                 Output::Transmit(frame) => self.port.link().and_then(|(link, _)| link.send(&frame)),
                 Output::Done { id, result } => {
+                    // A motor counts as moving from the request on, whose reply may be lost, and
+                    // until it has acknowledged that it is off or stopped.
+                    if let Ok([code, ..]) = result
+                        && matches!(Code::from(code), Code::Off | Code::Stop)
+                    {
+                        self.moving.remove(id);
+                    }
                     each(id, result);
                     Ok(())
                 }

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard};
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
     BoardInfo, Command, Config, Counters, Frame, Line, MAX_FRAME, Master, Motor, Output, Parse,
-    Profile, Recovery, Request, RequestError,
+    Profile, Recovery, RegisterId, Request, RequestError,
 };
 
 use super::error::{Target, advice, hint};
@@ -61,6 +61,8 @@ struct Inner {
     received: [u8; 256],
     /// Bit n: motor n + 1 was started and not stopped by this client.
     started: u8,
+    /// What motor number 0 addresses, as far as this client knows.
+    current: Motor,
 }
 
 impl Client {
@@ -89,7 +91,7 @@ impl Client {
 
     fn on(port: Reopening<Box<dyn ByteLink>>, options: Options) -> Self {
         let master = Master::new(options.line);
-        let inner = Inner { port, master, received: [0; 256], started: 0 };
+        let inner = Inner { port, master, received: [0; 256], started: 0, current: Motor::FIRST };
         Client { inner: Mutex::new(inner), profile: options.profile, limits: options.limits }
     }
 
@@ -161,10 +163,7 @@ impl Client {
         let mut inner = self.lock();
         inner.ready()?;
         let begun = inner.master.request(motor, request);
-        let what = || what(request);
-        let value = inner.conclude(begun, motor, what, reply)?;
-        inner.note(motor, request);
-        Ok(value)
+        inner.conclude(begun, motor, Some(request), || what(request), reply)
     }
 
     /// One exchange with any frame code and payload; gives the acknowledge's payload.
@@ -184,11 +183,7 @@ impl Client {
         let mut inner = self.lock();
         inner.ready()?;
         let begun = inner.master.request_raw(header, payload);
-        let reply = inner.conclude(begun, motor, what, |payload| Some(payload.to_vec()))?;
-        if let Some(request) = &request {
-            inner.note(motor, request);
-        }
-        Ok(reply)
+        inner.conclude(begun, motor, request.as_ref(), what, |payload| Some(payload.to_vec()))
     }
 
     /// Sends STOP_MOTOR without waiting for an answer: what is left when the drive's replies do not
@@ -225,22 +220,30 @@ impl Inner {
         &mut self,
         begun: Result<(), RequestError>,
         motor: u8,
+        request: Option<&Request<'_>>,
         what: impl Fn() -> String,
         reply: impl FnOnce(&[u8]) -> Option<T>,
     ) -> Result<T, Error> {
         if begun.is_err() {
             return Err(Error::TooLong(what()));
         }
-        let (port, motor) = (self.port.name.clone(), Target(motor));
+        let before = self.started;
+        if request.is_some_and(starts) {
+            self.started |= bit(self.addressed(motor));
+        }
+        let (port, target) = (self.port.name.clone(), Target(motor));
         match self.run(reply) {
             Ok(Ok((value, size))) => {
-                value.ok_or_else(|| Error::Reply { port, motor, what: what(), size })
+                self.acknowledged(motor, request);
+                value.ok_or_else(|| Error::Reply { port, motor: target, what: what(), size })
             }
             Ok(Err(proto::Error::Refused(code))) => {
-                Err(Error::Refused { port, motor, what: what(), code, hint: hint(code) })
+                self.started = before;
+                Err(Error::Refused { port, motor: target, what: what(), code, hint: hint(code) })
             }
             Ok(Err(proto::Error::Failed(failure))) => {
-                Err(Error::Failed { port, motor, what: what(), failure, hint: advice(failure) })
+                let hint = advice(failure);
+                Err(Error::Failed { port, motor: target, what: what(), failure, hint })
             }
             Err(error) => {
                 self.master.abandon();
@@ -272,17 +275,32 @@ impl Inner {
         }
     }
 
-    /// Remembers which motors this client has started.
-    fn note(&mut self, motor: u8, request: &Request<'_>) {
-        let Some(motor) = Motor::new(motor) else { return };
+    /// The motor that a motor number addresses.
+    fn addressed(&self, number: u8) -> Motor {
+        Motor::new(number).unwrap_or(self.current)
+    }
+
+    /// A motor counts as started from the START on, whose reply may be lost, and until a STOP is
+    /// acknowledged.
+    fn acknowledged(&mut self, motor: u8, request: Option<&Request<'_>>) {
+        self.current = self.addressed(motor);
         match request {
-            Request::Execute(Command::StartMotor | Command::StartStop | Command::ScStart) => {
-                self.started |= bit(motor);
+            Some(Request::Execute(Command::StopMotor | Command::ScStop)) => {
+                self.started &= !bit(self.current);
             }
-            Request::Execute(Command::StopMotor | Command::ScStop) => self.started &= !bit(motor),
+            Some(Request::SetRegister {
+                register: RegisterId::TARGET_MOTOR,
+                value: [index, ..],
+            }) => {
+                self.current = Motor::new(index.saturating_add(1)).unwrap_or(self.current);
+            }
             _ => {}
         }
     }
+}
+
+fn starts(request: &Request<'_>) -> bool {
+    matches!(request, Request::Execute(Command::StartMotor | Command::StartStop | Command::ScStart))
 }
 
 const fn bit(motor: Motor) -> u8 {
