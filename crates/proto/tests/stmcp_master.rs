@@ -27,6 +27,8 @@ struct Pair {
     delay: Duration,
     /// How many bytes of the next transmission reach the slave.
     cut: Option<usize>,
+    /// Which bit of the next transmission is flipped.
+    flip: Option<usize>,
     sent: Vec<Vec<u8>>,
 }
 
@@ -40,6 +42,7 @@ impl Pair {
             line: VecDeque::new(),
             delay: Duration(0),
             cut: None,
+            flip: None,
             sent: Vec::new(),
         }
     }
@@ -72,6 +75,10 @@ impl Pair {
     fn deliver(&mut self, bytes: &[u8]) {
         self.sent.push(bytes.to_vec());
         let reach = self.cut.take().unwrap_or(bytes.len());
+        let mut bytes = bytes.to_vec();
+        if let Some(bit) = self.flip.take() {
+            bytes[bit / 8] ^= 1 << (bit % 8);
+        }
         for &byte in bytes.iter().take(reach) {
             if let Some(reply) = self.slave.receive(self.now, byte, &mut self.drive) {
                 let last = self.line.back().map_or(self.now, |(at, _)| *at);
@@ -91,7 +98,7 @@ fn an_exchange_is_sent_once_and_ends_with_the_payload() {
 }
 
 #[test]
-fn a_refusal_keeps_its_code_and_the_line() {
+fn a_refusal_keeps_its_code_and_the_line_unless_the_frame_was_damaged() {
     let mut master = master(Recovery::None);
     for code in 0..=255 {
         master.request(0, &STATUS).unwrap();
@@ -102,7 +109,9 @@ fn a_refusal_keeps_its_code_and_the_line() {
         let refused = Error::Refused(ErrorCode::from(code));
         assert_eq!(master.poll(Instant(1)), Output::Done(Err(refused)));
         assert_eq!(u8::from(ErrorCode::from(code)), code);
-        assert_eq!(master.line(), Line::Up);
+        let damaged = matches!(code, 0x08..=0x0A);
+        assert_eq!(master.line(), if damaged { Line::Lost } else { Line::Up }, "{code:#04x}");
+        master.reopened();
     }
 }
 
@@ -245,6 +254,29 @@ fn bytes_behind_a_reply_lose_the_line_but_not_the_reply() {
     assert_eq!(pair.master.line(), Line::Lost);
     assert_eq!(pair.master.counters().unasked_bytes, 2);
     assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+}
+
+/// Flips one bit of the next request on its way, and asks twice.
+#[test]
+fn no_bit_flip_of_a_request_puts_the_line_off_by_one() {
+    let write = Request::SetRegister { register: RegisterId::TORQUE_KP, value: &[0x22, 0x11] };
+    for (request, size) in [(STATUS, 4), (write, 6), (Request::BoardInfo, 3)] {
+        for bit in 0..size * 8 {
+            let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+            pair.delay = Duration::from_millis(3);
+            pair.drive.set(1, RegisterId::SPEED_KP, 0x0102);
+            pair.drive.set(1, RegisterId::SPEED_KI, 0x0304);
+            pair.flip = Some(bit);
+            let _ = pair.exchange(1, request);
+            for (register, value) in
+                [(RegisterId::SPEED_KP, [2, 1]), (RegisterId::SPEED_KI, [4, 3])]
+            {
+                if let Ok(read) = pair.exchange(1, Request::GetRegister(register)) {
+                    assert_eq!(read, value, "{request:?}, bit {bit}");
+                }
+            }
+        }
+    }
 }
 
 proptest! {

@@ -222,7 +222,12 @@ impl Master {
         let (motor, code) = (frame.motor(), frame.code());
         let bytes = frame.encode(&mut self.buffer).ok_or(RequestError::TooLong)?;
         self.filled = bytes.len() as u8;
-        self.begin(motor, FrameCode::from_number(code, Profile::Spec));
+        // What is only a question in one profile may act in the other.
+        let codes = [Profile::Spec, Profile::Mcsdk54].map(|p| FrameCode::from_number(code, p));
+        let [known, other] = codes;
+        let read = known.is_some_and(FrameCode::is_read) && other.is_none_or(FrameCode::is_read);
+        self.begin(motor, known);
+        self.request.read = read;
         Ok(())
     }
 
@@ -230,7 +235,7 @@ impl Master {
         let alike = match code {
             Some(FrameCode::GetRevupData) => REVUP,
             Some(FrameCode::GetBoardInfo | FrameCode::GetFwVersion) => INFO,
-            Some(FrameCode::GetDataElement) | None => INFO | REVUP,
+            Some(FrameCode::GetDataElement | FrameCode::GetMpInfo) | None => INFO | REVUP,
             Some(_) => 0,
         };
         self.request = Asked { motor, read: code.is_some_and(FrameCode::is_read), alike };
@@ -399,6 +404,7 @@ impl Master {
     fn understand(&mut self) -> Option<Option<Result<u8, Error>>> {
         let received = self.buffer.get(..usize::from(self.filled))?;
         let header = *received.first()?;
+        let mut damaged = false;
         let failure = match Frame::parse(received) {
             _ if !matches!(header, HEADER_ACK | HEADER_NACK | HEADER_ATR) => {
                 Failure::Header(header)
@@ -407,7 +413,16 @@ impl Master {
             Parse::Bad(bad) => Failure::Damaged(bad),
             Parse::Frame(frame, size) => {
                 let result = match (header, frame.payload) {
-                    (HEADER_NACK, [code, ..]) => Err(Error::Refused(ErrorCode::from(*code))),
+                    (HEADER_NACK, [code, ..]) => {
+                        let code = ErrorCode::from(*code);
+                        // The drive did not understand the frame: it may take the rest of it for
+                        // another one, and answer that too.
+                        damaged = matches!(
+                            code,
+                            ErrorCode::BadCrc | ErrorCode::Timeout | ErrorCode::Overrun
+                        );
+                        Err(Error::Refused(code))
+                    }
                     (HEADER_NACK, []) => Err(Error::Refused(ErrorCode::None)),
                     _ => Ok(frame.payload.len() as u8),
                 };
@@ -422,8 +437,8 @@ impl Master {
                     self.filled = rest;
                     return Some(None);
                 }
-                if rest > 0 {
-                    self.unasked(usize::from(rest));
+                self.unasked(usize::from(rest));
+                if rest > 0 || damaged {
                     self.lose();
                 }
                 return Some(Some(result));
