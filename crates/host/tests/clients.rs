@@ -7,7 +7,7 @@ use std::os::unix::net::UnixStream;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{CanLink, FdLink, PortError};
+use motorlink::port::{ByteLink, CanLink, FdLink, PortError};
 use motorlink::rmd::{
     self, Bus, CanFrame, CentiDps, Code, MotorId, OnDrop, SpeedLimit, TorqueCommand,
 };
@@ -91,12 +91,12 @@ fn a_motor_whose_start_was_not_answered_is_stopped_too() {
     let client = Client::over("pair", Box::new(FdLink::new(ours, "pair").unwrap()), options);
     assert!(client.motor(3).unwrap().start().is_err());
     assert!(client.exchange(0, &Request::Execute(Command::StartMotor), |_| Some(())).is_err());
-    assert!(client.started().map(stmcp::Motor::number).eq([1, 3]));
+    assert_eq!(client.started().count(), 7, "which motor is the current one is not known");
     drop(client.guard());
     drop(client);
     let mut heard = Vec::new();
     (&theirs).read_to_end(&mut heard).unwrap();
-    for motor in [1u8, 3] {
+    for motor in 1u8..=7 {
         let stop = [motor << 5 | 3, 1, 2, (motor << 5 | 3) + 3];
         assert!(heard.windows(4).any(|frame| frame == stop), "motor {motor}: {heard:02x?}");
     }
@@ -129,6 +129,95 @@ fn a_motor_that_does_not_answer_stays_one_that_moves() {
     drop(bus.guard());
     let offs = sent.lock().unwrap().iter().filter(|frame| frame.data()[0] == 0x80).count();
     assert!(offs >= 3, "{offs}");
+}
+
+#[test]
+fn a_guard_follows_the_drives_current_motor() {
+    let drives = Served::new("current");
+    let client = open_st(&drives);
+    let refused = client.exchange(2, &Request::GetRegister(stmcp::RegisterId(0xFF)), |_| Some(()));
+    assert!(refused.is_err_and(|error| error.is_refusal()));
+    client.exchange(0, &Request::Execute(Command::StartMotor), |_| Some(())).unwrap();
+    drop(client.guard());
+    until("motor 2 rests", || client.motor(2).unwrap().status().unwrap() == Status::Idle);
+    assert!(matches!(
+        client.exchange(8, &Request::BoardInfo, |_| Some(())),
+        Err(stmcp::Error::NoSuchMotor(8))
+    ));
+    assert!(matches!(client.raw(9, 0x06, &[]), Err(stmcp::Error::NoSuchMotor(9))));
+}
+
+#[test]
+fn a_guard_waits_for_a_port_that_comes_back() {
+    let (ours, theirs) = UnixStream::pair().unwrap();
+    let mut ports = vec![None, Some(ours)];
+    let open = move || match ports.pop() {
+        Some(Some(stream)) => Ok(Box::new(FdLink::new(stream, "pair")?) as Box<dyn ByteLink>),
+        Some(None) => Err(PortError::Closed { port: "pair".to_owned() }),
+        None => {
+            let (ours, theirs) = UnixStream::pair().unwrap();
+            std::thread::spawn(move || answer_everything(theirs));
+            Ok(Box::new(FdLink::new(ours, "pair")?) as Box<dyn ByteLink>)
+        }
+    };
+    let client = Client::open_with("pair", Box::new(open), stmcp::Options::default()).unwrap();
+    let drive = std::thread::spawn(move || {
+        let mut start = [0; 4];
+        (&theirs).read_exact(&mut start).unwrap();
+        (&theirs).write_all(&[0xF0, 0x00, 0xF0]).unwrap();
+    });
+    client.motor(1).unwrap().start().unwrap();
+    drive.join().unwrap();
+    drop(client.guard());
+    assert_eq!(client.started().count(), 0);
+}
+
+/// A drive that acknowledges whatever it gets, and knows its name.
+fn answer_everything(stream: UnixStream) {
+    let mut slave = stmcp::Slave::new(stmcp::Profile::Spec, stmcp::Motor::FIRST);
+    let mut drive = motorlink_sim::st::StDrive::demo(motorlink::time::Instant(0));
+    let mut byte = [0];
+    while (&stream).read_exact(&mut byte).is_ok() {
+        if let Some(reply) = slave.receive(motorlink::time::Instant(0), byte[0], &mut drive) {
+            let _ = (&stream).write_all(reply);
+        }
+    }
+}
+
+/// A motor whose reply to the first request comes when the second has been made.
+#[derive(Default)]
+struct Tardy(Vec<CanFrame>);
+
+impl CanLink for Tardy {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let mut reply = [0; 8];
+        reply.copy_from_slice(frame.data());
+        reply[7] = self.0.len() as u8 + 1;
+        self.0.push(CanFrame::new(0x141, reply));
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        // The first wait is for the first reply, which is late.
+        if self.0.len() == 1 && timeout.is_some_and(|timeout| !timeout.is_zero()) {
+            std::thread::sleep(timeout.unwrap_or_default());
+            return Ok(None);
+        }
+        let unread = self.0.iter().position(|frame| frame.data()[0] != 0);
+        Ok(unread.map(|place| std::mem::replace(&mut self.0[place], CanFrame::new(0, [0; 8]))))
+    }
+}
+
+#[test]
+fn a_reply_that_waited_in_the_port_is_not_taken_for_the_next_one() {
+    let ms = Duration::from_millis;
+    let options = rmd::Options { timeout: ms(5), guard: ms(5), ..rmd::Options::default() };
+    let bus = Bus::over("tardy", Box::new(Tardy::default()), options);
+    let ask = || bus.raw(MotorId::new(1).unwrap(), [0x9C, 0, 0, 0, 0, 0, 0, 0]);
+    assert!(matches!(ask(), Err(rmd::Error::Timeout { .. })));
+    std::thread::sleep(ms(20));
+    assert_eq!(ask().unwrap()[7], 2, "the second request's reply");
+    assert_eq!(bus.counters().late, 1);
 }
 
 #[test]

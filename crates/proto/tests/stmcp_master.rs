@@ -72,6 +72,16 @@ impl Pair {
         }
     }
 
+    /// Nothing is asked for a while.
+    fn rest(&mut self, pause: Duration) {
+        let end = self.now + pause;
+        if let Some(deadline) = self.slave.deadline().filter(|deadline| *deadline <= end) {
+            let nack = self.slave.poll(deadline).expect("a NACK is due").to_vec();
+            self.line.push_back((deadline + self.delay, nack));
+        }
+        self.now = end;
+    }
+
     fn deliver(&mut self, bytes: &[u8]) {
         self.sent.push(bytes.to_vec());
         let reach = self.cut.take().unwrap_or(bytes.len());
@@ -261,13 +271,14 @@ fn bytes_behind_a_reply_lose_the_line_but_not_the_reply() {
 fn no_bit_flip_of_a_request_puts_the_line_off_by_one() {
     let write = Request::SetRegister { register: RegisterId::TORQUE_KP, value: &[0x22, 0x11] };
     for (request, size) in [(STATUS, 4), (write, 6), (Request::BoardInfo, 3)] {
-        for bit in 0..size * 8 {
+        for (bit, pause) in (0..size * 8).flat_map(|bit| [0, 30].map(|pause| (bit, pause))) {
             let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
             pair.delay = Duration::from_millis(3);
             pair.drive.set(1, RegisterId::SPEED_KP, 0x0102);
             pair.drive.set(1, RegisterId::SPEED_KI, 0x0304);
             pair.flip = Some(bit);
             let _ = pair.exchange(1, request);
+            pair.rest(Duration::from_millis(pause));
             for (register, value) in
                 [(RegisterId::SPEED_KP, [2, 1]), (RegisterId::SPEED_KI, [4, 3])]
             {

@@ -2,12 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::rmd::{CanFrame, MotorId};
 
 use super::{CanLink, Deadline, PortError};
 
-/// How many sent frames wait for their echo.
-const WAITING: usize = 8;
+/// How many sent frames wait for their echo: a cycle over every motor, and 0x280.
+const WAITING: usize = MotorId::COUNT + 1;
 /// An echo that has not come by then does not come; an equal frame is a motor's reply.
 const PATIENCE: Duration = Duration::from_millis(100);
 

@@ -27,6 +27,7 @@ pub struct SlcanLink<B: ByteLink> {
 struct Answers {
     done: u32,
     refused: u32,
+    frames: bool,
     garbage: bool,
 }
 
@@ -71,12 +72,15 @@ impl<B: ByteLink> SlcanLink<B> {
             match self.codec.answer() {
                 Some(Answer::Done) => answers.done += 1,
                 Some(Answer::Refused) => answers.refused += 1,
-                Some(Answer::Frame(_) | Answer::Info) => {}
+                Some(Answer::Frame(_)) => answers.frames = true,
+                Some(Answer::Info) => {}
                 None if self.fill(deadline)? => {}
                 None => break,
             }
         }
-        answers.garbage = self.codec.garbage() > before || self.codec.is_mid_line();
+        // On a busy bus the time may end in the middle of a frame.
+        let cut = self.codec.is_mid_line() && !answers.frames;
+        answers.garbage = self.codec.garbage() > before || cut;
         Ok(answers)
     }
 

@@ -2,7 +2,7 @@
 //! allocation in an exchange.
 
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Duration;
+use std::time::{Duration, Instant as Moment};
 
 use motorlink_proto::rmd::{
     self as proto, Code, Command, Counters, Dialect, Host, Limits, MotionStatus, MotorId, MotorSet,
@@ -51,6 +51,9 @@ pub enum Found {
     Echo(MotorId),
 }
 
+/// After a pause of this length whatever came meanwhile is taken from the port before a request.
+const IDLE: Duration = Duration::from_millis(1);
+
 /// IDs that a scan asks at once.
 const SCAN_WIDTH: usize = 8;
 
@@ -61,6 +64,7 @@ const SCAN_WIDTH: usize = 8;
 /// answer in time is left alone until its late reply came or cannot come any more.
 pub struct Bus {
     inner: Mutex<Inner>,
+    guard_time: Duration,
 }
 
 struct Inner {
@@ -68,6 +72,8 @@ struct Inner {
     host: Host,
     /// Motors that were given something to do by this bus and not switched off.
     moving: MotorSet,
+    /// When the last exchange ended.
+    ended: Moment,
 }
 
 impl Bus {
@@ -101,7 +107,11 @@ impl Bus {
         for id in MotorSet::ALL {
             host.set_limits(id, options.limits);
         }
-        Bus { inner: Mutex::new(Inner { port, host, moving: MotorSet::EMPTY }) }
+        let guard_time = options.guard;
+        Bus {
+            guard_time,
+            inner: Mutex::new(Inner { port, host, moving: MotorSet::EMPTY, ended: Moment::now() }),
+        }
     }
 
     /// Whether the port is open.
@@ -145,12 +155,12 @@ impl Bus {
         let mut inner = self.lock();
         let mut outcome = None;
         inner.ready()?;
-        if let Err(refused) = inner.request(id, request) {
+        while let Err(refused) = inner.request(id, request) {
             let Refused::Quarantined { until, .. } = refused else {
                 return Err(inner.refused(refused));
             };
-            inner.listen(until)?;
-            inner.request(id, request).map_err(|refused| inner.refused(refused))?;
+            let now = inner.port.now();
+            inner.hear(now, until).map_err(|error| inner.closed(error))?;
         }
         inner.run(|_, result| outcome = Some(result))?;
         let result = outcome.unwrap_or(Err(proto::Error::Timeout));
@@ -158,7 +168,8 @@ impl Bus {
     }
 
     /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
-    /// is called once a request, in the order in which the outcomes come.
+    /// is called once a request, in the order in which the outcomes come. It must not call this bus,
+    /// which is locked meanwhile.
     ///
     /// # Errors
     /// The port's. What fails for one motor is told to `each`.
@@ -236,6 +247,11 @@ impl Bus {
         Ok(())
     }
 
+    /// How long a late reply is awaited.
+    pub(super) fn guard_time(&self) -> Duration {
+        self.guard_time
+    }
+
     fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
@@ -243,7 +259,18 @@ impl Bus {
 
 impl Inner {
     fn ready(&mut self) -> Result<(), Error> {
-        self.port.link()?;
+        let (link, _) = self.port.link()?;
+        // What came meanwhile is late or unasked; left in the port it would pass for a reply.
+        if self.ended.elapsed() > IDLE {
+            let drained = loop {
+                match link.receive(Some(Duration::ZERO)) {
+                    Ok(Some(frame)) => self.host.receive(&frame),
+                    Ok(None) => break Ok(()),
+                    Err(error) => break Err(error),
+                }
+            };
+            drained.map_err(|error| self.closed(error))?;
+        }
         let now = self.port.now();
         for id in self.host.busy() {
             self.host.cancel(now, id);
@@ -279,20 +306,14 @@ impl Inner {
                     each(id, result);
                     Ok(())
                 }
-                Output::Wait(None) => return Ok(()),
+                Output::Wait(None) => {
+                    self.ended = Moment::now();
+                    return Ok(());
+                }
                 Output::Wait(Some(until)) => self.hear(now, until),
             };
             moved.map_err(|error| self.closed(error))?;
         }
-    }
-
-    /// Takes what comes until `until`.
-    fn listen(&mut self, until: Instant) -> Result<(), Error> {
-        while self.port.now() < until {
-            let now = self.port.now();
-            self.hear(now, until).map_err(|error| self.closed(error))?;
-        }
-        Ok(())
     }
 
     fn hear(&mut self, now: Instant, until: Instant) -> Result<(), PortError> {

@@ -1,11 +1,16 @@
 //! Stops motors when their program ends, however it ends.
 
-use motorlink_proto::rmd::{MotorId, Off, Stop};
+use std::time::Duration;
+
+use motorlink_proto::rmd::{Command, MotorId, MotorSet, Off, Stop};
 
 use super::{Bus, Error};
+use crate::line::LinkState;
 
 /// How often a guard tries to stop a motor before it gives up.
-const ATTEMPTS: u32 = 3;
+const ATTEMPTS: u32 = 4;
+/// The longest that a guard waits for a port to come back before it tries again.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// What a [`Guard`] does to the motors that it finds moving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,7 +22,7 @@ pub enum OnDrop {
 }
 
 /// Stops the motors that a [`Bus`] was used to move when it is dropped: at the end of a scope, on
-/// an early return, on a panic.
+/// an early return, on a panic. All are told before any answer is waited for.
 pub struct Guard<'a> {
     bus: &'a Bus,
     action: OnDrop,
@@ -45,7 +50,7 @@ impl<'a> Guard<'a> {
         self
     }
 
-    /// Calls `report` with what was done to each motor.
+    /// Calls `report` with what was done to each motor, when all is done.
     pub fn reporting(mut self, report: fn(&Stopped)) -> Self {
         self.report = report;
         self
@@ -55,20 +60,43 @@ impl<'a> Guard<'a> {
     pub fn disarm(mut self) {
         self.armed = false;
     }
+
+    fn stop_all(&self) -> Vec<Stopped> {
+        let mut stopped: Vec<Stopped> = Vec::new();
+        let request = match self.action {
+            OnDrop::Off => Off.encode(),
+            OnDrop::Stop => Stop.encode(),
+        };
+        for attempt in 1..=ATTEMPTS {
+            let requests: Vec<_> = self.bus.moving().map(|id| (id, request)).collect();
+            if requests.is_empty() {
+                break;
+            }
+            let mut told = Vec::new();
+            let cycle = self.bus.cycle(&requests, |id, result| {
+                told.push(Stopped { id, result: result.map(drop) });
+            });
+            // Motors that the port kept from hearing are not among those told.
+            let told_ids: MotorSet = told.iter().map(|one| one.id).collect();
+            let unheard = self.bus.moving().without(told_ids);
+            let unheard = unheard.map(|id| Stopped { id, result: cycle.clone() });
+            let outcomes = unheard.chain(told);
+            let last = attempt == ATTEMPTS;
+            stopped.extend(outcomes.filter(|one| last || one.result.is_ok()));
+            if let LinkState::Closed { retry_in } = self.bus.link_state() {
+                std::thread::sleep(retry_in.min(PATIENCE));
+            } else if !self.bus.moving().is_empty() {
+                std::thread::sleep(self.bus.guard_time());
+            }
+        }
+        stopped
+    }
 }
 
 impl Drop for Guard<'_> {
     fn drop(&mut self) {
-        if !self.armed {
-            return;
-        }
-        for id in self.bus.moving() {
-            let stop = || match self.action {
-                OnDrop::Off => self.bus.ask(id, &Off).map(drop),
-                OnDrop::Stop => self.bus.ask(id, &Stop).map(drop),
-            };
-            let result = (1..ATTEMPTS).fold(stop(), |result, _| result.or_else(|_| stop()));
-            (self.report)(&Stopped { id, result });
+        if self.armed {
+            self.stop_all().iter().for_each(self.report);
         }
     }
 }

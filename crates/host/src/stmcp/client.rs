@@ -1,6 +1,7 @@
 //! The blocking client: one lock around one exchange, no thread, no allocation in an exchange.
 
 use std::sync::{Mutex, MutexGuard};
+use std::time::{Duration, Instant};
 
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
@@ -11,7 +12,7 @@ use motorlink_proto::stmcp::{
 use super::error::{Target, advice, hint};
 use super::{Error, Guard, Limits, MotorHandle};
 use crate::line::{BackOff, LinkState, Opener, Reopening};
-use crate::port::{ByteLink, PortError, PortName};
+use crate::port::{ByteLink, LineName, PortError, PortName};
 
 /// How a [`Client`] behaves.
 #[derive(Debug, Clone, Copy, Default)]
@@ -25,6 +26,9 @@ pub struct Options {
     /// What no request may exceed.
     pub limits: Limits,
 }
+
+/// After a pause of this length whatever came unasked is taken note of before the next request.
+const IDLE: Duration = Duration::from_millis(20);
 
 /// What GET_BOARD_INFO tells (4.7).
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,8 +65,10 @@ struct Inner {
     received: [u8; 256],
     /// Bit n: motor n + 1 was started and not stopped by this client.
     started: u8,
-    /// What motor number 0 addresses, as far as this client knows.
-    current: Motor,
+    /// What motor number 0 addresses; `None` while that is not known.
+    current: Option<Motor>,
+    /// When the last exchange ended.
+    ended: Instant,
 }
 
 impl Client {
@@ -72,6 +78,11 @@ impl Client {
     /// What keeps the port from being opened. The drive is not asked anything.
     pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
         let name = port.clone();
+        let mut options = options;
+        if let PortName::Line(LineName::Serial { baud, .. }) = port {
+            // What recovery sends has to be out of the port before silence can begin.
+            options.line.quiet = options.line.quiet + Master::longest_transmission(*baud);
+        }
         Self::open_with(&port.to_string(), Box::new(move || name.open_line()), options)
     }
 
@@ -91,7 +102,14 @@ impl Client {
 
     fn on(port: Reopening<Box<dyn ByteLink>>, options: Options) -> Self {
         let master = Master::new(options.line);
-        let inner = Inner { port, master, received: [0; 256], started: 0, current: Motor::FIRST };
+        let inner = Inner {
+            port,
+            master,
+            received: [0; 256],
+            started: 0,
+            current: None,
+            ended: Instant::now(),
+        };
         Client { inner: Mutex::new(inner), profile: options.profile, limits: options.limits }
     }
 
@@ -152,13 +170,15 @@ impl Client {
     }
 
     /// One exchange with motor number `motor`, where 0 is the drive's current motor. `reply` reads
-    /// the acknowledge's payload; `None` from it is [`Error::Reply`].
+    /// the acknowledge's payload; `None` from it is [`Error::Reply`]. It must not call this client,
+    /// which is locked meanwhile.
     pub fn exchange<T>(
         &self,
         motor: u8,
         request: &Request<'_>,
         reply: impl FnOnce(&[u8]) -> Option<T>,
     ) -> Result<T, Error> {
+        addressable(motor)?;
         self.limits.check(request)?;
         let mut inner = self.lock();
         inner.ready()?;
@@ -168,6 +188,7 @@ impl Client {
 
     /// One exchange with any frame code and payload; gives the acknowledge's payload.
     pub fn raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Vec<u8>, Error> {
+        addressable(motor)?;
         let header = Frame::header(code, motor);
         let mut frame = [0; MAX_FRAME];
         let what = || format!("frame code {code:#04x}");
@@ -194,8 +215,11 @@ impl Client {
         let frame = stop.encode(motor.number(), &mut frame).unwrap_or(&[]);
         let mut inner = self.lock();
         inner.master.lost();
-        inner.port.link()?.0.write(frame)?;
-        Ok(())
+        let written = inner.port.link().and_then(|(link, _)| link.write(frame));
+        if written.is_err() {
+            inner.port.close();
+        }
+        Ok(written?)
     }
 
     /// A poisoned lock is taken all the same: an exchange that panicked left the master in a state
@@ -208,11 +232,22 @@ impl Client {
 impl Inner {
     /// Makes sure that the port is open and no abandoned exchange is under way.
     fn ready(&mut self) -> Result<(), PortError> {
-        let (_, reopened) = self.port.link()?;
+        let (link, reopened) = self.port.link()?;
         if reopened && self.master.config_mut().recovery == Recovery::None {
             self.master.reopened();
         }
         self.master.abandon();
+        if self.ended.elapsed() > IDLE {
+            let size = match link.read(&mut self.received, Some(Duration::ZERO)) {
+                Ok(size) => size,
+                Err(error) => {
+                    self.port.close();
+                    return Err(error);
+                }
+            };
+            let now = self.port.now();
+            self.master.receive(now, &self.received[..size]);
+        }
         Ok(())
     }
 
@@ -227,18 +262,27 @@ impl Inner {
         if begun.is_err() {
             return Err(Error::TooLong(what()));
         }
-        let before = self.started;
         if request.is_some_and(starts) {
-            self.started |= bit(self.addressed(motor));
+            self.started |= self.addressed(motor).map_or(ALL, bit);
         }
         let (port, target) = (self.port.name.clone(), Target(motor));
-        match self.run(reply) {
-            Ok(Ok((value, size))) => {
+        let outcome = self.run(reply);
+        self.ended = Instant::now();
+        match outcome {
+            Ok(Ok((Some(value), _))) => {
                 self.acknowledged(motor, request);
-                value.ok_or_else(|| Error::Reply { port, motor: target, what: what(), size })
+                return Ok(value);
+            }
+            // Whatever else came, the drive's current motor may have changed or not.
+            _ => self.current = None,
+        }
+        match outcome {
+            Ok(Ok((_, size))) => {
+                // A reply that fits no request: somebody else's, perhaps.
+                self.master.lost();
+                Err(Error::Reply { port, motor: target, what: what(), size })
             }
             Ok(Err(proto::Error::Refused(code))) => {
-                self.started = before;
                 Err(Error::Refused { port, motor: target, what: what(), code, hint: hint(code) })
             }
             Ok(Err(proto::Error::Failed(failure))) => {
@@ -275,9 +319,9 @@ impl Inner {
         }
     }
 
-    /// The motor that a motor number addresses.
-    fn addressed(&self, number: u8) -> Motor {
-        Motor::new(number).unwrap_or(self.current)
+    /// The motor that a motor number addresses, where that is known.
+    fn addressed(&self, number: u8) -> Option<Motor> {
+        Motor::new(number).or(self.current)
     }
 
     /// A motor counts as started from the START on, whose reply may be lost, and until a STOP is
@@ -286,22 +330,27 @@ impl Inner {
         self.current = self.addressed(motor);
         match request {
             Some(Request::Execute(Command::StopMotor | Command::ScStop)) => {
-                self.started &= !bit(self.current);
+                self.started &= !self.current.map_or(0, bit);
             }
-            Some(Request::SetRegister {
-                register: RegisterId::TARGET_MOTOR,
-                value: [index, ..],
-            }) => {
-                self.current = Motor::new(index.saturating_add(1)).unwrap_or(self.current);
+            Some(Request::SetRegister { register: RegisterId::TARGET_MOTOR, .. }) => {
+                self.current = None;
             }
             _ => {}
         }
     }
 }
 
+/// Motor numbers have three bits.
+fn addressable(motor: u8) -> Result<(), Error> {
+    if motor <= Motor::MAX { Ok(()) } else { Err(Error::NoSuchMotor(motor)) }
+}
+
 fn starts(request: &Request<'_>) -> bool {
     matches!(request, Request::Execute(Command::StartMotor | Command::StartStop | Command::ScStart))
 }
+
+/// Every motor that a drive can have.
+const ALL: u8 = 0x7F;
 
 const fn bit(motor: Motor) -> u8 {
     1 << motor.index()

@@ -1,15 +1,20 @@
 //! Stops motors when their program ends, however it ends.
 
-use motorlink_proto::stmcp::Motor;
+use std::time::Duration;
+
+use motorlink_proto::stmcp::{ErrorCode, Line, Motor};
 
 use super::{Client, Error};
+use crate::line::LinkState;
 
-/// How often a guard tries to stop a motor before it gives up. Where the drive does not answer, it
-/// may still hear.
-const ATTEMPTS: u32 = 3;
+/// How often a guard tries to stop a motor before it gives up.
+const ATTEMPTS: u32 = 4;
+/// The longest that a guard waits for a port to come back before it tries again.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Stops the motors that a [`Client`] started when it is dropped: at the end of a scope, on an
-/// early return, on a panic.
+/// early return, on a panic. Where the drive does not answer it may still hear, so that STOP_MOTOR
+/// is sent to every motor before any answer is waited for again.
 pub struct Guard<'a> {
     client: &'a Client,
     armed: bool,
@@ -30,7 +35,7 @@ impl<'a> Guard<'a> {
         Guard { client, armed: true, report: |_| {} }
     }
 
-    /// Calls `report` with what was done to each motor.
+    /// Calls `report` with what was done to each motor, when all is done.
     pub fn reporting(mut self, report: fn(&Stopped)) -> Self {
         self.report = report;
         self
@@ -40,21 +45,53 @@ impl<'a> Guard<'a> {
     pub fn disarm(mut self) {
         self.armed = false;
     }
+
+    /// Stops a motor; `Err` leaves it to the next attempt.
+    fn stop(&self, motor: Motor) -> Result<(), Error> {
+        match self.client.motor(motor.number())?.stop() {
+            // What is not there does not turn.
+            Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) => Ok(()),
+            result => result,
+        }
+    }
+
+    fn stop_all(&self) -> Vec<Stopped> {
+        let mut stopped: Vec<Stopped> = Vec::new();
+        let mut left: Vec<Motor> = self.client.started().collect();
+        for attempt in 1..=ATTEMPTS {
+            let mut failed = Vec::new();
+            let mut told = false;
+            for (n, &motor) in left.iter().enumerate() {
+                if !told && self.client.line() == Line::Lost {
+                    told = true;
+                    for &motor in &left[n..] {
+                        // If it fails, so does the stop below, which says why.
+                        let _ = self.client.stop_unheard(motor);
+                    }
+                }
+                let result = self.stop(motor);
+                if result.is_err() && attempt < ATTEMPTS {
+                    failed.push(motor);
+                } else {
+                    stopped.push(Stopped { motor, result });
+                }
+            }
+            left = failed;
+            if left.is_empty() {
+                break;
+            }
+            if let LinkState::Closed { retry_in } = self.client.link_state() {
+                std::thread::sleep(retry_in.min(PATIENCE));
+            }
+        }
+        stopped
+    }
 }
 
 impl Drop for Guard<'_> {
     fn drop(&mut self) {
-        if !self.armed {
-            return;
-        }
-        for motor in self.client.started() {
-            let stop = || self.client.motor(motor.number())?.stop();
-            let again = |_| {
-                self.client.stop_unheard(motor)?;
-                stop()
-            };
-            let result = (1..ATTEMPTS).fold(stop(), |result, _| result.or_else(again));
-            (self.report)(&Stopped { motor, result });
+        if self.armed {
+            self.stop_all().iter().for_each(self.report);
         }
     }
 }

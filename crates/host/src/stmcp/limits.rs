@@ -11,16 +11,23 @@ pub struct Limits {
     pub current_s16a: Option<u16>,
 }
 
-/// A request that exceeds a limit; it was not sent.
+/// A request that does not keep the limits; it was not sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{value} {unit} is over the limit of {limit} {unit} that was set; nothing was sent")]
-pub struct LimitError {
-    /// What was asked for.
-    pub value: i64,
-    /// What the caller allows.
-    pub limit: i64,
-    /// Unit of both.
-    pub unit: &'static str,
+#[non_exhaustive]
+pub enum LimitError {
+    /// It exceeds a limit.
+    #[error("{value} {unit} is over the limit of {limit} {unit} that was set; nothing was sent")]
+    Exceeded {
+        /// What was asked for.
+        value: i64,
+        /// What the caller allows.
+        limit: i64,
+        /// Unit of both.
+        unit: &'static str,
+    },
+    /// It writes a part of a limited register, the rest of which is not known.
+    #[error("a part of {0} cannot be written while it is limited; nothing was sent")]
+    Part(RegisterId),
 }
 
 impl Limits {
@@ -37,16 +44,13 @@ impl Limits {
                 self.current(reference.id_s16a.into())
             }
             Request::TorqueRamp(ramp) => self.current(ramp.torque_s16a),
-            Request::SetRegister { register, value } => {
-                let Some(value) = register.decode(value) else { return Ok(()) };
-                match register {
-                    RegisterId::RAMP_FINAL_SPEED => self.speed(value),
-                    RegisterId::TORQUE_REF | RegisterId::FLUX_REF | RegisterId::IQ_SPEEDMODE => {
-                        self.current(value)
-                    }
-                    _ => Ok(()),
+            Request::SetRegister { register, value } => match register {
+                RegisterId::RAMP_FINAL_SPEED => self.speed(whole(register, value)?),
+                RegisterId::TORQUE_REF | RegisterId::FLUX_REF | RegisterId::IQ_SPEEDMODE => {
+                    self.current(whole(register, value)?)
                 }
-            }
+                _ => Ok(()),
+            },
             _ => Ok(()),
         }
     }
@@ -60,10 +64,16 @@ impl Limits {
     }
 }
 
+/// The value that a drive takes from these bytes: it cuts what is too long.
+fn whole(register: RegisterId, value: &[u8]) -> Result<i32, LimitError> {
+    let size = register.shape().map_or(0, |shape| usize::from(shape.ty.size()));
+    value.get(..size).and_then(|value| register.decode(value)).ok_or(LimitError::Part(register))
+}
+
 fn within(value: i32, limit: Option<u32>, unit: &'static str) -> Result<(), LimitError> {
     match limit {
         Some(limit) if value.unsigned_abs() > limit => {
-            Err(LimitError { value: value.into(), limit: limit.into(), unit })
+            Err(LimitError::Exceeded { value: value.into(), limit: limit.into(), unit })
         }
         _ => Ok(()),
     }
@@ -84,7 +94,12 @@ mod tests {
         let currents = CurrentReference { iq_s16a: 0, id_s16a: -501 };
         assert!(limits.check(&Request::CurrentReference(currents)).is_err());
         let write = Request::SetRegister { register: RegisterId::TORQUE_REF, value: &[0xF5, 0x01] };
-        assert_eq!(limits.check(&write).unwrap_err().value, 501);
+        let exceeded = LimitError::Exceeded { value: 501, limit: 500, unit: "s16A" };
+        assert_eq!(limits.check(&write), Err(exceeded));
+        let torque = |value| Request::SetRegister { register: RegisterId::TORQUE_REF, value };
+        assert_eq!(limits.check(&torque(&[0xF5, 0x01, 0x00])), Err(exceeded));
+        let part = Err(LimitError::Part(RegisterId::TORQUE_REF));
+        assert_eq!(limits.check(&torque(&[0xFF])), part);
         assert!(Limits::default().check(&ramp(i32::MIN)).is_ok());
     }
 }

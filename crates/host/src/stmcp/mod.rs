@@ -25,7 +25,8 @@ mod value;
 pub use motorlink_proto::stmcp::{
     Command, Config, ControlMode, Counters, CurrentReference, ErrorCode, Failure, Feature,
     Features, Flags, FrameCode, Line, Motor, PositionMove, Profile, REVUP_PHASES, Ramp, Recovery,
-    RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Status, TorqueRamp, register,
+    RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Slave, Status, TorqueRamp,
+    register,
 };
 
 pub use client::{Client, FirmwareVersion, Info, Options};

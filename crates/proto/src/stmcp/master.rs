@@ -187,6 +187,13 @@ impl Master {
         }
     }
 
+    /// How long the longest thing that a master sends takes at `baud`, with 10 bits a byte. A caller
+    /// whose port takes bytes faster than the line carries them adds this to [`Config::quiet`].
+    pub const fn longest_transmission(baud: u32) -> Duration {
+        let bits = PADDING.len() as u64 * 10;
+        Duration(bits * 1_000_000 / if baud == 0 { 1 } else { baud as u64 })
+    }
+
     /// Whether the line can be used.
     pub const fn line(&self) -> Line {
         self.line
