@@ -11,7 +11,7 @@ SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 .PHONY: demo test lint unit probe e2e bench fmt clean
 
 demo:
-	$(CARGO) run --quiet --release --locked -p motorlink-cli -- demo
+	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
 test: lint unit probe e2e
 

@@ -145,7 +145,7 @@ def test_mcsdk_commands_work_with_its_profile(run, sim, tmp_path):
 
     assert st("--json", "torque-ramp", 100, 50).ended(0).json == OK
     assert st("--json", "move", 1.5, 0.5).ended(0).json == OK
-    assert st("move", -1.5, 0.5).ended(0).out.startswith("motor 1 turns")
+    assert st("move", -1.5, 0.5).ended(0).out.startswith("motor 1: move to -1.5 rad")
     assert st("info").ended(0).out.count("5.4.4") == 2
 
 
@@ -335,3 +335,15 @@ def test_ctrl_c_ends_an_exchange_that_has_long_to_wait(start, tmp_path):
         assert asked.wait(10)
         waiting.interrupt()
         assert waiting.wait(5) == 130
+
+
+@pytest.mark.parametrize("command", ["torque-ramp 100 50", "move 1.5 0.5"])
+def test_what_the_profile_lacks_is_not_sent(run, command):
+    refused = run("st", "-p", "sim:", "--trace", *command.split()).ended(2)
+    assert "--profile mcsdk-5.4" in refused.err and "->" not in refused.err
+
+
+def test_a_segment_is_not_sent_to_firmware_that_has_none(run):
+    segment = ("--profile", "mcsdk-5.4", "--trace", "segment", "STATUS")
+    refused = run("st", "-p", "sim:", *segment).ended(2)
+    assert "--profile spec" in refused.err and "->" not in refused.err

@@ -3,6 +3,7 @@
 import os
 import signal
 import socket
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -352,3 +353,23 @@ def test_several_commands_at_once_are_answered_in_order(rmd):
     rmd.process.stdin.write("\n".join(lines[:-1]) + "\n")
     assert rmd.say(lines[-1])["ok"]
     assert not rmd.say("nothing either")["ok"]
+
+
+def test_answers_that_nobody_reads_do_not_stop_the_drives(motorlink, tmp_path):
+    link = tmp_path / "st0"
+    simulator = subprocess.Popen(
+        [motorlink, "sim", "--st", f"pty:{link}"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    try:
+        simulator.stdout.readline()
+        os.set_blocking(simulator.stdin.fileno(), False)
+        written = b'{"command":"state"}\n' * 2000
+        simulator.stdin.raw.write(written[:60000])
+        with Line(str(link)) as line:
+            for _ in range(20):
+                assert line.get(CONTROL_MODE) == 1
+        simulator.terminate()
+        assert simulator.wait(10) == 0, "it ends although nobody reads"
+    finally:
+        simulator.kill()
+        simulator.wait()

@@ -5,6 +5,8 @@ use std::process::ExitCode;
 use motorlink::port::{NameError, PortError};
 use motorlink::{rmd, stmcp};
 
+use crate::output::note;
+
 /// Why, and with which exit code.
 #[derive(Debug)]
 pub enum Failure {
@@ -32,7 +34,7 @@ impl Failure {
             Failure::Interrupted => return ExitCode::from(130),
             Failure::OutputClosed => return ExitCode::SUCCESS,
         };
-        eprintln!("{} {message}", console::style("error:").red().bold().for_stderr());
+        note(format!("{} {message}", console::style("error:").red().bold().for_stderr()));
         ExitCode::from(code)
     }
 }

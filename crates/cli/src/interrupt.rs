@@ -6,6 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
+use crate::output::note;
+
 /// Exit code of a program that a signal ended.
 const INTERRUPTED_CODE: i32 = 130;
 
@@ -25,7 +27,7 @@ pub fn install() {
         WAKE.notify_all();
     });
     if let Err(error) = installed {
-        eprintln!("warning: Ctrl-C ends this program without stopping motors: {error}");
+        note(format!("warning: Ctrl-C ends this program without stopping motors: {error}"));
     }
 }
 

@@ -1,6 +1,6 @@
 //! What people and programs read: aligned rows, or a JSON object a line.
 
-use std::io::{Write, stdout};
+use std::io::{Write, stderr, stdout};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -47,6 +47,11 @@ impl Output {
     }
 }
 
+/// Prints a line on stderr; it must not matter whether somebody reads it.
+pub fn note(text: impl std::fmt::Display) {
+    let _ = writeln!(stderr(), "{text}");
+}
+
 /// Prints a line at once; a reader that is gone ends the program quietly.
 pub fn line(text: &dyn std::fmt::Display) -> Result<(), Failure> {
     let mut out = stdout().lock();
@@ -87,8 +92,15 @@ pub fn parse_hex(words: &[String]) -> Result<Vec<u8>, Failure> {
             }
         }
     }
+    if bytes.is_empty() {
+        return Err(Failure::Usage("give the bytes, as in `02 01 1e`".to_owned()));
+    }
     Ok(bytes)
 }
+
+/// The shortest and the longest interval that make sense.
+const SHORTEST: Duration = Duration::from_millis(1);
+const LONGEST: Duration = Duration::from_secs(86_400);
 
 /// Reads a time span such as `100ms`, `0.5s` or `2` (seconds).
 pub fn parse_span(text: &str) -> Result<Duration, String> {
@@ -98,8 +110,9 @@ pub fn parse_span(text: &str) -> Result<Duration, String> {
     };
     let seconds = number.trim().parse::<f64>().map(|number| number * unit);
     match seconds.map(Duration::try_from_secs_f64) {
-        Ok(Ok(span)) if !span.is_zero() => Ok(span),
-        _ => Err("write a time as 100ms or 0.5s".to_owned()),
+        Ok(Ok(span)) if (SHORTEST..=LONGEST).contains(&span) => Ok(span),
+        Ok(_) => Err("1ms to 86400s".to_owned()),
+        Err(_) => Err("write a time as 100ms or 0.5s".to_owned()),
     }
 }
 
@@ -130,5 +143,7 @@ mod tests {
         assert!(parse_span("-1s").is_err());
         assert!(parse_span("0").is_err());
         assert!(parse_span("soon").is_err());
+        assert!(parse_span("1e19s").is_err());
+        assert!(parse_span("1e-9s").is_err());
     }
 }

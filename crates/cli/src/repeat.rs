@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::output::parse_span;
+use crate::output::{note, parse_span};
 
 /// How often to read.
 #[derive(clap::Args, Clone, Copy)]
@@ -34,17 +34,17 @@ pub fn repeated<T>(
         match sample() {
             Ok(samples) => {
                 if let Some(over) = trouble.take() {
-                    eprintln!("{over}");
+                    note(over);
                 }
                 print(&samples, Some(began.elapsed().as_secs_f64()))?;
                 left -= 1;
             }
             Err(Failure::Line(message)) if trouble.is_none() => {
-                eprintln!("the line is lost: {message}; trying again until Ctrl-C");
+                note(format!("the line is lost: {message}; trying again until Ctrl-C"));
                 trouble = Some("the line is back");
             }
             Err(Failure::Silent(message)) if trouble.is_none() => {
-                eprintln!("{message}; trying again until Ctrl-C");
+                note(format!("{message}; trying again until Ctrl-C"));
                 trouble = Some("it answers again");
             }
             Err(Failure::Line(_) | Failure::Silent(_)) => {}

@@ -8,6 +8,7 @@ use std::time::Duration;
 use motorlink::port::ServeName;
 use motorlink::sim::{Bench, BenchConfig, ConfigError, ServeError};
 use motorlink::stmcp::Profile;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::getpgrp;
 use rustix::termios::{isatty, tcgetpgrp};
 
@@ -58,7 +59,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
     let mut bench = Bench::new();
     let mut out = std::io::stdout();
     serve(&mut bench, &config, &st, &rmd, &mut out)?;
-    obey(&mut bench, std::io::stdin(), &mut out, args.stdin)
+    obey(&mut bench, std::io::stdin(), &mut out, |end| interrupted() || end && args.stdin)
 }
 
 /// Serves the ports and says so on `out`, a JSON line each.
@@ -81,31 +82,36 @@ pub fn serve(
     Ok(())
 }
 
-/// Serves until a signal comes, or until `input` ends if `until_end`. Each line of `input` is a
-/// command and is answered with a line on `out`.
+/// Serves until `ended` says so, which is told whether `input` has ended. Each line of `input` is a
+/// command and is answered with a line on `out`; while nobody reads the answers, no command is taken
+/// and the drives go on.
 pub fn obey(
     bench: &mut Bench,
     mut input: impl Read + AsFd,
-    out: &mut impl Write,
-    until_end: bool,
+    out: &mut (impl Write + AsFd),
+    ended: impl Fn(bool) -> bool,
 ) -> Result<(), Failure> {
     let mut lines = Lines::default();
-    while !interrupted() {
-        let listen = !lines.ended && may_read(&input);
+    while !ended(lines.ended && lines.bytes.is_empty()) {
+        let listen = !lines.ended && may_read(&input) && may_write(out);
         let turn = bench.turn(IDLE, listen.then(|| input.as_fd()))?;
-        if !turn.extra_is_ready {
-            continue;
+        if turn.extra_is_ready {
+            lines.read(&mut input);
         }
-        lines.read(&mut input)?;
-        while let Some(line) = lines.next() {
+        while may_write(out)
+            && let Some(line) = lines.next()
+        {
             writeln!(out, "{}", bench.obey(&line))?;
             out.flush()?;
         }
-        if lines.ended && until_end {
-            return Ok(());
-        }
     }
     Ok(())
+}
+
+/// Whether an answer would be taken now.
+fn may_write(out: &impl AsFd) -> bool {
+    let mut fds = [PollFd::new(out, PollFlags::OUT)];
+    poll(&mut fds, Some(&Timespec::default())).is_ok_and(|ready| ready > 0)
 }
 
 /// A process in the background is stopped when it reads its terminal.
@@ -124,7 +130,7 @@ struct Lines {
 const LONGEST: usize = 64 * 1024;
 
 impl Lines {
-    fn read(&mut self, input: &mut impl Read) -> Result<(), Failure> {
+    fn read(&mut self, input: &mut impl Read) {
         let mut chunk = [0; 4096];
         match input.read(&mut chunk) {
             Ok(0) => self.ended = true,
@@ -133,7 +139,6 @@ impl Lines {
             Err(error) if error.kind() == ErrorKind::WouldBlock => {}
             Err(_) => self.ended = true,
         }
-        Ok(())
     }
 
     fn next(&mut self) -> Option<String> {

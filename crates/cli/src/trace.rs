@@ -6,7 +6,7 @@ use motorlink::port::Direction;
 use motorlink::rmd::{self, CanFrame};
 use motorlink::stmcp::{Profile, Transcript};
 
-use crate::output::hex;
+use crate::output::{hex, note};
 
 /// Prints the bytes of a serial line, with what they mean.
 pub fn bytes(profile: Profile) -> impl FnMut(Direction, Duration, &[u8]) + Send {
@@ -14,7 +14,12 @@ pub fn bytes(profile: Profile) -> impl FnMut(Direction, Duration, &[u8]) + Send 
     move |direction, at, bytes| {
         let sent = direction == Direction::Sent;
         let meaning = transcript.note(sent, bytes);
-        eprintln!("{:>10.6} {} {:<24} {meaning}", at.as_secs_f64(), arrow(direction), hex(bytes));
+        note(format!(
+            "{:>10.6} {} {:<24} {meaning}",
+            at.as_secs_f64(),
+            arrow(direction),
+            hex(bytes)
+        ));
     }
 }
 
@@ -27,7 +32,11 @@ pub fn frames() -> impl FnMut(Direction, Duration, &CanFrame) + Send {
         };
         let (id, data) = (frame.id(), hex(frame.data()));
         let meaning = rmd::describe(*frame, way);
-        eprintln!("{:>10.6} {} {id:03x}#{data:<24} {meaning}", at.as_secs_f64(), arrow(direction));
+        note(format!(
+            "{:>10.6} {} {id:03x}#{data:<24} {meaning}",
+            at.as_secs_f64(),
+            arrow(direction)
+        ));
     }
 }
 

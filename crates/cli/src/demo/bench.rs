@@ -75,7 +75,8 @@ fn serve([st, rmd]: &[String; 2], stream: &UnixStream) -> Result<(), Failure> {
     let mut bench = Bench::new();
     let mut out = stream;
     sim::serve(&mut bench, &BenchConfig::default(), from_ref(st), from_ref(rmd), &mut out)?;
-    sim::obey(&mut bench, stream, &mut out, true)
+    // A signal ends the demo first, which still has to stop its motors.
+    sim::obey(&mut bench, stream, &mut out, |end| end)
 }
 
 impl Control {

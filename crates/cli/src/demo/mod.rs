@@ -13,6 +13,7 @@ use story::Story;
 
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
+use crate::output::note;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -35,12 +36,12 @@ pub fn run(args: Args) -> Result<(), Failure> {
     )?;
     // Whatever happens below, these stop the motors.
     let _st_guard = st.guard().reporting(|stopped| match &stopped.result {
-        Ok(()) => eprintln!("{} is stopped", stopped.motor),
-        Err(error) => eprintln!("{} may still turn: {error}", stopped.motor),
+        Ok(()) => note(format!("ST {} is stopped", stopped.motor)),
+        Err(error) => note(format!("ST {} may still turn: {error}", stopped.motor)),
     });
     let _rmd_guard = bus.guard().reporting(|stopped| match &stopped.result {
-        Ok(()) => eprintln!("RMD motor {} is off", stopped.id),
-        Err(error) => eprintln!("RMD motor {} may still turn: {error}", stopped.id),
+        Ok(()) => note(format!("RMD motor {} is off", stopped.id)),
+        Err(error) => note(format!("RMD motor {} may still turn: {error}", stopped.id)),
     });
     let mut screen = Screen::new(args.plain);
     screen.title(&[

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use console::{Term, style};
+use console::{Term, style, truncate_str};
 
 /// How often a plain line is printed for a motor that is being watched.
 const PLAIN_EVERY: Duration = Duration::from_millis(500);
@@ -87,7 +87,9 @@ impl Screen {
 
     /// A reader that is gone is noticed by the summary.
     fn write(&self, line: &str) {
-        let _ = self.term.write_line(line);
+        // A line that wraps could not be erased.
+        let width = if self.live { usize::from(self.term.size().1) } else { usize::MAX };
+        let _ = self.term.write_line(&truncate_str(line, width, ""));
     }
 }
 

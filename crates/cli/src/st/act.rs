@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use motorlink::stmcp::{
-    Command as Execute, Flags, REVUP_PHASES, RevupPhase, Status, find_register, parse_value,
-    register,
+    Command as Execute, Flags, Profile, REVUP_PHASES, RevupPhase, Status, find_register,
+    parse_value, register,
 };
 use serde_json::json;
 
@@ -32,15 +32,24 @@ pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
         Command::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
         Command::Ramp { rpm, ms } => {
             motor.ramp(rpm, ms)?;
-            output.done(format!("{} goes to {rpm} rpm in {ms} ms", motor.number()))
+            output.done(format!(
+                "{}: ramp to {rpm} rpm in {ms} ms acknowledged; it executes while the motor runs",
+                motor.number()
+            ))
         }
         Command::TorqueRamp { iq, ms } => {
+            session.wants(Profile::Mcsdk54, "torque ramps")?;
             motor.torque_ramp(iq, ms)?;
-            output.done(format!("{} goes to Iq {iq} in {ms} ms", motor.number()))
+            output.done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
         }
         Command::Move { rad, seconds } => {
+            session.wants(Profile::Mcsdk54, "moves")?;
+            if !rad.is_finite() || !seconds.is_finite() || seconds < 0.0 {
+                return Err(Failure::Usage(format!("{rad} rad in {seconds} s is no move")));
+            }
             motor.move_to(rad, seconds)?;
-            output.done(format!("{} turns to {rad} rad in {seconds} s", motor.number()))
+            output
+                .done(format!("{}: move to {rad} rad in {seconds} s acknowledged", motor.number()))
         }
         Command::Current { iq, id } => {
             motor.current(iq, id)?;
@@ -116,7 +125,7 @@ fn set(session: &Session, name: &str, text: &str) -> Result<(), Failure> {
     let register = find_register(name)?;
     let bits = parse_value(register, text, session.client.profile(), session.raw)?;
     let size = register.shape().map_or(4, |shape| shape.ty.size());
-    let wide = session.client.profile() == motorlink::stmcp::Profile::Mcsdk54
+    let wide = session.client.profile() == Profile::Mcsdk54
         && [register::OBSERVER_C1.id(), register::OBSERVER_C2.id()].contains(&register);
     let motor = session.motor()?;
     motor.write_raw(register, bits, if wide { 4 } else { size })?;

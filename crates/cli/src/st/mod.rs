@@ -8,7 +8,7 @@ mod scan;
 use std::time::Duration;
 
 use motorlink::port::TapBytes;
-use motorlink::stmcp::{Client, Config, MotorHandle, Options, Recovery};
+use motorlink::stmcp::{Client, Config, MotorHandle, Options, Profile, Recovery};
 use motorlink::time;
 
 pub use args::{Args, parse_profile};
@@ -71,6 +71,18 @@ fn connect(connection: &Connection, drive: &Drive) -> Result<Session, Failure> {
 }
 
 impl Session {
+    /// What only one profile has is not sent to a drive of the other, where it may mean something
+    /// else.
+    fn wants(&self, profile: Profile, what: &str) -> Result<(), Failure> {
+        if self.client.profile() == profile {
+            return Ok(());
+        }
+        Err(Failure::Usage(format!(
+            "{what} exist in profile {0} only: add --profile {0} if that is what the drive speaks",
+            profile.name()
+        )))
+    }
+
     fn motor(&self) -> Result<MotorHandle<'_>, Failure> {
         Ok(self.client.motor(self.motor)?)
     }

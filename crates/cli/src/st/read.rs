@@ -1,6 +1,6 @@
 //! Commands that read.
 
-use motorlink::stmcp::{Flags, Reading, RegisterId, Status, find_register, register};
+use motorlink::stmcp::{Flags, Profile, Reading, RegisterId, Status, find_register, register};
 use serde_json::{Map, Value, json};
 
 use super::Session;
@@ -109,6 +109,7 @@ pub fn segment(
     names: &[String],
     repeat: Repeat,
 ) -> Result<(), Failure> {
+    session.wants(Profile::Spec, "data segments")?;
     let registers = find_all(names)?;
     let motor = session.motor()?;
     let mut configured = false;

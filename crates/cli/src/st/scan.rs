@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use indicatif::ProgressBar;
-use motorlink::port::PortName;
+use motorlink::port::{PortError, PortName};
 use motorlink::stmcp::{BAUD_RATES, Finding, scan_baud};
 use serde_json::json;
 
@@ -23,8 +23,19 @@ pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result
     let mut found = false;
     for &rate in rates {
         bar.set_message(format!("{rate} baud"));
-        let finding = scan_baud(line, rate, patience)?;
+        let finding = scan_baud(line, rate, patience);
         bar.inc(1);
+        if let Err(error @ PortError::BaudRefused { .. }) = &finding {
+            bar.suspend(|| {
+                let text = format!("{rate:>8} baud  not possible on this port");
+                output.result(
+                    text,
+                    json!({ "baud": rate, "finding": "impossible", "text": error.to_string() }),
+                )
+            })?;
+            continue;
+        }
+        let finding = finding?;
         found |= matches!(finding, Finding::Drive(_) | Finding::Refuses(_));
         report(&bar, output, rate, &finding)?;
     }

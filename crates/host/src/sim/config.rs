@@ -1,9 +1,11 @@
 //! What a bench of simulated drives has, from a TOML file.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use motorlink_proto::stmcp::Profile;
 use motorlink_proto::time::Instant;
+use motorlink_sim::machine::MachineConfig;
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
 use serde::Deserialize;
@@ -127,6 +129,18 @@ impl BenchConfig {
 
     /// The ST drive, powered on `now`.
     pub(super) fn station(&self, now: Instant) -> Result<StStation<Vec<StMotor>>, ConfigError> {
+        for (config, n) in self.st.0.iter().zip(1..) {
+            check(
+                &format!("st.motor {n}"),
+                &config.machine,
+                [
+                    ("bus_voltage", config.bus_voltage, 0.0..=1000.0),
+                    ("rated_current", config.rated_current, 1e-3..=1e3),
+                    ("full_scale_current", config.full_scale_current, 1e-3..=1e4),
+                    ("load_torque", config.load_torque, 0.0..=1e3),
+                ],
+            )?;
+        }
         let motors: Vec<StMotor> = self.st.0.iter().copied().map(StMotor::new).collect();
         let drive = StDrive::new(now, motors).ok_or_else(|| {
             ConfigError::Impossible(format!("a drive has 1 to 7 motors, not {}", self.st.0.len()))
@@ -136,6 +150,18 @@ impl BenchConfig {
 
     /// The CAN bus, powered on `now`.
     pub(super) fn bus(&self, now: Instant) -> Result<RmdBus<Vec<RmdNode>>, ConfigError> {
+        for (config, n) in self.rmd.0.iter().zip(1..) {
+            check(
+                &format!("rmd.motor {n}"),
+                &config.machine,
+                [
+                    ("supply_voltage", config.supply_voltage, 0.0..=1000.0),
+                    ("max_torque_current", config.max_torque_current, 0.0..=33.0),
+                    ("load_torque", config.load_torque, 0.0..=1e3),
+                    ("angle_degrees", config.angle_degrees, -1e6..=1e6),
+                ],
+            )?;
+        }
         let node = |config: &RmdConfig| {
             RmdNode::new(now, *config, config.factory_rom()).ok_or_else(|| {
                 ConfigError::Impossible(format!(
@@ -150,6 +176,32 @@ impl BenchConfig {
         let twice = ids.windows(2).find(|pair| pair[0] == pair[1]).map_or(0, |pair| pair[0]);
         RmdBus::new(now, nodes?)
             .ok_or_else(|| ConfigError::Impossible(format!("two motors have the same ID {twice}")))
+    }
+}
+
+/// Refuses what no machine can be.
+fn check(
+    place: &str,
+    machine: &MachineConfig,
+    values: [(&str, f32, RangeInclusive<f32>); 4],
+) -> Result<(), ConfigError> {
+    let positive = 1e-9..=1e3;
+    let machine = [
+        ("machine.pole_pairs", machine.pole_pairs as f32, 1.0..=100.0),
+        ("machine.torque_constant", machine.torque_constant, positive.clone()),
+        ("machine.resistance", machine.resistance, positive.clone()),
+        ("machine.inductance", machine.inductance, positive.clone()),
+        ("machine.inertia", machine.inertia, positive),
+        ("machine.viscous_friction", machine.viscous_friction, 0.0..=1e3),
+        ("machine.coulomb_friction", machine.coulomb_friction, 0.0..=1e3),
+    ];
+    match machine.into_iter().chain(values).find(|(_, value, range)| !range.contains(value)) {
+        None => Ok(()),
+        Some((name, value, range)) => Err(ConfigError::Impossible(format!(
+            "{place}: {name} is {} to {}, not {value}",
+            range.start(),
+            range.end()
+        ))),
     }
 }
 
@@ -227,5 +279,7 @@ mod tests {
         assert!(why("[st]\nmotor = []").contains("1 to 7"));
         assert!(why("[[st.motor]]\npreset = \"big\"").contains("servo"));
         assert!(why("profile = \"v9\"").contains("v9"));
+        assert!(why("[[st.motor]]\nbus_voltage = -1").contains("st.motor 1: bus_voltage"));
+        assert!(why("[[rmd.motor]]\nmachine.inertia = 0").contains("machine.inertia"));
     }
 }

@@ -87,12 +87,13 @@ pub trait Drive {
     /// Sets the current references: at once in RUN, else when RUN is reached (4.11).
     fn current_reference(&mut self, motor: Motor, reference: CurrentReference);
 
-    /// Programs a torque ramp (profile `mcsdk-5.4`): at once in RUN, else when RUN is reached.
-    fn torque_ramp(&mut self, motor: Motor, ramp: TorqueRamp);
+    /// Programs a torque ramp: at once in RUN, else when RUN is reached. Only profile `mcsdk-5.4`
+    /// has it; unless it is implemented it is acknowledged without effect.
+    fn torque_ramp(&mut self, _motor: Motor, _ramp: TorqueRamp) {}
 
-    /// Moves to an angle in a given time; only with
+    /// Moves to an angle in a given time; only in profile `mcsdk-5.4`, for a motor with
     /// [`Feature::PositionControl`](super::Feature::PositionControl).
-    fn position(&mut self, motor: Motor, target: PositionMove);
+    fn position(&mut self, _motor: Motor, _target: PositionMove) {}
 
     /// Registers that a step of the motor profiler shows; only with
     /// [`Feature::Profiler`](super::Feature::Profiler).
