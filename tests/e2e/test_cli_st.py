@@ -347,3 +347,15 @@ def test_a_segment_is_not_sent_to_firmware_that_has_none(run):
     segment = ("--profile", "mcsdk-5.4", "--trace", "segment", "STATUS")
     refused = run("st", "-p", "sim:", *segment).ended(2)
     assert "--profile spec" in refused.err and "->" not in refused.err
+
+
+def test_a_start_while_the_motor_stops_is_told_to_have_no_effect(run, sim):
+    drives = sim(rmd=())
+
+    def st(*arguments):
+        return run("st", "-p", drives.port("pty"), *arguments)
+
+    st("start").ended(0)
+    eventually(lambda: "RUN" in st("get", "STATUS").ended(0).out, "motor 1 runs")
+    st("stop").ended(0)
+    assert "still stopping" in st("start").ended(1).err

@@ -95,6 +95,12 @@ fn start(session: &Session) -> Result<(), Failure> {
                 motor.number()
             )))
         }
+        Status::AnyStop | Status::Stop | Status::StopIdle | Status::WaitStopMotor => {
+            Err(Failure::Refused(format!(
+                "{} did not start, it is still stopping ({status}); start it when it is IDLE",
+                motor.number()
+            )))
+        }
         _ => {
             let text = format!("{} starts: {status}", motor.number());
             session.output.result(text, json!({ "ok": true, "STATUS": status.to_string() }))
