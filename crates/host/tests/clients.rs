@@ -258,6 +258,22 @@ fn limits_hold_for_typed_and_raw_requests() {
 }
 
 #[test]
+fn a_typed_write_has_the_size_that_the_profile_wants() {
+    for profile in [stmcp::Profile::Spec, stmcp::Profile::Mcsdk54] {
+        let name = "sim:".to_owned();
+        let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let config = folder.join(format!("{}-{}.toml", profile.name(), std::process::id()));
+        std::fs::write(&config, format!("profile = \"{}\"", profile.name())).unwrap();
+        let port = (name + config.to_str().unwrap()).parse().unwrap();
+        let options = stmcp::Options { profile, ..stmcp::Options::default() };
+        let client = Client::open(&port, options).unwrap();
+        let motor = client.motor(1).unwrap();
+        motor.write(register::OBSERVER_C1, -1234).unwrap();
+        assert_eq!(motor.read(register::OBSERVER_C1).unwrap(), -1234);
+    }
+}
+
+#[test]
 fn a_port_that_goes_away_is_told_and_opened_again() {
     let drives = Served::new("away");
     let back_off = BackOff { first: Duration::from_millis(10), cap: Duration::from_millis(50) };

@@ -37,7 +37,8 @@ impl<'a> MotorHandle<'a> {
         register: Register<T, impl Writable>,
         value: T,
     ) -> Result<(), Error> {
-        self.write_raw(register.id(), value.bits(), T::TYPE.size())
+        let size = register.id().write_size(self.client.profile());
+        self.write_raw(register.id(), value.bits(), size)
     }
 
     /// Reads any register, known or not. The value's size is the reply's, its sign the table's.

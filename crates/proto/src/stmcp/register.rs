@@ -363,6 +363,16 @@ impl RegisterId {
         TEXTS.get(usize::from(self.0))
     }
 
+    /// Bytes that a drive of `profile` takes for the value of a SET_REG: those of the type where it
+    /// takes none, 4 for an unnamed register.
+    pub fn write_size(self, profile: Profile) -> u8 {
+        let Some(shape) = self.shape() else { return 4 };
+        match shape.writing(profile, Features::NONE.with(shape.feature)) {
+            Writing::Takes(size) => size,
+            Writing::ReadOnly | Writing::Refused => shape.ty.size(),
+        }
+    }
+
     /// Every register of the table.
     pub fn all() -> impl Iterator<Item = RegisterId> {
         (0..SHAPES.len() as u8).map(RegisterId)
