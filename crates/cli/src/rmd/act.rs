@@ -7,18 +7,18 @@ use motorlink::rmd::{
 use serde_json::{Map, Value, json};
 
 use super::Session;
-use super::args::{Command, Direction};
+use super::args::{Act, Direction};
 use super::read::{motion, status1, value};
 use crate::failure::Failure;
 use crate::output::{hex, line, parse_hex};
 
-pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
+pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     let motor = session.motor()?;
     let id = motor.id();
     let output = session.output;
-    match command {
-        Command::Pid { gains } => pid(session, &gains),
-        Command::Accel { dps_per_second: None } => {
+    match act {
+        Act::Pid { gains } => pid(session, &gains),
+        Act::Accel { dps_per_second: None } => {
             let limit = motor.acceleration()?;
             output.rows(&[value(
                 session,
@@ -29,12 +29,12 @@ pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
                 "°/s²",
             )])
         }
-        Command::Accel { dps_per_second: Some(limit) } => {
+        Act::Accel { dps_per_second: Some(limit) } => {
             motor.write_acceleration(DpsPerSecond(limit))?;
             output.done(format!("motor {id} accelerates with {limit} °/s² until power-off"))
         }
-        Command::Encoder { offset } => encoder(session, offset),
-        Command::Zero => {
+        Act::Encoder { offset } => encoder(session, offset),
+        Act::Zero => {
             session.rom("setting the zero")?;
             let offset = motor.write_zero_to_rom()?;
             output.result(
@@ -42,31 +42,31 @@ pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
                 json!({ "ok": true, "offset": offset }),
             )
         }
-        Command::Off => {
+        Act::Off => {
             motor.off()?;
             output.done(format!("motor {id} is off"))
         }
-        Command::Stop => {
+        Act::Stop => {
             motor.stop()?;
             output.done(format!("motor {id} is stopped; `run` resumes"))
         }
-        Command::Run => {
+        Act::Run => {
             motor.run()?;
             output.done(format!("motor {id} resumes what `stop` stopped, if anything"))
         }
-        Command::Torque { amps } => {
+        Act::Torque { amps } => {
             let torque = torque(session, amps)?;
             output.rows(&motion(session, &motor.torque(torque)?))
         }
-        Command::Speed { dps } => {
+        Act::Speed { dps } => {
             let speed = CentiDps(digits(session, dps, CentiDps::SCALE, "°/s")?);
             output.rows(&motion(session, &motor.speed(speed)?))
         }
-        Command::Move { degrees, max_speed, direction } => {
+        Act::Move { degrees, max_speed, direction } => {
             let status = go(session, degrees, max_speed, direction)?;
             output.rows(&motion(session, &status))
         }
-        Command::ClearError => {
+        Act::ClearError => {
             let status = motor.clear_errors()?;
             output.rows(&status1(session, &status))?;
             if status.errors.is_empty() {
@@ -77,9 +77,8 @@ pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
                 status.errors
             )))
         }
-        Command::Torque4 { amps } => torque4(session, &amps),
-        Command::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
-        Command::Scan { .. } | Command::Status { .. } | Command::Angle { .. } => Ok(()),
+        Act::Torque4 { amps } => torque4(session, &amps),
+        Act::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
     }
 }
 

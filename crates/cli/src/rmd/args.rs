@@ -33,6 +33,15 @@ pub struct Motor {
 
 #[derive(Subcommand)]
 pub enum Command {
+    #[command(flatten)]
+    Read(Read),
+    #[command(flatten)]
+    Act(Act),
+}
+
+/// Commands that change nothing.
+#[derive(Subcommand)]
+pub enum Read {
     /// Find the motors that answer
     Scan {
         /// IDs to ask instead of 1 to 32
@@ -44,6 +53,16 @@ pub enum Command {
         #[command(flatten)]
         repeat: Repeat,
     },
+    /// Show multi-turn and single-turn angle
+    Angle {
+        #[command(flatten)]
+        repeat: Repeat,
+    },
+}
+
+/// Commands that change something, and any frame.
+#[derive(Subcommand)]
+pub enum Act {
     /// Show the gains, or set them until power-off (for good with --write-rom)
     Pid {
         /// Position Kp, Ki, speed Kp, Ki, torque Kp, Ki: all six to set them
@@ -65,11 +84,6 @@ pub enum Command {
     },
     /// Make the current position the zero from the next power-on on (needs --write-rom)
     Zero,
-    /// Show multi-turn and single-turn angle
-    Angle {
-        #[command(flatten)]
-        repeat: Repeat,
-    },
     /// Switch the motor off and forget what it was doing
     Off,
     /// Stop the motor and remember what it was doing

@@ -10,7 +10,7 @@ use motorlink::port::TapCan;
 use motorlink::rmd::{Bus, MotorHandle, Options};
 
 pub use args::Args;
-use args::{Command, Motor};
+use args::{Command, Motor, Read};
 
 use crate::connection::Connection;
 use crate::failure::Failure;
@@ -30,10 +30,10 @@ pub fn run(args: Args) -> Result<(), Failure> {
     let Args { connection, motor, command } = args;
     let session = connect(&connection, &motor)?;
     match command {
-        Command::Scan { ids } => read::scan(&session, ids),
-        Command::Status { repeat } => read::status(&session, repeat),
-        Command::Angle { repeat } => read::angle(&session, repeat),
-        other => act::run(&session, other),
+        Command::Act(act) => act::run(&session, act),
+        Command::Read(Read::Scan { ids }) => read::scan(&session, ids),
+        Command::Read(Read::Status { repeat }) => read::status(&session, repeat),
+        Command::Read(Read::Angle { repeat }) => read::angle(&session, repeat),
     }
 }
 

@@ -4,45 +4,45 @@ use std::time::{Duration, Instant};
 
 use motorlink::stmcp::{
     Command as Execute, Flags, Profile, REVUP_PHASES, RevupPhase, Status, find_register,
-    parse_value, register,
+    parse_value,
 };
 use serde_json::json;
 
 use super::Session;
-use super::args::{Command, Pfc};
+use super::args::{Act, Pfc};
 use super::read::explain;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{hex, parse_hex};
 
-pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
+pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     let motor = session.motor()?;
     let output = session.output;
-    match command {
-        Command::Set { register, value } => set(session, &register, &value),
-        Command::Start => start(session),
-        Command::Stop => execute(session, Execute::StopMotor),
-        Command::StartStop => execute(session, Execute::StartStop),
-        Command::StopRamp => execute(session, Execute::StopRamp),
-        Command::FaultAck => acknowledge(session),
-        Command::EncoderAlign => execute(session, Execute::EncoderAlign),
-        Command::IqdrefClear => execute(session, Execute::IqdrefClear),
-        Command::Pfc { action: Pfc::Enable } => execute(session, Execute::PfcEnable),
-        Command::Pfc { action: Pfc::Disable } => execute(session, Execute::PfcDisable),
-        Command::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
-        Command::Ramp { rpm, ms } => {
+    match act {
+        Act::Set { register, value } => set(session, &register, &value),
+        Act::Start => start(session),
+        Act::Stop => execute(session, Execute::StopMotor),
+        Act::StartStop => execute(session, Execute::StartStop),
+        Act::StopRamp => execute(session, Execute::StopRamp),
+        Act::FaultAck => acknowledge(session),
+        Act::EncoderAlign => execute(session, Execute::EncoderAlign),
+        Act::IqdrefClear => execute(session, Execute::IqdrefClear),
+        Act::Pfc { action: Pfc::Enable } => execute(session, Execute::PfcEnable),
+        Act::Pfc { action: Pfc::Disable } => execute(session, Execute::PfcDisable),
+        Act::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
+        Act::Ramp { rpm, ms } => {
             motor.ramp(rpm, ms)?;
             output.done(format!(
                 "{}: ramp to {rpm} rpm in {ms} ms acknowledged; it executes while the motor runs",
                 motor.number()
             ))
         }
-        Command::TorqueRamp { iq, ms } => {
+        Act::TorqueRamp { iq, ms } => {
             session.wants(Profile::Mcsdk54, "torque ramps")?;
             motor.torque_ramp(iq, ms)?;
             output.done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
         }
-        Command::Move { rad, seconds } => {
+        Act::Move { rad, seconds } => {
             session.wants(Profile::Mcsdk54, "moves")?;
             if !rad.is_finite() || !seconds.is_finite() || seconds < 0.0 {
                 return Err(Failure::Usage(format!("{rad} rad in {seconds} s is no move")));
@@ -51,12 +51,12 @@ pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
             output
                 .done(format!("{}: move to {rad} rad in {seconds} s acknowledged", motor.number()))
         }
-        Command::Current { iq, id } => {
+        Act::Current { iq, id } => {
             motor.current(iq, id)?;
             output.done(format!("{}: references Iq {iq}, Id {id}", motor.number()))
         }
-        Command::Revup { phase: None, .. } => revup(session),
-        Command::Revup { phase: Some(phase), rpm, torque, ms } => {
+        Act::Revup { phase: None, .. } => revup(session),
+        Act::Revup { phase: Some(phase), rpm, torque, ms } => {
             let data = RevupPhase {
                 speed_rpm: rpm.unwrap_or_default(),
                 torque_s16a: torque.unwrap_or_default(),
@@ -65,13 +65,7 @@ pub fn run(session: &Session, command: Command) -> Result<(), Failure> {
             motor.set_revup(phase, data)?;
             output.done(format!("{}: rev-up phase {phase} is set", motor.number()))
         }
-        Command::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
-        Command::Info
-        | Command::Status
-        | Command::Registers
-        | Command::Get { .. }
-        | Command::Segment { .. }
-        | Command::Scan { .. } => Ok(()),
+        Act::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
     }
 }
 
@@ -129,12 +123,10 @@ fn acknowledge(session: &Session) -> Result<(), Failure> {
 
 fn set(session: &Session, name: &str, text: &str) -> Result<(), Failure> {
     let register = find_register(name)?;
-    let bits = parse_value(register, text, session.client.profile(), session.raw)?;
-    let size = register.shape().map_or(4, |shape| shape.ty.size());
-    let wide = session.client.profile() == Profile::Mcsdk54
-        && [register::OBSERVER_C1.id(), register::OBSERVER_C2.id()].contains(&register);
+    let profile = session.client.profile();
+    let bits = parse_value(register, text, profile, session.raw)?;
     let motor = session.motor()?;
-    motor.write_raw(register, bits, if wide { 4 } else { size })?;
+    motor.write_raw(register, bits, register.write_size(profile))?;
     session.output.done(format!("{}: {register} is written", motor.number()))
 }
 

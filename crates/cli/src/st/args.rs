@@ -37,6 +37,15 @@ pub struct Drive {
 
 #[derive(Subcommand)]
 pub enum Command {
+    #[command(flatten)]
+    Read(Read),
+    #[command(flatten)]
+    Act(Act),
+}
+
+/// Commands that change nothing.
+#[derive(Subcommand)]
+pub enum Read {
     /// Show name and version of the drive's SDK and firmware
     Info,
     /// Show state, faults, speed, current, voltage and temperature
@@ -51,6 +60,28 @@ pub enum Command {
         #[command(flatten)]
         repeat: Repeat,
     },
+    /// Sample registers at one instant, in one exchange; profile spec only
+    Segment {
+        /// The segment of the drive to use, 0 to 3
+        #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=3))]
+        number: u8,
+        /// Names or numbers, at most 32; those of access D too
+        #[arg(required = true, value_name = "REGISTER")]
+        registers: Vec<String>,
+        #[command(flatten)]
+        repeat: Repeat,
+    },
+    /// Try the usual baud rates and tell silence, garbage and refusal apart
+    Scan {
+        /// Rates to try instead of the usual ones
+        #[arg(value_name = "RATE")]
+        rates: Vec<u32>,
+    },
+}
+
+/// Commands that change something, and any frame.
+#[derive(Subcommand)]
+pub enum Act {
     /// Write a register
     Set {
         /// Name or number
@@ -125,23 +156,6 @@ pub enum Command {
         /// What to do
         #[arg(value_enum)]
         action: Pfc,
-    },
-    /// Sample registers at one instant, in one exchange; profile spec only
-    Segment {
-        /// The segment of the drive to use, 0 to 3
-        #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=3))]
-        number: u8,
-        /// Names or numbers, at most 32; those of access D too
-        #[arg(required = true, value_name = "REGISTER")]
-        registers: Vec<String>,
-        #[command(flatten)]
-        repeat: Repeat,
-    },
-    /// Try the usual baud rates and tell silence, garbage and refusal apart
-    Scan {
-        /// Rates to try instead of the usual ones
-        #[arg(value_name = "RATE")]
-        rates: Vec<u32>,
     },
     /// Send any frame: its code, then its payload
     Raw {

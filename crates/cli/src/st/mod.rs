@@ -12,7 +12,7 @@ use motorlink::stmcp::{Client, Config, MotorHandle, Options, Profile, Recovery};
 use motorlink::time;
 
 pub use args::{Args, parse_profile};
-use args::{Command, Drive};
+use args::{Command, Drive, Read};
 
 use crate::connection::Connection;
 use crate::failure::Failure;
@@ -34,18 +34,20 @@ pub fn run(args: Args) -> Result<(), Failure> {
     let Args { connection, drive, command } = args;
     let connect = || connect(&connection, &drive);
     match command {
-        Command::Registers => read::registers(connection.output()),
-        Command::Scan { rates } => {
-            let patience = drive.timeout.unwrap_or(SCAN_TIMEOUT);
-            scan::run(&connection, Duration::from_millis(patience.into()), &rates)
-        }
-        Command::Get { registers, repeat } => read::get(&connect()?, &registers, repeat),
-        Command::Segment { number, registers, repeat } => {
-            read::segment(&connect()?, number, &registers, repeat)
-        }
-        Command::Info => read::info(&connect()?),
-        Command::Status => read::status(&connect()?),
-        other => act::run(&connect()?, other),
+        Command::Act(act) => act::run(&connect()?, act),
+        Command::Read(read) => match read {
+            Read::Registers => read::registers(connection.output()),
+            Read::Scan { rates } => {
+                let patience = drive.timeout.unwrap_or(SCAN_TIMEOUT);
+                scan::run(&connection, Duration::from_millis(patience.into()), &rates)
+            }
+            Read::Get { registers, repeat } => read::get(&connect()?, &registers, repeat),
+            Read::Segment { number, registers, repeat } => {
+                read::segment(&connect()?, number, &registers, repeat)
+            }
+            Read::Info => read::info(&connect()?),
+            Read::Status => read::status(&connect()?),
+        },
     }
 }
 
