@@ -22,6 +22,20 @@ pub enum LinkState {
     },
 }
 
+/// How often a guard tries to stop a motor before it gives up.
+pub(crate) const STOP_ATTEMPTS: u32 = 4;
+/// The longest that a guard waits for a port to come back before it tries again.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+impl LinkState {
+    /// Waits until a closed port may be opened again, though not for long; whether it is closed.
+    pub(crate) fn await_retry(self) -> bool {
+        let LinkState::Closed { retry_in } = self else { return false };
+        std::thread::sleep(retry_in.min(PATIENCE));
+        true
+    }
+}
+
 /// How long to wait between attempts to open a port that went away.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BackOff {

@@ -29,6 +29,14 @@ macro_rules! named_numbers {
                 }
             }
 
+            /// The number on the wire.
+            pub const fn number(self) -> $repr {
+                match self {
+                    $( $name::$variant => $value, )+
+                    $name::Unknown(other) => other,
+                }
+            }
+
             /// What the value means, in a sentence; empty for an unnamed number.
             pub const fn doc(self) -> &'static str {
                 match self {
@@ -49,10 +57,7 @@ macro_rules! named_numbers {
 
         impl From<$name> for $repr {
             fn from(value: $name) -> Self {
-                match value {
-                    $( $name::$variant => $value, )+
-                    $name::Unknown(other) => other,
-                }
+                value.number()
             }
         }
 

@@ -64,7 +64,6 @@ const SCAN_WIDTH: usize = 8;
 /// answer in time is left alone until its late reply came or cannot come any more.
 pub struct Bus {
     inner: Mutex<Inner>,
-    guard_time: Duration,
 }
 
 struct Inner {
@@ -107,11 +106,8 @@ impl Bus {
         for id in MotorSet::ALL {
             host.set_limits(id, options.limits);
         }
-        let guard_time = options.guard;
-        Bus {
-            guard_time,
-            inner: Mutex::new(Inner { port, host, moving: MotorSet::EMPTY, ended: Moment::now() }),
-        }
+        let inner = Inner { port, host, moving: MotorSet::EMPTY, ended: Moment::now() };
+        Bus { inner: Mutex::new(inner) }
     }
 
     /// Whether the port is open.
@@ -249,7 +245,7 @@ impl Bus {
 
     /// How long a late reply is awaited.
     pub(super) fn guard_time(&self) -> Duration {
-        self.guard_time
+        self.lock().host.guard().into()
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {

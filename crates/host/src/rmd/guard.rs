@@ -1,16 +1,9 @@
 //! Stops motors when their program ends, however it ends.
 
-use std::time::Duration;
-
 use motorlink_proto::rmd::{Command, MotorId, MotorSet, Off, Stop};
 
 use super::{Bus, Error};
-use crate::line::LinkState;
-
-/// How often a guard tries to stop a motor before it gives up.
-const ATTEMPTS: u32 = 4;
-/// The longest that a guard waits for a port to come back before it tries again.
-const PATIENCE: Duration = Duration::from_millis(500);
+use crate::line::STOP_ATTEMPTS;
 
 /// What a [`Guard`] does to the motors that it finds moving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,7 +60,7 @@ impl<'a> Guard<'a> {
             OnDrop::Off => Off.encode(),
             OnDrop::Stop => Stop.encode(),
         };
-        for attempt in 1..=ATTEMPTS {
+        for attempt in 1..=STOP_ATTEMPTS {
             let requests: Vec<_> = self.bus.moving().map(|id| (id, request)).collect();
             if requests.is_empty() {
                 break;
@@ -81,11 +74,9 @@ impl<'a> Guard<'a> {
             let unheard = self.bus.moving().without(told_ids);
             let unheard = unheard.map(|id| Stopped { id, result: cycle.clone() });
             let outcomes = unheard.chain(told);
-            let last = attempt == ATTEMPTS;
+            let last = attempt == STOP_ATTEMPTS;
             stopped.extend(outcomes.filter(|one| last || one.result.is_ok()));
-            if let LinkState::Closed { retry_in } = self.bus.link_state() {
-                std::thread::sleep(retry_in.min(PATIENCE));
-            } else if !self.bus.moving().is_empty() {
+            if !self.bus.link_state().await_retry() && !self.bus.moving().is_empty() {
                 std::thread::sleep(self.bus.guard_time());
             }
         }

@@ -257,10 +257,10 @@ fn st(station: &mut Station, now: Instant, command: &Command) -> Result<(), Stri
 
 fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), String> {
     bus.advance_to(now);
-    let ids: Vec<MotorId> = bus.nodes().iter().map(RmdNode::id).collect();
     match command {
         Command::PowerCycle { motor: Some(number), .. } => rmd_node(bus, *number)?.power_cycle(now),
         Command::PowerCycle { motor: None, .. } => {
+            let ids: Vec<MotorId> = bus.nodes().iter().map(RmdNode::id).collect();
             for id in ids {
                 rmd_node(bus, id.number())?.power_cycle(now);
             }

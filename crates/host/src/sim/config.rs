@@ -101,26 +101,9 @@ impl BenchConfig {
     pub fn parse(text: &str) -> Result<Self, ConfigError> {
         let file: File =
             toml::from_str(text).map_err(|error| ConfigError::Text(error.to_string()))?;
-        let st = match file.st {
-            None => StConfigs::default(),
-            Some(motors) => {
-                let read = |(n, table)| st_motor(table, &format!("st.motor {}", n + 1));
-                let configs: Result<Vec<_>, _> =
-                    motors.motor.into_iter().enumerate().map(read).collect();
-                StConfigs(configs?)
-            }
-        };
-        let rmd = match file.rmd {
-            None => RmdConfigs::default(),
-            Some(motors) => {
-                let read = |(n, table)| {
-                    overlay(RmdConfig::default(), table, &format!("rmd.motor {}", n + 1))
-                };
-                let configs: Result<Vec<_>, _> =
-                    motors.motor.into_iter().enumerate().map(read).collect();
-                RmdConfigs(configs?)
-            }
-        };
+        let st = motors(file.st, "st.motor", st_motor)?.map(StConfigs).unwrap_or_default();
+        let rmd_motor = |table, place: &str| overlay(RmdConfig::default(), table, place);
+        let rmd = motors(file.rmd, "rmd.motor", rmd_motor)?.map(RmdConfigs).unwrap_or_default();
         let config = BenchConfig { profile: file.profile, st, rmd };
         config.station(Instant(0))?;
         config.bus(Instant(0))?;
@@ -171,11 +154,12 @@ impl BenchConfig {
             })
         };
         let nodes: Result<Vec<RmdNode>, ConfigError> = self.rmd.0.iter().map(node).collect();
-        let mut ids: Vec<u8> = self.rmd.0.iter().map(|config| config.id).collect();
-        ids.sort_unstable();
-        let twice = ids.windows(2).find(|pair| pair[0] == pair[1]).map_or(0, |pair| pair[0]);
-        RmdBus::new(now, nodes?)
-            .ok_or_else(|| ConfigError::Impossible(format!("two motors have the same ID {twice}")))
+        RmdBus::new(now, nodes?).ok_or_else(|| {
+            let mut ids: Vec<u8> = self.rmd.0.iter().map(|config| config.id).collect();
+            ids.sort_unstable();
+            let twice = ids.windows(2).find(|pair| pair[0] == pair[1]).map_or(0, |pair| pair[0]);
+            ConfigError::Impossible(format!("two motors have the same ID {twice}"))
+        })
     }
 }
 
@@ -203,6 +187,17 @@ fn check(
             range.end()
         ))),
     }
+}
+
+/// The motors of a section, if the file has it; `read` is told each one's place.
+fn motors<T>(
+    section: Option<Motors>,
+    name: &str,
+    read: impl Fn(Table, &str) -> Result<T, ConfigError>,
+) -> Result<Option<Vec<T>>, ConfigError> {
+    let Some(section) = section else { return Ok(None) };
+    let tables = section.motor.into_iter().zip(1..);
+    tables.map(|(table, n)| read(table, &format!("{name} {n}"))).collect::<Result<_, _>>().map(Some)
 }
 
 /// An ST motor: its preset (`mains` or `servo`) with what the table says on top.

@@ -76,9 +76,8 @@ impl Client {
     ///
     /// # Errors
     /// What keeps the port from being opened. The drive is not asked anything.
-    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+    pub fn open(port: &PortName, mut options: Options) -> Result<Self, Error> {
         let name = port.clone();
-        let mut options = options;
         if let PortName::Line(LineName::Serial { baud, .. }) = port {
             // What recovery sends has to be out of the port before silence can begin.
             options.line.quiet = options.line.quiet + Master::longest_transmission(*baud);
@@ -262,22 +261,21 @@ impl Inner {
         if begun.is_err() {
             return Err(Error::TooLong(what()));
         }
+        let addressed = Motor::new(motor).or(self.current);
         if request.is_some_and(starts) {
-            self.started |= self.addressed(motor).map_or(ALL, bit);
+            self.started |= addressed.map_or(ALL, bit);
         }
         let (port, target) = (self.port.name.clone(), Target(motor));
         let outcome = self.run(reply);
         self.ended = Instant::now();
+        // Unless the drive acknowledges, its current motor may have changed or not.
+        self.current = None;
         match outcome {
             Ok(Ok((Some(value), _))) => {
-                self.acknowledged(motor, request);
-                return Ok(value);
+                self.acknowledged(addressed, request);
+                Ok(value)
             }
-            // Whatever else came, the drive's current motor may have changed or not.
-            _ => self.current = None,
-        }
-        match outcome {
-            Ok(Ok((_, size))) => {
+            Ok(Ok((None, size))) => {
                 // A reply that fits no request: somebody else's, perhaps.
                 self.master.lost();
                 Err(Error::Reply { port, motor: target, what: what(), size })
@@ -319,24 +317,17 @@ impl Inner {
         }
     }
 
-    /// The motor that a motor number addresses, where that is known.
-    fn addressed(&self, number: u8) -> Option<Motor> {
-        Motor::new(number).or(self.current)
-    }
-
     /// A motor counts as started from the START on, whose reply may be lost, and until a STOP is
     /// acknowledged.
-    fn acknowledged(&mut self, motor: u8, request: Option<&Request<'_>>) {
-        self.current = self.addressed(motor);
+    fn acknowledged(&mut self, addressed: Option<Motor>, request: Option<&Request<'_>>) {
         match request {
+            Some(Request::SetRegister { register: RegisterId::TARGET_MOTOR, .. }) => return,
             Some(Request::Execute(Command::StopMotor | Command::ScStop)) => {
-                self.started &= !self.current.map_or(0, bit);
-            }
-            Some(Request::SetRegister { register: RegisterId::TARGET_MOTOR, .. }) => {
-                self.current = None;
+                self.started &= !addressed.map_or(0, bit);
             }
             _ => {}
         }
+        self.current = addressed;
     }
 }
 

@@ -1,16 +1,9 @@
 //! Stops motors when their program ends, however it ends.
 
-use std::time::Duration;
-
 use motorlink_proto::stmcp::{ErrorCode, Line, Motor};
 
 use super::{Client, Error};
-use crate::line::LinkState;
-
-/// How often a guard tries to stop a motor before it gives up.
-const ATTEMPTS: u32 = 4;
-/// The longest that a guard waits for a port to come back before it tries again.
-const PATIENCE: Duration = Duration::from_millis(500);
+use crate::line::STOP_ATTEMPTS;
 
 /// Stops the motors that a [`Client`] started when it is dropped: at the end of a scope, on an
 /// early return, on a panic. Where the drive does not answer it may still hear, so that STOP_MOTOR
@@ -58,7 +51,7 @@ impl<'a> Guard<'a> {
     fn stop_all(&self) -> Vec<Stopped> {
         let mut stopped: Vec<Stopped> = Vec::new();
         let mut left: Vec<Motor> = self.client.started().collect();
-        for attempt in 1..=ATTEMPTS {
+        for attempt in 1..=STOP_ATTEMPTS {
             let mut failed = Vec::new();
             let mut told = false;
             for (n, &motor) in left.iter().enumerate() {
@@ -70,7 +63,7 @@ impl<'a> Guard<'a> {
                     }
                 }
                 let result = self.stop(motor);
-                if result.is_err() && attempt < ATTEMPTS {
+                if result.is_err() && attempt < STOP_ATTEMPTS {
                     failed.push(motor);
                 } else {
                     stopped.push(Stopped { motor, result });
@@ -80,9 +73,7 @@ impl<'a> Guard<'a> {
             if left.is_empty() {
                 break;
             }
-            if let LinkState::Closed { retry_in } = self.client.link_state() {
-                std::thread::sleep(retry_in.min(PATIENCE));
-            }
+            self.client.link_state().await_retry();
         }
         stopped
     }

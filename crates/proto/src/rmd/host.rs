@@ -315,6 +315,11 @@ impl Host {
         self.guard = guard;
     }
 
+    /// How long a motor is in quarantine after a timeout.
+    pub const fn guard(&self) -> Duration {
+        self.guard
+    }
+
     /// What came and belonged to no exchange.
     pub const fn counters(&self) -> &Counters {
         &self.counters

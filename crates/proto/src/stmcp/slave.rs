@@ -347,11 +347,12 @@ fn revup_phase(phase: u8) -> Result<u8, ErrorCode> {
 
 /// A NACK frame. Header and length carry once into the high byte, so the checksum is the code
 /// plus one.
-const fn nack(code: u8) -> [u8; 4] {
+const fn nack(code: ErrorCode) -> [u8; 4] {
+    let code = code.number();
     [HEADER_NACK, 1, code, code.wrapping_add(1)]
 }
 
-static TIMEOUT_REPLY: [u8; 4] = nack(0x09);
+static TIMEOUT_REPLY: [u8; 4] = nack(ErrorCode::Timeout);
 
 #[derive(Debug, Clone, Copy)]
 struct Segment {
