@@ -7,9 +7,8 @@ use crate::output::Output;
 
 #[derive(clap::Args)]
 pub struct Connection {
-    /// The port: /dev/ttyACM0, tcp:HOST:PORT, slcan:DEVICE, socketcan:can0, sim: and more
-    #[arg(short, long, env = "MOTORLINK_PORT", global = true)]
-    port: Option<String>,
+    #[command(flatten)]
+    port: Port,
     /// Print JSON, an object a line
     #[arg(long, global = true)]
     json: bool,
@@ -21,9 +20,29 @@ pub struct Connection {
     pub trace: bool,
 }
 
+/// Which port.
+#[derive(clap::Args)]
+pub struct Port {
+    /// The port: /dev/ttyACM0, tcp:HOST:PORT, slcan:DEVICE, socketcan:can0, sim: and more
+    #[arg(short, long, env = "MOTORLINK_PORT", global = true)]
+    port: Option<String>,
+}
+
 impl Connection {
     /// The port that -p or MOTORLINK_PORT names.
     pub fn port(&self) -> Result<PortName, Failure> {
+        self.port.name()
+    }
+
+    /// Where results go.
+    pub fn output(&self) -> Output {
+        Output { json: self.json }
+    }
+}
+
+impl Port {
+    /// The port that -p or MOTORLINK_PORT names.
+    pub fn name(&self) -> Result<PortName, Failure> {
         match self.port.as_deref() {
             Some(name) if !name.is_empty() => Ok(name.parse()?),
             _ => Err(Failure::Usage(
@@ -32,10 +51,5 @@ impl Connection {
                     .to_owned(),
             )),
         }
-    }
-
-    /// Where results go.
-    pub fn output(&self) -> Output {
-        Output { json: self.json }
     }
 }

@@ -1,5 +1,6 @@
 //! `motorlink`: command, watch and simulate motor drives from the shell.
 
+mod conformance;
 mod connection;
 mod demo;
 mod failure;
@@ -40,6 +41,8 @@ enum Command {
     /// Talk to RMD motors on a CAN bus
     #[command(after_help = help::RMD_PORTS)]
     Rmd(rmd::Args),
+    /// Check a drive against the document it claims to follow, sentence by sentence
+    Conformance(conformance::Args),
     /// Print completions for a shell
     Completions {
         /// The shell
@@ -60,6 +63,7 @@ fn main() -> ExitCode {
         Command::Ports(args) => ports::run(args),
         Command::St(args) => st::run(args),
         Command::Rmd(args) => rmd::run(args),
+        Command::Conformance(args) => conformance::run(args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "motorlink", &mut script);

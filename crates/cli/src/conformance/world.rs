@@ -1,0 +1,50 @@
+//! The user's hands: shell commands for what the wire cannot do.
+
+use std::process::{Command, Stdio};
+
+use motorlink_conformance::{Unavailable, World};
+
+use super::args::Run;
+
+/// Runs what the user gave.
+pub struct Commands {
+    power_cycle: Option<String>,
+    fault_on: Option<String>,
+    fault_off: Option<String>,
+}
+
+impl Commands {
+    pub fn new(run: &Run) -> Self {
+        let Run { power_cycle, fault_on, fault_off, .. } = run;
+        let (power_cycle, fault_on) = (power_cycle.clone(), fault_on.clone());
+        Commands { power_cycle, fault_on, fault_off: fault_off.clone() }
+    }
+}
+
+impl World for Commands {
+    fn power_cycle(&mut self) -> Result<(), Unavailable> {
+        shell(self.power_cycle.as_deref(), "--power-cycle")
+    }
+
+    fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
+        let (command, option) = match present {
+            true => (&self.fault_on, "--fault-on"),
+            false => (&self.fault_off, "--fault-off"),
+        };
+        shell(command.as_deref(), option)
+    }
+}
+
+fn shell(command: Option<&str>, option: &str) -> Result<(), Unavailable> {
+    let command = command.ok_or_else(|| Unavailable(format!("{option} was not given")))?;
+    let status = Command::new("sh")
+        .args(["-c", command])
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .status()
+        .map_err(|error| Unavailable(format!("{option}: cannot run sh: {error}")))?;
+    if status.success() {
+        return Ok(());
+    }
+    Err(Unavailable(format!("{option}: `{command}` failed: {status}")))
+}

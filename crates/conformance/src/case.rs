@@ -1,0 +1,164 @@
+//! Cases: what is done to a drive and what must come of it.
+
+use std::borrow::Cow;
+
+use motorlink::port::PortError;
+
+use crate::report::{Outcome, Report, Verdict};
+use crate::world::Unavailable;
+
+/// What a case needs the user's leave or help for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Need {
+    /// The motor turns.
+    Spin,
+    /// The drive's ROM is written, which wears.
+    Rom,
+    /// The drive's power is cycled.
+    PowerCycle,
+    /// A fault is caused from outside.
+    Fault,
+}
+
+/// A test of one or a few clauses on a drive behind a bench `B`.
+pub struct Case<B> {
+    /// What must hold, as a sentence in snake case; a subject may follow in brackets:
+    /// `registers_read_in_their_size[SPEED_MEAS]`.
+    pub name: Cow<'static, str>,
+    /// Ids of the clauses that it tests.
+    pub clauses: &'static [&'static str],
+    /// What it needs.
+    pub needs: &'static [Need],
+    /// The test.
+    pub run: Run<B>,
+}
+
+/// What a case does.
+pub type Run<B> = Box<dyn Fn(&mut B) -> Result<(), Stop>>;
+
+/// Why a case did not pass.
+#[derive(Debug, thiserror::Error)]
+pub enum Stop {
+    /// The drive did something else.
+    #[error("{0:?}")]
+    Failed(Box<Finding>),
+    /// The case does not apply to this drive, or cannot be run; why.
+    #[error("{0}")]
+    Skipped(String),
+    /// The port failed: nothing is known about the drive.
+    #[error(transparent)]
+    Port(#[from] PortError),
+}
+
+impl From<Unavailable> for Stop {
+    fn from(error: Unavailable) -> Self {
+        Stop::Skipped(error.0)
+    }
+}
+
+/// What a drive did instead of what it must do.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Finding {
+    /// What was sent, in bytes or frames.
+    pub sent: String,
+    /// What must come of it, in bytes and words.
+    pub expected: String,
+    /// What came.
+    pub received: String,
+}
+
+/// A drive under test, as [`run`] sees it.
+pub trait Subject {
+    /// Brings drive and line to where a case may begin: the line silent and in step, the motor at
+    /// rest. Forgets the transcript.
+    fn begin(&mut self) -> Result<(), Stop>;
+
+    /// Undoes what the case wrote and started, whatever came of it.
+    fn restore(&mut self) -> Result<(), Stop>;
+
+    /// Whether the user allowed this.
+    fn allows(&self, need: Need) -> bool;
+
+    /// What passed the wire since [`begin`](Self::begin), a line each: `> 02 01 1e 21`.
+    fn transcript(&self) -> Vec<String>;
+}
+
+impl<B> Case<B> {
+    /// A case without a subject that needs nothing.
+    pub fn new(
+        name: impl Into<Cow<'static, str>>,
+        clauses: &'static [&'static str],
+        run: impl Fn(&mut B) -> Result<(), Stop> + 'static,
+    ) -> Self {
+        Case { name: name.into(), clauses, needs: &[], run: Box::new(run) }
+    }
+
+    /// The same with needs.
+    pub fn needs(self, needs: &'static [Need]) -> Self {
+        Case { needs, ..self }
+    }
+}
+
+/// Puts a drive through the cases; `progress` sees each outcome as it comes. When the port fails the
+/// rest is not run, and the report says so.
+pub fn run<B: Subject>(
+    cases: &[Case<B>],
+    bench: &mut B,
+    mut progress: impl FnMut(&Outcome),
+) -> Report {
+    let mut report = Report::default();
+    let mut dead: Option<String> = None;
+    for case in cases {
+        let verdict = match &dead {
+            Some(why) => Verdict::NotRun(why.clone()),
+            None => {
+                let missing = case.needs.iter().find(|&&need| !bench.allows(need));
+                match missing {
+                    Some(need) => Verdict::Skipped(need.unmet().to_owned()),
+                    None => conduct(case, bench),
+                }
+            }
+        };
+        if let Verdict::NotRun(why) = &verdict {
+            dead.get_or_insert_with(|| why.clone());
+        }
+        let transcript = match verdict {
+            Verdict::Failed(_) => bench.transcript(),
+            _ => Vec::new(),
+        };
+        let outcome =
+            Outcome { name: case.name.to_string(), clauses: case.clauses, verdict, transcript };
+        progress(&outcome);
+        report.outcomes.push(outcome);
+    }
+    report
+}
+
+/// A case between `begin` and `restore`. A drive that cannot be restored fails the case, too: the
+/// user has to know.
+fn conduct<B: Subject>(case: &Case<B>, bench: &mut B) -> Verdict {
+    let outcome = bench.begin().and_then(|()| (case.run)(bench));
+    let restored = bench.restore();
+    match (outcome, restored) {
+        (Err(Stop::Port(error)), _) | (_, Err(Stop::Port(error))) => {
+            Verdict::NotRun(error.to_string())
+        }
+        (Err(Stop::Failed(finding)), _) | (_, Err(Stop::Failed(finding))) => {
+            Verdict::Failed(finding)
+        }
+        (Err(Stop::Skipped(why)), _) | (_, Err(Stop::Skipped(why))) => Verdict::Skipped(why),
+        (Ok(()), Ok(())) => Verdict::Passed,
+    }
+}
+
+impl Need {
+    /// What to say where it is not met.
+    pub const fn unmet(self) -> &'static str {
+        match self {
+            Need::Spin => "turns the motor: run with --spin",
+            Need::Rom => "writes the drive's ROM, which wears: run with --write-rom",
+            Need::PowerCycle => "needs the power cycled: give a command with --power-cycle",
+            Need::Fault => "needs a fault caused: give commands with --fault-on and --fault-off",
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! A conformance kit for both protocols: what the documents demand, sentence by sentence, and what
+//! tests it.
+//!
+//! [`st::CLAUSES`] and [`rmd::CLAUSES`] are the sentences, each with an id. [`st::suite`] and
+//! [`rmd::suite`] are the cases that a drive is put through; each names the clauses it tests. A case
+//! speaks through a [`wire`], which is a real port or a simulated drive on virtual time, so the same
+//! cases test a drive on the bench and, in milliseconds, this kit itself. [`run`] runs them and gives
+//! a [`Report`].
+//!
+//! A drive is left as it was found: cases restore what they write, and nothing that may turn a motor,
+//! wears a ROM or needs a hand at the power switch runs unless it is [`Need`]ed and allowed.
+
+mod case;
+mod clause;
+mod junit;
+mod markdown;
+mod report;
+pub mod rmd;
+pub mod st;
+pub mod wire;
+mod world;
+
+pub use case::{Case, Finding, Need, Run, Stop, Subject, run};
+pub use clause::Clause;
+pub use markdown::markdown;
+pub use report::{Outcome, Report, Verdict};
+pub use world::{Unavailable, World};

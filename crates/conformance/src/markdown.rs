@@ -1,0 +1,31 @@
+//! docs/CONFORMANCE.md: every clause and what tests it.
+
+use std::fmt::Write;
+
+use crate::case::Case;
+use crate::clause::Clause;
+
+/// The table of `clauses` with the cases of `suite` that test each. Cases that differ in their
+/// subject only stand as one.
+pub fn markdown<B>(clauses: &[Clause], suite: &[Case<B>]) -> String {
+    let mut table = String::from("| id | demands | on a drive | on a host |\n|---|---|---|---|\n");
+    for clause in clauses {
+        let mut cases: Vec<&str> = Vec::new();
+        for case in suite.iter().filter(|case| case.clauses.contains(&clause.id)) {
+            let name = case.name.split('[').next().unwrap_or(&case.name);
+            if !cases.contains(&name) {
+                cases.push(name);
+            }
+        }
+        let drive = if cases.is_empty() { clause.untested.to_owned() } else { code(&cases) };
+        let host = code(clause.host);
+        let text = clause.text.replace('|', "\\|");
+        writeln!(table, "| {} | {text} | {drive} | {host} |", clause.id)
+            .expect("text is written to memory");
+    }
+    table
+}
+
+fn code(names: &[&str]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,150 @@
+//! What cases speak through: a line or a bus, and a clock that may be virtual.
+
+use std::collections::VecDeque;
+use std::time;
+
+use motorlink::port::{ByteLink, CanLink, PortError};
+use motorlink::serve::{ByteStation, CanStation};
+use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::time::Instant;
+
+/// A serial line with a clock.
+pub trait Line {
+    /// The time on this line.
+    fn now(&self) -> Instant;
+    /// Sends bytes.
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError>;
+    /// What comes until a moment, at most: empty when nothing came. May return early with a part.
+    fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError>;
+}
+
+/// A CAN bus with a clock.
+pub trait Bus {
+    /// The time on this bus.
+    fn now(&self) -> Instant;
+    /// Sends a frame.
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError>;
+    /// The next frame that comes until a moment.
+    fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError>;
+}
+
+/// A port of this machine, with its clock.
+pub struct Real<L> {
+    link: L,
+    began: time::Instant,
+}
+
+impl<L> Real<L> {
+    /// Speaks through an open port; its time begins now.
+    pub fn new(link: L) -> Self {
+        Real { link, began: time::Instant::now() }
+    }
+
+    fn moment(&self) -> Instant {
+        Instant(self.began.elapsed().as_micros() as u64)
+    }
+}
+
+impl<L: ByteLink> Line for Real<L> {
+    fn now(&self) -> Instant {
+        self.moment()
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.link.write(bytes)
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
+        let mut buffer = [0; 256];
+        let wait = until.since(self.moment()).into();
+        let size = self.link.read(&mut buffer, Some(wait))?;
+        Ok(buffer[..size].to_vec())
+    }
+}
+
+impl<L: CanLink> Bus for Real<L> {
+    fn now(&self) -> Instant {
+        self.moment()
+    }
+
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.link.send(frame)
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
+        let wait = until.since(self.moment()).into();
+        self.link.receive(Some(wait))
+    }
+}
+
+/// A station in this process whose time passes only while the kit waits.
+pub struct Virtual<S, T> {
+    /// The station, to look at and to change the world around it.
+    pub station: S,
+    now: Instant,
+    received: VecDeque<T>,
+}
+
+impl<S, T> Virtual<S, T> {
+    /// Speaks with `station`, whose time is 0.
+    pub fn new(station: S) -> Self {
+        Virtual { station, now: Instant(0), received: VecDeque::new() }
+    }
+
+    /// The next moment at which the station has something to do, up to `until`.
+    fn pass(&mut self, until: Instant, deadline: Option<Instant>) -> bool {
+        let due = deadline.filter(|deadline| *deadline <= until);
+        self.now = self.now.max(due.unwrap_or(until));
+        due.is_some()
+    }
+}
+
+impl<S: ByteStation> Line for Virtual<S, u8> {
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        let mut reply = Vec::new();
+        self.station.receive(self.now, bytes, &mut reply);
+        self.received.extend(reply);
+        Ok(())
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
+        while self.received.is_empty() && self.now < until {
+            let due = self.pass(until, self.station.deadline());
+            let mut reply = Vec::new();
+            if due {
+                self.station.poll(self.now, &mut reply);
+            }
+            self.received.extend(reply);
+        }
+        Ok(self.received.drain(..).collect())
+    }
+}
+
+impl<S: CanStation> Bus for Virtual<S, CanFrame> {
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let mut replies = Vec::new();
+        self.station.receive(self.now, frame, &mut replies);
+        self.received.extend(replies);
+        Ok(())
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
+        while self.received.is_empty() && self.now < until {
+            let due = self.pass(until, self.station.deadline());
+            let mut replies = Vec::new();
+            if due {
+                self.station.poll(self.now, &mut replies);
+            }
+            self.received.extend(replies);
+        }
+        Ok(self.received.pop_front())
+    }
+}
