@@ -1,5 +1,6 @@
 # make demo   simulated drives, driven through real ports
 # make test   everything that is tested, with what it needs installed first
+# make docs   writes the tables of docs/CONFORMANCE.md anew
 # make bench  ratios and instruction counts, as in docs/BENCHMARKS.md
 
 CARGO ?= cargo
@@ -8,7 +9,7 @@ VENV := .venv
 TARGET := thumbv7em-none-eabihf
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 
-.PHONY: demo test lint unit probe e2e bench fmt clean
+.PHONY: demo test lint unit probe e2e bench docs fmt clean
 
 demo:
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
@@ -38,6 +39,9 @@ bench:
 	command -v valgrind >/dev/null || $(SUDO) apt-get install -y --no-install-recommends valgrind || \
 		echo "valgrind cannot be installed: instructions are not counted"
 	$(CARGO) run --release --locked -p motorlink-bench -- all
+
+docs:
+	MOTORLINK_UPDATE_DOCS=1 $(CARGO) test -p motorlink-conformance --test document --locked
 
 fmt:
 	$(CARGO) fmt --all

@@ -22,6 +22,5 @@ mod world;
 
 pub use case::{Case, Finding, Need, Run, Stop, Subject, run};
 pub use clause::Clause;
-pub use markdown::markdown;
 pub use report::{Outcome, Report, Verdict};
 pub use world::{Unavailable, World};

@@ -7,11 +7,14 @@ use crate::clause::Clause;
 
 /// The table of `clauses` with the cases of `suite` that test each. Cases that differ in their
 /// subject only stand as one.
-pub fn markdown<B>(clauses: &[Clause], suite: &[Case<B>]) -> String {
+pub fn markdown<'a, B: 'a>(
+    clauses: &[Clause],
+    suite: impl Iterator<Item = &'a Case<B>> + Clone,
+) -> String {
     let mut table = String::from("| id | demands | on a drive | on a host |\n|---|---|---|---|\n");
     for clause in clauses {
         let mut cases: Vec<&str> = Vec::new();
-        for case in suite.iter().filter(|case| case.clauses.contains(&clause.id)) {
+        for case in suite.clone().filter(|case| case.clauses.contains(&clause.id)) {
             let name = case.name.split('[').next().unwrap_or(&case.name);
             if !cases.contains(&name) {
                 cases.push(name);

@@ -47,9 +47,6 @@ pub enum Command {
     Clauses {
         /// Of which document
         which: Which,
-        /// In which profile an ST drive is tested
-        #[arg(long, default_value = "spec", value_parser = parse_profile)]
-        profile: Profile,
     },
 }
 

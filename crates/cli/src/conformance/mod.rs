@@ -8,7 +8,7 @@ use std::io::Write;
 use std::path::Path;
 
 use motorlink_conformance::wire::Real;
-use motorlink_conformance::{Case, Need, Report, Subject, markdown, rmd, run as run_cases, st};
+use motorlink_conformance::{Case, Need, Report, Subject, rmd, run as run_cases, st};
 
 pub use args::Args;
 use args::{Command, Run, Which};
@@ -34,12 +34,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let bench = rmd::Bench::new(Box::new(Real::new(link)), world, options);
             conduct("rmd", &run, rmd::suite(), bench)
         }
-        Command::Clauses { which: Which::St, profile } => {
-            output::line(&markdown(st::CLAUSES, &st::suite(profile)).trim_end())
-        }
-        Command::Clauses { which: Which::Rmd, .. } => {
-            output::line(&markdown(rmd::CLAUSES, &rmd::suite()).trim_end())
-        }
+        Command::Clauses { which: Which::St } => output::line(&st::table().trim_end()),
+        Command::Clauses { which: Which::Rmd } => output::line(&rmd::table().trim_end()),
     }
 }
 

@@ -6,6 +6,7 @@ mod clauses;
 use motorlink_proto::rmd::{Command, ReadStatus1};
 
 use crate::case::Case;
+use crate::markdown::markdown;
 
 pub use bench::{Bench, Options};
 pub use clauses::CLAUSES;
@@ -17,4 +18,9 @@ pub fn suite() -> Vec<Case<Bench>> {
         let reply = bench.ask(request)?;
         bench.require(reply[0] == request[0], "DATA[0] of the request")
     })]
+}
+
+/// Every clause and what tests it, as a Markdown table.
+pub fn table() -> String {
+    markdown(CLAUSES, suite().iter())
 }

@@ -1,0 +1,62 @@
+//! docs/CONFORMANCE.md says what the kit has, and names tests that exist. `make docs` writes it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use motorlink_conformance::{Clause, rmd, st};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The text with the block between its markers replaced.
+fn with_block(text: &str, name: &str, table: &str) -> String {
+    let (begin, end) = (format!("<!-- {name} -->\n"), format!("<!-- /{name} -->"));
+    let (head, rest) = text.split_once(&begin).expect("the block begins");
+    let (_, tail) = rest.split_once(&end).expect("the block ends");
+    format!("{head}{begin}{table}{end}{tail}")
+}
+
+#[test]
+fn the_document_has_every_clause_and_what_tests_it() {
+    let path = root().join("docs/CONFORMANCE.md");
+    let text = fs::read_to_string(&path).expect("docs/CONFORMANCE.md");
+    let wanted = with_block(&with_block(&text, "st", &st::table()), "rmd", &rmd::table());
+    if std::env::var_os("MOTORLINK_UPDATE_DOCS").is_some() {
+        fs::write(&path, &wanted).expect("docs/CONFORMANCE.md is written");
+    } else {
+        assert!(text == wanted, "docs/CONFORMANCE.md is behind: run `make docs`");
+    }
+}
+
+/// The functions in Rust and Python files below a folder.
+fn functions(folder: &Path, found: &mut Vec<String>) {
+    for entry in fs::read_dir(folder).expect("a folder of the project").flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            functions(&path, found);
+        } else if path.extension().is_some_and(|kind| kind == "rs" || kind == "py") {
+            let text = fs::read_to_string(&path).expect("a file of the project");
+            let named = text.lines().filter_map(|line| {
+                let line = line.trim_start();
+                let rest = line.strip_prefix("fn ").or_else(|| line.strip_prefix("def "))?;
+                rest.split(['(', '<']).next()
+            });
+            found.extend(named.map(str::to_owned));
+        }
+    }
+}
+
+#[test]
+fn what_is_said_to_hold_hosts_to_a_clause_exists() {
+    let mut known = Vec::new();
+    for folder in ["crates", "tests/e2e"] {
+        functions(&root().join(folder), &mut known);
+    }
+    let missing = |clause: &'static Clause| {
+        let unknown = clause.host.iter().filter(|test| !known.iter().any(|name| name == *test));
+        unknown.map(|test| format!("{}: {test}", clause.id)).collect::<Vec<_>>()
+    };
+    let missing: Vec<String> = st::CLAUSES.iter().chain(rmd::CLAUSES).flat_map(missing).collect();
+    assert!(missing.is_empty(), "no such tests:\n{}", missing.join("\n"));
+}
