@@ -2,9 +2,10 @@
 //!
 //! [`port`] opens serial lines and CAN buses by name; [`serve`] is the other side of them, for
 //! simulated drives; [`list`] says what this machine has; [`slcan`] is the language of serial CAN
-//! adapters.
+//! adapters; [`fault`] makes a line misbehave.
 #![forbid(unsafe_code)]
 
+pub mod fault;
 mod line;
 pub mod list;
 pub mod port;

@@ -6,6 +6,7 @@
 
 mod echo;
 mod error;
+mod fault;
 mod fd;
 mod name;
 mod serial;
@@ -20,6 +21,7 @@ use motorlink_proto::rmd::CanFrame;
 
 pub use echo::EchoCanceller;
 pub use error::PortError;
+pub use fault::{FaultBytes, FaultCan};
 pub use fd::FdLink;
 pub use name::{DEFAULT_BAUD, LineName, NameError, PortName, ServeName};
 pub use slcan::SlcanLink;
@@ -149,5 +151,9 @@ impl Deadline {
     /// What is left: `None` is without limit, zero is over.
     fn remaining(self) -> Option<Duration> {
         self.0.map(|end| end.saturating_duration_since(Instant::now()))
+    }
+
+    fn is_over(self) -> bool {
+        self.remaining() == Some(Duration::ZERO)
     }
 }

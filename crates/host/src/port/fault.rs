@@ -1,0 +1,251 @@
+//! Ports that misbehave: a program's handling of errors, rehearsed on any port.
+
+use std::time::{Duration, Instant as Moment};
+
+use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::time::{self, Instant};
+
+use super::{ByteLink, CanLink, Deadline, PortError};
+use crate::fault::{FaultError, Faults, Lane, Unit, Way};
+
+/// A byte line with faults in both directions.
+///
+/// There is no thread: what is late in either direction moves while the program reads or writes.
+#[derive(Debug)]
+pub struct FaultBytes<B> {
+    link: B,
+    lanes: Lanes<u8>,
+}
+
+/// A CAN port with faults in both directions, as [`FaultBytes`] is for bytes.
+#[derive(Debug)]
+pub struct FaultCan<C> {
+    link: C,
+    lanes: Lanes<CanFrame>,
+}
+
+impl<B: ByteLink> FaultBytes<B> {
+    /// Wraps `link`.
+    ///
+    /// # Errors
+    /// A fault that serial lines do not have.
+    pub fn new(link: B, faults: Faults) -> Result<Self, FaultError> {
+        Ok(FaultBytes { link, lanes: Lanes::new(&faults.on_serial()?) })
+    }
+
+    fn transmit(&mut self) -> Result<(), PortError> {
+        let now = self.lanes.now();
+        let mut chunk = [0; 256];
+        loop {
+            let size = fill(&mut chunk, || self.lanes.sent.pop(now));
+            if size == 0 {
+                return Ok(());
+            }
+            self.link.write(&chunk[..size])?;
+        }
+    }
+}
+
+impl<C: CanLink> FaultCan<C> {
+    /// Wraps `link`.
+    ///
+    /// # Errors
+    /// A fault that CAN buses do not have.
+    pub fn new(link: C, faults: Faults) -> Result<Self, FaultError> {
+        Ok(FaultCan { link, lanes: Lanes::new(&faults.on_can()?) })
+    }
+
+    fn transmit(&mut self) -> Result<(), PortError> {
+        let now = self.lanes.now();
+        while let Some(frame) = self.lanes.sent.pop(now) {
+            self.link.send(&frame)?;
+        }
+        Ok(())
+    }
+}
+
+impl<B: ByteLink> ByteLink for FaultBytes<B> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        let now = self.lanes.now();
+        self.lanes.sent.push(now, bytes.iter().copied());
+        self.transmit()
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        let deadline = Deadline::after(timeout);
+        let mut chunk = [0; 256];
+        loop {
+            self.transmit()?;
+            let wait = self.lanes.patience(deadline);
+            let came = self.link.read(&mut chunk, wait)?;
+            let now = self.lanes.now();
+            if came > 0 {
+                self.lanes.received.push(now, chunk[..came].iter().copied());
+            }
+            let size = fill(buffer, || self.lanes.received.pop(now));
+            if size > 0 || deadline.is_over() {
+                return Ok(size);
+            }
+        }
+    }
+}
+
+impl<C: CanLink> CanLink for FaultCan<C> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let now = self.lanes.now();
+        self.lanes.sent.push(now, [*frame]);
+        self.transmit()
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        let deadline = Deadline::after(timeout);
+        loop {
+            self.transmit()?;
+            let wait = self.lanes.patience(deadline);
+            let came = self.link.receive(wait)?;
+            let now = self.lanes.now();
+            if let Some(frame) = came {
+                self.lanes.received.push(now, [frame]);
+            }
+            let frame = self.lanes.received.pop(now);
+            if frame.is_some() || deadline.is_over() {
+                return Ok(frame);
+            }
+        }
+    }
+}
+
+fn fill(buffer: &mut [u8], mut next: impl FnMut() -> Option<u8>) -> usize {
+    let slots = buffer.iter_mut();
+    slots.map_while(|slot| next().map(|byte| *slot = byte)).count()
+}
+
+/// Both directions, and the clock they go by.
+#[derive(Debug)]
+struct Lanes<T> {
+    began: Moment,
+    sent: Lane<T>,
+    received: Lane<T>,
+}
+
+impl<T: Unit> Lanes<T> {
+    /// The port itself sets the pace.
+    fn new(faults: &Faults) -> Self {
+        let lane = |way| Lane::new(faults, way, time::Duration(0));
+        Lanes { began: Moment::now(), sent: lane(Way::Sent), received: lane(Way::Received) }
+    }
+
+    fn now(&self) -> Instant {
+        Instant(self.began.elapsed().as_micros() as u64)
+    }
+
+    /// How long to wait for the port: not beyond the deadline nor past what is due meanwhile.
+    fn patience(&self, deadline: Deadline) -> Option<Duration> {
+        let due = [self.sent.due(), self.received.due()].into_iter().flatten().min();
+        let due = due.map(|due| due.since(self.now()).into());
+        [due, deadline.remaining()].into_iter().flatten().min()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+
+    /// Sends back what it is sent, at once.
+    struct Loopback<T>(VecDeque<T>);
+
+    impl<T> Loopback<T> {
+        fn new() -> Self {
+            Loopback(VecDeque::new())
+        }
+    }
+
+    /// A port waits when it has nothing.
+    fn idle(timeout: Option<Duration>) {
+        std::thread::sleep(timeout.expect("nothing will ever come"));
+    }
+
+    impl ByteLink for Loopback<u8> {
+        fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+            self.0.extend(bytes);
+            Ok(())
+        }
+        fn read(
+            &mut self,
+            buffer: &mut [u8],
+            timeout: Option<Duration>,
+        ) -> Result<usize, PortError> {
+            let size = fill(buffer, || self.0.pop_front());
+            if size == 0 {
+                idle(timeout);
+            }
+            Ok(size)
+        }
+    }
+
+    impl CanLink for Loopback<CanFrame> {
+        fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+            self.0.push_back(*frame);
+            Ok(())
+        }
+        fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+            let frame = self.0.pop_front();
+            if frame.is_none() {
+                idle(timeout);
+            }
+            Ok(frame)
+        }
+    }
+
+    fn bytes(faults: &str) -> FaultBytes<Loopback<u8>> {
+        FaultBytes::new(Loopback::new(), faults.parse().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn bytes_that_are_late_both_ways_arrive_in_one_read() {
+        let mut port = bytes("delay=5ms");
+        let began = Moment::now();
+        port.write(&[1, 2, 3]).unwrap();
+        let mut buffer = [0; 8];
+        assert_eq!(port.read(&mut buffer, None).unwrap(), 3);
+        assert_eq!(buffer[..3], [1, 2, 3]);
+        assert!(began.elapsed() >= Duration::from_millis(10));
+    }
+
+    #[test]
+    fn a_read_ends_at_its_timeout_and_what_is_late_comes_with_the_next() {
+        let mut port = bytes("delay=40ms,only=received");
+        port.write(&[1]).unwrap();
+        let mut buffer = [0; 8];
+        assert_eq!(port.read(&mut buffer, Some(Duration::ZERO)).unwrap(), 0);
+        assert_eq!(port.read(&mut buffer, Some(Duration::from_millis(1))).unwrap(), 0);
+        assert_eq!(port.read(&mut buffer, Some(Duration::from_secs(10))).unwrap(), 1);
+    }
+
+    #[test]
+    fn lost_bytes_never_come() {
+        let mut port = bytes("drop=1");
+        port.write(&[1, 2, 3]).unwrap();
+        assert_eq!(port.read(&mut [0; 8], Some(Duration::from_millis(1))).unwrap(), 0);
+    }
+
+    #[test]
+    fn frames_are_late_and_come_twice() {
+        let faults = "delay=5ms,dup=1,only=sent".parse().unwrap();
+        let mut port = FaultCan::new(Loopback::new(), faults).unwrap();
+        let frame = CanFrame::new(0x141, [0x9A; 8]);
+        port.send(&frame).unwrap();
+        assert_eq!(port.receive(Some(Duration::ZERO)).unwrap(), None);
+        assert_eq!(port.receive(None).unwrap(), Some(frame));
+        assert_eq!(port.receive(None).unwrap(), Some(frame));
+        assert_eq!(port.receive(Some(Duration::from_millis(1))).unwrap(), None);
+    }
+
+    #[test]
+    fn a_port_refuses_faults_of_the_other_kind() {
+        assert!(FaultBytes::new(Loopback::new(), "corrupt=1".parse().unwrap()).is_err());
+        assert!(FaultCan::new(Loopback::new(), "stuck0=1s@1".parse().unwrap()).is_err());
+    }
+}
