@@ -1,9 +1,12 @@
 //! What every command that opens a port takes.
 
-use motorlink::port::PortName;
+use motorlink::fault::Faults;
+use motorlink::port::{ByteLink, CanLink, FaultBytes, FaultCan, PortName, TapBytes, TapCan};
+use motorlink::stmcp::Profile;
 
 use crate::failure::Failure;
 use crate::output::Output;
+use crate::trace;
 
 #[derive(clap::Args)]
 pub struct Connection {
@@ -17,7 +20,10 @@ pub struct Connection {
     pub raw: bool,
     /// Show every frame on stderr
     #[arg(long, global = true)]
-    pub trace: bool,
+    trace: bool,
+    /// Damage what passes the port, to rehearse errors: flip=1e-4,delay=5ms..30ms; see below
+    #[arg(long, global = true, value_name = "SPEC")]
+    pub fault: Option<Faults>,
 }
 
 /// Which port.
@@ -32,6 +38,36 @@ impl Connection {
     /// The port that -p or MOTORLINK_PORT names.
     pub fn port(&self) -> Result<PortName, Failure> {
         self.port.name()
+    }
+
+    /// What goes around a serial line each time it is opened. A line that is opened again suffers
+    /// other damage, as one that is used on would.
+    pub fn around_line(
+        &self,
+        profile: Profile,
+    ) -> Result<impl FnMut(Box<dyn ByteLink>) -> Box<dyn ByteLink> + Send + 'static, Failure> {
+        let (trace, mut faults) = (self.trace, self.fault.map(Faults::on_serial).transpose()?);
+        Ok(move |mut link: Box<dyn ByteLink>| {
+            if let Some(faults) = &mut faults {
+                link = Box::new(FaultBytes::new(link, faults));
+                faults.seed = faults.seed.wrapping_add(1);
+            }
+            if trace { Box::new(TapBytes::new(link, trace::bytes(profile))) } else { link }
+        })
+    }
+
+    /// As [`around_line`](Self::around_line), for a CAN bus.
+    pub fn around_bus(
+        &self,
+    ) -> Result<impl FnMut(Box<dyn CanLink>) -> Box<dyn CanLink> + Send + 'static, Failure> {
+        let (trace, mut faults) = (self.trace, self.fault.map(Faults::on_can).transpose()?);
+        Ok(move |mut link: Box<dyn CanLink>| {
+            if let Some(faults) = &mut faults {
+                link = Box::new(FaultCan::new(link, faults));
+                faults.seed = faults.seed.wrapping_add(1);
+            }
+            if trace { Box::new(TapCan::new(link, trace::frames())) } else { link }
+        })
     }
 
     /// Where results go.

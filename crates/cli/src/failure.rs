@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use motorlink::fault::FaultError;
 use motorlink::port::{NameError, PortError};
 use motorlink::{rmd, stmcp};
 
@@ -79,6 +80,12 @@ impl From<&PortError> for Failure {
 
 impl From<NameError> for Failure {
     fn from(error: NameError) -> Self {
+        Failure::Usage(error.to_string())
+    }
+}
+
+impl From<FaultError> for Failure {
+    fn from(error: FaultError) -> Self {
         Failure::Usage(error.to_string())
     }
 }

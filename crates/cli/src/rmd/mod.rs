@@ -6,7 +6,6 @@ mod read;
 
 use std::time::Duration;
 
-use motorlink::port::TapCan;
 use motorlink::rmd::{Bus, MotorHandle, Options};
 
 pub use args::Args;
@@ -15,7 +14,6 @@ use args::{Command, Motor, Read};
 use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::output::Output;
-use crate::trace;
 
 /// An open bus, the motor that is meant, and how to show what it says.
 struct Session {
@@ -41,13 +39,7 @@ fn connect(connection: &Connection, motor: &Motor) -> Result<Session, Failure> {
     let port = connection.port()?;
     let timeout = Duration::from_millis(motor.timeout.into());
     let options = Options { timeout, ..Options::default() };
-    let bus = if connection.trace {
-        let name = port.clone();
-        let open = move || Ok(Box::new(TapCan::new(name.open_can()?, trace::frames())) as _);
-        Bus::open_with(&port.to_string(), Box::new(open), options)?
-    } else {
-        Bus::open(&port, options)?
-    };
+    let bus = Bus::open_wrapped(&port, connection.around_bus()?, options)?;
     let (output, raw) = (connection.output(), connection.raw);
     Ok(Session { bus, id: motor.id, output, raw, write_rom: motor.write_rom })
 }

@@ -7,7 +7,6 @@ mod scan;
 
 use std::time::Duration;
 
-use motorlink::port::TapBytes;
 use motorlink::stmcp::{Client, Config, MotorHandle, Options, Profile, Recovery};
 use motorlink::time;
 
@@ -17,7 +16,6 @@ use args::{Command, Drive, Read};
 use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::output::Output;
-use crate::trace;
 
 /// How long a drive has to answer a question of a scan unless told otherwise, ms.
 const SCAN_TIMEOUT: u32 = 200;
@@ -61,14 +59,7 @@ fn connect(connection: &Connection, drive: &Drive) -> Result<Session, Failure> {
         line: Config { timeout, recovery, ..Config::default() },
         ..Options::default()
     };
-    let client = if connection.trace {
-        let name = port.clone();
-        let open =
-            move || Ok(Box::new(TapBytes::new(name.open_line()?, trace::bytes(profile))) as _);
-        Client::open_with(&port.to_string(), Box::new(open), options)?
-    } else {
-        Client::open(&port, options)?
-    };
+    let client = Client::open_wrapped(&port, connection.around_line(profile)?, options)?;
     Ok(Session { client, motor: drive.motor, output: connection.output(), raw: connection.raw })
 }
 

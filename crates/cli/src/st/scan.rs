@@ -16,6 +16,9 @@ pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result
     let PortName::Line(line) = &port else {
         return Err(Failure::Usage(format!("`{port}` has no baud rate to scan")));
     };
+    if connection.fault.is_some() {
+        return Err(Failure::Usage("a scan of baud rates takes no --fault".to_owned()));
+    }
     let rates = if rates.is_empty() { &BAUD_RATES[..] } else { rates };
     let rates = if line.with_baud(rates[0]).is_some() { rates } else { &rates[..1] };
     let output = connection.output();

@@ -162,7 +162,7 @@ impl Faults {
         }
     };
 
-    /// The faults, if a serial line can have them.
+    /// The faults, if a serial line can have them; it ignores others.
     ///
     /// # Errors
     /// [`FaultError::NotHere`].
@@ -174,7 +174,7 @@ impl Faults {
         Ok(self)
     }
 
-    /// The faults, if a CAN bus can have them.
+    /// The faults, if a CAN bus can have them; a stuck bus is a [`cut`](Self::cut).
     ///
     /// # Errors
     /// [`FaultError::NotHere`].

@@ -81,11 +81,22 @@ impl Bus {
     /// # Errors
     /// What keeps the port from being opened.
     pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
-        let name = port.clone();
-        Self::open_with(&port.to_string(), Box::new(move || name.open_can()), options)
+        Self::open_wrapped(port, |link| link, options)
     }
 
-    /// As [`open`](Self::open), through a link of the caller's making: behind a tap, for example.
+    /// As [`open`](Self::open), through what `wrap` puts around the port each time it is opened: a
+    /// tap, or faults.
+    pub fn open_wrapped(
+        port: &PortName,
+        mut wrap: impl FnMut(Box<dyn CanLink>) -> Box<dyn CanLink> + Send + 'static,
+        options: Options,
+    ) -> Result<Self, Error> {
+        let name = port.clone();
+        let open = move || Ok(wrap(name.open_can()?));
+        Self::open_with(&port.to_string(), Box::new(open), options)
+    }
+
+    /// As [`open`](Self::open), through a link of the caller's making.
     pub fn open_with(
         name: &str,
         open: Opener<Box<dyn CanLink>>,

@@ -76,16 +76,27 @@ impl Client {
     ///
     /// # Errors
     /// What keeps the port from being opened. The drive is not asked anything.
-    pub fn open(port: &PortName, mut options: Options) -> Result<Self, Error> {
+    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        Self::open_wrapped(port, |link| link, options)
+    }
+
+    /// As [`open`](Self::open), through what `wrap` puts around the port each time it is opened: a
+    /// tap, or faults.
+    pub fn open_wrapped(
+        port: &PortName,
+        mut wrap: impl FnMut(Box<dyn ByteLink>) -> Box<dyn ByteLink> + Send + 'static,
+        mut options: Options,
+    ) -> Result<Self, Error> {
         let name = port.clone();
         if let PortName::Line(LineName::Serial { baud, .. }) = port {
             // What recovery sends has to be out of the port before silence can begin.
             options.line.quiet = options.line.quiet + Master::longest_transmission(*baud);
         }
-        Self::open_with(&port.to_string(), Box::new(move || name.open_line()), options)
+        let open = move || Ok(wrap(name.open_line()?));
+        Self::open_with(&port.to_string(), Box::new(open), options)
     }
 
-    /// As [`open`](Self::open), through a link of the caller's making: behind a tap, for example.
+    /// As [`open`](Self::open), through a link of the caller's making.
     pub fn open_with(
         name: &str,
         open: Opener<Box<dyn ByteLink>>,
