@@ -65,6 +65,7 @@ mod master;
 pub mod message;
 pub mod register;
 mod slave;
+mod verified;
 
 pub use code::{
     Command, ControlMode, ErrorCode, Flags, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
@@ -80,3 +81,4 @@ pub use message::{
 };
 pub use register::{Feature, Features, RegisterId};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
+pub use verified::{Unverified, VERIFY_ATTEMPTS, VerifiedWrite};

@@ -334,7 +334,7 @@ fn to_drive(profile: Profile, shape: &Shape, bits: i32) -> i32 {
 }
 
 /// Shipped firmware keeps speeds in tenths of a hertz, 6 rpm each (SPEC-NOTES S12).
-fn speed(profile: Profile, rpm: i32) -> i32 {
+pub(super) fn speed(profile: Profile, rpm: i32) -> i32 {
     match profile {
         Profile::Spec => rpm,
         Profile::Mcsdk54 => rpm / 6 * 6,

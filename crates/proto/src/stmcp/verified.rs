@@ -1,0 +1,117 @@
+//! A write that is read back: what one checksum of 8 bits lets through, two seldom do.
+
+use super::register::{Type, Unit, Writing};
+use super::slave::speed;
+use super::{Features, Profile, RegisterId, Request};
+
+/// Attempts of a verified write unless told otherwise.
+pub const VERIFY_ATTEMPTS: u8 = 3;
+
+/// Why a write is not, or cannot be, verified.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unverified<E> {
+    /// The register cannot be written and read back in this profile; nothing was sent.
+    NotReadable,
+    /// Writing it makes the motor do something, and the drive changes it by itself: repeating the
+    /// write is not for a library to decide, and what is read back proves nothing. Nothing was sent.
+    Acts,
+    /// An exchange failed for good, or failed in the last attempt: nothing is known of the register.
+    Exchange(E),
+    /// The register has another value after the last attempt.
+    Differs {
+        /// What it should have.
+        expected: i32,
+        /// What was read.
+        read: i32,
+    },
+}
+
+/// A register, a value, and what the register reads back when the write was right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct VerifiedWrite {
+    register: RegisterId,
+    bytes: [u8; 4],
+    size: u8,
+    expected: i32,
+}
+
+impl VerifiedWrite {
+    /// A write to a drive of `profile`. Of `value` the low bytes that the register has are written.
+    ///
+    /// # Errors
+    /// [`Unverified::NotReadable`] and [`Unverified::Acts`].
+    pub fn new<E>(
+        profile: Profile,
+        register: RegisterId,
+        value: i32,
+    ) -> Result<Self, Unverified<E>> {
+        let shape = register.shape().ok_or(Unverified::NotReadable)?;
+        let built = Features::NONE.with(shape.feature);
+        let Writing::Takes(size) = shape.writing(profile, built) else {
+            return Err(Unverified::NotReadable);
+        };
+        if shape.read_size(profile, built).is_none() {
+            return Err(Unverified::NotReadable);
+        }
+        if acts(register) {
+            return Err(Unverified::Acts);
+        }
+        let kept = shape.ty.fit(value);
+        let expected = match shape.unit {
+            Unit::Rpm if shape.ty != Type::F32 => speed(profile, kept),
+            _ => kept,
+        };
+        Ok(VerifiedWrite { register, bytes: value.to_le_bytes(), size, expected })
+    }
+
+    /// Writes and reads back until the register has the value, at most `attempts` times (0 counts
+    /// as 1); gives the number of the attempt that did it.
+    ///
+    /// `exchange` does one exchange: `None` is an acknowledge without a value. A write whose
+    /// acknowledge does not come is read back all the same: it may have been carried out. `is_final`
+    /// says which errors another attempt cannot change, such as a drive that refuses.
+    ///
+    /// # Errors
+    /// [`Unverified::Exchange`] and [`Unverified::Differs`].
+    pub fn run<E>(
+        &self,
+        attempts: u8,
+        mut exchange: impl FnMut(&Request<'_>) -> Result<Option<i32>, E>,
+        is_final: impl Fn(&E) -> bool,
+    ) -> Result<u8, Unverified<E>> {
+        let value = self.bytes.get(..usize::from(self.size)).unwrap_or(&self.bytes);
+        let write = Request::SetRegister { register: self.register, value };
+        let mut attempt: u8 = 1;
+        loop {
+            if let Err(error) = exchange(&write)
+                && is_final(&error)
+            {
+                return Err(Unverified::Exchange(error));
+            }
+            let expected = self.expected;
+            let failed = match exchange(&Request::GetRegister(self.register)) {
+                Ok(Some(read)) if read == expected => return Ok(attempt),
+                Ok(read) => Unverified::Differs { expected, read: read.unwrap_or_default() },
+                Err(error) if is_final(&error) => return Err(Unverified::Exchange(error)),
+                Err(error) => Unverified::Exchange(error),
+            };
+            if attempt >= attempts {
+                return Err(failed);
+            }
+            attempt = attempt.saturating_add(1);
+        }
+    }
+}
+
+/// Registers through which a drive is commanded: it acts on a write, changes them by itself, or
+/// addresses another motor from then on.
+fn acts(register: RegisterId) -> bool {
+    matches!(
+        register,
+        RegisterId::TARGET_MOTOR
+            | RegisterId::CONTROL_MODE
+            | RegisterId::TORQUE_REF
+            | RegisterId::FLUX_REF
+            | RegisterId::RAMP_FINAL_SPEED
+    )
+}
