@@ -44,7 +44,9 @@ impl From<stmcp::Error> for Failure {
     fn from(error: stmcp::Error) -> Self {
         let message = error.to_string();
         match error {
-            stmcp::Error::Refused { .. } => Failure::Refused(message),
+            stmcp::Error::Refused { .. } | stmcp::Error::Differs { .. } => {
+                Failure::Refused(message)
+            }
             stmcp::Error::Port(error) => error.into(),
             error if error.is_line_failure() => Failure::Line(message),
             _ => Failure::Usage(message),

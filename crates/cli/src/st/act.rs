@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use motorlink::stmcp::{
-    Command as Execute, Flags, Profile, REVUP_PHASES, RevupPhase, Status, find_register,
-    parse_value,
+    Command as Execute, Flags, Profile, REVUP_PHASES, RevupPhase, Status, VERIFY_ATTEMPTS,
+    find_register, parse_value,
 };
 use serde_json::json;
 
@@ -19,7 +19,10 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     let motor = session.motor()?;
     let output = session.output;
     match act {
-        Act::Set { register, value } => set(session, &register, &value),
+        Act::Set { register, value, verify } => {
+            let attempts = verify.map(|attempts| attempts.unwrap_or(VERIFY_ATTEMPTS));
+            set(session, &register, &value, attempts)
+        }
         Act::Start => start(session),
         Act::Stop => execute(session, Execute::StopMotor),
         Act::StartStop => execute(session, Execute::StartStop),
@@ -121,11 +124,17 @@ fn acknowledge(session: &Session) -> Result<(), Failure> {
     }
 }
 
-fn set(session: &Session, name: &str, text: &str) -> Result<(), Failure> {
+fn set(session: &Session, name: &str, text: &str, verify: Option<u8>) -> Result<(), Failure> {
     let register = find_register(name)?;
     let profile = session.client.profile();
     let bits = parse_value(register, text, profile, session.raw)?;
     let motor = session.motor()?;
+    if let Some(attempts) = verify {
+        let attempt = motor.write_raw_verified(register, bits, attempts)?;
+        let again = if attempt == 1 { String::new() } else { format!(", at attempt {attempt}") };
+        let text = format!("{}: {register} is written and reads back{again}", motor.number());
+        return session.output.result(text, json!({ "ok": true, "attempts": attempt }));
+    }
     motor.write_raw(register, bits, register.write_size(profile))?;
     session.output.done(format!("{}: {register} is written", motor.number()))
 }

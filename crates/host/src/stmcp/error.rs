@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use motorlink_proto::stmcp::{ErrorCode, Failure};
+use motorlink_proto::stmcp::{ErrorCode, Failure, Motor, RegisterId};
 
 use super::LimitError;
 use crate::port::PortError;
@@ -11,7 +11,8 @@ use crate::port::PortError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The drive understood and said no. Nothing was changed.
+    /// The drive said no. Nothing was changed, unless the code is BAD_CRC, TIMEOUT or OVERRUN: then
+    /// it did not understand what it received, and nothing is known.
     #[error("{port}: {motor} refused {what}: {code} ({}){hint}", .code.doc())]
     Refused {
         /// The port.
@@ -54,6 +55,29 @@ pub enum Error {
         /// Bytes of the reply's payload.
         size: usize,
     },
+    /// A verified write after whose last attempt the register has another value.
+    #[error(
+        "{motor}: {register} should be {expected} and reads {read}; does the drive take this value \
+         in its present state?"
+    )]
+    Differs {
+        /// The motor.
+        motor: Motor,
+        /// The register.
+        register: RegisterId,
+        /// What it should have, in digits.
+        expected: i32,
+        /// What it has, in digits.
+        read: i32,
+    },
+    /// A write that cannot be verified; nothing was sent.
+    #[error("writing {register} cannot be verified: {why}")]
+    NotVerifiable {
+        /// The register.
+        register: RegisterId,
+        /// Why, and what to do instead.
+        why: &'static str,
+    },
     /// The port.
     #[error(transparent)]
     Port(#[from] PortError),
@@ -90,6 +114,15 @@ impl Error {
     /// Whether nothing can be said about the drive because the line failed.
     pub fn is_line_failure(&self) -> bool {
         matches!(self, Error::Failed { .. } | Error::Reply { .. } | Error::Port(_))
+    }
+
+    /// Whether the same request may succeed on the same port: the line failed, or the drive did not
+    /// understand what it received.
+    pub(super) fn may_pass(&self) -> bool {
+        match self {
+            Error::Refused { code, .. } => code.is_damage(),
+            error => error.is_line_failure() && !matches!(error, Error::Port(_)),
+        }
     }
 }
 

@@ -26,7 +26,7 @@ pub use motorlink_proto::stmcp::{
     Command, Config, ControlMode, Counters, CurrentReference, ErrorCode, Failure, Feature,
     Features, Flags, FrameCode, Line, Motor, PositionMove, Profile, REVUP_PHASES, Ramp, Recovery,
     RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Slave, Status, TorqueRamp,
-    register,
+    VERIFY_ATTEMPTS, register,
 };
 
 pub use client::{Client, FirmwareVersion, Info, Options};

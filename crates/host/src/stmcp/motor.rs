@@ -3,10 +3,15 @@
 use motorlink_proto::stmcp::register::{Readable, Register, Value, Writable};
 use motorlink_proto::stmcp::{
     Command, CurrentReference, Flags, Motor, PositionMove, Ramp, RegisterId, Request, RevupPhase,
-    Status, TorqueRamp, register,
+    Status, TorqueRamp, Unverified, VerifiedWrite, register,
 };
 
 use super::{Client, Error};
+
+const ACTS: &str =
+    "the drive acts on it and changes it by itself; write it plainly, then read STATUS";
+const NOT_READABLE: &str =
+    "it cannot be both written and read in this profile; `motorlink st registers` says what can";
 
 /// One motor of a drive. Every call is one exchange; its errors are those of
 /// [`Client::exchange`].
@@ -51,6 +56,46 @@ impl<'a> MotorHandle<'a> {
         let bytes = value.to_le_bytes();
         let value = &bytes[..usize::from(size.min(4))];
         self.tell(&Request::SetRegister { register, value })
+    }
+
+    /// Writes a register, reads it back, and repeats both until it has the value, at most `attempts`
+    /// times ([`VERIFY_ATTEMPTS`](super::VERIFY_ATTEMPTS) is a good number); gives the number of the
+    /// attempt that did it. What the drive's profile rounds is compared rounded.
+    ///
+    /// # Errors
+    /// [`Error::NotVerifiable`] for a register that cannot be read back, or whose write makes the
+    /// motor do something; nothing is sent then. [`Error::Differs`]. Those of [`Client::exchange`],
+    /// which say nothing about the register.
+    pub fn write_verified<T: Value>(
+        &self,
+        register: Register<T, impl Readable + Writable>,
+        value: T,
+        attempts: u8,
+    ) -> Result<u8, Error> {
+        self.write_raw_verified(register.id(), value.bits(), attempts)
+    }
+
+    /// As [`write_verified`](Self::write_verified), for any register.
+    pub fn write_raw_verified(
+        &self,
+        register: RegisterId,
+        value: i32,
+        attempts: u8,
+    ) -> Result<u8, Error> {
+        let exchange = |request: &Request<'_>| match request {
+            Request::GetRegister(_) => self.read_raw(register).map(Some),
+            _ => self.tell(request).map(|()| None),
+        };
+        VerifiedWrite::new(self.client.profile(), register, value)
+            .and_then(|write| write.run(attempts, exchange, |error| !error.may_pass()))
+            .map_err(|why| match why {
+                Unverified::Exchange(error) => error,
+                Unverified::Differs { expected, read } => {
+                    Error::Differs { register, expected, read, motor: self.motor }
+                }
+                Unverified::Acts => Error::NotVerifiable { register, why: ACTS },
+                Unverified::NotReadable => Error::NotVerifiable { register, why: NOT_READABLE },
+            })
     }
 
     /// The state of its state machine.

@@ -104,6 +104,14 @@ named_numbers! {
     }
 }
 
+impl ErrorCode {
+    /// Whether the drive did not understand what it received. This may not even have been the
+    /// request that the code came in answer to, so nothing is known of that (SPEC-NOTES S16).
+    pub const fn is_damage(self) -> bool {
+        matches!(self, ErrorCode::BadCrc | ErrorCode::Timeout | ErrorCode::Overrun)
+    }
+}
+
 named_numbers! {
     /// The commands of EXECUTE_CMD (table 4, and those of shipped firmware).
     pub enum Command: u8 {

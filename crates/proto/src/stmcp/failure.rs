@@ -5,7 +5,7 @@ use super::{Bad, ErrorCode};
 /// Why an exchange did not end in a positive acknowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Error {
-    /// The drive said no.
+    /// The drive said no. It did nothing, unless the code [is damage](ErrorCode::is_damage).
     Refused(ErrorCode),
     /// There is no answer to trust: it is not known whether the drive did what was asked.
     Failed(Failure),

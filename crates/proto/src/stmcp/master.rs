@@ -424,10 +424,7 @@ impl Master {
                         let code = ErrorCode::from(*code);
                         // The drive did not understand the frame: it may take the rest of it for
                         // another one, and answer that too.
-                        damaged = matches!(
-                            code,
-                            ErrorCode::BadCrc | ErrorCode::Timeout | ErrorCode::Overrun
-                        );
+                        damaged = code.is_damage();
                         Err(Error::Refused(code))
                     }
                     (HEADER_NACK, []) => Err(Error::Refused(ErrorCode::None)),
