@@ -173,6 +173,23 @@ fn a_lost_line_comes_back_behind_silence_and_a_question() {
 }
 
 #[test]
+fn recovery_asks_what_cannot_be_answered_with_the_lost_reply() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+    for (lost, probe) in [
+        (Request::BoardInfo, [0x08, 0x01, 0x00, 0x09].as_slice()),
+        (Request::FirmwareVersion, &[0x08, 0x01, 0x00, 0x09]),
+        (Request::RevupData(0), &[0x06, 0x00, 0x06]),
+        (Request::BoardInfo, &[0x08, 0x01, 0x00, 0x09]),
+    ] {
+        pair.cut = Some(0);
+        pair.exchange(0, lost).unwrap_err();
+        pair.sent.clear();
+        pair.exchange(0, STATUS).unwrap();
+        assert_eq!(pair.sent[0], probe, "behind a lost {lost:?}");
+    }
+}
+
+#[test]
 fn nothing_but_questions_go_into_a_line_that_does_not_answer() {
     let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
     pair.delay = Duration::from_millis(60_000);
@@ -308,6 +325,35 @@ proptest! {
             let register = registers[n % registers.len()];
             if let Ok(value) = pair.exchange(1, Request::GetRegister(register)) {
                 prop_assert_eq!(register.decode(&value), Some(i32::from(register.0)));
+            }
+        }
+    }
+
+    /// Also where requests are answered with what recovery's questions are answered with.
+    #[test]
+    fn a_late_reply_is_never_taken_for_another_kinds(
+        steps in proptest::collection::vec((0u32..2_000, 0usize..5), 1..40),
+        pad in any::<bool>(),
+    ) {
+        let recovery = if pad { Recovery::Pad } else { Recovery::Drain };
+        let mut pair = Pair::new(Profile::Spec, recovery);
+        pair.drive.set(1, RegisterId::SPEED_KP, 0x1234);
+        let write = Request::SetRegister { register: RegisterId::SPEED_KI, value: &[1, 0] };
+        let requests = [
+            Request::GetRegister(RegisterId::SPEED_KP),
+            Request::BoardInfo,
+            Request::FirmwareVersion,
+            Request::RevupData(0),
+            write,
+        ];
+        let mut clean = Pair::new(Profile::Spec, recovery);
+        clean.drive.set(1, RegisterId::SPEED_KP, 0x1234);
+        let expected = requests.map(|request| clean.exchange(1, request));
+        for (delay, n) in steps {
+            pair.delay = Duration::from_millis(delay);
+            let result = pair.exchange(1, requests[n]);
+            if result.is_ok() {
+                prop_assert_eq!(&result, &expected[n], "{:?}", requests[n]);
             }
         }
     }

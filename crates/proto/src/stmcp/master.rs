@@ -36,6 +36,26 @@ pub struct Config {
     pub quiet: Duration,
 }
 
+impl Config {
+    /// The longest that an exchange can take, however the line behaves, beside the time in which the
+    /// port takes what is sent: the reply's timeout on a line that is up. On a lost line there come
+    /// before it silence, as long as may be waited for it, before and behind the question, and the
+    /// question's timeout; with `Pad` one silence more.
+    pub const fn longest_exchange(&self) -> Duration {
+        let (timeout, quiet) = (self.timeout.0, self.quiet.0);
+        let silence = quiet.saturating_add(timeout);
+        // Where the answer may be that to something else, nothing is sent for twice the timeout.
+        let answered = if quiet > timeout { silence } else { timeout.saturating_mul(2) };
+        let drained = silence.saturating_add(timeout).saturating_add(answered);
+        let recovered = match self.recovery {
+            Recovery::None => 0,
+            Recovery::Drain => drained,
+            Recovery::Pad => drained.saturating_add(silence),
+        };
+        Duration(recovered.saturating_add(timeout))
+    }
+}
+
 impl Default for Config {
     /// The document's 1 s, `Drain`, 50 ms of silence.
     fn default() -> Self {
@@ -129,11 +149,10 @@ enum State {
     Pad,
     /// Recovery: silence is to begin.
     Settle(Then),
-    /// Recovery: silent until `until`, or noise at `limit`.
+    /// Recovery: silent at `until`, or noise at `limit`.
     Quiet {
         until: Instant,
         limit: Instant,
-        silence: Duration,
         then: Then,
     },
     /// Recovery: the question has been sent.
@@ -288,8 +307,9 @@ impl Master {
                 Output::Transmit(&PADDING)
             }
             State::Settle(then) => {
-                self.settle(now, self.config.quiet, then);
-                Output::Wait(Some(now + self.config.quiet))
+                let until = now + self.config.quiet;
+                self.settle(until, then);
+                Output::Wait(Some(until))
             }
             State::Quiet { until, limit, .. } if now < until && now < limit => {
                 Output::Wait(Some(until.min(limit)))
@@ -345,10 +365,11 @@ impl Master {
         }
         match self.state {
             State::Sent | State::Waiting { .. } => self.reply(bytes),
-            State::Answer { .. } => self.answer(now, bytes),
-            State::Quiet { limit, silence, then, .. } => {
+            State::Answer { deadline } => self.answer(now, deadline, bytes),
+            State::Quiet { until, limit, then } => {
                 self.unasked(bytes.len());
-                self.state = State::Quiet { until: now + silence, limit, silence, then };
+                let until = until.max(now + self.config.quiet);
+                self.state = State::Quiet { until, limit, then };
             }
             _ => {
                 self.unasked(bytes.len());
@@ -366,30 +387,34 @@ impl Master {
     /// The question whose answer shows that the drive is in step again: one that is not
     /// outstanding, if there is one.
     fn probe(&mut self) -> &[u8] {
-        self.question =
-            if self.outstanding & INFO == 0 || self.question != INFO { INFO } else { REVUP };
+        self.question = match self.outstanding {
+            outstanding if outstanding & INFO == 0 => INFO,
+            outstanding if outstanding & REVUP == 0 => REVUP,
+            _ if self.question == REVUP => INFO,
+            _ => REVUP,
+        };
         let request =
             if self.question == INFO { Request::BoardInfo } else { Request::RevupData(0) };
         self.scan = Scan::NONE;
         request.encode(0, &mut self.probe).unwrap_or(&[])
     }
 
-    /// Looks for the reply to the question among late ones. Where the same question was asked
-    /// before and not answered, this may be the reply to that one, and the silence is longer.
-    fn answer(&mut self, now: Instant, bytes: &[u8]) {
+    /// Looks for the reply to the question, whose timeout is over at `deadline`, among late ones.
+    /// Where something else that is answered alike is outstanding, this may be the reply to that:
+    /// the silence lasts until the question's own reply cannot come any more.
+    fn answer(&mut self, now: Instant, deadline: Instant, bytes: &[u8]) {
         let size = if self.question == INFO { 32 } else { RevupPhase::SIZE as u8 };
         for &byte in bytes {
             if self.scan.take(byte) == Some((HEADER_ACK, size)) {
-                let repeated = self.outstanding & self.question != 0;
-                let silence = if repeated { self.config.timeout } else { self.config.quiet };
-                self.settle(now, silence, Then::Send);
+                let unsure = self.outstanding & self.question != 0;
+                let expired = if unsure { deadline + self.config.timeout } else { now };
+                self.settle(expired.max(now + self.config.quiet), Then::Send);
             }
         }
     }
 
-    fn settle(&mut self, now: Instant, silence: Duration, then: Then) {
-        let (until, limit) = (now + silence, now + silence + self.config.timeout);
-        self.state = State::Quiet { until, limit, silence, then };
+    fn settle(&mut self, until: Instant, then: Then) {
+        self.state = State::Quiet { until, limit: until + self.config.timeout, then };
     }
 
     fn reply(&mut self, bytes: &[u8]) {

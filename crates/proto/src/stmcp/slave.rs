@@ -61,6 +61,11 @@ impl Slave {
         self.current
     }
 
+    /// Whether a command is under way, the next byte being a part of it.
+    pub const fn is_receiving(&self) -> bool {
+        self.received > 0
+    }
+
     /// When [`poll`](Self::poll) has to be called; `None` while no frame is under way, and always
     /// in profile `mcsdk-5.4`, whose firmware never times out (SPEC-NOTES S11).
     pub const fn deadline(&self) -> Option<Instant> {
