@@ -7,7 +7,8 @@ use std::os::unix::net::UnixStream;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{ByteLink, CanLink, FdLink, PortError};
+use motorlink::fault::Faults;
+use motorlink::port::{ByteLink, CanLink, FaultBytes, FdLink, PortError};
 use motorlink::rmd::{
     self, Bus, CanFrame, CentiDps, Code, MotorId, OnDrop, SpeedLimit, TorqueCommand,
 };
@@ -100,6 +101,26 @@ fn a_motor_whose_start_was_not_answered_is_stopped_too() {
         let stop = [motor << 5 | 3, 1, 2, (motor << 5 | 3) + 3];
         assert!(heard.windows(4).any(|frame| frame == stop), "motor {motor}: {heard:02x?}");
     }
+}
+
+#[test]
+fn a_verified_write_comes_through_a_line_that_loses_bytes() {
+    let line = Config {
+        timeout: Duration::from_millis(30).into(),
+        quiet: Duration::from_millis(5).into(),
+        ..Config::default()
+    };
+    let options = stmcp::Options { line, ..stmcp::Options::default() };
+    let faults: Faults = "drop=2e-2,seed=1".parse().unwrap();
+    let wrap = move |link| Box::new(FaultBytes::new(link, &faults)) as Box<dyn ByteLink>;
+    let client = Client::open_wrapped(&"sim:".parse().unwrap(), wrap, options).unwrap();
+    let motor = client.motor(1).unwrap();
+    let attempts: Vec<u8> = (1..=20)
+        .map(|value| motor.write_verified(register::SPEED_KI, value, 20).unwrap())
+        .collect();
+    assert!(attempts.contains(&1) && attempts.iter().any(|n| *n > 1), "{attempts:?}");
+    let acts = motor.write_verified(register::RAMP_FINAL_SPEED, 600, 3).unwrap_err();
+    assert!(matches!(acts, stmcp::Error::NotVerifiable { .. }), "{acts}");
 }
 
 /// A bus whose motors hear and are not heard.

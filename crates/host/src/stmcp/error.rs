@@ -11,8 +11,7 @@ use crate::port::PortError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The drive said no. Nothing was changed, unless the code is BAD_CRC, TIMEOUT or OVERRUN: then
-    /// it did not understand what it received, and nothing is known.
+    /// The drive understood and said no. Nothing was changed.
     #[error("{port}: {motor} refused {what}: {code} ({}){hint}", .code.doc())]
     Refused {
         /// The port.
@@ -115,15 +114,6 @@ impl Error {
     pub fn is_line_failure(&self) -> bool {
         matches!(self, Error::Failed { .. } | Error::Reply { .. } | Error::Port(_))
     }
-
-    /// Whether the same request may succeed on the same port: the line failed, or the drive did not
-    /// understand what it received.
-    pub(super) fn may_pass(&self) -> bool {
-        match self {
-            Error::Refused { code, .. } => code.is_damage(),
-            error => error.is_line_failure() && !matches!(error, Error::Port(_)),
-        }
-    }
 }
 
 /// What a person can do about a failure.
@@ -136,6 +126,7 @@ pub(super) fn advice(failure: Failure) -> &'static str {
             "a wrong baud rate looks like this; `motorlink st scan` tries the usual rates"
         }
         Failure::Incomplete { .. } => "the line lost bytes; try again",
+        Failure::NotUnderstood(_) => "the line to the drive loses or damages bytes; try again",
         Failure::Lost => "the next call tries again",
         Failure::Noise => "something else is sending on this line",
         _ => "try again",
@@ -150,9 +141,6 @@ pub(super) fn hint(code: ErrorCode) -> &'static str {
              the feature is not built in"
         }
         ErrorCode::BadMotorSelected => "; --motor counts from 1",
-        ErrorCode::Timeout | ErrorCode::BadCrc | ErrorCode::Overrun => {
-            "; the line to the drive loses or damages bytes"
-        }
         _ => "",
     }
 }

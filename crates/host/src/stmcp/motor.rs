@@ -87,7 +87,7 @@ impl<'a> MotorHandle<'a> {
             _ => self.tell(request).map(|()| None),
         };
         VerifiedWrite::new(self.client.profile(), register, value)
-            .and_then(|write| write.run(attempts, exchange, |error| !error.may_pass()))
+            .and_then(|write| write.run(attempts, exchange, |error| !error.is_line_failure()))
             .map_err(|why| match why {
                 Unverified::Exchange(error) => error,
                 Unverified::Differs { expected, read } => {

@@ -45,6 +45,9 @@ pub fn scan_baud(line: &LineName, baud: u32, patience: Duration) -> Result<Findi
             Err(Error::Refused { code, .. }) => return Ok(Finding::Refuses(code)),
             Err(Error::Port(error)) => return Err(error),
             Err(Error::Failed { failure: Failure::Timeout | Failure::Lost, .. }) => {}
+            Err(Error::Failed { failure: Failure::NotUnderstood(code), .. }) => {
+                heard = Finding::Refuses(code);
+            }
             Err(_) => heard = Finding::Garbage,
         }
     }

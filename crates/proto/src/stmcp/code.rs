@@ -105,8 +105,7 @@ named_numbers! {
 }
 
 impl ErrorCode {
-    /// Whether the drive did not understand what it received. This may not even have been the
-    /// request that the code came in answer to, so nothing is known of that (SPEC-NOTES S16).
+    /// Whether the drive did not understand what it received, which is a failure of the line.
     pub const fn is_damage(self) -> bool {
         matches!(self, ErrorCode::BadCrc | ErrorCode::Timeout | ErrorCode::Overrun)
     }

@@ -5,7 +5,7 @@ use super::{Bad, ErrorCode};
 /// Why an exchange did not end in a positive acknowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Error {
-    /// The drive said no. It did nothing, unless the code [is damage](ErrorCode::is_damage).
+    /// The drive said no.
     Refused(ErrorCode),
     /// There is no answer to trust: it is not known whether the drive did what was asked.
     Failed(Failure),
@@ -26,6 +26,9 @@ pub enum Failure {
     Header(u8),
     /// A reply that is not a frame.
     Damaged(Bad),
+    /// The drive did not understand what it received. This may not even have been this request, but a
+    /// stray byte from before (SPEC-NOTES S16).
+    NotUnderstood(ErrorCode),
     /// The line was lost before; nothing was sent.
     Lost,
     /// The line was lost before and did not fall silent; nothing was sent.
@@ -54,6 +57,9 @@ impl core::fmt::Display for Failure {
             }
             Failure::Damaged(Bad::Checksum { expected, received }) => {
                 write!(f, "the reply's checksum is {received:#04x}, its bytes give {expected:#04x}")
+            }
+            Failure::NotUnderstood(code) => {
+                write!(f, "the drive did not understand what it received ({code}: {})", code.doc())
             }
             Failure::Lost => f.write_str("the line is lost and the drive does not answer"),
             Failure::Noise => f.write_str("the line does not fall silent"),

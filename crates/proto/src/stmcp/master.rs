@@ -450,7 +450,11 @@ impl Master {
                         // The drive did not understand the frame: it may take the rest of it for
                         // another one, and answer that too.
                         damaged = code.is_damage();
-                        Err(Error::Refused(code))
+                        Err(if damaged {
+                            Error::Failed(Failure::NotUnderstood(code))
+                        } else {
+                            Error::Refused(code)
+                        })
                     }
                     (HEADER_NACK, []) => Err(Error::Refused(ErrorCode::None)),
                     _ => Ok(frame.payload.len() as u8),

@@ -1,0 +1,163 @@
+//! Both protocols through lines that misbehave, on virtual time. See docs/RELIABILITY.md.
+
+mod campaign;
+mod plan;
+mod report;
+mod rmd;
+mod st;
+mod tally;
+mod wire;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use campaign::Failed;
+use plan::{GROUPS, SEEDS, Speaks, Trial, WRITES, seeded};
+use st::verified::{self, Writes};
+use tally::Tally;
+
+/// Sends both protocols through lines that misbehave and checks what Motorlink promises; fails with
+/// the seed and a trace where a promise is not kept.
+#[derive(Parser)]
+#[command(name = "motorlink-reliability")]
+struct Args {
+    /// Cut each trial to this many exchanges
+    #[arg(long, default_value_t = u64::MAX)]
+    most: u64,
+    /// Put the tables into this file, between its marks, instead of printing them
+    #[arg(long, value_name = "FILE")]
+    update: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    let result = measure(args.most).map_err(told).and_then(|tables| match args.update {
+        Some(path) => report::update(&path, &tables),
+        None => {
+            print!("{tables}");
+            Ok(())
+        }
+    });
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn measure(most: u64) -> Result<String, Failed> {
+    let mut tables = String::new();
+    let (mut st, mut rmd) = (0, 0);
+    for group in GROUPS {
+        let trials: Vec<Trial> = group.trials(most).collect();
+        let tallies = campaign::run(&trials, SEEDS)?;
+        let sum = tallies.iter().map(|tally| tally.exchanges).sum::<u64>();
+        match group.speaks {
+            Speaks::St(_) => st += sum,
+            Speaks::Rmd => rmd += sum,
+        }
+        let mut rows: Vec<(Trial, Tally)> = trials.into_iter().zip(tallies).collect();
+        tables += &report::trials(group.title, &mut rows).map_err(Failed::Plan)?;
+        eprintln!("{}: {sum} exchanges", group.title);
+    }
+    tables += &report::writes(&writes(most)?);
+    tables += &report::checksum();
+    let version = env!("CARGO_PKG_VERSION");
+    let head = format!(
+        "Motorlink {version}: {st} exchanges of ST's protocol and {rmd} of RMD, each trial in \
+         {SEEDS} parts with seeds 1 to {SEEDS}, and no promise was broken.\n\n"
+    );
+    Ok(head + &tables)
+}
+
+/// Plain and verified writes on the same lines.
+fn writes(most: u64) -> Result<Vec<(String, [Writes; 2])>, Failed> {
+    let mut rows = Vec::new();
+    for &(setup, faults, count) in WRITES {
+        let parts: Vec<(bool, u64)> =
+            (1..=SEEDS).flat_map(|seed| [(false, seed), (true, seed)]).collect();
+        let results =
+            campaign::each(&parts, |&(verified, seed)| {
+                let faults = seeded(faults, seed).map_err(Failed::Plan)?;
+                let count = count.min(most) / SEEDS;
+                verified::run(setup, &faults, verified, count).map_err(|violation| {
+                    Failed::Violated { faults: faults.to_string(), seed, violation }
+                })
+            });
+        let mut kinds = [Writes::default(); 2];
+        for ((verified, _), result) in parts.iter().zip(results) {
+            kinds[usize::from(*verified)].add(&result?);
+        }
+        rows.push((format!("{}, `{faults}`", setup.profile.name()), kinds));
+    }
+    Ok(rows)
+}
+
+fn told(failed: Failed) -> String {
+    match failed {
+        Failed::Plan(error) => error.to_string(),
+        Failed::Violated { faults, seed, violation } => format!(
+            "{}\n{}, on a line with {faults}, seed {seed}, in exchange {}",
+            violation.trace.join("\n"),
+            violation.what,
+            violation.exchange
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every trial of the long run, short.
+    #[test]
+    fn every_promise_is_kept_on_every_line() {
+        for group in GROUPS {
+            let trials: Vec<Trial> = group.trials(1_000).collect();
+            let tallies = campaign::run(&trials, 2).map_err(told).unwrap();
+            for (trial, tally) in trials.iter().zip(tallies) {
+                assert!(tally.exchanges >= 1_000, "{trial:?}");
+                assert!(tally.detected < tally.exchanges, "{trial:?}: nothing came through");
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_without_faults_fails_nobody() {
+        for group in GROUPS {
+            let clean =
+                Trial { faults: "drop=0", beyond: false, ..group.trials(2_000).next().unwrap() };
+            let [tally] = &campaign::run(&[clean], 1).map_err(told).unwrap()[..] else { panic!() };
+            assert_eq!((tally.detected, tally.undetected, tally.misplaced), (0, 0, 0));
+        }
+    }
+
+    /// The judge sees what it is there to see: replies beyond what can be told apart are taken for
+    /// those of other exchanges, and a run that promises otherwise fails and says where.
+    #[test]
+    fn a_broken_promise_is_found_and_traced() {
+        for group in GROUPS {
+            let Some(beyond) = group.trials(20_000).find(|trial| trial.beyond) else { continue };
+            let tally = &campaign::run(&[beyond], 1).map_err(told).unwrap()[0];
+            assert!(tally.misplaced > 0, "{}", group.title);
+            let promised = Trial { beyond: false, ..beyond };
+            let Err(Failed::Violated { violation, .. }) = campaign::run(&[promised], 1) else {
+                panic!("{}: nothing was found", group.title)
+            };
+            assert!(violation.trace.iter().any(|line| line.contains("VIOLATION")));
+        }
+    }
+
+    #[test]
+    fn verified_writes_are_right_where_plain_ones_are_not() {
+        let rows = writes(4_000).map_err(told).unwrap();
+        let (_, [plain, verified]) = &rows[2];
+        assert!(plain.wrong > 0, "{plain:?}");
+        assert_eq!(verified.wrong, 0, "{verified:?}");
+        assert!(verified.done > 0);
+    }
+}

@@ -1,0 +1,185 @@
+//! Which lines are tried, and for how long.
+
+use motorlink::fault::{FaultError, Faults};
+use motorlink_proto::stmcp::{Profile, Recovery};
+
+use crate::st::Setup;
+use crate::tally::Tally;
+use crate::{rmd, st};
+
+/// Who speaks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Speaks {
+    St(Setup),
+    Rmd,
+}
+
+/// A line.
+#[derive(Debug, Clone, Copy)]
+pub struct Trial {
+    pub speaks: Speaks,
+    /// As `--fault` takes them.
+    pub faults: &'static str,
+    /// Whether the line does what nobody promises to survive: replies that are later than the
+    /// protocol can tell.
+    pub beyond: bool,
+    pub exchanges: u64,
+}
+
+/// Trials with the same speakers.
+pub struct Group {
+    pub title: &'static str,
+    pub speaks: Speaks,
+    rows: &'static [(&'static str, u64)],
+    beyond: &'static [(&'static str, u64)],
+}
+
+/// Each trial is cut into runs with seeds of their own, from 1 on.
+pub const SEEDS: u64 = 8;
+
+const fn st(profile: Profile, recovery: Recovery) -> Speaks {
+    Speaks::St(Setup { profile, recovery })
+}
+
+/// What is tried with both profiles.
+const SERIAL: &[(&str, u64)] = &[
+    ("flip=1e-6", 8_000_000),
+    ("flip=1e-5", 4_000_000),
+    ("flip=1e-4", 3_000_000),
+    ("flip=1e-3", 1_500_000),
+    ("flip=1e-2", 400_000),
+    ("drop=1e-4", 1_000_000),
+    ("drop=1e-2", 300_000),
+    ("dup=1e-4", 1_000_000),
+    ("dup=1e-2", 300_000),
+    ("insert=1e-4", 1_000_000),
+    ("insert=1e-2", 300_000),
+    ("delay=0ms..60ms", 200_000),
+    ("delay=450ms..550ms", 200_000),
+    ("delay=0ms..990ms", 200_000),
+    ("pause=24ms..26ms@1e-3", 500_000),
+    ("pause=40ms..60ms@1e-3", 500_000),
+    ("pause=900ms..990ms@1e-3", 500_000),
+    ("cut=100ms@1e-4", 500_000),
+    ("cut=3s@1e-4", 500_000),
+    ("flood=300@1e-4", 500_000),
+    ("stuck0=300ms@1e-4", 500_000),
+    ("stuck1=300ms@1e-4", 500_000),
+    ("flip=1e-4,drop=1e-4,dup=1e-4,insert=1e-4,pause=30ms..1s@1e-4,cut=200ms@1e-5", 1_000_000),
+];
+
+/// What nothing can survive for sure in a protocol without sequence numbers.
+const SERIAL_BEYOND: &[(&str, u64)] = &[("delay=0ms..3s", 200_000), ("pause=2s..9s@1e-3", 500_000)];
+
+/// Where recovery does nothing, or not what the drive needs.
+const SHORT: &[(&str, u64)] = &[
+    ("flip=1e-4", 500_000),
+    ("flip=1e-3", 500_000),
+    ("drop=1e-3", 500_000),
+    ("insert=1e-3", 500_000),
+    ("cut=100ms@1e-4", 500_000),
+];
+
+const BUS: &[(&str, u64)] = &[
+    ("flip=1e-6", 8_000_000),
+    ("flip=1e-5", 4_000_000),
+    ("flip=1e-4", 3_000_000),
+    ("flip=1e-3", 1_500_000),
+    ("flip=1e-2", 400_000),
+    ("drop=1e-4", 1_000_000),
+    ("drop=1e-2", 1_000_000),
+    ("dup=1e-4", 1_000_000),
+    ("dup=1e-2", 1_000_000),
+    ("insert=1e-2", 1_000_000),
+    ("delay=0ms..20ms", 500_000),
+    ("delay=24ms..26ms", 500_000),
+    ("delay=0ms..74ms", 500_000),
+    ("pause=49ms..51ms@1e-3", 1_000_000),
+    ("pause=99ms..101ms@1e-3", 1_000_000),
+    ("pause=140ms..149ms@1e-3,only=received", 1_000_000),
+    ("cut=300ms@1e-4", 1_000_000),
+    ("flood=100@1e-3", 1_000_000),
+    ("corrupt=1e-6", 1_000_000),
+    ("corrupt=1e-4", 1_000_000),
+    ("corrupt=1e-2", 500_000),
+    ("flip=1e-5,drop=1e-4,dup=1e-4,insert=1e-3,pause=30ms..70ms@1e-4,cut=50ms@1e-5", 1_000_000),
+];
+
+const BUS_BEYOND: &[(&str, u64)] =
+    &[("delay=0ms..200ms", 500_000), ("pause=100ms..600ms@1e-3", 1_000_000)];
+
+/// Everything that is tried.
+pub const GROUPS: &[Group] = &[
+    Group {
+        title: "ST, profile spec, recovery Drain",
+        speaks: st(Profile::Spec, Recovery::Drain),
+        rows: SERIAL,
+        beyond: SERIAL_BEYOND,
+    },
+    Group {
+        title: "ST, profile mcsdk-5.4, recovery Pad",
+        speaks: st(Profile::Mcsdk54, Recovery::Pad),
+        rows: SERIAL,
+        beyond: SERIAL_BEYOND,
+    },
+    Group {
+        title: "ST, profile mcsdk-5.4, recovery Drain",
+        speaks: st(Profile::Mcsdk54, Recovery::Drain),
+        rows: SHORT,
+        beyond: &[],
+    },
+    Group {
+        title: "ST, profile spec, recovery None: opened again 3 s after each loss",
+        speaks: st(Profile::Spec, Recovery::None),
+        rows: SHORT,
+        beyond: &[],
+    },
+    Group { title: "RMD", speaks: Speaks::Rmd, rows: BUS, beyond: BUS_BEYOND },
+];
+
+/// Lines on which plain and verified writes are compared, and how many of each there are.
+pub const WRITES: &[(Setup, &str, u64)] = {
+    const SPEC: Setup = Setup { profile: Profile::Spec, recovery: Recovery::Drain };
+    const FIRMWARE: Setup = Setup { profile: Profile::Mcsdk54, recovery: Recovery::Pad };
+    &[
+        (SPEC, "flip=1e-4", 4_000_000),
+        (SPEC, "flip=1e-3", 2_000_000),
+        (SPEC, "flip=1e-2", 400_000),
+        (SPEC, "drop=1e-2", 400_000),
+        (SPEC, "insert=1e-2", 400_000),
+        (FIRMWARE, "flip=1e-3", 1_000_000),
+        (FIRMWARE, "drop=1e-2", 400_000),
+    ]
+};
+
+impl Group {
+    /// The trials, with a length for each cut to `most`.
+    pub fn trials(&self, most: u64) -> impl Iterator<Item = Trial> {
+        let speaks = self.speaks;
+        let rows = self.rows.iter().map(|row| (false, row));
+        rows.chain(self.beyond.iter().map(|row| (true, row))).map(
+            move |(beyond, &(faults, exchanges))| Trial {
+                speaks,
+                faults,
+                beyond,
+                exchanges: exchanges.min(most),
+            },
+        )
+    }
+}
+
+impl Trial {
+    /// How many damaged messages should have passed for whole ones.
+    pub fn expected(&self, tally: &Tally) -> Result<f64, FaultError> {
+        let faults = self.faults.parse()?;
+        Ok(match self.speaks {
+            Speaks::St(setup) => st::expected(setup, &faults, tally),
+            Speaks::Rmd => rmd::expected(&faults, tally),
+        })
+    }
+}
+
+/// The faults of a trial in the run with this seed.
+pub fn seeded(faults: &str, seed: u64) -> Result<Faults, FaultError> {
+    Ok(Faults { seed, ..faults.parse()? })
+}

@@ -1,0 +1,441 @@
+//! Master and slave on a line that misbehaves, and a judge that knows where every byte came from.
+
+use std::collections::VecDeque;
+use std::ops::RangeInclusive;
+
+use motorlink::fault::{Faults, Lane, Way};
+use motorlink::time::{Duration, Instant};
+use motorlink_proto::stmcp::{
+    Config, Error, ErrorCode, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, Line, MAX_FRAME,
+    Master, Motor, Output, Parse, Profile, Recovery, Request, Slave,
+};
+
+use super::drive::{MOTORS, Memory};
+use super::traffic::Ask;
+use crate::tally::Tally;
+use crate::wire::{Tagged, message};
+
+/// A byte at 115200 baud.
+const BYTE: Duration = Duration(87);
+/// How long the slave thinks.
+const TURNAROUND: Duration = Duration(100);
+/// As the blocking client, the master looks for what came unasked after a pause of this length.
+const IDLE: Duration = Duration::from_millis(20);
+/// Where a lost line does not recover by itself, the program opens it again this much later.
+const REOPENING: Duration = Duration::from_millis(3_000);
+/// Messages that are remembered; more are never on their way.
+const REMEMBERED: usize = 1 << 14;
+/// Lines that a trace keeps.
+const TRACED: usize = 60;
+
+/// Who speaks, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Setup {
+    pub profile: Profile,
+    pub recovery: Recovery,
+}
+
+/// A transmission of the master.
+struct Sent {
+    exchange: u64,
+    /// Whether it is the exchange's own request, not a part of recovery.
+    request: bool,
+    size: usize,
+}
+
+/// A reply of the slave.
+struct Reply {
+    size: usize,
+    answers: Answer,
+}
+
+/// What a reply answers.
+enum Answer {
+    /// The request of an exchange, as it was sent.
+    Exchange(u64),
+    /// A frame of recovery, as it was sent.
+    Recovery,
+    /// What was taken for a frame, with bytes from the requests of these exchanges.
+    Other(Option<RangeInclusive<u64>>),
+}
+
+pub struct Bench {
+    setup: Setup,
+    /// Whether the line does what nobody promises to survive.
+    beyond: bool,
+    config: Config,
+    master: Master,
+    slave: Slave,
+    pub drive: Memory,
+    out: Lane<Tagged<u8>>,
+    back: Lane<Tagged<u8>>,
+    pub now: Instant,
+    /// When the last exchange ended.
+    ended: Instant,
+    pub exchanges: u64,
+    /// The last exchange whose request was sent.
+    asked: u64,
+    sent: Log<Sent>,
+    replies: Log<Reply>,
+    /// What the slave takes for a command at the moment.
+    frame: Vec<Tagged<u8>>,
+    /// What has reached the master's port and was not read.
+    inbox: Vec<Tagged<u8>>,
+    /// What the master read since it sent its request.
+    heard: Vec<Tagged<u8>>,
+    payload: Vec<u8>,
+    pub tally: Tally,
+    pub violation: Option<String>,
+    trace: Option<VecDeque<String>>,
+}
+
+impl Bench {
+    pub fn new(setup: Setup, faults: &Faults, beyond: bool) -> Self {
+        let Setup { profile, recovery } = setup;
+        let config = Config { recovery, ..Config::default() };
+        let motors = Motor::new(MOTORS).expect("1 to 7");
+        Bench {
+            setup,
+            beyond,
+            config,
+            master: Master::new(config),
+            slave: Slave::new(profile, motors),
+            drive: Memory::new(),
+            out: Lane::new(faults, Way::Sent, BYTE),
+            back: Lane::new(faults, Way::Received, BYTE),
+            now: Instant(0),
+            ended: Instant(0),
+            exchanges: 0,
+            asked: 0,
+            sent: Log::new(),
+            replies: Log::new(),
+            frame: Vec::new(),
+            inbox: Vec::new(),
+            heard: Vec::new(),
+            payload: Vec::new(),
+            tally: Tally::default(),
+            violation: None,
+            trace: None,
+        }
+    }
+
+    /// Writes down from now on what passes the line.
+    pub fn trace(&mut self) {
+        self.trace = Some(VecDeque::new());
+    }
+
+    pub fn traced(self) -> Vec<String> {
+        self.trace.map(Vec::from).unwrap_or_default()
+    }
+
+    /// One exchange as the blocking client does it; gives the acknowledge's payload.
+    pub fn exchange(&mut self, ask: &Ask) -> Result<&[u8], Error> {
+        self.exchanges += 1;
+        let begun = self.now;
+        if self.now.since(self.ended) > IDLE {
+            self.read();
+        }
+        if self.setup.recovery == Recovery::None && self.master.line() == Line::Lost {
+            self.advance(self.now + REOPENING);
+            self.inbox.clear();
+            self.master.reopened();
+        }
+        let started = self.now;
+        let frame = Frame { header: ask.header, payload: ask.payload() };
+        let known = Request::decode(self.setup.profile, &frame);
+        let begins = match &known {
+            Ok(request) => self.master.request(frame.motor(), request),
+            Err(_) => self.master.request_raw(ask.header, ask.payload()),
+        };
+        begins.expect("no exchange is under way");
+        let mut sending = Duration(0);
+        let result = loop {
+            let mut bytes = [0; MAX_FRAME + 1];
+            let (request, size) = match self.master.poll(self.now) {
+                Output::Wait(until) => {
+                    let until = until.expect("an exchange is under way");
+                    self.wait(until);
+                    continue;
+                }
+                Output::Done(result) => {
+                    self.payload.clear();
+                    break result.map(|payload| self.payload.extend_from_slice(payload));
+                }
+                Output::Transmit(given) => {
+                    let size = given.len();
+                    bytes[..size].copy_from_slice(given);
+                    (self.master.line() == Line::Up, size)
+                }
+            };
+            sending = sending + Duration(BYTE.0 * size as u64);
+            self.transmit(&bytes[..size], request);
+        };
+        self.ended = self.now;
+        self.note(|| format!("exchange is over: {result:?}"));
+        let took = self.now.since(started);
+        if took > self.config.longest_exchange() + sending {
+            self.violates(format!("an exchange took {} ms", took.0 / 1_000));
+        }
+        self.tally.longest = self.tally.longest.max(self.now.since(begun));
+        self.judge(result);
+        result.map(|()| &self.payload[..])
+    }
+
+    /// Nothing is asked for a while.
+    pub fn rest(&mut self, pause: Duration) {
+        self.advance(self.now + pause);
+    }
+
+    fn transmit(&mut self, bytes: &[u8], request: bool) {
+        let message = self.sent.push(Sent { exchange: self.exchanges, request, size: bytes.len() });
+        if request {
+            self.asked = self.exchanges;
+            self.tally.requests += 1;
+            self.heard.clear();
+        }
+        self.note(|| format!("-> {bytes:02x?}{}", if request { "" } else { " (recovery)" }));
+        self.out.push(self.now, tagged(bytes, message));
+        self.advance(self.out.free());
+    }
+
+    /// Reads the port until then, or until something came.
+    fn wait(&mut self, until: Instant) {
+        while self.inbox.is_empty() {
+            let Some(next) = self.next().filter(|next| *next <= until) else {
+                self.now = self.now.max(until);
+                return;
+            };
+            self.now = self.now.max(next);
+            self.step();
+        }
+        self.read();
+    }
+
+    fn read(&mut self) {
+        let bytes: Vec<u8> = self.inbox.iter().map(|byte| byte.unit).collect();
+        if !bytes.is_empty() {
+            self.note(|| format!("<- {bytes:02x?}"));
+        }
+        self.heard.append(&mut self.inbox);
+        self.master.receive(self.now, &bytes);
+    }
+
+    fn advance(&mut self, until: Instant) {
+        while let Some(next) = self.next().filter(|next| *next <= until) {
+            self.now = self.now.max(next);
+            self.step();
+        }
+        self.now = self.now.max(until);
+    }
+
+    fn next(&self) -> Option<Instant> {
+        let heard = self.out.due().map(|due| due.max(self.deaf_until()));
+        [heard, self.back.due(), self.slave.deadline()].into_iter().flatten().min()
+    }
+
+    /// While the slave answers, bytes wait for it; shipped firmware throws them away.
+    fn deaf_until(&self) -> Instant {
+        if self.setup.profile == Profile::Spec { self.back.free() } else { Instant(0) }
+    }
+
+    fn step(&mut self) {
+        if let Some(nack) = self.slave.poll(self.now) {
+            let nack = nack.to_vec();
+            let answers = Answer::Other(self.involved());
+            self.frame.clear();
+            self.reply(&nack, answers);
+        }
+        while self.now >= self.deaf_until()
+            && let Some(byte) = self.out.pop(self.now)
+        {
+            if self.setup.profile == Profile::Spec || self.now >= self.back.free() {
+                self.deliver(byte);
+            }
+        }
+        while let Some(byte) = self.back.pop(self.now) {
+            self.inbox.push(byte);
+        }
+    }
+
+    fn deliver(&mut self, byte: Tagged<u8>) {
+        if !self.slave.is_receiving() {
+            self.frame.clear();
+        }
+        self.frame.push(byte);
+        let acts = self.drive.acts;
+        if let Some(reply) = self.slave.receive(self.now, byte.unit, &mut self.drive) {
+            let mut bytes = [0; MAX_FRAME];
+            let size = reply.len();
+            bytes[..size].copy_from_slice(reply);
+            self.take(&bytes[..size], self.drive.acts > acts);
+        }
+    }
+
+    /// The slave has taken `frame` for a command.
+    fn take(&mut self, reply: &[u8], acted: bool) {
+        let refused = reply[0] == HEADER_NACK && reply[2] == u8::from(ErrorCode::BadCrc);
+        let whole = message(&self.frame)
+            .and_then(|message| self.sent.get(message))
+            .filter(|sent| sent.size == self.frame.len())
+            .map(|sent| (sent.exchange, sent.request));
+        let answers = match whole {
+            Some((exchange, request)) => {
+                if refused {
+                    self.violates("a command that arrived as it was sent counts as damaged".into());
+                }
+                if request && exchange != self.asked && !self.beyond {
+                    self.violates(format!("the command of exchange {exchange} came after others"));
+                }
+                if request { Answer::Exchange(exchange) } else { Answer::Recovery }
+            }
+            // What padding is for: its own end is a frame of a motor that is not there.
+            None if self.is_padding() => Answer::Recovery,
+            // A frame with code 0, which nobody knows: what a line that is stuck at 0 says all the
+            // time. Its checksum fits always.
+            None if self.frame.iter().all(|byte| byte.unit == 0) => Answer::Other(self.involved()),
+            None => {
+                self.tally.judged += 1;
+                if !refused {
+                    let frame: Vec<u8> = self.frame.iter().map(|byte| byte.unit).collect();
+                    self.note(|| format!("   the drive takes {frame:02x?} for a command"));
+                    self.slip(&frame);
+                    self.tally.executed += u64::from(acted);
+                }
+                Answer::Other(self.involved())
+            }
+        };
+        self.reply(reply, answers);
+    }
+
+    fn reply(&mut self, bytes: &[u8], answers: Answer) {
+        self.tally.answers += u64::from(matches!(answers, Answer::Exchange(_)));
+        self.note(|| format!("   the drive answers {bytes:02x?}"));
+        let message = self.replies.push(Reply { size: bytes.len(), answers });
+        self.back.push(self.now + TURNAROUND, tagged(bytes, message));
+    }
+
+    /// Whether `frame` is made of nothing but what recovery sends.
+    fn is_padding(&self) -> bool {
+        let sent = |byte: &Tagged<u8>| self.sent.get(byte.source?.message);
+        let padding = |byte| sent(byte).is_some_and(|sent| !sent.request);
+        self.frame.iter().all(|byte| !byte.changed && padding(byte))
+    }
+
+    /// Exchanges of whose requests there are bytes in `frame`.
+    fn involved(&self) -> Option<RangeInclusive<u64>> {
+        let messages = self.frame.iter().filter_map(|byte| self.sent.get(byte.source?.message));
+        let mut exchanges = messages.filter(|sent| sent.request).map(|sent| sent.exchange);
+        let first = exchanges.next()?;
+        Some(first..=exchanges.next_back().unwrap_or(first))
+    }
+
+    fn judge(&mut self, result: Result<(), Error>) {
+        match result {
+            Ok(()) | Err(Error::Refused(_)) => self.trace_back(),
+            Err(Error::Failed(Failure::Damaged(_))) => {
+                self.tally.judged += 1;
+                self.tally.detected += 1;
+            }
+            Err(_) => self.tally.detected += 1,
+        }
+    }
+
+    /// Finds out where the reply came from that the master took.
+    fn trace_back(&mut self) {
+        let heard: Vec<u8> = self.heard.iter().map(|byte| byte.unit).collect();
+        let mut start = 0;
+        let size = loop {
+            match Frame::parse(&heard[start..]) {
+                Parse::Frame(frame, size) if frame.header == HEADER_ATR => start += size,
+                Parse::Frame(_, size) => break size,
+                _ => return self.violates("the master took a reply that did not come".into()),
+            }
+        };
+        let taken = &self.heard[start..start + size];
+        let reply = message(taken)
+            .and_then(|message| self.replies.get(message))
+            .filter(|reply| reply.size == size);
+        let current = self.exchanges;
+        match reply.map(|reply| &reply.answers) {
+            Some(Answer::Exchange(exchange)) if *exchange == current => {}
+            Some(Answer::Other(Some(involved))) if involved.contains(&current) => {}
+            Some(Answer::Other(_)) => {
+                self.note(|| "   that answered nothing of this exchange".to_owned());
+                self.tally.misplaced += 1;
+            }
+            Some(Answer::Exchange(_) | Answer::Recovery) if self.beyond => {
+                self.tally.misplaced += 1;
+            }
+            Some(Answer::Exchange(other)) => {
+                let what = format!("exchange {current} ended with the reply to exchange {other}");
+                self.violates(what);
+            }
+            Some(Answer::Recovery) => {
+                self.violates(format!("exchange {current} ended with a reply to recovery"));
+            }
+            None => {
+                self.tally.judged += 1;
+                self.note(|| "   that is no reply that the drive gave".to_owned());
+                self.slip(&heard[start..start + size]);
+            }
+        }
+    }
+
+    /// A frame that nobody sent was taken for one: only if its checksum fits.
+    fn slip(&mut self, frame: &[u8]) {
+        self.tally.undetected += 1;
+        let (check, body) = frame.split_last().expect("a frame has a checksum");
+        let sum: u32 = body.iter().map(|byte| u32::from(*byte)).sum();
+        if (sum % 0x100 + sum / 0x100) % 0x100 != u32::from(*check) {
+            self.violates(format!("{frame:02x?} was taken although its checksum is wrong"));
+        }
+        if !matches!(frame[0], HEADER_ACK | HEADER_NACK) && usize::from(frame[1]) + 3 != frame.len()
+        {
+            self.violates(format!("{frame:02x?} was taken although its length is wrong"));
+        }
+    }
+
+    fn violates(&mut self, what: String) {
+        self.note(|| format!("VIOLATION: {what}"));
+        self.violation.get_or_insert(what);
+    }
+
+    fn note(&mut self, what: impl FnOnce() -> String) {
+        if let Some(trace) = &mut self.trace {
+            if trace.len() == TRACED {
+                trace.pop_front();
+            }
+            let (exchange, ms) = (self.exchanges, self.now.0 as f64 / 1e3);
+            trace.push_back(format!("{ms:>14.3} ms  #{exchange}  {}", what()));
+        }
+    }
+}
+
+fn tagged(bytes: &[u8], message: u32) -> impl Iterator<Item = Tagged<u8>> {
+    bytes.iter().enumerate().map(move |(n, byte)| Tagged::new(*byte, message, n as u16))
+}
+
+/// The last messages, by number.
+struct Log<T> {
+    first: u32,
+    kept: VecDeque<T>,
+}
+
+impl<T> Log<T> {
+    fn new() -> Self {
+        Log { first: 0, kept: VecDeque::with_capacity(REMEMBERED) }
+    }
+
+    fn push(&mut self, value: T) -> u32 {
+        if self.kept.len() == REMEMBERED {
+            self.kept.pop_front();
+            self.first += 1;
+        }
+        self.kept.push_back(value);
+        self.first + self.kept.len() as u32 - 1
+    }
+
+    fn get(&self, number: u32) -> Option<&T> {
+        self.kept.get(number.checked_sub(self.first)? as usize)
+    }
+}

@@ -1,0 +1,79 @@
+//! Plain writes beside verified ones: what was reported as done, and what the register has.
+
+use motorlink::fault::{Faults, Rng};
+use motorlink_proto::stmcp::{
+    Error, RegisterId, Request, Unverified, VERIFY_ATTEMPTS, VerifiedWrite,
+};
+
+use super::bench::{Bench, Setup};
+use super::drive::MOTORS;
+use super::traffic::{self, Ask, SETTINGS};
+use crate::tally::Violation;
+
+/// What became of writes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Writes {
+    pub writes: u64,
+    /// Reported as done.
+    pub done: u64,
+    /// Reported as done, and the register has another value.
+    pub wrong: u64,
+    /// Another register has changed, whatever was reported.
+    pub beside: u64,
+}
+
+impl Writes {
+    pub fn add(&mut self, other: &Writes) {
+        self.writes += other.writes;
+        self.done += other.done;
+        self.wrong += other.wrong;
+        self.beside += other.beside;
+    }
+}
+
+/// Writes `count` random values to settings, each register read back and repeated if `verified`.
+pub fn run(setup: Setup, faults: &Faults, verified: bool, count: u64) -> Result<Writes, Violation> {
+    let mut bench = Bench::new(setup, faults, false);
+    let mut rng = Rng::with_seed(faults.seed ^ 0x5EED);
+    let mut writes = Writes { writes: count, ..Writes::default() };
+    for exchange in 0..count {
+        let motor = rng.u8(1..=MOTORS);
+        let register = SETTINGS[rng.usize(..SETTINGS.len())];
+        let shape = register.shape().expect("a setting is in the table");
+        let value = shape.ty.fit(rng.i32(..));
+        let mut expected = bench.drive.banks;
+        expected[usize::from(motor - 1)][usize::from(register.0)] = value;
+        let done = if verified {
+            write_verified(&mut bench, setup, motor, register, value)
+        } else {
+            bench.exchange(&traffic::write(motor, setup.profile, register, value)).is_ok()
+        };
+        if let Some(what) = bench.violation.take() {
+            return Err(Violation { exchange, what, trace: Vec::new() });
+        }
+        let kept = bench.drive.banks[usize::from(motor - 1)][usize::from(register.0)];
+        writes.done += u64::from(done);
+        writes.wrong += u64::from(done && kept != value);
+        expected[usize::from(motor - 1)][usize::from(register.0)] = kept;
+        writes.beside += u64::from(expected != bench.drive.banks);
+    }
+    Ok(writes)
+}
+
+fn write_verified(
+    bench: &mut Bench,
+    setup: Setup,
+    motor: u8,
+    register: RegisterId,
+    value: i32,
+) -> bool {
+    let write = VerifiedWrite::new::<Error>(setup.profile, register, value);
+    let exchange = |request: &Request<'_>| {
+        let payload = bench.exchange(&Ask::of(motor, request))?;
+        Ok(register.decode(payload))
+    };
+    let is_final = |error: &Error| matches!(error, Error::Refused(_));
+    let result: Result<u8, Unverified<Error>> =
+        write.and_then(|write| write.run(VERIFY_ATTEMPTS, exchange, is_final));
+    result.is_ok()
+}

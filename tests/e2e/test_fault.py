@@ -1,0 +1,105 @@
+"""`--fault`: a line that misbehaves as it is told, on real and on simulated ports."""
+
+import time
+
+import pytest
+
+ST = ("st", "-p", "sim:")
+RMD = ("rmd", "-p", "sim:")
+
+
+def test_what_is_late_still_comes(run, drives):
+    for port in ("pty", "tcp", "sim"):
+        began = time.monotonic()
+        late = run("st", "-p", drives.port(port), "--fault", "delay=60ms", "get", "STATUS").ended(0)
+        assert time.monotonic() - began >= 0.12, "both ways"
+        assert "STATUS" in late.out
+    late = run("rmd", "-p", drives.port("slcan"), "--fault", "delay=10ms", "angle").ended(0)
+    assert "angle" in late.out
+
+
+@pytest.mark.parametrize("fault", ["drop=1", "cut=5s@1", "drop=1,only=sent", "drop=1,only=received"])
+def test_a_line_that_loses_everything_has_failed(run, drives, fault):
+    for port in ("pty", "sim"):
+        lost = run("st", "-p", drives.port(port), "--timeout", 100, "--fault", fault, "info").ended(3)
+        assert "no reply in time" in lost.err
+    assert "does not answer" in run(*RMD, "--fault", fault, "status").ended(3).err
+
+
+def test_damage_is_found_and_shown(run):
+    damaged = run(*ST, "--fault", "flip=1e-1,only=received,seed=2", "--trace", "info").ended(3)
+    assert "06 00 06" in damaged.err, "what the program sent"
+    assert "f0 20 05 04 04 53" not in damaged.err, "what it received"
+
+
+def test_the_same_seed_does_the_same(run):
+    def received(seed):
+        fault = f"flip=3e-2,only=received,seed={seed}"
+        trace = run(*ST, "--fault", fault, "--trace", "info").err
+        return [line.split("<-")[1] for line in trace.splitlines() if "<-" in line]
+
+    assert received(5)[0] == received(5)[0]
+    assert received(5)[0] != received(6)[0]
+
+
+def test_a_watch_goes_on_through_damage(run):
+    fault = "drop=5e-2,seed=3"
+    watch = run(
+        *ST, "--json", "--timeout", 30, "--fault", fault, "get", "BUS_VOLTAGE", "--every", "2ms",
+        "--count", 40,
+    ).ended(0)
+    assert {line["BUS_VOLTAGE"]["value"] for line in watch.lines} == {325}
+    assert "the line is lost" in watch.err and "the line is back" in watch.err
+
+
+def test_a_bus_with_foreign_frames_and_copies_works(run):
+    fault = "flood=20@0.5,dup=0.2,insert=0.2,seed=1"
+    status = run(*RMD, "--fault", fault, "--json", "status", "--every", "5ms", "--count", 20)
+    assert len(status.ended(0).lines) == 20
+
+
+@pytest.mark.parametrize(
+    "arguments, why",
+    [
+        ((*ST, "--fault", "flop=1", "info"), "there is no fault `flop`"),
+        ((*ST, "--fault", "flip=2", "info"), "a rate from 0 to 1"),
+        ((*ST, "--fault", "seed=7", "info"), "no fault is named"),
+        ((*ST, "--fault", "corrupt=1e-3", "info"), "use flip"),
+        ((*RMD, "--fault", "stuck0=1s@1", "status"), "use cut"),
+        (("st", "-p", "/dev/ttyNONE", "--fault", "drop=1", "scan"), "takes no --fault"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_before_anything_is_sent(run, arguments, why):
+    assert why in run(*arguments).ended(2).err
+
+
+def test_a_verified_write_reads_back(run, drives):
+    for port in ("pty", "sim"):
+        st = ("st", "-p", drives.port(port))
+        done = run(*st, "--json", "--trace", "set", "SPEED_KP", 790, "--verify").ended(0)
+        assert done.json == {"ok": True, "attempts": 1}
+        assert done.err.count("->") == 2, "a write and a read"
+    assert "790" in run("st", "-p", drives.port("pty"), "get", "SPEED_KP").ended(0).out
+
+
+def test_a_verified_write_is_repeated_where_the_line_loses_it(run):
+    fault = ("--timeout", 50, "--fault", "drop=5e-2,seed=4")
+    done = run(*ST, *fault, "--json", "set", "SPEED_KP", 700, "--verify=9").ended(0)
+    assert done.json["attempts"] > 1
+    lost = run(*ST, "--timeout", 50, "--fault", "drop=1", "set", "SPEED_KP", 700, "--verify=2")
+    assert "failed" in lost.ended(3).err
+
+
+def test_a_drive_that_acknowledges_and_ignores_is_found_out(run, tmp_path):
+    config = tmp_path / "mcsdk.toml"
+    config.write_text('profile = "mcsdk-5.4"\n')
+    st = ("st", "-p", f"sim:{config}", "--profile", "mcsdk-5.4")
+    run(*st, "--raw", "set", "DAC_OUT1", 5).ended(0)
+    found = run(*st, "--raw", "set", "DAC_OUT1", 5, "--verify").ended(1)
+    assert "DAC_OUT1 should be 5 and reads" in found.err
+
+
+@pytest.mark.parametrize("register", ["RAMP_FINAL_SPEED", "CONTROL_MODE", "TORQUE_REF", "TARGET_MOTOR"])
+def test_what_acts_on_the_motor_is_not_verified(run, register):
+    refused = run(*ST, "--trace", "set", register, 1, "--verify").ended(2)
+    assert "cannot be verified" in refused.err and "->" not in refused.err
