@@ -129,7 +129,7 @@ pub fn checksum() -> String {
             let frame = Frame { header, payload: &payload };
             let bytes = frame.encode(&mut out).expect("at most 131 bytes").to_vec();
             for (sum, wrong) in sums.iter_mut().zip(WRONG) {
-                *sum += share(&bytes, wrong, &mut rng);
+                *sum += share(&bytes, wrong, |_| true, &mut rng);
             }
         }
         let mut cells: Vec<String> =

@@ -1,7 +1,9 @@
 //! How often a damaged frame should pass for a whole one.
 
 use motorlink::fault::Rng;
-use motorlink_proto::stmcp::{Frame, MAX_FRAME, Motor, Parse, Profile, Slave};
+use motorlink_proto::stmcp::{
+    Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile, Slave,
+};
 use motorlink_proto::time::Instant;
 
 use super::drive::{MOTORS, Memory};
@@ -26,13 +28,15 @@ pub fn undetected(profile: Profile, rate: f64) -> (f64, f64) {
         let request = traffic::next(profile, &mut rng).frame(&mut out).to_vec();
         let mut take = |byte: &u8| slave.receive(Instant(0), *byte, &mut drive).map(<[u8]>::to_vec);
         let reply = request.iter().filter_map(&mut take).last().expect("each frame is answered");
-        requests += passes(&request, rate, &mut rng);
-        replies += passes(&reply, rate, &mut rng);
+        requests += passes(&request, rate, |_| true, &mut rng);
+        // A master takes nothing else for a reply.
+        let reply_header = |header| matches!(header, HEADER_ACK | HEADER_NACK);
+        replies += passes(&reply, rate, reply_header, &mut rng);
     }
     (requests / FRAMES as f64, replies / FRAMES as f64)
 }
 
-fn passes(frame: &[u8], rate: f64, rng: &mut Rng) -> f64 {
+fn passes(frame: &[u8], rate: f64, header: impl Fn(u8) -> bool, rng: &mut Rng) -> f64 {
     let bits = frame.len() * 8;
     // The chance of no wrong bit, then of one more each time.
     let mut chance = (1.0 - rate).powi(bits as i32);
@@ -42,20 +46,21 @@ fn passes(frame: &[u8], rate: f64, rng: &mut Rng) -> f64 {
         chance *= (bits - wrong + 1) as f64 / wrong as f64 * rate / (1.0 - rate);
         left -= chance;
         if chance > 1e-12 {
-            sum += chance * share(frame, wrong, rng);
+            sum += chance * share(frame, wrong, &header, rng);
         }
     }
     sum + left.max(0.0) / 256.0
 }
 
 /// The share of the patterns of `wrong` bits that pass: of all of them up to two bits where there
-/// are not too many, else of some drawn by lot.
-pub fn share(frame: &[u8], wrong: usize, rng: &mut Rng) -> f64 {
+/// are not too many, else of some drawn by lot. Frames pass with the headers that `header` takes.
+pub fn share(frame: &[u8], wrong: usize, header: impl Fn(u8) -> bool, rng: &mut Rng) -> f64 {
     let bits = frame.len() * 8;
     let mut damaged = frame.to_vec();
     let mut flip = |pattern: &[usize]| {
         pattern.iter().for_each(|bit| damaged[bit / 8] ^= 1 << (bit % 8));
-        let passes = matches!(Frame::parse(&damaged), Parse::Frame(..));
+        let parsed = Frame::parse(&damaged);
+        let passes = matches!(parsed, Parse::Frame(frame, _) if header(frame.header));
         pattern.iter().for_each(|bit| damaged[bit / 8] ^= 1 << (bit % 8));
         usize::from(passes)
     };
@@ -111,10 +116,11 @@ mod tests {
     #[test]
     fn two_wrong_bits_pass_about_one_time_in_sixteen_and_many_one_in_256() {
         let mut rng = Rng::with_seed(1);
-        let exact = share(&frame(32), 2, &mut rng);
+        let exact = share(&frame(32), 2, |_| true, &mut rng);
         let closed = 34.0 * 33.0 / (2.0 * 35.0 * 279.0);
         assert!((exact - closed).abs() < 0.01, "{exact}, not about {closed}");
-        let many = (0..200).map(|_| share(&frame(127), 20, &mut rng)).sum::<f64>() / 200.0;
+        let many =
+            (0..200).map(|_| share(&frame(127), 20, |_| true, &mut rng)).sum::<f64>() / 200.0;
         assert!((0.002..0.006).contains(&many), "{many}, not about 1 in 256");
     }
 }

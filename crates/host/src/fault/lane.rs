@@ -36,6 +36,8 @@ pub struct Lane<T> {
     dead: Instant,
     /// What is on its way, the earliest first.
     coming: VecDeque<(Instant, T)>,
+    /// What a stuck line says, when next, and until when.
+    stuck: Option<(T, Instant, Instant)>,
 }
 
 impl<T: Unit> Lane<T> {
@@ -67,6 +69,7 @@ impl<T: Unit> Lane<T> {
             held: Instant(0),
             dead: Instant(0),
             coming: VecDeque::new(),
+            stuck: None,
         }
     }
 
@@ -92,13 +95,21 @@ impl<T: Unit> Lane<T> {
 
     /// When the next unit arrives; `None` while nothing is on its way.
     pub fn due(&self) -> Option<Instant> {
-        self.coming.front().map(|(due, _)| *due)
+        let coming = self.coming.front().map(|(due, _)| *due);
+        let stuck = self.stuck.map(|(_, next, _)| next);
+        [coming, stuck].into_iter().flatten().min()
     }
 
     /// The next unit, if it has arrived.
     pub fn pop(&mut self, now: Instant) -> Option<T> {
-        self.due().filter(|due| *due <= now)?;
-        self.coming.pop_front().map(|(_, unit)| unit)
+        let due = self.due().filter(|due| *due <= now)?;
+        if self.coming.front().is_some_and(|(first, _)| *first == due) {
+            return self.coming.pop_front().map(|(_, unit)| unit);
+        }
+        let (unit, _, until) = self.stuck?;
+        let next = due + self.pace.max(NOISE_PACE);
+        self.stuck = (next < until).then_some((unit, next, until));
+        Some(unit)
     }
 
     /// When everything that was pushed will be out.
@@ -114,10 +125,12 @@ impl<T: Unit> Lane<T> {
         if self.pause.0.hits(&mut self.rng) {
             self.held = self.held.max(at + drawn(self.pause.1, &mut self.rng));
         }
+        let pace = self.pace.max(NOISE_PACE);
         if self.flood.0.hits(&mut self.rng) {
+            let mut due = at.max(self.held).max(self.last());
             for _ in 0..self.flood.1 {
-                let noise = T::noise(self.way, &mut self.rng);
-                self.arrive(at.max(self.held), noise, self.pace.max(NOISE_PACE));
+                due += pace;
+                self.coming.push_back((due, T::noise(self.way, &mut self.rng)));
             }
         }
         if self.cut.0.hits(&mut self.rng) {
@@ -129,13 +142,14 @@ impl<T: Unit> Lane<T> {
                 continue;
             }
             self.dead = at + drawn(*length, &mut self.rng);
-            let pace = self.pace.max(NOISE_PACE);
-            let mut due = at + pace;
-            while let Some(unit) = T::stuck(high).filter(|_| due < self.dead) {
-                self.arrive(due, unit, pace);
-                due += pace;
-            }
+            let next = at.max(self.last()) + pace;
+            self.stuck = T::stuck(high).filter(|_| next < self.dead).map(|u| (u, next, self.dead));
         }
+    }
+
+    /// When the last unit arrives that is on its way.
+    fn last(&self) -> Instant {
+        self.coming.back().map_or(Instant(0), |(due, _)| *due)
     }
 
     fn pass(&mut self, due: Instant, mut unit: T) {
@@ -326,7 +340,7 @@ mod tests {
     fn a_flood_comes_at_the_pace_of_the_line_before_what_began_it() {
         let came = outcome(&mut lane("flood=100@1", 0), [0x55u8]);
         assert_eq!(came.len(), 101);
-        assert_eq!(came[100], (99 * NOISE_PACE.0, 0x55));
+        assert_eq!(came[100], (100 * NOISE_PACE.0, 0x55));
     }
 
     #[test]

@@ -136,9 +136,9 @@ const KEYS: &str =
 const RATE: &str = "a rate from 0 to 1, such as 1e-4";
 const TIME: &str = "a time such as 5ms, or 5ms..30ms, up to an hour";
 const SPELL: &str = "a time and a rate, such as 500ms@1e-3 or 10ms..2s@1e-3";
-const FLOOD: &str = "a count up to 1000000 and a rate, such as 200@1e-3";
+const FLOOD: &str = "a count up to 10000 and a rate, such as 200@1e-3";
 const LONGEST: Duration = Duration(3_600_000_000);
-const MOST: u32 = 1_000_000;
+const MOST: u32 = 10_000;
 
 impl Faults {
     /// A line on which nothing goes wrong.
