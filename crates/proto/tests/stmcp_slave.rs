@@ -75,7 +75,7 @@ fn a_frame_that_is_not_whole_after_25_ms_is_answered_with_timeout() {
         assert_eq!(bench.slave.poll(Instant(24_999)), None);
         let reply = bench.slave.poll(deadline).expect("a NACK is due").to_vec();
         assert_eq!(answer(&reply), Err(ErrorCode::Timeout));
-        assert_eq!(bench.slave.deadline(), None);
+        assert_eq!((bench.slave.deadline(), bench.slave.is_receiving()), (None, false));
         bench.now = deadline;
         assert_eq!(answer(&bench.bytes(&GET_STATUS)), Ok(vec![0]));
     }
@@ -116,9 +116,11 @@ fn shipped_firmware_never_times_out_and_drops_a_length_over_127() {
     let mut bench = mcsdk();
     bench.bytes(&GET_STATUS[..3]);
     bench.now += Duration::from_millis(60_000);
-    assert_eq!(bench.slave.deadline(), None);
+    assert_eq!((bench.slave.deadline(), bench.slave.is_receiving()), (None, true));
     assert_eq!(answer(&bench.bytes(&GET_STATUS[3..])), Ok(vec![0]));
+    assert!(!bench.slave.is_receiving());
     assert_eq!(bench.bytes(&[0x02, 128]), []);
+    assert!(!bench.slave.is_receiving());
     assert_eq!(answer(&bench.bytes(&GET_STATUS)), Ok(vec![0]), "the next byte is a header");
 }
 
