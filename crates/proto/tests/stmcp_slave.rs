@@ -125,6 +125,14 @@ fn shipped_firmware_never_times_out_and_drops_a_length_over_127() {
 }
 
 #[test]
+fn a_line_that_is_stuck_at_0_says_frames_of_code_0() {
+    for mut bench in [spec(), mcsdk()] {
+        assert_eq!(answer(&bench.bytes(&[0, 0, 0])), Err(ErrorCode::BadFrameId));
+        assert!(bench.drive.registers.is_empty() && bench.drive.log.is_empty());
+    }
+}
+
+#[test]
 fn an_overrun_drops_the_frame_and_says_so() {
     let mut bench = spec();
     bench.bytes(&GET_STATUS[..2]);
