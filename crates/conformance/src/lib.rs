@@ -12,6 +12,7 @@
 
 mod case;
 mod clause;
+pub mod host;
 mod junit;
 mod markdown;
 mod report;

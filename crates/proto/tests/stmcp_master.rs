@@ -298,6 +298,21 @@ fn bytes_behind_a_reply_lose_the_line_but_not_the_reply() {
     assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
 }
 
+#[test]
+fn two_replies_that_differ_are_no_answer() {
+    let (mut first, mut second) = ([0; MAX_FRAME], [0; MAX_FRAME]);
+    let ack = Frame { header: HEADER_ACK, payload: &[6] }.encode(&mut first).unwrap();
+    let other = Frame { header: HEADER_ACK, payload: &[8] }.encode(&mut second).unwrap();
+    for (copy, end) in [(ack, Ok(&[6][..])), (other, Err(Error::Failed(Failure::Ambiguous)))] {
+        let mut master = master(Recovery::Drain);
+        master.request(0, &STATUS).unwrap();
+        assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+        master.receive(Instant(1), &[ack, copy].concat());
+        assert_eq!(master.poll(Instant(1)), Output::Done(end));
+        assert_eq!(master.line(), Line::Lost);
+    }
+}
+
 /// Flips one bit of the next request on its way, and asks twice.
 #[test]
 fn no_bit_flip_of_a_request_puts_the_line_off_by_one() {

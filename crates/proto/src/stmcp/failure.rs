@@ -29,6 +29,8 @@ pub enum Failure {
     /// The drive did not understand what it received. This may not even have been this request, but a
     /// stray byte from before (SPEC-NOTES S16).
     NotUnderstood(ErrorCode),
+    /// Two replies that differ came at once: nothing tells which of them is the answer.
+    Ambiguous,
     /// The line was lost before; nothing was sent.
     Lost,
     /// The line was lost before and did not fall silent; nothing was sent.
@@ -61,6 +63,7 @@ impl core::fmt::Display for Failure {
             Failure::NotUnderstood(code) => {
                 write!(f, "the drive did not understand what it received ({code}: {})", code.doc())
             }
+            Failure::Ambiguous => f.write_str("two replies that differ came at once"),
             Failure::Lost => f.write_str("the line is lost and the drive does not answer"),
             Failure::Noise => f.write_str("the line does not fall silent"),
         }

@@ -470,11 +470,15 @@ impl Master {
                     self.filled = rest;
                     return Some(None);
                 }
+                let behind = Frame::parse(received.get(size..).unwrap_or(&[]));
+                let contradicts = matches!(behind, Parse::Frame(other, _)
+                    if matches!(other.header, HEADER_ACK | HEADER_NACK) && other != frame);
                 self.unasked(usize::from(rest));
                 if rest > 0 || damaged {
                     self.lose();
                 }
-                return Some(Some(result));
+                let ambiguous = Err(Error::Failed(Failure::Ambiguous));
+                return Some(Some(if contradicts { ambiguous } else { result }));
             }
         };
         self.lose();

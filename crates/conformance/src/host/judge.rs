@@ -1,0 +1,102 @@
+//! What a host said, held against what it was told.
+
+use crate::case::Finding;
+use crate::report::{Outcome, Verdict};
+
+use super::{Journal, Scenario, Task};
+
+/// What a host must bring home.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Demand {
+    /// Every reading: the disturbance is none of its business.
+    Everything,
+    /// Nothing false. A reading may fail, if it says so, or be made again.
+    Truth,
+    /// That it failed.
+    Error,
+}
+
+/// What a host said.
+#[derive(Debug, Clone, Default)]
+pub struct Said {
+    /// The values, in the document's unit, in the order in which it said them.
+    pub values: Vec<f64>,
+    /// Whether it said that something failed.
+    pub complained: bool,
+    /// That it did not come to an end, and what was done about it.
+    pub hung: Option<String>,
+}
+
+impl<S> Scenario<S> {
+    /// What comes of it when the host said this. A digit on the wire is `digit` of what it says.
+    pub fn judge(&self, journal: &Journal, said: &Said, digit: f64) -> Outcome {
+        let verdict = match self.fault(journal, said, digit) {
+            None => Verdict::Passed,
+            Some(fault) => Verdict::Failed(Box::new(Finding {
+                sent: journal.sent(),
+                expected: self.expected.to_owned(),
+                received: fault,
+            })),
+        };
+        let transcript = match verdict {
+            Verdict::Failed(_) => journal.transcript.clone(),
+            _ => Vec::new(),
+        };
+        Outcome { name: self.name.to_string(), clauses: self.clauses, verdict, transcript }
+    }
+
+    /// Why it was not run.
+    pub fn skipped(&self, why: &str) -> Outcome {
+        let verdict = Verdict::Skipped(why.to_owned());
+        let (name, transcript) = (self.name.to_string(), Vec::new());
+        Outcome { name, clauses: self.clauses, verdict, transcript }
+    }
+
+    fn fault(&self, journal: &Journal, said: &Said, digit: f64) -> Option<String> {
+        let falsehood = |(index, &value): (usize, &f64)| {
+            let is = |told: i64| (told as f64 * digit - value).abs() < digit / 2.0;
+            match journal.meaning(is) {
+                None => Some(format!("the host said {value}, which no reply told it")),
+                Some(told) => match &told.wrong {
+                    Some(why) => Some(format!("the host said {value}, but {why}")),
+                    None if said.values[..index].contains(&value) => {
+                        Some(format!("the host said {value} twice, which it was told once"))
+                    }
+                    None => None,
+                },
+            }
+        };
+        if let Some(fault) = said.values.iter().enumerate().find_map(falsehood) {
+            return Some(fault);
+        }
+        if let Some(violation) = journal.violations.first() {
+            return Some(format!("the host {violation}"));
+        }
+        if let Some(hung) = &said.hung {
+            return Some(hung.clone());
+        }
+        if journal.starts > 1 {
+            return Some(format!("the host sent START_MOTOR {} times", journal.starts));
+        }
+        let count = said.values.len();
+        let wanted = self.task.values();
+        match self.demand {
+            _ if self.task == Task::Start && journal.starts == 0 => {
+                Some("the host did not send START_MOTOR".to_owned())
+            }
+            Demand::Everything if count < wanted => {
+                Some(format!("the host said {count} values of {wanted}"))
+            }
+            Demand::Everything if said.complained && self.task == Task::Start => {
+                Some("the host said that it failed".to_owned())
+            }
+            Demand::Error if !said.complained => {
+                Some("the host did not say that anything failed".to_owned())
+            }
+            Demand::Truth if count < wanted && !said.complained => {
+                Some(format!("the host said {count} values of {wanted} and nothing of an error"))
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! Hosts that speak the RMD protocol V1.62.
+
+mod motors;
+mod scenarios;
+
+pub use motors::{Motors, Scenario};
+pub use scenarios::scenarios;
+
+/// What a digit of 0x92 is in what a host says: degrees.
+pub const DIGIT: f64 = 0.01;

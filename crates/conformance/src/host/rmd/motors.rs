@@ -1,0 +1,166 @@
+//! Motors that answer as their script says.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use motorlink::serve::CanStation;
+use motorlink_proto::rmd::{
+    CanFrame, Circle, Code, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, Status1, TORQUE4_ID,
+};
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::units::{
+    Celsius, CircleAngle, DeciVolts, Dps, MultiTurnAngle, TorqueFeedback,
+};
+
+use crate::host::journal::{Exchange, Journal};
+use crate::host::script::{Outbox, Send};
+
+/// A scenario for an RMD host.
+pub type Scenario = crate::host::Scenario<Script>;
+
+/// What the motors send for a request.
+#[derive(Clone)]
+pub struct Script(Rc<dyn Fn(&Turn) -> Vec<Send<CanFrame>>>);
+
+impl Script {
+    pub(super) fn new(script: impl Fn(&Turn) -> Vec<Send<CanFrame>> + 'static) -> Self {
+        Script(Rc::new(script))
+    }
+}
+
+/// A request to one motor, and how a motor of the document answers it. 0x280 is one to each of four.
+pub(super) struct Turn {
+    pub id: MotorId,
+    pub code: Code,
+    /// How often this motor was asked this before.
+    pub asked: usize,
+    pub request: CanFrame,
+    pub reply: [u8; 8],
+    /// The value in the reply, in digits.
+    pub value: Option<i64>,
+    /// How long the host waits for a reply.
+    pub timeout: Duration,
+}
+
+/// Four motors, IDs 1 to 4, and a script. Clones are the same motors.
+#[derive(Clone)]
+pub struct Motors(Rc<RefCell<Inner>>);
+
+struct Inner {
+    script: Script,
+    outbox: Outbox<CanFrame>,
+    asked: BTreeMap<(MotorId, u8), usize>,
+    readings: u16,
+    timeout: Duration,
+}
+
+/// Two requests to one motor within this time are in flight at once: no motor answers faster, and no
+/// host has given up by then.
+const AT_ONCE: Duration = Duration(100);
+
+impl Scenario {
+    /// The motors of this scenario, for a host that waits `timeout` for a reply.
+    pub fn motors(&self, timeout: Duration) -> Motors {
+        let (asked, readings) = Default::default();
+        let script = self.script.clone();
+        Motors(Rc::new(RefCell::new(Inner { script, outbox: Outbox::new(), asked, readings, timeout })))
+    }
+}
+
+impl Motors {
+    /// What passed so far.
+    pub fn journal(&self) -> Journal {
+        self.0.borrow().outbox.journal.clone()
+    }
+}
+
+impl CanStation for Motors {
+    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+        let mut inner = self.0.borrow_mut();
+        inner.outbox.journal.heard(now, &show(frame));
+        if let Some((can_id, data)) = frame.usable() {
+            if let Some(id) = MotorId::from_can_id(can_id.into()) {
+                inner.request(now, id, frame, Code::from(data[0]));
+            } else if can_id == TORQUE4_ID {
+                for id in MotorSet::TORQUE4 {
+                    inner.request(now, id, frame, Code::Torque);
+                }
+            }
+        }
+        inner.flush(now, replies);
+    }
+
+    fn poll(&mut self, now: Instant, replies: &mut Vec<CanFrame>) {
+        self.0.borrow_mut().flush(now, replies);
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.0.borrow().outbox.deadline()
+    }
+}
+
+impl Inner {
+    fn request(&mut self, now: Instant, id: MotorId, frame: &CanFrame, code: Code) {
+        if !MotorSet::TORQUE4.contains(id) {
+            return;
+        }
+        let exchange = self.asked(now, id, frame, code);
+        self.outbox.stir(now);
+        let count = self.asked.entry((id, code.into())).or_default();
+        let asked = *count;
+        *count += 1;
+        let (reply, value) = self.reply(code, frame);
+        let (request, timeout) = (*frame, self.timeout);
+        let sends = (self.script.0)(&Turn { id, code, asked, request, reply, value, timeout });
+        self.outbox.schedule(now, exchange, sends);
+    }
+
+    fn asked(&mut self, now: Instant, id: MotorId, frame: &CanFrame, code: Code) -> Exchange {
+        self.outbox.journal.asked(now, id.number(), code.into(), &show(frame), AT_ONCE)
+    }
+
+    /// What a motor of the document answers, with a value of its own each time.
+    fn reply(&mut self, code: Code, request: &CanFrame) -> ([u8; 8], Option<i64>) {
+        let Some(row) = code.info() else { return ([0; 8], None) };
+        if let Some((_, echoed)) = request.usable()
+            && row.echo
+        {
+            return (*echoed, None);
+        }
+        self.readings += 1;
+        let digits = 200 + 13 * self.readings;
+        let temperature = Celsius(30);
+        let reply = match code {
+            Code::ReadMultiTurnAngle => {
+                MultiTurn { angle: MultiTurnAngle(digits.into()) }.encode_as(code)
+            }
+            Code::ReadCircleAngle => Circle { angle: CircleAngle(digits) }.encode_as(code),
+            Code::ReadStatus1 | Code::ClearErrors => {
+                let (voltage, errors) = (DeciVolts(digits), Default::default());
+                Status1 { temperature, voltage, errors }.encode_as(Code::ReadStatus1)
+            }
+            _ if row.moves || code == Code::ReadStatus2 => {
+                let (iq, speed) = (TorqueFeedback(digits as i16), Dps(0));
+                MotionStatus { temperature, iq, speed, encoder: 0 }.encode_as(code)
+            }
+            _ => return ([code.into(), 0, 0, 0, 0, 0, 0, 0], None),
+        };
+        (reply, Some(digits.into()))
+    }
+
+    fn flush(&mut self, now: Instant, replies: &mut Vec<CanFrame>) {
+        self.outbox.flush(now, show, |frame| replies.push(frame));
+    }
+}
+
+fn show(frame: &CanFrame) -> String {
+    let data: Vec<String> = frame.data().iter().map(|byte| format!("{byte:02x}")).collect();
+    let kind = match (frame.is_extended(), frame.is_remote()) {
+        (true, true) => " extended remote",
+        (true, false) => " extended",
+        (false, true) => " remote",
+        (false, false) => "",
+    };
+    format!("{:03x}#{}{kind}", frame.id(), data.join(" "))
+}

@@ -1,0 +1,349 @@
+//! What RMD hosts are put through.
+
+use motorlink_proto::rmd::{CanFrame, Code, Dialect};
+use motorlink_proto::time::Duration;
+
+use super::motors::{Scenario, Script, Turn};
+use crate::host::script::{Send, share};
+use crate::host::{DISTURBED, Demand, Task};
+
+const IDENTIFIERS: &str = "RMD-1-01";
+const FRAME: &str = "RMD-1-02";
+const EIGHT_BYTES: &str = "RMD-1-03";
+const ANSWER: &str = "RMD-92-02";
+const CLEAR: &str = "RMD-9B-02";
+const FOUR: &str = "RMD-280-03";
+
+type Sends = Vec<Send<CanFrame>>;
+
+/// An angle, in digits, that no motor has: what unasked frames tell.
+const UNASKED: u16 = 7_001;
+
+/// Everything that RMD hosts are put through.
+pub fn scenarios() -> Vec<Scenario> {
+    let mut all = reading();
+    all.extend(many_motors());
+    all
+}
+
+/// With one motor.
+fn reading() -> Vec<Scenario> {
+    vec![
+        read(
+            "every_reading_has_its_own_value",
+            &[IDENTIFIERS, ANSWER],
+            "sends one request, reads the reply and says its value, every time",
+            Demand::Everything,
+            |turn| vec![right(turn)],
+        ),
+        read(
+            "a_reply_is_awaited_for_the_whole_timeout",
+            &[ANSWER],
+            "waits until the reply comes, 0.8 of its timeout later",
+            Demand::Everything,
+            |turn| vec![right(turn).after(share(turn.timeout, 4, 5))],
+        ),
+        read(
+            "a_reply_at_the_timeout_is_its_own_or_nobodys",
+            &[ANSWER],
+            "takes the reply that comes when its time is over, or none; never for the next one's",
+            Demand::Truth,
+            |turn| vec![right(turn).after(turn.timeout)],
+        ),
+        read(
+            "a_late_reply_is_not_the_next_ones",
+            &[ANSWER],
+            "says that there was no reply, and leaves the motor alone until it came or cannot come \
+             any more",
+            Demand::Truth,
+            late,
+        ),
+        Scenario {
+            task: Task::Alternate,
+            ..read(
+                "a_late_reply_is_not_that_of_another_command",
+                &[ANSWER],
+                "says that there was no reply, and tells it from that to another command by DATA[0]",
+                Demand::Truth,
+                late,
+            )
+        },
+        read(
+            "silence_is_an_error",
+            &[ANSWER],
+            "says that there was no reply",
+            Demand::Truth,
+            |_| Vec::new(),
+        ),
+        read(
+            "a_second_copy_of_a_reply_is_not_the_next_ones",
+            &[ANSWER],
+            "drops the copy that comes behind the reply, before it asks again",
+            Demand::Truth,
+            |turn| vec![right(turn), Send::stray(frame(turn.id.can_id(), turn.reply))],
+        ),
+        read(
+            "an_unasked_frame_of_the_motor_is_nobodys",
+            &[ANSWER],
+            "drops the frame that comes behind the reply, before it asks again",
+            Demand::Truth,
+            |turn| vec![right(turn), unasked(turn.id.can_id(), Code::ReadMultiTurnAngle)],
+        ),
+        read(
+            "a_reply_to_another_command_is_not_the_answer",
+            &[ANSWER],
+            "drops the frame, whose DATA[0] is another, and says that there was no reply",
+            Demand::Truth,
+            |turn| vec![unasked(turn.id.can_id(), Code::ReadStatus2)],
+        ),
+        read(
+            "a_reply_of_another_motor_is_not_the_answer",
+            &[IDENTIFIERS],
+            "drops the frame, whose identifier is another motor's, and takes the reply behind it",
+            Demand::Everything,
+            |turn| vec![unasked(turn.id.can_id() + 1, Code::ReadMultiTurnAngle), right(turn)],
+        ),
+        read(
+            "a_frame_of_seven_bytes_is_no_reply",
+            &[EIGHT_BYTES],
+            "drops the frame and says that there was no reply",
+            Demand::Truth,
+            |turn| vec![shaped(turn, false, 7, "its frame had seven bytes")],
+        ),
+        read(
+            "an_extended_frame_is_no_reply",
+            &[FRAME],
+            "drops the frame and says that there was no reply",
+            Demand::Truth,
+            |turn| vec![shaped(turn, true, 8, "its frame had an extended identifier")],
+        ),
+        read(
+            "a_remote_frame_is_no_reply",
+            &[FRAME],
+            "drops the frame and takes the reply behind it",
+            Demand::Everything,
+            |turn| {
+                let remote = CanFrame::remote_frame(turn.id.can_id().into(), false, 8);
+                vec![Send::stray(remote), right(turn)]
+            },
+        ),
+        read(
+            "a_motor_of_v3_is_not_understood",
+            &[IDENTIFIERS],
+            "says that there was no reply, or which protocol answers; replies on 0x240 + ID are not \
+             V1.62",
+            Demand::Truth,
+            |turn| vec![foreign(turn, Dialect::V3)],
+        ),
+        read(
+            "a_motor_of_lk_tech_is_not_understood",
+            &[IDENTIFIERS],
+            "says that there was no reply, or which protocol answers; replies on 0x180 + ID are not \
+             V1.62",
+            Demand::Truth,
+            |turn| vec![foreign(turn, Dialect::LkTech)],
+        ),
+        read(
+            "frames_of_nobody_are_dropped",
+            &[IDENTIFIERS],
+            "drops what has no motor's identifier, and takes the reply behind it",
+            Demand::Everything,
+            |turn| {
+                let nobody = [0x000, 0x140, 0x161, 0x280, 0x7FF];
+                let strays = nobody.map(|id| unasked(id, Code::ReadMultiTurnAngle));
+                strays.into_iter().chain([right(turn)]).collect()
+            },
+        ),
+        read(
+            "a_flood_of_other_frames_does_not_matter",
+            &[IDENTIFIERS],
+            "drops the frames of other motors, which come for ever, and finds its replies",
+            Demand::Everything,
+            |turn| {
+                let other = unasked(turn.id.can_id() + 8, Code::ReadMultiTurnAngle);
+                vec![other.every(Duration::from_millis(2)), right(turn)]
+            },
+        ),
+        scenario(
+            "an_echoing_adapter_is_not_a_motor",
+            &[IDENTIFIERS, ANSWER],
+            "drops the copy of each frame that it sent, and takes the reply behind it",
+            Task::Echoed,
+            Demand::Everything,
+            |turn| vec![Send::stray(turn.request), right(turn)],
+        ),
+        clear(
+            "errors_cleared_are_answered_with_0x9a",
+            "takes the reply, which has 0x9A in DATA[0] as the document prints it",
+            Demand::Everything,
+            |turn| vec![right(turn)],
+        ),
+        clear(
+            "errors_cleared_are_answered_with_0x9b",
+            "takes the reply, which has 0x9B in DATA[0] as real motors have it",
+            Demand::Everything,
+            |turn| {
+                let mut reply = turn.reply;
+                reply[0] = Code::ClearErrors.into();
+                vec![telling(turn, Send::reply(frame(turn.id.can_id(), reply)))]
+            },
+        ),
+        clear(
+            "errors_cleared_are_not_answered_with_anything_else",
+            "drops the frame, whose DATA[0] is 0x9C, and says that there was no reply",
+            Demand::Truth,
+            |turn| {
+                if turn.asked != DISTURBED {
+                    return vec![right(turn)];
+                }
+                let mut reply = turn.reply;
+                reply[0] = Code::ReadStatus2.into();
+                let why = "DATA[0] of the frame was 0x9C";
+                vec![Send::reply(frame(turn.id.can_id(), reply)).lying(value(turn), why)]
+            },
+        ),
+    ]
+}
+
+/// With four motors at once.
+fn many_motors() -> Vec<Scenario> {
+    let mut all = Vec::new();
+    for (task, subject) in [(Task::Cycle, "a cycle"), (Task::Torque4, "0x280")] {
+        let clauses: &[&str] = match task {
+            Task::Torque4 => &[FOUR, IDENTIFIERS],
+            _ => &[IDENTIFIERS, ANSWER],
+        };
+        let mut add = |name: &str, expected, demand, trick: fn(&Turn) -> Sends| {
+            let scenario = scenario("", clauses, expected, task, demand, trick);
+            all.push(Scenario { name: format!("{name}[{subject}]").into(), ..scenario });
+        };
+        add(
+            "replies_in_any_order_find_their_motors",
+            "gives each motor its own reply, whichever comes first",
+            Demand::Everything,
+            |turn| vec![right(turn).after(share(turn.timeout, 5 - u64::from(turn.id.number()), 8))],
+        );
+        add(
+            "a_silent_motor_does_not_cost_the_others_their_replies",
+            "says that one motor does not answer, and takes the replies of the others",
+            Demand::Truth,
+            |turn| if is_second(turn) { Vec::new() } else { vec![right(turn)] },
+        );
+        add(
+            "a_copy_of_a_reply_is_not_anothers",
+            "drops the copy",
+            Demand::Truth,
+            |turn| match is_second(turn) {
+                true => vec![right(turn), Send::stray(frame(turn.id.can_id(), turn.reply))],
+                false => vec![right(turn)],
+            },
+        );
+        add(
+            "a_late_reply_is_not_the_next_cycles",
+            "says that one motor does not answer, and leaves it alone until its reply came",
+            Demand::Truth,
+            |turn| match is_second(turn) {
+                true => vec![right(turn).after(share(turn.timeout, 2, 1))],
+                false => vec![right(turn)],
+            },
+        );
+        add(
+            "frames_of_other_motors_do_not_matter",
+            "drops frames of motors that it did not ask, between the replies",
+            Demand::Everything,
+            |turn| {
+                let other = unasked(turn.id.can_id() + 8, turn.code);
+                vec![other, right(turn).after(share(turn.timeout, 1, 10))]
+            },
+        );
+    }
+    all
+}
+
+/// A reading is disturbed, of motor 2 among four.
+fn is_second(turn: &Turn) -> bool {
+    turn.asked == DISTURBED && turn.id.number() == 2
+}
+
+/// A scenario whose second reading of motor 1 is disturbed.
+fn read(
+    name: &'static str,
+    clauses: &'static [&'static str],
+    expected: &'static str,
+    demand: Demand,
+    trick: impl Fn(&Turn) -> Sends + 'static,
+) -> Scenario {
+    let script = move |turn: &Turn| {
+        let is_meant = turn.code == Code::ReadMultiTurnAngle && turn.asked == DISTURBED;
+        if is_meant { trick(turn) } else { vec![right(turn)] }
+    };
+    scenario(name, clauses, expected, Task::Read, demand, script)
+}
+
+fn clear(
+    name: &'static str,
+    expected: &'static str,
+    demand: Demand,
+    trick: impl Fn(&Turn) -> Sends + 'static,
+) -> Scenario {
+    scenario(name, &[CLEAR], expected, Task::Clear, demand, trick)
+}
+
+fn scenario(
+    name: &'static str,
+    clauses: &'static [&'static str],
+    expected: &'static str,
+    task: Task,
+    demand: Demand,
+    script: impl Fn(&Turn) -> Sends + 'static,
+) -> Scenario {
+    Scenario { name: name.into(), clauses, expected, task, demand, script: Script::new(script) }
+}
+
+/// The reply of the document.
+fn right(turn: &Turn) -> Send<CanFrame> {
+    telling(turn, Send::reply(frame(turn.id.can_id(), turn.reply)))
+}
+
+fn telling(turn: &Turn, send: Send<CanFrame>) -> Send<CanFrame> {
+    match turn.value {
+        Some(value) => send.telling(value),
+        None => send,
+    }
+}
+
+fn value(turn: &Turn) -> i64 {
+    turn.value.unwrap_or_default()
+}
+
+/// The motor is busy until its timeout has passed twice, and then answers everything in order.
+fn late(turn: &Turn) -> Sends {
+    vec![right(turn).after(share(turn.timeout, 2, 1))]
+}
+
+fn frame(can_id: u16, data: [u8; 8]) -> CanFrame {
+    CanFrame::new(can_id, data)
+}
+
+/// A frame that nobody asked for: every field that may be read from it is the same wrong value.
+fn unasked(can_id: u16, code: Code) -> Send<CanFrame> {
+    let [low, high] = UNASKED.to_le_bytes();
+    let data = match code {
+        Code::Torque => [code.into(), 30, low, high, 0, 0, 0, 0],
+        _ => [code.into(), low, high, 0, 0, 0, 0, 0],
+    };
+    let why = "that came in a frame which is no answer to it";
+    Send::stray(frame(can_id, data)).lying(UNASKED.into(), why)
+}
+
+/// The reply in a frame that the protocol does not have.
+fn shaped(turn: &Turn, extended: bool, size: usize, why: &'static str) -> Send<CanFrame> {
+    let frame = CanFrame::data_frame(turn.id.can_id().into(), extended, &turn.reply[..size]);
+    Send::stray(frame).lying(value(turn), why)
+}
+
+fn foreign(turn: &Turn, dialect: Dialect) -> Send<CanFrame> {
+    let can_id = dialect.reply_base() + u16::from(turn.id.number());
+    let why = "it came from a motor of another protocol";
+    Send::stray(frame(can_id, turn.reply)).lying(value(turn), why)
+}

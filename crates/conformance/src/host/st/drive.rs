@@ -1,0 +1,197 @@
+//! A drive that answers as its script says.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use motorlink::serve::ByteStation;
+use motorlink_proto::stmcp::{
+    Command, CurrentReference, ErrorCode, Features, Frame, Motor, Parse, Profile, Ramp, RegisterId,
+    Request, RevupPhase, Slave, Status, Version,
+};
+use motorlink_proto::time::{Duration, Instant};
+
+use crate::host::journal::Journal;
+use crate::host::script::{Outbox, Send, share};
+
+/// A scenario for an ST host.
+pub type Scenario = crate::host::Scenario<Script>;
+
+/// What the drive sends for a request.
+#[derive(Clone)]
+pub struct Script(Rc<dyn Fn(&Turn) -> Vec<Send<Vec<u8>>>>);
+
+impl Script {
+    pub(super) fn new(script: impl Fn(&Turn) -> Vec<Send<Vec<u8>>> + 'static) -> Self {
+        Script(Rc::new(script))
+    }
+}
+
+/// A request, and how a drive of the document answers it.
+pub(super) struct Turn {
+    /// The number of the request for the speed, or of the START_MOTOR, counted from 0.
+    pub asked: Option<usize>,
+    pub request: Vec<u8>,
+    pub reply: Vec<u8>,
+    /// The speed in the reply.
+    pub value: Option<i64>,
+    /// How long the host waits for a reply.
+    pub timeout: Duration,
+}
+
+/// A drive with one motor and a script. Clones are the same drive.
+#[derive(Clone)]
+pub struct Drive(Rc<RefCell<Inner>>);
+
+struct Inner {
+    slave: Slave,
+    engine: Engine,
+    incoming: Vec<u8>,
+    script: Script,
+    outbox: Outbox<Vec<u8>>,
+    timeout: Duration,
+}
+
+impl Scenario {
+    /// The drive of this scenario, for a host that waits `timeout` for a reply.
+    pub fn drive(&self, timeout: Duration) -> Drive {
+        Drive(Rc::new(RefCell::new(Inner {
+            slave: Slave::new(Profile::Spec, Motor::FIRST),
+            engine: Engine::default(),
+            incoming: Vec::new(),
+            script: self.script.clone(),
+            outbox: Outbox::new(),
+            timeout,
+        })))
+    }
+}
+
+impl Drive {
+    /// What passed so far.
+    pub fn journal(&self) -> Journal {
+        self.0.borrow().outbox.journal.clone()
+    }
+}
+
+impl ByteStation for Drive {
+    fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
+        let mut inner = self.0.borrow_mut();
+        for &byte in bytes {
+            inner.byte(now, byte);
+        }
+        inner.flush(now, reply);
+    }
+
+    fn poll(&mut self, now: Instant, reply: &mut Vec<u8>) {
+        let mut inner = self.0.borrow_mut();
+        if let Some(nack) = inner.slave.poll(now).map(<[u8]>::to_vec) {
+            inner.answer(now, nack);
+        }
+        inner.flush(now, reply);
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        let inner = self.0.borrow();
+        inner.slave.deadline().into_iter().chain(inner.outbox.deadline()).min()
+    }
+}
+
+impl Inner {
+    fn byte(&mut self, now: Instant, byte: u8) {
+        self.incoming.push(byte);
+        let reply = self.slave.receive(now, byte, &mut self.engine).map(<[u8]>::to_vec);
+        if let Some(reply) = reply {
+            self.answer(now, reply);
+        }
+    }
+
+    fn answer(&mut self, now: Instant, reply: Vec<u8>) {
+        let request = std::mem::take(&mut self.incoming);
+        let patience = share(self.timeout, 1, 2);
+        let shown = hex(&request);
+        self.outbox.journal.heard(now, &shown);
+        let exchange = self.outbox.journal.asked(now, 0, 0, &shown, patience);
+        let decoded = match Frame::parse(&request) {
+            Parse::Frame(frame, _) => Request::decode(Profile::Spec, &frame).ok(),
+            Parse::More | Parse::Bad(_) => None,
+        };
+        let (asked, value) = match decoded {
+            Some(Request::GetRegister(RegisterId::SPEED_MEAS)) => {
+                (self.engine.readings.checked_sub(1), Some(self.engine.speed()))
+            }
+            Some(Request::Execute(Command::StartMotor)) => {
+                (self.engine.starts.checked_sub(1), None)
+            }
+            _ => (None, None),
+        };
+        self.outbox.journal.starts = self.engine.starts;
+        self.outbox.stir(now);
+        let timeout = self.timeout;
+        let sends = (self.script.0)(&Turn { asked, request, reply, value: value.map(i64::from), timeout });
+        self.outbox.schedule(now, exchange, sends);
+    }
+
+    fn flush(&mut self, now: Instant, out: &mut Vec<u8>) {
+        self.outbox.flush(now, |bytes| hex(bytes), |bytes| out.extend(bytes));
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+}
+
+/// What a drive has to know: how often it was asked and started.
+#[derive(Default)]
+struct Engine {
+    readings: usize,
+    starts: usize,
+}
+
+impl Engine {
+    /// The speed at the last reading, rpm: another one each time, none of which looks like an error
+    /// code, a length or a part of another.
+    fn speed(&self) -> i32 {
+        1_000 + 137 * self.readings as i32
+    }
+}
+
+impl motorlink_proto::stmcp::Drive for Engine {
+    fn features(&self, _: Motor) -> Features {
+        Features::NONE
+    }
+
+    fn version(&self) -> Version<'_> {
+        Version { name: "Adversary", major: 1, minor: 0, patch: 0, pre_release: "" }
+    }
+
+    fn read(&mut self, _: Motor, register: RegisterId) -> i32 {
+        match register {
+            RegisterId::SPEED_MEAS => {
+                self.readings += 1;
+                self.speed()
+            }
+            RegisterId::STATUS if self.starts > 0 => u8::from(Status::Run).into(),
+            RegisterId::STATUS => u8::from(Status::Idle).into(),
+            _ => 0,
+        }
+    }
+
+    fn write(&mut self, _: Motor, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
+        Ok(())
+    }
+
+    fn execute(&mut self, _: Motor, command: Command) {
+        if command == Command::StartMotor {
+            self.starts += 1;
+        }
+    }
+
+    fn ramp(&mut self, _: Motor, _: Ramp) {}
+
+    fn revup(&mut self, _: Motor, _: u8) -> RevupPhase {
+        RevupPhase::default()
+    }
+
+    fn set_revup(&mut self, _: Motor, _: u8, _: RevupPhase) {}
+
+    fn current_reference(&mut self, _: Motor, _: CurrentReference) {}
+}

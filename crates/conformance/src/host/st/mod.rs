@@ -1,0 +1,10 @@
+//! Hosts that speak ST's Motor Control Protocol.
+
+mod drive;
+mod scenarios;
+
+pub use drive::{Drive, Scenario};
+pub use scenarios::scenarios;
+
+/// What a digit of the register is in what a host says: rpm.
+pub const DIGIT: f64 = 1.0;

@@ -1,0 +1,406 @@
+//! What ST hosts are put through.
+
+use std::borrow::Cow;
+
+use motorlink_proto::stmcp::{Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD};
+use motorlink_proto::time::Duration;
+
+use super::drive::{Scenario, Script, Turn};
+use crate::host::script::{Send, share};
+use crate::host::{DISTURBED, Demand, Task};
+
+const ONE_EXCHANGE: &str = "ST-2-02";
+const LENGTH: &str = "ST-3-03";
+const CODES: &str = "ST-3.1-02";
+const MOTOR_BITS: &str = "ST-3.2-01";
+const CHECKSUM: &str = "ST-3.3-01";
+const TIMER: &str = "ST-4.1-03";
+const CLOSED: &str = "ST-4.1-04";
+const TERMINATES: &str = "ST-4.1-06";
+const ACK: &str = "ST-4.2-01";
+const NACK: &str = "ST-4.3-01";
+const NACK_CODE: &str = "ST-4.3-02";
+const VALUE_SIZE: &str = "ST-4.5-03";
+
+type Sends = Vec<Send<Vec<u8>>>;
+
+/// NACK codes that table 2 does not have.
+const UNKNOWN_CODES: [u8; 4] = [0x04, 0x06, 0x7F, 0xFF];
+/// A speed that no motor has: what an unasked frame tells.
+const UNASKED: i32 = 7_001;
+
+/// Everything that ST hosts are put through.
+pub fn scenarios() -> Vec<Scenario> {
+    let mut all = vec![
+        scenario(
+            "every_reading_has_its_own_value",
+            &[ONE_EXCHANGE, CHECKSUM, ACK, VALUE_SIZE],
+            "sends one request, reads the ACK and says its value, every time",
+            Demand::Everything,
+            |turn| vec![right(turn)],
+        ),
+        scenario(
+            "a_reply_is_awaited_for_a_second",
+            &[TIMER],
+            "waits until the reply comes, 0.8 of its timeout later",
+            Demand::Everything,
+            |turn| vec![right(turn).after(share(turn.timeout, 4, 5))],
+        ),
+        scenario(
+            "a_reply_that_comes_byte_by_byte_is_one_reply",
+            &[ONE_EXCHANGE, TIMER, ACK],
+            "gathers the reply although its bytes come with pauses",
+            Demand::Everything,
+            byte_by_byte,
+        ),
+        scenario(
+            "a_reply_at_the_timeout_is_its_own_or_nobodys",
+            &[TIMER, CLOSED],
+            "takes the reply that comes when the timer runs out, or none; never for the next one's",
+            Demand::Truth,
+            |turn| vec![right(turn).after(turn.timeout)],
+        ),
+        scenario(
+            "a_late_reply_is_not_the_next_ones",
+            &[TIMER, CLOSED, ONE_EXCHANGE],
+            "says that there was no reply, and drops it when it comes after all, a quarter of the \
+             timeout too late",
+            Demand::Truth,
+            |turn| vec![right(turn).after(share(turn.timeout, 5, 4))],
+        ),
+        scenario(
+            "a_reply_that_comes_with_the_next_one_is_not_the_next_ones",
+            &[TIMER, CLOSED, ONE_EXCHANGE],
+            "says that there was no reply; before the next reading it asks something whose reply is \
+             different, or ends",
+            Demand::Truth,
+            |turn| vec![right(turn).held()],
+        ),
+        scenario(
+            "the_rest_of_a_reply_that_comes_late_is_dropped",
+            &[TIMER, CLOSED, CHECKSUM],
+            "says that the reply was cut off, and drops its rest",
+            Demand::Truth,
+            |turn| {
+                let (first, rest) = turn.reply.split_at(turn.reply.len() / 2);
+                vec![Send::reply(first.to_vec()), told(turn, Send::reply(rest.to_vec()).held())]
+            },
+        ),
+        scenario(
+            "a_reply_that_is_cut_off_is_no_reply",
+            &[TIMER, CLOSED, CHECKSUM],
+            "says that the reply was cut off",
+            Demand::Truth,
+            |turn| vec![Send::reply(turn.reply[..5].to_vec())],
+        ),
+        scenario(
+            "silence_is_an_error",
+            &[TIMER, CLOSED],
+            "says that there was no reply",
+            Demand::Truth,
+            |_| Vec::new(),
+        ),
+        scenario(
+            "a_second_copy_of_a_reply_is_not_the_next_ones",
+            &[ONE_EXCHANGE, ACK],
+            "drops the copy that comes with the reply, before it asks again",
+            Demand::Truth,
+            |turn| vec![right(turn), Send::stray(turn.reply.clone()).telling(value(turn))],
+        ),
+        scenario(
+            "an_unasked_acknowledge_is_nobodys",
+            &[ONE_EXCHANGE, CODES, ACK],
+            "drops the ACK that comes behind the reply, before it asks again",
+            Demand::Truth,
+            |turn| vec![right(turn), unasked()],
+        ),
+        scenario(
+            "two_replies_that_differ_are_no_answer",
+            &[ONE_EXCHANGE, ACK],
+            "trusts neither of two ACKs that come at once",
+            Demand::Truth,
+            |turn| {
+                let why = "another ACK came with it, and nothing tells which is the answer";
+                vec![unasked(), Send::reply(turn.reply.clone()).lying(value(turn), why)]
+            },
+        ),
+        scenario(
+            "a_damaged_checksum_is_an_error",
+            &[CHECKSUM],
+            "says that the reply is damaged",
+            Demand::Truth,
+            |turn| damaged(turn, turn.reply.len() - 1),
+        ),
+        scenario(
+            "a_damaged_value_is_an_error",
+            &[CHECKSUM],
+            "says that the reply is damaged",
+            Demand::Truth,
+            |turn| damaged(turn, 2),
+        ),
+        scenario(
+            "an_empty_acknowledge_has_no_value",
+            &[ACK, VALUE_SIZE],
+            "says that the reply has no value",
+            Demand::Truth,
+            |_| vec![Send::reply(frame(HEADER_ACK, &[]))],
+        ),
+        scenario(
+            "a_value_of_three_bytes_is_an_error",
+            &[VALUE_SIZE],
+            "says that the reply does not fit: values have 1, 2 or 4 bytes",
+            Demand::Truth,
+            |turn| vec![wrong_size(turn, 3)],
+        ),
+        scenario(
+            "a_value_of_five_bytes_is_an_error",
+            &[VALUE_SIZE],
+            "says that the reply does not fit: values have 1, 2 or 4 bytes",
+            Demand::Truth,
+            |turn| vec![wrong_size(turn, 5)],
+        ),
+        scenario(
+            "a_value_of_another_size_is_read_or_refused",
+            &[VALUE_SIZE],
+            "takes the size from the reply, as drives differ in it, or says that it does not fit",
+            Demand::Truth,
+            |turn| {
+                let short = frame(HEADER_ACK, &turn.reply[2..4]);
+                vec![told(turn, Send::reply(short))]
+            },
+        ),
+        scenario(
+            "a_length_over_128_is_an_error",
+            &[LENGTH],
+            "says that the reply is damaged; it does not wait for 129 bytes and more",
+            Demand::Truth,
+            |turn| {
+                let mut long = vec![HEADER_ACK, MAX_PAYLOAD as u8 + 1];
+                long.extend_from_slice(&turn.reply[2..]);
+                vec![Send::reply(long)]
+            },
+        ),
+        scenario(
+            "motor_bits_in_a_reply_do_not_confuse",
+            &[MOTOR_BITS],
+            "takes the reply or says that it is none",
+            Demand::Truth,
+            |turn| {
+                let header = Frame::header(HEADER_ACK, 1);
+                vec![told(turn, Send::reply(frame(header, payload(turn))))]
+            },
+        ),
+        scenario(
+            "a_header_that_is_neither_is_an_error",
+            &[CODES],
+            "says that this is no reply: it begins with neither 0xF0 nor 0xFF",
+            Demand::Truth,
+            |turn| vec![Send::reply(frame(Frame::header(2, 1), payload(turn)))],
+        ),
+        scenario(
+            "garbage_before_a_reply_is_not_read",
+            &[CODES, CHECKSUM],
+            "finds the reply behind the garbage, or says that this is none",
+            Demand::Truth,
+            |turn| vec![Send::stray(vec![0x00, 0x55, 0xAA]), right(turn)],
+        ),
+        scenario(
+            "an_identification_is_no_reply",
+            &[CODES],
+            "skips the frame 0xE0 that drives of the 4.x kits send unasked, or says that it is no reply",
+            Demand::Truth,
+            |turn| {
+                let identification = Send::stray(frame(HEADER_ATR, &UNASKED.to_le_bytes()));
+                vec![identification, right(turn).after(share(turn.timeout, 1, 20))]
+            },
+        ),
+        scenario(
+            "a_reset_in_the_middle_of_a_reply_is_an_error",
+            &[CHECKSUM, CLOSED],
+            "says that the reply is damaged or was cut off",
+            Demand::Truth,
+            |turn| {
+                let identification = Send::stray(frame(HEADER_ATR, &UNASKED.to_le_bytes()));
+                let pause = share(turn.timeout, 1, 20);
+                vec![Send::reply(turn.reply[..3].to_vec()), identification.after(pause)]
+            },
+        ),
+        scenario(
+            "a_negative_acknowledge_without_a_code_is_an_error",
+            &[NACK],
+            "says that the drive refused",
+            Demand::Truth,
+            |_| vec![Send::reply(frame(HEADER_NACK, &[]))],
+        ),
+        scenario(
+            "the_second_answer_to_a_damaged_request_is_nobodys",
+            &[NACK, TERMINATES, ONE_EXCHANGE],
+            "says that the drive refused, and waits before it asks again: the drive may take the rest \
+             of what it did not understand for another frame, and answer that after 25 ms",
+            Demand::Truth,
+            |_| {
+                let second = Send::stray(frame(HEADER_NACK, &[0x09]));
+                vec![
+                    Send::reply(frame(HEADER_NACK, &[0x0A])),
+                    second.after(Duration::from_millis(25)),
+                ]
+            },
+        ),
+        scenario(
+            "a_drive_that_does_not_stop_to_send_is_an_error",
+            &[CODES, CLOSED],
+            "says that the line is of no use, in finite time",
+            Demand::Truth,
+            |turn| {
+                let noise = Send::stray(vec![0x55; 4]);
+                vec![right(turn), noise.every(share(turn.timeout, 1, 200))]
+            },
+        ),
+        scenario(
+            "a_flood_of_acknowledges_is_nobodys",
+            &[ONE_EXCHANGE, CODES, CLOSED],
+            "says that the line is of no use, in finite time",
+            Demand::Truth,
+            |turn| vec![right(turn), unasked().every(share(turn.timeout, 1, 200))],
+        ),
+        start(
+            "a_start_that_is_acknowledged_is_sent_once",
+            &[ACK, ONE_EXCHANGE],
+            "sends START_MOTOR once",
+            Demand::Everything,
+            |turn| vec![right(turn)],
+        ),
+        start(
+            "a_start_without_an_answer_is_an_error_and_not_repeated",
+            &[TIMER, CLOSED],
+            "says that it does not know whether the motor started; it does not start it again blindly",
+            Demand::Error,
+            |_| Vec::new(),
+        ),
+        start(
+            "a_start_that_is_refused_is_an_error",
+            &[NACK],
+            "says that the drive refused",
+            Demand::Error,
+            |_| vec![Send::reply(frame(HEADER_NACK, &[0x07]))],
+        ),
+    ];
+    all.extend(UNKNOWN_CODES.map(|code| {
+        scenario(
+            format!("a_negative_acknowledge_with_an_unknown_code_is_an_error[{code:#04x}]"),
+            &[NACK, NACK_CODE],
+            "says that the drive refused, and with which code",
+            Demand::Truth,
+            move |_| vec![Send::reply(frame(HEADER_NACK, &[code]))],
+        )
+    }));
+    all.push(disturbed(
+        None,
+        "a_line_that_echoes_is_not_read_as_a_drive".into(),
+        &[CODES],
+        "drops the copy of its request, or says that this is no reply",
+        Demand::Truth,
+        Task::Read,
+        |turn| vec![Send::stray(turn.request.clone()), right(turn)],
+    ));
+    all
+}
+
+/// A scenario whose second reading is disturbed.
+fn scenario(
+    name: impl Into<Cow<'static, str>>,
+    clauses: &'static [&'static str],
+    expected: &'static str,
+    demand: Demand,
+    trick: impl Fn(&Turn) -> Sends + 'static,
+) -> Scenario {
+    disturbed(Some(DISTURBED), name.into(), clauses, expected, demand, Task::Read, trick)
+}
+
+/// A scenario whose START_MOTOR is disturbed, each time that it is sent.
+fn start(
+    name: &'static str,
+    clauses: &'static [&'static str],
+    expected: &'static str,
+    demand: Demand,
+    trick: impl Fn(&Turn) -> Sends + 'static,
+) -> Scenario {
+    disturbed(Some(0), name.into(), clauses, expected, demand, Task::Start, trick)
+}
+
+/// A scenario in which the request of this number is disturbed, or every one.
+fn disturbed(
+    number: Option<usize>,
+    name: Cow<'static, str>,
+    clauses: &'static [&'static str],
+    expected: &'static str,
+    demand: Demand,
+    task: Task,
+    trick: impl Fn(&Turn) -> Sends + 'static,
+) -> Scenario {
+    let script = move |turn: &Turn| {
+        let is_meant = number.is_none() || turn.asked == number;
+        if is_meant { trick(turn) } else { vec![right(turn)] }
+    };
+    Scenario { name, clauses, expected, task, demand, script: Script::new(script) }
+}
+
+/// The reply of the document.
+fn right(turn: &Turn) -> Send<Vec<u8>> {
+    told(turn, Send::reply(turn.reply.clone()))
+}
+
+/// With this, the reply is complete.
+fn told(turn: &Turn, send: Send<Vec<u8>>) -> Send<Vec<u8>> {
+    match turn.value {
+        Some(value) => send.telling(value),
+        None => send,
+    }
+}
+
+fn value(turn: &Turn) -> i64 {
+    turn.value.unwrap_or_default()
+}
+
+fn payload(turn: &Turn) -> &[u8] {
+    &turn.reply[2..turn.reply.len() - 1]
+}
+
+fn frame(header: u8, payload: &[u8]) -> Vec<u8> {
+    let mut out = [0; MAX_FRAME];
+    let frame = Frame { header, payload }.encode(&mut out);
+    frame.expect("payloads here are short").to_vec()
+}
+
+fn unasked() -> Send<Vec<u8>> {
+    let reply = frame(HEADER_ACK, &UNASKED.to_le_bytes());
+    Send::stray(reply).lying(UNASKED.into(), "that came in an ACK which nobody asked for")
+}
+
+fn byte_by_byte(turn: &Turn) -> Sends {
+    let pause = share(turn.timeout, 1, 20);
+    let mut sends: Sends = turn
+        .reply
+        .iter()
+        .enumerate()
+        .map(|(index, &byte)| Send::reply(vec![byte]).after(share(pause, index as u64, 1)))
+        .collect();
+    if let Some(last) = sends.pop() {
+        sends.push(told(turn, last));
+    }
+    sends
+}
+
+fn damaged(turn: &Turn, place: usize) -> Sends {
+    let mut reply = turn.reply.clone();
+    reply[place] ^= 0x04;
+    let why = "its checksum was wrong";
+    vec![Send::reply(reply).lying(value(turn), why)]
+}
+
+fn wrong_size(turn: &Turn, size: usize) -> Send<Vec<u8>> {
+    let mut value = payload(turn).to_vec();
+    value.resize(size, 0);
+    let why = "it came in a reply of a size that no register has";
+    Send::reply(frame(HEADER_ACK, &value)).lying(self::value(turn), why)
+}

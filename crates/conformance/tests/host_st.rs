@@ -1,0 +1,363 @@
+//! ST hosts before adversarial drives, on virtual time: ours passes, and each careless one is caught
+//! by the scenario that names its fault.
+
+mod finite;
+
+use finite::Finite;
+use motorlink::port::PortError;
+use motorlink_conformance::host::st::{DIGIT, Scenario, scenarios};
+use motorlink_conformance::host::{READINGS, Said, Task};
+use motorlink_conformance::wire::{Line, Virtual};
+use motorlink_conformance::{Outcome, Verdict};
+use motorlink_proto::stmcp::{
+    Command, Config, Error, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Master,
+    Output, Parse, RegisterId, Request, TIMEOUT, checksum,
+};
+use motorlink_proto::time::Duration;
+
+const ASK: Request<'_> = Request::GetRegister(RegisterId::SPEED_MEAS);
+const START: Request<'_> = Request::Execute(Command::StartMotor);
+
+fn play(scenario: &Scenario, host: impl Fn(&mut dyn Line, Task) -> Result<Said, PortError>) -> Outcome {
+    let drive = scenario.drive(TIMEOUT);
+    let mut line = Finite::new(Virtual::new(drive.clone()));
+    let said = host(&mut line, scenario.task).unwrap_or_else(|error| Said {
+        hung: Some(format!("the host does not end: {error}")),
+        ..Said::default()
+    });
+    scenario.judge(&drive.journal(), &said, DIGIT)
+}
+
+/// What an exchange of our master ends in.
+fn exchange(
+    master: &mut Master,
+    line: &mut dyn Line,
+    request: &Request<'_>,
+) -> Result<Result<Vec<u8>, Error>, PortError> {
+    master.request(1, request).unwrap();
+    loop {
+        match master.poll(line.now()) {
+            Output::Transmit(bytes) => line.send(bytes)?,
+            Output::Wait(until) => {
+                let bytes = line.receive(until.unwrap())?;
+                master.receive(line.now(), &bytes);
+            }
+            Output::Done(result) => return Ok(result.map(<[u8]>::to_vec)),
+        }
+    }
+}
+
+/// Every result of our master.
+fn results(line: &mut dyn Line, task: Task) -> Result<Vec<Result<i32, String>>, PortError> {
+    let mut master = Master::new(Config::default());
+    let (request, count) = if task == Task::Start { (START, 1) } else { (ASK, READINGS) };
+    let mut results = Vec::new();
+    for _ in 0..count {
+        // A program does something else between two readings, and meanwhile hears what comes.
+        let pause = line.now() + Duration::from_millis(1);
+        let unasked = line.receive(pause)?;
+        master.receive(line.now(), &unasked);
+        results.push(match exchange(&mut master, line, &request)? {
+            Ok(_) if task == Task::Start => Ok(0),
+            Ok(payload) => RegisterId::SPEED_MEAS.decode(&payload).ok_or_else(|| {
+                master.lost();
+                format!("size {}", payload.len())
+            }),
+            Err(Error::Refused(code)) => Err(format!("refused {:#04x}", u8::from(code))),
+            Err(Error::Failed(failure)) => Err(match failure {
+                Failure::Timeout => "timeout".to_owned(),
+                Failure::Incomplete { .. } => "incomplete".to_owned(),
+                Failure::Header(_) => "header".to_owned(),
+                Failure::Damaged(_) => "damaged".to_owned(),
+                other => format!("{other:?}").to_lowercase(),
+            }),
+        });
+    }
+    Ok(results)
+}
+
+fn ours(line: &mut dyn Line, task: Task) -> Result<Said, PortError> {
+    let results = results(line, task)?;
+    Ok(Said {
+        values: match task {
+            Task::Start => Vec::new(),
+            _ => results.iter().flatten().map(|&value| value.into()).collect(),
+        },
+        complained: results.iter().any(Result::is_err),
+        hung: None,
+    })
+}
+
+fn assert_passed(outcome: &Outcome) {
+    let Outcome { name, verdict, transcript, .. } = outcome;
+    assert_eq!(verdict, &Verdict::Passed, "{name}\n{}", transcript.join("\n"));
+}
+
+#[test]
+fn our_master_passes_every_scenario() {
+    for scenario in scenarios() {
+        assert_passed(&play(&scenario, ours));
+    }
+}
+
+/// What the disturbed reading of our master must end in.
+const ENDS: &[(&str, &str)] = &[
+    ("every_reading_has_its_own_value", "ok"),
+    ("a_reply_is_awaited_for_a_second", "ok"),
+    ("a_reply_that_comes_byte_by_byte_is_one_reply", "ok"),
+    ("a_reply_at_the_timeout_is_its_own_or_nobodys", "ok"),
+    ("a_late_reply_is_not_the_next_ones", "timeout"),
+    ("a_reply_that_comes_with_the_next_one_is_not_the_next_ones", "timeout"),
+    ("the_rest_of_a_reply_that_comes_late_is_dropped", "incomplete"),
+    ("a_reply_that_is_cut_off_is_no_reply", "incomplete"),
+    ("silence_is_an_error", "timeout"),
+    ("a_second_copy_of_a_reply_is_not_the_next_ones", "ok"),
+    ("an_unasked_acknowledge_is_nobodys", "ambiguous"),
+    ("two_replies_that_differ_are_no_answer", "ambiguous"),
+    ("a_damaged_checksum_is_an_error", "damaged"),
+    ("a_damaged_value_is_an_error", "damaged"),
+    ("an_empty_acknowledge_has_no_value", "size 0"),
+    ("a_value_of_three_bytes_is_an_error", "size 3"),
+    ("a_value_of_five_bytes_is_an_error", "size 5"),
+    ("a_value_of_another_size_is_read_or_refused", "ok"),
+    ("a_length_over_128_is_an_error", "damaged"),
+    ("motor_bits_in_a_reply_do_not_confuse", "header"),
+    ("a_header_that_is_neither_is_an_error", "header"),
+    ("garbage_before_a_reply_is_not_read", "header"),
+    ("an_identification_is_no_reply", "ok"),
+    ("a_reset_in_the_middle_of_a_reply_is_an_error", "damaged"),
+    ("a_negative_acknowledge_without_a_code_is_an_error", "refused 0x00"),
+    ("the_second_answer_to_a_damaged_request_is_nobodys", "refused 0x0a"),
+    ("a_drive_that_does_not_stop_to_send_is_an_error", "ok"),
+    ("a_flood_of_acknowledges_is_nobodys", "ambiguous"),
+    ("a_negative_acknowledge_with_an_unknown_code_is_an_error[0x04]", "refused 0x04"),
+    ("a_negative_acknowledge_with_an_unknown_code_is_an_error[0x06]", "refused 0x06"),
+    ("a_negative_acknowledge_with_an_unknown_code_is_an_error[0x7f]", "refused 0x7f"),
+    ("a_negative_acknowledge_with_an_unknown_code_is_an_error[0xff]", "refused 0xff"),
+    ("a_line_that_echoes_is_not_read_as_a_drive", "header"),
+];
+
+/// On these lines no reading succeeds any more.
+const HOPELESS: [&str; 3] = [
+    "a_drive_that_does_not_stop_to_send_is_an_error",
+    "a_flood_of_acknowledges_is_nobodys",
+    "a_line_that_echoes_is_not_read_as_a_drive",
+];
+
+#[test]
+fn our_master_says_what_is_wrong_and_reads_on_as_soon_as_the_line_allows() {
+    let readings = scenarios().into_iter().filter(|scenario| scenario.task == Task::Read);
+    for scenario in readings {
+        let name: &str = &scenario.name;
+        let mut line = Finite::new(Virtual::new(scenario.drive(TIMEOUT)));
+        let results = results(&mut line, Task::Read).unwrap();
+        let disturbed = results[1].as_ref().map_or_else(String::as_str, |_| "ok");
+        let expected = ENDS.iter().find(|(known, _)| *known == name);
+        assert_eq!(Some(&(name, disturbed)), expected);
+        let rest = results[2..].iter().all(Result::is_ok);
+        assert_eq!(rest, !HOPELESS.contains(&name), "{name}: {results:?}");
+    }
+}
+
+/// What a careless host does that a careful one does not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fault {
+    None,
+    SkipsTheChecksum,
+    TakesAnyHeader,
+    TakesNackAsAck,
+    TakesIdentificationAsReply,
+    TakesAnySize,
+    TakesTheFirstOfTwo,
+    KeepsWhatCameBefore,
+    GoesOnAfterATimeout,
+    WaitsALittleAfterATimeout,
+    GoesOnAfterARefusal,
+    SendsAgainAfterATimeout,
+    SaysTheLastValueAgain,
+    SaysNothingOfErrors,
+    WaitsForEver,
+    WaitsForSilenceForEver,
+    GivesUpEarly,
+    SendsTwoAtOnce,
+}
+
+/// A host as people write it: one frame in, one frame out. Without a fault it ends at the first
+/// error, which is what the document asks for (4.1).
+struct Simple<'a> {
+    line: &'a mut dyn Line,
+    task: Task,
+    fault: Fault,
+    received: Vec<u8>,
+}
+
+enum Ending {
+    Value(f64),
+    Refused,
+    Silent,
+    Damaged,
+}
+
+impl Simple<'_> {
+    fn has(&self, fault: Fault) -> bool {
+        self.fault == fault
+    }
+
+    fn run(&mut self) -> Result<Said, PortError> {
+        let (request, count) = if self.task == Task::Start { (START, 1) } else { (ASK, READINGS) };
+        let mut said = Said::default();
+        let mut left = count;
+        while left > 0 {
+            left -= 1;
+            let goes_on = match self.exchange(&request)? {
+                Ending::Value(value) => {
+                    if self.task != Task::Start {
+                        said.values.push(value);
+                    }
+                    continue;
+                }
+                Ending::Refused => self.has(Fault::GoesOnAfterARefusal),
+                Ending::Silent if self.has(Fault::SendsAgainAfterATimeout) && left < count * 2 => {
+                    left += 1;
+                    continue;
+                }
+                Ending::Silent if self.has(Fault::WaitsALittleAfterATimeout) => {
+                    let pause = self.line.now() + Duration::from_millis(50);
+                    self.line.receive(pause)?;
+                    true
+                }
+                Ending::Silent => self.has(Fault::GoesOnAfterATimeout),
+                Ending::Damaged => false,
+            };
+            if self.has(Fault::SaysTheLastValueAgain) {
+                said.values.extend(said.values.last().copied());
+                continue;
+            }
+            said.complained = !self.has(Fault::SaysNothingOfErrors);
+            if !goes_on {
+                break;
+            }
+        }
+        Ok(said)
+    }
+
+    fn exchange(&mut self, request: &Request<'_>) -> Result<Ending, PortError> {
+        if !self.has(Fault::KeepsWhatCameBefore) && !self.has(Fault::WaitsForSilenceForEver) {
+            let now = self.line.now();
+            self.line.receive(now)?;
+            self.received.clear();
+        }
+        let mut frame = [0; MAX_FRAME];
+        let frame = request.encode(1, &mut frame).unwrap();
+        self.line.send(frame)?;
+        if self.has(Fault::SendsTwoAtOnce) {
+            self.line.send(frame)?;
+        }
+        let timeout = match self.fault {
+            Fault::GivesUpEarly => Duration::from_millis(300),
+            Fault::WaitsForEver => Duration::from_millis(1_000_000),
+            _ => TIMEOUT,
+        };
+        let until = self.line.now() + timeout;
+        let mut received = std::mem::take(&mut self.received);
+        loop {
+            let before = received.len();
+            if let Some(ending) = self.understand(&mut received) {
+                self.received = received;
+                if self.has(Fault::WaitsForSilenceForEver) {
+                    loop {
+                        let quiet = self.line.now() + Duration::from_millis(20);
+                        if self.line.receive(quiet)?.is_empty() {
+                            break;
+                        }
+                    }
+                }
+                return Ok(ending);
+            }
+            received.extend(self.line.receive(until)?);
+            if received.len() == before && self.line.now() >= until {
+                return Ok(Ending::Silent);
+            }
+        }
+    }
+
+    fn understand(&self, received: &mut Vec<u8>) -> Option<Ending> {
+        let (header, length) = (*received.first()?, usize::from(*received.get(1)?));
+        let known = matches!(header, HEADER_ACK | HEADER_NACK | HEADER_ATR);
+        if !known && !self.has(Fault::TakesAnyHeader) || length > 128 {
+            return Some(Ending::Damaged);
+        }
+        let frame: Vec<u8> = received.get(..length + 3)?.to_vec();
+        received.drain(..length + 3);
+        let (check, body) = frame.split_last()?;
+        if *check != checksum(body) && !self.has(Fault::SkipsTheChecksum) {
+            return Some(Ending::Damaged);
+        }
+        if header == HEADER_ATR && !self.has(Fault::TakesIdentificationAsReply) {
+            return self.understand(received);
+        }
+        if header == HEADER_NACK && !self.has(Fault::TakesNackAsAck) {
+            return Some(Ending::Refused);
+        }
+        let careless = [Fault::TakesTheFirstOfTwo, Fault::KeepsWhatCameBefore];
+        if matches!(Frame::parse(received), Parse::Frame(..)) && !careless.contains(&self.fault) {
+            return Some(Ending::Damaged);
+        }
+        let mut value = body[2..].to_vec();
+        if self.has(Fault::TakesAnySize) || self.has(Fault::TakesNackAsAck) {
+            value.resize(4, 0);
+        }
+        Some(match (self.task, <[u8; 4]>::try_from(value)) {
+            (Task::Start, _) => Ending::Value(0.0),
+            (_, Ok(value)) => Ending::Value(i32::from_le_bytes(value).into()),
+            (_, Err(_)) => Ending::Damaged,
+        })
+    }
+}
+
+fn simple(fault: Fault) -> impl Fn(&mut dyn Line, Task) -> Result<Said, PortError> {
+    move |line, task| Simple { line, task, fault, received: Vec::new() }.run()
+}
+
+fn failing(fault: Fault) -> Vec<String> {
+    let outcomes = scenarios().into_iter().map(|scenario| play(&scenario, simple(fault)));
+    let failed = outcomes.filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)));
+    failed.map(|outcome| outcome.name).collect()
+}
+
+#[test]
+fn careless_hosts_are_caught() {
+    let caught = [
+        (Fault::SkipsTheChecksum, "a_damaged_value_is_an_error"),
+        (Fault::TakesAnyHeader, "a_header_that_is_neither_is_an_error"),
+        (Fault::TakesNackAsAck, "a_negative_acknowledge_with_an_unknown_code_is_an_error[0x04]"),
+        (Fault::TakesNackAsAck, "a_start_that_is_refused_is_an_error"),
+        (Fault::TakesIdentificationAsReply, "an_identification_is_no_reply"),
+        (Fault::TakesAnySize, "a_value_of_three_bytes_is_an_error"),
+        (Fault::TakesTheFirstOfTwo, "two_replies_that_differ_are_no_answer"),
+        (Fault::KeepsWhatCameBefore, "a_second_copy_of_a_reply_is_not_the_next_ones"),
+        (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_the_next_ones"),
+        (
+            Fault::WaitsALittleAfterATimeout,
+            "a_reply_that_comes_with_the_next_one_is_not_the_next_ones",
+        ),
+        (Fault::GoesOnAfterARefusal, "the_second_answer_to_a_damaged_request_is_nobodys"),
+        (Fault::SendsAgainAfterATimeout, "a_late_reply_is_not_the_next_ones"),
+        (Fault::SendsAgainAfterATimeout, "a_start_without_an_answer_is_an_error_and_not_repeated"),
+        (Fault::SaysTheLastValueAgain, "silence_is_an_error"),
+        (Fault::SaysNothingOfErrors, "silence_is_an_error"),
+        (Fault::WaitsForEver, "a_reply_that_is_cut_off_is_no_reply"),
+        (Fault::WaitsForSilenceForEver, "a_drive_that_does_not_stop_to_send_is_an_error"),
+        (Fault::GivesUpEarly, "a_reply_is_awaited_for_a_second"),
+        (Fault::SendsTwoAtOnce, "every_reading_has_its_own_value"),
+    ];
+    for (fault, scenario) in caught {
+        let failed = failing(fault);
+        assert!(failed.iter().any(|name| name == scenario), "{fault:?}: {failed:?}");
+    }
+}
+
+#[test]
+fn a_simple_host_that_ends_at_the_first_error_passes() {
+    assert_eq!(failing(Fault::None), Vec::<String>::new());
+}
