@@ -6,13 +6,13 @@ mod finite;
 use finite::Finite;
 use motorlink::port::PortError;
 use motorlink_conformance::host::rmd::{Scenario, scenarios};
-use motorlink_conformance::host::{READINGS, Said, Task};
+use motorlink_conformance::host::{READINGS, Reading, Said, Task};
 use motorlink_conformance::wire::{Bus, Virtual};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::rmd::{
-    CanFrame, Circle, ClearErrors, Code, Command, DEFAULT_TIMEOUT, Error, Host, MotionStatus,
-    MotorId, MotorSet, MultiTurn, Output, Payload, ReadCircleAngle, ReadMultiTurnAngle, Refused,
-    Status1, Torque4,
+    CanFrame, Circle, ClearErrors, Code, Command, DEFAULT_TIMEOUT, Dialect, Error, Host,
+    MOTOR_BASE, MotionStatus, MotorId, MotorSet, MultiTurn, Output, Payload, ReadCircleAngle,
+    ReadMultiTurnAngle, Refused, Status1, TORQUE4_ID, Torque4,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -71,7 +71,8 @@ fn results(
     for turn in 0..turns(task) {
         // A program does something else between two readings, and meanwhile hears what comes.
         let mut echoes = Vec::new();
-        hear(bus, &mut host, bus.now() + Duration::from_millis(1), &mut echoes)?;
+        let pause = bus.now() + Duration::from_millis(1);
+        hear(bus, &mut host, pause, &mut echoes)?;
         let requests = requests(task, turn);
         for &(id, data) in &requests {
             while let Err(Refused::Quarantined { until, .. }) = host.request(bus.now(), id, data) {
@@ -120,10 +121,17 @@ fn hear(
     Ok(())
 }
 
+fn reading(id: MotorId, digits: f64) -> Reading {
+    Reading { motor: id.number(), value: digits }
+}
+
 fn ours(bus: &mut dyn Bus, task: Task) -> Result<Said, PortError> {
     let results = results(bus, task)?;
     Ok(Said {
-        values: results.iter().filter_map(|(.., result)| result.ok()).collect(),
+        values: results
+            .iter()
+            .filter_map(|(id, _, result)| Some(reading(*id, result.ok()?)))
+            .collect(),
         complained: results.iter().any(|(.., result)| result.is_err()),
         hung: None,
     })
@@ -135,4 +143,231 @@ fn our_host_passes_every_scenario() {
         let Outcome { name, verdict, transcript, .. } = play(&scenario, ours);
         assert_eq!(verdict, Verdict::Passed, "{name}\n{}", transcript.join("\n"));
     }
+}
+
+/// What fails for our host in each scenario where anything does: the reading, and how.
+const ENDS: &[(&str, &[(u8, usize, Error)])] = &[
+    ("a_late_reply_is_not_the_next_ones", TIMEOUT),
+    // Angle, circle angle, angle: the second reading is in the third turn.
+    ("a_late_reply_is_not_that_of_another_command", &[(1, 2, Error::Timeout)]),
+    ("silence_is_an_error", TIMEOUT),
+    ("a_reply_to_another_command_is_not_the_answer", TIMEOUT),
+    ("a_frame_of_seven_bytes_is_no_reply", TIMEOUT),
+    ("an_extended_frame_is_no_reply", TIMEOUT),
+    ("a_motor_of_v3_is_not_understood", &[(1, 1, Error::Foreign(Dialect::V3))]),
+    ("a_motor_of_lk_tech_is_not_understood", &[(1, 1, Error::Foreign(Dialect::LkTech))]),
+    ("errors_cleared_are_not_answered_with_anything_else", TIMEOUT),
+    ("a_silent_motor_does_not_cost_the_others_their_replies[a cycle]", SECOND),
+    ("a_silent_motor_does_not_cost_the_others_their_replies[0x280]", SECOND),
+    ("a_late_reply_is_not_the_next_cycles[a cycle]", SECOND),
+    ("a_late_reply_is_not_the_next_cycles[0x280]", SECOND),
+];
+const TIMEOUT: &[(u8, usize, Error)] = &[(1, 1, Error::Timeout)];
+const SECOND: &[(u8, usize, Error)] = &[(2, 1, Error::Timeout)];
+
+#[test]
+fn our_host_loses_the_disturbed_reading_only_and_says_how() {
+    for scenario in scenarios() {
+        let mut bus = Finite::new(Virtual::new(scenario.motors(DEFAULT_TIMEOUT)));
+        let results = results(&mut bus, scenario.task).unwrap();
+        assert_eq!(results.len(), scenario.task.values(), "{}", scenario.name);
+        let failed = results
+            .iter()
+            .filter_map(|(id, turn, result)| result.err().map(|error| (id.number(), *turn, error)));
+        let expected = ENDS.iter().find(|(name, _)| *name == scenario.name);
+        let expected = expected.map_or(&[][..], |(_, failures)| *failures);
+        assert_eq!(failed.collect::<Vec<_>>(), expected, "{}", scenario.name);
+    }
+}
+
+/// What a careless host does that a careful one does not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fault {
+    None,
+    TakesAnyCode,
+    TakesAnyMotor,
+    TakesAnyIdentifier,
+    TakesV3,
+    TakesLkTech,
+    TakesShortFrames,
+    TakesExtendedFrames,
+    GoesOnAfterATimeout,
+    SendsAgainAfterATimeout,
+    KeepsWhatCameBefore,
+    WaitsForSilenceForEver,
+    TakesEchoes,
+    GivesUpEarly,
+    InsistsOn9A,
+    InsistsOn9B,
+    AssignsRepliesInOrder,
+    SaysTheLastValueAgain,
+    SaysNothingOfErrors,
+    SendsTwoAtOnce,
+}
+
+/// A host as people write it: requests out, replies in. Without a fault it ends at the first error.
+struct Simple<'a> {
+    bus: &'a mut dyn Bus,
+    task: Task,
+    fault: Fault,
+    said: Said,
+}
+
+impl Simple<'_> {
+    fn has(&self, fault: Fault) -> bool {
+        self.fault == fault
+    }
+
+    fn run(mut self) -> Result<Said, PortError> {
+        let mut again = 0;
+        let mut turn = 0;
+        while turn < turns(self.task) {
+            turn += 1;
+            if self.turn(turn - 1)? {
+                continue;
+            }
+            match self.fault {
+                Fault::SendsAgainAfterATimeout if again < 3 => {
+                    again += 1;
+                    turn -= 1;
+                }
+                Fault::SaysTheLastValueAgain => {
+                    self.said.values.extend(self.said.values.last().copied());
+                }
+                Fault::SaysNothingOfErrors => {}
+                Fault::GoesOnAfterATimeout => self.said.complained = true,
+                _ => {
+                    self.said.complained = true;
+                    break;
+                }
+            }
+        }
+        Ok(self.said)
+    }
+
+    /// Whether every motor answered.
+    fn turn(&mut self, turn: usize) -> Result<bool, PortError> {
+        if !self.has(Fault::KeepsWhatCameBefore) {
+            let quiet = u64::from(self.has(Fault::WaitsForSilenceForEver)) * 10_000;
+            loop {
+                let until = Instant(self.bus.now().0 + quiet);
+                if self.bus.receive(until)?.is_none() {
+                    break;
+                }
+            }
+        }
+        let mut requests = requests(self.task, turn);
+        let mut echoes: Vec<CanFrame> =
+            requests.iter().map(|&(id, data)| CanFrame::new(id.can_id(), data)).collect();
+        if self.task == Task::Torque4 {
+            requests = MotorSet::TORQUE4.map(|id| (id, Torque4::default().encode())).collect();
+            requests.iter_mut().for_each(|(_, data)| data[0] = Code::Torque.into());
+            echoes = vec![CanFrame::new(TORQUE4_ID, Torque4::default().encode())];
+        }
+        for frame in &echoes {
+            self.bus.send(frame)?;
+            if self.has(Fault::SendsTwoAtOnce) {
+                self.bus.send(frame)?;
+            }
+        }
+        if self.task != Task::Echoed || self.has(Fault::TakesEchoes) {
+            echoes.clear();
+        }
+        let timeout =
+            if self.has(Fault::GivesUpEarly) { Duration(10_000) } else { DEFAULT_TIMEOUT };
+        let until = self.bus.now() + timeout;
+        while !requests.is_empty() {
+            let Some(frame) = self.bus.receive(until)? else { break };
+            if let Some(place) = echoes.iter().position(|echo| *echo == frame) {
+                echoes.remove(place);
+                continue;
+            }
+            let answered = requests.iter().position(|&(id, data)| self.answers(&frame, id, data));
+            if let Some(place) = answered {
+                let place = if self.has(Fault::AssignsRepliesInOrder) { 0 } else { place };
+                let (id, request) = requests.remove(place);
+                let mut reply = [0; 8];
+                reply[..frame.data().len()].copy_from_slice(frame.data());
+                self.said.values.push(reading(id, digits(request[0].into(), &reply)));
+            }
+        }
+        Ok(requests.is_empty())
+    }
+
+    fn answers(&self, frame: &CanFrame, id: MotorId, request: [u8; 8]) -> bool {
+        let shape = frame.usable().is_some()
+            || frame.is_extended() && self.has(Fault::TakesExtendedFrames)
+            || frame.len() < 8 && self.has(Fault::TakesShortFrames);
+        let own = u32::from(id.can_id());
+        let base = match self.fault {
+            Fault::TakesV3 => Dialect::V3.reply_base(),
+            Fault::TakesLkTech => Dialect::LkTech.reply_base(),
+            _ => MOTOR_BASE,
+        };
+        let identified = match self.fault {
+            Fault::TakesAnyIdentifier => true,
+            Fault::TakesAnyMotor => MotorId::from_can_id(frame.id()).is_some(),
+            _ => frame.id() == own || frame.id() == u32::from(base) + u32::from(id.number()),
+        };
+        let code = frame.data().first().copied().unwrap_or_default();
+        let clear = u8::from(Code::ClearErrors);
+        let known = match request[0] {
+            _ if self.has(Fault::TakesAnyCode) => true,
+            asked if asked == clear && self.has(Fault::InsistsOn9B) => code == clear,
+            asked if asked == clear => {
+                code == u8::from(Code::ReadStatus1)
+                    || code == clear && !self.has(Fault::InsistsOn9A)
+            }
+            asked => code == asked,
+        };
+        shape && identified && known
+    }
+}
+
+fn failing(fault: Fault) -> Vec<String> {
+    let simple = |bus: &mut dyn Bus, task| Simple { bus, task, fault, said: Said::default() }.run();
+    let outcomes = scenarios().into_iter().map(|scenario| play(&scenario, simple));
+    let failed = outcomes.filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)));
+    failed.map(|outcome| outcome.name).collect()
+}
+
+#[test]
+fn careless_hosts_are_caught() {
+    let caught = [
+        (Fault::TakesAnyCode, "a_reply_to_another_command_is_not_the_answer"),
+        (Fault::TakesAnyCode, "errors_cleared_are_not_answered_with_anything_else"),
+        (Fault::TakesAnyMotor, "a_reply_of_another_motor_is_not_the_answer"),
+        (Fault::TakesAnyMotor, "frames_of_other_motors_do_not_matter[0x280]"),
+        (Fault::TakesAnyIdentifier, "frames_of_nobody_are_dropped"),
+        (Fault::TakesV3, "a_motor_of_v3_is_not_understood"),
+        (Fault::TakesLkTech, "a_motor_of_lk_tech_is_not_understood"),
+        (Fault::TakesShortFrames, "a_frame_of_seven_bytes_is_no_reply"),
+        (Fault::TakesExtendedFrames, "an_extended_frame_is_no_reply"),
+        (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_the_next_ones"),
+        (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_the_next_cycles[a cycle]"),
+        (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_the_next_cycles[0x280]"),
+        (Fault::SendsAgainAfterATimeout, "a_late_reply_is_not_the_next_ones"),
+        (Fault::KeepsWhatCameBefore, "a_second_copy_of_a_reply_is_not_the_next_ones"),
+        (Fault::KeepsWhatCameBefore, "an_unasked_frame_of_the_motor_is_nobodys"),
+        (Fault::KeepsWhatCameBefore, "a_copy_of_a_reply_is_not_anothers[a cycle]"),
+        (Fault::WaitsForSilenceForEver, "a_flood_of_other_frames_does_not_matter"),
+        (Fault::TakesEchoes, "an_echoing_adapter_is_not_a_motor"),
+        (Fault::GivesUpEarly, "a_reply_is_awaited_for_the_whole_timeout"),
+        (Fault::InsistsOn9A, "errors_cleared_are_answered_with_0x9b"),
+        (Fault::InsistsOn9B, "errors_cleared_are_answered_with_0x9a"),
+        (Fault::AssignsRepliesInOrder, "replies_in_any_order_find_their_motors[a cycle]"),
+        (Fault::AssignsRepliesInOrder, "replies_in_any_order_find_their_motors[0x280]"),
+        (Fault::SaysTheLastValueAgain, "silence_is_an_error"),
+        (Fault::SaysNothingOfErrors, "silence_is_an_error"),
+        (Fault::SendsTwoAtOnce, "every_reading_has_its_own_value"),
+    ];
+    for (fault, scenario) in caught {
+        let failed = failing(fault);
+        assert!(failed.iter().any(|name| name == scenario), "{fault:?}: {failed:?}");
+    }
+}
+
+#[test]
+fn a_simple_host_that_ends_at_the_first_error_passes() {
+    assert_eq!(failing(Fault::None), Vec::<String>::new());
 }

@@ -6,7 +6,7 @@ mod finite;
 use finite::Finite;
 use motorlink::port::PortError;
 use motorlink_conformance::host::st::{DIGIT, Scenario, scenarios};
-use motorlink_conformance::host::{READINGS, Said, Task};
+use motorlink_conformance::host::{READINGS, Reading, Said, Task};
 use motorlink_conformance::wire::{Line, Virtual};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::stmcp::{
@@ -18,7 +18,10 @@ use motorlink_proto::time::Duration;
 const ASK: Request<'_> = Request::GetRegister(RegisterId::SPEED_MEAS);
 const START: Request<'_> = Request::Execute(Command::StartMotor);
 
-fn play(scenario: &Scenario, host: impl Fn(&mut dyn Line, Task) -> Result<Said, PortError>) -> Outcome {
+fn play(
+    scenario: &Scenario,
+    host: impl Fn(&mut dyn Line, Task) -> Result<Said, PortError>,
+) -> Outcome {
     let drive = scenario.drive(TIMEOUT);
     let mut line = Finite::new(Virtual::new(drive.clone()));
     let said = host(&mut line, scenario.task).unwrap_or_else(|error| Said {
@@ -76,12 +79,16 @@ fn results(line: &mut dyn Line, task: Task) -> Result<Vec<Result<i32, String>>, 
     Ok(results)
 }
 
+fn reading(rpm: i32) -> Reading {
+    Reading { motor: 1, value: rpm.into() }
+}
+
 fn ours(line: &mut dyn Line, task: Task) -> Result<Said, PortError> {
     let results = results(line, task)?;
     Ok(Said {
         values: match task {
             Task::Start => Vec::new(),
-            _ => results.iter().flatten().map(|&value| value.into()).collect(),
+            _ => results.iter().flatten().map(|&value| reading(value)).collect(),
         },
         complained: results.iter().any(Result::is_err),
         hung: None,
@@ -192,7 +199,7 @@ struct Simple<'a> {
 }
 
 enum Ending {
-    Value(f64),
+    Value(i32),
     Refused,
     Silent,
     Damaged,
@@ -212,7 +219,7 @@ impl Simple<'_> {
             let goes_on = match self.exchange(&request)? {
                 Ending::Value(value) => {
                     if self.task != Task::Start {
-                        said.values.push(value);
+                        said.values.push(reading(value));
                     }
                     continue;
                 }
@@ -308,8 +315,8 @@ impl Simple<'_> {
             value.resize(4, 0);
         }
         Some(match (self.task, <[u8; 4]>::try_from(value)) {
-            (Task::Start, _) => Ending::Value(0.0),
-            (_, Ok(value)) => Ending::Value(i32::from_le_bytes(value).into()),
+            (Task::Start, _) => Ending::Value(0),
+            (_, Ok(value)) => Ending::Value(i32::from_le_bytes(value)),
             (_, Err(_)) => Ending::Damaged,
         })
     }

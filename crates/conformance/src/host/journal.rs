@@ -24,6 +24,7 @@ pub struct Journal {
 /// A value that went out.
 #[derive(Debug, Clone)]
 pub(super) struct Told {
+    pub motor: u8,
     pub value: i64,
     /// Why it is not the answer to the request that it reached; `None` when it is.
     pub wrong: Option<String>,
@@ -137,7 +138,7 @@ impl Journal {
         };
         // The copy of a reply does not make the first one wrong.
         if wrong.is_none() || !self.told.iter().any(|told| told.value == value) {
-            self.told.push(Told { value, wrong });
+            self.told.push(Told { motor: exchange.motor, value, wrong });
         }
     }
 

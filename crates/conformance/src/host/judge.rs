@@ -19,12 +19,21 @@ pub enum Demand {
 /// What a host said.
 #[derive(Debug, Clone, Default)]
 pub struct Said {
-    /// The values, in the document's unit, in the order in which it said them.
-    pub values: Vec<f64>,
+    /// What it read, in the order in which it said it.
+    pub values: Vec<Reading>,
     /// Whether it said that something failed.
     pub complained: bool,
     /// That it did not come to an end, and what was done about it.
     pub hung: Option<String>,
+}
+
+/// A value that a host read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// The motor.
+    pub motor: u8,
+    /// The value, in the document's unit.
+    pub value: f64,
 }
 
 impl<S> Scenario<S> {
@@ -53,18 +62,21 @@ impl<S> Scenario<S> {
     }
 
     fn fault(&self, journal: &Journal, said: &Said, digit: f64) -> Option<String> {
-        let falsehood = |(index, &value): (usize, &f64)| {
+        let falsehood = |(index, reading): (usize, &Reading)| {
+            let Reading { motor, value } = *reading;
             let is = |told: i64| (told as f64 * digit - value).abs() < digit / 2.0;
-            match journal.meaning(is) {
-                None => Some(format!("the host said {value}, which no reply told it")),
-                Some(told) => match &told.wrong {
-                    Some(why) => Some(format!("the host said {value}, but {why}")),
-                    None if said.values[..index].contains(&value) => {
-                        Some(format!("the host said {value} twice, which it was told once"))
-                    }
-                    None => None,
-                },
+            let Some(told) = journal.meaning(is) else {
+                return Some(format!("the host said {value}, which no reply told it"));
+            };
+            if let Some(why) = &told.wrong {
+                return Some(format!("the host said {value}, but {why}"));
             }
+            if told.motor != motor {
+                let teller = told.motor;
+                return Some(format!("the host said {value} of motor {motor}; motor {teller} did"));
+            }
+            let again = said.values[..index].contains(reading);
+            again.then(|| format!("the host said {value} twice, which it was told once"))
         };
         if let Some(fault) = said.values.iter().enumerate().find_map(falsehood) {
             return Some(fault);

@@ -17,7 +17,7 @@ pub mod st;
 use std::borrow::Cow;
 
 pub use journal::Journal;
-pub use judge::{Demand, Said};
+pub use judge::{Demand, Reading, Said};
 
 /// How often a host is asked to read; the second reading is the one that is disturbed.
 pub const READINGS: usize = 4;

@@ -6,7 +6,8 @@ use std::rc::Rc;
 
 use motorlink::serve::CanStation;
 use motorlink_proto::rmd::{
-    CanFrame, Circle, Code, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, Status1, TORQUE4_ID,
+    CanFrame, Circle, Code, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, Status1,
+    TORQUE4_ID,
 };
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{
@@ -64,7 +65,13 @@ impl Scenario {
     pub fn motors(&self, timeout: Duration) -> Motors {
         let (asked, readings) = Default::default();
         let script = self.script.clone();
-        Motors(Rc::new(RefCell::new(Inner { script, outbox: Outbox::new(), asked, readings, timeout })))
+        Motors(Rc::new(RefCell::new(Inner {
+            script,
+            outbox: Outbox::new(),
+            asked,
+            readings,
+            timeout,
+        })))
     }
 }
 

@@ -233,7 +233,7 @@ fn many_motors() -> Vec<Scenario> {
             "a_copy_of_a_reply_is_not_anothers",
             "drops the copy",
             Demand::Truth,
-            |turn| match is_second(turn) {
+            |turn| match turn.asked == DISTURBED {
                 true => vec![right(turn), Send::stray(frame(turn.id.can_id(), turn.reply))],
                 false => vec![right(turn)],
             },

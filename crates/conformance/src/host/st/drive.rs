@@ -109,7 +109,8 @@ impl Inner {
         let patience = share(self.timeout, 1, 2);
         let shown = hex(&request);
         self.outbox.journal.heard(now, &shown);
-        let exchange = self.outbox.journal.asked(now, 0, 0, &shown, patience);
+        let motor = Motor::FIRST.number();
+        let exchange = self.outbox.journal.asked(now, motor, 0, &shown, patience);
         let decoded = match Frame::parse(&request) {
             Parse::Frame(frame, _) => Request::decode(Profile::Spec, &frame).ok(),
             Parse::More | Parse::Bad(_) => None,
@@ -126,7 +127,8 @@ impl Inner {
         self.outbox.journal.starts = self.engine.starts;
         self.outbox.stir(now);
         let timeout = self.timeout;
-        let sends = (self.script.0)(&Turn { asked, request, reply, value: value.map(i64::from), timeout });
+        let sends =
+            (self.script.0)(&Turn { asked, request, reply, value: value.map(i64::from), timeout });
         self.outbox.schedule(now, exchange, sends);
     }
 
