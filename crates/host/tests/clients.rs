@@ -2,6 +2,7 @@
 
 mod served;
 
+use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::sync::{Arc, Mutex};
@@ -239,6 +240,71 @@ fn a_reply_that_waited_in_the_port_is_not_taken_for_the_next_one() {
     std::thread::sleep(ms(20));
     assert_eq!(ask().unwrap()[7], 2, "the second request's reply");
     assert_eq!(bus.counters().late, 1);
+}
+
+/// Says everything twice; the copy waits in the port until it is read. Replies are numbered.
+struct Twice<T> {
+    unread: VecDeque<T>,
+    asked: u8,
+}
+
+impl<T> Twice<T> {
+    fn new() -> Box<Self> {
+        Box::new(Twice { unread: VecDeque::new(), asked: 0 })
+    }
+}
+
+impl CanLink for Twice<CanFrame> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.asked += 1;
+        let reply = CanFrame::new(0x141, [frame.data()[0], 0, 0, 0, 0, 0, 0, self.asked]);
+        self.unread.extend([reply, reply]);
+        Ok(())
+    }
+
+    fn receive(&mut self, _timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        Ok(self.unread.pop_front())
+    }
+}
+
+impl ByteLink for Twice<Vec<u8>> {
+    fn write(&mut self, _bytes: &[u8]) -> Result<(), PortError> {
+        self.asked += 1;
+        let reply = vec![0xF0, 0x01, self.asked, 0xF1 + self.asked];
+        self.unread.extend([reply.clone(), reply]);
+        Ok(())
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        let Some(bytes) = self.unread.pop_front() else {
+            std::thread::sleep(timeout.unwrap_or_default());
+            return Ok(0);
+        };
+        buffer[..bytes.len()].copy_from_slice(&bytes);
+        Ok(bytes.len())
+    }
+}
+
+#[test]
+fn a_copy_of_a_reply_is_not_taken_for_the_next_one_however_soon_that_is_asked() {
+    let bus = Bus::over("twice", Twice::<CanFrame>::new(), rmd::Options::default());
+    for number in 1..=3 {
+        let reply = bus.raw(MotorId::new(1).unwrap(), [0x9C, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+        assert_eq!(reply[7], number);
+    }
+}
+
+#[test]
+fn a_copy_of_a_reply_that_comes_in_a_pause_is_not_the_answer_to_the_next_question() {
+    let mut options = stmcp::Options::default();
+    options.line.timeout = Duration::from_millis(20).into();
+    options.line.quiet = Duration::from_millis(5).into();
+    let client = Client::over("twice", Twice::<Vec<u8>>::new(), options);
+    let ask = || client.motor(1).unwrap().read(register::CONTROL_MODE);
+    assert_eq!(ask().unwrap(), 1);
+    // Long for bytes, short for a program.
+    std::thread::sleep(Duration::from_millis(2));
+    assert!(!matches!(ask(), Ok(1)), "that is the copy");
 }
 
 #[test]

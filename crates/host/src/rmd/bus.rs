@@ -2,7 +2,7 @@
 //! allocation in an exchange.
 
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::{Duration, Instant as Moment};
+use std::time::Duration;
 
 use motorlink_proto::rmd::{
     self as proto, Code, Command, Counters, Dialect, Host, Limits, MotionStatus, MotorId, MotorSet,
@@ -51,9 +51,6 @@ pub enum Found {
     Echo(MotorId),
 }
 
-/// After a pause of this length whatever came meanwhile is taken from the port before a request.
-const IDLE: Duration = Duration::from_millis(1);
-
 /// IDs that a scan asks at once.
 const SCAN_WIDTH: usize = 8;
 
@@ -71,8 +68,6 @@ struct Inner {
     host: Host,
     /// Motors that were given something to do by this bus and not switched off.
     moving: MotorSet,
-    /// When the last exchange ended.
-    ended: Moment,
 }
 
 impl Bus {
@@ -117,7 +112,7 @@ impl Bus {
         for id in MotorSet::ALL {
             host.set_limits(id, options.limits);
         }
-        let inner = Inner { port, host, moving: MotorSet::EMPTY, ended: Moment::now() };
+        let inner = Inner { port, host, moving: MotorSet::EMPTY };
         Bus { inner: Mutex::new(inner) }
     }
 
@@ -268,16 +263,14 @@ impl Inner {
     fn ready(&mut self) -> Result<(), Error> {
         let (link, _) = self.port.link()?;
         // What came meanwhile is late or unasked; left in the port it would pass for a reply.
-        if self.ended.elapsed() > IDLE {
-            let drained = loop {
-                match link.receive(Some(Duration::ZERO)) {
-                    Ok(Some(frame)) => self.host.receive(&frame),
-                    Ok(None) => break Ok(()),
-                    Err(error) => break Err(error),
-                }
-            };
-            drained.map_err(|error| self.closed(error))?;
-        }
+        let drained = loop {
+            match link.receive(Some(Duration::ZERO)) {
+                Ok(Some(frame)) => self.host.receive(&frame),
+                Ok(None) => break Ok(()),
+                Err(error) => break Err(error),
+            }
+        };
+        drained.map_err(|error| self.closed(error))?;
         let now = self.port.now();
         for id in self.host.busy() {
             self.host.cancel(now, id);
@@ -313,10 +306,7 @@ impl Inner {
                     each(id, result);
                     Ok(())
                 }
-                Output::Wait(None) => {
-                    self.ended = Moment::now();
-                    return Ok(());
-                }
+                Output::Wait(None) => return Ok(()),
                 Output::Wait(Some(until)) => self.hear(now, until),
             };
             moved.map_err(|error| self.closed(error))?;

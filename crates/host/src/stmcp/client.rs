@@ -27,8 +27,9 @@ pub struct Options {
     pub limits: Limits,
 }
 
-/// After a pause of this length whatever came unasked is taken note of before the next request.
-const IDLE: Duration = Duration::from_millis(20);
+/// After a pause of this length whatever came unasked is taken note of before the next request: a
+/// byte or so at 115200 baud. In a shorter one hardly anything can come, and looking is a system call.
+const IDLE: Duration = Duration::from_micros(100);
 
 /// What GET_BOARD_INFO tells (4.7).
 #[derive(Debug, Clone, PartialEq, Eq)]
