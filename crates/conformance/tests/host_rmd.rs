@@ -26,7 +26,7 @@ fn play(
     let motors = scenario.motors(DEFAULT_TIMEOUT);
     let mut bus = Finite::new(Virtual::new(motors.clone()));
     let said = host(&mut bus, scenario.task).unwrap_or_else(|error| Said {
-        hung: Some(format!("the host does not end: {error}")),
+        ended_badly: Some(format!("the host does not end: {error}")),
         ..Said::default()
     });
     scenario.judge(&motors.journal(), &said, DIGIT)
@@ -133,7 +133,7 @@ fn ours(bus: &mut dyn Bus, task: Task) -> Result<Said, PortError> {
             .filter_map(|(id, _, result)| Some(reading(*id, result.ok()?)))
             .collect(),
         complained: results.iter().any(|(.., result)| result.is_err()),
-        hung: None,
+        ended_badly: None,
     })
 }
 

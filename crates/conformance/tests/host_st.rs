@@ -25,7 +25,7 @@ fn play(
     let drive = scenario.drive(TIMEOUT);
     let mut line = Finite::new(Virtual::new(drive.clone()));
     let said = host(&mut line, scenario.task).unwrap_or_else(|error| Said {
-        hung: Some(format!("the host does not end: {error}")),
+        ended_badly: Some(format!("the host does not end: {error}")),
         ..Said::default()
     });
     scenario.judge(&drive.journal(), &said, DIGIT)
@@ -91,7 +91,7 @@ fn ours(line: &mut dyn Line, task: Task) -> Result<Said, PortError> {
             _ => results.iter().flatten().map(|&value| reading(value)).collect(),
         },
         complained: results.iter().any(Result::is_err),
-        hung: None,
+        ended_badly: None,
     })
 }
 

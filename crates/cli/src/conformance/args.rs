@@ -1,12 +1,15 @@
 //! What `motorlink conformance` takes.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Subcommand;
+use motorlink::port::ServeName;
 use motorlink::rmd::{EncoderBits, MotorId};
 use motorlink::stmcp::{Motor, Profile};
 
 use crate::connection::Port;
+use crate::output::parse_span;
 use crate::st::parse_profile;
 
 #[derive(clap::Args)]
@@ -43,6 +46,9 @@ pub enum Command {
         #[arg(long, default_value = "14", value_parser = parse_encoder)]
         encoder: EncoderBits,
     },
+    /// Check a host: serve a drive that misbehaves and see what your program makes of it
+    #[command(after_help = super::host::CONTRACT)]
+    Host(Host),
     /// Print every clause and what tests it, as a Markdown table
     Clauses {
         /// Of which document
@@ -74,6 +80,13 @@ pub struct Run {
     /// A shell command that ends it
     #[arg(long, value_name = "COMMAND", requires = "fault_on")]
     pub fault_off: Option<String>,
+    #[command(flatten)]
+    pub results: Results,
+}
+
+/// What is run and shown, and where the results go.
+#[derive(clap::Args)]
+pub struct Results {
     /// Only cases with this in their name or in a clause they test, such as ST-4.5
     #[arg(long, value_name = "TEXT")]
     pub only: Option<String>,
@@ -86,6 +99,37 @@ pub struct Run {
     /// Write the results as JSON; without a file, to stdout instead of the table
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub json: Option<PathBuf>,
+}
+
+/// A host under test.
+#[derive(clap::Args)]
+pub struct Host {
+    /// Which protocol it speaks
+    pub which: Which,
+    /// Where the drive is served: pty:PATH or tcp-listen:ADDR:PORT for ST, slcan-pty:PATH or
+    /// tcp-listen:ADDR:PORT for RMD
+    #[arg(long, value_name = "PORT")]
+    pub serve: ServeName,
+    /// How long your program waits for a reply [default: 1s for ST, 50ms for RMD]
+    #[arg(long, value_name = "TIME", value_parser = parse_span)]
+    pub timeout: Option<Duration>,
+    /// How long a run of your program may take; then it is ended
+    #[arg(long, value_name = "TIME", value_parser = parse_span, default_value = "20s")]
+    pub limit: Duration,
+    /// Which number of a line is the value, counted from 1 [default: the last]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
+    pub field: Option<u8>,
+    /// A shell command that starts motor 1 of an ST drive once
+    #[arg(long, value_name = "COMMAND")]
+    pub start: Option<String>,
+    /// A shell command that reads as COMMAND does, from an RMD adapter that echoes what it is sent
+    #[arg(long, value_name = "COMMAND")]
+    pub echo: Option<String>,
+    #[command(flatten)]
+    pub results: Results,
+    /// Your program and its arguments
+    #[arg(last = true, required = true)]
+    pub command: Vec<String>,
 }
 
 fn parse_motor(text: &str) -> Result<Motor, String> {

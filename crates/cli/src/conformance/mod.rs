@@ -1,6 +1,7 @@
 //! `motorlink conformance`: is this drive what its document says?
 
 mod args;
+mod host;
 mod screen;
 mod world;
 
@@ -11,7 +12,7 @@ use motorlink_conformance::wire::Real;
 use motorlink_conformance::{Case, Need, Report, Subject, rmd, run as run_cases, st};
 
 pub use args::Args;
-use args::{Command, Run, Which};
+use args::{Command, Results, Run, Which};
 use screen::Screen;
 use world::Commands;
 
@@ -34,6 +35,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let bench = rmd::Bench::new(Box::new(Real::new(link)), world, options);
             conduct("rmd", &run, rmd::suite(), bench)
         }
+        Command::Host(args) => host::run(&args),
         Command::Clauses { which: Which::St } => output::line(&st::table().trim_end()),
         Command::Clauses { which: Which::Rmd } => output::line(&rmd::table().trim_end()),
     }
@@ -45,29 +47,45 @@ fn conduct<B: Subject>(
     mut suite: Vec<Case<B>>,
     mut bench: B,
 ) -> Result<(), Failure> {
-    if let Some(only) = &run.only {
-        suite.retain(|case| {
-            case.name.contains(only) || case.clauses.iter().any(|clause| clause.contains(only))
-        });
-        if suite.is_empty() {
-            return Err(Failure::Usage(format!("no case has `{only}` in its name or its clauses")));
-        }
-    }
-    let mut screen = Screen::new(suite.len(), run.json_to_stdout(), run.verbose);
+    let results = &run.results;
+    suite.retain(|case| results.wants(&case.name, case.clauses));
+    let mut screen = results.screen(suite.len())?;
     let report = run_cases(&suite, &mut bench, |outcome| screen.show(outcome));
     screen.summary(&report)?;
-    save(name, run, &report)?;
-    verdict(&report)
+    results.save(name, &report)?;
+    verdict(&report, "the drive")
 }
 
-fn save(name: &str, run: &Run, report: &Report) -> Result<(), Failure> {
-    if let Some(path) = &run.junit {
-        write(path, &report.to_junit(name))?;
+impl Results {
+    fn wants(&self, name: &str, clauses: &[&str]) -> bool {
+        let Some(only) = &self.only else { return true };
+        name.contains(only) || clauses.iter().any(|clause| clause.contains(only))
     }
-    match &run.json {
-        Some(_) if run.json_to_stdout() => output::line(&report.to_json()),
-        Some(path) => write(path, &format!("{:#}\n", report.to_json())),
-        None => Ok(()),
+
+    /// A screen for so many cases.
+    fn screen(&self, cases: usize) -> Result<Screen, Failure> {
+        match &self.only {
+            Some(only) if cases == 0 => {
+                Err(Failure::Usage(format!("no case has `{only}` in its name or its clauses")))
+            }
+            _ => Ok(Screen::new(cases, self.json_to_stdout(), self.verbose)),
+        }
+    }
+
+    fn save(&self, name: &str, report: &Report) -> Result<(), Failure> {
+        if let Some(path) = &self.junit {
+            write(path, &report.to_junit(name))?;
+        }
+        match &self.json {
+            Some(_) if self.json_to_stdout() => output::line(&report.to_json()),
+            Some(path) => write(path, &format!("{:#}\n", report.to_json())),
+            None => Ok(()),
+        }
+    }
+
+    /// `--json` without a file.
+    fn json_to_stdout(&self) -> bool {
+        self.json.as_deref() == Some(Path::new("-"))
     }
 }
 
@@ -76,13 +94,14 @@ fn write(path: &Path, text: &str) -> Result<(), Failure> {
     written.map_err(|error| Failure::Usage(format!("cannot write `{}`: {error}", path.display())))
 }
 
-fn verdict(report: &Report) -> Result<(), Failure> {
+/// `who` is what was tested.
+fn verdict(report: &Report, who: &str) -> Result<(), Failure> {
     if report.is_clean() {
         return Ok(());
     }
     match report.count("not run") {
         0 => Err(Failure::Refused(format!(
-            "{} of {} cases failed: the drive does not do what its document says",
+            "{} of {} cases failed: {who} does not do what its document says",
             report.failed().count(),
             report.outcomes.len()
         ))),
@@ -99,10 +118,5 @@ impl Run {
             (self.fault_on.is_some(), Need::Fault),
         ];
         allowed.into_iter().filter_map(|(given, need)| given.then_some(need)).collect()
-    }
-
-    /// `--json` without a file.
-    fn json_to_stdout(&self) -> bool {
-        self.json.as_deref() == Some(Path::new("-"))
     }
 }

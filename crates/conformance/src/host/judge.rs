@@ -23,8 +23,8 @@ pub struct Said {
     pub values: Vec<Reading>,
     /// Whether it said that something failed.
     pub complained: bool,
-    /// That it did not come to an end, and what was done about it.
-    pub hung: Option<String>,
+    /// That it crashed or did not come to an end.
+    pub ended_badly: Option<String>,
 }
 
 /// A value that a host read.
@@ -84,8 +84,8 @@ impl<S> Scenario<S> {
         if let Some(violation) = journal.violations.first() {
             return Some(format!("the host {violation}"));
         }
-        if let Some(hung) = &said.hung {
-            return Some(hung.clone());
+        if let Some(fault) = &said.ended_badly {
+            return Some(fault.clone());
         }
         if journal.starts > 1 {
             return Some(format!("the host sent START_MOTOR {} times", journal.starts));

@@ -3,6 +3,9 @@
 mod motors;
 mod scenarios;
 
+/// How long a host waits for a reply unless it is said otherwise.
+pub use motorlink_proto::rmd::DEFAULT_TIMEOUT as TIMEOUT;
+
 pub use motors::{Motors, Scenario};
 pub use scenarios::scenarios;
 

@@ -1,0 +1,244 @@
+//! `motorlink conformance host`: is this program a host that its document allows?
+
+use std::io::Read;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use motorlink::port::{PortError, ServeName};
+use motorlink::serve::{Served, Server};
+use motorlink_conformance::host::{Journal, Reading, Said, Scenario, Task, rmd, st};
+use motorlink_conformance::{Outcome, Report};
+use rustix::process::{Pid, Signal, kill_process_group};
+
+use super::args::{Host, Which};
+use super::verdict;
+use crate::failure::Failure;
+use crate::interrupt;
+
+/// Behind `motorlink conformance host --help`.
+pub const CONTRACT: &str = "\
+Your program is run once for each scenario, before a drive that misbehaves in its own way. It opens \
+the port once, reads a value 4 times and prints each on a line of its own. Where a reading fails it \
+prints something without a number, on stdout or stderr, or ends with another exit code than 0; it \
+may go on or end.
+  st   SPEED_MEAS (0x1E) of motor 1, in rpm
+  rmd  the multi-turn angle (0x92) of motor 1, in degrees
+{port} in its arguments becomes the port as motorlink names it, {path} the device or HOST:PORT; \
+MOTORLINK_PORT and MOTORLINK_PATH are the same. Each reading has a value of its own, so what your \
+program prints tells which reply it took for which request.
+With --start it is another command that is run, which starts motor 1 once and ends with 0 only when \
+the drive acknowledged it.
+  motorlink conformance host st --serve pty:./st0 -- python3 my_host.py {path}
+docs/HOST-CONFORMANCE.md has an example in Python and what each scenario expects.";
+
+/// How long the server waits for something to do before it looks at the program.
+const TURN: Duration = Duration::from_millis(5);
+/// How long what a program said may take to come when it has ended.
+const LAST_WORDS: Duration = Duration::from_secs(1);
+
+pub fn run(args: &Host) -> Result<(), Failure> {
+    interrupt::take_over();
+    match args.which {
+        Which::St => {
+            let timeout = args.timeout.map_or(st::TIMEOUT, Into::into);
+            conduct(args, "host st", st::scenarios(), st::DIGIT, |scenario, server| {
+                let drive = scenario.drive(timeout);
+                let served = server.serve_bytes(&args.serve, Box::new(drive.clone()))?;
+                Ok((served, Box::new(move || drive.journal())))
+            })
+        }
+        Which::Rmd => {
+            let timeout = args.timeout.map_or(rmd::TIMEOUT, Into::into);
+            conduct(args, "host rmd", rmd::scenarios(), rmd::DIGIT, |scenario, server| {
+                let motors = scenario.motors(timeout);
+                let served = server.serve_can(&args.serve, Box::new(motors.clone()))?;
+                Ok((served, Box::new(move || motors.journal())))
+            })
+        }
+    }
+}
+
+/// Tells what passed a served drive.
+type Tell = Box<dyn Fn() -> Journal>;
+
+fn conduct<S>(
+    args: &Host,
+    name: &str,
+    mut scenarios: Vec<Scenario<S>>,
+    digit: f64,
+    serve: impl Fn(&Scenario<S>, &mut Server) -> Result<(Served, Tell), PortError>,
+) -> Result<(), Failure> {
+    let results = &args.results;
+    scenarios.retain(|scenario| results.wants(&scenario.name, scenario.clauses));
+    let mut screen = results.screen(scenarios.len())?;
+    let mut report = Report::default();
+    for scenario in &scenarios {
+        let outcome = match program(args, scenario.task) {
+            Err(why) => scenario.skipped(why),
+            Ok(words) => {
+                let mut server = Server::new();
+                let (served, journal) = serve(scenario, &mut server)?;
+                let said = watch(args, &words, scenario.task, &mut server, &served)?;
+                explained(scenario.judge(&journal(), &said.said, digit), &said)
+            }
+        };
+        screen.show(&outcome);
+        report.outcomes.push(outcome);
+    }
+    screen.summary(&report)?;
+    results.save(name, &report)?;
+    verdict(&report, "the host")
+}
+
+/// The program for a task and its arguments, or why there is none.
+fn program(args: &Host, task: Task) -> Result<Vec<String>, &'static str> {
+    let shell = |command: &String| ["sh", "-c", command].map(str::to_owned).to_vec();
+    match task {
+        Task::Read => Ok(args.command.clone()),
+        Task::Start => {
+            args.start.as_ref().map(shell).ok_or("starts a motor: give a command with --start")
+        }
+        Task::Echoed => args
+            .echo
+            .as_ref()
+            .map(shell)
+            .ok_or("needs a host that drops echoes: give one with --echo"),
+        Task::Alternate | Task::Clear | Task::Cycle | Task::Torque4 => {
+            Err("is for hosts in Rust, which the kit calls: crates/conformance/tests/host_rmd.rs")
+        }
+    }
+}
+
+/// What a program said, as it was and as it is understood.
+struct Heard {
+    said: Said,
+    out: String,
+    err: String,
+}
+
+/// Where a program failed, its own words help.
+fn explained(mut outcome: Outcome, heard: &Heard) -> Outcome {
+    if !outcome.transcript.is_empty() {
+        let lines = heard.out.lines().map(|line| format!("stdout: {line}"));
+        outcome.transcript.extend(lines);
+        outcome.transcript.extend(heard.err.lines().map(|line| format!("stderr: {line}")));
+    }
+    outcome
+}
+
+/// Runs the program before the served drive until it ends, or for as long as it may take.
+fn watch(
+    args: &Host,
+    words: &[String],
+    task: Task,
+    server: &mut Server,
+    served: &Served,
+) -> Result<Heard, Failure> {
+    let mut child = spawn(args, words, served)?;
+    let (out, err) = (child.stdout.take().map(listen), child.stderr.take().map(listen));
+    let began = Instant::now();
+    let ended = loop {
+        server.turn(TURN, None)?;
+        if let Some(status) = child.try_wait()? {
+            break Some(status);
+        }
+        if interrupt::interrupted() || began.elapsed() > args.limit {
+            end(&mut child)?;
+            break None;
+        }
+    };
+    if interrupt::interrupted() {
+        return Err(Failure::Interrupted);
+    }
+    let words = |pipe: Option<Receiver<String>>| {
+        pipe.and_then(|pipe| pipe.recv_timeout(LAST_WORDS).ok()).unwrap_or_default()
+    };
+    let (out, err) = (words(out), words(err));
+    Ok(Heard { said: understand(args, task, ended, &out, &err), out, err })
+}
+
+fn spawn(args: &Host, words: &[String], served: &Served) -> Result<Child, Failure> {
+    let path = &served.path;
+    let port = match (args.which, &args.serve) {
+        (Which::St, ServeName::TcpListen { .. }) => format!("tcp:{path}"),
+        (Which::St, _) => path.clone(),
+        (Which::Rmd, ServeName::TcpListen { .. }) => format!("slcan:tcp:{path}"),
+        (Which::Rmd, _) => format!("slcan:{path}"),
+    };
+    let mut words = words.iter().map(|word| word.replace("{port}", &port).replace("{path}", path));
+    let program = words.next().unwrap_or_default();
+    Command::new(&program)
+        .args(words)
+        .env("MOTORLINK_PORT", &port)
+        .env("MOTORLINK_PATH", path)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .process_group(0)
+        .spawn()
+        .map_err(|error| Failure::Usage(format!("cannot run `{program}`: {error}")))
+}
+
+/// Gathers what comes through a pipe until its end.
+fn listen(mut pipe: impl Read + Send + 'static) -> Receiver<String> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        let _ = pipe.read_to_end(&mut bytes);
+        let _ = sender.send(String::from_utf8_lossy(&bytes).into_owned());
+    });
+    receiver
+}
+
+/// Ends a program and what it started.
+fn end(child: &mut Child) -> Result<(), Failure> {
+    if let Some(group) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
+        let _ = kill_process_group(group, Signal::KILL);
+    }
+    child.wait()?;
+    Ok(())
+}
+
+fn understand(args: &Host, task: Task, ended: Option<ExitStatus>, out: &str, err: &str) -> Said {
+    let ended_badly = match ended {
+        None => Some(format!("the host did not end within {:?}", args.limit)),
+        Some(status) => {
+            status.signal().map(|signal| format!("the host was ended by signal {signal}"))
+        }
+    };
+    let failed = ended.is_some_and(|status| !status.success());
+    if task == Task::Start {
+        return Said { values: Vec::new(), complained: failed, ended_badly };
+    }
+    let lines = || out.lines().filter(|line| !line.trim().is_empty());
+    let values: Vec<Reading> = lines()
+        .filter_map(|line| value(line, args.field))
+        .map(|value| Reading { motor: 1, value })
+        .collect();
+    let complained = failed || !err.trim().is_empty() || lines().count() > values.len();
+    Said { values, complained, ended_badly }
+}
+
+/// The value in a line: its last number, or that in its place.
+fn value(line: &str, field: Option<u8>) -> Option<f64> {
+    let mut numbers = line.split_whitespace().filter_map(|word| word.parse::<f64>().ok());
+    match field {
+        None => numbers.next_back(),
+        Some(field) => numbers.nth(usize::from(field) - 1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_value_of_a_line_is_its_last_number_or_the_one_that_was_said() {
+        assert_eq!(value("SPEED_MEAS  1137 rpm", None), Some(1137.0));
+        assert_eq!(value("0.020 s  angle 2.26 °   circle_angle 2.39 °", Some(2)), Some(2.26));
+        assert_eq!(value("error: no reply", None), None);
+        assert_eq!(value("1 2", Some(3)), None);
+    }
+}
