@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use motorlink::port::{PortError, ServeName};
 use motorlink::serve::{Served, Server};
 use motorlink_conformance::host::{Journal, Reading, Said, Scenario, Task, rmd, st};
-use motorlink_conformance::{Outcome, Report};
+use motorlink_conformance::{Outcome, Report, Verdict};
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::args::{Host, Which};
@@ -120,7 +120,7 @@ struct Heard {
 
 /// Where a program failed, its own words help.
 fn explained(mut outcome: Outcome, heard: &Heard) -> Outcome {
-    if !outcome.transcript.is_empty() {
+    if matches!(outcome.verdict, Verdict::Failed(_)) {
         let lines = heard.out.lines().map(|line| format!("stdout: {line}"));
         outcome.transcript.extend(lines);
         outcome.transcript.extend(heard.err.lines().map(|line| format!("stderr: {line}")));

@@ -81,14 +81,14 @@ impl<S> Scenario<S> {
         if let Some(fault) = said.values.iter().enumerate().find_map(falsehood) {
             return Some(fault);
         }
+        if journal.starts > 1 {
+            return Some(format!("the host sent START_MOTOR {} times", journal.starts));
+        }
         if let Some(violation) = journal.violations.first() {
             return Some(format!("the host {violation}"));
         }
         if let Some(fault) = &said.ended_badly {
             return Some(fault.clone());
-        }
-        if journal.starts > 1 {
-            return Some(format!("the host sent START_MOTOR {} times", journal.starts));
         }
         let count = said.values.len();
         let wanted = self.task.values();

@@ -39,9 +39,9 @@ fn reading() -> Vec<Scenario> {
         read(
             "a_reply_is_awaited_for_the_whole_timeout",
             &[ANSWER],
-            "waits until the reply comes, 0.8 of its timeout later",
+            "waits until the reply comes, 0.6 of its timeout later",
             Demand::Everything,
-            |turn| vec![right(turn).after(share(turn.timeout, 4, 5))],
+            |turn| vec![right(turn).after(share(turn.timeout, 3, 5))],
         ),
         read(
             "a_reply_at_the_timeout_is_its_own_or_nobodys",
@@ -243,7 +243,7 @@ fn many_motors() -> Vec<Scenario> {
             "says that one motor does not answer, and leaves it alone until its reply came",
             Demand::Truth,
             |turn| match is_second(turn) {
-                true => vec![right(turn).after(share(turn.timeout, 2, 1))],
+                true => late(turn),
                 false => vec![right(turn)],
             },
         );
@@ -316,9 +316,9 @@ fn value(turn: &Turn) -> i64 {
     turn.value.unwrap_or_default()
 }
 
-/// The motor is busy until its timeout has passed twice, and then answers everything in order.
+/// The motor is busy until a little after the host has given up, and then answers everything in order.
 fn late(turn: &Turn) -> Sends {
-    vec![right(turn).after(share(turn.timeout, 2, 1))]
+    vec![right(turn).after(turn.timeout + Duration::from_millis(20))]
 }
 
 fn frame(can_id: u16, data: [u8; 8]) -> CanFrame {

@@ -42,9 +42,9 @@ pub fn scenarios() -> Vec<Scenario> {
         scenario(
             "a_reply_is_awaited_for_a_second",
             &[TIMER],
-            "waits until the reply comes, 0.8 of its timeout later",
+            "waits until the reply comes, 0.6 of its timeout later",
             Demand::Everything,
-            |turn| vec![right(turn).after(share(turn.timeout, 4, 5))],
+            |turn| vec![right(turn).after(share(turn.timeout, 3, 5))],
         ),
         scenario(
             "a_reply_that_comes_byte_by_byte_is_one_reply",

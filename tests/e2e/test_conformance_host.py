@@ -1,0 +1,171 @@
+"""`motorlink conformance host`: programs before drives that misbehave."""
+
+import json
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+HOSTS = Path(__file__).parent / "hosts"
+WITHIN = 120
+
+
+def python(name, *arguments):
+    return ["--", sys.executable, str(HOSTS / name), "{path}", *map(str, arguments)]
+
+
+@pytest.fixture
+def check(run, tmp_path):
+    """Puts a host through scenarios; gives the exit code and each verdict by name."""
+    served = {"st": f"pty:{tmp_path}/st0", "rmd": f"slcan-pty:{tmp_path}/can0"}
+
+    def check(which, *arguments):
+        done = run(
+            *("conformance", "host", which, "--serve", served[which], "--json", *arguments),
+            within=WITHIN,
+        )
+        assert "panicked" not in done.err
+        return done.code, {case["name"]: case for case in done.json["cases"]}
+
+    return check
+
+
+def failed(cases):
+    return {name for name, case in cases.items() if case["verdict"] == "failed"}
+
+
+# Our own command line.
+
+
+def test_our_client_passes_every_scenario(check, motorlink):
+    start = f"{motorlink} st start"
+    get = ["--", motorlink, "st", "get", *["SPEED_MEAS"] * 4]
+    code, cases = check("st", "--start", start, *get)
+    assert failed(cases) == set()
+    assert code == 0
+    assert {case["verdict"] for case in cases.values()} == {"passed"}
+
+
+@pytest.mark.parametrize("only", ["late", "copy", "silence", "cut_off", "identification", "0x7f"])
+def test_our_client_reads_on_when_the_line_is_back(check, motorlink, only):
+    words = "st get SPEED_MEAS --every 20ms --count 4 --timeout 300".split()
+    code, cases = check("st", "--only", only, "--timeout", "300ms", "--", motorlink, *words)
+    assert failed(cases) == set()
+    assert code == 0
+
+
+def test_our_bus_passes_every_scenario_for_one_motor(check, motorlink):
+    angle = "rmd --timeout 400 angle --every 5ms --count 4"
+    echo = f"{motorlink} {angle} -p $MOTORLINK_PORT?echo=1"
+    told = ["--timeout", "400ms", "--field", 2, "--echo", echo]
+    code, cases = check("rmd", *told, "--", motorlink, *angle.split())
+    assert failed(cases) == set()
+    assert code == 0
+    assert sum(case["verdict"] == "passed" for case in cases.values()) == 17
+
+
+# Hosts as people write them.
+
+
+def test_a_naive_host_of_the_serial_protocol_is_caught(check):
+    code, cases = check("st", "--timeout", "200ms", *python("naive_st.py", 0.2))
+    assert code == 1
+    assert cases["every_reading_has_its_own_value"]["verdict"] == "passed"
+    assert failed(cases) >= {
+        "a_late_reply_is_not_the_next_ones",
+        "a_reply_that_comes_with_the_next_one_is_not_the_next_ones",
+        "a_second_copy_of_a_reply_is_not_the_next_ones",
+        "a_damaged_checksum_is_an_error",
+        "a_damaged_value_is_an_error",
+        "a_header_that_is_neither_is_an_error",
+        "a_flood_of_acknowledges_is_nobodys",
+        "a_line_that_echoes_is_not_read_as_a_drive",
+    }
+    copy = cases["a_second_copy_of_a_reply_is_not_the_next_ones"]
+    assert "twice" in copy["received"]
+    assert "22 01 1e 41" in copy["sent"]
+    assert any("drive f0 04" in line for line in copy["transcript"])
+    assert any(line.startswith("stdout: ") for line in copy["transcript"])
+
+
+def test_a_careful_host_of_the_serial_protocol_passes(check):
+    code, cases = check("st", *python("careful_st.py", 1))
+    assert failed(cases) == set()
+    assert code == 0
+    skipped = {name for name, case in cases.items() if case["verdict"] == "skipped"}
+    assert all(name.startswith("a_start") for name in skipped) and len(skipped) == 3
+
+
+def test_a_naive_host_of_rmd_is_caught(check):
+    code, cases = check("rmd", "--timeout", "200ms", *python("naive_rmd.py", 0.2))
+    assert code == 1
+    assert cases["every_reading_has_its_own_value"]["verdict"] == "passed"
+    assert failed(cases) >= {
+        "a_late_reply_is_not_the_next_ones",
+        "a_second_copy_of_a_reply_is_not_the_next_ones",
+        "a_reply_to_another_command_is_not_the_answer",
+        "a_reply_of_another_motor_is_not_the_answer",
+        "an_extended_frame_is_no_reply",
+        "a_motor_of_v3_is_not_understood",
+        "a_motor_of_lk_tech_is_not_understood",
+        "frames_of_nobody_are_dropped",
+        "a_flood_of_other_frames_does_not_matter",
+    }
+
+
+# How a program may end.
+
+
+def only(check, *command, limit="2s", name="every_reading_has_its_own_value"):
+    code, cases = check("st", "--only", name, "--limit", limit, "--", *command)
+    return code, cases[name]
+
+
+def test_a_host_that_hangs_is_ended_and_has_failed(check):
+    code, case = only(check, "sh", "-c", "sleep 60 & sleep 60", limit="300ms")
+    assert code == 1
+    assert "did not end within 300ms" in case["received"]
+
+
+def test_a_host_that_crashes_has_failed(check):
+    code, case = only(check, "sh", "-c", "kill -SEGV $$")
+    assert code == 1
+    assert "signal 11" in case["received"]
+
+
+def test_a_host_that_says_nothing_has_failed(check):
+    _, case = only(check, "true")
+    assert "0 values of 4" in case["received"]
+
+
+def test_a_host_that_invents_a_value_has_failed(check):
+    _, case = only(check, "echo", "42")
+    assert "42, which no reply told it" in case["received"]
+
+
+def test_a_host_that_starts_the_motor_again_has_failed(check, motorlink):
+    name = "a_start_without_an_answer_is_an_error_and_not_repeated"
+    start = f"{motorlink} st --timeout 100 start || {motorlink} st --timeout 100 start"
+    code, cases = check("st", "--only", name, "--start", start, "--", "true")
+    assert code == 1
+    assert "sent START_MOTOR 2 times" in cases[name]["received"]
+
+
+def test_a_program_that_is_not_there_is_a_usage_error(run, tmp_path):
+    words = ["conformance", "host", "st", "--serve", f"pty:{tmp_path}/st0", "--", "./not-there"]
+    assert "./not-there" in run(*words).ended(2).err
+
+
+def test_results_go_to_files_and_the_screen_explains_a_failure(run, tmp_path):
+    junit, results = tmp_path / "host.xml", tmp_path / "host.json"
+    done = run(
+        *("conformance", "host", "st", "--serve", "tcp-listen:127.0.0.1:0"),
+        *("--only", "every_reading", "--junit", junit, "--json", results),
+        *("--", "sh", "-c", "echo $MOTORLINK_PORT $1 7", "sh", "{port}"),
+    ).ended(1)
+    assert "FAILED" in done.out and "7, which no reply told it" in done.out
+    assert json.loads(results.read_text())["failed"] == 1
+    case = ElementTree.parse(junit).find(".//testcase")
+    assert case.find("failure") is not None
+    assert "stdout: tcp:127.0.0.1:" in case.find("failure").text
