@@ -1,0 +1,161 @@
+//! Our blocking clients before adversarial drives, through real ports. All scenarios run at once:
+//! nearly all of their time is waiting.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use motorlink::port::PortName;
+use motorlink::rmd::{Bus, Error, MotorId, MotorSet, Torque4, TorqueCommand};
+use motorlink::serve::Server;
+use motorlink::stmcp::{Client, register};
+use motorlink::{rmd, stmcp};
+use motorlink_conformance::Verdict;
+use motorlink_conformance::host::{self, Demand, Journal, READINGS, Reading, Said, Task};
+use motorlink_proto::rmd::{Command as _, MultiTurn, Payload as _, ReadMultiTurnAngle};
+
+/// Long against what a loaded machine adds, short for a test.
+const TIMEOUT: Duration = Duration::from_millis(500);
+
+/// Serves a drive of the making of `serve` while `host` is there; gives what it said and what passed.
+fn met(
+    name: String,
+    scheme: &str,
+    serve: impl FnOnce(&mut Server, &str) -> Box<dyn Fn() -> Journal> + Send,
+    host: impl FnOnce(&str) -> Said,
+) -> (Said, Journal) {
+    let folder: PathBuf = env!("CARGO_TARGET_TMPDIR").into();
+    let path = folder.join(format!("{name}-{}", std::process::id()));
+    let path = path.to_str().expect("a path in UTF-8");
+    let (ready, over) = (AtomicBool::new(false), AtomicBool::new(false));
+    thread::scope(|scope| {
+        let drive = scope.spawn(|| {
+            let mut server = Server::new();
+            let journal = serve(&mut server, &format!("{scheme}:{path}"));
+            ready.store(true, Ordering::SeqCst);
+            while !over.load(Ordering::SeqCst) {
+                server.turn(Duration::from_millis(5), None).expect("a turn");
+            }
+            journal()
+        });
+        while !ready.load(Ordering::SeqCst) {
+            assert!(!drive.is_finished(), "the drive is served");
+            thread::yield_now();
+        }
+        let said = host(path);
+        over.store(true, Ordering::SeqCst);
+        (said, drive.join().expect("the drive was served"))
+    })
+}
+
+/// Runs `play` for each number below `count`, all at once.
+fn at_once(count: usize, play: impl Fn(usize) + Sync) {
+    thread::scope(|scope| {
+        let play = &play;
+        for number in 0..count {
+            scope.spawn(move || play(number));
+        }
+    });
+}
+
+#[test]
+fn our_client_passes_every_scenario() {
+    at_once(host::st::scenarios().len(), |number| {
+        let scenario = host::st::scenarios().swap_remove(number);
+        let (said, journal) = met(
+            format!("st-{number}"),
+            "pty",
+            |server, name| {
+                let drive = host::st::scenarios().swap_remove(number).drive(TIMEOUT.into());
+                server.serve_bytes(&name.parse().unwrap(), Box::new(drive.clone())).unwrap();
+                Box::new(move || drive.journal())
+            },
+            |path| ask_client(path, scenario.task),
+        );
+        let outcome = scenario.judge(&journal, &said, host::st::DIGIT);
+        assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:#?}");
+        if scenario.demand == Demand::Everything {
+            assert!(!said.complained, "{outcome:#?}");
+        }
+    });
+}
+
+fn ask_client(path: &str, task: Task) -> Said {
+    let mut options = stmcp::Options::default();
+    options.line.timeout = TIMEOUT.into();
+    let client = Client::open(&path.parse().unwrap(), options).unwrap();
+    let motor = client.motor(1).unwrap();
+    let mut said = Said::default();
+    if task == Task::Start {
+        said.complained = motor.start().is_err();
+        assert_eq!(client.started().count(), 1, "it may have started");
+        return said;
+    }
+    for _ in 0..READINGS {
+        match motor.read(register::SPEED_MEAS) {
+            Ok(rpm) => said.values.push(Reading { motor: 1, value: rpm.into() }),
+            Err(_) => said.complained = true,
+        }
+    }
+    said
+}
+
+#[test]
+fn our_bus_passes_every_scenario() {
+    at_once(host::rmd::scenarios().len(), |number| {
+        let scenario = host::rmd::scenarios().swap_remove(number);
+        let (said, journal) = met(
+            format!("rmd-{number}"),
+            "slcan-pty",
+            |server, name| {
+                let motors = host::rmd::scenarios().swap_remove(number).motors(TIMEOUT.into());
+                server.serve_can(&name.parse().unwrap(), Box::new(motors.clone())).unwrap();
+                Box::new(move || motors.journal())
+            },
+            |path| ask_bus(path, scenario.task),
+        );
+        let outcome = scenario.judge(&journal, &said, 1.0);
+        assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:#?}");
+    });
+}
+
+fn ask_bus(path: &str, task: Task) -> Said {
+    let echo = if task == Task::Echoed { "?echo=1" } else { "" };
+    let port: PortName = format!("slcan:{path}{echo}").parse().unwrap();
+    let guard = Duration::from_millis(300);
+    let bus = Bus::open(&port, rmd::Options { timeout: TIMEOUT, guard, ..Default::default() });
+    let bus = bus.unwrap();
+    let motor = bus.motor(1).unwrap();
+    let mut said = Said::default();
+    let mut note = |motor: MotorId, digits: Result<i64, Error>| match digits {
+        Ok(digits) => said.values.push(Reading { motor: motor.number(), value: digits as f64 }),
+        Err(_) => said.complained = true,
+    };
+    for _ in 0..READINGS {
+        match task {
+            Task::Read | Task::Echoed => note(motor.id(), motor.multi_turn_angle().map(|a| a.0)),
+            Task::Alternate => {
+                note(motor.id(), motor.multi_turn_angle().map(|angle| angle.0));
+                note(motor.id(), motor.circle_angle().map(|angle| angle.0.into()));
+            }
+            Task::Clear => note(motor.id(), motor.clear_errors().map(|s| s.voltage.0.into())),
+            Task::Cycle => {
+                let request = ReadMultiTurnAngle.encode();
+                let requests: Vec<_> = MotorSet::TORQUE4.map(|id| (id, request)).collect();
+                let angle = |reply| MultiTurn::decode(&reply).angle.0;
+                bus.cycle(&requests, |id, reply| note(id, reply.map(angle))).unwrap();
+            }
+            Task::Torque4 => match bus.torque4(Torque4([TorqueCommand(0); 4]), MotorSet::TORQUE4) {
+                Ok(replies) => {
+                    for (id, reply) in MotorSet::TORQUE4.zip(replies) {
+                        note(id, reply.unwrap().map(|status| status.iq.0.into()));
+                    }
+                }
+                Err(error) => note(motor.id(), Err(error)),
+            },
+            Task::Start => unreachable!("RMD motors are not started"),
+        }
+    }
+    said
+}
