@@ -169,3 +169,9 @@ def test_results_go_to_files_and_the_screen_explains_a_failure(run, tmp_path):
     case = ElementTree.parse(junit).find(".//testcase")
     assert case.find("failure") is not None
     assert "stdout: tcp:127.0.0.1:" in case.find("failure").text
+
+
+@pytest.mark.parametrize("which", ["st", "rmd"])
+def test_the_document_has_every_scenario(run, which):
+    document = Path(__file__).parents[2] / "docs/HOST-CONFORMANCE.md"
+    assert run("conformance", "scenarios", which).ended(0).out in document.read_text()

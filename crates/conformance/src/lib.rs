@@ -7,6 +7,8 @@
 //! cases test a drive on the bench and, in milliseconds, this kit itself. [`run`] runs them and gives
 //! a [`Report`].
 //!
+//! [`host`] is for the other end: drives that misbehave, and what a host makes of them.
+//!
 //! A drive is left as it was found: cases restore what they write, and nothing that may turn a motor,
 //! wears a ROM or needs a hand at the power switch runs unless it is [`Need`]ed and allowed.
 
@@ -23,5 +25,6 @@ mod world;
 
 pub use case::{Case, Finding, Need, Run, Stop, Subject, run};
 pub use clause::Clause;
+pub use markdown::scenario_table;
 pub use report::{Outcome, Report, Verdict};
 pub use world::{Unavailable, World};

@@ -1,9 +1,10 @@
-//! docs/CONFORMANCE.md: every clause and what tests it.
+//! docs/CONFORMANCE.md: every clause and what tests it. docs/HOST-CONFORMANCE.md: every scenario.
 
 use std::fmt::Write;
 
 use crate::case::Case;
 use crate::clause::Clause;
+use crate::host::Scenario;
 
 /// The table of `clauses` with the cases of `suite` that test each. Cases that differ in their
 /// subject only stand as one.
@@ -24,6 +25,17 @@ pub fn markdown<'a, B: 'a>(
         let host = code(clause.host);
         let text = clause.text.replace('|', "\\|");
         writeln!(table, "| {} | {text} | {drive} | {host} |", clause.id)
+            .expect("text is written to memory");
+    }
+    table
+}
+
+/// The table of what hosts are put through.
+pub fn scenario_table<S>(scenarios: &[Scenario<S>]) -> String {
+    let mut table = String::from("| scenario | a correct host | clauses |\n|---|---|---|\n");
+    for Scenario { name, expected, clauses, .. } in scenarios {
+        let clauses = clauses.join(", ");
+        writeln!(table, "| `{name}` | {expected} | {clauses} |")
             .expect("text is written to memory");
     }
     table

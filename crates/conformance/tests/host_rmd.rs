@@ -61,11 +61,11 @@ fn turns(task: Task) -> usize {
     if task == Task::Alternate { 2 * READINGS } else { READINGS }
 }
 
+/// What a request to a motor, in the turn of this number, ended in.
+type Ended = (MotorId, usize, Result<f64, Error>);
+
 /// Our host: what each request ended in, in the order in which it did.
-fn results(
-    bus: &mut dyn Bus,
-    task: Task,
-) -> Result<Vec<(MotorId, usize, Result<f64, Error>)>, PortError> {
+fn results(bus: &mut dyn Bus, task: Task) -> Result<Vec<Ended>, PortError> {
     let mut host = Host::new();
     let mut results = Vec::new();
     for turn in 0..turns(task) {
@@ -145,8 +145,11 @@ fn our_host_passes_every_scenario() {
     }
 }
 
-/// What fails for our host in each scenario where anything does: the reading, and how.
-const ENDS: &[(&str, &[(u8, usize, Error)])] = &[
+/// The motor, the turn, and how it failed.
+type Failed = (u8, usize, Error);
+
+/// What fails for our host in each scenario where anything does.
+const ENDS: &[(&str, &[Failed])] = &[
     ("a_late_reply_is_not_the_next_ones", TIMEOUT),
     // Angle, circle angle, angle: the second reading is in the third turn.
     ("a_late_reply_is_not_that_of_another_command", &[(1, 2, Error::Timeout)]),
@@ -162,8 +165,8 @@ const ENDS: &[(&str, &[(u8, usize, Error)])] = &[
     ("a_late_reply_is_not_the_next_cycles[a cycle]", SECOND),
     ("a_late_reply_is_not_the_next_cycles[0x280]", SECOND),
 ];
-const TIMEOUT: &[(u8, usize, Error)] = &[(1, 1, Error::Timeout)];
-const SECOND: &[(u8, usize, Error)] = &[(2, 1, Error::Timeout)];
+const TIMEOUT: &[Failed] = &[(1, 1, Error::Timeout)];
+const SECOND: &[Failed] = &[(2, 1, Error::Timeout)];
 
 #[test]
 fn our_host_loses_the_disturbed_reading_only_and_says_how() {

@@ -49,6 +49,11 @@ pub enum Command {
     /// Check a host: serve a drive that misbehaves and see what your program makes of it
     #[command(after_help = super::host::CONTRACT)]
     Host(Host),
+    /// Print every scenario that a host is put through, as a Markdown table
+    Scenarios {
+        /// Of which protocol
+        which: Which,
+    },
     /// Print every clause and what tests it, as a Markdown table
     Clauses {
         /// Of which document

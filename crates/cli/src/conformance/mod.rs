@@ -9,7 +9,9 @@ use std::io::Write;
 use std::path::Path;
 
 use motorlink_conformance::wire::Real;
-use motorlink_conformance::{Case, Need, Report, Subject, rmd, run as run_cases, st};
+use motorlink_conformance::{
+    Case, Need, Report, Subject, host as hosts, rmd, run as run_cases, scenario_table, st,
+};
 
 pub use args::Args;
 use args::{Command, Results, Run, Which};
@@ -36,6 +38,12 @@ pub fn run(args: Args) -> Result<(), Failure> {
             conduct("rmd", &run, rmd::suite(), bench)
         }
         Command::Host(args) => host::run(&args),
+        Command::Scenarios { which: Which::St } => {
+            output::line(&scenario_table(&hosts::st::scenarios()).trim_end())
+        }
+        Command::Scenarios { which: Which::Rmd } => {
+            output::line(&scenario_table(&hosts::rmd::scenarios()).trim_end())
+        }
         Command::Clauses { which: Which::St } => output::line(&st::table().trim_end()),
         Command::Clauses { which: Which::Rmd } => output::line(&rmd::table().trim_end()),
     }

@@ -20,12 +20,14 @@ use crate::host::script::{Outbox, Send};
 /// A scenario for an RMD host.
 pub type Scenario = crate::host::Scenario<Script>;
 
+pub(super) type Sends = Vec<Send<CanFrame>>;
+
 /// What the motors send for a request.
 #[derive(Clone)]
-pub struct Script(Rc<dyn Fn(&Turn) -> Vec<Send<CanFrame>>>);
+pub struct Script(Rc<dyn Fn(&Turn) -> Sends>);
 
 impl Script {
-    pub(super) fn new(script: impl Fn(&Turn) -> Vec<Send<CanFrame>> + 'static) -> Self {
+    pub(super) fn new(script: impl Fn(&Turn) -> Sends + 'static) -> Self {
         Script(Rc::new(script))
     }
 }

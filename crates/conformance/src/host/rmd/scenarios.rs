@@ -3,7 +3,7 @@
 use motorlink_proto::rmd::{CanFrame, Code, Dialect};
 use motorlink_proto::time::Duration;
 
-use super::motors::{Scenario, Script, Turn};
+use super::motors::{Scenario, Script, Sends, Turn};
 use crate::host::script::{Send, share};
 use crate::host::{DISTURBED, Demand, Task};
 
@@ -13,8 +13,6 @@ const EIGHT_BYTES: &str = "RMD-1-03";
 const ANSWER: &str = "RMD-92-02";
 const CLEAR: &str = "RMD-9B-02";
 const FOUR: &str = "RMD-280-03";
-
-type Sends = Vec<Send<CanFrame>>;
 
 /// An angle, in digits, that no motor has: what unasked frames tell.
 const UNASKED: u16 = 7_001;

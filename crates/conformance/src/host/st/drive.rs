@@ -16,12 +16,14 @@ use crate::host::script::{Outbox, Send, share};
 /// A scenario for an ST host.
 pub type Scenario = crate::host::Scenario<Script>;
 
+pub(super) type Sends = Vec<Send<Vec<u8>>>;
+
 /// What the drive sends for a request.
 #[derive(Clone)]
-pub struct Script(Rc<dyn Fn(&Turn) -> Vec<Send<Vec<u8>>>>);
+pub struct Script(Rc<dyn Fn(&Turn) -> Sends>);
 
 impl Script {
-    pub(super) fn new(script: impl Fn(&Turn) -> Vec<Send<Vec<u8>>> + 'static) -> Self {
+    pub(super) fn new(script: impl Fn(&Turn) -> Sends + 'static) -> Self {
         Script(Rc::new(script))
     }
 }

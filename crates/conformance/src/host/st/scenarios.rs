@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use motorlink_proto::stmcp::{Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD};
 use motorlink_proto::time::Duration;
 
-use super::drive::{Scenario, Script, Turn};
+use super::drive::{Scenario, Script, Sends, Turn};
 use crate::host::script::{Send, share};
 use crate::host::{DISTURBED, Demand, Task};
 
@@ -21,8 +21,6 @@ const ACK: &str = "ST-4.2-01";
 const NACK: &str = "ST-4.3-01";
 const NACK_CODE: &str = "ST-4.3-02";
 const VALUE_SIZE: &str = "ST-4.5-03";
-
-type Sends = Vec<Send<Vec<u8>>>;
 
 /// NACK codes that table 2 does not have.
 const UNKNOWN_CODES: [u8; 4] = [0x04, 0x06, 0x7F, 0xFF];
