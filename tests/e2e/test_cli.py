@@ -92,7 +92,8 @@ def test_bash_takes_the_completions(run):
     script = run("completions", "bash").ended(0).out
     ask = "COMP_WORDS=(motorlink st rev) COMP_CWORD=2; _motorlink motorlink rev st"
     done = subprocess.run(
-        ["bash", "-c", f'{script}\n{ask}; echo "${{COMPREPLY[@]}}"'],
+        ["bash"],
+        input=f'{script}\n{ask}; echo "${{COMPREPLY[@]}}"\n',
         capture_output=True,
         text=True,
         timeout=10,

@@ -114,6 +114,21 @@ def test_a_naive_host_of_rmd_is_caught(check):
     }
 
 
+def test_hosts_of_four_motors_are_told_apart(check):
+    def cycle(name):
+        host = f"{sys.executable} {HOSTS / name} {{path}} 0.4"
+        told = ["--only", "[a cycle]", "--timeout", "400ms", "--cycle", host]
+        return check("rmd", *told, "--", "true")
+
+    code, cases = cycle("careful_cycle.py")
+    assert (code, len(cases), failed(cases)) == (0, 5, set())
+    code, cases = cycle("naive_cycle.py")
+    assert code == 1
+    mixed = "replies_in_any_order_find_their_motors[a cycle]"
+    assert failed(cases) >= {mixed, "frames_of_other_motors_do_not_matter[a cycle]"}
+    assert "of motor 1; motor 4 did" in cases[mixed]["received"]
+
+
 # How a program may end.
 
 

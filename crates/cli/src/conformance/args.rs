@@ -130,6 +130,10 @@ pub struct Host {
     /// A shell command that reads as COMMAND does, from an RMD adapter that echoes what it is sent
     #[arg(long, value_name = "COMMAND")]
     pub echo: Option<String>,
+    /// A shell command that reads the angles of RMD motors 1 to 4 at once, four times, and prints each
+    /// on a line that begins with the ID
+    #[arg(long, value_name = "COMMAND")]
+    pub cycle: Option<String>,
     #[command(flatten)]
     pub results: Results,
     /// Your program and its arguments

@@ -28,8 +28,8 @@ may go on or end.
 {port} in its arguments becomes the port as motorlink names it, {path} the device or HOST:PORT; \
 MOTORLINK_PORT and MOTORLINK_PATH are the same. Each reading has a value of its own, so what your \
 program prints tells which reply it took for which request.
-With --start it is another command that is run, which starts motor 1 once and ends with 0 only when \
-the drive acknowledged it.
+With --start, --echo and --cycle other commands are run as well. That of --start ends with 0 only \
+when the drive acknowledged it.
   motorlink conformance host st --serve pty:./st0 -- python3 my_host.py {path}
 docs/HOST-CONFORMANCE.md has an example in Python and what each scenario expects.";
 
@@ -94,21 +94,19 @@ fn conduct<S>(
 
 /// The program for a task and its arguments, or why there is none.
 fn program(args: &Host, task: Task) -> Result<Vec<String>, &'static str> {
-    let shell = |command: &String| ["sh", "-c", command].map(str::to_owned).to_vec();
-    match task {
-        Task::Read => Ok(args.command.clone()),
-        Task::Start => {
-            args.start.as_ref().map(shell).ok_or("starts a motor: give a command with --start")
+    let (command, why) = match task {
+        Task::Read => return Ok(args.command.clone()),
+        Task::Start => (&args.start, "starts a motor: give a command with --start"),
+        Task::Cycle => (&args.cycle, "asks four motors: give a command with --cycle"),
+        Task::Echoed => (&args.echo, "needs a host that drops echoes: give a command with --echo"),
+        Task::Alternate | Task::Clear | Task::Torque4 => {
+            return Err(
+                "is for hosts that the kit calls: see crates/conformance/tests/host_rmd.rs",
+            );
         }
-        Task::Echoed => args
-            .echo
-            .as_ref()
-            .map(shell)
-            .ok_or("needs a host that drops echoes: give one with --echo"),
-        Task::Alternate | Task::Clear | Task::Cycle | Task::Torque4 => {
-            Err("is for hosts in Rust, which the kit calls: crates/conformance/tests/host_rmd.rs")
-        }
-    }
+    };
+    let command = command.as_deref().ok_or(why)?;
+    Ok(["sh", "-c", command].map(str::to_owned).to_vec())
 }
 
 /// What a program said, as it was and as it is understood.
@@ -214,8 +212,10 @@ fn understand(args: &Host, task: Task, ended: Option<ExitStatus>, out: &str, err
     }
     let lines = || out.lines().filter(|line| !line.trim().is_empty());
     let values: Vec<Reading> = lines()
-        .filter_map(|line| value(line, args.field))
-        .map(|value| Reading { motor: 1, value })
+        .filter_map(|line| {
+            let motor = if task == Task::Cycle { value(line, Some(1))? as u8 } else { 1 };
+            Some(Reading { motor, value: value(line, args.field)? })
+        })
         .collect();
     let complained = failed || !err.trim().is_empty() || lines().count() > values.len();
     Said { values, complained, ended_badly }
