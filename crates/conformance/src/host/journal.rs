@@ -6,6 +6,8 @@ use super::script::{Send, When};
 
 /// Lines that a transcript keeps; a drive that never stops would fill memory.
 const TRANSCRIPT: usize = 120;
+/// Frames of the host that a finding shows.
+const SENT: usize = 8;
 
 /// What passed between a host and an adversarial drive.
 #[derive(Debug, Clone, Default)]
@@ -17,6 +19,7 @@ pub struct Journal {
     pub violations: Vec<String>,
     /// How often the host started the motor.
     pub starts: usize,
+    sent: Vec<String>,
     exchanges: Vec<Asked>,
     told: Vec<Told>,
 }
@@ -60,6 +63,9 @@ impl Journal {
     /// Something came from the host.
     pub(super) fn heard(&mut self, now: Instant, shown: &str) {
         self.note(now, "host ", shown);
+        if self.sent.len() < SENT {
+            self.sent.push(shown.to_owned());
+        }
     }
 
     /// It asked something. Until a reply came, or for `patience`, it must not have.
@@ -147,10 +153,9 @@ impl Journal {
         self.told.iter().rev().find(|told| is(told.value))
     }
 
-    /// What the host sent.
+    /// What the host sent first.
     pub(super) fn sent(&self) -> String {
-        let sent = self.transcript.iter().filter_map(|line| line.split_once("host  "));
-        sent.map(|(_, frame)| frame).take(8).collect::<Vec<_>>().join(" | ")
+        self.sent.join(" | ")
     }
 
     fn note(&mut self, now: Instant, who: &str, what: &str) {
