@@ -7,12 +7,15 @@ use super::motors::{Scenario, Script, Sends, Turn};
 use crate::host::script::{Send, share};
 use crate::host::{DISTURBED, Demand, Task};
 
+/// Request and reply are on 0x140 + ID.
 const IDENTIFIERS: &str = "RMD-1-01";
-const FRAME: &str = "RMD-1-02";
-const EIGHT_BYTES: &str = "RMD-1-03";
+const DATA_FRAMES: &str = "RMD-1-03";
+const STANDARD_FRAMES: &str = "RMD-1-04";
+const EIGHT_BYTES: &str = "RMD-1-05";
+/// One frame, DATA[0] that of the request.
 const ANSWER: &str = "RMD-92-02";
-const CLEAR: &str = "RMD-9B-02";
-const FOUR: &str = "RMD-280-03";
+const CLEAR: &str = "RMD-9B-03";
+const FOUR: &str = "RMD-280-05";
 
 /// An angle, in digits, that no motor has: what unasked frames tell.
 const UNASKED: u16 = 7_001;
@@ -110,14 +113,14 @@ fn reading() -> Vec<Scenario> {
         ),
         read(
             "an_extended_frame_is_no_reply",
-            &[FRAME],
+            &[STANDARD_FRAMES],
             "drops the frame and says that there was no reply",
             Demand::Truth,
             |turn| vec![shaped(turn, true, 8, "its frame had an extended identifier")],
         ),
         read(
             "a_remote_frame_is_no_reply",
-            &[FRAME],
+            &[DATA_FRAMES],
             "drops the frame and takes the reply behind it",
             Demand::Everything,
             |turn| {

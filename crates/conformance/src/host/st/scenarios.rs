@@ -9,18 +9,30 @@ use super::drive::{Scenario, Script, Sends, Turn};
 use crate::host::script::{Send, share};
 use crate::host::{DISTURBED, Demand, Task};
 
-const ONE_EXCHANGE: &str = "ST-2-02";
-const LENGTH: &str = "ST-3-03";
-const CODES: &str = "ST-3.1-02";
-const MOTOR_BITS: &str = "ST-3.2-01";
+/// A slave sends nothing unasked.
+const UNASKED_IS_NOTHING: &str = "ST-2-01";
+/// The next command follows the response to the last.
+const ONE_EXCHANGE: &str = "ST-2-04";
+const LENGTH: &str = "ST-3-05";
+const ACK_HEADER: &str = "ST-3.1-12";
+const NACK_HEADER: &str = "ST-3.1-13";
+const MOTOR_BITS: &str = "ST-3.2-02";
 const CHECKSUM: &str = "ST-3.3-01";
 const TIMER: &str = "ST-4.1-03";
-const CLOSED: &str = "ST-4.1-04";
-const TERMINATES: &str = "ST-4.1-06";
-const ACK: &str = "ST-4.2-01";
-const NACK: &str = "ST-4.3-01";
-const NACK_CODE: &str = "ST-4.3-02";
-const VALUE_SIZE: &str = "ST-4.5-03";
+/// What does not come in time is an error.
+const IN_TIME: &str = "ST-4.1-04";
+/// After that the communication is closed.
+const CLOSED: &str = "ST-4.1-05";
+/// BAD_CRC ends the exchange.
+const BAD_CRC: &str = "ST-4.1-07";
+const ACK: &str = "ST-4.2-03";
+const ACK_CARRIES: &str = "ST-4.2-04";
+const NACK: &str = "ST-4.3-03";
+const NACK_CODE: &str = "ST-4.3-04";
+const UNKNOWN_CODE: &str = "ST-4.3-16";
+const VALUE_SIZE: &str = "ST-4.5-05";
+
+type Clauses = &'static [&'static str];
 
 /// NACK codes that table 2 does not have.
 const UNKNOWN_CODES: [u8; 4] = [0x04, 0x06, 0x7F, 0xFF];
@@ -32,7 +44,7 @@ pub fn scenarios() -> Vec<Scenario> {
     let mut all = vec![
         scenario(
             "every_reading_has_its_own_value",
-            &[ONE_EXCHANGE, CHECKSUM, ACK, VALUE_SIZE],
+            &[ONE_EXCHANGE, CHECKSUM, ACK_CARRIES, VALUE_SIZE],
             "sends one request, reads the ACK and says its value, every time",
             Demand::Everything,
             |turn| vec![right(turn)],
@@ -46,21 +58,21 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         scenario(
             "a_reply_that_comes_byte_by_byte_is_one_reply",
-            &[ONE_EXCHANGE, TIMER, ACK],
+            &[ONE_EXCHANGE, TIMER],
             "gathers the reply although its bytes come with pauses",
             Demand::Everything,
             byte_by_byte,
         ),
         scenario(
             "a_reply_at_the_timeout_is_its_own_or_nobodys",
-            &[TIMER, CLOSED],
+            &[TIMER, IN_TIME, CLOSED],
             "takes the reply that comes when the timer runs out, or none; never for the next one's",
             Demand::Truth,
             |turn| vec![right(turn).after(turn.timeout)],
         ),
         scenario(
             "a_late_reply_is_not_the_next_ones",
-            &[TIMER, CLOSED, ONE_EXCHANGE],
+            &[IN_TIME, CLOSED, ONE_EXCHANGE],
             "says that there was no reply, and drops it when it comes after all, a quarter of the \
              timeout too late",
             Demand::Truth,
@@ -68,7 +80,7 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         scenario(
             "a_reply_that_comes_with_the_next_one_is_not_the_next_ones",
-            &[TIMER, CLOSED, ONE_EXCHANGE],
+            &[IN_TIME, CLOSED, ONE_EXCHANGE],
             "says that there was no reply; before the next reading it asks something whose reply is \
              different, or ends",
             Demand::Truth,
@@ -76,7 +88,7 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         scenario(
             "the_rest_of_a_reply_that_comes_late_is_dropped",
-            &[TIMER, CLOSED, CHECKSUM],
+            &[IN_TIME, CLOSED, CHECKSUM],
             "says that the reply was cut off, and drops its rest",
             Demand::Truth,
             |turn| {
@@ -86,35 +98,35 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         scenario(
             "a_reply_that_is_cut_off_is_no_reply",
-            &[TIMER, CLOSED, CHECKSUM],
+            &[IN_TIME, CHECKSUM],
             "says that the reply was cut off",
             Demand::Truth,
             |turn| vec![Send::reply(turn.reply[..5].to_vec())],
         ),
         scenario(
             "silence_is_an_error",
-            &[TIMER, CLOSED],
+            &[IN_TIME],
             "says that there was no reply",
             Demand::Truth,
             |_| Vec::new(),
         ),
         scenario(
             "a_second_copy_of_a_reply_is_not_the_next_ones",
-            &[ONE_EXCHANGE, ACK],
+            &[ONE_EXCHANGE, UNASKED_IS_NOTHING],
             "drops the copy that comes with the reply, before it asks again",
             Demand::Truth,
             |turn| vec![right(turn), Send::stray(turn.reply.clone()).telling(value(turn))],
         ),
         scenario(
             "an_unasked_acknowledge_is_nobodys",
-            &[ONE_EXCHANGE, CODES, ACK],
+            &[ONE_EXCHANGE, UNASKED_IS_NOTHING],
             "drops the ACK that comes behind the reply, before it asks again",
             Demand::Truth,
             |turn| vec![right(turn), unasked()],
         ),
         scenario(
             "two_replies_that_differ_are_no_answer",
-            &[ONE_EXCHANGE, ACK],
+            &[ONE_EXCHANGE, UNASKED_IS_NOTHING],
             "trusts neither of two ACKs that come at once",
             Demand::Truth,
             |turn| {
@@ -138,7 +150,7 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         scenario(
             "an_empty_acknowledge_has_no_value",
-            &[ACK, VALUE_SIZE],
+            &[ACK_CARRIES, VALUE_SIZE],
             "says that the reply has no value",
             Demand::Truth,
             |_| vec![Send::reply(frame(HEADER_ACK, &[]))],
@@ -190,21 +202,21 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         scenario(
             "a_header_that_is_neither_is_an_error",
-            &[CODES],
+            &[ACK_HEADER, NACK_HEADER],
             "says that this is no reply: it begins with neither 0xF0 nor 0xFF",
             Demand::Truth,
             |turn| vec![Send::reply(frame(Frame::header(2, 1), payload(turn)))],
         ),
         scenario(
             "garbage_before_a_reply_is_not_read",
-            &[CODES, CHECKSUM],
+            &[ACK_HEADER, CHECKSUM],
             "finds the reply behind the garbage, or says that this is none",
             Demand::Truth,
             |turn| vec![Send::stray(vec![0x00, 0x55, 0xAA]), right(turn)],
         ),
         scenario(
             "an_identification_is_no_reply",
-            &[CODES],
+            &[UNASKED_IS_NOTHING, ACK_HEADER],
             "skips the frame 0xE0 that drives of the 4.x kits send unasked, or says that it is no reply",
             Demand::Truth,
             |turn| {
@@ -214,7 +226,7 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         scenario(
             "a_reset_in_the_middle_of_a_reply_is_an_error",
-            &[CHECKSUM, CLOSED],
+            &[CHECKSUM, IN_TIME],
             "says that the reply is damaged or was cut off",
             Demand::Truth,
             |turn| {
@@ -225,14 +237,14 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         scenario(
             "a_negative_acknowledge_without_a_code_is_an_error",
-            &[NACK],
+            &[NACK, NACK_CODE],
             "says that the drive refused",
             Demand::Truth,
             |_| vec![Send::reply(frame(HEADER_NACK, &[]))],
         ),
         scenario(
             "the_second_answer_to_a_damaged_request_is_nobodys",
-            &[NACK, TERMINATES, ONE_EXCHANGE],
+            &[BAD_CRC, NACK, ONE_EXCHANGE],
             "says that the drive refused, and waits before it asks again: the drive may take the rest \
              of what it did not understand for another frame, and answer that after 25 ms",
             Demand::Truth,
@@ -246,7 +258,7 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         scenario(
             "a_drive_that_does_not_stop_to_send_is_an_error",
-            &[CODES, CLOSED],
+            &[UNASKED_IS_NOTHING, ACK_HEADER],
             "says that the line is of no use, in finite time",
             Demand::Truth,
             |turn| {
@@ -256,7 +268,7 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         scenario(
             "a_flood_of_acknowledges_is_nobodys",
-            &[ONE_EXCHANGE, CODES, CLOSED],
+            &[UNASKED_IS_NOTHING, ONE_EXCHANGE],
             "says that the line is of no use, in finite time",
             Demand::Truth,
             |turn| vec![right(turn), unasked().every(share(turn.timeout, 1, 200))],
@@ -270,7 +282,7 @@ pub fn scenarios() -> Vec<Scenario> {
         ),
         start(
             "a_start_without_an_answer_is_an_error_and_not_repeated",
-            &[TIMER, CLOSED],
+            &[IN_TIME, CLOSED],
             "says that it does not know whether the motor started; it does not start it again blindly",
             Demand::Error,
             |_| Vec::new(),
@@ -286,7 +298,7 @@ pub fn scenarios() -> Vec<Scenario> {
     all.extend(UNKNOWN_CODES.map(|code| {
         scenario(
             format!("a_negative_acknowledge_with_an_unknown_code_is_an_error[{code:#04x}]"),
-            &[NACK, NACK_CODE],
+            &[NACK, UNKNOWN_CODE],
             "says that the drive refused, and with which code",
             Demand::Truth,
             move |_| vec![Send::reply(frame(HEADER_NACK, &[code]))],
@@ -295,7 +307,7 @@ pub fn scenarios() -> Vec<Scenario> {
     all.push(disturbed(
         None,
         "a_line_that_echoes_is_not_read_as_a_drive".into(),
-        &[CODES],
+        &[ACK_HEADER],
         "drops the copy of its request, or says that this is no reply",
         Demand::Truth,
         Task::Read,
@@ -307,7 +319,7 @@ pub fn scenarios() -> Vec<Scenario> {
 /// A scenario whose second reading is disturbed.
 fn scenario(
     name: impl Into<Cow<'static, str>>,
-    clauses: &'static [&'static str],
+    clauses: Clauses,
     expected: &'static str,
     demand: Demand,
     trick: impl Fn(&Turn) -> Sends + 'static,
@@ -318,7 +330,7 @@ fn scenario(
 /// A scenario whose START_MOTOR is disturbed, each time that it is sent.
 fn start(
     name: &'static str,
-    clauses: &'static [&'static str],
+    clauses: Clauses,
     expected: &'static str,
     demand: Demand,
     trick: impl Fn(&Turn) -> Sends + 'static,
@@ -330,7 +342,7 @@ fn start(
 fn disturbed(
     number: Option<usize>,
     name: Cow<'static, str>,
-    clauses: &'static [&'static str],
+    clauses: Clauses,
     expected: &'static str,
     demand: Demand,
     task: Task,
