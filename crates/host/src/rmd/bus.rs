@@ -51,6 +51,9 @@ pub enum Found {
     Echo(MotorId),
 }
 
+/// More frames than a port holds: who sends as fast as they are read is not waited for.
+const BACKLOG: usize = 4096;
+
 /// IDs that a scan asks at once.
 const SCAN_WIDTH: usize = 8;
 
@@ -263,14 +266,13 @@ impl Inner {
     fn ready(&mut self) -> Result<(), Error> {
         let (link, _) = self.port.link()?;
         // What came meanwhile is late or unasked; left in the port it would pass for a reply.
-        let drained = loop {
+        for _ in 0..BACKLOG {
             match link.receive(Some(Duration::ZERO)) {
                 Ok(Some(frame)) => self.host.receive(&frame),
-                Ok(None) => break Ok(()),
-                Err(error) => break Err(error),
+                Ok(None) => break,
+                Err(error) => return Err(self.closed(error)),
             }
-        };
-        drained.map_err(|error| self.closed(error))?;
+        }
         let now = self.port.now();
         for id in self.host.busy() {
             self.host.cancel(now, id);
