@@ -149,6 +149,12 @@ def test_a_host_that_crashes_has_failed(check):
     assert "signal 11" in case["received"]
 
 
+def test_a_host_that_never_stops_to_talk_has_failed(check):
+    code, case = only(check, "yes", "7")
+    assert code == 1
+    assert "7, which no reply told it" in case["received"]
+
+
 def test_a_host_that_says_nothing_has_failed(check):
     _, case = only(check, "true")
     assert "0 values of 4" in case["received"]

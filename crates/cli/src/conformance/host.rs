@@ -37,6 +37,10 @@ docs/HOST-CONFORMANCE.md has an example in Python and what each scenario expects
 const TURN: Duration = Duration::from_millis(5);
 /// How long what a program said may take to come when it has ended.
 const LAST_WORDS: Duration = Duration::from_secs(1);
+/// Bytes that a program may say; then nobody reads it any more.
+const WORDS: u64 = 1 << 20;
+/// Lines of it that a report quotes.
+const QUOTED: usize = 50;
 
 pub fn run(args: &Host) -> Result<(), Failure> {
     interrupt::take_over();
@@ -119,9 +123,10 @@ struct Heard {
 /// Where a program failed, its own words help.
 fn explained(mut outcome: Outcome, heard: &Heard) -> Outcome {
     if matches!(outcome.verdict, Verdict::Failed(_)) {
-        let lines = heard.out.lines().map(|line| format!("stdout: {line}"));
-        outcome.transcript.extend(lines);
-        outcome.transcript.extend(heard.err.lines().map(|line| format!("stderr: {line}")));
+        for (pipe, said) in [("stdout", &heard.out), ("stderr", &heard.err)] {
+            let lines = said.lines().take(QUOTED).map(|line| format!("{pipe}: {line}"));
+            outcome.transcript.extend(lines);
+        }
     }
     outcome
 }
@@ -138,7 +143,10 @@ fn watch(
     let (out, err) = (child.stdout.take().map(listen), child.stderr.take().map(listen));
     let began = Instant::now();
     let ended = loop {
-        server.turn(TURN, None)?;
+        if let Err(error) = server.turn(TURN, None) {
+            end(&mut child)?;
+            return Err(error.into());
+        }
         if let Some(status) = child.try_wait()? {
             break Some(status);
         }
@@ -179,12 +187,12 @@ fn spawn(args: &Host, words: &[String], served: &Served) -> Result<Child, Failur
         .map_err(|error| Failure::Usage(format!("cannot run `{program}`: {error}")))
 }
 
-/// Gathers what comes through a pipe until its end.
-fn listen(mut pipe: impl Read + Send + 'static) -> Receiver<String> {
+/// Gathers what comes through a pipe until its end, or until it is too much.
+fn listen(pipe: impl Read + Send + 'static) -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
-        let _ = pipe.read_to_end(&mut bytes);
+        let _ = pipe.take(WORDS).read_to_end(&mut bytes);
         let _ = sender.send(String::from_utf8_lossy(&bytes).into_owned());
     });
     receiver
