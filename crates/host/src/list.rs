@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rustix::fs::{Access, access};
 
-use crate::port::{is_up, owning_group, permission_hint, up_hint};
+use crate::port::{Interface, owning_group, permission_hint, up_hint};
 
 /// The kernel's hardware type of CAN interfaces.
 const ARPHRD_CAN: &str = "280";
@@ -80,17 +80,18 @@ fn can_port(root: &Path, name: &str) -> Option<PortInfo> {
     if read(&class.join("type"))? != ARPHRD_CAN {
         return None;
     }
-    let problem = match is_up(name, &root.join("sys")) {
-        Some(false) => Some(format!("down: {}", up_hint(name))),
-        // A CAN controller without carrier is bus-off.
-        _ if read(&class.join("carrier")).as_deref() == Some("0") => Some(format!(
+    let sys = root.join("sys");
+    let interface = Interface::read(name, &sys)?;
+    let problem = match interface {
+        Interface { is_up: false, .. } => Some(format!("down: {}", up_hint(name, &sys))),
+        Interface { is_bus_off: true, .. } => Some(format!(
             "bus-off: check wiring, termination and bitrate, then \
              sudo ip link set {name} down && sudo ip link set {name} up"
         )),
         _ => None,
     };
     let device = class.join("device");
-    let virtual_can = (!device.exists()).then(|| "virtual CAN".to_owned());
+    let virtual_can = interface.is_virtual.then(|| "virtual CAN".to_owned());
     Some(PortInfo {
         name: format!("socketcan:{name}"),
         kind: PortKind::Can,
@@ -192,9 +193,13 @@ mod tests {
         )?;
         symlink("../../ttyACM0", machine.0.join("dev/serial/by-id/usb-STLink"))?;
         machine.file("sys/class/net/eth0/type", "1\n")?;
-        for (name, flags, carrier) in
-            [("can0", "0x40080", "1"), ("can1", "0x40081", "0"), ("vcan0", "0xc1", "1")]
-        {
+        for (name, flags, carrier) in [
+            ("can0", "0x40080", ""),
+            ("can1", "0x40081", "0"),
+            ("can2", "0x80", ""),
+            ("slcan0", "0x40081", "1"),
+            ("vcan0", "0x81", "1"),
+        ] {
             machine.file(&format!("sys/class/net/{name}/type"), "280\n")?;
             machine.file(&format!("sys/class/net/{name}/flags"), flags)?;
             machine.file(&format!("sys/class/net/{name}/carrier"), carrier)?;
@@ -202,14 +207,28 @@ mod tests {
 
         let found = ports_below(&machine.0);
         let names: Vec<_> = found.iter().map(|port| port.name.as_str()).collect();
-        assert_eq!(names, ["/dev/ttyACM0", "socketcan:can0", "socketcan:can1", "socketcan:vcan0"]);
-        let [acm, down, bus_off, fine] = found.as_slice() else { unreachable!("four") };
+        assert_eq!(
+            names,
+            [
+                "/dev/ttyACM0",
+                "socketcan:can0",
+                "socketcan:can1",
+                "socketcan:can2",
+                "socketcan:slcan0",
+                "socketcan:vcan0"
+            ]
+        );
+        let [acm, down, bus_off, virtual_down, adapter, fine] = found.as_slice() else {
+            unreachable!("six")
+        };
         assert_eq!(acm.description.as_deref(), Some("STMicroelectronics STM32 STLink"));
         assert_eq!(acm.stable_path.as_deref(), Some(Path::new("/dev/serial/by-id/usb-STLink")));
         assert_eq!(acm.problem, None);
         let problem = |port: &PortInfo| port.problem.clone().unwrap_or_default();
         assert!(problem(down).starts_with("down: sudo ip link set can0 up type can"));
         assert!(problem(bus_off).starts_with("bus-off"));
+        assert_eq!(problem(virtual_down), "down: sudo ip link set can2 up");
+        assert_eq!((problem(adapter), adapter.description.as_deref()), (String::new(), None));
         assert_eq!(
             (problem(fine), fine.description.as_deref()),
             (String::new(), Some("virtual CAN"))

@@ -6,6 +6,8 @@ use std::path::Path;
 
 use rustix::io::Errno;
 
+use super::up_hint;
+
 /// Why a port could not be opened or does not carry on.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -106,10 +108,12 @@ pub enum PortError {
         port: String,
     },
     /// The CAN interface exists and is not up.
-    #[error("CAN interface `{port}` is down: {}", super::socketcan::up_hint(.port))]
+    #[error("CAN interface `{port}` is down: {hint}")]
     InterfaceDown {
         /// The interface.
         port: String,
+        /// How it is brought up.
+        hint: String,
     },
     /// The CAN controller left the bus after too many errors.
     #[error(
@@ -200,13 +204,17 @@ impl PortError {
                 | Errno::NOTCONN
                 | Errno::TIMEDOUT,
             ) => PortError::Closed { port },
-            Some(Errno::NETDOWN) => PortError::InterfaceDown { port },
+            Some(Errno::NETDOWN) => Self::interface_down(port),
             Some(Errno::NOBUFS) => PortError::Stalled {
                 port,
                 hint: "no other node acknowledges the frames; check wiring, power and bitrate",
             },
             _ => PortError::Io { port, source },
         }
+    }
+
+    pub(crate) fn interface_down(port: String) -> Self {
+        PortError::InterfaceDown { hint: up_hint(&port, Path::new("/sys")), port }
     }
 
     /// What an error means when the device at `path` is being opened.

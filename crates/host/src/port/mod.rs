@@ -8,6 +8,7 @@ mod echo;
 mod error;
 mod fault;
 mod fd;
+mod interface;
 mod name;
 mod serial;
 mod slcan;
@@ -30,7 +31,7 @@ pub use tap::{Direction, TapBytes, TapCan};
 
 pub(crate) use error::{owning_group, permission_hint};
 pub(crate) use fd::timespec;
-pub(crate) use socketcan::{is_up, up_hint};
+pub(crate) use interface::{Interface, up_hint};
 pub(crate) use tcp::unbracketed;
 
 /// A line that carries bytes both ways.

@@ -69,6 +69,8 @@ pub enum ServeName {
         /// The TCP port.
         port: u16,
     },
+    /// `socketcan:can1`: a CAN interface of this machine, for a bus of motors.
+    SocketCan(String),
 }
 
 /// Why a string names no port.
@@ -121,7 +123,8 @@ pub enum NameError {
 
 const PORT_FORMS: &str = "ports are /dev/ttyACM0, serial:/dev/ttyACM0?baud=115200, tcp:HOST:PORT, \
     slcan:/dev/ttyACM0?bitrate=1000000, slcan:tcp:HOST:PORT, socketcan:can0, sim: and sim:FILE.toml";
-const SERVE_FORMS: &str = "served ports are pty:PATH, slcan-pty:PATH and tcp-listen:ADDR:PORT";
+const SERVE_FORMS: &str =
+    "served ports are pty:PATH, slcan-pty:PATH, tcp-listen:ADDR:PORT and socketcan:INTERFACE";
 
 impl FromStr for PortName {
     type Err = NameError;
@@ -130,9 +133,8 @@ impl FromStr for PortName {
         if let Some(rest) = name.strip_prefix("slcan:") {
             return parse_slcan(name, rest);
         }
-        if let Some(interface) = name.strip_prefix("socketcan:") {
-            let interface = present(name, interface, "an interface", "socketcan:can0")?;
-            return Ok(PortName::SocketCan(interface.to_owned()));
+        if let Some(interface) = parse_socketcan(name)? {
+            return Ok(PortName::SocketCan(interface));
         }
         if let Some(file) = name.strip_prefix("sim:") {
             return Ok(PortName::Sim((!file.is_empty()).then(|| file.into())));
@@ -147,6 +149,12 @@ impl FromStr for PortName {
         }
         Ok(PortName::Line(line))
     }
+}
+
+/// The CAN interface that `name` stands for, or nothing when it is of another form.
+fn parse_socketcan(name: &str) -> Result<Option<String>, NameError> {
+    let Some(interface) = name.strip_prefix("socketcan:") else { return Ok(None) };
+    Ok(Some(present(name, interface, "an interface", "socketcan:can0")?.to_owned()))
 }
 
 fn parse_slcan(name: &str, rest: &str) -> Result<PortName, NameError> {
@@ -231,6 +239,9 @@ impl FromStr for ServeName {
             let (host, port) = host_and_port(name, address, "tcp-listen:127.0.0.1:4000")?;
             return Ok(ServeName::TcpListen { host, port });
         }
+        if let Some(interface) = parse_socketcan(name)? {
+            return Ok(ServeName::SocketCan(interface));
+        }
         let path = name.rsplit(':').next().filter(|path| !path.is_empty()).unwrap_or("./st0");
         Err(unknown_form(name, format!("pty:{path}"), SERVE_FORMS))
     }
@@ -292,6 +303,7 @@ impl fmt::Display for ServeName {
             ServeName::Pty(path) => write!(f, "pty:{}", path.display()),
             ServeName::SlcanPty(path) => write!(f, "slcan-pty:{}", path.display()),
             ServeName::TcpListen { host, port } => write!(f, "tcp-listen:{host}:{port}"),
+            ServeName::SocketCan(interface) => write!(f, "socketcan:{interface}"),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Linux CAN.
 
-use std::os::fd::AsFd;
+use std::os::fd::{AsFd, BorrowedFd};
 use std::path::Path;
 use std::time::Duration;
 
@@ -12,12 +12,14 @@ use socketcan::{
     StandardId,
 };
 
-use super::{CanLink, Deadline, PortError, fd::wait};
+use super::{CanLink, Deadline, Interface, PortError, fd::wait};
 
 /// The error class of a controller that left the bus, in the mask of the kernel's error frames.
 const BUS_OFF: u32 = 0x40;
-/// The interface flag of one that is up.
-const UP: u32 = 0x1;
+/// How long an interface may take no frame at all before a sending fails.
+const SEND_TIMEOUT: Duration = Duration::from_secs(1);
+/// The kernel does not tell when an interface's queue has room again.
+const ASK_AGAIN: Duration = Duration::from_micros(200);
 
 /// A [`CanLink`] on a CAN interface. Other programs on the same interface see the frames that it
 /// sends; it does not see them itself.
@@ -43,42 +45,54 @@ impl SocketCanLink {
             }
             _ => PortError::in_use(&port, error),
         })?;
-        if is_up(interface, Path::new("/sys")) == Some(false) {
-            return Err(PortError::InterfaceDown { port });
+        match Interface::read(interface, Path::new("/sys")) {
+            Some(Interface { is_up: false, .. }) => return Err(PortError::interface_down(port)),
+            // It would take frames and drop them.
+            Some(Interface { is_bus_off: true, .. }) => return Err(PortError::BusOff { port }),
+            _ => {}
         }
         Ok(SocketCanLink { socket, interface: port })
     }
 
-    fn lost(&self, error: impl Into<std::io::Error>) -> PortError {
-        PortError::in_use(&self.interface, error)
-    }
-
-    fn wait(&self, event: PollFlags, deadline: Deadline) -> Result<bool, PortError> {
-        wait(self.socket.as_fd(), event, deadline).map_err(|errno| self.lost(errno))
-    }
-}
-
-impl CanLink for SocketCanLink {
-    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+    /// Hands `frame` to the bus if the interface has room for it now.
+    pub(crate) fn offer(&mut self, frame: &CanFrame) -> Result<bool, PortError> {
         let frame = to_kernel(frame);
-        let deadline = Deadline::after(Some(Duration::from_secs(1)));
         loop {
-            let error = match self.socket.write_frame(&frame) {
-                Ok(()) => return Ok(()),
-                Err(error) => error,
-            };
+            let Err(error) = self.socket.write_frame(&frame) else { return Ok(true) };
             match Errno::from_io_error(&error) {
                 Some(Errno::INTR) => {}
-                Some(Errno::AGAIN) if self.wait(PollFlags::OUT, deadline)? => {}
-                Some(Errno::AGAIN) => return Err(self.lost(Errno::NOBUFS)),
+                Some(Errno::AGAIN | Errno::NOBUFS) => return Ok(false),
                 _ => return Err(self.lost(error)),
             }
         }
     }
 
+    fn lost(&self, error: impl Into<std::io::Error>) -> PortError {
+        PortError::in_use(&self.interface, error)
+    }
+}
+
+impl AsFd for SocketCanLink {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+}
+
+impl CanLink for SocketCanLink {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let deadline = Deadline::after(Some(SEND_TIMEOUT));
+        while !self.offer(frame)? {
+            if deadline.remaining() == Some(Duration::ZERO) {
+                return Err(self.lost(Errno::NOBUFS));
+            }
+            std::thread::sleep(ASK_AGAIN);
+        }
+        Ok(())
+    }
+
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
         let deadline = Deadline::after(timeout);
-        while self.wait(PollFlags::IN, deadline)? {
+        while wait(self.as_fd(), PollFlags::IN, deadline).map_err(|errno| self.lost(errno))? {
             match self.socket.read_frame() {
                 Ok(socketcan::CanFrame::Error(_)) => {
                     return Err(PortError::BusOff { port: self.interface.clone() });
@@ -117,23 +131,6 @@ fn from_kernel(frame: &socketcan::CanFrame) -> CanFrame {
         CanFrame::remote_frame(id, extended, frame.dlc() as u8)
     } else {
         CanFrame::data_frame(id, extended, frame.data())
-    }
-}
-
-/// Whether a network interface is up, from the kernel's file system at `sys`.
-pub(crate) fn is_up(interface: &str, sys: &Path) -> Option<bool> {
-    let flags =
-        std::fs::read_to_string(sys.join("class/net").join(interface).join("flags")).ok()?;
-    let flags = u32::from_str_radix(flags.trim().strip_prefix("0x")?, 16).ok()?;
-    Some(flags & UP != 0)
-}
-
-/// How a CAN interface is brought up; a virtual one has no bitrate.
-pub(crate) fn up_hint(interface: &str) -> String {
-    if interface.starts_with('v') {
-        format!("sudo ip link set {interface} up")
-    } else {
-        format!("sudo ip link set {interface} up type can bitrate 1000000")
     }
 }
 

@@ -1,15 +1,17 @@
 //! Served ports: the other side of a serial line or a CAN bus, for simulated drives.
 //!
-//! A [`Server`] owns ptys and TCP listeners and one station behind each. It has no thread: whoever
+//! A [`Server`] owns ptys, TCP listeners and sockets on CAN interfaces and one station behind each. It has no thread: whoever
 //! runs it calls [`Server::turn`] again and again. It never waits for a client that does not read;
 //! what such a client misses is dropped and counted.
 //!
 //! A pty is a line with one client at a time; bytes that one left unread are not shown to the next.
 //! A served TCP port that is a serial line has one client too: while it is connected, others are
 //! closed at once. Behind a TCP port that is a CAN bus each client has an slcan adapter of its own
-//! on the same bus: it hears the station and the other clients.
+//! on the same bus: it hears the station and the other clients. A station on a CAN interface of the
+//! kernel is a node of that bus, and goes on when the interface was away.
 
 mod endpoint;
+mod interface;
 mod pty;
 
 use std::net::{TcpListener, ToSocketAddrs};
@@ -23,6 +25,7 @@ use rustix::io::Errno;
 
 use crate::port::{PortError, ServeName, timespec, unbracketed};
 use endpoint::{Door, Endpoint, Scratch, Station};
+use interface::Interface;
 use pty::Pty;
 
 /// What answers at the far end of a served serial line.
@@ -65,6 +68,7 @@ pub struct Turn {
 pub struct Server {
     started: std::time::Instant,
     endpoints: Vec<Endpoint>,
+    interfaces: Vec<Interface>,
     ready: Vec<bool>,
     scratch: Scratch,
 }
@@ -81,6 +85,7 @@ impl Server {
         Server {
             started: std::time::Instant::now(),
             endpoints: Vec::new(),
+            interfaces: Vec::new(),
             ready: Vec::new(),
             scratch: Scratch::default(),
         }
@@ -92,53 +97,49 @@ impl Server {
         name: &ServeName,
         station: Box<dyn ByteStation>,
     ) -> Result<Served, PortError> {
-        match name {
-            ServeName::Pty(_) | ServeName::TcpListen { .. } => {
-                self.serve(name, Station::Bytes(station))
-            }
-            ServeName::SlcanPty(_) => Err(PortError::WrongKind {
-                port: name.to_string(),
-                wanted: "serial line",
-                usable: "pty:PATH or tcp-listen:ADDR:PORT",
-            }),
-        }
+        self.serve(name, Station::Bytes(station))
     }
 
-    /// Serves a CAN bus with `station` on it, through slcan.
+    /// Serves a CAN bus with `station` on it: through slcan, or as a node on a CAN interface.
     pub fn serve_can(
         &mut self,
         name: &ServeName,
         station: Box<dyn CanStation>,
     ) -> Result<Served, PortError> {
-        match name {
-            ServeName::SlcanPty(_) | ServeName::TcpListen { .. } => {
-                self.serve(name, Station::Can(station))
-            }
-            ServeName::Pty(_) => Err(PortError::WrongKind {
-                port: name.to_string(),
-                wanted: "CAN bus",
-                usable: "slcan-pty:PATH or tcp-listen:ADDR:PORT",
-            }),
-        }
+        self.serve(name, Station::Can(station))
     }
 
     fn serve(&mut self, name: &ServeName, station: Station) -> Result<Served, PortError> {
         let mut port = name.to_string();
-        let (path, endpoint) = match name {
-            ServeName::Pty(link) | ServeName::SlcanPty(link) => {
+        let path = match (name, station) {
+            (ServeName::Pty(link), station @ Station::Bytes(_))
+            | (ServeName::SlcanPty(link), station @ Station::Can(_)) => {
                 let (pty, master) = Pty::open(link)?;
                 let path = pty.path().display().to_string();
-                (path, Endpoint::new(Door::Pty(pty), station, Some(master)))
+                self.endpoints.push(Endpoint::new(Door::Pty(pty), station, Some(master)));
+                path
             }
-            ServeName::TcpListen { host, port: tcp_port } => {
+            (ServeName::TcpListen { host, port: tcp_port }, station) => {
                 let (listener, path) = listen(host, *tcp_port, &port)?;
                 if *tcp_port == 0 {
                     port = format!("tcp-listen:{path}");
                 }
-                (path, Endpoint::new(Door::Listener(listener), station, None))
+                self.endpoints.push(Endpoint::new(Door::Listener(listener), station, None));
+                path
+            }
+            (ServeName::SocketCan(interface), Station::Can(station)) => {
+                self.interfaces.push(Interface::open(interface, station)?);
+                interface.clone()
+            }
+            (_, Station::Bytes(_)) => {
+                let usable = "pty:PATH or tcp-listen:ADDR:PORT";
+                return Err(PortError::WrongKind { port, wanted: "serial line", usable });
+            }
+            (_, Station::Can(_)) => {
+                let usable = "slcan-pty:PATH, tcp-listen:ADDR:PORT or socketcan:INTERFACE";
+                return Err(PortError::WrongKind { port, wanted: "CAN bus", usable });
             }
         };
-        self.endpoints.push(endpoint);
         Ok(Served { port, path })
     }
 
@@ -147,7 +148,7 @@ impl Server {
         Instant(self.started.elapsed().as_micros() as u64)
     }
 
-    /// How many bytes were dropped because a client did not read.
+    /// How many bytes were dropped because a client or a CAN bus did not take them.
     pub fn dropped(&self) -> u64 {
         self.scratch.dropped
     }
@@ -164,6 +165,7 @@ impl Server {
         for endpoint in &self.endpoints {
             endpoint.watch(&mut fds);
         }
+        fds.extend(self.interfaces.iter().filter_map(Interface::watch));
         fds.extend(extra.map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)));
         match poll(&mut fds, Some(&wait)) {
             Ok(_) => {}
@@ -180,12 +182,18 @@ impl Server {
             endpoint.serve(now, ours, &mut self.scratch);
             ready = others;
         }
+        for interface in &mut self.interfaces {
+            let (ours, others) = ready.split_at(usize::from(interface.watch().is_some()));
+            self.scratch.dropped += interface.serve(now, ours == [true]);
+            ready = others;
+        }
         Ok(Turn { extra_is_ready: ready.contains(&true) })
     }
 
     /// The time to the first deadline of a station.
     fn wait_time(&self, max_wait: Duration) -> Duration {
-        let first = self.endpoints.iter().filter_map(Endpoint::deadline).min();
+        let endpoints = self.endpoints.iter().filter_map(Endpoint::deadline);
+        let first = endpoints.chain(self.interfaces.iter().filter_map(Interface::deadline)).min();
         first.map_or(max_wait, |deadline| max_wait.min(deadline.since(self.now()).into()))
     }
 }

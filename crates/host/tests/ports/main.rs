@@ -291,6 +291,13 @@ fn a_port_that_cannot_be_opened_says_why() -> Outcome {
     assert!(error.to_string().contains("cannot be used as a CAN bus"), "{error}");
     let error = Running::can("pty:./never").err().ok_or("served")?;
     assert!(error.to_string().contains("use slcan-pty:PATH"), "{error}");
+    let error = Running::bytes("socketcan:nocan9").err().ok_or("served")?;
+    assert!(error.to_string().contains("cannot be used as a serial line"), "{error}");
+    let error = Running::can("socketcan:nocan9").err().ok_or("served")?.to_string();
+    assert!(
+        error.contains("there is no CAN interface `nocan9`") || error.contains("no CAN support"),
+        "{error}"
+    );
 
     let taken = TcpListener::bind("127.0.0.1:0")?;
     let error = Running::bytes(&format!("tcp-listen:{}", taken.local_addr()?)).err();

@@ -1,4 +1,4 @@
-//! Simulated drives behind ptys, served by a thread of the test.
+//! Simulated drives behind ports, served by a thread of the test.
 #![allow(dead_code)]
 
 use std::io::{BufRead, BufReader, Write};
@@ -10,9 +10,9 @@ use std::time::Duration;
 
 use motorlink::sim::{Bench, BenchConfig};
 
-/// Drives on ptys; gone when it is dropped.
+/// Drives that are gone when it is dropped.
 pub struct Served {
-    /// Port of the ST drive.
+    /// Port of the ST drive, if there is one.
     pub st: String,
     /// Port of the RMD bus.
     pub rmd: String,
@@ -25,18 +25,42 @@ impl Served {
     pub fn new(name: &str) -> Self {
         let folder: PathBuf = env!("CARGO_TARGET_TMPDIR").into();
         let path = |kind: &str| folder.join(format!("{name}-{kind}-{}", std::process::id()));
-        let (st, can) = (path("st"), path("can"));
+        let (st, can) = (path("st").display().to_string(), path("can").display().to_string());
+        let ports = (Some(format!("pty:{st}")), format!("slcan-pty:{can}"));
+        Self::start(BenchConfig::default(), ports, st, format!("slcan:{can}"))
+    }
+
+    /// Serves RMD motors 1 to `count` on a CAN interface, and no ST drive.
+    pub fn on(interface: &str, count: u8) -> Self {
+        let motors: String = (1..=count).map(|id| format!("[[rmd.motor]]\nid = {id}\n")).collect();
+        let config = BenchConfig::parse(&motors).expect("a configuration");
+        let port = format!("socketcan:{interface}");
+        Self::start(config, (None, port.clone()), String::new(), port)
+    }
+
+    fn start(
+        config: BenchConfig,
+        (st_served, rmd_served): (Option<String>, String),
+        st: String,
+        rmd: String,
+    ) -> Self {
         let (control, theirs) = UnixStream::pair().expect("a socket pair");
-        let ports = [format!("pty:{}", st.display()), format!("slcan-pty:{}", can.display())];
-        let thread = std::thread::spawn(move || serve(&ports, &theirs));
-        let mut served = Served {
-            st: st.display().to_string(),
-            rmd: format!("slcan:{}", can.display()),
-            control: Some(control),
-            thread: Some(thread),
-        };
-        served.obey("{\"command\":\"state\"}");
+        let thread = std::thread::spawn(move || {
+            let mut bench = Bench::new();
+            if let Some(port) = st_served {
+                bench.serve_st(&port.parse().expect("a port"), &config).expect("served");
+            }
+            bench.serve_rmd(&rmd_served.parse().expect("a port"), &config).expect("served");
+            run(bench, &theirs);
+        });
+        let mut served = Served { st, rmd, control: Some(control), thread: Some(thread) };
+        served.state();
         served
+    }
+
+    /// What is really going on in the motors, as JSON.
+    pub fn state(&mut self) -> String {
+        self.obey("{\"command\":\"state\"}")
     }
 
     /// Sends a command to the bench and waits until it is obeyed.
@@ -50,11 +74,7 @@ impl Served {
     }
 }
 
-fn serve([st, rmd]: &[String; 2], control: &UnixStream) {
-    let config = BenchConfig::default();
-    let mut bench = Bench::new();
-    bench.serve_st(&st.parse().expect("a port"), &config).expect("served");
-    bench.serve_rmd(&rmd.parse().expect("a port"), &config).expect("served");
+fn run(mut bench: Bench, control: &UnixStream) {
     let mut lines = BufReader::new(control).lines();
     loop {
         let turn = bench.turn(Duration::from_millis(10), Some(control.as_fd())).expect("a turn");

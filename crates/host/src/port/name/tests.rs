@@ -63,8 +63,14 @@ fn a_name_that_is_wrong_says_how_it_is_right() {
         let message = refusal(name);
         assert!(message.contains(says), "{name:?} gave: {message}");
     }
-    let message = "st0".parse::<ServeName>().expect_err("no scheme").to_string();
-    assert!(message.contains("did you mean `pty:st0`?"), "{message}");
+    for (name, says) in [
+        ("st0", "did you mean `pty:st0`?"),
+        ("can0", "tcp-listen:ADDR:PORT and socketcan:INTERFACE"),
+        ("socketcan:", "lacks an interface; write it like socketcan:can0"),
+    ] {
+        let message = name.parse::<ServeName>().expect_err("no served port").to_string();
+        assert!(message.contains(says), "{name:?} gave: {message}");
+    }
 }
 
 fn lines() -> impl Strategy<Value = LineName> {
@@ -89,7 +95,9 @@ proptest! {
     #[test]
     fn a_printed_serve_name_reads_back(path in "[./a-z0-9:]{1,20}", port: u16) {
         let listen = ServeName::TcpListen { host: "[::]".into(), port };
-        for name in [ServeName::Pty(path.clone().into()), ServeName::SlcanPty(path.into()), listen] {
+        let interface = ServeName::SocketCan(path.clone());
+        let pty = ServeName::Pty(path.clone().into());
+        for name in [pty, ServeName::SlcanPty(path.into()), listen, interface] {
             prop_assert_eq!(name.to_string().parse(), Ok(name));
         }
     }

@@ -1,0 +1,43 @@
+//! What the kernel says about a CAN interface.
+
+use std::fs;
+use std::path::Path;
+
+/// The interface flag of one that is up.
+const UP: u32 = 0x1;
+/// The interface flag of one whose driver hands sent frames back once they were on the bus. A
+/// virtual one has no bus, and does not.
+const ECHO: u32 = 0x40000;
+
+/// The state of a CAN interface.
+pub(crate) struct Interface {
+    pub(crate) is_up: bool,
+    /// Frames stay in the kernel; there is no bitrate.
+    pub(crate) is_virtual: bool,
+    /// The controller left the bus after too many errors.
+    pub(crate) is_bus_off: bool,
+}
+
+impl Interface {
+    /// Reads it from the kernel's file system at `sys`; nothing when there is no such interface.
+    pub(crate) fn read(name: &str, sys: &Path) -> Option<Self> {
+        let class = sys.join("class/net").join(name);
+        let flags = fs::read_to_string(class.join("flags")).ok()?;
+        let flags = u32::from_str_radix(flags.trim().strip_prefix("0x")?, 16).ok()?;
+        // Cannot be read while the interface is down.
+        let carrier = fs::read_to_string(class.join("carrier")).unwrap_or_default();
+        Some(Interface {
+            is_up: flags & UP != 0,
+            is_virtual: flags & ECHO == 0,
+            is_bus_off: carrier.trim() == "0",
+        })
+    }
+}
+
+/// How a CAN interface is brought up.
+pub(crate) fn up_hint(name: &str, sys: &Path) -> String {
+    match Interface::read(name, sys) {
+        Some(Interface { is_virtual: true, .. }) => format!("sudo ip link set {name} up"),
+        _ => format!("sudo ip link set {name} up type can bitrate 1000000"),
+    }
+}
