@@ -61,6 +61,8 @@ pub(crate) struct Reopening<L> {
     back_off: BackOff,
     wait: Duration,
     not_before: Instant,
+    /// What the last attempt said.
+    trouble: String,
     began: Instant,
 }
 
@@ -86,6 +88,7 @@ impl<L> Reopening<L> {
             back_off: BackOff::default(),
             wait: Duration::ZERO,
             not_before: now,
+            trouble: String::new(),
             began: now,
         }
     }
@@ -112,12 +115,13 @@ impl<L> Reopening<L> {
             let closed = || PortError::Closed { port: self.name.to_string() };
             let open = self.open.as_mut().ok_or_else(closed)?;
             if Instant::now() < self.not_before {
-                return Err(closed());
+                let (port, why) = (self.name.to_string(), self.trouble.clone());
+                return Err(PortError::Away { port, why });
             }
             match open() {
                 Ok(link) => self.link = Some(link),
                 Err(error) => {
-                    self.postpone();
+                    self.postpone(&error);
                     return Err(error);
                 }
             }
@@ -135,8 +139,32 @@ impl<L> Reopening<L> {
         self.not_before = Instant::now();
     }
 
-    fn postpone(&mut self) {
+    fn postpone(&mut self, error: &PortError) {
+        self.trouble = error.to_string();
         self.wait = (self.wait * 2).clamp(self.back_off.first, self.back_off.cap);
         self.not_before = Instant::now() + self.wait;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn until_the_next_attempt_the_last_one_is_told() {
+        let mut attempts = 0;
+        let open: Opener<()> = Box::new(move || {
+            attempts += 1;
+            let port = "can0".to_owned();
+            if attempts == 1 { Ok(()) } else { Err(PortError::NoSuchInterface { port }) }
+        });
+        let hour = Duration::from_secs(3600);
+        let mut port = Reopening::open("socketcan:can0", open, BackOff { first: hour, cap: hour })
+            .expect("the first attempt succeeds");
+        port.close();
+        let mut told = || port.link().expect_err("it is away").to_string();
+        let attempt = told();
+        assert!(attempt.starts_with("there is no CAN interface `can0`"), "{attempt}");
+        assert_eq!(told(), attempt);
     }
 }

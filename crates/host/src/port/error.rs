@@ -88,6 +88,14 @@ pub enum PortError {
         /// The port.
         port: String,
     },
+    /// The port could not be opened again, and the next attempt is not due yet.
+    #[error("{why}")]
+    Away {
+        /// The port.
+        port: String,
+        /// What the last attempt said.
+        why: String,
+    },
     /// The port takes no bytes or frames any more.
     #[error("`{port}` takes no more data: {hint}")]
     Stalled {

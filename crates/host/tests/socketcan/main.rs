@@ -16,7 +16,7 @@ use motorlink::rmd::{
 use motorlink::{BackOff, LinkState};
 use socketcan::{
     CanDataFrame, CanFdFrame, CanFdSocket, CanRemoteFrame, EmbeddedFrame, ExtendedId, Socket,
-    StandardId,
+    SocketOptions, StandardId,
 };
 
 use adapter::Adapter;
@@ -42,7 +42,7 @@ fn bus(interface: &str) -> Bus {
 fn hasty(interface: &str) -> Bus {
     let ms = Duration::from_millis;
     let back_off = BackOff { first: ms(1), cap: ms(10) };
-    let options = rmd::Options { timeout: ms(30), guard: ms(1), back_off, ..Default::default() };
+    let options = rmd::Options { timeout: ms(50), guard: ms(1), back_off, ..Default::default() };
     Bus::open(&port(interface), options).expect("the interface is up")
 }
 
@@ -152,6 +152,9 @@ fn the_hosts_interface_goes_down_and_comes_back() {
     ip("link set can0 down");
     let lost = motor.status1().expect_err("the interface is down").to_string();
     assert!(lost.contains("`can0` is down: sudo ip link set can0 up type can"), "{lost}");
+    for _ in 0..100 {
+        assert_eq!(motor.status1().expect_err("the interface is down").to_string(), lost);
+    }
     assert!(matches!(bus.link_state(), LinkState::Closed { .. }));
     ip("link set can0 up");
     until("the motor answers again", || motor.status1().is_ok());
@@ -195,9 +198,9 @@ fn an_interface_that_is_unplugged_is_told_and_used_when_it_is_back() {
     };
     plug();
     let _motors = Served::on("vcan9", 1);
-    let bus = bus("vcan9");
+    let bus = hasty("vcan9");
     let motor = bus.motor(1).expect("1 to 32");
-    motor.status1().expect("an answer");
+    until("the motor answers", || motor.status1().is_ok());
     ip("link del vcan9");
     let lost = motor.status1().expect_err("there is no interface").to_string();
     assert!(lost.contains("`vcan9`"), "{lost}");
@@ -230,15 +233,13 @@ fn error_frames_short_of_bus_off_disturb_nobody() {
     let _motors = Served::on("vcan0", 1);
     let bus = bus("vcan0");
     let motor = bus.motor(1).expect("1 to 32");
-    // The kernel does hand them on.
-    let mut witness = neighbour("vcan0");
-    socketcan::SocketOptions::set_error_filter_accept_all(&witness).expect("an option");
     for (name, class, data) in HARMLESS {
+        let witness = neighbour("vcan0");
+        witness.set_error_filter_accept_all().expect("an option of the kernel");
         report_error("vcan0", class, data);
-        assert!(matches!(witness.read_frame(), Ok(socketcan::CanFrame::Error(_))), "{name}");
+        let seen = witness.read_frame().expect("the kernel hands it on");
+        assert!(matches!(seen, socketcan::CanFrame::Error(_)), "{name}: {seen:?}");
         motor.status1().unwrap_or_else(|error| panic!("{name}: {error}"));
-        witness = neighbour("vcan0");
-        socketcan::SocketOptions::set_error_filter_accept_all(&witness).expect("an option");
     }
     assert_eq!(bus.counters().malformed, 0);
 }
@@ -247,9 +248,9 @@ fn error_frames_short_of_bus_off_disturb_nobody() {
 #[ignore = "needs CAN: make test-socketcan"]
 fn bus_off_is_told_and_the_port_is_opened_again() {
     let _motors = Served::on("vcan0", 1);
-    let bus = bus("vcan0");
+    let bus = hasty("vcan0");
     let motor = bus.motor(1).expect("1 to 32");
-    motor.status1().expect("an answer");
+    until("the motor answers", || motor.status1().is_ok());
     report_error("vcan0", BUS_OFF, [0; 8]);
     let lost = motor.status1().expect_err("the controller is off the bus").to_string();
     assert!(lost.starts_with("`vcan0` is bus-off after too many errors: check wiring"), "{lost}");
@@ -276,13 +277,12 @@ fn a_controller_that_is_bus_off_takes_no_request_until_it_is_restarted() {
         };
         list::ports().iter().any(|port| port.name == "socketcan:slcan0" && is_told(port))
     });
-    let is_bus_off = |error: &Error| matches!(error, Error::Port(error) if matches!(**error, PortError::BusOff { .. }));
-    let lost = motor.status1().expect_err("the controller is off the bus");
-    assert!(is_bus_off(&lost), "{lost}");
-    // It would take frames and drop them.
+    // The interface would take frames and drop them.
+    for _ in 0..100 {
+        let lost = motor.status1().expect_err("the controller is off the bus").to_string();
+        assert!(lost.starts_with("`slcan0` is bus-off after too many errors"), "{lost}");
+    }
     assert!(matches!(refusal("slcan0"), PortError::BusOff { .. }));
-    let lost = motor.status1().expect_err("the controller is still off the bus");
-    assert!(is_bus_off(&lost), "{lost}");
 
     ip("link set slcan0 down");
     ip("link set slcan0 up");
@@ -396,7 +396,7 @@ fn extended_remote_short_and_fd_frames_are_ignored_by_both_ends() {
 #[ignore = "needs CAN: make test-socketcan"]
 fn a_flood_of_other_frames_is_survived() {
     let _motors = Served::on("vcan0", 1);
-    let bus = bus("vcan0");
+    let bus = hasty("vcan0");
     let motor = bus.motor(1).expect("1 to 32");
     let frame = |id, data: [u8; 8]| -> socketcan::CanFrame {
         let id = StandardId::new(id).expect("11 bits");

@@ -1,0 +1,94 @@
+#!/bin/sh
+# Makes the folder $1 with what the virtual machine boots: `vmlinuz`, Debian's kernel, and
+# `initrd.gz`, an image of busybox, the kernel's CAN modules, iproute2, can-utils, our static
+# programs and the checks. Debian's kernel and busybox are unpacked there, never installed.
+# Ends with 77 where the packages cannot be had. SUDO is what makes a command root's.
+set -eu
+tests=$(cd "$(dirname "$0")" && pwd)
+mkdir -p "$1"
+made=$(cd "$1" && pwd)
+unpacked=$made/debian
+target=x86_64-unknown-linux-musl
+PATH=$PATH:/usr/sbin:/sbin
+
+unavailable() {
+    echo "$1" >&2
+    exit 77
+}
+
+is_installed() {
+    [ "$(dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null)" = installed ]
+}
+
+install_packages() {
+    missing=
+    for package in qemu-system-x86 seabios ipxe-qemu kmod cpio iproute2 can-utils; do
+        is_installed $package || missing="$missing $package"
+    done
+    [ "$missing" ] || return 0
+    # shellcheck disable=SC2086
+    $SUDO apt-get update -q && $SUDO apt-get install -q -y --no-install-recommends $missing
+}
+
+# The package $1 into the folder `debian`, without installing it.
+unpack() {
+    (cd "$made" && apt-get download -q -o APT::Sandbox::User=root "$1") &&
+        dpkg -x "$made/$1"_*.deb "$unpacked" && rm "$made/$1"_*.deb
+}
+
+unpack_debian() {
+    [ -e "$unpacked/complete" ] && return 0
+    rm -rf "$unpacked" "$made"/*.deb
+    kernel=$(apt-cache depends linux-image-amd64 | sed -n 's/^ *Depends: \(linux-image-[0-9].*\)/\1/p')
+    # The drivers of everything but CAN take 300 MB.
+    [ "$kernel" ] && unpack "$kernel" && unpack busybox-static &&
+        find "$unpacked/lib/modules" -name '*.ko' ! -path '*/net/can/*' -delete &&
+        touch "$unpacked/complete"
+}
+
+command -v apt-get >/dev/null || unavailable "there is no apt-get"
+install_packages >&2 || unavailable "packages cannot be installed"
+unpack_debian >&2 || unavailable "Debian's kernel cannot be downloaded"
+rustup target list --installed | grep -qx $target || rustup target add $target >&2 ||
+    unavailable "rustup cannot add the target $target"
+
+# Some optimisation, for an emulated processor; no debugging information, for a small image.
+export CARGO_PROFILE_DEV_OPT_LEVEL=1 CARGO_PROFILE_DEV_DEBUG=0
+build() {
+    ${CARGO:-cargo} "$@" --locked --target $target --message-format=json-render-diagnostics |
+        sed -n 's/.*"executable":"\([^"]*\)".*/\1/p'
+}
+program=$(build build -p motorlink-cli)
+[ -x "$program" ]
+port=$(build test -p motorlink --features sim --test socketcan --no-run)
+[ -x "$port" ]
+
+root=$made/root
+rm -rf "$root"
+mkdir -p "$root/bin" "$root/sbin" "$root/tests"
+version=$(cd "$unpacked/lib/modules" && echo *)
+modules=lib/modules/$version
+mkdir -p "$root/$modules/kernel/net" "$root/$modules/kernel/drivers/net"
+cp "$unpacked/$modules"/modules.* "$root/$modules"
+cp -r "$unpacked/$modules/kernel/net/can" "$root/$modules/kernel/net"
+cp -r "$unpacked/$modules/kernel/drivers/net/can" "$root/$modules/kernel/drivers/net"
+depmod -b "$root" "$version"
+cp "$unpacked/bin/busybox" "$program" "$root/bin"
+cp "$port" "$root/tests/port"
+cp "$tests/checks.sh" "$root/tests"
+cp "$tests/init" "$root"
+# busybox prefers its own `ip`: ours is called by its path.
+cp "$(command -v ip)" "$root/sbin"
+for tool in candump cansend slcan_attach; do
+    cp "$(command -v $tool)" "$root/bin"
+done
+ldd "$root/sbin/ip" "$root/bin/candump" "$root/bin/cansend" "$root/bin/slcan_attach" |
+    grep -o '/[^ ]*\.so[^ ]*' | sort -u | xargs -I {} cp -L --parents {} "$root"
+(cd "$root" && find . | cpio -o -H newc -R 0:0 --quiet | gzip -1) >"$made/initrd.gz"
+cp "$unpacked/boot/vmlinuz-$version" "$made/vmlinuz"
+
+# What has to pass, one name a line.
+{
+    "$port" --list --format terse | sed -n 's/: test$//p'
+    sh "$tests/checks.sh" list
+} >"$made/expected"

@@ -1,0 +1,53 @@
+#!/bin/sh
+# Boots Debian's kernel in QEMU and runs inside it what needs CAN; see docs/SOCKETCAN.md. Prints a
+# line `passed NAME` or `failed NAME: why` for each check. Ends with 0 when all that there is has
+# passed, with 77 where the packages for it cannot be had, and with 1 otherwise.
+set -eu
+here=$(dirname "$0")
+# Seconds; a whole run takes about 40 on a machine with nothing else to do.
+limit=300
+made=${CARGO_TARGET_DIR:-target}/socketcan
+
+status=0
+"$here/image.sh" "$made" || status=$?
+if [ $status = 77 ]; then
+    cat >&2 <<'NOTICE'
+
+  ****************************************************************************
+  **                                                                        **
+  **  NOT TESTED: the port socketcan: against a real CAN kernel.            **
+  **                                                                        **
+  **  This needs Debian's packages qemu-system-x86, linux-image-amd64,      **
+  **  busybox-static, can-utils and the Rust target                         **
+  **  x86_64-unknown-linux-musl, and some of them cannot be had here: the   **
+  **  line above says which. Run `make test-socketcan` where they can.      **
+  **                                                                        **
+  ****************************************************************************
+
+NOTICE
+fi
+[ $status = 0 ] || exit $status
+
+console=$made/console.log
+status=0
+timeout --kill-after=10 $limit qemu-system-x86_64 \
+    -M pc -accel tcg,thread=multi -smp 1 -m 512 -nodefaults -no-reboot -display none -nic none \
+    -kernel "$made/vmlinuz" -initrd "$made/initrd.gz" \
+    -append "console=ttyS0 rdinit=/init quiet panic=-1 mitigations=off tsc=reliable" \
+    -object can-bus,id=bus -device kvaser_pci,canbus=bus -device kvaser_pci,canbus=bus \
+    -serial file:"$console" </dev/null || status=$?
+tr -d '\r' <"$console" >"$made/console.txt"
+if [ $status != 0 ]; then
+    cat "$made/console.txt"
+    echo "the virtual machine did not end by itself within $limit s, or failed ($status)" >&2
+    exit 1
+fi
+grep -E '^(passed |failed |  \| )' "$made/console.txt" || cat "$made/console.txt"
+
+sed -n 's/^passed //p' "$made/console.txt" | sort >"$made/passed"
+sort "$made/expected" | comm -3 "$made/passed" - >"$made/difference"
+if [ -s "$made/difference" ] || ! [ -s "$made/passed" ]; then
+    echo "not passed: $(tr -s '\n\t' '  ' <"$made/difference")" >&2
+    exit 1
+fi
+echo "all $(grep -c . "$made/passed") checks in the virtual machine passed"
