@@ -47,6 +47,7 @@ grep -E '^(passed |failed |  \| )' "$made/console.txt" || cat "$made/console.txt
 sed -n 's/^passed //p' "$made/console.txt" | sort >"$made/passed"
 sort "$made/expected" | comm -3 "$made/passed" - >"$made/difference"
 if [ -s "$made/difference" ] || ! [ -s "$made/passed" ]; then
+    tail -n 5 "$made/console.txt" >&2
     echo "not passed: $(tr -s '\n\t' '  ' <"$made/difference")" >&2
     exit 1
 fi

@@ -3,7 +3,7 @@
 
 use std::ffi::OsStr;
 use std::fs::{File, OpenOptions};
-use std::io::{Read, Write};
+use std::io::{BufReader, Read, Write};
 use std::os::fd::OwnedFd;
 use std::os::unix::ffi::OsStrExt;
 use std::process::Command;
@@ -47,6 +47,26 @@ impl Adapter {
         let line = adapter.line.try_clone().expect("a descriptor");
         adapter.thread = Some(std::thread::spawn(move || answer(&line, pause)));
         adapter
+    }
+
+    /// Puts a request to each of motors 1 to 32 on the bus: status 1.
+    pub fn ask_all(&self) {
+        for id in 0x141..=0x160 {
+            write!(&self.line, "t{id:03x}89a00000000000000\r").expect("the driver takes it");
+        }
+    }
+
+    /// Takes `count` frames from the kernel, with a pause before each; gives their identifiers.
+    /// The kernel sends as it is read, so that is byte by byte.
+    pub fn take(&self, count: usize, pause: Duration) -> Vec<String> {
+        let mut bytes = BufReader::with_capacity(1, &self.line).bytes();
+        let mut frame = || -> Option<String> {
+            std::thread::sleep(pause);
+            let line = bytes.by_ref().map_while(Result::ok).take_while(|&byte| byte != b'\r');
+            let line = String::from_utf8(line.collect()).ok()?;
+            Some(line.get(1..4)?.to_owned())
+        };
+        (0..count).map(|_| frame().expect("a data frame")).collect()
     }
 
     /// Reports the state of the controller: `a` active, `p` passive, `b` bus-off.

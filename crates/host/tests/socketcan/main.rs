@@ -13,6 +13,8 @@ use motorlink::port::{CanLink, PortError, PortName};
 use motorlink::rmd::{
     self, Bus, CanFrame, CentiDps, Error, Found, Gains, MotorId, MotorSet, Torque4, TorqueCommand,
 };
+use motorlink::serve::{CanStation, Server};
+use motorlink::time::Instant;
 use motorlink::{BackOff, LinkState};
 use socketcan::{
     CanDataFrame, CanFdFrame, CanFdSocket, CanRemoteFrame, EmbeddedFrame, ExtendedId, Socket,
@@ -277,6 +279,7 @@ fn a_controller_that_is_bus_off_takes_no_request_until_it_is_restarted() {
         };
         list::ports().iter().any(|port| port.name == "socketcan:slcan0" && is_told(port))
     });
+    until("the host is told", || motor.status1().is_err());
     // The interface would take frames and drop them.
     for _ in 0..100 {
         let lost = motor.status1().expect_err("the controller is off the bus").to_string();
@@ -313,6 +316,40 @@ fn a_bus_that_takes_nothing_is_told() {
     let stalled = (0..).find_map(|_| link.send(&CanFrame::new(0x141, [0x9A; 8])).err());
     let says = stalled.expect("the queue is full at last").to_string();
     assert!(says.contains("takes no more data: no other node acknowledges the frames"), "{says}");
+}
+
+/// A node that answers each frame with the same.
+struct Echo;
+
+impl CanStation for Echo {
+    fn receive(&mut self, _: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+        replies.push(*frame);
+    }
+    fn poll(&mut self, _: Instant, _: &mut Vec<CanFrame>) {}
+    fn deadline(&self) -> Option<Instant> {
+        None
+    }
+}
+
+#[test]
+#[ignore = "needs CAN: make test-socketcan"]
+fn served_motors_wait_for_room_and_not_for_ever() {
+    let adapter = Adapter::deaf();
+    let motors = Served::on("slcan0", 32);
+    adapter.ask_all();
+    let mut answered = adapter.take(32, Duration::from_millis(2));
+    answered.sort();
+    let all: Vec<String> = (0x141..=0x160).map(|id| format!("{id:X}")).collect();
+    assert_eq!(answered, all);
+    drop(motors);
+
+    let mut server = Server::new();
+    server.serve_can(&"socketcan:slcan0".parse().expect("a port"), Box::new(Echo)).expect("up");
+    adapter.ask_all();
+    while server.dropped() == 0 {
+        server.turn(Duration::from_secs(1), None).expect("a turn");
+    }
+    assert!(server.dropped() < 32 * 8, "the interface's queue took some");
 }
 
 #[test]
