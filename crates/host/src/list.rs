@@ -91,11 +91,11 @@ fn can_port(root: &Path, name: &str) -> Option<PortInfo> {
         _ => None,
     };
     let device = class.join("device");
-    let virtual_can = interface.is_virtual.then(|| "virtual CAN".to_owned());
+    let soft = (!interface.needs_bitrate).then(|| "virtual or serial CAN".to_owned());
     Some(PortInfo {
         name: format!("socketcan:{name}"),
         kind: PortKind::Can,
-        description: usb_strings(&device).or_else(|| driver(&device)).or(virtual_can),
+        description: usb_strings(&device).or_else(|| driver(&device)).or(soft),
         stable_path: None,
         problem,
     })
@@ -197,7 +197,6 @@ mod tests {
             ("can0", "0x40080", ""),
             ("can1", "0x40081", "0"),
             ("can2", "0x80", ""),
-            ("slcan0", "0x40081", "1"),
             ("vcan0", "0x81", "1"),
         ] {
             machine.file(&format!("sys/class/net/{name}/type"), "280\n")?;
@@ -214,12 +213,11 @@ mod tests {
                 "socketcan:can0",
                 "socketcan:can1",
                 "socketcan:can2",
-                "socketcan:slcan0",
                 "socketcan:vcan0"
             ]
         );
-        let [acm, down, bus_off, virtual_down, adapter, fine] = found.as_slice() else {
-            unreachable!("six")
+        let [acm, down, bus_off, virtual_down, fine] = found.as_slice() else {
+            unreachable!("five")
         };
         assert_eq!(acm.description.as_deref(), Some("STMicroelectronics STM32 STLink"));
         assert_eq!(acm.stable_path.as_deref(), Some(Path::new("/dev/serial/by-id/usb-STLink")));
@@ -228,10 +226,9 @@ mod tests {
         assert!(problem(down).starts_with("down: sudo ip link set can0 up type can"));
         assert!(problem(bus_off).starts_with("bus-off"));
         assert_eq!(problem(virtual_down), "down: sudo ip link set can2 up");
-        assert_eq!((problem(adapter), adapter.description.as_deref()), (String::new(), None));
         assert_eq!(
             (problem(fine), fine.description.as_deref()),
-            (String::new(), Some("virtual CAN"))
+            (String::new(), Some("virtual or serial CAN"))
         );
         Ok(())
     }

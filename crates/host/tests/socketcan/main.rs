@@ -34,17 +34,18 @@ const STATUS_1: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
 
 /// A virtual machine may hold a motor up for longer than a motor would take.
 fn bus(interface: &str) -> Bus {
-    let back_off = BackOff { first: Duration::from_millis(1), cap: Duration::from_millis(10) };
-    let timeout = Duration::from_secs(5);
-    let options = rmd::Options { timeout, back_off, ..rmd::Options::default() };
-    Bus::open(&port(interface), options).expect("the interface is up")
+    bus_within(Duration::from_secs(5), interface)
 }
 
 /// A bus that soon takes a motor for silent.
 fn hasty(interface: &str) -> Bus {
+    bus_within(Duration::from_millis(50), interface)
+}
+
+fn bus_within(timeout: Duration, interface: &str) -> Bus {
     let ms = Duration::from_millis;
     let back_off = BackOff { first: ms(1), cap: ms(10) };
-    let options = rmd::Options { timeout: ms(50), guard: ms(1), back_off, ..Default::default() };
+    let options = rmd::Options { timeout, guard: ms(1), back_off, ..rmd::Options::default() };
     Bus::open(&port(interface), options).expect("the interface is up")
 }
 
@@ -454,7 +455,7 @@ fn a_flood_of_other_frames_is_survived() {
 #[ignore = "needs CAN: make test-socketcan"]
 fn a_late_reply_that_waited_in_the_socket_is_not_taken_for_the_next_one() {
     let witness = neighbour("vcan0");
-    let bus = hasty("vcan0");
+    let bus = bus_within(Duration::from_secs(1), "vcan0");
     let asked = bus.raw(id(1), [0x9C, 0, 0, 0, 0, 0, 0, 0]);
     assert!(matches!(asked, Err(Error::Timeout { .. })));
     let request = witness.read_frame().expect("the request");
