@@ -1,8 +1,8 @@
 //! Served ports: the other side of a serial line or a CAN bus, for simulated drives.
 //!
-//! A [`Server`] owns ptys, TCP listeners and sockets on CAN interfaces and one station behind each. It has no thread: whoever
-//! runs it calls [`Server::turn`] again and again. It never waits for a client that does not read;
-//! what such a client misses is dropped and counted.
+//! A [`Server`] owns ptys, TCP listeners and CAN sockets, and one station behind each. It has no
+//! thread: whoever runs it calls [`Server::turn`] again and again. It never waits for a client that
+//! does not read; what such a client misses is dropped and counted.
 //!
 //! A pty is a line with one client at a time; bytes that one left unread are not shown to the next.
 //! A served TCP port that is a serial line has one client too: while it is connected, others are
@@ -11,7 +11,7 @@
 //! kernel is a node of that bus, and goes on when the interface was away.
 
 mod endpoint;
-mod interface;
+mod node;
 mod pty;
 
 use std::net::{TcpListener, ToSocketAddrs};
@@ -25,7 +25,7 @@ use rustix::io::Errno;
 
 use crate::port::{PortError, ServeName, timespec, unbracketed};
 use endpoint::{Door, Endpoint, Scratch, Station};
-use interface::Interface;
+use node::Node;
 use pty::Pty;
 
 /// What answers at the far end of a served serial line.
@@ -68,7 +68,7 @@ pub struct Turn {
 pub struct Server {
     started: std::time::Instant,
     endpoints: Vec<Endpoint>,
-    interfaces: Vec<Interface>,
+    nodes: Vec<Node>,
     ready: Vec<bool>,
     scratch: Scratch,
 }
@@ -85,7 +85,7 @@ impl Server {
         Server {
             started: std::time::Instant::now(),
             endpoints: Vec::new(),
-            interfaces: Vec::new(),
+            nodes: Vec::new(),
             ready: Vec::new(),
             scratch: Scratch::default(),
         }
@@ -128,7 +128,7 @@ impl Server {
                 path
             }
             (ServeName::SocketCan(interface), Station::Can(station)) => {
-                self.interfaces.push(Interface::open(interface, station)?);
+                self.nodes.push(Node::open(interface, station)?);
                 interface.clone()
             }
             (_, Station::Bytes(_)) => {
@@ -165,7 +165,7 @@ impl Server {
         for endpoint in &self.endpoints {
             endpoint.watch(&mut fds);
         }
-        fds.extend(self.interfaces.iter().filter_map(Interface::watch));
+        fds.extend(self.nodes.iter().filter_map(Node::watch));
         fds.extend(extra.map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)));
         match poll(&mut fds, Some(&wait)) {
             Ok(_) => {}
@@ -182,9 +182,9 @@ impl Server {
             endpoint.serve(now, ours, &mut self.scratch);
             ready = others;
         }
-        for interface in &mut self.interfaces {
-            let (ours, others) = ready.split_at(usize::from(interface.watch().is_some()));
-            self.scratch.dropped += interface.serve(now, ours == [true]);
+        for node in &mut self.nodes {
+            let (ours, others) = ready.split_at(usize::from(node.watch().is_some()));
+            self.scratch.dropped += node.serve(now, ours == [true]);
             ready = others;
         }
         Ok(Turn { extra_is_ready: ready.contains(&true) })
@@ -193,7 +193,7 @@ impl Server {
     /// The time to the first deadline of a station.
     fn wait_time(&self, max_wait: Duration) -> Duration {
         let endpoints = self.endpoints.iter().filter_map(Endpoint::deadline);
-        let first = endpoints.chain(self.interfaces.iter().filter_map(Interface::deadline)).min();
+        let first = endpoints.chain(self.nodes.iter().filter_map(Node::deadline)).min();
         first.map_or(max_wait, |deadline| max_wait.min(deadline.since(self.now()).into()))
     }
 }

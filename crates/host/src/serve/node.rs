@@ -18,8 +18,8 @@ const STALE: Duration = Duration::from_millis(100);
 /// How soon an interface that is away is looked for again.
 const AWAY: Duration = Duration::from_millis(100);
 
-pub(super) struct Interface {
-    name: String,
+pub(super) struct Node {
+    interface: String,
     station: Box<dyn CanStation>,
     /// Nothing while the interface is away.
     link: Option<SocketCanLink>,
@@ -32,13 +32,13 @@ pub(super) struct Interface {
     said: Vec<CanFrame>,
 }
 
-impl Interface {
-    /// Opens the CAN interface `name`, which must be up now.
-    pub(super) fn open(name: &str, station: Box<dyn CanStation>) -> Result<Self, PortError> {
-        Ok(Interface {
-            name: name.to_owned(),
+impl Node {
+    /// Opens a CAN interface, which must be up now.
+    pub(super) fn open(interface: &str, station: Box<dyn CanStation>) -> Result<Self, PortError> {
+        Ok(Node {
+            interface: interface.to_owned(),
             station,
-            link: Some(SocketCanLink::open(name)?),
+            link: Some(SocketCanLink::open(interface)?),
             outgoing: VecDeque::new(),
             full_since: None,
             retry: None,
@@ -113,7 +113,7 @@ impl Interface {
     }
 
     fn reopen(&mut self, now: Instant) {
-        match SocketCanLink::open(&self.name) {
+        match SocketCanLink::open(&self.interface) {
             Ok(link) => self.link = Some(link),
             Err(_) => self.lose(now),
         }
