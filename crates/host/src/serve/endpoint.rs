@@ -1,24 +1,28 @@
 //! One served port: its door, its clients and its station.
 
+use std::io::ErrorKind::{ConnectionAborted, Interrupted, WouldBlock};
 use std::net::TcpListener;
 use std::os::fd::OwnedFd;
 
 use motorlink_proto::rmd::CanFrame;
-use motorlink_proto::time::Instant;
+use motorlink_proto::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags};
 use rustix::io::{Errno, read, write};
 
-use super::pty::Pty;
+use super::pty::{Pty, is_held};
 use super::{ByteStation, CanStation};
 use crate::slcan::Device;
 
 /// Bytes that are taken from a client at once.
 const CHUNK: usize = 4096;
 
+/// How long the door stays shut when a newcomer cannot be let in for want of descriptors.
+const PAUSE: Duration = Duration::from_millis(100);
+
 /// Where clients come from.
-pub(super) enum Door {
-    /// The one client is whoever holds the pty.
-    Pty(Pty),
+enum Door {
+    /// The one client is whoever holds the pty; its line waits here while nobody does.
+    Pty(Pty, Option<Client>),
     /// Each connection is a client.
     Listener(TcpListener),
 }
@@ -46,6 +50,8 @@ pub(super) struct Endpoint {
     door: Door,
     clients: Vec<Client>,
     station: Station,
+    /// Until then nobody is let in.
+    shut_until: Option<Instant>,
 }
 
 struct Client {
@@ -57,18 +63,26 @@ struct Client {
 }
 
 impl Endpoint {
-    /// `line` is the client that is there from the start.
-    pub(super) fn new(door: Door, station: Station, line: Option<OwnedFd>) -> Self {
-        Endpoint { door, clients: line.into_iter().map(Client::new).collect(), station }
+    pub(super) fn on_pty(pty: Pty, line: OwnedFd, station: Station) -> Self {
+        Self::new(Door::Pty(pty, Some(Client::new(line))), station)
+    }
+
+    pub(super) fn on_tcp(listener: TcpListener, station: Station) -> Self {
+        Self::new(Door::Listener(listener), station)
+    }
+
+    fn new(door: Door, station: Station) -> Self {
+        Endpoint { door, clients: Vec::new(), station, shut_until: None }
     }
 
     /// Appends what is to be polled: the clients, then the door. The door is
     /// looked at last: when a client's bytes are seen, its coming is seen as well.
     pub(super) fn watch<'a>(&'a self, fds: &mut Vec<PollFd<'a>>) {
         fds.extend(self.clients.iter().map(|client| PollFd::new(&client.line, PollFlags::IN)));
+        let coming = if self.shut_until.is_some() { PollFlags::empty() } else { PollFlags::IN };
         fds.push(match &self.door {
-            Door::Pty(pty) => PollFd::new(pty.comings(), PollFlags::IN),
-            Door::Listener(listener) => PollFd::new(listener, PollFlags::IN),
+            Door::Pty(pty, _) => PollFd::new(pty.comings(), coming),
+            Door::Listener(listener) => PollFd::new(listener, coming),
         });
     }
 
@@ -77,17 +91,15 @@ impl Endpoint {
         self.clients.len() + 1
     }
 
+    /// When something is to be done without being asked.
     pub(super) fn deadline(&self) -> Option<Instant> {
-        match &self.station {
-            Station::Bytes(station) => station.deadline(),
-            Station::Can(station) => station.deadline(),
-        }
+        self.shut_until.into_iter().chain(self.station.deadline()).min()
     }
 
     /// Does what is due. `ready` says which of the watched descriptors have something.
     pub(super) fn serve(&mut self, now: Instant, ready: &[bool], scratch: &mut Scratch) {
         let door_is_ready = ready.last() == Some(&true);
-        if door_is_ready && let Door::Pty(pty) = &self.door {
+        if door_is_ready && let Door::Pty(pty, _) = &self.door {
             pty.forget_unread();
         }
         for (index, &is_ready) in ready.iter().take(self.clients.len()).enumerate() {
@@ -96,16 +108,40 @@ impl Endpoint {
                 self.receive(now, index, scratch);
             }
         }
-        self.clients.retain(|client| !client.is_gone);
-        if door_is_ready {
-            self.admit();
+        self.see_off(now);
+        let reopens = self.shut_until.take_if(|until| *until <= now).is_some();
+        let known = self.clients.len();
+        if door_is_ready || reopens || self.is_taken_unseen() {
+            self.admit(now);
         }
-        if self.deadline().is_some_and(|deadline| deadline <= now) {
+        for newcomer in known..self.clients.len() {
+            self.receive(now, newcomer, scratch);
+        }
+        if self.station.deadline().is_some_and(|deadline| deadline <= now) {
             self.poll(now, &mut scratch.frames);
         }
         for client in &mut self.clients {
             scratch.dropped += client.flush();
         }
+    }
+
+    /// Lets go of the clients that left.
+    fn see_off(&mut self, now: Instant) {
+        for mut client in self.clients.extract_if(.., |client| client.is_gone) {
+            if let Station::Bytes(station) = &mut self.station {
+                station.left(now);
+            }
+            if let Door::Pty(pty, waiting) = &mut self.door {
+                pty.forget_unread();
+                client.is_gone = false;
+                *waiting = Some(client);
+            }
+        }
+    }
+
+    /// Whether someone opened the pty while its events were being dropped.
+    fn is_taken_unseen(&self) -> bool {
+        matches!(&self.door, Door::Pty(_, Some(line)) if is_held(&line.line))
     }
 
     fn receive(&mut self, now: Instant, index: usize, scratch: &mut Scratch) {
@@ -150,16 +186,42 @@ impl Endpoint {
         }
     }
 
-    /// Lets in who waits longest at the door. A serial line has one client; others are closed at
-    /// once. Only one a turn: one who comes in meanwhile may follow a client that is not yet seen to
-    /// have left.
-    fn admit(&mut self) {
-        let Door::Listener(listener) = &self.door else { return };
-        let Ok((stream, _)) = listener.accept() else { return };
-        let shared = matches!(self.station, Station::Can(_));
-        let usable = stream.set_nonblocking(true).and_then(|()| stream.set_nodelay(true));
-        if usable.is_ok() && (shared || self.clients.is_empty()) {
-            self.clients.push(Client::new(stream.into()));
+    /// Lets in who waits longest at the door, where the station takes them. Only one a turn: one
+    /// who comes in meanwhile may follow a client that is not yet seen to have left.
+    fn admit(&mut self, now: Instant) {
+        let others = self.clients.len();
+        let mut is_welcome = || match &mut self.station {
+            Station::Bytes(station) => station.came(now, others),
+            Station::Can(_) => true,
+        };
+        match &mut self.door {
+            // Whoever is not welcome on a pty cannot be closed: the station hears them all the same.
+            Door::Pty(_, waiting) => {
+                is_welcome();
+                self.clients.extend(waiting.take());
+            }
+            Door::Listener(listener) => match listener.accept() {
+                Ok((stream, _)) => {
+                    let usable =
+                        stream.set_nonblocking(true).and_then(|()| stream.set_nodelay(true));
+                    if usable.is_ok() && is_welcome() {
+                        self.clients.push(Client::new(stream.into()));
+                    }
+                }
+                Err(error)
+                    if matches!(error.kind(), WouldBlock | Interrupted | ConnectionAborted) => {}
+                // It still waits there, and would wake every turn.
+                Err(_) => self.shut_until = Some(now + PAUSE),
+            },
+        }
+    }
+}
+
+impl Station {
+    fn deadline(&self) -> Option<Instant> {
+        match self {
+            Station::Bytes(station) => station.deadline(),
+            Station::Can(station) => station.deadline(),
         }
     }
 }

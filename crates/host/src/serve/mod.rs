@@ -6,9 +6,10 @@
 //!
 //! A pty is a line with one client at a time; bytes that one left unread are not shown to the next.
 //! A served TCP port that is a serial line has one client too: while it is connected, others are
-//! closed at once. Behind a TCP port that is a CAN bus each client has an slcan adapter of its own
-//! on the same bus: it hears the station and the other clients. A station on a CAN interface of the
-//! kernel is a node of that bus, and goes on when the interface was away.
+//! closed at once; a [`ByteStation`] is told who comes and goes. Behind a TCP port that is a CAN bus
+//! each client has an slcan adapter of its own on the same bus: it hears the station and the other
+//! clients. A station on a CAN interface of the kernel is a node of that bus, and goes on when the
+//! interface was away.
 
 mod endpoint;
 mod node;
@@ -24,7 +25,7 @@ use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 
 use crate::port::{PortError, ServeName, timespec, unbracketed};
-use endpoint::{Door, Endpoint, Scratch, Station};
+use endpoint::{Endpoint, Scratch, Station};
 use node::Node;
 use pty::Pty;
 
@@ -36,6 +37,15 @@ pub trait ByteStation {
     fn poll(&mut self, now: Instant, reply: &mut Vec<u8>);
     /// When [`poll`](Self::poll) is to be called next, if at all.
     fn deadline(&self) -> Option<Instant>;
+
+    /// Someone opens the line, which `others` have open already. Unless it returns true they are
+    /// closed at once, where the port can: on a pty it cannot.
+    fn came(&mut self, _now: Instant, others: usize) -> bool {
+        others == 0
+    }
+
+    /// A client closed the line, or is gone.
+    fn left(&mut self, _now: Instant) {}
 }
 
 /// What sits on a served CAN bus.
@@ -116,7 +126,7 @@ impl Server {
             | (ServeName::SlcanPty(link), station @ Station::Can(_)) => {
                 let (pty, master) = Pty::open(link)?;
                 let path = pty.path().display().to_string();
-                self.endpoints.push(Endpoint::new(Door::Pty(pty), station, Some(master)));
+                self.endpoints.push(Endpoint::on_pty(pty, master, station));
                 path
             }
             (ServeName::TcpListen { host, port: tcp_port }, station) => {
@@ -124,7 +134,7 @@ impl Server {
                 if *tcp_port == 0 {
                     port = format!("tcp-listen:{path}");
                 }
-                self.endpoints.push(Endpoint::new(Door::Listener(listener), station, None));
+                self.endpoints.push(Endpoint::on_tcp(listener, station));
                 path
             }
             (ServeName::SocketCan(interface), Station::Can(station)) => {

@@ -7,6 +7,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::inotify::{self, WatchFlags};
 use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
@@ -14,11 +15,11 @@ use rustix::termios::{OptionalActions, QueueSelector, tcflush, tcgetattr, tcseta
 
 use crate::port::PortError;
 
-/// The client's side of a pty, kept open so that a client may leave and another come.
+/// A pty for one client after the other. The client's side is not kept open here, so that the
+/// kernel tells when the last one has closed it: the server's side then reads an error.
 pub(super) struct Pty {
     path: PathBuf,
     link: PathBuf,
-    slave: OwnedFd,
     comings: OwnedFd,
 }
 
@@ -27,10 +28,10 @@ impl Pty {
     pub(super) fn open(link: &Path) -> Result<(Self, OwnedFd), PortError> {
         let failed = |source| PortError::Io { port: link.display().to_string(), source };
         clear_link(link)?;
-        let (path, master, slave) = open_pair().map_err(|errno| failed(errno.into()))?;
+        let (path, master) = open_pair().map_err(|errno| failed(errno.into()))?;
         let comings = watch_comings(&path).map_err(|errno| failed(errno.into()))?;
         symlink(&path, link).map_err(failed)?;
-        Ok((Pty { path, link: link.to_owned(), slave, comings }, master))
+        Ok((Pty { path, link: link.to_owned(), comings }, master))
     }
 
     /// The device that a client opens.
@@ -38,18 +39,25 @@ impl Pty {
         &self.path
     }
 
-    /// Becomes readable when a client opens or closes the pty.
+    /// Becomes readable when a client opens the pty.
     pub(super) fn comings(&self) -> &OwnedFd {
         &self.comings
     }
 
     /// Drops what a former client did not read, now that someone has come or gone.
     pub(super) fn forget_unread(&self) {
+        // It cannot fail on a pty; if it did, the client would see old bytes.
+        let _ = open_client_side(&self.path)
+            .and_then(|client_side| tcflush(&client_side, QueueSelector::IFlush));
         let mut events = [0; 1024];
         while rustix::io::read(&self.comings, &mut events).is_ok_and(|len| len > 0) {}
-        // It cannot fail on a pty; if it did, the client would see old bytes.
-        let _ = tcflush(&self.slave, QueueSelector::IFlush);
     }
+}
+
+/// Whether a client holds the pty whose server's side this is.
+pub(super) fn is_held(master: &OwnedFd) -> bool {
+    let mut fds = [PollFd::new(master, PollFlags::empty())];
+    poll(&mut fds, Some(&Timespec::default())).is_ok() && !fds[0].revents().contains(PollFlags::HUP)
 }
 
 impl Drop for Pty {
@@ -60,24 +68,29 @@ impl Drop for Pty {
     }
 }
 
-/// A pty in raw mode: its path, the server's side (non-blocking) and the client's.
-fn open_pair() -> rustix::io::Result<(PathBuf, OwnedFd, OwnedFd)> {
+/// A pty in raw mode: its path and the server's side, non-blocking.
+fn open_pair() -> rustix::io::Result<(PathBuf, OwnedFd)> {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
     grantpt(&master)?;
     unlockpt(&master)?;
     fcntl_setfl(&master, OFlags::NONBLOCK)?;
     let name = ptsname(&master, Vec::new())?;
     let path = PathBuf::from(OsStr::from_bytes(name.as_bytes()));
-    let slave = open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
-    let mut settings = tcgetattr(&slave)?;
+    // The mode outlives this descriptor.
+    let client_side = open_client_side(&path)?;
+    let mut settings = tcgetattr(&client_side)?;
     settings.make_raw();
-    tcsetattr(&slave, OptionalActions::Now, &settings)?;
-    Ok((path, master, slave))
+    tcsetattr(&client_side, OptionalActions::Now, &settings)?;
+    Ok((path, master))
+}
+
+fn open_client_side(path: &Path) -> rustix::io::Result<OwnedFd> {
+    open(path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())
 }
 
 fn watch_comings(path: &Path) -> rustix::io::Result<OwnedFd> {
     let comings = inotify::init(inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC)?;
-    inotify::add_watch(&comings, path, WatchFlags::OPEN | WatchFlags::CLOSE)?;
+    inotify::add_watch(&comings, path, WatchFlags::OPEN)?;
     Ok(comings)
 }
 
