@@ -4,6 +4,7 @@ mod conformance;
 mod connection;
 mod demo;
 mod failure;
+mod guard;
 mod help;
 mod interrupt;
 mod output;
@@ -33,6 +34,8 @@ enum Command {
     Demo(demo::Args),
     /// Serve simulated drives on ports of this machine
     Sim(sim::Args),
+    /// Hold the line of an ST drive for a program, and stop its motors when the program is gone
+    Guard(guard::Args),
     /// List serial devices and CAN interfaces, and what could be wrong with them
     Ports(ports::Args),
     /// Talk to a drive that speaks ST's Motor Control Protocol
@@ -60,6 +63,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(args) => demo::run(args),
         Command::Sim(args) => sim::run(args),
+        Command::Guard(args) => guard::run(args),
         Command::Ports(args) => ports::run(args),
         Command::St(args) => st::run(args),
         Command::Rmd(args) => rmd::run(args),

@@ -1,6 +1,7 @@
 //! A byte line on a file descriptor: serial device, pty, TCP connection, socket pair.
 
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::sync::Arc;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -38,8 +39,35 @@ impl FdLink {
     }
 }
 
+/// A link that several hold: the descriptor is the kernel's to share.
+impl ByteLink for Arc<FdLink> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.put(bytes)
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        self.fetch(buffer, timeout)
+    }
+}
+
 impl ByteLink for FdLink {
-    fn write(&mut self, mut bytes: &[u8]) -> Result<(), PortError> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.put(bytes)
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        self.fetch(buffer, timeout)
+    }
+}
+
+impl AsFd for FdLink {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.fd.as_fd()
+    }
+}
+
+impl FdLink {
+    fn put(&self, mut bytes: &[u8]) -> Result<(), PortError> {
         while !bytes.is_empty() {
             match write(&self.fd, bytes) {
                 Ok(written) => bytes = &bytes[written..],
@@ -58,7 +86,7 @@ impl ByteLink for FdLink {
         Ok(())
     }
 
-    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+    fn fetch(&self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
         if buffer.is_empty() {
             return Ok(0);
         }

@@ -5,11 +5,12 @@ use std::time::{Duration, Instant};
 
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
-    BoardInfo, Command, Config, Counters, Frame, Line, MAX_FRAME, Master, Motor, Output, Parse,
-    Profile, Recovery, RegisterId, Request, RequestError,
+    BoardInfo, Command, Config, Counters, Frame, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor,
+    Output, Parse, Profile, Recovery, Request, RequestError,
 };
 
 use super::error::{Target, advice, hint};
+use super::started::Started;
 use super::{Error, Guard, Limits, MotorHandle};
 use crate::line::{BackOff, LinkState, Opener, Reopening};
 use crate::port::{ByteLink, LineName, PortError, PortName};
@@ -25,6 +26,16 @@ pub struct Options {
     pub back_off: BackOff,
     /// What no request may exceed.
     pub limits: Limits,
+}
+
+impl Options {
+    /// What recovery sends has to be out of the port before silence can begin.
+    pub(super) fn on(mut self, line: &LineName) -> Self {
+        if let LineName::Serial { baud, .. } = line {
+            self.line.quiet = self.line.quiet + Master::longest_transmission(*baud);
+        }
+        self
+    }
 }
 
 /// After a pause of this length whatever came unasked is taken note of before the next request: a
@@ -64,10 +75,8 @@ struct Inner {
     port: Reopening<Box<dyn ByteLink>>,
     master: Master,
     received: [u8; 256],
-    /// Bit n: motor n + 1 was started and not stopped by this client.
-    started: u8,
-    /// What motor number 0 addresses; `None` while that is not known.
-    current: Option<Motor>,
+    /// Motors that this client started and did not stop.
+    started: Started,
     /// When the last exchange ended.
     ended: Instant,
 }
@@ -89,9 +98,8 @@ impl Client {
         mut options: Options,
     ) -> Result<Self, Error> {
         let name = port.clone();
-        if let PortName::Line(LineName::Serial { baud, .. }) = port {
-            // What recovery sends has to be out of the port before silence can begin.
-            options.line.quiet = options.line.quiet + Master::longest_transmission(*baud);
+        if let PortName::Line(line) = port {
+            options = options.on(line);
         }
         let open = move || Ok(wrap(name.open_line()?));
         Self::open_with(&port.to_string(), Box::new(open), options)
@@ -117,8 +125,7 @@ impl Client {
             port,
             master,
             received: [0; 256],
-            started: 0,
-            current: None,
+            started: Started::default(),
             ended: Instant::now(),
         };
         Client { inner: Mutex::new(inner), profile: options.profile, limits: options.limits }
@@ -157,8 +164,7 @@ impl Client {
 
     /// Motors that this client started and did not stop.
     pub fn started(&self) -> impl Iterator<Item = Motor> + use<> {
-        let started = self.lock().started;
-        (1..=Motor::MAX).filter_map(Motor::new).filter(move |motor| started & bit(*motor) != 0)
+        self.lock().started.motors()
     }
 
     /// Name and version of the SDK (4.7).
@@ -233,6 +239,25 @@ impl Client {
         Ok(written?)
     }
 
+    /// Takes the line over from another master, which started these motors. `unanswered` is what it
+    /// sent last, if the reply to that may still come.
+    pub(super) fn take_over(&self, started: Started, unanswered: Option<&[u8]>) {
+        let mut inner = self.lock();
+        inner.started = started;
+        if let Some(sent) = unanswered {
+            let payload = sent.get(2..).unwrap_or(&[]);
+            let payload = &payload[..payload.len().min(MAX_PAYLOAD)];
+            // It always fits; what matters is which question it was.
+            let _ = inner.master.request_raw(sent.first().copied().unwrap_or(0), payload);
+            inner.master.abandon();
+        }
+    }
+
+    /// What [`take_over`](Self::take_over) was given and later calls left of it.
+    pub(super) fn hand_over(&self) -> Started {
+        self.lock().started
+    }
+
     /// A poisoned lock is taken all the same: an exchange that panicked left the master in a state
     /// that its next request deals with.
     fn lock(&self) -> MutexGuard<'_, Inner> {
@@ -273,18 +298,13 @@ impl Inner {
         if begun.is_err() {
             return Err(Error::TooLong(what()));
         }
-        let addressed = Motor::new(motor).or(self.current);
-        if request.is_some_and(starts) {
-            self.started |= addressed.map_or(ALL, bit);
-        }
+        let addressed = self.started.asked(motor, request);
         let (port, target) = (self.port.name.clone(), Target(motor));
         let outcome = self.run(reply);
         self.ended = Instant::now();
-        // Unless the drive acknowledges, its current motor may have changed or not.
-        self.current = None;
         match outcome {
             Ok(Ok((Some(value), _))) => {
-                self.acknowledged(addressed, request);
+                self.started.acknowledged(addressed, request);
                 Ok(value)
             }
             Ok(Ok((None, size))) => {
@@ -328,35 +348,11 @@ impl Inner {
             }
         }
     }
-
-    /// A motor counts as started from the START on, whose reply may be lost, and until a STOP is
-    /// acknowledged.
-    fn acknowledged(&mut self, addressed: Option<Motor>, request: Option<&Request<'_>>) {
-        match request {
-            Some(Request::SetRegister { register: RegisterId::TARGET_MOTOR, .. }) => return,
-            Some(Request::Execute(Command::StopMotor | Command::ScStop)) => {
-                self.started &= !addressed.map_or(0, bit);
-            }
-            _ => {}
-        }
-        self.current = addressed;
-    }
 }
 
 /// Motor numbers have three bits.
 fn addressable(motor: u8) -> Result<(), Error> {
     if motor <= Motor::MAX { Ok(()) } else { Err(Error::NoSuchMotor(motor)) }
-}
-
-fn starts(request: &Request<'_>) -> bool {
-    matches!(request, Request::Execute(Command::StartMotor | Command::StartStop | Command::ScStart))
-}
-
-/// Every motor that a drive can have.
-const ALL: u8 = 0x7F;
-
-const fn bit(motor: Motor) -> u8 {
-    1 << motor.index()
 }
 
 /// A request in words, for messages.

@@ -39,6 +39,12 @@ impl<'a> Guard<'a> {
         self.armed = false;
     }
 
+    /// Stops the motors now; gives what was done to each. Those that failed stay to be stopped.
+    pub fn stop_now(mut self) -> Vec<Stopped> {
+        self.armed = false;
+        self.stop_all()
+    }
+
     /// Stops a motor; `Err` leaves it to the next attempt.
     fn stop(&self, motor: Motor) -> Result<(), Error> {
         match self.client.motor(motor.number())?.stop() {

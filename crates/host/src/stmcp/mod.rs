@@ -15,10 +15,13 @@
 
 mod client;
 mod error;
+mod follow;
 mod guard;
 mod limits;
 mod motor;
+mod relay;
 mod scan;
+mod started;
 mod transcript;
 mod value;
 
@@ -34,6 +37,7 @@ pub use error::Error;
 pub use guard::{Guard, Stopped};
 pub use limits::{LimitError, Limits};
 pub use motor::MotorHandle;
+pub use relay::{Event, Halt, Reason, Relay, RelayError, RelayOptions};
 pub use scan::{BAUD_RATES, Finding, scan_baud};
 pub use transcript::Transcript;
 pub use value::{Reading, UnknownRegister, ValueError, find_register, parse_value};

@@ -1,0 +1,252 @@
+//! Follows what somebody else's master says to a drive: which motors it may have started.
+
+use motorlink_proto::stmcp::{
+    ErrorCode, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile,
+    Request,
+};
+
+use super::started::{Started, starts};
+
+/// Reads along on a line, from the host's bytes and the drive's.
+///
+/// It errs to one side. A START counts wherever in the stream its bytes stand: a drive that is out
+/// of step, or that completes a frame which was cut off, may take them for one. A STOP counts only
+/// when it was one whole request and was acknowledged, on a line that has been in step all the time.
+#[derive(Debug, Default)]
+pub(super) struct Follower {
+    started: Started,
+    /// Sent since the last whole reply.
+    request: Vec<u8>,
+    /// What came for it.
+    reply: Vec<u8>,
+    /// The reply is whole.
+    is_answered: bool,
+    /// Something did not look like requests and replies in turn.
+    out_of_step: bool,
+    /// The last bytes that were sent, as many as the longest frame has.
+    recent: Vec<u8>,
+}
+
+impl Follower {
+    /// On a line where these motors were started before.
+    pub(super) fn with(started: Started) -> Self {
+        Follower { started, ..Follower::default() }
+    }
+
+    pub(super) fn started(&self) -> Started {
+        self.started
+    }
+
+    /// Takes a motor for started.
+    pub(super) fn presume(&mut self, motor: Motor) {
+        self.started.presume(motor.number());
+    }
+
+    /// The bytes whose reply may still come, or that a drive may take for half a frame; `None` when
+    /// the line is at rest.
+    pub(super) fn unanswered(&self) -> Option<&[u8]> {
+        let is_at_rest = !self.out_of_step && (self.is_answered || self.request.is_empty());
+        (!is_at_rest).then_some(self.request.as_slice())
+    }
+
+    /// The host sends `bytes`.
+    pub(super) fn sent(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            if self.is_answered {
+                self.request.clear();
+                self.reply.clear();
+                self.is_answered = false;
+            }
+            if !self.reply.is_empty() || self.request.len() == MAX_FRAME {
+                self.lose();
+            }
+            if self.request.len() < MAX_FRAME {
+                self.request.push(byte);
+            }
+            if self.recent.len() == MAX_FRAME {
+                self.recent.remove(0);
+            }
+            self.recent.push(byte);
+            self.look_for_start();
+        }
+    }
+
+    /// The drive sends `bytes`.
+    pub(super) fn heard(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            if self.is_answered || self.request.is_empty() {
+                self.lose();
+                continue;
+            }
+            self.reply.push(byte);
+            match Frame::parse(&self.reply) {
+                Parse::More => {}
+                Parse::Frame(Frame { header: HEADER_ATR, .. }, _) => self.reply.clear(),
+                Parse::Frame(Frame { header, payload }, _) => {
+                    let (header, code) = (header, payload.first().copied().map(ErrorCode::from));
+                    self.conclude(header, code);
+                }
+                Parse::Bad(_) => {
+                    self.is_answered = true;
+                    self.lose();
+                }
+            }
+        }
+    }
+
+    fn conclude(&mut self, header: u8, code: Option<ErrorCode>) {
+        use ErrorCode::{BadCrc, Overrun, Timeout};
+        self.is_answered = true;
+        let frame = match Frame::parse(&self.request) {
+            Parse::Frame(frame, size) if size == self.request.len() => frame,
+            _ => return self.lose(),
+        };
+        // Commands and TARGET_MOTOR are the same in every profile.
+        let request = Request::decode(Profile::Spec, &frame).ok();
+        let addressed = self.started.asked(frame.motor(), request.as_ref());
+        match (header, code) {
+            (HEADER_ACK, _) if !self.out_of_step => {
+                self.started.acknowledged(addressed, request.as_ref());
+            }
+            (HEADER_ACK, _) => {}
+            // The drive may take the rest of a damaged frame for another.
+            (HEADER_NACK, Some(BadCrc | Timeout | Overrun)) => self.lose(),
+            (HEADER_NACK, _) => {}
+            _ => self.lose(),
+        }
+    }
+
+    fn lose(&mut self) {
+        self.out_of_step = true;
+        self.started.forget_current();
+    }
+
+    /// Whether the bytes up to the last one end in a START.
+    fn look_for_start(&mut self) {
+        for begin in 0..self.recent.len() {
+            if let Parse::Frame(frame, size) = Frame::parse(&self.recent[begin..])
+                && begin + size == self.recent.len()
+                && Request::decode(Profile::Spec, &frame).is_ok_and(|request| starts(&request))
+            {
+                self.started.presume(frame.motor());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motorlink_proto::stmcp::{Command, RegisterId};
+
+    use super::*;
+
+    const ACK: [u8; 3] = [0xF0, 0x00, 0xF0];
+
+    fn frame(motor: u8, request: &Request<'_>) -> Vec<u8> {
+        let mut bytes = [0; MAX_FRAME];
+        request.encode(motor, &mut bytes).unwrap().to_vec()
+    }
+
+    fn command(motor: u8, command: Command) -> Vec<u8> {
+        frame(motor, &Request::Execute(command))
+    }
+
+    fn motors(follower: &Follower) -> Vec<u8> {
+        follower.started().motors().map(|motor| motor.number()).collect()
+    }
+
+    #[test]
+    fn a_start_counts_at_once_and_a_stop_when_it_is_acknowledged() {
+        for start in [Command::StartMotor, Command::StartStop, Command::ScStart] {
+            let mut follower = Follower::default();
+            follower.sent(&command(2, start));
+            assert_eq!(motors(&follower), [2]);
+            assert!(follower.unanswered().is_some());
+            follower.heard(&ACK);
+            assert_eq!(follower.unanswered(), None);
+            follower.sent(&command(2, Command::StopMotor));
+            assert_eq!(motors(&follower), [2]);
+            follower.heard(&ACK);
+            assert!(follower.started().is_empty());
+        }
+    }
+
+    #[test]
+    fn a_refused_stop_stops_nothing() {
+        let mut follower = Follower::default();
+        follower.sent(&command(1, Command::StartMotor));
+        follower.heard(&ACK);
+        follower.sent(&command(1, Command::StopMotor));
+        follower.heard(&[0xFF, 0x01, 0x0B, 0x0C]);
+        assert_eq!(motors(&follower), [1]);
+    }
+
+    #[test]
+    fn motor_number_0_is_every_motor_until_the_current_one_is_known() {
+        let mut follower = Follower::default();
+        follower.sent(&command(0, Command::StartMotor));
+        assert_eq!(motors(&follower), [1, 2, 3, 4, 5, 6, 7]);
+
+        let mut follower = Follower::default();
+        follower.sent(&frame(3, &Request::GetRegister(RegisterId::STATUS)));
+        follower.heard(&[0xF0, 0x01, 0x00, 0xF1]);
+        follower.sent(&command(0, Command::StartMotor));
+        follower.heard(&ACK);
+        assert_eq!(motors(&follower), [3]);
+        let target = Request::SetRegister { register: RegisterId::TARGET_MOTOR, value: &[0] };
+        follower.sent(&frame(0, &target));
+        follower.heard(&ACK);
+        follower.sent(&command(0, Command::StartMotor));
+        assert_eq!(motors(&follower).len(), 7);
+    }
+
+    #[test]
+    fn a_start_counts_wherever_it_stands() {
+        let start = command(4, Command::StartMotor);
+        for before in 0..=MAX_FRAME {
+            let mut follower = Follower::default();
+            follower.sent(&vec![0xFF; before]);
+            start.iter().for_each(|&byte| follower.sent(&[byte]));
+            assert_eq!(motors(&follower), [4], "{before} bytes before");
+        }
+        // The payload may be longer than the command (SPEC-NOTES S18).
+        let mut follower = Follower::default();
+        let mut long = [0; MAX_FRAME];
+        let payload = &[&[0x01][..], &[0x55; 127]].concat()[..];
+        let long = Frame { header: Frame::header(3, 5), payload }.encode(&mut long).unwrap();
+        follower.sent(long);
+        assert_eq!(motors(&follower), [5]);
+    }
+
+    #[test]
+    fn on_a_line_that_was_out_of_step_no_stop_counts() {
+        let disturbances: [(&[u8], &[u8]); 5] = [
+            // A reply that nobody asked for, one that is none, one that is cut off, bytes that are
+            // no request, and two requests at once.
+            (&[], &ACK),
+            (&[0x06, 0x00, 0x06], &[0xF0, 0x00, 0x00]),
+            (&[0x06, 0x00, 0x06], &[0xF0]),
+            (&[0x06, 0x00, 0x07], &[0xFF, 0x01, 0x0A, 0x0B]),
+            (&[0x06, 0x00, 0x06, 0x06, 0x00, 0x06], &ACK),
+        ];
+        for (sent, heard) in disturbances {
+            let mut follower = Follower::default();
+            follower.sent(&command(1, Command::StartMotor));
+            follower.heard(&ACK);
+            follower.sent(sent);
+            follower.heard(heard);
+            follower.sent(&command(1, Command::StopMotor));
+            follower.heard(&ACK);
+            assert_eq!(motors(&follower), [1], "{sent:02x?} {heard:02x?}");
+            assert!(follower.unanswered().is_some());
+        }
+    }
+
+    #[test]
+    fn half_a_request_is_not_at_rest() {
+        let mut follower = Follower::default();
+        assert_eq!(follower.unanswered(), None);
+        follower.sent(&[0x23, 0x01]);
+        assert_eq!(follower.unanswered(), Some(&[0x23, 0x01][..]));
+    }
+}

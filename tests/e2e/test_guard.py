@@ -1,0 +1,313 @@
+"""`motorlink guard`: motors stop when the program that started them is gone, however it ends."""
+
+import json
+import os
+import signal
+import socket
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from program import environment, eventually
+from stmcp import ACK, EXECUTE, GET_REG, Line, frame, header
+
+STATUS, SPEED_KP = 0x02, 0x05
+START, STOP = 1, 2
+
+# A program that starts motors and then does nothing; what it is given on stdin ends it.
+CLIENT = """
+import sys
+from stmcp import ACK, EXECUTE, Line, frame, header
+line = Line(sys.argv[1])
+for word in sys.argv[2:]:
+    motor, command = map(int, word.split(":"))
+    assert line.ask(frame(header(EXECUTE, motor), [command]))[0] == ACK
+print("done", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def guard(start, tmp_path):
+    """A guard on a drive: `guard(port)` gives it with `.port`, where programs find the drive."""
+
+    def guard(port, *arguments, serve=None):
+        process = start("guard", "-p", port, "--serve", serve or f"pty:{tmp_path}/drive", *arguments)
+        announced = json.loads(process.line(0))
+        assert announced["protocol"] == "stmcp"
+        process.port = announced["port"].removeprefix("pty:").replace("tcp-listen:", "socket://")
+        return process
+
+    return guard
+
+
+@pytest.fixture
+def client():
+    """A program of its own that sends commands: `client(port, "1:1")` starts motor 1."""
+    started = []
+
+    def client(port, *commands):
+        process = subprocess.Popen(
+            [sys.executable, "-c", CLIENT, port, *commands],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=environment({"PYTHONPATH": str(Path(__file__).parent)}),
+        )
+        started.append(process)
+        assert process.stdout.readline() == "done\n"
+        return process
+
+    yield client
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def runs(drives, number):
+    eventually(lambda: drives.motor(number)["status"] == "RUN", f"motor {number} runs")
+
+
+def rests(drives, number):
+    eventually(lambda: drives.motor(number)["status"] == "IDLE", f"motor {number} rests")
+
+
+def test_every_byte_passes_both_ways(sim, guard):
+    drives = sim(rmd=())
+    with Line(guard(drives.st).port) as line:
+        assert line.get(SPEED_KP, motor=1) > 0
+        assert line.ask(frame(header(GET_REG, 1), [0xFF]))[0] != ACK
+        # What is no frame passes too: the drive answers it as it does without a guard.
+        line.send([0x06, 0x00, 0xFF])
+        assert line.reply() == frame(0xFF, [0x0A])
+        line.send([0x06])
+        assert line.reply() == frame(0xFF, [0x09])
+
+
+def test_a_killed_program_leaves_no_motor_spinning(sim, guard, client):
+    drives = sim(rmd=())
+    process = guard(drives.st, "--json")
+    program = client(process.port, "1:1", "2:1")
+    runs(drives, 1), runs(drives, 2)
+    program.kill()
+    rests(drives, 1), rests(drives, 2)
+    process.until(lambda: any('"stopped"' in text for text in process.out), "the event")
+    event = next(json.loads(text) for text in process.out if '"stopped"' in text)
+    assert event["reason"] == "client-gone"
+    assert [(motor["motor"], motor["stopped"]) for motor in event["motors"]] == [(1, True), (2, True)]
+    process.says("motor 1 is stopped")
+    # The next program gets the line.
+    with Line(process.port) as line:
+        assert line.get(STATUS, motor=1) == 0
+
+
+def test_without_a_guard_an_st_motor_spins_on(sim, client):
+    drives = sim(rmd=())
+    program = client(drives.st, "1:1")
+    runs(drives, 1)
+    program.kill()
+    program.wait()
+    began = drives.do("state")["time"]
+    eventually(lambda: drives.do("state")["time"] > began + 1, "a second passes")
+    assert drives.motor(1)["status"] == "RUN"
+
+
+def test_a_motor_that_its_program_stopped_is_left_alone(sim, guard, client):
+    drives = sim(rmd=())
+    process = guard(drives.st)
+    program = client(process.port, "1:1", "2:1", "1:2")
+    runs(drives, 2)
+    program.kill()
+    process.says("motor 2 is stopped")
+    assert not any("motor 1" in text for text in process.err), process.err
+    rests(drives, 2)
+
+
+def test_motor_number_0_is_whichever_motor_it_may_be(sim, guard, client):
+    drives = sim(rmd=())
+    with Line(drives.st) as line:
+        line.get(STATUS, motor=2)
+    process = guard(drives.st)
+    program = client(process.port, "0:1")
+    runs(drives, 2)
+    program.kill()
+    rests(drives, 2)
+    process.says("motor 1 is stopped")
+    assert not any("motor 3" in text for text in process.err), "this drive has two"
+
+
+def test_a_program_that_dies_in_the_middle_of_a_request(sim, guard, run, tmp_path):
+    # Shipped firmware waits for the rest of a frame for ever.
+    drives = sim("--profile", "mcsdk-5.4", rmd=())
+    process = guard(drives.st)
+    with Line(process.port) as line:
+        assert line.ask(frame(header(EXECUTE, 1), [START]))[0] == ACK
+        runs(drives, 1)
+        line.send([0x07, 0x06, 0x00])
+    rests(drives, 1)
+    process.says("motor 1 is stopped")
+    run("st", "-p", process.port, "--profile", "mcsdk-5.4", "info").ended(0)
+
+
+def test_a_reset_connection_stops_the_motor(sim, guard):
+    drives = sim(rmd=())
+    process = guard(drives.st, serve="tcp-listen:127.0.0.1:0")
+    host, _, port = process.port.removeprefix("socket://").rpartition(":")
+    program = socket.create_connection((host, int(port)), timeout=5)
+    program.sendall(frame(header(EXECUTE, 1), [START]))
+    assert program.recv(16) == frame(ACK)
+    runs(drives, 1)
+    program.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    program.close()
+    rests(drives, 1)
+
+
+def test_a_second_program_is_turned_away(sim, guard, run, start):
+    drives = sim(rmd=())
+    process = guard(drives.st, "--serve", "tcp-listen:127.0.0.1:0")
+    tcp = json.loads(process.line(1))["path"]
+    watching = start("st", "-p", process.port, "get", "SPEED_KP", "--every", "20ms")
+    watching.more_lines(1)
+    assert "in use by another program" in run("st", "-p", process.port, "info").ended(3).err
+    assert "hung up" in run("st", "-p", f"tcp:{tcp}", "info").ended(3).err
+    process.says("does not get the line")
+    watching.more_lines()
+    # The drive's own port is locked as well.
+    assert "in use by another program" in run("st", "-p", drives.st, "info").ended(3).err
+    watching.interrupt()
+    watching.wait()
+    run("st", "-p", f"tcp:{tcp}", "info").ended(0)
+
+
+def test_a_stopped_program_is_noticed_by_its_silence(sim, guard, client):
+    drives = sim(rmd=())
+    process = guard(drives.st, "--silence", "500ms")
+    program = client(process.port, "1:1")
+    program.send_signal(signal.SIGSTOP)
+    process.says("the program is silent: motor 1 is stopped")
+    rests(drives, 1)
+    program.send_signal(signal.SIGCONT)
+
+
+def test_a_program_that_talks_is_not_silent_and_one_without_motors_may_be(sim, guard, start):
+    drives = sim(rmd=())
+    process = guard(drives.st, "--silence", "1s")
+    with Line(process.port) as line:
+        assert line.ask(frame(header(EXECUTE, 1), [START]))[0] == ACK
+        began = drives.do("state")["time"]
+        while drives.do("state")["time"] < began + 2:
+            line.get(STATUS, motor=1)
+        assert drives.motor(1)["status"] == "RUN"
+        assert line.ask(frame(header(EXECUTE, 1), [STOP]))[0] == ACK
+        rests(drives, 1)
+        began = drives.do("state")["time"]
+        eventually(lambda: drives.do("state")["time"] > began + 1.5, "silence")
+    process.says("has left")
+    assert not any("silent" in text for text in process.err), process.err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_guard_stops_the_motors(sim, guard, client, tmp_path, number):
+    drives = sim(rmd=())
+    process = guard(drives.st)
+    client(process.port, "1:1")
+    runs(drives, 1)
+    process.process.send_signal(number)
+    assert process.wait() == 0
+    assert any("the guard ends: motor 1 is stopped" in text for text in process.err), process.err
+    rests(drives, 1)
+    assert not os.path.lexists(tmp_path / "drive")
+
+
+def test_a_drive_that_is_unplugged_is_stopped_when_it_is_back(sim, guard, client):
+    drives = sim(rmd=())
+    process = guard(drives.st)
+    program = client(process.port, "1:1")
+    drives.kill()
+    process.says("the drive's port is lost")
+    program.kill()
+    process.says("motor 1 MAY STILL TURN")
+    drives = sim(rmd=())
+    process.says("the drive's port is back")
+    process.says("motor 1 is stopped")
+    with Line(process.port) as line:
+        assert line.get(STATUS, motor=1) == 0
+
+
+def test_a_drive_that_hangs_is_stopped_when_it_goes_on(sim, guard, client):
+    drives = sim(rmd=())
+    process = guard(drives.st)
+    program = client(process.port, "1:1")
+    runs(drives, 1)
+    drives.process.send_signal(signal.SIGSTOP)
+    program.kill()
+    process.says("motor 1 MAY STILL TURN")
+    drives.process.send_signal(signal.SIGCONT)
+    rests(drives, 1)
+    process.says("motor 1 is stopped")
+
+
+def test_a_guard_whose_drive_is_silent_says_so_when_it_ends(sim, guard, client):
+    drives = sim(rmd=())
+    process = guard(drives.st)
+    client(process.port, "1:1")
+    drives.process.send_signal(signal.SIGSTOP)
+    try:
+        process.interrupt()
+        assert process.wait(30) == 3
+        assert any("may still turn" in text for text in process.err), process.err
+    finally:
+        drives.process.send_signal(signal.SIGCONT)
+
+
+@pytest.mark.parametrize(
+    ("port", "says"),
+    [
+        ("slcan:/dev/ttyACM0", "shutdown time"),
+        ("socketcan:can0", "shutdown time"),
+        ("sim:", "end with it"),
+    ],
+)
+def test_what_cannot_be_guarded_is_told(run, port, says):
+    assert says in run("guard", "-p", port).ended(2).err
+
+
+# RMD: the protocol's own means is the drive's shutdown time.
+
+CAN_CLIENT = """
+import sys, can
+with can.Bus(interface="slcan", channel=sys.argv[1], bitrate=1000000) as bus:
+    bus.send(can.Message(arbitration_id=0x141, is_extended_id=False,
+                         data=[0xA2, 0, 0, 0, 0xA0, 0x8C, 0, 0]))
+    assert bus.recv(10).data[0] == 0xA2
+    print("done", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("shutdown_ms", [0, 300])
+def test_an_rmd_motor_stops_by_its_shutdown_time_or_not_at_all(sim, tmp_path, shutdown_ms):
+    config = tmp_path / "bench.toml"
+    config.write_text(f"[[rmd.motor]]\nid = 1\nshutdown_ms = {shutdown_ms}\n")
+    drives = sim(config, st=())
+    program = subprocess.Popen(
+        [sys.executable, "-c", CAN_CLIENT, drives.can],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert program.stdout.readline() == "done\n"
+        assert shutdown_ms or drives.motor(1)["mode"] == "speed"
+    finally:
+        program.kill()
+        program.communicate()
+    if shutdown_ms:
+        eventually(lambda: drives.motor(1)["mode"] == "off", "the motor is off")
+    else:
+        began = drives.do("state")["time"]
+        eventually(lambda: drives.do("state")["time"] > began + 2, "two seconds pass")
+        assert drives.motor(1)["mode"] == "speed"
