@@ -1,6 +1,6 @@
 //! A port that may go away and come back: explicit state, back-off with a cap, one clock.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use motorlink_proto::time::Instant as Moment;
@@ -20,6 +20,32 @@ pub enum LinkState {
         /// What is left of the back-off.
         retry_in: Duration,
     },
+}
+
+/// A [`LinkState`] to look at while the port itself is in use, or being opened.
+#[derive(Clone)]
+pub(crate) struct LinkSign(Arc<Mutex<Shown>>);
+
+#[derive(Clone, Copy)]
+enum Shown {
+    Open,
+    ClosedUntil(Instant),
+}
+
+impl LinkSign {
+    pub(crate) fn state(&self) -> LinkState {
+        match *self.0.lock().unwrap_or_else(PoisonError::into_inner) {
+            Shown::Open => LinkState::Open,
+            Shown::ClosedUntil(retry) => {
+                let retry_in = retry.saturating_duration_since(Instant::now());
+                LinkState::Closed { retry_in }
+            }
+        }
+    }
+
+    fn show(&self, shown: Shown) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = shown;
+    }
 }
 
 /// How often a guard tries to stop a motor before it gives up.
@@ -64,6 +90,7 @@ pub(crate) struct Reopening<L> {
     /// What the last attempt said.
     trouble: String,
     began: Instant,
+    sign: LinkSign,
 }
 
 impl<L> Reopening<L> {
@@ -90,6 +117,7 @@ impl<L> Reopening<L> {
             not_before: now,
             trouble: String::new(),
             began: now,
+            sign: LinkSign(Arc::new(Mutex::new(Shown::Open))),
         }
     }
 
@@ -98,14 +126,9 @@ impl<L> Reopening<L> {
         Moment(self.began.elapsed().as_micros() as u64)
     }
 
-    pub(crate) fn state(&self) -> LinkState {
-        match self.link {
-            Some(_) => LinkState::Open,
-            None => {
-                let retry_in = self.not_before.saturating_duration_since(Instant::now());
-                LinkState::Closed { retry_in }
-            }
-        }
+    /// Shows whether the port is open, from now on.
+    pub(crate) fn sign(&self) -> LinkSign {
+        self.sign.clone()
     }
 
     /// The open link, and whether this call had to open it.
@@ -119,7 +142,10 @@ impl<L> Reopening<L> {
                 return Err(PortError::Away { port, why });
             }
             match open() {
-                Ok(link) => self.link = Some(link),
+                Ok(link) => {
+                    self.link = Some(link);
+                    self.sign.show(Shown::Open);
+                }
                 Err(error) => {
                     self.postpone(&error);
                     return Err(error);
@@ -136,13 +162,18 @@ impl<L> Reopening<L> {
     /// Closes the link; the next call may open it at once.
     pub(crate) fn close(&mut self) {
         self.link = None;
-        self.not_before = Instant::now();
+        self.closed_until(Instant::now());
     }
 
     fn postpone(&mut self, error: &PortError) {
         self.trouble = error.to_string();
         self.wait = (self.wait * 2).clamp(self.back_off.first, self.back_off.cap);
-        self.not_before = Instant::now() + self.wait;
+        self.closed_until(Instant::now() + self.wait);
+    }
+
+    fn closed_until(&mut self, retry: Instant) {
+        self.not_before = retry;
+        self.sign.show(Shown::ClosedUntil(retry));
     }
 }
 

@@ -5,7 +5,7 @@ mod served;
 use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
 use motorlink::fault::Faults;
@@ -396,6 +396,32 @@ fn a_port_that_goes_away_is_told_and_opened_again() {
     let _drives = Served::new("away");
     until("the drive is back", || motor.status().is_ok());
     assert_eq!((client.link_state(), client.line()), (LinkState::Open, Line::Up));
+}
+
+#[test]
+fn the_state_of_a_link_can_be_seen_while_it_is_being_opened() {
+    let (reached, reach) = mpsc::channel();
+    let (go_on, goes_on) = mpsc::channel::<()>();
+    let (ours, theirs) = UnixStream::pair().unwrap();
+    let mut first = Some(ours);
+    let open = move || match first.take() {
+        Some(ours) => Ok(Box::new(FdLink::new(ours, "pair")?) as Box<dyn ByteLink>),
+        None => {
+            reached.send(()).unwrap();
+            let _ = goes_on.recv();
+            Err(PortError::Closed { port: "pair".to_owned() })
+        }
+    };
+    let client = Client::open_with("pair", Box::new(open), stmcp::Options::default()).unwrap();
+    assert_eq!(client.link_state(), LinkState::Open);
+    drop(theirs);
+    assert!(client.info().is_err());
+    std::thread::scope(|scope| {
+        scope.spawn(|| client.info());
+        reach.recv().unwrap();
+        assert!(matches!(client.link_state(), LinkState::Closed { .. }));
+        drop(go_on);
+    });
 }
 
 #[test]

@@ -11,7 +11,7 @@ use motorlink_proto::rmd::{
 use motorlink_proto::time::Instant;
 
 use super::{Error, Guard, MotorHandle, OnDrop};
-use crate::line::{BackOff, LinkState, Opener, Reopening};
+use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{CanLink, PortError, PortName};
 
 /// How a [`Bus`] behaves.
@@ -64,6 +64,7 @@ const SCAN_WIDTH: usize = 8;
 /// answer in time is left alone until its late reply came or cannot come any more.
 pub struct Bus {
     inner: Mutex<Inner>,
+    sign: LinkSign,
 }
 
 struct Inner {
@@ -115,13 +116,14 @@ impl Bus {
         for id in MotorSet::ALL {
             host.set_limits(id, options.limits);
         }
+        let sign = port.sign();
         let inner = Inner { port, host, moving: MotorSet::EMPTY };
-        Bus { inner: Mutex::new(inner) }
+        Bus { inner: Mutex::new(inner), sign }
     }
 
-    /// Whether the port is open.
+    /// Whether the port is open. Never waits, not even while another thread opens it.
     pub fn link_state(&self) -> LinkState {
-        self.lock().port.state()
+        self.sign.state()
     }
 
     /// Frames that belonged to no exchange.

@@ -12,7 +12,7 @@ use motorlink_proto::stmcp::{
 use super::error::{Target, advice, hint};
 use super::started::Started;
 use super::{Error, Guard, Limits, MotorHandle};
-use crate::line::{BackOff, LinkState, Opener, Reopening};
+use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{ByteLink, LineName, PortError, PortName};
 
 /// How a [`Client`] behaves.
@@ -67,6 +67,7 @@ pub struct FirmwareVersion {
 /// as [`Config::recovery`] says.
 pub struct Client {
     inner: Mutex<Inner>,
+    sign: LinkSign,
     profile: Profile,
     limits: Limits,
 }
@@ -120,6 +121,7 @@ impl Client {
     }
 
     fn on(port: Reopening<Box<dyn ByteLink>>, options: Options) -> Self {
+        let sign = port.sign();
         let master = Master::new(options.line);
         let inner = Inner {
             port,
@@ -128,7 +130,7 @@ impl Client {
             started: Started::default(),
             ended: Instant::now(),
         };
-        Client { inner: Mutex::new(inner), profile: options.profile, limits: options.limits }
+        Client { inner: Mutex::new(inner), sign, profile: options.profile, limits: options.limits }
     }
 
     /// The profile that the drive is expected to follow.
@@ -136,9 +138,9 @@ impl Client {
         self.profile
     }
 
-    /// Whether the port is open.
+    /// Whether the port is open. Never waits, not even while another thread opens it.
     pub fn link_state(&self) -> LinkState {
-        self.lock().port.state()
+        self.sign.state()
     }
 
     /// Whether the last exchange ended in step.
