@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use motorlink::port::ServeName;
-use motorlink::sim::{Bench, BenchConfig, ConfigError, ServeError};
+use motorlink::sim::{Bench, BenchConfig, ConfigError, RomError, RomFolder, ServeError};
 use motorlink::stmcp::Profile;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::getpgrp;
@@ -37,6 +37,9 @@ pub struct Args {
     /// What the ST drive speaks, instead of what the configuration says
     #[arg(long, value_parser = crate::st::parse_profile)]
     profile: Option<Profile>,
+    /// Keep the ROM of RMD motors in this folder; without it their ROM ends with the process
+    #[arg(long, value_name = "DIR")]
+    rom: Option<PathBuf>,
     /// End when stdin does
     #[arg(long)]
     stdin: bool,
@@ -57,6 +60,9 @@ pub fn run(args: Args) -> Result<(), Failure> {
         (args.st, args.rmd)
     };
     let mut bench = Bench::new();
+    if let Some(folder) = &args.rom {
+        bench.keep_rom(RomFolder::open(folder).map_err(ServeError::from)?);
+    }
     let mut out = std::io::stdout();
     serve(&mut bench, &config, &st, &rmd, &mut out)?;
     obey(&mut bench, std::io::stdin(), &mut out, |end| interrupted() || end && args.stdin)
@@ -170,6 +176,7 @@ impl From<ServeError> for Failure {
     fn from(error: ServeError) -> Self {
         match error {
             ServeError::Port(error) => error.into(),
+            ServeError::Rom(error @ RomError::Io { .. }) => Failure::Line(error.to_string()),
             other => Failure::Usage(other.to_string()),
         }
     }

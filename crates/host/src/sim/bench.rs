@@ -1,6 +1,7 @@
 //! Drives on served ports, and the world around them.
 
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::os::fd::BorrowedFd;
 use std::rc::Rc;
 use std::time::Duration;
@@ -12,7 +13,7 @@ use motorlink_sim::rmd::{RmdBus, RmdNode};
 use motorlink_sim::st::{StMotor, StStation};
 use serde_json::{Value, json};
 
-use super::{BenchConfig, Command, ConfigError};
+use super::{BenchConfig, Command, ConfigError, RomError, RomFolder};
 use crate::port::{PortError, ServeName};
 use crate::serve::{ByteStation, CanStation, Served, Server, Turn};
 
@@ -24,6 +25,9 @@ type Bus = RmdBus<Vec<RmdNode>>;
 pub struct Bench {
     server: Server,
     places: Vec<Place>,
+    rom: Option<Rc<RomFolder>>,
+    /// A ROM that could not be written.
+    failure: Rc<RefCell<Option<RomError>>>,
 }
 
 struct Place {
@@ -46,12 +50,20 @@ pub enum ServeError {
     /// The configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// The ROM on disk.
+    #[error(transparent)]
+    Rom(#[from] RomError),
 }
 
 impl Bench {
     /// A bench without drives, whose time begins now.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Keeps the ROM of RMD motors that are served from now on in `folder`.
+    pub fn keep_rom(&mut self, folder: RomFolder) {
+        self.rom = Some(Rc::new(folder));
     }
 
     /// Powers an ST drive on and serves it; gives what the port is, for programs to read.
@@ -78,8 +90,23 @@ impl Bench {
         port: &ServeName,
         config: &BenchConfig,
     ) -> Result<Value, ServeError> {
-        let bus = Rc::new(RefCell::new(config.bus(self.server.now())?));
-        let served = self.server.serve_can(port, Box::new(RmdLine(Rc::clone(&bus))))?;
+        let others = self.places.iter().filter(|place| matches!(place.drives, Drives::Rmd(_)));
+        let number = others.count() + 1;
+        let mut roms = HashMap::new();
+        for motor in config.rmd_motors() {
+            let rom = self.rom.as_ref().map(|folder| folder.load(number, motor)).transpose()?;
+            roms.insert(motor.id, rom.unwrap_or_else(|| motor.factory_rom()));
+        }
+        let bus = config.bus(self.server.now(), |motor| roms[&motor.id])?;
+        let bus = Rc::new(RefCell::new(bus));
+        let rom = self.rom.as_ref().map(|folder| BusRom {
+            folder: Rc::clone(folder),
+            number,
+            seen: HashMap::new(),
+            failure: Rc::clone(&self.failure),
+        });
+        let served =
+            self.server.serve_can(port, Box::new(RmdLine { bus: Rc::clone(&bus), rom }))?;
         let ids: Vec<u8> = bus.borrow().nodes().iter().map(|node| node.id().number()).collect();
         let announcement = json!({
             "port": served.port, "protocol": "rmd", "path": served.path, "motors": ids.len(),
@@ -90,12 +117,18 @@ impl Bench {
     }
 
     /// Serves the ports once; waits at most `most` for something to do. `extra` is waited for too.
+    ///
+    /// # Errors
+    /// A ROM that could not be written to its folder. The write is not acknowledged to the host.
     pub fn turn(
         &mut self,
         most: Duration,
         extra: Option<BorrowedFd<'_>>,
-    ) -> Result<Turn, PortError> {
+    ) -> Result<Turn, ServeError> {
         let turn = self.server.turn(most, extra)?;
+        if let Some(failure) = self.failure.take() {
+            return Err(failure.into());
+        }
         let now = self.server.now();
         for place in &self.places {
             match &place.drives {
@@ -328,11 +361,51 @@ impl ByteStation for StLine {
     }
 }
 
-struct RmdLine(Rc<RefCell<Bus>>);
+struct RmdLine {
+    bus: Rc<RefCell<Bus>>,
+    rom: Option<BusRom>,
+}
+
+/// The ROM of a bus on disk.
+struct BusRom {
+    folder: Rc<RomFolder>,
+    /// Which bus of the bench, from 1.
+    number: usize,
+    /// How often each motor's ROM had been written when it was brought to the disk.
+    seen: HashMap<MotorId, u32>,
+    failure: Rc<RefCell<Option<RomError>>>,
+}
+
+impl BusRom {
+    /// Brings what was written to the disk; false when that failed.
+    fn keep(&mut self, nodes: &[RmdNode]) -> bool {
+        for node in nodes {
+            let writes = node.motor().rom_writes();
+            let seen = self.seen.entry(node.id()).or_default();
+            if *seen == writes {
+                continue;
+            }
+            match self.folder.store(self.number, node.motor().config(), node.drive().rom()) {
+                Ok(()) => *seen = writes,
+                Err(error) => {
+                    *self.failure.borrow_mut() = Some(error);
+                    return false;
+                }
+            }
+        }
+        true
+    }
+}
 
 impl CanStation for RmdLine {
+    /// A write to ROM is answered when it is on the disk.
     fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
-        self.0.borrow_mut().receive(now, frame, |reply| replies.push(reply));
+        let before = replies.len();
+        let mut bus = self.bus.borrow_mut();
+        bus.receive(now, frame, |reply| replies.push(reply));
+        if self.rom.as_mut().is_some_and(|rom| !rom.keep(bus.nodes())) {
+            replies.truncate(before);
+        }
     }
 
     fn poll(&mut self, _now: Instant, _replies: &mut Vec<CanFrame>) {}

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
+use motorlink_proto::rmd::Settings;
 use motorlink_proto::stmcp::Profile;
 use motorlink_proto::time::Instant;
 use motorlink_sim::machine::MachineConfig;
@@ -106,7 +107,7 @@ impl BenchConfig {
         let rmd = motors(file.rmd, "rmd.motor", rmd_motor)?.map(RmdConfigs).unwrap_or_default();
         let config = BenchConfig { profile: file.profile, st, rmd };
         config.station(Instant(0))?;
-        config.bus(Instant(0))?;
+        config.bus(Instant(0), RmdConfig::factory_rom)?;
         Ok(config)
     }
 
@@ -131,8 +132,17 @@ impl BenchConfig {
         Ok(StStation::new(self.profile, drive))
     }
 
-    /// The CAN bus, powered on `now`.
-    pub(super) fn bus(&self, now: Instant) -> Result<RmdBus<Vec<RmdNode>>, ConfigError> {
+    /// The motors on the CAN bus.
+    pub(super) fn rmd_motors(&self) -> &[RmdConfig] {
+        &self.rmd.0
+    }
+
+    /// The CAN bus, powered on `now`; `rom` says what each motor's ROM holds.
+    pub(super) fn bus(
+        &self,
+        now: Instant,
+        rom: impl Fn(&RmdConfig) -> Settings,
+    ) -> Result<RmdBus<Vec<RmdNode>>, ConfigError> {
         for (config, n) in self.rmd.0.iter().zip(1..) {
             check(
                 &format!("rmd.motor {n}"),
@@ -146,7 +156,7 @@ impl BenchConfig {
             )?;
         }
         let node = |config: &RmdConfig| {
-            RmdNode::new(now, *config, config.factory_rom()).ok_or_else(|| {
+            RmdNode::new(now, *config, rom(config)).ok_or_else(|| {
                 ConfigError::Impossible(format!(
                     "motor {}: IDs are 1 to 32 and encoders have 12 to 18 bits, not {}",
                     config.id, config.encoder_bits

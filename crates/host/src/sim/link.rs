@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use motorlink_proto::rmd::CanFrame;
 use motorlink_proto::time::Instant;
-use motorlink_sim::rmd::{RmdBus, RmdNode};
+use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 use motorlink_sim::st::{StMotor, StStation};
 
 use super::{BenchConfig, ConfigError};
@@ -88,7 +88,7 @@ pub(crate) fn open_line(config: Option<&Path>) -> Result<Box<dyn ByteLink>, Port
 
 /// Opens `sim:` as a CAN bus.
 pub(crate) fn open_can(config: Option<&Path>) -> Result<Box<dyn CanLink>, PortError> {
-    let bus = read(config).and_then(|config| config.bus(Instant(0)));
+    let bus = read(config).and_then(|config| config.bus(Instant(0), RmdConfig::factory_rom));
     let clock = Clock(std::time::Instant::now());
     let bus = bus.map_err(|error| refused(config, &error))?;
     Ok(Box::new(SimCan { bus, clock, received: VecDeque::with_capacity(64) }))

@@ -7,8 +7,10 @@ mod bench;
 mod command;
 mod config;
 mod link;
+mod rom;
 
 pub use bench::{Bench, ServeError};
 pub use command::Command;
 pub use config::{BenchConfig, ConfigError, RmdConfigs, StConfigs};
 pub(crate) use link::{open_can, open_line};
+pub use rom::{RomError, RomFolder};
