@@ -152,6 +152,15 @@ pub enum PortError {
         /// The bitrate that was asked for.
         bitrate: u32,
     },
+    /// The slcan adapter takes no frames any more.
+    #[error(
+        "the adapter on `{port}` refuses frames: was it reset, or is no other node on the bus? its \
+         channel is opened again with the next call"
+    )]
+    AdapterRefuses {
+        /// The port.
+        port: String,
+    },
     /// This library was built without simulated drives.
     #[error("`{port}` names simulated drives, which this build does not contain (feature `sim`)")]
     Simulated {

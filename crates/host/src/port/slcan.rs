@@ -11,15 +11,21 @@ use crate::slcan::{Answer, Bitrate, HostCodec, LONGEST_FRAME, encode};
 /// them, so silence is no failure.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(60);
 
+/// Refusals without anything else between them that are more than a full queue.
+const REFUSALS: u32 = 2;
+
 /// A [`CanLink`] through an slcan adapter. The channel is closed when the link is dropped.
 ///
 /// An adapter's refusal of a single frame is counted and does not end the line: the frame's sender
-/// notices that no motor answered.
+/// notices that no motor answered. One that refuses frame after frame has lost its channel, as after
+/// a reset, and is an error, so that it is opened anew.
 #[derive(Debug)]
 pub struct SlcanLink<B: ByteLink> {
     line: B,
     codec: HostCodec,
     refused: u64,
+    refused_in_a_row: u32,
+    port: String,
 }
 
 /// What came back for the commands of one step.
@@ -37,13 +43,15 @@ impl<B: ByteLink> SlcanLink<B> {
     /// The commands are `C`, `S` and `O`, after an empty line that ends whatever the adapter had
     /// received of a former host.
     pub fn open(line: B, port: impl Into<String>, bitrate: Bitrate) -> Result<Self, PortError> {
-        let mut link = SlcanLink { line, codec: HostCodec::default(), refused: 0 };
+        let port = port.into();
+        let codec = HostCodec::default();
+        let mut link =
+            SlcanLink { line, codec, refused: 0, refused_in_a_row: 0, port: port.clone() };
         // A channel that was open still talks here, and may refuse the empty line.
         let close = link.command(b"\rC\r", 2)?;
         let select = link.command(&bitrate.command(), 1)?;
         let open = link.command(b"O\r", 1)?;
 
-        let port = port.into();
         if select.garbage || open.garbage {
             return Err(PortError::NotSlcan { port, reason: "it sends something else" });
         }
@@ -111,9 +119,19 @@ impl<B: ByteLink> CanLink for SlcanLink<B> {
         let deadline = Deadline::after(timeout);
         loop {
             match self.codec.answer() {
-                Some(Answer::Frame(frame)) => return Ok(Some(frame)),
-                Some(Answer::Refused) => self.refused += 1,
-                Some(Answer::Done | Answer::Info) => {}
+                Some(Answer::Frame(frame)) => {
+                    self.refused_in_a_row = 0;
+                    return Ok(Some(frame));
+                }
+                Some(Answer::Refused) => {
+                    self.refused += 1;
+                    self.refused_in_a_row += 1;
+                    if self.refused_in_a_row >= REFUSALS {
+                        return Err(PortError::AdapterRefuses { port: self.port.clone() });
+                    }
+                }
+                Some(Answer::Done) => self.refused_in_a_row = 0,
+                Some(Answer::Info) => {}
                 None if self.fill(deadline)? => {}
                 None => return Ok(None),
             }
