@@ -1,6 +1,7 @@
 # make demo   simulated drives, driven through real ports
 # make test   everything that is tested, with what it needs installed first
 # make docs   writes the tables of docs/CONFORMANCE.md anew
+# make soak   a million exchanges with reconnects, some minutes
 # make bench  ratios and instruction counts, as in docs/BENCHMARKS.md
 # make reliability  both protocols through lines that misbehave, into docs/RELIABILITY.md
 
@@ -11,7 +12,7 @@ TARGET := thumbv7em-none-eabihf
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 SOCKETCAN := CARGO="$(CARGO)" SUDO="$(SUDO)" tests/socketcan/run.sh
 
-.PHONY: demo test lint unit probe e2e bench docs reliability test-socketcan fmt clean
+.PHONY: demo test lint unit probe e2e bench docs reliability test-socketcan soak fmt clean
 
 demo:
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
@@ -54,6 +55,10 @@ docs:
 # Some 90 million exchanges on virtual time; fails with a seed and a trace where a promise is broken.
 reliability:
 	$(CARGO) run --release --locked -p motorlink-reliability -- --update docs/RELIABILITY.md
+
+# A million exchanges a protocol with a thousand reconnects: memory and descriptors do not grow.
+soak:
+	$(CARGO) test --release --locked -p motorlink --all-features --test soak -- --ignored --nocapture
 
 fmt:
 	$(CARGO) fmt --all

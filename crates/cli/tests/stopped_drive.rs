@@ -1,0 +1,113 @@
+//! A drive that stands still for a while and then answers everything at once: its process is
+//! stopped with SIGSTOP. No reply may pass for another request's, and the client comes back in time.
+
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use motorlink::rmd::{self, Bus};
+use motorlink::stmcp::{self, Client, register};
+use rustix::process::{Pid, Signal, kill_process};
+
+/// How long a drive stands still.
+const PAUSES: [u64; 6] = [100, 300, 900, 1_500, 2_500, 5_000];
+/// docs/HOST-FAULTS.md says when a client is back; a loaded machine is given this much more.
+const MACHINE: Duration = Duration::from_secs(5);
+
+/// `motorlink sim` with one port.
+struct Drive {
+    process: Child,
+    port: String,
+}
+
+impl Drive {
+    fn new(kind: &str, scheme: &str) -> Self {
+        let name = format!("motorlink-stopped-{}-{}", kind.trim_matches('-'), std::process::id());
+        let link: PathBuf = std::env::temp_dir().join(name);
+        let mut process = Command::new(env!("CARGO_BIN_EXE_motorlink"))
+            .args(["sim", kind, &format!("{scheme}:{}", link.display())])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("started");
+        let mut announced = String::new();
+        let out = process.stdout.as_mut().expect("piped");
+        BufReader::new(out).read_line(&mut announced).expect("announced");
+        assert!(announced.contains("\"path\""), "{announced}");
+        Drive { process, port: link.display().to_string() }
+    }
+
+    fn signal(&self, signal: Signal) {
+        kill_process(Pid::from_child(&self.process), signal).expect("it runs");
+    }
+
+    /// Has `exchange` compare what it writes and reads, again and again, while the drive stands
+    /// still for each of the pauses; `stated` is how long after that a client may need.
+    fn stand_still(&self, stated: Duration, mut exchange: impl FnMut() -> Result<(), String>) {
+        let mut failures = 0;
+        for pause in PAUSES.map(Duration::from_millis) {
+            for _ in 0..20 {
+                exchange().expect("nothing is wrong");
+            }
+            self.signal(Signal::STOP);
+            let stopped = Instant::now();
+            while stopped.elapsed() < pause {
+                failures += u32::from(exchange().is_err());
+            }
+            self.signal(Signal::CONT);
+            let continued = Instant::now();
+            while exchange().is_err() {
+                let waited = continued.elapsed();
+                assert!(waited < stated + MACHINE, "not back {waited:?} after {pause:?}");
+            }
+            println!("{pause:?}: back after {:?}", continued.elapsed());
+        }
+        assert!(failures > 0, "a drive that stands still does not answer");
+    }
+}
+
+impl Drop for Drive {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+#[test]
+fn an_st_drive_that_stood_still_confuses_nobody() {
+    let drive = Drive::new("--st", "pty");
+    let client = Client::open(&drive.port.parse().expect("a port"), stmcp::Options::default());
+    let client = client.expect("opened");
+    let motor = client.motor(1).expect("a motor");
+    let mut number = 0i16;
+    drive.stand_still(Duration::from_secs(3), || {
+        number = number.wrapping_add(1);
+        // Both are asked in any case, so that replies of either kind wait.
+        let written = motor.write(register::SPEED_KP, number);
+        let read = motor.read(register::SPEED_KP);
+        written.map_err(|error| error.to_string())?;
+        assert_eq!(read.map_err(|error| error.to_string())?, number, "somebody else's reply");
+        Ok(())
+    });
+}
+
+#[test]
+fn rmd_motors_that_stood_still_confuse_nobody() {
+    let drive = Drive::new("--rmd", "slcan-pty");
+    let port = format!("slcan:{}", drive.port).parse().expect("a port");
+    let bus = Bus::open(&port, rmd::Options::default()).expect("opened");
+    let mut number = 0;
+    drive.stand_still(Duration::from_secs(1), || {
+        number += 1;
+        for id in 1..=2 {
+            let motor = bus.motor(id).expect("an ID");
+            let own = rmd::DpsPerSecond(number * 10 + i32::from(id));
+            // Both are asked in any case, so that replies of either kind wait.
+            let (written, read) = (motor.write_acceleration(own), motor.acceleration());
+            written.map_err(|error| error.to_string())?;
+            assert_eq!(read.map_err(|error| error.to_string())?, own, "somebody else's reply");
+        }
+        Ok(())
+    });
+}
