@@ -108,6 +108,22 @@ fn rmd_motors_that_stood_still_confuse_nobody() {
             written.map_err(|error| error.to_string())?;
             assert_eq!(read.map_err(|error| error.to_string())?, own, "somebody else's reply");
         }
+        // Motors 3 and 4 in cycles, which wait for nobody.
+        let [a, b, c, d] = number.to_le_bytes();
+        let cycle = |request: [u8; 8]| {
+            let requests = [3, 4].map(|id| (rmd::MotorId::new(id).expect("an ID"), request));
+            let mut replies = [[0; 8]; 2];
+            let mut outcome = Ok(());
+            let cycle = bus.cycle(&requests, |id, result| match result {
+                Ok(reply) => replies[usize::from(id.number()) - 3] = reply,
+                Err(error) => outcome = Err(error.to_string()),
+            });
+            cycle.map_err(|error| error.to_string()).and(outcome).map(|()| replies)
+        };
+        let written = cycle([0x34, 0, 0, 0, a, b, c, d]);
+        let read = cycle([0x33, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(written?, [[0x34, 0, 0, 0, a, b, c, d]; 2], "somebody else's reply");
+        assert_eq!(read?, [[0x33, 0, 0, 0, a, b, c, d]; 2], "somebody else's reply");
         Ok(())
     });
 }

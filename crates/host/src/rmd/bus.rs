@@ -5,11 +5,12 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use motorlink_proto::rmd::{
-    self as proto, Code, Command, Counters, Dialect, Host, Limits, MotionStatus, MotorId, MotorSet,
-    Output, Payload, ReadStatus1, Refused, Torque4,
+    self as proto, CanFrame, Code, Command, Counters, Dialect, Host, Limits, MotionStatus, MotorId,
+    MotorSet, Output, Payload, ReadStatus1, Refused, Torque4,
 };
 use motorlink_proto::time::Instant;
 
+use super::doubt::{Doubts, Trust, strays};
 use super::{Error, Guard, MotorHandle, OnDrop};
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{CanLink, PortError, PortName};
@@ -54,6 +55,9 @@ pub enum Found {
 /// More frames than a port holds: who sends as fast as they are read is not waited for.
 const BACKLOG: usize = 4096;
 
+/// How long a motor in doubt may go on talking.
+const SETTLE_LIMIT: Duration = Duration::from_secs(2);
+
 /// IDs that a scan asks at once.
 const SCAN_WIDTH: usize = 8;
 
@@ -61,7 +65,9 @@ const SCAN_WIDTH: usize = 8;
 ///
 /// A port that went away is opened again by the next call, behind a back-off; see
 /// [`link_state`](Self::link_state). Replies are matched on ID and command; a motor that did not
-/// answer in time is left alone until its late reply came or cannot come any more.
+/// answer in time is left alone until its late reply came or the guard time is over, and then asked
+/// for its status before anything else, in case its replies are later than that: [`Off`](proto::Off)
+/// and [`Stop`](proto::Stop) alone do not wait.
 pub struct Bus {
     inner: Mutex<Inner>,
     sign: LinkSign,
@@ -72,6 +78,8 @@ struct Inner {
     host: Host,
     /// Motors that were given something to do by this bus and not switched off.
     moving: MotorSet,
+    /// Whose replies may be late ones.
+    doubts: Doubts,
 }
 
 impl Bus {
@@ -117,7 +125,7 @@ impl Bus {
             host.set_limits(id, options.limits);
         }
         let sign = port.sign();
-        let inner = Inner { port, host, moving: MotorSet::EMPTY };
+        let inner = Inner { port, host, moving: MotorSet::EMPTY, doubts: Doubts::NONE };
         Bus { inner: Mutex::new(inner), sign }
     }
 
@@ -160,18 +168,11 @@ impl Bus {
     /// One exchange with any bytes, known command or not. A motor in quarantine is waited for.
     pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
         let mut inner = self.lock();
-        let mut outcome = None;
         inner.ready()?;
-        while let Err(refused) = inner.request(id, request) {
-            let Refused::Quarantined { until, .. } = refused else {
-                return Err(inner.refused(refused));
-            };
-            let now = inner.port.now();
-            inner.hear(now, until).map_err(|error| inner.closed(error))?;
+        if !halts(&request) {
+            inner.settle(id, request[0])?;
         }
-        inner.run(|_, result| outcome = Some(result))?;
-        let result = outcome.unwrap_or(Err(proto::Error::Timeout));
-        result.map_err(|error| inner.failed(id, request[0], error))
+        inner.exchange(id, request)?.map_err(|error| inner.failed(id, request[0], error))
     }
 
     /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
@@ -187,15 +188,34 @@ impl Bus {
     ) -> Result<(), Error> {
         let mut inner = self.lock();
         inner.ready()?;
+        let mut questions = MotorSet::EMPTY;
         for &(id, request) in requests {
-            if let Err(refused) = inner.request(id, request) {
+            let sent = match inner.trust(id) {
+                Trust::None if !halts(&request) => {
+                    questions.insert(id);
+                    inner.request(id, question())
+                }
+                Trust::From(until) if !halts(&request) => Err(Refused::Quarantined { id, until }),
+                _ => inner.request(id, request),
+            };
+            if let Err(refused) = sent {
+                questions.remove(id);
                 each(id, Err(inner.refused(refused)));
             }
         }
         let name = Arc::clone(&inner.port.name);
         let code = |of| requests.iter().find(|(id, _)| *id == of).map_or(0, |(_, data)| data[0]);
         inner.run(|id, result| {
-            each(id, result.map_err(|error| failed(&name, id, code(id), error)));
+            let result = result.map_err(|error| failed(&name, id, code(id), error));
+            each(
+                id,
+                match result {
+                    Ok(_) if questions.contains(id) => {
+                        Err(Error::Quarantined { port: Arc::clone(&name), id })
+                    }
+                    result => result,
+                },
+            );
         })
     }
 
@@ -211,6 +231,15 @@ impl Bus {
     ) -> Result<[Option<Result<MotionStatus, Error>>; 4], Error> {
         let mut inner = self.lock();
         inner.ready()?;
+        let doubtful = MotorSet::TORQUE4.intersection(expect);
+        for id in doubtful.filter(|id| inner.trust(*id) == Trust::None).collect::<MotorSet>() {
+            // If it cannot be asked, the next attempt does.
+            let _ = inner.request(id, question());
+        }
+        inner.run(|_, _| {})?;
+        if let Some(id) = doubtful.clone().find(|id| inner.trust(*id) != Trust::Full) {
+            return Err(Error::Quarantined { port: Arc::clone(&inner.port.name), id });
+        }
         let now = inner.port.now();
         let begun = inner.host.torque4(now, torques, expect);
         begun.map_err(|refused| inner.refused(refused))?;
@@ -241,13 +270,18 @@ impl Bus {
         while !left.is_empty() {
             let asked = left.by_ref().take(SCAN_WIDTH);
             let requests: Vec<_> = asked.map(|id| (id, ReadStatus1.encode())).collect();
+            let mut doubtful = MotorSet::EMPTY;
             self.cycle(&requests, |id, outcome| match outcome {
-                // A motor's reply has a voltage.
-                Ok(reply) if reply == ReadStatus1.encode() => each(Found::Echo(id)),
-                Ok(reply) => each(Found::Motor(id, proto::Status1::decode(&reply))),
-                Err(Error::Foreign { dialect, .. }) => each(Found::Foreign(id, dialect)),
-                Err(_) => {}
+                Err(Error::Quarantined { .. }) => doubtful.insert(id),
+                outcome => found(id, outcome).into_iter().for_each(&mut each),
             })?;
+            for id in doubtful {
+                let outcome = self.raw(id, ReadStatus1.encode());
+                if let Err(error @ Error::Port(_)) = outcome {
+                    return Err(error);
+                }
+                found(id, outcome).into_iter().for_each(&mut each);
+            }
             done += requests.len();
             progress(done);
         }
@@ -266,11 +300,12 @@ impl Bus {
 
 impl Inner {
     fn ready(&mut self) -> Result<(), Error> {
+        let now = self.port.now();
         let (link, _) = self.port.link()?;
         // What came meanwhile is late or unasked; left in the port it would pass for a reply.
         for _ in 0..BACKLOG {
             match link.receive(Some(Duration::ZERO)) {
-                Ok(Some(frame)) => self.host.receive(&frame),
+                Ok(Some(frame)) => take(now, &frame, &mut self.host, &mut self.doubts),
                 Ok(None) => break,
                 Err(error) => return Err(self.closed(error)),
             }
@@ -300,6 +335,11 @@ impl Inner {
             let moved = match self.host.poll(now) {
                 Output::Transmit(frame) => self.port.link().and_then(|(link, _)| link.send(&frame)),
                 Output::Done { id, result } => {
+                    match result {
+                        Ok(_) => self.doubts.answered(now, id),
+                        Err(proto::Error::Timeout) => self.doubts.timed_out(id),
+                        Err(_) => {}
+                    }
                     // A motor counts as moving from the request on, whose reply may be lost, and
                     // until it has acknowledged that it is off or stopped.
                     if let Ok([code, ..]) = result
@@ -320,9 +360,53 @@ impl Inner {
     fn hear(&mut self, now: Instant, until: Instant) -> Result<(), PortError> {
         let (link, _) = self.port.link()?;
         if let Some(frame) = link.receive(Some(until.since(now).into()))? {
-            self.host.receive(&frame);
+            let now = self.port.now();
+            take(now, &frame, &mut self.host, &mut self.doubts);
         }
         Ok(())
+    }
+
+    fn trust(&mut self, id: MotorId) -> Trust {
+        self.doubts.trust(self.port.now(), id, self.host.guard())
+    }
+
+    /// One exchange with a motor, whose quarantine is waited for.
+    fn exchange(
+        &mut self,
+        id: MotorId,
+        request: [u8; 8],
+    ) -> Result<Result<[u8; 8], proto::Error>, Error> {
+        while let Err(refused) = self.request(id, request) {
+            let Refused::Quarantined { until, .. } = refused else {
+                return Err(self.refused(refused));
+            };
+            let now = self.port.now();
+            self.hear(now, until).map_err(|error| self.closed(error))?;
+        }
+        let mut outcome = None;
+        self.run(|_, result| outcome = Some(result))?;
+        Ok(outcome.unwrap_or(Err(proto::Error::Timeout)))
+    }
+
+    /// Waits until the next reply of a motor can be trusted. `code` is for messages.
+    fn settle(&mut self, id: MotorId, code: u8) -> Result<(), Error> {
+        let give_up = Moment::now() + SETTLE_LIMIT;
+        loop {
+            match self.trust(id) {
+                Trust::Full => return Ok(()),
+                _ if Moment::now() > give_up => {
+                    return Err(Error::Quarantined { port: Arc::clone(&self.port.name), id });
+                }
+                Trust::From(until) => {
+                    let now = self.port.now();
+                    self.hear(now, until).map_err(|error| self.closed(error))?;
+                }
+                Trust::None => {
+                    let answer = self.exchange(id, question())?;
+                    answer.map_err(|error| self.failed(id, code, error))?;
+                }
+            }
+        }
     }
 
     fn closed(&mut self, error: PortError) -> Error {
@@ -344,6 +428,38 @@ impl Inner {
             Refused::Busy(id) => Error::Twice(id),
         }
     }
+}
+
+/// What the answer to a scan tells.
+fn found(id: MotorId, outcome: Result<[u8; 8], Error>) -> Option<Found> {
+    match outcome {
+        // A motor's reply has a voltage.
+        Ok(reply) if reply == ReadStatus1.encode() => Some(Found::Echo(id)),
+        Ok(reply) => Some(Found::Motor(id, proto::Status1::decode(&reply))),
+        Err(Error::Foreign { dialect, .. }) => Some(Found::Foreign(id, dialect)),
+        Err(_) => None,
+    }
+}
+
+/// Takes a frame from the bus, and notes which motor it came from too late.
+fn take(now: Instant, frame: &CanFrame, host: &mut Host, doubts: &mut Doubts) {
+    let before = strays(host.counters());
+    host.receive(frame);
+    if strays(host.counters()) != before
+        && let Some(id) = MotorId::from_can_id(frame.id())
+    {
+        doubts.came_late(now, id);
+    }
+}
+
+/// What a motor in doubt is asked.
+fn question() -> [u8; 8] {
+    ReadStatus1.encode()
+}
+
+/// Whether a request makes a motor safer, whatever its replies are worth.
+fn halts(request: &[u8; 8]) -> bool {
+    matches!(Code::from(request[0]), Code::Off | Code::Stop)
 }
 
 fn failed(name: &Arc<str>, id: MotorId, code: u8, error: proto::Error) -> Error {

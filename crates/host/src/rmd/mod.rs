@@ -13,6 +13,7 @@
 //! ```
 
 mod bus;
+mod doubt;
 mod error;
 mod guard;
 mod motor;
