@@ -100,7 +100,7 @@ impl Endpoint {
     pub(super) fn serve(&mut self, now: Instant, ready: &[bool], scratch: &mut Scratch) {
         let door_is_ready = ready.last() == Some(&true);
         if door_is_ready && let Door::Pty(pty, _) = &self.door {
-            pty.forget_unread();
+            pty.forget_comings();
         }
         for (index, &is_ready) in ready.iter().take(self.clients.len()).enumerate() {
             // Before someone new is let in, all that the others did is seen, and who left.

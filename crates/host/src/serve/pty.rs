@@ -44,11 +44,17 @@ impl Pty {
         &self.comings
     }
 
-    /// Drops what a former client did not read, now that someone has come or gone.
+    /// Drops what the client that left did not read. Never while one is there: a reply to the first
+    /// request may be among it.
     pub(super) fn forget_unread(&self) {
-        // It cannot fail on a pty; if it did, the client would see old bytes.
+        // It cannot fail on a pty; if it did, the next client would see old bytes.
         let _ = open_client_side(&self.path)
             .and_then(|client_side| tcflush(&client_side, QueueSelector::IFlush));
+        self.forget_comings();
+    }
+
+    /// Takes note that [`comings`](Self::comings) was seen.
+    pub(super) fn forget_comings(&self) {
         let mut events = [0; 1024];
         while rustix::io::read(&self.comings, &mut events).is_ok_and(|len| len > 0) {}
     }

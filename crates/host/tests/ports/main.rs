@@ -2,13 +2,15 @@
 
 mod running;
 
+use std::cell::RefCell;
 use std::error::Error;
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::os::unix::fs::symlink;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
+use std::rc::Rc;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -16,8 +18,9 @@ use motorlink::port::{
     ByteLink, CanLink, Direction, FdLink, PortError, PortName, ServeName, SlcanLink, TapBytes,
     TapCan,
 };
-use motorlink::serve::Server;
+use motorlink::serve::{ByteStation, Server};
 use motorlink::slcan::Bitrate;
+use motorlink_proto::time::Instant;
 use running::{Echo, Late, Place, Running, reply_of, request};
 
 type Outcome = Result<(), Box<dyn Error>>;
@@ -98,6 +101,40 @@ fn bytes_that_one_client_left_unread_are_not_shown_to_the_next() -> Outcome {
         next.read_exact(&mut seen)?;
         assert_eq!(&seen, words);
     }
+    Ok(())
+}
+
+/// Opens a pty and asks, once, while the server is at work.
+struct Caller {
+    pty: PathBuf,
+    line: Rc<RefCell<Option<File>>>,
+}
+
+impl ByteStation for Caller {
+    fn receive(&mut self, _: Instant, _: &[u8], _: &mut Vec<u8>) {}
+    fn poll(&mut self, _: Instant, _: &mut Vec<u8>) {
+        let mut line = OpenOptions::new().read(true).write(true).open(&self.pty).expect("opened");
+        line.write_all(b"hello").expect("written");
+        *self.line.borrow_mut() = Some(line);
+    }
+    fn deadline(&self) -> Option<Instant> {
+        self.line.borrow().is_none().then_some(Instant(0))
+    }
+}
+
+#[test]
+fn a_client_that_comes_while_the_server_is_at_work_gets_its_reply() -> Outcome {
+    let (calling, called) = (Place::new("calling"), Place::new("called"));
+    let mut server = Server::new();
+    let line = Rc::new(RefCell::new(None));
+    let caller = Caller { pty: called.0.clone(), line: Rc::clone(&line) };
+    server.serve_bytes(&calling.as_port("pty").parse()?, Box::new(caller))?;
+    server.serve_bytes(&called.as_port("pty").parse()?, Box::new(Echo))?;
+    for _ in 0..3 {
+        server.turn(Duration::ZERO, None)?;
+    }
+    let mut line = FdLink::new(line.take().ok_or("it called")?, "plain")?;
+    assert_eq!(gather(&mut line, 5)?, b"hello");
     Ok(())
 }
 
