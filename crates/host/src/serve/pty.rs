@@ -1,10 +1,11 @@
 //! Ptys that stand for serial devices.
 
 use std::ffi::OsStr;
+use std::fs::Metadata;
 use std::io;
 use std::os::fd::OwnedFd;
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::symlink;
+use std::os::unix::fs::{MetadataExt, symlink};
 use std::path::{Path, PathBuf};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -106,7 +107,10 @@ fn clear_link(link: &Path) -> Result<(), PortError> {
     let port = link.display().to_string();
     let is_ours = match std::fs::read_link(link) {
         Ok(target) if link.exists() && target.starts_with("/dev/pts") => {
-            return Err(PortError::PathServed { port });
+            if !is_older_than_its_pty(link) {
+                return Err(PortError::PathServed { port });
+            }
+            true
         }
         Ok(_) => !link.exists(),
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -118,4 +122,14 @@ fn clear_link(link: &Path) -> Result<(), PortError> {
         return Err(PortError::PathTaken { port });
     }
     std::fs::remove_file(link).map_err(|source| PortError::Io { port, source })
+}
+
+/// Whether the pty that `link` points to is a later one that got the number of the link's own, whose
+/// server was killed. A pty is made before its link, and its ctime stays unless its mode is changed.
+fn is_older_than_its_pty(link: &Path) -> bool {
+    let made = |metadata: Metadata| (metadata.ctime(), metadata.ctime_nsec());
+    match (link.symlink_metadata(), link.metadata()) {
+        (Ok(link), Ok(pty)) => made(link) < made(pty),
+        _ => false,
+    }
 }

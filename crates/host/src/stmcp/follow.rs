@@ -116,7 +116,8 @@ impl Follower {
         }
     }
 
-    fn lose(&mut self) {
+    /// Says that replies may come that nobody waits for.
+    pub(super) fn lose(&mut self) {
         self.out_of_step = true;
         self.started.forget_current();
     }

@@ -291,6 +291,10 @@ impl Relay {
             shared.follower.presume(unproven.motor);
         }
         let has_failed = !shared.follower.started().is_empty();
+        if has_failed {
+            // What was tried may be answered yet.
+            shared.follower.lose();
+        }
         shared.is_owing &= has_failed;
         if !(has_failed && self.has_complained) {
             shared.events.push_back(Event::Stopped { reason, motors });

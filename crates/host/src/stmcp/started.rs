@@ -26,13 +26,10 @@ impl Started {
         Motor::new(motor).or(self.current.take())
     }
 
-    /// The request was acknowledged.
+    /// The request that was [`asked`](Self::asked) last was acknowledged.
     pub(super) fn acknowledged(&mut self, addressed: Option<Motor>, request: Option<&Request<'_>>) {
         match request {
-            Some(Request::SetRegister { register: RegisterId::TARGET_MOTOR, .. }) => {
-                self.current = None;
-                return;
-            }
+            Some(Request::SetRegister { register: RegisterId::TARGET_MOTOR, .. }) => return,
             Some(Request::Execute(Command::StopMotor | Command::ScStop)) => {
                 self.motors &= !addressed.map_or(0, bit);
             }

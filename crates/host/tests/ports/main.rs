@@ -22,6 +22,7 @@ use motorlink::serve::{ByteStation, Server};
 use motorlink::slcan::Bitrate;
 use motorlink_proto::time::Instant;
 use running::{Echo, Late, Place, Running, reply_of, request};
+use rustix::pty::{OpenptFlags, openpt, ptsname};
 
 type Outcome = Result<(), Box<dyn Error>>;
 
@@ -164,6 +165,24 @@ fn a_link_is_replaced_and_a_file_is_not() -> Outcome {
     let error = Running::bytes(&place.as_port("pty")).err().ok_or("a file was replaced")?;
     assert!(error.to_string().contains("is no link to a pty"), "{error}");
     assert_eq!(fs::read_to_string(&place.0)?, "precious");
+    Ok(())
+}
+
+#[test]
+fn a_link_of_a_killed_server_is_replaced_when_its_number_is_anothers() -> Outcome {
+    let place = Place::new("reused");
+    let pty = || openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY);
+    let former = pty()?;
+    let name = PathBuf::from(ptsname(&former, Vec::new())?.to_str()?);
+    symlink(&name, &place.0)?;
+    drop(former);
+    // The clock of file systems has to have gone on.
+    std::thread::sleep(Duration::from_millis(50));
+    let mut others = vec![pty()?];
+    while !name.exists() {
+        others.push(pty()?);
+    }
+    drop(Running::bytes(&place.as_port("pty"))?);
     Ok(())
 }
 

@@ -1,0 +1,104 @@
+//! The relay behind `motorlink guard`, without a process of its own.
+
+mod served;
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use motorlink::stmcp::{Event, Reason, Relay, RelayError, RelayOptions};
+use served::Served;
+
+const START: [u8; 4] = [0x23, 0x01, 0x01, 0x25];
+const ACK: [u8; 3] = [0xF0, 0x00, 0xF0];
+
+/// A relay on a drive, and where it is served.
+fn relay(drives: &Served, options: RelayOptions) -> (Relay, String) {
+    let mut relay = Relay::open(&drives.st.parse().expect("a port"), options).expect("opened");
+    let served = relay.serve(&"tcp-listen:127.0.0.1:0".parse().expect("a name")).expect("served");
+    (relay, served.path)
+}
+
+/// Turns until the last event is as wanted; gives all.
+fn turn_until(relay: &mut Relay, wanted: impl Fn(&Event) -> bool) -> Vec<Event> {
+    let give_up = Instant::now() + Duration::from_secs(20);
+    let mut events = Vec::new();
+    while !events.last().is_some_and(&wanted) {
+        assert!(Instant::now() < give_up, "{events:?}");
+        events.extend(relay.turn(Duration::from_millis(10)).expect("a turn"));
+    }
+    events
+}
+
+/// Starts motor 1 through the relay.
+fn start(relay: &mut Relay, address: &str) -> TcpStream {
+    let mut client = TcpStream::connect(address).expect("connected");
+    client.write_all(&START).expect("written");
+    client.set_nonblocking(true).expect("set");
+    let (mut reply, mut read) = ([0; 3], 0);
+    let give_up = Instant::now() + Duration::from_secs(20);
+    while read < reply.len() {
+        assert!(Instant::now() < give_up);
+        relay.turn(Duration::from_millis(1)).expect("a turn");
+        read += client.read(&mut reply[read..]).unwrap_or(0);
+    }
+    assert_eq!(reply, ACK);
+    client
+}
+
+fn has_stopped(event: &Event, wanted: Reason) -> bool {
+    let Event::Stopped { reason, motors } = event else { return false };
+    assert_eq!(*reason, wanted);
+    assert!(motors.iter().all(|halt| halt.is_stopped()), "{motors:?}");
+    motors.iter().map(|halt| halt.motor.number()).eq([1])
+}
+
+#[test]
+fn the_motor_is_stopped_when_its_client_leaves() {
+    let drives = Served::new("relay-leaves");
+    let (mut relay, address) = relay(&drives, RelayOptions::default());
+    for _ in 0..2 {
+        drop(start(&mut relay, &address));
+        let events = turn_until(&mut relay, |event| has_stopped(event, Reason::ClientGone));
+        assert!(matches!(events[..], [Event::Left, Event::Stopped { .. }]), "{events:?}");
+    }
+    assert!(relay.end().is_empty(), "nothing is left to stop");
+}
+
+#[test]
+fn the_motor_is_stopped_when_its_client_is_silent() {
+    let drives = Served::new("relay-silent");
+    let options = RelayOptions { silence: Some(Duration::from_millis(100)) };
+    let (mut relay, address) = relay(&drives, options);
+    let _client = start(&mut relay, &address);
+    turn_until(&mut relay, |event| has_stopped(event, Reason::ClientSilent));
+    assert!(relay.end().is_empty(), "nothing is left to stop");
+}
+
+#[test]
+fn the_motor_is_stopped_when_the_relay_ends() {
+    let drives = Served::new("relay-ends");
+    let (mut relay, address) = relay(&drives, RelayOptions::default());
+    let _client = start(&mut relay, &address);
+    let last = relay.end();
+    assert!(last.iter().any(|event| has_stopped(event, Reason::Ending)), "{last:?}");
+}
+
+#[test]
+fn a_second_client_is_closed_and_told_of() {
+    let drives = Served::new("relay-second");
+    let (mut relay, address) = relay(&drives, RelayOptions::default());
+    let _client = start(&mut relay, &address);
+    let mut second = TcpStream::connect(&address).expect("the kernel takes it");
+    turn_until(&mut relay, |event| matches!(event, Event::TurnedAway { .. }));
+    assert_eq!(second.read(&mut [0; 8]).expect("closed in order"), 0);
+}
+
+#[test]
+fn what_is_no_serial_line_of_a_drive_is_refused() {
+    let open = |name: &str| Relay::open(&name.parse().expect("a name"), RelayOptions::default());
+    assert!(matches!(open("slcan:/dev/ttyACM0").err(), Some(RelayError::Can(_))));
+    assert!(matches!(open("socketcan:can0").err(), Some(RelayError::Can(_))));
+    assert!(matches!(open("sim:").err(), Some(RelayError::Simulated(_))));
+    assert!(matches!(open("/dev/ttyNONE0").err(), Some(RelayError::Port(_))));
+}
