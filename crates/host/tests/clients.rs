@@ -307,6 +307,45 @@ fn a_copy_of_a_reply_that_comes_in_a_pause_is_not_the_answer_to_the_next_questio
     assert!(!matches!(ask(), Ok(1)), "that is the copy");
 }
 
+/// A motor that misses the first request.
+#[derive(Default)]
+struct Absent(u32, Vec<CanFrame>);
+
+impl CanLink for Absent {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        if self.0 > 0 {
+            self.1.push(*frame);
+        }
+        self.0 += 1;
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        if self.1.is_empty() {
+            std::thread::sleep(timeout.unwrap_or_default());
+        }
+        Ok(self.1.pop())
+    }
+}
+
+#[test]
+fn the_answer_of_a_motor_in_doubt_is_nobodys_reply() {
+    let ms = Duration::from_millis;
+    let options = rmd::Options { timeout: ms(5), guard: ms(5), ..rmd::Options::default() };
+    let bus = Bus::over("absent", Box::new(Absent::default()), options);
+    let id = MotorId::new(1).unwrap();
+    assert!(matches!(bus.raw(id, [0x9C, 0, 0, 0, 0, 0, 0, 0]), Err(rmd::Error::Timeout { .. })));
+    std::thread::sleep(ms(20));
+    let mut outcomes = Vec::new();
+    let requests = [0x9C, 0x92].map(|code| (id, [code, 0, 0, 0, 0, 0, 0, 0]));
+    bus.cycle(&requests, |_, result| outcomes.push(result)).unwrap();
+    assert!(
+        matches!(outcomes[..], [Err(rmd::Error::Twice(_)), Err(rmd::Error::Quarantined { .. })]),
+        "{outcomes:?}"
+    );
+    assert_eq!(bus.raw(id, requests[0].1).unwrap()[0], 0x9C);
+}
+
 /// Another motor's frames, as fast as they are read.
 struct Flood;
 

@@ -199,7 +199,6 @@ impl Bus {
                 _ => inner.request(id, request),
             };
             if let Err(refused) = sent {
-                questions.remove(id);
                 each(id, Err(inner.refused(refused)));
             }
         }
