@@ -2,7 +2,7 @@
 //! allocation in an exchange.
 
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Duration;
+use std::time::{Duration, Instant as Moment};
 
 use motorlink_proto::rmd::{
     self as proto, CanFrame, Code, Command, Counters, Dialect, Host, Limits, MotionStatus, MotorId,
