@@ -354,6 +354,7 @@ fn codes_of_the_other_profile_are_unknown_or_mean_something_else() {
     assert_eq!(bench.drive.log, ["torque ramp 1 -2000 100", "position 1 1.5 0.25"]);
     bench.drive.features = Some(Features::NONE);
     assert_eq!(bench.ask(1, Request::Position(target)), Err(ErrorCode::BadFrameId));
+    assert_eq!(bench.raw(0x12, &[]), Err(ErrorCode::BadFrameId), "whatever the payload");
 }
 
 #[test]

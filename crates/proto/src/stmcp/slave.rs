@@ -3,9 +3,9 @@
 use super::message::Payload;
 use super::register::{Shape, Type, Unit, Writing};
 use super::{
-    BoardInfo, Command, Drive, ErrorCode, Feature, Features, FirmwareVersion, Frame, HEADER_ACK,
-    HEADER_NACK, MAX_FRAME, MAX_PAYLOAD, Motor, Parse, Profile, REVUP_PHASES, RegisterId, Request,
-    frame,
+    BoardInfo, Command, Drive, ErrorCode, Feature, Features, FirmwareVersion, Frame, FrameCode,
+    HEADER_ACK, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD, Motor, Parse, Profile, REVUP_PHASES,
+    RegisterId, Request, frame,
 };
 use crate::time::{Duration, Instant};
 
@@ -146,8 +146,12 @@ impl Slave {
             self.select(frame.motor()).ok_or(ErrorCode::BadMotorSelected)?;
         }
         let motor = self.current;
-        let request = Request::decode(self.profile, frame)?;
         let features = drive.features(motor);
+        let code = FrameCode::from_number(frame.code(), self.profile);
+        if code == Some(FrameCode::SetPositionCmd) && !features.has(Feature::PositionControl) {
+            return Err(ErrorCode::BadFrameId);
+        }
+        let request = Request::decode(self.profile, frame)?;
         let [_, _, room @ ..] = &mut self.buffer;
         let mut out = Payload::new(room);
         match request {
@@ -207,12 +211,7 @@ impl Slave {
                 *slot.ok_or(ErrorCode::WrongSet)? = chosen.ok_or(ErrorCode::WrongSet)?;
             }
             Request::TorqueRamp(ramp) => drive.torque_ramp(motor, ramp),
-            Request::Position(target) => {
-                if !features.has(Feature::PositionControl) {
-                    return Err(ErrorCode::BadFrameId);
-                }
-                drive.position(motor, target);
-            }
+            Request::Position(target) => drive.position(motor, target),
         }
         out.finish().ok_or(ErrorCode::WrongSet)
     }

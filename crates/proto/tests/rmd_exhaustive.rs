@@ -1,0 +1,112 @@
+//! Every code with every value of every byte, through drive and host.
+
+mod rmd_bench;
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::Instant;
+use rmd_bench::{Node, motor};
+
+/// What the bytes are that are not varied.
+const PATTERNS: [u8; 3] = [0x00, 0xFF, 0x5A];
+
+/// Every value of every byte behind the code, with the others of each pattern.
+fn frames(code: u8) -> impl Iterator<Item = [u8; 8]> {
+    PATTERNS.into_iter().flat_map(move |pattern| {
+        (1..8).flat_map(move |place| {
+            (0..=255).map(move |value| {
+                let mut data = [pattern; 8];
+                (data[0], data[place]) = (code, value);
+                data
+            })
+        })
+    })
+}
+
+/// The bytes that a field covers; the others are NULL.
+fn values(fields: &[Field], data: [u8; 8]) -> [u8; 8] {
+    let mut kept = [0; 8];
+    kept[0] = data[0];
+    for field in fields {
+        let (first, len) = (usize::from(field.offset), usize::from(field.len));
+        kept[first..first + len].copy_from_slice(&data[first..first + len]);
+    }
+    kept
+}
+
+#[test]
+fn every_frame_gets_the_reply_of_its_code_or_none() {
+    let id = motor(3);
+    for code in 0..=255 {
+        let row = Code::from(code).info();
+        let (mut node, mut host) = (Node::new(3), Host::new());
+        for data in frames(code) {
+            let (before, saved) = (*node.drive.settings(), node.motor.saved.len());
+            let reply = node.raw(data);
+            assert_eq!(reply.is_some(), row.is_some(), "{data:02x?}");
+            let wrote = node.motor.saved.len() > saved;
+            assert!(!wrote || row.is_some_and(|row| row.rom), "{data:02x?} wrote to ROM");
+            let Some((row, reply)) = row.zip(reply) else {
+                assert_eq!(*node.drive.settings(), before);
+                continue;
+            };
+            let answered = if code == 0x9B { 0x9A } else { code };
+            assert_eq!(reply[0], answered, "{data:02x?}");
+            assert!(!row.echo || reply == data, "{data:02x?} echoed as {reply:02x?}");
+            if !row.echo {
+                assert_eq!(reply, values(row.reply, reply), "NULL bytes are sent as 0");
+            }
+
+            if let Ok(()) = host.request(Instant(0), id, data) {
+                let frame = CanFrame::new(id.can_id(), data);
+                assert_eq!(host.poll(Instant(0)), Output::Transmit(frame));
+                host.receive(&CanFrame::new(id.can_id(), reply));
+                assert_eq!(host.poll(Instant(0)), Output::Done { id, result: Ok(reply) });
+            } else {
+                assert!(row.moves, "only what moves a motor is refused: {data:02x?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn only_a_reply_with_the_code_of_the_request_is_taken() {
+    let id = motor(3);
+    for code in 0..=255u8 {
+        for answer in 0..=255u8 {
+            let mut host = Host::new();
+            host.request(Instant(0), id, [code, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+            assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
+            host.receive(&CanFrame::new(id.can_id(), [answer, 1, 2, 3, 4, 5, 6, 7]));
+            let taken = matches!(host.poll(Instant(0)), Output::Done { .. });
+            let alike = code == answer || (code == 0x9B && answer == 0x9A);
+            assert_eq!(taken, alike, "{code:#04x} answered by {answer:#04x}");
+        }
+    }
+}
+
+/// Decoding and encoding keeps what the fields cover, in every byte.
+fn kept<P: Payload>(code: u8) {
+    for data in frames(code) {
+        let again = P::decode(&data).encode_as(Code::from(code));
+        assert_eq!(again, values(P::FIELDS, data), "{data:02x?}");
+    }
+}
+
+#[test]
+fn every_payload_keeps_what_its_fields_cover() {
+    kept::<Gains>(0x30);
+    kept::<Acceleration>(0x33);
+    kept::<Encoder>(0x90);
+    kept::<EncoderOffset>(0x91);
+    kept::<MultiTurn>(0x92);
+    kept::<Circle>(0x94);
+    kept::<Status1>(0x9A);
+    kept::<MotionStatus>(0x9C);
+    kept::<PhaseCurrents>(0x9D);
+    kept::<Torque>(0xA1);
+    kept::<Speed>(0xA2);
+    kept::<Position>(0xA3);
+    kept::<PositionLimited>(0xA4);
+    kept::<CirclePosition>(0xA5);
+    kept::<CirclePositionLimited>(0xA6);
+}
