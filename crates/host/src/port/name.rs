@@ -215,6 +215,22 @@ impl LineName {
         Ok(true)
     }
 
+    /// The name without its options.
+    fn to_body(&self) -> String {
+        match self {
+            LineName::Serial { path, .. } => format!("serial:{}", path.display()),
+            LineName::Tcp { host, port } => format!("tcp:{host}:{port}"),
+        }
+    }
+
+    /// The option that is not the default.
+    fn baud_option(&self) -> Option<String> {
+        match self {
+            LineName::Serial { baud, .. } if *baud != DEFAULT_BAUD => Some(format!("baud={baud}")),
+            _ => None,
+        }
+    }
+
     fn options(&self) -> &'static str {
         match self {
             LineName::Serial { .. } => "baud",
@@ -257,15 +273,15 @@ impl fmt::Display for PortName {
                 if *bitrate != Bitrate::DEFAULT {
                     options.push(format!("bitrate={}", bitrate.bits_per_second()));
                 }
-                match line {
-                    LineName::Serial { path, baud } => {
-                        write!(f, "slcan:{}", path.display())?;
-                        options.extend(baud_option(*baud));
-                    }
-                    LineName::Tcp { .. } => write!(f, "slcan:{line}")?,
-                }
+                options.extend(line.baud_option());
                 options.extend(echo.then(|| "echo=1".to_owned()));
-                write_options(f, &options)
+                let written = line.to_body();
+                let bare = written.strip_prefix("serial:").filter(|path| {
+                    // Such a path needs its scheme.
+                    !path.starts_with("serial:") && !path.starts_with("tcp:")
+                });
+                f.write_str("slcan:")?;
+                write_with_options(f, bare.unwrap_or(&written), &options)
             }
             PortName::SocketCan(interface) => write!(f, "socketcan:{interface}"),
             PortName::Sim(None) => f.write_str("sim:"),
@@ -276,22 +292,14 @@ impl fmt::Display for PortName {
 
 impl fmt::Display for LineName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            LineName::Serial { path, baud } => {
-                write!(f, "serial:{}", path.display())?;
-                write_options(f, &Vec::from_iter(baud_option(*baud)))
-            }
-            LineName::Tcp { host, port } => write!(f, "tcp:{host}:{port}"),
-        }
+        write_with_options(f, &self.to_body(), &Vec::from_iter(self.baud_option()))
     }
 }
 
-fn baud_option(baud: u32) -> Option<String> {
-    (baud != DEFAULT_BAUD).then(|| format!("baud={baud}"))
-}
-
-fn write_options(f: &mut fmt::Formatter<'_>, options: &[String]) -> fmt::Result {
-    if options.is_empty() {
+/// A `?` in `body` would begin the options if none followed it.
+fn write_with_options(f: &mut fmt::Formatter<'_>, body: &str, options: &[String]) -> fmt::Result {
+    f.write_str(body)?;
+    if options.is_empty() && !body.contains('?') {
         return Ok(());
     }
     write!(f, "?{}", options.join("&"))
