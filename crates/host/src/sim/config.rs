@@ -111,8 +111,11 @@ impl BenchConfig {
         Ok(config)
     }
 
-    /// The ST drive, powered on `now`.
-    pub(super) fn station(&self, now: Instant) -> Result<StStation<Vec<StMotor>>, ConfigError> {
+    /// The ST drive, powered on `now`, to be advanced by the caller.
+    ///
+    /// # Errors
+    /// A motor that cannot be; never with what [`parse`](Self::parse) gave.
+    pub fn station(&self, now: Instant) -> Result<StStation<Vec<StMotor>>, ConfigError> {
         for (config, n) in self.st.0.iter().zip(1..) {
             check(
                 &format!("st.motor {n}"),
@@ -137,8 +140,12 @@ impl BenchConfig {
         &self.rmd.0
     }
 
-    /// The CAN bus, powered on `now`; `rom` says what each motor's ROM holds.
-    pub(super) fn bus(
+    /// The CAN bus, powered on `now`, to be advanced by the caller; `rom` says what each motor's ROM
+    /// holds.
+    ///
+    /// # Errors
+    /// As [`station`](Self::station).
+    pub fn bus(
         &self,
         now: Instant,
         rom: impl Fn(&RmdConfig) -> Settings,

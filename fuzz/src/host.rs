@@ -1,0 +1,110 @@
+//! What the host library reads: slcan, port names, configurations and commands of simulated drives.
+
+use motorlink::port::{PortName, ServeName};
+use motorlink::sim::{Bench, BenchConfig};
+use motorlink::slcan::{self, Answer, Device, HostCodec};
+use motorlink_proto::rmd::{self, CanFrame, Command as _, MotorId};
+use motorlink_proto::stmcp::{self as st, MAX_FRAME, Request};
+use motorlink_proto::time::Instant;
+use motorlink_proto::units::CentiDps;
+
+use crate::input::Input;
+
+/// Any bytes to both ends of slcan.
+pub fn slcan(data: &[u8]) {
+    let mut input = Input::new(data);
+    let cut = usize::from(input.byte()) % 64 + 1;
+    let data = &data[data.len().min(1)..];
+    let (whole, garbage) = answers(data, 100);
+    assert_eq!(answers(data, cut), (whole.clone(), garbage), "chunks make no difference");
+    for answer in whole {
+        let Answer::Frame(frame) = answer else { continue };
+        let mut line = [0; slcan::LONGEST_FRAME];
+        let line = slcan::encode(&frame, &mut line);
+        assert_eq!(answers(line, 100), (vec![Answer::Frame(frame)], 0));
+    }
+
+    let mut device = Device::default();
+    let mut replies = Vec::new();
+    let mut frames = 0;
+    for &byte in data {
+        if let Some(frame) = device.receive(byte, &mut replies) {
+            frames += 1;
+            device.deliver(Instant(0), &frame, &mut replies);
+        }
+    }
+    let ends = data.iter().filter(|byte| **byte == b'\r').count();
+    let (answers, garbage) = answers(&replies, 100);
+    assert_eq!((answers.len(), garbage), (ends + frames, 0), "a line gets one answer");
+}
+
+fn answers(data: &[u8], cut: usize) -> (Vec<Answer>, u64) {
+    let mut codec = HostCodec::default();
+    let mut found = Vec::new();
+    for chunk in data.chunks(cut) {
+        codec.spare()[..chunk.len()].copy_from_slice(chunk);
+        codec.filled(chunk.len());
+        found.extend(std::iter::from_fn(|| codec.answer()));
+    }
+    (found, codec.garbage())
+}
+
+/// Any text as a port: what is taken is written so that it is read as the same.
+pub fn port_name(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    match text.parse::<PortName>() {
+        Ok(name) => assert_eq!(name.to_string().parse(), Ok(name)),
+        Err(error) => assert!(error.to_string().contains(text)),
+    }
+    match text.parse::<ServeName>() {
+        Ok(name) => assert_eq!(name.to_string().parse(), Ok(name)),
+        Err(error) => assert!(error.to_string().contains(text)),
+    }
+}
+
+/// Any text as a configuration: what is taken gives drives that start and turn by numbers.
+pub fn sim_config(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let Ok(config) = BenchConfig::parse(text) else { return };
+    let mut station = config.station(Instant(0)).expect("what was taken can be built");
+    let mut bus = config.bus(Instant(0)).expect("what was taken can be built");
+    for number in 1..=station.drive().last().number() {
+        for request in [Request::Execute(st::Command::StartMotor), Request::BoardInfo] {
+            let mut out = [0; MAX_FRAME];
+            let frame = request.encode(number, &mut out).expect("it fits");
+            station.receive(Instant(0), frame, |_| {});
+        }
+    }
+    let ids: Vec<MotorId> = bus.nodes().iter().map(|node| node.id()).collect();
+    for id in ids {
+        let speed = rmd::Speed { speed: CentiDps(36_000) };
+        bus.receive(Instant(0), &CanFrame::new(id.can_id(), speed.encode()), |_| {});
+    }
+    for end in [1_000, 40_000] {
+        station.advance_to(Instant(end));
+        bus.advance_to(Instant(end));
+        crate::stmcp::finite(station.drive().motors());
+        crate::rmd::finite(bus.nodes());
+    }
+}
+
+/// Any lines as commands to simulated drives: each is answered, and what is then told of the drives
+/// is made of numbers.
+pub fn sim_command(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let (mut st, mut rmd) = (Bench::new(), Bench::new());
+    let config = BenchConfig::default();
+    let free = ServeName::TcpListen { host: "127.0.0.1".to_owned(), port: 0 };
+    st.serve_st(&free, &config).expect("loopback has a free port");
+    rmd.serve_rmd(&free, &config).expect("loopback has a free port");
+    for line in text.lines() {
+        for bench in [&mut st, &mut rmd] {
+            let answer = bench.obey(line);
+            let done = answer["ok"].as_bool().expect("an answer says whether it was done");
+            assert!(done != answer["error"].is_string(), "{answer}");
+            let state = bench.obey(r#"{"command":"state"}"#);
+            assert_eq!(state["ok"], true);
+            assert!(!state.to_string().contains("null"), "behind {line}: {state}");
+        }
+    }
+}

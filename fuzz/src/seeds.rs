@@ -1,0 +1,181 @@
+//! What the fuzzers begin with: the wire vectors as each target reads them, and what the
+//! documentation shows.
+
+use std::path::{Path, PathBuf};
+
+use motorlink::slcan;
+use motorlink_proto::rmd::{CanFrame, TORQUE4_ID};
+use motorlink_sim::{rmd::RmdConfig, st::MotorConfig};
+use serde_json::Value;
+
+const PORTS: &[&str] = &[
+    "/dev/ttyACM0",
+    "ttyUSB1?baud=9600",
+    "serial:/dev/ttyACM0?baud=1843200",
+    "tcp:drive.local:4000",
+    "tcp:[::1]:4000",
+    "slcan:/dev/ttyACM0?bitrate=1000000&baud=115200&echo=1",
+    "slcan:tcp:h:1?bitrate=500000",
+    "slcan:serial:serial:x?echo=0",
+    "socketcan:can0",
+    "sim:",
+    "sim:bench.toml",
+    "pty:./st0",
+    "slcan-pty:./can0",
+    "tcp-listen:127.0.0.1:0",
+];
+
+/// Where the project is.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn text(path: &str) -> String {
+    let path = root().join(path);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// The seeds of a target.
+///
+/// # Panics
+/// When the vectors or the documentation are not what they were, and when there is no such target.
+pub fn of(target: &str) -> Vec<Vec<u8>> {
+    match target {
+        "st_frame" => st().flat_map(|(_, request, reply)| [request, reply]).collect(),
+        "st_master" => st().map(|(_, request, reply)| master(&request, &reply)).collect(),
+        "st_model" => st().map(|(profile, request, _)| sequence(profile, 0, &request)).collect(),
+        "st_slave" => st().map(|(profile, request, _)| sequence(profile, 1, &request)).collect(),
+        "rmd_frame" => rmd().map(|(id, data)| any_frame(id, data)).collect(),
+        "rmd_host" => rmd().map(|(id, data)| host(id, data)).collect(),
+        "rmd_drive" => rmd().map(|(id, data)| drive(id, data)).collect(),
+        "slcan" => rmd().map(|(id, data)| adapter(id, data)).collect(),
+        "port_name" => PORTS.iter().map(|name| name.as_bytes().to_vec()).collect(),
+        "sim_config" => configurations(),
+        "sim_command" => commands(),
+        _ => panic!("there is no target {target}"),
+    }
+}
+
+fn vectors(path: &str) -> Vec<Value> {
+    serde_json::from_str(&text(path)).expect("the vectors are a JSON list")
+}
+
+fn hexadecimal(value: &Value) -> Vec<u8> {
+    let digits = value.as_str().unwrap_or("");
+    let pairs = (0..digits.len()).step_by(2).map(|at| &digits[at..at + 2]);
+    pairs.map(|pair| u8::from_str_radix(pair, 16).expect("the vectors are hexadecimal")).collect()
+}
+
+/// Profile (as the targets take it), request and reply of each vector.
+fn st() -> impl Iterator<Item = (u8, Vec<u8>, Vec<u8>)> {
+    vectors("vectors/stmcp.json").into_iter().map(|vector| {
+        let profile = u8::from(vector["profile"] == "mcsdk-5.4");
+        (profile, hexadecimal(&vector["request"]), hexadecimal(&vector["reply"]))
+    })
+}
+
+/// Identifier and data of each vector.
+fn rmd() -> impl Iterator<Item = (u16, [u8; 8])> {
+    vectors("vectors/rmd.json").into_iter().map(|vector| {
+        let id = vector["id"].as_str().and_then(|id| id.strip_prefix("0x")).expect("0x and digits");
+        let id = u16::from_str_radix(id, 16).expect("hexadecimal");
+        (id, hexadecimal(&vector["bytes"]).try_into().expect("eight bytes"))
+    })
+}
+
+/// A request, its reply, time, and the same request again.
+fn master(request: &[u8], reply: &[u8]) -> Vec<u8> {
+    let mut seed = vec![1, 0xFF, 0xFF, 0xFF, 0];
+    let payload = &request[2..request.len() - 1];
+    for _ in 0..2 {
+        seed.extend([2, request[0], payload.len() as u8]);
+        seed.extend(payload);
+        seed.extend([3, reply.len() as u8]);
+        seed.extend(reply);
+        seed.extend([6, 0xFF, 0x7F]);
+    }
+    seed
+}
+
+/// A frame by the operation `frame`, time, and the same for the current motor.
+fn sequence(profile: u8, frame: u8, request: &[u8]) -> Vec<u8> {
+    let mut seed = vec![profile | 3 << 1];
+    let payload = &request[2..request.len() - 1];
+    for header in [request[0], request[0] & 0x1F] {
+        seed.extend([frame, header, payload.len() as u8]);
+        seed.extend(payload);
+        seed.extend([5, 0xC8]);
+    }
+    seed
+}
+
+fn any_frame(id: u16, data: [u8; 8]) -> Vec<u8> {
+    let (kind, base) = if id == TORQUE4_ID { (14, TORQUE4_ID) } else { (12, 0x140) };
+    let mut seed = vec![kind, 0, (id - base) as u8];
+    seed.extend(data);
+    seed
+}
+
+/// The index of a motor; the first for what all of them get.
+fn index(id: u16) -> u8 {
+    id.checked_sub(0x141).filter(|index| *index < 32).unwrap_or(0) as u8
+}
+
+/// A request and a reply of the same bytes, time, and once more.
+fn host(id: u16, data: [u8; 8]) -> Vec<u8> {
+    let mut seed = Vec::new();
+    for operation in [0, 6, 0] {
+        seed.extend([operation, index(id)]);
+        seed.extend(data);
+    }
+    seed.extend([7, 0, 0xFF, 0x7F]);
+    seed
+}
+
+/// A frame, and time for the motor to turn.
+fn drive(id: u16, data: [u8; 8]) -> Vec<u8> {
+    let mut seed = vec![0, index(id)];
+    seed.extend(data);
+    seed.extend([5, 0, 0xFF, 0x3F]);
+    seed
+}
+
+/// An adapter is opened and sends a frame.
+fn adapter(id: u16, data: [u8; 8]) -> Vec<u8> {
+    let mut seed = b"\x10C\rS8\rZ1\rO\r".to_vec();
+    seed.extend(slcan::encode(&CanFrame::new(id, data), &mut [0; slcan::LONGEST_FRAME]));
+    seed
+}
+
+/// What docs/SIMULATOR.md shows, and every member there is.
+fn configurations() -> Vec<Vec<u8>> {
+    let page = text("docs/SIMULATOR.md");
+    let shown = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next());
+    let st = [MotorConfig::default(), MotorConfig::servo()].map(|motor| members("st", &motor));
+    let shown = shown.expect("the page shows a configuration").to_owned();
+    [shown, members("rmd", &RmdConfig::default())].into_iter().chain(st).map(Into::into).collect()
+}
+
+fn members(section: &str, motor: &impl serde::Serialize) -> String {
+    let motor = toml::Value::try_from(motor).expect("a configuration is a table");
+    let list = toml::Value::Array(vec![motor]);
+    let section = [(section.to_owned(), toml::Table::from_iter([("motor".to_owned(), list)]))];
+    toml::Table::from_iter(section.map(|(name, table)| (name, table.into()))).to_string()
+}
+
+/// What docs/SIMULATOR.md shows, and one of each command.
+fn commands() -> Vec<Vec<u8>> {
+    let page = text("docs/SIMULATOR.md");
+    let shown = page.lines().map(str::trim).filter(|line| line.starts_with("{\"command\""));
+    let each = [
+        r#"{"command":"power-cycle"}"#,
+        r#"{"command":"power-cycle","motor":2}"#,
+        r#"{"command":"supply","motor":1,"volts":6.5}"#,
+        r#"{"command":"temperature","motor":2,"celsius":-40}"#,
+        r#"{"command":"load","motor":1,"newton_metres":1e3}"#,
+        r#"{"command":"lock-rotor","motor":1,"locked":true}"#,
+        r#"{"command":"fault","motor":1,"fault":"OVER_TEMP","hold":true}"#,
+        r#"{"command":"fault","motor":1,"fault":"LOW_VOLTAGE"}"#,
+    ];
+    shown.chain(each).map(|line| line.as_bytes().to_vec()).collect()
+}

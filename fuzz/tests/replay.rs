@@ -1,0 +1,38 @@
+//! Every target stands its seeds and what fuzzing once found.
+
+use std::fs;
+use std::path::Path;
+
+use motorlink_fuzz::{TARGETS, run, seeds};
+
+#[test]
+fn every_target_stands_its_seeds() {
+    for (target, _) in TARGETS {
+        let seeds = seeds::of(target);
+        assert!(!seeds.is_empty(), "{target} has no seeds");
+        for seed in &seeds {
+            run(target, seed);
+            // Cut and with each byte damaged they are seeds as well.
+            for at in 0..seed.len().min(200) {
+                run(target, &seed[..at]);
+                let mut damaged = seed.clone();
+                damaged[at] ^= 0x11;
+                run(target, &damaged);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_target_stands_what_was_found() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("regressions");
+    for entry in fs::read_dir(folder).expect("the folder is in the repository") {
+        let path = entry.expect("it can be listed").path();
+        let target = path.file_name().and_then(|name| name.to_str()).expect("a target's name");
+        for found in fs::read_dir(&path).expect("it can be listed") {
+            let file = found.expect("it can be listed").path();
+            println!("{}", file.display());
+            run(target, &fs::read(&file).expect("it can be read"));
+        }
+    }
+}
