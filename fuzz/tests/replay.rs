@@ -36,3 +36,24 @@ fn every_target_stands_what_was_found() {
         }
     }
 }
+
+/// One number in one place is too rare for a fuzzer to come by.
+#[test]
+fn a_configuration_with_an_extreme_value_is_refused_or_runs() {
+    let extremes =
+        ["inf", "nan", "-inf", "1e38", "-1e38", "1e-38", "0.0", "0", "-1", "255", "65535"];
+    for seed in seeds::of("sim_config") {
+        let text = String::from_utf8(seed).expect("a configuration is text");
+        let lines: Vec<&str> = text.lines().collect();
+        for (n, line) in lines.iter().enumerate() {
+            let Some((key, _)) = line.split_once(" = ") else { continue };
+            for value in extremes {
+                let changed = format!("{key} = {value}");
+                let mut lines = lines.clone();
+                lines[n] = &changed;
+                println!("{changed}");
+                run("sim_config", lines.join("\n").as_bytes());
+            }
+        }
+    }
+}

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use motorlink_proto::rmd::Settings;
 use motorlink_proto::stmcp::Profile;
 use motorlink_proto::time::Instant;
+use motorlink_sim::heat::HeatConfig;
 use motorlink_sim::machine::MachineConfig;
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
@@ -117,16 +118,22 @@ impl BenchConfig {
     /// A motor that cannot be; never with what [`parse`](Self::parse) gave.
     pub fn station(&self, now: Instant) -> Result<StStation<Vec<StMotor>>, ConfigError> {
         for (config, n) in self.st.0.iter().zip(1..) {
-            check(
-                &format!("st.motor {n}"),
-                &config.machine,
-                [
-                    ("bus_voltage", config.bus_voltage, 0.0..=1000.0),
-                    ("rated_current", config.rated_current, 1e-3..=1e3),
-                    ("full_scale_current", config.full_scale_current, 1e-3..=1e4),
-                    ("load_torque", config.load_torque, 0.0..=1e3),
-                ],
-            )?;
+            let limits = &config.thresholds;
+            let values = [
+                ("bus_voltage", config.bus_voltage, 0.0..=1000.0),
+                ("rated_current", config.rated_current, 1e-3..=1e3),
+                ("full_scale_current", config.full_scale_current, 1e-3..=1e4),
+                ("alignment_current", config.alignment_current, 0.0..=1e3),
+                ("load_torque", config.load_torque, 0.0..=1e3),
+                ("thresholds.over_voltage", limits.over_voltage, THRESHOLD),
+                ("thresholds.under_voltage", limits.under_voltage, THRESHOLD),
+                ("thresholds.over_temperature", limits.over_temperature, THRESHOLD),
+                ("thresholds.temperature_hysteresis", limits.temperature_hysteresis, THRESHOLD),
+            ];
+            let revup =
+                config.revup.iter().map(|phase| ("revup.current", phase.current, -1e3..=1e3));
+            let values = values.into_iter().chain(revup);
+            check(&format!("st.motor {n}"), &config.machine, &config.heat, values)?;
         }
         let motors: Vec<StMotor> = self.st.0.iter().copied().map(StMotor::new).collect();
         let drive = StDrive::new(now, motors).ok_or_else(|| {
@@ -151,16 +158,17 @@ impl BenchConfig {
         rom: impl Fn(&RmdConfig) -> Settings,
     ) -> Result<RmdBus<Vec<RmdNode>>, ConfigError> {
         for (config, n) in self.rmd.0.iter().zip(1..) {
-            check(
-                &format!("rmd.motor {n}"),
-                &config.machine,
-                [
-                    ("supply_voltage", config.supply_voltage, 0.0..=1000.0),
-                    ("max_torque_current", config.max_torque_current, 0.0..=33.0),
-                    ("load_torque", config.load_torque, 0.0..=1e3),
-                    ("angle_degrees", config.angle_degrees, -1e6..=1e6),
-                ],
-            )?;
+            let values = [
+                ("supply_voltage", config.supply_voltage, 0.0..=1000.0),
+                ("protect_voltage", config.protect_voltage, THRESHOLD),
+                ("protect_temperature", config.protect_temperature, THRESHOLD),
+                ("max_torque_current", config.max_torque_current, 0.0..=33.0),
+                ("max_speed_dps", config.max_speed_dps, THRESHOLD),
+                ("max_angle_degrees", config.max_angle_degrees, THRESHOLD),
+                ("load_torque", config.load_torque, 0.0..=1e3),
+                ("angle_degrees", config.angle_degrees, -1e6..=1e6),
+            ];
+            check(&format!("rmd.motor {n}"), &config.machine, &config.heat, values)?;
         }
         let node = |config: &RmdConfig| {
             RmdNode::new(now, *config, rom(config)).ok_or_else(|| {
@@ -180,11 +188,15 @@ impl BenchConfig {
     }
 }
 
+/// Where a threshold or a limit can be: anywhere, but a NaN would never be passed.
+const THRESHOLD: RangeInclusive<f32> = -1e6..=1e6;
+
 /// Refuses what no machine can be.
-fn check(
+fn check<'n>(
     place: &str,
     machine: &MachineConfig,
-    values: [(&str, f32, RangeInclusive<f32>); 4],
+    heat: &HeatConfig,
+    values: impl IntoIterator<Item = (&'n str, f32, RangeInclusive<f32>)>,
 ) -> Result<(), ConfigError> {
     let positive = 1e-9..=1e3;
     let machine = [
@@ -195,6 +207,9 @@ fn check(
         ("machine.inertia", machine.inertia, positive),
         ("machine.viscous_friction", machine.viscous_friction, 0.0..=1e3),
         ("machine.coulomb_friction", machine.coulomb_friction, 0.0..=1e3),
+        ("heat.ambient", heat.ambient, -100.0..=1000.0),
+        ("heat.resistance", heat.resistance, 0.0..=1e3),
+        ("heat.time_constant", heat.time_constant, 1e-3..=1e6),
     ];
     match machine.into_iter().chain(values).find(|(_, value, range)| !range.contains(value)) {
         None => Ok(()),
@@ -293,5 +308,13 @@ mod tests {
         assert!(why("profile = \"v9\"").contains("v9"));
         assert!(why("[[st.motor]]\nbus_voltage = -1").contains("st.motor 1: bus_voltage"));
         assert!(why("[[rmd.motor]]\nmachine.inertia = 0").contains("machine.inertia"));
+        assert!(why("[[rmd.motor]]\nheat.time_constant = 0").contains("heat.time_constant"));
+        assert!(why("[[rmd.motor]]\nprotect_voltage = nan").contains("protect_voltage"));
+        assert!(why("[[st.motor]]\nheat.ambient = inf").contains("heat.ambient"));
+        assert!(why("[[st.motor]]\nalignment_current = 1e38").contains("alignment_current"));
+        assert!(why("[[st.motor]]\nthresholds.over_voltage = nan").contains("over_voltage"));
+        let phase = "{ speed_rpm = 0, current = inf, duration_ms = 0 }";
+        let revup = format!("[[st.motor]]\nrevup = [{}]", [phase; 5].join(", "));
+        assert!(why(&revup).contains("revup.current"));
     }
 }
