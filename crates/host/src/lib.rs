@@ -15,6 +15,7 @@ pub mod serve;
 pub mod sim;
 pub mod slcan;
 pub mod stmcp;
+mod text;
 
 pub use line::{BackOff, LinkState, Opener};
 pub use motorlink_proto::time;

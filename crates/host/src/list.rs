@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use rustix::fs::{Access, access};
 
 use crate::port::{Interface, owning_group, permission_hint, up_hint};
+use crate::text::printable;
 
 /// The kernel's hardware type of CAN interfaces.
 const ARPHRD_CAN: &str = "280";
@@ -140,7 +141,7 @@ fn names_in(directory: &Path) -> Vec<String> {
 
 fn read(file: &Path) -> Option<String> {
     let text = fs::read_to_string(file).ok()?;
-    Some(text.trim().to_owned()).filter(|text| !text.is_empty())
+    Some(printable(text.trim())).filter(|text| !text.is_empty())
 }
 
 #[cfg(test)]
@@ -179,7 +180,7 @@ mod tests {
         let usb = "sys/devices/usb1/1-1";
         machine.file(&format!("{usb}/idVendor"), "0483\n")?;
         machine.file(&format!("{usb}/manufacturer"), "STMicroelectronics\n")?;
-        machine.file(&format!("{usb}/product"), "STM32 STLink\n")?;
+        machine.file(&format!("{usb}/product"), "STM32 \x1B[2JSTLink\n")?;
         machine.file(&format!("{usb}/1-1:1.2/driver"), "")?;
         machine.file("sys/class/tty/ttyACM0/dev", "166:0")?;
         machine.file("sys/class/tty/tty0/dev", "4:0")?;
@@ -219,7 +220,7 @@ mod tests {
         let [acm, down, bus_off, virtual_down, fine] = found.as_slice() else {
             unreachable!("five")
         };
-        assert_eq!(acm.description.as_deref(), Some("STMicroelectronics STM32 STLink"));
+        assert_eq!(acm.description.as_deref(), Some("STMicroelectronics STM32 \u{FFFD}[2JSTLink"));
         assert_eq!(acm.stable_path.as_deref(), Some(Path::new("/dev/serial/by-id/usb-STLink")));
         assert_eq!(acm.problem, None);
         let problem = |port: &PortInfo| port.problem.clone().unwrap_or_default();

@@ -154,6 +154,26 @@ fn a_motor_that_does_not_answer_stays_one_that_moves() {
 }
 
 #[test]
+fn a_drives_name_does_not_command_a_terminal() {
+    let (ours, theirs) = UnixStream::pair().unwrap();
+    let link = FdLink::new(ours, "pair").unwrap();
+    let client = Client::over("pair", Box::new(link), stmcp::Options::default());
+    let drive = std::thread::spawn(move || {
+        for _ in 0..2 {
+            (&theirs).read_exact(&mut [0; 3]).unwrap();
+            let mut reply = b"\xF0\x09543\x1B[2J\tA".to_vec();
+            let sum: u32 = reply.iter().map(|&byte| u32::from(byte)).sum();
+            reply.push((sum / 256 + sum % 256) as u8);
+            (&theirs).write_all(&reply).unwrap();
+        }
+    });
+    assert_eq!(client.info().unwrap().name, "\u{FFFD}[2J\u{FFFD}A");
+    let firmware = client.firmware_version().unwrap();
+    assert_eq!((&firmware.name[..], &firmware.version[..]), ("543\u{FFFD}[2J", "A"));
+    drive.join().unwrap();
+}
+
+#[test]
 fn a_guard_follows_the_drives_current_motor() {
     let drives = Served::new("current");
     let client = open_st(&drives);

@@ -34,7 +34,7 @@ fn values(fields: &[Field], data: [u8; 8]) -> [u8; 8] {
 }
 
 #[test]
-#[cfg_attr(miri, ignore = "an interpreter takes hours")]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn every_frame_gets_the_reply_of_its_code_or_none() {
     let id = motor(3);
     for code in 0..=255 {
@@ -70,7 +70,7 @@ fn every_frame_gets_the_reply_of_its_code_or_none() {
 }
 
 #[test]
-#[cfg_attr(miri, ignore = "an interpreter takes hours")]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn only_a_reply_with_the_code_of_the_request_is_taken() {
     let id = motor(3);
     for code in 0..=255u8 {
@@ -95,7 +95,7 @@ fn kept<P: Payload>(code: u8) {
 }
 
 #[test]
-#[cfg_attr(miri, ignore = "an interpreter takes hours")]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn every_payload_keeps_what_its_fields_cover() {
     kept::<Gains>(0x30);
     kept::<Acceleration>(0x33);

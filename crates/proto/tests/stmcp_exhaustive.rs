@@ -15,7 +15,7 @@ fn payload(first: u8, length: u8) -> Vec<u8> {
 }
 
 #[test]
-#[cfg_attr(miri, ignore = "an interpreter takes hours")]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn the_slave_answers_every_header_and_length_as_the_model_does() {
     for profile in [Profile::Spec, Profile::Mcsdk54] {
         for (first, motors) in FIRST.into_iter().zip([7, 1, 3, 2]) {
@@ -42,7 +42,7 @@ fn the_slave_answers_every_header_and_length_as_the_model_does() {
 }
 
 #[test]
-#[cfg_attr(miri, ignore = "an interpreter takes hours")]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn every_register_command_and_segment_does_as_the_model_does() {
     for profile in [Profile::Spec, Profile::Mcsdk54] {
         let mut twins = Twins::new(profile, 3);
@@ -66,7 +66,7 @@ fn every_register_command_and_segment_does_as_the_model_does() {
 }
 
 #[test]
-#[cfg_attr(miri, ignore = "an interpreter takes hours")]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn the_master_takes_every_header_and_length_for_what_it_is() {
     for header in 0..=255u8 {
         for length in 0..=255u8 {

@@ -315,6 +315,7 @@ fn two_replies_that_differ_are_no_answer() {
 
 /// Flips one bit of the next request on its way, and asks twice.
 #[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn no_bit_flip_of_a_request_puts_the_line_off_by_one() {
     let write = Request::SetRegister { register: RegisterId::TORQUE_KP, value: &[0x22, 0x11] };
     for (request, size) in [(STATUS, 4), (write, 6), (Request::BoardInfo, 3)] {

@@ -14,6 +14,7 @@ use super::started::Started;
 use super::{Error, Guard, Limits, MotorHandle};
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{ByteLink, LineName, PortError, PortName};
+use crate::text::printable;
 
 /// How a [`Client`] behaves.
 #[derive(Debug, Clone, Copy, Default)]
@@ -173,7 +174,7 @@ impl Client {
     pub fn info(&self) -> Result<Info, Error> {
         self.exchange(0, &Request::BoardInfo, |payload| {
             let info = BoardInfo::decode(payload)?;
-            Some(Info { version: info.version, name: info.name.to_owned() })
+            Some(Info { version: info.version, name: printable(info.name) })
         })
     }
 
@@ -182,8 +183,8 @@ impl Client {
         self.exchange(0, &Request::FirmwareVersion, |payload| {
             let version = proto::FirmwareVersion::decode(payload);
             Some(FirmwareVersion {
-                name: version.name.to_owned(),
-                version: version.version.to_owned(),
+                name: printable(version.name),
+                version: printable(version.version),
             })
         })
     }

@@ -6,6 +6,7 @@ use motorlink_proto::stmcp::{
 };
 
 use super::Reading;
+use crate::text::printable;
 
 /// Puts the chunks of one line into words. A chunk that is not one whole frame is said to be so.
 pub struct Transcript {
@@ -111,11 +112,11 @@ impl Transcript {
             Asked::BoardInfo => {
                 let BoardInfo { version: [major, minor, patch], name } =
                     BoardInfo::decode(payload)?;
-                Some(format!("{name} {major}.{minor}.{patch}"))
+                Some(format!("{} {major}.{minor}.{patch}", printable(name)))
             }
             Asked::Version => {
                 let version = FirmwareVersion::decode(payload);
-                Some(format!("{} {}", version.name, version.version))
+                Some(printable(&format!("{} {}", version.name, version.version)))
             }
             Asked::Revup => {
                 let RevupPhase { speed_rpm, torque_s16a, duration_ms } =
@@ -141,5 +142,17 @@ mod tests {
         assert_eq!(transcript.note(true, &[0x02, 0x01, 0x1E, 0x00]), "not a frame");
         let refusal = transcript.note(false, &[0xFF, 0x01, 0x0B, 0x0C]);
         assert!(refusal.starts_with("NACK BAD_MOTOR_SELECTED"), "{refusal}");
+    }
+
+    #[test]
+    fn a_drives_name_does_not_command_a_terminal() {
+        let mut transcript = Transcript::new(Profile::Spec);
+        for code in [0x06, 0x0C] {
+            transcript.note(true, &[code, 0, code]);
+            let mut out = [0; 32];
+            let reply = Frame { header: HEADER_ACK, payload: b"\x05\x04\x03A\x1B[2J\x07" };
+            let note = transcript.note(false, reply.encode(&mut out).unwrap());
+            assert!(note.contains("[2J") && !note.contains(char::is_control), "{note:?}");
+        }
     }
 }
