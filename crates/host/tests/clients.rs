@@ -9,10 +9,11 @@ use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
 use motorlink::fault::Faults;
-use motorlink::port::{ByteLink, CanLink, FaultBytes, FdLink, PortError};
+use motorlink::port::{ByteLink, CanLink, FaultBytes, FdLink, PortError, SlcanLink};
 use motorlink::rmd::{
     self, Bus, CanFrame, CentiDps, Code, MotorId, OnDrop, SpeedLimit, TorqueCommand,
 };
+use motorlink::slcan::Bitrate;
 use motorlink::stmcp::{
     self, Client, Command, Config, Failure, Limits, Line, Request, Status, register,
 };
@@ -171,6 +172,42 @@ fn a_drives_name_does_not_command_a_terminal() {
     let firmware = client.firmware_version().unwrap();
     assert_eq!((&firmware.name[..], &firmware.version[..]), ("543\u{FFFD}[2J", "A"));
     drive.join().unwrap();
+}
+
+/// A port that never falls silent.
+struct Flood(&'static [u8]);
+
+impl ByteLink for Flood {
+    fn write(&mut self, _: &[u8]) -> Result<(), PortError> {
+        Ok(())
+    }
+    fn read(&mut self, buffer: &mut [u8], _: Option<Duration>) -> Result<usize, PortError> {
+        buffer.iter_mut().zip(self.0.iter().cycle()).for_each(|(slot, byte)| *slot = *byte);
+        Ok(buffer.len())
+    }
+}
+
+/// What `work` gives; it must come to an end.
+fn ends<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
+    let (done, result) = std::sync::mpsc::channel();
+    std::thread::spawn(move || done.send(work()));
+    result.recv_timeout(Duration::from_secs(30)).expect("it does not end")
+}
+
+#[test]
+fn a_port_that_never_falls_silent_holds_nobody_up() {
+    for noise in [&b"x"[..], b"z\r", b"\x07", b"t1418A100000000000000\r", b"\xF0\x00\xF0"] {
+        let line = Config { timeout: Duration::from_millis(50).into(), ..Config::default() };
+        let options = stmcp::Options { line, ..stmcp::Options::default() };
+        let client = Client::over("flood", Box::new(Flood(noise)), options);
+        ends(move || [client.info().is_ok(), client.info().is_ok()]);
+        let Ok(adapter) = ends(|| SlcanLink::open(Flood(noise), "flood", Bitrate::DEFAULT)) else {
+            continue;
+        };
+        let bus = Bus::over("flood", Box::new(adapter), rmd::Options::default());
+        std::thread::sleep(Duration::from_millis(5));
+        ends(move || assert!(bus.motor(2).unwrap().off().is_err()));
+    }
 }
 
 #[test]

@@ -157,4 +157,9 @@ impl Deadline {
     fn is_over(self) -> bool {
         self.remaining() == Some(Duration::ZERO)
     }
+
+    /// Whether it was over `span` ago.
+    fn is_over_since(self, span: Duration) -> bool {
+        self.0.is_some_and(|end| end.elapsed() > span)
+    }
 }

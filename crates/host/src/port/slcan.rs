@@ -10,6 +10,8 @@ use crate::slcan::{Answer, Bitrate, HostCodec, LONGEST_FRAME, encode};
 /// How long an adapter may take to answer a command while it is opened. Many never answer some of
 /// them, so silence is no failure.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(60);
+/// How long after the end of a wait an adapter may go on sending what is not waited for.
+const BABBLE: Duration = Duration::from_millis(100);
 
 /// Refusals without anything else between them that are more than a full queue.
 const REFUSALS: u32 = 2;
@@ -92,8 +94,11 @@ impl<B: ByteLink> SlcanLink<B> {
         Ok(answers)
     }
 
-    /// Reads more bytes into the codec; false when none came in time.
+    /// Reads more bytes into the codec; false when none came in time, or when they do not end.
     fn fill(&mut self, deadline: Deadline) -> Result<bool, PortError> {
+        if deadline.is_over_since(BABBLE) {
+            return Ok(false);
+        }
         let len = self.line.read(self.codec.spare(), deadline.remaining())?;
         self.codec.filled(len);
         Ok(len > 0)

@@ -52,11 +52,11 @@ pub enum Found {
     Echo(MotorId),
 }
 
-/// More frames than a port holds: who sends as fast as they are read is not waited for.
-const BACKLOG: usize = 4096;
-
 /// How long a motor in doubt may go on talking.
 const SETTLE_LIMIT: Duration = Duration::from_secs(2);
+
+/// How long what came meanwhile may go on coming.
+const BABBLE: Duration = Duration::from_millis(100);
 
 /// IDs that a scan asks at once.
 const SCAN_WIDTH: usize = 8;
@@ -302,12 +302,16 @@ impl Inner {
         let now = self.port.now();
         let (link, _) = self.port.link()?;
         // What came meanwhile is late or unasked; left in the port it would pass for a reply.
-        for _ in 0..BACKLOG {
+        let begun = Moment::now();
+        loop {
             match link.receive(Some(Duration::ZERO)) {
+                // A bus that is never silent has to do: an Off must get through.
+                Ok(Some(_)) if begun.elapsed() > BABBLE => break,
                 Ok(Some(frame)) => take(now, &frame, &mut self.host, &mut self.doubts),
                 Ok(None) => break,
                 Err(error) => return Err(self.closed(error)),
             }
+        }
         }
         let now = self.port.now();
         for id in self.host.busy() {
