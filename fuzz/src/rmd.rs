@@ -63,7 +63,12 @@ pub fn frame(data: &[u8]) {
 /// A host under any sequence of calls and frames, with time going on.
 pub fn host(data: &[u8]) {
     let mut input = Input::new(data);
-    let mut bench = HostBench { host: Host::new(), now: Instant(0), torque4: None };
+    let mut bench = HostBench {
+        host: Host::new(),
+        now: Instant(0),
+        codes: [0; MotorId::COUNT + 1],
+        torque4: None,
+    };
     while let Some(operation) = input.operation() {
         let id = MotorId::new(input.byte() % 32 + 1).expect("1 to 32");
         match operation % 12 {
@@ -75,6 +80,9 @@ pub fn host(data: &[u8]) {
                 assert!(!(busy && taken.is_ok()), "two exchanges with a motor");
                 assert!(limits.check(&data).is_ok() || taken.is_err(), "a limit was passed");
                 assert!(taken.is_err() || bench.host.busy().contains(id));
+                if taken.is_ok() {
+                    bench.codes[usize::from(id.number())] = data[0];
+                }
             }
             3 => bench.torque4(input.byte(), &input.array()),
             4 | 5 => bench.host.receive(&any_frame(&mut input)),
@@ -112,6 +120,8 @@ pub fn host(data: &[u8]) {
 struct HostBench {
     host: Host,
     now: Instant,
+    /// What each motor was asked last.
+    codes: [u8; MotorId::COUNT + 1],
     torque4: Option<[u8; 8]>,
 }
 
@@ -124,6 +134,7 @@ impl HostBench {
             assert!(torques.0.iter().all(|torque| torque.0.unsigned_abs() <= 2000));
             assert!(expected.without(MotorSet::TORQUE4).is_empty());
             self.torque4 = Some(*data);
+            expected.for_each(|id| self.codes[usize::from(id.number())] = Code::Torque.into());
         }
     }
 
@@ -141,8 +152,11 @@ impl HostBench {
                         }
                     }
                 }
-                Output::Done { id, .. } => {
+                Output::Done { id, result } => {
                     assert!(busy.contains(id), "done with nothing");
+                    let asked = self.codes[usize::from(id.number())];
+                    let fits = |[code, ..]: [u8; 8]| code == asked || (asked, code) == (0x9B, 0x9A);
+                    assert!(result.is_err() || result.is_ok_and(fits), "another's reply");
                     assert!(!self.host.busy().contains(id), "done and busy");
                 }
                 Output::Wait(None) => {

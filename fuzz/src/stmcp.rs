@@ -69,6 +69,9 @@ fn message(profile: Profile, frame: &Frame<'_>) {
     assert!(frame.payload.starts_with(same.payload), "what follows a message is dropped");
 }
 
+/// What recovery asks: GET_BOARD_INFO, and GET_REVUP_DATA of phase 0.
+const QUESTIONS: [&[u8]; 2] = [&[0x06, 0x00, 0x06], &[0x08, 0x01, 0x00, 0x09]];
+
 /// A master under any sequence of calls, with time going on.
 pub fn master(data: &[u8]) {
     let mut input = Input::new(data);
@@ -78,8 +81,11 @@ pub fn master(data: &[u8]) {
     let mut bench = MasterBench {
         master: Master::new(Config { timeout, recovery, quiet }),
         now: Instant(0),
+        recovery,
         asked: None,
         sent: false,
+        lost: false,
+        heard: false,
     };
     while let Some(operation) = input.operation() {
         match operation % 10 {
@@ -111,9 +117,14 @@ pub fn master(data: &[u8]) {
 struct MasterBench {
     master: Master,
     now: Instant,
+    recovery: Recovery,
     /// The frame of the exchange under way.
     asked: Option<Vec<u8>>,
     sent: bool,
+    /// The line was lost when the exchange began.
+    lost: bool,
+    /// Something came since then.
+    heard: bool,
 }
 
 impl MasterBench {
@@ -142,7 +153,8 @@ impl MasterBench {
             (Ok(()), bytes) => {
                 assert!(self.asked.is_none(), "two exchanges at a time");
                 self.asked = Some(bytes.expect("it was taken, so it fits a frame"));
-                self.sent = false;
+                self.lost = self.master.line() == Line::Lost;
+                (self.sent, self.heard) = (false, false);
             }
         }
     }
@@ -150,6 +162,7 @@ impl MasterBench {
     /// Bytes from the line, whatever they are.
     fn receive(&mut self, bytes: &[u8]) {
         let before = self.master.counters();
+        self.heard |= !bytes.is_empty();
         self.master.receive(self.now, bytes);
         let unasked = self.master.counters().unasked_bytes - before.unasked_bytes;
         assert!(unasked as usize <= bytes.len() + MAX_FRAME);
@@ -172,6 +185,11 @@ impl MasterBench {
                     let asked = self.asked.as_deref().expect("nothing is sent unasked");
                     assert!(!bytes.is_empty() && bytes.len() <= MAX_FRAME + 1);
                     self.sent |= bytes == asked;
+                    // A line that does not answer is asked questions and told to stop, no more.
+                    let stop = matches!(bytes, [header, 1, 2, _] if header & 0x1F == 3);
+                    let harmless = stop || bytes[0] == 0xFF || QUESTIONS.contains(&bytes);
+                    assert!(!self.lost || self.recovery != Recovery::None, "sent into a lost line");
+                    assert!(!self.lost || self.heard || harmless, "{bytes:02x?} is sent unheard");
                 }
                 Output::Done(result) => {
                     assert!(self.asked.take().is_some(), "done with nothing");
