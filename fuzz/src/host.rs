@@ -3,6 +3,7 @@
 use motorlink::port::{PortName, ServeName};
 use motorlink::sim::{Bench, BenchConfig};
 use motorlink::slcan::{self, Answer, Device, HostCodec};
+use motorlink::stmcp::{Profile, Reading, RegisterId, find_register, parse_value};
 use motorlink_proto::rmd::{self, CanFrame, Command as _, MotorId};
 use motorlink_proto::stmcp::{self as st, MAX_FRAME, Request};
 use motorlink_proto::time::Instant;
@@ -59,6 +60,32 @@ pub fn port_name(data: &[u8]) {
     match text.parse::<ServeName>() {
         Ok(name) => assert_eq!(name.to_string().parse(), Ok(name)),
         Err(error) => assert!(error.to_string().contains(text)),
+    }
+}
+
+/// Any text as a register and as a value of any register: what is taken is a number of its type, and
+/// is taken again as it is shown.
+pub fn st_value(data: &[u8]) {
+    let mut input = Input::new(data);
+    let (register, flags) = (RegisterId(input.byte()), input.byte());
+    let Ok(text) = std::str::from_utf8(input.rest()) else { return };
+    if let Ok(found) = find_register(text) {
+        assert_eq!(find_register(&found.to_string()), Ok(found));
+    }
+    let profile = [Profile::Spec, Profile::Mcsdk54][usize::from(flags & 1)];
+    let raw = flags & 2 != 0;
+    match parse_value(register, text, profile, raw) {
+        Err(error) => assert!(error.to_string().contains(text)),
+        Ok(bits) => {
+            let reading = Reading { register, bits, profile };
+            assert!(!reading.to_string().is_empty());
+            let value = reading.value();
+            assert!(raw || value.is_finite(), "{text} became {value}");
+            let shown = if raw { reading.digits().to_string() } else { value.to_string() };
+            let again = parse_value(register, &shown, profile, raw);
+            let same = again.map(|bits| Reading { register, bits, profile }.value());
+            assert!(raw && !value.is_finite() || same == Ok(value), "{text}: {shown}");
+        }
     }
 }
 

@@ -15,6 +15,10 @@ impl<'a> Input<'a> {
         Some(first)
     }
 
+    pub fn rest(&self) -> &'a [u8] {
+        self.0
+    }
+
     pub fn byte(&mut self) -> u8 {
         self.operation().unwrap_or(0)
     }

@@ -25,6 +25,7 @@ pub const TARGETS: &[Target] = &[
     ("rmd_drive", rmd::drive),
     ("slcan", host::slcan),
     ("port_name", host::port_name),
+    ("st_value", host::st_value),
     ("sim_config", host::sim_config),
     ("sim_command", host::sim_command),
 ];

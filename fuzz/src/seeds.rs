@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use motorlink::slcan;
 use motorlink_proto::rmd::{CanFrame, TORQUE4_ID};
+use motorlink_proto::stmcp::RegisterId;
 use motorlink_sim::{rmd::RmdConfig, st::MotorConfig};
 use serde_json::Value;
 
@@ -50,6 +51,7 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "rmd_drive" => rmd().map(|(id, data)| drive(id, data)).collect(),
         "slcan" => rmd().map(|(id, data)| adapter(id, data)).collect(),
         "port_name" => PORTS.iter().map(|name| name.as_bytes().to_vec()).collect(),
+        "st_value" => values(),
         "sim_config" => configurations(),
         "sim_command" => commands(),
         _ => panic!("there is no target {target}"),
@@ -145,6 +147,18 @@ fn adapter(id: u16, data: [u8; 8]) -> Vec<u8> {
     let mut seed = b"\x10C\rS8\rZ1\rO\r".to_vec();
     seed.extend(slcan::encode(&CanFrame::new(id, data), &mut [0; slcan::LONGEST_FRAME]));
     seed
+}
+
+/// A value of each register, in units and in digits, and the register's name.
+fn values() -> Vec<Vec<u8>> {
+    let texts = ["-1500", "0x1F", "98.5", "1e39", "SPEED", "I_ALPHA"];
+    let each = RegisterId::all().zip(texts.into_iter().cycle());
+    each.flat_map(|(id, text)| {
+        let name = id.to_string();
+        [(0, text), (3, text), (1, &name[..])]
+            .map(|(flags, text)| [&[id.0, flags], text.as_bytes()].concat())
+    })
+    .collect()
 }
 
 /// What docs/SIMULATOR.md shows, and every member there is.

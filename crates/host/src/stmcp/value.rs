@@ -162,7 +162,7 @@ pub fn parse_value(
     if let Some(bits) = named_value(register, text) {
         return Ok(bits);
     }
-    let ty = register.shape().map_or(Type::I32, |shape| shape.ty);
+    let ty = register.shape().map(|shape| shape.ty);
     let not_a_value =
         || ValueError::NotAValue { text: text.to_owned(), register, usable: usable(register) };
     let value = match number(text) {
@@ -171,17 +171,21 @@ pub fn parse_value(
             text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(not_a_value)?
         }
     };
-    if ty == Type::F32 && !raw {
-        return Ok((value as f32).to_bits() as i32);
-    }
-    let scale = if raw { 1.0 } else { scale(register, profile) };
-    let digits = value / scale;
-    let (least, most) = range(ty);
     let unit = match unit(register) {
         "" => String::new(),
         unit => format!(" {unit}"),
     };
     let text = text.to_owned();
+    if ty == Some(Type::F32) && !raw {
+        let (least, most) = (f32::MIN.into(), f32::MAX.into());
+        return match value as f32 {
+            value if value.is_finite() => Ok(value.to_bits() as i32),
+            _ => Err(ValueError::OutOfRange { text, register, least, most, unit }),
+        };
+    }
+    let scale = if raw { 1.0 } else { scale(register, profile) };
+    let digits = value / scale;
+    let (least, most) = range(ty);
     if digits < least as f64 || digits > most as f64 {
         let (least, most) = (least as f64 * scale, most as f64 * scale);
         return Err(ValueError::OutOfRange { text, register, least, most, unit });
@@ -192,7 +196,8 @@ pub fn parse_value(
     Ok(digits.round() as i64 as i32)
 }
 
-fn range(ty: Type) -> (i64, i64) {
+fn range(ty: Option<Type>) -> (i64, i64) {
+    let Some(ty) = ty else { return (i32::MIN.into(), u32::MAX.into()) };
     match ty {
         Type::I8 => (i8::MIN.into(), i8::MAX.into()),
         Type::U8 => (0, u8::MAX.into()),
@@ -277,6 +282,12 @@ mod tests {
         assert!(parse(RegisterId::SPEED_KP, "fast").is_err());
         assert!(parse(RegisterId::SPEED_KP, "NaN").is_err());
         assert!(matches!(parse(RegisterId::SPEED_KP, "3.7"), Err(ValueError::Between { .. })));
+        let current = parse(RegisterId::SC_CURRENT, "1e39");
+        assert!(matches!(current, Err(ValueError::OutOfRange { .. })), "{current:?}");
+        assert_eq!(parse(RegisterId::SC_CURRENT, "0.25"), Ok(0.25f32.to_bits() as i32));
+        // Nobody knows the sign of an unnamed register.
+        assert_eq!(parse(RegisterId(0xC0), "0xFFFFFFFF"), Ok(-1));
+        assert_eq!(parse(RegisterId(0xC0), "-1"), Ok(-1));
         assert_eq!(parse(RegisterId::CONTROL_MODE, "speed"), Ok(1));
         assert_eq!(parse(RegisterId::DAC_OUT2, "I_ALPHA"), Ok(0x25));
         let tenths = parse_value(RegisterId::FLUXWK_BUS, "98.5", Profile::Mcsdk54, false);
