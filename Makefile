@@ -1,9 +1,12 @@
-# make demo   simulated drives, driven through real ports
-# make test   everything that is tested, with what it needs installed first
-# make docs   writes the tables of docs/CONFORMANCE.md anew
-# make soak   a million exchanges with reconnects, some minutes
-# make bench  ratios and instruction counts, as in docs/BENCHMARKS.md
-# make reliability  both protocols through lines that misbehave, into docs/RELIABILITY.md
+# make demo            simulated drives, driven through real ports
+# make test            everything that is tested, with what it needs installed first
+# make test-socketcan  the part of it that needs a CAN kernel, which runs in QEMU
+# make fuzz            every fuzz target for SECONDS=60 each
+# make soak            a million exchanges with reconnects, some minutes
+# make bench           ratios and instruction counts, as in docs/BENCHMARKS.md
+# make reliability     both protocols through lines that misbehave, into docs/RELIABILITY.md
+# make docs            writes the tables of docs/CONFORMANCE.md anew
+# make semver          the public interface against the last release
 
 CARGO ?= cargo
 PYTHON ?= python3
@@ -12,22 +15,63 @@ TARGET := thumbv7em-none-eabihf
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 SOCKETCAN := CARGO="$(CARGO)" SUDO="$(SUDO)" tests/socketcan/run.sh
 
-.PHONY: demo test lint unit probe e2e bench docs reliability test-socketcan soak fmt clean
+SECONDS ?= 60
+
+.PHONY: demo test lint deny unit fuzz-replay miri probe e2e test-socketcan
+.PHONY: fuzz soak bench reliability docs semver fmt clean
 
 demo:
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
 # Last, so that what was not tested is said last.
-test: lint unit probe e2e
+test: lint deny unit fuzz-replay miri probe e2e
 	$(SOCKETCAN) || [ $$? -eq 77 ]
 
 lint:
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
+	cd fuzz && $(CARGO) fmt --check && $(CARGO) clippy --all-targets --locked -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked --quiet
 
 unit:
 	$(CARGO) test --workspace --all-features --locked
+
+# What fuzzing found, and its seeds, on every target.
+fuzz-replay:
+	cd fuzz && $(CARGO) test --locked --quiet
+
+# make fuzz SECONDS=600   every fuzz target for so long, one after the other
+fuzz:
+	rustup run nightly rustc --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal
+	command -v cargo-fuzz >/dev/null || $(CARGO) install --locked cargo-fuzz
+	fuzz/run $(SECONDS)
+
+# proto's tests in an interpreter that sees undefined behaviour, with few cases a property.
+miri:
+	@rustup run nightly cargo miri --version >/dev/null 2>&1 || \
+		rustup toolchain install nightly --profile minimal --component miri --component rust-src || \
+		{ echo "MIRI DID NOT RUN: there is no nightly toolchain, and it cannot be installed" >&2; exit 0; }; \
+	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
+		$(CARGO) +nightly miri test -p motorlink-proto --locked
+
+# Licences, duplicates and sources of every dependency; known holes where their list can be had.
+deny:
+	command -v cargo-deny >/dev/null || $(CARGO) install --locked cargo-deny
+	@checks="licenses bans sources"; \
+	if $(CARGO) deny fetch db >/dev/null 2>&1; then checks="$$checks advisories"; \
+	else echo "ADVISORIES WERE NOT CHECKED: github.com/RustSec/advisory-db cannot be reached" >&2; fi; \
+	for manifest in Cargo.toml fuzz/Cargo.toml probe/Cargo.toml; do \
+		echo "$$manifest: $$checks"; \
+		$(CARGO) deny --manifest-path $$manifest --config deny.toml check $$checks || exit; \
+	done
+
+# The public interface against the last release: breaks that its version number does not allow.
+semver:
+	@release=$$(git describe --tags --abbrev=0 --match 'v[0-9]*' 2>/dev/null) || \
+		{ echo "there is no release yet (no tag v*) to compare with"; exit 0; }; \
+	command -v cargo-semver-checks >/dev/null || $(CARGO) install --locked cargo-semver-checks || exit; \
+	$(CARGO) semver-checks --baseline-rev $$release \
+		-p motorlink-proto -p motorlink-sim -p motorlink --all-features
 
 # Both protocols link for a Cortex-M4 without a path that panics, within their RAM.
 probe:
@@ -65,7 +109,7 @@ fmt:
 
 clean:
 	$(CARGO) clean
-	rm -rf $(VENV) probe/target
+	rm -rf $(VENV) probe/target fuzz/target
 
 $(VENV)/ready: tests/e2e/requirements.txt
 	$(PYTHON) -m venv $(VENV) || { \

@@ -8,6 +8,7 @@ use motorlink_proto::rmd::{self, CanFrame, Command as _, MotorId};
 use motorlink_proto::stmcp::{self as st, MAX_FRAME, Request};
 use motorlink_proto::time::Instant;
 use motorlink_proto::units::CentiDps;
+use motorlink_sim::rmd::RmdConfig;
 
 use crate::input::Input;
 
@@ -94,7 +95,8 @@ pub fn sim_config(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(config) = BenchConfig::parse(text) else { return };
     let mut station = config.station(Instant(0)).expect("what was taken can be built");
-    let mut bus = config.bus(Instant(0)).expect("what was taken can be built");
+    let mut bus =
+        config.bus(Instant(0), RmdConfig::factory_rom).expect("what was taken can be built");
     for number in 1..=station.drive().last().number() {
         for request in [Request::Execute(st::Command::StartMotor), Request::BoardInfo] {
             let mut out = [0; MAX_FRAME];

@@ -403,26 +403,6 @@ fn the_answer_of_a_motor_in_doubt_is_nobodys_reply() {
     assert_eq!(bus.raw(id, requests[0].1).unwrap()[0], 0x9C);
 }
 
-/// Another motor's frames, as fast as they are read.
-struct Flood;
-
-impl CanLink for Flood {
-    fn send(&mut self, _frame: &CanFrame) -> Result<(), PortError> {
-        Ok(())
-    }
-
-    fn receive(&mut self, _timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        Ok(Some(CanFrame::new(0x149, [0x9C; 8])))
-    }
-}
-
-#[test]
-fn a_bus_that_never_falls_silent_does_not_hold_a_request_up() {
-    let bus = Bus::over("flood", Box::new(Flood), rmd::Options::default());
-    let reply = bus.raw(MotorId::new(1).unwrap(), [0x9C, 0, 0, 0, 0, 0, 0, 0]);
-    assert!(matches!(reply, Err(rmd::Error::Timeout { .. })), "{reply:?}");
-}
-
 #[test]
 fn a_guard_switches_off_what_a_bus_was_used_to_move() {
     let drives = Served::new("guard-rmd");

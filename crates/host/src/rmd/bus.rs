@@ -312,7 +312,6 @@ impl Inner {
                 Err(error) => return Err(self.closed(error)),
             }
         }
-        }
         let now = self.port.now();
         for id in self.host.busy() {
             self.host.cancel(now, id);
