@@ -45,6 +45,9 @@ pub enum Stop {
     /// The case does not apply to this drive, or cannot be run; why.
     #[error("{0}")]
     Skipped(String),
+    /// Nothing more is to be tried on this drive; why.
+    #[error("{0}")]
+    Unfit(String),
     /// The port failed: nothing is known about the drive.
     #[error(transparent)]
     Port(#[from] PortError),
@@ -99,8 +102,8 @@ impl<B> Case<B> {
     }
 }
 
-/// Puts a drive through the cases; `progress` sees each outcome as it comes. When the port fails the
-/// rest is not run, and the report says so.
+/// Puts a drive through the cases; `progress` sees each outcome as it comes. When the port fails or
+/// the drive turns out unfit the rest is not run, and the report says so.
 pub fn run<B: Subject>(
     cases: &[Case<B>],
     bench: &mut B,
@@ -142,6 +145,13 @@ fn conduct<B: Subject>(case: &Case<B>, bench: &mut B) -> Verdict {
     match (outcome, restored) {
         (Err(Stop::Port(error)), _) | (_, Err(Stop::Port(error))) => {
             Verdict::NotRun(error.to_string())
+        }
+        (Err(Stop::Unfit(why)), _) | (_, Err(Stop::Unfit(why))) => Verdict::NotRun(why),
+        (Err(Stop::Failed(mut finding)), Err(Stop::Failed(left))) => {
+            let Finding { expected, received, .. } = *left;
+            finding.received +=
+                &format!("; and it is not as it was: expected {expected}, received {received}");
+            Verdict::Failed(finding)
         }
         (Err(Stop::Failed(finding)), _) | (_, Err(Stop::Failed(finding))) => {
             Verdict::Failed(finding)

@@ -67,6 +67,14 @@ impl Report {
         self.outcomes.iter().filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)))
     }
 
+    /// Why cases were not run, if any.
+    pub fn not_run(&self) -> Option<&str> {
+        self.outcomes.iter().find_map(|outcome| match &outcome.verdict {
+            Verdict::NotRun(why) => Some(why.as_str()),
+            _ => None,
+        })
+    }
+
     /// The report as one JSON object.
     pub fn to_json(&self) -> Value {
         let cases: Vec<Value> = self.outcomes.iter().map(Outcome::to_json).collect();

@@ -84,13 +84,16 @@ fn verdict(report: &Report) -> Result<(), Failure> {
     if report.is_clean() {
         return Ok(());
     }
-    match report.count("not run") {
-        0 => Err(Failure::Refused(format!(
+    match report.not_run() {
+        None => Err(Failure::Refused(format!(
             "{} of {} cases failed: the drive does not do what its document says",
             report.failed().count(),
             report.outcomes.len()
         ))),
-        count => Err(Failure::Line(format!("the port failed: {count} cases were not run"))),
+        Some(why) => {
+            let count = report.count("not run");
+            Err(Failure::Line(format!("{why}: {count} cases were not run")))
+        }
     }
 }
 

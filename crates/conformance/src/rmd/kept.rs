@@ -1,0 +1,210 @@
+//! What a motor is when a case begins, and how it becomes that again.
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::Duration;
+use motorlink_proto::units::DpsPerSecond;
+
+use super::bench::{Bench, PATIENCE};
+use crate::case::{Need, Stop};
+use crate::world::Unavailable;
+
+/// What was found and is put back, where a case touched it.
+#[derive(Debug, Default)]
+pub(super) struct Kept {
+    gains: Option<Gains>,
+    acceleration: Option<DpsPerSecond>,
+    /// The gains in ROM.
+    rom_gains: Option<Gains>,
+    offset: Option<u16>,
+    fault: bool,
+    moved: bool,
+    /// Other motors that may have moved.
+    others: MotorSet,
+}
+
+/// A motor this slow (°/s) is at rest.
+const REST: u16 = 5;
+/// A motor with less torque current than this (digits: half an ampere) is at rest.
+const CURRENTLESS: u16 = 31;
+/// How long a motor may take to come to rest, ms.
+const COASTING: u64 = 10_000;
+/// How long a motor may take until it answers when its power came back, ms.
+const STARTING: u64 = 5_000;
+
+impl Bench {
+    /// Waits until the motor is at rest. One that never is, is not tested: what turns it is not
+    /// this kit's to stop.
+    pub(super) fn at_rest(&mut self) -> Result<(), Stop> {
+        let begun = self.millis();
+        loop {
+            let status = self.status_of_somebody()?;
+            let (speed, iq) = (status.speed, status.iq);
+            if speed.0.unsigned_abs() <= REST && iq.0.unsigned_abs() <= CURRENTLESS {
+                return Ok(());
+            }
+            if self.millis() - begun > COASTING {
+                return Err(Stop::Unfit(format!(
+                    "motor {} is not at rest: it turns at {speed} with {:.1} A; switch it off first",
+                    self.id(),
+                    iq.amps()
+                )));
+            }
+            self.pause(Duration::from_millis(50))?;
+        }
+    }
+
+    /// Status 2, of a motor that may not be there.
+    fn status_of_somebody(&mut self) -> Result<MotionStatus, Stop> {
+        match self.read(ReadStatus2) {
+            Err(Stop::Failed(_)) if !self.heard && self.foreign.is_none() => Err(Stop::Unfit(
+                format!("motor {} does not answer; `motorlink rmd scan` tells who does", self.id()),
+            )),
+            other => other,
+        }
+    }
+
+    /// The gains; remembers them.
+    pub(super) fn keep_gains(&mut self) -> Result<Gains, Stop> {
+        let gains = self.read(ReadGains)?;
+        self.kept.gains.get_or_insert(gains);
+        Ok(gains)
+    }
+
+    /// The acceleration limit; remembers it.
+    pub(super) fn keep_acceleration(&mut self) -> Result<DpsPerSecond, Stop> {
+        let acceleration = self.read(ReadAcceleration)?.acceleration;
+        self.kept.acceleration.get_or_insert(acceleration);
+        Ok(acceleration)
+    }
+
+    /// The gains in ROM, as far as they can be known: those that a power-on brings, or without one
+    /// those that are in force. Remembers them.
+    pub(super) fn keep_rom_gains(&mut self) -> Result<Gains, Stop> {
+        self.keep_gains()?;
+        if self.options.allowed.contains(&Need::PowerCycle) {
+            self.power_cycle()?;
+        }
+        let gains = self.read(ReadGains)?;
+        self.kept.rom_gains.get_or_insert(gains);
+        Ok(gains)
+    }
+
+    /// What the encoder reads; remembers its offset.
+    pub(super) fn keep_offset(&mut self) -> Result<Encoder, Stop> {
+        let encoder = self.read(ReadEncoder)?;
+        self.kept.offset.get_or_insert(encoder.offset);
+        Ok(encoder)
+    }
+
+    /// From here on the motor may turn, and is switched off in the end.
+    pub(super) fn may_move(&mut self) {
+        self.kept.moved = true;
+    }
+
+    /// These motors may move, too.
+    pub(super) fn may_move_too(&mut self, motors: MotorSet) {
+        self.kept.others = self.kept.others.union(motors);
+    }
+
+    /// Takes the motor's power away and gives it back.
+    pub(super) fn power_cycle(&mut self) -> Result<(), Stop> {
+        self.keep_gains()?;
+        self.keep_acceleration()?;
+        self.cycle()
+    }
+
+    fn cycle(&mut self) -> Result<(), Stop> {
+        self.world.power_cycle()?;
+        let begun = self.millis();
+        while self.answers(&[self.frame(ReadStatus1.encode())])?.is_empty() {
+            self.require(self.millis() - begun < STARTING, "an answer within 5 s of power-on")?;
+        }
+        Ok(())
+    }
+
+    /// Makes a fault condition present, or ends it.
+    pub(super) fn fault(&mut self, present: bool) -> Result<(), Stop> {
+        self.kept.fault = true;
+        self.world.fault(present)?;
+        // What is around a motor changes more slowly than what is on its bus.
+        self.pause(PATIENCE)
+    }
+
+    /// Switches off what was moved, ends a fault, writes back what was written. Each is tried
+    /// whatever came of the others.
+    pub(super) fn put_back(&mut self) -> Result<(), Stop> {
+        let kept = std::mem::take(&mut self.kept);
+        if self.foreign.is_some() {
+            return Ok(());
+        }
+        let off = if kept.moved { self.switch_off() } else { Ok(()) };
+        let others = kept.others.map(|motor| CanFrame::new(motor.can_id(), Off.encode()));
+        self.collect(&others.collect::<Vec<_>>())?;
+        let fault = if kept.fault { self.end_fault() } else { Ok(()) };
+        let rom = self.put_back_rom(&kept);
+        let gains = kept.gains.map_or(Ok(()), |gains| self.put_back_gains(gains));
+        let acceleration = kept.acceleration.map_or(Ok(()), |a| self.put_back_acceleration(a));
+        off.and(fault).and(rom).and(gains).and(acceleration)
+    }
+
+    fn switch_off(&mut self) -> Result<(), Stop> {
+        let mut done = Ok([0; 8]);
+        for _ in 0..3 {
+            done = self.ask(Off.encode());
+            if done.is_ok() {
+                break;
+            }
+        }
+        done.map(|_| ())
+    }
+
+    fn end_fault(&mut self) -> Result<(), Stop> {
+        self.world.fault(false).map_err(|Unavailable(why)| {
+            self.failed(format!("the fault to be ended; end it by hand ({why})"))
+        })?;
+        self.pause(PATIENCE)?;
+        self.read(ClearErrors).map(|_| ())
+    }
+
+    fn put_back_rom(&mut self, kept: &Kept) -> Result<(), Stop> {
+        if kept.rom_gains.is_none() && kept.offset.is_none() {
+            return Ok(());
+        }
+        if let Some(gains) = kept.rom_gains {
+            self.ask(WriteGainsToRom(gains).encode())?;
+        }
+        if let Some(offset) = kept.offset {
+            self.read(WriteEncoderOffset(EncoderOffset { offset }))?;
+        }
+        if self.options.allowed.contains(&Need::PowerCycle) {
+            self.cycle()?;
+        }
+        if let Some(gains) = kept.rom_gains {
+            let read = self.read(ReadGains)?;
+            self.require(read == gains, format!("the gains in ROM as they were: {gains:?}"))?;
+        }
+        if let Some(offset) = kept.offset {
+            let read = self.read(ReadEncoder)?.offset;
+            self.require(read == offset, format!("the offset as it was: {offset}"))?;
+        }
+        Ok(())
+    }
+
+    fn put_back_gains(&mut self, gains: Gains) -> Result<(), Stop> {
+        if self.read(ReadGains)? != gains {
+            self.ask(WriteGains(gains).encode())?;
+            let read = self.read(ReadGains)?;
+            self.require(read == gains, format!("the gains as they were: {gains:?}"))?;
+        }
+        Ok(())
+    }
+
+    fn put_back_acceleration(&mut self, acceleration: DpsPerSecond) -> Result<(), Stop> {
+        if self.read(ReadAcceleration)?.acceleration != acceleration {
+            self.ask(WriteAcceleration(Acceleration { acceleration }).encode())?;
+            let read = self.read(ReadAcceleration)?.acceleration;
+            self.require(read == acceleration, format!("the limit as it was: {acceleration}"))?;
+        }
+        Ok(())
+    }
+}

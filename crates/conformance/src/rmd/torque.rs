@@ -1,0 +1,100 @@
+//! Torque current (0xA1).
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::Duration;
+use motorlink_proto::units::{PhaseCurrent, TorqueCommand, TorqueFeedback};
+
+use super::bench::Bench;
+use super::case;
+use super::status::phases;
+use crate::case::{Case, Need, Stop};
+
+/// One ampere of torque current, digits of a command: next to nothing for motors of this family.
+pub(super) const AMPERE: i16 = 62;
+/// The most that is tried to get a motor off its friction, digits.
+const MOST: i16 = 2 * AMPERE;
+
+pub(super) fn cases() -> Vec<Case<Bench>> {
+    vec![
+        case(
+            "torque_has_the_sign_of_its_command",
+            &["RMD-A1-01", "RMD-A1-07", "RMD-A1-08"],
+            |bench| {
+                let clockwise = break_away(bench, 1)?;
+                let counterclockwise = break_away(bench, -1)?;
+                let apart = clockwise.signum() != counterclockwise.signum();
+                bench.require(apart, "movement the other way under torque of the other sign")
+            },
+        ),
+        case("a_torque_digit_is_16_milliamperes", &["RMD-A1-02"], |bench| {
+            let (amps, _) = pulses(bench, one)?;
+            torque_is_an_ampere(bench, amps)
+        }),
+        case("phase_currents_have_64_digits_an_ampere", &["RMD-9D-05"], |bench| {
+            let (_, amps) = pulses(bench, one)?;
+            // Relatives name the amplitude or the effective value of the same current.
+            let words = format!("phase currents of about 1 A under 1 A of torque, not {amps:.2} A");
+            bench.require((0.6..1.6).contains(&amps), words)
+        }),
+    ]
+    .into_iter()
+    .map(|case| case.needs(&[Need::Spin]))
+    .collect()
+}
+
+/// The request with this torque for the motor under test.
+fn one(bench: &Bench, torque: i16) -> CanFrame {
+    bench.frame(Torque { torque: TorqueCommand(torque) }.encode())
+}
+
+/// Raises the torque until the motor turns; by how much it turned, 0.01°.
+fn break_away(bench: &mut Bench, sign: i16) -> Result<i64, Stop> {
+    let start = bench.angle()?;
+    let mut turned = 0;
+    let mut iq = 0;
+    for digits in (5..=MOST).step_by(5) {
+        bench.command(Torque { torque: TorqueCommand(sign * digits) })?;
+        let turns = bench.watch(50, |seen| {
+            (turned, iq) = (seen.angle - start, seen.iq);
+            turned.abs() > 100
+        })?;
+        if turns {
+            let told = digits < 10 || iq * sign > 0;
+            bench.require(told, format!("torque current with the sign of {}", sign * digits))?;
+            bench.ask(Off.encode())?;
+            bench.comes_to_a_stand(5_000)?;
+            return Ok(turned);
+        }
+    }
+    bench.ask(Off.encode())?;
+    let amps = TorqueFeedback(iq * sign).amps();
+    bench.require((1.5..2.5).contains(&amps), format!("about 2 A or movement, not {amps:.2} A"))?;
+    Err(Stop::Skipped("the motor does not turn under 2 A: its load holds it".to_owned()))
+}
+
+/// Torque of an ampere this way and that way, so shortly that the motor hardly turns; torque and
+/// phase current that are then read, A.
+pub(super) fn pulses(
+    bench: &mut Bench,
+    request: impl Fn(&Bench, i16) -> CanFrame,
+) -> Result<(f64, f64), Stop> {
+    const PULSES: i16 = 10;
+    const SETTLES: Duration = Duration::from_millis(5);
+    bench.may_move();
+    let (mut torque, mut phase) = (0.0, 0.0);
+    for sign in (0..PULSES).map(|n| if n % 2 == 0 { 1 } else { -1 }) {
+        let frame = request(bench, sign * AMPERE);
+        bench.ask_frame(&frame)?;
+        bench.pause(SETTLES)?;
+        torque += f64::from(sign) * bench.read(ReadStatus2)?.iq.amps();
+        let squares: f64 = phases(bench)?.iter().map(|digits| f64::from(digits * digits)).sum();
+        phase += (squares * 2.0 / 3.0).sqrt() * PhaseCurrent::SCALE;
+    }
+    bench.ask(Off.encode())?;
+    Ok((torque / f64::from(PULSES), phase / f64::from(PULSES)))
+}
+
+pub(super) fn torque_is_an_ampere(bench: &Bench, amps: f64) -> Result<(), Stop> {
+    let words = format!("about 1 A in the middle of ten pulses of ±1 A, not {amps:.2} A");
+    bench.require((0.85..1.15).contains(&amps), words)
+}

@@ -1,0 +1,166 @@
+//! Simulated motors on virtual time, the world around them, and what may be put between them and
+//! the bus.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use motorlink::serve::CanStation;
+use motorlink_conformance::rmd::{Bench, Options, suite};
+use motorlink_conformance::wire::{Bus, Virtual};
+use motorlink_conformance::{Need, Report, Unavailable, World, run};
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::Instant;
+use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
+
+pub const EVERYTHING: [Need; 4] = [Need::Spin, Need::Rom, Need::PowerCycle, Need::Fault];
+
+/// What happens to motors.
+pub enum Event<'a> {
+    Frame(&'a CanFrame),
+    PowerOn,
+}
+
+/// What is done in place of what the motors do.
+pub type Behaviour = Box<dyn FnMut(&mut Motors, Event) -> Vec<CanFrame>>;
+
+/// Motors on a bus.
+pub struct Motors {
+    pub bus: RmdBus<Vec<RmdNode>>,
+    pub now: Instant,
+}
+
+impl Motors {
+    /// What the motors do.
+    pub fn pass(&mut self, event: Event) -> Vec<CanFrame> {
+        let mut replies = Vec::new();
+        if let Event::Frame(frame) = event {
+            self.bus.receive(self.now, frame, |reply| replies.push(reply));
+        }
+        replies
+    }
+
+    /// The data of the first motor's reply.
+    pub fn ask(&mut self, data: [u8; 8]) -> [u8; 8] {
+        let frame = CanFrame::new(self.first().id().can_id(), data);
+        let replies = self.pass(Event::Frame(&frame));
+        *replies[0].usable().expect("a motor's reply").1
+    }
+
+    pub fn first(&self) -> &RmdNode {
+        &self.bus.nodes()[0]
+    }
+
+    fn ids(&self) -> Vec<MotorId> {
+        self.bus.nodes().iter().map(RmdNode::id).collect()
+    }
+}
+
+/// Motors that may behave otherwise.
+pub struct Station {
+    pub motors: Motors,
+    behaviour: Behaviour,
+    /// Whether a motor was ever under current, or told to move.
+    pub energised: bool,
+    pub powered_on: u32,
+}
+
+impl CanStation for Station {
+    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+        self.motors.now = now;
+        replies.extend((self.behaviour)(&mut self.motors, Event::Frame(frame)));
+        let off = |node: &RmdNode| node.motor().truth().mode == Mode::Off;
+        self.energised |= !self.motors.bus.nodes().iter().all(off);
+    }
+
+    fn poll(&mut self, _now: Instant, _replies: &mut Vec<CanFrame>) {}
+
+    fn deadline(&self) -> Option<Instant> {
+        None
+    }
+}
+
+type Shared = Rc<RefCell<Virtual<Station, CanFrame>>>;
+
+/// The hand at the power switch.
+struct Around(Shared);
+
+impl World for Around {
+    fn power_cycle(&mut self) -> Result<(), Unavailable> {
+        let mut bus = self.0.borrow_mut();
+        let now = bus.now();
+        let Station { motors, behaviour, powered_on, .. } = &mut bus.station;
+        motors.now = now;
+        motors.bus.advance_to(now);
+        for id in motors.ids() {
+            motors.bus.node_mut(id).expect("it is there").power_cycle(now);
+        }
+        *powered_on += 1;
+        behaviour(motors, Event::PowerOn);
+        Ok(())
+    }
+
+    fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
+        let mut bus = self.0.borrow_mut();
+        let faults = if present { Errors::LOW_VOLTAGE } else { Errors::NONE };
+        let motors = &mut bus.station.motors;
+        for id in motors.ids() {
+            motors.bus.node_mut(id).expect("it is there").motor_mut().hold_faults(faults);
+        }
+        Ok(())
+    }
+}
+
+/// A motor unlike a new one in all that can be told, so that nothing passes by chance.
+pub fn motor(id: u8) -> RmdConfig {
+    RmdConfig {
+        gains: [101, 99, 102, 98, 103, 97],
+        acceleration_dps2: 5_000,
+        encoder_offset: 1_000,
+        angle_degrees: 123.4,
+        ..RmdConfig::with_id(id)
+    }
+}
+
+/// What came of the suite, and the motors afterwards.
+pub struct Tested {
+    pub report: Report,
+    bus: Shared,
+}
+
+impl Tested {
+    pub fn station<T>(&self, look: impl FnOnce(&Station) -> T) -> T {
+        look(&self.bus.borrow().station)
+    }
+
+    /// The time that the run took, s.
+    pub fn seconds(&self) -> u64 {
+        self.bus.borrow().now().0 / 1_000_000
+    }
+}
+
+/// Puts the first of motors through the suite.
+pub fn test(configs: Vec<RmdConfig>, allowed: &[Need], behaviour: Behaviour) -> Tested {
+    let node = |config: RmdConfig| {
+        RmdNode::new(Instant(0), config, config.factory_rom()).expect("a fair configuration")
+    };
+    let first = configs[0];
+    let nodes = configs.into_iter().map(node).collect();
+    let motors =
+        Motors { bus: RmdBus::new(Instant(0), nodes).expect("IDs differ"), now: Instant(0) };
+    let station = Station { motors, behaviour, energised: false, powered_on: 0 };
+    let bus = Rc::new(RefCell::new(Virtual::new(station)));
+    let options = Options {
+        id: MotorId::new(first.id).expect("an ID"),
+        encoder: EncoderBits::new(first.encoder_bits).expect("a width"),
+        allowed: allowed.to_vec(),
+    };
+    let mut bench =
+        Bench::new(Box::new(Rc::clone(&bus)), Box::new(Around(Rc::clone(&bus))), options);
+    let report = run(&suite(), &mut bench, |_| {});
+    Tested { report, bus }
+}
+
+/// What motors do.
+pub fn honest() -> Behaviour {
+    Box::new(Motors::pass)
+}

@@ -1,0 +1,6 @@
+//! The kit for RMD motors, tested on simulated ones.
+
+mod clauses;
+mod drive;
+mod mutants;
+mod suite;

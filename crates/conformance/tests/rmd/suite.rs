@@ -1,0 +1,94 @@
+//! Simulated motors pass, and are afterwards what they were.
+
+use motorlink_conformance::{Report, Verdict};
+use motorlink_proto::rmd::Mode;
+use motorlink_sim::rmd::RmdConfig;
+
+use crate::drive::{EVERYTHING, Tested, honest, motor, test};
+
+/// Names of the cases that ended so.
+fn names(report: &Report, verdict: &str) -> Vec<String> {
+    let cases = report.outcomes.iter().filter(|outcome| outcome.verdict.word() == verdict);
+    cases.map(|outcome| outcome.name.clone()).collect()
+}
+
+fn passes(tested: &Tested) {
+    for outcome in &tested.report.outcomes {
+        let good = matches!(outcome.verdict, Verdict::Passed | Verdict::Skipped(_));
+        assert!(good, "{outcome:#?}");
+    }
+}
+
+#[test]
+fn motors_of_every_encoder_width_pass() {
+    for encoder_bits in [12, 14, 16, 18] {
+        let tested = test(vec![RmdConfig { encoder_bits, ..motor(1) }], &EVERYTHING, honest());
+        passes(&tested);
+        let beyond = ["an_offset_beyond_the_encoder_is_cut"];
+        let alone =
+            ["four_torques_are_answered_lowest_id_first", "a_motor_beyond_4_does_not_hear_them"];
+        let skipped = names(&tested.report, "skipped");
+        let width = if encoder_bits >= 16 { &beyond[..] } else { &[] };
+        assert_eq!(skipped, [width, &alone[..]].concat(), "{encoder_bits} bits");
+    }
+}
+
+#[test]
+fn one_of_four_motors_passes() {
+    let tested = test([3, 1, 2, 4].map(motor).into(), &EVERYTHING, honest());
+    passes(&tested);
+    assert_eq!(names(&tested.report, "skipped"), ["a_motor_beyond_4_does_not_hear_them"]);
+}
+
+#[test]
+fn a_motor_with_another_id_passes() {
+    let tested = test(vec![motor(32)], &EVERYTHING, honest());
+    passes(&tested);
+    let four = [
+        "four_torques_are_answered_once_by_each_motor",
+        "four_torques_are_answered_lowest_id_first",
+        "four_torques_are_answered_as_a_torque_command",
+        "each_motor_takes_its_own_of_four_torques",
+    ];
+    assert_eq!(names(&tested.report, "skipped"), four);
+}
+
+#[test]
+fn a_motor_is_afterwards_what_it_was() {
+    let before = test(vec![motor(1)], &[], honest());
+    let after = test(vec![motor(1)], &EVERYTHING, honest());
+    let settings = |tested: &Tested| {
+        tested.station(|station| {
+            let drive = station.motors.first().drive();
+            (*drive.settings(), *drive.rom(), drive.mode(), drive.errors())
+        })
+    };
+    assert_eq!(settings(&after), settings(&before));
+    assert_eq!(settings(&after).2, Mode::Off);
+    let writes = after.station(|station| station.motors.first().motor().rom_writes());
+    assert_eq!(writes, ROM_WRITES, "a case more or less that wears the ROM");
+}
+
+/// Eleven cases write a ROM: most of them once, an echo three times, two about zero twice; and
+/// each puts back what was there.
+const ROM_WRITES: u32 = (8 + 3 + 2 * 2) + 11;
+
+#[test]
+fn without_leave_nothing_is_energised_or_worn_and_it_is_over_soon() {
+    let tested = test([1, 2, 3, 4].map(motor).into(), &[], honest());
+    passes(&tested);
+    tested.station(|station| {
+        assert!(!station.energised);
+        assert_eq!(station.powered_on, 0);
+        for node in station.motors.bus.nodes() {
+            assert_eq!(node.motor().rom_writes(), 0);
+            let turned = node.motor().truth().angle_degrees - 123.4;
+            assert!(turned.abs() < 1e-3, "it turned by {turned}°");
+        }
+    });
+    assert!(tested.seconds() < 15, "{} s on a bus without delays", tested.seconds());
+    let needed =
+        |name: &str| names(&tested.report, "skipped").iter().any(|skipped| skipped == name);
+    assert!(needed("a_speed_is_reached_either_way") && needed("a_written_offset_is_in_force"));
+    assert!(tested.report.count("passed") > 30);
+}
