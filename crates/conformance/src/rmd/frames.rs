@@ -122,8 +122,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
     for (code, answered, null_reply, null_request) in QUESTIONS {
         cases.push(case(subject("a_question_gets_one_reply", code), answered, move |bench| {
             question(bench, code)?;
-            let request = bench.frame(request(code));
-            let replies = bench.answers(&[request])?;
+            bench.ask(request(code))?;
+            let replies = bench.answers(&[bench.frame(request(code))])?;
             bench.require(replies.len() == 1, "one reply, and not another within 50 ms")
         }));
         if !null_reply.is_empty() {

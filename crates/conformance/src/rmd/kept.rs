@@ -1,6 +1,6 @@
 //! What a motor is when a case begins, and how it becomes that again.
 
-use motorlink_proto::rmd::*;
+use motorlink_proto::rmd::{Stop as Halt, *};
 use motorlink_proto::time::Duration;
 use motorlink_proto::units::DpsPerSecond;
 
@@ -35,19 +35,28 @@ impl Bench {
     /// Waits until the motor is at rest. One that never is, is not tested: what turns it is not
     /// this kit's to stop.
     pub(super) fn at_rest(&mut self) -> Result<(), Stop> {
+        let MotionStatus { speed, iq, .. } = match self.comes_to_rest()? {
+            Ok(()) => return Ok(()),
+            Err(status) => status,
+        };
+        Err(Stop::Unfit(format!(
+            "motor {} is not at rest: it turns at {speed} with {:.1} A; switch it off first",
+            self.id(),
+            iq.amps()
+        )))
+    }
+
+    /// Waits until the motor is at rest, or gives what it does instead.
+    fn comes_to_rest(&mut self) -> Result<Result<(), MotionStatus>, Stop> {
         let begun = self.millis();
         loop {
             let status = self.status_of_somebody()?;
-            let (speed, iq) = (status.speed, status.iq);
-            if speed.0.unsigned_abs() <= REST && iq.0.unsigned_abs() <= CURRENTLESS {
-                return Ok(());
+            let (speed, iq) = (status.speed.0, status.iq.0);
+            if speed.unsigned_abs() <= REST && iq.unsigned_abs() <= CURRENTLESS {
+                return Ok(Ok(()));
             }
             if self.millis() - begun > COASTING {
-                return Err(Stop::Unfit(format!(
-                    "motor {} is not at rest: it turns at {speed} with {:.1} A; switch it off first",
-                    self.id(),
-                    iq.amps()
-                )));
+                return Ok(Err(status));
             }
             self.pause(Duration::from_millis(50))?;
         }
@@ -147,15 +156,20 @@ impl Bench {
         off.and(fault).and(rom).and(gains).and(acceleration)
     }
 
+    /// Off, and then a look whether it is. A motor that goes on is told to stop as well.
     fn switch_off(&mut self) -> Result<(), Stop> {
-        let mut done = Ok([0; 8]);
-        for _ in 0..3 {
-            done = self.ask(Off.encode());
-            if done.is_ok() {
-                break;
+        let mut told = self.ask(Off.encode());
+        for _ in 0..2 {
+            if told.is_err() {
+                told = self.ask(Off.encode());
             }
         }
-        done.map(|_| ())
+        if self.comes_to_rest()?.is_err() {
+            let failed = self.failed("a motor at rest within 10 s of 0x80");
+            self.ask(Halt.encode())?;
+            return Err(failed);
+        }
+        told.map(|_| ())
     }
 
     fn end_fault(&mut self) -> Result<(), Stop> {

@@ -5,7 +5,7 @@ use motorlink_proto::units::TorqueCommand;
 
 use super::bench::Bench;
 use super::case;
-use super::torque::{pulses, torque_is_an_ampere};
+use super::torque::{pulses, torque, torque_is_an_ampere};
 use crate::case::{Case, Need, Stop};
 
 pub(super) fn cases() -> Vec<Case<Bench>> {
@@ -43,11 +43,12 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         case("each_motor_takes_its_own_of_four_torques", &["RMD-280-02", "RMD-280-03"], |bench| {
             reach(bench)?;
             let slot = usize::from(bench.id().number() - 1);
-            let (amps, _) = pulses(bench, |_, torque| {
+            let request = move |_: &Bench, digits| {
                 let mut torques = [TorqueCommand(0); 4];
-                torques[slot] = TorqueCommand(torque);
+                torques[slot] = TorqueCommand(digits);
                 frame(torques)
-            })?;
+            };
+            let amps = pulses(bench, request, torque)?;
             torque_is_an_ampere(bench, amps)
         }),
         case("four_torques_in_another_form_are_ignored", &["RMD-280-01", "RMD-1-06"], |bench| {

@@ -36,18 +36,18 @@ pub use clauses::CLAUSES;
 /// Ids of clauses.
 type Clauses = &'static [&'static str];
 
-/// What a motor is put through: first what leaves it alone.
+/// What a motor is put through: first what leaves it alone, then whether it can be switched off.
 pub fn suite() -> Vec<Case<Bench>> {
     let topics = [
         frames::cases(),
         settings::cases(),
-        encoder::cases(),
         status::cases(),
+        power::cases(),
+        encoder::cases(),
         motion::cases(),
         torque::cases(),
         speed::cases(),
         position::cases(),
-        power::cases(),
         many::cases(),
     ];
     topics.into_iter().flatten().collect()

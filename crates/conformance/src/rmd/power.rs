@@ -12,7 +12,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         case("off_lets_the_motor_come_to_rest", &["RMD-80-02"], |bench| {
             runs(bench, 1)?;
             bench.ask(Off.encode())?;
-            bench.at_rest()
+            let rests = bench.comes_to_a_stand(10_000)?;
+            bench.require(rests, "a motor at rest within 10 s of 0x80")
         }),
         case("after_off_nothing_is_left_to_resume", &["RMD-80-03"], |bench| {
             runs(bench, 1)?;

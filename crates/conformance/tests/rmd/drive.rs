@@ -9,7 +9,7 @@ use motorlink_conformance::rmd::{Bench, Options, suite};
 use motorlink_conformance::wire::{Bus, Virtual};
 use motorlink_conformance::{Need, Report, Unavailable, World, run};
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::Instant;
+use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 
 pub const EVERYTHING: [Need; 4] = [Need::Spin, Need::Rom, Need::PowerCycle, Need::Fault];
@@ -27,6 +27,7 @@ pub type Behaviour = Box<dyn FnMut(&mut Motors, Event) -> Vec<CanFrame>>;
 pub struct Motors {
     pub bus: RmdBus<Vec<RmdNode>>,
     pub now: Instant,
+    first: MotorId,
 }
 
 impl Motors {
@@ -39,15 +40,29 @@ impl Motors {
         replies
     }
 
-    /// The data of the first motor's reply.
+    /// The data of the reply of the motor that is tested.
     pub fn ask(&mut self, data: [u8; 8]) -> [u8; 8] {
-        let frame = CanFrame::new(self.first().id().can_id(), data);
-        let replies = self.pass(Event::Frame(&frame));
-        *replies[0].usable().expect("a motor's reply").1
+        self.try_ask(data).expect("a command that is answered")
+    }
+
+    /// The same for what may not be a command.
+    pub fn try_ask(&mut self, data: [u8; 8]) -> Option<[u8; 8]> {
+        let replies = self.pass(Event::Frame(&CanFrame::new(self.first.can_id(), data)));
+        replies.first().and_then(CanFrame::usable).map(|(_, data)| *data)
+    }
+
+    /// The motor that is tested.
+    pub fn first_id(&self) -> MotorId {
+        self.first
+    }
+
+    /// The same, to change it.
+    pub fn first_mut(&mut self) -> &mut RmdNode {
+        self.bus.node_mut(self.first).expect("it is there")
     }
 
     pub fn first(&self) -> &RmdNode {
-        &self.bus.nodes()[0]
+        self.bus.node(self.first).expect("it is there")
     }
 
     fn ids(&self) -> Vec<MotorId> {
@@ -62,6 +77,8 @@ pub struct Station {
     /// Whether a motor was ever under current, or told to move.
     pub energised: bool,
     pub powered_on: u32,
+    /// The greatest speed that a motor had when a frame came, °/s.
+    pub fastest: f32,
 }
 
 impl CanStation for Station {
@@ -69,6 +86,8 @@ impl CanStation for Station {
         self.motors.now = now;
         replies.extend((self.behaviour)(&mut self.motors, Event::Frame(frame)));
         let off = |node: &RmdNode| node.motor().truth().mode == Mode::Off;
+        let speed = |node: &RmdNode| node.motor().truth().speed_dps.abs();
+        self.fastest = self.motors.bus.nodes().iter().map(speed).fold(self.fastest, f32::max);
         self.energised |= !self.motors.bus.nodes().iter().all(off);
     }
 
@@ -145,18 +164,22 @@ pub fn test(configs: Vec<RmdConfig>, allowed: &[Need], behaviour: Behaviour) -> 
     };
     let first = configs[0];
     let nodes = configs.into_iter().map(node).collect();
-    let motors =
-        Motors { bus: RmdBus::new(Instant(0), nodes).expect("IDs differ"), now: Instant(0) };
-    let station = Station { motors, behaviour, energised: false, powered_on: 0 };
+    let bus = RmdBus::new(Instant(0), nodes).expect("IDs differ");
+    let id = MotorId::new(first.id).expect("an ID");
+    let motors = Motors { bus, now: Instant(0), first: id };
+    let station = Station { motors, behaviour, energised: false, powered_on: 0, fastest: 0.0 };
     let bus = Rc::new(RefCell::new(Virtual::new(station)));
     let options = Options {
-        id: MotorId::new(first.id).expect("an ID"),
+        id,
         encoder: EncoderBits::new(first.encoder_bits).expect("a width"),
         allowed: allowed.to_vec(),
     };
     let mut bench =
         Bench::new(Box::new(Rc::clone(&bus)), Box::new(Around(Rc::clone(&bus))), options);
     let report = run(&suite(), &mut bench, |_| {});
+    // What was told last gets its time.
+    let now = bus.borrow().now();
+    bus.borrow_mut().station.motors.bus.advance_to(now + Duration::from_millis(1_000));
     Tested { report, bus }
 }
 
