@@ -33,7 +33,7 @@ pub enum Verdict {
     Failed(Box<Finding>),
     /// Not tried, and why.
     Skipped(String),
-    /// The port had failed before, or failed here.
+    /// The port or the drive had failed before, or failed here.
     NotRun(String),
 }
 
@@ -67,12 +67,13 @@ impl Report {
         self.outcomes.iter().filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)))
     }
 
-    /// Why cases were not run, if any.
-    pub fn not_run(&self) -> Option<&str> {
-        self.outcomes.iter().find_map(|outcome| match &outcome.verdict {
+    /// Why the rest was not run; empty where everything was.
+    pub fn lost(&self) -> &str {
+        let lost = self.outcomes.iter().find_map(|outcome| match &outcome.verdict {
             Verdict::NotRun(why) => Some(why.as_str()),
             _ => None,
-        })
+        });
+        lost.unwrap_or_default()
     }
 
     /// The report as one JSON object.

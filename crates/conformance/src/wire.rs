@@ -30,36 +30,6 @@ pub trait Bus {
     fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError>;
 }
 
-/// A line that the world around the drive needs as well.
-impl<L: Line + ?Sized> Line for Rc<RefCell<L>> {
-    fn now(&self) -> Instant {
-        self.borrow().now()
-    }
-
-    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        self.borrow_mut().send(bytes)
-    }
-
-    fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
-        self.borrow_mut().receive(until)
-    }
-}
-
-/// A bus that the world around the drive needs as well.
-impl<B: Bus + ?Sized> Bus for Rc<RefCell<B>> {
-    fn now(&self) -> Instant {
-        self.borrow().now()
-    }
-
-    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        self.borrow_mut().send(frame)
-    }
-
-    fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
-        self.borrow_mut().receive(until)
-    }
-}
-
 /// A port of this machine, with its clock.
 pub struct Real<L> {
     link: L,
@@ -153,6 +123,36 @@ impl<S: ByteStation> Line for Virtual<S, u8> {
             self.received.extend(reply);
         }
         Ok(self.received.drain(..).collect())
+    }
+}
+
+/// A line that the world around the drive has a hand on, too.
+impl<L: Line> Line for Rc<RefCell<L>> {
+    fn now(&self) -> Instant {
+        self.borrow().now()
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.borrow_mut().send(bytes)
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
+        self.borrow_mut().receive(until)
+    }
+}
+
+/// A bus that the world around the drive has a hand on, too.
+impl<B: Bus> Bus for Rc<RefCell<B>> {
+    fn now(&self) -> Instant {
+        self.borrow().now()
+    }
+
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.borrow_mut().send(frame)
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
+        self.borrow_mut().receive(until)
     }
 }
 

@@ -84,16 +84,13 @@ fn verdict(report: &Report) -> Result<(), Failure> {
     if report.is_clean() {
         return Ok(());
     }
-    match report.not_run() {
-        None => Err(Failure::Refused(format!(
+    match report.count("not run") {
+        0 => Err(Failure::Refused(format!(
             "{} of {} cases failed: the drive does not do what its document says",
             report.failed().count(),
             report.outcomes.len()
         ))),
-        Some(why) => {
-            let count = report.count("not run");
-            Err(Failure::Line(format!("{why}: {count} cases were not run")))
-        }
+        count => Err(Failure::Line(format!("{count} cases were not run: {}", report.lost()))),
     }
 }
 

@@ -3,7 +3,7 @@
 
 use console::style;
 use indicatif::ProgressBar;
-use motorlink_conformance::{Outcome, Report, Verdict};
+use motorlink_conformance::{Outcome, Report, Verdict, rmd, st};
 
 use crate::failure::Failure;
 use crate::output;
@@ -33,7 +33,7 @@ impl Screen {
             return Ok(());
         }
         for outcome in &report.outcomes {
-            if self.verbose || matches!(outcome.verdict, Verdict::Failed(_) | Verdict::NotRun(_)) {
+            if self.verbose || matches!(outcome.verdict, Verdict::Failed(_)) {
                 row(outcome)?;
             }
         }
@@ -56,12 +56,26 @@ fn row(outcome: &Outcome) -> Result<(), Failure> {
     ))?;
     match &outcome.verdict {
         Verdict::Passed => Ok(()),
-        Verdict::Failed(finding) => output::line(&format!(
-            "           sent     {}\n           expected {}\n           received {}",
-            finding.sent, finding.expected, finding.received
-        )),
+        Verdict::Failed(finding) => {
+            output::line(&format!(
+                "           sent     {}\n           expected {}\n           received {}",
+                finding.sent, finding.expected, finding.received
+            ))?;
+            demands(outcome.clauses)
+        }
         Verdict::Skipped(why) | Verdict::NotRun(why) => output::line(&format!("           {why}")),
     }
+}
+
+/// What the clauses of a case demand.
+fn demands(clauses: &[&str]) -> Result<(), Failure> {
+    for id in clauses {
+        let mut all = st::CLAUSES.iter().chain(rmd::CLAUSES);
+        if let Some(clause) = all.find(|clause| clause.id == *id) {
+            output::line(&format!("           {id:<10} {}", style(clause.text).dim()))?;
+        }
+    }
+    Ok(())
 }
 
 /// A line a paragraph, in the order of the suite.

@@ -167,7 +167,7 @@ impl Bench {
                 return Ok(());
             }
         }
-        Err(Stop::Unfit(
+        Err(Stop::Lost(
             "the bus is never silent: a motor can only be tested where nobody else speaks to it"
                 .to_owned(),
         ))
@@ -210,7 +210,7 @@ impl Bench {
 impl Subject for Bench {
     fn begin(&mut self) -> Result<(), Stop> {
         if let Some((dialect, id)) = self.foreign {
-            return Err(Stop::Unfit(format!(
+            return Err(Stop::Lost(format!(
                 "motor {id} answers as {dialect} motors do: it does not speak V1.62 and is not driven"
             )));
         }

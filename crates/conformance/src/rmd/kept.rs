@@ -39,7 +39,7 @@ impl Bench {
             Ok(()) => return Ok(()),
             Err(status) => status,
         };
-        Err(Stop::Unfit(format!(
+        Err(Stop::Lost(format!(
             "motor {} is not at rest: it turns at {speed} with {:.1} A; switch it off first",
             self.id(),
             iq.amps()
@@ -65,7 +65,7 @@ impl Bench {
     /// Status 2, of a motor that may not be there.
     fn status_of_somebody(&mut self) -> Result<MotionStatus, Stop> {
         match self.read(ReadStatus2) {
-            Err(Stop::Failed(_)) if !self.heard && self.foreign.is_none() => Err(Stop::Unfit(
+            Err(Stop::Failed(_)) if !self.heard && self.foreign.is_none() => Err(Stop::Lost(
                 format!("motor {} does not answer; `motorlink rmd scan` tells who does", self.id()),
             )),
             other => other,

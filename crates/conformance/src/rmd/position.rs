@@ -21,6 +21,24 @@ const COUNTERCLOCKWISE: Spin = Spin::Counterclockwise;
 /// A single-turn command of either kind.
 type Turn = fn(Spin, CircleAngle) -> [u8; 8];
 
+/// A multi-turn command of either kind.
+type Move = fn(i32) -> [u8; 8];
+
+const MOVES: [(Code, Move, Clauses, Clauses); 2] = [
+    (
+        Code::Position,
+        |angle| Position { angle: CentiDegrees(angle) }.encode(),
+        &["RMD-A3-02", "RMD-A3-01"],
+        &["RMD-A3-03"],
+    ),
+    (
+        Code::PositionLimited,
+        |angle| PositionLimited { max_speed: LONG, angle: CentiDegrees(angle) }.encode(),
+        &["RMD-A4-02", "RMD-A4-01"],
+        &["RMD-A4-03"],
+    ),
+];
+
 const TURNS: [(Code, Turn, [Clauses; 5]); 2] = [
     (
         Code::CirclePosition,
@@ -65,15 +83,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
 }
 
 fn multi_turn() -> Vec<Case<Bench>> {
-    let a3: fn(i32) -> [u8; 8] = |angle| Position { angle: CentiDegrees(angle) }.encode();
-    let a4: fn(i32) -> [u8; 8] =
-        |angle| PositionLimited { max_speed: LONG, angle: CentiDegrees(angle) }.encode();
-    let commands: [(Code, fn(i32) -> [u8; 8], Clauses, Clauses); 2] = [
-        (Code::Position, a3, &["RMD-A3-02", "RMD-A3-01"], &["RMD-A3-03"]),
-        (Code::PositionLimited, a4, &["RMD-A4-02", "RMD-A4-01"], &["RMD-A4-03"]),
-    ];
     let mut cases = Vec::new();
-    for (code, command, small, wide) in commands {
+    for (code, command, small, wide) in MOVES {
         let name = subject("a_position_is_reached", code);
         cases.push(case(name, small, move |bench| {
             bench.gently()?;
