@@ -98,7 +98,7 @@ impl CanStation for Station {
     }
 }
 
-type Shared = Rc<RefCell<Virtual<Station, CanFrame>>>;
+pub type Shared = Rc<RefCell<Virtual<Station, CanFrame>>>;
 
 /// The hand at the power switch.
 struct Around(Shared);
@@ -159,6 +159,16 @@ impl Tested {
 
 /// Puts the first of motors through the suite.
 pub fn test(configs: Vec<RmdConfig>, allowed: &[Need], behaviour: Behaviour) -> Tested {
+    test_through(|bus| Box::new(bus), configs, allowed, behaviour)
+}
+
+/// The same with something between the kit and the bus.
+pub fn test_through(
+    between: impl FnOnce(Shared) -> Box<dyn Bus>,
+    configs: Vec<RmdConfig>,
+    allowed: &[Need],
+    behaviour: Behaviour,
+) -> Tested {
     let node = |config: RmdConfig| {
         RmdNode::new(Instant(0), config, config.factory_rom()).expect("a fair configuration")
     };
@@ -175,7 +185,7 @@ pub fn test(configs: Vec<RmdConfig>, allowed: &[Need], behaviour: Behaviour) -> 
         allowed: allowed.to_vec(),
     };
     let mut bench =
-        Bench::new(Box::new(Rc::clone(&bus)), Box::new(Around(Rc::clone(&bus))), options);
+        Bench::new(between(Rc::clone(&bus)), Box::new(Around(Rc::clone(&bus))), options);
     let report = run(&suite(), &mut bench, |_| {});
     // What was told last gets its time.
     let now = bus.borrow().now();
