@@ -32,6 +32,8 @@ pub struct Bench {
     pub(super) kept: Kept,
     /// What of another protocol was heard.
     pub(super) foreign: Option<(Dialect, MotorId)>,
+    /// Whether the motor did not come to rest when it was switched off.
+    pub(super) runaway: bool,
     /// Whether the motor was heard at all.
     pub(super) heard: bool,
     transcript: Vec<String>,
@@ -55,6 +57,7 @@ impl Bench {
             options,
             kept: Kept::default(),
             foreign: None,
+            runaway: false,
             heard: false,
             transcript: Vec::new(),
             sent: Vec::new(),
@@ -76,10 +79,31 @@ impl Bench {
     /// request's code.
     pub(super) fn ask(&mut self, request: [u8; 8]) -> Result<[u8; 8], Stop> {
         let data = self.ask_frame(&self.frame(request))?;
+        self.answers_to(request, data)
+    }
+
+    /// The same, and that nothing comes behind it.
+    pub(super) fn ask_once(&mut self, request: [u8; 8]) -> Result<[u8; 8], Stop> {
+        let replies = self.answers(&[self.frame(request)])?;
+        match &replies[..] {
+            [reply] => {
+                let data = self.in_form(reply)?;
+                self.answers_to(request, data)
+            }
+            _ => Err(self.failed("one reply, and not another within 50 ms")),
+        }
+    }
+
+    fn answers_to(&self, request: [u8; 8], data: [u8; 8]) -> Result<[u8; 8], Stop> {
         let code = request[0];
         let printed = code == u8::from(Code::ClearErrors) && data[0] == u8::from(Code::ReadStatus1);
         self.require(data[0] == code || printed, format!("a reply with DATA[0] = {code:02X}"))?;
         Ok(data)
+    }
+
+    fn in_form(&self, reply: &CanFrame) -> Result<[u8; 8], Stop> {
+        let usable = reply.usable().map(|(_, data)| *data);
+        usable.ok_or_else(|| self.failed("a standard data frame of 8 bytes"))
     }
 
     /// The reply to a frame, whatever its code.
@@ -93,10 +117,7 @@ impl Bench {
                 _ => return Err(self.failed("a reply within 100 ms")),
             }
         };
-        match reply.usable() {
-            Some((_, data)) => Ok(*data),
-            None => Err(self.failed("a standard data frame of 8 bytes")),
-        }
+        self.in_form(&reply)
     }
 
     /// The reply to a command, as values.
@@ -213,6 +234,10 @@ impl Subject for Bench {
             return Err(Stop::Lost(format!(
                 "motor {id} answers as {dialect} motors do: it does not speak V1.62 and is not driven"
             )));
+        }
+        if self.runaway {
+            let id = self.id();
+            return Err(Stop::Lost(format!("motor {id} cannot be switched off: it is not driven")));
         }
         self.settle(Duration::from_millis(5))?;
         self.at_rest()?;

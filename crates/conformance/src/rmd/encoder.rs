@@ -86,7 +86,8 @@ fn offset() -> Vec<Case<Bench>> {
             &["RMD-91-02", "RMD-91-01", "RMD-91-04", "RMD-91-06", "RMD-2-07"],
             |bench| {
                 let offset = bench.another_offset()?;
-                let reply = bench.read(WriteEncoderOffset(offset))?;
+                let reply = bench.ask_once(WriteEncoderOffset(offset).encode())?;
+                let reply = EncoderOffset::decode(&reply);
                 bench.require(reply == offset, format!("the new offset {}", offset.offset))?;
                 offset_is(bench, offset)
             },
@@ -143,7 +144,7 @@ fn zero() -> Vec<Case<Bench>> {
             |bench| {
                 let raw = bench.keep_offset()?.raw;
                 let code = Code::WriteZeroToRom;
-                let reply = bench.ask(filled(request(code), code, 0xA5))?;
+                let reply = bench.ask_once(filled(request(code), code, 0xA5))?;
                 null_bytes_are_0(bench, code, &reply)?;
                 let offset = EncoderOffset::decode(&reply).offset;
                 let (offset, raw) = (bench.degrees(offset), bench.degrees(raw));

@@ -26,6 +26,8 @@ pub(super) struct Kept {
 const REST: u16 = 5;
 /// A motor with less torque current than this (digits: half an ampere) is at rest.
 const CURRENTLESS: u16 = 31;
+/// A motor that has become faster by this (°/s) does not come to rest.
+const FASTER: u16 = 30;
 /// How long a motor may take to come to rest, ms.
 const COASTING: u64 = 10_000;
 /// How long a motor may take until it answers when its power came back, ms.
@@ -49,13 +51,15 @@ impl Bench {
     /// Waits until the motor is at rest, or gives what it does instead.
     fn comes_to_rest(&mut self) -> Result<Result<(), MotionStatus>, Stop> {
         let begun = self.millis();
+        let mut slowest = u16::MAX;
         loop {
             let status = self.status_of_somebody()?;
-            let (speed, iq) = (status.speed.0, status.iq.0);
-            if speed.unsigned_abs() <= REST && iq.unsigned_abs() <= CURRENTLESS {
+            let (speed, iq) = (status.speed.0.unsigned_abs(), status.iq.0.unsigned_abs());
+            if speed <= REST && iq <= CURRENTLESS {
                 return Ok(Ok(()));
             }
-            if self.millis() - begun > COASTING {
+            slowest = slowest.min(speed);
+            if speed > slowest.saturating_add(FASTER) || self.millis() - begun > COASTING {
                 return Ok(Err(status));
             }
             self.pause(Duration::from_millis(50))?;
@@ -64,12 +68,18 @@ impl Bench {
 
     /// Status 2, of a motor that may not be there.
     fn status_of_somebody(&mut self) -> Result<MotionStatus, Stop> {
-        match self.read(ReadStatus2) {
-            Err(Stop::Failed(_)) if !self.heard && self.foreign.is_none() => Err(Stop::Lost(
-                format!("motor {} does not answer; `motorlink rmd scan` tells who does", self.id()),
-            )),
-            other => other,
+        let status = self.read(ReadStatus2);
+        if self.heard || self.foreign.is_some() || self.answers_at_all()? {
+            return status;
         }
+        Err(Stop::Lost(format!(
+            "motor {} does not answer; `motorlink rmd scan` tells who does",
+            self.id()
+        )))
+    }
+
+    fn answers_at_all(&mut self) -> Result<bool, Stop> {
+        Ok(!self.answers(&[self.frame(ReadStatus1.encode())])?.is_empty())
     }
 
     /// The gains; remembers them.
@@ -125,7 +135,7 @@ impl Bench {
     fn cycle(&mut self) -> Result<(), Stop> {
         self.world.power_cycle()?;
         let begun = self.millis();
-        while self.answers(&[self.frame(ReadStatus1.encode())])?.is_empty() {
+        while !self.answers_at_all()? {
             self.require(self.millis() - begun < STARTING, "an answer within 5 s of power-on")?;
         }
         Ok(())
@@ -156,7 +166,8 @@ impl Bench {
         off.and(fault).and(rom).and(gains).and(acceleration)
     }
 
-    /// Off, and then a look whether it is. A motor that goes on is told to stop as well.
+    /// Off, and then a look whether it is. A motor that goes on is told to stop instead, and is not
+    /// turned again.
     fn switch_off(&mut self) -> Result<(), Stop> {
         let mut told = self.ask(Off.encode());
         for _ in 0..2 {
@@ -166,6 +177,7 @@ impl Bench {
         }
         if self.comes_to_rest()?.is_err() {
             let failed = self.failed("a motor at rest within 10 s of 0x80");
+            self.runaway = true;
             self.ask(Halt.encode())?;
             return Err(failed);
         }

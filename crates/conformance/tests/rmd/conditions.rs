@@ -11,9 +11,7 @@ use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::machine::MachineConfig;
 use motorlink_sim::rmd::RmdConfig;
 
-use crate::drive::{
-    Behaviour, EVERYTHING, Event, Motors, Shared, Tested, honest, motor, test, test_through,
-};
+use crate::drive::{Behaviour, Event, Motors, Setup, Shared, Tested, motor};
 
 fn passes(tested: &Tested) {
     let failed: Vec<_> = tested.report.failed().collect();
@@ -58,11 +56,12 @@ impl Bus for Adapter {
 
 #[test]
 fn a_motor_behind_a_slow_adapter_passes() {
-    let adapter = |bus: Shared| Adapter { bus, received: VecDeque::new() };
-    let through = |bus| Box::new(adapter(bus)) as Box<dyn Bus>;
-    let motors = vec![motor(1), motor(2)];
-    passes(&test_through(through, motors.clone(), &EVERYTHING, honest()));
-    let careful = test_through(through, motors, &[], honest());
+    let slow = || {
+        let port = |bus| Box::new(Adapter { bus, received: VecDeque::new() }) as Box<dyn Bus>;
+        Setup { port, ..Setup::new(vec![motor(1), motor(2)]) }
+    };
+    passes(&slow().run());
+    let careful = Setup { allowed: &[], ..slow() }.run();
     passes(&careful);
     assert!(careful.seconds() < 30, "{} s", careful.seconds());
 }
@@ -77,20 +76,20 @@ fn motors_with_loads_and_friction_pass() {
         RmdConfig { machine: geared, load_torque: 0.05, ..config },
         RmdConfig { load_torque: 0.08, supply_voltage: 12.0, ..config },
     ] {
-        passes(&test(vec![changed], &EVERYTHING, honest()));
+        passes(&Setup::new(vec![changed]).run());
     }
 }
 
 #[test]
 fn a_motor_with_noisy_sensors_passes() {
-    passes(&test(vec![motor(1)], &EVERYTHING, noisy()));
+    passes(&Setup { behaviour: noisy(), ..Setup::new(vec![motor(1)]) }.run());
 }
 
 /// A load that two amperes do not move is no fault of the motor.
 #[test]
 fn a_motor_that_its_load_holds_is_not_blamed_for_it_by_the_torque_case() {
     let config = RmdConfig { load_torque: 0.5, ..motor(1) };
-    let tested = test(vec![config], &[Need::Spin], honest());
+    let tested = Setup { allowed: &[Need::Spin], ..Setup::new(vec![config]) }.run();
     let outcome = tested.report.outcomes.iter();
     let torque =
         outcome.clone().find(|outcome| outcome.name == "torque_has_the_sign_of_its_command");
@@ -100,7 +99,7 @@ fn a_motor_that_its_load_holds_is_not_blamed_for_it_by_the_torque_case() {
 #[test]
 fn a_motor_that_answers_0x9b_with_0x9b_passes() {
     let config = RmdConfig { clear_reply_0x9b: true, ..motor(1) };
-    passes(&test(vec![config], &EVERYTHING, honest()));
+    passes(&Setup::new(vec![config]).run());
 }
 
 /// Noise of a few digits on current, speed, voltage, temperature and phase currents.

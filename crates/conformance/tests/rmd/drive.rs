@@ -7,7 +7,7 @@ use std::rc::Rc;
 use motorlink::serve::CanStation;
 use motorlink_conformance::rmd::{Bench, Options, suite};
 use motorlink_conformance::wire::{Bus, Virtual};
-use motorlink_conformance::{Need, Report, Unavailable, World, run};
+use motorlink_conformance::{Case, Need, Report, Unavailable, World, run};
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
@@ -157,40 +157,43 @@ impl Tested {
     }
 }
 
-/// Puts the first of motors through the suite.
-pub fn test(configs: Vec<RmdConfig>, allowed: &[Need], behaviour: Behaviour) -> Tested {
-    test_through(|bus| Box::new(bus), configs, allowed, behaviour)
+/// What is tested, and how: everything is allowed unless told otherwise.
+pub struct Setup {
+    /// The motors on the bus; the first is tested.
+    pub motors: Vec<RmdConfig>,
+    pub allowed: &'static [Need],
+    pub behaviour: Behaviour,
+    pub suite: Vec<Case<Bench>>,
+    /// What is between the kit and the bus.
+    pub port: fn(Shared) -> Box<dyn Bus>,
 }
 
-/// The same with something between the kit and the bus.
-pub fn test_through(
-    between: impl FnOnce(Shared) -> Box<dyn Bus>,
-    configs: Vec<RmdConfig>,
-    allowed: &[Need],
-    behaviour: Behaviour,
-) -> Tested {
-    let node = |config: RmdConfig| {
-        RmdNode::new(Instant(0), config, config.factory_rom()).expect("a fair configuration")
-    };
-    let first = configs[0];
-    let nodes = configs.into_iter().map(node).collect();
-    let bus = RmdBus::new(Instant(0), nodes).expect("IDs differ");
-    let id = MotorId::new(first.id).expect("an ID");
-    let motors = Motors { bus, now: Instant(0), first: id };
-    let station = Station { motors, behaviour, energised: false, powered_on: 0, fastest: 0.0 };
-    let bus = Rc::new(RefCell::new(Virtual::new(station)));
-    let options = Options {
-        id,
-        encoder: EncoderBits::new(first.encoder_bits).expect("a width"),
-        allowed: allowed.to_vec(),
-    };
-    let mut bench =
-        Bench::new(between(Rc::clone(&bus)), Box::new(Around(Rc::clone(&bus))), options);
-    let report = run(&suite(), &mut bench, |_| {});
-    // What was told last gets its time.
-    let now = bus.borrow().now();
-    bus.borrow_mut().station.motors.bus.advance_to(now + Duration::from_millis(1_000));
-    Tested { report, bus }
+impl Setup {
+    pub fn new(motors: Vec<RmdConfig>) -> Self {
+        let port: fn(Shared) -> Box<dyn Bus> = |bus| Box::new(bus);
+        Setup { motors, allowed: &EVERYTHING, behaviour: honest(), suite: suite(), port }
+    }
+
+    /// Puts the first motor through the suite.
+    pub fn run(self) -> Tested {
+        let Setup { motors, allowed, behaviour, suite, port } = self;
+        let node = |config: &RmdConfig| {
+            RmdNode::new(Instant(0), *config, config.factory_rom()).expect("a fair configuration")
+        };
+        let bus = RmdBus::new(Instant(0), motors.iter().map(node).collect()).expect("IDs differ");
+        let id = MotorId::new(motors[0].id).expect("an ID");
+        let encoder = EncoderBits::new(motors[0].encoder_bits).expect("a width");
+        let motors = Motors { bus, now: Instant(0), first: id };
+        let station = Station { motors, behaviour, energised: false, powered_on: 0, fastest: 0.0 };
+        let bus = Rc::new(RefCell::new(Virtual::new(station)));
+        let options = Options { id, encoder, allowed: allowed.to_vec() };
+        let world = Box::new(Around(Rc::clone(&bus)));
+        let report = run(&suite, &mut Bench::new(port(Rc::clone(&bus)), world, options), |_| {});
+        // What was told last gets its time.
+        let now = bus.borrow().now();
+        bus.borrow_mut().station.motors.bus.advance_to(now + Duration::from_millis(1_000));
+        Tested { report, bus }
+    }
 }
 
 /// What motors do.

@@ -4,7 +4,7 @@ use motorlink_conformance::{Report, Verdict};
 use motorlink_proto::rmd::Mode;
 use motorlink_sim::rmd::RmdConfig;
 
-use crate::drive::{EVERYTHING, Tested, honest, motor, test};
+use crate::drive::{Setup, Tested, motor};
 
 /// Names of the cases that ended so.
 fn names(report: &Report, verdict: &str) -> Vec<String> {
@@ -22,7 +22,7 @@ fn passes(tested: &Tested) {
 #[test]
 fn motors_of_every_encoder_width_pass() {
     for encoder_bits in [12, 14, 16, 18] {
-        let tested = test(vec![RmdConfig { encoder_bits, ..motor(1) }], &EVERYTHING, honest());
+        let tested = Setup::new(vec![RmdConfig { encoder_bits, ..motor(1) }]).run();
         passes(&tested);
         let beyond = ["an_offset_beyond_the_encoder_is_cut"];
         let alone =
@@ -35,14 +35,14 @@ fn motors_of_every_encoder_width_pass() {
 
 #[test]
 fn one_of_four_motors_passes() {
-    let tested = test([3, 1, 2, 4].map(motor).into(), &EVERYTHING, honest());
+    let tested = Setup::new([3, 1, 2, 4].map(motor).into()).run();
     passes(&tested);
     assert_eq!(names(&tested.report, "skipped"), ["a_motor_beyond_4_does_not_hear_them"]);
 }
 
 #[test]
 fn a_motor_with_another_id_passes() {
-    let tested = test(vec![motor(32)], &EVERYTHING, honest());
+    let tested = Setup::new(vec![motor(32)]).run();
     passes(&tested);
     let four = [
         "four_torques_are_answered_once_by_each_motor",
@@ -55,8 +55,8 @@ fn a_motor_with_another_id_passes() {
 
 #[test]
 fn a_motor_is_afterwards_what_it_was() {
-    let before = test(vec![motor(1)], &[], honest());
-    let after = test(vec![motor(1)], &EVERYTHING, honest());
+    let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
+    let after = Setup::new(vec![motor(1)]).run();
     let settings = |tested: &Tested| {
         tested.station(|station| {
             let drive = station.motors.first().drive();
@@ -75,7 +75,7 @@ const ROM_WRITES: u32 = (8 + 3 + 2 * 2) + 11;
 
 #[test]
 fn without_leave_nothing_is_energised_or_worn_and_it_is_over_soon() {
-    let tested = test([1, 2, 3, 4].map(motor).into(), &[], honest());
+    let tested = Setup { allowed: &[], ..Setup::new([1, 2, 3, 4].map(motor).into()) }.run();
     passes(&tested);
     tested.station(|station| {
         assert!(!station.energised);

@@ -1,17 +1,33 @@
 //! Off, stop, run; torque and speed; torque for four motors.
 
+use motorlink_conformance::rmd::suite;
 use motorlink_proto::rmd::*;
 
-use super::settings::{on, taken_for};
 use super::{
-    Mutant, are_caught, code, commands, frames, i32_at, mutant, obey, put_i32, put_u16, requests,
-    u16_at,
+    Mutant, are_caught, code, commands, frames, i32_at, mutant, obey, on, put_i32, put_u16,
+    requests, taken_for, u16_at,
 };
-use crate::drive::{Behaviour, Event};
+use crate::drive::{Behaviour, Event, Setup, motor};
 
 #[test]
 fn mutants_of_off_stop_run_torque_and_speed_are_caught() {
     are_caught(mutants());
+}
+
+#[test]
+fn a_motor_that_cannot_be_switched_off_is_stopped_and_not_turned_again() {
+    let mut suite = suite();
+    suite.retain(|case| case.name.contains("torque"));
+    let behaviour = commands(|_, data| (data[0] == 0x80).then_some(Some(*data)));
+    let tested = Setup { suite, behaviour, ..Setup::new(vec![motor(1)]) }.run();
+    let verdicts: Vec<_> = tested.report.outcomes.iter().map(|o| o.verdict.word()).collect();
+    assert_eq!(verdicts[0], "FAILED");
+    assert!(verdicts[1..].iter().all(|word| *word == "not run"), "{verdicts:?}");
+    assert!(tested.report.lost().contains("cannot be switched off"));
+    tested.station(|station| {
+        assert!(station.fastest < 1_000.0, "{} °/s", station.fastest);
+        assert_eq!(station.motors.first().drive().mode(), Mode::Stopped);
+    });
 }
 
 fn mutants() -> Vec<Mutant> {

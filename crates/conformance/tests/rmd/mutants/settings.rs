@@ -3,7 +3,7 @@
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::DpsPerSecond;
 
-use super::{Mutant, are_caught, code, commands, i32_at, mutant, obey, put_i32, replies};
+use super::{Mutant, are_caught, code, commands, i32_at, mutant, obey, on, put_i32, taken_for};
 use crate::drive::{Behaviour, Event};
 
 #[test]
@@ -56,26 +56,6 @@ fn mutants() -> Vec<Mutant> {
             commands(|_, data| (data[0] == 0x34 && data[2] != 0).then_some(None)),
         ),
     ]
-}
-
-/// Changes replies to one command.
-pub fn on(to: Code, change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
-    replies(move |request, reply| {
-        if code(request) == to {
-            change(reply);
-        }
-    })
-}
-
-/// Takes one command for another, and answers as to the one.
-pub fn taken_for(one: u8, other: u8) -> Behaviour {
-    commands(move |motors, data| {
-        (data[0] == one).then(|| {
-            let mut done = *data;
-            done[0] = other;
-            obey(motors, data, done)
-        })
-    })
 }
 
 /// Torque where position stands.

@@ -2,8 +2,7 @@
 
 use motorlink_proto::rmd::*;
 
-use super::settings::on;
-use super::{Mutant, are_caught, code, commands, mutant, put_u16, replies, swap, u16_at};
+use super::{Mutant, are_caught, code, commands, mutant, on, put_u16, replies, swap, u16_at};
 use crate::drive::Behaviour;
 
 #[test]
