@@ -64,7 +64,7 @@ def test_a_simulated_motor_passes_and_is_left_alone(check, sim, tmp_path):
 
 
 def test_json_without_a_file_goes_to_stdout(check, sim):
-    done = check(sim(st=()).can, "--only", "RMD-30", "--json").ended(0)
+    done = check(sim(st=()).can, "--only", "RMD-33", "--json").ended(0)
     assert done.json["passed"] == len(done.json["cases"]) > 0
 
 
@@ -75,6 +75,16 @@ def test_with_leave_the_motor_turns_and_is_off_in_the_end(check, sim):
     assert "run_resumes_what_a_stop_has_interrupted" in done.out
     after = drives.motor(1)
     assert after["mode"] == "off" and abs(after["angle_degrees"] - before) > 1
+
+
+def test_ctrl_c_switches_the_motor_off(start, sim):
+    drives = sim(st=())
+    case = "the_acceleration_limit_holds"
+    run = start("conformance", "rmd", "-p", f"slcan:{drives.can}", "--spin", "--only", case)
+    eventually(lambda: drives.motor(1)["speed_dps"] > 10, "a motor that turns")
+    run.interrupt()
+    assert run.wait() == 130
+    assert drives.motor(1)["mode"] == "off"
 
 
 def test_a_failure_says_what_was_sent_expected_and_received(check, tmp_path):

@@ -16,6 +16,7 @@ use screen::Screen;
 use world::Commands;
 
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::output;
 
 pub fn run(args: Args) -> Result<(), Failure> {
@@ -32,6 +33,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let options = rmd::Options { id, encoder, allowed: run.allowed() };
             let world = Box::new(Commands::new(&run));
             let bench = rmd::Bench::new(Box::new(Real::new(link)), world, options);
+            interrupt::take_over();
             conduct("rmd", &run, rmd::suite(), bench)
         }
         Command::Clauses { which: Which::St, profile } => {
@@ -61,6 +63,9 @@ fn conduct<B: Subject>(
     let report = run_cases(&suite, &mut bench, |outcome| screen.show(outcome));
     screen.summary(&report)?;
     save(name, run, &report)?;
+    if interrupt::interrupted() {
+        return Err(Failure::Interrupted);
+    }
     verdict(&report)
 }
 

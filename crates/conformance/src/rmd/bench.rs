@@ -155,6 +155,14 @@ impl Bench {
         Ok(())
     }
 
+    /// Ends the run when the user wants it.
+    pub(super) fn go_on(&self) -> Result<(), Stop> {
+        match self.world.interrupted() {
+            true => Err(Stop::Lost("interrupted".to_owned())),
+            false => Ok(()),
+        }
+    }
+
     /// The time on the bus, ms.
     pub(super) fn millis(&self) -> u64 {
         self.bus.now().0 / 1000
@@ -230,6 +238,7 @@ impl Bench {
 
 impl Subject for Bench {
     fn begin(&mut self) -> Result<(), Stop> {
+        self.go_on()?;
         if let Some((dialect, id)) = self.foreign {
             return Err(Stop::Lost(format!(
                 "motor {id} answers as {dialect} motors do: it does not speak V1.62 and is not driven"

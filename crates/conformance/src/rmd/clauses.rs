@@ -78,7 +78,7 @@ pub static CLAUSES: &[Clause] = &[
         .host(LIST),
     Clause::new("RMD-2-23", "The command byte 0xA6 closes the position loop, command 4.")
         .host(LIST),
-    Clause::new("RMD-2-24", "A command byte that the list does not have is no command: it gets no reply.")
+    Clause::new("RMD-2-24", "A command byte that the list does not have is no command: it has no effect and gets no reply (SPEC-NOTES R28).")
         .host(&["a_code_that_nobody_knows_is_sent_and_answered_by_silence"]),
 
     Clause::new("RMD-30-01", "The host asks for the gains with DATA[0] = 0x30 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")

@@ -157,13 +157,12 @@ impl Bench {
             return Ok(());
         }
         let off = if kept.moved { self.switch_off() } else { Ok(()) };
-        let others = kept.others.map(|motor| CanFrame::new(motor.can_id(), Off.encode()));
-        self.collect(&others.collect::<Vec<_>>())?;
+        let others = self.switch_others_off(kept.others);
         let fault = if kept.fault { self.end_fault() } else { Ok(()) };
         let rom = self.put_back_rom(&kept);
         let gains = kept.gains.map_or(Ok(()), |gains| self.put_back_gains(gains));
         let acceleration = kept.acceleration.map_or(Ok(()), |a| self.put_back_acceleration(a));
-        off.and(fault).and(rom).and(gains).and(acceleration)
+        off.and(others).and(fault).and(rom).and(gains).and(acceleration)
     }
 
     /// Off, and then a look whether it is. A motor that goes on is told to stop instead, and is not
@@ -182,6 +181,14 @@ impl Bench {
             return Err(failed);
         }
         told.map(|_| ())
+    }
+
+    fn switch_others_off(&mut self, motors: MotorSet) -> Result<(), Stop> {
+        if motors.is_empty() {
+            return Ok(());
+        }
+        let off = motors.map(|motor| CanFrame::new(motor.can_id(), Off.encode()));
+        self.collect(&off.collect::<Vec<_>>()).map(|_| ())
     }
 
     fn end_fault(&mut self) -> Result<(), Stop> {

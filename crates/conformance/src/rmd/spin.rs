@@ -69,6 +69,7 @@ impl Bench {
     ) -> Result<bool, Stop> {
         let begun = self.millis();
         loop {
+            self.go_on()?;
             let status = self.read(ReadStatus2)?;
             if status.speed.0.unsigned_abs() > FAST {
                 let failed = self.failed(format!("no more than {FAST} °/s in any move"));

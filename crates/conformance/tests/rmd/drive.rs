@@ -101,11 +101,14 @@ impl CanStation for Station {
 pub type Shared = Rc<RefCell<Virtual<Station, CanFrame>>>;
 
 /// The hand at the power switch.
-struct Around(Shared);
+struct Around {
+    bus: Shared,
+    interrupted: Option<Instant>,
+}
 
 impl World for Around {
     fn power_cycle(&mut self) -> Result<(), Unavailable> {
-        let mut bus = self.0.borrow_mut();
+        let mut bus = self.bus.borrow_mut();
         let now = bus.now();
         let Station { motors, behaviour, powered_on, .. } = &mut bus.station;
         motors.now = now;
@@ -119,13 +122,17 @@ impl World for Around {
     }
 
     fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
-        let mut bus = self.0.borrow_mut();
+        let mut bus = self.bus.borrow_mut();
         let faults = if present { Errors::LOW_VOLTAGE } else { Errors::NONE };
         let motors = &mut bus.station.motors;
         for id in motors.ids() {
             motors.bus.node_mut(id).expect("it is there").motor_mut().hold_faults(faults);
         }
         Ok(())
+    }
+
+    fn interrupted(&self) -> bool {
+        self.interrupted.is_some_and(|moment| self.bus.borrow().now() >= moment)
     }
 }
 
@@ -166,17 +173,26 @@ pub struct Setup {
     pub suite: Vec<Case<Bench>>,
     /// What is between the kit and the bus.
     pub port: fn(Shared) -> Box<dyn Bus>,
+    /// When the user has had enough.
+    pub interrupted: Option<Instant>,
 }
 
 impl Setup {
     pub fn new(motors: Vec<RmdConfig>) -> Self {
         let port: fn(Shared) -> Box<dyn Bus> = |bus| Box::new(bus);
-        Setup { motors, allowed: &EVERYTHING, behaviour: honest(), suite: suite(), port }
+        Setup {
+            motors,
+            allowed: &EVERYTHING,
+            behaviour: honest(),
+            suite: suite(),
+            port,
+            interrupted: None,
+        }
     }
 
     /// Puts the first motor through the suite.
     pub fn run(self) -> Tested {
-        let Setup { motors, allowed, behaviour, suite, port } = self;
+        let Setup { motors, allowed, behaviour, suite, port, interrupted } = self;
         let node = |config: &RmdConfig| {
             RmdNode::new(Instant(0), *config, config.factory_rom()).expect("a fair configuration")
         };
@@ -187,7 +203,7 @@ impl Setup {
         let station = Station { motors, behaviour, energised: false, powered_on: 0, fastest: 0.0 };
         let bus = Rc::new(RefCell::new(Virtual::new(station)));
         let options = Options { id, encoder, allowed: allowed.to_vec() };
-        let world = Box::new(Around(Rc::clone(&bus)));
+        let world = Box::new(Around { bus: Rc::clone(&bus), interrupted });
         let report = run(&suite, &mut Bench::new(port(Rc::clone(&bus)), world, options), |_| {});
         // What was told last gets its time.
         let now = bus.borrow().now();

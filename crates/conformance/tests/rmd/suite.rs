@@ -1,7 +1,9 @@
 //! Simulated motors pass, and are afterwards what they were.
 
+use motorlink_conformance::rmd::suite;
 use motorlink_conformance::{Report, Verdict};
-use motorlink_proto::rmd::Mode;
+use motorlink_proto::rmd::{Errors, Mode, Settings};
+use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::RmdConfig;
 
 use crate::drive::{Setup, Tested, motor};
@@ -10,6 +12,22 @@ use crate::drive::{Setup, Tested, motor};
 fn names(report: &Report, verdict: &str) -> Vec<String> {
     let cases = report.outcomes.iter().filter(|outcome| outcome.verdict.word() == verdict);
     cases.map(|outcome| outcome.name.clone()).collect()
+}
+
+#[test]
+fn an_interrupted_run_leaves_the_motor_off_and_as_it_was() {
+    let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
+    let mut suite = suite();
+    suite.retain(|case| {
+        case.name == "a_speed_is_reached_either_way" || case.name == "status_2_can_be"
+    });
+    suite.reverse();
+    // By then the motor turns.
+    let interrupted = Some(Instant(300_000));
+    let tested = Setup { suite, interrupted, ..Setup::new(vec![motor(1)]) }.run();
+    assert!(tested.station(|station| station.fastest > 40.0));
+    assert_eq!((tested.report.count("not run"), tested.report.lost()), (2, "interrupted"));
+    assert_eq!(settings(&tested), settings(&before));
 }
 
 fn passes(tested: &Tested) {
@@ -57,16 +75,18 @@ fn a_motor_with_another_id_passes() {
 fn a_motor_is_afterwards_what_it_was() {
     let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
     let after = Setup::new(vec![motor(1)]).run();
-    let settings = |tested: &Tested| {
-        tested.station(|station| {
-            let drive = station.motors.first().drive();
-            (*drive.settings(), *drive.rom(), drive.mode(), drive.errors())
-        })
-    };
     assert_eq!(settings(&after), settings(&before));
     assert_eq!(settings(&after).2, Mode::Off);
     let writes = after.station(|station| station.motors.first().motor().rom_writes());
     assert_eq!(writes, ROM_WRITES, "a case more or less that wears the ROM");
+}
+
+/// What a motor is, as far as anything can change it.
+fn settings(tested: &Tested) -> (Settings, Settings, Mode, Errors) {
+    tested.station(|station| {
+        let drive = station.motors.first().drive();
+        (*drive.settings(), *drive.rom(), drive.mode(), drive.errors())
+    })
 }
 
 /// Eleven cases write a ROM: most of them once, an echo three times, two about zero twice; and
