@@ -36,7 +36,7 @@ pub struct Bench {
     pub(super) runaway: bool,
     /// Whether the motor was heard at all.
     pub(super) heard: bool,
-    transcript: Vec<String>,
+    transcript: Vec<(Direction, CanFrame)>,
     sent: Vec<CanFrame>,
     received: Vec<CanFrame>,
 }
@@ -208,7 +208,7 @@ impl Bench {
         self.sent.clear();
         self.received.clear();
         for frame in frames {
-            self.transcript.push(format!("> {}", words(frame, Direction::HostToDrive)));
+            self.transcript.push((Direction::HostToDrive, *frame));
             self.sent.push(*frame);
             self.bus.send(frame)?;
         }
@@ -218,7 +218,7 @@ impl Bench {
     /// The next frame.
     fn hear(&mut self, until: Instant) -> Result<Option<CanFrame>, Stop> {
         let Some(frame) = self.bus.receive(until)? else { return Ok(None) };
-        self.transcript.push(format!("< {}", words(&frame, Direction::DriveToHost)));
+        self.transcript.push((Direction::DriveToHost, frame));
         self.received.push(frame);
         self.heard |= self.is_own(&frame);
         let foreign = Dialect::from_can_id(frame.id()).filter(|_| !frame.is_extended());
@@ -263,6 +263,10 @@ impl Subject for Bench {
     }
 
     fn transcript(&self) -> Vec<String> {
-        self.transcript.clone()
+        let line = |(direction, frame): &(Direction, CanFrame)| {
+            let arrow = if *direction == Direction::HostToDrive { '>' } else { '<' };
+            format!("{arrow} {}", words(frame, *direction))
+        };
+        self.transcript.iter().map(line).collect()
     }
 }
