@@ -363,7 +363,7 @@ pub static CLAUSES: &[Clause] = &[
         .host(&["a_single_turn_command_outside_the_range_of_the_document_is_refused"]),
     Clause::new("RMD-A5-03", "With direction 0x00 the motor turns clockwise.")
         .host(VECTORS),
-    Clause::new("RMD-A5-04", "With direction 0x01 the motor turns counterclockwise.")
+    Clause::new("RMD-A5-04", "With direction 0x01 the motor turns counterclockwise; any other is answered and not carried out (SPEC-NOTES R15).")
         .host(VECTORS),
     Clause::new("RMD-A5-05", "The same command again starts no further turn (SPEC-NOTES R16)."),
     Clause::new("RMD-A5-06", "Max Speed of the vendor's tool limits the speed.")
@@ -389,7 +389,7 @@ pub static CLAUSES: &[Clause] = &[
         .host(&["a_single_turn_command_outside_the_range_of_the_document_is_refused"]),
     Clause::new("RMD-A6-03", "With direction 0x00 the motor turns clockwise.")
         .host(VECTORS),
-    Clause::new("RMD-A6-04", "With direction 0x01 the motor turns counterclockwise.")
+    Clause::new("RMD-A6-04", "With direction 0x01 the motor turns counterclockwise; any other is answered and not carried out (SPEC-NOTES R15).")
         .host(VECTORS),
     Clause::new("RMD-A6-05", "The same command again starts no further turn (SPEC-NOTES R16)."),
     Clause::new("RMD-A6-06", "It turns no faster than the greatest speed says, 1 °/s a digit."),
@@ -411,7 +411,7 @@ pub static CLAUSES: &[Clause] = &[
         .host(&["the_four_torques_go_to_the_motors_one_to_four"]),
     Clause::new("RMD-280-02", "It has the torque currents of motors 1 to 4 in this order, int16 each, low byte first.")
         .host(&["the_four_torques_go_to_the_motors_one_to_four"]),
-    Clause::new("RMD-280-03", "A digit is 16 mA, the range ±2000 digits for ±32 A.")
+    Clause::new("RMD-280-03", "A digit is 16 mA, as in RMD-A1-02 and with the range of RMD-A1-03.")
         .host(&["four_torques_are_refused_as_a_whole"]),
     Clause::new("RMD-280-04", "It reaches motors 1 to 4 and no other.")
         .host(&["an_unexpected_answer_to_four_torques_is_not_taken_for_another_exchange"]),

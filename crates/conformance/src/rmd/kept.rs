@@ -224,20 +224,14 @@ impl Bench {
     }
 
     fn put_back_gains(&mut self, gains: Gains) -> Result<(), Stop> {
-        if self.read(ReadGains)? != gains {
-            self.ask(WriteGains(gains).encode())?;
-            let read = self.read(ReadGains)?;
-            self.require(read == gains, format!("the gains as they were: {gains:?}"))?;
-        }
-        Ok(())
+        self.ask(WriteGains(gains).encode())?;
+        let read = self.read(ReadGains)?;
+        self.require(read == gains, format!("the gains as they were: {gains:?}"))
     }
 
     fn put_back_acceleration(&mut self, acceleration: DpsPerSecond) -> Result<(), Stop> {
-        if self.read(ReadAcceleration)?.acceleration != acceleration {
-            self.ask(WriteAcceleration(Acceleration { acceleration }).encode())?;
-            let read = self.read(ReadAcceleration)?.acceleration;
-            self.require(read == acceleration, format!("the limit as it was: {acceleration}"))?;
-        }
-        Ok(())
+        self.ask(WriteAcceleration(Acceleration { acceleration }).encode())?;
+        let read = self.read(ReadAcceleration)?.acceleration;
+        self.require(read == acceleration, format!("the limit as it was: {acceleration}"))
     }
 }

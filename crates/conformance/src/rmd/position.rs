@@ -48,7 +48,7 @@ const TURNS: [(Code, Turn, [Clauses; 5]); 2] = [
             &["RMD-A5-04", "RMD-A5-02"],
             &["RMD-A5-05"],
             &["RMD-A5-02"],
-            &["RMD-A5-03"],
+            &["RMD-A5-04"],
         ],
     ),
     (
@@ -59,7 +59,7 @@ const TURNS: [(Code, Turn, [Clauses; 5]); 2] = [
             &["RMD-A6-04", "RMD-A6-02"],
             &["RMD-A6-05"],
             &["RMD-A6-02"],
-            &["RMD-A6-03"],
+            &["RMD-A6-04"],
         ],
     ),
 ];

@@ -82,7 +82,7 @@ fn a_motor_is_afterwards_what_it_was() {
 }
 
 /// What a motor is, as far as anything can change it.
-fn settings(tested: &Tested) -> (Settings, Settings, Mode, Errors) {
+pub fn settings(tested: &Tested) -> (Settings, Settings, Mode, Errors) {
     tested.station(|station| {
         let drive = station.motors.first().drive();
         (*drive.settings(), *drive.rom(), drive.mode(), drive.errors())

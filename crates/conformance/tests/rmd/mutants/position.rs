@@ -38,7 +38,7 @@ fn mutants() -> Vec<Mutant> {
         }),
         mutant("a5_turns_the_other_way", "RMD-A5-03", on(0xA5, |data| data[1] ^= 1)),
         mutant("a5_always_turns_clockwise", "RMD-A5-04", on(0xA5, |data| data[1] = 0)),
-        mutant("a5_takes_another_direction_for_clockwise", "RMD-A5-03", {
+        mutant("a5_takes_another_direction_for_clockwise", "RMD-A5-04", {
             on(0xA5, |data| {
                 if data[1] > 1 {
                     data[1] = 0;
