@@ -101,7 +101,8 @@ impl Bench {
         Ok(data)
     }
 
-    fn in_form(&self, reply: &CanFrame) -> Result<[u8; 8], Stop> {
+    /// The data of a reply, which has to be a frame of the protocol.
+    pub(super) fn in_form(&self, reply: &CanFrame) -> Result<[u8; 8], Stop> {
         let usable = reply.usable().map(|(_, data)| *data);
         usable.ok_or_else(|| self.failed("a standard data frame of 8 bytes"))
     }

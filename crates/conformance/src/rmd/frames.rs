@@ -104,19 +104,14 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         case("unknown_command_bytes_are_met_with_silence", &["RMD-2-24"], |bench| {
             unknown(bench, nobodys().collect())
         }),
-        case(
-            // A relative's firmware may take these for commands that turn the motor or write.
-            "command_bytes_of_related_protocols_are_met_with_silence",
-            &["RMD-2-24"],
-            |bench| {
-                bench.keep_gains()?;
-                bench.keep_acceleration()?;
-                bench.may_move();
-                let known = |code: &u8| Code::from(*code).info().is_some();
-                let ours = (0..=u8::MAX).filter(|code| !known(code));
-                unknown(bench, ours.filter(|code| !nobodys().any(|free| free == *code)).collect())
-            },
-        )
+        case("command_bytes_of_related_protocols_are_met_with_silence", &["RMD-2-24"], |bench| {
+            bench.keep_gains()?;
+            bench.keep_acceleration()?;
+            bench.may_move();
+            let known = |code: &u8| Code::from(*code).info().is_some();
+            let ours = (0..=u8::MAX).filter(|code| !known(code));
+            unknown(bench, ours.filter(|code| !nobodys().any(|free| free == *code)).collect())
+        })
         .needs(&[Need::Spin, Need::Rom]),
     ];
     for (code, answered, null_reply, null_request) in QUESTIONS {

@@ -5,6 +5,10 @@
 //! 0x81 are sent, to a motor that is at rest: one that holds a load without showing current is let go
 //! of. Moves are slow, from a few degrees to a turn, and end switched off.
 //!
+//! Command bytes of related protocols, which a motor of this one must not know, are only sent where
+//! both [`Need::Spin`](crate::Need::Spin) and [`Need::Rom`](crate::Need::Rom) are allowed: firmware
+//! that does know them may move, or write.
+//!
 //! Gains in ROM cannot be read without a power cycle. Where none is at hand, those in RAM are taken
 //! for them: try [`Need::Rom`](crate::Need::Rom) on a motor that was just switched on.
 
