@@ -78,7 +78,7 @@ fn demands(clauses: &[&str]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A line a paragraph, in the order of the suite.
+/// A line a paragraph, in the order of the document.
 fn paragraphs(report: &Report) -> Result<(), Failure> {
     let mut table: Vec<(&str, [usize; 4])> = Vec::new();
     for outcome in &report.outcomes {
@@ -99,6 +99,7 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
             }
         }
     }
+    table.sort_by_key(|(paragraph, _)| place(paragraph));
     output::line(&format!(
         "{:<10} {:>7} {:>7} {:>8} {:>8}",
         "paragraph", "passed", "failed", "skipped", "not run"
@@ -109,6 +110,14 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
         total.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
     }
     counted("all", total)
+}
+
+/// The numbers of a paragraph, so that 4.10 comes behind 4.9. Where there are none, as in the codes
+/// of commands, the order is that of the text.
+fn place(paragraph: &str) -> (Vec<u32>, &str) {
+    let numbers = paragraph.rsplit('-').next().unwrap_or_default().split('.');
+    let numbers: Option<Vec<u32>> = numbers.map(|number| number.parse().ok()).collect();
+    (numbers.unwrap_or_default(), paragraph)
 }
 
 fn counted(name: &str, [passed, failed, skipped, not_run]: [usize; 4]) -> Result<(), Failure> {
