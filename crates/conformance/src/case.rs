@@ -48,6 +48,9 @@ pub enum Stop {
     /// The port failed: nothing is known about the drive.
     #[error(transparent)]
     Port(#[from] PortError),
+    /// The drive cannot be tested any further, such as one that does not answer at all; why.
+    #[error("{0}")]
+    Lost(String),
 }
 
 impl From<Unavailable> for Stop {
@@ -99,8 +102,8 @@ impl<B> Case<B> {
     }
 }
 
-/// Puts a drive through the cases; `progress` sees each outcome as it comes. When the port fails the
-/// rest is not run, and the report says so.
+/// Puts a drive through the cases; `progress` sees each outcome as it comes. When the port fails, or
+/// the drive is lost, the rest is not run, and the report says so.
 pub fn run<B: Subject>(
     cases: &[Case<B>],
     bench: &mut B,
@@ -109,19 +112,12 @@ pub fn run<B: Subject>(
     let mut report = Report::default();
     let mut dead: Option<String> = None;
     for case in cases {
-        let verdict = match &dead {
-            Some(why) => Verdict::NotRun(why.clone()),
-            None => {
-                let missing = case.needs.iter().find(|&&need| !bench.allows(need));
-                match missing {
-                    Some(need) => Verdict::Skipped(need.unmet().to_owned()),
-                    None => conduct(case, bench),
-                }
-            }
+        let missing = case.needs.iter().find(|&&need| !bench.allows(need));
+        let verdict = match (&dead, missing) {
+            (Some(why), _) => Verdict::NotRun(why.clone()),
+            (None, Some(need)) => Verdict::Skipped(need.unmet().to_owned()),
+            (None, None) => conduct(case, bench, &mut dead),
         };
-        if let Verdict::NotRun(why) = &verdict {
-            dead.get_or_insert_with(|| why.clone());
-        }
         let transcript = match verdict {
             Verdict::Failed(_) => bench.transcript(),
             _ => Vec::new(),
@@ -135,17 +131,35 @@ pub fn run<B: Subject>(
 }
 
 /// A case between `begin` and `restore`. A drive that cannot be restored fails the case, too: the
-/// user has to know.
-fn conduct<B: Subject>(case: &Case<B>, bench: &mut B) -> Verdict {
-    let outcome = bench.begin().and_then(|()| (case.run)(bench));
-    let restored = bench.restore();
+/// user has to know. `dead` is told why nothing more can be run.
+fn conduct<B: Subject>(case: &Case<B>, bench: &mut B, dead: &mut Option<String>) -> Verdict {
+    let begun = bench.begin();
+    // What cannot be begun with has nothing to be restored.
+    let (outcome, restored) = match begun {
+        Err(stop @ (Stop::Port(_) | Stop::Lost(_))) => (Err(stop), Ok(())),
+        begun => (begun.and_then(|()| (case.run)(bench)), bench.restore()),
+    };
+    for result in [&outcome, &restored] {
+        if let Err(stop @ (Stop::Port(_) | Stop::Lost(_))) = result {
+            dead.get_or_insert_with(|| stop.to_string());
+        }
+    }
     match (outcome, restored) {
-        (Err(Stop::Port(error)), _) | (_, Err(Stop::Port(error))) => {
-            Verdict::NotRun(error.to_string())
+        (Err(Stop::Failed(mut finding)), Err(Stop::Failed(left))) => {
+            let Finding { sent, expected, received } = *left;
+            finding.received += &format!(
+                "; and it was not left as it was found: sent {sent}, expected {expected}, received \
+                 {received}"
+            );
+            Verdict::Failed(finding)
         }
         (Err(Stop::Failed(finding)), _) | (_, Err(Stop::Failed(finding))) => {
             Verdict::Failed(finding)
         }
+        (Err(Stop::Port(error)), _) | (_, Err(Stop::Port(error))) => {
+            Verdict::NotRun(error.to_string())
+        }
+        (Err(Stop::Lost(why)), _) | (_, Err(Stop::Lost(why))) => Verdict::NotRun(why),
         (Err(Stop::Skipped(why)), _) | (_, Err(Stop::Skipped(why))) => Verdict::Skipped(why),
         (Ok(()), Ok(())) => Verdict::Passed,
     }
@@ -160,5 +174,104 @@ impl Need {
             Need::PowerCycle => "needs the power cycled: give a command with --power-cycle",
             Need::Fault => "needs a fault caused: give commands with --fault-on and --fault-off",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive whose `begin` and `restore` end as they are told to.
+    #[derive(Default)]
+    struct Told {
+        begin: Option<Stop>,
+        restore: Option<Stop>,
+        restored: u32,
+    }
+
+    impl Subject for Told {
+        fn begin(&mut self) -> Result<(), Stop> {
+            self.begin.take().map_or(Ok(()), Err)
+        }
+
+        fn restore(&mut self) -> Result<(), Stop> {
+            self.restored += 1;
+            self.restore.take().map_or(Ok(()), Err)
+        }
+
+        fn allows(&self, need: Need) -> bool {
+            need == Need::Spin
+        }
+
+        fn transcript(&self) -> Vec<String> {
+            Vec::new()
+        }
+    }
+
+    fn failed(what: &str) -> Stop {
+        let [sent, expected, received] = ["sent", "expected", "received"].map(|s| s.to_owned());
+        let expected = format!("{expected} {what}");
+        Stop::Failed(Box::new(Finding { sent, expected, received }))
+    }
+
+    fn lost() -> Stop {
+        Stop::Lost("it is gone".to_owned())
+    }
+
+    /// Runs two cases, of which the first ends as told; their verdicts.
+    fn verdicts(told: &mut Told, first: fn() -> Result<(), Stop>) -> [Verdict; 2] {
+        let cases =
+            [Case::new("first", &[], move |_| first()), Case::new("second", &[], |_| Ok(()))];
+        let report = run(&cases, told, |_| {});
+        report
+            .outcomes
+            .into_iter()
+            .map(|outcome| outcome.verdict)
+            .collect::<Vec<_>>()
+            .try_into()
+            .unwrap()
+    }
+
+    #[test]
+    fn a_case_that_cannot_be_undone_fails_and_says_so() {
+        let mut told = Told { restore: Some(failed("to be undone")), ..Told::default() };
+        let [first, second] = verdicts(&mut told, || Ok(()));
+        assert!(matches!(first, Verdict::Failed(finding) if finding.expected.contains("undone")));
+        assert_eq!(second, Verdict::Passed);
+
+        let mut told = Told { restore: Some(failed("to be undone")), ..Told::default() };
+        let [first, _] = verdicts(&mut told, || Err(failed("to hold")));
+        let Verdict::Failed(finding) = first else { panic!("{first:?}") };
+        assert_eq!(finding.expected, "expected to hold");
+        assert!(
+            finding
+                .received
+                .contains("not left as it was found: sent sent, expected expected to be undone")
+        );
+    }
+
+    #[test]
+    fn a_drive_that_is_lost_ends_the_run_and_keeps_what_was_found() {
+        let mut told = Told { restore: Some(lost()), ..Told::default() };
+        let [first, second] = verdicts(&mut told, || Err(failed("to hold")));
+        assert!(matches!(first, Verdict::Failed(_)), "{first:?}");
+        assert_eq!(second, Verdict::NotRun("it is gone".to_owned()));
+
+        let mut told = Told::default();
+        let [first, second] = verdicts(&mut told, || Err(lost()));
+        assert_eq!([first, second], [(); 2].map(|()| Verdict::NotRun("it is gone".to_owned())));
+        assert_eq!(told.restored, 1, "what the case did is undone");
+
+        let mut told = Told { begin: Some(lost()), ..Told::default() };
+        verdicts(&mut told, || Ok(()));
+        assert_eq!(told.restored, 0, "nothing was done");
+    }
+
+    #[test]
+    fn what_is_not_allowed_is_skipped_with_what_to_do() {
+        let cases = [Case::new("rom", &[], |_: &mut Told| Ok(())).needs(&[Need::Spin, Need::Rom])];
+        let report = run(&cases, &mut Told::default(), |_| {});
+        let Verdict::Skipped(why) = &report.outcomes[0].verdict else { panic!("not skipped") };
+        assert!(why.contains("--write-rom"), "{why}");
     }
 }

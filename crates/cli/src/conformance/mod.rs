@@ -19,6 +19,7 @@ use screen::Screen;
 use world::Commands;
 
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::output;
 
 pub fn run(args: Args) -> Result<(), Failure> {
@@ -35,6 +36,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let options = rmd::Options { id, encoder, allowed: run.allowed() };
             let world = Box::new(Commands::new(&run));
             let bench = rmd::Bench::new(Box::new(Real::new(link)), world, options);
+            interrupt::take_over();
             conduct("rmd", &run, rmd::suite(), bench)
         }
         Command::Host(args) => host::run(&args),
@@ -61,6 +63,9 @@ fn conduct<B: Subject>(
     let report = run_cases(&suite, &mut bench, |outcome| screen.show(outcome));
     screen.summary(&report)?;
     results.save(name, &report)?;
+    if interrupt::interrupted() {
+        return Err(Failure::Interrupted);
+    }
     verdict(&report, "the drive")
 }
 
@@ -113,7 +118,7 @@ fn verdict(report: &Report, who: &str) -> Result<(), Failure> {
             report.failed().count(),
             report.outcomes.len()
         ))),
-        count => Err(Failure::Line(format!("the port failed: {count} cases were not run"))),
+        count => Err(Failure::Line(format!("{count} cases were not run: {}", report.lost()))),
     }
 }
 

@@ -3,7 +3,7 @@
 
 use console::style;
 use indicatif::ProgressBar;
-use motorlink_conformance::{Outcome, Report, Verdict};
+use motorlink_conformance::{Outcome, Report, Verdict, rmd, st};
 
 use crate::failure::Failure;
 use crate::output;
@@ -33,7 +33,7 @@ impl Screen {
             return Ok(());
         }
         for outcome in &report.outcomes {
-            if self.verbose || matches!(outcome.verdict, Verdict::Failed(_) | Verdict::NotRun(_)) {
+            if self.verbose || matches!(outcome.verdict, Verdict::Failed(_)) {
                 row(outcome)?;
             }
         }
@@ -56,15 +56,29 @@ fn row(outcome: &Outcome) -> Result<(), Failure> {
     ))?;
     match &outcome.verdict {
         Verdict::Passed => Ok(()),
-        Verdict::Failed(finding) => output::line(&format!(
-            "           sent     {}\n           expected {}\n           received {}",
-            finding.sent, finding.expected, finding.received
-        )),
+        Verdict::Failed(finding) => {
+            output::line(&format!(
+                "           sent     {}\n           expected {}\n           received {}",
+                finding.sent, finding.expected, finding.received
+            ))?;
+            demands(outcome.clauses)
+        }
         Verdict::Skipped(why) | Verdict::NotRun(why) => output::line(&format!("           {why}")),
     }
 }
 
-/// A line a paragraph, in the order of the suite.
+/// What the clauses of a case demand.
+fn demands(clauses: &[&str]) -> Result<(), Failure> {
+    for id in clauses {
+        let mut all = st::CLAUSES.iter().chain(rmd::CLAUSES);
+        if let Some(clause) = all.find(|clause| clause.id == *id) {
+            output::line(&format!("           {id:<10} {}", style(clause.text).dim()))?;
+        }
+    }
+    Ok(())
+}
+
+/// A line a paragraph, in the order of the document.
 fn paragraphs(report: &Report) -> Result<(), Failure> {
     let mut table: Vec<(&str, [usize; 4])> = Vec::new();
     for outcome in &report.outcomes {
@@ -85,6 +99,7 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
             }
         }
     }
+    table.sort_by_key(|(paragraph, _)| place(paragraph));
     output::line(&format!(
         "{:<10} {:>7} {:>7} {:>8} {:>8}",
         "paragraph", "passed", "failed", "skipped", "not run"
@@ -95,6 +110,14 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
         total.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
     }
     counted("all", total)
+}
+
+/// The numbers of a paragraph, so that 4.10 comes behind 4.9. Where there are none, as in the codes
+/// of commands, the order is that of the text.
+fn place(paragraph: &str) -> (Vec<u32>, &str) {
+    let numbers = paragraph.rsplit('-').next().unwrap_or_default().split('.');
+    let numbers: Option<Vec<u32>> = numbers.map(|number| number.parse().ok()).collect();
+    (numbers.unwrap_or_default(), paragraph)
 }
 
 fn counted(name: &str, [passed, failed, skipped, not_run]: [usize; 4]) -> Result<(), Failure> {

@@ -1,8 +1,12 @@
-//! A motor on a CAN bus.
+//! A motor on a CAN bus: what is said to it and what it says.
 
-use motorlink_proto::rmd::{CanFrame, EncoderBits, MotorId};
-use motorlink_proto::time::Duration;
+use motorlink_proto::rmd::{
+    CanFrame, Code, Command, Dialect, Direction, EncoderBits, MotorId, Payload,
+};
+use motorlink_proto::time::{Duration, Instant};
 
+use super::kept::Kept;
+use super::words::{lines, words};
 use crate::case::{Finding, Need, Stop, Subject};
 use crate::wire::Bus;
 use crate::world::World;
@@ -19,64 +23,240 @@ pub struct Options {
 }
 
 /// A motor on a bus.
+///
+/// A motor that answers on the identifiers of another protocol is not spoken to any further.
 pub struct Bench {
     bus: Box<dyn Bus>,
-    world: Box<dyn World>,
-    options: Options,
-    transcript: Vec<String>,
-    sent: Option<CanFrame>,
-    received: Option<CanFrame>,
+    pub(super) world: Box<dyn World>,
+    pub(super) options: Options,
+    pub(super) kept: Kept,
+    /// What of another protocol was heard.
+    pub(super) foreign: Option<(Dialect, MotorId)>,
+    /// Whether the motor did not come to rest when it was switched off.
+    pub(super) runaway: bool,
+    /// Whether the motor was heard at all.
+    pub(super) heard: bool,
+    transcript: Vec<(Direction, CanFrame)>,
+    sent: Vec<CanFrame>,
+    received: Vec<CanFrame>,
 }
 
 /// How long a motor has for a reply: 50 times what real ones take.
-const PATIENCE: Duration = Duration::from_millis(100);
+pub(super) const PATIENCE: Duration = Duration::from_millis(100);
+/// Silence for this long means that nothing more comes: what a motor takes, and an adapter's delay.
+pub(super) const SILENCE: Duration = Duration::from_millis(50);
+/// More than this many frames that nobody asked for, one behind the other, is no bus to test on.
+const CROWD: usize = 1000;
 
 impl Bench {
     /// A bench for a motor on `bus`.
     pub fn new(bus: Box<dyn Bus>, world: Box<dyn World>, options: Options) -> Self {
-        Bench { bus, world, options, transcript: Vec::new(), sent: None, received: None }
-    }
-
-    /// Takes the motor's power away and gives it back.
-    pub fn power_cycle(&mut self) -> Result<(), Stop> {
-        Ok(self.world.power_cycle()?)
-    }
-
-    /// The reply to a request.
-    pub fn ask(&mut self, request: [u8; 8]) -> Result<[u8; 8], Stop> {
-        let frame = CanFrame::new(self.options.id.can_id(), request);
-        self.bus.send(&frame)?;
-        self.sent = Some(frame);
-        let until = self.bus.now() + PATIENCE;
-        self.received = self.bus.receive(until)?;
-        match self.received.as_ref().and_then(CanFrame::usable) {
-            Some((_, data)) => Ok(*data),
-            None => Err(self.failed("a reply")),
+        Bench {
+            bus,
+            world,
+            options,
+            kept: Kept::default(),
+            foreign: None,
+            runaway: false,
+            heard: false,
+            transcript: Vec::new(),
+            sent: Vec::new(),
+            received: Vec::new(),
         }
     }
 
+    /// The motor that is tested.
+    pub(super) fn id(&self) -> MotorId {
+        self.options.id
+    }
+
+    /// A frame to the motor.
+    pub(super) fn frame(&self, data: [u8; 8]) -> CanFrame {
+        CanFrame::new(self.id().can_id(), data)
+    }
+
+    /// The reply to a request: the first frame that comes from the motor, in its form, with the
+    /// request's code.
+    pub(super) fn ask(&mut self, request: [u8; 8]) -> Result<[u8; 8], Stop> {
+        let data = self.ask_frame(&self.frame(request))?;
+        self.answers_to(request, data)
+    }
+
+    /// The same, and that nothing comes behind it.
+    pub(super) fn ask_once(&mut self, request: [u8; 8]) -> Result<[u8; 8], Stop> {
+        let replies = self.answers(&[self.frame(request)])?;
+        match &replies[..] {
+            [reply] => {
+                let data = self.in_form(reply)?;
+                self.answers_to(request, data)
+            }
+            _ => Err(self.failed("one reply, and not another within 50 ms")),
+        }
+    }
+
+    fn answers_to(&self, request: [u8; 8], data: [u8; 8]) -> Result<[u8; 8], Stop> {
+        let code = request[0];
+        let printed = code == u8::from(Code::ClearErrors) && data[0] == u8::from(Code::ReadStatus1);
+        self.require(data[0] == code || printed, format!("a reply with DATA[0] = {code:02X}"))?;
+        Ok(data)
+    }
+
+    /// The data of a reply, which has to be a frame of the protocol.
+    pub(super) fn in_form(&self, reply: &CanFrame) -> Result<[u8; 8], Stop> {
+        let usable = reply.usable().map(|(_, data)| *data);
+        usable.ok_or_else(|| self.failed("a standard data frame of 8 bytes"))
+    }
+
+    /// The reply to a frame, whatever its code.
+    pub(super) fn ask_frame(&mut self, frame: &CanFrame) -> Result<[u8; 8], Stop> {
+        self.say(&[*frame])?;
+        let until = self.bus.now() + PATIENCE;
+        let reply = loop {
+            match self.hear(until)? {
+                Some(frame) if self.is_own(&frame) => break frame,
+                Some(_) if self.bus.now() < until => {}
+                _ => return Err(self.failed("a reply within 100 ms")),
+            }
+        };
+        self.in_form(&reply)
+    }
+
+    /// The reply to a command, as values.
+    pub(super) fn read<C: Command>(&mut self, command: C) -> Result<C::Reply, Stop> {
+        Ok(C::Reply::decode(&self.ask(command.encode())?))
+    }
+
+    /// All that comes of frames which are sent one behind the other, until silence.
+    pub(super) fn collect(&mut self, frames: &[CanFrame]) -> Result<Vec<CanFrame>, Stop> {
+        self.say(frames)?;
+        let mut until = self.bus.now() + SILENCE;
+        while self.received.len() < CROWD
+            && let Some(frame) = self.hear(until)?
+        {
+            if self.is_own(&frame) {
+                until = self.bus.now() + SILENCE;
+            }
+        }
+        Ok(self.received.clone())
+    }
+
+    /// All that the motor answers to frames.
+    pub(super) fn answers(&mut self, frames: &[CanFrame]) -> Result<Vec<CanFrame>, Stop> {
+        let mut frames = self.collect(frames)?;
+        frames.retain(|frame| self.is_own(frame));
+        Ok(frames)
+    }
+
+    /// Lets time pass.
+    pub(super) fn pause(&mut self, span: Duration) -> Result<(), Stop> {
+        let until = self.bus.now() + span;
+        while self.bus.now() < until {
+            self.hear(until)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the run when the user wants it.
+    pub(super) fn go_on(&self) -> Result<(), Stop> {
+        match self.world.interrupted() {
+            true => Err(Stop::Lost("interrupted".to_owned())),
+            false => Ok(()),
+        }
+    }
+
+    /// The time on the bus, ms.
+    pub(super) fn millis(&self) -> u64 {
+        self.bus.now().0 / 1000
+    }
+
     /// Fails the case unless `held`.
-    pub fn require(&self, held: bool, expected: &str) -> Result<(), Stop> {
+    pub(super) fn require(&self, held: bool, expected: impl Into<String>) -> Result<(), Stop> {
         if held { Ok(()) } else { Err(self.failed(expected)) }
     }
 
-    fn failed(&self, expected: &str) -> Stop {
+    /// The case has failed in what was said and heard last.
+    pub(super) fn failed(&self, expected: impl Into<String>) -> Stop {
         Stop::Failed(Box::new(Finding {
-            sent: format!("{:?}", self.sent),
-            expected: expected.to_owned(),
-            received: format!("{:?}", self.received),
+            sent: lines(&self.sent, Direction::HostToDrive),
+            expected: expected.into(),
+            received: lines(&self.received, Direction::DriveToHost),
         }))
+    }
+
+    /// Forgets what was said and heard.
+    pub(super) fn forget(&mut self) {
+        self.transcript.clear();
+        self.sent.clear();
+        self.received.clear();
+    }
+
+    /// Waits until the bus is silent; what came was not asked for.
+    pub(super) fn settle(&mut self, span: Duration) -> Result<(), Stop> {
+        for _ in 0..CROWD {
+            if self.hear(self.bus.now() + span)?.is_none() {
+                return Ok(());
+            }
+        }
+        Err(Stop::Lost(
+            "the bus is never silent: a motor can only be tested where nobody else speaks to it"
+                .to_owned(),
+        ))
+    }
+
+    /// Sends frames after what is waiting was taken.
+    fn say(&mut self, frames: &[CanFrame]) -> Result<(), Stop> {
+        self.settle(Duration(0))?;
+        self.sent.clear();
+        self.received.clear();
+        for frame in frames {
+            self.transcript.push((Direction::HostToDrive, *frame));
+            self.sent.push(*frame);
+            self.bus.send(frame)?;
+        }
+        Ok(())
+    }
+
+    /// The next frame.
+    fn hear(&mut self, until: Instant) -> Result<Option<CanFrame>, Stop> {
+        let Some(frame) = self.bus.receive(until)? else { return Ok(None) };
+        self.transcript.push((Direction::DriveToHost, frame));
+        self.received.push(frame);
+        self.heard |= self.is_own(&frame);
+        let foreign = Dialect::from_can_id(frame.id()).filter(|_| !frame.is_extended());
+        if let Some((dialect, id)) = foreign.filter(|(_, id)| *id == self.id()) {
+            self.foreign = Some((dialect, id));
+            let own = self.id().can_id();
+            return Err(self.failed(format!("a reply on {own:#05x}, not one of {dialect}")));
+        }
+        Ok(Some(frame))
+    }
+
+    /// Whether a frame has the motor's identifier.
+    pub(super) fn is_own(&self, frame: &CanFrame) -> bool {
+        frame.id() == u32::from(self.id().can_id())
     }
 }
 
 impl Subject for Bench {
     fn begin(&mut self) -> Result<(), Stop> {
-        self.transcript.clear();
+        self.go_on()?;
+        if let Some((dialect, id)) = self.foreign {
+            return Err(Stop::Lost(format!(
+                "motor {id} answers as {dialect} motors do: it does not speak V1.62 and is not driven"
+            )));
+        }
+        if self.runaway {
+            let id = self.id();
+            return Err(Stop::Lost(format!("motor {id} cannot be switched off: it is not driven")));
+        }
+        self.settle(Duration::from_millis(5))?;
+        self.at_rest()?;
+        self.forget();
         Ok(())
     }
 
     fn restore(&mut self) -> Result<(), Stop> {
-        Ok(())
+        self.put_back()
     }
 
     fn allows(&self, need: Need) -> bool {
@@ -84,6 +264,10 @@ impl Subject for Bench {
     }
 
     fn transcript(&self) -> Vec<String> {
-        self.transcript.clone()
+        let line = |(direction, frame): &(Direction, CanFrame)| {
+            let arrow = if *direction == Direction::HostToDrive { '>' } else { '<' };
+            format!("{arrow} {}", words(frame, *direction))
+        };
+        self.transcript.iter().map(line).collect()
     }
 }

@@ -1,23 +1,75 @@
 //! Motors that speak the RMD protocol V1.62.
+//!
+//! Nothing may turn the motor unless [`Need::Spin`](crate::Need::Spin) is allowed: neither 0x88 nor a
+//! motion command nor 0x280 is sent, not even with 0, for a motor under current may move. 0x80 and
+//! 0x81 are sent, to a motor that is at rest: one that holds a load without showing current is let go
+//! of. Moves are slow, from a few degrees to a turn, and end switched off.
+//!
+//! Command bytes of related protocols, which a motor of this one must not know, are only sent where
+//! both [`Need::Spin`](crate::Need::Spin) and [`Need::Rom`](crate::Need::Rom) are allowed: firmware
+//! that does know them may move, or write.
+//!
+//! Gains in ROM cannot be read without a power cycle. Where none is at hand, those in RAM are taken
+//! for them: try [`Need::Rom`](crate::Need::Rom) on a motor that was just switched on.
 
 mod bench;
 mod clauses;
+mod encoder;
+mod frames;
+mod kept;
+mod many;
+mod motion;
+mod position;
+mod power;
+mod settings;
+mod speed;
+mod spin;
+mod status;
+mod torque;
+mod words;
 
-use motorlink_proto::rmd::{Command, ReadStatus1};
+use std::borrow::Cow;
 
-use crate::case::Case;
+use motorlink_proto::rmd::Code;
+
+use crate::case::{Case, Stop};
 use crate::markdown::markdown;
 
 pub use bench::{Bench, Options};
 pub use clauses::CLAUSES;
 
-/// What a motor is put through.
+/// Ids of clauses.
+type Clauses = &'static [&'static str];
+
+/// What a motor is put through: first what leaves it alone, then whether it can be switched off.
 pub fn suite() -> Vec<Case<Bench>> {
-    vec![Case::new("status_1_is_answered_with_its_code", &["RMD-9A-01"], |bench: &mut Bench| {
-        let request = ReadStatus1.encode();
-        let reply = bench.ask(request)?;
-        bench.require(reply[0] == request[0], "DATA[0] of the request")
-    })]
+    let topics = [
+        frames::cases(),
+        settings::cases(),
+        status::cases(),
+        power::cases(),
+        encoder::cases(),
+        motion::cases(),
+        torque::cases(),
+        speed::cases(),
+        position::cases(),
+        many::cases(),
+    ];
+    topics.into_iter().flatten().collect()
+}
+
+/// A case on a motor.
+fn case(
+    name: impl Into<Cow<'static, str>>,
+    clauses: Clauses,
+    run: impl Fn(&mut Bench) -> Result<(), Stop> + 'static,
+) -> Case<Bench> {
+    Case::new(name, clauses, run)
+}
+
+/// The name of a case about a command.
+fn subject(name: &str, code: Code) -> String {
+    format!("{name}[{:#04X}]", u8::from(code))
 }
 
 /// Every clause and what tests it, as a Markdown table.

@@ -1,0 +1,234 @@
+//! Encoder, offset, zero and angles (0x90, 0x91, 0x19, 0x92, 0x94).
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::units::{CentiDegrees, SpeedLimit};
+
+use super::bench::Bench;
+use super::case;
+use super::frames::{filled, null_bytes_are_0, request};
+use crate::case::{Case, Need, Stop};
+
+/// What a rotor at rest may read apart from one reading to the next, degrees.
+const JITTER: f64 = 0.5;
+
+pub(super) fn cases() -> Vec<Case<Bench>> {
+    let mut cases = readings();
+    cases.extend(offset());
+    cases.extend(zero());
+    cases.push(
+        case("the_multi_turn_angle_falls_below_0", &["RMD-92-03", "RMD-92-04"], |bench| {
+            below_0(bench)
+        })
+        .needs(&[Need::Spin]),
+    );
+    cases
+}
+
+fn readings() -> Vec<Case<Bench>> {
+    vec![
+        case(
+            "the_position_is_the_original_position_minus_the_offset",
+            &["RMD-90-05", "RMD-90-04", "RMD-90-06", "RMD-90-07"],
+            |bench| {
+                let encoder = bench.read(ReadEncoder)?;
+                let Encoder { position, raw, offset } = encoder;
+                let due = (i32::from(raw) - i32::from(offset)).rem_euclid(bench.turn());
+                let words = format!("position {due}, that is {raw} - {offset}");
+                bench.require(i32::from(position) == due, words)
+            },
+        ),
+        case(
+            "encoder_values_are_within_the_encoders_width",
+            &["RMD-90-08", "RMD-280-08", "RMD-9C-06"],
+            |bench| {
+                let Encoder { position, raw, offset } = bench.read(ReadEncoder)?;
+                within_turn(bench, &[position, raw, offset])?;
+                let encoder = bench.read(ReadStatus2)?.encoder;
+                within_turn(bench, &[encoder])
+            },
+        ),
+        case("status_2_has_the_encoder_position", &["RMD-9C-06", "RMD-90-04"], |bench| {
+            let position = bench.read_position()?;
+            let read = bench.degrees(position);
+            let encoder = bench.read(ReadStatus2)?.encoder;
+            near(bench, bench.degrees(encoder), read, "the position that 0x90 reads")
+        }),
+        case("the_single_turn_angle_is_0_to_35999", &["RMD-94-04", "RMD-94-06"], |bench| {
+            let angle = bench.read(ReadCircleAngle)?.angle;
+            bench.require(angle.0 < FULL_TURN, "an angle of 0 to 35999")
+        }),
+        case(
+            "the_single_turn_angle_is_that_of_the_encoder",
+            &["RMD-94-05", "RMD-94-04"],
+            |bench| {
+                let position = bench.read_position()?;
+                let position = bench.degrees(position);
+                let angle = bench.read(ReadCircleAngle)?.angle.degrees();
+                near(bench, angle, position, "the angle of the encoder position in 0x90")
+            },
+        ),
+        case(
+            "the_multi_turn_angle_within_the_turn_is_the_single_turn_angle",
+            &["RMD-94-06", "RMD-92-05", "RMD-92-03"],
+            |bench| {
+                let circle = bench.read(ReadCircleAngle)?.angle.degrees();
+                let multi = bench.read(ReadMultiTurnAngle)?.angle.degrees();
+                near(bench, multi, circle, "modulo 360° the angle that 0x94 reads")
+            },
+        ),
+    ]
+}
+
+fn offset() -> Vec<Case<Bench>> {
+    vec![
+        case(
+            "a_written_offset_is_in_force",
+            &["RMD-91-02", "RMD-91-01", "RMD-91-04", "RMD-91-06", "RMD-2-07"],
+            |bench| {
+                let offset = bench.another_offset()?;
+                let reply = bench.ask_once(WriteEncoderOffset(offset).encode())?;
+                let reply = EncoderOffset::decode(&reply);
+                bench.require(reply == offset, format!("the new offset {}", offset.offset))?;
+                offset_is(bench, offset)
+            },
+        )
+        .needs(&[Need::Rom]),
+        case("null_bytes_of_an_offset_do_not_matter", &["RMD-91-05", "RMD-91-01"], |bench| {
+            let offset = bench.another_offset()?;
+            let code = Code::WriteEncoderOffset;
+            let sent = filled(WriteEncoderOffset(offset).encode(), code, 0xA5);
+            let reply = bench.ask(sent)?;
+            null_bytes_are_0(bench, code, &reply)?;
+            offset_is(bench, offset)
+        })
+        .needs(&[Need::Rom]),
+        case("an_offset_beyond_the_encoder_is_cut", &["RMD-91-03"], |bench| {
+            if bench.turn() > i32::from(u16::MAX) {
+                return Err(Stop::Skipped("nothing is beyond an encoder of 16 bits".into()));
+            }
+            bench.keep_offset()?;
+            let EncoderOffset { offset } =
+                bench.read(WriteEncoderOffset(EncoderOffset { offset: u16::MAX }))?;
+            within_turn(bench, &[offset])?;
+            offset_is(bench, EncoderOffset { offset })
+        })
+        .needs(&[Need::Rom]),
+        case("a_written_offset_outlasts_the_power", &["RMD-91-07"], |bench| {
+            let offset = bench.another_offset()?;
+            bench.read(WriteEncoderOffset(offset))?;
+            bench.power_cycle()?;
+            offset_is(bench, offset)
+        })
+        .needs(&[Need::Rom, Need::PowerCycle]),
+        case("a_position_that_is_held_stays_when_the_offset_moves", &["RMD-91-02"], |bench| {
+            bench.gently()?;
+            let angle = CentiDegrees(bench.angle_in_reach()?);
+            bench.command(PositionLimited { max_speed: SpeedLimit(30), angle })?;
+            let before = bench.keep_offset()?.raw;
+            let offset = bench.another_offset()?;
+            bench.read(WriteEncoderOffset(offset))?;
+            bench.watch(500, |_| false)?;
+            let after = bench.read(ReadEncoder)?.raw;
+            let (after, before) = (bench.degrees(after), bench.degrees(before));
+            near(bench, after, before, "the original position as it was")
+        })
+        .needs(&[Need::Spin, Need::Rom]),
+    ]
+}
+
+fn zero() -> Vec<Case<Bench>> {
+    vec![
+        case(
+            "a_new_zero_is_the_present_position",
+            &["RMD-19-05", "RMD-19-03", "RMD-19-06", "RMD-19-07", "RMD-19-01", "RMD-2-08"],
+            |bench| {
+                let raw = bench.keep_offset()?.raw;
+                let code = Code::WriteZeroToRom;
+                let reply = bench.ask_once(filled(request(code), code, 0xA5))?;
+                null_bytes_are_0(bench, code, &reply)?;
+                let offset = EncoderOffset::decode(&reply).offset;
+                let (offset, raw) = (bench.degrees(offset), bench.degrees(raw));
+                near(bench, offset, raw, "the original position that 0x90 read")
+            },
+        )
+        .needs(&[Need::Rom]),
+        case("a_new_zero_does_not_act_before_power_on", &["RMD-19-02"], |bench| {
+            let offset = bench.another_offset()?;
+            bench.read(WriteEncoderOffset(offset))?;
+            bench.read(WriteZeroToRom)?;
+            offset_is(bench, offset)
+        })
+        .needs(&[Need::Rom]),
+        case("a_new_zero_acts_from_power_on", &["RMD-19-02", "RMD-19-03"], |bench| {
+            let offset = bench.another_offset()?;
+            bench.read(WriteEncoderOffset(offset))?;
+            let zero = bench.read(WriteZeroToRom)?;
+            bench.power_cycle()?;
+            offset_is(bench, zero)
+        })
+        .needs(&[Need::Rom, Need::PowerCycle]),
+    ]
+}
+
+/// A move to an angle just below zero, which has a sign to carry.
+fn below_0(bench: &mut Bench) -> Result<(), Stop> {
+    const NEAR: i64 = 36_000;
+    const TARGET: i32 = -1_000;
+    let angle = bench.angle()?;
+    if angle.abs() > NEAR {
+        return Err(Stop::Skipped(format!(
+            "the motor is at {}°: switch it off and on, which makes it forget its turns",
+            angle / 100
+        )));
+    }
+    bench.gently()?;
+    bench.command(PositionLimited { max_speed: SpeedLimit(180), angle: CentiDegrees(TARGET) })?;
+    let arrived = bench.watch(8_000, |seen| seen.angle < -500)?;
+    bench.require(arrived, "an angle that falls to -10°")
+}
+
+impl Bench {
+    /// Values in a turn of the encoder, as they travel.
+    pub(super) fn turn(&self) -> i32 {
+        1 << self.options.encoder.bits().min(16)
+    }
+
+    pub(super) fn degrees(&self, counts: u16) -> f64 {
+        self.options.encoder.degrees(counts)
+    }
+
+    fn read_position(&mut self) -> Result<u16, Stop> {
+        Ok(self.read(ReadEncoder)?.position)
+    }
+
+    /// An offset that is not the present one, nor the present position; remembers the present one.
+    fn another_offset(&mut self) -> Result<EncoderOffset, Stop> {
+        let turn = self.turn();
+        let Encoder { raw, offset, .. } = self.keep_offset()?;
+        let other = |share: i32| (i32::from(offset) + turn / share) % turn;
+        let apart = (other(8) - i32::from(raw)).rem_euclid(turn);
+        let far = (turn / 32..turn - turn / 32).contains(&apart);
+        Ok(EncoderOffset { offset: if far { other(8) } else { other(4) } as u16 })
+    }
+}
+
+fn offset_is(bench: &mut Bench, EncoderOffset { offset }: EncoderOffset) -> Result<(), Stop> {
+    let read = bench.read(ReadEncoder)?;
+    bench.require(read.offset == offset, format!("the offset {offset}"))?;
+    let due = (i32::from(read.raw) - i32::from(offset)).rem_euclid(bench.turn());
+    bench.require(i32::from(read.position) == due, format!("the position {due}"))
+}
+
+fn within_turn(bench: &Bench, values: &[u16]) -> Result<(), Stop> {
+    let turn = bench.turn();
+    let within = values.iter().all(|value| i32::from(*value) < turn);
+    let bits = bench.options.encoder.bits();
+    bench.require(within, format!("values of 0 to {} with {bits} bits (--encoder)", turn - 1))
+}
+
+/// Two angles (degrees) that are the same within the turn.
+fn near(bench: &Bench, one: f64, other: f64, expected: &str) -> Result<(), Stop> {
+    let apart = (one - other + 180.0).rem_euclid(360.0) - 180.0;
+    let words = format!("{expected}, {other:.2}° within {JITTER}°; not {one:.2}°");
+    bench.require(apart.abs() <= JITTER, words)
+}

@@ -1,0 +1,223 @@
+//! Identifiers, forms and command bytes (chapters 1 and 2), and what every command has in common.
+
+use motorlink_proto::rmd::{Stop as Halt, *};
+
+use super::bench::Bench;
+use super::{Clauses, case, subject};
+use crate::case::{Case, Need, Stop};
+
+/// Commands that only ask: what tests that one reply comes, that its NULL bytes are 0, that those of
+/// the request do not matter.
+const QUESTIONS: [(Code, Clauses, Clauses, Clauses); 9] = [
+    (Code::ReadGains, &["RMD-30-02", "RMD-2-01"], &["RMD-30-03"], &["RMD-30-01"]),
+    (Code::ReadAcceleration, &["RMD-33-02", "RMD-2-04"], &["RMD-33-03"], &["RMD-33-01"]),
+    (Code::ReadEncoder, &["RMD-90-02", "RMD-2-06"], &["RMD-90-03"], &["RMD-90-01"]),
+    (Code::ReadMultiTurnAngle, &["RMD-92-02", "RMD-2-09"], &[], &["RMD-92-01"]),
+    (Code::ReadCircleAngle, &["RMD-94-02", "RMD-2-10"], &["RMD-94-03"], &["RMD-94-01"]),
+    (Code::ReadStatus1, &["RMD-9A-02", "RMD-2-11"], &["RMD-9A-06"], &["RMD-9A-01"]),
+    (Code::ClearErrors, &["RMD-9B-03", "RMD-2-12"], &["RMD-9B-07"], &["RMD-9B-01"]),
+    (Code::ReadStatus2, &["RMD-9C-02", "RMD-2-13"], &[], &["RMD-9C-01"]),
+    (Code::ReadStatus3, &["RMD-9D-02", "RMD-2-14"], &["RMD-9D-03"], &["RMD-9D-01"]),
+];
+
+/// What a request is made of.
+type Request = fn(&mut Bench) -> Result<[u8; 8], Stop>;
+
+/// Commands whose reply is the request: a request that changes nothing, and what tests the echo.
+const ECHOES: [(Code, Request, Clauses, &[Need]); 6] = [
+    (
+        Code::WriteGains,
+        |bench| Ok(WriteGains(bench.keep_gains()?).encode()),
+        &["RMD-31-04", "RMD-31-01", "RMD-2-02"],
+        &[],
+    ),
+    (
+        Code::WriteGainsToRom,
+        |bench| Ok(WriteGainsToRom(bench.keep_rom_gains()?).encode()),
+        &["RMD-32-03", "RMD-32-01", "RMD-2-03"],
+        &[Need::Rom],
+    ),
+    (
+        Code::WriteAcceleration,
+        |bench| {
+            let acceleration = bench.keep_acceleration()?;
+            Ok(WriteAcceleration(Acceleration { acceleration }).encode())
+        },
+        &["RMD-34-05", "RMD-34-01", "RMD-2-05"],
+        &[],
+    ),
+    (Code::Off, |_| Ok(Off.encode()), &["RMD-80-04", "RMD-80-01", "RMD-2-15"], &[]),
+    (Code::Stop, |_| Ok(Halt.encode()), &["RMD-81-04", "RMD-81-01", "RMD-2-16"], &[]),
+    (
+        Code::Run,
+        |bench| {
+            bench.may_move();
+            Ok(Run.encode())
+        },
+        &["RMD-88-04", "RMD-88-01", "RMD-2-17"],
+        &[Need::Spin],
+    ),
+];
+
+/// What stands in NULL bytes that nobody looks at.
+const STALE: [u8; 2] = [0xA5, 0xFF];
+
+/// Command bytes that neither this document nor a related protocol uses.
+fn nobodys() -> impl Iterator<Item = u8> {
+    (0x00..=0x0F).chain(0x50..=0x5F).chain(0xD0..=0xFF)
+}
+
+pub(super) fn cases() -> Vec<Case<Bench>> {
+    let mut cases = vec![
+        case("a_reply_has_the_identifier_of_its_motor", &["RMD-1-01"], |bench| {
+            let frames = bench.collect(&[bench.frame(ReadStatus1.encode())])?;
+            let own = u32::from(bench.id().can_id());
+            let same = frames.iter().any(|frame| frame.id() == own && !frame.is_extended());
+            bench.require(same, format!("a reply on {own:#05x}"))
+        }),
+        case(
+            "a_reply_is_a_standard_data_frame_of_8_bytes",
+            &["RMD-1-03", "RMD-1-04", "RMD-1-05"],
+            |bench| bench.ask(ReadStatus1.encode()).map(|_| ()),
+        ),
+        case("frames_of_other_lengths_are_ignored", &["RMD-1-05", "RMD-1-06"], |bench| {
+            let id = bench.id().can_id().into();
+            let status = ReadStatus1.encode();
+            let short = (0..8).map(|len| CanFrame::data_frame(id, false, &status[..len]));
+            silent(bench, &short.collect::<Vec<_>>())
+        }),
+        case("frames_with_29_bits_are_ignored", &["RMD-1-04", "RMD-1-06"], |bench| {
+            let id = bench.id().can_id().into();
+            let status = ReadStatus1.encode();
+            silent(bench, &[CanFrame::data_frame(id, true, &status)])
+        }),
+        case("remote_frames_are_ignored", &["RMD-1-03", "RMD-1-06"], |bench| {
+            let id = bench.id().can_id().into();
+            silent(bench, &[CanFrame::remote_frame(id, false, 8)])
+        }),
+        case("frames_to_others_are_ignored", &["RMD-1-01", "RMD-1-06"], |bench| {
+            let own = bench.id().can_id();
+            let others = (MOTOR_BASE..=MOTOR_BASE + 33).filter(|id| *id != own);
+            let status = ReadStatus1.encode();
+            silent(bench, &others.map(|id| CanFrame::new(id, status)).collect::<Vec<_>>())
+        }),
+        case("unknown_command_bytes_are_met_with_silence", &["RMD-2-24"], |bench| {
+            unknown(bench, nobodys().collect())
+        }),
+        case("command_bytes_of_related_protocols_are_met_with_silence", &["RMD-2-24"], |bench| {
+            bench.keep_gains()?;
+            bench.keep_acceleration()?;
+            bench.may_move();
+            let known = |code: &u8| Code::from(*code).info().is_some();
+            let ours = (0..=u8::MAX).filter(|code| !known(code));
+            unknown(bench, ours.filter(|code| !nobodys().any(|free| free == *code)).collect())
+        })
+        .needs(&[Need::Spin, Need::Rom]),
+    ];
+    for (code, answered, null_reply, null_request) in QUESTIONS {
+        cases.push(case(subject("a_question_gets_one_reply", code), answered, move |bench| {
+            question(bench, code)?;
+            bench.ask_once(request(code)).map(|_| ())
+        }));
+        if !null_reply.is_empty() {
+            cases.push(case(
+                subject("null_bytes_of_a_reply_are_0", code),
+                null_reply,
+                move |bench| {
+                    question(bench, code)?;
+                    let reply = bench.ask(request(code))?;
+                    null_bytes_are_0(bench, code, &reply)
+                },
+            ));
+        }
+        cases.push(case(
+            subject("null_bytes_of_a_request_are_not_looked_at", code),
+            null_request,
+            move |bench| {
+                question(bench, code)?;
+                let plain = bench.ask(request(code))?;
+                for stale in STALE {
+                    let reply = bench.ask(filled(request(code), code, stale))?;
+                    null_bytes_are_0(bench, code, &reply)?;
+                    let steady = matches!(code, Code::ReadGains | Code::ReadAcceleration);
+                    bench.require(!steady || reply == plain, "the same reply as without them")?;
+                }
+                Ok(())
+            },
+        ));
+    }
+    for (code, make, clauses, needs) in ECHOES {
+        let name = subject("the_reply_is_the_request", code);
+        let echo = case(name, clauses, move |bench| {
+            let request = make(bench)?;
+            for stale in [0x00, STALE[0], STALE[1]] {
+                let sent = filled(request, code, stale);
+                let reply = bench.ask(sent)?;
+                bench.require(reply == sent, "the frame that was sent")?;
+            }
+            Ok(())
+        });
+        let once = case(subject("an_echo_comes_once", code), &clauses[..1], move |bench| {
+            let request = make(bench)?;
+            bench.ask_once(request).map(|_| ())
+        });
+        cases.extend([echo.needs(needs), once.needs(needs)]);
+    }
+    cases
+}
+
+/// The request without values.
+pub(super) fn request(code: Code) -> [u8; 8] {
+    [code.into(), 0, 0, 0, 0, 0, 0, 0]
+}
+
+/// Clearing errors is only a question while there are none.
+fn question(bench: &mut Bench, code: Code) -> Result<(), Stop> {
+    if code == Code::ClearErrors {
+        let errors = bench.read(ReadStatus1)?.errors;
+        if !errors.is_empty() {
+            return Err(Stop::Skipped(format!("the motor has an error that would go: {errors}")));
+        }
+    }
+    Ok(())
+}
+
+/// The request with `stale` in the bytes that no value covers.
+pub(super) fn filled(mut data: [u8; 8], code: Code, stale: u8) -> [u8; 8] {
+    let fields = code.info().map_or(&[][..], |row| row.request);
+    nulls(fields).for_each(|byte| data[byte] = stale);
+    data
+}
+
+/// Checks the bytes of a reply that no value covers.
+pub(super) fn null_bytes_are_0(bench: &Bench, code: Code, reply: &[u8; 8]) -> Result<(), Stop> {
+    let fields = code.info().map_or(&[][..], |row| row.reply);
+    let wrong: Vec<_> = nulls(fields).filter(|byte| reply[*byte] != 0).collect();
+    let bytes = wrong.iter().map(|byte| format!("DATA[{byte}] = 00")).collect::<Vec<_>>();
+    bench.require(wrong.is_empty(), bytes.join(", "))
+}
+
+/// Bytes behind the code that no field covers.
+fn nulls(fields: &'static [Field]) -> impl Iterator<Item = usize> {
+    let covered = |byte: usize| {
+        fields.iter().any(|field| (field.offset..field.offset + field.len).contains(&(byte as u8)))
+    };
+    (1..8).filter(move |byte| !covered(*byte))
+}
+
+/// Sends what the motor must not answer.
+fn silent(bench: &mut Bench, frames: &[CanFrame]) -> Result<(), Stop> {
+    let answers = bench.answers(frames)?;
+    bench.require(answers.is_empty(), "silence")?;
+    bench.ask(ReadStatus1.encode()).map(|_| ())
+}
+
+/// Sends command bytes that the motor must not know, a few at a time: a controller's mailboxes are
+/// few.
+fn unknown(bench: &mut Bench, codes: Vec<u8>) -> Result<(), Stop> {
+    for codes in codes.chunks(8) {
+        let frames = codes.iter().map(|&code| bench.frame([code, 0, 0, 0, 0, 0, 0, 0]));
+        silent(bench, &frames.collect::<Vec<_>>())?;
+    }
+    Ok(())
+}

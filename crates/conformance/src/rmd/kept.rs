@@ -1,0 +1,237 @@
+//! What a motor is when a case begins, and how it becomes that again.
+
+use motorlink_proto::rmd::{Stop as Halt, *};
+use motorlink_proto::time::Duration;
+use motorlink_proto::units::DpsPerSecond;
+
+use super::bench::{Bench, PATIENCE};
+use crate::case::{Need, Stop};
+use crate::world::Unavailable;
+
+/// What was found and is put back, where a case touched it.
+#[derive(Debug, Default)]
+pub(super) struct Kept {
+    gains: Option<Gains>,
+    acceleration: Option<DpsPerSecond>,
+    /// The gains in ROM.
+    rom_gains: Option<Gains>,
+    offset: Option<u16>,
+    fault: bool,
+    moved: bool,
+    /// Other motors that may have moved.
+    others: MotorSet,
+}
+
+/// A motor this slow (°/s) is at rest.
+const REST: u16 = 5;
+/// A motor with less torque current than this (digits: half an ampere) is at rest.
+const CURRENTLESS: u16 = 31;
+/// A motor that has become faster by this (°/s) does not come to rest.
+const FASTER: u16 = 30;
+/// How long a motor may take to come to rest, ms.
+const COASTING: u64 = 10_000;
+/// How long a motor may take until it answers when its power came back, ms.
+const STARTING: u64 = 5_000;
+
+impl Bench {
+    /// Waits until the motor is at rest. One that never is, is not tested: what turns it is not
+    /// this kit's to stop.
+    pub(super) fn at_rest(&mut self) -> Result<(), Stop> {
+        let MotionStatus { speed, iq, .. } = match self.comes_to_rest()? {
+            Ok(()) => return Ok(()),
+            Err(status) => status,
+        };
+        Err(Stop::Lost(format!(
+            "motor {} is not at rest: it turns at {speed} with {:.1} A; switch it off first",
+            self.id(),
+            iq.amps()
+        )))
+    }
+
+    /// Waits until the motor is at rest, or gives what it does instead.
+    fn comes_to_rest(&mut self) -> Result<Result<(), MotionStatus>, Stop> {
+        let begun = self.millis();
+        let mut slowest = u16::MAX;
+        loop {
+            let status = self.status_of_somebody()?;
+            let (speed, iq) = (status.speed.0.unsigned_abs(), status.iq.0.unsigned_abs());
+            if speed <= REST && iq <= CURRENTLESS {
+                return Ok(Ok(()));
+            }
+            slowest = slowest.min(speed);
+            if speed > slowest.saturating_add(FASTER) || self.millis() - begun > COASTING {
+                return Ok(Err(status));
+            }
+            self.pause(Duration::from_millis(50))?;
+        }
+    }
+
+    /// Status 2, of a motor that may not be there.
+    fn status_of_somebody(&mut self) -> Result<MotionStatus, Stop> {
+        let status = self.read(ReadStatus2);
+        if self.heard || self.foreign.is_some() || self.answers_at_all()? {
+            return status;
+        }
+        Err(Stop::Lost(format!(
+            "motor {} does not answer; `motorlink rmd scan` tells who does",
+            self.id()
+        )))
+    }
+
+    fn answers_at_all(&mut self) -> Result<bool, Stop> {
+        Ok(!self.answers(&[self.frame(ReadStatus1.encode())])?.is_empty())
+    }
+
+    /// The gains; remembers them.
+    pub(super) fn keep_gains(&mut self) -> Result<Gains, Stop> {
+        let gains = self.read(ReadGains)?;
+        self.kept.gains.get_or_insert(gains);
+        Ok(gains)
+    }
+
+    /// The acceleration limit; remembers it.
+    pub(super) fn keep_acceleration(&mut self) -> Result<DpsPerSecond, Stop> {
+        let acceleration = self.read(ReadAcceleration)?.acceleration;
+        self.kept.acceleration.get_or_insert(acceleration);
+        Ok(acceleration)
+    }
+
+    /// The gains in ROM, as far as they can be known: those that a power-on brings, or without one
+    /// those that are in force. Remembers them.
+    pub(super) fn keep_rom_gains(&mut self) -> Result<Gains, Stop> {
+        self.keep_gains()?;
+        if self.options.allowed.contains(&Need::PowerCycle) {
+            self.power_cycle()?;
+        }
+        let gains = self.read(ReadGains)?;
+        self.kept.rom_gains.get_or_insert(gains);
+        Ok(gains)
+    }
+
+    /// What the encoder reads; remembers its offset.
+    pub(super) fn keep_offset(&mut self) -> Result<Encoder, Stop> {
+        let encoder = self.read(ReadEncoder)?;
+        self.kept.offset.get_or_insert(encoder.offset);
+        Ok(encoder)
+    }
+
+    /// From here on the motor may turn, and is switched off in the end.
+    pub(super) fn may_move(&mut self) {
+        self.kept.moved = true;
+    }
+
+    /// These motors may move, too.
+    pub(super) fn may_move_too(&mut self, motors: MotorSet) {
+        self.kept.others = self.kept.others.union(motors);
+    }
+
+    /// Takes the motor's power away and gives it back.
+    pub(super) fn power_cycle(&mut self) -> Result<(), Stop> {
+        self.keep_gains()?;
+        self.keep_acceleration()?;
+        self.cycle()
+    }
+
+    fn cycle(&mut self) -> Result<(), Stop> {
+        self.world.power_cycle()?;
+        let begun = self.millis();
+        while !self.answers_at_all()? {
+            self.require(self.millis() - begun < STARTING, "an answer within 5 s of power-on")?;
+        }
+        Ok(())
+    }
+
+    /// Makes a fault condition present, or ends it.
+    pub(super) fn fault(&mut self, present: bool) -> Result<(), Stop> {
+        self.kept.fault = true;
+        self.world.fault(present)?;
+        // What is around a motor changes more slowly than what is on its bus.
+        self.pause(PATIENCE)
+    }
+
+    /// Switches off what was moved, ends a fault, writes back what was written. Each is tried
+    /// whatever came of the others.
+    pub(super) fn put_back(&mut self) -> Result<(), Stop> {
+        let kept = std::mem::take(&mut self.kept);
+        if self.foreign.is_some() {
+            return Ok(());
+        }
+        let off = if kept.moved { self.switch_off() } else { Ok(()) };
+        let others = self.switch_others_off(kept.others);
+        let fault = if kept.fault { self.end_fault() } else { Ok(()) };
+        let rom = self.put_back_rom(&kept);
+        let gains = kept.gains.map_or(Ok(()), |gains| self.put_back_gains(gains));
+        let acceleration = kept.acceleration.map_or(Ok(()), |a| self.put_back_acceleration(a));
+        off.and(others).and(fault).and(rom).and(gains).and(acceleration)
+    }
+
+    /// Off, and then a look whether it is. A motor that goes on is told to stop instead, and is not
+    /// turned again.
+    fn switch_off(&mut self) -> Result<(), Stop> {
+        let mut told = self.ask(Off.encode());
+        for _ in 0..2 {
+            if told.is_err() {
+                told = self.ask(Off.encode());
+            }
+        }
+        if self.comes_to_rest()?.is_err() {
+            let failed = self.failed("a motor at rest within 10 s of 0x80");
+            self.runaway = true;
+            self.ask(Halt.encode())?;
+            return Err(failed);
+        }
+        told.map(|_| ())
+    }
+
+    fn switch_others_off(&mut self, motors: MotorSet) -> Result<(), Stop> {
+        if motors.is_empty() {
+            return Ok(());
+        }
+        let off = motors.map(|motor| CanFrame::new(motor.can_id(), Off.encode()));
+        self.collect(&off.collect::<Vec<_>>()).map(|_| ())
+    }
+
+    fn end_fault(&mut self) -> Result<(), Stop> {
+        self.world.fault(false).map_err(|Unavailable(why)| {
+            self.failed(format!("the fault to be ended; end it by hand ({why})"))
+        })?;
+        self.pause(PATIENCE)?;
+        self.read(ClearErrors).map(|_| ())
+    }
+
+    fn put_back_rom(&mut self, kept: &Kept) -> Result<(), Stop> {
+        if kept.rom_gains.is_none() && kept.offset.is_none() {
+            return Ok(());
+        }
+        if let Some(gains) = kept.rom_gains {
+            self.ask(WriteGainsToRom(gains).encode())?;
+        }
+        if let Some(offset) = kept.offset {
+            self.read(WriteEncoderOffset(EncoderOffset { offset }))?;
+        }
+        if self.options.allowed.contains(&Need::PowerCycle) {
+            self.cycle()?;
+        }
+        if let Some(gains) = kept.rom_gains {
+            let read = self.read(ReadGains)?;
+            self.require(read == gains, format!("the gains in ROM as they were: {gains:?}"))?;
+        }
+        if let Some(offset) = kept.offset {
+            let read = self.read(ReadEncoder)?.offset;
+            self.require(read == offset, format!("the offset as it was: {offset}"))?;
+        }
+        Ok(())
+    }
+
+    fn put_back_gains(&mut self, gains: Gains) -> Result<(), Stop> {
+        self.ask(WriteGains(gains).encode())?;
+        let read = self.read(ReadGains)?;
+        self.require(read == gains, format!("the gains as they were: {gains:?}"))
+    }
+
+    fn put_back_acceleration(&mut self, acceleration: DpsPerSecond) -> Result<(), Stop> {
+        self.ask(WriteAcceleration(Acceleration { acceleration }).encode())?;
+        let read = self.read(ReadAcceleration)?.acceleration;
+        self.require(read == acceleration, format!("the limit as it was: {acceleration}"))
+    }
+}

@@ -1,0 +1,158 @@
+//! What all motion commands (0xA1 to 0xA6) have in common: their replies, and the acceleration
+//! limit.
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::units::{CentiDegrees, CentiDps, CircleAngle, SpeedLimit, TorqueCommand};
+
+use super::bench::Bench;
+use super::frames::filled;
+use super::settings::accelerate;
+use super::{Clauses, case, subject};
+use crate::case::{Case, Need, Stop};
+
+/// The command, what tests its reply's code, the reply's values, and the NULL bytes of the request.
+const COMMANDS: [(Code, Clauses, Clauses, Clauses); 6] = [
+    (
+        Code::Torque,
+        &["RMD-A1-05", "RMD-2-18"],
+        &["RMD-A1-06", "RMD-A1-07", "RMD-A1-08", "RMD-A1-09"],
+        &["RMD-A1-01"],
+    ),
+    (
+        Code::Speed,
+        &["RMD-A2-05", "RMD-2-19"],
+        &["RMD-A2-06", "RMD-A2-07", "RMD-A2-08", "RMD-A2-09"],
+        &["RMD-A2-01"],
+    ),
+    (
+        Code::Position,
+        &["RMD-A3-08", "RMD-2-20"],
+        &["RMD-A3-09", "RMD-A3-10", "RMD-A3-11", "RMD-A3-12"],
+        &["RMD-A3-01"],
+    ),
+    (
+        Code::PositionLimited,
+        &["RMD-A4-08", "RMD-2-21"],
+        &["RMD-A4-09", "RMD-A4-10", "RMD-A4-11", "RMD-A4-12"],
+        &["RMD-A4-01"],
+    ),
+    (
+        Code::CirclePosition,
+        &["RMD-A5-09", "RMD-2-22"],
+        &["RMD-A5-10", "RMD-A5-11", "RMD-A5-12", "RMD-A5-13"],
+        &["RMD-A5-01"],
+    ),
+    (
+        Code::CirclePositionLimited,
+        &["RMD-A6-09", "RMD-2-23"],
+        &["RMD-A6-10", "RMD-A6-11", "RMD-A6-12", "RMD-A6-13"],
+        &["RMD-A6-01"],
+    ),
+];
+
+/// What the acceleration limit holds.
+const LIMITED: [(Code, Clauses); 5] = [
+    (Code::Speed, &["RMD-A2-04", "RMD-34-03"]),
+    (Code::Position, &["RMD-A3-06", "RMD-34-03"]),
+    (Code::PositionLimited, &["RMD-A4-06", "RMD-34-03"]),
+    (Code::CirclePosition, &["RMD-A5-07", "RMD-34-03"]),
+    (Code::CirclePositionLimited, &["RMD-A6-07", "RMD-34-03"]),
+];
+
+pub(super) fn cases() -> Vec<Case<Bench>> {
+    let mut cases = Vec::new();
+    for (code, once, values, request) in COMMANDS {
+        let name = subject("a_motion_command_gets_one_reply", code);
+        cases.push(case(name, once, move |bench| {
+            bench.gently()?;
+            let request = ahead(bench, code, 0)?;
+            bench.ask_once(request).map(|_| ())
+        }));
+        let name = subject("a_motion_reply_has_the_values_of_status_2", code);
+        cases.push(case(name, values, move |bench| {
+            bench.gently()?;
+            let request = ahead(bench, code, 0)?;
+            let before = bench.read(ReadStatus2)?;
+            let reply = MotionStatus::decode(&bench.ask(request)?);
+            bench.plausible(&reply)?;
+            same(bench, &reply, &before)
+        }));
+        let name = subject("null_bytes_of_a_motion_command_do_not_matter", code);
+        cases.push(case(name, request, move |bench| {
+            bench.gently()?;
+            let start = bench.angle()?;
+            // Little even for a motor that takes them for torque: 0x0101 is 4 A.
+            let request = filled(ahead(bench, code, 0)?, code, 0x01);
+            bench.ask(request)?;
+            let gone = bench.watch(500, |seen| (seen.angle - start).abs() > 1_500)?;
+            bench.require(!gone, "no more than a few degrees of movement")
+        }));
+    }
+    for (code, clauses) in LIMITED {
+        let name = subject("the_acceleration_limit_holds", code);
+        cases.push(case(name, clauses, move |bench| limited(bench, code)));
+    }
+    cases.into_iter().map(|case| case.needs(&[Need::Spin])).collect()
+}
+
+/// The command that goes `degrees` further than the motor is; 0 is next to nothing, which for
+/// commands with a direction must not be nothing.
+fn ahead(bench: &mut Bench, code: Code, degrees: i32) -> Result<[u8; 8], Stop> {
+    let max_speed = SpeedLimit(180);
+    let angle = CentiDegrees(bench.angle_in_reach()? + 100 * degrees);
+    let nearly = 100 * degrees.max(2);
+    let circle = i32::from(bench.read(ReadCircleAngle)?.angle.0) + nearly;
+    let circle = CircleAngle((circle % i32::from(FULL_TURN)) as u16);
+    let direction = Spin::Clockwise;
+    Ok(match code {
+        Code::Torque => Torque { torque: TorqueCommand(0) }.encode(),
+        Code::Speed => Speed { speed: CentiDps(100 * degrees) }.encode(),
+        Code::Position => Position { angle }.encode(),
+        Code::PositionLimited => PositionLimited { max_speed, angle }.encode(),
+        Code::CirclePosition => CirclePosition { direction, angle: circle }.encode(),
+        _ => CirclePositionLimited { direction, max_speed, angle: circle }.encode(),
+    })
+}
+
+/// Two looks at a motor that is at rest.
+fn same(bench: &Bench, one: &MotionStatus, other: &MotionStatus) -> Result<(), Stop> {
+    let turned = one.encoder.wrapping_sub(other.encoder) as i16;
+    let jitter = bench.turn() / 90;
+    let apart = i32::from(turned).rem_euclid(bench.turn());
+    let same = one.temperature.0.abs_diff(other.temperature.0) <= 2
+        && one.speed.0.abs_diff(other.speed.0) <= 10
+        && one.iq.0.abs_diff(other.iq.0) <= 62
+        && (apart <= jitter || apart >= bench.turn() - jitter);
+    let MotionStatus { temperature, iq, speed, encoder } = other;
+    let words = format!(
+        "about {temperature}, {:.1} A, {speed}, encoder {encoder}, as 0x9C had it",
+        iq.amps()
+    );
+    bench.require(same, words)
+}
+
+/// Speeds up under a limit, and looks whether it is faster than the limit allows.
+fn limited(bench: &mut Bench, code: Code) -> Result<(), Stop> {
+    /// °/s².
+    const LIMIT: i32 = 100;
+    /// ms by which the clock may have begun too late.
+    const LATE: u64 = 50;
+    bench.may_move();
+    accelerate(bench, LIMIT)?;
+    let request = ahead(bench, code, 60)?;
+    bench.ask(request)?;
+    let mut too_fast = None;
+    let fast = bench.watch(4_000, |seen| {
+        let allowed = 5 + LIMIT as u64 * (seen.millis + LATE) * 5 / 4 / 1000;
+        if u64::from(seen.speed.unsigned_abs()) > allowed {
+            too_fast = Some(*seen);
+        }
+        too_fast.is_some() || seen.speed.abs() > 45
+    })?;
+    if let Some(seen) = too_fast {
+        let (speed, millis) = (seen.speed, seen.millis);
+        let words = format!("no more than {LIMIT} °/s² (0x34), not {speed} °/s after {millis} ms");
+        return Err(bench.failed(words));
+    }
+    bench.require(fast, "a motor that speeds up beyond 45 °/s within 4 s")
+}

@@ -1,0 +1,202 @@
+//! Positions (0xA3 to 0xA6).
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::units::{CentiDegrees, CircleAngle, SpeedLimit};
+
+use super::bench::Bench;
+use super::{Clauses, case, subject};
+use crate::case::{Case, Need, Stop};
+
+/// How near a position is reached, 0.01°: friction keeps a loop without integral from the rest.
+const NEAR: i64 = 200;
+/// How far beyond its way a motor may turn, 0.01°.
+const BEYOND: i64 = 1_000;
+/// Greatest speed of moves, °/s.
+const SLOW: SpeedLimit = SpeedLimit(90);
+/// Greatest speed of moves that take most of a turn, °/s.
+const LONG: SpeedLimit = SpeedLimit(180);
+const CLOCKWISE: Spin = Spin::Clockwise;
+const COUNTERCLOCKWISE: Spin = Spin::Counterclockwise;
+
+/// A single-turn command of either kind.
+type Turn = fn(Spin, CircleAngle) -> [u8; 8];
+
+/// A multi-turn command of either kind.
+type Move = fn(i32) -> [u8; 8];
+
+const MOVES: [(Code, Move, Clauses, Clauses); 2] = [
+    (
+        Code::Position,
+        |angle| Position { angle: CentiDegrees(angle) }.encode(),
+        &["RMD-A3-02", "RMD-A3-01"],
+        &["RMD-A3-03"],
+    ),
+    (
+        Code::PositionLimited,
+        |angle| PositionLimited { max_speed: LONG, angle: CentiDegrees(angle) }.encode(),
+        &["RMD-A4-02", "RMD-A4-01"],
+        &["RMD-A4-03"],
+    ),
+];
+
+const TURNS: [(Code, Turn, [Clauses; 5]); 2] = [
+    (
+        Code::CirclePosition,
+        |direction, angle| CirclePosition { direction, angle }.encode(),
+        [
+            &["RMD-A5-03", "RMD-A5-02", "RMD-A5-01"],
+            &["RMD-A5-04", "RMD-A5-02"],
+            &["RMD-A5-05"],
+            &["RMD-A5-02"],
+            &["RMD-A5-04"],
+        ],
+    ),
+    (
+        Code::CirclePositionLimited,
+        |direction, angle| CirclePositionLimited { direction, max_speed: LONG, angle }.encode(),
+        [
+            &["RMD-A6-03", "RMD-A6-02", "RMD-A6-01"],
+            &["RMD-A6-04", "RMD-A6-02"],
+            &["RMD-A6-05"],
+            &["RMD-A6-02"],
+            &["RMD-A6-04"],
+        ],
+    ),
+];
+
+pub(super) fn cases() -> Vec<Case<Bench>> {
+    let mut cases = multi_turn();
+    for (code, turn, clauses) in TURNS {
+        cases.extend(single_turn(code, turn, clauses));
+    }
+    cases.push(case("the_long_way_is_turned_when_it_is_told", &["RMD-A6-04"], |bench| {
+        let (_, turn, _) = TURNS[1];
+        turns(bench, turn, COUNTERCLOCKWISE, 2_000, -34_000)
+    }));
+    cases.push(case("the_greatest_speed_of_a_turn_holds", &["RMD-A6-06"], |bench| {
+        bench.gently()?;
+        let angle = bench.circle(9_000)?;
+        let data = CirclePositionLimited { direction: CLOCKWISE, max_speed: SLOW, angle }.encode();
+        no_faster(bench, data)
+    }));
+    cases.into_iter().map(|case| case.needs(&[Need::Spin])).collect()
+}
+
+fn multi_turn() -> Vec<Case<Bench>> {
+    let mut cases = Vec::new();
+    for (code, command, small, wide) in MOVES {
+        let name = subject("a_position_is_reached", code);
+        cases.push(case(name, small, move |bench| {
+            bench.gently()?;
+            let start = bench.angle_in_reach()?;
+            moves(bench, command(start + 1_000), start.into(), 1_000)?;
+            moves(bench, command(start), i64::from(start) + 1_000, -1_000)
+        }));
+        let name = subject("a_position_is_reached_the_way_of_the_difference", code);
+        cases.push(case(name, wide, move |bench| {
+            bench.gently()?;
+            let start = bench.angle_in_reach()?;
+            moves(bench, command(start + 20_000), start.into(), 20_000)?;
+            moves(bench, command(start), i64::from(start) + 20_000, -20_000)
+        }));
+    }
+    cases.push(case("the_greatest_speed_of_a_move_holds", &["RMD-A4-04"], |bench| {
+        bench.gently()?;
+        let angle = CentiDegrees(bench.angle_in_reach()? + 9_000);
+        no_faster(bench, PositionLimited { max_speed: SLOW, angle }.encode())
+    }));
+    cases.push(case("with_a_greatest_speed_of_0_nothing_turns", &["RMD-A4-04"], |bench| {
+        bench.gently()?;
+        let start = bench.angle()?;
+        let angle = CentiDegrees(bench.angle_in_reach()? + 2_000);
+        bench.command(PositionLimited { max_speed: SpeedLimit(0), angle })?;
+        stays(bench, start)
+    }));
+    cases
+}
+
+fn single_turn(code: Code, turn: Turn, clauses: [Clauses; 5]) -> [Case<Bench>; 5] {
+    let [clockwise, counterclockwise, again, outside, other] = clauses;
+    [
+        case(subject("a_turn_goes_clockwise", code), clockwise, move |bench| {
+            turns(bench, turn, CLOCKWISE, 2_000, 2_000)
+        }),
+        case(subject("a_turn_goes_counterclockwise", code), counterclockwise, move |bench| {
+            turns(bench, turn, COUNTERCLOCKWISE, -2_000, -2_000)
+        }),
+        case(subject("the_same_turn_again_is_none", code), again, move |bench| {
+            bench.gently()?;
+            let (start, angle) = (bench.angle()?, bench.circle(1_500)?);
+            moves(bench, turn(CLOCKWISE, angle), start, 1_500)?;
+            let there = bench.angle()?;
+            bench.ask(turn(CLOCKWISE, angle))?;
+            stays(bench, there)
+        }),
+        case(subject("an_angle_beyond_the_turn_is_not_carried_out", code), outside, move |bench| {
+            bench.gently()?;
+            let start = bench.angle()?;
+            for angle in [FULL_TURN, u16::MAX] {
+                bench.ask(turn(CLOCKWISE, CircleAngle(angle)))?;
+                stays(bench, start)?;
+            }
+            Ok(())
+        }),
+        case(subject("a_direction_that_is_none_is_not_carried_out", code), other, move |bench| {
+            bench.gently()?;
+            let start = bench.angle()?;
+            let angle = bench.circle(2_000)?;
+            bench.ask(turn(Spin::Unknown(2), angle))?;
+            stays(bench, start)
+        }),
+    ]
+}
+
+/// A single-turn command to an angle that is `further` (0.01°) turns the motor by `by`.
+fn turns(bench: &mut Bench, turn: Turn, way: Spin, further: i32, by: i64) -> Result<(), Stop> {
+    bench.gently()?;
+    let (start, angle) = (bench.angle()?, bench.circle(further)?);
+    moves(bench, turn(way, angle), start, by)
+}
+
+/// The command turns the motor from `start` by `by` (0.01°) and no other way.
+fn moves(bench: &mut Bench, command: [u8; 8], start: i64, by: i64) -> Result<(), Stop> {
+    bench.ask(command)?;
+    let target = start + by;
+    let way = start.min(target) - BEYOND..=start.max(target) + BEYOND;
+    let mut astray = false;
+    let reached = bench.watch(10_000, |seen| {
+        astray = !way.contains(&seen.angle);
+        astray || ((seen.angle - target).abs() <= NEAR && seen.speed.abs() <= 5)
+    })?;
+    let (from, to) = (start as f64 / 100.0, target as f64 / 100.0);
+    let words =
+        format!("a move from {from:.1}° to {to:.1}° (within Max Angle of the vendor's tool)");
+    bench.require(reached && !astray, words)
+}
+
+/// The motor does not turn.
+fn stays(bench: &mut Bench, start: i64) -> Result<(), Stop> {
+    let turned = bench.watch(500, |seen| (seen.angle - start).abs() > NEAR)?;
+    bench.require(!turned, format!("no movement from {:.1}°", start as f64 / 100.0))
+}
+
+/// A move by 90° is no faster than it may be, and as fast.
+fn no_faster(bench: &mut Bench, command: [u8; 8]) -> Result<(), Stop> {
+    let most = SLOW.0 as i16;
+    bench.ask(command)?;
+    let mut greatest = 0;
+    bench.watch(4_000, |seen| {
+        greatest = greatest.max(seen.speed.abs());
+        greatest > most / 2 && seen.speed.abs() <= 5
+    })?;
+    let words = format!("a move at {most} °/s, not at {greatest} °/s");
+    bench.require((most / 2..=most + most / 8 + 3).contains(&greatest), words)
+}
+
+impl Bench {
+    /// The single-turn angle `further` (0.01°) clockwise.
+    fn circle(&mut self, further: i32) -> Result<CircleAngle, Stop> {
+        let angle = i32::from(self.read(ReadCircleAngle)?.angle.0) + further;
+        Ok(CircleAngle(angle.rem_euclid(FULL_TURN.into()) as u16))
+    }
+}

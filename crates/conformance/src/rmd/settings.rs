@@ -1,0 +1,96 @@
+//! Gains and acceleration (0x30 to 0x34).
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::units::DpsPerSecond;
+
+use super::bench::Bench;
+use super::case;
+use crate::case::{Case, Need, Stop};
+
+pub(super) fn cases() -> Vec<Case<Bench>> {
+    vec![
+        case(
+            "gains_in_ram_are_read_as_they_were_written",
+            &["RMD-31-02", "RMD-31-01", "RMD-30-04", "RMD-30-05", "RMD-30-06", "RMD-30-07"],
+            |bench| {
+                let gains = others(bench.keep_gains()?);
+                write(bench, gains)?;
+                gains_are(bench, gains)
+            },
+        ),
+        case("gains_in_ram_are_lost_with_the_power", &["RMD-31-03"], |bench| {
+            bench.power_cycle()?;
+            let rom = bench.keep_gains()?;
+            write(bench, others(rom))?;
+            bench.power_cycle()?;
+            gains_are(bench, rom)
+        })
+        .needs(&[Need::PowerCycle]),
+        case("gains_in_rom_outlast_the_power", &["RMD-32-02", "RMD-32-01"], |bench| {
+            let gains = others(bench.keep_rom_gains()?);
+            bench.ask(WriteGainsToRom(gains).encode())?;
+            bench.power_cycle()?;
+            gains_are(bench, gains)
+        })
+        .needs(&[Need::Rom, Need::PowerCycle]),
+        case(
+            "the_acceleration_is_read_as_it_was_written",
+            &["RMD-34-02", "RMD-34-01", "RMD-33-04"],
+            |bench| accelerations_are_kept(bench, &[1, 0x0102_0304]),
+        ),
+        case("no_acceleration_limit_can_be_written", &["RMD-34-02"], |bench| {
+            accelerations_are_kept(bench, &[0, -1])
+        }),
+        case("the_acceleration_is_lost_with_the_power", &["RMD-34-04"], |bench| {
+            bench.power_cycle()?;
+            let rom = bench.keep_acceleration()?;
+            accelerate(bench, rom.0 ^ 0x40)?;
+            bench.power_cycle()?;
+            acceleration_is(bench, rom.0)
+        })
+        .needs(&[Need::PowerCycle]),
+    ]
+}
+
+/// Six different gains, each another than it was.
+fn others(gains: Gains) -> Gains {
+    Gains {
+        position_kp: gains.position_kp ^ 1,
+        position_ki: gains.position_ki ^ 2,
+        speed_kp: gains.speed_kp ^ 4,
+        speed_ki: gains.speed_ki ^ 8,
+        torque_kp: gains.torque_kp ^ 16,
+        torque_ki: gains.torque_ki ^ 32,
+    }
+}
+
+pub(super) fn write(bench: &mut Bench, gains: Gains) -> Result<(), Stop> {
+    bench.keep_gains()?;
+    bench.ask(WriteGains(gains).encode()).map(|_| ())
+}
+
+fn gains_are(bench: &mut Bench, gains: Gains) -> Result<(), Stop> {
+    let data = bench.ask(ReadGains.encode())?;
+    let bytes = gains.encode_as(Code::ReadGains);
+    bench.require(data[2..] == bytes[2..], format!("gains {:02X?} in DATA[2] on", &bytes[2..]))
+}
+
+pub(super) fn accelerate(bench: &mut Bench, digits: i32) -> Result<(), Stop> {
+    bench.keep_acceleration()?;
+    let acceleration = DpsPerSecond(digits);
+    bench.ask(WriteAcceleration(Acceleration { acceleration }).encode()).map(|_| ())
+}
+
+fn accelerations_are_kept(bench: &mut Bench, values: &[i32]) -> Result<(), Stop> {
+    for &digits in values {
+        accelerate(bench, digits)?;
+        acceleration_is(bench, digits)?;
+    }
+    Ok(())
+}
+
+fn acceleration_is(bench: &mut Bench, digits: i32) -> Result<(), Stop> {
+    let data = bench.ask(ReadAcceleration.encode())?;
+    let bytes = digits.to_le_bytes();
+    bench.require(data[4..] == bytes, format!("{digits} °/s², {bytes:02X?} in DATA[4] on"))
+}

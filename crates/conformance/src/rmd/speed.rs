@@ -1,0 +1,81 @@
+//! Speed (0xA2), and what gains act on it.
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::Duration;
+use motorlink_proto::units::{CentiDegrees, CentiDps, SpeedLimit};
+
+use super::bench::Bench;
+use super::case;
+use super::settings::write;
+use crate::case::{Case, Need, Stop};
+
+/// Speed of the cases, °/s.
+pub(super) const SPEED: i16 = 60;
+
+pub(super) fn cases() -> Vec<Case<Bench>> {
+    vec![
+        case(
+            "a_speed_is_reached_either_way",
+            &["RMD-A2-02", "RMD-A2-01", "RMD-A2-08", "RMD-9C-05"],
+            |bench| {
+                for sign in [1, -1] {
+                    runs(bench, sign)?;
+                }
+                Ok(())
+            },
+        ),
+        case(
+            "the_multi_turn_angle_grows_as_the_speed_says",
+            &["RMD-92-04", "RMD-92-05", "RMD-9C-05"],
+            |bench| {
+                for sign in [1, -1] {
+                    runs(bench, sign)?;
+                    let (from, begun) = (bench.angle()?, bench.millis());
+                    bench.pause(Duration::from_millis(400))?;
+                    let turned = bench.angle()? - from;
+                    let due = i64::from(sign * SPEED) * (bench.millis() - begun) as i64 / 10;
+                    let near = (turned - due).abs() <= due.abs() / 4;
+                    bench.require(
+                        near,
+                        format!("{:.1}° further, not {:.1}°", deg(due), deg(turned)),
+                    )?;
+                }
+                Ok(())
+            },
+        ),
+        case("position_gains_do_not_act_on_speed", &["RMD-31-01", "RMD-30-04"], |bench| {
+            bench.gently()?;
+            let gains = bench.keep_gains()?;
+            write(bench, Gains { position_kp: 0, position_ki: 0, ..gains })?;
+            let angle = CentiDegrees(bench.angle_in_reach()? + 3_000);
+            bench.command(PositionLimited { max_speed: SpeedLimit(30), angle })?;
+            let turned = bench.watch(700, |seen| seen.speed.abs() > 10)?;
+            bench.require(!turned, "no way to a position without position gains")?;
+            runs(bench, 1)
+        }),
+    ]
+    .into_iter()
+    .map(|case| case.needs(&[Need::Spin]))
+    .collect()
+}
+
+/// Gets the motor to 60 °/s, one way or the other.
+pub(super) fn runs(bench: &mut Bench, sign: i16) -> Result<(), Stop> {
+    bench.gently()?;
+    bench.command(Speed { speed: CentiDps(100 * i32::from(sign * SPEED)) })?;
+    keeps_running(bench, sign)
+}
+
+/// The motor gets to 60 °/s and is still that fast a moment later.
+pub(super) fn keeps_running(bench: &mut Bench, sign: i16) -> Result<(), Stop> {
+    let good = |speed: i16| (speed - sign * SPEED).abs() <= 8;
+    let reached = bench.watch(4_000, |seen| good(seen.speed))?;
+    bench.require(reached, format!("{} °/s within 4 s", sign * SPEED))?;
+    bench.pause(Duration::from_millis(200))?;
+    let speed = bench.read(ReadStatus2)?.speed;
+    bench.require(good(speed.0), format!("{} °/s still, 0.2 s later", sign * SPEED))
+}
+
+fn deg(hundredths: i64) -> f64 {
+    hundredths as f64 / 100.0
+}

@@ -1,0 +1,96 @@
+//! Moves: slow ones, watched, and ended when they are not what was asked for.
+
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::Duration;
+
+use super::bench::Bench;
+use super::settings::accelerate;
+use crate::case::Stop;
+
+/// Acceleration limit under which cases turn the motor, °/s².
+pub(super) const GENTLE: i32 = 360;
+/// No move of this kit goes beyond this speed, °/s.
+const FAST: u16 = 500;
+/// How often a move is looked at.
+const EVERY: Duration = Duration::from_millis(10);
+
+/// What a look at a move has seen.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen {
+    /// Torque current, digits.
+    pub iq: i16,
+    /// °/s.
+    pub speed: i16,
+    /// Multi-turn angle, 0.01°.
+    pub angle: i64,
+    /// Since the watch began, ms; not less than it really was.
+    pub millis: u64,
+}
+
+impl Bench {
+    /// Limits the acceleration, for the sake of whatever the motor is mounted to.
+    pub(super) fn gently(&mut self) -> Result<(), Stop> {
+        self.may_move();
+        accelerate(self, GENTLE)
+    }
+
+    /// A command that may turn the motor; checks its reply.
+    pub(super) fn command<C: Command<Reply = MotionStatus>>(
+        &mut self,
+        command: C,
+    ) -> Result<MotionStatus, Stop> {
+        self.may_move();
+        let status = self.read(command)?;
+        self.plausible(&status)?;
+        Ok(status)
+    }
+
+    /// The multi-turn angle, 0.01°.
+    pub(super) fn angle(&mut self) -> Result<i64, Stop> {
+        Ok(self.read(ReadMultiTurnAngle)?.angle.0)
+    }
+
+    /// The multi-turn angle where 32 bits of a position command reach it.
+    pub(super) fn angle_in_reach(&mut self) -> Result<i32, Stop> {
+        const MARGIN: i32 = 100_000;
+        let angle = i32::try_from(self.angle()?).unwrap_or(i32::MAX);
+        if (-i32::MAX + MARGIN..i32::MAX - MARGIN).contains(&angle) {
+            return Ok(angle);
+        }
+        Err(Stop::Skipped("the motor has turned beyond what a position command reaches".to_owned()))
+    }
+
+    /// Looks at the motor until `done`, at most for `ms`; whether it became so. A motor that turns
+    /// faster than any move of this kit is switched off, and the case has failed.
+    pub(super) fn watch(
+        &mut self,
+        ms: u64,
+        mut done: impl FnMut(&Seen) -> bool,
+    ) -> Result<bool, Stop> {
+        let begun = self.millis();
+        loop {
+            self.go_on()?;
+            let status = self.read(ReadStatus2)?;
+            if status.speed.0.unsigned_abs() > FAST {
+                let failed = self.failed(format!("no more than {FAST} °/s in any move"));
+                self.ask(Off.encode())?;
+                return Err(failed);
+            }
+            let angle = self.angle()?;
+            let millis = self.millis() - begun;
+            let seen = Seen { iq: status.iq.0, speed: status.speed.0, angle, millis };
+            if done(&seen) {
+                return Ok(true);
+            }
+            if millis >= ms {
+                return Ok(false);
+            }
+            self.pause(EVERY)?;
+        }
+    }
+
+    /// Watches until the motor stands.
+    pub(super) fn comes_to_a_stand(&mut self, ms: u64) -> Result<bool, Stop> {
+        self.watch(ms, |seen| seen.speed.abs() <= 5)
+    }
+}

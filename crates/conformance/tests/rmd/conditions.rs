@@ -1,0 +1,135 @@
+//! Motors that are in order pass however they are reached, whatever they drive, and with what real
+//! sensors add.
+
+use std::collections::VecDeque;
+
+use motorlink::port::PortError;
+use motorlink_conformance::Need;
+use motorlink_conformance::wire::Bus;
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_sim::machine::MachineConfig;
+use motorlink_sim::rmd::RmdConfig;
+
+use crate::drive::{Behaviour, Event, Motors, Setup, Shared, Tested, motor};
+
+fn passes(tested: &Tested) {
+    let failed: Vec<_> = tested.report.failed().collect();
+    assert!(failed.is_empty() && tested.report.is_clean(), "{failed:#?}");
+}
+
+/// A USB adapter: frames wait for the next turn of the bus.
+struct Adapter {
+    bus: Shared,
+    received: VecDeque<(Instant, CanFrame)>,
+}
+
+const OUT: Duration = Duration::from_millis(2);
+const BACK: Duration = Duration::from_millis(16);
+
+impl Adapter {
+    fn pass(&mut self, until: Instant) -> Result<(), PortError> {
+        while let Some(frame) = self.bus.receive(until)? {
+            self.received.push_back((self.bus.now() + BACK, frame));
+        }
+        Ok(())
+    }
+}
+
+impl Bus for Adapter {
+    fn now(&self) -> Instant {
+        self.bus.now()
+    }
+
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.pass(self.now() + OUT)?;
+        self.bus.send(frame)?;
+        self.pass(self.now())
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
+        let due = self.received.front().map(|(due, _)| *due).filter(|due| *due <= until);
+        self.pass(due.unwrap_or(until).max(self.now()))?;
+        Ok(due.and_then(|_| self.received.pop_front()).map(|(_, frame)| frame))
+    }
+}
+
+#[test]
+fn a_motor_behind_a_slow_adapter_passes() {
+    let slow = || {
+        let port = |bus| Box::new(Adapter { bus, received: VecDeque::new() }) as Box<dyn Bus>;
+        Setup { port, ..Setup::new(vec![motor(1), motor(2)]) }
+    };
+    passes(&slow().run());
+    let careful = Setup { allowed: &[], ..slow() }.run();
+    passes(&careful);
+    assert!(careful.seconds() < 30, "{} s", careful.seconds());
+}
+
+#[test]
+fn motors_with_loads_and_friction_pass() {
+    let config = motor(1);
+    let heavy = MachineConfig { inertia: 5e-3, coulomb_friction: 0.05, ..config.machine };
+    let geared = MachineConfig { viscous_friction: 2e-3, ..heavy };
+    for changed in [
+        RmdConfig { machine: heavy, ..config },
+        RmdConfig { machine: geared, load_torque: 0.05, ..config },
+        RmdConfig { load_torque: 0.08, supply_voltage: 12.0, ..config },
+    ] {
+        passes(&Setup::new(vec![changed]).run());
+    }
+}
+
+#[test]
+fn a_motor_with_noisy_sensors_passes() {
+    passes(&Setup { behaviour: noisy(), ..Setup::new(vec![motor(1)]) }.run());
+}
+
+/// A load that two amperes do not move is no fault of the motor.
+#[test]
+fn a_motor_that_its_load_holds_is_not_blamed_for_it_by_the_torque_case() {
+    let config = RmdConfig { load_torque: 0.5, ..motor(1) };
+    let tested = Setup { allowed: &[Need::Spin], ..Setup::new(vec![config]) }.run();
+    let outcome = tested.report.outcomes.iter();
+    let torque =
+        outcome.clone().find(|outcome| outcome.name == "torque_has_the_sign_of_its_command");
+    assert_eq!(torque.map(|outcome| outcome.verdict.word()), Some("skipped"));
+}
+
+#[test]
+fn a_motor_that_answers_0x9b_with_0x9b_passes() {
+    let config = RmdConfig { clear_reply_0x9b: true, ..motor(1) };
+    passes(&Setup::new(vec![config]).run());
+}
+
+/// Noise of a few digits on current, speed, voltage, temperature and phase currents.
+fn noisy() -> Behaviour {
+    let mut state = 1_u32;
+    let mut noise = move |most: i16| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 16) as i16 % (most + 1)
+    };
+    let mut add = move |data: &mut [u8; 8], first: usize, most: i16| {
+        let value = i16::from_le_bytes([data[first], data[first + 1]]);
+        let value = value.saturating_add(noise(2 * most).abs() - most);
+        data[first..first + 2].copy_from_slice(&value.to_le_bytes());
+    };
+    Box::new(move |motors: &mut Motors, event: Event| {
+        let mut replies = motors.pass(event);
+        for reply in &mut replies {
+            let Some((id, data)) = reply.usable() else { continue };
+            let mut data = *data;
+            match data[0] {
+                0x9A => add(&mut data, 3, 3),
+                0x9C | 0xA1..=0xA6 => {
+                    add(&mut data, 2, 8);
+                    add(&mut data, 4, 3);
+                }
+                0x9D => [2, 4, 6].into_iter().for_each(|first| add(&mut data, first, 6)),
+                _ => {}
+            }
+            *reply = CanFrame::new(id, data);
+        }
+        replies
+    })
+}

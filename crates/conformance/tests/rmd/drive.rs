@@ -1,0 +1,218 @@
+//! Simulated motors on virtual time, the world around them, and what may be put between them and
+//! the bus.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use motorlink::serve::CanStation;
+use motorlink_conformance::rmd::{Bench, Options, suite};
+use motorlink_conformance::wire::{Bus, Virtual};
+use motorlink_conformance::{Case, Need, Report, Unavailable, World, run};
+use motorlink_proto::rmd::*;
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
+
+pub const EVERYTHING: [Need; 4] = [Need::Spin, Need::Rom, Need::PowerCycle, Need::Fault];
+
+/// What happens to motors.
+pub enum Event<'a> {
+    Frame(&'a CanFrame),
+    PowerOn,
+}
+
+/// What is done in place of what the motors do.
+pub type Behaviour = Box<dyn FnMut(&mut Motors, Event) -> Vec<CanFrame>>;
+
+/// Motors on a bus.
+pub struct Motors {
+    pub bus: RmdBus<Vec<RmdNode>>,
+    pub now: Instant,
+    first: MotorId,
+}
+
+impl Motors {
+    /// What the motors do.
+    pub fn pass(&mut self, event: Event) -> Vec<CanFrame> {
+        let mut replies = Vec::new();
+        if let Event::Frame(frame) = event {
+            self.bus.receive(self.now, frame, |reply| replies.push(reply));
+        }
+        replies
+    }
+
+    /// The data of the reply of the motor that is tested.
+    pub fn ask(&mut self, data: [u8; 8]) -> [u8; 8] {
+        self.try_ask(data).expect("a command that is answered")
+    }
+
+    /// The same for what may not be a command.
+    pub fn try_ask(&mut self, data: [u8; 8]) -> Option<[u8; 8]> {
+        let replies = self.pass(Event::Frame(&CanFrame::new(self.first.can_id(), data)));
+        replies.first().and_then(CanFrame::usable).map(|(_, data)| *data)
+    }
+
+    /// The motor that is tested.
+    pub fn first_id(&self) -> MotorId {
+        self.first
+    }
+
+    /// The same, to change it.
+    pub fn first_mut(&mut self) -> &mut RmdNode {
+        self.bus.node_mut(self.first).expect("it is there")
+    }
+
+    pub fn first(&self) -> &RmdNode {
+        self.bus.node(self.first).expect("it is there")
+    }
+
+    fn ids(&self) -> Vec<MotorId> {
+        self.bus.nodes().iter().map(RmdNode::id).collect()
+    }
+}
+
+/// Motors that may behave otherwise.
+pub struct Station {
+    pub motors: Motors,
+    behaviour: Behaviour,
+    /// Whether a motor was ever under current, or told to move.
+    pub energised: bool,
+    pub powered_on: u32,
+    /// The greatest speed that a motor had when a frame came, °/s.
+    pub fastest: f32,
+}
+
+impl CanStation for Station {
+    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+        self.motors.now = now;
+        replies.extend((self.behaviour)(&mut self.motors, Event::Frame(frame)));
+        let off = |node: &RmdNode| node.motor().truth().mode == Mode::Off;
+        let speed = |node: &RmdNode| node.motor().truth().speed_dps.abs();
+        self.fastest = self.motors.bus.nodes().iter().map(speed).fold(self.fastest, f32::max);
+        self.energised |= !self.motors.bus.nodes().iter().all(off);
+    }
+
+    fn poll(&mut self, _now: Instant, _replies: &mut Vec<CanFrame>) {}
+
+    fn deadline(&self) -> Option<Instant> {
+        None
+    }
+}
+
+pub type Shared = Rc<RefCell<Virtual<Station, CanFrame>>>;
+
+/// The hand at the power switch.
+struct Around {
+    bus: Shared,
+    interrupted: Option<Instant>,
+}
+
+impl World for Around {
+    fn power_cycle(&mut self) -> Result<(), Unavailable> {
+        let mut bus = self.bus.borrow_mut();
+        let now = bus.now();
+        let Station { motors, behaviour, powered_on, .. } = &mut bus.station;
+        motors.now = now;
+        motors.bus.advance_to(now);
+        for id in motors.ids() {
+            motors.bus.node_mut(id).expect("it is there").power_cycle(now);
+        }
+        *powered_on += 1;
+        behaviour(motors, Event::PowerOn);
+        Ok(())
+    }
+
+    fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
+        let mut bus = self.bus.borrow_mut();
+        let faults = if present { Errors::LOW_VOLTAGE } else { Errors::NONE };
+        let motors = &mut bus.station.motors;
+        for id in motors.ids() {
+            motors.bus.node_mut(id).expect("it is there").motor_mut().hold_faults(faults);
+        }
+        Ok(())
+    }
+
+    fn interrupted(&self) -> bool {
+        self.interrupted.is_some_and(|moment| self.bus.borrow().now() >= moment)
+    }
+}
+
+/// A motor unlike a new one in all that can be told, so that nothing passes by chance.
+pub fn motor(id: u8) -> RmdConfig {
+    RmdConfig {
+        gains: [101, 99, 102, 98, 103, 97],
+        acceleration_dps2: 5_000,
+        encoder_offset: 1_000,
+        angle_degrees: 123.4,
+        ..RmdConfig::with_id(id)
+    }
+}
+
+/// What came of the suite, and the motors afterwards.
+pub struct Tested {
+    pub report: Report,
+    bus: Shared,
+}
+
+impl Tested {
+    pub fn station<T>(&self, look: impl FnOnce(&Station) -> T) -> T {
+        look(&self.bus.borrow().station)
+    }
+
+    /// The time that the run took, s.
+    pub fn seconds(&self) -> u64 {
+        self.bus.borrow().now().0 / 1_000_000
+    }
+}
+
+/// What is tested, and how: everything is allowed unless told otherwise.
+pub struct Setup {
+    /// The motors on the bus; the first is tested.
+    pub motors: Vec<RmdConfig>,
+    pub allowed: &'static [Need],
+    pub behaviour: Behaviour,
+    pub suite: Vec<Case<Bench>>,
+    /// What is between the kit and the bus.
+    pub port: fn(Shared) -> Box<dyn Bus>,
+    /// When the user has had enough.
+    pub interrupted: Option<Instant>,
+}
+
+impl Setup {
+    pub fn new(motors: Vec<RmdConfig>) -> Self {
+        let port: fn(Shared) -> Box<dyn Bus> = |bus| Box::new(bus);
+        Setup {
+            motors,
+            allowed: &EVERYTHING,
+            behaviour: honest(),
+            suite: suite(),
+            port,
+            interrupted: None,
+        }
+    }
+
+    /// Puts the first motor through the suite.
+    pub fn run(self) -> Tested {
+        let Setup { motors, allowed, behaviour, suite, port, interrupted } = self;
+        let node = |config: &RmdConfig| {
+            RmdNode::new(Instant(0), *config, config.factory_rom()).expect("a fair configuration")
+        };
+        let bus = RmdBus::new(Instant(0), motors.iter().map(node).collect()).expect("IDs differ");
+        let id = MotorId::new(motors[0].id).expect("an ID");
+        let encoder = EncoderBits::new(motors[0].encoder_bits).expect("a width");
+        let motors = Motors { bus, now: Instant(0), first: id };
+        let station = Station { motors, behaviour, energised: false, powered_on: 0, fastest: 0.0 };
+        let bus = Rc::new(RefCell::new(Virtual::new(station)));
+        let options = Options { id, encoder, allowed: allowed.to_vec() };
+        let world = Box::new(Around { bus: Rc::clone(&bus), interrupted });
+        let report = run(&suite, &mut Bench::new(port(Rc::clone(&bus)), world, options), |_| {});
+        // What was told last gets its time.
+        let now = bus.borrow().now();
+        bus.borrow_mut().station.motors.bus.advance_to(now + Duration::from_millis(1_000));
+        Tested { report, bus }
+    }
+}
+
+/// What motors do.
+pub fn honest() -> Behaviour {
+    Box::new(Motors::pass)
+}

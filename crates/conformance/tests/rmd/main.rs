@@ -1,0 +1,7 @@
+//! The kit for RMD motors, tested on simulated ones.
+
+mod clauses;
+mod conditions;
+mod drive;
+mod mutants;
+mod suite;

@@ -1,0 +1,205 @@
+//! Motors that differ from the document in one thing each: the case that names the clause fails.
+
+mod encoder;
+mod every_command;
+mod frames;
+mod motion;
+mod position;
+mod settings;
+mod status;
+
+use motorlink_conformance::Verdict;
+use motorlink_proto::rmd::*;
+use motorlink_sim::rmd::Truth;
+
+use motorlink_conformance::rmd::suite;
+
+use crate::drive::{Behaviour, Event, Motors, Setup, honest, motor};
+use crate::suite::settings;
+
+/// A motor that differs in one thing.
+struct Mutant {
+    name: &'static str,
+    /// What it is caught by.
+    clause: &'static str,
+    /// The ID of the motor that is tested; there is a motor 2 besides.
+    id: u8,
+    behaviour: Behaviour,
+}
+
+fn mutant(name: &'static str, clause: &'static str, behaviour: Behaviour) -> Mutant {
+    Mutant { name, clause, id: 1, behaviour }
+}
+
+/// Mutants that cannot be left as they were: what they are cannot be read, written or switched off.
+const UNTRUE: [&str; 9] = [
+    "acceleration_is_read_high_byte_first",
+    "ki_before_kp_in_replies",
+    "acceleration_is_kept_and_not_obeyed",
+    "acceleration_has_tenfold_digits",
+    "offset_is_high_byte_first",
+    "a_written_offset_is_lost",
+    "a_written_offset_is_high_byte_first",
+    "off_is_ignored",
+    "off_is_a_stop",
+];
+
+/// Each mutant is caught by a case that names its clause, and kept from harm.
+fn are_caught(mutants: Vec<Mutant>) {
+    let untouched = settings(&Setup { allowed: &[], ..Setup::new(vec![motor(1), motor(2)]) }.run());
+    let mut escaped = Vec::new();
+    for Mutant { name, clause, id, behaviour } in mutants {
+        let tested = Setup { behaviour, ..Setup::new(vec![motor(id), motor(2)]) }.run();
+        let (caught, others): (Vec<_>, Vec<_>) =
+            tested.report.failed().partition(|outcome| outcome.clauses.contains(&clause));
+        let names = |outcomes: &[&motorlink_conformance::Outcome]| {
+            outcomes.iter().map(|outcome| outcome.name.clone()).collect::<Vec<_>>().join(" ")
+        };
+        println!(
+            "{name}, {clause}: {}\n    and {}: {}",
+            names(&caught),
+            others.len(),
+            names(&others)
+        );
+        for outcome in &caught {
+            let Verdict::Failed(finding) = &outcome.verdict else { unreachable!("it has failed") };
+            assert!(!finding.expected.is_empty() && !outcome.transcript.is_empty(), "{outcome:#?}");
+        }
+        tested.station(|station| {
+            // What the drive's greatest torque does in the milliseconds until it is noticed.
+            assert!(station.fastest < 2_000.0, "{name}: {} °/s", station.fastest);
+            let Truth { mode, speed_dps, .. } = station.motors.first().motor().truth();
+            let still = matches!(mode, Mode::Off | Mode::Stopped) && speed_dps.abs() < 10.0;
+            assert!(still, "{name}: {mode:?} at {speed_dps} °/s in the end");
+        });
+        let as_it_was = settings(&tested) == untouched;
+        assert!(as_it_was || UNTRUE.contains(&name), "{name}: {:?}", settings(&tested));
+        if caught.is_empty() {
+            escaped.push(name);
+        }
+    }
+    assert!(escaped.is_empty(), "not caught: {escaped:?}");
+}
+
+/// A case that names this clause fails; cases that do not name it are not run.
+fn is_caught(clause: &str, behaviour: Behaviour) {
+    let mut suite = suite();
+    suite.retain(|case| case.clauses.contains(&clause));
+    let tested = Setup { suite, behaviour, ..Setup::new(vec![motor(1)]) }.run();
+    assert!(tested.report.failed().count() > 0, "{clause}: {:#?}", tested.report.outcomes);
+}
+
+#[test]
+fn without_a_mutation_the_same_wrappers_pass() {
+    for behaviour in [honest(), replies(|_, _| ()), requests(|_| ())] {
+        let tested = Setup { behaviour, ..Setup::new(vec![motor(1), motor(2)]) }.run();
+        assert_eq!(tested.report.failed().count(), 0);
+        assert!(tested.report.is_clean());
+    }
+}
+
+/// Changes the data of replies, given the request's.
+fn replies(change: impl Fn(&[u8; 8], &mut [u8; 8]) + 'static) -> Behaviour {
+    frames(move |request, reply| {
+        let Some((id, data)) = reply.usable() else { return vec![reply] };
+        let (mut data, request) = (*data, *request.usable().expect("it was answered").1);
+        change(&request, &mut data);
+        vec![CanFrame::new(id, data)]
+    })
+}
+
+/// Changes replies to one command.
+fn on(to: Code, change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
+    replies(move |request, reply| {
+        if code(request) == to {
+            change(reply);
+        }
+    })
+}
+
+/// Changes replies, given the request.
+fn frames(change: impl Fn(&CanFrame, CanFrame) -> Vec<CanFrame> + 'static) -> Behaviour {
+    Box::new(move |motors, event| match event {
+        Event::Frame(request) => {
+            let replies = motors.pass(Event::Frame(request));
+            replies.into_iter().flat_map(|reply| change(request, reply)).collect()
+        }
+        Event::PowerOn => Vec::new(),
+    })
+}
+
+/// Changes the data of requests to the first motor; its reply has the code that was sent, and an
+/// echo all of it.
+fn requests(change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
+    commands(move |motors, data| {
+        let mut changed = *data;
+        change(&mut changed);
+        Some(obey(motors, data, changed))
+    })
+}
+
+/// What the first motor does to a command, as if it were another.
+fn obey(motors: &mut Motors, sent: &[u8; 8], done: [u8; 8]) -> Option<[u8; 8]> {
+    let mut reply = motors.try_ask(done)?;
+    let echoes = Code::from(sent[0]).info().is_some_and(|row| row.echo);
+    if done != *sent {
+        match echoes {
+            true => reply = *sent,
+            false => reply[0] = sent[0],
+        }
+    }
+    Some(reply)
+}
+
+/// Takes one command for another, and answers as to the one.
+fn taken_for(one: u8, other: u8) -> Behaviour {
+    commands(move |motors, data| {
+        (data[0] == one).then(|| {
+            let mut done = *data;
+            done[0] = other;
+            obey(motors, data, done)
+        })
+    })
+}
+
+/// Takes commands to the first motor away from it: `Some` is what is answered.
+fn commands(
+    mut take: impl FnMut(&mut Motors, &[u8; 8]) -> Option<Option<[u8; 8]>> + 'static,
+) -> Behaviour {
+    Box::new(move |motors, event| {
+        if let Event::Frame(frame) = event
+            && let Some((id, data)) = frame.usable()
+            && id == motors.first_id().can_id()
+            && let Some(reply) = take(motors, data)
+        {
+            return reply.map(|reply| CanFrame::new(id, reply)).into_iter().collect();
+        }
+        motors.pass(event)
+    })
+}
+
+/// The code that begins a frame.
+fn code(data: &[u8; 8]) -> Code {
+    Code::from(data[0])
+}
+
+/// Changes the byte order of a value.
+fn swap(data: &mut [u8; 8], first: usize) {
+    data.swap(first, first + 1);
+}
+
+fn u16_at(data: &[u8; 8], first: usize) -> u16 {
+    u16::from_le_bytes([data[first], data[first + 1]])
+}
+
+fn put_u16(data: &mut [u8; 8], first: usize, value: u16) {
+    data[first..first + 2].copy_from_slice(&value.to_le_bytes());
+}
+
+fn i32_at(data: &[u8; 8]) -> i32 {
+    i32::from_le_bytes([data[4], data[5], data[6], data[7]])
+}
+
+fn put_i32(data: &mut [u8; 8], value: i32) {
+    data[4..].copy_from_slice(&value.to_le_bytes());
+}

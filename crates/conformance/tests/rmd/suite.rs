@@ -1,0 +1,114 @@
+//! Simulated motors pass, and are afterwards what they were.
+
+use motorlink_conformance::rmd::suite;
+use motorlink_conformance::{Report, Verdict};
+use motorlink_proto::rmd::{Errors, Mode, Settings};
+use motorlink_proto::time::Instant;
+use motorlink_sim::rmd::RmdConfig;
+
+use crate::drive::{Setup, Tested, motor};
+
+/// Names of the cases that ended so.
+fn names(report: &Report, verdict: &str) -> Vec<String> {
+    let cases = report.outcomes.iter().filter(|outcome| outcome.verdict.word() == verdict);
+    cases.map(|outcome| outcome.name.clone()).collect()
+}
+
+#[test]
+fn an_interrupted_run_leaves_the_motor_off_and_as_it_was() {
+    let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
+    let mut suite = suite();
+    suite.retain(|case| {
+        case.name == "a_speed_is_reached_either_way" || case.name == "status_2_can_be"
+    });
+    suite.reverse();
+    // By then the motor turns.
+    let interrupted = Some(Instant(300_000));
+    let tested = Setup { suite, interrupted, ..Setup::new(vec![motor(1)]) }.run();
+    assert!(tested.station(|station| station.fastest > 40.0));
+    assert_eq!((tested.report.count("not run"), tested.report.lost()), (2, "interrupted"));
+    assert_eq!(settings(&tested), settings(&before));
+}
+
+fn passes(tested: &Tested) {
+    for outcome in &tested.report.outcomes {
+        let good = matches!(outcome.verdict, Verdict::Passed | Verdict::Skipped(_));
+        assert!(good, "{outcome:#?}");
+    }
+}
+
+#[test]
+fn motors_of_every_encoder_width_pass() {
+    for encoder_bits in [12, 14, 16, 18] {
+        let tested = Setup::new(vec![RmdConfig { encoder_bits, ..motor(1) }]).run();
+        passes(&tested);
+        let beyond = ["an_offset_beyond_the_encoder_is_cut"];
+        let alone =
+            ["four_torques_are_answered_lowest_id_first", "a_motor_beyond_4_does_not_hear_them"];
+        let skipped = names(&tested.report, "skipped");
+        let width = if encoder_bits >= 16 { &beyond[..] } else { &[] };
+        assert_eq!(skipped, [width, &alone[..]].concat(), "{encoder_bits} bits");
+    }
+}
+
+#[test]
+fn one_of_four_motors_passes() {
+    let tested = Setup::new([3, 1, 2, 4].map(motor).into()).run();
+    passes(&tested);
+    assert_eq!(names(&tested.report, "skipped"), ["a_motor_beyond_4_does_not_hear_them"]);
+}
+
+#[test]
+fn a_motor_with_another_id_passes() {
+    let tested = Setup::new(vec![motor(32)]).run();
+    passes(&tested);
+    let four = [
+        "four_torques_are_answered_once_by_each_motor",
+        "four_torques_are_answered_lowest_id_first",
+        "four_torques_are_answered_as_a_torque_command",
+        "each_motor_takes_its_own_of_four_torques",
+    ];
+    assert_eq!(names(&tested.report, "skipped"), four);
+}
+
+#[test]
+fn a_motor_is_afterwards_what_it_was() {
+    let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
+    let after = Setup::new(vec![motor(1)]).run();
+    assert_eq!(settings(&after), settings(&before));
+    assert_eq!(settings(&after).2, Mode::Off);
+    let writes = after.station(|station| station.motors.first().motor().rom_writes());
+    assert_eq!(writes, ROM_WRITES, "a case more or less that wears the ROM");
+}
+
+/// What a motor is, as far as anything can change it.
+pub fn settings(tested: &Tested) -> (Settings, Settings, Mode, Errors) {
+    tested.station(|station| {
+        let drive = station.motors.first().drive();
+        (*drive.settings(), *drive.rom(), drive.mode(), drive.errors())
+    })
+}
+
+/// Eleven cases write a ROM: most of them once, an echo three times, two about zero twice; and
+/// each puts back what was there.
+const ROM_WRITES: u32 = (8 + 3 + 2 * 2) + 11;
+
+#[test]
+fn without_leave_nothing_is_energised_or_worn_and_it_is_over_soon() {
+    let tested = Setup { allowed: &[], ..Setup::new([1, 2, 3, 4].map(motor).into()) }.run();
+    passes(&tested);
+    tested.station(|station| {
+        assert!(!station.energised);
+        assert_eq!(station.powered_on, 0);
+        for node in station.motors.bus.nodes() {
+            assert_eq!(node.motor().rom_writes(), 0);
+            let turned = node.motor().truth().angle_degrees - 123.4;
+            assert!(turned.abs() < 1e-3, "it turned by {turned}°");
+        }
+    });
+    assert!(tested.seconds() < 15, "{} s on a bus without delays", tested.seconds());
+    let needed =
+        |name: &str| names(&tested.report, "skipped").iter().any(|skipped| skipped == name);
+    assert!(needed("a_speed_is_reached_either_way") && needed("a_written_offset_is_in_force"));
+    assert!(tested.report.count("passed") > 30);
+}

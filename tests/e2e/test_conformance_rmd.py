@@ -1,0 +1,187 @@
+"""`motorlink conformance rmd`: simulated motors pass, wrong ones are told apart, none is moved."""
+
+import json
+import os
+import subprocess
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+from peers import device, slcan_adapter
+from program import environment, eventually
+
+STATUS_1 = "9A19000F00000000"
+STATUS_1_OF_24_V = "9A1900F000000000"
+STATUS_2 = "9C19000000000000"
+
+
+@pytest.fixture
+def check(run):
+    """Puts a motor through the cases."""
+
+    def check(port, *arguments):
+        return run("conformance", "rmd", "-p", f"slcan:{port}", *arguments, within=120)
+
+    return check
+
+
+class Peer:
+    """A motor with ID 1 that answers a few commands, and notes what it is sent."""
+
+    def __init__(self, replies, identifier="141"):
+        self.replies = replies
+        self.identifier = identifier
+        self.sent = []
+
+    def __call__(self, frame):
+        self.sent.append(frame)
+        data = self.replies.get(frame[5:7]) if frame.startswith("t1418") else None
+        return [f"t{self.identifier}8{data}"] if data else []
+
+
+def failures(path):
+    """Name and text of each failed case in a JUnit file."""
+    cases = ElementTree.parse(path).getroot().iter("testcase")
+    return {case.get("name"): case.find("failure") for case in cases if case.find("failure") is not None}
+
+
+def test_a_simulated_motor_passes_and_is_left_alone(check, sim, tmp_path):
+    drives = sim(st=())
+    before = drives.motor(1)
+    junit, saved = tmp_path / "rmd.xml", tmp_path / "rmd.json"
+    done = check(drives.can, "--junit", junit, "--json", saved).ended(0)
+    assert "needs" in done.out and "--spin" in done.out, "what was skipped says why"
+    report = json.loads(saved.read_text())
+    assert report["failed"] == report["not_run"] == 0
+    assert report["passed"] > 50 and len(report["cases"]) > 130
+    suite = ElementTree.parse(junit).getroot().find("testsuite")
+    assert (suite.get("name"), int(suite.get("failures"))) == ("rmd", 0)
+    assert len(suite.findall("testcase")) == len(report["cases"])
+    after = drives.motor(1)
+    for unmoved in ("angle_degrees", "mode", "rom_writes"):
+        assert after[unmoved] == before[unmoved]
+    assert after["mode"] == "off"
+
+
+def test_json_without_a_file_goes_to_stdout(check, sim):
+    done = check(sim(st=()).can, "--only", "RMD-33", "--json").ended(0)
+    assert done.json["passed"] == len(done.json["cases"]) > 0
+
+
+def test_with_leave_the_motor_turns_and_is_off_in_the_end(check, sim):
+    drives = sim(st=())
+    before = drives.motor(1)["angle_degrees"]
+    done = check(drives.can, "--only", "RMD-88", "--spin", "--verbose").ended(0)
+    assert "run_resumes_what_a_stop_has_interrupted" in done.out
+    after = drives.motor(1)
+    assert after["mode"] == "off" and abs(after["angle_degrees"] - before) > 1
+
+
+def test_ctrl_c_switches_the_motor_off(start, sim):
+    drives = sim(st=())
+    case = "the_acceleration_limit_holds"
+    run = start("conformance", "rmd", "-p", f"slcan:{drives.can}", "--spin", "--only", case)
+    eventually(lambda: drives.motor(1)["speed_dps"] > 10, "a motor that turns")
+    run.interrupt()
+    assert run.wait() == 130
+    assert drives.motor(1)["mode"] == "off"
+
+
+def test_a_failure_says_what_was_sent_expected_and_received(check, tmp_path):
+    peer = Peer({"9A": STATUS_1, "9C": STATUS_2})
+    junit = tmp_path / "rmd.xml"
+    with device(tmp_path / "can", slcan_adapter(peer)) as port:
+        done = check(port, "--only", "temperature_and_voltage", "--junit", junit).ended(1)
+    assert "FAILED" in done.out and "RMD-9A-04" in done.out
+    assert "141 [8] 9A 00 00 00 00 00 00 00" in done.out, "what was sent"
+    assert "5 V to 100 V, not 1.5 V" in done.out, "what was expected"
+    assert "141 [8] 9A 19 00 0F 00 00 00 00" in done.out, "what came"
+    assert "0.1 V a digit" in done.out, "what the document demands"
+    (failure,) = failures(junit).values()
+    assert "< 141 [8] 9A 19 00 0F" in failure.text and "> 141 [8] 9A" in failure.text
+
+
+def test_without_that_deviation_the_same_peer_passes(check, tmp_path):
+    peer = Peer({"9A": STATUS_1_OF_24_V, "9C": STATUS_2})
+    with device(tmp_path / "can", slcan_adapter(peer)) as port:
+        check(port, "--only", "temperature_and_voltage").ended(0)
+
+
+def test_a_motor_of_another_protocol_is_named_and_left_alone(check, tmp_path):
+    peer = Peer({"9A": STATUS_1, "9C": STATUS_2}, identifier="241")
+    with device(tmp_path / "can", slcan_adapter(peer)) as port:
+        done = check(port, "--spin", "--write-rom").ended(3)
+    assert "answers as V3/V4 motors do" in done.err
+    assert peer.sent == ["t14189C00000000000000"], "one question, and nothing after its answer"
+
+
+def test_a_motor_that_turns_is_not_tested(check, tmp_path):
+    peer = Peer({"9A": STATUS_1_OF_24_V, "9C": "9C190000B4000000"})
+    with device(tmp_path / "can", slcan_adapter(peer)) as port:
+        done = check(port, "--spin").ended(3)
+    assert "turns at 180 °/s" in done.err and "switch it off first" in done.err
+    assert {frame[5:7] for frame in peer.sent} == {"9C"}
+
+
+def test_a_motor_that_is_not_there_is_told(check, sim):
+    done = check(sim(st=()).can, "--id", 9).ended(3)
+    assert "motor 9 does not answer" in done.err
+
+
+def test_a_port_that_dies_ends_the_run(check, tmp_path):
+    frames = 0
+
+    def dying(received, adapter=slcan_adapter(Peer({"9A": STATUS_1_OF_24_V, "9C": STATUS_2}))):
+        nonlocal frames
+        frames += received.count(b"t141")
+        return adapter(received) if frames < 4 else None
+
+    junit = tmp_path / "rmd.xml"
+    with device(tmp_path / "can", dying) as port:
+        done = check(port, "--junit", junit).ended(3)
+    assert "cases were not run" in done.err
+    assert ElementTree.parse(junit).getroot().find("testsuite").find("testcase/error") is not None
+
+
+def test_hooks_cycle_the_power_and_cause_faults(check, motorlink, tmp_path):
+    """Commands reach a simulator through a FIFO; the hook waits for the answer."""
+    fifo, said, port = tmp_path / "commands", tmp_path / "said", tmp_path / "can"
+    os.mkfifo(fifo)
+    hook = tmp_path / "hook"
+    hook.write_text(
+        f"seen=$(wc -l < {said})\n"
+        f'echo "$1" > {fifo}\n'
+        f"until [ $(wc -l < {said}) -gt $seen ]; do sleep 0.01; done\n"
+    )
+    fault = '{"command":"fault","motor":1,"fault":"LOW_VOLTAGE","hold":%s}'
+    commands = os.open(fifo, os.O_RDWR)
+    with open(said, "w") as out:
+        arguments = [motorlink, "sim", "--stdin", "--rmd", f"slcan-pty:{port}"]
+        drives = subprocess.Popen(arguments, stdin=commands, stdout=out, env=environment())
+    try:
+        eventually(lambda: said.read_text().count("\n"), "the port to be served")
+        done = check(
+            *(port, "--write-rom", "--json"),
+            *("--power-cycle", f"sh {hook} '{{\"command\":\"power-cycle\"}}'"),
+            *("--fault-on", f"sh {hook} '{fault % 'true'}'"),
+            *("--fault-off", f"sh {hook} '{fault % 'false'}'"),
+        ).ended(0)
+    finally:
+        drives.terminate()
+        drives.wait(10)
+        os.close(commands)
+    verdicts = {case["name"]: case["verdict"] for case in done.json["cases"]}
+    for name in (
+        "gains_in_ram_are_lost_with_the_power",
+        "gains_in_rom_outlast_the_power",
+        "a_new_zero_acts_from_power_on",
+        "an_error_stays_while_its_cause_lasts",
+        "an_error_is_cleared_when_its_cause_is_gone",
+    ):
+        assert verdicts[name] == "passed"
+
+
+def test_a_hook_that_fails_is_told(check, sim):
+    case = "gains_in_ram_are_lost_with_the_power"
+    done = check(sim(st=()).can, "--only", case, "--power-cycle", "exit 4").ended(0)
+    assert "--power-cycle: `exit 4` failed" in done.out
