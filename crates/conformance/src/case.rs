@@ -48,6 +48,9 @@ pub enum Stop {
     /// The port failed: nothing is known about the drive.
     #[error(transparent)]
     Port(#[from] PortError),
+    /// The drive cannot be tested any further, such as one that does not answer at all; why.
+    #[error("{0}")]
+    Lost(String),
 }
 
 impl From<Unavailable> for Stop {
@@ -99,8 +102,8 @@ impl<B> Case<B> {
     }
 }
 
-/// Puts a drive through the cases; `progress` sees each outcome as it comes. When the port fails the
-/// rest is not run, and the report says so.
+/// Puts a drive through the cases; `progress` sees each outcome as it comes. When the port fails, or
+/// the drive is lost, the rest is not run, and the report says so.
 pub fn run<B: Subject>(
     cases: &[Case<B>],
     bench: &mut B,
@@ -143,9 +146,18 @@ fn conduct<B: Subject>(case: &Case<B>, bench: &mut B) -> Verdict {
         (Err(Stop::Port(error)), _) | (_, Err(Stop::Port(error))) => {
             Verdict::NotRun(error.to_string())
         }
+        (Err(Stop::Failed(mut finding)), Err(Stop::Failed(left))) => {
+            let Finding { sent, expected, received } = *left;
+            finding.received += &format!(
+                "; and it was not left as it was found: sent {sent}, expected {expected}, received \
+                 {received}"
+            );
+            Verdict::Failed(finding)
+        }
         (Err(Stop::Failed(finding)), _) | (_, Err(Stop::Failed(finding))) => {
             Verdict::Failed(finding)
         }
+        (Err(Stop::Lost(why)), _) | (_, Err(Stop::Lost(why))) => Verdict::NotRun(why),
         (Err(Stop::Skipped(why)), _) | (_, Err(Stop::Skipped(why))) => Verdict::Skipped(why),
         (Ok(()), Ok(())) => Verdict::Passed,
     }

@@ -33,7 +33,7 @@ pub enum Verdict {
     Failed(Box<Finding>),
     /// Not tried, and why.
     Skipped(String),
-    /// The port had failed before, or failed here.
+    /// The port or the drive had failed before, or failed here.
     NotRun(String),
 }
 
@@ -65,6 +65,15 @@ impl Report {
     /// Names of the cases that failed.
     pub fn failed(&self) -> impl Iterator<Item = &Outcome> {
         self.outcomes.iter().filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)))
+    }
+
+    /// Why the rest was not run; empty where everything was.
+    pub fn lost(&self) -> &str {
+        let lost = self.outcomes.iter().find_map(|outcome| match &outcome.verdict {
+            Verdict::NotRun(why) => Some(why.as_str()),
+            _ => None,
+        });
+        lost.unwrap_or_default()
     }
 
     /// The report as one JSON object.

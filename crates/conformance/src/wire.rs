@@ -1,6 +1,8 @@
 //! What cases speak through: a line or a bus, and a clock that may be virtual.
 
+use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::rc::Rc;
 use std::time;
 
 use motorlink::port::{ByteLink, CanLink, PortError};
@@ -121,6 +123,21 @@ impl<S: ByteStation> Line for Virtual<S, u8> {
             self.received.extend(reply);
         }
         Ok(self.received.drain(..).collect())
+    }
+}
+
+/// A line that the world around the drive has a hand on, too.
+impl<L: Line> Line for Rc<RefCell<L>> {
+    fn now(&self) -> Instant {
+        self.borrow().now()
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.borrow_mut().send(bytes)
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
+        self.borrow_mut().receive(until)
     }
 }
 

@@ -7,6 +7,8 @@ mod world;
 use std::io::Write;
 use std::path::Path;
 
+use motorlink::port::{LineName, PortName};
+use motorlink::time::Duration;
 use motorlink_conformance::wire::Real;
 use motorlink_conformance::{Case, Need, Report, Subject, markdown, rmd, run as run_cases, st};
 
@@ -21,8 +23,10 @@ use crate::output;
 pub fn run(args: Args) -> Result<(), Failure> {
     match args.command {
         Command::St { port, run, motor, profile } => {
-            let link = port.name()?.open_line()?;
-            let options = st::Options { profile, motor, allowed: run.allowed() };
+            let name = port.name()?;
+            let link = name.open_line()?;
+            let byte_time = byte_time(&name);
+            let options = st::Options { profile, motor, allowed: run.allowed(), byte_time };
             let world = Box::new(Commands::new(&run));
             let bench = st::Bench::new(Box::new(Real::new(link)), world, options);
             conduct("st", &run, st::suite(profile), bench)
@@ -40,6 +44,16 @@ pub fn run(args: Args) -> Result<(), Failure> {
         Command::Clauses { which: Which::Rmd, .. } => {
             output::line(&markdown(rmd::CLAUSES, &rmd::suite()).trim_end())
         }
+    }
+}
+
+/// How long a start bit, eight data bits and a stop bit take, where there is a baud rate.
+fn byte_time(name: &PortName) -> Duration {
+    match name {
+        PortName::Line(LineName::Serial { baud, .. }) => {
+            Duration(10_000_000 / u64::from((*baud).max(1)))
+        }
+        _ => Duration(0),
     }
 }
 
@@ -90,7 +104,7 @@ fn verdict(report: &Report) -> Result<(), Failure> {
             report.failed().count(),
             report.outcomes.len()
         ))),
-        count => Err(Failure::Line(format!("the port failed: {count} cases were not run"))),
+        count => Err(Failure::Line(format!("{count} cases were not run: {}", report.lost()))),
     }
 }
 

@@ -33,7 +33,7 @@ impl Screen {
             return Ok(());
         }
         for outcome in &report.outcomes {
-            if self.verbose || matches!(outcome.verdict, Verdict::Failed(_) | Verdict::NotRun(_)) {
+            if self.verbose || matches!(outcome.verdict, Verdict::Failed(_)) {
                 row(outcome)?;
             }
         }

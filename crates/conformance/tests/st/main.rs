@@ -1,0 +1,5 @@
+//! The kit against simulated ST drives on virtual time: those that are right, and those that are not.
+
+mod clauses;
+mod peer;
+mod suite;
