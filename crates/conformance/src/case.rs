@@ -112,19 +112,12 @@ pub fn run<B: Subject>(
     let mut report = Report::default();
     let mut dead: Option<String> = None;
     for case in cases {
-        let verdict = match &dead {
-            Some(why) => Verdict::NotRun(why.clone()),
-            None => {
-                let missing = case.needs.iter().find(|&&need| !bench.allows(need));
-                match missing {
-                    Some(need) => Verdict::Skipped(need.unmet().to_owned()),
-                    None => conduct(case, bench),
-                }
-            }
+        let missing = case.needs.iter().find(|&&need| !bench.allows(need));
+        let verdict = match (&dead, missing) {
+            (Some(why), _) => Verdict::NotRun(why.clone()),
+            (None, Some(need)) => Verdict::Skipped(need.unmet().to_owned()),
+            (None, None) => conduct(case, bench, &mut dead),
         };
-        if let Verdict::NotRun(why) = &verdict {
-            dead.get_or_insert_with(|| why.clone());
-        }
         let transcript = match verdict {
             Verdict::Failed(_) => bench.transcript(),
             _ => Vec::new(),
@@ -138,14 +131,20 @@ pub fn run<B: Subject>(
 }
 
 /// A case between `begin` and `restore`. A drive that cannot be restored fails the case, too: the
-/// user has to know.
-fn conduct<B: Subject>(case: &Case<B>, bench: &mut B) -> Verdict {
-    let outcome = bench.begin().and_then(|()| (case.run)(bench));
-    let restored = bench.restore();
-    match (outcome, restored) {
-        (Err(Stop::Port(error)), _) | (_, Err(Stop::Port(error))) => {
-            Verdict::NotRun(error.to_string())
+/// user has to know. `dead` is told why nothing more can be run.
+fn conduct<B: Subject>(case: &Case<B>, bench: &mut B, dead: &mut Option<String>) -> Verdict {
+    let begun = bench.begin();
+    // What cannot be begun with has nothing to be restored.
+    let (outcome, restored) = match begun {
+        Err(stop @ (Stop::Port(_) | Stop::Lost(_))) => (Err(stop), Ok(())),
+        begun => (begun.and_then(|()| (case.run)(bench)), bench.restore()),
+    };
+    for result in [&outcome, &restored] {
+        if let Err(stop @ (Stop::Port(_) | Stop::Lost(_))) = result {
+            dead.get_or_insert_with(|| stop.to_string());
         }
+    }
+    match (outcome, restored) {
         (Err(Stop::Failed(mut finding)), Err(Stop::Failed(left))) => {
             let Finding { sent, expected, received } = *left;
             finding.received += &format!(
@@ -156,6 +155,9 @@ fn conduct<B: Subject>(case: &Case<B>, bench: &mut B) -> Verdict {
         }
         (Err(Stop::Failed(finding)), _) | (_, Err(Stop::Failed(finding))) => {
             Verdict::Failed(finding)
+        }
+        (Err(Stop::Port(error)), _) | (_, Err(Stop::Port(error))) => {
+            Verdict::NotRun(error.to_string())
         }
         (Err(Stop::Lost(why)), _) | (_, Err(Stop::Lost(why))) => Verdict::NotRun(why),
         (Err(Stop::Skipped(why)), _) | (_, Err(Stop::Skipped(why))) => Verdict::Skipped(why),

@@ -40,6 +40,8 @@ pub struct Bench {
     pub(super) current: Option<u8>,
     /// Whether the drive may be in the middle of a frame, or have more to say.
     pub(super) out_of_step: bool,
+    /// Whether a reply did not come, and may come yet.
+    pub(super) owed: bool,
     /// Whether something was sent that may have started the motor.
     pub(super) moved: bool,
     transcript: Vec<String>,
@@ -69,7 +71,7 @@ impl Reply {
 
 /// How long a reply is waited for. A drive has one second (4.1); what comes later is told from what
 /// never comes.
-const PATIENCE: Duration = Duration::from_millis(2_000);
+pub(super) const PATIENCE: Duration = Duration::from_millis(2_000);
 /// Lines of a transcript that are kept.
 const TRANSCRIPT: usize = 60;
 
@@ -87,6 +89,7 @@ impl Bench {
             undo,
             current: None,
             out_of_step: true,
+            owed: false,
             moved: false,
             transcript,
             words,
@@ -183,9 +186,14 @@ impl Bench {
     /// The one reply to bytes.
     pub(super) fn exchange(&mut self, bytes: &[u8]) -> Result<Reply, Stop> {
         self.send(bytes)?;
+        self.awaited()
+    }
+
+    /// The one reply to what was sent.
+    pub(super) fn awaited(&mut self) -> Result<Reply, Stop> {
         let reply = self.reply(PATIENCE + self.on_the_line(MAX_FRAME))?;
         let Some(reply) = reply else {
-            self.out_of_step = true;
+            (self.out_of_step, self.owed) = (true, true);
             return Err(self.failed("a reply"));
         };
         if !self.pending.is_empty() {
@@ -284,16 +292,14 @@ impl Bench {
         }
     }
 
-    /// Waits until the line was silent for a time, whatever comes, at most twenty times as long.
+    /// Waits until the line was silent for a time, whatever comes; a line that never falls silent
+    /// is not waited for for ever.
     pub(super) fn drain(&mut self, span: Duration) -> Result<(), Stop> {
-        for _ in 0..20 {
-            let until = self.line.now() + span;
-            let mut silent = true;
-            while self.line.now() < until {
-                silent &= !self.take(until)?;
-            }
-            if silent {
-                break;
+        let last = self.line.now() + span + PATIENCE;
+        let mut until = self.line.now() + span;
+        while self.line.now() < until {
+            if self.take(until)? {
+                until = last.min(self.line.now() + span);
             }
         }
         self.give_up();

@@ -55,11 +55,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
             bench.refused(&Request::Execute(Command::ScStart), ErrorCode::WrongCmd)
         })
         .needs(&[Need::Spin]),
-        Case::new(
-            "references_are_cleared_to_their_defaults",
-            &["ST-4.6-27", "ST-4.4-25"],
-            clear_references,
-        ),
+        Case::new("references_are_cleared_to_their_defaults", &["ST-4.6-27"], clear_references),
         Case::new(
             "pfc_disable_needs_a_pfc",
             &["ST-4.6-34", "ST-4.6-33", "ST-4.6-05"],

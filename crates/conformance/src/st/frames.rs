@@ -180,6 +180,8 @@ fn motor_bits(bench: &mut Bench) -> Result<(), Stop> {
         let header = Frame::header(FrameCode::GetReg.number(), motor);
         bench.exchange(&frame(header, &[RegisterId::STATUS.0]))?;
         bench.exchange(&frame(header, &[0xEE]))?;
+        let long = Frame::header(FrameCode::GetBoardInfo.number(), motor);
+        bench.exchange(&frame(long, &[]))?;
     }
     Ok(())
 }
@@ -279,9 +281,8 @@ fn byte_by_byte(bench: &mut Bench) -> Result<(), Stop> {
     for byte in rest {
         bench.send_more(&[*byte])?;
     }
-    let reply = bench.reply(WATCH)?;
-    let held = reply.is_some_and(|reply| reply.header == HEADER_ACK);
-    bench.require(held, "ACK")
+    let reply = bench.awaited()?;
+    bench.require(reply.header == HEADER_ACK, "ACK")
 }
 
 /// Each header with its own length: what follows it is read as a frame, whatever it says.

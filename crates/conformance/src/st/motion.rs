@@ -16,19 +16,22 @@ const START: Duration = Duration::from_millis(15_000);
 const SETTLE: Duration = Duration::from_millis(5_000);
 /// Between two looks at a register.
 const LOOK: Duration = Duration::from_millis(10);
+/// In how many looks on end a speed is what it shall be.
+const STEADY: u32 = 40;
 /// What the motor turns at where the drive does not tell what it was last told, rpm.
 const SPEED: i32 = 1_500;
 
 type Test = fn(&mut Bench) -> Result<(), Stop>;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
-    let tests: [(&'static str, &'static [&'static str], Test); 16] = [
+    let tests: [(&'static str, &'static [&'static str], Test); 17] = [
+        // First what ends every other.
+        ("a_stop_brings_the_motor_to_rest", &["ST-4.6-11", "ST-4.6-13"], stop),
         (
             "a_start_brings_the_motor_to_run_and_to_its_ramp",
             &["ST-4.6-07", "ST-4.6-10", "ST-4.8-04", "ST-4.8-07"],
             start,
         ),
-        ("a_stop_brings_the_motor_to_rest", &["ST-4.6-11", "ST-4.6-13"], stop),
         ("starting_a_running_motor_does_nothing", &["ST-4.6-08", "ST-4.6-10"], start_again),
         ("start_stop_starts_and_stops", &["ST-4.6-17", "ST-4.6-18", "ST-4.6-20"], start_stop),
         ("a_ramp_in_run_is_executed_at_once", &["ST-4.8-03", "ST-4.8-09"], ramp_at_once),
@@ -45,6 +48,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         ("a_ramp_in_torque_mode_changes_to_speed_mode", &["ST-4.8-05"], ramp_in_torque_mode),
         ("the_control_mode_is_changed_back_by_a_write", &["ST-4.8-06", "ST-4.4-19"], mode),
         ("writing_the_final_speed_in_run_begins_a_ramp", &["ST-4.4-23"], final_speed),
+        ("the_id_reference_of_speed_mode_acts_in_run", &["ST-4.4-25"], speed_mode_id),
         ("encoder_align_at_rest_comes_back_to_rest", &["ST-4.6-24", "ST-4.6-26"], align),
         ("encoder_align_in_run_does_nothing", &["ST-4.6-25", "ST-4.6-26"], align_in_run),
     ];
@@ -85,13 +89,15 @@ fn running(bench: &mut Bench) -> Result<(), Stop> {
     bench.require(status == Status::Run, "ACK 6: RUN, within 15 s")
 }
 
-/// Waits until SPEED_MEAS is within a tenth of a speed.
+/// Waits until SPEED_MEAS is within a tenth of a speed, and stays there.
 fn reaches(bench: &mut Bench, speed: i32) -> Result<(), Stop> {
     let near = |measured: i32| (measured - speed).abs() <= speed.abs() / 10 + 30;
     let until = bench.line.now() + SETTLE;
+    let mut stays = 0;
     loop {
         let measured = bench.value(RegisterId::SPEED_MEAS)?;
-        if near(measured) {
+        stays = if near(measured) { stays + 1 } else { 0 };
+        if stays == STEADY {
             return Ok(());
         }
         if bench.line.now() >= until {
@@ -289,6 +295,14 @@ fn final_speed(bench: &mut Bench) -> Result<(), Stop> {
     let speed = run(bench)? * 4 / 5;
     bench.set(RegisterId::RAMP_FINAL_SPEED, speed)?;
     reaches(bench, speed)
+}
+
+fn speed_mode_id(bench: &mut Bench) -> Result<(), Stop> {
+    run(bench)?;
+    bench.set(RegisterId::IQ_SPEEDMODE, -60)?;
+    let id = bench.value(RegisterId::FLUX_REF)?;
+    bench.require(id == -60, "ACK -60 s16A, the Id reference that was written")?;
+    still_running(bench)
 }
 
 /// With an encoder it goes through the states of an alignment, without nothing happens.

@@ -1,7 +1,7 @@
 //! Cases of 3.2: motor numbers and the current motor.
 
 use motorlink_proto::stmcp::{
-    ErrorCode, Frame, FrameCode, HEADER_ACK, Motor, Profile, RegisterId, Request,
+    ErrorCode, Frame, FrameCode, HEADER_ACK, MAX_FRAME, Motor, Profile, RegisterId, Request,
 };
 
 use super::bench::{Bench, frame};
@@ -25,9 +25,14 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
             "motor_number_0_addresses_the_current_motor",
             &["ST-3.2-04", "ST-4.1-11"],
             |bench: &mut Bench| {
-                let tested = bench.options.motor;
+                let tested = bench.options.motor.number();
                 bench.status()?;
-                current_is(bench, tested.number())
+                current_is(bench, tested)?;
+                for request in [Request::BoardInfo, Request::FirmwareVersion, Request::RevupData(0)]
+                {
+                    bench.acknowledged_bytes(&to_the_current(&request))?;
+                }
+                current_is(bench, tested)
             },
         ),
         Case::new(
@@ -171,6 +176,11 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
         )
         .needs(&[Need::PowerCycle]),
     ]
+}
+
+fn to_the_current(request: &Request<'_>) -> Vec<u8> {
+    let mut room = [0; MAX_FRAME];
+    request.encode(0, &mut room).expect("the kit's requests fit a frame").to_vec()
 }
 
 /// GET_REG STATUS of a motor.

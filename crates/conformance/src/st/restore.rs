@@ -6,7 +6,7 @@ use motorlink_proto::stmcp::{
 };
 use motorlink_proto::time::Duration;
 
-use super::bench::{Bench, Reply, frame, hex};
+use super::bench::{Bench, PATIENCE, Reply, frame, hex};
 use crate::case::{Need, Stop, Subject};
 
 /// Something that a case changes and that is put back after it.
@@ -39,8 +39,6 @@ pub(super) struct Setpoints {
 const SILENCE: Duration = Duration::from_millis(100);
 /// How long a drive has to come to rest.
 const REST: Duration = Duration::from_millis(30_000);
-/// How long a probe is waited for.
-const PROBE: Duration = Duration::from_millis(2_000);
 /// Between two looks at a register.
 const LOOK: Duration = Duration::from_millis(10);
 
@@ -74,11 +72,14 @@ impl Subject for Bench {
         if faulted {
             self.world.fault(false)?;
         }
-        if self.moved || faulted {
+        let status = self.status()?;
+        let mut outcome = Ok(());
+        if status != Status::Idle {
+            let expected = "ACK 0: IDLE, for nothing was sent that starts a motor";
+            outcome = self.require(self.moved || faulted, expected);
             self.rest()?;
         }
         // One that fails does not keep the others from being put back.
-        let mut outcome = Ok(());
         for undo in undo.into_iter().rev() {
             outcome = outcome.and(self.put_back(undo));
         }
@@ -174,7 +175,9 @@ impl Bench {
         if !self.out_of_step {
             return Ok(());
         }
-        self.drain(SILENCE)?;
+        // A reply that is late must not be taken for the next one's.
+        let owed = std::mem::take(&mut self.owed);
+        self.drain(if owed { PATIENCE } else { SILENCE })?;
         let mut answered = self.probe()?;
         if answered.is_none() {
             // Completes whatever frame a drive without reception timeout waits for (SPEC-NOTES S16).
@@ -197,7 +200,7 @@ impl Bench {
     /// Asks which motor is the current one, which changes nothing.
     fn probe(&mut self) -> Result<Option<Reply>, Stop> {
         self.send(&current_motor())?;
-        self.reply(PROBE)
+        self.reply(PATIENCE)
     }
 
     fn put_back(&mut self, undo: Undo) -> Result<(), Stop> {

@@ -175,8 +175,8 @@ fn in_time(bench: &mut Bench) -> Result<(), Stop> {
         bench.silence(Duration(RECEPTION.as_micros() * 6 / 10))?;
         bench.send_more(&bytes[2..])?;
         let took = bench.line.now().since(began);
-        let reply = bench.reply(ANSWER)?;
-        if reply.as_ref().is_some_and(|reply| reply.header == HEADER_ACK) {
+        let reply = bench.awaited()?;
+        if reply.header == HEADER_ACK {
             bench.out_of_step = false;
             return Ok(());
         }

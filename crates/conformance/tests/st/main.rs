@@ -1,5 +1,6 @@
 //! The kit against simulated ST drives on virtual time: those that are right, and those that are not.
 
 mod clauses;
+mod mutants;
 mod peer;
 mod suite;
