@@ -3,21 +3,22 @@
 
 use console::style;
 use indicatif::ProgressBar;
-use motorlink_conformance::{Outcome, Report, Verdict};
+use motorlink_conformance::{Clause, Outcome, Report, Verdict};
 
 use crate::failure::Failure;
 use crate::output;
 
 pub struct Screen {
+    clauses: &'static [Clause],
     bar: ProgressBar,
     quiet: bool,
     verbose: bool,
 }
 
 impl Screen {
-    /// A screen for a run of `cases`. A quiet one leaves stdout alone.
-    pub fn new(cases: usize, quiet: bool, verbose: bool) -> Self {
-        Screen { bar: output::progress(cases), quiet, verbose }
+    /// A screen for a run of `cases` that test `clauses`. A quiet one leaves stdout alone.
+    pub fn new(clauses: &'static [Clause], cases: usize, quiet: bool, verbose: bool) -> Self {
+        Screen { clauses, bar: output::progress(cases), quiet, verbose }
     }
 
     /// Notes that a case has ended.
@@ -34,7 +35,7 @@ impl Screen {
         }
         for outcome in &report.outcomes {
             if self.verbose || matches!(outcome.verdict, Verdict::Failed(_)) {
-                row(outcome)?;
+                row(outcome, self.clauses)?;
             }
         }
         paragraphs(report)?;
@@ -42,7 +43,7 @@ impl Screen {
     }
 }
 
-fn row(outcome: &Outcome) -> Result<(), Failure> {
+fn row(outcome: &Outcome, clauses: &[Clause]) -> Result<(), Failure> {
     let word = outcome.verdict.word();
     let word = match outcome.verdict {
         Verdict::Passed => style(word).green(),
@@ -56,15 +57,22 @@ fn row(outcome: &Outcome) -> Result<(), Failure> {
     ))?;
     match &outcome.verdict {
         Verdict::Passed => Ok(()),
-        Verdict::Failed(finding) => output::line(&format!(
-            "           sent     {}\n           expected {}\n           received {}",
-            finding.sent, finding.expected, finding.received
-        )),
+        Verdict::Failed(finding) => {
+            output::line(&format!(
+                "           sent     {}\n           expected {}\n           received {}",
+                finding.sent, finding.expected, finding.received
+            ))?;
+            // What the case tests first is what it is about.
+            let clause = clauses.iter().find(|clause| outcome.clauses.first() == Some(&clause.id));
+            clause.map_or(Ok(()), |clause| {
+                output::line(&format!("           {} says {}", clause.paragraph(), clause.text))
+            })
+        }
         Verdict::Skipped(why) | Verdict::NotRun(why) => output::line(&format!("           {why}")),
     }
 }
 
-/// A line a paragraph, in the order of the suite.
+/// A line a paragraph, in the order of the document.
 fn paragraphs(report: &Report) -> Result<(), Failure> {
     let mut table: Vec<(&str, [usize; 4])> = Vec::new();
     for outcome in &report.outcomes {
@@ -85,6 +93,7 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
             }
         }
     }
+    table.sort_by_key(|(paragraph, _)| place(paragraph));
     output::line(&format!(
         "{:<10} {:>7} {:>7} {:>8} {:>8}",
         "paragraph", "passed", "failed", "skipped", "not run"
@@ -95,6 +104,14 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
         total.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
     }
     counted("all", total)
+}
+
+/// The numbers of a paragraph, so that 4.10 comes behind 4.9; a command's code is hexadecimal and
+/// comes behind chapters as it is.
+fn place(paragraph: &str) -> (Vec<u32>, &str) {
+    let numbers = paragraph.rsplit('-').next().unwrap_or_default().split('.');
+    let numbers: Option<Vec<u32>> = numbers.map(|number| number.parse().ok()).collect();
+    (numbers.unwrap_or_default(), paragraph)
 }
 
 fn counted(name: &str, [passed, failed, skipped, not_run]: [usize; 4]) -> Result<(), Failure> {

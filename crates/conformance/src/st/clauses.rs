@@ -26,7 +26,7 @@ pub static CLAUSES: &[Clause] = clauses! {
         host [every_header_and_length_parses_as_the_document_says];
     "ST-3-03" "The high 3 bits of a command's header say which motor is meant."
         host [every_request_encodes_to_its_bytes_and_decodes_from_them];
-    "ST-3-04" "A drive with one motor need not look at the motor bits; 4.1 wants a missing motor refused there, too, and is followed.";
+    "ST-3-04" "A drive with one motor need not look at the motor bits; 4.1 wants a missing motor refused there, too, and is followed (S34).";
     "ST-3-05" "The length is the number of payload bytes, 0 to 128 (shipped firmware: 127).";
     "ST-3-06" "What the payload holds depends on the frame code."
         untested "the clauses of 4.4 to 4.12 say what it holds";
@@ -173,7 +173,7 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.6-03" "An unknown command is answered with WRONG_CMD.";
     "ST-4.6-04" "A known one is executed, and an ACK without payload is sent.";
     "ST-4.6-05" "Where the execution fails, WRONG_CMD is sent.";
-    "ST-4.6-06" "Commands take no parameters: further bytes are ignored, and none is not enough (S18).";
+    "ST-4.6-06" "Commands take no parameters: further bytes are ignored (S33), and none is not enough (S18).";
     "ST-4.6-07" "START_MOTOR starts the motor.";
     "ST-4.6-08" "If it is started already, nothing happens.";
     "ST-4.6-09" "In an error state nothing happens.";

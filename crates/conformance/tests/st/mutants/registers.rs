@@ -170,7 +170,7 @@ const MUTANTS: [Mutant; 31] = [
                 .then(|| nack(ErrorCode::WrongSet))
         })
     }),
-    mutant("a DAC channel takes any register", "ST-4.4-22", || says_acked_for_dac()),
+    mutant("a DAC channel takes any register", "ST-4.4-22", any_for_dac),
     mutant("speeds are tenths of a hertz", "ST-4.4-17", || {
         gives(GET, |asked, value| {
             if asked == [RegisterId::RAMP_FINAL_SPEED.0] {
@@ -219,7 +219,7 @@ const MUTANTS: [Mutant; 31] = [
 ];
 
 /// Every value for a DAC channel is acknowledged, as shipped firmware does.
-fn says_acked_for_dac() -> crate::peer::Deviation {
+fn any_for_dac() -> crate::peer::Deviation {
     super::says(|request, reply| {
         if matches!(request, [_, _, 0x1C | 0x1D, ..]) && *reply == nack(ErrorCode::WrongSet) {
             *reply = ack();
