@@ -10,6 +10,7 @@ use motorlink_proto::time::{Duration, Instant};
 use super::found::Found;
 use super::restore::Undo;
 use super::safety;
+use super::timing::RECEPTION;
 use crate::case::{Finding, Need, Stop};
 use crate::wire::Line;
 use crate::world::World;
@@ -72,6 +73,8 @@ impl Reply {
 /// How long a reply is waited for. A drive has one second (4.1); what comes later is told from what
 /// never comes.
 pub(super) const PATIENCE: Duration = Duration::from_millis(2_000);
+/// How long the rest of a reply is waited for once it has begun.
+const GRACE: Duration = Duration::from_millis(50);
 /// Lines of a transcript that are kept.
 const TRANSCRIPT: usize = 60;
 
@@ -143,7 +146,7 @@ impl Bench {
 
     /// The next reply in form, if one comes within `patience` from the last byte sent.
     pub(super) fn reply(&mut self, patience: Duration) -> Result<Option<Reply>, Stop> {
-        let until = self.sent_at + patience;
+        let mut until = self.sent_at + patience;
         loop {
             match Frame::parse(&self.pending) {
                 Parse::Frame(Frame { header, payload }, size) => {
@@ -162,7 +165,9 @@ impl Bench {
             // The clock is looked at first, so that a busy host does not pass for a late drive.
             let last = self.line.now() >= until;
             let came = self.take(until)?;
-            if last && !came {
+            if came {
+                until = until.max(self.line.now() + GRACE);
+            } else if last {
                 if self.pending.is_empty() {
                     return Ok(None);
                 }
@@ -183,8 +188,14 @@ impl Bench {
         }
     }
 
-    /// The one reply to bytes.
+    /// The one reply to bytes. What the line cannot carry in time is not tried.
     pub(super) fn exchange(&mut self, bytes: &[u8]) -> Result<Reply, Stop> {
+        if bytes.len() > self.in_time() {
+            return Err(Stop::Skipped(format!(
+                "at this baud rate a frame of {} bytes takes longer than 25 ms",
+                bytes.len()
+            )));
+        }
         self.send(bytes)?;
         self.awaited()
     }
@@ -321,6 +332,14 @@ impl Bench {
         let sent = said(&self.sent, words.note(true, &self.sent));
         let received = said(&self.received, words.note(false, &self.received));
         Stop::Failed(Box::new(Finding { sent, expected: expected.into(), received }))
+    }
+
+    /// How many bytes the line carries within the reception timeout, with something to spare.
+    pub(super) fn in_time(&self) -> usize {
+        match (self.profile(), self.options.byte_time.as_micros()) {
+            (Profile::Mcsdk54, _) | (_, 0) => usize::MAX,
+            (Profile::Spec, byte) => (RECEPTION.as_micros() * 9 / 10 / byte) as usize,
+        }
     }
 
     /// How long `bytes` take on the line.

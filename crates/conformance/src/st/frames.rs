@@ -8,7 +8,6 @@ use motorlink_proto::time::Duration;
 
 use super::bench::{Bench, frame};
 use super::found::read_size;
-use super::timing::RECEPTION;
 use crate::case::{Case, Stop};
 
 /// How long it is watched that nothing comes.
@@ -197,12 +196,7 @@ fn long_write(bench: &Bench, value: &[u8], length: usize, filler: u8) -> Vec<u8>
 /// The longest payload that the line carries within the reception timeout.
 fn longest(bench: &Bench, profile: Profile) -> usize {
     let most = MAX_PAYLOAD - usize::from(profile == Profile::Mcsdk54);
-    let byte = bench.on_the_line(1).as_micros();
-    let bytes = match (profile, byte) {
-        (Profile::Mcsdk54, _) | (_, 0) => return most,
-        _ => (RECEPTION.as_micros() * 8 / 10 / byte) as usize,
-    };
-    most.min(bytes.saturating_sub(OVERHEAD))
+    most.min(bench.in_time().saturating_sub(OVERHEAD))
 }
 
 fn lengths(bench: &mut Bench, profile: Profile) -> Result<(), Stop> {

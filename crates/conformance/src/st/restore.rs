@@ -55,7 +55,8 @@ impl Subject for Bench {
         if reply.is_nack(ErrorCode::BadMotorSelected) {
             return Err(Stop::Lost(format!("the drive has no {motor}")));
         }
-        let status = self.wait_for(REST, |status| status == Status::Idle || faulty(status))?;
+        let settled = |status| matches!(status, Status::Idle | Status::Run) || faulty(status);
+        let status = self.wait_for(REST, settled)?;
         if status != Status::Idle {
             return Err(Stop::Lost(format!(
                 "the motor is not at rest: STATUS is {status}, and the kit begins in IDLE; stop the \

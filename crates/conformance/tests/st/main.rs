@@ -3,4 +3,5 @@
 mod clauses;
 mod mutants;
 mod peer;
+mod slow;
 mod suite;
