@@ -8,6 +8,7 @@ import xml.etree.ElementTree as xml
 import pytest
 import stmcp
 from peers import device
+from program import eventually
 
 PROFILES = ["spec", "mcsdk-5.4"]
 
@@ -119,6 +120,18 @@ def test_a_motor_that_turns_is_left_alone(sim, run):
     done = kit(run, drives.st).ended(3)
     assert "the motor is not at rest" in done.err
     assert drives.motor(1)["status"] != "IDLE"
+
+
+def test_ctrl_c_stops_the_motor_and_puts_everything_back(sim, start, run):
+    drives = sim(rmd=())
+    before = run("st", "-p", drives.st, "get", "RAMP_FINAL_SPEED", "SPEED_KD").out
+    words = ("conformance", "st", "-p", drives.st, "--spin", "--only", "ST-4.8-08", "--json")
+    kit = start(*words)
+    eventually(lambda: drives.motor(1)["status"] == "RUN", "a motor that runs")
+    kit.interrupt()
+    assert kit.wait() == 130
+    assert drives.motor(1)["status"] == "IDLE"
+    assert run("st", "-p", drives.st, "get", "RAMP_FINAL_SPEED", "SPEED_KD").out == before
 
 
 def test_a_silent_port_is_given_up(run, tmp_path):

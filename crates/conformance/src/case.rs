@@ -176,3 +176,102 @@ impl Need {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A drive whose `begin` and `restore` end as they are told to.
+    #[derive(Default)]
+    struct Told {
+        begin: Option<Stop>,
+        restore: Option<Stop>,
+        restored: u32,
+    }
+
+    impl Subject for Told {
+        fn begin(&mut self) -> Result<(), Stop> {
+            self.begin.take().map_or(Ok(()), Err)
+        }
+
+        fn restore(&mut self) -> Result<(), Stop> {
+            self.restored += 1;
+            self.restore.take().map_or(Ok(()), Err)
+        }
+
+        fn allows(&self, need: Need) -> bool {
+            need == Need::Spin
+        }
+
+        fn transcript(&self) -> Vec<String> {
+            Vec::new()
+        }
+    }
+
+    fn failed(what: &str) -> Stop {
+        let [sent, expected, received] = ["sent", "expected", "received"].map(|s| s.to_owned());
+        let expected = format!("{expected} {what}");
+        Stop::Failed(Box::new(Finding { sent, expected, received }))
+    }
+
+    fn lost() -> Stop {
+        Stop::Lost("it is gone".to_owned())
+    }
+
+    /// Runs two cases, of which the first ends as told; their verdicts.
+    fn verdicts(told: &mut Told, first: fn() -> Result<(), Stop>) -> [Verdict; 2] {
+        let cases =
+            [Case::new("first", &[], move |_| first()), Case::new("second", &[], |_| Ok(()))];
+        let report = run(&cases, told, |_| {});
+        report
+            .outcomes
+            .into_iter()
+            .map(|outcome| outcome.verdict)
+            .collect::<Vec<_>>()
+            .try_into()
+            .unwrap()
+    }
+
+    #[test]
+    fn a_case_that_cannot_be_undone_fails_and_says_so() {
+        let mut told = Told { restore: Some(failed("to be undone")), ..Told::default() };
+        let [first, second] = verdicts(&mut told, || Ok(()));
+        assert!(matches!(first, Verdict::Failed(finding) if finding.expected.contains("undone")));
+        assert_eq!(second, Verdict::Passed);
+
+        let mut told = Told { restore: Some(failed("to be undone")), ..Told::default() };
+        let [first, _] = verdicts(&mut told, || Err(failed("to hold")));
+        let Verdict::Failed(finding) = first else { panic!("{first:?}") };
+        assert_eq!(finding.expected, "expected to hold");
+        assert!(
+            finding
+                .received
+                .contains("not left as it was found: sent sent, expected expected to be undone")
+        );
+    }
+
+    #[test]
+    fn a_drive_that_is_lost_ends_the_run_and_keeps_what_was_found() {
+        let mut told = Told { restore: Some(lost()), ..Told::default() };
+        let [first, second] = verdicts(&mut told, || Err(failed("to hold")));
+        assert!(matches!(first, Verdict::Failed(_)), "{first:?}");
+        assert_eq!(second, Verdict::NotRun("it is gone".to_owned()));
+
+        let mut told = Told::default();
+        let [first, second] = verdicts(&mut told, || Err(lost()));
+        assert_eq!([first, second], [(); 2].map(|()| Verdict::NotRun("it is gone".to_owned())));
+        assert_eq!(told.restored, 1, "what the case did is undone");
+
+        let mut told = Told { begin: Some(lost()), ..Told::default() };
+        verdicts(&mut told, || Ok(()));
+        assert_eq!(told.restored, 0, "nothing was done");
+    }
+
+    #[test]
+    fn what_is_not_allowed_is_skipped_with_what_to_do() {
+        let cases = [Case::new("rom", &[], |_: &mut Told| Ok(())).needs(&[Need::Spin, Need::Rom])];
+        let report = run(&cases, &mut Told::default(), |_| {});
+        let Verdict::Skipped(why) = &report.outcomes[0].verdict else { panic!("not skipped") };
+        assert!(why.contains("--write-rom"), "{why}");
+    }
+}

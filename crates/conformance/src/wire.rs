@@ -141,6 +141,21 @@ impl<L: Line> Line for Rc<RefCell<L>> {
     }
 }
 
+/// A bus that the world around the drive has a hand on, too.
+impl<B: Bus> Bus for Rc<RefCell<B>> {
+    fn now(&self) -> Instant {
+        self.borrow().now()
+    }
+
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.borrow_mut().send(frame)
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
+        self.borrow_mut().receive(until)
+    }
+}
+
 impl<S: CanStation> Bus for Virtual<S, CanFrame> {
     fn now(&self) -> Instant {
         self.now

@@ -12,6 +12,12 @@ pub trait World {
     fn fault(&mut self, _present: bool) -> Result<(), Unavailable> {
         Err(Unavailable("the kit cannot cause a fault".to_owned()))
     }
+
+    /// Whether the user wants the run to end: the case at hand is then broken off, what it did is
+    /// undone, and the rest is not run.
+    fn interrupted(&self) -> bool {
+        false
+    }
 }
 
 /// Nobody is at the power switch.

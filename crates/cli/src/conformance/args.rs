@@ -31,6 +31,9 @@ pub enum Command {
         profile: Profile,
     },
     /// Check a motor that speaks the RMD protocol V1.62
+    ///
+    /// The motor has to be at rest. Even without --spin it is told to be off (0x80) and to stop
+    /// (0x81): one that holds a load lets go of it. Nobody else may speak to it meanwhile.
     Rmd {
         #[command(flatten)]
         port: Port,

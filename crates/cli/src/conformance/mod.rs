@@ -10,9 +10,7 @@ use std::path::Path;
 use motorlink::port::{LineName, PortName};
 use motorlink::time::Duration;
 use motorlink_conformance::wire::Real;
-use motorlink_conformance::{
-    Case, Clause, Need, Report, Subject, markdown, rmd, run as run_cases, st,
-};
+use motorlink_conformance::{Case, Need, Report, Subject, markdown, rmd, run as run_cases, st};
 
 pub use args::Args;
 use args::{Command, Run, Which};
@@ -20,6 +18,7 @@ use screen::Screen;
 use world::Commands;
 
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::output;
 
 pub fn run(args: Args) -> Result<(), Failure> {
@@ -31,14 +30,16 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let options = st::Options { profile, motor, allowed: run.allowed(), byte_time };
             let world = Box::new(Commands::new(&run));
             let bench = st::Bench::new(Box::new(Real::new(link)), world, options);
-            conduct("st", &run, st::CLAUSES, st::suite(profile), bench)
+            interrupt::take_over();
+            conduct("st", &run, st::suite(profile), bench)
         }
         Command::Rmd { port, run, id, encoder } => {
             let link = port.name()?.open_can()?;
             let options = rmd::Options { id, encoder, allowed: run.allowed() };
             let world = Box::new(Commands::new(&run));
             let bench = rmd::Bench::new(Box::new(Real::new(link)), world, options);
-            conduct("rmd", &run, rmd::CLAUSES, rmd::suite(), bench)
+            interrupt::take_over();
+            conduct("rmd", &run, rmd::suite(), bench)
         }
         Command::Clauses { which: Which::St, profile } => {
             output::line(&markdown(st::CLAUSES, &st::suite(profile)).trim_end())
@@ -62,7 +63,6 @@ fn byte_time(name: &PortName) -> Duration {
 fn conduct<B: Subject>(
     name: &str,
     run: &Run,
-    clauses: &'static [Clause],
     mut suite: Vec<Case<B>>,
     mut bench: B,
 ) -> Result<(), Failure> {
@@ -74,10 +74,13 @@ fn conduct<B: Subject>(
             return Err(Failure::Usage(format!("no case has `{only}` in its name or its clauses")));
         }
     }
-    let mut screen = Screen::new(clauses, suite.len(), run.json_to_stdout(), run.verbose);
+    let mut screen = Screen::new(suite.len(), run.json_to_stdout(), run.verbose);
     let report = run_cases(&suite, &mut bench, |outcome| screen.show(outcome));
     screen.summary(&report)?;
     save(name, run, &report)?;
+    if interrupt::interrupted() {
+        return Err(Failure::Interrupted);
+    }
     verdict(&report)
 }
 

@@ -3,22 +3,21 @@
 
 use console::style;
 use indicatif::ProgressBar;
-use motorlink_conformance::{Clause, Outcome, Report, Verdict};
+use motorlink_conformance::{Outcome, Report, Verdict, rmd, st};
 
 use crate::failure::Failure;
 use crate::output;
 
 pub struct Screen {
-    clauses: &'static [Clause],
     bar: ProgressBar,
     quiet: bool,
     verbose: bool,
 }
 
 impl Screen {
-    /// A screen for a run of `cases` that test `clauses`. A quiet one leaves stdout alone.
-    pub fn new(clauses: &'static [Clause], cases: usize, quiet: bool, verbose: bool) -> Self {
-        Screen { clauses, bar: output::progress(cases), quiet, verbose }
+    /// A screen for a run of `cases`. A quiet one leaves stdout alone.
+    pub fn new(cases: usize, quiet: bool, verbose: bool) -> Self {
+        Screen { bar: output::progress(cases), quiet, verbose }
     }
 
     /// Notes that a case has ended.
@@ -35,7 +34,7 @@ impl Screen {
         }
         for outcome in &report.outcomes {
             if self.verbose || matches!(outcome.verdict, Verdict::Failed(_)) {
-                row(outcome, self.clauses)?;
+                row(outcome)?;
             }
         }
         paragraphs(report)?;
@@ -43,7 +42,7 @@ impl Screen {
     }
 }
 
-fn row(outcome: &Outcome, clauses: &[Clause]) -> Result<(), Failure> {
+fn row(outcome: &Outcome) -> Result<(), Failure> {
     let word = outcome.verdict.word();
     let word = match outcome.verdict {
         Verdict::Passed => style(word).green(),
@@ -62,14 +61,21 @@ fn row(outcome: &Outcome, clauses: &[Clause]) -> Result<(), Failure> {
                 "           sent     {}\n           expected {}\n           received {}",
                 finding.sent, finding.expected, finding.received
             ))?;
-            // What the case tests first is what it is about.
-            let clause = clauses.iter().find(|clause| outcome.clauses.first() == Some(&clause.id));
-            clause.map_or(Ok(()), |clause| {
-                output::line(&format!("           {} says {}", clause.paragraph(), clause.text))
-            })
+            demands(outcome.clauses)
         }
         Verdict::Skipped(why) | Verdict::NotRun(why) => output::line(&format!("           {why}")),
     }
+}
+
+/// What the clauses of a case demand.
+fn demands(clauses: &[&str]) -> Result<(), Failure> {
+    for id in clauses {
+        let mut all = st::CLAUSES.iter().chain(rmd::CLAUSES);
+        if let Some(clause) = all.find(|clause| clause.id == *id) {
+            output::line(&format!("           {id:<10} {}", style(clause.text).dim()))?;
+        }
+    }
+    Ok(())
 }
 
 /// A line a paragraph, in the order of the document.
@@ -106,8 +112,8 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
     counted("all", total)
 }
 
-/// The numbers of a paragraph, so that 4.10 comes behind 4.9; a command's code is hexadecimal and
-/// comes behind chapters as it is.
+/// The numbers of a paragraph, so that 4.10 comes behind 4.9. Where there are none, as in the codes
+/// of commands, the order is that of the text.
 fn place(paragraph: &str) -> (Vec<u32>, &str) {
     let numbers = paragraph.rsplit('-').next().unwrap_or_default().split('.');
     let numbers: Option<Vec<u32>> = numbers.map(|number| number.parse().ok()).collect();

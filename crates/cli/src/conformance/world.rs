@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 use motorlink_conformance::{Unavailable, World};
 
 use super::args::Run;
+use crate::interrupt::interrupted;
 
 /// Runs what the user gave.
 pub struct Commands {
@@ -32,6 +33,10 @@ impl World for Commands {
             false => (&self.fault_off, "--fault-off"),
         };
         shell(command.as_deref(), option)
+    }
+
+    fn interrupted(&self) -> bool {
+        interrupted()
     }
 }
 

@@ -43,6 +43,8 @@ pub struct Bench {
     pub(super) out_of_step: bool,
     /// Whether a reply did not come, and may come yet.
     pub(super) owed: bool,
+    /// Whether the case is over, and what it did is being undone.
+    pub(super) restoring: bool,
     /// Whether something was sent that may have started the motor.
     pub(super) moved: bool,
     transcript: Vec<String>,
@@ -93,6 +95,7 @@ impl Bench {
             current: None,
             out_of_step: true,
             owed: false,
+            restoring: false,
             moved: false,
             transcript,
             words,
@@ -131,6 +134,9 @@ impl Bench {
 
     /// Sends more bytes of the same exchange.
     pub(super) fn send_more(&mut self, bytes: &[u8]) -> Result<(), Stop> {
+        if !self.restoring && self.world.interrupted() {
+            return Err(Stop::Lost("interrupted".to_owned()));
+        }
         if safety::may_start(bytes) {
             if !self.may_spin() {
                 return Err(Stop::Skipped(Need::Spin.unmet().to_owned()));

@@ -26,7 +26,7 @@ pub static CLAUSES: &[Clause] = clauses! {
         host [every_header_and_length_parses_as_the_document_says];
     "ST-3-03" "The high 3 bits of a command's header say which motor is meant."
         host [every_request_encodes_to_its_bytes_and_decodes_from_them];
-    "ST-3-04" "A drive with one motor need not look at the motor bits; 4.1 wants a missing motor refused there, too, and is followed (S34).";
+    "ST-3-04" "A drive with one motor need not look at the motor bits; 4.1 wants a missing motor refused there, too, and is followed (S36).";
     "ST-3-05" "The length is the number of payload bytes, 0 to 128 (shipped firmware: 127).";
     "ST-3-06" "What the payload holds depends on the frame code."
         untested "the clauses of 4.4 to 4.12 say what it holds";
@@ -173,13 +173,13 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.6-03" "An unknown command is answered with WRONG_CMD.";
     "ST-4.6-04" "A known one is executed, and an ACK without payload is sent.";
     "ST-4.6-05" "Where the execution fails, WRONG_CMD is sent.";
-    "ST-4.6-06" "Commands take no parameters: further bytes are ignored (S33), and none is not enough (S18).";
+    "ST-4.6-06" "Commands take no parameters: further bytes are ignored (S35), and none is not enough (S18).";
     "ST-4.6-07" "START_MOTOR starts the motor.";
     "ST-4.6-08" "If it is started already, nothing happens.";
     "ST-4.6-09" "In an error state nothing happens.";
     "ST-4.6-10" "It never fails (S31).";
     "ST-4.6-11" "STOP_MOTOR stops the motor.";
-    "ST-4.6-12" "If it is at rest already, nothing happens; the document's \"started\" is a slip (S32).";
+    "ST-4.6-12" "If it is at rest already, nothing happens; the document's \"started\" is a slip (S34).";
     "ST-4.6-13" "It never fails.";
     "ST-4.6-14" "STOP_RAMP ends the ramp under way where it is.";
     "ST-4.6-15" "Without a ramp nothing happens.";
@@ -199,7 +199,7 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.6-29" "PFC_ENABLE enables a power factor correction that is not enabled.";
     "ST-4.6-30" "One that is enabled it leaves alone.";
     "ST-4.6-31" "It fails only without power factor correction.";
-    "ST-4.6-32" "PFC_DISABLE disables one that is enabled; the document's \"not started\" is a slip (S32).";
+    "ST-4.6-32" "PFC_DISABLE disables one that is enabled; the document's \"not started\" is a slip (S34).";
     "ST-4.6-33" "One that is off it leaves alone.";
     "ST-4.6-34" "It fails only without power factor correction.";
     "ST-4.6-35" "PFC_FAULT_ACK acknowledges past faults of the power factor correction if none is present."

@@ -45,7 +45,7 @@ const LOOK: Duration = Duration::from_millis(10);
 impl Subject for Bench {
     fn begin(&mut self) -> Result<(), Stop> {
         self.forget();
-        (self.moved, self.current) = (false, None);
+        (self.moved, self.restoring, self.current) = (false, false, None);
         self.synchronise()?;
         let current = self.exchange(&current_motor())?;
         self.current = current.payload.first().filter(|_| current.header == HEADER_ACK).copied();
@@ -67,20 +67,21 @@ impl Subject for Bench {
     }
 
     fn restore(&mut self) -> Result<(), Stop> {
-        self.synchronise()?;
+        self.restoring = true;
         let undo = std::mem::take(&mut self.undo);
         let faulted = undo.iter().any(|undo| matches!(undo, Undo::Fault));
-        if faulted {
-            self.world.fault(false)?;
-        }
-        let status = self.status()?;
+        // What fails does not keep the rest from being put back.
         let mut outcome = Ok(());
+        if faulted {
+            outcome = self.world.fault(false).map_err(Stop::from);
+        }
+        self.synchronise()?;
+        let status = self.status()?;
         if status != Status::Idle {
             let expected = "ACK 0: IDLE, for nothing was sent that starts a motor";
-            outcome = self.require(self.moved || faulted, expected);
+            outcome = outcome.and(self.require(self.moved || faulted, expected));
             self.rest()?;
         }
-        // One that fails does not keep the others from being put back.
         for undo in undo.into_iter().rev() {
             outcome = outcome.and(self.put_back(undo));
         }
