@@ -2,7 +2,7 @@
 
 use motorlink::stmcp::Transcript;
 use motorlink_proto::stmcp::{
-    Command, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile,
+    Bad, Command, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile,
     RegisterId, Request, Status,
 };
 use motorlink_proto::time::{Duration, Instant};
@@ -162,9 +162,15 @@ impl Bench {
                     self.note(false, &bytes);
                     return self.in_form(reply).map(Some);
                 }
-                Parse::Bad(_) => {
+                Parse::Bad(bad) => {
+                    let expected = match bad {
+                        Bad::Length(_) => "a reply with at most 128 bytes of payload".to_owned(),
+                        Bad::Checksum { expected, .. } => {
+                            format!("a reply whose checksum is {expected:02x}")
+                        }
+                    };
                     self.give_up();
-                    return Err(self.failed("a reply whose length and checksum are right"));
+                    return Err(self.failed(expected));
                 }
                 Parse::More => {}
             }

@@ -175,43 +175,43 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.6-05" "Where the execution fails, WRONG_CMD is sent.";
     "ST-4.6-06" "Commands take no parameters: further bytes are ignored (S35), and none is not enough (S18).";
     "ST-4.6-07" "START_MOTOR starts the motor.";
-    "ST-4.6-08" "If it is started already, nothing happens.";
-    "ST-4.6-09" "In an error state nothing happens.";
-    "ST-4.6-10" "It never fails (S31).";
+    "ST-4.6-08" "START_MOTOR does nothing to a motor that is started already.";
+    "ST-4.6-09" "START_MOTOR does nothing in an error state.";
+    "ST-4.6-10" "START_MOTOR never fails (S31).";
     "ST-4.6-11" "STOP_MOTOR stops the motor.";
-    "ST-4.6-12" "If it is at rest already, nothing happens; the document's \"started\" is a slip (S34).";
-    "ST-4.6-13" "It never fails.";
+    "ST-4.6-12" "STOP_MOTOR does nothing to a motor that is at rest already; the document's \"started\" is a slip (S34).";
+    "ST-4.6-13" "STOP_MOTOR never fails.";
     "ST-4.6-14" "STOP_RAMP ends the ramp under way where it is.";
-    "ST-4.6-15" "Without a ramp nothing happens.";
-    "ST-4.6-16" "It never fails.";
+    "ST-4.6-15" "STOP_RAMP does nothing without a ramp.";
+    "ST-4.6-16" "STOP_RAMP never fails.";
     "ST-4.6-17" "START_STOP starts a motor that is idle.";
-    "ST-4.6-18" "It stops one that turns.";
-    "ST-4.6-19" "In an error state it does nothing.";
-    "ST-4.6-20" "It never fails.";
+    "ST-4.6-18" "START_STOP stops a motor that turns.";
+    "ST-4.6-19" "START_STOP does nothing in an error state.";
+    "ST-4.6-20" "START_STOP never fails.";
     "ST-4.6-21" "FAULT_ACK acknowledges past faults if none is present.";
-    "ST-4.6-22" "Otherwise it does nothing.";
-    "ST-4.6-23" "It never fails (S31).";
+    "ST-4.6-22" "FAULT_ACK does nothing while a fault is present, or without a past one.";
+    "ST-4.6-23" "FAULT_ACK never fails (S31).";
     "ST-4.6-24" "ENCODER_ALIGN aligns the encoder.";
-    "ST-4.6-25" "In a state that does not allow it nothing happens.";
-    "ST-4.6-26" "It never fails.";
+    "ST-4.6-25" "ENCODER_ALIGN does nothing in a state that does not allow it.";
+    "ST-4.6-26" "ENCODER_ALIGN never fails.";
     "ST-4.6-27" "IQDREF_CLEAR sets the current references to their defaults.";
-    "ST-4.6-28" "It never fails.";
+    "ST-4.6-28" "IQDREF_CLEAR never fails.";
     "ST-4.6-29" "PFC_ENABLE enables a power factor correction that is not enabled.";
-    "ST-4.6-30" "One that is enabled it leaves alone.";
-    "ST-4.6-31" "It fails only without power factor correction.";
+    "ST-4.6-30" "PFC_ENABLE does nothing to one that is enabled.";
+    "ST-4.6-31" "PFC_ENABLE fails only without power factor correction.";
     "ST-4.6-32" "PFC_DISABLE disables one that is enabled; the document's \"not started\" is a slip (S34).";
-    "ST-4.6-33" "One that is off it leaves alone.";
-    "ST-4.6-34" "It fails only without power factor correction.";
+    "ST-4.6-33" "PFC_DISABLE does nothing to one that is off.";
+    "ST-4.6-34" "PFC_DISABLE fails only without power factor correction.";
     "ST-4.6-35" "PFC_FAULT_ACK acknowledges past faults of the power factor correction if none is present."
         host [the_pfc_faults_when_the_mains_fail_and_takes_an_acknowledge]
         untested "the kit cannot make mains fail";
-    "ST-4.6-36" "Otherwise it does nothing.";
-    "ST-4.6-37" "It fails only without power factor correction.";
+    "ST-4.6-36" "PFC_FAULT_ACK does nothing while one is present, or without a past one.";
+    "ST-4.6-37" "PFC_FAULT_ACK fails only without power factor correction.";
     "ST-4.6-38" "Commands that table 4 leaves out are unknown; shipped firmware acknowledges RESET, PING and SC_STOP and needs a profiler for SC_START (S21)."
         host [commands_are_acknowledged_as_table_4_says];
 
     "ST-4.7-01" "GET_BOARD_INFO (0x06) asks for the version of the SDK; it carries nothing.";
-    "ST-4.7-02" "It never fails.";
+    "ST-4.7-02" "GET_BOARD_INFO never fails.";
     "ST-4.7-03" "The ACK has 32 bytes.";
     "ST-4.7-04" "Three bytes are major, minor and patch version, as unsigned integers (S13: in shipped firmware digits).";
     "ST-4.7-05" "The rest is the name of the SDK, with a NUL behind it.";
@@ -226,7 +226,7 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.8-06" "The mode can be changed back with SET_REG.";
     "ST-4.8-07" "The speed at the end is in rpm, 32 bits with a sign.";
     "ST-4.8-08" "The duration is in ms, 16 bits without a sign.";
-    "ST-4.8-09" "It never fails: an ACK without payload is sent.";
+    "ST-4.8-09" "SET_RAMP never fails: an ACK without payload is sent.";
     "ST-4.8-10" "A message that is too short is refused and changes nothing (S18).";
 
     "ST-4.9-01" "GET_REVUP_DATA (0x08) asks for a phase of the rev-up.";
@@ -234,7 +234,7 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.9-03" "The speed at the end of the phase is in rpm, 32 bits with a sign.";
     "ST-4.9-04" "The torque is in s16A, 16 bits with a sign.";
     "ST-4.9-05" "The duration is in ms, 16 bits without a sign.";
-    "ST-4.9-06" "It never fails: the ACK carries these three, in this order."
+    "ST-4.9-06" "GET_REVUP_DATA never fails: the ACK carries these three, in this order."
         host [every_reply_decodes_to_its_fields_and_encodes_from_them];
     "ST-4.9-07" "It is answered whether or not the motor has a sensor.";
     "ST-4.9-08" "A message without a phase is refused (S18).";
@@ -245,7 +245,7 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.10-04" "The speed is in rpm, 32 bits with a sign.";
     "ST-4.10-05" "The torque is in s16A, 16 bits with a sign.";
     "ST-4.10-06" "The duration is in ms, 16 bits without a sign.";
-    "ST-4.10-07" "It never fails: an ACK without payload is sent.";
+    "ST-4.10-07" "SET_REVUP_DATA never fails: an ACK without payload is sent.";
     "ST-4.10-08" "A message that is too short is refused and changes nothing (S18).";
 
     "ST-4.11-01" "SET_CURRENT_REF sets the Iq and Id references; its code is 0x0A, as table 1 has it (S2).";
@@ -253,7 +253,7 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.11-03" "In RUN they are applied at once (S25).";
     "ST-4.11-04" "Before that they wait until the motor runs.";
     "ST-4.11-05" "Iq comes first, then Id, 16 bits with a sign each.";
-    "ST-4.11-06" "It never fails: an ACK without payload is sent.";
+    "ST-4.11-06" "SET_CURRENT_REF never fails: an ACK without payload is sent.";
     "ST-4.11-07" "A message that is too short is refused and changes nothing (S18).";
 
     "ST-4.12-01" "GET_FW_VERSION (0x0C) asks for the version of the firmware.";

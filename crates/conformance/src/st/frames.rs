@@ -75,7 +75,11 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
             acknowledges_as_commands,
         ),
         Case::new("a_frame_may_come_byte_by_byte", &["ST-4.1-02"], byte_by_byte),
-        Case::new("bytes_of_the_line_are_whole_frames", &["ST-4.1-02", "ST-4.1-18"], every_header),
+        Case::new(
+            "every_header_to_a_missing_motor_is_refused",
+            &["ST-4.1-12", "ST-3-03"],
+            every_header,
+        ),
     ];
     cases.extend(KNOWN.iter().map(|&(code, clauses)| {
         Case::new(
@@ -279,7 +283,7 @@ fn byte_by_byte(bench: &mut Bench) -> Result<(), Stop> {
     bench.require(reply.header == HEADER_ACK, "ACK")
 }
 
-/// Each header with its own length: what follows it is read as a frame, whatever it says.
+/// Whatever the frame code says: the motor comes first.
 fn every_header(bench: &mut Bench) -> Result<(), Stop> {
     let missing = bench.missing_motor()?;
     for motor in missing..=Motor::MAX {

@@ -1,7 +1,9 @@
 //! Cases of 4.4 and 4.5 and of table 3, for every register: who reads it, who writes it.
 
 use motorlink_proto::stmcp::register::{Feature, Features, Writing};
-use motorlink_proto::stmcp::{ErrorCode, HEADER_ACK, Profile, RegisterId, Request, Status};
+use motorlink_proto::stmcp::{
+    ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status,
+};
 
 use super::bench::{Bench, hex};
 use super::found::read_size;
@@ -136,13 +138,13 @@ fn refuse(bench: &mut Bench, register: RegisterId, refusal: Writing) -> Result<(
         _ => ErrorCode::SetReadOnly,
     };
     let mut payload = write_what_is_there(bench, register)?;
-    let bytes = bench.frame(1, &payload);
+    let bytes = bench.frame(FrameCode::SetReg.number(), &payload);
     bench.refused_bytes(&bytes, code)?;
     // A value that a register of no danger would show.
     if steady(register) && bench.readable(register) && bench.has(feature(register))? {
         let before = payload.split_off(1);
         payload.extend(before.iter().map(|byte| byte ^ 0x20));
-        let bytes = bench.frame(1, &payload);
+        let bytes = bench.frame(FrameCode::SetReg.number(), &payload);
         bench.refused_bytes(&bytes, code)?;
         let now = bench.get(register)?;
         bench.require(now == before, format!("the value as before: {}", hex(&before)))?;
@@ -233,8 +235,10 @@ fn endian(bench: &mut Bench) -> Result<(), Stop> {
         }
     }
     bench.keep_setpoints()?;
-    bench
-        .acknowledged_bytes(&bench.frame(1, &[RegisterId::RAMP_FINAL_SPEED.0, 0x40, 0x06, 0, 0]))?;
+    bench.acknowledged_bytes(
+        &bench
+            .frame(FrameCode::SetReg.number(), &[RegisterId::RAMP_FINAL_SPEED.0, 0x40, 0x06, 0, 0]),
+    )?;
     let payload = bench.get(RegisterId::RAMP_FINAL_SPEED)?;
     let value = RegisterId::RAMP_FINAL_SPEED.decode(&payload);
     let shown = values::as_kept(bench.profile(), 0x0640);

@@ -1,6 +1,6 @@
 //! Deviations of messages and commands of a motor at rest.
 
-use motorlink_proto::stmcp::{ErrorCode, RegisterId};
+use motorlink_proto::stmcp::ErrorCode;
 
 use super::{MCSDK, Mutant, ack, answers, caught, gives, mutant, nack, refuses, takes};
 use crate::peer::frame;
@@ -167,7 +167,7 @@ const MUTANTS: [Mutant; 36] = [
     mutant("a data segment has its registers backwards", "ST-3.1-10", || {
         gives(0x0D, |_, payload| {
             if payload.len() == 9 {
-                *payload = [0x45, 0x01, 0, 0, 0, 0, 0, 0, RegisterId::STATUS.0].to_vec();
+                payload.reverse();
             }
         })
     }),
