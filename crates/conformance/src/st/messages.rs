@@ -141,7 +141,13 @@ fn board_version(bench: &mut Bench) -> Result<(), Stop> {
         Profile::Spec => number as u8,
         Profile::Mcsdk54 => b'0' + (number % 10) as u8,
     });
-    let expected = format!("ACK that begins with {}, as in the version string", hex(&wanted));
+    let hint = match (bench.profile(), payload.get(..3)) {
+        (Profile::Spec, Some(digits)) if digits.iter().all(u8::is_ascii_digit) => {
+            "; digits are what shipped firmware sends, which --profile mcsdk-5.4 is for"
+        }
+        _ => "",
+    };
+    let expected = format!("ACK that begins with {}, as in the version string{hint}", hex(&wanted));
     bench.require(payload.starts_with(&wanted), expected)
 }
 
