@@ -216,3 +216,25 @@ fn a_drive_that_does_not_answer_is_given_up() {
     let Verdict::NotRun(why) = &report.outcomes[0].verdict else { unreachable!() };
     assert!(why.starts_with("nothing answers"), "{why}");
 }
+
+#[test]
+fn what_a_case_wrote_is_put_back_after_a_line_that_was_bad_for_a_while() {
+    // Every 41st command is lost: cases fail in their middle, and the drive is as it was all the same.
+    let mut count = 0;
+    let lossy = Deviation {
+        before: Some(Box::new(move |_, _, bytes| {
+            count += 1;
+            if (500..2_500).contains(&count) && count % 41 == 0 {
+                bytes.clear();
+            }
+            None
+        })),
+        ..Deviation::default()
+    };
+    let wire = wire(Peer::new(Profile::Spec, &MotorConfig::demo(), lossy));
+    let before = dump(&wire, 1);
+    let report = test(&wire, 1, &[]);
+    assert!(report.failed().count() > 10, "{}", report.failed().count());
+    assert_eq!(report.count("not run"), 0);
+    assert_eq!(dump(&wire, 1), before);
+}
