@@ -21,6 +21,10 @@ pub struct Args {
 #[derive(Subcommand)]
 pub enum Command {
     /// Check a drive that speaks ST's Motor Control Protocol
+    ///
+    /// The motor has to be idle and without a fault, and nobody else may speak to the drive. Without
+    /// --spin nothing is sent that may start it; what is written is put back. The duration of the
+    /// last ramp cannot be read, so 2 s stay.
     St {
         #[command(flatten)]
         port: Port,

@@ -8,6 +8,8 @@ mod world;
 use std::io::Write;
 use std::path::Path;
 
+use motorlink::port::{LineName, PortName};
+use motorlink::time::Duration;
 use motorlink_conformance::wire::Real;
 use motorlink_conformance::{
     Case, Need, Report, Subject, host as hosts, rmd, run as run_cases, scenario_table, st,
@@ -25,10 +27,13 @@ use crate::output;
 pub fn run(args: Args) -> Result<(), Failure> {
     match args.command {
         Command::St { port, run, motor, profile } => {
-            let link = port.name()?.open_line()?;
-            let options = st::Options { profile, motor, allowed: run.allowed() };
+            let name = port.name()?;
+            let link = name.open_line()?;
+            let byte_time = byte_time(&name);
+            let options = st::Options { profile, motor, allowed: run.allowed(), byte_time };
             let world = Box::new(Commands::new(&run));
             let bench = st::Bench::new(Box::new(Real::new(link)), world, options);
+            interrupt::take_over();
             conduct("st", &run, st::suite(profile), bench)
         }
         Command::Rmd { port, run, id, encoder } => {
@@ -48,6 +53,16 @@ pub fn run(args: Args) -> Result<(), Failure> {
         }
         Command::Clauses { which: Which::St } => output::line(&st::table().trim_end()),
         Command::Clauses { which: Which::Rmd } => output::line(&rmd::table().trim_end()),
+    }
+}
+
+/// How long a start bit, eight data bits and a stop bit take, where there is a baud rate.
+fn byte_time(name: &PortName) -> Duration {
+    match name {
+        PortName::Line(LineName::Serial { baud, .. }) => {
+            Duration(10_000_000 / u64::from((*baud).max(1)))
+        }
+        _ => Duration(0),
     }
 }
 

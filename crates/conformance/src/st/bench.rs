@@ -1,9 +1,17 @@
-//! A drive on a serial line.
+//! A drive on a serial line: exchanges, and what is wrong with them.
 
-use motorlink_proto::stmcp::{Frame, HEADER_ACK, MAX_FRAME, Motor, Parse, Profile, Request};
-use motorlink_proto::time::Duration;
+use motorlink::stmcp::Transcript;
+use motorlink_proto::stmcp::{
+    Bad, Command, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile,
+    RegisterId, Request, Status,
+};
+use motorlink_proto::time::{Duration, Instant};
 
-use crate::case::{Finding, Need, Stop, Subject};
+use super::found::Found;
+use super::restore::Undo;
+use super::safety;
+use super::timing::RECEPTION;
+use crate::case::{Finding, Need, Stop};
 use crate::wire::Line;
 use crate::world::World;
 
@@ -16,82 +24,373 @@ pub struct Options {
     pub motor: Motor,
     /// What the user allowed.
     pub allowed: Vec<Need>,
+    /// How long a byte takes on the line; zero where that does not matter.
+    pub byte_time: Duration,
 }
 
 /// A drive behind a line.
 pub struct Bench {
-    line: Box<dyn Line>,
-    world: Box<dyn World>,
-    options: Options,
+    pub(super) line: Box<dyn Line>,
+    pub(super) world: Box<dyn World>,
+    pub(super) options: Options,
+    /// What was found out about the drive.
+    pub(super) found: Found,
+    /// What is to be undone after the case, the last first.
+    pub(super) undo: Vec<Undo>,
+    /// The current motor before the case.
+    pub(super) current: Option<u8>,
+    /// Whether the drive may be in the middle of a frame, or have more to say.
+    pub(super) out_of_step: bool,
+    /// Whether a reply did not come, and may come yet.
+    pub(super) owed: bool,
+    /// Whether the case is over, and what it did is being undone.
+    pub(super) restoring: bool,
+    /// Whether something was sent that may have started the motor.
+    pub(super) moved: bool,
     transcript: Vec<String>,
+    words: Transcript,
     sent: Vec<u8>,
+    sent_at: Instant,
     received: Vec<u8>,
+    /// What came and is not taken for a reply yet.
+    pending: Vec<u8>,
 }
 
-/// How long a drive has for a reply: what a master gives it (4.1).
-const PATIENCE: Duration = Duration::from_millis(1_000);
+/// A reply in form.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Reply {
+    pub(super) header: u8,
+    pub(super) payload: Vec<u8>,
+    /// How long after the last byte was sent it was whole.
+    pub(super) delay: Duration,
+}
+
+impl Reply {
+    /// Whether it is a NACK with this code.
+    pub(super) fn is_nack(&self, code: ErrorCode) -> bool {
+        self.header == HEADER_NACK && self.payload == [code.number()]
+    }
+}
+
+/// How long a reply is waited for. A drive has one second (4.1); what comes later is told from what
+/// never comes.
+pub(super) const PATIENCE: Duration = Duration::from_millis(2_000);
+/// How long the rest of a reply is waited for once it has begun.
+const GRACE: Duration = Duration::from_millis(50);
+/// Lines of a transcript that are kept.
+const TRANSCRIPT: usize = 60;
 
 impl Bench {
     /// A bench for the drive behind `line`.
     pub fn new(line: Box<dyn Line>, world: Box<dyn World>, options: Options) -> Self {
-        let (transcript, sent, received) = Default::default();
-        Bench { line, world, options, transcript, sent, received }
+        let words = Transcript::new(options.profile);
+        let sent_at = line.now();
+        let (found, undo, transcript, sent, received, pending) = Default::default();
+        Bench {
+            line,
+            world,
+            options,
+            found,
+            undo,
+            current: None,
+            out_of_step: true,
+            owed: false,
+            restoring: false,
+            moved: false,
+            transcript,
+            words,
+            sent,
+            sent_at,
+            received,
+            pending,
+        }
     }
 
-    /// Takes the drive's power away and gives it back.
-    pub fn power_cycle(&mut self) -> Result<(), Stop> {
-        Ok(self.world.power_cycle()?)
+    pub(super) fn profile(&self) -> Profile {
+        self.options.profile
     }
 
-    /// The payload of the acknowledge to a request.
-    pub fn acknowledged(&mut self, request: &Request<'_>) -> Result<Vec<u8>, Stop> {
-        let mut frame = [0; MAX_FRAME];
-        let frame = request.encode(self.options.motor.number(), &mut frame).unwrap_or(&[]);
-        self.line.send(frame)?;
-        self.sent = frame.to_vec();
+    pub(super) fn may_spin(&self) -> bool {
+        self.options.allowed.contains(&Need::Spin)
+    }
+
+    pub(super) fn lines(&self) -> Vec<String> {
+        let left_out = self.transcript.len().saturating_sub(TRANSCRIPT);
+        let note = (left_out > 0).then(|| format!("({left_out} earlier lines)"));
+        note.into_iter().chain(self.transcript.iter().skip(left_out).cloned()).collect()
+    }
+
+    pub(super) fn forget(&mut self) {
+        self.transcript.clear();
+    }
+
+    /// Sends bytes as they are. Whatever came before and was not waited for fails the case.
+    pub(super) fn send(&mut self, bytes: &[u8]) -> Result<(), Stop> {
+        self.silence(Duration(0))?;
+        self.sent.clear();
         self.received.clear();
-        let until = self.line.now() + PATIENCE;
-        while self.line.now() < until {
-            let bytes = self.line.receive(until)?;
-            self.received.extend(bytes);
-            if let Parse::Frame(Frame { header: HEADER_ACK, payload }, _) =
-                Frame::parse(&self.received)
-            {
-                return Ok(payload.to_vec());
+        self.send_more(bytes)
+    }
+
+    /// Sends more bytes of the same exchange.
+    pub(super) fn send_more(&mut self, bytes: &[u8]) -> Result<(), Stop> {
+        if !self.restoring && self.world.interrupted() {
+            return Err(Stop::Lost("interrupted".to_owned()));
+        }
+        if safety::may_start(bytes) {
+            if !self.may_spin() {
+                return Err(Stop::Skipped(Need::Spin.unmet().to_owned()));
+            }
+            self.moved = true;
+        }
+        self.note(true, bytes);
+        self.sent.extend(bytes);
+        self.line.send(bytes)?;
+        self.sent_at = self.line.now();
+        Ok(())
+    }
+
+    /// The next reply in form, if one comes within `patience` from the last byte sent.
+    pub(super) fn reply(&mut self, patience: Duration) -> Result<Option<Reply>, Stop> {
+        let mut until = self.sent_at + patience;
+        loop {
+            match Frame::parse(&self.pending) {
+                Parse::Frame(Frame { header, payload }, size) => {
+                    let delay = self.line.now().since(self.sent_at);
+                    let reply = Reply { header, payload: payload.to_vec(), delay };
+                    let bytes: Vec<u8> = self.pending.drain(..size).collect();
+                    self.note(false, &bytes);
+                    return self.in_form(reply).map(Some);
+                }
+                Parse::Bad(bad) => {
+                    let expected = match bad {
+                        Bad::Length(_) => "a reply with at most 128 bytes of payload".to_owned(),
+                        Bad::Checksum { expected, .. } => {
+                            format!("a reply whose checksum is {expected:02x}")
+                        }
+                    };
+                    self.give_up();
+                    return Err(self.failed(expected));
+                }
+                Parse::More => {}
+            }
+            // The clock is looked at first, so that a busy host does not pass for a late drive.
+            let last = self.line.now() >= until;
+            let came = self.take(until)?;
+            if came {
+                until = until.max(self.line.now() + GRACE);
+            } else if last {
+                if self.pending.is_empty() {
+                    return Ok(None);
+                }
+                self.give_up();
+                return Err(self.failed("a whole reply"));
             }
         }
-        Err(self.failed("an ACK"))
+    }
+
+    /// What is demanded of every reply (4.2, 4.3).
+    fn in_form(&self, reply: Reply) -> Result<Reply, Stop> {
+        match (reply.header, &*reply.payload) {
+            (HEADER_ACK, _) => Ok(reply),
+            (HEADER_NACK, &[code]) if ErrorCode::from(code) != ErrorCode::None => Ok(reply),
+            (HEADER_NACK, &[_]) => Err(self.failed("a NACK whose error code is not NONE")),
+            (HEADER_NACK, _) => Err(self.failed("a NACK with one error code")),
+            _ => Err(self.failed("a reply with header f0 (ACK) or ff (NACK)")),
+        }
+    }
+
+    /// The one reply to bytes. What the line cannot carry in time is not tried.
+    pub(super) fn exchange(&mut self, bytes: &[u8]) -> Result<Reply, Stop> {
+        if bytes.len() > self.in_time() {
+            return Err(Stop::Skipped(format!(
+                "at this baud rate a frame of {} bytes takes longer than 25 ms",
+                bytes.len()
+            )));
+        }
+        self.send(bytes)?;
+        self.awaited()
+    }
+
+    /// The one reply to what was sent.
+    pub(super) fn awaited(&mut self) -> Result<Reply, Stop> {
+        let reply = self.reply(PATIENCE + self.on_the_line(MAX_FRAME))?;
+        let Some(reply) = reply else {
+            (self.out_of_step, self.owed) = (true, true);
+            return Err(self.failed("a reply"));
+        };
+        if !self.pending.is_empty() {
+            self.give_up();
+            return Err(self.failed("one reply and nothing behind it"));
+        }
+        Ok(reply)
+    }
+
+    /// The payload of the ACK to bytes.
+    pub(super) fn acknowledged_bytes(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Stop> {
+        let reply = self.exchange(bytes)?;
+        self.require(reply.header == HEADER_ACK, "ACK")?;
+        Ok(reply.payload)
+    }
+
+    /// A NACK to bytes, with this code.
+    pub(super) fn refused_bytes(&mut self, bytes: &[u8], code: ErrorCode) -> Result<(), Stop> {
+        let reply = self.exchange(bytes)?;
+        self.require_nack(&reply, code)
+    }
+
+    /// Fails the case unless the reply is a NACK with this code.
+    pub(super) fn require_nack(&self, reply: &Reply, code: ErrorCode) -> Result<(), Stop> {
+        let bytes = frame(HEADER_NACK, &[code.number()]);
+        self.require(reply.is_nack(code), format!("{}  NACK {code}", hex(&bytes)))
+    }
+
+    /// The payload of the ACK to a request to the motor under test.
+    pub(super) fn acknowledged(&mut self, request: &Request<'_>) -> Result<Vec<u8>, Stop> {
+        let bytes = self.encode(request);
+        self.acknowledged_bytes(&bytes)
+    }
+
+    /// An ACK without payload.
+    pub(super) fn done(&mut self, request: &Request<'_>) -> Result<(), Stop> {
+        let payload = self.acknowledged(request)?;
+        self.require(payload.is_empty(), "f0 00 f0  ACK without payload")
+    }
+
+    /// A NACK with this code.
+    pub(super) fn refused(&mut self, request: &Request<'_>, code: ErrorCode) -> Result<(), Stop> {
+        let bytes = self.encode(request);
+        self.refused_bytes(&bytes, code)
+    }
+
+    /// The frame of a request to the motor under test.
+    pub(super) fn encode(&self, request: &Request<'_>) -> Vec<u8> {
+        let mut frame = [0; MAX_FRAME];
+        let bytes = request.encode(self.options.motor.number(), &mut frame);
+        bytes.expect("the kit's requests fit a frame").to_vec()
+    }
+
+    /// A frame of any code to the motor under test.
+    pub(super) fn frame(&self, code: u8, payload: &[u8]) -> Vec<u8> {
+        frame(Frame::header(code, self.options.motor.number()), payload)
+    }
+
+    /// The bytes of a register.
+    pub(super) fn get(&mut self, register: RegisterId) -> Result<Vec<u8>, Stop> {
+        self.acknowledged(&Request::GetRegister(register))
+    }
+
+    /// The value of a register.
+    pub(super) fn value(&mut self, register: RegisterId) -> Result<i32, Stop> {
+        let payload = self.get(register)?;
+        register.decode(&payload).ok_or_else(|| self.failed("ACK with 1, 2 or 4 bytes"))
+    }
+
+    /// Writes a register in the size that the profile has for it.
+    pub(super) fn set(&mut self, register: RegisterId, value: i32) -> Result<(), Stop> {
+        let size = usize::from(register.write_size(self.profile()));
+        self.done(&Request::SetRegister { register, value: &value.to_le_bytes()[..size] })
+    }
+
+    pub(super) fn execute(&mut self, command: Command) -> Result<(), Stop> {
+        self.done(&Request::Execute(command))
+    }
+
+    pub(super) fn status(&mut self) -> Result<Status, Stop> {
+        let value = self.value(RegisterId::STATUS)?;
+        Ok(Status::from(value as u8))
+    }
+
+    /// Nothing comes for a time; zero only looks at what is there.
+    pub(super) fn silence(&mut self, span: Duration) -> Result<(), Stop> {
+        let until = self.line.now() + span;
+        loop {
+            if self.take(until)? || !self.pending.is_empty() {
+                self.give_up();
+                return Err(self.failed("nothing that was not asked for"));
+            }
+            if self.line.now() >= until {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Waits until the line was silent for a time, whatever comes; a line that never falls silent
+    /// is not waited for for ever.
+    pub(super) fn drain(&mut self, span: Duration) -> Result<(), Stop> {
+        let last = self.line.now() + span + PATIENCE;
+        let mut until = self.line.now() + span;
+        while self.line.now() < until {
+            if self.take(until)? {
+                until = last.min(self.line.now() + span);
+            }
+        }
+        self.give_up();
+        Ok(())
     }
 
     /// Fails the case unless `held`.
-    pub fn require(&self, held: bool, expected: &str) -> Result<(), Stop> {
+    pub(super) fn require(&self, held: bool, expected: impl Into<String>) -> Result<(), Stop> {
         if held { Ok(()) } else { Err(self.failed(expected)) }
     }
 
-    fn failed(&self, expected: &str) -> Stop {
-        Stop::Failed(Box::new(Finding {
-            sent: format!("{:02x?}", self.sent),
-            expected: expected.to_owned(),
-            received: format!("{:02x?}", self.received),
-        }))
+    /// The last exchange, as what a drive did instead of what is expected.
+    pub(super) fn failed(&self, expected: impl Into<String>) -> Stop {
+        let mut words = Transcript::new(self.profile());
+        let said = |bytes: &[u8], words: String| match bytes {
+            [] => "nothing".to_owned(),
+            bytes => format!("{}  {words}", hex(bytes)),
+        };
+        let sent = said(&self.sent, words.note(true, &self.sent));
+        let received = said(&self.received, words.note(false, &self.received));
+        Stop::Failed(Box::new(Finding { sent, expected: expected.into(), received }))
+    }
+
+    /// How many bytes the line carries within the reception timeout, with something to spare.
+    pub(super) fn in_time(&self) -> usize {
+        match (self.profile(), self.options.byte_time.as_micros()) {
+            (Profile::Mcsdk54, _) | (_, 0) => usize::MAX,
+            (Profile::Spec, byte) => (RECEPTION.as_micros() * 9 / 10 / byte) as usize,
+        }
+    }
+
+    /// How long `bytes` take on the line.
+    pub(super) fn on_the_line(&self, bytes: usize) -> Duration {
+        Duration(self.options.byte_time.as_micros() * bytes as u64)
+    }
+
+    /// Takes what comes until a moment; whether anything did.
+    fn take(&mut self, until: Instant) -> Result<bool, Stop> {
+        let bytes = self.line.receive(until)?;
+        self.received.extend(&bytes);
+        self.pending.extend(&bytes);
+        Ok(!bytes.is_empty())
+    }
+
+    /// Notes what is no reply; what comes next has to be waited for.
+    fn give_up(&mut self) {
+        let bytes = std::mem::take(&mut self.pending);
+        if !bytes.is_empty() {
+            self.note(false, &bytes);
+            self.out_of_step = true;
+        }
+    }
+
+    fn note(&mut self, sent: bool, bytes: &[u8]) {
+        let words = self.words.note(sent, bytes);
+        let direction = if sent { '>' } else { '<' };
+        self.transcript.push(format!("{direction} {}  {words}", hex(bytes)));
     }
 }
 
-impl Subject for Bench {
-    fn begin(&mut self) -> Result<(), Stop> {
-        self.transcript.clear();
-        Ok(())
-    }
+/// A frame, its checksum right.
+pub(super) fn frame(header: u8, payload: &[u8]) -> Vec<u8> {
+    let mut room = [0; MAX_FRAME];
+    let bytes = Frame { header, payload }.encode(&mut room);
+    bytes.expect("the kit's payloads have at most 128 bytes").to_vec()
+}
 
-    fn restore(&mut self) -> Result<(), Stop> {
-        Ok(())
-    }
-
-    fn allows(&self, need: Need) -> bool {
-        self.options.allowed.contains(&need)
-    }
-
-    fn transcript(&self) -> Vec<String> {
-        self.transcript.clone()
-    }
+/// Bytes as people write them: `02 01 1e 21`.
+pub(super) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
 }

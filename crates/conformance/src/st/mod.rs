@@ -2,21 +2,44 @@
 
 mod bench;
 mod clauses;
+mod commands;
+mod faults;
+mod found;
+mod frames;
+mod messages;
+mod motion;
+mod motors;
+mod registers;
+mod restore;
+mod safety;
+mod sizes;
+mod timing;
+mod values;
 
-use motorlink_proto::stmcp::{Profile, Request};
+use motorlink_proto::stmcp::Profile;
 
 use crate::case::Case;
 use crate::markdown::markdown;
 
 pub use bench::{Bench, Options};
 pub use clauses::CLAUSES;
+pub use safety::may_start;
 
-/// What a drive of this profile is put through.
-pub fn suite(_profile: Profile) -> Vec<Case<Bench>> {
-    vec![Case::new("board_info_has_32_bytes", &["ST-4.7-02"], |bench: &mut Bench| {
-        let payload = bench.acknowledged(&Request::BoardInfo)?;
-        bench.require(payload.len() == 32, "an ACK with 32 bytes")
-    })]
+/// What a drive of this profile is put through: from the frame to the message, then what turns the
+/// motor or needs help.
+pub fn suite(profile: Profile) -> Vec<Case<Bench>> {
+    let topics = [
+        frames::cases,
+        timing::cases,
+        motors::cases,
+        registers::cases,
+        sizes::cases,
+        commands::cases,
+        messages::cases,
+        motion::cases,
+        faults::cases,
+    ];
+    topics.into_iter().flat_map(|cases| cases(profile)).collect()
 }
 
 /// Every clause and what tests it in either profile, as a Markdown table.

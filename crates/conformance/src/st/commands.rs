@@ -1,0 +1,153 @@
+//! Cases of 4.6 that leave the motor at rest: EXECUTE_CMD.
+
+use motorlink_proto::stmcp::register::Feature;
+use motorlink_proto::stmcp::{
+    Command, ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status,
+};
+
+use super::bench::Bench;
+use super::safety;
+use crate::case::{Case, Need, Stop};
+
+pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
+    let mut cases = vec![
+        Case::new(
+            "unknown_commands_are_refused",
+            &["ST-4.6-03", "ST-4.6-02", "ST-4.3-10"],
+            move |bench: &mut Bench| unknown(bench, profile),
+        ),
+        Case::new(
+            "a_command_that_takes_no_parameters_ignores_them",
+            &["ST-4.6-06"],
+            |bench: &mut Bench| {
+                let code = FrameCode::ExecuteCmd.number();
+                let bytes = bench.frame(code, &[Command::StopRamp.into(), 0xEE, 0xEE]);
+                let payload = bench.acknowledged_bytes(&bytes)?;
+                bench.require(payload.is_empty(), "f0 00 f0  ACK without payload")
+            },
+        ),
+    ];
+    let harmless: [(Command, &'static [&'static str]); 4] = [
+        (Command::StopMotor, &["ST-4.6-12", "ST-4.6-13", "ST-4.6-04"]),
+        (Command::StopRamp, &["ST-4.6-15", "ST-4.6-16", "ST-4.6-04"]),
+        (Command::FaultAck, &["ST-4.6-22", "ST-4.6-23", "ST-4.6-04"]),
+        (Command::IqdrefClear, &["ST-4.6-28", "ST-4.6-04"]),
+    ];
+    for (command, clauses) in harmless {
+        cases.push(Case::new(
+            format!("a_command_at_rest_is_acknowledged[{command}]"),
+            clauses,
+            move |bench: &mut Bench| at_rest(bench, command),
+        ));
+    }
+    if profile == Profile::Mcsdk54 {
+        for command in [Command::Reset, Command::Ping, Command::ScStop] {
+            cases.push(Case::new(
+                format!("a_command_at_rest_is_acknowledged[{command}]"),
+                &["ST-4.6-38", "ST-4.6-04"],
+                move |bench: &mut Bench| at_rest(bench, command),
+            ));
+        }
+    }
+    cases.extend([
+        Case::new("sc_start_needs_a_profiler", &["ST-4.6-38", "ST-4.6-03"], |bench: &mut Bench| {
+            bench.need_no(Feature::Profiler)?;
+            bench.refused(&Request::Execute(Command::ScStart), ErrorCode::WrongCmd)
+        })
+        .needs(&[Need::Spin]),
+        Case::new("references_are_cleared_to_their_defaults", &["ST-4.6-27"], clear_references),
+        Case::new(
+            "pfc_disable_needs_a_pfc",
+            &["ST-4.6-34", "ST-4.6-33", "ST-4.6-05"],
+            |bench: &mut Bench| pfc_command(bench, Command::PfcDisable),
+        ),
+        Case::new(
+            "pfc_fault_ack_needs_a_pfc",
+            &["ST-4.6-37", "ST-4.6-36", "ST-4.6-05"],
+            |bench: &mut Bench| pfc_command(bench, Command::PfcFaultAck),
+        ),
+        Case::new(
+            "pfc_enable_needs_a_pfc",
+            &["ST-4.6-31", "ST-4.6-29", "ST-4.6-30", "ST-4.6-32"],
+            pfc_enable,
+        )
+        .needs(&[Need::Spin]),
+    ]);
+    cases
+}
+
+/// Every id that table 4 lacks, but those that would start something in a drive that knows them.
+fn unknown(bench: &mut Bench, profile: Profile) -> Result<(), Stop> {
+    for id in 0..=255 {
+        let known = match Command::from(id) {
+            Command::Unknown(_) => false,
+            Command::Reset | Command::Ping | Command::ScStop => profile == Profile::Mcsdk54,
+            _ => true,
+        };
+        let bytes = bench.frame(FrameCode::ExecuteCmd.number(), &[id]);
+        if !known && !safety::may_start(&bytes) {
+            bench.refused_bytes(&bytes, ErrorCode::WrongCmd)?;
+        }
+    }
+    Ok(())
+}
+
+/// The command has no effect on a motor at rest without a fault, and succeeds.
+fn at_rest(bench: &mut Bench, command: Command) -> Result<(), Stop> {
+    if command == Command::IqdrefClear {
+        bench.keep_setpoints()?;
+    }
+    bench.execute(command)?;
+    let status = bench.status()?;
+    bench.require(status == Status::Idle, "ACK 0: IDLE, as before")
+}
+
+fn clear_references(bench: &mut Bench) -> Result<(), Stop> {
+    bench.keep_setpoints()?;
+    bench.execute(Command::IqdrefClear)?;
+    let default = bench.value(RegisterId::FLUX_REF)?;
+    bench.set(RegisterId::IQ_SPEEDMODE, default ^ 0x0123)?;
+    let other = bench.value(RegisterId::FLUX_REF)?;
+    if other == default {
+        return Err(Stop::Skipped("FLUX_REF does not show the Id reference at rest".to_owned()));
+    }
+    bench.execute(Command::IqdrefClear)?;
+    let now = bench.value(RegisterId::FLUX_REF)?;
+    bench.require(now == default, format!("ACK {default} s16A, the default"))
+}
+
+/// A PFC command without PFC is refused; with a PFC that is off it does nothing.
+fn pfc_command(bench: &mut Bench, command: Command) -> Result<(), Stop> {
+    if !bench.has(Feature::Pfc)? {
+        return bench.refused(&Request::Execute(command), ErrorCode::WrongCmd);
+    }
+    off_or_skip(bench)?;
+    bench.execute(command)?;
+    let enabled = bench.value(RegisterId::PFC_ENABLED)?;
+    bench.require(enabled == 0, "ACK 0: the PFC is off")
+}
+
+fn off_or_skip(bench: &mut Bench) -> Result<(), Stop> {
+    match bench.value(RegisterId::PFC_ENABLED)? {
+        0 => Ok(()),
+        _ => Err(Stop::Skipped("the PFC is enabled, and is left so".to_owned())),
+    }
+}
+
+fn pfc_enable(bench: &mut Bench) -> Result<(), Stop> {
+    if !bench.has(Feature::Pfc)? {
+        return bench.refused(&Request::Execute(Command::PfcEnable), ErrorCode::WrongCmd);
+    }
+    off_or_skip(bench)?;
+    bench.execute(Command::PfcEnable)?;
+    let enabled = bench.value(RegisterId::PFC_ENABLED)?;
+    // Once more: it is started already, and nothing happens.
+    let again = bench.encode(&Request::Execute(Command::PfcEnable));
+    let again = bench.exchange(&again)?;
+    let still = bench.value(RegisterId::PFC_ENABLED)?;
+    bench.execute(Command::PfcDisable)?;
+    bench.require(enabled == 1, "ACK 1: the PFC is enabled")?;
+    bench.require(again.header == HEADER_ACK && still == 1, "ACK, and the PFC stays enabled")?;
+    let enabled = bench.value(RegisterId::PFC_ENABLED)?;
+    bench.require(enabled == 0, "ACK 0: the PFC is off")
+}

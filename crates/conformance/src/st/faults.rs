@@ -1,0 +1,109 @@
+//! Cases of 4.6 and of FLAGS with a fault that somebody causes.
+
+use motorlink_proto::stmcp::{Command, Flags, Profile, RegisterId, Status};
+use motorlink_proto::time::Duration;
+
+use super::bench::Bench;
+use super::restore::faulty;
+use crate::case::{Case, Need, Stop};
+
+/// How long a drive may take to see a fault, or that it is gone.
+const SEEN: Duration = Duration::from_millis(5_000);
+/// How long it is watched that a command has no effect.
+const WATCH: Duration = Duration::from_millis(100);
+
+pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
+    vec![
+        // First what ends every other.
+        Case::new(
+            "a_fault_that_is_over_is_acknowledged",
+            &["ST-4.6-21", "ST-4.6-23", "ST-4.4-20"],
+            |bench: &mut Bench| {
+                over(bench)?;
+                bench.execute(Command::FaultAck)?;
+                let status = bench.wait_for(SEEN, |status| status == Status::Idle)?;
+                bench.require(status == Status::Idle, "ACK 0: IDLE")?;
+                let flags = flags(bench)?;
+                bench.require(flags.0 == 0, "ACK 0: no faults")
+            },
+        )
+        .needs(&[Need::Fault]),
+        Case::new("a_fault_is_shown_in_flags_and_status", &["ST-4.4-21", "ST-4.4-20"], shown)
+            .needs(&[Need::Fault]),
+        Case::new(
+            "a_fault_that_is_present_is_not_acknowledged",
+            &["ST-4.6-22", "ST-4.6-23"],
+            |bench: &mut Bench| {
+                present(bench)?;
+                bench.execute(Command::FaultAck)?;
+                bench.silence(WATCH)?;
+                let status = bench.status()?;
+                bench.require(status == Status::FaultNow, "ACK 10: FAULT_NOW, as before")?;
+                let flags = flags(bench)?;
+                bench.require(flags.occurred() != 0, "ACK with the faults that occurred")
+            },
+        )
+        .needs(&[Need::Fault]),
+        Case::new("a_motor_in_fault_does_not_start", &["ST-4.6-09", "ST-4.6-10"], |bench| {
+            no_start(bench, Command::StartMotor)
+        })
+        .needs(&[Need::Fault, Need::Spin]),
+        Case::new(
+            "start_stop_does_nothing_in_fault",
+            &["ST-4.6-19", "ST-4.6-20"],
+            |bench: &mut Bench| no_start(bench, Command::StartStop),
+        )
+        .needs(&[Need::Fault, Need::Spin]),
+    ]
+}
+
+fn flags(bench: &mut Bench) -> Result<Flags, Stop> {
+    Ok(Flags(bench.value(RegisterId::FLAGS)? as u32))
+}
+
+/// A fault whose cause is there.
+fn present(bench: &mut Bench) -> Result<(), Stop> {
+    bench.fault()?;
+    let status = bench.wait_for(SEEN, |status| status == Status::FaultNow)?;
+    bench.require(status == Status::FaultNow, "ACK 10: FAULT_NOW, for a fault was caused")
+}
+
+/// A fault whose cause is gone.
+fn over(bench: &mut Bench) -> Result<(), Stop> {
+    present(bench)?;
+    bench.world.fault(false)?;
+    let status = bench.wait_for(SEEN, |status| status == Status::FaultOver)?;
+    bench.require(status == Status::FaultOver, "ACK 11: FAULT_OVER, for its cause is gone")
+}
+
+fn shown(bench: &mut Bench) -> Result<(), Stop> {
+    present(bench)?;
+    let now = flags(bench)?;
+    bench.require(now.present() != 0, "ACK with a fault present in the high half")?;
+    let occurred = now.occurred() & now.present() == now.present();
+    bench.require(occurred, "ACK with the same fault in the low half")?;
+    bench.world.fault(false)?;
+    let status = bench.wait_for(SEEN, |status| status == Status::FaultOver)?;
+    bench.require(status == Status::FaultOver, "ACK 11: FAULT_OVER, for its cause is gone")?;
+    let now = flags(bench)?;
+    bench.require(now.present() == 0, "ACK with no fault present in the high half")?;
+    bench.require(now.occurred() != 0, "ACK with the fault that occurred in the low half")
+}
+
+fn no_start(bench: &mut Bench, command: Command) -> Result<(), Stop> {
+    present(bench)?;
+    stays_in_fault(bench, command)?;
+    bench.world.fault(false)?;
+    let status = bench.wait_for(SEEN, |status| status == Status::FaultOver)?;
+    bench.require(status == Status::FaultOver, "ACK 11: FAULT_OVER, for its cause is gone")?;
+    stays_in_fault(bench, command)
+}
+
+fn stays_in_fault(bench: &mut Bench, command: Command) -> Result<(), Stop> {
+    let before = bench.status()?;
+    bench.execute(command)?;
+    bench.silence(WATCH)?;
+    let status = bench.status()?;
+    let held = faulty(status) && status == before;
+    bench.require(held, format!("ACK: {before}, as before"))
+}

@@ -1,0 +1,334 @@
+//! Cases of 4.7 to 4.12 that leave the motor at rest.
+
+use motorlink_proto::stmcp::register::Feature;
+use motorlink_proto::stmcp::{
+    CurrentReference, ErrorCode, FrameCode, HEADER_ACK, MAX_PAYLOAD, PositionMove, Profile,
+    REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, Status, TorqueRamp,
+};
+
+use super::bench::{Bench, hex};
+use super::values::as_kept;
+use crate::case::{Case, Stop};
+
+pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
+    let mut cases = vec![
+        Case::new("board_info_has_32_bytes", &["ST-4.7-02", "ST-4.7-03"], |bench: &mut Bench| {
+            let payload = bench.acknowledged(&Request::BoardInfo)?;
+            bench.require(payload.len() == 32, "ACK with 32 bytes")
+        }),
+        Case::new("board_info_begins_with_the_version", &["ST-4.7-04"], board_version),
+        Case::new("board_info_ends_in_a_name", &["ST-4.7-05"], |bench: &mut Bench| {
+            let payload = bench.acknowledged(&Request::BoardInfo)?;
+            let name = payload.get(3..).and_then(terminated);
+            bench.require(name.is_some(), "printable characters and a NUL from byte 3 on")
+        }),
+        Case::new(
+            "firmware_version_has_32_bytes",
+            &["ST-4.12-02", "ST-4.12-03"],
+            |bench: &mut Bench| {
+                let payload = bench.acknowledged(&Request::FirmwareVersion)?;
+                bench.require(payload.len() == 32, "ACK with 32 bytes")
+            },
+        ),
+        Case::new("firmware_version_is_terminated", &["ST-4.12-04"], |bench: &mut Bench| {
+            let payload = bench.acknowledged(&Request::FirmwareVersion)?;
+            let text = terminated(&payload);
+            bench.require(text.is_some(), "printable characters, a tab among them, and a NUL")
+        }),
+        Case::new(
+            "firmware_version_follows_its_scheme",
+            &["ST-4.12-05", "ST-4.12-06", "ST-4.12-07", "ST-4.12-08", "ST-4.12-09", "ST-4.12-10"],
+            |bench: &mut Bench| version(bench).map(drop),
+        ),
+        Case::new(
+            "a_ramp_at_rest_is_kept_and_starts_nothing",
+            &["ST-4.8-02", "ST-4.8-04", "ST-4.8-07", "ST-4.8-09"],
+            ramp_at_rest,
+        ),
+        Case::new(
+            "current_references_at_rest_start_nothing",
+            &["ST-4.11-02", "ST-4.11-04", "ST-4.11-06"],
+            references_at_rest,
+        ),
+        Case::new(
+            "revup_phases_beyond_4_are_refused",
+            &["ST-4.9-02", "ST-4.10-03", "ST-4.3-09"],
+            |bench: &mut Bench| {
+                let data = RevupPhase { speed_rpm: 600, torque_s16a: 1_000, duration_ms: 100 };
+                for phase in REVUP_PHASES..=255 {
+                    bench.refused(&Request::RevupData(phase), ErrorCode::WrongSet)?;
+                    bench.refused(&Request::SetRevupData(phase, data), ErrorCode::WrongSet)?;
+                }
+                Ok(())
+            },
+        ),
+    ];
+    for phase in 0..REVUP_PHASES {
+        cases.push(Case::new(
+            format!("a_revup_phase_is_read[{phase}]"),
+            &["ST-4.9-06", "ST-4.9-02", "ST-4.9-07"],
+            move |bench: &mut Bench| {
+                let payload = bench.acknowledged(&Request::RevupData(phase))?;
+                let size = RevupPhase::SIZE;
+                bench.require(payload.len() == size, "ACK with 8 bytes: speed, torque, duration")
+            },
+        ));
+        cases.push(Case::new(
+            format!("a_revup_phase_is_written_and_read_back[{phase}]"),
+            &[
+                "ST-4.10-02",
+                "ST-4.10-04",
+                "ST-4.10-05",
+                "ST-4.10-06",
+                "ST-4.10-07",
+                "ST-4.9-03",
+                "ST-4.9-04",
+                "ST-4.9-05",
+            ],
+            move |bench: &mut Bench| revup(bench, phase),
+        ));
+    }
+    match profile {
+        Profile::Spec => cases.extend(segments()),
+        Profile::Mcsdk54 => cases.extend(firmware()),
+    }
+    cases
+}
+
+/// The text before the NUL, if there is one and the text is printable.
+fn terminated(bytes: &[u8]) -> Option<&str> {
+    let end = bytes.iter().position(|&byte| byte == 0)?;
+    let text = std::str::from_utf8(&bytes[..end]).ok()?;
+    let printable = text.chars().all(|c| c == '\t' || !c.is_control());
+    (printable && !text.is_empty()).then_some(text)
+}
+
+/// Major, minor and patch of the version string, which has to follow the scheme of 4.12.
+fn version(bench: &mut Bench) -> Result<[u32; 3], Stop> {
+    let payload = bench.acknowledged(&Request::FirmwareVersion)?;
+    let scheme = "NAME<tab>Ver.MAJOR.MINOR.PATCH, or that and -A, -B or -RC with a number from 1, \
+                  MAJOR from 1";
+    terminated(&payload).and_then(parse).ok_or_else(|| bench.failed(scheme))
+}
+
+fn parse(text: &str) -> Option<[u32; 3]> {
+    let (name, version) = text.split_once('\t')?;
+    let version = version.strip_prefix("Ver.")?;
+    let (numbers, pre_release) = match version.split_once('-') {
+        Some((numbers, pre_release)) => (numbers, Some(pre_release)),
+        None => (version, None),
+    };
+    let mut parts = numbers.split('.').map(number);
+    let found = [parts.next()??, parts.next()??, parts.next()??];
+    let whole = parts.next().is_none() && !name.is_empty() && found[0] >= 1;
+    let pre_release_is_one = pre_release.is_none_or(|text| {
+        let increment = ["RC", "A", "B"].iter().find_map(|kind| text.strip_prefix(kind));
+        increment.and_then(number).is_some_and(|increment| increment >= 1)
+    });
+    (whole && pre_release_is_one).then_some(found)
+}
+
+fn number(text: &str) -> Option<u32> {
+    text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse().ok())?
+}
+
+/// As integers, or in shipped firmware as ASCII digits (SPEC-NOTES S13): the version that the
+/// version string has.
+fn board_version(bench: &mut Bench) -> Result<(), Stop> {
+    let numbers = version(bench)?;
+    let payload = bench.acknowledged(&Request::BoardInfo)?;
+    let wanted = numbers.map(|number| match bench.profile() {
+        Profile::Spec => number as u8,
+        Profile::Mcsdk54 => b'0' + (number % 10) as u8,
+    });
+    let hint = match (bench.profile(), payload.get(..3)) {
+        (Profile::Spec, Some(digits)) if digits.iter().all(u8::is_ascii_digit) => {
+            "; digits are what shipped firmware sends, which --profile mcsdk-5.4 is for"
+        }
+        _ => "",
+    };
+    let expected = format!("ACK that begins with {}, as in the version string{hint}", hex(&wanted));
+    bench.require(payload.starts_with(&wanted), expected)
+}
+
+fn ramp_at_rest(bench: &mut Bench) -> Result<(), Stop> {
+    bench.keep_setpoints()?;
+    // The duration cannot be read back, so that a gentle one stays.
+    for speed_rpm in [0x0640, -1_002, 70_002] {
+        bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 2_000 }))?;
+        let now = bench.value(RegisterId::RAMP_FINAL_SPEED)?;
+        let shown = as_kept(bench.profile(), speed_rpm);
+        bench.require(now == shown, format!("ACK {shown} rpm, the final speed of the ramp"))?;
+        nothing_started(bench)?;
+    }
+    Ok(())
+}
+
+fn references_at_rest(bench: &mut Bench) -> Result<(), Stop> {
+    bench.keep_setpoints()?;
+    let reference = CurrentReference { iq_s16a: 0x0123, id_s16a: -0x0045 };
+    bench.done(&Request::CurrentReference(reference))?;
+    nothing_started(bench)?;
+    let measured = bench.value(RegisterId::TORQUE_MEAS)?;
+    bench.require(measured == 0, "ACK 0 s16A, for no current flows at rest")
+}
+
+fn nothing_started(bench: &mut Bench) -> Result<(), Stop> {
+    let status = bench.status()?;
+    bench.require(status == Status::Idle, "ACK 0: IDLE, for nothing was started")?;
+    let reference = bench.value(RegisterId::SPEED_REF)?;
+    bench.require(reference == 0, "ACK 0 rpm, for a ramp waits until the motor runs")
+}
+
+fn revup(bench: &mut Bench, phase: u8) -> Result<(), Stop> {
+    bench.keep_revup(phase)?;
+    let samples = [
+        // More than 16 bits of speed; less than nothing.
+        RevupPhase { speed_rpm: 70_002, torque_s16a: 0x0123, duration_ms: 0x0234 },
+        RevupPhase { speed_rpm: -798, torque_s16a: -0x0216, duration_ms: 0x8001 },
+    ];
+    for data in samples {
+        bench.done(&Request::SetRevupData(phase, data))?;
+        let payload = bench.acknowledged(&Request::RevupData(phase))?;
+        let bytes = data.to_bytes();
+        bench.require(payload == bytes, format!("ACK {}, which was written", hex(&bytes)))?;
+    }
+    // The other phases are others.
+    let data = samples[0];
+    let other = (phase + 1) % REVUP_PHASES;
+    let before = bench.acknowledged(&Request::RevupData(other))?;
+    bench.done(&Request::SetRevupData(phase, data))?;
+    let now = bench.acknowledged(&Request::RevupData(other))?;
+    bench.require(now == before, format!("phase {other} as before: {}", hex(&before)))
+}
+
+/// Data segments, whose layout is ours, for the document has lost its own (SPEC-NOTES S7).
+fn segments() -> Vec<Case<Bench>> {
+    vec![
+        Case::new(
+            "a_data_segment_gives_the_values_of_its_registers",
+            &["ST-3.1-10", "ST-3.1-11"],
+            |bench: &mut Bench| {
+                empty_segment(bench)?;
+                let registers = [
+                    RegisterId::STATUS.0,
+                    RegisterId::SPEED_MEAS.0,
+                    RegisterId::I_A.0,
+                    RegisterId::BUS_VOLTAGE.0,
+                ];
+                bench.done(&Request::ConfigDynStruct { segment: 0, registers: &registers })?;
+                let payload = bench.acknowledged(&Request::DataElement(0))?;
+                bench.require(payload.len() == 9, "ACK with 1, 4, 2 and 2 bytes")?;
+                bench.require(payload[..7] == [0; 7], "ACK with STATUS, speed and current 0")
+            },
+        ),
+        Case::new(
+            "what_no_data_segment_can_hold_is_refused",
+            &["ST-3.1-11", "ST-4.3-09"],
+            |bench: &mut Bench| {
+                empty_segment(bench)?;
+                let status = [RegisterId::STATUS.0];
+                bench.done(&Request::ConfigDynStruct { segment: 0, registers: &status })?;
+                let many = [RegisterId::STATUS.0; 33];
+                for registers in [&[0xEE][..], &many] {
+                    let request = Request::ConfigDynStruct { segment: 0, registers };
+                    bench.refused(&request, ErrorCode::WrongSet)?;
+                }
+                let none = Request::ConfigDynStruct { segment: 0xEE, registers: &status };
+                bench.refused(&none, ErrorCode::WrongSet)?;
+                bench.refused(&Request::DataElement(0xEE), ErrorCode::WrongSet)?;
+                let payload = bench.acknowledged(&Request::DataElement(0))?;
+                bench.require(payload.len() == 1, "ACK with the segment as before, 1 byte")
+            },
+        ),
+        Case::new("a_reply_may_have_128_bytes", &["ST-3-05", "ST-3.1-10"], |bench: &mut Bench| {
+            empty_segment(bench)?;
+            let registers = [RegisterId::SPEED_MEAS.0; 32];
+            bench.done(&Request::ConfigDynStruct { segment: 0, registers: &registers })?;
+            let payload = bench.acknowledged(&Request::DataElement(0))?;
+            bench.require(payload.len() == MAX_PAYLOAD, "ACK with 128 bytes")
+        }),
+    ]
+}
+
+/// Segment 0, which has to be empty: what it holds cannot be read, so it could not be put back.
+fn empty_segment(bench: &mut Bench) -> Result<(), Stop> {
+    let bytes = bench.encode(&Request::DataElement(0));
+    let reply = bench.exchange(&bytes)?;
+    if reply.is_nack(ErrorCode::BadFrameId) {
+        let why = "the drive has no data segments, whose section the document has lost";
+        return Err(Stop::Skipped(why.to_owned()));
+    }
+    bench.require(reply.header == HEADER_ACK, "ACK")?;
+    if !reply.payload.is_empty() {
+        return Err(Stop::Skipped("data segment 0 is in use".to_owned()));
+    }
+    bench.undo.push(super::restore::Undo::Segment(0));
+    Ok(())
+}
+
+/// Messages that only shipped firmware has.
+fn firmware() -> Vec<Case<Bench>> {
+    vec![
+        Case::new(
+            "profiler_information_needs_a_profiler",
+            &["ST-4.3-15", "ST-3.1-16"],
+            |bench: &mut Bench| {
+                bench.need_no(Feature::Profiler)?;
+                for steps in [&[][..], &[0, 1, 2]] {
+                    bench.refused(&Request::ProfilerInfo(steps), ErrorCode::MpNotEnabled)?;
+                }
+                Ok(())
+            },
+        ),
+        Case::new("a_torque_ramp_at_rest_starts_nothing", &["ST-3.1-10"], |bench: &mut Bench| {
+            bench.keep_setpoints()?;
+            let ramp = TorqueRamp { torque_s16a: 0x0123, duration_ms: 500 };
+            bench.done(&Request::TorqueRamp(ramp))?;
+            nothing_started(bench)
+        }),
+        Case::new(
+            "position_commands_need_position_control",
+            &["ST-3.1-16", "ST-4.1-16"],
+            |bench: &mut Bench| {
+                bench.need_no(Feature::PositionControl)?;
+                let target = PositionMove { angle_rad: 0.0, duration_s: 1.0 };
+                bench.refused(&Request::Position(target), ErrorCode::BadFrameId)
+            },
+        ),
+        Case::new(
+            "codes_that_firmware_lacks_are_refused",
+            &["ST-3.1-11", "ST-4.1-16"],
+            |bench: &mut Bench| {
+                let code = FrameCode::ConfigDynStruct.number();
+                let bytes = bench.frame(code, &[0, RegisterId::STATUS.0]);
+                bench.refused_bytes(&bytes, ErrorCode::BadFrameId)
+            },
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse;
+
+    #[test]
+    fn the_version_scheme_is_read_to_the_letter() {
+        assert_eq!(parse("ST MC SDK\tVer.5.4.4"), Some([5, 4, 4]));
+        assert_eq!(parse("Fan\tVer.1.0.12-RC2"), Some([1, 0, 12]));
+        for wrong in [
+            "ST MC SDK Ver.5.4.4",
+            "ST MC SDK\t5.4.4",
+            "\tVer.5.4.4",
+            "x\tVer.0.4.4",
+            "x\tVer.5.4",
+            "x\tVer.5.4.4.1",
+            "x\tVer.5.4.+4",
+            "x\tVer.5.4.4-RC",
+            "x\tVer.5.4.4-RC0",
+            "x\tVer.5.4.4-X1",
+        ] {
+            assert_eq!(parse(wrong), None, "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,369 @@
+//! Cases of 4.6, 4.8 and 4.11 that turn the motor.
+
+use motorlink_proto::stmcp::register::Feature;
+use motorlink_proto::stmcp::{
+    Command, ControlMode, CurrentReference, PositionMove, Profile, Ramp, RegisterId, Request,
+    Status, TorqueRamp,
+};
+use motorlink_proto::time::Duration;
+
+use super::bench::Bench;
+use crate::case::{Case, Need, Stop};
+
+/// How long a start may take, the alignment of an encoder included.
+const START: Duration = Duration::from_millis(15_000);
+/// How long a speed may take to settle behind its ramp.
+const SETTLE: Duration = Duration::from_millis(5_000);
+/// Between two looks at a register.
+const LOOK: Duration = Duration::from_millis(10);
+/// In how many looks on end a speed is what it shall be.
+const STEADY: u32 = 40;
+/// What the motor turns at where the drive does not tell what it was last told, rpm.
+const SPEED: i32 = 1_500;
+
+type Test = fn(&mut Bench) -> Result<(), Stop>;
+
+pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
+    let tests: [(&'static str, &'static [&'static str], Test); 17] = [
+        // First what ends every other.
+        ("a_stop_brings_the_motor_to_rest", &["ST-4.6-11", "ST-4.6-13"], stop),
+        (
+            "a_start_brings_the_motor_to_run_and_to_its_ramp",
+            &["ST-4.6-07", "ST-4.6-10", "ST-4.8-04", "ST-4.8-07"],
+            start,
+        ),
+        ("starting_a_running_motor_does_nothing", &["ST-4.6-08", "ST-4.6-10"], start_again),
+        ("start_stop_starts_and_stops", &["ST-4.6-17", "ST-4.6-18", "ST-4.6-20"], start_stop),
+        ("a_ramp_in_run_is_executed_at_once", &["ST-4.8-03", "ST-4.8-09"], ramp_at_once),
+        ("a_ramp_takes_its_duration", &["ST-4.8-08"], ramp_duration),
+        ("a_negative_ramp_turns_backwards", &["ST-4.8-07", "ST-4.4-16"], backwards),
+        ("stop_ramp_holds_what_was_reached", &["ST-4.6-14", "ST-4.6-16"], stop_ramp),
+        ("stop_ramp_without_a_ramp_does_nothing", &["ST-4.6-15"], stop_no_ramp),
+        (
+            "current_references_in_run_are_applied_at_once",
+            &["ST-4.11-03", "ST-4.11-05", "ST-4.11-02"],
+            references_at_once,
+        ),
+        ("current_references_at_rest_wait_for_run", &["ST-4.11-04"], references_deferred),
+        ("a_ramp_in_torque_mode_changes_to_speed_mode", &["ST-4.8-05"], ramp_in_torque_mode),
+        ("the_control_mode_is_changed_back_by_a_write", &["ST-4.8-06", "ST-4.4-19"], mode),
+        ("writing_the_final_speed_in_run_begins_a_ramp", &["ST-4.4-23"], final_speed),
+        ("the_id_reference_of_speed_mode_acts_in_run", &["ST-4.4-25"], speed_mode_id),
+        ("encoder_align_at_rest_comes_back_to_rest", &["ST-4.6-24", "ST-4.6-26"], align),
+        ("encoder_align_in_run_does_nothing", &["ST-4.6-25", "ST-4.6-26"], align_in_run),
+    ];
+    let mut cases: Vec<Case<Bench>> =
+        tests.map(|(name, clauses, test)| Case::new(name, clauses, test).needs(SPIN)).into();
+    if profile == Profile::Mcsdk54 {
+        cases.push(
+            Case::new("a_torque_ramp_takes_its_duration", &["ST-3.1-10"], torque_ramp).needs(SPIN),
+        );
+        cases.push(Case::new("a_position_is_gone_to", &["ST-3.1-16"], position).needs(SPIN));
+    }
+    cases
+}
+
+const SPIN: &[Need] = &[Need::Spin];
+
+/// A speed that the user's drive is set to anyway, within what registers allow.
+fn speed(bench: &mut Bench) -> Result<i32, Stop> {
+    let told = bench.value(RegisterId::RAMP_FINAL_SPEED)?.saturating_abs();
+    Ok(if (300..=5_000).contains(&told) { told / 6 * 6 } else { SPEED })
+}
+
+/// Programs a ramp and starts the motor; gives the speed when it is in RUN and at it.
+fn run(bench: &mut Bench) -> Result<i32, Stop> {
+    bench.keep_setpoints()?;
+    let speed_rpm = speed(bench)?;
+    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 500 }))?;
+    bench.execute(Command::StartMotor)?;
+    running(bench)?;
+    reaches(bench, speed_rpm)?;
+    Ok(speed_rpm)
+}
+
+fn running(bench: &mut Bench) -> Result<(), Stop> {
+    let status = bench.wait_for(START, |status| {
+        matches!(status, Status::Run) || super::restore::faulty(status)
+    })?;
+    bench.require(status == Status::Run, "ACK 6: RUN, within 15 s")
+}
+
+/// Waits until SPEED_MEAS is within a tenth of a speed, and stays there.
+fn reaches(bench: &mut Bench, speed: i32) -> Result<(), Stop> {
+    let near = |measured: i32| (measured - speed).abs() <= speed.abs() / 10 + 30;
+    let until = bench.line.now() + SETTLE;
+    let mut stays = 0;
+    loop {
+        let measured = bench.value(RegisterId::SPEED_MEAS)?;
+        stays = if near(measured) { stays + 1 } else { 0 };
+        if stays == STEADY {
+            return Ok(());
+        }
+        if bench.line.now() >= until {
+            return Err(bench.failed(format!("ACK {speed} rpm, give or take a tenth")));
+        }
+        bench.silence(LOOK)?;
+    }
+}
+
+fn still_running(bench: &mut Bench) -> Result<(), Stop> {
+    let status = bench.status()?;
+    bench.require(status == Status::Run, "ACK 6: RUN, as before")
+}
+
+fn start(bench: &mut Bench) -> Result<(), Stop> {
+    run(bench)?;
+    bench.silence(Duration::from_millis(300))?;
+    still_running(bench)
+}
+
+fn stop(bench: &mut Bench) -> Result<(), Stop> {
+    run(bench)?;
+    bench.execute(Command::StopMotor)?;
+    let status = bench.wait_for(START, |status| status == Status::Idle)?;
+    bench.require(status == Status::Idle, "ACK 0: IDLE")?;
+    let measured = bench.value(RegisterId::SPEED_MEAS)?;
+    bench.require(measured.abs() <= 30, "ACK 0 rpm")
+}
+
+fn start_again(bench: &mut Bench) -> Result<(), Stop> {
+    let speed = run(bench)?;
+    bench.execute(Command::StartMotor)?;
+    for _ in 0..10 {
+        still_running(bench)?;
+        bench.silence(LOOK)?;
+    }
+    reaches(bench, speed)
+}
+
+fn start_stop(bench: &mut Bench) -> Result<(), Stop> {
+    bench.keep_setpoints()?;
+    let speed_rpm = speed(bench)?;
+    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 500 }))?;
+    bench.execute(Command::StartStop)?;
+    running(bench)?;
+    reaches(bench, speed_rpm)?;
+    bench.execute(Command::StartStop)?;
+    let status = bench.wait_for(START, |status| status == Status::Idle)?;
+    bench.require(status == Status::Idle, "ACK 0: IDLE")
+}
+
+fn ramp_at_once(bench: &mut Bench) -> Result<(), Stop> {
+    let speed_rpm = run(bench)? * 4 / 5;
+    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 400 }))?;
+    still_running(bench)?;
+    reaches(bench, speed_rpm)
+}
+
+/// SPEED_REF follows a straight line; when it is there says how long the ramp was.
+fn ramp_duration(bench: &mut Bench) -> Result<(), Stop> {
+    let from = run(bench)?;
+    let (to, duration_ms) = (from * 4 / 5, 1_500);
+    bench.done(&Request::Ramp(Ramp { speed_rpm: to, duration_ms }))?;
+    let began = bench.line.now();
+    let near = |reference: i32| (reference - to).abs() <= (from - to).abs() / 20 + 6;
+    loop {
+        let reference = bench.value(RegisterId::SPEED_REF)?;
+        let took = bench.line.now().since(began).as_micros() / 1_000;
+        if near(reference) {
+            let held = (1_000..=2_500).contains(&took);
+            return bench
+                .require(held, format!("SPEED_REF at {to} rpm after 1500 ms, not {took} ms"));
+        }
+        if took > 3_000 {
+            return Err(bench.failed(format!("SPEED_REF at {to} rpm after 1500 ms")));
+        }
+        bench.silence(LOOK)?;
+    }
+}
+
+fn backwards(bench: &mut Bench) -> Result<(), Stop> {
+    bench.keep_setpoints()?;
+    let speed_rpm = -speed(bench)?;
+    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 500 }))?;
+    bench.execute(Command::StartMotor)?;
+    running(bench)?;
+    reaches(bench, speed_rpm)
+}
+
+fn stop_ramp(bench: &mut Bench) -> Result<(), Stop> {
+    let from = run(bench)?;
+    let to = from * 4 / 5;
+    bench.done(&Request::Ramp(Ramp { speed_rpm: to, duration_ms: 2_000 }))?;
+    bench.silence(Duration::from_millis(600))?;
+    bench.execute(Command::StopRamp)?;
+    still_running(bench)?;
+    let held = bench.value(RegisterId::SPEED_REF)?;
+    let between = held < from - 6 && held > to + 6;
+    bench.require(between, format!("ACK with a speed between {from} and {to} rpm"))?;
+    bench.silence(Duration::from_millis(500))?;
+    let now = bench.value(RegisterId::SPEED_REF)?;
+    bench.require((now - held).abs() <= 12, format!("ACK {held} rpm, held"))?;
+    still_running(bench)
+}
+
+fn stop_no_ramp(bench: &mut Bench) -> Result<(), Stop> {
+    let speed = run(bench)?;
+    bench.silence(Duration::from_millis(300))?;
+    bench.execute(Command::StopRamp)?;
+    bench.silence(Duration::from_millis(200))?;
+    still_running(bench)?;
+    reaches(bench, speed)
+}
+
+/// The current that the motor needs to keep its speed: the mean of a few looks, rounded to what
+/// keeps it turning.
+fn keeping_current(bench: &mut Bench) -> Result<i16, Stop> {
+    bench.silence(Duration::from_millis(500))?;
+    let mut sum = 0;
+    for _ in 0..16 {
+        sum += bench.value(RegisterId::TORQUE_MEAS)?;
+        bench.silence(LOOK)?;
+    }
+    Ok((sum / 16).clamp(-32_000, 32_000) as i16)
+}
+
+/// Different currents for the two axes, so that one is not taken for the other.
+fn reference(iq_s16a: i16) -> CurrentReference {
+    CurrentReference { iq_s16a, id_s16a: if iq_s16a == -60 { -90 } else { -60 } }
+}
+
+fn references_are(bench: &mut Bench, wanted: CurrentReference) -> Result<(), Stop> {
+    let CurrentReference { iq_s16a, id_s16a } = wanted;
+    let iq = bench.value(RegisterId::TORQUE_REF)?;
+    bench.require(iq == i32::from(iq_s16a), format!("ACK {iq_s16a} s16A, the Iq reference"))?;
+    let id = bench.value(RegisterId::FLUX_REF)?;
+    bench.require(id == i32::from(id_s16a), format!("ACK {id_s16a} s16A, the Id reference"))
+}
+
+fn references_at_once(bench: &mut Bench) -> Result<(), Stop> {
+    let speed_rpm = run(bench)?;
+    let reference = reference(keeping_current(bench)?);
+    bench.done(&Request::CurrentReference(reference))?;
+    let outcome = references_are(bench, reference).and_then(|()| still_running(bench));
+    // Back under speed control, whatever came of it.
+    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 100 }))?;
+    outcome
+}
+
+fn references_deferred(bench: &mut Bench) -> Result<(), Stop> {
+    run(bench)?;
+    let reference = reference(keeping_current(bench)?);
+    bench.rest()?;
+    bench.done(&Request::CurrentReference(reference))?;
+    let status = bench.status()?;
+    bench.require(status == Status::Idle, "ACK 0: IDLE, for nothing was started")?;
+    bench.execute(Command::StartMotor)?;
+    running(bench)?;
+    let outcome = references_are(bench, reference);
+    bench.execute(Command::StopMotor)?;
+    outcome
+}
+
+/// In RUN and in torque mode, with the current that keeps the speed; gives the speed.
+fn in_torque_mode(bench: &mut Bench) -> Result<i32, Stop> {
+    let speed = run(bench)?;
+    bench.set(RegisterId::CONTROL_MODE, u8::from(ControlMode::Torque).into())?;
+    mode_is(bench, ControlMode::Torque)?;
+    Ok(speed)
+}
+
+fn mode_is(bench: &mut Bench, mode: ControlMode) -> Result<(), Stop> {
+    let now = bench.value(RegisterId::CONTROL_MODE)?;
+    let held = now == i32::from(u8::from(mode));
+    bench.require(held, format!("ACK {}: {mode}", u8::from(mode)))
+}
+
+fn ramp_in_torque_mode(bench: &mut Bench) -> Result<(), Stop> {
+    let speed_rpm = in_torque_mode(bench)?;
+    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 300 }))?;
+    bench.silence(LOOK)?;
+    mode_is(bench, ControlMode::Speed)?;
+    still_running(bench)?;
+    reaches(bench, speed_rpm)
+}
+
+fn mode(bench: &mut Bench) -> Result<(), Stop> {
+    in_torque_mode(bench)?;
+    bench.set(RegisterId::CONTROL_MODE, u8::from(ControlMode::Speed).into())?;
+    mode_is(bench, ControlMode::Speed)?;
+    still_running(bench)
+}
+
+fn final_speed(bench: &mut Bench) -> Result<(), Stop> {
+    let speed = run(bench)? * 4 / 5;
+    bench.set(RegisterId::RAMP_FINAL_SPEED, speed)?;
+    reaches(bench, speed)
+}
+
+fn speed_mode_id(bench: &mut Bench) -> Result<(), Stop> {
+    run(bench)?;
+    bench.set(RegisterId::IQ_SPEEDMODE, -60)?;
+    let id = bench.value(RegisterId::FLUX_REF)?;
+    bench.require(id == -60, "ACK -60 s16A, the Id reference that was written")?;
+    still_running(bench)
+}
+
+/// With an encoder it goes through the states of an alignment, without nothing happens.
+fn align(bench: &mut Bench) -> Result<(), Stop> {
+    bench.execute(Command::EncoderAlign)?;
+    let mut aligning = false;
+    for _ in 0..10 {
+        let status = bench.status()?;
+        aligning |= matches!(
+            status,
+            Status::IdleAlignment
+                | Status::AlignChargeBootCap
+                | Status::AlignOffsetCalib
+                | Status::AlignClear
+                | Status::Alignment
+        );
+        bench.require(aligning || status == Status::Idle, "ACK: IDLE, or aligning")?;
+        bench.silence(LOOK)?;
+    }
+    let status = bench.wait_for(START, |status| status == Status::Idle)?;
+    bench.require(status == Status::Idle, "ACK 0: IDLE, once the encoder is aligned")
+}
+
+fn align_in_run(bench: &mut Bench) -> Result<(), Stop> {
+    let speed = run(bench)?;
+    bench.execute(Command::EncoderAlign)?;
+    for _ in 0..10 {
+        still_running(bench)?;
+        bench.silence(LOOK)?;
+    }
+    reaches(bench, speed)
+}
+
+/// SPEC-NOTES S7: from what the motor needs to a little more, in a straight line.
+fn torque_ramp(bench: &mut Bench) -> Result<(), Stop> {
+    let speed_rpm = run(bench)?;
+    let from = i32::from(keeping_current(bench)?);
+    let ramp = TorqueRamp { torque_s16a: from / 2, duration_ms: 300 };
+    bench.done(&Request::TorqueRamp(ramp))?;
+    bench.silence(LOOK)?;
+    let outcome = mode_is(bench, ControlMode::Torque).and_then(|()| {
+        bench.silence(Duration::from_millis(400))?;
+        let now = bench.value(RegisterId::TORQUE_REF)?;
+        bench.require(now == from / 2, format!("ACK {} s16A, the end of the ramp", from / 2))
+    });
+    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 100 }))?;
+    outcome
+}
+
+/// SPEC-NOTES S8: half a turn on from where the motor is.
+fn position(bench: &mut Bench) -> Result<(), Stop> {
+    bench.need(Feature::PositionControl)?;
+    bench.keep_setpoints()?;
+    let hold = PositionMove { angle_rad: 0.0, duration_s: 1.0 };
+    bench.done(&Request::Position(hold))?;
+    bench.execute(Command::StartMotor)?;
+    running(bench)?;
+    bench.silence(Duration::from_millis(1_500))?;
+    let target = PositionMove { angle_rad: std::f32::consts::PI, duration_s: 1.0 };
+    bench.done(&Request::Position(target))?;
+    bench.silence(Duration::from_millis(2_500))?;
+    let now = f32::from_bits(bench.value(RegisterId::CURRENT_POSITION)? as u32);
+    bench.require((now - target.angle_rad).abs() < 0.2, "ACK 3.14 rad, give or take 0.2")
+}

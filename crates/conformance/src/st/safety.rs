@@ -1,0 +1,28 @@
+//! What may start a motor.
+
+use motorlink_proto::stmcp::{Command, Frame, FrameCode, Parse};
+
+/// Commands after which something may turn or be under voltage.
+const STARTS: [Command; 5] = [
+    Command::StartMotor,
+    Command::StartStop,
+    Command::EncoderAlign,
+    Command::ScStart,
+    Command::PfcEnable,
+];
+
+/// Whether a drive may take these bytes, from any byte on, for a command that starts something. The
+/// checksum of what begins with the first byte does not matter: a drive may not look at it.
+pub fn may_start(bytes: &[u8]) -> bool {
+    let starts = |header: u8, payload: &[u8]| {
+        let code = header & 0x1F;
+        let command = payload.first().is_some_and(|id| STARTS.contains(&Command::from(*id)));
+        code == FrameCode::ExecuteCmd.number() && command
+    };
+    let first = matches!(bytes, [header, size, rest @ ..] if *size > 0 && starts(*header, rest));
+    first
+        || (0..bytes.len()).any(|at| match Frame::parse(&bytes[at..]) {
+            Parse::Frame(Frame { header, payload }, _) => starts(header, payload),
+            _ => false,
+        })
+}

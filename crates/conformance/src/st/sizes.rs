@@ -1,0 +1,184 @@
+//! Cases of 4.4 and SPEC-NOTES S18 and S19: values and messages that are too long or too short.
+
+use motorlink_proto::stmcp::register::Writing;
+use motorlink_proto::stmcp::{
+    ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status,
+};
+
+use super::bench::{Bench, hex};
+use super::found::read_size;
+use super::registers::writing;
+use super::values;
+use crate::case::{Case, Stop};
+
+pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
+    let mut cases: Vec<Case<Bench>> = Vec::new();
+    for register in RegisterId::all().filter(|&id| id != RegisterId::TARGET_MOTOR) {
+        // What cannot be read back does not show what was kept of a value.
+        let readable = read_size(register, profile).is_some();
+        let Writing::Takes(size) = writing(register, profile) else { continue };
+        if !readable {
+            continue;
+        }
+        let size = usize::from(size);
+        cases.push(Case::new(
+            format!("a_longer_value_is_cut_to_its_low_bytes[{register}]"),
+            &["ST-4.4-07", "ST-4.4-06", "ST-4.4-09"],
+            move |bench: &mut Bench| longer(bench, register, size),
+        ));
+        cases.push(match profile {
+            Profile::Spec => Case::new(
+                format!("a_shorter_value_keeps_the_other_bytes[{register}]"),
+                &["ST-4.4-08", "ST-4.4-06", "ST-4.4-09"],
+                move |bench: &mut Bench| shorter(bench, register, size),
+            ),
+            Profile::Mcsdk54 => Case::new(
+                format!("a_shorter_value_is_refused[{register}]"),
+                &["ST-4.4-08"],
+                move |bench: &mut Bench| short_refused(bench, register, size),
+            ),
+        });
+    }
+    for (code, least, refusal) in SHORT {
+        if FrameCode::from_number(code.number(), profile) != Some(code) {
+            continue;
+        }
+        let clauses: &'static [&'static str] = match code {
+            FrameCode::SetReg => &["ST-4.4-24"],
+            FrameCode::GetReg => &["ST-4.5-07"],
+            FrameCode::ExecuteCmd => &["ST-4.6-06"],
+            FrameCode::SetRamp => &["ST-4.8-10"],
+            FrameCode::GetRevupData => &["ST-4.9-08"],
+            FrameCode::SetRevupData => &["ST-4.10-08"],
+            FrameCode::SetCurrentRef => &["ST-4.11-07"],
+            _ => &["ST-3.1-10"],
+        };
+        cases.push(Case::new(
+            format!("a_message_that_is_too_short_is_refused[{}]", code.name()),
+            clauses,
+            move |bench: &mut Bench| too_short(bench, code, least, refusal),
+        ));
+    }
+    cases
+}
+
+/// Messages with the bytes that they need at least, and how fewer are refused.
+const SHORT: [(FrameCode, usize, ErrorCode); 8] = [
+    (FrameCode::SetReg, 1, ErrorCode::WrongSet),
+    (FrameCode::GetReg, 1, ErrorCode::GetWriteOnly),
+    (FrameCode::ExecuteCmd, 1, ErrorCode::WrongCmd),
+    (FrameCode::SetRamp, 6, ErrorCode::WrongSet),
+    (FrameCode::GetRevupData, 1, ErrorCode::WrongSet),
+    (FrameCode::SetRevupData, 9, ErrorCode::WrongSet),
+    (FrameCode::SetCurrentRef, 4, ErrorCode::WrongSet),
+    (FrameCode::SetTorqueRamp, 6, ErrorCode::WrongSet),
+];
+
+/// A register that is there and can be read back, kept; its value, and one to write.
+fn prepare(bench: &mut Bench, register: RegisterId) -> Result<(Vec<u8>, i32), Stop> {
+    if let Some(shape) = register.shape() {
+        bench.need(shape.feature)?;
+    }
+    let before = bench.keep(register)?;
+    let value = values::samples(bench.profile(), register, &before).first().copied();
+    Ok((before, value.unwrap_or_default()))
+}
+
+fn longer(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), Stop> {
+    let (_, value) = prepare(bench, register)?;
+    for excess in [1, 4, 8] {
+        let mut bytes = value.to_le_bytes()[..size].to_vec();
+        bytes.resize(size + excess, 0xEE);
+        bench.done(&Request::SetRegister { register, value: &bytes })?;
+        let now = bench.value(register)?;
+        bench.require(now == value, format!("the low bytes: {}", hex(&bytes[..size])))?;
+    }
+    Ok(())
+}
+
+fn shorter(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), Stop> {
+    let (_, value) = prepare(bench, register)?;
+    bench.set(register, value)?;
+    for kept in 0..size {
+        // One bit of the low byte differs, so that speeds and shares stay what they can be.
+        let mut bytes = value.to_le_bytes();
+        if kept > 0 {
+            bytes[0] ^= 0x04;
+        }
+        bench.done(&Request::SetRegister { register, value: &bytes[..kept] })?;
+        let now = bench.get(register)?;
+        let shown = &bytes[..now.len().min(4)];
+        bench.require(now == shown, format!("ACK {}: new low bytes, old high ones", hex(shown)))?;
+        bench.set(register, value)?;
+    }
+    Ok(())
+}
+
+fn short_refused(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), Stop> {
+    let (before, value) = prepare(bench, register)?;
+    for kept in 0..size {
+        prime(bench)?;
+        let value = &value.to_le_bytes()[..kept];
+        let bytes = bench.encode(&Request::SetRegister { register, value });
+        refused_or_old_bytes(bench, &bytes, ErrorCode::WrongSet)?;
+        let now = bench.get(register)?;
+        bench.require(now == before, format!("the value as before: {}", hex(&before)))?;
+    }
+    Ok(())
+}
+
+/// Fills the drive's receive buffer with bytes that are harmless in any message: stock firmware
+/// takes them for those that a short message does not carry (SPEC-NOTES S18).
+fn prime(bench: &mut Bench) -> Result<(), Stop> {
+    let bytes = bench.frame(0x1D, &[0xEE; 16]);
+    bench.refused_bytes(&bytes, ErrorCode::BadFrameId)
+}
+
+/// A refusal; in profile `mcsdk-5.4` an ACK only means that the drive is stock firmware.
+fn refused_or_old_bytes(bench: &mut Bench, bytes: &[u8], code: ErrorCode) -> Result<(), Stop> {
+    let reply = bench.exchange(bytes)?;
+    if bench.profile() == Profile::Mcsdk54 && reply.header == HEADER_ACK {
+        return Err(Stop::Skipped(
+            "the drive takes old bytes for missing ones, as shipped firmware does".to_owned(),
+        ));
+    }
+    bench.require_nack(&reply, code)
+}
+
+fn too_short(
+    bench: &mut Bench,
+    code: FrameCode,
+    least: usize,
+    refusal: ErrorCode,
+) -> Result<(), Stop> {
+    bench.keep_setpoints()?;
+    if code == FrameCode::SetRevupData {
+        bench.keep_revup(0)?;
+    }
+    let before = setpoints(bench)?;
+    for size in 0..least {
+        prime(bench)?;
+        let bytes = bench.frame(code.number(), &[0; 16][..size]);
+        refused_or_old_bytes(bench, &bytes, refusal)?;
+        let status = bench.status()?;
+        bench.require(status == Status::Idle, "ACK 0: IDLE, for nothing was started")?;
+    }
+    let now = setpoints(bench)?;
+    bench.require(now == before, "mode and references as before the refused message")
+}
+
+/// What the messages that are too short would change.
+fn setpoints(bench: &mut Bench) -> Result<Vec<Vec<u8>>, Stop> {
+    let registers = [
+        RegisterId::CONTROL_MODE,
+        RegisterId::RAMP_FINAL_SPEED,
+        RegisterId::TORQUE_REF,
+        RegisterId::FLUX_REF,
+    ];
+    let mut values = Vec::new();
+    for register in registers {
+        values.push(bench.get(register)?);
+    }
+    values.push(bench.acknowledged(&Request::RevupData(0))?);
+    Ok(values)
+}

@@ -1,0 +1,194 @@
+//! Cases of 4.1: how long a drive has for a reply, and a master for a frame.
+
+use motorlink_proto::stmcp::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
+use motorlink_proto::time::Duration;
+
+use super::bench::{Bench, Reply};
+use crate::case::{Case, Stop};
+
+/// In this time a whole command must have come (4.1).
+pub(super) const RECEPTION: Duration = Duration::from_millis(25);
+/// In this time a reply must have come (4.1).
+const ANSWER: Duration = Duration::from_millis(1_000);
+/// How late after the reception timeout its NACK may come: for a drive that looks at its timer
+/// every few milliseconds, an adapter that keeps bytes back, and a host with other things to do.
+const SLACK: Duration = Duration::from_millis(45);
+/// How much earlier than 25 ms a timer of another clock may be.
+const EARLY: Duration = Duration::from_millis(3);
+/// How long it is watched that nothing comes.
+const WATCH: Duration = Duration::from_millis(100);
+/// How often what depends on this host's own timing is tried.
+const TRIES: usize = 5;
+
+pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
+    let mut cases = vec![Case::new("a_reply_comes_within_a_second", &["ST-4.1-04"], in_a_second)];
+    match profile {
+        Profile::Spec => {
+            for (what, size) in CUTS {
+                cases.push(Case::new(
+                    format!("a_cut_frame_is_answered_with_timeout[{what}]"),
+                    &["ST-4.1-08", "ST-4.3-12"],
+                    move |bench: &mut Bench| cut(bench, size),
+                ));
+            }
+            cases.extend([
+                Case::new("the_timeout_is_answered_once", &["ST-4.1-08", "ST-2-03"], once),
+                Case::new("the_timeout_is_25_ms", &["ST-4.1-08"], on_time),
+                Case::new(
+                    "bytes_behind_a_timeout_begin_a_new_frame",
+                    &["ST-4.1-08", "ST-4.1-18"],
+                    late_bytes,
+                ),
+                Case::new("a_frame_within_25_ms_is_taken", &["ST-4.1-08"], in_time),
+                Case::new("the_timeout_counts_from_the_first_byte", &["ST-4.1-08"], trickle),
+            ]);
+        }
+        Profile::Mcsdk54 => cases.push(Case::new(
+            "a_frame_may_take_as_long_as_it_likes",
+            &["ST-4.1-08"],
+            |bench: &mut Bench| {
+                let bytes = bench.encode(&Request::GetRegister(RegisterId::STATUS));
+                for size in 1..bytes.len() {
+                    bench.send(&bytes[..size])?;
+                    bench.silence(WATCH)?;
+                    bench.send_more(&bytes[size..])?;
+                    let reply = bench.reply(ANSWER)?;
+                    let held = reply.is_some_and(|reply| reply.header == HEADER_ACK);
+                    bench
+                        .require(held, "ACK, for this firmware has no timeout (SPEC-NOTES S11)")?;
+                }
+                Ok(())
+            },
+        )),
+    }
+    cases
+}
+
+/// Where a frame with a payload of 6 bytes may be cut.
+const CUTS: [(&str, usize); 5] = [
+    ("behind the header", 1),
+    ("behind the length", 2),
+    ("behind a byte of the payload", 3),
+    ("within the payload", 5),
+    ("before the checksum", 8),
+];
+
+fn in_a_second(bench: &mut Bench) -> Result<(), Stop> {
+    // The quickest of several: a host that is busy once is no slow drive.
+    let mut quickest = None;
+    for _ in 0..3 {
+        for request in [
+            Request::GetRegister(RegisterId::STATUS),
+            Request::BoardInfo,
+            Request::GetRegister(RegisterId(0xEE)),
+        ] {
+            let bytes = bench.encode(&request);
+            let reply = bench.exchange(&bytes)?;
+            let flight = bench.on_the_line(bytes.len() + 40);
+            if reply.delay <= ANSWER + flight {
+                return Ok(());
+            }
+            quickest = quickest.min(Some(reply.delay)).or(Some(reply.delay));
+        }
+    }
+    let delay = quickest.map_or(0, |delay| delay.as_micros() / 1_000);
+    Err(bench.failed(format!("a reply within 1 s, not after {delay} ms")))
+}
+
+/// A question that is longer than it need be, its beginning.
+fn beginning(bench: &Bench, size: usize) -> Vec<u8> {
+    let payload = [RegisterId::STATUS.0, 0xEE, 0xEE, 0xEE, 0xEE, 0xEE];
+    let mut bytes = bench.frame(FrameCode::GetReg.number(), &payload);
+    bytes.truncate(size);
+    bytes
+}
+
+/// Sends the beginning of a frame; the NACK TIMEOUT that must come of it.
+fn timed_out(bench: &mut Bench, size: usize) -> Result<Reply, Stop> {
+    bench.out_of_step = true;
+    let bytes = beginning(bench, size);
+    let reply = bench.exchange(&bytes)?;
+    bench.require_nack(&reply, ErrorCode::Timeout)?;
+    bench.out_of_step = false;
+    Ok(reply)
+}
+
+fn cut(bench: &mut Bench, size: usize) -> Result<(), Stop> {
+    timed_out(bench, size)?;
+    bench.status().map(drop)
+}
+
+fn once(bench: &mut Bench) -> Result<(), Stop> {
+    timed_out(bench, 2)?;
+    bench.silence(WATCH)
+}
+
+fn on_time(bench: &mut Bench) -> Result<(), Stop> {
+    let mut outcome = Ok(());
+    for _ in 0..TRIES {
+        // What this host does between two looks at its clock makes a drive look late, never early.
+        let began = bench.line.now();
+        let reply = timed_out(bench, 2)?;
+        let took = bench.line.now().since(began);
+        let late = reply.delay > RECEPTION + SLACK + bench.on_the_line(6);
+        if took + EARLY >= RECEPTION && !late {
+            return Ok(());
+        }
+        let ms = took.as_micros() as f64 / 1e3;
+        outcome = Err(bench.failed(format!("NACK TIMEOUT after 25 ms, not after {ms} ms")));
+        if !late {
+            break;
+        }
+    }
+    outcome
+}
+
+/// The rest of a frame that timed out is the beginning of another (SPEC-NOTES S29).
+fn late_bytes(bench: &mut Bench) -> Result<(), Stop> {
+    let bytes = bench.encode(&Request::GetRegister(RegisterId::STATUS));
+    timed_out(bench, 2)?;
+    bench.out_of_step = true;
+    let reply = bench.exchange(&bytes[2..])?;
+    bench.require_nack(&reply, ErrorCode::Timeout)?;
+    bench.out_of_step = false;
+    bench.status().map(drop)
+}
+
+/// Bytes that come one by one are timed from the first (SPEC-NOTES S11): the NACK comes while they
+/// still come.
+fn trickle(bench: &mut Bench) -> Result<(), Stop> {
+    let bytes = beginning(bench, 8);
+    bench.out_of_step = true;
+    bench.send(&bytes[..1])?;
+    for byte in &bytes[1..] {
+        if let Some(reply) = bench.reply(Duration(RECEPTION.as_micros() * 6 / 10))? {
+            return bench.require_nack(&reply, ErrorCode::Timeout);
+        }
+        bench.send_more(&[*byte])?;
+    }
+    Err(bench.failed("NACK TIMEOUT 25 ms after the first byte, while others still come"))
+}
+
+fn in_time(bench: &mut Bench) -> Result<(), Stop> {
+    let bytes = bench.encode(&Request::GetRegister(RegisterId::STATUS));
+    let too_slow = "this host cannot send the parts of a frame within 25 ms".to_owned();
+    let mut outcome = Err(Stop::Skipped(too_slow));
+    bench.out_of_step = true;
+    for _ in 0..TRIES {
+        let began = bench.line.now();
+        bench.send(&bytes[..2])?;
+        bench.silence(Duration(RECEPTION.as_micros() * 6 / 10))?;
+        bench.send_more(&bytes[2..])?;
+        let took = bench.line.now().since(began);
+        let reply = bench.awaited()?;
+        if reply.header == HEADER_ACK {
+            bench.out_of_step = false;
+            return Ok(());
+        }
+        if took < Duration(RECEPTION.as_micros() * 9 / 10) {
+            outcome = Err(bench.failed("ACK, for the frame was whole after 15 ms"));
+        }
+        bench.drain(WATCH)?;
+    }
+    outcome
+}

@@ -1,0 +1,97 @@
+//! The clauses, the cases that name them, and the tests that they name belong together.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use motorlink_conformance::st;
+use motorlink_proto::stmcp::Profile;
+
+/// Names and clauses of the cases of both profiles.
+fn cases() -> BTreeMap<String, &'static [&'static str]> {
+    [Profile::Spec, Profile::Mcsdk54]
+        .into_iter()
+        .flat_map(st::suite)
+        .map(|case| (case.name.into_owned(), case.clauses))
+        .collect()
+}
+
+/// The paragraph as numbers, and the running number.
+fn place(id: &str) -> (Vec<u32>, u32) {
+    let number = |text: &str| text.parse().unwrap_or_else(|_| panic!("{id} has no such form"));
+    let parts: Vec<&str> = id.split('-').collect();
+    let ["ST", paragraph, running] = parts[..] else { panic!("{id} has no such form") };
+    (paragraph.split('.').map(number).collect(), number(running))
+}
+
+#[test]
+fn ids_count_without_a_gap_in_the_order_of_the_document() {
+    let mut last = (Vec::new(), 0);
+    for clause in st::CLAUSES {
+        let (paragraph, running) = place(clause.id);
+        let wanted = if paragraph == last.0 { last.1 + 1 } else { 1 };
+        assert_eq!(running, wanted, "{}", clause.id);
+        assert!(paragraph >= last.0, "{} comes after {:?}", clause.id, last.0);
+        last = (paragraph, running);
+    }
+}
+
+#[test]
+fn every_clause_is_tested_or_says_why_not() {
+    let tested: BTreeSet<&str> = cases().into_values().flatten().copied().collect();
+    for clause in st::CLAUSES {
+        let on_a_drive = tested.contains(clause.id);
+        let excused = !clause.untested.is_empty();
+        assert!(on_a_drive != excused, "{} needs either a case or a reason", clause.id);
+    }
+}
+
+#[test]
+fn every_case_names_clauses_that_exist() {
+    let known: BTreeSet<&str> = st::CLAUSES.iter().map(|clause| clause.id).collect();
+    for (name, clauses) in cases() {
+        assert!(!clauses.is_empty(), "{name} names no clause");
+        for clause in clauses {
+            assert!(known.contains(clause), "{name} names {clause}, which does not exist");
+        }
+    }
+}
+
+#[test]
+fn case_names_are_unique() {
+    for profile in [Profile::Spec, Profile::Mcsdk54] {
+        let mut seen = BTreeSet::new();
+        for case in st::suite(profile) {
+            assert!(seen.insert(case.name.clone()), "{} is there twice", case.name);
+        }
+    }
+}
+
+#[test]
+fn every_test_that_a_clause_names_is_in_the_repository() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut sources = String::new();
+    let mut folders: Vec<PathBuf> = ["crates", "tests/e2e"].map(|name| root.join(name)).into();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("the repository can be read").flatten() {
+            let path = entry.path();
+            match path.extension().and_then(|name| name.to_str()) {
+                Some("rs" | "py") => {
+                    sources += &fs::read_to_string(&path).expect("sources can be read");
+                }
+                _ if path.is_dir() => folders.push(path),
+                _ => {}
+            }
+        }
+    }
+    for clause in st::CLAUSES {
+        for test in clause.host {
+            let there = [format!("fn {test}("), format!("def {test}(")];
+            assert!(
+                there.iter().any(|text| sources.contains(text)),
+                "{} names {test}, which is no test",
+                clause.id
+            );
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! The kit against simulated ST drives on virtual time: those that are right, and those that are not.
+
+mod clauses;
+mod mutants;
+mod peer;
+mod slow;
+mod suite;

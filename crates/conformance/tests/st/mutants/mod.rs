@@ -1,0 +1,152 @@
+//! Drives with one deviation each: every one is caught by a case that names its clause.
+
+mod frames;
+mod messages;
+mod motion;
+mod registers;
+
+use motorlink_conformance::{Need, Outcome, Verdict, st};
+use motorlink_proto::stmcp::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse, Profile};
+use motorlink_proto::time::Instant;
+use motorlink_sim::st::MotorConfig;
+
+use crate::peer::{ALL, Deviation, Peer, Station, frame, test, wire};
+
+const SPEC: Profile = Profile::Spec;
+const MCSDK: Profile = Profile::Mcsdk54;
+
+/// What a drive does, the clause that forbids it, in which profile and on which motor it shows.
+struct Mutant {
+    name: &'static str,
+    clause: &'static str,
+    profile: Profile,
+    motor: u8,
+    allowed: &'static [Need],
+    make: fn() -> Deviation,
+}
+
+/// A deviation of a drive in profile `spec` that shows on motor 1 at rest.
+const fn mutant(name: &'static str, clause: &'static str, make: fn() -> Deviation) -> Mutant {
+    let allowed = &[Need::PowerCycle, Need::Fault];
+    Mutant { name, clause, profile: SPEC, motor: 1, allowed, make }
+}
+
+impl Mutant {
+    const fn of(self, profile: Profile) -> Self {
+        Mutant { profile, ..self }
+    }
+
+    const fn on(self, motor: u8) -> Self {
+        Mutant { motor, ..self }
+    }
+
+    /// It shows on a motor that turns.
+    const fn spinning(self) -> Self {
+        Mutant { allowed: &ALL, ..self }
+    }
+}
+
+/// Puts each mutant through the suite; tells what was caught by what.
+fn caught(mutants: &[Mutant]) {
+    let mut missed = Vec::new();
+    for Mutant { name, clause, profile, motor, allowed, make } in mutants {
+        assert!(st::CLAUSES.iter().any(|known| known.id == *clause), "{name} names {clause}");
+        let wire = wire(Peer::new(*profile, &MotorConfig::demo(), make()));
+        let report = test(&wire, *motor, allowed);
+        let failed: Vec<&Outcome> = report.failed().collect();
+        let (named, others): (Vec<&Outcome>, _) =
+            failed.into_iter().partition(|outcome| outcome.clauses.contains(clause));
+        let list = |outcomes: &[&Outcome]| {
+            outcomes.iter().map(|outcome| &*outcome.name).collect::<Vec<_>>().join(", ")
+        };
+        println!("{name} ({clause}): {}", list(&named));
+        println!("    besides, {} others: {}", others.len(), list(&others));
+        if named.is_empty() {
+            missed.push(format!("{name} ({clause}); others: {}", list(&others)));
+        }
+        for outcome in named {
+            let Verdict::Failed(finding) = &outcome.verdict else { unreachable!() };
+            assert!(!finding.expected.is_empty() && !finding.received.is_empty(), "{outcome:?}");
+        }
+    }
+    assert!(missed.is_empty(), "not caught:\n{}", missed.join("\n"));
+}
+
+/// Changes what the drive hears.
+fn hears(
+    mut change: impl FnMut(&mut Station, Instant, &mut Vec<u8>) -> Option<Vec<u8>> + 'static,
+) -> Deviation {
+    let before = Box::new(move |station: &mut Station, now, bytes: &mut Vec<u8>| {
+        change(station, now, bytes)
+    });
+    Deviation { before: Some(before), ..Deviation::default() }
+}
+
+/// Changes a reply, whose request is given with it.
+fn says(change: impl FnMut(&[u8], &mut Vec<u8>) + 'static) -> Deviation {
+    Deviation { after: Some(Box::new(change)), ..Deviation::default() }
+}
+
+/// Answers some right commands itself: header and payload in, the reply out.
+fn answers(
+    mut answer: impl FnMut(&mut Station, Instant, u8, &[u8]) -> Option<Vec<u8>> + 'static,
+) -> Deviation {
+    hears(move |station, now, bytes| {
+        let (header, payload) = parsed(bytes)?;
+        answer(station, now, header, &payload)
+    })
+}
+
+/// Changes the payload of right commands of a frame code.
+fn takes(code: u8, mut change: impl FnMut(&mut Station, &mut Vec<u8>) + 'static) -> Deviation {
+    hears(move |station, _, bytes| {
+        let (header, mut payload) = parsed(bytes)?;
+        if header & 0x1F == code {
+            change(station, &mut payload);
+            *bytes = frame(header, &payload);
+        }
+        None
+    })
+}
+
+/// Changes the payload of ACKs to commands of a frame code, given the command's payload.
+fn gives(code: u8, mut change: impl FnMut(&[u8], &mut Vec<u8>) + 'static) -> Deviation {
+    says(move |request, reply| {
+        let (Some((header, asked)), Some((HEADER_ACK, mut payload))) =
+            (parsed(request), parsed(reply))
+        else {
+            return;
+        };
+        if header & 0x1F == code {
+            change(&asked, &mut payload);
+            *reply = frame(HEADER_ACK, &payload);
+        }
+    })
+}
+
+/// Changes the error code of NACKs, given the command.
+fn refuses(mut change: impl FnMut(&[u8], ErrorCode) -> ErrorCode + 'static) -> Deviation {
+    says(move |request, reply| {
+        if let Some((HEADER_NACK, payload)) = parsed(reply) {
+            *reply = nack(change(request, ErrorCode::from(payload[0])));
+        }
+    })
+}
+
+fn ack() -> Vec<u8> {
+    frame(HEADER_ACK, &[])
+}
+
+fn nack(code: ErrorCode) -> Vec<u8> {
+    frame(HEADER_NACK, &[code.number()])
+}
+
+/// Header and payload of bytes that are one whole frame.
+fn parsed(bytes: &[u8]) -> Option<(u8, Vec<u8>)> {
+    match Frame::parse(bytes) {
+        Parse::Frame(frame, size) if size == bytes.len() => {
+            Some((frame.header, frame.payload.to_vec()))
+        }
+        _ => None,
+    }
+}

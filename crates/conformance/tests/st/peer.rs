@@ -1,0 +1,221 @@
+//! The drive under test: a simulated one on virtual time, as it is or with one deviation.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use motorlink::serve::ByteStation;
+use motorlink_conformance::st::{self, Bench, Options};
+use motorlink_conformance::wire::{Line, Virtual};
+use motorlink_conformance::{Need, Report, Unavailable, World, run};
+use motorlink_proto::stmcp::register::Features;
+use motorlink_proto::stmcp::{Flags, Frame, Motor, Profile, RegisterId};
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
+
+pub type Station = StStation<Vec<StMotor>>;
+pub type Wire = Rc<RefCell<Virtual<Peer, u8>>>;
+
+pub const ALL: [Need; 4] = [Need::Spin, Need::Rom, Need::PowerCycle, Need::Fault];
+
+/// Looks at bytes from the master and may change them, or answer them itself.
+pub type Before = Box<dyn FnMut(&mut Station, Instant, &mut Vec<u8>) -> Option<Vec<u8>>>;
+/// Looks at a reply, with the bytes it answers, and may change it.
+pub type After = Box<dyn FnMut(&[u8], &mut Vec<u8>)>;
+
+/// What a drive does otherwise than the simulated one.
+#[derive(Default)]
+pub struct Deviation {
+    /// Before the simulated drive.
+    pub before: Option<Before>,
+    /// Behind it.
+    pub after: Option<After>,
+    /// How late a reply is.
+    pub late: Option<fn(&[u8]) -> Duration>,
+    /// Whether a frame that timed out is gone on with.
+    pub glue: bool,
+    /// Whether a power cycle leaves the slave alone.
+    pub remembers: bool,
+    /// What is said unasked, and how often.
+    pub chatter: Option<(Duration, Vec<u8>)>,
+}
+
+/// A simulated drive on a line.
+pub struct Peer {
+    pub station: Station,
+    deviation: Deviation,
+    /// Bytes since the last reply.
+    request: Vec<u8>,
+    /// Bytes of a frame that timed out and is gone on with.
+    old: Vec<u8>,
+    /// Replies, and when they leave.
+    outbox: Vec<(Instant, Vec<u8>)>,
+    next_chatter: Option<Instant>,
+    /// The fastest any motor ever turned, rpm.
+    pub fastest: f32,
+    /// Everything that came from the master.
+    pub heard: Vec<u8>,
+}
+
+impl Peer {
+    pub fn new(profile: Profile, motors: &[MotorConfig], deviation: Deviation) -> Self {
+        let motors = motors.iter().copied().map(StMotor::new).collect();
+        let drive = StDrive::new(Instant(0), motors).expect("1 to 7 motors");
+        let next_chatter = deviation.chatter.as_ref().map(|(every, _)| Instant(0) + *every);
+        Peer {
+            station: StStation::new(profile, drive),
+            deviation,
+            request: Vec::new(),
+            old: Vec::new(),
+            outbox: Vec::new(),
+            next_chatter,
+            fastest: 0.0,
+            heard: Vec::new(),
+        }
+    }
+
+    fn look(&mut self) {
+        for motor in self.station.drive().motors() {
+            self.fastest = self.fastest.max(motor.truth().speed_rpm.abs());
+        }
+    }
+
+    fn say(&mut self, now: Instant, mut reply: Vec<u8>) {
+        if let Some(after) = &mut self.deviation.after {
+            after(&self.request, &mut reply);
+        }
+        self.request.clear();
+        let late = self.deviation.late.map_or(Duration(0), |late| late(&reply));
+        self.outbox.push((now + late, reply));
+    }
+
+    fn flush(&mut self, now: Instant, reply: &mut Vec<u8>) {
+        self.outbox.retain(|(at, bytes)| {
+            let due = *at <= now;
+            if due {
+                reply.extend(bytes);
+            }
+            !due
+        });
+    }
+}
+
+impl ByteStation for Peer {
+    fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
+        self.heard.extend(bytes);
+        self.station.advance_to(now);
+        let mut bytes = [std::mem::take(&mut self.old), bytes.to_vec()].concat();
+        self.request.extend(&bytes);
+        let own = match &mut self.deviation.before {
+            Some(before) => before(&mut self.station, now, &mut bytes),
+            None => None,
+        };
+        match own {
+            Some(own) => self.say(now, own),
+            None => {
+                let mut replies = Vec::new();
+                self.station.receive(now, &bytes, |bytes| replies.push(bytes.to_vec()));
+                replies.into_iter().for_each(|reply| self.say(now, reply));
+            }
+        }
+        self.look();
+        self.flush(now, reply);
+    }
+
+    fn poll(&mut self, now: Instant, reply: &mut Vec<u8>) {
+        let mut replies = Vec::new();
+        let request = self.request.clone();
+        self.station.poll(now, |bytes| replies.push(bytes.to_vec()));
+        if self.deviation.glue && !replies.is_empty() {
+            self.old = request;
+        }
+        replies.into_iter().for_each(|reply| self.say(now, reply));
+        if let (Some(at), Some((every, bytes))) = (self.next_chatter, &self.deviation.chatter)
+            && at <= now
+        {
+            reply.extend(bytes);
+            self.next_chatter = Some(now + *every);
+        }
+        self.look();
+        self.flush(now, reply);
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        let outbox = self.outbox.iter().map(|(at, _)| *at).min();
+        [self.station.deadline(), outbox, self.next_chatter].into_iter().flatten().min()
+    }
+}
+
+/// The power switch and the supply of the drive on the wire.
+struct Hands(Wire);
+
+impl World for Hands {
+    fn power_cycle(&mut self) -> Result<(), Unavailable> {
+        let peer = &mut self.0.borrow_mut().station;
+        peer.station.power_cycle();
+        if peer.deviation.remembers {
+            // Its last motor, which the kit has selected.
+            let last = peer.station.drive().last().number();
+            let select = frame(Frame::header(0x02, last), &[RegisterId::STATUS.0]);
+            peer.station.receive(Instant(0), &select, |_| {});
+        }
+        Ok(())
+    }
+
+    fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
+        let station = &mut self.0.borrow_mut().station.station;
+        let motors = station.drive().last().number();
+        let faults = if present { Flags::OVER_TEMP } else { 0 };
+        for motor in (1..=motors).filter_map(Motor::new) {
+            let motor = station.drive_mut().motor_mut(motor).expect("a motor of the drive");
+            motor.hold_faults(faults);
+        }
+        Ok(())
+    }
+}
+
+pub fn wire(peer: Peer) -> Wire {
+    Rc::new(RefCell::new(Virtual::new(peer)))
+}
+
+/// Puts the drive on a wire through the whole suite.
+pub fn test(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
+    let profile = wire.borrow().station.station.profile();
+    let motor = Motor::new(motor).expect("1 to 7");
+    let byte_time = Duration(0);
+    let options = Options { profile, motor, allowed: allowed.to_vec(), byte_time };
+    let world = Box::new(Hands(wire.clone()));
+    let mut bench = Bench::new(Box::new(wire.clone()), world, options);
+    run(&st::suite(profile), &mut bench, |_| {})
+}
+
+/// The current motor, every register of a motor as it reads, and its rev-up phases.
+pub fn dump(wire: &Wire, motor: u8) -> Vec<(String, Vec<u8>)> {
+    let profile = wire.borrow().station.station.profile();
+    let mut all = Vec::new();
+    let mut ask = |name: String, bytes: Vec<u8>| {
+        let mut line = wire.clone();
+        line.send(&bytes).expect("a virtual line does not fail");
+        let now = line.now();
+        let reply = line.receive(now).expect("a virtual line does not fail");
+        all.push((name, reply.clone()));
+        reply
+    };
+    let current = ask("current motor".to_owned(), frame(0x02, &[RegisterId::TARGET_MOTOR.0]));
+    for register in RegisterId::all() {
+        let shape = register.shape().expect("a register of the table");
+        if shape.read_size(profile, Features::NONE.with(shape.feature)).is_some() {
+            ask(register.to_string(), frame(Frame::header(0x02, motor), &[register.0]));
+        }
+    }
+    for phase in 0..5 {
+        ask(format!("phase {phase}"), frame(Frame::header(0x08, motor), &[phase]));
+    }
+    // Left as it was.
+    ask("current motor".to_owned(), frame(Frame::header(0x02, current[2] + 1), &[0]));
+    all
+}
+
+pub fn frame(header: u8, payload: &[u8]) -> Vec<u8> {
+    let mut room = [0; 131];
+    Frame { header, payload }.encode(&mut room).expect("at most 128 bytes").to_vec()
+}

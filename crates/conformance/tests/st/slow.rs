@@ -1,0 +1,111 @@
+//! A slow line: bytes take their time both ways, and the suite knows.
+
+use std::collections::VecDeque;
+
+use motorlink::port::PortError;
+use motorlink::serve::ByteStation;
+use motorlink_conformance::st::{self, Bench, Options};
+use motorlink_conformance::wire::Line;
+use motorlink_conformance::{Need, Verdict, run};
+use motorlink_proto::stmcp::{Motor, Profile};
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_sim::st::MotorConfig;
+
+use crate::peer::{Deviation, Peer};
+
+/// A UART with a drive at its end. `send` returns at once, as a driver with a buffer does.
+struct Uart {
+    peer: Peer,
+    byte_time: Duration,
+    now: Instant,
+    /// Bytes on the way to the drive, and when each is there.
+    outward: VecDeque<(Instant, u8)>,
+    /// Bytes on the way back.
+    inward: VecDeque<(Instant, u8)>,
+}
+
+impl Uart {
+    fn answer(&mut self, at: Instant, reply: Vec<u8>) {
+        for byte in reply {
+            let before = self.inward.back().map_or(at, |(last, _)| at.max(*last));
+            self.inward.push_back((before + self.byte_time, byte));
+        }
+    }
+
+    /// Lets time pass until the next thing happens, or until a moment.
+    fn step(&mut self, until: Instant) {
+        let arrival = self.outward.front().map(|(at, _)| *at);
+        let deadline = self.peer.deadline();
+        let due = [arrival, deadline].into_iter().flatten().min().filter(|due| *due <= until);
+        self.now = self.now.max(due.unwrap_or(until));
+        let mut reply = Vec::new();
+        if arrival.is_some_and(|at| at <= self.now) {
+            let (at, byte) = self.outward.pop_front().expect("it has just been there");
+            self.peer.receive(at, &[byte], &mut reply);
+        } else if deadline.is_some_and(|at| at <= self.now) {
+            self.peer.poll(self.now, &mut reply);
+        }
+        self.answer(self.now, reply);
+    }
+}
+
+impl Line for Uart {
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        for &byte in bytes {
+            let before = self.outward.back().map_or(self.now, |(last, _)| self.now.max(*last));
+            self.outward.push_back((before + self.byte_time, byte));
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
+        loop {
+            let came = self.inward.front().map(|(at, _)| *at);
+            if let Some(at) = came.filter(|at| *at <= until) {
+                while self.now < at {
+                    self.step(at);
+                }
+                let (_, byte) = self.inward.pop_front().expect("it has just been there");
+                return Ok(vec![byte]);
+            }
+            if self.now >= until {
+                return Ok(Vec::new());
+            }
+            self.step(until);
+        }
+    }
+}
+
+#[test]
+fn a_slow_line_fails_nothing_and_skips_what_it_cannot_carry_in_time() {
+    let too_long: &[&str] = &[
+        "payloads_of_every_length_are_taken",
+        "what_no_data_segment_can_hold_is_refused",
+        "a_reply_may_have_128_bytes",
+    ];
+    let lines = [
+        (Profile::Spec, 9_600, too_long),
+        (Profile::Spec, 57_600, &[]),
+        (Profile::Mcsdk54, 9_600, &[]),
+    ];
+    for (profile, baud, skipped) in lines {
+        let byte_time = Duration(10_000_000 / baud);
+        let peer = Peer::new(profile, &MotorConfig::demo(), Deviation::default());
+        let (outward, inward) = Default::default();
+        let uart = Uart { peer, byte_time, now: Instant(0), outward, inward };
+        let allowed = vec![Need::Spin];
+        let options = Options { profile, motor: Motor::FIRST, allowed, byte_time };
+        let mut bench = Bench::new(Box::new(uart), Box::new(()), options);
+        let report = run(&st::suite(profile), &mut bench, |_| {});
+        assert!(report.is_clean(), "{baud}: {:#?}", report.failed().collect::<Vec<_>>());
+        let slow = report.outcomes.iter().filter(
+            |outcome| matches!(&outcome.verdict, Verdict::Skipped(why) if why.contains("25 ms")),
+        );
+        let slow: Vec<&str> = slow.map(|outcome| &*outcome.name).collect();
+        assert_eq!(slow, skipped, "{profile:?} {baud}");
+    }
+}

@@ -1,0 +1,240 @@
+//! Drives that do what the document says pass, and are left as they were found.
+
+use std::collections::BTreeSet;
+
+use motorlink_conformance::st::may_start;
+use motorlink_conformance::{Need, Report, Verdict};
+use motorlink_proto::stmcp::Profile;
+use motorlink_sim::st::{BuildConfig, MotorConfig};
+
+use crate::peer::{ALL, Deviation, Peer, Wire, dump, test, wire};
+
+const PROFILES: [Profile; 2] = [Profile::Spec, Profile::Mcsdk54];
+
+/// Reads differently after the motor has turned: physical things.
+const PHYSICAL: [&str; 4] = ["HEATS_TEMP", "CURRENT_POSITION", "TARGET_POSITION", "MOVE_DURATION"];
+
+fn drive(profile: Profile, motors: &[MotorConfig]) -> Wire {
+    wire(Peer::new(profile, motors, Deviation::default()))
+}
+
+/// Builds with every feature, with none, and what lies between.
+fn builds() -> Vec<Vec<MotorConfig>> {
+    let bare = BuildConfig {
+        observer_pll: false,
+        observer_cordic: false,
+        position_sensor: true,
+        flux_weakening: false,
+        feed_forward: false,
+        pfc: false,
+        dac: false,
+        position_control: false,
+    };
+    let full = BuildConfig { observer_cordic: true, ..BuildConfig::default() };
+    let mains = MotorConfig::default();
+    vec![
+        MotorConfig::demo().to_vec(),
+        vec![MotorConfig { build: full, ..mains }],
+        vec![MotorConfig { build: bare, ..MotorConfig::servo() }],
+        vec![MotorConfig::servo(); 7],
+    ]
+}
+
+/// A whole frame, for any motor, of a command that starts something.
+fn is_start(bytes: &[u8]) -> bool {
+    let [header, 1, command, check] = *bytes else { return false };
+    let starts = [0x01, 0x06, 0x08, 0x0A, 0x0D].contains(&command);
+    let sum = u16::from(header) + 1 + u16::from(command);
+    header & 0x1F == 0x03 && starts && check == (sum >> 8) as u8 + (sum as u8)
+}
+
+#[test]
+fn what_may_start_a_motor_is_known() {
+    assert!(may_start(&[0x23, 0x01, 0x01, 0x25]) && is_start(&[0x23, 0x01, 0x01, 0x25]));
+    assert!(may_start(&[0x23, 0x01, 0x06, 0x00]), "a drive may not look at the checksum");
+    assert!(may_start(&[0x02, 0x03, 0x01, 0x01, 0x05]), "in the middle, motor 0");
+    assert!(may_start(&[0x03, 0x02, 0x0D, 0xEE, 0x00]), "with a byte too many");
+    assert!(!may_start(&[0x23, 0x01, 0x02, 0x26]), "STOP_MOTOR");
+    assert!(!may_start(&[0x22, 0x01, 0x01, 0x24]), "GET_REG FLAGS");
+    assert!(!may_start(&[0x03, 0x00, 0x03]) && !may_start(&[0x03]) && !may_start(&[]));
+}
+
+/// What went wrong, for whoever reads the failed test.
+fn not_clean(report: &Report) -> String {
+    let bad = report
+        .outcomes
+        .iter()
+        .filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_) | Verdict::NotRun(_)));
+    let text = |outcome: &motorlink_conformance::Outcome| {
+        let transcript = outcome.transcript.join("\n");
+        format!("{}: {:#?}\n{transcript}\n", outcome.name, outcome.verdict)
+    };
+    bad.take(5).map(text).collect()
+}
+
+/// Skipped cases by their reason, subjects left out.
+fn reasons(report: &Report) -> BTreeSet<(String, String)> {
+    let reason = |outcome: &motorlink_conformance::Outcome| match &outcome.verdict {
+        Verdict::Skipped(why) => {
+            let name = outcome.name.split('[').next().unwrap_or_default();
+            Some((name.to_owned(), why.clone()))
+        }
+        _ => None,
+    };
+    report.outcomes.iter().filter_map(reason).collect()
+}
+
+#[test]
+fn every_build_passes_in_both_profiles_and_is_left_as_it_was() {
+    for profile in PROFILES {
+        for motors in builds() {
+            for motor in [1, motors.len() as u8] {
+                let wire = drive(profile, &motors);
+                let before = dump(&wire, motor);
+                let report = test(&wire, motor, &ALL);
+                assert!(report.is_clean(), "{profile:?}, motor {motor}\n{}", not_clean(&report));
+                let after = dump(&wire, motor);
+                for (before, after) in before.iter().zip(&after) {
+                    let physical = PHYSICAL.contains(&&*before.0);
+                    assert!(physical || before == after, "{before:02x?} was left as {after:02x?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_skipped_is_what_the_drive_cannot_show() {
+    let registers = [
+        "a_register_is_read_in_its_size",
+        "a_register_takes_a_value_and_gives_it_back",
+        "a_longer_value_is_cut_to_its_low_bytes",
+        "a_shorter_value_keeps_the_other_bytes",
+    ];
+    let cordic = "not built in: state observer with CORDIC".to_owned();
+    let wanted: BTreeSet<_> =
+        registers.into_iter().map(|name| (name.to_owned(), cordic.clone())).collect();
+    let report = test(&drive(Profile::Spec, &MotorConfig::demo()), 1, &ALL);
+    assert_eq!(reasons(&report), wanted);
+
+    // Between them the two motors have every feature but those that no simulated drive has.
+    for profile in PROFILES {
+        let run = |motor| reasons(&test(&drive(profile, &MotorConfig::demo()), motor, &ALL));
+        let both = &run(1) & &run(2);
+        let reasons: BTreeSet<&str> = both.iter().map(|(_, why)| &**why).collect();
+        let wanted: &[&str] = match profile {
+            Profile::Spec => &[],
+            Profile::Mcsdk54 => {
+                &["not built in: high-frequency injection", "not built in: motor profiler"]
+            }
+        };
+        assert_eq!(reasons.into_iter().collect::<Vec<_>>(), wanted, "{profile:?}");
+    }
+}
+
+#[test]
+fn without_leave_the_motor_never_moves_and_nothing_that_could_start_it_is_sent() {
+    for profile in PROFILES {
+        for motors in builds() {
+            let wire = drive(profile, &motors);
+            let before = dump(&wire, 1);
+            let report = test(&wire, 1, &[]);
+            assert!(report.is_clean(), "{}", not_clean(&report));
+            assert!(report.count("passed") > 200, "{}", report.count("passed"));
+            for outcome in &report.outcomes {
+                let skipped = matches!(&outcome.verdict, Verdict::Skipped(why)
+                    if why == Need::Spin.unmet() || why == Need::Fault.unmet()
+                        || why == Need::PowerCycle.unmet() || why.starts_with("not built in")
+                        || why.starts_with("built in") || why.starts_with("the drive has"));
+                assert!(skipped || outcome.verdict == Verdict::Passed, "{outcome:?}");
+            }
+            {
+                let peer = &wire.borrow().station;
+                assert_eq!(peer.fastest, 0.0, "the motor turned");
+                // The stream as a whole, as a drive that has lost step would see it.
+                let heard = &peer.heard;
+                assert!(!heard.is_empty());
+                assert!(!heard.windows(4).any(is_start), "a START was on the line");
+            }
+            assert_eq!(dump(&wire, 1), before);
+        }
+    }
+}
+
+#[test]
+fn cases_that_need_leave_say_so() {
+    let report = test(&drive(Profile::Spec, &MotorConfig::demo()), 1, &[]);
+    let mut asked: Vec<&str> = Vec::new();
+    for outcome in &report.outcomes {
+        if let Verdict::Skipped(why) = &outcome.verdict
+            && !why.starts_with("not built in")
+            && !asked.contains(&&**why)
+        {
+            asked.push(why);
+        }
+    }
+    asked.sort_unstable();
+    let mut wanted = [Need::Spin, Need::PowerCycle, Need::Fault].map(Need::unmet);
+    wanted.sort_unstable();
+    assert_eq!(asked, wanted);
+}
+
+#[test]
+fn a_motor_that_is_not_at_rest_is_not_tested() {
+    let wire = drive(Profile::Spec, &MotorConfig::demo());
+    {
+        let peer = &mut wire.borrow_mut().station;
+        let start = crate::peer::frame(0x23, &[1]);
+        peer.station.receive(motorlink_proto::time::Instant(0), &start, |_| {});
+    }
+    let report = test(&wire, 1, &ALL);
+    assert_eq!(report.count("not run"), report.outcomes.len());
+    let Verdict::NotRun(why) = &report.outcomes[0].verdict else { unreachable!() };
+    assert!(why.starts_with("the motor is not at rest: STATUS is "), "{why}");
+}
+
+#[test]
+fn a_motor_that_the_drive_lacks_is_told() {
+    let report = test(&drive(Profile::Spec, &MotorConfig::demo()), 3, &ALL);
+    assert_eq!(report.count("not run"), report.outcomes.len());
+    let Verdict::NotRun(why) = &report.outcomes[0].verdict else { unreachable!() };
+    assert_eq!(why, "the drive has no motor 3");
+}
+
+#[test]
+fn a_drive_that_does_not_answer_is_given_up() {
+    let mute = Deviation {
+        before: Some(Box::new(|_, _, bytes| {
+            bytes.clear();
+            None
+        })),
+        ..Deviation::default()
+    };
+    let wire = wire(Peer::new(Profile::Spec, &MotorConfig::demo(), mute));
+    let report = test(&wire, 1, &ALL);
+    assert_eq!(report.count("not run"), report.outcomes.len());
+    let Verdict::NotRun(why) = &report.outcomes[0].verdict else { unreachable!() };
+    assert!(why.starts_with("nothing answers"), "{why}");
+}
+
+#[test]
+fn what_a_case_wrote_is_put_back_after_a_line_that_was_bad_for_a_while() {
+    // Every 41st command is lost: cases fail in their middle, and the drive is as it was all the same.
+    let mut count = 0;
+    let lossy = Deviation {
+        before: Some(Box::new(move |_, _, bytes| {
+            count += 1;
+            if (500..2_500).contains(&count) && count % 41 == 0 {
+                bytes.clear();
+            }
+            None
+        })),
+        ..Deviation::default()
+    };
+    let wire = wire(Peer::new(Profile::Spec, &MotorConfig::demo(), lossy));
+    let before = dump(&wire, 1);
+    let report = test(&wire, 1, &[]);
+    assert!(report.failed().count() > 10, "{}", report.failed().count());
+    assert_eq!(report.count("not run"), 0);
+    assert_eq!(dump(&wire, 1), before);
+}
