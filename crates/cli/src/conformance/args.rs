@@ -46,6 +46,9 @@ pub enum Command {
         port: Port,
         #[command(flatten)]
         run: Run,
+        /// Allow cases that write the motor's ROM, which wears
+        #[arg(long)]
+        write_rom: bool,
         /// The motor's ID, 1 to 32
         #[arg(short, long, default_value = "1", value_parser = parse_id)]
         id: MotorId,
@@ -80,9 +83,6 @@ pub struct Run {
     /// Allow cases that turn the motor
     #[arg(long)]
     pub spin: bool,
-    /// Allow cases that write the drive's ROM, which wears
-    #[arg(long)]
-    pub write_rom: bool,
     /// A shell command that cycles the drive's power and returns when the drive is back
     #[arg(long, value_name = "COMMAND")]
     pub power_cycle: Option<String>,

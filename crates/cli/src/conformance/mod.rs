@@ -36,9 +36,11 @@ pub fn run(args: Args) -> Result<(), Failure> {
             interrupt::take_over();
             conduct("st", &run, st::suite(profile), bench)
         }
-        Command::Rmd { port, run, id, encoder } => {
+        Command::Rmd { port, run, write_rom, id, encoder } => {
             let link = port.name()?.open_can()?;
-            let options = rmd::Options { id, encoder, allowed: run.allowed() };
+            let mut allowed = run.allowed();
+            allowed.extend(write_rom.then_some(Need::Rom));
+            let options = rmd::Options { id, encoder, allowed };
             let world = Box::new(Commands::new(&run));
             let bench = rmd::Bench::new(Box::new(Real::new(link)), world, options);
             interrupt::take_over();
@@ -141,7 +143,6 @@ impl Run {
     fn allowed(&self) -> Vec<Need> {
         let allowed = [
             (self.spin, Need::Spin),
-            (self.write_rom, Need::Rom),
             (self.power_cycle.is_some(), Need::PowerCycle),
             (self.fault_on.is_some(), Need::Fault),
         ];

@@ -112,12 +112,11 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
     counted("all", total)
 }
 
-/// The numbers of a paragraph, so that 4.10 comes behind 4.9. Where there are none, as in the codes
-/// of commands, the order is that of the text.
-fn place(paragraph: &str) -> (Vec<u32>, &str) {
-    let numbers = paragraph.rsplit('-').next().unwrap_or_default().split('.');
-    let numbers: Option<Vec<u32>> = numbers.map(|number| number.parse().ok()).collect();
-    (numbers.unwrap_or_default(), paragraph)
+/// The numbers of a paragraph, so that 4.10 comes behind 4.9. Read as hexadecimal, which keeps that
+/// order and puts chapters before commands.
+fn place(paragraph: &str) -> Option<Vec<u32>> {
+    let (_, numbers) = paragraph.rsplit_once('-')?;
+    numbers.split('.').map(|number| u32::from_str_radix(number, 16).ok()).collect()
 }
 
 fn counted(name: &str, [passed, failed, skipped, not_run]: [usize; 4]) -> Result<(), Failure> {
