@@ -6,7 +6,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use motorlink::stmcp::{Event, Reason, Relay, RelayError, RelayOptions};
+use motorlink::stmcp::{Client, Event, Options, Reason, Relay, RelayError, RelayOptions, Status};
 use served::Served;
 
 const START: [u8; 4] = [0x23, 0x01, 0x01, 0x25];
@@ -82,6 +82,22 @@ fn the_motor_is_stopped_when_the_relay_ends() {
     let _client = start(&mut relay, &address);
     let last = relay.end();
     assert!(last.iter().any(|event| has_stopped(event, Reason::Ending)), "{last:?}");
+}
+
+#[test]
+fn the_motor_is_stopped_when_the_relay_is_dropped_in_a_panic() {
+    let drives = Served::new("relay-panics");
+    let (mut relay, address) = relay(&drives, RelayOptions::default());
+    let _client = start(&mut relay, &address);
+    let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(move || {
+        let _relay = relay;
+        panic!("as programs do");
+    }));
+    assert!(panicked.is_err());
+    let client = Client::open(&drives.st.parse().expect("a port"), Options::default());
+    let client = client.expect("the relay has let go of the port");
+    let status = client.motor(1).and_then(|motor| motor.status()).expect("an answer");
+    assert!(matches!(status, Status::AnyStop | Status::Stop | Status::StopIdle | Status::Idle));
 }
 
 #[test]

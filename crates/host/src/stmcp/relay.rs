@@ -120,8 +120,8 @@ pub enum RelayError {
 /// Serves a drive's line to one client at a time, unchanged in both directions and without a thread,
 /// and stops the motors that a client started when it is gone.
 ///
-/// Whoever owns it calls [`turn`](Self::turn) again and again, and [`end`](Self::end) at last: dropping
-/// it stops nothing. A client is gone when it has closed the pty or the connection, which the kernel
+/// Whoever owns it calls [`turn`](Self::turn) again and again, and [`end`](Self::end) at last; where it
+/// is dropped instead, a panic included, motors are stopped all the same. A client is gone when it has closed the pty or the connection, which the kernel
 /// does for a process that is killed.
 pub struct Relay {
     server: Server,
@@ -227,11 +227,16 @@ impl Relay {
 
     /// Stops the motors that the client started; gives what happened. The served ports end.
     pub fn end(mut self) -> Vec<Event> {
+        self.stop_for_good();
+        self.shared.borrow_mut().events.drain(..).collect()
+    }
+
+    fn stop_for_good(&mut self) {
         if !self.shared.borrow().follower.started().is_empty() {
             self.has_complained = false;
             self.stop(Reason::Ending);
+            self.shared.borrow_mut().follower = Follower::default();
         }
-        self.shared.borrow_mut().events.drain(..).collect()
     }
 
     fn wait(&self, most: Duration) -> Duration {
@@ -301,6 +306,12 @@ impl Relay {
         }
         self.has_complained = has_failed;
         self.retry_at = if has_failed { self.server.now() + RETRY.into() } else { Instant(0) };
+    }
+}
+
+impl Drop for Relay {
+    fn drop(&mut self) {
+        self.stop_for_good();
     }
 }
 
