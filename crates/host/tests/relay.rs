@@ -65,6 +65,23 @@ fn the_motor_is_stopped_when_its_client_leaves() {
     assert!(relay.end().is_empty(), "nothing is left to stop");
 }
 
+/// Until something tells which motor is the current one, number 0 may be any of seven.
+#[test]
+fn motors_that_the_drive_lacks_keep_nobody_out() {
+    let drives = Served::new("relay-lacks");
+    let (mut relay, address) = relay(&drives, RelayOptions::default());
+    let mut client = TcpStream::connect(&address).expect("connected");
+    client.write_all(&[0x03, 0x01, 0x01, 0x05]).expect("written");
+    turn_until(&mut relay, |event| matches!(event, Event::Came { .. }));
+    drop(client);
+    let events = turn_until(&mut relay, |event| matches!(event, Event::Stopped { .. }));
+    let Some(Event::Stopped { motors, .. }) = events.last() else { unreachable!() };
+    assert!(motors.iter().all(|halt| halt.is_stopped()), "{motors:?}");
+    drop(start(&mut relay, &address));
+    turn_until(&mut relay, |event| has_stopped(event, Reason::ClientGone));
+    assert!(relay.end().is_empty(), "nothing is left to stop");
+}
+
 #[test]
 fn the_motor_is_stopped_when_its_client_is_silent() {
     let drives = Served::new("relay-silent");

@@ -242,6 +242,11 @@ impl Client {
         Ok(written?)
     }
 
+    /// The drive has no such motor, which may have been taken for started.
+    pub(super) fn is_missing(&self, motor: Motor) {
+        self.lock().started.is_missing(motor);
+    }
+
     /// Takes the line over from another master, which started these motors. `unanswered` is what it
     /// sent last, if the reply to that may still come.
     pub(super) fn take_over(&self, started: Started, unanswered: Option<&[u8]>) {

@@ -81,7 +81,11 @@ impl Follower {
             self.reply.push(byte);
             match Frame::parse(&self.reply) {
                 Parse::More => {}
-                Parse::Frame(Frame { header: HEADER_ATR, .. }, _) => self.reply.clear(),
+                Parse::Frame(Frame { header: HEADER_ATR, .. }, _) => {
+                    self.reply.clear();
+                    // The drive has just been reset.
+                    self.started.forget_current();
+                }
                 Parse::Frame(Frame { header, payload }, _) => {
                     let (header, code) = (header, payload.first().copied().map(ErrorCode::from));
                     self.conclude(header, code);
@@ -241,6 +245,20 @@ mod tests {
             assert_eq!(motors(&follower), [1], "{sent:02x?} {heard:02x?}");
             assert!(follower.unanswered().is_some());
         }
+    }
+
+    #[test]
+    fn a_drive_that_was_reset_has_another_current_motor() {
+        let mut follower = Follower::default();
+        let question = frame(2, &Request::GetRegister(RegisterId::STATUS));
+        follower.sent(&question);
+        follower.heard(&[0xF0, 0x01, 0x00, 0xF1]);
+        follower.sent(&command(0, Command::StartMotor));
+        assert_eq!(motors(&follower), [2]);
+        follower.heard(&[HEADER_ATR, 0x00, HEADER_ATR]);
+        follower.heard(&ACK);
+        follower.sent(&command(0, Command::StartMotor));
+        assert_eq!(motors(&follower).len(), 7);
     }
 
     #[test]

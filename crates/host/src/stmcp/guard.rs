@@ -49,7 +49,10 @@ impl<'a> Guard<'a> {
     fn stop(&self, motor: Motor) -> Result<(), Error> {
         match self.client.motor(motor.number())?.stop() {
             // What is not there does not turn.
-            Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) => Ok(()),
+            Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) => {
+                self.client.is_missing(motor);
+                Ok(())
+            }
             result => result,
         }
     }

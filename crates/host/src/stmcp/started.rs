@@ -23,7 +23,8 @@ impl Started {
             self.presume(motor);
         }
         // Unless the drive acknowledges, its current motor may have changed or not.
-        Motor::new(motor).or(self.current.take())
+        let current = self.current.take();
+        Motor::new(motor).or(current)
     }
 
     /// The request that was [`asked`](Self::asked) last was acknowledged.
@@ -41,6 +42,11 @@ impl Started {
     /// Takes motor number `motor` for started.
     pub(super) fn presume(&mut self, motor: u8) {
         self.motors |= Motor::new(motor).or(self.current).map_or(ALL, bit);
+    }
+
+    /// The drive has no such motor.
+    pub(super) fn is_missing(&mut self, motor: Motor) {
+        self.motors &= !bit(motor);
     }
 
     /// Says that the drive's current motor is not known.
