@@ -3,8 +3,10 @@
 use std::collections::BTreeSet;
 
 use motorlink_conformance::st::may_start;
+use motorlink_conformance::wire::Line;
 use motorlink_conformance::{Need, Report, Verdict};
 use motorlink_proto::stmcp::Profile;
+use motorlink_proto::time::Duration;
 use motorlink_sim::st::{BuildConfig, MotorConfig};
 
 use crate::peer::{ALL, Deviation, Peer, Wire, dump, test, wire};
@@ -237,4 +239,64 @@ fn what_a_case_wrote_is_put_back_after_a_line_that_was_bad_for_a_while() {
     assert!(report.failed().count() > 10, "{}", report.failed().count());
     assert_eq!(report.count("not run"), 0);
     assert_eq!(dump(&wire, 1), before);
+}
+
+/// A drive that goes wrong `after` so many replies, the first of them that to START_MOTOR.
+fn wrong_behind_a_start(after: u32, reply: impl Fn(u32, &mut Vec<u8>) + 'static) -> Wire {
+    let mut since: Option<u32> = None;
+    let deviation = Deviation {
+        after: Some(Box::new(move |request, bytes| {
+            if request == [0x23, 0x01, 0x01, 0x25] {
+                since.get_or_insert(0);
+            }
+            if let Some(count) = &mut since {
+                *count += 1;
+                if let Some(late) = count.checked_sub(after) {
+                    reply(late, bytes);
+                }
+            }
+        })),
+        ..Deviation::default()
+    };
+    wire(Peer::new(Profile::Spec, &MotorConfig::demo(), deviation))
+}
+
+/// Whether motor 1 is at rest a minute later.
+fn rests(wire: &Wire) -> bool {
+    let later = wire.borrow().now() + Duration::from_millis(60_000);
+    let _ = wire.borrow_mut().receive(later).expect("a virtual line does not fail");
+    let peer = &mut wire.borrow_mut().station;
+    peer.station.advance_to(later);
+    let motors = peer.station.drive().motors();
+    motors.iter().all(|motor| motor.truth().speed_rpm.abs() < 1.0)
+}
+
+#[test]
+fn a_motor_is_stopped_although_the_drive_says_nothing_any_more() {
+    for after in [1, 2, 3, 10] {
+        let wire = wrong_behind_a_start(after, |_, reply| reply.clear());
+        let report = test(&wire, 1, &ALL);
+        assert!(report.count("not run") > 0, "it was lost");
+        assert!(wire.borrow().station.fastest > 0.0, "it turned");
+        assert!(rests(&wire), "after {after} replies");
+    }
+}
+
+#[test]
+fn a_motor_is_stopped_and_the_run_goes_on_when_replies_are_lost() {
+    // The first in the case, the second while the case is undone: behind the question that brings the
+    // line in step are STATUS, STOP_MOTOR and STATUS again.
+    for second in 1..=5 {
+        let lost = move |late, reply: &mut Vec<u8>| {
+            if late == 0 || late == second {
+                reply.clear();
+            }
+        };
+        let wire = wrong_behind_a_start(50, lost);
+        let report = test(&wire, 1, &ALL);
+        assert!(wire.borrow().station.fastest > 0.0, "it turned");
+        assert_eq!(report.count("not run"), 0, "reply {second}: {}", report.lost());
+        assert!(report.failed().count() <= 2, "reply {second}: {}", not_clean(&report));
+        assert!(rests(&wire), "reply {second}");
+    }
 }
