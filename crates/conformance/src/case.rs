@@ -1,6 +1,7 @@
 //! Cases: what is done to a drive and what must come of it.
 
 use std::borrow::Cow;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use motorlink::port::PortError;
 
@@ -137,7 +138,12 @@ fn conduct<B: Subject>(case: &Case<B>, bench: &mut B, dead: &mut Option<String>)
     // What cannot be begun with has nothing to be restored.
     let (outcome, restored) = match begun {
         Err(stop @ (Stop::Port(_) | Stop::Lost(_))) => (Err(stop), Ok(())),
-        begun => (begun.and_then(|()| (case.run)(bench)), bench.restore()),
+        begun => {
+            // A fault of this kit must not leave a motor turning.
+            let ran = catch_unwind(AssertUnwindSafe(|| begun.and_then(|()| (case.run)(bench))));
+            let restored = bench.restore();
+            (ran.unwrap_or_else(|panic| resume_unwind(panic)), restored)
+        }
     };
     for result in [&outcome, &restored] {
         if let Err(stop @ (Stop::Port(_) | Stop::Lost(_))) = result {
@@ -265,6 +271,14 @@ mod tests {
         let mut told = Told { begin: Some(lost()), ..Told::default() };
         verdicts(&mut told, || Ok(()));
         assert_eq!(told.restored, 0, "nothing was done");
+    }
+
+    #[test]
+    fn what_a_case_did_is_undone_when_it_panics() {
+        let mut told = Told::default();
+        let run = || verdicts(&mut told, || panic!("a fault of the case"));
+        assert!(catch_unwind(AssertUnwindSafe(run)).is_err());
+        assert_eq!(told.restored, 1);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A motor on a CAN bus: what is said to it and what it says.
 
 use motorlink_proto::rmd::{
-    CanFrame, Code, Command, Dialect, Direction, EncoderBits, MotorId, Payload,
+    CanFrame, Code, Command, Dialect, Direction, EncoderBits, MotorId, Off, Payload,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -212,6 +212,19 @@ impl Bench {
             self.transcript.push((Direction::HostToDrive, *frame));
             self.sent.push(*frame);
             self.bus.send(frame)?;
+        }
+        Ok(())
+    }
+
+    /// Switches motors off that may hear although they do not answer, or others talk.
+    pub(super) fn off_unheard(
+        &mut self,
+        motors: impl IntoIterator<Item = MotorId>,
+    ) -> Result<(), Stop> {
+        for motor in motors {
+            let off = CanFrame::new(motor.can_id(), Off.encode());
+            self.transcript.push((Direction::HostToDrive, off));
+            self.bus.send(&off)?;
         }
         Ok(())
     }

@@ -154,7 +154,8 @@ impl Bench {
     pub(super) fn put_back(&mut self) -> Result<(), Stop> {
         let kept = std::mem::take(&mut self.kept);
         if self.foreign.is_some() {
-            return Ok(());
+            let own = kept.moved.then(|| self.id());
+            return self.off_unheard(own.into_iter().chain(kept.others));
         }
         let off = if kept.moved { self.switch_off() } else { Ok(()) };
         let others = self.switch_others_off(kept.others);
@@ -174,6 +175,9 @@ impl Bench {
                 told = self.ask(Off.encode());
             }
         }
+        if told.is_err() {
+            self.off_unheard([self.id()])?;
+        }
         if self.comes_to_rest()?.is_err() {
             let failed = self.failed("a motor at rest within 10 s of 0x80");
             self.runaway = true;
@@ -188,7 +192,11 @@ impl Bench {
             return Ok(());
         }
         let off = motors.map(|motor| CanFrame::new(motor.can_id(), Off.encode()));
-        self.collect(&off.collect::<Vec<_>>()).map(|_| ())
+        let told = self.collect(&off.collect::<Vec<_>>());
+        if told.is_err() {
+            self.off_unheard(motors)?;
+        }
+        told.map(|_| ())
     }
 
     fn end_fault(&mut self) -> Result<(), Stop> {

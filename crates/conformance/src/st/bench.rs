@@ -137,7 +137,8 @@ impl Bench {
         if !self.restoring && self.world.interrupted() {
             return Err(Stop::Lost("interrupted".to_owned()));
         }
-        if safety::may_start(bytes) {
+        // A command may be sent in parts.
+        if safety::may_start(&[&self.sent, bytes].concat()) {
             if !self.may_spin() {
                 return Err(Stop::Skipped(Need::Spin.unmet().to_owned()));
             }

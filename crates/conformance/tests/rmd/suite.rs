@@ -2,11 +2,11 @@
 
 use motorlink_conformance::rmd::suite;
 use motorlink_conformance::{Report, Verdict};
-use motorlink_proto::rmd::{Errors, Mode, Settings};
+use motorlink_proto::rmd::{CanFrame, Errors, Mode, Settings};
 use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::RmdConfig;
 
-use crate::drive::{Setup, Tested, motor};
+use crate::drive::{Behaviour, Event, Setup, Tested, motor};
 
 /// Names of the cases that ended so.
 fn names(report: &Report, verdict: &str) -> Vec<String> {
@@ -28,6 +28,42 @@ fn an_interrupted_run_leaves_the_motor_off_and_as_it_was() {
     assert!(tested.station(|station| station.fastest > 40.0));
     assert_eq!((tested.report.count("not run"), tested.report.lost()), (2, "interrupted"));
     assert_eq!(settings(&tested), settings(&before));
+}
+
+/// What a bus does once the motor turns.
+type Wrong = fn(&CanFrame, Vec<CanFrame>) -> Vec<CanFrame>;
+
+#[test]
+fn a_motor_that_turns_is_switched_off_whatever_is_heard_on_its_bus() {
+    let cases: [(&str, Wrong); 3] = [
+        ("nothing", |_, _| Vec::new()),
+        ("a motor of another protocol", |frame, replies| {
+            let foreign = u16::try_from(frame.id() + 0x100).expect("0x241");
+            [replies, vec![CanFrame::new(foreign, [0; 8])]].concat()
+        }),
+        ("frames without end", |_, replies| {
+            [replies, vec![CanFrame::new(0x7FF, [0; 8]); 2_000]].concat()
+        }),
+    ];
+    for (what, wrong) in cases {
+        let mut turns = false;
+        let behaviour: Behaviour = Box::new(move |motors, event| {
+            let frame = if let Event::Frame(frame) = &event { Some(**frame) } else { None };
+            let replies = motors.pass(event);
+            turns |= motors.first().motor().truth().speed_dps.abs() > 20.0;
+            match frame {
+                Some(frame) if turns => wrong(&frame, replies),
+                _ => replies,
+            }
+        });
+        let mut suite = suite();
+        suite.retain(|case| case.name == "a_speed_is_reached_either_way");
+        let tested = Setup { suite, behaviour, ..Setup::new(vec![motor(1)]) }.run();
+        assert!(tested.station(|station| station.fastest > 20.0), "{what}: it turned");
+        assert!(!tested.report.is_clean(), "{what}");
+        let mode = tested.station(|station| station.motors.first().motor().truth().mode);
+        assert_eq!(mode, Mode::Off, "{what}");
+    }
 }
 
 fn passes(tested: &Tested) {
