@@ -28,6 +28,8 @@ const REST: u16 = 5;
 const CURRENTLESS: u16 = 31;
 /// A motor that has become faster by this (°/s) does not come to rest.
 const FASTER: u16 = 30;
+/// How often something is tried that puts back what was found.
+const ATTEMPTS: u32 = 3;
 /// How long a motor may take to come to rest, ms.
 const COASTING: u64 = 10_000;
 /// How long a motor may take until it answers when its power came back, ms.
@@ -159,22 +161,30 @@ impl Bench {
         }
         let off = if kept.moved { self.switch_off() } else { Ok(()) };
         let others = self.switch_others_off(kept.others);
-        let fault = if kept.fault { self.end_fault() } else { Ok(()) };
-        let rom = self.put_back_rom(&kept);
-        let gains = kept.gains.map_or(Ok(()), |gains| self.put_back_gains(gains));
-        let acceleration = kept.acceleration.map_or(Ok(()), |a| self.put_back_acceleration(a));
+        let fault = if kept.fault { self.insist(Self::end_fault) } else { Ok(()) };
+        let rom = self.insist(|bench| bench.put_back_rom(&kept));
+        let gains = kept.gains.map_or(Ok(()), |gains| self.insist(|b| b.put_back_gains(gains)));
+        let acceleration = kept
+            .acceleration
+            .map_or(Ok(()), |limit| self.insist(|b| b.put_back_acceleration(limit)));
         off.and(others).and(fault).and(rom).and(gains).and(acceleration)
+    }
+
+    /// Tries a few times: a bus that is bad now and then must not leave a motor changed.
+    fn insist(&mut self, act: impl Fn(&mut Self) -> Result<(), Stop>) -> Result<(), Stop> {
+        let mut done = act(self);
+        for _ in 1..ATTEMPTS {
+            if let Err(Stop::Failed(_)) = done {
+                done = act(self);
+            }
+        }
+        done
     }
 
     /// Off, and then a look whether it is. A motor that goes on is told to stop instead, and is not
     /// turned again.
     fn switch_off(&mut self) -> Result<(), Stop> {
-        let mut told = self.ask(Off.encode());
-        for _ in 0..2 {
-            if told.is_err() {
-                told = self.ask(Off.encode());
-            }
-        }
+        let told = self.insist(|bench| bench.ask(Off.encode()).map(|_| ()));
         if told.is_err() {
             self.off_unheard([self.id()])?;
         }
@@ -184,7 +194,7 @@ impl Bench {
             self.ask(Halt.encode())?;
             return Err(failed);
         }
-        told.map(|_| ())
+        told
     }
 
     fn switch_others_off(&mut self, motors: MotorSet) -> Result<(), Stop> {

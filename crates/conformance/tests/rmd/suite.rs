@@ -66,6 +66,21 @@ fn a_motor_that_turns_is_switched_off_whatever_is_heard_on_its_bus() {
     }
 }
 
+#[test]
+fn what_a_case_wrote_is_put_back_on_a_bus_that_loses_commands_now_and_then() {
+    let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
+    for every in [11, 13, 17] {
+        let mut count = 0;
+        let behaviour: Behaviour = Box::new(move |motors, event| {
+            count += u32::from(matches!(event, Event::Frame(_)));
+            if count % every == 0 { Vec::new() } else { motors.pass(event) }
+        });
+        let tested = Setup { behaviour, ..Setup::new(vec![motor(1)]) }.run();
+        assert!(tested.report.failed().count() > 5, "one in {every}");
+        assert_eq!(settings(&tested), settings(&before), "one in {every}");
+    }
+}
+
 fn passes(tested: &Tested) {
     for outcome in &tested.report.outcomes {
         let good = matches!(outcome.verdict, Verdict::Passed | Verdict::Skipped(_));
