@@ -6,6 +6,7 @@ use motorlink_proto::stmcp::{
 };
 
 use super::bench::Bench;
+use super::restore::Undo;
 use super::safety;
 use crate::case::{Case, Need, Stop};
 
@@ -139,6 +140,7 @@ fn pfc_enable(bench: &mut Bench) -> Result<(), Stop> {
         return bench.refused(&Request::Execute(Command::PfcEnable), ErrorCode::WrongCmd);
     }
     off_or_skip(bench)?;
+    bench.undo.push(Undo::Pfc);
     bench.execute(Command::PfcEnable)?;
     let enabled = bench.value(RegisterId::PFC_ENABLED)?;
     // Once more: it is started already, and nothing happens.

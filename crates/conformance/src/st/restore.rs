@@ -20,6 +20,8 @@ pub(super) enum Undo {
     Revup(u8, RevupPhase),
     /// A data segment that was empty.
     Segment(u8),
+    /// A PFC that was off.
+    Pfc,
     /// A fault condition that the world was asked to cause.
     Fault,
 }
@@ -254,6 +256,7 @@ impl Bench {
             Undo::Segment(segment) => {
                 self.done(&Request::ConfigDynStruct { segment, registers: &[] })
             }
+            Undo::Pfc => self.execute(Command::PfcDisable),
             Undo::Fault => Ok(()),
         }
     }

@@ -300,3 +300,27 @@ fn a_motor_is_stopped_and_the_run_goes_on_when_replies_are_lost() {
         assert!(rests(&wire), "reply {second}");
     }
 }
+
+#[test]
+fn a_pfc_that_a_case_enabled_is_disabled_although_the_case_stops_in_its_middle() {
+    let enable = [0x23, 0x01, 0x0A, 0x2E];
+    let mut sent = 0;
+    let deviation = Deviation {
+        // The case sends it twice; the reply to the second is lost.
+        after: Some(Box::new(move |request, reply| {
+            sent += u32::from(request == enable);
+            if request == enable && sent == 2 {
+                reply.clear();
+            }
+        })),
+        ..Deviation::default()
+    };
+    let wire = wire(Peer::new(Profile::Spec, &MotorConfig::demo(), deviation));
+    let before = dump(&wire, 1);
+    let report = test(&wire, 1, &[Need::Spin]);
+    assert!(report.failed().any(|outcome| outcome.name == "pfc_enable_needs_a_pfc"));
+    let enabled = |dump: &[(String, Vec<u8>)]| {
+        dump.iter().find(|(name, _)| name == "PFC_ENABLED").map(|(_, reply)| reply.clone())
+    };
+    assert_eq!(enabled(&dump(&wire, 1)), enabled(&before));
+}
