@@ -160,6 +160,17 @@ def test_a_host_that_says_nothing_has_failed(check):
     assert "0 values of 4" in case["received"]
 
 
+def test_a_host_that_only_complains_has_passed_nothing(check):
+    code, cases = check("st", "--limit", "2s", "--start", "false", "--", "false")
+    assert code == 1
+    assert failed(cases) == set(cases)
+
+
+def test_a_host_that_starts_the_motor_when_it_shall_read_has_failed(check, motorlink):
+    _, case = only(check, "sh", "-c", f"{motorlink} st start >/dev/null")
+    assert "sent START_MOTOR 1 times" in case["received"]
+
+
 def test_a_host_that_invents_a_value_has_failed(check):
     _, case = only(check, "echo", "42")
     assert "42, which no reply told it" in case["received"]

@@ -108,6 +108,9 @@ impl<S> Scenario<S> {
             Demand::Truth if count < wanted && !said.complained => {
                 Some(format!("the host said {count} values of {wanted} and nothing of an error"))
             }
+            _ if journal.sent().is_empty() => {
+                Some("the host sent nothing, so that nothing was tested".to_owned())
+            }
             _ => None,
         }
     }

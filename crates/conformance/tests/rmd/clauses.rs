@@ -1,8 +1,6 @@
 //! The clauses and what tests them belong together.
 
 use std::collections::HashSet;
-use std::fs;
-use std::path::Path;
 
 use motorlink_conformance::rmd::{CLAUSES, suite};
 
@@ -41,33 +39,5 @@ fn every_case_has_a_name_of_its_own_and_names_clauses_that_exist() {
             assert!(CLAUSES.iter().any(|clause| clause.id == *id), "{}: {id}", case.name);
         }
         assert!(names.insert(case.name.clone()), "{} is there twice", case.name);
-    }
-}
-
-#[test]
-fn every_test_of_a_host_exists() {
-    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let mut source = String::new();
-    for folder in ["crates", "tests/e2e"] {
-        read(&repository.join(folder), &mut source);
-    }
-    for clause in CLAUSES {
-        for name in clause.host {
-            let there =
-                ["fn", "def"].iter().any(|word| source.contains(&format!("{word} {name}(")));
-            assert!(there, "{}: no test `{name}`", clause.id);
-        }
-    }
-}
-
-/// Appends every Rust and Python file below a folder.
-fn read(folder: &Path, source: &mut String) {
-    for entry in fs::read_dir(folder).expect("a folder of this repository") {
-        let path = entry.expect("an entry").path();
-        if path.is_dir() {
-            read(&path, source);
-        } else if path.extension().is_some_and(|end| end == "rs" || end == "py") {
-            *source += &fs::read_to_string(&path).expect("a source file");
-        }
     }
 }
