@@ -30,6 +30,11 @@ pub trait Bus {
     fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError>;
 }
 
+/// Bytes as people write them: `02 01 1e 21`.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+}
+
 /// A port of this machine, with its clock.
 pub struct Real<L> {
     link: L,

@@ -12,7 +12,7 @@ use super::restore::Undo;
 use super::safety;
 use super::timing::RECEPTION;
 use crate::case::{Finding, Need, Stop};
-use crate::wire::Line;
+use crate::wire::{Line, hex};
 use crate::world::World;
 
 /// How a drive is tested.
@@ -389,9 +389,4 @@ pub(super) fn frame(header: u8, payload: &[u8]) -> Vec<u8> {
     let mut room = [0; MAX_FRAME];
     let bytes = Frame { header, payload }.encode(&mut room);
     bytes.expect("the kit's payloads have at most 128 bytes").to_vec()
-}
-
-/// Bytes as people write them: `02 01 1e 21`.
-pub(super) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
 }

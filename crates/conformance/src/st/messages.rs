@@ -6,9 +6,10 @@ use motorlink_proto::stmcp::{
     REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, Status, TorqueRamp,
 };
 
-use super::bench::{Bench, hex};
+use super::bench::Bench;
 use super::values::as_kept;
 use crate::case::{Case, Stop};
+use crate::wire::hex;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
     let mut cases = vec![

@@ -197,7 +197,7 @@ fn current_is(bench: &mut Bench, motor: u8) -> Result<(), Stop> {
     let reply = bench.exchange(&current_motor())?;
     let held = reply.header == HEADER_ACK && reply.payload == [motor - 1];
     let bytes = frame(HEADER_ACK, &[motor - 1]);
-    let bytes = super::bench::hex(&bytes);
+    let bytes = crate::wire::hex(&bytes);
     bench.require(held, format!("{bytes}  ACK {}: motor {motor} is the current one", motor - 1))
 }
 

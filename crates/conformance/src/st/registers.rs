@@ -5,11 +5,12 @@ use motorlink_proto::stmcp::{
     ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status,
 };
 
-use super::bench::{Bench, hex};
+use super::bench::Bench;
 use super::found::read_size;
 use super::restore::is_setpoint;
 use super::values;
 use crate::case::{Case, Stop};
+use crate::wire::hex;
 
 /// Ids for a DAC channel that no register of access D has.
 const NOT_FOR_DAC: [RegisterId; 2] = [RegisterId::STATUS, RegisterId(0xEE)];

@@ -6,8 +6,9 @@ use motorlink_proto::stmcp::{
 };
 use motorlink_proto::time::Duration;
 
-use super::bench::{Bench, PATIENCE, Reply, frame, hex};
+use super::bench::{Bench, PATIENCE, Reply, frame};
 use crate::case::{Need, Stop, Subject};
+use crate::wire::hex;
 
 /// Something that a case changes and that is put back after it.
 #[derive(Debug, Clone)]

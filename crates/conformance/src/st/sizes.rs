@@ -5,11 +5,12 @@ use motorlink_proto::stmcp::{
     ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status,
 };
 
-use super::bench::{Bench, hex};
+use super::bench::Bench;
 use super::found::read_size;
 use super::registers::writing;
 use super::values;
 use crate::case::{Case, Stop};
+use crate::wire::hex;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
     let mut cases: Vec<Case<Bench>> = Vec::new();

@@ -63,7 +63,7 @@ impl Started {
     }
 }
 
-/// Whether a request may set a motor turning.
+/// Whether a request may set a motor turning until it is stopped. An alignment ends by itself.
 pub(super) fn starts(request: &Request<'_>) -> bool {
     matches!(request, Request::Execute(Command::StartMotor | Command::StartStop | Command::ScStart))
 }

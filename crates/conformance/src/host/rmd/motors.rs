@@ -16,6 +16,7 @@ use motorlink_proto::units::{
 
 use crate::host::journal::{Exchange, Journal};
 use crate::host::script::{Outbox, Send};
+use crate::wire::hex;
 
 /// A scenario for an RMD host.
 pub type Scenario = crate::host::Scenario<Script>;
@@ -164,12 +165,11 @@ impl Inner {
 }
 
 fn show(frame: &CanFrame) -> String {
-    let data: Vec<String> = frame.data().iter().map(|byte| format!("{byte:02x}")).collect();
     let kind = match (frame.is_extended(), frame.is_remote()) {
         (true, true) => " extended remote",
         (true, false) => " extended",
         (false, true) => " remote",
         (false, false) => "",
     };
-    format!("{:03x}#{}{kind}", frame.id(), data.join(" "))
+    format!("{:03x}#{}{kind}", frame.id(), hex(frame.data()))
 }

@@ -12,6 +12,7 @@ use motorlink_proto::time::{Duration, Instant};
 
 use crate::host::journal::Journal;
 use crate::host::script::{Outbox, Send, share};
+use crate::wire::hex;
 
 /// A scenario for an ST host.
 pub type Scenario = crate::host::Scenario<Script>;
@@ -137,10 +138,6 @@ impl Inner {
     fn flush(&mut self, now: Instant, out: &mut Vec<u8>) {
         self.outbox.flush(now, |bytes| hex(bytes), |bytes| out.extend(bytes));
     }
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
 }
 
 /// What a drive has to know: how often it was asked and started.
