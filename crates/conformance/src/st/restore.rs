@@ -9,6 +9,7 @@ use motorlink_proto::time::Duration;
 use super::bench::{Bench, PATIENCE, Reply, frame};
 use crate::case::{Need, Stop, Subject};
 use crate::wire::hex;
+use crate::world::Unavailable;
 
 /// Something that a case changes and that is put back after it.
 #[derive(Debug, Clone)]
@@ -77,7 +78,9 @@ impl Subject for Bench {
         // What fails does not keep the rest from being put back.
         let mut outcome = Ok(());
         if faulted {
-            outcome = self.world.fault(false).map_err(Stop::from);
+            outcome = self.world.fault(false).map_err(|Unavailable(why)| {
+                self.failed(format!("the fault to be ended; end it by hand ({why})"))
+            });
         }
         let may_turn = self.moved || faulted;
         let mut rests = self.end_at_rest(may_turn);

@@ -214,7 +214,7 @@ mod tests {
             start.iter().for_each(|&byte| follower.sent(&[byte]));
             assert_eq!(motors(&follower), [4], "{before} bytes before");
         }
-        // The payload may be longer than the command (SPEC-NOTES S18).
+        // The payload may be longer than the command (SPEC-NOTES S35).
         let mut follower = Follower::default();
         let mut long = [0; MAX_FRAME];
         let payload = &[&[0x01][..], &[0x55; 127]].concat()[..];
