@@ -85,10 +85,10 @@ pub fn host(data: &[u8]) {
                 }
             }
             3 => bench.torque4(input.byte(), &input.array()),
-            4 | 5 => bench.host.receive(&any_frame(&mut input)),
+            4 | 5 => bench.host.receive(bench.now, &any_frame(&mut input)),
             6 => {
                 let data: [u8; 8] = input.array();
-                bench.host.receive(&CanFrame::new(id.can_id(), data));
+                bench.host.receive(bench.now, &CanFrame::new(id.can_id(), data));
             }
             7 => bench.now += Duration(u64::from(input.word()) * 4),
             8 => {

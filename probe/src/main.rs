@@ -147,7 +147,7 @@ fn rmd() {
         let frame = CanFrame::data_frame(unknown(), unknown(), black_box(&[0; 8]));
         black_box(drive.receive(now, &frame, &mut Plant));
         drive.poll(now, &mut Plant);
-        host.receive(&frame);
+        host.receive(now, &frame);
         let _ = black_box(host.request(now, id(unknown()), unknown()));
         let _ = black_box(host.torque4(now, Torque4::default(), black_box(MotorSet::TORQUE4)));
         host.cancel(now, id(unknown()));

@@ -144,7 +144,7 @@ impl Rig {
         self.now = at;
         let Rig { wire, motors, turnaround, .. } = self;
         match sender {
-            Sender::Motor => self.host.receive(&frame),
+            Sender::Motor => self.host.receive(self.now, &frame),
             Sender::Host => motors.receive(at, &frame, |frame| {
                 wire.queue(Transfer { sender: Sender::Motor, frame, at: at + *turnaround });
             }),

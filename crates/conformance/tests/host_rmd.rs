@@ -73,33 +73,45 @@ fn results(bus: &mut dyn Bus, task: Task) -> Result<Vec<Ended>, PortError> {
         let mut echoes = Vec::new();
         let pause = bus.now() + Duration::from_millis(1);
         hear(bus, &mut host, pause, &mut echoes)?;
-        let requests = requests(task, turn);
-        for &(id, data) in &requests {
-            while let Err(Refused::Quarantined { until, .. }) = host.request(bus.now(), id, data) {
+        let mut requests = requests(task, turn);
+        // Again for motors that were asked for their status instead.
+        loop {
+            for &(id, data) in &requests {
+                while let Err(Refused::Quarantined { until, .. }) =
+                    host.request(bus.now(), id, data)
+                {
+                    hear(bus, &mut host, until, &mut echoes)?;
+                }
+            }
+            while task == Task::Torque4
+                && let Err(Refused::Quarantined { until, .. }) =
+                    host.torque4(bus.now(), Torque4::default(), MotorSet::TORQUE4)
+            {
                 hear(bus, &mut host, until, &mut echoes)?;
             }
-        }
-        while task == Task::Torque4
-            && let Err(Refused::Quarantined { until, .. }) =
-                host.torque4(bus.now(), Torque4::default(), MotorSet::TORQUE4)
-        {
-            hear(bus, &mut host, until, &mut echoes)?;
-        }
-        loop {
-            match host.poll(bus.now()) {
-                Output::Transmit(frame) => {
-                    bus.send(&frame)?;
-                    if task == Task::Echoed {
-                        echoes.push(frame);
+            let mut again = MotorSet::EMPTY;
+            loop {
+                match host.poll(bus.now()) {
+                    Output::Transmit(frame) => {
+                        bus.send(&frame)?;
+                        if task == Task::Echoed {
+                            echoes.push(frame);
+                        }
+                    }
+                    Output::Wait(Some(until)) => hear(bus, &mut host, until, &mut echoes)?,
+                    Output::Wait(None) => break,
+                    Output::Done { id, result: Err(Error::Quarantined) } => again.insert(id),
+                    Output::Done { id, result } => {
+                        let code =
+                            requests.first().map_or(Code::Torque, |(_, data)| data[0].into());
+                        results.push((id, turn, result.map(|reply| digits(code, &reply))));
                     }
                 }
-                Output::Wait(Some(until)) => hear(bus, &mut host, until, &mut echoes)?,
-                Output::Wait(None) => break,
-                Output::Done { id, result } => {
-                    let code = requests.first().map_or(Code::Torque, |(_, data)| data[0].into());
-                    results.push((id, turn, result.map(|reply| digits(code, &reply))));
-                }
             }
+            if again.is_empty() {
+                break;
+            }
+            requests.retain(|(id, _)| again.contains(*id));
         }
     }
     Ok(results)
@@ -115,7 +127,7 @@ fn hear(
     if let Some(frame) = bus.receive(until)? {
         match echoes.iter().position(|echo| *echo == frame) {
             Some(place) => drop(echoes.remove(place)),
-            None => host.receive(&frame),
+            None => host.receive(bus.now(), &frame),
         }
     }
     Ok(())

@@ -60,7 +60,7 @@ fn every_frame_gets_the_reply_of_its_code_or_none() {
             if let Ok(()) = host.request(Instant(0), id, data) {
                 let frame = CanFrame::new(id.can_id(), data);
                 assert_eq!(host.poll(Instant(0)), Output::Transmit(frame));
-                host.receive(&CanFrame::new(id.can_id(), reply));
+                host.receive(Instant(0), &CanFrame::new(id.can_id(), reply));
                 assert_eq!(host.poll(Instant(0)), Output::Done { id, result: Ok(reply) });
             } else {
                 assert!(row.moves, "only what moves a motor is refused: {data:02x?}");
@@ -78,7 +78,7 @@ fn only_a_reply_with_the_code_of_the_request_is_taken() {
             let mut host = Host::new();
             host.request(Instant(0), id, [code, 0, 0, 0, 0, 0, 0, 0]).unwrap();
             assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
-            host.receive(&CanFrame::new(id.can_id(), [answer, 1, 2, 3, 4, 5, 6, 7]));
+            host.receive(Instant(0), &CanFrame::new(id.can_id(), [answer, 1, 2, 3, 4, 5, 6, 7]));
             let taken = matches!(host.poll(Instant(0)), Output::Done { .. });
             let alike = code == answer || (code == 0x9B && answer == 0x9A);
             assert_eq!(taken, alike, "{code:#04x} answered by {answer:#04x}");

@@ -221,7 +221,7 @@ fn the_reply_to_clear_errors_may_have_either_code() {
     let mut host = Host::new();
     host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
     assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
-    host.receive(&CanFrame::new(0x141, [0x9B; 8]));
+    host.receive(Instant(0), &CanFrame::new(0x141, [0x9B; 8]));
     assert_eq!(host.counters().unasked, 1, "0x9B does not answer 0x9A");
 }
 
@@ -231,12 +231,12 @@ fn frames_that_answer_nothing_are_counted_and_dropped() {
     host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
     assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
     let data = ReadStatus1.encode();
-    host.receive(&CanFrame::new(0x142, data));
-    host.receive(&CanFrame::new(0x141, ReadStatus2.encode()));
-    host.receive(&CanFrame::data_frame(0x141, false, &data[..7]));
-    host.receive(&CanFrame::data_frame(0x141, true, &data));
-    host.receive(&CanFrame::remote_frame(0x141, false, 8));
-    host.receive(&CanFrame::new(0x7FF, data));
+    host.receive(Instant(0), &CanFrame::new(0x142, data));
+    host.receive(Instant(0), &CanFrame::new(0x141, ReadStatus2.encode()));
+    host.receive(Instant(0), &CanFrame::data_frame(0x141, false, &data[..7]));
+    host.receive(Instant(0), &CanFrame::data_frame(0x141, true, &data));
+    host.receive(Instant(0), &CanFrame::remote_frame(0x141, false, 8));
+    host.receive(Instant(0), &CanFrame::new(0x7FF, data));
     let Counters { unasked, malformed, late, .. } = *host.counters();
     assert_eq!((unasked, malformed, late), (2, 3, 0));
     assert!(matches!(host.poll(Instant(0)), Output::Wait(Some(_))));
@@ -248,7 +248,7 @@ fn a_motor_of_another_protocol_is_named_when_the_exchange_fails() {
         let mut host = Host::new();
         host.request(Instant(0), motor(7), ReadStatus1.encode()).unwrap();
         assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
-        host.receive(&CanFrame::new(base + 7, ReadStatus1.encode()));
+        host.receive(Instant(0), &CanFrame::new(base + 7, ReadStatus1.encode()));
         let Output::Done { result, .. } = host.poll(Instant(0) + DEFAULT_TIMEOUT) else {
             panic!("the time is over")
         };
@@ -283,4 +283,183 @@ fn a_code_that_nobody_knows_is_sent_and_answered_by_silence() {
     pair.host.request(pair.now, motor(1), [0x60; 8]).unwrap();
     assert_eq!(pair.run(), [(motor(1), Err(Error::Timeout))]);
     assert_eq!(pair.nodes[0].drive.ignored().unknown, 1);
+}
+
+/// A host that asks a motor again and again; replies carry the number of their request. From
+/// `stop` to `go_on` the motor stands still, and then it answers everything at once.
+struct Standstill {
+    host: Host,
+    now: Instant,
+    stop: Instant,
+    go_on: Instant,
+    coming: Vec<(Instant, CanFrame)>,
+    number: u32,
+}
+
+impl Standstill {
+    fn new(stop: u32, go_on: u32) -> Self {
+        let (stop, go_on) = (Duration::from_millis(stop), Duration::from_millis(go_on));
+        let (stop, go_on) = (Instant(0) + stop, Instant(0) + go_on);
+        let (host, now) = (Host::new(), Instant(0));
+        Standstill { host, now, stop, go_on, coming: vec![], number: 0 }
+    }
+
+    /// One exchange, which begins when the host takes the request. Its number and how it ended.
+    fn ask(&mut self, code: u8) -> (u32, Result<[u8; 8], Error>) {
+        self.number += 1;
+        let [a, b, c, d] = self.number.to_le_bytes();
+        let data = [code, 0, 0, 0, a, b, c, d];
+        while let Err(refused) = self.host.request(self.now, motor(1), data) {
+            let Refused::Quarantined { until, .. } = refused else { panic!("{refused}") };
+            assert!(until > self.now, "refused until now");
+            self.hear(until);
+        }
+        loop {
+            match self.host.poll(self.now) {
+                Output::Transmit(frame) => {
+                    let due = self.now + Duration(800);
+                    let still = (self.stop..self.go_on).contains(&due);
+                    self.coming.push((if still { self.go_on } else { due }, frame));
+                }
+                Output::Done { result, .. } => return (self.number, result),
+                Output::Wait(until) => self.hear(until.expect("an exchange is open")),
+            }
+        }
+    }
+
+    fn hear(&mut self, until: Instant) {
+        let next = self.coming.iter().position(|(at, _)| *at <= until);
+        let Some(next) = next else {
+            self.now = until;
+            return;
+        };
+        let (at, frame) = self.coming.remove(next);
+        self.now = self.now.max(at);
+        self.host.receive(self.now, &frame);
+    }
+}
+
+#[test]
+fn a_motor_that_stands_still_and_then_answers_everything_at_once_confuses_nobody() {
+    for code in [0x9C, 0x9A] {
+        for still in [60, 140, 160, 300, 1_000, 30_000] {
+            let mut bench = Standstill::new(100, 100 + still);
+            let (mut failed, mut back) = (0, None);
+            while bench.now < bench.go_on + Duration::from_millis(500) {
+                let (number, result) = bench.ask(code);
+                match result {
+                    Ok(reply) => {
+                        assert_eq!(reply[4..], number.to_le_bytes(), "{still} ms: another's")
+                    }
+                    Err(_) => failed += 1,
+                }
+                if result.is_ok() && bench.now > bench.go_on {
+                    back.get_or_insert(bench.now);
+                }
+                bench.now += Duration::from_millis(7);
+            }
+            assert!(failed > 0, "a motor that stands still does not answer");
+            let took = back.expect("the motor is back").since(bench.go_on);
+            let stated = DEFAULT_GUARD + DEFAULT_GUARD + DEFAULT_TIMEOUT;
+            assert!(took <= stated, "{} us to come back from {still} ms", took.0);
+        }
+    }
+}
+
+/// A host whose request to motor 1 with this code was not answered, after its guard time.
+fn unanswered(code: u8) -> (Host, Instant) {
+    let mut host = Host::new();
+    host.request(Instant(0), motor(1), [code, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
+    let timeout = Instant(0) + DEFAULT_TIMEOUT;
+    let failed = Output::Done { id: motor(1), result: Err(Error::Timeout) };
+    assert_eq!(host.poll(timeout), failed);
+    (host, timeout + DEFAULT_GUARD)
+}
+
+const QUESTION: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
+
+#[test]
+fn a_motor_that_did_not_answer_is_asked_for_its_status_and_then_has_to_be_silent() {
+    let (mut host, asked) = unanswered(0x9C);
+    let (own, question) = (ReadStatus2.encode(), CanFrame::new(0x141, QUESTION));
+    host.request(asked, motor(1), own).unwrap();
+    assert_eq!(host.poll(asked), Output::Transmit(question));
+    let heard = asked + Duration::from_millis(10);
+    host.receive(heard, &question);
+    let answered = Output::Done { id: motor(1), result: Err(Error::Quarantined) };
+    assert_eq!(host.poll(heard), answered);
+
+    // A late reply that is not the only one owed makes it longer.
+    let again = |until| Err(Refused::Quarantined { id: motor(1), until });
+    assert_eq!(host.request(heard, motor(1), own), again(heard + DEFAULT_GUARD));
+    host.request(heard, motor(1), Off.encode()).unwrap();
+    assert_eq!(host.poll(heard), Output::Transmit(CanFrame::new(0x141, Off.encode())));
+    let timeout = heard + DEFAULT_TIMEOUT;
+    assert!(matches!(host.poll(timeout), Output::Done { result: Err(Error::Timeout), .. }));
+    let late = timeout + Duration::from_millis(90);
+    host.receive(late, &CanFrame::new(0x141, own));
+    assert_eq!(host.counters().late, 1);
+    assert_eq!(host.request(late, motor(1), own), again(late + DEFAULT_GUARD));
+    assert_eq!(host.request(late + DEFAULT_GUARD, motor(1), own), Ok(()));
+    let sent = Output::Transmit(CanFrame::new(0x141, own));
+    assert_eq!(host.poll(late + DEFAULT_GUARD), sent);
+}
+
+#[test]
+fn a_motor_that_does_not_answer_the_question_is_left_alone_and_asked_again() {
+    let (mut host, mut now) = unanswered(0xA2);
+    for _ in 0..3 {
+        host.request(now, motor(1), Speed::default().encode()).unwrap();
+        assert_eq!(host.poll(now), Output::Transmit(CanFrame::new(0x141, QUESTION)));
+        now += DEFAULT_TIMEOUT;
+        let failed = Output::Done { id: motor(1), result: Err(Error::Timeout) };
+        assert_eq!(host.poll(now), failed);
+        let until = now + DEFAULT_GUARD;
+        let refused = Err(Refused::Quarantined { id: motor(1), until });
+        assert_eq!(host.request(now, motor(1), Speed::default().encode()), refused);
+        // Two kinds of replies are owed, and neither is that to Off.
+        for halt in [Off.encode(), Stop.encode()] {
+            host.request(now, motor(1), halt).unwrap();
+            host.cancel(now, motor(1));
+        }
+        now = until;
+    }
+}
+
+#[test]
+fn a_motor_that_goes_on_talking_is_switched_off_all_the_same() {
+    let (mut host, _) = unanswered(0x80);
+    let mut now = Instant(0) + DEFAULT_TIMEOUT;
+    let until = now + DEFAULT_GUARD;
+    host.request(now, motor(1), Stop.encode()).unwrap();
+    host.poll(now);
+    host.cancel(now, motor(1));
+    while now < until {
+        host.receive(now, &CanFrame::new(0x141, ReadStatus2.encode()));
+        let refused = Err(Refused::Quarantined { id: motor(1), until });
+        assert_eq!(host.request(now, motor(1), Off.encode()), refused, "at {}", now.0);
+        now += Duration::from_millis(10);
+    }
+    assert_eq!(host.request(now, motor(1), Off.encode()), Ok(()));
+    assert_eq!(host.poll(now), Output::Transmit(CanFrame::new(0x141, Off.encode())));
+}
+
+#[test]
+fn four_torques_are_not_sent_while_one_of_the_motors_is_in_doubt() {
+    let mut pair = Pair::new(&[1, 2]);
+    let expect: MotorSet = [1, 2].map(motor).into_iter().collect();
+    let (mut host, now) = unanswered(0x9C);
+    std::mem::swap(&mut pair.host, &mut host);
+    pair.now = now;
+    let torques = Torque4([7; 4].map(TorqueCommand));
+    pair.host.torque4(now, torques, expect).unwrap();
+    assert!(pair.run().iter().all(|(_, result)| *result == Err(Error::Quarantined)));
+    assert_eq!(pair.log, [0x141, 0x142, 0x141, 0x142]);
+    let refused = pair.host.torque4(pair.now, torques, expect);
+    assert!(matches!(refused, Err(Refused::Quarantined { id, .. }) if id == motor(1)));
+    pair.wait(DEFAULT_GUARD);
+    pair.host.torque4(pair.now, torques, expect).unwrap();
+    assert!(pair.run().iter().all(|(_, result)| result.is_ok()));
+    assert!(pair.nodes.iter().all(|node| node.motor.mode == Mode::Torque(TorqueCommand(7))));
 }

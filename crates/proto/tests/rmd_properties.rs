@@ -101,7 +101,7 @@ proptest! {
         }
         while let Output::Transmit(_) = host.poll(Instant(0)) {}
         for frame in &frames {
-            host.receive(frame);
+            host.receive(Instant(1), frame);
             match host.poll(Instant(1)) {
                 Output::Done { id, result } => {
                     let reply = result.unwrap();
@@ -149,7 +149,7 @@ proptest! {
                 }
                 now += Duration(1);
                 for (_, frame) in coming.extract_if(.., |(at, _)| *at <= now) {
-                    host.receive(&frame);
+                    host.receive(now, &frame);
                 }
             }
         }
@@ -169,8 +169,8 @@ proptest! {
             let Output::Transmit(frame) = hosts[own].poll(Instant(0)) else { panic!("it is free") };
             let node = &mut nodes[usize::from(id - 1)];
             let reply = node.receive(Instant(0), &frame).expect("a known code");
-            hosts[other].receive(&frame);
-            hosts.iter_mut().for_each(|host| host.receive(&reply));
+            hosts[other].receive(Instant(0), &frame);
+            hosts.iter_mut().for_each(|host| host.receive(Instant(0), &reply));
             prop_assert_eq!(
                 hosts[own].poll(Instant(0)),
                 Output::Done { id: motor(id), result: Ok(*reply.usable().unwrap().1) }

@@ -10,7 +10,6 @@ use motorlink_proto::rmd::{
 };
 use motorlink_proto::time::Instant;
 
-use super::doubt::{Doubts, Trust, strays};
 use super::{Error, Guard, MotorHandle, OnDrop};
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{CanLink, PortError, PortName};
@@ -52,7 +51,7 @@ pub enum Found {
     Echo(MotorId),
 }
 
-/// How long a motor in doubt may go on talking.
+/// How long a motor whose replies are in doubt may go on talking, beside the times of its exchanges.
 const SETTLE_LIMIT: Duration = Duration::from_secs(2);
 
 /// How long what came meanwhile may go on coming.
@@ -78,8 +77,8 @@ struct Inner {
     host: Host,
     /// Motors that were given something to do by this bus and not switched off.
     moving: MotorSet,
-    /// Whose replies may be late ones.
-    doubts: Doubts,
+    /// How long an exchange may be put off.
+    patience: Duration,
 }
 
 impl Bus {
@@ -125,7 +124,9 @@ impl Bus {
             host.set_limits(id, options.limits);
         }
         let sign = port.sign();
-        let inner = Inner { port, host, moving: MotorSet::EMPTY, doubts: Doubts::NONE };
+        let times = options.guard.saturating_mul(2).saturating_add(options.timeout);
+        let patience = times.saturating_add(SETTLE_LIMIT);
+        let inner = Inner { port, host, moving: MotorSet::EMPTY, patience };
         Bus { inner: Mutex::new(inner), sign }
     }
 
@@ -169,10 +170,13 @@ impl Bus {
     pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
         let mut inner = self.lock();
         inner.ready()?;
-        if !halts(&request) {
-            inner.settle(id, request[0])?;
+        let begun = Moment::now();
+        loop {
+            match inner.exchange(id, request) {
+                Err(Error::Quarantined { .. }) if begun.elapsed() < inner.patience => {}
+                outcome => return outcome,
+            }
         }
-        inner.exchange(id, request)?.map_err(|error| inner.failed(id, request[0], error))
     }
 
     /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
@@ -188,41 +192,23 @@ impl Bus {
     ) -> Result<(), Error> {
         let mut inner = self.lock();
         inner.ready()?;
-        let mut questions = MotorSet::EMPTY;
         for &(id, request) in requests {
-            let sent = match inner.trust(id) {
-                Trust::None if !halts(&request) => {
-                    questions.insert(id);
-                    inner.request(id, question())
-                }
-                Trust::From(until) if !halts(&request) => Err(Refused::Quarantined { id, until }),
-                _ => inner.request(id, request),
-            };
-            if let Err(refused) = sent {
+            let now = inner.port.now();
+            if let Err(refused) = inner.host.request(now, id, request) {
                 each(id, Err(inner.refused(refused)));
             }
         }
         let name = Arc::clone(&inner.port.name);
         let code = |of| requests.iter().find(|(id, _)| *id == of).map_or(0, |(_, data)| data[0]);
-        inner.run(|id, result| {
-            let result = result.map_err(|error| failed(&name, id, code(id), error));
-            each(
-                id,
-                match result {
-                    Ok(_) if questions.contains(id) => {
-                        Err(Error::Quarantined { port: Arc::clone(&name), id })
-                    }
-                    result => result,
-                },
-            );
-        })
+        inner.run(|id, result| each(id, result.map_err(|error| failed(&name, id, code(id), error))))
     }
 
     /// Sends torques to motors 1 to 4 in one frame and gathers the replies of those in `expect`;
     /// place n of the result is motor n + 1.
     ///
     /// # Errors
-    /// The port's, a limit's, [`Error::OutOfReach`], [`Error::Quarantined`]: nothing was sent then.
+    /// The port's, a limit's, [`Error::OutOfReach`], [`Error::Quarantined`]: nothing was sent then. Nor
+    /// was it if the result of a motor is [`Error::Quarantined`].
     pub fn torque4(
         &self,
         torques: Torque4,
@@ -230,19 +216,9 @@ impl Bus {
     ) -> Result<[Option<Result<MotionStatus, Error>>; 4], Error> {
         let mut inner = self.lock();
         inner.ready()?;
-        let doubtful = MotorSet::TORQUE4.intersection(expect);
-        for id in doubtful.filter(|id| inner.trust(*id) == Trust::None).collect::<MotorSet>() {
-            // If it cannot be asked, the next attempt does.
-            let _ = inner.request(id, question());
-        }
-        inner.run(|_, _| {})?;
-        if let Some(id) = doubtful.clone().find(|id| inner.trust(*id) != Trust::Full) {
-            return Err(Error::Quarantined { port: Arc::clone(&inner.port.name), id });
-        }
         let now = inner.port.now();
         let begun = inner.host.torque4(now, torques, expect);
         begun.map_err(|refused| inner.refused(refused))?;
-        inner.moving = inner.moving.union(MotorSet::TORQUE4);
         let name = Arc::clone(&inner.port.name);
         let mut replies = [const { None }; 4];
         inner.run(|id, result| {
@@ -307,7 +283,7 @@ impl Inner {
             match link.receive(Some(Duration::ZERO)) {
                 // A bus that is never silent has to do: an Off must get through.
                 Ok(Some(_)) if begun.elapsed() > BABBLE => break,
-                Ok(Some(frame)) => take(now, &frame, &mut self.host, &mut self.doubts),
+                Ok(Some(frame)) => self.host.receive(now, &frame),
                 Ok(None) => break,
                 Err(error) => return Err(self.closed(error)),
             }
@@ -315,14 +291,6 @@ impl Inner {
         let now = self.port.now();
         for id in self.host.busy() {
             self.host.cancel(now, id);
-        }
-        Ok(())
-    }
-
-    fn request(&mut self, id: MotorId, data: [u8; 8]) -> Result<(), Refused> {
-        self.host.request(self.port.now(), id, data)?;
-        if Code::from(data[0]).info().is_some_and(|row| row.moves) {
-            self.moving.insert(id);
         }
         Ok(())
     }
@@ -335,13 +303,11 @@ impl Inner {
         loop {
             let now = self.port.now();
             let moved = match self.host.poll(now) {
-                Output::Transmit(frame) => self.port.link().and_then(|(link, _)| link.send(&frame)),
+                Output::Transmit(frame) => {
+                    self.moving = self.moving.union(told_to_move(&frame));
+                    self.port.link().and_then(|(link, _)| link.send(&frame))
+                }
                 Output::Done { id, result } => {
-                    match result {
-                        Ok(_) => self.doubts.answered(now, id),
-                        Err(proto::Error::Timeout) => self.doubts.timed_out(id),
-                        Err(_) => {}
-                    }
                     // A motor counts as moving from the request on, whose reply may be lost, and
                     // until it has acknowledged that it is off or stopped.
                     if let Ok([code, ..]) = result
@@ -363,61 +329,28 @@ impl Inner {
         let (link, _) = self.port.link()?;
         if let Some(frame) = link.receive(Some(until.since(now).into()))? {
             let now = self.port.now();
-            take(now, &frame, &mut self.host, &mut self.doubts);
+            self.host.receive(now, &frame);
         }
         Ok(())
     }
 
-    fn trust(&mut self, id: MotorId) -> Trust {
-        self.doubts.trust(self.port.now(), id, self.host.guard())
-    }
-
-    /// One exchange with a motor, whose quarantine is waited for.
-    fn exchange(
-        &mut self,
-        id: MotorId,
-        request: [u8; 8],
-    ) -> Result<Result<[u8; 8], proto::Error>, Error> {
-        while let Err(refused) = self.request(id, request) {
-            let Refused::Quarantined { until, .. } = refused else {
-                return Err(self.refused(refused));
-            };
-            let now = self.port.now();
-            self.hear(now, until).map_err(|error| self.closed(error))?;
-        }
-        let mut outcome = None;
-        self.run(|_, result| outcome = Some(result))?;
-        Ok(outcome.unwrap_or(Err(proto::Error::Timeout)))
-    }
-
-    /// Waits until the next reply of a motor can be trusted. `code` is for messages.
-    fn settle(&mut self, id: MotorId, code: u8) -> Result<(), Error> {
-        let give_up = Moment::now() + SETTLE_LIMIT;
-        loop {
-            match self.trust(id) {
-                Trust::Full => return Ok(()),
-                _ if Moment::now() > give_up => {
-                    return Err(Error::Quarantined { port: Arc::clone(&self.port.name), id });
-                }
-                Trust::From(until) => {
-                    let now = self.port.now();
-                    self.hear(now, until).map_err(|error| self.closed(error))?;
-                }
-                Trust::None => {
-                    let answer = self.exchange(id, question())?;
-                    answer.map_err(|error| self.failed(id, code, error))?;
-                }
+    /// One exchange with a motor, or the wait until the next attempt at one: [`Error::Quarantined`].
+    fn exchange(&mut self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
+        let now = self.port.now();
+        if let Err(refused) = self.host.request(now, id, request) {
+            if let Refused::Quarantined { until, .. } = refused {
+                self.hear(now, until).map_err(|error| self.closed(error))?;
             }
+            return Err(self.refused(refused));
         }
+        let mut outcome = Err(proto::Error::Timeout);
+        self.run(|_, result| outcome = result)?;
+        outcome.map_err(|error| failed(&self.port.name, id, request[0], error))
     }
 
     fn closed(&mut self, error: PortError) -> Error {
         self.port.close();
         error.into()
-    }
-
-    fn failed(&self, id: MotorId, code: u8, error: proto::Error) -> Error {
-        failed(&self.port.name, id, code, error)
     }
 
     fn refused(&self, refused: Refused) -> Error {
@@ -443,31 +376,21 @@ fn found(id: MotorId, outcome: Result<[u8; 8], Error>) -> Option<Found> {
     }
 }
 
-/// Takes a frame from the bus, and notes which motor it came from too late.
-fn take(now: Instant, frame: &CanFrame, host: &mut Host, doubts: &mut Doubts) {
-    let before = strays(host.counters());
-    host.receive(frame);
-    if strays(host.counters()) != before
-        && let Some(id) = MotorId::from_can_id(frame.id())
-    {
-        doubts.came_late(now, id);
+/// The motors that a frame of ours tells to move.
+fn told_to_move(frame: &CanFrame) -> MotorSet {
+    let moves = |code| Code::from(code).info().is_some_and(|row| row.moves);
+    match (MotorId::from_can_id(frame.id()), frame.data()) {
+        (Some(id), [code, ..]) if moves(*code) => MotorSet::from(id),
+        (Some(_), _) => MotorSet::EMPTY,
+        (None, _) => MotorSet::TORQUE4,
     }
-}
-
-/// What a motor in doubt is asked.
-fn question() -> [u8; 8] {
-    ReadStatus1.encode()
-}
-
-/// Whether a request makes a motor safer, whatever its replies are worth.
-fn halts(request: &[u8; 8]) -> bool {
-    matches!(Code::from(request[0]), Code::Off | Code::Stop)
 }
 
 fn failed(name: &Arc<str>, id: MotorId, code: u8, error: proto::Error) -> Error {
     let port = Arc::clone(name);
     match error {
         proto::Error::Foreign(dialect) => Error::Foreign { port, id, dialect },
+        proto::Error::Quarantined => Error::Quarantined { port, id },
         _ => Error::Timeout { port, id, code: Code::from(code) },
     }
 }

@@ -13,7 +13,6 @@
 //! ```
 
 mod bus;
-mod doubt;
 mod error;
 mod guard;
 mod motor;

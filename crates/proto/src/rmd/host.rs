@@ -6,92 +6,34 @@
 //! under way.
 //!
 //! There is no sequence number and no error reply, so a reply is known by (ID, DATA\[0\]) and a
-//! motor has one exchange at a time. After a timeout the motor is in quarantine until the late reply
-//! came or the guard time passed, so that it cannot pass for the reply to the next request.
+//! motor has one exchange at a time. After a timeout the motor is in quarantine, so that a late reply
+//! cannot pass for that to the next request: nothing is sent until the late reply came or the guard
+//! time passed. If it did not come, the motor is asked for its status in place of the next request,
+//! which ends in [`Error::Quarantined`] when the motor answers. That answer may be an old one too, so
+//! the motor then has to be silent for the guard time (docs/SPEC-NOTES.md R29). No exchange takes
+//! longer than its timeout, and exchanges with other motors wait for none of this: who has to have a
+//! request carried out makes it again on [`Error::Quarantined`], and at the time that
+//! [`Refused::Quarantined`] tells.
 //!
 //! Some requests and their replies are the same bit for bit (0x31, 0x32, 0x34, 0x80, 0x81, 0x88). An
 //! adapter that echoes what it sends therefore looks like a motor that answers, which only the
 //! port can know: it has to drop its own frames.
 
-use super::command::{Code, Command};
+use super::command::Command;
+use super::doubt::{Admitted, Doubt, answers};
 use super::frame::CanFrame;
-use super::limits::{Exceeded, Limits};
-use super::message::{Torque, Torque4};
+use super::limits::Limits;
+use super::message::{ReadStatus1, Torque, Torque4};
 use super::motor::{Dialect, MotorId, MotorSet, TORQUE4_ID};
+use super::outcome::{Counters, Error, Output, Refused};
 use crate::time::{Duration, Instant};
-use core::fmt;
 
 /// How long a reply may take unless told otherwise: real motors answer in 0.3 to 2 ms, and a USB
 /// adapter may hold a frame for 16 ms.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_millis(50);
-/// How long after a timeout a late reply is awaited unless told otherwise.
+/// How long after a timeout a late reply is awaited, and how long a motor that did not answer has to
+/// be silent, unless told otherwise.
 pub const DEFAULT_GUARD: Duration = Duration::from_millis(100);
-
-/// What [`Host::poll`] wants the caller to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Output {
-    /// Send this frame; the time for its reply runs from now on.
-    Transmit(CanFrame),
-    /// The exchange with a motor is over.
-    Done {
-        /// The motor.
-        id: MotorId,
-        /// The eight bytes of its reply.
-        result: Result<[u8; 8], Error>,
-    },
-    /// Nothing more to do until a frame comes or this moment, at which to poll again.
-    Wait(Option<Instant>),
-}
-
-/// Why an exchange failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Error {
-    /// No reply in time. An unknown command gets none either.
-    Timeout,
-    /// No reply of this protocol, and a reply to the same command in another one.
-    Foreign(Dialect),
-}
-
-/// Why a request was not taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Refused {
-    /// This motor's exchange is not over.
-    Busy(MotorId),
-    /// This motor may still answer an exchange that timed out.
-    Quarantined {
-        /// The motor.
-        id: MotorId,
-        /// When its guard time is over.
-        until: Instant,
-    },
-    /// The frame exceeds a limit of this motor.
-    Limit {
-        /// The motor.
-        id: MotorId,
-        /// The limit.
-        exceeded: Exceeded,
-    },
-    /// The frame 0x280 does not reach this motor (chapter 4).
-    OutOfReach(MotorId),
-}
-
-/// Frames that belonged to no exchange; each count stays at its end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counters {
-    /// Replies that came during a quarantine, to an exchange that was over.
-    pub late: u32,
-    /// Replies that nobody waited for.
-    pub unasked: u32,
-    /// Frames of a motor's identifier that are not standard data frames of eight bytes.
-    pub malformed: u32,
-    /// Replies of V3 or V4 motors.
-    pub foreign_v3: u32,
-    /// Replies of LK-Tech V2.36 motors.
-    pub foreign_lk: u32,
-    /// The motor of the last foreign reply.
-    pub last_foreign: Option<(Dialect, MotorId)>,
-}
 
 #[derive(Debug, Clone, Copy)]
 struct Slot {
@@ -101,21 +43,8 @@ struct Slot {
     deadline: Instant,
     /// A foreign reply to this request.
     foreign: Option<Dialect>,
-    owed: Owed,
-    /// End of the quarantine.
-    until: Instant,
+    doubt: Doubt,
     limits: Limits,
-}
-
-/// What may still come from a motor in quarantine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Owed {
-    /// A reply with this code.
-    One(u8),
-    /// Replies with this code.
-    Several(u8),
-    /// Replies with different codes.
-    Mixed,
 }
 
 /// The host's side of one bus.
@@ -128,7 +57,8 @@ pub struct Host {
     in_flight: MotorSet,
     replied: MotorSet,
     failed: MotorSet,
-    quarantined: MotorSet,
+    /// Motors that are asked for their status in place of what was requested.
+    questioned: MotorSet,
     torque4: Option<Torque4>,
     /// No deadline in flight is before this moment.
     earliest: Instant,
@@ -147,8 +77,7 @@ impl Host {
             timeout: DEFAULT_TIMEOUT,
             deadline: NEVER,
             foreign: None,
-            owed: Owed::Mixed,
-            until: Instant(0),
+            doubt: Doubt::NONE,
             limits: Limits { current: None, speed: None, angle: None },
         };
         Host {
@@ -158,7 +87,7 @@ impl Host {
             in_flight: MotorSet::EMPTY,
             replied: MotorSet::EMPTY,
             failed: MotorSet::EMPTY,
-            quarantined: MotorSet::EMPTY,
+            questioned: MotorSet::EMPTY,
             torque4: None,
             earliest: NEVER,
             timeout: DEFAULT_TIMEOUT,
@@ -178,9 +107,12 @@ impl Host {
     /// docs/SPEC-NOTES.md R1). A typed request is `command.encode()`; codes that nobody knows are
     /// taken as well.
     ///
+    /// A motor that did not answer before may be asked for its status instead; the exchange ends in
+    /// [`Error::Quarantined`] then, or in a timeout.
+    ///
     /// # Errors
-    /// [`Refused`]; nothing is sent then. Off and Stop are taken during a quarantine, unless it is
-    /// their own late reply that is awaited (docs/SPEC-NOTES.md R22).
+    /// [`Refused`]; nothing is sent then. Off and Stop are taken and sent during a quarantine, unless
+    /// it is their own late reply that is awaited, for the guard time (docs/SPEC-NOTES.md R22).
     pub fn request(&mut self, now: Instant, id: MotorId, data: [u8; 8]) -> Result<(), Refused> {
         self.request_within(now, id, data, self.timeout)
     }
@@ -197,8 +129,10 @@ impl Host {
         timeout: Duration,
     ) -> Result<(), Refused> {
         self.limits(id).check(&data).map_err(|exceeded| Refused::Limit { id, exceeded })?;
-        self.admit(now, id, data)?;
-        self.open(id, data, timeout);
+        match self.admit(now, id, data)? {
+            Admitted::Request => self.open(id, data, timeout),
+            Admitted::Question => self.question(id, timeout),
+        }
         self.queued.insert(id);
         Ok(())
     }
@@ -207,7 +141,9 @@ impl Host {
     /// `expect` (4, Multiple motor torque closed loop control commands).
     ///
     /// The frame reaches all four. Those that are not expected to answer must have no exchange under
-    /// way either, and are in quarantine afterwards (docs/SPEC-NOTES.md R23).
+    /// way either, and are in quarantine afterwards (docs/SPEC-NOTES.md R23). If one of `expect` did
+    /// not answer before, each is asked for its status instead, as by [`request`](Self::request), and
+    /// nothing else is sent.
     ///
     /// # Errors
     /// [`Refused`]; nothing is sent then.
@@ -224,12 +160,20 @@ impl Host {
             return Err(Refused::Busy(id));
         }
         let data = Torque::default().encode();
+        let mut admitted = Admitted::Request;
         for (id, torque) in MotorSet::TORQUE4.zip(torques.0) {
             let checked = self.limits(id).current(torque);
             checked.map_err(|exceeded| Refused::Limit { id, exceeded })?;
-            if expect.contains(id) {
-                self.admit(now, id, data)?;
+            if expect.contains(id) && self.admit(now, id, data)? == Admitted::Question {
+                admitted = Admitted::Question;
             }
+        }
+        if admitted == Admitted::Question {
+            for id in expect {
+                self.question(id, self.timeout);
+            }
+            self.queued = self.queued.union(expect);
+            return Ok(());
         }
         for id in expect {
             self.open(id, data, self.timeout);
@@ -240,10 +184,10 @@ impl Host {
     }
 
     /// Takes a frame from the bus. Frames that belong to no exchange are counted and dropped.
-    pub fn receive(&mut self, frame: &CanFrame) {
+    pub fn receive(&mut self, now: Instant, frame: &CanFrame) {
         if let Some(id) = MotorId::from_can_id(frame.id()) {
             match frame.usable() {
-                Some((_, data)) => self.reply(id, data),
+                Some((_, data)) => self.reply(now, id, data),
                 None => count(&mut self.counters.malformed),
             }
         } else if let Some((_, data)) = frame.usable()
@@ -262,7 +206,10 @@ impl Host {
             self.expire(now);
         }
         if let Some(id) = self.replied.next() {
-            return Output::Done { id, result: Ok(self.slot(id).data) };
+            let answer = self.slot(id).data;
+            let result =
+                if self.questioned.contains(id) { Err(Error::Quarantined) } else { Ok(answer) };
+            return Output::Done { id, result };
         }
         if let Some(id) = self.failed.next() {
             let error = self.slot(id).foreign.map_or(Error::Timeout, Error::Foreign);
@@ -280,7 +227,7 @@ impl Host {
             self.queued_torque4 = MotorSet::EMPTY;
         }
         if self.in_flight.contains(id) {
-            self.quarantine(now, id);
+            self.owes(now, id);
         }
         for stage in [&mut self.queued, &mut self.in_flight, &mut self.replied, &mut self.failed] {
             stage.remove(id);
@@ -310,12 +257,13 @@ impl Host {
         self.timeout = timeout;
     }
 
-    /// Sets how long a motor is in quarantine from the next timeout on.
+    /// Sets the guard time: how long a motor is left alone from the next timeout on, and how long it
+    /// has to be silent.
     pub const fn set_guard(&mut self, guard: Duration) {
         self.guard = guard;
     }
 
-    /// How long a motor is in quarantine after a timeout.
+    /// The guard time.
     pub const fn guard(&self) -> Duration {
         self.guard
     }
@@ -332,7 +280,7 @@ impl Host {
             }
             for id in MotorSet::TORQUE4.without(self.queued_torque4) {
                 self.slot(id).data = Torque::default().encode();
-                self.quarantine(now, id);
+                self.owes(now, id);
             }
             self.queued_torque4 = MotorSet::EMPTY;
             return Some(CanFrame::new(TORQUE4_ID, torques.encode()));
@@ -342,24 +290,17 @@ impl Host {
         Some(CanFrame::new(id.can_id(), self.slot(id).data))
     }
 
-    fn reply(&mut self, id: MotorId, data: &[u8; 8]) {
+    fn reply(&mut self, now: Instant, id: MotorId, data: &[u8; 8]) {
         let slot = &mut self.slots[id.index()];
         if self.in_flight.contains(id) && answers(slot.data[0], data[0]) {
             slot.data = *data;
+            slot.doubt.answered(now);
             self.in_flight.remove(id);
             self.replied.insert(id);
             return;
         }
-        if !self.quarantined.contains(id) {
-            return count(&mut self.counters.unasked);
-        }
-        match slot.owed {
-            Owed::One(code) if answers(code, data[0]) => self.quarantined.remove(id),
-            Owed::Several(code) if answers(code, data[0]) => {}
-            Owed::Mixed => {}
-            _ => return count(&mut self.counters.unasked),
-        }
-        count(&mut self.counters.late);
+        let late = slot.doubt.came(now, data[0]);
+        count(if late { &mut self.counters.late } else { &mut self.counters.unasked });
     }
 
     fn foreign_reply(&mut self, dialect: Dialect, id: MotorId, data: &[u8; 8]) {
@@ -375,23 +316,18 @@ impl Host {
         }
     }
 
-    fn admit(&mut self, now: Instant, id: MotorId, data: [u8; 8]) -> Result<(), Refused> {
+    fn admit(&mut self, now: Instant, id: MotorId, data: [u8; 8]) -> Result<Admitted, Refused> {
         if self.busy().contains(id) {
             return Err(Refused::Busy(id));
         }
-        let Slot { owed, until, .. } = *self.slot(id);
-        if now >= until {
-            self.quarantined.remove(id);
-        }
-        let halts = matches!(Code::from(data[0]), Code::Off | Code::Stop);
-        let distinct = match owed {
-            Owed::One(code) | Owed::Several(code) => code != data[0],
-            Owed::Mixed => false,
-        };
-        if self.quarantined.contains(id) && !(halts && distinct) {
-            return Err(Refused::Quarantined { id, until });
-        }
-        Ok(())
+        let guard = self.guard;
+        let admitted = self.slot(id).doubt.admit(now, guard, data[0]);
+        admitted.map_err(|until| Refused::Quarantined { id, until })
+    }
+
+    fn question(&mut self, id: MotorId, timeout: Duration) {
+        self.open(id, ReadStatus1.encode(), timeout);
+        self.questioned.insert(id);
     }
 
     fn open(&mut self, id: MotorId, data: [u8; 8], timeout: Duration) {
@@ -399,6 +335,7 @@ impl Host {
         slot.data = data;
         slot.timeout = timeout;
         slot.foreign = None;
+        self.questioned.remove(id);
     }
 
     fn start(&mut self, now: Instant, id: MotorId) {
@@ -420,22 +357,15 @@ impl Host {
             }
             self.in_flight.remove(id);
             self.failed.insert(id);
-            self.quarantine(now, id);
+            self.owes(now, id);
         }
     }
 
-    fn quarantine(&mut self, now: Instant, id: MotorId) {
-        let until = now + self.guard;
-        let quarantined = self.quarantined.contains(id);
+    /// The reply to what was sent may still come.
+    fn owes(&mut self, now: Instant, id: MotorId) {
+        let guard = self.guard;
         let slot = self.slot(id);
-        let code = slot.data[0];
-        slot.owed = match slot.owed {
-            _ if !quarantined || now >= slot.until => Owed::One(code),
-            Owed::One(owed) | Owed::Several(owed) if owed == code => Owed::Several(code),
-            _ => Owed::Mixed,
-        };
-        slot.until = slot.until.max(until);
-        self.quarantined.insert(id);
+        slot.doubt.owes(now, guard, slot.data[0]);
     }
 
     fn slot(&mut self, id: MotorId) -> &mut Slot {
@@ -449,44 +379,6 @@ impl Default for Host {
     }
 }
 
-/// Whether a reply with the code `came` answers a request with the code `asked`.
-fn answers(asked: u8, came: u8) -> bool {
-    let (asked, came) = (Code::from(asked), Code::from(came));
-    asked == came || (asked == Code::ClearErrors && came == Code::ReadStatus1)
-}
-
 fn count(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Error::Timeout => f.write_str("no reply in time; check supply, ID and bit rate"),
-            Error::Foreign(dialect) => {
-                write!(f, "the motor answers in {dialect}, not V1.62; use a host of that protocol")
-            }
-        }
-    }
-}
-
-impl core::error::Error for Error {}
-
-impl fmt::Display for Refused {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Refused::Busy(id) => {
-                write!(f, "motor {id} has an exchange under way; wait for its result")
-            }
-            Refused::Quarantined { id, .. } => {
-                write!(f, "motor {id} may still answer late; try again after the guard time")
-            }
-            Refused::Limit { id, exceeded } => write!(f, "motor {id}: {exceeded}"),
-            Refused::OutOfReach(id) => {
-                write!(f, "the torque frame does not reach motor {id}; use IDs 1 to 4")
-            }
-        }
-    }
-}
-
-impl core::error::Error for Refused {}

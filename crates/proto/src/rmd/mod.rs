@@ -23,7 +23,7 @@
 //! let Output::Transmit(frame) = host.poll(Instant(0)) else { unreachable!() };
 //! assert_eq!(frame.data(), [0xA4, 0x00, 0x68, 0x01, 0x28, 0x23, 0x00, 0x00]);
 //!
-//! host.receive(&CanFrame::new(0x141, [0xA4, 25, 0, 4, 90, 0, 0, 0x10]));
+//! host.receive(Instant(800), &CanFrame::new(0x141, [0xA4, 25, 0, 4, 90, 0, 0, 0x10]));
 //! let Output::Done { result: Ok(reply), .. } = host.poll(Instant(800)) else { unreachable!() };
 //! let status = MotionStatus::decode(&reply);
 //! assert_eq!(status.iq.amps(), 16.5);
@@ -33,6 +33,7 @@
 
 mod command;
 mod describe;
+mod doubt;
 mod drive;
 mod encoder;
 mod frame;
@@ -40,6 +41,7 @@ mod host;
 mod limits;
 mod message;
 mod motor;
+mod outcome;
 mod payload;
 mod reply;
 
@@ -48,9 +50,10 @@ pub use describe::{Described, Direction, describe};
 pub use drive::{Config, Drive, Ignored, Mode, Motor, Sense, Settings};
 pub use encoder::{EncoderBits, FULL_TURN};
 pub use frame::CanFrame;
-pub use host::{Counters, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, Output, Refused};
+pub use host::{DEFAULT_GUARD, DEFAULT_TIMEOUT, Host};
 pub use limits::{Exceeded, Limits};
 pub use message::*;
 pub use motor::{Dialect, MOTOR_BASE, MotorId, MotorSet, TORQUE4_ID};
+pub use outcome::{Counters, Error, Output, Refused};
 pub use payload::{Field, Payload};
 pub use reply::*;

@@ -138,7 +138,7 @@ impl Pair {
         let now = self.now;
         for (_, frame) in self.coming.extract_if(.., |(at, _)| *at <= now) {
             self.log.push(frame.id());
-            self.host.receive(&frame);
+            self.host.receive(self.now, &frame);
         }
     }
 }

@@ -1,0 +1,111 @@
+//! What a host tells its caller.
+
+use super::frame::CanFrame;
+use super::limits::Exceeded;
+use super::motor::{Dialect, MotorId};
+use crate::time::Instant;
+use core::fmt;
+
+/// What [`Host::poll`] wants the caller to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Output {
+    /// Send this frame; the time for its reply runs from now on.
+    Transmit(CanFrame),
+    /// The exchange with a motor is over.
+    Done {
+        /// The motor.
+        id: MotorId,
+        /// The eight bytes of its reply.
+        result: Result<[u8; 8], Error>,
+    },
+    /// Nothing more to do until a frame comes or this moment, at which to poll again.
+    Wait(Option<Instant>),
+}
+
+/// Why an exchange failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Error {
+    /// No reply in time. An unknown command gets none either.
+    Timeout,
+    /// No reply of this protocol, and a reply to the same command in another one.
+    Foreign(Dialect),
+    /// Nothing was done: the motor was asked for its status instead, because it had not answered
+    /// before, and it answered. Ask again; it is trusted when it was silent for the guard time.
+    Quarantined,
+}
+
+/// Why a request was not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Refused {
+    /// This motor's exchange is not over.
+    Busy(MotorId),
+    /// This motor may still answer an exchange that timed out.
+    Quarantined {
+        /// The motor.
+        id: MotorId,
+        /// When to ask again; a reply may make it sooner or later.
+        until: Instant,
+    },
+    /// The frame exceeds a limit of this motor.
+    Limit {
+        /// The motor.
+        id: MotorId,
+        /// The limit.
+        exceeded: Exceeded,
+    },
+    /// The frame 0x280 does not reach this motor (chapter 4).
+    OutOfReach(MotorId),
+}
+
+/// Frames that belonged to no exchange; each count stays at its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counters {
+    /// Replies that came to an exchange that was over.
+    pub late: u32,
+    /// Replies that nobody waited for.
+    pub unasked: u32,
+    /// Frames of a motor's identifier that are not standard data frames of eight bytes.
+    pub malformed: u32,
+    /// Replies of V3 or V4 motors.
+    pub foreign_v3: u32,
+    /// Replies of LK-Tech V2.36 motors.
+    pub foreign_lk: u32,
+    /// The motor of the last foreign reply.
+    pub last_foreign: Option<(Dialect, MotorId)>,
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Timeout => f.write_str("no reply in time; check supply, ID and bit rate"),
+            Error::Foreign(dialect) => {
+                write!(f, "the motor answers in {dialect}, not V1.62; use a host of that protocol")
+            }
+            Error::Quarantined => f.write_str(
+                "the motor did not answer before and does now; nothing was sent, ask again",
+            ),
+        }
+    }
+}
+
+impl core::error::Error for Error {}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Refused::Busy(id) => {
+                write!(f, "motor {id} has an exchange under way; wait for its result")
+            }
+            Refused::Quarantined { id, .. } => {
+                write!(f, "motor {id} may still answer late; try again after the guard time")
+            }
+            Refused::Limit { id, exceeded } => write!(f, "motor {id}: {exceeded}"),
+            Refused::OutOfReach(id) => {
+                write!(f, "the torque frame does not reach motor {id}; use IDs 1 to 4")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Refused {}
