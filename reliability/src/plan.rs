@@ -97,6 +97,7 @@ const BUS: &[(&str, u64)] = &[
     ("pause=49ms..51ms@1e-3", 1_000_000),
     ("pause=99ms..101ms@1e-3", 1_000_000),
     ("pause=140ms..149ms@1e-3,only=received", 1_000_000),
+    ("pause=100ms..600ms@1e-3", 1_000_000),
     ("cut=300ms@1e-4", 1_000_000),
     ("flood=100@1e-3", 1_000_000),
     ("corrupt=1e-6", 1_000_000),
@@ -105,8 +106,8 @@ const BUS: &[(&str, u64)] = &[
     ("flip=1e-5,drop=1e-4,dup=1e-4,insert=1e-3,pause=30ms..70ms@1e-4,cut=50ms@1e-5", 1_000_000),
 ];
 
-const BUS_BEYOND: &[(&str, u64)] =
-    &[("delay=0ms..200ms", 500_000), ("pause=100ms..600ms@1e-3", 1_000_000)];
+/// Replies of a motor with more than the guard time between them.
+const BUS_BEYOND: &[(&str, u64)] = &[("delay=0ms..200ms", 500_000)];
 
 /// Everything that is tried.
 pub const GROUPS: &[Group] = &[

@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use motorlink::fault::{Faults, Lane, Unit, Way};
 use motorlink::time::{Duration, Instant};
 use motorlink_proto::rmd::{
-    CanFrame, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, MotorId, MotorSet, Output, Refused,
-    Torque4,
+    CanFrame, Code, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, MotorId, MotorSet, Output,
+    Refused, TORQUE4_ID, Torque4,
 };
 
 use super::motor::{Node, reaches};
@@ -18,22 +18,35 @@ pub const MOTORS: usize = 4;
 const FRAME: Duration = Duration(120);
 /// How long a motor thinks.
 const TURNAROUND: Duration = Duration(300);
+/// How long an exchange takes at most: the motor is left alone for the guard time, asked for its
+/// status, silent for the guard time, and asked.
+const LONGEST: Duration = Duration(2 * (DEFAULT_GUARD.0 + DEFAULT_TIMEOUT.0 + FRAME.0));
 /// As the blocking client, the host takes what came meanwhile after a pause of this length.
 const IDLE: Duration = Duration(1_000);
 /// Frames that are remembered; more are never on their way.
 const REMEMBERED: usize = 1 << 14;
 const TRACED: usize = 60;
 
-type Exchanges = [u64; MOTORS];
+/// A frame of the host to a motor.
+#[derive(Clone, Copy, Default)]
+struct Asked {
+    /// Counts what each motor was sent, from 1 on.
+    number: u64,
+    at: Instant,
+    /// Off and Stop do not wait until the motor's replies can be trusted.
+    halts: bool,
+    /// The number of what told the motor last to move.
+    moved: u64,
+}
 
-/// A frame of the host: the exchange of each motor that it belongs to, 0 for none.
-type Sent = Exchanges;
+/// A frame of the host to each motor that it reaches.
+type Sent = [Asked; MOTORS];
 
 /// A frame of a drive.
 #[derive(Clone, Copy)]
 struct Reply {
-    /// The exchange that it answers.
-    exchange: u64,
+    /// What it answers.
+    asked: Asked,
     /// Whether its request came twice, and this answers the second copy.
     again: bool,
 }
@@ -48,8 +61,8 @@ pub struct Bench {
     pub now: Instant,
     ended: Instant,
     pub exchanges: u64,
-    /// The exchange that each motor has under way.
-    open: Exchanges,
+    /// What each motor was sent last.
+    last: Sent,
     trouble: [Trouble; MOTORS],
     /// Motors whose last reply was not that to the exchange which took it.
     behind: [bool; MOTORS],
@@ -74,7 +87,7 @@ impl Bench {
             now: Instant(0),
             ended: Instant(0),
             exchanges: 0,
-            open: [0; MOTORS],
+            last: Sent::default(),
             trouble: [Trouble::default(); MOTORS],
             behind: [false; MOTORS],
             sent: Vec::new(),
@@ -99,17 +112,21 @@ impl Bench {
     /// One exchange with one motor, as the blocking client does it: a quarantine is waited for.
     pub fn ask(&mut self, id: MotorId, data: [u8; 8]) {
         let begun = self.now;
+        self.exchanges += 1;
         self.ready();
-        while let Err(refused) = self.host.request(self.now, id, data) {
-            let Refused::Quarantined { until, .. } = refused else {
-                return self.violates(format!("a request was refused: {refused}"));
-            };
-            self.hear(until);
-        }
-        self.begin(id);
-        self.run();
+        let outcome = loop {
+            match self.host.request(self.now, id, data) {
+                Ok(()) => match self.run() {
+                    Some((_, Err(Error::Quarantined))) => {}
+                    outcome => break outcome,
+                },
+                Err(Refused::Quarantined { until, .. }) => self.hear(until),
+                Err(refused) => return self.violates(format!("a request was refused: {refused}")),
+            }
+        };
+        self.over(id, matches!(outcome, Some((_, Ok(_)))));
         let took = self.now.since(begun);
-        if took > DEFAULT_GUARD + DEFAULT_TIMEOUT + FRAME {
+        if took > LONGEST && !self.beyond {
             self.violates(format!("an exchange took {} ms", took.0 / 1_000));
         }
         self.tally.longest = self.tally.longest.max(took);
@@ -119,12 +136,12 @@ impl Bench {
     pub fn cycle(&mut self, requests: [[u8; 8]; MOTORS]) {
         self.ready();
         for (id, data) in MotorSet::TORQUE4.zip(requests) {
-            self.begin(id);
+            self.exchanges += 1;
             if self.host.request(self.now, id, data).is_err() {
                 self.over(id, false);
             }
         }
-        self.run();
+        self.run_all();
     }
 
     /// Four torques in one frame.
@@ -133,8 +150,8 @@ impl Bench {
         if self.host.torque4(self.now, torques, MotorSet::TORQUE4).is_err() {
             return;
         }
-        MotorSet::TORQUE4.for_each(|id| self.begin(id));
-        self.run();
+        self.exchanges += MOTORS as u64;
+        self.run_all();
     }
 
     /// Nothing is asked for a while.
@@ -147,39 +164,60 @@ impl Bench {
         self.now = until;
     }
 
-    fn begin(&mut self, id: MotorId) {
-        self.exchanges += 1;
-        self.open[place(id)] = self.exchanges;
-    }
-
     fn ready(&mut self) {
         if self.now.since(self.ended) > IDLE {
             while self.take() {}
         }
     }
 
-    fn run(&mut self) {
+    /// Moves frames until every exchange is over, which waits for no motor in quarantine.
+    fn run_all(&mut self) {
+        let begun = self.now;
+        while let Some((id, result)) = self.run() {
+            self.over(id, result.is_ok());
+        }
+        let took = self.now.since(begun);
+        if took > DEFAULT_TIMEOUT {
+            self.violates(format!("a cycle took {} ms", took.0 / 1_000));
+        }
+    }
+
+    /// Moves frames until an exchange is over.
+    fn run(&mut self) -> Option<(MotorId, Result<[u8; 8], Error>)> {
         loop {
+            self.ended = self.now;
             match self.host.poll(self.now) {
                 Output::Transmit(frame) => self.transmit(frame),
-                Output::Done { id, result } => self.judge(id, result),
+                Output::Done { id, result } => {
+                    self.judge(id, result);
+                    return Some((id, result));
+                }
                 Output::Wait(Some(until)) => self.hear(until),
-                Output::Wait(None) => break,
+                Output::Wait(None) => return None,
             }
         }
-        self.ended = self.now;
     }
 
     fn transmit(&mut self, frame: CanFrame) {
         self.forget();
-        let mut exchanges = [0; MOTORS];
+        let mut sent = Sent::default();
         for id in MotorSet::TORQUE4.filter(|id| reaches(*id, frame.id())) {
-            exchanges[place(id)] = self.open[place(id)];
+            let Asked { number, moved, .. } = self.last[place(id)];
+            let code = match frame.id() == u32::from(TORQUE4_ID) {
+                true => Code::Torque,
+                false => Code::from(frame.data()[0]),
+            };
+            let halts = matches!(code, Code::Off | Code::Stop);
+            let moves = code.info().is_some_and(|row| row.moves);
+            let number = number + 1;
+            let moved = if moves { number } else { moved };
+            sent[place(id)] = Asked { number, at: self.now, halts, moved };
+            self.last[place(id)] = sent[place(id)];
             self.tally.requests += 1;
         }
         self.note(|| format!("-> {:03x} {:02x?}", frame.id(), frame.data()));
         let message = self.sent.len() as u32;
-        self.sent.push(exchanges);
+        self.sent.push(sent);
         self.out.push(self.now, [Tagged::new(frame, message, 0)]);
     }
 
@@ -199,7 +237,7 @@ impl Bench {
     fn take(&mut self) -> bool {
         let Some(frame) = self.inbox.pop_front() else { return false };
         self.note(|| format!("<- {:03x} {:02x?}", frame.unit.id(), frame.unit.data()));
-        self.host.receive(&frame.unit);
+        self.host.receive(self.now, &frame.unit);
         self.heard = Some(frame);
         true
     }
@@ -239,9 +277,9 @@ impl Bench {
         }
         self.tally.repeated += u64::from(frame.copy && acted);
         self.tally.answers += 1;
-        let exchange = self.sent[source.message as usize][place(id)];
+        let asked = self.sent[source.message as usize][place(id)];
         let message = self.replies.len() as u32;
-        self.replies.push(Reply { exchange, again: frame.copy });
+        self.replies.push(Reply { asked, again: frame.copy });
         self.back.push(self.now + TURNAROUND, [Tagged::new(reply, message, 0)]);
     }
 
@@ -250,7 +288,6 @@ impl Bench {
         if result.is_ok() {
             self.trace_back(id);
         }
-        self.over(id, result.is_ok());
     }
 
     /// Finds out where the reply came from that the host took.
@@ -266,21 +303,27 @@ impl Bench {
             return;
         }
         let reply = frame.source.map(|source| self.replies[source.message as usize]);
-        let Some(Reply { exchange, again }) = reply else { return };
-        let open = self.open[place(id)];
+        let Some(Reply { asked, again }) = reply else { return };
+        let last = self.last[place(id)];
         let behind = &mut self.behind[place(id)];
-        if exchange == open {
+        if asked.number == last.number {
             *behind = false;
             return;
         }
+        // Off and Stop are sent again after the guard time and may be acknowledged by the reply to an
+        // earlier one, behind which nothing moved the motor.
+        let late = self.now.since(asked.at) > DEFAULT_TIMEOUT + DEFAULT_GUARD;
+        let halted = late && last.halts && asked.number > last.moved;
         // Nothing tells the second copy of a reply from the reply to the next request, whose own
         // reply then passes for that of the one behind it.
-        if !(again || frame.copy || *behind || self.beyond) {
-            return self.violates(format!("exchange {open} ended with the reply to {exchange}"));
+        if !(again || frame.copy || *behind || halted || self.beyond) {
+            let (number, other) = (last.number, asked.number);
+            return self
+                .violates(format!("request {number} of motor {id} got the reply to {other}"));
         }
-        *behind = true;
+        *behind |= !halted;
         self.tally.misplaced += 1;
-        self.note(|| format!("   that answered exchange {exchange}"));
+        self.note(|| format!("   that answered request {}", asked.number));
     }
 
     fn over(&mut self, id: MotorId, answered: bool) {
