@@ -155,6 +155,54 @@ proptest! {
         }
     }
 
+    /// Replies carry the number of their request and keep their order; some are lost, and the motor
+    /// may stand still for any time and then answer everything at once.
+    #[test]
+    fn a_motor_that_stands_still_is_never_taken_for_one_that_answers(
+        steps in prop::collection::vec((0u8..2, any::<bool>(), 0u64..40, 0u64..2_000), 1..60),
+    ) {
+        let mut host = Host::new();
+        host.set_timeout(Duration(50));
+        host.set_guard(Duration(100));
+        let mut now = Instant(0);
+        let mut still = Instant(0);
+        let mut coming: Vec<(Instant, CanFrame)> = vec![];
+        for (number, (code, lost, pause, stand)) in (1u8..).zip(steps) {
+            let code = [0x9A, 0x9C][usize::from(code)];
+            // Most of the time the motor goes on.
+            if stand < 600 {
+                still = still.max(now + Duration(stand));
+                coming.iter_mut().for_each(|(at, _)| *at = still.max(*at));
+            }
+            let request = [code, number, 0, 0, 0, 0, 0, 0];
+            let mut asked = host.request(now, motor(1), request).is_ok();
+            let until = now + Duration(60 + pause);
+            while now < until {
+                loop {
+                    match host.poll(now) {
+                        Output::Transmit(frame) if !lost => {
+                            coming.push((still.max(now + Duration(1)), frame));
+                        }
+                        Output::Transmit(_) => {}
+                        Output::Done { result, .. } => {
+                            prop_assert!(asked, "an exchange that nobody began is over");
+                            asked = false;
+                            if let Ok(reply) = result {
+                                prop_assert_eq!(reply, request);
+                            }
+                        }
+                        Output::Wait(_) => break,
+                    }
+                }
+                now += Duration(1);
+                for (_, frame) in coming.extract_if(.., |(at, _)| *at <= now) {
+                    host.receive(now, &frame);
+                }
+            }
+            prop_assert!(!asked, "an exchange ends with its timeout");
+        }
+    }
+
     /// Each host sees the other's requests and the replies to them.
     #[test]
     fn two_hosts_that_talk_to_different_motors_do_not_mix(

@@ -85,7 +85,7 @@ impl Doubt {
         if self.owed == Owed::Nothing {
             return Ok(Admitted::Request);
         }
-        let silent = self.heard.map(|heard| self.until.max(heard + guard));
+        let silent = self.heard.map(|heard| heard + guard);
         if silent.is_some_and(|silent| now >= silent) {
             *self = Doubt::NONE;
             return Ok(Admitted::Request);
