@@ -6,7 +6,7 @@ use super::motor::{Dialect, MotorId};
 use crate::time::Instant;
 use core::fmt;
 
-/// What [`Host::poll`] wants the caller to do.
+/// What [`Host::poll`](super::Host::poll) wants the caller to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Output {
     /// Send this frame; the time for its reply runs from now on.
