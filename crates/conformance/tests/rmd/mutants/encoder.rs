@@ -89,6 +89,16 @@ fn mutants() -> Vec<Mutant> {
         mutant("the_reply_to_a_zero_has_none", "RMD-19-07", {
             on(Code::WriteZeroToRom, |data| put_u16(data, 6, 0))
         }),
+        mutant("the_reply_to_a_zero_has_the_old_one", "RMD-19-07", {
+            commands(|motors, data| {
+                (data[0] == 0x19).then(|| {
+                    let mut reply = motors.ask(*data);
+                    let old = u16_at(&motors.ask(Command::encode(&ReadEncoder_)), 6);
+                    put_u16(&mut reply, 6, old);
+                    Some(reply)
+                })
+            })
+        }),
         mutant("48_bits_of_a_multi_turn_angle", "RMD-92-03", {
             on(ReadMultiTurnAngle, |data| data[7] = 0)
         }),
