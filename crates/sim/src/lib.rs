@@ -35,9 +35,14 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
+pub mod angle;
 mod clock;
+pub mod hash;
 pub mod heat;
 pub mod machine;
+pub mod plant;
+pub mod preset;
 pub mod rmd;
 pub mod st;
 mod transform;
+pub mod vector;

@@ -1,0 +1,63 @@
+//! Binary angles: 2^32 a turn, so that they wrap by themselves and stay exact however far a rotor
+//! turns.
+
+use core::f32::consts::TAU;
+
+/// A turn of a multi-turn position.
+pub const TURN: i64 = 1 << 32;
+
+/// Radians of one digit.
+const DIGIT: f32 = TAU / TURN as f32;
+
+/// Radians of a span of positions.
+pub fn radians(span: i64) -> f32 {
+    span as f32 * DIGIT
+}
+
+/// The nearest position to an angle in rad; saturates.
+pub fn position(radians: f32) -> i64 {
+    libm::round(f64::from(radians) * (TURN as f64 / core::f64::consts::TAU)) as i64
+}
+
+/// Sine and cosine of an angle of 2^32 a turn, within 1e-7.
+///
+/// The angle is taken to the nearest quarter turn, which whole numbers do exactly; what is left, at
+/// most π/4, goes into the Taylor series.
+pub fn sin_cos(angle: u32) -> (f32, f32) {
+    const EIGHTH: u32 = 1 << 29;
+    let quarter = angle.wrapping_add(EIGHTH) >> 30;
+    let x = angle.wrapping_sub(quarter << 30) as i32 as f32 * DIGIT;
+    let z = x * x;
+    let sin = x + x * z * (-1.0 / 6.0 + z * (1.0 / 120.0 + z * (-1.0 / 5040.0 + z / 362_880.0)));
+    let cos = 1.0 + z * (-0.5 + z * (1.0 / 24.0 + z * (-1.0 / 720.0 + z / 40_320.0)));
+    match quarter {
+        0 => (sin, cos),
+        1 => (cos, -sin),
+        2 => (-sin, -cos),
+        _ => (-cos, sin),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sine_and_cosine_are_the_librarys() {
+        for step in 0..100_000u32 {
+            let angle = step.wrapping_mul(42_949_673);
+            let exact = f64::from(angle) * (core::f64::consts::TAU / TURN as f64);
+            let (sin, cos) = sin_cos(angle);
+            assert!((f64::from(sin) - libm::sin(exact)).abs() < 1e-7, "{angle:#x}");
+            assert!((f64::from(cos) - libm::cos(exact)).abs() < 1e-7, "{angle:#x}");
+        }
+    }
+
+    #[test]
+    fn positions_and_radians_are_inverse() {
+        for angle in [0.0, 1.0, -1000.0, 1e6] {
+            assert!((radians(position(angle)) - angle).abs() <= angle.abs() * 1e-6);
+        }
+        assert_eq!(position(f32::MAX), i64::MAX);
+    }
+}

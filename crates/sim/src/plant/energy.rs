@@ -1,0 +1,43 @@
+//! Where energy came from and where it went.
+
+/// Energies since the beginning, J. Nothing is lost:
+/// `source = supply + chopper + copper + iron + friction + gear + load + stored`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Energy {
+    /// Out of the source, and of what feeds the bus beside it.
+    pub source: f64,
+    /// Heat of the source's resistance.
+    pub supply: f64,
+    /// Heat of the brake resistor.
+    pub chopper: f64,
+    /// Through the motor's terminals; part of what follows.
+    pub electrical: f64,
+    /// Heat of windings and closed switches.
+    pub copper: f64,
+    /// Iron losses.
+    pub iron: f64,
+    /// Heat of the rotor's friction.
+    pub friction: f64,
+    /// Heat of the gear.
+    pub gear: f64,
+    /// Into what the output drives.
+    pub load: f64,
+    /// Gained by capacitor, windings, rotor, springs and weights.
+    pub stored: f64,
+}
+
+impl Energy {
+    /// All that was lost or given away.
+    pub fn spent(&self) -> f64 {
+        self.supply + self.chopper + self.copper + self.iron + self.friction + self.gear + self.load
+    }
+
+    /// What the account does not explain, as a share of all that was turned over.
+    pub fn imbalance(&self) -> f64 {
+        let turned_over = self.source.abs() + self.spent().abs() + self.stored.abs();
+        if turned_over == 0.0 {
+            return 0.0;
+        }
+        (self.source - self.spent() - self.stored) / turned_over
+    }
+}

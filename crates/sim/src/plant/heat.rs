@@ -1,0 +1,107 @@
+//! Two bodies that losses heat: the winding, and the housing between it and the air.
+//!
+//! ```text
+//! Cw dTw/dt = P_copper − (Tw − Th)/Rwh
+//! Ch dTh/dt = P_other + (Tw − Th)/Rwh − (Th − Ta)/Rha
+//! ```
+//!
+//! The usual lumped model of a motor's data sheet (winding and stator; see for example Maxon,
+//! *Formulae Handbook*, thermal behaviour).
+
+/// How a motor warms up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+pub struct HeatConfig {
+    /// Temperature of the air, and of everything at the beginning, °C.
+    pub ambient: f32,
+    /// Heat capacity of the winding, J/K.
+    pub winding_capacity: f32,
+    /// Heat capacity of the housing, J/K.
+    pub housing_capacity: f32,
+    /// From winding to housing, K/W.
+    pub winding_to_housing: f32,
+    /// From housing to air, K/W.
+    pub housing_to_air: f32,
+    /// Where the drive's sensor is.
+    pub sensor: HeatSensor,
+}
+
+/// Where a drive feels the temperature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "lowercase")
+)]
+pub enum HeatSensor {
+    /// In the winding.
+    Winding,
+    /// On the housing, which is the power stage's heatsink too.
+    #[default]
+    Housing,
+}
+
+impl Default for HeatConfig {
+    fn default() -> Self {
+        HeatConfig {
+            ambient: 25.0,
+            winding_capacity: 30.0,
+            housing_capacity: 250.0,
+            winding_to_housing: 1.0,
+            housing_to_air: 2.5,
+            sensor: HeatSensor::Housing,
+        }
+    }
+}
+
+/// The temperatures.
+#[derive(Debug, Clone)]
+pub(super) struct Heat {
+    config: HeatConfig,
+    /// °C.
+    winding: f32,
+    housing: f32,
+    /// What the sensor shows in place of the truth, °C.
+    forced: Option<f32>,
+}
+
+impl Heat {
+    pub(super) const fn new(config: HeatConfig) -> Self {
+        Heat { winding: config.ambient, housing: config.ambient, forced: None, config }
+    }
+
+    /// Temperature of the winding, °C.
+    pub(super) const fn winding(&self) -> f32 {
+        self.winding
+    }
+
+    /// Temperature of the housing, °C.
+    pub(super) const fn housing(&self) -> f32 {
+        self.housing
+    }
+
+    /// What the sensor shows, °C.
+    pub(super) fn sensed(&self) -> f32 {
+        self.forced.unwrap_or(match self.config.sensor {
+            HeatSensor::Winding => self.winding,
+            HeatSensor::Housing => self.housing,
+        })
+    }
+
+    pub(super) const fn force(&mut self, temperature: Option<f32>) {
+        self.forced = temperature;
+    }
+
+    /// Lets heat in the winding and in the housing (J) act over `dt` (s).
+    pub(super) fn step(&mut self, dt: f32, winding: f32, housing: f32) {
+        let HeatConfig { ambient, winding_to_housing, housing_to_air, .. } = self.config;
+        let inner = (self.winding - self.housing) / winding_to_housing * dt;
+        let outer = (self.housing - ambient) / housing_to_air * dt;
+        self.winding += (winding - inner) / self.config.winding_capacity;
+        self.housing += (housing + inner - outer) / self.config.housing_capacity;
+    }
+}

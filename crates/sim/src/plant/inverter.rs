@@ -1,0 +1,100 @@
+//! The inverter: three half bridges, averaged over a period.
+//!
+//! A voltage command is a share of the bus voltage in the stator's frame. Space-vector modulation
+//! centres the three duties (the common mode is minus the mean of the greatest and the least, see
+//! D. G. Holmes and T. A. Lipo, *Pulse Width Modulation for Power Converters*), and a duty ends at
+//! 0 and 1: so what comes out is within the hexagon. During the dead time the current chooses the
+//! rail, which takes `dead time / period` of the bus voltage from a phase that gives current and
+//! adds it to one that takes it; around zero, within the current's ripple, in proportion to it.
+
+use crate::vector::Vector;
+
+/// What the power stage is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+pub struct InverterConfig {
+    /// Time in which both switches of a half bridge are off, µs.
+    pub dead_time_us: f32,
+    /// Current below which the dead time's effect fades, A.
+    pub ripple_current: f32,
+    /// Resistance of a closed switch, Ω.
+    pub on_resistance: f32,
+}
+
+impl Default for InverterConfig {
+    fn default() -> Self {
+        InverterConfig { dead_time_us: 0.5, ripple_current: 0.2, on_resistance: 0.02 }
+    }
+}
+
+/// What the drive's firmware tells the power stage for a period.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Bridge {
+    /// All switches open. Current that still flows goes through the diodes.
+    #[default]
+    Off,
+    /// A voltage in the stator's frame, as a share of the bus voltage. A circle of radius 1/√3 fits
+    /// into what can come out.
+    Drive(Vector),
+}
+
+/// Voltage per bus voltage that comes out of a command, with this current (A) flowing out.
+pub(super) fn modulate(
+    command: Vector,
+    current: Vector,
+    dead: f32,
+    config: &InverterConfig,
+) -> Vector {
+    let [a, b, c] = command.phases();
+    let centre = 0.5 - 0.5 * (a.max(b).max(c) + a.min(b).min(c));
+    let currents = current.phases();
+    let leg = |share: f32, current: f32| {
+        let duty = (share + centre).clamp(0.0, 1.0);
+        duty - dead * (current / config.ripple_current).clamp(-1.0, 1.0)
+    };
+    let (a, b, c) = (leg(a, currents[0]), leg(b, currents[1]), leg(c, currents[2]));
+    let mean = (a + b + c) * (1.0 / 3.0);
+    Vector::from_phases(a - mean, b - mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::INVERSE_SQRT_3;
+
+    fn ideal(command: Vector) -> Vector {
+        modulate(command, Vector::ZERO, 0.0, &InverterConfig::default())
+    }
+
+    #[test]
+    fn what_fits_into_the_hexagon_comes_out() {
+        for angle in (0..64).map(|step| step << 26) {
+            let command = Vector::unit(angle) * (INVERSE_SQRT_3 - 1e-6);
+            assert!((ideal(command) - command).length() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn what_does_not_ends_at_the_hexagon() {
+        // Two thirds of the bus voltage at a corner, 1/√3 in the middle of a side.
+        let corner = ideal(Vector::new(5.0, 0.0));
+        assert!((corner - Vector::new(2.0 / 3.0, 0.0)).length() < 1e-6, "{corner:?}");
+        let side = ideal(Vector::new(0.0, 5.0));
+        assert!((side - Vector::new(0.0, INVERSE_SQRT_3)).length() < 1e-6, "{side:?}");
+    }
+
+    #[test]
+    fn dead_time_works_against_the_current() {
+        let config = InverterConfig { ripple_current: 0.1, ..InverterConfig::default() };
+        let current = Vector::new(2.0, 0.0);
+        let lost = modulate(Vector::ZERO, current, 0.01, &config);
+        // Phase A gives, B and C take: 4/3 of a leg's loss along A.
+        assert!((lost - Vector::new(-0.01 * 4.0 / 3.0, 0.0)).length() < 1e-6, "{lost:?}");
+        let small = modulate(Vector::ZERO, current * 0.01, 0.01, &config);
+        assert!(small.length() < 0.5 * lost.length());
+    }
+}

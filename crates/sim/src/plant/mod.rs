@@ -1,0 +1,405 @@
+//! A motor with its supply, its power stage and its sensors: what a drive's firmware runs on.
+//!
+//! [`Plant::step`] is one period of the pulse width modulation. The firmware reads
+//! [`sample`](Plant::sample), [`counts`](Plant::counts) and the bus voltage, and gives the power
+//! stage's command for the *next* period: the sample's delay of a real drive.
+
+mod energy;
+mod heat;
+mod inverter;
+mod load;
+mod machine;
+mod noise;
+mod range;
+mod sensing;
+mod supply;
+
+pub use energy::Energy;
+pub use heat::{HeatConfig, HeatSensor};
+pub use inverter::{Bridge, InverterConfig};
+pub use load::{LoadConfig, PendulumConfig, SpringConfig, StopsConfig};
+pub use machine::{Feed, Flow, GearConfig, Machine, MachineConfig};
+pub use range::OutOfRange;
+pub use sensing::{EncoderConfig, Sample, SensingConfig};
+pub use supply::{ChopperConfig, SupplyConfig};
+
+use heat::Heat;
+use supply::Supply;
+
+use crate::angle;
+use crate::vector::Vector;
+
+/// What a plant is built from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
+pub struct PlantConfig {
+    /// Period of the pulse width modulation and of the current control, µs.
+    pub period_us: u16,
+    /// What the noise is drawn from.
+    pub seed: u32,
+    /// Angle of the rotor at the beginning, °.
+    pub angle_degrees: f32,
+    /// The motor.
+    pub machine: MachineConfig,
+    /// What it drives.
+    pub load: LoadConfig,
+    /// How it warms up.
+    pub heat: HeatConfig,
+    /// What feeds it.
+    pub supply: SupplyConfig,
+    /// The power stage.
+    pub inverter: InverterConfig,
+    /// The current sensors.
+    pub sensing: SensingConfig,
+    /// The encoder.
+    pub encoder: EncoderConfig,
+}
+
+/// What is really going on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlantTruth {
+    /// Speed of the rotor, rad/s.
+    pub speed: f32,
+    /// Angle of the rotor over all turns, °.
+    pub angle_degrees: f64,
+    /// Angle of the output over all turns, °.
+    pub output_degrees: f64,
+    /// Flux current, A.
+    pub id: f32,
+    /// Torque current, A.
+    pub iq: f32,
+    /// Currents of the phases, A.
+    pub phase_currents: [f32; 3],
+    /// Voltage at the windings in the rotor's frame, V.
+    pub vd: f32,
+    /// Voltage at the windings in the rotor's frame, V.
+    pub vq: f32,
+    /// Electromagnetic torque, Nm.
+    pub torque: f32,
+    /// Torque of the load on the output, Nm.
+    pub load_torque: f32,
+    /// Bus voltage, V.
+    pub bus_voltage: f32,
+    /// Whether the brake resistor is on.
+    pub chopping: bool,
+    /// Temperature of the winding, °C.
+    pub winding_temperature: f32,
+    /// Temperature of the housing, °C.
+    pub housing_temperature: f32,
+    /// Whether the rotor is held.
+    pub locked: bool,
+}
+
+/// What the diodes of an open bridge do in a step, with voltages in the rotor's frame.
+enum Diodes {
+    /// No current flows.
+    Open,
+    /// Current flows against the bus.
+    Conduct(Vector),
+    /// Current comes to its end.
+    End(Vector),
+}
+
+/// Time between two steps of the heat, µs.
+const SLOW_US: u32 = 1000;
+
+/// A motor with its supply, its power stage and its sensors.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    config: PlantConfig,
+    /// Length of a step, s.
+    period: f32,
+    /// Dead time as a share of the period.
+    dead: f32,
+    machine: Machine,
+    supply: Supply,
+    heat: Heat,
+    /// What the power stage does in the coming step.
+    pending: Bridge,
+    /// What the windings were fed with in the last step.
+    fed_with: Feed,
+    /// Current that something feeds into the bus beside the source, A.
+    fed: f32,
+    /// Steps since the beginning.
+    count: u32,
+    /// Time since the last slow step, µs.
+    since_slow: u32,
+    /// Energies since the last slow step.
+    flow: Flow,
+    bus: supply::Flow,
+    energy: Energy,
+    /// Stored energy at the beginning, J.
+    initial: f64,
+}
+
+impl Plant {
+    /// A motor at rest with its bus charged.
+    pub fn new(config: PlantConfig) -> Self {
+        let start = angle::position(config.angle_degrees.to_radians());
+        let period = f32::from(config.period_us) * 1e-6;
+        let mut plant = Plant {
+            period,
+            dead: config.inverter.dead_time_us / f32::from(config.period_us),
+            machine: Machine::new(config.machine, config.load, start, 0.0),
+            supply: Supply::new(config.supply),
+            heat: Heat::new(config.heat),
+            pending: Bridge::Off,
+            fed_with: Feed::Stator(Vector::ZERO),
+            fed: 0.0,
+            count: 0,
+            since_slow: 0,
+            flow: Flow::default(),
+            bus: supply::Flow::default(),
+            energy: Energy::default(),
+            initial: 0.0,
+            config,
+        };
+        plant.machine.set_temperature(plant.heat.winding());
+        plant.initial = plant.stored();
+        plant
+    }
+
+    /// What the plant is built from; the load and the source may have changed since.
+    pub const fn config(&self) -> &PlantConfig {
+        &self.config
+    }
+
+    /// The motor.
+    pub const fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// Length of a step, s.
+    pub const fn period(&self) -> f32 {
+        self.period
+    }
+
+    /// Lets one period pass, with what was commanded at its beginning, and takes the command for
+    /// the next one.
+    pub fn step(&mut self, next: Bridge) {
+        let bridge = core::mem::replace(&mut self.pending, next);
+        self.count = self.count.wrapping_add(1);
+        let idle = bridge == Bridge::Off && self.fed == 0.0;
+        if !(idle && self.machine.rests() && self.supply.rests()) {
+            self.move_on(bridge);
+        }
+        self.since_slow += u32::from(self.config.period_us);
+        if self.since_slow >= SLOW_US {
+            self.warm_up();
+        }
+    }
+
+    fn move_on(&mut self, bridge: Bridge) {
+        let bus = self.supply.voltage();
+        let resistance = self.config.inverter.on_resistance;
+        let flow = match bridge {
+            Bridge::Drive(share) => {
+                let current = self.machine.current();
+                let share = inverter::modulate(share, current, self.dead, &self.config.inverter);
+                self.fed_with = Feed::Stator(share * bus);
+                self.machine.step(self.period, self.fed_with, resistance)
+            }
+            Bridge::Off => match self.through_diodes(bus) {
+                Diodes::Open => {
+                    self.fed_with = Feed::Stator(self.machine.back_emf());
+                    self.machine.coast(self.period)
+                }
+                Diodes::Conduct(voltage) => {
+                    self.fed_with = Feed::Rotor(voltage);
+                    self.machine.step(self.period, self.fed_with, resistance)
+                }
+                Diodes::End(voltage) => {
+                    self.fed_with = Feed::Rotor(voltage);
+                    let flow = self.machine.step(self.period, self.fed_with, resistance);
+                    self.machine.open();
+                    flow
+                }
+            },
+        };
+        self.add(flow);
+        let taken = flow.electrical / (self.period * bus.max(1e-3));
+        let bus = self.supply.step(self.period, taken, self.fed);
+        self.bus.source += bus.source;
+        self.bus.lost += bus.lost;
+        self.bus.braked += bus.braked;
+    }
+
+    /// What the diodes do while all switches are open: they put the bus, of which the six-step
+    /// fundamental is 2/π, against the current that there will be at the end of the step.
+    fn through_diodes(&self, bus: f32) -> Diodes {
+        const SIX_STEP: f32 = core::f32::consts::FRAC_2_PI;
+        let MachineConfig { inductance_d, inductance_q, .. } = *self.machine.config();
+        let most = SIX_STEP * bus;
+        let current = self.machine.rotor_current();
+        let back_emf = self.machine.speed() * self.machine.config().back_emf_constant();
+        if current == Vector::ZERO && back_emf.abs() <= most {
+            return Diodes::Open;
+        }
+        let change = Vector::new(inductance_d * current.x, inductance_q * current.y);
+        let ending = Vector::new(0.0, back_emf) - change * (1.0 / self.period);
+        let length = ending.length();
+        if length <= most { Diodes::End(ending) } else { Diodes::Conduct(ending * (most / length)) }
+    }
+
+    fn add(&mut self, flow: Flow) {
+        self.flow.electrical += flow.electrical;
+        self.flow.copper += flow.copper;
+        self.flow.iron += flow.iron;
+        self.flow.friction += flow.friction;
+        self.flow.gear += flow.gear;
+        self.flow.load += flow.load;
+    }
+
+    /// What happens once a millisecond: heat, and the account of energy.
+    fn warm_up(&mut self) {
+        let dt = self.since_slow as f32 * 1e-6;
+        self.since_slow = 0;
+        let flow = core::mem::take(&mut self.flow);
+        let bus = core::mem::take(&mut self.bus);
+        let series = self.config.inverter.on_resistance;
+        let resistance = self.machine.resistance();
+        let winding = flow.copper * resistance / (resistance + series);
+        let housing = flow.copper - winding + flow.iron + flow.friction;
+        self.heat.step(dt, winding, housing);
+        self.machine.set_temperature(self.heat.winding());
+        let energy = &mut self.energy;
+        for (sum, part) in [
+            (&mut energy.source, bus.source),
+            (&mut energy.supply, bus.lost),
+            (&mut energy.chopper, bus.braked),
+            (&mut energy.electrical, flow.electrical),
+            (&mut energy.copper, flow.copper),
+            (&mut energy.iron, flow.iron),
+            (&mut energy.friction, flow.friction),
+            (&mut energy.gear, flow.gear),
+            (&mut energy.load, flow.load),
+        ] {
+            *sum += f64::from(part);
+        }
+    }
+
+    fn stored(&self) -> f64 {
+        f64::from(self.supply.energy())
+            + f64::from(self.machine.magnetic_energy())
+            + f64::from(self.machine.mechanical_energy())
+    }
+}
+
+/// What the firmware sees.
+impl Plant {
+    /// The phase currents as the converter shows them.
+    pub fn sample(&self) -> Sample {
+        let current = self.machine.current();
+        self.config.sensing.sample(current, self.config.seed, self.count)
+    }
+
+    /// Counts of the encoder over all turns, 2^bits a turn.
+    pub fn counts(&self) -> i64 {
+        let offset = angle::position(self.config.encoder.offset_degrees.to_radians());
+        self.machine.position().wrapping_add(offset) >> self.finer_bits()
+    }
+
+    /// Bits of a position that are finer than the encoder.
+    pub fn finer_bits(&self) -> u32 {
+        angle::TURN.trailing_zeros() - u32::from(self.config.encoder.bits)
+    }
+
+    /// Hall sensors A, B and C as bits 0 to 2.
+    pub fn hall(&self) -> u8 {
+        sensing::hall(self.machine.electrical_angle())
+    }
+
+    /// Voltage of the bus, V.
+    pub fn bus_voltage(&self) -> f32 {
+        self.supply.voltage()
+    }
+
+    /// What the temperature sensor shows, °C.
+    pub fn temperature(&self) -> f32 {
+        self.heat.sensed()
+    }
+
+    /// Feeds a current (A) into the bus beside the source, in every step until it is changed.
+    pub fn feed(&mut self, current: f32) {
+        self.fed = current;
+    }
+}
+
+/// The world around the motor.
+impl Plant {
+    /// Sets the voltage of the source, V.
+    pub fn set_source(&mut self, voltage: f32) {
+        self.supply.set_source(voltage.max(0.0));
+    }
+
+    /// The supply as it is now.
+    pub fn supply(&self) -> &SupplyConfig {
+        self.supply.config()
+    }
+
+    /// Changes what hangs on the output.
+    pub fn change_load(&mut self, change: impl FnOnce(&mut LoadConfig)) {
+        let mut load = *self.machine.load();
+        change(&mut load);
+        self.machine.set_load(load);
+    }
+
+    /// Holds the rotor where it is, or lets it go.
+    pub const fn lock(&mut self, locked: bool) {
+        self.machine.lock(locked);
+    }
+
+    /// Makes the temperature sensor show this, °C, or the truth again.
+    pub const fn force_temperature(&mut self, temperature: Option<f32>) {
+        self.heat.force(temperature);
+    }
+
+    /// What is really going on.
+    pub fn truth(&self) -> PlantTruth {
+        let current = self.machine.rotor_current();
+        let frame = Vector::unit(self.machine.electrical_angle());
+        let voltage = match self.fed_with {
+            Feed::Stator(voltage) => voltage.seen_from(frame),
+            Feed::Rotor(voltage) => voltage,
+        };
+        let degrees = |position: i64| position as f64 * (360.0 / angle::TURN as f64);
+        PlantTruth {
+            speed: self.machine.speed(),
+            angle_degrees: degrees(self.machine.position()),
+            output_degrees: degrees(self.machine.position())
+                / f64::from(self.config.machine.gear.ratio),
+            id: current.x,
+            iq: current.y,
+            phase_currents: self.machine.current().phases(),
+            vd: voltage.x,
+            vq: voltage.y,
+            torque: self.machine.torque(),
+            load_torque: self.machine.load_torque(),
+            bus_voltage: self.supply.voltage(),
+            chopping: self.supply.chopping(),
+            winding_temperature: self.heat.winding(),
+            housing_temperature: self.heat.housing(),
+            locked: self.machine.locked(),
+        }
+    }
+
+    /// The account of energy up to now.
+    pub fn energy(&self) -> Energy {
+        Energy {
+            source: self.energy.source + f64::from(self.bus.source),
+            supply: self.energy.supply + f64::from(self.bus.lost),
+            chopper: self.energy.chopper + f64::from(self.bus.braked),
+            electrical: self.energy.electrical + f64::from(self.flow.electrical),
+            copper: self.energy.copper + f64::from(self.flow.copper),
+            iron: self.energy.iron + f64::from(self.flow.iron),
+            friction: self.energy.friction + f64::from(self.flow.friction),
+            gear: self.energy.gear + f64::from(self.flow.gear),
+            load: self.energy.load + f64::from(self.flow.load),
+            stored: self.stored() - self.initial,
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! The supply: a source behind a resistance, the bus capacitor, a brake chopper.
+//!
+//! ```text
+//! C dV/dt = (V0 − V)/R + I_in − I_bridge − (chopper closed) V/R_brake
+//! ```
+//!
+//! A step is a trapezoid, which is stable for any R C and keeps account of energy exactly.
+
+/// What feeds the power stage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+pub struct SupplyConfig {
+    /// Voltage of the source, V.
+    pub voltage: f32,
+    /// Resistance of source and cable, Ω.
+    pub resistance: f32,
+    /// Capacitor on the bus, F.
+    pub capacitance: f32,
+    /// Whether the source takes current back, as a battery does. A rectifier or a bench supply does
+    /// not: regeneration then raises the bus.
+    pub takes_back: bool,
+    /// A brake chopper, if there is one.
+    pub chopper: Option<ChopperConfig>,
+}
+
+/// A resistor that is switched on when the bus is too high.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
+pub struct ChopperConfig {
+    /// The resistor, Ω.
+    pub resistance: f32,
+    /// Bus voltage at which it is switched on, V.
+    pub on_voltage: f32,
+    /// Bus voltage at which it is switched off again, V.
+    pub off_voltage: f32,
+}
+
+impl Default for SupplyConfig {
+    fn default() -> Self {
+        SupplyConfig {
+            voltage: 24.0,
+            resistance: 0.05,
+            capacitance: 470e-6,
+            takes_back: false,
+            chopper: None,
+        }
+    }
+}
+
+/// Where energy came from and went in a step, J.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Flow {
+    /// Out of the source and what feeds beside it.
+    pub(super) source: f32,
+    /// Heat of the source's resistance.
+    pub(super) lost: f32,
+    /// Heat of the brake resistor.
+    pub(super) braked: f32,
+}
+
+/// The bus.
+#[derive(Debug, Clone)]
+pub(super) struct Supply {
+    config: SupplyConfig,
+    /// How far the bus is below the source, V: a small number keeps its digits.
+    sag: f32,
+    chopping: bool,
+}
+
+impl Supply {
+    pub(super) const fn new(config: SupplyConfig) -> Self {
+        Supply { sag: 0.0, chopping: false, config }
+    }
+
+    pub(super) const fn config(&self) -> &SupplyConfig {
+        &self.config
+    }
+
+    /// Sets the voltage of the source, V.
+    pub(super) const fn set_source(&mut self, voltage: f32) {
+        self.sag += voltage - self.config.voltage;
+        self.config.voltage = voltage;
+    }
+
+    /// Voltage of the bus, V.
+    pub(super) const fn voltage(&self) -> f32 {
+        self.config.voltage - self.sag
+    }
+
+    /// Whether the brake resistor is on.
+    pub(super) const fn chopping(&self) -> bool {
+        self.chopping
+    }
+
+    /// Energy in the capacitor, J.
+    pub(super) fn energy(&self) -> f32 {
+        0.5 * self.config.capacitance * self.voltage() * self.voltage()
+    }
+
+    /// Whether nothing changes as long as nothing is taken and nothing fed.
+    pub(super) fn rests(&self) -> bool {
+        const NEAR: f32 = 1e-5;
+        let SupplyConfig { voltage: source, takes_back, chopper, .. } = self.config;
+        let kept = self.sag < 0.0 && !takes_back;
+        let quiet = chopper.is_none_or(|chopper| self.voltage() <= chopper.on_voltage);
+        !self.chopping && quiet && (kept || self.sag.abs() <= NEAR * source)
+    }
+
+    /// Lets the bridge take `taken` (A; negative when it gives) and something feed `fed` (A) for
+    /// `dt` (s).
+    pub(super) fn step(&mut self, dt: f32, taken: f32, fed: f32) -> Flow {
+        let SupplyConfig { voltage: source, resistance, capacitance, takes_back, chopper } =
+            self.config;
+        if let Some(chopper) = chopper {
+            let threshold = if self.chopping { chopper.off_voltage } else { chopper.on_voltage };
+            self.chopping = self.voltage() > threshold;
+        }
+        let brake = match chopper {
+            Some(chopper) if self.chopping => 1.0 / chopper.resistance,
+            _ => 0.0,
+        };
+        let gain = 0.5 * dt / capacitance;
+        // The mean sag of the step, with the source connected or not.
+        let mean = |conductance: f32| {
+            (self.sag + gain * (taken - fed + brake * source))
+                / (1.0 + gain * (conductance + brake))
+        };
+        let mut conductance = 1.0 / resistance;
+        let mut middle = mean(conductance);
+        if middle < 0.0 && !takes_back {
+            conductance = 0.0;
+            middle = mean(conductance);
+        }
+        let middle = middle.min(source);
+        let drawn = middle * conductance;
+        self.sag = (2.0 * middle - self.sag).min(source);
+        let voltage = source - middle;
+        Flow {
+            source: (source * drawn + voltage * fed) * dt,
+            lost: drawn * middle * dt,
+            braked: voltage * voltage * brake * dt,
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Currents and torque.
+
+use motorlink_sim::plant::{Feed, LoadConfig, Machine, MachineConfig};
+use motorlink_sim::vector::Vector;
+
+use crate::plain;
+
+const DT: f32 = 50e-6;
+
+fn machine() -> Machine {
+    Machine::new(plain().machine, LoadConfig::default(), 0, 0.0)
+}
+
+#[test]
+fn a_locked_rotors_current_rises_with_its_time_constant() {
+    let MachineConfig { resistance, inductance_d, inductance_q, .. } = plain().machine;
+    for (voltage, inductance) in
+        [(Vector::new(2.0, 0.0), inductance_d), (Vector::new(0.0, 2.0), inductance_q)]
+    {
+        let mut machine = machine();
+        machine.lock(true);
+        for step in 1..=400 {
+            machine.step(DT, Feed::Stator(voltage), 0.0);
+            let time = step as f32 * DT;
+            let expected = 2.0 / resistance * (1.0 - (-time * resistance / inductance).exp());
+            let current = machine.rotor_current().length();
+            assert!((current - expected).abs() < 4e-5, "{current} A for {expected} A at {time} s");
+        }
+    }
+}
+
+#[test]
+fn torque_is_that_of_flux_and_reluctance() {
+    let mut machine = machine();
+    machine.lock(true);
+    let voltage = Vector::new(-1.5, 2.5);
+    for _ in 0..2000 {
+        machine.step(DT, Feed::Rotor(voltage), 0.0);
+    }
+    // Id = -3 A, Iq = 5 A: 1.5 * 4 * (0.01 * 5 + (1e-3 - 1.5e-3) * -15) Nm
+    assert!((machine.torque() - 6.0 * (0.05 + 0.0075)).abs() < 1e-4, "{} Nm", machine.torque());
+}
+
+#[test]
+fn the_back_emf_is_the_voltage_of_open_terminals() {
+    let fast = Machine::new(plain().machine, LoadConfig::default(), 0, 100.0);
+    let emf = fast.back_emf();
+    assert!(
+        (emf - Vector::new(0.0, 4.0)).length() < 1e-5,
+        "a quarter ahead of the magnet: {emf:?}"
+    );
+}
+
+#[test]
+fn a_hot_winding_has_more_resistance() {
+    let mut machine = machine();
+    machine.set_temperature(125.0);
+    assert!((machine.resistance() / 0.5 - 1.385).abs() < 0.001);
+}
+
+/// Current, speed and angle of an accelerating motor at 20 ms, in steps of `dt`.
+fn run_up(dt: f32) -> [f64; 4] {
+    let mut machine = machine();
+    let steps = (20e-3 / dt).round() as u32;
+    for _ in 0..steps {
+        machine.step(dt, Feed::Rotor(Vector::new(-1.0, 8.0)), 0.0);
+    }
+    let Vector { x: id, y: iq } = machine.rotor_current();
+    [id.into(), iq.into(), machine.speed().into(), machine.position() as f64]
+}
+
+#[test]
+fn shorter_steps_converge_with_at_least_the_second_order() {
+    let exact = run_up(1e-6);
+    let error = |dt| -> f64 {
+        let run = run_up(dt);
+        run.iter().zip(exact).map(|(value, exact)| ((value - exact) / exact).abs()).sum()
+    };
+    let (coarse, middle, usual) = (error(400e-6), error(200e-6), error(50e-6));
+    assert!(coarse > 3.0 * middle, "{coarse} with 400 µs, {middle} with 200 µs");
+    assert!(usual < 2e-4, "{usual} with 50 µs");
+}
+
+#[test]
+fn a_fast_winding_is_integrated_in_pieces() {
+    let config = MachineConfig {
+        resistance: 5.0,
+        inductance_d: 20e-6,
+        inductance_q: 20e-6,
+        ..plain().machine
+    };
+    let mut machine = Machine::new(config, LoadConfig::default(), 0, 0.0);
+    machine.lock(true);
+    for _ in 0..20 {
+        machine.step(DT, Feed::Stator(Vector::new(5.0, 0.0)), 0.0);
+    }
+    assert!((machine.rotor_current().x - 1.0).abs() < 1e-3, "{:?}", machine.rotor_current());
+}

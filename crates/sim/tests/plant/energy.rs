@@ -1,0 +1,113 @@
+//! Nothing is lost: what the source gave is heat, work, or still there.
+
+use motorlink_sim::plant::{
+    Bridge, ChopperConfig, GearConfig, InverterConfig, LoadConfig, MachineConfig, PendulumConfig,
+    Plant, PlantConfig, SpringConfig, StopsConfig, SupplyConfig,
+};
+use motorlink_sim::preset;
+use motorlink_sim::vector::Vector;
+
+use crate::plain;
+
+/// A motor with everything that takes energy.
+fn everything() -> PlantConfig {
+    PlantConfig {
+        machine: MachineConfig {
+            viscous_friction: 2e-5,
+            coulomb_friction: 2e-3,
+            stiction: 4e-3,
+            cogging_torque: 3e-3,
+            iron_hysteresis: 1e-3,
+            iron_eddy: 1e-5,
+            gear: GearConfig { ratio: 3.0, efficiency: 0.85 },
+            ..plain().machine
+        },
+        load: LoadConfig {
+            brake: 0.02,
+            viscous: 1e-4,
+            fan: 1e-6,
+            inertia: 2e-4,
+            ..LoadConfig::default()
+        },
+        supply: SupplyConfig {
+            resistance: 0.1,
+            chopper: Some(ChopperConfig { resistance: 4.0, on_voltage: 26.0, off_voltage: 25.0 }),
+            ..SupplyConfig::default()
+        },
+        inverter: InverterConfig::default(),
+        ..plain()
+    }
+}
+
+/// Forwards, more, off, backwards, off, with `share` of the bus voltage ahead of the magnet.
+fn drive(plant: &mut Plant, share: f32) {
+    for step in 0..40_000u32 {
+        let ahead = match step / 8000 {
+            0 => share,
+            1 => 2.0 * share,
+            3 => -share,
+            _ => 0.0,
+        };
+        let magnet = Vector::unit(plant.machine().electrical_angle());
+        let voltage = Vector::new(0.0, ahead).turned(magnet);
+        plant.step(if ahead == 0.0 { Bridge::Off } else { Bridge::Drive(voltage) });
+    }
+}
+
+#[track_caller]
+fn assert_balanced(plant: &Plant) {
+    let energy = plant.energy();
+    assert!(energy.imbalance().abs() < 0.005, "{:.3} %: {energy:?}", 100.0 * energy.imbalance());
+}
+
+#[test]
+fn what_goes_in_comes_out_or_stays() {
+    let mut plant = Plant::new(everything());
+    drive(&mut plant, 0.2);
+    assert_balanced(&plant);
+    let energy = plant.energy();
+    let parts = [energy.supply, energy.copper, energy.iron, energy.friction, energy.gear];
+    assert!(parts.iter().all(|part| *part > 1e-3), "each takes its part: {energy:?}");
+    assert!(energy.load > 0.1, "{energy:?}");
+}
+
+#[test]
+fn the_balance_holds_for_springs_weights_and_stops() {
+    let spring = SpringConfig { stiffness: 0.3, centre_degrees: -30.0 };
+    let pendulum = PendulumConfig { mass: 0.2, length: 0.1 };
+    let stops =
+        StopsConfig { low_degrees: -180.0, high_degrees: 180.0, stiffness: 5.0, damping: 0.01 };
+    for load in [
+        LoadConfig { spring, ..everything().load },
+        LoadConfig { pendulum, ..everything().load },
+        LoadConfig { stops: Some(stops), ..everything().load },
+    ] {
+        let mut plant = Plant::new(PlantConfig { load, ..everything() });
+        drive(&mut plant, 0.15);
+        assert_balanced(&plant);
+    }
+}
+
+#[test]
+fn a_swing_without_friction_keeps_its_energy() {
+    let spring = SpringConfig { stiffness: 0.5, centre_degrees: 90.0 };
+    let load = LoadConfig { spring, ..LoadConfig::default() };
+    let mut plant = Plant::new(PlantConfig { load, ..plain() });
+    let before = plant.machine().mechanical_energy();
+    for _ in 0..200_000 {
+        plant.step(Bridge::Off);
+    }
+    let after = plant.machine().mechanical_energy();
+    assert!((after / before - 1.0).abs() < 0.01, "{before} J, {after} J after 112 swings");
+}
+
+#[test]
+fn every_preset_keeps_the_balance() {
+    for (name, config) in preset::ALL {
+        let mut plant = Plant::new(config());
+        drive(&mut plant, 0.1);
+        let energy = plant.energy();
+        assert!(energy.source > 0.0, "{name}: {energy:?}");
+        assert!(energy.imbalance().abs() < 0.005, "{name}: {energy:?}");
+    }
+}
