@@ -54,6 +54,11 @@ impl Vector {
         [self.x, half + side, half - side]
     }
 
+    /// Each part times a factor of its own.
+    pub fn scaled(self, factors: Vector) -> Self {
+        Vector { x: self.x * factors.x, y: self.y * factors.y }
+    }
+
     /// Scalar product.
     pub fn dot(self, other: Vector) -> f32 {
         self.x * other.x + self.y * other.y

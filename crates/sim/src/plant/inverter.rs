@@ -6,8 +6,10 @@
 //! 0 and 1: so what comes out is within the hexagon. During the dead time the current chooses the
 //! rail, which takes `dead time / period` of the bus voltage from a phase that gives current and
 //! adds it to one that takes it; around zero, within the current's ripple, in proportion to it.
+//! A command within the circle that fits into the hexagon comes out as it is, so only the others are
+//! taken apart into duties.
 
-use crate::vector::Vector;
+use crate::vector::{INVERSE_SQRT_3, Vector};
 
 /// What the power stage is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,21 +44,38 @@ pub enum Bridge {
     Drive(Vector),
 }
 
-/// Voltage per bus voltage that comes out of a command, with this current (A) flowing out.
-pub(super) fn modulate(
-    command: Vector,
-    current: Vector,
+/// From commands to voltages.
+#[derive(Debug, Clone)]
+pub(super) struct Modulator {
+    /// Dead time as a share of the period.
     dead: f32,
-    config: &InverterConfig,
-) -> Vector {
+    /// One over the current's ripple, 1/A.
+    steepness: f32,
+}
+
+impl Modulator {
+    pub(super) fn new(config: &InverterConfig, period: f32) -> Self {
+        Modulator {
+            dead: config.dead_time_us * 1e-6 / period,
+            steepness: 1.0 / config.ripple_current,
+        }
+    }
+
+    /// Voltage per bus voltage that comes out of a command, with this current (A) flowing out.
+    pub(super) fn modulate(&self, command: Vector, current: Vector) -> Vector {
+        let circle = INVERSE_SQRT_3 * INVERSE_SQRT_3;
+        let wanted = if command.square() <= circle { command } else { within_hexagon(command) };
+        let [a, b, c] = current.phases().map(|current| (current * self.steepness).clamp(-1.0, 1.0));
+        let mean = (a + b + c) * (1.0 / 3.0);
+        wanted - Vector::from_phases(a - mean, b - mean) * self.dead
+    }
+}
+
+/// What comes out of a command that may be too great.
+fn within_hexagon(command: Vector) -> Vector {
     let [a, b, c] = command.phases();
     let centre = 0.5 - 0.5 * (a.max(b).max(c) + a.min(b).min(c));
-    let currents = current.phases();
-    let leg = |share: f32, current: f32| {
-        let duty = (share + centre).clamp(0.0, 1.0);
-        duty - dead * (current / config.ripple_current).clamp(-1.0, 1.0)
-    };
-    let (a, b, c) = (leg(a, currents[0]), leg(b, currents[1]), leg(c, currents[2]));
+    let [a, b, c] = [a, b, c].map(|share| (share + centre).clamp(0.0, 1.0));
     let mean = (a + b + c) * (1.0 / 3.0);
     Vector::from_phases(a - mean, b - mean)
 }
@@ -64,10 +83,10 @@ pub(super) fn modulate(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::INVERSE_SQRT_3;
 
     fn ideal(command: Vector) -> Vector {
-        modulate(command, Vector::ZERO, 0.0, &InverterConfig::default())
+        let config = InverterConfig { dead_time_us: 0.0, ..InverterConfig::default() };
+        Modulator::new(&config, 50e-6).modulate(command, Vector::ZERO)
     }
 
     #[test]
@@ -89,12 +108,14 @@ mod tests {
 
     #[test]
     fn dead_time_works_against_the_current() {
-        let config = InverterConfig { ripple_current: 0.1, ..InverterConfig::default() };
+        let config =
+            InverterConfig { dead_time_us: 0.5, ripple_current: 0.1, ..InverterConfig::default() };
+        let modulator = Modulator::new(&config, 50e-6);
         let current = Vector::new(2.0, 0.0);
-        let lost = modulate(Vector::ZERO, current, 0.01, &config);
+        let lost = modulator.modulate(Vector::ZERO, current);
         // Phase A gives, B and C take: 4/3 of a leg's loss along A.
         assert!((lost - Vector::new(-0.01 * 4.0 / 3.0, 0.0)).length() < 1e-6, "{lost:?}");
-        let small = modulate(Vector::ZERO, current * 0.01, 0.01, &config);
+        let small = modulator.modulate(Vector::ZERO, current * 0.01);
         assert!(small.length() < 0.5 * lost.length());
     }
 }

@@ -10,9 +10,13 @@
 //! T     = 1.5 p ψ × i        = 1.5 p (ψm iq + (Ld − Lq) id iq)
 //! ```
 //!
-//! In this frame a constant voltage is constant, so only R/L limits the step, not the speed. A step
-//! is one of Runge and Kutta's fourth order, with the rotor's angle at begin, middle and end from
-//! the speed and the last acceleration; a winding that is faster than [`FASTEST`] takes several.
+//! A step of length h is split symmetrically (Strang, *On the construction and comparison of
+//! difference schemes*, SIAM J. Numer. Anal. 5, 1968): the resistance acts for h/6, 4h/6 and h/6, and
+//! in between rotation and voltage act for h/2 each. Both parts are solved exactly: without
+//! resistance the flux linkage of the stator only adds up voltage; without voltage and rotation Ld id
+//! and Lq iq die away exponentially. A factor a axis makes the current of a constant voltage exact.
+//! What is left is of the second order, with Simpson's small constant for the angle that the rotor
+//! turns in a step.
 //!
 //! Shaft, at the rotor, with gear ratio N:
 //!
@@ -29,7 +33,7 @@
 //! currents are in proportion to it.
 
 use super::load::{Load, LoadConfig};
-use crate::angle::{TURN, sin_cos};
+use crate::angle::{self, TURN, sin_cos};
 use crate::vector::Vector;
 
 /// What a machine is. A machine's values belong together: start from a
@@ -105,8 +109,6 @@ impl MachineConfig {
     }
 }
 
-/// Greatest share of the windings' time constant that a step of integration may take.
-const FASTEST: f32 = 0.3;
 /// Growth of copper's resistance from 25 °C, 1/K: it would be nothing at -234.5 °C.
 const COPPER: f32 = 1.0 / 259.5;
 
@@ -117,16 +119,6 @@ pub enum Feed {
     Stator(Vector),
     /// A voltage that turns with the rotor, V: d and q.
     Rotor(Vector),
-}
-
-impl Feed {
-    /// The voltage in the stator's frame, where the rotor is at `frame`.
-    fn voltage(self, frame: Vector) -> Vector {
-        match self {
-            Feed::Stator(voltage) => voltage,
-            Feed::Rotor(voltage) => voltage.turned(frame),
-        }
-    }
 }
 
 /// Where the energy of a step went, J.
@@ -146,54 +138,123 @@ pub struct Flow {
     pub load: f32,
 }
 
-/// A motor with what hangs on its shaft.
+/// A motor with what hangs on its shaft, integrated in steps of one length.
 #[derive(Debug, Clone)]
 pub struct Machine {
     config: MachineConfig,
     load: Load,
     locked: bool,
-    /// Inertia of all that turns, at the rotor, kg m².
-    inertia: f32,
+    /// Length of a step, s.
+    period: f32,
+    /// Phase resistance now, Ω, and what is in series with it.
+    resistance: f32,
+    series: f32,
+    decay: Decay,
+    shaft: Shaft,
+    /// One over the speed of the Stribeck effect, s/rad.
+    inverse_stribeck: f32,
     /// One over the inductances, 1/H.
     inverse: Vector,
-    /// Phase resistance now, Ω.
-    resistance: f32,
-    /// Flux linkage in the stator's frame, Wb.
+    /// Ld id and Lq iq, Wb.
     flux: Vector,
-    /// Current in the stator's frame, A.
-    current: Vector,
     /// Where the rotor is: its electrical angle as a unit vector.
     frame: Vector,
     /// rad/s.
     speed: f32,
-    /// rad/s².
-    acceleration: f32,
+    /// What the last step added to the speed, rad/s.
+    change: f32,
     /// 2^32 a turn.
     position: i64,
     /// Electromagnetic torque, mean of the last step, Nm.
     torque: f32,
 }
 
+/// What the resistance does in a step.
+#[derive(Debug, Clone)]
+struct Decay {
+    /// What a sixth of a step leaves of a flux linkage.
+    outer: Vector,
+    /// What two sixths leave.
+    inner: Vector,
+    /// Time for which a voltage acts in half a step, s.
+    drive: Vector,
+}
+
+impl Decay {
+    fn new(period: f32, resistance: f32, inverse: Vector) -> Self {
+        let axis = |inverse: f32| {
+            let exponent = resistance * inverse * period;
+            let outer = libm::expf(-exponent / 6.0);
+            let inner = outer * outer;
+            // A constant voltage then ends at itself over the resistance.
+            let all = inner * inner * inner;
+            let drive = (1.0 - all) / (outer * (1.0 + inner * inner)) / (resistance * inverse);
+            (outer, inner, drive)
+        };
+        let (d, q) = (axis(inverse.x), axis(inverse.y));
+        Decay {
+            outer: Vector::new(d.0, q.0),
+            inner: Vector::new(d.1, q.1),
+            drive: Vector::new(d.2, q.2),
+        }
+    }
+}
+
+/// What a step needs of all that turns.
+#[derive(Debug, Clone)]
+struct Shaft {
+    /// Inertia at the rotor, kg m².
+    inertia: f32,
+    /// Speed per torque of a step, rad/s/Nm.
+    gain: f32,
+    /// What viscous friction leaves of a speed.
+    viscous: f32,
+}
+
+impl Shaft {
+    fn new(config: &MachineConfig, load: &Load, period: f32) -> Self {
+        let inertia = config.inertia + load.inertia();
+        let gain = period / inertia;
+        let viscous = 1.0 / (1.0 + gain * (config.viscous_friction + config.iron_eddy));
+        Shaft { inertia, gain, viscous }
+    }
+}
+
 impl Machine {
-    /// A machine without current, its rotor at `position` (2^32 a turn) and `speed` (rad/s).
-    pub fn new(config: MachineConfig, load: LoadConfig, position: i64, speed: f32) -> Self {
+    /// A machine at rest and without current, with its rotor at 0, for steps of `period` (s).
+    pub fn new(config: MachineConfig, load: LoadConfig, period: f32) -> Self {
         let load = Load::new(load, config.gear);
-        let frame = Vector::unit(electrical(position, &config));
+        let inverse = Vector::new(1.0 / config.inductance_d, 1.0 / config.inductance_q);
         Machine {
-            inertia: config.inertia + load.inertia(),
+            shaft: Shaft::new(&config, &load, period),
+            decay: Decay::new(period, config.resistance, inverse),
             load,
             locked: false,
-            inverse: Vector::new(1.0 / config.inductance_d, 1.0 / config.inductance_q),
+            period,
             resistance: config.resistance,
-            flux: frame * config.flux_linkage,
-            current: Vector::ZERO,
-            frame,
-            speed,
-            acceleration: 0.0,
-            position,
+            series: 0.0,
+            inverse_stribeck: 1.0 / config.stribeck_speed,
+            inverse,
+            flux: Vector::ZERO,
+            frame: Vector::unit(0),
+            speed: 0.0,
+            change: 0.0,
+            position: 0,
             torque: 0.0,
             config,
         }
+    }
+
+    /// Puts the rotor at a position (2^32 a turn) with a speed (rad/s).
+    pub fn place(&mut self, position: i64, speed: f32) {
+        (self.position, self.speed, self.change) = (position, speed, 0.0);
+        self.frame = Vector::unit(self.electrical_angle());
+    }
+
+    /// Puts a resistance (Ω) in series with each phase.
+    pub fn set_series(&mut self, resistance: f32) {
+        self.series = resistance;
+        self.decay = Decay::new(self.period, self.resistance + self.series, self.inverse);
     }
 
     /// What the machine is.
@@ -209,7 +270,7 @@ impl Machine {
     /// Hangs something else on the output.
     pub fn set_load(&mut self, load: LoadConfig) {
         self.load = Load::new(load, self.config.gear);
-        self.inertia = self.config.inertia + self.load.inertia();
+        self.shaft = Shaft::new(&self.config, &self.load, self.period);
     }
 
     /// Holds the rotor where it is, or lets it go.
@@ -243,13 +304,13 @@ impl Machine {
     }
 
     /// Current in the stator's frame, A.
-    pub const fn current(&self) -> Vector {
-        self.current
+    pub fn current(&self) -> Vector {
+        self.rotor_current().turned(self.frame)
     }
 
     /// Current in the rotor's frame, A: Id and Iq.
     pub fn rotor_current(&self) -> Vector {
-        self.current.seen_from(self.frame)
+        self.flux.scaled(self.inverse)
     }
 
     /// Back-EMF in the stator's frame, V.
@@ -276,8 +337,14 @@ impl Machine {
 
     /// Sets the windings' temperature, °C.
     pub fn set_temperature(&mut self, celsius: f32) {
+        /// Change of the resistance that is not worth a new exponential.
+        const SAME: f32 = 1e-5;
         let growth = (1.0 + COPPER * (celsius - 25.0)).max(0.1);
-        self.resistance = self.config.resistance * growth;
+        let resistance = self.config.resistance * growth;
+        if (resistance - self.resistance).abs() > SAME * resistance {
+            self.resistance = resistance;
+            self.set_series(self.series);
+        }
     }
 
     /// Energy in the windings' fields, J.
@@ -291,29 +358,19 @@ impl Machine {
         let MachineConfig { cogging_torque, cogging_periods, .. } = self.config;
         let periods = f32::from(cogging_periods.max(1));
         let cogging = cogging_torque / periods * (1.0 - self.cogging_angle(self.position).1);
-        0.5 * self.inertia * self.speed * self.speed + self.load.potential(self.position) + cogging
+        0.5 * self.shaft.inertia * self.speed * self.speed
+            + self.load.potential(self.position)
+            + cogging
     }
 
     /// Stops the current, as open terminals do.
     pub(super) fn open(&mut self) {
-        self.current = Vector::ZERO;
-        self.flux = self.frame * self.config.flux_linkage;
-        self.torque = 0.0;
-    }
-
-    /// Lets `dt` (s) pass with open terminals.
-    pub(super) fn coast(&mut self, dt: f32) -> Flow {
-        let mut flow = Flow::default();
-        let (middle, middle_speed) = self.middle(dt);
-        self.open();
-        self.advance(dt, middle, middle_speed, &mut flow);
-        self.open();
-        flow
+        (self.flux, self.torque) = (Vector::ZERO, 0.0);
     }
 
     /// Whether nothing changes as long as no current flows.
     pub(super) fn rests(&self) -> bool {
-        if self.speed != 0.0 || self.current != Vector::ZERO {
+        if self.speed != 0.0 || self.flux != Vector::ZERO {
             return false;
         }
         let load = self.load.at(self.position, 0.0).total();
@@ -321,106 +378,105 @@ impl Machine {
         self.locked || pull.abs() <= self.dry(0.0, load).total
     }
 
-    /// Lets a voltage act for `dt` (s), with `resistance` (Ω) in series with each phase.
-    pub fn step(&mut self, dt: f32, feed: Feed, resistance: f32) -> Flow {
-        let resistance = self.resistance + resistance;
-        let quickest = resistance * self.inverse.x.max(self.inverse.y) * dt;
-        let mut flow = Flow::default();
-        if quickest <= FASTEST {
-            self.piece(dt, feed, resistance, &mut flow);
-        } else {
-            let pieces = libm::ceilf(quickest / FASTEST);
-            for _ in 0..pieces as u32 {
-                self.piece(dt / pieces, feed, resistance, &mut flow);
+    /// Lets a step pass with open terminals.
+    pub(super) fn coast(&mut self, flow: &mut Flow) {
+        self.open();
+        self.advance(self.half(), flow);
+    }
+
+    /// Lets a voltage act for a step; adds where energy went.
+    pub fn step(&mut self, feed: Feed, flow: &mut Flow) {
+        match feed {
+            Feed::Stator(voltage) => {
+                let at = |frame| voltage.seen_from(frame);
+                self.drive(at, |_, end| voltage.seen_from(end), flow);
+            }
+            Feed::Rotor(voltage) => {
+                self.drive(|_| voltage, |half, _| half.mean(voltage), flow);
             }
         }
-        flow
     }
 
-    fn piece(&mut self, dt: f32, feed: Feed, resistance: f32, flow: &mut Flow) {
-        let half = 0.5 * dt;
-        let (middle, middle_speed) = self.middle(dt);
+    /// A step with a voltage that is `at` a frame as seen from it, and that adds up over half a step
+    /// to `over`, given that half and the frame at its end.
+    #[inline]
+    fn drive(
+        &mut self,
+        at: impl Fn(Vector) -> Vector,
+        over: impl Fn(&Half, Vector) -> Vector,
+        flow: &mut Flow,
+    ) {
+        let half = self.half();
         let begin = self.frame;
-        let between = Vector::unit(electrical(middle, &self.config));
-        // As far beyond the middle as the middle is beyond the beginning.
-        let end = between.turned(between.seen_from(begin));
-        let (v1, v2, v3) = (feed.voltage(begin), feed.voltage(between), feed.voltage(end));
+        let middle = begin.turned(half.turn);
+        let end = middle.turned(half.turn);
+        // The magnet's part of the flux linkage turns away.
+        let magnet = Vector::new(half.turn.x - 1.0, -half.turn.y) * self.config.flux_linkage;
+        let magnet = magnet * (2.0 / self.period);
+        let first = (over(&half, middle) + magnet).scaled(self.decay.drive);
+        let second = (over(&half, end) + magnet).scaled(self.decay.drive);
 
-        let i1 = self.current;
-        let k1 = v1 - i1 * resistance;
-        let flux2 = self.flux + k1 * half;
-        let i2 = self.current_of(flux2, between);
-        let k2 = v2 - i2 * resistance;
-        let flux3 = self.flux + k2 * half;
-        let i3 = self.current_of(flux3, between);
-        let k3 = v2 - i3 * resistance;
-        let flux4 = self.flux + k3 * dt;
-        let i4 = self.current_of(flux4, end);
-        let k4 = v3 - i4 * resistance;
+        let f1 = self.flux;
+        let driven = f1.scaled(self.decay.outer).seen_from(half.turn) + first;
+        let f2 = driven.scaled(self.decay.inner);
+        let driven = f2.scaled(self.decay.inner).seen_from(half.turn) + second;
+        let f3 = driven.scaled(self.decay.outer);
+        self.flux = f3;
 
-        let sixth = dt / 6.0;
-        let power = v1.dot(i1) + 2.0 * (v2.dot(i2) + v2.dot(i3)) + v3.dot(i4);
+        let (i1, i2, i3) =
+            (f1.scaled(self.inverse), f2.scaled(self.inverse), f3.scaled(self.inverse));
+        let sixth = self.period * (1.0 / 6.0);
+        let power = at(begin).dot(i1) + 4.0 * at(middle).dot(i2) + at(end).dot(i3);
         flow.electrical += 1.5 * sixth * power;
-        let square = i1.square() + 2.0 * (i2.square() + i3.square()) + i4.square();
-        flow.copper += 1.5 * resistance * sixth * square;
-        let product =
-            self.flux.cross(i1) + 2.0 * (flux2.cross(i2) + flux3.cross(i3)) + flux4.cross(i4);
-        self.torque = 1.5 * f32::from(self.config.pole_pairs) * product * (1.0 / 6.0);
-        self.flux = self.flux + (k1 + (k2 + k3) * 2.0 + k4) * sixth;
-
-        self.advance(dt, middle, middle_speed, flow);
-        self.current = self.current_of(self.flux, self.frame);
+        let square = i1.square() + 4.0 * i2.square() + i3.square();
+        flow.copper += 1.5 * (self.resistance + self.series) * sixth * square;
+        let product = f1.cross(i1) + 4.0 * f2.cross(i2) + f3.cross(i3);
+        let magnet = self.config.flux_linkage * (i1.y + 4.0 * i2.y + i3.y);
+        self.torque = 0.25 * f32::from(self.config.pole_pairs) * (magnet + product);
+        self.advance(half, flow);
     }
 
-    /// Position and speed in the middle of a step, by the last acceleration.
-    fn middle(&self, dt: f32) -> (i64, f32) {
-        let half = 0.5 * dt;
-        let speed = self.speed + half * self.acceleration;
-        let way = 0.5 * half * (self.speed + speed);
-        (self.position.wrapping_add(digits(way)), speed)
+    /// The first half of a step, by the speed and its last change.
+    fn half(&self) -> Half {
+        let speed = self.speed + 0.5 * self.change;
+        let way = 0.5 * self.period * speed;
+        let angle = way * f32::from(self.config.pole_pairs);
+        let position = self.position.wrapping_add(digits(way));
+        Half { position, speed, angle, turn: small(angle) }
     }
 
-    /// Moves the rotor on.
-    fn advance(&mut self, dt: f32, middle: i64, middle_speed: f32, flow: &mut Flow) {
+    /// Moves the rotor on, with the torques of friction and load as in the middle of the step.
+    fn advance(&mut self, half: Half, flow: &mut Flow) {
         if self.locked {
-            (self.speed, self.acceleration) = (0.0, 0.0);
-        } else {
-            self.turn(dt, middle, middle_speed, flow);
-            self.frame = Vector::unit(self.electrical_angle());
+            (self.speed, self.change) = (0.0, 0.0);
+            return;
         }
-    }
-
-    /// Current of a flux linkage, both in the stator's frame.
-    fn current_of(&self, flux: Vector, frame: Vector) -> Vector {
-        let rotor = flux.seen_from(frame);
-        let id = (rotor.x - self.config.flux_linkage) * self.inverse.x;
-        Vector::new(id, rotor.y * self.inverse.y).turned(frame)
-    }
-
-    /// Lets the torques act for `dt` (s), with those of the load as in the middle of the step.
-    fn turn(&mut self, dt: f32, middle: i64, middle_speed: f32, flow: &mut Flow) {
         let MachineConfig { viscous_friction, iron_eddy, iron_hysteresis, .. } = self.config;
         let last = self.speed;
-        let gain = dt / self.inertia;
-        let load = self.load.at(middle, middle_speed);
-        let pull = self.load.referred(load.total()) + self.cogging(middle);
-        let viscous = viscous_friction + iron_eddy;
-        let free = (last + gain * (self.torque + pull)) / (1.0 + gain * viscous);
-        let dry = self.dry(middle_speed, load.total());
-        let left = (free.abs() - gain * dry.total).max(0.0);
-        self.speed = if left > 0.0 { left.copysign(free) } else { 0.0 };
-        self.acceleration = (self.speed - last) / dt;
-        let way = 0.5 * (last + self.speed) * dt;
+        let load = self.load.at(half.position, half.speed);
+        let pull = self.load.referred(load.total()) + self.cogging(half.position);
+        let free = (last + self.shaft.gain * (self.torque + pull)) * self.shaft.viscous;
+        let dry = self.dry(half.speed, load.total());
+        let left = free.abs() - self.shaft.gain * dry.total;
+        let slips = left > 0.0;
+        self.speed = if slips { left.copysign(free) } else { 0.0 };
+        self.change = self.speed - last;
+        let mean = 0.5 * (last + self.speed);
+        let way = mean * self.period;
         self.position = self.position.wrapping_add(digits(way));
+        self.frame = Vector::unit(self.electrical_angle());
 
         // Each torque times the way is the kinetic energy's change, to the last digit.
+        let dry_way = if slips || dry.total == 0.0 {
+            way.copysign(free * way)
+        } else {
+            free * self.shaft.inertia * mean / dry.total
+        };
         let slowed = free * way;
-        let braked = (free - self.speed) * way / gain;
-        let share = if dry.total > 0.0 { braked / dry.total } else { 0.0 };
-        flow.friction += viscous_friction * slowed + dry.rotor * share;
-        flow.iron += iron_eddy * slowed + iron_hysteresis * share;
-        flow.gear += dry.gear * share;
-        flow.load += dry.brake * share - self.load.referred(load.lost) * way;
+        flow.friction += viscous_friction * slowed + dry.rotor * dry_way;
+        flow.iron += iron_eddy * slowed + iron_hysteresis * dry_way;
+        flow.gear += dry.gear * dry_way;
+        flow.load += dry.brake * dry_way - self.load.referred(load.lost) * way;
     }
 
     /// Torque of the cogging, Nm.
@@ -438,8 +494,8 @@ impl Machine {
 
     /// Torques that only brake, at a speed and with a load (Nm at the output).
     fn dry(&self, speed: f32, load: f32) -> Dry {
-        let MachineConfig { coulomb_friction, stiction, stribeck_speed, .. } = self.config;
-        let relative = speed / stribeck_speed;
+        let MachineConfig { coulomb_friction, stiction, .. } = self.config;
+        let relative = speed * self.inverse_stribeck;
         let extra = (stiction - coulomb_friction).max(0.0) / (1.0 + relative * relative);
         let rotor = coulomb_friction + extra;
         let (brake, gear) = self.load.dry(load);
@@ -455,9 +511,42 @@ struct Dry {
     total: f32,
 }
 
+/// The first half of a step.
+struct Half {
+    /// Where it ends.
+    position: i64,
+    /// Speed at its end, rad/s.
+    speed: f32,
+    /// Electrical angle that the rotor turns in it, rad, and as a unit vector.
+    angle: f32,
+    turn: Vector,
+}
+
+impl Half {
+    /// Mean of a voltage that turns with the rotor, as the rotor sees at the end what it left behind.
+    fn mean(&self, voltage: Vector) -> Vector {
+        let z = self.angle * self.angle;
+        let along = 1.0 - z * (1.0 / 6.0);
+        let behind = self.angle * (0.5 - z * (1.0 / 24.0));
+        voltage.seen_from(Vector::new(along, behind))
+    }
+}
+
+/// The unit vector of an angle in rad, which is small but for odd motors.
+fn small(x: f32) -> Vector {
+    /// Up to which the series are exact enough, rad.
+    const SMALL: f32 = 0.5;
+    if x.abs() > SMALL {
+        return Vector::unit(angle::position(x) as u32);
+    }
+    let z = x * x;
+    let cos = 1.0 + z * (-0.5 + z * (1.0 / 24.0 - z * (1.0 / 720.0)));
+    Vector::new(cos, x + x * z * (-1.0 / 6.0 + z * (1.0 / 120.0)))
+}
+
 /// Electrical angle of a rotor's position, 2^32 a turn.
-fn electrical(position: i64, config: &MachineConfig) -> u32 {
-    (position as u32).wrapping_mul(config.pole_pairs.into())
+const fn electrical(position: i64, config: &MachineConfig) -> u32 {
+    (position as u32).wrapping_mul(config.pole_pairs as u32)
 }
 
 /// Digits of a position in a small angle, rad.

@@ -24,6 +24,8 @@ pub use sensing::{EncoderConfig, Sample, SensingConfig};
 pub use supply::{ChopperConfig, SupplyConfig};
 
 use heat::Heat;
+use inverter::Modulator;
+use sensing::Sensor;
 use supply::Supply;
 
 use crate::angle;
@@ -104,6 +106,23 @@ enum Diodes {
     End(Vector),
 }
 
+/// What the diodes do while all switches are open: they put the bus, of which the six-step
+/// fundamental is 2/π, against the current that there will be at the end of the step.
+fn through_diodes(machine: &Machine, period: f32, bus: f32) -> Diodes {
+    const SIX_STEP: f32 = core::f32::consts::FRAC_2_PI;
+    let MachineConfig { inductance_d, inductance_q, .. } = *machine.config();
+    let most = SIX_STEP * bus;
+    let current = machine.rotor_current();
+    let back_emf = machine.speed() * machine.config().back_emf_constant();
+    if current == Vector::ZERO && back_emf.abs() <= most {
+        return Diodes::Open;
+    }
+    let change = Vector::new(inductance_d * current.x, inductance_q * current.y);
+    let ending = Vector::new(0.0, back_emf) - change * (1.0 / period);
+    let length = ending.length();
+    if length <= most { Diodes::End(ending) } else { Diodes::Conduct(ending * (most / length)) }
+}
+
 /// Time between two steps of the heat, µs.
 const SLOW_US: u32 = 1000;
 
@@ -113,8 +132,8 @@ pub struct Plant {
     config: PlantConfig,
     /// Length of a step, s.
     period: f32,
-    /// Dead time as a share of the period.
-    dead: f32,
+    modulator: Modulator,
+    sensor: Sensor,
     machine: Machine,
     supply: Supply,
     heat: Heat,
@@ -143,8 +162,9 @@ impl Plant {
         let period = f32::from(config.period_us) * 1e-6;
         let mut plant = Plant {
             period,
-            dead: config.inverter.dead_time_us / f32::from(config.period_us),
-            machine: Machine::new(config.machine, config.load, start, 0.0),
+            modulator: Modulator::new(&config.inverter, period),
+            sensor: Sensor::new(&config.sensing, config.seed),
+            machine: Machine::new(config.machine, config.load, period),
             supply: Supply::new(config.supply),
             heat: Heat::new(config.heat),
             pending: Bridge::Off,
@@ -158,6 +178,8 @@ impl Plant {
             initial: 0.0,
             config,
         };
+        plant.machine.place(start, 0.0);
+        plant.machine.set_series(config.inverter.on_resistance);
         plant.machine.set_temperature(plant.heat.winding());
         plant.initial = plant.stored();
         plant
@@ -195,63 +217,32 @@ impl Plant {
 
     fn move_on(&mut self, bridge: Bridge) {
         let bus = self.supply.voltage();
-        let resistance = self.config.inverter.on_resistance;
-        let flow = match bridge {
+        let before = self.flow.electrical;
+        let Plant { machine, flow, period, .. } = self;
+        match bridge {
             Bridge::Drive(share) => {
-                let current = self.machine.current();
-                let share = inverter::modulate(share, current, self.dead, &self.config.inverter);
+                let share = self.modulator.modulate(share, machine.current());
                 self.fed_with = Feed::Stator(share * bus);
-                self.machine.step(self.period, self.fed_with, resistance)
+                machine.step(self.fed_with, flow);
             }
-            Bridge::Off => match self.through_diodes(bus) {
+            Bridge::Off => match through_diodes(machine, *period, bus) {
                 Diodes::Open => {
-                    self.fed_with = Feed::Stator(self.machine.back_emf());
-                    self.machine.coast(self.period)
+                    machine.coast(flow);
+                    self.fed_with = Feed::Stator(machine.back_emf());
                 }
                 Diodes::Conduct(voltage) => {
                     self.fed_with = Feed::Rotor(voltage);
-                    self.machine.step(self.period, self.fed_with, resistance)
+                    machine.step(self.fed_with, flow);
                 }
                 Diodes::End(voltage) => {
                     self.fed_with = Feed::Rotor(voltage);
-                    let flow = self.machine.step(self.period, self.fed_with, resistance);
-                    self.machine.open();
-                    flow
+                    machine.step(self.fed_with, flow);
+                    machine.open();
                 }
             },
-        };
-        self.add(flow);
-        let taken = flow.electrical / (self.period * bus.max(1e-3));
-        let bus = self.supply.step(self.period, taken, self.fed);
-        self.bus.source += bus.source;
-        self.bus.lost += bus.lost;
-        self.bus.braked += bus.braked;
-    }
-
-    /// What the diodes do while all switches are open: they put the bus, of which the six-step
-    /// fundamental is 2/π, against the current that there will be at the end of the step.
-    fn through_diodes(&self, bus: f32) -> Diodes {
-        const SIX_STEP: f32 = core::f32::consts::FRAC_2_PI;
-        let MachineConfig { inductance_d, inductance_q, .. } = *self.machine.config();
-        let most = SIX_STEP * bus;
-        let current = self.machine.rotor_current();
-        let back_emf = self.machine.speed() * self.machine.config().back_emf_constant();
-        if current == Vector::ZERO && back_emf.abs() <= most {
-            return Diodes::Open;
         }
-        let change = Vector::new(inductance_d * current.x, inductance_q * current.y);
-        let ending = Vector::new(0.0, back_emf) - change * (1.0 / self.period);
-        let length = ending.length();
-        if length <= most { Diodes::End(ending) } else { Diodes::Conduct(ending * (most / length)) }
-    }
-
-    fn add(&mut self, flow: Flow) {
-        self.flow.electrical += flow.electrical;
-        self.flow.copper += flow.copper;
-        self.flow.iron += flow.iron;
-        self.flow.friction += flow.friction;
-        self.flow.gear += flow.gear;
-        self.flow.load += flow.load;
+        let taken = (self.flow.electrical - before) / (self.period * bus.max(1e-3));
+        self.supply.step(self.period, taken, self.fed, &mut self.bus);
     }
 
     /// What happens once a millisecond: heat, and the account of energy.
@@ -293,8 +284,7 @@ impl Plant {
 impl Plant {
     /// The phase currents as the converter shows them.
     pub fn sample(&self) -> Sample {
-        let current = self.machine.current();
-        self.config.sensing.sample(current, self.config.seed, self.count)
+        self.sensor.sample(self.machine.current(), self.count)
     }
 
     /// Counts of the encoder over all turns, 2^bits a turn.

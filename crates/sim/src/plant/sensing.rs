@@ -44,32 +44,48 @@ pub struct Sample {
     pub b: i16,
 }
 
-impl SensingConfig {
-    /// The `count`th sample, of a current in the stator's frame.
-    pub(super) fn sample(&self, current: Vector, seed: u32, count: u32) -> Sample {
-        let [a, b, _] = current.phases();
-        let (noise_a, noise_b) = if self.noise > 0.0 {
-            let (a, b) = noise::pair(seed, count);
-            (a * self.noise, b * self.noise)
-        } else {
-            (0.0, 0.0)
-        };
-        let [offset_a, offset_b] = self.offset;
-        let [gain_a, gain_b] = self.gain_error;
-        Sample {
-            a: self.convert(a + a * gain_a + offset_a + noise_a),
-            b: self.convert(b + b * gain_b + offset_b + noise_b),
+/// The sensors with their converter.
+#[derive(Debug, Clone)]
+pub(super) struct Sensor {
+    seed: u32,
+    /// Steps of the converter per A, of phases A and B.
+    gain: [f32; 2],
+    /// Offsets of phases A and B, and deviation of the noise, in such steps.
+    offset: [f32; 2],
+    noise: f32,
+    /// Bits that the converter does not have.
+    coarse: u32,
+}
+
+impl Sensor {
+    pub(super) fn new(config: &SensingConfig, seed: u32) -> Self {
+        let coarse = 16u32.saturating_sub(config.bits.into()).min(6);
+        let steps = 32767.0 / config.full_scale / (1u32 << coarse) as f32;
+        Sensor {
+            seed,
+            gain: config.gain_error.map(|error| (1.0 + error) * steps),
+            offset: config.offset.map(|offset| offset * steps),
+            noise: config.noise * steps,
+            coarse,
         }
     }
 
-    /// The nearest digits that the converter has; saturates.
-    fn convert(&self, current: f32) -> i16 {
-        let lost = 16u32.saturating_sub(self.bits.into()).min(6);
-        let finest = (1u32 << lost) as f32;
-        let wanted = current * (32767.0 / self.full_scale) / finest;
-        let most = 32767 >> lost;
-        let nearest = (wanted + if wanted < 0.0 { -0.5 } else { 0.5 }) as i32;
-        (nearest.clamp(-most - 1, most) << lost) as i16
+    /// The `count`th sample, of a current in the stator's frame.
+    pub(super) fn sample(&self, current: Vector, count: u32) -> Sample {
+        let [a, b, _] = current.phases();
+        let (noise_a, noise_b) =
+            if self.noise > 0.0 { noise::pair(self.seed, count) } else { (0.0, 0.0) };
+        Sample {
+            a: self.convert(a * self.gain[0] + self.offset[0] + noise_a * self.noise),
+            b: self.convert(b * self.gain[1] + self.offset[1] + noise_b * self.noise),
+        }
+    }
+
+    /// The digits of the nearest step; saturates.
+    fn convert(&self, steps: f32) -> i16 {
+        let most = 32767 >> self.coarse;
+        let nearest = (steps + 0.5f32.copysign(steps)) as i32;
+        (nearest.clamp(-most - 1, most) << self.coarse) as i16
     }
 }
 
@@ -112,16 +128,14 @@ mod tests {
     fn a_sample_is_the_current_with_its_errors_in_the_converters_digits() {
         let ideal = SensingConfig { full_scale: 32.767, bits: 16, ..SensingConfig::default() };
         let current = Vector::from_phases(10.0, -4.0);
-        assert_eq!(ideal.sample(current, 0, 0), Sample { a: 10_000, b: -4_000 });
+        let sample = |config: &SensingConfig, current| Sensor::new(config, 0).sample(current, 0);
+        assert_eq!(sample(&ideal, current), Sample { a: 10_000, b: -4_000 });
         let coarse = SensingConfig { bits: 12, ..ideal };
-        assert_eq!(coarse.sample(current, 0, 0), Sample { a: 10_000, b: -4_000 });
-        assert_eq!(
-            coarse.sample(Vector::from_phases(0.007, -0.009), 0, 0),
-            Sample { a: 0, b: -16 }
-        );
+        assert_eq!(sample(&coarse, current), Sample { a: 10_000, b: -4_000 });
+        assert_eq!(sample(&coarse, Vector::from_phases(0.007, -0.009)), Sample { a: 0, b: -16 });
         let odd = SensingConfig { offset: [0.5, 0.0], gain_error: [0.0, 0.1], ..ideal };
-        assert_eq!(odd.sample(current, 0, 0), Sample { a: 10_500, b: -4_400 });
-        let over = ideal.sample(Vector::from_phases(50.0, -50.0), 0, 0);
+        assert_eq!(sample(&odd, current), Sample { a: 10_500, b: -4_400 });
+        let over = sample(&ideal, Vector::from_phases(50.0, -50.0));
         assert_eq!(over, Sample { a: i16::MAX, b: i16::MIN });
     }
 

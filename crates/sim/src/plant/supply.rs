@@ -115,8 +115,8 @@ impl Supply {
     }
 
     /// Lets the bridge take `taken` (A; negative when it gives) and something feed `fed` (A) for
-    /// `dt` (s).
-    pub(super) fn step(&mut self, dt: f32, taken: f32, fed: f32) -> Flow {
+    /// `dt` (s); adds where energy went.
+    pub(super) fn step(&mut self, dt: f32, taken: f32, fed: f32, flow: &mut Flow) {
         let SupplyConfig { voltage: source, resistance, capacitance, takes_back, chopper } =
             self.config;
         if let Some(chopper) = chopper {
@@ -143,10 +143,8 @@ impl Supply {
         let drawn = middle * conductance;
         self.sag = (2.0 * middle - self.sag).min(source);
         let voltage = source - middle;
-        Flow {
-            source: (source * drawn + voltage * fed) * dt,
-            lost: drawn * middle * dt,
-            braked: voltage * voltage * brake * dt,
-        }
+        flow.source += (source * drawn + voltage * fed) * dt;
+        flow.lost += drawn * middle * dt;
+        flow.braked += voltage * voltage * brake * dt;
     }
 }
