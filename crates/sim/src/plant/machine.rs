@@ -112,6 +112,9 @@ impl MachineConfig {
 /// Growth of copper's resistance from 25 °C, 1/K: it would be nothing at -234.5 °C.
 const COPPER: f32 = 1.0 / 259.5;
 
+/// Steps after which rounding has done nothing to the rotor's frame yet.
+const EXACT: u8 = 32;
+
 /// What the windings are fed with for a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Feed {
@@ -144,8 +147,9 @@ pub struct Machine {
     config: MachineConfig,
     load: Load,
     locked: bool,
-    /// Length of a step, s.
+    /// Length of a step, s, and one over half of it.
     period: f32,
+    per_half: f32,
     /// Phase resistance now, Ω, and what is in series with it.
     resistance: f32,
     series: f32,
@@ -157,8 +161,12 @@ pub struct Machine {
     inverse: Vector,
     /// Ld id and Lq iq, Wb.
     flux: Vector,
-    /// Where the rotor is: its electrical angle as a unit vector.
+    /// Current in the stator's frame, A.
+    current: Vector,
+    /// Where the rotor is: its electrical angle as a unit vector, turned along step by step and
+    /// taken from the position every [`EXACT`] steps.
     frame: Vector,
+    count: u8,
     /// rad/s.
     speed: f32,
     /// What the last step added to the speed, rad/s.
@@ -231,12 +239,15 @@ impl Machine {
             load,
             locked: false,
             period,
+            per_half: 2.0 / period,
             resistance: config.resistance,
             series: 0.0,
             inverse_stribeck: 1.0 / config.stribeck_speed,
             inverse,
             flux: Vector::ZERO,
+            current: Vector::ZERO,
             frame: Vector::unit(0),
+            count: 0,
             speed: 0.0,
             change: 0.0,
             position: 0,
@@ -304,8 +315,8 @@ impl Machine {
     }
 
     /// Current in the stator's frame, A.
-    pub fn current(&self) -> Vector {
-        self.rotor_current().turned(self.frame)
+    pub const fn current(&self) -> Vector {
+        self.current
     }
 
     /// Current in the rotor's frame, A: Id and Iq.
@@ -365,7 +376,7 @@ impl Machine {
 
     /// Stops the current, as open terminals do.
     pub(super) fn open(&mut self) {
-        (self.flux, self.torque) = (Vector::ZERO, 0.0);
+        (self.flux, self.current, self.torque) = (Vector::ZERO, Vector::ZERO, 0.0);
     }
 
     /// Whether nothing changes as long as no current flows.
@@ -381,7 +392,9 @@ impl Machine {
     /// Lets a step pass with open terminals.
     pub(super) fn coast(&mut self, flow: &mut Flow) {
         self.open();
-        self.advance(self.half(), flow);
+        let half = self.half();
+        let end = self.frame.turned(half.turn).turned(half.turn);
+        self.advance(half, end, flow);
     }
 
     /// Lets a voltage act for a step; adds where energy went.
@@ -412,7 +425,7 @@ impl Machine {
         let end = middle.turned(half.turn);
         // The magnet's part of the flux linkage turns away.
         let magnet = Vector::new(half.turn.x - 1.0, -half.turn.y) * self.config.flux_linkage;
-        let magnet = magnet * (2.0 / self.period);
+        let magnet = magnet * self.per_half;
         let first = (over(&half, middle) + magnet).scaled(self.decay.drive);
         let second = (over(&half, end) + magnet).scaled(self.decay.drive);
 
@@ -433,7 +446,8 @@ impl Machine {
         let product = f1.cross(i1) + 4.0 * f2.cross(i2) + f3.cross(i3);
         let magnet = self.config.flux_linkage * (i1.y + 4.0 * i2.y + i3.y);
         self.torque = 0.25 * f32::from(self.config.pole_pairs) * (magnet + product);
-        self.advance(half, flow);
+        self.current = i3.turned(end);
+        self.advance(half, end, flow);
     }
 
     /// The first half of a step, by the speed and its last change.
@@ -442,11 +456,12 @@ impl Machine {
         let way = 0.5 * self.period * speed;
         let angle = way * f32::from(self.config.pole_pairs);
         let position = self.position.wrapping_add(digits(way));
-        Half { position, speed, angle, turn: small(angle) }
+        Half { position, speed, way, angle, turn: small(angle) }
     }
 
-    /// Moves the rotor on, with the torques of friction and load as in the middle of the step.
-    fn advance(&mut self, half: Half, flow: &mut Flow) {
+    /// Moves the rotor on, which was foreseen to come to `end`, with the torques of friction and load
+    /// as in the middle of the step.
+    fn advance(&mut self, half: Half, end: Vector, flow: &mut Flow) {
         if self.locked {
             (self.speed, self.change) = (0.0, 0.0);
             return;
@@ -464,7 +479,13 @@ impl Machine {
         let mean = 0.5 * (last + self.speed);
         let way = mean * self.period;
         self.position = self.position.wrapping_add(digits(way));
-        self.frame = Vector::unit(self.electrical_angle());
+        self.count = (self.count + 1) % EXACT;
+        self.frame = if self.count == 0 {
+            Vector::unit(self.electrical_angle())
+        } else {
+            let missed = (way - 2.0 * half.way) * f32::from(self.config.pole_pairs);
+            end + Vector::new(-end.y, end.x) * missed
+        };
 
         // Each torque times the way is the kinetic energy's change, to the last digit.
         let dry_way = if slips || dry.total == 0.0 {
@@ -517,6 +538,8 @@ struct Half {
     position: i64,
     /// Speed at its end, rad/s.
     speed: f32,
+    /// Angle that the rotor turns in it, rad.
+    way: f32,
     /// Electrical angle that the rotor turns in it, rad, and as a unit vector.
     angle: f32,
     turn: Vector,

@@ -73,11 +73,20 @@ pub(super) struct Supply {
     /// How far the bus is below the source, V: a small number keeps its digits.
     sag: f32,
     chopping: bool,
+    /// One over the resistance, 1/Ω, and over twice the capacitance, 1/F.
+    conductance: f32,
+    half_inverse: f32,
 }
 
 impl Supply {
     pub(super) const fn new(config: SupplyConfig) -> Self {
-        Supply { sag: 0.0, chopping: false, config }
+        Supply {
+            sag: 0.0,
+            chopping: false,
+            conductance: 1.0 / config.resistance,
+            half_inverse: 0.5 / config.capacitance,
+            config,
+        }
     }
 
     pub(super) const fn config(&self) -> &SupplyConfig {
@@ -117,8 +126,7 @@ impl Supply {
     /// Lets the bridge take `taken` (A; negative when it gives) and something feed `fed` (A) for
     /// `dt` (s); adds where energy went.
     pub(super) fn step(&mut self, dt: f32, taken: f32, fed: f32, flow: &mut Flow) {
-        let SupplyConfig { voltage: source, resistance, capacitance, takes_back, chopper } =
-            self.config;
+        let SupplyConfig { voltage: source, takes_back, chopper, .. } = self.config;
         if let Some(chopper) = chopper {
             let threshold = if self.chopping { chopper.off_voltage } else { chopper.on_voltage };
             self.chopping = self.voltage() > threshold;
@@ -127,13 +135,13 @@ impl Supply {
             Some(chopper) if self.chopping => 1.0 / chopper.resistance,
             _ => 0.0,
         };
-        let gain = 0.5 * dt / capacitance;
+        let gain = dt * self.half_inverse;
         // The mean sag of the step, with the source connected or not.
         let mean = |conductance: f32| {
             (self.sag + gain * (taken - fed + brake * source))
                 / (1.0 + gain * (conductance + brake))
         };
-        let mut conductance = 1.0 / resistance;
+        let mut conductance = self.conductance;
         let mut middle = mean(conductance);
         if middle < 0.0 && !takes_back {
             conductance = 0.0;
