@@ -398,6 +398,7 @@ impl Machine {
     }
 
     /// Lets a voltage act for a step; adds where energy went.
+    #[inline]
     pub fn step(&mut self, feed: Feed, flow: &mut Flow) {
         match feed {
             Feed::Stator(voltage) => {
@@ -451,6 +452,7 @@ impl Machine {
     }
 
     /// The first half of a step, by the speed and its last change.
+    #[inline]
     fn half(&self) -> Half {
         let speed = self.speed + 0.5 * self.change;
         let way = 0.5 * self.period * speed;
@@ -461,6 +463,7 @@ impl Machine {
 
     /// Moves the rotor on, which was foreseen to come to `end`, with the torques of friction and load
     /// as in the middle of the step.
+    #[inline]
     fn advance(&mut self, half: Half, end: Vector, flow: &mut Flow) {
         if self.locked {
             (self.speed, self.change) = (0.0, 0.0);

@@ -6,8 +6,8 @@ pub(super) fn pair(seed: u32, count: u32) -> (f32, f32) {
     /// Standard deviation of the sum of two numbers that are uniform over 2^16.
     const DEVIATION: f32 = 26_754.9;
     let bits = mix(u64::from(seed) << 32 | u64::from(count));
-    let uniform = |at: u32| f32::from((bits >> (16 * at)) as u16);
-    let number = |at| (uniform(at) + uniform(at + 1) - 65_535.0) * (1.0 / DEVIATION);
+    let uniform = |at: u32| i32::from((bits >> (16 * at)) as u16);
+    let number = |at| (uniform(at) + uniform(at + 1) - 65_535) as f32 * (1.0 / DEVIATION);
     (number(0), number(2))
 }
 
