@@ -3,21 +3,28 @@
 //! * [`st::StStation`] is a drive of one to seven motors behind ST's Motor Control Protocol: bytes
 //!   in, bytes out.
 //! * [`rmd::RmdBus`] is a CAN bus with RMD motors: frames in, frames out.
-//! * [`machine`] and [`heat`] are what both turn and warm up.
+//! * [`plant`] is what both drives run on: a motor in the dq frame with what hangs on its shaft, its
+//!   supply, its power stage, its sensors and its heat. [`preset`] has motors that exist.
 //!
 //! Time is an argument: each drive advances in steps of fixed length to the
-//! [`Instant`](motorlink_proto::time::Instant) that it is given. It reads no clock and draws no
-//! random number, so the same commands at the same times give the same bytes, however finely time
-//! is cut. Beside the protocol each motor has handles for the world around it (supply, temperature,
-//! load, locked rotor, faults) and a snapshot of what is really going on.
+//! [`Instant`](motorlink_proto::time::Instant) that it is given. It reads no clock, and noise only
+//! depends on a seed and the step, so the same commands at the same times give the same bytes and the
+//! same [fingerprint](hash::fingerprint), however finely time is cut. Beside the protocol each motor
+//! has its plant, to change the world around it (supply, load, locked rotor, temperature), faults to
+//! inject, and a snapshot of what is really going on.
 //!
 //! # Conventions
 //!
-//! SI units in `f32`; other units are in the name. Positive torque accelerates towards growing
-//! angles, which RMD calls clockwise. Phase quantities are amplitudes (the Clarke transform keeps
-//! them), so torque is the torque constant times Iq, back-EMF is two thirds of the torque constant
-//! times speed, and power is `1.5 (vq iq + vd id)`. The greatest phase voltage is the bus voltage
-//! over the square root of three.
+//! * SI units in `f32`; other units are in the name.
+//! * Positive torque and current turn towards growing angles, which RMD calls clockwise. Positive
+//!   power goes from the supply into the motor and from the motor into the load.
+//! * Phase quantities are amplitudes: the Clarke transform keeps them (alpha is phase A). So torque is
+//!   `1.5 p (ψ iq + (Ld − Lq) id iq)`, back-EMF is `p ψ ω`, power is `1.5 (vd id + vq iq)`.
+//! * The d axis is the magnet's, q is a quarter of an electrical turn ahead; at the electrical angle 0
+//!   the d axis is on phase A's.
+//! * Angles are binary where they are exact ([`angle`]): 2^32 a turn, over all turns in an `i64`.
+//! * The greatest phase voltage is the bus voltage over the square root of three.
+//! * What is in front of a gear is of the rotor, unless it says output or load.
 //!
 //! ```
 //! use motorlink_proto::{stmcp::{Command, Profile, Request}, time::Instant};
