@@ -17,8 +17,8 @@ use super::{BenchConfig, Command, ConfigError, RomError, RomFolder};
 use crate::port::{PortError, ServeName};
 use crate::serve::{ByteStation, CanStation, Served, Server, Turn};
 
-type Station = StStation<Vec<StMotor>>;
-type Bus = RmdBus<Vec<RmdNode>>;
+pub(super) type Station = StStation<Vec<StMotor>>;
+pub(super) type Bus = RmdBus<Vec<RmdNode>>;
 
 /// Simulated drives, each on a served port of its own, advanced to real time.
 #[derive(Default)]
@@ -252,7 +252,12 @@ fn mode(mode: Mode) -> &'static str {
     }
 }
 
-fn st(station: &mut Station, now: Instant, command: &Command) -> Result<(), String> {
+/// Faults of an RMD motor, with the names that commands have for them.
+pub(super) const RMD_FAULTS: [(Errors, &str); 2] =
+    [(Errors::LOW_VOLTAGE, "LOW_VOLTAGE"), (Errors::OVER_TEMPERATURE, "OVER_TEMPERATURE")];
+
+/// Changes the world around an ST motor.
+pub(super) fn st(station: &mut Station, now: Instant, command: &Command) -> Result<(), String> {
     station.advance_to(now);
     match command {
         Command::PowerCycle { motor: Some(_), .. } => {
@@ -288,7 +293,8 @@ fn st(station: &mut Station, now: Instant, command: &Command) -> Result<(), Stri
     Ok(())
 }
 
-fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), String> {
+/// Changes the world around RMD motors.
+pub(super) fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), String> {
     bus.advance_to(now);
     match command {
         Command::PowerCycle { motor: Some(number), .. } => rmd_node(bus, *number)?.power_cycle(now),
@@ -311,15 +317,10 @@ fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), String> {
             rmd_node(bus, *motor)?.motor_mut().lock_rotor(*locked)
         }
         Command::Fault { motor, fault, hold, .. } => {
-            let errors = match fault.to_ascii_uppercase().as_str() {
-                "LOW_VOLTAGE" => Errors::LOW_VOLTAGE,
-                "OVER_TEMPERATURE" => Errors::OVER_TEMPERATURE,
-                _ => {
-                    return Err(format!(
-                        "there is no fault `{fault}`: LOW_VOLTAGE, OVER_TEMPERATURE"
-                    ));
-                }
-            };
+            let known = RMD_FAULTS.iter().find(|(_, name)| name.eq_ignore_ascii_case(fault));
+            let names = || RMD_FAULTS.map(|(_, name)| name).join(", ");
+            let (errors, _) =
+                *known.ok_or_else(|| format!("there is no fault `{fault}`: {}", names()))?;
             let motor = rmd_node(bus, *motor)?.motor_mut();
             match hold {
                 None => motor.inject(errors),

@@ -101,8 +101,19 @@ impl BenchConfig {
 
     /// Reads the text of a file. What it does not say is as in the default.
     pub fn parse(text: &str) -> Result<Self, ConfigError> {
-        let file: File =
-            toml::from_str(text).map_err(|error| ConfigError::Text(error.to_string()))?;
+        Self::from_file(toml::from_str(text).map_err(|error| ConfigError::Text(error.to_string()))?)
+    }
+
+    /// Reads a file's table.
+    pub(super) fn from_table(table: Table) -> Result<Self, ConfigError> {
+        Self::from_file(
+            table
+                .try_into()
+                .map_err(|error: toml::de::Error| ConfigError::Text(error.message().to_owned()))?,
+        )
+    }
+
+    fn from_file(file: File) -> Result<Self, ConfigError> {
         let st = motors(file.st, "st.motor", st_motor)?.map(StConfigs).unwrap_or_default();
         let rmd_motor = |table, place: &str| overlay(RmdConfig::default(), table, place);
         let rmd = motors(file.rmd, "rmd.motor", rmd_motor)?.map(RmdConfigs).unwrap_or_default();
@@ -140,6 +151,11 @@ impl BenchConfig {
             ConfigError::Impossible(format!("a drive has 1 to 7 motors, not {}", self.st.0.len()))
         })?;
         Ok(StStation::new(self.profile, drive))
+    }
+
+    /// How many motors the ST drive has.
+    pub(super) fn st_motors(&self) -> usize {
+        self.st.0.len()
     }
 
     /// The motors on the CAN bus.

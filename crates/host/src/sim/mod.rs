@@ -8,6 +8,7 @@ mod command;
 mod config;
 mod link;
 mod rom;
+pub mod scenario;
 
 pub use bench::{Bench, ServeError};
 pub use command::Command;

@@ -1,4 +1,7 @@
-//! `motorlink sim`: serves simulated drives and obeys commands on stdin.
+//! `motorlink sim`: serves simulated drives and obeys commands on stdin, or plays a scenario.
+
+mod plot;
+mod run;
 
 use std::io::{ErrorKind, Read, Write};
 use std::os::fd::AsFd;
@@ -19,12 +22,15 @@ use crate::interrupt::{self, interrupted};
 const IDLE: Duration = Duration::from_millis(20);
 
 #[derive(clap::Args)]
-#[command(after_help = "\
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "\
 Ports that are served: pty:PATH (a serial line), slcan-pty:PATH (a CAN adapter), \
 tcp-listen:ADDRESS:PORT (either), socketcan:INTERFACE (the motors are nodes of that bus).
 Without --st and --rmd: --st pty:./st0 --rmd slcan-pty:./can0.
 One JSON line a port on stdout says that it can be opened. JSON commands on stdin change the world \
-of the motors; docs/SIMULATOR.md lists them.")]
+of the motors; docs/SIMULATOR.md lists them."
+)]
 pub struct Args {
     /// What the drives are, in TOML; without it an ST drive with two motors and RMD motors 1 to 4
     config: Option<PathBuf>,
@@ -43,9 +49,20 @@ pub struct Args {
     /// End when stdin does
     #[arg(long)]
     stdin: bool,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Play a scenario on virtual time: plot, CSV, and whether everything came as expected
+    Run(run::Args),
 }
 
 pub fn run(args: Args) -> Result<(), Failure> {
+    if let Some(Command::Run(args)) = &args.command {
+        return run::run(args);
+    }
     interrupt::take_over();
     let mut config = match &args.config {
         Some(path) => BenchConfig::read(path)?,

@@ -1,0 +1,169 @@
+//! `motorlink sim run`: plays a scenario on virtual time.
+
+use std::fs;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use motorlink::sim::scenario::{Run, Scenario, ScenarioError};
+use serde_json::{Map, Value, json};
+
+use super::plot;
+use crate::failure::Failure;
+use crate::output::{Output, line, note};
+
+/// Values of the final state in a line of text.
+const ON_A_LINE: usize = 5;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// The scenario, in TOML; docs/SCENARIOS.md says what it may contain
+    scenario: PathBuf,
+    /// Draw the panels of the scenario into this file
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write every signal into this file, a row a sample
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// One line of JSON instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let scenario = Scenario::read(&args.scenario)?;
+    if args.plot.is_some() && scenario.panels.is_empty() {
+        let why = "there is nothing to plot: add a [[panel]] with signals";
+        return Err(Failure::Usage(format!("{}: {why}", args.scenario.display())));
+    }
+    let began = Instant::now();
+    let run = scenario.run()?;
+    let took = began.elapsed().as_secs_f64();
+    let seconds = scenario.duration.0 as f64 / 1e6;
+    note(format!(
+        "{seconds} s in {took:.3} s: {:.0} times faster than real time",
+        seconds / took.max(1e-6)
+    ));
+    if let Some(path) = &args.csv {
+        write(path, |out| run.write_csv(out))?;
+    }
+    if let Some(path) = &args.plot {
+        let picture = plot::draw(&scenario, &run).map_err(Failure::Line)?;
+        write(path, |out| out.write_all(picture.as_bytes()))?;
+    }
+    let output = Output { json: args.json };
+    if output.json {
+        line(&object(&scenario, &run, seconds))?;
+    } else {
+        text(&scenario, &run, seconds)?;
+    }
+    if run.as_expected() {
+        return Ok(());
+    }
+    Err(Failure::Refused(not_as_expected(&run)))
+}
+
+fn write(
+    path: &Path,
+    content: impl FnOnce(&mut BufWriter<fs::File>) -> std::io::Result<()>,
+) -> Result<(), Failure> {
+    let written = fs::File::create(path).and_then(|file| {
+        let mut out = BufWriter::new(file);
+        content(&mut out)?;
+        out.flush()
+    });
+    written.map_err(|error| Failure::Line(format!("cannot write `{}`: {error}", path.display())))
+}
+
+fn text(scenario: &Scenario, run: &Run, seconds: f64) -> Result<(), Failure> {
+    line(&scenario.title)?;
+    let samples = run.times().count();
+    line(&format!(
+        "  simulated   {seconds} s, {samples} samples of {} signals",
+        run.signals.len()
+    ))?;
+    for (drive, signals) in last(run) {
+        let mut head = drive.as_str();
+        for shown in signals.chunks(ON_A_LINE) {
+            let shown: Vec<&str> = shown.iter().map(|(_, _, text)| text.as_str()).collect();
+            line(&format!("  {head:<10}  {}", shown.join(", ")))?;
+            head = "";
+        }
+    }
+    for verdict in &run.verdicts {
+        let mark = if verdict.holds { "holds" } else { "FAILS" };
+        let (why, signal, found) = (&verdict.why, &verdict.signal, &verdict.found);
+        line(&format!("  {mark:<10}  {why}: {signal} {found}"))?;
+    }
+    let holding = run.verdicts.iter().filter(|verdict| verdict.holds).count();
+    line(&format!("  expected    {holding} of {} expectations hold", run.verdicts.len()))?;
+    line(&format!("  state hash  {:016x}", run.state_hash))
+}
+
+fn object(scenario: &Scenario, run: &Run, seconds: f64) -> Value {
+    let drives: Map<String, Value> = last(run)
+        .into_iter()
+        .map(|(drive, signals)| {
+            let values = signals.into_iter().map(|(name, value, _)| (name, value));
+            (drive, Value::Object(values.collect()))
+        })
+        .collect();
+    let refusals: Vec<Value> = run
+        .refusals
+        .iter()
+        .map(|refusal| {
+            json!({
+                "at": refusal.at,
+                "motor": refusal.motor,
+                "event": refusal.event,
+                "reply": refusal.reply,
+                "announced": refusal.announced,
+            })
+        })
+        .collect();
+    json!({
+        "title": scenario.title,
+        "seconds": seconds,
+        "samples": run.times().count(),
+        "as_expected": run.as_expected(),
+        "final": drives,
+        "expectations": run.verdicts,
+        "refusals": refusals,
+        "state_hash": format!("{:016x}", run.state_hash),
+    })
+}
+
+/// The last sample of each signal, by drive: its name, as JSON, as text.
+fn last(run: &Run) -> Vec<(String, Vec<(String, Value, String)>)> {
+    let mut drives: Vec<(String, Vec<(String, Value, String)>)> = Vec::new();
+    for (signal, column) in run.signals.iter().zip(&run.columns) {
+        let (Some((drive, name)), Some(&value)) = (signal.name.split_once('.'), column.last())
+        else {
+            continue;
+        };
+        let shown = signal.kind.show(value);
+        let value = if signal.kind.unit().is_empty() { json!(shown) } else { json!(value) };
+        let text = format!("{} {shown}", signal.words());
+        match drives.last_mut() {
+            Some((last, signals)) if last == drive => signals.push((name.to_owned(), value, text)),
+            _ => drives.push((drive.to_owned(), vec![(name.to_owned(), value, text)])),
+        }
+    }
+    drives
+}
+
+/// What was not as expected, a line each.
+fn not_as_expected(run: &Run) -> String {
+    let refusals = run.refusals.iter().map(ToString::to_string);
+    let failed = run.verdicts.iter().filter(|verdict| !verdict.holds);
+    let failed =
+        failed.map(|verdict| format!("{}: {} {}", verdict.why, verdict.signal, verdict.found));
+    let all: Vec<String> = refusals.chain(failed).collect();
+    format!("it did not come as expected:\n  {}", all.join("\n  "))
+}
+
+impl From<ScenarioError> for Failure {
+    fn from(error: ScenarioError) -> Self {
+        Failure::Usage(error.to_string())
+    }
+}
