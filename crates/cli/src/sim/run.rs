@@ -5,7 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use motorlink::sim::scenario::{Run, Scenario, ScenarioError};
+use motorlink::sim::scenario::{Kind, Run, Scenario, ScenarioError};
 use serde_json::{Map, Value, json};
 
 use super::plot;
@@ -82,7 +82,7 @@ fn text(scenario: &Scenario, run: &Run, seconds: f64) -> Result<(), Failure> {
         "  simulated   {seconds} s, {samples} samples of {} signals",
         run.signals.len()
     ))?;
-    for (drive, signals) in last(run) {
+    for Last { drive, signals } in last(run) {
         let mut head = drive.as_str();
         for shown in signals.chunks(ON_A_LINE) {
             let shown: Vec<&str> = shown.iter().map(|(_, _, text)| text.as_str()).collect();
@@ -103,7 +103,7 @@ fn text(scenario: &Scenario, run: &Run, seconds: f64) -> Result<(), Failure> {
 fn object(scenario: &Scenario, run: &Run, seconds: f64) -> Value {
     let drives: Map<String, Value> = last(run)
         .into_iter()
-        .map(|(drive, signals)| {
+        .map(|Last { drive, signals }| {
             let values = signals.into_iter().map(|(name, value, _)| (name, value));
             (drive, Value::Object(values.collect()))
         })
@@ -133,20 +133,29 @@ fn object(scenario: &Scenario, run: &Run, seconds: f64) -> Value {
     })
 }
 
-/// The last sample of each signal, by drive: its name, as JSON, as text.
-fn last(run: &Run) -> Vec<(String, Vec<(String, Value, String)>)> {
-    let mut drives: Vec<(String, Vec<(String, Value, String)>)> = Vec::new();
+/// The last samples of a drive: each signal's name, as JSON, as text.
+struct Last {
+    drive: String,
+    signals: Vec<(String, Value, String)>,
+}
+
+fn last(run: &Run) -> Vec<Last> {
+    let mut drives: Vec<Last> = Vec::new();
     for (signal, column) in run.signals.iter().zip(&run.columns) {
         let (Some((drive, name)), Some(&value)) = (signal.name.split_once('.'), column.last())
         else {
             continue;
         };
         let shown = signal.kind.show(value);
-        let value = if signal.kind.unit().is_empty() { json!(shown) } else { json!(value) };
         let text = format!("{} {shown}", signal.words());
+        let value = match signal.kind {
+            Kind::Number { .. } => json!(value),
+            Kind::Named(_) => json!(shown),
+        };
+        let entry = (name.to_owned(), value, text);
         match drives.last_mut() {
-            Some((last, signals)) if last == drive => signals.push((name.to_owned(), value, text)),
-            _ => drives.push((drive.to_owned(), vec![(name.to_owned(), value, text)])),
+            Some(last) if last.drive == drive => last.signals.push(entry),
+            _ => drives.push(Last { drive: drive.to_owned(), signals: vec![entry] }),
         }
     }
     drives

@@ -263,7 +263,7 @@ fn st_motor(mut table: Table, place: &str) -> Result<MotorConfig, ConfigError> {
 }
 
 /// `preset` with the values of `table`, at any depth.
-fn overlay<T: serde::Serialize + DeserializeOwned>(
+pub(super) fn overlay<T: serde::Serialize + DeserializeOwned>(
     preset: T,
     table: Table,
     place: &str,

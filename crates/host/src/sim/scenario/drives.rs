@@ -1,16 +1,15 @@
 //! The drives of a scenario, on their line and their bus.
 
-use std::fmt::{self, Write};
-
 use motorlink_proto::rmd::{CanFrame, ClearErrors, Command as _, Payload, Status1};
 use motorlink_proto::stmcp::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse};
 use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::RmdConfig;
 
+use super::script::Cast;
 use super::signals::{rmd_values, st_values};
-use super::{Action, Parts, Target};
+use super::{Action, Target};
 use crate::sim::bench::{self, Bus, Station};
-use crate::sim::{BenchConfig, Command, ConfigError};
+use crate::sim::{Command, ConfigError};
 
 /// What answers, and moves.
 #[derive(Debug)]
@@ -21,9 +20,10 @@ pub(super) struct Drives {
 
 impl Drives {
     /// Powers the drives on at time 0.
-    pub(super) fn new(config: &BenchConfig, parts: Parts) -> Result<Self, ConfigError> {
-        let st = parts.st.then(|| config.station(Instant(0))).transpose()?;
-        let rmd = parts.rmd.then(|| config.bus(Instant(0), RmdConfig::factory_rom)).transpose()?;
+    pub(super) fn new(cast: &Cast) -> Result<Self, ConfigError> {
+        let station = || cast.config.station(Instant(0));
+        let bus = || cast.config.bus(Instant(0), RmdConfig::factory_rom);
+        let (st, rmd) = (cast.st.then(station).transpose()?, cast.rmd.then(bus).transpose()?);
         Ok(Drives { st, rmd })
     }
 
@@ -96,28 +96,9 @@ impl Drives {
         let remain = clears && !Status1::decode(data).errors.is_empty();
         remain.then(|| ERRORS.to_owned())
     }
-
-    /// FNV-1a over all that the drives are.
-    pub(super) fn hash(&self) -> u64 {
-        let mut hash = Fnv(0xCBF2_9CE4_8422_2325);
-        // Nothing that it writes fails.
-        let _ = write!(hash, "{self:?}");
-        hash.0
-    }
 }
 
 /// How an RMD motor refuses: it says nothing,
 const SILENT: &str = "silent";
 /// or keeps errors that it was to clear.
 const ERRORS: &str = "errors";
-
-struct Fnv(u64);
-
-impl Write for Fnv {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        for byte in text.bytes() {
-            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
-        }
-        Ok(())
-    }
-}

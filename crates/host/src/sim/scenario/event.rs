@@ -11,13 +11,13 @@ use toml::Table;
 use super::drives::Drives;
 use super::message::{RmdMessage, StMessage};
 use super::profile::LoadProfile;
-use super::{Action, Event, Parts, Target};
-use crate::sim::{BenchConfig, Command};
+use super::script::Cast;
+use super::{Action, Event, Target, moment};
+use crate::sim::Command;
 
 /// What events are read against.
 pub(super) struct Reader<'a> {
-    pub(super) drives: &'a BenchConfig,
-    pub(super) parts: Parts,
+    pub(super) cast: &'a Cast,
     pub(super) targets: &'a [Target],
     pub(super) folder: &'a Path,
     pub(super) duration: Duration,
@@ -26,18 +26,14 @@ pub(super) struct Reader<'a> {
 impl Reader<'_> {
     pub(super) fn event(&self, mut table: Table) -> Result<Event, String> {
         let at: f64 = take(&mut table, "at")?.ok_or("it needs a time, `at`, in s")?;
-        let end = self.duration.0 as f64 / 1e6;
-        if !(0.0..=end).contains(&at) {
-            return Err(format!("at {at} s: the run lasts from 0 to {end} s"));
-        }
+        let moment = moment(at, self.duration)?;
         let place = |why: String| format!("at {at} s: {why}");
         let label: Option<String> = take(&mut table, "label").map_err(place)?;
         let refused: Option<String> = take(&mut table, "refused").map_err(place)?;
         let target = self.target(&mut table).map_err(place)?;
         let (action, words) = self.action(target, table).map_err(place)?;
         if let Action::World(command) = &action {
-            let mut trial =
-                Drives::new(self.drives, self.parts).map_err(|e| place(e.to_string()))?;
+            let mut trial = Drives::new(self.cast).map_err(|e| place(e.to_string()))?;
             trial.change(Instant(0), target, command).map_err(place)?;
         }
         if refused.is_some() && matches!(action, Action::World(_)) {
@@ -47,8 +43,7 @@ impl Reader<'_> {
             [_] => words.clone(),
             _ => format!("{target} {words}"),
         });
-        let at = Instant((at * 1e6).round() as u64);
-        Ok(Event { at, target, action, words, label, refused })
+        Ok(Event { at: moment, target, action, words, label, refused })
     }
 
     fn target(&self, table: &mut Table) -> Result<Target, String> {
@@ -75,7 +70,7 @@ impl Reader<'_> {
         Ok(match target {
             Target::St(motor) => {
                 let message: StMessage = typed(table)?;
-                let bytes = message.encode(motor, self.drives.profile)?;
+                let bytes = message.encode(motor, self.cast.config.profile)?;
                 (Action::Bytes(bytes), message.words())
             }
             Target::Rmd(id) => {

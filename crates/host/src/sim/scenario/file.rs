@@ -1,17 +1,18 @@
 //! A scenario from its text.
 
+use std::mem::take;
 use std::path::Path;
 
-use motorlink_proto::rmd::MotorId;
-use motorlink_proto::stmcp::Motor;
 use motorlink_proto::time::Duration;
 use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::event::Reader;
 use super::expect::Written;
-use super::signals::{Kind, RMD, ST, Signal};
-use super::{Action, Event, Panel, Parts, Scenario, ScenarioError, Target, find_signal};
+use super::machine::{BareMachine, WrittenMachine, WrittenVoltage};
+use super::script::{Cast, Script};
+use super::signals::{Kind, Signal};
+use super::{Action, Event, Panel, Scenario, ScenarioError, Subject, find_signal};
 use crate::sim::{BenchConfig, Command};
 
 /// Drives step on multiples of this, µs.
@@ -32,6 +33,9 @@ struct File {
     profile: Option<Value>,
     st: Option<Value>,
     rmd: Option<Value>,
+    machine: Option<WrittenMachine>,
+    #[serde(default)]
+    voltage: Vec<WrittenVoltage>,
     #[serde(default)]
     event: Vec<Table>,
     #[serde(default)]
@@ -69,18 +73,12 @@ impl Scenario {
     /// # Errors
     /// What cannot be, and where.
     pub fn parse(text: &str, folder: &Path) -> Result<Self, String> {
-        let file: File = toml::from_str(text).map_err(|error| error.to_string())?;
+        let mut file: File = toml::from_str(text).map_err(|error| error.to_string())?;
         let (duration, sample) = times(file.duration, file.sample_us)?;
-        let parts = Parts { st: file.st.is_some(), rmd: file.rmd.is_some() };
-        if !parts.st && !parts.rmd {
-            return Err("there is no motor: add [[st.motor]] or [[rmd.motor]]".to_owned());
-        }
-        let sections = [("profile", file.profile), ("st", file.st), ("rmd", file.rmd)];
-        let table = sections.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
-        let drives = BenchConfig::from_table(table.collect()).map_err(|error| error.to_string())?;
-
-        let targets = targets(&drives, parts);
-        let signals = signals(&targets);
+        let (subject, signals) = match file.machine.take() {
+            Some(machine) => file.machine(machine, duration, sample)?,
+            None => file.drives(folder, duration)?,
+        };
         let count = duration.0 / sample.0 + 1;
         if count.saturating_mul(signals.len() as u64) > MOST_VALUES {
             return Err(format!(
@@ -88,9 +86,69 @@ impl Scenario {
                 signals.len()
             ));
         }
-        let reader = Reader { drives: &drives, parts, targets: &targets, folder, duration };
-        let loads = numbered("load_profile", file.load_profile, |load| reader.load(load))?;
-        let mut events = numbered("event", file.event, |event| reader.event(event))?;
+        let panels = numbered("panel", file.panel, |panel| panel.resolve(&signals))?;
+        let step = sample.0 as f64 / 1e6;
+        let expectations = numbered("expect", file.expect, |written| {
+            written.resolve(&signals, step, count as usize)
+        })?;
+        let (title, about) = (file.title, file.about);
+        Ok(Scenario { title, about, duration, sample, panels, subject, signals, expectations })
+    }
+}
+
+impl File {
+    /// A bare machine.
+    fn machine(
+        &mut self,
+        machine: WrittenMachine,
+        duration: Duration,
+        sample: Duration,
+    ) -> Result<(Subject, Vec<Signal>), String> {
+        let odd = [
+            ("profile", self.profile.is_some()),
+            ("[[st.motor]]", self.st.is_some()),
+            ("[[rmd.motor]]", self.rmd.is_some()),
+            ("[[event]]", !self.event.is_empty()),
+            ("[[load_profile]]", !self.load_profile.is_empty()),
+        ];
+        if let Some((name, _)) = odd.iter().find(|(_, there)| *there) {
+            return Err(format!("a bare machine has no {name}; leave it or [machine] out"));
+        }
+        let machine = machine.resolve()?;
+        if !sample.0.is_multiple_of(machine.step().0) {
+            return Err(format!("sample_us is a multiple of the step, {} µs", machine.step().0));
+        }
+        let voltages = numbered("voltage", take(&mut self.voltage), |voltage| {
+            voltage.resolve(&machine, duration)
+        })?;
+        let machine = machine.fed_with(voltages);
+        Ok((Subject::Machine(Box::new(machine)), BareMachine::signals()))
+    }
+
+    /// Drives and what happens to them.
+    fn drives(
+        &mut self,
+        folder: &Path,
+        duration: Duration,
+    ) -> Result<(Subject, Vec<Signal>), String> {
+        if !self.voltage.is_empty() {
+            return Err("only a bare [machine] is fed with a [[voltage]]".to_owned());
+        }
+        let (st, rmd) = (self.st.is_some(), self.rmd.is_some());
+        if !st && !rmd {
+            return Err(
+                "there is no motor: add [[st.motor]], [[rmd.motor]] or [machine]".to_owned()
+            );
+        }
+        let sections =
+            [("profile", self.profile.take()), ("st", self.st.take()), ("rmd", self.rmd.take())];
+        let table = sections.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
+        let config = BenchConfig::from_table(table.collect()).map_err(|error| error.to_string())?;
+        let cast = Cast { config, st, rmd };
+        let reader = Reader { cast: &cast, targets: &cast.targets(), folder, duration };
+        let loads =
+            numbered("load_profile", take(&mut self.load_profile), |load| reader.load(load))?;
+        let mut events = numbered("event", take(&mut self.event), |event| reader.event(event))?;
         let profiled = |event: &&Event| {
             matches!(event.action, Action::World(Command::Load { .. }))
                 && loads.iter().any(|(target, _)| *target == event.target)
@@ -99,25 +157,8 @@ impl Scenario {
             return Err(format!("the load of {} comes from its load_profile", event.target));
         }
         events.sort_by_key(|event| event.at);
-        let panels = numbered("panel", file.panel, |panel| panel.resolve(&signals))?;
-        let step = sample.0 as f64 / 1e6;
-        let expectations = numbered("expect", file.expect, |written| {
-            written.resolve(&signals, step, count as usize)
-        })?;
-        let (title, about) = (file.title, file.about);
-        Ok(Scenario {
-            title,
-            about,
-            duration,
-            sample,
-            panels,
-            drives,
-            parts,
-            signals,
-            events,
-            loads,
-            expectations,
-        })
+        let signals = cast.signals();
+        Ok((Subject::Drives(Script { cast, events, loads }), signals))
     }
 }
 
@@ -148,26 +189,6 @@ fn numbered<T, U>(
     numbered.map(|(item, n)| read(item).map_err(|why| format!("{name} {n}: {why}"))).collect()
 }
 
-fn targets(drives: &BenchConfig, parts: Parts) -> Vec<Target> {
-    let st = (1..).map_while(Motor::new).take(drives.st_motors()).map(Target::St);
-    let mut ids: Vec<MotorId> =
-        drives.rmd_motors().iter().filter_map(|motor| MotorId::new(motor.id)).collect();
-    ids.sort_unstable();
-    let st = st.filter(|_| parts.st);
-    st.chain(ids.into_iter().map(Target::Rmd).filter(|_| parts.rmd)).collect()
-}
-
-fn signals(targets: &[Target]) -> Vec<Signal> {
-    let of = |target: &Target| -> Vec<Signal> {
-        let name = target.to_string();
-        match target {
-            Target::St(_) => ST.iter().map(|row| row.signal(&name)).collect(),
-            Target::Rmd(_) => RMD.iter().map(|row| row.signal(&name)).collect(),
-        }
-    };
-    targets.iter().flat_map(of).collect()
-}
-
 impl WrittenPanel {
     fn resolve(self, signals: &[Signal]) -> Result<Panel, String> {
         let found: Result<Vec<usize>, String> =
@@ -192,6 +213,7 @@ impl WrittenPanel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sim::scenario::signals::ST;
 
     const HEAD: &str = "title = \"t\"\nduration = 1.0\n";
     const SERVO: &str = "[[st.motor]]\npreset = \"servo\"\n[[rmd.motor]]\nid = 3\n";
@@ -220,7 +242,8 @@ mod tests {
             label = \"\"
         ";
         let scenario = parse(text).unwrap();
-        let labels: Vec<&str> = scenario.events.iter().map(|event| &*event.label).collect();
+        let Subject::Drives(script) = scenario.subject else { panic!("there are drives") };
+        let labels: Vec<&str> = script.events.iter().map(|event| &*event.label).collect();
         assert_eq!(labels, ["rmd3 90 °/s", "st1 start", ""]);
         let names: Vec<&str> = scenario.signals.iter().map(|signal| &*signal.name).collect();
         assert_eq!((names[0], names[ST.len()]), ("st1.speed_rpm", "rmd3.speed_dps"));

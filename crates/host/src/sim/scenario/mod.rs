@@ -5,9 +5,11 @@ mod drives;
 mod event;
 mod expect;
 mod file;
+mod machine;
 mod message;
 mod profile;
 mod run;
+mod script;
 mod signals;
 
 use std::path::PathBuf;
@@ -19,9 +21,10 @@ pub use expect::Verdict;
 pub use run::{Mark, Refusal, Run};
 pub use signals::{Kind, Names, Signal, short};
 
-use super::{BenchConfig, Command};
+use super::Command;
 use expect::Expectation;
-use profile::LoadProfile;
+use machine::BareMachine;
+use script::Script;
 
 /// A scenario that can be played.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,20 +39,16 @@ pub struct Scenario {
     pub sample: Duration,
     /// What is plotted, from top to bottom.
     pub panels: Vec<Panel>,
-    drives: BenchConfig,
-    parts: Parts,
+    subject: Subject,
     signals: Vec<Signal>,
-    /// In the order of their time.
-    events: Vec<Event>,
-    loads: Vec<(Target, LoadProfile)>,
     expectations: Vec<Expectation>,
 }
 
-/// Which of the two kinds of drives there are.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Parts {
-    st: bool,
-    rmd: bool,
+/// What a scenario is about.
+#[derive(Debug, Clone, PartialEq)]
+enum Subject {
+    Drives(Script),
+    Machine(Box<BareMachine>),
 }
 
 /// A part of the plot.
@@ -98,6 +97,20 @@ enum Action {
     Bytes(Vec<u8>),
     Frame(CanFrame),
     World(Command),
+}
+
+/// A moment of a run that lasts so long, from s.
+fn moment(at: f64, duration: Duration) -> Result<Instant, String> {
+    let end = seconds(Instant(duration.0));
+    if !(0.0..=end).contains(&at) {
+        return Err(format!("at {at} s: the run lasts from 0 to {end} s"));
+    }
+    Ok(Instant((at * 1e6).round() as u64))
+}
+
+/// A moment in s.
+fn seconds(moment: Instant) -> f64 {
+    moment.0 as f64 / 1e6
 }
 
 /// Why a scenario is not played.

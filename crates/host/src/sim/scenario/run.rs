@@ -4,13 +4,9 @@ use std::io::{self, Write};
 
 use motorlink_proto::time::{Duration, Instant};
 
-use super::drives::Drives;
-use super::event::load;
-use super::{Scenario, Signal, Verdict};
+use super::expect::Expectation;
+use super::{Scenario, Signal, Subject, Verdict, seconds};
 use crate::sim::ConfigError;
-
-/// How often a load that changes all the time is set.
-const LOAD_STEP: Duration = Duration(50);
 
 /// What came of a scenario.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,68 +65,35 @@ impl std::fmt::Display for Refusal {
     }
 }
 
+/// What came of a run before it is judged.
+pub(super) struct Played {
+    pub(super) columns: Vec<Vec<f64>>,
+    pub(super) marks: Vec<Mark>,
+    pub(super) refusals: Vec<Refusal>,
+    pub(super) state_hash: u64,
+}
+
 impl Scenario {
     /// Plays it from power-on to its end.
     ///
     /// # Errors
     /// Drives that cannot be; never those of a scenario that was read.
     pub fn run(&self) -> Result<Run, ConfigError> {
-        let mut drives = Drives::new(&self.drives, self.parts)?;
-        let end = Instant(self.duration.0);
-        let rows = (self.duration.0 / self.sample.0 + 1) as usize;
-        let mut columns = vec![Vec::with_capacity(rows); self.signals.len()];
-        let mut refusals = Vec::new();
-        let mut events = self.events.iter().peekable();
-        let mut now = Instant(0);
-        let mut next_sample = Instant(0);
-        loop {
-            drives.advance_to(now);
-            for (target, profile) in &self.loads {
-                let command = load(*target, profile.at(now));
-                drives.change(now, *target, &command).map_err(ConfigError::Impossible)?;
-            }
-            if now == next_sample {
-                columns.iter_mut().zip(drives.values()).for_each(|(all, value)| all.push(value));
-                next_sample += self.sample;
-            }
-            while let Some(event) = events.next_if(|event| event.at <= now) {
-                let reply = drives.act(now, event.target, &event.action);
-                let reply = reply.map_err(ConfigError::Impossible)?;
-                if reply != event.refused {
-                    refusals.push(Refusal {
-                        at: seconds(now),
-                        motor: event.target.to_string(),
-                        event: event.words.clone(),
-                        reply,
-                        announced: event.refused.clone(),
-                    });
-                }
-            }
-            if now == end {
-                break;
-            }
-            let load = (!self.loads.is_empty()).then(|| now + LOAD_STEP);
-            let event = events.peek().map(|event| event.at);
-            let next = [load, event].into_iter().flatten().fold(next_sample, Instant::min);
-            now = next.min(end);
-        }
+        let Played { columns, marks, refusals, state_hash } = match &self.subject {
+            Subject::Drives(script) => script.play(self.duration, self.sample)?,
+            Subject::Machine(machine) => machine.play(self.duration, self.sample),
+        };
         let step = self.sample.0 as f64 / 1e6;
-        let check =
-            |expectation: &super::Expectation| expectation.check(&self.signals, &columns, step);
+        let check = |expectation: &Expectation| expectation.check(&self.signals, &columns, step);
         Ok(Run {
             verdicts: self.expectations.iter().map(check).collect(),
             signals: self.signals.clone(),
             columns,
             sample: self.sample,
-            marks: self.marks(),
+            marks,
             refusals,
-            state_hash: drives.hash(),
+            state_hash,
         })
-    }
-
-    fn marks(&self) -> Vec<Mark> {
-        let shown = self.events.iter().filter(|event| !event.label.is_empty());
-        shown.map(|event| Mark { at: seconds(event.at), label: event.label.clone() }).collect()
     }
 }
 
@@ -167,10 +130,6 @@ impl Run {
         }
         Ok(())
     }
-}
-
-fn seconds(moment: Instant) -> f64 {
-    moment.0 as f64 / 1e6
 }
 
 #[cfg(test)]

@@ -2,6 +2,8 @@
 
 use motorlink_proto::rmd::{Errors, Mode};
 use motorlink_proto::stmcp::{Flags, Status};
+use motorlink_sim::angle::TURN;
+use motorlink_sim::plant::Machine;
 use motorlink_sim::rmd::RmdNode;
 use motorlink_sim::st::StMotor;
 
@@ -169,6 +171,14 @@ signals!(ST, motorlink_sim::st::Truth, |truth| {
     faults[Names::Faults] = (truth.flags.occurred() | truth.flags.present()) as u8;
 });
 
+signals!(MACHINE, Machine, |machine| {
+    id_amps = machine.rotor_current().x;
+    iq_amps = machine.rotor_current().y;
+    speed_radians_per_second = machine.speed();
+    angle_radians = machine.position() as f64 * (core::f64::consts::TAU / TURN as f64);
+    torque_newton_metres = machine.torque();
+});
+
 /// An RMD motor and the errors that its drive remembers.
 pub(super) struct Rmd {
     truth: motorlink_sim::rmd::Truth,
@@ -226,9 +236,10 @@ mod tests {
     #[test]
     fn every_number_has_a_unit_and_every_signal_is_documented() {
         let document = include_str!("../../../../../docs/SCENARIOS.md");
-        let rows =
-            ST.iter().map(|row| row.signal("st1")).chain(RMD.iter().map(|row| row.signal("rmd1")));
-        for signal in rows {
+        let st = ST.iter().map(|row| row.signal("st1"));
+        let rmd = RMD.iter().map(|row| row.signal("rmd1"));
+        let machine = MACHINE.iter().map(|row| row.signal("machine"));
+        for signal in st.chain(rmd).chain(machine) {
             let quantity = signal.name.split_once('.').unwrap().1;
             assert!(document.contains(&format!("`{quantity}`")), "{quantity} is not documented");
             assert!(
