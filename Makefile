@@ -6,6 +6,7 @@
 # make bench           ratios and instruction counts, as in docs/BENCHMARKS.md
 # make reliability     both protocols through lines that misbehave, into docs/RELIABILITY.md
 # make docs            writes the tables of docs/CONFORMANCE.md anew
+# make pictures        plays the scenarios and draws docs/pictures anew
 # make semver          the public interface against the last release
 
 CARGO ?= cargo
@@ -18,7 +19,7 @@ SOCKETCAN := CARGO="$(CARGO)" SUDO="$(SUDO)" tests/socketcan/run.sh
 SECONDS ?= 60
 
 .PHONY: demo test lint deny unit fuzz-replay miri probe e2e test-socketcan
-.PHONY: fuzz soak bench reliability docs semver fmt clean
+.PHONY: fuzz soak bench reliability docs pictures semver fmt clean
 
 demo:
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
@@ -95,6 +96,12 @@ bench:
 
 docs:
 	MOTORLINK_UPDATE_DOCS=1 $(CARGO) test -p motorlink-conformance --test document --locked
+
+pictures:
+	@for scenario in scenarios/*.toml; do \
+		$(CARGO) run --release --locked --quiet -p motorlink-cli -- \
+			sim run $$scenario --plot docs/pictures/$$(basename $$scenario .toml).svg || exit; \
+	done
 
 # Some 90 million exchanges on virtual time; fails with a seed and a trace where a promise is broken.
 reliability:

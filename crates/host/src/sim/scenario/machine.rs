@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn a_locked_machine_takes_the_current_of_its_resistance_in_either_frame() {
-        let machine = "[machine]\npreset = \"shinano\"\nlocked = true\nangle = 0.7853981634\n";
+        let machine = "[machine]\npreset = \"shinano\"\nlocked = true\nangle = 2.356194490192345\n";
         let rotor = format!("{machine}[[voltage]]\nat = 0\nvd = 0.32\nvq = 0.64");
         let run = parse(&rotor).unwrap().run().unwrap();
         assert!((last(&run, "machine.id_amps") - 1.0).abs() < 1e-4);
@@ -195,12 +195,12 @@ mod tests {
         assert_eq!(last(&run, "machine.speed_radians_per_second"), 0.0);
         let torque = 1.5 * 2.0 * 16.06e-3 * 2.0;
         assert!((last(&run, "machine.torque_newton_metres") - torque).abs() < 1e-5);
-        assert!((last(&run, "machine.angle_radians") - 0.785_398_2).abs() < 1e-6);
-        // A quarter of an electrical turn ahead: the stator's alpha is the rotor's -q.
+        assert!((last(&run, "machine.angle_radians") - 0.75 * std::f64::consts::PI).abs() < 1e-6);
+        // The magnet stands a quarter of an electrical turn behind phase A.
         let stator = format!("{machine}[[voltage]]\nat = 0\nvalpha = 0.32\nvbeta = 0.64");
         let run = parse(&stator).unwrap().run().unwrap();
-        assert!((last(&run, "machine.id_amps") - 2.0).abs() < 1e-4);
-        assert!((last(&run, "machine.iq_amps") + 1.0).abs() < 1e-4);
+        assert!((last(&run, "machine.id_amps") + 2.0).abs() < 1e-4);
+        assert!((last(&run, "machine.iq_amps") - 1.0).abs() < 1e-4);
     }
 
     #[test]
