@@ -305,3 +305,44 @@ fn small() -> TextStyle<'static> {
 fn bold(size: i32) -> TextStyle<'static> {
     FontDesc::new(FontFamily::SansSerif, f64::from(size * FINE), FontStyle::Bold).color(&TEXT)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mark(at: f64, label: &str) -> Mark {
+        Mark { at, label: label.to_owned() }
+    }
+
+    #[test]
+    fn labels_do_not_cover_each_other_and_stay_in_the_picture() {
+        let marks = [
+            mark(0.0, "a long label at the beginning"),
+            mark(0.1, "another one beside it"),
+            mark(0.1, "at the same moment"),
+            mark(5.0, "far away"),
+            mark(10.0, "a long label at the end"),
+        ];
+        let labels = place_labels(&marks, 10.0);
+        let seen: Vec<(&str, i32, bool)> =
+            labels.iter().map(|label| (&*label.text, label.row, label.leftwards)).collect();
+        assert_eq!(seen[0], ("a long label at the beginning", 0, false));
+        assert_eq!(seen[1], ("another one beside it, at the same moment", 1, false));
+        assert_eq!(seen[2], ("far away", 0, false));
+        assert_eq!(seen[3], ("a long label at the end", 0, true));
+        assert!(labels.iter().all(|label| (LEFT..=WIDTH - RIGHT).contains(&label.x)));
+    }
+
+    #[test]
+    fn a_thinned_line_keeps_its_peaks_and_its_order() {
+        let mut column: Vec<f64> = (0..100_001).map(|n| f64::from(n % 7)).collect();
+        column[12_345] = 50.0;
+        column[77_777] = -50.0;
+        let points = thin(&column, 10.0, -20.0, 100.0);
+        assert!(points.len() < 4000);
+        assert!(points.is_sorted_by(|a, b| a.0 < b.0));
+        assert!(points.contains(&(12_345.0 * 1e-4, 50.0)));
+        assert!(points.contains(&(77_777.0 * 1e-4, -20.0)), "the range ends there");
+        assert_eq!(thin(&[1.0, 2.0, 3.0], 2.0, 0.0, 9.0), [(0.0, 1.0), (1.0, 2.0), (2.0, 3.0)]);
+    }
+}
