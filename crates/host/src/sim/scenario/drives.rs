@@ -98,7 +98,7 @@ impl Drives {
     }
 }
 
-/// How an RMD motor refuses: it says nothing,
-const SILENT: &str = "silent";
-/// or keeps errors that it was to clear.
-const ERRORS: &str = "errors";
+/// How a drive refuses that says nothing.
+pub(super) const SILENT: &str = "silent";
+/// How an RMD motor refuses that keeps errors which it was to clear.
+pub(super) const ERRORS: &str = "errors";

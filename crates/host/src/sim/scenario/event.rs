@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use motorlink_proto::rmd::MotorId;
-use motorlink_proto::stmcp::Motor;
+use motorlink_proto::stmcp::{ErrorCode, Motor};
 use motorlink_proto::time::{Duration, Instant};
 use serde::de::DeserializeOwned;
 use toml::Table;
 
-use super::drives::Drives;
+use super::drives::{Drives, ERRORS, SILENT};
 use super::message::{RmdMessage, StMessage};
 use super::profile::LoadProfile;
 use super::script::Cast;
@@ -36,8 +36,8 @@ impl Reader<'_> {
             let mut trial = Drives::new(self.cast).map_err(|e| place(e.to_string()))?;
             trial.change(Instant(0), target, command).map_err(place)?;
         }
-        if refused.is_some() && matches!(action, Action::World(_)) {
-            return Err(place("only messages are refused".to_owned()));
+        if let Some(refused) = &refused {
+            announced(refused, &action).map_err(place)?;
         }
         let label = label.unwrap_or_else(|| match self.targets {
             [_] => words.clone(),
@@ -97,6 +97,19 @@ impl Reader<'_> {
             .map_err(|why| format!("{}: {why}", path.display()))?;
         Ok((motor, profile))
     }
+}
+
+/// Refuses the announcement of what no drive replies.
+fn announced(refused: &str, action: &Action) -> Result<(), String> {
+    let known: Vec<&str> = match action {
+        Action::World(_) => return Err("only messages are refused".to_owned()),
+        Action::Bytes(_) => ErrorCode::ALL.iter().filter_map(|code| code.name()).collect(),
+        Action::Frame(_) => vec![SILENT, ERRORS],
+    };
+    if known.contains(&refused) {
+        return Ok(());
+    }
+    Err(format!("nothing is refused with `{refused}`, but with {}", known.join(", ")))
 }
 
 /// The command that sets a motor's load torque, Nm.
@@ -173,6 +186,9 @@ mod tests {
         assert!(why(&format!("{load}nan")).contains("newton_metres is"));
         assert!(why(&format!("{load}1\nport = \"x\"")).contains("port"));
         assert!(why(&format!("{load}1\nrefused = \"x\"")).contains("only messages"));
+        let start = "at = 0.5\nst = 1\nsend = \"start\"\nrefused = \"RATHER_NOT\"";
+        assert!(why(start).contains("WRONG_CMD"));
+        assert!(why("at = 0.5\nrmd = 3\nsend = \"off\"\nrefused = \"NO\"").contains("silent"));
         let fault = "at = 0.5\nst = 1\nworld = \"fault\"\nfault = \"BAD_LUCK\"";
         assert!(why(fault).contains("BREAK_IN"));
     }

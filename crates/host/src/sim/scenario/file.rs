@@ -12,7 +12,7 @@ use super::expect::Written;
 use super::machine::{BareMachine, WrittenMachine, WrittenVoltage};
 use super::script::{Cast, Script};
 use super::signals::{Kind, Signal};
-use super::{Action, Event, Panel, Scenario, ScenarioError, Subject, find_signal};
+use super::{Action, Event, Panel, Scenario, ScenarioError, Subject, Target, find_signal};
 use crate::sim::{BenchConfig, Command};
 
 /// Drives step on multiples of this, µs.
@@ -148,10 +148,17 @@ impl File {
         let reader = Reader { cast: &cast, targets: &cast.targets(), folder, duration };
         let loads =
             numbered("load_profile", take(&mut self.load_profile), |load| reader.load(load))?;
+        let mut loaded: Vec<Target> = Vec::new();
+        for (target, _) in &loads {
+            if loaded.contains(target) {
+                return Err(format!("{target} has two load_profiles"));
+            }
+            loaded.push(*target);
+        }
         let mut events = numbered("event", take(&mut self.event), |event| reader.event(event))?;
         let profiled = |event: &&Event| {
             matches!(event.action, Action::World(Command::Load { .. }))
-                && loads.iter().any(|(target, _)| *target == event.target)
+                && loaded.contains(&event.target)
         };
         if let Some(event) = events.iter().find(profiled) {
             return Err(format!("the load of {} comes from its load_profile", event.target));

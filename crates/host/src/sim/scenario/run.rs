@@ -225,6 +225,9 @@ mod tests {
         let event = "\n[[event]]\nat = 0\nrmd = 1\nworld = \"load\"\nnewton_metres = 1";
         let why = Scenario::parse(&format!("{text}{event}"), &folder).unwrap_err();
         assert!(why.contains("load_profile"), "{why}");
+        let twice = "\n[[load_profile]]\nrmd = 1\nfile = \"load.csv\"";
+        let why = Scenario::parse(&format!("{text}{twice}"), &folder).unwrap_err();
+        assert!(why.contains("two load_profiles"), "{why}");
         std::fs::write(folder.join("load.csv"), "t_s,newton_metres\n0,1e9\n").unwrap();
         let why = Scenario::parse(text, &folder).unwrap_err();
         assert!(why.contains("load.csv") && why.contains("newton_metres is"), "{why}");
