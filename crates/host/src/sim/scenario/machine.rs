@@ -1,7 +1,7 @@
 //! A machine alone on an ideal voltage source.
 
 use motorlink_proto::time::{Duration, Instant};
-use motorlink_sim::plant::{Feed, Machine, PlantConfig};
+use motorlink_sim::plant::{Feed, Flow, Machine, PlantConfig};
 use motorlink_sim::vector::Vector;
 use motorlink_sim::{angle, hash, preset};
 use serde::Deserialize;
@@ -136,10 +136,10 @@ impl BareMachine {
     /// Lets it turn.
     pub(super) fn play(&self, duration: Duration, sample: Duration) -> Played {
         let PlantConfig { machine, load, .. } = self.config;
-        let mut machine = Machine::new(machine, load, angle::position(self.angle), self.speed);
-        machine.lock(self.locked);
         let step = self.step();
-        let dt = step.0 as f32 * 1e-6;
+        let mut machine = Machine::new(machine, load, step.0 as f32 * 1e-6);
+        machine.place(angle::position(self.angle), self.speed);
+        machine.lock(self.locked);
         let mut columns = vec![Vec::new(); MACHINE.len()];
         let mut voltages = self.voltages.iter().peekable();
         let mut feed = Feed::Stator(Vector::ZERO);
@@ -155,7 +155,7 @@ impl BareMachine {
             while let Some(voltage) = voltages.next_if(|voltage| voltage.at <= now) {
                 feed = voltage.feed;
             }
-            machine.step(dt, feed, 0.0);
+            machine.step(feed, &mut Flow::default());
             now += step;
         }
         let mark =
