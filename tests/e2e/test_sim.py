@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from program import eventually
-from stmcp import Line, frame
+from stmcp import EXECUTE, Line, frame
 
 CONTROL_MODE = 0x03
+SPEED_MEAS = 0x1E
 
 
 def test_each_port_is_announced_when_it_can_be_opened(sim, tmp_path):
@@ -373,3 +374,18 @@ def test_answers_that_nobody_reads_do_not_stop_the_drives(motorlink, tmp_path):
     finally:
         simulator.kill()
         simulator.wait()
+
+
+def test_paused_drives_answer_and_stand_still(sim):
+    drives = sim(rmd=())
+    with Line(drives.st) as line:
+        line.ask(frame(EXECUTE, [1]))
+        eventually(lambda: drives.motor(1)["speed_rpm"] > 100, "a motor that turns")
+        drives.do("pause")
+        before = drives.do("state")
+        speeds = {line.get(SPEED_MEAS) for _ in range(20)}
+        drives.do("pause")
+        assert drives.do("state") == before and len(speeds) == 1
+        drives.do("resume")
+        eventually(lambda: drives.motor(1)["status"] == "RUN", "a start that goes on")
+        assert drives.do("state")["time"] > before["time"]

@@ -77,6 +77,9 @@ pub struct Turn {
 /// Serves ports until it is dropped.
 pub struct Server {
     started: std::time::Instant,
+    /// Where its time stands still, and how long it stood before.
+    held: Option<Instant>,
+    stood: Duration,
     endpoints: Vec<Endpoint>,
     nodes: Vec<Node>,
     ready: Vec<bool>,
@@ -94,6 +97,8 @@ impl Server {
     pub fn new() -> Self {
         Server {
             started: std::time::Instant::now(),
+            held: None,
+            stood: Duration::ZERO,
             endpoints: Vec::new(),
             nodes: Vec::new(),
             ready: Vec::new(),
@@ -153,9 +158,22 @@ impl Server {
         Ok(Served { port, path })
     }
 
-    /// The server's time: microseconds since it was made.
+    /// The server's time: microseconds since it was made, without those for which it stood still.
     pub fn now(&self) -> Instant {
-        Instant(self.started.elapsed().as_micros() as u64)
+        let running = || self.started.elapsed().saturating_sub(self.stood);
+        self.held.unwrap_or_else(|| Instant(running().as_micros() as u64))
+    }
+
+    /// Lets time stand still, or go on. Stations are served meanwhile, all at that one moment.
+    pub fn hold(&mut self, held: bool) {
+        match (held, self.held) {
+            (true, None) => self.held = Some(self.now()),
+            (false, Some(since)) => {
+                self.stood = self.started.elapsed().saturating_sub(Duration::from_micros(since.0));
+                self.held = None;
+            }
+            _ => {}
+        }
     }
 
     /// How many bytes were dropped because a client or a CAN bus did not take them.
@@ -202,6 +220,9 @@ impl Server {
 
     /// The time to the first deadline of a station.
     fn wait_time(&self, max_wait: Duration) -> Duration {
+        if self.held.is_some() {
+            return max_wait;
+        }
         let endpoints = self.endpoints.iter().filter_map(Endpoint::deadline);
         let first = endpoints.chain(self.nodes.iter().filter_map(Node::deadline)).min();
         first.map_or(max_wait, |deadline| max_wait.min(deadline.since(self.now()).into()))

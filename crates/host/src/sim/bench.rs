@@ -153,15 +153,22 @@ impl Bench {
     /// Executes a command; gives the answer, or why nothing was done.
     pub fn execute(&mut self, command: &Command) -> Result<Value, String> {
         let now = self.server.now();
-        if let Command::State { port } = command {
-            let wanted = |place: &&Place| port.as_ref().is_none_or(|port| *port == place.port);
-            let states: Vec<Value> = self.places.iter().filter(wanted).map(Place::state).collect();
-            if states.is_empty() {
-                return Err(self.which_port(port.as_deref()));
+        match command {
+            Command::State { port } => {
+                let wanted = |place: &&Place| port.as_ref().is_none_or(|port| *port == place.port);
+                let places = self.places.iter().filter(wanted);
+                let states: Vec<Value> = places.map(Place::state).collect();
+                if states.is_empty() {
+                    return Err(self.which_port(port.as_deref()));
+                }
+                return Ok(json!({ "ok": true, "time": now.0 as f64 / 1e6, "state": states }));
             }
-            return Ok(json!({ "ok": true, "time": now.0 as f64 / 1e6, "state": states }));
+            Command::Pause {} | Command::Resume {} => {
+                self.server.hold(matches!(command, Command::Pause {}));
+                return Ok(json!({ "ok": true }));
+            }
+            _ => command.check()?,
         }
-        command.check()?;
         match &self.place(command)?.drives {
             Drives::St(station) => st(&mut station.borrow_mut(), now, command)?,
             Drives::Rmd(bus) => rmd(&mut bus.borrow_mut(), now, command)?,
@@ -288,7 +295,7 @@ pub(super) fn st(station: &mut Station, now: Instant, command: &Command) -> Resu
                 Some(false) => st_motor(station, *number)?.hold_faults(0),
             }
         }
-        Command::State { .. } => {}
+        Command::State { .. } | Command::Pause {} | Command::Resume {} => {}
     }
     Ok(())
 }
@@ -328,7 +335,7 @@ pub(super) fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), 
                 Some(false) => motor.hold_faults(Errors::NONE),
             }
         }
-        Command::State { .. } => {}
+        Command::State { .. } | Command::Pause {} | Command::Resume {} => {}
     }
     Ok(())
 }

@@ -60,6 +60,10 @@ pub enum Command {
         /// True keeps it present, false lets it go; without it the fault happens once.
         hold: Option<bool>,
     },
+    /// Lets the time of all drives stand still; they answer meanwhile.
+    Pause {},
+    /// Lets it go on.
+    Resume {},
     /// Tells what is really going on in every motor.
     State {
         /// The served port; all of them without it.
@@ -78,6 +82,7 @@ impl Command {
             | Command::LockRotor { port, .. }
             | Command::Fault { port, .. }
             | Command::State { port } => port.as_deref(),
+            Command::Pause {} | Command::Resume {} => None,
         }
     }
 

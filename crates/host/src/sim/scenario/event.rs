@@ -128,6 +128,9 @@ fn world_event(target: Target, word: String, mut table: Table) -> Result<(Action
     if word == "state" {
         return Err("`state` changes nothing; look at signals".to_owned());
     }
+    if ["pause", "resume"].contains(&word.as_str()) {
+        return Err(format!("`{word}` is for drives in real time"));
+    }
     let values: Vec<String> = table.values().map(ToString::to_string).collect();
     let words = format!("{word} {}", values.join(" ").replace('"', ""));
     let motor = match target {
@@ -181,6 +184,7 @@ mod tests {
         assert!(why("at = 0.5\nst = 1\nsend = \"torque\"\namps = 3").contains("torque"));
         assert!(why("at = 0.5\nst = 1\nsend = \"start\"\nlabl = \"\"").contains("labl"));
         assert!(why("at = 0.5\nst = 1\nworld = \"state\"").contains("signals"));
+        assert!(why("at = 0.5\nst = 1\nworld = \"pause\"").contains("real time"));
         assert!(why("at = 0.5\nst = 1\nworld = \"load\"").contains("newton_metres"));
         let load = "at = 0.5\nst = 1\nworld = \"load\"\nnewton_metres = ";
         assert!(why(&format!("{load}nan")).contains("newton_metres is"));
