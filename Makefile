@@ -18,14 +18,14 @@ SOCKETCAN := CARGO="$(CARGO)" SUDO="$(SUDO)" tests/socketcan/run.sh
 
 SECONDS ?= 60
 
-.PHONY: demo test lint deny unit fuzz-replay miri probe e2e test-socketcan
+.PHONY: demo test lint deny unit determinism fuzz-replay miri probe e2e test-socketcan
 .PHONY: fuzz soak bench reliability docs pictures semver fmt clean
 
 demo:
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
 # Last, so that what was not tested is said last.
-test: lint deny unit fuzz-replay miri probe e2e
+test: lint deny unit determinism fuzz-replay miri probe e2e
 	$(SOCKETCAN) || [ $$? -eq 77 ]
 
 lint:
@@ -73,6 +73,15 @@ semver:
 	command -v cargo-semver-checks >/dev/null || $(CARGO) install --locked cargo-semver-checks || exit; \
 	$(CARGO) semver-checks --baseline-rev $$release \
 		-p motorlink-proto -p motorlink-sim -p motorlink --all-features
+
+# Simulated drives do the same to the last digit with and without optimisation.
+FINGERPRINT = $(CARGO) run --quiet --locked -p motorlink-sim --example fingerprint
+PLAIN := --target-dir target/plain --config profile.dev.package.motorlink-sim.opt-level=0
+determinism:
+	mkdir -p target
+	$(FINGERPRINT) > target/fingerprint
+	$(FINGERPRINT) --release | cmp - target/fingerprint
+	$(FINGERPRINT) $(PLAIN) | cmp - target/fingerprint
 
 # Both protocols link for a Cortex-M4 without a path that panics, within their RAM.
 probe:

@@ -1,0 +1,60 @@
+//! Prints a fingerprint of all that two simulated drives said and are, moment by moment. `make
+//! determinism` compares what it prints from builds with and without optimisation.
+
+use motorlink_proto::rmd::{CanFrame, Command as _, Position, ReadStatus3, Speed};
+use motorlink_proto::stmcp::{Command, MAX_FRAME, Profile, Ramp, RegisterId, Request};
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::units::{CentiDegrees, CentiDps};
+use motorlink_sim::hash::fingerprint;
+use motorlink_sim::rmd::RmdBus;
+use motorlink_sim::st::{StDrive, StStation};
+
+fn main() {
+    st();
+    rmd();
+}
+
+fn st() {
+    let mut now = Instant(0);
+    let mut station = StStation::new(Profile::Mcsdk54, StDrive::demo(now));
+    let mut said = Vec::new();
+    let mut ask = |station: &mut StStation<_>, now, motor, request: Request<'_>| {
+        let mut frame = [0; MAX_FRAME];
+        let frame = request.encode(motor, &mut frame).expect("the request fits");
+        station.receive(now, frame, |reply| said.extend_from_slice(reply));
+    };
+    for motor in [1, 2] {
+        ask(&mut station, now, motor, Request::Execute(Command::StartMotor));
+    }
+    for round in 0..30 {
+        now += Duration::from_millis(100);
+        for motor in [1, 2] {
+            let ramp = Ramp { speed_rpm: 1000 + 50 * round, duration_ms: 80 };
+            ask(&mut station, now, motor, Request::Ramp(ramp));
+            for id in RegisterId::all() {
+                ask(&mut station, now, motor, Request::GetRegister(id));
+            }
+        }
+        println!("st {} {:016x}", now.0, fingerprint(station.drive()));
+    }
+    println!("st said {:016x}", fingerprint(&said));
+}
+
+fn rmd() {
+    let mut now = Instant(0);
+    let mut bus = RmdBus::demo(now);
+    let mut said = Vec::new();
+    for round in 0..30 {
+        let spin = Speed { speed: CentiDps(round * 3000) }.encode();
+        let angle = CentiDegrees::from_degrees(f64::from(round * 37 % 100));
+        let requests = [(0x141, spin), (0x142, Position { angle }.encode())];
+        let looks = [0x141, 0x142].map(|id| (id, ReadStatus3.encode()));
+        for (id, data) in requests.into_iter().chain(looks) {
+            bus.receive(now, &CanFrame::new(id, data), |reply| said.push(reply));
+        }
+        now += Duration::from_millis(100);
+        bus.advance_to(now);
+        println!("rmd {} {:016x}", now.0, fingerprint(&bus));
+    }
+    println!("rmd said {:016x}", fingerprint(&said));
+}
