@@ -1,6 +1,7 @@
 //! `motorlink sim`: serves simulated drives and obeys commands on stdin, or plays a scenario.
 
 mod plot;
+mod presets;
 mod run;
 
 use std::io::{ErrorKind, Read, Write};
@@ -57,11 +58,15 @@ pub struct Args {
 enum Command {
     /// Play a scenario on virtual time: plot, CSV, and whether everything came as expected
     Run(run::Args),
+    /// The presets of motors and what they are
+    Presets(presets::Args),
 }
 
 pub fn run(args: Args) -> Result<(), Failure> {
-    if let Some(Command::Run(args)) = &args.command {
-        return run::run(args);
+    match &args.command {
+        Some(Command::Run(args)) => return run::run(args),
+        Some(Command::Presets(args)) => return presets::run(args),
+        None => {}
     }
     interrupt::take_over();
     let mut config = match &args.config {

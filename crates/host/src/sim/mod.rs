@@ -14,4 +14,5 @@ pub use bench::{Bench, ServeError};
 pub use command::Command;
 pub use config::{BenchConfig, ConfigError, RmdConfigs, StConfigs};
 pub(crate) use link::{open_can, open_line};
+pub use motorlink_sim::preset;
 pub use rom::{RomError, RomFolder};
