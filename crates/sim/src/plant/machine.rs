@@ -18,10 +18,10 @@
 //! What is left is of the second order, with Simpson's small constant for the angle that the rotor
 //! turns in a step.
 //!
-//! Shaft, at the rotor, with gear ratio N:
+//! Shaft, at the rotor, with gear ratio N and n periods of cogging a turn:
 //!
 //! ```text
-//! J dω/dt = T + cogging + T_load/N − B ω − dry(ω) sign ω
+//! J dω/dt = T − Tcog sin(n θ) + T_load/N − (B + Beddy) ω − dry(ω) sign ω
 //! dry     = Tc + (Ts − Tc) / (1 + (ω/ωs)²) + hysteresis + (brake + (1/η − 1) |T_load|) / N
 //! ```
 //!

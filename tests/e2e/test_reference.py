@@ -1,0 +1,129 @@
+"""The simulated motors against SciPy's solution of their equations (reference.py).
+
+A voltage step on a locked rotor, starts without load, and a short circuit at speed: half a second,
+in which currents, speed and angle agree at every sample within 0.2 % of their greatest value.
+"""
+
+import functools
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from reference import Experiment, Motor, solve
+
+PRESETS = ["drone", "shinano", "mains", "rmd-l-5005", "rmd-x8"]
+TOLERANCE = 0.002
+SIGNALS = ["id_amps", "iq_amps", "speed_radians_per_second", "angle_radians"]
+
+
+@pytest.fixture(scope="module")
+def plants(run):
+    """What the program says of its presets."""
+    lines = run("sim", "presets", "--json").ended(0).lines
+    return {line["preset"]: line["plant"] for line in lines}
+
+
+def motor_of(plant):
+    return Motor(**{field.name: plant["machine"][field.name] for field in fields(Motor)})
+
+
+def experiments(plant):
+    """From the motor's own values, so that the steps are great for it but nothing bursts."""
+    motor = motor_of(plant)
+    # The most that an inverter can make of the supply, and the speed whose back-EMF that is.
+    volts = plant["supply"]["voltage"] / math.sqrt(3)
+    speed = volts / (motor.pole_pairs * motor.flux_linkage)
+    holding = motor.dry(0.0) + motor.cogging_torque
+    breaking_loose = motor.resistance * holding / motor.torque(0.0, 1.0)
+    return {
+        "locked rotor": Experiment((0.1 * volts, 0.1 * volts), angle=0.25, locked=True),
+        "start": Experiment((0.0, volts), angle=0.25),
+        "start that hardly breaks loose": Experiment((0.0, 1.5 * breaking_loose)),
+        "short circuit": Experiment((0.0, 0.0), speed=speed),
+    }
+
+
+EXPERIMENTS = ["locked rotor", "start", "start that hardly breaks loose", "short circuit"]
+
+
+def scenario(preset, experiment):
+    vd, vq = experiment.voltage
+    return f"""
+title = "For comparison"
+duration = 0.5
+sample_us = 50
+
+[machine]
+preset = "{preset}"
+speed = {experiment.speed}
+angle = {experiment.angle}
+locked = {str(experiment.locked).lower()}
+
+[[voltage]]
+at = 0.0
+vd = {vd}
+vq = {vq}
+"""
+
+
+@pytest.fixture(scope="module")
+def simulate(run, plants, tmp_path_factory):
+    """Rows of time, Id, Iq, speed and angle, by preset and experiment; each is run once."""
+    folder = tmp_path_factory.mktemp("reference")
+
+    @functools.cache
+    def simulate(preset, name):
+        file, rows = folder / "scenario.toml", folder / "rows.csv"
+        file.write_text(scenario(preset, experiments(plants[preset])[name]))
+        run("sim", "run", file, "--csv", rows).ended(0)
+        table = np.genfromtxt(rows, delimiter=",", names=True, deletechars="")
+        return np.array([table["time_s"], *(table[f"machine.{signal}"] for signal in SIGNALS)])
+
+    return simulate
+
+
+def deviations(rows, solution):
+    """The greatest deviation of currents, speed and angle, as a share of each one's full scale."""
+    full = np.abs(solution).max(axis=1)
+    # A current is a share of the whole current: what Id ought to be may be nothing.
+    full[:2] = np.hypot(*solution[:2]).max()
+    return np.abs(rows - solution).max(axis=1) / np.where(full > 0, full, 1)
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_simulator_agrees_with_scipy(simulate, plants, preset, name):
+    times, *rows = simulate(preset, name)
+    assert len(times) == 10_001 and times[-1] == 0.5
+    plant = plants[preset]
+    solution = solve(motor_of(plant), experiments(plant)[name], times)
+    found = dict(zip(SIGNALS, deviations(np.array(rows), solution).tolist()))
+    assert max(found.values()) < TOLERANCE, found
+
+
+def test_every_preset_is_compared(plants):
+    assert list(plants) == PRESETS
+
+
+# A thousandth of what acts on these motors: one percent of it is nothing that could be noticed.
+FAINT = {"viscous_friction", "iron_eddy"}
+
+
+@pytest.mark.parametrize("parameter", [field.name for field in fields(Motor)])
+def test_a_parameter_that_is_one_percent_off_is_noticed(simulate, plants, parameter):
+    """The control: against a reference that is wrong in one parameter the comparison fails."""
+    plant = plants["rmd-l-5005"]
+    right = motor_of(plant)
+    value = getattr(right, parameter)
+    if isinstance(value, int):
+        wrong = value + 1
+    else:
+        wrong = value * (2.0 if parameter in FAINT else 1.01)
+    motor = replace(right, **{parameter: wrong})
+    worst = {}
+    for name, experiment in experiments(plant).items():
+        times, *rows = simulate("rmd-l-5005", name)
+        worst[name] = deviations(np.array(rows), solve(motor, experiment, times)).max()
+    assert max(worst.values()) > TOLERANCE, worst
