@@ -59,6 +59,11 @@ impl Vector {
         Vector { x: self.x * factors.x, y: self.y * factors.y }
     }
 
+    /// Each component and a share of it.
+    pub fn grown(self, shares: Vector) -> Self {
+        self + self.scaled(shares)
+    }
+
     /// Scalar product.
     pub fn dot(self, other: Vector) -> f32 {
         self.x * other.x + self.y * other.y

@@ -10,13 +10,19 @@
 //! T     = 1.5 p ψ × i        = 1.5 p (ψm iq + (Ld − Lq) id iq)
 //! ```
 //!
-//! A step of length h is split symmetrically (Strang, *On the construction and comparison of
-//! difference schemes*, SIAM J. Numer. Anal. 5, 1968): the resistance acts for h/6, 4h/6 and h/6, and
-//! in between rotation and voltage act for h/2 each. Both parts are solved exactly: without
-//! resistance the flux linkage of the stator only adds up voltage; without voltage and rotation Ld id
-//! and Lq iq die away exponentially. A factor a axis makes the current of a constant voltage exact.
-//! What is left is of the second order, with Simpson's small constant for the angle that the rotor
-//! turns in a step.
+//! In the rotor's frame Ld id and Lq iq turn back with the electrical speed ω and die away with R/L.
+//! What the axes have in common of that, a = R (1/Ld + 1/Lq) / 2, and voltage and back-EMF are solved
+//! exactly for half a step of constant speed, as complex numbers:
+//!
+//! ```text
+//! f(h/2) = E f + (1 − E) / (a + jω) (v − jω ψm),   E = exp(−(a + jω) h/2)
+//! ```
+//!
+//! A voltage that stands still in the stator's frame adds (1 − exp(−a h/2)) / a of itself, as the
+//! rotor sees it at the end. What the axes differ in, ±R (1/Ld − 1/Lq) / 2, acts in between for h/6,
+//! 4h/6 and h/6 (split symmetrically, Strang, *On the construction and comparison of difference
+//! schemes*, SIAM J. Numer. Anal. 5, 1968) and is nothing in a motor without saliency. The torque is
+//! Simpson's mean of begin, middle and end.
 //!
 //! Shaft, at the rotor, with gear ratio N and n periods of cogging a turn:
 //!
@@ -147,9 +153,8 @@ pub struct Machine {
     config: MachineConfig,
     load: Load,
     locked: bool,
-    /// Length of a step, s, and one over half of it.
+    /// Length of a step, s.
     period: f32,
-    per_half: f32,
     /// Phase resistance now, Ω, and what is in series with it.
     resistance: f32,
     series: f32,
@@ -180,31 +185,27 @@ pub struct Machine {
 /// What the resistance does in a step.
 #[derive(Debug, Clone)]
 struct Decay {
-    /// What a sixth of a step leaves of a flux linkage.
+    /// What the axes have in common: its rate, 1/s, what is gone of a flux linkage after half a step,
+    /// and the time for which a voltage that stands still acts in it, s.
+    rate: f32,
+    gone: f32,
+    drive: f32,
+    /// What they differ in: what a sixth and what two sixths of a step add, as a share.
     outer: Vector,
-    /// What two sixths leave.
     inner: Vector,
-    /// Time for which a voltage acts in half a step, s.
-    drive: Vector,
 }
 
 impl Decay {
     fn new(period: f32, resistance: f32, inverse: Vector) -> Self {
-        let axis = |inverse: f32| {
-            let exponent = resistance * inverse * period;
-            let outer = libm::expf(-exponent / 6.0);
-            let inner = outer * outer;
-            // A constant voltage then ends at itself over the resistance.
-            let all = inner * inner * inner;
-            let drive = (1.0 - all) / (outer * (1.0 + inner * inner)) / (resistance * inverse);
-            (outer, inner, drive)
+        let rate = 0.5 * resistance * (inverse.x + inverse.y);
+        let gone = -libm::expm1f(-0.5 * rate * period);
+        let drive = if gone > 0.0 { gone / rate } else { 0.5 * period };
+        let beyond = 0.5 * resistance * (inverse.x - inverse.y);
+        let change = |share: f32| {
+            let exponent = beyond * period * share;
+            Vector::new(libm::expm1f(-exponent), libm::expm1f(exponent))
         };
-        let (d, q) = (axis(inverse.x), axis(inverse.y));
-        Decay {
-            outer: Vector::new(d.0, q.0),
-            inner: Vector::new(d.1, q.1),
-            drive: Vector::new(d.2, q.2),
-        }
+        Decay { rate, gone, drive, outer: change(1.0 / 6.0), inner: change(1.0 / 3.0) }
     }
 }
 
@@ -239,7 +240,6 @@ impl Machine {
             load,
             locked: false,
             period,
-            per_half: 2.0 / period,
             resistance: config.resistance,
             series: 0.0,
             inverse_stribeck: 1.0 / config.stribeck_speed,
@@ -400,47 +400,31 @@ impl Machine {
     /// Lets a voltage act for a step; adds where energy went.
     #[inline]
     pub fn step(&mut self, feed: Feed, flow: &mut Flow) {
-        match feed {
-            Feed::Stator(voltage) => {
-                let at = |frame| voltage.seen_from(frame);
-                self.drive(at, |_, end| voltage.seen_from(end), flow);
-            }
-            Feed::Rotor(voltage) => {
-                self.drive(|_| voltage, |half, _| half.mean(voltage), flow);
-            }
-        }
-    }
-
-    /// A step with a voltage that is `at` a frame as seen from it, and that adds up over half a step
-    /// to `over`, given that half and the frame at its end.
-    #[inline]
-    fn drive(
-        &mut self,
-        at: impl Fn(Vector) -> Vector,
-        over: impl Fn(&Half, Vector) -> Vector,
-        flow: &mut Flow,
-    ) {
         let half = self.half();
         let begin = self.frame;
         let middle = begin.turned(half.turn);
         let end = middle.turned(half.turn);
-        // The magnet's part of the flux linkage turns away.
-        let magnet = Vector::new(half.turn.x - 1.0, -half.turn.y) * self.config.flux_linkage;
-        let magnet = magnet * self.per_half;
-        let first = (over(&half, middle) + magnet).scaled(self.decay.drive);
-        let second = (over(&half, end) + magnet).scaled(self.decay.drive);
-
+        let emf = Vector::new(0.0, half.electrical * self.config.flux_linkage);
+        // The voltage as the rotor sees it, what of it is constant there, and what is not.
+        let (v1, v2, v3, constant, still) = match feed {
+            Feed::Stator(v) => {
+                let seen = [begin, middle, end].map(|frame| v.seen_from(frame));
+                (seen[0], seen[1], seen[2], -emf, self.decay.drive)
+            }
+            Feed::Rotor(v) => (v, v, v, v - emf, 0.0),
+        };
+        let response = self.response(&half);
         let f1 = self.flux;
-        let driven = f1.scaled(self.decay.outer).seen_from(half.turn) + first;
-        let f2 = driven.scaled(self.decay.inner);
-        let driven = f2.scaled(self.decay.inner).seen_from(half.turn) + second;
-        let f3 = driven.scaled(self.decay.outer);
+        let driven = self.turn_back(f1.grown(self.decay.outer), &half, response, constant);
+        let f2 = (driven + v2 * still).grown(self.decay.inner);
+        let driven = self.turn_back(f2.grown(self.decay.inner), &half, response, constant);
+        let f3 = (driven + v3 * still).grown(self.decay.outer);
         self.flux = f3;
 
         let (i1, i2, i3) =
             (f1.scaled(self.inverse), f2.scaled(self.inverse), f3.scaled(self.inverse));
         let sixth = self.period * (1.0 / 6.0);
-        let power = at(begin).dot(i1) + 4.0 * at(middle).dot(i2) + at(end).dot(i3);
+        let power = v1.dot(i1) + 4.0 * v2.dot(i2) + v3.dot(i3);
         flow.electrical += 1.5 * sixth * power;
         let square = i1.square() + 4.0 * i2.square() + i3.square();
         flow.copper += 1.5 * (self.resistance + self.series) * sixth * square;
@@ -451,14 +435,37 @@ impl Machine {
         self.advance(half, end, flow);
     }
 
+    /// For how long a constant voltage of the rotor's frame acts in half a step, s: a complex number,
+    /// because what it did first has turned back since.
+    #[inline]
+    fn response(&self, half: &Half) -> Vector {
+        let Decay { rate, gone, drive, .. } = self.decay;
+        if half.electrical == 0.0 {
+            return Vector::new(drive, 0.0);
+        }
+        let left = 1.0 - gone;
+        let rate = Vector::new(rate, half.electrical);
+        Vector::new(gone + left * half.fallen, left * half.turn.y).seen_from(rate)
+            * (1.0 / rate.square())
+    }
+
+    /// A flux linkage after half a step of a constant voltage: it turns back and dies away.
+    #[inline]
+    fn turn_back(&self, flux: Vector, half: &Half, response: Vector, voltage: Vector) -> Vector {
+        let slope = voltage - flux * self.decay.rate;
+        let turning = Vector::new(flux.y, -flux.x) * half.electrical;
+        flux + (slope + turning).turned(response)
+    }
+
     /// The first half of a step, by the speed and its last change.
     #[inline]
     fn half(&self) -> Half {
         let speed = self.speed + 0.5 * self.change;
         let way = 0.5 * self.period * speed;
-        let angle = way * f32::from(self.config.pole_pairs);
+        let poles = f32::from(self.config.pole_pairs);
         let position = self.position.wrapping_add(digits(way));
-        Half { position, speed, way, angle, turn: small(angle) }
+        let (turn, fallen) = small(poles * way);
+        Half { position, speed, electrical: poles * speed, way, turn, fallen }
     }
 
     /// Moves the rotor on, which was foreseen to come to `end`, with the torques of friction and load
@@ -539,35 +546,27 @@ struct Dry {
 struct Half {
     /// Where it ends.
     position: i64,
-    /// Speed at its end, rad/s.
+    /// Speed at its end, of the rotor and electrical, rad/s.
     speed: f32,
-    /// Angle that the rotor turns in it, rad.
+    electrical: f32,
+    /// Angle that the rotor turns in it, rad, as an electrical unit vector, and what that lacks of 1
+    /// along the first axis.
     way: f32,
-    /// Electrical angle that the rotor turns in it, rad, and as a unit vector.
-    angle: f32,
     turn: Vector,
+    fallen: f32,
 }
 
-impl Half {
-    /// Mean of a voltage that turns with the rotor, as the rotor sees at the end what it left behind.
-    fn mean(&self, voltage: Vector) -> Vector {
-        let z = self.angle * self.angle;
-        let along = 1.0 - z * (1.0 / 6.0);
-        let behind = self.angle * (0.5 - z * (1.0 / 24.0));
-        voltage.seen_from(Vector::new(along, behind))
-    }
-}
-
-/// The unit vector of an angle in rad, which is small but for odd motors.
-fn small(x: f32) -> Vector {
+/// The unit vector of an angle in rad, which is small but for odd motors, and one less its cosine.
+fn small(x: f32) -> (Vector, f32) {
     /// Up to which the series are exact enough, rad.
     const SMALL: f32 = 0.5;
     if x.abs() > SMALL {
-        return Vector::unit(angle::position(x) as u32);
+        let turn = Vector::unit(angle::position(x) as u32);
+        return (turn, 1.0 - turn.x);
     }
     let z = x * x;
-    let cos = 1.0 + z * (-0.5 + z * (1.0 / 24.0 - z * (1.0 / 720.0)));
-    Vector::new(cos, x + x * z * (-1.0 / 6.0 + z * (1.0 / 120.0)))
+    let fallen = z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0)));
+    (Vector::new(1.0 - fallen, x + x * z * (-1.0 / 6.0 + z * (1.0 / 120.0))), fallen)
 }
 
 /// Electrical angle of a rotor's position, 2^32 a turn.
