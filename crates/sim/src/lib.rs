@@ -44,6 +44,7 @@
 
 pub mod angle;
 mod clock;
+pub mod control;
 pub mod hash;
 pub mod heat;
 pub mod machine;

@@ -1,0 +1,145 @@
+//! Regulators that both drives use. Units are the caller's.
+
+use crate::vector::Vector;
+
+/// Gains of a PID regulator, as they act in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Gains {
+    /// Output per error.
+    pub kp: f32,
+    /// Growth of the integral per error and step.
+    pub ki: f32,
+    /// Output per change of the error in a step.
+    pub kd: f32,
+}
+
+impl Gains {
+    /// Gains from the numerators of registers and their divisors: Kp, Ki and Kd.
+    pub fn new(numerators: [i32; 3], divisors: [i32; 3]) -> Self {
+        let gain = |n: usize| numerators[n] as f32 / divisors[n].max(1) as f32;
+        Gains { kp: gain(0), ki: gain(1), kd: gain(2) }
+    }
+
+    /// Ki over Kp, at most 1: the share of what was cut off that an integral gives back in a step.
+    fn tracking(&self) -> f32 {
+        if self.kp > self.ki { self.ki / self.kp } else { 1.0 }
+    }
+}
+
+/// A PID regulator.
+///
+/// ```text
+/// u = Kp e + I + Kd (e − e'),   I = I' + Ki e
+/// ```
+///
+/// Output and integral end at the limits, and the integral does not grow while the output is beyond
+/// the limit on that side (conditional integration; see K. J. Åström and T. Hägglund, *PID
+/// Controllers: Theory, Design and Tuning*, on windup).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Regulator {
+    integral: f32,
+    last_error: f32,
+}
+
+impl Regulator {
+    /// A regulator whose output begins at `output`.
+    pub const fn starting_at(output: f32) -> Self {
+        Regulator { integral: output, last_error: 0.0 }
+    }
+
+    /// The integral part of the output.
+    pub const fn integral(&self) -> f32 {
+        self.integral
+    }
+
+    /// Sets the integral part of the output.
+    pub const fn set_integral(&mut self, integral: f32) {
+        self.integral = integral;
+    }
+
+    /// One step: the output for an error, within `least` and `most`.
+    #[inline]
+    pub fn step(&mut self, error: f32, gains: &Gains, least: f32, most: f32) -> f32 {
+        let direct = gains.kp * error + gains.kd * (error - self.last_error);
+        self.last_error = error;
+        let integral = self.integral + gains.ki * error;
+        let output = direct + integral;
+        let windup = (output > most && error > 0.0) || (output < least && error < 0.0);
+        if !windup {
+            self.integral = within(integral, least, most);
+        }
+        within(direct + self.integral, least, most)
+    }
+
+    /// Tells the regulator by how much its output was cut (what acted minus what it gave), so that
+    /// the integral follows what acts (back-calculation).
+    pub fn give_back(&mut self, cut: f32, gains: &Gains) {
+        self.integral += cut * gains.tracking();
+    }
+}
+
+/// `value` held between two others; unlike `clamp` it takes any.
+#[inline]
+pub fn within(value: f32, least: f32, most: f32) -> f32 {
+    value.max(least).min(most)
+}
+
+/// A voltage within a circle of radius `most`: d, which holds the flux, goes first, up to
+/// `flux_share` of it, and q gets what is left.
+#[inline]
+pub fn limit_to_circle(voltage: Vector, most: f32, flux_share: f32) -> Vector {
+    if voltage.square() <= most * most {
+        return voltage;
+    }
+    let d = within(voltage.x, -flux_share * most, flux_share * most);
+    let left = libm::sqrtf((most * most - d * d).max(0.0));
+    Vector::new(d, within(voltage.y, -left, left))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gains_are_numerators_over_divisors() {
+        let gains = Gains::new([1024, 8, -16], [1024, 16, 0]);
+        assert_eq!(gains, Gains { kp: 1.0, ki: 0.5, kd: -16.0 });
+    }
+
+    #[test]
+    fn parts_add_up_and_the_integral_remembers() {
+        let gains = Gains { kp: 2.0, ki: 0.5, kd: 1.0 };
+        let mut regulator = Regulator::starting_at(1.0);
+        assert_eq!(regulator.step(1.0, &gains, -100.0, 100.0), 2.0 + 1.5 + 1.0);
+        assert_eq!(regulator.step(1.0, &gains, -100.0, 100.0), 2.0 + 2.0);
+        assert_eq!(regulator.integral(), 2.0);
+    }
+
+    #[test]
+    fn an_output_beyond_its_limit_does_not_wind_up() {
+        let gains = Gains { kp: 1.0, ki: 1.0, kd: 0.0 };
+        let mut regulator = Regulator::default();
+        for _ in 0..1000 {
+            assert_eq!(regulator.step(20.0, &gains, -10.0, 10.0), 10.0);
+        }
+        assert_eq!(regulator.step(-1.0, &gains, -10.0, 10.0), -2.0, "back at once");
+    }
+
+    #[test]
+    fn what_was_cut_off_is_given_back() {
+        let gains = Gains { kp: 2.0, ki: 0.5, kd: 0.0 };
+        let mut regulator = Regulator::starting_at(8.0);
+        regulator.give_back(-4.0, &gains);
+        assert_eq!(regulator.integral(), 7.0);
+    }
+
+    #[test]
+    fn the_circle_keeps_d_and_takes_from_q() {
+        let inside = Vector::new(3.0, 4.0);
+        assert_eq!(limit_to_circle(inside, 5.0, 0.95), inside);
+        let cut = limit_to_circle(Vector::new(-3.0, 9.0), 5.0, 0.95);
+        assert_eq!(cut, Vector::new(-3.0, 4.0));
+        let both = limit_to_circle(Vector::new(30.0, -9.0), 5.0, 0.6);
+        assert!((both - Vector::new(3.0, -4.0)).length() < 1e-5);
+    }
+}
