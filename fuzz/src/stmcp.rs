@@ -296,10 +296,10 @@ fn world(station: &mut StStation<[StMotor; 2]>, input: &mut Input<'_>) {
     let number = Motor::new(what % 2 + 1).expect("1 or 2");
     let motor = station.drive_mut().motor_mut(number).expect("there are two");
     match what / 2 % 6 {
-        0 => motor.set_bus_voltage(value.min(1000.0)),
-        1 => motor.set_temperature(Some(value - 100.0)),
-        2 => motor.set_load_torque(value.min(1000.0)),
-        3 => motor.lock_rotor(value > 500.0),
+        0 => motor.plant_mut().set_source(value.min(1000.0)),
+        1 => motor.plant_mut().force_temperature(Some(value - 100.0)),
+        2 => motor.plant_mut().change_load(|load| load.brake = value.min(1000.0)),
+        3 => motor.plant_mut().lock(value > 500.0),
         4 => motor.inject(value as u16),
         _ => motor.hold_faults(value as u16),
     }

@@ -215,19 +215,26 @@ impl Place {
 
 fn st_state(motor: &StMotor, number: u8) -> Value {
     let truth = motor.truth();
+    let plant = &truth.plant;
     json!({
         "motor": number,
         "status": truth.status.to_string(),
         "faults": truth.flags.to_string(),
         "speed_rpm": truth.speed_rpm,
         "speed_reference_rpm": truth.speed_reference_rpm,
-        "angle_degrees": truth.angle_degrees,
-        "iq_amps": truth.iq,
-        "id_amps": truth.id,
-        "bus_volts": truth.bus_voltage,
+        "angle_degrees": plant.angle_degrees,
+        "iq_amps": plant.iq,
+        "id_amps": plant.id,
+        "iq_reference_amps": truth.iq_reference,
+        "id_reference_amps": truth.id_reference,
+        "phase_amps": plant.phase_currents,
+        "torque_newton_metres": plant.torque,
+        "bus_volts": plant.bus_voltage,
+        "chopping": plant.chopping,
         "celsius": truth.temperature,
-        "load_newton_metres": truth.load_torque,
-        "locked": truth.locked,
+        "winding_celsius": plant.winding_temperature,
+        "load_newton_metres": motor.plant().machine().load().brake,
+        "locked": plant.locked,
     })
 }
 
@@ -272,16 +279,16 @@ pub(super) fn st(station: &mut Station, now: Instant, command: &Command) -> Resu
         }
         Command::PowerCycle { motor: None, .. } => station.power_cycle(),
         Command::Supply { motor: number, volts, .. } => {
-            st_motor(station, *number)?.set_bus_voltage(*volts)
+            st_motor(station, *number)?.plant_mut().set_source(*volts);
         }
         Command::Temperature { motor: number, celsius, .. } => {
-            st_motor(station, *number)?.set_temperature(*celsius);
+            st_motor(station, *number)?.plant_mut().force_temperature(*celsius);
         }
         Command::Load { motor: number, newton_metres, .. } => {
-            st_motor(station, *number)?.set_load_torque(*newton_metres);
+            st_motor(station, *number)?.plant_mut().change_load(|load| load.brake = *newton_metres);
         }
         Command::LockRotor { motor: number, locked, .. } => {
-            st_motor(station, *number)?.lock_rotor(*locked)
+            st_motor(station, *number)?.plant_mut().lock(*locked);
         }
         Command::Fault { motor: number, fault, hold, .. } => {
             let known = Flags::NAMES.iter().find(|(_, name, _)| name.eq_ignore_ascii_case(fault));

@@ -8,6 +8,7 @@ use motorlink_proto::stmcp::Profile;
 use motorlink_proto::time::Instant;
 use motorlink_sim::heat::HeatConfig;
 use motorlink_sim::machine::MachineConfig;
+use motorlink_sim::plant::OutOfRange;
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
 use serde::Deserialize;
@@ -129,22 +130,9 @@ impl BenchConfig {
     /// A motor that cannot be; never with what [`parse`](Self::parse) gave.
     pub fn station(&self, now: Instant) -> Result<StStation<Vec<StMotor>>, ConfigError> {
         for (config, n) in self.st.0.iter().zip(1..) {
-            let limits = &config.thresholds;
-            let values = [
-                ("bus_voltage", config.bus_voltage, 0.0..=1000.0),
-                ("rated_current", config.rated_current, 1e-3..=1e3),
-                ("full_scale_current", config.full_scale_current, 1e-3..=1e4),
-                ("alignment_current", config.alignment_current, 0.0..=1e3),
-                ("load_torque", config.load_torque, 0.0..=1e3),
-                ("thresholds.over_voltage", limits.over_voltage, THRESHOLD),
-                ("thresholds.under_voltage", limits.under_voltage, THRESHOLD),
-                ("thresholds.over_temperature", limits.over_temperature, THRESHOLD),
-                ("thresholds.temperature_hysteresis", limits.temperature_hysteresis, THRESHOLD),
-            ];
-            let revup =
-                config.revup.iter().map(|phase| ("revup.current", phase.current, -1e3..=1e3));
-            let values = values.into_iter().chain(revup);
-            check(&format!("st.motor {n}"), &config.machine, &config.heat, values)?;
+            let place =
+                |error: OutOfRange| ConfigError::Impossible(format!("st.motor {n}: {error}"));
+            config.check().map_err(place)?;
         }
         let motors: Vec<StMotor> = self.st.0.iter().copied().map(StMotor::new).collect();
         let drive = StDrive::new(now, motors).ok_or_else(|| {
@@ -248,15 +236,18 @@ fn motors<T>(
     tables.map(|(table, n)| read(table, &format!("{name} {n}"))).collect::<Result<_, _>>().map(Some)
 }
 
-/// An ST motor: its preset (`mains` or `servo`) with what the table says on top.
+/// An ST motor: its preset with what the table says on top.
 fn st_motor(mut table: Table, place: &str) -> Result<MotorConfig, ConfigError> {
     let preset = match table.remove("preset") {
         None => MotorConfig::default(),
-        Some(Value::String(name)) if name == "mains" => MotorConfig::default(),
-        Some(Value::String(name)) if name == "servo" => MotorConfig::servo(),
-        Some(other) => {
-            let why = format!("{place}: the presets are \"mains\" and \"servo\", not {other}");
-            return Err(ConfigError::Text(why));
+        Some(name) => {
+            let known = MotorConfig::PRESETS.iter().find(|(known, _)| name.as_str() == Some(known));
+            let Some((_, preset)) = known else {
+                let names = MotorConfig::PRESETS.map(|(name, _)| name).join(", ");
+                let why = format!("{place}: the presets are {names}, not {name}");
+                return Err(ConfigError::Text(why));
+            };
+            preset()
         }
     };
     overlay(preset, table, place)
@@ -300,16 +291,18 @@ mod tests {
             profile = \"mcsdk-5.4\"
             [[st.motor]]
             preset = \"servo\"
-            bus_voltage = 36.0
-            machine.pole_pairs = 7
+            plant.supply.voltage = 36.0
+            plant.machine.pole_pairs = 7
             [[rmd.motor]]
             id = 32
         ";
         let config = BenchConfig::parse(text).unwrap();
         assert_eq!(config.profile, Profile::Mcsdk54);
         let [motor] = &config.st.0[..] else { panic!("one motor is written") };
-        assert_eq!((motor.bus_voltage, motor.machine.pole_pairs), (36.0, 7));
-        assert_eq!(motor.machine.torque_constant, MotorConfig::servo().machine.torque_constant);
+        let plant = &motor.plant;
+        assert_eq!((plant.supply.voltage, plant.machine.pole_pairs), (36.0, 7));
+        let servo = MotorConfig::servo().plant;
+        assert_eq!(plant.machine.flux_linkage, servo.machine.flux_linkage);
         assert_eq!(config.rmd.0[0].id, 32);
     }
 
@@ -322,11 +315,13 @@ mod tests {
         assert!(why("[st]\nmotor = []").contains("1 to 7"));
         assert!(why("[[st.motor]]\npreset = \"big\"").contains("servo"));
         assert!(why("profile = \"v9\"").contains("v9"));
-        assert!(why("[[st.motor]]\nbus_voltage = -1").contains("st.motor 1: bus_voltage"));
+        assert!(
+            why("[[st.motor]]\nplant.supply.voltage = -1").contains("st.motor 1: plant.supply")
+        );
         assert!(why("[[rmd.motor]]\nmachine.inertia = 0").contains("machine.inertia"));
         assert!(why("[[rmd.motor]]\nheat.time_constant = 0").contains("heat.time_constant"));
         assert!(why("[[rmd.motor]]\nprotect_voltage = nan").contains("protect_voltage"));
-        assert!(why("[[st.motor]]\nheat.ambient = inf").contains("heat.ambient"));
+        assert!(why("[[st.motor]]\nplant.heat.ambient = inf").contains("heat.ambient"));
         assert!(why("[[st.motor]]\nalignment_current = 1e38").contains("alignment_current"));
         assert!(why("[[st.motor]]\nthresholds.over_voltage = nan").contains("over_voltage"));
         let phase = "{ speed_rpm = 0, current = inf, duration_ms = 0 }";

@@ -10,7 +10,7 @@ mod inverter;
 mod load;
 mod machine;
 mod noise;
-mod range;
+pub(crate) mod range;
 mod sensing;
 mod supply;
 

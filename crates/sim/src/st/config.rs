@@ -4,8 +4,9 @@ use motorlink_proto::stmcp::register::{Feature, Features};
 use motorlink_proto::stmcp::{REVUP_PHASES, RevupPhase};
 
 use super::Registers;
-use crate::heat::HeatConfig;
-use crate::machine::MachineConfig;
+use super::scale::{Scale, s16};
+use crate::plant::{ChopperConfig, OutOfRange, PlantConfig, range};
+use crate::preset;
 
 /// A motor with its drive. The default is a mains-fed motor without sensor, with everything that
 /// such a build can have; [`servo`](Self::servo) is its counterpart.
@@ -16,12 +17,12 @@ use crate::machine::MachineConfig;
     serde(default, deny_unknown_fields)
 )]
 pub struct MotorConfig {
+    /// The motor and what surrounds it. The firmware knows its values, as it would from the
+    /// design, and takes the voltage of its source as the nominal bus voltage; with PFC that is the
+    /// mains' peak.
+    pub plant: PlantConfig,
     /// What the firmware is built with.
     pub build: BuildConfig,
-    /// The machine.
-    pub machine: MachineConfig,
-    /// How the heatsink warms up from the copper loss.
-    pub heat: HeatConfig,
     /// Faults.
     pub thresholds: ThresholdConfig,
     /// Lengths of states.
@@ -30,16 +31,15 @@ pub struct MotorConfig {
     pub registers: Registers,
     /// The rev-up table at power-on.
     pub revup: [RevupConfig; REVUP_PHASES as usize],
-    /// Greatest current, A.
+    /// Greatest current of the motor, amplitude, A.
     pub rated_current: f32,
-    /// Current of 32767 s16A digits, A.
-    pub full_scale_current: f32,
+    /// Greatest current that the PFC takes from the mains, effective, A.
+    pub pfc_current: f32,
     /// Current that aligns the rotor, A.
     pub alignment_current: f32,
-    /// Voltage of the bus, V; with PFC, of the bus while the PFC is off: the mains' peak.
-    pub bus_voltage: f32,
-    /// Braking torque of the load, Nm.
-    pub load_torque: f32,
+    /// What the board takes for itself, W. It discharges a bus above its source; otherwise the
+    /// source gives it.
+    pub standby_power: f32,
     /// Speed to go to when a motor starts before any command, rpm.
     pub target_speed_rpm: i32,
     /// How long the ramp to it takes, ms.
@@ -48,43 +48,79 @@ pub struct MotorConfig {
 
 impl Default for MotorConfig {
     fn default() -> Self {
-        MotorConfig {
-            build: BuildConfig::default(),
-            machine: MachineConfig {
-                pole_pairs: 4,
-                torque_constant: 0.3,
-                resistance: 1.5,
-                inductance: 8e-3,
-                inertia: 3e-4,
-                viscous_friction: 2e-4,
-                coulomb_friction: 0.03,
-            },
-            heat: HeatConfig::default(),
-            thresholds: ThresholdConfig::default(),
-            durations: DurationConfig::default(),
-            registers: Registers::default(),
-            revup: [
-                RevupConfig { speed_rpm: 0, current: 2.0, duration_ms: 200 },
-                RevupConfig { speed_rpm: 500, current: 2.0, duration_ms: 250 },
-                RevupConfig { speed_rpm: 1000, current: 2.0, duration_ms: 250 },
-                RevupConfig { speed_rpm: 1000, current: 2.0, duration_ms: 50 },
-                RevupConfig { speed_rpm: 1000, current: 2.0, duration_ms: 50 },
-            ],
-            rated_current: 6.0,
-            full_scale_current: 16.5,
-            alignment_current: 2.0,
-            bus_voltage: 325.0,
-            load_torque: 0.0,
-            target_speed_rpm: 1500,
-            target_duration_ms: 1000,
-        }
+        MotorConfig::mains()
     }
 }
 
+/// A drive: its name in files, and what it is.
+pub type MotorPreset = (&'static str, fn() -> MotorConfig);
+
 impl MotorConfig {
-    /// A 24 V motor with encoder, CORDIC observer and position control; without what the default
-    /// has.
+    /// Every drive that has a name, the default first.
+    pub const PRESETS: [MotorPreset; 4] = [
+        ("mains", MotorConfig::mains),
+        ("servo", MotorConfig::servo),
+        ("shinano", MotorConfig::shinano),
+        ("drone", MotorConfig::drone),
+    ];
+
+    /// A 325 V [servo motor](preset::mains) without sensor; observer with PLL, flux weakening,
+    /// feed-forward, PFC, DAC, and a brake chopper.
+    pub fn mains() -> Self {
+        let mut plant = preset::mains();
+        plant.supply.chopper =
+            Some(ChopperConfig { resistance: 100.0, on_voltage: 415.0, off_voltage: 410.0 });
+        MotorConfig {
+            build: BuildConfig::default(),
+            thresholds: ThresholdConfig::default(),
+            durations: DurationConfig::default(),
+            registers: Registers::default(),
+            revup: revup(2.0, 1000, 200),
+            rated_current: 5.7,
+            pfc_current: 10.0,
+            alignment_current: 2.0,
+            standby_power: 5.0,
+            target_speed_rpm: 1500,
+            target_duration_ms: 1000,
+            plant,
+        }
+    }
+
+    /// The 24 V [motor of ST's kits](preset::shinano) without sensor; observer with PLL, flux
+    /// weakening, feed-forward and DAC.
+    pub fn shinano() -> Self {
+        let plant = preset::shinano();
+        MotorConfig {
+            build: BuildConfig { pfc: false, ..BuildConfig::default() },
+            thresholds: ThresholdConfig {
+                over_voltage: 32.0,
+                under_voltage: 12.0,
+                over_current: 14.0,
+                ..ThresholdConfig::default()
+            },
+            registers: Registers {
+                max_app_speed: 4000,
+                min_app_speed: 400,
+                ctrbid: 0x012,
+                pwbdid: 0x02C,
+                uid: 0x4D4C_0003,
+                ..Registers::tuned(&plant)
+            },
+            revup: revup(3.0, 1000, 300),
+            rated_current: 5.3,
+            alignment_current: 3.0,
+            standby_power: 1.0,
+            plant,
+            ..MotorConfig::mains()
+        }
+    }
+
+    /// The motor of [`shinano`](Self::shinano) with an encoder, CORDIC observer and position
+    /// control, and a brake chopper; without what else the default has.
     pub fn servo() -> Self {
+        let mut shinano = MotorConfig::shinano();
+        shinano.plant.supply.chopper =
+            Some(ChopperConfig { resistance: 5.0, on_voltage: 30.0, off_voltage: 29.0 });
         MotorConfig {
             build: BuildConfig {
                 observer_pll: false,
@@ -96,63 +132,85 @@ impl MotorConfig {
                 dac: false,
                 position_control: true,
             },
-            machine: MachineConfig {
-                pole_pairs: 2,
-                torque_constant: 0.04,
-                resistance: 0.64,
-                inductance: 0.9e-3,
-                inertia: 2e-5,
-                viscous_friction: 1e-5,
-                coulomb_friction: 2e-3,
-            },
-            heat: HeatConfig { resistance: 1.0, ..HeatConfig::default() },
+            registers: Registers { min_app_speed: 0, uid: 0x4D4C_0002, ..shinano.registers },
+            ..shinano
+        }
+    }
+
+    /// A [drone motor](preset::drone) without sensor and propeller; observer with PLL, flux
+    /// weakening, feed-forward and DAC.
+    pub fn drone() -> Self {
+        let plant = preset::drone();
+        MotorConfig {
             thresholds: ThresholdConfig {
-                over_voltage: 32.0,
-                under_voltage: 12.0,
+                over_voltage: 16.0,
+                under_voltage: 7.0,
+                over_current: 18.0,
                 ..ThresholdConfig::default()
             },
             registers: Registers {
-                speed_kp: 1600,
-                speed_ki: 500,
-                max_app_speed: 4000,
-                min_app_speed: 0,
-                ctrbid: 0x012,
-                pwbdid: 0x02C,
-                uid: 0x4D4C_0002,
-                ..Registers::default()
+                max_app_speed: 15_000,
+                min_app_speed: 1500,
+                uid: 0x4D4C_0004,
+                ..Registers::tuned(&plant)
             },
-            rated_current: 4.0,
-            full_scale_current: 10.0,
-            alignment_current: 2.0,
-            bus_voltage: 24.0,
-            ..MotorConfig::default()
+            revup: revup(4.0, 3000, 300),
+            rated_current: 10.0,
+            alignment_current: 4.0,
+            target_speed_rpm: 6000,
+            plant,
+            ..MotorConfig::shinano()
         }
     }
 
     /// What a bench without configuration has: two motors between which every feature is there once
     /// and missing once.
     pub fn demo() -> [Self; 2] {
-        [Self::default(), Self::servo()]
+        [Self::mains(), Self::servo()]
     }
 
-    /// Nearest s16A digits to a current in A.
-    pub(super) fn digits(&self, current: f32) -> i32 {
-        super::readings::s16(current, self.full_scale_current)
-    }
-
-    /// Current in A of s16A digits.
-    pub(super) fn amperes(&self, digits: f32) -> f32 {
-        digits * (self.full_scale_current / 32767.0)
+    /// Refuses what cannot be simulated.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        const ANY: f32 = 1e6;
+        self.plant.check()?;
+        let limits = &self.thresholds;
+        range::check([
+            ("rated_current", self.rated_current, 1e-3, 1e3),
+            ("pfc_current", self.pfc_current, 0.0, 1e3),
+            ("alignment_current", self.alignment_current, 0.0, 1e3),
+            ("standby_power", self.standby_power, 0.0, 1e3),
+            ("thresholds.over_voltage", limits.over_voltage, -ANY, ANY),
+            ("thresholds.under_voltage", limits.under_voltage, -ANY, ANY),
+            ("thresholds.over_temperature", limits.over_temperature, -ANY, ANY),
+            ("thresholds.temperature_hysteresis", limits.temperature_hysteresis, 0.0, ANY),
+            ("thresholds.over_current", limits.over_current, 0.0, ANY),
+        ])?;
+        range::check(self.revup.iter().map(|phase| ("revup.current", phase.current, -1e3, 1e3)))
     }
 
     /// The rev-up table as it travels.
-    pub(super) fn revup_phases(&self) -> [RevupPhase; REVUP_PHASES as usize] {
+    pub(super) fn revup_phases(&self, scale: &Scale) -> [RevupPhase; REVUP_PHASES as usize] {
         self.revup.map(|phase| RevupPhase {
             speed_rpm: phase.speed_rpm,
-            torque_s16a: self.digits(phase.current) as i16,
+            torque_s16a: s16(phase.current * scale.ampere) as i16,
             duration_ms: phase.duration_ms,
         })
     }
+}
+
+/// A rev-up that pulls the rotor to the field in `phase_ms`, speeds up to `speed_rpm` in twice that
+/// time, and stays there for 100 ms.
+const fn revup(current: f32, speed_rpm: i32, phase_ms: u16) -> [RevupConfig; 5] {
+    const fn phase(speed_rpm: i32, current: f32, duration_ms: u16) -> RevupConfig {
+        RevupConfig { speed_rpm, current, duration_ms }
+    }
+    [
+        phase(0, current, phase_ms),
+        phase(speed_rpm / 2, current, phase_ms),
+        phase(speed_rpm, current, phase_ms),
+        phase(speed_rpm, current, 50),
+        phase(speed_rpm, current, 50),
+    ]
 }
 
 /// What the firmware is built with; registers that need something else do not exist.
@@ -231,6 +289,8 @@ pub struct ThresholdConfig {
     pub over_temperature: f32,
     /// How far the heatsink must cool below it for the fault to go, K.
     pub temperature_hysteresis: f32,
+    /// BREAK_IN when a phase's current is beyond this, A: a comparator that switches the bridge off.
+    pub over_current: f32,
 }
 
 impl Default for ThresholdConfig {
@@ -240,6 +300,7 @@ impl Default for ThresholdConfig {
             under_voltage: 200.0,
             over_temperature: 100.0,
             temperature_hysteresis: 10.0,
+            over_current: 15.0,
         }
     }
 }

@@ -1,16 +1,11 @@
 //! References and regulators: from what was commanded to an Iq reference.
 
-use core::f32::consts::TAU;
-
 use motorlink_proto::stmcp::{ControlMode, CurrentReference, PositionMove, Ramp, TorqueRamp};
 
+use super::scale::{RPM, RPM_PER_DIGIT, s16};
 use super::{MotorConfig, Registers};
-use crate::machine::{self, within};
-
-/// Speed of one s16speed digit, 0.1 Hz, in rpm.
-pub(super) const RPM_PER_DIGIT: f32 = 6.0;
-/// Turns rad/s into rpm.
-pub(super) const RPM: f32 = 60.0 / TAU;
+use crate::angle;
+use crate::control::{Gains, Regulator, within};
 
 /// Time between two steps, s.
 const DT: f32 = 1e-3;
@@ -31,8 +26,8 @@ pub(super) struct Feedback {
     pub(super) speed_rpm: f32,
     /// From the aligned zero, 2^32 a turn.
     pub(super) position: i64,
-    /// Iq that the drive can make now, s16A.
-    pub(super) iq_range: (f32, f32),
+    /// Greatest Iq now, s16A.
+    pub(super) most_iq: f32,
 }
 
 #[derive(Debug, Clone)]
@@ -49,6 +44,7 @@ pub(super) struct Control {
     /// Iq reference, s16A.
     iq: Slope,
     path: Option<Path>,
+    /// s16speed in, s16A out.
     regulator: Regulator,
 }
 
@@ -106,9 +102,9 @@ impl Control {
 
     /// One millisecond in RUN: the Iq reference, s16A.
     pub(super) fn step(&mut self, feedback: &Feedback, registers: &Registers) -> f32 {
-        let Feedback { speed_rpm, position, iq_range: (least, most) } = *feedback;
+        let Feedback { speed_rpm, position, most_iq } = *feedback;
         if self.mode == ControlMode::Torque {
-            let iq = within(self.iq.step(), least, most);
+            let iq = within(self.iq.step(), -most_iq, most_iq);
             self.preset(speed_rpm, iq);
             return iq;
         }
@@ -122,7 +118,11 @@ impl Control {
             None => self.speed.step(),
         };
         let error = (reference - speed_rpm) / RPM_PER_DIGIT;
-        let iq = self.regulator.step(error, registers, least, most);
+        let gains = Gains::new(
+            [registers.speed_kp, registers.speed_ki, registers.speed_kd],
+            [registers.speed_kp_div, registers.speed_ki_div, registers.speed_kp_div],
+        );
+        let iq = self.regulator.step(error, &gains, -most_iq, most_iq);
         self.iq.set(iq);
         iq
     }
@@ -135,7 +135,7 @@ impl Control {
 
     fn preset(&mut self, speed_rpm: f32, iq: f32) {
         self.speed.set(speed_rpm);
-        self.regulator = Regulator { integral: iq, last_error: 0.0 };
+        self.regulator = Regulator::starting_at(iq);
     }
 
     /// Writes CONTROL_MODE: what the motor does now goes on in the other mode. A value that is no
@@ -170,7 +170,7 @@ impl Control {
 
     /// Iq reference, s16A.
     pub(super) fn iq_reference(&self) -> i32 {
-        libm::roundf(self.iq.value) as i32
+        s16(self.iq.value)
     }
 
     /// The last speed command.
@@ -238,26 +238,6 @@ impl Slope {
     }
 }
 
-/// The speed regulator: s16speed in, s16A out, gains as in the registers.
-#[derive(Debug, Clone, Default)]
-struct Regulator {
-    integral: f32,
-    last_error: f32,
-}
-
-impl Regulator {
-    fn step(&mut self, error: f32, registers: &Registers, least: f32, most: f32) -> f32 {
-        let fast = registers.speed_kp_div.max(1) as f32;
-        let slow = registers.speed_ki_div.max(1) as f32;
-        let proportional = registers.speed_kp as f32 / fast * error;
-        let derivative = registers.speed_kd as f32 / fast * (error - self.last_error);
-        self.last_error = error;
-        let integral = self.integral + registers.speed_ki as f32 / slow * error;
-        self.integral = within(integral, least, most);
-        within(proportional + self.integral + derivative, least, most)
-    }
-}
-
 /// A move to a position that begins and ends at rest, without a jerk.
 #[derive(Debug, Clone)]
 pub(super) struct Path {
@@ -271,7 +251,7 @@ pub(super) struct Path {
 
 impl Path {
     fn new(start: i64, target: PositionMove) -> Self {
-        let target_position = machine::position(target.angle_rad);
+        let target_position = angle::position(target.angle_rad);
         let duration = if target.duration_s > 0.0 { target.duration_s } else { 0.0 };
         let (elapsed, integral, last_error) = (0.0, 0.0, 0.0);
         Path { start, target: target_position, duration, elapsed, integral, last_error }
@@ -279,7 +259,7 @@ impl Path {
 
     /// Target, rad.
     pub(super) fn target(&self) -> f32 {
-        machine::radians(self.target)
+        angle::radians(self.target)
     }
 
     /// Duration, s.
@@ -293,14 +273,14 @@ impl Path {
         let (share, rate) = self.progress();
         let length = self.target.wrapping_sub(self.start);
         let wanted = self.start.wrapping_add((length as f64 * f64::from(share)) as i64);
-        let error = machine::radians(wanted.wrapping_sub(position));
+        let error = angle::radians(wanted.wrapping_sub(position));
         let slope = (error - self.last_error) / DT;
         self.last_error = error;
         self.integral += error * DT;
         let correction = registers.position_kp as f32 * error
             + registers.position_ki as f32 * self.integral
             + registers.position_kd as f32 * slope;
-        machine::radians(length) * rate + correction / POSITION_DIVISOR
+        angle::radians(length) * rate + correction / POSITION_DIVISOR
     }
 
     /// Share of the way that should be done by now, and its growth per second.

@@ -7,23 +7,20 @@ use motorlink_proto::stmcp::{
 use motorlink_proto::time::{Duration, Instant};
 
 use super::{MotorConfig, StMotor};
-use crate::clock::Clock;
-
-/// Length of a step.
-const STEP: Duration = Duration::from_millis(1);
+use crate::hash;
 
 /// An ST drive with its motors, kept in an array or a vector.
 #[derive(Debug, Clone)]
 pub struct StDrive<M> {
     motors: M,
-    clock: Clock,
+    now: Instant,
 }
 
 impl StDrive<[StMotor; 2]> {
     /// The motors of [`MotorConfig::demo`].
     pub fn demo(now: Instant) -> Self {
         let motors = MotorConfig::demo().map(StMotor::new);
-        StDrive { motors, clock: Clock::new(STEP, now) }
+        StDrive { motors, now }
     }
 }
 
@@ -32,7 +29,7 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
     pub fn new(now: Instant, motors: M) -> Option<Self> {
         let count = motors.as_ref().len();
         let fits = (1..=usize::from(Motor::MAX)).contains(&count);
-        fits.then(|| StDrive { motors, clock: Clock::new(STEP, now) })
+        fits.then(|| StDrive { motors, now })
     }
 
     /// The last motor, whose number is how many there are.
@@ -53,14 +50,20 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
 
     /// Lets time pass until `now`.
     pub fn advance_to(&mut self, now: Instant) {
-        for _ in self.clock.steps_until(now) {
-            self.motors.as_mut().iter_mut().for_each(StMotor::step);
-        }
+        let passed = now.since(self.now).0;
+        self.now += Duration(passed);
+        self.motors.as_mut().iter_mut().for_each(|motor| motor.advance(passed));
     }
 
     /// Takes the drive's power away and gives it back; see [`StMotor::power_cycle`].
     pub fn power_cycle(&mut self) {
         self.motors.as_mut().iter_mut().for_each(StMotor::power_cycle);
+    }
+
+    /// A fingerprint of all motors with their plants and firmware: two drives with the same one are
+    /// in the same state.
+    pub fn state_hash(&self) -> u64 {
+        hash::fingerprint(&self.motors.as_ref())
     }
 
     fn motor(&mut self, motor: Motor) -> &mut StMotor {

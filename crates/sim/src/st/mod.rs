@@ -26,15 +26,23 @@
 mod config;
 mod control;
 mod drive;
+mod encoder;
+mod foc;
 mod motor;
+mod observer;
 mod pfc;
 mod readings;
 mod registers;
+mod scale;
+mod slow;
 mod state;
 mod station;
+mod tuning;
 mod world;
 
-pub use config::{BuildConfig, DurationConfig, MotorConfig, RevupConfig, ThresholdConfig};
+pub use config::{
+    BuildConfig, DurationConfig, MotorConfig, MotorPreset, RevupConfig, ThresholdConfig,
+};
 pub use drive::StDrive;
 pub use motor::StMotor;
 pub use pfc::{PfcState, fault as pfc_fault};

@@ -5,37 +5,43 @@ use motorlink_proto::stmcp::{
     TorqueRamp,
 };
 
-use super::control::{Control, Feedback, RPM, step_to};
+use super::control::{Control, step_to};
+use super::encoder::Tracker;
+use super::foc::Foc;
+use super::observer::{Observer, Tracking};
 use super::pfc::Pfc;
-use super::state::{self, Situation};
-use super::{MotorConfig, Registers};
-use crate::heat::Heat;
-use crate::machine::{Machine, within};
+use super::scale::Scale;
+use super::{MotorConfig, Registers, state};
+use crate::control::Regulator;
+use crate::plant::{Bridge, Plant};
+use crate::vector::Vector;
 
-/// Length of a step, s.
-const DT: f32 = 1e-3;
-/// Share of the way to its reference that a current goes in a step: a lag of 1 ms.
-const CURRENT_LAG: f32 = 0.632;
-/// Time in which a rotor follows a forced field, s.
-const PULL: f32 = 5e-3;
-/// Rate at which the alignment turns the rotor to where it belongs, 1/s.
-const ALIGNMENT_RATE: f32 = 20.0;
-/// Speed below which the rotor stands, rpm.
-const STANDING: f32 = 1.0;
-/// How long a rotor may be stuck in RUN, ms.
-const STALL: u32 = 500;
+/// Time between two steps of the slow loops, µs.
+const SLOW_US: u32 = 1000;
 
 /// A motor of an ST drive.
 #[derive(Debug, Clone)]
 pub struct StMotor {
     pub(super) config: MotorConfig,
-    pub(super) machine: Machine,
-    pub(super) heat: Heat,
-    /// Voltage of the bus without PFC, V.
-    pub(super) supply: f32,
+    pub(super) plant: Plant,
     /// Faults that something outside holds.
     pub(super) held: u16,
     pub(super) firmware: Firmware,
+    /// Time that has passed but makes no whole period, µs.
+    pub(super) rest_us: u64,
+}
+
+/// Where the frame of the current control comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Frame {
+    /// Nowhere: the bridge is off.
+    Off,
+    /// Forced, whatever the rotor does.
+    Forced,
+    /// The encoder.
+    Encoder,
+    /// The observer.
+    Observed,
 }
 
 /// What a power cycle sets back.
@@ -43,28 +49,54 @@ pub struct StMotor {
 pub(super) struct Firmware {
     pub(super) status: Status,
     /// Steps in this state, ms.
-    elapsed: u32,
+    pub(super) elapsed: u32,
     /// Faults that happened since the last step.
     pub(super) events: u16,
-    occurred: u16,
-    present: u16,
+    pub(super) occurred: u16,
+    pub(super) present: u16,
     pub(super) registers: Registers,
     pub(super) revup: [RevupPhase; REVUP_PHASES as usize],
     pub(super) control: Control,
     pub(super) pfc: Pfc,
-    /// Iq and Id, A.
-    pub(super) iq: f32,
-    pub(super) id: f32,
-    aligned: bool,
-    starting: bool,
-    /// Position that the alignment made zero.
+    /// What the board takes from the bus, A.
+    pub(super) standby: f32,
+    pub(super) scale: Scale,
+    pub(super) foc: Foc,
+    pub(super) pll: Option<Observer>,
+    pub(super) cordic: Option<Observer>,
+    pub(super) tracker: Tracker,
+    pub(super) frame: Frame,
+    /// Electrical angle of the forced frame, 2^32 a turn, and its turn in a period.
+    pub(super) forced: u32,
+    pub(super) forced_step: i32,
+    /// Samples of both currents without current: their sums, how many, and what came of them.
+    pub(super) offset_sum: Vector,
+    pub(super) offset_count: u32,
+    pub(super) offset: Vector,
+    /// Measured speed, rad/s.
+    pub(super) speed: f32,
+    /// Electrical power into the motor, W.
+    pub(super) power: f32,
+    pub(super) weakening: Regulator,
+    pub(super) aligned: bool,
+    pub(super) starting: bool,
+    /// Position of the encoder that the alignment made zero, 2^32 a turn.
     pub(super) zero: i64,
-    stalled: u32,
+    /// How long the rotor has been stuck, and seen or not seen by the observer, ms.
+    pub(super) stalled: u32,
+    pub(super) seen: u32,
+    pub(super) unseen: u32,
+    since_slow_us: u32,
 }
 
 impl Firmware {
-    pub(super) fn new(config: &MotorConfig) -> Self {
+    pub(super) fn new(config: &MotorConfig, plant: &Plant) -> Self {
+        let scale = Scale::new(&config.plant);
         let limiter = config.durations.inrush_ms > 0;
+        let build = &config.build;
+        let observer = |tracking| Observer::new(tracking, &config.plant, &scale);
+        // A build without sensor has an observer, whether or not its registers exist.
+        let pll = build.observer_pll || !(build.observer_cordic || build.position_sensor);
         Firmware {
             status: if limiter { Status::IclWait } else { Status::Idle },
             elapsed: 0,
@@ -72,21 +104,71 @@ impl Firmware {
             occurred: 0,
             present: 0,
             registers: config.registers,
-            revup: config.revup_phases(),
+            revup: config.revup_phases(&scale),
             control: Control::new(config),
-            pfc: Pfc::default(),
-            iq: 0.0,
-            id: 0.0,
+            pfc: Pfc::new(&config.plant, scale, config.pfc_current),
+            standby: 0.0,
+            foc: Foc::new(&config.plant, &scale),
+            pll: pll.then(|| observer(Tracking::Pll)),
+            cordic: build.observer_cordic.then(|| observer(Tracking::Cordic)),
+            scale,
+            tracker: Tracker::new(plant.counts() << plant.finer_bits()),
+            frame: Frame::Off,
+            forced: 0,
+            forced_step: 0,
+            offset_sum: Vector::ZERO,
+            offset_count: 0,
+            offset: Vector::ZERO,
+            speed: 0.0,
+            power: 0.0,
+            weakening: Regulator::default(),
             aligned: false,
             starting: false,
             zero: 0,
             stalled: 0,
+            seen: 0,
+            unseen: 0,
+            since_slow_us: 0,
         }
     }
 
-    fn enter(&mut self, status: Status) {
+    /// Goes to a state, and gives the bridge what it does there.
+    pub(super) fn enter(&mut self, status: Status, sensor: bool) {
         self.status = status;
         self.elapsed = 0;
+        let last = self.frame;
+        self.frame = match status {
+            Status::Start | Status::StartRun | Status::Run if sensor => Frame::Encoder,
+            Status::Alignment | Status::Start => Frame::Forced,
+            Status::SwitchOver | Status::StartRun | Status::Run => Frame::Observed,
+            _ => Frame::Off,
+        };
+        match (last, self.frame) {
+            (Frame::Off, Frame::Off) => {}
+            (_, Frame::Off) => self.foc.stop(),
+            (Frame::Off, _) => self.begin(),
+            _ => {}
+        }
+        if matches!(status, Status::OffsetCalib | Status::AlignOffsetCalib) {
+            (self.offset_sum, self.offset_count) = (Vector::ZERO, 0);
+        }
+    }
+
+    /// Begins to drive currents.
+    fn begin(&mut self) {
+        self.foc.begin();
+        self.weakening = Regulator::default();
+        (self.forced, self.forced_step) = (0, 0);
+        (self.stalled, self.seen, self.unseen) = (0, 0, 0);
+        let backwards = self.control.backwards();
+        for observer in [&mut self.pll, &mut self.cordic].into_iter().flatten() {
+            observer.begin(backwards);
+        }
+    }
+
+    /// The observer that the drive runs on.
+    pub(super) fn observer(&self) -> Option<&Observer> {
+        self.pll.as_ref().or(self.cordic.as_ref())
     }
 }
 
@@ -102,13 +184,13 @@ impl StMotor {
             Command::StopRamp => self.firmware.control.stop_ramp(),
             Command::FaultAck if status == Status::FaultOver && self.firmware.events == 0 => {
                 self.firmware.occurred = 0;
-                self.firmware.enter(Status::StopIdle);
+                self.enter(Status::StopIdle);
             }
             Command::EncoderAlign
                 if status == Status::Idle && self.config.build.position_sensor =>
             {
                 self.firmware.starting = false;
-                self.firmware.enter(Status::IdleAlignment);
+                self.enter(Status::IdleAlignment);
             }
             Command::IqdrefClear => {
                 self.firmware.registers.iq_speedmode = self.config.registers.iq_speedmode;
@@ -126,13 +208,13 @@ impl StMotor {
     fn start(&mut self) {
         if self.firmware.status == Status::Idle {
             self.firmware.starting = true;
-            self.firmware.enter(Status::IdleStart);
+            self.enter(Status::IdleStart);
         }
     }
 
     fn stop(&mut self) {
         if state::stoppable(self.firmware.status) {
-            self.firmware.enter(Status::AnyStop);
+            self.enter(Status::AnyStop);
         }
     }
 
@@ -158,7 +240,7 @@ impl StMotor {
         }
     }
 
-    fn obey(&mut self) {
+    pub(super) fn obey(&mut self) {
         if self.running() {
             let position = self.position_from_zero();
             self.firmware.control.execute(self.firmware.registers.max_app_speed, position);
@@ -166,194 +248,98 @@ impl StMotor {
     }
 }
 
-/// What happens by itself.
+/// What happens by itself, each period.
 impl StMotor {
-    /// One millisecond.
-    pub(super) fn step(&mut self) {
-        self.watch();
-        self.proceed();
-        let torque = self.drive();
-        self.machine.step(DT, torque);
-        let loss = self.config.machine.copper_loss(self.firmware.iq, self.firmware.id);
-        self.heat.step(DT, loss);
-        if self.config.build.pfc {
-            let Firmware { pfc, registers, .. } = &mut self.firmware;
-            pfc.step(self.supply, self.config.bus_voltage, registers);
+    /// Lets time pass, µs.
+    pub(super) fn advance(&mut self, us: u64) {
+        let period = u64::from(self.config.plant.period_us);
+        self.rest_us += us;
+        while self.rest_us >= period {
+            self.rest_us -= period;
+            self.period();
         }
     }
 
-    /// Looks for the causes of faults; a new one switches the motor off.
-    fn watch(&mut self) {
-        let limits = self.config.thresholds;
-        let (voltage, temperature) = (self.bus_voltage(), self.heat.temperature());
-        let hot = self.firmware.present & Flags::OVER_TEMP != 0;
-        let cool_down = if hot { limits.temperature_hysteresis } else { 0.0 };
-        let causes = [
-            (Flags::OVER_VOLT, voltage > limits.over_voltage),
-            (Flags::UNDER_VOLT, voltage < limits.under_voltage),
-            (Flags::OVER_TEMP, temperature > limits.over_temperature - cool_down),
-            (Flags::SPEED_FDBK, self.feedback_lost()),
-        ];
-        let events = core::mem::take(&mut self.firmware.events);
-        let present = causes
-            .iter()
-            .filter(|(_, present)| *present)
-            .fold(self.held | events, |all, (fault, _)| all | fault);
-        self.firmware.present = present;
-        self.firmware.occurred |= present;
-        let status = self.firmware.status;
-        if present != 0 && !matches!(status, Status::FaultNow | Status::FaultOver) {
-            self.firmware.enter(Status::FaultNow);
+    fn period(&mut self) {
+        let bridge = match self.firmware.frame {
+            Frame::Off => {
+                self.sample_offsets();
+                Bridge::Off
+            }
+            frame => self.control_currents(frame),
+        };
+        if self.firmware.pfc.enabled() {
+            let (mains, bus) = (self.plant.supply().voltage, self.plant.bus_voltage());
+            let fed = self.firmware.pfc.feed(mains, bus);
+            self.plant.feed(fed - self.firmware.standby);
+        }
+        self.plant.step(bridge);
+        if bridge != Bridge::Off {
+            self.compare_currents();
+        }
+        self.firmware.since_slow_us += u32::from(self.config.plant.period_us);
+        if self.firmware.since_slow_us >= SLOW_US {
+            self.firmware.since_slow_us = 0;
+            self.millisecond();
         }
     }
 
-    /// Whether the rotor is not where the firmware believes.
-    fn feedback_lost(&mut self) -> bool {
-        let speed = self.speed_rpm().abs();
-        let most = self.firmware.registers.max_app_speed as f32;
-        let least = self.firmware.registers.min_app_speed as f32;
-        let pushed = self.firmware.iq.abs() >= 0.2 * self.config.rated_current;
-        let moving = self.firmware.control.path().is_some();
-        let stuck = pushed && !moving && speed <= STANDING.max(0.25 * least);
-        self.firmware.stalled = if self.running() && stuck { self.firmware.stalled + 1 } else { 0 };
-        self.running() && (speed > 1.2 * most || self.firmware.stalled >= STALL)
-    }
-
-    fn proceed(&mut self) {
-        self.firmware.elapsed = self.firmware.elapsed.saturating_add(1);
-        let sensor = self.config.build.position_sensor;
-        let situation = Situation {
-            elapsed: self.firmware.elapsed,
-            durations: &self.config.durations,
-            revup: &self.firmware.revup,
-            sensor,
-            unaligned: sensor && !self.firmware.aligned,
-            starting: self.firmware.starting,
-            standing: self.speed_rpm().abs() < STANDING,
-            faulty: self.firmware.present != 0,
-        };
-        let Some(next) = state::next(self.firmware.status, &situation) else { return };
-        match (self.firmware.status, next) {
-            (Status::Alignment, _) => {
-                self.firmware.aligned = true;
-                self.firmware.zero = self.machine.position();
-            }
-            (Status::Start, Status::SwitchOver) if !self.rotor_found() => {
-                self.firmware.events |= Flags::START_UP;
-                return;
-            }
-            _ => {}
-        }
-        self.firmware.enter(next);
-        self.obey();
-    }
-
-    /// Whether the observer can take over at the end of the rev-up.
-    fn rotor_found(&self) -> bool {
-        let (forced, _) = self.forced();
-        let least = self.firmware.registers.min_app_speed as f32;
-        forced.abs() >= least && self.speed_rpm() / forced >= 0.8
-    }
-
-    /// Speed (rpm) and current (A) that the rev-up forces now.
-    fn forced(&self) -> (f32, f32) {
-        let elapsed = match self.firmware.status {
-            Status::Start => self.firmware.elapsed,
-            _ => u32::MAX,
-        };
-        let (speed, digits) = state::revup(&self.firmware.revup, elapsed);
-        let sign = if self.firmware.control.backwards() { -1.0 } else { 1.0 };
-        (sign * speed, sign * self.config.amperes(digits))
-    }
-
-    /// Drives currents for a step; the torque that they make, Nm.
-    fn drive(&mut self) -> f32 {
-        let sensor = self.config.build.position_sensor;
-        match self.firmware.status {
-            Status::Run => self.regulate(),
-            Status::Start | Status::SwitchOver | Status::StartRun if !sensor => {
-                let (speed, current) = self.forced();
-                self.lag(current, 0.0);
-                self.pull(speed / RPM, self.firmware.iq)
-            }
-            Status::Alignment => {
-                self.lag(0.0, self.config.alignment_current);
-                let away = f32::from(self.machine.electrical_angle() as i16) / 65536.0;
-                let turns = -away / f32::from(self.config.machine.pole_pairs);
-                let speed = turns * core::f32::consts::TAU * ALIGNMENT_RATE;
-                self.pull(speed, self.firmware.id)
-            }
-            _ => {
-                (self.firmware.iq, self.firmware.id) = (0.0, 0.0);
-                self.firmware.control.follow(0.0, 0.0);
-                0.0
-            }
+    /// Takes samples of no current while the sensors are calibrated.
+    fn sample_offsets(&mut self) {
+        let firmware = &mut self.firmware;
+        if matches!(firmware.status, Status::OffsetCalib | Status::AlignOffsetCalib) {
+            let sample = self.plant.sample();
+            let sample = Vector::new(sample.a.into(), sample.b.into());
+            firmware.offset_sum = firmware.offset_sum + sample;
+            firmware.offset_count += 1;
         }
     }
 
-    /// A field that turns at `speed` (rad/s) pulls the rotor along as far as `current` (A) can.
-    fn pull(&mut self, speed: f32, current: f32) -> f32 {
-        let most = (self.config.machine.torque_constant * current).abs();
-        let wanted = self.config.machine.inertia * (speed - self.machine.speed()) / PULL;
-        let torque = within(wanted, -most, most);
-        let iq = self.config.digits(torque / self.config.machine.torque_constant);
-        self.firmware.control.follow(speed * RPM, iq as f32);
-        torque
-    }
-
-    fn regulate(&mut self) -> f32 {
-        let feedback = Feedback {
-            speed_rpm: self.speed_rpm(),
-            position: self.position_from_zero(),
-            iq_range: self.iq_range(),
+    #[inline]
+    fn control_currents(&mut self, frame: Frame) -> Bridge {
+        let firmware = &mut self.firmware;
+        let sample = self.plant.sample();
+        let (a, b) = (f32::from(sample.a), f32::from(sample.b));
+        let current = Vector::from_phases(a - firmware.offset.x, b - firmware.offset.y);
+        let acting = firmware.foc.acting();
+        let mut rotor = Vector::ZERO;
+        if let Some(observer) = &mut firmware.cordic {
+            rotor = observer.step(current, acting);
+        }
+        if let Some(observer) = &mut firmware.pll {
+            rotor = observer.step(current, acting);
+        }
+        let rotor = match frame {
+            Frame::Observed => rotor,
+            Frame::Encoder => {
+                let counts = self.plant.counts() << self.plant.finer_bits();
+                let position = counts.wrapping_sub(firmware.zero) as u32;
+                let pairs = u32::from(self.config.plant.machine.pole_pairs);
+                Vector::unit(position.wrapping_mul(pairs))
+            }
+            Frame::Forced | Frame::Off => {
+                firmware.forced = firmware.forced.wrapping_add(firmware.forced_step as u32);
+                Vector::unit(firmware.forced)
+            }
         };
-        let Firmware { control, registers, .. } = &mut self.firmware;
-        let iq = control.step(&feedback, registers);
-        let rated = self.config.rated_current;
-        let id = within(self.config.amperes(self.flux_reference() as f32), -rated, rated);
-        self.lag(self.config.amperes(iq), id);
-        self.config.machine.torque_constant * self.firmware.iq
+        firmware.foc.step(current, rotor)
     }
 
-    /// Iq that the rating allows and the bus voltage can drive, s16A.
-    fn iq_range(&self) -> (f32, f32) {
-        let voltage = self.phase_voltage();
-        let possible = |voltage: f32| {
-            let rated = self.config.rated_current;
-            let current = (voltage - self.machine.back_emf()) / self.config.machine.resistance;
-            within(current, -rated, rated) * (32767.0 / self.config.full_scale_current)
-        };
-        (possible(-voltage), possible(voltage))
+    /// The comparator: switches the bridge off when a phase's current is too high.
+    #[inline]
+    fn compare_currents(&mut self) {
+        let most = self.config.thresholds.over_current;
+        let current = self.plant.machine().current();
+        if current.square() > most * most && current.phases().iter().any(|phase| phase.abs() > most)
+        {
+            self.firmware.events |= Flags::BREAK_IN;
+            self.firmware.occurred |= Flags::BREAK_IN;
+            self.firmware.present |= Flags::BREAK_IN;
+            self.enter(Status::FaultNow);
+        }
     }
 
-    fn lag(&mut self, iq: f32, id: f32) {
-        self.firmware.iq += (iq - self.firmware.iq) * CURRENT_LAG;
-        self.firmware.id += (id - self.firmware.id) * CURRENT_LAG;
-    }
-
-    pub(super) fn running(&self) -> bool {
-        self.firmware.status == Status::Run
-    }
-
-    pub(super) fn flags(&self) -> Flags {
-        Flags::new(self.firmware.occurred, self.firmware.present)
-    }
-
-    pub(super) fn speed_rpm(&self) -> f32 {
-        self.machine.speed() * RPM
-    }
-
-    pub(super) fn position_from_zero(&self) -> i64 {
-        self.machine.position().wrapping_sub(self.firmware.zero)
-    }
-
-    pub(super) fn bus_voltage(&self) -> f32 {
-        self.firmware.pfc.bus_voltage(self.supply, &self.firmware.registers).max(0.0)
-    }
-
-    /// The greatest phase voltage, V.
-    pub(super) fn phase_voltage(&self) -> f32 {
-        const INVERSE_SQRT_3: f32 = 0.577_350_3;
-        self.bus_voltage() * INVERSE_SQRT_3
+    pub(super) fn enter(&mut self, status: Status) {
+        self.firmware.enter(status, self.config.build.position_sensor);
     }
 }

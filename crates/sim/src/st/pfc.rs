@@ -1,8 +1,34 @@
-//! Power factor correction: a stage between mains and bus that raises the bus voltage.
+//! Power factor correction: a boost converter between mains and bus that raises the bus voltage.
+//!
+//! It is averaged over a period of the mains, with its input at the mains' effective voltage U and
+//! current I (R. W. Erickson and D. Maksimović, *Fundamentals of Power Electronics*, on ideal
+//! rectifiers):
+//!
+//! ```text
+//! L dI/dt = u,   U − V_bus ≤ u ≤ U,   I ≥ 0         into the bus: U I / V_bus
+//! ```
+//!
+//! PFC_I_KP, KI and KD make u (s16V) from the current's error (s16A) each period; numerators over
+//! 1024, 16384 and 1024. PFC_V_KP, KI and KD make the current's reference (s16A) from the bus
+//! voltage's error (V) each millisecond; numerators over 16.
+
+use core::f32::consts::{FRAC_1_SQRT_2, TAU};
 
 use motorlink_proto::stmcp::Flags;
 
 use super::Registers;
+use super::scale::{Scale, divisor};
+use crate::control::{Gains, Regulator};
+use crate::plant::PlantConfig;
+
+/// The boost inductor, H.
+const INDUCTANCE: f32 = 1e-3;
+/// Bandwidth of the current loop as tuned, rad/s.
+const CURRENT_BANDWIDTH: f32 = TAU * 1000.0;
+/// Bandwidth of the voltage loop as tuned, rad/s.
+const VOLTAGE_BANDWIDTH: f32 = TAU * 10.0;
+/// Time between two steps of the voltage loop, s.
+const SLOW: f32 = 1e-3;
 
 /// Values of PFC_STATUS. The document does not list them; these are ours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -29,9 +55,44 @@ pub mod fault {
     pub const MAINS_HIGH: u16 = 0x02;
 }
 
-#[derive(Debug, Clone, Default)]
+/// Gains of both loops, as they act in a step, in digits.
+pub(super) struct PfcGains {
+    pub(super) current: Gains,
+    pub(super) voltage: Gains,
+}
+
+/// Gains for a board: see the [rules](super::tuning).
+pub(super) fn gains(plant: &PlantConfig, scale: &Scale) -> PfcGains {
+    let period = f32::from(plant.period_us) * 1e-6;
+    let kp = scale.resistance(CURRENT_BANDWIDTH * INDUCTANCE);
+    let current = Gains { kp, ki: kp * CURRENT_BANDWIDTH * period / 8.0, kd: 0.0 };
+    let bus = Registers::BARE.pfc_dcbus_ref as f32;
+    let per_current = scale.nominal * FRAC_1_SQRT_2 / (bus * plant.supply.capacitance);
+    let kp = 2.0 * VOLTAGE_BANDWIDTH / per_current * scale.ampere;
+    let ki = VOLTAGE_BANDWIDTH * VOLTAGE_BANDWIDTH * SLOW / per_current * scale.ampere;
+    PfcGains { current, voltage: Gains { kp, ki, kd: 0.0 } }
+}
+
+/// Effective value of mains with this peak, V.
+pub(super) fn effective(peak: f32) -> f32 {
+    peak * FRAC_1_SQRT_2
+}
+
+#[derive(Debug, Clone)]
 pub(super) struct Pfc {
     state: PfcState,
+    scale: Scale,
+    /// Digits of greatest current.
+    most: f32,
+    /// Length of a period, s.
+    period: f32,
+    gains: Gains,
+    current_loop: Regulator,
+    voltage_loop: Regulator,
+    /// Reference of the current, s16A.
+    reference: f32,
+    /// A.
+    current: f32,
     /// Steps in this state, ms.
     elapsed: u32,
     occurred: u16,
@@ -39,8 +100,46 @@ pub(super) struct Pfc {
 }
 
 impl Pfc {
-    /// One millisecond at a mains peak in V that should be `nominal`.
-    pub(super) fn step(&mut self, mains: f32, nominal: f32, registers: &Registers) {
+    pub(super) fn new(plant: &PlantConfig, scale: Scale, most: f32) -> Self {
+        Pfc {
+            state: PfcState::Idle,
+            scale,
+            most: most * scale.ampere,
+            period: f32::from(plant.period_us) * 1e-6,
+            gains: Gains::default(),
+            current_loop: Regulator::default(),
+            voltage_loop: Regulator::default(),
+            reference: 0.0,
+            current: 0.0,
+            elapsed: 0,
+            occurred: 0,
+            present: 0,
+        }
+    }
+
+    /// One period with the mains' peak and the bus at these voltages: the current into the bus, A.
+    pub(super) fn feed(&mut self, mains: f32, bus: f32) -> f32 {
+        if !self.enabled() {
+            self.current = 0.0;
+            return 0.0;
+        }
+        let mains = effective(mains);
+        let error = self.reference - self.current * self.scale.ampere;
+        let (least, most) = (mains - bus, mains);
+        let volts = 1.0 / self.scale.volt;
+        let wish = self.current_loop.step(
+            error,
+            &self.gains,
+            least * self.scale.volt,
+            most * self.scale.volt,
+        );
+        self.current = (self.current + wish * volts * self.period / INDUCTANCE).max(0.0);
+        mains * self.current / bus.max(1.0)
+    }
+
+    /// One millisecond at a mains peak in V that should be the nominal bus voltage.
+    pub(super) fn step(&mut self, mains: f32, bus: f32, registers: &Registers) {
+        let nominal = self.scale.nominal;
         self.elapsed = self.elapsed.saturating_add(1);
         self.present = 0;
         if mains < 0.7 * nominal {
@@ -62,23 +161,38 @@ impl Pfc {
         if self.state == PfcState::FaultNow {
             self.occurred |= self.present;
         }
+        self.regulate(mains, bus, registers);
     }
 
-    /// The voltage that the bus has with the stage in front of it, V.
-    pub(super) fn bus_voltage(&self, mains: f32, registers: &Registers) -> f32 {
-        let reference = registers.pfc_dcbus_ref as f32;
-        match self.state {
+    /// One millisecond of the voltage loop; the reference rises from the mains' peak during the
+    /// start-up.
+    fn regulate(&mut self, mains: f32, bus: f32, registers: &Registers) {
+        if !self.enabled() {
+            return;
+        }
+        let last = registers.pfc_dcbus_ref as f32;
+        let reference = match self.state {
             PfcState::StartUp => {
                 let share = self.elapsed as f32 / registers.pfc_startup_duration.max(1) as f32;
-                mains + (reference - mains) * share.min(1.0)
+                mains + (last - mains) * share.min(1.0)
             }
-            PfcState::Run => reference,
-            _ => mains,
-        }
+            _ => last,
+        };
+        let divisors = [divisor::PFC_VOLTAGE; 3];
+        let numerators = [registers.pfc_v_kp, registers.pfc_v_ki, registers.pfc_v_kd];
+        let gains = Gains::new(numerators, divisors);
+        self.reference = self.voltage_loop.step(reference - bus, &gains, 0.0, self.most);
+        self.gains = Gains::new(
+            [registers.pfc_i_kp, registers.pfc_i_ki, registers.pfc_i_kd],
+            [divisor::PFC_KP, divisor::PFC_KI, divisor::PFC_KP],
+        );
     }
 
     pub(super) fn enable(&mut self) {
         if self.state == PfcState::Idle {
+            self.current_loop = Regulator::default();
+            self.voltage_loop = Regulator::default();
+            self.reference = 0.0;
             self.enter(PfcState::StartUp);
         }
     }

@@ -2,31 +2,22 @@
 
 use motorlink_proto::stmcp::register::Value;
 use motorlink_proto::stmcp::{
-    ControlMode, CurrentReference, ErrorCode, REVUP_PHASES, Ramp, RegisterId, Status,
+    ControlMode, CurrentReference, ErrorCode, REVUP_PHASES, Ramp, RegisterId,
 };
 
 use super::StMotor;
-use super::control::RPM_PER_DIGIT;
-use crate::machine;
-use crate::transform::{phases, stator};
+use super::motor::Frame;
+use super::observer::Observer;
+use super::pfc;
+use super::scale::{FULL, SPEED, s16};
+use crate::angle;
 
 /// Mains frequency, 0.1 Hz.
 const MAINS_FREQUENCY: i32 = 500;
 
-/// The nearest s16 digits to a value of which `full_scale` is 32767 digits; saturates.
-pub(super) fn s16(value: f32, full_scale: f32) -> i32 {
-    i32::from(libm::roundf(value / full_scale * 32767.0) as i16)
-}
-
 /// The nearest whole number.
 fn whole(value: f32) -> i32 {
     libm::roundf(value) as i32
-}
-
-/// Voltages in the rotor's frame, V.
-struct Voltages {
-    d: f32,
-    q: f32,
 }
 
 impl StMotor {
@@ -37,7 +28,7 @@ impl StMotor {
         if let Some(value) = firmware.registers.get(register) {
             return value;
         }
-        let (iq, id) = (self.config.digits(firmware.iq), self.config.digits(firmware.id));
+        let foc = &firmware.foc;
         match register {
             R::FLAGS => self.flags().0 as i32,
             R::STATUS => u8::from(firmware.status).into(),
@@ -46,21 +37,23 @@ impl StMotor {
             R::SPEED_MEAS => whole(self.speed_rpm()),
             R::RAMP_FINAL_SPEED => firmware.control.ramp().speed_rpm,
             R::RAMP_DURATION => firmware.control.ramp().duration_ms.into(),
-            R::TORQUE_REF | R::I_Q_REF => self.torque_reference(),
-            R::FLUX_REF | R::I_D_REF => self.flux_reference(),
-            R::TORQUE_MEAS | R::I_Q => iq,
-            R::FLUX_MEAS | R::I_D => id,
-            R::BUS_VOLTAGE => whole(self.bus_voltage()),
-            R::HEATS_TEMP => whole(self.heat.temperature()),
-            R::MOTOR_POWER => whole(self.power()),
+            R::TORQUE_REF => self.torque_reference(),
+            R::FLUX_REF => self.flux_reference(),
+            R::I_Q_REF => s16(foc.reference.y),
+            R::I_D_REF => s16(foc.reference.x),
+            R::TORQUE_MEAS | R::I_Q => s16(foc.current.y),
+            R::FLUX_MEAS | R::I_D => s16(foc.current.x),
+            R::BUS_VOLTAGE => whole(self.plant.bus_voltage()),
+            R::HEATS_TEMP => whole(self.plant.temperature()),
+            R::MOTOR_POWER => whole(firmware.power),
             R::RUC_STAGE_NBR => REVUP_PHASES.into(),
             R::PFC_STATUS => firmware.pfc.state() as i32,
             R::PFC_FAULTS => firmware.pfc.faults().0 as i32,
-            R::PFC_DCBUS_MEAS => whole(self.bus_voltage()),
+            R::PFC_DCBUS_MEAS => whole(self.plant.bus_voltage()),
             R::PFC_ACBUS_FREQ => MAINS_FREQUENCY,
-            R::PFC_ACBUS_RMS => whole(self.supply),
+            R::PFC_ACBUS_RMS => whole(pfc::effective(self.plant.supply().voltage)),
             R::PFC_ENABLED => firmware.pfc.enabled().into(),
-            R::CURRENT_POSITION => machine::radians(self.position_from_zero()).bits(),
+            R::CURRENT_POSITION => angle::radians(self.position_from_zero()).bits(),
             R::TARGET_POSITION => firmware.control.path().map_or(0.0, |path| path.target()).bits(),
             R::MOVE_DURATION => firmware.control.path().map_or(0.0, |path| path.duration()).bits(),
             _ => self.signal(register),
@@ -70,50 +63,72 @@ impl StMotor {
     /// Signals of the current loop, mostly of access D; 0 for what a motor without them has.
     fn signal(&self, register: RegisterId) -> i32 {
         use RegisterId as R;
-        let full = self.phase_voltage();
-        let volts = |value| s16(value, full);
-        let angle = self.machine.electrical_angle();
-        let current = |at: usize| {
-            let (alpha, beta) = stator(self.firmware.id, self.firmware.iq, angle);
-            let (a, b) = phases((alpha, beta));
-            self.config.digits([a, b, alpha, beta][at])
-        };
-        let emf = || stator(0.0, if self.powered() { self.machine.back_emf() } else { 0.0 }, angle);
-        let voltage = || {
-            let Voltages { d, q } = self.voltages();
-            stator(d, q, angle)
-        };
-        let speed = whole(self.speed_rpm() / RPM_PER_DIGIT);
+        let firmware = &self.firmware;
+        let foc = &firmware.foc;
+        let [a, b, _] = foc.stator_current.phases();
+        let forward = foc.voltage - foc.regulated;
         match register {
-            R::I_A => current(0),
-            R::I_B => current(1),
-            R::I_ALPHA => current(2),
-            R::I_BETA => current(3),
-            R::V_Q => volts(self.voltages().q),
-            R::V_D => volts(self.voltages().d),
-            R::V_ALPHA => volts(voltage().0),
-            R::V_BETA => volts(voltage().1),
-            R::MEAS_EL_ANGLE => i32::from(angle as i16),
-            R::MEAS_ROT_SPEED => speed,
-            R::FLUXWK_BUS_MEAS => self.voltage_share(),
-            R::FF_VQ => self.feed_forward().1,
-            R::FF_VD => self.feed_forward().0,
-            R::FF_VQ_PIOUT => volts(self.voltages().q) - self.feed_forward().1,
-            R::FF_VD_PIOUT => volts(self.voltages().d) - self.feed_forward().0,
-            // An observer sees nothing of a motor that is not driven.
-            _ if !self.powered() => 0,
-            R::OBS_EL_ANGLE | R::OBS_CR_EL_ANGLE => i32::from(angle as i16),
-            R::OBS_ROT_SPEED | R::OBS_CR_ROT_SPEED => speed,
-            R::OBS_I_ALPHA | R::OBS_CR_I_ALPHA => current(2),
-            R::OBS_I_BETA | R::OBS_CR_I_BETA => current(3),
-            R::OBS_BEMF_ALPHA | R::OBS_CR_BEMF_ALPHA => volts(emf().0),
-            R::OBS_BEMF_BETA | R::OBS_CR_BEMF_BETA => volts(emf().1),
-            R::EST_BEMF_LEVEL | R::OBS_BEMF_LEVEL | R::EST_CR_BEMF_LEVEL | R::OBS_CR_BEMF_LEVEL => {
-                let level = volts(self.machine.back_emf());
-                level * level / 32768
+            R::I_A => s16(a),
+            R::I_B => s16(b),
+            R::I_ALPHA => s16(foc.stator_current.x),
+            R::I_BETA => s16(foc.stator_current.y),
+            R::V_Q => s16(foc.voltage.y),
+            R::V_D => s16(foc.voltage.x),
+            R::V_ALPHA => s16(foc.stator_voltage.x),
+            R::V_BETA => s16(foc.stator_voltage.y),
+            R::MEAS_EL_ANGLE => self.electrical_angle(),
+            R::MEAS_ROT_SPEED => s16(firmware.speed / SPEED),
+            R::FLUXWK_BUS_MEAS => whole(foc.voltage.length() / FULL * 1000.0).min(1000),
+            R::FF_VQ => s16(forward.y),
+            R::FF_VD => s16(forward.x),
+            R::FF_VQ_PIOUT => s16(foc.voltage.y) - s16(forward.y),
+            R::FF_VD_PIOUT => s16(foc.voltage.x) - s16(forward.x),
+            R::OBS_EL_ANGLE
+            | R::OBS_ROT_SPEED
+            | R::OBS_I_ALPHA
+            | R::OBS_I_BETA
+            | R::OBS_BEMF_ALPHA
+            | R::OBS_BEMF_BETA
+            | R::EST_BEMF_LEVEL
+            | R::OBS_BEMF_LEVEL => self.observed(register, firmware.pll.as_ref()),
+            _ => self.observed(register, firmware.cordic.as_ref()),
+        }
+    }
+
+    /// What an observer shows: nothing of a motor that is not driven.
+    fn observed(&self, register: RegisterId, observer: Option<&Observer>) -> i32 {
+        use RegisterId as R;
+        let Some(observer) = observer.filter(|_| self.powered()) else { return 0 };
+        // s16V are those of the present bus.
+        let share = self.bus_share();
+        match register {
+            R::OBS_EL_ANGLE | R::OBS_CR_EL_ANGLE => observer.degrees(),
+            R::OBS_ROT_SPEED | R::OBS_CR_ROT_SPEED => s16(observer.speed()),
+            R::OBS_I_ALPHA | R::OBS_CR_I_ALPHA => s16(observer.current().x),
+            R::OBS_I_BETA | R::OBS_CR_I_BETA => s16(observer.current().y),
+            R::OBS_BEMF_ALPHA | R::OBS_CR_BEMF_ALPHA => s16(observer.back_emf().x / share),
+            R::OBS_BEMF_BETA | R::OBS_CR_BEMF_BETA => s16(observer.back_emf().y / share),
+            R::EST_BEMF_LEVEL | R::EST_CR_BEMF_LEVEL => {
+                s16(observer.expected_level() / (share * share))
+            }
+            R::OBS_BEMF_LEVEL | R::OBS_CR_BEMF_LEVEL => {
+                s16(observer.observed_level() / (share * share))
             }
             _ => 0,
         }
+    }
+
+    /// The electrical angle that the drive measures or, without a sensor, works with; s16degree.
+    fn electrical_angle(&self) -> i32 {
+        let pairs = i64::from(self.config.plant.machine.pole_pairs);
+        let angle = match (self.firmware.frame, self.firmware.observer()) {
+            _ if self.config.build.position_sensor => {
+                self.position_from_zero().wrapping_mul(pairs) as u32
+            }
+            (Frame::Observed, Some(observer)) => return observer.degrees(),
+            _ => self.firmware.forced,
+        };
+        i32::from((angle >> 16) as i16)
     }
 
     /// Writes a register that may be written.
@@ -157,12 +172,12 @@ impl StMotor {
             return control.iq_reference();
         }
         if self.powered() {
-            return self.config.digits(self.firmware.iq);
+            return s16(self.firmware.foc.reference.y);
         }
         control.commanded_currents().map_or(0, |currents| currents.iq_s16a.into())
     }
 
-    /// Id reference, s16A: of torque mode, or of speed mode.
+    /// Id reference, s16A: of torque mode, or of speed mode; flux weakening adds to it.
     pub(super) fn flux_reference(&self) -> i32 {
         match self.firmware.control.commanded_currents() {
             Some(currents) => currents.id_s16a.into(),
@@ -172,46 +187,6 @@ impl StMotor {
 
     /// Whether the power stage drives current.
     fn powered(&self) -> bool {
-        use Status::{Alignment, Run, Start, StartRun, SwitchOver};
-        matches!(self.firmware.status, Start | SwitchOver | StartRun | Run | Alignment)
-    }
-
-    /// What the power stage applies so that the currents flow.
-    fn voltages(&self) -> Voltages {
-        if !self.powered() {
-            return Voltages { d: 0.0, q: 0.0 };
-        }
-        let machine = &self.config.machine;
-        let (iq, id) = (self.firmware.iq, self.firmware.id);
-        let reactance = self.machine.speed() * f32::from(machine.pole_pairs) * machine.inductance;
-        Voltages {
-            d: machine.resistance * id - reactance * iq,
-            q: machine.resistance * iq + reactance * id + self.machine.back_emf(),
-        }
-    }
-
-    /// Electrical power into the motor, W.
-    fn power(&self) -> f32 {
-        let Voltages { d, q } = self.voltages();
-        1.5 * (q * self.firmware.iq + d * self.firmware.id)
-    }
-
-    /// Share of the bus voltage in use, 0.1 %.
-    fn voltage_share(&self) -> i32 {
-        let Voltages { d, q } = self.voltages();
-        whole(libm::hypotf(d, q) / self.phase_voltage() * 1000.0).min(1000)
-    }
-
-    /// Feed-forward parts of Vd and Vq, s16V.
-    fn feed_forward(&self) -> (i32, i32) {
-        if !self.powered() {
-            return (0, 0);
-        }
-        let registers = &self.firmware.registers;
-        let speed = self.speed_rpm() / RPM_PER_DIGIT / 1024.0;
-        let share = |current| self.config.digits(current) as f32 / 32768.0;
-        let d = -speed * registers.ff_1d as f32 * share(self.firmware.iq);
-        let q = speed * (registers.ff_2 as f32 + registers.ff_1q as f32 * share(self.firmware.id));
-        (i32::from(d as i16), i32::from(q as i16))
+        self.firmware.frame != Frame::Off
     }
 }

@@ -1,8 +1,10 @@
 //! Registers that keep what they are given.
+//!
+//! Gains begin as the machine needs them ([`Registers::tuned`]); the table says what the others are.
 
 use motorlink_proto::stmcp::RegisterId;
 
-/// Declares the registers: id, field, value at power-on, what it is.
+/// Declares the registers: id, field, value at power-on without a motor, what it is.
 macro_rules! stored {
     ($( $id:ident $field:ident = $default:expr, $doc:literal; )+) => {
         /// Registers that keep what they are given, in the units of the wire. A value that is wider
@@ -15,13 +17,10 @@ macro_rules! stored {
         )]
         pub struct Registers { $( #[doc = $doc] pub $field: i32, )+ }
 
-        impl Default for Registers {
-            fn default() -> Self {
-                Registers { $( $field: $default, )+ }
-            }
-        }
-
         impl Registers {
+            /// Registers before a motor is known: no gain acts.
+            pub(super) const BARE: Registers = Registers { $( $field: $default, )+ };
+
             /// The value of a register; `None` when it is not kept here.
             pub(super) const fn get(&self, register: RegisterId) -> Option<i32> {
                 match register {
@@ -42,40 +41,40 @@ macro_rules! stored {
 }
 
 stored! {
-    SPEED_KP speed_kp = 800, "Speed regulator Kp, numerator, s16A per 0.1 Hz.";
-    SPEED_KI speed_ki = 100, "Speed regulator Ki, numerator, s16A per 0.1 Hz and ms.";
+    SPEED_KP speed_kp = 0, "Speed regulator Kp, numerator, s16A per 0.1 Hz.";
+    SPEED_KI speed_ki = 0, "Speed regulator Ki, numerator, s16A per 0.1 Hz and ms.";
     SPEED_KD speed_kd = 0, "Speed regulator Kd, numerator, s16A ms per 0.1 Hz.";
     SPEED_KP_DIV speed_kp_div = 16, "Divisor of Kp and Kd.";
     SPEED_KI_DIV speed_ki_div = 256, "Divisor of Ki.";
-    TORQUE_KP torque_kp = 2730, "Iq regulator Kp, numerator, s16V/s16A.";
-    TORQUE_KI torque_ki = 1240, "Iq regulator Ki, numerator, s16V/s16A.";
+    TORQUE_KP torque_kp = 0, "Iq regulator Kp, numerator, s16V/s16A.";
+    TORQUE_KI torque_ki = 0, "Iq regulator Ki, numerator, s16V/s16A.";
     TORQUE_KD torque_kd = 0, "Iq regulator Kd, numerator, s16V/s16A.";
-    FLUX_KP flux_kp = 2730, "Id regulator Kp, numerator, s16V/s16A.";
-    FLUX_KI flux_ki = 1240, "Id regulator Ki, numerator, s16V/s16A.";
+    FLUX_KP flux_kp = 0, "Id regulator Kp, numerator, s16V/s16A.";
+    FLUX_KI flux_ki = 0, "Id regulator Ki, numerator, s16V/s16A.";
     FLUX_KD flux_kd = 0, "Id regulator Kd, numerator, s16V/s16A.";
-    OBSERVER_C1 observer_c1 = -22_000, "PLL observer's gain C1.";
-    OBSERVER_C2 observer_c2 = 15_000, "PLL observer's gain C2.";
-    OBSERVER_CR_C1 observer_cr_c1 = -21_000, "CORDIC observer's gain C1.";
-    OBSERVER_CR_C2 observer_cr_c2 = 14_000, "CORDIC observer's gain C2.";
-    PLL_KP pll_kp = 638, "PLL Kp, numerator, dpp/s16V.";
-    PLL_KI pll_ki = 45, "PLL Ki, numerator, dpp/s16V.";
-    FLUXWK_KP fluxwk_kp = 3000, "Flux weakening Kp, s16A/s16V².";
-    FLUXWK_KI fluxwk_ki = 5000, "Flux weakening Ki, s16A/s16V².";
+    OBSERVER_C1 observer_c1 = 0, "PLL observer's gain C1, numerator.";
+    OBSERVER_C2 observer_c2 = 0, "PLL observer's gain C2, numerator, s16V/s16A.";
+    OBSERVER_CR_C1 observer_cr_c1 = 0, "CORDIC observer's gain C1, numerator.";
+    OBSERVER_CR_C2 observer_cr_c2 = 0, "CORDIC observer's gain C2, numerator, s16V/s16A.";
+    PLL_KP pll_kp = 0, "PLL Kp, numerator, dpp/s16V.";
+    PLL_KI pll_ki = 0, "PLL Ki, numerator, dpp/s16V.";
+    FLUXWK_KP fluxwk_kp = 0, "Flux weakening Kp, s16A/s16V².";
+    FLUXWK_KI fluxwk_ki = 0, "Flux weakening Ki, s16A/s16V².";
     FLUXWK_BUS fluxwk_bus = 985, "Share of the bus voltage that flux weakening may use, 0.1 %.";
     IQ_SPEEDMODE iq_speedmode = 0, "Id reference in speed mode, s16A.";
-    FF_1Q ff_1q = 150_000, "Feed-forward constant C1q.";
-    FF_1D ff_1d = 150_000, "Feed-forward constant C1d.";
-    FF_2 ff_2 = 22_000, "Feed-forward constant C2.";
-    POSITION_KP position_kp = 320, "Position regulator Kp, 1/16 rad/s per rad.";
+    FF_1Q ff_1q = 0, "Feed-forward constant C1q.";
+    FF_1D ff_1d = 0, "Feed-forward constant C1d.";
+    FF_2 ff_2 = 0, "Feed-forward constant C2.";
+    POSITION_KP position_kp = 640, "Position regulator Kp, 1/16 rad/s per rad.";
     POSITION_KI position_ki = 0, "Position regulator Ki, 1/16 rad/s per rad s.";
     POSITION_KD position_kd = 0, "Position regulator Kd, 1/16 rad/s per rad/s.";
     PFC_DCBUS_REF pfc_dcbus_ref = 400, "Bus voltage that the PFC keeps, V.";
     PFC_STARTUP_DURATION pfc_startup_duration = 200, "Length of the PFC's start-up, ms.";
-    PFC_I_KP pfc_i_kp = 2900, "PFC current regulator Kp, s16V/s16A.";
-    PFC_I_KI pfc_i_ki = 350, "PFC current regulator Ki, s16V/s16A.";
+    PFC_I_KP pfc_i_kp = 0, "PFC current regulator Kp, s16V/s16A.";
+    PFC_I_KI pfc_i_ki = 0, "PFC current regulator Ki, s16V/s16A.";
     PFC_I_KD pfc_i_kd = 0, "PFC current regulator Kd, s16V/s16A.";
-    PFC_V_KP pfc_v_kp = 1300, "PFC voltage regulator Kp, s16A/V.";
-    PFC_V_KI pfc_v_ki = 80, "PFC voltage regulator Ki, s16A/V.";
+    PFC_V_KP pfc_v_kp = 0, "PFC voltage regulator Kp, s16A/V.";
+    PFC_V_KI pfc_v_ki = 0, "PFC voltage regulator Ki, s16A/V.";
     PFC_V_KD pfc_v_kd = 0, "PFC voltage regulator Kd, s16A/V.";
     DAC_OUT1 dac_out1 = 0x23, "Id of the register on DAC channel 1: I_A.";
     DAC_OUT2 dac_out2 = 0x24, "Id of the register on DAC channel 2: I_B.";

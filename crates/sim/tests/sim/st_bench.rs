@@ -2,10 +2,11 @@
 
 use motorlink_proto::stmcp::register::{Register, Value};
 use motorlink_proto::stmcp::{
-    Command, Flags, Frame, HEADER_ACK, MAX_FRAME, Motor, Parse, Profile, Ramp, RegisterId, Request,
-    Status, register,
+    Command, Flags, Frame, HEADER_ACK, MAX_FRAME, Motor, Parse, Profile, REVUP_PHASES, Ramp,
+    RegisterId, Request, RevupPhase, Status, register,
 };
 use motorlink_proto::time::{Duration, Instant};
+use motorlink_sim::plant::Plant;
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation, Truth};
 
 /// The code of a NACK.
@@ -85,6 +86,22 @@ impl Line {
         self.ask(0, Request::Ramp(Ramp { speed_rpm, duration_ms })).expect("a ramp never fails");
     }
 
+    /// Changes the rev-up table of the current motor.
+    pub fn change_revup(&mut self, change: impl Fn(RevupPhase) -> RevupPhase) {
+        for phase in 0..REVUP_PHASES {
+            let data = self.ask(0, Request::RevupData(phase)).expect("there are five phases");
+            let data = change(RevupPhase::decode(&data).expect("a phase is 8 bytes"));
+            self.ask(0, Request::SetRevupData(phase, data)).expect("a phase can be set");
+        }
+    }
+
+    /// Gives each phase of the rev-up this current, A.
+    pub fn set_revup_current(&mut self, current: f32) {
+        let full = self.world().config().plant.sensing.full_scale;
+        let torque_s16a = (current / full * 32767.0) as i16;
+        self.change_revup(|phase| RevupPhase { torque_s16a, ..phase });
+    }
+
     pub fn status(&mut self) -> Status {
         Status::from(self.get(register::STATUS))
     }
@@ -127,9 +144,44 @@ impl Line {
         }
     }
 
+    /// Mean of a register of the current motor over 50 readings, one a millisecond: what is
+    /// measured has noise.
+    pub fn mean<T: Value + Into<f64>, A: register::Readable>(
+        &mut self,
+        register: Register<T, A>,
+    ) -> f64 {
+        self.mean_of(|line| line.get(register).into())
+    }
+
+    /// Mean of something over 50 ms.
+    pub fn mean_of(&mut self, mut read: impl FnMut(&mut Self) -> f64) -> f64 {
+        let sum: f64 = (0..50)
+            .map(|_| {
+                self.wait(1);
+                read(self)
+            })
+            .sum();
+        sum / 50.0
+    }
+
+    /// True speed, rpm, over 50 ms.
+    pub fn mean_rpm(&mut self) -> f64 {
+        self.mean_of(|line| line.truth().speed_rpm.into())
+    }
+
     /// Motor 1, to change the world around it.
     pub fn world(&mut self) -> &mut StMotor {
         self.station.drive_mut().motor_mut(Motor::FIRST).expect("motor 1 exists")
+    }
+
+    /// What surrounds motor 1.
+    pub fn plant(&mut self) -> &mut Plant {
+        self.world().plant_mut()
+    }
+
+    /// Sets the braking torque of the load, Nm.
+    pub fn brake(&mut self, torque: f32) {
+        self.plant().change_load(|load| load.brake = torque);
     }
 
     pub fn truth(&self) -> Truth {

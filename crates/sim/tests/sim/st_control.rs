@@ -1,8 +1,8 @@
 //! References, ramps and regulators.
 
 use motorlink_proto::stmcp::{
-    Command, ControlMode, CurrentReference, PositionMove, Request, RevupPhase, Status, TorqueRamp,
-    register::*,
+    Command, ControlMode, CurrentReference, Flags, PositionMove, Request, RevupPhase, Status,
+    TorqueRamp, register::*,
 };
 
 use crate::st_bench::Line;
@@ -17,7 +17,15 @@ fn mode(line: &mut Line) -> ControlMode {
 }
 
 /// Iq of 1 A on the motor without sensor, s16A.
-const ONE_AMPERE: i16 = 1986;
+const ONE_AMPERE: i16 = 1638;
+
+/// Asserts that a register's mean over 50 ms is a value within 2 % of an ampere.
+macro_rules! assert_current {
+    ($line:expr, $register:expr, $expected:expr) => {
+        let mean = $line.mean($register);
+        assert!((mean - f64::from($expected)).abs() < 33.0, "{mean} s16A, not {}", $expected);
+    };
+}
 
 #[test]
 fn a_ramp_of_1000_rpm_in_500_ms_is_2_rpm_per_ms() {
@@ -32,7 +40,7 @@ fn a_ramp_of_1000_rpm_in_500_ms_is_2_rpm_per_ms() {
     }
     assert_eq!(line.get(SPEED_REF), 2000);
     line.wait(1000);
-    let speed = line.truth().speed_rpm;
+    let speed = line.mean_rpm();
     assert!((speed - 2000.0).abs() < 1.0, "{speed} rpm: no steady error");
 }
 
@@ -45,7 +53,7 @@ fn the_last_ramp_before_run_is_the_one_that_is_executed() {
     line.ramp(1800, 400);
     line.until(Status::Run, 2000);
     let (at_once, begin) = (line.get(SPEED_REF), line.now);
-    assert!((at_once - 1000).abs() <= 10, "{at_once} rpm: begins where the rev-up ended");
+    assert!((at_once - 1000).abs() <= 100, "{at_once} rpm: begins where the rev-up ended");
     line.wait(400);
     assert_eq!(line.get(SPEED_REF), 1800, "400 ms after {begin:?}");
 }
@@ -54,21 +62,23 @@ fn the_last_ramp_before_run_is_the_one_that_is_executed() {
 fn current_references_given_before_run_wait_for_it() {
     let mut line = Line::sensorless();
     line.ramp(900, 100);
+    line.brake(0.3);
+    line.set_revup_current(3.0);
     currents(&mut line, ONE_AMPERE, -500);
     assert_eq!(mode(&mut line), ControlMode::Speed, "nothing happens before RUN");
     line.run();
-    line.wait(20);
+    line.wait(5);
     assert_eq!(mode(&mut line), ControlMode::Torque);
-    assert!((line.get(TORQUE_MEAS) - ONE_AMPERE).abs() <= 1);
-    assert!((line.get(FLUX_MEAS) + 500).abs() <= 1);
+    assert_current!(line, TORQUE_MEAS, ONE_AMPERE);
+    assert_current!(line, FLUX_MEAS, -500);
 }
 
 #[test]
 fn a_ramp_in_torque_mode_goes_on_from_the_present_speed() {
     let mut line = Line::sensorless();
     line.run();
-    currents(&mut line, ONE_AMPERE, 0);
-    line.wait(300);
+    currents(&mut line, ONE_AMPERE / 5, 0);
+    line.wait(100);
     let speed = line.truth().speed_rpm;
     line.ramp(3000, 1000);
     assert_eq!(mode(&mut line), ControlMode::Speed);
@@ -102,9 +112,12 @@ fn each_reference_can_be_written_alone() {
     line.wait(20);
     assert_eq!(mode(&mut line), ControlMode::Torque);
     assert_eq!((line.get(TORQUE_REF), line.get(FLUX_REF)), (400, -300));
+    assert_current!(line, TORQUE_MEAS, 400);
+    assert_current!(line, FLUX_MEAS, -300);
     line.execute(Command::IqdrefClear);
     line.wait(20);
-    assert_eq!((line.get(TORQUE_MEAS), line.get(FLUX_MEAS)), (0, 0));
+    assert_current!(line, TORQUE_MEAS, 0);
+    assert_current!(line, FLUX_MEAS, 0);
 }
 
 #[test]
@@ -114,14 +127,14 @@ fn the_id_reference_of_speed_mode_acts_in_speed_mode() {
     line.set(IQ_SPEEDMODE, -800);
     line.wait(20);
     assert_eq!(mode(&mut line), ControlMode::Speed);
-    assert!((line.get(FLUX_MEAS) + 800).abs() <= 1);
+    assert_current!(line, FLUX_MEAS, -800);
 }
 
 #[test]
 fn a_torque_ramp_is_linear() {
     let mut line = Line::servo();
     line.run();
-    line.world().lock_rotor(true);
+    line.plant().lock(true);
     line.wait(200);
     let from = i32::from(line.get(TORQUE_REF));
     let ramp = TorqueRamp { torque_s16a: from + 1000, duration_ms: 100 };
@@ -160,15 +173,30 @@ fn writing_the_final_speed_starts_a_ramp_of_the_last_duration() {
 }
 
 #[test]
-fn a_negative_ramp_starts_backwards_and_reverses_on_the_run() {
+fn a_negative_ramp_starts_backwards() {
     let mut line = Line::sensorless();
     line.ramp(-1500, 500);
     line.run();
     line.wait(1500);
-    assert!((line.truth().speed_rpm + 1500.0).abs() < 5.0);
-    line.ramp(1500, 1000);
-    line.wait(2000);
-    assert!((line.truth().speed_rpm - 1500.0).abs() < 5.0);
+    let speed = line.mean_rpm();
+    assert!((speed + 1500.0).abs() < 3.0, "{speed} rpm");
+}
+
+#[test]
+fn an_encoder_sees_the_rotor_reverse_and_an_observer_does_not() {
+    let reversed = |mut line: Line| {
+        line.ramp(-1500, 500);
+        line.run();
+        line.wait(1500);
+        line.ramp(1500, 2000);
+        line.wait(3000);
+        (line.status(), line.flags().occurred(), line.truth().speed_rpm)
+    };
+    let (status, _, speed) = reversed(Line::servo());
+    assert_eq!(status, Status::Run);
+    assert!((speed - 1500.0).abs() < 5.0, "{speed} rpm");
+    let (status, faults, _) = reversed(Line::sensorless());
+    assert_eq!((status, faults), (Status::FaultOver, Flags::SPEED_FDBK), "no back-EMF at rest");
 }
 
 #[test]
@@ -183,12 +211,13 @@ fn a_ramp_beyond_the_highest_speed_ends_there() {
 }
 
 /// Milliseconds from 1500 rpm to 90 % of a step to 2000 rpm.
-fn rise_time(kp: i16, ki: i16) -> u32 {
+fn rise_time(divisor: i16) -> u32 {
     let mut line = Line::sensorless();
     line.run();
     line.wait(3000);
-    line.set(SPEED_KP, kp);
-    line.set(SPEED_KI, ki);
+    let (kp, ki) = (line.get(SPEED_KP), line.get(SPEED_KI));
+    line.set(SPEED_KP, kp / divisor);
+    line.set(SPEED_KI, ki / divisor / divisor);
     line.ramp(2000, 0);
     (0..5000)
         .find(|_| {
@@ -200,9 +229,9 @@ fn rise_time(kp: i16, ki: i16) -> u32 {
 
 #[test]
 fn the_speed_gains_change_the_rise_time() {
-    let (shipped, faster, slower) = (rise_time(800, 100), rise_time(3200, 100), rise_time(200, 25));
-    assert!(faster * 2 < shipped, "{faster} ms with four times Kp, {shipped} ms as shipped");
-    assert!(slower > shipped * 2, "{slower} ms with a quarter, {shipped} ms as shipped");
+    let (shipped, slower, slowest) = (rise_time(1), rise_time(3), rise_time(8));
+    assert!(slower > shipped * 2, "{slower} ms with a third of Kp, {shipped} ms as shipped");
+    assert!(slowest > slower * 2, "{slowest} ms with an eighth, {slower} ms with a third");
 }
 
 #[test]
@@ -212,12 +241,12 @@ fn without_ki_a_load_leaves_a_speed_error() {
         line.run();
         line.wait(3000);
         line.set(SPEED_KI, ki);
-        line.world().set_load_torque(0.3);
+        line.brake(0.3);
         line.wait(3000);
-        (line.truth().speed_rpm - 1500.0).abs()
+        (line.mean_rpm() - 1500.0).abs()
     };
-    let (with, without) = (error(100), error(0));
-    assert!(with < 1.0, "{with} rpm");
+    let (with, without) = (error(89), error(0));
+    assert!(with < 3.0, "{with} rpm");
     assert!(without > 50.0, "{without} rpm");
 }
 
@@ -238,7 +267,7 @@ fn a_position_move_takes_its_time_and_arrives() {
     assert!((last - 25.0).abs() < 0.2, "{last} rad after half a second");
     line.wait(500);
     let end = line.get(CURRENT_POSITION);
-    assert!((end - 25.0).abs() < 0.01, "{end} rad");
+    assert!((end - 25.0).abs() < 0.01, "{end} rad: friction holds it six counts away at most");
     assert_eq!((line.get(TARGET_POSITION), line.get(MOVE_DURATION)), (25.0, 0.5));
 }
 
@@ -254,8 +283,8 @@ fn the_position_gain_changes_how_a_step_is_followed() {
         line.wait(100);
         line.get(CURRENT_POSITION)
     };
-    assert!(after_100_ms(320) > 0.7);
-    assert!(after_100_ms(40) < 0.4);
+    assert!(after_100_ms(640) > 0.9);
+    assert!(after_100_ms(80) < 0.5);
 }
 
 #[test]
@@ -274,10 +303,10 @@ fn the_rev_up_table_sets_how_long_the_start_takes() {
     let mut line = Line::sensorless();
     let phase = line.ask(0, Request::RevupData(1)).unwrap();
     let phase = RevupPhase::decode(&phase).unwrap();
-    assert_eq!((phase.speed_rpm, phase.duration_ms), (500, 250));
+    assert_eq!((phase.speed_rpm, phase.duration_ms), (500, 200));
     let slower = RevupPhase { duration_ms: 450, ..phase };
     line.ask(0, Request::SetRevupData(1, slower)).unwrap();
     line.execute(Command::StartMotor);
     line.until(Status::Start, 100);
-    assert_eq!(line.until(Status::SwitchOver, 2000), 1000);
+    assert_eq!(line.until(Status::SwitchOver, 2000), 950);
 }

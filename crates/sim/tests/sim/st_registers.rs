@@ -99,7 +99,7 @@ fn the_signals_of_a_running_motor_belong_together() {
     let mut line = Line::sensorless();
     line.run();
     line.wait(2000);
-    line.world().set_load_torque(0.6);
+    line.brake(0.6);
     line.set(IQ_SPEEDMODE, -600);
     line.wait(2000);
     use RegisterId as R;
@@ -109,22 +109,38 @@ fn the_signals_of_a_running_motor_belong_together() {
     let square = |x: i32, y: i32| f64::from(x * x + y * y).sqrt();
     assert!((square(alpha, beta) - square(q, d)).abs() < 2.0, "the amplitude stays");
     assert!((f64::from(a + 2 * b) / 3f64.sqrt() - f64::from(beta)).abs() < 2.0);
-    let iq = f64::from(q) * 16.5 / 32767.0;
-    assert!((iq - 0.63 / 0.3 - 0.1).abs() < 0.1, "{iq} A carry 0.6 Nm and friction at 0.3 Nm/A");
+    let truth = line.truth().plant;
+    let amperes = |digits: i32| f64::from(digits) * 20.0 / 32767.0;
+    for (measured, truth) in [(amperes(q), truth.iq), (amperes(d), truth.id)] {
+        assert!((measured - f64::from(truth)).abs() < 0.06, "{measured} A of {truth} A");
+    }
 
     let [vq, vd, v_alpha, v_beta] = sample(&mut line, [R::V_Q, R::V_D, R::V_ALPHA, R::V_BETA]);
     assert!((square(vq, vd) - square(v_alpha, v_beta)).abs() < 2.0);
+    let volts = |digits: f64| digits / 32767.0 * f64::from(truth.bus_voltage) / 3f64.sqrt();
+    let applied = volts(square(vq, vd));
+    let really = f64::from(truth.vd.hypot(truth.vq));
+    assert!((applied - really).abs() < 1.5, "{applied} V, {really} V at the windings");
     let [emf_alpha, emf_beta] = sample(&mut line, [R::OBS_BEMF_ALPHA, R::OBS_BEMF_BETA]);
-    let emf = square(emf_alpha, emf_beta) / 32767.0 * 325.0 / 3f64.sqrt();
-    assert!((emf - 31.4).abs() < 0.2, "{emf} V at 1500 rpm and 0.2 V s/rad");
-    let [expected, observed] = sample(&mut line, [R::EST_BEMF_LEVEL, R::OBS_BEMF_LEVEL]);
-    assert_eq!(expected, observed);
-    let power = line.get(MOTOR_POWER);
-    assert!((100..130).contains(&power), "{power} W for 99 W of shaft power");
+    let emf = volts(square(emf_alpha, emf_beta));
+    assert!((emf - 38.7).abs() < 1.5, "{emf} V at 1500 rpm and 0.246 V s/rad");
+    let [angle] = sample(&mut line, [R::OBS_EL_ANGLE]);
+    let rotor = (truth.angle_degrees * 4.0 / 360.0 * 65536.0) as i64 as i16;
+    let off = (angle as i16).wrapping_sub(rotor);
+    assert!(off.abs() < 1100, "{off} of 65536 away from the rotor, 6 degrees");
+    let power = line.mean(MOTOR_POWER);
+    assert!(
+        (100.0..112.0).contains(&power),
+        "{power} W for 94 W at the shaft, 4 W of friction, 8 W of copper"
+    );
     let [speed] = sample(&mut line, [R::OBS_ROT_SPEED]);
-    assert_eq!(speed, 250, "1500 rpm are 25.0 Hz");
+    assert!((speed - 250).abs() <= 1, "1500 rpm are 25.0 Hz, not {speed}");
     let [vq, ff, pi] = sample(&mut line, [R::V_Q, R::FF_VQ, R::FF_VQ_PIOUT]);
     assert_eq!(vq, ff + pi);
+    assert!(i32::abs(pi) * 4 < ff, "the back-EMF comes from the feed-forward: {pi} beside {ff}");
+    let (expected, observed) = (line.get(EST_BEMF_LEVEL), line.get(OBS_BEMF_LEVEL));
+    let ratio = f64::from(observed) / f64::from(expected);
+    assert!((0.9..1.1).contains(&ratio), "observed {observed}, expected {expected}");
 }
 
 #[test]
@@ -143,8 +159,9 @@ fn a_dac_channel_shows_the_register_that_was_chosen() {
 #[test]
 fn a_power_cycle_brings_every_register_back() {
     let mut line = Line::sensorless();
+    let shipped = line.get(SPEED_KP);
     line.set(SPEED_KP, 1);
     line.ramp(-3000, 7);
     line.station.power_cycle();
-    assert_eq!((line.get(SPEED_KP), line.get(RAMP_FINAL_SPEED)), (800, 1500));
+    assert_eq!((line.get(SPEED_KP), line.get(RAMP_FINAL_SPEED)), (shipped, 1500));
 }

@@ -20,7 +20,7 @@ fn cut(now: &mut Instant, us: u64, piece: u64, mut advance: impl FnMut(Instant))
 }
 
 /// Everything that two ST motors send in a run, and where they are at its end.
-fn st_run(piece: u64) -> (Vec<u8>, String) {
+fn st_run(piece: u64) -> (Vec<u8>, u64) {
     let mut line = Line::demo(Profile::Mcsdk54);
     for motor in [1, 2] {
         line.ask(motor, Request::Execute(Command::StartMotor)).unwrap();
@@ -29,15 +29,14 @@ fn st_run(piece: u64) -> (Vec<u8>, String) {
         let (mut now, station) = (line.now, &mut line.station);
         cut(&mut now, 77_777, piece, |now| station.advance_to(now));
         line.now = now;
-        line.world().set_load_torque(0.01 * round as f32);
+        line.brake(0.01 * round as f32);
         for motor in [1, 2] {
             for id in RegisterId::all() {
                 let _ = line.ask(motor, Request::GetRegister(id));
             }
         }
     }
-    let motors = line.station.drive().motors();
-    (line.log, format!("{:?} {:?}", motors[0].truth(), motors[1].truth()))
+    (line.log, line.station.drive().state_hash())
 }
 
 /// Every frame that two RMD motors send in a run, and where motor 1 is at its end.
@@ -91,12 +90,15 @@ fn a_configuration_names_what_differs_from_the_default() {
     use motorlink_sim::st::MotorConfig;
 
     let motor: MotorConfig =
-        toml::from_str("bus_voltage = 300\n[registers]\nspeed_kp = 5").unwrap();
-    assert_eq!((motor.bus_voltage, motor.registers.speed_kp), (300.0, 5));
-    assert_eq!(motor.rated_current, MotorConfig::default().rated_current);
-    assert!(toml::from_str::<MotorConfig>("bus_volts = 300").is_err());
-    let written = toml::to_string(&MotorConfig::servo()).unwrap();
-    assert_eq!(toml::from_str::<MotorConfig>(&written).unwrap(), MotorConfig::servo());
+        toml::from_str("rated_current = 3\n[registers]\nspeed_kp = 5").unwrap();
+    assert_eq!((motor.rated_current, motor.registers.speed_kp), (3.0, 5));
+    assert_eq!(motor.registers.speed_ki, MotorConfig::default().registers.speed_ki);
+    assert_eq!(motor.plant, MotorConfig::default().plant);
+    assert!(toml::from_str::<MotorConfig>("rated_amps = 3").is_err());
+    for (_, preset) in MotorConfig::PRESETS {
+        let written = toml::to_string(&preset()).unwrap();
+        assert_eq!(toml::from_str::<MotorConfig>(&written).unwrap(), preset());
+    }
     let rmd: RmdConfig = toml::from_str("id = 9\ngains = [1, 2, 3, 4, 5, 6]").unwrap();
     assert_eq!((rmd.id, rmd.factory_rom().gains.torque_ki), (9, 6));
     let written = toml::to_string(&rmd).unwrap();
