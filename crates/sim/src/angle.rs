@@ -32,12 +32,14 @@ pub fn sin_cos(angle: u32) -> (f32, f32) {
     let z = x * x;
     let sin = x + x * z * (-1.0 / 6.0 + z * (1.0 / 120.0 + z * (-1.0 / 5040.0 + z / 362_880.0)));
     let cos = 1.0 + z * (-0.5 + z * (1.0 / 24.0 + z * (-1.0 / 720.0 + z / 40_320.0)));
-    match quarter {
-        0 => (sin, cos),
-        1 => (cos, -sin),
-        2 => (-sin, -cos),
-        _ => (-cos, sin),
-    }
+    // Without branches, which nobody can foretell: each quarter exchanges both, every other one
+    // changes a sign.
+    let (sin, cos) = if quarter & 1 == 0 { (sin, cos) } else { (cos, sin) };
+    let sign = |quarter: u32| (quarter & 2) << 30;
+    (
+        f32::from_bits(sin.to_bits() ^ sign(quarter)),
+        f32::from_bits(cos.to_bits() ^ sign(quarter + 1)),
+    )
 }
 
 /// The angle of a vector, 2^32 a turn, within 1e-5 rad; 0 for the zero vector.
@@ -55,14 +57,10 @@ pub fn of(vector: Vector) -> u32 {
     let z = t * t;
     let series =
         0.999_866 + z * (-0.330_299_5 + z * (0.180_141 + z * (-0.085_133 + z * 0.020_835_1)));
-    let folded = t * series / DIGIT;
-    let first = (if x < y { QUARTER - folded } else { folded }) as u32;
-    match (vector.x < 0.0, vector.y < 0.0) {
-        (false, false) => first,
-        (true, false) => (1u32 << 31).wrapping_sub(first),
-        (true, true) => (1u32 << 31).wrapping_add(first),
-        (false, true) => first.wrapping_neg(),
-    }
+    let folded = t * series * (1.0 / DIGIT);
+    let first = (if x < y { QUARTER - folded } else { folded }) as i32 as u32;
+    let ahead = if vector.x < 0.0 { (1u32 << 31).wrapping_sub(first) } else { first };
+    if vector.y < 0.0 { ahead.wrapping_neg() } else { ahead }
 }
 
 #[cfg(test)]

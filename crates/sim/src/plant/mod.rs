@@ -96,31 +96,23 @@ pub struct PlantTruth {
     pub locked: bool,
 }
 
-/// What the diodes of an open bridge do in a step, with voltages in the rotor's frame.
-enum Diodes {
-    /// No current flows.
-    Open,
-    /// Current flows against the bus.
-    Conduct(Vector),
-    /// Current comes to its end.
-    End(Vector),
-}
-
 /// What the diodes do while all switches are open: they put the bus, of which the six-step
-/// fundamental is 2/π, against the current that there will be at the end of the step.
-fn through_diodes(machine: &Machine, period: f32, bus: f32) -> Diodes {
+/// fundamental is 2/π, against the current that there will be at the end of the step. Gives the
+/// voltage, if current flows, and whether it ends in this step.
+fn through_diodes(machine: &Machine, period: f32, bus: f32) -> (Option<Feed>, bool) {
     const SIX_STEP: f32 = core::f32::consts::FRAC_2_PI;
     let MachineConfig { inductance_d, inductance_q, .. } = *machine.config();
     let most = SIX_STEP * bus;
     let current = machine.rotor_current();
     let back_emf = machine.speed() * machine.config().back_emf_constant();
     if current == Vector::ZERO && back_emf.abs() <= most {
-        return Diodes::Open;
+        return (None, false);
     }
     let change = Vector::new(inductance_d * current.x, inductance_q * current.y);
     let ending = Vector::new(0.0, back_emf) - change * (1.0 / period);
     let length = ending.length();
-    if length <= most { Diodes::End(ending) } else { Diodes::Conduct(ending * (most / length)) }
+    let ends = length <= most;
+    (Some(Feed::Rotor(if ends { ending } else { ending * (most / length) })), ends)
 }
 
 /// Time between two steps of the heat, µs.
@@ -202,6 +194,7 @@ impl Plant {
 
     /// Lets one period pass, with what was commanded at its beginning, and takes the command for
     /// the next one.
+    #[inline]
     pub fn step(&mut self, next: Bridge) {
         let bridge = core::mem::replace(&mut self.pending, next);
         self.count = self.count.wrapping_add(1);
@@ -215,32 +208,26 @@ impl Plant {
         }
     }
 
+    #[inline]
     fn move_on(&mut self, bridge: Bridge) {
         let bus = self.supply.voltage();
         let before = self.flow.electrical;
         let Plant { machine, flow, period, .. } = self;
-        match bridge {
+        let (feed, ends) = match bridge {
             Bridge::Drive(share) => {
                 let share = self.modulator.modulate(share, machine.current());
-                self.fed_with = Feed::Stator(share * bus);
-                machine.step(self.fed_with, flow);
+                (Some(Feed::Stator(share * bus)), false)
             }
-            Bridge::Off => match through_diodes(machine, *period, bus) {
-                Diodes::Open => {
-                    machine.coast(flow);
-                    self.fed_with = Feed::Stator(machine.back_emf());
-                }
-                Diodes::Conduct(voltage) => {
-                    self.fed_with = Feed::Rotor(voltage);
-                    machine.step(self.fed_with, flow);
-                }
-                Diodes::End(voltage) => {
-                    self.fed_with = Feed::Rotor(voltage);
-                    machine.step(self.fed_with, flow);
-                    machine.open();
-                }
-            },
+            Bridge::Off => through_diodes(machine, *period, bus),
+        };
+        match feed {
+            Some(feed) => machine.step(feed, flow),
+            None => machine.coast(flow),
         }
+        if ends {
+            machine.open();
+        }
+        self.fed_with = feed.unwrap_or(Feed::Stator(machine.back_emf()));
         let taken = (self.flow.electrical - before) / (self.period * bus.max(1e-3));
         self.supply.step(self.period, taken, self.fed, &mut self.bus);
     }
