@@ -25,8 +25,9 @@
 //! millisecond, smoothed over three. The sign is that of the motion; it cannot be seen from ê.
 //!
 //! The rotor counts as seen while the speed varies from one millisecond to the next by less than a
-//! tenth (root of the mean square), and the observed back-EMF is within three fifths of what the
-//! speed makes it.
+//! tenth (root of the mean square), the square of the observed back-EMF is within three fifths of
+//! what the speed makes it, and the error of the current does not show that two fifths of the
+//! back-EMF are missed: `|î − i| (1 − a − c1) / b`.
 
 use super::scale::{FULL, SPEED, Scale, divisor};
 use crate::angle;
@@ -42,11 +43,13 @@ const MEMORY: f32 = 1.0 / 16.0;
 const VARIATION: f32 = 0.1;
 /// How far the back-EMF's square may be from what is expected, as a share of it.
 const TOLERANCE: f32 = 0.6;
+/// How much of the back-EMF the current's error may show to be missed, as a share.
+const MISSED: f32 = 0.4;
 /// 2^32 a turn per s16degree.
 const FINER: f32 = 65536.0;
 
-/// The fastest that a period's turn can be told from another.
-const HALF_TURN: f32 = (1u32 << 31) as f32;
+/// The fastest turn in a period that is believed: a quarter, 2^32 a turn. More is not a rotor.
+const FASTEST: f32 = (1u32 << 30) as f32;
 
 /// How the rotor is found in the back-EMF.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,6 +80,10 @@ pub(super) struct Observer {
     // State.
     current: Vector,
     emf: Vector,
+    /// î − i.
+    error: Vector,
+    /// Mean square of what of the back-EMF that error shows to be missed, s16V.
+    missed: f32,
     /// φ, 2^32 a turn.
     angle: u32,
     /// Σ Ki ε, 2^32 a turn a period.
@@ -113,6 +120,8 @@ impl Observer {
             ki: 0.0,
             current: Vector::ZERO,
             emf: Vector::ZERO,
+            error: Vector::ZERO,
+            missed: 0.0,
             angle: 0,
             integral: 0.0,
             way: 0.0,
@@ -129,6 +138,7 @@ impl Observer {
     pub(super) fn begin(&mut self, backwards: bool) {
         self.current = Vector::ZERO;
         self.emf = Vector::ZERO;
+        (self.error, self.missed) = (Vector::ZERO, 0.0);
         (self.angle, self.integral, self.way) = (0, 0.0, 0.0);
         (self.speed, self.last_speed, self.variance) = (0.0, 0.0, 0.0);
         self.sign = if backwards { -1.0 } else { 1.0 };
@@ -152,6 +162,7 @@ impl Observer {
     #[inline]
     pub(super) fn step(&mut self, measured: Vector, voltage: Vector) -> Vector {
         let error = self.current - measured;
+        self.error = error;
         let turned = self.emf.turned(self.turn);
         self.current = self.current * self.decay + (voltage - turned) * self.gain + error * self.c1;
         self.emf = bounded(turned + error * self.c2);
@@ -160,7 +171,7 @@ impl Observer {
             Tracking::Pll => {
                 let frame = Vector::unit(self.angle);
                 let error = -self.sign * self.emf.dot(frame);
-                self.integral = within(self.integral + self.ki * error, -HALF_TURN, HALF_TURN);
+                self.integral = within(self.integral + self.ki * error, -FASTEST, FASTEST);
                 let way = self.kp * error + self.integral;
                 self.angle = self.angle.wrapping_add(way as i32 as u32);
                 self.way += way;
@@ -170,7 +181,10 @@ impl Observer {
                 // The back-EMF is a quarter turn ahead of the rotor.
                 let rotor = Vector::new(self.emf.y, -self.emf.x) * self.sign;
                 let angle = angle::of(rotor);
-                self.way += angle.wrapping_sub(self.angle) as i32 as f32;
+                let way = angle.wrapping_sub(self.angle) as i32 as f32;
+                if way.abs() < FASTEST {
+                    self.way += way;
+                }
                 self.angle = angle;
                 Vector::unit(angle)
             }
@@ -185,6 +199,10 @@ impl Observer {
         self.speed += (speed - self.speed) * SMOOTHING;
         let change = speed - core::mem::replace(&mut self.last_speed, speed);
         self.variance += (change * change - self.variance) * MEMORY;
+        // What a back-EMF that is wrong by one makes of the current in the long run.
+        let sensitivity = (1.0 - self.decay - self.c1) / self.gain;
+        let missed = self.error.square() * sensitivity * sensitivity;
+        self.missed += (missed - self.missed) * MEMORY;
         self.sign = match sign {
             Some(sign) => sign,
             None if self.speed < 0.0 => -1.0,
@@ -199,7 +217,9 @@ impl Observer {
     pub(super) fn sees(&self) -> bool {
         let most = VARIATION * self.speed;
         let (expected, observed) = (self.expected_level(), self.observed_level());
-        self.variance <= most * most && (observed - expected).abs() <= TOLERANCE * expected
+        self.variance <= most * most
+            && (observed - expected).abs() <= TOLERANCE * expected
+            && self.missed <= MISSED * MISSED * 32768.0 * expected
     }
 
     /// The rotor's frame at the beginning of the coming period.

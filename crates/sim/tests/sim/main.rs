@@ -6,6 +6,7 @@ mod rmd_protocol;
 mod st_bench;
 mod st_control;
 mod st_faults;
+mod st_loops;
 mod st_registers;
 mod st_states;
 mod time;
