@@ -161,12 +161,21 @@ macro_rules! signals {
 signals!(ST, motorlink_sim::st::Truth, |truth| {
     speed_rpm = truth.speed_rpm;
     speed_reference_rpm = truth.speed_reference_rpm;
-    angle_degrees = truth.angle_degrees;
-    iq_amps = truth.iq;
-    id_amps = truth.id;
-    bus_volts = truth.bus_voltage;
+    angle_degrees = truth.plant.angle_degrees;
+    iq_amps = truth.plant.iq;
+    id_amps = truth.plant.id;
+    iq_reference_amps = truth.iq_reference;
+    id_reference_amps = truth.id_reference;
+    phase_a_amps = truth.plant.phase_currents[0];
+    phase_b_amps = truth.plant.phase_currents[1];
+    phase_c_amps = truth.plant.phase_currents[2];
+    vd_volts = truth.plant.vd;
+    vq_volts = truth.plant.vq;
+    torque_newton_metres = truth.plant.torque;
+    load_newton_metres = -truth.plant.load_torque;
+    bus_volts = truth.plant.bus_voltage;
     heatsink_celsius = truth.temperature;
-    load_newton_metres = truth.load_torque;
+    winding_celsius = truth.plant.winding_temperature;
     status[Names::Status] = u8::from(truth.status);
     faults[Names::Faults] = (truth.flags.occurred() | truth.flags.present()) as u8;
 });
