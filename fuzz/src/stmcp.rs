@@ -258,10 +258,11 @@ pub fn slave(data: &[u8]) {
 /// Whatever happened, the motors turn by numbers.
 pub fn finite(motors: &[StMotor]) {
     for truth in motors.iter().map(StMotor::truth) {
-        let values = [truth.speed_rpm, truth.speed_reference_rpm, truth.iq, truth.id];
-        let more = [truth.bus_voltage, truth.temperature, truth.load_torque];
+        let plant = truth.plant;
+        let values = [truth.speed_rpm, truth.speed_reference_rpm, plant.iq, plant.id];
+        let more = [plant.bus_voltage, truth.temperature, plant.load_torque, plant.torque];
         assert!(values.iter().chain(&more).all(|value| value.is_finite()), "{truth:?}");
-        assert!(truth.angle_degrees.is_finite(), "{truth:?}");
+        assert!(plant.angle_degrees.is_finite(), "{truth:?}");
     }
 }
 

@@ -167,7 +167,7 @@ def test_the_configuration_says_what_the_drives_are(sim, tmp_path):
         profile = "mcsdk-5.4"
         [[st.motor]]
         preset = "servo"
-        bus_voltage = 36.0
+        plant.supply.voltage = 28.0
         registers.speed_kp = 1234
         [[rmd.motor]]
         id = 32
@@ -177,7 +177,7 @@ def test_the_configuration_says_what_the_drives_are(sim, tmp_path):
     drives = sim(config)
     st, rmd = drives.ports
     assert (st["motors"], st["profile"], rmd["ids"]) == (1, "mcsdk-5.4", [32])
-    assert drives.motor(1, st["port"])["bus_volts"] == 36
+    assert drives.motor(1, st["port"])["bus_volts"] == 28
     assert drives.motor(32, rmd["port"])["supply_volts"] == 48
     with Line(drives.st) as line:
         assert line.get(0x05) == 1234
@@ -193,9 +193,9 @@ def test_the_profile_of_the_command_line_goes_before_the_configurations(sim, tmp
     "text, place",
     [
         ("[[rmd.motor]]\nid = 1\n[[rmd.motor]]\nidd = 3", ["rmd.motor 2", "idd"]),
-        ("[[st.motor]]\nmachine.poles = 3", ["st.motor 1", "poles"]),
+        ("[[st.motor]]\nplant.machine.poles = 3", ["st.motor 1", "poles"]),
         ('[[st.motor]]\npreset = "big"', ["st.motor 1", "servo"]),
-        ('[[st.motor]]\nbus_voltage = "high"', ["st.motor 1", "high"]),
+        ('[[st.motor]]\nplant.supply.voltage = "high"', ["st.motor 1", "high"]),
         ("[[rmd.motor]]\nid = 33", ["motor 33", "1 to 32"]),
         ("[[rmd.motor]]\nid = 3\n[[rmd.motor]]\nid = 3", ["same ID"]),
         ("[[st.motor]]\n" * 8, ["1 to 7 motors"]),
@@ -244,6 +244,8 @@ def test_state_tells_what_is_really_going_on(sim):
     assert set(st["motors"][0]) == {
         *("motor", "status", "faults", "speed_rpm", "speed_reference_rpm", "angle_degrees"),
         *("iq_amps", "id_amps", "bus_volts", "celsius", "load_newton_metres", "locked"),
+        *("iq_reference_amps", "id_reference_amps", "phase_amps", "torque_newton_metres"),
+        *("chopping", "winding_celsius"),
     }
     assert [motor["motor"] for motor in rmd["motors"]] == [1, 2, 3, 4]
     assert set(rmd["motors"][0]) == {
@@ -259,6 +261,7 @@ def test_time_passes_while_nobody_talks(rmd):
 
 def test_supply_sets_the_voltage(st, rmd):
     st.do("supply", motor=1, volts=300)
+    eventually(lambda: abs(st.motor(1)["bus_volts"] - 300) < 0.5, "the board empties the capacitor")
     assert st.motor(1)["bus_volts"] == 300
     rmd.do("supply", motor=4, volts=12.5)
     assert rmd.motor(4)["supply_volts"] == 12.5
