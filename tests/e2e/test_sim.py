@@ -46,9 +46,9 @@ def test_each_port_has_drives_of_its_own(sim, tmp_path):
         a.set(CONTROL_MODE, 0, 1)
         a.set(0x05, 77, 2)
         assert (a.get(0x05), b.get(0x05) == 77) == (77, False)
-    drives.do("supply", port=ports[1], motor=2, volts=30)
+    drives.do("supply", port=ports[1], motor=2, volts=28)
+    eventually(lambda: drives.motor(2, ports[1])["bus_volts"] > 27.9, "the capacitor is full")
     assert drives.motor(2, ports[0])["bus_volts"] == 24
-    assert drives.motor(2, ports[1])["bus_volts"] == 30
 
 
 def test_a_serial_line_over_tcp_has_one_client_at_a_time(sim):
@@ -261,8 +261,8 @@ def test_time_passes_while_nobody_talks(rmd):
 
 def test_supply_sets_the_voltage(st, rmd):
     st.do("supply", motor=1, volts=300)
-    eventually(lambda: abs(st.motor(1)["bus_volts"] - 300) < 0.5, "the board empties the capacitor")
-    assert st.motor(1)["bus_volts"] == 300
+    eventually(lambda: st.motor(1)["bus_volts"] < 300.1, "the board empties the capacitor")
+    assert st.motor(1)["bus_volts"] > 299.9
     rmd.do("supply", motor=4, volts=12.5)
     assert rmd.motor(4)["supply_volts"] == 12.5
 
@@ -347,9 +347,12 @@ def test_among_several_ports_the_one_meant_has_to_be_named(sim):
 def test_two_ports_of_the_same_name_can_both_be_commanded(sim):
     drives = sim(st=("tcp", "tcp"), rmd=())
     for number, port in enumerate(drives.ports):
-        drives.do("supply", port=port["port"], motor=1, volts=300 + number)
-    volts = [bench["motors"][0]["bus_volts"] for bench in drives.do("state")["state"]]
-    assert volts == [300, 301]
+        drives.do("supply", port=port["port"], motor=1, volts=330 + number)
+
+    def volts():
+        return [round(bench["motors"][0]["bus_volts"], 1) for bench in drives.do("state")["state"]]
+
+    eventually(lambda: volts() == [330, 331], "both capacitors are full")
 
 
 def test_several_commands_at_once_are_answered_in_order(rmd):
