@@ -105,12 +105,12 @@ impl Observer {
         let machine = &plant.machine;
         let period = f32::from(plant.period_us) * 1e-6;
         let resistance = machine.resistance + plant.inverter.on_resistance;
-        let decay = libm::expf(-resistance * period / machine.inductance_q);
+        let lost = -libm::expm1f(-resistance * period / machine.inductance_q);
         let turns = period * f32::from(machine.pole_pairs) * SPEED / core::f32::consts::TAU;
         Observer {
             tracking,
-            decay,
-            gain: (1.0 - decay) / scale.resistance(resistance),
+            decay: 1.0 - lost,
+            gain: lost / scale.resistance(resistance),
             back_emf: scale.volt * machine.back_emf_constant() * SPEED,
             speed_per_step: 1.0 / (turns * angle::TURN as f32),
             period: period * 1e3,

@@ -51,10 +51,10 @@ impl Registers {
         let speed_kp = per_speed / (SYMMETRY * delays);
         let speed_ki = speed_kp * SLOW / (SYMMETRY * SYMMETRY * delays);
 
-        let decay = libm::expf(-ohms * period / machine.inductance_q);
+        let lost = -libm::expm1f(-ohms * period / machine.inductance_q);
         let pole = libm::expf(OBSERVER_POLE);
-        let c1 = 2.0 * pole - 1.0 - decay;
-        let c2 = (1.0 - pole) * (1.0 - pole) / (1.0 - decay) * resistance;
+        let c1 = 2.0 * pole - 2.0 + lost;
+        let c2 = (1.0 - pole) * (1.0 - pole) / lost * resistance;
 
         let digits_per_radian = 65536.0 / TAU;
         let quarter = 0.25 * 32767.0;
