@@ -302,15 +302,11 @@ impl StMotor {
         let (a, b) = (f32::from(sample.a), f32::from(sample.b));
         let current = Vector::from_phases(a - firmware.offset.x, b - firmware.offset.y);
         let acting = firmware.foc.acting();
-        let mut rotor = Vector::ZERO;
-        if let Some(observer) = &mut firmware.cordic {
-            rotor = observer.step(current, acting);
-        }
-        if let Some(observer) = &mut firmware.pll {
-            rotor = observer.step(current, acting);
+        for observer in [&mut firmware.cordic, &mut firmware.pll].into_iter().flatten() {
+            observer.step(current, acting);
         }
         let rotor = match frame {
-            Frame::Observed => rotor,
+            Frame::Observed => firmware.observer().map_or(Vector::ZERO, Observer::frame),
             Frame::Encoder => {
                 let counts = self.plant.counts() << self.plant.finer_bits();
                 let position = counts.wrapping_sub(firmware.zero) as u32;

@@ -86,6 +86,8 @@ pub(super) struct Observer {
     missed: f32,
     /// φ, 2^32 a turn.
     angle: u32,
+    /// d axis in the middle of the last period, as long as it is found.
+    rotor: Vector,
     /// Σ Ki ε, 2^32 a turn a period.
     integral: f32,
     /// How far φ went since the last millisecond, 2^32 a turn.
@@ -123,6 +125,7 @@ impl Observer {
             error: Vector::ZERO,
             missed: 0.0,
             angle: 0,
+            rotor: Vector::new(1.0, 0.0),
             integral: 0.0,
             way: 0.0,
             turn: Vector::new(1.0, 0.0),
@@ -158,38 +161,46 @@ impl Observer {
     }
 
     /// A period: the current at its beginning and the voltage that acts in it, in digits of the
-    /// nominal bus. Gives the rotor's frame at the beginning.
+    /// nominal bus.
     #[inline]
-    pub(super) fn step(&mut self, measured: Vector, voltage: Vector) -> Vector {
+    pub(super) fn step(&mut self, measured: Vector, voltage: Vector) {
         let error = self.current - measured;
         self.error = error;
         let turned = self.emf.turned(self.turn);
-        self.current = self.current * self.decay + (voltage - turned) * self.gain + error * self.c1;
+        self.current = bounded(
+            self.current * self.decay + (voltage - turned) * self.gain + error * self.c1,
+        );
         self.emf = bounded(turned + error * self.c2);
-        self.current = bounded(self.current);
-        let frame = match self.tracking {
+        match self.tracking {
             Tracking::Pll => {
-                let frame = Vector::unit(self.angle);
-                let error = -self.sign * self.emf.dot(frame);
+                self.rotor = Vector::unit(self.angle);
+                let error = -self.sign * self.emf.dot(self.rotor);
                 self.integral = within(self.integral + self.ki * error, -FASTEST, FASTEST);
                 let way = self.kp * error + self.integral;
                 self.angle = self.angle.wrapping_add(way as i32 as u32);
                 self.way += way;
-                frame
             }
             Tracking::Cordic => {
                 // The back-EMF is a quarter turn ahead of the rotor.
-                let rotor = Vector::new(self.emf.y, -self.emf.x) * self.sign;
-                let angle = angle::of(rotor);
+                self.rotor = Vector::new(self.emf.y, -self.emf.x) * self.sign;
+                let angle = angle::of(self.rotor);
                 let way = angle.wrapping_sub(self.angle) as i32 as f32;
                 if way.abs() < FASTEST {
                     self.way += way;
                 }
                 self.angle = angle;
-                Vector::unit(angle)
             }
+        }
+    }
+
+    /// The rotor's frame at the beginning of the period that was stepped last.
+    #[inline]
+    pub(super) fn frame(&self) -> Vector {
+        let middle = match self.tracking {
+            Tracking::Pll => self.rotor,
+            Tracking::Cordic => Vector::unit(self.angle),
         };
-        frame.seen_from(self.half)
+        middle.seen_from(self.half)
     }
 
     /// A millisecond: the speed. `sign` is the motion's, where it is known from elsewhere.
@@ -220,11 +231,6 @@ impl Observer {
         self.variance <= most * most
             && (observed - expected).abs() <= TOLERANCE * expected
             && self.missed <= MISSED * MISSED * 32768.0 * expected
-    }
-
-    /// The rotor's frame at the beginning of the coming period.
-    pub(super) fn frame(&self) -> Vector {
-        Vector::unit(self.angle).seen_from(self.half)
     }
 
     /// Electrical angle, s16degree, of the middle of the last period.
