@@ -10,7 +10,7 @@
 //! ê' = ê°               + c2 (î − i)        ê° = ê turned on by the observed speed
 //! ```
 //!
-//! `c1 = OBSERVER_C1 / 16384` has no unit, `c2 = OBSERVER_C2 / 4096` is s16V/s16A; without
+//! `c1 = OBSERVER_C1 / 16384` has no unit, `c2 = OBSERVER_C2 / 2048` is s16V/s16A; without
 //! rotation the error's poles are those of `z² − (1 + a + c1) z + a + c1 + b c2`. ê is the mean of
 //! the period, so its angle is that of the period's middle.
 //!
@@ -45,6 +45,8 @@ const VARIATION: f32 = 0.1;
 const TOLERANCE: f32 = 0.6;
 /// How much of the back-EMF the current's error may show to be missed, as a share.
 const MISSED: f32 = 0.4;
+/// Greatest square of a voltage that is kept, so that a mean with it is a number, s16V².
+const MOST_MISSED: f32 = 1e12;
 /// 2^32 a turn per s16degree.
 const FINER: f32 = 65536.0;
 
@@ -167,9 +169,7 @@ impl Observer {
         let error = self.current - measured;
         self.error = error;
         let turned = self.emf.turned(self.turn);
-        self.current = bounded(
-            self.current * self.decay + (voltage - turned) * self.gain + error * self.c1,
-        );
+        self.current = self.current * self.decay + (voltage - turned) * self.gain + error * self.c1;
         self.emf = bounded(turned + error * self.c2);
         match self.tracking {
             Tracking::Pll => {
@@ -205,6 +205,7 @@ impl Observer {
 
     /// A millisecond: the speed. `sign` is the motion's, where it is known from elsewhere.
     pub(super) fn measure(&mut self, sign: Option<f32>) {
+        self.current = bounded(self.current);
         let steps = core::mem::take(&mut self.way) * self.period;
         let speed = steps * self.speed_per_step;
         self.speed += (speed - self.speed) * SMOOTHING;
@@ -212,7 +213,7 @@ impl Observer {
         self.variance += (change * change - self.variance) * MEMORY;
         // What a back-EMF that is wrong by one makes of the current in the long run.
         let sensitivity = (1.0 - self.decay - self.c1) / self.gain;
-        let missed = self.error.square() * sensitivity * sensitivity;
+        let missed = (self.error.square() * sensitivity * sensitivity).min(MOST_MISSED);
         self.missed += (missed - self.missed) * MEMORY;
         self.sign = match sign {
             Some(sign) => sign,

@@ -61,7 +61,7 @@ pub(super) mod divisor {
     /// OBSERVER_C1 and OBSERVER_CR_C1.
     pub const OBSERVER_C1: i32 = 16_384;
     /// OBSERVER_C2 and OBSERVER_CR_C2.
-    pub const OBSERVER_C2: i32 = 4096;
+    pub const OBSERVER_C2: i32 = 2048;
     /// PLL_KP.
     pub const PLL_KP: i32 = 16_384;
     /// PLL_KI, a period.

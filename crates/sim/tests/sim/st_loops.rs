@@ -3,7 +3,7 @@
 use motorlink_proto::stmcp::{
     Command, CurrentReference, Flags, Profile, Request, RevupPhase, Status, register::*,
 };
-use motorlink_sim::plant::{ChopperConfig, HeatSensor, MachineConfig};
+use motorlink_sim::plant::{ChopperConfig, HeatSensor, MachineConfig, PlantConfig};
 use motorlink_sim::st::{MotorConfig, Registers};
 
 use crate::st_bench::Line;
@@ -32,6 +32,42 @@ fn turning(config: MotorConfig, rpm: f64) -> Line {
 /// Torque of the rated current, Nm.
 fn rated_torque(config: &MotorConfig) -> f32 {
     config.plant.machine.torque_constant() * config.rated_current
+}
+
+#[test]
+fn every_motor_is_tuned_within_the_range_of_its_registers() {
+    for (name, config, _) in motors() {
+        for period_us in [25, 50, 100] {
+            let gains = Registers::tuned(&PlantConfig { period_us, ..config.plant });
+            let Registers { torque_kp, torque_ki, flux_kp, flux_ki, speed_kp, speed_ki, .. } =
+                gains;
+            let Registers { observer_c1, observer_c2, pll_kp, pll_ki, .. } = gains;
+            let Registers { fluxwk_kp, fluxwk_ki, .. } = gains;
+            for gain in [
+                [torque_kp, torque_ki, flux_kp, flux_ki],
+                [speed_kp, speed_ki, -observer_c1, observer_c2],
+                [pll_kp, pll_ki, fluxwk_kp, fluxwk_ki],
+            ]
+            .concat()
+            {
+                assert!((50..32_767).contains(&gain), "{name} at {period_us} µs: {gains:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_motor_runs_at_other_periods_too() {
+    for (name, mut config, speed) in motors() {
+        for period_us in [25, 40, 100] {
+            config.plant.period_us = period_us;
+            let Registers { max_app_speed, min_app_speed, .. } = config.registers;
+            config.registers =
+                Registers { max_app_speed, min_app_speed, ..Registers::tuned(&config.plant) };
+            let rpm = turning(config, speed).mean_rpm();
+            assert!((rpm / speed - 1.0).abs() < 0.002, "{name} at {period_us} µs: {rpm} rpm");
+        }
+    }
 }
 
 #[test]
