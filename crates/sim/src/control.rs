@@ -64,11 +64,11 @@ impl Regulator {
         self.last_error = error;
         let integral = self.integral + gains.ki * error;
         let output = direct + integral;
-        let windup = (output > most && error > 0.0) || (output < least && error < 0.0);
-        if !windup {
-            self.integral = within(integral, least, most);
-        }
-        within(direct + self.integral, least, most)
+        // Without branches, which errors around zero would make hard to foretell.
+        let windup = ((output > most) & (error > 0.0)) | ((output < least) & (error < 0.0));
+        let kept = within(integral, least, most);
+        self.integral = if windup { self.integral } else { kept };
+        within(direct + kept, least, most)
     }
 
     /// Tells the regulator by how much its output was cut (what acted minus what it gave), so that
