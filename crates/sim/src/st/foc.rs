@@ -47,7 +47,7 @@ pub(super) struct Foc {
     pub(super) voltage: Vector,
     /// Regulators' part of it.
     pub(super) regulated: Vector,
-    /// What the circle left of no voltage: the wish, s16V.
+    /// d and q before the circle, s16V: what flux weakening looks at.
     pub(super) wish: Vector,
     /// What was given to the bridge last, in the stator's frame, s16V.
     pub(super) stator_voltage: Vector,

@@ -224,6 +224,21 @@ fn regeneration_trips_over_voltage_without_the_brake_and_not_with_it() {
 }
 
 #[test]
+fn a_stop_beyond_base_speed_charges_the_bus_through_the_diodes() {
+    let mut config = MotorConfig::shinano();
+    let base = base_speed(&config);
+    config.registers.max_app_speed = (1.5 * base) as i32;
+    let mut line = turning(config, 1.3 * base);
+    line.wait(1000);
+    line.execute(Command::StopMotor);
+    line.wait(20);
+    let truth = line.truth();
+    assert_eq!(truth.status, Status::WaitStopMotor);
+    let bus = truth.plant.bus_voltage;
+    assert!((25.5..32.0).contains(&bus), "{bus} V from a back-EMF above 24 V");
+}
+
+#[test]
 fn over_temperature_comes_when_the_heat_model_says() {
     let mut config = MotorConfig::servo();
     config.plant.heat.sensor = HeatSensor::Winding;
