@@ -213,10 +213,10 @@ pub fn drive(data: &[u8]) {
                 let (what, value) = (input.byte(), f32::from(input.word()) / 65.0);
                 let motor = bus.node_mut(id).expect("1 to 4 are there").motor_mut();
                 match what % 6 {
-                    0 => motor.set_supply_voltage(value.min(1000.0)),
-                    1 => motor.set_temperature(Some(value - 100.0)),
-                    2 => motor.set_load_torque(value.min(1000.0)),
-                    3 => motor.lock_rotor(value > 500.0),
+                    0 => motor.plant_mut().set_source(value.min(1000.0)),
+                    1 => motor.plant_mut().force_temperature(Some(value - 100.0)),
+                    2 => motor.plant_mut().change_load(|load| load.brake = value.min(1000.0)),
+                    3 => motor.plant_mut().lock(value > 500.0),
                     4 => motor.inject(Errors::from(value as u8)),
                     _ => motor.hold_faults(Errors::from(value as u8)),
                 }
@@ -232,10 +232,11 @@ pub fn drive(data: &[u8]) {
 pub fn finite(nodes: &[RmdNode]) {
     for node in nodes {
         let truth = node.motor().truth();
-        let values = [truth.speed_dps, truth.speed_reference_dps, truth.iq];
-        let more = [truth.supply_voltage, truth.temperature, truth.load_torque];
+        let plant = &truth.plant;
+        let values = [truth.speed_dps, truth.speed_reference_dps, plant.iq, plant.id];
+        let more = [plant.bus_voltage, truth.temperature, plant.winding_temperature];
         assert!(values.iter().chain(&more).all(|value| value.is_finite()), "{truth:?}");
-        assert!(truth.angle_degrees.is_finite(), "{truth:?}");
+        assert!(plant.angle_degrees.is_finite(), "{truth:?}");
         assert!(node.drive().errors().is_empty() || node.drive().mode() == Mode::Off);
     }
 }

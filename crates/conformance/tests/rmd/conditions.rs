@@ -8,7 +8,7 @@ use motorlink_conformance::Need;
 use motorlink_conformance::wire::Bus;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
-use motorlink_sim::machine::MachineConfig;
+use motorlink_sim::plant::PlantConfig;
 use motorlink_sim::rmd::RmdConfig;
 
 use crate::drive::{Behaviour, Event, Motors, Setup, Shared, Tested, motor};
@@ -68,13 +68,16 @@ fn a_motor_behind_a_slow_adapter_passes() {
 
 #[test]
 fn motors_with_loads_and_friction_pass() {
-    let config = motor(1);
-    let heavy = MachineConfig { inertia: 5e-3, coulomb_friction: 0.05, ..config.machine };
-    let geared = MachineConfig { viscous_friction: 2e-3, ..heavy };
+    let with = |change: fn(&mut PlantConfig)| {
+        let mut config = motor(1);
+        change(&mut config.plant);
+        config
+    };
     for changed in [
-        RmdConfig { machine: heavy, ..config },
-        RmdConfig { machine: geared, load_torque: 0.05, ..config },
-        RmdConfig { load_torque: 0.08, supply_voltage: 12.0, ..config },
+        RmdConfig { plant: RmdConfig::default().plant, ..motor(1) },
+        with(|plant| plant.load.inertia = 0.12),
+        with(|plant| plant.load.viscous = 0.5),
+        with(|plant| (plant.load.brake, plant.supply.voltage) = (0.8, 24.0)),
     ] {
         passes(&Setup::new(vec![changed]).run());
     }
@@ -88,7 +91,8 @@ fn a_motor_with_noisy_sensors_passes() {
 /// A load that two amperes do not move is no fault of the motor.
 #[test]
 fn a_motor_that_its_load_holds_is_not_blamed_for_it_by_the_torque_case() {
-    let config = RmdConfig { load_torque: 0.5, ..motor(1) };
+    let mut config = motor(1);
+    config.plant.load.brake = 8.0;
     let tested = Setup { allowed: &[Need::Spin], ..Setup::new(vec![config]) }.run();
     let outcome = tested.report.outcomes.iter();
     let torque =

@@ -136,15 +136,19 @@ impl World for Around {
     }
 }
 
-/// A motor unlike a new one in all that can be told, so that nothing passes by chance.
+/// A motor unlike a new one in all that can be told, so that nothing passes by chance. It turns
+/// a disc, as on a bench.
 pub fn motor(id: u8) -> RmdConfig {
-    RmdConfig {
+    let mut config = RmdConfig {
         gains: [101, 99, 102, 98, 103, 97],
         acceleration_dps2: 5_000,
         encoder_offset: 1_000,
-        angle_degrees: 123.4,
-        ..RmdConfig::with_id(id)
-    }
+        id,
+        ..RmdConfig::x8()
+    };
+    config.plant.angle_degrees = 123.4;
+    config.plant.load.inertia = 0.06;
+    config
 }
 
 /// What came of the suite, and the motors afterwards.
@@ -196,9 +200,9 @@ impl Setup {
         let node = |config: &RmdConfig| {
             RmdNode::new(Instant(0), *config, config.factory_rom()).expect("a fair configuration")
         };
-        let bus = RmdBus::new(Instant(0), motors.iter().map(node).collect()).expect("IDs differ");
+        let bus = RmdBus::new(motors.iter().map(node).collect()).expect("IDs differ");
         let id = MotorId::new(motors[0].id).expect("an ID");
-        let encoder = EncoderBits::new(motors[0].encoder_bits).expect("a width");
+        let encoder = EncoderBits::new(motors[0].plant.encoder.bits).expect("a width");
         let motors = Motors { bus, now: Instant(0), first: id };
         let station = Station { motors, behaviour, energised: false, powered_on: 0, fastest: 0.0 };
         let bus = Rc::new(RefCell::new(Virtual::new(station)));

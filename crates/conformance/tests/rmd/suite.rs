@@ -4,7 +4,6 @@ use motorlink_conformance::rmd::suite;
 use motorlink_conformance::{Report, Verdict};
 use motorlink_proto::rmd::{CanFrame, Errors, Mode, Settings};
 use motorlink_proto::time::Instant;
-use motorlink_sim::rmd::RmdConfig;
 
 use crate::drive::{Behaviour, Event, Setup, Tested, motor};
 
@@ -91,7 +90,9 @@ fn passes(tested: &Tested) {
 #[test]
 fn motors_of_every_encoder_width_pass() {
     for encoder_bits in [12, 14, 16, 18] {
-        let tested = Setup::new(vec![RmdConfig { encoder_bits, ..motor(1) }]).run();
+        let mut config = motor(1);
+        config.plant.encoder.bits = encoder_bits;
+        let tested = Setup::new(vec![config]).run();
         passes(&tested);
         let beyond = ["an_offset_beyond_the_encoder_is_cut"];
         let alone =
@@ -153,7 +154,7 @@ fn without_leave_nothing_is_energised_or_worn_and_it_is_over_soon() {
         assert_eq!(station.powered_on, 0);
         for node in station.motors.bus.nodes() {
             assert_eq!(node.motor().rom_writes(), 0);
-            let turned = node.motor().truth().angle_degrees - 123.4;
+            let turned = node.motor().truth().plant.angle_degrees - 123.4;
             assert!(turned.abs() < 1e-3, "it turned by {turned}°");
         }
     });

@@ -239,20 +239,28 @@ fn st_state(motor: &StMotor, number: u8) -> Value {
 }
 
 fn rmd_state(node: &RmdNode) -> Value {
-    let truth = node.motor().truth();
+    let motor = node.motor();
+    let truth = motor.truth();
+    let plant = &truth.plant;
     json!({
         "motor": node.id().number(),
         "mode": mode(truth.mode),
         "errors": node.drive().errors().to_string(),
         "speed_dps": truth.speed_dps,
         "speed_reference_dps": truth.speed_reference_dps,
-        "angle_degrees": truth.angle_degrees,
-        "iq_amps": truth.iq,
-        "supply_volts": truth.supply_voltage,
+        "angle_degrees": plant.angle_degrees,
+        "output_degrees": plant.output_degrees,
+        "iq_amps": plant.iq,
+        "id_amps": plant.id,
+        "phase_amps": plant.phase_currents,
+        "torque_newton_metres": plant.torque,
+        "supply_volts": plant.bus_voltage,
+        "chopping": plant.chopping,
         "celsius": truth.temperature,
-        "load_newton_metres": truth.load_torque,
-        "locked": truth.locked,
-        "rom_writes": node.motor().rom_writes(),
+        "winding_celsius": plant.winding_temperature,
+        "load_newton_metres": motor.plant().machine().load().brake,
+        "locked": plant.locked,
+        "rom_writes": motor.rom_writes(),
     })
 }
 
@@ -319,16 +327,17 @@ pub(super) fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), 
             }
         }
         Command::Supply { motor, volts, .. } => {
-            rmd_node(bus, *motor)?.motor_mut().set_supply_voltage(*volts);
+            rmd_node(bus, *motor)?.motor_mut().plant_mut().set_source(*volts);
         }
         Command::Temperature { motor, celsius, .. } => {
-            rmd_node(bus, *motor)?.motor_mut().set_temperature(*celsius);
+            rmd_node(bus, *motor)?.motor_mut().plant_mut().force_temperature(*celsius);
         }
         Command::Load { motor, newton_metres, .. } => {
-            rmd_node(bus, *motor)?.motor_mut().set_load_torque(*newton_metres);
+            let plant = rmd_node(bus, *motor)?.motor_mut().plant_mut();
+            plant.change_load(|load| load.brake = *newton_metres);
         }
         Command::LockRotor { motor, locked, .. } => {
-            rmd_node(bus, *motor)?.motor_mut().lock_rotor(*locked)
+            rmd_node(bus, *motor)?.motor_mut().plant_mut().lock(*locked);
         }
         Command::Fault { motor, fault, hold, .. } => {
             let known = RMD_FAULTS.iter().find(|(_, name)| name.eq_ignore_ascii_case(fault));

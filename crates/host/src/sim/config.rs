@@ -116,7 +116,6 @@ impl BenchConfig {
 
     fn from_file(file: File) -> Result<Self, ConfigError> {
         let st = motors(file.st, "st.motor", st_motor)?.map(StConfigs).unwrap_or_default();
-        let rmd_motor = |table, place: &str| overlay(RmdConfig::default(), table, place);
         let rmd = motors(file.rmd, "rmd.motor", rmd_motor)?.map(RmdConfigs).unwrap_or_default();
         let config = BenchConfig { profile: file.profile, st, rmd };
         config.station(Instant(0))?;
@@ -162,28 +161,13 @@ impl BenchConfig {
         rom: impl Fn(&RmdConfig) -> Settings,
     ) -> Result<RmdBus<Vec<RmdNode>>, ConfigError> {
         for (config, n) in self.rmd.0.iter().zip(1..) {
-            let values = [
-                ("supply_voltage", config.supply_voltage, 0.0..=1000.0),
-                ("protect_voltage", config.protect_voltage, THRESHOLD),
-                ("protect_temperature", config.protect_temperature, THRESHOLD),
-                ("max_torque_current", config.max_torque_current, 0.0..=33.0),
-                ("max_speed_dps", config.max_speed_dps, THRESHOLD),
-                ("max_angle_degrees", config.max_angle_degrees, THRESHOLD),
-                ("load_torque", config.load_torque, 0.0..=1e3),
-                ("angle_degrees", config.angle_degrees, -1e6..=1e6),
-            ];
-            check(&format!("rmd.motor {n}"), &config.machine, &config.heat, values)?;
+            let place =
+                |error: OutOfRange| ConfigError::Impossible(format!("rmd.motor {n}: {error}"));
+            config.check().map_err(place)?;
         }
-        let node = |config: &RmdConfig| {
-            RmdNode::new(now, *config, rom(config)).ok_or_else(|| {
-                ConfigError::Impossible(format!(
-                    "motor {}: IDs are 1 to 32 and encoders have 12 to 18 bits, not {}",
-                    config.id, config.encoder_bits
-                ))
-            })
-        };
-        let nodes: Result<Vec<RmdNode>, ConfigError> = self.rmd.0.iter().map(node).collect();
-        RmdBus::new(now, nodes?).ok_or_else(|| {
+        let node =
+            |config: &RmdConfig| RmdNode::new(now, *config, rom(config)).expect("it was checked");
+        RmdBus::new(self.rmd.0.iter().map(node).collect()).ok_or_else(|| {
             let mut ids: Vec<u8> = self.rmd.0.iter().map(|config| config.id).collect();
             ids.sort_unstable();
             let twice = ids.windows(2).find(|pair| pair[0] == pair[1]).map_or(0, |pair| pair[0]);
@@ -253,6 +237,21 @@ fn st_motor(mut table: Table, place: &str) -> Result<MotorConfig, ConfigError> {
     overlay(preset, table, place)
 }
 
+/// An RMD motor: its preset (`rmd-l-5005` or `rmd-x8`) with what the table says on top.
+fn rmd_motor(mut table: Table, place: &str) -> Result<RmdConfig, ConfigError> {
+    let preset = match table.remove("preset") {
+        None => RmdConfig::default(),
+        Some(Value::String(name)) if name == "rmd-l-5005" => RmdConfig::default(),
+        Some(Value::String(name)) if name == "rmd-x8" => RmdConfig::x8(),
+        Some(other) => {
+            let why =
+                format!("{place}: the presets are \"rmd-l-5005\" and \"rmd-x8\", not {other}");
+            return Err(ConfigError::Text(why));
+        }
+    };
+    overlay(preset, table, place)
+}
+
 /// `preset` with the values of `table`, at any depth.
 pub(super) fn overlay<T: serde::Serialize + DeserializeOwned>(
     preset: T,
@@ -294,7 +293,10 @@ mod tests {
             plant.supply.voltage = 36.0
             plant.machine.pole_pairs = 7
             [[rmd.motor]]
+            preset = \"rmd-x8\"
             id = 32
+            plant.supply.chopper = { resistance = 5, on_voltage = 56, off_voltage = 54 }
+            plant.machine.gear.ratio = 6
         ";
         let config = BenchConfig::parse(text).unwrap();
         assert_eq!(config.profile, Profile::Mcsdk54);
@@ -303,7 +305,10 @@ mod tests {
         assert_eq!((plant.supply.voltage, plant.machine.pole_pairs), (36.0, 7));
         let servo = MotorConfig::servo().plant;
         assert_eq!(plant.machine.flux_linkage, servo.machine.flux_linkage);
-        assert_eq!(config.rmd.0[0].id, 32);
+        let motor = &config.rmd.0[0];
+        assert_eq!((motor.id, motor.plant.machine.gear.ratio), (32, 6.0));
+        assert_eq!(motor.plant.machine.pole_pairs, RmdConfig::x8().plant.machine.pole_pairs);
+        assert!(motor.plant.supply.chopper.is_some());
     }
 
     #[test]
@@ -318,8 +323,9 @@ mod tests {
         assert!(
             why("[[st.motor]]\nplant.supply.voltage = -1").contains("st.motor 1: plant.supply")
         );
-        assert!(why("[[rmd.motor]]\nmachine.inertia = 0").contains("machine.inertia"));
-        assert!(why("[[rmd.motor]]\nheat.time_constant = 0").contains("heat.time_constant"));
+        assert!(why("[[rmd.motor]]\nplant.machine.inertia = 0").contains("plant.machine.inertia"));
+        assert!(why("[[rmd.motor]]\nplant.encoder.bits = 19").contains("plant.encoder.bits"));
+        assert!(why("[[rmd.motor]]\npreset = \"big\"").contains("rmd-x8"));
         assert!(why("[[rmd.motor]]\nprotect_voltage = nan").contains("protect_voltage"));
         assert!(why("[[st.motor]]\nplant.heat.ambient = inf").contains("heat.ambient"));
         assert!(why("[[st.motor]]\nalignment_current = 1e38").contains("alignment_current"));

@@ -130,7 +130,7 @@ impl Image {
         Image {
             format: FORMAT.to_owned(),
             id: motor.id,
-            encoder_bits: motor.encoder_bits,
+            encoder_bits: motor.plant.encoder.bits,
             gains: [position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki],
             acceleration_dps2: rom.acceleration.0,
             encoder_offset: rom.encoder_offset,
@@ -158,7 +158,7 @@ impl Image {
 
     /// Refuses another motor's.
     fn check(self, motor: &RmdConfig) -> Result<Self, String> {
-        let own = (motor.id, motor.encoder_bits);
+        let own = (motor.id, motor.plant.encoder.bits);
         if (self.id, self.encoder_bits) == own {
             return Ok(self);
         }

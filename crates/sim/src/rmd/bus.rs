@@ -3,16 +3,14 @@
 use motorlink_proto::rmd::{CanFrame, MotorId};
 use motorlink_proto::time::Instant;
 
-use super::cascade::STEP;
 use super::{RmdConfig, RmdNode};
-use crate::clock::Clock;
+use crate::hash;
 
 /// A CAN bus with RMD motors, kept in an array or a vector. A motor only speaks when it is asked,
 /// so there is nothing to poll: time that passed meanwhile is made up for.
 #[derive(Debug, Clone)]
 pub struct RmdBus<N> {
     nodes: N,
-    clock: Clock,
 }
 
 impl RmdBus<[RmdNode; 4]> {
@@ -21,16 +19,16 @@ impl RmdBus<[RmdNode; 4]> {
         let nodes = RmdConfig::demo().map(|config| {
             RmdNode::new(now, config, config.factory_rom()).expect("IDs 1 to 4 exist")
         });
-        RmdBus { nodes, clock: Clock::new(STEP, now) }
+        RmdBus { nodes }
     }
 }
 
 impl<N: AsRef<[RmdNode]> + AsMut<[RmdNode]>> RmdBus<N> {
-    /// A bus with these motors, whose time begins `now`; `None` when two have the same ID.
-    pub fn new(now: Instant, mut nodes: N) -> Option<Self> {
+    /// A bus with these motors; `None` when two have the same ID.
+    pub fn new(mut nodes: N) -> Option<Self> {
         nodes.as_mut().sort_unstable_by_key(RmdNode::id);
         let distinct = nodes.as_ref().is_sorted_by(|one, next| one.id() < next.id());
-        distinct.then(|| RmdBus { nodes, clock: Clock::new(STEP, now) })
+        distinct.then(|| RmdBus { nodes })
     }
 
     /// Takes a frame from the bus at `now` and hands the replies to `reply`: the lowest ID first,
@@ -46,9 +44,12 @@ impl<N: AsRef<[RmdNode]> + AsMut<[RmdNode]>> RmdBus<N> {
 
     /// Lets time pass until `now`.
     pub fn advance_to(&mut self, now: Instant) {
-        for end in self.clock.steps_until(now) {
-            self.nodes.as_mut().iter_mut().for_each(|node| node.step(end));
-        }
+        self.nodes.as_mut().iter_mut().for_each(|node| node.advance_to(now));
+    }
+
+    /// A fingerprint of everything that the motors are: two buses with the same behave the same.
+    pub fn state_hash(&self) -> u64 {
+        hash::fingerprint(&self.nodes.as_ref())
     }
 
     /// The motors, lowest ID first.

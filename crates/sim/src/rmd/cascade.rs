@@ -1,14 +1,9 @@
-//! The three loops: position, speed, torque current.
+//! The loops for position and speed, which give the torque loop its reference.
 
 use motorlink_proto::rmd::Gains;
-use motorlink_proto::time::Duration;
 
-use crate::machine::{Machine, MachineConfig, within};
-
-/// Length of a step.
-pub(super) const STEP: Duration = Duration(250);
-/// The same in s.
-pub(super) const DT: f32 = STEP.as_micros() as f32 * 1e-6;
+use crate::control::{self, Regulator, within};
+use crate::plant::MachineConfig;
 
 /// A byte of gain that leaves a loop as it is tuned.
 const AS_SHIPPED: f32 = 100.0;
@@ -19,86 +14,79 @@ const POSITION_KI: f32 = 2.0;
 /// Position error within which the position loop integrates, rad.
 const POSITION_INTEGRAL_RANGE: f32 = 0.02;
 /// Bandwidth of the speed loop as shipped, rad/s.
-const SPEED_BANDWIDTH: f32 = 100.0;
+const SPEED_BANDWIDTH: f32 = 300.0;
 /// Ki over Kp of the speed loop as shipped, 1/s.
-const SPEED_KI_PER_KP: f32 = 20.0;
-/// Share of a current step that the torque loop does in one step as shipped.
-const TORQUE_SHARE: f32 = 0.3;
+const SPEED_KI_PER_KP: f32 = 50.0;
+
+/// What a byte of gain multiplies its loop's gain by.
+pub(super) fn factor(byte: u8) -> f32 {
+    f32::from(byte) / AS_SHIPPED
+}
 
 /// What the speed loop has to do.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Speed {
+pub(super) enum Task {
     /// Reach a speed (rad/s) with an acceleration (rad/s²).
     Reach { speed: f32, acceleration: f32 },
     /// Close a distance (rad), no faster than `top` (rad/s) and with an acceleration (rad/s²).
     Close { distance: f32, top: f32, acceleration: f32 },
 }
 
-/// Gains in SI units, by the six bytes and the machine.
+/// Gains in SI units, by the bytes and the machine.
 #[derive(Debug, Clone, Default)]
 struct Tuning {
     position_kp: f32,
     position_ki: f32,
-    /// A s/rad, A/rad.
-    speed_kp: f32,
-    speed_ki: f32,
+    /// A s/rad, A s/rad a step.
+    speed: control::Gains,
     /// A s²/rad; a Kp below the shipped one feeds less forward, a greater one not more.
     feed_forward: f32,
-    /// V/A, V/A a step.
-    torque_kp: f32,
-    torque_ki: f32,
 }
 
 #[derive(Debug, Clone)]
 pub(super) struct Cascade {
     tuning: Tuning,
+    /// Length of a step, s.
+    dt: f32,
     /// Speed reference, rad/s.
     reference: f32,
+    /// The reference as the speed's low pass shows it, rad/s.
+    expected: f32,
+    /// Share of a new speed in that low pass.
+    new: f32,
     /// rad s.
     position_integral: f32,
-    /// A.
-    speed_integral: f32,
-    /// V.
-    torque_integral: f32,
-    /// Torque current, A.
-    iq: f32,
-    /// Share of itself that a current without voltage keeps in a step.
-    decay: f32,
+    speed: Regulator,
 }
 
 impl Cascade {
-    pub(super) fn new(machine: &MachineConfig) -> Self {
+    /// Loops that take a step every `dt` (s), with a speed that went through a low pass of which
+    /// `new` is the share of the new value.
+    pub(super) fn new(dt: f32, new: f32) -> Self {
         Cascade {
             tuning: Tuning::default(),
+            dt,
             reference: 0.0,
+            expected: 0.0,
+            new,
             position_integral: 0.0,
-            speed_integral: 0.0,
-            torque_integral: 0.0,
-            iq: 0.0,
-            decay: libm::expf(-machine.resistance * DT / machine.inductance),
+            speed: Regulator::default(),
         }
     }
 
     pub(super) fn tune(&mut self, gains: &Gains, machine: &MachineConfig) {
-        let factor = |byte: u8| f32::from(byte) / AS_SHIPPED;
-        let current_per_acceleration = machine.inertia / machine.torque_constant;
+        let current_per_acceleration = machine.inertia / machine.torque_constant();
         let speed_kp = SPEED_BANDWIDTH * current_per_acceleration;
-        let torque_ki = TORQUE_SHARE * machine.resistance;
         self.tuning = Tuning {
             position_kp: factor(gains.position_kp) * POSITION_KP,
             position_ki: factor(gains.position_ki) * POSITION_KI,
-            speed_kp: factor(gains.speed_kp) * speed_kp,
-            speed_ki: factor(gains.speed_ki) * speed_kp * SPEED_KI_PER_KP,
+            speed: control::Gains {
+                kp: factor(gains.speed_kp) * speed_kp,
+                ki: factor(gains.speed_ki) * speed_kp * SPEED_KI_PER_KP * self.dt,
+                kd: 0.0,
+            },
             feed_forward: factor(gains.speed_kp).min(1.0) * current_per_acceleration,
-            // So the regulator's zero cancels the winding's lag.
-            torque_kp: factor(gains.torque_kp) * torque_ki * self.decay / (1.0 - self.decay),
-            torque_ki: factor(gains.torque_ki) * torque_ki,
         };
-    }
-
-    /// Torque current, A.
-    pub(super) fn iq(&self) -> f32 {
-        self.iq
     }
 
     /// Speed reference, rad/s.
@@ -106,53 +94,37 @@ impl Cascade {
         self.reference
     }
 
-    /// Without current.
-    pub(super) fn off(&mut self, machine: &Machine) {
-        (self.iq, self.torque_integral) = (0.0, 0.0);
-        self.follow(machine);
+    /// Takes over smoothly from a speed (rad/s) with a torque current (A).
+    pub(super) fn follow(&mut self, speed: f32, iq: f32) {
+        (self.reference, self.expected) = (speed, speed);
+        self.speed = Regulator::starting_at(iq);
+        self.position_integral = 0.0;
     }
 
-    /// Torque current towards `iq` (A) with at most `voltage` (V) a phase.
-    pub(super) fn torque(&mut self, iq: f32, voltage: f32, machine: &Machine) {
-        self.follow(machine);
-        self.current_loop(iq, voltage, machine);
-    }
-
-    /// Speed or position, with at most `most` (A) of torque current.
-    pub(super) fn speed(&mut self, task: Speed, most: f32, voltage: f32, machine: &Machine) {
+    /// The torque current (A, at most `most`) for a task, at a speed (rad/s).
+    pub(super) fn step(&mut self, task: Task, most: f32, speed: f32) -> f32 {
         let last = self.reference;
         match task {
-            Speed::Reach { speed, acceleration } => {
+            Task::Reach { speed, acceleration } => {
                 self.position_integral = 0.0;
                 self.approach(speed, acceleration);
             }
-            Speed::Close { distance, top, acceleration } => {
+            Task::Close { distance, top, acceleration } => {
                 let speed = within(self.position_loop(distance, acceleration), -top, top);
                 self.approach(speed, acceleration);
             }
         }
-        let error = self.reference - machine.speed();
-        let accelerating = self.tuning.feed_forward * (self.reference - last) / DT;
-        let integral = self.speed_integral + self.tuning.speed_ki * DT * error;
-        let wanted = self.tuning.speed_kp * error + accelerating + integral;
-        let iq = within(wanted, -most, most);
-        // At the limit the integral only moves back.
-        if wanted == iq || (wanted > iq) != (error > 0.0) {
-            self.speed_integral = within(integral, -most, most);
-        }
-        self.current_loop(iq, voltage, machine);
-    }
-
-    /// Takes over smoothly from what happens now.
-    fn follow(&mut self, machine: &Machine) {
-        self.reference = machine.speed();
-        self.speed_integral = self.iq;
-        self.position_integral = 0.0;
+        let accelerating = self.tuning.feed_forward * (self.reference - last) / self.dt;
+        let forward = within(accelerating, -most, most);
+        // The encoder shows what was between the last step and this one.
+        self.expected += (last - self.expected) * self.new;
+        let error = self.expected - speed;
+        forward + self.speed.step(error, &self.tuning.speed, -most - forward, most - forward)
     }
 
     /// Moves the speed reference towards `speed`.
     fn approach(&mut self, speed: f32, acceleration: f32) {
-        let most = acceleration * DT;
+        let most = acceleration * self.dt;
         self.reference += within(speed - self.reference, -most, most);
     }
 
@@ -160,7 +132,7 @@ impl Cascade {
     fn position_loop(&mut self, distance: f32, acceleration: f32) -> f32 {
         let Tuning { position_kp, position_ki, .. } = self.tuning;
         if distance.abs() < POSITION_INTEGRAL_RANGE {
-            self.position_integral += distance * DT;
+            self.position_integral += distance * self.dt;
         } else {
             self.position_integral = 0.0;
         }
@@ -172,19 +144,5 @@ impl Cascade {
             libm::sqrtf(2.0 * acceleration * distance.abs() - knee * knee)
         };
         speed.copysign(distance) + position_ki * self.position_integral
-    }
-
-    /// Voltage for a current, and the current that comes of it. The back-EMF is fed forward.
-    fn current_loop(&mut self, iq: f32, voltage: f32, machine: &Machine) {
-        let error = iq - self.iq;
-        let integral = self.torque_integral + self.tuning.torque_ki * error;
-        let emf = machine.back_emf();
-        let wanted = self.tuning.torque_kp * error + integral + emf;
-        let applied = within(wanted, -voltage, voltage);
-        if applied == wanted {
-            self.torque_integral = integral;
-        }
-        let final_current = (applied - emf) / machine.config().resistance;
-        self.iq = final_current + (self.iq - final_current) * self.decay;
     }
 }

@@ -4,11 +4,12 @@ use motorlink_proto::rmd::{Config, EncoderBits, Gains, MotorId, Settings};
 use motorlink_proto::time::Duration;
 use motorlink_proto::units::DpsPerSecond;
 
-use crate::heat::HeatConfig;
-use crate::machine::MachineConfig;
+use crate::plant::range::check;
+use crate::plant::{OutOfRange, PlantConfig};
+use crate::preset;
 
 /// A motor with its drive: what the vendor's tool sets, what the ROM holds when new, and the
-/// machine.
+/// machine with its supply and sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -18,8 +19,6 @@ use crate::machine::MachineConfig;
 pub struct RmdConfig {
     /// The ID on the bus, 1 to 32.
     pub id: u8,
-    /// Width of the encoder, 12 to 18 bits.
-    pub encoder_bits: u8,
     /// Switches the motor off after this long without a command, ms; 0 is never.
     pub shutdown_ms: u32,
     /// Answers 0x9B with 0x9B and not with 0x9A as printed.
@@ -40,46 +39,26 @@ pub struct RmdConfig {
     pub protect_voltage: f32,
     /// Over temperature protection above this temperature, °C.
     pub protect_temperature: f32,
-    /// Supply voltage, V.
-    pub supply_voltage: f32,
-    /// Braking torque of the load, Nm.
-    pub load_torque: f32,
-    /// Angle of the rotor at the beginning, °.
-    pub angle_degrees: f32,
-    /// The machine.
-    pub machine: MachineConfig,
-    /// How the motor warms up from the copper loss.
-    pub heat: HeatConfig,
+    /// The machine, its load, supply, power stage and sensors.
+    pub plant: PlantConfig,
 }
 
+/// A direct drive like an RMD-L-5005.
 impl Default for RmdConfig {
     fn default() -> Self {
         RmdConfig {
             id: 1,
-            encoder_bits: 14,
             shutdown_ms: 0,
             clear_reply_0x9b: false,
             gains: [100; 6],
             acceleration_dps2: 0,
             encoder_offset: 0,
-            max_torque_current: 16.0,
+            max_torque_current: 5.0,
             max_speed_dps: 0.0,
             max_angle_degrees: 0.0,
             protect_voltage: 7.0,
             protect_temperature: 100.0,
-            supply_voltage: 24.0,
-            load_torque: 0.0,
-            angle_degrees: 0.0,
-            machine: MachineConfig {
-                pole_pairs: 14,
-                torque_constant: 0.1,
-                resistance: 0.25,
-                inductance: 0.2e-3,
-                inertia: 5e-4,
-                viscous_friction: 1e-4,
-                coulomb_friction: 0.01,
-            },
-            heat: HeatConfig { resistance: 1.0, ..HeatConfig::default() },
+            plant: preset::rmd_l_5005(),
         }
     }
 }
@@ -95,12 +74,30 @@ impl RmdConfig {
         [1, 2, 3, 4].map(Self::with_id)
     }
 
+    /// A geared actuator like an RMD-X8.
+    pub fn x8() -> Self {
+        RmdConfig { max_torque_current: 10.0, plant: preset::rmd_x8(), ..RmdConfig::default() }
+    }
+
+    /// Refuses what cannot be a motor.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        self.plant.check()?;
+        check([
+            ("id", self.id.into(), 1.0, 32.0),
+            ("max_torque_current", self.max_torque_current, 0.0, 33.0),
+            ("max_speed_dps", self.max_speed_dps, 0.0, 1e6),
+            ("max_angle_degrees", self.max_angle_degrees, 0.0, 1e6),
+            ("protect_voltage", self.protect_voltage, -1e6, 1e6),
+            ("protect_temperature", self.protect_temperature, -1e6, 1e6),
+        ])
+    }
+
     /// What the drive needs; `None` unless ID and encoder are in their ranges.
     pub(super) fn drive(&self) -> Option<Config> {
         let shutdown = Duration::from_millis(self.shutdown_ms);
         Some(Config {
             id: MotorId::new(self.id)?,
-            encoder: EncoderBits::new(self.encoder_bits)?,
+            encoder: EncoderBits::new(self.plant.encoder.bits)?,
             shutdown: (self.shutdown_ms > 0).then_some(shutdown),
             clear_reply_0x9b: self.clear_reply_0x9b,
         })

@@ -16,8 +16,10 @@
 mod bus;
 mod cascade;
 mod config;
+mod current;
 mod motor;
 mod node;
+mod speed;
 
 pub use bus::RmdBus;
 pub use config::RmdConfig;

@@ -1,23 +1,28 @@
 //! A drive and its motor.
 
 use motorlink_proto::rmd::{CanFrame, Drive, MotorId, Settings};
-use motorlink_proto::time::Instant;
+use motorlink_proto::time::{Duration, Instant};
 
 use super::{RmdConfig, RmdMotor};
+use crate::clock::Clock;
 
 /// An RMD motor with the drive that answers for it.
 #[derive(Debug, Clone)]
 pub struct RmdNode {
     drive: Drive,
     motor: RmdMotor,
+    clock: Clock,
 }
 
 impl RmdNode {
-    /// A motor that is powered on `now` with this ROM; `None` unless the configuration's ID is 1 to
-    /// 32 and its encoder has 12 to 18 bits. A new ROM is [`RmdConfig::factory_rom`].
+    /// A motor that is powered on `now` with this ROM; `None` where [`RmdConfig::check`] refuses
+    /// the configuration. A new ROM is [`RmdConfig::factory_rom`].
     pub fn new(now: Instant, config: RmdConfig, rom: Settings) -> Option<Self> {
+        config.check().ok()?;
         let drive = Drive::new(config.drive()?, rom);
-        let mut node = RmdNode { drive, motor: RmdMotor::new(config) };
+        let period = Duration(config.plant.period_us.into());
+        let clock = Clock::new(period, now);
+        let mut node = RmdNode { drive, motor: RmdMotor::new(config), clock };
         node.power_cycle(now);
         Some(node)
     }
@@ -49,12 +54,15 @@ impl RmdNode {
         self.drive.power_on(now, &mut self.motor);
     }
 
-    /// A step that ends `now`.
-    pub(super) fn step(&mut self, now: Instant) {
-        self.motor.step();
-        let silent = self.drive.deadline().is_some_and(|deadline| now >= deadline);
-        if silent || !self.motor.faults().is_empty() {
-            self.drive.poll(now, &mut self.motor);
+    /// Lets time pass until `now`.
+    pub(super) fn advance_to(&mut self, now: Instant) {
+        for end in self.clock.steps_until(now) {
+            if self.motor.step() {
+                let silent = self.drive.deadline().is_some_and(|deadline| end >= deadline);
+                if silent || !self.motor.faults().is_empty() {
+                    self.drive.poll(end, &mut self.motor);
+                }
+            }
         }
     }
 

@@ -2,6 +2,7 @@
 
 mod rmd_bench;
 mod rmd_motion;
+mod rmd_plant;
 mod rmd_protocol;
 mod st_bench;
 mod st_control;

@@ -4,6 +4,13 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdMotor, RmdNode, Truth};
 
+/// A default motor with an encoder of this width.
+pub fn with_bits(bits: u8) -> RmdConfig {
+    let mut config = RmdConfig::default();
+    config.plant.encoder.bits = bits;
+    config
+}
+
 pub struct Bench {
     pub bus: RmdBus<Vec<RmdNode>>,
     pub now: Instant,
@@ -17,7 +24,7 @@ impl Bench {
             RmdNode::new(Instant(0), config, config.factory_rom()).expect("a fair configuration")
         };
         let nodes = configs.into_iter().map(node).collect();
-        let bus = RmdBus::new(Instant(0), nodes).expect("IDs differ");
+        let bus = RmdBus::new(nodes).expect("IDs differ");
         Bench { bus, now: Instant(0), log: Vec::new() }
     }
 
@@ -62,6 +69,18 @@ impl Bench {
         self.node().motor_mut()
     }
 
+    /// Sets the braking torque at the output of motor 1, Nm.
+    pub fn brake(&mut self, torque: f32) {
+        self.world().plant_mut().change_load(|load| load.brake = torque);
+    }
+
+    /// Mean speed of motor 1 over `ms`, °/s.
+    pub fn mean_speed(&mut self, ms: u32) -> f64 {
+        let before = self.truth().plant.angle_degrees;
+        self.wait(ms);
+        (self.truth().plant.angle_degrees - before) / f64::from(ms) * 1000.0
+    }
+
     pub fn truth(&mut self) -> Truth {
         self.world().truth()
     }
@@ -84,11 +103,11 @@ impl Bench {
         for _ in 0..ms {
             self.wait(1);
             let truth = self.truth();
-            seen.least = seen.least.min(truth.angle_degrees);
-            seen.greatest = seen.greatest.max(truth.angle_degrees);
+            seen.least = seen.least.min(truth.plant.angle_degrees);
+            seen.greatest = seen.greatest.max(truth.plant.angle_degrees);
             seen.speed = seen.speed.max(truth.speed_dps.abs());
             seen.acceleration = seen.acceleration.max((truth.speed_dps - last).abs() * 1000.0);
-            seen.current = seen.current.max(truth.iq.abs());
+            seen.current = seen.current.max(truth.plant.iq.abs());
             last = truth.speed_dps;
         }
         seen

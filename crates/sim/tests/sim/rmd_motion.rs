@@ -4,7 +4,7 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::units::*;
 use motorlink_sim::rmd::RmdConfig;
 
-use crate::rmd_bench::Bench;
+use crate::rmd_bench::{Bench, with_bits};
 
 fn position(degrees: f64) -> Position {
     Position { angle: CentiDegrees::from_degrees(degrees) }
@@ -16,85 +16,140 @@ fn speed(dps: f64) -> Speed {
 
 #[test]
 fn torque_accelerates_the_rotor() {
-    let mut bench = Bench::one();
+    let mut bench = Bench::new([RmdConfig::x8()]);
     bench.ask(Torque { torque: TorqueCommand::from_amps(1.6) });
     bench.wait(50);
     let status = bench.ask(ReadStatus2);
-    assert!((status.iq.amps() - 1.6).abs() < 0.02, "{} A", status.iq.amps());
-    // 0.15 Nm after friction on 5e-4 kg m² are 300 rad/s² for 50 ms.
-    assert!((820..=880).contains(&status.speed.0), "{}", status.speed);
+    assert!((status.iq.amps() - 1.6).abs() < 0.05, "{} A", status.iq.amps());
+    // 0.31 Nm after friction and iron on 2.6e-4 kg m² are 1170 rad/s² for 50 ms.
+    let speed = bench.truth().speed_dps;
+    assert!((3200.0..3500.0).contains(&speed), "{speed} °/s");
     bench.ask(Torque { torque: TorqueCommand::from_amps(-1.6) });
-    bench.wait(200);
+    bench.wait(150);
     assert!(bench.truth().speed_dps < -1000.0);
+}
+
+#[test]
+fn torque_is_the_torque_constant_times_the_current() {
+    for config in [RmdConfig::default(), RmdConfig::x8()] {
+        for amps in [0.5, -2.0, 5.0] {
+            let mut bench = Bench::new([config]);
+            bench.world().plant_mut().lock(true);
+            bench.ask(Torque { torque: TorqueCommand::from_amps(amps) });
+            bench.wait(20);
+            let (mut torque, mut read) = (0.0, 0.0);
+            for _ in 0..100 {
+                bench.wait(1);
+                torque += f64::from(bench.truth().plant.torque) / 100.0;
+                read += bench.ask(ReadStatus2).iq.amps() / 100.0;
+            }
+            let told = amps * f64::from(config.plant.machine.torque_constant());
+            assert!((torque / told - 1.0).abs() < 0.02, "{torque} for {told} Nm");
+            assert!((read / amps - 1.0).abs() < 0.02, "{read} for {amps} A");
+        }
+    }
 }
 
 #[test]
 fn torque_is_not_limited_by_the_greatest_torque_current() {
     let mut bench = Bench::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
+    bench.world().plant_mut().lock(true);
     bench.ask(Torque { torque: TorqueCommand::from_amps(10.0) });
-    assert!(bench.watch(20).current > 9.9);
+    let current = bench.watch(20).current;
+    assert!((9.8..10.5).contains(&current), "{current} A");
     bench.ask(speed(-3000.0));
     bench.wait(20);
     let current = bench.watch(500).current;
-    assert!((1.9..2.01).contains(&current), "{current} A");
+    assert!((1.9..2.1).contains(&current), "{current} A");
 }
 
 #[test]
 fn a_speed_is_reached_without_error_and_held_against_a_load() {
-    let mut bench = Bench::one();
-    bench.ask(speed(1234.5));
-    let seen = bench.watch(1000);
-    assert!(seen.speed < 1234.5 * 1.02, "{} °/s on the way", seen.speed);
-    assert!((bench.truth().speed_dps - 1234.5).abs() < 0.5);
-    bench.world().set_load_torque(0.5);
-    let dip = bench.watch(10);
-    assert!(dip.current > 0.2, "{} A", dip.current);
-    bench.wait(1000);
-    assert!((bench.truth().speed_dps - 1234.5).abs() < 0.5, "{}", bench.truth().speed_dps);
+    // A load of 1.2 A, at the output.
+    for (config, brake) in [(RmdConfig::default(), 0.1), (RmdConfig::x8(), 2.1)] {
+        let mut bench = Bench::new([config]);
+        bench.ask(speed(1234.5));
+        let seen = bench.watch(300);
+        assert!(seen.speed < 1234.5 * 1.05, "{} °/s on the way", seen.speed);
+        let most = config.max_torque_current * 1.03;
+        assert!(seen.current < most, "{} A of {most}", seen.current);
+        assert!((bench.mean_speed(500) / 1234.5 - 1.0).abs() < 0.002);
+        bench.brake(brake);
+        let dip = bench.watch(30);
+        assert!((1.1..2.2).contains(&dip.current), "{} A", dip.current);
+        bench.wait(100);
+        let loaded = bench.mean_speed(500);
+        assert!((loaded / 1234.5 - 1.0).abs() < 0.002, "{loaded} °/s");
+    }
 }
 
 #[test]
 fn the_acceleration_limit_makes_a_trapezoid() {
-    let mut bench = Bench::one();
-    bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(2000) }));
-    bench.ask(speed(1000.0));
-    let seen = bench.watch(400);
-    assert!(seen.acceleration < 2200.0, "{} °/s²", seen.acceleration);
-    let halfway = bench.truth().speed_dps;
-    assert!((halfway - 800.0).abs() < 20.0, "{halfway} °/s after 0.4 s");
-    bench.wait(500);
-    assert!((bench.truth().speed_dps - 1000.0).abs() < 1.0);
+    for config in [RmdConfig::default(), RmdConfig::x8()] {
+        let mut bench = Bench::new([config]);
+        bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(2000) }));
+        bench.ask(speed(1000.0));
+        for ms in (50..500).step_by(50) {
+            bench.wait(50);
+            let (now, due) = (bench.truth().speed_dps, 2.0 * ms as f32);
+            assert!((now - due).abs() < 20.0, "{now} °/s after {ms} ms");
+        }
+        bench.wait(300);
+        assert!((bench.mean_speed(300) - 1000.0).abs() < 2.0);
+    }
+}
+
+#[test]
+fn a_move_is_a_trapezoid_that_never_goes_back() {
+    for config in [RmdConfig::default(), RmdConfig::x8()] {
+        for (angle, acceleration) in [(90.0, 3000), (-720.0, 20_000)] {
+            let mut bench = Bench::new([config]);
+            let acceleration = Acceleration { acceleration: DpsPerSecond(acceleration) };
+            bench.ask(WriteAcceleration(acceleration));
+            let max_speed = SpeedLimit(400);
+            let target = CentiDegrees::from_degrees(angle);
+            bench.ask(PositionLimited { max_speed, angle: target });
+            let limit = acceleration.acceleration.0 as f32;
+            let (mut last_speed, mut last, mut cruised) = (0.0, 0.0, 0);
+            let mut ms = 0;
+            while ms < 3000 {
+                ms += 10;
+                bench.wait(10);
+                let truth = bench.truth();
+                let way = truth.plant.angle_degrees * angle.signum();
+                assert!(way >= last - 0.01, "from {last}° back to {way}°");
+                let speed = truth.speed_dps * angle.signum() as f32;
+                // Cogging and what sticks at the beginning make 50 °/s.
+                assert!(speed < 450.0, "{speed} °/s");
+                let change = (speed - last_speed).abs() - 50.0;
+                assert!(change < limit * 0.01, "{change} °/s in 10 ms");
+                cruised += i32::from((380.0..420.0).contains(&speed));
+                (last, last_speed) = (way, speed);
+            }
+            assert!(cruised > 5, "{cruised}");
+            let off = (bench.truth().plant.output_degrees
+                - angle / f64::from(config.plant.machine.gear.ratio))
+            .abs();
+            assert!(off < 0.05, "{off}° at the output");
+        }
+    }
 }
 
 #[test]
 fn a_position_is_reached_within_a_tenth_of_a_degree_without_swinging() {
     for bits in 12..=18 {
         for degrees in [0.5, 90.0, -3600.0, 36_000.0] {
-            let config = RmdConfig { encoder_bits: bits, ..RmdConfig::default() };
+            let config = with_bits(bits);
             let mut bench = Bench::new([config]);
             bench.ask(position(degrees));
             let seen = bench.watch(5000);
-            let end = bench.truth().angle_degrees;
+            let end = bench.truth().plant.angle_degrees;
             let close = if bits < 14 { 0.2 } else { 0.1 };
             assert!((end - degrees).abs() < close, "{end}° for {degrees}° with {bits} bits");
             let over = (seen.greatest - degrees.max(0.0)).max(degrees.min(0.0) - seen.least);
             assert!(over < 0.2, "{over}° too far for {degrees}° with {bits} bits");
         }
     }
-}
-
-#[test]
-fn a_limited_position_move_keeps_its_speed_and_acceleration() {
-    let mut bench = Bench::one();
-    bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(3000) }));
-    let angle = CentiDegrees::from_degrees(720.0);
-    bench.ask(PositionLimited { max_speed: SpeedLimit(360), angle });
-    let seen = bench.watch(2000);
-    assert!((355.0..365.0).contains(&seen.speed), "{} °/s", seen.speed);
-    assert!(seen.acceleration < 3500.0, "{} °/s²", seen.acceleration);
-    assert!(bench.angle() < 719.0, "two turns take more than two seconds");
-    bench.wait(800);
-    assert!((bench.angle() - 720.0).abs() < 0.1);
 }
 
 #[test]
@@ -110,8 +165,8 @@ fn the_drives_own_limits_hold_a_position_command() {
     assert!((bench.angle() + 90.0).abs() < 0.1, "the offset is a quarter of a turn");
     bench.ask(position(1000.0));
     let seen = bench.watch(2000);
-    assert!(seen.speed < 505.0, "{} °/s", seen.speed);
-    assert!(seen.current < 3.01, "{} A", seen.current);
+    assert!(seen.speed < 540.0, "{} °/s", seen.speed);
+    assert!(seen.current < 3.1, "{} A", seen.current);
     assert!((bench.angle() - 180.0).abs() < 0.1, "{}°", bench.angle());
     bench.ask(position(-1000.0));
     bench.wait(3000);
@@ -142,7 +197,7 @@ fn a_single_turn_position_is_reached_in_the_direction_that_is_told() {
     };
     bench.ask(slow);
     let seen = bench.watch(2000);
-    assert!((95.0..105.0).contains(&seen.speed), "{} °/s", seen.speed);
+    assert!((95.0..130.0).contains(&seen.speed), "{} °/s", seen.speed);
     bench.wait(2500);
     assert!((bench.angle() - 50.0).abs() < 0.1, "{}°", bench.angle());
     assert!((bench.ask(ReadCircleAngle).angle.degrees() - 50.0).abs() < 0.1);
@@ -155,7 +210,7 @@ fn follow(gains: Gains, ms: u32, command: impl FnOnce(&mut Bench)) -> (f64, f32,
     command(&mut bench);
     bench.wait(ms);
     let truth = bench.truth();
-    (truth.angle_degrees, truth.speed_dps, truth.iq)
+    (truth.plant.angle_degrees, truth.speed_dps, truth.plant.iq)
 }
 
 #[test]
@@ -165,10 +220,10 @@ fn each_gain_acts() {
     assert!(step(Gains { position_kp: 20, ..shipped }) < 0.7 * step(shipped));
 
     let dip = |gains| {
-        let (_, speed, _) = follow(gains, 15, |bench| {
+        let (_, speed, _) = follow(gains, 8, |bench| {
             bench.ask(speed(1000.0));
             bench.wait(1000);
-            bench.world().set_load_torque(0.5);
+            bench.brake(0.015);
         });
         1000.0 - speed
     };
@@ -176,27 +231,27 @@ fn each_gain_acts() {
 
     let torque = TorqueCommand::from_amps(5.0);
     let push = |gains| follow(gains, 1, |bench| _ = bench.ask(Torque { torque })).2;
-    assert!(push(Gains { torque_kp: 30, torque_ki: 30, ..shipped }) < 0.7 * push(shipped));
+    assert!(push(Gains { torque_kp: 10, torque_ki: 10, ..shipped }) < 0.7 * push(shipped));
 
     let loaded = |gains| {
         follow(gains, 1000, |bench| {
-            bench.world().set_load_torque(0.5);
+            bench.brake(0.1);
             bench.ask(speed(2000.0));
         })
     };
     let (_, with, _) = loaded(shipped);
     let (_, without, _) = loaded(Gains { speed_ki: 0, ..shipped });
-    assert!((with - 2000.0).abs() < 2.0 && without < 1700.0, "{with} and {without} °/s");
+    assert!((with - 2000.0).abs() < 20.0 && without < 1700.0, "{with} and {without} °/s");
 
     let (.., current) = follow(Gains { torque_ki: 0, ..shipped }, 5, |bench| {
-        bench.world().lock_rotor(true);
+        bench.world().plant_mut().lock(true);
         bench.ask(Torque { torque });
     });
     assert!(current < 4.5, "{current} A without Ki");
 
     let held = |position_ki| {
-        let gains = Gains { position_ki, speed_ki: 0, ..shipped };
-        follow(gains, 4000, |bench| _ = bench.ask(position(0.5))).0
+        let gains = Gains { position_ki, speed_kp: 255, speed_ki: 0, ..shipped };
+        follow(gains, 20_000, |bench| _ = bench.ask(position(0.5))).0
     };
     assert!((held(255) - 0.5).abs() < (held(0) - 0.5).abs(), "{} and {}", held(255), held(0));
 
@@ -210,7 +265,7 @@ fn each_gain_acts() {
 #[test]
 fn stop_brings_the_rotor_to_a_stand_and_off_lets_it_coast() {
     let coasting = |stop: bool| {
-        let mut bench = Bench::one();
+        let mut bench = Bench::new([RmdConfig::x8()]);
         bench.ask(speed(3000.0));
         bench.wait(500);
         if stop {
@@ -219,34 +274,36 @@ fn stop_brings_the_rotor_to_a_stand_and_off_lets_it_coast() {
             bench.ask(Off);
         }
         bench.wait(100);
-        (bench.truth().speed_dps, bench.truth().iq)
+        (bench.truth().speed_dps, bench.truth().plant.iq)
     };
     let (stopped, _) = coasting(true);
     assert!(stopped.abs() < 30.0, "{stopped} °/s");
     let (off, current) = coasting(false);
-    assert!(off > 2500.0, "{off} °/s");
+    assert!(off > 2000.0, "{off} °/s");
     assert_eq!(current, 0.0);
 }
 
 #[test]
 fn phase_currents_sum_to_zero_and_follow_the_electrical_angle() {
     let mut bench = Bench::one();
-    bench.world().lock_rotor(true);
+    bench.world().plant_mut().lock(true);
     bench.ask(Torque { torque: TorqueCommand::from_amps(8.0) });
     bench.wait(50);
     let PhaseCurrents { phase_a, phase_b, phase_c } = bench.ask(ReadStatus3);
     assert_eq!(phase_a.0 + phase_b.0 + phase_c.0, 0);
-    assert_eq!(phase_a.0, 0, "Iq at an electrical angle of zero leaves phase A alone");
-    assert!((phase_b.amps() - 8.0 * 0.75f64.sqrt()).abs() < 0.05, "{phase_b}");
+    // Iq at an electrical angle of zero leaves phase A alone; half a count is 0.6° of it.
+    assert!(phase_a.amps().abs() < 0.15, "{phase_a}");
+    assert!((phase_b.amps() - 8.0 * 0.75f64.sqrt()).abs() < 0.15, "{phase_b}");
 
-    bench.world().lock_rotor(false);
+    bench.world().plant_mut().lock(false);
     bench.ask(speed(77.0));
     for _ in 0..100 {
         bench.wait(7);
         let PhaseCurrents { phase_a, phase_b, phase_c } = bench.ask(ReadStatus3);
         assert_eq!(phase_a.0 + phase_b.0 + phase_c.0, 0);
-        let squares = phase_a.amps().powi(2) + phase_b.amps().powi(2) + phase_c.amps().powi(2);
-        let iq = f64::from(bench.truth().iq).abs();
-        assert!(((squares / 1.5).sqrt() - iq).abs() < 0.03, "{squares} for {iq} A");
+        let truth = bench.truth().plant;
+        for (read, real) in [phase_a, phase_b, phase_c].iter().zip(truth.phase_currents) {
+            assert!((read.amps() - f64::from(real)).abs() < 0.1, "{read} for {real} A");
+        }
     }
 }

@@ -59,7 +59,7 @@ fn stop_and_run_resume_what_off_forgets() {
     assert!(bench.truth().speed_dps.abs() < 1.0);
     bench.ask(Run);
     bench.wait(300);
-    assert!((bench.truth().speed_dps - 500.0).abs() < 5.0);
+    assert!((bench.mean_speed(200) - 500.0).abs() < 1.0);
     bench.ask(Off);
     bench.ask(Run);
     bench.wait(3000);
@@ -71,18 +71,22 @@ fn protections_switch_off_and_stay_while_the_cause_lasts() {
     let mut bench = Bench::one();
     bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
     bench.wait(300);
-    bench.world().set_supply_voltage(6.9);
+    bench.world().plant_mut().set_source(6.9);
     bench.wait(1);
-    bench.world().set_supply_voltage(24.0);
+    assert!(bench.ask(ReadStatus1).errors.is_empty(), "the capacitor holds for a while");
+    bench.wait(300);
+    bench.world().plant_mut().set_source(24.0);
+    bench.wait(1);
     assert_eq!(bench.ask(ReadStatus1).errors, Errors::LOW_VOLTAGE);
     assert_eq!(bench.truth().mode, Mode::Off);
 
-    bench.world().set_temperature(Some(101.0));
+    bench.world().plant_mut().force_temperature(Some(101.0));
     bench.wait(1);
     assert_eq!(bench.ask(ClearErrors).errors, Errors::OVER_TEMPERATURE);
     bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
     assert_eq!(bench.truth().mode, Mode::Off);
-    bench.world().set_temperature(Some(60.0));
+    bench.world().plant_mut().force_temperature(Some(60.0));
+    bench.wait(300);
     let status = bench.ask(ClearErrors);
     assert_eq!((status.errors, status.temperature), (Errors::NONE, Celsius(60)));
     assert_eq!(status.voltage.volts(), 24.0);
@@ -105,19 +109,6 @@ fn injected_faults_happen_once_or_last() {
 }
 
 #[test]
-fn a_hard_working_motor_gets_too_hot() {
-    let mut bench = Bench::one();
-    bench.world().lock_rotor(true);
-    bench.ask(Torque { torque: TorqueCommand::from_amps(20.0) });
-    // 150 W at 1 K/W and 60 s: from 25 °C to 100 °C in 60 s ln 2, which is 42 s.
-    bench.wait(40_000);
-    assert!(bench.ask(ReadStatus1).errors.is_empty());
-    bench.wait(4_000);
-    assert_eq!(bench.ask(ReadStatus1).errors, Errors::OVER_TEMPERATURE);
-    assert_eq!(bench.truth().iq, 0.0);
-}
-
-#[test]
 fn silence_for_the_shutdown_time_switches_off() {
     let mut bench = Bench::new([RmdConfig { shutdown_ms: 200, ..RmdConfig::default() }]);
     bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
@@ -133,6 +124,9 @@ fn silence_for_the_shutdown_time_switches_off() {
 #[test]
 fn four_torques_are_answered_lowest_id_first() {
     let mut bench = Bench::new([4, 2, 7, 1, 3].map(RmdConfig::with_id));
+    for id in (1..=4).filter_map(MotorId::new) {
+        bench.bus.node_mut(id).unwrap().motor_mut().plant_mut().lock(true);
+    }
     let torques = Torque4([100, -100, 200, -200].map(TorqueCommand));
     bench.send(&CanFrame::new(0x280, torques.encode()));
     bench.wait(50);
@@ -142,7 +136,7 @@ fn four_torques_are_answered_lowest_id_first() {
     for (reply, torque) in replies.iter().zip(torques.0) {
         assert_eq!(reply.data()[0], 0xA1);
         let status = MotionStatus::decode(reply.data().try_into().unwrap());
-        assert!((status.iq.amps() - torque.amps()).abs() < 0.03, "{} {torque}", status.iq);
+        assert!((status.iq.amps() - torque.amps()).abs() < 0.05, "{} {torque}", status.iq);
     }
 }
 
@@ -171,9 +165,9 @@ fn an_odd_configuration_is_refused() {
     let odd = [
         RmdConfig { id: 0, ..RmdConfig::default() },
         RmdConfig { id: 33, ..RmdConfig::default() },
-        RmdConfig { encoder_bits: 19, ..RmdConfig::default() },
+        RmdConfig { max_speed_dps: f32::NAN, ..RmdConfig::default() },
     ];
     assert!(odd.into_iter().all(|config| RmdNode::new(Instant(0), config, rom).is_none()));
     let twins = [3, 3].map(|id| RmdNode::new(Instant(0), RmdConfig::with_id(id), rom).unwrap());
-    assert!(RmdBus::new(Instant(0), twins).is_none());
+    assert!(RmdBus::new(twins).is_none());
 }

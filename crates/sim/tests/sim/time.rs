@@ -56,7 +56,7 @@ fn rmd_run(piece: u64) -> (Vec<Vec<u8>>, String) {
             bench.send(&motorlink_proto::rmd::CanFrame::new(0x142, request));
         }
     }
-    let end = format!("{:?}", bench.truth());
+    let end = format!("{:?} {:#x}", bench.truth(), bench.bus.state_hash());
     (bench.log.iter().map(|frame| frame.data().to_vec()).collect(), end)
 }
 
