@@ -346,7 +346,7 @@ def test_over_temperature_is_flagged_and_cleared_when_the_motor_is_cool(simulato
 
 def test_an_encoder_of_18_bits_travels_with_its_upper_16(sim, tmp_path):
     config = tmp_path / "bench.toml"
-    config.write_text("[[rmd.motor]]\nencoder_bits = 18\nangle_degrees = 90.0\n")
+    config.write_text("[[rmd.motor]]\nplant.encoder.bits = 18\nplant.angle_degrees = 90.0\n")
     with Host(sim(config, st=()).can) as host:
         assert host.read(1, READ_ENCODER, "xHHH") == (16384, 16384, 0)
         assert is_at(host.single_turn_angle(1), 90)

@@ -70,7 +70,7 @@ impl CurrentLoop {
             },
             gains: control::Gains::default(),
             digit: sensing.full_scale / 32767.0,
-            correction: (1 << (finer_bits - 1)) - zero,
+            correction: (1u32 << (finer_bits - 1)).wrapping_sub(zero),
             finer_bits,
             lead: 1.5 * plant.period() * (TURN as f32 / TAU),
             d: Regulator::default(),

@@ -169,6 +169,22 @@ fn angles_and_speeds_are_those_of_the_motor_shaft() {
     assert!((890..=910).contains(&shown), "{shown} °/s");
 }
 
+#[test]
+fn torque_is_the_same_wherever_the_encoders_zero_is() {
+    for offset in [-120.0, -0.01, 200.0] {
+        let mut config = RmdConfig::x8();
+        config.plant.encoder.offset_degrees = offset;
+        let mut bench = Bench::new([config]);
+        bench.world().plant_mut().lock(true);
+        let angle = f64::from(offset).rem_euclid(360.0);
+        assert!((bench.angle() - angle).abs() < 0.03, "{}° for {offset}°", bench.angle());
+        bench.ask(Torque { torque: TorqueCommand::from_amps(5.0) });
+        bench.wait(50);
+        let torque = bench.truth().plant.torque / config.plant.machine.torque_constant();
+        assert!((torque / 5.0 - 1.0).abs() < 0.03, "that of {torque} A with {offset}°");
+    }
+}
+
 /// Time to nine tenths of a speed, ms, and how far Iq and speed then go up and down, A and °/s.
 fn step(config: RmdConfig, gains: Gains) -> (u32, f32, f32) {
     let mut bench = Bench::new([config]);
