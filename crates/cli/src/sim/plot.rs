@@ -1,6 +1,6 @@
 //! A run as a picture: panels over a common time, with what happened marked through all of them.
 
-use motorlink::sim::scenario::{Kind, Mark, Panel, Run, Scenario, Signal, short};
+use motorlink::sim::scenario::{Kind, Mark, Names, Panel, Run, Scenario, Signal, short};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -35,6 +35,9 @@ const LINES: [RGBColor; 6] = [
     RGBColor(0xE6, 0x9F, 0x00),
     RGBColor(0x56, 0xB4, 0xE9),
 ];
+/// Colours of states, so that those which follow each other differ.
+const STATES: [RGBColor; 4] = [LINES[4], LINES[5], LINES[2], LINES[0]];
+const FAULT: RGBColor = LINES[1];
 
 /// Draws the panels of a scenario as SVG.
 ///
@@ -178,13 +181,15 @@ fn strip(chart: &mut Chart<'_, '_>, signal: &Signal, column: &[f64], end: f64, t
     for run in column.chunk_by(|a, b| a == b) {
         let next = (first + run.len()).min(column.len() - 1);
         let (from, to) = (moment(first), moment(next));
-        let colour = match run[0] {
-            0.0 => FAINT.to_rgba(),
-            value => LINES[value as usize % LINES.len()].mix(0.35),
+        let name = signal.kind.show(run[0]);
+        let colour = match (run[0], signal.kind) {
+            (0.0, _) => FAINT.to_rgba(),
+            (_, Kind::Named(Names::Faults | Names::Errors)) => FAULT.mix(0.45),
+            _ if name.starts_with("FAULT") => FAULT.mix(0.45),
+            (value, _) => STATES[value as usize % STATES.len()].mix(0.35),
         };
         let corners = [(from, top - 0.12), (to, top - 0.88)];
         chart.draw_series(std::iter::once(Rectangle::new(corners, colour.filled())))?;
-        let name = signal.kind.show(run[0]);
         let room = (to - from) / end * f64::from(WIDTH - LEFT - RIGHT);
         if f64::from(width(&name)) + 6.0 < room {
             let style = small().pos(Pos::new(HPos::Center, VPos::Center));
