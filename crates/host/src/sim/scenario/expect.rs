@@ -189,7 +189,7 @@ impl Expectation {
         let slopes = || samples.windows(2).map(|pair| (pair[1] - pair[0]) / step);
         let (values, moment, unit) = match self.of {
             Of::Every => (worst(&mut samples.iter().copied()), true, unit.to_owned()),
-            Of::Slope => (worst(&mut slopes()), true, format!("{unit}/s")),
+            Of::Slope => (worst(&mut slopes()), true, per_second(unit)),
             Of::Some => {
                 let all = samples.iter().map(|value| (*value, outside(*value))).enumerate();
                 let best = all.reduce(|best, next| if next.1.1 < best.1.1 { next } else { best });
@@ -217,13 +217,31 @@ impl Expectation {
             let found = match (self.of, moment) {
                 (Of::Some, _) => format!("{} {unit} at {} s", short(value), short(at(n))),
                 (_, false) => format!("{} {unit}", short(value)),
-                _ => format!("{bounds} throughout"),
+                (Of::Slope, _) => extremes(&mut slopes(), &unit),
+                _ => extremes(&mut samples.iter().copied(), &unit),
             };
             return (true, found);
         }
         let moment = if moment { format!(" at {} s", short(at(n))) } else { String::new() };
         let miss = short(miss);
         (false, format!("{} {unit}{moment}, {miss} {unit} outside {bounds}", short(value)))
+    }
+}
+
+/// The least and the greatest of some values.
+fn extremes(values: &mut dyn Iterator<Item = f64>, unit: &str) -> String {
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let (least, most) = values.fold(none, |(least, most), v| (v.min(least), v.max(most)));
+    match (short(least), short(most)) {
+        (least, most) if least == most => format!("{least} {unit} throughout"),
+        (least, most) => format!("{least} to {most} {unit}"),
+    }
+}
+
+fn per_second(unit: &str) -> String {
+    match unit.strip_suffix("/s") {
+        Some(unit) => format!("{unit}/s²"),
+        None => format!("{unit}/s"),
     }
 }
 
@@ -260,10 +278,10 @@ mod tests {
 
     #[test]
     fn numbers_are_compared_and_the_worst_is_told() {
-        holds("speed between = [0.3, 0.5]\nmin = 3\nmax = 5", true, "3 to 5 rpm throughout");
+        holds("speed between = [0.3, 0.5]\nmin = 3\nmax = 6", true, "3 to 5 rpm");
         let found = "6 rpm at 0.6 s, 1 rpm outside 3 to 5 rpm";
         holds("speed between = [0.3, 0.6]\nmin = 3\nmax = 5", false, found);
-        holds("speed at = 0.72\nvalue = 7.5\nwithin = 0.5", true, "7 to 8 rpm throughout");
+        holds("speed at = 0.72\nvalue = 7.5\nwithin = 0.5", true, "7 rpm throughout");
         holds("speed max = 9", false, "10 rpm at 1 s, 1 rpm outside at most 9 rpm");
         holds("speed of = \"some\"\nmin = 4\nmax = 5", true, "4 rpm at 0.4 s");
         let found = "10 rpm at 1 s, 10 rpm outside at least 20 rpm";
@@ -271,9 +289,14 @@ mod tests {
         holds("speed of = \"mean\"\nvalue = 5\nwithin = 0", true, "5 rpm");
         holds("speed of = \"mean\"\nmin = 6", false, "5 rpm, 1 rpm outside at least 6 rpm");
         holds("speed of = \"swing\"\nmin = 10", true, "10 rpm");
-        holds("speed of = \"slope\"\nmin = 9.99", true, "at least 9.99 rpm/s throughout");
+        holds("speed of = \"slope\"\nmin = 9.99", true, "10 rpm/s throughout");
         let found = "10 rpm/s at 0 s, 5 rpm/s outside at most 5 rpm/s";
         holds("speed of = \"slope\"\nmax = 5", false, found);
+    }
+
+    #[test]
+    fn a_slope_has_its_own_unit() {
+        assert_eq!([per_second("rpm"), per_second("°/s")], ["rpm/s", "°/s²"]);
     }
 
     #[test]
