@@ -82,14 +82,10 @@ def test_a_shipped_scenario_comes_as_expected_and_always_the_same(run, tmp_path,
 
 def test_a_failed_expectation_says_by_how_much_and_when(run, write):
     scenario = write("""
-        [[event]]
-        at = 0.1
-        st = 1
-        world = "supply"
-        volts = 250
         [[expect]]
-        why = "the bus keeps its voltage"
-        signal = "st1.bus_volts"
+        why = "it turns by itself"
+        signal = "st1.speed_rpm"
+        between = [0.25, 1.0]
         min = 300
         [[expect]]
         why = "nobody starts it"
@@ -97,11 +93,12 @@ def test_a_failed_expectation_says_by_how_much_and_when(run, write):
         is = "IDLE"
     """)
     text = run("sim", "run", scenario).ended(1)
-    assert "the bus keeps its voltage: st1.bus_volts 250 V at" in text.err
-    assert "50 V outside at least 300 V" in text.err
+    found = "0 rpm at 0.25 s, 300 rpm outside at least 300 rpm"
+    assert f"it turns by itself: st1.speed_rpm {found}" in text.err
     assert "1 of 2 expectations hold" in text.out and "nobody starts it" not in text.err
     told = run("sim", "run", scenario, "--json").ended(1).json
     assert [one["holds"] for one in told["expectations"]] == [False, True]
+    assert told["expectations"][0]["found"] == found
 
 
 def test_a_refusal_that_was_not_announced_fails_the_run(run, write):
@@ -134,18 +131,27 @@ def test_a_bare_machine_is_that_of_its_equations(run, write, tmp_path):
 
 
 def test_a_load_comes_from_a_file_beside_the_scenario(run, write, tmp_path):
-    (tmp_path / "pump.csv").write_text("t_s,newton_metres\n0,0\n1,0.8\n")
-    scenario = write("""
+    (tmp_path / "pump.csv").write_text("t_s,newton_metres\n0,0\n1,0.1\n")
+    scenario = write(
+        """
         [[load_profile]]
-        st = 1
+        rmd = 1
         file = "pump.csv"
+        [[event]]
+        at = 0
+        rmd = 1
+        send = "speed"
+        dps = 720
         [[expect]]
-        why = "half of it after half of the time"
-        signal = "st1.load_newton_metres"
-        at = 0.5
-        value = 0.4
+        why = "four fifths of it in four fifths of the time"
+        signal = "rmd1.load_newton_metres"
+        between = [0.2, 1.0]
+        of = "swing"
+        value = 0.08
         within = 1e-6
-    """)
+        """,
+        motor="[[rmd.motor]]",
+    )
     run("sim", "run", scenario).ended(0)
     (tmp_path / "pump.csv").write_text("t_s,newton_metres\n0,0\n0,0.8\n")
     assert "pump.csv: line 3" in run("sim", "run", scenario).ended(2).err
