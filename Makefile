@@ -107,6 +107,7 @@ docs:
 	MOTORLINK_UPDATE_DOCS=1 $(CARGO) test -p motorlink-conformance --test document --locked
 
 pictures:
+	mkdir -p docs/pictures
 	@for scenario in scenarios/*.toml; do \
 		$(CARGO) run --release --locked --quiet -p motorlink-cli -- \
 			sim run $$scenario --plot docs/pictures/$$(basename $$scenario .toml).svg || exit; \
