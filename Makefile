@@ -12,6 +12,7 @@
 CARGO ?= cargo
 PYTHON ?= python3
 VENV := .venv
+BENCH_VENV := .venv-bench
 TARGET := thumbv7em-none-eabihf
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 SOCKETCAN := CARGO="$(CARGO)" SUDO="$(SUDO)" tests/socketcan/run.sh
@@ -98,10 +99,16 @@ e2e: $(VENV)/ready
 test-socketcan:
 	$(SOCKETCAN)
 
-bench:
+bench: $(BENCH_VENV)/ready
 	command -v valgrind >/dev/null || $(SUDO) apt-get install -y --no-install-recommends valgrind || \
 		echo "valgrind cannot be installed: instructions are not counted"
 	$(CARGO) run --release --locked -p motorlink-bench -- all
+
+# The other simulators, for comparison. The benchmark goes on without them, and says so.
+$(BENCH_VENV)/ready: bench/requirements.txt
+	rm -f $@
+	{ $(PYTHON) -m venv $(BENCH_VENV) && $(BENCH_VENV)/bin/python -m pip install --quiet -r $< && touch $@; } || \
+		echo "THE OTHER SIMULATORS ARE NOT MEASURED: they cannot be installed into $(BENCH_VENV)" >&2
 
 docs:
 	MOTORLINK_UPDATE_DOCS=1 $(CARGO) test -p motorlink-conformance --test document --locked
@@ -126,7 +133,7 @@ fmt:
 
 clean:
 	$(CARGO) clean
-	rm -rf $(VENV) probe/target fuzz/target
+	rm -rf $(VENV) $(BENCH_VENV) probe/target fuzz/target
 
 $(VENV)/ready: tests/e2e/requirements.txt
 	$(PYTHON) -m venv $(VENV) || { \

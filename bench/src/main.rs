@@ -8,6 +8,7 @@ mod kernel;
 mod line;
 mod machine;
 mod report;
+mod simulation;
 
 use std::error::Error;
 
@@ -40,6 +41,8 @@ enum What {
     Can,
     /// Instructions of an ST exchange, master and slave together
     Exchange,
+    /// Simulated drives against real time, and beside other simulators
+    Simulation,
     /// Repeats one piece of work, to be counted from outside
     #[command(hide = true)]
     Kernel { name: String, count: u32 },
@@ -55,11 +58,14 @@ fn main() -> Result<()> {
     let args = Args::parse();
     let style = if args.markdown { Style::Markdown } else { Style::Plain };
     let parts: &[Part] = match args.what {
-        What::All => &[codec::measure, line::measure, can::measure, exchange::measure],
+        What::All => {
+            &[codec::measure, line::measure, can::measure, exchange::measure, simulation::measure]
+        }
         What::Codec => &[codec::measure],
         What::Line => &[line::measure],
         What::Can => &[can::measure],
         What::Exchange => &[exchange::measure],
+        What::Simulation => &[simulation::measure],
         What::Kernel { name, count } => return repeat(&name, count),
         What::Sitting { line } => return line::sitting(&line),
     };
@@ -76,7 +82,7 @@ fn main() -> Result<()> {
 
 /// Runs under the instruction counter, see [`kernel::Counter`].
 fn repeat(name: &str, count: u32) -> Result<()> {
-    let kernels = codec::kernels().chain(exchange::kernels());
+    let kernels = codec::kernels().chain(exchange::kernels()).chain(simulation::kernels());
     let mut found = kernels.into_iter().filter(|kernel| kernel.name == name);
     found.next().ok_or_else(|| format!("no kernel is called {name}"))?.repeat(count);
     Ok(())

@@ -1,0 +1,163 @@
+//! Our drives, each at its work, as kernels that let one period pass.
+
+use std::hint::black_box;
+
+use motorlink_proto::rmd::{CanFrame, Command as _, Speed};
+use motorlink_proto::stmcp::{Command, Drive as _, Motor, Profile, Ramp};
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::units::CentiDps;
+use motorlink_sim::plant::{Bridge, LoadConfig, Plant, PlantConfig};
+use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
+use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
+use motorlink_sim::vector::Vector;
+use motorlink_sim::{angle, preset};
+use serde_json::{Value, json};
+
+use crate::kernel::Kernel;
+
+/// A period of the pulse width modulation.
+const PERIOD: Duration = Duration(50);
+pub(super) const PERIOD_S: f64 = 50e-6;
+
+/// Time to get to the speed.
+const SETTLED: Instant = Instant(3_000_000);
+/// Speed of the ST motors, rpm.
+const RPM: i32 = 1_500;
+/// Speed of the RMD motor, °/s.
+const DPS: i32 = 720;
+
+/// A drive and what it does.
+pub(super) struct Rig {
+    pub(super) name: &'static str,
+    /// Whether a speed is asked of it.
+    pub(super) is_required: bool,
+    build: fn(&'static str) -> Kernel,
+}
+
+impl Rig {
+    /// The drive when it has got to its speed.
+    pub(super) fn kernel(&self) -> Kernel {
+        (self.build)(self.name)
+    }
+}
+
+pub(super) const ENCODER: Rig =
+    Rig { name: "ST with encoder", is_required: true, build: |name| st(name, encoder(), RPM) };
+pub(super) const SENSORLESS: Rig = Rig {
+    name: "ST sensorless",
+    is_required: true,
+    build: |name| st(name, MotorConfig::default(), RPM),
+};
+const RMD: Rig = Rig { name: "RMD", is_required: true, build: |name| rmd(name, DPS) };
+const IDLE: Rig =
+    Rig { name: "ST with encoder, idle", is_required: false, build: |name| st(name, encoder(), 0) };
+
+pub(super) const PLANT: Rig = Rig { name: "plant alone", is_required: false, build: plant };
+
+pub(super) const RIGS: [Rig; 5] = [ENCODER, SENSORLESS, RMD, IDLE, PLANT];
+
+/// Speed (rad/s) and torque current (A) of the plant alone, and of the other simulators.
+pub(super) const SPEED: f32 = RPM as f32 * (core::f32::consts::TAU / 60.0);
+const IQ: f32 = 2.0;
+
+/// The motor that all of them are.
+fn motor() -> PlantConfig {
+    preset::shinano()
+}
+
+/// What bench/peers.py is told of it.
+pub(super) fn machine() -> Value {
+    let PlantConfig { machine, supply, .. } = motor();
+    json!({
+        "pole_pairs": machine.pole_pairs,
+        "resistance_ohm": machine.resistance,
+        "ld_henry": machine.inductance_d,
+        "lq_henry": machine.inductance_q,
+        "flux_weber": machine.flux_linkage,
+        "inertia_kg_m2": machine.inertia,
+        "bus_volts": supply.voltage,
+        "speed_rad_s": SPEED,
+        "iq_amps": IQ,
+    })
+}
+
+/// A plant whose voltages turn with the rotor, and whose load takes the torque.
+fn plant(name: &'static str) -> Kernel {
+    let config = motor();
+    let machine = config.machine;
+    let dry = machine.coulomb_friction + machine.iron_hysteresis;
+    let torque = machine.torque_constant() * IQ - dry;
+    let own = machine.viscous_friction + machine.iron_eddy;
+    let load = LoadConfig { viscous: torque / SPEED - own, ..config.load };
+    let mut plant = Plant::new(PlantConfig { load, ..config });
+    let electrical = SPEED * f32::from(machine.pole_pairs);
+    let across = machine.resistance * IQ + electrical * machine.flux_linkage;
+    let share = Vector::new(-electrical * machine.inductance_q * IQ, across)
+        * (1.0 / config.supply.voltage);
+    // The voltage acts in the next period: the rotor is one and a half ahead in its middle.
+    let ahead = angle::position(1.5 * PERIOD_S as f32 * electrical) as u32;
+    let mut period = move || {
+        let frame = Vector::unit(plant.machine().electrical_angle().wrapping_add(ahead));
+        plant.step(Bridge::Drive(share.turned(frame)));
+        black_box((plant.sample(), plant.counts()));
+        plant.machine().speed()
+    };
+    let speed = (0..SETTLED.0 / PERIOD.0).map(|_| period()).last();
+    assert!(speed.is_some_and(|speed| (speed / SPEED - 1.0).abs() < 0.1), "{name}: {speed:?}");
+    Kernel::new(name, move || {
+        period();
+    })
+}
+
+/// The ST motor with an encoder.
+fn encoder() -> MotorConfig {
+    MotorConfig::servo()
+}
+
+/// An ST drive that turns at a speed; 0: it was never started.
+fn st(name: &'static str, config: MotorConfig, rpm: i32) -> Kernel {
+    let drive = StDrive::new(Instant(0), [StMotor::new(config)]).expect("one motor is allowed");
+    let mut station = StStation::new(Profile::Spec, drive);
+    if rpm != 0 {
+        let drive = station.drive_mut();
+        drive.ramp(Motor::FIRST, Ramp { speed_rpm: rpm, duration_ms: 500 });
+        drive.execute(Motor::FIRST, Command::StartMotor);
+    }
+    station.advance_to(SETTLED);
+    let [motor] = station.drive().motors();
+    let truth = motor.truth();
+    assert!((truth.speed_rpm - rpm as f32).abs() < 20.0, "{name}: {truth:?}");
+    let mut now = SETTLED;
+    Kernel::new(name, move || {
+        now += PERIOD;
+        station.advance_to(now);
+    })
+}
+
+/// An RMD motor that turns at a speed.
+fn rmd(name: &'static str, dps: i32) -> Kernel {
+    let config = RmdConfig::default();
+    let node = RmdNode::new(Instant(0), config, config.factory_rom()).expect("its ID exists");
+    let id = node.id();
+    let mut bus = RmdBus::new(Instant(0), [node]).expect("one motor has an ID of its own");
+    let request = CanFrame::new(id.can_id(), Speed { speed: CentiDps(dps * 100) }.encode());
+    bus.receive(Instant(0), &request, |_| ());
+    bus.advance_to(SETTLED);
+    let truth = bus.node(id).expect("the motor is there").motor().truth();
+    assert!((truth.speed_dps - dps as f32).abs() < 20.0, "{name}: {truth:?}");
+    let mut now = SETTLED;
+    Kernel::new(name, move || {
+        now += PERIOD;
+        bus.advance_to(now);
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_drive_gets_to_its_speed_and_goes_on() {
+        RIGS.iter().for_each(|rig| rig.kernel().repeat(2));
+    }
+}

@@ -1,0 +1,158 @@
+//! Simulated drives: how much faster than real ones they are, and than other simulators.
+
+mod drives;
+mod peers;
+
+use rustix::time::{ClockId, clock_gettime};
+
+use crate::Result;
+use crate::kernel::{Counter, Kernel};
+use crate::report::{Goal, Section};
+
+use drives::Rig;
+use peers::{Peer, Peers};
+
+/// How often the drives and the other simulators take turns.
+const ROUNDS: usize = 7;
+/// Periods of ours in a turn.
+const PERIODS: u32 = 100_000;
+/// Drives that one core has to run in real time.
+const REAL_TIME: f64 = 500.0;
+/// How much faster than the others a whole drive has to be.
+const FASTER: f64 = 100.0;
+
+/// How the others are set up.
+const OTHERS: &str = "\
+The others run as fast as they can be made to (bench/peers.py): nothing is plotted or \
+rewarded that need not be, and no period has more than one voltage. gym-electric-motor is its \
+Cont-CC-PMSM-v0 without gymnasium's checks, with its default and fastest solver, one Euler step a \
+period; its own controllers need a package that draws diagrams, so that PI regulators of ours in \
+plain floats are its control. motulator is its Drive with stiff mechanics and its \
+CurrentVectorControl; it always integrates by SciPy, with RK23 here because its default RK45 is \
+slower, and with one midpoint step of ours in place of that, for what is left when its solver \
+costs next to nothing. Ours has, beside what theirs have, friction with stiction, cogging, iron \
+loss, heat, supply and dead time, current sensors with noise, an encoder, and as a drive all of its \
+firmware.";
+
+pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
+    let counter = Counter::find();
+    let (own, mut goals) = own(counter.as_ref())?;
+    let (others, comparisons) = beside_others()?;
+    goals.extend(comparisons);
+    Ok((vec![own, others], goals))
+}
+
+/// Each built when it is asked for, because it has to get to its speed first.
+pub fn kernels() -> impl Iterator<Item = Kernel> {
+    drives::RIGS.iter().map(Rig::kernel)
+}
+
+fn own(counter: Option<&Counter>) -> Result<(Section, Vec<Goal>)> {
+    let (mut rows, mut goals) = (Vec::new(), Vec::new());
+    for rig in &drives::RIGS {
+        let mut kernel = rig.kernel();
+        let factor = median((0..ROUNDS).map(|_| drives::PERIOD_S * rate(&mut kernel)));
+        let cost = kernel.cost(counter)?.show();
+        let row = [rig.name.to_owned(), format!("{factor:.0}")].into_iter().chain(cost);
+        rows.push(row.collect());
+        if rig.is_required {
+            goals.push(Goal {
+                what: format!("times real time on one core, {}", rig.name),
+                wanted: format!(">= {REAL_TIME}"),
+                reached: Some((format!("{factor:.0}"), factor >= REAL_TIME)),
+            });
+        }
+    }
+    let section = Section {
+        title: "A simulated drive",
+        note: format!(
+            "A PWM period of 50 us of one motor: plant, power stage, sensing and the drive's \
+             software; the ST drive's regulators run in each period. Virtual seconds a second of \
+             one core's time, median of {ROUNDS} turns of {PERIODS} periods; then time and \
+             instructions a period."
+        ),
+        columns: vec!["drive", "times real time", "ns, least", "median", "instructions"],
+        rows,
+    };
+    Ok((section, goals))
+}
+
+fn beside_others() -> Result<(Section, Vec<Goal>)> {
+    let mut rows = Vec::new();
+    let mut slowest = peers::PACKAGES.map(|package| (package, None::<f64>));
+    let started = Peers::start()?;
+    let found = started.as_ref().map_or_else(|| "nothing".to_owned(), Peers::versions);
+    if let Some(mut peers) = started {
+        for peer in &peers::PEERS {
+            let (theirs, ours, ratio) = take_turns(peer, &mut peers)?;
+            rows.push(vec![
+                format!("{}: {}", peer.package, peer.what),
+                format!("{theirs:.0}"),
+                peer.ours.name.to_owned(),
+                format!("{ours:.0}"),
+                format!("{ratio:.0}"),
+            ]);
+            for (_, least) in slowest.iter_mut().filter(|(package, _)| *package == peer.package) {
+                *least = Some(least.map_or(ratio, |least| least.min(ratio)));
+            }
+        }
+    }
+    let goals = slowest.map(|(package, ratio)| Goal {
+        what: format!("steps a second over {package}'s, the least ratio"),
+        wanted: format!(">= {FASTER}"),
+        reached: ratio.map(|ratio| (format!("{ratio:.0}"), ratio >= FASTER)),
+    });
+    let section = Section {
+        title: "Beside other simulators",
+        note: format!(
+            "Steps of 50 us a second of one core's time, in turns: ours, theirs, {ROUNDS} times; \
+             medians, and the median of the ratios of neighbouring turns. The same motor at the \
+             same speed and current for all; measured beside {found}.\n\n{OTHERS}"
+        ),
+        columns: vec!["simulator", "steps/s", "ours", "steps/s", "ratio"],
+        rows,
+    };
+    Ok((section, goals.into()))
+}
+
+/// Medians of their steps a second, ours, and the ratio.
+fn take_turns(peer: &Peer, peers: &mut Peers) -> Result<(f64, f64, f64)> {
+    let mut kernel = peer.ours.kernel();
+    let mut turns = Vec::new();
+    for _ in 0..ROUNDS {
+        turns.push((peers.rate(peer)?, rate(&mut kernel)));
+    }
+    Ok((
+        median(turns.iter().map(|(theirs, _)| *theirs)),
+        median(turns.iter().map(|(_, ours)| *ours)),
+        median(turns.iter().map(|(theirs, ours)| ours / theirs)),
+    ))
+}
+
+/// Repetitions a second of this thread's time on the processor.
+fn rate(kernel: &mut Kernel) -> f64 {
+    let began = processor_seconds();
+    kernel.repeat(PERIODS);
+    f64::from(PERIODS) / (processor_seconds() - began)
+}
+
+fn processor_seconds() -> f64 {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_the_middle_in_whatever_order() {
+        assert_eq!(median([3.0, -1.0, 2.0].into_iter()), 2.0);
+    }
+}

@@ -1,0 +1,126 @@
+//! The other simulators: Python packages, measured by bench/peers.py in a process of its own.
+
+use std::io::{BufRead, BufReader, Lines, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+use serde_json::Value;
+
+use super::drives::{self, ENCODER, PLANT, Rig, SENSORLESS};
+use crate::Result;
+
+const GEM: &str = "gym-electric-motor";
+const MOTULATOR: &str = "motulator";
+pub(super) const PACKAGES: [&str; 2] = [GEM, MOTULATOR];
+
+/// A model of another simulator.
+pub(super) struct Peer {
+    pub(super) package: &'static str,
+    /// What it is, for the reader.
+    pub(super) what: &'static str,
+    /// What bench/peers.py calls it.
+    model: &'static str,
+    /// Steps in a turn, a good quarter of a second.
+    steps: u32,
+    /// What of ours it is nearest to.
+    pub(super) ours: Rig,
+}
+
+impl Peer {
+    const fn new(
+        package: &'static str,
+        what: &'static str,
+        model: &'static str,
+        steps: u32,
+        ours: Rig,
+    ) -> Self {
+        Peer { package, what, model, steps, ours }
+    }
+}
+
+pub(super) const PEERS: [Peer; 8] = [
+    Peer::new(GEM, "physical system, Euler", "gem plant", 8_000, PLANT),
+    Peer::new(GEM, "current control, Euler", "gem control", 6_000, ENCODER),
+    Peer::new(MOTULATOR, "plant, RK23", "motulator plant rk23", 2_000, PLANT),
+    Peer::new(MOTULATOR, "plant, midpoint", "motulator plant midpoint", 8_000, PLANT),
+    Peer::new(MOTULATOR, "encoder, RK23", "motulator encoder rk23", 1_000, ENCODER),
+    Peer::new(MOTULATOR, "encoder, midpoint", "motulator encoder midpoint", 2_000, ENCODER),
+    Peer::new(MOTULATOR, "sensorless, RK23", "motulator sensorless rk23", 1_000, SENSORLESS),
+    Peer::new(
+        MOTULATOR,
+        "sensorless, midpoint",
+        "motulator sensorless midpoint",
+        2_000,
+        SENSORLESS,
+    ),
+];
+
+/// The packages at work.
+pub(super) struct Peers {
+    child: Child,
+    orders: ChildStdin,
+    answers: Lines<BufReader<ChildStdout>>,
+    versions: Value,
+}
+
+impl Peers {
+    /// `None`, loudly, where `make bench` could not install the packages.
+    pub(super) fn start() -> Result<Option<Self>> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let python = folder.join("../.venv-bench/bin/python");
+        if !folder.join("../.venv-bench/ready").exists() {
+            eprintln!(
+                "WARNING: {} ARE NOT MEASURED: `make bench` did not get them into .venv-bench",
+                PACKAGES.join(" and ").to_uppercase()
+            );
+            return Ok(None);
+        }
+        let mut child = Command::new(python)
+            .arg(folder.join("peers.py"))
+            .arg(drives::machine().to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()?;
+        let (orders, answers) = (child.stdin.take(), child.stdout.take());
+        let (Some(orders), Some(answers)) = (orders, answers) else {
+            return Err("the pipes to bench/peers.py are missing".into());
+        };
+        let answers = BufReader::new(answers).lines();
+        let mut peers = Peers { child, orders, answers, versions: Value::Null };
+        peers.versions = peers.answer()?;
+        Ok(Some(peers))
+    }
+
+    /// What is measured, with versions.
+    pub(super) fn versions(&self) -> String {
+        let versions = self.versions.as_object().into_iter().flatten();
+        let named =
+            versions.map(|(name, version)| format!("{name} {}", version.as_str().unwrap_or("?")));
+        named.collect::<Vec<_>>().join(", ")
+    }
+
+    /// Steps a second of this peer.
+    pub(super) fn rate(&mut self, peer: &Peer) -> Result<f64> {
+        writeln!(self.orders, "{} {}", peer.model, peer.steps)?;
+        let answer = self.answer()?;
+        let figure = |name: &str| answer[name].as_f64().ok_or("bench/peers.py left out a figure");
+        let speed = figure("speed_rad_s")?;
+        if (speed / f64::from(drives::SPEED) - 1.0).abs() > 0.1 {
+            return Err(format!("{} turns at {speed} rad/s", peer.model).into());
+        }
+        Ok(figure("steps")? / figure("seconds")?)
+    }
+
+    fn answer(&mut self) -> Result<Value> {
+        let line = self.answers.next().ok_or("bench/peers.py ended: its error is above")??;
+        Ok(serde_json::from_str(&line)?)
+    }
+}
+
+impl Drop for Peers {
+    fn drop(&mut self) {
+        // It may have ended by itself already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
