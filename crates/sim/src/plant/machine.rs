@@ -160,6 +160,8 @@ pub struct Machine {
     series: f32,
     decay: Decay,
     shaft: Shaft,
+    /// Pairs of poles.
+    poles: f32,
     /// One over the speed of the Stribeck effect, s/rad.
     inverse_stribeck: f32,
     /// One over the inductances, 1/H.
@@ -193,6 +195,8 @@ struct Decay {
     /// What they differ in: what a sixth and what two sixths of a step add, as a share.
     outer: Vector,
     inner: Vector,
+    /// Whether they differ at all.
+    salient: bool,
 }
 
 impl Decay {
@@ -205,7 +209,14 @@ impl Decay {
             let exponent = beyond * period * share;
             Vector::new(libm::expm1f(-exponent), libm::expm1f(exponent))
         };
-        Decay { rate, gone, drive, outer: change(1.0 / 6.0), inner: change(1.0 / 3.0) }
+        Decay {
+            rate,
+            gone,
+            drive,
+            outer: change(1.0 / 6.0),
+            inner: change(1.0 / 3.0),
+            salient: beyond != 0.0,
+        }
     }
 }
 
@@ -239,6 +250,7 @@ impl Machine {
             decay: Decay::new(period, config.resistance, inverse),
             load,
             locked: false,
+            poles: f32::from(config.pole_pairs),
             period,
             resistance: config.resistance,
             series: 0.0,
@@ -401,24 +413,27 @@ impl Machine {
     #[inline]
     pub fn step(&mut self, feed: Feed, flow: &mut Flow) {
         let half = self.half();
-        let begin = self.frame;
-        let middle = begin.turned(half.turn);
-        let end = middle.turned(half.turn);
+        let end = self.frame.turned(half.turn).turned(half.turn);
         let emf = Vector::new(0.0, half.electrical * self.config.flux_linkage);
         // The voltage as the rotor sees it, what of it is constant there, and what is not.
         let (v1, v2, v3, constant, still) = match feed {
             Feed::Stator(v) => {
-                let seen = [begin, middle, end].map(|frame| v.seen_from(frame));
-                (seen[0], seen[1], seen[2], -emf, self.decay.drive)
+                let v1 = v.seen_from(self.frame);
+                let v2 = v1.seen_from(half.turn);
+                (v1, v2, v2.seen_from(half.turn), -emf, self.decay.drive)
             }
             Feed::Rotor(v) => (v, v, v, v - emf, 0.0),
         };
-        let response = self.response(&half);
+        let gone = self.gone(&half);
+        let driven = constant.turned(self.response(&half, gone));
+        // What is added is small, and summed first: so the flux linkage keeps its digits.
         let f1 = self.flux;
-        let driven = self.turn_back(f1.grown(self.decay.outer), &half, response, constant);
-        let f2 = (driven + v2 * still).grown(self.decay.inner);
-        let driven = self.turn_back(f2.grown(self.decay.inner), &half, response, constant);
-        let f3 = (driven + v3 * still).grown(self.decay.outer);
+        let f2 = self.apart(f1, self.decay.outer);
+        let f2 = f2 + (driven + v2 * still - f2.turned(gone));
+        let f2 = self.apart(f2, self.decay.inner);
+        let f3 = self.apart(f2, self.decay.inner);
+        let f3 = f3 + (driven + v3 * still - f3.turned(gone));
+        let f3 = self.apart(f3, self.decay.outer);
         self.flux = f3;
 
         let (i1, i2, i3) =
@@ -428,33 +443,37 @@ impl Machine {
         flow.electrical += 1.5 * sixth * power;
         let square = i1.square() + 4.0 * i2.square() + i3.square();
         flow.copper += 1.5 * (self.resistance + self.series) * sixth * square;
-        let product = f1.cross(i1) + 4.0 * f2.cross(i2) + f3.cross(i3);
-        let magnet = self.config.flux_linkage * (i1.y + 4.0 * i2.y + i3.y);
-        self.torque = 0.25 * f32::from(self.config.pole_pairs) * (magnet + product);
+        let mut product = self.config.flux_linkage * (i1.y + 4.0 * i2.y + i3.y);
+        if self.decay.salient {
+            product += f1.cross(i1) + 4.0 * f2.cross(i2) + f3.cross(i3);
+        }
+        self.torque = 0.25 * self.poles * product;
         self.current = i3.turned(end);
         self.advance(half, end, flow);
+    }
+
+    /// What half a step takes away of a flux linkage as it turns back and dies away.
+    #[inline]
+    fn gone(&self, half: &Half) -> Vector {
+        let left = 1.0 - self.decay.gone;
+        Vector::new(self.decay.gone + left * half.fallen, left * half.turn.y)
     }
 
     /// For how long a constant voltage of the rotor's frame acts in half a step, s: a complex number,
     /// because what it did first has turned back since.
     #[inline]
-    fn response(&self, half: &Half) -> Vector {
-        let Decay { rate, gone, drive, .. } = self.decay;
+    fn response(&self, half: &Half, gone: Vector) -> Vector {
         if half.electrical == 0.0 {
-            return Vector::new(drive, 0.0);
+            return Vector::new(self.decay.drive, 0.0);
         }
-        let left = 1.0 - gone;
-        let rate = Vector::new(rate, half.electrical);
-        Vector::new(gone + left * half.fallen, left * half.turn.y).seen_from(rate)
-            * (1.0 / rate.square())
+        let rate = Vector::new(self.decay.rate, half.electrical);
+        gone.seen_from(rate) * (1.0 / rate.square())
     }
 
-    /// A flux linkage after half a step of a constant voltage: it turns back and dies away.
+    /// A flux linkage after what the axes differ in has acted.
     #[inline]
-    fn turn_back(&self, flux: Vector, half: &Half, response: Vector, voltage: Vector) -> Vector {
-        let slope = voltage - flux * self.decay.rate;
-        let turning = Vector::new(flux.y, -flux.x) * half.electrical;
-        flux + (slope + turning).turned(response)
+    fn apart(&self, flux: Vector, shares: Vector) -> Vector {
+        if self.decay.salient { flux.grown(shares) } else { flux }
     }
 
     /// The first half of a step, by the speed and its last change.
@@ -462,10 +481,9 @@ impl Machine {
     fn half(&self) -> Half {
         let speed = self.speed + 0.5 * self.change;
         let way = 0.5 * self.period * speed;
-        let poles = f32::from(self.config.pole_pairs);
         let position = self.position.wrapping_add(digits(way));
-        let (turn, fallen) = small(poles * way);
-        Half { position, speed, electrical: poles * speed, way, turn, fallen }
+        let (turn, fallen) = small(self.poles * way);
+        Half { position, speed, electrical: self.poles * speed, way, turn, fallen }
     }
 
     /// Moves the rotor on, which was foreseen to come to `end`, with the torques of friction and load
@@ -493,7 +511,7 @@ impl Machine {
         self.frame = if self.count == 0 {
             Vector::unit(self.electrical_angle())
         } else {
-            let missed = (way - 2.0 * half.way) * f32::from(self.config.pole_pairs);
+            let missed = (way - 2.0 * half.way) * self.poles;
             end + Vector::new(-end.y, end.x) * missed
         };
 
@@ -557,16 +575,22 @@ struct Half {
 }
 
 /// The unit vector of an angle in rad, which is small but for odd motors, and one less its cosine.
+#[inline]
 fn small(x: f32) -> (Vector, f32) {
     /// Up to which the series are exact enough, rad.
     const SMALL: f32 = 0.5;
     if x.abs() > SMALL {
-        let turn = Vector::unit(angle::position(x) as u32);
-        return (turn, 1.0 - turn.x);
+        return great(x);
     }
     let z = x * x;
     let fallen = z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0)));
     (Vector::new(1.0 - fallen, x + x * z * (-1.0 / 6.0 + z * (1.0 / 120.0))), fallen)
+}
+
+#[cold]
+fn great(x: f32) -> (Vector, f32) {
+    let turn = Vector::unit(angle::position(x) as u32);
+    (turn, 1.0 - turn.x)
 }
 
 /// Electrical angle of a rotor's position, 2^32 a turn.
