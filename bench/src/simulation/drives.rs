@@ -20,7 +20,7 @@ const PERIOD: Duration = Duration(50);
 pub(super) const PERIOD_S: f64 = 50e-6;
 
 /// Time to get to the speed.
-const SETTLED: Instant = Instant(3_000_000);
+const SETTLED: Instant = Instant(6_000_000);
 /// Speed of the ST motors, rpm.
 const RPM: i32 = 1_500;
 /// Speed of the RMD motor, °/s.
@@ -41,16 +41,22 @@ impl Rig {
     }
 }
 
-pub(super) const ENCODER: Rig =
-    Rig { name: "ST with encoder", is_required: true, build: |name| st(name, encoder(), RPM) };
+pub(super) const ENCODER: Rig = Rig {
+    name: "ST with encoder",
+    is_required: true,
+    build: |name| st(name, MotorConfig::servo(), RPM),
+};
 pub(super) const SENSORLESS: Rig = Rig {
     name: "ST sensorless",
     is_required: true,
-    build: |name| st(name, MotorConfig::default(), RPM),
+    build: |name| st(name, MotorConfig::shinano(), RPM),
 };
 const RMD: Rig = Rig { name: "RMD", is_required: true, build: |name| rmd(name, DPS) };
-const IDLE: Rig =
-    Rig { name: "ST with encoder, idle", is_required: false, build: |name| st(name, encoder(), 0) };
+const IDLE: Rig = Rig {
+    name: "ST with encoder, idle",
+    is_required: false,
+    build: |name| st(name, MotorConfig::servo(), 0),
+};
 
 pub(super) const PLANT: Rig = Rig { name: "plant alone", is_required: false, build: plant };
 
@@ -60,9 +66,15 @@ pub(super) const RIGS: [Rig; 5] = [ENCODER, SENSORLESS, RMD, IDLE, PLANT];
 pub(super) const SPEED: f32 = RPM as f32 * (core::f32::consts::TAU / 60.0);
 const IQ: f32 = 2.0;
 
-/// The motor that all of them are.
+/// The motor that all but the RMD motor are, with a load that takes its torque.
 fn motor() -> PlantConfig {
-    preset::shinano()
+    let motor = preset::shinano();
+    let machine = motor.machine;
+    let dry = machine.coulomb_friction + machine.iron_hysteresis;
+    let torque = machine.torque_constant() * IQ - dry;
+    let own = machine.viscous_friction + machine.iron_eddy;
+    let load = LoadConfig { viscous: torque / SPEED - own, ..motor.load };
+    PlantConfig { load, ..motor }
 }
 
 /// What bench/peers.py is told of it.
@@ -81,15 +93,11 @@ pub(super) fn machine() -> Value {
     })
 }
 
-/// A plant whose voltages turn with the rotor, and whose load takes the torque.
+/// A plant whose voltages turn with the rotor.
 fn plant(name: &'static str) -> Kernel {
     let config = motor();
     let machine = config.machine;
-    let dry = machine.coulomb_friction + machine.iron_hysteresis;
-    let torque = machine.torque_constant() * IQ - dry;
-    let own = machine.viscous_friction + machine.iron_eddy;
-    let load = LoadConfig { viscous: torque / SPEED - own, ..config.load };
-    let mut plant = Plant::new(PlantConfig { load, ..config });
+    let mut plant = Plant::new(config);
     let electrical = SPEED * f32::from(machine.pole_pairs);
     let across = machine.resistance * IQ + electrical * machine.flux_linkage;
     let share = Vector::new(-electrical * machine.inductance_q * IQ, across)
@@ -109,13 +117,9 @@ fn plant(name: &'static str) -> Kernel {
     })
 }
 
-/// The ST motor with an encoder.
-fn encoder() -> MotorConfig {
-    MotorConfig::servo()
-}
-
 /// An ST drive that turns at a speed; 0: it was never started.
-fn st(name: &'static str, config: MotorConfig, rpm: i32) -> Kernel {
+fn st(name: &'static str, mut config: MotorConfig, rpm: i32) -> Kernel {
+    config.plant.load = motor().load;
     let drive = StDrive::new(Instant(0), [StMotor::new(config)]).expect("one motor is allowed");
     let mut station = StStation::new(Profile::Spec, drive);
     if rpm != 0 {
