@@ -380,7 +380,8 @@ impl Machine {
     pub fn mechanical_energy(&self) -> f32 {
         let MachineConfig { cogging_torque, cogging_periods, .. } = self.config;
         let periods = f32::from(cogging_periods.max(1));
-        let cogging = cogging_torque / periods * (1.0 - self.cogging_angle(self.position).1);
+        let cogging =
+            cogging_torque / periods * (1.0 - sin_cos(self.cogging_angle(self.position)).1);
         0.5 * self.shaft.inertia * self.speed * self.speed
             + self.load.potential(self.position)
             + cogging
@@ -533,12 +534,12 @@ impl Machine {
         if self.config.cogging_torque == 0.0 {
             return 0.0;
         }
-        -self.config.cogging_torque * self.cogging_angle(position).0
+        -self.config.cogging_torque * angle::sin(self.cogging_angle(position))
     }
 
-    /// Sine and cosine of where a position is in a period of the cogging.
-    fn cogging_angle(&self, position: i64) -> (f32, f32) {
-        sin_cos((position as u32).wrapping_mul(self.config.cogging_periods.into()))
+    /// Where a position is in a period of the cogging, 2^32 a period.
+    fn cogging_angle(&self, position: i64) -> u32 {
+        (position as u32).wrapping_mul(self.config.cogging_periods.into())
     }
 
     /// Torques that only brake, at a speed and with a load (Nm at the output).

@@ -135,6 +135,8 @@ pub struct Plant {
     fed_with: Feed,
     /// Current that something feeds into the bus beside the source, A.
     fed: f32,
+    /// What the encoder shows where the rotor's position is 0, 2^32 a turn.
+    encoder_zero: i64,
     /// Steps since the beginning.
     count: u32,
     /// Time since the last slow step, µs.
@@ -162,6 +164,7 @@ impl Plant {
             pending: Bridge::Off,
             fed_with: Feed::Stator(Vector::ZERO),
             fed: 0.0,
+            encoder_zero: angle::position(config.encoder.offset_degrees.to_radians()),
             count: 0,
             since_slow: 0,
             flow: Flow::default(),
@@ -276,8 +279,7 @@ impl Plant {
 
     /// Counts of the encoder over all turns, 2^bits a turn.
     pub fn counts(&self) -> i64 {
-        let offset = angle::position(self.config.encoder.offset_degrees.to_radians());
-        self.machine.position().wrapping_add(offset) >> self.finer_bits()
+        self.machine.position().wrapping_add(self.encoder_zero) >> self.finer_bits()
     }
 
     /// Bits of a position that are finer than the encoder.
