@@ -41,26 +41,25 @@ impl Rig {
     }
 }
 
-pub(super) const ENCODER: Rig = Rig {
-    name: "ST with encoder",
-    is_required: true,
-    build: |name| st(name, MotorConfig::servo(), RPM),
-};
+pub(super) const ENCODER: Rig =
+    Rig { name: "ST with encoder", is_required: true, build: |name| st(name, encoder(), RPM) };
 pub(super) const SENSORLESS: Rig = Rig {
     name: "ST sensorless",
     is_required: true,
     build: |name| st(name, MotorConfig::shinano(), RPM),
 };
-const RMD: Rig = Rig { name: "RMD", is_required: true, build: |name| rmd(name, DPS) };
-const IDLE: Rig = Rig {
-    name: "ST with encoder, idle",
+const OBSERVED: Rig = Rig {
+    name: "ST with encoder and observer",
     is_required: false,
-    build: |name| st(name, MotorConfig::servo(), 0),
+    build: |name| st(name, MotorConfig::servo(), RPM),
 };
+const RMD: Rig = Rig { name: "RMD", is_required: true, build: |name| rmd(name, DPS) };
+const IDLE: Rig =
+    Rig { name: "ST with encoder, idle", is_required: false, build: |name| st(name, encoder(), 0) };
 
 pub(super) const PLANT: Rig = Rig { name: "plant alone", is_required: false, build: plant };
 
-pub(super) const RIGS: [Rig; 5] = [ENCODER, SENSORLESS, RMD, IDLE, PLANT];
+pub(super) const RIGS: [Rig; 6] = [ENCODER, SENSORLESS, RMD, OBSERVED, IDLE, PLANT];
 
 /// Speed (rad/s) and torque current (A) of the plant alone, and of the other simulators.
 pub(super) const SPEED: f32 = RPM as f32 * (core::f32::consts::TAU / 60.0);
@@ -115,6 +114,13 @@ fn plant(name: &'static str) -> Kernel {
     Kernel::new(name, move || {
         period();
     })
+}
+
+/// A drive that has an encoder and no observer beside it.
+fn encoder() -> MotorConfig {
+    let mut config = MotorConfig::servo();
+    config.build.observer_cordic = false;
+    config
 }
 
 /// An ST drive that turns at a speed; 0: it was never started.
