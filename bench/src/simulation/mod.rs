@@ -81,7 +81,10 @@ fn beside_others() -> Result<(Section, Vec<Goal>)> {
     let mut rows = Vec::new();
     let mut slowest = peers::PACKAGES.map(|package| (package, None::<f64>));
     let started = Peers::start()?;
-    let found = started.as_ref().map_or_else(|| "nothing".to_owned(), Peers::versions);
+    let found = started.as_ref().map_or_else(
+        || "nothing, because the packages are not installed".to_owned(),
+        Peers::versions,
+    );
     if let Some(mut peers) = started {
         for peer in &peers::PEERS {
             let (theirs, ours, ratio) = take_turns(peer, &mut peers)?;
