@@ -149,7 +149,7 @@ fn rmd(name: &'static str, dps: i32) -> Kernel {
     let config = RmdConfig::default();
     let node = RmdNode::new(Instant(0), config, config.factory_rom()).expect("its ID exists");
     let id = node.id();
-    let mut bus = RmdBus::new(Instant(0), [node]).expect("one motor has an ID of its own");
+    let mut bus = RmdBus::new([node]).expect("one motor has an ID of its own");
     let request = CanFrame::new(id.can_id(), Speed { speed: CentiDps(dps * 100) }.encode());
     bus.receive(Instant(0), &request, |_| ());
     bus.advance_to(SETTLED);

@@ -6,14 +6,13 @@ use std::os::fd::BorrowedFd;
 use std::rc::Rc;
 use std::time::Duration;
 
-use motorlink_proto::rmd::{CanFrame, Errors, Mode, MotorId};
-use motorlink_proto::stmcp::{Flags, Motor};
+use motorlink_proto::rmd::{CanFrame, Mode, MotorId};
 use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::{RmdBus, RmdNode};
 use motorlink_sim::st::{StMotor, StStation};
 use serde_json::{Value, json};
 
-use super::{BenchConfig, Command, ConfigError, RomError, RomFolder};
+use super::{BenchConfig, Command, ConfigError, RomError, RomFolder, world};
 use crate::port::{PortError, ServeName};
 use crate::serve::{ByteStation, CanStation, Served, Server, Turn};
 
@@ -170,8 +169,8 @@ impl Bench {
             _ => command.check()?,
         }
         match &self.place(command)?.drives {
-            Drives::St(station) => st(&mut station.borrow_mut(), now, command)?,
-            Drives::Rmd(bus) => rmd(&mut bus.borrow_mut(), now, command)?,
+            Drives::St(station) => world::st(&mut station.borrow_mut(), now, command)?,
+            Drives::Rmd(bus) => world::rmd(&mut bus.borrow_mut(), now, command)?,
         }
         Ok(json!({ "ok": true }))
     }
@@ -272,101 +271,6 @@ fn mode(mode: Mode) -> &'static str {
         Mode::Speed(_) => "speed",
         Mode::Position { .. } => "position",
     }
-}
-
-/// Faults of an RMD motor, with the names that commands have for them.
-pub(super) const RMD_FAULTS: [(Errors, &str); 2] =
-    [(Errors::LOW_VOLTAGE, "LOW_VOLTAGE"), (Errors::OVER_TEMPERATURE, "OVER_TEMPERATURE")];
-
-/// Changes the world around an ST motor.
-pub(super) fn st(station: &mut Station, now: Instant, command: &Command) -> Result<(), String> {
-    station.advance_to(now);
-    match command {
-        Command::PowerCycle { motor: Some(_), .. } => {
-            return Err("an ST drive has one supply: leave the motor out".to_owned());
-        }
-        Command::PowerCycle { motor: None, .. } => station.power_cycle(),
-        Command::Supply { motor: number, volts, .. } => {
-            st_motor(station, *number)?.plant_mut().set_source(*volts);
-        }
-        Command::Temperature { motor: number, celsius, .. } => {
-            st_motor(station, *number)?.plant_mut().force_temperature(*celsius);
-        }
-        Command::Load { motor: number, newton_metres, .. } => {
-            st_motor(station, *number)?.plant_mut().change_load(|load| load.brake = *newton_metres);
-        }
-        Command::LockRotor { motor: number, locked, .. } => {
-            st_motor(station, *number)?.plant_mut().lock(*locked);
-        }
-        Command::Fault { motor: number, fault, hold, .. } => {
-            let known = Flags::NAMES.iter().find(|(_, name, _)| name.eq_ignore_ascii_case(fault));
-            let names =
-                || Flags::NAMES.iter().map(|(_, name, _)| *name).collect::<Vec<_>>().join(", ");
-            let (bit, ..) =
-                known.ok_or_else(|| format!("there is no fault `{fault}`: {}", names()))?;
-            match hold {
-                None => st_motor(station, *number)?.inject(*bit),
-                Some(true) => st_motor(station, *number)?.hold_faults(*bit),
-                Some(false) => st_motor(station, *number)?.hold_faults(0),
-            }
-        }
-        Command::State { .. } | Command::Pause {} | Command::Resume {} => {}
-    }
-    Ok(())
-}
-
-/// Changes the world around RMD motors.
-pub(super) fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), String> {
-    bus.advance_to(now);
-    match command {
-        Command::PowerCycle { motor: Some(number), .. } => rmd_node(bus, *number)?.power_cycle(now),
-        Command::PowerCycle { motor: None, .. } => {
-            let ids: Vec<MotorId> = bus.nodes().iter().map(RmdNode::id).collect();
-            for id in ids {
-                rmd_node(bus, id.number())?.power_cycle(now);
-            }
-        }
-        Command::Supply { motor, volts, .. } => {
-            rmd_node(bus, *motor)?.motor_mut().plant_mut().set_source(*volts);
-        }
-        Command::Temperature { motor, celsius, .. } => {
-            rmd_node(bus, *motor)?.motor_mut().plant_mut().force_temperature(*celsius);
-        }
-        Command::Load { motor, newton_metres, .. } => {
-            let plant = rmd_node(bus, *motor)?.motor_mut().plant_mut();
-            plant.change_load(|load| load.brake = *newton_metres);
-        }
-        Command::LockRotor { motor, locked, .. } => {
-            rmd_node(bus, *motor)?.motor_mut().plant_mut().lock(*locked);
-        }
-        Command::Fault { motor, fault, hold, .. } => {
-            let known = RMD_FAULTS.iter().find(|(_, name)| name.eq_ignore_ascii_case(fault));
-            let names = || RMD_FAULTS.map(|(_, name)| name).join(", ");
-            let (errors, _) =
-                *known.ok_or_else(|| format!("there is no fault `{fault}`: {}", names()))?;
-            let motor = rmd_node(bus, *motor)?.motor_mut();
-            match hold {
-                None => motor.inject(errors),
-                Some(true) => motor.hold_faults(errors),
-                Some(false) => motor.hold_faults(Errors::NONE),
-            }
-        }
-        Command::State { .. } | Command::Pause {} | Command::Resume {} => {}
-    }
-    Ok(())
-}
-
-fn st_motor(station: &mut Station, number: u8) -> Result<&mut StMotor, String> {
-    let count = station.drive().motors().len();
-    Motor::new(number)
-        .and_then(|motor| station.drive_mut().motor_mut(motor))
-        .ok_or_else(|| format!("there is no motor {number}: this drive has {count}"))
-}
-
-fn rmd_node(bus: &mut Bus, number: u8) -> Result<&mut RmdNode, String> {
-    MotorId::new(number)
-        .and_then(|id| bus.node_mut(id))
-        .ok_or_else(|| format!("there is no motor {number} on this bus"))
 }
 
 struct StLine(Rc<RefCell<Station>>);

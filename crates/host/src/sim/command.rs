@@ -40,6 +40,15 @@ pub enum Command {
         /// Nm.
         newton_metres: f32,
     },
+    /// Sets the torque with which something turns the output.
+    Push {
+        /// The served port.
+        port: Option<String>,
+        /// The motor.
+        motor: u8,
+        /// Nm; negative backwards.
+        newton_metres: f32,
+    },
     /// Holds the rotor, or lets it go.
     LockRotor {
         /// The served port.
@@ -79,6 +88,7 @@ impl Command {
             | Command::Supply { port, .. }
             | Command::Temperature { port, .. }
             | Command::Load { port, .. }
+            | Command::Push { port, .. }
             | Command::LockRotor { port, .. }
             | Command::Fault { port, .. }
             | Command::State { port } => port.as_deref(),
@@ -94,6 +104,7 @@ impl Command {
                 ("celsius", celsius, -100.0..=1000.0)
             }
             Command::Load { newton_metres, .. } => ("newton_metres", newton_metres, 0.0..=1000.0),
+            Command::Push { newton_metres, .. } => ("newton_metres", newton_metres, -1e3..=1e3),
             _ => return Ok(()),
         };
         if range.contains(&value) {

@@ -1,13 +1,10 @@
 //! What a bench of simulated drives has, from a TOML file.
 
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use motorlink_proto::rmd::Settings;
 use motorlink_proto::stmcp::Profile;
 use motorlink_proto::time::Instant;
-use motorlink_sim::heat::HeatConfig;
-use motorlink_sim::machine::MachineConfig;
 use motorlink_sim::plant::OutOfRange;
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
@@ -129,9 +126,7 @@ impl BenchConfig {
     /// A motor that cannot be; never with what [`parse`](Self::parse) gave.
     pub fn station(&self, now: Instant) -> Result<StStation<Vec<StMotor>>, ConfigError> {
         for (config, n) in self.st.0.iter().zip(1..) {
-            let place =
-                |error: OutOfRange| ConfigError::Impossible(format!("st.motor {n}: {error}"));
-            config.check().map_err(place)?;
+            config.check().map_err(impossible("st.motor", n))?;
         }
         let motors: Vec<StMotor> = self.st.0.iter().copied().map(StMotor::new).collect();
         let drive = StDrive::new(now, motors).ok_or_else(|| {
@@ -161,9 +156,7 @@ impl BenchConfig {
         rom: impl Fn(&RmdConfig) -> Settings,
     ) -> Result<RmdBus<Vec<RmdNode>>, ConfigError> {
         for (config, n) in self.rmd.0.iter().zip(1..) {
-            let place =
-                |error: OutOfRange| ConfigError::Impossible(format!("rmd.motor {n}: {error}"));
-            config.check().map_err(place)?;
+            config.check().map_err(impossible("rmd.motor", n))?;
         }
         let node =
             |config: &RmdConfig| RmdNode::new(now, *config, rom(config)).expect("it was checked");
@@ -176,37 +169,9 @@ impl BenchConfig {
     }
 }
 
-/// Where a threshold or a limit can be: anywhere, but a NaN would never be passed.
-const THRESHOLD: RangeInclusive<f32> = -1e6..=1e6;
-
-/// Refuses what no machine can be.
-fn check<'n>(
-    place: &str,
-    machine: &MachineConfig,
-    heat: &HeatConfig,
-    values: impl IntoIterator<Item = (&'n str, f32, RangeInclusive<f32>)>,
-) -> Result<(), ConfigError> {
-    let positive = 1e-9..=1e3;
-    let machine = [
-        ("machine.pole_pairs", machine.pole_pairs as f32, 1.0..=100.0),
-        ("machine.torque_constant", machine.torque_constant, positive.clone()),
-        ("machine.resistance", machine.resistance, positive.clone()),
-        ("machine.inductance", machine.inductance, positive.clone()),
-        ("machine.inertia", machine.inertia, positive),
-        ("machine.viscous_friction", machine.viscous_friction, 0.0..=1e3),
-        ("machine.coulomb_friction", machine.coulomb_friction, 0.0..=1e3),
-        ("heat.ambient", heat.ambient, -100.0..=1000.0),
-        ("heat.resistance", heat.resistance, 0.0..=1e3),
-        ("heat.time_constant", heat.time_constant, 1e-3..=1e6),
-    ];
-    match machine.into_iter().chain(values).find(|(_, value, range)| !range.contains(value)) {
-        None => Ok(()),
-        Some((name, value, range)) => Err(ConfigError::Impossible(format!(
-            "{place}: {name} is {} to {}, not {value}",
-            range.start(),
-            range.end()
-        ))),
-    }
+/// Says which motor has a value that cannot be.
+fn impossible(motor: &str, number: usize) -> impl Fn(OutOfRange) -> ConfigError {
+    move |error| ConfigError::Impossible(format!("{motor} {number}: {error}"))
 }
 
 /// The motors of a section, if the file has it; `read` is told each one's place.

@@ -9,6 +9,7 @@ mod config;
 mod link;
 mod rom;
 pub mod scenario;
+mod world;
 
 pub use bench::{Bench, ServeError};
 pub use command::Command;

@@ -8,7 +8,8 @@ use motorlink_sim::rmd::RmdConfig;
 use super::script::Cast;
 use super::signals::{rmd_values, st_values};
 use super::{Action, Target};
-use crate::sim::bench::{self, Bus, Station};
+use crate::sim::bench::{Bus, Station};
+use crate::sim::world;
 use crate::sim::{Command, ConfigError};
 
 /// What answers, and moves.
@@ -68,8 +69,8 @@ impl Drives {
         command: &Command,
     ) -> Result<(), String> {
         match (target, &mut self.st, &mut self.rmd) {
-            (Target::St(_), Some(station), _) => bench::st(station, now, command),
-            (Target::Rmd(_), _, Some(bus)) => bench::rmd(bus, now, command),
+            (Target::St(_), Some(station), _) => world::st(station, now, command),
+            (Target::Rmd(_), _, Some(bus)) => world::rmd(bus, now, command),
             _ => Err(format!("there is no {target}")),
         }
     }

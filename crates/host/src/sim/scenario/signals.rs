@@ -7,7 +7,7 @@ use motorlink_sim::plant::Machine;
 use motorlink_sim::rmd::RmdNode;
 use motorlink_sim::st::StMotor;
 
-use crate::sim::bench::RMD_FAULTS;
+use crate::sim::world::RMD_FAULTS;
 
 /// A signal of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -197,11 +197,20 @@ pub(super) struct Rmd {
 signals!(RMD, Rmd, |rmd| {
     speed_dps = rmd.truth.speed_dps;
     speed_reference_dps = rmd.truth.speed_reference_dps;
-    angle_degrees = rmd.truth.angle_degrees;
-    iq_amps = rmd.truth.iq;
-    supply_volts = rmd.truth.supply_voltage;
+    angle_degrees = rmd.truth.plant.angle_degrees;
+    output_degrees = rmd.truth.plant.output_degrees;
+    iq_amps = rmd.truth.plant.iq;
+    id_amps = rmd.truth.plant.id;
+    phase_a_amps = rmd.truth.plant.phase_currents[0];
+    phase_b_amps = rmd.truth.plant.phase_currents[1];
+    phase_c_amps = rmd.truth.plant.phase_currents[2];
+    vd_volts = rmd.truth.plant.vd;
+    vq_volts = rmd.truth.plant.vq;
+    torque_newton_metres = rmd.truth.plant.torque;
+    load_newton_metres = -rmd.truth.plant.load_torque;
+    supply_volts = rmd.truth.plant.bus_voltage;
     motor_celsius = rmd.truth.temperature;
-    load_newton_metres = rmd.truth.load_torque;
+    winding_celsius = rmd.truth.plant.winding_temperature;
     mode[Names::Mode] = mode_number(rmd.truth.mode);
     errors[Names::Errors] = u8::from(rmd.errors);
 });

@@ -1,0 +1,109 @@
+//! What commands do to the world around simulated drives.
+
+use motorlink_proto::rmd::{Errors, MotorId};
+use motorlink_proto::stmcp::{Flags, Motor};
+use motorlink_proto::time::Instant;
+use motorlink_sim::plant::Plant;
+use motorlink_sim::rmd::RmdNode;
+use motorlink_sim::st::StMotor;
+
+use super::Command;
+use super::bench::{Bus, Station};
+
+/// Faults of an RMD motor, with the names that commands have for them.
+pub(super) const RMD_FAULTS: [(Errors, &str); 2] =
+    [(Errors::LOW_VOLTAGE, "LOW_VOLTAGE"), (Errors::OVER_TEMPERATURE, "OVER_TEMPERATURE")];
+
+/// Changes the world around an ST motor.
+pub(super) fn st(station: &mut Station, now: Instant, command: &Command) -> Result<(), String> {
+    station.advance_to(now);
+    match command {
+        Command::PowerCycle { motor: Some(_), .. } => {
+            return Err("an ST drive has one supply: leave the motor out".to_owned());
+        }
+        Command::PowerCycle { motor: None, .. } => station.power_cycle(),
+        Command::Supply { motor, .. }
+        | Command::Temperature { motor, .. }
+        | Command::Load { motor, .. }
+        | Command::Push { motor, .. }
+        | Command::LockRotor { motor, .. } => {
+            surround(st_motor(station, *motor)?.plant_mut(), command);
+        }
+        Command::Fault { motor: number, fault, hold, .. } => {
+            let known = Flags::NAMES.iter().find(|(_, name, _)| name.eq_ignore_ascii_case(fault));
+            let names =
+                || Flags::NAMES.iter().map(|(_, name, _)| *name).collect::<Vec<_>>().join(", ");
+            let (bit, ..) =
+                known.ok_or_else(|| format!("there is no fault `{fault}`: {}", names()))?;
+            match hold {
+                None => st_motor(station, *number)?.inject(*bit),
+                Some(true) => st_motor(station, *number)?.hold_faults(*bit),
+                Some(false) => st_motor(station, *number)?.hold_faults(0),
+            }
+        }
+        Command::State { .. } | Command::Pause {} | Command::Resume {} => {}
+    }
+    Ok(())
+}
+
+/// Changes the world around RMD motors.
+pub(super) fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), String> {
+    bus.advance_to(now);
+    match command {
+        Command::PowerCycle { motor: Some(number), .. } => rmd_node(bus, *number)?.power_cycle(now),
+        Command::PowerCycle { motor: None, .. } => {
+            let ids: Vec<MotorId> = bus.nodes().iter().map(RmdNode::id).collect();
+            for id in ids {
+                rmd_node(bus, id.number())?.power_cycle(now);
+            }
+        }
+        Command::Supply { motor, .. }
+        | Command::Temperature { motor, .. }
+        | Command::Load { motor, .. }
+        | Command::Push { motor, .. }
+        | Command::LockRotor { motor, .. } => {
+            surround(rmd_node(bus, *motor)?.motor_mut().plant_mut(), command);
+        }
+        Command::Fault { motor, fault, hold, .. } => {
+            let known = RMD_FAULTS.iter().find(|(_, name)| name.eq_ignore_ascii_case(fault));
+            let names = || RMD_FAULTS.map(|(_, name)| name).join(", ");
+            let (errors, _) =
+                *known.ok_or_else(|| format!("there is no fault `{fault}`: {}", names()))?;
+            let motor = rmd_node(bus, *motor)?.motor_mut();
+            match hold {
+                None => motor.inject(errors),
+                Some(true) => motor.hold_faults(errors),
+                Some(false) => motor.hold_faults(Errors::NONE),
+            }
+        }
+        Command::State { .. } | Command::Pause {} | Command::Resume {} => {}
+    }
+    Ok(())
+}
+
+/// Changes what surrounds a motor, whatever drives it.
+fn surround(plant: &mut Plant, command: &Command) {
+    match *command {
+        Command::Supply { volts, .. } => plant.set_source(volts),
+        Command::Temperature { celsius, .. } => plant.force_temperature(celsius),
+        Command::Load { newton_metres, .. } => plant.change_load(|load| load.brake = newton_metres),
+        Command::Push { newton_metres, .. } => {
+            plant.change_load(|load| load.torque = newton_metres);
+        }
+        Command::LockRotor { locked, .. } => plant.lock(locked),
+        _ => {}
+    }
+}
+
+fn st_motor(station: &mut Station, number: u8) -> Result<&mut StMotor, String> {
+    let count = station.drive().motors().len();
+    Motor::new(number)
+        .and_then(|motor| station.drive_mut().motor_mut(motor))
+        .ok_or_else(|| format!("there is no motor {number}: this drive has {count}"))
+}
+
+fn rmd_node(bus: &mut Bus, number: u8) -> Result<&mut RmdNode, String> {
+    MotorId::new(number)
+        .and_then(|id| bus.node_mut(id))
+        .ok_or_else(|| format!("there is no motor {number} on this bus"))
+}
