@@ -98,15 +98,20 @@ pub(super) struct Load {
 /// Torques of a load at the output, Nm, without the brake.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Torques {
-    /// What takes or gives energy for good.
-    pub(super) lost: f32,
+    /// What turns it, and takes or gives energy for good.
+    pub(super) turning: f32,
     /// What springs and weights give back.
     pub(super) kept: f32,
+    /// Torque against the motion per speed, Nm s/rad.
+    pub(super) damping: f32,
+    /// Speed of the output, rad/s.
+    speed: f32,
 }
 
 impl Torques {
+    /// All of them together.
     pub(super) fn total(&self) -> f32 {
-        self.lost + self.kept
+        self.turning + self.kept - self.damping * self.speed
     }
 }
 
@@ -137,20 +142,30 @@ impl Load {
         torque * self.step_down
     }
 
+    /// Torque per speed at the output as it is at the rotor.
+    pub(super) fn damping(&self, torques: &Torques) -> f32 {
+        torques.damping * self.step_down * self.step_down
+    }
+
     /// Torques at a position (2^32 a turn) and speed (rad/s) of the rotor.
     pub(super) fn at(&self, position: i64, speed: f32) -> Torques {
         let LoadConfig { torque, viscous, fan, .. } = self.config;
         let speed = speed * self.step_down;
-        let lost = torque - (viscous + fan * speed.abs()) * speed;
+        let damping = viscous + fan * speed.abs();
+        let plain = Torques { turning: torque, kept: 0.0, damping, speed };
         if !self.positional {
-            return Torques { lost, kept: 0.0 };
+            return plain;
         }
         let angle = self.angle(position);
         let (beyond, damping) = self.beyond(angle);
         let stiffness = self.config.stops.map_or(0.0, |stops| stops.stiffness);
         let spring = self.config.spring.stiffness * self.stretch(angle);
         let weight = self.weight() * libm::sinf(angle);
-        Torques { lost: lost - damping * speed, kept: -spring - weight - stiffness * beyond }
+        Torques {
+            kept: -spring - weight - stiffness * beyond,
+            damping: plain.damping + damping,
+            ..plain
+        }
     }
 
     /// Torques of the brake and of the gear's loss against the motion, at the rotor, when the load

@@ -31,7 +31,7 @@
 //! dry     = Tc + (Ts − Tc) / (1 + (ω/ωs)²) + hysteresis + (brake + (1/η − 1) |T_load|) / N
 //! ```
 //!
-//! Viscous friction is implicit; dry friction takes away speed but never more than there is, so a
+//! Viscous friction is implicit, also the load's; dry friction takes away speed but never more than there is, so a
 //! rotor stays where what pulls it is less (stiction with the Stribeck effect, see B. Armstrong,
 //! *A survey of models, analysis tools and compensation methods for the control of machines with
 //! friction*, Automatica 30, 1994). Torques that depend on the position are taken in the middle of
@@ -498,8 +498,15 @@ impl Machine {
         let MachineConfig { viscous_friction, iron_eddy, iron_hysteresis, .. } = self.config;
         let last = self.speed;
         let load = self.load.at(half.position, half.speed);
-        let pull = self.load.referred(load.total()) + self.cogging(half.position);
-        let free = (last + self.shaft.gain * (self.torque + pull)) * self.shaft.viscous;
+        let turning = self.load.referred(load.turning);
+        let pull = turning + self.load.referred(load.kept) + self.cogging(half.position);
+        let damping = self.load.damping(&load);
+        let slower = if damping == 0.0 {
+            self.shaft.viscous
+        } else {
+            1.0 / (1.0 / self.shaft.viscous + self.shaft.gain * damping)
+        };
+        let free = (last + self.shaft.gain * (self.torque + pull)) * slower;
         let dry = self.dry(half.speed, load.total());
         let left = free.abs() - self.shaft.gain * dry.total;
         let slips = left > 0.0;
@@ -526,7 +533,7 @@ impl Machine {
         flow.friction += viscous_friction * slowed + dry.rotor * dry_way;
         flow.iron += iron_eddy * slowed + iron_hysteresis * dry_way;
         flow.gear += dry.gear * dry_way;
-        flow.load += dry.brake * dry_way - self.load.referred(load.lost) * way;
+        flow.load += dry.brake * dry_way + damping * slowed - turning * way;
     }
 
     /// Torque of the cogging, Nm.

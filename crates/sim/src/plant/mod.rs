@@ -270,8 +270,13 @@ impl Plant {
     }
 }
 
-/// What the firmware sees.
+/// What the firmware does and sees.
 impl Plant {
+    /// Opens all switches now, and not only after the period for which there is a command.
+    pub const fn open_bridge(&mut self) {
+        self.pending = Bridge::Off;
+    }
+
     /// The phase currents as the converter shows them.
     pub fn sample(&self) -> Sample {
         self.sensor.sample(self.machine.current(), self.count)

@@ -115,6 +115,33 @@ impl PlantConfig {
                 ("plant.load.stops.damping", stops.damping, 0.0, 1e3),
             ])?;
         }
-        Ok(())
+        // What swings faster than this is not followed from step to step.
+        let period = f32::from(self.period_us) * 1e-6;
+        let weight = load.pendulum.mass * load.pendulum.length;
+        let behind = load.inertia + weight * load.pendulum.length;
+        let rotor = machine.inertia + behind / (machine.gear.ratio * machine.gear.ratio);
+        let stiffest = 0.25 * rotor / (period * period);
+        let behind_gear = stiffest * machine.gear.ratio * machine.gear.ratio;
+        let inductance = machine.inductance_d.min(machine.inductance_q);
+        let magnet = machine.torque_constant() * machine.back_emf_constant() / inductance;
+        let stiffness_of_stops = load.stops.map_or(0.0, |stops| stops.stiffness);
+        let cogging = machine.cogging_torque * f32::from(machine.cogging_periods);
+        check([
+            ("with this inertia, 1.5 p² ψ² / L of plant.machine", magnet, 0.0, stiffest),
+            ("with this inertia, cogging_torque times periods", cogging, 0.0, stiffest),
+            (
+                "with this inertia, plant.load.spring.stiffness",
+                load.spring.stiffness,
+                0.0,
+                behind_gear,
+            ),
+            (
+                "with this inertia, stiffness of plant.load.stops",
+                stiffness_of_stops,
+                0.0,
+                behind_gear,
+            ),
+            ("with this inertia, weight of plant.load.pendulum", weight * 9.81, 0.0, behind_gear),
+        ])
     }
 }

@@ -337,5 +337,8 @@ impl StMotor {
 
     pub(super) fn enter(&mut self, status: Status) {
         self.firmware.enter(status, self.config.build.position_sensor);
+        if self.firmware.frame == Frame::Off {
+            self.plant.open_bridge();
+        }
     }
 }

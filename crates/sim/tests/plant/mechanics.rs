@@ -5,6 +5,7 @@ use motorlink_sim::plant::{
     Bridge, GearConfig, LoadConfig, MachineConfig, PendulumConfig, Plant, PlantConfig,
     SpringConfig, StopsConfig,
 };
+use motorlink_sim::vector::Vector;
 
 use crate::plain;
 
@@ -166,4 +167,26 @@ fn a_locked_rotor_stays() {
     run(&mut plant, 0.1);
     assert!(plant.machine().speed() > 0.0);
     assert_eq!(angle::TURN, 1 << 32);
+}
+
+#[test]
+fn a_load_that_damps_more_than_a_step_can_does_not_burst() {
+    for load in [
+        LoadConfig { torque: 1.0, viscous: 255.0, ..LoadConfig::default() },
+        LoadConfig { torque: 1.0, fan: 255.0, ..LoadConfig::default() },
+    ] {
+        let mut plant = with_load(load);
+        run(&mut plant, 0.1);
+        let speed = plant.machine().speed();
+        assert!((0.0..0.3).contains(&speed), "{speed} rad/s with {load:?}");
+    }
+}
+
+#[test]
+fn an_open_bridge_is_open_at_once() {
+    let mut plant = Plant::new(plain());
+    plant.step(Bridge::Drive(Vector::new(0.1, 0.0)));
+    plant.open_bridge();
+    plant.step(Bridge::Off);
+    assert_eq!(plant.truth().id, 0.0);
 }
