@@ -137,16 +137,10 @@ impl Supply {
         };
         let gain = dt * self.half_inverse;
         // The mean sag of the step, with the source connected or not.
-        let mean = |conductance: f32| {
-            (self.sag + gain * (taken - fed + brake * source))
-                / (1.0 + gain * (conductance + brake))
-        };
-        let mut conductance = self.conductance;
-        let mut middle = mean(conductance);
-        if middle < 0.0 && !takes_back {
-            conductance = 0.0;
-            middle = mean(conductance);
-        }
+        let pulled = self.sag + gain * (taken - fed + brake * source);
+        let connected = takes_back || pulled >= 0.0;
+        let conductance = if connected { self.conductance } else { 0.0 };
+        let middle = pulled / (1.0 + gain * (conductance + brake));
         let middle = middle.min(source);
         let drawn = middle * conductance;
         self.sag = (2.0 * middle - self.sag).min(source);
