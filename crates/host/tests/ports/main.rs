@@ -172,12 +172,19 @@ fn a_link_is_replaced_and_a_file_is_not() -> Outcome {
 fn a_link_of_a_killed_server_is_replaced_when_its_number_is_anothers() -> Outcome {
     let place = Place::new("reused");
     let pty = || openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY);
-    let former = pty()?;
-    let name = PathBuf::from(ptsname(&former, Vec::new())?.to_str()?);
-    symlink(&name, &place.0)?;
-    drop(former);
-    // The clock of file systems has to have gone on.
-    std::thread::sleep(Duration::from_millis(50));
+    let name = loop {
+        let former = pty()?;
+        let name = PathBuf::from(ptsname(&former, Vec::new())?.to_str()?);
+        symlink(&name, &place.0)?;
+        drop(former);
+        // The clock of file systems has to have gone on.
+        std::thread::sleep(Duration::from_millis(50));
+        if !name.exists() {
+            break name;
+        }
+        // Another program took the number too soon to be told from the former owner.
+        std::fs::remove_file(&place.0)?;
+    };
     let mut others = vec![pty()?];
     while !name.exists() {
         others.push(pty()?);
