@@ -74,7 +74,7 @@ impl Drives {
 fn serve([st, rmd]: &[String; 2], stream: &UnixStream) -> Result<(), Failure> {
     let mut bench = Bench::new();
     let mut out = stream;
-    sim::serve(&mut bench, &BenchConfig::default(), from_ref(st), from_ref(rmd), &mut out)?;
+    sim::serve(&mut bench, &drives(), from_ref(st), from_ref(rmd), &mut out)?;
     // A signal ends the demo first, which still has to stop its motors.
     sim::obey(&mut bench, stream, &mut out, |end| end)
 }
@@ -104,4 +104,11 @@ impl Drop for Drives {
         }
         let _ = std::fs::remove_dir(&self.folder);
     }
+}
+
+/// The default drives, with a paddle in water on each RMD motor: bare they are too quick to watch.
+fn drives() -> BenchConfig {
+    let motor = |id| format!("[[rmd.motor]]\nid = {id}\nplant.load.viscous = 1.5e-3\n");
+    let text: String = (1..=4).map(motor).collect();
+    BenchConfig::parse(&text).expect("the demo's own drives can be")
 }
