@@ -146,7 +146,9 @@ fn st(name: &'static str, mut config: MotorConfig, rpm: i32) -> Kernel {
 
 /// An RMD motor that turns at a speed.
 fn rmd(name: &'static str, dps: i32) -> Kernel {
-    let config = RmdConfig::default();
+    let mut config = RmdConfig::default();
+    // About an ampere at this speed.
+    config.plant.load.viscous = 6e-3;
     let node = RmdNode::new(Instant(0), config, config.factory_rom()).expect("its ID exists");
     let id = node.id();
     let mut bus = RmdBus::new([node]).expect("one motor has an ID of its own");
