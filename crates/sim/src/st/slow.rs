@@ -217,7 +217,8 @@ impl StMotor {
 
     fn rev_up(&mut self) {
         let (speed_rpm, current) = self.forced();
-        self.firmware.forced_step = self.electrical_step(speed_rpm / RPM) + self.approach(current);
+        let turn = self.electrical_step(speed_rpm / RPM);
+        self.firmware.forced_step = turn.wrapping_add(self.approach(current));
         self.firmware.foc.reference = Vector::new(0.0, current);
         self.firmware.control.follow(speed_rpm, current);
         let least = self.firmware.registers.min_app_speed as f32;

@@ -200,6 +200,17 @@ fn a_rev_up_that_is_too_weak_too_fast_or_too_slow_is_a_start_up_fault() {
 }
 
 #[test]
+fn a_rev_up_to_any_speed_ends_in_a_fault() {
+    for speed_rpm in [i32::MAX, 100_000_000, i32::MIN] {
+        let mut line = line(MotorConfig::mains());
+        line.change_revup(|phase| RevupPhase { speed_rpm, ..phase });
+        line.execute(Command::StartMotor);
+        line.wait(2000);
+        assert_eq!(line.status(), Status::FaultOver, "{speed_rpm} rpm");
+    }
+}
+
+#[test]
 fn regeneration_trips_over_voltage_without_the_brake_and_not_with_it() {
     let stopping = |chopper| {
         let mut config = MotorConfig::shinano();
