@@ -22,7 +22,7 @@ impl Gains {
 
     /// Ki over Kp, at most 1: the share of what was cut off that an integral gives back in a step.
     fn tracking(&self) -> f32 {
-        if self.kp > self.ki { self.ki / self.kp } else { 1.0 }
+        if self.kp.abs() > self.ki.abs() { (self.ki / self.kp).abs() } else { 1.0 }
     }
 }
 
@@ -131,6 +131,16 @@ mod tests {
         let mut regulator = Regulator::starting_at(8.0);
         regulator.give_back(-4.0, &gains);
         assert_eq!(regulator.integral(), 7.0);
+    }
+
+    #[test]
+    fn what_is_given_back_is_a_number_whatever_the_gains() {
+        for (kp, ki) in [(0.0, 0.0), (0.0, -1.0), (-1.0, 0.5), (1.0, -1e6), (-1e-6, -1.0)] {
+            let gains = Gains { kp, ki, kd: 0.0 };
+            let mut regulator = Regulator::starting_at(8.0);
+            regulator.give_back(-4.0, &gains);
+            assert!((4.0..=8.0).contains(&regulator.integral()), "{gains:?}: {regulator:?}");
+        }
     }
 
     #[test]
