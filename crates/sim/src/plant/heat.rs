@@ -62,33 +62,38 @@ impl Default for HeatConfig {
 #[derive(Debug, Clone)]
 pub(super) struct Heat {
     config: HeatConfig,
-    /// °C.
-    winding: f32,
-    housing: f32,
+    /// °C, in more digits than the rest: what a large body warms up by in a step is little beside it.
+    winding: f64,
+    housing: f64,
     /// What the sensor shows in place of the truth, °C.
     forced: Option<f32>,
 }
 
 impl Heat {
     pub(super) const fn new(config: HeatConfig) -> Self {
-        Heat { winding: config.ambient, housing: config.ambient, forced: None, config }
+        Heat {
+            winding: config.ambient as f64,
+            housing: config.ambient as f64,
+            forced: None,
+            config,
+        }
     }
 
     /// Temperature of the winding, °C.
     pub(super) const fn winding(&self) -> f32 {
-        self.winding
+        self.winding as f32
     }
 
     /// Temperature of the housing, °C.
     pub(super) const fn housing(&self) -> f32 {
-        self.housing
+        self.housing as f32
     }
 
     /// What the sensor shows, °C.
     pub(super) fn sensed(&self) -> f32 {
         self.forced.unwrap_or(match self.config.sensor {
-            HeatSensor::Winding => self.winding,
-            HeatSensor::Housing => self.housing,
+            HeatSensor::Winding => self.winding(),
+            HeatSensor::Housing => self.housing(),
         })
     }
 
@@ -99,9 +104,32 @@ impl Heat {
     /// Lets heat in the winding and in the housing (J) act over `dt` (s).
     pub(super) fn step(&mut self, dt: f32, winding: f32, housing: f32) {
         let HeatConfig { ambient, winding_to_housing, housing_to_air, .. } = self.config;
-        let inner = (self.winding - self.housing) / winding_to_housing * dt;
-        let outer = (self.housing - ambient) / housing_to_air * dt;
-        self.winding += (winding - inner) / self.config.winding_capacity;
-        self.housing += (housing + inner - outer) / self.config.housing_capacity;
+        let inner = (self.winding() - self.housing()) / winding_to_housing * dt;
+        let outer = (self.housing() - ambient) / housing_to_air * dt;
+        self.winding += f64::from((winding - inner) / self.config.winding_capacity);
+        self.housing += f64::from((housing + inner - outer) / self.config.housing_capacity);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_large_body_warms_up_too_and_comes_to_where_it_gives_away_what_it_gets() {
+        let config = HeatConfig {
+            ambient: 40.0,
+            winding_capacity: 100.0,
+            housing_capacity: 2000.0,
+            winding_to_housing: 0.5,
+            housing_to_air: 0.5,
+            sensor: HeatSensor::Housing,
+        };
+        let mut heat = Heat::new(config);
+        for _ in 0..10_000_000 {
+            heat.step(1e-3, 0.0, 3e-3);
+        }
+        // 3 W through 0.5 K/W, after ten time constants.
+        assert!((heat.housing() - 41.5).abs() < 0.01, "{} °C", heat.housing());
     }
 }
