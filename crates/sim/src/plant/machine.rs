@@ -40,6 +40,7 @@
 
 use super::load::{Load, LoadConfig};
 use crate::angle::{self, TURN, sin_cos};
+use crate::control::within;
 use crate::vector::Vector;
 
 /// What a machine is. A machine's values belong together: start from a
@@ -118,8 +119,14 @@ impl MachineConfig {
 /// Growth of copper's resistance from 25 °C, 1/K: it would be nothing at -234.5 °C.
 const COPPER: f32 = 1.0 / 259.5;
 
+/// Greatest growth of the resistance: copper boils at 2560 °C.
+const VAPOUR: f32 = 10.0;
+
 /// Steps after which rounding has done nothing to the rotor's frame yet.
 const EXACT: u8 = 32;
+
+/// Up to which what a step missed of the electrical angle does not stretch the frame, rad.
+const NEAR: f32 = 0.01;
 
 /// What the windings are fed with for a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -362,7 +369,7 @@ impl Machine {
     pub fn set_temperature(&mut self, celsius: f32) {
         /// Change of the resistance that is not worth a new exponential.
         const SAME: f32 = 1e-5;
-        let growth = (1.0 + COPPER * (celsius - 25.0)).max(0.1);
+        let growth = within(1.0 + COPPER * (celsius - 25.0), 0.1, VAPOUR);
         let resistance = self.config.resistance * growth;
         if (resistance - self.resistance).abs() > SAME * resistance {
             self.resistance = resistance;
@@ -516,10 +523,10 @@ impl Machine {
         let way = mean * self.period;
         self.position = self.position.wrapping_add(digits(way));
         self.count = (self.count + 1) % EXACT;
-        self.frame = if self.count == 0 {
+        let missed = (way - 2.0 * half.way) * self.poles;
+        self.frame = if self.count == 0 || missed.abs() > NEAR {
             Vector::unit(self.electrical_angle())
         } else {
-            let missed = (way - 2.0 * half.way) * self.poles;
             end + Vector::new(-end.y, end.x) * missed
         };
 

@@ -124,9 +124,12 @@ impl PlantConfig {
         let behind_gear = stiffest * machine.gear.ratio * machine.gear.ratio;
         let inductance = machine.inductance_d.min(machine.inductance_q);
         let magnet = machine.torque_constant() * machine.back_emf_constant() / inductance;
+        let apart = 0.5 * (machine.resistance + inverter.on_resistance) * period;
+        let apart = apart * (1.0 / machine.inductance_d - 1.0 / machine.inductance_q).abs();
         let stiffness_of_stops = load.stops.map_or(0.0, |stops| stops.stiffness);
         let cogging = machine.cogging_torque * f32::from(machine.cogging_periods);
         check([
+            ("in plant.period_us, what R/2L of plant.machine's axes differ by", apart, 0.0, 0.5),
             ("with this inertia, 1.5 p² ψ² / L of plant.machine", magnet, 0.0, stiffest),
             ("with this inertia, cogging_torque times periods", cogging, 0.0, stiffest),
             (

@@ -58,6 +58,8 @@ fn a_hot_winding_has_more_resistance() {
     let mut machine = machine();
     machine.set_temperature(125.0);
     assert!((machine.resistance() / 0.5 - 1.385).abs() < 0.001);
+    machine.set_temperature(1e30);
+    assert_eq!(machine.resistance(), 5.0, "copper that boils");
 }
 
 /// Current, speed and angle of an accelerating motor at 20 ms, in steps of `dt`.

@@ -5,6 +5,7 @@ use motorlink_sim::plant::{
     Bridge, GearConfig, LoadConfig, MachineConfig, PendulumConfig, Plant, PlantConfig,
     SpringConfig, StopsConfig,
 };
+use motorlink_sim::preset;
 use motorlink_sim::vector::Vector;
 
 use crate::plain;
@@ -179,6 +180,20 @@ fn a_load_that_damps_more_than_a_step_can_does_not_burst() {
         run(&mut plant, 0.1);
         let speed = plant.machine().speed();
         assert!((0.0..0.3).contains(&speed), "{speed} rad/s with {load:?}");
+    }
+}
+
+#[test]
+fn a_push_that_no_bearing_stands_ends_in_numbers() {
+    let machine = preset::drone().machine;
+    for fan in [0.0, 592.0] {
+        let load = LoadConfig { torque: 1000.0, fan, ..LoadConfig::default() };
+        let mut plant = Plant::new(PlantConfig { load, machine, ..plain() });
+        for step in 0..20_000u32 {
+            plant.step(Bridge::Drive(Vector::unit(step.wrapping_mul(40_000_000)) * 0.3));
+            let truth = plant.truth();
+            assert!(truth.iq.abs() < 1e6 && truth.vq.abs() < 1e6, "step {step}: {truth:?}");
+        }
     }
 }
 
