@@ -499,6 +499,8 @@ impl Machine {
     #[inline]
     fn advance(&mut self, half: Half, end: Vector, flow: &mut Flow) {
         if self.locked {
+            // What holds the rotor takes its energy.
+            flow.load += 0.5 * self.shaft.inertia * self.speed * self.speed;
             (self.speed, self.change) = (0.0, 0.0);
             return;
         }

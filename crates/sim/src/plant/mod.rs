@@ -325,11 +325,13 @@ impl Plant {
         self.supply.config()
     }
 
-    /// Changes what hangs on the output.
+    /// Changes what hangs on the output. It comes with the energy that it holds there.
     pub fn change_load(&mut self, change: impl FnOnce(&mut LoadConfig)) {
+        let before = self.stored();
         let mut load = *self.machine.load();
         change(&mut load);
         self.machine.set_load(load);
+        self.initial += self.stored() - before;
     }
 
     /// Holds the rotor where it is, or lets it go.

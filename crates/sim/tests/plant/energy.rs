@@ -89,6 +89,27 @@ fn the_balance_holds_for_springs_weights_and_stops() {
 }
 
 #[test]
+fn the_balance_holds_when_the_world_changes() {
+    let mut plant = Plant::new(everything());
+    drive(&mut plant, 0.2);
+    for _ in 0..8000 {
+        let magnet = Vector::unit(plant.machine().electrical_angle());
+        plant.step(Bridge::Drive(Vector::new(0.0, 0.4).turned(magnet)));
+    }
+    let stored = plant.energy().stored;
+    plant.lock(true);
+    plant.step(Bridge::Off);
+    assert_eq!(plant.machine().speed(), 0.0);
+    assert!(stored - plant.energy().stored > 0.1, "{:?}", plant.energy());
+    assert_balanced(&plant);
+    plant.lock(false);
+    plant.change_load(|load| load.spring = SpringConfig { stiffness: 0.3, centre_degrees: 720.0 });
+    assert_balanced(&plant);
+    drive(&mut plant, 0.1);
+    assert_balanced(&plant);
+}
+
+#[test]
 fn a_swing_without_friction_keeps_its_energy() {
     let spring = SpringConfig { stiffness: 0.5, centre_degrees: 90.0 };
     let load = LoadConfig { spring, ..LoadConfig::default() };
