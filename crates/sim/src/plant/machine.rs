@@ -183,8 +183,9 @@ pub struct Machine {
     count: u8,
     /// rad/s.
     speed: f32,
-    /// What the last step added to the speed, rad/s.
+    /// What the last step added to the speed, rad/s, and what rounding left out of it.
     change: f32,
+    rest: f32,
     /// 2^32 a turn.
     position: i64,
     /// Electromagnetic torque, mean of the last step, Nm.
@@ -234,7 +235,7 @@ struct Shaft {
     inertia: f32,
     /// Speed per torque of a step, rad/s/Nm.
     gain: f32,
-    /// What viscous friction leaves of a speed.
+    /// What viscous friction takes of a speed, per what it leaves.
     viscous: f32,
 }
 
@@ -242,7 +243,7 @@ impl Shaft {
     fn new(config: &MachineConfig, load: &Load, period: f32) -> Self {
         let inertia = config.inertia + load.inertia();
         let gain = period / inertia;
-        let viscous = 1.0 / (1.0 + gain * (config.viscous_friction + config.iron_eddy));
+        let viscous = gain * (config.viscous_friction + config.iron_eddy);
         Shaft { inertia, gain, viscous }
     }
 }
@@ -269,6 +270,7 @@ impl Machine {
             count: 0,
             speed: 0.0,
             change: 0.0,
+            rest: 0.0,
             position: 0,
             torque: 0.0,
             config,
@@ -277,7 +279,8 @@ impl Machine {
 
     /// Puts the rotor at a position (2^32 a turn) with a speed (rad/s).
     pub fn place(&mut self, position: i64, speed: f32) {
-        (self.position, self.speed, self.change) = (position, speed, 0.0);
+        (self.position, self.speed) = (position, speed);
+        (self.change, self.rest) = (0.0, 0.0);
         self.frame = Vector::unit(self.electrical_angle());
     }
 
@@ -501,7 +504,7 @@ impl Machine {
         if self.locked {
             // What holds the rotor takes its energy.
             flow.load += 0.5 * self.shaft.inertia * self.speed * self.speed;
-            (self.speed, self.change) = (0.0, 0.0);
+            (self.speed, self.change, self.rest) = (0.0, 0.0, 0.0);
             return;
         }
         let MachineConfig { viscous_friction, iron_eddy, iron_hysteresis, .. } = self.config;
@@ -510,17 +513,18 @@ impl Machine {
         let turning = self.load.referred(load.turning);
         let pull = turning + self.load.referred(load.kept) + self.cogging(half.position);
         let damping = self.load.damping(&load);
-        let slower = if damping == 0.0 {
-            self.shaft.viscous
-        } else {
-            1.0 / (1.0 / self.shaft.viscous + self.shaft.gain * damping)
-        };
-        let free = (last + self.shaft.gain * (self.torque + pull)) * slower;
+        let slower = self.shaft.viscous + self.shaft.gain * damping;
+        let gained = self.shaft.gain * (self.torque + pull);
+        // A flywheel's speed changes by less than its last digits: what they leave out is kept.
+        let pushed = (gained - slower * last) / (1.0 + slower) + self.rest;
+        let free = last + pushed;
         let dry = self.dry(half.speed, load.total());
-        let left = free.abs() - self.shaft.gain * dry.total;
-        let slips = left > 0.0;
-        self.speed = if slips { left.copysign(free) } else { 0.0 };
+        let held = self.shaft.gain * dry.total;
+        let slips = free.abs() > held;
+        let change = if slips { pushed - held.copysign(free) } else { -last };
+        self.speed = if slips { last + change } else { 0.0 };
         self.change = self.speed - last;
+        self.rest = change - self.change;
         let mean = 0.5 * (last + self.speed);
         let way = mean * self.period;
         self.position = self.position.wrapping_add(digits(way));

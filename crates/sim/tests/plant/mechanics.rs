@@ -2,8 +2,8 @@
 
 use motorlink_sim::angle;
 use motorlink_sim::plant::{
-    Bridge, GearConfig, LoadConfig, MachineConfig, PendulumConfig, Plant, PlantConfig,
-    SpringConfig, StopsConfig,
+    Bridge, Feed, Flow, GearConfig, LoadConfig, Machine, MachineConfig, PendulumConfig, Plant,
+    PlantConfig, SpringConfig, StopsConfig,
 };
 use motorlink_sim::preset;
 use motorlink_sim::vector::Vector;
@@ -31,6 +31,23 @@ fn a_torque_accelerates_the_inertia_of_rotor_and_load() {
     // 0.02 Nm on 2e-4 kg m² for 50 ms.
     assert!((plant.machine().speed() - 5.0).abs() < 0.01, "{} rad/s", plant.machine().speed());
     assert!((output_radians(&plant) - 0.125).abs() < 1e-3);
+}
+
+#[test]
+fn a_flywheel_gains_speed_however_slowly() {
+    for inertia in [0.01, 0.1, 1.0, 10.0] {
+        let machine = MachineConfig { inertia, ..plain().machine };
+        let load = LoadConfig { torque: 1.0, ..LoadConfig::default() };
+        let mut flywheel = Machine::new(machine, load, 50e-6);
+        flywheel.place(0, 300.0);
+        for _ in 0..20_000 {
+            // The voltage that lets no current flow.
+            let emf = flywheel.speed() * machine.back_emf_constant();
+            flywheel.step(Feed::Rotor(Vector::new(0.0, emf)), &mut Flow::default());
+        }
+        let gained = flywheel.speed() - 300.0;
+        assert!((gained * inertia - 1.0).abs() < 1e-3, "{gained} rad/s with {inertia} kg m²");
+    }
 }
 
 #[test]
