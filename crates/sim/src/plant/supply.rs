@@ -140,7 +140,10 @@ impl Supply {
         let pulled = self.sag + gain * (taken - fed + brake * source);
         let connected = takes_back || pulled >= 0.0;
         let conductance = if connected { self.conductance } else { 0.0 };
-        let middle = pulled / (1.0 + gain * (conductance + brake));
+        let share = 1.0 / (1.0 + gain * (conductance + brake));
+        // The bridge takes power: what it took at the begin of the step is less where the bus rose.
+        let ratio = (self.voltage() / (source - pulled * share).max(1e-3)).clamp(0.5, 2.0);
+        let middle = (pulled + gain * taken * (ratio - 1.0)) * share;
         let middle = middle.min(source);
         let drawn = middle * conductance;
         self.sag = (2.0 * middle - self.sag).min(source);

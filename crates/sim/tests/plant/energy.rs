@@ -110,6 +110,19 @@ fn the_balance_holds_when_the_world_changes() {
 }
 
 #[test]
+fn a_bus_that_jumps_with_every_period_keeps_the_balance() {
+    let supply = SupplyConfig { resistance: 0.5, capacitance: 100e-6, ..SupplyConfig::default() };
+    let mut plant = Plant::new(PlantConfig { supply, ..plain() });
+    plant.lock(true);
+    for step in 0..40_000u32 {
+        let share = if step % 8 < 4 { 0.5 } else { -0.4 };
+        plant.step(Bridge::Drive(Vector::new(share, 0.0)));
+    }
+    assert!(plant.energy().copper > 1.0, "{:?}", plant.energy());
+    assert_balanced(&plant);
+}
+
+#[test]
 fn a_swing_without_friction_keeps_its_energy() {
     let spring = SpringConfig { stiffness: 0.5, centre_degrees: 90.0 };
     let load = LoadConfig { spring, ..LoadConfig::default() };
