@@ -29,7 +29,7 @@ use sensing::Sensor;
 use supply::Supply;
 
 use crate::angle;
-use crate::vector::Vector;
+use crate::vector::{INVERSE_SQRT_3, Vector};
 
 /// What a plant is built from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,16 +96,18 @@ pub struct PlantTruth {
     pub locked: bool,
 }
 
-/// What the diodes do while all switches are open: they put the bus, of which the six-step
-/// fundamental is 2/π, against the current that there will be at the end of the step. Gives the
-/// voltage, if current flows, and whether it ends in this step.
+/// What the diodes do while all switches are open: current begins to flow where the back-EMF between
+/// two terminals is above the bus; then they put the bus, of which the six-step fundamental is 2/π,
+/// against the current that there will be at the end of the step. Gives the voltage, if current
+/// flows, and whether it ends in this step.
 fn through_diodes(machine: &Machine, period: f32, bus: f32) -> (Option<Feed>, bool) {
     const SIX_STEP: f32 = core::f32::consts::FRAC_2_PI;
     let MachineConfig { inductance_d, inductance_q, .. } = *machine.config();
-    let most = SIX_STEP * bus;
     let current = machine.rotor_current();
     let back_emf = machine.speed() * machine.config().back_emf_constant();
-    if current == Vector::ZERO && back_emf.abs() <= most {
+    let flows = current != Vector::ZERO;
+    let most = if flows { SIX_STEP } else { INVERSE_SQRT_3 } * bus;
+    if !flows && back_emf.abs() <= most {
         return (None, false);
     }
     let change = Vector::new(inductance_d * current.x, inductance_q * current.y);
