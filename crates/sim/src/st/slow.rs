@@ -104,7 +104,7 @@ impl StMotor {
     fn feedback_lost(&mut self) -> bool {
         let running = self.running();
         let speed = self.speed_rpm().abs();
-        let most = self.firmware.registers.max_app_speed as f32;
+        let most = self.firmware.registers.max_app_speed.saturating_abs() as f32;
         let lost = if self.config.build.position_sensor {
             let stuck = running && self.stuck(speed);
             self.firmware.stalled = if stuck { self.firmware.stalled + 1 } else { 0 };
@@ -248,7 +248,8 @@ impl StMotor {
         let machine = &self.config.plant.machine;
         let pairs = f32::from(machine.pole_pairs);
         let pull = machine.torque_constant() * self.config.alignment_current.max(1e-3);
-        let inertia = machine.inertia + self.config.plant.load.inertia;
+        let ratio = machine.gear.ratio;
+        let inertia = machine.inertia + self.config.plant.load.inertia / (ratio * ratio);
         let swing = libm::sqrtf(pairs * pull / inertia);
         let yielding = 2.0 * ALIGNMENT_DAMPING * pairs / swing * self.firmware.speed;
         let turns = -0.25 * (1.0 - 2.0 * done).max(0.0) - within(yielding / TAU, -0.2, 0.2);

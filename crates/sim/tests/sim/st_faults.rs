@@ -1,7 +1,9 @@
 //! Faults: what causes them, how they latch, how they go.
 
-use motorlink_proto::stmcp::{Command, CurrentReference, Flags, Request, Status, register::*};
-use motorlink_sim::st::{PfcState, pfc_fault};
+use motorlink_proto::stmcp::{
+    Command, CurrentReference, Flags, Profile, Request, Status, register::*,
+};
+use motorlink_sim::st::{MotorConfig, PfcState, pfc_fault};
 
 use crate::st_bench::Line;
 
@@ -197,4 +199,14 @@ fn a_pfc_that_is_told_too_much_trips_the_motor() {
     line.execute(Command::PfcEnable);
     line.until(Status::FaultNow, 1000);
     assert_eq!(line.flags().present(), Flags::OVER_VOLT);
+}
+
+#[test]
+fn a_highest_speed_has_no_direction() {
+    let mut config = MotorConfig::shinano();
+    config.registers.max_app_speed = -4000;
+    let mut line = Line::new(Profile::Spec, [config]);
+    line.run();
+    line.wait(2000);
+    assert_eq!((line.status(), line.get(SPEED_REF)), (Status::Run, 1500));
 }

@@ -164,3 +164,16 @@ fn motors_of_a_drive_run_apart() {
     assert_eq!(line.get_id(1, register::STATUS.id()), Ok(u8::from(Idle).into()));
     assert_eq!(line.get_id(2, register::STATUS.id()), Ok(u8::from(Run).into()));
 }
+
+#[test]
+fn a_rotor_with_a_load_behind_a_gear_comes_to_rest_in_the_alignment() {
+    let mut config = MotorConfig::servo();
+    config.plant.machine.gear.ratio = 30.0;
+    config.plant.load.inertia = 0.02;
+    let mut line = Line::new(Profile::Spec, [config]);
+    line.execute(Command::EncoderAlign);
+    line.until(Status::Alignment, 100);
+    line.wait(600);
+    let rpm = line.truth().speed_rpm;
+    assert!(rpm.abs() < 1.0, "{rpm} rpm: it swings");
+}
