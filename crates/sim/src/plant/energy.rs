@@ -34,7 +34,8 @@ impl Energy {
 
     /// What the account does not explain, as a share of all that was turned over.
     pub fn imbalance(&self) -> f64 {
-        let turned_over = self.source.abs() + self.spent().abs() + self.stored.abs();
+        let heat = self.spent() - self.load;
+        let turned_over = self.source.abs() + heat + self.load.abs() + self.stored.abs();
         if turned_over == 0.0 {
             return 0.0;
         }

@@ -53,6 +53,10 @@ pub mod fault {
     pub const MAINS_LOW: u16 = 0x01;
     /// The mains' peak is above the bus voltage to keep.
     pub const MAINS_HIGH: u16 = 0x02;
+    /// The stage's current is half as much again as its greatest.
+    pub const OVER_CURRENT: u16 = 0x04;
+    /// The bus is 15 % above what it is to be.
+    pub const BUS_HIGH: u16 = 0x08;
 }
 
 /// Gains of both loops, as they act in a step, in digits.
@@ -147,6 +151,12 @@ impl Pfc {
         }
         if mains > registers.pfc_dcbus_ref as f32 {
             self.present |= fault::MAINS_HIGH;
+        }
+        if self.current * self.scale.ampere > 1.5 * self.most {
+            self.present |= fault::OVER_CURRENT;
+        }
+        if bus > 1.15 * registers.pfc_dcbus_ref as f32 {
+            self.present |= fault::BUS_HIGH;
         }
         let startup = u32::try_from(registers.pfc_startup_duration).unwrap_or(0);
         match self.state {

@@ -193,6 +193,20 @@ fn the_pfc_faults_when_the_mains_fail_and_takes_an_acknowledge() {
 }
 
 #[test]
+fn a_pfc_whose_gains_run_away_switches_itself_off() {
+    let mut line = Line::sensorless();
+    line.execute(Command::PfcEnable);
+    line.wait(500);
+    assert_eq!(line.get(PFC_STATUS), PfcState::Run as i8);
+    line.set(PFC_I_KD, -30_000);
+    line.wait(1000);
+    assert_eq!(line.get(PFC_ENABLED), 0);
+    let faults = Flags(line.get(PFC_FAULTS)).occurred();
+    assert_ne!(faults & (pfc_fault::OVER_CURRENT | pfc_fault::BUS_HIGH), 0, "{faults:#x}");
+    assert!(line.truth().plant.bus_voltage < 500.0, "{} V", line.truth().plant.bus_voltage);
+}
+
+#[test]
 fn a_pfc_that_is_told_too_much_trips_the_motor() {
     let mut line = running();
     line.set(PFC_DCBUS_REF, 440);

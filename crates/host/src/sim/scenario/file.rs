@@ -178,7 +178,10 @@ fn times(duration: f64, sample_us: u64) -> Result<(Duration, Duration), String> 
         return Err(format!("duration is 0 to {LONGEST} s, not {duration}"));
     }
     let micros = (duration * 1e6).round() as u64;
-    if micros == 0 || !micros.is_multiple_of(sample_us) {
+    if micros == 0 {
+        return Err(format!("duration is {duration} s: nothing can happen in no time"));
+    }
+    if !micros.is_multiple_of(sample_us) {
         return Err(format!(
             "duration {duration} s is no whole number of samples of {sample_us} µs"
         ));

@@ -1,0 +1,300 @@
+//! The machine: a permanent-magnet synchronous motor on a shaft.
+//!
+//! # Equations
+//!
+//! Windings, in the stator's frame with the flux linkage ψ as state (Park's equations, see P. Krause
+//! and others, *Analysis of Electric Machinery and Drive Systems*, chapter on synchronous machines):
+//!
+//! ```text
+//! dψ/dt = v − R i            ψd = Ld id + ψm,   ψq = Lq iq
+//! T     = 1.5 p ψ × i        = 1.5 p (ψm iq + (Ld − Lq) id iq)
+//! ```
+//!
+//! In the rotor's frame Ld id and Lq iq turn back with the electrical speed ω and die away with R/L.
+//! What the axes have in common of that, a = R (1/Ld + 1/Lq) / 2, and voltage and back-EMF are solved
+//! exactly for half a step of constant speed, as complex numbers:
+//!
+//! ```text
+//! f(h/2) = E f + (1 − E) / (a + jω) (v − jω ψm),   E = exp(−(a + jω) h/2)
+//! ```
+//!
+//! A voltage that stands still in the stator's frame adds (1 − exp(−a h/2)) / a of itself, as the
+//! rotor sees it at the end. What the axes differ in, ±R (1/Ld − 1/Lq) / 2, acts in between for h/6,
+//! 4h/6 and h/6 (split symmetrically, Strang, *On the construction and comparison of difference
+//! schemes*, SIAM J. Numer. Anal. 5, 1968) and is nothing in a motor without saliency. The torque is
+//! Simpson's mean of begin, middle and end.
+//!
+//! Shaft, at the rotor, with gear ratio N and n periods of cogging a turn:
+//!
+//! ```text
+//! J dω/dt = T − Tcog sin(n θ) + T_load/N − (B + Beddy) ω − dry(ω) sign ω
+//! dry     = Tc + (Ts − Tc) / (1 + (ω/ωs)²) + hysteresis + (brake + (1/η − 1) |T_load|) / N
+//! ```
+//!
+//! Viscous friction is implicit, also the load's; dry friction takes away speed but never more than there is, so a
+//! rotor stays where what pulls it is less (stiction with the Stribeck effect, see B. Armstrong,
+//! *A survey of models, analysis tools and compensation methods for the control of machines with
+//! friction*, Automatica 30, 1994). Torques that depend on the position are taken in the middle of
+//! the step. Iron losses are torques against the motion: hysteresis does not depend on speed, eddy
+//! currents are in proportion to it.
+
+mod config;
+mod step;
+
+pub use config::{GearConfig, MachineConfig};
+
+use super::load::{Load, LoadConfig};
+use crate::angle::sin_cos;
+use crate::control::within;
+use crate::vector::Vector;
+use step::Decay;
+
+/// Growth of copper's resistance from 25 °C, 1/K: it would be nothing at -234.5 °C.
+const COPPER: f32 = 1.0 / 259.5;
+
+/// Greatest growth of the resistance: copper boils at 2560 °C.
+const VAPOUR: f32 = 10.0;
+
+/// What the windings are fed with for a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Feed {
+    /// A voltage that stands still in the stator's frame, V.
+    Stator(Vector),
+    /// A voltage that turns with the rotor, V: d and q.
+    Rotor(Vector),
+}
+
+/// Where the energy of a step went, J.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Flow {
+    /// Into the terminals.
+    pub electrical: f32,
+    /// Heat of the windings and of what is in series with them.
+    pub copper: f32,
+    /// Viscous and dry friction of the rotor.
+    pub friction: f32,
+    /// Iron losses.
+    pub iron: f32,
+    /// Loss of the gear.
+    pub gear: f32,
+    /// Into what the output drives, without what its springs and weights keep.
+    pub load: f32,
+}
+
+/// A motor with what hangs on its shaft, integrated in steps of one length.
+#[derive(Debug, Clone)]
+pub struct Machine {
+    config: MachineConfig,
+    load: Load,
+    locked: bool,
+    /// Length of a step, s.
+    period: f32,
+    /// Phase resistance now, Ω, and what is in series with it.
+    resistance: f32,
+    series: f32,
+    decay: Decay,
+    shaft: Shaft,
+    /// Pairs of poles.
+    poles: f32,
+    /// One over the speed of the Stribeck effect, s/rad.
+    inverse_stribeck: f32,
+    /// One over the inductances, 1/H.
+    inverse: Vector,
+    /// Ld id and Lq iq, Wb.
+    flux: Vector,
+    /// Current in the stator's frame, A.
+    current: Vector,
+    /// Where the rotor is: its electrical angle as a unit vector, turned along step by step and
+    /// taken from the position every [`EXACT`] steps.
+    frame: Vector,
+    count: u8,
+    /// rad/s.
+    speed: f32,
+    /// What the last step added to the speed, rad/s, and what rounding left out of it.
+    change: f32,
+    rest: f32,
+    /// 2^32 a turn.
+    position: i64,
+    /// Electromagnetic torque, mean of the last step, Nm.
+    torque: f32,
+}
+
+/// What a step needs of all that turns.
+#[derive(Debug, Clone)]
+struct Shaft {
+    /// Inertia at the rotor, kg m².
+    inertia: f32,
+    /// Speed per torque of a step, rad/s/Nm.
+    gain: f32,
+    /// What viscous friction takes of a speed, per what it leaves.
+    viscous: f32,
+}
+
+impl Shaft {
+    fn new(config: &MachineConfig, load: &Load, period: f32) -> Self {
+        let inertia = config.inertia + load.inertia();
+        let gain = period / inertia;
+        let viscous = gain * (config.viscous_friction + config.iron_eddy);
+        Shaft { inertia, gain, viscous }
+    }
+}
+
+impl Machine {
+    /// A machine at rest and without current, with its rotor at 0, for steps of `period` (s).
+    pub fn new(config: MachineConfig, load: LoadConfig, period: f32) -> Self {
+        let load = Load::new(load, config.gear);
+        let inverse = Vector::new(1.0 / config.inductance_d, 1.0 / config.inductance_q);
+        Machine {
+            shaft: Shaft::new(&config, &load, period),
+            decay: Decay::new(period, config.resistance, inverse),
+            load,
+            locked: false,
+            poles: f32::from(config.pole_pairs),
+            period,
+            resistance: config.resistance,
+            series: 0.0,
+            inverse_stribeck: 1.0 / config.stribeck_speed,
+            inverse,
+            flux: Vector::ZERO,
+            current: Vector::ZERO,
+            frame: Vector::unit(0),
+            count: 0,
+            speed: 0.0,
+            change: 0.0,
+            rest: 0.0,
+            position: 0,
+            torque: 0.0,
+            config,
+        }
+    }
+
+    /// Puts the rotor at a position (2^32 a turn) with a speed (rad/s).
+    pub fn place(&mut self, position: i64, speed: f32) {
+        (self.position, self.speed) = (position, speed);
+        (self.change, self.rest) = (0.0, 0.0);
+        self.frame = Vector::unit(self.electrical_angle());
+    }
+
+    /// Puts a resistance (Ω) in series with each phase.
+    pub fn set_series(&mut self, resistance: f32) {
+        self.series = resistance;
+        self.decay = Decay::new(self.period, self.resistance + self.series, self.inverse);
+    }
+
+    /// What the machine is.
+    pub const fn config(&self) -> &MachineConfig {
+        &self.config
+    }
+
+    /// What hangs on the output.
+    pub const fn load(&self) -> &LoadConfig {
+        self.load.config()
+    }
+
+    /// Hangs something else on the output.
+    pub fn set_load(&mut self, load: LoadConfig) {
+        self.load = Load::new(load, self.config.gear);
+        self.shaft = Shaft::new(&self.config, &self.load, self.period);
+    }
+
+    /// Holds the rotor where it is, or lets it go.
+    pub const fn lock(&mut self, locked: bool) {
+        self.locked = locked;
+    }
+
+    /// Whether the rotor is held.
+    pub const fn locked(&self) -> bool {
+        self.locked
+    }
+
+    /// Speed of the rotor, rad/s.
+    pub const fn speed(&self) -> f32 {
+        self.speed
+    }
+
+    /// Position of the rotor over all turns, [`TURN`] a turn.
+    pub const fn position(&self) -> i64 {
+        self.position
+    }
+
+    /// Position of the output over all turns, [`TURN`] a turn.
+    pub fn output_position(&self) -> i64 {
+        (self.position as f64 / f64::from(self.config.gear.ratio)) as i64
+    }
+
+    /// Electrical angle, 2^32 a turn.
+    pub fn electrical_angle(&self) -> u32 {
+        electrical(self.position, &self.config)
+    }
+
+    /// Current in the stator's frame, A.
+    pub const fn current(&self) -> Vector {
+        self.current
+    }
+
+    /// Current in the rotor's frame, A: Id and Iq.
+    pub fn rotor_current(&self) -> Vector {
+        self.flux.scaled(self.inverse)
+    }
+
+    /// Back-EMF in the stator's frame, V.
+    pub fn back_emf(&self) -> Vector {
+        let amplitude = self.speed * self.config.back_emf_constant();
+        Vector::new(-self.frame.y, self.frame.x) * amplitude
+    }
+
+    /// Electromagnetic torque, mean of the last step, Nm.
+    pub const fn torque(&self) -> f32 {
+        self.torque
+    }
+
+    /// Torque that the load puts on the output now, Nm, with the sign of positions.
+    pub fn load_torque(&self) -> f32 {
+        let brake = if self.speed == 0.0 { 0.0 } else { self.load().brake.copysign(self.speed) };
+        self.load.at(self.position, self.speed).total() - brake
+    }
+
+    /// Phase resistance at the present temperature, Ω.
+    pub const fn resistance(&self) -> f32 {
+        self.resistance
+    }
+
+    /// Sets the windings' temperature, °C.
+    pub fn set_temperature(&mut self, celsius: f32) {
+        /// Change of the resistance that is not worth a new exponential.
+        const SAME: f32 = 1e-5;
+        let growth = within(1.0 + COPPER * (celsius - 25.0), 0.1, VAPOUR);
+        let resistance = self.config.resistance * growth;
+        if (resistance - self.resistance).abs() > SAME * resistance {
+            self.resistance = resistance;
+            self.set_series(self.series);
+        }
+    }
+
+    /// Energy in the windings' fields, J.
+    pub fn magnetic_energy(&self) -> f32 {
+        let Vector { x: id, y: iq } = self.rotor_current();
+        0.75 * (self.config.inductance_d * id * id + self.config.inductance_q * iq * iq)
+    }
+
+    /// Energy of what turns, and of what springs, weights and the cogging torque hold, J.
+    pub fn mechanical_energy(&self) -> f32 {
+        let MachineConfig { cogging_torque, cogging_periods, .. } = self.config;
+        let periods = f32::from(cogging_periods.max(1));
+        let cogging =
+            cogging_torque / periods * (1.0 - sin_cos(self.cogging_angle(self.position)).1);
+        0.5 * self.shaft.inertia * self.speed * self.speed
+            + self.load.potential(self.position)
+            + cogging
+    }
+
+    /// Stops the current, as open terminals do.
+    pub(super) fn open(&mut self) {
+        (self.flux, self.current, self.torque) = (Vector::ZERO, Vector::ZERO, 0.0);
+    }
+}
+
+/// Electrical angle of a rotor's position, 2^32 a turn.
+const fn electrical(position: i64, config: &MachineConfig) -> u32 {
+    (position as u32).wrapping_mul(config.pole_pairs as u32)
+}
