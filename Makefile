@@ -1,6 +1,7 @@
 # make demo            simulated drives, driven through real ports
 # make test            everything that is tested, with what it needs installed first
 # make test-socketcan  the part of it that needs a CAN kernel, which runs in QEMU
+# make determinism     simulated drives with and without optimisation, to the last digit
 # make fuzz            every fuzz target for SECONDS=60 each
 # make soak            a million exchanges with reconnects, some minutes
 # make bench           ratios and instruction counts, as in docs/BENCHMARKS.md

@@ -212,12 +212,12 @@ impl Machine {
         self.speed
     }
 
-    /// Position of the rotor over all turns, [`TURN`] a turn.
+    /// Position of the rotor over all turns, [`TURN`](crate::angle::TURN) a turn.
     pub const fn position(&self) -> i64 {
         self.position
     }
 
-    /// Position of the output over all turns, [`TURN`] a turn.
+    /// Position of the output over all turns, [`TURN`](crate::angle::TURN) a turn.
     pub fn output_position(&self) -> i64 {
         (self.position as f64 / f64::from(self.config.gear.ratio)) as i64
     }
