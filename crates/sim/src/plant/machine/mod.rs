@@ -217,11 +217,6 @@ impl Machine {
         self.position
     }
 
-    /// Position of the output over all turns, [`TURN`](crate::angle::TURN) a turn.
-    pub fn output_position(&self) -> i64 {
-        (self.position as f64 / f64::from(self.config.gear.ratio)) as i64
-    }
-
     /// Electrical angle, 2^32 a turn.
     pub fn electrical_angle(&self) -> u32 {
         electrical(self.position, &self.config)
