@@ -241,27 +241,30 @@ impl Plant {
     fn warm_up(&mut self) {
         let dt = self.since_slow as f32 * 1e-6;
         self.since_slow = 0;
+        self.energy = self.accounted();
+        self.bus = supply::Flow::default();
         let flow = core::mem::take(&mut self.flow);
-        let bus = core::mem::take(&mut self.bus);
         let series = self.config.inverter.on_resistance;
         let resistance = self.machine.resistance();
         let winding = flow.copper * resistance / (resistance + series);
         let housing = flow.copper - winding + flow.iron + flow.friction;
         self.heat.step(dt, winding, housing);
         self.machine.set_temperature(self.heat.winding());
-        let energy = &mut self.energy;
-        for (sum, part) in [
-            (&mut energy.source, bus.source),
-            (&mut energy.supply, bus.lost),
-            (&mut energy.chopper, bus.braked),
-            (&mut energy.electrical, flow.electrical),
-            (&mut energy.copper, flow.copper),
-            (&mut energy.iron, flow.iron),
-            (&mut energy.friction, flow.friction),
-            (&mut energy.gear, flow.gear),
-            (&mut energy.load, flow.load),
-        ] {
-            *sum += f64::from(part);
+    }
+
+    /// The account with what came since it was written, but for what is stored.
+    fn accounted(&self) -> Energy {
+        Energy {
+            source: self.energy.source + f64::from(self.bus.source),
+            supply: self.energy.supply + f64::from(self.bus.lost),
+            chopper: self.energy.chopper + f64::from(self.bus.braked),
+            electrical: self.energy.electrical + f64::from(self.flow.electrical),
+            copper: self.energy.copper + f64::from(self.flow.copper),
+            iron: self.energy.iron + f64::from(self.flow.iron),
+            friction: self.energy.friction + f64::from(self.flow.friction),
+            gear: self.energy.gear + f64::from(self.flow.gear),
+            load: self.energy.load + f64::from(self.flow.load),
+            ..self.energy
         }
     }
 
@@ -377,17 +380,6 @@ impl Plant {
 
     /// The account of energy up to now.
     pub fn energy(&self) -> Energy {
-        Energy {
-            source: self.energy.source + f64::from(self.bus.source),
-            supply: self.energy.supply + f64::from(self.bus.lost),
-            chopper: self.energy.chopper + f64::from(self.bus.braked),
-            electrical: self.energy.electrical + f64::from(self.flow.electrical),
-            copper: self.energy.copper + f64::from(self.flow.copper),
-            iron: self.energy.iron + f64::from(self.flow.iron),
-            friction: self.energy.friction + f64::from(self.flow.friction),
-            gear: self.energy.gear + f64::from(self.flow.gear),
-            load: self.energy.load + f64::from(self.flow.load),
-            stored: self.stored() - self.initial,
-        }
+        Energy { stored: self.stored() - self.initial, ..self.accounted() }
     }
 }
