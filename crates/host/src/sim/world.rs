@@ -30,15 +30,12 @@ pub(super) fn st(station: &mut Station, now: Instant, command: &Command) -> Resu
             surround(st_motor(station, *motor)?.plant_mut(), command);
         }
         Command::Fault { motor: number, fault, hold, .. } => {
-            let known = Flags::NAMES.iter().find(|(_, name, _)| name.eq_ignore_ascii_case(fault));
-            let names =
-                || Flags::NAMES.iter().map(|(_, name, _)| *name).collect::<Vec<_>>().join(", ");
-            let (bit, ..) =
-                known.ok_or_else(|| format!("there is no fault `{fault}`: {}", names()))?;
+            let bit = named(fault, Flags::NAMES.iter().map(|(bit, name, _)| (*bit, *name)))?;
+            let motor = st_motor(station, *number)?;
             match hold {
-                None => st_motor(station, *number)?.inject(*bit),
-                Some(true) => st_motor(station, *number)?.hold_faults(*bit),
-                Some(false) => st_motor(station, *number)?.hold_faults(0),
+                None => motor.inject(bit),
+                Some(true) => motor.hold_faults(bit),
+                Some(false) => motor.hold_faults(0),
             }
         }
         Command::State { .. } | Command::Pause {} | Command::Resume {} => {}
@@ -65,10 +62,7 @@ pub(super) fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), 
             surround(rmd_node(bus, *motor)?.motor_mut().plant_mut(), command);
         }
         Command::Fault { motor, fault, hold, .. } => {
-            let known = RMD_FAULTS.iter().find(|(_, name)| name.eq_ignore_ascii_case(fault));
-            let names = || RMD_FAULTS.map(|(_, name)| name).join(", ");
-            let (errors, _) =
-                *known.ok_or_else(|| format!("there is no fault `{fault}`: {}", names()))?;
+            let errors = named(fault, RMD_FAULTS.into_iter())?;
             let motor = rmd_node(bus, *motor)?.motor_mut();
             match hold {
                 None => motor.inject(errors),
@@ -93,6 +87,18 @@ fn surround(plant: &mut Plant, command: &Command) {
         Command::LockRotor { locked, .. } => plant.lock(locked),
         _ => {}
     }
+}
+
+/// The fault of a name, among those that a drive knows.
+fn named<'n, T>(
+    fault: &str,
+    known: impl Iterator<Item = (T, &'n str)> + Clone,
+) -> Result<T, String> {
+    let names = known.clone().map(|(_, name)| name);
+    let mut found = known.filter(|(_, name)| name.eq_ignore_ascii_case(fault));
+    found.next().map(|(fault, _)| fault).ok_or_else(|| {
+        format!("there is no fault `{fault}`: {}", names.collect::<Vec<_>>().join(", "))
+    })
 }
 
 fn st_motor(station: &mut Station, number: u8) -> Result<&mut StMotor, String> {
