@@ -30,9 +30,9 @@ pub fn slcan(data: &[u8]) {
     let mut replies = Vec::new();
     let mut frames = 0;
     for &byte in data {
-        if let Some(frame) = device.receive(byte, &mut replies) {
+        if let Some(frame) = device.receive(byte, |answer| replies.extend_from_slice(answer)) {
             frames += 1;
-            device.deliver(Instant(0), &frame, &mut replies);
+            device.deliver(Instant(0), &frame, |line| replies.extend_from_slice(line));
         }
     }
     let ends = data.iter().filter(|byte| **byte == b'\r').count();

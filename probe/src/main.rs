@@ -1,4 +1,4 @@
-//! Links masters and slaves of both protocols without anything else. The panic handler calls a
+//! Links masters and slaves of both protocols, and slcan, without anything else. The panic handler calls a
 //! function that does not exist, so if any path in them can panic this does not link.
 #![no_std]
 #![no_main]
@@ -16,6 +16,7 @@ use motorlink_proto::stmcp::{
     TorqueRamp, Version,
 };
 use motorlink_proto::time::Instant;
+use motorlink_slcan::{AnswerParser, Bitrate, Device};
 
 const _: () = assert!(size_of::<Master>() + size_of::<Slave>() < 800, "RAM of both ends of ST MCP");
 const _: () = assert!(size_of::<Slave>() < 350, "RAM of an ST slave");
@@ -160,6 +161,21 @@ fn rmd() {
     }
 }
 
+fn slcan() {
+    let mut device = Device::default();
+    let mut host = AnswerParser::default();
+    loop {
+        let _ = black_box(device.receive(unknown(), |answer| _ = black_box(answer.len())));
+        let frame = CanFrame::data_frame(unknown(), unknown(), black_box(&[0; 8]));
+        device.deliver(Instant(unknown()), &frame, |line| _ = black_box(line.len()));
+        black_box(host.receive(unknown()));
+        black_box(Bitrate::from_index(unknown()).map(Bitrate::command));
+        if unknown() {
+            return;
+        }
+    }
+}
+
 fn id(number: u8) -> MotorId {
     match MotorId::new(number) {
         Some(id) => id,
@@ -180,5 +196,6 @@ pub extern "C" fn probe() -> ! {
     slave(black_box(Profile::Mcsdk54));
     master();
     rmd();
+    slcan();
     rest()
 }

@@ -13,9 +13,9 @@ pub mod rmd;
 pub mod serve;
 #[cfg(feature = "sim")]
 pub mod sim;
-pub mod slcan;
 pub mod stmcp;
 mod text;
 
 pub use line::{BackOff, LinkState, Opener};
 pub use motorlink_proto::time;
+pub use motorlink_slcan as slcan;

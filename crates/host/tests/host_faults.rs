@@ -119,9 +119,10 @@ fn adapter(reset: Arc<AtomicBool>, opened: Arc<AtomicU32>) -> Answer {
         }
         for &byte in bytes {
             opened.fetch_add(u32::from(byte == b'O'), Ordering::SeqCst);
-            if let Some(frame) = adapter.receive(byte, reply) {
+            if let Some(frame) = adapter.receive(byte, |answer| reply.extend_from_slice(answer)) {
                 bus.receive(time::Instant(0), &frame, |answer| {
-                    adapter.deliver(time::Instant(0), &answer, reply);
+                    adapter
+                        .deliver(time::Instant(0), &answer, |line| reply.extend_from_slice(line));
                 });
             }
         }

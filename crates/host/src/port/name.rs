@@ -169,8 +169,7 @@ fn parse_slcan(name: &str, rest: &str) -> Result<PortName, NameError> {
         match (key, value) {
             ("bitrate", _) => {
                 let parsed = value.parse().ok().and_then(Bitrate::from_bits_per_second);
-                bitrate =
-                    parsed.ok_or_else(|| bad_option(name, "bitrate", value, Bitrate::list()))?;
+                bitrate = parsed.ok_or_else(|| bad_option(name, "bitrate", value, bitrates()))?;
             }
             ("echo", "0" | "1") => echo = value == "1",
             ("echo", _) => return Err(bad_option(name, "echo", value, "0 or 1".to_owned())),
@@ -179,6 +178,10 @@ fn parse_slcan(name: &str, rest: &str) -> Result<PortName, NameError> {
         }
     }
     Ok(PortName::Slcan { line, bitrate, echo })
+}
+
+fn bitrates() -> String {
+    Bitrate::ALL.map(|rate| rate.bits_per_second().to_string()).join(", ")
 }
 
 /// The line that `body` names, or nothing when it looks like none. `name` is for messages.

@@ -159,7 +159,8 @@ impl Endpoint {
             Station::Can(station) => {
                 for &byte in bytes {
                     let Client { adapter, outgoing, .. } = &mut self.clients[index];
-                    let Some(frame) = adapter.receive(byte, outgoing) else { continue };
+                    let answer = |answer: &[u8]| outgoing.extend_from_slice(answer);
+                    let Some(frame) = adapter.receive(byte, answer) else { continue };
                     for (other, client) in self.clients.iter_mut().enumerate() {
                         if other != index {
                             client.deliver(now, &frame);
@@ -241,7 +242,7 @@ impl Client {
     }
 
     fn deliver(&mut self, now: Instant, frame: &CanFrame) {
-        self.adapter.deliver(now, frame, &mut self.outgoing);
+        self.adapter.deliver(now, frame, |line| self.outgoing.extend_from_slice(line));
     }
 
     /// Writes what the line takes at once and returns how many bytes it did not take.

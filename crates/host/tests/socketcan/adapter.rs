@@ -79,18 +79,19 @@ fn answer(mut line: &File, pause: Duration) {
     let mut device = Device::default();
     let mut said = Vec::new();
     for byte in *b"S8\rO\r" {
-        device.receive(byte, &mut said);
+        device.receive(byte, |_| {});
     }
-    said.clear();
     let mut bytes = [0; 64];
     while let Ok(len @ 1..) = line.read(&mut bytes) {
         for &byte in &bytes[..len] {
-            let Some(frame) = device.receive(byte, &mut said) else { continue };
+            let answer = |answer: &[u8]| said.extend_from_slice(answer);
+            let Some(frame) = device.receive(byte, answer) else { continue };
             std::thread::sleep(pause);
             let mut data = [0; 8];
             data.copy_from_slice(frame.data());
             data[1] = 25;
-            device.deliver(Instant(0), &CanFrame::new(frame.id() as u16, data), &mut said);
+            let reply = CanFrame::new(frame.id() as u16, data);
+            device.deliver(Instant(0), &reply, |line| said.extend_from_slice(line));
         }
         if line.write_all(&said).is_err() {
             return;

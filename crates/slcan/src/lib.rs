@@ -4,12 +4,33 @@
 //! one; an identifier has 3 or 8 hexadecimal digits, then come the length and the bytes. The other
 //! lines are commands of the host. An adapter answers with CR, with `z` or `Z` and CR after a
 //! frame, or with BEL when it refuses.
+//!
+//! The crate is `no_std`, allocates nothing, contains no `unsafe` and does not panic. A drive that
+//! speaks slcan itself, without an adapter:
+//!
+//! ```
+//! use motorlink_proto::{rmd::CanFrame, time::Instant};
+//! use motorlink_slcan::Device;
+//!
+//! let (mut device, mut sent) = (Device::default(), Vec::new());
+//! for &byte in b"S8\rO\rt14189C00000000000000\r" {
+//!     let send = |bytes: &[u8]| sent.extend_from_slice(bytes);
+//!     let Some(frame) = device.receive(byte, send) else { continue };
+//!     assert_eq!(frame.id(), 0x141);
+//!     let reply = CanFrame::new(0x141, [0x9C, 25, 0, 0, 0, 0, 0, 0]);
+//!     device.deliver(Instant(0), &reply, |bytes| sent.extend_from_slice(bytes));
+//! }
+//! assert_eq!(sent, b"\r\rz\rt14189C19000000000000\r");
+//! ```
+#![no_std]
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
 
 mod device;
 mod host;
 
 pub use device::Device;
-pub use host::{Answer, HostCodec};
+pub use host::{Answer, AnswerParser, HostCodec};
 
 use motorlink_proto::rmd::CanFrame;
 
@@ -22,41 +43,48 @@ const LONGEST_LINE: usize = 30;
 /// The longest line that a host sends for a frame, with its CR.
 pub const LONGEST_FRAME: usize = LONGEST_LINE - 4 + 1;
 
-/// The bitrates that slcan knows, S0 to S8, in bits per second.
-const BITRATES: [u32; 9] =
-    [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
-
-/// A bitrate of the CAN bus that slcan can ask for.
+/// A bitrate of the CAN bus that slcan can ask for, S0 to S8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Bitrate(u8);
+pub struct Bitrate {
+    digit: u8,
+    bits_per_second: u32,
+}
 
 impl Bitrate {
     /// 1 Mbit/s, the bitrate of RMD motors.
-    pub const DEFAULT: Bitrate = Bitrate(8);
+    pub const DEFAULT: Bitrate = Bitrate::ALL[8];
+
+    /// All of them, at the index that is in their command.
+    pub const ALL: [Bitrate; 9] = [
+        Bitrate { digit: b'0', bits_per_second: 10_000 },
+        Bitrate { digit: b'1', bits_per_second: 20_000 },
+        Bitrate { digit: b'2', bits_per_second: 50_000 },
+        Bitrate { digit: b'3', bits_per_second: 100_000 },
+        Bitrate { digit: b'4', bits_per_second: 125_000 },
+        Bitrate { digit: b'5', bits_per_second: 250_000 },
+        Bitrate { digit: b'6', bits_per_second: 500_000 },
+        Bitrate { digit: b'7', bits_per_second: 800_000 },
+        Bitrate { digit: b'8', bits_per_second: 1_000_000 },
+    ];
 
     /// The bitrate with this number of bits per second, when slcan has it.
     pub fn from_bits_per_second(rate: u32) -> Option<Self> {
-        BITRATES.iter().position(|&known| known == rate).map(|index| Bitrate(index as u8))
+        Self::ALL.into_iter().find(|known| known.bits_per_second == rate)
     }
 
     /// The bitrate of the command S0 to S8.
     pub fn from_index(index: u8) -> Option<Self> {
-        (usize::from(index) < BITRATES.len()).then_some(Bitrate(index))
+        Self::ALL.get(usize::from(index)).copied()
     }
 
     /// The bits per second.
-    pub fn bits_per_second(self) -> u32 {
-        BITRATES[usize::from(self.0)]
+    pub const fn bits_per_second(self) -> u32 {
+        self.bits_per_second
     }
 
     /// The command that selects it, with its CR.
-    pub(crate) fn command(self) -> [u8; 3] {
-        [b'S', b'0' + self.0, CR]
-    }
-
-    /// All of them, for a message.
-    pub(crate) fn list() -> String {
-        BITRATES.map(|rate| rate.to_string()).join(", ")
+    pub const fn command(self) -> [u8; 3] {
+        [b'S', self.digit, CR]
     }
 }
 
@@ -76,8 +104,7 @@ pub fn encode<'a>(frame: &CanFrame, buffer: &'a mut [u8; LONGEST_FRAME]) -> &'a 
         line.hex(u32::from(byte), 2);
     }
     line.push(CR);
-    let Writer { buffer, len } = line;
-    &buffer[..len]
+    line.finish()
 }
 
 struct Writer<'a> {
@@ -85,16 +112,22 @@ struct Writer<'a> {
     len: usize,
 }
 
-impl Writer<'_> {
+impl<'a> Writer<'a> {
     fn push(&mut self, byte: u8) {
-        self.buffer[self.len] = byte;
-        self.len += 1;
+        if let Some(slot) = self.buffer.get_mut(self.len) {
+            *slot = byte;
+            self.len += 1;
+        }
     }
 
     fn hex(&mut self, value: u32, digits: u32) {
         for digit in (0..digits).rev() {
-            self.push(hex_digit(value >> (4 * digit)));
+            self.push(hex_digit(value.wrapping_shr(4 * digit)));
         }
+    }
+
+    fn finish(self) -> &'a [u8] {
+        self.buffer.get(..self.len).unwrap_or(&[])
     }
 }
 
@@ -122,7 +155,7 @@ fn decode(line: &[u8]) -> Option<(CanFrame, &[u8])> {
         return Some((CanFrame::remote_frame(id, extended, len as u8), rest));
     }
     let mut data = [0; 8];
-    let data = &mut data[..len as usize];
+    let data = data.get_mut(..len as usize)?;
     for byte in data.iter_mut() {
         let (value, after) = hex(rest, 2)?;
         *byte = value as u8;
@@ -166,9 +199,6 @@ impl Line {
 
     /// Ends the line: its bytes, or nothing when it was too long.
     fn take(&mut self) -> Option<&[u8]> {
-        self.bytes.get(..std::mem::take(&mut self.len))
+        self.bytes.get(..core::mem::take(&mut self.len))
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,7 +1,9 @@
-use motorlink_proto::time::Instant;
-use proptest::prelude::*;
+//! Both ends of slcan: against the lines of the field notes, against garbage, against each other.
 
-use super::*;
+use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::time::Instant;
+use motorlink_slcan::{Answer, Device, HostCodec, LONGEST_FRAME, encode};
+use proptest::prelude::*;
 
 fn text(frame: &CanFrame) -> String {
     String::from_utf8_lossy(encode(frame, &mut [0xA5; LONGEST_FRAME])).into_owned()
@@ -19,8 +21,15 @@ fn answers(codec: &mut HostCodec, bytes: &[u8]) -> Vec<Answer> {
 
 fn say(device: &mut Device, bytes: &str) -> (String, Vec<CanFrame>) {
     let mut reply = Vec::new();
-    let frames = bytes.bytes().filter_map(|byte| device.receive(byte, &mut reply)).collect();
+    let frames = bytes
+        .bytes()
+        .filter_map(|byte| device.receive(byte, |answer| reply.extend_from_slice(answer)))
+        .collect();
     (String::from_utf8(reply).expect("slcan is ASCII"), frames)
+}
+
+fn deliver(device: &Device, now: u64, frame: &CanFrame, heard: &mut Vec<u8>) {
+    device.deliver(Instant(now), frame, |line| heard.extend_from_slice(line));
 }
 
 fn status_request() -> CanFrame {
@@ -132,16 +141,16 @@ fn the_device_answers_a_host_that_opens_drives_and_closes() {
 fn the_device_passes_frames_both_ways_while_it_is_open() {
     let mut device = Device::default();
     let mut heard = Vec::new();
-    device.deliver(Instant(0), &status_request(), &mut heard);
+    deliver(&device, 0, &status_request(), &mut heard);
     assert!(heard.is_empty(), "a closed channel is silent");
 
     let (answer, frames) = say(&mut device, "O\rt14189c00000000000000\rR000001238\r");
     assert_eq!(answer, "\rz\rZ\r");
     assert_eq!(frames, [status_request(), CanFrame::remote_frame(0x123, true, 8)]);
 
-    device.deliver(Instant(0), &status_request(), &mut heard);
+    deliver(&device, 0, &status_request(), &mut heard);
     say(&mut device, "Z1\r");
-    device.deliver(Instant(60_255_999), &CanFrame::data_frame(1, false, &[]), &mut heard);
+    deliver(&device, 60_255_999, &CanFrame::data_frame(1, false, &[]), &mut heard);
     assert_eq!(String::from_utf8_lossy(&heard), "t14189C00000000000000\rt001000FF\r");
 }
 
@@ -158,7 +167,7 @@ proptest! {
         let mut device = Device::default();
         let mut wire = Vec::new();
         say(&mut device, "O\rZ1\r");
-        device.deliver(Instant(id.into()), &frame, &mut wire);
+        deliver(&device, id.into(), &frame, &mut wire);
         prop_assert_eq!(answers(&mut HostCodec::default(), &wire), [Answer::Frame(frame)]);
         prop_assert_eq!(say(&mut device, &text(&frame)).1, [frame]);
     }
@@ -175,7 +184,7 @@ proptest! {
         let mut device = Device::default();
         let mut reply = Vec::new();
         for byte in garbage {
-            device.receive(byte, &mut reply);
+            device.receive(byte, |answer| reply.extend_from_slice(answer));
         }
         prop_assert!(say(&mut device, "\rO\rt0010\r").1.len() == 1);
     }

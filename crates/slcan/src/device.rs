@@ -3,7 +3,7 @@
 use motorlink_proto::rmd::CanFrame;
 use motorlink_proto::time::Instant;
 
-use super::{BEL, Bitrate, CR, LONGEST_FRAME, Line, decode, encode, hex_digit, is_hex};
+use super::{BEL, Bitrate, CR, LONGEST_FRAME, LONGEST_LINE, Line, Writer, decode, encode, is_hex};
 
 /// Timestamps count milliseconds and start again after a minute.
 const TIMESTAMP_PERIOD_MS: u64 = 60_000;
@@ -28,9 +28,9 @@ enum Channel {
 }
 
 impl Device {
-    /// Takes a byte from the host. Answers are appended to `reply`; a frame that the host sends to
-    /// the bus is returned.
-    pub fn receive(&mut self, byte: u8, reply: &mut Vec<u8>) -> Option<CanFrame> {
+    /// Takes a byte from the host. The answer to a line goes to `reply` in one piece; a frame that
+    /// the host sends to the bus is returned.
+    pub fn receive(&mut self, byte: u8, reply: impl FnOnce(&[u8])) -> Option<CanFrame> {
         match byte {
             CR => {}
             b'\n' => return None,
@@ -39,13 +39,12 @@ impl Device {
                 return None;
             }
         }
-        let mut line = std::mem::take(&mut self.line);
+        let mut line = core::mem::take(&mut self.line);
         let Some(Outcome { answer, frame }) = line.take().and_then(|line| self.obey(line)) else {
-            reply.push(BEL);
+            reply(&[BEL]);
             return None;
         };
-        reply.extend_from_slice(answer);
-        reply.push(CR);
+        reply(answer);
         frame
     }
 
@@ -57,7 +56,7 @@ impl Device {
             (b't' | b'T' | b'r' | b'R', _) => {
                 let (frame, rest) = decode(line)?;
                 let sendable = self.channel == Channel::Open && rest.is_empty();
-                let answer: &[u8] = if command.is_ascii_lowercase() { b"z" } else { b"Z" };
+                let answer: &[u8] = if command.is_ascii_lowercase() { b"z\r" } else { b"Z\r" };
                 return sendable.then_some(Outcome { answer, frame: Some(frame) });
             }
             (b'C', []) => self.channel = Channel::Closed,
@@ -71,37 +70,41 @@ impl Device {
             (b'M' | b'm', filter) if closed && is_hex(filter, 8) => {}
             (b'X', b"0" | b"1") => {}
             (b'Z', &[digit @ (b'0' | b'1')]) => self.timestamps = digit == b'1',
-            (b'V', []) => return Some(Outcome::info(b"V1010")),
-            (b'N', []) => return Some(Outcome::info(b"NML01")),
-            (b'F', []) if !closed => return Some(Outcome::info(b"F00")),
+            (b'V', []) => return Some(Outcome::info(b"V1010\r")),
+            (b'N', []) => return Some(Outcome::info(b"NML01\r")),
+            (b'F', []) if !closed => return Some(Outcome::info(b"F00\r")),
             _ => return None,
         }
         Some(Outcome::DONE)
     }
 
-    /// Appends a frame from the bus to `reply`, when the host has opened the channel.
-    pub fn deliver(&self, now: Instant, frame: &CanFrame, reply: &mut Vec<u8>) {
+    /// Hands a frame from the bus to `reply` as a line, when the host has opened the channel.
+    pub fn deliver(&self, now: Instant, frame: &CanFrame, reply: impl FnOnce(&[u8])) {
         if self.channel == Channel::Closed {
             return;
         }
-        reply.extend_from_slice(encode(frame, &mut [0; LONGEST_FRAME]));
+        let mut plain = [0; LONGEST_FRAME];
+        let mut line = encode(frame, &mut plain);
+        let mut stamped = [0; LONGEST_LINE + 1];
         if self.timestamps {
-            reply.pop();
-            let ms = (now.0 / 1_000 % TIMESTAMP_PERIOD_MS) as u32;
-            reply.extend([12, 8, 4, 0].map(|shift| hex_digit(ms >> shift)));
-            reply.push(CR);
+            let mut writer = Writer { buffer: &mut stamped, len: 0 };
+            line.iter().filter(|&&byte| byte != CR).for_each(|&byte| writer.push(byte));
+            writer.hex((now.0 / 1_000 % TIMESTAMP_PERIOD_MS) as u32, 4);
+            writer.push(CR);
+            line = writer.finish();
         }
+        reply(line);
     }
 }
 
-/// A line that is obeyed: what is said before the CR, and the frame for the bus.
+/// A line that is obeyed: what is said, CR included, and the frame for the bus.
 struct Outcome {
     answer: &'static [u8],
     frame: Option<CanFrame>,
 }
 
 impl Outcome {
-    const DONE: Outcome = Outcome { answer: b"", frame: None };
+    const DONE: Outcome = Outcome { answer: &[CR], frame: None };
 
     fn info(answer: &'static [u8]) -> Self {
         Outcome { answer, frame: None }

@@ -20,52 +20,16 @@ pub enum Answer {
     Info,
 }
 
-/// Takes an adapter's bytes apart, one answer at a time.
-///
-/// Bytes go in through [`spare`](Self::spare) and [`filled`](Self::filled), so that a port reads
-/// straight into the codec; nothing is allocated. A line that is no answer is counted and left out.
-#[derive(Debug)]
-pub struct HostCodec {
-    buffer: [u8; BUFFERED],
-    start: usize,
-    end: usize,
+/// Takes an adapter's bytes apart, one at a time. A line that is no answer is counted and left out.
+#[derive(Debug, Default)]
+pub struct AnswerParser {
     line: Line,
     garbage: u64,
 }
 
-impl Default for HostCodec {
-    fn default() -> Self {
-        HostCodec { buffer: [0; BUFFERED], start: 0, end: 0, line: Line::default(), garbage: 0 }
-    }
-}
-
-impl HostCodec {
-    /// Room for received bytes; all of it once [`answer`](Self::answer) has returned `None`.
-    pub fn spare(&mut self) -> &mut [u8] {
-        if self.start == self.end {
-            (self.start, self.end) = (0, 0);
-        }
-        &mut self.buffer[self.end..]
-    }
-
-    /// Says that `len` bytes were put into the room.
-    pub fn filled(&mut self, len: usize) {
-        self.end = BUFFERED.min(self.end + len);
-    }
-
-    /// The next answer, or `None` when more bytes are needed.
-    pub fn answer(&mut self) -> Option<Answer> {
-        while self.start < self.end {
-            let byte = self.buffer[self.start];
-            self.start += 1;
-            if let Some(answer) = self.receive(byte) {
-                return Some(answer);
-            }
-        }
-        None
-    }
-
-    fn receive(&mut self, byte: u8) -> Option<Answer> {
+impl AnswerParser {
+    /// Takes a byte; gives the answer that it completes.
+    pub fn receive(&mut self, byte: u8) -> Option<Answer> {
         match byte {
             CR => {
                 let answer = self.line.take().and_then(parse);
@@ -94,6 +58,61 @@ impl HostCodec {
     /// Whether a line has begun and not ended.
     pub fn is_mid_line(&self) -> bool {
         !self.line.is_empty()
+    }
+}
+
+/// An [`AnswerParser`] with room for what a port reads at once.
+///
+/// Bytes go in through [`spare`](Self::spare) and [`filled`](Self::filled), so that a port reads
+/// straight into the codec.
+#[derive(Debug)]
+pub struct HostCodec {
+    buffer: [u8; BUFFERED],
+    start: usize,
+    end: usize,
+    parser: AnswerParser,
+}
+
+impl Default for HostCodec {
+    fn default() -> Self {
+        HostCodec { buffer: [0; BUFFERED], start: 0, end: 0, parser: AnswerParser::default() }
+    }
+}
+
+impl HostCodec {
+    /// Room for received bytes; all of it once [`answer`](Self::answer) has returned `None`.
+    pub fn spare(&mut self) -> &mut [u8] {
+        if self.start == self.end {
+            (self.start, self.end) = (0, 0);
+        }
+        self.buffer.get_mut(self.end..).unwrap_or(&mut [])
+    }
+
+    /// Says that `len` bytes were put into the room.
+    pub fn filled(&mut self, len: usize) {
+        self.end = BUFFERED.min(self.end.saturating_add(len));
+    }
+
+    /// The next answer, or `None` when more bytes are needed.
+    pub fn answer(&mut self) -> Option<Answer> {
+        while self.start < self.end {
+            let byte = *self.buffer.get(self.start)?;
+            self.start += 1;
+            if let Some(answer) = self.parser.receive(byte) {
+                return Some(answer);
+            }
+        }
+        None
+    }
+
+    /// How many lines were no answer.
+    pub fn garbage(&self) -> u64 {
+        self.parser.garbage()
+    }
+
+    /// Whether a line has begun and not ended.
+    pub fn is_mid_line(&self) -> bool {
+        self.parser.is_mid_line()
     }
 }
 
