@@ -1,0 +1,2033 @@
+/* Motorlink: both ends of ST's serial Motor Control Protocol and of RMD over CAN V1.62. */
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/* Written by `make header` from crates/ffi and the protocols' tables. Do not edit. */
+
+
+#ifndef MOTORLINK_H
+#define MOTORLINK_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/** Registers (table 3): `reg` in calls. A comment has type, access and unit. */
+enum motorlink_st_register {
+  MOTORLINK_ST_REG_TARGET_MOTOR          = 0x00, /**< u8 RW: Motor that motor number 0 addresses, counted from 0 */
+  MOTORLINK_ST_REG_FLAGS                 = 0x01, /**< u32 R : Faults: low half occurred, high half present */
+  MOTORLINK_ST_REG_STATUS                = 0x02, /**< u8 R : State of the state machine */
+  MOTORLINK_ST_REG_CONTROL_MODE          = 0x03, /**< u8 RW: Torque (0) or speed (1) control */
+  MOTORLINK_ST_REG_SPEED_REF             = 0x04, /**< i32 R  rpm: Speed reference */
+  MOTORLINK_ST_REG_SPEED_KP              = 0x05, /**< i16 RW s16A/unit: Speed regulator Kp, numerator */
+  MOTORLINK_ST_REG_SPEED_KI              = 0x06, /**< i16 RW s16A/unit: Speed regulator Ki, numerator */
+  MOTORLINK_ST_REG_SPEED_KD              = 0x07, /**< i16 RW s16A/unit: Speed regulator Kd, numerator */
+  MOTORLINK_ST_REG_TORQUE_REF            = 0x08, /**< i16 RW s16A: Iq reference */
+  MOTORLINK_ST_REG_TORQUE_KP             = 0x09, /**< i16 RW s16V/s16A: Iq regulator Kp, numerator */
+  MOTORLINK_ST_REG_TORQUE_KI             = 0x0A, /**< i16 RW s16V/s16A: Iq regulator Ki, numerator */
+  MOTORLINK_ST_REG_TORQUE_KD             = 0x0B, /**< i16 RW s16V/s16A: Iq regulator Kd, numerator */
+  MOTORLINK_ST_REG_FLUX_REF              = 0x0C, /**< i16 RW s16A: Id reference */
+  MOTORLINK_ST_REG_FLUX_KP               = 0x0D, /**< i16 RW s16V/s16A: Id regulator Kp, numerator */
+  MOTORLINK_ST_REG_FLUX_KI               = 0x0E, /**< i16 RW s16V/s16A: Id regulator Ki, numerator */
+  MOTORLINK_ST_REG_FLUX_KD               = 0x0F, /**< i16 RW s16V/s16A: Id regulator Kd, numerator */
+  MOTORLINK_ST_REG_OBSERVER_C1           = 0x10, /**< i16 RW: Observer gain C1 (PLL) */
+  MOTORLINK_ST_REG_OBSERVER_C2           = 0x11, /**< i16 RW: Observer gain C2 (PLL) */
+  MOTORLINK_ST_REG_OBSERVER_CR_C1        = 0x12, /**< i16 RW: Observer gain C1 (CORDIC) */
+  MOTORLINK_ST_REG_OBSERVER_CR_C2        = 0x13, /**< i16 RW: Observer gain C2 (CORDIC) */
+  MOTORLINK_ST_REG_PLL_KI                = 0x14, /**< i16 RW dpp/s16V: PLL regulator Ki, numerator */
+  MOTORLINK_ST_REG_PLL_KP                = 0x15, /**< i16 RW dpp/s16V: PLL regulator Kp, numerator */
+  MOTORLINK_ST_REG_FLUXWK_KP             = 0x16, /**< i16 RW s16A/s16V²: Flux weakening regulator Kp */
+  MOTORLINK_ST_REG_FLUXWK_KI             = 0x17, /**< i16 RW s16A/s16V²: Flux weakening regulator Ki */
+  MOTORLINK_ST_REG_FLUXWK_BUS            = 0x18, /**< u16 RW %: Share of the bus voltage that flux weakening may use */
+  MOTORLINK_ST_REG_BUS_VOLTAGE           = 0x19, /**< u16 R  V: Bus voltage */
+  MOTORLINK_ST_REG_HEATS_TEMP            = 0x1A, /**< i16 R  °C: Heatsink temperature */
+  MOTORLINK_ST_REG_MOTOR_POWER           = 0x1B, /**< i16 R  W: Electrical power into the motor */
+  MOTORLINK_ST_REG_DAC_OUT1              = 0x1C, /**< u8 RW: Register shown on DAC channel 1 */
+  MOTORLINK_ST_REG_DAC_OUT2              = 0x1D, /**< u8 RW: Register shown on DAC channel 2 */
+  MOTORLINK_ST_REG_SPEED_MEAS            = 0x1E, /**< i32 R  rpm: Mechanical speed, averaged */
+  MOTORLINK_ST_REG_TORQUE_MEAS           = 0x1F, /**< i16 R  s16A: Iq, measured */
+  MOTORLINK_ST_REG_FLUX_MEAS             = 0x20, /**< i16 R  s16A: Id, measured */
+  MOTORLINK_ST_REG_FLUXWK_BUS_MEAS       = 0x21, /**< u16 R  %: Share of the bus voltage in use */
+  MOTORLINK_ST_REG_RUC_STAGE_NBR         = 0x22, /**< u8 R : Number of rev-up phases */
+  MOTORLINK_ST_REG_I_A                   = 0x23, /**< i16 D  s16A: Phase A current */
+  MOTORLINK_ST_REG_I_B                   = 0x24, /**< i16 D  s16A: Phase B current */
+  MOTORLINK_ST_REG_I_ALPHA               = 0x25, /**< i16 D  s16A: Alpha current */
+  MOTORLINK_ST_REG_I_BETA                = 0x26, /**< i16 D  s16A: Beta current */
+  MOTORLINK_ST_REG_I_Q                   = 0x27, /**< i16 D  s16A: Iq, measured */
+  MOTORLINK_ST_REG_I_D                   = 0x28, /**< i16 D  s16A: Id, measured */
+  MOTORLINK_ST_REG_I_Q_REF               = 0x29, /**< i16 D  s16A: Iq reference */
+  MOTORLINK_ST_REG_I_D_REF               = 0x2A, /**< i16 D  s16A: Id reference */
+  MOTORLINK_ST_REG_V_Q                   = 0x2B, /**< i16 D  s16V: Vq */
+  MOTORLINK_ST_REG_V_D                   = 0x2C, /**< i16 D  s16V: Vd */
+  MOTORLINK_ST_REG_V_ALPHA               = 0x2D, /**< i16 D  s16V: Alpha voltage */
+  MOTORLINK_ST_REG_V_BETA                = 0x2E, /**< i16 D  s16V: Beta voltage */
+  MOTORLINK_ST_REG_MEAS_EL_ANGLE         = 0x2F, /**< i16 D  s16degree: Electrical angle from the sensor */
+  MOTORLINK_ST_REG_MEAS_ROT_SPEED        = 0x30, /**< i16 D  s16speed: Mechanical speed from the sensor */
+  MOTORLINK_ST_REG_OBS_EL_ANGLE          = 0x31, /**< i16 D  s16degree: Observed electrical angle (PLL) */
+  MOTORLINK_ST_REG_OBS_ROT_SPEED         = 0x32, /**< i16 D  s16speed: Observed mechanical speed (PLL) */
+  MOTORLINK_ST_REG_OBS_I_ALPHA           = 0x33, /**< i16 D  s16A: Estimated alpha current (PLL) */
+  MOTORLINK_ST_REG_OBS_I_BETA            = 0x34, /**< i16 D  s16A: Estimated beta current (PLL) */
+  MOTORLINK_ST_REG_OBS_BEMF_ALPHA        = 0x35, /**< i16 D  s16V: Observed back-EMF, alpha (PLL) */
+  MOTORLINK_ST_REG_OBS_BEMF_BETA         = 0x36, /**< i16 D  s16V: Observed back-EMF, beta (PLL) */
+  MOTORLINK_ST_REG_OBS_CR_EL_ANGLE       = 0x37, /**< i16 D  s16degree: Observed electrical angle (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_ROT_SPEED      = 0x38, /**< i16 D  s16speed: Observed mechanical speed (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_I_ALPHA        = 0x39, /**< i16 D  s16A: Estimated alpha current (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_I_BETA         = 0x3A, /**< i16 D  s16A: Estimated beta current (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_BEMF_ALPHA     = 0x3B, /**< i16 D  s16V: Observed back-EMF, alpha (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_BEMF_BETA      = 0x3C, /**< i16 D  s16V: Observed back-EMF, beta (CORDIC) */
+  MOTORLINK_ST_REG_DAC_USER1             = 0x3D, /**< i16 D : User value of DAC channel 1 */
+  MOTORLINK_ST_REG_DAC_USER2             = 0x3E, /**< i16 D : User value of DAC channel 2 */
+  MOTORLINK_ST_REG_MAX_APP_SPEED         = 0x3F, /**< u32 R  rpm: Highest speed of the application */
+  MOTORLINK_ST_REG_MIN_APP_SPEED         = 0x40, /**< u32 R  rpm: Lowest speed of the application */
+  MOTORLINK_ST_REG_IQ_SPEEDMODE          = 0x41, /**< i16 W  s16A: Id reference in speed mode */
+  MOTORLINK_ST_REG_EST_BEMF_LEVEL        = 0x42, /**< i16 R  s16V²: Expected back-EMF level (PLL) */
+  MOTORLINK_ST_REG_OBS_BEMF_LEVEL        = 0x43, /**< i16 R  s16V²: Observed back-EMF level (PLL) */
+  MOTORLINK_ST_REG_EST_CR_BEMF_LEVEL     = 0x44, /**< i16 R  s16V²: Expected back-EMF level (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_BEMF_LEVEL     = 0x45, /**< i16 R  s16V²: Observed back-EMF level (CORDIC) */
+  MOTORLINK_ST_REG_FF_1Q                 = 0x46, /**< i32 RW: Feed-forward constant C1q */
+  MOTORLINK_ST_REG_FF_1D                 = 0x47, /**< i32 RW: Feed-forward constant C1d */
+  MOTORLINK_ST_REG_FF_2                  = 0x48, /**< i32 RW: Feed-forward constant C2 */
+  MOTORLINK_ST_REG_FF_VQ                 = 0x49, /**< i16 R  s16V: Feed-forward part of Vq */
+  MOTORLINK_ST_REG_FF_VD                 = 0x4A, /**< i16 R  s16V: Feed-forward part of Vd */
+  MOTORLINK_ST_REG_FF_VQ_PIOUT           = 0x4B, /**< i16 R  s16V/s16A: Regulator part of Vq */
+  MOTORLINK_ST_REG_FF_VD_PIOUT           = 0x4C, /**< i16 R  s16V/s16A: Regulator part of Vd */
+  MOTORLINK_ST_REG_PFC_STATUS            = 0x4D, /**< i8 R : PFC state */
+  MOTORLINK_ST_REG_PFC_FAULTS            = 0x4E, /**< u32 R : PFC faults */
+  MOTORLINK_ST_REG_PFC_DCBUS_REF         = 0x4F, /**< i16 RW V: PFC bus voltage reference */
+  MOTORLINK_ST_REG_PFC_DCBUS_MEAS        = 0x50, /**< i16 R  V: PFC bus voltage */
+  MOTORLINK_ST_REG_PFC_ACBUS_FREQ        = 0x51, /**< i16 R  0.1 Hz: Mains frequency */
+  MOTORLINK_ST_REG_PFC_ACBUS_RMS         = 0x52, /**< i16 R  V: Mains voltage, zero to peak */
+  MOTORLINK_ST_REG_PFC_I_KP              = 0x53, /**< i16 RW s16V/s16A: PFC current regulator Kp */
+  MOTORLINK_ST_REG_PFC_I_KI              = 0x54, /**< i16 RW s16V/s16A: PFC current regulator Ki */
+  MOTORLINK_ST_REG_PFC_I_KD              = 0x55, /**< i16 RW s16V/s16A: PFC current regulator Kd */
+  MOTORLINK_ST_REG_PFC_V_KP              = 0x56, /**< i16 RW s16A/V: PFC voltage regulator Kp */
+  MOTORLINK_ST_REG_PFC_V_KI              = 0x57, /**< i16 RW s16A/V: PFC voltage regulator Ki */
+  MOTORLINK_ST_REG_PFC_V_KD              = 0x58, /**< i16 RW s16A/V: PFC voltage regulator Kd */
+  MOTORLINK_ST_REG_PFC_STARTUP_DURATION  = 0x59, /**< i16 RW ms: Length of the PFC start-up */
+  MOTORLINK_ST_REG_PFC_ENABLED           = 0x5A, /**< i8 R : Whether the PFC is enabled */
+  MOTORLINK_ST_REG_RAMP_FINAL_SPEED      = 0x5B, /**< i32 RW rpm: Final speed of the ramp */
+  MOTORLINK_ST_REG_RAMP_DURATION         = 0x5C, /**< u16 -  ms: Length of the ramp (firmware only) */
+  MOTORLINK_ST_REG_HFI_EL_ANGLE          = 0x5D, /**< i16 R  s16degree: Electrical angle from HFI (firmware only) */
+  MOTORLINK_ST_REG_HFI_ROT_SPEED         = 0x5E, /**< i16 R  s16speed: Mechanical speed from HFI (firmware only) */
+  MOTORLINK_ST_REG_HFI_CURRENT           = 0x5F, /**< i16 R  s16A: HFI current (firmware only) */
+  MOTORLINK_ST_REG_HFI_INIT_ANG_PLL      = 0x60, /**< i16 R  s16degree: Initial angle from the HFI PLL (firmware only) */
+  MOTORLINK_ST_REG_HFI_INIT_ANG_SAT_DIFF = 0x61, /**< i16 RW: Initial angle saturation difference (firmware only) */
+  MOTORLINK_ST_REG_HFI_PI_PLL_KP         = 0x62, /**< i16 - : HFI PLL Kp (firmware only) */
+  MOTORLINK_ST_REG_HFI_PI_PLL_KI         = 0x63, /**< i16 - : HFI PLL Ki (firmware only) */
+  MOTORLINK_ST_REG_HFI_PI_TRACK_KP       = 0x64, /**< i16 RW: HFI tracking Kp (firmware only) */
+  MOTORLINK_ST_REG_HFI_PI_TRACK_KI       = 0x65, /**< i16 RW: HFI tracking Ki (firmware only) */
+  MOTORLINK_ST_REG_SC_CHECK              = 0x66, /**< u8 R : Profiler is built in (firmware only) */
+  MOTORLINK_ST_REG_SC_STATE              = 0x67, /**< u8 R : Profiler state (firmware only) */
+  MOTORLINK_ST_REG_SC_RS                 = 0x68, /**< f32 R  Ω: Profiler: stator resistance (firmware only) */
+  MOTORLINK_ST_REG_SC_LS                 = 0x69, /**< f32 R  H: Profiler: stator inductance (firmware only) */
+  MOTORLINK_ST_REG_SC_KE                 = 0x6A, /**< f32 R : Profiler: back-EMF constant (firmware only) */
+  MOTORLINK_ST_REG_SC_VBUS               = 0x6B, /**< f32 R  V: Profiler: bus voltage (firmware only) */
+  MOTORLINK_ST_REG_SC_MEAS_NOMINALSPEED  = 0x6C, /**< f32 R  rpm: Profiler: measured nominal speed (firmware only) */
+  MOTORLINK_ST_REG_SC_STEPS              = 0x6D, /**< u8 R : Profiler: number of steps (firmware only) */
+  MOTORLINK_ST_REG_SPEED_KP_DIV          = 0x6E, /**< i16 R : Speed regulator Kp, divisor */
+  MOTORLINK_ST_REG_SPEED_KI_DIV          = 0x6F, /**< i16 R : Speed regulator Ki, divisor */
+  MOTORLINK_ST_REG_UID                   = 0x70, /**< u32 R : Unique identification (firmware only) */
+  MOTORLINK_ST_REG_HWTYPE                = 0x71, /**< i16 - : Hardware type (firmware only) */
+  MOTORLINK_ST_REG_CTRBID                = 0x72, /**< u32 R : Control board identification */
+  MOTORLINK_ST_REG_PWBDID                = 0x73, /**< u32 R : Power board identification */
+  MOTORLINK_ST_REG_SC_PP                 = 0x74, /**< u8 RW: Profiler: pole pairs (firmware only) */
+  MOTORLINK_ST_REG_SC_CURRENT            = 0x75, /**< f32 RW A: Profiler: current (firmware only) */
+  MOTORLINK_ST_REG_SC_SPDBANDWIDTH       = 0x76, /**< f32 RW: Profiler: speed bandwidth (firmware only) */
+  MOTORLINK_ST_REG_SC_LDLQRATIO          = 0x77, /**< f32 RW: Profiler: Ld/Lq ratio (firmware only) */
+  MOTORLINK_ST_REG_SC_NOMINAL_SPEED      = 0x78, /**< u32 RW rpm: Profiler: nominal speed (firmware only) */
+  MOTORLINK_ST_REG_SC_CURRBANDWIDTH      = 0x79, /**< f32 RW: Profiler: current bandwidth (firmware only) */
+  MOTORLINK_ST_REG_SC_J                  = 0x7A, /**< f32 R : Profiler: inertia (firmware only) */
+  MOTORLINK_ST_REG_SC_F                  = 0x7B, /**< f32 R : Profiler: friction (firmware only) */
+  MOTORLINK_ST_REG_SC_MAX_CURRENT        = 0x7C, /**< f32 R  A: Profiler: highest current (firmware only) */
+  MOTORLINK_ST_REG_SC_STARTUP_SPEED      = 0x7D, /**< u32 R  rpm: Profiler: start-up speed (firmware only) */
+  MOTORLINK_ST_REG_SC_STARTUP_ACC        = 0x7E, /**< u32 R : Profiler: start-up acceleration (firmware only) */
+  MOTORLINK_ST_REG_SC_PWM_FREQUENCY      = 0x7F, /**< u32 R  Hz: Profiler: PWM frequency (firmware only) */
+  MOTORLINK_ST_REG_SC_FOC_REP_RATE       = 0x80, /**< u8 R : Profiler: FOC repetition rate (firmware only) */
+  MOTORLINK_ST_REG_PWBDID2               = 0x81, /**< u32 R : Power board identification, motor 2 */
+  MOTORLINK_ST_REG_SC_COMPLETED          = 0x82, /**< u8 R : Profiler has completed (firmware only) */
+  MOTORLINK_ST_REG_CURRENT_POSITION      = 0x83, /**< f32 R  rad: Position (firmware only) */
+  MOTORLINK_ST_REG_TARGET_POSITION       = 0x84, /**< f32 R  rad: Target position (firmware only) */
+  MOTORLINK_ST_REG_MOVE_DURATION         = 0x85, /**< f32 R  s: Duration of the move (firmware only) */
+  MOTORLINK_ST_REG_POSITION_KP           = 0x86, /**< i16 RW: Position regulator Kp (firmware only) */
+  MOTORLINK_ST_REG_POSITION_KI           = 0x87, /**< i16 RW: Position regulator Ki (firmware only) */
+  MOTORLINK_ST_REG_POSITION_KD           = 0x88  /**< i16 RW: Position regulator Kd (firmware only) */
+};
+
+/** Frame codes (table 1). */
+enum motorlink_st_frame {
+  MOTORLINK_ST_FRAME_SET_REG           = 0x01, /**< write a register (4.4) */
+  MOTORLINK_ST_FRAME_GET_REG           = 0x02, /**< read a register (4.5) */
+  MOTORLINK_ST_FRAME_EXECUTE_CMD       = 0x03, /**< execute a command (4.6) */
+  MOTORLINK_ST_FRAME_GET_BOARD_INFO    = 0x06, /**< read the SDK's version and name (4.7) */
+  MOTORLINK_ST_FRAME_SET_RAMP          = 0x07, /**< program a speed ramp (4.8) */
+  MOTORLINK_ST_FRAME_GET_REVUP_DATA    = 0x08, /**< read a rev-up phase (4.9) */
+  MOTORLINK_ST_FRAME_SET_REVUP_DATA    = 0x09, /**< write a rev-up phase (4.10) */
+  MOTORLINK_ST_FRAME_SET_CURRENT_REF   = 0x0A, /**< set the Iq and Id references (4.11) */
+  MOTORLINK_ST_FRAME_GET_MP_INFO       = 0x0B, /**< list the registers of motor profiler steps (profile MCSDK 5.4 only) */
+  MOTORLINK_ST_FRAME_GET_FW_VERSION    = 0x0C, /**< read the firmware's version string (4.12) */
+  MOTORLINK_ST_FRAME_GET_DATA_ELEMENT  = 0x0D, /**< read a data segment (profile SPEC only) */
+  MOTORLINK_ST_FRAME_SET_TORQUE_RAMP   = 0x0D, /**< program a torque ramp (profile MCSDK 5.4 only) */
+  MOTORLINK_ST_FRAME_CONFIG_DYN_STRUCT = 0x0E, /**< choose the registers of a data segment (profile SPEC only) */
+  MOTORLINK_ST_FRAME_SET_POSITION_CMD  = 0x12  /**< move to an angle in a given time (profile MCSDK 5.4 only) */
+};
+
+/** Commands (table 4). */
+enum motorlink_st_command {
+  MOTORLINK_ST_COMMAND_START_MOTOR   = 0x01, /**< start the motor; nothing happens when it runs or is in fault */
+  MOTORLINK_ST_COMMAND_STOP_MOTOR    = 0x02, /**< stop the motor */
+  MOTORLINK_ST_COMMAND_STOP_RAMP     = 0x03, /**< stop the ramp that is executing */
+  MOTORLINK_ST_COMMAND_RESET         = 0x04, /**< acknowledged without effect (mcsdk-5.4 only) */
+  MOTORLINK_ST_COMMAND_PING          = 0x05, /**< acknowledged without effect (mcsdk-5.4 only) */
+  MOTORLINK_ST_COMMAND_START_STOP    = 0x06, /**< start an idle motor, stop a spinning one */
+  MOTORLINK_ST_COMMAND_FAULT_ACK     = 0x07, /**< acknowledge past faults whose cause is gone */
+  MOTORLINK_ST_COMMAND_ENCODER_ALIGN = 0x08, /**< align the encoder */
+  MOTORLINK_ST_COMMAND_IQDREF_CLEAR  = 0x09, /**< set the current references to their defaults */
+  MOTORLINK_ST_COMMAND_PFC_ENABLE    = 0x0A, /**< start the power factor correction */
+  MOTORLINK_ST_COMMAND_PFC_DISABLE   = 0x0B, /**< stop the power factor correction */
+  MOTORLINK_ST_COMMAND_PFC_FAULT_ACK = 0x0C, /**< acknowledge past faults of the power factor correction */
+  MOTORLINK_ST_COMMAND_SC_START      = 0x0D, /**< start the motor profiler (mcsdk-5.4 only) */
+  MOTORLINK_ST_COMMAND_SC_STOP       = 0x0E  /**< stop the motor profiler; acts as STOP_MOTOR (mcsdk-5.4 only) */
+};
+
+/** Why a drive refused (table 2). */
+enum motorlink_st_refusal {
+  MOTORLINK_ST_REFUSAL_NONE               = 0x00, /**< not an error; never found in a NACK */
+  MOTORLINK_ST_REFUSAL_BAD_FRAME_ID       = 0x01, /**< the drive does not know this frame code */
+  MOTORLINK_ST_REFUSAL_SET_READ_ONLY      = 0x02, /**< the register is read-only or does not exist */
+  MOTORLINK_ST_REFUSAL_GET_WRITE_ONLY     = 0x03, /**< the register cannot be read or does not exist */
+  MOTORLINK_ST_REFUSAL_WRONG_SET          = 0x05, /**< the value is not valid */
+  MOTORLINK_ST_REFUSAL_WRONG_CMD          = 0x07, /**< the command is unknown or not possible on this drive */
+  MOTORLINK_ST_REFUSAL_OVERRUN            = 0x08, /**< bytes came faster than the drive could take them */
+  MOTORLINK_ST_REFUSAL_TIMEOUT            = 0x09, /**< the drive did not receive the whole frame in time */
+  MOTORLINK_ST_REFUSAL_BAD_CRC            = 0x0A, /**< the checksum did not match what the drive received */
+  MOTORLINK_ST_REFUSAL_BAD_MOTOR_SELECTED = 0x0B, /**< the drive has no motor of this number */
+  MOTORLINK_ST_REFUSAL_MP_NOT_ENABLED     = 0x0C  /**< the drive is built without the motor profiler */
+};
+
+/** Values of register STATUS. */
+enum motorlink_st_status {
+  MOTORLINK_ST_STATUS_IDLE                  = 0x00, /**< at rest, ready to start */
+  MOTORLINK_ST_STATUS_IDLE_ALIGNMENT        = 0x01, /**< about to align the encoder */
+  MOTORLINK_ST_STATUS_ALIGNMENT             = 0x02, /**< aligning the encoder */
+  MOTORLINK_ST_STATUS_IDLE_START            = 0x03, /**< about to start */
+  MOTORLINK_ST_STATUS_START                 = 0x04, /**< rev-up */
+  MOTORLINK_ST_STATUS_START_RUN             = 0x05, /**< rev-up is over, about to run */
+  MOTORLINK_ST_STATUS_RUN                   = 0x06, /**< under closed-loop control */
+  MOTORLINK_ST_STATUS_ANY_STOP              = 0x07, /**< a stop was asked for */
+  MOTORLINK_ST_STATUS_STOP                  = 0x08, /**< stopping */
+  MOTORLINK_ST_STATUS_STOP_IDLE             = 0x09, /**< stopped, about to be idle */
+  MOTORLINK_ST_STATUS_FAULT_NOW             = 0x0A, /**< the cause of a fault is present */
+  MOTORLINK_ST_STATUS_FAULT_OVER            = 0x0B, /**< a fault's cause is gone; it waits to be acknowledged */
+  MOTORLINK_ST_STATUS_ICLWAIT               = 0x0C, /**< waiting for the inrush current limiter */
+  MOTORLINK_ST_STATUS_ALIGN_CHARGE_BOOT_CAP = 0x0D, /**< charging boot capacitors before alignment */
+  MOTORLINK_ST_STATUS_ALIGN_OFFSET_CALIB    = 0x0E, /**< calibrating current offsets before alignment */
+  MOTORLINK_ST_STATUS_ALIGN_CLEAR           = 0x0F, /**< clearing controllers before alignment */
+  MOTORLINK_ST_STATUS_CHARGE_BOOT_CAP       = 0x10, /**< charging the boot capacitors */
+  MOTORLINK_ST_STATUS_OFFSET_CALIB          = 0x11, /**< calibrating the current offsets */
+  MOTORLINK_ST_STATUS_CLEAR                 = 0x12, /**< clearing the controllers */
+  MOTORLINK_ST_STATUS_SWITCH_OVER           = 0x13, /**< changing from rev-up to the observer */
+  MOTORLINK_ST_STATUS_WAIT_STOP_MOTOR       = 0x14  /**< waiting for the rotor to stand still */
+};
+
+/** Values of register CONTROL_MODE. */
+enum motorlink_st_control_mode {
+  MOTORLINK_ST_CONTROL_MODE_TORQUE = 0x00, /**< the Iq reference is commanded */
+  MOTORLINK_ST_CONTROL_MODE_SPEED  = 0x01  /**< the speed reference is commanded */
+};
+
+/** Bits of register FLAGS: occurred; 16 bits to the left: present. */
+enum motorlink_st_fault {
+  MOTORLINK_ST_FAULT_FOC_DURATION = 0x01, /**< the control loop took longer than its period */
+  MOTORLINK_ST_FAULT_OVER_VOLT    = 0x02, /**< bus voltage too high */
+  MOTORLINK_ST_FAULT_UNDER_VOLT   = 0x04, /**< bus voltage too low */
+  MOTORLINK_ST_FAULT_OVER_TEMP    = 0x08, /**< heatsink too hot */
+  MOTORLINK_ST_FAULT_START_UP     = 0x10, /**< the motor did not start */
+  MOTORLINK_ST_FAULT_SPEED_FDBK   = 0x20, /**< speed feedback lost */
+  MOTORLINK_ST_FAULT_BREAK_IN     = 0x40, /**< over-current */
+  MOTORLINK_ST_FAULT_SW_ERROR     = 0x80  /**< software error */
+};
+
+/** What a motor's control may be built with. */
+enum motorlink_st_feature {
+  MOTORLINK_ST_FEATURE_OBSERVER_PLL     = 0x0002, /**< state observer with PLL */
+  MOTORLINK_ST_FEATURE_OBSERVER_CORDIC  = 0x0004, /**< state observer with CORDIC */
+  MOTORLINK_ST_FEATURE_POSITION_SENSOR  = 0x0008, /**< encoder or Hall sensors */
+  MOTORLINK_ST_FEATURE_FLUX_WEAKENING   = 0x0010, /**< flux weakening */
+  MOTORLINK_ST_FEATURE_FEED_FORWARD     = 0x0020, /**< feed-forward */
+  MOTORLINK_ST_FEATURE_PFC              = 0x0040, /**< power factor correction */
+  MOTORLINK_ST_FEATURE_DAC              = 0x0080, /**< DAC */
+  MOTORLINK_ST_FEATURE_HFI              = 0x0100, /**< high-frequency injection */
+  MOTORLINK_ST_FEATURE_PROFILER         = 0x0200, /**< motor profiler */
+  MOTORLINK_ST_FEATURE_POSITION_CONTROL = 0x0400  /**< position control */
+};
+
+/** Commands (chapter 2): the first byte of request and reply. */
+enum motorlink_rmd_code {
+  MOTORLINK_RMD_CODE_READ_GAINS              = 0x30, /**< reads the gains in RAM */
+  MOTORLINK_RMD_CODE_WRITE_GAINS             = 0x31, /**< sets the gains until power-off */
+  MOTORLINK_RMD_CODE_WRITE_GAINS_TO_ROM      = 0x32, /**< sets the gains for good; wears the ROM */
+  MOTORLINK_RMD_CODE_READ_ACCELERATION       = 0x33, /**< reads the acceleration limit */
+  MOTORLINK_RMD_CODE_WRITE_ACCELERATION      = 0x34, /**< sets the acceleration limit until power-off */
+  MOTORLINK_RMD_CODE_READ_ENCODER            = 0x90, /**< reads encoder position, original position and offset */
+  MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET    = 0x91, /**< sets the encoder offset, at once and for good; wears the ROM */
+  MOTORLINK_RMD_CODE_WRITE_ZERO_TO_ROM       = 0x19, /**< makes the current position the zero from the next power-on on; wears the ROM */
+  MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE   = 0x92, /**< reads the angle over all turns */
+  MOTORLINK_RMD_CODE_READ_CIRCLE_ANGLE       = 0x94, /**< reads the angle within the turn */
+  MOTORLINK_RMD_CODE_READ_STATUS_1           = 0x9A, /**< reads temperature, voltage and error flags */
+  MOTORLINK_RMD_CODE_CLEAR_ERRORS            = 0x9B, /**< clears the error flags whose cause is gone */
+  MOTORLINK_RMD_CODE_READ_STATUS_2           = 0x9C, /**< reads temperature, torque current, speed and encoder position */
+  MOTORLINK_RMD_CODE_READ_STATUS_3           = 0x9D, /**< reads the three phase currents */
+  MOTORLINK_RMD_CODE_OFF                     = 0x80, /**< switches the motor off and forgets what it was doing */
+  MOTORLINK_RMD_CODE_STOP                    = 0x81, /**< stops the motor and remembers what it was doing */
+  MOTORLINK_RMD_CODE_RUN                     = 0x88, /**< resumes what the motor was doing before the stop */
+  MOTORLINK_RMD_CODE_TORQUE                  = 0xA1, /**< holds a torque current */
+  MOTORLINK_RMD_CODE_SPEED                   = 0xA2, /**< holds a speed */
+  MOTORLINK_RMD_CODE_POSITION                = 0xA3, /**< turns to a multi-turn angle */
+  MOTORLINK_RMD_CODE_POSITION_LIMITED        = 0xA4, /**< turns to a multi-turn angle no faster than a limit */
+  MOTORLINK_RMD_CODE_CIRCLE_POSITION         = 0xA5, /**< turns to an angle within the turn, in a given direction */
+  MOTORLINK_RMD_CODE_CIRCLE_POSITION_LIMITED = 0xA6  /**< turns to an angle within the turn, in a given direction, no faster than a limit */
+};
+
+/** Bits of the error state. */
+enum motorlink_rmd_fault {
+  MOTORLINK_RMD_FAULT_LOW_VOLTAGE      = 0x01, /**< low voltage protection */
+  MOTORLINK_RMD_FAULT_OVER_TEMPERATURE = 0x08  /**< over temperature protection */
+};
+
+/** Which way to turn to an angle within the turn. */
+enum motorlink_rmd_spin {
+  MOTORLINK_RMD_SPIN_CLOCKWISE        = 0x00, /**< towards growing angles */
+  MOTORLINK_RMD_SPIN_COUNTERCLOCKWISE = 0x01  /**< towards falling angles */
+};
+
+/** CAN identifiers. */
+enum motorlink_rmd_can_id {
+  MOTORLINK_RMD_MOTOR_BASE = 0x0140, /**< request and reply of the motor with ID n have the identifier n above this */
+  MOTORLINK_RMD_TORQUE4_ID = 0x0280  /**< torque currents for motors 1 to 4 */
+};
+
+
+
+/**
+ * Success, as all functions give it.
+ */
+#define MOTORLINK_OK 0
+
+/**
+ * The moment of a `WAIT` that only a received byte or frame, or a new request, can end.
+ */
+#define MOTORLINK_NEVER UINT64_MAX
+
+/**
+ * Words of 8 bytes in a [`motorlink_st_slave`].
+ */
+#define MOTORLINK_ST_SLAVE_WORDS 38
+
+/**
+ * Words of 8 bytes in a [`motorlink_st_master`].
+ */
+#define MOTORLINK_ST_MASTER_WORDS 29
+
+/**
+ * Words of 8 bytes in a [`motorlink_rmd_host`].
+ */
+#define MOTORLINK_RMD_HOST_WORDS 333
+
+/**
+ * Words of 8 bytes in a [`motorlink_rmd_drive`].
+ */
+#define MOTORLINK_RMD_DRIVE_WORDS 13
+
+/**
+ * The longest payload.
+ */
+#define MOTORLINK_ST_MAX_PAYLOAD 128
+
+/**
+ * Bytes for a text of a reply with its NUL.
+ */
+#define MOTORLINK_ST_TEXT_SIZE 33
+
+/**
+ * In `motorlink_rmd_limits`: no limit beyond the document's range.
+ */
+#define MOTORLINK_RMD_NO_LIMIT -1
+
+/**
+ * What became of a call, or of an exchange. 0 is success.
+ */
+enum motorlink_error
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Done.
+   */
+  MOTORLINK_ERROR_OK = 0,
+  /**
+   * A pointer that is needed is NULL.
+   */
+  MOTORLINK_ERROR_NULL_POINTER = 1,
+  /**
+   * A pointer is not aligned as its type demands.
+   */
+  MOTORLINK_ERROR_MISALIGNED = 2,
+  /**
+   * The storage is smaller than this library needs: it was declared with another header.
+   */
+  MOTORLINK_ERROR_STORAGE_TOO_SMALL = 3,
+  /**
+   * The storage was never initialised, or something wrote over it.
+   */
+  MOTORLINK_ERROR_UNINITIALISED = 4,
+  /**
+   * The storage belongs to an object of another kind.
+   */
+  MOTORLINK_ERROR_WRONG_KIND = 5,
+  /**
+   * A call for this object is under way: this one comes from one of its callbacks, from an
+   * interrupt or from another thread.
+   */
+  MOTORLINK_ERROR_IN_USE = 6,
+  /**
+   * A number is outside of its range.
+   */
+  MOTORLINK_ERROR_BAD_ARGUMENT = 7,
+  /**
+   * The payload does not fit a frame.
+   */
+  MOTORLINK_ERROR_TOO_LONG = 8,
+  /**
+   * An exchange is under way, with the drive (ST) or this motor (RMD).
+   */
+  MOTORLINK_ERROR_BUSY = 9,
+  /**
+   * The drive refused; `refusal` tells why (ST).
+   */
+  MOTORLINK_ERROR_REFUSED = 20,
+  /**
+   * No reply in time. It is not known whether the drive did what was asked.
+   */
+  MOTORLINK_ERROR_TIMEOUT = 21,
+  /**
+   * A reply began and stopped (ST).
+   */
+  MOTORLINK_ERROR_INCOMPLETE = 22,
+  /**
+   * A byte came that begins no reply (ST).
+   */
+  MOTORLINK_ERROR_NOT_A_REPLY = 23,
+  /**
+   * A reply is damaged (ST).
+   */
+  MOTORLINK_ERROR_DAMAGED = 24,
+  /**
+   * The drive did not understand what it received; `refusal` tells why (ST).
+   */
+  MOTORLINK_ERROR_NOT_UNDERSTOOD = 25,
+  /**
+   * Two replies that differ came at once (ST).
+   */
+  MOTORLINK_ERROR_AMBIGUOUS = 26,
+  /**
+   * The line was lost before, and the drive does not answer; nothing was sent (ST).
+   */
+  MOTORLINK_ERROR_LOST = 27,
+  /**
+   * The line was lost before, and does not fall silent; nothing was sent (ST).
+   */
+  MOTORLINK_ERROR_NOISE = 28,
+  /**
+   * The motor did not answer before and cannot be trusted yet; nothing was done. Ask again (RMD).
+   */
+  MOTORLINK_ERROR_QUARANTINED = 40,
+  /**
+   * A limit that the caller set, or the document's range, is exceeded; nothing was sent (RMD).
+   */
+  MOTORLINK_ERROR_LIMIT = 41,
+  /**
+   * No reply of this protocol, but one of RMD V3 or V4, or LK-Tech V2.36 (RMD).
+   */
+  MOTORLINK_ERROR_FOREIGN = 42,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum motorlink_error motorlink_error;
+#else
+typedef int32_t motorlink_error;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What the caller of a `poll` has to do next.
+ */
+enum motorlink_action
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Hand in what comes, and poll again at `until_us` at the latest.
+   */
+  MOTORLINK_ACTION_WAIT = 0,
+  /**
+   * Send, then poll again.
+   */
+  MOTORLINK_ACTION_TRANSMIT = 1,
+  /**
+   * An exchange is over; poll again.
+   */
+  MOTORLINK_ACTION_DONE = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum motorlink_action motorlink_action;
+#else
+typedef uint8_t motorlink_action;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How a drive behaves where the document and shipped firmware differ.
+ */
+enum motorlink_st_profile
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * The document as written.
+   */
+  MOTORLINK_ST_PROFILE_SPEC = 0,
+  /**
+   * What firmware of MCSDK 5.4 does on the wire.
+   */
+  MOTORLINK_ST_PROFILE_MCSDK54 = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum motorlink_st_profile motorlink_st_profile;
+#else
+typedef uint8_t motorlink_st_profile;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How a line comes back on which an exchange failed.
+ */
+enum motorlink_st_recovery
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Not by itself: `motorlink_st_master_reopened` says that the caller opened it anew.
+   */
+  MOTORLINK_ST_RECOVERY_NONE = 0,
+  /**
+   * Waits for silence, asks a question, goes on when it was answered.
+   */
+  MOTORLINK_ST_RECOVERY_DRAIN = 1,
+  /**
+   * As `DRAIN`, behind bytes that complete a frame which a 5.x drive may still be waiting for.
+   */
+  MOTORLINK_ST_RECOVERY_PAD = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum motorlink_st_recovery motorlink_st_recovery;
+#else
+typedef uint8_t motorlink_st_recovery;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What a motor does.
+ */
+enum motorlink_rmd_mode
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Without current.
+   */
+  MOTORLINK_RMD_MODE_OFF = 0,
+  /**
+   * Brought to a stand and kept there.
+   */
+  MOTORLINK_RMD_MODE_STOPPED = 1,
+  /**
+   * Holds `torque_16ma`.
+   */
+  MOTORLINK_RMD_MODE_TORQUE = 2,
+  /**
+   * Holds `speed_centidps`.
+   */
+  MOTORLINK_RMD_MODE_SPEED = 3,
+  /**
+   * Turns to `target_counts` and holds it.
+   */
+  MOTORLINK_RMD_MODE_POSITION = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum motorlink_rmd_mode motorlink_rmd_mode;
+#else
+typedef uint8_t motorlink_rmd_mode;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How a master behaves.
+ */
+typedef struct motorlink_st_master_config {
+  /**
+   * How long to wait for a reply, µs.
+   */
+  uint32_t timeout_us;
+  /**
+   * The silence after which nothing more is expected to come, µs.
+   */
+  uint32_t quiet_us;
+  /**
+   * How the drive behaves: one of `motorlink_st_profile`.
+   */
+  uint8_t profile;
+  /**
+   * How a lost line comes back: one of `motorlink_st_recovery`.
+   */
+  uint8_t recovery;
+} motorlink_st_master_config;
+
+/**
+ * A master of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
+ * Opaque; may be moved and copied while no call for it is under way.
+ */
+typedef struct motorlink_st_master {
+  /**
+   * Nobody's business.
+   */
+  uint64_t opaque[MOTORLINK_ST_MASTER_WORDS];
+} motorlink_st_master;
+
+/**
+ * A phase of the rev-up (4.9).
+ */
+typedef struct motorlink_st_revup_phase {
+  /**
+   * Mechanical speed at the end of the phase, rpm.
+   */
+  int32_t speed_rpm;
+  /**
+   * Iq at the end of the phase, s16A digits.
+   */
+  int16_t torque_s16a;
+  /**
+   * Length of the phase, ms.
+   */
+  uint16_t duration_ms;
+} motorlink_st_revup_phase;
+
+/**
+ * Bytes that belong to an object: to be sent or copied before the next call for it.
+ */
+typedef struct motorlink_bytes {
+  /**
+   * The first byte; never NULL, also when there is none.
+   */
+  const uint8_t *data;
+  /**
+   * How many bytes there are.
+   */
+  size_t size;
+} motorlink_bytes;
+
+/**
+ * What to do next, or what became of the exchange.
+ */
+typedef struct motorlink_st_action {
+  /**
+   * `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
+   */
+  uint64_t until_us;
+  /**
+   * `TRANSMIT`: what to send. `DONE`: the payload of the reply. They belong to the master, until
+   * the next call for it.
+   */
+  struct motorlink_bytes bytes;
+  /**
+   * `DONE`: whether the drive did what was asked, and why not.
+   */
+  motorlink_error result;
+  /**
+   * `DONE` of a register read: the register's value, the sign extended as its type has it; the
+   * bits of a floating-point register. 0 for anything else.
+   */
+  int32_t value;
+  /**
+   * What this is: `WAIT`, `TRANSMIT` or `DONE`.
+   */
+  motorlink_action kind;
+  /**
+   * `DONE` with `REFUSED` or `NOT_UNDERSTOOD`: one of `motorlink_st_refusal`, or a number that
+   * the document does not name.
+   */
+  uint8_t refusal;
+} motorlink_st_action;
+
+/**
+ * The answer to a board information request (4.7).
+ */
+typedef struct motorlink_st_board_info {
+  /**
+   * Major version of the SDK.
+   */
+  uint8_t major;
+  /**
+   * Minor version of the SDK.
+   */
+  uint8_t minor;
+  /**
+   * Patch version of the SDK.
+   */
+  uint8_t patch;
+  /**
+   * Name of the SDK, UTF-8, with a NUL at its end.
+   */
+  char name[MOTORLINK_ST_TEXT_SIZE];
+} motorlink_st_board_info;
+
+/**
+ * The answer to a firmware version request (4.12).
+ */
+typedef struct motorlink_st_firmware_version {
+  /**
+   * Name of the firmware, UTF-8, with a NUL at its end.
+   */
+  char name[MOTORLINK_ST_TEXT_SIZE];
+  /**
+   * Its version, such as `Ver.5.4.4`, UTF-8, with a NUL at its end.
+   */
+  char version[MOTORLINK_ST_TEXT_SIZE];
+} motorlink_st_firmware_version;
+
+/**
+ * A slave of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
+ * Opaque; may be moved and copied while no call for it is under way.
+ */
+typedef struct motorlink_st_slave {
+  /**
+   * Nobody's business.
+   */
+  uint64_t opaque[MOTORLINK_ST_SLAVE_WORDS];
+} motorlink_st_slave;
+
+/**
+ * The firmware's version, as board information (4.7) and firmware version (4.12) tell it.
+ */
+typedef struct motorlink_st_version {
+  /**
+   * Name of the SDK, ASCII, NUL-terminated; the replies have room for 28 and 15 bytes of it.
+   * NULL is no name.
+   */
+  const char *name;
+  /**
+   * Type and number of a pre-release, such as "RC2", ASCII, NUL-terminated. NULL is a release.
+   */
+  const char *pre_release;
+  /**
+   * Major version.
+   */
+  uint8_t major;
+  /**
+   * Minor version.
+   */
+  uint8_t minor;
+  /**
+   * Patch version.
+   */
+  uint8_t patch;
+} motorlink_st_version;
+
+/**
+ * A drive behind a slave: what it is and what it does. The slave has checked the frame, the
+ * motor, the register's existence and access, and every size before it calls.
+ *
+ * Every callback may be NULL. It is called from within `motorlink_st_slave_receive`, and may not
+ * call for the same slave: such calls give `IN_USE`. `motor` is 1 to 7, and exists.
+ */
+typedef struct motorlink_st_drive {
+  /**
+   * Handed to each callback.
+   */
+  void *context;
+  /**
+   * The firmware's version.
+   */
+  struct motorlink_st_version version;
+  /**
+   * What this motor's control is built with: a sum of `MOTORLINK_ST_FEATURE_*`.
+   * NULL: nothing.
+   */
+  uint16_t (*features)(void *context, uint8_t motor);
+  /**
+   * The value of a register that exists with `features`. Not called for TARGET_MOTOR, which
+   * the slave keeps. FLUXWK_BUS and FLUXWK_BUS_MEAS are tenths of a percent; the value of a
+   * floating-point register is its bits. NULL: 0.
+   */
+  int32_t (*read)(void *context, uint8_t motor, uint8_t reg);
+  /**
+   * Writes a register that may be written; gives 0, or why not: `MOTORLINK_ST_REFUSAL_*`,
+   * WRONG_SET for a value that the register cannot take. NULL: WRONG_SET.
+   */
+  uint8_t (*write)(void *context, uint8_t motor, uint8_t reg, int32_t value);
+  /**
+   * Executes a `MOTORLINK_ST_COMMAND_*`. What the state does not allow has no effect (4.6).
+   * NULL: none has.
+   */
+  void (*execute)(void *context, uint8_t motor, uint8_t command);
+  /**
+   * Programs a speed ramp: at once in RUN, else when RUN is reached (4.8). 0 ms is a step.
+   * NULL: without effect.
+   */
+  void (*ramp)(void *context, uint8_t motor, int32_t speed_rpm, uint16_t duration_ms);
+  /**
+   * Gives rev-up phase 0 to 4 (4.9); what is not set is 0. NULL: all is 0.
+   */
+  void (*revup)(void *context, uint8_t motor, uint8_t phase, struct motorlink_st_revup_phase *data);
+  /**
+   * Sets rev-up phase 0 to 4 (4.10). NULL: without effect.
+   */
+  void (*set_revup)(void *context,
+                    uint8_t motor,
+                    uint8_t phase,
+                    const struct motorlink_st_revup_phase *data);
+  /**
+   * Sets the current references: at once in RUN, else when RUN is reached (4.11).
+   * NULL: without effect.
+   */
+  void (*current)(void *context, uint8_t motor, int16_t iq_s16a, int16_t id_s16a);
+  /**
+   * Programs a torque ramp (profile MCSDK 5.4). NULL: without effect.
+   */
+  void (*torque_ramp)(void *context, uint8_t motor, int32_t torque_s16a, uint16_t duration_ms);
+  /**
+   * Moves to an angle (profile MCSDK 5.4, with POSITION_CONTROL). NULL: without effect.
+   */
+  void (*position)(void *context, uint8_t motor, float angle_rad, float duration_s);
+  /**
+   * Registers that a step of the motor profiler shows (profile MCSDK 5.4, with PROFILER): gives
+   * how many there are and where, until the next call of a callback. NULL: none.
+   */
+  uint8_t (*profiler_step)(void *context, uint8_t motor, uint8_t step, const uint8_t **registers);
+} motorlink_st_drive;
+
+/**
+ * The eight bytes of a request or a reply.
+ */
+typedef struct motorlink_rmd_data {
+  /**
+   * DATA\[0\] to DATA\[7\].
+   */
+  uint8_t bytes[8];
+} motorlink_rmd_data;
+
+/**
+ * Gains of the three loops, without unit.
+ */
+typedef struct motorlink_rmd_gains {
+  uint8_t position_kp;
+  uint8_t position_ki;
+  uint8_t speed_kp;
+  uint8_t speed_ki;
+  uint8_t torque_kp;
+  uint8_t torque_ki;
+} motorlink_rmd_gains;
+
+/**
+ * What the encoder reads, in counts of its width, or of 16 bits when it is wider.
+ */
+typedef struct motorlink_rmd_encoder {
+  /**
+   * `raw` minus `offset`, modulo one turn.
+   */
+  uint16_t position;
+  /**
+   * The original position.
+   */
+  uint16_t raw;
+  /**
+   * The zero point.
+   */
+  uint16_t offset;
+} motorlink_rmd_encoder;
+
+/**
+ * Temperature, voltage and errors: the reply to 0x9A and 0x9B.
+ */
+typedef struct motorlink_rmd_status {
+  /**
+   * Supply voltage, 0.1 V a digit.
+   */
+  uint16_t voltage_decivolts;
+  /**
+   * Motor temperature, °C.
+   */
+  int8_t temperature_celsius;
+  /**
+   * Which protections are active: a sum of `MOTORLINK_RMD_FAULT_*`.
+   */
+  uint8_t errors;
+} motorlink_rmd_status;
+
+/**
+ * The reply to 0x9C, to every motion command and to 0x280.
+ */
+typedef struct motorlink_rmd_motion_status {
+  /**
+   * Torque current, 33/2048 A a digit.
+   */
+  int16_t iq_digits;
+  /**
+   * Speed, °/s, positive is clockwise.
+   */
+  int16_t speed_dps;
+  /**
+   * Encoder position in counts of its width, the upper 16 bits of a wider one.
+   */
+  uint16_t encoder_counts;
+  /**
+   * Motor temperature, °C.
+   */
+  int8_t temperature_celsius;
+} motorlink_rmd_motion_status;
+
+/**
+ * Phase currents: the reply to 0x9D.
+ */
+typedef struct motorlink_rmd_phase_currents {
+  /**
+   * Phase A, 1/64 A a digit.
+   */
+  int16_t a_digits;
+  /**
+   * Phase B, 1/64 A a digit.
+   */
+  int16_t b_digits;
+  /**
+   * Phase C, 1/64 A a digit.
+   */
+  int16_t c_digits;
+} motorlink_rmd_phase_currents;
+
+/**
+ * The host of a bus with RMD motors, in storage of the caller's: static, on the stack or on the heap.
+ * Opaque; may be moved and copied while no call for it is under way.
+ */
+typedef struct motorlink_rmd_host {
+  /**
+   * Nobody's business.
+   */
+  uint64_t opaque[MOTORLINK_RMD_HOST_WORDS];
+} motorlink_rmd_host;
+
+/**
+ * What a motor may be told, either way round.
+ */
+typedef struct motorlink_rmd_limits {
+  /**
+   * Greatest torque current of 0xA1 and 0x280, 0.016 A a digit, or `MOTORLINK_RMD_NO_LIMIT`.
+   */
+  int32_t torque_16ma;
+  /**
+   * Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_RMD_NO_LIMIT`. 0xA3 and 0xA5
+   * carry no speed and are refused while this is set.
+   */
+  int32_t speed_dps;
+  /**
+   * Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit, or `MOTORLINK_RMD_NO_LIMIT`.
+   */
+  int32_t angle_centidegrees;
+} motorlink_rmd_limits;
+
+/**
+ * A classic CAN frame of any kind.
+ */
+typedef struct motorlink_can_frame {
+  /**
+   * The identifier: 11 bits, or 29.
+   */
+  uint32_t id;
+  /**
+   * 1 where the identifier has 29 bits.
+   */
+  uint8_t extended;
+  /**
+   * 1 for a remote transmission request.
+   */
+  uint8_t remote;
+  /**
+   * The length code, 0 to 8.
+   */
+  uint8_t size;
+  /**
+   * The bytes; of these `size` count.
+   */
+  uint8_t data[8];
+} motorlink_can_frame;
+
+/**
+ * What to do next, or what became of an exchange.
+ */
+typedef struct motorlink_rmd_action {
+  /**
+   * `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
+   */
+  uint64_t until_us;
+  /**
+   * `TRANSMIT`: the frame to send.
+   */
+  struct motorlink_can_frame frame;
+  /**
+   * `DONE`: the motor's reply, for the `motorlink_rmd_decode_*` functions.
+   */
+  struct motorlink_rmd_data reply;
+  /**
+   * `DONE`: what became of the exchange.
+   */
+  motorlink_error result;
+  /**
+   * What this is: `WAIT`, `TRANSMIT` or `DONE`.
+   */
+  motorlink_action kind;
+  /**
+   * `DONE`: the motor, 1 to 32.
+   */
+  uint8_t motor;
+} motorlink_rmd_action;
+
+/**
+ * An RMD drive, in storage of the caller's: static, on the stack or on the heap.
+ * Opaque; may be moved and copied while no call for it is under way.
+ */
+typedef struct motorlink_rmd_drive {
+  /**
+   * Nobody's business.
+   */
+  uint64_t opaque[MOTORLINK_RMD_DRIVE_WORDS];
+} motorlink_rmd_drive;
+
+/**
+ * What the vendor's tool or a switch sets, not the bus.
+ */
+typedef struct motorlink_rmd_drive_config {
+  /**
+   * Switches the motor off after this long without a command, µs; 0 is never.
+   */
+  uint64_t shutdown_us;
+  /**
+   * The ID that the drive answers to, 1 to 32.
+   */
+  uint8_t id;
+  /**
+   * Width of the encoder, 12 to 18 bits; 0 is the document's 14.
+   */
+  uint8_t encoder_bits;
+  /**
+   * 1 answers 0x9B with 0x9B, as relatives do, 0 with 0x9A as printed (docs/SPEC-NOTES.md R1).
+   */
+  uint8_t clear_reply_0x9b;
+} motorlink_rmd_drive_config;
+
+/**
+ * What a host can set: once in RAM, which commands act on, and once in ROM, which power-on copies.
+ */
+typedef struct motorlink_rmd_settings {
+  /**
+   * Acceleration limit, °/s²; 0 and less are no limit.
+   */
+  int32_t acceleration_dps2;
+  /**
+   * Encoder value that is zero, as it travels: at most 16 bits.
+   */
+  uint16_t encoder_offset;
+  /**
+   * Gains of the three loops.
+   */
+  struct motorlink_rmd_gains gains;
+} motorlink_rmd_settings;
+
+/**
+ * What a motor does, with the values that belong to it; the others are 0.
+ */
+typedef struct motorlink_rmd_motion {
+  /**
+   * `POSITION`: encoder counts as in `motorlink_rmd_sense`.
+   */
+  int64_t target_counts;
+  /**
+   * `SPEED`: 0.01 °/s a digit, positive is clockwise.
+   */
+  int32_t speed_centidps;
+  /**
+   * `POSITION`: greatest speed on the way, °/s; -1 leaves it to the drive's own.
+   */
+  int32_t max_speed_dps;
+  /**
+   * `TORQUE`: torque current, 0.016 A a digit, -2000 to 2000.
+   */
+  int16_t torque_16ma;
+  /**
+   * `POSITION`: 1 where the drive's greatest angle holds, 0 for angles within the turn.
+   */
+  uint8_t within_max_angle;
+  /**
+   * One of `motorlink_rmd_mode`.
+   */
+  uint8_t kind;
+} motorlink_rmd_motion;
+
+/**
+ * What the sensors read.
+ */
+typedef struct motorlink_rmd_sense {
+  /**
+   * Encoder counts in the encoder's own width, growing clockwise and counted on beyond each end
+   * of the turn. Starts within the turn at power-on.
+   */
+  int64_t encoder_counts;
+  /**
+   * Torque current, 33/2048 A a digit.
+   */
+  int16_t iq_digits;
+  /**
+   * Speed, °/s, positive is clockwise.
+   */
+  int16_t speed_dps;
+  /**
+   * Supply voltage, 0.1 V a digit.
+   */
+  uint16_t voltage_decivolts;
+  /**
+   * Currents of the phases A, B and C, 1/64 A a digit.
+   */
+  int16_t phase_digits[3];
+  /**
+   * Motor temperature, °C.
+   */
+  int8_t temperature_celsius;
+  /**
+   * Faults that are present now, a sum of `MOTORLINK_RMD_FAULT_*`; the drive latches them.
+   */
+  uint8_t faults;
+} motorlink_rmd_sense;
+
+/**
+ * The motor behind a drive: the power stage, its control loops and its sensors.
+ *
+ * Every callback may be NULL. It is called from within `motorlink_rmd_drive_power_on`, `_receive`
+ * and `_poll`, and may not call for the same drive: such calls give `IN_USE`.
+ */
+typedef struct motorlink_rmd_motor {
+  /**
+   * Handed to each callback.
+   */
+  void *context;
+  /**
+   * Does this from now on. NULL: without effect.
+   */
+  void (*set_mode)(void *context, const struct motorlink_rmd_motion *motion);
+  /**
+   * Uses these gains and this acceleration limit from now on. NULL: without effect.
+   */
+  void (*configure)(void *context, const struct motorlink_rmd_settings *settings);
+  /**
+   * Tells what the sensors read; what is not set is 0. NULL: all is 0.
+   */
+  void (*sense)(void *context, struct motorlink_rmd_sense *sense);
+  /**
+   * Keeps what `motorlink_rmd_drive_init` gets after a power cycle. Wears a real ROM.
+   * NULL: forgotten at power-off.
+   */
+  void (*save)(void *context, const struct motorlink_rmd_settings *rom);
+} motorlink_rmd_motor;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * The error in words, in English, without a full stop. Never NULL; any number is taken. The text
+ * is constant. A program that does not call this does not carry the texts.
+ */
+const char *motorlink_error_text(int32_t error);
+
+/**
+ * The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
+ */
+struct motorlink_st_master_config motorlink_st_master_defaults(void);
+
+/**
+ * Begins a master on a line that is up, whatever the storage held before.
+ *
+ * `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` or `recovery` is
+ * not one of its enum's.
+ */
+motorlink_error motorlink_st_master_init(struct motorlink_st_master *master,
+                                         size_t size,
+                                         const struct motorlink_st_master_config *config);
+
+/**
+ * Begins to read a register; `value` of the result is its value. Any number is taken.
+ */
+motorlink_error motorlink_st_master_get_register(struct motorlink_st_master *master,
+                                                 uint8_t motor,
+                                                 uint8_t reg);
+
+/**
+ * Begins to write a register, with as many low bytes of `value` as it has; of a floating-point
+ * register `value` is the bits. Any number is taken.
+ */
+motorlink_error motorlink_st_master_set_register(struct motorlink_st_master *master,
+                                                 uint8_t motor,
+                                                 uint8_t reg,
+                                                 int32_t value);
+
+/**
+ * Begins to have a command executed, one of `motorlink_st_command`. Any number is taken.
+ */
+motorlink_error motorlink_st_master_execute(struct motorlink_st_master *master,
+                                            uint8_t motor,
+                                            uint8_t command);
+
+/**
+ * Begins to program a speed ramp (4.8): to `speed_rpm` in `duration_ms`; 0 ms is a step.
+ */
+motorlink_error motorlink_st_master_ramp(struct motorlink_st_master *master,
+                                         uint8_t motor,
+                                         int32_t speed_rpm,
+                                         uint16_t duration_ms);
+
+/**
+ * Begins to set the references of Iq and Id (4.11), s16A digits.
+ */
+motorlink_error motorlink_st_master_current(struct motorlink_st_master *master,
+                                            uint8_t motor,
+                                            int16_t iq_s16a,
+                                            int16_t id_s16a);
+
+/**
+ * Begins to program a torque ramp (profile MCSDK 5.4): to `torque_s16a` in `duration_ms`; 0 ms is
+ * a step.
+ */
+motorlink_error motorlink_st_master_torque_ramp(struct motorlink_st_master *master,
+                                                uint8_t motor,
+                                                int32_t torque_s16a,
+                                                uint16_t duration_ms);
+
+/**
+ * Begins a move to `angle_rad` in `duration_s` (profile MCSDK 5.4).
+ *
+ * `BAD_ARGUMENT`: `motor` is over 7, or a value is not finite.
+ */
+motorlink_error motorlink_st_master_move(struct motorlink_st_master *master,
+                                         uint8_t motor,
+                                         float angle_rad,
+                                         float duration_s);
+
+/**
+ * Begins to read rev-up phase 0 to 4 (4.9); `motorlink_st_decode_revup` reads the result.
+ *
+ * `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
+ */
+motorlink_error motorlink_st_master_revup(struct motorlink_st_master *master,
+                                          uint8_t motor,
+                                          uint8_t phase);
+
+/**
+ * Begins to write rev-up phase 0 to 4 (4.10). `data` is copied.
+ *
+ * `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
+ */
+motorlink_error motorlink_st_master_set_revup(struct motorlink_st_master *master,
+                                              uint8_t motor,
+                                              uint8_t phase,
+                                              const struct motorlink_st_revup_phase *data);
+
+/**
+ * Begins to read the SDK's version and name (4.7); `motorlink_st_decode_board_info` reads the
+ * result.
+ */
+motorlink_error motorlink_st_master_board_info(struct motorlink_st_master *master, uint8_t motor);
+
+/**
+ * Begins to read the firmware's version (4.12); `motorlink_st_decode_firmware_version` reads the
+ * result.
+ */
+motorlink_error motorlink_st_master_firmware_version(struct motorlink_st_master *master,
+                                                     uint8_t motor);
+
+/**
+ * Begins to choose the registers of a data segment (profile SPEC): `count` numbers, which are
+ * copied.
+ */
+motorlink_error motorlink_st_master_configure_segment(struct motorlink_st_master *master,
+                                                      uint8_t motor,
+                                                      uint8_t segment,
+                                                      const uint8_t *registers,
+                                                      size_t count);
+
+/**
+ * Begins to read a data segment (profile SPEC): the values of its registers, one behind the other,
+ * little-endian, in the size that each has.
+ */
+motorlink_error motorlink_st_master_read_segment(struct motorlink_st_master *master,
+                                                 uint8_t motor,
+                                                 uint8_t segment);
+
+/**
+ * Begins to ask which registers steps of the motor profiler show (profile MCSDK 5.4): `count`
+ * numbers of steps, which are copied. The result has the count and the registers of each step.
+ */
+motorlink_error motorlink_st_master_profiler_info(struct motorlink_st_master *master,
+                                                  uint8_t motor,
+                                                  const uint8_t *steps,
+                                                  size_t count);
+
+/**
+ * Begins an exchange with any header (5 bits of `motorlink_st_frame`, 3 bits of motor) and any
+ * payload of up to 128 bytes, which is copied.
+ *
+ * `TOO_LONG`: over 128 bytes.
+ */
+motorlink_error motorlink_st_master_raw(struct motorlink_st_master *master,
+                                        uint8_t header,
+                                        const uint8_t *payload,
+                                        size_t size);
+
+/**
+ * What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
+ * `DONE`; after `WAIT` when something came or the time is over.
+ */
+motorlink_error motorlink_st_master_poll(struct motorlink_st_master *master,
+                                         uint64_t now_us,
+                                         struct motorlink_st_action *action);
+
+/**
+ * Takes what came from the drive at `now_us`, in any pieces. `bytes` may not lie in the storage.
+ */
+motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
+                                            uint64_t now_us,
+                                            const uint8_t *bytes,
+                                            size_t size);
+
+/**
+ * Gives up the exchange under way. Its reply may still come, so the line is lost.
+ */
+motorlink_error motorlink_st_master_abandon(struct motorlink_st_master *master);
+
+/**
+ * Tells that the line was closed and opened again, with nothing left in it from before. An
+ * exchange under way ends without a result.
+ */
+motorlink_error motorlink_st_master_reopened(struct motorlink_st_master *master);
+
+/**
+ * Sets `lost` to 1 where an exchange failed and the next one has to recover the line first, and to
+ * 0 where the last one ended in step.
+ */
+motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, uint8_t *lost);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_board_info`.
+ *
+ * `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+ */
+motorlink_error motorlink_st_decode_board_info(const uint8_t *payload,
+                                               size_t size,
+                                               struct motorlink_st_board_info *info);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
+ * UTF-8 are cut there.
+ *
+ * `NULL_POINTER`, `MISALIGNED`.
+ */
+motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
+                                                     size_t size,
+                                                     struct motorlink_st_firmware_version *version);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_revup`.
+ *
+ * `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+ */
+motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
+                                          size_t size,
+                                          struct motorlink_st_revup_phase *phase);
+
+/**
+ * Begins a slave for a drive with motors 1 to `motors`, whatever the storage held before.
+ *
+ * `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
+ * may be constant. Not from a callback of the same slave.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` is none of
+ * `motorlink_st_profile`, or `motors` is not 1 to 7.
+ */
+motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
+                                        size_t size,
+                                        uint8_t profile,
+                                        uint8_t motors,
+                                        const struct motorlink_st_drive *drive);
+
+/**
+ * Takes a byte that came at `now_us`. Where it completes a command the drive is called, and
+ * `reply` is what to send before the next byte is handed in; else `reply` has no bytes.
+ *
+ * The bytes belong to the slave, until the next call for it. A byte costs some instructions, a
+ * complete command a checksum over it and the callbacks.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_st_slave_receive(struct motorlink_st_slave *slave,
+                                           uint64_t now_us,
+                                           uint8_t byte,
+                                           struct motorlink_bytes *reply);
+
+/**
+ * Call at the deadline: gives the refusal that a command is owed which did not come whole in time
+ * (4.1), and no bytes when there is none. The bytes belong to the slave, until the next call for
+ * it.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_st_slave_poll(struct motorlink_st_slave *slave,
+                                        uint64_t now_us,
+                                        struct motorlink_bytes *reply);
+
+/**
+ * When `motorlink_st_slave_poll` has to be called; `MOTORLINK_NEVER` while no command is under
+ * way, and always in profile MCSDK 5.4, whose firmware never times out.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_st_slave_deadline(struct motorlink_st_slave *slave,
+                                            uint64_t *deadline_us);
+
+/**
+ * Tells that the receiver lost bytes (overrun, framing, noise): drops the command under way and
+ * gives the refusal to send. The bytes belong to the slave, until the next call for it.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_st_slave_overrun(struct motorlink_st_slave *slave,
+                                           struct motorlink_bytes *reply);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_board_info`.
+ *
+ * `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+ */
+motorlink_error motorlink_st_decode_board_info(const uint8_t *payload,
+                                               size_t size,
+                                               struct motorlink_st_board_info *info);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
+ * UTF-8 are cut there.
+ *
+ * `NULL_POINTER`, `MISALIGNED`.
+ */
+motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
+                                                     size_t size,
+                                                     struct motorlink_st_firmware_version *version);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_revup`.
+ *
+ * `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+ */
+motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
+                                          size_t size,
+                                          struct motorlink_st_revup_phase *phase);
+
+/**
+ * The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
+ */
+struct motorlink_st_master_config motorlink_st_master_defaults(void);
+
+/**
+ * Begins a master on a line that is up, whatever the storage held before.
+ *
+ * `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` or `recovery` is
+ * not one of its enum's.
+ */
+motorlink_error motorlink_st_master_init(struct motorlink_st_master *master,
+                                         size_t size,
+                                         const struct motorlink_st_master_config *config);
+
+/**
+ * Begins to read a register; `value` of the result is its value. Any number is taken.
+ */
+motorlink_error motorlink_st_master_get_register(struct motorlink_st_master *master,
+                                                 uint8_t motor,
+                                                 uint8_t reg);
+
+/**
+ * Begins to write a register, with as many low bytes of `value` as it has; of a floating-point
+ * register `value` is the bits. Any number is taken.
+ */
+motorlink_error motorlink_st_master_set_register(struct motorlink_st_master *master,
+                                                 uint8_t motor,
+                                                 uint8_t reg,
+                                                 int32_t value);
+
+/**
+ * Begins to have a command executed, one of `motorlink_st_command`. Any number is taken.
+ */
+motorlink_error motorlink_st_master_execute(struct motorlink_st_master *master,
+                                            uint8_t motor,
+                                            uint8_t command);
+
+/**
+ * Begins to program a speed ramp (4.8): to `speed_rpm` in `duration_ms`; 0 ms is a step.
+ */
+motorlink_error motorlink_st_master_ramp(struct motorlink_st_master *master,
+                                         uint8_t motor,
+                                         int32_t speed_rpm,
+                                         uint16_t duration_ms);
+
+/**
+ * Begins to set the references of Iq and Id (4.11), s16A digits.
+ */
+motorlink_error motorlink_st_master_current(struct motorlink_st_master *master,
+                                            uint8_t motor,
+                                            int16_t iq_s16a,
+                                            int16_t id_s16a);
+
+/**
+ * Begins to program a torque ramp (profile MCSDK 5.4): to `torque_s16a` in `duration_ms`; 0 ms is
+ * a step.
+ */
+motorlink_error motorlink_st_master_torque_ramp(struct motorlink_st_master *master,
+                                                uint8_t motor,
+                                                int32_t torque_s16a,
+                                                uint16_t duration_ms);
+
+/**
+ * Begins a move to `angle_rad` in `duration_s` (profile MCSDK 5.4).
+ *
+ * `BAD_ARGUMENT`: `motor` is over 7, or a value is not finite.
+ */
+motorlink_error motorlink_st_master_move(struct motorlink_st_master *master,
+                                         uint8_t motor,
+                                         float angle_rad,
+                                         float duration_s);
+
+/**
+ * Begins to read rev-up phase 0 to 4 (4.9); `motorlink_st_decode_revup` reads the result.
+ *
+ * `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
+ */
+motorlink_error motorlink_st_master_revup(struct motorlink_st_master *master,
+                                          uint8_t motor,
+                                          uint8_t phase);
+
+/**
+ * Begins to write rev-up phase 0 to 4 (4.10). `data` is copied.
+ *
+ * `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
+ */
+motorlink_error motorlink_st_master_set_revup(struct motorlink_st_master *master,
+                                              uint8_t motor,
+                                              uint8_t phase,
+                                              const struct motorlink_st_revup_phase *data);
+
+/**
+ * Begins to read the SDK's version and name (4.7); `motorlink_st_decode_board_info` reads the
+ * result.
+ */
+motorlink_error motorlink_st_master_board_info(struct motorlink_st_master *master, uint8_t motor);
+
+/**
+ * Begins to read the firmware's version (4.12); `motorlink_st_decode_firmware_version` reads the
+ * result.
+ */
+motorlink_error motorlink_st_master_firmware_version(struct motorlink_st_master *master,
+                                                     uint8_t motor);
+
+/**
+ * Begins to choose the registers of a data segment (profile SPEC): `count` numbers, which are
+ * copied.
+ */
+motorlink_error motorlink_st_master_configure_segment(struct motorlink_st_master *master,
+                                                      uint8_t motor,
+                                                      uint8_t segment,
+                                                      const uint8_t *registers,
+                                                      size_t count);
+
+/**
+ * Begins to read a data segment (profile SPEC): the values of its registers, one behind the other,
+ * little-endian, in the size that each has.
+ */
+motorlink_error motorlink_st_master_read_segment(struct motorlink_st_master *master,
+                                                 uint8_t motor,
+                                                 uint8_t segment);
+
+/**
+ * Begins to ask which registers steps of the motor profiler show (profile MCSDK 5.4): `count`
+ * numbers of steps, which are copied. The result has the count and the registers of each step.
+ */
+motorlink_error motorlink_st_master_profiler_info(struct motorlink_st_master *master,
+                                                  uint8_t motor,
+                                                  const uint8_t *steps,
+                                                  size_t count);
+
+/**
+ * Begins an exchange with any header (5 bits of `motorlink_st_frame`, 3 bits of motor) and any
+ * payload of up to 128 bytes, which is copied.
+ *
+ * `TOO_LONG`: over 128 bytes.
+ */
+motorlink_error motorlink_st_master_raw(struct motorlink_st_master *master,
+                                        uint8_t header,
+                                        const uint8_t *payload,
+                                        size_t size);
+
+/**
+ * What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
+ * `DONE`; after `WAIT` when something came or the time is over.
+ */
+motorlink_error motorlink_st_master_poll(struct motorlink_st_master *master,
+                                         uint64_t now_us,
+                                         struct motorlink_st_action *action);
+
+/**
+ * Takes what came from the drive at `now_us`, in any pieces. `bytes` may not lie in the storage.
+ */
+motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
+                                            uint64_t now_us,
+                                            const uint8_t *bytes,
+                                            size_t size);
+
+/**
+ * Gives up the exchange under way. Its reply may still come, so the line is lost.
+ */
+motorlink_error motorlink_st_master_abandon(struct motorlink_st_master *master);
+
+/**
+ * Tells that the line was closed and opened again, with nothing left in it from before. An
+ * exchange under way ends without a result.
+ */
+motorlink_error motorlink_st_master_reopened(struct motorlink_st_master *master);
+
+/**
+ * Sets `lost` to 1 where an exchange failed and the next one has to recover the line first, and to
+ * 0 where the last one ended in step.
+ */
+motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, uint8_t *lost);
+
+/**
+ * Begins a slave for a drive with motors 1 to `motors`, whatever the storage held before.
+ *
+ * `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
+ * may be constant. Not from a callback of the same slave.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` is none of
+ * `motorlink_st_profile`, or `motors` is not 1 to 7.
+ */
+motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
+                                        size_t size,
+                                        uint8_t profile,
+                                        uint8_t motors,
+                                        const struct motorlink_st_drive *drive);
+
+/**
+ * Takes a byte that came at `now_us`. Where it completes a command the drive is called, and
+ * `reply` is what to send before the next byte is handed in; else `reply` has no bytes.
+ *
+ * The bytes belong to the slave, until the next call for it. A byte costs some instructions, a
+ * complete command a checksum over it and the callbacks.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_st_slave_receive(struct motorlink_st_slave *slave,
+                                           uint64_t now_us,
+                                           uint8_t byte,
+                                           struct motorlink_bytes *reply);
+
+/**
+ * Call at the deadline: gives the refusal that a command is owed which did not come whole in time
+ * (4.1), and no bytes when there is none. The bytes belong to the slave, until the next call for
+ * it.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_st_slave_poll(struct motorlink_st_slave *slave,
+                                        uint64_t now_us,
+                                        struct motorlink_bytes *reply);
+
+/**
+ * When `motorlink_st_slave_poll` has to be called; `MOTORLINK_NEVER` while no command is under
+ * way, and always in profile MCSDK 5.4, whose firmware never times out.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_st_slave_deadline(struct motorlink_st_slave *slave,
+                                            uint64_t *deadline_us);
+
+/**
+ * Tells that the receiver lost bytes (overrun, framing, noise): drops the command under way and
+ * gives the refusal to send. The bytes belong to the slave, until the next call for it.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_st_slave_overrun(struct motorlink_st_slave *slave,
+                                           struct motorlink_bytes *reply);
+
+/**
+ * Request 0x30: reads the gains in RAM.
+ */
+struct motorlink_rmd_data motorlink_rmd_read_gains(void);
+
+/**
+ * Request 0x33: reads the acceleration limit.
+ */
+struct motorlink_rmd_data motorlink_rmd_read_acceleration(void);
+
+/**
+ * Request 0x90: reads the encoder.
+ */
+struct motorlink_rmd_data motorlink_rmd_read_encoder(void);
+
+/**
+ * Request 0x19: makes the current position the zero from the next power-on on. Wears the ROM.
+ */
+struct motorlink_rmd_data motorlink_rmd_write_zero_to_rom(void);
+
+/**
+ * Request 0x92: reads the angle over all turns.
+ */
+struct motorlink_rmd_data motorlink_rmd_read_multi_turn_angle(void);
+
+/**
+ * Request 0x94: reads the angle within the turn.
+ */
+struct motorlink_rmd_data motorlink_rmd_read_circle_angle(void);
+
+/**
+ * Request 0x9A: reads temperature, voltage and errors.
+ */
+struct motorlink_rmd_data motorlink_rmd_read_status(void);
+
+/**
+ * Request 0x9B: clears the errors whose cause is gone. The reply is that to 0x9A.
+ */
+struct motorlink_rmd_data motorlink_rmd_clear_errors(void);
+
+/**
+ * Request 0x9C: reads temperature, torque current, speed and encoder.
+ */
+struct motorlink_rmd_data motorlink_rmd_read_motion_status(void);
+
+/**
+ * Request 0x9D: reads the phase currents.
+ */
+struct motorlink_rmd_data motorlink_rmd_read_phase_currents(void);
+
+/**
+ * Request 0x80: switches the motor off and forgets what it was doing.
+ */
+struct motorlink_rmd_data motorlink_rmd_off(void);
+
+/**
+ * Request 0x81: stops the motor and remembers what it was doing.
+ */
+struct motorlink_rmd_data motorlink_rmd_stop(void);
+
+/**
+ * Request 0x88: resumes what 0x81 stopped. The motor may turn.
+ */
+struct motorlink_rmd_data motorlink_rmd_run(void);
+
+/**
+ * Request 0x31: sets the gains until power-off.
+ */
+struct motorlink_rmd_data motorlink_rmd_write_gains(struct motorlink_rmd_gains gains);
+
+/**
+ * Request 0x32: sets the gains for good. Wears the ROM.
+ */
+struct motorlink_rmd_data motorlink_rmd_write_gains_to_rom(struct motorlink_rmd_gains gains);
+
+/**
+ * Request 0x34: sets the acceleration limit, °/s², until power-off.
+ */
+struct motorlink_rmd_data motorlink_rmd_write_acceleration(int32_t acceleration_dps2);
+
+/**
+ * Request 0x91: sets the encoder's zero point, in counts, at once and for good. Wears the ROM.
+ */
+struct motorlink_rmd_data motorlink_rmd_write_encoder_offset(uint16_t offset);
+
+/**
+ * Request 0xA1: holds a torque current, 0.016 A a digit, -2000 to 2000.
+ */
+struct motorlink_rmd_data motorlink_rmd_torque(int16_t torque_16ma);
+
+/**
+ * Request 0xA2: holds a speed, 0.01 °/s a digit, positive is clockwise.
+ */
+struct motorlink_rmd_data motorlink_rmd_speed(int32_t speed_centidps);
+
+/**
+ * Request 0xA3: turns to a multi-turn angle, 0.01° a digit, positive is clockwise from zero.
+ */
+struct motorlink_rmd_data motorlink_rmd_position(int32_t angle_centidegrees);
+
+/**
+ * Request 0xA4: turns to a multi-turn angle, 0.01° a digit, no faster than a limit, °/s.
+ */
+struct motorlink_rmd_data motorlink_rmd_position_limited(int32_t angle_centidegrees,
+                                                         uint16_t max_speed_dps);
+
+/**
+ * Request 0xA5: turns to an angle within the turn, 0.01° a digit, 0 to 35999, in a direction of `motorlink_rmd_spin`.
+ */
+struct motorlink_rmd_data motorlink_rmd_circle_position(uint8_t direction,
+                                                        uint16_t angle_centidegrees);
+
+/**
+ * Request 0xA6: as 0xA5, no faster than a limit, °/s.
+ */
+struct motorlink_rmd_data motorlink_rmd_circle_position_limited(uint8_t direction,
+                                                                uint16_t angle_centidegrees,
+                                                                uint16_t max_speed_dps);
+
+/**
+ * Reads the gains in the reply to 0x30, 0x31 and 0x32.
+ */
+struct motorlink_rmd_gains motorlink_rmd_decode_gains(struct motorlink_rmd_data reply);
+
+/**
+ * Reads the acceleration limit in the reply to 0x33 and 0x34, °/s².
+ */
+int32_t motorlink_rmd_decode_acceleration(struct motorlink_rmd_data reply);
+
+/**
+ * Reads the encoder in the reply to 0x90.
+ */
+struct motorlink_rmd_encoder motorlink_rmd_decode_encoder(struct motorlink_rmd_data reply);
+
+/**
+ * Reads the zero point in the reply to 0x91 and 0x19, in encoder counts.
+ */
+uint16_t motorlink_rmd_decode_encoder_offset(struct motorlink_rmd_data reply);
+
+/**
+ * Reads the angle over all turns in the reply to 0x92, 0.01° a digit, positive is clockwise.
+ */
+int64_t motorlink_rmd_decode_multi_turn_angle(struct motorlink_rmd_data reply);
+
+/**
+ * Reads the angle within the turn in the reply to 0x94, 0.01° a digit, 0 to 35999.
+ */
+uint16_t motorlink_rmd_decode_circle_angle(struct motorlink_rmd_data reply);
+
+/**
+ * Reads temperature, voltage and errors in the reply to 0x9A and 0x9B.
+ */
+struct motorlink_rmd_status motorlink_rmd_decode_status(struct motorlink_rmd_data reply);
+
+/**
+ * Reads the status in the reply to 0x9C, to every motion command and to 0x280.
+ */
+struct motorlink_rmd_motion_status motorlink_rmd_decode_motion_status(struct motorlink_rmd_data reply);
+
+/**
+ * Reads the phase currents in the reply to 0x9D.
+ */
+struct motorlink_rmd_phase_currents motorlink_rmd_decode_phase_currents(struct motorlink_rmd_data reply);
+
+/**
+ * An encoder value of a reply as an angle, 0.01° a digit; `encoder_bits` is the encoder's width,
+ * 12 to 18. 0 for any other width.
+ */
+uint16_t motorlink_rmd_encoder_centidegrees(uint16_t counts, uint8_t encoder_bits);
+
+/**
+ * Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of guard time, no
+ * limits. `size` is `sizeof *host`.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`.
+ */
+motorlink_error motorlink_rmd_host_init(struct motorlink_rmd_host *host, size_t size);
+
+/**
+ * Sets how long a reply may take, and how long after a timeout a late one is awaited, from the
+ * next request on.
+ */
+motorlink_error motorlink_rmd_host_set_times(struct motorlink_rmd_host *host,
+                                             uint32_t timeout_us,
+                                             uint32_t guard_us);
+
+/**
+ * Sets what a motor may be told from the next request on.
+ *
+ * `BAD_ARGUMENT`: `motor` is not 1 to 32, or a limit is neither `MOTORLINK_RMD_NO_LIMIT` nor in
+ * the range of its kind: 0 to 32767, 0 to 65535, 0 and more.
+ */
+motorlink_error motorlink_rmd_host_set_limits(struct motorlink_rmd_host *host,
+                                              uint8_t motor,
+                                              const struct motorlink_rmd_limits *limits);
+
+/**
+ * Begins an exchange with a motor: `request` is what one of the functions for requests gives, or
+ * any eight bytes.
+ *
+ * A motor that did not answer before may be asked for its status instead; the exchange ends in
+ * `QUARANTINED` then.
+ *
+ * `BAD_ARGUMENT`: `motor` is not 1 to 32. `BUSY`: its last exchange is not over. `LIMIT`: a limit
+ * or the document's range is exceeded. `QUARANTINED`: ask again at the time that
+ * `motorlink_rmd_host_retry` tells. Nothing is sent then.
+ */
+motorlink_error motorlink_rmd_host_request(struct motorlink_rmd_host *host,
+                                           uint64_t now_us,
+                                           uint8_t motor,
+                                           struct motorlink_rmd_data request);
+
+/**
+ * Begins an exchange with motors 1 to 4 in one frame (0x280): a torque current each, 0.016 A a
+ * digit. `expect` has a bit a motor that has to answer, bit 0 for motor 1. Each of them ends in a
+ * `DONE`. All four are told; those that are not expected to answer are in quarantine afterwards.
+ *
+ * As `motorlink_rmd_host_request`; `BAD_ARGUMENT`: a bit above 3 is set.
+ */
+motorlink_error motorlink_rmd_host_torque4(struct motorlink_rmd_host *host,
+                                           uint64_t now_us,
+                                           const int16_t *torques_16ma,
+                                           uint8_t expect);
+
+/**
+ * When to ask again what was last refused with `QUARANTINED`; a reply may make it sooner or later.
+ */
+motorlink_error motorlink_rmd_host_retry(struct motorlink_rmd_host *host, uint64_t *at_us);
+
+/**
+ * What to do next. Call until it is `WAIT`.
+ */
+motorlink_error motorlink_rmd_host_poll(struct motorlink_rmd_host *host,
+                                        uint64_t now_us,
+                                        struct motorlink_rmd_action *action);
+
+/**
+ * Takes a frame that came from the bus at `now_us`. Frames that belong to no exchange are dropped.
+ * An adapter that echoes what was sent looks like a motor that answers: drop its echoes.
+ *
+ * `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
+ */
+motorlink_error motorlink_rmd_host_receive(struct motorlink_rmd_host *host,
+                                           uint64_t now_us,
+                                           const struct motorlink_can_frame *frame);
+
+/**
+ * Gives up the exchange with a motor without a result, so that another request can be made.
+ *
+ * `BAD_ARGUMENT`: `motor` is not 1 to 32.
+ */
+motorlink_error motorlink_rmd_host_cancel(struct motorlink_rmd_host *host,
+                                          uint64_t now_us,
+                                          uint8_t motor);
+
+/**
+ * The motors with an exchange under way: a bit each, bit 0 for motor 1.
+ */
+motorlink_error motorlink_rmd_host_busy(struct motorlink_rmd_host *host, uint32_t *motors);
+
+/**
+ * Begins a drive, whatever the storage held before. It does nothing before
+ * `motorlink_rmd_drive_power_on`.
+ *
+ * `size` is `sizeof *drive`. `config` and `rom` (what the ROM holds; NULL: zeros) are copied.
+ * `motor` is kept: it has to live as long as the drive is used, and may be constant. Not from a
+ * callback of the same drive.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `id` is not 1 to 32, or
+ * `encoder_bits` neither 0 nor 12 to 18.
+ */
+motorlink_error motorlink_rmd_drive_init(struct motorlink_rmd_drive *drive,
+                                         size_t size,
+                                         const struct motorlink_rmd_drive_config *config,
+                                         const struct motorlink_rmd_settings *rom,
+                                         const struct motorlink_rmd_motor *motor);
+
+/**
+ * Starts, also after a power cycle: settings come from ROM, the motor is off, no error is latched
+ * and nothing is left to resume.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_rmd_drive_power_on(struct motorlink_rmd_drive *drive, uint64_t now_us);
+
+/**
+ * Takes a frame from the bus that came at `now_us`. `reply` is the frame to send; its size is 0
+ * where there is none: frames for others, unknown codes and frames that are not eight bytes of
+ * standard data are not answered.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`; `BAD_ARGUMENT`: no CAN
+ * frame has such a size or identifier.
+ */
+motorlink_error motorlink_rmd_drive_receive(struct motorlink_rmd_drive *drive,
+                                            uint64_t now_us,
+                                            const struct motorlink_can_frame *frame,
+                                            struct motorlink_can_frame *reply);
+
+/**
+ * Latches faults and keeps the shutdown time. Call at the deadline, and often enough for a fault
+ * to switch the motor off in time.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_rmd_drive_poll(struct motorlink_rmd_drive *drive, uint64_t now_us);
+
+/**
+ * When the shutdown time will be over; `MOTORLINK_NEVER` while the motor is off or has none.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_rmd_drive_deadline(struct motorlink_rmd_drive *drive,
+                                             uint64_t *deadline_us);
+
+/**
+ * What the motor was last told to do.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_rmd_drive_motion(struct motorlink_rmd_drive *drive,
+                                           struct motorlink_rmd_motion *motion);
+
+/**
+ * The latched errors, a sum of `MOTORLINK_RMD_FAULT_*`.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_rmd_drive_errors(struct motorlink_rmd_drive *drive, uint8_t *errors);
+
+/**
+ * The settings in RAM, which commands act on.
+ *
+ * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+ */
+motorlink_error motorlink_rmd_drive_settings(struct motorlink_rmd_drive *drive,
+                                             struct motorlink_rmd_settings *settings);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* MOTORLINK_H */

@@ -1,0 +1,32 @@
+//! What both protocols tell a C caller.
+
+/// The moment of a `WAIT` that only a received byte or frame, or a new request, can end.
+pub const MOTORLINK_NEVER: u64 = u64::MAX;
+
+/// Bytes that belong to an object: to be sent or copied before the next call for it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_bytes {
+    /// The first byte; never NULL, also when there is none.
+    pub data: *const u8,
+    /// How many bytes there are.
+    pub size: usize,
+}
+
+impl From<&[u8]> for motorlink_bytes {
+    fn from(bytes: &[u8]) -> Self {
+        motorlink_bytes { data: bytes.as_ptr(), size: bytes.len() }
+    }
+}
+
+/// What the caller of a `poll` has to do next.
+#[repr(u8)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum motorlink_action {
+    /// Hand in what comes, and poll again at `until_us` at the latest.
+    Wait = 0,
+    /// Send, then poll again.
+    Transmit = 1,
+    /// An exchange is over; poll again.
+    Done = 2,
+}

@@ -1,0 +1,284 @@
+//! The only place with `unsafe`: what C hands in becomes Rust's here, and is safe from then on.
+
+use core::marker::PhantomData;
+use core::mem::size_of;
+use core::ops::{Deref, DerefMut};
+use core::slice;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use crate::error::motorlink_error;
+
+type Result<T> = core::result::Result<T, motorlink_error>;
+
+/// A pointer to something that may be read, or NULL, or misaligned.
+pub(crate) struct In<T>(*const T);
+
+/// A pointer to something that may be written, or NULL, or misaligned.
+pub(crate) struct Out<T>(*mut T);
+
+impl<T> Clone for In<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for In<T> {}
+
+/// Pointers that a caller makes promises about.
+pub(crate) trait Promise {
+    type Promised;
+
+    /// Takes the caller at the word.
+    ///
+    /// # Safety
+    /// What the crate's documentation demands of a pointer holds as long as the result is used.
+    unsafe fn promised(self) -> Self::Promised;
+}
+
+impl<T> Promise for *const T {
+    type Promised = In<T>;
+    unsafe fn promised(self) -> In<T> {
+        In(self)
+    }
+}
+
+impl<T> Promise for *mut T {
+    type Promised = Out<T>;
+    unsafe fn promised(self) -> Out<T> {
+        Out(self)
+    }
+}
+
+/// Takes an exported function's pointers for what its callers promise them to be.
+macro_rules! promised {
+    ($($pointer:ident),+) => { $(
+        // SAFETY: a caller keeps to the contract in the crate's documentation.
+        let $pointer = unsafe { $crate::pointer::Promise::promised($pointer) };
+    )+ };
+}
+pub(crate) use promised;
+
+fn check<T>(pointer: *const T) -> Result<()> {
+    if pointer.is_null() {
+        return Err(motorlink_error::NullPointer);
+    }
+    if !pointer.is_aligned() {
+        return Err(motorlink_error::Misaligned);
+    }
+    Ok(())
+}
+
+/// Structs of C: every bit pattern of their size is a value.
+///
+/// # Safety
+/// Only integers, arrays of them, pointers, [`In`] and optional functions of C are in there.
+pub(crate) unsafe trait Plain: Copy + 'static {}
+
+macro_rules! plain {
+    ($($type:ty),+ $(,)?) => { $(
+        // SAFETY: it has nothing but integers, arrays of them, pointers and optional functions.
+        unsafe impl $crate::pointer::Plain for $type {}
+    )+ };
+}
+pub(crate) use plain;
+
+plain!(u8, i16);
+
+impl<T: Plain> In<T> {
+    /// The value there.
+    pub(crate) fn read(self) -> Result<T> {
+        Ok(*self.get()?)
+    }
+
+    /// The value there, `None` for NULL.
+    pub(crate) fn read_optional(self) -> Result<Option<T>> {
+        if self.0.is_null() { Ok(None) } else { self.read().map(Some) }
+    }
+
+    /// What is there, as long as the promise holds.
+    pub(crate) fn get<'a>(self) -> Result<&'a T> {
+        check(self.0)?;
+        // SAFETY: neither NULL nor misaligned, promised to be readable, and any bits are a `T`.
+        Ok(unsafe { &*self.0 })
+    }
+
+    /// The `len` values there; NULL is as good as any pointer to none.
+    pub(crate) fn slice<'a>(self, len: usize) -> Result<&'a [T]> {
+        if len == 0 {
+            return Ok(&[]);
+        }
+        check(self.0)?;
+        if len > isize::MAX as usize / size_of::<T>().max(1) {
+            return Err(motorlink_error::BadArgument);
+        }
+        // SAFETY: neither NULL nor misaligned, promised to be readable, any bits are a `T`, and no
+        // longer than an object can be.
+        Ok(unsafe { slice::from_raw_parts(self.0, len) })
+    }
+}
+
+/// The ASCII at the beginning of a C string, of which no more than `most` bytes are looked at.
+pub(crate) fn ascii<'a>(text: In<u8>, most: usize) -> &'a str {
+    if text.0.is_null() {
+        return "";
+    }
+    let mut len = 0;
+    while len < most {
+        let at = text.0.wrapping_add(len);
+        // SAFETY: promised to be a C string, and no byte before this one was its end.
+        if !matches!(unsafe { at.read() }, 1..=0x7F) {
+            break;
+        }
+        len = len.wrapping_add(1);
+    }
+    // SAFETY: these bytes were just read.
+    let bytes = unsafe { slice::from_raw_parts(text.0, len) };
+    // SAFETY: each of them is ASCII.
+    unsafe { str::from_utf8_unchecked(bytes) }
+}
+
+/// A place for a result.
+pub(crate) struct Place<T>(*mut T);
+
+impl<T> Out<T> {
+    /// The place, of which it is known that it can be written.
+    pub(crate) fn place(&self) -> Result<Place<T>> {
+        check(self.0)?;
+        Ok(Place(self.0))
+    }
+}
+
+impl<T> Place<T> {
+    pub(crate) fn set(self, value: T) {
+        // SAFETY: neither NULL nor misaligned, and promised to be writable.
+        unsafe { self.0.write(value) };
+    }
+}
+
+/// What C declares as an opaque array is a tag and a state to us.
+///
+/// # Safety
+/// `Stored<State>` is no larger and no more aligned than the type.
+pub(crate) unsafe trait Storage {
+    type State;
+    /// Not that of another kind, nor its complement.
+    const TAG: u32;
+}
+
+/// The tag tells whether there is a state, of which kind, and whether a call for it is under way:
+/// then it is complemented.
+#[repr(C)]
+pub(crate) struct Stored<S> {
+    tag: AtomicU32,
+    state: S,
+}
+
+/// Declares the storage of an object.
+macro_rules! storage {
+    ($( $type:ident: $state:ty, $tag:literal; )+) => {
+        $(
+            const _: () = {
+                use core::mem::{align_of, size_of};
+                use $crate::pointer::Stored;
+                assert!(size_of::<Stored<$state>>() <= size_of::<$type>(), "storage too small");
+                assert!(align_of::<Stored<$state>>() <= align_of::<$type>());
+            };
+
+            // SAFETY: asserted above.
+            unsafe impl $crate::pointer::Storage for $type {
+                type State = $state;
+                const TAG: u32 = $tag;
+            }
+        )+
+
+        /// The tags of all kinds.
+        pub(crate) const TAGS: [u32; [$($tag),+].len()] = [$($tag),+];
+    };
+}
+pub(crate) use storage;
+
+impl<K: Storage> Out<K> {
+    fn stored(&self) -> Result<*mut Stored<K::State>> {
+        check(self.0)?;
+        Ok(self.0.cast())
+    }
+
+    /// Begins an object in a storage of `size` bytes, whatever was there.
+    pub(crate) fn init(&self, size: usize, state: impl FnOnce() -> K::State) -> Result<()> {
+        let stored = self.stored()?;
+        if size < size_of::<K>() {
+            return Err(motorlink_error::StorageTooSmall);
+        }
+        let value = Stored { tag: AtomicU32::new(K::TAG), state: state() };
+        // SAFETY: neither NULL nor misaligned, promised to be writable and not in use, and large
+        // enough for a `Stored`.
+        unsafe { stored.write(value) };
+        Ok(())
+    }
+
+    /// The object, for one call.
+    pub(crate) fn enter<'a>(&self) -> Result<Entered<'a, K>> {
+        let stored = self.stored()?;
+        // SAFETY: neither NULL nor misaligned, promised to be storage of some kind, each of which
+        // begins with a tag; any bits are one.
+        let tag = unsafe { &(*stored).tag };
+        if let Err(found) = take(tag, K::TAG) {
+            return Err(match found {
+                busy if busy == !K::TAG => motorlink_error::InUse,
+                other if crate::storage::TAGS.iter().any(|&tag| other == tag || other == !tag) => {
+                    motorlink_error::WrongKind
+                }
+                _ => motorlink_error::Uninitialised,
+            });
+        }
+        Ok(Entered { stored, call: PhantomData })
+    }
+}
+
+/// Complements the tag if it is `idle`, and gives it if it is not.
+#[cfg(target_has_atomic = "32")]
+fn take(tag: &AtomicU32, idle: u32) -> core::result::Result<(), u32> {
+    tag.compare_exchange(idle, !idle, Ordering::Acquire, Ordering::Relaxed).map(drop)
+}
+
+/// Complements the tag if it is `idle`, and gives it if it is not. Without an exchange of the
+/// processor's: an interrupt in between is over before this goes on.
+#[cfg(not(target_has_atomic = "32"))]
+fn take(tag: &AtomicU32, idle: u32) -> core::result::Result<(), u32> {
+    let found = tag.load(Ordering::Acquire);
+    if found != idle {
+        return Err(found);
+    }
+    tag.store(!idle, Ordering::Relaxed);
+    core::sync::atomic::compiler_fence(Ordering::SeqCst);
+    Ok(())
+}
+
+/// An object during a call. Other calls for it find it in use.
+pub(crate) struct Entered<'a, K: Storage> {
+    stored: *mut Stored<K::State>,
+    call: PhantomData<&'a mut K::State>,
+}
+
+impl<K: Storage> Deref for Entered<'_, K> {
+    type Target = K::State;
+    fn deref(&self) -> &K::State {
+        // SAFETY: the tag told that there is a state, and that nobody else uses it.
+        unsafe { &(*self.stored).state }
+    }
+}
+
+impl<K: Storage> DerefMut for Entered<'_, K> {
+    fn deref_mut(&mut self) -> &mut K::State {
+        // SAFETY: the tag told that there is a state, and that nobody else uses it.
+        unsafe { &mut (*self.stored).state }
+    }
+}
+
+impl<K: Storage> Drop for Entered<'_, K> {
+    fn drop(&mut self) {
+        // SAFETY: the storage was entered, so there is a tag.
+        let tag = unsafe { &(*self.stored).tag };
+        tag.store(K::TAG, Ordering::Release);
+    }
+}

@@ -1,0 +1,385 @@
+//! The drive's end: frames in, replies out, a table of callbacks to the motor.
+
+use core::ffi::c_void;
+
+use motorlink_proto::rmd::{
+    Config, Drive, EncoderBits, Errors, Mode, Motor, MotorId, PhaseCurrents, Sense, Settings,
+};
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::units::{Celsius, DeciVolts, Dps, DpsPerSecond, PhaseCurrent, TorqueFeedback};
+
+use super::frame::{NO_FRAME, motorlink_can_frame};
+use super::message::motorlink_rmd_gains;
+use super::motorlink_rmd_drive;
+use crate::bytes::MOTORLINK_NEVER;
+use crate::error::{answer, motorlink_error};
+use crate::pointer::{In, plain, promised};
+
+/// What a motor does.
+#[repr(u8)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum motorlink_rmd_mode {
+    /// Without current.
+    Off = 0,
+    /// Brought to a stand and kept there.
+    Stopped = 1,
+    /// Holds `torque_16ma`.
+    Torque = 2,
+    /// Holds `speed_centidps`.
+    Speed = 3,
+    /// Turns to `target_counts` and holds it.
+    Position = 4,
+}
+
+/// What a motor does, with the values that belong to it; the others are 0.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_rmd_motion {
+    /// `POSITION`: encoder counts as in `motorlink_rmd_sense`.
+    pub target_counts: i64,
+    /// `SPEED`: 0.01 °/s a digit, positive is clockwise.
+    pub speed_centidps: i32,
+    /// `POSITION`: greatest speed on the way, °/s; -1 leaves it to the drive's own.
+    pub max_speed_dps: i32,
+    /// `TORQUE`: torque current, 0.016 A a digit, -2000 to 2000.
+    pub torque_16ma: i16,
+    /// `POSITION`: 1 where the drive's greatest angle holds, 0 for angles within the turn.
+    pub within_max_angle: u8,
+    /// One of `motorlink_rmd_mode`.
+    pub kind: u8,
+}
+
+/// What the sensors read.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_rmd_sense {
+    /// Encoder counts in the encoder's own width, growing clockwise and counted on beyond each end
+    /// of the turn. Starts within the turn at power-on.
+    pub encoder_counts: i64,
+    /// Torque current, 33/2048 A a digit.
+    pub iq_digits: i16,
+    /// Speed, °/s, positive is clockwise.
+    pub speed_dps: i16,
+    /// Supply voltage, 0.1 V a digit.
+    pub voltage_decivolts: u16,
+    /// Currents of the phases A, B and C, 1/64 A a digit.
+    pub phase_digits: [i16; 3],
+    /// Motor temperature, °C.
+    pub temperature_celsius: i8,
+    /// Faults that are present now, a sum of `MOTORLINK_RMD_FAULT_*`; the drive latches them.
+    pub faults: u8,
+}
+
+/// What a host can set: once in RAM, which commands act on, and once in ROM, which power-on copies.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_rmd_settings {
+    /// Acceleration limit, °/s²; 0 and less are no limit.
+    pub acceleration_dps2: i32,
+    /// Encoder value that is zero, as it travels: at most 16 bits.
+    pub encoder_offset: u16,
+    /// Gains of the three loops.
+    pub gains: motorlink_rmd_gains,
+}
+
+/// What the vendor's tool or a switch sets, not the bus.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_rmd_drive_config {
+    /// Switches the motor off after this long without a command, µs; 0 is never.
+    pub shutdown_us: u64,
+    /// The ID that the drive answers to, 1 to 32.
+    pub id: u8,
+    /// Width of the encoder, 12 to 18 bits; 0 is the document's 14.
+    pub encoder_bits: u8,
+    /// 1 answers 0x9B with 0x9B, as relatives do, 0 with 0x9A as printed (docs/SPEC-NOTES.md R1).
+    pub clear_reply_0x9b: u8,
+}
+
+/// The motor behind a drive: the power stage, its control loops and its sensors.
+///
+/// Every callback may be NULL. It is called from within `motorlink_rmd_drive_power_on`, `_receive`
+/// and `_poll`, and may not call for the same drive: such calls give `IN_USE`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_rmd_motor {
+    /// Handed to each callback.
+    pub context: *mut c_void,
+    /// Does this from now on. NULL: without effect.
+    pub set_mode: Option<extern "C" fn(context: *mut c_void, motion: *const motorlink_rmd_motion)>,
+    /// Uses these gains and this acceleration limit from now on. NULL: without effect.
+    pub configure:
+        Option<extern "C" fn(context: *mut c_void, settings: *const motorlink_rmd_settings)>,
+    /// Tells what the sensors read; what is not set is 0. NULL: all is 0.
+    pub sense: Option<extern "C" fn(context: *mut c_void, sense: *mut motorlink_rmd_sense)>,
+    /// Keeps what `motorlink_rmd_drive_init` gets after a power cycle. Wears a real ROM.
+    /// NULL: forgotten at power-off.
+    pub save: Option<extern "C" fn(context: *mut c_void, rom: *const motorlink_rmd_settings)>,
+}
+
+plain!(motorlink_rmd_settings, motorlink_rmd_drive_config, motorlink_rmd_motor);
+
+/// What the storage of a drive holds.
+pub(crate) struct State {
+    drive: Drive,
+    motor: In<motorlink_rmd_motor>,
+}
+
+impl From<Mode> for motorlink_rmd_motion {
+    fn from(mode: Mode) -> Self {
+        let mut all = motorlink_rmd_motion {
+            target_counts: 0,
+            speed_centidps: 0,
+            max_speed_dps: 0,
+            torque_16ma: 0,
+            within_max_angle: 0,
+            kind: 0,
+        };
+        let kind = match mode {
+            Mode::Off => motorlink_rmd_mode::Off,
+            Mode::Stopped => motorlink_rmd_mode::Stopped,
+            Mode::Torque(torque) => {
+                all.torque_16ma = torque.0;
+                motorlink_rmd_mode::Torque
+            }
+            Mode::Speed(speed) => {
+                all.speed_centidps = speed.0;
+                motorlink_rmd_mode::Speed
+            }
+            Mode::Position { target, max_speed, within_max_angle } => {
+                all.target_counts = target;
+                all.max_speed_dps = max_speed.map_or(-1, |limit| limit.0.into());
+                all.within_max_angle = within_max_angle.into();
+                motorlink_rmd_mode::Position
+            }
+        };
+        motorlink_rmd_motion { kind: kind as u8, ..all }
+    }
+}
+
+impl From<&Settings> for motorlink_rmd_settings {
+    fn from(settings: &Settings) -> Self {
+        motorlink_rmd_settings {
+            acceleration_dps2: settings.acceleration.0,
+            encoder_offset: settings.encoder_offset,
+            gains: settings.gains.into(),
+        }
+    }
+}
+
+impl From<motorlink_rmd_settings> for Settings {
+    fn from(settings: motorlink_rmd_settings) -> Self {
+        Settings {
+            gains: settings.gains.into(),
+            acceleration: DpsPerSecond(settings.acceleration_dps2),
+            encoder_offset: settings.encoder_offset,
+        }
+    }
+}
+
+impl Motor for &motorlink_rmd_motor {
+    fn set_mode(&mut self, mode: Mode) {
+        if let Some(call) = self.set_mode {
+            call(self.context, &raw const *&mode.into());
+        }
+    }
+
+    fn configure(&mut self, settings: &Settings) {
+        if let Some(call) = self.configure {
+            call(self.context, &raw const *&settings.into());
+        }
+    }
+
+    fn sense(&mut self) -> Sense {
+        let mut sense = motorlink_rmd_sense {
+            encoder_counts: 0,
+            iq_digits: 0,
+            speed_dps: 0,
+            voltage_decivolts: 0,
+            phase_digits: [0; 3],
+            temperature_celsius: 0,
+            faults: 0,
+        };
+        if let Some(call) = self.sense {
+            call(self.context, &raw mut sense);
+        }
+        let [phase_a, phase_b, phase_c] = sense.phase_digits.map(PhaseCurrent);
+        Sense {
+            temperature: Celsius(sense.temperature_celsius),
+            voltage: DeciVolts(sense.voltage_decivolts),
+            iq: TorqueFeedback(sense.iq_digits),
+            speed: Dps(sense.speed_dps),
+            encoder: sense.encoder_counts,
+            phase_currents: PhaseCurrents { phase_a, phase_b, phase_c },
+            faults: Errors(sense.faults),
+        }
+    }
+
+    fn save(&mut self, rom: &Settings) {
+        if let Some(call) = self.save {
+            call(self.context, &raw const *&rom.into());
+        }
+    }
+}
+
+/// Begins a drive, whatever the storage held before. It does nothing before
+/// `motorlink_rmd_drive_power_on`.
+///
+/// `size` is `sizeof *drive`. `config` and `rom` (what the ROM holds; NULL: zeros) are copied.
+/// `motor` is kept: it has to live as long as the drive is used, and may be constant. Not from a
+/// callback of the same drive.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `id` is not 1 to 32, or
+/// `encoder_bits` neither 0 nor 12 to 18.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_drive_init(
+    drive: *mut motorlink_rmd_drive,
+    size: usize,
+    config: *const motorlink_rmd_drive_config,
+    rom: *const motorlink_rmd_settings,
+    motor: *const motorlink_rmd_motor,
+) -> motorlink_error {
+    promised!(drive, config, rom, motor);
+    answer(|| {
+        motor.get()?;
+        let config = config.read()?;
+        let rom = rom.read_optional()?.map_or_else(Settings::default, Settings::from);
+        let encoder = match config.encoder_bits {
+            0 => Some(EncoderBits::default()),
+            bits => EncoderBits::new(bits),
+        };
+        let config = Config {
+            id: MotorId::new(config.id).ok_or(motorlink_error::BadArgument)?,
+            encoder: encoder.ok_or(motorlink_error::BadArgument)?,
+            shutdown: (config.shutdown_us != 0).then_some(Duration(config.shutdown_us)),
+            clear_reply_0x9b: config.clear_reply_0x9b != 0,
+        };
+        drive.init(size, || State { drive: Drive::new(config, rom), motor })
+    })
+}
+
+/// Starts, also after a power cycle: settings come from ROM, the motor is off, no error is latched
+/// and nothing is left to resume.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_drive_power_on(
+    drive: *mut motorlink_rmd_drive,
+    now_us: u64,
+) -> motorlink_error {
+    promised!(drive);
+    answer(|| {
+        let mut state = drive.enter()?;
+        let State { drive, motor } = &mut *state;
+        drive.power_on(Instant(now_us), &mut motor.get()?);
+        Ok(())
+    })
+}
+
+/// Takes a frame from the bus that came at `now_us`. `reply` is the frame to send; its size is 0
+/// where there is none: frames for others, unknown codes and frames that are not eight bytes of
+/// standard data are not answered.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`; `BAD_ARGUMENT`: no CAN
+/// frame has such a size or identifier.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_drive_receive(
+    drive: *mut motorlink_rmd_drive,
+    now_us: u64,
+    frame: *const motorlink_can_frame,
+    reply: *mut motorlink_can_frame,
+) -> motorlink_error {
+    promised!(drive, frame, reply);
+    answer(|| {
+        let frame = frame.read()?.try_into()?;
+        let place = reply.place()?;
+        let mut state = drive.enter()?;
+        let State { drive, motor } = &mut *state;
+        let reply = drive.receive(Instant(now_us), &frame, &mut motor.get()?);
+        place.set(reply.map_or(NO_FRAME, motorlink_can_frame::from));
+        Ok(())
+    })
+}
+
+/// Latches faults and keeps the shutdown time. Call at the deadline, and often enough for a fault
+/// to switch the motor off in time.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_drive_poll(
+    drive: *mut motorlink_rmd_drive,
+    now_us: u64,
+) -> motorlink_error {
+    promised!(drive);
+    answer(|| {
+        let mut state = drive.enter()?;
+        let State { drive, motor } = &mut *state;
+        drive.poll(Instant(now_us), &mut motor.get()?);
+        Ok(())
+    })
+}
+
+/// When the shutdown time will be over; `MOTORLINK_NEVER` while the motor is off or has none.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_drive_deadline(
+    drive: *mut motorlink_rmd_drive,
+    deadline_us: *mut u64,
+) -> motorlink_error {
+    promised!(drive, deadline_us);
+    answer(|| {
+        let place = deadline_us.place()?;
+        let deadline = drive.enter()?.drive.deadline();
+        place.set(deadline.map_or(MOTORLINK_NEVER, |at| at.0));
+        Ok(())
+    })
+}
+
+/// What the motor was last told to do.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_drive_motion(
+    drive: *mut motorlink_rmd_drive,
+    motion: *mut motorlink_rmd_motion,
+) -> motorlink_error {
+    promised!(drive, motion);
+    answer(|| {
+        let place = motion.place()?;
+        place.set(drive.enter()?.drive.mode().into());
+        Ok(())
+    })
+}
+
+/// The latched errors, a sum of `MOTORLINK_RMD_FAULT_*`.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_drive_errors(
+    drive: *mut motorlink_rmd_drive,
+    errors: *mut u8,
+) -> motorlink_error {
+    promised!(drive, errors);
+    answer(|| {
+        let place = errors.place()?;
+        place.set(drive.enter()?.drive.errors().0);
+        Ok(())
+    })
+}
+
+/// The settings in RAM, which commands act on.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_drive_settings(
+    drive: *mut motorlink_rmd_drive,
+    settings: *mut motorlink_rmd_settings,
+) -> motorlink_error {
+    promised!(drive, settings);
+    answer(|| {
+        let place = settings.place()?;
+        place.set(drive.enter()?.drive.settings().into());
+        Ok(())
+    })
+}

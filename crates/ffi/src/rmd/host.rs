@@ -1,0 +1,293 @@
+//! The host's end: many motors, an exchange each.
+
+use motorlink_proto::rmd::{Error, Host, Limits, MotorId, MotorSet, Output, Refused, Torque4};
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::units::{CentiDegrees, SpeedLimit, TorqueCommand};
+
+use super::frame::{NO_FRAME, motorlink_can_frame};
+use super::message::motorlink_rmd_data;
+use super::motorlink_rmd_host;
+use crate::bytes::{MOTORLINK_NEVER, motorlink_action};
+use crate::error::{answer, motorlink_error};
+use crate::pointer::{plain, promised};
+
+/// In `motorlink_rmd_limits`: no limit beyond the document's range.
+pub const MOTORLINK_RMD_NO_LIMIT: i32 = -1;
+
+/// What a motor may be told, either way round.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_rmd_limits {
+    /// Greatest torque current of 0xA1 and 0x280, 0.016 A a digit, or `MOTORLINK_RMD_NO_LIMIT`.
+    pub torque_16ma: i32,
+    /// Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_RMD_NO_LIMIT`. 0xA3 and 0xA5
+    /// carry no speed and are refused while this is set.
+    pub speed_dps: i32,
+    /// Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit, or `MOTORLINK_RMD_NO_LIMIT`.
+    pub angle_centidegrees: i32,
+}
+
+/// What to do next, or what became of an exchange.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_rmd_action {
+    /// `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
+    pub until_us: u64,
+    /// `TRANSMIT`: the frame to send.
+    pub frame: motorlink_can_frame,
+    /// `DONE`: the motor's reply, for the `motorlink_rmd_decode_*` functions.
+    pub reply: motorlink_rmd_data,
+    /// `DONE`: what became of the exchange.
+    pub result: motorlink_error,
+    /// What this is: `WAIT`, `TRANSMIT` or `DONE`.
+    pub kind: motorlink_action,
+    /// `DONE`: the motor, 1 to 32.
+    pub motor: u8,
+}
+
+plain!(motorlink_rmd_limits);
+
+/// What the storage of a host holds.
+pub(crate) struct State {
+    host: Host,
+    /// When what was last refused may be asked again.
+    retry: Instant,
+}
+
+fn id(motor: u8) -> Result<MotorId, motorlink_error> {
+    MotorId::new(motor).ok_or(motorlink_error::BadArgument)
+}
+
+impl State {
+    fn refused(&mut self, refused: Refused) -> motorlink_error {
+        match refused {
+            Refused::Busy(_) => motorlink_error::Busy,
+            Refused::Quarantined { until, .. } => {
+                self.retry = until;
+                motorlink_error::Quarantined
+            }
+            Refused::Limit { .. } => motorlink_error::Limit,
+            Refused::OutOfReach(_) => motorlink_error::BadArgument,
+        }
+    }
+}
+
+/// Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of guard time, no
+/// limits. `size` is `sizeof *host`.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_init(
+    host: *mut motorlink_rmd_host,
+    size: usize,
+) -> motorlink_error {
+    promised!(host);
+    answer(|| host.init(size, || State { host: Host::new(), retry: Instant(0) }))
+}
+
+/// Sets how long a reply may take, and how long after a timeout a late one is awaited, from the
+/// next request on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_set_times(
+    host: *mut motorlink_rmd_host,
+    timeout_us: u32,
+    guard_us: u32,
+) -> motorlink_error {
+    promised!(host);
+    answer(|| {
+        let mut state = host.enter()?;
+        state.host.set_timeout(Duration(timeout_us.into()));
+        state.host.set_guard(Duration(guard_us.into()));
+        Ok(())
+    })
+}
+
+/// Sets what a motor may be told from the next request on.
+///
+/// `BAD_ARGUMENT`: `motor` is not 1 to 32, or a limit is neither `MOTORLINK_RMD_NO_LIMIT` nor in
+/// the range of its kind: 0 to 32767, 0 to 65535, 0 and more.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_set_limits(
+    host: *mut motorlink_rmd_host,
+    motor: u8,
+    limits: *const motorlink_rmd_limits,
+) -> motorlink_error {
+    fn limit<T: TryFrom<i32> + PartialOrd + Default>(
+        digits: i32,
+    ) -> Result<Option<T>, motorlink_error> {
+        if digits == MOTORLINK_RMD_NO_LIMIT {
+            return Ok(None);
+        }
+        let limit = T::try_from(digits).ok().filter(|limit| *limit >= T::default());
+        limit.map(Some).ok_or(motorlink_error::BadArgument)
+    }
+
+    promised!(host, limits);
+    answer(|| {
+        let limits = limits.read()?;
+        let limits = Limits {
+            current: limit(limits.torque_16ma)?.map(TorqueCommand),
+            speed: limit(limits.speed_dps)?.map(SpeedLimit),
+            angle: limit(limits.angle_centidegrees)?.map(CentiDegrees),
+        };
+        host.enter()?.host.set_limits(id(motor)?, limits);
+        Ok(())
+    })
+}
+
+/// Begins an exchange with a motor: `request` is what one of the functions for requests gives, or
+/// any eight bytes.
+///
+/// A motor that did not answer before may be asked for its status instead; the exchange ends in
+/// `QUARANTINED` then.
+///
+/// `BAD_ARGUMENT`: `motor` is not 1 to 32. `BUSY`: its last exchange is not over. `LIMIT`: a limit
+/// or the document's range is exceeded. `QUARANTINED`: ask again at the time that
+/// `motorlink_rmd_host_retry` tells. Nothing is sent then.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_request(
+    host: *mut motorlink_rmd_host,
+    now_us: u64,
+    motor: u8,
+    request: motorlink_rmd_data,
+) -> motorlink_error {
+    promised!(host);
+    answer(|| {
+        let mut state = host.enter()?;
+        let taken = state.host.request(Instant(now_us), id(motor)?, request.bytes);
+        taken.map_err(|refused| state.refused(refused))
+    })
+}
+
+/// Begins an exchange with motors 1 to 4 in one frame (0x280): a torque current each, 0.016 A a
+/// digit. `expect` has a bit a motor that has to answer, bit 0 for motor 1. Each of them ends in a
+/// `DONE`. All four are told; those that are not expected to answer are in quarantine afterwards.
+///
+/// As `motorlink_rmd_host_request`; `BAD_ARGUMENT`: a bit above 3 is set.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_torque4(
+    host: *mut motorlink_rmd_host,
+    now_us: u64,
+    torques_16ma: *const i16,
+    expect: u8,
+) -> motorlink_error {
+    promised!(host, torques_16ma);
+    answer(|| {
+        let &[one, two, three, four] = torques_16ma.slice(4)? else {
+            return Err(motorlink_error::BadArgument);
+        };
+        if expect > 0b1111 {
+            return Err(motorlink_error::BadArgument);
+        }
+        let torques = Torque4([one, two, three, four].map(TorqueCommand));
+        let expect =
+            MotorSet::TORQUE4.filter(|id| expect & 1u8.wrapping_shl(id.number() as u32 - 1) != 0);
+        let expect = expect.collect();
+        let mut state = host.enter()?;
+        let taken = state.host.torque4(Instant(now_us), torques, expect);
+        taken.map_err(|refused| state.refused(refused))
+    })
+}
+
+/// When to ask again what was last refused with `QUARANTINED`; a reply may make it sooner or later.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_retry(
+    host: *mut motorlink_rmd_host,
+    at_us: *mut u64,
+) -> motorlink_error {
+    promised!(host, at_us);
+    answer(|| {
+        let place = at_us.place()?;
+        place.set(host.enter()?.retry.0);
+        Ok(())
+    })
+}
+
+/// What to do next. Call until it is `WAIT`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_poll(
+    host: *mut motorlink_rmd_host,
+    now_us: u64,
+    action: *mut motorlink_rmd_action,
+) -> motorlink_error {
+    promised!(host, action);
+    answer(|| {
+        let place = action.place()?;
+        let mut action = motorlink_rmd_action {
+            until_us: MOTORLINK_NEVER,
+            frame: NO_FRAME,
+            reply: motorlink_rmd_data { bytes: [0; 8] },
+            result: motorlink_error::Ok,
+            kind: motorlink_action::Wait,
+            motor: 0,
+        };
+        match host.enter()?.host.poll(Instant(now_us)) {
+            Output::Wait(until) => action.until_us = until.map_or(MOTORLINK_NEVER, |at| at.0),
+            Output::Transmit(frame) => {
+                action.kind = motorlink_action::Transmit;
+                action.frame = frame.into();
+            }
+            Output::Done { id, result } => {
+                action.kind = motorlink_action::Done;
+                action.motor = id.number();
+                match result {
+                    Ok(bytes) => action.reply = motorlink_rmd_data { bytes },
+                    Err(Error::Foreign(_)) => action.result = motorlink_error::Foreign,
+                    Err(Error::Quarantined) => action.result = motorlink_error::Quarantined,
+                    Err(_) => action.result = motorlink_error::Timeout,
+                }
+            }
+        }
+        place.set(action);
+        Ok(())
+    })
+}
+
+/// Takes a frame that came from the bus at `now_us`. Frames that belong to no exchange are dropped.
+/// An adapter that echoes what was sent looks like a motor that answers: drop its echoes.
+///
+/// `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_receive(
+    host: *mut motorlink_rmd_host,
+    now_us: u64,
+    frame: *const motorlink_can_frame,
+) -> motorlink_error {
+    promised!(host, frame);
+    answer(|| {
+        let frame = frame.read()?.try_into()?;
+        host.enter()?.host.receive(Instant(now_us), &frame);
+        Ok(())
+    })
+}
+
+/// Gives up the exchange with a motor without a result, so that another request can be made.
+///
+/// `BAD_ARGUMENT`: `motor` is not 1 to 32.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_cancel(
+    host: *mut motorlink_rmd_host,
+    now_us: u64,
+    motor: u8,
+) -> motorlink_error {
+    promised!(host);
+    answer(|| {
+        host.enter()?.host.cancel(Instant(now_us), id(motor)?);
+        Ok(())
+    })
+}
+
+/// The motors with an exchange under way: a bit each, bit 0 for motor 1.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_busy(
+    host: *mut motorlink_rmd_host,
+    motors: *mut u32,
+) -> motorlink_error {
+    promised!(host, motors);
+    answer(|| {
+        let place = motors.place()?;
+        let busy = host.enter()?.host.busy();
+        place.set(busy.fold(0, |bits, id| bits | 1u32.wrapping_shl(u32::from(id.number()) - 1)));
+        Ok(())
+    })
+}

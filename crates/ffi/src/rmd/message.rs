@@ -1,0 +1,347 @@
+//! Requests and replies, by value: what goes in a frame as numbers with their units.
+
+use motorlink_proto::rmd::{
+    Acceleration, Circle, CirclePosition, CirclePositionLimited, ClearErrors, Command, Encoder,
+    EncoderBits, EncoderOffset, Gains, MotionStatus, MultiTurn, Off, Payload, PhaseCurrents,
+    Position, PositionLimited, ReadAcceleration, ReadCircleAngle, ReadEncoder, ReadGains,
+    ReadMultiTurnAngle, ReadStatus1, ReadStatus2, ReadStatus3, Run, Speed, Spin, Status1, Stop,
+    Torque, WriteAcceleration, WriteEncoderOffset, WriteGains, WriteGainsToRom, WriteZeroToRom,
+};
+use motorlink_proto::units::{
+    CentiDegrees, CentiDps, CircleAngle, DpsPerSecond, SpeedLimit, TorqueCommand,
+};
+
+/// The eight bytes of a request or a reply.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_rmd_data {
+    /// DATA\[0\] to DATA\[7\].
+    pub bytes: [u8; 8],
+}
+
+/// Gains of the three loops, without unit.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub struct motorlink_rmd_gains {
+    pub position_kp: u8,
+    pub position_ki: u8,
+    pub speed_kp: u8,
+    pub speed_ki: u8,
+    pub torque_kp: u8,
+    pub torque_ki: u8,
+}
+
+/// What the encoder reads, in counts of its width, or of 16 bits when it is wider.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_rmd_encoder {
+    /// `raw` minus `offset`, modulo one turn.
+    pub position: u16,
+    /// The original position.
+    pub raw: u16,
+    /// The zero point.
+    pub offset: u16,
+}
+
+/// Temperature, voltage and errors: the reply to 0x9A and 0x9B.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_rmd_status {
+    /// Supply voltage, 0.1 V a digit.
+    pub voltage_decivolts: u16,
+    /// Motor temperature, °C.
+    pub temperature_celsius: i8,
+    /// Which protections are active: a sum of `MOTORLINK_RMD_FAULT_*`.
+    pub errors: u8,
+}
+
+/// The reply to 0x9C, to every motion command and to 0x280.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_rmd_motion_status {
+    /// Torque current, 33/2048 A a digit.
+    pub iq_digits: i16,
+    /// Speed, °/s, positive is clockwise.
+    pub speed_dps: i16,
+    /// Encoder position in counts of its width, the upper 16 bits of a wider one.
+    pub encoder_counts: u16,
+    /// Motor temperature, °C.
+    pub temperature_celsius: i8,
+}
+
+/// Phase currents: the reply to 0x9D.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_rmd_phase_currents {
+    /// Phase A, 1/64 A a digit.
+    pub a_digits: i16,
+    /// Phase B, 1/64 A a digit.
+    pub b_digits: i16,
+    /// Phase C, 1/64 A a digit.
+    pub c_digits: i16,
+}
+
+impl From<Gains> for motorlink_rmd_gains {
+    fn from(gains: Gains) -> Self {
+        let Gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki } = gains;
+        motorlink_rmd_gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki }
+    }
+}
+
+impl From<motorlink_rmd_gains> for Gains {
+    fn from(gains: motorlink_rmd_gains) -> Self {
+        let motorlink_rmd_gains {
+            position_kp,
+            position_ki,
+            speed_kp,
+            speed_ki,
+            torque_kp,
+            torque_ki,
+        } = gains;
+        Gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki }
+    }
+}
+
+fn data(command: impl Command) -> motorlink_rmd_data {
+    motorlink_rmd_data { bytes: command.encode() }
+}
+
+/// Request 0x30: reads the gains in RAM.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_read_gains() -> motorlink_rmd_data {
+    data(ReadGains)
+}
+
+/// Request 0x33: reads the acceleration limit.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_read_acceleration() -> motorlink_rmd_data {
+    data(ReadAcceleration)
+}
+
+/// Request 0x90: reads the encoder.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_read_encoder() -> motorlink_rmd_data {
+    data(ReadEncoder)
+}
+
+/// Request 0x19: makes the current position the zero from the next power-on on. Wears the ROM.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_write_zero_to_rom() -> motorlink_rmd_data {
+    data(WriteZeroToRom)
+}
+
+/// Request 0x92: reads the angle over all turns.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_read_multi_turn_angle() -> motorlink_rmd_data {
+    data(ReadMultiTurnAngle)
+}
+
+/// Request 0x94: reads the angle within the turn.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_read_circle_angle() -> motorlink_rmd_data {
+    data(ReadCircleAngle)
+}
+
+/// Request 0x9A: reads temperature, voltage and errors.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_read_status() -> motorlink_rmd_data {
+    data(ReadStatus1)
+}
+
+/// Request 0x9B: clears the errors whose cause is gone. The reply is that to 0x9A.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_clear_errors() -> motorlink_rmd_data {
+    data(ClearErrors)
+}
+
+/// Request 0x9C: reads temperature, torque current, speed and encoder.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_read_motion_status() -> motorlink_rmd_data {
+    data(ReadStatus2)
+}
+
+/// Request 0x9D: reads the phase currents.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_read_phase_currents() -> motorlink_rmd_data {
+    data(ReadStatus3)
+}
+
+/// Request 0x80: switches the motor off and forgets what it was doing.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_off() -> motorlink_rmd_data {
+    data(Off)
+}
+
+/// Request 0x81: stops the motor and remembers what it was doing.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_stop() -> motorlink_rmd_data {
+    data(Stop)
+}
+
+/// Request 0x88: resumes what 0x81 stopped. The motor may turn.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_run() -> motorlink_rmd_data {
+    data(Run)
+}
+
+/// Request 0x31: sets the gains until power-off.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_write_gains(gains: motorlink_rmd_gains) -> motorlink_rmd_data {
+    data(WriteGains(gains.into()))
+}
+
+/// Request 0x32: sets the gains for good. Wears the ROM.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_write_gains_to_rom(
+    gains: motorlink_rmd_gains,
+) -> motorlink_rmd_data {
+    data(WriteGainsToRom(gains.into()))
+}
+
+/// Request 0x34: sets the acceleration limit, °/s², until power-off.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_write_acceleration(acceleration_dps2: i32) -> motorlink_rmd_data {
+    data(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(acceleration_dps2) }))
+}
+
+/// Request 0x91: sets the encoder's zero point, in counts, at once and for good. Wears the ROM.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_write_encoder_offset(offset: u16) -> motorlink_rmd_data {
+    data(WriteEncoderOffset(EncoderOffset { offset }))
+}
+
+/// Request 0xA1: holds a torque current, 0.016 A a digit, -2000 to 2000.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_torque(torque_16ma: i16) -> motorlink_rmd_data {
+    data(Torque { torque: TorqueCommand(torque_16ma) })
+}
+
+/// Request 0xA2: holds a speed, 0.01 °/s a digit, positive is clockwise.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_speed(speed_centidps: i32) -> motorlink_rmd_data {
+    data(Speed { speed: CentiDps(speed_centidps) })
+}
+
+/// Request 0xA3: turns to a multi-turn angle, 0.01° a digit, positive is clockwise from zero.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_position(angle_centidegrees: i32) -> motorlink_rmd_data {
+    data(Position { angle: CentiDegrees(angle_centidegrees) })
+}
+
+/// Request 0xA4: turns to a multi-turn angle, 0.01° a digit, no faster than a limit, °/s.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_position_limited(
+    angle_centidegrees: i32,
+    max_speed_dps: u16,
+) -> motorlink_rmd_data {
+    data(PositionLimited {
+        max_speed: SpeedLimit(max_speed_dps),
+        angle: CentiDegrees(angle_centidegrees),
+    })
+}
+
+/// Request 0xA5: turns to an angle within the turn, 0.01° a digit, 0 to 35999, in a direction of `motorlink_rmd_spin`.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_circle_position(
+    direction: u8,
+    angle_centidegrees: u16,
+) -> motorlink_rmd_data {
+    data(CirclePosition {
+        direction: Spin::from(direction),
+        angle: CircleAngle(angle_centidegrees),
+    })
+}
+
+/// Request 0xA6: as 0xA5, no faster than a limit, °/s.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_circle_position_limited(
+    direction: u8,
+    angle_centidegrees: u16,
+    max_speed_dps: u16,
+) -> motorlink_rmd_data {
+    data(CirclePositionLimited {
+        direction: Spin::from(direction),
+        max_speed: SpeedLimit(max_speed_dps),
+        angle: CircleAngle(angle_centidegrees),
+    })
+}
+
+/// Reads the gains in the reply to 0x30, 0x31 and 0x32.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_decode_gains(reply: motorlink_rmd_data) -> motorlink_rmd_gains {
+    Gains::decode(&reply.bytes).into()
+}
+
+/// Reads the acceleration limit in the reply to 0x33 and 0x34, °/s².
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_decode_acceleration(reply: motorlink_rmd_data) -> i32 {
+    Acceleration::decode(&reply.bytes).acceleration.0
+}
+
+/// Reads the encoder in the reply to 0x90.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_decode_encoder(reply: motorlink_rmd_data) -> motorlink_rmd_encoder {
+    let Encoder { position, raw, offset } = Encoder::decode(&reply.bytes);
+    motorlink_rmd_encoder { position, raw, offset }
+}
+
+/// Reads the zero point in the reply to 0x91 and 0x19, in encoder counts.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_decode_encoder_offset(reply: motorlink_rmd_data) -> u16 {
+    EncoderOffset::decode(&reply.bytes).offset
+}
+
+/// Reads the angle over all turns in the reply to 0x92, 0.01° a digit, positive is clockwise.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_decode_multi_turn_angle(reply: motorlink_rmd_data) -> i64 {
+    MultiTurn::decode(&reply.bytes).angle.0
+}
+
+/// Reads the angle within the turn in the reply to 0x94, 0.01° a digit, 0 to 35999.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_decode_circle_angle(reply: motorlink_rmd_data) -> u16 {
+    Circle::decode(&reply.bytes).angle.0
+}
+
+/// Reads temperature, voltage and errors in the reply to 0x9A and 0x9B.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_decode_status(reply: motorlink_rmd_data) -> motorlink_rmd_status {
+    let Status1 { temperature, voltage, errors } = Status1::decode(&reply.bytes);
+    motorlink_rmd_status {
+        voltage_decivolts: voltage.0,
+        temperature_celsius: temperature.0,
+        errors: errors.0,
+    }
+}
+
+/// Reads the status in the reply to 0x9C, to every motion command and to 0x280.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_decode_motion_status(
+    reply: motorlink_rmd_data,
+) -> motorlink_rmd_motion_status {
+    let MotionStatus { temperature, iq, speed, encoder } = MotionStatus::decode(&reply.bytes);
+    motorlink_rmd_motion_status {
+        iq_digits: iq.0,
+        speed_dps: speed.0,
+        encoder_counts: encoder,
+        temperature_celsius: temperature.0,
+    }
+}
+
+/// Reads the phase currents in the reply to 0x9D.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_decode_phase_currents(
+    reply: motorlink_rmd_data,
+) -> motorlink_rmd_phase_currents {
+    let PhaseCurrents { phase_a, phase_b, phase_c } = PhaseCurrents::decode(&reply.bytes);
+    motorlink_rmd_phase_currents { a_digits: phase_a.0, b_digits: phase_b.0, c_digits: phase_c.0 }
+}
+
+/// An encoder value of a reply as an angle, 0.01° a digit; `encoder_bits` is the encoder's width,
+/// 12 to 18. 0 for any other width.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_rmd_encoder_centidegrees(counts: u16, encoder_bits: u8) -> u16 {
+    let Some(bits) = EncoderBits::new(encoder_bits) else { return 0 };
+    (bits.degrees(counts) * 100.0) as u16
+}

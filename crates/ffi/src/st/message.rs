@@ -1,0 +1,132 @@
+//! What messages carry, as C has it.
+
+use core::ffi::c_char;
+
+use motorlink_proto::stmcp::{BoardInfo, FirmwareVersion, RevupPhase};
+
+use crate::error::{answer, motorlink_error};
+use crate::pointer::{In, plain, promised};
+
+/// A phase of the rev-up (4.9).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_st_revup_phase {
+    /// Mechanical speed at the end of the phase, rpm.
+    pub speed_rpm: i32,
+    /// Iq at the end of the phase, s16A digits.
+    pub torque_s16a: i16,
+    /// Length of the phase, ms.
+    pub duration_ms: u16,
+}
+
+/// Bytes for a text of a reply with its NUL.
+pub const MOTORLINK_ST_TEXT_SIZE: usize = 33;
+
+/// The answer to a board information request (4.7).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_st_board_info {
+    /// Major version of the SDK.
+    pub major: u8,
+    /// Minor version of the SDK.
+    pub minor: u8,
+    /// Patch version of the SDK.
+    pub patch: u8,
+    /// Name of the SDK, UTF-8, with a NUL at its end.
+    pub name: [c_char; MOTORLINK_ST_TEXT_SIZE],
+}
+
+/// The answer to a firmware version request (4.12).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_st_firmware_version {
+    /// Name of the firmware, UTF-8, with a NUL at its end.
+    pub name: [c_char; MOTORLINK_ST_TEXT_SIZE],
+    /// Its version, such as `Ver.5.4.4`, UTF-8, with a NUL at its end.
+    pub version: [c_char; MOTORLINK_ST_TEXT_SIZE],
+}
+
+plain!(motorlink_st_revup_phase);
+
+impl From<RevupPhase> for motorlink_st_revup_phase {
+    fn from(phase: RevupPhase) -> Self {
+        let RevupPhase { speed_rpm, torque_s16a, duration_ms } = phase;
+        motorlink_st_revup_phase { speed_rpm, torque_s16a, duration_ms }
+    }
+}
+
+impl From<motorlink_st_revup_phase> for RevupPhase {
+    fn from(phase: motorlink_st_revup_phase) -> Self {
+        let motorlink_st_revup_phase { speed_rpm, torque_s16a, duration_ms } = phase;
+        RevupPhase { speed_rpm, torque_s16a, duration_ms }
+    }
+}
+
+/// A text with a NUL behind it, cut where there is no room.
+fn terminated(text: &str) -> [c_char; MOTORLINK_ST_TEXT_SIZE] {
+    let mut out = [0; MOTORLINK_ST_TEXT_SIZE];
+    let most = MOTORLINK_ST_TEXT_SIZE - 1;
+    for (slot, byte) in out.iter_mut().zip(text.bytes().take(most)) {
+        *slot = byte as c_char;
+    }
+    out
+}
+
+/// Reads the payload of an answer to `motorlink_st_master_board_info`.
+///
+/// `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_decode_board_info(
+    payload: *const u8,
+    size: usize,
+    info: *mut motorlink_st_board_info,
+) -> motorlink_error {
+    promised!(payload, info);
+    answer(|| {
+        let payload: In<u8> = payload;
+        let (payload, place) = (payload.slice(size)?, info.place()?);
+        let info = BoardInfo::decode(payload).ok_or(motorlink_error::BadArgument)?;
+        let [major, minor, patch] = info.version;
+        let name = terminated(info.name);
+        place.set(motorlink_st_board_info { major, minor, patch, name });
+        Ok(())
+    })
+}
+
+/// Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
+/// UTF-8 are cut there.
+///
+/// `NULL_POINTER`, `MISALIGNED`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_decode_firmware_version(
+    payload: *const u8,
+    size: usize,
+    version: *mut motorlink_st_firmware_version,
+) -> motorlink_error {
+    promised!(payload, version);
+    answer(|| {
+        let (payload, place) = (payload.slice(size)?, version.place()?);
+        let FirmwareVersion { name, version } = FirmwareVersion::decode(payload);
+        let (name, version) = (terminated(name), terminated(version));
+        place.set(motorlink_st_firmware_version { name, version });
+        Ok(())
+    })
+}
+
+/// Reads the payload of an answer to `motorlink_st_master_revup`.
+///
+/// `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_decode_revup(
+    payload: *const u8,
+    size: usize,
+    phase: *mut motorlink_st_revup_phase,
+) -> motorlink_error {
+    promised!(payload, phase);
+    answer(|| {
+        let (payload, place) = (payload.slice(size)?, phase.place()?);
+        let phase = RevupPhase::decode(payload).ok_or(motorlink_error::BadArgument)?;
+        place.set(phase.into());
+        Ok(())
+    })
+}

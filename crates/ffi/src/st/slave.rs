@@ -1,0 +1,290 @@
+//! The slave's end: bytes in, replies out, a table of callbacks in between.
+
+use core::ffi::{c_char, c_void};
+
+use motorlink_proto::stmcp::{
+    Command, CurrentReference, Drive, ErrorCode, Feature, Features, Motor, PositionMove, Ramp,
+    RegisterId, RevupPhase, Slave, TorqueRamp, Version,
+};
+use motorlink_proto::time::Instant;
+
+use super::message::motorlink_st_revup_phase;
+use super::{motorlink_st_slave, profile};
+use crate::bytes::{MOTORLINK_NEVER, motorlink_bytes};
+use crate::error::{answer, motorlink_error};
+use crate::pointer::{In, ascii, plain, promised};
+
+/// The firmware's version, as board information (4.7) and firmware version (4.12) tell it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_st_version {
+    /// Name of the SDK, ASCII, NUL-terminated; the replies have room for 28 and 15 bytes of it.
+    /// NULL is no name.
+    pub name: *const c_char,
+    /// Type and number of a pre-release, such as "RC2", ASCII, NUL-terminated. NULL is a release.
+    pub pre_release: *const c_char,
+    /// Major version.
+    pub major: u8,
+    /// Minor version.
+    pub minor: u8,
+    /// Patch version.
+    pub patch: u8,
+}
+
+/// A drive behind a slave: what it is and what it does. The slave has checked the frame, the
+/// motor, the register's existence and access, and every size before it calls.
+///
+/// Every callback may be NULL. It is called from within `motorlink_st_slave_receive`, and may not
+/// call for the same slave: such calls give `IN_USE`. `motor` is 1 to 7, and exists.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_st_drive {
+    /// Handed to each callback.
+    pub context: *mut c_void,
+    /// The firmware's version.
+    pub version: motorlink_st_version,
+    /// What this motor's control is built with: a sum of `MOTORLINK_ST_FEATURE_*`.
+    /// NULL: nothing.
+    pub features: Option<extern "C" fn(context: *mut c_void, motor: u8) -> u16>,
+    /// The value of a register that exists with `features`. Not called for TARGET_MOTOR, which
+    /// the slave keeps. FLUXWK_BUS and FLUXWK_BUS_MEAS are tenths of a percent; the value of a
+    /// floating-point register is its bits. NULL: 0.
+    pub read: Option<extern "C" fn(context: *mut c_void, motor: u8, reg: u8) -> i32>,
+    /// Writes a register that may be written; gives 0, or why not: `MOTORLINK_ST_REFUSAL_*`,
+    /// WRONG_SET for a value that the register cannot take. NULL: WRONG_SET.
+    pub write: Option<extern "C" fn(context: *mut c_void, motor: u8, reg: u8, value: i32) -> u8>,
+    /// Executes a `MOTORLINK_ST_COMMAND_*`. What the state does not allow has no effect (4.6).
+    /// NULL: none has.
+    pub execute: Option<extern "C" fn(context: *mut c_void, motor: u8, command: u8)>,
+    /// Programs a speed ramp: at once in RUN, else when RUN is reached (4.8). 0 ms is a step.
+    /// NULL: without effect.
+    pub ramp:
+        Option<extern "C" fn(context: *mut c_void, motor: u8, speed_rpm: i32, duration_ms: u16)>,
+    /// Gives rev-up phase 0 to 4 (4.9); what is not set is 0. NULL: all is 0.
+    pub revup: Option<
+        extern "C" fn(
+            context: *mut c_void,
+            motor: u8,
+            phase: u8,
+            data: *mut motorlink_st_revup_phase,
+        ),
+    >,
+    /// Sets rev-up phase 0 to 4 (4.10). NULL: without effect.
+    pub set_revup: Option<
+        extern "C" fn(
+            context: *mut c_void,
+            motor: u8,
+            phase: u8,
+            data: *const motorlink_st_revup_phase,
+        ),
+    >,
+    /// Sets the current references: at once in RUN, else when RUN is reached (4.11).
+    /// NULL: without effect.
+    pub current: Option<extern "C" fn(context: *mut c_void, motor: u8, iq_s16a: i16, id_s16a: i16)>,
+    /// Programs a torque ramp (profile MCSDK 5.4). NULL: without effect.
+    pub torque_ramp:
+        Option<extern "C" fn(context: *mut c_void, motor: u8, torque_s16a: i32, duration_ms: u16)>,
+    /// Moves to an angle (profile MCSDK 5.4, with POSITION_CONTROL). NULL: without effect.
+    pub position:
+        Option<extern "C" fn(context: *mut c_void, motor: u8, angle_rad: f32, duration_s: f32)>,
+    /// Registers that a step of the motor profiler shows (profile MCSDK 5.4, with PROFILER): gives
+    /// how many there are and where, until the next call of a callback. NULL: none.
+    pub profiler_step: Option<
+        extern "C" fn(context: *mut c_void, motor: u8, step: u8, registers: *mut *const u8) -> u8,
+    >,
+}
+
+plain!(motorlink_st_drive);
+
+/// What the storage of a slave holds.
+pub(crate) struct State {
+    slave: Slave,
+    drive: In<motorlink_st_drive>,
+}
+
+impl Drive for &motorlink_st_drive {
+    fn features(&self, motor: Motor) -> Features {
+        let bits = self.features.map_or(0, |call| call(self.context, motor.number()));
+        let has = |feature: &&Feature| bits & 1u16.wrapping_shl(**feature as u32) != 0;
+        Feature::ALL.iter().filter(has).fold(Features::NONE, |all, one| all.with(*one))
+    }
+
+    fn version(&self) -> Version<'_> {
+        let motorlink_st_version { name, pre_release, major, minor, patch } = self.version;
+        let (name, pre_release) = (name.cast::<u8>(), pre_release.cast::<u8>());
+        promised!(name, pre_release);
+        let (name, pre_release) = (ascii(name, 32), ascii(pre_release, 32));
+        Version { name, major, minor, patch, pre_release }
+    }
+
+    fn read(&mut self, motor: Motor, register: RegisterId) -> i32 {
+        self.read.map_or(0, |call| call(self.context, motor.number(), register.0))
+    }
+
+    fn write(&mut self, motor: Motor, register: RegisterId, value: i32) -> Result<(), ErrorCode> {
+        let call = self.write.ok_or(ErrorCode::WrongSet)?;
+        match call(self.context, motor.number(), register.0, value) {
+            0 => Ok(()),
+            refusal => Err(refusal.into()),
+        }
+    }
+
+    fn execute(&mut self, motor: Motor, command: Command) {
+        if let Some(call) = self.execute {
+            call(self.context, motor.number(), command.number());
+        }
+    }
+
+    fn ramp(&mut self, motor: Motor, ramp: Ramp) {
+        if let Some(call) = self.ramp {
+            call(self.context, motor.number(), ramp.speed_rpm, ramp.duration_ms);
+        }
+    }
+
+    fn revup(&mut self, motor: Motor, phase: u8) -> RevupPhase {
+        let mut data = motorlink_st_revup_phase::from(RevupPhase::default());
+        if let Some(call) = self.revup {
+            call(self.context, motor.number(), phase, &raw mut data);
+        }
+        data.into()
+    }
+
+    fn set_revup(&mut self, motor: Motor, phase: u8, data: RevupPhase) {
+        if let Some(call) = self.set_revup {
+            call(self.context, motor.number(), phase, &raw const *&data.into());
+        }
+    }
+
+    fn current_reference(&mut self, motor: Motor, reference: CurrentReference) {
+        if let Some(call) = self.current {
+            call(self.context, motor.number(), reference.iq_s16a, reference.id_s16a);
+        }
+    }
+
+    fn torque_ramp(&mut self, motor: Motor, ramp: TorqueRamp) {
+        if let Some(call) = self.torque_ramp {
+            call(self.context, motor.number(), ramp.torque_s16a, ramp.duration_ms);
+        }
+    }
+
+    fn position(&mut self, motor: Motor, target: PositionMove) {
+        if let Some(call) = self.position {
+            call(self.context, motor.number(), target.angle_rad, target.duration_s);
+        }
+    }
+
+    fn profiler_step(&self, motor: Motor, step: u8) -> &[u8] {
+        let mut registers = core::ptr::null();
+        let call = self.profiler_step;
+        let count =
+            call.map_or(0, |call| call(self.context, motor.number(), step, &raw mut registers));
+        promised!(registers);
+        registers.slice(count.into()).unwrap_or(&[])
+    }
+}
+
+/// Begins a slave for a drive with motors 1 to `motors`, whatever the storage held before.
+///
+/// `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
+/// may be constant. Not from a callback of the same slave.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` is none of
+/// `motorlink_st_profile`, or `motors` is not 1 to 7.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_slave_init(
+    slave: *mut motorlink_st_slave,
+    size: usize,
+    profile: u8,
+    motors: u8,
+    drive: *const motorlink_st_drive,
+) -> motorlink_error {
+    promised!(slave, drive);
+    answer(|| {
+        drive.get()?;
+        let profile = self::profile(profile)?;
+        let motors = Motor::new(motors).ok_or(motorlink_error::BadArgument)?;
+        slave.init(size, || State { slave: Slave::new(profile, motors), drive })
+    })
+}
+
+/// Takes a byte that came at `now_us`. Where it completes a command the drive is called, and
+/// `reply` is what to send before the next byte is handed in; else `reply` has no bytes.
+///
+/// The bytes belong to the slave, until the next call for it. A byte costs some instructions, a
+/// complete command a checksum over it and the callbacks.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_slave_receive(
+    slave: *mut motorlink_st_slave,
+    now_us: u64,
+    byte: u8,
+    reply: *mut motorlink_bytes,
+) -> motorlink_error {
+    promised!(slave, reply);
+    answer(|| {
+        let reply = reply.place()?;
+        let mut state = slave.enter()?;
+        let State { slave, drive } = &mut *state;
+        let mut drive = drive.get()?;
+        let sent = slave.receive(Instant(now_us), byte, &mut drive);
+        reply.set(sent.unwrap_or(&[]).into());
+        Ok(())
+    })
+}
+
+/// Call at the deadline: gives the refusal that a command is owed which did not come whole in time
+/// (4.1), and no bytes when there is none. The bytes belong to the slave, until the next call for
+/// it.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_slave_poll(
+    slave: *mut motorlink_st_slave,
+    now_us: u64,
+    reply: *mut motorlink_bytes,
+) -> motorlink_error {
+    promised!(slave, reply);
+    answer(|| {
+        let reply = reply.place()?;
+        let mut state = slave.enter()?;
+        reply.set(state.slave.poll(Instant(now_us)).unwrap_or(&[]).into());
+        Ok(())
+    })
+}
+
+/// When `motorlink_st_slave_poll` has to be called; `MOTORLINK_NEVER` while no command is under
+/// way, and always in profile MCSDK 5.4, whose firmware never times out.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_slave_deadline(
+    slave: *mut motorlink_st_slave,
+    deadline_us: *mut u64,
+) -> motorlink_error {
+    promised!(slave, deadline_us);
+    answer(|| {
+        let place = deadline_us.place()?;
+        let deadline = slave.enter()?.slave.deadline();
+        place.set(deadline.map_or(MOTORLINK_NEVER, |deadline| deadline.0));
+        Ok(())
+    })
+}
+
+/// Tells that the receiver lost bytes (overrun, framing, noise): drops the command under way and
+/// gives the refusal to send. The bytes belong to the slave, until the next call for it.
+///
+/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_slave_overrun(
+    slave: *mut motorlink_st_slave,
+    reply: *mut motorlink_bytes,
+) -> motorlink_error {
+    promised!(slave, reply);
+    answer(|| {
+        let reply = reply.place()?;
+        let mut state = slave.enter()?;
+        reply.set(state.slave.overrun().into());
+        Ok(())
+    })
+}

@@ -1,0 +1,56 @@
+//! The objects' storage. Its sizes are the same on every target: those of the largest.
+
+use crate::rmd::{drive, host};
+use crate::st::{master, slave};
+
+/// Words of 8 bytes in a [`motorlink_st_slave`].
+pub const MOTORLINK_ST_SLAVE_WORDS: usize = 38;
+/// Words of 8 bytes in a [`motorlink_st_master`].
+pub const MOTORLINK_ST_MASTER_WORDS: usize = 29;
+/// Words of 8 bytes in a [`motorlink_rmd_host`].
+pub const MOTORLINK_RMD_HOST_WORDS: usize = 333;
+/// Words of 8 bytes in a [`motorlink_rmd_drive`].
+pub const MOTORLINK_RMD_DRIVE_WORDS: usize = 13;
+
+/// A slave of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
+/// Opaque; may be moved and copied while no call for it is under way.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_st_slave {
+    /// Nobody's business.
+    pub opaque: [u64; MOTORLINK_ST_SLAVE_WORDS],
+}
+
+/// A master of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
+/// Opaque; may be moved and copied while no call for it is under way.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_st_master {
+    /// Nobody's business.
+    pub opaque: [u64; MOTORLINK_ST_MASTER_WORDS],
+}
+
+/// The host of a bus with RMD motors, in storage of the caller's: static, on the stack or on the heap.
+/// Opaque; may be moved and copied while no call for it is under way.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_rmd_host {
+    /// Nobody's business.
+    pub opaque: [u64; MOTORLINK_RMD_HOST_WORDS],
+}
+
+/// An RMD drive, in storage of the caller's: static, on the stack or on the heap.
+/// Opaque; may be moved and copied while no call for it is under way.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_rmd_drive {
+    /// Nobody's business.
+    pub opaque: [u64; MOTORLINK_RMD_DRIVE_WORDS],
+}
+
+crate::pointer::storage! {
+    motorlink_st_slave: slave::State, 0x5EA1_51A7;
+    motorlink_st_master: master::State, 0x3A57_C0DE;
+    motorlink_rmd_host: host::State, 0x7B05_1D1E;
+    motorlink_rmd_drive: drive::State, 0x2D21_7E11;
+}

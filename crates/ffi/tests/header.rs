@@ -1,0 +1,47 @@
+//! `include/motorlink.h` is what the sources and the protocols' tables say.
+//!
+//! `MOTORLINK_UPDATE_HEADER=1 cargo test -p motorlink-ffi --test header` writes it anew.
+
+mod tables;
+
+use std::path::Path;
+use std::{env, fs};
+
+/// In the order in which a reader wants them.
+const SOURCES: [&str; 10] = [
+    "error.rs",
+    "bytes.rs",
+    "storage.rs",
+    "st/mod.rs",
+    "st/message.rs",
+    "st/master.rs",
+    "st/slave.rs",
+    "rmd/frame.rs",
+    "rmd/message.rs",
+    "rmd/host.rs",
+];
+
+fn generated(root: &Path) -> String {
+    let mut config =
+        cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("cbindgen.toml");
+    config.after_includes = Some(format!("\n{}", tables::text()));
+    let mut builder = cbindgen::Builder::new().with_config(config);
+    for source in SOURCES.iter().chain(&["rmd/drive.rs"]) {
+        builder = builder.with_src(root.join("src").join(source));
+    }
+    let mut header = Vec::new();
+    builder.generate().expect("cbindgen understands the sources").write(&mut header);
+    String::from_utf8(header).expect("UTF-8")
+}
+
+#[test]
+fn the_header_is_what_the_sources_say() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let path = root.join("include/motorlink.h");
+    let generated = generated(root);
+    if env::var_os("MOTORLINK_UPDATE_HEADER").is_some() {
+        fs::write(&path, &generated).expect("the header can be written");
+    }
+    let committed = fs::read_to_string(&path).unwrap_or_default();
+    assert!(committed == generated, "include/motorlink.h is old: `make header` writes it anew");
+}

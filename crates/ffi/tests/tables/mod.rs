@@ -1,0 +1,180 @@
+//! The protocols' numbers as C, from proto's tables.
+
+use std::fmt::Write;
+
+use motorlink_proto::rmd::{COMMANDS, Errors, MOTOR_BASE, Spin, TORQUE4_ID};
+use motorlink_proto::stmcp::register::{Access, Origin};
+use motorlink_proto::stmcp::{
+    Command, ControlMode, ErrorCode, Feature, Flags, FrameCode, Profile, RegisterId, Status,
+};
+
+pub fn text() -> String {
+    let mut out = String::new();
+    group(
+        &mut out,
+        "motorlink_st_register",
+        "Registers (table 3): `reg` in calls. A comment has type, access and unit.",
+        registers(),
+    );
+    let plain = |prefix: &'static str, all: Vec<(u32, &'static str, String)>| {
+        all.into_iter().map(move |(number, name, doc)| (format!("{prefix}_{name}"), number, doc))
+    };
+    let frames = FrameCode::ALL.iter().map(|code| {
+        let known = |profile| FrameCode::from_number(code.number(), profile) == Some(*code);
+        let only = match (known(Profile::Spec), known(Profile::Mcsdk54)) {
+            (true, false) => " (profile SPEC only)",
+            (false, true) => " (profile MCSDK 5.4 only)",
+            _ => "",
+        };
+        (u32::from(code.number()), code.name(), format!("{}{only}", code.doc()))
+    });
+    group(
+        &mut out,
+        "motorlink_st_frame",
+        "Frame codes (table 1).",
+        plain("MOTORLINK_ST_FRAME", frames.collect()),
+    );
+    macro_rules! named {
+        ($enum:ident) => {
+            $enum::ALL
+                .iter()
+                .map(|one| {
+                    (u32::from(one.number()), one.name().expect("named"), one.doc().to_owned())
+                })
+                .collect()
+        };
+    }
+    group(
+        &mut out,
+        "motorlink_st_command",
+        "Commands (table 4).",
+        plain("MOTORLINK_ST_COMMAND", named!(Command)),
+    );
+    group(
+        &mut out,
+        "motorlink_st_refusal",
+        "Why a drive refused (table 2).",
+        plain("MOTORLINK_ST_REFUSAL", named!(ErrorCode)),
+    );
+    group(
+        &mut out,
+        "motorlink_st_status",
+        "Values of register STATUS.",
+        plain("MOTORLINK_ST_STATUS", named!(Status)),
+    );
+    group(
+        &mut out,
+        "motorlink_st_control_mode",
+        "Values of register CONTROL_MODE.",
+        plain("MOTORLINK_ST_CONTROL_MODE", named!(ControlMode)),
+    );
+    let faults =
+        Flags::NAMES.iter().map(|(bit, name, doc)| (u32::from(*bit), *name, (*doc).to_owned()));
+    group(
+        &mut out,
+        "motorlink_st_fault",
+        "Bits of register FLAGS: occurred; 16 bits to the left: present.",
+        plain("MOTORLINK_ST_FAULT", faults.collect()),
+    );
+    let features =
+        Feature::ALL.iter().filter(|feature| **feature != Feature::Core).map(|feature| {
+            let name = screaming(&format!("{feature:?}"));
+            (
+                format!("MOTORLINK_ST_FEATURE_{name}"),
+                1 << *feature as u32,
+                feature.name().to_owned(),
+            )
+        });
+    group(&mut out, "motorlink_st_feature", "What a motor's control may be built with.", features);
+    let codes = COMMANDS.iter().map(|row| {
+        let name = screaming(&format!("{:?}", row.code));
+        let rom = if row.rom { "; wears the ROM" } else { "" };
+        (
+            format!("MOTORLINK_RMD_CODE_{name}"),
+            u32::from(row.code.number()),
+            format!("{}{rom}", row.code.doc()),
+        )
+    });
+    group(
+        &mut out,
+        "motorlink_rmd_code",
+        "Commands (chapter 2): the first byte of request and reply.",
+        codes,
+    );
+    let errors = Errors::NAMES.iter().map(|(bits, text)| {
+        let name = text.trim_end_matches(" protection").replace(' ', "_").to_uppercase();
+        (format!("MOTORLINK_RMD_FAULT_{name}"), u32::from(bits.0), (*text).to_owned())
+    });
+    group(&mut out, "motorlink_rmd_fault", "Bits of the error state.", errors);
+    let spins = Spin::ALL.iter().map(|spin| {
+        let name = spin.name().expect("named").to_uppercase();
+        (format!("MOTORLINK_RMD_SPIN_{name}"), u32::from(spin.number()), spin.doc().to_owned())
+    });
+    group(&mut out, "motorlink_rmd_spin", "Which way to turn to an angle within the turn.", spins);
+    let ids = [
+        (
+            "MOTORLINK_RMD_MOTOR_BASE".to_owned(),
+            u32::from(MOTOR_BASE),
+            "request and reply of the motor with ID n have the identifier n above this".to_owned(),
+        ),
+        (
+            "MOTORLINK_RMD_TORQUE4_ID".to_owned(),
+            u32::from(TORQUE4_ID),
+            "torque currents for motors 1 to 4".to_owned(),
+        ),
+    ];
+    group(&mut out, "motorlink_rmd_can_id", "CAN identifiers.", ids.into_iter());
+    out
+}
+
+fn registers() -> impl Iterator<Item = (String, u32, String)> {
+    RegisterId::all().map(|id| {
+        let (shape, text) = (id.shape().expect("in the table"), id.text().expect("in the table"));
+        let access = match shape.access {
+            Access::ReadWrite => "RW",
+            Access::ReadOnly => "R",
+            Access::WriteOnly => "W",
+            Access::Dac => "D",
+            Access::Never => "-",
+        };
+        let mut doc = format!("{} {access:<2}", shape.ty.name());
+        if !shape.unit.symbol().is_empty() {
+            write!(doc, " {}", shape.unit.symbol()).expect("a string");
+        }
+        write!(doc, ": {}", text.doc).expect("a string");
+        if shape.origin == Origin::Firmware {
+            doc.push_str(" (firmware only)");
+        }
+        (format!("MOTORLINK_ST_REG_{}", text.name), u32::from(id.0), doc)
+    })
+}
+
+fn group(
+    out: &mut String,
+    name: &str,
+    doc: &str,
+    rows: impl Iterator<Item = (String, u32, String)>,
+) {
+    let rows: Vec<_> = rows.collect();
+    let wide = rows.iter().map(|(name, ..)| name.len()).max().unwrap_or(0);
+    let digits = if rows.iter().any(|row| row.1 > 0xFF) { 4 } else { 2 };
+    writeln!(out, "/** {doc} */\nenum {name} {{").expect("a string");
+    for (index, (name, number, doc)) in rows.iter().enumerate() {
+        let comma = if index + 1 < rows.len() { "," } else { " " };
+        writeln!(out, "  {name:<wide$} = 0x{number:0digits$X}{comma} /**< {doc} */")
+            .expect("a string");
+    }
+    out.push_str("};\n\n");
+}
+
+/// `FluxWeakening` as `FLUX_WEAKENING`, `ReadStatus1` as `READ_STATUS_1`.
+fn screaming(camel: &str) -> String {
+    let mut out = String::new();
+    for (index, letter) in camel.char_indices() {
+        if index > 0 && !letter.is_ascii_lowercase() {
+            out.push('_');
+        }
+        out.push(letter.to_ascii_uppercase());
+    }
+    out
+}
