@@ -180,13 +180,13 @@ impl From<motorlink_rmd_settings> for Settings {
 impl Motor for &motorlink_rmd_motor {
     fn set_mode(&mut self, mode: Mode) {
         if let Some(call) = self.set_mode {
-            call(self.context, &raw const *&mode.into());
+            call(self.context, &motorlink_rmd_motion::from(mode));
         }
     }
 
     fn configure(&mut self, settings: &Settings) {
         if let Some(call) = self.configure {
-            call(self.context, &raw const *&settings.into());
+            call(self.context, &motorlink_rmd_settings::from(settings));
         }
     }
 
@@ -217,7 +217,7 @@ impl Motor for &motorlink_rmd_motor {
 
     fn save(&mut self, rom: &Settings) {
         if let Some(call) = self.save {
-            call(self.context, &raw const *&rom.into());
+            call(self.context, &motorlink_rmd_settings::from(rom));
         }
     }
 }

@@ -151,7 +151,7 @@ impl Drive for &motorlink_st_drive {
 
     fn set_revup(&mut self, motor: Motor, phase: u8, data: RevupPhase) {
         if let Some(call) = self.set_revup {
-            call(self.context, motor.number(), phase, &raw const *&data.into());
+            call(self.context, motor.number(), phase, &motorlink_st_revup_phase::from(data));
         }
     }
 
