@@ -1,6 +1,54 @@
-/* Motorlink: both ends of ST's serial Motor Control Protocol and of RMD over CAN V1.62. */
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
-/* Written by `make header` from crates/ffi and the protocols' tables. Do not edit. */
+/* Written by `make header` from crates/ffi and from the protocols' tables: do not edit. */
+
+/**
+ * Motorlink: both ends of two protocols for motor drives. ST's serial Motor Control Protocol as
+ * MCSDK 5.x drives speak it, master and slave; the RMD motor control protocol over CAN, V1.62,
+ * host and drive; and slcan, with which a serial line carries CAN frames. C99 and C++11.
+ * Paragraph numbers in brackets are those of the protocols' documents.
+ *
+ * Nothing here reads a clock, touches a port, allocates or prints. A caller hands in received bytes
+ * or frames with the time at which they came, and polls for what to do: send, wait until, done.
+ *
+ *     static motorlink_st_master master;
+ *     motorlink_st_action action;
+ *
+ *     motorlink_st_master_init(&master, sizeof master, NULL);
+ *     motorlink_st_master_get_register(&master, 1, MOTORLINK_ST_REG_SPEED_MEAS);
+ *     do {
+ *       motorlink_st_master_poll(&master, now_us(), &action);
+ *       if (action.kind == MOTORLINK_ACTION_TRANSMIT) {
+ *         send(action.bytes.data, action.bytes.size);
+ *       } else if (action.kind == MOTORLINK_ACTION_WAIT) {
+ *         size_t size = receive_until(action.until_us, buffer, sizeof buffer);
+ *         motorlink_st_master_receive(&master, now_us(), buffer, size);
+ *       }
+ *     } while (action.kind != MOTORLINK_ACTION_DONE);
+ *     if (action.result == MOTORLINK_OK) { speed_rpm = action.value; }
+ *
+ * What holds for every function:
+ *
+ * Ownership. The caller owns the storage of every object, which may be static, on the stack or on
+ * the heap, and which is opaque: `_init` begins an object there, whatever the storage held before.
+ * There is nothing to release. A pointer is used during the call only, where its function does not
+ * say that it is kept; pointers in one call do not overlap one another or an object's storage.
+ *
+ * Time is in microseconds since any moment, as long as it is the same one for an object and time
+ * does not run backwards.
+ *
+ * Errors. A function gives MOTORLINK_OK or another `motorlink_error`, which says that nothing was
+ * done. Besides those that a function names it may be NULL_POINTER, MISALIGNED and, where it takes
+ * an object, UNINITIALISED, WRONG_KIND and IN_USE. `_init` may give STORAGE_TOO_SMALL.
+ *
+ * Reentrancy. Calls for different objects have nothing to do with each other; there are no globals.
+ * A call for an object that is in a call already (from one of its callbacks, from an interrupt,
+ * from another thread) gives IN_USE and does nothing. `_init` alone cannot know, and must not be
+ * called then.
+ *
+ * Cost. Every call ends after a number of steps that depends on the bytes that were handed in and
+ * on the callbacks, and needs less than 1 KiB of stack beside them on a Cortex-M4. What is not
+ * called is not linked.
+ */
 
 
 #ifndef MOTORLINK_H
@@ -336,6 +384,16 @@ enum motorlink_rmd_can_id {
 #define MOTORLINK_RMD_DRIVE_WORDS 13
 
 /**
+ * Words of 8 bytes in a [`motorlink_slcan_host`].
+ */
+#define MOTORLINK_SLCAN_HOST_WORDS 7
+
+/**
+ * Words of 8 bytes in a [`motorlink_slcan_device`].
+ */
+#define MOTORLINK_SLCAN_DEVICE_WORDS 7
+
+/**
  * The longest payload.
  */
 #define MOTORLINK_ST_MAX_PAYLOAD 128
@@ -346,9 +404,19 @@ enum motorlink_rmd_can_id {
 #define MOTORLINK_ST_TEXT_SIZE 33
 
 /**
+ * The `id` of no frame, which has no bytes either.
+ */
+#define MOTORLINK_NO_FRAME UINT32_MAX
+
+/**
  * In `motorlink_rmd_limits`: no limit beyond the document's range.
  */
 #define MOTORLINK_RMD_NO_LIMIT -1
+
+/**
+ * The longest line: a frame of 8 bytes with 29 bits of identifier and a timestamp.
+ */
+#define MOTORLINK_SLCAN_LINE_SIZE 31
 
 /**
  * What became of a call, or of an exchange. 0 is success.
@@ -482,6 +550,43 @@ enum motorlink_action
 typedef enum motorlink_action motorlink_action;
 #else
 typedef uint8_t motorlink_action;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What an adapter said.
+ */
+enum motorlink_slcan_answer
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Nothing yet.
+   */
+  MOTORLINK_SLCAN_ANSWER_NONE = 0,
+  /**
+   * A frame came from the bus.
+   */
+  MOTORLINK_SLCAN_ANSWER_FRAME = 1,
+  /**
+   * A command or a frame was taken.
+   */
+  MOTORLINK_SLCAN_ANSWER_TAKEN = 2,
+  /**
+   * A command or a frame was refused.
+   */
+  MOTORLINK_SLCAN_ANSWER_REFUSED = 3,
+  /**
+   * The answer to a question about version, serial number or status.
+   */
+  MOTORLINK_SLCAN_ANSWER_INFO = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum motorlink_slcan_answer motorlink_slcan_answer;
+#else
+typedef uint8_t motorlink_slcan_answer;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -1151,6 +1256,40 @@ typedef struct motorlink_rmd_motor {
   void (*save)(void *context, const struct motorlink_rmd_settings *rom);
 } motorlink_rmd_motor;
 
+/**
+ * The host's end of a serial line to a CAN adapter, in storage of the caller's.
+ */
+typedef struct motorlink_slcan_host {
+  /**
+   * Nobody's business.
+   */
+  uint64_t opaque[MOTORLINK_SLCAN_HOST_WORDS];
+} motorlink_slcan_host;
+
+/**
+ * What is to be sent on the serial line.
+ */
+typedef struct motorlink_slcan_line {
+  /**
+   * The characters; of these `size` count.
+   */
+  uint8_t bytes[MOTORLINK_SLCAN_LINE_SIZE];
+  /**
+   * How many there are; 0 where there is nothing to send.
+   */
+  uint8_t size;
+} motorlink_slcan_line;
+
+/**
+ * The adapter's end of such a line, in storage of the caller's.
+ */
+typedef struct motorlink_slcan_device {
+  /**
+   * Nobody's business.
+   */
+  uint64_t opaque[MOTORLINK_SLCAN_DEVICE_WORDS];
+} motorlink_slcan_device;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -1171,7 +1310,7 @@ struct motorlink_st_master_config motorlink_st_master_defaults(void);
  *
  * `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
  *
- * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` or `recovery` is
+ * `BAD_ARGUMENT`: `profile` or `recovery` is
  * not one of its enum's.
  */
 motorlink_error motorlink_st_master_init(struct motorlink_st_master *master,
@@ -1342,7 +1481,7 @@ motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, 
 /**
  * Reads the payload of an answer to `motorlink_st_master_board_info`.
  *
- * `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+ * `BAD_ARGUMENT`: the payload is too short to be one.
  */
 motorlink_error motorlink_st_decode_board_info(const uint8_t *payload,
                                                size_t size,
@@ -1351,8 +1490,6 @@ motorlink_error motorlink_st_decode_board_info(const uint8_t *payload,
 /**
  * Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
  * UTF-8 are cut there.
- *
- * `NULL_POINTER`, `MISALIGNED`.
  */
 motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
                                                      size_t size,
@@ -1361,7 +1498,7 @@ motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
 /**
  * Reads the payload of an answer to `motorlink_st_master_revup`.
  *
- * `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+ * `BAD_ARGUMENT`: the payload is too short to be one.
  */
 motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
                                           size_t size,
@@ -1373,7 +1510,7 @@ motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
  * `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
  * may be constant. Not from a callback of the same slave.
  *
- * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` is none of
+ * `BAD_ARGUMENT`: `profile` is none of
  * `motorlink_st_profile`, or `motors` is not 1 to 7.
  */
 motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
@@ -1388,8 +1525,6 @@ motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
  *
  * The bytes belong to the slave, until the next call for it. A byte costs some instructions, a
  * complete command a checksum over it and the callbacks.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_st_slave_receive(struct motorlink_st_slave *slave,
                                            uint64_t now_us,
@@ -1400,8 +1535,6 @@ motorlink_error motorlink_st_slave_receive(struct motorlink_st_slave *slave,
  * Call at the deadline: gives the refusal that a command is owed which did not come whole in time
  * (4.1), and no bytes when there is none. The bytes belong to the slave, until the next call for
  * it.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_st_slave_poll(struct motorlink_st_slave *slave,
                                         uint64_t now_us,
@@ -1410,8 +1543,6 @@ motorlink_error motorlink_st_slave_poll(struct motorlink_st_slave *slave,
 /**
  * When `motorlink_st_slave_poll` has to be called; `MOTORLINK_NEVER` while no command is under
  * way, and always in profile MCSDK 5.4, whose firmware never times out.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_st_slave_deadline(struct motorlink_st_slave *slave,
                                             uint64_t *deadline_us);
@@ -1419,8 +1550,6 @@ motorlink_error motorlink_st_slave_deadline(struct motorlink_st_slave *slave,
 /**
  * Tells that the receiver lost bytes (overrun, framing, noise): drops the command under way and
  * gives the refusal to send. The bytes belong to the slave, until the next call for it.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_st_slave_overrun(struct motorlink_st_slave *slave,
                                            struct motorlink_bytes *reply);
@@ -1428,7 +1557,7 @@ motorlink_error motorlink_st_slave_overrun(struct motorlink_st_slave *slave,
 /**
  * Reads the payload of an answer to `motorlink_st_master_board_info`.
  *
- * `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+ * `BAD_ARGUMENT`: the payload is too short to be one.
  */
 motorlink_error motorlink_st_decode_board_info(const uint8_t *payload,
                                                size_t size,
@@ -1437,8 +1566,6 @@ motorlink_error motorlink_st_decode_board_info(const uint8_t *payload,
 /**
  * Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
  * UTF-8 are cut there.
- *
- * `NULL_POINTER`, `MISALIGNED`.
  */
 motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
                                                      size_t size,
@@ -1447,7 +1574,7 @@ motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
 /**
  * Reads the payload of an answer to `motorlink_st_master_revup`.
  *
- * `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+ * `BAD_ARGUMENT`: the payload is too short to be one.
  */
 motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
                                           size_t size,
@@ -1463,7 +1590,7 @@ struct motorlink_st_master_config motorlink_st_master_defaults(void);
  *
  * `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
  *
- * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` or `recovery` is
+ * `BAD_ARGUMENT`: `profile` or `recovery` is
  * not one of its enum's.
  */
 motorlink_error motorlink_st_master_init(struct motorlink_st_master *master,
@@ -1637,7 +1764,7 @@ motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, 
  * `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
  * may be constant. Not from a callback of the same slave.
  *
- * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` is none of
+ * `BAD_ARGUMENT`: `profile` is none of
  * `motorlink_st_profile`, or `motors` is not 1 to 7.
  */
 motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
@@ -1652,8 +1779,6 @@ motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
  *
  * The bytes belong to the slave, until the next call for it. A byte costs some instructions, a
  * complete command a checksum over it and the callbacks.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_st_slave_receive(struct motorlink_st_slave *slave,
                                            uint64_t now_us,
@@ -1664,8 +1789,6 @@ motorlink_error motorlink_st_slave_receive(struct motorlink_st_slave *slave,
  * Call at the deadline: gives the refusal that a command is owed which did not come whole in time
  * (4.1), and no bytes when there is none. The bytes belong to the slave, until the next call for
  * it.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_st_slave_poll(struct motorlink_st_slave *slave,
                                         uint64_t now_us,
@@ -1674,8 +1797,6 @@ motorlink_error motorlink_st_slave_poll(struct motorlink_st_slave *slave,
 /**
  * When `motorlink_st_slave_poll` has to be called; `MOTORLINK_NEVER` while no command is under
  * way, and always in profile MCSDK 5.4, whose firmware never times out.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_st_slave_deadline(struct motorlink_st_slave *slave,
                                             uint64_t *deadline_us);
@@ -1683,8 +1804,6 @@ motorlink_error motorlink_st_slave_deadline(struct motorlink_st_slave *slave,
 /**
  * Tells that the receiver lost bytes (overrun, framing, noise): drops the command under way and
  * gives the refusal to send. The bytes belong to the slave, until the next call for it.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_st_slave_overrun(struct motorlink_st_slave *slave,
                                            struct motorlink_bytes *reply);
@@ -1862,8 +1981,6 @@ uint16_t motorlink_rmd_encoder_centidegrees(uint16_t counts, uint8_t encoder_bit
 /**
  * Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of guard time, no
  * limits. `size` is `sizeof *host`.
- *
- * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`.
  */
 motorlink_error motorlink_rmd_host_init(struct motorlink_rmd_host *host, size_t size);
 
@@ -1957,7 +2074,7 @@ motorlink_error motorlink_rmd_host_busy(struct motorlink_rmd_host *host, uint32_
  * `motor` is kept: it has to live as long as the drive is used, and may be constant. Not from a
  * callback of the same drive.
  *
- * `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `id` is not 1 to 32, or
+ * `BAD_ARGUMENT`: `id` is not 1 to 32, or
  * `encoder_bits` neither 0 nor 12 to 18.
  */
 motorlink_error motorlink_rmd_drive_init(struct motorlink_rmd_drive *drive,
@@ -1969,17 +2086,15 @@ motorlink_error motorlink_rmd_drive_init(struct motorlink_rmd_drive *drive,
 /**
  * Starts, also after a power cycle: settings come from ROM, the motor is off, no error is latched
  * and nothing is left to resume.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_rmd_drive_power_on(struct motorlink_rmd_drive *drive, uint64_t now_us);
 
 /**
- * Takes a frame from the bus that came at `now_us`. `reply` is the frame to send; its size is 0
- * where there is none: frames for others, unknown codes and frames that are not eight bytes of
+ * Takes a frame from the bus that came at `now_us`. `reply` is the frame to send; its id is
+ * `MOTORLINK_NO_FRAME` where there is none: frames for others, unknown codes and frames that are not eight bytes of
  * standard data are not answered.
  *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`; `BAD_ARGUMENT`: no CAN
+ * `BAD_ARGUMENT`: no CAN
  * frame has such a size or identifier.
  */
 motorlink_error motorlink_rmd_drive_receive(struct motorlink_rmd_drive *drive,
@@ -1990,41 +2105,86 @@ motorlink_error motorlink_rmd_drive_receive(struct motorlink_rmd_drive *drive,
 /**
  * Latches faults and keeps the shutdown time. Call at the deadline, and often enough for a fault
  * to switch the motor off in time.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_rmd_drive_poll(struct motorlink_rmd_drive *drive, uint64_t now_us);
 
 /**
  * When the shutdown time will be over; `MOTORLINK_NEVER` while the motor is off or has none.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_rmd_drive_deadline(struct motorlink_rmd_drive *drive,
                                              uint64_t *deadline_us);
 
 /**
  * What the motor was last told to do.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_rmd_drive_motion(struct motorlink_rmd_drive *drive,
                                            struct motorlink_rmd_motion *motion);
 
 /**
  * The latched errors, a sum of `MOTORLINK_RMD_FAULT_*`.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_rmd_drive_errors(struct motorlink_rmd_drive *drive, uint8_t *errors);
 
 /**
  * The settings in RAM, which commands act on.
- *
- * `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
  */
 motorlink_error motorlink_rmd_drive_settings(struct motorlink_rmd_drive *drive,
                                              struct motorlink_rmd_settings *settings);
+
+/**
+ * Begins the host's end, for the adapter on a serial line. `size` is `sizeof *host`.
+ */
+motorlink_error motorlink_slcan_host_init(struct motorlink_slcan_host *host, size_t size);
+
+/**
+ * Takes a byte from the adapter; tells what it completes, and the frame where it is one. A line
+ * that is no answer is left out.
+ */
+motorlink_error motorlink_slcan_host_receive(struct motorlink_slcan_host *host,
+                                             uint8_t byte,
+                                             motorlink_slcan_answer *kind,
+                                             struct motorlink_can_frame *frame);
+
+/**
+ * Gives what opens an adapter's channel: an end of what it was told before, close, bitrate, open.
+ * It answers each of the four, or some of them, or none; motors have 1 000 000 bit/s.
+ *
+ * `BAD_ARGUMENT`: slcan has no such bitrate (10, 20, 50, 100, 125, 250, 500, 800 or 1000 kbit/s).
+ */
+motorlink_error motorlink_slcan_open(uint32_t bits_per_second, struct motorlink_slcan_line *line);
+
+/**
+ * Gives the line that has an adapter send a frame.
+ *
+ * `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
+ */
+motorlink_error motorlink_slcan_encode(const struct motorlink_can_frame *frame,
+                                       struct motorlink_slcan_line *line);
+
+/**
+ * Begins the adapter's end, for a drive that speaks slcan itself. `size` is `sizeof *device`.
+ */
+motorlink_error motorlink_slcan_device_init(struct motorlink_slcan_device *device, size_t size);
+
+/**
+ * Takes a byte from the host. `line` is the answer to send, if any; `frame` is what the host sends
+ * to the bus, its id is `MOTORLINK_NO_FRAME` where there is none.
+ */
+motorlink_error motorlink_slcan_device_receive(struct motorlink_slcan_device *device,
+                                               uint8_t byte,
+                                               struct motorlink_slcan_line *line,
+                                               struct motorlink_can_frame *frame);
+
+/**
+ * Gives the line for a frame that comes from the bus at `now_us`; nothing where the host has not
+ * opened the channel.
+ *
+ * `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
+ */
+motorlink_error motorlink_slcan_device_deliver(struct motorlink_slcan_device *device,
+                                               uint64_t now_us,
+                                               const struct motorlink_can_frame *frame,
+                                               struct motorlink_slcan_line *line);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -20,10 +20,13 @@ extern crate std;
 
 mod bytes;
 mod error;
+mod frame;
 mod pointer;
 pub mod rmd;
+pub mod slcan;
 pub mod st;
 mod storage;
 
 pub use bytes::{MOTORLINK_NEVER, motorlink_action, motorlink_bytes};
 pub use error::{MOTORLINK_OK, motorlink_error, motorlink_error_text};
+pub use frame::{MOTORLINK_NO_FRAME, motorlink_can_frame};

@@ -1,5 +1,7 @@
 //! The objects' storage. Its sizes are the same on every target: those of the largest.
 
+use motorlink_slcan::{AnswerParser, Device};
+
 use crate::rmd::{drive, host};
 use crate::st::{master, slave};
 
@@ -11,6 +13,11 @@ pub const MOTORLINK_ST_MASTER_WORDS: usize = 29;
 pub const MOTORLINK_RMD_HOST_WORDS: usize = 333;
 /// Words of 8 bytes in a [`motorlink_rmd_drive`].
 pub const MOTORLINK_RMD_DRIVE_WORDS: usize = 13;
+
+/// Words of 8 bytes in a [`motorlink_slcan_host`].
+pub const MOTORLINK_SLCAN_HOST_WORDS: usize = 7;
+/// Words of 8 bytes in a [`motorlink_slcan_device`].
+pub const MOTORLINK_SLCAN_DEVICE_WORDS: usize = 7;
 
 /// A slave of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
 /// Opaque; may be moved and copied while no call for it is under way.
@@ -48,9 +55,27 @@ pub struct motorlink_rmd_drive {
     pub opaque: [u64; MOTORLINK_RMD_DRIVE_WORDS],
 }
 
+/// The host's end of a serial line to a CAN adapter, in storage of the caller's.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_slcan_host {
+    /// Nobody's business.
+    pub opaque: [u64; MOTORLINK_SLCAN_HOST_WORDS],
+}
+
+/// The adapter's end of such a line, in storage of the caller's.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct motorlink_slcan_device {
+    /// Nobody's business.
+    pub opaque: [u64; MOTORLINK_SLCAN_DEVICE_WORDS],
+}
+
 crate::pointer::storage! {
     motorlink_st_slave: slave::State, 0x5EA1_51A7;
     motorlink_st_master: master::State, 0x3A57_C0DE;
     motorlink_rmd_host: host::State, 0x7B05_1D1E;
     motorlink_rmd_drive: drive::State, 0x2D21_7E11;
+    motorlink_slcan_host: AnswerParser, 0x51CA_4057;
+    motorlink_slcan_device: Device, 0x51CA_DEF1;
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::{env, fs};
 
 /// In the order in which a reader wants them.
-const SOURCES: [&str; 10] = [
+const SOURCES: [&str; 12] = [
     "error.rs",
     "bytes.rs",
     "storage.rs",
@@ -16,9 +16,11 @@ const SOURCES: [&str; 10] = [
     "st/message.rs",
     "st/master.rs",
     "st/slave.rs",
-    "rmd/frame.rs",
+    "frame.rs",
     "rmd/message.rs",
     "rmd/host.rs",
+    "rmd/drive.rs",
+    "slcan.rs",
 ];
 
 fn generated(root: &Path) -> String {
@@ -26,7 +28,7 @@ fn generated(root: &Path) -> String {
         cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("cbindgen.toml");
     config.after_includes = Some(format!("\n{}", tables::text()));
     let mut builder = cbindgen::Builder::new().with_config(config);
-    for source in SOURCES.iter().chain(&["rmd/drive.rs"]) {
+    for source in SOURCES {
         builder = builder.with_src(root.join("src").join(source));
     }
     let mut header = Vec::new();

@@ -8,11 +8,11 @@ use motorlink_proto::rmd::{
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{Celsius, DeciVolts, Dps, DpsPerSecond, PhaseCurrent, TorqueFeedback};
 
-use super::frame::{NO_FRAME, motorlink_can_frame};
 use super::message::motorlink_rmd_gains;
 use super::motorlink_rmd_drive;
 use crate::bytes::MOTORLINK_NEVER;
 use crate::error::{answer, motorlink_error};
+use crate::frame::{NO_FRAME, motorlink_can_frame};
 use crate::pointer::{In, plain, promised};
 
 /// What a motor does.
@@ -229,7 +229,7 @@ impl Motor for &motorlink_rmd_motor {
 /// `motor` is kept: it has to live as long as the drive is used, and may be constant. Not from a
 /// callback of the same drive.
 ///
-/// `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `id` is not 1 to 32, or
+/// `BAD_ARGUMENT`: `id` is not 1 to 32, or
 /// `encoder_bits` neither 0 nor 12 to 18.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_init(
@@ -260,8 +260,6 @@ pub unsafe extern "C" fn motorlink_rmd_drive_init(
 
 /// Starts, also after a power cycle: settings come from ROM, the motor is off, no error is latched
 /// and nothing is left to resume.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_power_on(
     drive: *mut motorlink_rmd_drive,
@@ -276,11 +274,11 @@ pub unsafe extern "C" fn motorlink_rmd_drive_power_on(
     })
 }
 
-/// Takes a frame from the bus that came at `now_us`. `reply` is the frame to send; its size is 0
-/// where there is none: frames for others, unknown codes and frames that are not eight bytes of
+/// Takes a frame from the bus that came at `now_us`. `reply` is the frame to send; its id is
+/// `MOTORLINK_NO_FRAME` where there is none: frames for others, unknown codes and frames that are not eight bytes of
 /// standard data are not answered.
 ///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`; `BAD_ARGUMENT`: no CAN
+/// `BAD_ARGUMENT`: no CAN
 /// frame has such a size or identifier.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_receive(
@@ -303,8 +301,6 @@ pub unsafe extern "C" fn motorlink_rmd_drive_receive(
 
 /// Latches faults and keeps the shutdown time. Call at the deadline, and often enough for a fault
 /// to switch the motor off in time.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_poll(
     drive: *mut motorlink_rmd_drive,
@@ -320,8 +316,6 @@ pub unsafe extern "C" fn motorlink_rmd_drive_poll(
 }
 
 /// When the shutdown time will be over; `MOTORLINK_NEVER` while the motor is off or has none.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_deadline(
     drive: *mut motorlink_rmd_drive,
@@ -337,8 +331,6 @@ pub unsafe extern "C" fn motorlink_rmd_drive_deadline(
 }
 
 /// What the motor was last told to do.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_motion(
     drive: *mut motorlink_rmd_drive,
@@ -353,8 +345,6 @@ pub unsafe extern "C" fn motorlink_rmd_drive_motion(
 }
 
 /// The latched errors, a sum of `MOTORLINK_RMD_FAULT_*`.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_errors(
     drive: *mut motorlink_rmd_drive,
@@ -369,8 +359,6 @@ pub unsafe extern "C" fn motorlink_rmd_drive_errors(
 }
 
 /// The settings in RAM, which commands act on.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_settings(
     drive: *mut motorlink_rmd_drive,

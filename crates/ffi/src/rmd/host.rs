@@ -4,11 +4,11 @@ use motorlink_proto::rmd::{Error, Host, Limits, MotorId, MotorSet, Output, Refus
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{CentiDegrees, SpeedLimit, TorqueCommand};
 
-use super::frame::{NO_FRAME, motorlink_can_frame};
 use super::message::motorlink_rmd_data;
 use super::motorlink_rmd_host;
 use crate::bytes::{MOTORLINK_NEVER, motorlink_action};
 use crate::error::{answer, motorlink_error};
+use crate::frame::{NO_FRAME, motorlink_can_frame};
 use crate::pointer::{plain, promised};
 
 /// In `motorlink_rmd_limits`: no limit beyond the document's range.
@@ -74,8 +74,6 @@ impl State {
 
 /// Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of guard time, no
 /// limits. `size` is `sizeof *host`.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_init(
     host: *mut motorlink_rmd_host,

@@ -1,7 +1,6 @@
 //! The RMD motor control protocol over CAN, V1.62.
 
 pub mod drive;
-pub mod frame;
 pub mod host;
 pub mod message;
 

@@ -86,7 +86,7 @@ pub extern "C" fn motorlink_st_master_defaults() -> motorlink_st_master_config {
 ///
 /// `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
 ///
-/// `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` or `recovery` is
+/// `BAD_ARGUMENT`: `profile` or `recovery` is
 /// not one of its enum's.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_init(

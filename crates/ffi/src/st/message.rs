@@ -74,7 +74,7 @@ fn terminated(text: &str) -> [c_char; MOTORLINK_ST_TEXT_SIZE] {
 
 /// Reads the payload of an answer to `motorlink_st_master_board_info`.
 ///
-/// `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+/// `BAD_ARGUMENT`: the payload is too short to be one.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_decode_board_info(
     payload: *const u8,
@@ -95,8 +95,6 @@ pub unsafe extern "C" fn motorlink_st_decode_board_info(
 
 /// Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
 /// UTF-8 are cut there.
-///
-/// `NULL_POINTER`, `MISALIGNED`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_decode_firmware_version(
     payload: *const u8,
@@ -115,7 +113,7 @@ pub unsafe extern "C" fn motorlink_st_decode_firmware_version(
 
 /// Reads the payload of an answer to `motorlink_st_master_revup`.
 ///
-/// `BAD_ARGUMENT`: the payload is too short to be one. `NULL_POINTER`, `MISALIGNED`.
+/// `BAD_ARGUMENT`: the payload is too short to be one.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_decode_revup(
     payload: *const u8,

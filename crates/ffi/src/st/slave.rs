@@ -188,7 +188,7 @@ impl Drive for &motorlink_st_drive {
 /// `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
 /// may be constant. Not from a callback of the same slave.
 ///
-/// `NULL_POINTER`, `MISALIGNED`, `STORAGE_TOO_SMALL`; `BAD_ARGUMENT`: `profile` is none of
+/// `BAD_ARGUMENT`: `profile` is none of
 /// `motorlink_st_profile`, or `motors` is not 1 to 7.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_init(
@@ -212,8 +212,6 @@ pub unsafe extern "C" fn motorlink_st_slave_init(
 ///
 /// The bytes belong to the slave, until the next call for it. A byte costs some instructions, a
 /// complete command a checksum over it and the callbacks.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_receive(
     slave: *mut motorlink_st_slave,
@@ -236,8 +234,6 @@ pub unsafe extern "C" fn motorlink_st_slave_receive(
 /// Call at the deadline: gives the refusal that a command is owed which did not come whole in time
 /// (4.1), and no bytes when there is none. The bytes belong to the slave, until the next call for
 /// it.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_poll(
     slave: *mut motorlink_st_slave,
@@ -255,8 +251,6 @@ pub unsafe extern "C" fn motorlink_st_slave_poll(
 
 /// When `motorlink_st_slave_poll` has to be called; `MOTORLINK_NEVER` while no command is under
 /// way, and always in profile MCSDK 5.4, whose firmware never times out.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_deadline(
     slave: *mut motorlink_st_slave,
@@ -273,8 +267,6 @@ pub unsafe extern "C" fn motorlink_st_slave_deadline(
 
 /// Tells that the receiver lost bytes (overrun, framing, noise): drops the command under way and
 /// gives the refusal to send. The bytes belong to the slave, until the next call for it.
-///
-/// `NULL_POINTER`, `MISALIGNED`, `UNINITIALISED`, `WRONG_KIND`, `IN_USE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_overrun(
     slave: *mut motorlink_st_slave,

@@ -5,6 +5,9 @@ use motorlink_proto::rmd::CanFrame;
 use crate::error::motorlink_error;
 use crate::pointer::plain;
 
+/// The `id` of no frame, which has no bytes either.
+pub const MOTORLINK_NO_FRAME: u32 = u32::MAX;
+
 /// A classic CAN frame of any kind.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,6 +54,5 @@ impl TryFrom<motorlink_can_frame> for CanFrame {
     }
 }
 
-/// No frame: its size is 0.
-pub(super) const NO_FRAME: motorlink_can_frame =
-    motorlink_can_frame { id: 0, extended: 0, remote: 0, size: 0, data: [0; 8] };
+pub(crate) const NO_FRAME: motorlink_can_frame =
+    motorlink_can_frame { id: MOTORLINK_NO_FRAME, extended: 0, remote: 0, size: 0, data: [0; 8] };
