@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/*
+ * Commands an ST drive: st_master /dev/ttyACM0 [RPM]
+ *
+ * Shows what the drive is, ramps motor 1 to RPM (1000 without it) within a second, waits until it
+ * turns so fast, and stops it. Ends with 0, with 1 where the drive refused, with 3 where the line
+ * failed.
+ */
+#define _POSIX_C_SOURCE 200809L
+#include "posix.h"
+
+#include <motorlink.h>
+
+enum { MOTOR = 1 };
+
+static motorlink_st_master master;
+
+/* Conducts the exchange that was begun; gives what became of it. */
+static motorlink_st_action exchange(int fd, motorlink_error begun) {
+  motorlink_st_action action;
+  if (begun != MOTORLINK_OK) {
+    fprintf(stderr, "%s\n", motorlink_error_text(begun));
+    exit(2);
+  }
+  for (;;) {
+    motorlink_st_master_poll(&master, now_us(), &action);
+    if (action.kind == MOTORLINK_ACTION_DONE) {
+      return action;
+    }
+    if (action.kind == MOTORLINK_ACTION_TRANSMIT) {
+      send_all(fd, action.bytes.data, action.bytes.size);
+    } else {
+      uint8_t bytes[256];
+      size_t size = receive_until(fd, action.until_us, bytes, sizeof bytes);
+      motorlink_st_master_receive(&master, now_us(), bytes, size);
+    }
+  }
+}
+
+/* As `exchange`, for those that have to succeed. */
+static motorlink_st_action done(int fd, const char *what, motorlink_error begun) {
+  motorlink_st_action action = exchange(fd, begun);
+  if (action.result == MOTORLINK_ERROR_REFUSED) {
+    fprintf(stderr, "%s: refused with code %u\n", what, (unsigned)action.refusal);
+    exit(1);
+  }
+  if (action.result != MOTORLINK_OK) {
+    fprintf(stderr, "%s: %s\n", what, motorlink_error_text(action.result));
+    exit(3);
+  }
+  return action;
+}
+
+static int32_t read_register(int fd, uint8_t reg) {
+  return done(fd, "read", motorlink_st_master_get_register(&master, MOTOR, reg)).value;
+}
+
+int main(int argc, char **argv) {
+  int32_t rpm = argc > 2 ? (int32_t)strtol(argv[2], NULL, 10) : 1000;
+  int32_t speed = 0;
+  uint64_t give_up;
+  motorlink_st_action action;
+  motorlink_st_board_info info;
+  int fd;
+
+  if (argc < 2) {
+    fprintf(stderr, "usage: %s PORT [RPM]\n", argv[0]);
+    return 2;
+  }
+  fd = open_line(argv[1]);
+  motorlink_st_master_init(&master, sizeof master, NULL);
+
+  action = done(fd, "board information", motorlink_st_master_board_info(&master, MOTOR));
+  if (motorlink_st_decode_board_info(action.bytes.data, action.bytes.size, &info) != MOTORLINK_OK) {
+    fprintf(stderr, "the board information is too short\n");
+    return 3;
+  }
+  printf("%s %u.%u.%u\n", info.name, (unsigned)info.major, (unsigned)info.minor,
+         (unsigned)info.patch);
+
+  done(fd, "ramp", motorlink_st_master_ramp(&master, MOTOR, rpm, 1000));
+  done(fd, "start", motorlink_st_master_execute(&master, MOTOR, MOTORLINK_ST_COMMAND_START_MOTOR));
+  give_up = now_us() + 20000000U;
+  do {
+    speed = read_register(fd, MOTORLINK_ST_REG_SPEED_MEAS);
+  } while (labs((long)speed - rpm) > labs((long)rpm) / 20 && now_us() < give_up);
+  printf("%ld rpm, state %ld, faults 0x%08lx\n", (long)speed,
+         (long)read_register(fd, MOTORLINK_ST_REG_STATUS),
+         (unsigned long)(uint32_t)read_register(fd, MOTORLINK_ST_REG_FLAGS));
+  done(fd, "stop", motorlink_st_master_execute(&master, MOTOR, MOTORLINK_ST_COMMAND_STOP_MOTOR));
+
+  /* What is read-only is refused, and the line stays in step. */
+  action = exchange(fd, motorlink_st_master_set_register(&master, MOTOR,
+                                                         MOTORLINK_ST_REG_SPEED_MEAS, 1));
+  if (action.result != MOTORLINK_ERROR_REFUSED ||
+      action.refusal != MOTORLINK_ST_REFUSAL_SET_READ_ONLY) {
+    fprintf(stderr, "the drive let a read-only register be written\n");
+    return 3;
+  }
+  close(fd);
+  return labs((long)speed - rpm) > labs((long)rpm) / 20 ? 3 : 0;
+}
