@@ -1,0 +1,353 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/* vectors_rmd rmd.json: each vector through the host and through the drive. */
+#include "vectors.h"
+
+static motorlink_rmd_host host;
+static motorlink_rmd_drive drive;
+
+/* What the motor was told last, and what its sensors read. */
+static motorlink_rmd_motion told;
+static motorlink_rmd_sense sensed;
+
+static void set_mode(void *context, const motorlink_rmd_motion *motion) {
+  (void)context;
+  told = *motion;
+}
+
+static void sense(void *context, motorlink_rmd_sense *out) {
+  (void)context;
+  *out = sensed;
+}
+
+static const motorlink_rmd_motor motor = {NULL, set_mode, NULL, sense, NULL};
+
+static uint8_t command_of(const json_t *vector) {
+  const char *command = text(vector, "command");
+  return strcmp(command, "torque4") == 0 ? 0 : (uint8_t)strtoul(command, NULL, 16);
+}
+
+static uint8_t motor_of(const json_t *vector) {
+  unsigned long id = strtoul(text(vector, "id"), NULL, 16);
+  return id == MOTORLINK_RMD_TORQUE4_ID ? 1 : (uint8_t)(id - MOTORLINK_RMD_MOTOR_BASE);
+}
+
+static motorlink_rmd_data data_of(const json_t *vector) {
+  struct bytes bytes = hex(vector, "bytes");
+  motorlink_rmd_data data;
+  CHECK(bytes.size == sizeof data.bytes);
+  memcpy(data.bytes, bytes.data, sizeof data.bytes);
+  return data;
+}
+
+static int same(motorlink_rmd_data one, motorlink_rmd_data other) {
+  return memcmp(one.bytes, other.bytes, sizeof one.bytes) == 0;
+}
+
+static motorlink_rmd_gains gains_of(const json_t *f) {
+  motorlink_rmd_gains gains;
+  gains.position_kp = (uint8_t)number(f, "position_kp");
+  gains.position_ki = (uint8_t)number(f, "position_ki");
+  gains.speed_kp = (uint8_t)number(f, "speed_kp");
+  gains.speed_ki = (uint8_t)number(f, "speed_ki");
+  gains.torque_kp = (uint8_t)number(f, "torque_kp");
+  gains.torque_ki = (uint8_t)number(f, "torque_ki");
+  return gains;
+}
+
+/* The request that a vector's fields describe. */
+static motorlink_rmd_data request_of(uint8_t command, const json_t *f) {
+  switch (command) {
+    case MOTORLINK_RMD_CODE_READ_GAINS: return motorlink_rmd_read_gains();
+    case MOTORLINK_RMD_CODE_WRITE_GAINS: return motorlink_rmd_write_gains(gains_of(f));
+    case MOTORLINK_RMD_CODE_WRITE_GAINS_TO_ROM: return motorlink_rmd_write_gains_to_rom(gains_of(f));
+    case MOTORLINK_RMD_CODE_READ_ACCELERATION: return motorlink_rmd_read_acceleration();
+    case MOTORLINK_RMD_CODE_WRITE_ACCELERATION:
+      return motorlink_rmd_write_acceleration((int32_t)number(f, "acceleration"));
+    case MOTORLINK_RMD_CODE_READ_ENCODER: return motorlink_rmd_read_encoder();
+    case MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET:
+      return motorlink_rmd_write_encoder_offset((uint16_t)number(f, "offset"));
+    case MOTORLINK_RMD_CODE_WRITE_ZERO_TO_ROM: return motorlink_rmd_write_zero_to_rom();
+    case MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE: return motorlink_rmd_read_multi_turn_angle();
+    case MOTORLINK_RMD_CODE_READ_CIRCLE_ANGLE: return motorlink_rmd_read_circle_angle();
+    case MOTORLINK_RMD_CODE_READ_STATUS_1: return motorlink_rmd_read_status();
+    case MOTORLINK_RMD_CODE_CLEAR_ERRORS: return motorlink_rmd_clear_errors();
+    case MOTORLINK_RMD_CODE_READ_STATUS_2: return motorlink_rmd_read_motion_status();
+    case MOTORLINK_RMD_CODE_READ_STATUS_3: return motorlink_rmd_read_phase_currents();
+    case MOTORLINK_RMD_CODE_OFF: return motorlink_rmd_off();
+    case MOTORLINK_RMD_CODE_STOP: return motorlink_rmd_stop();
+    case MOTORLINK_RMD_CODE_RUN: return motorlink_rmd_run();
+    case MOTORLINK_RMD_CODE_TORQUE: return motorlink_rmd_torque((int16_t)number(f, "torque"));
+    case MOTORLINK_RMD_CODE_SPEED: return motorlink_rmd_speed((int32_t)number(f, "speed"));
+    case MOTORLINK_RMD_CODE_POSITION: return motorlink_rmd_position((int32_t)number(f, "angle"));
+    case MOTORLINK_RMD_CODE_POSITION_LIMITED:
+      return motorlink_rmd_position_limited((int32_t)number(f, "angle"),
+                                            (uint16_t)number(f, "max_speed"));
+    case MOTORLINK_RMD_CODE_CIRCLE_POSITION:
+      return motorlink_rmd_circle_position((uint8_t)number(f, "direction"),
+                                           (uint16_t)number(f, "angle"));
+    default:
+      CHECK(command == MOTORLINK_RMD_CODE_CIRCLE_POSITION_LIMITED);
+      return motorlink_rmd_circle_position_limited((uint8_t)number(f, "direction"),
+                                                   (uint16_t)number(f, "angle"),
+                                                   (uint16_t)number(f, "max_speed"));
+  }
+}
+
+/* What is read from a reply is what its fields say. */
+static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) {
+  switch (command) {
+    case MOTORLINK_RMD_CODE_READ_GAINS:
+    case MOTORLINK_RMD_CODE_WRITE_GAINS:
+    case MOTORLINK_RMD_CODE_WRITE_GAINS_TO_ROM: {
+      motorlink_rmd_gains gains = motorlink_rmd_decode_gains(reply), expected = gains_of(f);
+      CHECK(memcmp(&gains, &expected, sizeof gains) == 0);
+      break;
+    }
+    case MOTORLINK_RMD_CODE_READ_ACCELERATION:
+    case MOTORLINK_RMD_CODE_WRITE_ACCELERATION:
+      CHECK(motorlink_rmd_decode_acceleration(reply) == number(f, "acceleration"));
+      break;
+    case MOTORLINK_RMD_CODE_READ_ENCODER: {
+      motorlink_rmd_encoder encoder = motorlink_rmd_decode_encoder(reply);
+      CHECK(encoder.position == number(f, "position") && encoder.raw == number(f, "raw"));
+      CHECK(encoder.offset == number(f, "offset"));
+      break;
+    }
+    case MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET:
+    case MOTORLINK_RMD_CODE_WRITE_ZERO_TO_ROM:
+      CHECK(motorlink_rmd_decode_encoder_offset(reply) == number(f, "offset"));
+      break;
+    case MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE:
+      CHECK(motorlink_rmd_decode_multi_turn_angle(reply) == number(f, "angle"));
+      break;
+    case MOTORLINK_RMD_CODE_READ_CIRCLE_ANGLE:
+      CHECK(motorlink_rmd_decode_circle_angle(reply) == number(f, "angle"));
+      break;
+    case MOTORLINK_RMD_CODE_READ_STATUS_1:
+    case MOTORLINK_RMD_CODE_CLEAR_ERRORS: {
+      motorlink_rmd_status status = motorlink_rmd_decode_status(reply);
+      CHECK(status.temperature_celsius == number(f, "temperature"));
+      CHECK(status.voltage_decivolts == number(f, "voltage"));
+      CHECK(status.errors == number(f, "errors"));
+      break;
+    }
+    case MOTORLINK_RMD_CODE_READ_STATUS_3: {
+      motorlink_rmd_phase_currents currents = motorlink_rmd_decode_phase_currents(reply);
+      CHECK(currents.a_digits == number(f, "phase_a") && currents.b_digits == number(f, "phase_b"));
+      CHECK(currents.c_digits == number(f, "phase_c"));
+      break;
+    }
+    case MOTORLINK_RMD_CODE_OFF:
+    case MOTORLINK_RMD_CODE_STOP:
+    case MOTORLINK_RMD_CODE_RUN:
+      CHECK(json_object_size(f) == 0);
+      break;
+    default: {
+      motorlink_rmd_motion_status status = motorlink_rmd_decode_motion_status(reply);
+      CHECK(status.temperature_celsius == number(f, "temperature"));
+      CHECK(status.iq_digits == number(f, "iq") && status.speed_dps == number(f, "speed"));
+      CHECK(status.encoder_counts == number(f, "encoder"));
+      break;
+    }
+  }
+}
+
+static motorlink_rmd_action next(uint64_t now_us, uint8_t kind) {
+  motorlink_rmd_action action;
+  OK(motorlink_rmd_host_poll(&host, now_us, &action));
+  CHECK(action.kind == kind);
+  return action;
+}
+
+/* Four torques, or a request to one motor: the frame is that of the vector. */
+static void sent_by_the_host(const json_t *vector) {
+  const json_t *f = member(vector, "fields");
+  uint8_t command = command_of(vector);
+  motorlink_rmd_action action;
+  if (command == 0) {
+    const int16_t torques[4] = {(int16_t)number(f, "torque_1"), (int16_t)number(f, "torque_2"),
+                                (int16_t)number(f, "torque_3"), (int16_t)number(f, "torque_4")};
+    OK(motorlink_rmd_host_torque4(&host, 0, torques, 0x0F));
+  } else {
+    OK(motorlink_rmd_host_request(&host, 0, motor_of(vector), request_of(command, f)));
+  }
+  action = next(0, MOTORLINK_ACTION_TRANSMIT);
+  CHECK(action.frame.id == strtoul(text(vector, "id"), NULL, 16) && action.frame.size == 8);
+  CHECK(memcmp(action.frame.data, data_of(vector).bytes, 8) == 0);
+}
+
+/* The reply of the vector ends an exchange with its motor. */
+static void heard_by_the_host(const json_t *vector) {
+  uint8_t command = command_of(vector), id = motor_of(vector);
+  motorlink_rmd_data reply = data_of(vector), asked = motorlink_rmd_torque(0);
+  motorlink_can_frame frame;
+  motorlink_rmd_action action;
+  if (command != 0) {
+    memset(asked.bytes, 0, sizeof asked.bytes);
+    asked.bytes[0] = command;
+  }
+  OK(motorlink_rmd_host_request(&host, 0, id, asked));
+  next(0, MOTORLINK_ACTION_TRANSMIT);
+  memset(&frame, 0, sizeof frame);
+  frame.id = (uint32_t)MOTORLINK_RMD_MOTOR_BASE + id;
+  frame.size = 8;
+  memcpy(frame.data, reply.bytes, sizeof frame.data);
+  OK(motorlink_rmd_host_receive(&host, 800, &frame));
+  action = next(800, MOTORLINK_ACTION_DONE);
+  CHECK(action.motor == id && action.result == MOTORLINK_OK && same(action.reply, reply));
+  decoded(command, action.reply, member(vector, "fields"));
+}
+
+static void power_on(const json_t *vector, uint8_t encoder_bits, const motorlink_rmd_settings *rom) {
+  motorlink_rmd_drive_config config;
+  memset(&config, 0, sizeof config);
+  config.id = motor_of(vector);
+  config.encoder_bits = encoder_bits;
+  OK(motorlink_rmd_drive_init(&drive, sizeof drive, &config, rom, &motor));
+  OK(motorlink_rmd_drive_power_on(&drive, 0));
+}
+
+static motorlink_can_frame ask(uint32_t id, motorlink_rmd_data request) {
+  motorlink_can_frame frame, reply;
+  memset(&frame, 0, sizeof frame);
+  frame.id = id;
+  frame.size = 8;
+  memcpy(frame.data, request.bytes, sizeof frame.data);
+  OK(motorlink_rmd_drive_receive(&drive, 0, &frame, &reply));
+  return reply;
+}
+
+/* The drive has its motor do what the request says. */
+static void carried_out(const json_t *vector) {
+  const json_t *f = member(vector, "fields");
+  uint8_t command = command_of(vector);
+  motorlink_can_frame reply;
+  memset(&sensed, 0, sizeof sensed);
+  power_on(vector, 18, NULL);
+  reply = ask((uint32_t)strtoul(text(vector, "id"), NULL, 16), data_of(vector));
+  CHECK(reply.size == 8);
+  CHECK(reply.id == (uint32_t)MOTORLINK_RMD_MOTOR_BASE + motor_of(vector));
+  switch (command) {
+    case 0:
+      CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.torque_16ma == number(f, "torque_1"));
+      break;
+    case MOTORLINK_RMD_CODE_TORQUE:
+      CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.torque_16ma == number(f, "torque"));
+      break;
+    case MOTORLINK_RMD_CODE_SPEED:
+      CHECK(told.kind == MOTORLINK_RMD_MODE_SPEED && told.speed_centidps == number(f, "speed"));
+      break;
+    case MOTORLINK_RMD_CODE_POSITION_LIMITED:
+    case MOTORLINK_RMD_CODE_CIRCLE_POSITION_LIMITED:
+      CHECK(told.max_speed_dps == number(f, "max_speed"));
+      CHECK(told.kind == MOTORLINK_RMD_MODE_POSITION);
+      break;
+    case MOTORLINK_RMD_CODE_POSITION:
+    case MOTORLINK_RMD_CODE_CIRCLE_POSITION:
+      CHECK(told.max_speed_dps == -1 && told.kind == MOTORLINK_RMD_MODE_POSITION);
+      break;
+    default:
+      CHECK(told.kind == MOTORLINK_RMD_MODE_OFF);
+      break;
+  }
+  if (told.kind == MOTORLINK_RMD_MODE_POSITION) {
+    int64_t turn = INT64_C(1) << 18, angle = number(f, "angle");
+    int64_t counts = (angle * turn + (angle < 0 ? -18000 : 18000)) / 36000;
+    if (has(f, "direction") && number(f, "direction") != 0) {
+      counts = counts == 0 ? 0 : counts - turn;
+    }
+    CHECK(told.target_counts == counts);
+  }
+}
+
+/* A drive whose sensors and ROM have the fields gives the reply; tells whether one can. */
+static int given_by_the_drive(const json_t *vector) {
+  const json_t *f = member(vector, "fields");
+  uint8_t command = command_of(vector), encoder_bits = 16;
+  motorlink_rmd_data expected = data_of(vector), request = expected;
+  motorlink_rmd_settings rom;
+  motorlink_can_frame reply;
+  memset(&rom, 0, sizeof rom);
+  memset(&sensed, 0, sizeof sensed);
+  switch (command) {
+    case MOTORLINK_RMD_CODE_READ_GAINS:
+      rom.gains = gains_of(f);
+      break;
+    case MOTORLINK_RMD_CODE_READ_ACCELERATION:
+      rom.acceleration_dps2 = (int32_t)number(f, "acceleration");
+      break;
+    case MOTORLINK_RMD_CODE_READ_ENCODER:
+      encoder_bits = number(f, "raw") < 1 << 14 ? 14 : 16;
+      sensed.encoder_counts = number(f, "raw");
+      rom.encoder_offset = (uint16_t)number(f, "offset");
+      break;
+    case MOTORLINK_RMD_CODE_WRITE_ZERO_TO_ROM:
+      sensed.encoder_counts = number(f, "offset");
+      break;
+    case MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE:
+    case MOTORLINK_RMD_CODE_READ_CIRCLE_ANGLE: {
+      int64_t angle = number(f, "angle");
+      encoder_bits = 18;
+      if (angle > INT64_C(1) << 40 || angle < -(INT64_C(1) << 40)) {
+        return 0;
+      }
+      /* The least counts at the angle: a count is less than a digit. */
+      sensed.encoder_counts = (angle * (INT64_C(1) << 18) + (angle < 0 ? 0 : 35999)) / 36000;
+      break;
+    }
+    case MOTORLINK_RMD_CODE_READ_STATUS_1:
+    case MOTORLINK_RMD_CODE_CLEAR_ERRORS:
+      sensed.temperature_celsius = (int8_t)number(f, "temperature");
+      sensed.voltage_decivolts = (uint16_t)number(f, "voltage");
+      sensed.faults = (uint8_t)number(f, "errors");
+      break;
+    case MOTORLINK_RMD_CODE_READ_STATUS_3:
+      sensed.phase_digits[0] = (int16_t)number(f, "phase_a");
+      sensed.phase_digits[1] = (int16_t)number(f, "phase_b");
+      sensed.phase_digits[2] = (int16_t)number(f, "phase_c");
+      break;
+    default:
+      if (has(f, "iq")) {
+        sensed.temperature_celsius = (int8_t)number(f, "temperature");
+        sensed.iq_digits = (int16_t)number(f, "iq");
+        sensed.speed_dps = (int16_t)number(f, "speed");
+        sensed.encoder_counts = number(f, "encoder");
+      }
+      break;
+  }
+  power_on(vector, encoder_bits, &rom);
+  if (command == MOTORLINK_RMD_CODE_CLEAR_ERRORS) {
+    request.bytes[0] = command;
+  }
+  reply = ask((uint32_t)MOTORLINK_RMD_MOTOR_BASE + motor_of(vector), request);
+  CHECK(reply.size == 8 && memcmp(reply.data, expected.bytes, 8) == 0);
+  return 1;
+}
+
+int main(int argc, char **argv) {
+  json_t *vectors;
+  const json_t *vector;
+  size_t index;
+  int requests = 0, replies = 0, given = 0;
+
+  CHECK(argc == 2);
+  vectors = load(argv[1]);
+  json_array_foreach(vectors, index, vector) {
+    subject = text(vector, "name");
+    OK(motorlink_rmd_host_init(&host, sizeof host));
+    if (strcmp(text(vector, "dir"), "request") == 0) {
+      sent_by_the_host(vector);
+      carried_out(vector);
+      requests++;
+    } else {
+      heard_by_the_host(vector);
+      given += given_by_the_drive(vector);
+      replies++;
+    }
+  }
+  CHECK(requests + replies == (int)json_array_size(vectors));
+  printf("rmd: %d vectors: %d requests, %d replies, %d of them given by a drive\n",
+         requests + replies, requests, replies, given);
+  json_decref(vectors);
+  return 0;
+}
