@@ -203,6 +203,7 @@ static void power_on(const json_t *vector, uint8_t encoder_bits, const motorlink
   memset(&config, 0, sizeof config);
   config.id = motor_of(vector);
   config.encoder_bits = encoder_bits;
+  config.clear_reply_0x9b = data_of(vector).bytes[0] == MOTORLINK_RMD_CODE_CLEAR_ERRORS;
   OK(motorlink_rmd_drive_init(&drive, sizeof drive, &config, rom, &motor));
   OK(motorlink_rmd_drive_power_on(&drive, 0));
 }
