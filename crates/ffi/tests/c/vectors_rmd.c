@@ -152,6 +152,11 @@ static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) 
   }
 }
 
+/* The document names 0 and 1: the host does not send another, and the drive does not turn. */
+static int unnamed_direction(const json_t *f) {
+  return has(f, "direction") && number(f, "direction") > MOTORLINK_RMD_SPIN_COUNTERCLOCKWISE;
+}
+
 static motorlink_rmd_action next(uint64_t now_us, uint8_t kind) {
   motorlink_rmd_action action;
   OK(motorlink_rmd_host_poll(&host, now_us, &action));
@@ -169,7 +174,13 @@ static void sent_by_the_host(const json_t *vector) {
                                 (int16_t)number(f, "torque_3"), (int16_t)number(f, "torque_4")};
     OK(motorlink_rmd_host_torque4(&host, 0, torques, 0x0F));
   } else {
-    OK(motorlink_rmd_host_request(&host, 0, motor_of(vector), request_of(command, f)));
+    motorlink_rmd_data request = request_of(command, f);
+    motorlink_error taken = motorlink_rmd_host_request(&host, 0, motor_of(vector), request);
+    CHECK(same(request, data_of(vector)));
+    CHECK(taken == (unnamed_direction(f) ? MOTORLINK_ERROR_LIMIT : MOTORLINK_OK));
+    if (taken != MOTORLINK_OK) {
+      return;
+    }
   }
   action = next(0, MOTORLINK_ACTION_TRANSMIT);
   CHECK(action.frame.id == strtoul(text(vector, "id"), NULL, 16) && action.frame.size == 8);
@@ -228,6 +239,10 @@ static void carried_out(const json_t *vector) {
   reply = ask((uint32_t)strtoul(text(vector, "id"), NULL, 16), data_of(vector));
   CHECK(reply.size == 8);
   CHECK(reply.id == (uint32_t)MOTORLINK_RMD_MOTOR_BASE + motor_of(vector));
+  if (unnamed_direction(f)) {
+    CHECK(told.kind == MOTORLINK_RMD_MODE_OFF);
+    return;
+  }
   switch (command) {
     case 0:
       CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.torque_16ma == number(f, "torque_1"));
