@@ -1,0 +1,478 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/*
+ * What no caller should do, done to every function: it answers with an error and does nothing.
+ * Run it where a sanitizer or valgrind watches.
+ */
+#include <math.h>
+
+#include "check.h"
+
+#define REFUSED(call) CHECK((call) == expected)
+#define GIVES(error, call) CHECK((call) == MOTORLINK_ERROR_##error)
+
+static int groups;
+
+static motorlink_can_frame frame_of(uint32_t id, uint8_t size) {
+  motorlink_can_frame frame;
+  memset(&frame, 0, sizeof frame);
+  frame.id = id;
+  frame.size = size;
+  return frame;
+}
+
+/* Every function of an object finds the same wrong with its storage. */
+
+static void st_master(motorlink_st_master *master, motorlink_error expected) {
+  const motorlink_st_revup_phase phase = {0, 0, 0};
+  const uint8_t bytes[4] = {1, 2, 3, 4};
+  motorlink_st_action action;
+  uint8_t lost;
+  REFUSED(motorlink_st_master_get_register(master, 1, MOTORLINK_ST_REG_STATUS));
+  REFUSED(motorlink_st_master_set_register(master, 1, MOTORLINK_ST_REG_SPEED_KP, 1));
+  REFUSED(motorlink_st_master_execute(master, 1, MOTORLINK_ST_COMMAND_STOP_MOTOR));
+  REFUSED(motorlink_st_master_ramp(master, 1, 0, 0));
+  REFUSED(motorlink_st_master_current(master, 1, 0, 0));
+  REFUSED(motorlink_st_master_torque_ramp(master, 1, 0, 0));
+  REFUSED(motorlink_st_master_move(master, 1, 0, 0));
+  REFUSED(motorlink_st_master_revup(master, 1, 0));
+  REFUSED(motorlink_st_master_set_revup(master, 1, 0, &phase));
+  REFUSED(motorlink_st_master_board_info(master, 1));
+  REFUSED(motorlink_st_master_firmware_version(master, 1));
+  REFUSED(motorlink_st_master_configure_segment(master, 1, 0, bytes, sizeof bytes));
+  REFUSED(motorlink_st_master_read_segment(master, 1, 0));
+  REFUSED(motorlink_st_master_profiler_info(master, 1, bytes, sizeof bytes));
+  REFUSED(motorlink_st_master_raw(master, 0, bytes, sizeof bytes));
+  REFUSED(motorlink_st_master_poll(master, 0, &action));
+  REFUSED(motorlink_st_master_receive(master, 0, bytes, sizeof bytes));
+  REFUSED(motorlink_st_master_abandon(master));
+  REFUSED(motorlink_st_master_reopened(master));
+  REFUSED(motorlink_st_master_is_lost(master, &lost));
+  groups++;
+}
+
+static void st_slave(motorlink_st_slave *slave, motorlink_error expected) {
+  motorlink_bytes reply;
+  uint64_t deadline;
+  REFUSED(motorlink_st_slave_receive(slave, 0, 0, &reply));
+  REFUSED(motorlink_st_slave_poll(slave, 0, &reply));
+  REFUSED(motorlink_st_slave_deadline(slave, &deadline));
+  REFUSED(motorlink_st_slave_overrun(slave, &reply));
+  groups++;
+}
+
+static void rmd_host(motorlink_rmd_host *host, motorlink_error expected) {
+  const motorlink_rmd_limits limits = {MOTORLINK_RMD_NO_LIMIT, 1, 1};
+  const int16_t torques[4] = {0, 0, 0, 0};
+  const motorlink_can_frame frame = frame_of(0x141, 8);
+  motorlink_rmd_action action;
+  uint64_t at;
+  uint32_t motors;
+  REFUSED(motorlink_rmd_host_set_times(host, 1, 1));
+  REFUSED(motorlink_rmd_host_set_limits(host, 1, &limits));
+  REFUSED(motorlink_rmd_host_request(host, 0, 1, motorlink_rmd_off()));
+  REFUSED(motorlink_rmd_host_torque4(host, 0, torques, 0x0F));
+  REFUSED(motorlink_rmd_host_retry(host, &at));
+  REFUSED(motorlink_rmd_host_poll(host, 0, &action));
+  REFUSED(motorlink_rmd_host_receive(host, 0, &frame));
+  REFUSED(motorlink_rmd_host_cancel(host, 0, 1));
+  REFUSED(motorlink_rmd_host_busy(host, &motors));
+  groups++;
+}
+
+static void rmd_drive(motorlink_rmd_drive *drive, motorlink_error expected) {
+  const motorlink_can_frame frame = frame_of(0x141, 8);
+  motorlink_can_frame reply;
+  motorlink_rmd_motion motion;
+  motorlink_rmd_settings settings;
+  uint64_t deadline;
+  uint8_t errors;
+  REFUSED(motorlink_rmd_drive_power_on(drive, 0));
+  REFUSED(motorlink_rmd_drive_receive(drive, 0, &frame, &reply));
+  REFUSED(motorlink_rmd_drive_poll(drive, 0));
+  REFUSED(motorlink_rmd_drive_deadline(drive, &deadline));
+  REFUSED(motorlink_rmd_drive_motion(drive, &motion));
+  REFUSED(motorlink_rmd_drive_errors(drive, &errors));
+  REFUSED(motorlink_rmd_drive_settings(drive, &settings));
+  groups++;
+}
+
+static void slcan_host(motorlink_slcan_host *host, motorlink_error expected) {
+  motorlink_slcan_answer answer;
+  motorlink_can_frame frame;
+  REFUSED(motorlink_slcan_host_receive(host, '\r', &answer, &frame));
+  groups++;
+}
+
+static void slcan_device(motorlink_slcan_device *device, motorlink_error expected) {
+  const motorlink_can_frame sent = frame_of(0x141, 8);
+  motorlink_slcan_line line;
+  motorlink_can_frame frame;
+  REFUSED(motorlink_slcan_device_receive(device, '\r', &line, &frame));
+  REFUSED(motorlink_slcan_device_deliver(device, 0, &sent, &line));
+  groups++;
+}
+
+static void every_object(void *storage, motorlink_error expected) {
+  st_master((motorlink_st_master *)storage, expected);
+  st_slave((motorlink_st_slave *)storage, expected);
+  rmd_host((motorlink_rmd_host *)storage, expected);
+  rmd_drive((motorlink_rmd_drive *)storage, expected);
+  slcan_host((motorlink_slcan_host *)storage, expected);
+  slcan_device((motorlink_slcan_device *)storage, expected);
+}
+
+static motorlink_st_drive no_drive;
+static motorlink_rmd_motor no_motor;
+
+/* Storage for any object, and a byte more. */
+static uint64_t memory[MOTORLINK_RMD_HOST_WORDS + 1];
+
+static void wrong_storage(void) {
+  const motorlink_rmd_drive_config config = {0, 1, 0, 0};
+  unsigned fill;
+  subject = "NULL";
+  every_object(NULL, MOTORLINK_ERROR_NULL_POINTER);
+  subject = "misaligned";
+  every_object((unsigned char *)memory + 1, MOTORLINK_ERROR_MISALIGNED);
+  every_object((unsigned char *)memory + 4, MOTORLINK_ERROR_MISALIGNED);
+  subject = "never initialised";
+  for (fill = 0; fill < 256; fill++) {
+    memset(memory, (int)fill, sizeof memory);
+    every_object(memory, MOTORLINK_ERROR_UNINITIALISED);
+  }
+
+  subject = "of another kind";
+  OK(motorlink_st_master_init((motorlink_st_master *)memory, sizeof memory, NULL));
+  st_slave((motorlink_st_slave *)memory, MOTORLINK_ERROR_WRONG_KIND);
+  rmd_host((motorlink_rmd_host *)memory, MOTORLINK_ERROR_WRONG_KIND);
+  rmd_drive((motorlink_rmd_drive *)memory, MOTORLINK_ERROR_WRONG_KIND);
+  slcan_host((motorlink_slcan_host *)memory, MOTORLINK_ERROR_WRONG_KIND);
+  slcan_device((motorlink_slcan_device *)memory, MOTORLINK_ERROR_WRONG_KIND);
+  OK(motorlink_st_slave_init((motorlink_st_slave *)memory, sizeof memory, 0, 1, &no_drive));
+  st_master((motorlink_st_master *)memory, MOTORLINK_ERROR_WRONG_KIND);
+  OK(motorlink_rmd_host_init((motorlink_rmd_host *)memory, sizeof memory));
+  rmd_drive((motorlink_rmd_drive *)memory, MOTORLINK_ERROR_WRONG_KIND);
+  OK(motorlink_rmd_drive_init((motorlink_rmd_drive *)memory, sizeof memory, &config, NULL,
+                              &no_motor));
+  rmd_host((motorlink_rmd_host *)memory, MOTORLINK_ERROR_WRONG_KIND);
+  OK(motorlink_slcan_host_init((motorlink_slcan_host *)memory, sizeof memory));
+  slcan_device((motorlink_slcan_device *)memory, MOTORLINK_ERROR_WRONG_KIND);
+  OK(motorlink_slcan_device_init((motorlink_slcan_device *)memory, sizeof memory));
+  slcan_host((motorlink_slcan_host *)memory, MOTORLINK_ERROR_WRONG_KIND);
+}
+
+static void wrong_sizes(void) {
+  const motorlink_rmd_drive_config config = {0, 1, 0, 0};
+  motorlink_st_master master;
+  motorlink_st_slave slave;
+  motorlink_rmd_host *host = (motorlink_rmd_host *)memory;
+  motorlink_rmd_drive drive;
+  motorlink_slcan_host adapter;
+  motorlink_slcan_device device;
+  subject = "too small";
+  memset(memory, 0, sizeof memory);
+  GIVES(STORAGE_TOO_SMALL, motorlink_st_master_init(&master, sizeof master - 1, NULL));
+  GIVES(STORAGE_TOO_SMALL, motorlink_st_slave_init(&slave, sizeof slave - 1, 0, 1, &no_drive));
+  GIVES(STORAGE_TOO_SMALL, motorlink_rmd_host_init(host, sizeof *host - 1));
+  GIVES(STORAGE_TOO_SMALL,
+        motorlink_rmd_drive_init(&drive, sizeof drive - 1, &config, NULL, &no_motor));
+  GIVES(STORAGE_TOO_SMALL, motorlink_slcan_host_init(&adapter, sizeof adapter - 1));
+  GIVES(STORAGE_TOO_SMALL, motorlink_slcan_device_init(&device, sizeof device - 1));
+  GIVES(STORAGE_TOO_SMALL, motorlink_rmd_host_init(host, 0));
+  rmd_host(host, MOTORLINK_ERROR_UNINITIALISED);
+}
+
+static void wrong_pointers(void) {
+  static motorlink_st_master master;
+  static motorlink_st_slave slave;
+  static motorlink_rmd_host host;
+  static motorlink_rmd_drive drive;
+  static motorlink_slcan_host adapter;
+  static motorlink_slcan_device device;
+  unsigned char *odd = (unsigned char *)memory + 1;
+  motorlink_rmd_drive_config config = {0, 1, 0, 0};
+  motorlink_can_frame frame = frame_of(0x141, 8), other;
+  motorlink_slcan_line line;
+  motorlink_slcan_answer answer;
+  motorlink_st_board_info info;
+  motorlink_st_firmware_version version;
+  motorlink_st_revup_phase phase;
+  const uint8_t bytes[8] = {0};
+
+  subject = "other pointers";
+  GIVES(NULL_POINTER, motorlink_st_master_init(NULL, sizeof master, NULL));
+  GIVES(MISALIGNED, motorlink_st_master_init((motorlink_st_master *)(void *)odd, 1000, NULL));
+  GIVES(MISALIGNED, motorlink_st_master_init(&master, sizeof master,
+                                             (motorlink_st_master_config *)(void *)odd));
+  GIVES(NULL_POINTER, motorlink_st_slave_init(NULL, sizeof slave, 0, 1, &no_drive));
+  GIVES(NULL_POINTER, motorlink_st_slave_init(&slave, sizeof slave, 0, 1, NULL));
+  GIVES(MISALIGNED, motorlink_st_slave_init(&slave, sizeof slave, 0, 1,
+                                            (motorlink_st_drive *)(void *)odd));
+  GIVES(NULL_POINTER, motorlink_rmd_host_init(NULL, sizeof host));
+  GIVES(NULL_POINTER, motorlink_rmd_drive_init(NULL, sizeof drive, &config, NULL, &no_motor));
+  GIVES(NULL_POINTER, motorlink_rmd_drive_init(&drive, sizeof drive, NULL, NULL, &no_motor));
+  GIVES(NULL_POINTER, motorlink_rmd_drive_init(&drive, sizeof drive, &config, NULL, NULL));
+  GIVES(MISALIGNED, motorlink_rmd_drive_init(&drive, sizeof drive, &config,
+                                             (motorlink_rmd_settings *)(void *)odd, &no_motor));
+  GIVES(NULL_POINTER, motorlink_slcan_host_init(NULL, sizeof adapter));
+  GIVES(NULL_POINTER, motorlink_slcan_device_init(NULL, sizeof device));
+
+  OK(motorlink_st_master_init(&master, sizeof master, NULL));
+  OK(motorlink_st_slave_init(&slave, sizeof slave, 0, 1, &no_drive));
+  OK(motorlink_rmd_host_init(&host, sizeof host));
+  OK(motorlink_rmd_drive_init(&drive, sizeof drive, &config, NULL, &no_motor));
+  OK(motorlink_slcan_host_init(&adapter, sizeof adapter));
+  OK(motorlink_slcan_device_init(&device, sizeof device));
+
+  GIVES(NULL_POINTER, motorlink_st_master_set_revup(&master, 1, 0, NULL));
+  GIVES(NULL_POINTER, motorlink_st_master_configure_segment(&master, 1, 0, NULL, 1));
+  GIVES(NULL_POINTER, motorlink_st_master_profiler_info(&master, 1, NULL, 1));
+  GIVES(NULL_POINTER, motorlink_st_master_raw(&master, 0, NULL, 1));
+  GIVES(NULL_POINTER, motorlink_st_master_poll(&master, 0, NULL));
+  GIVES(NULL_POINTER, motorlink_st_master_receive(&master, 0, NULL, 1));
+  GIVES(NULL_POINTER, motorlink_st_master_is_lost(&master, NULL));
+  GIVES(MISALIGNED, motorlink_st_master_poll(&master, 0, (motorlink_st_action *)(void *)odd));
+  OK(motorlink_st_master_receive(&master, 0, NULL, 0));
+  OK(motorlink_st_master_raw(&master, 0, NULL, 0));
+  GIVES(NULL_POINTER, motorlink_st_slave_receive(&slave, 0, 0, NULL));
+  GIVES(NULL_POINTER, motorlink_st_slave_poll(&slave, 0, NULL));
+  GIVES(NULL_POINTER, motorlink_st_slave_deadline(&slave, NULL));
+  GIVES(NULL_POINTER, motorlink_st_slave_overrun(&slave, NULL));
+  GIVES(NULL_POINTER, motorlink_st_decode_board_info(NULL, 8, &info));
+  GIVES(NULL_POINTER, motorlink_st_decode_board_info(bytes, 8, NULL));
+  GIVES(NULL_POINTER, motorlink_st_decode_firmware_version(NULL, 8, &version));
+  GIVES(NULL_POINTER, motorlink_st_decode_firmware_version(bytes, 8, NULL));
+  GIVES(NULL_POINTER, motorlink_st_decode_revup(NULL, 8, &phase));
+  GIVES(NULL_POINTER, motorlink_st_decode_revup(bytes, 8, NULL));
+
+  GIVES(NULL_POINTER, motorlink_rmd_host_set_limits(&host, 1, NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_host_torque4(&host, 0, NULL, 0));
+  GIVES(MISALIGNED, motorlink_rmd_host_torque4(&host, 0, (int16_t *)(void *)odd, 0));
+  GIVES(NULL_POINTER, motorlink_rmd_host_retry(&host, NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_host_poll(&host, 0, NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_host_receive(&host, 0, NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_host_busy(&host, NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_drive_receive(&drive, 0, NULL, &other));
+  GIVES(NULL_POINTER, motorlink_rmd_drive_receive(&drive, 0, &frame, NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_drive_deadline(&drive, NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_drive_motion(&drive, NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_drive_errors(&drive, NULL));
+  GIVES(NULL_POINTER, motorlink_rmd_drive_settings(&drive, NULL));
+
+  GIVES(NULL_POINTER, motorlink_slcan_host_receive(&adapter, 0, NULL, &other));
+  GIVES(NULL_POINTER, motorlink_slcan_host_receive(&adapter, 0, &answer, NULL));
+  GIVES(NULL_POINTER, motorlink_slcan_open(1000000, NULL));
+  GIVES(NULL_POINTER, motorlink_slcan_encode(NULL, &line));
+  GIVES(NULL_POINTER, motorlink_slcan_encode(&frame, NULL));
+  GIVES(NULL_POINTER, motorlink_slcan_device_receive(&device, 0, NULL, &other));
+  GIVES(NULL_POINTER, motorlink_slcan_device_receive(&device, 0, &line, NULL));
+  GIVES(NULL_POINTER, motorlink_slcan_device_deliver(&device, 0, NULL, &line));
+  GIVES(NULL_POINTER, motorlink_slcan_device_deliver(&device, 0, &frame, NULL));
+}
+
+static void wrong_numbers(void) {
+  static motorlink_st_master master;
+  static motorlink_st_slave slave;
+  static motorlink_rmd_host host;
+  static motorlink_rmd_drive drive;
+  const uint8_t bytes[130] = {0};
+  const int16_t torques[4] = {0, 0, 0, 2001};
+  const motorlink_st_revup_phase phase = {0, 0, 0};
+  motorlink_st_master_config config = motorlink_st_master_defaults();
+  motorlink_rmd_drive_config drive_config = {0, 1, 0, 0};
+  motorlink_rmd_limits limits = {MOTORLINK_RMD_NO_LIMIT, MOTORLINK_RMD_NO_LIMIT,
+                                 MOTORLINK_RMD_NO_LIMIT};
+  motorlink_can_frame frame, reply;
+  motorlink_st_board_info info;
+  motorlink_st_revup_phase read;
+  motorlink_slcan_line line;
+  motorlink_st_action action;
+
+  subject = "numbers";
+  OK(motorlink_st_master_init(&master, sizeof master, NULL));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_get_register(&master, 8, 0));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_set_register(&master, 9, 0, 0));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_execute(&master, 255, 1));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_revup(&master, 1, 5));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_set_revup(&master, 1, 255, &phase));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_move(&master, 1, (float)HUGE_VAL, 1));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_move(&master, 1, 1, (float)-HUGE_VAL));
+  GIVES(TOO_LONG, motorlink_st_master_raw(&master, 0, bytes, 129));
+  GIVES(TOO_LONG, motorlink_st_master_configure_segment(&master, 1, 0, bytes, 128));
+  GIVES(TOO_LONG, motorlink_st_master_profiler_info(&master, 1, bytes, 129));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_raw(&master, 0, bytes, SIZE_MAX));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_receive(&master, 0, bytes, SIZE_MAX / 2 + 1));
+  /* Nothing of this began an exchange. */
+  OK(motorlink_st_master_poll(&master, 0, &action));
+  CHECK(action.kind == MOTORLINK_ACTION_WAIT && action.until_us == MOTORLINK_NEVER);
+  OK(motorlink_st_master_board_info(&master, 7));
+  GIVES(BUSY, motorlink_st_master_execute(&master, 1, MOTORLINK_ST_COMMAND_STOP_MOTOR));
+  GIVES(BUSY, motorlink_st_master_raw(&master, 0, bytes, 1));
+  config.profile = 2;
+  GIVES(BAD_ARGUMENT, motorlink_st_master_init(&master, sizeof master, &config));
+  config.profile = MOTORLINK_ST_PROFILE_MCSDK54;
+  config.recovery = 3;
+  GIVES(BAD_ARGUMENT, motorlink_st_master_init(&master, sizeof master, &config));
+  GIVES(BAD_ARGUMENT, motorlink_st_slave_init(&slave, sizeof slave, 2, 1, &no_drive));
+  GIVES(BAD_ARGUMENT, motorlink_st_slave_init(&slave, sizeof slave, 0, 0, &no_drive));
+  GIVES(BAD_ARGUMENT, motorlink_st_slave_init(&slave, sizeof slave, 0, 8, &no_drive));
+  st_slave(&slave, MOTORLINK_ERROR_UNINITIALISED);
+  GIVES(BAD_ARGUMENT, motorlink_st_decode_board_info(bytes, 2, &info));
+  GIVES(BAD_ARGUMENT, motorlink_st_decode_revup(bytes, 7, &read));
+
+  OK(motorlink_rmd_host_init(&host, sizeof host));
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_request(&host, 0, 0, motorlink_rmd_off()));
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_request(&host, 0, 33, motorlink_rmd_off()));
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_cancel(&host, 0, 33));
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_torque4(&host, 0, torques, 0x10));
+  GIVES(LIMIT, motorlink_rmd_host_torque4(&host, 0, torques, 0x0F));
+  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_torque(-2001)));
+  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_circle_position(7, 0)));
+  limits.torque_16ma = 32768;
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 1, &limits));
+  limits.torque_16ma = -2;
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 1, &limits));
+  limits.torque_16ma = MOTORLINK_RMD_NO_LIMIT;
+  limits.speed_dps = 65536;
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 1, &limits));
+  limits.speed_dps = 100;
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 33, &limits));
+  OK(motorlink_rmd_host_set_limits(&host, 1, &limits));
+  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_speed(10001)));
+  OK(motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_speed(10000)));
+  GIVES(BUSY, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_off()));
+
+  OK(motorlink_rmd_drive_init(&drive, sizeof drive, &drive_config, NULL, &no_motor));
+  OK(motorlink_rmd_drive_power_on(&drive, 0));
+  frame = frame_of(0x141, 9);
+  GIVES(BAD_ARGUMENT, motorlink_rmd_drive_receive(&drive, 0, &frame, &reply));
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_receive(&host, 0, &frame));
+  GIVES(BAD_ARGUMENT, motorlink_slcan_encode(&frame, &line));
+  frame = frame_of(0x800, 8);
+  GIVES(BAD_ARGUMENT, motorlink_rmd_drive_receive(&drive, 0, &frame, &reply));
+  frame.extended = 255;
+  OK(motorlink_rmd_drive_receive(&drive, 0, &frame, &reply));
+  CHECK(reply.id == MOTORLINK_NO_FRAME && reply.size == 0);
+  GIVES(BAD_ARGUMENT, motorlink_rmd_drive_receive(&drive, 0, &reply, &frame));
+  GIVES(BAD_ARGUMENT, motorlink_slcan_open(123, &line));
+  drive_config.id = 33;
+  GIVES(BAD_ARGUMENT,
+        motorlink_rmd_drive_init(&drive, sizeof drive, &drive_config, NULL, &no_motor));
+  drive_config.id = 1;
+  drive_config.encoder_bits = 19;
+  GIVES(BAD_ARGUMENT,
+        motorlink_rmd_drive_init(&drive, sizeof drive, &drive_config, NULL, &no_motor));
+
+  CHECK(motorlink_rmd_encoder_centidegrees(0x1000, 14) == 9000);
+  CHECK(motorlink_rmd_encoder_centidegrees(0x1000, 11) == 0);
+  CHECK(strcmp(motorlink_error_text(-1), motorlink_error_text(1000)) == 0);
+  CHECK(strcmp(motorlink_error_text(MOTORLINK_OK), "done") == 0);
+}
+
+/* Callbacks that call for the object that calls them. */
+
+static motorlink_st_slave calling_slave;
+static motorlink_rmd_drive calling_drive;
+static int called;
+
+static void from_the_slave(void) {
+  st_slave(&calling_slave, MOTORLINK_ERROR_IN_USE);
+  st_master((motorlink_st_master *)&calling_slave, MOTORLINK_ERROR_WRONG_KIND);
+  called++;
+}
+
+static uint16_t features(void *context, uint8_t motor) {
+  (void)context;
+  (void)motor;
+  from_the_slave();
+  return MOTORLINK_ST_FEATURE_PFC;
+}
+
+static int32_t read_register(void *context, uint8_t motor, uint8_t reg) {
+  (void)context;
+  (void)motor;
+  (void)reg;
+  from_the_slave();
+  return 42;
+}
+
+static void from_the_drive(void) {
+  rmd_drive(&calling_drive, MOTORLINK_ERROR_IN_USE);
+  called++;
+}
+
+static void set_mode(void *context, const motorlink_rmd_motion *motion) {
+  (void)context;
+  (void)motion;
+  from_the_drive();
+}
+
+static void configure(void *context, const motorlink_rmd_settings *settings) {
+  (void)context;
+  (void)settings;
+  from_the_drive();
+}
+
+static void sense(void *context, motorlink_rmd_sense *sense_out) {
+  (void)context;
+  (void)sense_out;
+  from_the_drive();
+}
+
+static void reentered(void) {
+  static motorlink_st_drive drive;
+  static motorlink_rmd_motor motor;
+  const uint8_t get[4] = {0x22, 0x01, 0x02, 0x25};
+  const uint8_t answered[4] = {0xF0, 0x01, 42, 0x1C};
+  const motorlink_rmd_drive_config config = {0, 1, 0, 0};
+  motorlink_can_frame frame = frame_of(0x141, 8), reply;
+  motorlink_bytes sent;
+  size_t at;
+
+  subject = "called from a callback";
+  drive.features = features;
+  drive.read = read_register;
+  OK(motorlink_st_slave_init(&calling_slave, sizeof calling_slave, 0, 1, &drive));
+  for (at = 0; at < sizeof get; at++) {
+    OK(motorlink_st_slave_receive(&calling_slave, 0, get[at], &sent));
+  }
+  CHECK(called >= 2);
+  CHECK(sent.size == sizeof answered && memcmp(sent.data, answered, sent.size) == 0);
+
+  called = 0;
+  motor.set_mode = set_mode;
+  motor.configure = configure;
+  motor.sense = sense;
+  OK(motorlink_rmd_drive_init(&calling_drive, sizeof calling_drive, &config, NULL, &motor));
+  OK(motorlink_rmd_drive_power_on(&calling_drive, 0));
+  CHECK(called == 2);
+  memcpy(frame.data, motorlink_rmd_torque(5).bytes, sizeof frame.data);
+  OK(motorlink_rmd_drive_receive(&calling_drive, 0, &frame, &reply));
+  CHECK(called >= 4 && reply.size == 8);
+  OK(motorlink_rmd_drive_poll(&calling_drive, 0));
+}
+
+/* Objects are plain data: a copy is an object of its own. */
+static void copied(void) {
+  motorlink_st_master one, two;
+  motorlink_st_action action;
+  subject = "copies";
+  OK(motorlink_st_master_init(&one, sizeof one, NULL));
+  two = one;
+  OK(motorlink_st_master_board_info(&one, 0));
+  OK(motorlink_st_master_poll(&two, 0, &action));
+  CHECK(action.kind == MOTORLINK_ACTION_WAIT);
+  OK(motorlink_st_master_poll(&one, 0, &action));
+  CHECK(action.kind == MOTORLINK_ACTION_TRANSMIT && action.bytes.size == 3);
+}
+
+int main(void) {
+  wrong_storage();
+  wrong_sizes();
+  wrong_pointers();
+  wrong_numbers();
+  reentered();
+  copied();
+  printf("robustness: %d times every function of an object refused\n", groups);
+  return 0;
+}
