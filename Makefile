@@ -7,6 +7,8 @@
 # make bench           ratios and instruction counts, as in docs/BENCHMARKS.md
 # make reliability     both protocols through lines that misbehave, into docs/RELIABILITY.md
 # make docs            writes the tables of docs/CONFORMANCE.md anew
+# make header        writes crates/ffi/include/motorlink.h anew
+# make install-c     C header and libraries, pkg-config and CMake files: PREFIX=/usr/local DESTDIR=
 # make pictures        plays the scenarios and draws docs/pictures anew
 # make semver          the public interface against the last release
 
@@ -20,14 +22,14 @@ SOCKETCAN := CARGO="$(CARGO)" SUDO="$(SUDO)" tests/socketcan/run.sh
 
 SECONDS ?= 60
 
-.PHONY: demo test lint deny unit determinism fuzz-replay miri probe e2e test-socketcan
-.PHONY: fuzz soak bench reliability docs pictures semver fmt clean
+.PHONY: demo test lint deny unit determinism fuzz-replay miri probe e2e ffi-test test-socketcan
+.PHONY: fuzz soak bench reliability docs header install-c pictures semver fmt clean
 
 demo:
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
 # Last, so that what was not tested is said last.
-test: lint deny unit determinism fuzz-replay miri probe e2e
+test: lint deny unit determinism fuzz-replay miri probe e2e ffi-test
 	$(SOCKETCAN) || [ $$? -eq 77 ]
 
 lint:
@@ -49,13 +51,13 @@ fuzz:
 	command -v cargo-fuzz >/dev/null || $(CARGO) install --locked cargo-fuzz
 	fuzz/run $(SECONDS)
 
-# proto's tests in an interpreter that sees undefined behaviour, with few cases a property.
+# Tests of proto and of the C face in an interpreter that sees undefined behaviour, with few cases a property.
 miri:
 	@rustup run nightly cargo miri --version >/dev/null 2>&1 || \
 		rustup toolchain install nightly --profile minimal --component miri --component rust-src || \
 		{ echo "MIRI DID NOT RUN: there is no nightly toolchain, and it cannot be installed" >&2; exit 0; }; \
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
-		$(CARGO) +nightly miri test -p motorlink-proto --locked
+		$(CARGO) +nightly miri test -p motorlink-proto -p motorlink-ffi --locked
 
 # Licences, duplicates and sources of every dependency; known holes where their list can be had.
 deny:
@@ -96,6 +98,12 @@ e2e: $(VENV)/ready
 	$(CARGO) build -p motorlink-cli --locked
 	MOTORLINK_BIN=$$PWD/target/debug/motorlink $(VENV)/bin/python -m pytest -q tests/e2e
 
+# The C face: header, packages, vectors, misuse, examples. Ends well, and says so, without a compiler.
+ffi-test:
+	$(CARGO) build -p motorlink-cli --locked
+	CARGO="$(CARGO)" SUDO="$(SUDO)" crates/ffi/tests/c/run $${CARGO_TARGET_DIR:-target}/debug/motorlink || \
+		[ $$? -eq 77 ]
+
 # The port socketcan: in Debian's kernel in QEMU. Ends with 77 where the packages cannot be had.
 test-socketcan:
 	$(SOCKETCAN)
@@ -113,6 +121,13 @@ $(BENCH_VENV)/ready: bench/requirements.txt
 
 docs:
 	MOTORLINK_UPDATE_DOCS=1 $(CARGO) test -p motorlink-conformance --test document --locked
+
+header:
+	MOTORLINK_UPDATE_HEADER=1 $(CARGO) test -p motorlink-ffi --test header --locked
+
+PREFIX ?= /usr/local
+install-c:
+	CARGO="$(CARGO)" crates/ffi/packaging/install $(PREFIX) $(DESTDIR)
 
 pictures:
 	mkdir -p docs/pictures
