@@ -1,0 +1,293 @@
+//! The C face as C calls it: both ends joined, and what no caller should do. Miri watches.
+#![allow(clippy::undocumented_unsafe_blocks, reason = "every call here is one of C's")]
+
+use std::ffi::c_void;
+use std::mem::MaybeUninit;
+use std::ptr::{null, null_mut};
+use std::slice;
+
+use motorlink_ffi::motorlink_error as Error;
+use motorlink_ffi::rmd::{drive::*, host::*, message::*, *};
+use motorlink_ffi::slcan::*;
+use motorlink_ffi::st::{master::*, message::*, slave::*, *};
+use motorlink_ffi::*;
+
+const OK: Error = Error::Ok;
+
+macro_rules! gives {
+    ($error:ident, $($call:expr),+ $(,)?) => { $( assert_eq!(unsafe { $call }, Error::$error); )+ };
+}
+
+fn zeroed<T>() -> T {
+    unsafe { MaybeUninit::zeroed().assume_init() }
+}
+
+fn bytes(bytes: &motorlink_bytes) -> Vec<u8> {
+    unsafe { slice::from_raw_parts(bytes.data, bytes.size) }.to_vec()
+}
+
+#[derive(Default)]
+struct Fan {
+    rpm: i32,
+    commands: Vec<u8>,
+    revup: Option<motorlink_st_revup_phase>,
+    slave: Option<*mut motorlink_st_slave>,
+}
+
+fn fan<'a>(context: *mut c_void) -> &'a mut Fan {
+    unsafe { &mut *context.cast() }
+}
+
+extern "C" fn read(context: *mut c_void, _: u8, _: u8) -> i32 {
+    let fan = fan(context);
+    if let Some(slave) = fan.slave {
+        let (mut reply, mut at) = (zeroed(), 0);
+        gives!(
+            InUse,
+            motorlink_st_slave_receive(slave, 0, 0, &mut reply),
+            motorlink_st_slave_poll(slave, 0, &mut reply),
+            motorlink_st_slave_overrun(slave, &mut reply),
+            motorlink_st_slave_deadline(slave, &mut at),
+        );
+        gives!(WrongKind, motorlink_st_master_abandon(slave.cast()));
+    }
+    fan.rpm
+}
+
+extern "C" fn write(_: *mut c_void, _: u8, _: u8, value: i32) -> u8 {
+    if value == 13 { 0x05 } else { 0 }
+}
+
+extern "C" fn execute(context: *mut c_void, _: u8, command: u8) {
+    fan(context).commands.push(command);
+}
+
+extern "C" fn ramp(context: *mut c_void, _: u8, speed_rpm: i32, _: u16) {
+    fan(context).rpm = speed_rpm;
+}
+
+extern "C" fn revup(context: *mut c_void, _: u8, _: u8, data: *mut motorlink_st_revup_phase) {
+    if let Some(known) = fan(context).revup {
+        unsafe { *data = known };
+    }
+}
+
+extern "C" fn set_revup(context: *mut c_void, _: u8, _: u8, data: *const motorlink_st_revup_phase) {
+    fan(context).revup = Some(unsafe { *data });
+}
+
+extern "C" fn features(_: *mut c_void, _: u8) -> u16 {
+    0xFFFF
+}
+
+extern "C" fn profiler_step(_: *mut c_void, _: u8, step: u8, registers: *mut *const u8) -> u8 {
+    static SHOWN: [u8; 2] = [0x66, 0x67];
+    unsafe { *registers = if step == 1 { SHOWN.as_ptr() } else { null() } };
+    // A step that claims registers and shows none has none.
+    2
+}
+
+struct StBench {
+    master: motorlink_st_master,
+    slave: motorlink_st_slave,
+}
+
+impl StBench {
+    fn new(profile: u8, drive: &motorlink_st_drive) -> Box<Self> {
+        let mut bench = Box::new(StBench { master: zeroed(), slave: zeroed() });
+        let config = motorlink_st_master_config { profile, ..motorlink_st_master_defaults() };
+        let StBench { master, slave } = &mut *bench;
+        gives!(Ok, motorlink_st_master_init(master, size_of_val(master), &config));
+        gives!(Ok, motorlink_st_slave_init(slave, size_of_val(slave), profile, 1, drive));
+        bench
+    }
+
+    /// Conducts the exchange that was begun: what became of it, and the payload.
+    fn done(&mut self, begun: Error) -> (motorlink_st_action, Vec<u8>) {
+        assert_eq!(begun, OK);
+        let StBench { master, slave } = self;
+        let (mut action, mut reply): (motorlink_st_action, motorlink_bytes) = (zeroed(), zeroed());
+        loop {
+            gives!(Ok, motorlink_st_master_poll(master, 0, &mut action));
+            match action.kind {
+                motorlink_action::Done => return (action, bytes(&action.bytes)),
+                motorlink_action::Wait => panic!("the slave did not answer"),
+                motorlink_action::Transmit => {}
+            }
+            let sent = bytes(&action.bytes);
+            gives!(Ok, motorlink_st_master_poll(master, 0, &mut action));
+            for byte in sent {
+                gives!(Ok, motorlink_st_slave_receive(slave, 0, byte, &mut reply));
+                gives!(Ok, motorlink_st_master_receive(master, 0, reply.data, reply.size));
+            }
+        }
+    }
+}
+
+fn drive(context: &mut Fan) -> motorlink_st_drive {
+    let mut drive: motorlink_st_drive = zeroed();
+    drive.context = std::ptr::from_mut(context).cast();
+    drive.version.name = c"Fan".as_ptr();
+    drive.version.major = 1;
+    drive.features = Some(features);
+    drive.read = Some(read);
+    drive.write = Some(write);
+    drive.execute = Some(execute);
+    drive.ramp = Some(ramp);
+    drive.revup = Some(revup);
+    drive.set_revup = Some(set_revup);
+    drive.profiler_step = Some(profiler_step);
+    drive
+}
+
+macro_rules! exchange {
+    ($bench:ident, $function:ident($($argument:expr),*)) => {{
+        let begun = unsafe { $function(&mut $bench.master, 1, $($argument),*) };
+        $bench.done(begun)
+    }};
+}
+
+#[test]
+fn a_master_and_a_slave_understand_each_other() {
+    let mut fan = Fan::default();
+    let drive = drive(&mut fan);
+    let mut bench = StBench::new(1, &drive);
+    assert_eq!(exchange!(bench, motorlink_st_master_ramp(1500, 100)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_get_register(0x1E)).0.value, 1500);
+    assert_eq!(exchange!(bench, motorlink_st_master_execute(1)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_set_register(0x05, -2)).0.result, OK);
+    let refused = exchange!(bench, motorlink_st_master_set_register(0x05, 13)).0;
+    assert_eq!((refused.result, refused.refusal), (Error::Refused, 0x05));
+    assert_eq!(exchange!(bench, motorlink_st_master_current(1, 2)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_torque_ramp(1, 2)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_move(1.0, 2.0)).0.result, OK);
+
+    let phase = motorlink_st_revup_phase { speed_rpm: 600, torque_s16a: -7, duration_ms: 9 };
+    assert_eq!(exchange!(bench, motorlink_st_master_set_revup(0, &phase)).0.result, OK);
+    let (_, payload) = exchange!(bench, motorlink_st_master_revup(0));
+    let mut read: motorlink_st_revup_phase = zeroed();
+    gives!(Ok, motorlink_st_decode_revup(payload.as_ptr(), payload.len(), &mut read));
+    assert_eq!(read, phase);
+
+    let (_, payload) = exchange!(bench, motorlink_st_master_board_info());
+    let mut info: motorlink_st_board_info = zeroed();
+    gives!(Ok, motorlink_st_decode_board_info(payload.as_ptr(), payload.len(), &mut info));
+    assert_eq!((info.major, info.name[..4].to_vec()), (1, b"Fan\0".map(|b| b as _).to_vec()));
+    let (_, payload) = exchange!(bench, motorlink_st_master_firmware_version());
+    let mut version: motorlink_st_firmware_version = zeroed();
+    gives!(Ok, motorlink_st_decode_firmware_version(payload.as_ptr(), payload.len(), &mut version));
+    assert_eq!(version.version[..5], b"Ver.1".map(|b| b as _));
+
+    let steps = [0, 1];
+    let (_, payload) = exchange!(bench, motorlink_st_master_profiler_info(steps.as_ptr(), 2));
+    assert_eq!(payload, [0, 2, 0x66, 0x67]);
+    assert_eq!(fan.commands, [1]);
+}
+
+#[test]
+fn a_drive_without_callbacks_answers() {
+    let nothing: motorlink_st_drive = zeroed();
+    let mut bench = StBench::new(0, &nothing);
+    assert_eq!(exchange!(bench, motorlink_st_master_get_register(0x1E)).0.value, 0);
+    assert_eq!(exchange!(bench, motorlink_st_master_set_register(0x05, 1)).0.refusal, 0x05);
+    assert_eq!(exchange!(bench, motorlink_st_master_execute(1)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_ramp(1, 1)).0.result, OK);
+    let registers = [0x02, 0x1E];
+    let chosen = exchange!(bench, motorlink_st_master_configure_segment(0, registers.as_ptr(), 2));
+    assert_eq!(chosen.0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_read_segment(0)).1, [0; 5]);
+}
+
+#[test]
+fn a_slave_that_is_called_from_its_callback_is_in_use() {
+    let mut fan = Fan { rpm: 42, ..Fan::default() };
+    let drive = drive(&mut fan);
+    let slave: *mut motorlink_st_slave = Box::into_raw(Box::new(zeroed()));
+    fan.slave = Some(slave);
+    let mut reply: motorlink_bytes = zeroed();
+    gives!(Ok, motorlink_st_slave_init(slave, size_of::<motorlink_st_slave>(), 0, 1, &drive));
+    for byte in [0x22, 0x01, 0x02, 0x25] {
+        gives!(Ok, motorlink_st_slave_receive(slave, 0, byte, &mut reply));
+    }
+    assert_eq!(bytes(&reply), [0xF0, 0x01, 42, 0x1C]);
+    drop(unsafe { Box::from_raw(slave) });
+}
+
+#[test]
+fn storage_that_is_not_one_is_refused() {
+    let mut memory = [0u64; 400];
+    let (size, at): (usize, *mut u64) = (size_of_val(&memory), memory.as_mut_ptr());
+    let mut action: motorlink_st_action = zeroed();
+    let mut deadline = 0;
+    gives!(
+        Uninitialised,
+        motorlink_st_master_poll(at.cast(), 0, &mut action),
+        motorlink_rmd_host_cancel(at.cast(), 0, 1),
+    );
+    gives!(NullPointer, motorlink_st_master_poll(null_mut(), 0, &mut action));
+    gives!(Misaligned, motorlink_st_master_poll(at.byte_add(1).cast(), 0, &mut action));
+    gives!(
+        StorageTooSmall,
+        motorlink_rmd_host_init(at.cast(), size_of::<motorlink_rmd_host>() - 1)
+    );
+    gives!(Ok, motorlink_rmd_host_init(at.cast(), size));
+    gives!(
+        WrongKind,
+        motorlink_st_slave_deadline(at.cast(), &mut deadline),
+        motorlink_rmd_drive_deadline(at.cast(), &mut deadline),
+    );
+    gives!(NullPointer, motorlink_rmd_host_retry(at.cast(), null_mut()));
+    gives!(Ok, motorlink_rmd_host_retry(at.cast(), &mut deadline));
+}
+
+/// An adapter in between, so that a request is a frame, a line, a frame and back.
+#[test]
+fn a_host_commands_a_drive_through_an_adapter() {
+    extern "C" fn sense(_: *mut c_void, sense: *mut motorlink_rmd_sense) {
+        unsafe { (*sense).temperature_celsius = 25 };
+    }
+    let mut motor: motorlink_rmd_motor = zeroed();
+    motor.sense = Some(sense);
+    let config =
+        motorlink_rmd_drive_config { shutdown_us: 0, id: 3, encoder_bits: 0, clear_reply_0x9b: 0 };
+    let (mut host, mut drive): (motorlink_rmd_host, motorlink_rmd_drive) = (zeroed(), zeroed());
+    let (mut adapter, mut codec): (motorlink_slcan_device, motorlink_slcan_host) =
+        (zeroed(), zeroed());
+    gives!(
+        Ok,
+        motorlink_rmd_host_init(&mut host, size_of_val(&host)),
+        motorlink_rmd_drive_init(&mut drive, size_of_val(&drive), &config, null(), &motor),
+        motorlink_rmd_drive_power_on(&mut drive, 0),
+        motorlink_slcan_device_init(&mut adapter, size_of_val(&adapter)),
+        motorlink_slcan_host_init(&mut codec, size_of_val(&codec)),
+    );
+    let (mut line, mut answer): (motorlink_slcan_line, motorlink_slcan_line) = (zeroed(), zeroed());
+    let mut frame: motorlink_can_frame = zeroed();
+    let (mut action, mut said): (motorlink_rmd_action, _) =
+        (zeroed(), motorlink_slcan_answer::None);
+    gives!(Ok, motorlink_slcan_open(1_000_000, &mut line));
+    for byte in &line.bytes[..line.size.into()] {
+        gives!(Ok, motorlink_slcan_device_receive(&mut adapter, *byte, &mut answer, &mut frame));
+        assert_eq!(frame.id, MOTORLINK_NO_FRAME);
+    }
+    gives!(Ok, motorlink_rmd_host_request(&mut host, 0, 3, motorlink_rmd_torque(100)));
+    gives!(Ok, motorlink_rmd_host_poll(&mut host, 0, &mut action));
+    gives!(Ok, motorlink_slcan_encode(&action.frame, &mut line));
+    let mut reply: motorlink_can_frame = zeroed();
+    for byte in &line.bytes[..line.size.into()] {
+        gives!(Ok, motorlink_slcan_device_receive(&mut adapter, *byte, &mut answer, &mut frame));
+    }
+    gives!(Ok, motorlink_rmd_drive_receive(&mut drive, 0, &frame, &mut reply));
+    gives!(Ok, motorlink_slcan_device_deliver(&mut adapter, 0, &reply, &mut line));
+    for byte in &line.bytes[..line.size.into()] {
+        gives!(Ok, motorlink_slcan_host_receive(&mut codec, *byte, &mut said, &mut frame));
+    }
+    assert_eq!(said, motorlink_slcan_answer::Frame);
+    gives!(Ok, motorlink_rmd_host_receive(&mut host, 0, &frame));
+    gives!(Ok, motorlink_rmd_host_poll(&mut host, 0, &mut action));
+    assert_eq!((action.kind, action.motor, action.result), (motorlink_action::Done, 3, OK));
+    assert_eq!(motorlink_rmd_decode_motion_status(action.reply).temperature_celsius, 25);
+    let mut motion: motorlink_rmd_motion = zeroed();
+    gives!(Ok, motorlink_rmd_drive_motion(&mut drive, &mut motion));
+    assert_eq!((motion.kind, motion.torque_16ma), (2, 100));
+}
