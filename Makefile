@@ -87,7 +87,7 @@ determinism:
 	$(FINGERPRINT) --release | cmp - target/fingerprint
 	$(FINGERPRINT) $(PLAIN) | cmp - target/fingerprint
 
-# Both protocols link for a Cortex-M4 without a path that panics, within their RAM.
+# Both protocols, and their C face, link for a Cortex-M4 without a path that panics, within their RAM.
 probe:
 	rustup target list --installed | grep -qx $(TARGET) || rustup target add $(TARGET)
 	cd probe && $(CARGO) build --release --locked

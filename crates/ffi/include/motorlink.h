@@ -364,32 +364,32 @@ enum motorlink_rmd_can_id {
 #define MOTORLINK_NEVER UINT64_MAX
 
 /**
- * Words of 8 bytes in a [`motorlink_st_slave`].
+ * Words of 8 bytes in a `motorlink_st_slave`.
  */
 #define MOTORLINK_ST_SLAVE_WORDS 38
 
 /**
- * Words of 8 bytes in a [`motorlink_st_master`].
+ * Words of 8 bytes in a `motorlink_st_master`.
  */
 #define MOTORLINK_ST_MASTER_WORDS 29
 
 /**
- * Words of 8 bytes in a [`motorlink_rmd_host`].
+ * Words of 8 bytes in a `motorlink_rmd_host`.
  */
 #define MOTORLINK_RMD_HOST_WORDS 333
 
 /**
- * Words of 8 bytes in a [`motorlink_rmd_drive`].
+ * Words of 8 bytes in a `motorlink_rmd_drive`.
  */
 #define MOTORLINK_RMD_DRIVE_WORDS 13
 
 /**
- * Words of 8 bytes in a [`motorlink_slcan_host`].
+ * Words of 8 bytes in a `motorlink_slcan_host`.
  */
 #define MOTORLINK_SLCAN_HOST_WORDS 7
 
 /**
- * Words of 8 bytes in a [`motorlink_slcan_device`].
+ * Words of 8 bytes in a `motorlink_slcan_device`.
  */
 #define MOTORLINK_SLCAN_DEVICE_WORDS 7
 

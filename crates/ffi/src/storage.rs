@@ -5,18 +5,18 @@ use motorlink_slcan::{AnswerParser, Device};
 use crate::rmd::{drive, host};
 use crate::st::{master, slave};
 
-/// Words of 8 bytes in a [`motorlink_st_slave`].
+/// Words of 8 bytes in a `motorlink_st_slave`.
 pub const MOTORLINK_ST_SLAVE_WORDS: usize = 38;
-/// Words of 8 bytes in a [`motorlink_st_master`].
+/// Words of 8 bytes in a `motorlink_st_master`.
 pub const MOTORLINK_ST_MASTER_WORDS: usize = 29;
-/// Words of 8 bytes in a [`motorlink_rmd_host`].
+/// Words of 8 bytes in a `motorlink_rmd_host`.
 pub const MOTORLINK_RMD_HOST_WORDS: usize = 333;
-/// Words of 8 bytes in a [`motorlink_rmd_drive`].
+/// Words of 8 bytes in a `motorlink_rmd_drive`.
 pub const MOTORLINK_RMD_DRIVE_WORDS: usize = 13;
 
-/// Words of 8 bytes in a [`motorlink_slcan_host`].
+/// Words of 8 bytes in a `motorlink_slcan_host`.
 pub const MOTORLINK_SLCAN_HOST_WORDS: usize = 7;
-/// Words of 8 bytes in a [`motorlink_slcan_device`].
+/// Words of 8 bytes in a `motorlink_slcan_device`.
 pub const MOTORLINK_SLCAN_DEVICE_WORDS: usize = 7;
 
 /// A slave of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.

@@ -200,10 +200,9 @@ fn a_drive_without_callbacks_answers() {
 
 #[test]
 fn a_slave_that_is_called_from_its_callback_is_in_use() {
-    let mut fan = Fan { rpm: 42, ..Fan::default() };
-    let drive = drive(&mut fan);
     let slave: *mut motorlink_st_slave = Box::into_raw(Box::new(zeroed()));
-    fan.slave = Some(slave);
+    let mut fan = Fan { rpm: 42, slave: Some(slave), ..Fan::default() };
+    let drive = drive(&mut fan);
     let mut reply: motorlink_bytes = zeroed();
     gives!(Ok, motorlink_st_slave_init(slave, size_of::<motorlink_st_slave>(), 0, 1, &drive));
     for byte in [0x22, 0x01, 0x02, 0x25] {

@@ -49,3 +49,22 @@ fn the_header_is_what_the_sources_say() {
     let committed = fs::read_to_string(&path).unwrap_or_default();
     assert!(committed == generated, "include/motorlink.h is old: `make header` writes it anew");
 }
+
+/// The names behind which there is a bracket.
+fn functions(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter(|line| !line.trim_start().starts_with('*')).filter_map(|line| {
+        let (before, _) = line.split_once('(')?;
+        before.rsplit([' ', '*']).next().filter(|name| name.starts_with("motorlink_"))
+    })
+}
+
+#[test]
+fn the_probe_for_panics_links_every_function() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |path: &str| fs::read_to_string(root.join(path)).expect(path);
+    let (header, probe) = (read("include/motorlink.h"), read("../../probe/src/bin/ffi.rs"));
+    let linked: Vec<&str> = probe.split_whitespace().collect();
+    let missing: Vec<&str> = functions(&header).filter(|name| !linked.contains(name)).collect();
+    assert!(functions(&header).count() > 80, "the header has functions");
+    assert!(missing.is_empty(), "probe/src/bin/ffi.rs leaves out {missing:?}");
+}
