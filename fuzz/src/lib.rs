@@ -1,8 +1,9 @@
 //! What every parser and state machine of Motorlink has to stand: functions that take any bytes and
 //! panic when something is not as it should be. The fuzzers in `fuzz_targets` feed them for hours
 //! (`make fuzz`), `tests/replay.rs` feeds them seeds and regressions in `make test`.
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
+mod ffi;
 mod host;
 mod input;
 #[path = "../../crates/proto/tests/model/mod.rs"]
@@ -23,6 +24,7 @@ pub const TARGETS: &[Target] = &[
     ("rmd_frame", rmd::frame),
     ("rmd_host", rmd::host),
     ("rmd_drive", rmd::drive),
+    ("ffi", ffi::ffi),
     ("slcan", host::slcan),
     ("port_name", host::port_name),
     ("st_value", host::st_value),

@@ -49,6 +49,10 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "rmd_frame" => rmd().map(|(id, data)| any_frame(id, data)).collect(),
         "rmd_host" => rmd().map(|(id, data)| host(id, data)).collect(),
         "rmd_drive" => rmd().map(|(id, data)| drive(id, data)).collect(),
+        "ffi" => st()
+            .map(|(profile, request, _)| st_through_c(profile, &request))
+            .chain(rmd().map(|(id, data)| rmd_through_c(id, data)))
+            .collect(),
         "slcan" => rmd().map(|(id, data)| adapter(id, data)).collect(),
         "port_name" => PORTS.iter().map(|name| name.as_bytes().to_vec()).collect(),
         "st_value" => values(),
@@ -140,6 +144,34 @@ fn drive(id: u16, data: [u8; 8]) -> Vec<u8> {
     seed.extend(data);
     seed.extend([5, 0, 0xFF, 0x3F]);
     seed
+}
+
+/// Calls for the storages 0 to 3 as the target `ffi` reads them.
+const INIT: u8 = 0;
+const CALL: u8 = 5 * 4;
+
+/// A request from a master to a slave, and its reply.
+fn st_through_c(profile: u8, request: &[u8]) -> Vec<u8> {
+    let payload = &request[2..request.len() - 1];
+    let mut seed = vec![INIT, 0, 1, profile, 0, INIT + 1, 1, 1, profile, 7];
+    seed.extend([CALL, 0, 14, 0, request[0], payload.len() as u8]);
+    seed.extend(payload);
+    let poll = [CALL, 0, 21, 0, 0, 0];
+    let carry = [CALL + 1, 1, 5, CALL, 0, 19, 0, 0, 0];
+    [&seed[..], &poll, &carry, &poll].concat()
+}
+
+/// A request from a host to a drive, and its reply.
+fn rmd_through_c(id: u16, data: [u8; 8]) -> Vec<u8> {
+    let motor = index(id) + 1;
+    let mut seed = vec![INIT + 2, 2, 1, 0, 0, INIT + 3, 3, 1, motor, 0];
+    seed.extend([CALL + 2, 2, 2, motor]);
+    seed.extend(data);
+    let poll = [CALL + 2, 2, 9, 0];
+    let heard = [0; 12];
+    let receive = [CALL + 3, 3, 6];
+    let reply = [CALL + 2, 2, 8, 0];
+    [&seed[..], &poll, &receive, &heard, &reply, &heard, &poll].concat()
 }
 
 /// An adapter is opened and sends a frame.
