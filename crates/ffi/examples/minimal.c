@@ -6,20 +6,22 @@
 #include <motorlink.h>
 
 int main(int argc, char **argv) {
-  int fd = argc == 2 ? open_line(argv[1]) : (fprintf(stderr, "usage: %s PORT\n", argv[0]), exit(2), -1);
   motorlink_st_master master;
   motorlink_st_action todo;
   uint8_t bytes[256];
+  int fd = open_line(argc > 1 ? argv[1] : "/dev/ttyACM0");
+
   motorlink_st_master_init(&master, sizeof master, NULL);
   motorlink_st_master_get_register(&master, 1, MOTORLINK_ST_REG_SPEED_MEAS);
-  for (;;) {
+  do {
     motorlink_st_master_poll(&master, now_us(), &todo);
-    if (todo.kind == MOTORLINK_ACTION_DONE) break;
-    if (todo.kind == MOTORLINK_ACTION_TRANSMIT) send_all(fd, todo.bytes.data, todo.bytes.size);
-    else motorlink_st_master_receive(&master, now_us(), bytes,
-                                     receive_until(fd, todo.until_us, bytes, sizeof bytes));
-  }
-  if (todo.result == MOTORLINK_OK) printf("%d rpm\n", (int)todo.value);
-  else fprintf(stderr, "%s\n", motorlink_error_text(todo.result));
+    if (todo.kind == MOTORLINK_ACTION_TRANSMIT) {
+      send_all(fd, todo.bytes.data, todo.bytes.size);
+    } else if (todo.kind == MOTORLINK_ACTION_WAIT) {
+      size_t size = receive_until(fd, todo.until_us, bytes, sizeof bytes);
+      motorlink_st_master_receive(&master, now_us(), bytes, size);
+    }
+  } while (todo.kind != MOTORLINK_ACTION_DONE);
+  printf("%s: %d rpm\n", motorlink_error_text(todo.result), (int)todo.value);
   return todo.result == MOTORLINK_OK ? 0 : 3;
 }

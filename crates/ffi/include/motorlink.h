@@ -33,6 +33,11 @@
  * There is nothing to release. A pointer is used during the call only, where its function does not
  * say that it is kept; pointers in one call do not overlap one another or an object's storage.
  *
+ * Requests. A `motorlink_st_master_` function that takes a motor begins an exchange, which
+ * `_poll` conducts: send what it says, hand in what comes, until it says done. `motor` is 1 to 7, or
+ * 0 for the drive's current motor (3.2). BAD_ARGUMENT: `motor` is over 7. BUSY: an exchange is under
+ * way. The host of RMD motors has an exchange with each motor, all at once.
+ *
  * Time is in microseconds since any moment, as long as it is the same one for an object and time
  * does not run backwards.
  *
@@ -46,8 +51,8 @@
  * called then.
  *
  * Cost. Every call ends after a number of steps that depends on the bytes that were handed in and
- * on the callbacks, and needs less than 1 KiB of stack beside them on a Cortex-M4. What is not
- * called is not linked.
+ * on the callbacks. On a Cortex-M4 it needs less than 1 KiB of stack beside them; only
+ * motorlink_rmd_host_init needs 6 KiB. What is not called is not linked.
  */
 
 
@@ -57,145 +62,145 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** Registers (table 3): `reg` in calls. A comment has type, access and unit. */
+/** Registers (table 3): `reg` in calls. A comment has access (D: for the DAC only), type and unit. */
 enum motorlink_st_register {
-  MOTORLINK_ST_REG_TARGET_MOTOR          = 0x00, /**< u8 RW: Motor that motor number 0 addresses, counted from 0 */
-  MOTORLINK_ST_REG_FLAGS                 = 0x01, /**< u32 R : Faults: low half occurred, high half present */
-  MOTORLINK_ST_REG_STATUS                = 0x02, /**< u8 R : State of the state machine */
-  MOTORLINK_ST_REG_CONTROL_MODE          = 0x03, /**< u8 RW: Torque (0) or speed (1) control */
-  MOTORLINK_ST_REG_SPEED_REF             = 0x04, /**< i32 R  rpm: Speed reference */
-  MOTORLINK_ST_REG_SPEED_KP              = 0x05, /**< i16 RW s16A/unit: Speed regulator Kp, numerator */
-  MOTORLINK_ST_REG_SPEED_KI              = 0x06, /**< i16 RW s16A/unit: Speed regulator Ki, numerator */
-  MOTORLINK_ST_REG_SPEED_KD              = 0x07, /**< i16 RW s16A/unit: Speed regulator Kd, numerator */
-  MOTORLINK_ST_REG_TORQUE_REF            = 0x08, /**< i16 RW s16A: Iq reference */
-  MOTORLINK_ST_REG_TORQUE_KP             = 0x09, /**< i16 RW s16V/s16A: Iq regulator Kp, numerator */
-  MOTORLINK_ST_REG_TORQUE_KI             = 0x0A, /**< i16 RW s16V/s16A: Iq regulator Ki, numerator */
-  MOTORLINK_ST_REG_TORQUE_KD             = 0x0B, /**< i16 RW s16V/s16A: Iq regulator Kd, numerator */
-  MOTORLINK_ST_REG_FLUX_REF              = 0x0C, /**< i16 RW s16A: Id reference */
-  MOTORLINK_ST_REG_FLUX_KP               = 0x0D, /**< i16 RW s16V/s16A: Id regulator Kp, numerator */
-  MOTORLINK_ST_REG_FLUX_KI               = 0x0E, /**< i16 RW s16V/s16A: Id regulator Ki, numerator */
-  MOTORLINK_ST_REG_FLUX_KD               = 0x0F, /**< i16 RW s16V/s16A: Id regulator Kd, numerator */
-  MOTORLINK_ST_REG_OBSERVER_C1           = 0x10, /**< i16 RW: Observer gain C1 (PLL) */
-  MOTORLINK_ST_REG_OBSERVER_C2           = 0x11, /**< i16 RW: Observer gain C2 (PLL) */
-  MOTORLINK_ST_REG_OBSERVER_CR_C1        = 0x12, /**< i16 RW: Observer gain C1 (CORDIC) */
-  MOTORLINK_ST_REG_OBSERVER_CR_C2        = 0x13, /**< i16 RW: Observer gain C2 (CORDIC) */
-  MOTORLINK_ST_REG_PLL_KI                = 0x14, /**< i16 RW dpp/s16V: PLL regulator Ki, numerator */
-  MOTORLINK_ST_REG_PLL_KP                = 0x15, /**< i16 RW dpp/s16V: PLL regulator Kp, numerator */
-  MOTORLINK_ST_REG_FLUXWK_KP             = 0x16, /**< i16 RW s16A/s16V²: Flux weakening regulator Kp */
-  MOTORLINK_ST_REG_FLUXWK_KI             = 0x17, /**< i16 RW s16A/s16V²: Flux weakening regulator Ki */
-  MOTORLINK_ST_REG_FLUXWK_BUS            = 0x18, /**< u16 RW %: Share of the bus voltage that flux weakening may use */
-  MOTORLINK_ST_REG_BUS_VOLTAGE           = 0x19, /**< u16 R  V: Bus voltage */
-  MOTORLINK_ST_REG_HEATS_TEMP            = 0x1A, /**< i16 R  °C: Heatsink temperature */
-  MOTORLINK_ST_REG_MOTOR_POWER           = 0x1B, /**< i16 R  W: Electrical power into the motor */
-  MOTORLINK_ST_REG_DAC_OUT1              = 0x1C, /**< u8 RW: Register shown on DAC channel 1 */
-  MOTORLINK_ST_REG_DAC_OUT2              = 0x1D, /**< u8 RW: Register shown on DAC channel 2 */
-  MOTORLINK_ST_REG_SPEED_MEAS            = 0x1E, /**< i32 R  rpm: Mechanical speed, averaged */
-  MOTORLINK_ST_REG_TORQUE_MEAS           = 0x1F, /**< i16 R  s16A: Iq, measured */
-  MOTORLINK_ST_REG_FLUX_MEAS             = 0x20, /**< i16 R  s16A: Id, measured */
-  MOTORLINK_ST_REG_FLUXWK_BUS_MEAS       = 0x21, /**< u16 R  %: Share of the bus voltage in use */
-  MOTORLINK_ST_REG_RUC_STAGE_NBR         = 0x22, /**< u8 R : Number of rev-up phases */
-  MOTORLINK_ST_REG_I_A                   = 0x23, /**< i16 D  s16A: Phase A current */
-  MOTORLINK_ST_REG_I_B                   = 0x24, /**< i16 D  s16A: Phase B current */
-  MOTORLINK_ST_REG_I_ALPHA               = 0x25, /**< i16 D  s16A: Alpha current */
-  MOTORLINK_ST_REG_I_BETA                = 0x26, /**< i16 D  s16A: Beta current */
-  MOTORLINK_ST_REG_I_Q                   = 0x27, /**< i16 D  s16A: Iq, measured */
-  MOTORLINK_ST_REG_I_D                   = 0x28, /**< i16 D  s16A: Id, measured */
-  MOTORLINK_ST_REG_I_Q_REF               = 0x29, /**< i16 D  s16A: Iq reference */
-  MOTORLINK_ST_REG_I_D_REF               = 0x2A, /**< i16 D  s16A: Id reference */
-  MOTORLINK_ST_REG_V_Q                   = 0x2B, /**< i16 D  s16V: Vq */
-  MOTORLINK_ST_REG_V_D                   = 0x2C, /**< i16 D  s16V: Vd */
-  MOTORLINK_ST_REG_V_ALPHA               = 0x2D, /**< i16 D  s16V: Alpha voltage */
-  MOTORLINK_ST_REG_V_BETA                = 0x2E, /**< i16 D  s16V: Beta voltage */
-  MOTORLINK_ST_REG_MEAS_EL_ANGLE         = 0x2F, /**< i16 D  s16degree: Electrical angle from the sensor */
-  MOTORLINK_ST_REG_MEAS_ROT_SPEED        = 0x30, /**< i16 D  s16speed: Mechanical speed from the sensor */
-  MOTORLINK_ST_REG_OBS_EL_ANGLE          = 0x31, /**< i16 D  s16degree: Observed electrical angle (PLL) */
-  MOTORLINK_ST_REG_OBS_ROT_SPEED         = 0x32, /**< i16 D  s16speed: Observed mechanical speed (PLL) */
-  MOTORLINK_ST_REG_OBS_I_ALPHA           = 0x33, /**< i16 D  s16A: Estimated alpha current (PLL) */
-  MOTORLINK_ST_REG_OBS_I_BETA            = 0x34, /**< i16 D  s16A: Estimated beta current (PLL) */
-  MOTORLINK_ST_REG_OBS_BEMF_ALPHA        = 0x35, /**< i16 D  s16V: Observed back-EMF, alpha (PLL) */
-  MOTORLINK_ST_REG_OBS_BEMF_BETA         = 0x36, /**< i16 D  s16V: Observed back-EMF, beta (PLL) */
-  MOTORLINK_ST_REG_OBS_CR_EL_ANGLE       = 0x37, /**< i16 D  s16degree: Observed electrical angle (CORDIC) */
-  MOTORLINK_ST_REG_OBS_CR_ROT_SPEED      = 0x38, /**< i16 D  s16speed: Observed mechanical speed (CORDIC) */
-  MOTORLINK_ST_REG_OBS_CR_I_ALPHA        = 0x39, /**< i16 D  s16A: Estimated alpha current (CORDIC) */
-  MOTORLINK_ST_REG_OBS_CR_I_BETA         = 0x3A, /**< i16 D  s16A: Estimated beta current (CORDIC) */
-  MOTORLINK_ST_REG_OBS_CR_BEMF_ALPHA     = 0x3B, /**< i16 D  s16V: Observed back-EMF, alpha (CORDIC) */
-  MOTORLINK_ST_REG_OBS_CR_BEMF_BETA      = 0x3C, /**< i16 D  s16V: Observed back-EMF, beta (CORDIC) */
-  MOTORLINK_ST_REG_DAC_USER1             = 0x3D, /**< i16 D : User value of DAC channel 1 */
-  MOTORLINK_ST_REG_DAC_USER2             = 0x3E, /**< i16 D : User value of DAC channel 2 */
-  MOTORLINK_ST_REG_MAX_APP_SPEED         = 0x3F, /**< u32 R  rpm: Highest speed of the application */
-  MOTORLINK_ST_REG_MIN_APP_SPEED         = 0x40, /**< u32 R  rpm: Lowest speed of the application */
-  MOTORLINK_ST_REG_IQ_SPEEDMODE          = 0x41, /**< i16 W  s16A: Id reference in speed mode */
-  MOTORLINK_ST_REG_EST_BEMF_LEVEL        = 0x42, /**< i16 R  s16V²: Expected back-EMF level (PLL) */
-  MOTORLINK_ST_REG_OBS_BEMF_LEVEL        = 0x43, /**< i16 R  s16V²: Observed back-EMF level (PLL) */
-  MOTORLINK_ST_REG_EST_CR_BEMF_LEVEL     = 0x44, /**< i16 R  s16V²: Expected back-EMF level (CORDIC) */
-  MOTORLINK_ST_REG_OBS_CR_BEMF_LEVEL     = 0x45, /**< i16 R  s16V²: Observed back-EMF level (CORDIC) */
-  MOTORLINK_ST_REG_FF_1Q                 = 0x46, /**< i32 RW: Feed-forward constant C1q */
-  MOTORLINK_ST_REG_FF_1D                 = 0x47, /**< i32 RW: Feed-forward constant C1d */
-  MOTORLINK_ST_REG_FF_2                  = 0x48, /**< i32 RW: Feed-forward constant C2 */
-  MOTORLINK_ST_REG_FF_VQ                 = 0x49, /**< i16 R  s16V: Feed-forward part of Vq */
-  MOTORLINK_ST_REG_FF_VD                 = 0x4A, /**< i16 R  s16V: Feed-forward part of Vd */
-  MOTORLINK_ST_REG_FF_VQ_PIOUT           = 0x4B, /**< i16 R  s16V/s16A: Regulator part of Vq */
-  MOTORLINK_ST_REG_FF_VD_PIOUT           = 0x4C, /**< i16 R  s16V/s16A: Regulator part of Vd */
-  MOTORLINK_ST_REG_PFC_STATUS            = 0x4D, /**< i8 R : PFC state */
-  MOTORLINK_ST_REG_PFC_FAULTS            = 0x4E, /**< u32 R : PFC faults */
-  MOTORLINK_ST_REG_PFC_DCBUS_REF         = 0x4F, /**< i16 RW V: PFC bus voltage reference */
-  MOTORLINK_ST_REG_PFC_DCBUS_MEAS        = 0x50, /**< i16 R  V: PFC bus voltage */
-  MOTORLINK_ST_REG_PFC_ACBUS_FREQ        = 0x51, /**< i16 R  0.1 Hz: Mains frequency */
-  MOTORLINK_ST_REG_PFC_ACBUS_RMS         = 0x52, /**< i16 R  V: Mains voltage, zero to peak */
-  MOTORLINK_ST_REG_PFC_I_KP              = 0x53, /**< i16 RW s16V/s16A: PFC current regulator Kp */
-  MOTORLINK_ST_REG_PFC_I_KI              = 0x54, /**< i16 RW s16V/s16A: PFC current regulator Ki */
-  MOTORLINK_ST_REG_PFC_I_KD              = 0x55, /**< i16 RW s16V/s16A: PFC current regulator Kd */
-  MOTORLINK_ST_REG_PFC_V_KP              = 0x56, /**< i16 RW s16A/V: PFC voltage regulator Kp */
-  MOTORLINK_ST_REG_PFC_V_KI              = 0x57, /**< i16 RW s16A/V: PFC voltage regulator Ki */
-  MOTORLINK_ST_REG_PFC_V_KD              = 0x58, /**< i16 RW s16A/V: PFC voltage regulator Kd */
-  MOTORLINK_ST_REG_PFC_STARTUP_DURATION  = 0x59, /**< i16 RW ms: Length of the PFC start-up */
-  MOTORLINK_ST_REG_PFC_ENABLED           = 0x5A, /**< i8 R : Whether the PFC is enabled */
-  MOTORLINK_ST_REG_RAMP_FINAL_SPEED      = 0x5B, /**< i32 RW rpm: Final speed of the ramp */
-  MOTORLINK_ST_REG_RAMP_DURATION         = 0x5C, /**< u16 -  ms: Length of the ramp (firmware only) */
-  MOTORLINK_ST_REG_HFI_EL_ANGLE          = 0x5D, /**< i16 R  s16degree: Electrical angle from HFI (firmware only) */
-  MOTORLINK_ST_REG_HFI_ROT_SPEED         = 0x5E, /**< i16 R  s16speed: Mechanical speed from HFI (firmware only) */
-  MOTORLINK_ST_REG_HFI_CURRENT           = 0x5F, /**< i16 R  s16A: HFI current (firmware only) */
-  MOTORLINK_ST_REG_HFI_INIT_ANG_PLL      = 0x60, /**< i16 R  s16degree: Initial angle from the HFI PLL (firmware only) */
-  MOTORLINK_ST_REG_HFI_INIT_ANG_SAT_DIFF = 0x61, /**< i16 RW: Initial angle saturation difference (firmware only) */
-  MOTORLINK_ST_REG_HFI_PI_PLL_KP         = 0x62, /**< i16 - : HFI PLL Kp (firmware only) */
-  MOTORLINK_ST_REG_HFI_PI_PLL_KI         = 0x63, /**< i16 - : HFI PLL Ki (firmware only) */
-  MOTORLINK_ST_REG_HFI_PI_TRACK_KP       = 0x64, /**< i16 RW: HFI tracking Kp (firmware only) */
-  MOTORLINK_ST_REG_HFI_PI_TRACK_KI       = 0x65, /**< i16 RW: HFI tracking Ki (firmware only) */
-  MOTORLINK_ST_REG_SC_CHECK              = 0x66, /**< u8 R : Profiler is built in (firmware only) */
-  MOTORLINK_ST_REG_SC_STATE              = 0x67, /**< u8 R : Profiler state (firmware only) */
-  MOTORLINK_ST_REG_SC_RS                 = 0x68, /**< f32 R  Ω: Profiler: stator resistance (firmware only) */
-  MOTORLINK_ST_REG_SC_LS                 = 0x69, /**< f32 R  H: Profiler: stator inductance (firmware only) */
-  MOTORLINK_ST_REG_SC_KE                 = 0x6A, /**< f32 R : Profiler: back-EMF constant (firmware only) */
-  MOTORLINK_ST_REG_SC_VBUS               = 0x6B, /**< f32 R  V: Profiler: bus voltage (firmware only) */
-  MOTORLINK_ST_REG_SC_MEAS_NOMINALSPEED  = 0x6C, /**< f32 R  rpm: Profiler: measured nominal speed (firmware only) */
-  MOTORLINK_ST_REG_SC_STEPS              = 0x6D, /**< u8 R : Profiler: number of steps (firmware only) */
-  MOTORLINK_ST_REG_SPEED_KP_DIV          = 0x6E, /**< i16 R : Speed regulator Kp, divisor */
-  MOTORLINK_ST_REG_SPEED_KI_DIV          = 0x6F, /**< i16 R : Speed regulator Ki, divisor */
-  MOTORLINK_ST_REG_UID                   = 0x70, /**< u32 R : Unique identification (firmware only) */
-  MOTORLINK_ST_REG_HWTYPE                = 0x71, /**< i16 - : Hardware type (firmware only) */
-  MOTORLINK_ST_REG_CTRBID                = 0x72, /**< u32 R : Control board identification */
-  MOTORLINK_ST_REG_PWBDID                = 0x73, /**< u32 R : Power board identification */
-  MOTORLINK_ST_REG_SC_PP                 = 0x74, /**< u8 RW: Profiler: pole pairs (firmware only) */
-  MOTORLINK_ST_REG_SC_CURRENT            = 0x75, /**< f32 RW A: Profiler: current (firmware only) */
-  MOTORLINK_ST_REG_SC_SPDBANDWIDTH       = 0x76, /**< f32 RW: Profiler: speed bandwidth (firmware only) */
-  MOTORLINK_ST_REG_SC_LDLQRATIO          = 0x77, /**< f32 RW: Profiler: Ld/Lq ratio (firmware only) */
-  MOTORLINK_ST_REG_SC_NOMINAL_SPEED      = 0x78, /**< u32 RW rpm: Profiler: nominal speed (firmware only) */
-  MOTORLINK_ST_REG_SC_CURRBANDWIDTH      = 0x79, /**< f32 RW: Profiler: current bandwidth (firmware only) */
-  MOTORLINK_ST_REG_SC_J                  = 0x7A, /**< f32 R : Profiler: inertia (firmware only) */
-  MOTORLINK_ST_REG_SC_F                  = 0x7B, /**< f32 R : Profiler: friction (firmware only) */
-  MOTORLINK_ST_REG_SC_MAX_CURRENT        = 0x7C, /**< f32 R  A: Profiler: highest current (firmware only) */
-  MOTORLINK_ST_REG_SC_STARTUP_SPEED      = 0x7D, /**< u32 R  rpm: Profiler: start-up speed (firmware only) */
-  MOTORLINK_ST_REG_SC_STARTUP_ACC        = 0x7E, /**< u32 R : Profiler: start-up acceleration (firmware only) */
-  MOTORLINK_ST_REG_SC_PWM_FREQUENCY      = 0x7F, /**< u32 R  Hz: Profiler: PWM frequency (firmware only) */
-  MOTORLINK_ST_REG_SC_FOC_REP_RATE       = 0x80, /**< u8 R : Profiler: FOC repetition rate (firmware only) */
-  MOTORLINK_ST_REG_PWBDID2               = 0x81, /**< u32 R : Power board identification, motor 2 */
-  MOTORLINK_ST_REG_SC_COMPLETED          = 0x82, /**< u8 R : Profiler has completed (firmware only) */
-  MOTORLINK_ST_REG_CURRENT_POSITION      = 0x83, /**< f32 R  rad: Position (firmware only) */
-  MOTORLINK_ST_REG_TARGET_POSITION       = 0x84, /**< f32 R  rad: Target position (firmware only) */
-  MOTORLINK_ST_REG_MOVE_DURATION         = 0x85, /**< f32 R  s: Duration of the move (firmware only) */
-  MOTORLINK_ST_REG_POSITION_KP           = 0x86, /**< i16 RW: Position regulator Kp (firmware only) */
-  MOTORLINK_ST_REG_POSITION_KI           = 0x87, /**< i16 RW: Position regulator Ki (firmware only) */
-  MOTORLINK_ST_REG_POSITION_KD           = 0x88  /**< i16 RW: Position regulator Kd (firmware only) */
+  MOTORLINK_ST_REG_TARGET_MOTOR          = 0x00, /**< RW u8: Motor that motor number 0 addresses, counted from 0 */
+  MOTORLINK_ST_REG_FLAGS                 = 0x01, /**< R  u32: Faults: low half occurred, high half present */
+  MOTORLINK_ST_REG_STATUS                = 0x02, /**< R  u8: State of the state machine */
+  MOTORLINK_ST_REG_CONTROL_MODE          = 0x03, /**< RW u8: Torque (0) or speed (1) control */
+  MOTORLINK_ST_REG_SPEED_REF             = 0x04, /**< R  i32 rpm: Speed reference */
+  MOTORLINK_ST_REG_SPEED_KP              = 0x05, /**< RW i16 s16A/unit: Speed regulator Kp, numerator */
+  MOTORLINK_ST_REG_SPEED_KI              = 0x06, /**< RW i16 s16A/unit: Speed regulator Ki, numerator */
+  MOTORLINK_ST_REG_SPEED_KD              = 0x07, /**< RW i16 s16A/unit: Speed regulator Kd, numerator */
+  MOTORLINK_ST_REG_TORQUE_REF            = 0x08, /**< RW i16 s16A: Iq reference */
+  MOTORLINK_ST_REG_TORQUE_KP             = 0x09, /**< RW i16 s16V/s16A: Iq regulator Kp, numerator */
+  MOTORLINK_ST_REG_TORQUE_KI             = 0x0A, /**< RW i16 s16V/s16A: Iq regulator Ki, numerator */
+  MOTORLINK_ST_REG_TORQUE_KD             = 0x0B, /**< RW i16 s16V/s16A: Iq regulator Kd, numerator */
+  MOTORLINK_ST_REG_FLUX_REF              = 0x0C, /**< RW i16 s16A: Id reference */
+  MOTORLINK_ST_REG_FLUX_KP               = 0x0D, /**< RW i16 s16V/s16A: Id regulator Kp, numerator */
+  MOTORLINK_ST_REG_FLUX_KI               = 0x0E, /**< RW i16 s16V/s16A: Id regulator Ki, numerator */
+  MOTORLINK_ST_REG_FLUX_KD               = 0x0F, /**< RW i16 s16V/s16A: Id regulator Kd, numerator */
+  MOTORLINK_ST_REG_OBSERVER_C1           = 0x10, /**< RW i16: Observer gain C1 (PLL) */
+  MOTORLINK_ST_REG_OBSERVER_C2           = 0x11, /**< RW i16: Observer gain C2 (PLL) */
+  MOTORLINK_ST_REG_OBSERVER_CR_C1        = 0x12, /**< RW i16: Observer gain C1 (CORDIC) */
+  MOTORLINK_ST_REG_OBSERVER_CR_C2        = 0x13, /**< RW i16: Observer gain C2 (CORDIC) */
+  MOTORLINK_ST_REG_PLL_KI                = 0x14, /**< RW i16 dpp/s16V: PLL regulator Ki, numerator */
+  MOTORLINK_ST_REG_PLL_KP                = 0x15, /**< RW i16 dpp/s16V: PLL regulator Kp, numerator */
+  MOTORLINK_ST_REG_FLUXWK_KP             = 0x16, /**< RW i16 s16A/s16V²: Flux weakening regulator Kp */
+  MOTORLINK_ST_REG_FLUXWK_KI             = 0x17, /**< RW i16 s16A/s16V²: Flux weakening regulator Ki */
+  MOTORLINK_ST_REG_FLUXWK_BUS            = 0x18, /**< RW u16 %: Share of the bus voltage that flux weakening may use */
+  MOTORLINK_ST_REG_BUS_VOLTAGE           = 0x19, /**< R  u16 V: Bus voltage */
+  MOTORLINK_ST_REG_HEATS_TEMP            = 0x1A, /**< R  i16 °C: Heatsink temperature */
+  MOTORLINK_ST_REG_MOTOR_POWER           = 0x1B, /**< R  i16 W: Electrical power into the motor */
+  MOTORLINK_ST_REG_DAC_OUT1              = 0x1C, /**< RW u8: Register shown on DAC channel 1 */
+  MOTORLINK_ST_REG_DAC_OUT2              = 0x1D, /**< RW u8: Register shown on DAC channel 2 */
+  MOTORLINK_ST_REG_SPEED_MEAS            = 0x1E, /**< R  i32 rpm: Mechanical speed, averaged */
+  MOTORLINK_ST_REG_TORQUE_MEAS           = 0x1F, /**< R  i16 s16A: Iq, measured */
+  MOTORLINK_ST_REG_FLUX_MEAS             = 0x20, /**< R  i16 s16A: Id, measured */
+  MOTORLINK_ST_REG_FLUXWK_BUS_MEAS       = 0x21, /**< R  u16 %: Share of the bus voltage in use */
+  MOTORLINK_ST_REG_RUC_STAGE_NBR         = 0x22, /**< R  u8: Number of rev-up phases */
+  MOTORLINK_ST_REG_I_A                   = 0x23, /**< D  i16 s16A: Phase A current */
+  MOTORLINK_ST_REG_I_B                   = 0x24, /**< D  i16 s16A: Phase B current */
+  MOTORLINK_ST_REG_I_ALPHA               = 0x25, /**< D  i16 s16A: Alpha current */
+  MOTORLINK_ST_REG_I_BETA                = 0x26, /**< D  i16 s16A: Beta current */
+  MOTORLINK_ST_REG_I_Q                   = 0x27, /**< D  i16 s16A: Iq, measured */
+  MOTORLINK_ST_REG_I_D                   = 0x28, /**< D  i16 s16A: Id, measured */
+  MOTORLINK_ST_REG_I_Q_REF               = 0x29, /**< D  i16 s16A: Iq reference */
+  MOTORLINK_ST_REG_I_D_REF               = 0x2A, /**< D  i16 s16A: Id reference */
+  MOTORLINK_ST_REG_V_Q                   = 0x2B, /**< D  i16 s16V: Vq */
+  MOTORLINK_ST_REG_V_D                   = 0x2C, /**< D  i16 s16V: Vd */
+  MOTORLINK_ST_REG_V_ALPHA               = 0x2D, /**< D  i16 s16V: Alpha voltage */
+  MOTORLINK_ST_REG_V_BETA                = 0x2E, /**< D  i16 s16V: Beta voltage */
+  MOTORLINK_ST_REG_MEAS_EL_ANGLE         = 0x2F, /**< D  i16 s16degree: Electrical angle from the sensor */
+  MOTORLINK_ST_REG_MEAS_ROT_SPEED        = 0x30, /**< D  i16 s16speed: Mechanical speed from the sensor */
+  MOTORLINK_ST_REG_OBS_EL_ANGLE          = 0x31, /**< D  i16 s16degree: Observed electrical angle (PLL) */
+  MOTORLINK_ST_REG_OBS_ROT_SPEED         = 0x32, /**< D  i16 s16speed: Observed mechanical speed (PLL) */
+  MOTORLINK_ST_REG_OBS_I_ALPHA           = 0x33, /**< D  i16 s16A: Estimated alpha current (PLL) */
+  MOTORLINK_ST_REG_OBS_I_BETA            = 0x34, /**< D  i16 s16A: Estimated beta current (PLL) */
+  MOTORLINK_ST_REG_OBS_BEMF_ALPHA        = 0x35, /**< D  i16 s16V: Observed back-EMF, alpha (PLL) */
+  MOTORLINK_ST_REG_OBS_BEMF_BETA         = 0x36, /**< D  i16 s16V: Observed back-EMF, beta (PLL) */
+  MOTORLINK_ST_REG_OBS_CR_EL_ANGLE       = 0x37, /**< D  i16 s16degree: Observed electrical angle (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_ROT_SPEED      = 0x38, /**< D  i16 s16speed: Observed mechanical speed (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_I_ALPHA        = 0x39, /**< D  i16 s16A: Estimated alpha current (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_I_BETA         = 0x3A, /**< D  i16 s16A: Estimated beta current (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_BEMF_ALPHA     = 0x3B, /**< D  i16 s16V: Observed back-EMF, alpha (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_BEMF_BETA      = 0x3C, /**< D  i16 s16V: Observed back-EMF, beta (CORDIC) */
+  MOTORLINK_ST_REG_DAC_USER1             = 0x3D, /**< D  i16: User value of DAC channel 1 */
+  MOTORLINK_ST_REG_DAC_USER2             = 0x3E, /**< D  i16: User value of DAC channel 2 */
+  MOTORLINK_ST_REG_MAX_APP_SPEED         = 0x3F, /**< R  u32 rpm: Highest speed of the application */
+  MOTORLINK_ST_REG_MIN_APP_SPEED         = 0x40, /**< R  u32 rpm: Lowest speed of the application */
+  MOTORLINK_ST_REG_IQ_SPEEDMODE          = 0x41, /**< W  i16 s16A: Id reference in speed mode */
+  MOTORLINK_ST_REG_EST_BEMF_LEVEL        = 0x42, /**< R  i16 s16V²: Expected back-EMF level (PLL) */
+  MOTORLINK_ST_REG_OBS_BEMF_LEVEL        = 0x43, /**< R  i16 s16V²: Observed back-EMF level (PLL) */
+  MOTORLINK_ST_REG_EST_CR_BEMF_LEVEL     = 0x44, /**< R  i16 s16V²: Expected back-EMF level (CORDIC) */
+  MOTORLINK_ST_REG_OBS_CR_BEMF_LEVEL     = 0x45, /**< R  i16 s16V²: Observed back-EMF level (CORDIC) */
+  MOTORLINK_ST_REG_FF_1Q                 = 0x46, /**< RW i32: Feed-forward constant C1q */
+  MOTORLINK_ST_REG_FF_1D                 = 0x47, /**< RW i32: Feed-forward constant C1d */
+  MOTORLINK_ST_REG_FF_2                  = 0x48, /**< RW i32: Feed-forward constant C2 */
+  MOTORLINK_ST_REG_FF_VQ                 = 0x49, /**< R  i16 s16V: Feed-forward part of Vq */
+  MOTORLINK_ST_REG_FF_VD                 = 0x4A, /**< R  i16 s16V: Feed-forward part of Vd */
+  MOTORLINK_ST_REG_FF_VQ_PIOUT           = 0x4B, /**< R  i16 s16V/s16A: Regulator part of Vq */
+  MOTORLINK_ST_REG_FF_VD_PIOUT           = 0x4C, /**< R  i16 s16V/s16A: Regulator part of Vd */
+  MOTORLINK_ST_REG_PFC_STATUS            = 0x4D, /**< R  i8: PFC state */
+  MOTORLINK_ST_REG_PFC_FAULTS            = 0x4E, /**< R  u32: PFC faults */
+  MOTORLINK_ST_REG_PFC_DCBUS_REF         = 0x4F, /**< RW i16 V: PFC bus voltage reference */
+  MOTORLINK_ST_REG_PFC_DCBUS_MEAS        = 0x50, /**< R  i16 V: PFC bus voltage */
+  MOTORLINK_ST_REG_PFC_ACBUS_FREQ        = 0x51, /**< R  i16 0.1 Hz: Mains frequency */
+  MOTORLINK_ST_REG_PFC_ACBUS_RMS         = 0x52, /**< R  i16 V: Mains voltage, zero to peak */
+  MOTORLINK_ST_REG_PFC_I_KP              = 0x53, /**< RW i16 s16V/s16A: PFC current regulator Kp */
+  MOTORLINK_ST_REG_PFC_I_KI              = 0x54, /**< RW i16 s16V/s16A: PFC current regulator Ki */
+  MOTORLINK_ST_REG_PFC_I_KD              = 0x55, /**< RW i16 s16V/s16A: PFC current regulator Kd */
+  MOTORLINK_ST_REG_PFC_V_KP              = 0x56, /**< RW i16 s16A/V: PFC voltage regulator Kp */
+  MOTORLINK_ST_REG_PFC_V_KI              = 0x57, /**< RW i16 s16A/V: PFC voltage regulator Ki */
+  MOTORLINK_ST_REG_PFC_V_KD              = 0x58, /**< RW i16 s16A/V: PFC voltage regulator Kd */
+  MOTORLINK_ST_REG_PFC_STARTUP_DURATION  = 0x59, /**< RW i16 ms: Length of the PFC start-up */
+  MOTORLINK_ST_REG_PFC_ENABLED           = 0x5A, /**< R  i8: Whether the PFC is enabled */
+  MOTORLINK_ST_REG_RAMP_FINAL_SPEED      = 0x5B, /**< RW i32 rpm: Final speed of the ramp */
+  MOTORLINK_ST_REG_RAMP_DURATION         = 0x5C, /**< -  u16 ms: Length of the ramp (firmware only) */
+  MOTORLINK_ST_REG_HFI_EL_ANGLE          = 0x5D, /**< R  i16 s16degree: Electrical angle from HFI (firmware only) */
+  MOTORLINK_ST_REG_HFI_ROT_SPEED         = 0x5E, /**< R  i16 s16speed: Mechanical speed from HFI (firmware only) */
+  MOTORLINK_ST_REG_HFI_CURRENT           = 0x5F, /**< R  i16 s16A: HFI current (firmware only) */
+  MOTORLINK_ST_REG_HFI_INIT_ANG_PLL      = 0x60, /**< R  i16 s16degree: Initial angle from the HFI PLL (firmware only) */
+  MOTORLINK_ST_REG_HFI_INIT_ANG_SAT_DIFF = 0x61, /**< RW i16: Initial angle saturation difference (firmware only) */
+  MOTORLINK_ST_REG_HFI_PI_PLL_KP         = 0x62, /**< -  i16: HFI PLL Kp (firmware only) */
+  MOTORLINK_ST_REG_HFI_PI_PLL_KI         = 0x63, /**< -  i16: HFI PLL Ki (firmware only) */
+  MOTORLINK_ST_REG_HFI_PI_TRACK_KP       = 0x64, /**< RW i16: HFI tracking Kp (firmware only) */
+  MOTORLINK_ST_REG_HFI_PI_TRACK_KI       = 0x65, /**< RW i16: HFI tracking Ki (firmware only) */
+  MOTORLINK_ST_REG_SC_CHECK              = 0x66, /**< R  u8: Profiler is built in (firmware only) */
+  MOTORLINK_ST_REG_SC_STATE              = 0x67, /**< R  u8: Profiler state (firmware only) */
+  MOTORLINK_ST_REG_SC_RS                 = 0x68, /**< R  f32 Ω: Profiler: stator resistance (firmware only) */
+  MOTORLINK_ST_REG_SC_LS                 = 0x69, /**< R  f32 H: Profiler: stator inductance (firmware only) */
+  MOTORLINK_ST_REG_SC_KE                 = 0x6A, /**< R  f32: Profiler: back-EMF constant (firmware only) */
+  MOTORLINK_ST_REG_SC_VBUS               = 0x6B, /**< R  f32 V: Profiler: bus voltage (firmware only) */
+  MOTORLINK_ST_REG_SC_MEAS_NOMINALSPEED  = 0x6C, /**< R  f32 rpm: Profiler: measured nominal speed (firmware only) */
+  MOTORLINK_ST_REG_SC_STEPS              = 0x6D, /**< R  u8: Profiler: number of steps (firmware only) */
+  MOTORLINK_ST_REG_SPEED_KP_DIV          = 0x6E, /**< R  i16: Speed regulator Kp, divisor */
+  MOTORLINK_ST_REG_SPEED_KI_DIV          = 0x6F, /**< R  i16: Speed regulator Ki, divisor */
+  MOTORLINK_ST_REG_UID                   = 0x70, /**< R  u32: Unique identification (firmware only) */
+  MOTORLINK_ST_REG_HWTYPE                = 0x71, /**< -  i16: Hardware type (firmware only) */
+  MOTORLINK_ST_REG_CTRBID                = 0x72, /**< R  u32: Control board identification */
+  MOTORLINK_ST_REG_PWBDID                = 0x73, /**< R  u32: Power board identification */
+  MOTORLINK_ST_REG_SC_PP                 = 0x74, /**< RW u8: Profiler: pole pairs (firmware only) */
+  MOTORLINK_ST_REG_SC_CURRENT            = 0x75, /**< RW f32 A: Profiler: current (firmware only) */
+  MOTORLINK_ST_REG_SC_SPDBANDWIDTH       = 0x76, /**< RW f32: Profiler: speed bandwidth (firmware only) */
+  MOTORLINK_ST_REG_SC_LDLQRATIO          = 0x77, /**< RW f32: Profiler: Ld/Lq ratio (firmware only) */
+  MOTORLINK_ST_REG_SC_NOMINAL_SPEED      = 0x78, /**< RW u32 rpm: Profiler: nominal speed (firmware only) */
+  MOTORLINK_ST_REG_SC_CURRBANDWIDTH      = 0x79, /**< RW f32: Profiler: current bandwidth (firmware only) */
+  MOTORLINK_ST_REG_SC_J                  = 0x7A, /**< R  f32: Profiler: inertia (firmware only) */
+  MOTORLINK_ST_REG_SC_F                  = 0x7B, /**< R  f32: Profiler: friction (firmware only) */
+  MOTORLINK_ST_REG_SC_MAX_CURRENT        = 0x7C, /**< R  f32 A: Profiler: highest current (firmware only) */
+  MOTORLINK_ST_REG_SC_STARTUP_SPEED      = 0x7D, /**< R  u32 rpm: Profiler: start-up speed (firmware only) */
+  MOTORLINK_ST_REG_SC_STARTUP_ACC        = 0x7E, /**< R  u32: Profiler: start-up acceleration (firmware only) */
+  MOTORLINK_ST_REG_SC_PWM_FREQUENCY      = 0x7F, /**< R  u32 Hz: Profiler: PWM frequency (firmware only) */
+  MOTORLINK_ST_REG_SC_FOC_REP_RATE       = 0x80, /**< R  u8: Profiler: FOC repetition rate (firmware only) */
+  MOTORLINK_ST_REG_PWBDID2               = 0x81, /**< R  u32: Power board identification, motor 2 */
+  MOTORLINK_ST_REG_SC_COMPLETED          = 0x82, /**< R  u8: Profiler has completed (firmware only) */
+  MOTORLINK_ST_REG_CURRENT_POSITION      = 0x83, /**< R  f32 rad: Position (firmware only) */
+  MOTORLINK_ST_REG_TARGET_POSITION       = 0x84, /**< R  f32 rad: Target position (firmware only) */
+  MOTORLINK_ST_REG_MOVE_DURATION         = 0x85, /**< R  f32 s: Duration of the move (firmware only) */
+  MOTORLINK_ST_REG_POSITION_KP           = 0x86, /**< RW i16: Position regulator Kp (firmware only) */
+  MOTORLINK_ST_REG_POSITION_KI           = 0x87, /**< RW i16: Position regulator Ki (firmware only) */
+  MOTORLINK_ST_REG_POSITION_KD           = 0x88  /**< RW i16: Position regulator Kd (firmware only) */
 };
 
 /** Frame codes (table 1). */

@@ -1,7 +1,7 @@
 //! The only place with `unsafe`: what C hands in becomes Rust's here, and is safe from then on.
 
 use core::marker::PhantomData;
-use core::mem::size_of;
+use core::mem::{MaybeUninit, size_of};
 use core::ops::{Deref, DerefMut};
 use core::slice;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -204,15 +204,15 @@ impl<K: Storage> Out<K> {
     }
 
     /// Begins an object in a storage of `size` bytes, whatever was there.
-    pub(crate) fn init(&self, size: usize, state: impl FnOnce() -> K::State) -> Result<()> {
+    pub(crate) fn init(&self, size: usize, state: K::State) -> Result<()> {
         let stored = self.stored()?;
         if size < size_of::<K>() {
             return Err(motorlink_error::StorageTooSmall);
         }
-        let value = Stored { tag: AtomicU32::new(K::TAG), state: state() };
         // SAFETY: neither NULL nor misaligned, promised to be writable and not in use, and large
         // enough for a `Stored`.
-        unsafe { stored.write(value) };
+        let stored = unsafe { &mut *stored.cast::<MaybeUninit<Stored<K::State>>>() };
+        stored.write(Stored { tag: AtomicU32::new(K::TAG), state });
         Ok(())
     }
 

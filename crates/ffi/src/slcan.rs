@@ -59,7 +59,7 @@ pub unsafe extern "C" fn motorlink_slcan_host_init(
     size: usize,
 ) -> motorlink_error {
     promised!(host);
-    answer(|| host.init(size, AnswerParser::default))
+    answer(|| host.init(size, AnswerParser::default()))
 }
 
 /// Takes a byte from the adapter; tells what it completes, and the frame where it is one. A line
@@ -138,7 +138,7 @@ pub unsafe extern "C" fn motorlink_slcan_device_init(
     size: usize,
 ) -> motorlink_error {
     promised!(device);
-    answer(|| device.init(size, Device::default))
+    answer(|| device.init(size, Device::default()))
 }
 
 /// Takes a byte from the host. `line` is the answer to send, if any; `frame` is what the host sends

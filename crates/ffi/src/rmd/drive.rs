@@ -254,7 +254,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_init(
             shutdown: (config.shutdown_us != 0).then_some(Duration(config.shutdown_us)),
             clear_reply_0x9b: config.clear_reply_0x9b != 0,
         };
-        drive.init(size, || State { drive: Drive::new(config, rom), motor })
+        drive.init(size, State { drive: Drive::new(config, rom), motor })
     })
 }
 

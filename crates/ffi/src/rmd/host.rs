@@ -80,7 +80,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_init(
     size: usize,
 ) -> motorlink_error {
     promised!(host);
-    answer(|| host.init(size, || State { host: Host::new(), retry: Instant(0) }))
+    answer(|| host.init(size, State { host: Host::new(), retry: Instant(0) }))
 }
 
 /// Sets how long a reply may take, and how long after a timeout a late one is awaited, from the

@@ -2,10 +2,11 @@
 
 use motorlink_proto::rmd::{
     Acceleration, Circle, CirclePosition, CirclePositionLimited, ClearErrors, Command, Encoder,
-    EncoderBits, EncoderOffset, Gains, MotionStatus, MultiTurn, Off, Payload, PhaseCurrents,
-    Position, PositionLimited, ReadAcceleration, ReadCircleAngle, ReadEncoder, ReadGains,
-    ReadMultiTurnAngle, ReadStatus1, ReadStatus2, ReadStatus3, Run, Speed, Spin, Status1, Stop,
-    Torque, WriteAcceleration, WriteEncoderOffset, WriteGains, WriteGainsToRom, WriteZeroToRom,
+    EncoderBits, EncoderOffset, FULL_TURN, Gains, MotionStatus, MultiTurn, Off, Payload,
+    PhaseCurrents, Position, PositionLimited, ReadAcceleration, ReadCircleAngle, ReadEncoder,
+    ReadGains, ReadMultiTurnAngle, ReadStatus1, ReadStatus2, ReadStatus3, Run, Speed, Spin,
+    Status1, Stop, Torque, WriteAcceleration, WriteEncoderOffset, WriteGains, WriteGainsToRom,
+    WriteZeroToRom,
 };
 use motorlink_proto::units::{
     CentiDegrees, CentiDps, CircleAngle, DpsPerSecond, SpeedLimit, TorqueCommand,
@@ -343,5 +344,7 @@ pub extern "C" fn motorlink_rmd_decode_phase_currents(
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_rmd_encoder_centidegrees(counts: u16, encoder_bits: u8) -> u16 {
     let Some(bits) = EncoderBits::new(encoder_bits) else { return 0 };
-    (bits.degrees(counts) * 100.0) as u16
+    // Of a wider encoder the upper 16 bits travel.
+    let width = u32::from(bits.bits().min(16));
+    (u32::from(counts) * u32::from(FULL_TURN)).wrapping_shr(width) as u16
 }

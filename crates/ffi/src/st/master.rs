@@ -103,7 +103,7 @@ pub unsafe extern "C" fn motorlink_st_master_init(
             recovery: recovery(config.recovery)?,
             quiet: Duration(config.quiet_us.into()),
         };
-        master.init(size, || State { master: Master::new(config), profile, asked: None })
+        master.init(size, State { master: Master::new(config), profile, asked: None })
     })
 }
 

@@ -203,7 +203,7 @@ pub unsafe extern "C" fn motorlink_st_slave_init(
         drive.get()?;
         let profile = self::profile(profile)?;
         let motors = Motor::new(motors).ok_or(motorlink_error::BadArgument)?;
-        slave.init(size, || State { slave: Slave::new(profile, motors), drive })
+        slave.init(size, State { slave: Slave::new(profile, motors), drive })
     })
 }
 

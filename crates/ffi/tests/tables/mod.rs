@@ -13,7 +13,7 @@ pub fn text() -> String {
     group(
         &mut out,
         "motorlink_st_register",
-        "Registers (table 3): `reg` in calls. A comment has type, access and unit.",
+        "Registers (table 3): `reg` in calls. A comment has access (D: for the DAC only), type and unit.",
         registers(),
     );
     let plain = |prefix: &'static str, all: Vec<(u32, &'static str, String)>| {
@@ -137,7 +137,7 @@ fn registers() -> impl Iterator<Item = (String, u32, String)> {
             Access::Dac => "D",
             Access::Never => "-",
         };
-        let mut doc = format!("{} {access:<2}", shape.ty.name());
+        let mut doc = format!("{access:<2} {}", shape.ty.name());
         if !shape.unit.symbol().is_empty() {
             write!(doc, " {}", shape.unit.symbol()).expect("a string");
         }
