@@ -273,6 +273,7 @@ impl Bench {
                 14 => motorlink_st_master_raw(master, one, list, size),
                 15 => motorlink_st_master_receive(master, now, list, size),
                 16 => motorlink_st_master_abandon(master),
+                17 if one & 1 == 0 => motorlink_st_master_lost(master),
                 17 => motorlink_st_master_reopened(master),
                 18 => motorlink_st_master_is_lost(master, &mut lost),
                 19 | 20 => {
@@ -301,6 +302,10 @@ impl Bench {
                 ]
             };
             assert_eq!(read[1], Error::Ok);
+            // The payload as the names of registers, and as their values.
+            let mut values = vec![0; size];
+            // SAFETY: as above, and there are as many values as registers.
+            unsafe { motorlink_st_decode_segment(at, size, at, size, values.as_mut_ptr()) };
         }
         result
     }

@@ -1451,6 +1451,12 @@ motorlink_error motorlink_st_master_raw(struct motorlink_st_master *master,
                                         size_t size);
 
 /**
+ * How long the longest thing that a master sends takes at `baud`, µs. Where the port takes bytes
+ * faster than the line carries them, add this to `quiet_us`.
+ */
+uint64_t motorlink_st_longest_transmission_us(uint32_t baud);
+
+/**
  * What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
  * `DONE`; after `WAIT` when something came or the time is over.
  */
@@ -1470,6 +1476,12 @@ motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
  * Gives up the exchange under way. Its reply may still come, so the line is lost.
  */
 motorlink_error motorlink_st_master_abandon(struct motorlink_st_master *master);
+
+/**
+ * Tells that the line is out of step: something was sent or received beside the master. An
+ * exchange under way ends without a result.
+ */
+motorlink_error motorlink_st_master_lost(struct motorlink_st_master *master);
 
 /**
  * Tells that the line was closed and opened again, with nothing left in it from before. An
@@ -1508,6 +1520,45 @@ motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
 motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
                                           size_t size,
                                           struct motorlink_st_revup_phase *phase);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_read_segment`: the values of the `count`
+ * registers that the segment was configured with, in the same order, into as many `values`, each
+ * as in `motorlink_st_action`.
+ *
+ * `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are left alone.
+ */
+motorlink_error motorlink_st_decode_segment(const uint8_t *payload,
+                                            size_t size,
+                                            const uint8_t *registers,
+                                            size_t count,
+                                            int32_t *values);
+
+/**
+ * The name of a register, UTF-8 without a NUL, constant: `printf("%.*s", (int)size, data)`. Empty
+ * for a number that nobody names, as all names here.
+ */
+struct motorlink_bytes motorlink_st_register_name(uint8_t reg);
+
+/**
+ * The symbol of the unit of a register's value; empty where there is none.
+ */
+struct motorlink_bytes motorlink_st_register_unit(uint8_t reg);
+
+/**
+ * The name of a `motorlink_st_refusal`.
+ */
+struct motorlink_bytes motorlink_st_refusal_name(uint8_t refusal);
+
+/**
+ * The name of a `motorlink_st_status`.
+ */
+struct motorlink_bytes motorlink_st_status_name(uint8_t status);
+
+/**
+ * The name of a `motorlink_st_command`.
+ */
+struct motorlink_bytes motorlink_st_command_name(uint8_t command);
 
 /**
  * Begins a slave for a drive with motors 1 to `motors`, whatever the storage held before.
@@ -1584,6 +1635,19 @@ motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
 motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
                                           size_t size,
                                           struct motorlink_st_revup_phase *phase);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_read_segment`: the values of the `count`
+ * registers that the segment was configured with, in the same order, into as many `values`, each
+ * as in `motorlink_st_action`.
+ *
+ * `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are left alone.
+ */
+motorlink_error motorlink_st_decode_segment(const uint8_t *payload,
+                                            size_t size,
+                                            const uint8_t *registers,
+                                            size_t count,
+                                            int32_t *values);
 
 /**
  * The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
@@ -1731,6 +1795,12 @@ motorlink_error motorlink_st_master_raw(struct motorlink_st_master *master,
                                         size_t size);
 
 /**
+ * How long the longest thing that a master sends takes at `baud`, µs. Where the port takes bytes
+ * faster than the line carries them, add this to `quiet_us`.
+ */
+uint64_t motorlink_st_longest_transmission_us(uint32_t baud);
+
+/**
  * What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
  * `DONE`; after `WAIT` when something came or the time is over.
  */
@@ -1750,6 +1820,12 @@ motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
  * Gives up the exchange under way. Its reply may still come, so the line is lost.
  */
 motorlink_error motorlink_st_master_abandon(struct motorlink_st_master *master);
+
+/**
+ * Tells that the line is out of step: something was sent or received beside the master. An
+ * exchange under way ends without a result.
+ */
+motorlink_error motorlink_st_master_lost(struct motorlink_st_master *master);
 
 /**
  * Tells that the line was closed and opened again, with nothing left in it from before. An
@@ -1812,6 +1888,32 @@ motorlink_error motorlink_st_slave_deadline(struct motorlink_st_slave *slave,
  */
 motorlink_error motorlink_st_slave_overrun(struct motorlink_st_slave *slave,
                                            struct motorlink_bytes *reply);
+
+/**
+ * The name of a register, UTF-8 without a NUL, constant: `printf("%.*s", (int)size, data)`. Empty
+ * for a number that nobody names, as all names here.
+ */
+struct motorlink_bytes motorlink_st_register_name(uint8_t reg);
+
+/**
+ * The symbol of the unit of a register's value; empty where there is none.
+ */
+struct motorlink_bytes motorlink_st_register_unit(uint8_t reg);
+
+/**
+ * The name of a `motorlink_st_refusal`.
+ */
+struct motorlink_bytes motorlink_st_refusal_name(uint8_t refusal);
+
+/**
+ * The name of a `motorlink_st_status`.
+ */
+struct motorlink_bytes motorlink_st_status_name(uint8_t status);
+
+/**
+ * The name of a `motorlink_st_command`.
+ */
+struct motorlink_bytes motorlink_st_command_name(uint8_t command);
 
 /**
  * Request 0x30: reads the gains in RAM.

@@ -68,6 +68,12 @@ fn check<T>(pointer: *const T) -> Result<()> {
     Ok(())
 }
 
+/// As many `T` as one object may have.
+fn checked<T>(len: usize) -> Result<usize> {
+    let most = isize::MAX as usize / size_of::<T>().max(1);
+    if len <= most { Ok(len) } else { Err(motorlink_error::BadArgument) }
+}
+
 /// Structs of C: every bit pattern of their size is a value.
 ///
 /// # Safety
@@ -82,7 +88,7 @@ macro_rules! plain {
 }
 pub(crate) use plain;
 
-plain!(u8, i16);
+plain!(u8, i16, i32);
 
 impl<T: Plain> In<T> {
     /// The value there.
@@ -108,9 +114,7 @@ impl<T: Plain> In<T> {
             return Ok(&[]);
         }
         check(self.0)?;
-        if len > isize::MAX as usize / size_of::<T>().max(1) {
-            return Err(motorlink_error::BadArgument);
-        }
+        let len = checked::<T>(len)?;
         // SAFETY: neither NULL nor misaligned, promised to be readable, any bits are a `T`, and no
         // longer than an object can be.
         Ok(unsafe { slice::from_raw_parts(self.0, len) })
@@ -145,6 +149,20 @@ impl<T> Out<T> {
     pub(crate) fn place(&self) -> Result<Place<T>> {
         check(self.0)?;
         Ok(Place(self.0))
+    }
+}
+
+impl<T: Plain> Out<T> {
+    /// The places of `len` values; NULL is as good as any pointer to none.
+    pub(crate) fn places<'a>(&self, len: usize) -> Result<&'a mut [MaybeUninit<T>]> {
+        if len == 0 {
+            return Ok(&mut []);
+        }
+        check(self.0)?;
+        let len = checked::<T>(len)?;
+        // SAFETY: neither NULL nor misaligned, promised to be writable, and no longer than an
+        // object can be.
+        Ok(unsafe { slice::from_raw_parts_mut(self.0.cast(), len) })
     }
 }
 

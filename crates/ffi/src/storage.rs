@@ -79,3 +79,29 @@ crate::pointer::storage! {
     motorlink_slcan_host: AnswerParser, 0x51CA_4057;
     motorlink_slcan_device: Device, 0x51CA_DEF1;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pointer::{Storage, Stored};
+
+    #[test]
+    fn storage_is_no_larger_than_it_has_to_be() {
+        fn unused<K: Storage>() -> usize {
+            size_of::<K>() - size_of::<Stored<K::State>>()
+        }
+        assert!(unused::<motorlink_st_slave>() <= 8);
+        assert!(unused::<motorlink_st_master>() <= 8);
+        assert!(unused::<motorlink_rmd_host>() <= 8);
+        assert!(unused::<motorlink_rmd_drive>() <= 8);
+        assert!(unused::<motorlink_slcan_host>() <= 16);
+        assert!(unused::<motorlink_slcan_device>() <= 16);
+    }
+
+    #[test]
+    fn no_tag_is_another_one_or_its_complement() {
+        for (index, tag) in TAGS.iter().enumerate() {
+            assert!(TAGS.iter().skip(index + 1).all(|other| tag != other && *tag != !other));
+        }
+    }
+}

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::{env, fs};
 
 /// In the order in which a reader wants them.
-const SOURCES: [&str; 12] = [
+const SOURCES: [&str; 13] = [
     "error.rs",
     "bytes.rs",
     "storage.rs",
@@ -18,6 +18,7 @@ const SOURCES: [&str; 12] = [
     "st/message.rs",
     "st/master.rs",
     "st/slave.rs",
+    "st/names.rs",
     "frame.rs",
     "rmd/message.rs",
     "rmd/host.rs",

@@ -7,7 +7,7 @@ use core::hint::black_box;
 use motorlink_ffi::motorlink_error_text;
 use motorlink_ffi::rmd::{drive::*, host::*, message::*};
 use motorlink_ffi::slcan::*;
-use motorlink_ffi::st::{master::*, message::*, slave::*};
+use motorlink_ffi::st::{master::*, message::*, names::*, slave::*};
 
 unsafe extern "C" {
     fn a_path_of_the_c_face_can_panic() -> !;
@@ -49,6 +49,14 @@ pub extern "C" fn probe() -> ! {
         motorlink_st_master_poll
         motorlink_st_master_receive
         motorlink_st_master_abandon
+        motorlink_st_master_lost
+        motorlink_st_longest_transmission_us
+        motorlink_st_decode_segment
+        motorlink_st_register_name
+        motorlink_st_register_unit
+        motorlink_st_refusal_name
+        motorlink_st_status_name
+        motorlink_st_command_name
         motorlink_st_master_reopened
         motorlink_st_master_is_lost
         motorlink_st_decode_board_info

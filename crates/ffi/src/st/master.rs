@@ -366,6 +366,13 @@ pub unsafe extern "C" fn motorlink_st_master_raw(
     })
 }
 
+/// How long the longest thing that a master sends takes at `baud`, µs. Where the port takes bytes
+/// faster than the line carries them, add this to `quiet_us`.
+#[unsafe(no_mangle)]
+pub extern "C" fn motorlink_st_longest_transmission_us(baud: u32) -> u64 {
+    Master::longest_transmission(baud).0
+}
+
 /// What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
 /// `DONE`; after `WAIT` when something came or the time is over.
 #[unsafe(no_mangle)]
@@ -452,6 +459,19 @@ pub unsafe extern "C" fn motorlink_st_master_abandon(
     promised!(master);
     answer(|| {
         master.enter()?.master.abandon();
+        Ok(())
+    })
+}
+
+/// Tells that the line is out of step: something was sent or received beside the master. An
+/// exchange under way ends without a result.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_master_lost(
+    master: *mut motorlink_st_master,
+) -> motorlink_error {
+    promised!(master);
+    answer(|| {
+        master.enter()?.master.lost();
         Ok(())
     })
 }

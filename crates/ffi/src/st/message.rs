@@ -2,7 +2,7 @@
 
 use core::ffi::c_char;
 
-use motorlink_proto::stmcp::{BoardInfo, FirmwareVersion, RevupPhase};
+use motorlink_proto::stmcp::{BoardInfo, FirmwareVersion, RegisterId, RevupPhase};
 
 use crate::error::{answer, motorlink_error};
 use crate::pointer::{In, plain, promised};
@@ -125,6 +125,44 @@ pub unsafe extern "C" fn motorlink_st_decode_revup(
         let (payload, place) = (payload.slice(size)?, phase.place()?);
         let phase = RevupPhase::decode(payload).ok_or(motorlink_error::BadArgument)?;
         place.set(phase.into());
+        Ok(())
+    })
+}
+
+/// Reads the payload of an answer to `motorlink_st_master_read_segment`: the values of the `count`
+/// registers that the segment was configured with, in the same order, into as many `values`, each
+/// as in `motorlink_st_action`.
+///
+/// `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are left alone.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_decode_segment(
+    payload: *const u8,
+    size: usize,
+    registers: *const u8,
+    count: usize,
+    values: *mut i32,
+) -> motorlink_error {
+    promised!(payload, registers, values);
+    answer(|| {
+        let (payload, registers) = (payload.slice(size)?, registers.slice(count)?);
+        let values = values.places(count)?;
+        let sizes = registers.iter().map(|&id| {
+            let shape = RegisterId(id).shape().ok_or(motorlink_error::BadArgument);
+            shape.map(|shape| usize::from(shape.ty.size()))
+        });
+        let mut total = 0usize;
+        for size in sizes.clone() {
+            total = total.saturating_add(size?);
+        }
+        if total != payload.len() {
+            return Err(motorlink_error::BadArgument);
+        }
+        let mut rest = payload;
+        for ((value, &id), size) in values.iter_mut().zip(registers).zip(sizes) {
+            let (bytes, behind) = rest.split_at_checked(size?).unwrap_or((rest, &[]));
+            value.write(RegisterId(id).decode(bytes).unwrap_or_default());
+            rest = behind;
+        }
         Ok(())
     })
 }

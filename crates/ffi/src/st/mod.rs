@@ -2,6 +2,7 @@
 
 pub mod master;
 pub mod message;
+pub mod names;
 pub mod slave;
 
 pub use crate::storage::{motorlink_st_master, motorlink_st_slave};

@@ -45,6 +45,7 @@ static void st_master(motorlink_st_master *master, motorlink_error expected) {
   REFUSED(motorlink_st_master_poll(master, 0, &action));
   REFUSED(motorlink_st_master_receive(master, 0, bytes, sizeof bytes));
   REFUSED(motorlink_st_master_abandon(master));
+  REFUSED(motorlink_st_master_lost(master));
   REFUSED(motorlink_st_master_reopened(master));
   REFUSED(motorlink_st_master_is_lost(master, &lost));
   groups++;
@@ -198,6 +199,7 @@ static void wrong_pointers(void) {
   motorlink_st_firmware_version version;
   motorlink_st_revup_phase phase;
   const uint8_t bytes[8] = {0};
+  int32_t value;
 
   subject = "other pointers";
   GIVES(NULL_POINTER, motorlink_st_master_init(NULL, sizeof master, NULL));
@@ -244,6 +246,11 @@ static void wrong_pointers(void) {
   GIVES(NULL_POINTER, motorlink_st_decode_firmware_version(bytes, 8, NULL));
   GIVES(NULL_POINTER, motorlink_st_decode_revup(NULL, 8, &phase));
   GIVES(NULL_POINTER, motorlink_st_decode_revup(bytes, 8, NULL));
+  GIVES(NULL_POINTER, motorlink_st_decode_segment(NULL, 1, bytes, 1, &value));
+  GIVES(NULL_POINTER, motorlink_st_decode_segment(bytes, 1, NULL, 1, &value));
+  GIVES(NULL_POINTER, motorlink_st_decode_segment(bytes, 1, bytes, 1, NULL));
+  GIVES(MISALIGNED, motorlink_st_decode_segment(bytes, 1, bytes, 1, (int32_t *)(void *)odd));
+  OK(motorlink_st_decode_segment(NULL, 0, NULL, 0, NULL));
 
   GIVES(NULL_POINTER, motorlink_rmd_host_set_limits(&host, 1, NULL));
   GIVES(NULL_POINTER, motorlink_rmd_host_torque4(&host, 0, NULL, 0));
@@ -270,12 +277,17 @@ static void wrong_pointers(void) {
   GIVES(NULL_POINTER, motorlink_slcan_device_deliver(&device, 0, &frame, NULL));
 }
 
+static int named(motorlink_bytes name, const char *expected) {
+  return name.size == strlen(expected) && memcmp(name.data, expected, name.size) == 0;
+}
+
 static void wrong_numbers(void) {
   static motorlink_st_master master;
   static motorlink_st_slave slave;
   static motorlink_rmd_host host;
   static motorlink_rmd_drive drive;
-  const uint8_t bytes[130] = {0};
+  const uint8_t bytes[130] = {0}, unnamed[1] = {255};
+  int32_t value;
   const int16_t torques[4] = {0, 0, 0, 2001};
   const motorlink_st_revup_phase phase = {0, 0, 0};
   motorlink_st_master_config config = motorlink_st_master_defaults();
@@ -319,6 +331,16 @@ static void wrong_numbers(void) {
   st_slave(&slave, MOTORLINK_ERROR_UNINITIALISED);
   GIVES(BAD_ARGUMENT, motorlink_st_decode_board_info(bytes, 2, &info));
   GIVES(BAD_ARGUMENT, motorlink_st_decode_revup(bytes, 7, &read));
+  GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 2, bytes, 1, &value));
+  GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 1, unnamed, 1, &value));
+  GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 8, bytes, SIZE_MAX, &value));
+  CHECK(motorlink_st_register_name(255).size == 0 && motorlink_st_register_name(255).data != NULL);
+  CHECK(named(motorlink_st_register_name(MOTORLINK_ST_REG_SPEED_MEAS), "SPEED_MEAS"));
+  CHECK(named(motorlink_st_register_unit(MOTORLINK_ST_REG_SPEED_MEAS), "rpm"));
+  CHECK(named(motorlink_st_refusal_name(MOTORLINK_ST_REFUSAL_WRONG_SET), "WRONG_SET"));
+  CHECK(named(motorlink_st_status_name(MOTORLINK_ST_STATUS_RUN), "RUN"));
+  CHECK(named(motorlink_st_command_name(MOTORLINK_ST_COMMAND_FAULT_ACK), "FAULT_ACK"));
+  CHECK(motorlink_st_longest_transmission_us(0) > motorlink_st_longest_transmission_us(115200));
 
   OK(motorlink_rmd_host_init(&host, sizeof host));
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_request(&host, 0, 0, motorlink_rmd_off()));

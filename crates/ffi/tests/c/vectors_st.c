@@ -182,7 +182,14 @@ static void answered(const char *code, const motorlink_st_action *done, const js
     OK(motorlink_st_decode_revup(payload, size, &phase));
     CHECK(memcmp(&phase, &expected, sizeof phase) == 0);
   } else if (strcmp(code, "GET_DATA_ELEMENT") == 0) {
-    CHECK(same(done->bytes, hex(answer, "values")));
+    const uint8_t chosen[3] = {MOTORLINK_ST_REG_STATUS, MOTORLINK_ST_REG_SPEED_MEAS,
+                               MOTORLINK_ST_REG_I_Q};
+    struct bytes values = hex(answer, "values");
+    int32_t read[3];
+    CHECK(same(done->bytes, values));
+    OK(motorlink_st_decode_segment(payload, size, chosen, 3, read));
+    CHECK(read[0] == values.data[0] && read[1] == little_endian(values, 1, 4));
+    CHECK(read[2] == little_endian(values, 5, 2));
   } else {
     CHECK(size == 0);
   }
