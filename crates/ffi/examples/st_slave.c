@@ -3,7 +3,7 @@
  * A drive with one motor on a pty: st_slave
  *
  * Prints the path that a master opens, and serves it until stdin ends. Its motor follows a ramp
- * exactly; a fan without a load. Ends with 0.
+ * exactly; a fan without a load or faults. Ends with 0.
  */
 #define _XOPEN_SOURCE 700
 #include "posix.h"
@@ -14,8 +14,9 @@ struct fan {
   int running;
   int32_t from_rpm, to_rpm;
   uint64_t began_us, length_us;
-  int16_t speed_kp;
   motorlink_st_revup_phase revup[5];
+  /* What a master may set, and read again. */
+  int32_t values[256];
 };
 
 static int32_t speed(const struct fan *fan) {
@@ -36,32 +37,54 @@ static int32_t read_register(void *context, uint8_t motor, uint8_t reg) {
   switch (reg) {
     case MOTORLINK_ST_REG_STATUS:
       return fan->running ? MOTORLINK_ST_STATUS_RUN : MOTORLINK_ST_STATUS_IDLE;
-    case MOTORLINK_ST_REG_CONTROL_MODE:
-      return MOTORLINK_ST_CONTROL_MODE_SPEED;
     case MOTORLINK_ST_REG_SPEED_REF:
     case MOTORLINK_ST_REG_SPEED_MEAS:
       return speed(fan);
     case MOTORLINK_ST_REG_RAMP_FINAL_SPEED:
       return fan->to_rpm;
-    case MOTORLINK_ST_REG_SPEED_KP:
-      return fan->speed_kp;
     case MOTORLINK_ST_REG_BUS_VOLTAGE:
       return 24;
     case MOTORLINK_ST_REG_HEATS_TEMP:
       return 25;
+    case MOTORLINK_ST_REG_RUC_STAGE_NBR:
+      return 5;
+    case MOTORLINK_ST_REG_MAX_APP_SPEED:
+      return 4000;
     default:
-      return 0;
+      return fan->values[reg];
   }
+}
+
+/* From now on to another speed. */
+static void go(struct fan *fan, int32_t speed_rpm, uint16_t duration_ms) {
+  fan->from_rpm = speed(fan);
+  fan->to_rpm = speed_rpm;
+  fan->length_us = (uint64_t)duration_ms * 1000U;
+  fan->began_us = now_us();
 }
 
 static uint8_t write_register(void *context, uint8_t motor, uint8_t reg, int32_t value) {
   struct fan *fan = (struct fan *)context;
   (void)motor;
-  if (reg != MOTORLINK_ST_REG_SPEED_KP) {
-    return MOTORLINK_ST_REFUSAL_WRONG_SET;
+  if (reg == MOTORLINK_ST_REG_CONTROL_MODE && value > MOTORLINK_ST_CONTROL_MODE_SPEED) {
+    return MOTORLINK_ST_REFUSAL_NONE; /* taken, and changes nothing */
   }
-  fan->speed_kp = (int16_t)value;
+  fan->values[reg] = value;
+  if (reg == MOTORLINK_ST_REG_RAMP_FINAL_SPEED) {
+    go(fan, value, 0);
+  } else if (reg == MOTORLINK_ST_REG_IQ_SPEEDMODE) {
+    fan->values[MOTORLINK_ST_REG_FLUX_REF] = value;
+  }
   return MOTORLINK_ST_REFUSAL_NONE;
+}
+
+/* A ramp begins when the motor does. */
+static void start(struct fan *fan, int running) {
+  if (running && !fan->running) {
+    fan->from_rpm = 0;
+    fan->began_us = now_us();
+  }
+  fan->running = running;
 }
 
 static void execute(void *context, uint8_t motor, uint8_t command) {
@@ -69,14 +92,20 @@ static void execute(void *context, uint8_t motor, uint8_t command) {
   (void)motor;
   switch (command) {
     case MOTORLINK_ST_COMMAND_START_MOTOR:
-      if (!fan->running) {
-        fan->running = 1;
-        fan->from_rpm = 0;
-        fan->began_us = now_us();
-      }
+      start(fan, 1);
       break;
     case MOTORLINK_ST_COMMAND_STOP_MOTOR:
-      fan->running = 0;
+      start(fan, 0);
+      break;
+    case MOTORLINK_ST_COMMAND_IQDREF_CLEAR:
+      fan->values[MOTORLINK_ST_REG_TORQUE_REF] = 0;
+      fan->values[MOTORLINK_ST_REG_FLUX_REF] = 0;
+      break;
+    case MOTORLINK_ST_COMMAND_STOP_RAMP:
+      go(fan, speed(fan), 0);
+      break;
+    case MOTORLINK_ST_COMMAND_START_STOP:
+      start(fan, !fan->running);
       break;
     default:
       break;
@@ -86,10 +115,15 @@ static void execute(void *context, uint8_t motor, uint8_t command) {
 static void ramp(void *context, uint8_t motor, int32_t speed_rpm, uint16_t duration_ms) {
   struct fan *fan = (struct fan *)context;
   (void)motor;
-  fan->from_rpm = speed(fan);
-  fan->to_rpm = speed_rpm;
-  fan->length_us = (uint64_t)duration_ms * 1000U;
-  fan->began_us = now_us();
+  fan->values[MOTORLINK_ST_REG_CONTROL_MODE] = MOTORLINK_ST_CONTROL_MODE_SPEED;
+  go(fan, speed_rpm, duration_ms);
+}
+
+static void current(void *context, uint8_t motor, int16_t iq_s16a, int16_t id_s16a) {
+  struct fan *fan = (struct fan *)context;
+  (void)motor;
+  fan->values[MOTORLINK_ST_REG_TORQUE_REF] = iq_s16a;
+  fan->values[MOTORLINK_ST_REG_FLUX_REF] = id_s16a;
 }
 
 static void revup(void *context, uint8_t motor, uint8_t phase, motorlink_st_revup_phase *data) {
@@ -133,6 +167,7 @@ int main(void) {
   drive.ramp = ramp;
   drive.revup = revup;
   drive.set_revup = set_revup;
+  drive.current = current;
   check(motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, 1, &drive));
   printf("%s\n", ptsname(fd));
   fflush(stdout);

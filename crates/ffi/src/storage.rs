@@ -83,10 +83,11 @@ crate::pointer::storage! {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pointer::{Storage, Stored};
-
+    #[cfg(target_pointer_width = "64")]
     #[test]
     fn storage_is_no_larger_than_it_has_to_be() {
+        use crate::pointer::{Storage, Stored};
+
         fn unused<K: Storage>() -> usize {
             size_of::<K>() - size_of::<Stored<K::State>>()
         }
