@@ -399,14 +399,14 @@ enum motorlink_rmd_can_id {
 #define MOTORLINK_SLCAN_DEVICE_WORDS 7
 
 /**
- * The longest payload.
- */
-#define MOTORLINK_ST_MAX_PAYLOAD 128
-
-/**
  * Bytes for a text of a reply with its NUL.
  */
 #define MOTORLINK_ST_TEXT_SIZE 33
+
+/**
+ * The longest payload.
+ */
+#define MOTORLINK_ST_MAX_PAYLOAD 128
 
 /**
  * The `id` of no frame, which has no bytes either.
@@ -687,6 +687,60 @@ typedef uint8_t motorlink_rmd_mode;
 #endif // __cplusplus
 
 /**
+ * The answer to a board information request (4.7).
+ */
+typedef struct motorlink_st_board_info {
+  /**
+   * Major version of the SDK.
+   */
+  uint8_t major;
+  /**
+   * Minor version of the SDK.
+   */
+  uint8_t minor;
+  /**
+   * Patch version of the SDK.
+   */
+  uint8_t patch;
+  /**
+   * Name of the SDK, UTF-8, with a NUL at its end.
+   */
+  char name[MOTORLINK_ST_TEXT_SIZE];
+} motorlink_st_board_info;
+
+/**
+ * The answer to a firmware version request (4.12).
+ */
+typedef struct motorlink_st_firmware_version {
+  /**
+   * Name of the firmware, UTF-8, with a NUL at its end.
+   */
+  char name[MOTORLINK_ST_TEXT_SIZE];
+  /**
+   * Its version, such as `Ver.5.4.4`, UTF-8, with a NUL at its end.
+   */
+  char version[MOTORLINK_ST_TEXT_SIZE];
+} motorlink_st_firmware_version;
+
+/**
+ * A phase of the rev-up (4.9).
+ */
+typedef struct motorlink_st_revup_phase {
+  /**
+   * Mechanical speed at the end of the phase, rpm.
+   */
+  int32_t speed_rpm;
+  /**
+   * Iq at the end of the phase, s16A digits.
+   */
+  int16_t torque_s16a;
+  /**
+   * Length of the phase, ms.
+   */
+  uint16_t duration_ms;
+} motorlink_st_revup_phase;
+
+/**
  * How a master behaves.
  */
 typedef struct motorlink_st_master_config {
@@ -718,24 +772,6 @@ typedef struct motorlink_st_master {
    */
   uint64_t opaque[MOTORLINK_ST_MASTER_WORDS];
 } motorlink_st_master;
-
-/**
- * A phase of the rev-up (4.9).
- */
-typedef struct motorlink_st_revup_phase {
-  /**
-   * Mechanical speed at the end of the phase, rpm.
-   */
-  int32_t speed_rpm;
-  /**
-   * Iq at the end of the phase, s16A digits.
-   */
-  int16_t torque_s16a;
-  /**
-   * Length of the phase, ms.
-   */
-  uint16_t duration_ms;
-} motorlink_st_revup_phase;
 
 /**
  * Bytes that belong to an object: to be sent or copied before the next call for it.
@@ -783,42 +819,6 @@ typedef struct motorlink_st_action {
    */
   uint8_t refusal;
 } motorlink_st_action;
-
-/**
- * The answer to a board information request (4.7).
- */
-typedef struct motorlink_st_board_info {
-  /**
-   * Major version of the SDK.
-   */
-  uint8_t major;
-  /**
-   * Minor version of the SDK.
-   */
-  uint8_t minor;
-  /**
-   * Patch version of the SDK.
-   */
-  uint8_t patch;
-  /**
-   * Name of the SDK, UTF-8, with a NUL at its end.
-   */
-  char name[MOTORLINK_ST_TEXT_SIZE];
-} motorlink_st_board_info;
-
-/**
- * The answer to a firmware version request (4.12).
- */
-typedef struct motorlink_st_firmware_version {
-  /**
-   * Name of the firmware, UTF-8, with a NUL at its end.
-   */
-  char name[MOTORLINK_ST_TEXT_SIZE];
-  /**
-   * Its version, such as `Ver.5.4.4`, UTF-8, with a NUL at its end.
-   */
-  char version[MOTORLINK_ST_TEXT_SIZE];
-} motorlink_st_firmware_version;
 
 /**
  * A slave of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
@@ -1306,6 +1306,45 @@ extern "C" {
 const char *motorlink_error_text(int32_t error);
 
 /**
+ * Reads the payload of an answer to `motorlink_st_master_board_info`.
+ *
+ * `BAD_ARGUMENT`: the payload is too short to be one.
+ */
+motorlink_error motorlink_st_decode_board_info(const uint8_t *payload,
+                                               size_t size,
+                                               struct motorlink_st_board_info *info);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
+ * UTF-8 are cut there.
+ */
+motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
+                                                     size_t size,
+                                                     struct motorlink_st_firmware_version *version);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_revup`.
+ *
+ * `BAD_ARGUMENT`: the payload is too short to be one.
+ */
+motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
+                                          size_t size,
+                                          struct motorlink_st_revup_phase *phase);
+
+/**
+ * Reads the payload of an answer to `motorlink_st_master_read_segment`: the values of the `count`
+ * registers that the segment was configured with, in the same order, into as many `values`, each
+ * as in `motorlink_st_action`.
+ *
+ * `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are left alone.
+ */
+motorlink_error motorlink_st_decode_segment(const uint8_t *payload,
+                                            size_t size,
+                                            const uint8_t *registers,
+                                            size_t count,
+                                            int32_t *values);
+
+/**
  * The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
  */
 struct motorlink_st_master_config motorlink_st_master_defaults(void);
@@ -1321,6 +1360,51 @@ struct motorlink_st_master_config motorlink_st_master_defaults(void);
 motorlink_error motorlink_st_master_init(struct motorlink_st_master *master,
                                          size_t size,
                                          const struct motorlink_st_master_config *config);
+
+/**
+ * How long the longest thing that a master sends takes at `baud`, µs. Where the port takes bytes
+ * faster than the line carries them, add this to `quiet_us`.
+ */
+uint64_t motorlink_st_longest_transmission_us(uint32_t baud);
+
+/**
+ * What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
+ * `DONE`; after `WAIT` when something came or the time is over.
+ */
+motorlink_error motorlink_st_master_poll(struct motorlink_st_master *master,
+                                         uint64_t now_us,
+                                         struct motorlink_st_action *action);
+
+/**
+ * Takes what came from the drive at `now_us`, in any pieces. `bytes` may not lie in the storage.
+ */
+motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
+                                            uint64_t now_us,
+                                            const uint8_t *bytes,
+                                            size_t size);
+
+/**
+ * Gives up the exchange under way. Its reply may still come, so the line is lost.
+ */
+motorlink_error motorlink_st_master_abandon(struct motorlink_st_master *master);
+
+/**
+ * Tells that the line is out of step: something was sent or received beside the master. An
+ * exchange under way ends without a result.
+ */
+motorlink_error motorlink_st_master_lost(struct motorlink_st_master *master);
+
+/**
+ * Tells that the line was closed and opened again, with nothing left in it from before. An
+ * exchange under way ends without a result.
+ */
+motorlink_error motorlink_st_master_reopened(struct motorlink_st_master *master);
+
+/**
+ * Sets `lost` to 1 where an exchange failed and the next one has to recover the line first, and to
+ * 0 where the last one ended in step.
+ */
+motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, uint8_t *lost);
 
 /**
  * Begins to read a register; `value` of the result is its value. Any number is taken.
@@ -1449,395 +1533,6 @@ motorlink_error motorlink_st_master_raw(struct motorlink_st_master *master,
                                         uint8_t header,
                                         const uint8_t *payload,
                                         size_t size);
-
-/**
- * How long the longest thing that a master sends takes at `baud`, µs. Where the port takes bytes
- * faster than the line carries them, add this to `quiet_us`.
- */
-uint64_t motorlink_st_longest_transmission_us(uint32_t baud);
-
-/**
- * What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
- * `DONE`; after `WAIT` when something came or the time is over.
- */
-motorlink_error motorlink_st_master_poll(struct motorlink_st_master *master,
-                                         uint64_t now_us,
-                                         struct motorlink_st_action *action);
-
-/**
- * Takes what came from the drive at `now_us`, in any pieces. `bytes` may not lie in the storage.
- */
-motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
-                                            uint64_t now_us,
-                                            const uint8_t *bytes,
-                                            size_t size);
-
-/**
- * Gives up the exchange under way. Its reply may still come, so the line is lost.
- */
-motorlink_error motorlink_st_master_abandon(struct motorlink_st_master *master);
-
-/**
- * Tells that the line is out of step: something was sent or received beside the master. An
- * exchange under way ends without a result.
- */
-motorlink_error motorlink_st_master_lost(struct motorlink_st_master *master);
-
-/**
- * Tells that the line was closed and opened again, with nothing left in it from before. An
- * exchange under way ends without a result.
- */
-motorlink_error motorlink_st_master_reopened(struct motorlink_st_master *master);
-
-/**
- * Sets `lost` to 1 where an exchange failed and the next one has to recover the line first, and to
- * 0 where the last one ended in step.
- */
-motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, uint8_t *lost);
-
-/**
- * Reads the payload of an answer to `motorlink_st_master_board_info`.
- *
- * `BAD_ARGUMENT`: the payload is too short to be one.
- */
-motorlink_error motorlink_st_decode_board_info(const uint8_t *payload,
-                                               size_t size,
-                                               struct motorlink_st_board_info *info);
-
-/**
- * Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
- * UTF-8 are cut there.
- */
-motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
-                                                     size_t size,
-                                                     struct motorlink_st_firmware_version *version);
-
-/**
- * Reads the payload of an answer to `motorlink_st_master_revup`.
- *
- * `BAD_ARGUMENT`: the payload is too short to be one.
- */
-motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
-                                          size_t size,
-                                          struct motorlink_st_revup_phase *phase);
-
-/**
- * Reads the payload of an answer to `motorlink_st_master_read_segment`: the values of the `count`
- * registers that the segment was configured with, in the same order, into as many `values`, each
- * as in `motorlink_st_action`.
- *
- * `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are left alone.
- */
-motorlink_error motorlink_st_decode_segment(const uint8_t *payload,
-                                            size_t size,
-                                            const uint8_t *registers,
-                                            size_t count,
-                                            int32_t *values);
-
-/**
- * The name of a register, UTF-8 without a NUL, constant: `printf("%.*s", (int)size, data)`. Empty
- * for a number that nobody names, as all names here.
- */
-struct motorlink_bytes motorlink_st_register_name(uint8_t reg);
-
-/**
- * The symbol of the unit of a register's value; empty where there is none.
- */
-struct motorlink_bytes motorlink_st_register_unit(uint8_t reg);
-
-/**
- * The name of a `motorlink_st_refusal`.
- */
-struct motorlink_bytes motorlink_st_refusal_name(uint8_t refusal);
-
-/**
- * The name of a `motorlink_st_status`.
- */
-struct motorlink_bytes motorlink_st_status_name(uint8_t status);
-
-/**
- * The name of a `motorlink_st_command`.
- */
-struct motorlink_bytes motorlink_st_command_name(uint8_t command);
-
-/**
- * Begins a slave for a drive with motors 1 to `motors`, whatever the storage held before.
- *
- * `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
- * may be constant. Not from a callback of the same slave.
- *
- * `BAD_ARGUMENT`: `profile` is none of
- * `motorlink_st_profile`, or `motors` is not 1 to 7.
- */
-motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
-                                        size_t size,
-                                        uint8_t profile,
-                                        uint8_t motors,
-                                        const struct motorlink_st_drive *drive);
-
-/**
- * Takes a byte that came at `now_us`. Where it completes a command the drive is called, and
- * `reply` is what to send before the next byte is handed in; else `reply` has no bytes.
- *
- * The bytes belong to the slave, until the next call for it. A byte costs some instructions, a
- * complete command a checksum over it and the callbacks.
- */
-motorlink_error motorlink_st_slave_receive(struct motorlink_st_slave *slave,
-                                           uint64_t now_us,
-                                           uint8_t byte,
-                                           struct motorlink_bytes *reply);
-
-/**
- * Call at the deadline: gives the refusal that a command is owed which did not come whole in time
- * (4.1), and no bytes when there is none. The bytes belong to the slave, until the next call for
- * it.
- */
-motorlink_error motorlink_st_slave_poll(struct motorlink_st_slave *slave,
-                                        uint64_t now_us,
-                                        struct motorlink_bytes *reply);
-
-/**
- * When `motorlink_st_slave_poll` has to be called; `MOTORLINK_NEVER` while no command is under
- * way, and always in profile MCSDK 5.4, whose firmware never times out.
- */
-motorlink_error motorlink_st_slave_deadline(struct motorlink_st_slave *slave,
-                                            uint64_t *deadline_us);
-
-/**
- * Tells that the receiver lost bytes (overrun, framing, noise): drops the command under way and
- * gives the refusal to send. The bytes belong to the slave, until the next call for it.
- */
-motorlink_error motorlink_st_slave_overrun(struct motorlink_st_slave *slave,
-                                           struct motorlink_bytes *reply);
-
-/**
- * Reads the payload of an answer to `motorlink_st_master_board_info`.
- *
- * `BAD_ARGUMENT`: the payload is too short to be one.
- */
-motorlink_error motorlink_st_decode_board_info(const uint8_t *payload,
-                                               size_t size,
-                                               struct motorlink_st_board_info *info);
-
-/**
- * Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
- * UTF-8 are cut there.
- */
-motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
-                                                     size_t size,
-                                                     struct motorlink_st_firmware_version *version);
-
-/**
- * Reads the payload of an answer to `motorlink_st_master_revup`.
- *
- * `BAD_ARGUMENT`: the payload is too short to be one.
- */
-motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
-                                          size_t size,
-                                          struct motorlink_st_revup_phase *phase);
-
-/**
- * Reads the payload of an answer to `motorlink_st_master_read_segment`: the values of the `count`
- * registers that the segment was configured with, in the same order, into as many `values`, each
- * as in `motorlink_st_action`.
- *
- * `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are left alone.
- */
-motorlink_error motorlink_st_decode_segment(const uint8_t *payload,
-                                            size_t size,
-                                            const uint8_t *registers,
-                                            size_t count,
-                                            int32_t *values);
-
-/**
- * The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
- */
-struct motorlink_st_master_config motorlink_st_master_defaults(void);
-
-/**
- * Begins a master on a line that is up, whatever the storage held before.
- *
- * `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
- *
- * `BAD_ARGUMENT`: `profile` or `recovery` is
- * not one of its enum's.
- */
-motorlink_error motorlink_st_master_init(struct motorlink_st_master *master,
-                                         size_t size,
-                                         const struct motorlink_st_master_config *config);
-
-/**
- * Begins to read a register; `value` of the result is its value. Any number is taken.
- */
-motorlink_error motorlink_st_master_get_register(struct motorlink_st_master *master,
-                                                 uint8_t motor,
-                                                 uint8_t reg);
-
-/**
- * Begins to write a register, with as many low bytes of `value` as it has; of a floating-point
- * register `value` is the bits. Any number is taken.
- */
-motorlink_error motorlink_st_master_set_register(struct motorlink_st_master *master,
-                                                 uint8_t motor,
-                                                 uint8_t reg,
-                                                 int32_t value);
-
-/**
- * Begins to have a command executed, one of `motorlink_st_command`. Any number is taken.
- */
-motorlink_error motorlink_st_master_execute(struct motorlink_st_master *master,
-                                            uint8_t motor,
-                                            uint8_t command);
-
-/**
- * Begins to program a speed ramp (4.8): to `speed_rpm` in `duration_ms`; 0 ms is a step.
- */
-motorlink_error motorlink_st_master_ramp(struct motorlink_st_master *master,
-                                         uint8_t motor,
-                                         int32_t speed_rpm,
-                                         uint16_t duration_ms);
-
-/**
- * Begins to set the references of Iq and Id (4.11), s16A digits.
- */
-motorlink_error motorlink_st_master_current(struct motorlink_st_master *master,
-                                            uint8_t motor,
-                                            int16_t iq_s16a,
-                                            int16_t id_s16a);
-
-/**
- * Begins to program a torque ramp (profile MCSDK 5.4): to `torque_s16a` in `duration_ms`; 0 ms is
- * a step.
- */
-motorlink_error motorlink_st_master_torque_ramp(struct motorlink_st_master *master,
-                                                uint8_t motor,
-                                                int32_t torque_s16a,
-                                                uint16_t duration_ms);
-
-/**
- * Begins a move to `angle_rad` in `duration_s` (profile MCSDK 5.4).
- *
- * `BAD_ARGUMENT`: `motor` is over 7, or a value is not finite.
- */
-motorlink_error motorlink_st_master_move(struct motorlink_st_master *master,
-                                         uint8_t motor,
-                                         float angle_rad,
-                                         float duration_s);
-
-/**
- * Begins to read rev-up phase 0 to 4 (4.9); `motorlink_st_decode_revup` reads the result.
- *
- * `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
- */
-motorlink_error motorlink_st_master_revup(struct motorlink_st_master *master,
-                                          uint8_t motor,
-                                          uint8_t phase);
-
-/**
- * Begins to write rev-up phase 0 to 4 (4.10). `data` is copied.
- *
- * `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
- */
-motorlink_error motorlink_st_master_set_revup(struct motorlink_st_master *master,
-                                              uint8_t motor,
-                                              uint8_t phase,
-                                              const struct motorlink_st_revup_phase *data);
-
-/**
- * Begins to read the SDK's version and name (4.7); `motorlink_st_decode_board_info` reads the
- * result.
- */
-motorlink_error motorlink_st_master_board_info(struct motorlink_st_master *master, uint8_t motor);
-
-/**
- * Begins to read the firmware's version (4.12); `motorlink_st_decode_firmware_version` reads the
- * result.
- */
-motorlink_error motorlink_st_master_firmware_version(struct motorlink_st_master *master,
-                                                     uint8_t motor);
-
-/**
- * Begins to choose the registers of a data segment (profile SPEC): `count` numbers, which are
- * copied.
- */
-motorlink_error motorlink_st_master_configure_segment(struct motorlink_st_master *master,
-                                                      uint8_t motor,
-                                                      uint8_t segment,
-                                                      const uint8_t *registers,
-                                                      size_t count);
-
-/**
- * Begins to read a data segment (profile SPEC): the values of its registers, one behind the other,
- * little-endian, in the size that each has.
- */
-motorlink_error motorlink_st_master_read_segment(struct motorlink_st_master *master,
-                                                 uint8_t motor,
-                                                 uint8_t segment);
-
-/**
- * Begins to ask which registers steps of the motor profiler show (profile MCSDK 5.4): `count`
- * numbers of steps, which are copied. The result has the count and the registers of each step.
- */
-motorlink_error motorlink_st_master_profiler_info(struct motorlink_st_master *master,
-                                                  uint8_t motor,
-                                                  const uint8_t *steps,
-                                                  size_t count);
-
-/**
- * Begins an exchange with any header (5 bits of `motorlink_st_frame`, 3 bits of motor) and any
- * payload of up to 128 bytes, which is copied.
- *
- * `TOO_LONG`: over 128 bytes.
- */
-motorlink_error motorlink_st_master_raw(struct motorlink_st_master *master,
-                                        uint8_t header,
-                                        const uint8_t *payload,
-                                        size_t size);
-
-/**
- * How long the longest thing that a master sends takes at `baud`, µs. Where the port takes bytes
- * faster than the line carries them, add this to `quiet_us`.
- */
-uint64_t motorlink_st_longest_transmission_us(uint32_t baud);
-
-/**
- * What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
- * `DONE`; after `WAIT` when something came or the time is over.
- */
-motorlink_error motorlink_st_master_poll(struct motorlink_st_master *master,
-                                         uint64_t now_us,
-                                         struct motorlink_st_action *action);
-
-/**
- * Takes what came from the drive at `now_us`, in any pieces. `bytes` may not lie in the storage.
- */
-motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
-                                            uint64_t now_us,
-                                            const uint8_t *bytes,
-                                            size_t size);
-
-/**
- * Gives up the exchange under way. Its reply may still come, so the line is lost.
- */
-motorlink_error motorlink_st_master_abandon(struct motorlink_st_master *master);
-
-/**
- * Tells that the line is out of step: something was sent or received beside the master. An
- * exchange under way ends without a result.
- */
-motorlink_error motorlink_st_master_lost(struct motorlink_st_master *master);
-
-/**
- * Tells that the line was closed and opened again, with nothing left in it from before. An
- * exchange under way ends without a result.
- */
-motorlink_error motorlink_st_master_reopened(struct motorlink_st_master *master);
-
-/**
- * Sets `lost` to 1 where an exchange failed and the next one has to recover the line first, and to
- * 0 where the last one ended in step.
- */
-motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, uint8_t *lost);
 
 /**
  * Begins a slave for a drive with motors 1 to `motors`, whatever the storage held before.

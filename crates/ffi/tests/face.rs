@@ -9,7 +9,7 @@ use std::slice;
 use motorlink_ffi::motorlink_error as Error;
 use motorlink_ffi::rmd::{drive::*, host::*, message::*, *};
 use motorlink_ffi::slcan::*;
-use motorlink_ffi::st::{master::*, message::*, slave::*, *};
+use motorlink_ffi::st::{master::*, message::*, request::*, slave::*, *};
 use motorlink_ffi::*;
 
 const OK: Error = Error::Ok;

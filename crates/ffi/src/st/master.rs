@@ -1,17 +1,15 @@
 //! The master's end: one exchange at a time.
 
 use motorlink_proto::stmcp::{
-    Command, Config, CurrentReference, Error, Failure, Line, MAX_PAYLOAD, Master, Motor, Output,
-    PositionMove, Profile, REVUP_PHASES, Ramp, Recovery, RegisterId, Request, RequestError,
-    TorqueRamp,
+    Config, Error, Failure, Line, MAX_PAYLOAD, Master, Output, Profile, Recovery, RegisterId,
 };
 use motorlink_proto::time::{Duration, Instant};
 
-use super::message::motorlink_st_revup_phase;
-use super::{motorlink_st_master, profile};
+use super::motorlink_st_master;
+use super::profile::{motorlink_st_profile, profile};
 use crate::bytes::{MOTORLINK_NEVER, motorlink_action, motorlink_bytes};
 use crate::error::{answer, motorlink_error};
-use crate::pointer::{Out, plain, promised};
+use crate::pointer::{plain, promised};
 
 /// How a line comes back on which an exchange failed.
 #[repr(u8)]
@@ -64,10 +62,10 @@ plain!(motorlink_st_master_config);
 
 /// What the storage of a master holds.
 pub(crate) struct State {
-    master: Master,
-    profile: Profile,
+    pub(super) master: Master,
+    pub(super) profile: Profile,
     /// The register whose value is asked for.
-    asked: Option<RegisterId>,
+    pub(super) asked: Option<RegisterId>,
 }
 
 /// The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
@@ -77,7 +75,7 @@ pub extern "C" fn motorlink_st_master_defaults() -> motorlink_st_master_config {
     motorlink_st_master_config {
         timeout_us: timeout.0 as u32,
         quiet_us: quiet.0 as u32,
-        profile: super::motorlink_st_profile::Spec as u8,
+        profile: motorlink_st_profile::Spec as u8,
         recovery: motorlink_st_recovery::Drain as u8,
     }
 }
@@ -117,253 +115,6 @@ fn recovery(number: u8) -> Result<Recovery, motorlink_error> {
         PAD => Ok(Recovery::Pad),
         _ => Err(motorlink_error::BadArgument),
     }
-}
-
-/// Begins an exchange; all requests end here.
-fn request(
-    master: Out<motorlink_st_master>,
-    motor: u8,
-    request: &Request<'_>,
-) -> Result<(), motorlink_error> {
-    let mut state = master.enter()?;
-    check_motor(motor)?;
-    state.master.request(motor, request).map_err(refused)?;
-    state.asked = match request {
-        Request::GetRegister(register) => Some(*register),
-        _ => None,
-    };
-    Ok(())
-}
-
-fn check_motor(motor: u8) -> Result<(), motorlink_error> {
-    if motor <= Motor::MAX { Ok(()) } else { Err(motorlink_error::BadArgument) }
-}
-
-fn refused(error: RequestError) -> motorlink_error {
-    match error {
-        RequestError::Busy => motorlink_error::Busy,
-        RequestError::TooLong => motorlink_error::TooLong,
-    }
-}
-
-/// Begins to read a register; `value` of the result is its value. Any number is taken.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_get_register(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    reg: u8,
-) -> motorlink_error {
-    promised!(master);
-    answer(|| request(master, motor, &Request::GetRegister(RegisterId(reg))))
-}
-
-/// Begins to write a register, with as many low bytes of `value` as it has; of a floating-point
-/// register `value` is the bits. Any number is taken.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_set_register(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    reg: u8,
-    value: i32,
-) -> motorlink_error {
-    promised!(master);
-    answer(|| {
-        let mut state = master.enter()?;
-        check_motor(motor)?;
-        let register = RegisterId(reg);
-        let size = register.write_size(state.profile);
-        let bytes = value.to_le_bytes();
-        let value = bytes.get(..usize::from(size)).unwrap_or(&bytes);
-        state.asked = None;
-        let request = Request::SetRegister { register, value };
-        state.master.request(motor, &request).map_err(refused)
-    })
-}
-
-/// Begins to have a command executed, one of `motorlink_st_command`. Any number is taken.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_execute(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    command: u8,
-) -> motorlink_error {
-    promised!(master);
-    answer(|| request(master, motor, &Request::Execute(Command::from(command))))
-}
-
-/// Begins to program a speed ramp (4.8): to `speed_rpm` in `duration_ms`; 0 ms is a step.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_ramp(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    speed_rpm: i32,
-    duration_ms: u16,
-) -> motorlink_error {
-    promised!(master);
-    answer(|| request(master, motor, &Request::Ramp(Ramp { speed_rpm, duration_ms })))
-}
-
-/// Begins to set the references of Iq and Id (4.11), s16A digits.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_current(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    iq_s16a: i16,
-    id_s16a: i16,
-) -> motorlink_error {
-    promised!(master);
-    let reference = CurrentReference { iq_s16a, id_s16a };
-    answer(|| request(master, motor, &Request::CurrentReference(reference)))
-}
-
-/// Begins to program a torque ramp (profile MCSDK 5.4): to `torque_s16a` in `duration_ms`; 0 ms is
-/// a step.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_torque_ramp(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    torque_s16a: i32,
-    duration_ms: u16,
-) -> motorlink_error {
-    promised!(master);
-    answer(|| request(master, motor, &Request::TorqueRamp(TorqueRamp { torque_s16a, duration_ms })))
-}
-
-/// Begins a move to `angle_rad` in `duration_s` (profile MCSDK 5.4).
-///
-/// `BAD_ARGUMENT`: `motor` is over 7, or a value is not finite.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_move(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    angle_rad: f32,
-    duration_s: f32,
-) -> motorlink_error {
-    promised!(master);
-    answer(|| {
-        if !angle_rad.is_finite() || !duration_s.is_finite() {
-            return Err(motorlink_error::BadArgument);
-        }
-        request(master, motor, &Request::Position(PositionMove { angle_rad, duration_s }))
-    })
-}
-
-/// Begins to read rev-up phase 0 to 4 (4.9); `motorlink_st_decode_revup` reads the result.
-///
-/// `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_revup(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    phase: u8,
-) -> motorlink_error {
-    promised!(master);
-    answer(|| request(master, motor, &Request::RevupData(check_phase(phase)?)))
-}
-
-fn check_phase(phase: u8) -> Result<u8, motorlink_error> {
-    if phase < REVUP_PHASES { Ok(phase) } else { Err(motorlink_error::BadArgument) }
-}
-
-/// Begins to write rev-up phase 0 to 4 (4.10). `data` is copied.
-///
-/// `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_set_revup(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    phase: u8,
-    data: *const motorlink_st_revup_phase,
-) -> motorlink_error {
-    promised!(master, data);
-    answer(|| {
-        let data = data.read()?.into();
-        request(master, motor, &Request::SetRevupData(check_phase(phase)?, data))
-    })
-}
-
-/// Begins to read the SDK's version and name (4.7); `motorlink_st_decode_board_info` reads the
-/// result.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_board_info(
-    master: *mut motorlink_st_master,
-    motor: u8,
-) -> motorlink_error {
-    promised!(master);
-    answer(|| request(master, motor, &Request::BoardInfo))
-}
-
-/// Begins to read the firmware's version (4.12); `motorlink_st_decode_firmware_version` reads the
-/// result.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_firmware_version(
-    master: *mut motorlink_st_master,
-    motor: u8,
-) -> motorlink_error {
-    promised!(master);
-    answer(|| request(master, motor, &Request::FirmwareVersion))
-}
-
-/// Begins to choose the registers of a data segment (profile SPEC): `count` numbers, which are
-/// copied.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_configure_segment(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    segment: u8,
-    registers: *const u8,
-    count: usize,
-) -> motorlink_error {
-    promised!(master, registers);
-    answer(|| {
-        let registers = registers.slice(count)?;
-        request(master, motor, &Request::ConfigDynStruct { segment, registers })
-    })
-}
-
-/// Begins to read a data segment (profile SPEC): the values of its registers, one behind the other,
-/// little-endian, in the size that each has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_read_segment(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    segment: u8,
-) -> motorlink_error {
-    promised!(master);
-    answer(|| request(master, motor, &Request::DataElement(segment)))
-}
-
-/// Begins to ask which registers steps of the motor profiler show (profile MCSDK 5.4): `count`
-/// numbers of steps, which are copied. The result has the count and the registers of each step.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_profiler_info(
-    master: *mut motorlink_st_master,
-    motor: u8,
-    steps: *const u8,
-    count: usize,
-) -> motorlink_error {
-    promised!(master, steps);
-    answer(|| request(master, motor, &Request::ProfilerInfo(steps.slice(count)?)))
-}
-
-/// Begins an exchange with any header (5 bits of `motorlink_st_frame`, 3 bits of motor) and any
-/// payload of up to 128 bytes, which is copied.
-///
-/// `TOO_LONG`: over 128 bytes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_raw(
-    master: *mut motorlink_st_master,
-    header: u8,
-    payload: *const u8,
-    size: usize,
-) -> motorlink_error {
-    promised!(master, payload);
-    answer(|| {
-        let payload = payload.slice(size)?;
-        let mut state = master.enter()?;
-        state.asked = None;
-        state.master.request_raw(header, payload).map_err(refused)
-    })
 }
 
 /// How long the longest thing that a master sends takes at `baud`, µs. Where the port takes bytes

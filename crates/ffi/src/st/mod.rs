@@ -3,30 +3,8 @@
 pub mod master;
 pub mod message;
 pub mod names;
+pub mod profile;
+pub mod request;
 pub mod slave;
 
 pub use crate::storage::{motorlink_st_master, motorlink_st_slave};
-
-use motorlink_proto::stmcp::Profile;
-
-use crate::error::motorlink_error;
-
-/// How a drive behaves where the document and shipped firmware differ.
-#[repr(u8)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum motorlink_st_profile {
-    /// The document as written.
-    Spec = 0,
-    /// What firmware of MCSDK 5.4 does on the wire.
-    Mcsdk54 = 1,
-}
-
-fn profile(number: u8) -> Result<Profile, motorlink_error> {
-    const SPEC: u8 = motorlink_st_profile::Spec as u8;
-    const MCSDK54: u8 = motorlink_st_profile::Mcsdk54 as u8;
-    match number {
-        SPEC => Ok(Profile::Spec),
-        MCSDK54 => Ok(Profile::Mcsdk54),
-        _ => Err(motorlink_error::BadArgument),
-    }
-}

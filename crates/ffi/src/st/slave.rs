@@ -9,7 +9,8 @@ use motorlink_proto::stmcp::{
 use motorlink_proto::time::Instant;
 
 use super::message::motorlink_st_revup_phase;
-use super::{motorlink_st_slave, profile};
+use super::motorlink_st_slave;
+use super::profile::profile;
 use crate::bytes::{MOTORLINK_NEVER, motorlink_bytes};
 use crate::error::{answer, motorlink_error};
 use crate::pointer::{In, ascii, plain, promised};
