@@ -290,3 +290,20 @@ fn a_host_commands_a_drive_through_an_adapter() {
     gives!(Ok, motorlink_rmd_drive_motion(&mut drive, &mut motion));
     assert_eq!((motion.kind, motion.torque_16ma), (2, 100));
 }
+
+#[test]
+fn two_threads_do_not_enter_one_object() {
+    let mut host: Box<motorlink_rmd_host> = Box::new(zeroed());
+    gives!(Ok, motorlink_rmd_host_init(&mut *host, size_of_val(&*host)));
+    let address = std::ptr::from_mut(&mut *host).expose_provenance();
+    let threads = [(); 2].map(|()| {
+        std::thread::spawn(move || {
+            let host = std::ptr::with_exposed_provenance_mut(address);
+            let mut busy = 0;
+            let calls = (0..200).map(|_| unsafe { motorlink_rmd_host_busy(host, &mut busy) });
+            calls.filter(|result| *result == OK).count() > 0
+        })
+    });
+    assert!(threads.map(|thread| thread.join().expect("it ends")).contains(&true));
+    drop(host);
+}
