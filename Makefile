@@ -51,7 +51,8 @@ fuzz:
 	command -v cargo-fuzz >/dev/null || $(CARGO) install --locked cargo-fuzz
 	fuzz/run $(SECONDS)
 
-# Tests of proto and of the C face in an interpreter that sees undefined behaviour, with few cases a property.
+# Tests of proto and of the C face in an interpreter that sees undefined behaviour, with few cases
+# a property.
 miri:
 	@rustup run nightly cargo miri --version >/dev/null 2>&1 || \
 		rustup toolchain install nightly --profile minimal --component miri --component rust-src || \
@@ -98,7 +99,8 @@ e2e: $(VENV)/ready
 	$(CARGO) build -p motorlink-cli --locked
 	MOTORLINK_BIN=$$PWD/target/debug/motorlink $(VENV)/bin/python -m pytest -q tests/e2e
 
-# The C face: header, packages, vectors, misuse, examples. Ends well, and says so, without a compiler.
+# The C face from a C programmer's side. Says so, and goes on, where compilers cannot be installed.
+# (That the header is up to date, a Rust test says.)
 ffi-test:
 	$(CARGO) build -p motorlink-cli --locked
 	CARGO="$(CARGO)" SUDO="$(SUDO)" crates/ffi/tests/c/run $${CARGO_TARGET_DIR:-target}/debug/motorlink || \
