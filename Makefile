@@ -89,10 +89,11 @@ determinism:
 	$(FINGERPRINT) $(PLAIN) | cmp - target/fingerprint
 
 # Both protocols, and their C face, link for a Cortex-M4 without a path that panics, within their RAM.
+# What else is for boards builds there.
 probe:
 	rustup target list --installed | grep -qx $(TARGET) || rustup target add $(TARGET)
 	cd probe && $(CARGO) build --release --locked
-	$(CARGO) build -p motorlink-proto -p motorlink-sim --target $(TARGET) --locked
+	$(CARGO) build -p motorlink-embedded -p motorlink-sim --target $(TARGET) --locked
 
 # The built program against independent clients on ptys and loopback.
 e2e: $(VENV)/ready

@@ -10,7 +10,7 @@ use super::current::CurrentLoop;
 use super::speed::Speedometer;
 use crate::angle;
 use crate::control::within;
-use crate::plant::{Bridge, Plant, PlantTruth};
+use crate::plant::{Bridge, OutOfRange, Plant, PlantTruth};
 use crate::vector::INVERSE_SQRT_3;
 
 /// Time between two steps of the loops for speed and position, µs.
@@ -65,7 +65,10 @@ pub struct Truth {
 
 /// The world around the motor.
 impl RmdMotor {
-    pub(super) fn new(config: RmdConfig) -> Self {
+    /// A motor without a drive, for one whose [`Drive`](motorlink_proto::rmd::Drive) is elsewhere;
+    /// refused where [`RmdConfig::check`] refuses the configuration.
+    pub fn new(config: RmdConfig) -> Result<Self, OutOfRange> {
+        config.check()?;
         let plant = Plant::new(config.plant);
         let periods = (LOOP_US / config.plant.period_us).max(1);
         let dt = plant.period() * f32::from(periods);
@@ -86,11 +89,11 @@ impl RmdMotor {
             config,
         };
         motor.power_on();
-        motor
+        Ok(motor)
     }
 
     /// Starts to count turns anew, as an encoder does that only knows its place in the turn.
-    pub(super) fn power_on(&mut self) {
+    pub fn power_on(&mut self) {
         let turn = 1 << self.config.plant.encoder.bits;
         self.origin = self.plant.counts() & -turn;
     }
@@ -140,8 +143,9 @@ impl RmdMotor {
 
 /// What happens by itself.
 impl RmdMotor {
-    /// A period; whether the loops for speed and position took a step.
-    pub(super) fn step(&mut self) -> bool {
+    /// A period of the plant's configuration; whether the loops for speed and position took a step.
+    /// [`RmdNode`](super::RmdNode) does this by itself.
+    pub fn step(&mut self) -> bool {
         let bridge = match self.mode {
             Mode::Off => Bridge::Off,
             _ => self.current.step(&self.plant),

@@ -18,11 +18,11 @@ impl RmdNode {
     /// A motor that is powered on `now` with this ROM; `None` where [`RmdConfig::check`] refuses
     /// the configuration. A new ROM is [`RmdConfig::factory_rom`].
     pub fn new(now: Instant, config: RmdConfig, rom: Settings) -> Option<Self> {
-        config.check().ok()?;
+        let motor = RmdMotor::new(config).ok()?;
         let drive = Drive::new(config.drive()?, rom);
         let period = Duration(config.plant.period_us.into());
         let clock = Clock::new(period, now);
-        let mut node = RmdNode { drive, motor: RmdMotor::new(config), clock };
+        let mut node = RmdNode { drive, motor, clock };
         node.power_cycle(now);
         Some(node)
     }

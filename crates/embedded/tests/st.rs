@@ -1,0 +1,190 @@
+//! Both ends of ST MCP behind embedded-io, on a simulated line and a virtual clock.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
+use motorlink_embedded::st::{Event, MasterPort, SlavePort};
+use motorlink_proto::stmcp::{
+    Config, Error, ErrorCode, Failure, Master, Profile, Ramp, RegisterId, Request, Slave,
+};
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_sim::st::{StDrive, StMotor};
+
+/// What a UART has received: bytes, or that some were lost.
+type Received = Rc<RefCell<VecDeque<Result<u8, ErrorKind>>>>;
+
+/// One end of a line on which bytes take no time.
+struct Uart {
+    received: Received,
+    other: Received,
+}
+
+fn line() -> (Uart, Uart) {
+    let (one, other) = (Received::default(), Received::default());
+    (Uart { received: one.clone(), other: other.clone() }, Uart { received: other, other: one })
+}
+
+impl ErrorType for Uart {
+    type Error = ErrorKind;
+}
+
+impl ReadReady for Uart {
+    fn read_ready(&mut self) -> Result<bool, ErrorKind> {
+        Ok(!self.received.borrow().is_empty())
+    }
+}
+
+impl Read for Uart {
+    fn read(&mut self, room: &mut [u8]) -> Result<usize, ErrorKind> {
+        let mut received = self.received.borrow_mut();
+        assert!(!received.is_empty(), "a board would stand still here");
+        if let Some(&Err(error)) = received.front() {
+            received.pop_front();
+            return Err(error);
+        }
+        let mut len = 0;
+        while let (Some(slot), Some(&Ok(byte))) = (room.get_mut(len), received.front()) {
+            (*slot, len) = (byte, len + 1);
+            received.pop_front();
+        }
+        Ok(len)
+    }
+}
+
+impl Write for Uart {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+        // Like a FIFO: a few at a time.
+        let taken = &bytes[..bytes.len().min(7)];
+        self.other.borrow_mut().extend(taken.iter().map(|&byte| Ok(byte)));
+        Ok(taken.len())
+    }
+    fn flush(&mut self) -> Result<(), ErrorKind> {
+        Ok(())
+    }
+}
+
+struct Bench {
+    now: Instant,
+    master: MasterPort<Uart>,
+    slave: SlavePort<Uart>,
+    drive: StDrive<[StMotor; 2]>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let (ours, theirs) = line();
+        let drive = StDrive::demo(Instant(0));
+        let slave = Slave::new(Profile::Spec, drive.last());
+        let master = Master::new(Config::default());
+        Bench {
+            now: Instant(0),
+            master: MasterPort::new(ours, master),
+            slave: SlavePort::new(theirs, slave),
+            drive,
+        }
+    }
+
+    fn serve(&mut self) -> Option<Instant> {
+        loop {
+            match self.slave.poll(self.now, &mut self.drive).expect("nothing was lost") {
+                Some(at) if at <= self.now => {}
+                next => return next,
+            }
+        }
+    }
+
+    /// Both ends until the exchange is over; time passes where both wait.
+    fn exchange(&mut self) -> Result<Vec<u8>, Error> {
+        loop {
+            let served = self.serve();
+            match self.master.poll(self.now).expect("nothing was lost") {
+                Event::Done(result) => return result.map(<[u8]>::to_vec),
+                Event::Wait(next) => {
+                    let next = next.into_iter().chain(served).min();
+                    self.now = self.now.max(next.expect("an exchange is under way"));
+                }
+            }
+        }
+    }
+
+    fn ask(&mut self, request: Request<'_>) -> Result<Vec<u8>, Error> {
+        self.master.master_mut().request(1, &request).expect("the last exchange is over");
+        self.exchange()
+    }
+
+    /// What the slave has sent, taken off the line.
+    fn sent(&mut self) -> Vec<u8> {
+        let mut sent = self.master.uart_mut().received.borrow_mut();
+        sent.drain(..).map(|byte| byte.expect("a byte")).collect()
+    }
+}
+
+#[test]
+fn a_master_behind_one_uart_commands_a_drive_behind_another() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.ask(Request::Ramp(Ramp { speed_rpm: 1200, duration_ms: 0 })), Ok(vec![]));
+    let reference = bench.ask(Request::GetRegister(RegisterId::RAMP_FINAL_SPEED));
+    assert_eq!(reference, Ok(1200_i32.to_le_bytes().to_vec()));
+    assert_eq!(bench.ask(Request::BoardInfo).map(|info| info.len()), Ok(32));
+    let unknown = bench.ask(Request::GetRegister(RegisterId(0xEE)));
+    assert_eq!(unknown, Err(Error::Refused(ErrorCode::GetWriteOnly)));
+    assert_eq!(bench.now, Instant(0), "nothing had to be waited for");
+}
+
+#[test]
+fn a_command_that_does_not_come_whole_is_answered_when_its_time_is_over() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.serve(), None, "an idle line waits for bytes alone");
+    bench.master.uart_mut().write_all(&[0x22, 0x01]).unwrap();
+    let deadline = bench.serve().expect("a command is under way");
+    assert_eq!(deadline, Instant(25_000));
+    assert_eq!(bench.sent(), []);
+    bench.now = deadline;
+    assert_eq!(bench.serve(), None);
+    assert_eq!(bench.sent(), [0xFF, 0x01, 0x09, 0x0A]);
+}
+
+#[test]
+fn lost_bytes_are_answered_with_overrun_and_the_next_command_is_understood() {
+    let mut bench = Bench::new();
+    bench.master.uart_mut().write_all(&[0x22, 0x01]).unwrap();
+    bench.serve();
+    bench.slave.uart_mut().received.borrow_mut().push_back(Err(ErrorKind::Other));
+    assert_eq!(bench.slave.poll(bench.now, &mut bench.drive), Err(ErrorKind::Other));
+    assert_eq!(bench.sent(), [0xFF, 0x01, 0x08, 0x09]);
+    assert_eq!(bench.ask(Request::BoardInfo).map(|info| info.len()), Ok(32));
+}
+
+#[test]
+fn a_call_does_a_bounded_amount_of_work_on_a_line_full_of_garbage() {
+    let mut bench = Bench::new();
+    bench.slave.uart_mut().received.borrow_mut().extend([Ok(0xA5); 1000]);
+    assert_eq!(bench.slave.poll(bench.now, &mut bench.drive), Ok(Some(bench.now)));
+    assert_eq!(bench.slave.uart_mut().received.borrow().len(), 1000 - 32);
+}
+
+#[test]
+fn a_drive_that_is_silent_costs_the_timeout_and_the_line_recovers() {
+    let mut bench = Bench::new();
+    bench.master.master_mut().request(1, &Request::BoardInfo).unwrap();
+    let Ok(Event::Wait(Some(_))) = bench.master.poll(bench.now) else { panic!("sent") };
+    bench.slave.uart_mut().received.borrow_mut().clear();
+    assert_eq!(bench.exchange(), Err(Error::Failed(Failure::Timeout)));
+    assert_eq!(bench.now, Instant(0) + Duration::from_millis(1000));
+    assert_eq!(bench.ask(Request::FirmwareVersion).map(|text| text.len()), Ok(32));
+}
+
+#[test]
+fn bytes_of_a_reply_that_are_lost_end_the_exchange_and_not_the_port() {
+    let mut bench = Bench::new();
+    bench.master.master_mut().request(1, &Request::BoardInfo).unwrap();
+    bench.master.poll(bench.now).expect("sent");
+    bench.master.uart_mut().received.borrow_mut().push_back(Err(ErrorKind::Other));
+    assert_eq!(bench.master.poll(bench.now), Err(ErrorKind::Other));
+    bench.serve();
+    bench.master.uart_mut().received.borrow_mut().drain(..10);
+    assert!(bench.exchange().is_err(), "half a reply is none");
+    assert_eq!(bench.ask(Request::BoardInfo).map(|info| info.len()), Ok(32));
+}
