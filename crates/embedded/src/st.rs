@@ -82,12 +82,14 @@ pub enum Event<'a> {
 pub struct MasterPort<U> {
     uart: U,
     master: Master,
+    /// Something was sent since the last call.
+    sent: bool,
 }
 
 impl<U: Read + Write + ReadReady> MasterPort<U> {
     /// Puts `master` on a UART.
     pub const fn new(uart: U, master: Master) -> Self {
-        MasterPort { uart, master }
+        MasterPort { uart, master, sent: false }
     }
 
     /// Takes what has come, at most 32 bytes, and sends what is due.
@@ -96,6 +98,10 @@ impl<U: Read + Write + ReadReady> MasterPort<U> {
     /// Those of the UART. The exchange goes on: where a reply's bytes were lost it ends at its
     /// timeout, and the line recovers before the next one.
     pub fn poll(&mut self, now: Instant) -> Result<Event<'_>, U::Error> {
+        if core::mem::take(&mut self.sent) {
+            // The reply's time runs from here on.
+            self.master.poll(now);
+        }
         let mut chunk = [0; CHUNK];
         let received = read_some(&mut self.uart, &mut chunk)?;
         self.master.receive(now, received);
@@ -103,7 +109,7 @@ impl<U: Read + Write + ReadReady> MasterPort<U> {
             Output::Transmit(bytes) => {
                 self.uart.write_all(bytes)?;
                 self.uart.flush()?;
-                // The reply's time runs from the next call on.
+                self.sent = true;
                 Ok(Event::Wait(Some(now)))
             }
             Output::Done(result) => Ok(Event::Done(result)),
