@@ -2,6 +2,7 @@
 //!
 //! * [`st`]: ST's Motor Control Protocol on a UART that has the traits of [`embedded_io`].
 //! * [`rmd`]: RMD on a CAN controller that has those of [`embedded_can::nb`].
+//! * [`slcan`]: such a controller made of a UART that speaks slcan.
 //!
 //! A port moves bytes or frames between a peripheral and a machine of [`motorlink_proto`], and
 //! nothing else: no clock, no interrupt, no allocation, no `unsafe`, no panic. Its `poll` takes the
@@ -31,4 +32,5 @@
 #![deny(missing_docs)]
 
 pub mod rmd;
+pub mod slcan;
 pub mod st;

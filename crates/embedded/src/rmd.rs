@@ -181,10 +181,7 @@ fn ready<T, E>(result: nb::Result<T, E>) -> Result<Option<T>, E> {
 
 /// A controller's frame as the protocol sees it.
 pub fn from_can(frame: &impl Frame) -> CanFrame {
-    let (id, extended) = match frame.id() {
-        Id::Standard(id) => (u32::from(id.as_raw()), false),
-        Id::Extended(id) => (id.as_raw(), true),
-    };
+    let (id, extended) = raw(frame.id());
     if frame.is_remote_frame() {
         CanFrame::remote_frame(id, extended, u8::try_from(frame.dlc()).unwrap_or(u8::MAX))
     } else {
@@ -194,14 +191,26 @@ pub fn from_can(frame: &impl Frame) -> CanFrame {
 
 /// A frame of the protocol as a controller takes it; `None` where the controller has no such frames.
 pub fn to_can<F: Frame>(frame: &CanFrame) -> Option<F> {
-    let id = if frame.is_extended() {
-        Id::Extended(ExtendedId::new(frame.id())?)
-    } else {
-        Id::Standard(StandardId::new(u16::try_from(frame.id()).ok()?)?)
-    };
     if frame.is_remote() {
-        F::new_remote(id, usize::from(frame.len()))
+        F::new_remote(id(frame), usize::from(frame.len()))
     } else {
-        F::new(id, frame.data())
+        F::new(id(frame), frame.data())
+    }
+}
+
+/// An identifier as a number, and whether it has 29 bits.
+pub(crate) fn raw(id: Id) -> (u32, bool) {
+    match id {
+        Id::Standard(id) => (u32::from(id.as_raw()), false),
+        Id::Extended(id) => (id.as_raw(), true),
+    }
+}
+
+pub(crate) fn id(frame: &CanFrame) -> Id {
+    // A CanFrame's identifier always has as many bits as it may have.
+    if frame.is_extended() {
+        Id::Extended(ExtendedId::new(frame.id()).unwrap_or(ExtendedId::MAX))
+    } else {
+        Id::Standard(StandardId::new(frame.id() as u16).unwrap_or(StandardId::MAX))
     }
 }
