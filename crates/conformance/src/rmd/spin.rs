@@ -89,6 +89,19 @@ impl Bench {
         }
     }
 
+    /// Lets the motor lose what speed pulses of torque have left it, which on a real line are not of
+    /// one length.
+    pub(super) fn slows_down(&mut self) -> Result<(), Stop> {
+        const PATIENCE_MS: u64 = 2_000;
+        let begun = self.millis();
+        while self.read(ReadStatus2)?.speed.0.unsigned_abs() > FAST
+            && self.millis() - begun < PATIENCE_MS
+        {
+            self.pause(EVERY)?;
+        }
+        Ok(())
+    }
+
     /// Watches until the motor stands.
     pub(super) fn comes_to_a_stand(&mut self, ms: u64) -> Result<bool, Stop> {
         self.watch(ms, |seen| seen.speed.abs() <= 5)

@@ -106,6 +106,7 @@ pub(super) fn pulses(
         sum += look(bench, sign)?;
     }
     bench.ask(Off.encode())?;
+    bench.slows_down()?;
     Ok(sum / f64::from(PULSES))
 }
 
