@@ -66,14 +66,20 @@ pub(super) fn runs(bench: &mut Bench, sign: i16) -> Result<(), Stop> {
     keeps_running(bench, sign)
 }
 
-/// The motor gets to 60 °/s and is still that fast a moment later.
+/// The motor gets to 60 °/s and stays that fast.
 pub(super) fn keeps_running(bench: &mut Bench, sign: i16) -> Result<(), Stop> {
     let good = |speed: i16| (speed - sign * SPEED).abs() <= 8;
     let reached = bench.watch(4_000, |seen| good(seen.speed))?;
     bench.require(reached, format!("{} °/s within 4 s", sign * SPEED))?;
-    bench.pause(Duration::from_millis(200))?;
-    let speed = bench.read(ReadStatus2)?.speed;
-    bench.require(good(speed.0), format!("{} °/s still, 0.2 s later", sign * SPEED))
+    // A look may catch a motor where its cogging holds it; the mean of some is its speed.
+    const LOOKS: i32 = 20;
+    let mut sum = 0;
+    for _ in 0..LOOKS {
+        bench.pause(Duration::from_millis(10))?;
+        sum += i32::from(bench.read(ReadStatus2)?.speed.0);
+    }
+    let words = format!("{} °/s still for 0.2 s, not {}", sign * SPEED, sum / LOOKS);
+    bench.require(good((sum / LOOKS) as i16), words)
 }
 
 fn deg(hundredths: i64) -> f64 {

@@ -89,12 +89,14 @@ impl Bench {
         }
     }
 
-    /// Lets the motor lose what speed pulses of torque have left it, which on a real line are not of
-    /// one length.
+    /// Lets the motor lose the speed that pulses of torque have left it, which on a real line are
+    /// not of one length, and lets what it shows of its speed follow.
     pub(super) fn slows_down(&mut self) -> Result<(), Stop> {
+        const FOLLOWS: Duration = Duration::from_millis(100);
         const PATIENCE_MS: u64 = 2_000;
+        self.pause(FOLLOWS)?;
         let begun = self.millis();
-        while self.read(ReadStatus2)?.speed.0.unsigned_abs() > FAST
+        while self.read(ReadStatus2)?.speed.0.unsigned_abs() > FAST / 10
             && self.millis() - begun < PATIENCE_MS
         {
             self.pause(EVERY)?;
