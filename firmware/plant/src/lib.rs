@@ -7,7 +7,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-use motorlink_proto::rmd::{Config, Drive, MotorId};
+use motorlink_proto::rmd::{Config, Drive, MotorId, Settings};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::plant::OutOfRange;
 use motorlink_sim::rmd::{RmdConfig, RmdMotor};
@@ -49,9 +49,14 @@ impl Plant {
     /// The drives of the RMD motors, not yet powered on.
     pub fn rmd_drives() -> [Drive; RMD_IDS.len()] {
         RMD_IDS.map(|id| {
-            let rom = RmdConfig::with_id(id).factory_rom();
-            Drive::new(Config::new(MotorId::new(id).expect("IDs 1 and 2 exist")), rom)
+            let id = MotorId::new(id).expect("IDs 1 and 2 exist");
+            Drive::new(Config::new(id), Self::rmd_rom())
         })
+    }
+
+    /// What a new RMD motor has in its ROM.
+    pub fn rmd_rom() -> Settings {
+        RmdConfig::default().factory_rom()
     }
 
     /// Moves the motors on by a slice of time, at most to `now`; whether they have reached it.
