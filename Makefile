@@ -1,6 +1,7 @@
 # make demo            simulated drives, driven through real ports
 # make test            everything that is tested, with what it needs installed first
 # make test-socketcan  the part of it that needs a CAN kernel, which runs in QEMU
+# make firmware-test   the part that runs on an emulated board, in Rust and in C
 # make determinism     simulated drives with and without optimisation, to the last digit
 # make fuzz            every fuzz target for SECONDS=60 each
 # make soak            a million exchanges with reconnects, some minutes
@@ -20,10 +21,12 @@ TARGET := thumbv7em-none-eabihf
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 SOCKETCAN := CARGO="$(CARGO)" SUDO="$(SUDO)" tests/socketcan/run.sh
 
+FIRMWARE := CARGO="$(CARGO)" SUDO="$(SUDO)" PYTEST="$(VENV)/bin/python -m pytest" tests/firmware/run.sh
+
 SECONDS ?= 60
 
-.PHONY: demo test lint deny unit determinism fuzz-replay miri probe e2e ffi-test test-socketcan
-.PHONY: fuzz soak bench reliability docs header install-c pictures semver fmt clean
+.PHONY: demo test lint deny unit determinism fuzz-replay miri probe sizes e2e python wheel ffi-test firmware-test
+.PHONY: test-socketcan fuzz soak bench reliability docs header install-c pictures semver fmt clean
 
 demo:
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
@@ -106,6 +109,12 @@ ffi-test:
 	$(CARGO) build -p motorlink-cli --locked
 	CARGO="$(CARGO)" SUDO="$(SUDO)" crates/ffi/tests/c/run $${CARGO_TARGET_DIR:-target}/debug/motorlink || \
 		[ $$? -eq 77 ]
+
+# Both boards in QEMU, against the conformance kit and hosts on this machine. Ends with 77 where the
+# packages cannot be had.
+firmware-test: $(VENV)/ready
+	$(CARGO) build -p motorlink-cli --locked
+	MOTORLINK_BIN=$${CARGO_TARGET_DIR:-$$PWD/target}/debug/motorlink $(FIRMWARE)
 
 # The port socketcan: in Debian's kernel in QEMU. Ends with 77 where the packages cannot be had.
 test-socketcan:

@@ -12,8 +12,6 @@
 #include "motorlink.h"
 #include "plant.h"
 
-#define ST_MOTORS 1
-
 /* ---- Registers (RM0090; PM0214 for the core) ---- */
 
 typedef struct {
@@ -176,7 +174,7 @@ static motorlink_st_drive st_drive = {
 static motorlink_error st_start(plant *motors)
 {
     st_drive.context = motors;
-    return motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, ST_MOTORS,
+    return motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, PLANT_ST_MOTORS,
                                    &st_drive);
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /*
- * Simulated motors for a board without any: a servo motor for the ST drive and PLANT_RMD_MOTORS
- * direct drives for the RMD bus. Functions with a context are callbacks of motorlink.h; on a real
+ * Simulated motors for a board without any: PLANT_ST_MOTORS behind the ST drive and PLANT_RMD_MOTORS
+ * on the RMD bus, with the IDs 1 and on. Functions with a context are callbacks of motorlink.h; on a real
  * board they are the motor control.
  *
  * There is one plant. Its functions are called from the main loop, one at a time; none from an
@@ -12,7 +12,8 @@
 
 #include "motorlink.h"
 
-#define PLANT_RMD_MOTORS 2
+#define PLANT_ST_MOTORS 2
+#define PLANT_RMD_MOTORS 4
 
 typedef struct plant plant;
 

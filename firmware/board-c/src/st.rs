@@ -11,7 +11,7 @@ use motorlink_sim::st::{StDrive, StMotor};
 use plant::Plant;
 
 /// The drive behind a context, and the motor of this number.
-unsafe fn drive<'a>(context: *mut c_void, motor: u8) -> (&'a mut StDrive<[StMotor; 1]>, Motor) {
+unsafe fn drive<'a>(context: *mut c_void, motor: u8) -> (&'a mut StDrive<[StMotor; 2]>, Motor) {
     // SAFETY: the contract of the crate, which the caller passes on.
     let plant = unsafe { &mut *context.cast::<Plant>() };
     (&mut plant.st, Motor::new(motor).unwrap_or(Motor::FIRST))

@@ -1,4 +1,4 @@
-//! A board that answers for an ST drive on USART1 and for two RMD drives, through slcan, on USART2,
+//! A board that answers for an ST drive on USART1 and for four RMD drives, through slcan, on USART2,
 //! with simulated motors behind them.
 //!
 //! It is for QEMU's netduinoplus2, an STM32F405 without clock control, pins, DMA and CAN: nothing here

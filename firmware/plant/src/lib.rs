@@ -1,5 +1,5 @@
-//! The motors that both boards have: a servo motor behind the ST drive, two direct drives on the
-//! RMD bus, with the firmware of their control loops, from `motorlink-sim`.
+//! The motors that both boards have, from `motorlink-sim` with the firmware of their control loops:
+//! two behind the ST drive, four on the RMD bus, those of `motorlink sim` without a configuration.
 //!
 //! The simulation runs on the board itself. Where that cannot keep up, the motors' time falls behind
 //! the board's, which only the protocols go by: motors then move slowly, and every answer still comes
@@ -11,10 +11,10 @@ use motorlink_proto::rmd::{Config, Drive, MotorId, Settings};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::plant::OutOfRange;
 use motorlink_sim::rmd::{RmdConfig, RmdMotor};
-use motorlink_sim::st::{MotorConfig, StDrive, StMotor};
+use motorlink_sim::st::{StDrive, StMotor};
 
 /// The IDs of the RMD motors.
-pub const RMD_IDS: [u8; 2] = [1, 2];
+pub const RMD_IDS: [u8; 4] = [1, 2, 3, 4];
 
 /// Motors advance by so much between two looks at the ports.
 const SLICE: Duration = Duration(500);
@@ -23,8 +23,8 @@ const LAG: Duration = Duration(20_000);
 
 /// The motors and their time.
 pub struct Plant {
-    /// The drive behind ST's protocol, with one motor.
-    pub st: StDrive<[StMotor; 1]>,
+    /// The drive behind ST's protocol.
+    pub st: StDrive<[StMotor; 2]>,
     /// The motors on the RMD bus.
     pub rmd: [RmdMotor; RMD_IDS.len()],
     /// Which moment the motors have reached, on their clock.
@@ -36,11 +36,10 @@ pub struct Plant {
 impl Plant {
     /// Motors at rest, powered on `now`.
     pub fn new(now: Instant) -> Result<Self, OutOfRange> {
-        let [one, two] = RMD_IDS.map(|id| RmdMotor::new(RmdConfig::with_id(id)));
-        let st = StDrive::new(Instant(0), [StMotor::new(MotorConfig::servo())]);
+        let [one, two, three, four] = RmdConfig::demo().map(RmdMotor::new);
         Ok(Plant {
-            st: st.expect("a drive may have one motor"),
-            rmd: [one?, two?],
+            st: StDrive::demo(Instant(0)),
+            rmd: [one?, two?, three?, four?],
             reached: Instant(0),
             at: now,
         })
@@ -49,7 +48,7 @@ impl Plant {
     /// The drives of the RMD motors, not yet powered on.
     pub fn rmd_drives() -> [Drive; RMD_IDS.len()] {
         RMD_IDS.map(|id| {
-            let id = MotorId::new(id).expect("IDs 1 and 2 exist");
+            let id = MotorId::new(id).expect("IDs 1 to 4 exist");
             Drive::new(Config::new(id), Self::rmd_rom())
         })
     }

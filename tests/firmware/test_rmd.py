@@ -1,0 +1,69 @@
+"""The board's RMD motors: as frames through slcan, and as `motorlink rmd` drives them."""
+
+import pytest
+
+from program import eventually
+from test_rmd_can import (  # noqa: F401  # tests that run here with this file's fixture
+    Host,
+    test_a_closed_loop_command_is_answered_as_status_2_is,
+    test_a_motor_at_rest_reports_its_voltage_and_temperature,
+    test_a_position_command_reaches_the_multi_turn_angle,
+    test_a_single_turn_position_is_reached_the_way_that_is_asked,
+    test_a_speed_command_turns_the_motor_at_that_speed,
+    test_an_echoing_reply_echoes_the_null_bytes_too,
+    test_an_unknown_command_is_met_with_silence,
+    test_clear_error_is_answered_with_0x9a_as_printed,
+    test_each_motor_answers_under_its_own_identifier,
+    test_four_torques_in_one_frame_are_answered_lowest_id_first,
+    test_four_torques_turn_four_motors_each_its_way,
+    test_frames_of_another_form_or_for_nobody_are_ignored,
+    test_run_resumes_what_stop_interrupted_and_nothing_after_off,
+    test_the_acceleration_limit_is_an_i32_in_data_4_to_7,
+    test_the_gains_are_six_bytes_from_data_2_on,
+    test_the_phase_currents_add_up_to_nothing,
+)
+
+
+@pytest.fixture
+def host(board):
+    with Host(f"socket://127.0.0.1:{board.rmd}") as host:
+        yield host
+
+
+def test_a_scan_finds_the_motors(rmd):
+    found = rmd("--json", "scan", 1, 2, 3, 4, 5).ended(0).lines
+    assert [motor["id"] for motor in found] == [1, 2, 3, 4]
+    assert {motor["protocol"] for motor in found} == {"V1.62"}
+
+
+def test_a_motor_moves_holds_a_torque_and_is_switched_off(rmd):
+    def angle():
+        return rmd("-i", 2, "--json", "angle").ended(0).json["angle"]
+
+    rmd("-i", 2, "move", 90, "--max-speed", 500).ended(0)
+    eventually(lambda: abs(angle() - 90) < 1, "90°", within=30)
+    rmd("-i", 2, "torque", 0.3).ended(0)
+    eventually(lambda: angle() > 180, "a motor that turns", within=30)
+    rmd("-i", 2, "off").ended(0)
+    eventually(lambda: rmd("-i", 2, "--json", "status").ended(0).json["speed"] == 0, "rest")
+    torques = rmd("--json", "torque4", 0.0, 0.0, 0.0, 0.0).ended(0)
+    assert len(torques.lines) == 4
+
+
+def test_garbage_at_full_speed_leaves_the_drives_in_order(board, rmd):
+    garbage = bytes((index * 89 + 7) & 0xFF for index in range(20_000))
+    with board.connect(board.rmd) as line:
+        line.sendall(garbage + b"\r")
+        line.settimeout(0.3)
+        try:
+            while line.recv(4096):
+                pass
+        except TimeoutError:
+            pass
+    assert rmd("-i", 1, "--json", "status").ended(0).json["voltage"] == 24.0
+
+
+def test_hosts_come_and_go(board):
+    for motor in (1, 2, 3, 4) * 3:
+        with Host(f"socket://127.0.0.1:{board.rmd}") as host:
+            host.ask(motor, 0x9A)

@@ -1,0 +1,110 @@
+"""The board's ST drive: as bytes on the line, and as `motorlink st` drives it."""
+
+import pytest
+
+from program import eventually
+from stmcp import GET_REG, Line, frame
+from test_st_bytes import (  # noqa: F401  # tests that run here with this file's fixture
+    test_a_cut_off_frame_is_answered_with_timeout_after_25_ms,
+    test_a_frame_in_single_bytes_is_understood,
+    test_a_length_over_128_makes_the_drive_deaf_until_the_line_was_silent,
+    test_a_named_motor_stays_the_current_one_until_another_is_named,
+    test_a_payload_of_128_bytes_is_taken_and_one_of_128_bytes_comes_back,
+    test_a_refused_segment_leaves_the_old_one,
+    test_a_short_value_leaves_the_bytes_that_it_does_not_carry,
+    test_every_wrong_checksum_is_refused,
+    test_frame_codes_that_table_1_lacks_are_refused,
+    test_motors_have_registers_of_their_own,
+    test_noise_never_wedges_the_drive,
+    test_the_checksum_is_checked_before_the_motor_and_the_motor_before_the_frame_code,
+    test_what_a_register_is_not_for_is_refused,
+)
+
+BREAK_IN = 0x40
+
+
+@pytest.fixture
+def spec(board):
+    with Line(f"socket://127.0.0.1:{board.st}") as line:
+        yield line
+
+
+def test_info_status_and_registers_are_read(st):
+    info = st("--json", "info").ended(0).json
+    assert (info["sdk"], info["version"]) == ("ST MC SDK", [5, 4, 4])
+    status = st("--json", "status").ended(0).json
+    assert status["BUS_VOLTAGE"] == {"value": 325, "unit": "V"}
+    assert len(st("--json", "revup").ended(0).lines) == 5
+    assert list(st("--json", "segment", "SPEED_MEAS", "I_A").ended(0).json) == ["SPEED_MEAS", "I_A"]
+
+
+def test_what_is_written_is_read_back_and_what_is_wrong_is_refused(st):
+    st("set", "SPEED_KP", 1234).ended(0)
+    assert st("--json", "get", "SPEED_KP").ended(0).json["SPEED_KP"]["value"] == 1234
+    refused = st("get", "0xEE").ended(1)
+    assert "GET_WRITE_ONLY" in refused.err
+    assert "BAD_MOTOR_SELECTED" in st("-m", 3, "status").ended(1).err
+
+
+@pytest.mark.parametrize("motor", [1, 2])
+def test_a_motor_starts_reaches_its_speed_and_stops(st, motor):
+    def value(register):
+        return st("-m", motor, "--json", "--raw", "get", register).ended(0).json[register]
+
+    st("-m", motor, "ramp", 1200, 500).ended(0)
+    st("-m", motor, "start").ended(0)
+    eventually(lambda: abs(value("SPEED_MEAS") - 1200) <= 10, "1200 rpm", within=30)
+    st("-m", motor, "ramp", 900, 100).ended(0)
+    eventually(lambda: abs(value("SPEED_MEAS") - 900) <= 10, "900 rpm", within=30)
+    st("-m", motor, "stop").ended(0)
+    eventually(lambda: value("STATUS") == 0, "IDLE", within=30)
+    assert value("FLAGS") == 0
+
+
+def test_torque_turns_the_motor_with_an_encoder(st):
+    def speed():
+        return st("-m", 2, "--json", "--raw", "get", "SPEED_MEAS").ended(0).json["SPEED_MEAS"]
+
+    st("-m", 2, "current", 600, 0).ended(0)
+    st("-m", 2, "start").ended(0)
+    eventually(lambda: speed() > 200, "a motor that turns", within=30)
+    st("-m", 2, "stop").ended(0)
+
+
+def test_an_over_current_is_a_fault_until_it_is_acknowledged(st):
+    def value(register):
+        return st("-m", 2, "--json", "--raw", "get", register).ended(0).json[register]
+
+    # Current regulators that overshoot as far as they can.
+    for register in ("TORQUE_KP", "TORQUE_KI", "FLUX_KP", "FLUX_KI"):
+        st("-m", 2, "set", register, 32767).ended(0)
+    st("-m", 2, "start")
+    eventually(lambda: value("FLAGS") & BREAK_IN, "BREAK_IN", within=30)
+    eventually(lambda: value("STATUS") == 11, "FAULT_OVER", within=30)
+    st("-m", 2, "ack").ended(0)
+    eventually(lambda: value("STATUS") == 0, "IDLE", within=30)
+    assert value("FLAGS") == 0
+
+
+def test_garbage_at_full_speed_leaves_the_drive_in_order(board, spec):
+    garbage = bytes((index * 89 + 7) & 0xFF for index in range(20_000))
+    spec.send(garbage)
+    spec.port.timeout = 0.3
+    while spec.port.read(256):
+        pass
+    spec.port.timeout = 5
+    assert spec.ask(frame(GET_REG, [0x03])) == frame(0xF0, [1])
+
+
+def test_hosts_come_and_go(board):
+    for _ in range(20):
+        with Line(f"socket://127.0.0.1:{board.st}") as line:
+            assert line.get(0x03) == 1
+            line.send(frame(GET_REG, [0x03])[:2])
+    with Line(f"socket://127.0.0.1:{board.st}") as line:
+        # What the last host left behind may be answered first.
+        line.port.timeout = 0.3
+        while line.port.read(64):
+            pass
+        line.port.timeout = 5
+        assert line.get(0x03) == 1
