@@ -7,6 +7,7 @@
 # make soak            a million exchanges with reconnects, some minutes
 # make bench           ratios and instruction counts, as in docs/BENCHMARKS.md
 # make reliability     both protocols through lines that misbehave, into docs/RELIABILITY.md
+# make sizes           flash and RAM on a Cortex-M4, into docs/SIZES.md
 # make docs            writes the tables of docs/CONFORMANCE.md anew
 # make header        writes crates/ffi/include/motorlink.h anew
 # make install-c     C header and libraries, pkg-config and CMake files: PREFIX=/usr/local DESTDIR=
@@ -31,7 +32,7 @@ SECONDS ?= 60
 demo:
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
-# Last, so that what was not tested is said last.
+# The last need packages; what was not tested is said last.
 test: lint deny unit determinism fuzz-replay miri probe e2e ffi-test
 	$(SOCKETCAN) || [ $$? -eq 77 ]
 
@@ -91,12 +92,17 @@ determinism:
 	$(FINGERPRINT) --release | cmp - target/fingerprint
 	$(FINGERPRINT) $(PLAIN) | cmp - target/fingerprint
 
-# Both protocols, and their C face, link for a Cortex-M4 without a path that panics, within their RAM.
-# What else is for boards builds there.
+# Both protocols, and their C face, link for a Cortex-M4 without a path that panics, within their flash
+# and RAM. What else is for boards builds there.
+SIZES = $(PYTHON) sizes.py $${CARGO_TARGET_DIR:-target}/$(TARGET)/release
 probe:
 	rustup target list --installed | grep -qx $(TARGET) || rustup target add $(TARGET)
-	cd probe && $(CARGO) build --release --locked
+	cd probe && $(CARGO) build --release --locked && $(SIZES) --check
 	$(CARGO) build -p motorlink-embedded -p motorlink-sim --target $(TARGET) --locked
+
+sizes:
+	rustup target list --installed | grep -qx $(TARGET) || rustup target add $(TARGET)
+	cd probe && $(CARGO) build --release --locked && $(SIZES) > ../docs/SIZES.md
 
 # The built program against independent clients on ptys and loopback.
 e2e: $(VENV)/ready

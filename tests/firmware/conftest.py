@@ -36,6 +36,15 @@ def elf(language):
     return path
 
 
+def in_real_time():
+    """The protocols' deadlines are real time: where it is allowed, a board goes before what else this
+    machine does."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+    except PermissionError:
+        pass
+
+
 class Board:
     """A board in QEMU with both UARTs on TCP ports of this machine, which QEMU chooses."""
 
@@ -46,15 +55,14 @@ class Board:
             # Bytes go out one by one: without nodelay each waits for the last one's acknowledge.
             options = "host=127.0.0.1,port=0,server=on,wait=off,nodelay=on"
             uarts += ["-chardev", f"socket,id={name},{options}", "-serial", f"chardev:{name}"]
-        # The protocols' deadlines are real time: where it is allowed, the board goes first.
-        nice = ["nice", "-n", "-10"] if os.geteuid() == 0 else []
         self.process = subprocess.Popen(
-            [*nice, "qemu-system-arm", "-M", "netduinoplus2", "-kernel", str(elf(language))]
+            ["qemu-system-arm", "-M", "netduinoplus2", "-kernel", str(elf(language))]
             + ["-display", "none", "-monitor", "none", "-qmp", "stdio", *uarts],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
+            preexec_fn=in_real_time,
         )
         try:
             self._read()
@@ -63,8 +71,8 @@ class Board:
             self.st, self.rmd = (
                 int(re.search(r"127\.0\.0\.1:(\d+)", found[name])[1]) for name in ("st", "rmd")
             )
-            eventually(lambda: self._answers(self.st, GET_STATUS), "an answer on USART1")
-            eventually(lambda: self._answers(self.rmd, b"\r"), "an answer on USART2")
+            self._await(self.st, GET_STATUS)
+            self._await(self.rmd, b"\r")
         except BaseException:
             self.end()
             raise
@@ -81,13 +89,27 @@ class Board:
             assert "error" not in answer, answer
         return answer["return"]
 
-    def _answers(self, port, question):
-        with self.connect(port, timeout=0.2) as line:
-            line.sendall(question)
-            try:
-                return line.recv(64)
-            except TimeoutError:
-                return b""
+    def _await(self, port, question):
+        """Asks until there are answers, and takes them all."""
+        with self.connect(port) as line:
+            line.settimeout(0.1)
+            answers = b""
+
+            def answer():
+                nonlocal answers
+                try:
+                    answers += line.recv(64)
+                    return True
+                except TimeoutError:
+                    return False
+
+            def asked():
+                line.sendall(question)
+                return answer()
+
+            eventually(asked, f"an answer on port {port}")
+            while answer():
+                pass
 
     def connect(self, port, timeout=5):
         line = socket.create_connection(("127.0.0.1", port), timeout)

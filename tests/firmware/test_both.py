@@ -21,8 +21,7 @@ def rmd_exchanges(board):
     """Asks motor after motor for its gains; checks each reply."""
     with board.connect(board.rmd) as line:
         line.sendall(b"C\rS8\rO\r")
-        while line.recv(1) != b"\r" or line.recv(2) != b"\r\r":
-            pass
+        assert received(line, 3) == b"\r\r\r"
         for count in range(EXCHANGES):
             motor = b"1234"[count % 4 : count % 4 + 1]
             line.sendall(b"t14" + motor + b"83000000000000000\r")

@@ -340,6 +340,8 @@ impl<'o> Payload<'o> {
         Payload { room, len: 0 }
     }
 
+    // A call is smaller than what it does, and replies are short.
+    #[inline(never)]
     pub(super) fn byte(&mut self, byte: u8) -> &mut Self {
         if let Some(slot) = self.room.get_mut(self.len) {
             *slot = byte;
@@ -348,6 +350,7 @@ impl<'o> Payload<'o> {
         self
     }
 
+    #[inline(never)]
     pub(super) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
         for &byte in bytes {
             self.byte(byte);
@@ -366,11 +369,8 @@ impl<'o> Payload<'o> {
     }
 
     fn decimal(&mut self, number: u8) -> &mut Self {
-        if number >= 100 {
-            self.byte(b'0' + number / 100);
-        }
         if number >= 10 {
-            self.byte(b'0' + number / 10 % 10);
+            self.decimal(number / 10);
         }
         self.byte(b'0' + number % 10)
     }

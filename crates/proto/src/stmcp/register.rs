@@ -259,12 +259,15 @@ pub struct Shape {
     pub feature: Feature,
     /// Whether table 3 has the row.
     pub origin: Origin,
-    mcsdk_get: u8,
-    mcsdk_set: u8,
+    /// Bytes of shipped firmware's replies to GET_REG, and in the low half those that it takes of a
+    /// SET_REG.
+    mcsdk: u8,
 }
 
 /// Bits of a SET_REG value that firmware names but always answers with WRONG_SET.
 pub(super) const REFUSED: u8 = 0xFF;
+/// The same among bytes.
+const REFUSED_NIBBLE: u8 = 0xF;
 
 /// What a slave does with a SET_REG for a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -287,7 +290,8 @@ impl Shape {
             Some(bits) => bits,
             None => (if access.reads() { bits } else { 0 }, if access.writes() { bits } else { 0 }),
         };
-        Shape { ty, unit, access, feature, origin, mcsdk_get, mcsdk_set }
+        let mcsdk_set = if mcsdk_set == REFUSED { REFUSED_NIBBLE } else { mcsdk_set / 8 };
+        Shape { ty, unit, access, feature, origin, mcsdk: (mcsdk_get / 8) << 4 | mcsdk_set }
     }
 
     /// Bytes of the reply to a GET_REG from a drive with `features`; `None` where it refuses.
@@ -296,7 +300,7 @@ impl Shape {
             Profile::Spec if matches!(self.origin, Origin::Firmware) => 0,
             Profile::Spec if self.access.reads() => self.ty.size(),
             Profile::Spec => 0,
-            Profile::Mcsdk54 => self.mcsdk_get / 8,
+            Profile::Mcsdk54 => self.mcsdk >> 4,
         };
         if size == 0 || !features.has(self.feature) { None } else { Some(size) }
     }
@@ -314,10 +318,10 @@ impl Shape {
                 }
             }
             // DAC_OUT1 and DAC_OUT2 are taken even by a build without DAC.
-            Profile::Mcsdk54 => match self.mcsdk_set {
+            Profile::Mcsdk54 => match self.mcsdk & 0xF {
                 0 => Writing::ReadOnly,
-                REFUSED => Writing::Refused,
-                bits if there || matches!(self.feature, Feature::Dac) => Writing::Takes(bits / 8),
+                REFUSED_NIBBLE => Writing::Refused,
+                size if there || matches!(self.feature, Feature::Dac) => Writing::Takes(size),
                 _ => Writing::Refused,
             },
         }

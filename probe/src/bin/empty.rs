@@ -1,0 +1,5 @@
+//! Nothing: what any such program has.
+#![no_std]
+#![no_main]
+
+probe::program!((), (), |_: &mut ()| core::hint::black_box(()));
