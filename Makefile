@@ -65,6 +65,7 @@ miri:
 		$(CARGO) +nightly miri test -p motorlink-proto -p motorlink-ffi --locked
 
 # Licences, duplicates and sources of every dependency; known holes where their list can be had.
+# cortex-m carries two versions of embedded-hal, so the firmware may have duplicates.
 deny:
 	command -v cargo-deny >/dev/null || $(CARGO) install --locked cargo-deny
 	@checks="licenses bans sources"; \
@@ -73,7 +74,9 @@ deny:
 	for manifest in Cargo.toml fuzz/Cargo.toml probe/Cargo.toml; do \
 		echo "$$manifest: $$checks"; \
 		$(CARGO) deny --manifest-path $$manifest --config deny.toml check $$checks || exit; \
-	done
+	done; \
+	echo "firmware/Cargo.toml: licenses sources"; \
+	$(CARGO) deny --manifest-path firmware/Cargo.toml --config deny.toml check licenses sources
 
 # The public interface against the last release: breaks that its version number does not allow.
 semver:
@@ -98,6 +101,7 @@ SIZES = $(PYTHON) sizes.py $${CARGO_TARGET_DIR:-target}/$(TARGET)/release
 probe:
 	rustup target list --installed | grep -qx $(TARGET) || rustup target add $(TARGET)
 	cd probe && $(CARGO) build --release --locked && $(SIZES) --check
+	cd firmware && $(CARGO) fmt --check && $(CARGO) clippy --release --locked -- -D warnings
 	$(CARGO) build -p motorlink-embedded -p motorlink-sim --target $(TARGET) --locked
 
 sizes:
@@ -119,8 +123,7 @@ ffi-test:
 # Both boards in QEMU, against the conformance kit and hosts on this machine. Ends with 77 where the
 # packages cannot be had.
 firmware-test: $(VENV)/ready
-	$(CARGO) build -p motorlink-cli --locked
-	MOTORLINK_BIN=$${CARGO_TARGET_DIR:-$$PWD/target}/debug/motorlink $(FIRMWARE)
+	$(FIRMWARE)
 
 # The port socketcan: in Debian's kernel in QEMU. Ends with 77 where the packages cannot be had.
 test-socketcan:
@@ -167,7 +170,7 @@ fmt:
 
 clean:
 	$(CARGO) clean
-	rm -rf $(VENV) $(BENCH_VENV) probe/target fuzz/target
+	rm -rf $(VENV) $(BENCH_VENV) probe/target fuzz/target firmware/target
 
 $(VENV)/ready: tests/e2e/requirements.txt
 	$(PYTHON) -m venv $(VENV) || { \

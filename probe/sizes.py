@@ -75,6 +75,7 @@ def main(folder, *options):
         return missed
     compiler = subprocess.run(["rustc", "--version"], capture_output=True, text=True, check=True)
     print(TEXT.format(compiler=compiler.stdout.split(" (")[0].strip(), bare=bare))
+    sizes["empty"] = measured["empty"]
     for name, (flash, memory, ram) in sizes.items():
         goal = "below {} / {}".format(*GOALS[name]) if name in GOALS else ""
         print(f"| {PROGRAMS[name]} | {flash} | {memory} | {ram} | {goal} |")

@@ -1,7 +1,6 @@
 #!/bin/sh
 # Builds both boards, boots them in QEMU and runs tests/firmware against them. Ends with 77 where the
-# packages for it cannot be had. PYTEST is how to run pytest, MOTORLINK_BIN the program, SUDO what
-# makes a command root's.
+# packages for it cannot be had. PYTEST is how to run pytest, SUDO what makes a command root's.
 set -eu
 tests=$(cd "$(dirname "$0")" && pwd)
 repository=$tests/../..
@@ -40,7 +39,10 @@ fi
 rustup target list --installed | grep -qx $target || rustup target add $target >&2 ||
     unavailable "rustup cannot add the target."
 
-"$repository/firmware/build.sh"
-MOTORLINK_FIRMWARE=${CARGO_TARGET_DIR:-$repository/firmware/target}/firmware
-export MOTORLINK_FIRMWARE
-exec ${PYTEST:-python3 -m pytest} -q "$tests"
+cd "$repository"
+${CARGO:-cargo} build --quiet --locked -p motorlink-cli
+firmware/build.sh
+MOTORLINK_BIN=${CARGO_TARGET_DIR:-target}/debug/motorlink
+MOTORLINK_FIRMWARE=${CARGO_TARGET_DIR:-firmware/target}/firmware
+export MOTORLINK_BIN MOTORLINK_FIRMWARE
+exec ${PYTEST:-python3 -m pytest} -q tests/firmware
