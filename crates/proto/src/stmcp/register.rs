@@ -265,9 +265,9 @@ pub struct Shape {
 }
 
 /// Bits of a SET_REG value that firmware names but always answers with WRONG_SET.
-pub(super) const REFUSED: u8 = 0xFF;
-/// The same among bytes.
-const REFUSED_NIBBLE: u8 = 0xF;
+pub(super) const REFUSED: u8 = 8 * REFUSED_SIZE;
+/// The same in bytes; no value has so many.
+const REFUSED_SIZE: u8 = 0xF;
 
 /// What a slave does with a SET_REG for a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -290,8 +290,8 @@ impl Shape {
             Some(bits) => bits,
             None => (if access.reads() { bits } else { 0 }, if access.writes() { bits } else { 0 }),
         };
-        let mcsdk_set = if mcsdk_set == REFUSED { REFUSED_NIBBLE } else { mcsdk_set / 8 };
-        Shape { ty, unit, access, feature, origin, mcsdk: (mcsdk_get / 8) << 4 | mcsdk_set }
+        let mcsdk = (mcsdk_get / 8) << 4 | mcsdk_set / 8;
+        Shape { ty, unit, access, feature, origin, mcsdk }
     }
 
     /// Bytes of the reply to a GET_REG from a drive with `features`; `None` where it refuses.
@@ -320,7 +320,7 @@ impl Shape {
             // DAC_OUT1 and DAC_OUT2 are taken even by a build without DAC.
             Profile::Mcsdk54 => match self.mcsdk & 0xF {
                 0 => Writing::ReadOnly,
-                REFUSED_NIBBLE => Writing::Refused,
+                REFUSED_SIZE => Writing::Refused,
                 size if there || matches!(self.feature, Feature::Dac) => Writing::Takes(size),
                 _ => Writing::Refused,
             },
