@@ -1,7 +1,5 @@
 //! How the program ends when it did not do what it was asked.
 
-use std::process::ExitCode;
-
 use motorlink::fault::FaultError;
 use motorlink::port::{NameError, PortError};
 use motorlink::{rmd, stmcp};
@@ -27,16 +25,16 @@ pub enum Failure {
 
 impl Failure {
     /// Says why on stderr; gives the exit code.
-    pub fn report(self) -> ExitCode {
+    pub fn report(self) -> u8 {
         let (code, message) = match self {
             Failure::Refused(message) => (1, message),
             Failure::Usage(message) => (2, message),
             Failure::Line(message) | Failure::Silent(message) => (3, message),
-            Failure::Interrupted => return ExitCode::from(130),
-            Failure::OutputClosed => return ExitCode::SUCCESS,
+            Failure::Interrupted => return 130,
+            Failure::OutputClosed => return 0,
         };
         note(format!("{} {message}", console::style("error:").red().bold().for_stderr()));
-        ExitCode::from(code)
+        code
     }
 }
 

@@ -54,6 +54,12 @@ impl<'a> Guard<'a> {
         self.armed = false;
     }
 
+    /// Stops the motors now; gives what was done to each.
+    pub fn stop_now(mut self) -> Vec<Stopped> {
+        self.armed = false;
+        self.stop_all()
+    }
+
     fn stop_all(&self) -> Vec<Stopped> {
         let mut stopped: Vec<Stopped> = Vec::new();
         let request = match self.action {

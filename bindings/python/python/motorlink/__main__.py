@@ -1,0 +1,5 @@
+import sys
+
+from motorlink._cli import main
+
+sys.exit(main())

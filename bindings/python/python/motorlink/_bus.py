@@ -1,0 +1,45 @@
+"""What buses of both protocols have in common: names of ports, and their end."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable
+
+from motorlink.errors import BadValue, LineLost, MotorlinkError
+
+def port_name(port: str | os.PathLike[str]) -> str:
+    """The port as the library names it."""
+    return os.fspath(port)
+
+
+def on_close_checked(on_close: str, known: tuple[str, ...]) -> str:
+    """What is done at the end, if it is known."""
+    if on_close not in known:
+        raise BadValue(f"on_close={on_close!r}: give one of {', '.join(map(repr, known))}")
+    return on_close
+
+
+def end(
+    stop: Callable[[], list[tuple[int, MotorlinkError]]],
+    close: Callable[[], None],
+    port: str,
+    *,
+    in_flight: bool,
+) -> None:
+    """Stops what was started, then closes the port.
+
+    A motor that could not be stopped is an exception, or a warning while another exception is on its
+    way, which must not be hidden.
+    """
+    try:
+        failed = stop()
+    finally:
+        close()
+    if not failed:
+        return
+    motors = "; ".join(f"motor {motor} may still be running: {error}" for motor, error in failed)
+    if in_flight:
+        warnings.warn(motors, RuntimeWarning, stacklevel=3)
+        return
+    raise LineLost(motors, port=port, motor=failed[0][0]) from failed[0][1]

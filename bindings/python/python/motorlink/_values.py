@@ -1,0 +1,198 @@
+"""What drives answer. The unit of each number is the end of its name."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from motorlink import _core
+
+
+class Word(str):
+    """A value that the protocol has a word for. It is that word: ``status == "RUN"``.
+
+    A number without a word survives as such: ``0x63``.
+    """
+
+    #: The number on the wire.
+    number: int
+    #: What it means, in a few words; empty for a number without a word.
+    doc: str
+
+    def __new__(cls, word: str, number: int = 0, doc: str = "") -> Word:
+        self = super().__new__(cls, word)
+        self.number = number
+        self.doc = doc
+        return self
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({str(self)!r})"
+
+    def __getnewargs__(self) -> tuple[str, int, str]:
+        return str(self), self.number, self.doc
+
+
+class State(Word):
+    """State of an ST drive's state machine: ``IDLE``, ``RUN``, ``FAULT_NOW`` (register STATUS)."""
+
+
+class ControlMode(Word):
+    """``TORQUE`` or ``SPEED``: what an ST drive follows (register CONTROL_MODE)."""
+
+
+class Faults(NamedTuple):
+    """Faults of an ST drive (register FLAGS). False when there are none."""
+
+    #: Faults since they were last acknowledged, by name: ``OVER_VOLT``.
+    occurred: tuple[str, ...]
+    #: Faults whose cause is still there.
+    present: tuple[str, ...]
+    #: The 32 bits of the register: occurred below, present above.
+    bits: int
+
+    def __bool__(self) -> bool:
+        return self.bits != 0
+
+    def __str__(self) -> str:
+        return _core.st_flags_text(self.bits)
+
+
+class Info(NamedTuple):
+    """Version and name of the drive's SDK (Motor Control Protocol, 4.7)."""
+
+    #: Major, minor, patch.
+    version: tuple[int, int, int]
+    name: str
+
+
+class FirmwareVersion(NamedTuple):
+    """Name and version of the drive's firmware (Motor Control Protocol, 4.12)."""
+
+    name: str
+    version: str
+
+
+class RevupPhase(NamedTuple):
+    """A phase of the rev-up (Motor Control Protocol, 4.9).
+
+    ``current`` is Iq at the end of the phase: digits of the drive (s16A), or A for a motor with
+    ``full_scale_amps``.
+    """
+
+    #: Mechanical speed at the end of the phase.
+    speed_rpm: int
+    current: float
+    duration_s: float
+
+
+class MotionStatus(NamedTuple):
+    """What an RMD motor says to 0x9C and to every command that moves it (3, Read motor status 2)."""
+
+    temperature_c: int
+    #: Torque current; positive is clockwise.
+    iq_a: float
+    #: Speed of the motor shaft; positive is clockwise.
+    speed_dps: int
+    #: Position within the turn, in counts of the encoder.
+    encoder: int
+
+
+class MotorErrors(NamedTuple):
+    """Protections of an RMD motor that are active. False when there are none."""
+
+    #: The document's words: ``low voltage protection``.
+    names: tuple[str, ...]
+    #: The bits of the error byte, also those that the document does not name.
+    bits: int
+
+    def __bool__(self) -> bool:
+        return self.bits != 0
+
+    def __str__(self) -> str:
+        return _core.rmd_errors_text(self.bits)
+
+
+class MotorStatus(NamedTuple):
+    """What an RMD motor says to 0x9A and 0x9B (3, Read motor status 1 and error flag commands)."""
+
+    temperature_c: int
+    voltage_v: float
+    errors: MotorErrors
+
+
+class PhaseCurrents(NamedTuple):
+    """Phase currents of an RMD motor, A (3, Read motor status 3)."""
+
+    phase_a_a: float
+    phase_b_a: float
+    phase_c_a: float
+
+
+class Gains(NamedTuple):
+    """Gains of an RMD motor's three loops, 0 to 255 (3, Read PID parameter command)."""
+
+    position_kp: int
+    position_ki: int
+    speed_kp: int
+    speed_ki: int
+    torque_kp: int
+    torque_ki: int
+
+
+class Encoder(NamedTuple):
+    """What an RMD motor's encoder reads, in its counts (3, Read encoder data command)."""
+
+    #: ``raw`` minus ``offset``, within the turn.
+    position: int
+    raw: int
+    #: The zero point.
+    offset: int
+
+
+class Found(NamedTuple):
+    """What a scan found under a motor ID."""
+
+    id: int
+    #: ``motor`` of this protocol; ``foreign``: of a protocol that looks like it and is not driven;
+    #: ``echo``: the request itself came back (option ``echo=1`` of an slcan port drops such).
+    kind: str
+    #: Of a motor.
+    status: MotorStatus | None
+    #: What a foreign motor speaks.
+    dialect: str | None
+
+
+class RegisterInfo(NamedTuple):
+    """A register of an ST drive (Motor Control Protocol, table 3)."""
+
+    #: The number on the wire.
+    id: int
+    name: str
+    #: Unit of the value as this motor reads it; empty when there is none.
+    unit: str
+    #: ``i16``, ``u32``, ``f32``.
+    type: str
+    #: ``RW``, ``R``, ``W``; ``D``: only on the DAC and in data segments; ``-``: firmware names it only.
+    access: str
+    #: What it is, in a few words.
+    doc: str
+    #: What the drive must be built with.
+    needs: str
+    #: Whether a drive of this profile, so built, answers when it is read.
+    readable: bool
+    #: Whether a drive of this profile, so built, takes a value.
+    writable: bool
+
+
+class Frame(NamedTuple):
+    """An RMD frame in words, from ``motorlink.rmd.decode``."""
+
+    #: The motor; ``None`` for the frame 0x280 to motors 1 to 4.
+    motor: int | None
+    #: The document's name of the command.
+    name: str
+    #: The values by name, in their units.
+    values: dict[str, float]
+    #: The values by name, in digits.
+    digits: dict[str, int]
+    #: All of it as text.
+    text: str

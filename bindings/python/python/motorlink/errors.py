@@ -1,0 +1,76 @@
+"""What can go wrong. Every exception of this package is a :class:`MotorlinkError`.
+
+A drive that refuses is told apart from a line that fails: after :class:`Refused` the drive is as it
+was, after :class:`LineLost` and :class:`Timeout` nobody knows whether it did what was asked.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["BadValue", "Closed", "LineLost", "MotorlinkError", "PortError", "Refused", "Timeout"]
+
+
+class MotorlinkError(Exception):
+    """Something did not work; the message says what, where, and what to try."""
+
+    #: The port, as messages name it; ``None`` where there is none.
+    port: str | None
+    #: The motor; ``None`` where it is about none, or about whichever the drive has selected.
+    motor: int | None
+    #: What was sampled before it happened, if it happened in ``bus.sample``.
+    samples: Any
+
+    def __init__(self, message: str = "", *, port: str | None = None, motor: int | None = None):
+        super().__init__(message)
+        self.port = port
+        self.motor = motor
+        self.samples = None
+
+
+class Refused(MotorlinkError):
+    """The drive understood and said no, or did not keep what it was told; the line works.
+
+    RMD motors never refuse: one that does not know a command is silent (:class:`Timeout`).
+    """
+
+    #: The drive's reason (Motor Control Protocol, table 2); ``None`` where it gave none.
+    code: int | None
+    #: The document's name for it, such as ``WRONG_SET``; ``None`` for a code without a name.
+    name: str | None
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        port: str | None = None,
+        motor: int | None = None,
+        code: int | None = None,
+        name: str | None = None,
+    ):
+        super().__init__(message, port=port, motor=motor)
+        self.code = code
+        self.name = name
+
+
+class LineLost(MotorlinkError, ConnectionError):
+    """There is no answer to trust: damage, noise, a port that went away.
+
+    Call again: the line is recovered first, so that a late reply is never taken for another's.
+    """
+
+
+class Timeout(MotorlinkError, TimeoutError):
+    """No answer in time. What is not there, not powered or of another baud rate is silent, too."""
+
+
+class PortError(LineLost):
+    """The port cannot be opened, or was closed by its far end."""
+
+
+class BadValue(MotorlinkError, ValueError):
+    """A value that cannot be sent, or that a limit forbids; nothing was sent."""
+
+
+class Closed(MotorlinkError, ValueError):
+    """The bus was closed by this program; open it again."""

@@ -1,0 +1,131 @@
+//! Errors of the host library as exceptions of `motorlink.errors`, with the library's messages.
+
+use std::fmt::Display;
+
+use motorlink::port::PortError;
+use motorlink::stmcp::{ErrorCode, Failure};
+use motorlink::{rmd, stmcp};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyType};
+
+/// Which exception.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    Refused,
+    LineLost,
+    Timeout,
+    PortError,
+    BadValue,
+    Closed,
+}
+
+/// What an exception tells beside its message.
+#[derive(Default)]
+struct Facts<'a> {
+    port: Option<&'a str>,
+    motor: Option<u8>,
+    code: Option<ErrorCode>,
+}
+
+impl Kind {
+    fn class(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+        static CLASSES: [PyOnceLock<Py<PyType>>; 6] = [const { PyOnceLock::new() }; 6];
+        let name = match self {
+            Kind::Refused => "Refused",
+            Kind::LineLost => "LineLost",
+            Kind::Timeout => "Timeout",
+            Kind::PortError => "PortError",
+            Kind::BadValue => "BadValue",
+            Kind::Closed => "Closed",
+        };
+        CLASSES[self as usize].import(py, "motorlink.errors", name)
+    }
+
+    fn raise(self, py: Python<'_>, message: impl Display, facts: Facts<'_>) -> PyErr {
+        let made = || {
+            let named = PyDict::new(py);
+            named.set_item("port", facts.port)?;
+            named.set_item("motor", facts.motor)?;
+            if let Some(code) = facts.code {
+                named.set_item("code", code.number())?;
+                named.set_item("name", code.name())?;
+            }
+            self.class(py)?.call((message.to_string(),), Some(&named))
+        };
+        made().map_or_else(|error| error, PyErr::from_value)
+    }
+}
+
+/// A value that cannot be sent.
+pub(crate) fn bad_value(py: Python<'_>, message: impl Display) -> PyErr {
+    Kind::BadValue.raise(py, message, Facts::default())
+}
+
+/// A bus that was closed.
+pub(crate) fn closed(py: Python<'_>, port: &str) -> PyErr {
+    let facts = Facts { port: Some(port), ..Facts::default() };
+    Kind::Closed.raise(py, format_args!("{port} was closed by this program; open it again"), facts)
+}
+
+/// What an ST client says.
+pub(crate) fn st_error(py: Python<'_>, error: &stmcp::Error) -> PyErr {
+    use stmcp::Error;
+    // Motor number 0 is whichever the drive has selected.
+    let named = |number: u8| Some(number).filter(|number| *number != 0);
+    let (kind, facts) = match error {
+        Error::Refused { port, motor, code, .. } => {
+            let facts = Facts { port: Some(port), motor: named(motor.0), code: Some(*code) };
+            (Kind::Refused, facts)
+        }
+        Error::Failed { port, motor, failure, .. } => {
+            let kind = match failure {
+                Failure::Timeout => Kind::Timeout,
+                _ => Kind::LineLost,
+            };
+            (kind, Facts { port: Some(port), motor: named(motor.0), code: None })
+        }
+        Error::Reply { port, motor, .. } => {
+            (Kind::LineLost, Facts { port: Some(port), motor: named(motor.0), code: None })
+        }
+        Error::Differs { motor, .. } => {
+            (Kind::Refused, Facts { motor: Some(motor.number()), ..Facts::default() })
+        }
+        Error::Port(error) => return port_error(py, error),
+        _ => (Kind::BadValue, Facts::default()),
+    };
+    kind.raise(py, error, facts)
+}
+
+/// What a drive's negative acknowledge says, without a port it came from.
+pub(crate) fn refusal(py: Python<'_>, code: ErrorCode) -> PyErr {
+    let facts = Facts { code: Some(code), ..Facts::default() };
+    Kind::Refused.raise(py, format_args!("the drive refused: {code} ({})", code.doc()), facts)
+}
+
+/// What an RMD bus says.
+pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
+    use rmd::Error;
+    let facts =
+        |port, id: &rmd::MotorId| Facts { port: Some(port), motor: Some(id.number()), code: None };
+    let (kind, facts) = match error {
+        Error::Timeout { port, id, .. } | Error::Quarantined { port, id } => {
+            (Kind::Timeout, facts(port, id))
+        }
+        Error::Foreign { port, id, .. } => (Kind::LineLost, facts(port, id)),
+        Error::Twice(id) | Error::OutOfReach(id) | Error::Limit { id, .. } => {
+            (Kind::BadValue, Facts { motor: Some(id.number()), ..Facts::default() })
+        }
+        Error::Port(error) => return port_error(py, error),
+        _ => (Kind::BadValue, Facts::default()),
+    };
+    kind.raise(py, error, facts)
+}
+
+/// What a port says.
+pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
+    match error {
+        PortError::WrongKind { .. } => bad_value(py, error),
+        _ => Kind::PortError.raise(py, error, Facts::default()),
+    }
+}

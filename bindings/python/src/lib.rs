@@ -1,0 +1,39 @@
+//! `motorlink._core`: what the Python package `motorlink` is made of.
+//!
+//! Requests are objects that check their arguments and read their replies ([`st::StRequest`],
+//! [`rmd::RmdRequest`]); clients, blocking or not, carry them. Everything typed and documented for
+//! people is in the Python files on top.
+
+mod clock;
+mod error;
+mod number;
+mod rmd;
+mod st;
+mod values;
+
+use pyo3::prelude::*;
+
+/// The extension module of the package `motorlink`.
+#[pymodule]
+mod _core {
+    use std::ffi::OsString;
+
+    use super::*;
+
+    #[pymodule_export]
+    use super::rmd::{RmdBus, RmdRequest, rmd_decode, rmd_errors_text, rmd_quantities};
+    #[pymodule_export]
+    use super::st::{StClient, StRequest, st_flags_text, st_register, st_registers};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+
+    /// The command line, the program's name first; gives the exit code. It takes over the process's
+    /// signals.
+    #[pyfunction]
+    fn cli(py: Python<'_>, words: Vec<OsString>) -> u8 {
+        py.detach(|| motorlink_cli::run(words))
+    }
+}

@@ -1,0 +1,40 @@
+//! Physical values into the integers of the wire. What does not fit is refused, never cut.
+
+use std::time::Duration;
+
+use pyo3::prelude::*;
+
+use crate::error::bad_value;
+
+/// The nearest digit to `value` in `unit`s, of which a digit has `scale`.
+pub(crate) fn digits<T: TryFrom<i64>>(
+    py: Python<'_>,
+    what: &str,
+    value: f64,
+    scale: f64,
+    unit: &str,
+) -> PyResult<T> {
+    let nearest = value.is_finite().then(|| (value / scale).round() as i64);
+    nearest.and_then(|digits| T::try_from(digits).ok()).ok_or_else(|| {
+        bad_value(
+            py,
+            format_args!("{what} of {value} {unit} does not fit the frame; nothing was sent"),
+        )
+    })
+}
+
+/// A duration in s as the wire's ms.
+pub(crate) fn milliseconds(py: Python<'_>, seconds: f64) -> PyResult<u16> {
+    digits(py, "a duration", seconds, 1e-3, "s")
+}
+
+/// A time in s that a program waits for; more than 0, up to a day.
+pub(crate) fn span(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Duration> {
+    let day = Duration::from_secs(86_400);
+    match Duration::try_from_secs_f64(seconds) {
+        Ok(span) if !span.is_zero() && span <= day => Ok(span),
+        _ => {
+            Err(bad_value(py, format_args!("{what} of {seconds} s: give more than 0, up to a day")))
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! A CAN bus with RMD motors, for threads that may wait.
+
+use std::sync::{Arc, PoisonError, RwLock};
+
+use motorlink::rmd::{
+    Bus, CentiDegrees, Error, Found, Limits, MotorId, MotorSet, OnDrop, Options, SpeedLimit,
+    Torque4, TorqueCommand,
+};
+use pyo3::IntoPyObjectExt;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::request::{RmdRequest, motion_status, motor_id, motor_status, torque};
+use crate::clock::{Clock, RealTime};
+use crate::error::{bad_value, closed, rmd_error};
+use crate::number::{digits, span};
+use crate::values;
+
+/// IDs that are asked before signals are looked at.
+const SCAN_STEP: usize = 8;
+
+/// A CAN bus with RMD motors. Every call lets other Python threads run while it waits.
+#[pyclass(frozen, module = "motorlink._core")]
+pub(crate) struct RmdBus {
+    bus: RwLock<Option<Arc<Bus>>>,
+    port: String,
+    clock: Arc<dyn Clock>,
+}
+
+impl RmdBus {
+    /// Over a bus that is open, on this clock.
+    pub(crate) fn from_bus(bus: Arc<Bus>, port: String, clock: Arc<dyn Clock>) -> Self {
+        RmdBus { bus: RwLock::new(Some(bus)), port, clock }
+    }
+
+    /// The bus; an error once it was closed.
+    pub(crate) fn bus(&self, py: Python<'_>) -> PyResult<Arc<Bus>> {
+        let bus = self.bus.read().unwrap_or_else(PoisonError::into_inner);
+        bus.clone().ok_or_else(|| closed(py, &self.port))
+    }
+
+    /// The time that this bus lives in.
+    pub(crate) fn clock(&self) -> &Arc<dyn Clock> {
+        &self.clock
+    }
+}
+
+#[pymethods]
+impl RmdBus {
+    /// Opens a port. No motor is asked anything.
+    #[staticmethod]
+    #[pyo3(signature = (
+        port, *, timeout = 0.05, guard = 0.1, current_limit_a = None, speed_limit_dps = None,
+        angle_limit_deg = None,
+    ))]
+    fn open(
+        py: Python<'_>,
+        port: &str,
+        timeout: f64,
+        guard: f64,
+        current_limit_a: Option<f64>,
+        speed_limit_dps: Option<f64>,
+        angle_limit_deg: Option<f64>,
+    ) -> PyResult<Self> {
+        let limits = limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?;
+        let options = options(py, timeout, guard, limits)?;
+        let name = port.parse().map_err(|error| bad_value(py, error))?;
+        let bus = py.detach(|| Bus::open(&name, options));
+        let bus = Arc::new(bus.map_err(|error| rmd_error(py, &error))?);
+        Ok(Self::from_bus(bus, port.to_owned(), Arc::new(RealTime::new())))
+    }
+
+    /// One exchange; gives what the request makes of the reply.
+    fn perform(&self, py: Python<'_>, id: i64, request: &RmdRequest) -> PyResult<Py<PyAny>> {
+        let (bus, id) = (self.bus(py)?, motor_id(py, id)?);
+        let data = request.data();
+        let reply = py.detach(|| bus.raw(id, data)).map_err(|error| rmd_error(py, &error))?;
+        request.value(py, &reply)
+    }
+
+    /// Exchanges that overlap, one a motor; gives the value, or the exception, by ID.
+    fn cycle<'py>(
+        &self,
+        py: Python<'py>,
+        requests: Vec<(i64, PyRef<'py, RmdRequest>)>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let bus = self.bus(py)?;
+        let mut asked: Vec<(MotorId, [u8; 8])> = Vec::with_capacity(requests.len());
+        for (id, request) in &requests {
+            asked.push((motor_id(py, *id)?, request.data()));
+        }
+        let mut outcomes: Vec<(MotorId, Result<[u8; 8], Error>)> = Vec::with_capacity(asked.len());
+        let cycle = || bus.cycle(&asked, |id, outcome| outcomes.push((id, outcome)));
+        py.detach(cycle).map_err(|error| rmd_error(py, &error))?;
+        let by_id = PyDict::new(py);
+        for ((id, _), (_, request)) in asked.iter().zip(&requests) {
+            let outcome = outcomes.iter().find(|(of, _)| of == id);
+            let value = match outcome {
+                Some((_, Ok(reply))) => request.value(py, reply)?,
+                Some((_, Err(error))) => rmd_error(py, error).into_py_any(py)?,
+                None => continue,
+            };
+            by_id.set_item(id.number(), value)?;
+        }
+        Ok(by_id)
+    }
+
+    /// Torque currents, A, for motors 1 to 4 in one frame; gives what each of `expect` answers.
+    #[pyo3(signature = (amps, expect))]
+    fn torque4<'py>(
+        &self,
+        py: Python<'py>,
+        amps: [f64; 4],
+        expect: Vec<i64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let bus = self.bus(py)?;
+        let mut torques = [TorqueCommand(0); 4];
+        for (slot, amps) in torques.iter_mut().zip(amps) {
+            *slot = torque(py, amps)?;
+        }
+        let expect: PyResult<MotorSet> = expect.into_iter().map(|id| motor_id(py, id)).collect();
+        let expect = expect?;
+        let replies = py.detach(|| bus.torque4(Torque4(torques), expect));
+        let by_id = PyDict::new(py);
+        for (reply, id) in replies.map_err(|error| rmd_error(py, &error))?.into_iter().zip(1..) {
+            match reply {
+                Some(Ok(status)) => by_id.set_item(id, motion_status(py, &status)?)?,
+                Some(Err(error)) => by_id.set_item(id, rmd_error(py, &error))?,
+                None => {}
+            }
+        }
+        Ok(by_id)
+    }
+
+    /// Asks every ID for its status; gives what answered.
+    fn scan(&self, py: Python<'_>, ids: Vec<i64>) -> PyResult<Vec<Py<PyAny>>> {
+        let bus = self.bus(py)?;
+        let ids: PyResult<MotorSet> = ids.into_iter().map(|id| motor_id(py, id)).collect();
+        let mut left = ids?;
+        let mut found = Vec::new();
+        while !left.is_empty() {
+            let some: MotorSet = left.by_ref().take(SCAN_STEP).collect();
+            py.detach(|| bus.scan(some, |one| found.push(one), |_| {}))
+                .map_err(|error| rmd_error(py, &error))?;
+            py.check_signals()?;
+        }
+        found.into_iter().map(|one| finding(py, one)).collect()
+    }
+
+    /// Sets what a motor may be told; `None` is no limit.
+    fn set_limits(
+        &self,
+        py: Python<'_>,
+        id: i64,
+        current_a: Option<f64>,
+        speed_dps: Option<f64>,
+        angle_deg: Option<f64>,
+    ) -> PyResult<()> {
+        let (bus, id) = (self.bus(py)?, motor_id(py, id)?);
+        let limits = limits(py, current_a, speed_dps, angle_deg)?;
+        py.detach(|| bus.set_limits(id, limits));
+        Ok(())
+    }
+
+    /// Motors that were given something to do and neither stopped nor switched off.
+    #[getter]
+    fn moving(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+        let bus = self.bus(py)?;
+        Ok(py.detach(|| bus.moving().map(MotorId::number).collect()))
+    }
+
+    /// Stops the motors that this bus was used to move, or switches them off; gives those that did
+    /// not acknowledge it, and why.
+    #[pyo3(signature = (*, off))]
+    fn stop_moving(&self, py: Python<'_>, off: bool) -> PyResult<Vec<(u8, PyErr)>> {
+        let bus = self.bus(py)?;
+        let action = if off { OnDrop::Off } else { OnDrop::Stop };
+        let stopped = py.detach(|| bus.guard().with(action).stop_now());
+        let failed = stopped.into_iter().filter_map(|one| {
+            one.result.err().map(|error| (one.id.number(), rmd_error(py, &error)))
+        });
+        Ok(failed.collect())
+    }
+
+    /// Closes the port, when exchanges that are under way are over. Again is no error.
+    fn close(&self, py: Python<'_>) {
+        let bus = self.bus.write().unwrap_or_else(PoisonError::into_inner).take();
+        py.detach(|| drop(bus));
+    }
+
+    /// Whether it was closed.
+    #[getter]
+    fn is_closed(&self) -> bool {
+        self.bus.read().unwrap_or_else(PoisonError::into_inner).is_none()
+    }
+
+    /// The port's name.
+    #[getter]
+    fn port(&self) -> &str {
+        &self.port
+    }
+}
+
+/// What the arguments of `open` say.
+pub(crate) fn options(
+    py: Python<'_>,
+    timeout: f64,
+    guard: f64,
+    limits: Limits,
+) -> PyResult<Options> {
+    Ok(Options {
+        timeout: span(py, "a timeout", timeout)?,
+        guard: span(py, "a guard time", guard)?,
+        limits,
+        ..Options::default()
+    })
+}
+
+/// Limits in the units of the field. A limit between two digits is the lower one.
+pub(crate) fn limits(
+    py: Python<'_>,
+    current_a: Option<f64>,
+    speed_dps: Option<f64>,
+    angle_deg: Option<f64>,
+) -> PyResult<Limits> {
+    fn limit<T: TryFrom<i64>>(
+        py: Python<'_>,
+        value: Option<f64>,
+        scale: f64,
+        unit: &str,
+    ) -> PyResult<Option<T>> {
+        let below = |value: f64| match value {
+            value if value >= 0.0 => {
+                let whole = (value / scale + 1e-9).floor() * scale;
+                digits(py, "a limit", whole, scale, unit)
+            }
+            _ => Err(bad_value(py, format_args!("{value} {unit} is no limit: give 0 or more"))),
+        };
+        value.map(below).transpose()
+    }
+    let current = limit(py, current_a, TorqueCommand::SCALE, TorqueCommand::SYMBOL)?;
+    let angle = limit(py, angle_deg, CentiDegrees::SCALE, CentiDegrees::SYMBOL)?;
+    Ok(Limits {
+        current: current.map(TorqueCommand),
+        speed: limit(py, speed_dps, SpeedLimit::SCALE, SpeedLimit::SYMBOL)?.map(SpeedLimit),
+        angle: angle.map(CentiDegrees),
+    })
+}
+
+fn finding(py: Python<'_>, found: Found) -> PyResult<Py<PyAny>> {
+    let nothing = || py.None();
+    let row = match found {
+        Found::Motor(id, status) => {
+            let status = motor_status(py, &status)?;
+            (id.number(), "motor", status, nothing())
+        }
+        Found::Foreign(id, dialect) => {
+            let dialect = dialect.to_string().into_py_any(py)?;
+            (id.number(), "foreign", nothing(), dialect)
+        }
+        Found::Echo(id) => (id.number(), "echo", nothing(), nothing()),
+    };
+    values::found(py, row)
+}

@@ -1,0 +1,60 @@
+//! The RMD protocol over CAN, V1.62.
+
+mod bus;
+mod quantity;
+mod request;
+
+pub(crate) use bus::RmdBus;
+pub(crate) use quantity::rmd_quantities;
+pub(crate) use request::RmdRequest;
+
+use motorlink_proto::rmd::{
+    CanFrame, Code, Direction, Errors, Field, MotorId, Payload, TORQUE4_ID, Torque4, describe,
+};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::error::bad_value;
+use crate::values;
+
+/// A frame in words and values. `reply`: the motor sent it; the frame does not tell.
+#[pyfunction]
+#[pyo3(signature = (can_id, data, *, reply))]
+pub(crate) fn rmd_decode(
+    py: Python<'_>,
+    can_id: u32,
+    data: &[u8],
+    reply: bool,
+) -> PyResult<Py<PyAny>> {
+    let data = request::eight(py, data)?;
+    let id = u16::try_from(can_id).ok().filter(|id| *id < 0x800);
+    let id = id.ok_or_else(|| bad_value(py, format_args!("{can_id:#x} has not 11 bits")))?;
+    let motor = MotorId::from_can_id(can_id);
+    let code = Code::from(data[0]);
+    let (name, fields): (_, &[Field]) = match (motor, code.info()) {
+        (None, _) if id == TORQUE4_ID && !reply => (TORQUE4.to_owned(), Torque4::FIELDS),
+        (None, _) => {
+            return Err(bad_value(py, format_args!("{id:#05x} is no identifier of this protocol")));
+        }
+        (Some(_), Some(row)) => (row.code.to_string(), if reply { row.reply } else { row.request }),
+        (Some(_), None) => (code.to_string(), &[]),
+    };
+    let (physical, digits) = (PyDict::new(py), PyDict::new(py));
+    for field in fields {
+        let raw = field.raw(&data);
+        digits.set_item(field.name, raw)?;
+        physical.set_item(quantity::named(field), raw as f64 * field.scale)?;
+    }
+    let direction = if reply { Direction::DriveToHost } else { Direction::HostToDrive };
+    let text = describe(CanFrame::new(id, data), direction).to_string();
+    values::frame(py, (motor.map(MotorId::number), name, physical, digits, text))
+}
+
+/// What the frame 0x280 is called.
+const TORQUE4: &str = "Multiple motor torque closed loop control";
+
+/// The bits of an error byte as text.
+#[pyfunction]
+pub(crate) fn rmd_errors_text(bits: u8) -> String {
+    Errors(bits).to_string()
+}

@@ -1,0 +1,81 @@
+//! ST's Motor Control Protocol.
+
+mod client;
+mod reply;
+mod request;
+mod scale;
+
+pub(crate) use client::StClient;
+pub(crate) use request::StRequest;
+
+use motorlink::stmcp::register::{Feature, Features, Writing};
+use motorlink::stmcp::{Flags, Profile, RegisterId};
+use pyo3::prelude::*;
+
+use crate::error::bad_value;
+use crate::values;
+use scale::{Scale, register};
+
+/// The profile of this name.
+fn profile(py: Python<'_>, name: &str) -> PyResult<Profile> {
+    let known = [Profile::Spec, Profile::Mcsdk54];
+    known.into_iter().find(|profile| profile.name() == name).ok_or_else(|| {
+        let names = known.map(Profile::name).join("` and `");
+        bad_value(py, format_args!("there is no profile `{name}`; there are `{names}`"))
+    })
+}
+
+/// A register by name or number, with the unit that a motor of this full scale has it in.
+#[pyfunction]
+#[pyo3(signature = (name, profile = "spec", full_scale_amps = None))]
+pub(crate) fn st_register(
+    py: Python<'_>,
+    name: &Bound<'_, PyAny>,
+    profile: &str,
+    full_scale_amps: Option<f64>,
+) -> PyResult<Py<PyAny>> {
+    let scale = Scale::new(py, profile, full_scale_amps)?;
+    let register = register(name)?;
+    let (Some(shape), Some(text)) = (register.shape(), register.text()) else {
+        let id = register.0;
+        return Err(bad_value(py, format_args!("nobody knows what register {id:#04x} is")));
+    };
+    let built = Features::NONE.with(shape.feature);
+    values::register_info(
+        py,
+        (
+            register.0,
+            text.name,
+            scale.unit(register),
+            shape.ty.name(),
+            shape.access.name(),
+            text.doc,
+            shape.feature.name(),
+            shape.read_size(scale.profile, built).is_some(),
+            matches!(shape.writing(scale.profile, built), Writing::Takes(_)),
+        ),
+    )
+}
+
+/// Names of the registers that drives of a profile may have, in the order of their numbers.
+#[pyfunction]
+#[pyo3(signature = (profile = "spec"))]
+pub(crate) fn st_registers(py: Python<'_>, profile: &str) -> PyResult<Vec<&'static str>> {
+    let profile = self::profile(py, profile)?;
+    let every = Feature::ALL.iter().fold(Features::NONE, |all, &feature| all.with(feature));
+    let there = |register: &RegisterId| {
+        register.shape().is_some_and(|shape| {
+            shape.read_size(profile, every).is_some()
+                || matches!(shape.writing(profile, every), Writing::Takes(_))
+                || shape.shows_on_dac(every)
+        })
+    };
+    let known = RegisterId::all().filter(there);
+    Ok(known.filter_map(|register| register.text().map(|text| text.name)).collect())
+}
+
+/// The faults of a FLAGS value as text.
+#[pyfunction]
+pub(crate) fn st_flags_text(bits: u32) -> String {
+    Flags(bits).to_string()
+}

@@ -1,0 +1,128 @@
+//! Reading the reply to a request, in two steps: the first needs no interpreter.
+
+use motorlink_proto::stmcp::{
+    BoardInfo, ControlMode, FirmwareVersion, Flags, RegisterId, RevupPhase, Status,
+};
+use pyo3::IntoPyObjectExt;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
+
+use super::scale::Scale;
+use crate::values;
+
+/// What the payload of the acknowledge is.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Reply {
+    Nothing,
+    Number { register: RegisterId, raw: bool },
+    State,
+    Faults,
+    ControlMode,
+    Info,
+    FirmwareVersion,
+    Revup,
+    Segment { registers: Vec<RegisterId>, raw: bool },
+    Bytes,
+}
+
+/// A reply that fits its request; made where no interpreter is at hand.
+pub(crate) enum Answer {
+    Nothing,
+    Bits(i32),
+    Info([u8; 3], String),
+    FirmwareVersion(String, String),
+    Revup(RevupPhase),
+    Values(Vec<i32>),
+    Bytes(Vec<u8>),
+}
+
+impl Reply {
+    /// Reads the payload of a positive acknowledge; `None` where it answers something else.
+    pub(super) fn understand(&self, payload: &[u8]) -> Option<Answer> {
+        Some(match self {
+            Reply::Nothing => Answer::Nothing,
+            Reply::Number { register, .. } => Answer::Bits(register.decode(payload)?),
+            Reply::State => Answer::Bits(RegisterId::STATUS.decode(payload)?),
+            Reply::Faults => Answer::Bits(RegisterId::FLAGS.decode(payload)?),
+            Reply::ControlMode => Answer::Bits(RegisterId::CONTROL_MODE.decode(payload)?),
+            Reply::Info => {
+                let info = BoardInfo::decode(payload)?;
+                Answer::Info(info.version, info.name.to_owned())
+            }
+            Reply::FirmwareVersion => {
+                let version = FirmwareVersion::decode(payload);
+                Answer::FirmwareVersion(version.name.to_owned(), version.version.to_owned())
+            }
+            Reply::Revup => Answer::Revup(RevupPhase::decode(payload)?),
+            Reply::Segment { registers, .. } => Answer::Values(segment(registers, payload)?),
+            Reply::Bytes => Answer::Bytes(payload.to_vec()),
+        })
+    }
+
+    /// The answer for Python.
+    pub(super) fn value(
+        &self,
+        py: Python<'_>,
+        scale: &Scale,
+        answer: Answer,
+    ) -> PyResult<Py<PyAny>> {
+        match (answer, self) {
+            (Answer::Nothing, _) => Ok(py.None()),
+            (Answer::Bits(bits), Reply::Number { register, raw }) => {
+                scale.value(py, *register, bits, *raw)
+            }
+            (Answer::Bits(bits), Reply::State) => {
+                let state = Status::from(bits as u8);
+                values::state(py, (state.to_string(), state.number(), state.doc()))
+            }
+            (Answer::Bits(bits), Reply::ControlMode) => {
+                let mode = ControlMode::from(bits as u8);
+                values::control_mode(py, (mode.to_string(), mode.number(), mode.doc()))
+            }
+            (Answer::Bits(bits), _) => {
+                let flags = Flags(bits as u32);
+                let names = |bits| PyTuple::new(py, faults(bits));
+                values::faults(py, (names(flags.occurred())?, names(flags.present())?, flags.0))
+            }
+            (Answer::Info(version, name), _) => {
+                values::info(py, (PyTuple::new(py, version)?, name))
+            }
+            (Answer::FirmwareVersion(name, version), _) => {
+                values::firmware_version(py, (name, version))
+            }
+            (Answer::Revup(phase), _) => {
+                let current = scale.amps(py, phase.torque_s16a.into())?;
+                let seconds = f64::from(phase.duration_ms) / 1e3;
+                values::revup_phase(py, (phase.speed_rpm, current, seconds))
+            }
+            (Answer::Values(bits), Reply::Segment { registers, raw }) => {
+                let named = PyDict::new(py);
+                for (register, bits) in registers.iter().zip(bits) {
+                    named
+                        .set_item(register.to_string(), scale.value(py, *register, bits, *raw)?)?;
+                }
+                named.into_py_any(py)
+            }
+            (Answer::Values(bits), _) => bits.into_py_any(py),
+            (Answer::Bytes(bytes), _) => PyBytes::new(py, &bytes).into_py_any(py),
+        }
+    }
+}
+
+/// Values of the registers of a segment; `None` where the payload is not theirs.
+pub(super) fn segment(registers: &[RegisterId], mut payload: &[u8]) -> Option<Vec<i32>> {
+    let next = |register: &RegisterId| {
+        let size = usize::from(register.shape()?.ty.size());
+        let (bytes, rest) = payload.split_at_checked(size)?;
+        payload = rest;
+        register.decode(bytes)
+    };
+    registers.iter().map(next).collect()
+}
+
+/// Names of the faults in one half of FLAGS; the number of a bit that has none.
+fn faults(half: u16) -> Vec<String> {
+    let bits = (0..16).map(|n| 1u16 << n).filter(|bit| half & bit != 0);
+    let name = |bit| Flags::NAMES.iter().find(|(known, ..)| *known == bit).map(|row| row.1);
+    bits.map(|bit| name(bit).map_or_else(|| format!("{bit:#06x}"), str::to_owned)).collect()
+}

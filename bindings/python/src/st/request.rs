@@ -1,0 +1,479 @@
+//! One request to an ST drive: checked when it is made, and able to read its reply.
+
+use motorlink_proto::stmcp::{
+    Command, CurrentReference, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse,
+    PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS,
+    TorqueRamp,
+};
+use pyo3::IntoPyObjectExt;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyString};
+
+use super::reply::{Answer, Reply};
+use super::scale::{Scale, register};
+use crate::error::{bad_value, refusal};
+use crate::number::{digits, milliseconds};
+
+/// A request to an ST drive, in the units of the motor that it is made for.
+#[pyclass(frozen, eq, module = "motorlink._core")]
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StRequest {
+    /// The request, apart from its list of bytes.
+    request: Request<'static>,
+    /// The list of bytes of requests that have one.
+    bytes: Vec<u8>,
+    scale: Scale,
+    reply: Reply,
+}
+
+impl StRequest {
+    fn told(scale: Scale, request: Request<'static>) -> Self {
+        StRequest { request, bytes: Vec::new(), scale, reply: Reply::Nothing }
+    }
+
+    fn asked(scale: Scale, request: Request<'static>, reply: Reply) -> Self {
+        StRequest { reply, ..Self::told(scale, request) }
+    }
+
+    /// The request for a client or a machine.
+    pub(crate) fn request(&self) -> Request<'_> {
+        match self.request {
+            Request::SetRegister { register, .. } => {
+                Request::SetRegister { register, value: &self.bytes }
+            }
+            Request::ProfilerInfo(_) => Request::ProfilerInfo(&self.bytes),
+            Request::ConfigDynStruct { segment, .. } => {
+                Request::ConfigDynStruct { segment, registers: &self.bytes }
+            }
+            other => other,
+        }
+    }
+
+    /// Reads the payload of a positive acknowledge; `None` where it answers something else.
+    pub(crate) fn understand(&self, payload: &[u8]) -> Option<Answer> {
+        self.reply.understand(payload)
+    }
+
+    /// The answer for Python.
+    pub(crate) fn value(&self, py: Python<'_>, answer: Answer) -> PyResult<Py<PyAny>> {
+        self.reply.value(py, &self.scale, answer)
+    }
+}
+
+#[pymethods]
+impl StRequest {
+    /// Reads a register (4.5).
+    #[staticmethod]
+    #[pyo3(signature = (register, *, profile = "spec", raw = false, full_scale_amps = None))]
+    fn read(
+        py: Python<'_>,
+        #[pyo3(from_py_with = super::scale::register)] register: RegisterId,
+        profile: &str,
+        raw: bool,
+        full_scale_amps: Option<f64>,
+    ) -> PyResult<Self> {
+        let scale = Scale::new(py, profile, full_scale_amps)?;
+        let reply = Reply::Number { register, raw };
+        Ok(Self::asked(scale, Request::GetRegister(register), reply))
+    }
+
+    /// Writes a register (4.4).
+    #[staticmethod]
+    #[pyo3(signature = (register, value, *, profile = "spec", raw = false, full_scale_amps = None))]
+    fn write(
+        py: Python<'_>,
+        #[pyo3(from_py_with = super::scale::register)] register: RegisterId,
+        value: &Bound<'_, PyAny>,
+        profile: &str,
+        raw: bool,
+        full_scale_amps: Option<f64>,
+    ) -> PyResult<Self> {
+        let scale = Scale::new(py, profile, full_scale_amps)?;
+        let bits = scale.bits(register, value, raw)?;
+        let size = usize::from(register.write_size(scale.profile).min(4));
+        let request = Request::SetRegister { register, value: &[] };
+        let bytes = bits.to_le_bytes()[..size].to_vec();
+        Ok(StRequest { bytes, ..Self::told(scale, request) })
+    }
+
+    /// Writes any bytes to any register (4.4).
+    #[staticmethod]
+    fn write_bytes(
+        py: Python<'_>,
+        #[pyo3(from_py_with = super::scale::register)] register: RegisterId,
+        value: Vec<u8>,
+    ) -> PyResult<Self> {
+        let request = Request::SetRegister { register, value: &[] };
+        let request = StRequest { bytes: value, ..Self::told(Scale::plain(), request) };
+        request.fitting(py)
+    }
+
+    /// Reads STATUS: the state in words.
+    #[staticmethod]
+    fn state() -> Self {
+        Self::asked(Scale::plain(), Request::GetRegister(RegisterId::STATUS), Reply::State)
+    }
+
+    /// Reads FLAGS: the faults in words.
+    #[staticmethod]
+    fn faults() -> Self {
+        Self::asked(Scale::plain(), Request::GetRegister(RegisterId::FLAGS), Reply::Faults)
+    }
+
+    /// Reads CONTROL_MODE in words.
+    #[staticmethod]
+    fn control_mode() -> Self {
+        let request = Request::GetRegister(RegisterId::CONTROL_MODE);
+        Self::asked(Scale::plain(), request, Reply::ControlMode)
+    }
+
+    /// Executes a command by name or number (4.6).
+    #[staticmethod]
+    fn execute(py: Python<'_>, command: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let command = match command.cast::<PyString>() {
+            Ok(name) => named_command(py, &name.to_cow()?)?,
+            Err(_) => Command::from(command.extract::<u8>()?),
+        };
+        Ok(Self::told(Scale::plain(), Request::Execute(command)))
+    }
+
+    /// Version and name of the SDK (4.7).
+    #[staticmethod]
+    fn info() -> Self {
+        Self::asked(Scale::plain(), Request::BoardInfo, Reply::Info)
+    }
+
+    /// Name and version of the firmware (4.12).
+    #[staticmethod]
+    fn firmware_version() -> Self {
+        Self::asked(Scale::plain(), Request::FirmwareVersion, Reply::FirmwareVersion)
+    }
+
+    /// Programs a speed ramp: rpm, s (4.8).
+    #[staticmethod]
+    fn ramp(py: Python<'_>, speed_rpm: f64, duration_s: f64) -> PyResult<Self> {
+        let speed_rpm = rpm(py, speed_rpm)?;
+        let ramp = Ramp { speed_rpm, duration_ms: milliseconds(py, duration_s)? };
+        Ok(Self::told(Scale::plain(), Request::Ramp(ramp)))
+    }
+
+    /// Programs a torque ramp: Iq, s (profile `mcsdk-5.4`).
+    #[staticmethod]
+    #[pyo3(signature = (iq, duration_s, *, full_scale_amps = None))]
+    fn torque_ramp(
+        py: Python<'_>,
+        iq: f64,
+        duration_s: f64,
+        full_scale_amps: Option<f64>,
+    ) -> PyResult<Self> {
+        let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
+        let torque_s16a = scale.digits(py, iq)?;
+        let ramp = TorqueRamp { torque_s16a, duration_ms: milliseconds(py, duration_s)? };
+        Ok(Self::told(scale, Request::TorqueRamp(ramp)))
+    }
+
+    /// Sets the current references Iq and Id (4.11).
+    #[staticmethod]
+    #[pyo3(signature = (iq, id = 0.0, *, full_scale_amps = None))]
+    fn current(py: Python<'_>, iq: f64, id: f64, full_scale_amps: Option<f64>) -> PyResult<Self> {
+        let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
+        let (iq_s16a, id_s16a) = (scale.digits(py, iq)?, scale.digits(py, id)?);
+        let request = Request::CurrentReference(CurrentReference { iq_s16a, id_s16a });
+        Ok(Self::told(scale, request))
+    }
+
+    /// Turns to an angle: rad, s (profile `mcsdk-5.4`).
+    #[staticmethod]
+    fn move_to(py: Python<'_>, angle_rad: f64, duration_s: f64) -> PyResult<Self> {
+        let (angle, duration) = (angle_rad as f32, duration_s as f32);
+        if !angle.is_finite() || !duration.is_finite() || duration < 0.0 {
+            let move_ = format!("{angle_rad} rad in {duration_s} s is no move; nothing was sent");
+            return Err(bad_value(py, move_));
+        }
+        let target = PositionMove { angle_rad: angle, duration_s: duration };
+        Ok(Self::told(Scale::plain(), Request::Position(target)))
+    }
+
+    /// Reads a rev-up phase, 0 to 4 (4.9).
+    #[staticmethod]
+    #[pyo3(signature = (phase, *, full_scale_amps = None))]
+    fn revup(py: Python<'_>, phase: i64, full_scale_amps: Option<f64>) -> PyResult<Self> {
+        let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
+        let phase = below(py, "rev-up phase", phase, REVUP_PHASES.into())?;
+        Ok(Self::asked(scale, Request::RevupData(phase), Reply::Revup))
+    }
+
+    /// Sets a rev-up phase, 0 to 4: rpm, Iq, s (4.10).
+    #[staticmethod]
+    #[pyo3(signature = (phase, speed_rpm, current, duration_s, *, full_scale_amps = None))]
+    fn set_revup(
+        py: Python<'_>,
+        phase: i64,
+        speed_rpm: f64,
+        current: f64,
+        duration_s: f64,
+        full_scale_amps: Option<f64>,
+    ) -> PyResult<Self> {
+        let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
+        let phase = below(py, "rev-up phase", phase, REVUP_PHASES.into())?;
+        let data = RevupPhase {
+            speed_rpm: rpm(py, speed_rpm)?,
+            torque_s16a: scale.digits(py, current)?,
+            duration_ms: milliseconds(py, duration_s)?,
+        };
+        Ok(Self::told(scale, Request::SetRevupData(phase, data)))
+    }
+
+    /// Chooses the registers of a data segment, 0 to 3 (profile `spec`).
+    #[staticmethod]
+    fn configure_segment(
+        py: Python<'_>,
+        segment: i64,
+        registers: Vec<Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let segment = below(py, "data segment", segment, SEGMENTS)?;
+        let bytes = segment_registers(py, &registers)?.into_iter().map(|id| id.0).collect();
+        let request = Request::ConfigDynStruct { segment, registers: &[] };
+        Ok(StRequest { bytes, ..Self::told(Scale::plain(), request) })
+    }
+
+    /// Reads a data segment that was configured with these registers (profile `spec`).
+    #[staticmethod]
+    #[pyo3(signature = (segment, registers, *, raw = false, full_scale_amps = None))]
+    fn read_segment(
+        py: Python<'_>,
+        segment: i64,
+        registers: Vec<Bound<'_, PyAny>>,
+        raw: bool,
+        full_scale_amps: Option<f64>,
+    ) -> PyResult<Self> {
+        let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
+        let segment = below(py, "data segment", segment, SEGMENTS)?;
+        let registers = segment_registers(py, &registers)?;
+        let reply = Reply::Segment { registers, raw };
+        Ok(Self::asked(scale, Request::DataElement(segment), reply))
+    }
+
+    /// Lists the registers of motor profiler steps (profile `mcsdk-5.4`).
+    #[staticmethod]
+    fn profiler_info(py: Python<'_>, steps: Vec<u8>) -> PyResult<Self> {
+        let request = Self::asked(Scale::plain(), Request::ProfilerInfo(&[]), Reply::Bytes);
+        StRequest { bytes: steps, ..request }.fitting(py)
+    }
+
+    /// The request in a frame, and the motor that it is for.
+    #[staticmethod]
+    #[pyo3(signature = (frame, *, profile = "spec"))]
+    fn decode(py: Python<'_>, frame: &[u8], profile: &str) -> PyResult<(u8, Self)> {
+        let scale = Scale::new(py, profile, None)?;
+        let parsed = parse(py, frame)?;
+        let request = Request::decode(scale.profile, &parsed).map_err(|code| {
+            let header = parsed.header;
+            bad_value(
+                py,
+                format_args!("{header:#04x} begins no request that {profile} knows: {code}"),
+            )
+        })?;
+        Ok((parsed.motor(), Self::decoded(scale, request)))
+    }
+
+    /// The frame for a motor, 1 to 7; 0 is the one that the drive has selected.
+    #[pyo3(signature = (motor = 0))]
+    fn encode<'py>(&self, py: Python<'py>, motor: i64) -> PyResult<Bound<'py, PyBytes>> {
+        let motor = motor_number(py, motor)?;
+        let mut out = [0; MAX_FRAME];
+        match self.request().encode(motor, &mut out) {
+            Some(frame) => Ok(PyBytes::new(py, frame)),
+            None => Err(too_long(py)),
+        }
+    }
+
+    /// What a reply frame says to this request.
+    ///
+    /// Raises `Refused` for a negative acknowledge, `BadValue` for what is no reply to it.
+    fn decode_reply(&self, py: Python<'_>, frame: &[u8]) -> PyResult<Py<PyAny>> {
+        let parsed = parse(py, frame)?;
+        let answer = match (parsed.header, parsed.payload) {
+            (HEADER_ACK, payload) => self.understand(payload),
+            (HEADER_NACK, [code, ..]) => return Err(refusal(py, ErrorCode::from(*code))),
+            _ => None,
+        };
+        let code = self.code();
+        match answer {
+            Some(answer) => self.value(py, answer),
+            None => Err(bad_value(py, format_args!("these bytes are no reply to {code}"))),
+        }
+    }
+
+    /// The document's name of the frame code: `GET_REG`.
+    #[getter]
+    fn code(&self) -> &'static str {
+        self.request.code().name()
+    }
+
+    /// Whether it only asks; anything else changes something in the drive.
+    #[getter]
+    fn is_read(&self) -> bool {
+        self.request.is_read()
+    }
+
+    /// The values of the request as they travel, by name.
+    #[getter]
+    fn fields<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let fields = PyDict::new(py);
+        let set = |name: &str, value: Py<PyAny>| fields.set_item(name, value);
+        match self.request() {
+            Request::SetRegister { register, value } => {
+                set("register", register.0.into_py_any(py)?)?;
+                set("value", PyBytes::new(py, value).into_py_any(py)?)?;
+            }
+            Request::GetRegister(register) => set("register", register.0.into_py_any(py)?)?,
+            Request::Execute(command) => set("command", command.number().into_py_any(py)?)?,
+            Request::BoardInfo | Request::FirmwareVersion => {}
+            Request::Ramp(ramp) => {
+                set("speed_rpm", ramp.speed_rpm.into_py_any(py)?)?;
+                set("duration_ms", ramp.duration_ms.into_py_any(py)?)?;
+            }
+            Request::RevupData(phase) => set("phase", phase.into_py_any(py)?)?,
+            Request::SetRevupData(phase, data) => {
+                set("phase", phase.into_py_any(py)?)?;
+                set("speed_rpm", data.speed_rpm.into_py_any(py)?)?;
+                set("torque_s16a", data.torque_s16a.into_py_any(py)?)?;
+                set("duration_ms", data.duration_ms.into_py_any(py)?)?;
+            }
+            Request::CurrentReference(reference) => {
+                set("iq_s16a", reference.iq_s16a.into_py_any(py)?)?;
+                set("id_s16a", reference.id_s16a.into_py_any(py)?)?;
+            }
+            Request::ProfilerInfo(steps) => {
+                set("steps", PyBytes::new(py, steps).into_py_any(py)?)?;
+            }
+            Request::DataElement(segment) => set("segment", segment.into_py_any(py)?)?,
+            Request::ConfigDynStruct { segment, registers } => {
+                set("segment", segment.into_py_any(py)?)?;
+                set("registers", PyBytes::new(py, registers).into_py_any(py)?)?;
+            }
+            Request::TorqueRamp(ramp) => {
+                set("torque_s16a", ramp.torque_s16a.into_py_any(py)?)?;
+                set("duration_ms", ramp.duration_ms.into_py_any(py)?)?;
+            }
+            Request::Position(target) => {
+                set("angle_rad", target.angle_rad.into_py_any(py)?)?;
+                set("duration_s", target.duration_s.into_py_any(py)?)?;
+            }
+        }
+        Ok(fields)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(format!("<Request {} {}>", self.code(), self.fields(py)?))
+    }
+}
+
+impl StRequest {
+    /// What a decoded request is answered with; its numbers are digits.
+    fn decoded(scale: Scale, request: Request<'_>) -> Self {
+        let (request, bytes): (Request<'static>, &[u8]) = match request {
+            Request::SetRegister { register, value } => {
+                (Request::SetRegister { register, value: &[] }, value)
+            }
+            Request::ProfilerInfo(steps) => (Request::ProfilerInfo(&[]), steps),
+            Request::ConfigDynStruct { segment, registers } => {
+                (Request::ConfigDynStruct { segment, registers: &[] }, registers)
+            }
+            Request::GetRegister(register) => (Request::GetRegister(register), &[]),
+            Request::Execute(command) => (Request::Execute(command), &[]),
+            Request::BoardInfo => (Request::BoardInfo, &[]),
+            Request::Ramp(ramp) => (Request::Ramp(ramp), &[]),
+            Request::RevupData(phase) => (Request::RevupData(phase), &[]),
+            Request::SetRevupData(phase, data) => (Request::SetRevupData(phase, data), &[]),
+            Request::CurrentReference(both) => (Request::CurrentReference(both), &[]),
+            Request::FirmwareVersion => (Request::FirmwareVersion, &[]),
+            Request::DataElement(segment) => (Request::DataElement(segment), &[]),
+            Request::TorqueRamp(ramp) => (Request::TorqueRamp(ramp), &[]),
+            Request::Position(target) => (Request::Position(target), &[]),
+        };
+        let reply = match request {
+            Request::GetRegister(register) => Reply::Number { register, raw: true },
+            Request::BoardInfo => Reply::Info,
+            Request::FirmwareVersion => Reply::FirmwareVersion,
+            Request::RevupData(_) => Reply::Revup,
+            Request::DataElement(_) | Request::ProfilerInfo(_) => Reply::Bytes,
+            _ => Reply::Nothing,
+        };
+        StRequest { bytes: bytes.to_vec(), ..Self::asked(scale, request, reply) }
+    }
+
+    /// The request, if it fits a frame.
+    fn fitting(self, py: Python<'_>) -> PyResult<Self> {
+        let fits = self.request().encode(0, &mut [0; MAX_FRAME]).is_some();
+        if fits { Ok(self) } else { Err(too_long(py)) }
+    }
+
+    /// The register and the bits of a write.
+    pub(super) fn written(&self) -> Option<(RegisterId, i32)> {
+        let Request::SetRegister { register, .. } = self.request else { return None };
+        let mut bits = [0; 4];
+        bits.iter_mut().zip(&self.bytes).for_each(|(slot, byte)| *slot = *byte);
+        Some((register, i32::from_le_bytes(bits)))
+    }
+}
+
+/// A motor number, 0 to 7, where 0 is the motor that the drive has selected.
+pub(crate) fn motor_number(py: Python<'_>, motor: i64) -> PyResult<u8> {
+    let number = u8::try_from(motor).ok().filter(|number| *number <= Motor::MAX);
+    number.ok_or_else(|| {
+        bad_value(py, format_args!("motor {motor} does not exist: motor numbers are 1 to 7"))
+    })
+}
+
+fn named_command(py: Python<'_>, name: &str) -> PyResult<Command> {
+    let known =
+        |command: &&Command| command.name().is_some_and(|known| known.eq_ignore_ascii_case(name));
+    Command::ALL.iter().find(known).copied().ok_or_else(|| {
+        let names: Vec<_> = Command::ALL.iter().filter_map(|command| command.name()).collect();
+        bad_value(py, format_args!("there is no command `{name}`; there are {}", names.join(", ")))
+    })
+}
+
+fn rpm(py: Python<'_>, speed: f64) -> PyResult<i32> {
+    digits(py, "a speed", speed, 1.0, "rpm")
+}
+
+fn below(py: Python<'_>, what: &str, number: i64, end: usize) -> PyResult<u8> {
+    let fits = usize::try_from(number).is_ok_and(|number| number < end);
+    let number = u8::try_from(number).ok().filter(|_| fits);
+    number.ok_or_else(|| bad_value(py, format_args!("{what}s are 0 to {}", end - 1)))
+}
+
+fn segment_registers(py: Python<'_>, names: &[Bound<'_, PyAny>]) -> PyResult<Vec<RegisterId>> {
+    if names.is_empty() || names.len() > SEGMENT_REGISTERS {
+        let count = names.len();
+        let why = format!("a data segment has 1 to {SEGMENT_REGISTERS} registers, not {count}");
+        return Err(bad_value(py, why));
+    }
+    let known = |name| {
+        let found = register(name)?;
+        match found.shape() {
+            Some(_) => Ok(found),
+            None => Err(bad_value(py, format_args!("nobody knows the size of register {found}"))),
+        }
+    };
+    names.iter().map(known).collect()
+}
+
+fn parse<'a>(py: Python<'_>, frame: &'a [u8]) -> PyResult<Frame<'a>> {
+    match Frame::parse(frame) {
+        Parse::Frame(parsed, size) if size == frame.len() => Ok(parsed),
+        Parse::Frame(_, size) => {
+            let more = frame.len() - size;
+            Err(bad_value(py, format_args!("the frame ends {more} bytes before its bytes do")))
+        }
+        Parse::More => Err(bad_value(py, "the frame is not complete")),
+        Parse::Bad(why) => Err(bad_value(py, format_args!("this is no frame: {why:?}"))),
+    }
+}
+
+fn too_long(py: Python<'_>) -> PyErr {
+    bad_value(py, "the request does not fit a frame: a payload has at most 128 bytes")
+}

@@ -1,0 +1,150 @@
+//! Register values between the wire and the units of the field.
+
+use motorlink::stmcp::register::{Type, Unit};
+use motorlink::stmcp::{Profile, Reading, RegisterId, find_register, parse_value};
+use pyo3::IntoPyObjectExt;
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+
+use crate::error::bad_value;
+use crate::number::digits;
+
+/// Digits of a drive's full scale of current.
+const FULL_SCALE: f64 = 32767.0;
+
+/// What the digits of a motor's registers are worth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Scale {
+    pub(crate) profile: Profile,
+    /// One s16A digit, A; `None` while nobody has told, and currents are digits.
+    ampere: Option<f64>,
+}
+
+impl Scale {
+    pub(crate) fn new(
+        py: Python<'_>,
+        profile: &str,
+        full_scale_amps: Option<f64>,
+    ) -> PyResult<Self> {
+        let profile = super::profile(py, profile)?;
+        Scale { profile, ampere: None }.with_full_scale(py, full_scale_amps)
+    }
+
+    /// Of a request on which neither the profile nor a full scale has a bearing.
+    pub(crate) fn plain() -> Self {
+        Scale { profile: Profile::default(), ampere: None }
+    }
+
+    /// The same with currents in A.
+    pub(crate) fn with_full_scale(
+        self,
+        py: Python<'_>,
+        full_scale_amps: Option<f64>,
+    ) -> PyResult<Self> {
+        match full_scale_amps {
+            Some(amps) if !(amps.is_finite() && amps > 0.0) => {
+                let why = "give the current of digit 32767, in A";
+                Err(bad_value(py, format_args!("{amps} A is no full scale: {why}")))
+            }
+            amps => Ok(Scale { profile: self.profile, ampere: amps.map(|amps| amps / FULL_SCALE) }),
+        }
+    }
+
+    /// One digit of a current, and the unit it is in.
+    pub(crate) fn current(&self) -> (f64, &'static str) {
+        self.ampere.map_or((1.0, Unit::S16A.symbol()), |ampere| (ampere, Unit::Ampere.symbol()))
+    }
+
+    /// A current as digits.
+    pub(crate) fn digits<T: TryFrom<i64>>(&self, py: Python<'_>, current: f64) -> PyResult<T> {
+        let (scale, unit) = self.current();
+        digits(py, "a current", current, scale, unit)
+    }
+
+    /// Digits as a current: a float in A, an integer in s16A.
+    pub(crate) fn amps(&self, py: Python<'_>, digits: i32) -> PyResult<Py<PyAny>> {
+        match self.ampere {
+            Some(ampere) => (f64::from(digits) * ampere).into_py_any(py),
+            None => digits.into_py_any(py),
+        }
+    }
+
+    /// The unit of a register's values.
+    pub(crate) fn unit(&self, register: RegisterId) -> &'static str {
+        if is_current(register) { self.current().1 } else { self.reading(register, 0).unit() }
+    }
+
+    /// What was read, in [`unit`](Self::unit)s.
+    pub(crate) fn physical(&self, register: RegisterId, bits: i32) -> f64 {
+        match self.ampere {
+            Some(ampere) if is_current(register) => f64::from(bits) * ampere,
+            _ => self.reading(register, bits).value(),
+        }
+    }
+
+    /// What was read as an integer; the bits of a float.
+    pub(crate) fn raw(&self, register: RegisterId, bits: i32) -> i64 {
+        self.reading(register, bits).digits()
+    }
+
+    /// What was read, for Python: an integer where a digit is one unit.
+    pub(crate) fn value(
+        &self,
+        py: Python<'_>,
+        register: RegisterId,
+        bits: i32,
+        raw: bool,
+    ) -> PyResult<Py<PyAny>> {
+        let (digits, value) = (self.raw(register, bits), self.physical(register, bits));
+        let float = register.shape().is_some_and(|shape| shape.ty == Type::F32);
+        if raw || !float && self.is_whole(register) {
+            return digits.into_py_any(py);
+        }
+        value.into_py_any(py)
+    }
+
+    /// The bits of a value that a program gives: a number, or a name where values have names.
+    pub(crate) fn bits(
+        &self,
+        register: RegisterId,
+        value: &Bound<'_, PyAny>,
+        raw: bool,
+    ) -> PyResult<i32> {
+        let py = value.py();
+        if !raw && self.ampere.is_some() && is_current(register) {
+            return self.digits::<i16>(py, value.extract()?).map(i32::from);
+        }
+        let text = if let Ok(text) = value.cast::<PyString>() {
+            text.to_string()
+        } else if let Ok(whole) = value.extract::<i64>() {
+            whole.to_string()
+        } else {
+            value.extract::<f64>()?.to_string()
+        };
+        parse_value(register, &text, self.profile, raw).map_err(|error| bad_value(py, error))
+    }
+
+    fn is_whole(&self, register: RegisterId) -> bool {
+        self.physical(register, 1) == 1.0
+    }
+
+    fn reading(&self, register: RegisterId, bits: i32) -> Reading {
+        Reading { register, bits, profile: self.profile }
+    }
+}
+
+fn is_current(register: RegisterId) -> bool {
+    register.shape().is_some_and(|shape| shape.unit == Unit::S16A)
+}
+
+/// A register by name or number.
+pub(crate) fn register(name: &Bound<'_, PyAny>) -> PyResult<RegisterId> {
+    let py = name.py();
+    if let Ok(text) = name.cast::<PyString>() {
+        return find_register(&text.to_cow()?).map_err(|error| bad_value(py, error));
+    }
+    let number: i64 = name.extract()?;
+    u8::try_from(number)
+        .map(RegisterId)
+        .map_err(|_| bad_value(py, format_args!("{number} is no register: numbers are 0 to 255")))
+}

@@ -1,0 +1,96 @@
+//! `motorlink`: command, watch and simulate motor drives from the shell. A library so that another
+//! program can be the same command.
+
+mod conformance;
+mod connection;
+mod demo;
+mod failure;
+mod guard;
+mod help;
+mod interrupt;
+mod output;
+mod ports;
+mod repeat;
+mod rmd;
+mod sim;
+mod st;
+mod trace;
+
+use std::ffi::OsString;
+
+use clap::{CommandFactory, Parser, Subcommand};
+
+/// Command, watch and simulate motor drives: ST's Motor Control Protocol over a serial line and the
+/// RMD protocol V1.62 over CAN.
+#[derive(Parser)]
+#[command(name = "motorlink", version, max_term_width = 100, after_help = help::EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Drive simulated motors of both kinds through real ports, and show what happens
+    Demo(demo::Args),
+    /// Serve simulated drives on ports of this machine
+    Sim(sim::Args),
+    /// Hold the line of an ST drive for a program, and stop its motors when the program is gone
+    Guard(guard::Args),
+    /// List serial devices and CAN interfaces, and what could be wrong with them
+    Ports(ports::Args),
+    /// Talk to a drive that speaks ST's Motor Control Protocol
+    #[command(after_help = help::ST_PORTS)]
+    St(st::Args),
+    /// Talk to RMD motors on a CAN bus
+    #[command(after_help = help::RMD_PORTS)]
+    Rmd(rmd::Args),
+    /// Check a drive against the document it claims to follow, sentence by sentence
+    Conformance(conformance::Args),
+    /// Print completions for a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages into a folder
+    Man {
+        /// The folder; it is made if it is not there
+        folder: std::path::PathBuf,
+    },
+}
+
+/// Does what a command line says, the program's name first, and gives the exit code: 0 done, 1 the
+/// drive refused, 2 usage, 3 the line failed, 130 interrupted.
+///
+/// It takes the process over as the command does: SIGINT, SIGTERM and SIGHUP are its own from now on,
+/// and end the process where nothing has to be tidied up.
+pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
+    interrupt::install();
+    let cli = match Cli::try_parse_from(words) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help for a reader that is gone.
+            let _ = error.print();
+            return error.exit_code().try_into().unwrap_or(2);
+        }
+    };
+    let result = match cli.command {
+        Command::Demo(args) => demo::run(args),
+        Command::Sim(args) => sim::run(args),
+        Command::Guard(args) => guard::run(args),
+        Command::Ports(args) => ports::run(args),
+        Command::St(args) => st::run(args),
+        Command::Rmd(args) => rmd::run(args),
+        Command::Conformance(args) => conformance::run(args),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "motorlink", &mut script);
+            output::line(&String::from_utf8_lossy(&script).trim_end())
+        }
+        Command::Man { folder } => help::write_manual(Cli::command(), &folder),
+    };
+    match result {
+        Ok(()) => 0,
+        Err(failure) => failure.report(),
+    }
+}
