@@ -8,6 +8,7 @@ mod clock;
 mod error;
 mod number;
 mod rmd;
+mod sampling;
 mod st;
 mod values;
 
@@ -23,7 +24,9 @@ mod _core {
     #[pymodule_export]
     use super::rmd::{RmdBus, RmdRequest, rmd_decode, rmd_errors_text, rmd_quantities};
     #[pymodule_export]
-    use super::st::{StClient, StRequest, st_flags_text, st_register, st_registers};
+    use super::st::{
+        StClient, StRequest, st_flags_text, st_register, st_register_name, st_registers,
+    };
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -23,6 +23,21 @@ pub(crate) fn digits<T: TryFrom<i64>>(
     })
 }
 
+/// A limit, which no value may exceed: one between two digits is the lower one.
+pub(crate) fn limit<T: TryFrom<i64>>(
+    py: Python<'_>,
+    value: f64,
+    scale: f64,
+    unit: &str,
+) -> PyResult<T> {
+    if value.is_nan() || value < 0.0 {
+        return Err(bad_value(py, format_args!("{value} {unit} is no limit: give 0 or more")));
+    }
+    // What is a digit but for the rounding of a float is that digit.
+    let whole = (value / scale + 1e-9).floor();
+    digits(py, "a limit", whole * scale, scale, unit)
+}
+
 /// A duration in s as the wire's ms.
 pub(crate) fn milliseconds(py: Python<'_>, seconds: f64) -> PyResult<u16> {
     digits(py, "a duration", seconds, 1e-3, "s")

@@ -3,21 +3,56 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from motorlink.errors import BadValue
+
+#: A structured array: ``t`` in s since the first instant, and a field a value.
 Samples = npt.NDArray[np.void]
+
+
+def columns(names: Sequence[str]) -> list[str]:
+    """The names of the values, each once."""
+    if not names:
+        raise BadValue("name what to sample")
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise BadValue(f"{', '.join(sorted(twice))}: named twice in one sample")
+    return list(names)
+
+
+def skips(on_error: str) -> bool:
+    """Whether a row that fails is left out."""
+    if on_error not in ("raise", "skip"):
+        raise BadValue(f"on_error={on_error!r}: give 'raise' or 'skip'")
+    return on_error == "skip"
+
+
+def array(
+    outcome: tuple[bytearray, BaseException | None], names: Sequence[str], *, raw: bool
+) -> Samples:
+    """The rows as an array; raises what ended them early, with the array in its ``samples``."""
+    rows, error = outcome
+    kind = "i8" if raw else "f8"
+    samples = np.frombuffer(rows, dtype=[("t", "f8"), *((name, kind) for name in names)])
+    if error is not None:
+        error.samples = samples  # type: ignore[attr-defined]
+        raise error
+    return samples
 
 
 def to_pandas(samples: Samples) -> Any:
     """A ``pandas.DataFrame`` of what ``bus.sample`` gave, with the time in s as its index.
 
-    Raises ``ImportError`` where pandas is not installed: ``pip install motorlink[pandas]``.
+    Raises ``ImportError`` where pandas is not installed.
     """
     try:
         pandas = importlib.import_module("pandas")
     except ImportError as error:
-        raise ImportError("pandas is not installed: `pip install pandas`") from error
-    return pandas.DataFrame({name: samples[name] for name in samples.dtype.names or ()}).set_index("t")
+        raise ImportError("to_pandas needs pandas: `pip install pandas`", name="pandas") from error
+    named = {name: samples[name] for name in samples.dtype.names or ()}
+    return pandas.DataFrame(named).set_index("t")

@@ -27,8 +27,8 @@ class Word(str):
     def __repr__(self) -> str:
         return f"{type(self).__name__}({str(self)!r})"
 
-    def __getnewargs__(self) -> tuple[str, int, str]:
-        return str(self), self.number, self.doc
+    def __reduce__(self) -> tuple[type[Word], tuple[str, int, str]]:
+        return type(self), (str(self), self.number, self.doc)
 
 
 class State(Word):

@@ -1,18 +1,92 @@
-"""RMD motors on a CAN bus, protocol V1.62."""
+"""RMD motors on a CAN bus, protocol V1.62.
+
+>>> import motorlink
+>>> with motorlink.rmd.open("sim:") as bus:      # or "socketcan:can0", "slcan:/dev/ttyACM0"
+...     motor = bus.motor(1)
+...     status = motor.move_to(90, max_speed=500)
+...     motor.status.voltage_v
+24.0
+
+Angles are °, speeds °/s, accelerations °/s², torque currents A, all of the motor shaft; positive is
+clockwise. Every method of a motor is one exchange and raises
+
+* ``Timeout`` where the motor does not answer; nobody knows then what it did. There is no refusal in
+  this protocol: a motor that does not know a command is silent, too,
+* ``LineLost`` and ``PortError`` where the line fails, or the motor speaks another protocol,
+* ``BadValue`` where nothing was sent: no such motor, out of range, over a limit,
+* ``Closed`` after ``bus.close()``.
+
+Names in brackets are paragraphs of chapter 3 of the document, or codes of commands.
+"""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
 from motorlink import _core
 from motorlink._bus import end, on_close_checked, port_name
 from motorlink._core import RmdRequest as Request
+from motorlink._sampling import Samples, array, columns, skips
+from motorlink._values import (
+    Encoder,
+    Found,
+    Frame,
+    Gains,
+    MotionStatus,
+    MotorErrors,
+    MotorStatus,
+    PhaseCurrents,
+)
+from motorlink.errors import BadValue, MotorlinkError
 
-__all__ = ["Bus", "Request", "open"]
+__all__ = [
+    "QUANTITIES",
+    "Bus",
+    "Encoder",
+    "Found",
+    "Frame",
+    "Gains",
+    "MotionStatus",
+    "Motor",
+    "MotorErrors",
+    "MotorStatus",
+    "PhaseCurrents",
+    "Request",
+    "decode",
+    "move_to",
+    "off",
+    "open",
+    "read_angle",
+    "read_motion",
+    "read_phase_currents",
+    "read_status",
+    "run",
+    "speed",
+    "stop",
+    "torque",
+    "turn_to",
+]
 
 _ON_CLOSE = ("stop", "off", "nothing")
+
+#: What ``Bus.sample`` can read.
+QUANTITIES: tuple[str, ...] = tuple(_core.rmd_quantities())
+
+# Requests for ``Bus.cycle``.
+torque = Request.torque
+speed = Request.speed
+move_to = Request.move_to
+turn_to = Request.turn_to
+stop = Request.stop
+off = Request.off
+run = Request.run
+read_status = Request.read_status
+read_motion = Request.read_motion
+read_phase_currents = Request.read_phase_currents
+read_angle = Request.read_angle
 
 
 def open(
@@ -25,7 +99,24 @@ def open(
     angle_limit: float | None = None,
     on_close: str = "stop",
 ) -> Bus:
-    """Opens a CAN bus. Nothing is sent."""
+    """Opens a CAN bus. Nothing is sent.
+
+    ``port``
+        ``socketcan:can0``, ``slcan:/dev/ttyACM0``, ``slcan:tcp:HOST:PORT``, or ``sim:`` for simulated
+        motors inside the process.
+    ``timeout``
+        How long to wait for a motor's reply, s.
+    ``guard``
+        How long after a timeout a late reply is awaited before the motor is asked again, s.
+    ``current_limit``, ``speed_limit``, ``angle_limit``
+        What no request to any motor may exceed in either direction: A, °/s, ° from zero; also not by
+        raw frames. With a speed limit a move needs ``max_speed``.
+    ``on_close``
+        What the end of ``with``, and ``close()``, do to motors that this bus set moving: ``stop``
+        (0x81: they hold still), ``off`` (0x80), or ``nothing``.
+
+    Raises ``PortError`` where the port cannot be opened.
+    """
     on_close_checked(on_close, _ON_CLOSE)
     core = _core.RmdBus.open(
         port_name(port),
@@ -38,28 +129,139 @@ def open(
     return Bus(core, on_close=on_close)
 
 
+def decode(can_id: int, data: bytes, *, reply: bool) -> Frame:
+    """A frame in words and values. Request and reply look alike: say which it is.
+
+    >>> frame = decode(0x141, bytes.fromhex("A100000064000000"), reply=False)
+    >>> frame.values
+    {'torque_a': 1.6}
+    >>> frame.text
+    'motor 1 > 0xA1 Torque closed-loop command: torque 1.600 A'
+
+    Raises ``BadValue`` for a frame that is none of this protocol.
+    """
+    return _core.rmd_decode(can_id, data, reply=reply)
+
+
 class Bus:
-    """A CAN bus with RMD motors. Threads may share it."""
+    """A CAN bus with RMD motors; from :func:`open`.
+
+    Threads may share it: one exchange or cycle at a time is on the bus, and each caller gets its own
+    answer.
+    """
 
     def __init__(self, core: _core.RmdBus, *, on_close: str = "stop"):
         self._core = core
         self._on_close = on_close_checked(on_close, _ON_CLOSE)
 
+    @property
+    def port(self) -> str:
+        """The port's name."""
+        return self._core.port
+
+    @property
+    def moving(self) -> list[int]:
+        """IDs of the motors that this bus gave something to do and that did not stop since."""
+        return self._core.moving
+
+    def motor(self, id: int = 1) -> Motor:
+        """A motor of the bus, ID 1 to 32."""
+        return Motor(self, id)
+
     def perform(self, motor: int, request: Request) -> Any:
-        """One exchange; gives what the request makes of the reply."""
+        """One exchange with a motor; gives what the request makes of the reply."""
         return self._core.perform(motor, request)
 
+    def cycle(self, requests: Mapping[int, Request]) -> dict[int, Any]:
+        """Asks many motors at once; the exchanges overlap. Gives what each answered, by ID.
+
+        >>> import motorlink
+        >>> from motorlink import rmd
+        >>> with rmd.open("sim:") as bus:
+        ...     answers = bus.cycle({1: rmd.speed(100), 2: rmd.torque(0.5), 9: rmd.read_motion()})
+        >>> type(answers[1]).__name__, type(answers[9]).__name__
+        ('MotionStatus', 'Timeout')
+
+        What fails for one motor is its answer, an exception that is not raised; what fails for the
+        line is raised.
+        """
+        return self._core.cycle(list(requests.items()))
+
+    def torque4(
+        self,
+        first: float,
+        second: float,
+        third: float,
+        fourth: float,
+        *,
+        expect: Iterable[int] = (1, 2, 3, 4),
+    ) -> dict[int, MotionStatus | MotorlinkError]:
+        """Torque currents, A, for motors 1 to 4 in one frame (chapter 4, 0x280).
+
+        Gives what each of the motors in ``expect`` answered; a motor that fails has an exception
+        there, which is not raised. Raises ``BadValue`` beyond ±32 A or a limit; nothing is sent then.
+        """
+        return self._core.torque4((first, second, third, fourth), list(expect))
+
+    def scan(self, ids: Iterable[int] = range(1, 33)) -> list[Found]:
+        """Asks every ID for its status; gives what answered, in the order of the answers."""
+        return self._core.scan(list(ids))
+
+    def sample(
+        self,
+        quantities: Mapping[int, Sequence[str]] | Sequence[str],
+        *,
+        rate: float,
+        seconds: float,
+        motor: int = 1,
+        raw: bool = False,
+        on_error: str = "raise",
+    ) -> Samples:
+        """Reads what motors tell ``rate`` times a second for ``seconds``; gives a structured array.
+
+        >>> import motorlink
+        >>> with motorlink.rmd.open("sim:") as bus:
+        ...     data = bus.sample({1: ["iq_a", "speed_dps"], 2: ["iq_a"]}, rate=100, seconds=0.1)
+        >>> data.dtype.names
+        ('t', 'iq_a_1', 'speed_dps_1', 'iq_a_2')
+
+        What there is: :data:`QUANTITIES`. A list of names samples ``motor``, and its fields have no
+        number behind them. ``t`` is the moment, s since the first instant, at which the row's first
+        requests left. Motors are asked in the same cycles; quantities of different commands take one
+        cycle each. Instants do not drift; one that the bus was too slow for is missing, and no row is
+        ever made up.
+
+        A row that fails raises, with what was sampled before in the exception's ``samples``; with
+        ``on_error="skip"`` a motor that fails costs the row only. Ctrl-C ends it, with ``samples`` too.
+        """
+        skip = skips(on_error)
+        if isinstance(quantities, Mapping):
+            motors = [(id, list(names)) for id, names in quantities.items()]
+            fields = [f"{name}_{id}" for id, names in motors for name in names]
+        else:
+            motors = [(motor, list(quantities))]
+            fields = list(quantities)
+        fields = columns(fields)
+        return array(self._core.sample(motors, rate, seconds, raw, skip), fields, raw=raw)
+
     def close(self) -> None:
-        """Stops the motors that this bus was used to move, and closes the port."""
+        """Stops the motors that this bus set moving, as it was opened to; closes the port.
+
+        Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
+        port is closed all the same.
+        """
         self._end(in_flight=False)
 
     def _end(self, *, in_flight: bool) -> None:
         core = self._core
         if core.is_closed:
             return
-        off = self._on_close == "off"
-        stop = list if self._on_close == "nothing" else lambda: core.stop_moving(off=off)
-        end(stop, core.close, core.port, in_flight=in_flight)
+        on_close = self._on_close
+
+        def halt() -> list[tuple[int, MotorlinkError]]:
+            return [] if on_close == "nothing" else core.stop_moving(off=on_close == "off")
+
+        end(halt, core.close, core.port, in_flight=in_flight)
 
     def __enter__(self) -> Bus:
         return self
@@ -71,3 +273,187 @@ class Bus:
         traceback: TracebackType | None,
     ) -> None:
         self._end(in_flight=error is not None)
+
+    def __repr__(self) -> str:
+        closed = ", closed" if self._core.is_closed else ""
+        return f"<motorlink.rmd.Bus {self.port}{closed}>"
+
+
+class Motor:
+    """One motor on the bus; from :meth:`Bus.motor`."""
+
+    def __init__(self, bus: Bus, id: int):
+        self._bus = bus
+        self._id = id
+
+    @property
+    def bus(self) -> Bus:
+        """The bus."""
+        return self._bus
+
+    @property
+    def id(self) -> int:
+        """The motor's ID."""
+        return self._id
+
+    def _perform(self, request: Request) -> Any:
+        return self._bus.perform(self._id, request)
+
+    def set_limits(
+        self,
+        *,
+        current: float | None = None,
+        speed: float | None = None,
+        angle: float | None = None,
+    ) -> None:
+        """What this motor may be told from now on, A, °/s, ° from zero; ``None`` is no limit."""
+        self._bus._core.set_limits(self._id, current, speed, angle)
+
+    @property
+    def status(self) -> MotorStatus:
+        """Temperature, supply voltage and errors (Read motor status 1 and error flag commands)."""
+        status: MotorStatus = self._perform(Request.read_status())
+        return status
+
+    @property
+    def motion(self) -> MotionStatus:
+        """Temperature, torque current, speed and encoder position (Read motor status 2)."""
+        status: MotionStatus = self._perform(Request.read_motion())
+        return status
+
+    @property
+    def phase_currents(self) -> PhaseCurrents:
+        """The three phase currents, A (Read motor status 3)."""
+        currents: PhaseCurrents = self._perform(Request.read_phase_currents())
+        return currents
+
+    @property
+    def angle(self) -> float:
+        """The angle over all turns, ° (Read multi turns angle command)."""
+        angle: float = self._perform(Request.read_angle())
+        return angle
+
+    @property
+    def circle_angle(self) -> float:
+        """The angle within the turn, 0 to 359.99 ° (Read single circle angle command)."""
+        angle: float = self._perform(Request.read_circle_angle())
+        return angle
+
+    @property
+    def encoder(self) -> Encoder:
+        """What the encoder reads, in counts (Read encoder data command)."""
+        encoder: Encoder = self._perform(Request.read_encoder())
+        return encoder
+
+    def clear_errors(self) -> MotorStatus:
+        """Clears the errors whose cause is gone; gives what is left (Clear motor error flag command)."""
+        status: MotorStatus = self._perform(Request.clear_errors())
+        return status
+
+    def torque(self, amps: float) -> MotionStatus:
+        """Holds a torque current, within ±32 A (Torque current control command)."""
+        status: MotionStatus = self._perform(Request.torque(amps))
+        return status
+
+    def speed(self, dps: float) -> MotionStatus:
+        """Holds a speed, °/s (Speed control command)."""
+        status: MotionStatus = self._perform(Request.speed(dps))
+        return status
+
+    def move_to(self, degrees: float, max_speed: float | None = None) -> MotionStatus:
+        """Turns to an angle over all turns, °, no faster than ``max_speed``, °/s.
+
+        Position control commands 1 and 2. Gives the motion as it was when the command came.
+        """
+        status: MotionStatus = self._perform(Request.move_to(degrees, max_speed))
+        return status
+
+    def turn_to(
+        self, degrees: float, max_speed: float | None = None, *, clockwise: bool = True
+    ) -> MotionStatus:
+        """Turns to an angle within the turn, 0 to 359.99 °, this way round.
+
+        No faster than ``max_speed``, °/s. Position control commands 3 and 4.
+        """
+        status: MotionStatus = self._perform(
+            Request.turn_to(degrees, max_speed, clockwise=clockwise)
+        )
+        return status
+
+    def off(self) -> None:
+        """Switches the motor off; it forgets what it was doing (Motor off command)."""
+        self._perform(Request.off())
+
+    def stop(self) -> None:
+        """Stops the motor; it holds still and remembers what it was doing (Motor stop command)."""
+        self._perform(Request.stop())
+
+    def run(self) -> None:
+        """Resumes what :meth:`stop` stopped (Motor running command)."""
+        self._perform(Request.run())
+
+    @property
+    def gains(self) -> Gains:
+        """The gains in RAM. Set them until power-off by assignment; :meth:`write_gains` for good.
+
+        >>> import motorlink
+        >>> with motorlink.rmd.open("sim:") as bus:
+        ...     motor = bus.motor(1)
+        ...     motor.gains = motor.gains._replace(speed_kp=50)
+        ...     motor.gains.speed_kp
+        50
+        """
+        gains: Gains = self._perform(Request.read_gains())
+        return gains
+
+    @gains.setter
+    def gains(self, gains: Gains) -> None:
+        self.write_gains(gains)
+
+    def write_gains(self, gains: Gains, *, rom: bool = False) -> None:
+        """Sets the gains until power-off, or with ``rom=True`` for good, which wears the ROM.
+
+        Write PID to RAM, and to ROM, parameter command.
+        """
+        self._perform(Request.write_gains(*gains, rom=rom))
+
+    @property
+    def acceleration(self) -> int:
+        """The acceleration limit, °/s²; 0 is none. Set it until power-off by assignment (0x33, 0x34)."""
+        limit: int = self._perform(Request.read_acceleration())
+        return limit
+
+    @acceleration.setter
+    def acceleration(self, dps2: float) -> None:
+        self._perform(Request.write_acceleration(dps2))
+
+    def write_encoder_offset(self, counts: int, *, rom: bool) -> int:
+        """Sets the encoder's zero, in counts, at once and for good, which wears the ROM: ``rom=True``.
+
+        Gives the offset that the motor took (Write encoder offset command).
+        """
+        _worn(rom, "the encoder offset")
+        offset: int = self._perform(Request.write_encoder_offset_to_rom(counts))
+        return offset
+
+    def write_zero(self, *, rom: bool) -> int:
+        """Makes the position the zero from the next power-on on, which wears the ROM: ``rom=True``.
+
+        Gives the new offset, in counts (Write current position to ROM as motor zero position command).
+        """
+        _worn(rom, "the zero")
+        offset: int = self._perform(Request.write_zero_to_rom())
+        return offset
+
+    def exchange_raw(self, data: bytes, *, rom: bool = False) -> bytes:
+        """One exchange with any eight bytes; ``rom=True`` allows those that wear the ROM."""
+        reply: bytes = self._perform(Request.raw(data, rom=rom))
+        return reply
+
+    def __repr__(self) -> str:
+        return f"<motorlink.rmd.Motor {self._id} on {self._bus.port}>"
+
+
+def _worn(rom: bool, what: str) -> None:
+    if not rom:
+        raise BadValue(f"{what} goes to the motor's ROM, which wears: say rom=True")

@@ -8,12 +8,15 @@ use motorlink::rmd::{
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyByteArray, PyDict};
 
+use super::quantity::Quantity;
 use super::request::{RmdRequest, motion_status, motor_id, motor_status, torque};
+use super::sample::{Lane, sample};
 use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, closed, rmd_error};
-use crate::number::{digits, span};
+use crate::number::{limit, span};
+use crate::sampling::Plan;
 use crate::values;
 
 /// IDs that are asked before signals are looked at.
@@ -37,11 +40,6 @@ impl RmdBus {
     pub(crate) fn bus(&self, py: Python<'_>) -> PyResult<Arc<Bus>> {
         let bus = self.bus.read().unwrap_or_else(PoisonError::into_inner);
         bus.clone().ok_or_else(|| closed(py, &self.port))
-    }
-
-    /// The time that this bus lives in.
-    pub(crate) fn clock(&self) -> &Arc<dyn Clock> {
-        &self.clock
     }
 }
 
@@ -147,6 +145,30 @@ impl RmdBus {
         found.into_iter().map(|one| finding(py, one)).collect()
     }
 
+    /// Samples quantities of motors `(id, names)`. Gives rows of a time in s and the values, eight bytes
+    /// each, and what ended it before its time.
+    fn sample<'py>(
+        &self,
+        py: Python<'py>,
+        motors: Vec<(i64, Vec<String>)>,
+        rate: f64,
+        seconds: f64,
+        raw: bool,
+        skip: bool,
+    ) -> PyResult<(Bound<'py, PyByteArray>, Option<PyErr>)> {
+        let bus = self.bus(py)?;
+        let plan = Plan::new(py, rate, seconds)?;
+        let mut lanes = Vec::with_capacity(motors.len());
+        for (id, names) in motors {
+            let quantities: PyResult<_> =
+                names.iter().map(|name| Quantity::named(py, name)).collect();
+            lanes.push(Lane { id: motor_id(py, id)?, quantities: quantities? });
+        }
+        let clock = &*self.clock;
+        let (rows, outcome) = py.detach(|| sample(&bus, clock, &plan, &lanes, raw, skip));
+        Ok((PyByteArray::new(py, &rows.0), outcome.err()))
+    }
+
     /// Sets what a motor may be told; `None` is no limit.
     fn set_limits(
         &self,
@@ -223,27 +245,14 @@ pub(crate) fn limits(
     speed_dps: Option<f64>,
     angle_deg: Option<f64>,
 ) -> PyResult<Limits> {
-    fn limit<T: TryFrom<i64>>(
-        py: Python<'_>,
-        value: Option<f64>,
-        scale: f64,
-        unit: &str,
-    ) -> PyResult<Option<T>> {
-        let below = |value: f64| match value {
-            value if value >= 0.0 => {
-                let whole = (value / scale + 1e-9).floor() * scale;
-                digits(py, "a limit", whole, scale, unit)
-            }
-            _ => Err(bad_value(py, format_args!("{value} {unit} is no limit: give 0 or more"))),
-        };
-        value.map(below).transpose()
-    }
-    let current = limit(py, current_a, TorqueCommand::SCALE, TorqueCommand::SYMBOL)?;
-    let angle = limit(py, angle_deg, CentiDegrees::SCALE, CentiDegrees::SYMBOL)?;
+    let (ampere, degree) = (TorqueCommand::SCALE, CentiDegrees::SCALE);
+    let current = current_a.map(|amps| limit(py, amps, ampere, TorqueCommand::SYMBOL));
+    let speed = speed_dps.map(|dps| limit(py, dps, SpeedLimit::SCALE, SpeedLimit::SYMBOL));
+    let angle = angle_deg.map(|degrees| limit(py, degrees, degree, CentiDegrees::SYMBOL));
     Ok(Limits {
-        current: current.map(TorqueCommand),
-        speed: limit(py, speed_dps, SpeedLimit::SCALE, SpeedLimit::SYMBOL)?.map(SpeedLimit),
-        angle: angle.map(CentiDegrees),
+        current: current.transpose()?.map(TorqueCommand),
+        speed: speed.transpose()?.map(SpeedLimit),
+        angle: angle.transpose()?.map(CentiDegrees),
     })
 }
 

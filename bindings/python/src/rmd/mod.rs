@@ -3,6 +3,7 @@
 mod bus;
 mod quantity;
 mod request;
+mod sample;
 
 pub(crate) use bus::RmdBus;
 pub(crate) use quantity::rmd_quantities;

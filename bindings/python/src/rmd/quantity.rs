@@ -3,6 +3,8 @@
 use motorlink_proto::rmd::{Code, Field};
 use pyo3::prelude::*;
 
+use crate::error::bad_value;
+
 /// Reads whose values a program may sample, the one that tells most first.
 const READS: [Code; 5] = [
     Code::ReadStatus2,
@@ -53,8 +55,12 @@ impl Quantity {
     }
 
     /// The quantity of this name.
-    pub(crate) fn find(name: &str) -> Option<Quantity> {
-        Self::all().into_iter().find(|(known, _)| known == name).map(|(_, quantity)| quantity)
+    pub(crate) fn named(py: Python<'_>, name: &str) -> PyResult<Quantity> {
+        let found = Self::all().into_iter().find(|(known, _)| known == name);
+        found.map(|(_, quantity)| quantity).ok_or_else(|| {
+            let known = rmd_quantities().join(", ");
+            bad_value(py, format_args!("motors do not tell `{name}`; there are {known}"))
+        })
     }
 }
 

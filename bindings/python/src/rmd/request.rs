@@ -209,7 +209,6 @@ impl RmdRequest {
     #[pyo3(signature = (
         position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki, *, rom = false,
     ))]
-    #[expect(clippy::too_many_arguments, reason = "the six gains of the protocol")]
     fn write_gains(
         py: Python<'_>,
         position_kp: i64,
@@ -258,14 +257,14 @@ impl RmdRequest {
 
     /// Sets the encoder offset, at once and for good (0x91). Wears the ROM.
     #[staticmethod]
-    fn write_encoder_offset(py: Python<'_>, counts: f64) -> PyResult<Self> {
+    fn write_encoder_offset_to_rom(py: Python<'_>, counts: f64) -> PyResult<Self> {
         let offset = digits(py, "an offset", counts, 1.0, "counts")?;
         Ok(Self::of(WriteEncoderOffset(EncoderOffset { offset })))
     }
 
     /// Makes the current position the zero from the next power-on on (0x19). Wears the ROM.
     #[staticmethod]
-    fn write_zero() -> Self {
+    fn write_zero_to_rom() -> Self {
         Self::of(WriteZeroToRom)
     }
 
@@ -281,10 +280,17 @@ impl RmdRequest {
         Self::of(ReadCircleAngle)
     }
 
-    /// Eight bytes as they are, answered with eight bytes.
+    /// Eight bytes as they are, answered with eight bytes. `rom` allows those that wear the ROM.
     #[staticmethod]
-    fn raw(py: Python<'_>, data: &[u8]) -> PyResult<Self> {
-        Ok(RmdRequest { data: eight(py, data)?, plain: true })
+    #[pyo3(signature = (data, *, rom = false))]
+    fn raw(py: Python<'_>, data: &[u8], rom: bool) -> PyResult<Self> {
+        let request = RmdRequest { data: eight(py, data)?, plain: true };
+        if request.is_rom() && !rom {
+            let code = request.code();
+            let why = format!("{code:#04x} writes to the motor's ROM, which wears: say rom=True");
+            return Err(bad_value(py, why));
+        }
+        Ok(request)
     }
 
     /// The request in eight bytes.

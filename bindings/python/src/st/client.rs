@@ -2,15 +2,17 @@
 
 use std::sync::{Arc, PoisonError, RwLock};
 
-use motorlink::stmcp::{Client, Limits, Motor, Options, Recovery};
-use motorlink_proto::time::Duration;
+use motorlink::stmcp::{Client, Limits, Motor, Options, Profile, Recovery};
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyByteArray, PyBytes};
 
 use super::request::{StRequest, motor_number};
+use super::sample::{Lane, sample};
+use super::scale::{Scale, register};
 use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, closed, st_error};
-use crate::number::{digits, span};
+use crate::number::{limit, span};
+use crate::sampling::Plan;
 
 /// A master on a serial line. Every call lets other Python threads run while it waits.
 #[pyclass(frozen, module = "motorlink._core")]
@@ -31,11 +33,6 @@ impl StClient {
         let client = self.client.read().unwrap_or_else(PoisonError::into_inner);
         client.clone().ok_or_else(|| closed(py, &self.port))
     }
-
-    /// The time that this client lives in.
-    pub(crate) fn clock(&self) -> &Arc<dyn Clock> {
-        &self.clock
-    }
 }
 
 #[pymethods]
@@ -43,8 +40,8 @@ impl StClient {
     /// Opens a port. The drive is not asked anything.
     #[staticmethod]
     #[pyo3(signature = (
-        port, *, profile = "spec", timeout = 1.0, recovery = "drain", speed_limit_rpm = None,
-        current_limit_s16a = None,
+        port, *, profile = "spec", timeout = 1.0, recovery = "drain", speed_limit = None,
+        current_limit = None, full_scale_amps = None,
     ))]
     fn open(
         py: Python<'_>,
@@ -52,10 +49,13 @@ impl StClient {
         profile: &str,
         timeout: f64,
         recovery: &str,
-        speed_limit_rpm: Option<f64>,
-        current_limit_s16a: Option<f64>,
+        speed_limit: Option<f64>,
+        current_limit: Option<f64>,
+        full_scale_amps: Option<f64>,
     ) -> PyResult<Self> {
-        let options = options(py, profile, timeout, recovery, speed_limit_rpm, current_limit_s16a)?;
+        let scale = Scale::new(py, profile, full_scale_amps)?;
+        let limits = limits(py, scale, speed_limit, current_limit)?;
+        let options = options(py, scale.profile, timeout, recovery, limits)?;
         let name = port.parse().map_err(|error| bad_value(py, error))?;
         let client = py.detach(|| Client::open(&name, options));
         let client = Arc::new(client.map_err(|error| st_error(py, &error))?);
@@ -102,6 +102,30 @@ impl StClient {
         Ok(PyBytes::new(py, &reply.map_err(|error| st_error(py, &error))?))
     }
 
+    /// Samples registers of motors `(motor, registers, full_scale_amps)`. Gives rows of a time in s
+    /// and the values, eight bytes each, and what ended it before its time.
+    fn sample<'py>(
+        &self,
+        py: Python<'py>,
+        motors: Vec<(i64, Vec<Bound<'py, PyAny>>, Option<f64>)>,
+        rate: f64,
+        seconds: f64,
+        raw: bool,
+        skip: bool,
+    ) -> PyResult<(Bound<'py, PyByteArray>, Option<PyErr>)> {
+        let client = self.client(py)?;
+        let plan = Plan::new(py, rate, seconds)?;
+        let mut lanes = Vec::with_capacity(motors.len());
+        for (motor, names, full_scale_amps) in motors {
+            let scale = Scale::new(py, client.profile().name(), full_scale_amps)?;
+            let registers: PyResult<_> = names.iter().map(register).collect();
+            lanes.push(Lane { motor: motor_number(py, motor)?, registers: registers?, scale });
+        }
+        let clock = &*self.clock;
+        let (rows, outcome) = py.detach(|| sample(&client, clock, &plan, &lanes, raw, skip));
+        Ok((PyByteArray::new(py, &rows.0), outcome.err()))
+    }
+
     /// Motors that this client started and did not stop.
     #[getter]
     fn started(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
@@ -141,14 +165,13 @@ impl StClient {
 /// What the arguments of `open` say.
 pub(crate) fn options(
     py: Python<'_>,
-    profile: &str,
+    profile: Profile,
     timeout: f64,
     recovery: &str,
-    speed_limit_rpm: Option<f64>,
-    current_limit_s16a: Option<f64>,
+    limits: Limits,
 ) -> PyResult<Options> {
-    let mut options = Options { profile: super::profile(py, profile)?, ..Options::default() };
-    options.line.timeout = Duration::from(span(py, "a timeout", timeout)?);
+    let mut options = Options { profile, limits, ..Options::default() };
+    options.line.timeout = span(py, "a timeout", timeout)?.into();
     options.line.recovery = match recovery {
         "drain" => Recovery::Drain,
         "pad" => Recovery::Pad,
@@ -158,13 +181,19 @@ pub(crate) fn options(
             return Err(bad_value(py, format_args!("there is no recovery `{other}`; {known}")));
         }
     };
-    let limit = |limit: Option<f64>, unit| -> PyResult<Option<u32>> {
-        limit.map(|limit| digits(py, "a limit", limit.floor(), 1.0, unit)).transpose()
-    };
-    let current = limit(current_limit_s16a, "s16A")?;
-    options.limits = Limits {
-        speed_rpm: limit(speed_limit_rpm, "rpm")?,
-        current_s16a: current.map(|limit| limit.try_into().unwrap_or(u16::MAX)),
-    };
     Ok(options)
+}
+
+/// Limits in rpm and in the unit that the scale gives currents. A limit between two digits is the
+/// lower one.
+pub(crate) fn limits(
+    py: Python<'_>,
+    scale: Scale,
+    speed: Option<f64>,
+    current: Option<f64>,
+) -> PyResult<Limits> {
+    let (ampere, unit) = scale.current();
+    let speed_rpm = speed.map(|speed| limit(py, speed, 1.0, "rpm")).transpose()?;
+    let current_s16a = current.map(|current| limit(py, current, ampere, unit)).transpose()?;
+    Ok(Limits { speed_rpm, current_s16a })
 }

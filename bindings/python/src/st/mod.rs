@@ -3,6 +3,7 @@
 mod client;
 mod reply;
 mod request;
+mod sample;
 mod scale;
 
 pub(crate) use client::StClient;
@@ -55,6 +56,12 @@ pub(crate) fn st_register(
             matches!(shape.writing(scale.profile, built), Writing::Takes(_)),
         ),
     )
+}
+
+/// The name of a register, or its number in hexadecimal where it has none.
+#[pyfunction]
+pub(crate) fn st_register_name(#[pyo3(from_py_with = register)] name: RegisterId) -> String {
+    name.to_string()
 }
 
 /// Names of the registers that drives of a profile may have, in the order of their numbers.

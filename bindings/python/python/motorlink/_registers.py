@@ -1,0 +1,101 @@
+"""The registers of a motor as a mapping."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from motorlink import _core
+from motorlink._values import RegisterInfo
+from motorlink.errors import Refused
+
+if TYPE_CHECKING:
+    from motorlink.st import Motor
+
+
+class Registers(Mapping[str, float]):
+    """The registers of one motor (Motor Control Protocol, table 3), by name.
+
+    >>> import motorlink
+    >>> bus = motorlink.st.open("sim:")
+    >>> registers = bus.motor(1).registers
+    >>> registers["SPEED_KP"] = 1200             # writes; so does registers.SPEED_KP = 1200
+    >>> registers.SPEED_KP                       # reads
+    1200
+    >>> registers.info("BUS_VOLTAGE").unit
+    'V'
+    >>> bus.close()
+
+    Each access is one exchange with the drive, with the exceptions of ``Motor.read`` and
+    ``Motor.write``. Names complete in IPython and Jupyter: ``registers.<TAB>``, ``registers["<TAB>``.
+    """
+
+    __slots__ = ("_motor",)
+
+    _motor: Motor
+
+    def __init__(self, motor: Motor):
+        object.__setattr__(self, "_motor", motor)
+
+    def __getitem__(self, name: str | int) -> float:
+        return self._motor.read(name)
+
+    def __setitem__(self, name: str | int, value: float | str) -> None:
+        self._motor.write(name, value)
+
+    def __getattr__(self, name: str) -> float:
+        if name not in self._names():
+            raise AttributeError(f"there is no register {name!r}; `list(registers)` has their names")
+        return self._motor.read(name)
+
+    def __setattr__(self, name: str, value: float | str) -> None:
+        if name not in self._names():
+            raise AttributeError(f"there is no register {name!r}; `list(registers)` has their names")
+        self._motor.write(name, value)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names())
+
+    def __len__(self) -> int:
+        return len(self._names())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names()
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._names()]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return self._names()
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} registers of {self._motor!r}>"
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    def info(self, name: str | int) -> RegisterInfo:
+        """What a register is, from the table: unit, type, access, and what it needs. Asks nobody.
+
+        Raises ``BadValue`` for one that nobody names.
+        """
+        motor = self._motor
+        return _core.st_register(name, motor.bus.profile, motor.full_scale_amps)
+
+    def read_all(self) -> dict[str, float]:
+        """Every register that can be read and that this drive has, an exchange each."""
+        values = {}
+        for name in self:
+            if not self.info(name).readable:
+                continue
+            try:
+                values[name] = self[name]
+            except Refused:
+                continue
+        return values
+
+    def _names(self) -> list[str]:
+        return _core.st_registers(self._motor.bus.profile)
