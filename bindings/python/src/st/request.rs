@@ -2,8 +2,7 @@
 
 use motorlink_proto::stmcp::{
     Command, CurrentReference, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse,
-    PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS,
-    TorqueRamp,
+    PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENTS, TorqueRamp,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -224,7 +223,7 @@ impl StRequest {
         Ok(Self::told(scale, Request::SetRevupData(phase, data)))
     }
 
-    /// Chooses the registers of a data segment, 0 to 3 (profile `spec`).
+    /// Chooses the registers of a data segment, 0 to 3 (profile `spec`). A drive takes up to 32.
     #[staticmethod]
     fn configure_segment(
         py: Python<'_>,
@@ -232,9 +231,10 @@ impl StRequest {
         registers: Vec<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let segment = below(py, "data segment", segment, SEGMENTS)?;
-        let bytes = segment_registers(py, &registers)?.into_iter().map(|id| id.0).collect();
+        let registers: PyResult<Vec<_>> = registers.iter().map(register).collect();
+        let bytes = registers?.into_iter().map(|register| register.0).collect();
         let request = Request::ConfigDynStruct { segment, registers: &[] };
-        Ok(StRequest { bytes, ..Self::told(Scale::plain(), request) })
+        StRequest { bytes, ..Self::told(Scale::plain(), request) }.fitting(py)
     }
 
     /// Reads a data segment that was configured with these registers (profile `spec`).
@@ -446,11 +446,10 @@ fn below(py: Python<'_>, what: &str, number: i64, end: usize) -> PyResult<u8> {
     number.ok_or_else(|| bad_value(py, format_args!("{what}s are 0 to {}", end - 1)))
 }
 
+/// Registers whose sizes are known.
 fn segment_registers(py: Python<'_>, names: &[Bound<'_, PyAny>]) -> PyResult<Vec<RegisterId>> {
-    if names.is_empty() || names.len() > SEGMENT_REGISTERS {
-        let count = names.len();
-        let why = format!("a data segment has 1 to {SEGMENT_REGISTERS} registers, not {count}");
-        return Err(bad_value(py, why));
+    if names.is_empty() {
+        return Err(bad_value(py, "which registers was the data segment configured with?"));
     }
     let known = |name| {
         let found = register(name)?;

@@ -1,0 +1,87 @@
+"""Simulated drives, inside the process and served on ptys by the installed command."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sysconfig
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import motorlink
+
+REPOSITORY = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="session")
+def command() -> str:
+    """The command `motorlink` that pip installed beside this interpreter."""
+    path = Path(sysconfig.get_path("scripts")) / "motorlink"
+    assert os.access(path, os.X_OK), f"{path} is not there: is the package installed?"
+    return str(path)
+
+
+@pytest.fixture
+def st_bus() -> Iterator[motorlink.st.Bus]:
+    """A bus with a simulated drive."""
+    with motorlink.st.open("sim:") as bus:
+        yield bus
+
+
+@pytest.fixture
+def rmd_bus() -> Iterator[motorlink.rmd.Bus]:
+    """A bus with four simulated motors."""
+    with motorlink.rmd.open("sim:") as bus:
+        yield bus
+
+
+class Served:
+    """Simulated drives on ptys, and what is really going on in them."""
+
+    def __init__(self, command: str, folder: Path, *words: str):
+        self.st, self.can = f"{folder}/st0", f"slcan:{folder}/can0"
+        ports = ["--st", f"pty:{self.st}", "--rmd", f"slcan-pty:{folder}/can0"]
+        self._process = subprocess.Popen(
+            [command, "sim", *words, *ports],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self.ports = [self._line(), self._line()]
+
+    def _line(self) -> dict[str, object]:
+        assert self._process.stdout
+        line: dict[str, object] = json.loads(self._process.stdout.readline())
+        return line
+
+    def do(self, command: str, **fields: object) -> dict[str, object]:
+        """A command that the simulator obeys."""
+        assert self._process.stdin
+        self._process.stdin.write(json.dumps({"command": command, **fields}) + "\n")
+        self._process.stdin.flush()
+        answer = self._line()
+        assert answer["ok"], answer
+        return answer
+
+    def motor(self, protocol: str, number: int) -> dict[str, object]:
+        """The truth about a motor."""
+        port = next(str(p["port"]) for p in self.ports if p["protocol"] == protocol)
+        (bench,) = self.do("state", port=port)["state"]  # type: ignore[misc]
+        motors: list[dict[str, object]] = bench["motors"]  # type: ignore[index]
+        return next(motor for motor in motors if motor["motor"] == number)
+
+    def end(self) -> None:
+        """Ends the simulator."""
+        self._process.terminate()
+        self._process.communicate(timeout=10)
+
+
+@pytest.fixture
+def served(command: str, tmp_path: Path) -> Iterator[Served]:
+    """Drives on ptys of their own process."""
+    drives = Served(command, tmp_path)
+    yield drives
+    drives.end()
