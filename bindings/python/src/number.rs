@@ -23,7 +23,7 @@ pub(crate) fn digits<T: TryFrom<i64>>(
     })
 }
 
-/// A limit, which no value may exceed: one between two digits is the lower one.
+/// A limit, which no value may exceed; rounded as the values are that it is for.
 pub(crate) fn limit<T: TryFrom<i64>>(
     py: Python<'_>,
     value: f64,
@@ -33,9 +33,7 @@ pub(crate) fn limit<T: TryFrom<i64>>(
     if value.is_nan() || value < 0.0 {
         return Err(bad_value(py, format_args!("{value} {unit} is no limit: give 0 or more")));
     }
-    // What is a digit but for the rounding of a float is that digit.
-    let whole = (value / scale + 1e-9).floor();
-    digits(py, "a limit", whole * scale, scale, unit)
+    digits(py, "a limit", value, scale, unit)
 }
 
 /// A duration in s as the wire's ms.

@@ -6,14 +6,27 @@ import json
 import os
 import subprocess
 import sysconfig
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 
 import motorlink
 
-REPOSITORY = Path(__file__).parents[3]
+T = TypeVar("T")
+
+
+def eventually(condition: Callable[[], T], what: str, within: float = 10) -> T:
+    """Waits until `condition` gives something true, and gives that."""
+    deadline = time.monotonic() + within
+    while True:
+        value = condition()
+        if value:
+            return value
+        assert time.monotonic() < deadline, f"{what} was expected within {within} s"
+        time.sleep(0.005)
 
 
 @pytest.fixture(scope="session")
@@ -75,8 +88,9 @@ class Served:
 
     def end(self) -> None:
         """Ends the simulator."""
-        self._process.terminate()
-        self._process.communicate(timeout=10)
+        if self._process.poll() is None:
+            self._process.terminate()
+            self._process.communicate(timeout=10)
 
 
 @pytest.fixture

@@ -2,13 +2,14 @@
 
 use std::sync::{Arc, PoisonError, RwLock};
 
+use motorlink::port::PortName;
 use motorlink::rmd::{
     Bus, CentiDegrees, Error, Found, Limits, MotorId, MotorSet, OnDrop, Options, SpeedLimit,
     Torque4, TorqueCommand,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use pyo3::types::{PyByteArray, PyDict};
+use pyo3::types::{PyByteArray, PyDict, PyList};
 
 use super::quantity::Quantity;
 use super::request::{RmdRequest, motion_status, motor_id, motor_status, torque};
@@ -62,10 +63,10 @@ impl RmdBus {
     ) -> PyResult<Self> {
         let limits = limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?;
         let options = options(py, timeout, guard, limits)?;
-        let name = port.parse().map_err(|error| bad_value(py, error))?;
+        let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
         let bus = py.detach(|| Bus::open(&name, options));
         let bus = Arc::new(bus.map_err(|error| rmd_error(py, &error))?);
-        Ok(Self::from_bus(bus, port.to_owned(), Arc::new(RealTime::new())))
+        Ok(Self::from_bus(bus, name.to_string(), Arc::new(RealTime::new())))
     }
 
     /// One exchange; gives what the request makes of the reply.
@@ -186,9 +187,10 @@ impl RmdBus {
 
     /// Motors that were given something to do and neither stopped nor switched off.
     #[getter]
-    fn moving(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+    fn moving<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let bus = self.bus(py)?;
-        Ok(py.detach(|| bus.moving().map(MotorId::number).collect()))
+        let numbers: Vec<u8> = py.detach(|| bus.moving().map(MotorId::number).collect());
+        PyList::new(py, numbers)
     }
 
     /// Stops the motors that this bus was used to move, or switches them off; gives those that did
@@ -238,7 +240,7 @@ pub(crate) fn options(
     })
 }
 
-/// Limits in the units of the field. A limit between two digits is the lower one.
+/// Limits in the units of the field. A limit is rounded as commands are.
 pub(crate) fn limits(
     py: Python<'_>,
     current_a: Option<f64>,

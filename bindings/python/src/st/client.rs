@@ -2,9 +2,10 @@
 
 use std::sync::{Arc, PoisonError, RwLock};
 
+use motorlink::port::PortName;
 use motorlink::stmcp::{Client, Limits, Motor, Options, Profile, Recovery};
 use pyo3::prelude::*;
-use pyo3::types::{PyByteArray, PyBytes};
+use pyo3::types::{PyByteArray, PyBytes, PyList};
 
 use super::request::{StRequest, motor_number};
 use super::sample::{Lane, sample};
@@ -56,10 +57,10 @@ impl StClient {
         let scale = Scale::new(py, profile, full_scale_amps)?;
         let limits = limits(py, scale, speed_limit, current_limit)?;
         let options = options(py, scale.profile, timeout, recovery, limits)?;
-        let name = port.parse().map_err(|error| bad_value(py, error))?;
+        let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
         let client = py.detach(|| Client::open(&name, options));
         let client = Arc::new(client.map_err(|error| st_error(py, &error))?);
-        Ok(Self::from_client(client, port.to_owned(), Arc::new(RealTime::new())))
+        Ok(Self::from_client(client, name.to_string(), Arc::new(RealTime::new())))
     }
 
     /// One exchange; gives what the request makes of the reply.
@@ -128,9 +129,10 @@ impl StClient {
 
     /// Motors that this client started and did not stop.
     #[getter]
-    fn started(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
+    fn started<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let client = self.client(py)?;
-        Ok(py.detach(|| client.started().map(Motor::number).collect()))
+        let numbers: Vec<u8> = py.detach(|| client.started().map(Motor::number).collect());
+        PyList::new(py, numbers)
     }
 
     /// Stops the motors that this client started; gives those that did not acknowledge it, and why.
@@ -184,8 +186,8 @@ pub(crate) fn options(
     Ok(options)
 }
 
-/// Limits in rpm and in the unit that the scale gives currents. A limit between two digits is the
-/// lower one.
+/// Limits in rpm and in the unit that the scale gives currents. A limit is rounded as
+/// commands are.
 pub(crate) fn limits(
     py: Python<'_>,
     scale: Scale,

@@ -1,0 +1,75 @@
+"""The command `motorlink` that pip installs: what the program of that name does."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import motorlink
+from conftest import Served
+
+
+def run(*words: str) -> subprocess.CompletedProcess[str]:
+    """Runs a command line to its end."""
+    return subprocess.run(words, capture_output=True, text=True, timeout=30)
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (0, ["st", "-p", "sim:", "get", "SPEED_MEAS"]),
+        (0, ["--help"]),
+        (0, ["--version"]),
+        (1, ["st", "-p", "sim:", "get", "I_A"]),
+        (2, ["st", "-p", "sim:", "get", "SPEED"]),
+        (2, ["fly"]),
+        (2, []),
+        (3, ["st", "-p", "/dev/nothing-there", "info"]),
+        (3, ["rmd", "-p", "sim:", "--id", "20", "status"]),
+    ],
+)
+def test_it_has_the_exit_codes_of_the_program(command: str, code: int, words: list[str]) -> None:
+    done = run(command, *words)
+    assert done.returncode == code, done.stderr
+    assert ("error" in done.stderr) == (code > 0 and words != []), done.stderr
+    assert "Traceback" not in done.stderr and "panicked" not in done.stderr
+    assert bool(done.stdout) == (code == 0)
+
+
+def test_it_is_a_module_too(command: str) -> None:
+    done = run(sys.executable, "-m", "motorlink", "--version")
+    assert done.stdout == run(command, "--version").stdout == f"motorlink {motorlink.__version__}\n"
+
+
+def test_json_comes_a_line_at_a_time_until_ctrl_c(command: str, served: Served) -> None:
+    words = [command, "st", "-p", served.st, "--json", "get", "STATUS", "--every", "20ms"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as loop:
+        assert loop.stdout
+        assert json.loads(loop.stdout.readline())["STATUS"]["name"] == "IDLE"
+        loop.send_signal(signal.SIGINT)
+        loop.communicate(timeout=10)
+        assert loop.returncode == 0
+
+
+def test_ctrl_c_ends_a_wait_at_once(command: str, tmp_path: Path) -> None:
+    words = [command, "sim", "--st", f"pty:{tmp_path}/st0"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as sim:
+        assert sim.stdout and sim.stdout.readline()
+        sim.send_signal(signal.SIGINT)
+        sim.communicate(timeout=10)
+        assert sim.returncode == 0
+    assert not (tmp_path / "st0").is_symlink(), "nothing is left behind"
+
+
+def test_a_reader_that_is_gone_is_no_error(command: str, served: Served) -> None:
+    words = [command, "st", "-p", served.st, "get", "STATUS", "--every", "5ms"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as loop:
+        assert loop.stdout and loop.stderr and loop.stdout.readline()
+        loop.stdout.close()
+        assert loop.wait(10) == 0
+        assert loop.stderr.read() == ""

@@ -1,0 +1,59 @@
+"""The package as a whole: examples in its texts, and stubs that tell the truth."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import inspect
+import pkgutil
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import motorlink
+from motorlink import _core
+
+
+def modules() -> list[str]:
+    """Every module of the package, but for the one that runs when it is imported."""
+    found = pkgutil.walk_packages(motorlink.__path__, "motorlink.")
+    names = [module.name for module in found if not module.name.endswith("__main__")]
+    return ["motorlink", *names]
+
+
+@pytest.mark.parametrize("name", modules())
+def test_the_examples_do_what_they_show(name: str) -> None:
+    module = importlib.import_module(name)
+    done = doctest.testmod(module, optionflags=doctest.ELLIPSIS)
+    assert done.failed == 0
+
+
+def public(module: ModuleType) -> list[tuple[str, object]]:
+    """What a module offers."""
+    return [(name, getattr(module, name)) for name in module.__all__]
+
+
+@pytest.mark.parametrize("module", [motorlink, motorlink.st, motorlink.rmd, motorlink.errors])
+def test_everything_public_says_what_it_is(module: ModuleType) -> None:
+    for name, thing in public(module):
+        if not (inspect.isclass(thing) or inspect.isroutine(thing)):
+            continue
+        assert inspect.getdoc(thing), name
+        if inspect.isclass(thing):
+            for method, member in vars(thing).items():
+                if not method.startswith("_") and callable(member):
+                    assert inspect.getdoc(member), f"{name}.{method}"
+
+
+def test_the_stub_names_what_the_module_has() -> None:
+    stub = Path(motorlink.__path__[0], "_core.pyi").read_text()
+    for name, thing in vars(_core).items():
+        if name.startswith("__"):
+            continue
+        assert f"def {name}(" in stub or f"class {name}:" in stub, name
+        if inspect.isclass(thing):
+            body = stub[stub.index(f"class {name}:") :]
+            for member in vars(thing):
+                if not member.startswith("__"):
+                    assert f"def {member}(" in body, f"{name}.{member}"

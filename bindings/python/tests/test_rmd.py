@@ -1,0 +1,208 @@
+"""The blocking API for RMD motors, on simulated ones."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import pytest
+
+import motorlink
+from conftest import Served, eventually
+from motorlink import rmd
+
+
+def test_a_motor_moves_to_an_angle(rmd_bus: rmd.Bus) -> None:
+    motor = rmd_bus.motor(1)
+    status = motor.move_to(90, max_speed=500)
+    assert isinstance(status, rmd.MotionStatus) and status.temperature_c == 25
+    assert rmd_bus.moving == [1]
+    eventually(lambda: abs(motor.angle - 90) < 1, "90 °")
+    motor.turn_to(45, 500, clockwise=False)
+    eventually(lambda: abs(motor.circle_angle - 45) < 1, "45 °")
+    motor.stop()
+    assert rmd_bus.moving == []
+    motor.run()
+    motor.off()
+
+
+def test_speed_and_torque_do_what_they_say(rmd_bus: rmd.Bus) -> None:
+    motor = rmd_bus.motor(2)
+    motor.speed(-360)
+    eventually(lambda: abs(motor.motion.speed_dps + 360) < 20, "-360 °/s")
+    motor.torque(0.5)
+    eventually(lambda: abs(motor.motion.iq_a - 0.5) < 0.1, "0.5 A")
+    assert sum(motor.phase_currents) == pytest.approx(0, abs=0.1)
+    assert motor.status == (motor.status.temperature_c, 24.0, ((), 0))
+
+
+def test_gains_and_acceleration_are_kept(rmd_bus: rmd.Bus) -> None:
+    motor = rmd_bus.motor(1)
+    gains = motor.gains._replace(position_kp=1, torque_ki=255)
+    motor.gains = gains
+    assert motor.gains == gains
+    motor.acceleration = 1234
+    assert motor.acceleration == 1234
+    for nonsense in (gains._replace(speed_kp=256), gains._replace(speed_kp=-1)):
+        with pytest.raises(motorlink.BadValue, match="0 to 255"):
+            motor.gains = nonsense
+    assert motor.gains == gains
+
+
+def test_rom_is_written_with_an_explicit_word_only(served: Served) -> None:
+    with rmd.open(served.can) as bus:
+        motor = bus.motor(1)
+
+        def writes() -> object:
+            return served.motor("rmd", 1)["rom_writes"]
+
+        with pytest.raises(motorlink.BadValue, match="rom=True"):
+            motor.write_zero(rom=False)
+        with pytest.raises(motorlink.BadValue, match="rom=True"):
+            motor.write_encoder_offset(7, rom=False)
+        with pytest.raises(motorlink.BadValue, match="rom=True"):
+            motor.exchange_raw(bytes([0x19, 0, 0, 0, 0, 0, 0, 0]))
+        motor.write_gains(motor.gains)
+        assert writes() == 0
+        motor.write_gains(motor.gains, rom=True)
+        assert motor.write_encoder_offset(7, rom=True) == motor.encoder.offset == 7
+        assert isinstance(motor.write_zero(rom=True), int)
+        assert writes() == 3
+
+
+def test_errors_are_named_and_cleared(served: Served) -> None:
+    with rmd.open(served.can) as bus:
+        motor, port = bus.motor(3), f"slcan-pty:{served.can.removeprefix('slcan:')}"
+        served.do("fault", port=port, motor=3, fault="OVER_TEMPERATURE")
+        errors = eventually(lambda: motor.status.errors, "the error")
+        assert errors.names == ("over temperature protection",) and str(errors) == errors.names[0]
+        assert not motor.clear_errors().errors
+
+
+def test_a_cycle_gives_each_motor_its_own_answer(rmd_bus: rmd.Bus) -> None:
+    answers = rmd_bus.cycle(
+        {4: rmd.read_status(), 2: rmd.torque(0.1), 9: rmd.read_motion(), 1: rmd.off()}
+    )
+    assert list(answers) == [4, 2, 9, 1]
+    assert isinstance(answers[4], rmd.MotorStatus)
+    assert isinstance(answers[2], rmd.MotionStatus)
+    assert isinstance(answers[9], motorlink.Timeout) and answers[9].motor == 9
+    assert answers[1] is None
+    assert rmd_bus.cycle({}) == {}
+    with pytest.raises(motorlink.BadValue):
+        rmd_bus.cycle({33: rmd.off()})
+
+
+def test_four_torques_in_one_frame(rmd_bus: rmd.Bus) -> None:
+    answers = rmd_bus.torque4(0.1, 0, -0.1, 0.2)
+    assert list(answers) == [1, 2, 3, 4]
+    assert all(isinstance(answer, rmd.MotionStatus) for answer in answers.values())
+    assert list(rmd_bus.torque4(0, 0, 0, 0, expect=[2])) == [2]
+    with pytest.raises(motorlink.BadValue, match="32 A"):
+        rmd_bus.torque4(0, 0, 33, 0)
+    with pytest.raises(motorlink.BadValue, match="not reached"):
+        rmd_bus.torque4(0, 0, 0, 0, expect=[5])
+
+
+def test_a_scan_finds_the_motors(rmd_bus: rmd.Bus) -> None:
+    found = rmd_bus.scan()
+    assert [(one.id, one.kind) for one in found] == [(id, "motor") for id in (1, 2, 3, 4)]
+    assert all(one.status and one.status.voltage_v == 24.0 for one in found)
+    assert [one.id for one in rmd_bus.scan([2, 30])] == [2]
+
+
+def test_limits_hold() -> None:
+    with rmd.open("sim:", current_limit=1.0, speed_limit=360, angle_limit=90) as bus:
+        motor = bus.motor(1)
+        motor.move_to(-90, max_speed=360)
+        motor.torque(1.0)
+        for beyond in (
+            lambda: motor.torque(-1.02),
+            lambda: motor.speed(360.01),
+            lambda: motor.move_to(90.01, 1),
+            lambda: motor.move_to(10),
+            lambda: motor.exchange_raw(bytes([0xA1, 0, 0, 0, 0xFF, 0, 0, 0])),
+            lambda: bus.torque4(2, 0, 0, 0),
+        ):
+            with pytest.raises(motorlink.BadValue, match="limit"):
+                beyond()
+        assert isinstance(bus.cycle({1: rmd.torque(2)})[1], motorlink.BadValue)
+        motor.set_limits(current=3)
+        motor.torque(2.5)
+        bus.motor(2).torque(0.9)
+        with pytest.raises(motorlink.BadValue):
+            bus.motor(2).torque(2.5)
+
+
+def test_nonsense_is_refused_before_it_is_sent(rmd_bus: rmd.Bus) -> None:
+    motor = rmd_bus.motor(1)
+    for nonsense in (
+        lambda: motor.torque(float("nan")),
+        lambda: motor.torque(32.1),
+        lambda: motor.speed(1e9),
+        lambda: motor.move_to(1e9),
+        lambda: motor.move_to(1, max_speed=-1),
+        lambda: motor.turn_to(360),
+        lambda: motor.turn_to(-1),
+        lambda: rmd_bus.motor(0).off(),
+        lambda: rmd_bus.motor(33).off(),
+        lambda: motor.exchange_raw(b"\x9c"),
+        lambda: rmd.open("sim:", timeout=-1),
+        lambda: rmd.open("sim:", on_close="maybe"),
+        lambda: rmd.open("/dev/ttyACM0"),
+        lambda: rmd.decode(0x141, b"", reply=True),
+        lambda: rmd.decode(0x7FF, bytes(8), reply=True),
+    ):
+        with pytest.raises(motorlink.BadValue):
+            nonsense()
+    assert rmd_bus.moving == []
+
+
+def test_a_motor_that_is_not_there_is_a_timeout(rmd_bus: rmd.Bus) -> None:
+    with pytest.raises(motorlink.Timeout) as silent:
+        _ = rmd_bus.motor(20).angle
+    assert silent.value.motor == 20 and "0x92" in str(silent.value)
+
+
+def test_raw_bytes(rmd_bus: rmd.Bus) -> None:
+    reply = rmd_bus.motor(1).exchange_raw(bytes([0x9A]) + bytes(7))
+    assert reply[0] == 0x9A and rmd.decode(0x141, reply, reply=True).values["voltage_v"] == 24.0
+
+
+def test_the_end_of_with_stops_what_moves(served: Served) -> None:
+    def mode(motor: int) -> object:
+        return served.motor("rmd", motor)["mode"]
+
+    with pytest.raises(ZeroDivisionError), rmd.open(served.can) as bus:
+        bus.motor(1).speed(100)
+        bus.torque4(0.1, 0.1, 0, 0)
+        assert (mode(1), mode(2)) == ("torque", "torque")
+        _ = 1 / 0
+    assert (mode(1), mode(2), mode(3)) == ("stopped", "stopped", "stopped")
+    with rmd.open(served.can, on_close="off") as bus:
+        bus.motor(1).speed(100)
+    assert mode(1) == "off"
+    with rmd.open(served.can, on_close="nothing") as bus:
+        bus.motor(1).speed(100)
+    assert mode(1) == "speed"
+
+
+def test_after_its_end_a_bus_says_that_it_is_closed(tmp_path: Path) -> None:
+    bus = rmd.open("sim:")
+    assert repr(bus) == "<motorlink.rmd.Bus sim:>"
+    bus.close()
+    bus.close()
+    for use in (bus.motor(1).off, bus.scan, lambda: bus.cycle({}), lambda: bus.moving):
+        with pytest.raises(motorlink.Closed):
+            use()
+    assert repr(bus.motor(3)) == "<motorlink.rmd.Motor 3 on sim:>"
+    with pytest.raises(motorlink.PortError):
+        rmd.open(f"slcan:{tmp_path}/nothing")
+
+
+def test_values_and_requests_are_values(rmd_bus: rmd.Bus) -> None:
+    status = rmd_bus.motor(1).status
+    assert pickle.loads(pickle.dumps(status)) == status
+    assert rmd.speed(1) == rmd.speed(1.0) != rmd.speed(2)
+    assert len({rmd.off(), rmd.off(), rmd.stop()}) == 2
+    assert repr(rmd.off()) == "<Request 80 00 00 00 00 00 00 00 (Motor off command)>"

@@ -1,0 +1,297 @@
+"""The blocking API for ST drives, on simulated ones."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import warnings
+from pathlib import Path
+
+import pytest
+
+import motorlink
+from conftest import Served, eventually
+from motorlink import st
+
+
+def test_what_is_written_is_read(st_bus: st.Bus) -> None:
+    motor = st_bus.motor(1)
+    motor.write("SPEED_KP", 1234)
+    assert motor.read("SPEED_KP") == 1234
+    assert motor.read(0x05) == 1234
+    assert motor.read("speed_kp", raw=True) == 1234
+    assert st_bus.motor(2).read("SPEED_KP") != 1234
+    motor.write("CONTROL_MODE", "TORQUE")
+    motor.write("SPEED_KI", "0x10")
+    assert motor.read("SPEED_KI") == 16
+
+
+def test_a_motor_runs_and_stops(st_bus: st.Bus) -> None:
+    motor = st_bus.motor(2)
+    assert motor.status == "IDLE" and not motor.faults
+    motor.ramp(500, 0.1)
+    motor.start()
+    assert st_bus.started == [2]
+    eventually(lambda: motor.status == "RUN", "RUN")
+    assert motor.control_mode == "SPEED"
+    motor.stop()
+    assert st_bus.started == []
+    eventually(lambda: motor.status == "IDLE", "IDLE")
+
+
+def test_words_keep_their_numbers_and_survive_a_trip(st_bus: st.Bus) -> None:
+    state = st_bus.motor(1).status
+    assert isinstance(state, st.State) and isinstance(state, str)
+    assert (str(state), state.number) == ("IDLE", 0)
+    assert state.doc
+    again = pickle.loads(pickle.dumps(state))
+    assert (again, again.number, again.doc) == (state, state.number, state.doc)
+    assert repr(state) == "State('IDLE')"
+
+
+def test_faults_are_named(served: Served) -> None:
+    with st.open(served.st) as bus:
+        motor = bus.motor(1)
+        served.do("fault", port=f"pty:{served.st}", motor=1, fault="OVER_TEMP", hold=True)
+        faults = eventually(lambda: motor.faults, "the fault")
+        assert faults.present == ("OVER_TEMP",) == faults.occurred
+        assert str(faults) == "OVER_TEMP (present)"
+        assert motor.status == "FAULT_NOW"
+        served.do("fault", port=f"pty:{served.st}", motor=1, fault="OVER_TEMP", hold=False)
+        eventually(lambda: not motor.faults.present, "the end of the cause")
+        motor.acknowledge_faults()
+        eventually(lambda: not motor.faults, "no faults")
+
+
+def test_registers_are_a_mapping_with_names_and_units(st_bus: st.Bus) -> None:
+    registers = st_bus.motor(1).registers
+    registers["SPEED_KP"] = 700
+    assert registers["SPEED_KP"] == registers.SPEED_KP == 700
+    registers.SPEED_KP = 701
+    assert registers["SPEED_KP"] == 701
+    assert "SPEED_KP" in registers and "SPEED_KP" in list(registers)
+    assert "SPEED_KP" in dir(registers)
+    assert "SPEED_KP" in registers._ipython_key_completions_()
+    assert len(registers) == len(list(registers)) > 80
+    info = registers.info("SPEED_MEAS")
+    assert (info.id, info.unit, info.type, info.access) == (0x1E, "rpm", "i32", "R")
+    assert info.readable and not info.writable and info.doc == "Mechanical speed, averaged"
+    values = registers.read_all()
+    assert values["SPEED_KP"] == 701 and "I_A" not in values
+    with pytest.raises(AttributeError):
+        _ = registers.SPEED_MES
+    with pytest.raises(AttributeError):
+        registers.SPEED_MES = 3
+    with pytest.raises(motorlink.BadValue, match="did you mean `SPEED_MEAS`"):
+        _ = registers["SPEED_MES"]
+
+
+def test_currents_are_amperes_where_full_scale_is_known(st_bus: st.Bus) -> None:
+    digits, amps = st_bus.motor(1), st_bus.motor(1, full_scale_amps=32.767)
+    assert digits.registers.info("TORQUE_REF").unit == "s16A"
+    assert amps.registers.info("TORQUE_REF").unit == "A"
+    digits.write("TORQUE_REF", 1500)
+    assert amps.read("TORQUE_REF") == pytest.approx(1.5)
+    assert amps.read("TORQUE_REF", raw=True) == 1500
+    amps.write("TORQUE_REF", -2.0004)
+    assert digits.read("TORQUE_REF") == -2000
+    amps.set_revup(1, 800, 3.0, 0.5)
+    assert digits.revup(1) == (800, 3000, 0.5)
+    assert amps.revup(1).current == pytest.approx(3.0)
+    amps.current(0.5, -0.25)
+    with pytest.raises(motorlink.BadValue, match="33 A does not fit"):
+        amps.write("TORQUE_REF", 33)
+    for nonsense in (0, -1, float("nan")):
+        with pytest.raises(motorlink.BadValue, match="full scale"):
+            st_bus.motor(1, full_scale_amps=nonsense).read("TORQUE_REF")
+
+
+def test_a_refusal_says_who_and_why(st_bus: st.Bus) -> None:
+    with pytest.raises(motorlink.Refused) as refused:
+        st_bus.motor(1).read("I_A")
+    error = refused.value
+    assert (error.code, error.name, error.motor) == (3, "GET_WRITE_ONLY", 1)
+    assert error.port and error.port.startswith("sim")
+    assert "refused reading I_A" in str(error)
+    assert isinstance(error, motorlink.MotorlinkError)
+    with pytest.raises(motorlink.Refused) as refused:
+        st_bus.motor(7).read("STATUS")
+    assert refused.value.name == "BAD_MOTOR_SELECTED"
+    with pytest.raises(motorlink.Refused):
+        st_bus.motor(1).write("SPEED_MEAS", 3)
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.code, again.port) == (str(error), error.code, error.port)
+
+
+@pytest.mark.parametrize("value", [40000, -40000, 0.5, float("nan"), float("inf"), "fast", ""])
+def test_a_value_that_does_not_fit_is_not_sent(st_bus: st.Bus, value: float | str) -> None:
+    motor = st_bus.motor(1)
+    before = motor.read("SPEED_KP")
+    with pytest.raises(motorlink.BadValue) as bad:
+        motor.write("SPEED_KP", value)
+    assert isinstance(bad.value, ValueError)
+    assert motor.read("SPEED_KP") == before
+
+
+def test_nonsense_is_refused_before_it_is_sent(st_bus: st.Bus) -> None:
+    motor = st_bus.motor(1)
+    for nonsense in (
+        lambda: motor.ramp(1e12, 1),
+        lambda: motor.ramp(100, -1),
+        lambda: motor.ramp(100, 66),
+        lambda: motor.ramp(float("nan"), 1),
+        lambda: motor.revup(5),
+        lambda: motor.revup(-1),
+        lambda: motor.current(1e6),
+        lambda: motor.execute("START_ENGINE"),
+        lambda: motor.configure_segment(4, ["STATUS"]),
+        lambda: motor.read_segment(0),
+        lambda: motor.move_to(1, 1),
+        lambda: motor.torque_ramp(1, 1),
+        lambda: st_bus.motor(8).read("STATUS"),
+        lambda: st_bus.motor(-1).read("STATUS"),
+        lambda: st_bus.motor(10**30).read("STATUS"),
+        lambda: motor.read(256),
+        lambda: st_bus.exchange_raw(0x20),
+        lambda: st_bus.exchange_raw(1, bytes(129)),
+        lambda: st.open("sim:", profile="5.4"),
+        lambda: st.open("sim:", timeout=0),
+        lambda: st.open("sim:", on_close="explode"),
+        lambda: st.open("sim:", recovery="hope"),
+        lambda: st.open("sim:", speed_limit=-1),
+        lambda: st.open("slcan:/dev/ttyACM0"),
+        lambda: st.open(""),
+    ):
+        with pytest.raises((motorlink.BadValue, OverflowError)):
+            nonsense()
+    with pytest.raises(TypeError):
+        motor.ramp("fast", 1)  # type: ignore[arg-type]
+
+
+def test_a_port_that_is_not_there_says_so(tmp_path: Path) -> None:
+    with pytest.raises(motorlink.PortError, match="is it plugged in") as error:
+        st.open(tmp_path / "nothing")
+    assert isinstance(error.value, motorlink.LineLost)
+
+
+def test_limits_hold_for_every_way_to_say_it() -> None:
+    with st.open("sim:", speed_limit=1000, current_limit=1.0, full_scale_amps=32.767) as bus:
+        motor = bus.motor(1)
+        motor.ramp(-1000, 0)
+        motor.current(1.0, -1.0)
+        for beyond in (
+            lambda: motor.ramp(1001, 0),
+            lambda: motor.write("RAMP_FINAL_SPEED", -1001),
+            lambda: motor.current(1.002),
+            lambda: motor.write("TORQUE_REF", 1.01),
+            lambda: motor.set_revup(0, 1001, 0, 0.1),
+            lambda: bus.exchange_raw(0x07, bytes.fromhex("e90300000000"), motor=1),
+        ):
+            with pytest.raises(motorlink.BadValue, match="limit"):
+                beyond()
+
+
+def test_a_write_is_verified(st_bus: st.Bus) -> None:
+    motor = st_bus.motor(1)
+    assert motor.write_verified("SPEED_KP", 321) == 1
+    assert motor.read("SPEED_KP") == 321
+    with pytest.raises(motorlink.BadValue, match="cannot be verified"):
+        motor.write_verified("TORQUE_REF", 100)
+
+
+def test_data_segments_read_many_registers_at_once(st_bus: st.Bus) -> None:
+    motor = st_bus.motor(1)
+    motor.configure_segment(1, ["STATUS", "BUS_VOLTAGE", "I_Q"])
+    values = motor.read_segment(1)
+    assert list(values) == ["STATUS", "BUS_VOLTAGE", "I_Q"]
+    assert values["BUS_VOLTAGE"] == motor.read("BUS_VOLTAGE")
+    assert motor.read_segment(1, [2, 0x19, 0x27]) == values
+
+
+def test_the_other_profile_has_moves_and_no_segments(tmp_path: Path) -> None:
+    config = tmp_path / "bench.toml"
+    config.write_text('profile = "mcsdk-5.4"\n')
+    with st.open(f"sim:{config}", profile="mcsdk-5.4") as bus:
+        motor = bus.motor(1)
+        motor.torque_ramp(100, 0.1)
+        with pytest.raises(motorlink.BadValue, match="profile spec"):
+            motor.configure_segment(0, ["STATUS"])
+        assert "CURRENT_POSITION" in motor.registers
+        data = bus.sample(["SPEED_MEAS", "BUS_VOLTAGE"], rate=200, seconds=0.05)
+        assert len(data) > 0
+
+
+def test_raw_frames(st_bus: st.Bus) -> None:
+    speed = st_bus.exchange_raw(0x02, b"\x1e", motor=1)
+    assert int.from_bytes(speed, "little", signed=True) == st_bus.motor(1).read("SPEED_MEAS")
+    info = st_bus.info()
+    assert bytes(info.version) == st_bus.exchange_raw(0x06)[:3]
+    assert st_bus.firmware_version().version.startswith("Ver.")
+
+
+def test_after_its_end_a_bus_says_that_it_is_closed() -> None:
+    bus = st.open("sim:")
+    motor = bus.motor(1)
+    bus.close()
+    bus.close()
+    for use in (lambda: motor.read("STATUS"), motor.start, bus.info, lambda: bus.started):
+        with pytest.raises(motorlink.Closed, match="was closed by this program"):
+            use()
+    assert "closed" in repr(bus)
+
+
+def test_objects_say_what_they_are(st_bus: st.Bus) -> None:
+    assert repr(st_bus) == "<motorlink.st.Bus sim:, profile spec>"
+    assert repr(st_bus.motor(2)) == "<motorlink.st.Motor 2 on sim:>"
+    assert "registers of <motorlink.st.Motor 2" in repr(st_bus.motor(2).registers)
+    assert "GET_REG" in repr(st.Request.read("STATUS"))
+
+
+def test_the_end_of_with_stops_what_was_started(served: Served) -> None:
+    with pytest.raises(ZeroDivisionError), st.open(served.st) as bus:
+        motor = bus.motor(1)
+        motor.ramp(1500, 0.1)
+        motor.start()
+        assert served.motor("stmcp", 1)["status"] != "IDLE"
+        _ = 1 / 0
+    eventually(lambda: served.motor("stmcp", 1)["status"] == "IDLE", "a motor at rest")
+    with st.open(served.st, on_close="nothing") as bus:
+        bus.motor(1).start()
+    assert served.motor("stmcp", 1)["status"] not in ("IDLE", "STOP", "ANY_STOP")
+    with st.open(served.st) as bus:
+        bus.motor(1).stop()
+
+
+def test_a_motor_that_cannot_be_stopped_is_not_passed_over(served: Served) -> None:
+    bus = st.open(served.st, timeout=0.05)
+    bus.motor(1).start()
+    served.end()
+    with pytest.raises(motorlink.LineLost, match="motor 1 may still be running") as lost:
+        bus.close()
+    assert lost.value.motor == 1
+    assert "closed" in repr(bus)
+
+
+def test_nor_does_it_hide_what_went_wrong_before(served: Served) -> None:
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        with pytest.raises(ZeroDivisionError), st.open(served.st, timeout=0.05) as bus:
+            bus.motor(1).start()
+            served.end()
+            _ = 1 / 0
+    assert any("motor 1 may still be running" in str(one.message) for one in told)
+
+
+def test_a_silent_drive_is_a_timeout() -> None:
+    ours, theirs = os.openpty()
+    try:
+        with st.open(os.ttyname(theirs), timeout=0.05) as bus:
+            with pytest.raises(motorlink.Timeout) as silent:
+                bus.motor(3).read("STATUS")
+            assert (silent.value.motor, silent.value.port) == (3, bus.port)
+            assert isinstance(silent.value, TimeoutError)
+            with pytest.raises(motorlink.LineLost):
+                bus.motor(3).read("STATUS")
+    finally:
+        os.close(ours)
+        os.close(theirs)

@@ -1,0 +1,182 @@
+"""Threads on one bus, the interpreter's lock, and Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+from collections.abc import Callable, Sequence
+
+import pytest
+
+import motorlink
+from conftest import Served, eventually
+from motorlink import rmd, st
+
+ROUNDS = 150
+
+
+def together(jobs: Sequence[Callable[[], None]]) -> None:
+    """Runs a thread a job; raises what any of them raised."""
+    failed: list[BaseException] = []
+    begin = threading.Barrier(len(jobs))
+
+    def run(job: Callable[[], None]) -> None:
+        try:
+            begin.wait(10)
+            job()
+        except BaseException as error:
+            failed.append(error)
+
+    threads = [threading.Thread(target=run, args=(job,)) for job in jobs]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+        assert not thread.is_alive()
+    if failed:
+        raise failed[0]
+
+
+def test_eight_threads_on_a_serial_line_get_their_own_answers(served: Served) -> None:
+    registers = ["SPEED_KP", "SPEED_KI", "TORQUE_KP", "FLUX_KI"]
+    with st.open(served.st) as bus:
+
+        def job(place: int) -> Callable[[], None]:
+            motor, register = bus.motor(1 + place % 2), registers[place // 2]
+
+            def run() -> None:
+                for n in range(ROUNDS):
+                    # No other thread ever writes this value anywhere.
+                    value = place * 1000 + n
+                    motor.write(register, value)
+                    assert motor.read(register) == value
+
+            return run
+
+        together([job(place) for place in range(8)])
+
+
+def test_eight_threads_on_a_can_bus_get_their_own_answers(served: Served) -> None:
+    with rmd.open(served.can) as bus:
+
+        def gains(id: int) -> Callable[[], None]:
+            motor = bus.motor(id)
+
+            def run() -> None:
+                for n in range(ROUNDS // 2):
+                    mine = rmd.Gains(id, n, id, n, id, n)
+                    motor.gains = mine
+                    assert motor.gains == mine
+
+            return run
+
+        def acceleration(id: int) -> Callable[[], None]:
+            motor = bus.motor(id)
+
+            def run() -> None:
+                for n in range(ROUNDS // 2):
+                    motor.acceleration = id * 1000 + n
+                    assert motor.acceleration == id * 1000 + n
+
+            return run
+
+        together([make(id) for make in (gains, acceleration) for id in (1, 2, 3, 4)])
+
+
+def test_others_run_while_a_drive_is_waited_for() -> None:
+    ours, theirs = os.openpty()
+    done = threading.Event()
+    rounds = 0
+
+    def count() -> None:
+        nonlocal rounds
+        while not done.wait(0.001):
+            rounds += 1
+
+    counter = threading.Thread(target=count)
+    try:
+        with st.open(os.ttyname(theirs), timeout=1.0) as bus:
+            counter.start()
+            eventually(lambda: rounds > 0, "a first round")
+            before = rounds
+            with pytest.raises(motorlink.Timeout):
+                bus.motor(1).read("STATUS")
+            assert rounds - before > 50
+    finally:
+        done.set()
+        counter.join()
+        os.close(ours)
+        os.close(theirs)
+
+
+def test_closing_while_others_call_is_clean() -> None:
+    bus = st.open("sim:")
+    motor = bus.motor(1)
+
+    def use() -> None:
+        with pytest.raises(motorlink.Closed):
+            while True:
+                motor.read("STATUS")
+
+    together([use, use, use, bus.close])
+
+
+def python(script: str, *arguments: str) -> subprocess.Popen[str]:
+    """A Python program that says `ready`, and then waits for Ctrl-C."""
+    words = [sys.executable, "-c", textwrap.dedent(script), *arguments]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout and process.stdout.readline() == "ready\n"
+    return process
+
+
+SAMPLE = """
+    import sys, motorlink
+    print("ready", flush=True)
+    with motorlink.st.open(sys.argv[1]) as bus:
+        motor = bus.motor(1)
+        motor.ramp(1500, 0.1)
+        motor.start()
+        try:
+            bus.sample(["SPEED_MEAS"], rate=100, seconds=600)
+        except KeyboardInterrupt as error:
+            print(len(error.samples), flush=True)
+            raise
+"""
+
+WAIT = """
+    import sys, motorlink
+    with motorlink.st.open(sys.argv[1], timeout=1.0) as bus:
+        print("ready", flush=True)
+        while True:
+            try:
+                bus.motor(1).read("STATUS")
+            except motorlink.MotorlinkError:
+                pass
+"""
+
+
+def test_ctrl_c_ends_a_long_sampling_and_stops_the_motor(served: Served) -> None:
+    with python(SAMPLE, served.st) as program:
+        eventually(lambda: served.motor("stmcp", 1)["status"] == "RUN", "a motor in RUN")
+        program.send_signal(signal.SIGINT)
+        out, err = program.communicate(timeout=10)
+        assert int(out) > 0
+        assert "KeyboardInterrupt" in err and program.returncode in (130, -signal.SIGINT)
+    eventually(lambda: served.motor("stmcp", 1)["status"] == "IDLE", "a motor at rest")
+
+
+def test_ctrl_c_ends_a_program_that_a_drive_keeps_waiting() -> None:
+    ours, theirs = os.openpty()
+    try:
+        with python(WAIT, os.ttyname(theirs)) as program:
+            assert os.read(ours, 1), "it has asked"
+            program.send_signal(signal.SIGINT)
+            _, err = program.communicate(timeout=20)
+            assert "KeyboardInterrupt" in err and program.returncode in (130, -signal.SIGINT)
+    finally:
+        os.close(ours)
+        os.close(theirs)
