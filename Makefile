@@ -3,6 +3,8 @@
 # make test-socketcan  the part of it that needs a CAN kernel, which runs in QEMU
 # make firmware-test   the part that runs on an emulated board, in Rust and in C
 # make determinism     simulated drives with and without optimisation, to the last digit
+# make python          the Python package: built, typed, its examples and its tests
+# make wheel           the Python package as a wheel, in target/wheels
 # make fuzz            every fuzz target for SECONDS=60 each
 # make soak            a million exchanges with reconnects, some minutes
 # make bench           ratios and instruction counts, as in docs/BENCHMARKS.md
@@ -17,6 +19,7 @@
 CARGO ?= cargo
 PYTHON ?= python3
 VENV := .venv
+PYTHON_VENV := .venv-python
 BENCH_VENV := .venv-bench
 TARGET := thumbv7em-none-eabihf
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
@@ -33,7 +36,8 @@ demo:
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
 # The last need packages; what was not tested is said last.
-test: lint deny unit determinism fuzz-replay miri probe e2e ffi-test
+test: lint deny unit determinism fuzz-replay miri probe e2e python ffi-test
+	$(FIRMWARE) || [ $$? -eq 77 ]
 	$(SOCKETCAN) || [ $$? -eq 77 ]
 
 lint:
@@ -125,6 +129,17 @@ ffi-test:
 firmware-test: $(VENV)/ready
 	$(FIRMWARE)
 
+# The package as `pip install .` makes it, but for the optimisation; with the checks that its users' code
+# would go through.
+python: $(PYTHON_VENV)/ready
+	$(PYTHON_VENV)/bin/python -m pip install --quiet -C build-args=--profile=dev .
+	$(PYTHON_VENV)/bin/python -m mypy --strict -p motorlink
+	cd bindings/python/tests && ../../../$(PYTHON_VENV)/bin/python -m mypy --strict .
+	$(PYTHON_VENV)/bin/python -m pytest -q bindings/python/tests
+
+wheel: $(PYTHON_VENV)/ready
+	$(PYTHON_VENV)/bin/python -m pip wheel --quiet --no-deps --wheel-dir target/wheels .
+
 # The port socketcan: in Debian's kernel in QEMU. Ends with 77 where the packages cannot be had.
 test-socketcan:
 	$(SOCKETCAN)
@@ -170,11 +185,13 @@ fmt:
 
 clean:
 	$(CARGO) clean
-	rm -rf $(VENV) $(BENCH_VENV) probe/target fuzz/target firmware/target
+	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) probe/target fuzz/target firmware/target
 
 $(VENV)/ready: tests/e2e/requirements.txt
-	$(PYTHON) -m venv $(VENV) || { \
+$(PYTHON_VENV)/ready: bindings/python/tests/requirements.txt
+$(VENV)/ready $(PYTHON_VENV)/ready:
+	$(PYTHON) -m venv $(@D) || { \
 		$(SUDO) apt-get update && $(SUDO) apt-get install -y --no-install-recommends python3-venv && \
-		$(PYTHON) -m venv $(VENV); }
-	$(VENV)/bin/python -m pip install --quiet -r $<
+		$(PYTHON) -m venv $(@D); }
+	$(@D)/bin/python -m pip install --quiet -r $<
 	touch $@

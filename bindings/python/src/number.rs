@@ -23,6 +23,16 @@ pub(crate) fn digits<T: TryFrom<i64>>(
     })
 }
 
+/// Digits of `scale` in the physical unit: 239 of 0.1 are 23.9, and not 23.900000000000002.
+pub(crate) fn physical(digits: i64, scale: f64) -> f64 {
+    let parts = scale.recip().round();
+    if parts > 1.0 && parts.recip() == scale {
+        digits as f64 / parts
+    } else {
+        digits as f64 * scale
+    }
+}
+
 /// A limit, which no value may exceed; rounded as the values are that it is for.
 pub(crate) fn limit<T: TryFrom<i64>>(
     py: Python<'_>,

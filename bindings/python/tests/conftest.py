@@ -9,11 +9,16 @@ import sysconfig
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
 
 import motorlink
+
+REPOSITORY = Path(__file__).parents[3]
+
+#: For a motor that is there, on a machine that has other things to do, s.
+PATIENT = 2.0
 
 T = TypeVar("T")
 
@@ -47,7 +52,7 @@ def st_bus() -> Iterator[motorlink.st.Bus]:
 @pytest.fixture
 def rmd_bus() -> Iterator[motorlink.rmd.Bus]:
     """A bus with four simulated motors."""
-    with motorlink.rmd.open("sim:") as bus:
+    with motorlink.rmd.open("sim:", timeout=PATIENT) as bus:
         yield bus
 
 
@@ -65,12 +70,12 @@ class Served:
         )
         self.ports = [self._line(), self._line()]
 
-    def _line(self) -> dict[str, object]:
+    def _line(self) -> dict[str, Any]:
         assert self._process.stdout
-        line: dict[str, object] = json.loads(self._process.stdout.readline())
+        line: dict[str, Any] = json.loads(self._process.stdout.readline())
         return line
 
-    def do(self, command: str, **fields: object) -> dict[str, object]:
+    def do(self, command: str, **fields: object) -> dict[str, Any]:
         """A command that the simulator obeys."""
         assert self._process.stdin
         self._process.stdin.write(json.dumps({"command": command, **fields}) + "\n")
@@ -82,8 +87,8 @@ class Served:
     def motor(self, protocol: str, number: int) -> dict[str, object]:
         """The truth about a motor."""
         port = next(str(p["port"]) for p in self.ports if p["protocol"] == protocol)
-        (bench,) = self.do("state", port=port)["state"]  # type: ignore[misc]
-        motors: list[dict[str, object]] = bench["motors"]  # type: ignore[index]
+        (bench,) = self.do("state", port=port)["state"]
+        motors: list[dict[str, object]] = bench["motors"]
         return next(motor for motor in motors if motor["motor"] == number)
 
     def end(self) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import threading
+import types
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -34,8 +36,8 @@ def test_instants_do_not_drift_and_none_is_made_up(st_bus: st.Bus) -> None:
 
 def test_a_line_that_is_too_slow_leaves_instants_out(served: Served) -> None:
     with st.open(served.st) as bus:
-        data = bus.sample(["SPEED_MEAS"], rate=1_000_000, seconds=0.05)
-    assert 1 <= len(data) < 50_000
+        data = bus.sample(["SPEED_MEAS"], rate=1_000_000, seconds=0.3)
+    assert 1 <= len(data) < 300_000
     assert np.all(np.diff(data["t"]) > 0)
 
 
@@ -47,7 +49,7 @@ def test_segments_and_single_reads_tell_the_same(tmp_path: Any) -> None:
     with st.open(f"sim:{config}") as single, st.open("sim:") as many:
         for bus in (single, many):
             bus.motor(1).write("SPEED_KP", 77)
-        one, other = (bus.sample(names, rate=100, seconds=0.05) for bus in (single, many))
+        one, other = (bus.sample(names, rate=100, seconds=0.3) for bus in (single, many))
     assert set(one["SPEED_KP"]) == set(other["SPEED_KP"]) == {77}
     assert set(one["BUS_VOLTAGE"]) == set(other["BUS_VOLTAGE"])
 
@@ -55,7 +57,7 @@ def test_segments_and_single_reads_tell_the_same(tmp_path: Any) -> None:
 def test_more_registers_than_a_segment_has(st_bus: st.Bus) -> None:
     registers = st_bus.motor(1).registers
     names = [name for name in registers.read_all()][:40]
-    data = st_bus.sample(names, rate=20, seconds=0.1)
+    data = st_bus.sample(names, rate=20, seconds=0.3)
     assert data.dtype.names == ("t", *names)
     assert data["SPEED_KP"][0] == registers.SPEED_KP
 
@@ -64,14 +66,14 @@ def test_motors_have_columns_of_their_own(st_bus: st.Bus) -> None:
     st_bus.motor(1).write("SPEED_KP", 11)
     st_bus.motor(2).write("SPEED_KP", 22)
     asked = {1: ["SPEED_KP", "STATUS"], 2: ["SPEED_KP", "STATUS"]}
-    data = st_bus.sample(asked, rate=50, seconds=0.1)
+    data = st_bus.sample(asked, rate=50, seconds=0.3)
     assert data.dtype.names == ("t", "SPEED_KP_1", "STATUS_1", "SPEED_KP_2", "STATUS_2")
     assert set(data["SPEED_KP_1"]) == {11} and set(data["SPEED_KP_2"]) == {22}
 
 
 def test_raw_samples_are_digits(st_bus: st.Bus) -> None:
     st_bus.motor(1).write("TORQUE_REF", -1234)
-    data = st_bus.sample(["TORQUE_REF", "FLAGS"], rate=50, seconds=0.05, raw=True)
+    data = st_bus.sample(["TORQUE_REF", "FLAGS"], rate=50, seconds=0.3, raw=True)
     assert data.dtype["TORQUE_REF"] == np.int64
     assert set(data["TORQUE_REF"]) == {-1234} and set(data["FLAGS"]) == {0}
 
@@ -79,7 +81,7 @@ def test_raw_samples_are_digits(st_bus: st.Bus) -> None:
 def test_currents_are_amperes_where_full_scale_is_known() -> None:
     with st.open("sim:", full_scale_amps=32.767) as bus:
         bus.motor(1).write("TORQUE_REF", 1.5)
-        data = bus.sample(["TORQUE_REF"], rate=50, seconds=0.05)
+        data = bus.sample(["TORQUE_REF"], rate=50, seconds=0.3)
     assert data["TORQUE_REF"] == pytest.approx(1.5)
 
 
@@ -90,10 +92,10 @@ def test_what_motors_tell_is_sampled_in_cycles(rmd_bus: rmd.Bus) -> None:
     assert data.dtype.names == ("t", "speed_dps_1", "angle_deg_1", "voltage_v_1", "speed_dps_2")
     assert data["speed_dps_1"][-1] > 400 and set(data["speed_dps_2"]) == {0}
     assert np.all(np.diff(data["angle_deg_1"]) >= 0) and data["angle_deg_1"][-1] > 100
-    assert set(data["voltage_v_1"]) == {24.0}
-    every = rmd_bus.sample(rmd.QUANTITIES, rate=100, seconds=0.02, motor=1, raw=True)
+    assert data["voltage_v_1"] == pytest.approx(24, abs=1)
+    every = rmd_bus.sample(rmd.QUANTITIES, rate=100, seconds=0.3, motor=1, raw=True)
     assert every.dtype.names == ("t", *rmd.QUANTITIES)
-    assert every["voltage_v"][0] == 240
+    assert every["voltage_v"][0] == pytest.approx(240, abs=10)
 
 
 def test_quantities_are_fields_of_what_is_answered() -> None:
@@ -115,17 +117,17 @@ def test_an_error_ends_it_with_what_there_was(served: Served) -> None:
 
 
 def test_a_motor_that_is_silent_can_be_passed_over() -> None:
-    with rmd.open("sim:", timeout=0.01, guard=0.01) as bus:
+    with rmd.open("sim:", timeout=0.2, guard=0.01) as bus:
         asked = {1: ["iq_a"], 9: ["iq_a"]}
         with pytest.raises(motorlink.Timeout) as silent:
-            bus.sample(asked, rate=50, seconds=0.1)
+            bus.sample(asked, rate=50, seconds=0.3)
         assert silent.value.motor == 9 and len(silent.value.samples) == 0
         assert len(bus.sample(asked, rate=50, seconds=0.1, on_error="skip")) == 0
-        assert len(bus.sample({1: ["iq_a"]}, rate=50, seconds=0.1)) > 0
+        assert len(bus.sample({1: ["iq_a"]}, rate=50, seconds=0.3)) > 0
 
 
 def test_nonsense_is_refused(st_bus: st.Bus, rmd_bus: rmd.Bus) -> None:
-    for nonsense in (
+    cases: list[Callable[[], object]] = [
         lambda: st_bus.sample([], rate=10, seconds=1),
         lambda: st_bus.sample(["STATUS"], rate=0, seconds=1),
         lambda: st_bus.sample(["STATUS"], rate=-1, seconds=1),
@@ -138,7 +140,8 @@ def test_nonsense_is_refused(st_bus: st.Bus, rmd_bus: rmd.Bus) -> None:
         lambda: st_bus.sample(["STATUS"], rate=10, seconds=1, on_error="pray"),
         lambda: rmd_bus.sample({1: ["speed"]}, rate=10, seconds=1),
         lambda: rmd_bus.sample({0: ["iq_a"]}, rate=10, seconds=1),
-    ):
+    ]
+    for nonsense in cases:
         with pytest.raises(motorlink.BadValue):
             nonsense()
     with pytest.raises(motorlink.Refused):
@@ -146,7 +149,7 @@ def test_nonsense_is_refused(st_bus: st.Bus, rmd_bus: rmd.Bus) -> None:
 
 
 def test_without_pandas_it_says_so(st_bus: st.Bus, monkeypatch: pytest.MonkeyPatch) -> None:
-    data = st_bus.sample(["STATUS"], rate=100, seconds=0.02)
+    data = st_bus.sample(["STATUS"], rate=100, seconds=0.3)
     plain = importlib.import_module
 
     def missing(name: str, package: str | None = None) -> Any:
@@ -174,12 +177,12 @@ class Frame:
 def test_with_pandas_the_time_is_the_index(
     st_bus: st.Bus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    data = st_bus.sample(["STATUS", "SPEED_MEAS"], rate=100, seconds=0.05)
+    data = st_bus.sample(["STATUS", "SPEED_MEAS"], rate=100, seconds=0.3)
     if importlib.util.find_spec("pandas"):
         frame = motorlink.to_pandas(data)
         assert list(frame.columns) == ["STATUS", "SPEED_MEAS"] and frame.index.name == "t"
         return
-    pandas = type("pandas", (), {"DataFrame": Frame})
+    pandas = types.SimpleNamespace(DataFrame=Frame)
     monkeypatch.setattr(importlib, "import_module", lambda name: pandas)
     frame = motorlink.to_pandas(data)
     assert list(frame.columns) == ["t", "STATUS", "SPEED_MEAS"] and frame.index == "t"

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import pytest
 
 import motorlink
-from conftest import Served, eventually
+from conftest import PATIENT, Served, eventually
 from motorlink import rmd, st
 
 ROUNDS = 150
@@ -61,7 +61,7 @@ def test_eight_threads_on_a_serial_line_get_their_own_answers(served: Served) ->
 
 
 def test_eight_threads_on_a_can_bus_get_their_own_answers(served: Served) -> None:
-    with rmd.open(served.can) as bus:
+    with rmd.open(served.can, timeout=PATIENT) as bus:
 
         def gains(id: int) -> Callable[[], None]:
             motor = bus.motor(id)

@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::error::bad_value;
-use crate::values;
+use crate::number::physical;
 
 /// A frame in words and values. `reply`: the motor sent it; the frame does not tell.
 #[pyfunction]
@@ -40,15 +40,15 @@ pub(crate) fn rmd_decode(
         (Some(_), Some(row)) => (row.code.to_string(), if reply { row.reply } else { row.request }),
         (Some(_), None) => (code.to_string(), &[]),
     };
-    let (physical, digits) = (PyDict::new(py), PyDict::new(py));
+    let (values, digits) = (PyDict::new(py), PyDict::new(py));
     for field in fields {
         let raw = field.raw(&data);
         digits.set_item(field.name, raw)?;
-        physical.set_item(quantity::named(field), raw as f64 * field.scale)?;
+        values.set_item(quantity::named(field), physical(raw, field.scale))?;
     }
     let direction = if reply { Direction::DriveToHost } else { Direction::HostToDrive };
     let text = describe(CanFrame::new(id, data), direction).to_string();
-    values::frame(py, (motor.map(MotorId::number), name, physical, digits, text))
+    crate::values::frame(py, (motor.map(MotorId::number), name, values, digits, text))
 }
 
 /// What the frame 0x280 is called.

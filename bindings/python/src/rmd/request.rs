@@ -9,14 +9,15 @@ use motorlink_proto::rmd::{
     WriteGainsToRom, WriteZeroToRom,
 };
 use motorlink_proto::units::{
-    CentiDegrees, CentiDps, CircleAngle, DpsPerSecond, SpeedLimit, TorqueCommand,
+    CentiDegrees, CentiDps, CircleAngle, DeciVolts, DpsPerSecond, MultiTurnAngle, SpeedLimit,
+    TorqueCommand,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 
 use crate::error::bad_value;
-use crate::number::digits;
+use crate::number::{digits, physical};
 use crate::values;
 
 /// A request to an RMD motor.
@@ -64,8 +65,12 @@ impl RmdRequest {
             Code::WriteEncoderOffset | Code::WriteZeroToRom => {
                 EncoderOffset::decode(reply).offset.into_py_any(py)
             }
-            Code::ReadMultiTurnAngle => MultiTurn::decode(reply).angle.degrees().into_py_any(py),
-            Code::ReadCircleAngle => Circle::decode(reply).angle.degrees().into_py_any(py),
+            Code::ReadMultiTurnAngle => {
+                physical(MultiTurn::decode(reply).angle.0, MultiTurnAngle::SCALE).into_py_any(py)
+            }
+            Code::ReadCircleAngle => {
+                physical(Circle::decode(reply).angle.0.into(), CircleAngle::SCALE).into_py_any(py)
+            }
             Code::ReadStatus1 | Code::ClearErrors => motor_status(py, &Status1::decode(reply)),
             Code::ReadStatus3 => {
                 let PhaseCurrents { phase_a, phase_b, phase_c } = PhaseCurrents::decode(reply);
@@ -93,7 +98,8 @@ pub(crate) fn motion_status(py: Python<'_>, status: &MotionStatus) -> PyResult<P
 /// The reply to 0x9A.
 pub(crate) fn motor_status(py: Python<'_>, status: &Status1) -> PyResult<Py<PyAny>> {
     let errors = values::motor_errors(py, (errors(py, status.errors)?, status.errors.0))?;
-    values::motor_status(py, (status.temperature.0, status.voltage.volts(), errors))
+    let voltage = physical(status.voltage.0.into(), DeciVolts::SCALE);
+    values::motor_status(py, (status.temperature.0, voltage, errors))
 }
 
 /// The document's words for error bits; the number of a bit that has none.

@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use super::quantity::Quantity;
 use crate::clock::Clock;
 use crate::error::rmd_error;
+use crate::number::physical;
 use crate::sampling::{Plan, Rows, cell};
 
 /// The quantities of one motor.
@@ -83,7 +84,7 @@ fn row(
             let reply = replies.iter().find(|(id, of, _)| *id == lane.id && of == code);
             // Every request was answered, or the row has failed above.
             let digits = reply.map_or(0, |(.., reply)| field.raw(reply));
-            values.push(cell(raw, digits, digits as f64 * field.scale));
+            values.push(cell(raw, digits, physical(digits, field.scale)));
         }
     }
     Ok(values)
