@@ -138,7 +138,7 @@ python: $(PYTHON_VENV)/ready
 	$(PYTHON_VENV)/bin/python -m pytest -q bindings/python/tests
 
 wheel: $(PYTHON_VENV)/ready
-	$(PYTHON_VENV)/bin/python -m pip wheel --quiet --no-deps --wheel-dir target/wheels .
+	$(PYTHON_VENV)/bin/python -m maturin build --quiet --release --out target/wheels
 
 # The port socketcan: in Debian's kernel in QEMU. Ends with 77 where the packages cannot be had.
 test-socketcan:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
@@ -66,7 +67,7 @@ class Registers(Mapping[str, float]):
         return [*super().__dir__(), *self._names()]
 
     def _ipython_key_completions_(self) -> list[str]:
-        return self._names()
+        return list(self._names())
 
     def __repr__(self) -> str:
         return f"<{len(self)} registers of {self._motor!r}>"
@@ -97,5 +98,11 @@ class Registers(Mapping[str, float]):
                 continue
         return values
 
-    def _names(self) -> list[str]:
-        return _core.st_registers(self._motor.bus.profile)
+    def _names(self) -> dict[str, None]:
+        return _names(self._motor.bus.profile)
+
+
+@functools.cache
+def _names(profile: str) -> dict[str, None]:
+    """The names of a profile's registers, in the order of their numbers."""
+    return dict.fromkeys(_core.st_registers(profile))

@@ -188,7 +188,7 @@ class Frame(NamedTuple):
 
     #: The motor; ``None`` for the frame 0x280 to motors 1 to 4.
     motor: int | None
-    #: The document's name of the command.
+    #: The document's name of the command; ``0x280`` for the frame to four motors.
     name: str
     #: The values by name, in their units.
     values: dict[str, float]

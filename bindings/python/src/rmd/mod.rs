@@ -33,7 +33,7 @@ pub(crate) fn rmd_decode(
     let motor = MotorId::from_can_id(can_id);
     let code = Code::from(data[0]);
     let (name, fields): (_, &[Field]) = match (motor, code.info()) {
-        (None, _) if id == TORQUE4_ID && !reply => (TORQUE4.to_owned(), Torque4::FIELDS),
+        (None, _) if id == TORQUE4_ID && !reply => (format!("{id:#x}"), Torque4::FIELDS),
         (None, _) => {
             return Err(bad_value(py, format_args!("{id:#05x} is no identifier of this protocol")));
         }
@@ -50,9 +50,6 @@ pub(crate) fn rmd_decode(
     let text = describe(CanFrame::new(id, data), direction).to_string();
     crate::values::frame(py, (motor.map(MotorId::number), name, values, digits, text))
 }
-
-/// What the frame 0x280 is called.
-const TORQUE4: &str = "Multiple motor torque closed loop control";
 
 /// The bits of an error byte as text.
 #[pyfunction]
