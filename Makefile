@@ -134,6 +134,7 @@ firmware-test: $(VENV)/ready
 python: $(PYTHON_VENV)/ready
 	$(PYTHON_VENV)/bin/python -m pip install --quiet -C build-args=--profile=dev .
 	$(PYTHON_VENV)/bin/python -m mypy --strict -p motorlink
+	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
 	cd bindings/python/tests && ../../../$(PYTHON_VENV)/bin/python -m mypy --strict .
 	$(PYTHON_VENV)/bin/python -m pytest -q bindings/python/tests
 

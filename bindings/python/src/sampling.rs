@@ -8,7 +8,7 @@ use crate::clock::Clock;
 use crate::error::bad_value;
 use crate::number::span;
 
-/// How often Ctrl-C is looked for.
+/// How often a program's other wishes are looked for.
 const LOOK: Duration = Duration::from_millis(50);
 /// Rows beyond which something must be wrong with the arguments.
 const MOST: f64 = 1e8;
@@ -22,7 +22,7 @@ pub(crate) struct Plan {
 impl Plan {
     /// `rate` times a second, from the first instant on for `seconds`.
     pub(crate) fn new(py: Python<'_>, rate: f64, seconds: f64) -> PyResult<Self> {
-        let period = span(py, "a period", 1.0 / rate)?;
+        let period = span(py, "a time between samples", 1.0 / rate)?;
         let instants = (span(py, "a time", seconds)?.as_secs_f64() * rate + 1e-6).floor().max(1.0);
         if instants > MOST {
             return Err(bad_value(py, format_args!("{instants} samples are too many at once")));
@@ -31,10 +31,12 @@ impl Plan {
     }
 
     /// Calls `take` at each instant with the time since the first one, s. An instant whose period
-    /// has passed before `take` came back is left out.
+    /// has passed before `take` came back is left out. `look` is called now and then; an error of it
+    /// ends the sampling.
     pub(crate) fn run(
         &self,
         clock: &dyn Clock,
+        look: impl Fn(Python<'_>) -> PyResult<()>,
         mut take: impl FnMut(f64) -> PyResult<()>,
     ) -> PyResult<()> {
         let mut looked = Instant::now();
@@ -45,7 +47,7 @@ impl Plan {
             let due = self.period * next;
             if looked.elapsed() >= LOOK {
                 looked = Instant::now();
-                Python::attach(|py| py.check_signals())?;
+                Python::attach(|py| py.check_signals().and_then(|()| look(py)))?;
             }
             if since < due {
                 clock.pass((due - since).min(LOOK));

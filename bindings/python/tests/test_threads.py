@@ -125,6 +125,23 @@ def test_closing_while_others_call_is_clean() -> None:
     together([use, use, use, bus.close])
 
 
+def test_closing_ends_a_sampling_with_what_there_was() -> None:
+    for bus, what in ((st.open("sim:"), ["SPEED_MEAS"]), (rmd.open("sim:"), ["iq_a"])):
+        going = threading.Event()
+
+        def sample(bus: st.Bus | rmd.Bus = bus, what: list[str] = what) -> None:
+            going.set()
+            with pytest.raises(motorlink.Closed) as closed:
+                bus.sample(what, rate=100, seconds=600)  # type: ignore[arg-type]
+            assert closed.value.samples.dtype.names == ("t", *what)
+
+        def close(bus: st.Bus | rmd.Bus = bus) -> None:
+            going.wait(10)
+            bus.close()
+
+        together([sample, close])
+
+
 def python(script: str, *arguments: str) -> subprocess.Popen[str]:
     """A Python program that says `ready`, and then waits for Ctrl-C."""
     words = [sys.executable, "-c", textwrap.dedent(script), *arguments]

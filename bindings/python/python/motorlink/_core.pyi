@@ -6,6 +6,22 @@ from typing import Any, final
 from motorlink._values import Found, Frame, MotionStatus, RegisterInfo
 from motorlink.errors import MotorlinkError
 
+__all__ = [
+    "__version__",
+    "RmdBus",
+    "RmdRequest",
+    "StClient",
+    "StRequest",
+    "cli",
+    "rmd_decode",
+    "rmd_errors_text",
+    "rmd_quantities",
+    "st_flags_text",
+    "st_register",
+    "st_register_name",
+    "st_registers",
+]
+
 __version__: str
 
 def cli(words: Sequence[str]) -> int: ...

@@ -165,8 +165,9 @@ impl RmdBus {
                 names.iter().map(|name| Quantity::named(py, name)).collect();
             lanes.push(Lane { id: motor_id(py, id)?, quantities: quantities? });
         }
+        let look = |py: Python<'_>| self.bus(py).map(drop);
         let clock = &*self.clock;
-        let (rows, outcome) = py.detach(|| sample(&bus, clock, &plan, &lanes, raw, skip));
+        let (rows, outcome) = py.detach(|| sample(&bus, clock, look, &plan, &lanes, raw, skip));
         Ok((PyByteArray::new(py, &rows.0), outcome.err()))
     }
 

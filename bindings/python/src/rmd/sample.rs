@@ -21,6 +21,7 @@ pub(super) struct Lane {
 pub(super) fn sample(
     bus: &Bus,
     clock: &dyn Clock,
+    look: impl Fn(Python<'_>) -> PyResult<()>,
     plan: &Plan,
     lanes: &[Lane],
     raw: bool,
@@ -28,7 +29,7 @@ pub(super) fn sample(
 ) -> (Rows, PyResult<()>) {
     let mut rows = Rows::default();
     let cycles = cycles(lanes);
-    let outcome = plan.run(clock, |time| match row(bus, lanes, &cycles, raw) {
+    let outcome = plan.run(clock, look, |time| match row(bus, lanes, &cycles, raw) {
         Ok(values) => {
             rows.push(time, &values);
             Ok(())

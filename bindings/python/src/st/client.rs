@@ -122,8 +122,9 @@ impl StClient {
             let registers: PyResult<_> = names.iter().map(register).collect();
             lanes.push(Lane { motor: motor_number(py, motor)?, registers: registers?, scale });
         }
+        let look = |py: Python<'_>| self.client(py).map(drop);
         let clock = &*self.clock;
-        let (rows, outcome) = py.detach(|| sample(&client, clock, &plan, &lanes, raw, skip));
+        let (rows, outcome) = py.detach(|| sample(&client, clock, look, &plan, &lanes, raw, skip));
         Ok((PyByteArray::new(py, &rows.0), outcome.err()))
     }
 

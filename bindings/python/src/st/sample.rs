@@ -29,6 +29,7 @@ struct Reader<'a> {
 pub(super) fn sample(
     client: &Client,
     clock: &dyn Clock,
+    look: impl Fn(Python<'_>) -> PyResult<()>,
     plan: &Plan,
     lanes: &[Lane],
     raw: bool,
@@ -46,7 +47,7 @@ pub(super) fn sample(
         Err(error) => return (rows, Err(raised(error))),
     };
     let mut values = Vec::new();
-    let outcome = plan.run(clock, |time| {
+    let outcome = plan.run(clock, look, |time| {
         values.clear();
         for reader in &mut readers {
             match reader.read(raw, &mut values) {
