@@ -132,7 +132,7 @@ firmware-test: $(VENV)/ready
 # The package as `pip install .` makes it, but for the optimisation; with the checks that its users' code
 # would go through.
 python: $(PYTHON_VENV)/ready
-	$(PYTHON_VENV)/bin/python -m pip install --quiet -C build-args=--profile=dev .
+	$(PYTHON_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
 	$(PYTHON_VENV)/bin/python -m mypy --strict -p motorlink
 	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
 	cd bindings/python/tests && ../../../$(PYTHON_VENV)/bin/python -m mypy --strict .

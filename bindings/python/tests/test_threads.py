@@ -132,7 +132,7 @@ def test_closing_ends_a_sampling_with_what_there_was() -> None:
         def sample(bus: st.Bus | rmd.Bus = bus, what: list[str] = what) -> None:
             going.set()
             with pytest.raises(motorlink.Closed) as closed:
-                bus.sample(what, rate=100, seconds=600)  # type: ignore[arg-type]
+                bus.sample(what, rate=100, seconds=600)
             assert closed.value.samples.dtype.names == ("t", *what)
 
         def close(bus: st.Bus | rmd.Bus = bus) -> None:
