@@ -195,6 +195,15 @@ def test_the_end_of_with_stops_what_moves(served: Served) -> None:
     assert mode(1) == "speed"
 
 
+def test_a_motor_that_cannot_be_stopped_is_not_passed_over(served: Served) -> None:
+    bus = rmd.open(served.can, timeout=PATIENT)
+    bus.motor(2).speed(100)
+    served.end()
+    with pytest.raises(motorlink.LineLost, match="motor 2 may still be running") as lost:
+        bus.close()
+    assert lost.value.motor == 2 and "closed" in repr(bus)
+
+
 def test_after_its_end_a_bus_says_that_it_is_closed(tmp_path: Path) -> None:
     bus = rmd.open("sim:")
     assert repr(bus) == "<motorlink.rmd.Bus sim:>"

@@ -419,6 +419,16 @@ fn a_guard_switches_off_what_a_bus_was_used_to_move() {
 }
 
 #[test]
+fn a_guard_tells_what_it_did_to_each_motor() {
+    let drives = Served::new("guard-told");
+    let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
+    bus.motor(3).unwrap().torque(TorqueCommand(50)).unwrap();
+    let stopped = bus.guard().stop_now();
+    assert!(matches!(&stopped[..], [one] if one.id.number() == 3 && one.result.is_ok()));
+    assert!(bus.guard().stop_now().is_empty());
+}
+
+#[test]
 fn limits_hold_for_typed_and_raw_requests() {
     let drives = Served::new("limits");
     let limits = Limits { speed_rpm: Some(1000), current_s16a: Some(2000) };
