@@ -17,6 +17,7 @@ enum Kind {
     Timeout,
     PortError,
     BadValue,
+    NoSuchRegister,
     Closed,
 }
 
@@ -30,13 +31,14 @@ struct Facts<'a> {
 
 impl Kind {
     fn class(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
-        static CLASSES: [PyOnceLock<Py<PyType>>; 6] = [const { PyOnceLock::new() }; 6];
+        static CLASSES: [PyOnceLock<Py<PyType>>; 7] = [const { PyOnceLock::new() }; 7];
         let name = match self {
             Kind::Refused => "Refused",
             Kind::LineLost => "LineLost",
             Kind::Timeout => "Timeout",
             Kind::PortError => "PortError",
             Kind::BadValue => "BadValue",
+            Kind::NoSuchRegister => "NoSuchRegister",
             Kind::Closed => "Closed",
         };
         CLASSES[self as usize].import(py, "motorlink.errors", name)
@@ -60,6 +62,11 @@ impl Kind {
 /// A value that cannot be sent.
 pub(crate) fn bad_value(py: Python<'_>, message: impl Display) -> PyErr {
     Kind::BadValue.raise(py, message, Facts::default())
+}
+
+/// A register that nobody knows.
+pub(crate) fn no_such_register(py: Python<'_>, message: impl Display) -> PyErr {
+    Kind::NoSuchRegister.raise(py, message, Facts::default())
 }
 
 /// A bus that was closed.

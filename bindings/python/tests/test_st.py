@@ -82,8 +82,13 @@ def test_registers_are_a_mapping_with_names_and_units(st_bus: st.Bus) -> None:
         _ = registers.SPEED_MES
     with pytest.raises(AttributeError):
         registers.SPEED_MES = 3
-    with pytest.raises(motorlink.BadValue, match="did you mean `SPEED_MEAS`"):
+    with pytest.raises(motorlink.errors.NoSuchRegister, match="^there is no register `SPEED_MES`; did"):
         _ = registers["SPEED_MES"]
+    assert registers.get("SPEED_MES") is None and "SPEED_MES" not in registers
+    assert registers.get("SPEED_KP") == 701
+    assert issubclass(motorlink.errors.NoSuchRegister, (motorlink.BadValue, KeyError))
+    with pytest.raises(KeyError):
+        registers.info(0xC0)
 
 
 def test_currents_are_amperes_where_full_scale_is_known(st_bus: st.Bus) -> None:

@@ -81,7 +81,7 @@ class Registers(Mapping[str, float]):
     def info(self, name: str | int) -> RegisterInfo:
         """What a register is, from the table: unit, type, access, and what it needs. Asks nobody.
 
-        Raises ``BadValue`` for one that nobody names.
+        Raises ``NoSuchRegister``, a ``BadValue`` and a ``KeyError``, for one that nobody names.
         """
         motor = self._motor
         return _core.st_register(name, motor.bus.profile, motor.full_scale_amps)

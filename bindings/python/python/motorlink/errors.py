@@ -8,7 +8,16 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["BadValue", "Closed", "LineLost", "MotorlinkError", "PortError", "Refused", "Timeout"]
+__all__ = [
+    "BadValue",
+    "Closed",
+    "LineLost",
+    "MotorlinkError",
+    "NoSuchRegister",
+    "PortError",
+    "Refused",
+    "Timeout",
+]
 
 
 class MotorlinkError(Exception):
@@ -70,6 +79,13 @@ class PortError(LineLost):
 
 class BadValue(MotorlinkError, ValueError):
     """A value that cannot be sent, or that a limit forbids; nothing was sent."""
+
+
+class NoSuchRegister(BadValue, KeyError):
+    """A register name or number that nobody knows; nothing was sent."""
+
+    # That of KeyError quotes the message.
+    __str__ = Exception.__str__
 
 
 class Closed(MotorlinkError, ValueError):

@@ -14,7 +14,8 @@ Every method of a motor is one exchange unless it says otherwise, and raises
 
 * ``Refused`` where the drive says no (table 2 of the document),
 * ``Timeout`` and ``LineLost`` where there is no answer to trust: nobody knows what the drive did,
-* ``BadValue`` where nothing was sent: no such register or motor, out of range, over a limit,
+* ``BadValue`` where nothing was sent: no such motor, out of range, over a limit; of a register that
+  nobody knows, its subclass ``errors.NoSuchRegister``, which is a ``KeyError``, too,
 * ``Closed`` after ``bus.close()``.
 
 Paragraphs in brackets are those of the document "Motor Control Protocol". Ctrl-C is obeyed when the

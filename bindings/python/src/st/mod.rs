@@ -13,7 +13,7 @@ use motorlink::stmcp::register::{Feature, Features, Writing};
 use motorlink::stmcp::{Flags, Profile, RegisterId};
 use pyo3::prelude::*;
 
-use crate::error::bad_value;
+use crate::error::{bad_value, no_such_register};
 use crate::values;
 use scale::{Scale, register};
 
@@ -39,7 +39,7 @@ pub(crate) fn st_register(
     let register = register(name)?;
     let (Some(shape), Some(text)) = (register.shape(), register.text()) else {
         let id = register.0;
-        return Err(bad_value(py, format_args!("nobody knows what register {id:#04x} is")));
+        return Err(no_such_register(py, format_args!("nobody knows what register {id:#04x} is")));
     };
     let built = Features::NONE.with(shape.feature);
     values::register_info(

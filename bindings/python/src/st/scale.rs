@@ -6,7 +6,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
-use crate::error::bad_value;
+use crate::error::{bad_value, no_such_register};
 use crate::number::digits;
 
 /// Digits of a drive's full scale of current.
@@ -141,10 +141,10 @@ fn is_current(register: RegisterId) -> bool {
 pub(crate) fn register(name: &Bound<'_, PyAny>) -> PyResult<RegisterId> {
     let py = name.py();
     if let Ok(text) = name.cast::<PyString>() {
-        return find_register(&text.to_cow()?).map_err(|error| bad_value(py, error));
+        return find_register(&text.to_cow()?).map_err(|error| no_such_register(py, error));
     }
     let number: i64 = name.extract()?;
-    u8::try_from(number)
-        .map(RegisterId)
-        .map_err(|_| bad_value(py, format_args!("{number} is no register: numbers are 0 to 255")))
+    u8::try_from(number).map(RegisterId).map_err(|_| {
+        no_such_register(py, format_args!("{number} is no register: numbers are 0 to 255"))
+    })
 }
