@@ -1,7 +1,9 @@
 //! Sampling registers: in data segments where the drive has them, else one by one.
 
 use motorlink::stmcp::register::Access;
-use motorlink::stmcp::{Client, Error, MotorHandle, Profile, RegisterId, SEGMENT_REGISTERS};
+use motorlink::stmcp::{
+    Client, Error, MotorHandle, Profile, RegisterId, SEGMENT_REGISTERS, SEGMENTS,
+};
 use pyo3::prelude::*;
 
 use super::scale::Scale;
@@ -39,7 +41,7 @@ pub(super) fn sample(
     let raised = |error: Error| Python::attach(|py| st_error(py, &error));
     let readers: Result<Vec<Reader<'_>>, Error> = lanes
         .iter()
-        .zip((0..4).rev().map(Some).chain(std::iter::repeat(None)))
+        .zip((0..SEGMENTS as u8).rev().map(Some).chain(std::iter::repeat(None)))
         .map(|(lane, segment)| Reader::new(client, lane, segment))
         .collect();
     let mut readers = match readers {
