@@ -5,6 +5,7 @@
 //! adapters; [`fault`] makes a line misbehave.
 #![forbid(unsafe_code)]
 
+mod clock;
 pub mod fault;
 mod line;
 pub mod list;
@@ -16,6 +17,7 @@ pub mod sim;
 pub mod stmcp;
 mod text;
 
+pub use clock::Clock;
 pub use line::{BackOff, LinkState, Opener};
 pub use motorlink_proto::time;
 pub use motorlink_slcan as slcan;

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use motorlink_proto::time::Instant as Moment;
 
+use crate::Clock;
 use crate::port::PortError;
 
 /// Opens the port, again and again if it must.
@@ -89,7 +90,7 @@ pub(crate) struct Reopening<L> {
     not_before: Instant,
     /// What the last attempt said.
     trouble: String,
-    began: Instant,
+    clock: Clock,
     sign: LinkSign,
 }
 
@@ -116,14 +117,22 @@ impl<L> Reopening<L> {
             wait: Duration::ZERO,
             not_before: now,
             trouble: String::new(),
-            began: now,
+            clock: Clock::default(),
             sign: LinkSign(Arc::new(Mutex::new(Shown::Open))),
         }
     }
 
-    /// The time for the sans-IO machines: microseconds since the port was first opened.
+    /// Goes by the clock of the link, if it has one, which those that take its place share.
+    pub(crate) fn by(mut self, clock: impl FnOnce(&L) -> Option<Clock>) -> Self {
+        if let Some(clock) = self.link.as_ref().and_then(clock) {
+            self.clock = clock;
+        }
+        self
+    }
+
+    /// The time for the sans-IO machines.
     pub(crate) fn now(&self) -> Moment {
-        Moment(self.began.elapsed().as_micros() as u64)
+        self.clock.now()
     }
 
     /// Shows whether the port is open, from now on.

@@ -1,11 +1,12 @@
 //! Ports that misbehave: a program's handling of errors, rehearsed on any port.
 
-use std::time::{Duration, Instant as Moment};
+use std::time::Duration;
 
 use motorlink_proto::rmd::CanFrame;
-use motorlink_proto::time::{self, Instant};
+use motorlink_proto::time::Instant;
 
-use super::{ByteLink, CanLink, Deadline, PortError};
+use super::{ByteLink, CanLink, PortError};
+use crate::Clock;
 use crate::fault::{Faults, Lane, Unit, Way};
 
 /// A byte line with faults in both directions.
@@ -27,7 +28,12 @@ pub struct FaultCan<C> {
 impl<B: ByteLink> FaultBytes<B> {
     /// Wraps `link`. [`Faults::on_serial`] finds what has no meaning here.
     pub fn new(link: B, faults: &Faults) -> Self {
-        FaultBytes { link, lanes: Lanes::new(faults) }
+        Self::paced(link, faults, Duration::ZERO)
+    }
+
+    /// Wraps a `link` that has no pace of its own: a byte takes so long, in either direction.
+    pub fn paced(link: B, faults: &Faults, byte: Duration) -> Self {
+        FaultBytes { lanes: Lanes::new(faults, byte, link.clock()), link }
     }
 
     fn transmit(&mut self) -> Result<(), PortError> {
@@ -46,7 +52,13 @@ impl<B: ByteLink> FaultBytes<B> {
 impl<C: CanLink> FaultCan<C> {
     /// Wraps `link`. [`Faults::on_can`] finds what has no meaning here.
     pub fn new(link: C, faults: &Faults) -> Self {
-        FaultCan { link, lanes: Lanes::new(faults) }
+        Self::paced(link, faults, Duration::ZERO)
+    }
+
+    /// Wraps a `link` that has no pace of its own: a frame takes so long, and both directions share
+    /// the bus.
+    pub fn paced(link: C, faults: &Faults, frame: Duration) -> Self {
+        FaultCan { lanes: Lanes::new(faults, frame, link.clock()), link }
     }
 
     fn transmit(&mut self) -> Result<(), PortError> {
@@ -66,7 +78,7 @@ impl<B: ByteLink> ByteLink for FaultBytes<B> {
     }
 
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
-        let deadline = Deadline::after(timeout);
+        let deadline = self.lanes.deadline(timeout);
         let mut chunk = [0; 256];
         loop {
             self.transmit()?;
@@ -77,35 +89,43 @@ impl<B: ByteLink> ByteLink for FaultBytes<B> {
                 self.lanes.received.push(now, chunk[..came].iter().copied());
             }
             let size = fill(buffer, || self.lanes.received.pop(now));
-            if size > 0 || deadline.is_over() {
+            if size > 0 || deadline.is_some_and(|end| end <= now) {
                 return Ok(size);
             }
         }
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.link.clock()
     }
 }
 
 impl<C: CanLink> CanLink for FaultCan<C> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        let now = self.lanes.now();
-        self.lanes.sent.push(now, [*frame]);
+        let free = self.lanes.now().max(self.lanes.received.free());
+        self.lanes.sent.push(free, [*frame]);
         self.transmit()
     }
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        let deadline = Deadline::after(timeout);
+        let deadline = self.lanes.deadline(timeout);
         loop {
             self.transmit()?;
             let wait = self.lanes.patience(deadline);
             let came = self.link.receive(wait)?;
             let now = self.lanes.now();
             if let Some(frame) = came {
-                self.lanes.received.push(now, [frame]);
+                self.lanes.received.push(now.max(self.lanes.sent.free()), [frame]);
             }
             let frame = self.lanes.received.pop(now);
-            if frame.is_some() || deadline.is_over() {
+            if frame.is_some() || deadline.is_some_and(|end| end <= now) {
                 return Ok(frame);
             }
         }
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.link.clock()
     }
 }
 
@@ -117,33 +137,38 @@ fn fill(buffer: &mut [u8], mut next: impl FnMut() -> Option<u8>) -> usize {
 /// Both directions, and the clock they go by.
 #[derive(Debug)]
 struct Lanes<T> {
-    began: Moment,
+    clock: Clock,
     sent: Lane<T>,
     received: Lane<T>,
 }
 
 impl<T: Unit> Lanes<T> {
-    /// The port itself sets the pace.
-    fn new(faults: &Faults) -> Self {
-        let lane = |way| Lane::new(faults, way, time::Duration(0));
-        Lanes { began: Moment::now(), sent: lane(Way::Sent), received: lane(Way::Received) }
+    fn new(faults: &Faults, pace: Duration, clock: Option<Clock>) -> Self {
+        let lane = |way| Lane::new(faults, way, pace.into());
+        let clock = clock.unwrap_or_default();
+        Lanes { clock, sent: lane(Way::Sent), received: lane(Way::Received) }
     }
 
     fn now(&self) -> Instant {
-        Instant(self.began.elapsed().as_micros() as u64)
+        self.clock.now()
+    }
+
+    /// The end of a wait that begins now.
+    fn deadline(&self, timeout: Option<Duration>) -> Option<Instant> {
+        timeout.map(|timeout| self.now() + timeout.into())
     }
 
     /// How long to wait for the port: not beyond the deadline nor past what is due meanwhile.
-    fn patience(&self, deadline: Deadline) -> Option<Duration> {
-        let due = [self.sent.due(), self.received.due()].into_iter().flatten().min();
-        let due = due.map(|due| due.since(self.now()).into());
-        [due, deadline.remaining()].into_iter().flatten().min()
+    fn patience(&self, deadline: Option<Instant>) -> Option<Duration> {
+        let first = [self.sent.due(), self.received.due(), deadline].into_iter().flatten().min();
+        first.map(|first| first.since(self.now()).into())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use std::collections::VecDeque;
+    use std::time::Instant as Moment;
 
     use super::*;
 

@@ -20,6 +20,8 @@ use std::time::{Duration, Instant};
 
 use motorlink_proto::rmd::CanFrame;
 
+use crate::Clock;
+
 pub use echo::EchoCanceller;
 pub use error::PortError;
 pub use fault::{FaultBytes, FaultCan};
@@ -43,6 +45,12 @@ pub trait ByteLink: Send {
     /// `Ok(0)` means that nothing came in time. A signal does not end the wait: who wants to look
     /// at a flag now and then passes a short `timeout`.
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError>;
+
+    /// The clock that its waits go by, where that is not the machine's. A wrapper has that of the
+    /// link within.
+    fn clock(&self) -> Option<Clock> {
+        None
+    }
 }
 
 /// A CAN bus.
@@ -53,6 +61,11 @@ pub trait CanLink: Send {
     /// The next frame from the bus, waiting at most `timeout` (`None`: without limit). Frames that
     /// this link sent are not among them.
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError>;
+
+    /// As [`ByteLink::clock`].
+    fn clock(&self) -> Option<Clock> {
+        None
+    }
 }
 
 impl<B: ByteLink + ?Sized> ByteLink for Box<B> {
@@ -63,6 +76,10 @@ impl<B: ByteLink + ?Sized> ByteLink for Box<B> {
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
         (**self).read(buffer, timeout)
     }
+
+    fn clock(&self) -> Option<Clock> {
+        (**self).clock()
+    }
 }
 
 impl<C: CanLink + ?Sized> CanLink for Box<C> {
@@ -72,6 +89,10 @@ impl<C: CanLink + ?Sized> CanLink for Box<C> {
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
         (**self).receive(timeout)
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        (**self).clock()
     }
 }
 
@@ -152,10 +173,6 @@ impl Deadline {
     /// What is left: `None` is without limit, zero is over.
     fn remaining(self) -> Option<Duration> {
         self.0.map(|end| end.saturating_duration_since(Instant::now()))
-    }
-
-    fn is_over(self) -> bool {
-        self.remaining() == Some(Duration::ZERO)
     }
 
     /// Whether it was over `span` ago.

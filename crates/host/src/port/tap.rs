@@ -1,10 +1,12 @@
 //! Taps: whoever wants to see what passes a port.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::time::Instant;
 
 use super::{ByteLink, CanLink, PortError};
+use crate::Clock;
 
 /// Which way data went, as the program sees it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -23,7 +25,7 @@ pub enum Direction {
 pub struct TapBytes<B, F> {
     link: B,
     observer: F,
-    since: Instant,
+    time: Stopwatch,
 }
 
 /// Shows an observer every frame that passes a CAN port, as [`TapBytes`] does for bytes.
@@ -31,26 +33,26 @@ pub struct TapBytes<B, F> {
 pub struct TapCan<C, F> {
     link: C,
     observer: F,
-    since: Instant,
+    time: Stopwatch,
 }
 
 impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> TapBytes<B, F> {
     /// Wraps `link`.
     pub fn new(link: B, observer: F) -> Self {
-        TapBytes { link, observer, since: Instant::now() }
+        TapBytes { time: Stopwatch::on(link.clock().unwrap_or_default()), link, observer }
     }
 }
 
 impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> TapCan<C, F> {
     /// Wraps `link`.
     pub fn new(link: C, observer: F) -> Self {
-        TapCan { link, observer, since: Instant::now() }
+        TapCan { time: Stopwatch::on(link.clock().unwrap_or_default()), link, observer }
     }
 }
 
 impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> ByteLink for TapBytes<B, F> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        let at = self.since.elapsed();
+        let at = self.time.elapsed();
         self.link.write(bytes)?;
         (self.observer)(Direction::Sent, at, bytes);
         Ok(())
@@ -59,15 +61,19 @@ impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> ByteLink for TapB
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
         let len = self.link.read(buffer, timeout)?;
         if len > 0 {
-            (self.observer)(Direction::Received, self.since.elapsed(), &buffer[..len]);
+            (self.observer)(Direction::Received, self.time.elapsed(), &buffer[..len]);
         }
         Ok(len)
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.link.clock()
     }
 }
 
 impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for TapCan<C, F> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        let at = self.since.elapsed();
+        let at = self.time.elapsed();
         self.link.send(frame)?;
         (self.observer)(Direction::Sent, at, frame);
         Ok(())
@@ -76,8 +82,27 @@ impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for Ta
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
         let frame = self.link.receive(timeout)?;
         if let Some(frame) = &frame {
-            (self.observer)(Direction::Received, self.since.elapsed(), frame);
+            (self.observer)(Direction::Received, self.time.elapsed(), frame);
         }
         Ok(frame)
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.link.clock()
+    }
+}
+
+/// Time since a tap was made.
+#[derive(Debug)]
+struct Stopwatch(Clock, Instant);
+
+impl Stopwatch {
+    fn on(clock: Clock) -> Self {
+        let now = clock.now();
+        Stopwatch(clock, now)
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.0.now().since(self.1).into()
     }
 }

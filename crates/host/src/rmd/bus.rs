@@ -2,13 +2,13 @@
 //! allocation in an exchange.
 
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::{Duration, Instant as Moment};
+use std::time::Duration;
 
 use motorlink_proto::rmd::{
     self as proto, CanFrame, Code, Command, Counters, Dialect, Host, Limits, MotionStatus, MotorId,
     MotorSet, Output, Payload, ReadStatus1, Refused, Torque4,
 };
-use motorlink_proto::time::Instant;
+use motorlink_proto::time::{self, Instant};
 
 use super::{Error, Guard, MotorHandle, OnDrop};
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
@@ -55,7 +55,7 @@ pub enum Found {
 const SETTLE_LIMIT: Duration = Duration::from_secs(2);
 
 /// How long what came meanwhile may go on coming.
-const BABBLE: Duration = Duration::from_millis(100);
+const BABBLE: time::Duration = time::Duration::from_millis(100);
 
 /// IDs that a scan asks at once.
 const SCAN_WIDTH: usize = 8;
@@ -78,7 +78,7 @@ struct Inner {
     /// Motors that were given something to do by this bus and not switched off.
     moving: MotorSet,
     /// How long an exchange may be put off.
-    patience: Duration,
+    patience: time::Duration,
 }
 
 impl Bus {
@@ -123,9 +123,10 @@ impl Bus {
         for id in MotorSet::ALL {
             host.set_limits(id, options.limits);
         }
+        let port = port.by(|link| link.clock());
         let sign = port.sign();
         let times = options.guard.saturating_mul(2).saturating_add(options.timeout);
-        let patience = times.saturating_add(SETTLE_LIMIT);
+        let patience = times.saturating_add(SETTLE_LIMIT).into();
         let inner = Inner { port, host, moving: MotorSet::EMPTY, patience };
         Bus { inner: Mutex::new(inner), sign }
     }
@@ -170,10 +171,11 @@ impl Bus {
     pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
         let mut inner = self.lock();
         inner.ready()?;
-        let begun = Moment::now();
+        let begun = inner.port.now();
         loop {
             match inner.exchange(id, request) {
-                Err(Error::Quarantined { .. }) if begun.elapsed() < inner.patience => {}
+                Err(Error::Quarantined { .. })
+                    if inner.port.now().since(begun) < inner.patience => {}
                 outcome => return outcome,
             }
         }
@@ -275,14 +277,13 @@ impl Bus {
 
 impl Inner {
     fn ready(&mut self) -> Result<(), Error> {
-        let now = self.port.now();
-        let (link, _) = self.port.link()?;
+        self.port.link()?;
         // What came meanwhile is late or unasked; left in the port it would pass for a reply.
-        let begun = Moment::now();
+        let now = self.port.now();
         loop {
-            match link.receive(Some(Duration::ZERO)) {
+            match self.port.link()?.0.receive(Some(Duration::ZERO)) {
                 // A bus that is never silent has to do: an Off must get through.
-                Ok(Some(_)) if begun.elapsed() > BABBLE => break,
+                Ok(Some(_)) if self.port.now().since(now) > BABBLE => break,
                 Ok(Some(frame)) => self.host.receive(now, &frame),
                 Ok(None) => break,
                 Err(error) => return Err(self.closed(error)),

@@ -1,13 +1,14 @@
 //! The blocking client: one lock around one exchange, no thread, no allocation in an exchange.
 
 use std::sync::{Mutex, MutexGuard};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
     BoardInfo, Command, Config, Counters, Frame, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor,
     Output, Parse, Profile, Recovery, Request, RequestError,
 };
+use motorlink_proto::time::{self, Instant};
 
 use super::error::{Target, advice, hint};
 use super::started::Started;
@@ -41,7 +42,7 @@ impl Options {
 
 /// After a pause of this length whatever came unasked is taken note of before the next request: a
 /// byte or so at 115200 baud. In a shorter one hardly anything can come, and looking is a system call.
-const IDLE: Duration = Duration::from_micros(100);
+const IDLE: time::Duration = time::Duration(100);
 
 /// What GET_BOARD_INFO tells (4.7).
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -122,14 +123,15 @@ impl Client {
     }
 
     fn on(port: Reopening<Box<dyn ByteLink>>, options: Options) -> Self {
+        let port = port.by(|link| link.clock());
         let sign = port.sign();
         let master = Master::new(options.line);
         let inner = Inner {
+            ended: port.now(),
             port,
             master,
             received: [0; 256],
             started: Started::default(),
-            ended: Instant::now(),
         };
         Client { inner: Mutex::new(inner), sign, profile: options.profile, limits: options.limits }
     }
@@ -276,12 +278,13 @@ impl Client {
 impl Inner {
     /// Makes sure that the port is open and no abandoned exchange is under way.
     fn ready(&mut self) -> Result<(), PortError> {
+        let idle = self.port.now().since(self.ended) > IDLE;
         let (link, reopened) = self.port.link()?;
         if reopened && self.master.config_mut().recovery == Recovery::None {
             self.master.reopened();
         }
         self.master.abandon();
-        if self.ended.elapsed() > IDLE {
+        if idle {
             let size = match link.read(&mut self.received, Some(Duration::ZERO)) {
                 Ok(size) => size,
                 Err(error) => {
@@ -309,7 +312,7 @@ impl Inner {
         let addressed = self.started.asked(motor, request);
         let (port, target) = (self.port.name.clone(), Target(motor));
         let outcome = self.run(reply);
-        self.ended = Instant::now();
+        self.ended = self.port.now();
         match outcome {
             Ok(Ok((Some(value), _))) => {
                 self.started.acknowledged(addressed, request);
