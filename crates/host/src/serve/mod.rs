@@ -24,6 +24,7 @@ use motorlink_proto::time::Instant;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 
+use crate::Clock;
 use crate::port::{PortError, ServeName, timespec, unbracketed};
 use endpoint::{Endpoint, Scratch, Station};
 use node::Node;
@@ -76,10 +77,7 @@ pub struct Turn {
 
 /// Serves ports until it is dropped.
 pub struct Server {
-    started: std::time::Instant,
-    /// Where its time stands still, and how long it stood before.
-    held: Option<Instant>,
-    stood: Duration,
+    clock: Clock,
     endpoints: Vec<Endpoint>,
     nodes: Vec<Node>,
     ready: Vec<bool>,
@@ -95,10 +93,13 @@ impl Default for Server {
 impl Server {
     /// A server without ports, whose time begins now.
     pub fn new() -> Self {
+        Self::by(Clock::running())
+    }
+
+    /// A server without ports, whose time is that of `clock`.
+    pub fn by(clock: Clock) -> Self {
         Server {
-            started: std::time::Instant::now(),
-            held: None,
-            stood: Duration::ZERO,
+            clock,
             endpoints: Vec::new(),
             nodes: Vec::new(),
             ready: Vec::new(),
@@ -158,22 +159,14 @@ impl Server {
         Ok(Served { port, path })
     }
 
-    /// The server's time: microseconds since it was made, without those for which it stood still.
+    /// The server's time.
     pub fn now(&self) -> Instant {
-        let running = || self.started.elapsed().saturating_sub(self.stood);
-        self.held.unwrap_or_else(|| Instant(running().as_micros() as u64))
+        self.clock.now()
     }
 
     /// Lets time stand still, or go on. Stations are served meanwhile, all at that one moment.
     pub fn hold(&mut self, held: bool) {
-        match (held, self.held) {
-            (true, None) => self.held = Some(self.now()),
-            (false, Some(since)) => {
-                self.stood = self.started.elapsed().saturating_sub(Duration::from_micros(since.0));
-                self.held = None;
-            }
-            _ => {}
-        }
+        self.clock.hold(held);
     }
 
     /// How many bytes were dropped because a client or a CAN bus did not take them.
@@ -220,7 +213,7 @@ impl Server {
 
     /// The time to the first deadline of a station.
     fn wait_time(&self, max_wait: Duration) -> Duration {
-        if self.held.is_some() {
+        if self.clock.stands() {
             return max_wait;
         }
         let endpoints = self.endpoints.iter().filter_map(Endpoint::deadline);

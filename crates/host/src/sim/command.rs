@@ -81,6 +81,11 @@ pub enum Command {
 }
 
 impl Command {
+    /// Reads a command that is written as JSON.
+    pub(super) fn read(text: &str) -> Result<Self, String> {
+        serde_json::from_str(text).map_err(|error| format!("not a command: {error}"))
+    }
+
     /// The served port that the command names.
     pub fn port(&self) -> Option<&str> {
         match self {

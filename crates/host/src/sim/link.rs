@@ -1,4 +1,4 @@
-//! The port `sim:`: a drive inside the process, advanced to real time at each access.
+//! Links to drives inside the process. The port `sim:` is one on a clock that runs.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -6,48 +6,43 @@ use std::time::Duration;
 
 use motorlink_proto::rmd::CanFrame;
 use motorlink_proto::time::Instant;
-use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
-use motorlink_sim::st::{StMotor, StStation};
+use motorlink_sim::rmd::RmdConfig;
 
+use super::drives::{Drives, Stage, Station};
 use super::{BenchConfig, ConfigError};
+use crate::Clock;
 use crate::port::{ByteLink, CanLink, PortError};
 
-/// Virtual time that follows the machine's.
-struct Clock(std::time::Instant);
-
-impl Clock {
-    fn now(&self) -> Instant {
-        Instant(self.0.elapsed().as_micros() as u64)
-    }
-
-    /// Sleeps until `until`, or as long as `timeout` allows.
-    fn sleep(&self, until: Option<Instant>, timeout: Option<Duration>) {
-        let until = until.map(|until| until.since(self.now()).into());
-        match until.into_iter().chain(timeout).min() {
-            Some(time) => std::thread::sleep(time),
-            None => std::thread::park(),
-        }
-    }
-}
-
-struct SimLine {
-    station: StStation<Vec<StMotor>>,
+/// The line of an ST drive. Bytes take no time on it.
+pub(super) struct SimLine {
+    stage: Stage,
     clock: Clock,
     received: VecDeque<u8>,
 }
 
+impl SimLine {
+    pub(super) fn new(stage: Stage, clock: Clock) -> Self {
+        SimLine { stage, clock, received: VecDeque::with_capacity(256) }
+    }
+}
+
 impl ByteLink for SimLine {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        let SimLine { station, clock, received } = self;
-        station.receive(clock.now(), bytes, |reply| received.extend(reply));
+        let now = self.clock.now();
+        if let Some(station) = &mut self.stage.at(now).drives.st {
+            station.receive(now, bytes, |reply| self.received.extend(reply));
+        }
         Ok(())
     }
 
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
         if self.received.is_empty() {
-            self.clock.sleep(self.station.deadline(), timeout);
-            let SimLine { station, clock, received } = self;
-            station.poll(clock.now(), |reply| received.extend(reply));
+            let deadline = self.stage.last().drives.st.as_ref().and_then(Station::deadline);
+            wait(&self.clock, deadline, timeout);
+            let now = self.clock.now();
+            if let Some(station) = &mut self.stage.at(now).drives.st {
+                station.poll(now, |reply| self.received.extend(reply));
+            }
         }
         let size = buffer.len().min(self.received.len());
         for (slot, byte) in buffer.iter_mut().zip(self.received.drain(..size)) {
@@ -55,43 +50,70 @@ impl ByteLink for SimLine {
         }
         Ok(size)
     }
+
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
+    }
 }
 
-struct SimCan {
-    bus: RmdBus<Vec<RmdNode>>,
+/// The bus of RMD motors. Frames take no time on it.
+pub(super) struct SimCan {
+    stage: Stage,
     clock: Clock,
     received: VecDeque<CanFrame>,
 }
 
+impl SimCan {
+    pub(super) fn new(stage: Stage, clock: Clock) -> Self {
+        SimCan { stage, clock, received: VecDeque::with_capacity(64) }
+    }
+}
+
 impl CanLink for SimCan {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        let SimCan { bus, clock, received } = self;
-        bus.receive(clock.now(), frame, |reply| received.push_back(reply));
+        let now = self.clock.now();
+        if let Some(bus) = &mut self.stage.at(now).drives.rmd {
+            bus.receive(now, frame, |reply| self.received.push_back(reply));
+        }
         Ok(())
     }
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
         if self.received.is_empty() {
-            self.clock.sleep(None, timeout);
+            wait(&self.clock, None, timeout);
         }
         Ok(self.received.pop_front())
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
+    }
+}
+
+/// Waits until `due`, or as long as `timeout` allows.
+fn wait(clock: &Clock, due: Option<Instant>, timeout: Option<Duration>) {
+    let end = timeout.map(|timeout| clock.now() + timeout.into());
+    match due.into_iter().chain(end).min() {
+        Some(end) => clock.wait(end),
+        None => std::thread::park(),
     }
 }
 
 /// Opens `sim:` as a serial line.
 pub(crate) fn open_line(config: Option<&Path>) -> Result<Box<dyn ByteLink>, PortError> {
     let station = read(config).and_then(|config| config.station(Instant(0)));
-    let clock = Clock(std::time::Instant::now());
     let station = station.map_err(|error| refused(config, &error))?;
-    Ok(Box::new(SimLine { station, clock, received: VecDeque::with_capacity(256) }))
+    Ok(Box::new(SimLine::new(
+        Stage::new(Drives { st: Some(station), rmd: None }),
+        Clock::running(),
+    )))
 }
 
 /// Opens `sim:` as a CAN bus.
 pub(crate) fn open_can(config: Option<&Path>) -> Result<Box<dyn CanLink>, PortError> {
     let bus = read(config).and_then(|config| config.bus(Instant(0), RmdConfig::factory_rom));
-    let clock = Clock(std::time::Instant::now());
     let bus = bus.map_err(|error| refused(config, &error))?;
-    Ok(Box::new(SimCan { bus, clock, received: VecDeque::with_capacity(64) }))
+    Ok(Box::new(SimCan::new(Stage::new(Drives { st: None, rmd: Some(bus) }), Clock::running())))
 }
 
 fn read(path: Option<&Path>) -> Result<BenchConfig, ConfigError> {

@@ -8,7 +8,7 @@ use motorlink_sim::rmd::RmdNode;
 use motorlink_sim::st::StMotor;
 
 use super::Command;
-use super::bench::{Bus, Station};
+use super::drives::{Bus, Station};
 
 /// Faults of an RMD motor, with the names that commands have for them.
 pub(super) const RMD_FAULTS: [(Errors, &str); 2] =

@@ -1,4 +1,4 @@
-//! The drives of a scenario, on their line and their bus.
+//! What events do to the drives of a scenario.
 
 use motorlink_proto::rmd::{CanFrame, ClearErrors, Command as _, Payload, Status1};
 use motorlink_proto::stmcp::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse};
@@ -6,42 +6,17 @@ use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::RmdConfig;
 
 use super::script::Cast;
-use super::signals::{rmd_values, st_values};
 use super::{Action, Target};
-use crate::sim::bench::{Bus, Station};
-use crate::sim::world;
+use crate::sim::drives::Drives;
 use crate::sim::{Command, ConfigError};
-
-/// What answers, and moves.
-#[derive(Debug)]
-pub(super) struct Drives {
-    st: Option<Station>,
-    rmd: Option<Bus>,
-}
 
 impl Drives {
     /// Powers the drives on at time 0.
-    pub(super) fn new(cast: &Cast) -> Result<Self, ConfigError> {
+    pub(in crate::sim) fn new(cast: &Cast) -> Result<Self, ConfigError> {
         let station = || cast.config.station(Instant(0));
         let bus = || cast.config.bus(Instant(0), RmdConfig::factory_rom);
         let (st, rmd) = (cast.st.then(station).transpose()?, cast.rmd.then(bus).transpose()?);
         Ok(Drives { st, rmd })
-    }
-
-    pub(super) fn advance_to(&mut self, now: Instant) {
-        if let Some(station) = &mut self.st {
-            station.advance_to(now);
-        }
-        if let Some(bus) = &mut self.rmd {
-            bus.advance_to(now);
-        }
-    }
-
-    /// Values of all signals, in the order of the motors and of the tables.
-    pub(super) fn values(&self) -> impl Iterator<Item = f64> {
-        let st = self.st.iter().flat_map(|station| station.drive().motors());
-        let rmd = self.rmd.iter().flat_map(|bus| bus.nodes());
-        st.flat_map(st_values).chain(rmd.flat_map(rmd_values))
     }
 
     /// Does what an event says. Gives how a drive refused it, if it did.
@@ -68,10 +43,9 @@ impl Drives {
         target: Target,
         command: &Command,
     ) -> Result<(), String> {
-        match (target, &mut self.st, &mut self.rmd) {
-            (Target::St(_), Some(station), _) => world::st(station, now, command),
-            (Target::Rmd(_), _, Some(bus)) => world::rmd(bus, now, command),
-            _ => Err(format!("there is no {target}")),
+        match target {
+            Target::St(_) => self.change_st(now, command),
+            Target::Rmd(_) => self.change_rmd(now, command),
         }
     }
 

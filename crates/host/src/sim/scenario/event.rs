@@ -8,12 +8,13 @@ use motorlink_proto::time::{Duration, Instant};
 use serde::de::DeserializeOwned;
 use toml::Table;
 
-use super::drives::{Drives, ERRORS, SILENT};
+use super::drives::{ERRORS, SILENT};
 use super::message::{RmdMessage, StMessage};
 use super::profile::LoadProfile;
 use super::script::Cast;
 use super::{Action, Event, Target, moment};
 use crate::sim::Command;
+use crate::sim::drives::Drives;
 
 /// What events are read against.
 pub(super) struct Reader<'a> {

@@ -19,7 +19,9 @@ use motorlink_proto::time::{Duration, Instant};
 
 pub use expect::Verdict;
 pub use run::{Mark, Refusal, Run};
+pub(super) use script::Cast;
 pub use signals::{Kind, Names, Signal, short};
+pub(super) use signals::{rmd_values, st_values};
 
 use super::Command;
 use expect::Expectation;
@@ -136,7 +138,7 @@ pub enum ScenarioError {
 }
 
 /// The place of a signal in the list.
-fn find_signal(name: &str, signals: &[Signal]) -> Result<usize, String> {
+pub(super) fn find_signal(name: &str, signals: &[Signal]) -> Result<usize, String> {
     signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
         let likeness = |signal: &&Signal| strsim::jaro_winkler(name, &signal.name);
         let nearest = signals.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));

@@ -5,12 +5,12 @@ use motorlink_proto::stmcp::Motor;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::hash;
 
-use super::drives::Drives;
 use super::event::load;
 use super::profile::LoadProfile;
 use super::run::Played;
 use super::signals::{RMD, ST, Signal};
 use super::{Event, Mark, Refusal, Target, seconds};
+use crate::sim::drives::Drives;
 use crate::sim::{BenchConfig, ConfigError};
 
 /// How often a load that changes all the time is set.
@@ -25,14 +25,14 @@ pub(super) struct Script {
     pub(super) loads: Vec<(Target, LoadProfile)>,
 }
 
-/// The drives that a scenario has.
+/// The drives that are there.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Cast {
-    pub(super) config: BenchConfig,
+pub(in crate::sim) struct Cast {
+    pub(in crate::sim) config: BenchConfig,
     /// Whether there is an ST drive.
-    pub(super) st: bool,
+    pub(in crate::sim) st: bool,
     /// Whether there is a bus of RMD motors.
-    pub(super) rmd: bool,
+    pub(in crate::sim) rmd: bool,
 }
 
 impl Cast {
@@ -47,7 +47,7 @@ impl Cast {
     }
 
     /// What can be looked at.
-    pub(super) fn signals(&self) -> Vec<Signal> {
+    pub(in crate::sim) fn signals(&self) -> Vec<Signal> {
         let of = |target: Target| -> Vec<Signal> {
             let name = target.to_string();
             match target {

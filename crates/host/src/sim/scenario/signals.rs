@@ -216,13 +216,13 @@ signals!(RMD, Rmd, |rmd| {
 });
 
 /// Values of an ST motor's signals, in the order of their table.
-pub(super) fn st_values(motor: &StMotor) -> impl Iterator<Item = f64> {
+pub(in crate::sim) fn st_values(motor: &StMotor) -> impl Iterator<Item = f64> {
     let truth = motor.truth();
     ST.iter().map(move |row| row.value(&truth))
 }
 
 /// Values of an RMD motor's signals, in the order of their table.
-pub(super) fn rmd_values(node: &RmdNode) -> impl Iterator<Item = f64> {
+pub(in crate::sim) fn rmd_values(node: &RmdNode) -> impl Iterator<Item = f64> {
     let truth = node.motor().truth();
     let rmd = Rmd { errors: node.drive().errors().union(truth.faults), truth };
     RMD.iter().map(move |row| row.value(&rmd))
