@@ -82,7 +82,10 @@ pub enum Command {
 
 impl Command {
     /// Reads a command that is written as JSON.
-    pub(super) fn read(text: &str) -> Result<Self, String> {
+    ///
+    /// # Errors
+    /// Why it is none.
+    pub fn read(text: &str) -> Result<Self, String> {
         serde_json::from_str(text).map_err(|error| format!("not a command: {error}"))
     }
 

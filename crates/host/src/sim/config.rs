@@ -102,6 +102,12 @@ impl BenchConfig {
         Self::from_file(toml::from_str(text).map_err(|error| ConfigError::Text(error.to_string()))?)
     }
 
+    /// Reads the same as JSON: an object with the members that a file has.
+    pub fn parse_json(text: &str) -> Result<Self, ConfigError> {
+        let file = serde_json::from_str(text);
+        Self::from_file(file.map_err(|error| ConfigError::Text(error.to_string()))?)
+    }
+
     /// Reads a file's table.
     pub(super) fn from_table(table: Table) -> Result<Self, ConfigError> {
         Self::from_file(
@@ -118,6 +124,16 @@ impl BenchConfig {
         config.station(Instant(0))?;
         config.bus(Instant(0), RmdConfig::factory_rom)?;
         Ok(config)
+    }
+
+    /// The same with other noise: that of `seed` for the first motor, of the next number for the next.
+    pub fn seeded(mut self, seed: u32) -> Self {
+        let st = self.st.0.iter_mut().map(|motor| &mut motor.plant.seed);
+        let rmd = self.rmd.0.iter_mut().map(|motor| &mut motor.plant.seed);
+        for (slot, n) in st.chain(rmd).zip(0..) {
+            *slot = seed.wrapping_add(n);
+        }
+        self
     }
 
     /// The ST drive, powered on `now`, to be advanced by the caller.
@@ -274,6 +290,24 @@ mod tests {
         assert_eq!((motor.id, motor.plant.machine.gear.ratio), (32, 6.0));
         assert_eq!(motor.plant.machine.pole_pairs, RmdConfig::x8().plant.machine.pole_pairs);
         assert!(motor.plant.supply.chopper.is_some());
+    }
+
+    #[test]
+    fn json_says_the_same() {
+        let toml =
+            "[[st.motor]]\npreset = \"servo\"\nplant.supply.voltage = 36\n[[rmd.motor]]\nid = 7";
+        let json = r#"{"st": {"motor": [{"preset": "servo", "plant": {"supply": {"voltage": 36}}}]},
+            "rmd": {"motor": [{"id": 7}]}}"#;
+        assert_eq!(BenchConfig::parse_json(json).unwrap(), BenchConfig::parse(toml).unwrap());
+        assert!(BenchConfig::parse_json(r#"{"st": 3}"#).is_err());
+    }
+
+    #[test]
+    fn each_motor_has_noise_of_its_own() {
+        let config = BenchConfig::default().seeded(u32::MAX);
+        let seeds: Vec<u32> = config.st.0.iter().map(|motor| motor.plant.seed).collect();
+        assert_eq!(seeds, [u32::MAX, 0]);
+        assert_eq!(config.rmd.0[3].plant.seed, 4);
     }
 
     #[test]

@@ -57,6 +57,11 @@ impl VirtualBench {
         Ok(VirtualBench { clock: Clock::standing(), stage, places, signals: cast.signals() })
     }
 
+    /// The bench's clock.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
     /// The bench's time.
     pub fn now(&self) -> Instant {
         self.clock.now()
