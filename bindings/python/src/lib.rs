@@ -9,6 +9,7 @@ mod error;
 mod number;
 mod rmd;
 mod sampling;
+mod sim;
 mod st;
 mod values;
 
@@ -23,6 +24,8 @@ mod _core {
 
     #[pymodule_export]
     use super::rmd::{RmdBus, RmdRequest, rmd_decode, rmd_errors_text, rmd_quantities};
+    #[pymodule_export]
+    use super::sim::{SimBench, SimPort, SimRecording, SimServing, sim_presets, sim_run};
     #[pymodule_export]
     use super::st::{
         StClient, StRequest, st_flags_text, st_register, st_register_name, st_registers,

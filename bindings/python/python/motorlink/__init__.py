@@ -7,11 +7,12 @@
 ...     motor.read("SPEED_MEAS")
 0
 
-``motorlink.st`` and ``motorlink.rmd`` are the two protocols. What goes wrong is a
+``motorlink.st`` and ``motorlink.rmd`` are the two protocols, ``motorlink.sim`` is drives for a program
+without hardware. What goes wrong is a
 :class:`MotorlinkError`. Nothing here has a thread of its own; buses may be shared between threads.
 """
 
-from motorlink import _core, errors, rmd, st
+from motorlink import _core, errors, rmd, sim, st
 from motorlink._sampling import to_pandas
 from motorlink.errors import (
     BadValue,
@@ -36,6 +37,7 @@ __all__ = [
     "__version__",
     "errors",
     "rmd",
+    "sim",
     "st",
     "to_pandas",
 ]

@@ -121,7 +121,7 @@ class StClient:
 
     @staticmethod
     def open(
-        port: str,
+        port: str | SimPort,
         *,
         profile: str = "spec",
         timeout: float = 1.0,
@@ -222,7 +222,7 @@ class RmdBus:
 
     @staticmethod
     def open(
-        port: str,
+        port: str | SimPort,
         *,
         timeout: float = 0.05,
         guard: float = 0.1,
@@ -259,3 +259,57 @@ class RmdBus:
     def is_closed(self) -> bool: ...
     @property
     def port(self) -> str: ...
+
+@final
+class SimBench:
+    """An ST drive and a bus of RMD motors on virtual time."""
+
+    def __new__(
+        cls,
+        *,
+        toml: str = "",
+        json: str | None = None,
+        path: str | None = None,
+        seed: int | None = None,
+    ) -> SimBench: ...
+    def port(self, fault: str | None = None) -> SimPort: ...
+    @property
+    def now(self) -> float: ...
+    def run(self, seconds: float) -> None: ...
+    def execute(self, command: str) -> str: ...
+    @property
+    def signals(self) -> list[tuple[str, str]]: ...
+    def values(self) -> list[float]: ...
+    def truth(self, motor: str) -> dict[str, Any]: ...
+    def record(self, signals: list[str], every: float) -> SimRecording: ...
+    @property
+    def state_hash(self) -> int: ...
+    def serve(self, *, st: str | None = None, rmd: str | None = None) -> SimServing: ...
+
+@final
+class SimPort:
+    """The line and the bus of a bench, with faults."""
+
+@final
+class SimRecording:
+    """Signals that are written down while time passes."""
+
+    @property
+    def began(self) -> int: ...
+    @property
+    def every(self) -> int: ...
+    def take(self) -> bytearray: ...
+    def end(self) -> None: ...
+
+@final
+class SimServing:
+    """Ports on which a bench is served until it ends."""
+
+    @property
+    def st(self) -> tuple[str, str] | None: ...
+    @property
+    def rmd(self) -> tuple[str, str] | None: ...
+    def end(self) -> None: ...
+
+def sim_run(text: str, path: str | None = None) -> dict[str, Any]: ...
+def sim_presets() -> str: ...

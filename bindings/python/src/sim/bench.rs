@@ -1,0 +1,186 @@
+//! Drives on virtual time.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant as Moment;
+
+use motorlink::sim::scenario::Kind;
+use motorlink::sim::{BenchConfig, Command, Recording, VirtualBench};
+use motorlink_proto::time::{Duration, Instant};
+use pyo3::prelude::*;
+use pyo3::types::{PyByteArray, PyDict};
+
+use super::bytes;
+use super::port::SimPort;
+use super::serving::SimServing;
+use crate::error::bad_value;
+use crate::number::digits;
+
+/// How much time passes before the machine's is looked at.
+const SLICE: Duration = Duration::from_millis(20);
+/// How long signals wait: Ctrl-C is one.
+const LOOK: std::time::Duration = std::time::Duration::from_millis(20);
+
+/// An ST drive and a bus of RMD motors, whose time passes when it is waited for.
+#[pyclass(frozen, module = "motorlink._core")]
+pub(crate) struct SimBench(Arc<VirtualBench>);
+
+#[pymethods]
+impl SimBench {
+    /// A bench of a configuration: `toml` or `json` text, or the `path` of a TOML file.
+    #[new]
+    #[pyo3(signature = (*, toml = "", json = None, path = None, seed = None))]
+    fn new(
+        py: Python<'_>,
+        toml: &str,
+        json: Option<&str>,
+        path: Option<PathBuf>,
+        seed: Option<u32>,
+    ) -> PyResult<Self> {
+        let config = match (json, path) {
+            (Some(json), _) => BenchConfig::parse_json(json),
+            (None, Some(path)) => BenchConfig::read(&path),
+            (None, None) => BenchConfig::parse(toml),
+        };
+        let config = config.map(|config| match seed {
+            Some(seed) => config.seeded(seed),
+            None => config,
+        });
+        let bench = config.and_then(|config| VirtualBench::new(&config));
+        Ok(SimBench(Arc::new(bench.map_err(|error| bad_value(py, error))?)))
+    }
+
+    /// The bench as a port, with faults.
+    #[pyo3(signature = (fault = None))]
+    fn port(&self, fault: Option<String>) -> SimPort {
+        SimPort { bench: Arc::clone(&self.0), fault }
+    }
+
+    /// The time, s.
+    #[getter]
+    fn now(&self) -> f64 {
+        self.0.now().0 as f64 / 1e6
+    }
+
+    /// Lets time pass, s; a signal ends it.
+    fn run(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let span = microseconds(py, "a time", seconds)?;
+        let end = self.0.now() + span;
+        while py.detach(|| self.advance(end)) {
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+
+    /// Executes a command that is written as JSON; gives the answer as JSON.
+    fn execute(&self, py: Python<'_>, command: &str) -> PyResult<String> {
+        let answer = Command::read(command).and_then(|command| self.0.execute(&command));
+        answer.map(|answer| answer.to_string()).map_err(|why| bad_value(py, why))
+    }
+
+    /// Names and units of all signals, motor by motor.
+    #[getter]
+    fn signals(&self) -> Vec<(&str, &'static str)> {
+        let signals = self.0.signals().iter();
+        signals.map(|signal| (signal.name.as_str(), signal.kind.unit())).collect()
+    }
+
+    /// The values of all signals, in their order.
+    fn values(&self, py: Python<'_>) -> Vec<f64> {
+        py.detach(|| self.0.values())
+    }
+
+    /// The values of a motor's signals, with names where values have some.
+    fn truth<'py>(&self, py: Python<'py>, motor: &str) -> PyResult<Bound<'py, PyDict>> {
+        let truth = PyDict::new(py);
+        for (signal, value) in self.0.signals().iter().zip(self.values(py)) {
+            let Some((of, name)) = signal.name.split_once('.').filter(|(of, _)| *of == motor)
+            else {
+                continue;
+            };
+            debug_assert_eq!(of, motor);
+            match signal.kind {
+                Kind::Number { .. } => truth.set_item(name, value)?,
+                Kind::Named(names) => truth.set_item(name, names.name(value as u8))?,
+            }
+        }
+        Ok(truth)
+    }
+
+    /// Writes signals down from now on, every so many s.
+    fn record(&self, py: Python<'_>, signals: Vec<String>, every: f64) -> PyResult<SimRecording> {
+        let signals: Vec<&str> = signals.iter().map(String::as_str).collect();
+        let every = microseconds(py, "a distance of samples", every)?;
+        let recording = py.detach(|| self.0.record(&signals, every));
+        let recording = recording.map_err(|why| bad_value(py, why))?;
+        let (began, every) = (recording.began().0, recording.every().0);
+        Ok(SimRecording { recording: Mutex::new(Some(recording)), began, every })
+    }
+
+    /// A fingerprint of the state of all drives.
+    #[getter]
+    fn state_hash(&self, py: Python<'_>) -> u64 {
+        py.detach(|| self.0.state_hash())
+    }
+
+    /// Serves the drives on ports, on real time.
+    #[pyo3(signature = (*, st = None, rmd = None))]
+    fn serve(&self, py: Python<'_>, st: Option<&str>, rmd: Option<&str>) -> PyResult<SimServing> {
+        SimServing::new(py, &self.0, st, rmd)
+    }
+}
+
+impl SimBench {
+    /// Lets time pass until `end`, though not for longer than signals wait; whether some is left.
+    fn advance(&self, end: Instant) -> bool {
+        let began = Moment::now();
+        loop {
+            let left = end.since(self.0.now());
+            if left == Duration(0) || began.elapsed() > LOOK {
+                return left > Duration(0);
+            }
+            self.0.run(left.min(SLICE));
+        }
+    }
+}
+
+/// A time in s, up to a day.
+fn microseconds(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Duration> {
+    const DAY: u64 = 86_400_000_000;
+    let span = digits(py, what, seconds, 1e-6, "s").ok().filter(|span: &u64| *span <= DAY);
+    span.map(Duration).ok_or_else(|| {
+        bad_value(py, format_args!("{what} of {seconds} s: give 0 to 86400 s, a day"))
+    })
+}
+
+/// Signals that are written down while time passes.
+#[pyclass(frozen, module = "motorlink._core")]
+pub(crate) struct SimRecording {
+    recording: Mutex<Option<Recording>>,
+    /// When the first sample was taken, µs.
+    #[pyo3(get)]
+    began: u64,
+    /// From sample to sample, µs.
+    #[pyo3(get)]
+    every: u64,
+}
+
+#[pymethods]
+impl SimRecording {
+    /// What was written since the last call, as `float64` in the machine's order: sample by sample.
+    fn take<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
+        let rows = py.detach(|| self.lock().as_ref().map(Recording::take));
+        bytes(py, rows.as_deref().unwrap_or(&[]))
+    }
+
+    /// Ends it. Again is no error.
+    fn end(&self) {
+        drop(self.lock().take());
+    }
+}
+
+impl SimRecording {
+    fn lock(&self) -> MutexGuard<'_, Option<Recording>> {
+        self.recording.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

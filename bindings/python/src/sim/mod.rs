@@ -1,0 +1,33 @@
+//! Simulated drives in the process.
+
+mod bench;
+mod port;
+mod scenario;
+mod serving;
+
+pub(crate) use bench::{SimBench, SimRecording};
+pub(crate) use port::{Port, SimPort};
+pub(crate) use scenario::sim_run;
+pub(crate) use serving::SimServing;
+
+use motorlink::sim::preset;
+use pyo3::prelude::*;
+use pyo3::types::PyByteArray;
+
+use crate::error::bad_value;
+
+/// The presets as JSON, by name. Numbers have the fewest digits that say which is meant.
+#[pyfunction]
+pub(crate) fn sim_presets(py: Python<'_>) -> PyResult<String> {
+    let presets = preset::ALL.iter().map(|(name, config)| {
+        let plant = serde_json::to_string(&config());
+        Ok(format!("{name:?}:{}", plant.map_err(|error| bad_value(py, error))?))
+    });
+    Ok(format!("{{{}}}", presets.collect::<PyResult<Vec<_>>>()?.join(",")))
+}
+
+/// Numbers as `float64` in the machine's order, for NumPy to take without a copy.
+fn bytes<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyByteArray> {
+    let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
+    PyByteArray::new(py, &bytes)
+}

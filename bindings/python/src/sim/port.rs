@@ -1,0 +1,68 @@
+//! A bench as a port.
+
+use std::sync::Arc;
+
+use motorlink::Clock;
+use motorlink::fault::{FaultError, Faults};
+use motorlink::port::{ByteLink, CanLink};
+use motorlink::sim::VirtualBench;
+use motorlink_proto::time::Instant;
+use pyo3::prelude::*;
+
+use crate::clock;
+use crate::error::bad_value;
+
+/// What is opened.
+#[derive(FromPyObject)]
+pub(crate) enum Port<'py> {
+    /// A port by its name.
+    Name(String),
+    /// One of a bench.
+    Sim(PyRef<'py, SimPort>),
+}
+
+/// The line and the bus of a bench, with faults.
+#[pyclass(frozen, module = "motorlink._core")]
+pub(crate) struct SimPort {
+    pub(super) bench: Arc<VirtualBench>,
+    pub(super) fault: Option<String>,
+}
+
+impl SimPort {
+    /// What messages call it.
+    pub(crate) const NAME: &'static str = "the bench";
+
+    /// A serial line to the ST drive.
+    pub(crate) fn line(&self, py: Python<'_>) -> PyResult<Box<dyn ByteLink>> {
+        Ok(self.bench.line(&self.faults(py, Faults::on_serial)?))
+    }
+
+    /// A CAN bus with the RMD motors.
+    pub(crate) fn can(&self, py: Python<'_>) -> PyResult<Box<dyn CanLink>> {
+        Ok(self.bench.can(&self.faults(py, Faults::on_can)?))
+    }
+
+    /// The time that passes on it.
+    pub(crate) fn clock(&self) -> Arc<dyn clock::Clock> {
+        Arc::new(self.bench.clock().clone())
+    }
+
+    fn faults(
+        &self,
+        py: Python<'_>,
+        usable: fn(Faults) -> Result<Faults, FaultError>,
+    ) -> PyResult<Faults> {
+        let faults = self.fault.as_ref().map(|text| text.parse().and_then(usable)).transpose();
+        Ok(faults.map_err(|error| bad_value(py, error))?.unwrap_or(Faults::NONE))
+    }
+}
+
+impl clock::Clock for Clock {
+    fn now(&self) -> std::time::Duration {
+        self.now().since(Instant(0)).into()
+    }
+
+    fn pass(&self, span: std::time::Duration) {
+        self.wait(self.now() + span.into());
+    }
+}

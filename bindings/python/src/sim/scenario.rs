@@ -1,0 +1,73 @@
+//! Playing a scenario.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
+
+use motorlink::sim::scenario::{Run, Scenario};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::bytes;
+use crate::error::bad_value;
+
+/// How long signals wait: Ctrl-C is one.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Plays a scenario, from its text or from a file, to its end; gives what came of it.
+#[pyfunction]
+#[pyo3(signature = (text, path = None))]
+pub(crate) fn sim_run<'py>(
+    py: Python<'py>,
+    text: &str,
+    path: Option<PathBuf>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let scenario = match path {
+        Some(path) => Scenario::read(&path).map_err(|error| bad_value(py, error))?,
+        None => Scenario::parse(text, Path::new("")).map_err(|why| bad_value(py, why))?,
+    };
+    let (title, about) = (scenario.title.clone(), scenario.about.clone());
+    let (tell, mut told) = mpsc::channel();
+    // After a signal nobody waits for what it tells.
+    std::thread::spawn(move || drop(tell.send(scenario.run())));
+    let run = loop {
+        let heard;
+        (heard, told) = py.detach(move || (told.recv_timeout(LOOK), told));
+        match heard {
+            Ok(run) => break run.map_err(|error| bad_value(py, error))?,
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => return Err(bad_value(py, "the run failed")),
+        }
+    };
+    let told = PyDict::new(py);
+    told.set_item("title", title)?;
+    told.set_item("about", about)?;
+    fill(&told, &run)?;
+    Ok(told)
+}
+
+fn fill(told: &Bound<'_, PyDict>, run: &Run) -> PyResult<()> {
+    let py = told.py();
+    let signals = run.signals.iter().map(|signal| (signal.name.as_str(), signal.kind.unit()));
+    told.set_item("signals", signals.collect::<Vec<_>>())?;
+    let columns = run.columns.iter().map(|column| bytes(py, column));
+    told.set_item("columns", columns.collect::<Vec<_>>())?;
+    told.set_item("sample", run.sample.0)?;
+    let verdicts = run.verdicts.iter().map(|one| (&one.why, &one.signal, one.holds, &one.found));
+    told.set_item("expectations", verdicts.collect::<Vec<_>>())?;
+    let refusals = run.refusals.iter().map(|one| {
+        (
+            one.at,
+            &one.motor,
+            &one.event,
+            one.reply.as_ref(),
+            one.announced.as_ref(),
+            one.to_string(),
+        )
+    });
+    told.set_item("refusals", refusals.collect::<Vec<_>>())?;
+    let marks = run.marks.iter().map(|mark| (mark.at, &mark.label));
+    told.set_item("marks", marks.collect::<Vec<_>>())?;
+    told.set_item("state_hash", run.state_hash)?;
+    told.set_item("as_expected", run.as_expected())
+}
