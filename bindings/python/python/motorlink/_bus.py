@@ -5,12 +5,28 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable
+from typing import Protocol, Union
 
+from motorlink import _core
 from motorlink.errors import BadValue, LineLost, MotorlinkError
 
-def port_name(port: str | os.PathLike[str]) -> str:
-    """The port as the library names it."""
-    return os.fspath(port)
+class HasPort(Protocol):
+    """What is a port without a name, such as a bench of ``motorlink.sim``."""
+
+    @property
+    def _port(self) -> _core.SimPort: ...
+
+
+Port = Union[str, "os.PathLike[str]", HasPort]
+
+
+def opened(port: Port) -> str | _core.SimPort:
+    """What the extension opens: a name, or a port that has none."""
+    if isinstance(port, (str, os.PathLike)):
+        return os.fspath(port)
+    if not hasattr(port, "_port"):
+        raise TypeError(f"{port!r} is no port: give a name, a path or a bench")
+    return port._port
 
 
 def on_close_checked(on_close: str, known: tuple[str, ...]) -> str:

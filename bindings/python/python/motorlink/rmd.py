@@ -21,13 +21,12 @@ Names in brackets are paragraphs of chapter 3 of the document, or codes of comma
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import end, on_close_checked, port_name
+from motorlink._bus import Port, end, on_close_checked, opened
 from motorlink._core import RmdRequest as Request
 from motorlink._sampling import Samples, array, columns, skips
 from motorlink._values import (
@@ -90,7 +89,7 @@ read_angle = Request.read_angle
 
 
 def open(
-    port: str | os.PathLike[str],
+    port: Port,
     *,
     timeout: float = 0.05,
     guard: float = 0.1,
@@ -119,7 +118,7 @@ def open(
     """
     on_close_checked(on_close, _ON_CLOSE)
     core = _core.RmdBus.open(
-        port_name(port),
+        opened(port),
         timeout=timeout,
         guard=guard,
         current_limit_a=current_limit,

@@ -24,13 +24,12 @@ exchange under way is over, after ``timeout`` at the latest unless the line is b
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import end, on_close_checked, port_name
+from motorlink._bus import Port, end, on_close_checked, opened
 from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
 from motorlink._sampling import Samples, array, columns, skips
@@ -64,7 +63,7 @@ _ON_CLOSE = ("stop", "nothing")
 
 
 def open(
-    port: str | os.PathLike[str],
+    port: Port,
     *,
     profile: str = "spec",
     timeout: float = 1.0,
@@ -99,7 +98,7 @@ def open(
     """
     on_close_checked(on_close, _ON_CLOSE)
     client = _core.StClient.open(
-        port_name(port),
+        opened(port),
         profile=profile,
         timeout=timeout,
         recovery=recovery,

@@ -18,6 +18,7 @@ use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, closed, rmd_error};
 use crate::number::{limit, span};
 use crate::sampling::Plan;
+use crate::sim::{Port, SimPort};
 use crate::values;
 
 /// IDs that are asked before signals are looked at.
@@ -54,7 +55,7 @@ impl RmdBus {
     ))]
     fn open(
         py: Python<'_>,
-        port: &str,
+        port: Port<'_>,
         timeout: f64,
         guard: f64,
         current_limit_a: Option<f64>,
@@ -63,10 +64,19 @@ impl RmdBus {
     ) -> PyResult<Self> {
         let limits = limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?;
         let options = options(py, timeout, guard, limits)?;
-        let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
-        let bus = py.detach(|| Bus::open(&name, options));
-        let bus = Arc::new(bus.map_err(|error| rmd_error(py, &error))?);
-        Ok(Self::from_bus(bus, name.to_string(), Arc::new(RealTime::new())))
+        let (bus, name, clock): (_, _, Arc<dyn Clock>) = match port {
+            Port::Name(name) => {
+                let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
+                let bus = py.detach(|| Bus::open(&name, options));
+                let bus = bus.map_err(|error| rmd_error(py, &error))?;
+                (bus, name.to_string(), Arc::new(RealTime::new()))
+            }
+            Port::Sim(port) => {
+                let bus = Bus::over(SimPort::NAME, port.can(py)?, options);
+                (bus, SimPort::NAME.to_owned(), port.clock())
+            }
+        };
+        Ok(Self::from_bus(Arc::new(bus), name, clock))
     }
 
     /// One exchange; gives what the request makes of the reply.

@@ -14,6 +14,7 @@ use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, closed, st_error};
 use crate::number::{limit, span};
 use crate::sampling::Plan;
+use crate::sim::{Port, SimPort};
 
 /// A master on a serial line. Every call lets other Python threads run while it waits.
 #[pyclass(frozen, module = "motorlink._core")]
@@ -46,7 +47,7 @@ impl StClient {
     ))]
     fn open(
         py: Python<'_>,
-        port: &str,
+        port: Port<'_>,
         profile: &str,
         timeout: f64,
         recovery: &str,
@@ -57,10 +58,19 @@ impl StClient {
         let scale = Scale::new(py, profile, full_scale_amps)?;
         let limits = limits(py, scale, speed_limit, current_limit)?;
         let options = options(py, scale.profile, timeout, recovery, limits)?;
-        let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
-        let client = py.detach(|| Client::open(&name, options));
-        let client = Arc::new(client.map_err(|error| st_error(py, &error))?);
-        Ok(Self::from_client(client, name.to_string(), Arc::new(RealTime::new())))
+        let (client, name, clock): (_, _, Arc<dyn Clock>) = match port {
+            Port::Name(name) => {
+                let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
+                let client = py.detach(|| Client::open(&name, options));
+                let client = client.map_err(|error| st_error(py, &error))?;
+                (client, name.to_string(), Arc::new(RealTime::new()))
+            }
+            Port::Sim(port) => {
+                let client = Client::over(SimPort::NAME, port.line(py)?, options);
+                (client, SimPort::NAME.to_owned(), port.clock())
+            }
+        };
+        Ok(Self::from_client(Arc::new(client), name, clock))
     }
 
     /// One exchange; gives what the request makes of the reply.
