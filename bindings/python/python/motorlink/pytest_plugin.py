@@ -1,0 +1,94 @@
+"""Fixtures for pytest: a user's own code against simulated drives. Installed with the package.
+
+::
+
+    import motorlink
+    import pytest
+    from my_robot import Arm                       # opens its drive with motorlink.st.open(port)
+
+    @pytest.mark.motorlink("[[st.motor]]\\npreset = 'servo'")
+    def test_the_arm_stops_when_it_jams(motorlink_bench):
+        arm = Arm(motorlink_bench)                 # a bench is a port
+        arm.lift()
+        motorlink_bench.lock_rotor("st1")
+        motorlink_bench.run(2.0)                   # s; over at once
+        assert motorlink_bench.truth("st1")["status"] == "IDLE"
+
+``motorlink_bench``
+    A fresh :class:`motorlink.sim.Bench` on virtual time.
+``motorlink_time``
+    While the test runs, ``time.sleep`` and the clocks of ``time`` go by that bench
+    (:meth:`~motorlink.sim.Bench.patch_time`): for code that sleeps.
+``motorlink_ports``
+    That bench on ptys in ``tmp_path``, on real time, for code that opens ports by their names:
+    :class:`motorlink.sim.Serving`, ``ports.st`` and ``ports.rmd``.
+
+The marker ``motorlink(config, *, seed, fault)`` has the arguments of the bench; the path of a file is
+relative to the test's. Tests without it have what ``motorlink_config`` in pytest's configuration says,
+relative to that file, and otherwise the default bench.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+# What they have is imported with the first fixture: most runs of pytest need none.
+if TYPE_CHECKING:
+    from motorlink.sim import Bench, Serving
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Adds ``motorlink_config`` to pytest's configuration file."""
+    about = "configuration of motorlink_bench: a TOML file, or its text"
+    parser.addini("motorlink_config", about, default="")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Registers the marker."""
+    about = "motorlink(config, *, seed, fault): what the test's motorlink_bench is"
+    config.addinivalue_line("markers", about)
+
+
+@pytest.fixture
+def motorlink_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    """Simulated drives on virtual time, fresh for this test."""
+    from motorlink.sim import Bench
+
+    marker = request.node.get_closest_marker("motorlink")
+    if marker is None:
+        inifile = request.config.inipath
+        folder = request.config.rootpath if inifile is None else inifile.parent
+        bench = Bench(_beside(folder, request.config.getini("motorlink_config")))
+    else:
+        config, *others = marker.args or (None,)
+        bench = Bench(_beside(request.path.parent, config), *others, **marker.kwargs)
+    with bench:
+        yield bench
+
+
+@pytest.fixture
+def motorlink_time(motorlink_bench: Bench) -> Iterator[None]:
+    """``time.sleep`` and the clocks of ``time`` go by ``motorlink_bench``."""
+    with motorlink_bench.patch_time():
+        yield
+
+
+@pytest.fixture
+def motorlink_ports(motorlink_bench: Bench, tmp_path: Path) -> Iterator[Serving]:
+    """``motorlink_bench`` on ptys, on real time."""
+    names = {"st": f"pty:{tmp_path}/st0", "rmd": f"slcan-pty:{tmp_path}/can0"}
+    with motorlink_bench.serve(**names) as ports:
+        yield ports
+
+
+def _beside(folder: Path, config: Any) -> Any:
+    """A path is relative to ``folder``; everything else is as it is."""
+    is_text = isinstance(config, str) and (not config or "=" in config or "\n" in config)
+    if is_text or not isinstance(config, (str, os.PathLike)):
+        return config
+    return folder / config
