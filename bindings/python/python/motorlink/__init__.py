@@ -8,23 +8,14 @@
 0
 
 ``motorlink.st`` and ``motorlink.rmd`` are the two protocols, ``motorlink.sim`` is drives for a program
-without hardware. What goes wrong is a
-:class:`MotorlinkError`. Nothing here has a thread of its own; buses may be shared between threads.
+without hardware. What goes wrong is a :class:`MotorlinkError`. Buses have no thread of their own, and
+may be shared between threads.
 """
 
-from motorlink import _core, errors, rmd, sim, st
-from motorlink._sampling import to_pandas
-from motorlink.errors import (
-    BadValue,
-    Closed,
-    LineLost,
-    MotorlinkError,
-    PortError,
-    Refused,
-    Timeout,
-)
+from __future__ import annotations
 
-__version__: str = _core.__version__
+import importlib
+from typing import TYPE_CHECKING, Any
 
 __all__ = [
     "BadValue",
@@ -41,3 +32,31 @@ __all__ = [
     "st",
     "to_pandas",
 ]
+
+if TYPE_CHECKING:
+    from motorlink import errors, rmd, sim, st
+    from motorlink._core import __version__
+    from motorlink._sampling import to_pandas
+    from motorlink.errors import (
+        BadValue,
+        Closed,
+        LineLost,
+        MotorlinkError,
+        PortError,
+        Refused,
+        Timeout,
+    )
+else:
+    _FROM = {"__version__": "motorlink._core", "to_pandas": "motorlink._sampling"}
+
+    def __getattr__(name: str) -> Any:
+        """A part, loaded when it is first used: the command and pytest's plugin need no NumPy."""
+        if name in ("errors", "rmd", "sim", "st"):
+            return importlib.import_module(f"motorlink.{name}")
+        if name not in __all__:
+            raise AttributeError(f"module 'motorlink' has no attribute {name!r}")
+        part = importlib.import_module(_FROM.get(name, "motorlink.errors"))
+        return getattr(part, name)
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__})

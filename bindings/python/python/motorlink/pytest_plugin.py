@@ -30,7 +30,6 @@ relative to that file, and otherwise the default bench.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -88,7 +87,6 @@ def motorlink_ports(motorlink_bench: Bench, tmp_path: Path) -> Iterator[Serving]
 
 def _beside(folder: Path, config: Any) -> Any:
     """A path is relative to ``folder``; everything else is as it is."""
-    is_text = isinstance(config, str) and (not config or "=" in config or "\n" in config)
-    if is_text or not isinstance(config, (str, os.PathLike)):
-        return config
-    return folder / config
+    from motorlink.sim import is_path
+
+    return folder / config if is_path(config) else config

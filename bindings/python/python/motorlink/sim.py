@@ -59,8 +59,8 @@ Source = Union[str, "os.PathLike[str]"]
 class Bench:
     """An ST drive on a serial line and RMD motors on a CAN bus, on virtual time.
 
-    ``config``: what there is. TOML text, the path of a TOML file (a ``str`` with a line break or a
-    ``=`` is text), or the same as a ``dict``. Without it there are two ST motors and RMD motors 1 to 4.
+    ``config``: what there is. TOML text, the path of a TOML file (a ``str`` with a ``[``, a ``=`` or a
+    line break is text), or the same as a ``dict``. Without it there are two ST motors and RMD motors 1 to 4.
 
     ``seed``: of the noise in the sensors; without it, as the configuration says. ``fault``: what the
     lines of this bench do, in the words of ``motorlink --fault``, such as ``"drop=1e-3,seed=7"``.
@@ -87,7 +87,7 @@ class Bench:
         if isinstance(config, Mapping):
             self._core = _core.SimBench(json=json.dumps(config), seed=seed)
         else:
-            text, path = _text_or_path(config)
+            text, path = _text_or_path("" if config is None else config)
             self._core = _core.SimBench(toml=text, path=path, seed=seed)
         self._port = self._core.port(fault)
         self._st: st.Bus | None = None
@@ -162,8 +162,9 @@ class Bench:
             origin = real() - self.now
             return here(lambda: origin + self.now, real)
 
-        clocks = {name: clock(getattr(time, name)) for name in ("monotonic", "perf_counter", "time")}
-        with mock.patch.multiple(time, sleep=here(self.run, time.sleep), **clocks):
+        clocks = ("monotonic", "perf_counter", "time")
+        patched: dict[str, Any] = {name: clock(getattr(time, name)) for name in clocks}
+        with mock.patch.multiple(time, sleep=here(self.run, time.sleep), **patched):
             yield
 
     # The world around the motors
@@ -353,7 +354,7 @@ class Recording:
     def data(self) -> Samples:
         """What was written down so far, as :meth:`Bench.record` gives it."""
         self._raw += self._core.take()
-        rows = np.frombuffer(self._raw, "f8").reshape(-1, len(self._dtype) - 1)
+        rows = np.frombuffer(self._raw, "f8").reshape(-1, len(self._dtype.names or ()) - 1)
         times = self._core.every * np.arange(len(rows)) / 1e6
         return _structured(self._dtype, times, rows.T)
 
@@ -482,7 +483,7 @@ class Run:
 def run(scenario: Source) -> Run:
     """Plays a scenario (docs/SCENARIOS.md): TOML text, or the path of a file.
 
-    A ``str`` with a line break or a ``=`` is text; files that it names are looked for in the working
+    A ``str`` with a ``[``, a ``=`` or a line break is text; files that it names are looked for in the working
     directory. Raises :class:`~motorlink.BadValue` where it says what cannot be.
 
     >>> told = run('''
@@ -542,13 +543,15 @@ def _structured(dtype: np.dtype[Any], times: Any, columns: Any) -> Samples:
     return samples
 
 
-def _text_or_path(source: Source | None) -> tuple[str, str | None]:
+def is_path(source: Any) -> bool:
+    """Whether a configuration or scenario is the path of a file, not the text itself."""
+    is_text = isinstance(source, str) and (not source or re.search(r"[=\[\n]", source))
+    return isinstance(source, (str, os.PathLike)) and not is_text
+
+
+def _text_or_path(source: Source) -> tuple[str, str | None]:
     """TOML text, or the path of a file."""
-    if source is None:
-        return "", None
-    if isinstance(source, str) and (not source or "=" in source or "\n" in source):
-        return source, None
-    return "", os.fspath(source)
+    return ("", os.fspath(source)) if is_path(source) else (str(source), None)
 
 
 def _opened(served: tuple[str, str] | None, line: str) -> tuple[str, str]:

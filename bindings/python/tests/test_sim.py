@@ -1,0 +1,409 @@
+"""Benches on virtual time: that time passes as it says, the same each time, and that the world acts."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import motorlink
+from motorlink import sim
+
+SERVO = "[[st.motor]]\npreset = 'servo'"
+SCENARIOS = Path(__file__).parents[3] / "scenarios"
+
+
+def started(bench: sim.Bench, rpm: float = 1000) -> motorlink.st.Motor:
+    """The bench's first ST motor at a speed."""
+    motor = bench.st.motor(1)
+    motor.ramp(rpm, 0.2)
+    motor.start()
+    bench.run(3.0)
+    return motor
+
+
+def test_time_passes_only_when_it_is_waited_for() -> None:
+    bench = sim.Bench()
+    assert bench.now == 0.0
+    bench.st.motor(1).status
+    assert bench.now == pytest.approx(8 * 87e-6)  # eight bytes at 115200 baud
+    before = bench.now
+    bench.rmd.torque4(0, 0, 0, 0)
+    assert bench.now - before == pytest.approx(5 * 125e-6)  # a frame there, four back
+    bench.run(0.25)
+    assert bench.now == pytest.approx(before + 5 * 125e-6 + 0.25)
+    bench.run(0)
+    for seconds in (-1, float("nan"), 1e6):
+        with pytest.raises(motorlink.BadValue, match="0 to 86400 s"):
+            bench.run(seconds)
+
+
+def test_a_minute_of_timeouts_takes_less_than_that() -> None:
+    bench = sim.Bench()
+    began = time.monotonic()
+    with motorlink.st.open(bench.port(fault="drop=1"), timeout=10, on_close="nothing") as bus:
+        for _ in range(6):
+            with pytest.raises(motorlink.MotorlinkError):
+                bus.motor(1).read("SPEED_MEAS")
+    assert bench.now > 60
+    assert time.monotonic() - began < bench.now / 2
+
+
+def test_the_same_program_gives_the_same_run_and_another_seed_another() -> None:
+    def run(seed: int, fault: str) -> tuple[list[Any], bytes, str]:
+        bench = sim.Bench(SERVO, seed=seed, fault=fault)
+        told: list[Any] = []
+        with bench.recording(["st1.speed_rpm", "rmd2.iq_amps"], every=0.01) as recording:
+            for n in range(60):
+                try:
+                    motor = bench.st.motor(1)
+                    if n == 1:
+                        motor.start()
+                    told.append(motor.read("SPEED_MEAS"))
+                    told.append(bench.rmd.motor(2).speed(90 + n))
+                except motorlink.MotorlinkError as error:
+                    told.append(str(error))
+                bench.run(0.02)
+        return told, recording.data.tobytes(), bench.state_hash
+
+    first = run(1, "drop=5e-3,seed=2")
+    assert first == run(1, "drop=5e-3,seed=2")
+    assert any(isinstance(answer, str) for answer in first[0])
+    assert first[1] != run(2, "drop=5e-3,seed=2")[1]
+    assert first[0] != run(1, "drop=5e-3,seed=3")[0]
+
+
+def test_configurations_are_text_a_file_or_a_dict(tmp_path: Path) -> None:
+    text = "[[st.motor]]\npreset = 'shinano'\n[[rmd.motor]]\nid = 7\n"
+    file = tmp_path / "bench.toml"
+    file.write_text(text)
+    named = {"st": {"motor": [{"preset": "shinano"}]}, "rmd": {"motor": [{"id": 7}]}}
+    hashes = set()
+    for config in (text, file, str(file), named):
+        bench = sim.Bench(config)
+        assert bench.motors == ("st1", "rmd7")
+        hashes.add(bench.state_hash)
+    assert len(hashes) == 1
+    with pytest.raises(motorlink.BadValue, match="nowhere.toml"):
+        sim.Bench(tmp_path / "nowhere.toml")
+    file.write_text("[[rmd.motor]]\nid = 33")
+    with pytest.raises(motorlink.BadValue, match=r"bench\.toml: rmd\.motor 1: .*1 to 32"):
+        sim.Bench(file)
+
+
+def test_a_load_brakes_and_a_push_turns() -> None:
+    bench = sim.Bench(SERVO)
+    started(bench)
+    free = bench.truth("st1")["iq_amps"]
+    bench.brake("st1", 0.1)
+    bench.run(1.0)
+    truth = bench.truth("st1")
+    assert truth["speed_rpm"] == pytest.approx(1000, abs=20)
+    assert truth["iq_amps"] > 2 * free
+    bench.push("rmd1", -0.2)
+    bench.run(0.5)
+    assert bench.truth("rmd1")["speed_dps"] < -100
+
+
+def test_faults_temperatures_supplies_and_power_cycles() -> None:
+    bench = sim.Bench(SERVO)
+    motor = bench.st.motor(1)
+    bench.temperature("st1", 60)
+    bench.supply("rmd3", 5)
+    bench.inject("st1", "BREAK_IN", hold=True)
+    bench.run(1.0)
+    assert motor.read("HEATS_TEMP") == 60
+    assert (motor.status, motor.faults.present) == ("FAULT_NOW", ("BREAK_IN",))
+    assert bench.truth("st1")["faults"] == "BREAK_IN"
+    bench.inject("st1", "BREAK_IN", hold=False)
+    bench.run(0.1)
+    motor.acknowledge_faults()
+    bench.run(0.1)
+    assert motor.status == "IDLE"
+    bench.temperature("st1", None)
+    assert motor.read("HEATS_TEMP") == 25
+
+    gains = bench.rmd.motor(1).gains._replace(speed_kp=7)
+    bench.rmd.motor(1).gains = gains
+    bench.power_cycle("rmd1")
+    assert bench.rmd.motor(1).gains.speed_kp != 7
+    bench.power_cycle("st")
+
+    bench.lock_rotor("rmd2")
+    bench.rmd.motor(2).torque(1)
+    bench.run(0.5)
+    assert abs(bench.truth("rmd2")["speed_dps"]) < 1
+    bench.lock_rotor("rmd2", False)
+    bench.run(0.5)
+    assert bench.truth("rmd2")["speed_dps"] > 100
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda bench: bench.brake("st9", 1), "there are st1, st2, rmd1"),
+        (lambda bench: bench.brake("motor", 1), "there are st1, st2, rmd1"),
+        (lambda bench: bench.truth("st9"), "there are st1, st2, rmd1"),
+        (lambda bench: bench.brake("st1", -1), "0 to 1000"),
+        (lambda bench: bench.inject("st1", "FIRE"), "BREAK_IN"),
+        (lambda bench: bench.power_cycle("st1"), "one supply"),
+        (lambda bench: bench.execute({"command": "explode"}), "not a command"),
+        (lambda bench: bench.execute({"command": "pause"}), "stands still"),
+        (lambda bench: bench.record(["st1.speed"], seconds=1), "st1.speed_rpm"),
+        (lambda bench: bench.record(["st1.speed_rpm"], seconds=1, every=1e-6), "50 µs"),
+        (lambda bench: motorlink.st.open(bench.port(fault="explode=1")), "explode"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_nothing_happens(wrong: Any, message: str) -> None:
+    bench = sim.Bench()
+    before = bench.state_hash
+    with pytest.raises(motorlink.BadValue, match=message):
+        wrong(bench)
+    assert (bench.now, bench.state_hash) == (0.0, before)
+
+
+def test_commands_are_those_of_the_program() -> None:
+    bench = sim.Bench()
+    answer = bench.execute({"command": "state", "port": "rmd"})
+    assert [motor["motor"] for motor in answer["state"][0]["motors"]] == [1, 2, 3, 4]
+
+
+def test_truth_has_the_signals_with_their_units() -> None:
+    bench = sim.Bench()
+    truth = bench.truth("st1")
+    names = [name for name in bench.signals if name.startswith("st1.")]
+    assert [f"st1.{name}" for name in truth] == names
+    assert bench.signals["st1.bus_volts"] == "V"
+    assert bench.signals["st1.status"] == ""
+    assert truth["status"] == "IDLE"
+    assert truth["bus_volts"] == pytest.approx(325, abs=1)
+
+
+def test_a_recording_is_the_same_whoever_lets_time_pass() -> None:
+    def data(through_the_line: bool) -> Any:
+        bench = sim.Bench(SERVO)
+        bench.rmd.motor(1).speed(360)
+        with bench.recording(["rmd1.angle_degrees", "rmd1.mode"], every=0.005) as recording:
+            end = bench.now + 0.5
+            while bench.now < end:
+                if through_the_line:
+                    bench.st.motor(1).status
+                else:
+                    bench.run(0.1)
+        return recording.data[:100]
+
+    one, other = data(True), data(False)
+    assert one.dtype.names == ("t", "rmd1.angle_degrees", "rmd1.mode")
+    np.testing.assert_array_equal(one, other)
+    np.testing.assert_allclose(one["t"], np.arange(100) * 0.005)
+    assert set(one["rmd1.mode"]) == {3}
+    assert one["rmd1.angle_degrees"][-1] > 100
+
+
+def test_a_recording_can_be_looked_at_while_it_grows_and_ends() -> None:
+    bench = sim.Bench()
+    with bench.recording(["rmd1.angle_degrees"], every=0.1) as recording:
+        bench.run(0.25)
+        assert len(recording.data) == 3
+        bench.run(0.1)
+        assert len(recording.data) == 4
+    bench.run(1.0)
+    assert len(recording.data) == 4
+    recording.data["rmd1.angle_degrees"][0] = 1.0  # its own memory
+
+
+def test_registers_are_sampled_on_virtual_time() -> None:
+    bench = sim.Bench(SERVO)
+    started(bench)
+    before = bench.now
+    samples = bench.st.sample(["SPEED_MEAS", "TORQUE_MEAS"], rate=100, seconds=1)
+    assert len(samples) == 100
+    assert bench.now - before == pytest.approx(0.99, abs=0.02)
+    np.testing.assert_allclose(np.diff(samples["t"]), 0.01, atol=1e-6)
+    assert samples["SPEED_MEAS"].mean() == pytest.approx(1000, abs=20)
+
+
+def test_the_end_of_a_bench_stops_its_motors() -> None:
+    with sim.Bench(SERVO) as bench:
+        started(bench)
+        bench.rmd.motor(1).speed(360)
+    bench.run(5.0)
+    assert bench.truth("st1")["status"] == "IDLE"
+    assert bench.truth("rmd1")["mode"] == "stopped"
+    assert bench.st.motor(1).status == "IDLE"  # another bus
+
+
+def test_code_that_sleeps_sleeps_on_the_bench() -> None:
+    bench = sim.Bench()
+    elsewhere: list[float] = []
+
+    def other() -> None:
+        time.sleep(0.001)
+        elsewhere.append(time.monotonic())
+
+    real = time.sleep
+    with bench.patch_time():
+        began = [clock() for clock in (time.monotonic, time.perf_counter, time.time)]
+        time.sleep(100)
+        now = [clock() for clock in (time.monotonic, time.perf_counter, time.time)]
+        thread = threading.Thread(target=other)
+        thread.start()
+        thread.join()
+        virtual = time.monotonic()
+        with pytest.raises(ValueError):
+            time.sleep(-1)
+    assert time.sleep is real
+    assert np.subtract(now, began) == pytest.approx([100, 100, 100])
+    assert bench.now == pytest.approx(100)
+    assert elsewhere[0] < virtual - 50
+
+
+def test_ctrl_c_ends_a_long_run() -> None:
+    code = """
+import sys, motorlink
+bench = motorlink.sim.Bench()
+bench.st.motor(1).start()
+try:
+    print("runs", flush=True)
+    bench.run(86400)
+except KeyboardInterrupt:
+    print("interrupted", bench.now < 86400, bench.st.motor(1).status != "")
+"""
+    program = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert program.stdout
+    assert program.stdout.readline() == "runs\n"
+    program.send_signal(signal.SIGINT)
+    out, err = program.communicate(timeout=60)
+    assert (out, err) == ("interrupted True True\n", "")
+
+
+def test_other_threads_run_while_time_passes() -> None:
+    bench = sim.Bench(SERVO)
+    started(bench)
+    over = threading.Event()
+    turns = 0
+
+    def count() -> None:
+        nonlocal turns
+        while not over.is_set():
+            turns += 1
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    try:
+        before = turns
+        bench.run(60)
+        assert turns > before + 1000
+    finally:
+        over.set()
+        thread.join()
+
+
+def test_served_on_ptys_the_drives_go_on_in_real_time(tmp_path: Path) -> None:
+    bench = sim.Bench()
+    bench.run(1000.0)
+    ports = {"st": f"pty:{tmp_path}/st0", "rmd": f"slcan-pty:{tmp_path}/can0"}
+    with bench.serve(**ports) as serving:
+        assert (serving.st, serving.rmd) == (f"{tmp_path}/st0", f"slcan:{tmp_path}/can0")
+        assert serving.st_path.startswith("/dev/pts/")
+        with pytest.raises(motorlink.PortError, match="served already"):
+            bench.serve()
+        with motorlink.st.open(serving.st) as st, motorlink.rmd.open(serving.rmd, timeout=5) as rmd:
+            assert st.motor(1).status == "IDLE"
+            bench.push("rmd1", 0.5)
+            while rmd.motor(1).motion.speed_dps < 180:
+                assert bench.now < 1060
+            before = bench.now
+            bench.run(0.05)
+            assert bench.now >= before + 0.05
+    assert not (tmp_path / "st0").exists()
+    stands = bench.now
+    assert stands > 1000
+    time.sleep(0.005)
+    assert bench.now == stands
+
+
+def test_served_without_a_name_or_over_tcp() -> None:
+    with sim.Bench().serve() as serving, motorlink.rmd.open(serving.rmd, timeout=5) as bus:
+        assert len(bus.scan(range(1, 5))) == 4
+        folder = Path(serving.st).parent
+    assert not folder.exists()
+    with sim.Bench().serve(st="tcp-listen:127.0.0.1:0") as serving:
+        assert serving.rmd == ""
+        with motorlink.st.open(serving.st) as st:
+            assert st.motor(1).status == "IDLE"
+    serving.close()
+    with pytest.raises(motorlink.BadValue):
+        sim.Bench().serve(st="nonsense")
+
+
+def test_a_port_that_cannot_be_served_leaves_virtual_time(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    bench = sim.Bench()
+    with pytest.raises(motorlink.PortError, match="no link to a pty"):
+        bench.serve(st=f"pty:{tmp_path}/file")
+    bench.run(1.0)
+    assert bench.now == 1.0
+
+
+def test_what_is_no_port_is_refused() -> None:
+    with pytest.raises(TypeError, match="no port"):
+        motorlink.st.open(3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.toml")), ids=lambda path: str(path.stem))
+def test_the_scenarios_that_ship_run_as_expected(path: Path) -> None:
+    run = sim.run(path)
+    assert run.as_expected, run.failures
+    assert run.expectations and all(one.holds for one in run.expectations)
+    assert set(run.units) == set(run.samples.dtype.names or ()) - {"t"}
+    assert np.all(np.diff(run.samples["t"]) > 0)
+    assert sim.run(str(path)).state_hash == run.state_hash
+
+
+def test_what_was_not_expected_is_told() -> None:
+    run = sim.run(
+        """
+        title = "A refusal"
+        duration = 0.2
+        [[st.motor]]
+        [[event]]
+        at = 0.1
+        st = 1
+        send = "set"
+        register = "SPEED_MEAS"
+        value = 3
+        label = "nonsense"
+        [[expect]]
+        why = "it turns"
+        signal = "st1.speed_rpm"
+        min = 1
+        """
+    )
+    assert not run.as_expected
+    (refusal,) = run.refusals
+    assert (refusal.at, refusal.motor, refusal.reply) == (0.1, "st1", "SET_READ_ONLY")
+    assert run.marks == [(0.1, "nonsense")]
+    assert run.failures == [
+        "it turns: st1.speed_rpm 0 rpm at 0 s, 1 rpm outside at least 1 rpm",
+        "at 0.1 s st1 refused `SPEED_MEAS 3` with SET_READ_ONLY",
+    ]
+    with pytest.raises(motorlink.BadValue, match="duration"):
+        sim.run("title = ''")
+    with pytest.raises(motorlink.BadValue, match="nowhere"):
+        sim.run("nowhere.toml")
+
+
+def test_presets_have_every_value() -> None:
+    presets = sim.presets()
+    assert set(presets) == {"drone", "shinano", "mains", "rmd-l-5005", "rmd-x8"}
+    assert presets["drone"]["machine"]["resistance"] == 0.11
