@@ -1,0 +1,124 @@
+"""A test bench with pytest: a robot's own code against simulated drives, in milliseconds.
+
+    pytest test_bench.py
+
+The fixtures come with the package. `motorlink_bench` is a fresh bench for each test, on virtual time;
+the marker says what it is; `motorlink_time` makes `time.sleep` of the code under test pass on it.
+"""
+
+# %% The code under test
+# It knows nothing of simulation: it opens the port that it is given, sleeps, and looks at the clock.
+import time
+
+import pytest
+
+import motorlink
+
+
+class Jammed(Exception):
+    """The conveyor does not move as it was told."""
+
+
+class Conveyor:
+    """A conveyor belt on motor 1 of an ST drive."""
+
+    def __init__(self, port):
+        self._bus = motorlink.st.open(port, speed_limit=3000)
+        self._motor = self._bus.motor(1)
+
+    def run(self, rpm, patience=3.0):
+        """Brings the belt to a speed; stops it and raises Jammed where it does not get there."""
+        self._motor.ramp(rpm, 0.5)
+        self._motor.start()
+        deadline = time.monotonic() + patience
+        while abs(self._motor.read("SPEED_MEAS") - rpm) > 0.05 * rpm:
+            if time.monotonic() > deadline:
+                self.stop()
+                raise Jammed(f"{self._motor.read('SPEED_MEAS')} rpm instead of {rpm}")
+            time.sleep(0.02)
+
+    def recover(self):
+        """Acknowledges what made the drive switch off; gives its name."""
+        names = self._motor.faults.occurred
+        self._motor.acknowledge_faults()
+        return names
+
+    def stop(self):
+        """Stops the belt."""
+        self._motor.stop()
+
+
+# %% The bench
+# A flywheel stands for the belt. Everything that a configuration can say is in docs/SIMULATOR.md.
+pytestmark = [
+    pytest.mark.motorlink("[[st.motor]]\npreset = 'servo'\nplant.load.inertia = 2e-5"),
+    pytest.mark.usefixtures("motorlink_time"),
+]
+
+
+@pytest.fixture
+def conveyor(motorlink_bench):
+    """A conveyor on the bench of the test."""
+    return Conveyor(motorlink_bench)
+
+
+# %% What shall be
+def test_it_comes_to_its_speed(conveyor, motorlink_bench):
+    conveyor.run(1500)
+    motorlink_bench.run(1.0)
+    assert motorlink_bench.truth("st1")["speed_rpm"] == pytest.approx(1500, rel=0.02)
+
+
+def test_it_holds_its_speed_under_a_load(conveyor, motorlink_bench):
+    conveyor.run(1500)
+    motorlink_bench.brake("st1", 0.05)
+    data = motorlink_bench.record(["st1.speed_rpm"], seconds=1.0)
+    speed = data["st1.speed_rpm"]
+    assert speed.min() > 1000
+    assert speed[data["t"] > 0.5] == pytest.approx(1500, rel=0.03)
+
+
+# %% What may go wrong
+def test_it_notices_that_it_is_jammed_and_no_current_flows_on(conveyor, motorlink_bench):
+    motorlink_bench.lock_rotor("st1")
+    with pytest.raises(Jammed):
+        conveyor.run(1500)
+    motorlink_bench.run(0.5)
+    truth = motorlink_bench.truth("st1")
+    assert truth["faults"] == "SPEED_FDBK"  # the drive saw it, too
+    assert abs(truth["iq_amps"]) < 0.01
+
+
+def test_it_recovers_after_a_fault(conveyor, motorlink_bench):
+    conveyor.run(1000)
+    motorlink_bench.inject("st1", "OVER_TEMP")
+    motorlink_bench.run(5.0)
+    assert conveyor.recover() == ("OVER_TEMP",)
+    conveyor.run(1000)
+
+
+def test_nobody_can_ask_for_too_much(conveyor, motorlink_bench):
+    with pytest.raises(motorlink.BadValue, match="3000 rpm"):
+        conveyor.run(3500)
+    assert motorlink_bench.truth("st1")["status"] == "IDLE"
+
+
+def test_a_bad_line_does_not_keep_it_from_stopping(motorlink_bench):
+    conveyor = Conveyor(motorlink_bench.port(fault="drop=5e-3,seed=5"))
+    failures = 0
+
+    def insist(action):
+        nonlocal failures
+        for _ in range(10):
+            try:
+                return action()
+            except (motorlink.LineLost, motorlink.Timeout):
+                failures += 1
+        pytest.fail("the line never came back")
+
+    for rpm in range(500, 1500, 100):
+        insist(lambda: conveyor.run(rpm))
+    insist(conveyor.stop)
+    assert failures > 0
+    motorlink_bench.run(3.0)
+    assert motorlink_bench.truth("st1")["status"] == "IDLE"
