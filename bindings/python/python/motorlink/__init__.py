@@ -14,7 +14,7 @@ may be shared between threads.
 
 from __future__ import annotations
 
-import importlib
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 __all__ = [
@@ -52,10 +52,10 @@ else:
     def __getattr__(name: str) -> Any:
         """A part, loaded when it is first used: the command and pytest's plugin need no NumPy."""
         if name in ("errors", "rmd", "sim", "st"):
-            return importlib.import_module(f"motorlink.{name}")
+            return import_module(f"motorlink.{name}")
         if name not in __all__:
             raise AttributeError(f"module 'motorlink' has no attribute {name!r}")
-        part = importlib.import_module(_FROM.get(name, "motorlink.errors"))
+        part = import_module(_FROM.get(name, "motorlink.errors"))
         return getattr(part, name)
 
     def __dir__() -> list[str]:

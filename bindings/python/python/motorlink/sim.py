@@ -45,6 +45,7 @@ __all__ = [
     "Bench",
     "Expectation",
     "Mark",
+    "Port",
     "Recording",
     "Refusal",
     "Run",
