@@ -38,7 +38,7 @@ from typing import Any, Callable, NamedTuple, Union
 import numpy as np
 
 from motorlink import _core, rmd, st
-from motorlink._sampling import Samples
+from motorlink._sampling import Samples, columns
 from motorlink.errors import BadValue
 
 __all__ = [
@@ -320,9 +320,20 @@ class Bench:
 
     def close(self) -> None:
         """Closes :attr:`st` and :attr:`rmd`, which stops what they started."""
-        for bus in (self._st, self._rmd):
-            if bus is not None:
-                bus.close()
+        self._end(None, None, None)
+
+    def _end(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            if self._st is not None:
+                self._st.__exit__(kind, error, traceback)
+        finally:
+            if self._rmd is not None:
+                self._rmd.__exit__(kind, error, traceback)
 
     def __enter__(self) -> Bench:
         return self
@@ -333,7 +344,7 @@ class Bench:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self.close()
+        self._end(kind, error, traceback)
 
 
 class Port:
@@ -347,17 +358,17 @@ class Recording:
     """What is written down of a bench until the end of its ``with``, from :meth:`Bench.recording`."""
 
     def __init__(self, core: _core.SimBench, signals: Sequence[str], every: float):
-        self._core = core.record(list(signals), every)
-        self._dtype = np.dtype([("t", "f8"), *((name, "f8") for name in signals)])
+        self._names = columns([signals] if isinstance(signals, str) else signals)
+        self._core = core.record(self._names, every)
         self._raw = bytearray()
 
     @property
     def data(self) -> Samples:
         """What was written down so far, as :meth:`Bench.record` gives it."""
         self._raw += self._core.take()
-        rows = np.frombuffer(self._raw, "f8").reshape(-1, len(self._dtype.names or ()) - 1)
+        rows = np.frombuffer(self._raw, "f8").reshape(-1, len(self._names))
         times = self._core.every * np.arange(len(rows)) / 1e6
-        return _structured(self._dtype, times, rows.T)
+        return _structured(self._names, times, rows.T)
 
     def __enter__(self) -> Recording:
         return self
@@ -511,13 +522,12 @@ def run(scenario: Source) -> Run:
     text, path = _text_or_path(scenario)
     told = _core.sim_run(text, path)
     units = dict(told["signals"])
-    dtype = np.dtype([("t", "f8"), *((name, "f8") for name in units)])
-    columns = [np.frombuffer(column, "f8") for column in told["columns"]]
-    times = told["sample"] * np.arange(len(columns[0])) / 1e6
+    values = [np.frombuffer(column, "f8") for column in told["columns"]]
+    times = told["sample"] * np.arange(len(values[0])) / 1e6
     return Run(
         title=told["title"],
         about=told["about"],
-        samples=_structured(dtype, times, columns),
+        samples=_structured(list(units), times, values),
         units=units,
         expectations=[Expectation(*one) for one in told["expectations"]],
         refusals=[Refusal(*one) for one in told["refusals"]],
@@ -537,9 +547,11 @@ def presets() -> dict[str, dict[str, Any]]:
     return known
 
 
-def _structured(dtype: np.dtype[Any], times: Any, columns: Any) -> Samples:
-    samples: Samples = np.empty(len(times), dtype)
-    for name, column in zip(dtype.names or (), [times, *columns]):
+def _structured(names: list[str], times: Any, values: Any) -> Samples:
+    """A structured array of a time and a column a name."""
+    names = ["t", *names]
+    samples: Samples = np.empty(len(times), [(name, "f8") for name in names])
+    for name, column in zip(names, [times, *values]):
         samples[name] = column
     return samples
 

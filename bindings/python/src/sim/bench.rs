@@ -85,15 +85,10 @@ impl SimBench {
         signals.map(|signal| (signal.name.as_str(), signal.kind.unit())).collect()
     }
 
-    /// The values of all signals, in their order.
-    fn values(&self, py: Python<'_>) -> Vec<f64> {
-        py.detach(|| self.0.values())
-    }
-
     /// The values of a motor's signals, with names where values have some.
     fn truth<'py>(&self, py: Python<'py>, motor: &str) -> PyResult<Bound<'py, PyDict>> {
         let truth = PyDict::new(py);
-        for (signal, value) in self.0.signals().iter().zip(self.values(py)) {
+        for (signal, value) in self.0.signals().iter().zip(py.detach(|| self.0.values())) {
             let Some((of, name)) = signal.name.split_once('.').filter(|(of, _)| *of == motor)
             else {
                 continue;
@@ -113,8 +108,8 @@ impl SimBench {
         let every = microseconds(py, "a distance of samples", every)?;
         let recording = py.detach(|| self.0.record(&signals, every));
         let recording = recording.map_err(|why| bad_value(py, why))?;
-        let (began, every) = (recording.began().0, recording.every().0);
-        Ok(SimRecording { recording: Mutex::new(Some(recording)), began, every })
+        let every = recording.every().0;
+        Ok(SimRecording { recording: Mutex::new(Some(recording)), every })
     }
 
     /// A fingerprint of the state of all drives.
@@ -157,9 +152,6 @@ fn microseconds(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Duration> 
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct SimRecording {
     recording: Mutex<Option<Recording>>,
-    /// When the first sample was taken, µs.
-    #[pyo3(get)]
-    began: u64,
     /// From sample to sample, µs.
     #[pyo3(get)]
     every: u64,
