@@ -98,6 +98,13 @@ def test_configurations_are_text_a_file_or_a_dict(tmp_path: Path) -> None:
         sim.Bench(file)
 
 
+def test_the_bus_of_a_bench_speaks_as_its_drive_does() -> None:
+    assert sim.Bench().st.profile == "spec"
+    bus = sim.Bench("profile = 'mcsdk-5.4'").st
+    assert bus.profile == "mcsdk-5.4"
+    bus.motor(2).torque_ramp(100, 0.1)
+
+
 def test_a_load_brakes_and_a_push_turns() -> None:
     bench = sim.Bench(SERVO)
     started(bench)
@@ -274,6 +281,7 @@ def test_code_that_sleeps_sleeps_on_the_bench() -> None:
         thread.start()
         thread.join()
         virtual = time.monotonic()
+        assert time.monotonic_ns() == round(virtual * 1e9)
         with pytest.raises(ValueError):
             time.sleep(-1)
     assert time.sleep is real

@@ -188,6 +188,19 @@ fn what_is_recorded_does_not_depend_on_who_lets_time_pass() {
 }
 
 #[test]
+fn what_was_taken_down_is_whole_up_to_this_moment() {
+    let bench = bench();
+    let recording = bench.record(&["st1.bus_volts"], time::Duration(50)).unwrap();
+    let bus = rmd(&bench, "");
+    let mut rows = 0;
+    for _ in 0..5 {
+        bus.motor(1).unwrap().status1().unwrap();
+        rows += recording.take().len() as u64;
+        assert_eq!(rows, bench.now().0 / 50 + 1);
+    }
+}
+
+#[test]
 fn a_recording_is_refused_with_the_nearest_name() {
     let bench = bench();
     let why = |name, every| bench.record(&[name], every).err().unwrap();

@@ -96,9 +96,9 @@ class Bench:
 
     @property
     def st(self) -> st.Bus:
-        """The bus of the ST drive, open. For other options than the defaults, ``st.open(bench, ...)``."""
+        """The bus of the ST drive, open, with the drive's profile. For other options, ``st.open(bench, ...)``."""
         if self._st is None or self._st._client.is_closed:
-            self._st = st.open(self)
+            self._st = st.open(self, profile=self._core.profile)
         return self._st
 
     @property
@@ -141,8 +141,8 @@ class Bench:
     def patch_time(self) -> Iterator[None]:
         """Code of this thread that calls ``time.sleep`` lets time of the bench pass meanwhile.
 
-        ``time.monotonic``, ``time.perf_counter`` and ``time.time`` go by the bench, too. A name that was
-        imported before (``from time import sleep``) stays as it is.
+        ``time.monotonic``, ``time.perf_counter``, ``time.time`` and their like in ns go by the bench, too. A
+        name that was imported before (``from time import sleep``) stays as it is.
 
         >>> import time
         >>> bench = Bench()
@@ -159,14 +159,22 @@ class Bench:
         def here(virtual: Callable[..., Any], real: Callable[..., Any]) -> Callable[..., Any]:
             return lambda *args: (virtual if threading.get_ident() == mine else real)(*args)
 
-        def clock(real: Callable[[], float]) -> Callable[..., Any]:
-            origin = real() - self.now
-            return here(lambda: origin + self.now, real)
+        def clock(name: str) -> dict[str, Callable[..., Any]]:
+            real, real_ns = getattr(time, name), getattr(time, f"{name}_ns")
+            began = real_ns() - self._ns()
+            return {
+                name: here(lambda: (began + self._ns()) / 1e9, real),
+                f"{name}_ns": here(lambda: began + self._ns(), real_ns),
+            }
 
-        clocks = ("monotonic", "perf_counter", "time")
-        patched: dict[str, Any] = {name: clock(getattr(time, name)) for name in clocks}
-        with mock.patch.multiple(time, sleep=here(self.run, time.sleep), **patched):
+        patched: dict[str, Any] = {"sleep": here(self.run, time.sleep)}
+        for name in ("monotonic", "perf_counter", "time"):
+            patched.update(clock(name))
+        with mock.patch.multiple(time, **patched):
             yield
+
+    def _ns(self) -> int:
+        return round(self.now * 1e6) * 1000
 
     # The world around the motors
 

@@ -56,6 +56,12 @@ impl SimBench {
         SimPort { bench: Arc::clone(&self.0), fault }
     }
 
+    /// What the ST drive speaks.
+    #[getter]
+    fn profile(&self) -> &'static str {
+        self.0.profile().name()
+    }
+
     /// The time, s.
     #[getter]
     fn now(&self) -> f64 {

@@ -8,6 +8,7 @@ use motorlink_sim::st::{StMotor, StStation};
 
 use super::scenario::{rmd_values, st_values};
 use super::{Command, world};
+use crate::Clock;
 
 pub(super) type Station = StStation<Vec<StMotor>>;
 pub(super) type Bus = RmdBus<Vec<RmdNode>>;
@@ -86,12 +87,13 @@ impl Stage {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Begins to write the signals at `columns` down, the first time `now`.
-    pub(super) fn record(&self, now: Instant, columns: Vec<usize>, every: Duration) -> Recording {
+    /// Begins to write the signals at `columns` down, the first time now.
+    pub(super) fn record(&self, clock: &Clock, columns: Vec<usize>, every: Duration) -> Recording {
+        let now = clock.now();
         let mut observed = self.at(now);
         let key = observed.sheets.iter().map(|sheet| sheet.key + 1).max().unwrap_or(0);
         observed.sheets.push(Sheet { key, columns, every, next: now, rows: Vec::new() });
-        Recording { stage: self.clone(), key, began: now, every }
+        Recording { stage: self.clone(), clock: clock.clone(), key, began: now, every }
     }
 }
 
@@ -115,6 +117,7 @@ impl Observed {
 /// dropped.
 pub struct Recording {
     stage: Stage,
+    clock: Clock,
     key: u64,
     began: Instant,
     every: Duration,
@@ -134,7 +137,7 @@ impl Recording {
     /// The samples that were taken since the last call: the signals of one moment side by side. A
     /// sample is the state before what happens at its moment.
     pub fn take(&self) -> Vec<f64> {
-        let mut observed = self.stage.last();
+        let mut observed = self.stage.at(self.clock.now());
         let sheet = observed.sheets.iter_mut().find(|sheet| sheet.key == self.key);
         sheet.map(|sheet| std::mem::take(&mut sheet.rows)).unwrap_or_default()
     }

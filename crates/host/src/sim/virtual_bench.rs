@@ -7,6 +7,7 @@ use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use motorlink_proto::stmcp::Profile;
 use motorlink_proto::time::{self, Instant};
 use motorlink_sim::hash;
 use serde_json::Value;
@@ -41,6 +42,7 @@ pub struct VirtualBench {
     stage: Stage,
     places: Places,
     signals: Vec<Signal>,
+    profile: Profile,
 }
 
 impl VirtualBench {
@@ -54,7 +56,13 @@ impl VirtualBench {
         let mut places = Places::default();
         places.add("st".to_owned(), Kind::St, stage.clone());
         places.add("rmd".to_owned(), Kind::Rmd, stage.clone());
-        Ok(VirtualBench { clock: Clock::standing(), stage, places, signals: cast.signals() })
+        let (signals, profile) = (cast.signals(), config.profile);
+        Ok(VirtualBench { clock: Clock::standing(), stage, places, signals, profile })
+    }
+
+    /// What the ST drive speaks.
+    pub fn profile(&self) -> Profile {
+        self.profile
     }
 
     /// The bench's clock.
@@ -118,7 +126,7 @@ impl VirtualBench {
             return Err(format!("drives step every {} µs: nothing is seen more often", STEP.0));
         }
         let columns = signals.iter().map(|name| find_signal(name, &self.signals));
-        Ok(self.stage.record(self.now(), columns.collect::<Result<_, _>>()?, every))
+        Ok(self.stage.record(&self.clock, columns.collect::<Result<_, _>>()?, every))
     }
 
     /// Serves the drives on ports, in a thread. Time runs until what this gives is dropped; links of
