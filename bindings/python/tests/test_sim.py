@@ -32,6 +32,7 @@ def started(bench: sim.Bench, rpm: float = 1000) -> motorlink.st.Motor:
 def test_time_passes_only_when_it_is_waited_for() -> None:
     bench = sim.Bench()
     assert bench.now == 0.0
+    assert repr(bench) == "<motorlink.sim.Bench st1, st2, rmd1, rmd2, rmd3, rmd4 at 0 s>"
     bench.st.motor(1).status
     assert bench.now == pytest.approx(8 * 87e-6)  # eight bytes at 115200 baud
     before = bench.now
@@ -290,14 +291,23 @@ def test_code_that_sleeps_sleeps_on_the_bench() -> None:
     assert elsewhere[0] < virtual - 50
 
 
-def test_ctrl_c_ends_a_long_run() -> None:
-    code = """
-import sys, motorlink
+RUN = "bench.run(86400)"
+SCENARIO = """motorlink.sim.run(
+    "title = 'A day'; duration = 86400; sample_us = 10000000; [[rmd.motor]];"
+    "[[event]]; at = 0; rmd = 1; send = 'speed'; dps = 360".replace(";", "\\n")
+    )"""
+
+
+@pytest.mark.parametrize("long", [RUN, SCENARIO], ids=["run", "scenario"])
+def test_ctrl_c_ends_what_takes_long(long: str) -> None:
+    code = f"""
+import motorlink
 bench = motorlink.sim.Bench()
 bench.st.motor(1).start()
 try:
     print("runs", flush=True)
-    bench.run(86400)
+    {long}
+    print("to the end")
 except KeyboardInterrupt:
     print("interrupted", bench.now < 86400, bench.st.motor(1).status != "")
 """
@@ -348,8 +358,11 @@ def test_served_on_ptys_the_drives_go_on_in_real_time(tmp_path: Path) -> None:
             while rmd.motor(1).motion.speed_dps < 180:
                 assert bench.now < 70
             before = bench.now
-            bench.run(0.05)
+            with bench.recording(["rmd1.angle_degrees"], every=0.01) as recording:
+                bench.run(0.05)
             assert bench.now >= before + 0.05
+            assert len(recording.data) >= 6
+            assert np.all(np.diff(recording.data["rmd1.angle_degrees"]) > 0)
     assert not (tmp_path / "st0").exists()
     stands = bench.now
     assert stands > 10

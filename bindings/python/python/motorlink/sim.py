@@ -354,6 +354,9 @@ class Bench:
     ) -> None:
         self._end(kind, error, traceback)
 
+    def __repr__(self) -> str:
+        return f"<motorlink.sim.Bench {', '.join(self.motors)} at {self.now:g} s>"
+
 
 class Port:
     """A bench as a port, from :meth:`Bench.port`."""
