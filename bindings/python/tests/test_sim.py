@@ -240,6 +240,12 @@ def test_registers_are_sampled_on_virtual_time() -> None:
     assert samples["SPEED_MEAS"].mean() == pytest.approx(1000, abs=20)
 
 
+def test_an_instant_between_two_microseconds_comes() -> None:
+    bench = sim.Bench()
+    samples = bench.rmd.sample(["speed_dps"], rate=3, seconds=2)
+    np.testing.assert_allclose(samples["t"], np.arange(6) / 3, atol=2e-6)
+
+
 def test_the_end_of_a_bench_stops_its_motors() -> None:
     with sim.Bench(SERVO) as bench:
         started(bench)

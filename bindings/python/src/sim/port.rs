@@ -6,7 +6,7 @@ use motorlink::Clock;
 use motorlink::fault::{FaultError, Faults};
 use motorlink::port::{ByteLink, CanLink};
 use motorlink::sim::VirtualBench;
-use motorlink_proto::time::Instant;
+use motorlink_proto::time::{Duration, Instant};
 use pyo3::prelude::*;
 
 use crate::clock;
@@ -63,6 +63,8 @@ impl clock::Clock for Clock {
     }
 
     fn pass(&self, span: std::time::Duration) {
-        self.wait(self.now() + span.into());
+        // A part of a microsecond is one: virtual time would never pass it.
+        let micros = span.as_nanos().div_ceil(1000);
+        self.wait(self.now() + Duration(micros.try_into().unwrap_or(u64::MAX)));
     }
 }
