@@ -234,7 +234,11 @@ class Bench:
         >>> Bench().execute({"command": "supply", "port": "rmd", "motor": 2, "volts": 6.5})
         {'ok': True}
         """
-        answer: dict[str, Any] = json.loads(self._core.execute(json.dumps(dict(command))))
+        try:
+            text = json.dumps(dict(command), allow_nan=False)
+        except (TypeError, ValueError) as error:
+            raise BadValue(f"not a command: {error} in {dict(command)}") from error
+        answer: dict[str, Any] = json.loads(self._core.execute(text))
         return answer
 
     def _do(self, command: str, motor: str, **members: Any) -> None:
