@@ -49,6 +49,9 @@ impl LinkSign {
     }
 }
 
+/// How soon a port that does not take everything at once is offered the rest.
+pub(crate) const FULL: Duration = Duration::from_millis(1);
+
 /// How often a guard tries to stop a motor before it gives up.
 pub(crate) const STOP_ATTEMPTS: u32 = 4;
 /// The longest that a guard waits for a port to come back before it tries again.
@@ -130,6 +133,10 @@ impl<L> Reopening<L> {
         self
     }
 
+    pub(crate) fn clock(&self) -> Clock {
+        self.clock.clone()
+    }
+
     /// The time for the sans-IO machines.
     pub(crate) fn now(&self) -> Moment {
         self.clock.now()
@@ -138,6 +145,15 @@ impl<L> Reopening<L> {
     /// Shows whether the port is open, from now on.
     pub(crate) fn sign(&self) -> LinkSign {
         self.sign.clone()
+    }
+
+    /// The link if it is open.
+    pub(crate) fn open_link(&self) -> Option<&L> {
+        self.link.as_ref()
+    }
+
+    pub(crate) fn open_link_mut(&mut self) -> Option<&mut L> {
+        self.link.as_mut()
     }
 
     /// The open link, and whether this call had to open it.
@@ -183,6 +199,16 @@ impl<L> Reopening<L> {
     fn closed_until(&mut self, retry: Instant) {
         self.not_before = retry;
         self.sign.show(Shown::ClosedUntil(retry));
+    }
+}
+
+impl<L: 'static> Reopening<L> {
+    /// The same port with its links in another form.
+    pub(crate) fn map<M: 'static>(self, form: fn(L) -> M) -> Reopening<M> {
+        let Reopening { name, link, open, back_off, wait, not_before, trouble, clock, sign } = self;
+        let link = link.map(form);
+        let open = open.map(|mut open| -> Opener<M> { Box::new(move || open().map(form)) });
+        Reopening { name, link, open, back_off, wait, not_before, trouble, clock, sign }
     }
 }
 

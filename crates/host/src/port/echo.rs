@@ -26,6 +26,14 @@ impl<C: CanLink> EchoCanceller<C> {
         EchoCanceller { link, expected: [None; WAITING] }
     }
 
+    pub(super) fn link(&self) -> &C {
+        &self.link
+    }
+
+    pub(super) fn link_mut(&mut self) -> &mut C {
+        &mut self.link
+    }
+
     /// Strikes `frame` off the expected echoes.
     fn is_echo(&mut self, frame: &CanFrame) -> bool {
         let now = Instant::now();

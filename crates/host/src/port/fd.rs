@@ -11,7 +11,7 @@ use rustix::io::{Errno, read, write};
 use super::{ByteLink, Deadline, PortError};
 
 /// How long the far end may take no byte at all before a write fails.
-const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
+pub(super) const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A [`ByteLink`] on a file descriptor.
 #[derive(Debug)]
@@ -69,21 +69,36 @@ impl AsFd for FdLink {
 impl FdLink {
     fn put(&self, mut bytes: &[u8]) -> Result<(), PortError> {
         while !bytes.is_empty() {
-            match write(&self.fd, bytes) {
-                Ok(written) => bytes = &bytes[written..],
-                Err(Errno::INTR) => {}
-                Err(Errno::AGAIN) => {
+            match self.offer(bytes)? {
+                0 => {
                     if !self.wait(PollFlags::OUT, Deadline::after(Some(WRITE_TIMEOUT)))? {
-                        return Err(PortError::Stalled {
-                            port: self.port.clone(),
-                            hint: "the far end does not read; is the right program or device there?",
-                        });
+                        return Err(self.stalled());
                     }
                 }
-                Err(errno) => return Err(self.lost(errno)),
+                taken => bytes = &bytes[taken..],
             }
         }
         Ok(())
+    }
+
+    /// Writes as many of `bytes` as are taken at once.
+    pub(super) fn offer(&self, bytes: &[u8]) -> Result<usize, PortError> {
+        loop {
+            return match write(&self.fd, bytes) {
+                Ok(taken) => Ok(taken),
+                Err(Errno::INTR) => continue,
+                Err(Errno::AGAIN) => Ok(0),
+                Err(errno) => Err(self.lost(errno)),
+            };
+        }
+    }
+
+    /// The far end takes nothing.
+    pub(super) fn stalled(&self) -> PortError {
+        PortError::Stalled {
+            port: self.port.clone(),
+            hint: "the far end does not read; is the right program or device there?",
+        }
     }
 
     fn fetch(&self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {

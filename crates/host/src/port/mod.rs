@@ -6,6 +6,7 @@
 
 mod echo;
 mod error;
+mod event;
 mod fault;
 mod fd;
 mod interface;
@@ -24,6 +25,7 @@ use crate::Clock;
 
 pub use echo::EchoCanceller;
 pub use error::PortError;
+pub use event::{EventCan, EventLine, Evented};
 pub use fault::{FaultBytes, FaultCan};
 pub use fd::FdLink;
 pub use name::{DEFAULT_BAUD, LineName, NameError, PortName, ServeName};
@@ -101,15 +103,9 @@ impl PortName {
     pub fn open_line(&self) -> Result<Box<dyn ByteLink>, PortError> {
         match self {
             PortName::Line(line) => Ok(Box::new(line.open()?)),
-            PortName::Slcan { .. } | PortName::SocketCan(_) => Err(PortError::WrongKind {
-                port: self.to_string(),
-                wanted: "serial line",
-                usable: "a device path or tcp:HOST:PORT",
-            }),
             #[cfg(feature = "sim")]
-            PortName::Sim(config) => crate::sim::open_line(config.as_deref()),
-            #[cfg(not(feature = "sim"))]
-            PortName::Sim(_) => Err(PortError::Simulated { port: self.to_string() }),
+            PortName::Sim(config) => Ok(Box::new(crate::sim::open_line(config.as_deref())?)),
+            other => Err(other.no_line()),
         }
     }
 
@@ -121,15 +117,27 @@ impl PortName {
                 Ok(if *echo { Box::new(EchoCanceller::new(link)) } else { Box::new(link) })
             }
             PortName::SocketCan(interface) => Ok(Box::new(SocketCanLink::open(interface)?)),
-            PortName::Line(_) => Err(PortError::WrongKind {
-                port: self.to_string(),
-                wanted: "CAN bus",
-                usable: "slcan:DEVICE, slcan:tcp:HOST:PORT or socketcan:INTERFACE",
-            }),
             #[cfg(feature = "sim")]
-            PortName::Sim(config) => crate::sim::open_can(config.as_deref()),
-            #[cfg(not(feature = "sim"))]
-            PortName::Sim(_) => Err(PortError::Simulated { port: self.to_string() }),
+            PortName::Sim(config) => Ok(Box::new(crate::sim::open_can(config.as_deref())?)),
+            other => Err(other.no_can()),
+        }
+    }
+
+    /// Why this is no serial line.
+    fn no_line(&self) -> PortError {
+        self.unusable("serial line", "a device path or tcp:HOST:PORT")
+    }
+
+    /// Why this is no CAN bus.
+    fn no_can(&self) -> PortError {
+        self.unusable("CAN bus", "slcan:DEVICE, slcan:tcp:HOST:PORT or socketcan:INTERFACE")
+    }
+
+    fn unusable(&self, wanted: &'static str, usable: &'static str) -> PortError {
+        let port = self.to_string();
+        match self {
+            PortName::Sim(_) => PortError::Simulated { port },
+            _ => PortError::WrongKind { port, wanted, usable },
         }
     }
 }

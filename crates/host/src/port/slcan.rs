@@ -104,6 +104,14 @@ impl<B: ByteLink> SlcanLink<B> {
         Ok(len > 0)
     }
 
+    pub(super) fn line(&self) -> &B {
+        &self.line
+    }
+
+    pub(super) fn line_mut(&mut self) -> &mut B {
+        &mut self.line
+    }
+
     /// How many frames the adapter refused.
     pub fn refused(&self) -> u64 {
         self.refused

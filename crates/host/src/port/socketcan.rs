@@ -67,7 +67,7 @@ impl SocketCanLink {
         }
     }
 
-    fn lost(&self, error: impl Into<std::io::Error>) -> PortError {
+    pub(super) fn lost(&self, error: impl Into<std::io::Error>) -> PortError {
         PortError::in_use(&self.interface, error)
     }
 }

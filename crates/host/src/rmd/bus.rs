@@ -1,15 +1,16 @@
 //! The blocking client: many motors, one lock around one exchange or cycle, no thread, no
 //! allocation in an exchange.
 
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
 use motorlink_proto::rmd::{
-    self as proto, CanFrame, Code, Command, Counters, Dialect, Host, Limits, MotionStatus, MotorId,
-    MotorSet, Output, Payload, ReadStatus1, Refused, Torque4,
+    self as proto, Command, Counters, Dialect, Limits, MotionStatus, MotorId, MotorSet, Payload,
+    ReadStatus1, Torque4,
 };
-use motorlink_proto::time::{self, Instant};
+use motorlink_proto::time;
 
+use super::session::{Output, Session};
 use super::{Error, Guard, MotorHandle, OnDrop};
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{CanLink, PortError, PortName};
@@ -51,9 +52,6 @@ pub enum Found {
     Echo(MotorId),
 }
 
-/// How long a motor whose replies are in doubt may go on talking, beside the times of its exchanges.
-const SETTLE_LIMIT: Duration = Duration::from_secs(2);
-
 /// How long what came meanwhile may go on coming.
 const BABBLE: time::Duration = time::Duration::from_millis(100);
 
@@ -68,17 +66,14 @@ const SCAN_WIDTH: usize = 8;
 /// for its status before anything else, in case its replies are later than that: [`Off`](proto::Off)
 /// and [`Stop`](proto::Stop) alone do not wait.
 pub struct Bus {
-    inner: Mutex<Inner>,
+    driven: Mutex<Driven<Box<dyn CanLink>>>,
     sign: LinkSign,
 }
 
-struct Inner {
-    port: Reopening<Box<dyn CanLink>>,
-    host: Host,
-    /// Motors that were given something to do by this bus and not switched off.
-    moving: MotorSet,
-    /// How long an exchange may be put off.
-    patience: time::Duration,
+/// A session and its port.
+pub(super) struct Driven<L> {
+    pub(super) port: Reopening<L>,
+    pub(super) session: Session,
 }
 
 impl Bus {
@@ -117,18 +112,12 @@ impl Bus {
     }
 
     fn on(port: Reopening<Box<dyn CanLink>>, options: Options) -> Self {
-        let mut host = Host::new();
-        host.set_timeout(options.timeout.into());
-        host.set_guard(options.guard.into());
-        for id in MotorSet::ALL {
-            host.set_limits(id, options.limits);
-        }
-        let port = port.by(|link| link.clock());
-        let sign = port.sign();
-        let times = options.guard.saturating_mul(2).saturating_add(options.timeout);
-        let patience = times.saturating_add(SETTLE_LIMIT).into();
-        let inner = Inner { port, host, moving: MotorSet::EMPTY, patience };
-        Bus { inner: Mutex::new(inner), sign }
+        Self::driving(Driven::new(port, &options))
+    }
+
+    pub(super) fn driving(driven: Driven<Box<dyn CanLink>>) -> Self {
+        let sign = driven.port.sign();
+        Bus { driven: Mutex::new(driven), sign }
     }
 
     /// Whether the port is open. Never waits, not even while another thread opens it.
@@ -138,7 +127,7 @@ impl Bus {
 
     /// Frames that belonged to no exchange.
     pub fn counters(&self) -> Counters {
-        *self.lock().host.counters()
+        self.lock().session.counters()
     }
 
     /// A motor of the bus, ID 1 to 32.
@@ -154,12 +143,12 @@ impl Bus {
 
     /// Motors that were given something to do and not switched off.
     pub fn moving(&self) -> MotorSet {
-        self.lock().moving
+        self.lock().session.moving()
     }
 
     /// Sets what a motor may be told; it holds for every call, raw frames included.
     pub fn set_limits(&self, id: MotorId, limits: Limits) {
-        self.lock().host.set_limits(id, limits);
+        self.lock().session.set_limits(id, limits);
     }
 
     /// One exchange with one motor. A motor in quarantine is waited for.
@@ -169,16 +158,13 @@ impl Bus {
 
     /// One exchange with any bytes, known command or not. A motor in quarantine is waited for.
     pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
-        let mut inner = self.lock();
-        inner.ready()?;
-        let begun = inner.port.now();
-        loop {
-            match inner.exchange(id, request) {
-                Err(Error::Quarantined { .. })
-                    if inner.port.now().since(begun) < inner.patience => {}
-                outcome => return outcome,
-            }
-        }
+        let mut driven = self.lock();
+        driven.ready()?;
+        let now = driven.port.now();
+        driven.session.ask(now, id, request)?;
+        let mut outcome = None;
+        driven.run(|_, result| outcome = Some(result))?;
+        outcome.expect("an exchange that was begun ends")
     }
 
     /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
@@ -192,17 +178,15 @@ impl Bus {
         requests: &[(MotorId, [u8; 8])],
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<(), Error> {
-        let mut inner = self.lock();
-        inner.ready()?;
+        let mut driven = self.lock();
+        driven.ready()?;
         for &(id, request) in requests {
-            let now = inner.port.now();
-            if let Err(refused) = inner.host.request(now, id, request) {
-                each(id, Err(inner.refused(refused)));
+            let now = driven.port.now();
+            if let Err(error) = driven.session.request(now, id, request) {
+                each(id, Err(error));
             }
         }
-        let name = Arc::clone(&inner.port.name);
-        let code = |of| requests.iter().find(|(id, _)| *id == of).map_or(0, |(_, data)| data[0]);
-        inner.run(|id, result| each(id, result.map_err(|error| failed(&name, id, code(id), error))))
+        driven.run(each)
     }
 
     /// Sends torques to motors 1 to 4 in one frame and gathers the replies of those in `expect`;
@@ -216,19 +200,14 @@ impl Bus {
         torques: Torque4,
         expect: MotorSet,
     ) -> Result<[Option<Result<MotionStatus, Error>>; 4], Error> {
-        let mut inner = self.lock();
-        inner.ready()?;
-        let now = inner.port.now();
-        let begun = inner.host.torque4(now, torques, expect);
-        begun.map_err(|refused| inner.refused(refused))?;
-        let name = Arc::clone(&inner.port.name);
+        let mut driven = self.lock();
+        driven.ready()?;
+        let now = driven.port.now();
+        driven.session.torque4(now, torques, expect)?;
         let mut replies = [const { None }; 4];
-        inner.run(|id, result| {
-            let reply = result
-                .map(|data| MotionStatus::decode(&data))
-                .map_err(|error| failed(&name, id, Code::Torque.into(), error));
+        driven.run(|id, result| {
             if let Some(slot) = replies.get_mut(usize::from(id.number()) - 1) {
-                *slot = Some(reply);
+                *slot = Some(result.map(|data| MotionStatus::decode(&data)));
             }
         })?;
         Ok(replies)
@@ -267,102 +246,73 @@ impl Bus {
 
     /// How long a late reply is awaited.
     pub(super) fn guard_time(&self) -> Duration {
-        self.lock().host.guard().into()
+        self.lock().session.guard().into()
     }
 
-    fn lock(&self) -> MutexGuard<'_, Inner> {
-        self.inner.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    fn lock(&self) -> MutexGuard<'_, Driven<Box<dyn CanLink>>> {
+        self.driven.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }
 
-impl Inner {
+impl<L: CanLink> Driven<L> {
+    pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
+        let port = port.by(|link| link.clock());
+        let session = Session::new(port.name.clone(), options);
+        Driven { port, session }
+    }
+
     fn ready(&mut self) -> Result<(), Error> {
-        self.port.link()?;
-        // What came meanwhile is late or unasked; left in the port it would pass for a reply.
+        self.listen()?;
         let now = self.port.now();
-        loop {
-            match self.port.link()?.0.receive(Some(Duration::ZERO)) {
-                // A bus that is never silent has to do: an Off must get through.
-                Ok(Some(_)) if self.port.now().since(now) > BABBLE => break,
-                Ok(Some(frame)) => self.host.receive(now, &frame),
-                Ok(None) => break,
-                Err(error) => return Err(self.closed(error)),
-            }
-        }
-        let now = self.port.now();
-        for id in self.host.busy() {
-            self.host.cancel(now, id);
+        for id in self.session.busy() {
+            self.session.cancel(now, id);
         }
         Ok(())
     }
 
+    /// Makes sure that the port is open and that nothing is left in it: what came meanwhile would
+    /// pass for a reply to what is sent now.
+    pub(super) fn listen(&mut self) -> Result<(), Error> {
+        self.port.link()?;
+        let now = self.port.now();
+        loop {
+            match self.port.link()?.0.receive(Some(Duration::ZERO)) {
+                // A bus that is never silent has to do: an Off must get through.
+                Ok(Some(_)) if self.port.now().since(now) > BABBLE => return Ok(()),
+                Ok(Some(frame)) => self.session.receive(now, &frame),
+                Ok(None) => return Ok(()),
+                Err(error) => return Err(self.closed(error)),
+            }
+        }
+    }
+
     /// Moves frames until no exchange is open.
-    fn run(
-        &mut self,
-        mut each: impl FnMut(MotorId, Result<[u8; 8], proto::Error>),
-    ) -> Result<(), Error> {
+    fn run(&mut self, mut each: impl FnMut(MotorId, Result<[u8; 8], Error>)) -> Result<(), Error> {
         loop {
             let now = self.port.now();
-            let moved = match self.host.poll(now) {
-                Output::Transmit(frame) => {
-                    self.moving = self.moving.union(told_to_move(&frame));
-                    self.port.link().and_then(|(link, _)| link.send(&frame))
-                }
-                Output::Done { id, result } => {
-                    // A motor counts as moving from the request on, whose reply may be lost, and
-                    // until it has acknowledged that it is off or stopped.
-                    if let Ok([code, ..]) = result
-                        && matches!(Code::from(code), Code::Off | Code::Stop)
-                    {
-                        self.moving.remove(id);
-                    }
+            let moved = match self.session.poll(now) {
+                Output::Transmit(frame) => self.port.link().and_then(|(link, _)| link.send(&frame)),
+                Output::Done(id, result) => {
                     each(id, result);
                     Ok(())
                 }
                 Output::Wait(None) => return Ok(()),
-                Output::Wait(Some(until)) => self.hear(now, until),
+                Output::Wait(Some(until)) => {
+                    let wait = Some(until.since(now).into());
+                    let came = self.port.link().and_then(|(link, _)| link.receive(wait));
+                    came.map(|frame| {
+                        let now = self.port.now();
+                        frame.iter().for_each(|frame| self.session.receive(now, frame));
+                    })
+                }
             };
             moved.map_err(|error| self.closed(error))?;
         }
     }
 
-    fn hear(&mut self, now: Instant, until: Instant) -> Result<(), PortError> {
-        let (link, _) = self.port.link()?;
-        if let Some(frame) = link.receive(Some(until.since(now).into()))? {
-            let now = self.port.now();
-            self.host.receive(now, &frame);
-        }
-        Ok(())
-    }
-
-    /// One exchange with a motor, or the wait until the next attempt at one: [`Error::Quarantined`].
-    fn exchange(&mut self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
-        let now = self.port.now();
-        if let Err(refused) = self.host.request(now, id, request) {
-            if let Refused::Quarantined { until, .. } = refused {
-                self.hear(now, until).map_err(|error| self.closed(error))?;
-            }
-            return Err(self.refused(refused));
-        }
-        let mut outcome = Err(proto::Error::Timeout);
-        self.run(|_, result| outcome = result)?;
-        outcome.map_err(|error| failed(&self.port.name, id, request[0], error))
-    }
-
-    fn closed(&mut self, error: PortError) -> Error {
+    pub(super) fn closed(&mut self, error: PortError) -> Error {
         self.port.close();
         error.into()
-    }
-
-    fn refused(&self, refused: Refused) -> Error {
-        match refused {
-            Refused::Quarantined { id, .. } => {
-                Error::Quarantined { port: Arc::clone(&self.port.name), id }
-            }
-            Refused::Limit { id, exceeded } => Error::Limit { id, exceeded },
-            Refused::OutOfReach(id) => Error::OutOfReach(id),
-            Refused::Busy(id) => Error::Twice(id),
-        }
     }
 }
 
@@ -374,24 +324,5 @@ fn found(id: MotorId, outcome: Result<[u8; 8], Error>) -> Option<Found> {
         Ok(reply) => Some(Found::Motor(id, proto::Status1::decode(&reply))),
         Err(Error::Foreign { dialect, .. }) => Some(Found::Foreign(id, dialect)),
         Err(_) => None,
-    }
-}
-
-/// The motors that a frame of ours tells to move.
-fn told_to_move(frame: &CanFrame) -> MotorSet {
-    let moves = |code| Code::from(code).info().is_some_and(|row| row.moves);
-    match (MotorId::from_can_id(frame.id()), frame.data()) {
-        (Some(id), [code, ..]) if moves(*code) => MotorSet::from(id),
-        (Some(_), _) => MotorSet::EMPTY,
-        (None, _) => MotorSet::TORQUE4,
-    }
-}
-
-fn failed(name: &Arc<str>, id: MotorId, code: u8, error: proto::Error) -> Error {
-    let port = Arc::clone(name);
-    match error {
-        proto::Error::Foreign(dialect) => Error::Foreign { port, id, dialect },
-        proto::Error::Quarantined => Error::Quarantined { port, id },
-        _ => Error::Timeout { port, id, code: Code::from(code) },
     }
 }

@@ -14,8 +14,10 @@
 
 mod bus;
 mod error;
+mod event;
 mod guard;
 mod motor;
+mod session;
 
 pub use motorlink_proto::rmd::{
     Acceleration, CanFrame, Circle, CirclePosition, CirclePositionLimited, Code, Command,
@@ -27,5 +29,6 @@ pub use motorlink_proto::units::*;
 
 pub use bus::{Bus, Found, Options};
 pub use error::Error;
+pub use event::EventBus;
 pub use guard::{Guard, OnDrop, Stopped};
 pub use motor::MotorHandle;

@@ -1,6 +1,7 @@
 //! Links to drives inside the process. The port `sim:` is one on a clock that runs.
 
 use std::collections::VecDeque;
+use std::os::fd::BorrowedFd;
 use std::path::Path;
 use std::time::Duration;
 
@@ -11,7 +12,7 @@ use motorlink_sim::rmd::RmdConfig;
 use super::drives::{Drives, Stage, Station};
 use super::{BenchConfig, ConfigError};
 use crate::Clock;
-use crate::port::{ByteLink, CanLink, PortError};
+use crate::port::{ByteLink, CanLink, EventCan, EventLine, Evented, PortError};
 
 /// The line of an ST drive. Bytes take no time on it.
 pub(super) struct SimLine {
@@ -53,6 +54,16 @@ impl ByteLink for SimLine {
 
     fn clock(&self) -> Option<Clock> {
         Some(self.clock.clone())
+    }
+}
+
+impl Evented for SimLine {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        Ok(false)
     }
 }
 
@@ -99,21 +110,30 @@ fn wait(clock: &Clock, due: Option<Instant>, timeout: Option<Duration>) {
     }
 }
 
+impl Evented for SimCan {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        Ok(false)
+    }
+}
+
 /// Opens `sim:` as a serial line.
-pub(crate) fn open_line(config: Option<&Path>) -> Result<Box<dyn ByteLink>, PortError> {
+pub(crate) fn open_line(config: Option<&Path>) -> Result<impl EventLine + use<>, PortError> {
     let station = read(config).and_then(|config| config.station(Instant(0)));
     let station = station.map_err(|error| refused(config, &error))?;
-    Ok(Box::new(SimLine::new(
-        Stage::new(Drives { st: Some(station), rmd: None }),
-        Clock::running(),
-    )))
+    let stage = Stage::new(Drives { st: Some(station), rmd: None });
+    Ok(SimLine::new(stage, Clock::running()))
 }
 
 /// Opens `sim:` as a CAN bus.
-pub(crate) fn open_can(config: Option<&Path>) -> Result<Box<dyn CanLink>, PortError> {
+pub(crate) fn open_can(config: Option<&Path>) -> Result<impl EventCan + use<>, PortError> {
     let bus = read(config).and_then(|config| config.bus(Instant(0), RmdConfig::factory_rom));
     let bus = bus.map_err(|error| refused(config, &error))?;
-    Ok(Box::new(SimCan::new(Stage::new(Drives { st: None, rmd: Some(bus) }), Clock::running())))
+    let stage = Stage::new(Drives { st: None, rmd: Some(bus) });
+    Ok(SimCan::new(stage, Clock::running()))
 }
 
 fn read(path: Option<&Path>) -> Result<BenchConfig, ConfigError> {

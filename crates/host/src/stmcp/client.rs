@@ -5,12 +5,11 @@ use std::time::Duration;
 
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
-    BoardInfo, Command, Config, Counters, Frame, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor,
-    Output, Parse, Profile, Recovery, Request, RequestError,
+    BoardInfo, Config, Counters, Line, MAX_FRAME, Master, Motor, Output, Profile, Request,
 };
 use motorlink_proto::time::{self, Instant};
 
-use super::error::{Target, advice, hint};
+use super::session::{Rules, Session};
 use super::started::Started;
 use super::{Error, Guard, Limits, MotorHandle};
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
@@ -68,20 +67,18 @@ pub struct FirmwareVersion {
 /// [`link_state`](Self::link_state). A failed exchange loses the line, which the next call recovers
 /// as [`Config::recovery`] says.
 pub struct Client {
-    inner: Mutex<Inner>,
+    driven: Mutex<Driven<Box<dyn ByteLink>>>,
     sign: LinkSign,
-    profile: Profile,
-    limits: Limits,
+    rules: Rules,
 }
 
-struct Inner {
-    port: Reopening<Box<dyn ByteLink>>,
-    master: Master,
-    received: [u8; 256],
-    /// Motors that this client started and did not stop.
-    started: Started,
+/// A session and its port.
+pub(super) struct Driven<L> {
+    pub(super) port: Reopening<L>,
+    pub(super) session: Session,
+    pub(super) received: [u8; 256],
     /// When the last exchange ended.
-    ended: Instant,
+    pub(super) ended: Instant,
 }
 
 impl Client {
@@ -123,22 +120,17 @@ impl Client {
     }
 
     fn on(port: Reopening<Box<dyn ByteLink>>, options: Options) -> Self {
-        let port = port.by(|link| link.clock());
-        let sign = port.sign();
-        let master = Master::new(options.line);
-        let inner = Inner {
-            ended: port.now(),
-            port,
-            master,
-            received: [0; 256],
-            started: Started::default(),
-        };
-        Client { inner: Mutex::new(inner), sign, profile: options.profile, limits: options.limits }
+        Self::driving(Driven::new(port, &options))
+    }
+
+    pub(super) fn driving(driven: Driven<Box<dyn ByteLink>>) -> Self {
+        let (sign, rules) = (driven.port.sign(), driven.session.rules());
+        Client { driven: Mutex::new(driven), sign, rules }
     }
 
     /// The profile that the drive is expected to follow.
     pub fn profile(&self) -> Profile {
-        self.profile
+        self.rules.profile
     }
 
     /// Whether the port is open. Never waits, not even while another thread opens it.
@@ -148,12 +140,12 @@ impl Client {
 
     /// Whether the last exchange ended in step.
     pub fn line(&self) -> Line {
-        self.lock().master.line()
+        self.lock().session.line()
     }
 
     /// What came without being asked for.
     pub fn counters(&self) -> Counters {
-        self.lock().master.counters()
+        self.lock().session.counters()
     }
 
     /// A motor of the drive, 1 to 7.
@@ -169,7 +161,7 @@ impl Client {
 
     /// Motors that this client started and did not stop.
     pub fn started(&self) -> impl Iterator<Item = Motor> + use<> {
-        self.lock().started.motors()
+        self.lock().session.started().motors()
     }
 
     /// Name and version of the SDK (4.7).
@@ -200,90 +192,73 @@ impl Client {
         request: &Request<'_>,
         reply: impl FnOnce(&[u8]) -> Option<T>,
     ) -> Result<T, Error> {
-        addressable(motor)?;
-        self.limits.check(request)?;
-        let mut inner = self.lock();
-        inner.ready()?;
-        let begun = inner.master.request(motor, request);
-        inner.conclude(begun, motor, Some(request), || what(request), reply)
+        self.rules.check(motor, request)?;
+        let mut driven = self.lock();
+        driven.ready()?;
+        driven.session.request(motor, request)?;
+        driven.conclude(reply)
     }
 
     /// One exchange with any frame code and payload; gives the acknowledge's payload.
     pub fn raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Vec<u8>, Error> {
-        addressable(motor)?;
-        let header = Frame::header(code, motor);
-        let mut frame = [0; MAX_FRAME];
-        let what = || format!("frame code {code:#04x}");
-        let sent =
-            Frame { header, payload }.encode(&mut frame).ok_or_else(|| Error::TooLong(what()))?;
-        let request = match Frame::parse(sent) {
-            Parse::Frame(frame, _) => Request::decode(self.profile, &frame).ok(),
-            _ => None,
-        };
-        if let Some(request) = &request {
-            self.limits.check(request)?;
-        }
-        let mut inner = self.lock();
-        inner.ready()?;
-        let begun = inner.master.request_raw(header, payload);
-        inner.conclude(begun, motor, request.as_ref(), what, |payload| Some(payload.to_vec()))
+        self.rules.check_raw(motor, code, payload)?;
+        let mut driven = self.lock();
+        driven.ready()?;
+        driven.session.raw(motor, code, payload)?;
+        driven.conclude(|payload| Some(payload.to_vec()))
     }
 
     /// Sends STOP_MOTOR without waiting for an answer: what is left when the drive's replies do not
     /// come. Any other request would wait until the line has recovered.
     pub fn stop_unheard(&self, motor: Motor) -> Result<(), Error> {
         let mut frame = [0; MAX_FRAME];
-        let stop = Request::Execute(Command::StopMotor);
-        let frame = stop.encode(motor.number(), &mut frame).unwrap_or(&[]);
-        let mut inner = self.lock();
-        inner.master.lost();
-        let written = inner.port.link().and_then(|(link, _)| link.write(frame));
+        let mut driven = self.lock();
+        let stop = driven.session.stop_unheard(motor, &mut frame);
+        let written = driven.port.link().and_then(|(link, _)| link.write(stop));
         if written.is_err() {
-            inner.port.close();
+            driven.port.close();
         }
         Ok(written?)
     }
 
     /// The drive has no such motor, which may have been taken for started.
     pub(super) fn is_missing(&self, motor: Motor) {
-        self.lock().started.is_missing(motor);
+        self.lock().session.is_missing(motor);
     }
 
     /// Takes the line over from another master, which started these motors. `unanswered` is what it
     /// sent last, if the reply to that may still come.
     pub(super) fn take_over(&self, started: Started, unanswered: Option<&[u8]>) {
-        let mut inner = self.lock();
-        inner.started = started;
-        if let Some(sent) = unanswered {
-            let payload = sent.get(2..).unwrap_or(&[]);
-            let payload = &payload[..payload.len().min(MAX_PAYLOAD)];
-            // It always fits; what matters is which question it was.
-            let _ = inner.master.request_raw(sent.first().copied().unwrap_or(0), payload);
-            inner.master.abandon();
-        }
+        self.lock().session.take_over(started, unanswered);
     }
 
     /// What [`take_over`](Self::take_over) was given and later calls left of it.
     pub(super) fn hand_over(&self) -> Started {
-        self.lock().started
+        self.lock().session.started()
     }
 
     /// A poisoned lock is taken all the same: an exchange that panicked left the master in a state
     /// that its next request deals with.
-    fn lock(&self) -> MutexGuard<'_, Inner> {
-        self.inner.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    fn lock(&self) -> MutexGuard<'_, Driven<Box<dyn ByteLink>>> {
+        self.driven.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }
 
-impl Inner {
+impl<L: ByteLink> Driven<L> {
+    pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
+        let port = port.by(|link| link.clock());
+        let session = Session::new(port.name.clone(), options);
+        Driven { ended: port.now(), port, session, received: [0; 256] }
+    }
+
     /// Makes sure that the port is open and no abandoned exchange is under way.
-    fn ready(&mut self) -> Result<(), PortError> {
+    pub(super) fn ready(&mut self) -> Result<(), PortError> {
         let idle = self.port.now().since(self.ended) > IDLE;
         let (link, reopened) = self.port.link()?;
-        if reopened && self.master.config_mut().recovery == Recovery::None {
-            self.master.reopened();
+        if reopened {
+            self.session.reopened();
         }
-        self.master.abandon();
+        self.session.abandon();
         if idle {
             let size = match link.read(&mut self.received, Some(Duration::ZERO)) {
                 Ok(size) => size,
@@ -293,49 +268,26 @@ impl Inner {
                 }
             };
             let now = self.port.now();
-            self.master.receive(now, &self.received[..size]);
+            self.session.receive(now, &self.received[..size]);
         }
         Ok(())
     }
 
-    fn conclude<T>(
-        &mut self,
-        begun: Result<(), RequestError>,
-        motor: u8,
-        request: Option<&Request<'_>>,
-        what: impl Fn() -> String,
-        reply: impl FnOnce(&[u8]) -> Option<T>,
-    ) -> Result<T, Error> {
-        if begun.is_err() {
-            return Err(Error::TooLong(what()));
-        }
-        let addressed = self.started.asked(motor, request);
-        let (port, target) = (self.port.name.clone(), Target(motor));
+    /// Brings the exchange that was begun to its end.
+    fn conclude<T>(&mut self, reply: impl FnOnce(&[u8]) -> Option<T>) -> Result<T, Error> {
         let outcome = self.run(reply);
         self.ended = self.port.now();
         match outcome {
-            Ok(Ok((Some(value), _))) => {
-                self.started.acknowledged(addressed, request);
-                Ok(value)
-            }
-            Ok(Ok((None, size))) => {
-                // A reply that fits no request: somebody else's, perhaps.
-                self.master.lost();
-                Err(Error::Reply { port, motor: target, what: what(), size })
-            }
-            Ok(Err(proto::Error::Refused(code))) => {
-                Err(Error::Refused { port, motor: target, what: what(), code, hint: hint(code) })
-            }
-            Ok(Err(proto::Error::Failed(failure))) => {
-                let hint = advice(failure);
-                Err(Error::Failed { port, motor: target, what: what(), failure, hint })
-            }
-            Err(error) => {
-                self.master.abandon();
-                self.port.close();
-                Err(error.into())
-            }
+            Ok(outcome) => self.session.conclude(outcome),
+            Err(error) => Err(self.lost(error)),
         }
+    }
+
+    /// The port failed in the middle of an exchange.
+    pub(super) fn lost(&mut self, error: PortError) -> Error {
+        self.session.abandon();
+        self.port.close();
+        error.into()
     }
 
     /// Moves bytes until the exchange is over; gives what `reply` made of the payload, and its size.
@@ -345,33 +297,18 @@ impl Inner {
     ) -> Result<Result<(Option<T>, usize), proto::Error>, PortError> {
         loop {
             let now = self.port.now();
-            match self.master.poll(now) {
+            match self.session.poll(now) {
                 Output::Transmit(bytes) => self.port.link()?.0.write(bytes)?,
                 Output::Wait(until) => {
                     let wait = until.map(|until| until.since(now).into());
                     let size = self.port.link()?.0.read(&mut self.received, wait)?;
                     let now = self.port.now();
-                    self.master.receive(now, &self.received[..size]);
+                    self.session.receive(now, &self.received[..size]);
                 }
                 Output::Done(result) => {
                     return Ok(result.map(|payload| (reply(payload), payload.len())));
                 }
             }
         }
-    }
-}
-
-/// Motor numbers have three bits.
-fn addressable(motor: u8) -> Result<(), Error> {
-    if motor <= Motor::MAX { Ok(()) } else { Err(Error::NoSuchMotor(motor)) }
-}
-
-/// A request in words, for messages.
-fn what(request: &Request<'_>) -> String {
-    match request {
-        Request::SetRegister { register, .. } => format!("writing {register}"),
-        Request::GetRegister(register) => format!("reading {register}"),
-        Request::Execute(command) => command.to_string(),
-        other => other.code().name().to_owned(),
     }
 }

@@ -5,7 +5,7 @@ use motorlink_proto::stmcp::{
     Request,
 };
 
-use super::started::{Started, starts};
+use super::started::{Effect, Started};
 
 /// Reads along on a line, from the host's bytes and the drive's.
 ///
@@ -105,12 +105,11 @@ impl Follower {
             Parse::Frame(frame, size) if size == self.request.len() => frame,
             _ => return self.lose(),
         };
-        // Commands and TARGET_MOTOR are the same in every profile.
-        let request = Request::decode(Profile::Spec, &frame).ok();
-        let addressed = self.started.asked(frame.motor(), request.as_ref());
+        let effect = effect(&frame);
+        let addressed = self.started.asked(frame.motor(), effect);
         match (header, code) {
             (HEADER_ACK, _) if !self.out_of_step => {
-                self.started.acknowledged(addressed, request.as_ref());
+                self.started.acknowledged(addressed, effect);
             }
             (HEADER_ACK, _) => {}
             // The drive may take the rest of a damaged frame for another.
@@ -131,12 +130,17 @@ impl Follower {
         for begin in 0..self.recent.len() {
             if let Parse::Frame(frame, size) = Frame::parse(&self.recent[begin..])
                 && begin + size == self.recent.len()
-                && Request::decode(Profile::Spec, &frame).is_ok_and(|request| starts(&request))
+                && effect(&frame) == Effect::Starts
             {
                 self.started.presume(frame.motor());
             }
         }
     }
+}
+
+/// Commands and TARGET_MOTOR are the same in every profile.
+fn effect(frame: &Frame<'_>) -> Effect {
+    Effect::of(Request::decode(Profile::Spec, frame).ok().as_ref())
 }
 
 #[cfg(test)]

@@ -15,12 +15,14 @@
 
 mod client;
 mod error;
+mod event;
 mod follow;
 mod guard;
 mod limits;
 mod motor;
 mod relay;
 mod scan;
+mod session;
 mod started;
 mod transcript;
 mod value;
@@ -34,6 +36,7 @@ pub use motorlink_proto::stmcp::{
 
 pub use client::{Client, FirmwareVersion, Info, Options};
 pub use error::Error;
+pub use event::{EventClient, Progress};
 pub use guard::{Guard, Stopped};
 pub use limits::{LimitError, Limits};
 pub use motor::MotorHandle;

@@ -5,6 +5,33 @@ use motorlink_proto::stmcp::{Command, Motor, RegisterId, Request};
 /// Every motor that a drive can have.
 const ALL: u8 = 0x7F;
 
+/// What a request does to the account of started motors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Effect {
+    None,
+    /// It may set a motor turning until it is stopped. An alignment ends by itself.
+    Starts,
+    Stops,
+    /// Motor number 0 addresses another motor from now on.
+    Retargets,
+}
+
+impl Effect {
+    pub(super) fn of(request: Option<&Request<'_>>) -> Self {
+        match request {
+            Some(Request::Execute(command)) => match command {
+                Command::StartMotor | Command::StartStop | Command::ScStart => Effect::Starts,
+                Command::StopMotor | Command::ScStop => Effect::Stops,
+                _ => Effect::None,
+            },
+            Some(Request::SetRegister { register: RegisterId::TARGET_MOTOR, .. }) => {
+                Effect::Retargets
+            }
+            _ => Effect::None,
+        }
+    }
+}
+
 /// A motor counts as started from the START on, whose reply may be lost, and until a STOP is
 /// acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -18,8 +45,8 @@ pub(super) struct Started {
 impl Started {
     /// A request for motor number `motor` leaves. Gives the motor that it addresses, where that is
     /// known, for [`acknowledged`](Self::acknowledged).
-    pub(super) fn asked(&mut self, motor: u8, request: Option<&Request<'_>>) -> Option<Motor> {
-        if request.is_some_and(starts) {
+    pub(super) fn asked(&mut self, motor: u8, effect: Effect) -> Option<Motor> {
+        if effect == Effect::Starts {
             self.presume(motor);
         }
         // Unless the drive acknowledges, its current motor may have changed or not.
@@ -28,13 +55,11 @@ impl Started {
     }
 
     /// The request that was [`asked`](Self::asked) last was acknowledged.
-    pub(super) fn acknowledged(&mut self, addressed: Option<Motor>, request: Option<&Request<'_>>) {
-        match request {
-            Some(Request::SetRegister { register: RegisterId::TARGET_MOTOR, .. }) => return,
-            Some(Request::Execute(Command::StopMotor | Command::ScStop)) => {
-                self.motors &= !addressed.map_or(0, bit);
-            }
-            _ => {}
+    pub(super) fn acknowledged(&mut self, addressed: Option<Motor>, effect: Effect) {
+        match effect {
+            Effect::Retargets => return,
+            Effect::Stops => self.motors &= !addressed.map_or(0, bit),
+            Effect::None | Effect::Starts => {}
         }
         self.current = addressed;
     }
@@ -61,11 +86,6 @@ impl Started {
     pub(super) fn motors(self) -> impl Iterator<Item = Motor> {
         (1..=Motor::MAX).filter_map(Motor::new).filter(move |motor| self.motors & bit(*motor) != 0)
     }
-}
-
-/// Whether a request may set a motor turning until it is stopped. An alignment ends by itself.
-pub(super) fn starts(request: &Request<'_>) -> bool {
-    matches!(request, Request::Execute(Command::StartMotor | Command::StartStop | Command::ScStart))
 }
 
 const fn bit(motor: Motor) -> u8 {

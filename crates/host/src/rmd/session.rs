@@ -1,0 +1,247 @@
+//! The host's end of a CAN bus without the bus: what the blocking client and event loops share.
+
+use std::sync::Arc;
+
+use motorlink_proto::rmd::{
+    self as proto, CanFrame, Code, Command, Counters, Host, Limits, MotorId, MotorSet, Refused,
+    Torque, Torque4,
+};
+use motorlink_proto::time::{Duration, Instant};
+
+use super::{Error, Options};
+
+/// How long a motor whose replies are in doubt may go on talking, beside the times of its exchanges.
+const SETTLE_LIMIT: Duration = Duration::from_millis(2_000);
+
+/// A host that waits for motors in quarantine, with the motors that it set moving, and its errors in
+/// words: sans I/O. [`request`](Self::request), [`ask`](Self::ask) or [`torque4`](Self::torque4),
+/// then [`poll`](Self::poll) until it waits, handing in with [`receive`](Self::receive) what comes.
+#[derive(Debug, Clone)]
+pub(super) struct Session {
+    port: Arc<str>,
+    host: Host,
+    /// Motors that were given something to do and not switched off.
+    moving: MotorSet,
+    /// How long an exchange may be put off.
+    patience: Duration,
+    /// What each motor was asked last.
+    asked: [Asked; MotorId::COUNT],
+    /// Motors whose quarantine an exchange outlasts.
+    insisting: MotorSet,
+    /// Those of them whose request cannot leave yet.
+    waiting: MotorSet,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    request: [u8; 8],
+    /// When a motor in quarantine is waited for no longer.
+    until: Instant,
+}
+
+/// What the caller has to do next.
+#[derive(Debug)]
+pub(super) enum Output {
+    /// Send this frame, then poll again.
+    Transmit(CanFrame),
+    /// The exchange with a motor is over.
+    Done(MotorId, Result<[u8; 8], Error>),
+    /// Hand in what comes until then; `None` while no exchange is under way.
+    Wait(Option<Instant>),
+}
+
+impl Session {
+    /// `port` is for messages.
+    pub(super) fn new(port: Arc<str>, options: &Options) -> Self {
+        let mut host = Host::new();
+        host.set_timeout(options.timeout.into());
+        host.set_guard(options.guard.into());
+        for id in MotorSet::ALL {
+            host.set_limits(id, options.limits);
+        }
+        let times = options.guard.saturating_mul(2).saturating_add(options.timeout);
+        let nothing = Asked { request: [0; 8], until: Instant(0) };
+        Session {
+            port,
+            host,
+            moving: MotorSet::EMPTY,
+            patience: SETTLE_LIMIT + times.into(),
+            asked: [nothing; MotorId::COUNT],
+            insisting: MotorSet::EMPTY,
+            waiting: MotorSet::EMPTY,
+        }
+    }
+
+    pub(super) fn counters(&self) -> Counters {
+        *self.host.counters()
+    }
+
+    pub(super) fn moving(&self) -> MotorSet {
+        self.moving
+    }
+
+    pub(super) fn guard(&self) -> Duration {
+        self.host.guard()
+    }
+
+    pub(super) fn set_limits(&mut self, id: MotorId, limits: Limits) {
+        self.host.set_limits(id, limits);
+    }
+
+    /// The motors with an exchange under way.
+    pub(super) fn busy(&self) -> MotorSet {
+        self.host.busy().union(self.waiting)
+    }
+
+    /// Begins an exchange with a motor that is not in quarantine.
+    ///
+    /// # Errors
+    /// Nothing is sent then.
+    pub(super) fn request(
+        &mut self,
+        now: Instant,
+        id: MotorId,
+        request: [u8; 8],
+    ) -> Result<(), Error> {
+        self.free(id)?;
+        let begun = self.host.request(now, id, request);
+        begun.map_err(|refused| self.refused(refused))?;
+        self.asked[place(id)] = Asked { request, until: now };
+        Ok(())
+    }
+
+    /// Begins an exchange that waits for a motor in quarantine.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub(super) fn ask(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
+        self.free(id)?;
+        match self.host.request(now, id, request) {
+            Ok(()) => {}
+            Err(Refused::Quarantined { .. }) => self.waiting.insert(id),
+            Err(refused) => return Err(self.refused(refused)),
+        }
+        self.insisting.insert(id);
+        self.asked[place(id)] = Asked { request, until: now + self.patience };
+        Ok(())
+    }
+
+    /// Begins an exchange with those of motors 1 to 4 that are expected to answer.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub(super) fn torque4(
+        &mut self,
+        now: Instant,
+        torques: Torque4,
+        expect: MotorSet,
+    ) -> Result<(), Error> {
+        if let Some(id) = self.waiting.intersection(MotorSet::TORQUE4).next() {
+            return Err(Error::Twice(id));
+        }
+        let begun = self.host.torque4(now, torques, expect);
+        begun.map_err(|refused| self.refused(refused))?;
+        let request = Torque::default().encode();
+        for id in expect {
+            self.asked[place(id)] = Asked { request, until: now };
+        }
+        Ok(())
+    }
+
+    pub(super) fn receive(&mut self, now: Instant, frame: &CanFrame) {
+        self.host.receive(now, frame);
+    }
+
+    pub(super) fn poll(&mut self, now: Instant) -> Output {
+        loop {
+            let mut again = None;
+            for id in self.waiting {
+                let Asked { request, until } = self.asked[place(id)];
+                match self.host.request(now, id, request) {
+                    Err(Refused::Quarantined { until: free, .. }) if now < until => {
+                        again = Some(again.map_or(free, |again: Instant| again.min(free)));
+                    }
+                    begun => {
+                        self.waiting.remove(id);
+                        if let Err(refused) = begun {
+                            self.insisting.remove(id);
+                            return Output::Done(id, Err(self.refused(refused)));
+                        }
+                    }
+                }
+            }
+            match self.host.poll(now) {
+                proto::Output::Transmit(frame) => {
+                    self.moving = self.moving.union(told_to_move(&frame));
+                    return Output::Transmit(frame);
+                }
+                proto::Output::Done { id, result: Err(proto::Error::Quarantined) }
+                    if self.insisting.contains(id) && now < self.asked[place(id)].until =>
+                {
+                    self.waiting.insert(id);
+                }
+                proto::Output::Done { id, result } => {
+                    self.insisting.remove(id);
+                    // A motor counts as moving from the request on, whose reply may be lost, and
+                    // until it has acknowledged that it is off or stopped.
+                    if let Ok([code, ..]) = result
+                        && matches!(Code::from(code), Code::Off | Code::Stop)
+                    {
+                        self.moving.remove(id);
+                    }
+                    return Output::Done(id, result.map_err(|error| self.failed(id, error)));
+                }
+                proto::Output::Wait(until) => {
+                    return Output::Wait(until.into_iter().chain(again).min());
+                }
+            }
+        }
+    }
+
+    /// Gives up the exchange with a motor, if there is one. Its reply may still come.
+    pub(super) fn cancel(&mut self, now: Instant, id: MotorId) {
+        self.insisting.remove(id);
+        self.waiting.remove(id);
+        self.host.cancel(now, id);
+    }
+
+    fn free(&self, id: MotorId) -> Result<(), Error> {
+        if self.waiting.contains(id) { Err(Error::Twice(id)) } else { Ok(()) }
+    }
+
+    fn refused(&self, refused: Refused) -> Error {
+        match refused {
+            Refused::Quarantined { id, .. } => {
+                Error::Quarantined { port: Arc::clone(&self.port), id }
+            }
+            Refused::Limit { id, exceeded } => Error::Limit { id, exceeded },
+            Refused::OutOfReach(id) => Error::OutOfReach(id),
+            Refused::Busy(id) => Error::Twice(id),
+        }
+    }
+
+    fn failed(&self, id: MotorId, error: proto::Error) -> Error {
+        let port = Arc::clone(&self.port);
+        let [code, ..] = self.asked[place(id)].request;
+        match error {
+            proto::Error::Foreign(dialect) => Error::Foreign { port, id, dialect },
+            proto::Error::Quarantined => Error::Quarantined { port, id },
+            _ => Error::Timeout { port, id, code: Code::from(code) },
+        }
+    }
+}
+
+/// The place of a motor in a table of all.
+fn place(id: MotorId) -> usize {
+    usize::from(id.number()) - 1
+}
+
+/// The motors that a frame of ours tells to move.
+fn told_to_move(frame: &CanFrame) -> MotorSet {
+    let moves = |code| Code::from(code).info().is_some_and(|row| row.moves);
+    match (MotorId::from_can_id(frame.id()), frame.data()) {
+        (Some(id), [code, ..]) if moves(*code) => MotorSet::from(id),
+        (Some(_), _) => MotorSet::EMPTY,
+        (None, _) => MotorSet::TORQUE4,
+    }
+}

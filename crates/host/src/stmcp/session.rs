@@ -1,0 +1,248 @@
+//! One end of a line to an ST drive without the line: what the blocking client and event loops share.
+
+use std::fmt;
+use std::sync::Arc;
+
+use motorlink_proto::stmcp as proto;
+use motorlink_proto::stmcp::{
+    Command, Counters, Frame, FrameCode, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor, Output,
+    Parse, Profile, Recovery, RegisterId, Request, RequestError,
+};
+use motorlink_proto::time::Instant;
+
+use super::error::{Target, advice, hint};
+use super::started::{Effect, Started};
+use super::{Error, Limits, Options};
+
+/// What a request is held to before it leaves.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rules {
+    pub(super) profile: Profile,
+    pub(super) limits: Limits,
+}
+
+/// A master with the limits of its caller, the motors that it started, and its errors in words: sans
+/// I/O. [`request`](Self::request) or [`raw`](Self::raw), then [`poll`](Self::poll) until it says
+/// [`Output::Done`], handing in with [`receive`](Self::receive) what comes meanwhile, then
+/// [`conclude`](Self::conclude).
+#[derive(Debug, Clone)]
+pub(super) struct Session {
+    port: Arc<str>,
+    rules: Rules,
+    master: Master,
+    /// Motors that were started and not stopped.
+    started: Started,
+    asked: Asked,
+}
+
+/// The request under way.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    motor: u8,
+    /// The motor that this addresses, where it is known.
+    addressed: Option<Motor>,
+    effect: Effect,
+    what: What,
+}
+
+/// A request in words, for messages.
+#[derive(Debug, Clone, Copy)]
+enum What {
+    Writing(RegisterId),
+    Reading(RegisterId),
+    Executing(Command),
+    Known(FrameCode),
+    Raw(u8),
+}
+
+impl Rules {
+    pub(super) fn check(&self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
+        addressable(motor)?;
+        Ok(self.limits.check(request)?)
+    }
+
+    /// As [`check`](Self::check), for any frame; gives the effect that it has as a request.
+    pub(super) fn check_raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Effect, Error> {
+        addressable(motor)?;
+        let mut frame = [0; MAX_FRAME];
+        let header = Frame::header(code, motor);
+        let sent = Frame { header, payload }.encode(&mut frame);
+        let sent = sent.ok_or_else(|| Error::TooLong(What::Raw(code).to_string()))?;
+        let request = match Frame::parse(sent) {
+            Parse::Frame(frame, _) => Request::decode(self.profile, &frame).ok(),
+            _ => None,
+        };
+        if let Some(request) = &request {
+            self.limits.check(request)?;
+        }
+        Ok(Effect::of(request.as_ref()))
+    }
+}
+
+impl Session {
+    /// On a line that is up. `port` is for messages.
+    pub(super) fn new(port: Arc<str>, options: &Options) -> Self {
+        let rules = Rules { profile: options.profile, limits: options.limits };
+        let what = What::Known(FrameCode::GetBoardInfo);
+        let asked = Asked { motor: 0, addressed: None, effect: Effect::None, what };
+        let master = Master::new(options.line);
+        Session { port, rules, master, started: Started::default(), asked }
+    }
+
+    pub(super) fn rules(&self) -> Rules {
+        self.rules
+    }
+
+    pub(super) fn line(&self) -> Line {
+        self.master.line()
+    }
+
+    pub(super) fn counters(&self) -> Counters {
+        self.master.counters()
+    }
+
+    pub(super) fn started(&self) -> Started {
+        self.started
+    }
+
+    /// Begins an exchange with motor number `motor`, where 0 is the drive's current motor.
+    ///
+    /// # Errors
+    /// What the limits forbid; nothing is sent then.
+    pub(super) fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
+        self.rules.check(motor, request)?;
+        let begun = self.master.request(motor, request);
+        self.begun(begun, motor, Effect::of(Some(request)), What::of(request))
+    }
+
+    /// Begins an exchange with any frame code and payload.
+    ///
+    /// # Errors
+    /// Those of [`request`](Self::request).
+    pub(super) fn raw(&mut self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
+        let effect = self.rules.check_raw(motor, code, payload)?;
+        let begun = self.master.request_raw(Frame::header(code, motor), payload);
+        self.begun(begun, motor, effect, What::Raw(code))
+    }
+
+    fn begun(
+        &mut self,
+        begun: Result<(), RequestError>,
+        motor: u8,
+        effect: Effect,
+        what: What,
+    ) -> Result<(), Error> {
+        if begun.is_err() {
+            return Err(Error::TooLong(what.to_string()));
+        }
+        let addressed = self.started.asked(motor, effect);
+        self.asked = Asked { motor, addressed, effect, what };
+        Ok(())
+    }
+
+    pub(super) fn receive(&mut self, now: Instant, bytes: &[u8]) {
+        self.master.receive(now, bytes);
+    }
+
+    pub(super) fn poll(&mut self, now: Instant) -> Output<'_> {
+        self.master.poll(now)
+    }
+
+    /// The exchange is over: with what the reader of replies made of the acknowledge's payload, and
+    /// its size, or without an acknowledge.
+    pub(super) fn conclude<T>(
+        &mut self,
+        outcome: Result<(Option<T>, usize), proto::Error>,
+    ) -> Result<T, Error> {
+        let Asked { motor, addressed, effect, what } = self.asked;
+        let (port, target) = (Arc::clone(&self.port), Target(motor));
+        match outcome {
+            Ok((Some(value), _)) => {
+                self.started.acknowledged(addressed, effect);
+                Ok(value)
+            }
+            Ok((None, size)) => {
+                // A reply that fits no request: somebody else's, perhaps.
+                self.master.lost();
+                Err(Error::Reply { port, motor: target, what: what.to_string(), size })
+            }
+            Err(proto::Error::Refused(code)) => {
+                let what = what.to_string();
+                Err(Error::Refused { port, motor: target, what, code, hint: hint(code) })
+            }
+            Err(proto::Error::Failed(failure)) => {
+                let (what, hint) = (what.to_string(), advice(failure));
+                Err(Error::Failed { port, motor: target, what, failure, hint })
+            }
+        }
+    }
+
+    /// Gives up the exchange under way, if there is one. Its reply may still come.
+    pub(super) fn abandon(&mut self) {
+        self.master.abandon();
+    }
+
+    /// Tells that the line was closed and opened again.
+    pub(super) fn reopened(&mut self) {
+        if self.master.config_mut().recovery == Recovery::None {
+            self.master.reopened();
+        }
+    }
+
+    /// A STOP_MOTOR to be sent beside the exchanges, without waiting for an answer.
+    pub(super) fn stop_unheard<'a>(
+        &mut self,
+        motor: Motor,
+        frame: &'a mut [u8; MAX_FRAME],
+    ) -> &'a [u8] {
+        self.master.lost();
+        let stop = Request::Execute(Command::StopMotor);
+        stop.encode(motor.number(), frame).unwrap_or(&[])
+    }
+
+    /// The drive has no such motor, which may have been taken for started.
+    pub(super) fn is_missing(&mut self, motor: Motor) {
+        self.started.is_missing(motor);
+    }
+
+    /// Takes the line over from another master, which started these motors. `unanswered` is what it
+    /// sent last, if the reply to that may still come.
+    pub(super) fn take_over(&mut self, started: Started, unanswered: Option<&[u8]>) {
+        self.started = started;
+        if let Some(sent) = unanswered {
+            let payload = sent.get(2..).unwrap_or(&[]);
+            let payload = &payload[..payload.len().min(MAX_PAYLOAD)];
+            // It always fits; what matters is which question it was.
+            let _ = self.master.request_raw(sent.first().copied().unwrap_or(0), payload);
+            self.master.abandon();
+        }
+    }
+}
+
+impl What {
+    fn of(request: &Request<'_>) -> Self {
+        match request {
+            Request::SetRegister { register, .. } => What::Writing(*register),
+            Request::GetRegister(register) => What::Reading(*register),
+            Request::Execute(command) => What::Executing(*command),
+            other => What::Known(other.code()),
+        }
+    }
+}
+
+impl fmt::Display for What {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            What::Writing(register) => write!(f, "writing {register}"),
+            What::Reading(register) => write!(f, "reading {register}"),
+            What::Executing(command) => command.fmt(f),
+            What::Known(code) => f.write_str(code.name()),
+            What::Raw(code) => write!(f, "frame code {code:#04x}"),
+        }
+    }
+}
+
+/// Motor numbers have three bits.
+fn addressable(motor: u8) -> Result<(), Error> {
+    if motor <= Motor::MAX { Ok(()) } else { Err(Error::NoSuchMotor(motor)) }
+}
