@@ -5,6 +5,7 @@ use std::fmt::Display;
 use motorlink::port::PortError;
 use motorlink::stmcp::{ErrorCode, Failure};
 use motorlink::{rmd, stmcp};
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
@@ -129,10 +130,20 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
     kind.raise(py, error, facts)
 }
 
-/// What a port says.
+/// What a port says. What Python code raised in it is the cause; a KeyboardInterrupt goes on.
 pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
-    match error {
-        PortError::WrongKind { .. } => bad_value(py, error),
-        _ => Kind::PortError.raise(py, error, Facts::default()),
+    let raised = match error {
+        PortError::WrongKind { .. } => return bad_value(py, error),
+        PortError::Io { source, .. } => source.get_ref().and_then(|raised| raised.downcast_ref()),
+        _ => None,
+    };
+    let cause = raised.map(|raised: &PyErr| raised.clone_ref(py));
+    match cause {
+        Some(cause) if !cause.is_instance_of::<PyException>(py) => cause,
+        cause => {
+            let error = Kind::PortError.raise(py, error, Facts::default());
+            error.set_cause(py, cause);
+            error
+        }
     }
 }

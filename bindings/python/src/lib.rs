@@ -4,8 +4,10 @@
 //! [`rmd::RmdRequest`]); clients, blocking or not, carry them. Everything typed and documented for
 //! people is in the Python files on top.
 
+mod can;
 mod clock;
 mod error;
+mod machine;
 mod number;
 mod rmd;
 mod sampling;
@@ -22,6 +24,10 @@ mod _core {
 
     use super::*;
 
+    #[pymodule_export]
+    use super::can::CanPort;
+    #[pymodule_export]
+    use super::machine::{RmdMachine, StMachine};
     #[pymodule_export]
     use super::rmd::{RmdBus, RmdRequest, rmd_decode, rmd_errors_text, rmd_quantities};
     #[pymodule_export]

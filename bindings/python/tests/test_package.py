@@ -32,7 +32,19 @@ def public(module: ModuleType) -> list[tuple[str, object]]:
     return [(name, getattr(module, name)) for name in module.__all__]
 
 
-@pytest.mark.parametrize("module", [motorlink, motorlink.st, motorlink.rmd, motorlink.sim, motorlink.errors])
+@pytest.mark.parametrize(
+    "module",
+    [
+        motorlink,
+        motorlink.st,
+        motorlink.rmd,
+        motorlink.sim,
+        motorlink.errors,
+        motorlink.can,
+        motorlink.aio.st,
+        motorlink.aio.rmd,
+    ],
+)
 def test_everything_public_says_what_it_is(module: ModuleType) -> None:
     for name, thing in public(module):
         if not (inspect.isclass(thing) or inspect.isroutine(thing)):

@@ -26,6 +26,8 @@ __all__ = [
     "Refused",
     "Timeout",
     "__version__",
+    "aio",
+    "can",
     "errors",
     "rmd",
     "sim",
@@ -34,7 +36,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from motorlink import errors, rmd, sim, st
+    from motorlink import aio, can, errors, rmd, sim, st
     from motorlink._core import __version__
     from motorlink._sampling import to_pandas
     from motorlink.errors import (
@@ -51,7 +53,7 @@ else:
 
     def __getattr__(name: str) -> Any:
         """A part, loaded when it is first used: the command and pytest's plugin need no NumPy."""
-        if name in ("errors", "rmd", "sim", "st"):
+        if name in ("aio", "can", "errors", "rmd", "sim", "st"):
             return import_module(f"motorlink.{name}")
         if name not in __all__:
             raise AttributeError(f"module 'motorlink' has no attribute {name!r}")

@@ -29,6 +29,11 @@ def opened(port: Port) -> str | _core.SimPort:
     return port._port
 
 
+def opened_can(port: Port | _core.CanPort) -> str | _core.SimPort | _core.CanPort:
+    """What the extension opens as a CAN bus."""
+    return port if isinstance(port, _core.CanPort) else opened(port)
+
+
 def on_close_checked(on_close: str, known: tuple[str, ...]) -> str:
     """What is done at the end, if it is known."""
     if on_close not in known:
@@ -43,19 +48,40 @@ def end(
     *,
     in_flight: bool,
 ) -> None:
-    """Stops what was started, then closes the port.
-
-    A motor that could not be stopped is an exception, or a warning while another exception is on its
-    way, which must not be hidden.
-    """
+    """Stops what was started, then closes the port."""
     try:
         failed = stop()
     finally:
         close()
+    report(failed, port, in_flight=in_flight)
+
+
+def report(failed: list[tuple[int, MotorlinkError]], port: str, *, in_flight: bool) -> None:
+    """Tells of motors that could not be stopped.
+
+    That is an exception, or a warning while another exception is on its way, which must not be hidden.
+    """
     if not failed:
         return
     motors = "; ".join(f"motor {motor} may still be running: {error}" for motor, error in failed)
     if in_flight:
-        warnings.warn(motors, RuntimeWarning, stacklevel=3)
+        warnings.warn(motors, RuntimeWarning, stacklevel=4)
         return
     raise LineLost(motors, port=port, motor=failed[0][0]) from failed[0][1]
+
+
+def worn(rom: bool, what: str) -> None:
+    """Asks for the word that allows a write to a motor's ROM."""
+    if not rom:
+        raise BadValue(f"{what} goes to the motor's ROM, which wears: say rom=True")
+
+
+def only(profile: str, what: str, *, of: str, port: str, motor: int) -> None:
+    """Refuses what another profile than that of the bus has."""
+    if of != profile:
+        raise BadValue(
+            f"{what} are of profile {profile}, and {port} was opened with profile {of};"
+            " nothing was sent",
+            port=port,
+            motor=motor,
+        )

@@ -7,15 +7,18 @@ from motorlink._values import Found, Frame, MotionStatus, RegisterInfo
 from motorlink.errors import MotorlinkError
 
 __all__ = [
-    "__version__",
+    "CanPort",
     "RmdBus",
+    "RmdMachine",
     "RmdRequest",
     "SimBench",
     "SimPort",
     "SimRecording",
     "SimServing",
     "StClient",
+    "StMachine",
     "StRequest",
+    "__version__",
     "cli",
     "rmd_decode",
     "rmd_errors_text",
@@ -228,7 +231,7 @@ class RmdBus:
 
     @staticmethod
     def open(
-        port: str | SimPort,
+        port: str | SimPort | CanPort,
         *,
         timeout: float = 0.05,
         guard: float = 0.1,
@@ -318,3 +321,78 @@ class SimServing:
 
 def sim_run(text: str, path: str | None = None) -> dict[str, Any]: ...
 def sim_presets() -> str: ...
+
+@final
+class StMachine:
+    """A master on a serial line, driven by an event loop."""
+
+    @staticmethod
+    def open(
+        port: str,
+        *,
+        profile: str = "spec",
+        timeout: float = 1.0,
+        recovery: str = "drain",
+        speed_limit: float | None = None,
+        current_limit: float | None = None,
+        full_scale_amps: float | None = None,
+    ) -> StMachine: ...
+    @property
+    def is_open(self) -> bool: ...
+    def reopen(self) -> None: ...
+    def fileno(self) -> int | None: ...
+    def begin(self, motor: int, request: StRequest) -> None: ...
+    def begin_raw(self, motor: int, code: int, payload: bytes) -> None: ...
+    def advance(self) -> tuple[bool, Any]: ...
+    def abandon(self) -> None: ...
+    @property
+    def started(self) -> list[int]: ...
+    def close(self, *, stop: bool) -> list[tuple[int, MotorlinkError]]: ...
+    @property
+    def port(self) -> str: ...
+
+@final
+class RmdMachine:
+    """A CAN bus with RMD motors, driven by an event loop."""
+
+    @staticmethod
+    def open(
+        port: str | CanPort,
+        *,
+        timeout: float = 0.05,
+        guard: float = 0.1,
+        current_limit_a: float | None = None,
+        speed_limit_dps: float | None = None,
+        angle_limit_deg: float | None = None,
+    ) -> RmdMachine: ...
+    @property
+    def is_open(self) -> bool: ...
+    def reopen(self) -> None: ...
+    def fileno(self) -> int | None: ...
+    def ask(self, id: int, request: RmdRequest, *, patient: bool = True) -> None: ...
+    def look_for(self, id: int) -> None: ...
+    def torque4(
+        self, amps: tuple[float, float, float, float], expect: Sequence[int]
+    ) -> None: ...
+    def advance(self) -> tuple[float | None, list[tuple[int, Any]]]: ...
+    def cancel(self, id: int) -> None: ...
+    def set_limits(
+        self,
+        id: int,
+        current_a: float | None,
+        speed_dps: float | None,
+        angle_deg: float | None,
+    ) -> None: ...
+    @property
+    def moving(self) -> list[int]: ...
+    def close(self, *, stop: bool, off: bool) -> list[tuple[int, MotorlinkError]]: ...
+    @property
+    def port(self) -> str: ...
+
+@final
+class CanPort:
+    """A bus of python-can as a port; from ``motorlink.can.from_python_can``."""
+
+    def __new__(cls, bus: Any, message: Any, name: str) -> CanPort: ...
+    @property
+    def name(self) -> str: ...

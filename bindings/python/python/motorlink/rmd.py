@@ -26,7 +26,8 @@ from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import Port, end, on_close_checked, opened
+from motorlink._bus import Port, end, on_close_checked, opened_can, worn
+from motorlink._core import CanPort
 from motorlink._core import RmdRequest as Request
 from motorlink._sampling import Samples, array, columns, skips
 from motorlink._values import (
@@ -39,7 +40,7 @@ from motorlink._values import (
     MotorStatus,
     PhaseCurrents,
 )
-from motorlink.errors import BadValue, MotorlinkError
+from motorlink.errors import MotorlinkError
 
 __all__ = [
     "QUANTITIES",
@@ -89,7 +90,7 @@ read_angle = Request.read_angle
 
 
 def open(
-    port: Port,
+    port: Port | CanPort,
     *,
     timeout: float = 0.05,
     guard: float = 0.1,
@@ -101,8 +102,8 @@ def open(
     """Opens a CAN bus. Nothing is sent.
 
     ``port``
-        ``socketcan:can0``, ``slcan:/dev/ttyACM0``, ``slcan:tcp:HOST:PORT``, or ``sim:`` for simulated
-        motors inside the process.
+        ``socketcan:can0``, ``slcan:/dev/ttyACM0``, ``slcan:tcp:HOST:PORT``, ``sim:`` for simulated
+        motors inside the process, or a bus of python-can (:func:`motorlink.can.from_python_can`).
     ``timeout``
         How long to wait for a motor's reply, s.
     ``guard``
@@ -118,7 +119,7 @@ def open(
     """
     on_close_checked(on_close, _ON_CLOSE)
     core = _core.RmdBus.open(
-        opened(port),
+        opened_can(port),
         timeout=timeout,
         guard=guard,
         current_limit_a=current_limit,
@@ -431,7 +432,7 @@ class Motor:
 
         Gives the offset that the motor took (Write encoder offset command).
         """
-        _worn(rom, "the encoder offset")
+        worn(rom, "the encoder offset")
         offset: int = self._perform(Request.write_encoder_offset_to_rom(counts))
         return offset
 
@@ -440,7 +441,7 @@ class Motor:
 
         Gives the new offset, in counts (Write current position to ROM as motor zero position command).
         """
-        _worn(rom, "the zero")
+        worn(rom, "the zero")
         offset: int = self._perform(Request.write_zero_to_rom())
         return offset
 
@@ -451,8 +452,3 @@ class Motor:
 
     def __repr__(self) -> str:
         return f"<motorlink.rmd.Motor {self._id} on {self._bus.port}>"
-
-
-def _worn(rom: bool, what: str) -> None:
-    if not rom:
-        raise BadValue(f"{what} goes to the motor's ROM, which wears: say rom=True")

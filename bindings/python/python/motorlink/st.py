@@ -29,7 +29,7 @@ from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import Port, end, on_close_checked, opened
+from motorlink._bus import Port, end, on_close_checked, only, opened
 from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
 from motorlink._sampling import Samples, array, columns, skips
@@ -42,7 +42,6 @@ from motorlink._values import (
     RevupPhase,
     State,
 )
-from motorlink.errors import BadValue
 
 __all__ = [
     "Bus",
@@ -443,13 +442,7 @@ class Motor:
         return values
 
     def _only(self, profile: str, what: str) -> None:
-        if self._bus.profile != profile:
-            raise BadValue(
-                f"{what} are of profile {profile}, and {self._bus.port} was opened with profile"
-                f" {self._bus.profile}; nothing was sent",
-                port=self._bus.port,
-                motor=self._number,
-            )
+        only(profile, what, of=self._bus.profile, port=self._bus.port, motor=self._number)
 
     def __repr__(self) -> str:
         return f"<motorlink.st.Motor {self._number} on {self._bus.port}>"

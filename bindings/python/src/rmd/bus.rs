@@ -14,6 +14,7 @@ use pyo3::types::{PyByteArray, PyDict, PyList};
 use super::quantity::Quantity;
 use super::request::{RmdRequest, motion_status, motor_id, motor_status, torque};
 use super::sample::{Lane, sample};
+use crate::can::AnyPort;
 use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, closed, rmd_error};
 use crate::number::{limit, span};
@@ -55,7 +56,7 @@ impl RmdBus {
     ))]
     fn open(
         py: Python<'_>,
-        port: Port<'_>,
+        port: AnyPort<'_>,
         timeout: f64,
         guard: f64,
         current_limit_a: Option<f64>,
@@ -65,15 +66,20 @@ impl RmdBus {
         let limits = limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?;
         let options = options(py, timeout, guard, limits)?;
         let (bus, name, clock): (_, _, Arc<dyn Clock>) = match port {
-            Port::Name(name) => {
+            AnyPort::Other(Port::Name(name)) => {
                 let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
                 let bus = py.detach(|| Bus::open(&name, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
                 (bus, name.to_string(), Arc::new(RealTime::new()))
             }
-            Port::Sim(port) => {
+            AnyPort::Other(Port::Sim(port)) => {
                 let bus = Bus::over(SimPort::NAME, port.can(py)?, options);
                 (bus, SimPort::NAME.to_owned(), port.clock())
+            }
+            AnyPort::Can(port) => {
+                let port = port.get();
+                let bus = Bus::over(port.name(), port.link(), options);
+                (bus, port.name().to_owned(), Arc::new(RealTime::new()))
             }
         };
         Ok(Self::from_bus(Arc::new(bus), name, clock))
@@ -123,13 +129,8 @@ impl RmdBus {
         expect: Vec<i64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let bus = self.bus(py)?;
-        let mut torques = [TorqueCommand(0); 4];
-        for (slot, amps) in torques.iter_mut().zip(amps) {
-            *slot = torque(py, amps)?;
-        }
-        let expect: PyResult<MotorSet> = expect.into_iter().map(|id| motor_id(py, id)).collect();
-        let expect = expect?;
-        let replies = py.detach(|| bus.torque4(Torque4(torques), expect));
+        let (torques, expect) = (four_torques(py, amps)?, motor_ids(py, expect)?);
+        let replies = py.detach(|| bus.torque4(torques, expect));
         let by_id = PyDict::new(py);
         for (reply, id) in replies.map_err(|error| rmd_error(py, &error))?.into_iter().zip(1..) {
             match reply {
@@ -144,8 +145,7 @@ impl RmdBus {
     /// Asks every ID for its status; gives what answered.
     fn scan(&self, py: Python<'_>, ids: Vec<i64>) -> PyResult<Vec<Py<PyAny>>> {
         let bus = self.bus(py)?;
-        let ids: PyResult<MotorSet> = ids.into_iter().map(|id| motor_id(py, id)).collect();
-        let mut left = ids?;
+        let mut left = motor_ids(py, ids)?;
         let mut found = Vec::new();
         while !left.is_empty() {
             let some: MotorSet = left.by_ref().take(SCAN_STEP).collect();
@@ -269,7 +269,20 @@ pub(crate) fn limits(
     })
 }
 
-fn finding(py: Python<'_>, found: Found) -> PyResult<Py<PyAny>> {
+/// Torque currents of motors 1 to 4, A.
+pub(crate) fn four_torques(py: Python<'_>, amps: [f64; 4]) -> PyResult<Torque4> {
+    let mut torques = [TorqueCommand(0); 4];
+    for (slot, amps) in torques.iter_mut().zip(amps) {
+        *slot = torque(py, amps)?;
+    }
+    Ok(Torque4(torques))
+}
+
+pub(crate) fn motor_ids(py: Python<'_>, ids: Vec<i64>) -> PyResult<MotorSet> {
+    ids.into_iter().map(|id| motor_id(py, id)).collect()
+}
+
+pub(crate) fn finding(py: Python<'_>, found: Found) -> PyResult<Py<PyAny>> {
     let nothing = || py.None();
     let row = match found {
         Found::Motor(id, status) => {

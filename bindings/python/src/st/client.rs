@@ -107,8 +107,7 @@ impl StClient {
         payload: &[u8],
     ) -> PyResult<Bound<'py, PyBytes>> {
         let (client, motor) = (self.client(py)?, motor_number(py, motor)?);
-        let code = u8::try_from(code).ok().filter(|code| *code < 0x20);
-        let code = code.ok_or_else(|| bad_value(py, "frame codes are 0 to 0x1f"))?;
+        let code = frame_code(py, code)?;
         let reply = py.detach(|| client.raw(motor, code, payload));
         Ok(PyBytes::new(py, &reply.map_err(|error| st_error(py, &error))?))
     }
@@ -173,6 +172,12 @@ impl StClient {
     fn port(&self) -> &str {
         &self.port
     }
+}
+
+/// A frame code, 5 bits.
+pub(crate) fn frame_code(py: Python<'_>, code: i64) -> PyResult<u8> {
+    let code = u8::try_from(code).ok().filter(|code| *code < 0x20);
+    code.ok_or_else(|| bad_value(py, "frame codes are 0 to 0x1f"))
 }
 
 /// What the arguments of `open` say.

@@ -6,8 +6,10 @@ mod request;
 mod sample;
 mod scale;
 
-pub(crate) use client::StClient;
-pub(crate) use request::StRequest;
+pub(crate) use client::{StClient, frame_code, limits, options};
+pub(crate) use reply::Answer;
+pub(crate) use request::{StRequest, motor_number};
+pub(crate) use scale::Scale;
 
 use motorlink::stmcp::register::{Feature, Features, Writing};
 use motorlink::stmcp::{Flags, Profile, RegisterId};
@@ -15,7 +17,7 @@ use pyo3::prelude::*;
 
 use crate::error::{bad_value, no_such_register};
 use crate::values;
-use scale::{Scale, register};
+use scale::register;
 
 /// The profile of this name.
 fn profile(py: Python<'_>, name: &str) -> PyResult<Profile> {

@@ -229,14 +229,14 @@ impl Bus {
             let mut doubtful = MotorSet::EMPTY;
             self.cycle(&requests, |id, outcome| match outcome {
                 Err(Error::Quarantined { .. }) => doubtful.insert(id),
-                outcome => found(id, outcome).into_iter().for_each(&mut each),
+                outcome => Found::of(id, outcome).into_iter().for_each(&mut each),
             })?;
             for id in doubtful {
                 let outcome = self.raw(id, ReadStatus1.encode());
                 if let Err(error @ Error::Port(_)) = outcome {
                     return Err(error);
                 }
-                found(id, outcome).into_iter().for_each(&mut each);
+                Found::of(id, outcome).into_iter().for_each(&mut each);
             }
             done += requests.len();
             progress(done);
@@ -316,13 +316,15 @@ impl<L: CanLink> Driven<L> {
     }
 }
 
-/// What the answer to a scan tells.
-fn found(id: MotorId, outcome: Result<[u8; 8], Error>) -> Option<Found> {
-    match outcome {
-        // A motor's reply has a voltage.
-        Ok(reply) if reply == ReadStatus1.encode() => Some(Found::Echo(id)),
-        Ok(reply) => Some(Found::Motor(id, proto::Status1::decode(&reply))),
-        Err(Error::Foreign { dialect, .. }) => Some(Found::Foreign(id, dialect)),
-        Err(_) => None,
+impl Found {
+    /// What the outcome of a [`ReadStatus1`] tells of the motor that it was for.
+    pub fn of(id: MotorId, outcome: Result<[u8; 8], Error>) -> Option<Self> {
+        match outcome {
+            // A motor's reply has a voltage.
+            Ok(reply) if reply == ReadStatus1.encode() => Some(Found::Echo(id)),
+            Ok(reply) => Some(Found::Motor(id, proto::Status1::decode(&reply))),
+            Err(Error::Foreign { dialect, .. }) => Some(Found::Foreign(id, dialect)),
+            Err(_) => None,
+        }
     }
 }

@@ -30,7 +30,8 @@ pub enum Progress<T> {
 }
 
 impl EventClient {
-    /// Opens a port. May wait, as only this and [`reopen`](Self::reopen) do.
+    /// Opens a port, which may wait. So may [`reopen`](Self::reopen), and what begins an exchange while
+    /// the port is closed; nothing else does.
     ///
     /// # Errors
     /// What keeps the port from being opened. The drive is not asked anything.

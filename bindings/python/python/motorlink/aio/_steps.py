@@ -1,0 +1,174 @@
+"""Drives a machine of the extension module in an event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+from motorlink.errors import Closed
+
+Value = TypeVar("Value")
+
+
+def port_name(port: str | os.PathLike[str]) -> str:
+    """The port as the library names it."""
+    if isinstance(port, (str, os.PathLike)):
+        return os.fspath(port)
+    raise TypeError(
+        f"{port!r} is no port for asyncio, which is on real time: give a name or a path; a bench of"
+        " motorlink.sim has some while it is served (bench.serve)"
+    )
+
+
+class Machine(Protocol):
+    """What the machines of both protocols have in common."""
+
+    @property
+    def is_open(self) -> bool: ...
+    @property
+    def port(self) -> str: ...
+    def reopen(self) -> None: ...
+    def fileno(self) -> int | None: ...
+
+
+class Steps:
+    """Takes a machine's steps when its port has something and when its time has come.
+
+    ``advance`` moves what can be moved at once, and gives after how many s to go on.
+    """
+
+    def __init__(self, machine: Machine, advance: Callable[[], float | None]):
+        self._loop = asyncio.get_running_loop()
+        self._machine = machine
+        self._advance = advance
+        self._watched: int | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._opening: asyncio.Future[None] | None = None
+        self.is_closed = False
+        self.watch()
+
+    def future(self) -> asyncio.Future[Value]:
+        """What an exchange ends in."""
+        return self._loop.create_future()
+
+    async def ready(self) -> None:
+        """Opens the port if it went away; its back-off and its failure are raised."""
+        if asyncio.get_running_loop() is not self._loop:
+            raise RuntimeError(f"{self._machine.port} belongs to another event loop")
+        while not self.is_closed:
+            opening = self._opening
+            if opening is None:
+                if self._machine.is_open:
+                    return
+                opening = self._loop.run_in_executor(None, self._machine.reopen)
+                opening.add_done_callback(self._opened)
+                self._opening = opening
+            # Others may wait for it as well.
+            await asyncio.shield(opening)
+        raise self.closed()
+
+    def closed(self) -> Closed:
+        """What calls end in from the close on."""
+        port = self._machine.port
+        return Closed(f"{port} was closed by this program; open it again", port=port)
+
+    def _opened(self, opening: asyncio.Future[None]) -> None:
+        self._opening = None
+        # Who waited for it was told; perhaps nobody does any more.
+        if not opening.cancelled():
+            opening.exception()
+        if not self.is_closed:
+            self.watch()
+
+    def watch(self) -> None:
+        """Watches the descriptor that the machine has now, and none that it had."""
+        descriptor = self._machine.fileno()
+        if descriptor == self._watched:
+            return
+        self._unwatch()
+        if descriptor is not None:
+            self._loop.add_reader(descriptor, self.take)
+            self._watched = descriptor
+
+    def _unwatch(self) -> None:
+        if self._watched is not None:
+            self._loop.remove_reader(self._watched)
+            self._watched = None
+
+    async def turn(self) -> None:
+        """Lets others have their turn where a port answers without any waiting."""
+        if self._watched is None:
+            await asyncio.sleep(0)
+
+    def drop(self, give_up: Callable[[], None]) -> None:
+        """Gives an exchange up, unless its port is gone anyway."""
+        if not self.is_closed and self._opening is None:
+            give_up()
+
+    def take(self) -> None:
+        """Takes the steps that can be taken now."""
+        if self.is_closed or self._opening is not None:
+            return
+        wait = self._advance()
+        if not self._machine.is_open:
+            self.watch()
+        if wait is None:
+            return
+        due = self._loop.time() + wait
+        if self._timer is not None:
+            # One that is early looks again; most exchanges need none of their own.
+            if self._timer.when() <= due:
+                return
+            self._timer.cancel()
+        self._timer = self._loop.call_at(due, self._due)
+
+    def _due(self) -> None:
+        self._timer = None
+        self.take()
+
+    async def close(
+        self, close: Callable[[], Value]
+    ) -> tuple[Value, asyncio.CancelledError | None]:
+        """Takes no more steps, and has the machine closed, whatever cancels this task meanwhile.
+
+        Gives what ``close`` gave, and a cancellation that is to go on.
+        """
+        self.is_closed = True
+        self._unwatch()
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        closing = self._loop.run_in_executor(None, close)
+        cancelled = None
+        while not closing.done():
+            try:
+                await asyncio.wait({closing})
+            except asyncio.CancelledError as error:
+                cancelled = error
+        return closing.result(), cancelled
+
+
+async def opened(open: Callable[[], Value], discard: Callable[[Value], object]) -> Value:
+    """Opens in another thread; what comes when nobody waits for it any more is discarded."""
+    loop = asyncio.get_running_loop()
+    opening = loop.run_in_executor(None, open)
+    try:
+        return await asyncio.shield(opening)
+    except asyncio.CancelledError:
+
+        def came(opening: asyncio.Future[Value]) -> None:
+            if not opening.cancelled() and opening.exception() is None:
+                loop.run_in_executor(None, discard, opening.result())
+
+        opening.add_done_callback(came)
+        raise
+
+
+def is_told(answer: asyncio.Future[Any]) -> bool:
+    """Whether an exchange came to its end, though perhaps nobody waits for that any more."""
+    if not answer.done() or answer.cancelled():
+        return False
+    answer.exception()
+    return True

@@ -1,0 +1,234 @@
+//! A CAN bus with RMD motors, for event loops.
+
+use std::sync::{Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+use motorlink::LinkState;
+use motorlink::port::PortName;
+use motorlink::rmd::{EventBus, Found, MotorId, OnDrop};
+use motorlink_proto::rmd::{Command, ReadStatus1, Torque};
+use pyo3::prelude::*;
+
+use super::{Driven, fileno, outcome, seconds};
+use crate::can::CanPort;
+use crate::error::{bad_value, rmd_error};
+use crate::rmd::{RmdRequest, finding, four_torques, limits, motor_id, motor_ids, options};
+
+/// A CAN bus, one exchange a motor at a time: `ask`, then `advance` when the descriptor is readable
+/// and when the time that it gave has passed.
+#[pyclass(frozen, module = "motorlink._core")]
+pub(crate) struct RmdMachine {
+    driven: Driven<Motors>,
+    /// Receives from a bus of another program.
+    reader: Mutex<Option<JoinHandle<()>>>,
+}
+
+struct Motors {
+    bus: EventBus,
+    /// What each motor was asked.
+    asked: [Asked; MotorId::COUNT],
+}
+
+/// What is opened: another program's bus, or a port by its name.
+#[derive(FromPyObject)]
+enum CanBus {
+    Port(Py<CanPort>),
+    Name(String),
+}
+
+/// Exchanges that are over: ID, and the value or the exception in its place.
+type Over = Vec<(u8, Py<PyAny>)>;
+
+/// What is made of a reply.
+#[derive(Clone)]
+enum Asked {
+    Value(RmdRequest),
+    /// What there is under this ID.
+    Found,
+}
+
+impl RmdMachine {
+    fn new(bus: EventBus, port: String, reader: Option<JoinHandle<()>>) -> Self {
+        let motors = Motors { bus, asked: [const { Asked::Found }; MotorId::COUNT] };
+        RmdMachine { driven: Driven::new(motors, port), reader: Mutex::new(reader) }
+    }
+}
+
+#[pymethods]
+impl RmdMachine {
+    /// Opens a port, by its name or from another program's bus, which may wait. No motor is asked
+    /// anything.
+    #[staticmethod]
+    #[pyo3(signature = (
+        port, *, timeout = 0.05, guard = 0.1, current_limit_a = None, speed_limit_dps = None,
+        angle_limit_deg = None,
+    ))]
+    fn open(
+        py: Python<'_>,
+        port: CanBus,
+        timeout: f64,
+        guard: f64,
+        current_limit_a: Option<f64>,
+        speed_limit_dps: Option<f64>,
+        angle_limit_deg: Option<f64>,
+    ) -> PyResult<Self> {
+        let limits = limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?;
+        let options = options(py, timeout, guard, limits)?;
+        match port {
+            CanBus::Port(port) => {
+                let port = port.get();
+                let (link, reader) = port.event_link()?;
+                let bus = EventBus::over(port.name(), link, options);
+                Ok(Self::new(bus, port.name().to_owned(), Some(reader)))
+            }
+            CanBus::Name(port) => {
+                let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
+                let bus = py.detach(|| EventBus::open(&name, options));
+                let bus = bus.map_err(|error| rmd_error(py, &error))?;
+                Ok(Self::new(bus, name.to_string(), None))
+            }
+        }
+    }
+
+    /// Whether the port is open.
+    #[getter]
+    fn is_open(&self, py: Python<'_>) -> PyResult<bool> {
+        self.driven.step(py, |motors| Ok(motors.bus.link_state() == LinkState::Open))
+    }
+
+    /// Opens the port if it is closed and its back-off is over, which may wait.
+    fn reopen(&self, py: Python<'_>) -> PyResult<()> {
+        let opened = self.driven.detached(py, |motors| motors.bus.reopen())?;
+        opened.map_err(|error| rmd_error(py, &error))
+    }
+
+    /// The descriptor to watch; `None` where there is none.
+    fn fileno(&self, py: Python<'_>) -> PyResult<Option<i32>> {
+        self.driven.step(py, |motors| Ok(fileno(motors.bus.descriptor())))
+    }
+
+    /// Begins an exchange with a motor that has none under way. One in quarantine is waited for if
+    /// `patient`, and an error if not.
+    #[pyo3(signature = (id, request, *, patient = true))]
+    fn ask(&self, py: Python<'_>, id: i64, request: &RmdRequest, patient: bool) -> PyResult<()> {
+        let id = motor_id(py, id)?;
+        self.driven.step(py, |motors| {
+            let data = request.data();
+            let begun =
+                if patient { motors.bus.ask(id, data) } else { motors.bus.request(id, data) };
+            begun.map_err(|error| rmd_error(py, &error))?;
+            motors.expect(id, Asked::Value(request.clone()));
+            Ok(())
+        })
+    }
+
+    /// Begins to look for a motor under an ID; ends in what was found, `None` if nothing.
+    fn look_for(&self, py: Python<'_>, id: i64) -> PyResult<()> {
+        let id = motor_id(py, id)?;
+        self.driven.step(py, |motors| {
+            let begun = motors.bus.ask(id, ReadStatus1.encode());
+            begun.map_err(|error| rmd_error(py, &error))?;
+            motors.expect(id, Asked::Found);
+            Ok(())
+        })
+    }
+
+    /// Begins exchanges with those of motors 1 to 4 that are expected to answer: torque currents, A,
+    /// for all four, in one frame.
+    fn torque4(&self, py: Python<'_>, amps: [f64; 4], expect: Vec<i64>) -> PyResult<()> {
+        let (torques, expect) = (four_torques(py, amps)?, motor_ids(py, expect)?);
+        self.driven.step(py, |motors| {
+            let begun = motors.bus.torque4(torques, expect);
+            begun.map_err(|error| rmd_error(py, &error))?;
+            for id in expect {
+                motors.expect(id, Asked::Value(RmdRequest::of(Torque::default())));
+            }
+            Ok(())
+        })
+    }
+
+    /// Moves what can be moved at once. Gives after how many s to go on, `None` while no exchange is
+    /// under way, and the exchanges that are over: ID, and the value or the exception in its place.
+    fn advance(&self, py: Python<'_>) -> PyResult<(Option<f64>, Over)> {
+        self.driven.step(py, |motors| {
+            let Motors { bus, asked } = motors;
+            let mut over = Vec::new();
+            let wait = bus.advance(|id, result| {
+                let value = match &asked[usize::from(id.number()) - 1] {
+                    Asked::Found => Found::of(id, result)
+                        .map_or_else(|| Ok(py.None()), |found| finding(py, found)),
+                    Asked::Value(request) => result
+                        .map_err(|error| rmd_error(py, &error))
+                        .and_then(|reply| request.value(py, &reply)),
+                };
+                over.push((id.number(), outcome(py, value)));
+            });
+            Ok((seconds(wait.map_err(|error| rmd_error(py, &error))?), over))
+        })
+    }
+
+    /// Gives up the exchange with a motor, if there is one.
+    fn cancel(&self, py: Python<'_>, id: i64) -> PyResult<()> {
+        let id = motor_id(py, id)?;
+        self.driven.step(py, |motors| {
+            motors.bus.cancel(id);
+            Ok(())
+        })
+    }
+
+    /// Sets what a motor may be told; `None` is no limit.
+    fn set_limits(
+        &self,
+        py: Python<'_>,
+        id: i64,
+        current_a: Option<f64>,
+        speed_dps: Option<f64>,
+        angle_deg: Option<f64>,
+    ) -> PyResult<()> {
+        let id = motor_id(py, id)?;
+        let limits = limits(py, current_a, speed_dps, angle_deg)?;
+        self.driven.step(py, |motors| {
+            motors.bus.set_limits(id, limits);
+            Ok(())
+        })
+    }
+
+    /// Motors that were given something to do and neither stopped nor switched off.
+    #[getter]
+    fn moving(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
+        self.driven
+            .detached(py, |motors| motors.bus.moving().map(|id| id.number().into()).collect())
+    }
+
+    /// Closes the port, which may wait; `stop` stops what is moving before, or switches it `off`,
+    /// and gives the motors that did not acknowledge it, and why. Again is no error.
+    #[pyo3(signature = (*, stop, off))]
+    fn close(&self, py: Python<'_>, stop: bool, off: bool) -> Vec<(u8, PyErr)> {
+        let action = if off { OnDrop::Off } else { OnDrop::Stop };
+        let stopped = py.detach(|| {
+            let bus = self.driven.take().map(|motors| motors.bus.into_bus());
+            let stop = bus.filter(|_| stop);
+            let stopped = stop.map_or_else(Vec::new, |bus| bus.guard().with(action).stop_now());
+            // From here on nobody receives from a bus that its owner may shut down.
+            let reader = self.reader.lock().unwrap_or_else(PoisonError::into_inner).take();
+            reader.map(JoinHandle::join);
+            stopped
+        });
+        let failed = stopped.into_iter().filter_map(|one| {
+            one.result.err().map(|error| (one.id.number(), rmd_error(py, &error)))
+        });
+        failed.collect()
+    }
+
+    /// The port's name.
+    #[getter]
+    fn port(&self) -> &str {
+        &self.driven.port
+    }
+}
+
+impl Motors {
+    fn expect(&mut self, id: MotorId, asked: Asked) {
+        self.asked[usize::from(id.number()) - 1] = asked;
+    }
+}

@@ -1,0 +1,167 @@
+//! A serial line with an ST drive, for event loops.
+
+use motorlink::LinkState;
+use motorlink::port::PortName;
+use motorlink::stmcp::{EventClient, Progress};
+use pyo3::IntoPyObjectExt;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use super::{Driven, fileno, outcome, seconds};
+use crate::error::{bad_value, st_error};
+use crate::st::{Answer, Scale, StRequest, frame_code, limits, motor_number, options};
+
+/// A master on a serial line, one exchange at a time: `begin`, then `advance` when the descriptor is
+/// readable and when the time that it gave has passed, until it is done.
+#[pyclass(frozen, module = "motorlink._core")]
+pub(crate) struct StMachine {
+    driven: Driven<Line>,
+}
+
+struct Line {
+    client: EventClient,
+    /// What was asked, while its exchange is under way; nothing where the reply is wanted as bytes.
+    asked: Option<Py<StRequest>>,
+}
+
+/// A reply that fits its request.
+enum Read<'a> {
+    Answer(&'a StRequest, Answer),
+    Bytes(Vec<u8>),
+}
+
+fn understand<'a>(asked: Option<&'a StRequest>, payload: &[u8]) -> Option<Read<'a>> {
+    match asked {
+        Some(request) => Some(Read::Answer(request, request.understand(payload)?)),
+        None => Some(Read::Bytes(payload.to_vec())),
+    }
+}
+
+#[pymethods]
+impl StMachine {
+    /// Opens a port, which may wait. The drive is not asked anything.
+    #[staticmethod]
+    #[pyo3(signature = (
+        port, *, profile = "spec", timeout = 1.0, recovery = "drain", speed_limit = None,
+        current_limit = None, full_scale_amps = None,
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "named in Python")]
+    fn open(
+        py: Python<'_>,
+        port: &str,
+        profile: &str,
+        timeout: f64,
+        recovery: &str,
+        speed_limit: Option<f64>,
+        current_limit: Option<f64>,
+        full_scale_amps: Option<f64>,
+    ) -> PyResult<Self> {
+        let scale = Scale::new(py, profile, full_scale_amps)?;
+        let limits = limits(py, scale, speed_limit, current_limit)?;
+        let options = options(py, scale.profile, timeout, recovery, limits)?;
+        let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
+        let client = py.detach(|| EventClient::open(&name, options));
+        let client = client.map_err(|error| st_error(py, &error))?;
+        let line = Line { client, asked: None };
+        Ok(StMachine { driven: Driven::new(line, name.to_string()) })
+    }
+
+    /// Whether the port is open.
+    #[getter]
+    fn is_open(&self, py: Python<'_>) -> PyResult<bool> {
+        self.driven.step(py, |line| Ok(line.client.link_state() == LinkState::Open))
+    }
+
+    /// Opens the port if it is closed and its back-off is over, which may wait.
+    fn reopen(&self, py: Python<'_>) -> PyResult<()> {
+        let opened = self.driven.detached(py, |line| line.client.reopen())?;
+        opened.map_err(|error| st_error(py, &error))
+    }
+
+    /// The descriptor to watch; `None` where there is none.
+    fn fileno(&self, py: Python<'_>) -> PyResult<Option<i32>> {
+        self.driven.step(py, |line| Ok(fileno(line.client.descriptor())))
+    }
+
+    /// Begins an exchange; one that is under way is abandoned.
+    fn begin(&self, py: Python<'_>, motor: i64, request: Py<StRequest>) -> PyResult<()> {
+        let motor = motor_number(py, motor)?;
+        self.driven.step(py, |line| {
+            line.asked = None;
+            let begun = line.client.begin(motor, &request.get().request());
+            begun.map_err(|error| st_error(py, &error))?;
+            line.asked = Some(request);
+            Ok(())
+        })
+    }
+
+    /// Begins an exchange with any frame code and payload; its value is the reply's payload.
+    fn begin_raw(&self, py: Python<'_>, motor: i64, code: i64, payload: &[u8]) -> PyResult<()> {
+        let (motor, code) = (motor_number(py, motor)?, frame_code(py, code)?);
+        self.driven.step(py, |line| {
+            line.asked = None;
+            let begun = line.client.begin_raw(motor, code, payload);
+            begun.map_err(|error| st_error(py, &error))
+        })
+    }
+
+    /// Moves what can be moved at once. `(True, value)`, or the exception in its place, when the
+    /// exchange is over; else `False` and after how many s to go on, `None` while none is under way.
+    fn advance(&self, py: Python<'_>) -> PyResult<(bool, Option<Py<PyAny>>)> {
+        self.driven.step(py, |line| {
+            let asked = line.asked.as_ref().map(Py::get);
+            match line.client.advance(|payload| understand(asked, payload)) {
+                Progress::Wait(wait) => {
+                    let wait = seconds(wait).map(|wait| wait.into_py_any(py)).transpose()?;
+                    Ok((false, wait))
+                }
+                Progress::Done(result) => {
+                    let value = result.map_err(|error| st_error(py, &error));
+                    let value = value.and_then(|reply| match reply {
+                        Read::Answer(request, answer) => request.value(py, answer),
+                        Read::Bytes(bytes) => PyBytes::new(py, &bytes).into_py_any(py),
+                    });
+                    line.asked = None;
+                    Ok((true, Some(outcome(py, value))))
+                }
+            }
+        })
+    }
+
+    /// Gives up the exchange that is under way, if there is one.
+    fn abandon(&self, py: Python<'_>) -> PyResult<()> {
+        self.driven.step(py, |line| {
+            line.asked = None;
+            line.client.abandon();
+            Ok(())
+        })
+    }
+
+    /// Motors that were started and not stopped.
+    #[getter]
+    fn started(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
+        self.driven
+            .detached(py, |line| line.client.started().map(|motor| motor.number().into()).collect())
+    }
+
+    /// Closes the port, which may wait; `stop` stops what was started before, and gives the motors
+    /// that did not acknowledge it, and why. Again is no error.
+    #[pyo3(signature = (*, stop))]
+    fn close(&self, py: Python<'_>, stop: bool) -> Vec<(u8, PyErr)> {
+        let stopped = py.detach(|| {
+            let client = self.driven.take().map(|line| line.client.into_client());
+            let stop = client.filter(|_| stop);
+            stop.map_or_else(Vec::new, |client| client.guard().stop_now())
+        });
+        let failed = stopped.into_iter().filter_map(|one| {
+            one.result.err().map(|error| (one.motor.number(), st_error(py, &error)))
+        });
+        failed.collect()
+    }
+
+    /// The port's name.
+    #[getter]
+    fn port(&self) -> &str {
+        &self.driven.port
+    }
+}

@@ -1,0 +1,86 @@
+"""A drive on a pty that says of each reply whose it is, as slow as a test wants it."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import threading
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+#: Registers of 32 bits, by name and number.
+REGISTERS = {"SPEED_REF": 0x04, "SPEED_MEAS": 0x1E, "RAMP_FINAL_SPEED": 0x5B}
+
+GET_REG, EXECUTE, BOARD_INFO, REVUP = 0x02, 0x03, 0x06, 0x08
+START, STOP = 0x01, 0x02
+
+
+def value(drive: int, motor: int, register: int) -> int:
+    """What a drive says of a register: no two say the same."""
+    return drive << 20 | motor << 12 | register
+
+
+def frame(header: int, payload: bytes) -> bytes:
+    """A frame with its checksum (3)."""
+    body = bytes([header, len(payload), *payload])
+    total = sum(body)
+    return body + bytes([(total & 0xFF) + (total >> 8) & 0xFF])
+
+
+class Drive:
+    """Answers at a path, one request after the other, each after ``delay()`` s."""
+
+    def __init__(self, path: Path, number: int, delay: Callable[[], float] = lambda: 0.0):
+        self.path = path
+        self.number = number
+        self.delay = delay
+        #: What was executed: motor and command.
+        self.executed: list[tuple[int, int]] = []
+        self.plug()
+
+    def plug(self) -> None:
+        """Is there."""
+        self._line, self._other = pty.openpty()
+        tty.setraw(self._other)
+        self._end, self._ended = os.pipe()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+        self.path.symlink_to(os.ttyname(self._other))
+
+    def unplug(self) -> None:
+        """Is gone, with what it did not answer yet."""
+        self.path.unlink()
+        os.close(self._ended)
+        self._thread.join()
+        for descriptor in (self._line, self._other, self._end):
+            os.close(descriptor)
+
+    def _ends(self, wait: float) -> bool:
+        return self._end in select.select([self._end], [], [], wait)[0]
+
+    def _serve(self) -> None:
+        heard = b""
+        while not self._end in select.select([self._line, self._end], [], [])[0]:
+            heard += os.read(self._line, 4096)
+            while len(heard) >= 2 and len(heard) >= heard[1] + 3:
+                request, heard = heard[: heard[1] + 3], heard[heard[1] + 3 :]
+                reply = self._reply(request)
+                if self._ends(self.delay()):
+                    return
+                os.write(self._line, reply)
+
+    def _reply(self, request: bytes) -> bytes:
+        motor, code, payload = request[0] >> 5, request[0] & 0x1F, request[2:-1]
+        if code == GET_REG:
+            told = value(self.number, motor, payload[0])
+            return frame(0xF0, told.to_bytes(4, "little"))
+        if code == EXECUTE:
+            self.executed.append((motor, payload[0]))
+            return frame(0xF0, b"")
+        if code == BOARD_INFO:
+            return frame(0xF0, bytes(32))
+        if code == REVUP:
+            return frame(0xF0, bytes(8))
+        return frame(0xFF, b"\x02")

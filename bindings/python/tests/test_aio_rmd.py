@@ -1,0 +1,262 @@
+"""asyncio on a CAN bus: exchanges that overlap, motors whose replies are late, what moves at the end."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import random
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+from conftest import Served
+
+import motorlink
+from motorlink import aio, rmd
+
+
+class Motors:
+    """An slcan adapter over TCP with motors whose speed is their ID, slow as a test wants it."""
+
+    def __init__(self, delay: Callable[[int], float] = lambda id: 0.0):
+        self.delay = delay
+        #: What came: ID and command.
+        self.heard: list[tuple[int, int]] = []
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port = f"slcan:tcp:127.0.0.1:{self._listener.getsockname()[1]}"
+        self._clients: list[socket.socket] = []
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def _serve(self) -> None:
+        while True:
+            try:
+                client, _ = self._listener.accept()
+            except OSError:
+                return
+            self._clients.append(client)
+            line = b""
+            # Who hung up is not there any more.
+            with contextlib.suppress(OSError):
+                while received := client.recv(4096):
+                    line += received
+                    *lines, line = line.split(b"\r")
+                    for one in lines:
+                        self._take(client, one)
+
+    @staticmethod
+    def _send(client: socket.socket, frame: bytes) -> None:
+        with contextlib.suppress(OSError):
+            client.sendall(frame)
+
+    def _take(self, client: socket.socket, line: bytes) -> None:
+        if not line.startswith(b"t"):
+            client.sendall(b"\r")
+            return
+        client.sendall(b"z\r")
+        can_id, data = int(line[1:4], 16), bytes.fromhex(line[5:21].decode())
+        ids = range(1, 5) if can_id == 0x280 else [can_id - 0x140]
+        for id in ids:
+            code = 0xA1 if can_id == 0x280 else data[0]
+            self.heard.append((id, code))
+            if id > 8:
+                continue
+            reply = bytes([code, 25, 0, 0]) + id.to_bytes(2, "little") + bytes(2)
+            if code in (0x80, 0x81):
+                reply = data
+            frame = b"t%03X8%s\r" % (0x140 + id, reply.hex().upper().encode())
+            delay = self.delay(id)
+            if delay:
+                timer = threading.Timer(delay, self._send, [client, frame])
+                timer.daemon = True
+                timer.start()
+            else:
+                client.sendall(frame)
+
+    def hang_up(self) -> None:
+        for client in self._clients:
+            with contextlib.suppress(OSError):
+                client.shutdown(socket.SHUT_RDWR)
+            client.close()
+        self._clients.clear()
+
+    def end(self) -> None:
+        self._listener.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+        self.hang_up()
+
+
+@pytest.fixture
+def motors() -> Iterator[Motors]:
+    motors = Motors()
+    yield motors
+    motors.end()
+
+
+def test_exchanges_with_different_motors_overlap(motors: Motors) -> None:
+    motors.delay = lambda id: 0.2
+
+    async def main() -> None:
+        async with aio.rmd.open(motors.port, timeout=5) as bus:
+            began = time.monotonic()
+            answers = await asyncio.gather(*(bus.motor(id).motion() for id in range(1, 9)))
+            assert [answer.speed_dps for answer in answers] == list(range(1, 9))
+            assert time.monotonic() - began < 8 * 0.2, "one after the other would take this long"
+            both = await asyncio.gather(bus.motor(3).motion(), bus.motor(3).motion())
+            assert [answer.speed_dps for answer in both] == [3, 3]
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+
+
+def test_cycles_and_four_torques_tell_what_each_motor_answered(motors: Motors) -> None:
+    async def main() -> None:
+        async with aio.rmd.open(motors.port, timeout=1) as bus:
+            answers = await bus.cycle({2: rmd.speed(10), 20: rmd.read_motion(), 1: rmd.stop()})
+            assert answers[2].speed_dps == 2 and answers[1] is None
+            assert isinstance(answers[20], motorlink.Timeout) and answers[20].motor == 20
+            four = await bus.torque4(0.1, 0.2, 0.3, 0.4, expect=[4, 2])
+            assert [four[id] for id in (2, 4)] == [await bus.motor(id).motion() for id in (2, 4)]
+            assert len(four) == 2
+            with pytest.raises(motorlink.BadValue, match="beyond"):
+                await bus.torque4(0, 0, 0, 33)
+            with pytest.raises(motorlink.BadValue, match="motor 5"):
+                await bus.torque4(0, 0, 0, 0, expect=[5])
+            assert bus.moving == [1, 2, 3, 4], "the frame reached all four"
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+
+
+def test_a_late_reply_to_a_cancelled_exchange_is_nobody_elses(motors: Motors) -> None:
+    async def main() -> None:
+        async with aio.rmd.open(motors.port, timeout=1, guard=0.05) as bus:
+            motor = bus.motor(1)
+            motors.delay = lambda id: 0.02
+            exchange = asyncio.ensure_future(motor.motion())
+            while (1, 0x9C) not in motors.heard:
+                assert not exchange.done(), exchange
+                await asyncio.sleep(0)
+            exchange.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await exchange
+            motors.delay = lambda id: 0
+            # The same command: only the wait for the late reply tells the two apart.
+            before = len(motors.heard)
+            assert (await motor.motion()).speed_dps == 1
+            assert motors.heard[before:] == [(1, 0x9C)], "it was asked once, after the late reply"
+            # An Off does not wait.
+            await motor.off()
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cancelled_exchanges_leave_nothing_behind_for_others(motors: Motors, seed: int) -> None:
+    rng = random.Random(seed)
+    motors.delay = lambda id: rng.choice([0, 0.001, 0.004])
+    answered = cancelled = 0
+
+    async def caller(bus: aio.rmd.Bus, choice: random.Random) -> None:
+        nonlocal answered, cancelled
+        for _ in range(4):
+            id = choice.randrange(1, 9)
+            task = asyncio.ensure_future(bus.motor(id).motion())
+            if choice.random() < 0.4:
+                await asyncio.sleep(choice.random() * 0.004)
+                task.cancel()
+            try:
+                assert (await task).speed_dps == id
+                answered += 1
+            except asyncio.CancelledError:
+                cancelled += 1
+
+    async def main() -> None:
+        before = os.listdir("/proc/self/fd")
+        bus = await aio.rmd.open(motors.port, timeout=1, guard=0.02)
+        callers = [caller(bus, random.Random(rng.random())) for _ in range(8)]
+        await asyncio.wait_for(asyncio.gather(*callers), 60)
+        answers = await bus.cycle({id: rmd.read_motion() for id in range(1, 9)})
+        told = {
+            id: answer.speed_dps
+            for id, answer in answers.items()
+            if not isinstance(answer, motorlink.Timeout)
+        }
+        assert all(id == speed for id, speed in told.items())
+        await bus.close()
+        motors.hang_up()
+        assert len(os.listdir("/proc/self/fd")) <= len(before)
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+    assert answered and cancelled
+
+
+def test_a_port_that_went_away_is_lost_and_then_opened_again(motors: Motors) -> None:
+    async def main() -> None:
+        async with aio.rmd.open(motors.port, timeout=5) as bus:
+            motors.delay = lambda id: 5.0
+            waiting = [asyncio.ensure_future(bus.motor(id).motion()) for id in (1, 2)]
+            while len(motors.heard) < 2:
+                assert not any(task.done() for task in waiting), waiting
+                await asyncio.sleep(0.001)
+            motors.hang_up()
+            for task in waiting:
+                with pytest.raises(motorlink.LineLost):
+                    await asyncio.wait_for(task, 10)
+            motors.delay = lambda id: 0.0
+            assert (await bus.motor(1).motion()).speed_dps == 1
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+
+
+@pytest.mark.parametrize("on_close, code", [("stop", 0x81), ("off", 0x80), ("nothing", None)])
+def test_the_end_does_to_moving_motors_what_it_was_told(
+    motors: Motors, on_close: str, code: int | None
+) -> None:
+    async def work() -> None:
+        async with aio.rmd.open(motors.port, timeout=5, on_close=on_close) as bus:
+            await bus.motor(1).speed(10)
+            await bus.motor(2).torque(0.1)
+            await bus.motor(3).motion()
+            assert sorted(bus.moving) == [1, 2]
+            await asyncio.sleep(3600)
+
+    async def main() -> None:
+        task = asyncio.ensure_future(work())
+        while (3, 0x9C) not in motors.heard:
+            assert not task.done(), task
+            await asyncio.sleep(0.001)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+    told = [heard for heard in motors.heard if heard[1] in (0x80, 0x81)]
+    assert sorted(told) == ([] if code is None else [(1, code), (2, code)])
+
+
+def test_a_scan_finds_what_is_there(motors: Motors) -> None:
+    async def main() -> None:
+        async with aio.rmd.open(motors.port, timeout=1) as bus:
+            found = await bus.scan(range(6, 13))
+            assert [(one.id, one.kind) for one in found] == [(6, "motor"), (7, "motor"), (8, "motor")]
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+
+
+def test_served_motors_turn_to_where_they_are_told(served: Served) -> None:
+    async def main() -> None:
+        async with aio.rmd.open(served.can, timeout=2) as bus:
+            motor = bus.motor(2)
+            motor.set_limits(speed=400)
+            with pytest.raises(motorlink.BadValue, match="limit"):
+                await motor.move_to(45, max_speed=401)
+            await motor.move_to(45, max_speed=400)
+            while abs(await motor.angle() - 45) > 1:
+                await asyncio.sleep(0.01)
+            await motor.write_gains((await motor.gains())._replace(speed_kp=50))
+            assert (await motor.gains()).speed_kp == 50
+            with pytest.raises(motorlink.BadValue, match="rom=True"):
+                await motor.write_zero(rom=False)
+
+    asyncio.run(asyncio.wait_for(main(), 60))

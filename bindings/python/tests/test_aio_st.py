@@ -1,0 +1,353 @@
+"""asyncio on serial lines: the right answers to the right callers, whatever is cancelled."""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import os
+import random
+from collections.abc import Awaitable, Iterator
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+from drive import REGISTERS, START, STOP, Drive, value
+
+import motorlink
+from motorlink import aio
+
+T = TypeVar("T")
+Exchange = Awaitable[float]
+
+
+@pytest.fixture
+def drives(tmp_path: Path) -> Iterator[list[Drive]]:
+    """Four drives that can be told apart."""
+    drives = [Drive(tmp_path / f"st{number}", number) for number in range(4)]
+    yield drives
+    for drive in drives:
+        drive.unplug()
+
+
+@pytest.fixture
+def drive(drives: list[Drive]) -> Drive:
+    return drives[3]
+
+
+async def within(seconds: float, awaitable: Awaitable[T]) -> T:
+    """A test that hangs fails."""
+    return await asyncio.wait_for(awaitable, seconds)
+
+
+async def asked(bus: aio.st.Bus, drive: Drive, choice: random.Random) -> None:
+    """One exchange with any motor, checked."""
+    motor, (name, number) = choice.randrange(1, 8), choice.choice(sorted(REGISTERS.items()))
+    assert await bus.motor(motor).read(name) == value(drive.number, motor, number)
+
+
+def test_four_buses_with_many_tasks_each_give_everybody_their_own_answers(
+    drives: list[Drive],
+) -> None:
+    seeds = random.Random(1)
+    for drive in drives:
+        drive.delay = functools.partial(random.Random(drive.number).choice, [0, 0, 0, 0.001])
+
+    async def caller(bus: aio.st.Bus, drive: Drive, seed: float) -> None:
+        choice = random.Random(seed)
+        for _ in range(25):
+            await asked(bus, drive, choice)
+
+    async def main() -> None:
+        buses = [await aio.st.open(drive.path) for drive in drives]
+        callers = [
+            caller(bus, drive, seeds.random())
+            for bus, drive in zip(buses, drives)
+            for _ in range(8)
+        ]
+        await within(60, asyncio.gather(*callers))
+        for bus in buses:
+            await bus.close()
+
+    asyncio.run(within(60, main()))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_cancelled_exchanges_leave_nothing_behind_for_others(
+    drives: list[Drive], seed: int
+) -> None:
+    """Replies come up to 8 ms late; tasks give up at any moment up to 6 ms."""
+    rng = random.Random(seed)
+    for drive in drives:
+        drive.delay = lambda: rng.choice([0, 0.002, 0.008])
+    cancelled = answered = 0
+
+    async def caller(bus: aio.st.Bus, drive: Drive, choice: random.Random) -> None:
+        nonlocal cancelled, answered
+        for _ in range(3):
+            task = asyncio.ensure_future(asked(bus, drive, choice))
+            if choice.random() < 0.4:
+                await asyncio.sleep(choice.random() * 0.006)
+                task.cancel()
+            try:
+                await task
+                answered += 1
+            except asyncio.CancelledError:
+                cancelled += 1
+
+    async def main() -> None:
+        loop = asyncio.get_running_loop()
+        before = os.listdir("/proc/self/fd")
+        buses = [await aio.st.open(drive.path) for drive in drives]
+        callers = [
+            caller(bus, drive, random.Random(rng.random()))
+            for bus, drive in zip(buses, drives)
+            for _ in range(3)
+        ]
+        await within(60, asyncio.gather(*callers))
+        for bus, drive in zip(buses, drives):
+            await within(10, asked(bus, drive, rng))
+            descriptor = bus._machine.fileno()
+            assert descriptor is not None
+            await bus.close()
+            assert not loop.remove_reader(descriptor), "nothing watches it any more"
+        assert sorted(os.listdir("/proc/self/fd")) == sorted(before)
+
+    asyncio.run(within(60, main()))
+    assert cancelled and answered
+
+
+def test_a_task_that_is_cancelled_while_it_waits_for_its_turn_costs_nothing(drive: Drive) -> None:
+    drive.delay = lambda: 0.02
+
+    async def main() -> None:
+        async with aio.st.open(drive.path) as bus:
+            first = asyncio.ensure_future(bus.motor(1).read("SPEED_REF"))
+            others = [asyncio.ensure_future(bus.motor(n).read("SPEED_MEAS")) for n in (2, 3, 4)]
+            await asyncio.sleep(0.005)
+            others[1].cancel()
+            assert await first == value(3, 1, REGISTERS["SPEED_REF"])
+            assert await others[0] == value(3, 2, REGISTERS["SPEED_MEAS"])
+            assert await others[2] == value(3, 4, REGISTERS["SPEED_MEAS"])
+            assert others[1].cancelled()
+
+    asyncio.run(within(60, main()))
+
+
+def test_exchanges_are_carried_out_in_the_order_in_which_they_were_asked_for(drive: Drive) -> None:
+    async def main() -> None:
+        order: list[int] = []
+
+        async def start(bus: aio.st.Bus, motor: int) -> None:
+            await bus.motor(motor).start()
+            order.append(motor)
+
+        async with aio.st.open(drive.path, on_close="nothing") as bus:
+            await asyncio.gather(*(start(bus, motor) for motor in range(1, 8)))
+        assert order == list(range(1, 8))
+        assert drive.executed == [(motor, START) for motor in range(1, 8)]
+
+    asyncio.run(within(60, main()))
+
+
+def test_the_end_stops_what_was_started(drive: Drive) -> None:
+    async def main() -> None:
+        with pytest.raises(ZeroDivisionError):
+            async with aio.st.open(drive.path) as bus:
+                await bus.motor(2).start()
+                await bus.motor(5).start()
+                await bus.motor(5).stop()
+                assert bus.started == [2]
+                raise ZeroDivisionError
+        with pytest.raises(motorlink.Closed):
+            await bus.info()
+
+    asyncio.run(within(60, main()))
+    assert drive.executed == [(2, START), (5, START), (5, STOP), (2, STOP)]
+
+
+def test_a_task_that_is_cancelled_again_and_again_still_stops_what_it_started(drive: Drive) -> None:
+    async def work(running: asyncio.Event) -> None:
+        async with aio.st.open(drive.path) as bus:
+            await bus.motor(1).start()
+            drive.delay = lambda: 0.05
+            running.set()
+            while True:
+                await bus.motor(1).read("SPEED_MEAS")
+
+    async def main() -> None:
+        running = asyncio.Event()
+        task = asyncio.ensure_future(work(running))
+        await within(10, running.wait())
+        while not task.done():
+            task.cancel()
+            await asyncio.sleep(0.01)
+        assert task.cancelled()
+        # Where an exchange was given up, the motor is told before the line has recovered, too.
+        first, *stops = drive.executed
+        assert first == (1, START) and set(stops) == {(1, STOP)}
+
+    asyncio.run(within(60, main()))
+
+
+def test_the_end_of_the_loop_still_stops_what_a_task_started(drive: Drive) -> None:
+    async def work(running: asyncio.Event) -> None:
+        async with aio.st.open(drive.path) as bus:
+            await bus.motor(1).start()
+            running.set()
+            await asyncio.sleep(3600)
+
+    async def main() -> None:
+        running = asyncio.Event()
+        main.task = asyncio.ensure_future(work(running))  # type: ignore[attr-defined]
+        await within(10, running.wait())
+
+    asyncio.run(within(60, main()))
+    assert drive.executed == [(1, START), (1, STOP)]
+
+
+def test_close_ends_the_exchanges_of_others(drive: Drive) -> None:
+    async def main() -> None:
+        drive.delay = lambda: 0.5
+        bus = await aio.st.open(drive.path)
+        waiting = [asyncio.ensure_future(bus.motor(n).read("SPEED_REF")) for n in (1, 2)]
+        await asyncio.sleep(0.01)
+        await bus.close()
+        for task in waiting:
+            with pytest.raises(motorlink.Closed):
+                await task
+        await bus.close()
+
+    asyncio.run(within(60, main()))
+
+
+def test_a_port_that_went_away_is_lost_and_then_opened_again(drive: Drive) -> None:
+    beats = 0
+
+    async def heart() -> None:
+        nonlocal beats
+        while True:
+            await asyncio.sleep(0.001)
+            beats += 1
+
+    async def main() -> None:
+        heartbeat = asyncio.ensure_future(heart())
+        async with aio.st.open(drive.path) as bus:
+            motor = bus.motor(1)
+            drive.delay = lambda: 5.0
+            exchange = asyncio.ensure_future(motor.read("SPEED_REF"))
+            await asyncio.sleep(0.01)
+            drive.unplug()
+            with pytest.raises(motorlink.LineLost, match="hung up"):
+                await within(10, exchange)
+            with pytest.raises(motorlink.PortError, match=str(drive.path)):
+                await motor.read("SPEED_REF")
+            drive.delay = lambda: 0.0
+            drive.plug()
+            while True:
+                try:
+                    assert await motor.read("SPEED_REF") == value(3, 1, REGISTERS["SPEED_REF"])
+                    break
+                except motorlink.PortError:
+                    await asyncio.sleep(0.01)
+            # Noticed also while nobody asks for anything.
+            drive.unplug()
+            while bus._machine.is_open:
+                await asyncio.sleep(0.001)
+            drive.plug()
+            while True:
+                try:
+                    await motor.read("SPEED_REF")
+                    break
+                except motorlink.PortError:
+                    await asyncio.sleep(0.01)
+        heartbeat.cancel()
+
+    asyncio.run(within(60, main()))
+    assert beats > 10
+
+
+def test_errors_are_those_of_the_blocking_api(drive: Drive) -> None:
+    def blocking() -> list[str]:
+        told = []
+        with motorlink.st.open(drive.path, speed_limit=100) as bus:
+            for call in (
+                lambda: bus.motor(9).read("SPEED_REF"),
+                lambda: bus.motor(1).read("NO_SUCH"),
+                lambda: bus.motor(1).ramp(101, 1),
+                lambda: bus.motor(1).revup(9),
+                lambda: bus.motor(1).write("SPEED_KP", 1),
+                lambda: bus.motor(1).move_to(1, 1),
+                lambda: bus.exchange_raw(0x20),
+            ):
+                with pytest.raises(motorlink.MotorlinkError) as error:
+                    call()
+                told.append(f"{type(error.value).__name__}: {error.value}")
+        return told
+
+    async def awaited() -> list[str]:
+        told = []
+        async with aio.st.open(drive.path, speed_limit=100) as bus:
+            for call in (
+                lambda: bus.motor(9).read("SPEED_REF"),
+                lambda: bus.motor(1).read("NO_SUCH"),
+                lambda: bus.motor(1).ramp(101, 1),
+                lambda: bus.motor(1).revup(9),
+                lambda: bus.motor(1).write("SPEED_KP", 1),
+                lambda: bus.motor(1).move_to(1, 1),
+                lambda: bus.exchange_raw(0x20),
+            ):
+                with pytest.raises(motorlink.MotorlinkError) as error:
+                    await call()
+                told.append(f"{type(error.value).__name__}: {error.value}")
+        return told
+
+    assert asyncio.run(awaited()) == blocking()
+
+
+def test_a_bus_belongs_to_one_loop(drive: Drive) -> None:
+    async def opened() -> aio.st.Bus:
+        return await aio.st.open("sim:")
+
+    bus = asyncio.run(opened())
+    with pytest.raises(RuntimeError, match="another event loop"):
+        asyncio.run(bus.info())
+
+
+def test_an_opening_that_is_cancelled_leaves_the_port_free(drive: Drive) -> None:
+    async def main() -> None:
+        opening = asyncio.ensure_future(aio.st.open(drive.path)._open())
+        await asyncio.sleep(0)
+        opening.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await opening
+        while True:
+            try:
+                async with aio.st.open(drive.path) as bus:
+                    await bus.motor(1).read("SPEED_REF")
+                return
+            except motorlink.PortError:
+                await asyncio.sleep(0.001)
+
+    asyncio.run(within(10, main()))
+
+
+def test_the_simulated_drive_runs_beside_other_tasks() -> None:
+    async def main() -> None:
+        async with aio.st.open("sim:") as bus, aio.st.open("sim:") as other:
+            motor = bus.motor(1)
+            await motor.ramp(1000, 0.1)
+            await motor.start()
+
+            async def until_it_runs() -> None:
+                while str(await motor.status()) != "RUN":
+                    pass
+
+            async def meanwhile() -> None:
+                while not running.done():
+                    assert await other.motor(1).read("SPEED_MEAS") == 0
+
+            running = asyncio.ensure_future(until_it_runs())
+            await within(30, asyncio.gather(running, meanwhile()))
+            assert bus.started == [1] and not await motor.faults()
+
+    asyncio.run(within(60, main()))

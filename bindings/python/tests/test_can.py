@@ -1,0 +1,189 @@
+"""Buses of python-can as ports, with simulated motors on them."""
+
+from __future__ import annotations
+
+import asyncio
+import builtins
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import can
+import pytest
+from conftest import Served
+
+import motorlink
+from motorlink import aio, rmd
+from motorlink.can import CanPort, from_python_can
+
+
+class Motor(threading.Thread):
+    """A motor on a virtual bus that answers with its ID as its speed, and with much else."""
+
+    def __init__(self, channel: str, id: int):
+        super().__init__(daemon=True)
+        self.bus = can.Bus(channel, interface="virtual")
+        self.id = id
+        self.heard: list[int] = []
+        self.ended = False
+        self.start()
+
+    def run(self) -> None:
+        while not self.ended:
+            message = self.bus.recv(0.05)
+            if message is None or message.arbitration_id != 0x140 + self.id:
+                continue
+            self.heard.append(message.data[0])
+            reply = bytes([message.data[0], 25, 0, 0]) + self.id.to_bytes(2, "little") + bytes(2)
+            # None of these is the motor's reply.
+            wrong = bytes([message.data[0]]) + bytes(7)
+            for strange in (
+                can.Message(arbitration_id=0x140 + self.id, data=wrong, is_extended_id=True),
+                can.Message(arbitration_id=0x140 + self.id, is_extended_id=False, is_remote_frame=True, dlc=8),
+                can.Message(arbitration_id=0x140 + self.id, is_extended_id=False, is_error_frame=True),
+                can.Message(arbitration_id=0x140 + self.id, data=wrong[:4], is_extended_id=False),
+                can.Message(arbitration_id=0x140 + self.id, data=bytes(12), is_fd=True, is_extended_id=False),
+            ):
+                self.bus.send(strange)
+            if message.data[0] in (0x80, 0x81):
+                reply = bytes(message.data)
+            self.bus.send(
+                can.Message(arbitration_id=0x140 + self.id, data=reply, is_extended_id=False)
+            )
+
+    def end(self) -> None:
+        self.ended = True
+        self.join()
+        self.bus.shutdown()
+
+
+@pytest.fixture
+def motor(request: pytest.FixtureRequest) -> Iterator[Motor]:
+    motor = Motor(request.node.name, 7)
+    yield motor
+    motor.end()
+
+
+@pytest.fixture
+def bus(request: pytest.FixtureRequest) -> Iterator[can.BusABC]:
+    """The host's end, which also hears what it sends itself."""
+    bus = can.Bus(request.node.name, interface="virtual", receive_own_messages=True)
+    yield bus
+    bus.shutdown()
+
+
+def test_a_motor_on_a_bus_of_python_can_is_commanded(bus: can.BusABC, motor: Motor) -> None:
+    with rmd.open(from_python_can(bus), timeout=2) as motors:
+        assert motors.motor(7).motion.speed_dps == 7
+        # Answered with the very bytes of the request, as the bus's own echo would be.
+        motors.motor(7).stop()
+        assert motors.cycle({7: rmd.speed(100)})[7].speed_dps == 7
+        assert motors.moving == [7]
+        assert "python-can" in motors.port
+    assert motor.heard == [0x9C, 0x81, 0xA2, 0x81]
+
+
+def test_an_echo_is_no_answer(bus: can.BusABC) -> None:
+    with rmd.open(from_python_can(bus), timeout=0.05) as motors:
+        with pytest.raises(motorlink.Timeout, match="motor 3"):
+            motors.motor(3).stop()
+
+
+def test_asyncio_commands_it_as_well(bus: can.BusABC, motor: Motor) -> None:
+    async def main() -> None:
+        async with aio.rmd.open(from_python_can(bus), timeout=2) as motors:
+            one = motors.motor(7)
+            answers = await asyncio.gather(*(one.motion() for _ in range(20)))
+            assert all(answer.speed_dps == 7 for answer in answers)
+            await one.speed(100)
+
+    threads = threading.active_count()
+    asyncio.run(asyncio.wait_for(main(), 60))
+    assert motor.heard[-1] == 0x81
+    assert threading.active_count() == threads
+    # Nobody receives from it any more.
+    motor.bus.send(can.Message(arbitration_id=0x123, is_extended_id=False))
+    message = bus.recv(5)
+    while message is not None and message.arbitration_id != 0x123:
+        message = bus.recv(5)
+    assert message is not None
+
+
+class Broken(can.bus.BusABC):
+    """A bus whose adapter is pulled out after some frames."""
+
+    def __init__(self, frames: int):
+        super().__init__(channel="broken")
+        self.channel_info = "broken"
+        self.left = frames
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self.left -= 1
+        if self.left < 0:
+            raise can.CanOperationError("the adapter is gone")
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        if self.left <= 0:
+            raise can.CanOperationError("the adapter is gone")
+        return None, False
+
+
+def check(error: BaseException) -> None:
+    assert isinstance(error, motorlink.LineLost)
+    assert "the adapter is gone" in str(error)
+    assert isinstance(error.__cause__, can.CanOperationError)
+
+
+def test_what_the_bus_raises_is_the_cause_of_a_lost_line() -> None:
+    bus = Broken(1)
+    with rmd.open(from_python_can(bus), timeout=5, on_close="nothing") as motors:
+        with pytest.raises(motorlink.LineLost) as lost:
+            motors.motor(1).motion
+        check(lost.value)
+        with pytest.raises(motorlink.LineLost, match="closed"):
+            motors.motor(1).motion
+    bus.shutdown()
+
+
+def test_and_in_asyncio() -> None:
+    async def main(bus: can.BusABC) -> None:
+        async with aio.rmd.open(from_python_can(bus), timeout=5, on_close="nothing") as motors:
+            with pytest.raises(motorlink.LineLost) as lost:
+                await motors.motor(1).motion()
+            check(lost.value)
+
+    for frames in (0, 1):
+        bus = Broken(frames)
+        asyncio.run(asyncio.wait_for(main(bus), 60))
+        bus.shutdown()
+
+
+def test_served_motors_through_python_cans_own_slcan(served: Served) -> None:
+    path = served.can.partition(":")[2]
+    with can.Bus(path, interface="slcan", bitrate=1_000_000, sleep_after_open=0) as bus:
+        with rmd.open(from_python_can(bus), timeout=2) as motors:
+            motors.motor(1).speed(180)
+            while motors.motor(1).motion.speed_dps < 100:
+                pass
+            assert [one.id for one in motors.scan([1, 2, 3, 4])] == [1, 2, 3, 4]
+    assert served.motor("rmd", 1)["mode"] == "stopped"
+
+
+def test_without_python_can_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = builtins.__import__
+
+    def missing(name: str, *rest: Any) -> Any:
+        if name == "can":
+            raise ImportError("No module named 'can'", name="can")
+        return real(name, *rest)
+
+    monkeypatch.setattr("importlib.import_module", missing)
+    with pytest.raises(ImportError, match=r"pip install \"motorlink\[can\]\""):
+        from_python_can(object())
+
+
+def test_what_is_no_bus_is_told_apart() -> None:
+    with pytest.raises(TypeError, match="no bus of python-can"):
+        from_python_can("can0")
+    port = CanPort(None, None, "nothing")
+    assert repr(port) == "<CanPort nothing>"
