@@ -7,6 +7,7 @@ mod exchange;
 mod kernel;
 mod line;
 mod machine;
+mod python;
 mod report;
 mod simulation;
 
@@ -41,6 +42,8 @@ enum What {
     Can,
     /// Instructions of an ST exchange, master and slave together
     Exchange,
+    /// Exchanges per second through Python, beside pyserial
+    Python,
     /// Simulated drives against real time, and beside other simulators
     Simulation,
     /// Repeats one piece of work, to be counted from outside
@@ -49,6 +52,9 @@ enum What {
     /// Measures one line for a while, in a process of its own
     #[command(hide = true)]
     Sitting { line: String },
+    /// Answers on so many ptys until standard input ends
+    #[command(hide = true)]
+    Respond { count: u32 },
 }
 
 /// One part of the benchmark: its tables, and what became of its goals.
@@ -58,16 +64,23 @@ fn main() -> Result<()> {
     let args = Args::parse();
     let style = if args.markdown { Style::Markdown } else { Style::Plain };
     let parts: &[Part] = match args.what {
-        What::All => {
-            &[codec::measure, line::measure, can::measure, exchange::measure, simulation::measure]
-        }
+        What::All => &[
+            codec::measure,
+            line::measure,
+            python::measure,
+            can::measure,
+            exchange::measure,
+            simulation::measure,
+        ],
         What::Codec => &[codec::measure],
         What::Line => &[line::measure],
         What::Can => &[can::measure],
         What::Exchange => &[exchange::measure],
+        What::Python => &[python::measure],
         What::Simulation => &[simulation::measure],
         What::Kernel { name, count } => return repeat(&name, count),
         What::Sitting { line } => return line::sitting(&line),
+        What::Respond { count } => return line::respond(count),
     };
     machine::describe(style);
     let mut goals = Vec::new();

@@ -5,11 +5,16 @@ mod sitting;
 mod transport;
 
 use std::env::current_exe;
+use std::io::{Read, stdin};
 use std::process::{Command, Stdio};
+use std::thread;
+
+use rustix::termios::ttyname;
 
 use crate::Result;
 use crate::report::{Goal, Section};
-use sitting::{Rates, sit};
+use raw::{Far, Functions};
+use sitting::{Rates, sit, yielding};
 use transport::Transport;
 
 /// Processes that measure: where code and stacks come to lie in memory makes a tenth.
@@ -94,16 +99,31 @@ pub fn sitting(name: &str) -> Result<()> {
     Ok(())
 }
 
+/// Answers at the far ends of `count` ptys, whose paths it prints, until standard input ends.
+pub fn respond(count: u32) -> Result<()> {
+    let mut near = Vec::new();
+    for _ in 0..count {
+        let line = Transport::Pty.open()?;
+        println!("{}", ttyname(&line.near, Vec::new())?.to_str()?);
+        let far = Far::new(line.far)?;
+        // Who opens the device may close it again.
+        near.push(line.near);
+        thread::spawn(|| yielding(|| far.serve::<Functions>()));
+    }
+    stdin().read_to_end(&mut Vec::new())?;
+    Ok(())
+}
+
 /// The middle and the ends of what was measured.
 #[derive(Debug, PartialEq)]
-struct Spread {
+pub struct Spread {
     least: f64,
-    median: f64,
+    pub median: f64,
     most: f64,
 }
 
 impl Spread {
-    fn of(mut values: Vec<f64>) -> Self {
+    pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         let at = |place: usize| values.get(place).copied().unwrap_or(f64::NAN);
         let last = values.len().saturating_sub(1);

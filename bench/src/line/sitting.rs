@@ -95,7 +95,7 @@ fn pin() -> Result<()> {
 }
 
 /// Does `work` at a lower priority.
-fn yielding(work: impl FnOnce()) {
+pub(super) fn yielding(work: impl FnOnce()) {
     // Never refused: on Linux this is for the calling thread alone, and only raising takes a right.
     let _ = setpriority_process(None, 10);
     work();

@@ -1,0 +1,114 @@
+//! Exchanges per second through Python, measured by bench/python/exchange.py in a process of its own.
+
+use std::env::current_exe;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::Result;
+use crate::line::Spread;
+use crate::report::{Goal, Section};
+
+/// Rounds of every contestant in turn.
+const ROUNDS: u32 = 400;
+/// Exchanges in a round.
+const EXCHANGES: u32 = 200;
+/// The share of the rate of pyserial without a protocol that the package has to reach.
+const TO_BYTES: f64 = 1.0;
+/// How many times as fast as plain Python it has to be.
+const TO_PYTHON: f64 = 5.0;
+
+/// Contestants as the script calls them, and what they are.
+const CONTESTANTS: [(&str, &str); 6] = [
+    ("motorlink", "motorlink, m.read"),
+    ("bytes only", "pyserial, bytes only"),
+    ("plain python", "pyserial, framing and checks"),
+    ("system calls", "os.write and os.read only"),
+    ("asyncio", "motorlink.aio, one bus"),
+    ("asyncio, four", "motorlink.aio, four buses"),
+];
+
+pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let goals = |to_bytes: Option<f64>, to_python: Option<f64>| {
+        let goal = |what: &str, least: f64, ratio: Option<f64>| Goal {
+            what: what.to_owned(),
+            wanted: format!(">= {least:.2}"),
+            reached: ratio.map(|ratio| (format!("{ratio:.3}"), ratio >= least)),
+        };
+        vec![
+            goal("Python, pty: ratio to pyserial, bytes only", TO_BYTES, to_bytes),
+            goal("Python, pty: ratio to framing and checks in Python", TO_PYTHON, to_python),
+        ]
+    };
+    if !folder.join("../.venv-bench/motorlink").exists() {
+        eprintln!("WARNING: PYTHON IS NOT MEASURED: `make bench` did not get it into .venv-bench");
+        return Ok((Vec::new(), goals(None, None)));
+    }
+    let output = Command::new(folder.join("../.venv-bench/bin/python"))
+        .arg(folder.join("python/exchange.py"))
+        .arg(current_exe()?)
+        .args([ROUNDS, EXCHANGES].map(|number| number.to_string()))
+        .stdin(Stdio::null())
+        .stderr(Stdio::inherit())
+        .output()?;
+    if !output.status.success() {
+        return Err("bench/python/exchange.py failed: its error is above".into());
+    }
+    let mut lines = std::str::from_utf8(&output.stdout)?.lines().map(serde_json::from_str);
+    let head: Value = lines.next().ok_or("bench/python/exchange.py measured nothing")??;
+    let rounds: Vec<Value> = lines.collect::<std::result::Result<_, _>>()?;
+
+    let spread = |figure: &dyn Fn(&Value) -> Option<f64>| -> Result<Spread> {
+        let figures: Option<Vec<f64>> = rounds.iter().map(figure).collect();
+        Ok(Spread::of(figures.ok_or("bench/python/exchange.py left out a figure")?))
+    };
+    let ratio = |to: &str| {
+        spread(&|round| Some(round["motorlink"]["rate"].as_f64()? / round[to]["rate"].as_f64()?))
+    };
+    let most = spread(&|round| {
+        Some(round["system calls"]["rate"].as_f64()? / round["plain python"]["rate"].as_f64()?)
+    })?;
+    let mut rows = Vec::new();
+    for (name, what) in CONTESTANTS {
+        let rate = spread(&|round| round[name]["rate"].as_f64())?;
+        let work = spread(&|round| round[name]["us"].as_f64())?;
+        let alone = head["without a line"][name].as_f64();
+        rows.push(vec![
+            what.to_owned(),
+            format!("{:.0}", rate.median),
+            format!("{:.3}", ratio(name)?.median),
+            format!("{:.1}", work.median),
+            alone.map_or_else(|| "-".to_owned(), |ns| format!("{:.2}", ns / 1e3)),
+        ]);
+    }
+    let versions = head["versions"].as_object().into_iter().flatten();
+    let versions: Vec<String> = versions
+        .map(|(name, version)| format!("{name} {}", version.as_str().unwrap_or("?")))
+        .collect();
+    let section = Section {
+        title: "Exchanges per second through Python",
+        note: format!(
+            "GET_REG SPEED_MEAS on a pty whose far end answers at once, another process on the same \
+             core: {ROUNDS} rounds of {EXCHANGES} exchanges of each in turn. Rates are medians; the \
+             ratio is that of motorlink's rate to the row's in the same round. Processor time is that \
+             of the asking process, with its system calls; most of an exchange is the kernel's and the \
+             far end's, for everybody: the system calls alone are {:.2} times as fast as framing and \
+             checks in Python, which is the most that is to be had on this line. Without a line: a request encoded, a reply checked and decoded, \
+             the least of 15. {}.",
+            most.median,
+            versions.join(", ")
+        ),
+        columns: vec![
+            "program",
+            "exchanges/s",
+            "ratio to it",
+            "us of processor",
+            "us without a line",
+        ],
+        rows,
+    };
+    let goals = goals(Some(ratio("bytes only")?.median), Some(ratio("plain python")?.median));
+    Ok((vec![section], goals))
+}
