@@ -11,8 +11,8 @@
 # make reliability     both protocols through lines that misbehave, into docs/RELIABILITY.md
 # make sizes           flash and RAM on a Cortex-M4, into docs/SIZES.md
 # make docs            writes the tables of docs/CONFORMANCE.md anew
-# make header        writes crates/ffi/include/motorlink.h anew
-# make install-c     C header and libraries, pkg-config and CMake files: PREFIX=/usr/local DESTDIR=
+# make header          writes crates/ffi/include/motorlink.h anew
+# make install-c       C header and libraries, pkg-config and CMake files: PREFIX=/usr/local DESTDIR=
 # make pictures        plays the scenarios and draws docs/pictures anew
 # make semver          the public interface against the last release
 

@@ -290,7 +290,7 @@ impl Shape {
             Some(bits) => bits,
             None => (if access.reads() { bits } else { 0 }, if access.writes() { bits } else { 0 }),
         };
-        let mcsdk = (mcsdk_get / 8) << 4 | mcsdk_set / 8;
+        let mcsdk = ((mcsdk_get / 8) << 4) | (mcsdk_set / 8);
         Shape { ty, unit, access, feature, origin, mcsdk }
     }
 
