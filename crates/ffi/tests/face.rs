@@ -199,6 +199,23 @@ fn a_drive_without_callbacks_answers() {
 }
 
 #[test]
+fn a_request_that_is_refused_leaves_the_one_under_way_alone() {
+    let mut fan = Fan { rpm: 1500, ..Fan::default() };
+    let drive = drive(&mut fan);
+    let mut bench = StBench::new(1, &drive);
+    let master: *mut motorlink_st_master = &mut bench.master;
+    let begun = unsafe { motorlink_st_master_get_register(master, 1, 0x1E) };
+    gives!(
+        Busy,
+        motorlink_st_master_get_register(master, 1, 0x02),
+        motorlink_st_master_set_register(master, 1, 0x05, 1),
+        motorlink_st_master_execute(master, 1, 2),
+        motorlink_st_master_raw(master, 0, null(), 0),
+    );
+    assert_eq!(bench.done(begun).0.value, 1500);
+}
+
+#[test]
 fn a_slave_that_is_called_from_its_callback_is_in_use() {
     let slave: *mut motorlink_st_slave = Box::into_raw(Box::new(zeroed()));
     let mut fan = Fan { rpm: 42, slave: Some(slave), ..Fan::default() };

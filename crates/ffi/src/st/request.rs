@@ -5,18 +5,24 @@ use motorlink_proto::stmcp::{
     RequestError, TorqueRamp,
 };
 
+use super::master::State;
 use super::message::motorlink_st_revup_phase;
 use super::motorlink_st_master;
 use crate::error::{answer, motorlink_error};
 use crate::pointer::{Out, promised};
 
-/// Begins an exchange; all requests end here.
+/// Begins an exchange.
 fn request(
     master: Out<motorlink_st_master>,
     motor: u8,
     request: &Request<'_>,
 ) -> Result<(), motorlink_error> {
     let mut state = master.enter()?;
+    begin(&mut state, motor, request)
+}
+
+/// Where all requests end. One that is refused changes nothing.
+fn begin(state: &mut State, motor: u8, request: &Request<'_>) -> Result<(), motorlink_error> {
     check_motor(motor)?;
     state.master.request(motor, request).map_err(refused)?;
     state.asked = match request {
@@ -60,14 +66,11 @@ pub unsafe extern "C" fn motorlink_st_master_set_register(
     promised!(master);
     answer(|| {
         let mut state = master.enter()?;
-        check_motor(motor)?;
         let register = RegisterId(reg);
         let size = register.write_size(state.profile);
         let bytes = value.to_le_bytes();
         let value = bytes.get(..usize::from(size)).unwrap_or(&bytes);
-        state.asked = None;
-        let request = Request::SetRegister { register, value };
-        state.master.request(motor, &request).map_err(refused)
+        begin(&mut state, motor, &Request::SetRegister { register, value })
     })
 }
 
@@ -252,7 +255,8 @@ pub unsafe extern "C" fn motorlink_st_master_raw(
     answer(|| {
         let payload = payload.slice(size)?;
         let mut state = master.enter()?;
+        state.master.request_raw(header, payload).map_err(refused)?;
         state.asked = None;
-        state.master.request_raw(header, payload).map_err(refused)
+        Ok(())
     })
 }
