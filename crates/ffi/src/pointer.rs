@@ -93,7 +93,9 @@ plain!(u8, i16, i32);
 impl<T: Plain> In<T> {
     /// The value there.
     pub(crate) fn read(self) -> Result<T> {
-        Ok(*self.get()?)
+        check(self.0)?;
+        // SAFETY: neither NULL nor misaligned, promised to be readable, and any bits are a `T`.
+        Ok(unsafe { self.0.read() })
     }
 
     /// The value there, `None` for NULL.
@@ -101,11 +103,10 @@ impl<T: Plain> In<T> {
         if self.0.is_null() { Ok(None) } else { self.read().map(Some) }
     }
 
-    /// What is there, as long as the promise holds.
-    pub(crate) fn get<'a>(self) -> Result<&'a T> {
+    /// What stays there as long as the promise holds.
+    pub(crate) fn keep(self) -> Result<Kept<T>> {
         check(self.0)?;
-        // SAFETY: neither NULL nor misaligned, promised to be readable, and any bits are a `T`.
-        Ok(unsafe { &*self.0 })
+        Ok(Kept(self.0))
     }
 
     /// The `len` values there; NULL is as good as any pointer to none.
@@ -139,6 +140,17 @@ pub(crate) fn ascii<'a>(text: In<u8>, most: usize) -> &'a str {
     let bytes = unsafe { slice::from_raw_parts(text.0, len) };
     // SAFETY: each of them is ASCII.
     unsafe { str::from_utf8_unchecked(bytes) }
+}
+
+/// What a caller leaves in place as long as an object is used, and may change.
+pub(crate) struct Kept<T>(*const T);
+
+impl<T: Plain> Kept<T> {
+    /// The value there now: no reference, which a callback that changes it would break.
+    pub(crate) fn now(&self) -> T {
+        // SAFETY: neither NULL nor misaligned, promised to be readable, and any bits are a `T`.
+        unsafe { self.0.read() }
+    }
 }
 
 /// A place for a result.

@@ -215,6 +215,47 @@ fn a_request_that_is_refused_leaves_the_one_under_way_alone() {
     assert_eq!(bench.done(begun).0.value, 1500);
 }
 
+/// Not forbidden, so it has to go well: a callback may change the table that it is called from.
+#[test]
+fn callbacks_may_change_their_table() {
+    extern "C" fn other(_: *mut c_void, _: u8, _: u8) -> i32 {
+        7
+    }
+    extern "C" fn features_and_more(context: *mut c_void, _: u8) -> u16 {
+        unsafe { (*context.cast::<motorlink_st_drive>()).read = Some(other) };
+        0
+    }
+    let table: *mut motorlink_st_drive = Box::into_raw(Box::new(zeroed()));
+    let features = Some(features_and_more as _);
+    unsafe { *table = motorlink_st_drive { context: table.cast(), features, ..zeroed() } };
+    let mut slave: motorlink_st_slave = zeroed();
+    let mut reply: motorlink_bytes = zeroed();
+    gives!(Ok, motorlink_st_slave_init(&mut slave, size_of_val(&slave), 0, 1, table));
+    for byte in [0x22, 0x01, 0x02, 0x25] {
+        gives!(Ok, motorlink_st_slave_receive(&mut slave, 0, byte, &mut reply));
+    }
+    assert_eq!(bytes(&reply), [0xF0, 0x01, 7, 0xF8]);
+    drop(unsafe { Box::from_raw(table) });
+
+    extern "C" fn once(context: *mut c_void, _: *const motorlink_rmd_motion) {
+        unsafe { (*context.cast::<motorlink_rmd_motor>()).set_mode = None };
+    }
+    let table: *mut motorlink_rmd_motor = Box::into_raw(Box::new(zeroed()));
+    let set_mode = Some(once as _);
+    unsafe { *table = motorlink_rmd_motor { context: table.cast(), set_mode, ..zeroed() } };
+    let config =
+        motorlink_rmd_drive_config { shutdown_us: 0, id: 1, encoder_bits: 0, clear_reply_0x9b: 0 };
+    let mut drive: motorlink_rmd_drive = zeroed();
+    gives!(
+        Ok,
+        motorlink_rmd_drive_init(&mut drive, size_of_val(&drive), &config, null(), table),
+        motorlink_rmd_drive_power_on(&mut drive, 0),
+        motorlink_rmd_drive_poll(&mut drive, 0),
+    );
+    assert!(unsafe { (*table).set_mode }.is_none());
+    drop(unsafe { Box::from_raw(table) });
+}
+
 #[test]
 fn a_slave_that_is_called_from_its_callback_is_in_use() {
     let slave: *mut motorlink_st_slave = Box::into_raw(Box::new(zeroed()));

@@ -13,7 +13,7 @@ use super::motorlink_rmd_drive;
 use crate::bytes::MOTORLINK_NEVER;
 use crate::error::{answer, motorlink_error};
 use crate::frame::{NO_FRAME, motorlink_can_frame};
-use crate::pointer::{In, plain, promised};
+use crate::pointer::{Kept, plain, promised};
 
 /// What a motor does.
 #[repr(u8)]
@@ -122,7 +122,7 @@ plain!(motorlink_rmd_settings, motorlink_rmd_drive_config, motorlink_rmd_motor);
 /// What the storage of a drive holds.
 pub(crate) struct State {
     drive: Drive,
-    motor: In<motorlink_rmd_motor>,
+    motor: Kept<motorlink_rmd_motor>,
 }
 
 impl From<Mode> for motorlink_rmd_motion {
@@ -177,20 +177,23 @@ impl From<motorlink_rmd_settings> for Settings {
     }
 }
 
-impl Motor for &motorlink_rmd_motor {
+impl Motor for Kept<motorlink_rmd_motor> {
     fn set_mode(&mut self, mode: Mode) {
-        if let Some(call) = self.set_mode {
-            call(self.context, &motorlink_rmd_motion::from(mode));
+        let motor = self.now();
+        if let Some(call) = motor.set_mode {
+            call(motor.context, &motorlink_rmd_motion::from(mode));
         }
     }
 
     fn configure(&mut self, settings: &Settings) {
-        if let Some(call) = self.configure {
-            call(self.context, &motorlink_rmd_settings::from(settings));
+        let motor = self.now();
+        if let Some(call) = motor.configure {
+            call(motor.context, &motorlink_rmd_settings::from(settings));
         }
     }
 
     fn sense(&mut self) -> Sense {
+        let motor = self.now();
         let mut sense = motorlink_rmd_sense {
             encoder_counts: 0,
             iq_digits: 0,
@@ -200,8 +203,8 @@ impl Motor for &motorlink_rmd_motor {
             temperature_celsius: 0,
             faults: 0,
         };
-        if let Some(call) = self.sense {
-            call(self.context, &raw mut sense);
+        if let Some(call) = motor.sense {
+            call(motor.context, &raw mut sense);
         }
         let [phase_a, phase_b, phase_c] = sense.phase_digits.map(PhaseCurrent);
         Sense {
@@ -216,8 +219,9 @@ impl Motor for &motorlink_rmd_motor {
     }
 
     fn save(&mut self, rom: &Settings) {
-        if let Some(call) = self.save {
-            call(self.context, &motorlink_rmd_settings::from(rom));
+        let motor = self.now();
+        if let Some(call) = motor.save {
+            call(motor.context, &motorlink_rmd_settings::from(rom));
         }
     }
 }
@@ -241,7 +245,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_init(
 ) -> motorlink_error {
     promised!(drive, config, rom, motor);
     answer(|| {
-        motor.get()?;
+        let motor = motor.keep()?;
         let config = config.read()?;
         let rom = rom.read_optional()?.map_or_else(Settings::default, Settings::from);
         let encoder = match config.encoder_bits {
@@ -269,7 +273,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_power_on(
     answer(|| {
         let mut state = drive.enter()?;
         let State { drive, motor } = &mut *state;
-        drive.power_on(Instant(now_us), &mut motor.get()?);
+        drive.power_on(Instant(now_us), motor);
         Ok(())
     })
 }
@@ -293,7 +297,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_receive(
         let place = reply.place()?;
         let mut state = drive.enter()?;
         let State { drive, motor } = &mut *state;
-        let reply = drive.receive(Instant(now_us), &frame, &mut motor.get()?);
+        let reply = drive.receive(Instant(now_us), &frame, motor);
         place.set(reply.map_or(NO_FRAME, motorlink_can_frame::from));
         Ok(())
     })
@@ -310,7 +314,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_poll(
     answer(|| {
         let mut state = drive.enter()?;
         let State { drive, motor } = &mut *state;
-        drive.poll(Instant(now_us), &mut motor.get()?);
+        drive.poll(Instant(now_us), motor);
         Ok(())
     })
 }

@@ -13,7 +13,7 @@ use super::motorlink_st_slave;
 use super::profile::profile;
 use crate::bytes::{MOTORLINK_NEVER, motorlink_bytes};
 use crate::error::{answer, motorlink_error};
-use crate::pointer::{In, ascii, plain, promised};
+use crate::pointer::{Kept, ascii, plain, promised};
 
 /// The firmware's version, as board information (4.7) and firmware version (4.12) tell it.
 #[repr(C)]
@@ -100,18 +100,20 @@ plain!(motorlink_st_drive);
 /// What the storage of a slave holds.
 pub(crate) struct State {
     slave: Slave,
-    drive: In<motorlink_st_drive>,
+    drive: Kept<motorlink_st_drive>,
 }
 
-impl Drive for &motorlink_st_drive {
+impl Drive for Kept<motorlink_st_drive> {
     fn features(&self, motor: Motor) -> Features {
-        let bits = self.features.map_or(0, |call| call(self.context, motor.number()));
+        let drive = self.now();
+        let bits = drive.features.map_or(0, |call| call(drive.context, motor.number()));
         let has = |feature: &&Feature| bits & 1u16.wrapping_shl(**feature as u32) != 0;
         Feature::ALL.iter().filter(has).fold(Features::NONE, |all, one| all.with(*one))
     }
 
     fn version(&self) -> Version<'_> {
-        let motorlink_st_version { name, pre_release, major, minor, patch } = self.version;
+        let drive = self.now();
+        let motorlink_st_version { name, pre_release, major, minor, patch } = drive.version;
         let (name, pre_release) = (name.cast::<u8>(), pre_release.cast::<u8>());
         promised!(name, pre_release);
         let (name, pre_release) = (ascii(name, 32), ascii(pre_release, 32));
@@ -119,66 +121,76 @@ impl Drive for &motorlink_st_drive {
     }
 
     fn read(&mut self, motor: Motor, register: RegisterId) -> i32 {
-        self.read.map_or(0, |call| call(self.context, motor.number(), register.0))
+        let drive = self.now();
+        drive.read.map_or(0, |call| call(drive.context, motor.number(), register.0))
     }
 
     fn write(&mut self, motor: Motor, register: RegisterId, value: i32) -> Result<(), ErrorCode> {
-        let call = self.write.ok_or(ErrorCode::WrongSet)?;
-        match call(self.context, motor.number(), register.0, value) {
+        let drive = self.now();
+        let call = drive.write.ok_or(ErrorCode::WrongSet)?;
+        match call(drive.context, motor.number(), register.0, value) {
             0 => Ok(()),
             refusal => Err(refusal.into()),
         }
     }
 
     fn execute(&mut self, motor: Motor, command: Command) {
-        if let Some(call) = self.execute {
-            call(self.context, motor.number(), command.number());
+        let drive = self.now();
+        if let Some(call) = drive.execute {
+            call(drive.context, motor.number(), command.number());
         }
     }
 
     fn ramp(&mut self, motor: Motor, ramp: Ramp) {
-        if let Some(call) = self.ramp {
-            call(self.context, motor.number(), ramp.speed_rpm, ramp.duration_ms);
+        let drive = self.now();
+        if let Some(call) = drive.ramp {
+            call(drive.context, motor.number(), ramp.speed_rpm, ramp.duration_ms);
         }
     }
 
     fn revup(&mut self, motor: Motor, phase: u8) -> RevupPhase {
+        let drive = self.now();
         let mut data = motorlink_st_revup_phase::from(RevupPhase::default());
-        if let Some(call) = self.revup {
-            call(self.context, motor.number(), phase, &raw mut data);
+        if let Some(call) = drive.revup {
+            call(drive.context, motor.number(), phase, &raw mut data);
         }
         data.into()
     }
 
     fn set_revup(&mut self, motor: Motor, phase: u8, data: RevupPhase) {
-        if let Some(call) = self.set_revup {
-            call(self.context, motor.number(), phase, &motorlink_st_revup_phase::from(data));
+        let drive = self.now();
+        if let Some(call) = drive.set_revup {
+            call(drive.context, motor.number(), phase, &motorlink_st_revup_phase::from(data));
         }
     }
 
     fn current_reference(&mut self, motor: Motor, reference: CurrentReference) {
-        if let Some(call) = self.current {
-            call(self.context, motor.number(), reference.iq_s16a, reference.id_s16a);
+        let drive = self.now();
+        if let Some(call) = drive.current {
+            call(drive.context, motor.number(), reference.iq_s16a, reference.id_s16a);
         }
     }
 
     fn torque_ramp(&mut self, motor: Motor, ramp: TorqueRamp) {
-        if let Some(call) = self.torque_ramp {
-            call(self.context, motor.number(), ramp.torque_s16a, ramp.duration_ms);
+        let drive = self.now();
+        if let Some(call) = drive.torque_ramp {
+            call(drive.context, motor.number(), ramp.torque_s16a, ramp.duration_ms);
         }
     }
 
     fn position(&mut self, motor: Motor, target: PositionMove) {
-        if let Some(call) = self.position {
-            call(self.context, motor.number(), target.angle_rad, target.duration_s);
+        let drive = self.now();
+        if let Some(call) = drive.position {
+            call(drive.context, motor.number(), target.angle_rad, target.duration_s);
         }
     }
 
     fn profiler_step(&self, motor: Motor, step: u8) -> &[u8] {
+        let drive = self.now();
         let mut registers = core::ptr::null();
-        let call = self.profiler_step;
+        let call = drive.profiler_step;
         let count =
-            call.map_or(0, |call| call(self.context, motor.number(), step, &raw mut registers));
+            call.map_or(0, |call| call(drive.context, motor.number(), step, &raw mut registers));
         promised!(registers);
         registers.slice(count.into()).unwrap_or(&[])
     }
@@ -201,7 +213,7 @@ pub unsafe extern "C" fn motorlink_st_slave_init(
 ) -> motorlink_error {
     promised!(slave, drive);
     answer(|| {
-        drive.get()?;
+        let drive = drive.keep()?;
         let profile = self::profile(profile)?;
         let motors = Motor::new(motors).ok_or(motorlink_error::BadArgument)?;
         slave.init(size, State { slave: Slave::new(profile, motors), drive })
@@ -225,8 +237,7 @@ pub unsafe extern "C" fn motorlink_st_slave_receive(
         let reply = reply.place()?;
         let mut state = slave.enter()?;
         let State { slave, drive } = &mut *state;
-        let mut drive = drive.get()?;
-        let sent = slave.receive(Instant(now_us), byte, &mut drive);
+        let sent = slave.receive(Instant(now_us), byte, drive);
         reply.set(sent.unwrap_or(&[]).into());
         Ok(())
     })
