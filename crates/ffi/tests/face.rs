@@ -215,6 +215,32 @@ fn a_request_that_is_refused_leaves_the_one_under_way_alone() {
     assert_eq!(bench.done(begun).0.value, 1500);
 }
 
+/// A loop that hands in what came before it polls may have the answer before the poll that follows
+/// the question.
+#[test]
+fn an_answer_that_comes_before_the_next_poll_recovers_the_line() {
+    let nothing: motorlink_st_drive = zeroed();
+    let mut bench = StBench::new(0, &nothing);
+    let StBench { master, slave } = &mut *bench;
+    let (mut action, mut reply): (motorlink_st_action, motorlink_bytes) = (zeroed(), zeroed());
+    gives!(Ok, motorlink_st_master_lost(master), motorlink_st_master_get_register(master, 1, 2));
+    let mut now = 0;
+    loop {
+        gives!(Ok, motorlink_st_master_poll(master, now, &mut action));
+        match action.kind {
+            motorlink_action::Done => break,
+            motorlink_action::Wait => now = action.until_us,
+            motorlink_action::Transmit => {
+                for byte in bytes(&action.bytes) {
+                    gives!(Ok, motorlink_st_slave_receive(slave, now, byte, &mut reply));
+                }
+                gives!(Ok, motorlink_st_master_receive(master, now, reply.data, reply.size));
+            }
+        }
+    }
+    assert_eq!(action.result, OK);
+}
+
 /// Not forbidden, so it has to go well: a callback may change the table that it is called from.
 #[test]
 fn callbacks_may_change_their_table() {

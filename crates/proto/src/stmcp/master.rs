@@ -365,6 +365,11 @@ impl Master {
         }
         match self.state {
             State::Sent | State::Waiting { .. } => self.reply(bytes),
+            State::Probed => {
+                let deadline = now + self.config.timeout;
+                self.state = State::Answer { deadline };
+                self.answer(now, deadline, bytes);
+            }
             State::Answer { deadline } => self.answer(now, deadline, bytes),
             State::Quiet { until, limit, then } => {
                 self.unasked(bytes.len());
