@@ -509,6 +509,10 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_NOISE = 28,
   /**
+   * The drive acknowledged, with something that is no value of a register (ST).
+   */
+  MOTORLINK_ERROR_WRONG_REPLY = 29,
+  /**
    * The motor did not answer before and cannot be trusted yet; nothing was done. Ask again (RMD).
    */
   MOTORLINK_ERROR_QUARANTINED = 40,
@@ -806,7 +810,8 @@ typedef struct motorlink_st_action {
   motorlink_error result;
   /**
    * `DONE` of a register read: the register's value, the sign extended as its type has it; the
-   * bits of a floating-point register. 0 for anything else.
+   * bits of a floating-point register; of a register of type u32 the cast to `uint32_t` is the
+   * value. 0 for anything else.
    */
   int32_t value;
   /**

@@ -47,6 +47,8 @@ pub enum motorlink_error {
     Lost = 27,
     /// The line was lost before, and does not fall silent; nothing was sent (ST).
     Noise = 28,
+    /// The drive acknowledged, with something that is no value of a register (ST).
+    WrongReply = 29,
     /// The motor did not answer before and cannot be trusted yet; nothing was done. Ask again (RMD).
     Quarantined = 40,
     /// A limit that the caller set, or the document's range, is exceeded; nothing was sent (RMD).
@@ -80,13 +82,14 @@ impl motorlink_error {
             Self::Ambiguous => c"two replies that differ came at once",
             Self::Lost => c"the line is lost and the drive does not answer",
             Self::Noise => c"the line does not fall silent",
+            Self::WrongReply => c"the reply has no value of a register",
             Self::Quarantined => c"the motor did not answer before: ask again",
             Self::Limit => c"beyond a limit of this motor",
             Self::Foreign => c"the motor answers in another protocol",
         }
     }
 
-    const ALL: [Self; 22] = [
+    const ALL: [Self; 23] = [
         Self::Ok,
         Self::NullPointer,
         Self::Misaligned,
@@ -106,6 +109,7 @@ impl motorlink_error {
         Self::Ambiguous,
         Self::Lost,
         Self::Noise,
+        Self::WrongReply,
         Self::Quarantined,
         Self::Limit,
         Self::Foreign,

@@ -49,7 +49,8 @@ pub struct motorlink_st_action {
     /// `DONE`: whether the drive did what was asked, and why not.
     pub result: motorlink_error,
     /// `DONE` of a register read: the register's value, the sign extended as its type has it; the
-    /// bits of a floating-point register. 0 for anything else.
+    /// bits of a floating-point register; of a register of type u32 the cast to `uint32_t` is the
+    /// value. 0 for anything else.
     pub value: i32,
     /// What this is: `WAIT`, `TRANSMIT` or `DONE`.
     pub kind: motorlink_action,
@@ -156,8 +157,11 @@ pub unsafe extern "C" fn motorlink_st_master_poll(
                 match result {
                     Ok(payload) => {
                         action.bytes = payload.into();
-                        let value = asked.and_then(|register| register.decode(payload));
-                        action.value = value.unwrap_or_default();
+                        match asked.map(|register| register.decode(payload)) {
+                            Some(Some(value)) => action.value = value,
+                            Some(None) => action.result = motorlink_error::WrongReply,
+                            None => {}
+                        }
                     }
                     Err(error) => (action.result, action.refusal) = failed(error),
                 }
