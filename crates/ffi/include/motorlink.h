@@ -34,7 +34,8 @@
  * say that it is kept; pointers in one call do not overlap one another or an object's storage.
  *
  * Requests. A `motorlink_st_master_` function that takes a motor begins an exchange, which
- * `_poll` conducts: send what it says, hand in what comes, until it says done. `motor` is 1 to 7, or
+ * `_poll` conducts: send what it says, hand in what comes, until it says done. It is not over
+ * before that is polled, and until then every other request is BUSY. `motor` is 1 to 7, or
  * 0 for the drive's current motor (3.2). BAD_ARGUMENT: `motor` is over 7. BUSY: an exchange is under
  * way. The host of RMD motors has an exchange with each motor, all at once.
  *
@@ -49,6 +50,9 @@
  * A call for an object that is in a call already (from one of its callbacks, from an interrupt,
  * from another thread) gives IN_USE and does nothing. `_init` alone cannot know, and must not be
  * called then.
+ *
+ * Callbacks return: they do not leave by longjmp or by a C++ exception. Their table may be changed,
+ * also by them.
  *
  * Cost. Every call ends after a number of steps that depends on the bytes that were handed in and
  * on the callbacks. On a Cortex-M4 it needs less than 1 KiB of stack beside them; only
@@ -1503,7 +1507,9 @@ motorlink_error motorlink_st_master_firmware_version(struct motorlink_st_master 
 
 /**
  * Begins to choose the registers of a data segment (profile SPEC): `count` numbers, which are
- * copied.
+ * copied. A slave of this library has segments 0 to 3, of up to 32 registers each.
+ *
+ * `TOO_LONG`: over 127 registers.
  */
 motorlink_error motorlink_st_master_configure_segment(struct motorlink_st_master *master,
                                                       uint8_t motor,
@@ -1522,6 +1528,8 @@ motorlink_error motorlink_st_master_read_segment(struct motorlink_st_master *mas
 /**
  * Begins to ask which registers steps of the motor profiler show (profile MCSDK 5.4): `count`
  * numbers of steps, which are copied. The result has the count and the registers of each step.
+ *
+ * `TOO_LONG`: over 128 steps.
  */
 motorlink_error motorlink_st_master_profiler_info(struct motorlink_st_master *master,
                                                   uint8_t motor,
@@ -1814,7 +1822,8 @@ motorlink_error motorlink_rmd_host_set_limits(struct motorlink_rmd_host *host,
  * any eight bytes.
  *
  * A motor that did not answer before may be asked for its status instead; the exchange ends in
- * `QUARANTINED` then.
+ * `QUARANTINED` then. Off and Stop are taken and sent during a quarantine, unless it is their own
+ * late reply that is awaited.
  *
  * `BAD_ARGUMENT`: `motor` is not 1 to 32. `BUSY`: its last exchange is not over. `LIMIT`: a limit
  * or the document's range is exceeded. `QUARANTINED`: ask again at the time that
@@ -1829,8 +1838,10 @@ motorlink_error motorlink_rmd_host_request(struct motorlink_rmd_host *host,
  * Begins an exchange with motors 1 to 4 in one frame (0x280): a torque current each, 0.016 A a
  * digit. `expect` has a bit a motor that has to answer, bit 0 for motor 1. Each of them ends in a
  * `DONE`. All four are told; those that are not expected to answer are in quarantine afterwards.
+ * Where one of `expect` did not answer before, each of them is asked for its status instead.
  *
- * As `motorlink_rmd_host_request`; `BAD_ARGUMENT`: a bit above 3 is set.
+ * As `motorlink_rmd_host_request`: `BUSY` and `LIMIT` of any of the four, `QUARANTINED` of `expect`.
+ * `BAD_ARGUMENT`: a bit above 3 is set.
  */
 motorlink_error motorlink_rmd_host_torque4(struct motorlink_rmd_host *host,
                                            uint64_t now_us,
@@ -1860,7 +1871,8 @@ motorlink_error motorlink_rmd_host_receive(struct motorlink_rmd_host *host,
                                            const struct motorlink_can_frame *frame);
 
 /**
- * Gives up the exchange with a motor without a result, so that another request can be made.
+ * Gives up the exchange with a motor without a result, so that another request can be made. A frame
+ * of `motorlink_rmd_host_torque4` that still waits and would reach the motor is given up for all.
  *
  * `BAD_ARGUMENT`: `motor` is not 1 to 32.
  */

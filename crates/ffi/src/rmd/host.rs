@@ -137,7 +137,8 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_limits(
 /// any eight bytes.
 ///
 /// A motor that did not answer before may be asked for its status instead; the exchange ends in
-/// `QUARANTINED` then.
+/// `QUARANTINED` then. Off and Stop are taken and sent during a quarantine, unless it is their own
+/// late reply that is awaited.
 ///
 /// `BAD_ARGUMENT`: `motor` is not 1 to 32. `BUSY`: its last exchange is not over. `LIMIT`: a limit
 /// or the document's range is exceeded. `QUARANTINED`: ask again at the time that
@@ -160,8 +161,10 @@ pub unsafe extern "C" fn motorlink_rmd_host_request(
 /// Begins an exchange with motors 1 to 4 in one frame (0x280): a torque current each, 0.016 A a
 /// digit. `expect` has a bit a motor that has to answer, bit 0 for motor 1. Each of them ends in a
 /// `DONE`. All four are told; those that are not expected to answer are in quarantine afterwards.
+/// Where one of `expect` did not answer before, each of them is asked for its status instead.
 ///
-/// As `motorlink_rmd_host_request`; `BAD_ARGUMENT`: a bit above 3 is set.
+/// As `motorlink_rmd_host_request`: `BUSY` and `LIMIT` of any of the four, `QUARANTINED` of `expect`.
+/// `BAD_ARGUMENT`: a bit above 3 is set.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_torque4(
     host: *mut motorlink_rmd_host,
@@ -259,7 +262,8 @@ pub unsafe extern "C" fn motorlink_rmd_host_receive(
     })
 }
 
-/// Gives up the exchange with a motor without a result, so that another request can be made.
+/// Gives up the exchange with a motor without a result, so that another request can be made. A frame
+/// of `motorlink_rmd_host_torque4` that still waits and would reach the motor is given up for all.
 ///
 /// `BAD_ARGUMENT`: `motor` is not 1 to 32.
 #[unsafe(no_mangle)]

@@ -199,7 +199,9 @@ pub unsafe extern "C" fn motorlink_st_master_firmware_version(
 }
 
 /// Begins to choose the registers of a data segment (profile SPEC): `count` numbers, which are
-/// copied.
+/// copied. A slave of this library has segments 0 to 3, of up to 32 registers each.
+///
+/// `TOO_LONG`: over 127 registers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_configure_segment(
     master: *mut motorlink_st_master,
@@ -229,6 +231,8 @@ pub unsafe extern "C" fn motorlink_st_master_read_segment(
 
 /// Begins to ask which registers steps of the motor profiler show (profile MCSDK 5.4): `count`
 /// numbers of steps, which are copied. The result has the count and the registers of each step.
+///
+/// `TOO_LONG`: over 128 steps.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_profiler_info(
     master: *mut motorlink_st_master,
