@@ -241,6 +241,17 @@ fn an_answer_that_comes_before_the_next_poll_recovers_the_line() {
     assert_eq!(action.result, OK);
 }
 
+#[test]
+fn a_name_that_is_too_long_is_cut_between_characters() {
+    let name = "a".repeat(31) + "°C";
+    let payload = [&[5, 4, 4], name.as_bytes()].concat();
+    let mut info: motorlink_st_board_info = zeroed();
+    gives!(Ok, motorlink_st_decode_board_info(payload.as_ptr(), payload.len(), &mut info));
+    let mut expected = [b'a'; 33];
+    expected[31..].fill(0);
+    assert_eq!(info.name.map(|letter| letter as u8), expected);
+}
+
 /// No register has three bytes, or none: that is no value, least of all 0.
 #[test]
 fn a_read_that_is_answered_with_no_value_says_so() {

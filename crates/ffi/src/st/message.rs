@@ -62,11 +62,11 @@ impl From<motorlink_st_revup_phase> for RevupPhase {
     }
 }
 
-/// A text with a NUL behind it, cut where there is no room.
+/// A text with a NUL behind it, without the characters that there is no room for.
 fn terminated(text: &str) -> [c_char; MOTORLINK_ST_TEXT_SIZE] {
     let mut out = [0; MOTORLINK_ST_TEXT_SIZE];
-    let most = MOTORLINK_ST_TEXT_SIZE - 1;
-    for (slot, byte) in out.iter_mut().zip(text.bytes().take(most)) {
+    let end = (0..MOTORLINK_ST_TEXT_SIZE).rev().find(|&end| text.is_char_boundary(end));
+    for (slot, byte) in out.iter_mut().zip(text.bytes().take(end.unwrap_or(0))) {
         *slot = byte as c_char;
     }
     out
