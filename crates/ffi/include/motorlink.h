@@ -1363,8 +1363,7 @@ struct motorlink_st_master_config motorlink_st_master_defaults(void);
  *
  * `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
  *
- * `BAD_ARGUMENT`: `profile` or `recovery` is
- * not one of its enum's.
+ * `BAD_ARGUMENT`: `profile` or `recovery` is not one of its enum's.
  */
 motorlink_error motorlink_st_master_init(struct motorlink_st_master *master,
                                          size_t size,
@@ -1553,8 +1552,7 @@ motorlink_error motorlink_st_master_raw(struct motorlink_st_master *master,
  * `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
  * may be constant. Not from a callback of the same slave.
  *
- * `BAD_ARGUMENT`: `profile` is none of
- * `motorlink_st_profile`, or `motors` is not 1 to 7.
+ * `BAD_ARGUMENT`: `profile` is none of `motorlink_st_profile`, or `motors` is not 1 to 7.
  */
 motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
                                         size_t size,
@@ -1893,8 +1891,7 @@ motorlink_error motorlink_rmd_host_busy(struct motorlink_rmd_host *host, uint32_
  * `motor` is kept: it has to live as long as the drive is used, and may be constant. Not from a
  * callback of the same drive.
  *
- * `BAD_ARGUMENT`: `id` is not 1 to 32, or
- * `encoder_bits` neither 0 nor 12 to 18.
+ * `BAD_ARGUMENT`: `id` is not 1 to 32, or `encoder_bits` neither 0 nor 12 to 18.
  */
 motorlink_error motorlink_rmd_drive_init(struct motorlink_rmd_drive *drive,
                                          size_t size,
@@ -1910,11 +1907,10 @@ motorlink_error motorlink_rmd_drive_power_on(struct motorlink_rmd_drive *drive, 
 
 /**
  * Takes a frame from the bus that came at `now_us`. `reply` is the frame to send; its id is
- * `MOTORLINK_NO_FRAME` where there is none: frames for others, unknown codes and frames that are not eight bytes of
- * standard data are not answered.
+ * `MOTORLINK_NO_FRAME` where there is none: frames for others, unknown codes and frames that are
+ * not eight bytes of standard data are not answered.
  *
- * `BAD_ARGUMENT`: no CAN
- * frame has such a size or identifier.
+ * `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
  */
 motorlink_error motorlink_rmd_drive_receive(struct motorlink_rmd_drive *drive,
                                             uint64_t now_us,

@@ -233,8 +233,7 @@ impl Motor for Kept<motorlink_rmd_motor> {
 /// `motor` is kept: it has to live as long as the drive is used, and may be constant. Not from a
 /// callback of the same drive.
 ///
-/// `BAD_ARGUMENT`: `id` is not 1 to 32, or
-/// `encoder_bits` neither 0 nor 12 to 18.
+/// `BAD_ARGUMENT`: `id` is not 1 to 32, or `encoder_bits` neither 0 nor 12 to 18.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_init(
     drive: *mut motorlink_rmd_drive,
@@ -279,11 +278,10 @@ pub unsafe extern "C" fn motorlink_rmd_drive_power_on(
 }
 
 /// Takes a frame from the bus that came at `now_us`. `reply` is the frame to send; its id is
-/// `MOTORLINK_NO_FRAME` where there is none: frames for others, unknown codes and frames that are not eight bytes of
-/// standard data are not answered.
+/// `MOTORLINK_NO_FRAME` where there is none: frames for others, unknown codes and frames that are
+/// not eight bytes of standard data are not answered.
 ///
-/// `BAD_ARGUMENT`: no CAN
-/// frame has such a size or identifier.
+/// `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_receive(
     drive: *mut motorlink_rmd_drive,

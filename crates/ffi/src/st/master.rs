@@ -85,8 +85,7 @@ pub extern "C" fn motorlink_st_master_defaults() -> motorlink_st_master_config {
 ///
 /// `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
 ///
-/// `BAD_ARGUMENT`: `profile` or `recovery` is
-/// not one of its enum's.
+/// `BAD_ARGUMENT`: `profile` or `recovery` is not one of its enum's.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_init(
     master: *mut motorlink_st_master,

@@ -201,8 +201,7 @@ impl Drive for Kept<motorlink_st_drive> {
 /// `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
 /// may be constant. Not from a callback of the same slave.
 ///
-/// `BAD_ARGUMENT`: `profile` is none of
-/// `motorlink_st_profile`, or `motors` is not 1 to 7.
+/// `BAD_ARGUMENT`: `profile` is none of `motorlink_st_profile`, or `motors` is not 1 to 7.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_init(
     slave: *mut motorlink_st_slave,
