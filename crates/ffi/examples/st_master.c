@@ -3,8 +3,8 @@
  * Commands an ST drive: st_master /dev/ttyACM0 [RPM]
  *
  * Shows what the drive is, ramps motor 1 to RPM (1000 without it) within a second, waits until it
- * turns so fast, and stops it. Ends with 0, with 1 where the drive refused, with 3 where the line
- * failed.
+ * turns so fast, and stops it, also after a failure. Ends with 0, with 1 where the drive refused,
+ * with 3 where the line failed.
  */
 #define _POSIX_C_SOURCE 200809L
 #include "posix.h"
@@ -14,6 +14,7 @@
 enum { MOTOR = 1 };
 
 static motorlink_st_master master;
+static int started;
 
 /* Conducts the exchange that was begun; gives what became of it. */
 static motorlink_st_action exchange(int fd, motorlink_error begun) {
@@ -37,16 +38,24 @@ static motorlink_st_action exchange(int fd, motorlink_error begun) {
   }
 }
 
+/* Ends the program, and the motor before it: after a failure the line recovers for that. */
+static void leave(int fd, int code) {
+  if (started) {
+    exchange(fd, motorlink_st_master_execute(&master, MOTOR, MOTORLINK_ST_COMMAND_STOP_MOTOR));
+  }
+  exit(code);
+}
+
 /* As `exchange`, for those that have to succeed. */
 static motorlink_st_action done(int fd, const char *what, motorlink_error begun) {
   motorlink_st_action action = exchange(fd, begun);
   if (action.result == MOTORLINK_ERROR_REFUSED) {
     fprintf(stderr, "%s: refused with code %u\n", what, (unsigned)action.refusal);
-    exit(1);
+    leave(fd, 1);
   }
   if (action.result != MOTORLINK_OK) {
     fprintf(stderr, "%s: %s\n", what, motorlink_error_text(action.result));
-    exit(3);
+    leave(fd, 3);
   }
   return action;
 }
@@ -79,6 +88,7 @@ int main(int argc, char **argv) {
          (unsigned)info.patch);
 
   done(fd, "ramp", motorlink_st_master_ramp(&master, MOTOR, rpm, 1000));
+  started = 1;
   done(fd, "start", motorlink_st_master_execute(&master, MOTOR, MOTORLINK_ST_COMMAND_START_MOTOR));
   give_up = now_us() + 20000000U;
   do {
@@ -88,6 +98,7 @@ int main(int argc, char **argv) {
          (long)read_register(fd, MOTORLINK_ST_REG_STATUS),
          (unsigned long)(uint32_t)read_register(fd, MOTORLINK_ST_REG_FLAGS));
   done(fd, "stop", motorlink_st_master_execute(&master, MOTOR, MOTORLINK_ST_COMMAND_STOP_MOTOR));
+  started = 0;
 
   /* What is read-only is refused, and the line stays in step. */
   action = exchange(fd, motorlink_st_master_set_register(&master, MOTOR,
