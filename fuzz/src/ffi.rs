@@ -44,8 +44,8 @@ struct Bench {
     kinds: [Kind; BLOCKS],
     now: u64,
     heard: Heard,
-    st: motorlink_st_drive,
-    motor: motorlink_rmd_motor,
+    st: *const motorlink_st_drive,
+    motor: *const motorlink_rmd_motor,
 }
 
 thread_local! {
@@ -126,8 +126,8 @@ pub fn ffi(data: &[u8]) {
         kinds: [Kind::Nothing; BLOCKS],
         now: 0,
         heard: Heard::default(),
-        st,
-        motor,
+        st: &raw const st,
+        motor: &raw const motor,
     };
     let mut input = Input::new(data);
     while let Some(operation) = input.operation() {
@@ -212,11 +212,11 @@ impl Bench {
             match kind {
                 Kind::Master => motorlink_st_master_init(storage.cast(), size, &config),
                 Kind::Slave => {
-                    motorlink_st_slave_init(storage.cast(), size, one & 3, two & 15, &self.st)
+                    motorlink_st_slave_init(storage.cast(), size, one & 3, two & 15, self.st)
                 }
                 Kind::Host => motorlink_rmd_host_init(storage.cast(), size),
                 Kind::Drive => {
-                    let (storage, motor) = (storage.cast(), &self.motor);
+                    let (storage, motor) = (storage.cast(), self.motor);
                     motorlink_rmd_drive_init(storage, size, &drive, null(), motor)
                 }
                 Kind::Codec => motorlink_slcan_host_init(storage.cast(), size),
