@@ -3,8 +3,8 @@
  * Commands RMD motors behind an slcan adapter: rmd_host /dev/ttyACM0
  *
  * Turns motor 1 to 90 degrees, no faster than 360 degrees per second; has motors 1 to 4 hold a
- * torque current of 0 in one frame; shows that a limit holds. Ends with 0, with 3 where the line
- * failed.
+ * torque current of 0 in one frame; shows that a limit holds. Switches motor 1 off, also after a
+ * failure. Ends with 0, with 3 where the line failed.
  */
 #define _POSIX_C_SOURCE 200809L
 #include "posix.h"
@@ -13,11 +13,14 @@
 
 static motorlink_rmd_host host;
 static motorlink_slcan_host adapter;
+static int turning;
 
-static void check(motorlink_error error) {
+static void leave(int fd);
+
+static void check(int fd, motorlink_error error) {
   if (error != MOTORLINK_OK) {
     fprintf(stderr, "%s\n", motorlink_error_text(error));
-    exit(3);
+    leave(fd);
   }
 }
 
@@ -33,9 +36,9 @@ static void hear(int fd, uint64_t until_us) {
   for (at = 0; at < size; at++) {
     motorlink_slcan_answer answer;
     motorlink_can_frame frame;
-    check(motorlink_slcan_host_receive(&adapter, bytes[at], &answer, &frame));
+    check(fd, motorlink_slcan_host_receive(&adapter, bytes[at], &answer, &frame));
     if (answer == MOTORLINK_SLCAN_ANSWER_FRAME) {
-      check(motorlink_rmd_host_receive(&host, now_us(), &frame));
+      check(fd, motorlink_rmd_host_receive(&host, now_us(), &frame));
     }
   }
 }
@@ -45,13 +48,13 @@ static motorlink_rmd_action next_done(int fd) {
   for (;;) {
     motorlink_rmd_action action;
     motorlink_slcan_line line;
-    check(motorlink_rmd_host_poll(&host, now_us(), &action));
+    check(fd, motorlink_rmd_host_poll(&host, now_us(), &action));
     if (action.kind == MOTORLINK_ACTION_DONE) {
-      check(action.result);
+      check(fd, action.result);
       return action;
     }
     if (action.kind == MOTORLINK_ACTION_TRANSMIT) {
-      check(motorlink_slcan_encode(&action.frame, &line));
+      check(fd, motorlink_slcan_encode(&action.frame, &line));
       send_line(fd, &line);
     } else {
       hear(fd, action.until_us);
@@ -59,8 +62,19 @@ static motorlink_rmd_action next_done(int fd) {
   }
 }
 
+/* Ends the program, and the motor before it. */
+static void leave(int fd) {
+  if (turning) {
+    turning = 0;
+    if (motorlink_rmd_host_request(&host, now_us(), 1, motorlink_rmd_off()) == MOTORLINK_OK) {
+      next_done(fd);
+    }
+  }
+  exit(3);
+}
+
 static motorlink_rmd_data exchange(int fd, uint8_t motor, motorlink_rmd_data request) {
-  check(motorlink_rmd_host_request(&host, now_us(), motor, request));
+  check(fd, motorlink_rmd_host_request(&host, now_us(), motor, request));
   return next_done(fd).reply;
 }
 
@@ -79,9 +93,9 @@ int main(int argc, char **argv) {
     return 2;
   }
   fd = open_line(argv[1]);
-  check(motorlink_slcan_host_init(&adapter, sizeof adapter));
-  check(motorlink_rmd_host_init(&host, sizeof host));
-  check(motorlink_slcan_open(1000000, &line));
+  check(fd, motorlink_slcan_host_init(&adapter, sizeof adapter));
+  check(fd, motorlink_rmd_host_init(&host, sizeof host));
+  check(fd, motorlink_slcan_open(1000000, &line));
   send_line(fd, &line);
   hear(fd, now_us() + 100000U);
 
@@ -90,6 +104,7 @@ int main(int argc, char **argv) {
          (unsigned)(status.voltage_decivolts / 10), (unsigned)(status.voltage_decivolts % 10),
          (unsigned)status.errors);
 
+  turning = 1;
   exchange(fd, 1, motorlink_rmd_position_limited(9000, 360));
   give_up = now_us() + 20000000U;
   do {
@@ -98,7 +113,7 @@ int main(int argc, char **argv) {
   } while ((angle < 8900 || angle > 9100) && now_us() < give_up);
   printf("motor 1: %ld hundredths of a degree\n", (long)angle);
 
-  check(motorlink_rmd_host_torque4(&host, now_us(), torques, 0x0F));
+  check(fd, motorlink_rmd_host_torque4(&host, now_us(), torques, 0x0F));
   for (left = 4; left > 0; left--) {
     motorlink_rmd_action action = next_done(fd);
     motorlink_rmd_motion_status motion = motorlink_rmd_decode_motion_status(action.reply);
@@ -108,14 +123,15 @@ int main(int argc, char **argv) {
   limits.torque_16ma = 100;
   limits.speed_dps = MOTORLINK_RMD_NO_LIMIT;
   limits.angle_centidegrees = MOTORLINK_RMD_NO_LIMIT;
-  check(motorlink_rmd_host_set_limits(&host, 2, &limits));
+  check(fd, motorlink_rmd_host_set_limits(&host, 2, &limits));
   if (motorlink_rmd_host_request(&host, now_us(), 2, motorlink_rmd_torque(101)) !=
       MOTORLINK_ERROR_LIMIT) {
     fprintf(stderr, "the limit did not hold\n");
-    return 3;
+    leave(fd);
   }
   exchange(fd, 1, motorlink_rmd_off());
-  check(motorlink_rmd_host_busy(&host, &busy));
+  turning = 0;
+  check(fd, motorlink_rmd_host_busy(&host, &busy));
   close(fd);
   return busy == 0 && angle >= 8900 && angle <= 9100 ? 0 : 3;
 }

@@ -31,13 +31,15 @@
  * Ownership. The caller owns the storage of every object, which may be static, on the stack or on
  * the heap, and which is opaque: `_init` begins an object there, whatever the storage held before.
  * There is nothing to release. A pointer is used during the call only, where its function does not
- * say that it is kept; pointers in one call do not overlap one another or an object's storage.
+ * say that it is kept; pointers in one call do not overlap one another or an object's storage, where
+ * the bytes are that an action or a reply points to: copy them to hand them in again.
  *
  * Requests. A `motorlink_st_master_` function that takes a motor begins an exchange, which
  * `_poll` conducts: send what it says, hand in what comes, until it says done. It is not over
  * before that is polled, and until then every other request is BUSY. `motor` is 1 to 7, or
  * 0 for the drive's current motor (3.2). BAD_ARGUMENT: `motor` is over 7. BUSY: an exchange is under
- * way. The host of RMD motors has an exchange with each motor, all at once.
+ * way. The host of RMD motors has an exchange with each motor, all at once, and limits that the
+ * caller may set; a master has none: what it is told is sent.
  *
  * Time is in microseconds since any moment, as long as it is the same one for an object and time
  * does not run backwards.
@@ -48,8 +50,9 @@
  *
  * Reentrancy. Calls for different objects have nothing to do with each other; there are no globals.
  * A call for an object that is in a call already (from one of its callbacks, from an interrupt,
- * from another thread) gives IN_USE and does nothing. `_init` alone cannot know, and must not be
- * called then.
+ * from another thread) gives IN_USE and does nothing; on a processor without compare-and-exchange,
+ * such as a Cortex-M0, that holds for callbacks and interrupts only. `_init` alone cannot know, and
+ * must not be called then.
  *
  * Callbacks return: they do not leave by longjmp or by a C++ exception. Their table may be changed,
  * also by them.
