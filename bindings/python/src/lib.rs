@@ -29,16 +29,19 @@ mod _core {
     #[pymodule_export]
     use super::machine::{RmdMachine, StMachine};
     #[pymodule_export]
-    use super::rmd::{RmdBus, RmdRequest, rmd_decode, rmd_errors_text, rmd_quantities};
+    use super::rmd::{
+        RmdBus, RmdRequest, RmdSampling, rmd_decode, rmd_errors_text, rmd_quantities,
+    };
     #[pymodule_export]
     use super::sim::{SimBench, SimPort, SimRecording, SimServing, sim_presets, sim_run};
     #[pymodule_export]
     use super::st::{
-        StClient, StRequest, st_flags_text, st_register, st_register_name, st_registers,
+        StClient, StRequest, StSampling, st_flags_text, st_register, st_register_name, st_registers,
     };
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("ST_SEGMENTS", motorlink::stmcp::SEGMENTS)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 

@@ -30,37 +30,83 @@ impl Plan {
         Ok(Plan { period, instants: instants as u32 })
     }
 
-    /// Calls `take` at each instant with the time since the first one, s. An instant whose period
-    /// has passed before `take` came back is left out. `look` is called now and then; an error of it
-    /// ends the sampling.
+    /// Calls `take` at each instant with the time since the first one, s. `look` is called now and then;
+    /// an error of it ends the sampling.
     pub(crate) fn run(
-        &self,
+        self,
         clock: &dyn Clock,
         look: impl Fn(Python<'_>) -> PyResult<()>,
         mut take: impl FnMut(f64) -> PyResult<()>,
     ) -> PyResult<()> {
+        let mut instants = Instants::new(self);
         let mut looked = Instant::now();
         let began = clock.now();
-        let mut next = 0;
-        while next < self.instants {
+        loop {
             let since = clock.now() - began;
-            let due = self.period * next;
             if looked.elapsed() >= LOOK {
                 looked = Instant::now();
                 Python::attach(|py| py.check_signals().and_then(|()| look(py)))?;
             }
-            if since < due {
-                clock.pass((due - since).min(LOOK));
-                continue;
+            match instants.after(since) {
+                None => return Ok(()),
+                Some(Duration::ZERO) => take(since.as_secs_f64())?,
+                Some(wait) => clock.pass(wait.min(LOOK)),
             }
-            let current = since.as_nanos() / self.period.as_nanos();
-            next = u32::try_from(current).unwrap_or(u32::MAX).max(next);
-            if next < self.instants {
-                take(since.as_secs_f64())?;
-            }
-            next = next.saturating_add(1);
         }
-        Ok(())
+    }
+}
+
+/// The instants of a plan, one after the other. One whose period has passed is left out.
+struct Instants {
+    plan: Plan,
+    next: u32,
+}
+
+impl Instants {
+    fn new(plan: Plan) -> Self {
+        Instants { plan, next: 0 }
+    }
+
+    /// How long to wait at this time since the first instant; nothing of it is an instant, and `None`
+    /// is the end.
+    fn after(&mut self, since: Duration) -> Option<Duration> {
+        let Plan { period, instants } = self.plan;
+        let due = period * self.next;
+        if self.next < instants && since < due {
+            return Some(due - since);
+        }
+        let current = since.as_nanos() / period.as_nanos();
+        let current = u32::try_from(current).unwrap_or(u32::MAX).max(self.next);
+        self.next = current.saturating_add(1);
+        (current < instants).then_some(Duration::ZERO)
+    }
+}
+
+/// A sampling by an event loop: instants, and rows that are taken step by step.
+pub(crate) struct Stepped {
+    instants: Instants,
+    /// When the row's first request left.
+    time: f64,
+    pub(crate) rows: Rows,
+}
+
+impl Stepped {
+    pub(crate) fn new(plan: Plan) -> Self {
+        Stepped { instants: Instants::new(plan), time: 0.0, rows: Rows::default() }
+    }
+
+    /// As [`Instants::after`], in s; a row begins where that is 0.
+    pub(crate) fn after(&mut self, py: Python<'_>, since: f64) -> PyResult<Option<f64>> {
+        let passed = Duration::try_from_secs_f64(since).map_err(|_| {
+            bad_value(py, format_args!("{since} s is no time since the first instant"))
+        })?;
+        self.time = since;
+        Ok(self.instants.after(passed).map(|wait| wait.as_secs_f64()))
+    }
+
+    /// Ends the row.
+    pub(crate) fn push(&mut self, values: &[[u8; 8]]) {
+        self.rows.push(self.time, values);
     }
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import importlib
 import importlib.util
 import threading
@@ -14,7 +15,7 @@ import pytest
 
 import motorlink
 from conftest import Served
-from motorlink import rmd, st
+from motorlink import aio, rmd, st
 
 
 def test_registers_are_sampled_in_their_units(st_bus: st.Bus) -> None:
@@ -186,3 +187,138 @@ def test_with_pandas_the_time_is_the_index(
     monkeypatch.setattr(importlib, "import_module", lambda name: pandas)
     frame = motorlink.to_pandas(data)
     assert list(frame.columns) == ["t", "STATUS", "SPEED_MEAS"] and frame.index == "t"
+
+
+def test_a_sample_leaves_the_segments_of_others_alone(st_bus: st.Bus) -> None:
+    motor = st_bus.motor(1)
+    motor.configure_segment(3, ["SPEED_KP", "SPEED_KI"])
+    here = motor.read_segment(3)
+    sampled: list[bool] = []
+
+    def look(names: list[str]) -> None:
+        data = st_bus.sample(names, rate=200, seconds=0.3)
+        sampled.append(all(set(data[name]) == {motor.read(name)} for name in names))
+
+    others = [["SPEED_MEAS", "SPEED_REF"], ["BUS_VOLTAGE", "HEATS_TEMP"]]
+    threads = [threading.Thread(target=look, args=[names]) for names in others]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sampled == [True, True]
+    assert motor.read_segment(3) == here
+
+
+def test_asyncio_samples_what_the_blocking_api_samples(served: Served) -> None:
+    asked = {1: ["SPEED_KP", "BUS_VOLTAGE"], 2: ["SPEED_KP"]}
+    with st.open(served.st) as bus:
+        bus.motor(1).write("SPEED_KP", 11)
+        bus.motor(2).write("SPEED_KP", 22)
+        plain = bus.sample(asked, rate=50, seconds=0.2, raw=True)
+
+    async def main() -> None:
+        async with aio.st.open(served.st) as bus:
+            data = await bus.sample(asked, rate=50, seconds=0.2, raw=True)
+            assert data.dtype == plain.dtype and len(data) > 0
+            assert all(set(data[name]) == set(plain[name]) for name in plain.dtype.names or () if name != "t")
+            assert bus._segments._sampled == set()
+            t = (await bus.sample(["STATUS"], rate=100, seconds=0.3))["t"]
+            instants = np.floor(t * 100 + 1e-6).astype(int)
+            assert np.all(np.diff(instants) >= 1) and instants[-1] <= 29
+
+    asyncio.run(main())
+
+
+def test_asyncio_samples_without_segments_where_the_drive_has_none(tmp_path: Any) -> None:
+    config = tmp_path / "bench.toml"
+    config.write_text('profile = "mcsdk-5.4"\n')
+
+    async def main() -> None:
+        # The bus takes the drive for one with segments, which this drive refuses.
+        async with aio.st.open(f"sim:{config}") as bus:
+            await bus.motor(1).write("SPEED_KP", 77)
+            data = await bus.sample(["BUS_VOLTAGE", "SPEED_KP"], rate=100, seconds=0.2)
+            assert set(data["SPEED_KP"]) == {77}
+
+    asyncio.run(main())
+
+
+def test_others_have_their_turn_while_a_task_samples_and_a_cancelled_one_has_its_samples() -> None:
+    async def main() -> None:
+        async with aio.st.open("sim:") as bus, aio.rmd.open("sim:", timeout=2) as motors:
+            names = ["SPEED_MEAS", "SPEED_REF"]
+            tasks = [
+                asyncio.ensure_future(bus.sample(names, rate=1000, seconds=60)),
+                asyncio.ensure_future(bus.sample(["SPEED_KP", "SPEED_KI"], rate=1000, seconds=60)),
+                asyncio.ensure_future(motors.sample(rmd.QUANTITIES, rate=1000, seconds=60)),
+            ]
+            for value in range(50):
+                await bus.motor(1).write("SPEED_KP", value)
+                assert await bus.motor(1).read("SPEED_KP") == value
+                assert (await motors.motor(2).status()).voltage_v == pytest.approx(24, abs=1)
+            with pytest.raises(motorlink.BadValue, match="in use"):
+                await bus.motor(1).configure_segment(3, names)
+            for task in tasks:
+                task.cancel()
+            done = await asyncio.gather(*tasks, return_exceptions=True)
+            assert all(isinstance(one, asyncio.CancelledError) for one in done)
+            assert await bus.motor(1).read("SPEED_KP") == 49
+            await bus.motor(1).configure_segment(3, names)
+
+    asyncio.run(main())
+
+
+def test_a_cancelled_sample_has_what_there_was() -> None:
+    async def main() -> None:
+        async with aio.st.open("sim:") as bus:
+            task = asyncio.ensure_future(bus.sample(["SPEED_MEAS"], rate=100, seconds=60))
+            await asyncio.sleep(0.3)
+            task.cancel()
+            try:
+                await task
+            except asyncio.CancelledError as ended:
+                context: BaseException | None = ended
+                while context is not None and not hasattr(context, "samples"):
+                    context = context.__context__
+                assert context is not None and len(context.samples) > 0
+
+    asyncio.run(main())
+
+
+def test_asyncio_passes_over_a_motor_that_is_silent() -> None:
+    async def main() -> None:
+        async with aio.rmd.open("sim:", timeout=0.2, guard=0.01) as bus:
+            asked = {1: ["iq_a"], 9: ["iq_a"]}
+            with pytest.raises(motorlink.Timeout) as silent:
+                await bus.sample(asked, rate=50, seconds=0.3)
+            assert silent.value.motor == 9 and len(silent.value.samples) == 0
+            assert len(await bus.sample(asked, rate=50, seconds=0.1, on_error="skip")) == 0
+            data = await bus.sample({1: ["voltage_v", "angle_deg"]}, rate=50, seconds=0.3)
+            assert data["voltage_v_1"] == pytest.approx(24, abs=1)
+
+    asyncio.run(main())
+
+
+def test_asyncio_refuses_nonsense() -> None:
+    async def main() -> None:
+        async with aio.st.open("sim:") as bus:
+            for names, rate in (([], 10), (["STATUS"], 0), (["STATUS", "status"], 10), (["STATE"], 10)):
+                with pytest.raises(motorlink.BadValue):
+                    await bus.sample(names, rate=rate, seconds=1)
+            with pytest.raises(motorlink.Refused):
+                await bus.sample({7: ["STATUS"]}, rate=10, seconds=1)
+
+    asyncio.run(main())
+
+
+def test_names_of_registers_in_asyncio() -> None:
+    async def main() -> None:
+        async with aio.st.open("sim:", full_scale_amps=10) as bus:
+            registers = bus.motor(1).registers
+            assert "SPEED_KP" in registers and "NO_SUCH" not in registers
+            assert len(list(registers)) == len(registers) > 50
+            assert registers.info("TORQUE_MEAS").unit == "A"
+            with pytest.raises(KeyError):
+                registers.info("NO_SUCH")
+
+    asyncio.run(main())

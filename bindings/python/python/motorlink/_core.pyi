@@ -11,13 +11,16 @@ __all__ = [
     "RmdBus",
     "RmdMachine",
     "RmdRequest",
+    "RmdSampling",
     "SimBench",
     "SimPort",
     "SimRecording",
     "SimServing",
+    "ST_SEGMENTS",
     "StClient",
     "StMachine",
     "StRequest",
+    "StSampling",
     "__version__",
     "cli",
     "rmd_decode",
@@ -32,6 +35,8 @@ __all__ = [
 ]
 
 __version__: str
+#: How many data segments a drive has.
+ST_SEGMENTS: int
 
 def cli(words: Sequence[str]) -> int: ...
 def st_register(
@@ -145,6 +150,7 @@ class StClient:
     def sample(
         self,
         motors: Sequence[tuple[int, Sequence[str | int], float | None]],
+        segments: Sequence[int],
         rate: float,
         seconds: float,
         raw: bool,
@@ -350,6 +356,39 @@ class StMachine:
     def close(self, *, stop: bool) -> list[tuple[int, MotorlinkError]]: ...
     @property
     def port(self) -> str: ...
+
+@final
+class StSampling:
+    """Sampling registers in an event loop: what is to be asked, one request after the other."""
+
+    def __new__(
+        cls,
+        profile: str,
+        motors: Sequence[tuple[int, Sequence[str | int], float | None]],
+        segments: Sequence[int],
+        rate: float,
+        seconds: float,
+        raw: bool,
+    ) -> StSampling: ...
+    def after(self, since: float) -> float | None: ...
+    def request(self) -> tuple[int, StRequest] | None: ...
+    def answered(self, value: Any) -> None: ...
+    def refused(self) -> bool: ...
+    def push(self) -> None: ...
+    def rows(self) -> bytearray: ...
+
+@final
+class RmdSampling:
+    """Sampling motors in an event loop: what is to be asked, one cycle after the other."""
+
+    def __new__(
+        cls, motors: Sequence[tuple[int, Sequence[str]]], rate: float, seconds: float, raw: bool
+    ) -> RmdSampling: ...
+    def after(self, since: float) -> float | None: ...
+    @property
+    def cycles(self) -> list[dict[int, RmdRequest]]: ...
+    def push(self, answers: Sequence[dict[int, bytes]]) -> None: ...
+    def rows(self) -> bytearray: ...
 
 @final
 class RmdMachine:

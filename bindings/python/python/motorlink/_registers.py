@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterator, Mapping
+from typing import TYPE_CHECKING, Protocol
 
 from motorlink import _core
 from motorlink._values import RegisterInfo
@@ -83,8 +83,7 @@ class Registers(Mapping[str, float]):
 
         Raises ``NoSuchRegister``, a ``BadValue`` and a ``KeyError``, for one that nobody names.
         """
-        motor = self._motor
-        return _core.st_register(name, motor.bus.profile, motor.full_scale_amps)
+        return RegisterNames(self._motor).info(name)
 
     def read_all(self) -> dict[str, float]:
         """Every register that can be read and that this drive has, an exchange each."""
@@ -100,6 +99,59 @@ class Registers(Mapping[str, float]):
 
     def _names(self) -> dict[str, None]:
         return _names(self._motor.bus.profile)
+
+
+class HasRegisters(Protocol):
+    """A motor of either API."""
+
+    @property
+    def bus(self) -> HasProfile: ...
+    @property
+    def full_scale_amps(self) -> float | None: ...
+
+
+class HasProfile(Protocol):
+    """A bus of either API."""
+
+    @property
+    def profile(self) -> str: ...
+
+
+class RegisterNames(Collection[str]):
+    """The names of a motor's registers, in the order of their numbers (table 3). Asks nobody.
+
+    >>> import asyncio, motorlink
+    >>> async def main() -> str:
+    ...     async with motorlink.aio.st.open("sim:") as bus:
+    ...         return bus.motor(1).registers.info("BUS_VOLTAGE").unit
+    >>> asyncio.run(main())
+    'V'
+    """
+
+    __slots__ = ("_motor",)
+
+    def __init__(self, motor: HasRegisters):
+        self._motor = motor
+
+    def info(self, name: str | int) -> RegisterInfo:
+        """What a register is, from the table: unit, type, access, and what it needs.
+
+        Raises ``NoSuchRegister``, a ``BadValue`` and a ``KeyError``, for one that nobody names.
+        """
+        motor = self._motor
+        return _core.st_register(name, motor.bus.profile, motor.full_scale_amps)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_names(self._motor.bus.profile))
+
+    def __len__(self) -> int:
+        return len(_names(self._motor.bus.profile))
+
+    def __contains__(self, name: object) -> bool:
+        return name in _names(self._motor.bus.profile)
+
+    def __repr__(self) -> str:
+        return f"<names of {len(self)} registers of {self._motor!r}>"
 
 
 @functools.cache

@@ -3,16 +3,34 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from motorlink.errors import BadValue
 
+Name = TypeVar("Name")
+
 #: A structured array: ``t`` in s since the first instant, and a field a value.
 Samples = npt.NDArray[np.void]
+
+
+def by_motor(
+    wanted: Mapping[int, Sequence[Name]] | Sequence[Name], motor: int, called: Callable[[Name], str]
+) -> tuple[list[tuple[int, list[Name]]], list[str]]:
+    """What is wanted of each motor, and what the values are called, each once.
+
+    Where motors are named, so is the motor of a value.
+    """
+    if isinstance(wanted, Mapping):
+        motors = [(number, list(some)) for number, some in wanted.items()]
+        names = [f"{called(one)}_{number}" for number, some in motors for one in some]
+    else:
+        motors = [(motor, list(wanted))]
+        names = [called(one) for one in motors[0][1]]
+    return motors, columns(names)
 
 
 def columns(names: Sequence[str]) -> list[str]:

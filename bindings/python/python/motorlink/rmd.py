@@ -29,7 +29,7 @@ from motorlink import _core
 from motorlink._bus import Port, end, on_close_checked, opened_can, worn
 from motorlink._core import CanPort
 from motorlink._core import RmdRequest as Request
-from motorlink._sampling import Samples, array, columns, skips
+from motorlink._sampling import Samples, array, by_motor, skips
 from motorlink._values import (
     Encoder,
     Found,
@@ -235,14 +235,8 @@ class Bus:
         ``on_error="skip"`` a motor that fails costs the row only. Ctrl-C ends it, with ``samples`` too.
         """
         skip = skips(on_error)
-        if isinstance(quantities, Mapping):
-            motors = [(id, list(names)) for id, names in quantities.items()]
-            fields = [f"{name}_{id}" for id, names in motors for name in names]
-        else:
-            motors = [(motor, list(quantities))]
-            fields = list(quantities)
-        fields = columns(fields)
-        return array(self._core.sample(motors, rate, seconds, raw, skip), fields, raw=raw)
+        motors, names = by_motor(quantities, motor, str)
+        return array(self._core.sample(motors, rate, seconds, raw, skip), names, raw=raw)
 
     def close(self) -> None:
         """Stops the motors that this bus set moving, as it was opened to; closes the port.

@@ -32,7 +32,8 @@ from motorlink import _core
 from motorlink._bus import Port, end, on_close_checked, only, opened
 from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
-from motorlink._sampling import Samples, array, columns, skips
+from motorlink._sampling import Samples, array, by_motor, skips
+from motorlink._segments import Segments
 from motorlink._values import (
     ControlMode,
     Faults,
@@ -126,8 +127,7 @@ class Bus:
         self._profile = profile
         self._full_scale_amps = full_scale_amps
         self._on_close = on_close_checked(on_close, _ON_CLOSE)
-        #: The registers of each data segment, as far as they were chosen here.
-        self._segments: dict[int, list[str | int]] = {}
+        self._segments = Segments()
 
     @property
     def port(self) -> str:
@@ -197,26 +197,20 @@ class Bus:
         the line was too slow for is missing, and no row is ever made up: look at ``t``.
 
         The registers of a row come in one exchange, of the same moment, where the drive has data
-        segments (profile ``spec``); segment 3 is used, and 2 to 0 for further motors. Otherwise they
-        are read one by one. ``{1: ["SPEED_MEAS"], 2: ["SPEED_MEAS"]}`` samples several motors; their
+        segments (profile ``spec``); one a motor is used, from segment 3 down, of those that neither
+        ``configure_segment`` nor another ``sample`` of this bus has. Otherwise they are read one by
+        one. ``{1: ["SPEED_MEAS"], 2: ["SPEED_MEAS"]}`` samples several motors; their
         fields are ``SPEED_MEAS_1`` and ``SPEED_MEAS_2``.
 
         A row that fails raises, with what was sampled before in the exception's ``samples``; with
         ``on_error="skip"`` a line that fails costs the row only. Ctrl-C ends it, with ``samples`` too.
         """
         skip = skips(on_error)
-        if isinstance(registers, Mapping):
-            motors = [
-                (number, list(some), self._full_scale_amps) for number, some in registers.items()
-            ]
-            names = [
-                f"{_core.st_register_name(one)}_{number}" for number, some, _ in motors for one in some
-            ]
-        else:
-            motors = [(motor, list(registers), self._full_scale_amps)]
-            names = [_core.st_register_name(one) for one in registers]
-        names = columns(names)
-        return array(self._client.sample(motors, rate, seconds, raw, skip), names, raw=raw)
+        wanted, names = by_motor(registers, motor, _core.st_register_name)
+        motors = [(number, some, self._full_scale_amps) for number, some in wanted]
+        with self._segments.for_sampling(len(motors)) as segments:
+            outcome = self._client.sample(motors, segments, rate, seconds, raw, skip)
+        return array(outcome, names, raw=raw)
 
     def close(self) -> None:
         """Stops the motors that this bus started, unless it was opened otherwise; closes the port.
@@ -422,8 +416,10 @@ class Motor:
         The drive keeps one set of segments for all of its motors, until it is powered off.
         """
         self._only("spec", "data segments")
-        self._perform(Request.configure_segment(segment, registers))
-        self._bus._segments[segment] = list(registers)
+        request = Request.configure_segment(segment, registers)
+        self._bus._segments.claim(segment)
+        self._perform(request)
+        self._bus._segments.chosen(segment, registers)
 
     def read_segment(
         self, segment: int, registers: Sequence[str | int] | None = None, *, raw: bool = False
@@ -434,7 +430,7 @@ class Motor:
         """
         self._only("spec", "data segments")
         if registers is None:
-            registers = self._bus._segments.get(segment, [])
+            registers = self._bus._segments.registers(segment)
         request = Request.read_segment(
             segment, registers, raw=raw, full_scale_amps=self._full_scale_amps
         )

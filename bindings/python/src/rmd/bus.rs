@@ -11,9 +11,8 @@ use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict, PyList};
 
-use super::quantity::Quantity;
 use super::request::{RmdRequest, motion_status, motor_id, motor_status, torque};
-use super::sample::{Lane, sample};
+use super::sample::{Questions, sample};
 use crate::can::AnyPort;
 use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, closed, rmd_error};
@@ -169,15 +168,10 @@ impl RmdBus {
     ) -> PyResult<(Bound<'py, PyByteArray>, Option<PyErr>)> {
         let bus = self.bus(py)?;
         let plan = Plan::new(py, rate, seconds)?;
-        let mut lanes = Vec::with_capacity(motors.len());
-        for (id, names) in motors {
-            let quantities: PyResult<_> =
-                names.iter().map(|name| Quantity::named(py, name)).collect();
-            lanes.push(Lane { id: motor_id(py, id)?, quantities: quantities? });
-        }
+        let questions = Questions::new(py, motors, raw)?;
         let look = |py: Python<'_>| self.bus(py).map(drop);
         let clock = &*self.clock;
-        let (rows, outcome) = py.detach(|| sample(&bus, clock, look, &plan, &lanes, raw, skip));
+        let (rows, outcome) = py.detach(|| sample(&bus, clock, look, plan, &questions, skip));
         Ok((PyByteArray::new(py, &rows.0), outcome.err()))
     }
 

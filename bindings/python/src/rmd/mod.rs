@@ -8,6 +8,7 @@ mod sample;
 pub(crate) use bus::{RmdBus, finding, four_torques, limits, motor_ids, options};
 pub(crate) use quantity::rmd_quantities;
 pub(crate) use request::{RmdRequest, motor_id};
+pub(crate) use sample::RmdSampling;
 
 use motorlink_proto::rmd::{
     CanFrame, Code, Direction, Errors, Field, MotorId, Payload, TORQUE4_ID, Torque4, describe,

@@ -35,6 +35,11 @@ impl RmdRequest {
         RmdRequest { data: command.encode(), plain: false }
     }
 
+    /// A command whose reply is wanted as bytes.
+    pub(super) fn plain(data: [u8; 8]) -> Self {
+        RmdRequest { data, plain: true }
+    }
+
     /// The eight bytes of the request.
     pub(crate) fn data(&self) -> [u8; 8] {
         self.data

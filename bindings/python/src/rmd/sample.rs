@@ -1,19 +1,79 @@
 //! Sampling what motors tell, all of them in the same cycles.
 
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use motorlink::rmd::{Bus, Error, MotorId};
 use motorlink_proto::rmd::Code;
 use pyo3::prelude::*;
+use pyo3::types::PyByteArray;
 
 use super::quantity::Quantity;
+use super::request::{RmdRequest, motor_id};
 use crate::clock::Clock;
 use crate::error::rmd_error;
 use crate::number::physical;
-use crate::sampling::{Plan, Rows, cell};
+use crate::sampling::{Plan, Rows, Stepped, cell};
 
 /// The quantities of one motor.
-pub(super) struct Lane {
-    pub(super) id: MotorId,
-    pub(super) quantities: Vec<Quantity>,
+struct Lane {
+    id: MotorId,
+    quantities: Vec<Quantity>,
+}
+
+/// What is asked for a row, and what its values are among the answers.
+pub(super) struct Questions {
+    lanes: Vec<Lane>,
+    /// Each motor once a cycle, until every motor has been asked all of its questions.
+    cycles: Vec<Vec<(MotorId, [u8; 8])>>,
+    raw: bool,
+}
+
+/// Answers of a row: who, to what, and the reply.
+type Replies = Vec<(MotorId, Code, [u8; 8])>;
+
+impl Questions {
+    /// About the quantities of motors `(id, names)`.
+    pub(super) fn new(
+        py: Python<'_>,
+        motors: Vec<(i64, Vec<String>)>,
+        raw: bool,
+    ) -> PyResult<Self> {
+        let mut lanes = Vec::with_capacity(motors.len());
+        for (id, names) in motors {
+            let quantities: PyResult<_> =
+                names.iter().map(|name| Quantity::named(py, name)).collect();
+            lanes.push(Lane { id: motor_id(py, id)?, quantities: quantities? });
+        }
+        let mut cycles: Vec<Vec<(MotorId, [u8; 8])>> = Vec::new();
+        for lane in &lanes {
+            let mut codes: Vec<Code> = Vec::new();
+            for quantity in &lane.quantities {
+                if !codes.contains(&quantity.code) {
+                    codes.push(quantity.code);
+                }
+            }
+            cycles.resize_with(cycles.len().max(codes.len()), Vec::new);
+            for (cycle, code) in cycles.iter_mut().zip(codes) {
+                // A read has nothing but its code.
+                cycle.push((lane.id, [code.number(), 0, 0, 0, 0, 0, 0, 0]));
+            }
+        }
+        Ok(Questions { lanes, cycles, raw })
+    }
+
+    fn values(&self, replies: &Replies) -> Vec<[u8; 8]> {
+        let mut values = Vec::new();
+        for lane in &self.lanes {
+            for Quantity { code, field } in &lane.quantities {
+                let reply = replies.iter().find(|(id, of, _)| *id == lane.id && of == code);
+                // Every request was answered, or the row has failed before.
+                let digits = reply.map_or(0, |(.., reply)| field.raw(reply));
+                values.push(cell(self.raw, digits, physical(digits, field.scale)));
+            }
+        }
+        values
+    }
 }
 
 /// Samples until the plan is done or something fails; gives what was sampled in either case. With
@@ -22,16 +82,14 @@ pub(super) fn sample(
     bus: &Bus,
     clock: &dyn Clock,
     look: impl Fn(Python<'_>) -> PyResult<()>,
-    plan: &Plan,
-    lanes: &[Lane],
-    raw: bool,
+    plan: Plan,
+    questions: &Questions,
     skip: bool,
 ) -> (Rows, PyResult<()>) {
     let mut rows = Rows::default();
-    let cycles = cycles(lanes);
-    let outcome = plan.run(clock, look, |time| match row(bus, lanes, &cycles, raw) {
-        Ok(values) => {
-            rows.push(time, &values);
+    let outcome = plan.run(clock, look, |time| match replies(bus, questions) {
+        Ok(replies) => {
+            rows.push(time, &questions.values(&replies));
             Ok(())
         }
         Err(error) if skip && error.is_line_failure() => Ok(()),
@@ -40,33 +98,9 @@ pub(super) fn sample(
     (rows, outcome)
 }
 
-/// Each motor once a cycle, until every motor has been asked all of its questions.
-fn cycles(lanes: &[Lane]) -> Vec<Vec<(MotorId, [u8; 8])>> {
-    let mut cycles: Vec<Vec<(MotorId, [u8; 8])>> = Vec::new();
-    for lane in lanes {
-        let mut codes: Vec<Code> = Vec::new();
-        for quantity in &lane.quantities {
-            if !codes.contains(&quantity.code) {
-                codes.push(quantity.code);
-            }
-        }
-        cycles.resize_with(cycles.len().max(codes.len()), Vec::new);
-        for (cycle, code) in cycles.iter_mut().zip(codes) {
-            // A read has nothing but its code.
-            cycle.push((lane.id, [code.number(), 0, 0, 0, 0, 0, 0, 0]));
-        }
-    }
-    cycles
-}
-
-fn row(
-    bus: &Bus,
-    lanes: &[Lane],
-    cycles: &[Vec<(MotorId, [u8; 8])>],
-    raw: bool,
-) -> Result<Vec<[u8; 8]>, Error> {
-    let mut replies: Vec<(MotorId, Code, [u8; 8])> = Vec::new();
-    for requests in cycles {
+fn replies(bus: &Bus, questions: &Questions) -> Result<Replies, Error> {
+    let mut replies = Replies::new();
+    for requests in &questions.cycles {
         let mut failed = None;
         bus.cycle(requests, |id, outcome| match outcome {
             Ok(reply) => {
@@ -79,14 +113,66 @@ fn row(
             return Err(error);
         }
     }
-    let mut values = Vec::new();
-    for lane in lanes {
-        for Quantity { code, field } in &lane.quantities {
-            let reply = replies.iter().find(|(id, of, _)| *id == lane.id && of == code);
-            // Every request was answered, or the row has failed above.
-            let digits = reply.map_or(0, |(.., reply)| field.raw(reply));
-            values.push(cell(raw, digits, physical(digits, field.scale)));
-        }
+    Ok(replies)
+}
+
+/// Sampling motors in an event loop: what is to be asked, one cycle after the other.
+#[pyclass(frozen, module = "motorlink._core")]
+pub(crate) struct RmdSampling {
+    stepped: Mutex<Stepped>,
+    questions: Questions,
+}
+
+impl RmdSampling {
+    fn lock(&self) -> MutexGuard<'_, Stepped> {
+        self.stepped.lock().unwrap_or_else(PoisonError::into_inner)
     }
-    Ok(values)
+}
+
+#[pymethods]
+impl RmdSampling {
+    /// Quantities of motors `(id, names)`.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        motors: Vec<(i64, Vec<String>)>,
+        rate: f64,
+        seconds: f64,
+        raw: bool,
+    ) -> PyResult<Self> {
+        let stepped = Mutex::new(Stepped::new(Plan::new(py, rate, seconds)?));
+        Ok(RmdSampling { stepped, questions: Questions::new(py, motors, raw)? })
+    }
+
+    /// How long to wait for the next instant, so many s after the first one; 0 begins its row, and
+    /// `None` is the end.
+    fn after(&self, py: Python<'_>, since: f64) -> PyResult<Option<f64>> {
+        self.lock().after(py, since)
+    }
+
+    /// The cycles of a row: requests by ID, answered with bytes.
+    #[getter]
+    fn cycles(&self) -> Vec<BTreeMap<u8, RmdRequest>> {
+        let named = |&(id, request): &(MotorId, [u8; 8])| (id.number(), RmdRequest::plain(request));
+        self.questions.cycles.iter().map(|cycle| cycle.iter().map(named).collect()).collect()
+    }
+
+    /// Ends the row with the answers of its cycles.
+    fn push(&self, py: Python<'_>, answers: Vec<BTreeMap<i64, [u8; 8]>>) -> PyResult<()> {
+        let mut replies = Replies::new();
+        for (cycle, answers) in self.questions.cycles.iter().zip(answers) {
+            for (id, reply) in answers {
+                let id = motor_id(py, id)?;
+                let asked = cycle.iter().find(|(of, _)| *of == id);
+                replies.extend(asked.map(|(_, request)| (id, Code::from(request[0]), reply)));
+            }
+        }
+        self.lock().push(&self.questions.values(&replies));
+        Ok(())
+    }
+
+    /// The rows: a time in s and the values, eight bytes each.
+    fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
+        PyByteArray::new(py, &self.lock().rows.0)
+    }
 }

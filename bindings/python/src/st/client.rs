@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyList};
 
 use super::request::{StRequest, motor_number};
-use super::sample::{Lane, sample};
-use super::scale::{Scale, register};
+use super::sample::{self, Reading, sample};
+use super::scale::Scale;
 use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, closed, st_error};
 use crate::number::{limit, span};
@@ -112,12 +112,14 @@ impl StClient {
         Ok(PyBytes::new(py, &reply.map_err(|error| st_error(py, &error))?))
     }
 
-    /// Samples registers of motors `(motor, registers, full_scale_amps)`. Gives rows of a time in s
-    /// and the values, eight bytes each, and what ended it before its time.
+    /// Samples registers of motors `(motor, registers, full_scale_amps)`, each in one of `segments`
+    /// where that can be done. Gives rows of a time in s and the values, eight bytes each, and what
+    /// ended it before its time.
     fn sample<'py>(
         &self,
         py: Python<'py>,
-        motors: Vec<(i64, Vec<Bound<'py, PyAny>>, Option<f64>)>,
+        motors: Vec<sample::Motor<'py>>,
+        segments: Vec<u8>,
         rate: f64,
         seconds: f64,
         raw: bool,
@@ -125,15 +127,10 @@ impl StClient {
     ) -> PyResult<(Bound<'py, PyByteArray>, Option<PyErr>)> {
         let client = self.client(py)?;
         let plan = Plan::new(py, rate, seconds)?;
-        let mut lanes = Vec::with_capacity(motors.len());
-        for (motor, names, full_scale_amps) in motors {
-            let scale = Scale::new(py, client.profile().name(), full_scale_amps)?;
-            let registers: PyResult<_> = names.iter().map(register).collect();
-            lanes.push(Lane { motor: motor_number(py, motor)?, registers: registers?, scale });
-        }
+        let reading = Reading::new(py, client.profile(), motors, segments, raw)?;
         let look = |py: Python<'_>| self.client(py).map(drop);
         let clock = &*self.clock;
-        let (rows, outcome) = py.detach(|| sample(&client, clock, look, &plan, &lanes, raw, skip));
+        let (rows, outcome) = py.detach(|| sample(&client, clock, look, plan, reading, skip));
         Ok((PyByteArray::new(py, &rows.0), outcome.err()))
     }
 

@@ -9,6 +9,7 @@ mod scale;
 pub(crate) use client::{StClient, frame_code, limits, options};
 pub(crate) use reply::Answer;
 pub(crate) use request::{StRequest, motor_number};
+pub(crate) use sample::StSampling;
 pub(crate) use scale::Scale;
 
 use motorlink::stmcp::register::{Feature, Features, Writing};

@@ -53,6 +53,29 @@ impl StRequest {
         self.reply.understand(payload)
     }
 
+    /// Reads a register.
+    pub(super) fn reading(scale: Scale, register: RegisterId, raw: bool) -> Self {
+        Self::asked(scale, Request::GetRegister(register), Reply::Number { register, raw })
+    }
+
+    /// Chooses the registers of a data segment.
+    pub(super) fn choosing(segment: u8, registers: &[RegisterId]) -> Self {
+        let request = Request::ConfigDynStruct { segment, registers: &[] };
+        let bytes = registers.iter().map(|register| register.0).collect();
+        StRequest { bytes, ..Self::told(Scale::plain(), request) }
+    }
+
+    /// Reads a data segment that has these registers.
+    pub(super) fn sampling(scale: Scale, segment: u8, registers: &[RegisterId], raw: bool) -> Self {
+        let reply = Reply::Segment { registers: registers.to_vec(), raw };
+        Self::asked(scale, Request::DataElement(segment), reply)
+    }
+
+    /// The numbers of an answer as a sample has them.
+    pub(super) fn cells(&self, answer: Answer) -> Option<Vec<[u8; 8]>> {
+        self.reply.cells(&self.scale, answer)
+    }
+
     /// The answer for Python.
     pub(crate) fn value(&self, py: Python<'_>, answer: Answer) -> PyResult<Py<PyAny>> {
         self.reply.value(py, &self.scale, answer)
@@ -71,9 +94,7 @@ impl StRequest {
         raw: bool,
         full_scale_amps: Option<f64>,
     ) -> PyResult<Self> {
-        let scale = Scale::new(py, profile, full_scale_amps)?;
-        let reply = Reply::Number { register, raw };
-        Ok(Self::asked(scale, Request::GetRegister(register), reply))
+        Ok(Self::reading(Scale::new(py, profile, full_scale_amps)?, register, raw))
     }
 
     /// Writes a register (4.4).
@@ -232,9 +253,7 @@ impl StRequest {
     ) -> PyResult<Self> {
         let segment = below(py, "data segment", segment, SEGMENTS)?;
         let registers: PyResult<Vec<_>> = registers.iter().map(register).collect();
-        let bytes = registers?.into_iter().map(|register| register.0).collect();
-        let request = Request::ConfigDynStruct { segment, registers: &[] };
-        StRequest { bytes, ..Self::told(Scale::plain(), request) }.fitting(py)
+        Self::choosing(segment, &registers?).fitting(py)
     }
 
     /// Reads a data segment that was configured with these registers (profile `spec`).
@@ -250,8 +269,7 @@ impl StRequest {
         let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
         let segment = below(py, "data segment", segment, SEGMENTS)?;
         let registers = segment_registers(py, &registers)?;
-        let reply = Reply::Segment { registers, raw };
-        Ok(Self::asked(scale, Request::DataElement(segment), reply))
+        Ok(Self::sampling(scale, segment, &registers, raw))
     }
 
     /// Lists the registers of motor profiler steps (profile `mcsdk-5.4`).

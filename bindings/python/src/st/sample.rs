@@ -1,29 +1,170 @@
 //! Sampling registers: in data segments where the drive has them, else one by one.
 
-use motorlink::stmcp::register::Access;
-use motorlink::stmcp::{
-    Client, Error, MotorHandle, Profile, RegisterId, SEGMENT_REGISTERS, SEGMENTS,
-};
-use pyo3::prelude::*;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::scale::Scale;
+use motorlink::stmcp::register::Access;
+use motorlink::stmcp::{Client, Error, Profile, RegisterId, SEGMENT_REGISTERS};
+use pyo3::prelude::*;
+use pyo3::types::{PyByteArray, PyDict};
+
+use super::request::{StRequest, motor_number};
+use super::scale::{Scale, register};
 use crate::clock::Clock;
 use crate::error::st_error;
-use crate::sampling::{Plan, Rows, cell};
+use crate::sampling::{Plan, Rows, Stepped, cell};
+
+/// What a program samples of one motor: its number, registers, and its full scale of current, A.
+pub(super) type Motor<'py> = (i64, Vec<Bound<'py, PyAny>>, Option<f64>);
 
 /// The registers of one motor.
-pub(super) struct Lane {
-    pub(super) motor: u8,
-    pub(super) registers: Vec<RegisterId>,
-    pub(super) scale: Scale,
+struct Lane {
+    motor: u8,
+    registers: Vec<RegisterId>,
+    scale: Scale,
+    /// The data segment that has them.
+    segment: Option<u8>,
 }
 
-/// A lane on its drive.
-struct Reader<'a> {
-    motor: MotorHandle<'a>,
-    lane: &'a Lane,
-    /// The data segment that has its registers.
-    segment: Option<u8>,
+/// Where a row is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum At {
+    /// Before the first row: the lane's segment is configured.
+    Preparing(usize),
+    /// A lane's segment is read; it was configured anew, or not.
+    Segment(usize, bool),
+    /// A lane's segment is configured anew, as the drive did not know it.
+    Configuring(usize),
+    /// A register of a lane is read.
+    Single(usize, usize),
+    Whole,
+}
+
+/// Rows without the line: [`request`](Self::request), then [`answered`](Self::answered) or
+/// [`refused`](Self::refused), until there is no request.
+pub(super) struct Reading {
+    lanes: Vec<Lane>,
+    raw: bool,
+    at: At,
+    values: Vec<[u8; 8]>,
+}
+
+impl Reading {
+    /// Chooses how to read. Each of `segments` may be configured for one motor.
+    pub(super) fn new(
+        py: Python<'_>,
+        profile: Profile,
+        motors: Vec<Motor<'_>>,
+        segments: Vec<u8>,
+        raw: bool,
+    ) -> PyResult<Self> {
+        let mut segments = segments.into_iter();
+        let mut lanes = Vec::with_capacity(motors.len());
+        for (motor, names, full_scale_amps) in motors {
+            let scale = Scale::new(py, profile.name(), full_scale_amps)?;
+            let registers: PyResult<Vec<_>> = names.iter().map(register).collect();
+            let (motor, registers) = (motor_number(py, motor)?, registers?);
+            let segment = segments.next().filter(|_| is_segment(profile, &registers));
+            lanes.push(Lane { motor, registers, scale, segment });
+        }
+        let mut reading = Reading { lanes, raw, at: At::Whole, values: Vec::new() };
+        reading.at = reading.preparing(0);
+        Ok(reading)
+    }
+
+    /// Begins a row.
+    fn begin(&mut self) {
+        self.values.clear();
+        self.at = self.lane(0);
+    }
+
+    /// What the row, or what is done before the first one, goes on with.
+    fn request(&self) -> Option<(u8, StRequest)> {
+        let (lane, configures) = match self.at {
+            At::Preparing(lane) | At::Configuring(lane) => (lane, true),
+            At::Segment(lane, _) | At::Single(lane, _) => (lane, false),
+            At::Whole => return None,
+        };
+        let Lane { motor, registers, scale, segment } = &self.lanes[lane];
+        let request = match (self.at, *segment) {
+            (At::Single(_, n), _) => StRequest::reading(*scale, registers[n], self.raw),
+            (_, Some(segment)) if configures => StRequest::choosing(segment, registers),
+            (_, Some(segment)) => StRequest::sampling(*scale, segment, registers, self.raw),
+            (_, None) => return None,
+        };
+        Some((*motor, request))
+    }
+
+    /// The request was acknowledged, with these values.
+    fn answered(&mut self, values: impl IntoIterator<Item = [u8; 8]>) {
+        self.values.extend(values);
+        self.at = match self.at {
+            At::Preparing(lane) => self.preparing(lane + 1),
+            At::Configuring(lane) => At::Segment(lane, true),
+            At::Single(lane, n) if n + 1 < self.lanes[lane].registers.len() => {
+                At::Single(lane, n + 1)
+            }
+            At::Segment(lane, _) | At::Single(lane, _) => self.lane(lane + 1),
+            At::Whole => At::Whole,
+        };
+    }
+
+    /// The drive refused the request; whether it goes on all the same: with one register after the
+    /// other where the drive has no segments, with a segment configured anew where the drive was
+    /// restarted and has forgotten it.
+    fn refused(&mut self) -> bool {
+        self.at = match self.at {
+            At::Preparing(lane) => {
+                self.lanes[lane].segment = None;
+                self.preparing(lane + 1)
+            }
+            At::Configuring(lane) => {
+                self.lanes[lane].segment = None;
+                self.lane(lane)
+            }
+            At::Segment(lane, false) => At::Configuring(lane),
+            At::Segment(_, true) | At::Single(..) | At::Whole => return false,
+        };
+        true
+    }
+
+    /// Before the first row, from this lane on.
+    fn preparing(&self, from: usize) -> At {
+        let next = (from..self.lanes.len()).find(|lane| self.lanes[*lane].segment.is_some());
+        next.map_or(At::Whole, At::Preparing)
+    }
+
+    /// The beginning of a lane.
+    fn lane(&self, lane: usize) -> At {
+        match self.lanes.get(lane) {
+            Some(Lane { segment: Some(_), .. }) => At::Segment(lane, false),
+            Some(Lane { registers, .. }) if registers.is_empty() => self.lane(lane + 1),
+            Some(_) => At::Single(lane, 0),
+            None => At::Whole,
+        }
+    }
+
+    /// Carries out what there is to do, with these exchanges.
+    fn carry_out(&mut self, client: &Client) -> Result<(), Error> {
+        while let Some((motor, request)) = self.request() {
+            let read = |payload: &[u8]| request.cells(request.understand(payload)?);
+            match client.exchange(motor, &request.request(), read) {
+                Ok(values) => self.answered(values),
+                Err(error) if error.is_refusal() && self.refused() => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether these registers are worth a segment, and can have one.
+fn is_segment(profile: Profile, registers: &[RegisterId]) -> bool {
+    let only_there =
+        |register: &RegisterId| register.shape().is_some_and(|shape| shape.access == Access::Dac);
+    let known = registers.iter().all(|register| register.shape().is_some());
+    // In the other profile the same frame codes command the motor.
+    let possible = profile == Profile::Spec && known && registers.len() <= SEGMENT_REGISTERS;
+    possible && (registers.len() > 1 || registers.iter().any(only_there))
 }
 
 /// Samples until the plan is done or something fails; gives what was sampled in either case. With
@@ -32,86 +173,101 @@ pub(super) fn sample(
     client: &Client,
     clock: &dyn Clock,
     look: impl Fn(Python<'_>) -> PyResult<()>,
-    plan: &Plan,
-    lanes: &[Lane],
-    raw: bool,
+    plan: Plan,
+    mut reading: Reading,
     skip: bool,
 ) -> (Rows, PyResult<()>) {
     let mut rows = Rows::default();
     let raised = |error: Error| Python::attach(|py| st_error(py, &error));
-    let readers: Result<Vec<Reader<'_>>, Error> = lanes
-        .iter()
-        .zip((0..SEGMENTS as u8).rev().map(Some).chain(std::iter::repeat(None)))
-        .map(|(lane, segment)| Reader::new(client, lane, segment))
-        .collect();
-    let mut readers = match readers {
-        Ok(readers) => readers,
-        Err(error) => return (rows, Err(raised(error))),
-    };
-    let mut values = Vec::new();
+    if let Err(error) = reading.carry_out(client) {
+        return (rows, Err(raised(error)));
+    }
     let outcome = plan.run(clock, look, |time| {
-        values.clear();
-        for reader in &mut readers {
-            match reader.read(raw, &mut values) {
-                Ok(()) => {}
-                Err(error) if skip && error.is_line_failure() => return Ok(()),
-                Err(error) => return Err(raised(error)),
-            }
+        reading.begin();
+        match reading.carry_out(client) {
+            Ok(()) => rows.push(time, &reading.values),
+            Err(error) if skip && error.is_line_failure() => {}
+            Err(error) => return Err(raised(error)),
         }
-        rows.push(time, &values);
         Ok(())
     });
     (rows, outcome)
 }
 
-impl<'a> Reader<'a> {
-    /// Chooses how to read, and configures the segment if there is one.
-    fn new(client: &'a Client, lane: &'a Lane, segment: Option<u8>) -> Result<Self, Error> {
-        let only_there = |register: &RegisterId| {
-            register.shape().is_some_and(|shape| shape.access == Access::Dac)
+/// Sampling registers in an event loop: what is to be asked, one request after the other.
+#[pyclass(frozen, module = "motorlink._core")]
+pub(crate) struct StSampling(Mutex<(Stepped, Reading)>);
+
+impl StSampling {
+    fn lock(&self) -> MutexGuard<'_, (Stepped, Reading)> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl StSampling {
+    /// Registers of motors `(motor, registers, full_scale_amps)`, each in one of `segments` where that
+    /// can be done.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        profile: &str,
+        motors: Vec<Motor<'_>>,
+        segments: Vec<u8>,
+        rate: f64,
+        seconds: f64,
+        raw: bool,
+    ) -> PyResult<Self> {
+        let stepped = Stepped::new(Plan::new(py, rate, seconds)?);
+        let reading = Reading::new(py, super::profile(py, profile)?, motors, segments, raw)?;
+        Ok(StSampling(Mutex::new((stepped, reading))))
+    }
+
+    /// How long to wait for the next instant, so many s after the first one; 0 begins its row, and
+    /// `None` is the end.
+    fn after(&self, py: Python<'_>, since: f64) -> PyResult<Option<f64>> {
+        let (stepped, reading) = &mut *self.lock();
+        let wait = stepped.after(py, since)?;
+        if wait == Some(0.0) {
+            reading.begin();
+        }
+        Ok(wait)
+    }
+
+    /// The next request and its motor, `None` when the row is whole.
+    fn request(&self) -> Option<(u8, StRequest)> {
+        self.lock().1.request()
+    }
+
+    /// Takes the value of that request.
+    fn answered(&self, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        let reading = &mut self.lock().1;
+        let cells = |value: Bound<'_, PyAny>| match reading.raw {
+            true => value.extract().map(|digits| cell(true, digits, 0.0)),
+            false => value.extract().map(|value| cell(false, 0, value)),
         };
-        let registers = &lane.registers;
-        let known = registers.iter().all(|register| register.shape().is_some());
-        // In the other profile the same frame codes command the motor.
-        let possible =
-            client.profile() == Profile::Spec && known && registers.len() <= SEGMENT_REGISTERS;
-        let worth = registers.len() > 1 || registers.iter().any(only_there);
-        let motor = client.motor(lane.motor)?;
-        let mut reader = Reader { motor, lane, segment: segment.filter(|_| possible && worth) };
-        reader.configure()?;
-        Ok(reader)
-    }
-
-    /// A drive that refuses the segment has its registers read one by one.
-    fn configure(&mut self) -> Result<(), Error> {
-        let Some(segment) = self.segment else { return Ok(()) };
-        match self.motor.configure_segment(segment, &self.lane.registers) {
-            Err(error) if error.is_refusal() => self.segment = None,
-            other => return other,
-        }
+        let cells: PyResult<Vec<_>> = match value.cast::<PyDict>() {
+            Ok(values) => values.values().iter().map(cells).collect(),
+            Err(_) if value.is_none() => Ok(Vec::new()),
+            Err(_) => cells(value.clone()).map(|cell| vec![cell]),
+        };
+        reading.answered(cells?);
         Ok(())
     }
 
-    fn read(&mut self, raw: bool, values: &mut Vec<[u8; 8]>) -> Result<(), Error> {
-        let Lane { registers, scale, .. } = self.lane;
-        let mut bits = [0; SEGMENT_REGISTERS];
-        let mut read = self.read_segment(&mut bits);
-        if read.as_ref().is_err_and(Error::is_refusal) {
-            // A drive that was restarted has forgotten the segment.
-            self.configure()?;
-            read = self.read_segment(&mut bits);
-        }
-        let segmented = read?;
-        for (n, &register) in registers.iter().enumerate() {
-            let bits = if segmented { bits[n] } else { self.motor.read_raw(register)? };
-            values.push(cell(raw, scale.raw(register, bits), scale.physical(register, bits)));
-        }
-        Ok(())
+    /// The drive refused that request; whether the row goes on all the same.
+    fn refused(&self) -> bool {
+        self.lock().1.refused()
     }
 
-    /// Whether there is a segment, which has been read.
-    fn read_segment(&self, bits: &mut [i32]) -> Result<bool, Error> {
-        let Some(segment) = self.segment else { return Ok(false) };
-        self.motor.read_segment(segment, &self.lane.registers, bits).map(|()| true)
+    /// Ends the row.
+    fn push(&self) {
+        let (stepped, reading) = &mut *self.lock();
+        stepped.push(&reading.values);
+    }
+
+    /// The rows: a time in s and the values, eight bytes each.
+    fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
+        PyByteArray::new(py, &self.lock().0.rows.0)
     }
 }

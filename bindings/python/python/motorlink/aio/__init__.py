@@ -10,9 +10,9 @@
 0
 
 Methods, arguments, values and exceptions are those of ``motorlink.st`` and ``motorlink.rmd``, checked
-by the same code; what is a property of a motor there, such as ``status``, is a method here. ``sample``,
-``write_verified`` and the mapping ``registers`` are of the blocking API only. No thread carries an
-exchange: the loop watches the port's descriptor. Only opening a port, and the end of ``async with``, which
+by the same code; what is a property of a motor there, such as ``status``, is a method here, and a motor's
+``registers`` are names and what they stand for. No thread carries an exchange: the loop watches the
+port's descriptor. Only opening a port, and the end of ``async with``, which
 may wait for long, happen in the loop's default executor.
 
 Any exchange may be cancelled, at any moment, by ``asyncio.timeout``, ``task.cancel()`` or the end of

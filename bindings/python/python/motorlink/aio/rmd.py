@@ -15,7 +15,7 @@ from __future__ import annotations
 import asyncio
 import functools
 import os
-from collections.abc import AsyncIterator, Callable, Generator, Iterable, Mapping
+from collections.abc import AsyncIterator, Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from types import TracebackType
 from typing import Any
@@ -24,7 +24,9 @@ from motorlink import _core
 from motorlink._bus import on_close_checked, report, worn
 from motorlink._core import CanPort
 from motorlink._core import RmdRequest as Request
+from motorlink._sampling import Samples, by_motor, skips
 from motorlink._values import Encoder, Found, Gains, MotionStatus, MotorStatus, PhaseCurrents
+from motorlink.aio._sampling import sampled
 from motorlink.aio._steps import Steps, is_told, opened, port_name
 from motorlink.errors import Closed, MotorlinkError, PortError
 
@@ -181,6 +183,45 @@ class Bus:
                 if answer is not None:
                     found.append(answer)
         return found
+
+    async def sample(
+        self,
+        quantities: Mapping[int, Sequence[str]] | Sequence[str],
+        *,
+        rate: float,
+        seconds: float,
+        motor: int = 1,
+        raw: bool = False,
+        on_error: str = "raise",
+    ) -> Samples:
+        """Reads what motors tell ``rate`` times a second for ``seconds``: :meth:`motorlink.rmd.Bus.sample`.
+
+        >>> import asyncio, motorlink
+        >>> async def main() -> tuple[str, ...]:
+        ...     async with motorlink.aio.rmd.open("sim:") as bus:
+        ...         data = await bus.sample({1: ["iq_a"], 2: ["iq_a"]}, rate=100, seconds=0.1)
+        ...     return data.dtype.names
+        >>> asyncio.run(main())
+        ('t', 'iq_a_1', 'iq_a_2')
+
+        Exchanges of other tasks have their turns in between. The exception that ends it early has in
+        its ``samples`` what was sampled before; so has ``CancelledError``.
+        """
+        skip = skips(on_error)
+        motors, names = by_motor(quantities, motor, str)
+        sampling = _core.RmdSampling(motors, rate, seconds, raw)
+        cycles = sampling.cycles
+
+        async def row() -> None:
+            answers = []
+            for cycle in cycles:
+                answers.append(await self.cycle(cycle))
+                for answer in answers[-1].values():
+                    if isinstance(answer, MotorlinkError):
+                        raise answer
+            sampling.push(answers)
+
+        return await sampled(sampling, row, names, raw=raw, skip=skip)
 
     async def _gather(self, ids: Iterable[int], ask: Callable[[int], None]) -> dict[int, Any]:
         """Asks each motor; gives what each answered or why it was not asked, by ID."""

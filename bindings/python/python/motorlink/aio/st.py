@@ -14,15 +14,20 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
 from motorlink import _core
 from motorlink._bus import on_close_checked, only, report
 from motorlink._core import StRequest as Request
+from motorlink._registers import RegisterNames
+from motorlink._sampling import Samples, by_motor, skips
+from motorlink._segments import Segments
 from motorlink._values import ControlMode, Faults, FirmwareVersion, Info, RevupPhase, State
+from motorlink.aio._sampling import sampled
 from motorlink.aio._steps import Steps, is_told, opened, port_name
+from motorlink.errors import Refused
 
 __all__ = ["Bus", "Motor", "Opening", "open"]
 
@@ -126,8 +131,7 @@ class Bus:
         self._turn = asyncio.Lock()
         self._answer: asyncio.Future[Any] | None = None
         self._steps = Steps(machine, self._advance)
-        #: The registers of each data segment, as far as they were chosen here.
-        self._segments: dict[int, list[str | int]] = {}
+        self._segments = Segments()
 
     @property
     def port(self) -> str:
@@ -169,6 +173,51 @@ class Bus:
         begin = self._machine.begin_raw
         reply: bytes = await self._exchange(lambda: begin(motor, code, payload))
         return reply
+
+    async def sample(
+        self,
+        registers: Sequence[str | int] | Mapping[int, Sequence[str | int]],
+        *,
+        rate: float,
+        seconds: float,
+        motor: int = 1,
+        raw: bool = False,
+        on_error: str = "raise",
+    ) -> Samples:
+        """Reads registers ``rate`` times a second for ``seconds``: :meth:`motorlink.st.Bus.sample`.
+
+        >>> import asyncio, motorlink
+        >>> async def main() -> tuple[str, ...]:
+        ...     async with motorlink.aio.st.open("sim:") as bus:
+        ...         data = await bus.sample(["SPEED_MEAS", "BUS_VOLTAGE"], rate=100, seconds=0.1)
+        ...     return data.dtype.names
+        >>> asyncio.run(main())
+        ('t', 'SPEED_MEAS', 'BUS_VOLTAGE')
+
+        Exchanges of other tasks have their turns in between. The exception that ends it early has in
+        its ``samples`` what was sampled before; so has ``CancelledError``.
+        """
+        skip = skips(on_error)
+        wanted, names = by_motor(registers, motor, _core.st_register_name)
+        motors = [(number, some, self._full_scale_amps) for number, some in wanted]
+        with self._segments.for_sampling(len(motors)) as segments:
+            sampling = _core.StSampling(self._profile, motors, segments, rate, seconds, raw)
+
+            async def carry_out() -> None:
+                while (asked := sampling.request()) is not None:
+                    try:
+                        value = await self.perform(*asked)
+                    except Refused:
+                        if not sampling.refused():
+                            raise
+                    else:
+                        sampling.answered(value)
+
+            async def row() -> None:
+                await carry_out()
+                sampling.push()
+
+            return await sampled(sampling, row, names, raw=raw, skip=skip, prepare=carry_out)
 
     async def _exchange(self, begin: Callable[[], None]) -> Any:
         async with self._turn:
@@ -258,6 +307,11 @@ class Motor:
     def full_scale_amps(self) -> float | None:
         """The current of digit 32767, A; ``None`` while currents are digits."""
         return self._full_scale_amps
+
+    @property
+    def registers(self) -> RegisterNames:
+        """The names of the registers, and what each is: ``"SPEED_KP" in motor.registers``."""
+        return RegisterNames(self)
 
     async def _perform(self, request: Request) -> Any:
         return await self._bus.perform(self._number, request)
@@ -362,8 +416,10 @@ class Motor:
     async def configure_segment(self, segment: int, registers: Sequence[str | int]) -> None:
         """Chooses the registers, at most 32, of a data segment, 0 to 3 (profile ``spec``)."""
         self._only("spec", "data segments")
-        await self._perform(Request.configure_segment(segment, registers))
-        self._bus._segments[segment] = list(registers)
+        request = Request.configure_segment(segment, registers)
+        self._bus._segments.claim(segment)
+        await self._perform(request)
+        self._bus._segments.chosen(segment, registers)
 
     async def read_segment(
         self, segment: int, registers: Sequence[str | int] | None = None, *, raw: bool = False
@@ -371,7 +427,7 @@ class Motor:
         """Reads a data segment in one exchange: the registers' values by name (profile ``spec``)."""
         self._only("spec", "data segments")
         if registers is None:
-            registers = self._bus._segments.get(segment, [])
+            registers = self._bus._segments.registers(segment)
         request = Request.read_segment(
             segment, registers, raw=raw, full_scale_amps=self._full_scale_amps
         )

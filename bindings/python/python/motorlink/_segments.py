@@ -1,0 +1,50 @@
+"""Who uses which data segment of a drive, as far as one bus knows."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from motorlink import _core
+from motorlink.errors import BadValue
+
+
+class Segments:
+    """The data segments of a drive: those that a program chose registers for, and those of samplings."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._chosen: dict[int, list[str | int]] = {}
+        self._sampled: set[int] = set()
+
+    def claim(self, segment: int) -> None:
+        """Keeps samplings away from a segment that a program is about to configure."""
+        with self._lock:
+            if segment in self._sampled:
+                raise BadValue(
+                    f"data segment {segment} is in use by `sample`; nothing was sent: take another one,"
+                    " or configure it before, and `sample` takes another one"
+                )
+            self._chosen.setdefault(segment, [])
+
+    def chosen(self, segment: int, registers: Sequence[str | int]) -> None:
+        """Remembers what a segment was configured with."""
+        self._chosen[segment] = list(registers)
+
+    def registers(self, segment: int) -> list[str | int]:
+        """What a segment was configured with; nothing where that is not known."""
+        return self._chosen.get(segment, [])
+
+    @contextmanager
+    def for_sampling(self, count: int) -> Iterator[list[int]]:
+        """Segments that nobody else uses meanwhile, as many as there are, the last one first."""
+        with self._lock:
+            taken = self._sampled.union(self._chosen)
+            free = [n for n in reversed(range(_core.ST_SEGMENTS)) if n not in taken][:count]
+            self._sampled.update(free)
+        try:
+            yield free
+        finally:
+            with self._lock:
+                self._sampled.difference_update(free)

@@ -1,0 +1,50 @@
+"""Sampling in an event loop: the rows of ``bus.sample``, awaited."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Protocol
+
+from motorlink._sampling import Samples, array
+from motorlink.errors import LineLost, Timeout
+
+
+class Sampling(Protocol):
+    """What samplings of both protocols have in common."""
+
+    def after(self, since: float) -> float | None: ...
+    def rows(self) -> bytearray: ...
+
+
+async def nothing() -> None:
+    """What is done before the first row where there is nothing to do."""
+
+
+async def sampled(
+    sampling: Sampling,
+    row: Callable[[], Awaitable[None]],
+    names: Sequence[str],
+    *,
+    raw: bool,
+    skip: bool,
+    prepare: Callable[[], Awaitable[None]] = nothing,
+) -> Samples:
+    """Takes a row at each instant; raises what ends it early, with the rows in its ``samples``."""
+    loop = asyncio.get_running_loop()
+    ended: BaseException | None = None
+    try:
+        await prepare()
+        began = loop.time()
+        while (wait := sampling.after(loop.time() - began)) is not None:
+            if wait:
+                await asyncio.sleep(wait)
+                continue
+            try:
+                await row()
+            except (LineLost, Timeout):
+                if not skip:
+                    raise
+    except BaseException as error:
+        ended = error
+    return array((sampling.rows(), ended), names, raw=raw)
