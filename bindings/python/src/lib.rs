@@ -36,7 +36,8 @@ mod _core {
     use super::sim::{SimBench, SimPort, SimRecording, SimServing, sim_presets, sim_run};
     #[pymodule_export]
     use super::st::{
-        StClient, StRequest, StSampling, st_flags_text, st_register, st_register_name, st_registers,
+        StClient, StRequest, StSampling, StVerifiedWrite, st_flags_text, st_register,
+        st_register_name, st_registers,
     };
 
     #[pymodule_init]

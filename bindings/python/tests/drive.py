@@ -13,7 +13,7 @@ from pathlib import Path
 #: Registers of 32 bits, by name and number.
 REGISTERS = {"SPEED_REF": 0x04, "SPEED_MEAS": 0x1E, "RAMP_FINAL_SPEED": 0x5B}
 
-GET_REG, EXECUTE, BOARD_INFO, REVUP = 0x02, 0x03, 0x06, 0x08
+SET_REG, GET_REG, EXECUTE, BOARD_INFO, REVUP = 0x01, 0x02, 0x03, 0x06, 0x08
 START, STOP = 0x01, 0x02
 
 
@@ -36,6 +36,8 @@ class Drive:
         self.path = path
         self.number = number
         self.delay = delay
+        #: What any register reads, in 16 bits, where writes are acknowledged.
+        self.reads: Callable[[int], int] | None = None
         #: What was executed: motor and command.
         self.executed: list[tuple[int, int]] = []
         self.plug()
@@ -73,6 +75,9 @@ class Drive:
 
     def _reply(self, request: bytes) -> bytes:
         motor, code, payload = request[0] >> 5, request[0] & 0x1F, request[2:-1]
+        if self.reads is not None and code in (SET_REG, GET_REG):
+            kept = self.reads(payload[0]).to_bytes(2, "little") if code == GET_REG else b""
+            return frame(0xF0, kept)
         if code == GET_REG:
             told = value(self.number, motor, payload[0])
             return frame(0xF0, told.to_bytes(4, "little"))

@@ -351,3 +351,32 @@ def test_the_simulated_drive_runs_beside_other_tasks() -> None:
             assert bus.started == [1] and not await motor.faults()
 
     asyncio.run(within(60, main()))
+
+
+def test_a_verified_write_is_that_of_the_blocking_api() -> None:
+    async def main() -> None:
+        async with aio.st.open("sim:") as bus:
+            motor = bus.motor(1)
+            assert await motor.write_verified("SPEED_KP", 321) == 1
+            assert await motor.read("SPEED_KP") == 321
+            assert await motor.write_verified("SPEED_KP", -5) == 1
+            with pytest.raises(motorlink.BadValue, match="cannot be verified"):
+                await motor.write_verified("TORQUE_REF", 100)
+            with pytest.raises(motorlink.Refused):
+                await bus.motor(7).write_verified("SPEED_KP", 1)
+
+    asyncio.run(within(60, main()))
+
+
+def test_a_verified_write_is_repeated_and_says_what_it_found(drive: Drive) -> None:
+    answers = iter([6, 7, 6, 6, 6])
+    drive.reads = lambda register: next(answers)
+
+    async def main() -> None:
+        async with aio.st.open(drive.path) as bus:
+            assert await bus.motor(1).write_verified("SPEED_KP", 7) == 2
+            with pytest.raises(motorlink.Refused, match="should be 7 and reads 6"):
+                await bus.motor(1).write_verified("SPEED_KP", 7)
+        assert next(answers, None) is None
+
+    asyncio.run(within(60, main()))

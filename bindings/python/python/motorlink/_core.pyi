@@ -21,6 +21,7 @@ __all__ = [
     "StMachine",
     "StRequest",
     "StSampling",
+    "StVerifiedWrite",
     "__version__",
     "cli",
     "rmd_decode",
@@ -376,6 +377,17 @@ class StSampling:
     def refused(self) -> bool: ...
     def push(self) -> None: ...
     def rows(self) -> bytearray: ...
+
+@final
+class StVerifiedWrite:
+    """A verified write in an event loop: what is to be asked, one request after the other."""
+
+    def __new__(
+        cls, motor: int, request: StRequest, attempts: int, profile: str
+    ) -> StVerifiedWrite: ...
+    def request(self) -> StRequest: ...
+    def answered(self, digits: int | None) -> int | None: ...
+    def failed(self, error: BaseException) -> int | None: ...
 
 @final
 class RmdSampling:

@@ -92,8 +92,7 @@ impl StClient {
         attempts: u8,
     ) -> PyResult<u8> {
         let (client, motor) = (self.client(py)?, motor_number(py, motor)?);
-        let (register, bits) =
-            request.written().ok_or_else(|| bad_value(py, "only a write can be verified"))?;
+        let (register, bits) = request.verifiable(py)?;
         let written = || client.motor(motor)?.write_raw_verified(register, bits, attempts);
         py.detach(written).map_err(|error| st_error(py, &error))
     }

@@ -5,12 +5,14 @@ mod reply;
 mod request;
 mod sample;
 mod scale;
+mod verified;
 
 pub(crate) use client::{StClient, frame_code, limits, options};
 pub(crate) use reply::Answer;
 pub(crate) use request::{StRequest, motor_number};
 pub(crate) use sample::StSampling;
 pub(crate) use scale::Scale;
+pub(crate) use verified::StVerifiedWrite;
 
 use motorlink::stmcp::register::{Feature, Features, Writing};
 use motorlink::stmcp::{Flags, Profile, RegisterId};

@@ -58,6 +58,12 @@ impl StRequest {
         Self::asked(scale, Request::GetRegister(register), Reply::Number { register, raw })
     }
 
+    /// Writes these bytes to a register.
+    pub(super) fn writing(register: RegisterId, value: &[u8]) -> Self {
+        let request = Request::SetRegister { register, value: &[] };
+        StRequest { bytes: value.to_vec(), ..Self::told(Scale::plain(), request) }
+    }
+
     /// Chooses the registers of a data segment.
     pub(super) fn choosing(segment: u8, registers: &[RegisterId]) -> Self {
         let request = Request::ConfigDynStruct { segment, registers: &[] };
@@ -123,9 +129,7 @@ impl StRequest {
         #[pyo3(from_py_with = super::scale::register)] register: RegisterId,
         value: Vec<u8>,
     ) -> PyResult<Self> {
-        let request = Request::SetRegister { register, value: &[] };
-        let request = StRequest { bytes: value, ..Self::told(Scale::plain(), request) };
-        request.fitting(py)
+        Self::writing(register, &value).fitting(py)
     }
 
     /// Reads STATUS: the state in words.
@@ -428,12 +432,14 @@ impl StRequest {
         if fits { Ok(self) } else { Err(too_long(py)) }
     }
 
-    /// The register and the bits of a write.
-    pub(super) fn written(&self) -> Option<(RegisterId, i32)> {
-        let Request::SetRegister { register, .. } = self.request else { return None };
+    /// The register and the bits of a write, which alone can be verified.
+    pub(super) fn verifiable(&self, py: Python<'_>) -> PyResult<(RegisterId, i32)> {
+        let Request::SetRegister { register, .. } = self.request else {
+            return Err(bad_value(py, "only a write can be verified"));
+        };
         let mut bits = [0; 4];
         bits.iter_mut().zip(&self.bytes).for_each(|(slot, byte)| *slot = *byte);
-        Some((register, i32::from_le_bytes(bits)))
+        Ok((register, i32::from_le_bytes(bits)))
     }
 }
 

@@ -2,10 +2,15 @@
 
 use std::sync::Arc;
 
-use motorlink_proto::stmcp::{ErrorCode, Failure, Motor, RegisterId};
+use motorlink_proto::stmcp::{ErrorCode, Failure, Motor, RegisterId, Unverified};
 
 use super::LimitError;
 use crate::port::PortError;
+
+const ACTS: &str =
+    "the drive acts on it and changes it by itself; write it plainly, then read STATUS";
+const NOT_READABLE: &str =
+    "it cannot be both written and read in this profile; `motorlink st registers` says what can";
 
 /// Why a call to a drive did not do what it says.
 #[derive(Debug, thiserror::Error)]
@@ -105,6 +110,22 @@ impl std::fmt::Display for Target {
 }
 
 impl Error {
+    /// Why a write was not verified; `Err` has what its last exchange failed with.
+    pub fn unverified<E>(
+        motor: Motor,
+        register: RegisterId,
+        why: Unverified<E>,
+    ) -> Result<Self, E> {
+        match why {
+            Unverified::Exchange(error) => Err(error),
+            Unverified::Differs { expected, read } => {
+                Ok(Error::Differs { register, expected, read, motor })
+            }
+            Unverified::Acts => Ok(Error::NotVerifiable { register, why: ACTS }),
+            Unverified::NotReadable => Ok(Error::NotVerifiable { register, why: NOT_READABLE }),
+        }
+    }
+
     /// Whether the drive said no, as opposed to a line that failed.
     pub fn is_refusal(&self) -> bool {
         matches!(self, Error::Refused { .. })

@@ -3,15 +3,10 @@
 use motorlink_proto::stmcp::register::{Readable, Register, Value, Writable};
 use motorlink_proto::stmcp::{
     Command, CurrentReference, Flags, Motor, PositionMove, Ramp, RegisterId, Request, RevupPhase,
-    Status, TorqueRamp, Unverified, VerifiedWrite, register,
+    Status, TorqueRamp, VerifiedWrite, register,
 };
 
 use super::{Client, Error};
-
-const ACTS: &str =
-    "the drive acts on it and changes it by itself; write it plainly, then read STATUS";
-const NOT_READABLE: &str =
-    "it cannot be both written and read in this profile; `motorlink st registers` says what can";
 
 /// One motor of a drive. Every call is one exchange; its errors are those of
 /// [`Client::exchange`].
@@ -88,13 +83,8 @@ impl<'a> MotorHandle<'a> {
         };
         VerifiedWrite::new(self.client.profile(), register, value)
             .and_then(|write| write.run(attempts, exchange, |error| !error.is_line_failure()))
-            .map_err(|why| match why {
-                Unverified::Exchange(error) => error,
-                Unverified::Differs { expected, read } => {
-                    Error::Differs { register, expected, read, motor: self.motor }
-                }
-                Unverified::Acts => Error::NotVerifiable { register, why: ACTS },
-                Unverified::NotReadable => Error::NotVerifiable { register, why: NOT_READABLE },
+            .map_err(|why| {
+                Error::unverified(self.motor, register, why).unwrap_or_else(|exchange| exchange)
             })
     }
 

@@ -81,4 +81,4 @@ pub use message::{
 };
 pub use register::{Feature, Features, RegisterId};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
-pub use verified::{Unverified, VERIFY_ATTEMPTS, VerifiedWrite};
+pub use verified::{Unverified, VERIFY_ATTEMPTS, VerifiedWrite, Verifying};

@@ -79,27 +79,62 @@ impl VerifiedWrite {
         mut exchange: impl FnMut(&Request<'_>) -> Result<Option<i32>, E>,
         is_final: impl Fn(&E) -> bool,
     ) -> Result<u8, Unverified<E>> {
-        let value = self.bytes.get(..usize::from(self.size)).unwrap_or(&self.bytes);
-        let write = Request::SetRegister { register: self.register, value };
-        let mut attempt: u8 = 1;
+        let mut verifying = self.begin(attempts);
         loop {
-            if let Err(error) = exchange(&write)
-                && is_final(&error)
-            {
-                return Err(Unverified::Exchange(error));
+            let outcome = exchange(&verifying.request());
+            if let Some(verified) = verifying.step(outcome, &is_final) {
+                return verified;
             }
-            let expected = self.expected;
-            let failed = match exchange(&Request::GetRegister(self.register)) {
-                Ok(Some(read)) if read == expected => return Ok(attempt),
-                Ok(read) => Unverified::Differs { expected, read: read.unwrap_or_default() },
-                Err(error) if is_final(&error) => return Err(Unverified::Exchange(error)),
-                Err(error) => Unverified::Exchange(error),
-            };
-            if attempt >= attempts {
-                return Err(failed);
-            }
-            attempt = attempt.saturating_add(1);
         }
+    }
+
+    /// The same without the line, for whoever carries out the exchanges.
+    pub fn begin(self, attempts: u8) -> Verifying {
+        Verifying { write: self, attempts, attempt: 1, reading: false }
+    }
+}
+
+/// A verified write under way: carry out [`request`](Self::request) and hand its outcome to
+/// [`step`](Self::step), until that gives the end. As [`VerifiedWrite::run`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Verifying {
+    write: VerifiedWrite,
+    attempts: u8,
+    attempt: u8,
+    reading: bool,
+}
+
+impl Verifying {
+    /// What is to be asked now.
+    pub fn request(&self) -> Request<'_> {
+        let VerifiedWrite { register, bytes, size, .. } = &self.write;
+        if self.reading {
+            return Request::GetRegister(*register);
+        }
+        let value = bytes.get(..usize::from(*size)).unwrap_or(bytes);
+        Request::SetRegister { register: *register, value }
+    }
+
+    /// The request was carried out, or failed; gives how it all ended, if it did.
+    pub fn step<E>(
+        &mut self,
+        outcome: Result<Option<i32>, E>,
+        is_final: impl Fn(&E) -> bool,
+    ) -> Option<Result<u8, Unverified<E>>> {
+        let expected = self.write.expected;
+        self.reading = !self.reading;
+        let failed = match outcome {
+            Err(error) if is_final(&error) => return Some(Err(Unverified::Exchange(error))),
+            _ if self.reading => return None,
+            Ok(Some(read)) if read == expected => return Some(Ok(self.attempt)),
+            Ok(read) => Unverified::Differs { expected, read: read.unwrap_or_default() },
+            Err(error) => Unverified::Exchange(error),
+        };
+        if self.attempt >= self.attempts {
+            return Some(Err(failed));
+        }
+        self.attempt = self.attempt.saturating_add(1);
+        None
     }
 }
 

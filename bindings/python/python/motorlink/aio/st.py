@@ -27,7 +27,7 @@ from motorlink._segments import Segments
 from motorlink._values import ControlMode, Faults, FirmwareVersion, Info, RevupPhase, State
 from motorlink.aio._sampling import sampled
 from motorlink.aio._steps import Steps, is_told, opened, port_name
-from motorlink.errors import Refused
+from motorlink.errors import LineLost, Refused, Timeout
 
 __all__ = ["Bus", "Motor", "Opening", "open"]
 
@@ -333,6 +333,26 @@ class Motor:
     async def write(self, register: str | int, value: float | str, *, raw: bool = False) -> None:
         """Writes a register (4.4), in its unit, or in digits with ``raw=True``."""
         await self._perform(self._write(register, value, raw))
+
+    async def write_verified(
+        self, register: str | int, value: float | str, *, raw: bool = False, attempts: int = 3
+    ) -> int:
+        """Writes a register, reads it back, and repeats both until it has the value.
+
+        Gives the number of the attempt that did it; see :meth:`motorlink.st.Motor.write_verified`.
+        What another task writes to the register in between is found, and written over.
+        """
+        request = self._write(register, value, raw)
+        write = _core.StVerifiedWrite(self._number, request, attempts, self._bus.profile)
+        attempt = None
+        while attempt is None:
+            try:
+                told = await self._perform(write.request())
+            except (LineLost, Timeout) as error:
+                attempt = write.failed(error)
+            else:
+                attempt = write.answered(told)
+        return attempt
 
     def _write(self, register: str | int, value: float | str, raw: bool) -> Request:
         return Request.write(
