@@ -130,7 +130,8 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
     kind.raise(py, error, facts)
 }
 
-/// What a port says. What Python code raised in it is the cause; a KeyboardInterrupt goes on.
+/// What a port says. What Python code raised in it is the cause; a KeyboardInterrupt,
+/// and what another signal raises, goes on.
 pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
     let raised = match error {
         PortError::WrongKind { .. } => return bad_value(py, error),
@@ -139,7 +140,7 @@ pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
     };
     let cause = raised.map(|raised: &PyErr| raised.clone_ref(py));
     match cause {
-        Some(cause) if !cause.is_instance_of::<PyException>(py) => cause,
+        Some(cause) if error.is_interruption() || !cause.is_instance_of::<PyException>(py) => cause,
         cause => {
             let error = Kind::PortError.raise(py, error, Facts::default());
             error.set_cause(py, cause);

@@ -7,9 +7,8 @@ use pyo3::prelude::*;
 use crate::clock::Clock;
 use crate::error::bad_value;
 use crate::number::span;
+use crate::signals::LOOK;
 
-/// How often a program's other wishes are looked for.
-const LOOK: Duration = Duration::from_millis(50);
 /// Rows beyond which something must be wrong with the arguments.
 const MOST: f64 = 1e8;
 

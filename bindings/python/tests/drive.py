@@ -38,6 +38,9 @@ class Drive:
         self.delay = delay
         #: What any register reads, in 16 bits, where writes are acknowledged.
         self.reads: Callable[[int], int] | None = None
+        #: A register that is never answered, and how often it was asked for.
+        self.is_deaf_to: int | None = None
+        self.unanswered = 0
         #: What was executed: motor and command.
         self.executed: list[tuple[int, int]] = []
         self.plug()
@@ -68,6 +71,9 @@ class Drive:
             heard += os.read(self._line, 4096)
             while len(heard) >= 2 and len(heard) >= heard[1] + 3:
                 request, heard = heard[: heard[1] + 3], heard[heard[1] + 3 :]
+                if request[0] & 0x1F == GET_REG and request[2] == self.is_deaf_to:
+                    self.unanswered += 1
+                    continue
                 reply = self._reply(request)
                 if self._ends(self.delay()):
                     return

@@ -9,11 +9,13 @@ import sys
 import textwrap
 import threading
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import pytest
 
 import motorlink
 from conftest import PATIENT, Served, eventually
+from drive import REGISTERS, START, STOP, Drive, value
 from motorlink import rmd, st
 
 ROUNDS = 150
@@ -145,7 +147,9 @@ def test_closing_ends_a_sampling_with_what_there_was() -> None:
 def python(script: str, *arguments: str) -> subprocess.Popen[str]:
     """A Python program that says `ready`, and then waits for Ctrl-C."""
     words = [sys.executable, "-c", textwrap.dedent(script), *arguments]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     assert process.stdout and process.stdout.readline() == "ready\n"
     return process
 
@@ -174,6 +178,54 @@ WAIT = """
             except motorlink.MotorlinkError:
                 pass
 """
+
+
+IMPATIENT = """
+    import sys, motorlink
+    with motorlink.st.open(sys.argv[1], timeout=30.0) as bus:
+        motor = bus.motor(1)
+        motor.start()
+        print("ready", flush=True)
+        for wait in (
+            lambda: motor.read("SPEED_REF"),
+            lambda: bus.sample(["SPEED_REF"], rate=10, seconds=60, on_error="skip"),
+        ):
+            try:
+                wait()
+                raise SystemExit("it was not interrupted")
+            except KeyboardInterrupt:
+                print("interrupted", flush=True)
+                sys.stdin.readline()
+            print(motor.read("SPEED_MEAS"), flush=True)
+        print("ready", flush=True)
+        motor.read("SPEED_REF")
+"""
+
+
+def test_ctrl_c_ends_a_wait_for_a_drive_and_the_next_exchange_is_right(tmp_path: Path) -> None:
+    drive = Drive(tmp_path / "st0", 3)
+    drive.is_deaf_to = REGISTERS["SPEED_REF"]
+    try:
+        with python(IMPATIENT, str(drive.path)) as program:
+            assert program.stdin and program.stdout
+            for times in (1, 2):
+                eventually(lambda: drive.unanswered == times, "a request without an answer")
+                program.send_signal(signal.SIGINT)
+                assert program.stdout.readline() == "interrupted\n"
+                program.stdin.write("\n")
+                program.stdin.flush()
+                told = int(program.stdout.readline())
+                assert told == value(3, 1, REGISTERS["SPEED_MEAS"])
+            assert program.stdout.readline() == "ready\n"
+            eventually(lambda: drive.unanswered == 3, "a request without an answer")
+            assert drive.executed == [(1, START)]
+            program.send_signal(signal.SIGINT)
+            _, err = program.communicate(timeout=10)
+            assert "KeyboardInterrupt" in err and program.returncode in (130, -signal.SIGINT)
+        # Once unheard, before the line has recovered, and once with an answer.
+        assert drive.executed[0] == (1, START) and set(drive.executed[1:]) == {(1, STOP)}
+    finally:
+        drive.unplug()
 
 
 def test_ctrl_c_ends_a_long_sampling_and_stops_the_motor(served: Served) -> None:

@@ -18,8 +18,9 @@ Every method of a motor is one exchange unless it says otherwise, and raises
   nobody knows, its subclass ``errors.NoSuchRegister``, which is a ``KeyError``, too,
 * ``Closed`` after ``bus.close()``.
 
-Paragraphs in brackets are those of the document "Motor Control Protocol". Ctrl-C is obeyed when the
-exchange under way is over, after ``timeout`` at the latest unless the line is being recovered.
+Paragraphs in brackets are those of the document "Motor Control Protocol". Ctrl-C ends a wait for a
+silent drive at once; nobody knows then what the drive did, and the next exchange recovers the line
+first. While motors are being stopped at the end it has to wait.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, PoisonError, RwLock};
 
-use motorlink::port::PortName;
+use motorlink::port::{CanLink, PortName};
 use motorlink::rmd::{
     Bus, CentiDegrees, Error, Found, Limits, MotorId, MotorSet, OnDrop, Options, SpeedLimit,
     Torque4, TorqueCommand,
@@ -18,6 +18,7 @@ use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, closed, rmd_error};
 use crate::number::{limit, span};
 use crate::sampling::Plan;
+use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
 use crate::values;
 
@@ -30,14 +31,10 @@ pub(crate) struct RmdBus {
     bus: RwLock<Option<Arc<Bus>>>,
     port: String,
     clock: Arc<dyn Clock>,
+    deafness: Deafness,
 }
 
 impl RmdBus {
-    /// Over a bus that is open, on this clock.
-    pub(crate) fn from_bus(bus: Arc<Bus>, port: String, clock: Arc<dyn Clock>) -> Self {
-        RmdBus { bus: RwLock::new(Some(bus)), port, clock }
-    }
-
     /// The bus; an error once it was closed.
     pub(crate) fn bus(&self, py: Python<'_>) -> PyResult<Arc<Bus>> {
         let bus = self.bus.read().unwrap_or_else(PoisonError::into_inner);
@@ -64,10 +61,13 @@ impl RmdBus {
     ) -> PyResult<Self> {
         let limits = limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?;
         let options = options(py, timeout, guard, limits)?;
-        let (bus, name, clock): (_, _, Arc<dyn Clock>) = match port {
+        let deafness = Deafness::default();
+        let (bus, port, clock): (_, _, Arc<dyn Clock>) = match port {
             AnyPort::Other(Port::Name(name)) => {
                 let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
-                let bus = py.detach(|| Bus::open(&name, options));
+                let deaf = deafness.clone();
+                let wrap = move |link| Box::new(deaf.around(link)) as Box<dyn CanLink>;
+                let bus = py.detach(|| Bus::open_wrapped(&name, wrap, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
                 (bus, name.to_string(), Arc::new(RealTime::new()))
             }
@@ -81,7 +81,8 @@ impl RmdBus {
                 (bus, port.name().to_owned(), Arc::new(RealTime::new()))
             }
         };
-        Ok(Self::from_bus(Arc::new(bus), name, clock))
+        let bus = RwLock::new(Some(Arc::new(bus)));
+        Ok(RmdBus { bus, port, clock, deafness })
     }
 
     /// One exchange; gives what the request makes of the reply.
@@ -204,7 +205,8 @@ impl RmdBus {
     fn stop_moving(&self, py: Python<'_>, off: bool) -> PyResult<Vec<(u8, PyErr)>> {
         let bus = self.bus(py)?;
         let action = if off { OnDrop::Off } else { OnDrop::Stop };
-        let stopped = py.detach(|| bus.guard().with(action).stop_now());
+        let stop = || bus.guard().with(action).stop_now();
+        let stopped = py.detach(|| self.deafness.during(stop));
         let failed = stopped.into_iter().filter_map(|one| {
             one.result.err().map(|error| (one.id.number(), rmd_error(py, &error)))
         });

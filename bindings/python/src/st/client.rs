@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, PoisonError, RwLock};
 
-use motorlink::port::PortName;
+use motorlink::port::{ByteLink, PortName};
 use motorlink::stmcp::{Client, Limits, Motor, Options, Profile, Recovery};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyList};
@@ -14,6 +14,7 @@ use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, closed, st_error};
 use crate::number::{limit, span};
 use crate::sampling::Plan;
+use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
 
 /// A master on a serial line. Every call lets other Python threads run while it waits.
@@ -22,14 +23,10 @@ pub(crate) struct StClient {
     client: RwLock<Option<Arc<Client>>>,
     port: String,
     clock: Arc<dyn Clock>,
+    deafness: Deafness,
 }
 
 impl StClient {
-    /// Over a client that is open, on this clock.
-    pub(crate) fn from_client(client: Arc<Client>, port: String, clock: Arc<dyn Clock>) -> Self {
-        StClient { client: RwLock::new(Some(client)), port, clock }
-    }
-
     /// The client; an error once it was closed.
     pub(crate) fn client(&self, py: Python<'_>) -> PyResult<Arc<Client>> {
         let client = self.client.read().unwrap_or_else(PoisonError::into_inner);
@@ -58,10 +55,13 @@ impl StClient {
         let scale = Scale::new(py, profile, full_scale_amps)?;
         let limits = limits(py, scale, speed_limit, current_limit)?;
         let options = options(py, scale.profile, timeout, recovery, limits)?;
-        let (client, name, clock): (_, _, Arc<dyn Clock>) = match port {
+        let deafness = Deafness::default();
+        let (client, port, clock): (_, _, Arc<dyn Clock>) = match port {
             Port::Name(name) => {
                 let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
-                let client = py.detach(|| Client::open(&name, options));
+                let deaf = deafness.clone();
+                let wrap = move |link| Box::new(deaf.around(link)) as Box<dyn ByteLink>;
+                let client = py.detach(|| Client::open_wrapped(&name, wrap, options));
                 let client = client.map_err(|error| st_error(py, &error))?;
                 (client, name.to_string(), Arc::new(RealTime::new()))
             }
@@ -70,7 +70,8 @@ impl StClient {
                 (client, SimPort::NAME.to_owned(), port.clock())
             }
         };
-        Ok(Self::from_client(Arc::new(client), name, clock))
+        let client = RwLock::new(Some(Arc::new(client)));
+        Ok(StClient { client, port, clock, deafness })
     }
 
     /// One exchange; gives what the request makes of the reply.
@@ -144,7 +145,7 @@ impl StClient {
     /// Stops the motors that this client started; gives those that did not acknowledge it, and why.
     fn stop_started(&self, py: Python<'_>) -> PyResult<Vec<(u8, PyErr)>> {
         let client = self.client(py)?;
-        let stopped = py.detach(|| client.guard().stop_now());
+        let stopped = py.detach(|| self.deafness.during(|| client.guard().stop_now()));
         let failed = stopped.into_iter().filter_map(|one| {
             one.result.err().map(|error| (one.motor.number(), st_error(py, &error)))
         });

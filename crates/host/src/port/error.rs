@@ -206,6 +206,12 @@ pub enum PortError {
 }
 
 impl PortError {
+    /// Whether a link ended a wait because its caller wants to do something else. The port stays open,
+    /// and the exchange is abandoned.
+    pub fn is_interruption(&self) -> bool {
+        matches!(self, PortError::Io { source, .. } if source.kind() == io::ErrorKind::Interrupted)
+    }
+
     /// What an error means for a port that is open.
     pub(crate) fn in_use(port: &str, error: impl Into<io::Error>) -> Self {
         let source = error.into();

@@ -45,7 +45,8 @@ pub trait ByteLink: Send {
 
     /// Reads what is there, waiting at most `timeout` (`None`: without limit) for the first byte.
     /// `Ok(0)` means that nothing came in time. A signal does not end the wait: who wants to look
-    /// at a flag now and then passes a short `timeout`.
+    /// at a flag now and then passes a short `timeout`, or wraps the link in one that does so and
+    /// gives up with [`PortError::Io`] of the kind `Interrupted`.
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError>;
 
     /// The clock that its waits go by, where that is not the machine's. A wrapper has that of the

@@ -310,8 +310,11 @@ impl<L: CanLink> Driven<L> {
         }
     }
 
+    /// The port failed, or did not want to wait; the next call cancels what is under way.
     pub(super) fn closed(&mut self, error: PortError) -> Error {
-        self.port.close();
+        if !error.is_interruption() {
+            self.port.close();
+        }
         error.into()
     }
 }

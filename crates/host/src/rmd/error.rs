@@ -78,12 +78,10 @@ impl From<PortError> for Error {
 impl Error {
     /// Whether nothing can be said about the motor because it, or the line, was silent.
     pub fn is_line_failure(&self) -> bool {
-        matches!(
-            self,
-            Error::Timeout { .. }
-                | Error::Foreign { .. }
-                | Error::Quarantined { .. }
-                | Error::Port(_)
-        )
+        match self {
+            Error::Port(error) => !error.is_interruption(),
+            Error::Timeout { .. } | Error::Foreign { .. } | Error::Quarantined { .. } => true,
+            _ => false,
+        }
     }
 }

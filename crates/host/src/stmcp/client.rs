@@ -283,10 +283,12 @@ impl<L: ByteLink> Driven<L> {
         }
     }
 
-    /// The port failed in the middle of an exchange.
+    /// The port failed in the middle of an exchange, or did not want to wait for its end.
     pub(super) fn lost(&mut self, error: PortError) -> Error {
         self.session.abandon();
-        self.port.close();
+        if !error.is_interruption() {
+            self.port.close();
+        }
         error.into()
     }
 

@@ -133,7 +133,10 @@ impl Error {
 
     /// Whether nothing can be said about the drive because the line failed.
     pub fn is_line_failure(&self) -> bool {
-        matches!(self, Error::Failed { .. } | Error::Reply { .. } | Error::Port(_))
+        match self {
+            Error::Port(error) => !error.is_interruption(),
+            _ => matches!(self, Error::Failed { .. } | Error::Reply { .. }),
+        }
     }
 }
 
