@@ -274,13 +274,13 @@ def test_a_cancelled_sample_has_what_there_was() -> None:
             task = asyncio.ensure_future(bus.sample(["SPEED_MEAS"], rate=100, seconds=60))
             await asyncio.sleep(0.3)
             task.cancel()
-            try:
+            with pytest.raises(asyncio.CancelledError) as ended:
                 await task
-            except asyncio.CancelledError as ended:
-                context: BaseException | None = ended
-                while context is not None and not hasattr(context, "samples"):
-                    context = context.__context__
-                assert context is not None and len(context.samples) > 0
+            # Before Python 3.11 the task's own exception is the context of what is raised here.
+            context: BaseException | None = ended.value
+            while context is not None and not hasattr(context, "samples"):
+                context = context.__context__
+            assert context is not None and len(context.samples) > 0
 
     asyncio.run(main())
 
