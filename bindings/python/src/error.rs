@@ -76,6 +76,13 @@ pub(crate) fn closed(py: Python<'_>, port: &str) -> PyErr {
     Kind::Closed.raise(py, format_args!("{port} was closed by this program; open it again"), facts)
 }
 
+/// A bus of a process that this one was forked from.
+pub(crate) fn elsewhere(py: Python<'_>, port: &str) -> PyErr {
+    let facts = Facts { port: Some(port), ..Facts::default() };
+    let why = "was opened by another process, which this one was forked from; open it in this one";
+    Kind::Closed.raise(py, format_args!("{port} {why}"), facts)
+}
+
 /// What an ST client says.
 pub(crate) fn st_error(py: Python<'_>, error: &stmcp::Error) -> PyErr {
     use stmcp::Error;

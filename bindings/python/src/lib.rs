@@ -11,6 +11,7 @@ mod machine;
 mod number;
 mod rmd;
 mod sampling;
+mod shared;
 mod signals;
 mod sim;
 mod st;

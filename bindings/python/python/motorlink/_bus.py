@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import warnings
+import weakref
 from collections.abc import Callable
 from typing import Protocol, Union
 
 from motorlink import _core
 from motorlink.errors import BadValue, LineLost, MotorlinkError
+
 
 class HasPort(Protocol):
     """What is a port without a name, such as a bench of ``motorlink.sim``."""
@@ -41,19 +43,17 @@ def on_close_checked(on_close: str, known: tuple[str, ...]) -> str:
     return on_close
 
 
-def end(
-    stop: Callable[[], list[tuple[int, MotorlinkError]]],
-    close: Callable[[], None],
-    port: str,
-    *,
-    in_flight: bool,
-) -> None:
-    """Stops what was started, then closes the port."""
-    try:
-        failed = stop()
-    finally:
-        close()
-    report(failed, port, in_flight=in_flight)
+#: Closes the port; gives the motors that could not be stopped before, and why.
+Close = Callable[[], "list[tuple[int, MotorlinkError]]"]
+
+
+def when_forgotten(bus: object, close: Close, port: str) -> None:
+    """Closes a bus that nobody closed, when it is collected or the program ends."""
+
+    def end() -> None:
+        report(close(), port, in_flight=True)
+
+    weakref.finalize(bus, end)
 
 
 def report(failed: list[tuple[int, MotorlinkError]], port: str, *, in_flight: bool) -> None:

@@ -21,12 +21,13 @@ Names in brackets are paragraphs of chapter 3 of the document, or codes of comma
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import Port, end, on_close_checked, opened_can, worn
+from motorlink._bus import Port, on_close_checked, opened_can, report, when_forgotten, worn
 from motorlink._core import CanPort
 from motorlink._core import RmdRequest as Request
 from motorlink._sampling import Samples, array, by_motor, skips
@@ -152,7 +153,9 @@ class Bus:
 
     def __init__(self, core: _core.RmdBus, *, on_close: str = "stop"):
         self._core = core
-        self._on_close = on_close_checked(on_close, _ON_CLOSE)
+        stop, off = on_close_checked(on_close, _ON_CLOSE) != "nothing", on_close == "off"
+        self._close = functools.partial(core.close, stop=stop, off=off)
+        when_forgotten(self, self._close, core.port)
 
     @property
     def port(self) -> str:
@@ -242,20 +245,15 @@ class Bus:
         """Stops the motors that this bus set moving, as it was opened to; closes the port.
 
         Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
-        port is closed all the same.
+        port is closed all the same. Exchanges of other threads that are under way are waited for.
+
+        A bus that nobody closed is closed when it is collected, or when the program ends; a process
+        that forks leaves it to the parent.
         """
         self._end(in_flight=False)
 
     def _end(self, *, in_flight: bool) -> None:
-        core = self._core
-        if core.is_closed:
-            return
-        on_close = self._on_close
-
-        def halt() -> list[tuple[int, MotorlinkError]]:
-            return [] if on_close == "nothing" else core.stop_moving(off=on_close == "off")
-
-        end(halt, core.close, core.port, in_flight=in_flight)
+        report(self._close(), self.port, in_flight=in_flight)
 
     def __enter__(self) -> Bus:
         return self

@@ -25,12 +25,13 @@ first. While motors are being stopped at the end it has to wait.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import Port, end, on_close_checked, only, opened
+from motorlink._bus import Port, on_close_checked, only, opened, report, when_forgotten
 from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
 from motorlink._sampling import Samples, array, by_motor, skips
@@ -127,7 +128,9 @@ class Bus:
         self._client = client
         self._profile = profile
         self._full_scale_amps = full_scale_amps
-        self._on_close = on_close_checked(on_close, _ON_CLOSE)
+        stop = on_close_checked(on_close, _ON_CLOSE) == "stop"
+        self._close = functools.partial(client.close, stop=stop)
+        when_forgotten(self, self._close, client.port)
         self._segments = Segments()
 
     @property
@@ -217,16 +220,15 @@ class Bus:
         """Stops the motors that this bus started, unless it was opened otherwise; closes the port.
 
         Raises ``LineLost`` where a motor could not be stopped, which then may still be running. The
-        port is closed all the same.
+        port is closed all the same. Exchanges of other threads that are under way are waited for.
+
+        A bus that nobody closed is closed when it is collected, or when the program ends; a process
+        that forks leaves it to the parent.
         """
         self._end(in_flight=False)
 
     def _end(self, *, in_flight: bool) -> None:
-        client = self._client
-        if client.is_closed:
-            return
-        stop = client.stop_started if self._on_close == "stop" else list
-        end(stop, client.close, client.port, in_flight=in_flight)
+        report(self._close(), self.port, in_flight=in_flight)
 
     def __enter__(self) -> Bus:
         return self

@@ -1,6 +1,6 @@
 //! A CAN bus with RMD motors, for threads that may wait.
 
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::Arc;
 
 use motorlink::port::{CanLink, PortName};
 use motorlink::rmd::{
@@ -15,9 +15,10 @@ use super::request::{RmdRequest, motion_status, motor_id, motor_status, torque};
 use super::sample::{Questions, sample};
 use crate::can::AnyPort;
 use crate::clock::{Clock, RealTime};
-use crate::error::{bad_value, closed, rmd_error};
+use crate::error::{bad_value, rmd_error};
 use crate::number::{limit, span};
 use crate::sampling::Plan;
+use crate::shared::Shared;
 use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
 use crate::values;
@@ -28,18 +29,9 @@ const SCAN_STEP: usize = 8;
 /// A CAN bus with RMD motors. Every call lets other Python threads run while it waits.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdBus {
-    bus: RwLock<Option<Arc<Bus>>>,
-    port: String,
+    bus: Shared<Bus>,
     clock: Arc<dyn Clock>,
     deafness: Deafness,
-}
-
-impl RmdBus {
-    /// The bus; an error once it was closed.
-    pub(crate) fn bus(&self, py: Python<'_>) -> PyResult<Arc<Bus>> {
-        let bus = self.bus.read().unwrap_or_else(PoisonError::into_inner);
-        bus.clone().ok_or_else(|| closed(py, &self.port))
-    }
 }
 
 #[pymethods]
@@ -81,16 +73,14 @@ impl RmdBus {
                 (bus, port.name().to_owned(), Arc::new(RealTime::new()))
             }
         };
-        let bus = RwLock::new(Some(Arc::new(bus)));
-        Ok(RmdBus { bus, port, clock, deafness })
+        Ok(RmdBus { bus: Shared::new(bus, port), clock, deafness })
     }
 
     /// One exchange; gives what the request makes of the reply.
     fn perform(&self, py: Python<'_>, id: i64, request: &RmdRequest) -> PyResult<Py<PyAny>> {
-        let (bus, id) = (self.bus(py)?, motor_id(py, id)?);
-        let data = request.data();
-        let reply = py.detach(|| bus.raw(id, data)).map_err(|error| rmd_error(py, &error))?;
-        request.value(py, &reply)
+        let (id, data) = (motor_id(py, id)?, request.data());
+        let reply = self.bus.exchange(py, |bus| bus.raw(id, data))?;
+        request.value(py, &reply.map_err(|error| rmd_error(py, &error))?)
     }
 
     /// Exchanges that overlap, one a motor; gives the value, or the exception, by ID.
@@ -99,14 +89,15 @@ impl RmdBus {
         py: Python<'py>,
         requests: Vec<(i64, PyRef<'py, RmdRequest>)>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let bus = self.bus(py)?;
         let mut asked: Vec<(MotorId, [u8; 8])> = Vec::with_capacity(requests.len());
         for (id, request) in &requests {
             asked.push((motor_id(py, *id)?, request.data()));
         }
         let mut outcomes: Vec<(MotorId, Result<[u8; 8], Error>)> = Vec::with_capacity(asked.len());
-        let cycle = || bus.cycle(&asked, |id, outcome| outcomes.push((id, outcome)));
-        py.detach(cycle).map_err(|error| rmd_error(py, &error))?;
+        let cycle = self
+            .bus
+            .exchange(py, |bus| bus.cycle(&asked, |id, outcome| outcomes.push((id, outcome))))?;
+        cycle.map_err(|error| rmd_error(py, &error))?;
         let by_id = PyDict::new(py);
         for ((id, _), (_, request)) in asked.iter().zip(&requests) {
             let outcome = outcomes.iter().find(|(of, _)| of == id);
@@ -128,9 +119,8 @@ impl RmdBus {
         amps: [f64; 4],
         expect: Vec<i64>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let bus = self.bus(py)?;
         let (torques, expect) = (four_torques(py, amps)?, motor_ids(py, expect)?);
-        let replies = py.detach(|| bus.torque4(torques, expect));
+        let replies = self.bus.exchange(py, |bus| bus.torque4(torques, expect))?;
         let by_id = PyDict::new(py);
         for (reply, id) in replies.map_err(|error| rmd_error(py, &error))?.into_iter().zip(1..) {
             match reply {
@@ -144,7 +134,7 @@ impl RmdBus {
 
     /// Asks every ID for its status; gives what answered.
     fn scan(&self, py: Python<'_>, ids: Vec<i64>) -> PyResult<Vec<Py<PyAny>>> {
-        let bus = self.bus(py)?;
+        let bus = self.bus.get(py)?;
         let mut left = motor_ids(py, ids)?;
         let mut found = Vec::new();
         while !left.is_empty() {
@@ -167,10 +157,10 @@ impl RmdBus {
         raw: bool,
         skip: bool,
     ) -> PyResult<(Bound<'py, PyByteArray>, Option<PyErr>)> {
-        let bus = self.bus(py)?;
+        let bus = self.bus.get(py)?;
         let plan = Plan::new(py, rate, seconds)?;
         let questions = Questions::new(py, motors, raw)?;
-        let look = |py: Python<'_>| self.bus(py).map(drop);
+        let look = |py: Python<'_>| self.bus.get(py).map(drop);
         let clock = &*self.clock;
         let (rows, outcome) = py.detach(|| sample(&bus, clock, look, plan, &questions, skip));
         Ok((PyByteArray::new(py, &rows.0), outcome.err()))
@@ -185,7 +175,7 @@ impl RmdBus {
         speed_dps: Option<f64>,
         angle_deg: Option<f64>,
     ) -> PyResult<()> {
-        let (bus, id) = (self.bus(py)?, motor_id(py, id)?);
+        let (bus, id) = (self.bus.get(py)?, motor_id(py, id)?);
         let limits = limits(py, current_a, speed_dps, angle_deg)?;
         py.detach(|| bus.set_limits(id, limits));
         Ok(())
@@ -194,41 +184,37 @@ impl RmdBus {
     /// Motors that were given something to do and neither stopped nor switched off.
     #[getter]
     fn moving<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        let bus = self.bus(py)?;
+        let bus = self.bus.get(py)?;
         let numbers: Vec<u8> = py.detach(|| bus.moving().map(MotorId::number).collect());
         PyList::new(py, numbers)
     }
 
-    /// Stops the motors that this bus was used to move, or switches them off; gives those that did
-    /// not acknowledge it, and why.
-    #[pyo3(signature = (*, off))]
-    fn stop_moving(&self, py: Python<'_>, off: bool) -> PyResult<Vec<(u8, PyErr)>> {
-        let bus = self.bus(py)?;
+    /// Closes the port, when exchanges that are under way are over; `stop` stops what is moving
+    /// before, or switches it `off`, and gives the motors that did not acknowledge it, and why.
+    /// Again is no error.
+    #[pyo3(signature = (*, stop, off))]
+    fn close(&self, py: Python<'_>, stop: bool, off: bool) -> Vec<(u8, PyErr)> {
         let action = if off { OnDrop::Off } else { OnDrop::Stop };
-        let stop = || bus.guard().with(action).stop_now();
-        let stopped = py.detach(|| self.deafness.during(stop));
-        let failed = stopped.into_iter().filter_map(|one| {
+        let halt = |bus: &Bus| {
+            let stop_now = || bus.guard().with(action).stop_now();
+            if stop { self.deafness.during(stop_now) } else { Vec::new() }
+        };
+        let failed = self.bus.close(py, halt).into_iter().filter_map(|one| {
             one.result.err().map(|error| (one.id.number(), rmd_error(py, &error)))
         });
-        Ok(failed.collect())
-    }
-
-    /// Closes the port, when exchanges that are under way are over. Again is no error.
-    fn close(&self, py: Python<'_>) {
-        let bus = self.bus.write().unwrap_or_else(PoisonError::into_inner).take();
-        py.detach(|| drop(bus));
+        failed.collect()
     }
 
     /// Whether it was closed.
     #[getter]
     fn is_closed(&self) -> bool {
-        self.bus.read().unwrap_or_else(PoisonError::into_inner).is_none()
+        self.bus.is_closed()
     }
 
     /// The port's name.
     #[getter]
     fn port(&self) -> &str {
-        &self.port
+        self.bus.port()
     }
 }
 

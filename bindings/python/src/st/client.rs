@@ -1,6 +1,6 @@
 //! A serial line with an ST drive, for threads that may wait.
 
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::Arc;
 
 use motorlink::port::{ByteLink, PortName};
 use motorlink::stmcp::{Client, Limits, Motor, Options, Profile, Recovery};
@@ -11,27 +11,19 @@ use super::request::{StRequest, motor_number};
 use super::sample::{self, Reading, sample};
 use super::scale::Scale;
 use crate::clock::{Clock, RealTime};
-use crate::error::{bad_value, closed, st_error};
+use crate::error::{bad_value, st_error};
 use crate::number::{limit, span};
 use crate::sampling::Plan;
+use crate::shared::Shared;
 use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
 
 /// A master on a serial line. Every call lets other Python threads run while it waits.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct StClient {
-    client: RwLock<Option<Arc<Client>>>,
-    port: String,
+    client: Shared<Client>,
     clock: Arc<dyn Clock>,
     deafness: Deafness,
-}
-
-impl StClient {
-    /// The client; an error once it was closed.
-    pub(crate) fn client(&self, py: Python<'_>) -> PyResult<Arc<Client>> {
-        let client = self.client.read().unwrap_or_else(PoisonError::into_inner);
-        client.clone().ok_or_else(|| closed(py, &self.port))
-    }
 }
 
 #[pymethods]
@@ -70,17 +62,16 @@ impl StClient {
                 (client, SimPort::NAME.to_owned(), port.clock())
             }
         };
-        let client = RwLock::new(Some(Arc::new(client)));
-        Ok(StClient { client, port, clock, deafness })
+        Ok(StClient { client: Shared::new(client, port), clock, deafness })
     }
 
     /// One exchange; gives what the request makes of the reply.
     fn perform(&self, py: Python<'_>, motor: i64, request: &StRequest) -> PyResult<Py<PyAny>> {
-        let (client, motor) = (self.client(py)?, motor_number(py, motor)?);
-        let exchange =
-            || client.exchange(motor, &request.request(), |payload| request.understand(payload));
-        let answer = py.detach(exchange).map_err(|error| st_error(py, &error))?;
-        request.value(py, answer)
+        let motor = motor_number(py, motor)?;
+        let answer = self.client.exchange(py, |client| {
+            client.exchange(motor, &request.request(), |payload| request.understand(payload))
+        })?;
+        request.value(py, answer.map_err(|error| st_error(py, &error))?)
     }
 
     /// Writes, reads back and repeats until the register has the value; gives the number of the
@@ -92,10 +83,12 @@ impl StClient {
         request: &StRequest,
         attempts: u8,
     ) -> PyResult<u8> {
-        let (client, motor) = (self.client(py)?, motor_number(py, motor)?);
+        let motor = motor_number(py, motor)?;
         let (register, bits) = request.verifiable(py)?;
-        let written = || client.motor(motor)?.write_raw_verified(register, bits, attempts);
-        py.detach(written).map_err(|error| st_error(py, &error))
+        let written = self.client.exchange(py, |client| {
+            client.motor(motor)?.write_raw_verified(register, bits, attempts)
+        })?;
+        written.map_err(|error| st_error(py, &error))
     }
 
     /// One exchange with any frame code and payload; gives the acknowledge's payload.
@@ -106,9 +99,8 @@ impl StClient {
         code: i64,
         payload: &[u8],
     ) -> PyResult<Bound<'py, PyBytes>> {
-        let (client, motor) = (self.client(py)?, motor_number(py, motor)?);
-        let code = frame_code(py, code)?;
-        let reply = py.detach(|| client.raw(motor, code, payload));
+        let (motor, code) = (motor_number(py, motor)?, frame_code(py, code)?);
+        let reply = self.client.exchange(py, |client| client.raw(motor, code, payload))?;
         Ok(PyBytes::new(py, &reply.map_err(|error| st_error(py, &error))?))
     }
 
@@ -125,10 +117,10 @@ impl StClient {
         raw: bool,
         skip: bool,
     ) -> PyResult<(Bound<'py, PyByteArray>, Option<PyErr>)> {
-        let client = self.client(py)?;
+        let client = self.client.get(py)?;
         let plan = Plan::new(py, rate, seconds)?;
         let reading = Reading::new(py, client.profile(), motors, segments, raw)?;
-        let look = |py: Python<'_>| self.client(py).map(drop);
+        let look = |py: Python<'_>| self.client.get(py).map(drop);
         let clock = &*self.clock;
         let (rows, outcome) = py.detach(|| sample(&client, clock, look, plan, reading, skip));
         Ok((PyByteArray::new(py, &rows.0), outcome.err()))
@@ -137,37 +129,35 @@ impl StClient {
     /// Motors that this client started and did not stop.
     #[getter]
     fn started<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        let client = self.client(py)?;
+        let client = self.client.get(py)?;
         let numbers: Vec<u8> = py.detach(|| client.started().map(Motor::number).collect());
         PyList::new(py, numbers)
     }
 
-    /// Stops the motors that this client started; gives those that did not acknowledge it, and why.
-    fn stop_started(&self, py: Python<'_>) -> PyResult<Vec<(u8, PyErr)>> {
-        let client = self.client(py)?;
-        let stopped = py.detach(|| self.deafness.during(|| client.guard().stop_now()));
-        let failed = stopped.into_iter().filter_map(|one| {
+    /// Closes the port, when exchanges that are under way are over; `stop` stops what was started
+    /// before, and gives the motors that did not acknowledge it, and why. Again is no error.
+    #[pyo3(signature = (*, stop))]
+    fn close(&self, py: Python<'_>, stop: bool) -> Vec<(u8, PyErr)> {
+        let halt = |client: &Client| {
+            let stop_now = || client.guard().stop_now();
+            if stop { self.deafness.during(stop_now) } else { Vec::new() }
+        };
+        let failed = self.client.close(py, halt).into_iter().filter_map(|one| {
             one.result.err().map(|error| (one.motor.number(), st_error(py, &error)))
         });
-        Ok(failed.collect())
-    }
-
-    /// Closes the port, when exchanges that are under way are over. Again is no error.
-    fn close(&self, py: Python<'_>) {
-        let client = self.client.write().unwrap_or_else(PoisonError::into_inner).take();
-        py.detach(|| drop(client));
+        failed.collect()
     }
 
     /// Whether it was closed.
     #[getter]
     fn is_closed(&self) -> bool {
-        self.client.read().unwrap_or_else(PoisonError::into_inner).is_none()
+        self.client.is_closed()
     }
 
     /// The port's name.
     #[getter]
     fn port(&self) -> &str {
-        &self.port
+        self.client.port()
     }
 }
 

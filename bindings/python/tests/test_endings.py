@@ -1,0 +1,137 @@
+"""Motors stop however a bus ends: closed under threads, forgotten, in a program that ends, after a fork."""
+
+from __future__ import annotations
+
+import gc
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+
+import pytest
+
+import motorlink
+from conftest import Served, eventually
+from motorlink import rmd, sim, st
+
+
+def start(bus: st.Bus | rmd.Bus) -> None:
+    """Sets a motor of a bench turning."""
+    if isinstance(bus, rmd.Bus):
+        bus.motor(1).speed(100)
+    else:
+        bus.motor(2).ramp(500, 0)
+        bus.motor(2).start()
+
+
+def is_turning(bench: sim.Bench, bus: str) -> bool:
+    bench.run(0.5)
+    if bus == "rmd":
+        return abs(float(bench.truth("rmd1")["speed_dps"])) > 1
+    return bench.truth("st2")["status"] not in ("IDLE", "STOP", "STOP_IDLE")
+
+
+#: How a bus of each protocol is opened on a bench.
+OPEN: dict[str, Callable[[sim.Bench], st.Bus | rmd.Bus]] = {"st": st.open, "rmd": rmd.open}
+
+
+@pytest.mark.parametrize("kind", OPEN)
+def test_nothing_turns_that_was_started_while_the_bus_was_closed(kind: str) -> None:
+    for _ in range(30):
+        bench = sim.Bench()
+        bus = OPEN[kind](bench)
+        going = threading.Event()
+
+        def use(bus: st.Bus | rmd.Bus = bus, going: threading.Event = going) -> None:
+            with pytest.raises(motorlink.Closed):
+                while True:
+                    start(bus)
+                    going.set()
+
+        threads = [threading.Thread(target=use) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        assert going.wait(10)
+        bus.close()
+        assert not is_turning(bench, kind)
+        for thread in threads:
+            thread.join(10)
+
+
+@pytest.mark.parametrize("kind", OPEN)
+def test_a_bus_that_is_forgotten_stops_its_motors(kind: str) -> None:
+    bench = sim.Bench()
+    bus = OPEN[kind](bench)
+    start(bus)
+    assert is_turning(bench, kind)
+    del bus
+    gc.collect()
+    assert not is_turning(bench, kind)
+
+
+def test_a_bus_that_is_to_leave_its_motors_alone_does_so_when_forgotten() -> None:
+    bench = sim.Bench()
+    bus = rmd.open(bench, on_close="nothing")
+    bus.motor(1).speed(100)
+    del bus
+    gc.collect()
+    assert is_turning(bench, "rmd")
+
+
+def test_a_program_that_ends_without_closing_stops_its_motors(served: Served) -> None:
+    script = "\n".join((
+        "import sys, motorlink",
+        "bus = motorlink.rmd.open(sys.argv[1], timeout=2.0)",
+        "bus.motor(1).speed(360)",
+        "print(bus.moving)",
+    ))
+    words = [sys.executable, "-c", script, served.can]
+    out = subprocess.run(words, capture_output=True, text=True, check=True, timeout=60).stdout
+    assert out == "[1]\n"
+
+    def speed() -> float:
+        told = served.motor("rmd", 1)["speed_dps"]
+        assert isinstance(told, float)
+        return told
+
+    eventually(lambda: abs(speed()) < 1, "a motor at rest")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_process_leaves_the_line_alone() -> None:
+    bench = sim.Bench()
+    with rmd.open(bench) as bus:
+        bus.motor(1).speed(100)
+        child = os.fork()
+        if child == 0:
+            try:
+                try:
+                    bus.motor(1).stop()
+                except motorlink.Closed as error:
+                    assert "another process" in str(error)
+                    bus.close()
+                    os._exit(7)
+            finally:
+                os._exit(1)
+        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+        assert bus.moving == [1] and is_turning(bench, "rmd")
+
+
+@pytest.mark.parametrize("kind", OPEN)
+def test_a_signal_handler_may_close_a_bus_that_is_sampled(kind: str) -> None:
+    script = "\n".join((
+        "import os, signal, sys, threading, time, motorlink",
+        "kind, what = sys.argv[1:]",
+        "bus = getattr(motorlink, kind).open('sim:')",
+        "signal.signal(signal.SIGTERM, lambda *_: bus.close())",
+        "threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGTERM)).start()",
+        "try:",
+        "    bus.sample([what], rate=100, seconds=600)",
+        "except motorlink.Closed as error:",
+        "    print(len(error.samples) > 0)",
+    ))
+    words = [sys.executable, "-c", script, kind, {"st": "SPEED_MEAS", "rmd": "iq_a"}[kind]]
+    out = subprocess.run(words, capture_output=True, text=True, check=True, timeout=60).stdout
+    assert out == "True\n"
