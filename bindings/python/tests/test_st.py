@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import pickle
 import warnings
@@ -300,3 +301,14 @@ def test_a_silent_drive_is_a_timeout() -> None:
     finally:
         os.close(ours)
         os.close(theirs)
+
+
+def test_a_command_that_does_not_exist_is_a_bad_value(st_bus: st.Bus) -> None:
+    for number in (256, -1):
+        with pytest.raises(motorlink.BadValue, match="0 to 255"):
+            st_bus.motor(1).execute(number)
+
+
+def test_registers_are_copied_without_asking_the_drive(st_bus: st.Bus) -> None:
+    registers = st_bus.motor(1).registers
+    assert copy.copy(registers)["SPEED_KP"] == registers["SPEED_KP"]

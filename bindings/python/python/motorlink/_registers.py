@@ -54,6 +54,9 @@ class Registers(Mapping[str, float]):
             raise AttributeError(f"there is no register {name!r}; `list(registers)` has their names")
         self._motor.write(name, value)
 
+    def __copy__(self) -> Registers:
+        return Registers(self._motor)
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._names())
 

@@ -111,7 +111,8 @@ def open(
         How long after a timeout a late reply is awaited before the motor is asked again, s.
     ``current_limit``, ``speed_limit``, ``angle_limit``
         What no request to any motor may exceed in either direction: A, °/s, ° from zero; also not by
-        raw frames. With a speed limit a move needs ``max_speed``.
+        raw frames. With a speed limit a move needs ``max_speed``. The angle is that of ``move_to``:
+        ``turn_to`` names none over all turns, and is not held back by it.
     ``on_close``
         What the end of ``with``, and ``close()``, do to motors that this bus set moving: ``stop``
         (0x81: they hold still), ``off`` (0x80), or ``nothing``.
@@ -298,7 +299,10 @@ class Motor:
         speed: float | None = None,
         angle: float | None = None,
     ) -> None:
-        """What this motor may be told from now on, A, °/s, ° from zero; ``None`` is no limit."""
+        """What this motor may be told from now on, A, °/s, ° from zero; ``None`` is no limit.
+
+        All three at once, in place of those of :func:`open`.
+        """
         self._bus._core.set_limits(self._id, current, speed, angle)
 
     @property

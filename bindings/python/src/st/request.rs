@@ -156,7 +156,12 @@ impl StRequest {
     fn execute(py: Python<'_>, command: &Bound<'_, PyAny>) -> PyResult<Self> {
         let command = match command.cast::<PyString>() {
             Ok(name) => named_command(py, &name.to_cow()?)?,
-            Err(_) => Command::from(command.extract::<u8>()?),
+            Err(_) => {
+                let number: i64 = command.extract()?;
+                Command::from(u8::try_from(number).map_err(|_| {
+                    bad_value(py, format_args!("commands are 0 to 255, not {number}"))
+                })?)
+            }
         };
         Ok(Self::told(Scale::plain(), Request::Execute(command)))
     }
