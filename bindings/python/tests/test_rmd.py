@@ -223,3 +223,9 @@ def test_values_and_requests_are_values(rmd_bus: rmd.Bus) -> None:
     assert rmd.speed(1) == rmd.speed(1.0) != rmd.speed(2)
     assert len({rmd.off(), rmd.off(), rmd.stop()}) == 2
     assert repr(rmd.off()) == "<Request 80 00 00 00 00 00 00 00 (Motor off command)>"
+
+
+@pytest.mark.parametrize("id", [-1, 0, 33, 300])
+def test_a_motor_that_cannot_exist_is_refused_at_once(brief_bus: rmd.Bus, id: int) -> None:
+    with pytest.raises(motorlink.BadValue, match="1 to 32"):
+        brief_bus.motor(id)

@@ -322,3 +322,8 @@ def test_names_of_registers_in_asyncio() -> None:
                 registers.info("NO_SUCH")
 
     asyncio.run(main())
+
+
+def test_one_name_is_no_list_of_letters(st_bus: st.Bus) -> None:
+    with pytest.raises(motorlink.BadValue, match="list of names"):
+        st_bus.sample("SPEED_MEAS", rate=10, seconds=0.1)

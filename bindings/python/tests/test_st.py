@@ -312,3 +312,9 @@ def test_a_command_that_does_not_exist_is_a_bad_value(st_bus: st.Bus) -> None:
 def test_registers_are_copied_without_asking_the_drive(st_bus: st.Bus) -> None:
     registers = st_bus.motor(1).registers
     assert copy.copy(registers)["SPEED_KP"] == registers["SPEED_KP"]
+
+
+@pytest.mark.parametrize("number", [-1, 8, 300])
+def test_a_motor_that_cannot_exist_is_refused_at_once(st_bus: st.Bus, number: int) -> None:
+    with pytest.raises(motorlink.BadValue, match="1 to 7"):
+        st_bus.motor(number)

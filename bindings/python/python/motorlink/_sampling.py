@@ -24,6 +24,8 @@ def by_motor(
 
     Where motors are named, so is the motor of a value.
     """
+    if isinstance(wanted, str):
+        raise BadValue(f"{wanted!r} is one name: give a list of names")
     if isinstance(wanted, Mapping):
         motors = [(number, list(some)) for number, some in wanted.items()]
         names = [f"{called(one)}_{number}" for number, some in motors for one in some]

@@ -251,7 +251,7 @@ class Motor:
 
     def __init__(self, bus: Bus, number: int, full_scale_amps: float | None):
         self._bus = bus
-        self._number = number
+        self._number = _core.st_motor(number)
         self._full_scale_amps = full_scale_amps
         self._reads: dict[tuple[str | int, bool], Request] = {}
 

@@ -19,6 +19,12 @@ use pyo3::types::PyDict;
 use crate::error::bad_value;
 use crate::number::physical;
 
+/// A motor's ID, 1 to 32.
+#[pyfunction]
+pub(crate) fn rmd_motor(py: Python<'_>, id: i64) -> PyResult<u8> {
+    Ok(motor_id(py, id)?.number())
+}
+
 /// A frame in words and values. `reply`: the motor sent it; the frame does not tell.
 #[pyfunction]
 #[pyo3(signature = (can_id, data, *, reply))]

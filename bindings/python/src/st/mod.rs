@@ -63,6 +63,12 @@ pub(crate) fn st_register(
     )
 }
 
+/// The number of a motor, 1 to 7, or 0 for the one that the drive has selected.
+#[pyfunction]
+pub(crate) fn st_motor(py: Python<'_>, number: i64) -> PyResult<u8> {
+    motor_number(py, number)
+}
+
 /// The name of a register, or its number in hexadecimal where it has none.
 #[pyfunction]
 pub(crate) fn st_register_name(#[pyo3(from_py_with = register)] name: RegisterId) -> String {

@@ -343,7 +343,7 @@ class Motor:
 
     def __init__(self, bus: Bus, id: int):
         self._bus = bus
-        self._id = id
+        self._id = _core.rmd_motor(id)
 
     @property
     def bus(self) -> Bus:
