@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sysconfig
 import time
@@ -19,6 +20,9 @@ REPOSITORY = Path(__file__).parents[3]
 
 #: For a motor that is there, on a machine that has other things to do, s.
 PATIENT = 2.0
+
+# Programs that a shell started in the background ignore Ctrl-C, and so would those that tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 T = TypeVar("T")
 
