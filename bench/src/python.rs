@@ -19,7 +19,7 @@ const EXCHANGES: u32 = 200;
 const GOALS: [(&str, f64); 3] = [
     ("Python, pty: ratio to pyserial, bytes only", 1.0),
     ("Python, pty: ratio to framing and checks in Python", 5.0),
-    ("Python, without a line: ratio to framing and checks in Python", 5.0),
+    ("Python, without a line: ratio to framing and checks", 5.0),
 ];
 
 /// Contestants as the script calls them, and what they are.
