@@ -79,13 +79,25 @@ def test_a_bus_that_is_to_leave_its_motors_alone_does_so_when_forgotten() -> Non
     assert is_turning(bench, "rmd")
 
 
-def test_a_program_that_ends_without_closing_stops_its_motors(served: Served) -> None:
-    script = "\n".join((
-        "import sys, motorlink",
-        "bus = motorlink.rmd.open(sys.argv[1], timeout=2.0)",
-        "bus.motor(1).speed(360)",
-        "print(bus.moving)",
-    ))
+BLOCKING = """\
+import sys, motorlink
+bus = motorlink.rmd.open(sys.argv[1], timeout=2.0)
+bus.motor(1).speed(360)
+print(bus.moving)
+"""
+
+ASYNC = """\
+import asyncio, sys, motorlink.aio
+async def main():
+    bus = await motorlink.aio.rmd.open(sys.argv[1], timeout=2.0)
+    await bus.motor(1).speed(360)
+    print(bus.moving)
+asyncio.run(main())
+"""
+
+
+@pytest.mark.parametrize("script", [BLOCKING, ASYNC], ids=["blocking", "asyncio"])
+def test_a_program_that_ends_without_closing_stops_its_motors(served: Served, script: str) -> None:
     words = [sys.executable, "-c", script, served.can]
     out = subprocess.run(words, capture_output=True, text=True, check=True, timeout=60).stdout
     assert out == "[1]\n"

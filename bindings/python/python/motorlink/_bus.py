@@ -48,10 +48,12 @@ Close = Callable[[], "list[tuple[int, MotorlinkError]]"]
 
 
 def when_forgotten(bus: object, close: Close, port: str) -> None:
-    """Closes a bus that nobody closed, when it is collected or the program ends."""
+    """Closes a bus that nobody closed, when it is collected or the program that opened it ends."""
+    owner = os.getpid()
 
     def end() -> None:
-        report(close(), port, in_flight=True)
+        if os.getpid() == owner:
+            report(close(), port, in_flight=True)
 
     weakref.finalize(bus, end)
 

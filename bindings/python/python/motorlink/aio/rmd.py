@@ -21,7 +21,7 @@ from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import on_close_checked, report, worn
+from motorlink._bus import on_close_checked, report, when_forgotten, worn
 from motorlink._core import CanPort
 from motorlink._core import RmdRequest as Request
 from motorlink._sampling import Samples, by_motor, skips
@@ -105,7 +105,10 @@ class Bus:
 
     def __init__(self, machine: _core.RmdMachine, *, on_close: str = "stop"):
         self._machine = machine
-        self._on_close = on_close_checked(on_close, _ON_CLOSE)
+        on_close = on_close_checked(on_close, _ON_CLOSE)
+        stop, off = on_close != "nothing", on_close == "off"
+        self._close = functools.partial(machine.close, stop=stop, off=off)
+        when_forgotten(self, self._close, machine.port)
         self._turns: dict[int, asyncio.Lock] = {}
         self._answers: dict[int, asyncio.Future[Any]] = {}
         self._steps = Steps(machine, self._advance)
@@ -315,9 +318,7 @@ class Bus:
 
     async def _end(self, *, in_flight: bool) -> None:
         self._fail(self._steps.closed())
-        stop, off = self._on_close != "nothing", self._on_close == "off"
-        close = functools.partial(self._machine.close, stop=stop, off=off)
-        failed, cancelled = await self._steps.close(close)
+        failed, cancelled = await self._steps.close(self._close)
         report(failed, self.port, in_flight=in_flight or cancelled is not None)
         if cancelled is not None:
             raise cancelled

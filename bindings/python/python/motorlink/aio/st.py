@@ -13,13 +13,14 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import os
 from collections.abc import Callable, Generator, Mapping, Sequence
 from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import on_close_checked, only, report
+from motorlink._bus import on_close_checked, only, report, when_forgotten
 from motorlink._core import StRequest as Request
 from motorlink._registers import RegisterNames
 from motorlink._sampling import Samples, by_motor, skips
@@ -127,7 +128,9 @@ class Bus:
         self._machine = machine
         self._profile = profile
         self._full_scale_amps = full_scale_amps
-        self._on_close = on_close_checked(on_close, _ON_CLOSE)
+        stop = on_close_checked(on_close, _ON_CLOSE) == "stop"
+        self._close = functools.partial(machine.close, stop=stop)
+        when_forgotten(self, self._close, machine.port)
         self._turn = asyncio.Lock()
         self._answer: asyncio.Future[Any] | None = None
         self._steps = Steps(machine, self._advance)
@@ -262,8 +265,7 @@ class Bus:
     async def _end(self, *, in_flight: bool) -> None:
         if self._answer is not None and not self._answer.done():
             self._answer.set_exception(self._steps.closed())
-        stop = self._on_close == "stop"
-        failed, cancelled = await self._steps.close(lambda: self._machine.close(stop=stop))
+        failed, cancelled = await self._steps.close(self._close)
         report(failed, self.port, in_flight=in_flight or cancelled is not None)
         if cancelled is not None:
             raise cancelled
