@@ -5,7 +5,6 @@
 //! people is in the Python files on top.
 
 mod can;
-mod clock;
 mod error;
 mod machine;
 mod number;

@@ -1,7 +1,6 @@
 //! A CAN bus with RMD motors, for threads that may wait.
 
-use std::sync::Arc;
-
+use motorlink::Clock;
 use motorlink::port::{CanLink, PortName};
 use motorlink::rmd::{
     Bus, CentiDegrees, Error, Found, Limits, MotorId, MotorSet, OnDrop, Options, SpeedLimit,
@@ -14,7 +13,6 @@ use pyo3::types::{PyByteArray, PyDict, PyList};
 use super::request::{RmdRequest, motion_status, motor_id, motor_status, torque};
 use super::sample::{Questions, sample};
 use crate::can::AnyPort;
-use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, rmd_error};
 use crate::number::{limit, span};
 use crate::sampling::Plan;
@@ -30,7 +28,7 @@ const SCAN_STEP: usize = 8;
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdBus {
     bus: Shared<Bus>,
-    clock: Arc<dyn Clock>,
+    clock: Clock,
     deafness: Deafness,
 }
 
@@ -54,14 +52,14 @@ impl RmdBus {
         let limits = limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?;
         let options = options(py, timeout, guard, limits)?;
         let deafness = Deafness::default();
-        let (bus, port, clock): (_, _, Arc<dyn Clock>) = match port {
+        let (bus, port, clock) = match port {
             AnyPort::Other(Port::Name(name)) => {
                 let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
                 let deaf = deafness.clone();
                 let wrap = move |link| Box::new(deaf.around(link)) as Box<dyn CanLink>;
                 let bus = py.detach(|| Bus::open_wrapped(&name, wrap, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
-                (bus, name.to_string(), Arc::new(RealTime::new()))
+                (bus, name.to_string(), Clock::running())
             }
             AnyPort::Other(Port::Sim(port)) => {
                 let bus = Bus::over(SimPort::NAME, port.can(py)?, options);
@@ -70,7 +68,7 @@ impl RmdBus {
             AnyPort::Can(port) => {
                 let port = port.get();
                 let bus = Bus::over(port.name(), port.link(), options);
-                (bus, port.name().to_owned(), Arc::new(RealTime::new()))
+                (bus, port.name().to_owned(), Clock::running())
             }
         };
         Ok(RmdBus { bus: Shared::new(bus, port), clock, deafness })
@@ -161,7 +159,7 @@ impl RmdBus {
         let plan = Plan::new(py, rate, seconds)?;
         let questions = Questions::new(py, motors, raw)?;
         let look = |py: Python<'_>| self.bus.get(py).map(drop);
-        let clock = &*self.clock;
+        let clock = &self.clock;
         let (rows, outcome) = py.detach(|| sample(&bus, clock, look, plan, &questions, skip));
         Ok((PyByteArray::new(py, &rows.0), outcome.err()))
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use motorlink::Clock;
 use motorlink::rmd::{Bus, Error, MotorId};
 use motorlink_proto::rmd::Code;
 use pyo3::prelude::*;
@@ -10,7 +11,6 @@ use pyo3::types::PyByteArray;
 
 use super::quantity::Quantity;
 use super::request::{RmdRequest, motor_id};
-use crate::clock::Clock;
 use crate::error::rmd_error;
 use crate::number::physical;
 use crate::sampling::{Plan, Rows, Stepped, cell};
@@ -80,7 +80,7 @@ impl Questions {
 /// `skip` a motor that fails to answer costs the row and nothing else.
 pub(super) fn sample(
     bus: &Bus,
-    clock: &dyn Clock,
+    clock: &Clock,
     look: impl Fn(Python<'_>) -> PyResult<()>,
     plan: Plan,
     questions: &Questions,

@@ -6,10 +6,8 @@ use motorlink::Clock;
 use motorlink::fault::{FaultError, Faults};
 use motorlink::port::{ByteLink, CanLink};
 use motorlink::sim::VirtualBench;
-use motorlink_proto::time::{Duration, Instant};
 use pyo3::prelude::*;
 
-use crate::clock;
 use crate::error::bad_value;
 
 /// What is opened.
@@ -43,8 +41,8 @@ impl SimPort {
     }
 
     /// The time that passes on it.
-    pub(crate) fn clock(&self) -> Arc<dyn clock::Clock> {
-        Arc::new(self.bench.clock().clone())
+    pub(crate) fn clock(&self) -> Clock {
+        self.bench.clock().clone()
     }
 
     fn faults(
@@ -54,17 +52,5 @@ impl SimPort {
     ) -> PyResult<Faults> {
         let faults = self.fault.as_ref().map(|text| text.parse().and_then(usable)).transpose();
         Ok(faults.map_err(|error| bad_value(py, error))?.unwrap_or(Faults::NONE))
-    }
-}
-
-impl clock::Clock for Clock {
-    fn now(&self) -> std::time::Duration {
-        self.now().since(Instant(0)).into()
-    }
-
-    fn pass(&self, span: std::time::Duration) {
-        // A part of a microsecond is one: virtual time would never pass it.
-        let micros = span.as_nanos().div_ceil(1000);
-        self.wait(self.now() + Duration(micros.try_into().unwrap_or(u64::MAX)));
     }
 }

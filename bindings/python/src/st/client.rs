@@ -1,7 +1,6 @@
 //! A serial line with an ST drive, for threads that may wait.
 
-use std::sync::Arc;
-
+use motorlink::Clock;
 use motorlink::port::{ByteLink, PortName};
 use motorlink::stmcp::{Client, Limits, Motor, Options, Profile, Recovery};
 use pyo3::prelude::*;
@@ -10,7 +9,6 @@ use pyo3::types::{PyByteArray, PyBytes, PyList};
 use super::request::{StRequest, motor_number};
 use super::sample::{self, Reading, sample};
 use super::scale::Scale;
-use crate::clock::{Clock, RealTime};
 use crate::error::{bad_value, st_error};
 use crate::number::{limit, span};
 use crate::sampling::Plan;
@@ -22,7 +20,7 @@ use crate::sim::{Port, SimPort};
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct StClient {
     client: Shared<Client>,
-    clock: Arc<dyn Clock>,
+    clock: Clock,
     deafness: Deafness,
 }
 
@@ -48,14 +46,14 @@ impl StClient {
         let limits = limits(py, scale, speed_limit, current_limit)?;
         let options = options(py, scale.profile, timeout, recovery, limits)?;
         let deafness = Deafness::default();
-        let (client, port, clock): (_, _, Arc<dyn Clock>) = match port {
+        let (client, port, clock) = match port {
             Port::Name(name) => {
                 let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
                 let deaf = deafness.clone();
                 let wrap = move |link| Box::new(deaf.around(link)) as Box<dyn ByteLink>;
                 let client = py.detach(|| Client::open_wrapped(&name, wrap, options));
                 let client = client.map_err(|error| st_error(py, &error))?;
-                (client, name.to_string(), Arc::new(RealTime::new()))
+                (client, name.to_string(), Clock::running())
             }
             Port::Sim(port) => {
                 let client = Client::over(SimPort::NAME, port.line(py)?, options);
@@ -121,7 +119,7 @@ impl StClient {
         let plan = Plan::new(py, rate, seconds)?;
         let reading = Reading::new(py, client.profile(), motors, segments, raw)?;
         let look = |py: Python<'_>| self.client.get(py).map(drop);
-        let clock = &*self.clock;
+        let clock = &self.clock;
         let (rows, outcome) = py.detach(|| sample(&client, clock, look, plan, reading, skip));
         Ok((PyByteArray::new(py, &rows.0), outcome.err()))
     }

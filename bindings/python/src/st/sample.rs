@@ -2,6 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use motorlink::Clock;
 use motorlink::stmcp::register::Access;
 use motorlink::stmcp::{Client, Error, Profile, RegisterId, SEGMENT_REGISTERS};
 use pyo3::prelude::*;
@@ -9,7 +10,6 @@ use pyo3::types::{PyByteArray, PyDict};
 
 use super::request::{StRequest, motor_number};
 use super::scale::{Scale, register};
-use crate::clock::Clock;
 use crate::error::st_error;
 use crate::sampling::{Plan, Rows, Stepped, cell};
 
@@ -171,7 +171,7 @@ fn is_segment(profile: Profile, registers: &[RegisterId]) -> bool {
 /// `skip` a line that fails costs the row and nothing else.
 pub(super) fn sample(
     client: &Client,
-    clock: &dyn Clock,
+    clock: &Clock,
     look: impl Fn(Python<'_>) -> PyResult<()>,
     plan: Plan,
     mut reading: Reading,
