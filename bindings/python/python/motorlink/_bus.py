@@ -6,7 +6,8 @@ import os
 import warnings
 import weakref
 from collections.abc import Callable
-from typing import Protocol, Union
+from types import TracebackType
+from typing import Protocol, TypeVar, Union
 
 from motorlink import _core
 from motorlink.errors import BadValue, LineLost, MotorlinkError
@@ -43,6 +44,8 @@ def on_close_checked(on_close: str, known: tuple[str, ...]) -> str:
     return on_close
 
 
+Entered = TypeVar("Entered", bound="Ending")
+
 #: Closes the port; gives the motors that could not be stopped before, and why.
 Close = Callable[[], "list[tuple[int, MotorlinkError]]"]
 
@@ -70,6 +73,45 @@ def report(failed: list[tuple[int, MotorlinkError]], port: str, *, in_flight: bo
         warnings.warn(motors, RuntimeWarning, stacklevel=4)
         return
     raise LineLost(motors, port=port, motor=failed[0][0]) from failed[0][1]
+
+
+class Ending:
+    """What the blocking buses of both protocols have in common: how they end."""
+
+    def __init__(self, close: Close, port: str):
+        self._close = close
+        self._name = port
+        when_forgotten(self, close, port)
+
+    @property
+    def port(self) -> str:
+        """The port's name."""
+        return self._name
+
+    def close(self) -> None:
+        """Stops the motors that this bus set moving, as it was opened to; closes the port.
+
+        Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
+        port is closed all the same. Exchanges of other threads that are under way are waited for.
+
+        A bus that nobody closed is closed when it is collected, or when the program ends; a process
+        that forks leaves it to the parent.
+        """
+        self._end(in_flight=False)
+
+    def _end(self, *, in_flight: bool) -> None:
+        report(self._close(), self.port, in_flight=in_flight)
+
+    def __enter__(self: Entered) -> Entered:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._end(in_flight=error is not None)
 
 
 def worn(rom: bool, what: str) -> None:

@@ -23,11 +23,10 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Mapping, Sequence
-from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import Port, on_close_checked, opened_can, report, when_forgotten, worn
+from motorlink._bus import Ending, Port, on_close_checked, opened_can, worn
 from motorlink._core import CanPort
 from motorlink._core import RmdRequest as Request
 from motorlink._sampling import Samples, array, by_motor, skips
@@ -145,7 +144,7 @@ def decode(can_id: int, data: bytes, *, reply: bool) -> Frame:
     return _core.rmd_decode(can_id, data, reply=reply)
 
 
-class Bus:
+class Bus(Ending):
     """A CAN bus with RMD motors; from :func:`open`.
 
     Threads may share it: one exchange or cycle at a time is on the bus, and each caller gets its own
@@ -155,13 +154,7 @@ class Bus:
     def __init__(self, core: _core.RmdBus, *, on_close: str = "stop"):
         self._core = core
         stop, off = on_close_checked(on_close, _ON_CLOSE) != "nothing", on_close == "off"
-        self._close = functools.partial(core.close, stop=stop, off=off)
-        when_forgotten(self, self._close, core.port)
-
-    @property
-    def port(self) -> str:
-        """The port's name."""
-        return self._core.port
+        super().__init__(functools.partial(core.close, stop=stop, off=off), core.port)
 
     @property
     def moving(self) -> list[int]:
@@ -241,31 +234,6 @@ class Bus:
         skip = skips(on_error)
         motors, names = by_motor(quantities, motor, str)
         return array(self._core.sample(motors, rate, seconds, raw, skip), names, raw=raw)
-
-    def close(self) -> None:
-        """Stops the motors that this bus set moving, as it was opened to; closes the port.
-
-        Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
-        port is closed all the same. Exchanges of other threads that are under way are waited for.
-
-        A bus that nobody closed is closed when it is collected, or when the program ends; a process
-        that forks leaves it to the parent.
-        """
-        self._end(in_flight=False)
-
-    def _end(self, *, in_flight: bool) -> None:
-        report(self._close(), self.port, in_flight=in_flight)
-
-    def __enter__(self) -> Bus:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self._end(in_flight=error is not None)
 
     def __repr__(self) -> str:
         closed = ", closed" if self._core.is_closed else ""

@@ -27,11 +27,10 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import Port, on_close_checked, only, opened, report, when_forgotten
+from motorlink._bus import Ending, Port, on_close_checked, only, opened
 from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
 from motorlink._sampling import Samples, array, by_motor, skips
@@ -111,7 +110,7 @@ def open(
     return Bus(client, profile=profile, full_scale_amps=full_scale_amps, on_close=on_close)
 
 
-class Bus:
+class Bus(Ending):
     """A serial line with a drive of up to seven motors; from :func:`open`.
 
     Threads may share it: one exchange at a time is on the line, and each caller gets its own answer.
@@ -129,14 +128,8 @@ class Bus:
         self._profile = profile
         self._full_scale_amps = full_scale_amps
         stop = on_close_checked(on_close, _ON_CLOSE) == "stop"
-        self._close = functools.partial(client.close, stop=stop)
-        when_forgotten(self, self._close, client.port)
+        super().__init__(functools.partial(client.close, stop=stop), client.port)
         self._segments = Segments()
-
-    @property
-    def port(self) -> str:
-        """The port's name."""
-        return self._client.port
 
     @property
     def profile(self) -> str:
@@ -215,31 +208,6 @@ class Bus:
         with self._segments.for_sampling(len(motors)) as segments:
             outcome = self._client.sample(motors, segments, rate, seconds, raw, skip)
         return array(outcome, names, raw=raw)
-
-    def close(self) -> None:
-        """Stops the motors that this bus started, unless it was opened otherwise; closes the port.
-
-        Raises ``LineLost`` where a motor could not be stopped, which then may still be running. The
-        port is closed all the same. Exchanges of other threads that are under way are waited for.
-
-        A bus that nobody closed is closed when it is collected, or when the program ends; a process
-        that forks leaves it to the parent.
-        """
-        self._end(in_flight=False)
-
-    def _end(self, *, in_flight: bool) -> None:
-        report(self._close(), self.port, in_flight=in_flight)
-
-    def __enter__(self) -> Bus:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self._end(in_flight=error is not None)
 
     def __repr__(self) -> str:
         closed = ", closed" if self._client.is_closed else ""

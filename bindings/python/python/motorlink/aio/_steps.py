@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable
-from typing import Any, Protocol, TypeVar
+from collections.abc import Callable, Coroutine, Generator
+from types import TracebackType
+from typing import Any, Generic, Protocol, TypeVar
 
-from motorlink.errors import Closed
+from motorlink._bus import Close, report, when_forgotten
+from motorlink.errors import Closed, MotorlinkError
 
 Value = TypeVar("Value")
+Entered = TypeVar("Entered", bound="Ending")
 
 
 def port_name(port: str | os.PathLike[str]) -> str:
@@ -150,6 +153,78 @@ class Steps:
         return closing.result(), cancelled
 
 
+class Ending:
+    """What the buses of both protocols have in common: how they end."""
+
+    def __init__(self, steps: Steps, close: Close, port: str):
+        self._steps = steps
+        self._close = close
+        self._name = port
+        when_forgotten(self, close, port)
+
+    @property
+    def port(self) -> str:
+        """The port's name."""
+        return self._name
+
+    async def close(self) -> None:
+        """Stops the motors that this bus set moving, as it was opened to; closes the port.
+
+        Exchanges that are under way end in ``Closed``. A task that is cancelled meanwhile is cancelled
+        when all is done.
+
+        Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
+        port is closed all the same.
+        """
+        await self._end(in_flight=False)
+
+    async def _end(self, *, in_flight: bool) -> None:
+        self._fail(self._steps.closed())
+        failed, cancelled = await self._steps.close(self._close)
+        report(failed, self.port, in_flight=in_flight or cancelled is not None)
+        if cancelled is not None:
+            raise cancelled
+
+    def _fail(self, error: MotorlinkError) -> None:
+        """Ends the exchanges under way."""
+        raise NotImplementedError
+
+    async def __aenter__(self: Entered) -> Entered:
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        await self._end(in_flight=error is not None)
+
+
+class Opening(Generic[Entered]):
+    """A bus that is to be opened: ``async with`` it, or ``await`` it."""
+
+    def __init__(self, open: Callable[[], Coroutine[Any, Any, Entered]]):
+        self._open = open
+        self._bus: Entered | None = None
+
+    def __await__(self) -> Generator[Any, None, Entered]:
+        return self._open().__await__()
+
+    async def __aenter__(self) -> Entered:
+        self._bus = await self._open()
+        return self._bus
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._bus is not None:
+            await self._bus.__aexit__(kind, error, traceback)
+
+
 async def opened(open: Callable[[], Value], discard: Callable[[Value], object]) -> Value:
     """Opens in another thread; what comes when nobody waits for it any more is discarded."""
     loop = asyncio.get_running_loop()
@@ -164,6 +239,16 @@ async def opened(open: Callable[[], Value], discard: Callable[[Value], object]) 
 
         opening.add_done_callback(came)
         raise
+
+
+def tell(answer: asyncio.Future[Any] | None, value: Any) -> None:
+    """Ends an exchange, unless nobody waits for it any more: in an exception, or in a value."""
+    if answer is None or answer.done():
+        return
+    if isinstance(value, BaseException):
+        answer.set_exception(value)
+    else:
+        answer.set_result(value)
 
 
 def is_told(answer: asyncio.Future[Any]) -> bool:

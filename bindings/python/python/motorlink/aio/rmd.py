@@ -15,19 +15,18 @@ from __future__ import annotations
 import asyncio
 import functools
 import os
-from collections.abc import AsyncIterator, Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
-from types import TracebackType
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import on_close_checked, report, when_forgotten, worn
+from motorlink._bus import on_close_checked, worn
 from motorlink._core import CanPort
 from motorlink._core import RmdRequest as Request
 from motorlink._sampling import Samples, by_motor, skips
 from motorlink._values import Encoder, Found, Gains, MotionStatus, MotorStatus, PhaseCurrents
 from motorlink.aio._sampling import sampled
-from motorlink.aio._steps import Steps, is_told, opened, port_name
+from motorlink.aio._steps import Ending, Opening, Steps, is_told, opened, port_name, tell
 from motorlink.errors import Closed, MotorlinkError, PortError
 
 __all__ = ["Bus", "Motor", "Opening", "open"]
@@ -46,7 +45,7 @@ def open(
     speed_limit: float | None = None,
     angle_limit: float | None = None,
     on_close: str = "stop",
-) -> Opening:
+) -> Opening[Bus]:
     """Opens a CAN bus: ``async with open(...) as bus``, or ``await open(...)``.
 
     The arguments are those of :func:`motorlink.rmd.open`. Nothing is sent.
@@ -64,39 +63,14 @@ def open(
             angle_limit_deg=angle_limit,
         )
 
-    return Opening(machine, on_close=on_close)
+    async def bus() -> Bus:
+        came = await opened(machine, lambda late: late.close(stop=False, off=False))
+        return Bus(came, on_close=on_close)
+
+    return Opening(bus)
 
 
-class Opening:
-    """A bus that is to be opened; from :func:`open`."""
-
-    def __init__(self, machine: Callable[[], _core.RmdMachine], *, on_close: str):
-        self._machine = machine
-        self._on_close = on_close
-        self._bus: Bus | None = None
-
-    async def _open(self) -> Bus:
-        machine = await opened(self._machine, lambda late: late.close(stop=False, off=False))
-        return Bus(machine, on_close=self._on_close)
-
-    def __await__(self) -> Generator[Any, None, Bus]:
-        return self._open().__await__()
-
-    async def __aenter__(self) -> Bus:
-        self._bus = await self._open()
-        return self._bus
-
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        if self._bus is not None:
-            await self._bus.__aexit__(kind, error, traceback)
-
-
-class Bus:
+class Bus(Ending):
     """A CAN bus with RMD motors; from :func:`open`.
 
     Tasks may share it. Exchanges with different motors overlap; a motor has one at a time, in the order
@@ -107,16 +81,10 @@ class Bus:
         self._machine = machine
         on_close = on_close_checked(on_close, _ON_CLOSE)
         stop, off = on_close != "nothing", on_close == "off"
-        self._close = functools.partial(machine.close, stop=stop, off=off)
-        when_forgotten(self, self._close, machine.port)
+        close = functools.partial(machine.close, stop=stop, off=off)
+        super().__init__(Steps(machine, self._advance), close, machine.port)
         self._turns: dict[int, asyncio.Lock] = {}
         self._answers: dict[int, asyncio.Future[Any]] = {}
-        self._steps = Steps(machine, self._advance)
-
-    @property
-    def port(self) -> str:
-        """The port's name."""
-        return self._machine.port
 
     @property
     def moving(self) -> list[int]:
@@ -291,48 +259,12 @@ class Bus:
             self._fail(error)
             return None
         for id, value in over:
-            answer = self._answers.get(id)
-            if answer is None or answer.done():
-                continue
-            if isinstance(value, BaseException):
-                answer.set_exception(value)
-            else:
-                answer.set_result(value)
+            tell(self._answers.get(id), value)
         return wait
 
     def _fail(self, error: MotorlinkError) -> None:
         for answer in self._answers.values():
-            if not answer.done():
-                answer.set_exception(error)
-
-    async def close(self) -> None:
-        """Stops the motors that this bus set moving, as it was opened to; closes the port.
-
-        Exchanges that are under way end in ``Closed``. A task that is cancelled meanwhile is cancelled
-        when all is done.
-
-        Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
-        port is closed all the same.
-        """
-        await self._end(in_flight=False)
-
-    async def _end(self, *, in_flight: bool) -> None:
-        self._fail(self._steps.closed())
-        failed, cancelled = await self._steps.close(self._close)
-        report(failed, self.port, in_flight=in_flight or cancelled is not None)
-        if cancelled is not None:
-            raise cancelled
-
-    async def __aenter__(self) -> Bus:
-        return self
-
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        await self._end(in_flight=error is not None)
+            tell(answer, error)
 
     def __repr__(self) -> str:
         closed = ", closed" if self._steps.is_closed else ""

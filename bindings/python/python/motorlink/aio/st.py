@@ -15,20 +15,19 @@ from __future__ import annotations
 import asyncio
 import functools
 import os
-from collections.abc import Callable, Generator, Mapping, Sequence
-from types import TracebackType
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from motorlink import _core
-from motorlink._bus import on_close_checked, only, report, when_forgotten
+from motorlink._bus import on_close_checked, only
 from motorlink._core import StRequest as Request
 from motorlink._registers import RegisterNames
 from motorlink._sampling import Samples, by_motor, skips
 from motorlink._segments import Segments
 from motorlink._values import ControlMode, Faults, FirmwareVersion, Info, RevupPhase, State
 from motorlink.aio._sampling import sampled
-from motorlink.aio._steps import Steps, is_told, opened, port_name
-from motorlink.errors import LineLost, Refused, Timeout
+from motorlink.aio._steps import Ending, Opening, Steps, is_told, opened, port_name, tell
+from motorlink.errors import LineLost, MotorlinkError, Refused, Timeout
 
 __all__ = ["Bus", "Motor", "Opening", "open"]
 
@@ -45,7 +44,7 @@ def open(
     full_scale_amps: float | None = None,
     recovery: str = "drain",
     on_close: str = "stop",
-) -> Opening:
+) -> Opening[Bus]:
     """Opens a serial line with a drive: ``async with open(...) as bus``, or ``await open(...)``.
 
     The arguments are those of :func:`motorlink.st.open`. Nothing is sent.
@@ -64,53 +63,14 @@ def open(
             full_scale_amps=full_scale_amps,
         )
 
-    return Opening(machine, profile=profile, full_scale_amps=full_scale_amps, on_close=on_close)
+    async def bus() -> Bus:
+        came = await opened(machine, lambda late: late.close(stop=False))
+        return Bus(came, profile=profile, full_scale_amps=full_scale_amps, on_close=on_close)
+
+    return Opening(bus)
 
 
-class Opening:
-    """A bus that is to be opened; from :func:`open`."""
-
-    def __init__(
-        self,
-        machine: Callable[[], _core.StMachine],
-        *,
-        profile: str,
-        full_scale_amps: float | None,
-        on_close: str,
-    ):
-        self._machine = machine
-        self._profile = profile
-        self._full_scale_amps = full_scale_amps
-        self._on_close = on_close
-        self._bus: Bus | None = None
-
-    async def _open(self) -> Bus:
-        machine = await opened(self._machine, lambda late: late.close(stop=False))
-        return Bus(
-            machine,
-            profile=self._profile,
-            full_scale_amps=self._full_scale_amps,
-            on_close=self._on_close,
-        )
-
-    def __await__(self) -> Generator[Any, None, Bus]:
-        return self._open().__await__()
-
-    async def __aenter__(self) -> Bus:
-        self._bus = await self._open()
-        return self._bus
-
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        if self._bus is not None:
-            await self._bus.__aexit__(kind, error, traceback)
-
-
-class Bus:
+class Bus(Ending):
     """A serial line with a drive of up to seven motors; from :func:`open`.
 
     Tasks may share it: one exchange at a time is on the line, in the order in which they were asked
@@ -129,17 +89,11 @@ class Bus:
         self._profile = profile
         self._full_scale_amps = full_scale_amps
         stop = on_close_checked(on_close, _ON_CLOSE) == "stop"
-        self._close = functools.partial(machine.close, stop=stop)
-        when_forgotten(self, self._close, machine.port)
+        close = functools.partial(machine.close, stop=stop)
+        super().__init__(Steps(machine, self._advance), close, machine.port)
         self._turn = asyncio.Lock()
         self._answer: asyncio.Future[Any] | None = None
-        self._steps = Steps(machine, self._advance)
         self._segments = Segments()
-
-    @property
-    def port(self) -> str:
-        """The port's name."""
-        return self._machine.port
 
     @property
     def profile(self) -> str:
@@ -243,43 +197,11 @@ class Bus:
         if not done:
             wait: float | None = value
             return wait
-        answer = self._answer
-        if answer is not None and not answer.done():
-            if isinstance(value, BaseException):
-                answer.set_exception(value)
-            else:
-                answer.set_result(value)
+        tell(self._answer, value)
         return None
 
-    async def close(self) -> None:
-        """Stops the motors that this bus started, unless it was opened otherwise; closes the port.
-
-        Exchanges that are under way end in ``Closed``. A task that is cancelled meanwhile is cancelled
-        when all is done.
-
-        Raises ``LineLost`` where a motor could not be stopped, which then may still be running. The
-        port is closed all the same.
-        """
-        await self._end(in_flight=False)
-
-    async def _end(self, *, in_flight: bool) -> None:
-        if self._answer is not None and not self._answer.done():
-            self._answer.set_exception(self._steps.closed())
-        failed, cancelled = await self._steps.close(self._close)
-        report(failed, self.port, in_flight=in_flight or cancelled is not None)
-        if cancelled is not None:
-            raise cancelled
-
-    async def __aenter__(self) -> Bus:
-        return self
-
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        await self._end(in_flight=error is not None)
+    def _fail(self, error: MotorlinkError) -> None:
+        tell(self._answer, error)
 
     def __repr__(self) -> str:
         closed = ", closed" if self._steps.is_closed else ""
