@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+"""Runs parts of `make test`, two at a time, and says how long each took.
+
+A part is a target of the Makefile. Its output goes to target/parts/PART.log and is printed when the
+part fails. A line that begins with SKIPPED names a check that could not run here: those are printed at
+the end.
+"""
+
+import argparse
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+LOGS = REPOSITORY / "target/parts"
+
+
+class Run:
+    """One run of a part."""
+
+    def __init__(self, part, label):
+        self.part, self.label = part, label
+        self.log = LOGS / f"{label}.log"
+        self.begun = time.monotonic()
+        with self.log.open("wb") as output:
+            self.process = subprocess.Popen(
+                ["make", "--no-print-directory", part],
+                cwd=REPOSITORY,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+
+    def wait(self):
+        self.passed = self.process.wait() == 0
+        self.seconds = time.monotonic() - self.begun
+        self.output = self.log.read_text(errors="replace")
+        self.tests = sum(map(int, re.findall(r"\b(\d+) passed", self.output)))
+        self.skipped = re.findall(r"^SKIPPED.*", self.output, re.M)
+
+    def end(self):
+        try:
+            os.killpg(self.process.pid, signal.SIGTERM)
+        except ProcessLookupError:
+            pass
+
+    def __str__(self):
+        verdict = "FAILED" if not self.passed else "skipped" if self.skipped else "passed"
+        tests = f"{self.tests} tests" if self.tests else ""
+        return f"{self.label:18} {verdict:8} {self.seconds:5.0f} s  {tests}".rstrip()
+
+
+class Runner:
+    """Parts that wait, parts that run, and runs that are over."""
+
+    def __init__(self, labels):
+        self.waiting = deque(labels)
+        self.running, self.over = set(), []
+        self.lock = threading.Lock()
+        self.stopped = False
+
+    def work(self):
+        while True:
+            with self.lock:
+                if self.stopped or not self.waiting:
+                    return
+                run = Run(*self.waiting.popleft())
+                self.running.add(run)
+            run.wait()
+            with self.lock:
+                self.running.remove(run)
+                if self.stopped:
+                    return
+                self.over.append(run)
+                if not run.passed:
+                    print(f"\n---- {run.log}\n{run.output}\n----", flush=True)
+                print(run, flush=True)
+
+    def stop(self):
+        with self.lock:
+            self.stopped = True
+            for run in self.running:
+                run.end()
+
+
+def load(count):
+    """`count` processes that compute without end, at the priority of the tests."""
+    subprocess.run([REPOSITORY / "tests/install", "stress-ng"], check=True)
+    return subprocess.Popen(["stress-ng", "--quiet", "--cpu", str(count)])
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    arguments.add_argument("--jobs", type=int, default=2, help="parts at a time (default 2)")
+    arguments.add_argument("--runs", type=int, default=1, help="runs of each part (default 1)")
+    arguments.add_argument("--load", type=int, default=0, help="processes that compute beside them")
+    arguments.add_argument("--strict", action="store_true", help="a skipped check is a failure")
+    arguments.add_argument("parts", nargs="+", metavar="PART")
+    given = arguments.parse_args()
+
+    LOGS.mkdir(parents=True, exist_ok=True)
+    numbers = range(1, given.runs + 1)
+    label = "{part}".format if given.runs == 1 else "{part}-{run}".format
+    runner = Runner((part, label(part=part, run=run)) for run in numbers for part in given.parts)
+    workers = [threading.Thread(target=runner.work) for _ in range(given.jobs)]
+    begun = time.monotonic()
+    hogs = load(given.load) if given.load else None
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    try:
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+    finally:
+        runner.stop()
+        if hogs:
+            hogs.terminate()
+            hogs.wait()
+
+    for run in runner.over:
+        for line in run.skipped:
+            print(line)
+    failed = sum(not run.passed for run in runner.over)
+    skipped = sum(run.passed and bool(run.skipped) for run in runner.over)
+    print(f"{time.monotonic() - begun:.0f} s in all; logs are in {LOGS.relative_to(REPOSITORY)}")
+    tail = f", {skipped} skipped" if skipped else ""
+    print(f"{len(runner.over) - failed - skipped} passed, {failed} failed{tail}")
+    sys.exit(bool(failed or given.strict and skipped))
+
+
+if __name__ == "__main__":
+    main()
