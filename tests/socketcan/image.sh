@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes the folder $1 with what the virtual machine boots: `vmlinuz`, Debian's kernel, and
-# `initrd.gz`, an image of busybox, the kernel's CAN modules, iproute2, can-utils, our static
+# `initrd.gz`, an image of busybox, the kernel's CAN modules, iproute2, can-utils, our
 # programs and the checks. Debian's kernel and busybox are unpacked there, never installed.
 # Ends with 77 where the packages cannot be had. SUDO is what makes a command root's.
 set -eu
@@ -8,26 +8,11 @@ tests=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$1"
 made=$(cd "$1" && pwd)
 unpacked=$made/debian
-target=x86_64-unknown-linux-musl
 PATH=$PATH:/usr/sbin:/sbin
 
 unavailable() {
     echo "$1" >&2
     exit 77
-}
-
-is_installed() {
-    [ "$(dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null)" = installed ]
-}
-
-install_packages() {
-    missing=
-    for package in qemu-system-x86 seabios ipxe-qemu kmod cpio iproute2 can-utils; do
-        is_installed $package || missing="$missing $package"
-    done
-    [ "$missing" ] || return 0
-    # shellcheck disable=SC2086
-    $SUDO apt-get update -q && $SUDO apt-get install -q -y --no-install-recommends $missing
 }
 
 # The package $1 into the folder `debian`, without installing it.
@@ -46,21 +31,21 @@ unpack_debian() {
         touch "$unpacked/complete"
 }
 
-command -v apt-get >/dev/null || unavailable "there is no apt-get"
-install_packages >&2 || unavailable "packages cannot be installed"
+"$tests/../install" binutils qemu-system-x86 seabios ipxe-qemu kmod cpio iproute2 can-utils ||
+    unavailable "packages cannot be installed"
+# The lists of packages must not change meanwhile.
+exec 9>"${TMPDIR:-/tmp}/motorlink-apt.lock"
+flock 9
 unpack_debian >&2 || unavailable "Debian's kernel cannot be downloaded"
-rustup target list --installed | grep -qx $target || rustup target add $target >&2 ||
-    unavailable "rustup cannot add the target $target"
-
-# Some optimisation, for an emulated processor; no debugging information, for a small image.
-export CARGO_PROFILE_DEV_OPT_LEVEL=1 CARGO_PROFILE_DEV_DEBUG=0
+exec 9>&-
+# The program and the tests of the port as the other parts of `make test` build them.
 build() {
-    ${CARGO:-cargo} "$@" --locked --target $target --message-format=json-render-diagnostics |
+    ${CARGO:-cargo} "$@" --workspace --all-features --locked --message-format=json-render-diagnostics |
         sed -n 's/.*"executable":"\([^"]*\)".*/\1/p'
 }
-program=$(build build -p motorlink-cli)
+program=$(build build --bin motorlink)
 [ -x "$program" ]
-port=$(build test -p motorlink --features sim --test socketcan --no-run)
+port=$(build test --test socketcan --no-run)
 [ -x "$port" ]
 
 root=$made/root
@@ -73,8 +58,9 @@ cp "$unpacked/$modules"/modules.* "$root/$modules"
 cp -r "$unpacked/$modules/kernel/net/can" "$root/$modules/kernel/net"
 cp -r "$unpacked/$modules/kernel/drivers/net/can" "$root/$modules/kernel/drivers/net"
 depmod -b "$root" "$version"
-cp "$unpacked/bin/busybox" "$program" "$root/bin"
-cp "$port" "$root/tests/port"
+cp "$unpacked/bin/busybox" "$root/bin"
+strip -o "$root/bin/motorlink" "$program"
+strip -o "$root/tests/port" "$port"
 cp "$tests/checks.sh" "$root/tests"
 cp "$tests/init" "$root"
 # busybox prefers its own `ip`: ours is called by its path.
@@ -82,7 +68,7 @@ cp "$(command -v ip)" "$root/sbin"
 for tool in candump cansend slcan_attach; do
     cp "$(command -v $tool)" "$root/bin"
 done
-ldd "$root/sbin/ip" "$root/bin/candump" "$root/bin/cansend" "$root/bin/slcan_attach" |
+ldd "$program" "$port" "$root/sbin/ip" "$root/bin/candump" "$root/bin/cansend" "$root/bin/slcan_attach" |
     grep -o '/[^ ]*\.so[^ ]*' | sort -u | xargs -I {} cp -L --parents {} "$root"
 (cd "$root" && find . | cpio -o -H newc -R 0:0 --quiet | gzip -1) >"$made/initrd.gz"
 cp "$unpacked/boot/vmlinuz-$version" "$made/vmlinuz"
