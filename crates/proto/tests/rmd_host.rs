@@ -340,6 +340,7 @@ impl Standstill {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn a_motor_that_stands_still_and_then_answers_everything_at_once_confuses_nobody() {
     for code in [0x9C, 0x9A] {
         for still in [60, 140, 160, 300, 1_000, 30_000] {

@@ -26,6 +26,7 @@ fn any_frame() -> impl Strategy<Value = CanFrame> {
 
 proptest! {
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_drive_answers_only_its_own_frames_and_only_those_change_it(
         id in 1u8..=32,
         encoder in any::<i64>(),
@@ -88,6 +89,7 @@ proptest! {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn no_frame_ends_an_exchange_but_the_reply_to_it(
         asked in prop::collection::vec((1u8..=32, any::<u8>()), 1..8),
         frames in prop::collection::vec(any_frame(), 0..80),
@@ -118,6 +120,7 @@ proptest! {
 
     /// Replies carry the number of their request; some take longer than the timeout.
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_late_reply_is_never_taken_for_the_reply_to_another_exchange(
         steps in prop::collection::vec((1u8..=4, 0u8..3, 1u64..140, any::<bool>(), 0u64..40), 1..150),
     ) {
@@ -158,6 +161,7 @@ proptest! {
     /// Replies carry the number of their request and keep their order; some are lost, and the motor
     /// may stand still for any time and then answer everything at once.
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_motor_that_stands_still_is_never_taken_for_one_that_answers(
         steps in prop::collection::vec((0u8..2, any::<bool>(), 0u64..40, 0u64..2_000), 1..60),
     ) {

@@ -1,5 +1,8 @@
 //! The wire vectors, both ways.
 
+// An interpreter takes long to read JSON.
+#![cfg(not(miri))]
+
 use motorlink_proto::rmd::*;
 use serde_json::Value;
 

@@ -31,6 +31,7 @@ fn a_payload_over_128_bytes_or_a_short_buffer_is_not_encoded() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn every_header_and_length_parses_as_the_document_says() {
     for header in 0..=255u8 {
         for length in 0..=255u8 {
@@ -62,6 +63,7 @@ fn checksum_by_the_words(bytes: &[u8]) -> u8 {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn every_double_bit_flip_is_refused_or_passes_the_checksum() {
     let frame = encoded(0x22, &[0x1E, 0x00, 0xFF, 0x80]);
     let bits = frame.len() * 8;

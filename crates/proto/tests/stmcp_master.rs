@@ -239,6 +239,7 @@ fn a_line_that_never_falls_silent_is_given_up() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn padding_brings_back_shipped_firmware_from_every_cut() {
     let write = Request::SetRegister { register: RegisterId::SPEED_KP, value: &[0x10, 0x00] };
     let start = Request::Execute(Command::StartMotor);
@@ -340,6 +341,7 @@ fn no_bit_flip_of_a_request_puts_the_line_off_by_one() {
 
 proptest! {
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_late_reply_is_never_taken_for_another_exchanges(
         delays in proptest::collection::vec(0u32..2_000, 1..40),
         pad in any::<bool>(),
@@ -390,6 +392,7 @@ proptest! {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_drive_that_was_stopped_and_answers_everything_at_once_confuses_nobody(
         stops in proptest::collection::vec(0u32..9_000, 1..10),
     ) {

@@ -142,6 +142,7 @@ fn an_overrun_drops_the_frame_and_says_so() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn every_register_is_read_and_written_as_table_3_says() {
     for features in [Features::NONE, all_features()] {
         let mut bench = Bench::new(Profile::Spec, 1, Memory::with(features));

@@ -1,5 +1,8 @@
 //! `vectors/stmcp.json`, each both ways.
 
+// An interpreter takes long to read JSON.
+#![cfg(not(miri))]
+
 use motorlink_proto::stmcp::*;
 use serde_json::Value;
 

@@ -102,6 +102,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn the_circle_angle_is_the_multi_turn_angle_modulo_a_turn() {
         for bits in widths() {
             for counts in (-3_000_000..3_000_000).step_by(9973) {
@@ -112,6 +113,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn an_angle_turned_into_counts_and_back_is_off_by_no_more_than_a_count() {
         for bits in widths() {
             let count = 36_000 / (1 << bits.bits()) + 1;
