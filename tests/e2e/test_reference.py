@@ -117,6 +117,8 @@ def test_every_preset_is_compared(plants):
     assert list(plants) == MOTORS
 
 
+# Enough to see a deviation of TOLERANCE.
+ROUGH = 1e-5
 # A thousandth of what acts on these motors: one percent of it is nothing that could be noticed.
 FAINT = {"viscous_friction", "iron_eddy"}
 
@@ -132,8 +134,10 @@ def test_a_parameter_that_is_one_percent_off_is_noticed(simulate, plants, parame
     else:
         wrong = value * (2.0 if parameter in FAINT else 1.01)
     motor = replace(right, **{parameter: wrong})
-    worst = {}
-    for name, experiment in experiments(plant).items():
+
+    def deviation(name, experiment):
         times, *rows = simulate("rmd-l-5005", name)
-        worst[name] = deviations(np.array(rows), solve(motor, experiment, times)).max()
-    assert max(worst.values()) > TOLERANCE, worst
+        return deviations(np.array(rows), solve(motor, experiment, times, ROUGH)).max()
+
+    # The first experiment that shows it ends the search.
+    assert any(deviation(*each) > TOLERANCE for each in experiments(plant).items())
