@@ -4,6 +4,7 @@
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use motorlink::rmd::{self, Bus};
@@ -12,6 +13,8 @@ use rustix::process::{Pid, Signal, kill_process};
 
 /// How long a drive stands still.
 const PAUSES: [u64; 6] = [100, 300, 900, 1_500, 2_500, 5_000];
+/// The longest that an exchange of either protocol waits for its reply.
+const TIMEOUT: Duration = Duration::from_secs(1);
 /// docs/HOST-FAULTS.md says when a client is back; a loaded machine is given this much more.
 const MACHINE: Duration = Duration::from_secs(5);
 
@@ -23,7 +26,9 @@ struct Drive {
 
 impl Drive {
     fn new(kind: &str, scheme: &str) -> Self {
-        let name = format!("motorlink-stopped-{}-{}", kind.trim_matches('-'), std::process::id());
+        static DRIVES: AtomicU32 = AtomicU32::new(0);
+        let number = DRIVES.fetch_add(1, Ordering::Relaxed);
+        let name = format!("motorlink-stopped-{}-{number}", std::process::id());
         let link: PathBuf = std::env::temp_dir().join(name);
         let mut process = Command::new(env!("CARGO_BIN_EXE_motorlink"))
             .args(["sim", kind, &format!("{scheme}:{}", link.display())])
@@ -43,28 +48,41 @@ impl Drive {
     }
 
     /// Has `exchange` compare what it writes and reads, again and again, while the drive stands
-    /// still for each of the pauses; `stated` is how long after that a client may need.
-    fn stand_still(&self, stated: Duration, mut exchange: impl FnMut() -> Result<(), String>) {
-        let mut failures = 0;
-        for pause in PAUSES.map(Duration::from_millis) {
-            for _ in 0..20 {
-                exchange().expect("nothing is wrong");
-            }
-            self.signal(Signal::STOP);
-            let stopped = Instant::now();
-            while stopped.elapsed() < pause {
-                failures += u32::from(exchange().is_err());
-            }
-            self.signal(Signal::CONT);
-            let continued = Instant::now();
-            while exchange().is_err() {
-                let waited = continued.elapsed();
-                assert!(waited < stated + MACHINE, "not back {waited:?} after {pause:?}");
-            }
-            println!("{pause:?}: back after {:?}", continued.elapsed());
+    /// still for `pause`; `stated` is how long after that a client may need.
+    fn stand_still(
+        &self,
+        pause: Duration,
+        stated: Duration,
+        mut exchange: impl FnMut() -> Result<(), String>,
+    ) {
+        for _ in 0..20 {
+            exchange().expect("nothing is wrong");
         }
-        assert!(failures > 0, "a drive that stands still does not answer");
+        self.signal(Signal::STOP);
+        let stopped = Instant::now();
+        let mut failures = 0;
+        while stopped.elapsed() < pause {
+            failures += u32::from(exchange().is_err());
+        }
+        assert!(failures > 0 || pause <= TIMEOUT, "a drive that stands still does not answer");
+        self.signal(Signal::CONT);
+        let continued = Instant::now();
+        while exchange().is_err() {
+            let waited = continued.elapsed();
+            assert!(waited < stated + MACHINE, "not back {waited:?} after {pause:?}");
+        }
+        println!("{pause:?}: back after {:?}", continued.elapsed());
     }
+}
+
+/// Has a drive of its own stand still for each of the pauses, at once: `test` is given the pause.
+fn for_each_pause(test: impl Fn(Duration) + Sync) {
+    std::thread::scope(|scope| {
+        for pause in PAUSES.map(Duration::from_millis) {
+            let test = &test;
+            scope.spawn(move || test(pause));
+        }
+    });
 }
 
 impl Drop for Drive {
@@ -76,12 +94,16 @@ impl Drop for Drive {
 
 #[test]
 fn an_st_drive_that_stood_still_confuses_nobody() {
+    for_each_pause(st_stands_still);
+}
+
+fn st_stands_still(pause: Duration) {
     let drive = Drive::new("--st", "pty");
     let client = Client::open(&drive.port.parse().expect("a port"), stmcp::Options::default());
     let client = client.expect("opened");
     let motor = client.motor(1).expect("a motor");
     let mut number = 0i16;
-    drive.stand_still(Duration::from_secs(3), || {
+    drive.stand_still(pause, Duration::from_secs(3), || {
         number = number.wrapping_add(1);
         // Both are asked in any case, so that replies of either kind wait.
         let written = motor.write(register::SPEED_KP, number);
@@ -94,11 +116,15 @@ fn an_st_drive_that_stood_still_confuses_nobody() {
 
 #[test]
 fn rmd_motors_that_stood_still_confuse_nobody() {
+    for_each_pause(rmd_stands_still);
+}
+
+fn rmd_stands_still(pause: Duration) {
     let drive = Drive::new("--rmd", "slcan-pty");
     let port = format!("slcan:{}", drive.port).parse().expect("a port");
     let bus = Bus::open(&port, rmd::Options::default()).expect("opened");
     let mut number = 0;
-    drive.stand_still(Duration::from_secs(1), || {
+    drive.stand_still(pause, Duration::from_secs(1), || {
         number += 1;
         for id in 1..=2 {
             let motor = bus.motor(id).expect("an ID");
