@@ -83,7 +83,7 @@ lint: ## format, clippy, rustdoc: no warning
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	cd fuzz && $(CARGO) fmt --check && $(CARGO) clippy --all-targets --locked $(FUZZ_TARGET) -- -D warnings
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked --quiet
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked
 
 # That the header is up to date is a test of unit.
 ffi-test: ## the C face: sanitizers, valgrind, C against the program
@@ -91,7 +91,7 @@ ffi-test: ## the C face: sanitizers, valgrind, C against the program
 	CARGO="$(CARGO)" SUDO="$(SUDO)" crates/ffi/tests/c/run $(DEBUG)/motorlink || [ $$? -eq 77 ]
 
 fuzz-replay: ## fuzz targets with their seeds and with what fuzzing found
-	cd fuzz && $(CARGO) test --locked --quiet $(FUZZ_TARGET) $(T)
+	cd fuzz && $(CARGO) test --locked $(FUZZ_TARGET) $(T)
 
 test-socketcan: ## the port socketcan: in Debian's kernel in QEMU, against can-utils
 	CARGO="$(CARGO)" SUDO="$(SUDO)" tests/socketcan/run.sh || [ $$? -eq 77 ]

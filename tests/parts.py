@@ -43,6 +43,9 @@ class Run:
         self.seconds = time.monotonic() - self.begun
         self.output = self.log.read_text(errors="replace")
         self.tests = sum(map(int, re.findall(r"\b(\d+) passed", self.output)))
+        # As cargo says it.
+        compiled = re.findall(r"^ *Finished .* in (?:(\d+)m )?([\d.]+)s$", self.output, re.M)
+        self.compiled = sum(60 * int(m or 0) + float(s) for m, s in compiled)
         self.skipped = re.findall(r"^SKIPPED.*", self.output, re.M)
 
     def end(self):
@@ -54,7 +57,8 @@ class Run:
     def __str__(self):
         verdict = "FAILED" if not self.passed else "skipped" if self.skipped else "passed"
         tests = f"{self.tests} tests" if self.tests else ""
-        return f"{self.label:18} {verdict:8} {self.seconds:5.0f} s  {tests}".rstrip()
+        compiled = f"{self.compiled:.0f} s of it cargo compiled" if self.compiled > 1 else ""
+        return f"{self.label:18} {verdict:8} {self.seconds:5.0f} s  {tests:11} {compiled}".rstrip()
 
 
 class Runner:

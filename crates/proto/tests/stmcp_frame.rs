@@ -99,6 +99,7 @@ proptest! {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn noise_never_panics_and_25_ms_of_silence_bring_the_slave_back(
         noise in proptest::collection::vec((any::<u8>(), 0u64..40_000), 0..400),
     ) {

@@ -364,6 +364,7 @@ proptest! {
 
     /// Also where requests are answered with what recovery's questions are answered with.
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn a_late_reply_is_never_taken_for_another_kinds(
         steps in proptest::collection::vec((0u32..2_000, 0usize..5), 1..40),
         pad in any::<bool>(),
@@ -415,6 +416,7 @@ proptest! {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn noise_never_panics_and_an_exchange_always_ends(
         chunks in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..40), 1..60),
         pad in any::<bool>(),

@@ -43,6 +43,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 
 proptest! {
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn any_sequence_is_answered_as_the_model_does(motors in 1..=7u8, steps in steps()) {
         for profile in PROFILES {
             let mut twins = Twins::new(profile, motors);
