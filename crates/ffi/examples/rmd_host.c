@@ -95,6 +95,8 @@ int main(int argc, char **argv) {
   fd = open_line(argv[1]);
   check(fd, motorlink_slcan_host_init(&adapter, sizeof adapter));
   check(fd, motorlink_rmd_host_init(&host, sizeof host));
+  /* A motor answers within some milliseconds; a computer with other work may notice it much later. */
+  check(fd, motorlink_rmd_host_set_times(&host, 1000000U, 100000U));
   check(fd, motorlink_slcan_open(1000000, &line));
   send_line(fd, &line);
   hear(fd, now_us() + 100000U);
