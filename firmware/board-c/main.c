@@ -294,8 +294,9 @@ int main(void)
     port_start(&rmd_port);
     NVIC_ISER1 = 1u << (USART1_IRQ - 32) | 1u << (USART2_IRQ - 32);
     for (;;) {
+        bool reached = plant_advance(motors, now_us()) != 0;
+        /* Bytes may have come while the motors advanced: their time is not the one before. */
         now = now_us();
-        bool reached = plant_advance(motors, now) != 0;
         st_serve(now);
         rmd_serve(now);
         if (reached) {

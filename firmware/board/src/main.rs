@@ -45,8 +45,9 @@ fn main() -> ! {
         unsafe { NVIC::unmask(interrupt) };
     }
     loop {
+        let caught_up = plant.advance(clock.now());
+        // Bytes may have come while the motors advanced: their time is not the one before.
         let now = clock.now();
-        let caught_up = plant.advance(now);
         // An error is an overrun, which the ports have answered for.
         let _ = st.poll(now, &mut plant.st);
         rmd.can_mut().set_time(now);
