@@ -6,6 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
+use motorlink::Clock;
+
 use crate::output::note;
 
 /// Exit code of a program that a signal ended.
@@ -39,6 +41,15 @@ pub fn take_over() {
 /// Whether a signal came.
 pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::SeqCst)
+}
+
+/// As [`wait`], by a port's clock, which may be virtual.
+pub fn wait_by(clock: &Clock, time: Duration) -> bool {
+    if !clock.stands() {
+        return wait(time);
+    }
+    clock.wait(clock.now() + time.into());
+    !interrupted()
 }
 
 /// Waits; `false` when a signal ended the wait or came before.

@@ -1,6 +1,8 @@
 //! Reading again and again, through losses of the line.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use motorlink::Clock;
 
 use crate::failure::Failure;
 use crate::interrupt;
@@ -18,25 +20,27 @@ pub struct Repeat {
 }
 
 /// Prints samples once, or again and again with the seconds since the first: then a line that fails
-/// is waited for.
+/// is waited for. `clock` is the port's.
 pub fn repeated<T>(
+    clock: &Clock,
     repeat: Repeat,
     mut sample: impl FnMut() -> Result<Vec<T>, Failure>,
     print: impl Fn(&[T], Option<f64>) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let Some(every) = repeat.every else { return print(&sample()?, None) };
-    let began = Instant::now();
+    let began = clock.now();
     interrupt::take_over();
     let mut trouble = None;
     let mut left = repeat.count.unwrap_or(u64::MAX);
-    let mut due = began;
+    let elapsed = || Duration::from(clock.now().since(began));
+    let mut due = Duration::ZERO;
     while left > 0 && !interrupt::interrupted() {
         match sample() {
             Ok(samples) => {
                 if let Some(over) = trouble.take() {
                     note(over);
                 }
-                print(&samples, Some(began.elapsed().as_secs_f64()))?;
+                print(&samples, Some(elapsed().as_secs_f64()))?;
                 left -= 1;
             }
             Err(Failure::Line(message)) if trouble.is_none() => {
@@ -51,11 +55,14 @@ pub fn repeated<T>(
             Err(other) => return Err(other),
         }
         // A slow line skips readings rather than falling behind.
-        let now = Instant::now();
+        let now = elapsed();
         while due <= now {
             due += every;
         }
-        if left > 0 {
+        if left > 0 && trouble.is_none() {
+            interrupt::wait_by(clock, due - now);
+        } else if left > 0 {
+            // The clock of a port that is lost may be virtual, and its return takes real time.
             interrupt::wait(due - now);
         }
     }

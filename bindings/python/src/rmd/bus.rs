@@ -59,7 +59,8 @@ impl RmdBus {
                 let wrap = move |link| Box::new(deaf.around(link)) as Box<dyn CanLink>;
                 let bus = py.detach(|| Bus::open_wrapped(&name, wrap, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
-                (bus, name.to_string(), Clock::running())
+                let clock = bus.clock();
+                (bus, name.to_string(), clock)
             }
             AnyPort::Other(Port::Sim(port)) => {
                 let bus = Bus::over(SimPort::NAME, port.can(py)?, options);

@@ -53,7 +53,8 @@ impl StClient {
                 let wrap = move |link| Box::new(deaf.around(link)) as Box<dyn ByteLink>;
                 let client = py.detach(|| Client::open_wrapped(&name, wrap, options));
                 let client = client.map_err(|error| st_error(py, &error))?;
-                (client, name.to_string(), Clock::running())
+                let clock = client.clock();
+                (client, name.to_string(), clock)
             }
             Port::Sim(port) => {
                 let client = Client::over(SimPort::NAME, port.line(py)?, options);

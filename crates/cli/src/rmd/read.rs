@@ -82,6 +82,7 @@ fn show(
     mut sample: impl FnMut(&Session) -> Result<Vec<Row>, Failure>,
 ) -> Result<(), Failure> {
     repeated(
+        &session.bus.clock(),
         repeat,
         || sample(session),
         |rows, at| match at {

@@ -1,11 +1,12 @@
 //! Commands that change something in the drive.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use motorlink::stmcp::{
     Command as Execute, Flags, Profile, REVUP_PHASES, RevupPhase, Status, VERIFY_ATTEMPTS,
     find_register, parse_value,
 };
+use motorlink::time;
 use serde_json::json;
 
 use super::Session;
@@ -105,19 +106,23 @@ fn start(session: &Session) -> Result<(), Failure> {
     }
 }
 
+/// How long the state machine may take to follow FAULT_ACK.
+const ACKNOWLEDGED_WITHIN: time::Duration = time::Duration::from_millis(200);
+
 /// As with START, an acknowledged FAULT_ACK may have had no effect. The state machine takes a
 /// moment to follow.
 fn acknowledge(session: &Session) -> Result<(), Failure> {
     let motor = session.motor()?;
     motor.acknowledge_faults()?;
-    let give_up = Instant::now() + Duration::from_millis(200);
+    let clock = session.client.clock();
+    let give_up = clock.now() + ACKNOWLEDGED_WITHIN;
     loop {
         let faults = motor.faults()?;
         if faults == Flags::default() {
             let text = format!("{}: no faults", motor.number());
             return session.output.result(text, json!({ "ok": true, "FLAGS": 0 }));
         }
-        if Instant::now() > give_up || !interrupt::wait(Duration::from_millis(10)) {
+        if clock.now() > give_up || !interrupt::wait_by(&clock, Duration::from_millis(10)) {
             let why = explain(faults);
             return Err(Failure::Refused(format!("{} keeps its faults: {why}", motor.number())));
         }

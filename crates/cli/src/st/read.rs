@@ -97,6 +97,7 @@ pub fn explain(flags: Flags) -> String {
 pub fn get(session: &Session, names: &[String], repeat: Repeat) -> Result<(), Failure> {
     let registers = find_all(names)?;
     repeated(
+        &session.client.clock(),
         repeat,
         || registers.iter().map(|&register| read(session, register)).collect(),
         |readings, at| print(session, readings, at),
@@ -125,7 +126,9 @@ pub fn segment(
         let read = registers.iter().zip(values);
         Ok(read.map(|(&register, bits)| Reading { register, bits, profile }).collect())
     };
-    repeated(repeat, &mut sample, |readings, at| print(session, readings, at))
+    repeated(&session.client.clock(), repeat, &mut sample, |readings, at| {
+        print(session, readings, at)
+    })
 }
 
 fn find_all(names: &[String]) -> Result<Vec<RegisterId>, Failure> {

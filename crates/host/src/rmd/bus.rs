@@ -12,6 +12,7 @@ use motorlink_proto::time;
 
 use super::session::{Output, Session};
 use super::{Error, Guard, MotorHandle, OnDrop};
+use crate::Clock;
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{CanLink, PortError, PortName};
 
@@ -118,6 +119,11 @@ impl Bus {
     pub(super) fn driving(driven: Driven<Box<dyn CanLink>>) -> Self {
         let sign = driven.port.sign();
         Bus { driven: Mutex::new(driven), sign }
+    }
+
+    /// The clock that the port goes by: the machine's, or that of drives on a time of their own.
+    pub fn clock(&self) -> Clock {
+        self.lock().port.clock()
     }
 
     /// Whether the port is open. Never waits, not even while another thread opens it.

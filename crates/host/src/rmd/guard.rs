@@ -83,7 +83,8 @@ impl<'a> Guard<'a> {
             let last = attempt == STOP_ATTEMPTS;
             stopped.extend(outcomes.filter(|one| last || one.result.is_ok()));
             if !self.bus.link_state().await_retry() && !self.bus.moving().is_empty() {
-                std::thread::sleep(self.bus.guard_time());
+                let clock = self.bus.clock();
+                clock.wait(clock.now() + self.bus.guard_time().into());
             }
         }
         stopped

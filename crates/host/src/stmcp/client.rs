@@ -12,6 +12,7 @@ use motorlink_proto::time::{self, Instant};
 use super::session::{Rules, Session};
 use super::started::Started;
 use super::{Error, Guard, Limits, MotorHandle};
+use crate::Clock;
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{ByteLink, LineName, PortError, PortName};
 use crate::text::printable;
@@ -136,6 +137,11 @@ impl Client {
     /// Whether the port is open. Never waits, not even while another thread opens it.
     pub fn link_state(&self) -> LinkState {
         self.sign.state()
+    }
+
+    /// The clock that the port goes by: the machine's, or that of drives on a time of their own.
+    pub fn clock(&self) -> Clock {
+        self.lock().port.clock()
     }
 
     /// Whether the last exchange ended in step.
