@@ -15,6 +15,7 @@ const PORTS: &[&str] = &[
     "serial:/dev/ttyACM0?baud=1843200",
     "tcp:drive.local:4000",
     "tcp:[::1]:4000",
+    "tcp:h:1?clock=h:3",
     "slcan:/dev/ttyACM0?bitrate=1000000&baud=115200&echo=1",
     "slcan:tcp:h:1?bitrate=500000",
     "slcan:serial:serial:x?echo=0",

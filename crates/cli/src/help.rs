@@ -16,6 +16,7 @@ pub const ST_PORTS: &str = "\
 Ports:
   /dev/ttyACM0, serial:/dev/ttyUSB0?baud=115200   a UART
   tcp:HOST:PORT                                   a serial line behind a TCP server
+  tcp:HOST:PORT?clock=HOST:PORT                   the same on the time of an emulated board
   sim:, sim:bench.toml                            simulated drives inside this process
 MOTORLINK_PORT names the port where -p does not.
 --fault damages what passes the port, both ways unless only=sent or only=received:
@@ -34,7 +35,8 @@ Ports:
   slcan:tcp:HOST:PORT                  the same behind a TCP server
   socketcan:can0                       a CAN interface of Linux
   sim:, sim:bench.toml                 simulated motors inside this process
-Behind slcan ports: baud=RATE for the adapter's own line, echo=1 if it sends back what it is sent.
+Behind slcan ports: baud=RATE for the adapter's own line, echo=1 if it sends back what it is sent,
+clock=HOST:PORT for the time of an emulated board.
 MOTORLINK_PORT names the port where -p does not.
 --fault damages what passes the port, both ways unless only=sent or only=received:
   flip=RATE drop=RATE dup=RATE insert=RATE   a bit wrong, a frame lost, twice, or from nowhere

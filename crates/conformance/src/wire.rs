@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
-use std::time;
 
+use motorlink::Clock;
 use motorlink::port::{ByteLink, CanLink, PortError};
 use motorlink::serve::{ByteStation, CanStation};
 use motorlink_proto::rmd::CanFrame;
@@ -35,26 +35,29 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
 }
 
-/// A port of this machine, with its clock.
+/// A port of this machine, and the clock that it goes by.
 pub struct Real<L> {
     link: L,
-    began: time::Instant,
+    clock: Clock,
 }
 
-impl<L> Real<L> {
-    /// Speaks through an open port; its time begins now.
-    pub fn new(link: L) -> Self {
-        Real { link, began: time::Instant::now() }
+impl<L: ByteLink> Real<L> {
+    /// Speaks through an open line.
+    pub fn on_line(link: L) -> Self {
+        Real { clock: link.clock().unwrap_or_default(), link }
     }
+}
 
-    fn moment(&self) -> Instant {
-        Instant(self.began.elapsed().as_micros() as u64)
+impl<L: CanLink> Real<L> {
+    /// Speaks through an open bus.
+    pub fn on_bus(link: L) -> Self {
+        Real { clock: link.clock().unwrap_or_default(), link }
     }
 }
 
 impl<L: ByteLink> Line for Real<L> {
     fn now(&self) -> Instant {
-        self.moment()
+        self.clock.now()
     }
 
     fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
@@ -63,7 +66,7 @@ impl<L: ByteLink> Line for Real<L> {
 
     fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
         let mut buffer = [0; 256];
-        let wait = until.since(self.moment()).into();
+        let wait = until.since(self.clock.now()).into();
         let size = self.link.read(&mut buffer, Some(wait))?;
         Ok(buffer[..size].to_vec())
     }
@@ -71,7 +74,7 @@ impl<L: ByteLink> Line for Real<L> {
 
 impl<L: CanLink> Bus for Real<L> {
     fn now(&self) -> Instant {
-        self.moment()
+        self.clock.now()
     }
 
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
@@ -79,7 +82,7 @@ impl<L: CanLink> Bus for Real<L> {
     }
 
     fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
-        let wait = until.since(self.moment()).into();
+        let wait = until.since(self.clock.now()).into();
         self.link.receive(Some(wait))
     }
 }

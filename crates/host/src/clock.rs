@@ -1,7 +1,7 @@
 //! Time that follows the machine's, or stands still until somebody waits.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant as Moment;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::time::{Duration as Span, Instant as Moment};
 
 use motorlink_proto::time::{Duration, Instant};
 
@@ -69,8 +69,32 @@ impl Clock {
         std::thread::sleep(left.into());
     }
 
+    /// The end of a wait that begins now; `None` is without limit.
+    pub(crate) fn end_of(&self, timeout: Option<Span>) -> Option<Instant> {
+        timeout.map(|timeout| self.now() + timeout.into())
+    }
+
+    /// What is left until [`end_of`](Self::end_of) a wait: `None` is without limit, zero is over.
+    pub(crate) fn left(&self, end: Option<Instant>) -> Option<Span> {
+        end.map(|end| end.since(self.now()).into())
+    }
+
+    pub(crate) fn downgrade(&self) -> WeakClock {
+        WeakClock(Arc::downgrade(&self.0))
+    }
+
     fn lock(&self) -> MutexGuard<'_, Pace> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A clock as long as somebody else has it.
+#[derive(Debug)]
+pub(crate) struct WeakClock(Weak<Mutex<Pace>>);
+
+impl WeakClock {
+    pub(crate) fn upgrade(&self) -> Option<Clock> {
+        self.0.upgrade().map(Clock)
     }
 }
 

@@ -239,3 +239,16 @@ fn a_motor_whose_exchange_was_given_up_is_waited_for() {
         assert_eq!(Code::from(result.unwrap()[0]), Code::from(code), "{motor}");
     }
 }
+
+#[test]
+fn a_line_on_a_boards_time_is_refused_before_it_is_opened() {
+    for name in ["tcp:127.0.0.1:1?clock=127.0.0.1:2", "slcan:tcp:127.0.0.1:1?clock=127.0.0.1:2"] {
+        let port: PortName = name.parse().unwrap();
+        let error = match name.starts_with("slcan") {
+            true => port.open_event_can().err(),
+            false => port.open_event_line().err(),
+        };
+        assert!(matches!(error, Some(PortError::Emulated { .. })), "{error:?}");
+        assert!(error.unwrap().to_string().contains("leave out `clock=`"));
+    }
+}

@@ -32,7 +32,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let byte_time = byte_time(&name);
             let options = st::Options { profile, motor, allowed: run.allowed(), byte_time };
             let world = Box::new(Commands::new(&run));
-            let bench = st::Bench::new(Box::new(Real::new(link)), world, options);
+            let bench = st::Bench::new(Box::new(Real::on_line(link)), world, options);
             interrupt::take_over();
             conduct("st", &run, st::suite(profile), bench)
         }
@@ -42,7 +42,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             allowed.extend(write_rom.then_some(Need::Rom));
             let options = rmd::Options { id, encoder, allowed };
             let world = Box::new(Commands::new(&run));
-            let bench = rmd::Bench::new(Box::new(Real::new(link)), world, options);
+            let bench = rmd::Bench::new(Box::new(Real::on_bus(link)), world, options);
             interrupt::take_over();
             conduct("rmd", &run, rmd::suite(), bench)
         }

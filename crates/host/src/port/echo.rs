@@ -1,15 +1,17 @@
 //! For adapters that send back what they transmit.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use motorlink_proto::rmd::{CanFrame, MotorId};
+use motorlink_proto::time::{self, Instant};
 
-use super::{CanLink, Deadline, PortError};
+use super::{CanLink, PortError};
+use crate::Clock;
 
 /// How many sent frames wait for their echo: a cycle over every motor, and 0x280.
 const WAITING: usize = MotorId::COUNT + 1;
 /// An echo that has not come by then does not come; an equal frame is a motor's reply.
-const PATIENCE: Duration = Duration::from_millis(100);
+const PATIENCE: time::Duration = time::Duration::from_millis(100);
 
 /// Leaves out the first received frame that is identical to each sent one.
 ///
@@ -17,13 +19,14 @@ const PATIENCE: Duration = Duration::from_millis(100);
 #[derive(Debug)]
 pub struct EchoCanceller<C> {
     link: C,
+    clock: Clock,
     expected: [Option<(CanFrame, Instant)>; WAITING],
 }
 
 impl<C: CanLink> EchoCanceller<C> {
     /// Wraps `link`.
     pub fn new(link: C) -> Self {
-        EchoCanceller { link, expected: [None; WAITING] }
+        EchoCanceller { clock: link.clock().unwrap_or_default(), link, expected: [None; WAITING] }
     }
 
     pub(super) fn link(&self) -> &C {
@@ -36,10 +39,10 @@ impl<C: CanLink> EchoCanceller<C> {
 
     /// Strikes `frame` off the expected echoes.
     fn is_echo(&mut self, frame: &CanFrame) -> bool {
-        let now = Instant::now();
+        let now = self.clock.now();
         for slot in &mut self.expected {
             match slot {
-                Some((_, sent)) if now.duration_since(*sent) > PATIENCE => *slot = None,
+                Some((_, sent)) if now.since(*sent) > PATIENCE => *slot = None,
                 Some((expected, _)) if expected == frame => {
                     *slot = None;
                     return true;
@@ -56,19 +59,23 @@ impl<C: CanLink> CanLink for EchoCanceller<C> {
         self.link.send(frame)?;
         // A free place, or else the oldest: `None` is less than any `Some`.
         if let Some(slot) = self.expected.iter_mut().min_by_key(|slot| slot.map(|(_, sent)| sent)) {
-            *slot = Some((*frame, Instant::now()));
+            *slot = Some((*frame, self.clock.now()));
         }
         Ok(())
     }
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        let deadline = Deadline::after(timeout);
+        let end = self.clock.end_of(timeout);
         loop {
-            match self.link.receive(deadline.remaining())? {
+            match self.link.receive(self.clock.left(end))? {
                 Some(frame) if self.is_echo(&frame) => {}
                 other => return Ok(other),
             }
         }
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.link.clock()
     }
 }
 

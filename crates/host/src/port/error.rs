@@ -3,6 +3,7 @@
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+use std::time::Duration;
 
 use rustix::io::Errno;
 
@@ -103,6 +104,26 @@ pub enum PortError {
         port: String,
         /// What to look at.
         hint: &'static str,
+    },
+    /// The clock port of an emulated board does not answer.
+    #[error(
+        "`{port}`: the board's clock did not answer within {after:?}: does the emulator run, is this \
+         its clock port, and is no other program connected to that?"
+    )]
+    ClockStopped {
+        /// The clock port.
+        port: String,
+        /// How long an answer was awaited.
+        after: Duration,
+    },
+    /// The time of this port is that of an emulated board, and its user needs the machine's.
+    #[error(
+        "`{port}` goes by the time of an emulated board, and event loops and guards go by the \
+         machine's: leave out `clock=`, or use a blocking client"
+    )]
+    Emulated {
+        /// The port.
+        port: String,
     },
     /// This kernel has no CAN at all.
     #[error(

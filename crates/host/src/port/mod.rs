@@ -5,6 +5,7 @@
 //! and one to receive.
 
 mod echo;
+mod emulated;
 mod error;
 mod event;
 mod fault;
@@ -22,13 +23,14 @@ use std::time::{Duration, Instant};
 use motorlink_proto::rmd::CanFrame;
 
 use crate::Clock;
+use emulated::EmulatedLine;
 
 pub use echo::EchoCanceller;
 pub use error::PortError;
 pub use event::{EventCan, EventLine, Evented};
 pub use fault::{FaultBytes, FaultCan};
 pub use fd::FdLink;
-pub use name::{DEFAULT_BAUD, LineName, NameError, PortName, ServeName};
+pub use name::{DEFAULT_BAUD, LineName, NameError, PortName, ServeName, TcpAddress};
 pub use slcan::SlcanLink;
 pub use socketcan::SocketCanLink;
 pub use tap::{Direction, TapBytes, TapCan};
@@ -103,7 +105,7 @@ impl PortName {
     /// Opens the port as a serial line.
     pub fn open_line(&self) -> Result<Box<dyn ByteLink>, PortError> {
         match self {
-            PortName::Line(line) => Ok(Box::new(line.open()?)),
+            PortName::Line(line) => line.open_blocking(),
             #[cfg(feature = "sim")]
             PortName::Sim(config) => Ok(Box::new(crate::sim::open_line(config.as_deref())?)),
             other => Err(other.no_line()),
@@ -114,7 +116,7 @@ impl PortName {
     pub fn open_can(&self) -> Result<Box<dyn CanLink>, PortError> {
         match self {
             PortName::Slcan { line, bitrate, echo } => {
-                let link = SlcanLink::open(line.open()?, line.label(), *bitrate)?;
+                let link = SlcanLink::open(line.open_blocking()?, line.label(), *bitrate)?;
                 Ok(if *echo { Box::new(EchoCanceller::new(link)) } else { Box::new(link) })
             }
             PortName::SocketCan(interface) => Ok(Box::new(SocketCanLink::open(interface)?)),
@@ -144,12 +146,27 @@ impl PortName {
 }
 
 impl LineName {
-    /// Opens the line.
+    /// Opens the line. Its time is the machine's: a line on the time of an emulated board is refused.
     pub fn open(&self) -> Result<FdLink, PortError> {
         match self {
             LineName::Serial { path, baud } => serial::open(path, *baud),
-            LineName::Tcp { host, port } => tcp::open(host, *port, self.label()),
+            LineName::Tcp { address, clock: None } => tcp::open(address, self.label()),
+            LineName::Tcp { clock: Some(_), .. } => {
+                Err(PortError::Emulated { port: self.to_string() })
+            }
         }
+    }
+
+    /// Opens the line, whatever its time is.
+    fn open_blocking(&self) -> Result<Box<dyn ByteLink>, PortError> {
+        let LineName::Tcp { address, clock: Some(clock) } = self else {
+            return Ok(Box::new(self.open()?));
+        };
+        // The clock first: who has that has the board.
+        let name = format!("clock={clock}");
+        let board = tcp::open(clock, name.clone())?;
+        let data = tcp::open(address, self.label())?;
+        Ok(Box::new(EmulatedLine::new(data, board, name)?))
     }
 
     /// The same line at another baud rate, for a scan: drop the open one first. `None` when this
@@ -182,10 +199,5 @@ impl Deadline {
     /// What is left: `None` is without limit, zero is over.
     fn remaining(self) -> Option<Duration> {
         self.0.map(|end| end.saturating_duration_since(Instant::now()))
-    }
-
-    /// Whether it was over `span` ago.
-    fn is_over_since(self, span: Duration) -> bool {
-        self.0.is_some_and(|end| end.elapsed() > span)
     }
 }

@@ -19,7 +19,8 @@ pub const DEFAULT_BAUD: u32 = 115_200;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum PortName {
-    /// `serial:/dev/ttyACM0?baud=115200`, a bare device path, or `tcp:host:port`.
+    /// `serial:/dev/ttyACM0?baud=115200`, a bare device path, `tcp:host:port`, or
+    /// `tcp:host:port?clock=host:port` on the time of an emulated board.
     Line(LineName),
     /// `slcan:/dev/ttyACM0?bitrate=1000000` or `slcan:tcp:host:port`.
     Slcan {
@@ -48,11 +49,26 @@ pub enum LineName {
     },
     /// A serial line behind a TCP server.
     Tcp {
-        /// Name or address; an IPv6 address stands in brackets.
-        host: String,
-        /// The TCP port.
-        port: u16,
+        /// Where it listens.
+        address: TcpAddress,
+        /// The clock port of the emulated board behind it, whose time is then the line's (`clock=`).
+        clock: Option<TcpAddress>,
     },
+}
+
+/// A host and a TCP port of it.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct TcpAddress {
+    /// Name or address; an IPv6 address stands in brackets.
+    pub host: String,
+    /// The TCP port.
+    pub port: u16,
+}
+
+impl fmt::Display for TcpAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.host, self.port)
+    }
 }
 
 /// A port that the simulator serves.
@@ -123,6 +139,7 @@ pub enum NameError {
 
 const PORT_FORMS: &str = "ports are /dev/ttyACM0, serial:/dev/ttyACM0?baud=115200, tcp:HOST:PORT, \
     slcan:/dev/ttyACM0?bitrate=1000000, slcan:tcp:HOST:PORT, socketcan:can0, sim: and sim:FILE.toml";
+const SLCAN_OPTIONS: &str = "bitrate, echo, on a device baud, and behind TCP clock";
 const SERVE_FORMS: &str =
     "served ports are pty:PATH, slcan-pty:PATH, tcp-listen:ADDR:PORT and socketcan:INTERFACE";
 
@@ -174,7 +191,7 @@ fn parse_slcan(name: &str, rest: &str) -> Result<PortName, NameError> {
             ("echo", "0" | "1") => echo = value == "1",
             ("echo", _) => return Err(bad_option(name, "echo", value, "0 or 1".to_owned())),
             _ if line.set_option(name, key, value)? => {}
-            _ => return Err(unknown_option(name, key, "bitrate, echo and, on a device, baud")),
+            _ => return Err(unknown_option(name, key, SLCAN_OPTIONS)),
         }
     }
     Ok(PortName::Slcan { line, bitrate, echo })
@@ -191,11 +208,8 @@ fn parse_line(name: &str, body: &str) -> Result<Option<LineName>, NameError> {
         return Ok(Some(LineName::serial(path)));
     }
     if let Some(address) = body.strip_prefix("tcp:") {
-        let (host, port) = host_and_port(name, address, "tcp:192.168.1.5:4000")?;
-        if port == 0 {
-            return Err(bad_option(name, "the port", "0", "1 to 65535".to_owned()));
-        }
-        return Ok(Some(LineName::Tcp { host, port }));
+        let address = tcp_address(name, address, "tcp:192.168.1.5:4000")?;
+        return Ok(Some(LineName::Tcp { address, clock: None }));
     }
     let bare = body.starts_with(['/', '.']) || (body.contains("tty") && !body.contains(':'));
     Ok(bare.then(|| LineName::serial(body)))
@@ -211,10 +225,18 @@ impl LineName {
 
     /// Takes an option; false when there is none of that name.
     fn set_option(&mut self, name: &str, key: &str, value: &str) -> Result<bool, NameError> {
-        let (LineName::Serial { baud, .. }, "baud") = (self, key) else { return Ok(false) };
-        *baud = value.parse().ok().filter(|&rate| rate > 0).ok_or_else(|| {
-            bad_option(name, "baud", value, "a number like 9600, 115200 or 1843200".to_owned())
-        })?;
+        match (self, key) {
+            (LineName::Serial { baud, .. }, "baud") => {
+                *baud = value.parse().ok().filter(|&rate| rate > 0).ok_or_else(|| {
+                    let usable = "a number like 9600, 115200 or 1843200".to_owned();
+                    bad_option(name, "baud", value, usable)
+                })?;
+            }
+            (LineName::Tcp { clock, .. }, "clock") => {
+                *clock = Some(tcp_address(name, value, "tcp:127.0.0.1:4000?clock=127.0.0.1:4002")?);
+            }
+            _ => return Ok(false),
+        }
         Ok(true)
     }
 
@@ -222,14 +244,15 @@ impl LineName {
     fn to_body(&self) -> String {
         match self {
             LineName::Serial { path, .. } => format!("serial:{}", path.display()),
-            LineName::Tcp { host, port } => format!("tcp:{host}:{port}"),
+            LineName::Tcp { address, .. } => format!("tcp:{address}"),
         }
     }
 
     /// The option that is not the default.
-    fn baud_option(&self) -> Option<String> {
+    fn option(&self) -> Option<String> {
         match self {
             LineName::Serial { baud, .. } if *baud != DEFAULT_BAUD => Some(format!("baud={baud}")),
+            LineName::Tcp { clock: Some(clock), .. } => Some(format!("clock={clock}")),
             _ => None,
         }
     }
@@ -237,7 +260,7 @@ impl LineName {
     fn options(&self) -> &'static str {
         match self {
             LineName::Serial { .. } => "baud",
-            LineName::Tcp { .. } => "none for tcp",
+            LineName::Tcp { .. } => "clock",
         }
     }
 }
@@ -276,7 +299,7 @@ impl fmt::Display for PortName {
                 if *bitrate != Bitrate::DEFAULT {
                     options.push(format!("bitrate={}", bitrate.bits_per_second()));
                 }
-                options.extend(line.baud_option());
+                options.extend(line.option());
                 options.extend(echo.then(|| "echo=1".to_owned()));
                 let written = line.to_body();
                 let bare = written.strip_prefix("serial:").filter(|path| {
@@ -295,7 +318,7 @@ impl fmt::Display for PortName {
 
 impl fmt::Display for LineName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_with_options(f, &self.to_body(), &Vec::from_iter(self.baud_option()))
+        write_with_options(f, &self.to_body(), &Vec::from_iter(self.option()))
     }
 }
 
@@ -366,6 +389,14 @@ fn host_and_port(
     let host = present(name, host, "a host", example)?;
     let port = port.parse().map_err(|_| lacks("a TCP port from 0 to 65535"))?;
     Ok((host.to_owned(), port))
+}
+
+fn tcp_address(name: &str, address: &str, example: &'static str) -> Result<TcpAddress, NameError> {
+    let (host, port) = host_and_port(name, address, example)?;
+    if port == 0 {
+        return Err(bad_option(name, "the port", "0", "1 to 65535".to_owned()));
+    }
+    Ok(TcpAddress { host, port })
 }
 
 /// The options follow the last `?`, so that a path may contain one.

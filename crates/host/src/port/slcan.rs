@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::time::Instant;
 
-use super::{ByteLink, CanLink, Deadline, PortError};
+use super::{ByteLink, CanLink, PortError};
+use crate::Clock;
 use crate::slcan::{Answer, Bitrate, HostCodec, LONGEST_FRAME, encode};
 
 /// How long an adapter may take to answer a command while it is opened. Many never answer some of
@@ -24,6 +26,7 @@ const REFUSALS: u32 = 2;
 #[derive(Debug)]
 pub struct SlcanLink<B: ByteLink> {
     line: B,
+    clock: Clock,
     codec: HostCodec,
     refused: u64,
     refused_in_a_row: u32,
@@ -46,9 +49,9 @@ impl<B: ByteLink> SlcanLink<B> {
     /// received of a former host.
     pub fn open(line: B, port: impl Into<String>, bitrate: Bitrate) -> Result<Self, PortError> {
         let port = port.into();
-        let codec = HostCodec::default();
+        let (codec, clock) = (HostCodec::default(), line.clock().unwrap_or_default());
         let mut link =
-            SlcanLink { line, codec, refused: 0, refused_in_a_row: 0, port: port.clone() };
+            SlcanLink { line, clock, codec, refused: 0, refused_in_a_row: 0, port: port.clone() };
         // A channel that was open still talks here, and may refuse the empty line.
         let close = link.command(b"\rC\r", 2)?;
         let select = link.command(&bitrate.command(), 1)?;
@@ -77,14 +80,14 @@ impl<B: ByteLink> SlcanLink<B> {
         let before = self.codec.garbage();
         self.line.write(command)?;
         let mut answers = Answers::default();
-        let deadline = Deadline::after(Some(ANSWER_TIMEOUT));
+        let end = self.clock.end_of(Some(ANSWER_TIMEOUT));
         while answers.done + answers.refused < expected {
             match self.codec.answer() {
                 Some(Answer::Done) => answers.done += 1,
                 Some(Answer::Refused) => answers.refused += 1,
                 Some(Answer::Frame(_)) => answers.frames = true,
                 Some(Answer::Info) => {}
-                None if self.fill(deadline)? => {}
+                None if self.fill(end)? => {}
                 None => break,
             }
         }
@@ -95,11 +98,11 @@ impl<B: ByteLink> SlcanLink<B> {
     }
 
     /// Reads more bytes into the codec; false when none came in time, or when they do not end.
-    fn fill(&mut self, deadline: Deadline) -> Result<bool, PortError> {
-        if deadline.is_over_since(BABBLE) {
+    fn fill(&mut self, end: Option<Instant>) -> Result<bool, PortError> {
+        if end.is_some_and(|end| self.clock.now().since(end) > BABBLE.into()) {
             return Ok(false);
         }
-        let len = self.line.read(self.codec.spare(), deadline.remaining())?;
+        let len = self.line.read(self.codec.spare(), self.clock.left(end))?;
         self.codec.filled(len);
         Ok(len > 0)
     }
@@ -129,7 +132,7 @@ impl<B: ByteLink> CanLink for SlcanLink<B> {
     }
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        let deadline = Deadline::after(timeout);
+        let end = self.clock.end_of(timeout);
         loop {
             match self.codec.answer() {
                 Some(Answer::Frame(frame)) => {
@@ -145,10 +148,14 @@ impl<B: ByteLink> CanLink for SlcanLink<B> {
                 }
                 Some(Answer::Done) => self.refused_in_a_row = 0,
                 Some(Answer::Info) => {}
-                None if self.fill(deadline)? => {}
+                None if self.fill(end)? => {}
                 None => return Ok(None),
             }
         }
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.line.clock()
     }
 }
 

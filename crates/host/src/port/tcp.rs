@@ -4,13 +4,13 @@ use std::io;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-use super::{FdLink, PortError};
+use super::{FdLink, PortError, TcpAddress};
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Connects to the first address of `host` that takes the connection.
-pub(super) fn open(host: &str, tcp_port: u16, port: String) -> Result<FdLink, PortError> {
-    let addresses = match (unbracketed(host), tcp_port).to_socket_addrs() {
+/// Connects to the first address of the host that takes the connection. `port` is for messages.
+pub(super) fn open(address: &TcpAddress, port: String) -> Result<FdLink, PortError> {
+    let addresses = match (unbracketed(&address.host), address.port).to_socket_addrs() {
         Ok(addresses) => addresses,
         Err(source) => return Err(PortError::UnknownHost { port, source }),
     };

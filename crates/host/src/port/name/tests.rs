@@ -22,6 +22,9 @@ fn every_form_has_one_spelling_without_what_is_the_default() {
         ("serial:st0", "serial:st0"),
         ("tcp:drive.local:4000", "tcp:drive.local:4000"),
         ("tcp:[::1]:4000", "tcp:[::1]:4000"),
+        ("tcp:h:1?clock=h:3", "tcp:h:1?clock=h:3"),
+        ("tcp:odd?host:1?clock=[::1]:3", "tcp:odd?host:1?clock=[::1]:3"),
+        ("slcan:tcp:h:1?clock=h:3&bitrate=250000", "slcan:tcp:h:1?bitrate=250000&clock=h:3"),
         ("slcan:./can0?bitrate=1000000&baud=115200", "slcan:./can0"),
         ("slcan:can0?baud=2000000", "slcan:can0?baud=2000000"),
         ("slcan:serial:/dev/ttyACM0?bitrate=500000", "slcan:/dev/ttyACM0?bitrate=500000"),
@@ -63,6 +66,11 @@ fn a_name_that_is_wrong_says_how_it_is_right() {
         ("/dev/ttyACM0?baud=0", "baud cannot be `0`"),
         ("/dev/ttyACM0?boud=9600", "unknown option `boud`; there is baud"),
         ("tcp:host:1?baud=9600", "unknown option `baud`"),
+        ("tcp:host:1?clock=5003", "lacks a TCP port; write it like tcp:127.0.0.1:4000?clock="),
+        ("tcp:host:1?clock=", "lacks a TCP port"),
+        ("tcp:host:1?clock=host:0", "the port cannot be `0`"),
+        ("/dev/ttyACM0?clock=host:1", "unknown option `clock`; there is baud"),
+        ("slcan:/dev/ttyACM0?clock=host:1", "unknown option `clock`; there is bitrate, echo"),
         ("slcan:/dev/ttyACM0?bitrate=123", "bitrate cannot be `123`; use 10000, 20000"),
         ("slcan:/dev/ttyACM0?echo=yes", "echo cannot be `yes`"),
     ] {
@@ -79,13 +87,17 @@ fn a_name_that_is_wrong_says_how_it_is_right() {
     }
 }
 
+fn addresses() -> impl Strategy<Value = TcpAddress> {
+    ("[a-z0-9.-]{1,12}|\\[::1\\]", 1..=u16::MAX).prop_map(|(host, port)| TcpAddress { host, port })
+}
+
 fn lines() -> impl Strategy<Value = LineName> {
     let path = prop_oneof!["/[a-zA-Z0-9_./?=&:-]{0,20}", "\\.[a-z/?]{0,9}"];
     prop_oneof![
         (path, 1..=4_000_000_u32)
             .prop_map(|(path, baud)| LineName::Serial { path: path.into(), baud }),
-        ("[a-z0-9.-]{1,12}|\\[::1\\]", 1..=u16::MAX)
-            .prop_map(|(host, port)| LineName::Tcp { host, port }),
+        (addresses(), proptest::option::of(addresses()))
+            .prop_map(|(address, clock)| LineName::Tcp { address, clock }),
     ]
 }
 
