@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /*
  * A board that answers for an ST drive on USART1 and for RMD drives, through slcan, on USART2, with
- * simulated motors behind them: what motorlink.h asks of firmware in C.
+ * simulated motors behind them: what motorlink.h asks of firmware in C. USART3 is the clock port: a
+ * host that steps the board's time.
  *
  * It is for QEMU's netduinoplus2, an STM32F405 without clock control, pins, DMA and CAN: nothing
  * here waits for them. On a real board their set-up comes first, a CAN controller's frames go to the
@@ -20,6 +21,7 @@ typedef struct {
 
 #define USART1 ((usart *)0x40011000)
 #define USART2 ((usart *)0x40004400)
+#define USART3 ((usart *)0x40004800)
 #define USART_SR_ORE (1u << 3)
 #define USART_SR_TXE (1u << 7)
 #define USART_CR1_RE (1u << 2)
@@ -40,37 +42,12 @@ typedef struct {
 #define NVIC_ISER1 (*(volatile uint32_t *)0xE000E104)
 #define USART1_IRQ 37
 #define USART2_IRQ 38
+#define USART3_IRQ 39
 
 /* What SysTick counts in QEMU, and on a board whose clocks are set up. */
 #define CORE_HZ 168000000u
 /* What TIM2 counts in QEMU. On a board it is half of the core's clock. */
 #define TIMER_HZ 1000000000u
-
-/* ---- Time ---- */
-
-static void clock_start(void)
-{
-    TIM2_PSC = TIMER_HZ / 1000000u - 1;
-    TIM2_CR1 = TIM_CR1_CEN;
-    /* Wakes the core each millisecond, for the motors and for deadlines. */
-    SYST_RVR = CORE_HZ / 1000u - 1;
-    SYST_CVR = 0;
-    SYST_CSR = SYST_CSR_ENABLE_TICKINT_CORE;
-}
-
-/* Microseconds since the start. To be asked at least once an hour, or a turn of the counter is
- * missed. */
-static uint64_t now_us(void)
-{
-    static uint32_t high, last;
-    uint32_t low = TIM2_CNT;
-
-    if (low < last) {
-        high++;
-    }
-    last = low;
-    return (uint64_t)high << 32 | low;
-}
 
 /* ---- UARTs: the interrupt fills a ring, the main loop empties it ---- */
 
@@ -86,10 +63,12 @@ typedef struct {
     volatile uint32_t put;   /* only written by the interrupt */
     volatile uint32_t taken; /* only written by the main loop */
     volatile bool lost;      /* set by the interrupt, cleared by the main loop */
+    uint32_t sent;
 } port;
 
 static port st_port = { .regs = USART1 };
 static port rmd_port = { .regs = USART2 };
+static port clock_port = { .regs = USART3 };
 
 static void port_start(port *p)
 {
@@ -119,6 +98,9 @@ void usart1_handler(void) { port_interrupt(&st_port); }
 
 void usart2_handler(void);
 void usart2_handler(void) { port_interrupt(&rmd_port); }
+
+void usart3_handler(void);
+void usart3_handler(void) { port_interrupt(&clock_port); }
 
 static bool port_waits(const port *p) { return p->lost || p->put != p->taken; }
 
@@ -152,6 +134,92 @@ static void port_send(port *p, const uint8_t *bytes, size_t size)
         }
         p->regs->dr = bytes[i];
     }
+    p->sent += (uint32_t)size;
+}
+
+/* ---- Time: that of a timer, or that of a host which steps it ---- */
+
+/* Time advances in ticks of this length once a host steps it. */
+#define TICK_US 100u
+/* The command that asks how many bytes were taken. */
+#define CLOCK_COUNT 0
+
+static struct {
+    bool stepped;         /* by a host, from its first byte on */
+    uint64_t now;         /* while it is stepped, us */
+    uint8_t ticks, done;  /* of the command to advance under way; ticks is 0 while there is none */
+    uint32_t taken, sent; /* on the other ports, up to the last answer */
+} board_clock;
+
+static void clock_start(void)
+{
+    TIM2_PSC = TIMER_HZ / 1000000u - 1;
+    TIM2_CR1 = TIM_CR1_CEN;
+    /* Wakes the core each millisecond, for the motors and for deadlines. */
+    SYST_RVR = CORE_HZ / 1000u - 1;
+    SYST_CVR = 0;
+    SYST_CSR = SYST_CSR_ENABLE_TICKINT_CORE;
+}
+
+/* Microseconds since the start. To be asked at least once an hour, or a turn of the counter is
+ * missed. */
+static uint64_t now_us(void)
+{
+    static uint32_t high, last;
+
+    if (board_clock.stepped) {
+        return board_clock.now;
+    }
+    uint32_t low = TIM2_CNT;
+    if (low < last) {
+        high++;
+    }
+    last = low;
+    return (uint64_t)high << 32 | low;
+}
+
+static void clock_answer(uint8_t answer)
+{
+    board_clock.taken = st_port.taken + rmd_port.taken;
+    board_clock.sent = st_port.sent + rmd_port.sent;
+    port_send(&clock_port, &answer, 1);
+}
+
+/* Obeys the clock port. To be called when everything that is due now is done. Returns whether there
+ * may be more to do at once.
+ *
+ * A command is a byte, and so is its answer. 1 to 255 advances by so many ticks, but no further than
+ * the first tick at whose end bytes have moved on the other ports since the last answer; the answer
+ * is the number of ticks. 0 asks for the number of bytes that the other ports have taken since the
+ * last answer, 255 for more. */
+static bool clock_serve(void)
+{
+    uint32_t taken = st_port.taken + rmd_port.taken - board_clock.taken;
+    uint32_t sent = st_port.sent + rmd_port.sent - board_clock.sent;
+    uint8_t command;
+
+    if (board_clock.ticks != 0) {
+        if (board_clock.done < board_clock.ticks && taken == 0 && sent == 0) {
+            board_clock.now += TICK_US;
+            board_clock.done++;
+        } else {
+            board_clock.ticks = 0;
+            clock_answer(board_clock.done);
+        }
+        return true;
+    }
+    if (!port_take(&clock_port, &command)) {
+        return false;
+    }
+    board_clock.now = now_us();
+    board_clock.stepped = true;
+    if (command == CLOCK_COUNT) {
+        clock_answer(taken < 255 ? (uint8_t)taken : 255);
+    } else {
+        board_clock.ticks = command;
+        board_clock.done = 0;
+    }
+    return true;
 }
 
 /* ---- The ST drive ---- */
@@ -270,12 +338,12 @@ static void rmd_serve(uint64_t now)
 
 /* ---- The board ---- */
 
-/* Waits for an interrupt, unless there is something to do already. One that comes in between is
- * pending, and ends the wait all the same. */
+/* Lets the clock port advance time and otherwise waits for an interrupt, unless there is something
+ * to do already. An interrupt that comes in between is pending, and ends the wait all the same. */
 static void rest(void)
 {
     __asm volatile("cpsid i" ::: "memory");
-    if (!port_waits(&st_port) && !port_waits(&rmd_port)) {
+    if (!port_waits(&st_port) && !port_waits(&rmd_port) && !clock_serve()) {
         __asm volatile("wfi" ::: "memory");
     }
     __asm volatile("cpsie i" ::: "memory");
@@ -292,7 +360,10 @@ int main(void)
     }
     port_start(&st_port);
     port_start(&rmd_port);
-    NVIC_ISER1 = 1u << (USART1_IRQ - 32) | 1u << (USART2_IRQ - 32);
+    port_start(&clock_port);
+    NVIC_ISER1 = 1u << (USART1_IRQ - 32) | 1u << (USART2_IRQ - 32) | 1u << (USART3_IRQ - 32);
+    /* Tells whoever is connected to the clock port that the board is ready. */
+    clock_answer(0);
     for (;;) {
         bool reached = plant_advance(motors, now_us()) != 0;
         /* Bytes may have come while the motors advanced: their time is not the one before. */

@@ -10,6 +10,7 @@ int main(void);
 void reset_handler(void);
 void usart1_handler(void);
 void usart2_handler(void);
+void usart3_handler(void);
 
 /* Coprocessor access control: full access to 10 and 11, the FPU. */
 #define CPACR (*(volatile uint32_t *)0xE000ED88)
@@ -47,7 +48,7 @@ typedef void (*handler)(void);
 typedef struct {
     uint32_t *stack;
     handler exceptions[15];
-    handler interrupts[39];
+    handler interrupts[40];
 } vector_table;
 
 __attribute__((section(".vectors"), used)) static const vector_table vectors = {
@@ -63,5 +64,5 @@ __attribute__((section(".vectors"), used)) static const vector_table vectors = {
         [13] = stuck_handler, /* PendSV */
         [14] = tick_handler, /* SysTick */
     },
-    .interrupts = { [37] = usart1_handler, [38] = usart2_handler },
+    .interrupts = { [37] = usart1_handler, [38] = usart2_handler, [39] = usart3_handler },
 };

@@ -1,5 +1,5 @@
 //! A board that answers for an ST drive on USART1 and for four RMD drives, through slcan, on USART2,
-//! with simulated motors behind them.
+//! with simulated motors behind them. USART3 is the clock port: a host that steps the board's time.
 //!
 //! It is for QEMU's netduinoplus2, an STM32F405 without clock control, pins, DMA and CAN: nothing here
 //! waits for them. On a real board the UARTs and the CAN controller are those of its HAL, behind the
@@ -19,19 +19,21 @@ use motorlink_embedded::st::SlavePort;
 use motorlink_proto::stmcp::{Profile, Slave};
 use panic_halt as _;
 use plant::Plant;
-use stm32f4::stm32f405::{Interrupt, Peripherals, USART1, USART2, interrupt};
+use stm32f4::stm32f405::{Interrupt, Peripherals, USART1, USART2, USART3, interrupt};
 
 use clock::Clock;
 use uart::{Line, Uart};
 
 static ST_LINE: Line = uart::line();
 static RMD_LINE: Line = uart::line();
+static CLOCK_LINE: Line = uart::line();
 
 #[entry]
 fn main() -> ! {
     let board = Peripherals::take().expect("nobody took them before");
     let core = cortex_m::Peripherals::take().expect("nobody took them before");
-    let mut clock = Clock::start(board.TIM2, core.SYST);
+    let clock_port = Uart::new(board.USART3, &CLOCK_LINE);
+    let mut clock = Clock::start(board.TIM2, core.SYST, clock_port);
     let now = clock.now();
     let mut plant = Plant::new(now).expect("the presets can be simulated");
     let slave = Slave::new(Profile::Spec, plant.st.last());
@@ -39,11 +41,12 @@ fn main() -> ! {
     let adapter = Adapter::new(Uart::new(board.USART2, &RMD_LINE));
     let mut rmd = DrivePort::new(adapter, Plant::rmd_drives());
     rmd.power_on(now, &mut plant.rmd);
-    for interrupt in [Interrupt::USART1, Interrupt::USART2] {
+    for interrupt in [Interrupt::USART1, Interrupt::USART2, Interrupt::USART3] {
         // SAFETY: no code relies on these interrupts being masked; what they share with the main
         // loop is behind critical sections.
         unsafe { NVIC::unmask(interrupt) };
     }
+    clock.greet();
     loop {
         let caught_up = plant.advance(clock.now());
         // Bytes may have come while the motors advanced: their time is not the one before.
@@ -55,9 +58,9 @@ fn main() -> ! {
         if caught_up {
             // An interrupt that comes here is pending, and ends the wait all the same.
             cortex_m::interrupt::free(|_| {
-                let waiting = st.uart_mut().read_ready().unwrap_or(true)
-                    || rmd.can_mut().uart_mut().read_ready().unwrap_or(true);
-                if !waiting {
+                let (st, rmd) = (st.uart_mut(), rmd.can_mut().uart_mut());
+                let waiting = st.read_ready().unwrap_or(true) || rmd.read_ready().unwrap_or(true);
+                if !waiting && !clock.serve(st.traffic() + rmd.traffic()) {
                     cortex_m::asm::wfi();
                 }
             });
@@ -77,6 +80,13 @@ fn USART2() {
     // SAFETY: as in USART1.
     let registers = unsafe { USART2::steal() };
     uart::interrupt(&registers, &RMD_LINE);
+}
+
+#[interrupt]
+fn USART3() {
+    // SAFETY: as in USART1.
+    let registers = unsafe { USART3::steal() };
+    uart::interrupt(&registers, &CLOCK_LINE);
 }
 
 /// Wakes the core each millisecond, for the motors and for deadlines.

@@ -1,7 +1,7 @@
 //! UARTs: received bytes wait in a queue that the interrupt fills, sent bytes are waited for.
 
 use core::cell::RefCell;
-use core::ops::Deref;
+use core::ops::{Add, Deref};
 
 use critical_section::Mutex;
 use embedded_io::{Error, ErrorKind, ErrorType, Read, ReadReady, Write};
@@ -37,10 +37,42 @@ pub fn interrupt(registers: &RegisterBlock, line: &Line) {
     });
 }
 
+/// How many bytes were taken from a UART's [`Line`] and sent. The numbers wrap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Traffic {
+    taken: u32,
+    sent: u32,
+}
+
+impl Traffic {
+    /// How many bytes were taken since `earlier`; 255 for more.
+    pub fn taken_since(self, earlier: Traffic) -> u8 {
+        self.taken.wrapping_sub(earlier.taken).try_into().unwrap_or(u8::MAX)
+    }
+}
+
+impl Add for Traffic {
+    type Output = Traffic;
+    fn add(self, other: Traffic) -> Traffic {
+        Traffic {
+            taken: self.taken.wrapping_add(other.taken),
+            sent: self.sent.wrapping_add(other.sent),
+        }
+    }
+}
+
 /// A UART that is read through its [`Line`].
 pub struct Uart<R> {
     registers: R,
     line: &'static Line,
+    traffic: Traffic,
+}
+
+impl<R> Uart<R> {
+    /// What has moved so far.
+    pub fn traffic(&self) -> Traffic {
+        self.traffic
+    }
 }
 
 impl<R: Deref<Target = RegisterBlock>> Uart<R> {
@@ -50,7 +82,7 @@ impl<R: Deref<Target = RegisterBlock>> Uart<R> {
         registers
             .cr1()
             .write(|w| w.ue().enabled().te().enabled().re().enabled().rxneie().enabled());
-        Uart { registers, line }
+        Uart { registers, line, traffic: Traffic::default() }
     }
 }
 
@@ -90,15 +122,19 @@ impl<R> Read for Uart<R> {
     fn read(&mut self, room: &mut [u8]) -> Result<usize, Overrun> {
         critical_section::with(|cs| {
             let received = &mut *self.line.borrow_ref_mut(cs);
+            let waiting = received.bytes.len();
             if core::mem::take(&mut received.lost) {
                 received.bytes.clear();
+                self.traffic.taken = self.traffic.taken.wrapping_add(waiting as u32);
                 return Err(Overrun);
             }
             let taken = room.iter_mut().map_while(|slot| {
                 *slot = received.bytes.pop_front()?;
                 Some(())
             });
-            Ok(taken.count())
+            let taken = taken.count();
+            self.traffic.taken = self.traffic.taken.wrapping_add(taken as u32);
+            Ok(taken)
         })
     }
 }
@@ -109,6 +145,7 @@ impl<R: Deref<Target = RegisterBlock>> Write for Uart<R> {
             while self.registers.sr().read().txe().bit_is_clear() {}
             self.registers.dr().write(|w| w.dr().set(u16::from(byte)));
         }
+        self.traffic.sent = self.traffic.sent.wrapping_add(bytes.len() as u32);
         Ok(bytes.len())
     }
 

@@ -1,9 +1,8 @@
 //! The motors that both boards have, from `motorlink-sim` with the firmware of their control loops:
 //! two behind the ST drive, four on the RMD bus, those of `motorlink sim` without a configuration.
 //!
-//! The simulation runs on the board itself. Where that cannot keep up, the motors' time falls behind
-//! the board's, which only the protocols go by: motors then move slowly, and every answer still comes
-//! in time.
+//! The simulation runs on the board itself. Where that cannot keep up with a time that runs, the
+//! motors' time falls behind the board's, which only the protocols go by.
 #![no_std]
 #![forbid(unsafe_code)]
 
