@@ -1,17 +1,19 @@
 """Boards in QEMU, in Rust and in C. `make firmware-test` builds them and does all of it.
 
 MOTORLINK_FIRMWARE is the folder with board-rust.elf and board-c.elf. A test gets a board that has
-just been switched on, and the program and the hosts of tests/e2e.
+just been switched on, and the program and the hosts of tests/e2e. Deadlines and motors go by the
+board's time, which passes as the program and the tests say: a machine under load is slow, and the
+results are the same.
 """
 
 import importlib.util
 import json
 import os
 import re
-import socket
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -19,16 +21,16 @@ END_TO_END = Path(__file__).parents[1] / "e2e"
 sys.path.insert(0, str(END_TO_END))
 pytest.register_assert_rewrite("test_rmd_can", "test_st_bytes")
 
-import stmcp  # noqa: E402
-from program import eventually  # noqa: E402
+import serial  # noqa: E402
+from clock import PATIENCE, Clock  # noqa: E402
+
+# The scheme `board:` of pyserial's URLs.
+serial.protocol_handler_packages.append("ports")
 
 _spec = importlib.util.spec_from_file_location("end_to_end", END_TO_END / "conftest.py")
 _end_to_end = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(_end_to_end)
 motorlink, run, start = _end_to_end.motorlink, _end_to_end.run, _end_to_end.start
-
-GET_STATUS = stmcp.frame(stmcp.header(stmcp.GET_REG, 1), [0x02])
-
 
 def elf(language):
     path = Path(os.environ["MOTORLINK_FIRMWARE"]) / f"board-{language}.elf"
@@ -36,45 +38,36 @@ def elf(language):
     return path
 
 
-def first():
-    """The protocols' deadlines are real time: where it is allowed, a board goes before what else this
-    machine does. Kernels that group by session look at the group's niceness alone."""
-    os.setsid()
-    try:
-        os.nice(-15)
-        Path("/proc/self/autogroup").write_text("-15")
-    except OSError:
-        pass
-
-
 class Board:
-    """A board in QEMU with both UARTs on TCP ports of this machine, which QEMU chooses."""
+    """A board in QEMU with its UARTs on TCP ports of this machine, which QEMU chooses. Its time stands
+    still from the first use of the clock port on, except while somebody steps it."""
 
     def __init__(self, language):
         self.language = language
         uarts = []
-        for name in ("st", "rmd"):
+        for name in ("st", "rmd", "clock"):
             # Bytes go out one by one: without nodelay each waits for the last one's acknowledge.
             options = "host=127.0.0.1,port=0,server=on,wait=off,nodelay=on"
             uarts += ["-chardev", f"socket,id={name},{options}", "-serial", f"chardev:{name}"]
         self.process = subprocess.Popen(
-            ["qemu-system-arm", "-M", "netduinoplus2", "-kernel", str(elf(language))]
+            ["qemu-system-arm", "-M", "netduinoplus2", "-kernel", str(elf(language)), "-S"]
             + ["-display", "none", "-monitor", "none", "-qmp", "stdio", *uarts],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            preexec_fn=first,
         )
         try:
             self._read()
             self._do("qmp_capabilities")
             found = {device["label"]: device["filename"] for device in self._do("query-chardev")}
-            self.st, self.rmd = (
-                int(re.search(r"127\.0\.0\.1:(\d+)", found[name])[1]) for name in ("st", "rmd")
+            self.st, self.rmd, self.clock_port = (
+                int(re.search(r"127\.0\.0\.1:(\d+)", found[name])[1])
+                for name in ("st", "rmd", "clock")
             )
-            self._await(self.st, GET_STATUS)
-            self._await(self.rmd, b"\r")
+            with self.clock() as clock:
+                self._do("cont")
+                clock.answer()
         except BaseException:
             self.end()
             raise
@@ -91,46 +84,58 @@ class Board:
             assert "error" not in answer, answer
         return answer["return"]
 
-    def _await(self, port, question):
-        """Asks until there are answers, and takes them all."""
-        with self.connect(port) as line:
-            line.settimeout(0.1)
-            answers = b""
+    def clock(self):
+        """A connection to the clock port."""
+        return Clock(self.clock_port)
 
-            def answer():
-                nonlocal answers
-                try:
-                    answers += line.recv(64)
-                    return True
-                except TimeoutError:
-                    return False
+    def advance(self, seconds):
+        """Lets the board's time pass, for tests with nothing else connected to the clock port."""
+        with self.clock() as clock:
+            clock.advance(seconds)
 
-            def asked():
-                line.sendall(question)
-                return answer()
-
-            eventually(asked, f"an answer on port {port}")
-            while answer():
-                pass
-
-    def connect(self, port, timeout=5):
-        line = socket.create_connection(("127.0.0.1", port), timeout)
-        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return line
+    def url(self, port):
+        """What pyserial takes for a line on the board's time."""
+        return f"board://127.0.0.1:{port}?clock={self.clock_port}"
 
     @property
     def st_port(self):
         """What -p takes for the ST drive."""
-        return f"tcp:127.0.0.1:{self.st}"
+        return f"tcp:127.0.0.1:{self.st}?clock=127.0.0.1:{self.clock_port}"
 
     @property
     def rmd_port(self):
         """What -p takes for the RMD motors."""
-        return f"slcan:tcp:127.0.0.1:{self.rmd}"
+        return f"slcan:tcp:127.0.0.1:{self.rmd}?clock=127.0.0.1:{self.clock_port}"
 
     def end(self):
         self.process.terminate()
-        self.process.communicate(timeout=10)
+        self.process.communicate(timeout=PATIENCE)
+
+
+def patience(advance, pause):
+    """`program.eventually` on a board's time, `pause` seconds of which pass after each try."""
+
+    def eventually(condition, what, within=10):
+        for _ in range(round(within / pause)):
+            value = condition()
+            if value:
+                return value
+            advance(pause)
+        raise AssertionError(f"{what} was expected within {within} s of the board's time")
+
+    return eventually
+
+
+@pytest.fixture
+def on_board_time(monkeypatch):
+    """Makes the tests of a module of tests/e2e go by the time of a line that they have."""
+
+    def on_board_time(module, port):
+        monkeypatch.setattr(module, "eventually", patience(port.advance, 0.005))
+        if hasattr(module, "time"):
+            monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=port.now))
+
+    return on_board_time
 
 
 @pytest.fixture(params=["rust", "c"])
@@ -142,6 +147,12 @@ def board(request):
 
 
 @pytest.fixture
+def eventually(board):
+    """Waits on the board's time for what the program says."""
+    return patience(board.advance, 0.05)
+
+
+@pytest.fixture
 def st(run, board):
     """Runs `motorlink st` on the board."""
     return lambda *words, **options: run("st", "-p", board.st_port, *words, **options)
@@ -149,5 +160,5 @@ def st(run, board):
 
 @pytest.fixture
 def rmd(run, board):
-    """Runs `motorlink rmd` on the board, which may take its time on a machine under load."""
-    return lambda *words: run("rmd", "-p", board.rmd_port, "--timeout", 500, *words)
+    """Runs `motorlink rmd` on the board."""
+    return lambda *words: run("rmd", "-p", board.rmd_port, *words)

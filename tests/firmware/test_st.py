@@ -2,8 +2,8 @@
 
 import pytest
 
-from program import eventually
-from stmcp import ACK, EXECUTE, GET_REG, Line, frame, header
+import test_st_bytes
+from stmcp import ACK, EXECUTE, GET_REG, TIMEOUT, Line, frame, header, nack
 from test_st_bytes import (  # noqa: F401  # tests that run here with this file's fixture
     test_a_cut_off_frame_is_answered_with_timeout_after_25_ms,
     test_a_frame_in_single_bytes_is_understood,
@@ -25,8 +25,9 @@ FLAGS, STATUS, FAULT_OVER, START_UP = 0x01, 0x02, 11, 0x10
 
 
 @pytest.fixture
-def spec(board):
-    with Line(f"socket://127.0.0.1:{board.st}") as line:
+def spec(board, on_board_time):
+    with Line(board.url(board.st)) as line:
+        on_board_time(test_st_bytes, line.port)
         yield line
 
 
@@ -48,70 +49,77 @@ def test_what_is_written_is_read_back_and_what_is_wrong_is_refused(st):
 
 
 @pytest.mark.parametrize("motor", [1, 2])
-def test_a_motor_starts_reaches_its_speed_and_stops(st, motor):
+def test_a_motor_starts_reaches_its_speed_and_stops(st, eventually, motor):
     def value(register):
         return st("-m", motor, "--json", "--raw", "get", register).ended(0).json[register]
 
     st("-m", motor, "ramp", 1200, 500).ended(0)
     st("-m", motor, "start").ended(0)
-    eventually(lambda: abs(value("SPEED_MEAS") - 1200) <= 10, "1200 rpm", within=30)
+    eventually(lambda: abs(value("SPEED_MEAS") - 1200) <= 10, "1200 rpm")
     st("-m", motor, "ramp", 900, 100).ended(0)
-    eventually(lambda: abs(value("SPEED_MEAS") - 900) <= 10, "900 rpm", within=30)
+    eventually(lambda: abs(value("SPEED_MEAS") - 900) <= 10, "900 rpm")
     st("-m", motor, "stop").ended(0)
-    eventually(lambda: value("STATUS") == 0, "IDLE", within=30)
+    eventually(lambda: value("STATUS") == 0, "IDLE")
     assert value("FLAGS") == 0
 
 
-def test_torque_turns_the_motor_with_an_encoder(st):
+def test_torque_turns_the_motor_with_an_encoder(st, eventually):
     def speed():
         return st("-m", 2, "--json", "--raw", "get", "SPEED_MEAS").ended(0).json["SPEED_MEAS"]
 
     st("-m", 2, "current", 600, 0).ended(0)
     st("-m", 2, "start").ended(0)
-    eventually(lambda: speed() > 200, "a motor that turns", within=30)
+    eventually(lambda: speed() > 200, "a motor that turns")
     st("-m", 2, "stop").ended(0)
 
 
-def test_a_rotor_that_does_not_follow_is_a_fault_until_it_is_acknowledged(st, spec):
+def test_a_rotor_that_does_not_follow_is_a_fault_until_it_is_acknowledged(st, spec, eventually):
     for phase in range(5):
         # No torque, in 20 ms.
         data = [phase, *(1000).to_bytes(4, "little"), 0, 0, 20, 0]
         assert spec.ask(frame(header(SET_REVUP_DATA, 1), data)) == frame(ACK)
     assert spec.ask(frame(header(EXECUTE, 1), [START_MOTOR])) == frame(ACK)
-    eventually(lambda: spec.get(STATUS) == FAULT_OVER, "FAULT_OVER", within=30)
+    test_st_bytes.eventually(lambda: spec.get(STATUS) == FAULT_OVER, "FAULT_OVER")
     assert spec.get(FLAGS) == START_UP
     spec.port.close()
     assert "START_UP" in st("start").ended(1).err
     st("fault-ack").ended(0)
-    status = st("--json", "status").ended(0).json
-    assert status["STATUS"]["name"] == "IDLE"
+
+    def status():
+        return st("--json", "status").ended(0).json["STATUS"]["name"]
+
+    eventually(lambda: status() == "IDLE", "IDLE")
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 70])
+def test_a_cut_off_frame_is_answered_25_ms_after_its_first_byte(spec, size):
+    spec.send(frame(GET_REG, [0x03] * 80)[:size])
+    spec.port.timeout = 0.0249
+    assert spec.port.read(64) == b""
+    spec.port.timeout = 0.0002
+    assert spec.port.read(4) == nack(TIMEOUT)
+
+
+def test_a_frame_of_full_length_is_in_time_however_slow_the_machine_is(spec):
+    whole = frame(0x01, [0x46, *(0x01020304).to_bytes(4, "little")] + [0xEE] * 123)
+    for _ in range(100):
+        assert spec.ask(whole) == frame(ACK)
 
 
 def test_garbage_at_full_speed_leaves_the_drive_in_order(spec):
     spec.send(bytes((index * 89 + 7) & 0xFF for index in range(20_000)))
     spec.port.timeout = 0.3
-
-    def heard():
-        """Everything until the line is silent."""
-        return b"".join(iter(lambda: spec.port.read(256), b""))
-
-    def answers():
-        heard()
-        spec.send(frame(GET_REG, [0x03]))
-        return heard() == frame(ACK, [1])
-
-    eventually(answers, "the answer to a question and nothing else", within=30)
+    while spec.port.read(256):
+        pass
+    spec.send(frame(GET_REG, [0x03]))
+    assert spec.port.read(256) == frame(ACK, [1])
 
 
 def test_hosts_come_and_go(board):
     for _ in range(20):
-        with Line(f"socket://127.0.0.1:{board.st}") as line:
+        with Line(board.url(board.st)) as line:
             assert line.get(0x03) == 1
             line.send(frame(GET_REG, [0x03])[:2])
-    with Line(f"socket://127.0.0.1:{board.st}") as line:
-        # What the last host left behind may be answered first.
-        line.port.timeout = 0.3
-        while line.port.read(64):
-            pass
-        line.port.timeout = 5
-        assert line.get(0x03) == 1
+            # What this host leaves behind is answered while nobody listens.
+            line.port.advance(0.0249)
+        board.advance(0.001)
