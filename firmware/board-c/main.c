@@ -180,18 +180,22 @@ static uint64_t now_us(void)
 
 static void clock_answer(uint8_t answer)
 {
+    uint32_t sent = st_port.sent + rmd_port.sent;
+    uint32_t more = sent - board_clock.sent;
+    const uint8_t bytes[] = { answer, more < 255 ? (uint8_t)more : 255 };
+
     board_clock.taken = st_port.taken + rmd_port.taken;
-    board_clock.sent = st_port.sent + rmd_port.sent;
-    port_send(&clock_port, &answer, 1);
+    board_clock.sent = sent;
+    port_send(&clock_port, bytes, sizeof bytes);
 }
 
 /* Obeys the clock port. To be called when everything that is due now is done. Returns whether there
  * may be more to do at once.
  *
- * A command is a byte, and so is its answer. 1 to 255 advances by so many ticks, but no further than
+ * A command is a byte, and its answer is two. 1 to 255 advances by so many ticks, but no further than
  * the first tick at whose end bytes have moved on the other ports since the last answer; the answer
  * is the number of ticks. 0 asks for the number of bytes that the other ports have taken since the
- * last answer, 255 for more. */
+ * last answer, 255 for more. The second byte is the number of bytes that they have sent since then. */
 static bool clock_serve(void)
 {
     uint32_t taken = st_port.taken + rmd_port.taken - board_clock.taken;

@@ -23,6 +23,8 @@ class Clock:
         self.line = connect(port)
         # What passed in steps of this connection.
         self.ticks = 0
+        # How many bytes the board has sent, which the line's user takes off.
+        self.due = 0
 
     def __enter__(self):
         return self
@@ -39,8 +41,12 @@ class Clock:
         return self.answer()
 
     def answer(self):
-        answer = self.line.recv(1)
-        assert answer, "the board hung up"
+        answer = b""
+        while len(answer) < 2:
+            more = self.line.recv(2 - len(answer))
+            assert more, "the board hung up"
+            answer += more
+        self.due += answer[1]
         return answer[0]
 
     def delivered(self, count):

@@ -48,10 +48,10 @@ struct Step {
 /// The timer's time until a byte comes on the clock port; from then on time stands still except
 /// while a command of that port advances it.
 ///
-/// A command is a byte, and so is its answer. 1 to 255 advances by so many ticks, but no further
+/// A command is a byte, and its answer is two. 1 to 255 advances by so many ticks, but no further
 /// than the first tick at whose end bytes have moved on the other ports since the last answer; the
 /// answer is the number of ticks. 0 asks for the number of bytes that the other ports have taken
-/// since the last answer.
+/// since the last answer. The second byte is the number of bytes that they have sent since then.
 pub struct Clock<R> {
     timer: Timer,
     port: Uart<R>,
@@ -120,8 +120,9 @@ impl<R: Deref<Target = RegisterBlock>> Clock<R> {
     }
 
     fn answer(&mut self, answer: u8, traffic: Traffic) {
+        let sent = traffic.sent_since(self.answered);
         self.answered = traffic;
         // Writing never fails.
-        let _ = self.port.write(&[answer]);
+        let _ = self.port.write(&[answer, sent]);
     }
 }

@@ -49,6 +49,11 @@ impl Traffic {
     pub fn taken_since(self, earlier: Traffic) -> u8 {
         self.taken.wrapping_sub(earlier.taken).try_into().unwrap_or(u8::MAX)
     }
+
+    /// How many bytes were sent since `earlier`; 255 for more.
+    pub fn sent_since(self, earlier: Traffic) -> u8 {
+        self.sent.wrapping_sub(earlier.sent).try_into().unwrap_or(u8::MAX)
+    }
 }
 
 impl Add for Traffic {

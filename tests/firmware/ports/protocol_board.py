@@ -10,6 +10,7 @@ from serial.serialutil import PortNotOpenError, SerialBase
 from clock import MOST_TICKS, TICK, Clock, connect
 
 CHUNK = 128
+ARRIVAL = 1
 
 
 class Serial(SerialBase):
@@ -52,6 +53,7 @@ class Serial(SerialBase):
                 more = self._line.recv(size - len(received))
                 assert more, "the board hung up"
                 received += more
+                self._clock.due = max(0, self._clock.due - len(more))
             elif end is None:
                 self._clock.step(MOST_TICKS)
             elif self._clock.ticks < end:
@@ -76,13 +78,18 @@ class Serial(SerialBase):
 
     def reset_input_buffer(self):
         while self._waits():
-            self._line.recv(4096)
+            self._clock.due = max(0, self._clock.due - len(self._line.recv(4096)))
 
     def reset_output_buffer(self):
         pass
 
     def _waits(self):
-        return bool(select.select([self._line], [], [], 0)[0])
+        """Whether there are bytes to read. Those that the board has sent are waited for; those of its other
+        line never come."""
+        waits = bool(select.select([self._line], [], [], ARRIVAL if self._clock.due else 0)[0])
+        if not waits:
+            self._clock.due = 0
+        return waits
 
     def _reconfigure_port(self):
         pass

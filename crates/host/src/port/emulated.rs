@@ -18,6 +18,9 @@ const TICK: Duration = Duration(100);
 const MOST_TICKS: u64 = 255;
 /// The command that asks how many bytes the board has taken.
 const COUNT: u8 = 0;
+/// How long bytes that the board has sent may take to arrive, in the machine's time. Those of the
+/// board's other line never do.
+const ARRIVAL: time::Duration = time::Duration::from_secs(1);
 /// How many bytes are sent before the board has taken them: it counts up to 255.
 const CHUNK: usize = 128;
 
@@ -32,6 +35,8 @@ pub(super) struct EmulatedLine {
     clock: Clock,
     /// Which moment the board has reached, on `clock`.
     reached: Instant,
+    /// How many bytes the board has sent that were not read yet.
+    due: usize,
     /// How long the emulator may take to answer, in the machine's time.
     patience: time::Duration,
     /// The clock port, for messages.
@@ -52,19 +57,29 @@ impl EmulatedLine {
         patience: time::Duration,
     ) -> Result<Self, PortError> {
         let clock = clock_of(&name);
-        let mut line = EmulatedLine { data, board, reached: clock.now(), clock, patience, name };
+        let reached = clock.now();
+        let mut line = EmulatedLine { data, board, clock, reached, due: 0, patience, name };
         line.ask(COUNT)?;
+        line.due = 0;
         Ok(line)
     }
 
     /// Sends a command to the clock port; gives the answer.
     fn ask(&mut self, command: u8) -> Result<u8, PortError> {
-        let mut answer = [0];
+        let mut answer = [0; 2];
         self.board.write(&[command])?;
-        match self.board.read(&mut answer, Some(self.patience))? {
-            0 => Err(PortError::ClockStopped { port: self.name.clone(), after: self.patience }),
-            _ => Ok(answer[0]),
+        let mut size = 0;
+        while size < answer.len() {
+            size += match self.board.read(&mut answer[size..], Some(self.patience))? {
+                0 => {
+                    let (port, after) = (self.name.clone(), self.patience);
+                    return Err(PortError::ClockStopped { port, after });
+                }
+                more => more,
+            };
         }
+        self.due += usize::from(answer[1]);
+        Ok(answer[0])
     }
 
     /// Lets the board's time advance towards `end`. It stops early when bytes move.
@@ -126,7 +141,9 @@ impl ByteLink for EmulatedLine {
         });
         self.step_to(now)?;
         loop {
-            let size = self.data.read(buffer, Some(time::Duration::ZERO))?;
+            let wait = if self.due > 0 { ARRIVAL } else { time::Duration::ZERO };
+            let size = self.data.read(buffer, Some(wait))?;
+            self.due = if size > 0 { self.due.saturating_sub(size) } else { 0 };
             if size > 0 || self.reached >= end {
                 return Ok(size);
             }
@@ -178,7 +195,8 @@ mod tests {
     fn board(mut clock: TcpStream, mut data: TcpStream, delay: u64) -> JoinHandle<u64> {
         data.set_nonblocking(true).unwrap();
         std::thread::spawn(move || {
-            let (mut now, mut due, mut moved) = (0, VecDeque::new(), 0);
+            let (mut now, mut due, mut late) = (0, VecDeque::new(), Vec::new());
+            let (mut moved, mut sent) = (0, 0);
             let mut command = [0];
             while clock.read_exact(&mut command).is_ok() {
                 // A byte a command, as in QEMU.
@@ -195,12 +213,18 @@ mod tests {
                     answer += 1;
                     now += 1;
                     if due.front().is_some_and(|(at, _)| *at <= now) {
-                        data.write_all(&[due.pop_front().unwrap().1]).unwrap();
-                        moved += 1;
+                        late.push(due.pop_front().unwrap().1);
+                        (moved, sent) = (moved + 1, sent + 1);
                     }
                 }
                 moved = 0;
-                clock.write_all(&[answer]).unwrap();
+                clock.write_all(&[answer, sent]).unwrap();
+                // Connections do not deliver in the order of each other.
+                if sent > 0 {
+                    std::thread::sleep(5 * MS);
+                    data.write_all(&late).unwrap();
+                    (sent, late) = (0, Vec::new());
+                }
             }
             now
         })
