@@ -2,12 +2,15 @@
 
 CARGO ?= cargo
 PYTHON ?= python3
-SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
+export SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
+ifneq ($(words $(CURDIR)),1)
+$(error make does not work in a folder with spaces in its path: $(CURDIR))
+endif
 # For Miri and the fuzzers. Raise it in a commit of its own; rust-toolchain.toml pins stable.
 NIGHTLY := nightly-2026-05-20
 # What boards have: a Cortex-M4.
 TARGET := thumbv7em-none-eabihf
-DEBUG := $(or $(CARGO_TARGET_DIR),$(CURDIR)/target)/debug
+DEBUG := $(or $(abspath $(CARGO_TARGET_DIR)),$(CURDIR)/target)/debug
 
 VENV := $(CURDIR)/.venv
 PYTHON_VENV := $(CURDIR)/.venv-python
@@ -15,7 +18,7 @@ BENCH_VENV := $(CURDIR)/.venv-bench
 
 # Which tests of a part to run: arguments of cargo test for unit, fuzz-replay and miri; of pytest, in
 # the folder of the tests, for e2e, python and firmware-test.
-T ?=
+T =
 # Tests that pytest runs at a time. Most of them wait.
 WORKERS ?= 4
 PYTEST = $(VENV)/bin/python -m pytest -q -n $(WORKERS)
@@ -24,14 +27,15 @@ PYTEST = $(VENV)/bin/python -m pytest -q -n $(WORKERS)
 PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --locked
 
 # The parts of `make test`, the longest first: two run at a time.
-PARTS := unit python e2e miri firmware-test lint ffi-test fuzz-replay test-socketcan probe determinism deny
+ALL_PARTS := unit python e2e miri firmware-test lint ffi-test fuzz-replay test-socketcan probe determinism deny
+PARTS = $(ALL_PARTS)
 # Those that wait for real time.
 TIMED := unit e2e python firmware-test ffi-test
 RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
 
-.PHONY: help demo test check flakes $(PARTS) wheel fuzz soak bench bench-python reliability sizes docs header
+.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header
 .PHONY: install-c pictures semver fmt clean toolchain nightly board-target
 
 help: ## this list
@@ -41,6 +45,8 @@ demo: toolchain ## simulated drives, driven through real ports
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
 test: toolchain ## all parts below; installs what they need. STRICT=1: none may be skipped
+	$(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
+	$(if $(T),$(error T= is for one part: make PART T="..."))
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict) $(PARTS)
 
 check: toolchain ## format, clippy and the quick tests, while you work
@@ -67,15 +73,17 @@ e2e: $(VENV)/ready ## the built program against independent clients on ptys and 
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
 
+NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
+	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
 # With few cases a property; brute force is left out.
 miri: ## proto and the C face, in an interpreter that sees undefined behaviour
-	@$(MAKE) --no-print-directory nightly || \
+	@{ $(NIGHTLY_READY); } || \
 		{ echo "SKIPPED: miri: $(NIGHTLY) cannot be installed" >&2; exit 0; }; \
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
 		$(CARGO) +$(NIGHTLY) miri test -p motorlink-proto -p motorlink-ffi --locked $(T)
 
 firmware-test: $(VENV)/ready ## boards in QEMU against the conformance kit and hosts
-	CARGO="$(CARGO)" SUDO="$(SUDO)" PYTEST="$(PYTEST)" tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
+	CARGO="$(CARGO)" PYTEST="$(PYTEST)" tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
 
 # The fuzz targets are a workspace of their own with the same dependencies.
 FUZZ_TARGET := --target-dir $(DEBUG)/..
@@ -88,13 +96,13 @@ lint: ## format, clippy, rustdoc: no warning
 # That the header is up to date is a test of unit.
 ffi-test: ## the C face: sanitizers, valgrind, C against the program
 	$(PROGRAM)
-	CARGO="$(CARGO)" SUDO="$(SUDO)" crates/ffi/tests/c/run $(DEBUG)/motorlink || [ $$? -eq 77 ]
+	CARGO="$(CARGO)" crates/ffi/tests/c/run $(DEBUG)/motorlink || [ $$? -eq 77 ]
 
 fuzz-replay: ## fuzz targets with their seeds and with what fuzzing found
 	cd fuzz && $(CARGO) test --locked $(FUZZ_TARGET) $(T)
 
 test-socketcan: ## the port socketcan: in Debian's kernel in QEMU, against can-utils
-	CARGO="$(CARGO)" SUDO="$(SUDO)" tests/socketcan/run.sh || [ $$? -eq 77 ]
+	CARGO="$(CARGO)" tests/socketcan/run.sh || [ $$? -eq 77 ]
 
 SIZES = $(PYTHON) sizes.py $(or $(CARGO_TARGET_DIR),target)/$(TARGET)/release
 probe: board-target ## the protocols on a Cortex-M4: no panic, within flash and RAM
@@ -107,26 +115,30 @@ PLAIN := --target-dir target/plain --config profile.dev.package.motorlink-sim.op
 determinism: ## simulated drives with and without optimisation, to the last digit
 	mkdir -p target
 	$(FINGERPRINT) > target/fingerprint
-	$(FINGERPRINT) --release | cmp - target/fingerprint
-	$(FINGERPRINT) $(PLAIN) | cmp - target/fingerprint
+	$(FINGERPRINT) --release > target/fingerprint.release
+	$(FINGERPRINT) $(PLAIN) > target/fingerprint.plain
+	cmp target/fingerprint target/fingerprint.release
+	cmp target/fingerprint target/fingerprint.plain
 
 # What was checked is in deny.checked. cortex-m carries two versions of embedded-hal, so the firmware may
 # have duplicates.
 LOCKED := deny.toml Cargo.lock fuzz/Cargo.lock probe/Cargo.lock firmware/Cargo.lock
-deny: ## licences, sources, known holes of changed dependencies; FORCE=1: of all
-	@if [ -z "$(FORCE)" ] && sha256sum --check --status deny.checked; then \
-		echo "these lock files were checked (deny.checked); FORCE=1 checks them again"; exit; fi; \
+deny: ## licences, sources, known holes of dependencies that changed (FORCE=1: all)
+	@sums=$$(sha256sum $(LOCKED)) || exit; unknown="SKIPPED: advisories: their list could not be fetched"; \
+	if [ -z "$(FORCE)" ] && [ "$$sums" = "$$(grep -v '^advisories' deny.checked 2>/dev/null)" ]; then \
+		echo "these lock files were checked (deny.checked); FORCE=1 checks them again"; \
+		grep -q '^advisories checked' deny.checked || echo "$$unknown"; exit 0; fi; \
 	command -v cargo-deny >/dev/null || $(CARGO) install --locked cargo-deny || exit; \
-	checks="licenses bans sources"; \
-	if $(CARGO) deny fetch db >/dev/null 2>&1; then checks="$$checks advisories"; \
-	else echo "SKIPPED: advisories: github.com/RustSec/advisory-db cannot be reached" >&2; fi; \
+	checks="licenses bans sources"; known="advisories not checked"; \
+	if $(CARGO) deny fetch db >/dev/null 2>&1; then checks="$$checks advisories"; known="advisories checked"; \
+	else echo "$$unknown"; fi; \
 	for manifest in Cargo.toml fuzz/Cargo.toml probe/Cargo.toml; do \
 		echo "$$manifest: $$checks"; \
 		$(CARGO) deny --manifest-path $$manifest --config deny.toml check $$checks || exit; \
 	done; \
 	echo "firmware/Cargo.toml: licenses sources"; \
-	$(CARGO) deny --manifest-path firmware/Cargo.toml --config deny.toml check licenses sources && \
-	sha256sum $(LOCKED) > deny.checked
+	$(CARGO) deny --manifest-path firmware/Cargo.toml --config deny.toml check licenses sources || exit; \
+	printf '%s\n' "$$sums" "$$known" > deny.checked
 
 # ---- Campaigns and figures ----
 
@@ -143,7 +155,7 @@ reliability: ## some 90 million exchanges on lines that misbehave, into docs/REL
 	$(CARGO) run --release --locked -p motorlink-reliability -- --update docs/RELIABILITY.md
 
 bench: $(BENCH_VENV)/ready bench-python ## ratios and instruction counts, as in docs/BENCHMARKS.md
-	SUDO="$(SUDO)" tests/install valgrind || \
+	tests/install valgrind || \
 		echo "valgrind cannot be installed: instructions are not counted"
 	$(CARGO) run --release --locked -p motorlink-bench -- all
 
@@ -207,8 +219,7 @@ toolchain:
 	@! command -v rustup >/dev/null || rustup which rustc >/dev/null 2>&1 || rustup toolchain install
 
 nightly:
-	@rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
-		rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
+	@$(NIGHTLY_READY)
 
 board-target: toolchain
 	@rustup target list --installed | grep -qx $(TARGET) || rustup target add $(TARGET)
@@ -220,5 +231,5 @@ $(VENV)/ready $(PYTHON_VENV)/ready:
 	@mkdir -p target && flock target/$(notdir $(@D)).lock $(MAKE) --no-print-directory $(@D).venv FROM=$<
 %.venv:
 	@test $*/ready -nt $(FROM) || { \
-		{ $(PYTHON) -m venv $* || { SUDO="$(SUDO)" tests/install python3-venv && $(PYTHON) -m venv $*; }; } && \
+		{ $(PYTHON) -m venv $* || { tests/install python3-venv && $(PYTHON) -m venv $*; }; } && \
 		$*/bin/python -m pip install --quiet -r $(FROM) && touch $*/ready; }

@@ -7,6 +7,7 @@ the end.
 """
 
 import argparse
+import fcntl
 import os
 import re
 import signal
@@ -19,6 +20,8 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 LOGS = REPOSITORY / "target/parts"
+#: A part that takes longer hangs, s.
+LIMIT = 3600
 
 
 class Run:
@@ -39,9 +42,15 @@ class Run:
             )
 
     def wait(self):
-        self.passed = self.process.wait() == 0
+        try:
+            self.passed = self.process.wait(LIMIT) == 0
+            late = ""
+        except subprocess.TimeoutExpired:
+            self.passed = False
+            late = f"\nended after {LIMIT} s"
+        self.end()
         self.seconds = time.monotonic() - self.begun
-        self.output = self.log.read_text(errors="replace")
+        self.output = self.log.read_text(errors="replace") + late
         self.tests = sum(map(int, re.findall(r"\b(\d+) passed", self.output)))
         # As cargo says it.
         compiled = re.findall(r"^ *Finished .* in (?:(\d+)m )?([\d.]+)s$", self.output, re.M)
@@ -49,10 +58,15 @@ class Run:
         self.skipped = re.findall(r"^SKIPPED.*", self.output, re.M)
 
     def end(self):
-        try:
-            os.killpg(self.process.pid, signal.SIGTERM)
-        except ProcessLookupError:
-            pass
+        """Ends what still runs of it."""
+        for sign in (signal.SIGTERM, signal.SIGKILL):
+            try:
+                os.killpg(self.process.pid, sign)
+                self.process.wait(5)
+            except ProcessLookupError:
+                return
+            except subprocess.TimeoutExpired:
+                pass
 
     def __str__(self):
         verdict = "FAILED" if not self.passed else "skipped" if self.skipped else "passed"
@@ -66,6 +80,7 @@ class Runner:
 
     def __init__(self, labels):
         self.waiting = deque(labels)
+        self.count = len(self.waiting)
         self.running, self.over = set(), []
         self.lock = threading.Lock()
         self.stopped = False
@@ -90,33 +105,52 @@ class Runner:
     def stop(self):
         with self.lock:
             self.stopped = True
-            for run in self.running:
-                run.end()
+            running = list(self.running)
+        for run in running:
+            run.end()
 
 
 def load(count):
     """`count` processes that compute without end, at the priority of the tests."""
     subprocess.run([REPOSITORY / "tests/install", "stress-ng"], check=True)
-    return subprocess.Popen(["stress-ng", "--quiet", "--cpu", str(count)])
+    # They end with this process, however it ends.
+    ending = ["setpriv", "--pdeathsig", "TERM"]
+    return subprocess.Popen([*ending, "stress-ng", "--quiet", "--cpu", str(count)])
+
+
+def number(text):
+    if int(text) < 1:
+        raise argparse.ArgumentTypeError("1 or more")
+    return int(text)
 
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    arguments.add_argument("--jobs", type=int, default=2, help="parts at a time (default 2)")
-    arguments.add_argument("--runs", type=int, default=1, help="runs of each part (default 1)")
+    arguments.add_argument("--jobs", type=number, default=2, help="parts at a time (default 2)")
+    arguments.add_argument("--runs", type=number, default=1, help="runs of each part (default 1)")
     arguments.add_argument("--load", type=int, default=0, help="processes that compute beside them")
     arguments.add_argument("--strict", action="store_true", help="a skipped check is a failure")
     arguments.add_argument("parts", nargs="+", metavar="PART")
     given = arguments.parse_args()
+    parts = list(dict.fromkeys(given.parts))
+    sys.stdout.reconfigure(errors="backslashreplace")
 
     LOGS.mkdir(parents=True, exist_ok=True)
+    lock = (LOGS / "lock").open("w")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        sys.exit(f"parts of this folder run already ({LOGS}): wait for their end")
+
     numbers = range(1, given.runs + 1)
-    label = "{part}".format if given.runs == 1 else "{part}-{run}".format
-    runner = Runner((part, label(part=part, run=run)) for run in numbers for part in given.parts)
+    label = "{part}" if given.runs == 1 else "{part}-{run}"
+    runner = Runner((part, label.format(part=part, run=run)) for run in numbers for part in parts)
     workers = [threading.Thread(target=runner.work) for _ in range(given.jobs)]
     begun = time.monotonic()
+    for ending in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(ending, lambda sign, _: sys.exit(128 + sign))
     hogs = load(given.load) if given.load else None
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    idle = False
     try:
         for worker in workers:
             worker.start()
@@ -125,18 +159,23 @@ def main():
     finally:
         runner.stop()
         if hogs:
+            idle = hogs.poll() is not None
             hogs.terminate()
             hogs.wait()
 
     for run in runner.over:
         for line in run.skipped:
             print(line)
-    failed = sum(not run.passed for run in runner.over)
+    if idle:
+        print("the load ended before the parts")
     skipped = sum(run.passed and bool(run.skipped) for run in runner.over)
+    passed = sum(run.passed for run in runner.over) - skipped
+    # What did not come to its end has failed.
+    failed = runner.count - passed - skipped
     print(f"{time.monotonic() - begun:.0f} s in all; logs are in {LOGS.relative_to(REPOSITORY)}")
     tail = f", {skipped} skipped" if skipped else ""
-    print(f"{len(runner.over) - failed - skipped} passed, {failed} failed{tail}")
-    sys.exit(bool(failed or given.strict and skipped))
+    print(f"{passed} passed, {failed} failed{tail}")
+    sys.exit(bool(failed or not passed or idle or given.strict and skipped))
 
 
 if __name__ == "__main__":

@@ -143,6 +143,8 @@ static void port_send(port *p, const uint8_t *bytes, size_t size)
 #define TICK_US 100u
 /* The command that asks how many bytes were taken. */
 #define CLOCK_COUNT 0
+/* The command that a new host begins with, and both bytes of its answer. */
+#define CLOCK_SYNC 255
 
 static struct {
     bool stepped;         /* by a host, from its first byte on */
@@ -178,11 +180,14 @@ static uint64_t now_us(void)
     return (uint64_t)high << 32 | low;
 }
 
+/* A number of bytes, 254 for more. */
+static uint8_t byte_count(uint32_t bytes) { return bytes < 254 ? (uint8_t)bytes : 254; }
+
 static void clock_answer(uint8_t answer)
 {
     uint32_t sent = st_port.sent + rmd_port.sent;
-    uint32_t more = sent - board_clock.sent;
-    const uint8_t bytes[] = { answer, more < 255 ? (uint8_t)more : 255 };
+    uint8_t second = answer == CLOCK_SYNC ? CLOCK_SYNC : byte_count(sent - board_clock.sent);
+    const uint8_t bytes[] = { answer, second };
 
     board_clock.taken = st_port.taken + rmd_port.taken;
     board_clock.sent = sent;
@@ -192,10 +197,11 @@ static void clock_answer(uint8_t answer)
 /* Obeys the clock port. To be called when everything that is due now is done. Returns whether there
  * may be more to do at once.
  *
- * A command is a byte, and its answer is two. 1 to 255 advances by so many ticks, but no further than
+ * A command is a byte, and its answer is two. 1 to 254 advances by so many ticks, but no further than
  * the first tick at whose end bytes have moved on the other ports since the last answer; the answer
  * is the number of ticks. 0 asks for the number of bytes that the other ports have taken since the
- * last answer, 255 for more. The second byte is the number of bytes that they have sent since then. */
+ * last answer, 254 for more. The second byte is the number of bytes that they have sent since then. 255
+ * is answered with 255 twice: what comes before that answers a former host. */
 static bool clock_serve(void)
 {
     uint32_t taken = st_port.taken + rmd_port.taken - board_clock.taken;
@@ -218,7 +224,9 @@ static bool clock_serve(void)
     board_clock.now = now_us();
     board_clock.stepped = true;
     if (command == CLOCK_COUNT) {
-        clock_answer(taken < 255 ? (uint8_t)taken : 255);
+        clock_answer(byte_count(taken));
+    } else if (command == CLOCK_SYNC) {
+        clock_answer(CLOCK_SYNC);
     } else {
         board_clock.ticks = command;
         board_clock.done = 0;
@@ -366,8 +374,6 @@ int main(void)
     port_start(&rmd_port);
     port_start(&clock_port);
     NVIC_ISER1 = 1u << (USART1_IRQ - 32) | 1u << (USART2_IRQ - 32) | 1u << (USART3_IRQ - 32);
-    /* Tells whoever is connected to the clock port that the board is ready. */
-    clock_answer(0);
     for (;;) {
         bool reached = plant_advance(motors, now_us()) != 0;
         /* Bytes may have come while the motors advanced: their time is not the one before. */

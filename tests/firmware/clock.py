@@ -1,11 +1,13 @@
 """The clock port of a board: who is connected to it says how the board's time passes."""
 
+import contextlib
 import socket
 import time
 
 TICK = 1e-4
-MOST_TICKS = 255
+MOST_TICKS = 254
 COUNT = 0
+SYNC = 255
 # A machine under load may take so long for anything.
 PATIENCE = 30
 
@@ -25,6 +27,7 @@ class Clock:
         self.ticks = 0
         # How many bytes the board has sent, which the line's user takes off.
         self.due = 0
+        self.synchronise()
 
     def __enter__(self):
         return self
@@ -35,19 +38,34 @@ class Clock:
     def close(self):
         self.line.close()
 
+    def synchronise(self):
+        """Drops what the board still answers to a former host; asks again while it does not listen yet."""
+        deadline = time.monotonic() + PATIENCE
+        self.line.settimeout(0.1)
+        answer = None
+        while answer != SYNC:
+            assert time.monotonic() < deadline, "the board's clock port does not answer"
+            self.line.sendall(bytes([SYNC]))
+            with contextlib.suppress(TimeoutError):
+                while (answer := self.byte()) != SYNC:
+                    pass
+        self.line.settimeout(PATIENCE)
+
     def ask(self, command):
         """Sends a command; gives the answer."""
         self.line.sendall(bytes([command]))
         return self.answer()
 
     def answer(self):
-        answer = b""
-        while len(answer) < 2:
-            more = self.line.recv(2 - len(answer))
-            assert more, "the board hung up"
-            answer += more
-        self.due += answer[1]
-        return answer[0]
+        while (answer := self.byte()) == SYNC:
+            pass
+        self.due += self.byte()
+        return answer
+
+    def byte(self):
+        received = self.line.recv(1)
+        assert received, "the board hung up"
+        return received[0]
 
     def delivered(self, count):
         """Waits, while the board's time stands still, until it has taken so many bytes."""

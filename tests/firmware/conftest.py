@@ -65,9 +65,8 @@ class Board:
                 int(re.search(r"127\.0\.0\.1:(\d+)", found[name])[1])
                 for name in ("st", "rmd", "clock")
             )
-            with self.clock() as clock:
-                self._do("cont")
-                clock.answer()
+            self._do("cont")
+            self.clock().close()
         except BaseException:
             self.end()
             raise

@@ -3,6 +3,7 @@
 import pytest
 
 import test_st_bytes
+from clock import MOST_TICKS
 from stmcp import ACK, EXECUTE, GET_REG, TIMEOUT, Line, frame, header, nack
 from test_st_bytes import (  # noqa: F401  # tests that run here with this file's fixture
     test_a_cut_off_frame_is_answered_with_timeout_after_25_ms,
@@ -123,3 +124,10 @@ def test_hosts_come_and_go(board):
             # What this host leaves behind is answered while nobody listens.
             line.port.advance(0.0249)
         board.advance(0.001)
+
+
+def test_a_host_that_ends_in_a_step_leaves_the_clock_in_order(board, st):
+    for _ in range(10):
+        with board.clock() as clock:
+            clock.line.sendall(bytes([MOST_TICKS]))
+        assert st("--json", "get", "STATUS").ended(0).json["STATUS"]["value"] == 0

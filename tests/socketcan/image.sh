@@ -34,7 +34,7 @@ unpack_debian() {
 "$tests/../install" binutils qemu-system-x86 seabios ipxe-qemu kmod cpio iproute2 can-utils ||
     unavailable "packages cannot be installed"
 # The lists of packages must not change meanwhile.
-exec 9>"${TMPDIR:-/tmp}/motorlink-apt.lock"
+exec 9>"${TMPDIR:-/tmp}/motorlink-apt-$(id -u).lock"
 flock 9
 unpack_debian >&2 || unavailable "Debian's kernel cannot be downloaded"
 exec 9>&-

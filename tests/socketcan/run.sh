@@ -16,7 +16,7 @@ status=0
 
 console=$made/console.log
 status=0
-timeout --kill-after=10 $limit qemu-system-x86_64 \
+timeout --foreground --kill-after=10 $limit qemu-system-x86_64 \
     -M pc -accel tcg -icount shift=0,sleep=off -rtc clock=vm -smp 1 -m 512 -nodefaults -no-reboot -display none -nic none \
     -kernel "$made/vmlinuz" -initrd "$made/initrd.gz" \
     -append "console=ttyS0 rdinit=/init quiet panic=-1 mitigations=off tsc=reliable" \

@@ -10,7 +10,7 @@ import pytest
 
 import motorlink
 from conftest import PATIENT, Served, eventually
-from motorlink import rmd
+from motorlink import rmd, sim
 
 
 def test_a_motor_moves_to_an_angle(rmd_bus: rmd.Bus) -> None:
@@ -82,8 +82,8 @@ def test_errors_are_named_and_cleared(served: Served) -> None:
 
 @pytest.fixture
 def brief_bus() -> Iterator[rmd.Bus]:
-    """A bus on which motors that are not there are not waited for for long."""
-    with rmd.open("sim:", timeout=0.3) as bus:
+    """A bus on virtual time, on which a timeout costs none."""
+    with rmd.open(sim.Bench(), timeout=0.3) as bus:
         yield bus
 
 

@@ -15,7 +15,7 @@ import pytest
 
 import motorlink
 from conftest import Served
-from motorlink import aio, rmd, st
+from motorlink import aio, rmd, sim, st
 
 
 def test_registers_are_sampled_in_their_units(st_bus: st.Bus) -> None:
@@ -118,7 +118,7 @@ def test_an_error_ends_it_with_what_there_was(served: Served) -> None:
 
 
 def test_a_motor_that_is_silent_can_be_passed_over() -> None:
-    with rmd.open("sim:", timeout=0.2, guard=0.01) as bus:
+    with rmd.open(sim.Bench(), timeout=0.2, guard=0.01) as bus:
         asked = {1: ["iq_a"], 9: ["iq_a"]}
         with pytest.raises(motorlink.Timeout) as silent:
             bus.sample(asked, rate=50, seconds=0.3)
@@ -245,7 +245,7 @@ def test_asyncio_samples_without_segments_where_the_drive_has_none(tmp_path: Any
 
 def test_others_have_their_turn_while_a_task_samples_and_a_cancelled_one_has_its_samples() -> None:
     async def main() -> None:
-        async with aio.st.open("sim:") as bus, aio.rmd.open("sim:", timeout=2) as motors:
+        async with aio.st.open("sim:") as bus, aio.rmd.open("sim:", timeout=30) as motors:
             names = ["SPEED_MEAS", "SPEED_REF"]
             tasks = [
                 asyncio.ensure_future(bus.sample(names, rate=1000, seconds=60)),

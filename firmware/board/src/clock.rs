@@ -20,6 +20,8 @@ const TIMER_HZ: u32 = 1_000_000_000;
 const TICK: Duration = Duration(100);
 /// The command that asks how many bytes were taken.
 const COUNT: u8 = 0;
+/// The command that a new host begins with, and both bytes of its answer.
+const SYNC: u8 = 255;
 
 /// Microseconds since the start, from TIM2, which counts by itself: no interrupt that comes late
 /// makes time run late.
@@ -48,10 +50,11 @@ struct Step {
 /// The timer's time until a byte comes on the clock port; from then on time stands still except
 /// while a command of that port advances it.
 ///
-/// A command is a byte, and its answer is two. 1 to 255 advances by so many ticks, but no further
+/// A command is a byte, and its answer is two. 1 to 254 advances by so many ticks, but no further
 /// than the first tick at whose end bytes have moved on the other ports since the last answer; the
 /// answer is the number of ticks. 0 asks for the number of bytes that the other ports have taken
 /// since the last answer. The second byte is the number of bytes that they have sent since then.
+/// 255 is answered with 255 twice: what comes before that answers a former host.
 pub struct Clock<R> {
     timer: Timer,
     port: Uart<R>,
@@ -85,11 +88,6 @@ impl<R: Deref<Target = RegisterBlock>> Clock<R> {
         }
     }
 
-    /// Tells whoever is connected to the clock port that the board is ready.
-    pub fn greet(&mut self) {
-        self.answer(0, Traffic::default());
-    }
-
     /// Obeys the clock port. To be called when everything that is due now is done; `traffic` is what
     /// has moved on the other ports. Returns whether there may be more to do at once.
     pub fn serve(&mut self, traffic: Traffic) -> bool {
@@ -111,6 +109,7 @@ impl<R: Deref<Target = RegisterBlock>> Clock<R> {
                 }
                 self.stepped = Some(self.now());
                 match command {
+                    [SYNC] => self.answer(SYNC, traffic),
                     [COUNT] => self.answer(traffic.taken_since(self.answered), traffic),
                     [ticks] => self.step = Some(Step { ticks, done: 0 }),
                 }
@@ -120,7 +119,7 @@ impl<R: Deref<Target = RegisterBlock>> Clock<R> {
     }
 
     fn answer(&mut self, answer: u8, traffic: Traffic) {
-        let sent = traffic.sent_since(self.answered);
+        let sent = if answer == SYNC { SYNC } else { traffic.sent_since(self.answered) };
         self.answered = traffic;
         // Writing never fails.
         let _ = self.port.write(&[answer, sent]);

@@ -46,7 +46,6 @@ fn main() -> ! {
         // loop is behind critical sections.
         unsafe { NVIC::unmask(interrupt) };
     }
-    clock.greet();
     loop {
         let caught_up = plant.advance(clock.now());
         // Bytes may have come while the motors advanced: their time is not the one before.

@@ -45,15 +45,20 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// How many bytes were taken since `earlier`; 255 for more.
+    /// How many bytes were taken since `earlier`; 254 for more.
     pub fn taken_since(self, earlier: Traffic) -> u8 {
-        self.taken.wrapping_sub(earlier.taken).try_into().unwrap_or(u8::MAX)
+        count(self.taken.wrapping_sub(earlier.taken))
     }
 
-    /// How many bytes were sent since `earlier`; 255 for more.
+    /// How many bytes were sent since `earlier`; 254 for more.
     pub fn sent_since(self, earlier: Traffic) -> u8 {
-        self.sent.wrapping_sub(earlier.sent).try_into().unwrap_or(u8::MAX)
+        count(self.sent.wrapping_sub(earlier.sent))
     }
+}
+
+/// A number of bytes; 254 for more.
+fn count(bytes: u32) -> u8 {
+    bytes.min(254) as u8
 }
 
 impl Add for Traffic {

@@ -15,13 +15,17 @@ use crate::clock::WeakClock;
 /// How far a board's time advances by one.
 const TICK: Duration = Duration(100);
 /// The most ticks that one command asks for.
-const MOST_TICKS: u64 = 255;
+const MOST_TICKS: u64 = 254;
 /// The command that asks how many bytes the board has taken.
 const COUNT: u8 = 0;
+/// The command that a new host begins with, and both bytes of its answer; no other answer has this byte.
+const SYNC: u8 = 255;
 /// How long bytes that the board has sent may take to arrive, in the machine's time. Those of the
 /// board's other line never do.
 const ARRIVAL: time::Duration = time::Duration::from_secs(1);
-/// How many bytes are sent before the board has taken them: it counts up to 255.
+/// How long after an unanswered [`SYNC`] the next one is sent, in the machine's time.
+const ASK_AGAIN: time::Duration = time::Duration::from_millis(100);
+/// How many bytes are sent before the board has taken them: it counts up to 254.
 const CHUNK: usize = 128;
 
 /// A [`ByteLink`] on the time of an emulated board, which passes only while somebody waits.
@@ -59,27 +63,48 @@ impl EmulatedLine {
         let clock = clock_of(&name);
         let reached = clock.now();
         let mut line = EmulatedLine { data, board, clock, reached, due: 0, patience, name };
-        line.ask(COUNT)?;
-        line.due = 0;
+        line.synchronise()?;
         Ok(line)
+    }
+
+    /// Drops what the board still answers to a former host. Asks again while the board does not listen
+    /// yet.
+    fn synchronise(&mut self) -> Result<(), PortError> {
+        let began = time::Instant::now();
+        let mut byte = [0];
+        while began.elapsed() < self.patience {
+            self.board.write(&[SYNC])?;
+            while self.board.read(&mut byte, Some(ASK_AGAIN.min(self.patience)))? > 0 {
+                if byte == [SYNC] {
+                    return Ok(());
+                }
+            }
+        }
+        Err(self.stopped())
     }
 
     /// Sends a command to the clock port; gives the answer.
     fn ask(&mut self, command: u8) -> Result<u8, PortError> {
-        let mut answer = [0; 2];
         self.board.write(&[command])?;
-        let mut size = 0;
-        while size < answer.len() {
-            size += match self.board.read(&mut answer[size..], Some(self.patience))? {
-                0 => {
-                    let (port, after) = (self.name.clone(), self.patience);
-                    return Err(PortError::ClockStopped { port, after });
-                }
-                more => more,
-            };
+        let mut answer = self.answer()?;
+        while answer == SYNC {
+            answer = self.answer()?;
         }
-        self.due += usize::from(answer[1]);
-        Ok(answer[0])
+        self.due += usize::from(self.answer()?);
+        Ok(answer)
+    }
+
+    /// The next byte of an answer.
+    fn answer(&mut self) -> Result<u8, PortError> {
+        let mut byte = [0];
+        match self.board.read(&mut byte, Some(self.patience))? {
+            0 => Err(self.stopped()),
+            _ => Ok(byte[0]),
+        }
+    }
+
+    fn stopped(&self) -> PortError {
+        PortError::ClockStopped { port: self.name.clone(), after: self.patience }
     }
 
     /// Lets the board's time advance towards `end`. It stops early when bytes move.
@@ -205,6 +230,11 @@ mod tests {
                     due.push_back((now + delay, byte[0].wrapping_add(1)));
                     moved += 1;
                 }
+                if command[0] == SYNC {
+                    clock.write_all(&[SYNC; 2]).unwrap();
+                    moved = 0;
+                    continue;
+                }
                 let mut answer = 0;
                 if command[0] == COUNT {
                     answer = moved;
@@ -246,6 +276,22 @@ mod tests {
     fn name() -> String {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         format!("clock {}", COUNT.fetch_add(1, Ordering::Relaxed))
+    }
+
+    #[test]
+    fn what_a_former_host_left_is_dropped() {
+        let ((data, far_data), (clock, mut far_clock)) = (pair(), pair());
+        // It was ended in a step, or in the middle of an answer.
+        far_clock.write_all(&[7, 250, 3]).unwrap();
+        let board = board(far_clock, far_data, 250);
+        let data = FdLink::new(data, "data").unwrap();
+        let mut line = EmulatedLine::new(data, link(clock), name()).unwrap();
+        line.write(&[7]).unwrap();
+        let mut byte = [0];
+        assert_eq!(line.read(&mut byte, None).unwrap(), 1);
+        assert_eq!((byte[0], line.clock.now()), (8, Instant(25_100)));
+        drop(line);
+        assert_eq!(board.join().unwrap(), 251);
     }
 
     #[test]
