@@ -19,9 +19,12 @@ BENCH_VENV := $(CURDIR)/.venv-bench
 # Which tests of a part to run: arguments of cargo test for unit, fuzz-replay and miri; of pytest, in
 # the folder of the tests, for e2e, python and firmware-test.
 T =
+# What `make check` leaves to `make test`: the tests of Rust that take seconds.
+QUICK := $(addprefix --skip=,mutants suite nothing_grows stood_still every_promise every_header)
 # Tests that pytest runs at a time. Most of them wait.
 WORKERS ?= 4
-PYTEST = $(VENV)/bin/python -m pytest -q -n $(WORKERS)
+PYTEST_FLAGS = -q -rs -n $(WORKERS) --dist worksteal
+PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 
 # The program with the features of the whole workspace: built once for all parts.
 PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --locked
@@ -52,7 +55,7 @@ test: toolchain ## all parts below; installs what they need. STRICT=1: none may 
 check: toolchain ## format, clippy and the quick tests, while you work
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
-	$(CARGO) test --workspace --all-features --locked --quiet
+	$(CARGO) test --workspace --all-features --locked --quiet --lib --bins --tests -- $(QUICK)
 
 flakes: toolchain ## the parts that wait for time, RUNS=5 times, beside LOAD=4 processes that compute
 	@$(PYTHON) tests/parts.py --jobs 1 --runs $(RUNS) --load $(LOAD) $(TIMED)
@@ -67,7 +70,7 @@ python: $(PYTHON_VENV)/ready ## the Python package: its build, types, examples, 
 	$(PYTHON_VENV)/bin/python -m mypy --strict -p motorlink
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m mypy --strict --cache-dir $(CURDIR)/.mypy_cache .
 	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
-	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m pytest -q -n $(WORKERS) $(T)
+	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
 e2e: $(VENV)/ready ## the built program against independent clients on ptys and loopback
 	$(PROGRAM)
