@@ -47,7 +47,7 @@ help: ## this list
 demo: toolchain ## simulated drives, driven through real ports
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
-test: toolchain ## all parts below; installs what they need. STRICT=1: none may be skipped
+test: toolchain ## all parts below; PARTS="unit e2e": some; STRICT=1: skip none
 	$(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
 	$(if $(T),$(error T= is for one part: make PART T="..."))
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict) $(PARTS)
@@ -57,7 +57,7 @@ check: toolchain ## format, clippy and the quick tests, while you work
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	$(CARGO) test --workspace --all-features --locked --quiet --lib --bins --tests -- $(QUICK)
 
-flakes: toolchain ## the parts that wait for time, RUNS=5 times, beside LOAD=4 processes that compute
+flakes: toolchain ## parts that wait for time, RUNS=5 times beside a load of LOAD=4
 	@$(PYTHON) tests/parts.py --jobs 1 --runs $(RUNS) --load $(LOAD) $(TIMED)
 
 # ---- Parts of make test. T="..." runs some tests of a part. ----
@@ -72,14 +72,14 @@ python: $(PYTHON_VENV)/ready ## the Python package: its build, types, examples, 
 	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
-e2e: $(VENV)/ready ## the built program against independent clients on ptys and loopback
+e2e: $(VENV)/ready ## the program against independent clients on ptys and loopback
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
 
 NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
 	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
 # With few cases a property; brute force is left out.
-miri: ## proto and the C face, in an interpreter that sees undefined behaviour
+miri: ## proto and the C face without undefined behaviour
 	@{ $(NIGHTLY_READY); } || \
 		{ echo "SKIPPED: miri: $(NIGHTLY) cannot be installed" >&2; exit 0; }; \
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
@@ -104,18 +104,18 @@ ffi-test: ## the C face: sanitizers, valgrind, C against the program
 fuzz-replay: ## fuzz targets with their seeds and with what fuzzing found
 	cd fuzz && $(CARGO) test --locked $(FUZZ_TARGET) $(T)
 
-test-socketcan: ## the port socketcan: in Debian's kernel in QEMU, against can-utils
+test-socketcan: ## the port socketcan: in a CAN kernel in QEMU
 	CARGO="$(CARGO)" tests/socketcan/run.sh || [ $$? -eq 77 ]
 
 SIZES = $(PYTHON) sizes.py $(or $(CARGO_TARGET_DIR),target)/$(TARGET)/release
-probe: board-target ## the protocols on a Cortex-M4: no panic, within flash and RAM
+probe: board-target ## the protocols on a Cortex-M4: no panic, flash, RAM
 	cd probe && $(CARGO) build --release --locked && $(SIZES) --check
 	cd firmware && $(CARGO) fmt --check && $(CARGO) clippy --release --locked -- -D warnings
 	$(CARGO) build -p motorlink-embedded -p motorlink-sim --target $(TARGET) --locked
 
 FINGERPRINT = $(CARGO) run --quiet --locked -p motorlink-sim --example fingerprint
 PLAIN := --target-dir target/plain --config profile.dev.package.motorlink-sim.opt-level=0
-determinism: ## simulated drives with and without optimisation, to the last digit
+determinism: ## simulated drives, optimised or not, to the last digit
 	mkdir -p target
 	$(FINGERPRINT) > target/fingerprint
 	$(FINGERPRINT) --release > target/fingerprint.release
@@ -126,7 +126,7 @@ determinism: ## simulated drives with and without optimisation, to the last digi
 # What was checked is in deny.checked. cortex-m carries two versions of embedded-hal, so the firmware may
 # have duplicates.
 LOCKED := deny.toml Cargo.lock fuzz/Cargo.lock probe/Cargo.lock firmware/Cargo.lock
-deny: ## licences, sources, known holes of dependencies that changed (FORCE=1: all)
+deny: ## licences and known holes of dependencies; FORCE=1
 	@sums=$$(sha256sum $(LOCKED)) || exit; unknown="SKIPPED: advisories: their list could not be fetched"; \
 	if [ -z "$(FORCE)" ] && [ "$$sums" = "$$(grep -v '^advisories' deny.checked 2>/dev/null)" ]; then \
 		echo "these lock files were checked (deny.checked); FORCE=1 checks them again"; \
@@ -150,11 +150,11 @@ fuzz: nightly ## every fuzz target for SECONDS=60 each
 	NIGHTLY=$(NIGHTLY) fuzz/run $(SECONDS)
 
 # Memory and descriptors do not grow.
-soak: ## a million exchanges a protocol with a thousand reconnects, some minutes
+soak: ## a million exchanges with a thousand reconnects
 	$(CARGO) test --release --locked -p motorlink --all-features --test soak -- --ignored --nocapture
 
 # Fails with a seed and a trace where a promise is broken.
-reliability: ## some 90 million exchanges on lines that misbehave, into docs/RELIABILITY.md
+reliability: ## 90 million exchanges on bad lines, docs/RELIABILITY.md
 	$(CARGO) run --release --locked -p motorlink-reliability -- --update docs/RELIABILITY.md
 
 bench: $(BENCH_VENV)/ready bench-python ## ratios and instruction counts, as in docs/BENCHMARKS.md
@@ -194,7 +194,7 @@ pictures: ## docs/pictures: the scenarios are played and drawn
 	done
 
 PREFIX ?= /usr/local
-install-c: ## C header and libraries, pkg-config and CMake files: PREFIX=/usr/local DESTDIR=
+install-c: ## C header and libraries: PREFIX=/usr/local DESTDIR=
 	CARGO="$(CARGO)" crates/ffi/packaging/install $(PREFIX) $(DESTDIR)
 
 wheel: $(PYTHON_VENV)/ready ## the Python package as a wheel, in target/wheels

@@ -113,7 +113,7 @@ class Runner:
 def load(count):
     """`count` processes that compute without end, at the priority of the tests."""
     subprocess.run([REPOSITORY / "tests/install", "stress-ng"], check=True)
-    # They end with this process, however it ends.
+    # They end with this process, even if it is killed.
     ending = ["setpriv", "--pdeathsig", "TERM"]
     return subprocess.Popen([*ending, "stress-ng", "--quiet", "--cpu", str(count)])
 

@@ -68,7 +68,7 @@ class Clock:
         return received[0]
 
     def delivered(self, count):
-        """Waits, while the board's time stands still, until it has taken so many bytes."""
+        """Waits until the board has taken so many bytes. Its time does not advance."""
         deadline = time.monotonic() + PATIENCE
         while count > 0:
             taken = self.ask(COUNT)

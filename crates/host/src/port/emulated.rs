@@ -123,7 +123,7 @@ impl EmulatedLine {
         Ok(())
     }
 
-    /// Waits, while the board's time stands still, until it has taken `count` bytes.
+    /// Waits until the board has taken `count` bytes. Its time does not advance.
     fn delivered(&mut self, count: usize) -> Result<(), PortError> {
         let mut left = count;
         let mut last = time::Instant::now();
