@@ -70,7 +70,7 @@ fn nobodys() -> impl Iterator<Item = u8> {
 pub(super) fn cases() -> Vec<Case<Bench>> {
     let mut cases = vec![
         case("a_reply_has_the_identifier_of_its_motor", &["RMD-1-01"], |bench| {
-            let frames = bench.collect(&[bench.frame(ReadStatus1.encode())])?;
+            let frames = bench.replies(&[bench.frame(ReadStatus1.encode())])?;
             let own = u32::from(bench.id().can_id());
             let same = frames.iter().any(|frame| frame.id() == own && !frame.is_extended());
             bench.require(same, format!("a reply on {own:#05x}"))

@@ -4,7 +4,7 @@ use motorlink_proto::rmd::{Stop as Halt, *};
 use motorlink_proto::time::Duration;
 use motorlink_proto::units::DpsPerSecond;
 
-use super::bench::{Bench, PATIENCE};
+use super::bench::Bench;
 use crate::case::{Need, Stop};
 use crate::world::Unavailable;
 
@@ -32,6 +32,8 @@ const FASTER: u16 = 30;
 const ATTEMPTS: u32 = 3;
 /// How long a motor may take to come to rest, ms.
 const COASTING: u64 = 10_000;
+/// What is around a motor changes more slowly than what is on its bus.
+const CHANGE: Duration = Duration::from_millis(100);
 /// How long a motor may take until it answers when its power came back, ms.
 const STARTING: u64 = 5_000;
 
@@ -81,7 +83,8 @@ impl Bench {
     }
 
     fn answers_at_all(&mut self) -> Result<bool, Stop> {
-        Ok(!self.answers(&[self.frame(ReadStatus1.encode())])?.is_empty())
+        let replies = self.replies(&[self.frame(ReadStatus1.encode())])?;
+        Ok(replies.iter().any(|frame| self.is_own(frame)))
     }
 
     /// The gains; remembers them.
@@ -147,8 +150,7 @@ impl Bench {
     pub(super) fn fault(&mut self, present: bool) -> Result<(), Stop> {
         self.kept.fault = true;
         self.world.fault(present)?;
-        // What is around a motor changes more slowly than what is on its bus.
-        self.pause(PATIENCE)
+        self.pause(CHANGE)
     }
 
     /// Switches off what was moved, ends a fault, writes back what was written. Each is tried
@@ -202,7 +204,7 @@ impl Bench {
             return Ok(());
         }
         let off = motors.map(|motor| CanFrame::new(motor.can_id(), Off.encode()));
-        let told = self.collect(&off.collect::<Vec<_>>());
+        let told = self.replies(&off.collect::<Vec<_>>());
         if told.is_err() {
             self.off_unheard(motors)?;
         }
@@ -213,7 +215,7 @@ impl Bench {
         self.world.fault(false).map_err(|Unavailable(why)| {
             self.failed(format!("the fault to be ended; end it by hand ({why})"))
         })?;
-        self.pause(PATIENCE)?;
+        self.pause(CHANGE)?;
         self.read(ClearErrors).map(|_| ())
     }
 

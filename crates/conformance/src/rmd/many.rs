@@ -94,7 +94,7 @@ fn ask_all(bench: &mut Bench) -> Result<(MotorSet, Vec<CanFrame>), Stop> {
     reach(bench)?;
     let status = ReadStatus2.encode();
     let question = |motor: MotorId| CanFrame::new(motor.can_id(), status);
-    let there = bench.collect(&MotorSet::TORQUE4.map(question).collect::<Vec<_>>())?;
+    let there = bench.replies(&MotorSet::TORQUE4.map(question).collect::<Vec<_>>())?;
     let mut motors = MotorSet::EMPTY;
     for (frame, motor) in there.iter().filter_map(|frame| Some((frame, motor(frame)?))) {
         let turns = frame.usable().is_none_or(|(_, data)| {
@@ -108,7 +108,7 @@ fn ask_all(bench: &mut Bench) -> Result<(MotorSet, Vec<CanFrame>), Stop> {
     }
     bench.may_move();
     bench.may_move_too(motors);
-    let mut replies = bench.collect(&[frame([TorqueCommand(0); 4])])?;
+    let mut replies = bench.replies(&[frame([TorqueCommand(0); 4])])?;
     replies.retain(|frame| motor(frame).is_some());
     Ok((motors, replies))
 }
