@@ -209,6 +209,7 @@ proptest! {
 
     /// Each host sees the other's requests and the replies to them.
     #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn two_hosts_that_talk_to_different_motors_do_not_mix(
         steps in prop::collection::vec((1u8..=8, prop::sample::select(Code::ALL)), 1..60),
     ) {

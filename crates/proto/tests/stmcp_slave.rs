@@ -92,6 +92,7 @@ fn a_byte_behind_the_deadline_begins_a_new_command() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn a_length_over_128_is_answered_with_timeout_after_25_ms_of_silence() {
     let mut bench = spec();
     for length in 129..=255u8 {
@@ -246,6 +247,7 @@ fn dac_channels_show_registers_of_access_d() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn commands_are_acknowledged_as_table_4_says() {
     let log = |bench: &Bench| bench.drive.log.join(", ");
     for number in 0..=255u8 {
