@@ -1,4 +1,5 @@
-# `make help` lists what there is; the text behind ## is what it prints. docs/CHECKS.md has the times.
+# `make help` lists what there is; the text behind ## is what it prints. Times are those of a fresh clone on
+# two cores with two parts at a time; docs/CHECKS.md has them exactly.
 
 CARGO ?= cargo
 PYTHON ?= python3
@@ -44,78 +45,78 @@ SECONDS ?= 60
 help: ## this list
 	@sed -nE 's/^([a-z0-9-]+):[^#]*## (.*)/\1\t\2/p' Makefile | expand -t 16
 
-demo: toolchain ## simulated drives, driven through real ports
+demo: toolchain ## 1 min: simulated drives, driven through real ports
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
-test: toolchain ## all parts below; PARTS="unit e2e": some; STRICT=1: skip none
+test: toolchain ## 15 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
 	$(if $(T),$(error T= is for one part: make PART T="..."))
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict) $(PARTS)
 
-check: toolchain ## format, clippy and the quick tests, while you work
+check: toolchain ## 1 min: format, clippy and the quick tests, while you work
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	$(CARGO) test --workspace --all-features --locked --quiet --lib --bins --tests -- $(QUICK)
 
-flakes: toolchain ## parts that wait for time, RUNS=5 times beside a load of LOAD=4
+flakes: toolchain ## 1 h: parts that wait for time, RUNS=5 times beside LOAD=4 hogs
 	@$(PYTHON) tests/parts.py --jobs 1 --runs $(RUNS) --load $(LOAD) $(TIMED)
 
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
-unit: ## tests in Rust
+unit: ## 4 min: tests in Rust
 	$(CARGO) test --workspace --all-features --locked $(T)
 
-python: $(PYTHON_VENV)/ready ## the Python package: its build, types, examples, tests
+python: $(PYTHON_VENV)/ready ## 3 min: the Python package: its build, types, examples, tests
 	$(PYTHON_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
 	$(PYTHON_VENV)/bin/python -m mypy --strict -p motorlink
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m mypy --strict --cache-dir $(CURDIR)/.mypy_cache .
 	$(PYTHON_VENV)/bin/python -m mypy.stubtest motorlink._core
 	cd bindings/python/tests && $(PYTHON_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
-e2e: $(VENV)/ready ## the program against independent clients on ptys and loopback
+e2e: $(VENV)/ready ## 2 min: the program against independent clients
 	$(PROGRAM)
 	cd tests/e2e && MOTORLINK_BIN=$(DEBUG)/motorlink $(PYTEST) $(T)
 
 NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
 	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
 # With few cases a property; brute force is left out.
-miri: ## proto and the C face without undefined behaviour
+miri: ## 3 min: proto and the C face without undefined behaviour
 	@{ $(NIGHTLY_READY); } || \
 		{ echo "SKIPPED: miri: $(NIGHTLY) cannot be installed" >&2; exit 0; }; \
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
 		$(CARGO) +$(NIGHTLY) miri test -p motorlink-proto -p motorlink-ffi --locked $(T)
 
-firmware-test: $(VENV)/ready ## boards in QEMU against the conformance kit and hosts
+firmware-test: $(VENV)/ready ## 4 min: boards in QEMU against the conformance kit and hosts
 	CARGO="$(CARGO)" PYTEST="$(PYTEST)" tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
 
 # The fuzz targets are a workspace of their own with the same dependencies.
 FUZZ_TARGET := --target-dir $(DEBUG)/..
-lint: ## format, clippy, rustdoc: no warning
+lint: ## 3 min: format, clippy, rustdoc: no warning
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	cd fuzz && $(CARGO) fmt --check && $(CARGO) clippy --all-targets --locked $(FUZZ_TARGET) -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked
 
 # That the header is up to date is a test of unit.
-ffi-test: ## the C face: sanitizers, valgrind, C against the program
+ffi-test: ## 2 min: the C face: sanitizers, valgrind, C against the program
 	$(PROGRAM)
 	CARGO="$(CARGO)" crates/ffi/tests/c/run $(DEBUG)/motorlink || [ $$? -eq 77 ]
 
-fuzz-replay: ## fuzz targets with their seeds and with what fuzzing found
+fuzz-replay: ## 1 min: fuzz targets with their seeds and old findings
 	cd fuzz && $(CARGO) test --locked $(FUZZ_TARGET) $(T)
 
-test-socketcan: ## the port socketcan: in a CAN kernel in QEMU
+test-socketcan: ## 2 min: the port socketcan: in a CAN kernel in QEMU
 	CARGO="$(CARGO)" tests/socketcan/run.sh || [ $$? -eq 77 ]
 
 SIZES = $(PYTHON) sizes.py $(or $(CARGO_TARGET_DIR),target)/$(TARGET)/release
-probe: board-target ## the protocols on a Cortex-M4: no panic, flash, RAM
+probe: board-target ## 1 min: the protocols on a Cortex-M4: no panic, flash, RAM
 	cd probe && $(CARGO) build --release --locked && $(SIZES) --check
 	cd firmware && $(CARGO) fmt --check && $(CARGO) clippy --release --locked -- -D warnings
 	$(CARGO) build -p motorlink-embedded -p motorlink-sim --target $(TARGET) --locked
 
 FINGERPRINT = $(CARGO) run --quiet --locked -p motorlink-sim --example fingerprint
 PLAIN := --target-dir target/plain --config profile.dev.package.motorlink-sim.opt-level=0
-determinism: ## simulated drives, optimised or not, to the last digit
+determinism: ## 1 min: simulated drives, optimised or not, to the last digit
 	mkdir -p target
 	$(FINGERPRINT) > target/fingerprint
 	$(FINGERPRINT) --release > target/fingerprint.release
@@ -126,7 +127,7 @@ determinism: ## simulated drives, optimised or not, to the last digit
 # What was checked is in deny.checked. cortex-m carries two versions of embedded-hal, so the firmware may
 # have duplicates.
 LOCKED := deny.toml Cargo.lock fuzz/Cargo.lock probe/Cargo.lock firmware/Cargo.lock
-deny: ## licences and known holes of dependencies; FORCE=1
+deny: ## 4 min: licences, known holes; 0 if nothing changed; FORCE=1
 	@sums=$$(sha256sum $(LOCKED)) || exit; unknown="SKIPPED: advisories: their list could not be fetched"; \
 	if [ -z "$(FORCE)" ] && [ "$$sums" = "$$(grep -v '^advisories' deny.checked 2>/dev/null)" ]; then \
 		echo "these lock files were checked (deny.checked); FORCE=1 checks them again"; \
