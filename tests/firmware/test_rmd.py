@@ -1,9 +1,11 @@
 """The board's RMD motors: as frames through slcan, and as `motorlink rmd` drives them."""
 
+import time
+
 import pytest
 
 import test_rmd_can
-from clock import connect
+from clock import PATIENCE, connect
 from test_rmd_can import (  # noqa: F401  # tests that run here with this file's fixture
     Host,
     test_a_closed_loop_command_is_answered_as_status_2_is,
@@ -61,6 +63,7 @@ def test_garbage_at_full_speed_leaves_the_drives_in_order(board, rmd):
     with connect(board.rmd) as line:
         line.sendall(garbage)
         line.settimeout(0.2)
+        deadline = time.monotonic() + PATIENCE
         received = b""
         while not received.endswith(VERSION):
             try:
@@ -68,6 +71,7 @@ def test_garbage_at_full_speed_leaves_the_drives_in_order(board, rmd):
                 assert more, "the board hung up"
                 received += more
             except TimeoutError:
+                assert time.monotonic() < deadline, "the adapter does not answer"
                 # Overruns may have taken the last question.
                 line.sendall(b"\rV\r")
     assert rmd("-i", 1, "--json", "status").ended(0).json["voltage"] == 24.0
