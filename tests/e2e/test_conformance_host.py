@@ -65,11 +65,12 @@ def test_our_bus_passes_every_scenario_for_one_motor(check, motorlink):
     assert sum(case["verdict"] == "passed" for case in cases.values()) == 17
 
 
-# Hosts as people write them.
+# Hosts as people write them. The naive ones give up sooner than the drive is told, so that on a busy
+# machine, too, a late reply comes after that.
 
 
 def test_a_naive_host_of_the_serial_protocol_is_caught(check):
-    code, cases = check("st", "--timeout", "200ms", *python("naive_st.py", 0.2))
+    code, cases = check("st", "--timeout", "300ms", *python("naive_st.py", 0.2))
     assert code == 1
     assert cases["every_reading_has_its_own_value"]["verdict"] == "passed"
     assert failed(cases) >= {
@@ -98,7 +99,7 @@ def test_a_careful_host_of_the_serial_protocol_passes(check):
 
 
 def test_a_naive_host_of_rmd_is_caught(check):
-    code, cases = check("rmd", "--timeout", "200ms", *python("naive_rmd.py", 0.2))
+    code, cases = check("rmd", "--timeout", "300ms", *python("naive_rmd.py", 0.2))
     assert code == 1
     assert cases["every_reading_has_its_own_value"]["verdict"] == "passed"
     assert failed(cases) >= {
