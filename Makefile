@@ -87,7 +87,8 @@ miri: ## 3 min: proto and the C face without undefined behaviour
 		$(CARGO) +$(NIGHTLY) miri test -p motorlink-proto -p motorlink-ffi --locked $(T)
 
 firmware-test: $(VENV)/ready ## 4 min: boards in QEMU against the conformance kit and hosts
-	CARGO="$(CARGO)" PYTEST="$(PYTEST)" tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
+	$(PROGRAM)
+	CARGO="$(CARGO)" PYTEST="$(PYTEST)" MOTORLINK_BIN=$(DEBUG)/motorlink tests/firmware/run.sh $(T) || [ $$? -eq 77 ]
 
 # The fuzz targets are a workspace of their own with the same dependencies.
 FUZZ_TARGET := --target-dir $(DEBUG)/..

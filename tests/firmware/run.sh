@@ -1,6 +1,7 @@
 #!/bin/sh
 # Builds both boards, boots them in QEMU and runs tests/firmware against them. Ends with 77 where the
-# packages for it cannot be had. PYTEST is how to run pytest, SUDO what makes a command root's.
+# packages cannot be installed. MOTORLINK_BIN is the built program, PYTEST how to run pytest, SUDO what
+# makes a command root's.
 set -eu
 tests=$(cd "$(dirname "$0")" && pwd)
 repository=$tests/../..
@@ -18,10 +19,8 @@ rustup target list --installed | grep -qx $target || rustup target add $target >
     unavailable "rustup cannot add the target $target"
 
 cd "$repository"
-${CARGO:-cargo} build --workspace --all-features --bin motorlink --locked --quiet
 firmware/build.sh
-MOTORLINK_BIN=${CARGO_TARGET_DIR:-$PWD/target}/debug/motorlink
 MOTORLINK_FIRMWARE=${CARGO_TARGET_DIR:-$PWD/firmware/target}/firmware
-export MOTORLINK_BIN MOTORLINK_FIRMWARE
+export MOTORLINK_FIRMWARE
 cd tests/firmware
 exec ${PYTEST:-python3 -m pytest -q} "$@"
