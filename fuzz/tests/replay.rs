@@ -5,6 +5,21 @@ use std::path::Path;
 
 use motorlink_fuzz::{TARGETS, run, seeds};
 
+/// The program of a target and its line in Cargo.toml; without them it is never fuzzed.
+#[test]
+fn every_target_has_a_fuzzer() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let manifest = fs::read_to_string(root.join("Cargo.toml")).expect("it can be read");
+    let programs = fs::read_dir(root.join("fuzz_targets")).expect("it can be listed");
+    for (target, _) in TARGETS {
+        let program = fs::read_to_string(root.join(format!("fuzz_targets/{target}.rs")))
+            .unwrap_or_else(|error| panic!("the program of {target}: {error}"));
+        assert!(program.contains(&format!("motorlink_fuzz::run(\"{target}\", data)")), "{target}");
+        assert!(manifest.contains(&format!("path = \"fuzz_targets/{target}.rs\"")), "{target}");
+    }
+    assert_eq!(programs.count(), TARGETS.len(), "a program in fuzz_targets is no target");
+}
+
 #[test]
 fn every_target_stands_its_seeds() {
     for (target, _) in TARGETS {

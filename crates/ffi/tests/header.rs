@@ -80,3 +80,22 @@ fn the_probe_for_panics_links_every_function() {
     assert!(functions(&header).count() > 80, "the header has functions");
     assert!(missing.is_empty(), "probe/src/bin/ffi.rs leaves out {missing:?}");
 }
+
+/// The compiler can forbid `unsafe` only for the whole crate.
+#[test]
+fn only_pointer_rs_has_unsafe_blocks() {
+    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
+    let mut with_blocks = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("it can be listed") {
+            let path = entry.expect("it can be listed").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if fs::read_to_string(&path).expect("it can be read").contains("unsafe {") {
+                with_blocks.push(path);
+            }
+        }
+    }
+    assert_eq!(with_blocks.len(), 1, "{with_blocks:?}");
+    assert!(with_blocks[0].ends_with("pointer.rs"), "{with_blocks:?}");
+}
