@@ -40,7 +40,7 @@ LOAD ?= 4
 SECONDS ?= 60
 
 .PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header
-.PHONY: install-c pictures semver fmt clean toolchain nightly board-target
+.PHONY: install-c pictures semver oldest fmt clean toolchain nightly board-target
 
 help: ## this list
 	@sed -nE 's/^([a-z0-9-]+):[^#]*## (.*)/\1\t\2/p' Makefile | expand -t 16
@@ -48,9 +48,10 @@ help: ## this list
 demo: toolchain ## 1 min: simulated drives, driven through real ports
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
-test: toolchain ## 15 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
+WHOLE = $(if $(T),$(error T= is for one part: make PART T="..."))
+test: toolchain ## 12 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
-	$(if $(T),$(error T= is for one part: make PART T="..."))
+	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict) $(PARTS)
 
 check: toolchain ## 1 min: format, clippy and the quick tests, while you work
@@ -59,7 +60,8 @@ check: toolchain ## 1 min: format, clippy and the quick tests, while you work
 	$(CARGO) test --workspace --all-features --locked --quiet --lib --bins --tests -- $(QUICK)
 
 flakes: toolchain ## 1 h: parts that wait for time, RUNS=5 times beside LOAD=4 hogs
-	@$(PYTHON) tests/parts.py --jobs 1 --runs $(RUNS) --load $(LOAD) $(TIMED)
+	$(WHOLE)
+	@$(PYTHON) tests/parts.py --runs $(RUNS) --load $(LOAD) $(if $(STRICT),--strict) $(TIMED)
 
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
@@ -80,7 +82,7 @@ e2e: $(VENV)/ready ## 2 min: the program against independent clients
 NIGHTLY_READY := rustup run $(NIGHTLY) cargo miri --version >/dev/null 2>&1 || \
 	rustup toolchain install $(NIGHTLY) --profile minimal --component miri --component rust-src
 # With few cases a property; brute force is left out.
-miri: ## 3 min: proto and the C face without undefined behaviour
+miri: ## 5 min: proto and the C face without undefined behaviour
 	@{ $(NIGHTLY_READY); } || \
 		{ echo "SKIPPED: miri: $(NIGHTLY) cannot be installed" >&2; exit 0; }; \
 	PROPTEST_CASES=2 MIRIFLAGS=-Zmiri-disable-isolation \
@@ -92,7 +94,7 @@ firmware-test: $(VENV)/ready ## 4 min: boards in QEMU against the conformance ki
 
 # The fuzz targets are a workspace of their own with the same dependencies.
 FUZZ_TARGET := --target-dir $(DEBUG)/..
-lint: ## 3 min: format, clippy, rustdoc: no warning
+lint: ## 2 min: format, clippy, rustdoc: no warning
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	cd fuzz && $(CARGO) fmt --check && $(CARGO) clippy --all-targets --locked $(FUZZ_TARGET) -- -D warnings
@@ -111,6 +113,7 @@ test-socketcan: ## 2 min: the port socketcan: in a CAN kernel in QEMU
 
 SIZES = $(PYTHON) sizes.py $(or $(CARGO_TARGET_DIR),target)/$(TARGET)/release
 probe: board-target ## 1 min: the protocols on a Cortex-M4: no panic, flash, RAM
+	cd probe && $(CARGO) fmt --check && $(CARGO) clippy --release --locked -- -D warnings
 	cd probe && $(CARGO) build --release --locked && $(SIZES) --check
 	cd firmware && $(CARGO) fmt --check && $(CARGO) clippy --release --locked -- -D warnings
 	$(CARGO) build -p motorlink-embedded -p motorlink-sim --target $(TARGET) --locked
@@ -125,25 +128,8 @@ determinism: ## 1 min: simulated drives, optimised or not, to the last digit
 	cmp target/fingerprint target/fingerprint.release
 	cmp target/fingerprint target/fingerprint.plain
 
-# What was checked is in deny.checked. cortex-m carries two versions of embedded-hal, so the firmware may
-# have duplicates.
-LOCKED := deny.toml Cargo.lock fuzz/Cargo.lock probe/Cargo.lock firmware/Cargo.lock
 deny: ## 4 min: licences, known holes; 0 if nothing changed; FORCE=1
-	@sums=$$(sha256sum $(LOCKED)) || exit; unknown="SKIPPED: advisories: their list could not be fetched"; \
-	if [ -z "$(FORCE)" ] && [ "$$sums" = "$$(grep -v '^advisories' deny.checked 2>/dev/null)" ]; then \
-		echo "these lock files were checked (deny.checked); FORCE=1 checks them again"; \
-		grep -q '^advisories checked' deny.checked || echo "$$unknown"; exit 0; fi; \
-	command -v cargo-deny >/dev/null || $(CARGO) install --locked cargo-deny || exit; \
-	checks="licenses bans sources"; known="advisories not checked"; \
-	if $(CARGO) deny fetch db >/dev/null 2>&1; then checks="$$checks advisories"; known="advisories checked"; \
-	else echo "$$unknown"; fi; \
-	for manifest in Cargo.toml fuzz/Cargo.toml probe/Cargo.toml; do \
-		echo "$$manifest: $$checks"; \
-		$(CARGO) deny --manifest-path $$manifest --config deny.toml check $$checks || exit; \
-	done; \
-	echo "firmware/Cargo.toml: licenses sources"; \
-	$(CARGO) deny --manifest-path firmware/Cargo.toml --config deny.toml check licenses sources || exit; \
-	printf '%s\n' "$$sums" "$$known" > deny.checked
+	CARGO="$(CARGO)" tests/deny $(if $(FORCE),force)
 
 # ---- Campaigns and figures ----
 
@@ -202,6 +188,12 @@ install-c: ## C header and libraries: PREFIX=/usr/local DESTDIR=
 wheel: $(PYTHON_VENV)/ready ## the Python package as a wheel, in target/wheels
 	$(PYTHON_VENV)/bin/python -m maturin build --quiet --release --out target/wheels
 
+# What rust-version promises.
+oldest: ## builds everything with the oldest Rust that is meant to work
+	rust=$$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml) && \
+		rustup toolchain install --profile minimal $$rust && \
+		$(CARGO) +$$rust check --workspace --all-features --locked --target-dir target/oldest
+
 # Breaks that the version number does not allow.
 semver: ## the public interface against the last release
 	@release=$$(git describe --tags --abbrev=0 --match 'v[0-9]*' 2>/dev/null) || \
@@ -211,7 +203,7 @@ semver: ## the public interface against the last release
 		-p motorlink-proto -p motorlink-sim -p motorlink --all-features
 
 fmt: ## formats the Rust code
-	$(CARGO) fmt --all
+	for workspace in . fuzz probe firmware; do (cd $$workspace && $(CARGO) fmt --all) || exit; done
 
 clean: ## removes all that was built or installed into this folder
 	$(CARGO) clean
