@@ -8,7 +8,7 @@ pub struct Clause {
     pub id: &'static str,
     /// What is demanded, of whom.
     pub text: &'static str,
-    /// Tests that hold a host to it: names of host scenarios or of this project's own tests.
+    /// Tests that hold a host to it: names of this project's own tests.
     pub host: &'static [&'static str],
     /// Why no drive is tested against it; empty where one is.
     pub untested: &'static str,
