@@ -40,7 +40,7 @@ LOAD ?= 4
 SECONDS ?= 60
 
 .PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header
-.PHONY: install-c pictures semver oldest fmt clean toolchain nightly board-target
+.PHONY: install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
 	@sed -nE 's/^([a-z0-9-]+):[^#]*## (.*)/\1\t\2/p' Makefile | expand -t 16
@@ -49,7 +49,7 @@ demo: toolchain ## 1 min: simulated drives, driven through real ports
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
 WHOLE = $(if $(T),$(error T= is for one part: make PART T="..."))
-test: toolchain ## 12 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
+test: toolchain $(if $(SUDO),packages) ## 12 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict) $(PARTS)
@@ -217,6 +217,11 @@ toolchain:
 
 nightly:
 	@$(NIGHTLY_READY)
+
+# Before the parts, because sudo may ask for a password. What is still missing the parts list as skipped.
+packages:
+	-@$(PYTHON) -m ensurepip --version >/dev/null 2>&1 || tests/install python3-venv
+	-@tests/install $(filter ffi-test firmware-test test-socketcan,$(PARTS))
 
 board-target: toolchain
 	@rustup target list --installed | grep -qx $(TARGET) || rustup target add $(TARGET)

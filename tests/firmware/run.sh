@@ -6,15 +6,14 @@ set -eu
 tests=$(cd "$(dirname "$0")" && pwd)
 repository=$tests/../..
 target=thumbv7em-none-eabihf
-packages="qemu-system-arm gcc-arm-none-eabi libnewlib-arm-none-eabi"
 
 unavailable() {
     echo "SKIPPED: the firmware on an emulated board: $1" >&2
     exit 77
 }
 
-# shellcheck disable=SC2086
-"$repository/tests/install" $packages || unavailable "$packages cannot be installed"
+"$repository/tests/install" firmware-test ||
+    unavailable "packages are missing; as root: tests/install firmware-test"
 rustup target list --installed | grep -qx $target || rustup target add $target >&2 ||
     unavailable "rustup cannot add the target $target"
 
