@@ -1,32 +1,35 @@
 //! For adapters that send back what they transmit.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use motorlink_proto::rmd::{CanFrame, MotorId};
-use motorlink_proto::time::{self, Instant};
 
 use super::{CanLink, PortError};
 use crate::Clock;
 
 /// How many sent frames wait for their echo: a cycle over every motor, and 0x280.
 const WAITING: usize = MotorId::COUNT + 1;
-/// An echo that has not come by then does not come; an equal frame is a motor's reply.
-const PATIENCE: time::Duration = time::Duration::from_millis(100);
 
 /// Leaves out the first received frame that is identical to each sent one.
 ///
-/// RMD motors answer some requests with the same frame, so an adapter's echo looks like a motor.
+/// RMD motors answer some requests with the same frame, so an adapter's echo looks like a motor. An
+/// echo may take any time: an adapter, a network or this process may have been busy. Echoes come in
+/// the order of sending, so one that a later echo overtakes was lost. Until then a motor's reply may
+/// be taken for it. Its request ends with a timeout, the next one is answered.
 #[derive(Debug)]
 pub struct EchoCanceller<C> {
     link: C,
     clock: Clock,
-    expected: [Option<(CanFrame, Instant)>; WAITING],
+    /// Oldest first.
+    expected: VecDeque<CanFrame>,
 }
 
 impl<C: CanLink> EchoCanceller<C> {
     /// Wraps `link`.
     pub fn new(link: C) -> Self {
-        EchoCanceller { clock: link.clock().unwrap_or_default(), link, expected: [None; WAITING] }
+        let expected = VecDeque::with_capacity(WAITING);
+        EchoCanceller { clock: link.clock().unwrap_or_default(), link, expected }
     }
 
     pub(super) fn link(&self) -> &C {
@@ -37,30 +40,23 @@ impl<C: CanLink> EchoCanceller<C> {
         &mut self.link
     }
 
-    /// Strikes `frame` off the expected echoes.
+    /// Strikes `frame` off the expected echoes, and those that were sent before it.
     fn is_echo(&mut self, frame: &CanFrame) -> bool {
-        let now = self.clock.now();
-        for slot in &mut self.expected {
-            match slot {
-                Some((_, sent)) if now.since(*sent) > PATIENCE => *slot = None,
-                Some((expected, _)) if expected == frame => {
-                    *slot = None;
-                    return true;
-                }
-                _ => {}
-            }
+        let place = self.expected.iter().position(|expected| expected == frame);
+        if let Some(place) = place {
+            self.expected.drain(..=place);
         }
-        false
+        place.is_some()
     }
 }
 
 impl<C: CanLink> CanLink for EchoCanceller<C> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         self.link.send(frame)?;
-        // A free place, or else the oldest: `None` is less than any `Some`.
-        if let Some(slot) = self.expected.iter_mut().min_by_key(|slot| slot.map(|(_, sent)| sent)) {
-            *slot = Some((*frame, self.clock.now()));
+        if self.expected.len() == WAITING {
+            self.expected.pop_front();
         }
+        self.expected.push_back(*frame);
         Ok(())
     }
 
@@ -81,35 +77,83 @@ impl<C: CanLink> CanLink for EchoCanceller<C> {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::VecDeque;
+    use motorlink_proto::time::Instant;
 
     use super::*;
 
     /// A bus on which every sent frame comes back, twice when a motor echoes it too.
-    struct Mirror(VecDeque<CanFrame>, usize);
+    struct Mirror {
+        clock: Clock,
+        frames: VecDeque<CanFrame>,
+        copies: usize,
+    }
+
+    fn mirror(copies: usize) -> EchoCanceller<Mirror> {
+        EchoCanceller::new(Mirror { clock: Clock::standing(), frames: VecDeque::new(), copies })
+    }
 
     impl CanLink for Mirror {
         fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-            self.0.extend(std::iter::repeat_n(*frame, self.1));
+            self.frames.extend(std::iter::repeat_n(*frame, self.copies));
             Ok(())
         }
         fn receive(&mut self, _: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-            Ok(self.0.pop_front())
+            Ok(self.frames.pop_front())
+        }
+        fn clock(&self) -> Option<Clock> {
+            Some(self.clock.clone())
         }
     }
 
+    const RUN: CanFrame = CanFrame::new(0x141, [0x88, 0, 0, 0, 0, 0, 0, 0]);
+    const ANGLE: CanFrame = CanFrame::new(0x141, [0x92, 0, 0, 0, 0, 0, 0, 0]);
+    const NOW: Option<Duration> = Some(Duration::ZERO);
+
     #[test]
     fn the_echo_goes_and_the_equal_reply_stays() -> Result<(), PortError> {
-        let frame = CanFrame::new(0x141, [0x88, 0, 0, 0, 0, 0, 0, 0]);
-        let mut silent = EchoCanceller::new(Mirror(VecDeque::new(), 1));
-        silent.send(&frame)?;
-        assert_eq!(silent.receive(Some(Duration::ZERO))?, None);
+        let mut silent = mirror(1);
+        silent.send(&RUN)?;
+        assert_eq!(silent.receive(NOW)?, None);
 
-        let mut answered = EchoCanceller::new(Mirror(VecDeque::new(), 2));
+        let mut answered = mirror(2);
         for _ in 0..2 * WAITING {
-            answered.send(&frame)?;
-            assert_eq!(answered.receive(Some(Duration::ZERO))?, Some(frame));
-            assert_eq!(answered.receive(Some(Duration::ZERO))?, None);
+            answered.send(&RUN)?;
+            assert_eq!(answered.receive(NOW)?, Some(RUN));
+            assert_eq!(answered.receive(NOW)?, None);
+        }
+        Ok(())
+    }
+
+    /// The adapter, the network or this process was busy. Taken for a reply it would be an angle of 0.
+    #[test]
+    fn a_late_echo_is_no_reply() -> Result<(), PortError> {
+        let mut bus = mirror(1);
+        bus.send(&ANGLE)?;
+        bus.link().clock.wait(Instant(3_600_000_000));
+        assert_eq!(bus.receive(NOW)?, None);
+        Ok(())
+    }
+
+    #[test]
+    fn a_lost_echo_costs_at_most_one_reply() -> Result<(), PortError> {
+        let mut bus = mirror(0);
+        bus.send(&ANGLE)?;
+        bus.link_mut().copies = 2;
+        bus.send(&RUN)?;
+        assert_eq!(bus.receive(NOW)?, Some(RUN), "the echo of RUN came after the lost one");
+        assert_eq!(bus.receive(NOW)?, None);
+        bus.send(&ANGLE)?;
+        assert_eq!(bus.receive(NOW)?, Some(ANGLE));
+
+        bus.link_mut().copies = 0;
+        bus.send(&RUN)?;
+        bus.link_mut().copies = 2;
+        for replies in [0, 1, 1] {
+            bus.send(&RUN)?;
+            for _ in 0..replies {
+                assert_eq!(bus.receive(NOW)?, Some(RUN));
+            }
+            assert_eq!(bus.receive(NOW)?, None);
         }
         Ok(())
     }
