@@ -33,7 +33,7 @@ pub enum Verdict {
     Failed(Box<Finding>),
     /// Not tried, and why.
     Skipped(String),
-    /// The port or the drive had failed before, or failed here.
+    /// The port or the drive had failed before, or failed here; or this machine was too busy to judge.
     NotRun(String),
 }
 

@@ -54,9 +54,8 @@ impl<S> Scenario<S> {
         Outcome { name: self.name.to_string(), clauses: self.clauses, verdict, transcript }
     }
 
-    /// Why it was not run.
-    pub fn skipped(&self, why: &str) -> Outcome {
-        let verdict = Verdict::Skipped(why.to_owned());
+    /// The verdict where no host was judged: skipped, or not run.
+    pub fn unjudged(&self, verdict: Verdict) -> Outcome {
         let (name, transcript) = (self.name.to_string(), Vec::new());
         Outcome { name, clauses: self.clauses, verdict, transcript }
     }
