@@ -61,7 +61,7 @@ check: toolchain ## 1 min: format, clippy and the quick tests, while you work
 
 flakes: toolchain ## 1 h: parts that wait for time, RUNS=5 times beside LOAD=4 hogs
 	$(WHOLE)
-	@$(PYTHON) tests/parts.py --runs $(RUNS) --load $(LOAD) $(if $(STRICT),--strict) $(TIMED)
+	@$(PYTHON) tests/parts.py --jobs 1 --runs $(RUNS) --load $(LOAD) $(if $(STRICT),--strict) $(TIMED)
 
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 

@@ -99,7 +99,7 @@ class Served:
         """Ends the simulator."""
         if self._process.poll() is None:
             self._process.terminate()
-            self._process.communicate(timeout=10)
+            self._process.communicate(timeout=60)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 
 import pytest
-from conftest import Served
+from conftest import PATIENT, Served
 
 import motorlink
 from motorlink import aio, rmd
@@ -115,7 +115,7 @@ def test_exchanges_with_different_motors_overlap(motors: Motors) -> None:
 
 def test_cycles_and_four_torques_tell_what_each_motor_answered(motors: Motors) -> None:
     async def main() -> None:
-        async with aio.rmd.open(motors.port, timeout=1) as bus:
+        async with aio.rmd.open(motors.port, timeout=PATIENT) as bus:
             answers = await bus.cycle({2: rmd.speed(10), 20: rmd.read_motion(), 1: rmd.stop()})
             assert answers[2].speed_dps == 2 and answers[1] is None
             assert isinstance(answers[20], motorlink.Timeout) and answers[20].motor == 20
@@ -240,7 +240,7 @@ def test_the_end_does_to_moving_motors_what_it_was_told(
 
 def test_a_scan_finds_what_is_there(motors: Motors) -> None:
     async def main() -> None:
-        async with aio.rmd.open(motors.port, timeout=1) as bus:
+        async with aio.rmd.open(motors.port, timeout=PATIENT) as bus:
             found = await bus.scan(range(6, 13))
             assert [(one.id, one.kind) for one in found] == [(6, "motor"), (7, "motor"), (8, "motor")]
 

@@ -8,7 +8,14 @@ import subprocess
 import sys
 from pathlib import Path
 
-from conftest import REPOSITORY, Served
+from conftest import PATIENT, REPOSITORY, Served
+
+#: What answers is no motor but a process, on a machine that may be busy.
+PREPARED = f"""\
+import motorlink
+for protocol in motorlink.st, motorlink.rmd:
+    protocol.open.__kwdefaults__["timeout"] = {PATIENT}
+"""
 
 
 def test_the_lines_of_the_readme_run_as_printed(
@@ -20,7 +27,7 @@ def test_the_lines_of_the_readme_run_as_printed(
     path = f"{Path(command).parent}:{os.environ['PATH']}"
     for block in blocks:
         done = subprocess.run(
-            [sys.executable, "-c", block],
+            [sys.executable, "-c", PREPARED + block],
             cwd=tmp_path,
             env={**os.environ, "PATH": path},
             capture_output=True,
