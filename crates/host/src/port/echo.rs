@@ -15,8 +15,8 @@ const WAITING: usize = MotorId::COUNT + 1;
 ///
 /// RMD motors answer some requests with the same frame, so an adapter's echo looks like a motor. An
 /// echo may take any time: an adapter, a network or this process may have been busy. Echoes come in
-/// the order of sending, so one that a later echo overtakes was lost. Until then a motor's reply may
-/// be taken for it. Its request ends with a timeout, the next one is answered.
+/// the order of sending, so one that a later echo of the same identifier overtakes was lost. Until
+/// then a motor's reply may be taken for it. Its request ends with a timeout.
 #[derive(Debug)]
 pub struct EchoCanceller<C> {
     link: C,
@@ -40,11 +40,14 @@ impl<C: CanLink> EchoCanceller<C> {
         &mut self.link
     }
 
-    /// Strikes `frame` off the expected echoes, and those that were sent before it.
+    /// Strikes `frame` off the expected echoes, and those to the same motor before it. Those to other
+    /// motors stay: this may be a late reply.
     fn is_echo(&mut self, frame: &CanFrame) -> bool {
         let place = self.expected.iter().position(|expected| expected == frame);
         if let Some(place) = place {
-            self.expected.drain(..=place);
+            let mut index = 0..;
+            self.expected
+                .retain(|expected| index.next() > Some(place) || expected.id() != frame.id());
         }
         place.is_some()
     }
@@ -130,6 +133,18 @@ mod tests {
         let mut bus = mirror(1);
         bus.send(&ANGLE)?;
         bus.link().clock.wait(Instant(3_600_000_000));
+        assert_eq!(bus.receive(NOW)?, None);
+        Ok(())
+    }
+
+    #[test]
+    fn a_late_reply_does_not_strike_off_an_echo_to_another_motor() -> Result<(), PortError> {
+        let stop = CanFrame::new(0x142, [0x81, 0, 0, 0, 0, 0, 0, 0]);
+        let mut bus = mirror(0);
+        bus.send(&ANGLE)?;
+        bus.send(&stop)?;
+        bus.link_mut().frames.extend([stop, ANGLE, stop]);
+        assert_eq!(bus.receive(NOW)?, Some(stop));
         assert_eq!(bus.receive(NOW)?, None);
         Ok(())
     }
