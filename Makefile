@@ -59,7 +59,7 @@ check: toolchain ## 1 min: format, clippy and the quick tests, while you work
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	$(CARGO) test --workspace --all-features --locked --quiet --lib --bins --tests -- $(QUICK)
 
-flakes: toolchain ## 1 h: parts that wait for time, RUNS=5 times beside LOAD=4 hogs
+flakes: toolchain ## 45 min: parts that wait for time, RUNS=5 times beside LOAD=4 hogs
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py --jobs 1 --runs $(RUNS) --load $(LOAD) $(if $(STRICT),--strict) $(TIMED)
 
