@@ -8,8 +8,11 @@ use motorlink_proto::rmd::{CanFrame, MotorId};
 use super::{CanLink, PortError};
 use crate::Clock;
 
-/// How many sent frames wait for their echo: a cycle over every motor, and 0x280.
-const WAITING: usize = MotorId::COUNT + 1;
+/// How many sent frames of one identifier wait for their echo. What is sent to one motor again and
+/// again does not push out the STOP to another.
+const PER_ID: usize = 32;
+/// How many wait in all: those to every motor, and 0x280.
+const WAITING: usize = PER_ID * (MotorId::COUNT + 1);
 
 /// Leaves out the first received frame that is identical to each sent one.
 ///
@@ -56,6 +59,10 @@ impl<C: CanLink> EchoCanceller<C> {
 impl<C: CanLink> CanLink for EchoCanceller<C> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         self.link.send(frame)?;
+        let is_same = |other: &CanFrame| other.id() == frame.id();
+        if self.expected.iter().filter(|other| is_same(other)).count() == PER_ID {
+            self.expected.iter().position(is_same).map(|oldest| self.expected.remove(oldest));
+        }
         if self.expected.len() == WAITING {
             self.expected.pop_front();
         }
@@ -134,6 +141,25 @@ mod tests {
         bus.send(&ANGLE)?;
         bus.link().clock.wait(Instant(3_600_000_000));
         assert_eq!(bus.receive(NOW)?, None);
+        Ok(())
+    }
+
+    /// The line stands still while a cycle goes on and a STOP is repeated; then everything comes.
+    #[test]
+    fn what_is_repeated_for_one_motor_does_not_push_out_the_echo_for_another()
+    -> Result<(), PortError> {
+        let mut bus = mirror(1);
+        for _ in 0..4 {
+            for id in (1..=32).filter_map(MotorId::new) {
+                bus.send(&CanFrame::new(id.can_id(), [0x81, 0, 0, 0, 0, 0, 0, 0]))?;
+            }
+            for _ in 0..100 {
+                bus.send(&CanFrame::new(0x280, [0; 8]))?;
+            }
+        }
+        while let Some(frame) = bus.receive(NOW)? {
+            assert_eq!(frame.id(), 0x280, "an echo became a reply");
+        }
         Ok(())
     }
 
