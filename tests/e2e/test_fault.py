@@ -14,7 +14,7 @@ def test_what_is_late_still_comes(run, drives):
         late = run("st", "-p", drives.port(port), "--fault", "delay=60ms", "get", "STATUS").ended(0)
         assert time.monotonic() - began >= 0.12, "both ways"
         assert "STATUS" in late.out
-    late = run("rmd", "-p", drives.port("slcan"), "--fault", "delay=10ms", "angle").ended(0)
+    late = run("rmd", "-p", drives.port("slcan"), "--timeout", 2000, "--fault", "delay=10ms", "angle").ended(0)
     assert "angle" in late.out
 
 

@@ -73,7 +73,7 @@ fn our_client_passes_every_scenario() {
             },
             |path| ask_client(path, scenario.task),
         );
-        let outcome = scenario.judge(&journal, &said, host::st::DIGIT);
+        let outcome = scenario.judge(&journal, &said, host::st::DIGIT, None);
         assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:#?}");
         if scenario.demand == Demand::Everything {
             assert!(!said.complained, "{outcome:#?}");
@@ -115,7 +115,7 @@ fn our_bus_passes_every_scenario() {
             },
             |path| ask_bus(path, scenario.task),
         );
-        let outcome = scenario.judge(&journal, &said, 1.0);
+        let outcome = scenario.judge(&journal, &said, 1.0, None);
         assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:#?}");
     });
 }

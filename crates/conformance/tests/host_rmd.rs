@@ -29,7 +29,7 @@ fn play(
         ended_badly: Some(format!("the host does not end: {error}")),
         ..Said::default()
     });
-    scenario.judge(&motors.journal(), &said, DIGIT)
+    scenario.judge(&motors.journal(), &said, DIGIT, None)
 }
 
 /// The digits of the value in a reply.

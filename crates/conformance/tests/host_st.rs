@@ -28,7 +28,7 @@ fn play(
         ended_badly: Some(format!("the host does not end: {error}")),
         ..Said::default()
     });
-    scenario.judge(&drive.journal(), &said, DIGIT)
+    scenario.judge(&drive.journal(), &said, DIGIT, None)
 }
 
 /// What an exchange of our master ends in.

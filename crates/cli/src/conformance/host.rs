@@ -13,7 +13,7 @@ use motorlink_conformance::{Outcome, Report, Verdict};
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::args::{Host, Which};
-use super::verdict;
+use super::{refused, verdict};
 use crate::failure::Failure;
 use crate::interrupt;
 
@@ -37,6 +37,9 @@ docs/HOST-CONFORMANCE.md has an example in Python and what each scenario expects
 const TURN: Duration = Duration::from_millis(5);
 /// How often a scenario is tried while this machine is too busy to judge a host.
 const TRIES: usize = 5;
+/// A drive is in time when no pause was longer than this part of the timeout. Replies that are in time
+/// come within six tenths of it.
+const PUNCTUAL: u32 = 8;
 /// How long what a program said may take to come when it has ended.
 const LAST_WORDS: Duration = Duration::from_secs(1);
 /// Bytes that a program may say; then nobody reads it any more.
@@ -97,7 +100,7 @@ fn conduct<S>(
     let mut report = Report::default();
     for scenario in &scenarios {
         let outcome = match program(args, scenario.task) {
-            Err(why) => scenario.unjudged(Verdict::Skipped(why.to_owned())),
+            Err(why) => scenario.skipped(why),
             Ok(words) => judged(args, scenario, &words, digit, timeout, &serve)?,
         };
         screen.show(&outcome);
@@ -105,11 +108,14 @@ fn conduct<S>(
     }
     screen.summary(&report)?;
     results.save(name, &report)?;
+    // Whatever this machine was too busy for.
+    if report.failed().next().is_some() {
+        return Err(refused(&report, "the host"));
+    }
     verdict(&report, "the host")
 }
 
-/// A host is not blamed for a drive that was late because this machine was busy: when the host asked
-/// again, it may have given up rightly.
+/// Tries a scenario until this machine serves the drive in time, or the host fails in any case.
 fn judged<S>(
     args: &Host,
     scenario: &Scenario<S>,
@@ -118,21 +124,18 @@ fn judged<S>(
     timeout: Duration,
     serve: impl Fn(&Scenario<S>, &mut Server) -> Result<(Served, Tell), PortError>,
 ) -> Result<Outcome, Failure> {
-    let mut late = Duration::ZERO;
-    for _ in 0..TRIES {
+    let mut tries = 0;
+    loop {
+        tries += 1;
         let mut server = Server::new();
         let (served, journal) = serve(scenario, &mut server)?;
         let heard = watch(args, words, scenario.task, &mut server, &served)?;
-        let outcome = scenario.judge(&journal(), &heard.said, digit);
-        late = heard.late;
-        if !matches!(outcome.verdict, Verdict::Failed(_)) || late < timeout / 2 {
+        let late = (heard.late > timeout / PUNCTUAL).then_some(heard.late);
+        let outcome = scenario.judge(&journal(), &heard.said, digit, late);
+        if tries == TRIES || !matches!(outcome.verdict, Verdict::NotRun(_)) {
             return Ok(explained(outcome, &heard));
         }
     }
-    Ok(scenario.unjudged(Verdict::NotRun(format!(
-        "this machine is too busy to judge a host: the drive was served {} ms late",
-        late.as_millis()
-    ))))
 }
 
 /// The program for a task and its arguments, or why there is none.
@@ -157,7 +160,7 @@ struct Heard {
     said: Said,
     out: String,
     err: String,
-    /// How long nobody served the drive.
+    /// The longest time for which the drive was not served.
     late: Duration,
 }
 
@@ -180,18 +183,20 @@ fn watch(
     server: &mut Server,
     served: &Served,
 ) -> Result<Heard, Failure> {
+    let began = Instant::now();
     let mut child = spawn(args, words, served)?;
     let (out, err) = (child.stdout.take().map(listen), child.stderr.take().map(listen));
-    let began = Instant::now();
-    let (mut served_at, mut late) = (began, Duration::ZERO);
+    let (mut last, mut late) = (began, Duration::ZERO);
     let ended = loop {
         if let Err(error) = server.turn(TURN, None) {
             end(&mut child)?;
             return Err(error.into());
         }
-        late = late.max(served_at.elapsed().saturating_sub(TURN));
-        served_at = Instant::now();
+        let now = Instant::now();
+        late = late.max((now - last).saturating_sub(TURN));
+        last = now;
         if let Some(status) = child.try_wait()? {
+            end(&mut child)?;
             break Some(status);
         }
         if interrupt::interrupted() || began.elapsed() > args.limit {

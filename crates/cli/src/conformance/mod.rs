@@ -130,13 +130,17 @@ fn verdict(report: &Report, who: &str) -> Result<(), Failure> {
         return Ok(());
     }
     match report.count("not run") {
-        0 => Err(Failure::Refused(format!(
-            "{} of {} cases failed: {who} does not do what its document says",
-            report.failed().count(),
-            report.outcomes.len()
-        ))),
+        0 => Err(refused(report, who)),
         count => Err(Failure::Line(format!("{count} cases were not run: {}", report.lost()))),
     }
+}
+
+fn refused(report: &Report, who: &str) -> Failure {
+    Failure::Refused(format!(
+        "{} of {} cases failed: {who} does not do what its document says",
+        report.failed().count(),
+        report.outcomes.len()
+    ))
 }
 
 impl Run {

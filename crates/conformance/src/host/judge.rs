@@ -1,5 +1,7 @@
 //! What a host said, held against what it was told.
 
+use std::time::Duration;
+
 use crate::case::Finding;
 use crate::report::{Outcome, Verdict};
 
@@ -38,14 +40,31 @@ pub struct Reading {
 
 impl<S> Scenario<S> {
     /// What comes of it when the host said this. A digit on the wire is `digit` of what it says.
-    pub fn judge(&self, journal: &Journal, said: &Said, digit: f64) -> Outcome {
-        let verdict = match self.fault(journal, said, digit) {
-            None => Verdict::Passed,
-            Some(fault) => Verdict::Failed(Box::new(Finding {
+    /// `late` is how much later than planned the drive was served, where that matters: then a host
+    /// may have given up rightly, and is judged only by what is wrong in any case.
+    pub fn judge(
+        &self,
+        journal: &Journal,
+        said: &Said,
+        digit: f64,
+        late: Option<Duration>,
+    ) -> Outcome {
+        let failed = |fault| {
+            Verdict::Failed(Box::new(Finding {
                 sent: journal.sent(),
                 expected: self.expected.to_owned(),
                 received: fault,
-            })),
+            }))
+        };
+        // A host that sent nothing did not notice.
+        let late = late.filter(|_| !journal.sent().is_empty());
+        let verdict = match (self.wrong(journal, said, digit), self.missing(journal, said), late) {
+            (Some(fault), ..) | (None, Some(fault), None) => failed(fault),
+            (None, Some(_), Some(late)) => Verdict::NotRun(format!(
+                "this machine is too busy to judge a host: the drive was served {} ms late",
+                late.as_millis()
+            )),
+            (None, None, _) => Verdict::Passed,
         };
         let transcript = match verdict {
             Verdict::Failed(_) => journal.transcript.clone(),
@@ -54,13 +73,15 @@ impl<S> Scenario<S> {
         Outcome { name: self.name.to_string(), clauses: self.clauses, verdict, transcript }
     }
 
-    /// The verdict where no host was judged: skipped, or not run.
-    pub fn unjudged(&self, verdict: Verdict) -> Outcome {
+    /// Why it was not run.
+    pub fn skipped(&self, why: &str) -> Outcome {
+        let verdict = Verdict::Skipped(why.to_owned());
         let (name, transcript) = (self.name.to_string(), Vec::new());
         Outcome { name, clauses: self.clauses, verdict, transcript }
     }
 
-    fn fault(&self, journal: &Journal, said: &Said, digit: f64) -> Option<String> {
+    /// What is wrong however late the drive was served.
+    fn wrong(&self, journal: &Journal, said: &Said, digit: f64) -> Option<String> {
         let falsehood = |(index, reading): (usize, &Reading)| {
             let Reading { motor, value } = *reading;
             let is = |told: i64| (told as f64 * digit - value).abs() < digit / 2.0;
@@ -83,11 +104,13 @@ impl<S> Scenario<S> {
         if journal.starts > usize::from(self.task == Task::Start) {
             return Some(format!("the host sent START_MOTOR {} times", journal.starts));
         }
+        said.ended_badly.clone()
+    }
+
+    /// What a late drive may explain.
+    fn missing(&self, journal: &Journal, said: &Said) -> Option<String> {
         if let Some(violation) = journal.violations.first() {
             return Some(format!("the host {violation}"));
-        }
-        if let Some(fault) = &said.ended_badly {
-            return Some(fault.clone());
         }
         let count = said.values.len();
         let wanted = self.task.values();
