@@ -48,9 +48,9 @@ help: ## this list
 demo: toolchain ## 1 min: simulated drives, driven through real ports
 	$(CARGO) run --release --locked -p motorlink-cli -- demo
 
-WHOLE = $(if $(T),$(error T= is for one part: make PART T="..."))
+WHOLE = $(if $(T),$(error T= is for one part: make PART T="..."))\
+$(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
 test: toolchain $(if $(SUDO),packages) ## 12 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
-	$(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict) $(PARTS)
 
@@ -59,9 +59,10 @@ check: toolchain ## 1 min: format, clippy and the quick tests, while you work
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	$(CARGO) test --workspace --all-features --locked --quiet --lib --bins --tests -- $(QUICK)
 
-flakes: toolchain ## 45 min: parts that wait for time, RUNS=5 times beside LOAD=4 hogs
+flakes: PARTS = $(TIMED)
+flakes: toolchain $(if $(SUDO),packages) ## 45 min: parts that wait for time, RUNS=5 times beside LOAD=4 hogs
 	$(WHOLE)
-	@$(PYTHON) tests/parts.py --jobs 1 --runs $(RUNS) --load $(LOAD) $(if $(STRICT),--strict) $(TIMED)
+	@$(PYTHON) tests/parts.py --jobs 1 --runs $(RUNS) --load $(LOAD) $(if $(STRICT),--strict) $(PARTS)
 
 # ---- Parts of make test. T="..." runs some tests of a part. ----
 
@@ -189,7 +190,7 @@ wheel: $(PYTHON_VENV)/ready ## the Python package as a wheel, in target/wheels
 	$(PYTHON_VENV)/bin/python -m maturin build --quiet --release --out target/wheels
 
 # What rust-version promises.
-oldest: ## builds everything with the oldest Rust that is meant to work
+oldest: ## compiles the workspace with the oldest Rust that is meant to work
 	rust=$$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml) && \
 		rustup toolchain install --profile minimal $$rust && \
 		$(CARGO) +$$rust check --workspace --all-features --locked --target-dir target/oldest
@@ -218,9 +219,11 @@ toolchain:
 nightly:
 	@$(NIGHTLY_READY)
 
-# Before the parts, because sudo may ask for a password. What is still missing the parts list as skipped.
+# Before the parts, because sudo may ask for a password. A part says what is still missing.
 packages:
-	-@$(PYTHON) -m ensurepip --version >/dev/null 2>&1 || tests/install python3-venv
+	$(WHOLE)
+	-@$(if $(filter e2e python firmware-test,$(PARTS)),$(PYTHON) -m ensurepip --version >/dev/null 2>&1 || \
+		tests/install python3-venv)
 	-@tests/install $(filter ffi-test firmware-test test-socketcan,$(PARTS))
 
 board-target: toolchain
