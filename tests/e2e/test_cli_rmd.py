@@ -41,7 +41,7 @@ def test_scan_asks_all_32_ids(run, sim, tmp_path):
     config = tmp_path / "bench.toml"
     config.write_text("[[rmd.motor]]\nid = 7\n[[rmd.motor]]\nid = 32\n")
     port = sim(config, st=()).port("slcan")
-    found = run("rmd", "-p", port, "--json", "scan").ended(0).lines
+    found = run("rmd", "-p", port, "--timeout", 500, "--json", "scan").ended(0).lines
     assert [motor["id"] for motor in found] == [7, 32]
 
 
@@ -160,11 +160,11 @@ def test_an_error_that_has_its_cause_stays_and_is_told(run, sim):
     port = bus.port("slcan")
     bus.do("supply", motor=1, volts=5.0)
     eventually(lambda: bus.motor(1)["errors"] != "no error", "low voltage")
-    refused = run("rmd", "-p", port, "--json", "clear-error").ended(1)
+    refused = run("rmd", "-p", port, "--timeout", 500, "--json", "clear-error").ended(1)
     assert refused.json["errors"] and "keeps its errors" in refused.err
     bus.do("supply", motor=1, volts=24.0)
-    eventually(lambda: run("rmd", "-p", port, "clear-error").code == 0, "the error is cleared")
-    assert run("rmd", "-p", port, "--json", "clear-error").ended(0).json["errors"] == []
+    eventually(lambda: run("rmd", "-p", port, "--timeout", 500, "clear-error").code == 0, "the error is cleared")
+    assert run("rmd", "-p", port, "--timeout", 500, "--json", "clear-error").ended(0).json["errors"] == []
 
 
 # What a person gets wrong.
@@ -221,7 +221,7 @@ def test_torque4_tells_what_answered_and_that_a_motor_did_not(run, sim, tmp_path
     config = tmp_path / "bench.toml"
     config.write_text("[[rmd.motor]]\nid = 1\n[[rmd.motor]]\nid = 3\n")
     port = sim(config, st=()).port("slcan")
-    partly = run("rmd", "-p", port, "--json", "torque4", 0, 0, 0, 0).ended(3)
+    partly = run("rmd", "-p", port, "--timeout", 500, "--json", "torque4", 0, 0, 0, 0).ended(3)
     assert [reply["id"] for reply in partly.lines] == [1, 3]
     assert "motor 2" in partly.err
 
