@@ -14,12 +14,15 @@ GAINS = ["position_kp", "position_ki", "speed_kp", "speed_ki", "torque_kp", "tor
 SHIPPED_GAINS = "100 100 100 100 100 100"
 
 
+def on(run, port):
+    """Runs `motorlink rmd` on a port. A busy machine may take longer than the 50 ms that a bus does."""
+    return lambda *arguments: run("rmd", "-p", port, "--timeout", 500, *arguments)
+
+
 @pytest.fixture
 def rmd(run, drives, request):
     """Runs `motorlink rmd` on a port of the shared drives, a pty where the test does not choose."""
-    port = drives.port(getattr(request, "param", "slcan"))
-    # A machine under load may take longer than the 50 ms that a bus does.
-    return lambda *arguments: run("rmd", "-p", port, "--timeout", 500, *arguments)
+    return on(run, drives.port(getattr(request, "param", "slcan")))
 
 
 on_every_port = pytest.mark.parametrize("rmd", PORTS, indirect=True)
@@ -41,7 +44,7 @@ def test_scan_asks_all_32_ids(run, sim, tmp_path):
     config = tmp_path / "bench.toml"
     config.write_text("[[rmd.motor]]\nid = 7\n[[rmd.motor]]\nid = 32\n")
     port = sim(config, st=()).port("slcan")
-    found = run("rmd", "-p", port, "--timeout", 500, "--json", "scan").ended(0).lines
+    found = on(run, port)("--json", "scan").ended(0).lines
     assert [motor["id"] for motor in found] == [7, 32]
 
 
@@ -141,7 +144,7 @@ def test_a_motor_turns_stops_and_resumes(run, sim):
     bus = sim(st=())
 
     def rmd(*arguments):
-        return run("rmd", "-p", bus.port("slcan"), "--timeout", 500, *arguments).ended(0)
+        return on(run, bus.port("slcan"))(*arguments).ended(0)
 
     rmd("speed", 360)
     eventually(lambda: bus.motor(1)["speed_dps"] > 350, "motor 1 turns")
@@ -157,14 +160,14 @@ def test_a_motor_turns_stops_and_resumes(run, sim):
 
 def test_an_error_that_has_its_cause_stays_and_is_told(run, sim):
     bus = sim(st=())
-    port = bus.port("slcan")
+    rmd = on(run, bus.port("slcan"))
     bus.do("supply", motor=1, volts=5.0)
     eventually(lambda: bus.motor(1)["errors"] != "no error", "low voltage")
-    refused = run("rmd", "-p", port, "--timeout", 500, "--json", "clear-error").ended(1)
+    refused = rmd("--json", "clear-error").ended(1)
     assert refused.json["errors"] and "keeps its errors" in refused.err
     bus.do("supply", motor=1, volts=24.0)
-    eventually(lambda: run("rmd", "-p", port, "--timeout", 500, "clear-error").code == 0, "the error is cleared")
-    assert run("rmd", "-p", port, "--timeout", 500, "--json", "clear-error").ended(0).json["errors"] == []
+    eventually(lambda: rmd("clear-error").code == 0, "the error is cleared")
+    assert rmd("--json", "clear-error").ended(0).json["errors"] == []
 
 
 # What a person gets wrong.
@@ -221,7 +224,7 @@ def test_torque4_tells_what_answered_and_that_a_motor_did_not(run, sim, tmp_path
     config = tmp_path / "bench.toml"
     config.write_text("[[rmd.motor]]\nid = 1\n[[rmd.motor]]\nid = 3\n")
     port = sim(config, st=()).port("slcan")
-    partly = run("rmd", "-p", port, "--timeout", 500, "--json", "torque4", 0, 0, 0, 0).ended(3)
+    partly = on(run, port)("--json", "torque4", 0, 0, 0, 0).ended(3)
     assert [reply["id"] for reply in partly.lines] == [1, 3]
     assert "motor 2" in partly.err
 
@@ -270,12 +273,12 @@ def test_a_motor_that_speaks_v3_is_named_and_not_driven(run, tmp_path):
 
     with device(tmp_path / "can", slcan_adapter(v3_motor)) as link:
         port = f"slcan:{link}"
-        told = run("rmd", "-p", port, "--timeout", 500, "status").ended(3).err
+        told = on(run, port)("status").ended(3).err
         assert "V3" in told and "0x241" in told
 
-        found = run("rmd", "-p", port, "--timeout", 500, "--json", "scan", 1).ended(0).json
+        found = on(run, port)("--json", "scan", 1).ended(0).json
         assert found["id"] == 1 and "V3" in found["protocol"]
-        scanned = run("rmd", "-p", port, "--timeout", 500, "scan", 1).ended(0).out
+        scanned = on(run, port)("scan", 1).ended(0).out
         assert "it is not driven" in scanned
 
 
