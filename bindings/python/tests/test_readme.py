@@ -10,7 +10,7 @@ from pathlib import Path
 
 from conftest import PATIENT, REPOSITORY, Served
 
-#: What answers is no motor but a process, on a machine that may be busy.
+#: A simulator answers, in a process of its own: a busy machine delays it.
 PREPARED = f"""\
 import motorlink
 for protocol in motorlink.st, motorlink.rmd:

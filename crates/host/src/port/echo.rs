@@ -46,13 +46,12 @@ impl<C: CanLink> EchoCanceller<C> {
     /// Strikes `frame` off the expected echoes, and those to the same motor before it. Those to other
     /// motors stay: this may be a late reply.
     fn is_echo(&mut self, frame: &CanFrame) -> bool {
-        let place = self.expected.iter().position(|expected| expected == frame);
-        if let Some(place) = place {
-            let mut index = 0..;
-            self.expected
-                .retain(|expected| index.next() > Some(place) || expected.id() != frame.id());
-        }
-        place.is_some()
+        let Some(place) = self.expected.iter().position(|expected| expected == frame) else {
+            return false;
+        };
+        let mut index = 0..;
+        self.expected.retain(|expected| index.next() > Some(place) || expected.id() != frame.id());
+        true
     }
 }
 
@@ -144,7 +143,7 @@ mod tests {
         Ok(())
     }
 
-    /// The line stands still while a cycle goes on and a STOP is repeated; then everything comes.
+    /// The line delivers nothing during a cycle and repeated STOPs, then everything.
     #[test]
     fn what_is_repeated_for_one_motor_does_not_push_out_the_echo_for_another()
     -> Result<(), PortError> {
