@@ -48,6 +48,11 @@ impl Device {
         frame
     }
 
+    /// Drops a line that its host began and did not end, so that the next host does not end it.
+    pub fn forget_line(&mut self) {
+        self.line = Line::default();
+    }
+
     /// Does what `line` says; nothing when it is refused.
     fn obey(&mut self, line: &[u8]) -> Option<Outcome> {
         let Some((&command, arguments)) = line.split_first() else { return Some(Outcome::DONE) };

@@ -196,10 +196,22 @@ pub enum PortError {
         /// What is wrong with it.
         why: String,
     },
-    /// The link of a served pty would replace something that is not a link to a pty.
-    #[error("`{port}` exists and is no link to a pty: remove it or choose another path")]
+    /// A served port would replace something that no server left behind.
+    #[error("`{port}` exists and is no {wanted}: remove it or choose another path")]
     PathTaken {
         /// The path.
+        port: String,
+        /// What may be replaced.
+        wanted: &'static str,
+    },
+    /// The link to a served pty was left behind by a server that was killed, and the pty that it
+    /// points to is another program's by now.
+    #[error(
+        "`{port}` is stale: the server that made it is gone, and its pty belongs to another program \
+         by now. Nothing was sent; start the server again"
+    )]
+    Stale {
+        /// The link.
         port: String,
     },
     /// The link of a served pty is another server's.

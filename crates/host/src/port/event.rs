@@ -21,6 +21,26 @@ pub trait Evented {
 
     /// Sends what the port did not take at once; whether some of it is left still.
     fn flush(&mut self) -> Result<bool, PortError>;
+
+    /// Drops what was written and has not left, where that can be done: the end of it may be a part
+    /// of a request.
+    fn discard(&mut self) -> Result<(), PortError> {
+        Ok(())
+    }
+}
+
+impl<E: Evented + ?Sized> Evented for Box<E> {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        (**self).descriptor()
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        (**self).flush()
+    }
+
+    fn discard(&mut self) -> Result<(), PortError> {
+        (**self).discard()
+    }
 }
 
 /// A byte line whose writes wait for nothing: what the port does not take at once is kept for
@@ -110,6 +130,11 @@ impl Evented for QueuedLine {
             self.stuck = Instant::now();
         }
         Ok(false)
+    }
+
+    fn discard(&mut self) -> Result<(), PortError> {
+        self.queue.clear();
+        self.link.discard()
     }
 }
 

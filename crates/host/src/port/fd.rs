@@ -7,6 +7,7 @@ use std::time::Duration;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::{Errno, read, write};
+use rustix::termios::{QueueSelector, tcflush};
 
 use super::{ByteLink, Deadline, PortError};
 
@@ -90,6 +91,14 @@ impl FdLink {
                 Err(Errno::AGAIN) => Ok(0),
                 Err(errno) => Err(self.lost(errno)),
             };
+        }
+    }
+
+    /// Drops what was written and has not left. A socket has no such thing.
+    pub(super) fn discard(&self) -> Result<(), PortError> {
+        match tcflush(&self.fd, QueueSelector::OFlush) {
+            Ok(()) | Err(Errno::NOTTY | Errno::OPNOTSUPP) => Ok(()),
+            Err(errno) => Err(self.lost(errno)),
         }
     }
 

@@ -17,6 +17,7 @@ mod slcan;
 mod socketcan;
 mod tap;
 mod tcp;
+mod unix;
 
 use std::time::{Duration, Instant};
 
@@ -38,7 +39,8 @@ pub use tap::{Direction, TapBytes, TapCan};
 pub(crate) use error::{owning_group, permission_hint};
 pub(crate) use fd::timespec;
 pub(crate) use interface::{Interface, up_hint};
-pub(crate) use tcp::unbracketed;
+pub(crate) use serial::{MARKED_LINK, mark};
+pub(crate) use tcp::{keep_alive, unbracketed};
 
 /// A line that carries bytes both ways.
 pub trait ByteLink: Send {
@@ -128,12 +130,13 @@ impl PortName {
 
     /// Why this is no serial line.
     fn no_line(&self) -> PortError {
-        self.unusable("serial line", "a device path or tcp:HOST:PORT")
+        self.unusable("serial line", "a device path, tcp:HOST:PORT or unix:PATH")
     }
 
     /// Why this is no CAN bus.
     fn no_can(&self) -> PortError {
-        self.unusable("CAN bus", "slcan:DEVICE, slcan:tcp:HOST:PORT or socketcan:INTERFACE")
+        let usable = "slcan:DEVICE, slcan:tcp:HOST:PORT, slcan:unix:PATH or socketcan:INTERFACE";
+        self.unusable("CAN bus", usable)
     }
 
     fn unusable(&self, wanted: &'static str, usable: &'static str) -> PortError {
@@ -154,6 +157,7 @@ impl LineName {
             LineName::Tcp { clock: Some(_), .. } => {
                 Err(PortError::Emulated { port: self.to_string() })
             }
+            LineName::Unix(path) => unix::open(path, self.label()),
         }
     }
 
@@ -174,7 +178,7 @@ impl LineName {
     pub fn with_baud(&self, baud: u32) -> Option<LineName> {
         match self {
             LineName::Serial { path, .. } => Some(LineName::Serial { path: path.clone(), baud }),
-            LineName::Tcp { .. } => None,
+            LineName::Tcp { .. } | LineName::Unix(_) => None,
         }
     }
 
@@ -182,7 +186,7 @@ impl LineName {
     fn label(&self) -> String {
         match self {
             LineName::Serial { path, .. } => path.display().to_string(),
-            LineName::Tcp { .. } => self.to_string(),
+            LineName::Tcp { .. } | LineName::Unix(_) => self.to_string(),
         }
     }
 }

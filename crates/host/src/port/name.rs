@@ -19,10 +19,10 @@ pub const DEFAULT_BAUD: u32 = 115_200;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum PortName {
-    /// `serial:/dev/ttyACM0?baud=115200`, a bare device path, `tcp:host:port`, or
+    /// `serial:/dev/ttyACM0?baud=115200`, a bare device path, `tcp:host:port`, `unix:path`, or
     /// `tcp:host:port?clock=host:port` on the time of an emulated board.
     Line(LineName),
-    /// `slcan:/dev/ttyACM0?bitrate=1000000` or `slcan:tcp:host:port`.
+    /// `slcan:/dev/ttyACM0?bitrate=1000000`, `slcan:tcp:host:port` or `slcan:unix:path`.
     Slcan {
         /// Where the adapter is attached.
         line: LineName,
@@ -54,6 +54,8 @@ pub enum LineName {
         /// The clock port of the emulated board behind it, whose time is then the line's (`clock=`).
         clock: Option<TcpAddress>,
     },
+    /// A serial line behind a Unix socket.
+    Unix(PathBuf),
 }
 
 /// A host and a TCP port of it.
@@ -85,6 +87,8 @@ pub enum ServeName {
         /// The TCP port.
         port: u16,
     },
+    /// `unix-listen:PATH`: the same behind a Unix socket, for the user who serves it.
+    UnixListen(PathBuf),
     /// `socketcan:can1`: a CAN interface of this machine, for a bus of motors.
     SocketCan(String),
 }
@@ -138,10 +142,11 @@ pub enum NameError {
 }
 
 const PORT_FORMS: &str = "ports are /dev/ttyACM0, serial:/dev/ttyACM0?baud=115200, tcp:HOST:PORT, \
-    slcan:/dev/ttyACM0?bitrate=1000000, slcan:tcp:HOST:PORT, socketcan:can0, sim: and sim:FILE.toml";
+    unix:PATH, slcan:/dev/ttyACM0?bitrate=1000000, slcan:tcp:HOST:PORT, slcan:unix:PATH, \
+    socketcan:can0, sim: and sim:FILE.toml";
 const SLCAN_OPTIONS: &str = "bitrate, echo, on a device baud, and behind TCP clock";
-const SERVE_FORMS: &str =
-    "served ports are pty:PATH, slcan-pty:PATH, tcp-listen:ADDR:PORT and socketcan:INTERFACE";
+const SERVE_FORMS: &str = "served ports are pty:PATH, slcan-pty:PATH, unix-listen:PATH, \
+    tcp-listen:ADDR:PORT and socketcan:INTERFACE";
 
 impl FromStr for PortName {
     type Err = NameError;
@@ -211,6 +216,10 @@ fn parse_line(name: &str, body: &str) -> Result<Option<LineName>, NameError> {
         let address = tcp_address(name, address, "tcp:192.168.1.5:4000")?;
         return Ok(Some(LineName::Tcp { address, clock: None }));
     }
+    if let Some(path) = body.strip_prefix("unix:") {
+        let path = present(name, path, "a path", "unix:./drive")?;
+        return Ok(Some(LineName::Unix(path.into())));
+    }
     let bare = body.starts_with(['/', '.']) || (body.contains("tty") && !body.contains(':'));
     Ok(bare.then(|| LineName::serial(body)))
 }
@@ -245,6 +254,7 @@ impl LineName {
         match self {
             LineName::Serial { path, .. } => format!("serial:{}", path.display()),
             LineName::Tcp { address, .. } => format!("tcp:{address}"),
+            LineName::Unix(path) => format!("unix:{}", path.display()),
         }
     }
 
@@ -261,6 +271,7 @@ impl LineName {
         match self {
             LineName::Serial { .. } => "baud",
             LineName::Tcp { .. } => "clock",
+            LineName::Unix(_) => "none",
         }
     }
 }
@@ -276,6 +287,10 @@ impl FromStr for ServeName {
             return Ok(ServeName::SlcanPty(
                 present(name, path, "a path", "slcan-pty:./can0")?.into(),
             ));
+        }
+        if let Some(path) = name.strip_prefix("unix-listen:") {
+            let path = present(name, path, "a path", "unix-listen:./drive")?;
+            return Ok(ServeName::UnixListen(path.into()));
         }
         if let Some(address) = name.strip_prefix("tcp-listen:") {
             let (host, port) = host_and_port(name, address, "tcp-listen:127.0.0.1:4000")?;
@@ -304,7 +319,7 @@ impl fmt::Display for PortName {
                 let written = line.to_body();
                 let bare = written.strip_prefix("serial:").filter(|path| {
                     // Such a path needs its scheme.
-                    !path.starts_with("serial:") && !path.starts_with("tcp:")
+                    !["serial:", "tcp:", "unix:"].iter().any(|scheme| path.starts_with(scheme))
                 });
                 f.write_str("slcan:")?;
                 write_with_options(f, bare.unwrap_or(&written), &options)
@@ -336,6 +351,7 @@ impl fmt::Display for ServeName {
         match self {
             ServeName::Pty(path) => write!(f, "pty:{}", path.display()),
             ServeName::SlcanPty(path) => write!(f, "slcan-pty:{}", path.display()),
+            ServeName::UnixListen(path) => write!(f, "unix-listen:{}", path.display()),
             ServeName::TcpListen { host, port } => write!(f, "tcp-listen:{host}:{port}"),
             ServeName::SocketCan(interface) => write!(f, "socketcan:{interface}"),
         }
@@ -355,6 +371,7 @@ fn nearest(name: &str) -> String {
         "can" | "socket" => format!("socketcan:{rest}"),
         "sl" | "lawicel" | "slcand" | "slcan-pty" => format!("slcan:{rest}"),
         "tcp-listen" => format!("tcp:{rest}"),
+        "unix-listen" => format!("unix:{rest}"),
         _ if rest.parse::<u16>().is_ok() => format!("tcp:{name}"),
         _ => format!("serial:{rest}"),
     }

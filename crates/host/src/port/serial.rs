@@ -5,13 +5,16 @@
 //! would do the same for some other drivers and is not set: it can only be reached through an
 //! unsafe call.
 
-use std::os::fd::OwnedFd;
-use std::path::Path;
+use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
 
 use rustix::fs::{FlockOperation, Mode, OFlags, flock, open as open_fd};
 use rustix::io::Errno;
 use rustix::termios::{
-    ControlModes, OptionalActions, QueueSelector, ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr,
+    ControlModes, OptionalActions, QueueSelector, ioctl_tiocexcl, tcflush, tcgetattr, tcgetwinsize,
+    tcsetattr, tcsetwinsize,
 };
 
 use super::{FdLink, PortError};
@@ -19,7 +22,11 @@ use super::{FdLink, PortError};
 /// Opens the device at `path`, for this process alone.
 pub(super) fn open(path: &Path, baud: u32) -> Result<FdLink, PortError> {
     let device = path.canonicalize().map_err(|error| PortError::at_open(path, error))?;
-    let fd = open_exclusively(&device).map_err(|errno| PortError::at_open(path, errno))?;
+    let fd = open_device(&device).map_err(|errno| PortError::at_open(path, errno))?;
+    if is_stale(path, &fd) {
+        return Err(PortError::Stale { port: path.display().to_string() });
+    }
+    claim(&fd, &device).map_err(|errno| PortError::at_open(path, errno))?;
     let actual = configure(&fd, baud).map_err(|errno| PortError::at_open(path, errno))?;
     let port = path.display().to_string();
     // A divider rarely hits the rate exactly; a UART bears 2 % on each side.
@@ -30,17 +37,58 @@ pub(super) fn open(path: &Path, baud: u32) -> Result<FdLink, PortError> {
     FdLink::new(fd, port)
 }
 
-fn open_exclusively(device: &Path) -> Result<OwnedFd, Errno> {
+fn open_device(device: &Path) -> Result<OwnedFd, Errno> {
     // Without NONBLOCK, opening would wait for a modem's carrier.
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
-    let fd = open_fd(device, flags, Mode::empty())?;
-    flock(&fd, FlockOperation::NonBlockingLockExclusive)?;
+    open_fd(device, flags, Mode::empty())
+}
+
+/// Keeps others out.
+fn claim(fd: &OwnedFd, device: &Path) -> Result<(), Errno> {
+    flock(fd, FlockOperation::NonBlockingLockExclusive)?;
     // The lock keeps out programs that lock too; a real device can keep out all others. Not a pty:
     // whoever serves it holds it open, and the mark would outlive us.
     if !device.starts_with("/dev/pts") {
-        ioctl_tiocexcl(&fd)?;
+        ioctl_tiocexcl(fd)?;
     }
-    Ok(fd)
+    Ok(())
+}
+
+/// How the target of a link to a pty begins when a server of ours made the link. The kernel takes it
+/// as it takes `/dev/pts/`; nobody else writes it so.
+pub(crate) const MARKED_LINK: &str = "/dev/pts/./";
+
+/// Marks the pty of a server as the one that `link` was made for: in the two sizes of its window that
+/// nothing uses. A later pty that gets the same number does not have them.
+pub(crate) fn mark(pty: impl AsFd, link: &Path) -> std::io::Result<()> {
+    let mut size = tcgetwinsize(&pty)?;
+    (size.ws_xpixel, size.ws_ypixel) = mark_of(link.symlink_metadata()?.ino());
+    Ok(tcsetwinsize(&pty, size)?)
+}
+
+/// Whether a server of ours made the link that `path` is or leads to, for another pty than this.
+fn is_stale(path: &Path, pty: &OwnedFd) -> bool {
+    let Some(inode) = marked_link(path) else { return false };
+    !tcgetwinsize(pty).is_ok_and(|size| (size.ws_xpixel, size.ws_ypixel) == mark_of(inode))
+}
+
+/// The inode of the link of a server of ours, if `path` is one or leads to one.
+fn marked_link(path: &Path) -> Option<u64> {
+    let mut link = PathBuf::from(path);
+    // A loop cannot be opened in the first place.
+    loop {
+        let target = std::fs::read_link(&link).ok()?;
+        if target.as_os_str().as_bytes().starts_with(MARKED_LINK.as_bytes()) {
+            return Some(link.symlink_metadata().ok()?.ino());
+        }
+        link = link.parent()?.join(target);
+    }
+}
+
+/// Never what an unmarked pty has, which is zero.
+fn mark_of(inode: u64) -> (u16, u16) {
+    let mixed = inode.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    ((mixed >> 48) as u16 | 1, (mixed >> 32) as u16)
 }
 
 /// Sets the line up, drops what came before, and returns the baud rate that the driver took.

@@ -4,9 +4,14 @@ use std::io;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
+use rustix::net::sockopt;
+
 use super::{FdLink, PortError, TcpAddress};
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
+/// After so long without a word a machine is asked whether it is there, so many times.
+const PROBE_PERIOD: Duration = Duration::from_secs(1);
+const PROBES: u32 = 4;
 
 /// Connects to the first address of the host that takes the connection. `port` is for messages.
 pub(super) fn open(address: &TcpAddress, port: String) -> Result<FdLink, PortError> {
@@ -19,6 +24,7 @@ pub(super) fn open(address: &TcpAddress, port: String) -> Result<FdLink, PortErr
         match TcpStream::connect_timeout(&address, CONNECT_TIMEOUT) {
             Ok(stream) => {
                 stream.set_nodelay(true).map_err(|error| PortError::in_use(&port, error))?;
+                keep_alive(&stream);
                 return FdLink::new(stream, port);
             }
             Err(error) => failure = error,
@@ -28,6 +34,18 @@ pub(super) fn open(address: &TcpAddress, port: String) -> Result<FdLink, PortErr
         io::ErrorKind::ConnectionRefused => PortError::Refused { port },
         _ => PortError::Unreachable { port, source: failure },
     })
+}
+
+/// Lets the kernel find out that the machine at the other end is gone, whether it owes an
+/// acknowledge or nothing is under way. A system that knows none of this notices later.
+pub(crate) fn keep_alive(stream: &TcpStream) {
+    let _ = sockopt::set_socket_keepalive(stream, true)
+        .and_then(|()| sockopt::set_tcp_keepidle(stream, PROBE_PERIOD))
+        .and_then(|()| sockopt::set_tcp_keepintvl(stream, PROBE_PERIOD))
+        .and_then(|()| sockopt::set_tcp_keepcnt(stream, PROBES))
+        .and_then(|()| {
+            sockopt::set_tcp_user_timeout(stream, PROBE_PERIOD.as_millis() as u32 * PROBES)
+        });
 }
 
 /// The address without the brackets that set an IPv6 address apart in a port's name.

@@ -10,7 +10,10 @@ use rustix::event::{PollFd, PollFlags};
 use rustix::io::{Errno, read, write};
 
 use super::pty::{Pty, is_held};
+use super::stranger::{Gate, HELD};
+use super::unix::UnixDoor;
 use super::{ByteStation, CanStation};
+use crate::port::keep_alive;
 use crate::slcan::Device;
 
 /// Bytes that are taken from a client at once.
@@ -24,7 +27,8 @@ enum Door {
     /// The one client is whoever holds the pty; its line waits here while nobody does.
     Pty(Pty, Option<Client>),
     /// Each connection is a client.
-    Listener(TcpListener),
+    Tcp(TcpListener),
+    Unix(UnixDoor),
 }
 
 pub(super) enum Station {
@@ -58,17 +62,25 @@ struct Client {
     line: OwnedFd,
     /// Its adapter; idle on a serial line.
     adapter: Device,
+    /// What its first bytes have to pass.
+    gate: Gate,
     outgoing: Vec<u8>,
     is_gone: bool,
+    /// It left bytes that nobody read.
+    left_bytes: bool,
 }
 
 impl Endpoint {
     pub(super) fn on_pty(pty: Pty, line: OwnedFd, station: Station) -> Self {
-        Self::new(Door::Pty(pty, Some(Client::new(line))), station)
+        Self::new(Door::Pty(pty, Some(Client::new(line, Gate::open()))), station)
     }
 
     pub(super) fn on_tcp(listener: TcpListener, station: Station) -> Self {
-        Self::new(Door::Listener(listener), station)
+        Self::new(Door::Tcp(listener), station)
+    }
+
+    pub(super) fn on_unix(door: UnixDoor, station: Station) -> Self {
+        Self::new(Door::Unix(door), station)
     }
 
     fn new(door: Door, station: Station) -> Self {
@@ -78,11 +90,14 @@ impl Endpoint {
     /// Appends what is to be polled: the clients, then the door. The door is
     /// looked at last: when a client's bytes are seen, its coming is seen as well.
     pub(super) fn watch<'a>(&'a self, fds: &mut Vec<PollFd<'a>>) {
-        fds.extend(self.clients.iter().map(|client| PollFd::new(&client.line, PollFlags::IN)));
+        // That a client is gone is told in any case.
+        let listen = if self.station.wants() { PollFlags::IN } else { PollFlags::RDHUP };
+        fds.extend(self.clients.iter().map(|client| PollFd::new(&client.line, listen)));
         let coming = if self.shut_until.is_some() { PollFlags::empty() } else { PollFlags::IN };
         fds.push(match &self.door {
             Door::Pty(pty, _) => PollFd::new(pty.comings(), coming),
-            Door::Listener(listener) => PollFd::new(listener, coming),
+            Door::Tcp(listener) => PollFd::new(listener, coming),
+            Door::Unix(door) => PollFd::new(door.listener(), coming),
         });
     }
 
@@ -96,16 +111,19 @@ impl Endpoint {
         self.shut_until.into_iter().chain(self.station.deadline()).min()
     }
 
-    /// Does what is due. `ready` says which of the watched descriptors have something.
-    pub(super) fn serve(&mut self, now: Instant, ready: &[bool], scratch: &mut Scratch) {
-        let door_is_ready = ready.last() == Some(&true);
+    /// Does what is due. `ready` says what the watched descriptors have.
+    pub(super) fn serve(&mut self, now: Instant, ready: &[PollFlags], scratch: &mut Scratch) {
+        let door_is_ready = ready.last().is_some_and(|events| !events.is_empty());
         if door_is_ready && let Door::Pty(pty, _) = &self.door {
             pty.forget_comings();
         }
-        for (index, &is_ready) in ready.iter().take(self.clients.len()).enumerate() {
+        for (index, events) in ready.iter().take(self.clients.len()).enumerate() {
             // Before someone new is let in, all that the others did is seen, and who left.
-            if is_ready || door_is_ready {
+            if self.station.wants() && (!events.is_empty() || door_is_ready) {
                 self.receive(now, index, scratch);
+            } else if events.intersects(PollFlags::HUP | PollFlags::RDHUP | PollFlags::ERR) {
+                let client = &mut self.clients[index];
+                (client.is_gone, client.left_bytes) = (true, true);
             }
         }
         self.see_off(now);
@@ -128,12 +146,11 @@ impl Endpoint {
     /// Lets go of the clients that left.
     fn see_off(&mut self, now: Instant) {
         for mut client in self.clients.extract_if(.., |client| client.is_gone) {
-            if let Station::Bytes(station) = &mut self.station {
-                station.left(now);
-            }
+            self.station.left(now);
             if let Door::Pty(pty, waiting) = &mut self.door {
-                pty.forget_unread();
-                client.is_gone = false;
+                pty.forget_unread(client.left_bytes);
+                client.adapter.forget_line();
+                (client.is_gone, client.left_bytes) = (false, false);
                 *waiting = Some(client);
             }
         }
@@ -146,13 +163,17 @@ impl Endpoint {
 
     fn receive(&mut self, now: Instant, index: usize, scratch: &mut Scratch) {
         let client = &mut self.clients[index];
-        let bytes = match read(&client.line, &mut scratch.chunk) {
-            Ok(len) if len > 0 => &scratch.chunk[..len],
+        let len = match read(&client.line, &mut scratch.chunk[HELD..]) {
+            Ok(len) if len > 0 => len,
             Err(Errno::AGAIN | Errno::INTR) => return,
             Ok(_) | Err(_) => {
                 client.is_gone = true;
                 return;
             }
+        };
+        let Some(bytes) = client.gate.pass(&mut scratch.chunk[..HELD + len]) else {
+            client.is_gone = true;
+            return self.station.stranger(now);
         };
         match &mut self.station {
             Station::Bytes(station) => station.receive(now, bytes, &mut client.outgoing),
@@ -191,34 +212,64 @@ impl Endpoint {
     /// who comes in meanwhile may follow a client that is not yet seen to have left.
     fn admit(&mut self, now: Instant) {
         let others = self.clients.len();
-        let mut is_welcome = || match &mut self.station {
-            Station::Bytes(station) => station.came(now, others),
-            Station::Can(_) => true,
-        };
-        match &mut self.door {
+        let came = match &mut self.door {
             // Whoever is not welcome on a pty cannot be closed: the station hears them all the same.
             Door::Pty(_, waiting) => {
-                is_welcome();
+                self.station.came(now, others);
                 self.clients.extend(waiting.take());
+                return;
             }
-            Door::Listener(listener) => match listener.accept() {
-                Ok((stream, _)) => {
-                    let usable =
-                        stream.set_nonblocking(true).and_then(|()| stream.set_nodelay(true));
-                    if usable.is_ok() && is_welcome() {
-                        self.clients.push(Client::new(stream.into()));
-                    }
-                }
-                Err(error)
-                    if matches!(error.kind(), WouldBlock | Interrupted | ConnectionAborted) => {}
-                // It still waits there, and would wake every turn.
-                Err(_) => self.shut_until = Some(now + PAUSE),
-            },
+            Door::Tcp(listener) => listener.accept().map(|(stream, _)| {
+                let usable = stream.set_nonblocking(true).and_then(|()| stream.set_nodelay(true));
+                keep_alive(&stream);
+                usable.is_ok().then(|| Client::new(stream.into(), Gate::held()))
+            }),
+            Door::Unix(door) => door.listener().accept().map(|(stream, _)| {
+                let usable = stream.set_nonblocking(true);
+                usable.is_ok().then(|| Client::new(stream.into(), Gate::open()))
+            }),
+        };
+        match came {
+            Ok(client) => {
+                let welcome = client.filter(|_| self.station.came(now, others));
+                self.clients.extend(welcome);
+            }
+            Err(error) if matches!(error.kind(), WouldBlock | Interrupted | ConnectionAborted) => {}
+            // It still waits there, and would wake every turn.
+            Err(_) => self.shut_until = Some(now + PAUSE),
         }
     }
 }
 
 impl Station {
+    fn came(&mut self, now: Instant, others: usize) -> bool {
+        match self {
+            Station::Bytes(station) => station.came(now, others),
+            Station::Can(station) => station.came(now, others),
+        }
+    }
+
+    fn left(&mut self, now: Instant) {
+        match self {
+            Station::Bytes(station) => station.left(now),
+            Station::Can(station) => station.left(now),
+        }
+    }
+
+    fn wants(&self) -> bool {
+        match self {
+            Station::Bytes(station) => station.wants(),
+            Station::Can(station) => station.wants(),
+        }
+    }
+
+    fn stranger(&mut self, now: Instant) {
+        match self {
+            Station::Bytes(station) => station.stranger(now),
+            Station::Can(station) => station.stranger(now),
+        }
+    }
+
     fn deadline(&self) -> Option<Instant> {
         match self {
             Station::Bytes(station) => station.deadline(),
@@ -237,8 +288,9 @@ fn deliver_all(now: Instant, frames: &mut Vec<CanFrame>, clients: &mut [Client])
 }
 
 impl Client {
-    fn new(line: OwnedFd) -> Self {
-        Client { line, adapter: Device::default(), outgoing: Vec::new(), is_gone: false }
+    fn new(line: OwnedFd, gate: Gate) -> Self {
+        let (adapter, outgoing) = (Device::default(), Vec::new());
+        Client { line, adapter, gate, outgoing, is_gone: false, left_bytes: false }
     }
 
     fn deliver(&mut self, now: Instant, frame: &CanFrame) {

@@ -6,14 +6,20 @@
 //!
 //! A pty is a line with one client at a time; bytes that one left unread are not shown to the next.
 //! A served TCP port that is a serial line has one client too: while it is connected, others are
-//! closed at once; a [`ByteStation`] is told who comes and goes. Behind a TCP port that is a CAN bus
+//! closed at once; a station is told who comes and goes. Behind a TCP port that is a CAN bus
 //! each client has an slcan adapter of its own on the same bus: it hears the station and the other
-//! clients. A station on a CAN interface of the kernel is a node of that bus, and goes on when the
-//! interface was away.
+//! clients. Unix sockets (`unix-listen:`) serve as TCP ports do, to the user who serves them. A
+//! station on a CAN interface of the kernel is a node of that bus, and goes on when the interface was
+//! away.
+//!
+//! Web pages can make a browser connect to TCP ports of this machine. A client that begins with an
+//! HTTP request, a TLS handshake or a STUN message is closed; a station gets none of its bytes.
 
 mod endpoint;
 mod node;
 mod pty;
+mod stranger;
+mod unix;
 
 use std::net::{TcpListener, ToSocketAddrs};
 use std::os::fd::BorrowedFd;
@@ -29,6 +35,7 @@ use crate::port::{PortError, ServeName, timespec, unbracketed};
 use endpoint::{Endpoint, Scratch, Station};
 use node::Node;
 use pty::Pty;
+use unix::UnixDoor;
 
 /// What answers at the far end of a served serial line.
 pub trait ByteStation {
@@ -47,6 +54,15 @@ pub trait ByteStation {
 
     /// A client closed the line, or is gone.
     fn left(&mut self, _now: Instant) {}
+
+    /// Whether clients may send more now. While they may not, their bytes wait in the kernel, and
+    /// those of a client that leaves are dropped.
+    fn wants(&self) -> bool {
+        true
+    }
+
+    /// A client that came spoke HTTP, TLS or STUN, and is closed.
+    fn stranger(&mut self, _now: Instant) {}
 }
 
 /// What sits on a served CAN bus.
@@ -57,6 +73,22 @@ pub trait CanStation {
     fn poll(&mut self, now: Instant, replies: &mut Vec<CanFrame>);
     /// When [`poll`](Self::poll) is to be called next, if at all.
     fn deadline(&self) -> Option<Instant>;
+
+    /// As [`ByteStation::came`]. Unless the station says otherwise everybody is welcome.
+    fn came(&mut self, _now: Instant, _others: usize) -> bool {
+        true
+    }
+
+    /// As [`ByteStation::left`].
+    fn left(&mut self, _now: Instant) {}
+
+    /// As [`ByteStation::wants`].
+    fn wants(&self) -> bool {
+        true
+    }
+
+    /// As [`ByteStation::stranger`].
+    fn stranger(&mut self, _now: Instant) {}
 }
 
 /// A port that can be opened now.
@@ -80,7 +112,7 @@ pub struct Server {
     clock: Clock,
     endpoints: Vec<Endpoint>,
     nodes: Vec<Node>,
-    ready: Vec<bool>,
+    ready: Vec<PollFlags>,
     scratch: Scratch,
 }
 
@@ -143,16 +175,21 @@ impl Server {
                 self.endpoints.push(Endpoint::on_tcp(listener, station));
                 path
             }
+            (ServeName::UnixListen(path), station) => {
+                self.endpoints.push(Endpoint::on_unix(UnixDoor::open(path)?, station));
+                path.display().to_string()
+            }
             (ServeName::SocketCan(interface), Station::Can(station)) => {
                 self.nodes.push(Node::open(interface, station)?);
                 interface.clone()
             }
             (_, Station::Bytes(_)) => {
-                let usable = "pty:PATH or tcp-listen:ADDR:PORT";
+                let usable = "pty:PATH, unix-listen:PATH or tcp-listen:ADDR:PORT";
                 return Err(PortError::WrongKind { port, wanted: "serial line", usable });
             }
             (_, Station::Can(_)) => {
-                let usable = "slcan-pty:PATH, tcp-listen:ADDR:PORT or socketcan:INTERFACE";
+                let usable = "slcan-pty:PATH, unix-listen:PATH, tcp-listen:ADDR:PORT or \
+                    socketcan:INTERFACE";
                 return Err(PortError::WrongKind { port, wanted: "CAN bus", usable });
             }
         };
@@ -194,7 +231,7 @@ impl Server {
             Err(errno) => return Err(PortError::in_use("the served ports", errno)),
         }
         self.ready.clear();
-        self.ready.extend(fds.iter().map(|fd| !fd.revents().is_empty()));
+        self.ready.extend(fds.iter().map(PollFd::revents));
 
         let now = self.now();
         let mut ready = self.ready.as_slice();
@@ -205,10 +242,11 @@ impl Server {
         }
         for node in &mut self.nodes {
             let (ours, others) = ready.split_at(usize::from(node.watch().is_some()));
-            self.scratch.dropped += node.serve(now, ours == [true]);
+            let is_ready = ours.iter().any(|events| !events.is_empty());
+            self.scratch.dropped += node.serve(now, is_ready);
             ready = others;
         }
-        Ok(Turn { extra_is_ready: ready.contains(&true) })
+        Ok(Turn { extra_is_ready: ready.iter().any(|events| !events.is_empty()) })
     }
 
     /// The time to the first deadline of a station.

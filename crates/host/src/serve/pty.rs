@@ -14,7 +14,7 @@ use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr};
 
-use crate::port::PortError;
+use crate::port::{MARKED_LINK, PortError, mark};
 
 /// A pty for one client after the other. The client's side is not kept open here, so that the
 /// kernel tells when the last one has closed it: the server's side then reads an error.
@@ -32,6 +32,7 @@ impl Pty {
         let (path, master) = open_pair().map_err(|errno| failed(errno.into()))?;
         let comings = watch_comings(&path).map_err(|errno| failed(errno.into()))?;
         symlink(&path, link).map_err(failed)?;
+        mark(&master, link).map_err(failed)?;
         Ok((Pty { path, link: link.to_owned(), comings }, master))
     }
 
@@ -45,12 +46,12 @@ impl Pty {
         &self.comings
     }
 
-    /// Drops what the client that left did not read. Never while one is there: a reply to the first
-    /// request may be among it.
-    pub(super) fn forget_unread(&self) {
+    /// Drops what the client that left did not read, and what it `left_bytes` of for the server.
+    /// Never while one is there: a reply to the first request may be among it.
+    pub(super) fn forget_unread(&self, left_bytes: bool) {
+        let queues = if left_bytes { QueueSelector::IOFlush } else { QueueSelector::IFlush };
         // It cannot fail on a pty; if it did, the next client would see old bytes.
-        let _ = open_client_side(&self.path)
-            .and_then(|client_side| tcflush(&client_side, QueueSelector::IFlush));
+        let _ = open_client_side(&self.path).and_then(|client_side| tcflush(&client_side, queues));
         self.forget_comings();
     }
 
@@ -82,7 +83,9 @@ fn open_pair() -> rustix::io::Result<(PathBuf, OwnedFd)> {
     unlockpt(&master)?;
     fcntl_setfl(&master, OFlags::NONBLOCK)?;
     let name = ptsname(&master, Vec::new())?;
-    let path = PathBuf::from(OsStr::from_bytes(name.as_bytes()));
+    let number = Path::new(OsStr::from_bytes(name.as_bytes())).file_name().unwrap_or_default();
+    // Spelled so that a link to it is known for a server's.
+    let path = Path::new(MARKED_LINK).join(number);
     // The mode outlives this descriptor.
     let client_side = open_client_side(&path)?;
     let mut settings = tcgetattr(&client_side)?;
@@ -101,25 +104,25 @@ fn watch_comings(path: &Path) -> rustix::io::Result<OwnedFd> {
     Ok(comings)
 }
 
-/// Removes a link that a server left behind, whose pty is gone; anything else at `link` stays and is
-/// an error.
+/// Removes a link that a server left behind, whose pty is gone; anything else at `link`, a link to
+/// something else that is not there included, stays and is an error.
 fn clear_link(link: &Path) -> Result<(), PortError> {
     let port = link.display().to_string();
     let is_ours = match std::fs::read_link(link) {
-        Ok(target) if link.exists() && target.starts_with("/dev/pts") => {
-            if !is_older_than_its_pty(link) {
+        Ok(target) if target.starts_with("/dev/pts") => {
+            if link.exists() && !is_older_than_its_pty(link) {
                 return Err(PortError::PathServed { port });
             }
             true
         }
-        Ok(_) => !link.exists(),
+        Ok(_) => false,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         // Not a link at all.
         Err(error) if error.kind() == io::ErrorKind::InvalidInput => false,
         Err(source) => return Err(PortError::Io { port, source }),
     };
     if !is_ours {
-        return Err(PortError::PathTaken { port });
+        return Err(PortError::PathTaken { port, wanted: "link to a pty that a server left" });
     }
     std::fs::remove_file(link).map_err(|source| PortError::Io { port, source })
 }

@@ -1,0 +1,186 @@
+//! Clients that speak what browsers speak: a web page can make one connect to a served TCP port.
+
+/// How requests of HTTP begin.
+const METHODS: [&[u8]; 10] = [
+    b"GET ",
+    b"POST ",
+    b"PUT ",
+    b"HEAD ",
+    b"OPTIONS ",
+    b"DELETE ",
+    b"PATCH ",
+    b"TRACE ",
+    b"CONNECT ",
+    b"PRI * HTTP",
+];
+
+/// Bytes of which some may be anything.
+type Pattern = &'static [Option<fn(u8) -> bool>];
+
+/// A record of type handshake, version 3.0 to 3.4, of any length, with a ClientHello.
+const TLS: Pattern = &[
+    Some(|byte| byte == 0x16),
+    Some(|byte| byte == 0x03),
+    Some(|byte| byte <= 0x04),
+    None,
+    None,
+    Some(|byte| byte == 0x01),
+];
+/// A Binding or Allocate request of any length with the magic cookie (RFC 8489), which WebRTC sends
+/// over TCP.
+const STUN: Pattern = &[
+    Some(|byte| byte == 0x00),
+    Some(|byte| byte == 0x01 || byte == 0x03),
+    None,
+    None,
+    Some(|byte| byte == 0x21),
+    Some(|byte| byte == 0x12),
+    Some(|byte| byte == 0xA4),
+    Some(|byte| byte == 0x42),
+];
+/// The same behind the length of two bytes that ICE puts before it (RFC 4571).
+const FRAMED_STUN: Pattern = &[
+    Some(|byte| byte == 0x00),
+    None,
+    Some(|byte| byte == 0x00),
+    Some(|byte| byte == 0x01),
+    None,
+    None,
+    Some(|byte| byte == 0x21),
+    Some(|byte| byte == 0x12),
+    Some(|byte| byte == 0xA4),
+    Some(|byte| byte == 0x42),
+];
+
+/// As many bytes as decide, at most.
+pub(super) const HELD: usize = 10;
+
+/// Holds the first bytes of a client back until they are no beginning of what browsers speak.
+#[derive(Debug)]
+pub(super) struct Gate {
+    is_open: bool,
+    held: Vec<u8>,
+}
+
+impl Gate {
+    /// Lets everything through.
+    pub(super) fn open() -> Self {
+        Gate { is_open: true, held: Vec::new() }
+    }
+
+    /// Looks at the first bytes.
+    pub(super) fn held() -> Self {
+        Gate { is_open: false, held: Vec::new() }
+    }
+
+    /// Takes what the client sent, behind [`HELD`] bytes of room; gives what may pass now. `None`: it
+    /// is a stranger.
+    pub(super) fn pass<'a>(&mut self, chunk: &'a mut [u8]) -> Option<&'a [u8]> {
+        if self.is_open {
+            return Some(&chunk[HELD..]);
+        }
+        let start = HELD - self.held.len();
+        chunk[start..HELD].copy_from_slice(&self.held);
+        let all = &chunk[start..];
+        match judge(all) {
+            Judgement::Stranger => None,
+            Judgement::Undecided => {
+                self.held = all.to_vec();
+                Some(&[])
+            }
+            Judgement::Welcome => {
+                (self.is_open, self.held) = (true, Vec::new());
+                Some(all)
+            }
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Judgement {
+    Stranger,
+    Undecided,
+    Welcome,
+}
+
+fn judge(bytes: &[u8]) -> Judgement {
+    let methods = METHODS.iter().map(|method| {
+        let agrees = bytes.iter().zip(*method).all(|(byte, wanted)| byte == wanted);
+        (agrees, method.len())
+    });
+    let patterns = [TLS, STUN, FRAMED_STUN].into_iter().map(|pattern| {
+        let fits = |(&byte, place): (&u8, &Option<fn(u8) -> bool>)| place.is_none_or(|is| is(byte));
+        (bytes.iter().zip(pattern).all(fits), pattern.len())
+    });
+    let mut judgement = Judgement::Welcome;
+    for (agrees, length) in methods.chain(patterns) {
+        match agrees {
+            true if bytes.len() >= length => return Judgement::Stranger,
+            true => judgement = Judgement::Undecided,
+            false => {}
+        }
+    }
+    judgement
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HELLO: &[u8] = &[0x16, 0x03, 0x01, 0x02, 0x00, 0x01, 0x00, 0x01, 0xFC, 0x03, 0x03];
+    const BINDING: &[u8] = &[0, 1, 0, 8, 0x21, 0x12, 0xA4, 0x42, 1, 2, 3, 4, 5, 6, 7, 8];
+
+    /// What a gate lets through of pieces that come one after the other; nothing where the client was
+    /// found out.
+    fn passed<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> Option<Vec<u8>> {
+        let mut gate = Gate::held();
+        let mut passed = Vec::new();
+        for piece in pieces {
+            let mut chunk = [&[0; HELD], piece].concat();
+            passed.extend_from_slice(gate.pass(&mut chunk)?);
+        }
+        Some(passed)
+    }
+
+    fn in_two(sent: &[u8], at: usize) -> Option<Vec<u8>> {
+        let (first, second) = sent.split_at(at);
+        passed([first, second].into_iter().filter(|piece| !piece.is_empty()))
+    }
+
+    #[test]
+    fn nothing_of_a_browser_passes_wherever_it_is_cut() {
+        let framed = [&[0, 16], BINDING].concat();
+        let rest = b"/ HTTP/1.1\r\n\r\n\x23\x01\x01\x25";
+        let requests = METHODS.map(|method| [method, rest].concat());
+        for sent in requests.iter().map(Vec::as_slice).chain([HELLO, BINDING, &framed]) {
+            assert_eq!(passed(sent.chunks(1)), None, "{sent:02x?} byte by byte");
+            for at in 0..=sent.len() {
+                assert_eq!(in_two(sent, at), None, "{sent:02x?} cut at {at}");
+                // Before it is known for what it is, nothing has passed either.
+                let first = passed([&sent[..at]]).unwrap_or_default();
+                assert!(first.is_empty(), "{sent:02x?} cut at {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn requests_to_drives_pass_whole_wherever_they_are_cut() {
+        let frames =
+            (0..=255u8).map(|header| vec![header, 0x02, 0x01, 0x01, header.wrapping_add(4)]);
+        let lines = ["\rC\rS8\rO\r", "C\r", "O\r", "T0000014180102030405060708\r", "t14180\r"];
+        let lines = lines.map(|line| line.as_bytes().to_vec());
+        for sent in frames.chain(lines) {
+            for at in 0..=sent.len() {
+                // Frame code 0 for motor 0, which the protocol does not have, may be held.
+                let whole = in_two(&sent, at).as_deref() == Some(&sent[..]);
+                assert!(whole || sent[0] == 0, "{sent:02x?} at {at}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_held_passes_in_order_with_what_follows() {
+        assert_eq!(passed([&b"P"[..], b"O", b"S"]), Some(Vec::new()));
+        assert_eq!(passed([&b"PO"[..], b"S", b"\rGET / HTTP"]), Some(b"POS\rGET / HTTP".to_vec()));
+    }
+}

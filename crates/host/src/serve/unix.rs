@@ -1,0 +1,84 @@
+//! Unix sockets as served ports: the file system says who may connect.
+
+use std::io;
+use std::os::fd::OwnedFd;
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
+use std::os::unix::net::UnixListener;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{Mode, chmod};
+use rustix::io::Errno;
+use rustix::net::{
+    AddressFamily, SocketAddrUnix, SocketFlags, SocketType, bind, connect, listen, socket_with,
+};
+
+use crate::port::PortError;
+
+/// How many newcomers may wait at the door.
+const BACKLOG: i32 = 64;
+
+/// A listening Unix socket that only its user may connect to.
+pub(super) struct UnixDoor {
+    listener: UnixListener,
+    path: PathBuf,
+    /// The socket's own file, so that another's in its place is not removed.
+    inode: u64,
+}
+
+impl UnixDoor {
+    /// Listens at `path`. A socket that a killed server left behind there is replaced.
+    pub(super) fn open(path: &Path) -> Result<Self, PortError> {
+        let port = path.display().to_string();
+        clear(path)?;
+        let failed = |source| PortError::Io { port: port.clone(), source };
+        let fd = listening(path).map_err(failed)?;
+        let inode = path.symlink_metadata().map_err(failed)?.ino();
+        Ok(UnixDoor { listener: fd.into(), path: path.to_owned(), inode })
+    }
+
+    pub(super) fn listener(&self) -> &UnixListener {
+        &self.listener
+    }
+}
+
+impl Drop for UnixDoor {
+    fn drop(&mut self) {
+        if self.path.symlink_metadata().is_ok_and(|file| file.ino() == self.inode) {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Nobody can connect before the socket listens, and by then its mode is set.
+fn listening(path: &Path) -> io::Result<OwnedFd> {
+    let fd = socket()?;
+    bind(&fd, &SocketAddrUnix::new(path)?)?;
+    chmod(path, Mode::RUSR | Mode::WUSR)?;
+    listen(&fd, BACKLOG)?;
+    Ok(fd)
+}
+
+/// Removes a socket that nobody listens at; anything else at `path` stays and is an error.
+fn clear(path: &Path) -> Result<(), PortError> {
+    let port = path.display().to_string();
+    match path.symlink_metadata() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(source) => return Err(PortError::Io { port, source }),
+        Ok(file) if !file.file_type().is_socket() => {
+            return Err(PortError::PathTaken { port, wanted: "socket" });
+        }
+        Ok(_) => {}
+    }
+    let knock = || connect(&socket()?, &SocketAddrUnix::new(path)?);
+    match knock() {
+        Err(Errno::CONNREFUSED) => {
+            std::fs::remove_file(path).map_err(|source| PortError::Io { port, source })
+        }
+        _ => Err(PortError::PathServed { port }),
+    }
+}
+
+fn socket() -> rustix::io::Result<OwnedFd> {
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)
+}
