@@ -263,18 +263,6 @@ def test_a_guard_whose_drive_is_silent_says_so_when_it_ends(sim, guard, client):
         drives.process.send_signal(signal.SIGCONT)
 
 
-@pytest.mark.parametrize(
-    ("port", "says"),
-    [
-        ("slcan:/dev/ttyACM0", "shutdown time"),
-        ("socketcan:can0", "shutdown time"),
-        ("sim:", "end with it"),
-    ],
-)
-def test_what_cannot_be_guarded_is_told(run, port, says):
-    assert says in run("guard", "-p", port).ended(2).err
-
-
 # RMD: the protocol's own means is the drive's shutdown time.
 
 CAN_CLIENT = """

@@ -1,41 +1,95 @@
-//! Ctrl-C, SIGTERM and SIGHUP. A one-shot command ends at once and leaves the motor as told;
+//! Signals that ask for the end. A one-shot command ends at once and leaves the motor as told;
 //! whatever holds a line open takes the signals over, ends in order and stops its motors.
+//!
+//! A signal that is ignored when the program starts stays ignored, as `nohup` means it.
 
 use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Condvar, Mutex, PoisonError};
+use std::sync::{Condvar, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use motorlink::Clock;
+use signal_hook::consts::*;
+use signal_hook::iterator::{Handle, Signals};
 
 use crate::output::note;
 
 /// Exit code of a program that a signal ended.
 const INTERRUPTED_CODE: i32 = 130;
 
+/// Ctrl-C, what supervisors send, and a terminal that is closed.
+const ENDING: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
+/// Others that end a program which does not handle them.
+const KILLING: [i32; 9] =
+    [SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU, SIGXFSZ];
+/// Those that suspend one.
+const SUSPENDING: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];
+
+static HANDLE: OnceLock<Handle> = OnceLock::new();
 static TAKEN_OVER: AtomicBool = AtomicBool::new(false);
+static HOLDS: AtomicBool = AtomicBool::new(false);
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static LOCK: Mutex<()> = Mutex::new(());
 static WAKE: Condvar = Condvar::new();
 
 /// Handles the signals: they end the process at once until someone takes over.
 pub fn install() {
-    let installed = ctrlc::set_handler(|| {
-        // A second signal while the first is being obeyed ends the process as well.
-        if !TAKEN_OVER.load(Ordering::SeqCst) || INTERRUPTED.swap(true, Ordering::SeqCst) {
-            exit(INTERRUPTED_CODE);
-        }
-        let _held = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
-        WAKE.notify_all();
+    let listening = Signals::new(obeyed(&ENDING)).and_then(|mut signals| {
+        let handle = signals.handle();
+        std::thread::Builder::new().spawn(move || signals.forever().for_each(obey))?;
+        Ok(handle)
     });
-    if let Err(error) = installed {
-        note(format!("warning: Ctrl-C ends this program without stopping motors: {error}"));
+    match listening {
+        Ok(handle) => drop(HANDLE.set(handle)),
+        Err(error) => {
+            note(format!("warning: Ctrl-C ends this program without stopping motors: {error}"));
+        }
     }
 }
 
-/// From now on the caller looks at [`interrupted`] and ends in order.
+/// From now on the caller looks at [`interrupted`] and ends in order. A second signal ends the process
+/// at once.
 pub fn take_over() {
     TAKEN_OVER.store(true, Ordering::SeqCst);
+}
+
+/// As [`take_over`], for what motors depend on: every signal that would end the process asks for its
+/// end in order, however many come, and none suspends it.
+pub fn hold() {
+    HOLDS.store(true, Ordering::SeqCst);
+    take_over();
+    let Some(handle) = HANDLE.get() else { return };
+    for signal in obeyed(&KILLING).into_iter().chain(SUSPENDING) {
+        if let Err(error) = handle.add_signal(signal) {
+            note(format!("warning: signal {signal} is not handled: {error}"));
+        }
+    }
+}
+
+fn obey(signal: i32) {
+    if SUSPENDING.contains(&signal) {
+        return note(
+            "not suspended: motors depend on this program; to run it in the background start it with `&`",
+        );
+    }
+    let is_first = !INTERRUPTED.swap(true, Ordering::SeqCst);
+    if !TAKEN_OVER.load(Ordering::SeqCst) || !(is_first || HOLDS.load(Ordering::SeqCst)) {
+        exit(INTERRUPTED_CODE);
+    }
+    let _held = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
+    WAKE.notify_all();
+}
+
+/// Those of `signals` that were not ignored when the program started.
+fn obeyed(signals: &[i32]) -> Vec<i32> {
+    let ignored = ignored(&std::fs::read_to_string("/proc/self/status").unwrap_or_default());
+    signals.iter().copied().filter(|signal| ignored >> (signal - 1) & 1 == 0).collect()
+}
+
+/// The signals that a process ignores, a bit each, from its `status`; none where it does not say.
+fn ignored(status: &str) -> u64 {
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
 }
 
 /// Whether a signal came.
@@ -58,4 +112,16 @@ pub fn wait(time: Duration) -> bool {
     let waited = WAKE.wait_timeout_while(held, time, |()| !interrupted());
     drop(waited);
     !interrupted()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ignored_signals_are_read_from_the_status_of_a_process() {
+        let status = "Name:\tmotorlink\nSigBlk:\t0000000000000000\nSigIgn:\t0000000000001001\n";
+        assert_eq!(ignored(status), 1 << (SIGHUP - 1) | 1 << (SIGPIPE - 1));
+        assert_eq!(ignored("Name:\tmotorlink\n"), 0);
+    }
 }

@@ -15,6 +15,7 @@ mod rmd;
 mod sim;
 mod st;
 mod trace;
+mod voice;
 
 use std::ffi::OsString;
 
@@ -35,7 +36,7 @@ enum Command {
     Demo(demo::Args),
     /// Serve simulated drives on ports of this machine
     Sim(sim::Args),
-    /// Hold the line of an ST drive for a program, and stop its motors when the program is gone
+    /// Hold the line of a drive for a program, and stop its motors when the program is gone
     Guard(guard::Args),
     /// List serial devices and CAN interfaces, and what could be wrong with them
     Ports(ports::Args),
@@ -89,8 +90,10 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
         }
         Command::Man { folder } => help::write_manual(Cli::command(), &folder),
     };
-    match result {
+    let code = match result {
         Ok(()) => 0,
         Err(failure) => failure.report(),
-    }
+    };
+    output::finish();
+    code
 }

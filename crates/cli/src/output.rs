@@ -1,12 +1,17 @@
 //! What people and programs read: aligned rows, or a JSON object a line.
 
 use std::io::{Write, stderr, stdout};
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use crate::failure::Failure;
+use crate::voice::Voice;
+
+/// stdout and stderr of a program that must not wait for their readers.
+static VOICES: OnceLock<(Voice, Voice)> = OnceLock::new();
 
 /// Where results go.
 #[derive(Debug, Clone, Copy)]
@@ -47,13 +52,43 @@ impl Output {
     }
 }
 
+/// From now on nothing that is printed is waited for: motors depend on this program, or drives do.
+/// Gives stdout.
+pub fn never_wait() -> &'static Voice {
+    let (results, _) = VOICES.get_or_init(|| {
+        let messages = |lines| format!("{lines} lines were dropped here: nobody read them");
+        (Voice::new(stdout(), missed), Voice::new(stderr(), messages))
+    });
+    results
+}
+
+/// Stands where `lines` JSON lines were dropped.
+pub fn missed(lines: u64) -> String {
+    json!({ "event": "dropped", "lines": lines }).to_string()
+}
+
+/// Gives what was printed a moment to be read, at the end of a program that waits for nothing.
+pub fn finish() {
+    if let Some((results, messages)) = VOICES.get() {
+        messages.finish();
+        results.finish();
+    }
+}
+
 /// Prints a line on stderr; it must not matter whether somebody reads it.
 pub fn note(text: impl std::fmt::Display) {
-    let _ = writeln!(stderr(), "{text}");
+    match VOICES.get() {
+        Some((_, messages)) => messages.say(text),
+        None => drop(writeln!(stderr(), "{text}")),
+    }
 }
 
 /// Prints a line at once; a reader that is gone ends the program quietly.
 pub fn line(text: &dyn std::fmt::Display) -> Result<(), Failure> {
+    if let Some((results, _)) = VOICES.get() {
+        results.say(text);
+        return Ok(());
+    }
     let mut out = stdout().lock();
     writeln!(out, "{text}")?;
     out.flush()?;

@@ -2,7 +2,7 @@
 //!
 //! [`port`] opens serial lines and CAN buses by name; [`serve`] is the other side of them, for
 //! simulated drives; [`list`] says what this machine has; [`slcan`] is the language of serial CAN
-//! adapters; [`fault`] makes a line misbehave.
+//! adapters; [`relay`] stands between a program and its motors; [`fault`] makes a line misbehave.
 #![forbid(unsafe_code)]
 
 mod clock;
@@ -10,6 +10,7 @@ pub mod fault;
 mod line;
 pub mod list;
 pub mod port;
+pub mod relay;
 pub mod rmd;
 pub mod serve;
 #[cfg(feature = "sim")]

@@ -6,7 +6,9 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use motorlink::stmcp::{Client, Event, Options, Reason, Relay, RelayError, RelayOptions, Status};
+use motorlink::relay::{Event, Part, Reason, Relay, RelayError, RelayOptions};
+use motorlink::rmd::OnDrop;
+use motorlink::stmcp::{Client, Options, Status};
 use served::Served;
 
 const START: [u8; 4] = [0x23, 0x01, 0x01, 0x25];
@@ -14,7 +16,7 @@ const ACK: [u8; 3] = [0xF0, 0x00, 0xF0];
 
 /// A relay on a drive, and where it is served.
 fn relay(drives: &Served, options: RelayOptions) -> (Relay, String) {
-    let mut relay = Relay::open(&drives.st.parse().expect("a port"), options).expect("opened");
+    let mut relay = Relay::st(&drives.st.parse().expect("a port"), options).expect("opened");
     let served = relay.serve(&"tcp-listen:127.0.0.1:0".parse().expect("a name")).expect("served");
     (relay, served.path)
 }
@@ -47,10 +49,10 @@ fn start(relay: &mut Relay, address: &str) -> TcpStream {
 }
 
 fn has_stopped(event: &Event, wanted: Reason) -> bool {
-    let Event::Stopped { reason, motors } = event else { return false };
+    let Event::Stopped { reason, halts } = event else { return false };
     assert_eq!(*reason, wanted);
-    assert!(motors.iter().all(|halt| halt.is_stopped()), "{motors:?}");
-    motors.iter().map(|halt| halt.motor.number()).eq([1])
+    assert!(halts.iter().all(|halt| halt.is_stopped()), "{halts:?}");
+    halts.iter().map(|halt| halt.part).eq([Part::Motor(1)])
 }
 
 #[test]
@@ -60,7 +62,10 @@ fn the_motor_is_stopped_when_its_client_leaves() {
     for _ in 0..2 {
         drop(start(&mut relay, &address));
         let events = turn_until(&mut relay, |event| has_stopped(event, Reason::ClientGone));
-        assert!(matches!(events[..], [Event::Left, Event::Stopped { .. }]), "{events:?}");
+        assert!(
+            matches!(events[..], [Event::Left { dropped: 0 }, Event::Stopped { .. }]),
+            "{events:?}"
+        );
     }
     assert!(relay.end().is_empty(), "nothing is left to stop");
 }
@@ -75,8 +80,8 @@ fn motors_that_the_drive_lacks_keep_nobody_out() {
     turn_until(&mut relay, |event| matches!(event, Event::Came { .. }));
     drop(client);
     let events = turn_until(&mut relay, |event| matches!(event, Event::Stopped { .. }));
-    let Some(Event::Stopped { motors, .. }) = events.last() else { unreachable!() };
-    assert!(motors.iter().all(|halt| halt.is_stopped()), "{motors:?}");
+    let Some(Event::Stopped { halts, .. }) = events.last() else { unreachable!() };
+    assert!(halts.iter().all(|halt| halt.is_stopped()), "{halts:?}");
     drop(start(&mut relay, &address));
     turn_until(&mut relay, |event| has_stopped(event, Reason::ClientGone));
     assert!(relay.end().is_empty(), "nothing is left to stop");
@@ -137,10 +142,17 @@ fn a_second_client_is_closed_and_told_of() {
 }
 
 #[test]
-fn what_is_no_serial_line_of_a_drive_is_refused() {
-    let open = |name: &str| Relay::open(&name.parse().expect("a name"), RelayOptions::default());
-    assert!(matches!(open("slcan:/dev/ttyACM0").err(), Some(RelayError::Can(_))));
-    assert!(matches!(open("socketcan:can0").err(), Some(RelayError::Can(_))));
-    assert!(matches!(open("sim:").err(), Some(RelayError::Simulated(_))));
-    assert!(matches!(open("/dev/ttyNONE0").err(), Some(RelayError::Port(_))));
+fn a_port_of_the_other_kind_and_drives_within_the_process_are_refused() {
+    use motorlink::port::PortError::{NotFound, WrongKind};
+    let options = RelayOptions::default();
+    let st = |name: &str| Relay::st(&name.parse().expect("a name"), options).err();
+    let rmd = |name: &str| Relay::rmd(&name.parse().expect("a name"), OnDrop::Off, options).err();
+    assert!(matches!(st("slcan:/dev/ttyACM0"), Some(RelayError::Port(WrongKind { .. }))));
+    assert!(matches!(st("socketcan:can0"), Some(RelayError::Port(WrongKind { .. }))));
+    assert!(matches!(rmd("/dev/ttyACM0"), Some(RelayError::Port(WrongKind { .. }))));
+    assert!(matches!(st("/dev/ttyNONE0"), Some(RelayError::Port(NotFound { .. }))));
+    assert!(matches!(rmd("slcan:/dev/ttyNONE0"), Some(RelayError::Port(NotFound { .. }))));
+    for refused in [st("sim:"), rmd("sim:")] {
+        assert!(matches!(refused, Some(RelayError::Simulated(_))));
+    }
 }

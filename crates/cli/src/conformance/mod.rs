@@ -33,7 +33,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let options = st::Options { profile, motor, allowed: run.allowed(), byte_time };
             let world = Box::new(Commands::new(&run));
             let bench = st::Bench::new(Box::new(Real::on_line(link)), world, options);
-            interrupt::take_over();
+            interrupt::hold();
             conduct("st", &run, st::suite(profile), bench)
         }
         Command::Rmd { port, run, write_rom, id, encoder } => {
@@ -43,7 +43,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let options = rmd::Options { id, encoder, allowed };
             let world = Box::new(Commands::new(&run));
             let bench = rmd::Bench::new(Box::new(Real::on_bus(link)), world, options);
-            interrupt::take_over();
+            interrupt::hold();
             conduct("rmd", &run, rmd::suite(), bench)
         }
         Command::Host(args) => host::run(&args),

@@ -12,7 +12,9 @@ use motorlink::sim::{Bench, BenchConfig};
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
+use crate::output::missed;
 use crate::sim;
+use crate::voice::Voice;
 
 pub struct Drives {
     /// Port of the ST drive.
@@ -73,10 +75,10 @@ impl Drives {
 
 fn serve([st, rmd]: &[String; 2], stream: &UnixStream) -> Result<(), Failure> {
     let mut bench = Bench::new();
-    let mut out = stream;
-    sim::serve(&mut bench, &drives(), from_ref(st), from_ref(rmd), &mut out)?;
+    let out = Voice::new(stream.try_clone()?, missed);
+    sim::serve(&mut bench, &drives(), from_ref(st), from_ref(rmd), &out)?;
     // A signal ends the demo first, which still has to stop its motors.
-    sim::obey(&mut bench, stream, &mut out, |end| end)
+    sim::obey(&mut bench, stream, &out, |end| end)
 }
 
 impl Control {

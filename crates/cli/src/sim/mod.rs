@@ -4,7 +4,7 @@ mod plot;
 mod presets;
 mod run;
 
-use std::io::{ErrorKind, Read, Write};
+use std::io::{ErrorKind, Read};
 use std::os::fd::AsFd;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -12,12 +12,13 @@ use std::time::Duration;
 use motorlink::port::ServeName;
 use motorlink::sim::{Bench, BenchConfig, ConfigError, RomError, RomFolder, ServeError};
 use motorlink::stmcp::Profile;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::getpgrp;
 use rustix::termios::{isatty, tcgetpgrp};
 
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
+use crate::output;
+use crate::voice::Voice;
 
 /// How long the simulated time may fall behind while nobody talks.
 const IDLE: Duration = Duration::from_millis(20);
@@ -85,9 +86,9 @@ pub fn run(args: Args) -> Result<(), Failure> {
     if let Some(folder) = &args.rom {
         bench.keep_rom(RomFolder::open(folder).map_err(ServeError::from)?);
     }
-    let mut out = std::io::stdout();
-    serve(&mut bench, &config, &st, &rmd, &mut out)?;
-    obey(&mut bench, std::io::stdin(), &mut out, |end| interrupted() || end && args.stdin)
+    let out = output::never_wait();
+    serve(&mut bench, &config, &st, &rmd, out)?;
+    obey(&mut bench, std::io::stdin(), out, |end| interrupted() || end && args.stdin)
 }
 
 /// Serves the ports and says so on `out`, a JSON line each.
@@ -96,17 +97,14 @@ pub fn serve(
     config: &BenchConfig,
     st: &[String],
     rmd: &[String],
-    out: &mut impl Write,
+    out: &Voice,
 ) -> Result<(), Failure> {
     for port in st {
-        let announcement = bench.serve_st(&port.parse::<ServeName>()?, config)?;
-        writeln!(out, "{announcement}")?;
+        out.say(bench.serve_st(&port.parse::<ServeName>()?, config)?);
     }
     for port in rmd {
-        let announcement = bench.serve_rmd(&port.parse::<ServeName>()?, config)?;
-        writeln!(out, "{announcement}")?;
+        out.say(bench.serve_rmd(&port.parse::<ServeName>()?, config)?);
     }
-    out.flush()?;
     Ok(())
 }
 
@@ -116,30 +114,23 @@ pub fn serve(
 pub fn obey(
     bench: &mut Bench,
     mut input: impl Read + AsFd,
-    out: &mut (impl Write + AsFd),
+    out: &Voice,
     ended: impl Fn(bool) -> bool,
 ) -> Result<(), Failure> {
     let mut lines = Lines::default();
     while !ended(lines.ended && lines.bytes.is_empty()) {
-        let listen = !lines.ended && may_read(&input) && may_write(out);
+        let listen = !lines.ended && may_read(&input) && out.has_room();
         let turn = bench.turn(IDLE, listen.then(|| input.as_fd()))?;
         if turn.extra_is_ready {
             lines.read(&mut input);
         }
-        while may_write(out)
+        while out.has_room()
             && let Some(line) = lines.next()
         {
-            writeln!(out, "{}", bench.obey(&line))?;
-            out.flush()?;
+            out.say(bench.obey(&line));
         }
     }
     Ok(())
-}
-
-/// Whether an answer would be taken now.
-fn may_write(out: &impl AsFd) -> bool {
-    let mut fds = [PollFd::new(out, PollFlags::OUT)];
-    poll(&mut fds, Some(&Timespec::default())).is_ok_and(|ready| ready > 0)
 }
 
 /// A process in the background is stopped when it reads its terminal.

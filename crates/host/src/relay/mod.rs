@@ -1,28 +1,28 @@
-//! Holds a drive's line for one client at a time, and stops what the client started when it is gone.
+//! Holds a port for one client at a time, and stops what the client set turning when it is gone.
+//!
+//! [`Relay::st`] holds the serial line of an ST drive, [`Relay::rmd`] a CAN bus with RMD motors. The
+//! client sits behind a served port ([`Relay::serve`]) and notices nothing of the relay.
+
+mod pace;
+mod port;
+mod rmd;
+mod st;
+mod station;
 
 use std::cell::RefCell;
-use std::collections::VecDeque;
-use std::os::fd::AsFd;
+use std::fmt;
 use std::rc::Rc;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use motorlink_proto::stmcp::{Config, ErrorCode, Motor, Recovery, Status};
 use motorlink_proto::time::Instant;
 
-use super::follow::Follower;
-use super::{Client, Error, Options, Stopped};
-use crate::line::{BackOff, Reopening};
-use crate::port::{ByteLink, FdLink, LineName, PortError, PortName, ServeName};
-use crate::serve::{ByteStation, Served, Server};
+use crate::port::{PortError, PortName, ServeName};
+use crate::rmd::OnDrop;
+use crate::serve::{Served, Server};
+use station::Desk;
 
-/// How long a motor has to show that it stops, and how often it is asked.
-const STATUS_PATIENCE: Duration = Duration::from_millis(500);
-const STATUS_PERIOD: Duration = Duration::from_millis(10);
 /// How long after a stop that failed the next one is tried.
 const RETRY: Duration = Duration::from_secs(1);
-/// The longest turn while the drive's port is closed and tried again and again.
-const REOPEN_PERIOD: Duration = Duration::from_millis(50);
 
 /// How a [`Relay`] behaves.
 #[derive(Debug, Clone, Copy, Default)]
@@ -52,47 +52,84 @@ pub enum Event {
         port: String,
     },
     /// The client has left.
-    Left,
+    Left {
+        /// How many bytes, or frames, it left that were not sent any more.
+        dropped: usize,
+    },
     /// Someone came while the line was another's, or while motors have yet to be stopped.
     TurnedAway {
         /// The served port.
         port: String,
     },
+    /// A client spoke HTTP, TLS or STUN, as a browser does for a web page. It was closed, and nothing
+    /// of what it sent was passed on.
+    Browser {
+        /// The served port.
+        port: String,
+    },
+    /// Another node of the bus commands a motor. What it sets turning is not stopped here.
+    Unguarded {
+        /// The motor's ID.
+        motor: u8,
+        /// DATA\[0\] of the frame.
+        code: u8,
+    },
     /// The drive's port failed; it is opened again as soon as that can be done.
     PortLost(PortError),
     /// The drive's port is open again.
     PortBack,
-    /// Motors were stopped: all of them, if every result is `Ok`. Those that failed are tried again.
+    /// Motors were stopped: all of them, if [`Halt::is_stopped`] says so of every one. What was not is
+    /// tried again.
     Stopped {
         /// Why.
         reason: Reason,
         /// How that went for each; none where the drive has none of the motors that were meant.
-        motors: Vec<Halt>,
+        halts: Vec<Halt>,
     },
 }
 
-/// What came of stopping one motor.
-#[derive(Debug)]
+/// What is stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The motor of this number, or ID.
+    Motor(u8),
+    /// The power factor correction of an ST drive.
+    Pfc,
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Part::Motor(number) => write!(f, "motor {number}"),
+            Part::Pfc => f.write_str("the PFC"),
+        }
+    }
+}
+
+/// What came of stopping one part.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Halt {
-    /// The motor.
-    pub motor: Motor,
-    /// The state that it was last seen in, behind an acknowledged STOP_MOTOR.
-    pub result: Result<Status, Error>,
+    /// The part.
+    pub part: Part,
+    /// What it said.
+    pub outcome: Outcome,
+}
+
+/// How a stop went.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Outcome {
+    /// It rests, or is about to: the state in which it was seen, or what it acknowledged.
+    Stopped(String),
+    /// It acknowledged its stop and was seen in this state afterwards.
+    Unproven(String),
+    /// Nobody knows, for this reason.
+    Failed(String),
 }
 
 impl Halt {
-    /// Whether the motor rests, or is about to.
+    /// Whether the part rests, or is about to.
     pub fn is_stopped(&self) -> bool {
-        matches!(
-            self.result,
-            Ok(Status::Idle
-                | Status::AnyStop
-                | Status::Stop
-                | Status::StopIdle
-                | Status::WaitStopMotor
-                | Status::FaultNow
-                | Status::FaultOver)
-        )
+        matches!(self.outcome, Outcome::Stopped(_))
     }
 }
 
@@ -103,12 +140,6 @@ pub enum RelayError {
     /// The port cannot be opened or served.
     #[error(transparent)]
     Port(#[from] PortError),
-    /// The port is a CAN bus.
-    #[error(
-        "`{0}` is a CAN bus, and a guard holds the serial line of an ST drive: an RMD motor stops by \
-         itself after its shutdown time, which the vendor's tool sets (docs/HOST-FAULTS.md)"
-    )]
-    Can(PortName),
     /// The drives are inside the process.
     #[error(
         "`{0}` names simulated drives inside this process, which end with it: serve them with \
@@ -117,192 +148,188 @@ pub enum RelayError {
     Simulated(PortName),
 }
 
-/// Serves a drive's line to one client at a time, unchanged in both directions and without a thread,
-/// and stops the motors that a client started when it is gone.
+/// The protocol's side of a relay: the port, what passes it, and what was set turning.
+trait Hold {
+    fn serve(
+        &self,
+        server: &mut Server,
+        name: &ServeName,
+        desk: &Rc<RefCell<Desk>>,
+        port: Rc<RefCell<String>>,
+    ) -> Result<Served, PortError>;
+
+    /// A turn of the server that ends when the port has something as well; whether the port is open.
+    fn turn(&self, server: &mut Server, most: Duration) -> Result<bool, PortError>;
+
+    /// Moves what can be moved between port and client. While the port is closed what the client
+    /// sends is dropped: it must not come out of the blue later.
+    fn pass(&mut self, now: Instant, desk: &mut Desk) -> Result<(), PortError>;
+
+    /// When [`pass`](Self::pass) has to be called again.
+    fn due(&self, now: Instant) -> Option<Instant>;
+
+    /// The client is gone: drops what it sent and the port has not taken. Gives how much that was.
+    fn forget(&mut self, now: Instant) -> usize;
+
+    /// Whether something was set turning and not stopped.
+    fn owes(&self) -> bool;
+
+    /// Stops what was set turning, which takes as long as the drive needs to answer. What could not be
+    /// stopped is owed still.
+    fn stop(&mut self) -> Vec<Halt>;
+}
+
+/// Serves a port to one client at a time, unchanged in both directions and without a thread, and stops
+/// what a client set turning when it is gone.
 ///
 /// Whoever owns it calls [`turn`](Self::turn) again and again, and [`end`](Self::end) at last; where it
-/// is dropped instead, a panic included, motors are stopped all the same. A client is gone when it has closed the pty or the connection, which the kernel
-/// does for a process that is killed.
+/// is dropped instead, a panic included, motors are stopped all the same. A client is gone when it has
+/// closed the pty or the connection, which the kernel does for a process that is killed.
+///
+/// What a client sends faster than the drive takes it waits with the client. What it left behind when
+/// it is gone is dropped, and the stop is the next that the drive gets.
 pub struct Relay {
     server: Server,
-    shared: Rc<RefCell<Shared>>,
+    hold: Box<dyn Hold>,
+    desk: Rc<RefCell<Desk>>,
     silence: Option<Duration>,
-    line: LineName,
+    /// The client is gone, and motors have to be stopped before anybody is let in.
+    is_owing: bool,
     /// No stop is tried before.
     retry_at: Instant,
     /// That motors could not be stopped was told.
     has_complained: bool,
 }
 
-/// The drive's port; several hold it, one uses it at a time.
-#[derive(Clone)]
-struct Port(Arc<Mutex<Reopening<Arc<FdLink>>>>);
-
-struct Shared {
-    port: Port,
-    follower: Follower,
-    /// The served port whose client has the line.
-    client: Option<String>,
-    /// When the client last sent something.
-    heard_at: Instant,
-    to_client: Vec<u8>,
-    /// Motors have to be stopped before anybody is let in.
-    is_owing: bool,
-    /// That the drive's port failed was told.
-    is_lost: bool,
-    events: VecDeque<Event>,
-}
-
-/// One served port.
-struct Place {
-    shared: Rc<RefCell<Shared>>,
-    port: Rc<RefCell<String>>,
-}
-
 impl Relay {
-    /// Opens a drive's port and locks it, as every client does.
-    pub fn open(port: &PortName, options: RelayOptions) -> Result<Self, RelayError> {
-        let line = match port {
-            PortName::Line(line) => line.clone(),
-            PortName::Sim(_) => return Err(RelayError::Simulated(port.clone())),
-            PortName::Slcan { .. } | PortName::SocketCan(_) => {
-                return Err(RelayError::Can(port.clone()));
-            }
-        };
-        let opened = line.clone();
-        let open = Box::new(move || opened.open().map(Arc::new));
-        let back_off = BackOff { cap: Duration::from_millis(500), ..BackOff::default() };
-        let port = Port(Arc::new(Mutex::new(Reopening::open(&port.to_string(), open, back_off)?)));
-        let shared = Shared {
-            port,
-            follower: Follower::default(),
-            client: None,
-            heard_at: Instant(0),
-            to_client: Vec::new(),
-            is_owing: false,
-            is_lost: false,
-            events: VecDeque::new(),
-        };
-        Ok(Relay {
-            server: Server::new(),
-            shared: Rc::new(RefCell::new(shared)),
-            silence: options.silence,
-            line,
-            retry_at: Instant(0),
-            has_complained: false,
-        })
+    /// Opens the port of an ST drive and locks it, as every client does.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened.
+    pub fn st(port: &PortName, options: RelayOptions) -> Result<Self, RelayError> {
+        refuse_simulated(port)?;
+        Ok(Self::over(Box::new(st::StHold::open(port)?), options))
     }
 
-    /// Serves the line on a further port.
+    /// Opens a CAN bus with RMD motors. When a client is gone `on_loss` is done to the motors that it
+    /// set moving.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened.
+    pub fn rmd(
+        port: &PortName,
+        on_loss: OnDrop,
+        options: RelayOptions,
+    ) -> Result<Self, RelayError> {
+        refuse_simulated(port)?;
+        Ok(Self::over(Box::new(rmd::RmdHold::open(port, on_loss)?), options))
+    }
+
+    fn over(hold: Box<dyn Hold>, options: RelayOptions) -> Self {
+        Relay {
+            server: Server::new(),
+            hold,
+            desk: Rc::default(),
+            silence: options.silence,
+            is_owing: false,
+            retry_at: Instant(0),
+            has_complained: false,
+        }
+    }
+
+    /// Serves the line on a further port: an ST drive's as a serial line, a CAN bus as slcan.
+    ///
+    /// # Errors
+    /// What keeps it from being served there.
     pub fn serve(&mut self, name: &ServeName) -> Result<Served, PortError> {
         let port = Rc::new(RefCell::new(name.to_string()));
-        let place = Place { shared: Rc::clone(&self.shared), port: Rc::clone(&port) };
-        let served = self.server.serve_bytes(name, Box::new(place))?;
+        let served = self.hold.serve(&mut self.server, name, &self.desk, Rc::clone(&port))?;
         port.borrow_mut().clone_from(&served.port);
         Ok(served)
     }
 
     /// Waits until something passes, at most for `most`; passes it on, and stops motors where that is
     /// due: such a turn takes as long as the drive needs to answer. Gives what happened.
+    ///
+    /// # Errors
+    /// The served ports cannot be waited for any more.
     pub fn turn(&mut self, most: Duration) -> Result<Vec<Event>, PortError> {
-        let port = self.shared.borrow().port.clone();
-        match port.open() {
-            Some(link) => {
-                self.shared.borrow_mut().port_is_open();
-                let turn = self.server.turn(self.wait(most), Some(link.as_fd()))?;
-                drop(link);
-                if turn.extra_is_ready {
-                    self.shared.borrow_mut().pull();
-                }
-            }
-            None => {
-                self.server.turn(self.wait(most.min(REOPEN_PERIOD)), None)?;
-            }
+        let most = self.wait(most);
+        let is_open = self.hold.turn(&mut self.server, most)?;
+        let now = self.server.now();
+        let mut desk = self.desk.borrow_mut();
+        if desk.has_left {
+            desk.has_left = false;
+            let dropped = self.hold.forget(now) + std::mem::take(&mut desk.dropped);
+            desk.events.push_back(Event::Left { dropped });
+            self.is_owing = self.hold.owes();
         }
+        if is_open {
+            desk.port_is_open();
+        }
+        if let Err(error) = self.hold.pass(now, &mut desk) {
+            desk.port_failed(error);
+        }
+        drop(desk);
         if let Some(reason) = self.due() {
             self.stop(reason);
         }
-        Ok(self.shared.borrow_mut().events.drain(..).collect())
+        let mut desk = self.desk.borrow_mut();
+        desk.is_shut = self.is_owing;
+        Ok(desk.events.drain(..).collect())
     }
 
-    /// Stops the motors that the client started; gives what happened. The served ports end.
+    /// Stops what the client set turning; gives what happened. The served ports end.
     pub fn end(mut self) -> Vec<Event> {
         self.stop_for_good();
-        self.shared.borrow_mut().events.drain(..).collect()
+        self.desk.borrow_mut().events.drain(..).collect()
     }
 
     fn stop_for_good(&mut self) {
-        if !self.shared.borrow().follower.started().is_empty() {
+        if self.hold.owes() {
+            self.hold.forget(self.server.now());
             self.has_complained = false;
             self.stop(Reason::Ending);
-            self.shared.borrow_mut().follower = Follower::default();
         }
     }
 
     fn wait(&self, most: Duration) -> Duration {
-        let shared = self.shared.borrow();
-        let due = if shared.follower.started().is_empty() {
-            None
-        } else if shared.is_owing {
-            Some(self.retry_at)
-        } else {
-            self.silence.map(|silence| (shared.heard_at + silence.into()).max(self.retry_at))
+        let now = self.server.now();
+        let silent = self.silent_at().map(|silent| silent.max(self.retry_at));
+        let stop = match (self.hold.owes(), self.is_owing) {
+            (false, _) => None,
+            (true, true) => Some(self.retry_at),
+            (true, false) => silent,
         };
-        due.map_or(most, |due| most.min(due.since(self.server.now()).into()))
+        let first = self.hold.due(now).into_iter().chain(stop).min();
+        first.map_or(most, |first| most.min(first.since(now).into()))
+    }
+
+    /// When the client that is there has been silent for too long.
+    fn silent_at(&self) -> Option<Instant> {
+        let desk = self.desk.borrow();
+        let silence = self.silence.filter(|_| desk.client.is_some())?;
+        Some(desk.heard_at + silence.into())
     }
 
     /// Why motors have to be stopped now, if they have to.
     fn due(&self) -> Option<Reason> {
-        let shared = self.shared.borrow();
         let now = self.server.now();
-        if shared.follower.started().is_empty() || now < self.retry_at {
+        if !self.hold.owes() || now < self.retry_at {
             return None;
         }
-        let silent = self.silence.is_some_and(|silence| now >= shared.heard_at + silence.into());
-        match shared.client {
-            _ if shared.is_owing => Some(Reason::ClientGone),
-            Some(_) if silent => Some(Reason::ClientSilent),
-            _ => None,
+        if self.is_owing {
+            return Some(Reason::ClientGone);
         }
+        self.silent_at().filter(|silent| now >= *silent).map(|_| Reason::ClientSilent)
     }
 
-    /// Recovers the line, sends STOP_MOTOR to what was started, and looks whether it stops. What was
-    /// not stopped stays to be stopped.
     fn stop(&mut self, reason: Reason) {
-        let mut shared = self.shared.borrow_mut();
-        shared.pull();
-        let port = shared.port.clone();
-        let config = Config { recovery: Recovery::Pad, ..Config::default() };
-        let options = Options { line: config, ..Options::default() }.on(&self.line);
-        let reopened = port.clone();
-        let open = Box::new(move || match reopened.open() {
-            Some(_) => Ok(Box::new(reopened.clone()) as _),
-            None => Err(reopened.closed()),
-        });
-        let owed = shared.follower.started();
-        let motors: Vec<Halt> = match Client::open_with(&port.name(), open, options) {
-            Ok(client) => {
-                client.take_over(owed, shared.follower.unanswered());
-                let stopped = client.guard().stop_now();
-                shared.follower = Follower::with(client.hand_over());
-                stopped.into_iter().filter_map(|one| seen_to_stop(&client, one)).collect()
-            }
-            Err(_) => {
-                let result = |motor| Halt { motor, result: Err(port.closed().into()) };
-                owed.motors().map(result).collect()
-            }
-        };
-        for unproven in motors.iter().filter(|halt| !halt.is_stopped()) {
-            shared.follower.presume(unproven.motor);
-        }
-        let has_failed = !shared.follower.started().is_empty();
-        if has_failed {
-            // What was tried may be answered yet.
-            shared.follower.lose();
-        }
-        shared.is_owing &= has_failed;
+        let halts = self.hold.stop();
+        let has_failed = self.hold.owes();
+        self.is_owing &= has_failed;
         if !(has_failed && self.has_complained) {
-            shared.events.push_back(Event::Stopped { reason, motors });
+            self.desk.borrow_mut().events.push_back(Event::Stopped { reason, halts });
         }
         self.has_complained = has_failed;
         self.retry_at = if has_failed { self.server.now() + RETRY.into() } else { Instant(0) };
@@ -315,157 +342,9 @@ impl Drop for Relay {
     }
 }
 
-/// Waits until a motor that acknowledged its stop shows it; `None` when there is no such motor.
-fn seen_to_stop(client: &Client, Stopped { motor, result }: Stopped) -> Option<Halt> {
-    if let Err(error) = result {
-        return Some(Halt { motor, result: Err(error) });
-    }
-    let give_up = std::time::Instant::now() + STATUS_PATIENCE;
-    loop {
-        let result = client.motor(motor.number()).and_then(|motor| motor.status());
-        if matches!(result, Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. })) {
-            return None;
-        }
-        let halt = Halt { motor, result };
-        if halt.is_stopped() || halt.result.is_err() || std::time::Instant::now() > give_up {
-            return Some(halt);
-        }
-        std::thread::sleep(STATUS_PERIOD);
-    }
-}
-
-impl Port {
-    /// The open link; `None` while it cannot be opened.
-    fn open(&self) -> Option<Arc<FdLink>> {
-        self.lock().link().ok().map(|(link, _)| Arc::clone(link))
-    }
-
-    /// Does something with the link, which is closed when that fails.
-    fn with<T>(
-        &self,
-        act: impl FnOnce(&mut Arc<FdLink>) -> Result<T, PortError>,
-    ) -> Result<T, PortError> {
-        let mut port = self.lock();
-        let done = port.link().and_then(|(link, _)| act(link));
-        if done.is_err() {
-            port.close();
-        }
-        done
-    }
-
-    fn name(&self) -> String {
-        self.lock().name.to_string()
-    }
-
-    fn closed(&self) -> PortError {
-        PortError::Closed { port: self.name() }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Reopening<Arc<FdLink>>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl ByteLink for Port {
-    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        self.with(|link| link.write(bytes))
-    }
-
-    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
-        self.with(|link| link.read(buffer, timeout))
-    }
-}
-
-impl Shared {
-    /// Takes what the drive has sent.
-    fn pull(&mut self) {
-        let mut bytes = [0; 4096];
-        match self.port.read(&mut bytes, Some(Duration::ZERO)) {
-            Ok(size) => {
-                self.follower.heard(&bytes[..size]);
-                if self.client.is_some() {
-                    self.to_client.extend_from_slice(&bytes[..size]);
-                }
-            }
-            Err(error) => self.port_failed(error),
-        }
-    }
-
-    fn port_failed(&mut self, error: PortError) {
-        if !self.is_lost {
-            self.is_lost = true;
-            self.events.push_back(Event::PortLost(error));
-        }
-    }
-
-    fn port_is_open(&mut self) {
-        if self.is_lost {
-            self.is_lost = false;
-            self.events.push_back(Event::PortBack);
-        }
-    }
-
-    /// Gives the line to whoever is at `port`, if it is free.
-    fn admit(&mut self, now: Instant, port: &str) -> bool {
-        if self.client.is_some() || self.is_owing {
-            return false;
-        }
-        self.client = Some(port.to_owned());
-        self.heard_at = now;
-        self.to_client.clear();
-        self.events.push_back(Event::Came { port: port.to_owned() });
-        true
-    }
-}
-
-impl Place {
-    fn has_the_line(&self) -> bool {
-        self.shared.borrow().client.as_deref() == Some(&*self.port.borrow())
-    }
-}
-
-impl ByteStation for Place {
-    fn receive(&mut self, now: Instant, bytes: &[u8], _: &mut Vec<u8>) {
-        let has_the_line = self.has_the_line();
-        let mut shared = self.shared.borrow_mut();
-        // Whoever was turned away on a pty has stayed, and may have the line when it is free.
-        if !has_the_line && !shared.admit(now, &self.port.borrow()) {
-            return;
-        }
-        shared.heard_at = now;
-        // What may start a motor is noted before it leaves.
-        shared.follower.sent(bytes);
-        if let Err(error) = shared.port.write(bytes) {
-            shared.port_failed(error);
-        }
-    }
-
-    fn poll(&mut self, _: Instant, reply: &mut Vec<u8>) {
-        reply.append(&mut self.shared.borrow_mut().to_client);
-    }
-
-    /// At once while there is something for the client.
-    fn deadline(&self) -> Option<Instant> {
-        let is_waiting = self.has_the_line() && !self.shared.borrow().to_client.is_empty();
-        is_waiting.then_some(Instant(0))
-    }
-
-    fn came(&mut self, now: Instant, others: usize) -> bool {
-        let mut shared = self.shared.borrow_mut();
-        let port = self.port.borrow();
-        let is_welcome = others == 0 && shared.admit(now, &port);
-        if !is_welcome {
-            shared.events.push_back(Event::TurnedAway { port: port.clone() });
-        }
-        is_welcome
-    }
-
-    fn left(&mut self, _: Instant) {
-        if self.has_the_line() {
-            let mut shared = self.shared.borrow_mut();
-            shared.client = None;
-            shared.is_owing = !shared.follower.started().is_empty();
-            shared.events.push_back(Event::Left);
-        }
+fn refuse_simulated(port: &PortName) -> Result<(), RelayError> {
+    match port {
+        PortName::Sim(_) => Err(RelayError::Simulated(port.clone())),
+        _ => Ok(()),
     }
 }

@@ -152,6 +152,11 @@ impl Bus {
         self.lock().session.moving()
     }
 
+    /// Takes motors over that somebody else set moving.
+    pub(crate) fn take_over(&self, moving: MotorSet) {
+        self.lock().session.take_over(moving);
+    }
+
     /// Sets what a motor may be told; it holds for every call, raw frames included.
     pub fn set_limits(&self, id: MotorId, limits: Limits) {
         self.lock().session.set_limits(id, limits);

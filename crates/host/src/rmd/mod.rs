@@ -15,6 +15,7 @@
 mod bus;
 mod error;
 mod event;
+pub(crate) mod follow;
 mod guard;
 mod motor;
 mod session;

@@ -80,6 +80,11 @@ impl Session {
         self.moving
     }
 
+    /// Takes motors over that somebody else set moving.
+    pub(super) fn take_over(&mut self, moving: MotorSet) {
+        self.moving = self.moving.union(moving);
+    }
+
     pub(super) fn guard(&self) -> Duration {
         self.host.guard()
     }
@@ -172,7 +177,7 @@ impl Session {
             }
             match self.host.poll(now) {
                 proto::Output::Transmit(frame) => {
-                    self.moving = self.moving.union(told_to_move(&frame));
+                    self.moving = self.moving.union(MotorSet::moved_by(&frame));
                     return Output::Transmit(frame);
                 }
                 proto::Output::Done { id, result: Err(proto::Error::Quarantined) }
@@ -234,14 +239,4 @@ impl Session {
 /// The place of a motor in a table of all.
 fn place(id: MotorId) -> usize {
     usize::from(id.number()) - 1
-}
-
-/// The motors that a frame of ours tells to move.
-fn told_to_move(frame: &CanFrame) -> MotorSet {
-    let moves = |code| Code::from(code).info().is_some_and(|row| row.moves);
-    match (MotorId::from_can_id(frame.id()), frame.data()) {
-        (Some(id), [code, ..]) if moves(*code) => MotorSet::from(id),
-        (Some(_), _) => MotorSet::EMPTY,
-        (None, _) => MotorSet::TORQUE4,
-    }
 }

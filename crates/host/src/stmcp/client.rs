@@ -32,7 +32,7 @@ pub struct Options {
 
 impl Options {
     /// What recovery sends has to be out of the port before silence can begin.
-    pub(super) fn on(mut self, line: &LineName) -> Self {
+    pub(crate) fn on(mut self, line: &LineName) -> Self {
         if let LineName::Serial { baud, .. } = line {
             self.line.quiet = self.line.quiet + Master::longest_transmission(*baud);
         }
@@ -234,12 +234,12 @@ impl Client {
 
     /// Takes the line over from another master, which started these motors. `unanswered` is what it
     /// sent last, if the reply to that may still come.
-    pub(super) fn take_over(&self, started: Started, unanswered: Option<&[u8]>) {
+    pub(crate) fn take_over(&self, started: Started, unanswered: Option<&[u8]>) {
         self.lock().session.take_over(started, unanswered);
     }
 
     /// What [`take_over`](Self::take_over) was given and later calls left of it.
-    pub(super) fn hand_over(&self) -> Started {
+    pub(crate) fn hand_over(&self) -> Started {
         self.lock().session.started()
     }
 

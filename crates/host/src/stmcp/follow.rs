@@ -1,7 +1,7 @@
 //! Follows what somebody else's master says to a drive: which motors it may have started.
 
 use motorlink_proto::stmcp::{
-    ErrorCode, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile,
+    Command, ErrorCode, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Parse, Profile,
     Request,
 };
 
@@ -12,9 +12,12 @@ use super::started::{Effect, Started};
 /// It errs to one side. A START counts wherever in the stream its bytes stand: a drive that is out
 /// of step, or that completes a frame which was cut off, may take them for one. A STOP counts only
 /// when it was one whole request and was acknowledged, on a line that has been in step all the time.
+/// So it is with PFC_ENABLE and PFC_DISABLE.
 #[derive(Debug, Default)]
-pub(super) struct Follower {
+pub(crate) struct Follower {
     started: Started,
+    /// The PFC may be enabled; the motor number that this was said with.
+    pfc: Option<u8>,
     /// Sent since the last whole reply.
     request: Vec<u8>,
     /// What came for it.
@@ -28,29 +31,39 @@ pub(super) struct Follower {
 }
 
 impl Follower {
-    /// On a line where these motors were started before.
-    pub(super) fn with(started: Started) -> Self {
-        Follower { started, ..Follower::default() }
+    /// On a line where these motors were started before, and the PFC was enabled with this number.
+    pub(crate) fn with(started: Started, pfc: Option<u8>) -> Self {
+        Follower { started, pfc, ..Follower::default() }
     }
 
-    pub(super) fn started(&self) -> Started {
+    pub(crate) fn started(&self) -> Started {
         self.started
     }
 
     /// Takes a motor for started.
-    pub(super) fn presume(&mut self, motor: Motor) {
-        self.started.presume(motor.number());
+    pub(crate) fn presume(&mut self, number: u8) {
+        self.started.presume(number);
+    }
+
+    /// The motor number with which the PFC was enabled, if it may be.
+    pub(crate) fn pfc(&self) -> Option<u8> {
+        self.pfc
+    }
+
+    /// The PFC is disabled, or there is none.
+    pub(crate) fn forget_pfc(&mut self) {
+        self.pfc = None;
     }
 
     /// The bytes whose reply may still come, or that a drive may take for half a frame; `None` when
     /// the line is at rest.
-    pub(super) fn unanswered(&self) -> Option<&[u8]> {
+    pub(crate) fn unanswered(&self) -> Option<&[u8]> {
         let is_at_rest = !self.out_of_step && (self.is_answered || self.request.is_empty());
         (!is_at_rest).then_some(self.request.as_slice())
     }
 
     /// The host sends `bytes`.
-    pub(super) fn sent(&mut self, bytes: &[u8]) {
+    pub(crate) fn sent(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             if self.is_answered {
                 self.request.clear();
@@ -72,7 +85,7 @@ impl Follower {
     }
 
     /// The drive sends `bytes`.
-    pub(super) fn heard(&mut self, bytes: &[u8]) {
+    pub(crate) fn heard(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             if self.is_answered || self.request.is_empty() {
                 self.lose();
@@ -109,6 +122,9 @@ impl Follower {
         let addressed = self.started.asked(frame.motor(), effect);
         match (header, code) {
             (HEADER_ACK, _) if !self.out_of_step => {
+                if command(&frame) == Some(Command::PfcDisable) {
+                    self.pfc = None;
+                }
                 self.started.acknowledged(addressed, effect);
             }
             (HEADER_ACK, _) => {}
@@ -120,19 +136,23 @@ impl Follower {
     }
 
     /// Says that replies may come that nobody waits for.
-    pub(super) fn lose(&mut self) {
+    pub(crate) fn lose(&mut self) {
         self.out_of_step = true;
         self.started.forget_current();
     }
 
-    /// Whether the bytes up to the last one end in a START.
+    /// Whether the bytes up to the last one end in what sets something going.
     fn look_for_start(&mut self) {
         for begin in 0..self.recent.len() {
-            if let Parse::Frame(frame, size) = Frame::parse(&self.recent[begin..])
-                && begin + size == self.recent.len()
-                && effect(&frame) == Effect::Starts
-            {
+            let frame = match Frame::parse(&self.recent[begin..]) {
+                Parse::Frame(frame, size) if begin + size == self.recent.len() => frame,
+                _ => continue,
+            };
+            if effect(&frame) == Effect::Starts {
                 self.started.presume(frame.motor());
+            }
+            if command(&frame) == Some(Command::PfcEnable) {
+                self.pfc = Some(frame.motor());
             }
         }
     }
@@ -143,9 +163,16 @@ fn effect(frame: &Frame<'_>) -> Effect {
     Effect::of(Request::decode(Profile::Spec, frame).ok().as_ref())
 }
 
+fn command(frame: &Frame<'_>) -> Option<Command> {
+    match Request::decode(Profile::Spec, frame) {
+        Ok(Request::Execute(command)) => Some(command),
+        _ => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use motorlink_proto::stmcp::{Command, RegisterId};
+    use motorlink_proto::stmcp::RegisterId;
 
     use super::*;
 
@@ -178,6 +205,22 @@ mod tests {
             follower.heard(&ACK);
             assert!(follower.started().is_empty());
         }
+    }
+
+    #[test]
+    fn the_pfc_is_enabled_until_its_end_is_acknowledged() {
+        let mut follower = Follower::default();
+        follower.sent(&command(1, Command::PfcEnable));
+        assert_eq!(follower.pfc(), Some(1));
+        assert!(follower.started().is_empty());
+        follower.heard(&ACK);
+        follower.sent(&command(1, Command::PfcDisable));
+        assert_eq!(follower.pfc(), Some(1));
+        follower.heard(&ACK);
+        assert_eq!(follower.pfc(), None);
+        // Wherever it stands, as a START.
+        follower.sent(&[&[0xFF; 9][..], &command(2, Command::PfcEnable)].concat());
+        assert_eq!(follower.pfc(), Some(2));
     }
 
     #[test]

@@ -35,7 +35,7 @@ impl Effect {
 /// A motor counts as started from the START on, whose reply may be lost, and until a STOP is
 /// acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Started {
+pub(crate) struct Started {
     /// Bit n: motor n + 1.
     motors: u8,
     /// What motor number 0 addresses; `None` while that is not known.
@@ -79,11 +79,11 @@ impl Started {
         self.current = None;
     }
 
-    pub(super) fn is_empty(self) -> bool {
+    pub(crate) fn is_empty(self) -> bool {
         self.motors == 0
     }
 
-    pub(super) fn motors(self) -> impl Iterator<Item = Motor> {
+    pub(crate) fn motors(self) -> impl Iterator<Item = Motor> {
         (1..=Motor::MAX).filter_map(Motor::new).filter(move |motor| self.motors & bit(*motor) != 0)
     }
 }

@@ -1,6 +1,8 @@
 //! The command table: the one place where a command's number and name stand.
 
+use super::frame::CanFrame;
 use super::message::*;
+use super::motor::{MotorId, MotorSet, TORQUE4_ID};
 use super::payload::{Field, Payload};
 use super::reply::*;
 
@@ -47,6 +49,28 @@ impl Code {
     /// The row of the table; `None` for a code that the document does not name.
     pub fn info(self) -> Option<&'static CommandInfo> {
         COMMANDS.iter().find(|row| row.code == self)
+    }
+
+    /// Whether a motor may turn after it. Of the codes that the document does not name, those beside
+    /// its motion commands (0xA0 to 0xAF) may: successors of this protocol have theirs there.
+    pub fn may_move(self) -> bool {
+        match self.info() {
+            Some(row) => row.moves,
+            None => matches!(u8::from(self), 0xA0..=0xAF),
+        }
+    }
+}
+
+impl MotorSet {
+    /// The motors that may turn after a host's `frame`.
+    pub fn moved_by(frame: &CanFrame) -> Self {
+        match frame.usable() {
+            Some((TORQUE4_ID, _)) => MotorSet::TORQUE4,
+            Some((id, [code, ..])) if Code::from(*code).may_move() => {
+                MotorId::from_can_id(id.into()).map_or(MotorSet::EMPTY, MotorSet::from)
+            }
+            _ => MotorSet::EMPTY,
+        }
     }
 }
 
@@ -164,6 +188,22 @@ mod tests {
             assert_eq!(Code::from(u8::from(row.code)), row.code);
         }
         assert!(Code::from(0x35).info().is_none());
+    }
+
+    #[test]
+    fn a_frame_moves_the_motors_that_it_is_for() {
+        let moved = |frame: CanFrame| MotorSet::moved_by(&frame);
+        let three = MotorSet::from(MotorId::new(3).unwrap());
+        for code in 0..=u8::MAX {
+            let frame = CanFrame::new(0x143, [code, 0, 0, 0, 0, 0, 0, 0]);
+            let moves = code == 0x88 || code & 0xF0 == 0xA0;
+            assert_eq!(moved(frame), if moves { three } else { MotorSet::EMPTY }, "{code:#04x}");
+        }
+        assert_eq!(moved(CanFrame::new(TORQUE4_ID, [0; 8])), MotorSet::TORQUE4);
+        // Nothing that a motor ignores (chapter 1).
+        assert_eq!(moved(CanFrame::new(0x140, [0xA2; 8])), MotorSet::EMPTY);
+        assert_eq!(moved(CanFrame::data_frame(0x141, true, &[0xA2; 8])), MotorSet::EMPTY);
+        assert_eq!(moved(CanFrame::data_frame(0x141, false, &[0xA2; 7])), MotorSet::EMPTY);
     }
 
     #[test]

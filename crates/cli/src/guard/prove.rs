@@ -1,0 +1,284 @@
+//! `motorlink guard --prove`: a motor, a program that dies, and the time until nothing turns.
+
+use std::io::{BufRead, BufReader};
+use std::os::unix::fs::DirBuilderExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::time::{Duration, Instant};
+
+use motorlink::port::{PortName, ServeName};
+use motorlink::relay::{Event, Relay};
+use motorlink::rmd::{self, Bus, CentiDps};
+use motorlink::stmcp::{self, Client, Ramp, Request, register};
+use serde_json::json;
+
+use super::{leaves_something_turning, words};
+use crate::failure::Failure;
+use crate::interrupt::interrupted;
+use crate::output::{line, note};
+
+/// How long a motor may take to turn, or to come to rest.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// How often a motor is looked at.
+const LOOK: Duration = Duration::from_millis(10);
+/// RMD motors behind a busy machine.
+const TIMEOUT: Duration = Duration::from_millis(500);
+/// A motor turns as it was told from this part of the speed on, and stands still below that part.
+const TURNS: f64 = 0.8;
+const RESTS: f64 = 0.01;
+
+/// The program that is killed: it turns a motor and goes on asking how fast that is.
+#[derive(clap::Args)]
+pub struct Spin {
+    protocol: Protocol,
+    port: String,
+    motor: u8,
+    #[arg(allow_negative_numbers = true)]
+    speed: i32,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Protocol {
+    St,
+    Rmd,
+}
+
+impl Spin {
+    pub fn run(self) -> Result<(), Failure> {
+        let drive = Drive::open(self.protocol, &self.port.parse()?, self.motor)?;
+        drive.turn(self.speed)?;
+        let wanted = f64::from(self.speed) * TURNS;
+        let give_up = Instant::now() + PATIENCE;
+        let mut is_told = false;
+        loop {
+            let speed = drive.speed()?;
+            if !is_told && speed / wanted >= 1.0 {
+                is_told = true;
+                line(&speed)?;
+            }
+            if !is_told && Instant::now() > give_up {
+                return Err(Failure::Refused(format!(
+                    "the motor turns at {speed} {unit} and was told {told} {unit}: does it have \
+                     power, and is it free to turn?",
+                    unit = drive.unit(),
+                    told = self.speed,
+                )));
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+}
+
+/// A client of the motor that is turned.
+enum Drive {
+    St { client: Client, motor: u8 },
+    Rmd { bus: Bus, id: u8 },
+}
+
+impl Drive {
+    fn open(protocol: Protocol, port: &PortName, motor: u8) -> Result<Self, Failure> {
+        Ok(match protocol {
+            Protocol::St => {
+                Drive::St { client: Client::open(port, stmcp::Options::default())?, motor }
+            }
+            Protocol::Rmd => {
+                let options = rmd::Options { timeout: TIMEOUT, ..rmd::Options::default() };
+                Drive::Rmd { bus: Bus::open(port, options)?, id: motor }
+            }
+        })
+    }
+
+    fn turn(&self, speed: i32) -> Result<(), Failure> {
+        match self {
+            Drive::St { client, motor } => {
+                let ramp = Request::Ramp(Ramp { speed_rpm: speed, duration_ms: 500 });
+                client.exchange(*motor, &ramp, |_| Some(()))?;
+                client.motor(*motor)?.start()?;
+            }
+            Drive::Rmd { bus, id } => {
+                bus.motor(*id)?.speed(CentiDps(speed.saturating_mul(100)))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn speed(&self) -> Result<f64, Failure> {
+        Ok(match self {
+            Drive::St { client, motor } => client.motor(*motor)?.read(register::SPEED_MEAS)?.into(),
+            Drive::Rmd { bus, id } => bus.motor(*id)?.status2()?.speed.dps().into(),
+        })
+    }
+
+    fn unit(&self) -> &'static str {
+        match self {
+            Drive::St { .. } => "rpm",
+            Drive::Rmd { .. } => "°/s",
+        }
+    }
+}
+
+/// What is to be proved.
+pub struct Proof {
+    protocol: Protocol,
+    port: PortName,
+    motor: u8,
+    speed: i32,
+}
+
+impl Proof {
+    pub fn st(port: PortName, motor: u8, speed: i32) -> Self {
+        Proof { protocol: Protocol::St, port, motor, speed }
+    }
+
+    pub fn rmd(port: PortName, id: u8, speed: i32) -> Self {
+        Proof { protocol: Protocol::Rmd, port, motor: id, speed }
+    }
+
+    pub fn show(&self, mut relay: Relay, json: bool) -> Result<(), Failure> {
+        if self.speed == 0 {
+            return Err(Failure::Usage("--spin 0 turns nothing: give a speed".into()));
+        }
+        let folder = Folder::new()?;
+        let path = folder.0.join("line");
+        relay.serve(&format!("unix-listen:{}", path.display()).parse::<ServeName>()?)?;
+        let mut program = Program::start(self, &path)?;
+        let reached = program.turning(&mut relay)?;
+        let unit = match self.protocol {
+            Protocol::St => "rpm",
+            Protocol::Rmd => "°/s",
+        };
+        note(format!(
+            "a program turns motor {} at {reached} {unit}; it is killed now (SIGKILL)",
+            self.motor
+        ));
+        let killed = Instant::now();
+        program.kill();
+        let stop = stopped(&mut relay, killed)?;
+        drop(relay);
+        let rest = self.at_rest(killed)?;
+        let text = format!(
+            "motor {} was told to stop after {stop:.1} ms and stood still after {rest:.0} ms",
+            self.motor
+        );
+        let object = json!({
+            "proved": true, "motor": self.motor, "speed": reached, "unit": unit,
+            "stopped_after_ms": stop, "still_after_ms": rest,
+        });
+        if json { line(&object) } else { line(&text) }
+    }
+
+    /// Waits until the motor stands still; gives the time since then, ms.
+    fn at_rest(&self, since: Instant) -> Result<f64, Failure> {
+        let drive = Drive::open(self.protocol, &self.port, self.motor)?;
+        let slow = (f64::from(self.speed).abs() * RESTS).max(1.0);
+        loop {
+            let speed = drive.speed()?;
+            if speed.abs() <= slow {
+                return Ok(since.elapsed().as_secs_f64() * 1e3);
+            }
+            if since.elapsed() > PATIENCE {
+                return Err(Failure::Refused(format!(
+                    "motor {} still turns at {speed} {} although it acknowledged its stop: does \
+                     something drive it?",
+                    self.motor,
+                    drive.unit(),
+                )));
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+}
+
+/// Turns until the motors of the killed program are stopped; gives the time since then, ms.
+fn stopped(relay: &mut Relay, since: Instant) -> Result<f64, Failure> {
+    while since.elapsed() < PATIENCE {
+        for event in relay.turn(LOOK)? {
+            let (text, _) = words::of(&event);
+            note(text);
+            if matches!(event, Event::Stopped { .. }) && !leaves_something_turning(&event) {
+                return Ok(since.elapsed().as_secs_f64() * 1e3);
+            }
+        }
+    }
+    Err(Failure::Line("motors may still turn: the guard could not stop them".into()))
+}
+
+/// The program that turns the motor, a process of its own.
+struct Program {
+    child: Child,
+    said: Receiver<f64>,
+}
+
+impl Program {
+    fn start(proof: &Proof, path: &Path) -> Result<Self, Failure> {
+        let (protocol, port) = match proof.protocol {
+            Protocol::St => ("st", format!("unix:{}", path.display())),
+            Protocol::Rmd => ("rmd", format!("slcan:unix:{}", path.display())),
+        };
+        let program = std::env::current_exe()?;
+        let mut command = Command::new(&program);
+        // The Python package runs this in the interpreter.
+        if program.file_name().is_some_and(|name| name.to_string_lossy().starts_with("python")) {
+            command.args(["-m", "motorlink"]);
+        }
+        command.args(["guard", "spin", protocol, &port]);
+        command.args([proof.motor.to_string(), proof.speed.to_string()]);
+        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn()?;
+        let (say, said) = channel();
+        let out = child.stdout.take();
+        std::thread::spawn(move || {
+            let lines = out.into_iter().flat_map(|out: ChildStdout| BufReader::new(out).lines());
+            lines.map_while(|line| line.ok()?.parse().ok()).try_for_each(|speed| say.send(speed))
+        });
+        Ok(Program { child, said })
+    }
+
+    /// Guards the program until it says that the motor turns; gives the speed.
+    fn turning(&mut self, relay: &mut Relay) -> Result<f64, Failure> {
+        loop {
+            for event in relay.turn(LOOK)? {
+                note(words::of(&event).0);
+            }
+            match self.said.try_recv() {
+                Ok(speed) => return Ok(speed),
+                Err(TryRecvError::Empty) if interrupted() => return Err(Failure::Interrupted),
+                Err(TryRecvError::Empty) => {}
+                Err(TryRecvError::Disconnected) => {
+                    return Err(Failure::Line(
+                        "the motor could not be turned: see above; nothing was proved".into(),
+                    ));
+                }
+            }
+        }
+    }
+
+    fn kill(&mut self) {
+        // It has ended if it cannot be killed.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// A folder of this user's own, gone at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Result<Self, Failure> {
+        let path = std::env::temp_dir().join(format!("motorlink-prove-{}", std::process::id()));
+        std::fs::DirBuilder::new().mode(0o700).create(&path)?;
+        Ok(Folder(path))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}

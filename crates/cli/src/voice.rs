@@ -1,0 +1,148 @@
+//! Printing that nothing waits for: a thread of its own writes, and what nobody reads is dropped and
+//! counted.
+
+use std::fmt::Display;
+use std::io::Write;
+use std::os::fd::AsFd;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::time::Duration;
+
+use rustix::process::getpgrp;
+use rustix::termios::{LocalModes, isatty, tcgetattr, tcgetpgrp};
+
+/// Lines that wait to be written.
+const WAITING: usize = 256;
+/// How long the last lines may take.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// A stream to print on.
+pub struct Voice {
+    words: SyncSender<Word>,
+    state: Arc<State>,
+}
+
+#[derive(Default)]
+struct State {
+    waiting: AtomicUsize,
+    dropped: AtomicU64,
+}
+
+enum Word {
+    Line(String),
+    /// Told when all before it is written.
+    End(SyncSender<()>),
+}
+
+impl Voice {
+    /// Prints on `out`; `missed` puts into words how many lines were dropped.
+    pub fn new(out: impl Write + AsFd + Send + 'static, missed: fn(u64) -> String) -> Self {
+        let (words, spoken) = sync_channel(WAITING);
+        let state = Arc::new(State::default());
+        let shared = Arc::clone(&state);
+        std::thread::spawn(move || speak(out, &spoken, &shared, missed));
+        Voice { words, state }
+    }
+
+    /// Prints a line, unless too many wait already.
+    pub fn say(&self, text: impl Display) {
+        self.state.waiting.fetch_add(1, Ordering::SeqCst);
+        if self.words.try_send(Word::Line(text.to_string())).is_err() {
+            self.state.waiting.fetch_sub(1, Ordering::SeqCst);
+            self.state.dropped.fetch_add(1, Ordering::SeqCst);
+        }
+    }
+
+    /// Whether the next line would not be dropped.
+    pub fn has_room(&self) -> bool {
+        self.state.waiting.load(Ordering::SeqCst) < WAITING
+    }
+
+    /// Waits until all is written, though not for long.
+    pub fn finish(&self) {
+        let (written, told) = sync_channel(1);
+        if self.words.try_send(Word::End(written)).is_ok() {
+            let _ = told.recv_timeout(PATIENCE);
+        }
+    }
+}
+
+fn speak(
+    mut out: impl Write + AsFd,
+    words: &Receiver<Word>,
+    state: &State,
+    missed: fn(u64) -> String,
+) {
+    for word in words {
+        let line = match word {
+            Word::Line(line) => line,
+            Word::End(written) => {
+                let _ = written.send(());
+                continue;
+            }
+        };
+        let dropped = state.dropped.swap(0, Ordering::SeqCst);
+        let missed = if dropped > 0 { missed(dropped) + "\n" } else { String::new() };
+        let is_written =
+            may_write(&out) && write!(out, "{missed}{line}\n").and_then(|()| out.flush()).is_ok();
+        if !is_written {
+            state.dropped.fetch_add(dropped + 1, Ordering::SeqCst);
+        }
+        state.waiting.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// A process in the background is stopped when it writes to a terminal that is set so (`stty tostop`).
+fn may_write(out: &impl AsFd) -> bool {
+    !isatty(out)
+        || tcgetpgrp(out).is_ok_and(|group| group == getpgrp())
+        || !tcgetattr(out).is_ok_and(|modes| modes.local_modes.contains(LocalModes::TOSTOP))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{BufRead, BufReader};
+    use std::os::unix::net::UnixStream;
+
+    use super::*;
+
+    #[test]
+    fn what_nobody_reads_is_dropped_and_counted_and_nothing_waits() {
+        let (near, far) = UnixStream::pair().unwrap();
+        let voice = Voice::new(near, |lines| format!("{lines} missed"));
+        let said = 20_000;
+        for n in 0..said {
+            voice.say(format_args!("{n} {}", "x".repeat(200)));
+        }
+        assert!(!voice.has_room());
+        let mut reader = BufReader::new(far).lines().map(Result::unwrap);
+        let mut read = 0;
+        while !voice.has_room() {
+            let line = reader.next().unwrap();
+            assert!(line.starts_with(&format!("{read} ")), "{line}");
+            read += 1;
+        }
+        voice.say("last");
+        drop(voice);
+        let rest: Vec<String> = reader.collect();
+        let missed = rest.iter().find_map(|line| line.strip_suffix(" missed"));
+        let missed: u64 = missed.expect("some were dropped").parse().unwrap();
+        assert_eq!(rest.last().map(String::as_str), Some("last"));
+        assert_eq!(read as u64 + rest.len() as u64 - 2 + missed, said);
+    }
+
+    #[test]
+    fn a_reader_that_is_gone_ends_nothing() {
+        let (near, far) = UnixStream::pair().unwrap();
+        drop(far);
+        let voice = Voice::new(near, |lines| format!("{lines} missed"));
+        for n in 0..1000 {
+            voice.say(n);
+        }
+        voice.finish();
+        while !voice.has_room() {
+            std::thread::yield_now();
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! A CAN bus with RMD motors in a relay.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use motorlink_proto::rmd::{CanFrame, Code, MotorId};
+use motorlink_proto::time::{self, Instant};
+
+use super::pace::Pace;
+use super::port::Port;
+use super::station::{Desk, Lane, Place};
+use super::{Event, Halt, Hold, Outcome, Part};
+use crate::line::FULL;
+use crate::port::{CanLink, EventCan, Evented, PortError, PortName, ServeName};
+use crate::rmd::follow::Follower;
+use crate::rmd::{Bus, OnDrop, Options, Stopped};
+use crate::serve::{Served, Server};
+
+/// What a frame takes behind a serial adapter at 115200 baud: 27 bytes. A CAN interface of the kernel
+/// has a short queue of its own.
+const FRAME: time::Duration = time::Duration(2_344);
+/// A request to every motor, and as many to all of 1 to 4.
+const FRAMES_AHEAD: u64 = 64;
+/// Frames that are taken from the bus in one turn: the client has its turn as well.
+const TURN: usize = 64;
+/// Nobody waits for a guard's exchanges but its motors, who are told first.
+const TIMEOUT: Duration = Duration::from_millis(200);
+
+pub(super) struct RmdHold {
+    port: Port<Box<dyn EventCan>>,
+    on_loss: OnDrop,
+    lane: Rc<RefCell<Lane<CanFrame>>>,
+    follower: Follower,
+    pace: Pace,
+    /// The port takes nothing at the moment.
+    is_full: bool,
+}
+
+impl RmdHold {
+    pub(super) fn open(name: &PortName, on_loss: OnDrop) -> Result<Self, PortError> {
+        let opened = name.clone();
+        let frame = match name {
+            PortName::SocketCan(_) => time::Duration(0),
+            _ => FRAME,
+        };
+        Ok(RmdHold {
+            port: Port::open(name, Box::new(move || opened.open_event_can()))?,
+            on_loss,
+            lane: Rc::default(),
+            follower: Follower::default(),
+            pace: Pace::new(frame, time::Duration(frame.0 * FRAMES_AHEAD)),
+            is_full: false,
+        })
+    }
+
+    /// Takes what is on the bus.
+    fn pull(&mut self, now: Instant, events: &mut dyn FnMut(Event)) -> Result<(), PortError> {
+        for _ in 0..TURN {
+            let Some(frame) = self.port.receive(Some(Duration::ZERO))? else { break };
+            let heard = self.follower.heard(now, &frame);
+            if let Some(number) = heard.reply_to {
+                self.pace.arrived(now, number);
+            }
+            if let (Some(id), [code, ..]) = (heard.unguarded, frame.data()) {
+                events(Event::Unguarded { motor: id.number(), code: *code });
+            }
+            self.lane.borrow_mut().to_client.push_back(frame);
+        }
+        Ok(())
+    }
+
+    /// Hands over what the bus takes of what the client has sent.
+    fn push(&mut self, now: Instant) -> Result<(), PortError> {
+        let mut lane = self.lane.borrow_mut();
+        loop {
+            self.is_full = self.port.with(|link| link.flush())?;
+            if self.is_full || self.pace.room(now) == 0 {
+                return Ok(());
+            }
+            let Some(frame) = lane.to_port.pop_front() else { return Ok(()) };
+            // What may set a motor turning is noted before it leaves.
+            let number = self.pace.hand(now, 1);
+            self.follower.sent(now, &frame, number);
+            self.port.with(|link| link.send(&frame))?;
+        }
+    }
+}
+
+impl Hold for RmdHold {
+    fn serve(
+        &self,
+        server: &mut Server,
+        name: &ServeName,
+        desk: &Rc<RefCell<Desk>>,
+        port: Rc<RefCell<String>>,
+    ) -> Result<Served, PortError> {
+        if let ServeName::SocketCan(_) = name {
+            // Everybody on such an interface would be the one client.
+            let usable = "slcan-pty:PATH, unix-listen:PATH or tcp-listen:ADDR:PORT";
+            let (port, wanted) = (name.to_string(), "CAN bus with one client");
+            return Err(PortError::WrongKind { port, wanted, usable });
+        }
+        let place = Place { desk: Rc::clone(desk), lane: Rc::clone(&self.lane), port };
+        server.serve_can(name, Box::new(place))
+    }
+
+    fn turn(&self, server: &mut Server, most: Duration) -> Result<bool, PortError> {
+        self.port.turn(server, most)
+    }
+
+    fn pass(&mut self, now: Instant, desk: &mut Desk) -> Result<(), PortError> {
+        let mut events = |event| desk.events.push_back(event);
+        let passed = self.pull(now, &mut events).and_then(|()| self.push(now));
+        let mut lane = self.lane.borrow_mut();
+        if passed.is_err() {
+            lane.to_port.clear();
+        }
+        if desk.client.is_none() {
+            lane.to_client.clear();
+        }
+        passed
+    }
+
+    fn due(&self, now: Instant) -> Option<Instant> {
+        let is_waiting = !self.lane.borrow().to_port.is_empty();
+        match self.is_full {
+            true => Some(now + FULL.into()),
+            false => is_waiting.then(|| self.pace.next(now)),
+        }
+    }
+
+    fn forget(&mut self, _: Instant) -> usize {
+        self.pace.rest();
+        self.follower.client_left();
+        std::mem::take(&mut self.lane.borrow_mut().to_port).len()
+    }
+
+    fn owes(&self) -> bool {
+        !self.follower.moving().is_empty()
+    }
+
+    /// Tells the motors first, then waits for their answers.
+    fn stop(&mut self) -> Vec<Halt> {
+        let moving = self.follower.moving();
+        let open = self.port.opener(|port| Box::new(port) as Box<dyn CanLink>);
+        let options = Options { timeout: TIMEOUT, ..Options::default() };
+        let Ok(bus) = Bus::open_with(&self.port.name(), open, options) else {
+            let why = self.port.closed().to_string();
+            let failed = |id: MotorId| Halt {
+                part: Part::Motor(id.number()),
+                outcome: Outcome::Failed(why.clone()),
+            };
+            return moving.map(failed).collect();
+        };
+        bus.take_over(moving);
+        let stopped = bus.guard().with(self.on_loss).stop_now();
+        self.follower = Follower::with(bus.moving());
+        let code = match self.on_loss {
+            OnDrop::Off => Code::Off,
+            OnDrop::Stop => Code::Stop,
+        };
+        let told = |Stopped { id, result }: Stopped| Halt {
+            part: Part::Motor(id.number()),
+            outcome: match result {
+                Ok(()) => Outcome::Stopped(format!("{:#04x} acknowledged", u8::from(code))),
+                Err(error) => Outcome::Failed(error.to_string()),
+            },
+        };
+        let mut halts: Vec<Halt> = stopped.into_iter().map(told).collect();
+        halts.sort_by_key(|halt| match halt.part {
+            Part::Motor(id) => id,
+            Part::Pfc => u8::MAX,
+        });
+        halts
+    }
+}
