@@ -103,6 +103,9 @@ pub(crate) fn st_error(py: Python<'_>, error: &stmcp::Error) -> PyErr {
         Error::Reply { port, motor, .. } => {
             (Kind::LineLost, Facts { port: Some(port), motor: named(motor.0), code: None })
         }
+        Error::Limit { motor, .. } => {
+            (Kind::BadValue, Facts { motor: named(motor.0), ..Facts::default() })
+        }
         Error::Differs { motor, .. } => {
             (Kind::Refused, Facts { motor: Some(motor.number()), ..Facts::default() })
         }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use motorlink_proto::units::{SpeedLimit, inward};
 use pyo3::prelude::*;
 
 use crate::error::bad_value;
@@ -15,7 +16,18 @@ pub(crate) fn digits<T: TryFrom<i64>>(
     unit: &str,
 ) -> PyResult<T> {
     let nearest = value.is_finite().then(|| (value / scale).round() as i64);
-    nearest.and_then(|digits| T::try_from(digits).ok()).ok_or_else(|| {
+    fitting(py, what, value, nearest, unit)
+}
+
+/// The digits of `value`, if there are any and the frame has room for them.
+fn fitting<T: TryFrom<i64>>(
+    py: Python<'_>,
+    what: &str,
+    value: f64,
+    digits: Option<i64>,
+    unit: &str,
+) -> PyResult<T> {
+    digits.and_then(|digits| T::try_from(digits).ok()).ok_or_else(|| {
         bad_value(
             py,
             format_args!("{what} of {value} {unit} does not fit the frame; nothing was sent"),
@@ -33,7 +45,7 @@ pub(crate) fn physical(digits: i64, scale: f64) -> f64 {
     }
 }
 
-/// A limit, which no value may exceed; rounded as the values are that it is for.
+/// A limit, which no value may exceed; rounded towards 0, so that no digit does.
 pub(crate) fn limit<T: TryFrom<i64>>(
     py: Python<'_>,
     value: f64,
@@ -43,7 +55,19 @@ pub(crate) fn limit<T: TryFrom<i64>>(
     if value.is_nan() || value < 0.0 {
         return Err(bad_value(py, format_args!("{value} {unit} is no limit: give 0 or more")));
     }
-    digits(py, "a limit", value, scale, unit)
+    fitting(py, "a limit", value, Some(inward(value, scale)), unit)
+}
+
+/// A greatest speed in °/s, rounded towards 0. What would be 0 is refused: to a drive it may mean any
+/// speed, or that the motor never moves.
+pub(crate) fn greatest_speed(py: Python<'_>, dps: f64) -> PyResult<SpeedLimit> {
+    let digits = inward(dps, SpeedLimit::SCALE);
+    if digits < 1 {
+        let (least, unit) = (SpeedLimit(1).dps(), SpeedLimit::SYMBOL);
+        let why = format!("a max speed of {dps} {unit} is too small: give {least} {unit} or more");
+        return Err(bad_value(py, format_args!("{why}; nothing was sent")));
+    }
+    fitting(py, "a max speed", dps, Some(digits), SpeedLimit::SYMBOL).map(SpeedLimit)
 }
 
 /// A duration in s as the wire's ms.

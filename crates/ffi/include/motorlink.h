@@ -1062,7 +1062,8 @@ typedef struct motorlink_rmd_limits {
   int32_t torque_16ma;
   /**
    * Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_RMD_NO_LIMIT`. 0xA3 and 0xA5
-   * carry no speed and are refused while this is set.
+   * carry no speed and are refused while this is set, as are 0xA4 and 0xA6 with 0. A torque
+   * command has no speed, and the motor turns as fast as its load allows.
    */
   int32_t speed_dps;
   /**

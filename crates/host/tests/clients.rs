@@ -436,7 +436,8 @@ fn limits_hold_for_typed_and_raw_requests() {
     let client = Client::open(&drives.st.parse().unwrap(), options).unwrap();
     let motor = client.motor(1).unwrap();
     motor.ramp(1000, 0).unwrap();
-    let refused = |result: Result<(), stmcp::Error>| matches!(result, Err(stmcp::Error::Limit(_)));
+    let refused =
+        |result: Result<(), stmcp::Error>| matches!(result, Err(stmcp::Error::Limit { .. }));
     assert!(refused(motor.ramp(-1001, 0)));
     assert!(refused(motor.write(register::TORQUE_REF, 2001)));
     assert!(refused(client.raw(1, 0x07, &[0xE9, 3, 0, 0, 0, 0]).map(drop)));

@@ -105,7 +105,10 @@ fn a_limit_holds_before_a_byte_leaves() {
     let mut client = over_pairs([ours].into(), options).unwrap();
     let ramp = Request::Ramp(stmcp::Ramp { speed_rpm: 1001, duration_ms: 0 });
     let refused = exchange(&mut client, &ramp).unwrap_err();
-    assert!(matches!(refused, stmcp::Error::Limit(LimitError::Exceeded { .. })), "{refused}");
+    assert!(
+        matches!(refused, stmcp::Error::Limit { why: LimitError::Exceeded { .. }, .. }),
+        "{refused}"
+    );
     let raw = client.begin_raw(1, 0x07, &[0xE9, 0x03, 0, 0, 0, 0]).unwrap_err();
     assert_eq!(raw.to_string(), refused.to_string());
     drop(client);

@@ -1,6 +1,19 @@
 //! Wire integers with their unit in the type. The integer is kept exactly; conversions to and from
 //! physical values round to the nearest digit and saturate at the ends of the integer.
 
+/// How far a value may be from a digit and still count as it, in digits: more than what division of
+/// binary fractions loses in 32 bits, far less than a digit.
+const TOLERANCE: f64 = 1e-6;
+
+/// The whole digits of `scale` in `value`, rounded towards 0: what a limit of `value` allows. As 0.3
+/// has 30 digits of 0.01 although binary fractions say 29.999…, what misses a digit by a millionth of
+/// one counts as that digit. Saturates, and NaN is 0.
+pub fn inward(value: f64, scale: f64) -> i64 {
+    let digits = value / scale;
+    let tolerance = if digits < 0.0 { -TOLERANCE } else { TOLERANCE };
+    (digits + tolerance) as i64
+}
+
 /// Declares a wire integer with its scale: `digits * NUMERATOR / DENOMINATOR` in the physical unit.
 macro_rules! unit {
     ($(#[$meta:meta])* $name:ident($repr:ty), $value:ident, $from:ident, $scale:expr, $symbol:literal) => {

@@ -232,7 +232,7 @@ pub(crate) fn options(
     })
 }
 
-/// Limits in the units of the field. A limit is rounded as commands are.
+/// Limits in the units of the field. A limit is rounded towards 0.
 pub(crate) fn limits(
     py: Python<'_>,
     current_a: Option<f64>,

@@ -9,15 +9,14 @@ use motorlink_proto::rmd::{
     WriteGainsToRom, WriteZeroToRom,
 };
 use motorlink_proto::units::{
-    CentiDegrees, CentiDps, CircleAngle, DeciVolts, DpsPerSecond, MultiTurnAngle, SpeedLimit,
-    TorqueCommand,
+    CentiDegrees, CentiDps, CircleAngle, DeciVolts, DpsPerSecond, MultiTurnAngle, TorqueCommand,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 
 use crate::error::bad_value;
-use crate::number::{digits, physical};
+use crate::number::{digits, greatest_speed, physical};
 use crate::values;
 
 /// A request to an RMD motor.
@@ -138,7 +137,7 @@ impl RmdRequest {
         let angle = CentiDegrees(angle);
         Ok(match max_speed {
             None => Self::of(Position { angle }),
-            Some(dps) => Self::of(PositionLimited { max_speed: speed_limit(py, dps)?, angle }),
+            Some(dps) => Self::of(PositionLimited { max_speed: greatest_speed(py, dps)?, angle }),
         })
     }
 
@@ -161,7 +160,7 @@ impl RmdRequest {
         Ok(match max_speed {
             None => Self::of(CirclePosition { direction, angle }),
             Some(dps) => {
-                let max_speed = speed_limit(py, dps)?;
+                let max_speed = greatest_speed(py, dps)?;
                 Self::of(CirclePositionLimited { direction, max_speed, angle })
             }
         })
@@ -363,8 +362,4 @@ pub(crate) fn torque(py: Python<'_>, amps: f64) -> PyResult<TorqueCommand> {
 pub(crate) fn eight(py: Python<'_>, data: &[u8]) -> PyResult<[u8; 8]> {
     let size = data.len();
     data.try_into().map_err(|_| bad_value(py, format_args!("a frame has 8 bytes, not {size}")))
-}
-
-fn speed_limit(py: Python<'_>, dps: f64) -> PyResult<SpeedLimit> {
-    digits(py, "a greatest speed", dps, SpeedLimit::SCALE, SpeedLimit::SYMBOL).map(SpeedLimit)
 }

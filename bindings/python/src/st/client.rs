@@ -188,8 +188,8 @@ pub(crate) fn options(
     Ok(options)
 }
 
-/// Limits in rpm and in the unit that the scale gives currents. A limit is rounded as
-/// commands are.
+/// Limits in rpm and in the unit that the scale gives currents. A limit is rounded
+/// towards 0.
 pub(crate) fn limits(
     py: Python<'_>,
     scale: Scale,

@@ -24,9 +24,8 @@ use scale::register;
 
 /// The profile of this name.
 fn profile(py: Python<'_>, name: &str) -> PyResult<Profile> {
-    let known = [Profile::Spec, Profile::Mcsdk54];
-    known.into_iter().find(|profile| profile.name() == name).ok_or_else(|| {
-        let names = known.map(Profile::name).join("` and `");
+    Profile::ALL.into_iter().find(|profile| profile.name() == name).ok_or_else(|| {
+        let names = Profile::ALL.map(Profile::name).join("` and `");
         bad_value(py, format_args!("there is no profile `{name}`; there are `{names}`"))
     })
 }

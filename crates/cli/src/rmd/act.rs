@@ -2,7 +2,7 @@
 
 use motorlink::rmd::{
     CentiDegrees, CentiDps, CircleAngle, Code, DpsPerSecond, Gains, MotionStatus, MotorSet,
-    SpeedLimit, Spin, Torque, Torque4, TorqueCommand,
+    SpeedLimit, Spin, Torque, Torque4, TorqueCommand, inward,
 };
 use serde_json::{Map, Value, json};
 
@@ -138,7 +138,7 @@ fn go(
 ) -> Result<MotionStatus, Failure> {
     let motor = session.motor()?;
     let max_speed = match max_speed {
-        Some(dps) => Some(SpeedLimit(digits(session, dps, SpeedLimit::SCALE, "°/s")?)),
+        Some(dps) => Some(greatest_speed(session, dps)?),
         None => None,
     };
     let Some(direction) = direction else {
@@ -219,9 +219,29 @@ fn digits<T: TryFrom<i64>>(
     unit: &str,
 ) -> Result<T, Failure> {
     let digits = if session.raw { value } else { value / scale };
-    let fits = digits.is_finite().then(|| digits.round() as i64).and_then(|n| T::try_from(n).ok());
-    fits.ok_or_else(|| {
-        let unit = if session.raw { "digits" } else { unit };
-        Failure::Usage(format!("{value} {unit} does not fit the frame; nothing was sent"))
-    })
+    let nearest = digits.is_finite().then(|| digits.round() as i64);
+    nearest.and_then(|n| T::try_from(n).ok()).ok_or_else(|| too_large(session, value, unit))
+}
+
+/// A greatest speed in °/s, or with --raw in digits, rounded towards 0. What would be 0 is refused:
+/// to a drive it may mean any speed, or that the motor never moves.
+fn greatest_speed(session: &Session, value: f64) -> Result<SpeedLimit, Failure> {
+    let (scale, unit) = match session.raw {
+        true => (1.0, "digits"),
+        false => (SpeedLimit::SCALE, SpeedLimit::SYMBOL),
+    };
+    let digits = inward(value, scale);
+    if digits < 1 {
+        return Err(Failure::Usage(format!(
+            "--max-speed of {value} {unit} is too small: give {scale} {unit} or more; nothing was \
+             sent"
+        )));
+    }
+    let fits = u16::try_from(digits).map(SpeedLimit);
+    fits.map_err(|_| too_large(session, value, SpeedLimit::SYMBOL))
+}
+
+fn too_large(session: &Session, value: f64, unit: &str) -> Failure {
+    let unit = if session.raw { "digits" } else { unit };
+    Failure::Usage(format!("{value} {unit} does not fit the frame; nothing was sent"))
 }

@@ -177,7 +177,7 @@ pub enum Pfc {
 }
 
 pub fn parse_profile(text: &str) -> Result<Profile, String> {
-    [Profile::Spec, Profile::Mcsdk54]
+    Profile::ALL
         .into_iter()
         .find(|profile| profile.name() == text)
         .ok_or_else(|| "the profiles are spec and mcsdk-5.4".to_owned())

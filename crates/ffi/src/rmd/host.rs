@@ -21,7 +21,8 @@ pub struct motorlink_rmd_limits {
     /// Greatest torque current of 0xA1 and 0x280, 0.016 A a digit, or `MOTORLINK_RMD_NO_LIMIT`.
     pub torque_16ma: i32,
     /// Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_RMD_NO_LIMIT`. 0xA3 and 0xA5
-    /// carry no speed and are refused while this is set.
+    /// carry no speed and are refused while this is set, as are 0xA4 and 0xA6 with 0. A torque
+    /// command has no speed, and the motor turns as fast as its load allows.
     pub speed_dps: i32,
     /// Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit, or `MOTORLINK_RMD_NO_LIMIT`.
     pub angle_centidegrees: i32,

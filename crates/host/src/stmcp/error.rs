@@ -86,8 +86,13 @@ pub enum Error {
     #[error(transparent)]
     Port(#[from] PortError),
     /// A limit of the caller forbids it; nothing was sent.
-    #[error("{0}")]
-    Limit(#[from] LimitError),
+    #[error("{motor}: {why}")]
+    Limit {
+        /// The motor, in words.
+        motor: Target,
+        /// Which limit, and what to do.
+        why: LimitError,
+    },
     /// There is no such motor number; nothing was sent.
     #[error("motor {0} does not exist: motor numbers are 1 to 7")]
     NoSuchMotor(u8),

@@ -20,6 +20,7 @@ pub(crate) mod follow;
 mod guard;
 mod limits;
 mod motor;
+mod ramped;
 mod scan;
 mod session;
 mod started;

@@ -6,13 +6,14 @@ use std::sync::Arc;
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
     Command, Counters, Frame, FrameCode, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor, Output,
-    Parse, Profile, Recovery, RegisterId, Request, RequestError,
+    Profile, Recovery, RegisterId, Request, RequestError,
 };
 use motorlink_proto::time::Instant;
 
 use super::error::{Target, advice, hint};
+use super::ramped::Ramped;
 use super::started::{Effect, Started};
-use super::{Error, Limits, Options};
+use super::{Error, LimitError, Limits, Options};
 
 /// What a request is held to before it leaves.
 #[derive(Debug, Clone, Copy)]
@@ -32,8 +33,15 @@ pub(super) struct Session {
     master: Master,
     /// Motors that were started and not stopped.
     started: Started,
+    /// Motors that a speed ramp was acknowledged for.
+    ramped: Ramped,
+    /// What the line had been through when a request began.
+    history: History,
     asked: Asked,
 }
+
+/// Losses of the line, and identifications that a drive sends when it was reset.
+type History = (u32, u32);
 
 /// The request under way.
 #[derive(Debug, Clone, Copy)]
@@ -58,24 +66,17 @@ enum What {
 impl Rules {
     pub(super) fn check(&self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         addressable(motor)?;
-        Ok(self.limits.check(request)?)
+        self.limits.check(request).map_err(|why| Error::Limit { motor: Target(motor), why })
     }
 
-    /// As [`check`](Self::check), for any frame; gives the effect that it has as a request.
-    pub(super) fn check_raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Effect, Error> {
+    /// As [`check`](Self::check), for any frame, in every profile.
+    pub(super) fn check_raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
         addressable(motor)?;
-        let mut frame = [0; MAX_FRAME];
-        let header = Frame::header(code, motor);
-        let sent = Frame { header, payload }.encode(&mut frame);
-        let sent = sent.ok_or_else(|| Error::TooLong(What::Raw(code).to_string()))?;
-        let request = match Frame::parse(sent) {
-            Parse::Frame(frame, _) => Request::decode(self.profile, &frame).ok(),
-            _ => None,
-        };
-        if let Some(request) = &request {
-            self.limits.check(request)?;
+        if payload.len() > MAX_PAYLOAD {
+            return Err(Error::TooLong(What::Raw(code).to_string()));
         }
-        Ok(Effect::of(request.as_ref()))
+        let frame = Frame { header: Frame::header(code, motor), payload };
+        self.limits.check_frame(&frame).map_err(|why| Error::Limit { motor: Target(motor), why })
     }
 }
 
@@ -86,7 +87,15 @@ impl Session {
         let what = What::Known(FrameCode::GetBoardInfo);
         let asked = Asked { motor: 0, addressed: None, effect: Effect::None, what };
         let master = Master::new(options.line);
-        Session { port, rules, master, started: Started::default(), asked }
+        Session {
+            port,
+            rules,
+            master,
+            started: Started::default(),
+            ramped: Ramped::default(),
+            history: History::default(),
+            asked,
+        }
     }
 
     pub(super) fn rules(&self) -> Rules {
@@ -111,8 +120,10 @@ impl Session {
     /// What the limits forbid; nothing is sent then.
     pub(super) fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         self.rules.check(motor, request)?;
+        let effect = Effect::of(Some(request));
+        self.check_start(motor, effect)?;
         let begun = self.master.request(motor, request);
-        self.begun(begun, motor, Effect::of(Some(request)), What::of(request))
+        self.begun(begun, motor, effect, What::of(request))
     }
 
     /// Begins an exchange with any frame code and payload.
@@ -120,9 +131,36 @@ impl Session {
     /// # Errors
     /// Those of [`request`](Self::request).
     pub(super) fn raw(&mut self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
-        let effect = self.rules.check_raw(motor, code, payload)?;
-        let begun = self.master.request_raw(Frame::header(code, motor), payload);
+        self.rules.check_raw(motor, code, payload)?;
+        let frame = Frame { header: Frame::header(code, motor), payload };
+        let effect = Effect::of_frame(&frame);
+        self.check_start(motor, effect)?;
+        let begun = self.master.request_raw(frame.header, payload);
+        self.started.presume_within(frame.encode(&mut [0; MAX_FRAME]).unwrap_or(&[]));
         self.begun(begun, motor, effect, What::Raw(code))
+    }
+
+    /// Whether the request may leave: under a speed limit no motor is started without a ramp.
+    fn check_start(&mut self, motor: u8, effect: Effect) -> Result<(), Error> {
+        let Counters { losses, identifications, .. } = self.master.counters();
+        if self.history != (losses, identifications) {
+            self.history = (losses, identifications);
+            self.forget_drive();
+        }
+        match self.rules.limits.speed_rpm {
+            Some(limit_rpm)
+                if effect == Effect::Starts && !self.ramped.has(self.started.addressed(motor)) =>
+            {
+                Err(Error::Limit { motor: Target(motor), why: LimitError::NoRamp { limit_rpm } })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The drive may be another one, or have been reset.
+    fn forget_drive(&mut self) {
+        self.ramped.forget();
+        self.started.forget_current();
     }
 
     fn begun(
@@ -136,6 +174,7 @@ impl Session {
             return Err(Error::TooLong(what.to_string()));
         }
         let addressed = self.started.asked(motor, effect);
+        self.ramped.asked(addressed, effect);
         self.asked = Asked { motor, addressed, effect, what };
         Ok(())
     }
@@ -159,6 +198,7 @@ impl Session {
         match outcome {
             Ok((Some(value), _)) => {
                 self.started.acknowledged(addressed, effect);
+                self.ramped.acknowledged(addressed, effect);
                 Ok(value)
             }
             Ok((None, size)) => {
@@ -184,6 +224,7 @@ impl Session {
 
     /// Tells that the line was closed and opened again.
     pub(super) fn reopened(&mut self) {
+        self.forget_drive();
         if self.master.config_mut().recovery == Recovery::None {
             self.master.reopened();
         }

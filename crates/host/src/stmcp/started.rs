@@ -1,11 +1,13 @@
 //! Which motors were started and not stopped, as far as requests and replies tell.
 
-use motorlink_proto::stmcp::{Command, Motor, RegisterId, Request};
+use motorlink_proto::stmcp::{
+    Command, Frame, FrameCode, Motor, Parse, Profile, RegisterId, Request,
+};
 
 /// Every motor that a drive can have.
 const ALL: u8 = 0x7F;
 
-/// What a request does to the account of started motors.
+/// What a request does to the accounts of started motors and of their setpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Effect {
     None,
@@ -14,6 +16,12 @@ pub(super) enum Effect {
     Stops,
     /// Motor number 0 addresses another motor from now on.
     Retargets,
+    /// It gives the speed that a start goes to.
+    Ramps,
+    /// It may give a start something other than a speed ramp to do.
+    Supersedes,
+    /// The drive may forget what it was told.
+    Resets,
 }
 
 impl Effect {
@@ -22,13 +30,35 @@ impl Effect {
             Some(Request::Execute(command)) => match command {
                 Command::StartMotor | Command::StartStop | Command::ScStart => Effect::Starts,
                 Command::StopMotor | Command::ScStop => Effect::Stops,
+                Command::Reset => Effect::Resets,
                 _ => Effect::None,
             },
-            Some(Request::SetRegister { register: RegisterId::TARGET_MOTOR, .. }) => {
-                Effect::Retargets
+            Some(Request::SetRegister { register, .. }) => match *register {
+                RegisterId::TARGET_MOTOR => Effect::Retargets,
+                RegisterId::RAMP_FINAL_SPEED => Effect::Ramps,
+                // Firmware makes a ramp to its own reference of a change to speed control.
+                RegisterId::CONTROL_MODE | RegisterId::TORQUE_REF | RegisterId::FLUX_REF => {
+                    Effect::Supersedes
+                }
+                _ => Effect::None,
+            },
+            Some(Request::Ramp(_)) => Effect::Ramps,
+            Some(Request::CurrentReference(_) | Request::TorqueRamp(_) | Request::Position(_)) => {
+                Effect::Supersedes
             }
             _ => Effect::None,
         }
+    }
+
+    /// What a raw frame does in the profile in which it does something.
+    pub(super) fn of_frame(frame: &Frame<'_>) -> Self {
+        let code = |profile| FrameCode::from_number(frame.code(), profile);
+        let effects = Profile::ALL.map(|profile| match Request::decode(profile, frame) {
+            // Shipped firmware takes an old byte for the command (docs/SPEC-NOTES.md S18).
+            Err(_) if code(profile) == Some(FrameCode::ExecuteCmd) => Effect::Starts,
+            request => Effect::of(request.ok().as_ref()),
+        });
+        effects.into_iter().find(|effect| *effect != Effect::None).unwrap_or(Effect::None)
     }
 }
 
@@ -49,9 +79,15 @@ impl Started {
         if effect == Effect::Starts {
             self.presume(motor);
         }
+        let addressed = self.addressed(motor);
         // Unless the drive acknowledges, its current motor may have changed or not.
-        let current = self.current.take();
-        Motor::new(motor).or(current)
+        self.current = None;
+        addressed
+    }
+
+    /// The motor that motor number `motor` addresses, where it is known.
+    pub(super) fn addressed(&self, motor: u8) -> Option<Motor> {
+        Motor::new(motor).or(self.current)
     }
 
     /// The request that was [`asked`](Self::asked) last was acknowledged.
@@ -59,14 +95,26 @@ impl Started {
         match effect {
             Effect::Retargets => return,
             Effect::Stops => self.motors &= !addressed.map_or(0, bit),
-            Effect::None | Effect::Starts => {}
+            _ => {}
         }
         self.current = addressed;
     }
 
     /// Takes motor number `motor` for started.
     pub(super) fn presume(&mut self, motor: u8) {
-        self.motors |= Motor::new(motor).or(self.current).map_or(ALL, bit);
+        self.motors |= self.addressed(motor).map_or(ALL, bit);
+    }
+
+    /// Takes for started what a START in `bytes` addresses, wherever it stands: shipped firmware
+    /// reads the payload of the longest frame as frames (docs/SPEC-NOTES.md S10).
+    pub(super) fn presume_within(&mut self, bytes: &[u8]) {
+        for begin in 0..bytes.len() {
+            if let Parse::Frame(frame, _) = Frame::parse(&bytes[begin..])
+                && Effect::of_frame(&frame) == Effect::Starts
+            {
+                self.presume(frame.motor());
+            }
+        }
     }
 
     /// The drive has no such motor.
@@ -88,6 +136,7 @@ impl Started {
     }
 }
 
-const fn bit(motor: Motor) -> u8 {
+/// Bit n: motor n + 1.
+pub(super) const fn bit(motor: Motor) -> u8 {
     1 << motor.index()
 }

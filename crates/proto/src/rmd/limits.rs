@@ -9,14 +9,17 @@ use crate::units::{CentiDegrees, CentiDps, CircleAngle, SpeedLimit, TorqueComman
 use core::fmt;
 
 /// The most that may be commanded to a motor, either way round; `None` is no limit beyond the
-/// protocol's own ranges. A limit holds for what a frame carries: a torque command has no speed,
-/// and the drive's own settings bound the current of a speed or position command.
+/// protocol's own ranges. A limit holds for what a frame carries: a torque command has no speed, so
+/// that the motor turns as fast as its load allows, whatever the limit of speed; the drive's own
+/// settings bound the current of a speed or position command. [`inward`](crate::units::inward)
+/// rounds a physical limit so that no digit exceeds it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Limits {
     /// Greatest torque current of 0xA1 and 0x280, 0.016 A a digit.
     pub current: Option<TorqueCommand>,
     /// Greatest speed of 0xA2, 0xA4 and 0xA6, 1 °/s a digit. 0xA3 and 0xA5 carry no speed and are
-    /// refused while this is set (docs/SPEC-NOTES.md R14).
+    /// refused while this is set, as are 0xA4 and 0xA6 with 0, which may mean any speed to a drive
+    /// (docs/SPEC-NOTES.md R13, R14).
     pub speed: Option<SpeedLimit>,
     /// Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit.
     pub angle: Option<CentiDegrees>,
@@ -74,7 +77,7 @@ impl Limits {
             }
             Code::PositionLimited => {
                 let command = PositionLimited::decode(data);
-                self.speed(centi(command.max_speed))?;
+                self.max_speed(command.max_speed)?;
                 self.angle(command.angle)
             }
             Code::CirclePosition => {
@@ -84,7 +87,7 @@ impl Limits {
             }
             Code::CirclePositionLimited => {
                 let command = CirclePositionLimited::decode(data);
-                self.speed(centi(command.max_speed))?;
+                self.max_speed(command.max_speed)?;
                 circle(command.angle, command.direction)
             }
             _ => Ok(()),
@@ -110,6 +113,13 @@ impl Limits {
             }
             _ => Ok(()),
         }
+    }
+
+    fn max_speed(&self, asked: SpeedLimit) -> Result<(), Exceeded> {
+        if asked == SpeedLimit(0) {
+            return self.no_speed();
+        }
+        self.speed(centi(asked))
     }
 
     fn no_speed(&self) -> Result<(), Exceeded> {
@@ -154,7 +164,8 @@ impl fmt::Display for Exceeded {
             }
             Exceeded::NoSpeed { limit } => write!(
                 f,
-                "this command carries no speed to hold to the limit of {} °/s; use 0xA4 or 0xA6",
+                "this command carries no speed to hold to the limit of {} °/s; use 0xA4 or 0xA6 with a \
+                 max speed of 1 °/s at least",
                 limit.0
             ),
             Exceeded::Angle { asked, limit } => write!(
@@ -232,6 +243,17 @@ mod tests {
         let circle = CirclePosition::default().encode();
         assert_eq!(LIMITS.check(&circle), Err(Exceeded::NoSpeed { limit }));
         assert_eq!(Limits::default().check(&circle), Ok(()));
+    }
+
+    #[test]
+    fn a_max_speed_of_0_is_no_speed_while_speed_is_limited() {
+        let limit = SpeedLimit(360);
+        let turn = PositionLimited::default().encode();
+        let circle = CirclePositionLimited::default().encode();
+        for data in [turn, circle] {
+            assert_eq!(LIMITS.check(&data), Err(Exceeded::NoSpeed { limit }));
+            assert_eq!(Limits::default().check(&data), Ok(()));
+        }
     }
 
     #[test]

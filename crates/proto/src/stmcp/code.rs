@@ -14,6 +14,9 @@ pub enum Profile {
 }
 
 impl Profile {
+    /// Every profile.
+    pub const ALL: [Profile; 2] = [Profile::Spec, Profile::Mcsdk54];
+
     /// The profile's name as the command line spells it.
     pub const fn name(self) -> &'static str {
         match self {

@@ -249,7 +249,7 @@ impl Master {
         let bytes = frame.encode(&mut self.buffer).ok_or(RequestError::TooLong)?;
         self.filled = bytes.len() as u8;
         // What is only a question in one profile may act in the other.
-        let codes = [Profile::Spec, Profile::Mcsdk54].map(|p| FrameCode::from_number(code, p));
+        let codes = Profile::ALL.map(|p| FrameCode::from_number(code, p));
         let [known, other] = codes;
         let read = known.is_some_and(FrameCode::is_read) && other.is_none_or(FrameCode::is_read);
         self.begin(motor, known);
