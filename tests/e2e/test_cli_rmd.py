@@ -122,6 +122,22 @@ def test_a_motion_command_answers_with_what_the_motor_does(rmd, command):
     rmd("-i", 3, "off").ended(0)
 
 
+@pytest.mark.parametrize("direction", [(), ("--direction", "cw")])
+def test_a_max_speed_never_rounds_up_and_is_never_0(rmd, direction):
+    def most(value, *options):
+        return rmd("--trace", *options, "move", 10, *direction, f"--max-speed={value}")
+
+    for value, sent in (("1.999", "01 00"), ("360.999", "68 01")):
+        data = next(line for line in most(value).ended(0).err.splitlines() if "-> 141#a" in line)
+        assert data.split("#")[1][6:11] == sent
+    assert next(line for line in most("2.9", "--raw").ended(0).err.splitlines() if " 02 00 " in line)
+    for value in ("0", "0.999", "-1", "nan"):
+        refused = most(value).ended(2).err
+        assert "give 1 °/s or more; nothing was sent" in refused and "->" not in refused
+    assert "give 1 digits or more" in most("0.9", "--raw").ended(2).err
+    assert "does not fit" in most("65536").ended(2).err
+
+
 @on_every_port
 def test_torque4_answers_for_each_motor(rmd):
     replies = rmd("--json", "torque4", 0, -0.1, 0.1, 0).ended(0).lines

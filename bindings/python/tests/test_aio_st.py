@@ -277,6 +277,8 @@ def test_errors_are_those_of_the_blocking_api(drive: Drive) -> None:
                 lambda: bus.motor(1).revup(9),
                 lambda: bus.motor(1).write("SPEED_KP", 1),
                 lambda: bus.motor(1).move_to(1, 1),
+                lambda: bus.motor(1).start(),
+                lambda: bus.exchange_raw(0x12, bytes(8)),
                 lambda: bus.exchange_raw(0x20),
             ):
                 with pytest.raises(motorlink.MotorlinkError) as error:
@@ -294,6 +296,8 @@ def test_errors_are_those_of_the_blocking_api(drive: Drive) -> None:
                 lambda: bus.motor(1).revup(9),
                 lambda: bus.motor(1).write("SPEED_KP", 1),
                 lambda: bus.motor(1).move_to(1, 1),
+                lambda: bus.motor(1).start(),
+                lambda: bus.exchange_raw(0x12, bytes(8)),
                 lambda: bus.exchange_raw(0x20),
             ):
                 with pytest.raises(motorlink.MotorlinkError) as error:
@@ -302,6 +306,25 @@ def test_errors_are_those_of_the_blocking_api(drive: Drive) -> None:
         return told
 
     assert asyncio.run(awaited()) == blocking()
+
+
+def test_a_start_needs_a_ramp_within_the_speed_limit() -> None:
+    async def main() -> None:
+        async with aio.st.open("sim:", speed_limit=100) as bus:
+            motor = bus.motor(1)
+            for start in (
+                lambda: motor.start(),
+                lambda: motor.execute("START_STOP"),
+                lambda: bus.exchange_raw(0x03, b"\x01", motor=1),
+            ):
+                with pytest.raises(motorlink.BadValue, match=r"first `ramp\(...\)`"):
+                    await start()
+            assert bus.started == []
+            await motor.ramp(100, 0)
+            await motor.start()
+            assert bus.started == [1]
+
+    asyncio.run(within(60, main()))
 
 
 def test_a_bus_belongs_to_one_loop(drive: Drive) -> None:

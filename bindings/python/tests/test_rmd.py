@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -123,12 +123,15 @@ def test_limits_hold() -> None:
     with rmd.open("sim:", timeout=PATIENT, current_limit=1.0, speed_limit=360, angle_limit=90) as bus:
         motor = bus.motor(1)
         motor.move_to(-90, max_speed=360)
-        motor.torque(1.0)
+        # A digit is 0.016 A: 62 digits are within 1 A.
+        motor.torque(0.992)
         for beyond in (
+            lambda: motor.torque(1.0),
             lambda: motor.torque(-1.02),
             lambda: motor.speed(360.01),
             lambda: motor.move_to(90.01, 1),
             lambda: motor.move_to(10),
+            lambda: motor.exchange_raw(bytes([0xA4, 0, 0, 0, 0, 0, 0, 0])),
             lambda: motor.exchange_raw(bytes([0xA1, 0, 0, 0, 0xFF, 0, 0, 0])),
             lambda: bus.torque4(2, 0, 0, 0),
         ):
@@ -140,6 +143,43 @@ def test_limits_hold() -> None:
         bus.motor(2).torque(0.9)
         with pytest.raises(motorlink.BadValue):
             bus.motor(2).torque(2.5)
+
+
+def test_limits_and_max_speeds_round_towards_0() -> None:
+    with rmd.open("sim:", timeout=PATIENT, speed_limit=360.9, angle_limit=90.019) as bus:
+        motor = bus.motor(1)
+        motor.move_to(90.01, max_speed=360.9)
+        calls: list[Callable[[], object]] = [
+            lambda: motor.speed(360.5),
+            lambda: motor.move_to(90.02, max_speed=1),
+            lambda: motor.move_to(1, max_speed=361),
+        ]
+        for beyond in calls:
+            with pytest.raises(motorlink.BadValue, match="limit"):
+                beyond()
+    # 0.3 has 30 digits of 0.01, whatever binary fractions say.
+    with rmd.open("sim:", timeout=PATIENT, angle_limit=0.3, current_limit=0.48) as bus:
+        bus.motor(1).move_to(0.3)
+        bus.motor(1).torque(0.48)
+
+
+@pytest.mark.parametrize("most", [0, 0.4, 0.999, -1, -0.5, float("-inf"), float("nan")])
+def test_a_max_speed_that_would_be_0_is_refused(most: float) -> None:
+    requests: list[Callable[[], object]] = [
+        lambda: rmd.Request.move_to(1, most),
+        lambda: rmd.Request.turn_to(1, most),
+    ]
+    for request in requests:
+        with pytest.raises(motorlink.BadValue, match="give 1 °/s or more; nothing was sent"):
+            request()
+
+
+def test_a_max_speed_never_rounds_up() -> None:
+    for most, digits in ((1, 1), (1.999, 1), (360.5, 360), (360.999, 360), (65535.9, 65535)):
+        for request in (rmd.Request.move_to(1, most), rmd.Request.turn_to(1, most)):
+            assert int.from_bytes(request.encode()[2:4], "little") == digits
+    with pytest.raises(motorlink.BadValue, match="does not fit"):
+        rmd.Request.move_to(1, 65536)
 
 
 def test_nonsense_is_refused_before_it_is_sent(rmd_bus: rmd.Bus) -> None:

@@ -6,6 +6,7 @@ import copy
 import os
 import pickle
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -195,6 +196,65 @@ def test_limits_hold_for_every_way_to_say_it() -> None:
         ):
             with pytest.raises(motorlink.BadValue, match="limit"):
                 beyond()
+
+
+def test_a_start_needs_a_ramp_within_the_speed_limit() -> None:
+    starts: list[Callable[[st.Bus], object]] = [
+        lambda bus: bus.motor(1).start(),
+        lambda bus: bus.motor(1).execute("START_STOP"),
+        lambda bus: bus.motor(1).execute("SC_START"),
+        lambda bus: bus.exchange_raw(0x03, b"\x01", motor=1),
+        lambda bus: bus.exchange_raw(0x12, bytes(8), motor=1),
+        lambda bus: bus.exchange_raw(0x0C, bytes(128), motor=1),
+    ]
+    with st.open("sim:", speed_limit=100) as bus:
+        for start in starts:
+            with pytest.raises(motorlink.BadValue, match="nothing was sent") as error:
+                start(bus)
+            assert error.value.motor == 1
+        assert bus.started == []
+        with pytest.raises(motorlink.BadValue, match=r"first `ramp\(...\)` within the limit"):
+            bus.motor(1).start()
+        bus.motor(1).ramp(100, 0)
+        with pytest.raises(motorlink.BadValue, match="first"):
+            bus.motor(2).start()
+        bus.motor(1).start()
+        assert bus.started == [1]
+
+
+@pytest.mark.parametrize("profile", ["spec", "mcsdk-5.4"])
+def test_a_motor_never_turns_faster_than_its_speed_limit(profile: str) -> None:
+    servo = "[[st.motor]]\npreset = 'servo'\nbuild.position_control = true\n"
+    bench = motorlink.sim.Bench(f"profile = '{profile}'\n{servo}")
+    with st.open(bench, profile=profile, speed_limit=300) as bus:
+        motor = bus.motor(1)
+        with pytest.raises(motorlink.BadValue):
+            motor.start()
+        motor.ramp(270, 0.2)
+        motor.start()
+        if profile == "mcsdk-5.4":
+            with pytest.raises(motorlink.BadValue, match="position command carries no speed"):
+                motor.move_to(6000, 0.5)
+        top = 0.0
+        for _ in range(300):
+            bench.run(0.01)
+            top = max(top, abs(bench.truth("st1")["speed_rpm"]))
+        assert 250 < top <= 300
+
+
+def test_a_limit_of_current_rounds_towards_0() -> None:
+    # A digit is 0.01 A, then 0.3 A: 1.0 A are 3 digits, of which the fourth is beyond.
+    for full_scale, limit, most in ((327.67, 0.3, 0.3), (9830.1, 1.0, 0.9), (9830.1, 0.29, 0.0)):
+        with st.open("sim:", current_limit=limit, full_scale_amps=full_scale) as bus:
+            motor = bus.motor(1)
+            motor.current(most, -most)
+            digit = full_scale / 32767
+            with pytest.raises(motorlink.BadValue, match="limit"):
+                motor.current(most + digit)
+    with st.open("sim:", speed_limit=999.9) as bus:
+        bus.motor(1).ramp(999, 0)
+        with pytest.raises(motorlink.BadValue, match="limit of 999 rpm"):
+            bus.motor(1).ramp(999.9, 0)
 
 
 def test_a_write_is_verified(st_bus: st.Bus) -> None:

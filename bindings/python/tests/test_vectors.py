@@ -186,9 +186,11 @@ def test_an_rmd_request_encodes_to_its_bytes_and_decodes_from_them(vector: Vecto
     assert frame.motor == can_id - 0x140
     decoded = rmd.Request.decode(data)
     assert (decoded.code, decoded.encode()) == (code, data)
-    # What the document does not allow is read, and never made.
-    if abs(frame.digits.get("torque", 0)) > 2000 or (
-        code in (0xA5, 0xA6) and frame.digits["angle"] >= 36000
+    # What the document does not allow is read, and never made; nor is a max speed of 0.
+    if (
+        abs(frame.digits.get("torque", 0)) > 2000
+        or (code in (0xA5, 0xA6) and frame.digits["angle"] >= 36000)
+        or frame.digits.get("max_speed") == 0
     ):
         with pytest.raises(motorlink.BadValue):
             rmd_request(frame, code)

@@ -292,7 +292,7 @@ fn a_ramp_counts_until_the_drive_may_have_forgotten_it() {
             disturbance.lock().unwrap().deafens = false;
             motor.status().unwrap();
         }),
-        ("bytes came that nobody asked for", |motor, disturbance| {
+        ("unasked bytes came", |motor, disturbance| {
             disturbance.lock().unwrap().first = vec![0xF0, 0x00, 0xF0, 0x00];
             motor.status().unwrap_err();
         }),

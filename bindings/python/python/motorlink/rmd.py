@@ -110,7 +110,9 @@ def open(
         How long after a timeout a late reply is awaited before the motor is asked again, s.
     ``current_limit``, ``speed_limit``, ``angle_limit``
         What no request to any motor may exceed in either direction: A, °/s, ° from zero; also not by
-        raw frames. With a speed limit a move needs ``max_speed``. The angle is that of ``move_to``:
+        raw frames. Rounded towards 0 to what a frame can say: 1.0 A allows 0.992 A, as a digit is
+        0.016 A. With a speed limit a move needs ``max_speed``. It does not bound the speed under a
+        torque command, which is as fast as the load allows. The angle is that of ``move_to``:
         ``turn_to`` names none over all turns, and is not held back by it.
     ``on_close``
         What the end of ``with``, and ``close()``, do to motors that this bus set moving: ``stop``
@@ -269,7 +271,7 @@ class Motor:
     ) -> None:
         """What this motor may be told from now on, A, °/s, ° from zero; ``None`` is no limit.
 
-        All three at once, in place of those of :func:`open`.
+        All three at once, in place of those of :func:`open`, and rounded as they are.
         """
         self._bus._core.set_limits(self._id, current, speed, angle)
 
@@ -327,7 +329,8 @@ class Motor:
     def move_to(self, degrees: float, max_speed: float | None = None) -> MotionStatus:
         """Turns to an angle over all turns, °, no faster than ``max_speed``, °/s.
 
-        Position control commands 1 and 2. Gives the motion as it was when the command came.
+        ``max_speed`` is 1 at least and is rounded down to whole °/s. Position control commands 1
+        and 2. Gives the motion as it was when the command came.
         """
         status: MotionStatus = self._perform(Request.move_to(degrees, max_speed))
         return status
@@ -337,7 +340,8 @@ class Motor:
     ) -> MotionStatus:
         """Turns to an angle within the turn, 0 to 359.99 °, this way round.
 
-        No faster than ``max_speed``, °/s. Position control commands 3 and 4.
+        No faster than ``max_speed``, °/s, 1 at least, rounded down. Position control commands 3
+        and 4.
         """
         status: MotionStatus = self._perform(
             Request.turn_to(degrees, max_speed, clockwise=clockwise)

@@ -85,7 +85,12 @@ def open(
         How long to wait for a reply, s (4.1 says 1 s).
     ``speed_limit``, ``current_limit``
         What no request may exceed in either direction, rpm, and A with ``full_scale_amps``, digits
-        without; also not by writing registers or raw frames.
+        without; also not by writing registers or raw frames. Rounded towards 0 to what a frame can
+        say. With a speed limit a motor is started only after a ``ramp`` within it, and ``move_to`` is
+        refused. The ramp no longer counts after a torque command, a write of CONTROL_MODE, a reset
+        of the drive, or a lost line or port. A speed limit does not bound the speed under a torque
+        command (``current``, ``torque_ramp``), which is as fast as the load allows, nor the
+        drive's own rev-up, alignment and motor profiler.
     ``full_scale_amps``
         The current of digit 32767, A, for every motor that is not given its own.
     ``recovery``
@@ -321,7 +326,10 @@ class Motor:
         self._perform(Request.execute(command))
 
     def start(self) -> None:
-        """Starts the motor (4.6). With a fault pending the drive acknowledges and does nothing."""
+        """Starts the motor (4.6). With a fault pending the drive acknowledges and does nothing.
+
+        With a ``speed_limit``, call :meth:`ramp` before: the drive may have a target of its own.
+        """
         self.execute("START_MOTOR")
 
     def stop(self) -> None:
@@ -348,19 +356,26 @@ class Motor:
         self._perform(Request.ramp(speed, seconds))
 
     def current(self, iq: float, id: float = 0.0) -> None:
-        """Sets the current references (4.11); A with ``full_scale_amps``, else digits."""
+        """Sets the current references (4.11); A with ``full_scale_amps``, else digits.
+
+        No ``speed_limit`` bounds the motor then.
+        """
         self._perform(Request.current(iq, id, full_scale_amps=self._full_scale_amps))
 
     def torque_ramp(self, iq: float, seconds: float) -> None:
         """Goes to ``iq`` within ``seconds``; A with ``full_scale_amps``, else digits.
 
-        Of profile ``mcsdk-5.4``; for others the same bytes ask for something else.
+        Of profile ``mcsdk-5.4``; for others the same bytes ask for something else. No
+        ``speed_limit`` bounds the motor then.
         """
         self._only("mcsdk-5.4", "torque ramps")
         self._perform(Request.torque_ramp(iq, seconds, full_scale_amps=self._full_scale_amps))
 
     def move_to(self, angle_rad: float, seconds: float) -> None:
-        """Turns to ``angle_rad``, rad, within ``seconds``; profile ``mcsdk-5.4`` with position control."""
+        """Turns to ``angle_rad``, rad, within ``seconds``; profile ``mcsdk-5.4`` with position control.
+
+        Refused while there is a ``speed_limit``: the command carries no speed.
+        """
         self._only("mcsdk-5.4", "moves")
         self._perform(Request.move_to(angle_rad, seconds))
 

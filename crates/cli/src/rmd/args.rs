@@ -107,7 +107,7 @@ pub enum Act {
         /// Degrees over all turns, positive is clockwise; 0 to 359.99 with --direction
         #[arg(allow_negative_numbers = true)]
         degrees: f64,
-        /// No faster than this, °/s
+        /// No faster than this, °/s; 1 at least, rounded down to whole °/s
         #[arg(long, value_name = "DPS")]
         max_speed: Option<f64>,
         /// Turn to an angle within the turn, this way round

@@ -10,10 +10,12 @@ use motorlink_proto::stmcp::{Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId,
 /// command, a write of CONTROL_MODE or a RESET, and after the drive was reset, the line was lost or
 /// the port was opened again. Position commands carry no speed and are refused.
 ///
-/// Three things are not bounded by `speed_rpm`: the speed under a torque command, which turns the
-/// motor as fast as its load allows; the speed of the drive's rev-up phases, which belong to the
-/// drive until they are set; the speed of the motor profiler (SC_START). A motor that was running
-/// before keeps its speed until it is told otherwise.
+/// A limit bounds what is asked for. `speed_rpm` does not bound:
+/// * a torque command: the motor then turns as fast as its load allows;
+/// * the rev-up of a drive without sensor, its alignment, and the motor profiler (SC_START), whose
+///   speeds are the drive's own. [`MotorHandle::set_revup`](super::MotorHandle::set_revup) sets the
+///   rev-up's;
+/// * what the drive's regulator overshoots, and a motor that was running before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Limits {
     /// Highest speed in either direction, rpm.
@@ -81,7 +83,7 @@ pub enum LimitError {
 }
 
 impl Limits {
-    /// Whether `request` keeps the limits, beside the ramp that a start needs.
+    /// Whether `request` keeps the limits. Whether a start had its ramp is checked by the client.
     ///
     /// # Errors
     /// Why it does not.
@@ -110,8 +112,7 @@ impl Limits {
         }
     }
 
-    /// Whether a raw frame keeps the limits, beside the ramp that a start needs, whichever profile
-    /// the drive follows.
+    /// Whether a raw frame keeps the limits in every profile, as [`check`](Self::check).
     ///
     /// # Errors
     /// Why it does not.

@@ -20,7 +20,7 @@ pub(super) enum Effect {
     Ramps,
     /// It may give a start something other than a speed ramp to do.
     Supersedes,
-    /// The drive may forget what it was told.
+    /// It may reset the drive.
     Resets,
 }
 
@@ -93,7 +93,7 @@ impl Started {
     /// The request that was [`asked`](Self::asked) last was acknowledged.
     pub(super) fn acknowledged(&mut self, addressed: Option<Motor>, effect: Effect) {
         match effect {
-            Effect::Retargets => return,
+            Effect::Retargets | Effect::Resets => return,
             Effect::Stops => self.motors &= !addressed.map_or(0, bit),
             _ => {}
         }

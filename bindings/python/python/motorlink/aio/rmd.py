@@ -347,14 +347,20 @@ class Motor:
         return status
 
     async def move_to(self, degrees: float, max_speed: float | None = None) -> MotionStatus:
-        """Turns to an angle over all turns, °, no faster than ``max_speed``, °/s."""
+        """Turns to an angle over all turns, °, no faster than ``max_speed``, °/s.
+
+        ``max_speed`` is 1 at least and is rounded down to whole °/s.
+        """
         status: MotionStatus = await self._perform(Request.move_to(degrees, max_speed))
         return status
 
     async def turn_to(
         self, degrees: float, max_speed: float | None = None, *, clockwise: bool = True
     ) -> MotionStatus:
-        """Turns to an angle within the turn, 0 to 359.99 °, this way round."""
+        """Turns to an angle within the turn, 0 to 359.99 °, this way round.
+
+        No faster than ``max_speed``, °/s, 1 at least, rounded down.
+        """
         request = Request.turn_to(degrees, max_speed, clockwise=clockwise)
         status: MotionStatus = await self._perform(request)
         return status

@@ -307,7 +307,10 @@ class Motor:
         await self._perform(Request.execute(command))
 
     async def start(self) -> None:
-        """Starts the motor (4.6). With a fault pending the drive acknowledges and does nothing."""
+        """Starts the motor (4.6). With a fault pending the drive acknowledges and does nothing.
+
+        With a ``speed_limit``, call :meth:`ramp` before: the drive may have a target of its own.
+        """
         await self.execute("START_MOTOR")
 
     async def stop(self) -> None:
@@ -340,7 +343,10 @@ class Motor:
         await self._perform(Request.torque_ramp(iq, seconds, full_scale_amps=self._full_scale_amps))
 
     async def move_to(self, angle_rad: float, seconds: float) -> None:
-        """Turns to ``angle_rad``, rad, within ``seconds``; profile ``mcsdk-5.4`` with position control."""
+        """Turns to ``angle_rad``, rad, within ``seconds``; profile ``mcsdk-5.4`` with position control.
+
+        Refused while there is a ``speed_limit``: the command carries no speed.
+        """
         self._only("mcsdk-5.4", "moves")
         await self._perform(Request.move_to(angle_rad, seconds))
 
