@@ -7,15 +7,17 @@ use motorlink_proto::stmcp::{Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId,
 /// While `speed_rpm` is set, a motor is started only after a speed ramp to it was acknowledged, as
 /// the drive otherwise goes to a target of its own. The ramp may be SET_RAMP or a write of
 /// RAMP_FINAL_SPEED. It no longer counts after a later ramp that was not acknowledged, after a torque
-/// command, a write of CONTROL_MODE or a RESET, and after the drive was reset, the line was lost or
-/// the port was opened again. Position commands carry no speed and are refused.
+/// command, a write of CONTROL_MODE or a RESET, and after the drive identified itself anew, the line
+/// was lost or the port was opened again. Position commands carry no speed and are refused.
 ///
 /// A limit bounds what is asked for. `speed_rpm` does not bound:
 /// * a torque command: the motor then turns as fast as its load allows;
 /// * the rev-up of a drive without sensor, its alignment, and the motor profiler (SC_START), whose
 ///   speeds are the drive's own. [`MotorHandle::set_revup`](super::MotorHandle::set_revup) sets the
 ///   rev-up's;
-/// * what the drive's regulator overshoots, and a motor that was running before.
+/// * what the drive's regulator overshoots, and a motor that was running before;
+/// * a start after the drive was reset without a sign on the line, as a power cycle between the ramp
+///   and the start can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Limits {
     /// Highest speed in either direction, rpm.
