@@ -16,6 +16,7 @@ pub const ST_PORTS: &str = "\
 Ports:
   /dev/ttyACM0, serial:/dev/ttyUSB0?baud=115200   a UART
   tcp:HOST:PORT                                   a serial line behind a TCP server
+  unix:PATH                                       a serial line behind a Unix socket
   tcp:HOST:PORT?clock=HOST:PORT                   the same on the time of an emulated board
   sim:, sim:bench.toml                            simulated drives inside this process
 MOTORLINK_PORT names the port where -p does not.
@@ -33,6 +34,7 @@ pub const RMD_PORTS: &str = "\
 Ports:
   slcan:/dev/ttyACM0?bitrate=1000000   a CAN adapter that speaks slcan
   slcan:tcp:HOST:PORT                  the same behind a TCP server
+  slcan:unix:PATH                      the same behind a Unix socket
   socketcan:can0                       a CAN interface of Linux
   sim:, sim:bench.toml                 simulated motors inside this process
 Behind slcan ports: baud=RATE for the adapter's own line, echo=1 if it sends back what it is sent,

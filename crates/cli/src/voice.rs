@@ -85,7 +85,7 @@ fn speak(
         let dropped = state.dropped.swap(0, Ordering::SeqCst);
         let missed = if dropped > 0 { missed(dropped) + "\n" } else { String::new() };
         let is_written =
-            may_write(&out) && write!(out, "{missed}{line}\n").and_then(|()| out.flush()).is_ok();
+            may_write(&out) && writeln!(out, "{missed}{line}").and_then(|()| out.flush()).is_ok();
         if !is_written {
             state.dropped.fetch_add(dropped + 1, Ordering::SeqCst);
         }

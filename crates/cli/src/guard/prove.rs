@@ -72,19 +72,20 @@ impl Spin {
 
 /// A client of the motor that is turned.
 enum Drive {
-    St { client: Client, motor: u8 },
-    Rmd { bus: Bus, id: u8 },
+    St { client: Box<Client>, motor: u8 },
+    Rmd { bus: Box<Bus>, id: u8 },
 }
 
 impl Drive {
     fn open(protocol: Protocol, port: &PortName, motor: u8) -> Result<Self, Failure> {
         Ok(match protocol {
             Protocol::St => {
-                Drive::St { client: Client::open(port, stmcp::Options::default())?, motor }
+                let client = Client::open(port, stmcp::Options::default())?;
+                Drive::St { client: Box::new(client), motor }
             }
             Protocol::Rmd => {
                 let options = rmd::Options { timeout: TIMEOUT, ..rmd::Options::default() };
-                Drive::Rmd { bus: Bus::open(port, options)?, id: motor }
+                Drive::Rmd { bus: Box::new(Bus::open(port, options)?), id: motor }
             }
         })
     }
@@ -106,7 +107,7 @@ impl Drive {
     fn speed(&self) -> Result<f64, Failure> {
         Ok(match self {
             Drive::St { client, motor } => client.motor(*motor)?.read(register::SPEED_MEAS)?.into(),
-            Drive::Rmd { bus, id } => bus.motor(*id)?.status2()?.speed.dps().into(),
+            Drive::Rmd { bus, id } => bus.motor(*id)?.status2()?.speed.dps(),
         })
     }
 

@@ -14,8 +14,9 @@ const METHODS: [&[u8]; 10] = [
     b"PRI * HTTP",
 ];
 
-/// Bytes of which some may be anything.
-type Pattern = &'static [Option<fn(u8) -> bool>];
+/// What a byte has to be; `None`: anything.
+type Byte = Option<fn(u8) -> bool>;
+type Pattern = &'static [Byte];
 
 /// A record of type handshake, version 3.0 to 3.4, of any length, with a ClientHello.
 const TLS: Pattern = &[
@@ -109,7 +110,7 @@ fn judge(bytes: &[u8]) -> Judgement {
         (agrees, method.len())
     });
     let patterns = [TLS, STUN, FRAMED_STUN].into_iter().map(|pattern| {
-        let fits = |(&byte, place): (&u8, &Option<fn(u8) -> bool>)| place.is_none_or(|is| is(byte));
+        let fits = |(&byte, place): (&u8, &Byte)| place.is_none_or(|is| is(byte));
         (bytes.iter().zip(pattern).all(fits), pattern.len())
     });
     let mut judgement = Judgement::Welcome;

@@ -118,7 +118,7 @@ impl Follower {
             Parse::Frame(frame, size) if size == self.request.len() => frame,
             _ => return self.lose(),
         };
-        let effect = effect(&frame);
+        let effect = Effect::of_frame(&frame);
         let addressed = self.started.asked(frame.motor(), effect);
         match (header, code) {
             (HEADER_ACK, _) if !self.out_of_step => {
@@ -148,7 +148,7 @@ impl Follower {
                 Parse::Frame(frame, size) if begin + size == self.recent.len() => frame,
                 _ => continue,
             };
-            if effect(&frame) == Effect::Starts {
+            if Effect::of_frame(&frame) == Effect::Starts {
                 self.started.presume(frame.motor());
             }
             if command(&frame) == Some(Command::PfcEnable) {
@@ -158,11 +158,7 @@ impl Follower {
     }
 }
 
-/// Commands and TARGET_MOTOR are the same in every profile.
-fn effect(frame: &Frame<'_>) -> Effect {
-    Effect::of(Request::decode(Profile::Spec, frame).ok().as_ref())
-}
-
+/// Commands are the same in every profile.
 fn command(frame: &Frame<'_>) -> Option<Command> {
     match Request::decode(Profile::Spec, frame) {
         Ok(Request::Execute(command)) => Some(command),

@@ -36,7 +36,7 @@ impl Effect {
             Some(Request::SetRegister { register, .. }) => match *register {
                 RegisterId::TARGET_MOTOR => Effect::Retargets,
                 RegisterId::RAMP_FINAL_SPEED => Effect::Ramps,
-                // Firmware makes a ramp to its own reference of a change to speed control.
+                // A change of mode may bring a reference of the drive's own.
                 RegisterId::CONTROL_MODE | RegisterId::TORQUE_REF | RegisterId::FLUX_REF => {
                     Effect::Supersedes
                 }
