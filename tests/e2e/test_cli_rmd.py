@@ -320,3 +320,20 @@ def test_a_loop_survives_a_bus_that_goes_and_comes_back(start, sim, kind):
     loop.more_lines()
     loop.interrupt()
     assert loop.wait() == 0
+
+
+def test_error_bits_that_mean_nothing_are_no_errors(run, tmp_path):
+    """Bits 1, 2 and 4 to 7 of the error state are invalid (3, Read motor status 1)."""
+    bits = {"state": "F6"}
+
+    def motor(frame):
+        return [f"t1418{frame[5:7]}1900F0000000{bits['state']}"]
+
+    with device(tmp_path / "can0", slcan_adapter(motor)) as path:
+        words = ("rmd", "-p", f"slcan:{path}", "--timeout", 500, "clear-error")
+        cleared = run(*words, "--json").ended(0).json
+        assert cleared["errors"] == []
+        assert "no error (bits 0xf6 mean nothing)" in run(*words).ended(0).out
+        bits["state"] = "F7"
+        kept = run(*words, "--json").ended(1)
+        assert kept.json["errors"] == ["low voltage protection"]

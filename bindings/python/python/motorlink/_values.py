@@ -101,11 +101,11 @@ class MotorErrors(NamedTuple):
 
     #: The document's words: ``low voltage protection``.
     names: tuple[str, ...]
-    #: The bits of the error byte, also those that the document does not name.
+    #: The bits of the error byte, also those that mean nothing.
     bits: int
 
     def __bool__(self) -> bool:
-        return self.bits != 0
+        return bool(self.names)
 
     def __str__(self) -> str:
         return _core.rmd_errors_text(self.bits)

@@ -108,10 +108,8 @@ pub(crate) fn motor_status(py: Python<'_>, status: &Status1) -> PyResult<Py<PyAn
 
 /// The document's words for error bits; the number of a bit that has none.
 fn errors(py: Python<'_>, errors: Errors) -> PyResult<Bound<'_, PyTuple>> {
-    let bits = (0..8).map(|n| Errors(1 << n)).filter(|bit| errors.contains(*bit));
-    let named = |bit| Errors::NAMES.iter().find(|(known, _)| *known == bit).map(|row| row.1);
-    let names = bits.map(|bit| named(bit).map_or_else(|| format!("{:#04x}", bit.0), str::to_owned));
-    PyTuple::new(py, names.collect::<Vec<_>>())
+    let active = Errors::NAMES.iter().filter(|(bit, _)| errors.contains(*bit));
+    PyTuple::new(py, active.map(|(_, name)| *name).collect::<Vec<_>>())
 }
 
 #[pymethods]

@@ -167,5 +167,6 @@ fn rounded(value: f64, decimals: u8) -> f64 {
 }
 
 fn names(errors: Errors) -> Value {
-    if errors.is_empty() { json!([]) } else { json!([errors.to_string()]) }
+    let active = Errors::NAMES.iter().filter(|(bit, _)| errors.contains(*bit));
+    active.map(|(_, name)| *name).collect()
 }

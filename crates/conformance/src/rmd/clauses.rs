@@ -220,11 +220,11 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-9A-06", "DATA[2], DATA[5] and DATA[6] of the reply are 0.")
         .host(REPLIES),
     Clause::new("RMD-9A-07", "Bit 0 of the error state is low voltage protection: set is active.")
-        .host(&["unnamed_error_bits_are_kept_and_shown"]),
+        .host(&["invalid_error_bits_are_shown_and_mean_nothing"]),
     Clause::new("RMD-9A-08", "Bit 3 of the error state is over temperature protection: set is active.")
-        .host(&["unnamed_error_bits_are_kept_and_shown"]),
+        .host(&["invalid_error_bits_are_shown_and_mean_nothing"]),
     Clause::new("RMD-9A-09", "The other bits of the error state mean nothing.")
-        .host(&["unnamed_error_bits_are_kept_and_shown"])
+        .host(&["invalid_error_bits_are_shown_and_mean_nothing"])
         .untested("a bit without meaning can have either value"),
     Clause::new("RMD-9A-10", "While a protection is active the motor is off, and motion commands are answered and not carried out (SPEC-NOTES R18)."),
 
@@ -242,11 +242,11 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-9B-07", "DATA[2], DATA[5] and DATA[6] of the reply are 0.")
         .host(REPLIES),
     Clause::new("RMD-9B-08", "Bit 0 of the error state is low voltage protection: set is active.")
-        .host(&["unnamed_error_bits_are_kept_and_shown"]),
+        .host(&["invalid_error_bits_are_shown_and_mean_nothing"]),
     Clause::new("RMD-9B-09", "Bit 3 of the error state is over temperature protection: set is active.")
-        .host(&["unnamed_error_bits_are_kept_and_shown"]),
+        .host(&["invalid_error_bits_are_shown_and_mean_nothing"]),
     Clause::new("RMD-9B-10", "The other bits of the error state mean nothing.")
-        .host(&["unnamed_error_bits_are_kept_and_shown"])
+        .host(&["invalid_error_bits_are_shown_and_mean_nothing"])
         .untested("a bit without meaning can have either value"),
     Clause::new("RMD-9B-11", "A flag whose cause lasts cannot be cleared (SPEC-NOTES R10)."),
 

@@ -101,7 +101,7 @@ payload! {
 }
 
 /// The error state byte: a bit a protection (3, Read motor status 1 and error flag commands). Bits
-/// that the document calls invalid are kept and shown.
+/// that the document calls invalid are kept and shown, and mean nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Errors(pub u8);
 
@@ -113,6 +113,8 @@ macro_rules! error_bits {
 
             /// Each named bit with the document's words for it.
             pub const NAMES: &'static [(Errors, &'static str)] = &[$( (Errors::$name, $text), )+];
+
+            const VALID: u8 = $( 1 << $bit )|+;
         }
     };
 }
@@ -125,9 +127,14 @@ impl Errors {
     /// No error.
     pub const NONE: Self = Errors(0);
 
-    /// Whether no bit is set.
+    /// Those whose meaning the document names.
+    pub const fn active(self) -> Self {
+        Errors(self.0 & Self::VALID)
+    }
+
+    /// Whether no protection is active, whatever the bits that mean nothing are.
     pub const fn is_empty(self) -> bool {
-        self.0 == 0
+        self.active().0 == 0
     }
 
     /// Whether every bit of `other` is set.
@@ -162,21 +169,17 @@ byte!(Errors);
 impl fmt::Display for Errors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_empty() {
-            return f.write_str("no error");
+            f.write_str("no error")?;
         }
-        let mut unnamed = self.0;
         let mut separator = "";
-        for (bit, name) in Self::NAMES {
-            if self.contains(*bit) {
-                write!(f, "{separator}{name}")?;
-                separator = ", ";
-                unnamed &= !bit.0;
-            }
+        for (_, name) in Self::NAMES.iter().filter(|(bit, _)| self.contains(*bit)) {
+            write!(f, "{separator}{name}")?;
+            separator = ", ";
         }
-        if unnamed == 0 {
-            return Ok(());
+        match self.0 & !Self::VALID {
+            0 => Ok(()),
+            invalid => write!(f, " (bits {invalid:#04x} mean nothing)"),
         }
-        write!(f, "{separator}unnamed error bits {unnamed:#04x}")
     }
 }
 
@@ -194,13 +197,19 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn unnamed_error_bits_are_kept_and_shown() {
+    fn invalid_error_bits_are_shown_and_mean_nothing() {
         assert_eq!(Errors::NONE.to_string(), "no error");
+        for bits in 0..=u8::MAX {
+            let errors = Errors(bits);
+            assert_eq!(errors.is_empty(), bits & 0x09 == 0, "{bits:#04x}");
+            assert_eq!(errors.to_string().starts_with("no error"), errors.is_empty());
+        }
+        assert_eq!(Errors(0xF6).to_string(), "no error (bits 0xf6 mean nothing)");
         assert_eq!(Errors::LOW_VOLTAGE.to_string(), "low voltage protection");
         let errors = Status1::decode(&[0x9A, 0, 0, 0, 0, 0, 0, 0x89]).errors;
         assert_eq!(
             errors.to_string(),
-            "low voltage protection, over temperature protection, unnamed error bits 0x80"
+            "low voltage protection, over temperature protection (bits 0x80 mean nothing)"
         );
     }
 
