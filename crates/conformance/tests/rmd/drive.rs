@@ -123,10 +123,13 @@ impl World for Around {
 
     fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
         let mut bus = self.bus.borrow_mut();
-        let faults = if present { Errors::LOW_VOLTAGE } else { Errors::NONE };
         let motors = &mut bus.station.motors;
         for id in motors.ids() {
-            motors.bus.node_mut(id).expect("it is there").motor_mut().hold_faults(faults);
+            let motor = motors.bus.node_mut(id).expect("it is there").motor_mut();
+            match present {
+                true => motor.hold_faults(Errors::LOW_VOLTAGE),
+                false => motor.release_faults(Errors::LOW_VOLTAGE),
+            }
         }
         Ok(())
     }

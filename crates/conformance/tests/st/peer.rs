@@ -164,10 +164,12 @@ impl World for Hands {
     fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
         let station = &mut self.0.borrow_mut().station.station;
         let motors = station.drive().last().number();
-        let faults = if present { Flags::OVER_TEMP } else { 0 };
         for motor in (1..=motors).filter_map(Motor::new) {
             let motor = station.drive_mut().motor_mut(motor).expect("a motor of the drive");
-            motor.hold_faults(faults);
+            match present {
+                true => motor.hold_faults(Flags::OVER_TEMP),
+                false => motor.release_faults(Flags::OVER_TEMP),
+            }
         }
         Ok(())
     }

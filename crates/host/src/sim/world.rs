@@ -35,7 +35,7 @@ pub(super) fn st(station: &mut Station, now: Instant, command: &Command) -> Resu
             match hold {
                 None => motor.inject(bit),
                 Some(true) => motor.hold_faults(bit),
-                Some(false) => motor.hold_faults(0),
+                Some(false) => motor.release_faults(bit),
             }
         }
         Command::State { .. } | Command::Pause {} | Command::Resume {} => {}
@@ -67,7 +67,7 @@ pub(super) fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), 
             match hold {
                 None => motor.inject(errors),
                 Some(true) => motor.hold_faults(errors),
-                Some(false) => motor.hold_faults(Errors::NONE),
+                Some(false) => motor.release_faults(errors),
             }
         }
         Command::State { .. } | Command::Pause {} | Command::Resume {} => {}

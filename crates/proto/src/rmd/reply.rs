@@ -147,6 +147,11 @@ impl Errors {
         Errors(self.0 | other.0)
     }
 
+    /// The bits that `other` does not have.
+    pub const fn without(self, other: Self) -> Self {
+        Errors(self.0 & !other.0)
+    }
+
     /// The bits that both have.
     pub const fn intersection(self, other: Self) -> Self {
         Errors(self.0 & other.0)

@@ -123,9 +123,14 @@ impl RmdMotor {
         self.injected = self.injected.union(faults);
     }
 
-    /// Sets which faults are kept present from outside.
+    /// Keeps these faults present from outside, beside those that are kept already.
     pub const fn hold_faults(&mut self, faults: Errors) {
-        self.held = faults;
+        self.held = self.held.union(faults);
+    }
+
+    /// Ends that for these faults.
+    pub const fn release_faults(&mut self, faults: Errors) {
+        self.held = self.held.without(faults);
     }
 
     /// What is really going on.

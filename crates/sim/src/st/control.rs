@@ -154,8 +154,12 @@ impl Control {
         self.stop_ramp();
     }
 
-    pub(super) fn mode(&self) -> ControlMode {
-        self.mode
+    /// The mode that was asked for last, by whatever command.
+    pub(super) fn requested_mode(&self) -> ControlMode {
+        match self.task {
+            Task::Torque => ControlMode::Torque,
+            Task::Speed | Task::Position => ControlMode::Speed,
+        }
     }
 
     pub(super) fn stop_ramp(&mut self) {

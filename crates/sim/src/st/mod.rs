@@ -48,7 +48,7 @@
 //!   32768) / 1024` and `FF_VD = -n FF_1D Iq / 32768 / 1024` at the nominal bus voltage, which is the
 //!   voltage of the configured source; more or less where the bus is lower or higher.
 //! * PFC_STATUS is a [`PfcState`]; PFC_FAULTS is laid out as FLAGS with [`pfc_fault`] bits.
-//!   PFC_ACBUS_RMS is the effective value of the mains, as its name says.
+//!   PFC_ACBUS_RMS is the peak of the mains, as the document's words have it.
 //! * MOTOR_POWER is the mean electrical power into the motor over about 20 ms.
 
 mod config;

@@ -32,7 +32,7 @@ impl StMotor {
         match register {
             R::FLAGS => self.flags().0 as i32,
             R::STATUS => u8::from(firmware.status).into(),
-            R::CONTROL_MODE => u8::from(firmware.control.mode()).into(),
+            R::CONTROL_MODE => u8::from(firmware.control.requested_mode()).into(),
             R::SPEED_REF => whole(firmware.control.speed_reference()),
             R::SPEED_MEAS => whole(self.speed_rpm()),
             R::RAMP_FINAL_SPEED => firmware.control.ramp().speed_rpm,
@@ -51,7 +51,7 @@ impl StMotor {
             R::PFC_FAULTS => firmware.pfc.faults().0 as i32,
             R::PFC_DCBUS_MEAS => whole(self.plant.bus_voltage()),
             R::PFC_ACBUS_FREQ => MAINS_FREQUENCY,
-            R::PFC_ACBUS_RMS => whole(pfc::effective(self.plant.supply().voltage)),
+            R::PFC_ACBUS_RMS => whole(self.plant.supply().voltage),
             R::PFC_ENABLED => firmware.pfc.enabled().into(),
             R::CURRENT_POSITION => angle::radians(self.position_from_zero()).bits(),
             R::TARGET_POSITION => firmware.control.path().map_or(0.0, |path| path.target()).bits(),

@@ -62,9 +62,14 @@ impl StMotor {
         self.firmware.events |= faults;
     }
 
-    /// Sets which faults are kept present from outside.
+    /// Keeps these faults present from outside, beside those that are kept already.
     pub const fn hold_faults(&mut self, faults: u16) {
-        self.held = faults;
+        self.held |= faults;
+    }
+
+    /// Ends that for these faults.
+    pub const fn release_faults(&mut self, faults: u16) {
+        self.held &= !faults;
     }
 
     /// What is really going on.

@@ -102,9 +102,13 @@ fn injected_faults_happen_once_or_last() {
     assert_eq!(bench.ask(ReadStatus1).errors, Errors::OVER_TEMPERATURE);
     assert_eq!(bench.ask(ClearErrors).errors, Errors::NONE);
     bench.world().hold_faults(Errors::LOW_VOLTAGE);
+    bench.world().hold_faults(Errors::OVER_TEMPERATURE);
     bench.wait(1);
+    let both = Errors::LOW_VOLTAGE.union(Errors::OVER_TEMPERATURE);
+    assert_eq!(bench.ask(ClearErrors).errors, both);
+    bench.world().release_faults(Errors::OVER_TEMPERATURE);
     assert_eq!(bench.ask(ClearErrors).errors, Errors::LOW_VOLTAGE);
-    bench.world().hold_faults(Errors::NONE);
+    bench.world().release_faults(Errors::LOW_VOLTAGE);
     assert_eq!(bench.ask(ClearErrors).errors, Errors::NONE);
 }
 

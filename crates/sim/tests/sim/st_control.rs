@@ -1,8 +1,8 @@
 //! References, ramps and regulators.
 
 use motorlink_proto::stmcp::{
-    Command, ControlMode, CurrentReference, Flags, PositionMove, Request, RevupPhase, Status,
-    TorqueRamp, register::*,
+    Command, ControlMode, CurrentReference, Flags, PositionMove, Profile, Request, RevupPhase,
+    Status, TorqueRamp, register::*,
 };
 
 use crate::st_bench::Line;
@@ -65,10 +65,10 @@ fn current_references_given_before_run_wait_for_it() {
     line.brake(0.3);
     line.set_revup_current(3.0);
     currents(&mut line, ONE_AMPERE, -500);
-    assert_eq!(mode(&mut line), ControlMode::Speed, "nothing happens before RUN");
+    assert_eq!(mode(&mut line), ControlMode::Torque, "what was asked for last");
+    assert_eq!(line.get(TORQUE_MEAS), 0, "nothing happens before RUN");
     line.run();
     line.wait(5);
-    assert_eq!(mode(&mut line), ControlMode::Torque);
     assert_current!(line, TORQUE_MEAS, ONE_AMPERE);
     assert_current!(line, FLUX_MEAS, -500);
 }
@@ -85,6 +85,23 @@ fn a_ramp_in_torque_mode_goes_on_from_the_present_speed() {
     assert!((line.get(SPEED_REF) as f32 - speed).abs() < 20.0);
     line.wait(2000);
     assert!((line.truth().speed_rpm - 3000.0).abs() < 5.0);
+}
+
+#[test]
+fn control_mode_reads_the_mode_that_was_asked_for_last() {
+    for profile in Profile::ALL {
+        let mut line = Line::demo(profile);
+        // At rest, where nothing of it is applied yet.
+        assert_eq!(mode(&mut line), ControlMode::Speed);
+        currents(&mut line, ONE_AMPERE, 0);
+        assert_eq!(mode(&mut line), ControlMode::Torque);
+        line.ramp(1500, 0);
+        assert_eq!(mode(&mut line), ControlMode::Speed);
+        line.set(CONTROL_MODE, 0);
+        assert_eq!(mode(&mut line), ControlMode::Torque);
+        line.set(CONTROL_MODE, 1);
+        assert_eq!(mode(&mut line), ControlMode::Speed);
+    }
 }
 
 #[test]

@@ -75,10 +75,14 @@ fn injected_faults_happen_once_or_last() {
     assert_eq!(line.flags(), Flags::new(Flags::BREAK_IN | Flags::SW_ERROR, 0));
 
     line.world().hold_faults(Flags::FOC_DURATION);
+    line.world().hold_faults(Flags::OVER_TEMP);
     line.wait(100);
     assert_eq!(line.status(), Status::FaultNow);
+    assert_eq!(line.flags().present(), Flags::FOC_DURATION | Flags::OVER_TEMP);
+    line.world().release_faults(Flags::OVER_TEMP);
+    line.wait(1);
     assert_eq!(line.flags().present(), Flags::FOC_DURATION);
-    line.world().hold_faults(0);
+    line.world().release_faults(Flags::FOC_DURATION);
     line.wait(1);
     line.execute(Command::FaultAck);
     assert_eq!(line.flags(), Flags::default());
@@ -134,7 +138,7 @@ fn the_pfc_raises_the_bus_voltage() {
     line.set(PFC_STARTUP_DURATION, 100);
     line.set(PFC_DCBUS_REF, 385);
     assert_eq!((line.get(PFC_ENABLED), line.get(BUS_VOLTAGE)), (0, 325));
-    assert_eq!((line.get(PFC_ACBUS_FREQ), line.get(PFC_ACBUS_RMS)), (500, 230));
+    assert_eq!((line.get(PFC_ACBUS_FREQ), line.get(PFC_ACBUS_RMS)), (500, 325));
     line.execute(Command::PfcEnable);
     line.wait(50);
     assert_eq!(line.get(PFC_STATUS), PfcState::StartUp as i8);

@@ -86,7 +86,7 @@ fn stubborn() -> Behaviour {
 fn overcoming() -> Behaviour {
     commands(|motors, data| {
         if code(data) == Code::Speed {
-            motors.first_mut().motor_mut().hold_faults(Errors::NONE);
+            motors.first_mut().motor_mut().release_faults(Errors::LOW_VOLTAGE);
             motors.ask(Command::encode(&ClearErrors));
         }
         None
