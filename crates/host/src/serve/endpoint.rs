@@ -16,7 +16,7 @@ use super::{ByteStation, CanStation};
 use crate::port::keep_alive;
 use crate::slcan::Device;
 
-/// Bytes that are taken from a client at once.
+/// Bytes that are taken at once from the clients of a CAN bus together, or from the one of a line.
 const CHUNK: usize = 4096;
 
 /// How long the door stays shut when a newcomer cannot be let in for want of descriptors.
@@ -38,7 +38,7 @@ pub(super) enum Station {
 
 /// Room that all endpoints use in turn.
 pub(super) struct Scratch {
-    chunk: [u8; CHUNK],
+    chunk: [u8; HELD + CHUNK],
     frames: Vec<CanFrame>,
     /// Bytes that clients did not read in time.
     pub(super) dropped: u64,
@@ -46,7 +46,7 @@ pub(super) struct Scratch {
 
 impl Default for Scratch {
     fn default() -> Self {
-        Scratch { chunk: [0; CHUNK], frames: Vec::new(), dropped: 0 }
+        Scratch { chunk: [0; HELD + CHUNK], frames: Vec::new(), dropped: 0 }
     }
 }
 
@@ -162,8 +162,10 @@ impl Endpoint {
     }
 
     fn receive(&mut self, now: Instant, index: usize, scratch: &mut Scratch) {
+        // Each frame goes to all others: what is taken in a turn must not grow with their number.
+        let most = (CHUNK / self.clients.len()).max(1);
         let client = &mut self.clients[index];
-        let len = match read(&client.line, &mut scratch.chunk[HELD..]) {
+        let len = match read(&client.line, &mut scratch.chunk[HELD..][..most]) {
             Ok(len) if len > 0 => len,
             Err(Errno::AGAIN | Errno::INTR) => return,
             Ok(_) | Err(_) => {

@@ -37,6 +37,9 @@ use node::Node;
 use pty::Pty;
 use unix::UnixDoor;
 
+/// The clients that a served CAN bus has at a time; one more is closed at once.
+pub const MOST_CLIENTS: usize = 64;
+
 /// What answers at the far end of a served serial line.
 pub trait ByteStation {
     /// Takes received bytes; what is to be sent back is appended to `reply`.
@@ -74,9 +77,9 @@ pub trait CanStation {
     /// When [`poll`](Self::poll) is to be called next, if at all.
     fn deadline(&self) -> Option<Instant>;
 
-    /// As [`ByteStation::came`]. Unless the station says otherwise everybody is welcome.
-    fn came(&mut self, _now: Instant, _others: usize) -> bool {
-        true
+    /// As [`ByteStation::came`]. Unless the station says otherwise, [`MOST_CLIENTS`] are welcome.
+    fn came(&mut self, _now: Instant, others: usize) -> bool {
+        others < MOST_CLIENTS
     }
 
     /// As [`ByteStation::left`].

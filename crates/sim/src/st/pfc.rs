@@ -78,7 +78,7 @@ pub(super) fn gains(plant: &PlantConfig, scale: &Scale) -> PfcGains {
 }
 
 /// Effective value of mains with this peak, V.
-pub(super) fn effective(peak: f32) -> f32 {
+fn effective(peak: f32) -> f32 {
     peak * FRAC_1_SQRT_2
 }
 

@@ -8,7 +8,6 @@ use motorlink_proto::stmcp::{
 use super::StMotor;
 use super::motor::Frame;
 use super::observer::Observer;
-use super::pfc;
 use super::scale::{FULL, SPEED, s16};
 use crate::angle;
 
