@@ -130,7 +130,9 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
         Error::Timeout { port, id, .. } | Error::Quarantined { port, id } => {
             (Kind::Timeout, facts(port, id))
         }
-        Error::Foreign { port, id, .. } => (Kind::LineLost, facts(port, id)),
+        Error::Foreign { port, id, .. } | Error::Altered { port, id, .. } => {
+            (Kind::LineLost, facts(port, id))
+        }
         Error::Twice(id) | Error::OutOfReach(id) | Error::Limit { id, .. } => {
             (Kind::BadValue, Facts { motor: Some(id.number()), ..Facts::default() })
         }

@@ -531,6 +531,11 @@ enum motorlink_error
    * No reply of this protocol, but one of RMD V3 or V4, or LK-Tech V2.36 (RMD).
    */
   MOTORLINK_ERROR_FOREIGN = 42,
+  /**
+   * The reply has another content than the request that it has to repeat. It is not known what the
+   * motor did (RMD).
+   */
+  MOTORLINK_ERROR_ALTERED = 43,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

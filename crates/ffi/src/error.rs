@@ -55,6 +55,9 @@ pub enum motorlink_error {
     Limit = 41,
     /// No reply of this protocol, but one of RMD V3 or V4, or LK-Tech V2.36 (RMD).
     Foreign = 42,
+    /// The reply has another content than the request that it has to repeat. It is not known what the
+    /// motor did (RMD).
+    Altered = 43,
 }
 
 /// Success, as all functions give it.
@@ -86,10 +89,11 @@ impl motorlink_error {
             Self::Quarantined => c"the motor did not answer before: ask again",
             Self::Limit => c"beyond a limit of this motor",
             Self::Foreign => c"the motor answers in another protocol",
+            Self::Altered => c"the reply does not repeat the request",
         }
     }
 
-    const ALL: [Self; 23] = [
+    const ALL: [Self; 24] = [
         Self::Ok,
         Self::NullPointer,
         Self::Misaligned,
@@ -113,6 +117,7 @@ impl motorlink_error {
         Self::Quarantined,
         Self::Limit,
         Self::Foreign,
+        Self::Altered,
     ];
 }
 

@@ -28,6 +28,28 @@ fn a_cycle_over_many_motors_takes_as_long_as_one_exchange() {
     assert_eq!(*pair.host.counters(), Counters::default());
 }
 
+/// 0x31, 0x32, 0x34, 0x80, 0x81 and 0x88 are answered with the request (3).
+#[test]
+fn an_echo_with_another_content_promises_nothing() {
+    for row in COMMANDS.iter().filter(|row| row.code != Code::ClearErrors) {
+        for byte in 1..8 {
+            let (mut host, id) = (Host::new(), motor(1));
+            let request = [row.code.into(), 1, 2, 3, 4, 5, 6, 7];
+            host.request(Instant(0), id, request).unwrap();
+            assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
+            let mut reply = request;
+            reply[byte] ^= 0x10;
+            host.receive(Instant(500), &CanFrame::new(id.can_id(), reply));
+            let result = if row.echo { Err(Error::Altered) } else { Ok(reply) };
+            assert_eq!(host.poll(Instant(500)), Output::Done { id, result }, "{}", row.paragraph);
+            // The motor's own reply may come yet.
+            let next = host.request(Instant(600), id, ReadStatus2.encode());
+            let is_left_alone = matches!(next, Err(Refused::Quarantined { .. }));
+            assert_eq!(is_left_alone, row.echo, "{}", row.paragraph);
+        }
+    }
+}
+
 #[test]
 fn four_torques_in_one_frame_reach_their_motors_and_all_answer() {
     let mut pair = Pair::new(&[1, 2, 3, 4, 5]);

@@ -235,6 +235,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_poll(
                 match result {
                     Ok(bytes) => action.reply = motorlink_rmd_data { bytes },
                     Err(Error::Foreign(_)) => action.result = motorlink_error::Foreign,
+                    Err(Error::Altered) => action.result = motorlink_error::Altered,
                     Err(Error::Quarantined) => action.result = motorlink_error::Quarantined,
                     Err(_) => action.result = motorlink_error::Timeout,
                 }

@@ -39,6 +39,22 @@ pub enum Error {
         /// What it speaks.
         dialect: Dialect,
     },
+    /// The reply is not the request bit for bit, which it is in this protocol; it is not known what
+    /// the motor did.
+    #[error(
+        "{port}: motor {id} answered {:#04x} ({code}) with another content than it was sent, and has to \
+         repeat it; it is not known what it did. Is another host on the bus, or an old reply in the \
+         adapter? ask again",
+        u8::from(*code)
+    )]
+    Altered {
+        /// The port.
+        port: Arc<str>,
+        /// The motor.
+        id: MotorId,
+        /// What was asked for.
+        code: Code,
+    },
     /// The motor may still answer an exchange that timed out; nothing was sent.
     #[error("{port}: motor {id} may still answer an earlier request; nothing was sent")]
     Quarantined {
@@ -80,7 +96,10 @@ impl Error {
     pub fn is_line_failure(&self) -> bool {
         match self {
             Error::Port(error) => !error.is_interruption(),
-            Error::Timeout { .. } | Error::Foreign { .. } | Error::Quarantined { .. } => true,
+            Error::Timeout { .. }
+            | Error::Foreign { .. }
+            | Error::Altered { .. }
+            | Error::Quarantined { .. } => true,
             _ => false,
         }
     }

@@ -228,10 +228,12 @@ impl Session {
     fn failed(&self, id: MotorId, error: proto::Error) -> Error {
         let port = Arc::clone(&self.port);
         let [code, ..] = self.asked[place(id)].request;
+        let code = Code::from(code);
         match error {
+            proto::Error::Altered => Error::Altered { port, id, code },
             proto::Error::Foreign(dialect) => Error::Foreign { port, id, dialect },
             proto::Error::Quarantined => Error::Quarantined { port, id },
-            _ => Error::Timeout { port, id, code: Code::from(code) },
+            _ => Error::Timeout { port, id, code },
         }
     }
 }

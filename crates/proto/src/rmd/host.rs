@@ -15,11 +15,11 @@
 //! request carried out makes it again on [`Error::Quarantined`], and at the time that
 //! [`Refused::Quarantined`] tells.
 //!
-//! Some requests and their replies are the same bit for bit (0x31, 0x32, 0x34, 0x80, 0x81, 0x88). An
-//! adapter that echoes what it sends therefore looks like a motor that answers, which only the
+//! Some requests and their replies are the same bit for bit (0x31, 0x32, 0x34, 0x80, 0x81, 0x88). A
+//! reply with another content is [`Error::Altered`], and the motor is in quarantine. An adapter that echoes what it sends therefore looks like a motor that answers, which only the
 //! port can know: it has to drop its own frames.
 
-use super::command::Command;
+use super::command::{Code, Command};
 use super::doubt::{Admitted, Doubt, answers};
 use super::frame::CanFrame;
 use super::limits::Limits;
@@ -41,8 +41,8 @@ struct Slot {
     data: [u8; 8],
     timeout: Duration,
     deadline: Instant,
-    /// A foreign reply to this request.
-    foreign: Option<Dialect>,
+    /// What came instead of the reply to this request: nothing, so far.
+    instead: Error,
     doubt: Doubt,
     limits: Limits,
 }
@@ -76,7 +76,7 @@ impl Host {
             data: [0; 8],
             timeout: DEFAULT_TIMEOUT,
             deadline: NEVER,
-            foreign: None,
+            instead: Error::Timeout,
             doubt: Doubt::NONE,
             limits: Limits { current: None, speed: None, angle: None },
         };
@@ -212,8 +212,8 @@ impl Host {
             return Output::Done { id, result };
         }
         if let Some(id) = self.failed.next() {
-            let error = self.slot(id).foreign.map_or(Error::Timeout, Error::Foreign);
-            return Output::Done { id, result: Err(error) };
+            let instead = self.slot(id).instead;
+            return Output::Done { id, result: Err(instead) };
         }
         Output::Wait((!self.in_flight.is_empty()).then_some(self.earliest))
     }
@@ -293,9 +293,16 @@ impl Host {
     fn reply(&mut self, now: Instant, id: MotorId, data: &[u8; 8]) {
         let slot = &mut self.slots[id.index()];
         if self.in_flight.contains(id) && answers(slot.data[0], data[0]) {
+            self.in_flight.remove(id);
+            let is_echo = Code::from(data[0]).info().is_some_and(|row| row.echo);
+            if is_echo && slot.data != *data {
+                slot.instead = Error::Altered;
+                self.failed.insert(id);
+                self.owes(now, id);
+                return;
+            }
             slot.data = *data;
             slot.doubt.answered(now);
-            self.in_flight.remove(id);
             self.replied.insert(id);
             return;
         }
@@ -312,7 +319,7 @@ impl Host {
         let asked = self.in_flight.contains(id);
         let slot = self.slot(id);
         if asked && slot.data[0] == data[0] {
-            slot.foreign = Some(dialect);
+            slot.instead = Error::Foreign(dialect);
         }
     }
 
@@ -334,7 +341,7 @@ impl Host {
         let slot = self.slot(id);
         slot.data = data;
         slot.timeout = timeout;
-        slot.foreign = None;
+        slot.instead = Error::Timeout;
         self.questioned.remove(id);
     }
 

@@ -30,6 +30,9 @@ pub enum Error {
     Timeout,
     /// No reply of this protocol, and a reply to the same command in another one.
     Foreign(Dialect),
+    /// The reply is not the request bit for bit, which the document says it is. What the motor did is
+    /// not known.
+    Altered,
     /// Nothing was done: the motor was asked for its status instead, because it had not answered
     /// before, and it answered. Ask again; it is trusted when it was silent for the guard time.
     Quarantined,
@@ -82,6 +85,10 @@ impl fmt::Display for Error {
             Error::Foreign(dialect) => {
                 write!(f, "the motor answers in {dialect}, not V1.62; use a host of that protocol")
             }
+            Error::Altered => f.write_str(
+                "the reply has another content than the request that it repeats; it is not known what \
+                 the motor did",
+            ),
             Error::Quarantined => f.write_str(
                 "the motor did not answer before and does now; nothing was sent, ask again",
             ),
