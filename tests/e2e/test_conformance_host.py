@@ -60,11 +60,12 @@ def test_our_client_reads_on_when_the_line_is_back(check, motorlink, only):
 def test_our_bus_passes_every_scenario_for_one_motor(check, motorlink):
     angle = "rmd --timeout 400 angle --every 5ms --count 4"
     echo = f"{motorlink} {angle} -p $MOTORLINK_PORT?echo=1"
-    told = ["--timeout", "400ms", "--field", 2, "--echo", echo]
+    off = f"{motorlink} rmd --timeout 400 off"
+    told = ["--timeout", "400ms", "--field", 2, "--echo", echo, "--off", off]
     code, cases = check("rmd", *told, "--", motorlink, *angle.split())
     assert failed(cases) == {}
     assert code == 0
-    assert sum(case["verdict"] == "passed" for case in cases.values()) == 17
+    assert sum(case["verdict"] == "passed" for case in cases.values()) == 20
 
 
 # Hosts as people write them. The naive ones give up sooner than the drive is told, so that on a busy

@@ -132,6 +132,10 @@ fn ask_bus(path: &str, task: Task) -> Said {
         Ok(digits) => said.values.push(Reading { motor: motor.number(), value: digits as f64 }),
         Err(_) => said.complained = true,
     };
+    if task == Task::Off {
+        let complained = motor.off().is_err();
+        return Said { complained, ..Said::default() };
+    }
     for _ in 0..READINGS {
         match task {
             Task::Read | Task::Echoed => note(motor.id(), motor.multi_turn_angle().map(|a| a.0)),
@@ -154,7 +158,7 @@ fn ask_bus(path: &str, task: Task) -> Said {
                 }
                 Err(error) => note(motor.id(), Err(error)),
             },
-            Task::Start => unreachable!("RMD motors are not started"),
+            Task::Start | Task::Off => unreachable!("no readings"),
         }
     }
     said

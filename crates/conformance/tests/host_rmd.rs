@@ -11,7 +11,7 @@ use motorlink_conformance::wire::{Bus, Virtual};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::rmd::{
     CanFrame, Circle, ClearErrors, Code, Command, DEFAULT_TIMEOUT, Dialect, Error, Host,
-    MOTOR_BASE, MotionStatus, MotorId, MotorSet, MultiTurn, Output, Payload, ReadCircleAngle,
+    MOTOR_BASE, MotionStatus, MotorId, MotorSet, MultiTurn, Off, Output, Payload, ReadCircleAngle,
     ReadMultiTurnAngle, Refused, Status1, TORQUE4_ID, Torque4,
 };
 use motorlink_proto::time::{Duration, Instant};
@@ -53,12 +53,17 @@ fn requests(task: Task, turn: usize) -> Vec<(MotorId, [u8; 8])> {
         Task::Read | Task::Echoed | Task::Alternate => first.map(|id| (id, angle)).collect(),
         Task::Clear => first.map(|id| (id, ClearErrors.encode())).collect(),
         Task::Cycle => MotorSet::TORQUE4.map(|id| (id, angle)).collect(),
+        Task::Off => first.map(|id| (id, Off.encode())).collect(),
         Task::Torque4 | Task::Start => Vec::new(),
     }
 }
 
 fn turns(task: Task) -> usize {
-    if task == Task::Alternate { 2 * READINGS } else { READINGS }
+    match task {
+        Task::Alternate => 2 * READINGS,
+        Task::Off => 1,
+        _ => READINGS,
+    }
 }
 
 /// What a request to a motor, in the turn of this number, ended in.
@@ -143,6 +148,7 @@ fn ours(bus: &mut dyn Bus, task: Task) -> Result<Said, PortError> {
         values: results
             .iter()
             .filter_map(|(id, _, result)| Some(reading(*id, result.ok()?)))
+            .take(task.values())
             .collect(),
         complained: results.iter().any(|(.., result)| result.is_err()),
         ended_badly: None,
@@ -171,6 +177,8 @@ const ENDS: &[(&str, &[Failed])] = &[
     ("an_extended_frame_is_no_reply", TIMEOUT),
     ("a_motor_of_v3_is_not_understood", &[(1, 1, Error::Foreign(Dialect::V3))]),
     ("a_motor_of_lk_tech_is_not_understood", &[(1, 1, Error::Foreign(Dialect::LkTech))]),
+    ("an_off_with_another_content_is_no_acknowledge", &[(1, 0, Error::Altered)]),
+    ("an_off_without_an_answer_is_an_error", &[(1, 0, Error::Timeout)]),
     ("errors_cleared_are_not_answered_with_anything_else", TIMEOUT),
     ("a_silent_motor_does_not_cost_the_others_their_replies[a cycle]", SECOND),
     ("a_silent_motor_does_not_cost_the_others_their_replies[0x280]", SECOND),
@@ -185,7 +193,7 @@ fn our_host_loses_the_disturbed_reading_only_and_says_how() {
     for scenario in scenarios() {
         let mut bus = Finite::new(Virtual::new(scenario.motors(DEFAULT_TIMEOUT)));
         let results = results(&mut bus, scenario.task).unwrap();
-        assert_eq!(results.len(), scenario.task.values(), "{}", scenario.name);
+        assert_eq!(results.len(), scenario.task.values().max(1), "{}", scenario.name);
         let failed = results
             .iter()
             .filter_map(|(id, turn, result)| result.err().map(|error| (id.number(), *turn, error)));
@@ -219,6 +227,8 @@ enum Fault {
     SaysTheLastValueAgain,
     SaysNothingOfErrors,
     SendsTwoAtOnce,
+    TakesAnyEcho,
+    TakesRepliesForEchoes,
 }
 
 /// A host as people write it: requests out, replies in. Without a fault it ends at the first error.
@@ -304,6 +314,11 @@ impl Simple<'_> {
                 let (id, request) = requests.remove(place);
                 let mut reply = [0; 8];
                 reply[..frame.data().len()].copy_from_slice(frame.data());
+                if self.task == Task::Off {
+                    let repeats = reply == request && !self.has(Fault::TakesRepliesForEchoes);
+                    let is_off = repeats || self.has(Fault::TakesAnyEcho);
+                    return Ok(is_off);
+                }
                 self.said.values.push(reading(id, digits(request[0].into(), &reply)));
             }
         }
@@ -377,6 +392,9 @@ const CAUGHT: &[(Fault, &str)] = &[
     (Fault::SaysTheLastValueAgain, "silence_is_an_error"),
     (Fault::SaysNothingOfErrors, "silence_is_an_error"),
     (Fault::SendsTwoAtOnce, "every_reading_has_its_own_value"),
+    (Fault::TakesAnyEcho, "an_off_with_another_content_is_no_acknowledge"),
+    (Fault::SaysNothingOfErrors, "an_off_without_an_answer_is_an_error"),
+    (Fault::TakesRepliesForEchoes, "an_off_that_is_repeated_is_acknowledged"),
 ];
 
 #[test]

@@ -134,6 +134,9 @@ pub struct Host {
     /// A shell command that starts motor 1 of an ST drive once
     #[arg(long, value_name = "COMMAND")]
     pub start: Option<String>,
+    /// A shell command that switches RMD motor 1 off once
+    #[arg(long, value_name = "COMMAND")]
+    pub off: Option<String>,
     /// A shell command that reads as COMMAND does, from an RMD adapter that echoes what it is sent
     #[arg(long, value_name = "COMMAND")]
     pub echo: Option<String>,

@@ -28,8 +28,8 @@ may go on or end.
 {port} in its arguments becomes the port as motorlink names it, {path} the device or HOST:PORT; \
 MOTORLINK_PORT and MOTORLINK_PATH are the same. Each reading has a value of its own, so what your \
 program prints tells which reply it took for which request.
-With --start, --echo and --cycle other commands are run as well. That of --start ends with 0 only \
-when the drive acknowledged it.
+With --start, --off, --echo and --cycle other commands are run as well. Those of --start and --off \
+end with 0 only when the drive acknowledged it.
   motorlink conformance host st --serve pty:./st0 -- python3 my_host.py {path}
 docs/HOST-CONFORMANCE.md has an example in Python and what each scenario expects.";
 
@@ -143,6 +143,7 @@ fn program(args: &Host, task: Task) -> Result<Vec<String>, &'static str> {
     let (command, why) = match task {
         Task::Read => return Ok(args.command.clone()),
         Task::Start => (&args.start, "starts a motor: give a command with --start"),
+        Task::Off => (&args.off, "switches a motor off: give a command with --off"),
         Task::Cycle => (&args.cycle, "asks four motors: give a command with --cycle"),
         Task::Echoed => (&args.echo, "needs a host that drops echoes: give a command with --echo"),
         Task::Alternate | Task::Clear | Task::Torque4 => {
@@ -264,7 +265,7 @@ fn understand(args: &Host, task: Task, ended: Option<ExitStatus>, out: &str, err
         }
     };
     let failed = ended.is_some_and(|status| !status.success());
-    if task == Task::Start {
+    if task.values() == 0 {
         return Said { values: Vec::new(), complained: failed, ended_badly };
     }
     let lines = || out.lines().filter(|line| !line.trim().is_empty());

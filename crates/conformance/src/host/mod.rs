@@ -32,8 +32,10 @@ pub enum Task {
     Read,
     /// The same behind an adapter that sends back what it is sent, which the host was told.
     Echoed,
-    /// Start motor 1 once.
+    /// Start motor 1 once (ST).
     Start,
+    /// Switch motor 1 off once (RMD).
+    Off,
     /// Read multi-turn and single-turn angle of motor 1 in turn.
     Alternate,
     /// Clear the errors of motor 1 and read the supply voltage from the reply.
@@ -48,7 +50,7 @@ impl Task {
     /// How many values the host says when all goes well.
     pub const fn values(self) -> usize {
         match self {
-            Task::Start => 0,
+            Task::Start | Task::Off => 0,
             Task::Read | Task::Echoed | Task::Clear => READINGS,
             Task::Alternate => 2 * READINGS,
             Task::Cycle | Task::Torque4 => 4 * READINGS,

@@ -16,6 +16,8 @@ const EIGHT_BYTES: &str = "RMD-1-05";
 const ANSWER: &str = "RMD-92-02";
 const CLEAR: &str = "RMD-9B-03";
 const FOUR: &str = "RMD-280-05";
+/// The reply to 0x80 is the request.
+const OFF: &str = "RMD-80-04";
 
 /// An angle, in digits, that no motor has: what unasked frames tell.
 const UNASKED: u16 = 7_001;
@@ -173,6 +175,28 @@ fn reading() -> Vec<Scenario> {
             Demand::Everything,
             |turn| vec![Send::stray(turn.request), right(turn)],
         ),
+        off(
+            "an_off_that_is_repeated_is_acknowledged",
+            "sends 0x80 and says that the motor is off",
+            Demand::Everything,
+            |turn| vec![right(turn)],
+        ),
+        off(
+            "an_off_with_another_content_is_no_acknowledge",
+            "says that the motor may not be off: the reply has to repeat the request",
+            Demand::Error,
+            |turn| {
+                let mut reply = turn.reply;
+                reply[7] ^= 0x01;
+                vec![Send::stray(frame(turn.id.can_id(), reply))]
+            },
+        ),
+        off(
+            "an_off_without_an_answer_is_an_error",
+            "says that the motor may not be off",
+            Demand::Error,
+            |_| Vec::new(),
+        ),
         clear(
             "errors_cleared_are_answered_with_0x9a",
             "takes the reply, which has 0x9A in DATA[0] as the document prints it",
@@ -279,6 +303,19 @@ fn read(
         if is_meant { trick(turn) } else { vec![right(turn)] }
     };
     scenario(name, clauses, expected, Task::Read, demand, script)
+}
+
+/// A scenario in which every 0x80 is disturbed.
+fn off(
+    name: &'static str,
+    expected: &'static str,
+    demand: Demand,
+    trick: impl Fn(&Turn) -> Sends + 'static,
+) -> Scenario {
+    let script = move |turn: &Turn| {
+        if turn.code == Code::Off { trick(turn) } else { vec![right(turn)] }
+    };
+    scenario(name, &[OFF], expected, Task::Off, demand, script)
 }
 
 fn clear(
