@@ -17,8 +17,10 @@ pub mod serve;
 pub mod sim;
 pub mod stmcp;
 mod text;
+mod turn;
 
 pub use clock::Clock;
 pub use line::{BackOff, LinkState, Opener};
 pub use motorlink_proto::time;
 pub use motorlink_slcan as slcan;
+pub use turn::LOOK;

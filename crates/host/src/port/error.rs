@@ -228,6 +228,15 @@ pub enum PortError {
         /// The port.
         port: String,
     },
+    /// The thread that waited for an exchange used the port from within, as a signal's handler does.
+    #[error(
+        "`{port}`: an exchange was given up for another one of the same thread, such as a signal \
+         handler's; nobody knows what the drive did"
+    )]
+    Overtaken {
+        /// The port.
+        port: String,
+    },
     /// Anything else that the system says.
     #[error("`{port}` failed: {source}")]
     Io {
@@ -242,7 +251,11 @@ impl PortError {
     /// Whether a link ended a wait because its caller wants to do something else. The port stays open,
     /// and the exchange is abandoned.
     pub fn is_interruption(&self) -> bool {
-        matches!(self, PortError::Io { source, .. } if source.kind() == io::ErrorKind::Interrupted)
+        match self {
+            PortError::Overtaken { .. } => true,
+            PortError::Io { source, .. } => source.kind() == io::ErrorKind::Interrupted,
+            _ => false,
+        }
     }
 
     /// What an error means for a port that is open.

@@ -1,8 +1,9 @@
 //! The blocking client: many motors, one lock around one exchange or cycle, no thread, no
 //! allocation in an exchange.
 
-use std::sync::{Mutex, MutexGuard};
-use std::time::Duration;
+use std::error;
+use std::sync::Arc;
+use std::time::{self as machine, Duration};
 
 use motorlink_proto::rmd::{
     self as proto, Command, Counters, Dialect, Limits, MotionStatus, MotorId, MotorSet, Payload,
@@ -10,11 +11,12 @@ use motorlink_proto::rmd::{
 };
 use motorlink_proto::time;
 
-use super::session::{Output, Session};
+use super::session::{Output, Session, ends_motion};
 use super::{Error, Guard, MotorHandle, OnDrop};
 use crate::Clock;
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{CanLink, PortError, PortName};
+use crate::turn::{Turn, Turns};
 
 /// How a [`Bus`] behaves.
 #[derive(Debug, Clone, Copy)]
@@ -67,7 +69,7 @@ const SCAN_WIDTH: usize = 8;
 /// for its status before anything else, in case its replies are later than that: [`Off`](proto::Off)
 /// and [`Stop`](proto::Stop) alone do not wait.
 pub struct Bus {
-    driven: Mutex<Driven<Box<dyn CanLink>>>,
+    line: Turns<Driven<Box<dyn CanLink>>>,
     sign: LinkSign,
 }
 
@@ -75,6 +77,8 @@ pub struct Bus {
 pub(super) struct Driven<L> {
     pub(super) port: Reopening<L>,
     pub(super) session: Session,
+    /// Exchanges and cycles so far: another number says that the one before it was given up.
+    pub(super) exchanges: u64,
 }
 
 impl Bus {
@@ -118,12 +122,31 @@ impl Bus {
 
     pub(super) fn driving(driven: Driven<Box<dyn CanLink>>) -> Self {
         let sign = driven.port.sign();
-        Bus { driven: Mutex::new(driven), sign }
+        Bus { line: Turns::new(driven), sign }
+    }
+
+    /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
+    /// error from it ends the exchange with an interruption.
+    ///
+    /// `look` may use this bus, as a signal's handler does. What waits is given up then, and ends with
+    /// [`PortError::Overtaken`]; otherwise it goes on. Other threads wait.
+    pub fn looking(
+        mut self,
+        look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
+    ) -> Self {
+        self.line.set_look(Box::new(look));
+        self
+    }
+
+    /// Gives up the exchanges that this thread has under way while it [looks](Self::looking); replies
+    /// may still come. Waits for exchanges of other threads.
+    pub fn abandon(&self) {
+        self.line.take().abandon();
     }
 
     /// The clock that the port goes by: the machine's, or that of drives on a time of their own.
     pub fn clock(&self) -> Clock {
-        self.lock().port.clock()
+        self.line.take().port.clock()
     }
 
     /// Whether the port is open. Never waits, not even while another thread opens it.
@@ -133,7 +156,7 @@ impl Bus {
 
     /// Frames that belonged to no exchange.
     pub fn counters(&self) -> Counters {
-        self.lock().session.counters()
+        self.line.take().session.counters()
     }
 
     /// A motor of the bus, ID 1 to 32.
@@ -149,7 +172,7 @@ impl Bus {
 
     /// Motors that were given something to do and not switched off.
     pub fn moving(&self) -> MotorSet {
-        self.lock().session.moving()
+        self.line.take().session.moving()
     }
 
     /// Takes motors over that somebody else set moving.
@@ -159,7 +182,7 @@ impl Bus {
 
     /// Sets what a motor may be told; it holds for every call, raw frames included.
     pub fn set_limits(&self, id: MotorId, limits: Limits) {
-        self.lock().session.set_limits(id, limits);
+        self.line.take().session.set_limits(id, limits);
     }
 
     /// One exchange with one motor. A motor in quarantine is waited for.
@@ -169,12 +192,12 @@ impl Bus {
 
     /// One exchange with any bytes, known command or not. A motor in quarantine is waited for.
     pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
-        let mut driven = self.lock();
-        driven.ready()?;
+        let mut driven = self.line.take();
+        driven.ready([&request])?;
         let now = driven.port.now();
         driven.session.ask(now, id, request)?;
         let mut outcome = None;
-        driven.run(|_, result| outcome = Some(result))?;
+        self.run(driven, |_, result| outcome = Some(result))?;
         outcome.expect("an exchange that was begun ends")
     }
 
@@ -189,15 +212,15 @@ impl Bus {
         requests: &[(MotorId, [u8; 8])],
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<(), Error> {
-        let mut driven = self.lock();
-        driven.ready()?;
+        let mut driven = self.line.take();
+        driven.ready(requests.iter().map(|(_, request)| request))?;
         for &(id, request) in requests {
             let now = driven.port.now();
             if let Err(error) = driven.session.request(now, id, request) {
                 each(id, Err(error));
             }
         }
-        driven.run(each)
+        self.run(driven, each)
     }
 
     /// Sends torques to motors 1 to 4 in one frame and gathers the replies of those in `expect`;
@@ -211,12 +234,12 @@ impl Bus {
         torques: Torque4,
         expect: MotorSet,
     ) -> Result<[Option<Result<MotionStatus, Error>>; 4], Error> {
-        let mut driven = self.lock();
-        driven.ready()?;
+        let mut driven = self.line.take();
+        driven.ready([])?;
         let now = driven.port.now();
         driven.session.torque4(now, torques, expect)?;
         let mut replies = [const { None }; 4];
-        driven.run(|id, result| {
+        self.run(driven, |id, result| {
             if let Some(slot) = replies.get_mut(usize::from(id.number()) - 1) {
                 *slot = Some(result.map(|data| MotionStatus::decode(&data)));
             }
@@ -257,11 +280,27 @@ impl Bus {
 
     /// How long a late reply is awaited.
     pub(super) fn guard_time(&self) -> Duration {
-        self.lock().session.guard().into()
+        self.line.take().session.guard().into()
     }
 
-    fn lock(&self) -> MutexGuard<'_, Driven<Box<dyn CanLink>>> {
-        self.driven.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    /// Moves frames until no exchange is open.
+    fn run(
+        &self,
+        mut driven: Turn<'_, Driven<Box<dyn CanLink>>>,
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<(), Error> {
+        let exchange = driven.exchanges;
+        while !driven.run(self.line.next_look(), &mut each)? {
+            let port = Arc::clone(&driven.port.name);
+            let looked;
+            (driven, looked) = driven.look(&port);
+            let overtaken = (driven.exchanges != exchange)
+                .then(|| PortError::Overtaken { port: port.to_string() });
+            if let Some(error) = looked.err().or(overtaken) {
+                return Err(driven.closed(error));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -269,16 +308,34 @@ impl<L: CanLink> Driven<L> {
     pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
         let port = port.by(|link| link.clock());
         let session = Session::new(port.name.clone(), options);
-        Driven { port, session }
+        Driven { port, session, exchanges: 0 }
     }
 
-    fn ready(&mut self) -> Result<(), Error> {
-        self.listen()?;
+    /// Makes ready for these requests.
+    fn ready<'a>(&mut self, requests: impl IntoIterator<Item = &'a [u8; 8]>) -> Result<(), Error> {
+        self.abandon();
+        self.listen_for(requests)
+    }
+
+    /// Gives up what is under way. Replies may still come.
+    fn abandon(&mut self) {
+        self.exchanges += 1;
         let now = self.port.now();
         for id in self.session.busy() {
             self.session.cancel(now, id);
         }
-        Ok(())
+    }
+
+    /// As [`listen`](Self::listen), before these requests are sent.
+    pub(super) fn listen_for<'a>(
+        &mut self,
+        requests: impl IntoIterator<Item = &'a [u8; 8]>,
+    ) -> Result<(), Error> {
+        match self.listen() {
+            // That the port failed since the last exchange must not keep a motor from being stopped.
+            Err(_) if requests.into_iter().any(ends_motion) => self.listen(),
+            done => done,
+        }
     }
 
     /// Makes sure that the port is open and that nothing is left in it: what came meanwhile would
@@ -297,8 +354,12 @@ impl<L: CanLink> Driven<L> {
         }
     }
 
-    /// Moves frames until no exchange is open.
-    fn run(&mut self, mut each: impl FnMut(MotorId, Result<[u8; 8], Error>)) -> Result<(), Error> {
+    /// Moves frames until no exchange is open, or until `pause`: `false`.
+    fn run(
+        &mut self,
+        pause: Option<machine::Instant>,
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<bool, Error> {
         loop {
             let now = self.port.now();
             let moved = match self.session.poll(now) {
@@ -307,9 +368,14 @@ impl<L: CanLink> Driven<L> {
                     each(id, result);
                     Ok(())
                 }
-                Output::Wait(None) => return Ok(()),
+                Output::Wait(None) => return Ok(true),
                 Output::Wait(Some(until)) => {
-                    let wait = Some(until.since(now).into());
+                    let left =
+                        pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
+                    if left == Some(Duration::ZERO) {
+                        return Ok(false);
+                    }
+                    let wait = [Some(until.since(now).into()), left].into_iter().flatten().min();
                     let came = self.port.link().and_then(|(link, _)| link.receive(wait));
                     came.map(|frame| {
                         let now = self.port.now();

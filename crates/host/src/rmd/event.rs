@@ -88,7 +88,7 @@ impl EventBus {
     /// # Errors
     /// The port, or what forbids the request; nothing is sent then.
     pub fn ask(&mut self, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
-        self.driven.listen()?;
+        self.driven.listen_for([&request])?;
         let now = self.driven.port.now();
         self.driven.session.ask(now, id, request)
     }
@@ -98,7 +98,7 @@ impl EventBus {
     /// # Errors
     /// Those of [`ask`](Self::ask).
     pub fn request(&mut self, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
-        self.driven.listen()?;
+        self.driven.listen_for([&request])?;
         let now = self.driven.port.now();
         self.driven.session.request(now, id, request)
     }
@@ -139,15 +139,16 @@ impl EventBus {
 
     /// The bus that waits, with what this one knows of the motors: to stop what is moving.
     pub fn into_bus(self) -> Bus {
-        let Driven { port, session } = self.driven;
-        Bus::driving(Driven { port: port.map(|link| link as Box<dyn CanLink>), session })
+        let Driven { port, session, exchanges } = self.driven;
+        let port = port.map(|link| link as Box<dyn CanLink>);
+        Bus::driving(Driven { port, session, exchanges })
     }
 
     fn moved(
         &mut self,
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<Option<Duration>, PortError> {
-        let Driven { port, session } = &mut self.driven;
+        let Driven { port, session, .. } = &mut self.driven;
         let clock = port.clock();
         let Some(link) = port.open_link_mut() else { return Ok(None) };
         let mut listens = STEP;

@@ -62,6 +62,7 @@ impl<'a> Guard<'a> {
 
     fn stop_all(&self) -> Vec<Stopped> {
         let mut stopped: Vec<Stopped> = Vec::new();
+        self.bus.abandon();
         let request = match self.action {
             OnDrop::Off => Off.encode(),
             OnDrop::Stop => Stop.encode(),

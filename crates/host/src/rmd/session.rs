@@ -189,9 +189,7 @@ impl Session {
                     self.insisting.remove(id);
                     // A motor counts as moving from the request on, whose reply may be lost, and
                     // until it has acknowledged that it is off or stopped.
-                    if let Ok([code, ..]) = result
-                        && matches!(Code::from(code), Code::Off | Code::Stop)
-                    {
+                    if result.as_ref().is_ok_and(ends_motion) {
                         self.moving.remove(id);
                     }
                     return Output::Done(id, result.map_err(|error| self.failed(id, error)));
@@ -236,6 +234,11 @@ impl Session {
             _ => Error::Timeout { port, id, code },
         }
     }
+}
+
+/// Whether a frame, or the reply to it, is Off or Stop.
+pub(super) fn ends_motion([code, ..]: &[u8; 8]) -> bool {
+    matches!(Code::from(*code), Code::Off | Code::Stop)
 }
 
 /// The place of a motor in a table of all.

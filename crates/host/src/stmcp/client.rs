@@ -1,7 +1,8 @@
 //! The blocking client: one lock around one exchange, no thread, no allocation in an exchange.
 
-use std::sync::{Mutex, MutexGuard};
-use std::time::Duration;
+use std::error;
+use std::sync::Arc;
+use std::time::{self as machine, Duration};
 
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
@@ -10,12 +11,13 @@ use motorlink_proto::stmcp::{
 use motorlink_proto::time::{self, Instant};
 
 use super::session::{Rules, Session};
-use super::started::Started;
+use super::started::{Effect, Started};
 use super::{Error, Guard, Limits, MotorHandle};
 use crate::Clock;
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{ByteLink, LineName, PortError, PortName};
 use crate::text::printable;
+use crate::turn::{Turn, Turns};
 
 /// How a [`Client`] behaves.
 #[derive(Debug, Clone, Copy, Default)]
@@ -66,12 +68,16 @@ pub struct FirmwareVersion {
 ///
 /// A port that went away is opened again by the next call, behind a back-off; see
 /// [`link_state`](Self::link_state). A failed exchange loses the line, which the next call recovers
-/// as [`Config::recovery`] says.
+/// as [`Config::recovery`] says. What stops a motor does not wait for that: it is sent at once and
+/// again on the recovered line, and only the second reply counts.
 pub struct Client {
-    driven: Mutex<Driven<Box<dyn ByteLink>>>,
+    line: Turns<Driven<Box<dyn ByteLink>>>,
     sign: LinkSign,
     rules: Rules,
 }
+
+/// How an exchange ended: with what was made of the acknowledge's payload, and its size.
+type Outcome<T> = Result<(Option<T>, usize), proto::Error>;
 
 /// A session and its port.
 pub(super) struct Driven<L> {
@@ -80,6 +86,8 @@ pub(super) struct Driven<L> {
     pub(super) received: [u8; 256],
     /// When the last exchange ended.
     pub(super) ended: Instant,
+    /// Exchanges so far: another number says that the one before it was given up.
+    pub(super) exchanges: u64,
 }
 
 impl Client {
@@ -126,7 +134,26 @@ impl Client {
 
     pub(super) fn driving(driven: Driven<Box<dyn ByteLink>>) -> Self {
         let (sign, rules) = (driven.port.sign(), driven.session.rules());
-        Client { driven: Mutex::new(driven), sign, rules }
+        Client { line: Turns::new(driven), sign, rules }
+    }
+
+    /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
+    /// error from it ends the exchange with an interruption.
+    ///
+    /// `look` may use this client, as a signal's handler does. The exchange that waits is given up
+    /// then and ends with [`PortError::Overtaken`]; otherwise it goes on. Other threads wait.
+    pub fn looking(
+        mut self,
+        look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
+    ) -> Self {
+        self.line.set_look(Box::new(look));
+        self
+    }
+
+    /// Gives up the exchange that this thread has under way while it
+    /// [looks](Self::looking); its reply may still come. Waits for exchanges of other threads.
+    pub fn abandon(&self) {
+        self.line.take().abandon();
     }
 
     /// The profile that the drive is expected to follow.
@@ -141,17 +168,17 @@ impl Client {
 
     /// The clock that the port goes by: the machine's, or that of drives on a time of their own.
     pub fn clock(&self) -> Clock {
-        self.lock().port.clock()
+        self.line.take().port.clock()
     }
 
     /// Whether the last exchange ended in step.
     pub fn line(&self) -> Line {
-        self.lock().session.line()
+        self.line.take().session.line()
     }
 
     /// What came without being asked for.
     pub fn counters(&self) -> Counters {
-        self.lock().session.counters()
+        self.line.take().session.counters()
     }
 
     /// A motor of the drive, 1 to 7.
@@ -167,7 +194,7 @@ impl Client {
 
     /// Motors that this client started and did not stop.
     pub fn started(&self) -> impl Iterator<Item = Motor> + use<> {
-        self.lock().session.started().motors()
+        self.line.take().session.started().motors()
     }
 
     /// Name and version of the SDK (4.7).
@@ -199,26 +226,25 @@ impl Client {
         reply: impl FnOnce(&[u8]) -> Option<T>,
     ) -> Result<T, Error> {
         self.rules.check(motor, request)?;
-        let mut driven = self.lock();
-        driven.ready()?;
-        driven.session.request(motor, request)?;
-        driven.conclude(reply)
+        let mut driven = self.line.take();
+        driven.begin(motor, request)?;
+        self.conclude(driven, reply)
     }
 
     /// One exchange with any frame code and payload; gives the acknowledge's payload.
     pub fn raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Vec<u8>, Error> {
-        self.rules.check_raw(motor, code, payload)?;
-        let mut driven = self.lock();
-        driven.ready()?;
-        driven.session.raw(motor, code, payload)?;
-        driven.conclude(|payload| Some(payload.to_vec()))
+        let effect = self.rules.check_raw(motor, code, payload)?;
+        let mut driven = self.line.take();
+        driven.begin_raw(motor, code, payload, effect)?;
+        self.conclude(driven, |payload| Some(payload.to_vec()))
     }
 
-    /// Sends STOP_MOTOR without waiting for an answer: what is left when the drive's replies do not
-    /// come. Any other request would wait until the line has recovered.
+    /// Sends STOP_MOTOR without waiting for an answer, as for the other motors of a drive that does
+    /// not answer. Afterwards the line is lost.
     pub fn stop_unheard(&self, motor: Motor) -> Result<(), Error> {
         let mut frame = [0; MAX_FRAME];
-        let mut driven = self.lock();
+        let mut driven = self.line.take();
+        driven.abandon();
         let stop = driven.session.stop_unheard(motor, &mut frame);
         let written = driven.port.link().and_then(|(link, _)| link.write(stop));
         if written.is_err() {
@@ -229,24 +255,51 @@ impl Client {
 
     /// The drive has no such motor, which may have been taken for started.
     pub(super) fn is_missing(&self, motor: Motor) {
-        self.lock().session.is_missing(motor);
+        self.line.take().session.is_missing(motor);
     }
 
     /// Takes the line over from another master, which started these motors. `unanswered` is what it
     /// sent last, if the reply to that may still come.
     pub(crate) fn take_over(&self, started: Started, unanswered: Option<&[u8]>) {
-        self.lock().session.take_over(started, unanswered);
+        self.line.take().session.take_over(started, unanswered);
     }
 
     /// What [`take_over`](Self::take_over) was given and later calls left of it.
     pub(crate) fn hand_over(&self) -> Started {
-        self.lock().session.started()
+        self.line.take().session.started()
     }
-
-    /// A poisoned lock is taken all the same: an exchange that panicked left the master in a state
-    /// that its next request deals with.
-    fn lock(&self) -> MutexGuard<'_, Driven<Box<dyn ByteLink>>> {
-        self.driven.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    /// Brings the exchange that was begun to its end.
+    fn conclude<T>(
+        &self,
+        mut driven: Turn<'_, Driven<Box<dyn ByteLink>>>,
+        reply: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Result<T, Error> {
+        let mut reply = Some(reply);
+        let mut reply = |payload: &[u8]| reply.take()?(payload);
+        let exchange = driven.exchanges;
+        let outcome = loop {
+            match driven.run(self.line.next_look(), &mut reply) {
+                Ok(Some(outcome)) => break Ok(outcome),
+                Ok(None) => {}
+                Err(error) => break Err(error),
+            }
+            let port = Arc::clone(&driven.port.name);
+            let looked;
+            (driven, looked) = driven.look(&port);
+            let overtaken = driven.exchanges != exchange;
+            if overtaken {
+                let overtaken = PortError::Overtaken { port: port.to_string() };
+                return Err(looked.err().unwrap_or(overtaken).into());
+            }
+            if let Err(error) = looked {
+                break Err(error);
+            }
+        };
+        driven.ended = driven.port.now();
+        match outcome {
+            Ok(outcome) => driven.session.conclude(outcome),
+            Err(error) => Err(driven.lost(error)),
+        }
     }
 }
 
@@ -254,17 +307,43 @@ impl<L: ByteLink> Driven<L> {
     pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
         let port = port.by(|link| link.clock());
         let session = Session::new(port.name.clone(), options);
-        Driven { ended: port.now(), port, session, received: [0; 256] }
+        Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
+    }
+
+    /// Begins an exchange with motor number `motor`.
+    pub(super) fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
+        self.ready_for(Effect::of(Some(request)))?;
+        self.session.request(motor, request)
+    }
+
+    /// Begins an exchange with any frame code and payload, which has this effect.
+    pub(super) fn begin_raw(
+        &mut self,
+        motor: u8,
+        code: u8,
+        payload: &[u8],
+        effect: Effect,
+    ) -> Result<(), Error> {
+        self.ready_for(effect)?;
+        self.session.raw(motor, code, payload)
+    }
+
+    fn ready_for(&mut self, effect: Effect) -> Result<(), PortError> {
+        match self.ready() {
+            // That the port failed since the last exchange must not keep a motor from being stopped.
+            Err(_) if effect == Effect::Stops => self.ready(),
+            done => done,
+        }
     }
 
     /// Makes sure that the port is open and no abandoned exchange is under way.
     pub(super) fn ready(&mut self) -> Result<(), PortError> {
         let idle = self.port.now().since(self.ended) > IDLE;
+        self.abandon();
         let (link, reopened) = self.port.link()?;
         if reopened {
             self.session.reopened();
         }
-        self.session.abandon();
         if idle {
             let size = match link.read(&mut self.received, Some(Duration::ZERO)) {
                 Ok(size) => size,
@@ -279,14 +358,10 @@ impl<L: ByteLink> Driven<L> {
         Ok(())
     }
 
-    /// Brings the exchange that was begun to its end.
-    fn conclude<T>(&mut self, reply: impl FnOnce(&[u8]) -> Option<T>) -> Result<T, Error> {
-        let outcome = self.run(reply);
-        self.ended = self.port.now();
-        match outcome {
-            Ok(outcome) => self.session.conclude(outcome),
-            Err(error) => Err(self.lost(error)),
-        }
+    /// Gives up the exchange under way, if there is one. Its reply may still come.
+    pub(super) fn abandon(&mut self) {
+        self.session.abandon();
+        self.exchanges += 1;
     }
 
     /// The port failed in the middle of an exchange, or did not want to wait for its end.
@@ -298,23 +373,31 @@ impl<L: ByteLink> Driven<L> {
         error.into()
     }
 
-    /// Moves bytes until the exchange is over; gives what `reply` made of the payload, and its size.
+    /// Moves bytes until the exchange is over, or until `pause`; gives what `reply` made of the
+    /// payload, and its size.
     fn run<T>(
         &mut self,
-        reply: impl FnOnce(&[u8]) -> Option<T>,
-    ) -> Result<Result<(Option<T>, usize), proto::Error>, PortError> {
+        pause: Option<machine::Instant>,
+        reply: &mut impl FnMut(&[u8]) -> Option<T>,
+    ) -> Result<Option<Outcome<T>>, PortError> {
         loop {
             let now = self.port.now();
             match self.session.poll(now) {
                 Output::Transmit(bytes) => self.port.link()?.0.write(bytes)?,
                 Output::Wait(until) => {
+                    let left =
+                        pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
+                    if left == Some(Duration::ZERO) {
+                        return Ok(None);
+                    }
                     let wait = until.map(|until| until.since(now).into());
+                    let wait = wait.into_iter().chain(left).min();
                     let size = self.port.link()?.0.read(&mut self.received, wait)?;
                     let now = self.port.now();
                     self.session.receive(now, &self.received[..size]);
                 }
                 Output::Done(result) => {
-                    return Ok(result.map(|payload| (reply(payload), payload.len())));
+                    return Ok(Some(result.map(|payload| (reply(payload), payload.len()))));
                 }
             }
         }

@@ -83,8 +83,7 @@ impl EventClient {
     /// The port, or what forbids the request; no exchange is under way then.
     pub fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         self.driven.session.rules().check(motor, request)?;
-        self.driven.ready()?;
-        self.driven.session.request(motor, request)
+        self.driven.begin(motor, request)
     }
 
     /// Begins an exchange with any frame code and payload, as [`Client::raw`].
@@ -92,9 +91,8 @@ impl EventClient {
     /// # Errors
     /// Those of [`begin`](Self::begin).
     pub fn begin_raw(&mut self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
-        self.driven.session.rules().check_raw(motor, code, payload)?;
-        self.driven.ready()?;
-        self.driven.session.raw(motor, code, payload)
+        let effect = self.driven.session.rules().check_raw(motor, code, payload)?;
+        self.driven.begin_raw(motor, code, payload, effect)
     }
 
     /// Moves what can be moved without waiting. `reply` reads the acknowledge's payload; `None` from
@@ -118,9 +116,9 @@ impl EventClient {
     /// The client that waits, with what this one knows of the line: to stop what was started.
     pub fn into_client(mut self) -> Client {
         self.abandon();
-        let Driven { port, session, received, ended } = self.driven;
+        let Driven { port, session, received, ended, exchanges } = self.driven;
         let port = port.map(|link| link as Box<dyn ByteLink>);
-        Client::driving(Driven { port, session, received, ended })
+        Client::driving(Driven { port, session, received, ended, exchanges })
     }
 
     fn moved<T>(

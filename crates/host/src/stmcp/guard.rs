@@ -59,6 +59,7 @@ impl<'a> Guard<'a> {
 
     fn stop_all(&self) -> Vec<Stopped> {
         let mut stopped: Vec<Stopped> = Vec::new();
+        self.client.abandon();
         let mut left: Vec<Motor> = self.client.started().collect();
         for attempt in 1..=STOP_ATTEMPTS {
             let mut failed = Vec::new();
@@ -66,7 +67,8 @@ impl<'a> Guard<'a> {
             for (n, &motor) in left.iter().enumerate() {
                 if !told && self.client.line() == Line::Lost {
                     told = true;
-                    for &motor in &left[n..] {
+                    // This motor's is the first thing that `stop` sends.
+                    for &motor in &left[n + 1..] {
                         // If it fails, so does the stop below, which says why.
                         let _ = self.client.stop_unheard(motor);
                     }

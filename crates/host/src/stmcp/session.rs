@@ -38,6 +38,9 @@ pub(super) struct Session {
     /// What the line had been through when a request began.
     history: History,
     asked: Asked,
+    /// What is sent before a lost line is recovered, and its size.
+    ahead: [u8; MAX_FRAME],
+    ahead_size: usize,
 }
 
 /// Losses of the line, and identifications that a drive sends when it was reset.
@@ -95,6 +98,8 @@ impl Session {
             ramped: Ramped::default(),
             history: History::default(),
             asked,
+            ahead: [0; MAX_FRAME],
+            ahead_size: 0,
         }
     }
 
@@ -122,6 +127,10 @@ impl Session {
         self.rules.check(motor, request)?;
         let effect = Effect::of(Some(request));
         self.check_start(motor, effect)?;
+        self.ahead_size = match self.is_urgent(effect) {
+            true => request.encode(motor, &mut self.ahead).map_or(0, <[u8]>::len),
+            false => 0,
+        };
         let begun = self.master.request(motor, request);
         self.begun(begun, motor, effect, What::of(request))
     }
@@ -135,9 +144,19 @@ impl Session {
         let frame = Frame { header: Frame::header(code, motor), payload };
         let effect = Effect::of_frame(&frame);
         self.check_start(motor, effect)?;
+        self.ahead_size = match self.is_urgent(effect) {
+            true => frame.encode(&mut self.ahead).map_or(0, <[u8]>::len),
+            false => 0,
+        };
         let begun = self.master.request_raw(frame.header, payload);
         self.started.presume_within(frame.encode(&mut [0; MAX_FRAME]).unwrap_or(&[]));
         self.begun(begun, motor, effect, What::Raw(code))
+    }
+
+    /// Whether a request is sent before the line has recovered, and again afterwards. Its first reply
+    /// comes before the answer to the question of recovery, so that it never counts.
+    fn is_urgent(&self, effect: Effect) -> bool {
+        effect == Effect::Stops && self.master.line() == Line::Lost
     }
 
     /// Whether the request may leave: under a speed limit no motor is started without a ramp.
@@ -184,7 +203,10 @@ impl Session {
     }
 
     pub(super) fn poll(&mut self, now: Instant) -> Output<'_> {
-        self.master.poll(now)
+        match std::mem::take(&mut self.ahead_size) {
+            0 => self.master.poll(now),
+            size => Output::Transmit(&self.ahead[..size]),
+        }
     }
 
     /// The exchange is over: with what the reader of replies made of the acknowledge's payload, and
@@ -219,6 +241,7 @@ impl Session {
 
     /// Gives up the exchange under way, if there is one. Its reply may still come.
     pub(super) fn abandon(&mut self) {
+        self.ahead_size = 0;
         self.master.abandon();
     }
 
