@@ -1,27 +1,32 @@
 //! A bus of python-can as a port.
+//!
+//! The bus is Python code. Where that ran in the thread that waits for an exchange, handlers of
+//! signals would run there as well, with the port in the hands of the exchange. So one thread receives
+//! and one sends.
 
+use std::collections::VecDeque;
 use std::io::{Error, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
-use std::thread::JoinHandle;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{CanLink, EventCan, Evented, PortError};
+use motorlink::port::{CanLink, Evented, PortError};
 use motorlink_proto::rmd::CanFrame;
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
+use crate::shared::Owner;
 use crate::sim::Port;
 
 /// How long a bus may take no frame at all before a sending fails.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
-/// How soon the reader of a bus notices that nobody listens any more, and how long a wait keeps
-/// Python's signals waiting.
+/// How soon the reader of a bus notices that nobody listens any more.
 const TURN: Duration = Duration::from_millis(100);
+/// How long a bus may go on giving what it received before it was opened.
+const BABBLE: Duration = Duration::from_millis(100);
 
 /// A bus of python-can, for `motorlink.rmd.open` and `motorlink.aio.rmd.open`.
 #[pyclass(frozen, module = "motorlink._core")]
@@ -56,35 +61,166 @@ impl CanPort {
 }
 
 impl CanPort {
-    /// For a client that waits.
-    pub(crate) fn link(&self) -> Box<dyn CanLink> {
-        Box::new(Link(Arc::clone(&self.bus)))
-    }
-
-    /// For an event loop: a thread receives. It ends soon after the link was dropped.
-    pub(crate) fn event_link(&self) -> PyResult<(Box<dyn EventCan>, JoinHandle<()>)> {
+    /// Starts the threads that receive and send.
+    pub(crate) fn start(&self) -> PyResult<Threads> {
         let (bell, ringer) = UnixStream::pair()?;
         bell.set_nonblocking(true)?;
         ringer.set_nonblocking(true)?;
-        let (inbox, frames) = channel();
-        let is_dropped = Arc::new(AtomicBool::new(false));
-        let (bus, ends) = (Arc::clone(&self.bus), Arc::clone(&is_dropped));
-        let thread = std::thread::spawn(move || {
-            while !ends.load(Ordering::Relaxed) {
-                let Some(came) = bus.receive(TURN).transpose() else { continue };
-                let failed = came.is_err();
-                if inbox.send(came).is_err() {
-                    return;
-                }
-                // A bell that takes no more rings already.
-                let _ = (&ringer).write(&[0]);
-                if failed {
-                    return;
+        let office = Arc::new(Office {
+            bus: Arc::clone(&self.bus),
+            desk: Mutex::new(Desk::default()),
+            changed: Condvar::new(),
+            bell,
+            ringer,
+        });
+        let (reader, writer) = (Arc::clone(&office), Arc::clone(&office));
+        let threads = [thread::spawn(move || reader.read()), thread::spawn(move || writer.write())];
+        Ok(Threads { office, threads: Mutex::new(threads.into()), owner: Owner::new() })
+    }
+}
+
+/// The threads of a bus. They end soon after this is dropped.
+pub(crate) struct Threads {
+    office: Arc<Office>,
+    threads: Mutex<Vec<JoinHandle<()>>>,
+    owner: Owner,
+}
+
+impl Threads {
+    /// What makes a link: the first one, and another one after each failure.
+    pub(crate) fn links(&self) -> impl FnMut() -> Link + Send + 'static {
+        let office = Arc::clone(&self.office);
+        move || Link::new(Arc::clone(&office))
+    }
+
+    /// Ends them, and waits for that: nobody uses a bus any more that its owner may shut down.
+    pub(crate) fn end(&self) {
+        if self.owner.is_here() {
+            self.office.end();
+            let threads =
+                std::mem::take(&mut *self.threads.lock().unwrap_or_else(PoisonError::into_inner));
+            threads.into_iter().for_each(|thread| drop(thread.join()));
+        }
+    }
+}
+
+impl Drop for Threads {
+    fn drop(&mut self) {
+        if self.owner.is_here() {
+            self.office.end();
+        }
+    }
+}
+
+/// Where the threads of a bus and its links meet.
+struct Office {
+    bus: Arc<PythonCan>,
+    desk: Mutex<Desk>,
+    changed: Condvar,
+    /// Readable when something was received.
+    bell: UnixStream,
+    ringer: UnixStream,
+}
+
+#[derive(Default)]
+struct Desk {
+    /// The number of the link in use. What fails for an earlier one does not count.
+    link: u64,
+    reader: Reader,
+    inbox: VecDeque<Result<CanFrame, PortError>>,
+    outbox: VecDeque<CanFrame>,
+    is_ended: bool,
+}
+
+/// What the thread that receives does.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+enum Reader {
+    /// Nothing before the next frame is sent: the bus failed.
+    #[default]
+    Paused,
+    /// Drops what the bus received before. Nothing is sent meanwhile.
+    Draining,
+    Receiving,
+}
+
+impl Office {
+    fn lock(&self) -> MutexGuard<'_, Desk> {
+        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wait<'a>(
+        &self,
+        desk: MutexGuard<'a, Desk>,
+        until: impl Fn(&Desk) -> bool,
+    ) -> MutexGuard<'a, Desk> {
+        let waited = self.changed.wait_while(desk, |desk| !desk.is_ended && !until(desk));
+        waited.unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn end(&self) {
+        self.lock().is_ended = true;
+        self.changed.notify_all();
+    }
+
+    /// Receives, until the end.
+    fn read(&self) {
+        loop {
+            let desk = self.wait(self.lock(), |desk| desk.reader != Reader::Paused);
+            let (link, drains) = (desk.link, desk.reader == Reader::Draining);
+            if desk.is_ended {
+                return;
+            }
+            drop(desk);
+            let came = if drains { self.drain() } else { self.bus.receive(TURN) };
+            let mut desk = self.lock();
+            match came {
+                Ok(None) if drains => desk.reader = Reader::Receiving,
+                Ok(None) => continue,
+                Err(_) if drains => desk.reader = Reader::Paused,
+                Err(_) if link != desk.link => continue,
+                came => {
+                    if came.is_err() {
+                        desk.reader = Reader::Paused;
+                    }
+                    desk.inbox.extend(came.transpose());
                 }
             }
-        });
-        let bus = Arc::clone(&self.bus);
-        Ok((Box::new(Pump { bus, frames, bell, is_dropped }), thread))
+            self.ring();
+        }
+    }
+
+    /// Drops what the bus received before.
+    fn drain(&self) -> Result<Option<CanFrame>, PortError> {
+        let began = Instant::now();
+        while began.elapsed() < BABBLE && self.bus.receive(Duration::ZERO)?.is_some() {}
+        Ok(None)
+    }
+
+    /// Sends, until the end.
+    fn write(&self) {
+        loop {
+            let ready = |desk: &Desk| !desk.outbox.is_empty() && desk.reader != Reader::Draining;
+            let mut desk = self.wait(self.lock(), ready);
+            if desk.is_ended {
+                return;
+            }
+            let (link, frame) = (desk.link, desk.outbox.pop_front());
+            desk.reader = Reader::Receiving;
+            drop(desk);
+            self.changed.notify_all();
+            let Some(Err(error)) = frame.map(|frame| self.bus.send(&frame)) else { continue };
+            let mut desk = self.lock();
+            if link == desk.link {
+                desk.inbox.push_back(Err(error));
+                self.ring();
+            }
+        }
+    }
+
+    fn ring(&self) {
+        // A bell that takes no more rings already.
+        let _ = (&self.ringer).write(&[0]);
+        self.changed.notify_all();
     }
 }
 
@@ -149,78 +285,61 @@ fn frame(message: &Bound<'_, PyAny>) -> PyResult<Option<CanFrame>> {
     Ok(Some(CanFrame::data_frame(id, extended, &data)))
 }
 
-/// Waits in the bus itself.
-struct Link(Arc<PythonCan>);
+/// A bus in use, until it fails.
+pub(crate) struct Link(Arc<Office>);
+
+impl Link {
+    fn new(office: Arc<Office>) -> Self {
+        let mut desk = office.lock();
+        desk.link += 1;
+        desk.inbox.clear();
+        desk.outbox.clear();
+        if desk.reader == Reader::Paused {
+            desk.reader = Reader::Draining;
+            office.changed.notify_all();
+        }
+        drop(desk);
+        Link(office)
+    }
+}
 
 impl CanLink for Link {
+    /// What fails in sending is received.
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        self.0.send(frame)
+        self.0.lock().outbox.push_back(*frame);
+        self.0.changed.notify_all();
+        Ok(())
     }
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        let deadline = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
+        let office = &self.0;
+        let end = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
+        let mut desk = office.lock();
         loop {
-            let left = deadline.map(|end| end.saturating_duration_since(Instant::now()));
-            let came = self.0.receive(left.map_or(TURN, |left| left.min(TURN)))?;
-            if came.is_some() || left == Some(Duration::ZERO) {
-                return Ok(came);
+            if let Some(came) = desk.inbox.pop_front() {
+                return came.map(Some);
             }
+            if desk.is_ended {
+                return Err(PortError::Closed { port: office.bus.name.clone() });
+            }
+            // From here on it rings for what comes.
+            while (&office.bell).read(&mut [0; 64]).is_ok_and(|size| size == 64) {}
+            let left = end.map(|end| end.saturating_duration_since(Instant::now()));
+            if left == Some(Duration::ZERO) {
+                return Ok(None);
+            }
+            let waited = office.changed.wait_timeout(desk, left.unwrap_or(TURN));
+            desk = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 }
 
-/// Takes what a thread received.
-struct Pump {
-    bus: Arc<PythonCan>,
-    frames: Receiver<Result<CanFrame, PortError>>,
-    /// Readable when there are frames.
-    bell: UnixStream,
-    is_dropped: Arc<AtomicBool>,
-}
-
-impl Pump {
-    fn gone(&self) -> PortError {
-        PortError::Closed { port: self.bus.name.clone() }
-    }
-}
-
-impl CanLink for Pump {
-    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        self.bus.send(frame)
-    }
-
-    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        if let Ok(came) = self.frames.try_recv() {
-            return came.map(Some);
-        }
-        // Silenced before it is looked again, so that it rings for whatever comes after.
-        while (&self.bell).read(&mut [0; 64]).is_ok_and(|size| size == 64) {}
-        let came = match timeout {
-            Some(Duration::ZERO) => match self.frames.try_recv() {
-                Err(TryRecvError::Empty) => return Ok(None),
-                came => came.map_err(|_| self.gone()),
-            },
-            timeout => match self.frames.recv_timeout(timeout.unwrap_or(Duration::MAX)) {
-                Err(RecvTimeoutError::Timeout) => return Ok(None),
-                came => came.map_err(|_| self.gone()),
-            },
-        };
-        came?.map(Some)
-    }
-}
-
-impl Evented for Pump {
+impl Evented for Link {
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        Some(self.bell.as_fd())
+        Some(self.0.bell.as_fd())
     }
 
     fn flush(&mut self) -> Result<bool, PortError> {
         Ok(false)
-    }
-}
-
-impl Drop for Pump {
-    fn drop(&mut self) {
-        self.is_dropped.store(true, Ordering::Relaxed);
     }
 }

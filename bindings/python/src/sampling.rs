@@ -2,13 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use motorlink::Clock;
+use motorlink::{Clock, LOOK};
 use motorlink_proto::time;
 use pyo3::prelude::*;
 
 use crate::error::bad_value;
 use crate::number::span;
-use crate::signals::LOOK;
 
 /// Rows beyond which something must be wrong with the arguments.
 const MOST: f64 = 1e8;

@@ -1,7 +1,7 @@
 //! A bus that threads share, until one of them closes it.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::thread::{self, ThreadId};
 use std::time::Duration;
 
 use pyo3::prelude::*;
@@ -11,20 +11,35 @@ use crate::error::{closed, elsewhere};
 /// How soon a close notices that the last exchange is over.
 const TURN: Duration = Duration::from_millis(1);
 
+/// The process that made it. A fork has the memory of its parent, but none of its threads, and locks
+/// that nobody will ever release.
+pub(crate) struct Owner(u32);
+
+impl Owner {
+    /// This process.
+    pub(crate) fn new() -> Self {
+        Owner(std::process::id())
+    }
+
+    /// Whether that is this process.
+    pub(crate) fn is_here(&self) -> bool {
+        self.0 == std::process::id()
+    }
+}
+
 /// What drives a line, and whose it is.
 pub(crate) struct Shared<T> {
     line: RwLock<Option<Arc<T>>>,
-    /// Exchanges that may set something moving.
-    under_way: AtomicUsize,
+    /// Threads with exchanges that may set something moving.
+    under_way: UnderWay,
     port: String,
-    /// A fork has the descriptors of its parent, and locks that nobody will ever release.
-    process: u32,
+    owner: Owner,
 }
 
 impl<T: Send + Sync> Shared<T> {
     pub(crate) fn new(line: T, port: String) -> Self {
-        let (line, process) = (RwLock::new(Some(Arc::new(line))), std::process::id());
-        Shared { line, under_way: AtomicUsize::new(0), port, process }
+        let line = RwLock::new(Some(Arc::new(line)));
+        Shared { line, under_way: UnderWay::default(), port, owner: Owner::new() }
     }
 
     /// The port's name.
@@ -39,18 +54,19 @@ impl<T: Send + Sync> Shared<T> {
         act: impl FnOnce(&T) -> R + Send,
     ) -> PyResult<R> {
         // Counted before it is known that the line is open: a close has either closed it, or waits.
-        let _counted = Counted::new(&self.under_way);
+        let _entered = self.under_way.enter();
         let line = self.get(py)?;
         Ok(py.detach(|| act(&line)))
     }
 
     /// The line, for what sets nothing moving; an error once it was closed.
     pub(crate) fn get(&self, py: Python<'_>) -> PyResult<Arc<T>> {
-        if !self.is_ours() {
+        if !self.owner.is_here() {
             return Err(elsewhere(py, &self.port));
         }
-        let line = self.line.read().unwrap_or_else(PoisonError::into_inner);
-        line.clone().ok_or_else(|| closed(py, &self.port))
+        // Unlocked before the exception is made: handlers of signals run there.
+        let line = self.line.read().unwrap_or_else(PoisonError::into_inner).clone();
+        line.ok_or_else(|| closed(py, &self.port))
     }
 
     /// Whether it was closed.
@@ -59,8 +75,9 @@ impl<T: Send + Sync> Shared<T> {
     }
 
     /// Closes it: `stop` stops what moves, at once, and again when exchanges that were under way are
-    /// over, for they may have set something moving. Gives what the last `stop` gave; again is no
-    /// error. A process that did not open it only forgets it.
+    /// over, for they may have set something moving. Those of this thread, whose signal's handler this
+    /// is then, are for `stop` to give up. Gives what the last `stop` gave; again is no error. A
+    /// process that did not open it only forgets it.
     pub(crate) fn close<R: Send>(
         &self,
         py: Python<'_>,
@@ -68,41 +85,54 @@ impl<T: Send + Sync> Shared<T> {
     ) -> Vec<R> {
         let line = self.line.write().unwrap_or_else(PoisonError::into_inner).take();
         let Some(line) = line else { return Vec::new() };
-        if !self.is_ours() {
+        if !self.owner.is_here() {
             std::mem::forget(line);
             return Vec::new();
         }
         py.detach(|| {
-            let is_used = || self.under_way.load(Ordering::SeqCst) > 0;
-            let was_used = is_used();
+            let was_used = self.under_way.elsewhere();
             let stopped = stop(&line);
             if !was_used {
                 return stopped;
             }
-            while is_used() {
-                std::thread::sleep(TURN);
+            while self.under_way.elsewhere() {
+                thread::sleep(TURN);
             }
             stop(&line)
         })
     }
+}
 
-    fn is_ours(&self) -> bool {
-        self.process == std::process::id()
+/// The threads in a bus, one entry an exchange.
+#[derive(Default)]
+struct UnderWay(Mutex<Vec<ThreadId>>);
+
+impl UnderWay {
+    /// This thread has an exchange until that is dropped.
+    fn enter(&self) -> Entered<'_> {
+        self.with(|threads| threads.push(thread::current().id()));
+        Entered(self)
+    }
+
+    /// Whether another thread has one.
+    fn elsewhere(&self) -> bool {
+        let here = thread::current().id();
+        self.with(|threads| threads.iter().any(|thread| *thread != here))
+    }
+
+    fn with<T>(&self, act: impl FnOnce(&mut Vec<ThreadId>) -> T) -> T {
+        act(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-/// One more, while it lives.
-struct Counted<'a>(&'a AtomicUsize);
+struct Entered<'a>(&'a UnderWay);
 
-impl<'a> Counted<'a> {
-    fn new(count: &'a AtomicUsize) -> Self {
-        count.fetch_add(1, Ordering::SeqCst);
-        Counted(count)
-    }
-}
-
-impl Drop for Counted<'_> {
+impl Drop for Entered<'_> {
     fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::SeqCst);
+        let here = thread::current().id();
+        self.0.with(|threads| {
+            let place = threads.iter().position(|thread| *thread == here);
+            place.map(|place| threads.swap_remove(place));
+        });
     }
 }

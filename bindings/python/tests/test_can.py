@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import builtins
+import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import can
 import pytest
-from conftest import Served
+from can.interfaces.virtual import VirtualBus
+from conftest import Served, eventually
 
 import motorlink
 from motorlink import aio, rmd
@@ -141,9 +146,127 @@ def test_what_the_bus_raises_is_the_cause_of_a_lost_line() -> None:
         with pytest.raises(motorlink.LineLost) as lost:
             motors.motor(1).motion
         check(lost.value)
-        with pytest.raises(motorlink.LineLost, match="closed"):
+        # It is tried again, and says so again.
+        with pytest.raises(motorlink.LineLost) as lost:
             motors.motor(1).motion
+        check(lost.value)
     bus.shutdown()
+
+
+class Flaky(VirtualBus):
+    """A bus that fails now and then."""
+
+    def __init__(self, channel: str):
+        self.fails_to_send = self.fails_to_receive = 0
+        super().__init__(channel)
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        if self.fails_to_send > 0:
+            self.fails_to_send -= 1
+            raise can.CanOperationError("no room")
+        super().send(msg, timeout)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        if self.fails_to_receive > 0:
+            self.fails_to_receive -= 1
+            raise can.CanOperationError("no room")
+        return super()._recv_internal(timeout)
+
+
+@pytest.fixture
+def flaky(request: pytest.FixtureRequest) -> Iterator[Flaky]:
+    bus = Flaky(request.node.name)
+    yield bus
+    bus.shutdown()
+
+
+def test_a_bus_that_failed_once_is_used_again(flaky: Flaky, motor: Motor) -> None:
+    with rmd.open(from_python_can(flaky), timeout=2) as motors:
+        one = motors.motor(7)
+        one.speed(100)
+        for _ in range(20):
+            flaky.fails_to_send = 1
+            with pytest.raises(motorlink.LineLost, match="no room"):
+                one.motion
+            assert one.motion.speed_dps == 7
+            flaky.fails_to_receive = 1
+            eventually(lambda: flaky.fails_to_receive == 0, "a failure while nothing is asked")
+            # What happened meanwhile does not keep the motor from being stopped.
+            one.stop()
+            assert motors.moving == []
+            one.speed(100)
+    assert motor.heard[-1] == 0x81
+
+
+def test_stops_are_sent_where_nothing_can_be_received(flaky: Flaky, motor: Motor) -> None:
+    with rmd.open(from_python_can(flaky), timeout=2, on_close="nothing") as motors:
+        motors.motor(7).speed(100)
+        flaky.fails_to_receive = 1_000_000
+        for stop, code in ((motors.motor(7).stop, 0x81), (motors.motor(7).off, 0x80)):
+            for _ in range(3):
+                motor.heard.clear()
+                with pytest.raises(motorlink.LineLost, match="no room"):
+                    stop()
+                eventually(lambda: motor.heard == [code], "a frame that stops the motor")
+
+
+def test_a_bus_that_failed_once_is_used_again_by_asyncio(flaky: Flaky, motor: Motor) -> None:
+    async def main() -> None:
+        async with aio.rmd.open(from_python_can(flaky), timeout=2) as motors:
+            one = motors.motor(7)
+            await one.speed(100)
+            for _ in range(20):
+                flaky.fails_to_send = 1
+                with pytest.raises(motorlink.LineLost, match="no room"):
+                    await one.motion()
+                assert (await one.motion()).speed_dps == 7
+                flaky.fails_to_receive = 1
+                while flaky.fails_to_receive:
+                    await asyncio.sleep(0.005)
+                await one.stop()
+                assert motors.moving == []
+                await one.speed(100)
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+    assert motor.heard[-1] == 0x81
+
+
+INTERRUPTED = """\
+import can, motorlink
+from test_can import Motor
+other = Motor("interrupted", 7)
+with can.Bus("interrupted", interface="virtual") as line:
+    try:
+        with motorlink.rmd.open(motorlink.can.from_python_can(line), timeout=30.0) as bus:
+            for _ in range(3):
+                bus.motor(7).speed(100)
+                try:
+                    print("asks", flush=True)
+                    bus.motor(3).motion
+                except KeyboardInterrupt:
+                    print("interrupted", bus.motor(7).motion.speed_dps, flush=True)
+            print("asks", flush=True)
+            bus.motor(3).motion
+    finally:
+        print(other.heard[-1] == 0x81, flush=True)
+        other.end()
+"""
+
+
+def test_ctrl_c_interrupts_a_wait_and_leaves_the_bus_open() -> None:
+    words = [sys.executable, "-c", INTERRUPTED]
+    folder = Path(__file__).parent
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder) as program:
+        assert program.stdout
+        try:
+            for line in ["interrupted 7\n"] * 3 + ["True\n"]:
+                assert program.stdout.readline() == "asks\n"
+                program.send_signal(signal.SIGINT)
+                assert program.stdout.readline() == line
+            _, err = program.communicate(timeout=60)
+            assert err.splitlines()[-1] == "KeyboardInterrupt"
+        finally:
+            program.kill()
 
 
 def test_and_in_asyncio() -> None:

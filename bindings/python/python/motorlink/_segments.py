@@ -14,7 +14,8 @@ class Segments:
     """The data segments of a drive: those that a program chose registers for, and those of samplings."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        # A signal handler may come in between.
+        self._lock = threading.RLock()
         self._chosen: dict[int, list[str | int]] = {}
         self._sampled: set[int] = set()
 

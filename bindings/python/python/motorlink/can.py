@@ -29,9 +29,12 @@ def from_python_can(bus: Any) -> CanPort:
     nobody is on this bus
 
     ``bus`` stays the caller's: opened at 1 Mbit/s before, shut down afterwards. Nothing else may receive
-    from it meanwhile, no ``can.Notifier`` either: what one receives the other misses. Where the bus
-    raises, the line is lost (``LineLost``, with what was raised as its cause), and is not opened again.
-    In asyncio a thread receives, and the bus's own ``send`` runs in the loop's thread.
+    from it meanwhile, no ``can.Notifier`` either: what one receives the other misses. Until the bus of
+    :func:`motorlink.rmd.open` is closed, one thread calls ``bus.recv`` and another one ``bus.send``.
+
+    Where the bus raises, the exchange fails (``LineLost``, with what was raised as its cause). The next
+    call uses the bus again. ``stop`` and ``off`` are sent even if receiving failed before. Ctrl-C is no
+    failure: it ends the wait, and the bus stays open.
 
     Raises ``ImportError`` where python-can is not installed.
     """

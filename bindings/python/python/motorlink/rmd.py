@@ -16,6 +16,9 @@ clockwise. Every method of a motor is one exchange and raises
 * ``BadValue`` where nothing was sent: no such motor, out of range, over a limit,
 * ``Closed`` after ``bus.close()``.
 
+Ctrl-C and handlers of signals: as in :mod:`motorlink.st`. A motor that did not answer in time is waited
+for before it is told anything else; ``stop()`` and ``off()`` do not wait.
+
 Names in brackets are paragraphs of chapter 3 of the document, or codes of commands.
 """
 

@@ -20,7 +20,13 @@ Every method of a motor is one exchange unless it says otherwise, and raises
 
 Paragraphs in brackets are those of the document "Motor Control Protocol". Ctrl-C ends a wait for a
 silent drive at once; nobody knows then what the drive did, and the next exchange recovers the line
-first. While motors are being stopped at the end it has to wait.
+first. ``stop()`` does not wait for that: it is sent at once, and again on the recovered line. While
+motors are being stopped at the end Ctrl-C has to wait.
+
+A signal handler may use the bus that the main thread waits for, such as ``motor.stop()`` or
+``bus.close()``. The exchange that it interrupted is given up then and raises ``PortError``. A handler
+that does not use the bus does not disturb the exchange. If another thread has an exchange under way,
+the handler waits until that is over.
 """
 
 from __future__ import annotations

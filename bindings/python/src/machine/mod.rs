@@ -13,26 +13,34 @@ use std::time::Duration;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-use crate::error::closed;
+use crate::error::{closed, elsewhere};
+use crate::shared::Owner;
 
 /// What a machine drives, until it is closed. Only its opening and closing wait, and they may do so
 /// in another thread; everything else belongs to the thread of the event loop.
 struct Driven<T> {
     state: Mutex<Option<T>>,
     port: String,
+    owner: Owner,
 }
 
 impl<T: Send> Driven<T> {
     fn new(state: T, port: String) -> Self {
-        Driven { state: Mutex::new(Some(state)), port }
+        Driven { state: Mutex::new(Some(state)), port, owner: Owner::new() }
     }
 
-    /// A step, which does not wait.
-    fn step<R>(&self, py: Python<'_>, step: impl FnOnce(&mut T) -> PyResult<R>) -> PyResult<R> {
-        let mut state = self.state.try_lock().map_err(|_| {
-            PyRuntimeError::new_err(format!("{} is being opened or closed", self.port))
-        })?;
-        step(state.as_mut().ok_or_else(|| closed(py, &self.port))?)
+    /// A step, which does not wait. No Python code may run in it: handlers of signals would run there,
+    /// too, and could not close what the step has locked.
+    fn step<R>(&self, py: Python<'_>, step: impl FnOnce(&mut T) -> R) -> PyResult<R> {
+        self.check_owner(py)?;
+        let done = match self.state.try_lock() {
+            Ok(mut state) => state.as_mut().map(step),
+            Err(_) => {
+                let why = format!("{} is being opened or closed", self.port);
+                return Err(PyRuntimeError::new_err(why));
+            }
+        };
+        done.ok_or_else(|| closed(py, &self.port))
     }
 
     /// What may wait, while other Python threads run.
@@ -41,13 +49,18 @@ impl<T: Send> Driven<T> {
         py: Python<'_>,
         act: impl FnOnce(&mut T) -> R + Send,
     ) -> PyResult<R> {
+        self.check_owner(py)?;
         let done = py.detach(|| self.lock().as_mut().map(act));
         done.ok_or_else(|| closed(py, &self.port))
     }
 
-    /// Ends it; nothing the second time.
+    /// Ends it; nothing the second time, nor in another process.
     fn take(&self) -> Option<T> {
-        self.lock().take()
+        if self.owner.is_here() { self.lock().take() } else { None }
+    }
+
+    fn check_owner(&self, py: Python<'_>) -> PyResult<()> {
+        if self.owner.is_here() { Ok(()) } else { Err(elsewhere(py, &self.port)) }
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<T>> {

@@ -1,8 +1,5 @@
 //! A CAN bus with RMD motors, for event loops.
 
-use std::sync::{Mutex, PoisonError};
-use std::thread::JoinHandle;
-
 use motorlink::LinkState;
 use motorlink::port::PortName;
 use motorlink::rmd::{EventBus, Found, MotorId, OnDrop};
@@ -10,7 +7,7 @@ use motorlink_proto::rmd::{Command, ReadStatus1, Torque};
 use pyo3::prelude::*;
 
 use super::{Driven, fileno, outcome, seconds};
-use crate::can::CanPort;
+use crate::can::{CanPort, Threads};
 use crate::error::{bad_value, rmd_error};
 use crate::rmd::{RmdRequest, finding, four_torques, limits, motor_id, motor_ids, options};
 
@@ -19,8 +16,8 @@ use crate::rmd::{RmdRequest, finding, four_torques, limits, motor_id, motor_ids,
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdMachine {
     driven: Driven<Motors>,
-    /// Receives from a bus of another program.
-    reader: Mutex<Option<JoinHandle<()>>>,
+    /// Those of a bus of python-can.
+    threads: Option<Threads>,
 }
 
 struct Motors {
@@ -48,9 +45,9 @@ enum Asked {
 }
 
 impl RmdMachine {
-    fn new(bus: EventBus, port: String, reader: Option<JoinHandle<()>>) -> Self {
+    fn new(bus: EventBus, port: String, threads: Option<Threads>) -> Self {
         let motors = Motors { bus, asked: [const { Asked::Found }; MotorId::COUNT] };
-        RmdMachine { driven: Driven::new(motors, port), reader: Mutex::new(reader) }
+        RmdMachine { driven: Driven::new(motors, port), threads }
     }
 }
 
@@ -77,9 +74,12 @@ impl RmdMachine {
         match port {
             CanBus::Port(port) => {
                 let port = port.get();
-                let (link, reader) = port.event_link()?;
-                let bus = EventBus::over(port.name(), link, options);
-                Ok(Self::new(bus, port.name().to_owned(), Some(reader)))
+                let threads = port.start()?;
+                let mut links = threads.links();
+                let open = Box::new(move || Ok(Box::new(links()) as _));
+                let bus = EventBus::open_with(port.name(), open, options);
+                let bus = bus.map_err(|error| rmd_error(py, &error))?;
+                Ok(Self::new(bus, port.name().to_owned(), Some(threads)))
             }
             CanBus::Name(port) => {
                 let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
@@ -93,7 +93,7 @@ impl RmdMachine {
     /// Whether the port is open.
     #[getter]
     fn is_open(&self, py: Python<'_>) -> PyResult<bool> {
-        self.driven.step(py, |motors| Ok(motors.bus.link_state() == LinkState::Open))
+        self.driven.step(py, |motors| motors.bus.link_state() == LinkState::Open)
     }
 
     /// Opens the port if it is closed and its back-off is over, which may wait.
@@ -104,7 +104,7 @@ impl RmdMachine {
 
     /// The descriptor to watch; `None` where there is none.
     fn fileno(&self, py: Python<'_>) -> PyResult<Option<i32>> {
-        self.driven.step(py, |motors| Ok(fileno(motors.bus.descriptor())))
+        self.driven.step(py, |motors| fileno(motors.bus.descriptor()))
     }
 
     /// Begins an exchange with a motor that has none under way. One in quarantine is waited for if
@@ -112,59 +112,63 @@ impl RmdMachine {
     #[pyo3(signature = (id, request, *, patient = true))]
     fn ask(&self, py: Python<'_>, id: i64, request: &RmdRequest, patient: bool) -> PyResult<()> {
         let id = motor_id(py, id)?;
-        self.driven.step(py, |motors| {
+        let begun = self.driven.step(py, |motors| {
             let data = request.data();
-            let begun =
-                if patient { motors.bus.ask(id, data) } else { motors.bus.request(id, data) };
-            begun.map_err(|error| rmd_error(py, &error))?;
+            if patient { motors.bus.ask(id, data) } else { motors.bus.request(id, data) }?;
             motors.expect(id, Asked::Value(request.clone()));
             Ok(())
-        })
+        })?;
+        begun.map_err(|error| rmd_error(py, &error))
     }
 
     /// Begins to look for a motor under an ID; ends in what was found, `None` if nothing.
     fn look_for(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
-        self.driven.step(py, |motors| {
-            let begun = motors.bus.ask(id, ReadStatus1.encode());
-            begun.map_err(|error| rmd_error(py, &error))?;
+        let begun = self.driven.step(py, |motors| {
+            motors.bus.ask(id, ReadStatus1.encode())?;
             motors.expect(id, Asked::Found);
             Ok(())
-        })
+        })?;
+        begun.map_err(|error| rmd_error(py, &error))
     }
 
     /// Begins exchanges with those of motors 1 to 4 that are expected to answer: torque currents, A,
     /// for all four, in one frame.
     fn torque4(&self, py: Python<'_>, amps: [f64; 4], expect: Vec<i64>) -> PyResult<()> {
         let (torques, expect) = (four_torques(py, amps)?, motor_ids(py, expect)?);
-        self.driven.step(py, |motors| {
-            let begun = motors.bus.torque4(torques, expect);
-            begun.map_err(|error| rmd_error(py, &error))?;
+        let begun = self.driven.step(py, |motors| {
+            motors.bus.torque4(torques, expect)?;
             for id in expect {
                 motors.expect(id, Asked::Value(RmdRequest::of(Torque::default())));
             }
             Ok(())
-        })
+        })?;
+        begun.map_err(|error| rmd_error(py, &error))
     }
 
     /// Moves what can be moved at once. Gives after how many s to go on, `None` while no exchange is
     /// under way, and the exchanges that are over: ID, and the value or the exception in its place.
     fn advance(&self, py: Python<'_>) -> PyResult<(Option<f64>, Over)> {
-        self.driven.step(py, |motors| {
-            let Motors { bus, asked } = motors;
+        let (wait, over) = self.driven.step(py, |Motors { bus, asked }| {
             let mut over = Vec::new();
             let wait = bus.advance(|id, result| {
-                let value = match &asked[usize::from(id.number()) - 1] {
-                    Asked::Found => Found::of(id, result)
-                        .map_or_else(|| Ok(py.None()), |found| finding(py, found)),
-                    Asked::Value(request) => result
-                        .map_err(|error| rmd_error(py, &error))
-                        .and_then(|reply| request.value(py, &reply)),
-                };
-                over.push((id.number(), outcome(py, value)));
+                over.push((id, asked[usize::from(id.number()) - 1].clone(), result));
             });
-            Ok((seconds(wait.map_err(|error| rmd_error(py, &error))?), over))
-        })
+            (wait, over)
+        })?;
+        let wait = wait.map_err(|error| rmd_error(py, &error))?;
+        let value = |(id, asked, result)| {
+            let value = match asked {
+                Asked::Found => {
+                    Found::of(id, result).map_or_else(|| Ok(py.None()), |found| finding(py, found))
+                }
+                Asked::Value(request) => result
+                    .map_err(|error| rmd_error(py, &error))
+                    .and_then(|reply| request.value(py, &reply)),
+            };
+            (id.number(), outcome(py, value))
+        };
+        Ok((seconds(wait), over.into_iter().map(value).collect()))
     }
 
     /// Gives up the exchange with a motor, if there is one.
@@ -172,7 +176,6 @@ impl RmdMachine {
         let id = motor_id(py, id)?;
         self.driven.step(py, |motors| {
             motors.bus.cancel(id);
-            Ok(())
         })
     }
 
@@ -189,7 +192,6 @@ impl RmdMachine {
         let limits = limits(py, current_a, speed_dps, angle_deg)?;
         self.driven.step(py, |motors| {
             motors.bus.set_limits(id, limits);
-            Ok(())
         })
     }
 
@@ -209,9 +211,7 @@ impl RmdMachine {
             let bus = self.driven.take().map(|motors| motors.bus.into_bus());
             let stop = bus.filter(|_| stop);
             let stopped = stop.map_or_else(Vec::new, |bus| bus.guard().with(action).stop_now());
-            // From here on nobody receives from a bus that its owner may shut down.
-            let reader = self.reader.lock().unwrap_or_else(PoisonError::into_inner).take();
-            reader.map(JoinHandle::join);
+            self.threads.iter().for_each(Threads::end);
             stopped
         });
         let failed = stopped.into_iter().filter_map(|one| {

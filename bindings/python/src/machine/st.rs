@@ -25,16 +25,14 @@ struct Line {
 }
 
 /// A reply that fits its request.
-enum Read<'a> {
-    Answer(&'a StRequest, Answer),
+enum Read {
+    Answer(Py<StRequest>, Answer),
     Bytes(Vec<u8>),
 }
 
-fn understand<'a>(asked: Option<&'a StRequest>, payload: &[u8]) -> Option<Read<'a>> {
-    match asked {
-        Some(request) => Some(Read::Answer(request, request.understand(payload)?)),
-        None => Some(Read::Bytes(payload.to_vec())),
-    }
+fn understand(py: Python<'_>, asked: Option<&Py<StRequest>>, payload: &[u8]) -> Option<Read> {
+    let Some(request) = asked else { return Some(Read::Bytes(payload.to_vec())) };
+    Some(Read::Answer(request.clone_ref(py), request.get().understand(payload)?))
 }
 
 #[pymethods]
@@ -69,7 +67,7 @@ impl StMachine {
     /// Whether the port is open.
     #[getter]
     fn is_open(&self, py: Python<'_>) -> PyResult<bool> {
-        self.driven.step(py, |line| Ok(line.client.link_state() == LinkState::Open))
+        self.driven.step(py, |line| line.client.link_state() == LinkState::Open)
     }
 
     /// Opens the port if it is closed and its back-off is over, which may wait.
@@ -80,52 +78,53 @@ impl StMachine {
 
     /// The descriptor to watch; `None` where there is none.
     fn fileno(&self, py: Python<'_>) -> PyResult<Option<i32>> {
-        self.driven.step(py, |line| Ok(fileno(line.client.descriptor())))
+        self.driven.step(py, |line| fileno(line.client.descriptor()))
     }
 
     /// Begins an exchange; one that is under way is abandoned.
     fn begin(&self, py: Python<'_>, motor: i64, request: Py<StRequest>) -> PyResult<()> {
         let motor = motor_number(py, motor)?;
-        self.driven.step(py, |line| {
+        let begun = self.driven.step(py, |line| {
             line.asked = None;
-            let begun = line.client.begin(motor, &request.get().request());
-            begun.map_err(|error| st_error(py, &error))?;
+            line.client.begin(motor, &request.get().request())?;
             line.asked = Some(request);
             Ok(())
-        })
+        })?;
+        begun.map_err(|error| st_error(py, &error))
     }
 
     /// Begins an exchange with any frame code and payload; its value is the reply's payload.
     fn begin_raw(&self, py: Python<'_>, motor: i64, code: i64, payload: &[u8]) -> PyResult<()> {
         let (motor, code) = (motor_number(py, motor)?, frame_code(py, code)?);
-        self.driven.step(py, |line| {
+        let begun = self.driven.step(py, |line| {
             line.asked = None;
-            let begun = line.client.begin_raw(motor, code, payload);
-            begun.map_err(|error| st_error(py, &error))
-        })
+            line.client.begin_raw(motor, code, payload)
+        })?;
+        begun.map_err(|error| st_error(py, &error))
     }
 
     /// Moves what can be moved at once. `(True, value)`, or the exception in its place, when the
     /// exchange is over; else `False` and after how many s to go on, `None` while none is under way.
     fn advance(&self, py: Python<'_>) -> PyResult<(bool, Option<Py<PyAny>>)> {
-        self.driven.step(py, |line| {
-            let asked = line.asked.as_ref().map(Py::get);
-            match line.client.advance(|payload| understand(asked, payload)) {
-                Progress::Wait(wait) => {
-                    let wait = seconds(wait).map(|wait| wait.into_py_any(py)).transpose()?;
-                    Ok((false, wait))
-                }
-                Progress::Done(result) => {
-                    let value = result.map_err(|error| st_error(py, &error));
-                    let value = value.and_then(|reply| match reply {
-                        Read::Answer(request, answer) => request.value(py, answer),
-                        Read::Bytes(bytes) => PyBytes::new(py, &bytes).into_py_any(py),
-                    });
-                    line.asked = None;
-                    Ok((true, Some(outcome(py, value))))
-                }
+        let progress = self.driven.step(py, |Line { client, asked }| {
+            let progress = client.advance(|payload| understand(py, asked.as_ref(), payload));
+            if matches!(progress, Progress::Done(_)) {
+                *asked = None;
             }
-        })
+            progress
+        })?;
+        let result = match progress {
+            Progress::Wait(wait) => {
+                let wait = seconds(wait).map(|wait| wait.into_py_any(py)).transpose()?;
+                return Ok((false, wait));
+            }
+            Progress::Done(result) => result.map_err(|error| st_error(py, &error)),
+        };
+        let value = result.and_then(|reply| match reply {
+            Read::Answer(request, answer) => request.get().value(py, answer),
+            Read::Bytes(bytes) => PyBytes::new(py, &bytes).into_py_any(py),
+        });
+        Ok((true, Some(outcome(py, value))))
     }
 
     /// Gives up the exchange that is under way, if there is one.
@@ -133,7 +132,6 @@ impl StMachine {
         self.driven.step(py, |line| {
             line.asked = None;
             line.client.abandon();
-            Ok(())
         })
     }
 

@@ -1,7 +1,7 @@
 //! A CAN bus with RMD motors, for threads that may wait.
 
 use motorlink::Clock;
-use motorlink::port::{CanLink, PortName};
+use motorlink::port::PortName;
 use motorlink::rmd::{
     Bus, CentiDegrees, Error, Found, Limits, MotorId, MotorSet, OnDrop, Options, SpeedLimit,
     Torque4, TorqueCommand,
@@ -12,7 +12,7 @@ use pyo3::types::{PyByteArray, PyDict, PyList};
 
 use super::request::{RmdRequest, motion_status, motor_id, motor_status, torque};
 use super::sample::{Questions, sample};
-use crate::can::AnyPort;
+use crate::can::{AnyPort, Threads};
 use crate::error::{bad_value, rmd_error};
 use crate::number::{limit, span};
 use crate::sampling::Plan;
@@ -30,6 +30,8 @@ pub(crate) struct RmdBus {
     bus: Shared<Bus>,
     clock: Clock,
     deafness: Deafness,
+    /// Those of a bus of python-can.
+    threads: Option<Threads>,
 }
 
 #[pymethods]
@@ -52,27 +54,29 @@ impl RmdBus {
         let limits = limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?;
         let options = options(py, timeout, guard, limits)?;
         let deafness = Deafness::default();
-        let (bus, port, clock) = match port {
+        let mut threads = None;
+        let (bus, port) = match port {
             AnyPort::Other(Port::Name(name)) => {
                 let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
-                let deaf = deafness.clone();
-                let wrap = move |link| Box::new(deaf.around(link)) as Box<dyn CanLink>;
-                let bus = py.detach(|| Bus::open_wrapped(&name, wrap, options));
+                let bus = py.detach(|| Bus::open(&name, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
-                let clock = bus.clock();
-                (bus, name.to_string(), clock)
+                (bus.looking(deafness.look()), name.to_string())
             }
             AnyPort::Other(Port::Sim(port)) => {
                 let bus = Bus::over(SimPort::NAME, port.can(py)?, options);
-                (bus, SimPort::NAME.to_owned(), port.clock())
+                (bus, SimPort::NAME.to_owned())
             }
             AnyPort::Can(port) => {
                 let port = port.get();
-                let bus = Bus::over(port.name(), port.link(), options);
-                (bus, port.name().to_owned(), Clock::running())
+                let mut links = threads.insert(port.start()?).links();
+                let open = Box::new(move || Ok(Box::new(links()) as _));
+                let bus = Bus::open_with(port.name(), open, options);
+                let bus = bus.map_err(|error| rmd_error(py, &error))?;
+                (bus.looking(deafness.look()), port.name().to_owned())
             }
         };
-        Ok(RmdBus { bus: Shared::new(bus, port), clock, deafness })
+        let clock = bus.clock();
+        Ok(RmdBus { bus: Shared::new(bus, port), clock, deafness, threads })
     }
 
     /// One exchange; gives what the request makes of the reply.
@@ -195,10 +199,13 @@ impl RmdBus {
     fn close(&self, py: Python<'_>, stop: bool, off: bool) -> Vec<(u8, PyErr)> {
         let action = if off { OnDrop::Off } else { OnDrop::Stop };
         let halt = |bus: &Bus| {
+            bus.abandon();
             let stop_now = || bus.guard().with(action).stop_now();
             if stop { self.deafness.during(stop_now) } else { Vec::new() }
         };
-        let failed = self.bus.close(py, halt).into_iter().filter_map(|one| {
+        let stopped = self.bus.close(py, halt);
+        py.detach(|| self.threads.iter().for_each(Threads::end));
+        let failed = stopped.into_iter().filter_map(|one| {
             one.result.err().map(|error| (one.id.number(), rmd_error(py, &error)))
         });
         failed.collect()

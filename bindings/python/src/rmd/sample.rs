@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use motorlink::Clock;
+use motorlink::port::PortError;
 use motorlink::rmd::{Bus, Error, MotorId};
 use motorlink_proto::rmd::Code;
 use pyo3::prelude::*;
@@ -77,7 +78,8 @@ impl Questions {
 }
 
 /// Samples until the plan is done or something fails; gives what was sampled in either case. With
-/// `skip` a motor that fails to answer costs the row and nothing else.
+/// `skip` a motor that fails to answer costs the row and nothing else; so does a signal's handler that
+/// uses the bus.
 pub(super) fn sample(
     bus: &Bus,
     clock: &Clock,
@@ -87,12 +89,15 @@ pub(super) fn sample(
     skip: bool,
 ) -> (Rows, PyResult<()>) {
     let mut rows = Rows::default();
-    let outcome = plan.run(clock, look, |time| match replies(bus, questions) {
+    let outcome = plan.run(clock, &look, |time| match replies(bus, questions) {
         Ok(replies) => {
             rows.push(time, &questions.values(&replies));
             Ok(())
         }
         Err(error) if skip && error.is_line_failure() => Ok(()),
+        Err(Error::Port(error)) if matches!(*error, PortError::Overtaken { .. }) => {
+            Python::attach(&look)
+        }
         Err(error) => Err(Python::attach(|py| rmd_error(py, &error))),
     });
     (rows, outcome)

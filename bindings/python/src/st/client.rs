@@ -1,7 +1,7 @@
 //! A serial line with an ST drive, for threads that may wait.
 
 use motorlink::Clock;
-use motorlink::port::{ByteLink, PortName};
+use motorlink::port::PortName;
 use motorlink::stmcp::{Client, Limits, Motor, Options, Profile, Recovery};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyList};
@@ -49,10 +49,9 @@ impl StClient {
         let (client, port, clock) = match port {
             Port::Name(name) => {
                 let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
-                let deaf = deafness.clone();
-                let wrap = move |link| Box::new(deaf.around(link)) as Box<dyn ByteLink>;
-                let client = py.detach(|| Client::open_wrapped(&name, wrap, options));
+                let client = py.detach(|| Client::open(&name, options));
                 let client = client.map_err(|error| st_error(py, &error))?;
+                let client = client.looking(deafness.look());
                 let clock = client.clock();
                 (client, name.to_string(), clock)
             }
@@ -138,6 +137,7 @@ impl StClient {
     #[pyo3(signature = (*, stop))]
     fn close(&self, py: Python<'_>, stop: bool) -> Vec<(u8, PyErr)> {
         let halt = |client: &Client| {
+            client.abandon();
             let stop_now = || client.guard().stop_now();
             if stop { self.deafness.during(stop_now) } else { Vec::new() }
         };

@@ -3,6 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use motorlink::Clock;
+use motorlink::port::PortError;
 use motorlink::stmcp::register::Access;
 use motorlink::stmcp::{Client, Error, Profile, RegisterId, SEGMENT_REGISTERS};
 use pyo3::prelude::*;
@@ -168,7 +169,7 @@ fn is_segment(profile: Profile, registers: &[RegisterId]) -> bool {
 }
 
 /// Samples until the plan is done or something fails; gives what was sampled in either case. With
-/// `skip` a line that fails costs the row and nothing else.
+/// `skip` a line that fails costs the row and nothing else; so does a signal's handler that uses it.
 pub(super) fn sample(
     client: &Client,
     clock: &Clock,
@@ -182,11 +183,12 @@ pub(super) fn sample(
     if let Err(error) = reading.carry_out(client) {
         return (rows, Err(raised(error)));
     }
-    let outcome = plan.run(clock, look, |time| {
+    let outcome = plan.run(clock, &look, |time| {
         reading.begin();
         match reading.carry_out(client) {
             Ok(()) => rows.push(time, &reading.values),
             Err(error) if skip && error.is_line_failure() => {}
+            Err(Error::Port(PortError::Overtaken { .. })) => Python::attach(&look)?,
             Err(error) => return Err(raised(error)),
         }
         Ok(())

@@ -1,0 +1,257 @@
+"""Handlers of signals that use the bus which the interrupted code waits for."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from conftest import Served, eventually
+from drive import REGISTERS, START, STOP, Drive, frame
+
+#: How often what once hung in most runs, but not in all, is tried.
+RUNS = 20
+
+#: How long a program may take that waits for nothing, s.
+PATIENT = 60
+
+BEGIN = """
+    import os, random, signal, sys, threading, time, motorlink
+
+    def on_signal(act):
+        signal.signal(signal.SIGUSR1, lambda *_: act())
+
+    def signal_later(wait=0.0):
+        threading.Timer(wait, os.kill, (os.getpid(), signal.SIGUSR1)).start()
+
+    def signals_until(done):
+        # From another thread, at random instants.
+        def shoot():
+            while not done():
+                time.sleep(random.uniform(0.0, 0.02))
+                os.kill(os.getpid(), signal.SIGUSR1)
+        thread = threading.Thread(target=shoot)
+        thread.start()
+        return thread
+
+    def waits(wait):
+        try:
+            wait()
+            print("went on", flush=True)
+        except motorlink.MotorlinkError as error:
+            print(type(error).__name__, "given up" in str(error), flush=True)
+"""
+
+
+def program(script: str, *arguments: str) -> subprocess.Popen[str]:
+    """A Python program in this folder."""
+    words = [sys.executable, "-c", textwrap.dedent(BEGIN) + textwrap.dedent(script), *arguments]
+    folder = Path(__file__).parent
+    return subprocess.Popen(
+        words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder
+    )
+
+
+def ends(process: subprocess.Popen[str]) -> list[str]:
+    """What a program says until it ends, which it has to."""
+    try:
+        out, err = process.communicate(timeout=PATIENT)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        raise AssertionError("it hangs") from None
+    assert process.returncode == 0, err
+    return out.splitlines()
+
+
+STOP_WHILE_DEAF = """
+    with motorlink.st.open(sys.argv[1], timeout=30.0, on_close="nothing") as bus:
+        motor = bus.motor(1)
+        motor.start()
+        on_signal(motor.stop)
+        signal_later(0.1)
+        waits(lambda: motor.read("SPEED_REF"))
+        print(bus.started)
+"""
+
+
+def test_a_handler_stops_a_motor_while_an_answer_is_awaited(tmp_path: Path) -> None:
+    drive = Drive(tmp_path / "st0", 3)
+    drive.is_deaf_to = REGISTERS["SPEED_REF"]
+    try:
+        for _ in range(RUNS):
+            drive.executed.clear()
+            assert ends(program(STOP_WHILE_DEAF, str(drive.path))) == ["PortError True", "[]"]
+            # At once, and again when the line has recovered.
+            assert drive.executed == [(1, START), (1, STOP), (1, STOP)]
+    finally:
+        drive.unplug()
+
+
+CLOSE_WHILE_SILENT = """
+    bus = motorlink.st.open(sys.argv[1], timeout=0.2)
+    def close():
+        try:
+            bus.close()
+        except motorlink.LineLost:
+            print("may still be running", flush=True)
+    on_signal(close)
+    signal_later(0.1)
+    waits(lambda: bus.motor(1).start())
+    waits(lambda: bus.motor(1).start())
+"""
+
+
+def test_a_handler_closes_a_bus_whose_drive_is_silent() -> None:
+    for _ in range(4):
+        ours, theirs = os.openpty()
+        try:
+            said = ends(program(CLOSE_WHILE_SILENT, os.ttyname(theirs)))
+            assert said == ["may still be running", "PortError True", "Closed False"]
+            start, stop = frame(0x23, bytes([START])), frame(0x23, bytes([STOP]))
+            assert os.read(ours, 4096).startswith(start + stop)
+        finally:
+            os.close(ours)
+            os.close(theirs)
+
+
+IDLE_HANDLER = """
+    ran = []
+    with motorlink.st.open(sys.argv[1], timeout=30.0) as bus:
+        motor = bus.motor(1)
+        on_signal(lambda: ran.append(bus.started))
+        for _ in range(20):
+            signal_later(0.01)
+            print(motor.read("SPEED_MEAS"), flush=True)
+    assert len(ran) == 20, ran
+"""
+
+
+def test_a_handler_that_sends_nothing_does_not_disturb_an_exchange(tmp_path: Path) -> None:
+    drive = Drive(tmp_path / "st0", 3, delay=lambda: 0.12)
+    try:
+        said = ends(program(IDLE_HANDLER, str(drive.path)))
+        assert len(set(said)) == 1 and len(said) == 20
+    finally:
+        drive.unplug()
+
+
+HANDLER_AT_RANDOM = """
+    kind, port = sys.argv[1:]
+    done = []
+    def stop():
+        bus.motor(1).stop()
+        done.append(True)
+    on_signal(stop)
+    going = True
+    with getattr(motorlink, kind).open(port, timeout=2.0) as bus:
+        thread = signals_until(lambda: not going)
+        while len(done) < 50:
+            try:
+                bus.motor(1).read("STATUS") if kind == "st" else bus.motor(1).motion
+            except motorlink.PortError as error:
+                assert "given up" in str(error), error
+        data = bus.sample(["SPEED_MEAS" if kind == "st" else "iq_a"], rate=200, seconds=0.3)
+        going = False
+        thread.join()
+    print(len(data) > 0)
+"""
+
+
+@pytest.mark.parametrize("kind", ["st", "rmd"])
+def test_handlers_stop_motors_whenever_they_come(served: Served, kind: str) -> None:
+    port = served.st if kind == "st" else served.can
+    assert ends(program(HANDLER_AT_RANDOM, kind, port)) == ["True"]
+
+
+STOP_ON_PYTHON_CAN = """
+    import can
+    from test_can import Motor
+    other = Motor("handlers", 7)
+    with can.Bus("handlers", interface="virtual") as line:
+        with motorlink.rmd.open(motorlink.can.from_python_can(line), timeout=2.0) as bus:
+            motor = bus.motor(7)
+            done = []
+            def stop():
+                motor.stop()
+                done.append(True)
+            on_signal(stop)
+            thread = signals_until(lambda: len(done) >= 10)
+            while thread.is_alive():
+                try:
+                    motor.speed(100)
+                    motor.motion
+                except motorlink.PortError as error:
+                    assert "given up" in str(error), error
+            print(0x81 in other.heard)
+    other.end()
+"""
+
+
+def test_a_handler_stops_a_motor_on_a_bus_of_python_can() -> None:
+    for _ in range(RUNS):
+        assert ends(program(STOP_ON_PYTHON_CAN)) == ["True"]
+
+
+ASYNCIO = """
+    import asyncio
+    async def main():
+        async with motorlink.aio.st.open(sys.argv[1], timeout=30.0) as bus:
+            motor = bus.motor(1)
+            await motor.start()
+            loop = asyncio.get_running_loop()
+            waiting = loop.create_task(motor.read("SPEED_REF"))
+            loop.add_signal_handler(signal.SIGUSR1, waiting.cancel)
+            signal_later(0.1)
+            await asyncio.wait([waiting])
+            await motor.stop()
+            print(waiting.cancelled(), bus.started)
+    asyncio.run(main())
+"""
+
+
+def test_a_handler_of_an_event_loop_cancels_a_wait_and_stops_the_motor(tmp_path: Path) -> None:
+    drive = Drive(tmp_path / "st0", 3)
+    drive.is_deaf_to = REGISTERS["SPEED_REF"]
+    try:
+        assert ends(program(ASYNCIO, str(drive.path))) == ["True []"]
+        assert drive.executed == [(1, START), (1, STOP), (1, STOP)]
+    finally:
+        drive.unplug()
+
+
+SECOND_SIGNAL = """
+    with motorlink.st.open(sys.argv[1], timeout=30.0, on_close="nothing") as bus:
+        motor = bus.motor(1)
+        def stop():
+            signal.signal(signal.SIGUSR1, lambda *_: None)
+            signal_later(0.1)
+            try:
+                motor.read("SPEED_REF")
+            except KeyboardInterrupt:
+                print("interrupted", flush=True)
+            motor.stop()
+        on_signal(stop)
+        signal_later(0.1)
+        waits(lambda: motor.read("SPEED_REF"))
+"""
+
+
+def test_a_handler_may_itself_be_interrupted(tmp_path: Path) -> None:
+    drive = Drive(tmp_path / "st0", 3)
+    drive.is_deaf_to = REGISTERS["SPEED_REF"]
+    nested = program(SECOND_SIGNAL, str(drive.path))
+    try:
+        eventually(lambda: drive.unanswered == 2, "a request from within another")
+        nested.send_signal(signal.SIGINT)
+        assert ends(nested) == ["interrupted", "PortError True"]
+        assert drive.executed == [(1, STOP), (1, STOP)]
+    finally:
+        nested.kill()
+        nested.communicate()
+        drive.unplug()
