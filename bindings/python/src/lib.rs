@@ -47,6 +47,12 @@ mod _core {
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 
+    /// The descriptors of ports that this process has open.
+    #[pyfunction]
+    fn open_descriptors() -> Vec<i32> {
+        motorlink::port::open_descriptors().collect()
+    }
+
     /// The command line, the program's name first; gives the exit code. It takes over the process's
     /// signals.
     #[pyfunction]

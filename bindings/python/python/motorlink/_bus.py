@@ -20,6 +20,21 @@ class HasPort(Protocol):
     def _port(self) -> _core.SimPort: ...
 
 
+def _leave_ports() -> None:
+    """Takes the ports of its parent from a process that was forked, which would keep them open.
+
+    The buses own the numbers, so that these stay in use: for nothing.
+    """
+    descriptors = _core.open_descriptors()
+    if descriptors:
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for descriptor in descriptors:
+            os.dup2(nothing, descriptor, inheritable=False)
+        os.close(nothing)
+
+
+os.register_at_fork(after_in_child=_leave_ports)
+
 Port = Union[str, "os.PathLike[str]", HasPort]
 
 
@@ -94,8 +109,8 @@ class Ending:
         Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
         port is closed all the same. Exchanges of other threads that are under way are waited for.
 
-        A bus that nobody closed is closed when it is collected, or when the program ends; a process
-        that forks leaves it to the parent.
+        A bus that nobody closed is closed when it is collected, or when the program ends. In a process
+        that was forked it is of no use (``Closed``), and its port is not open: that is the parent's.
         """
         self._end(in_flight=False)
 

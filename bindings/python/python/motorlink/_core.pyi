@@ -24,6 +24,7 @@ __all__ = [
     "StVerifiedWrite",
     "__version__",
     "cli",
+    "open_descriptors",
     "rmd_decode",
     "rmd_errors_text",
     "rmd_motor",
@@ -42,6 +43,7 @@ __version__: str
 ST_SEGMENTS: int
 
 def cli(words: Sequence[str]) -> int: ...
+def open_descriptors() -> list[int]: ...
 def st_register(
     name: str | int, profile: str = "spec", full_scale_amps: float | None = None
 ) -> RegisterInfo: ...

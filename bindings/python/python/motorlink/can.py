@@ -28,7 +28,8 @@ def from_python_can(bus: Any) -> CanPort:
     ...             print("nobody is on this bus")
     nobody is on this bus
 
-    ``bus`` stays the caller's: opened at 1 Mbit/s before, shut down afterwards. Nothing else may receive
+    ``bus`` stays the caller's: opened at 1 Mbit/s before, shut down afterwards, and in a process that
+    was forked it is the caller who has to close it. Nothing else may receive
     from it meanwhile, no ``can.Notifier`` either: what one receives the other misses. Until the bus of
     :func:`motorlink.rmd.open` is closed, one thread calls ``bus.recv`` and another one ``bus.send``.
 

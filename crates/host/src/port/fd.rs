@@ -9,6 +9,7 @@ use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::{Errno, read, write};
 use rustix::termios::{QueueSelector, tcflush};
 
+use super::descriptors::Listed;
 use super::{ByteLink, Deadline, PortError};
 
 /// How long the far end may take no byte at all before a write fails.
@@ -17,6 +18,8 @@ pub(super) const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 /// A [`ByteLink`] on a file descriptor.
 #[derive(Debug)]
 pub struct FdLink {
+    /// Before the descriptor: fields are dropped in order.
+    _listed: Listed,
     fd: OwnedFd,
     port: String,
 }
@@ -28,7 +31,7 @@ impl FdLink {
         fcntl_getfl(&fd)
             .and_then(|flags| fcntl_setfl(&fd, flags | OFlags::NONBLOCK))
             .map_err(|errno| PortError::in_use(&port, errno))?;
-        Ok(FdLink { fd, port })
+        Ok(FdLink { _listed: Listed::new(fd.as_fd()), fd, port })
     }
 
     fn lost(&self, errno: Errno) -> PortError {

@@ -4,6 +4,7 @@
 //! start no thread, allocate nothing in an exchange, and make one system call to send, one to wait
 //! and one to receive.
 
+mod descriptors;
 mod echo;
 mod emulated;
 mod error;
@@ -26,6 +27,7 @@ use motorlink_proto::rmd::CanFrame;
 use crate::Clock;
 use emulated::EmulatedLine;
 
+pub use descriptors::open_descriptors;
 pub use echo::EchoCanceller;
 pub use error::PortError;
 pub use event::{EventCan, EventLine, Evented};

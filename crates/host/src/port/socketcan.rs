@@ -12,6 +12,7 @@ use socketcan::{
     StandardId,
 };
 
+use super::descriptors::Listed;
 use super::{CanLink, Deadline, Interface, PortError, fd::wait};
 
 /// The error class of a controller that left the bus, in the mask of the kernel's error frames.
@@ -25,6 +26,8 @@ const ASK_AGAIN: Duration = Duration::from_micros(200);
 /// sends; it does not see them itself.
 #[derive(Debug)]
 pub struct SocketCanLink {
+    /// Before the descriptor: fields are dropped in order.
+    _listed: Listed,
     socket: CanSocket,
     interface: String,
 }
@@ -51,7 +54,7 @@ impl SocketCanLink {
             Some(Interface { is_bus_off: true, .. }) => return Err(PortError::BusOff { port }),
             _ => {}
         }
-        Ok(SocketCanLink { socket, interface: port })
+        Ok(SocketCanLink { _listed: Listed::new(socket.as_fd()), socket, interface: port })
     }
 
     /// Hands `frame` to the bus if the interface has room for it now.
