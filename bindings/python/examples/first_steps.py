@@ -20,8 +20,8 @@ else:
     st_port, rmd_port, wait = bench, bench, bench.run
 
 # %% An ST drive
-# `with` stops the motors that were started in it, however it ends: at its end, with an exception,
-# with Ctrl-C.
+# `with` stops the motors that were started in it, however it is left: at its end, with an exception,
+# with Ctrl-C or SIGTERM.
 with motorlink.st.open(st_port) as bus:
     print("drive   ", bus.info())
     motor = bus.motor(1)

@@ -29,16 +29,23 @@ impl Owner {
 
 /// What drives a line, and whose it is.
 pub(crate) struct Shared<T> {
-    line: RwLock<Option<Arc<T>>>,
+    line: RwLock<Line<T>>,
     /// Threads with exchanges that may set something moving.
     under_way: UnderWay,
     port: String,
     owner: Owner,
 }
 
+enum Line<T> {
+    Open(Arc<T>),
+    /// What moves is being stopped.
+    Closing(Arc<T>),
+    Closed,
+}
+
 impl<T: Send + Sync> Shared<T> {
     pub(crate) fn new(line: T, port: String) -> Self {
-        let line = RwLock::new(Some(Arc::new(line)));
+        let line = RwLock::new(Line::Open(Arc::new(line)));
         Shared { line, under_way: UnderWay::default(), port, owner: Owner::new() }
     }
 
@@ -65,41 +72,52 @@ impl<T: Send + Sync> Shared<T> {
             return Err(elsewhere(py, &self.port));
         }
         // Unlocked before the exception is made: handlers of signals run there.
-        let line = self.line.read().unwrap_or_else(PoisonError::into_inner).clone();
+        let line = match &*self.line.read().unwrap_or_else(PoisonError::into_inner) {
+            Line::Open(line) => Some(Arc::clone(line)),
+            Line::Closing(_) | Line::Closed => None,
+        };
         line.ok_or_else(|| closed(py, &self.port))
     }
 
     /// Whether it was closed.
     pub(crate) fn is_closed(&self) -> bool {
-        self.line.read().unwrap_or_else(PoisonError::into_inner).is_none()
+        !matches!(*self.line.read().unwrap_or_else(PoisonError::into_inner), Line::Open(_))
     }
 
     /// Closes it: `stop` stops what moves, at once, and again when exchanges that were under way are
     /// over, for they may have set something moving. Those of this thread, whose signal's handler this
-    /// is then, are for `stop` to give up. Gives what the last `stop` gave; again is no error. A
-    /// process that did not open it only forgets it.
+    /// is then, are for `stop` to give up. Gives what the last `stop` gave; again is no error, and
+    /// while another thread is at it, stops as well. Nothing in a process that did not open it.
     pub(crate) fn close<R: Send>(
         &self,
         py: Python<'_>,
         stop: impl Fn(&T) -> Vec<R> + Send + Sync,
     ) -> Vec<R> {
-        let line = self.line.write().unwrap_or_else(PoisonError::into_inner).take();
-        let Some(line) = line else { return Vec::new() };
         if !self.owner.is_here() {
-            std::mem::forget(line);
             return Vec::new();
         }
         py.detach(|| {
+            let Some(line) = self.closing() else { return Vec::new() };
             let was_used = self.under_way.elsewhere();
-            let stopped = stop(&line);
-            if !was_used {
-                return stopped;
+            let mut stopped = stop(&line);
+            if was_used {
+                while self.under_way.elsewhere() {
+                    thread::sleep(TURN);
+                }
+                stopped = stop(&line);
             }
-            while self.under_way.elsewhere() {
-                thread::sleep(TURN);
-            }
-            stop(&line)
+            *self.line.write().unwrap_or_else(PoisonError::into_inner) = Line::Closed;
+            stopped
         })
+    }
+
+    /// The line, for who closes it.
+    fn closing(&self) -> Option<Arc<T>> {
+        let mut state = self.line.write().unwrap_or_else(PoisonError::into_inner);
+        let (Line::Open(line) | Line::Closing(line)) = &*state else { return None };
+        let line = Arc::clone(line);
+        *state = Line::Closing(Arc::clone(&line));
+        Some(line)
     }
 }
 

@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Protocol, TypeVar, Union
 
 from motorlink import _core
+from motorlink._signals import before_signals
 from motorlink.errors import BadValue, LineLost, MotorlinkError
 
 
@@ -65,15 +66,25 @@ Entered = TypeVar("Entered", bound="Ending")
 Close = Callable[[], "list[tuple[int, MotorlinkError]]"]
 
 
-def when_forgotten(bus: object, close: Close, port: str) -> None:
-    """Closes a bus that nobody closed, when it is collected or the program that opened it ends."""
+def when_left_open(
+    bus: object, close: Close, port: str, *, stop_on_signals: bool
+) -> Callable[[], None]:
+    """Closes a bus that nobody closed, when it is collected or the program that opened it ends.
+
+    With ``stop_on_signals`` SIGTERM and SIGHUP are such ends, until the result is called.
+    """
     owner = os.getpid()
 
     def end() -> None:
         if os.getpid() == owner:
-            report(close(), port, in_flight=True)
+            try:
+                report(close(), port, in_flight=True)
+            finally:
+                release()
 
+    release = before_signals(end) if stop_on_signals else lambda: None
     weakref.finalize(bus, end)
+    return release
 
 
 def report(failed: list[tuple[int, MotorlinkError]], port: str, *, in_flight: bool) -> None:
@@ -93,10 +104,10 @@ def report(failed: list[tuple[int, MotorlinkError]], port: str, *, in_flight: bo
 class Ending:
     """What the blocking buses of both protocols have in common: how they end."""
 
-    def __init__(self, close: Close, port: str):
+    def __init__(self, close: Close, port: str, *, stop_on_signals: bool):
         self._close = close
         self._name = port
-        when_forgotten(self, close, port)
+        self._release = when_left_open(self, close, port, stop_on_signals=stop_on_signals)
 
     @property
     def port(self) -> str:
@@ -115,7 +126,10 @@ class Ending:
         self._end(in_flight=False)
 
     def _end(self, *, in_flight: bool) -> None:
-        report(self._close(), self.port, in_flight=in_flight)
+        try:
+            report(self._close(), self.port, in_flight=in_flight)
+        finally:
+            self._release()
 
     def __enter__(self: Entered) -> Entered:
         return self

@@ -101,6 +101,7 @@ def open(
     speed_limit: float | None = None,
     angle_limit: float | None = None,
     on_close: str = "stop",
+    stop_on_signals: bool = True,
 ) -> Bus:
     """Opens a CAN bus. Nothing is sent.
 
@@ -120,6 +121,10 @@ def open(
     ``on_close``
         What the end of ``with``, and ``close()``, do to motors that this bus set moving: ``stop``
         (0x81: they hold still), ``off`` (0x80), or ``nothing``.
+    ``stop_on_signals``
+        SIGTERM and SIGHUP do what ``close()`` does, and then end the program as they would have
+        without. Handlers are installed if this is called in the main thread, in place of the default
+        action only. The last ``close()`` restores it. ``False``: nothing is installed.
 
     Raises ``PortError`` where the port cannot be opened.
     """
@@ -132,7 +137,7 @@ def open(
         speed_limit_dps=speed_limit,
         angle_limit_deg=angle_limit,
     )
-    return Bus(core, on_close=on_close)
+    return Bus(core, on_close=on_close, stop_on_signals=stop_on_signals)
 
 
 def decode(can_id: int, data: bytes, *, reply: bool) -> Frame:
@@ -156,10 +161,13 @@ class Bus(Ending):
     answer.
     """
 
-    def __init__(self, core: _core.RmdBus, *, on_close: str = "stop"):
+    def __init__(
+        self, core: _core.RmdBus, *, on_close: str = "stop", stop_on_signals: bool = True
+    ):
         self._core = core
         stop, off = on_close_checked(on_close, _ON_CLOSE) != "nothing", on_close == "off"
-        super().__init__(functools.partial(core.close, stop=stop, off=off), core.port)
+        close = functools.partial(core.close, stop=stop, off=off)
+        super().__init__(close, core.port, stop_on_signals=stop_on_signals and stop)
 
     @property
     def moving(self) -> list[int]:

@@ -79,6 +79,7 @@ def open(
     full_scale_amps: float | None = None,
     recovery: str = "drain",
     on_close: str = "stop",
+    stop_on_signals: bool = True,
 ) -> Bus:
     """Opens a serial line with a drive. Nothing is sent.
 
@@ -105,6 +106,10 @@ def open(
     ``on_close``
         ``stop``: the end of ``with``, and ``close()``, stop the motors that this bus started;
         ``nothing``: they run on.
+    ``stop_on_signals``
+        SIGTERM and SIGHUP do what ``close()`` does, and then end the program as they would have
+        without. Handlers are installed if this is called in the main thread, in place of the default
+        action only. The last ``close()`` restores it. ``False``: nothing is installed.
 
     Raises ``PortError`` where the port cannot be opened.
     """
@@ -118,7 +123,13 @@ def open(
         current_limit=current_limit,
         full_scale_amps=full_scale_amps,
     )
-    return Bus(client, profile=profile, full_scale_amps=full_scale_amps, on_close=on_close)
+    return Bus(
+        client,
+        profile=profile,
+        full_scale_amps=full_scale_amps,
+        on_close=on_close,
+        stop_on_signals=stop_on_signals,
+    )
 
 
 class Bus(Ending):
@@ -134,12 +145,14 @@ class Bus(Ending):
         profile: str = "spec",
         full_scale_amps: float | None = None,
         on_close: str = "stop",
+        stop_on_signals: bool = True,
     ):
         self._client = client
         self._profile = profile
         self._full_scale_amps = full_scale_amps
         stop = on_close_checked(on_close, _ON_CLOSE) == "stop"
-        super().__init__(functools.partial(client.close, stop=stop), client.port)
+        close = functools.partial(client.close, stop=stop)
+        super().__init__(close, client.port, stop_on_signals=stop_on_signals and stop)
         self._segments = Segments()
 
     @property

@@ -22,11 +22,17 @@ struct Driven<T> {
     state: Mutex<Option<T>>,
     port: String,
     owner: Owner,
+    closing: Mutex<()>,
 }
 
 impl<T: Send> Driven<T> {
     fn new(state: T, port: String) -> Self {
-        Driven { state: Mutex::new(Some(state)), port, owner: Owner::new() }
+        Driven {
+            state: Mutex::new(Some(state)),
+            port,
+            owner: Owner::new(),
+            closing: Mutex::new(()),
+        }
     }
 
     /// A step, which does not wait. No Python code may run in it: handlers of signals would run there,
@@ -54,9 +60,17 @@ impl<T: Send> Driven<T> {
         done.ok_or_else(|| closed(py, &self.port))
     }
 
-    /// Ends it; nothing the second time, nor in another process.
-    fn take(&self) -> Option<T> {
-        if self.owner.is_here() { self.lock().take() } else { None }
+    /// Ends it, while other Python threads run. Nothing the second time, though not before the first
+    /// is over, nor in another process.
+    fn close<R: Send>(&self, py: Python<'_>, end: impl FnOnce(T) -> Vec<R> + Send) -> Vec<R> {
+        if !self.owner.is_here() {
+            return Vec::new();
+        }
+        py.detach(|| {
+            let _closing = self.closing.lock().unwrap_or_else(PoisonError::into_inner);
+            let state = self.lock().take();
+            state.map_or_else(Vec::new, end)
+        })
     }
 
     fn check_owner(&self, py: Python<'_>) -> PyResult<()> {

@@ -207,10 +207,9 @@ impl RmdMachine {
     #[pyo3(signature = (*, stop, off))]
     fn close(&self, py: Python<'_>, stop: bool, off: bool) -> Vec<(u8, PyErr)> {
         let action = if off { OnDrop::Off } else { OnDrop::Stop };
-        let stopped = py.detach(|| {
-            let bus = self.driven.take().map(|motors| motors.bus.into_bus());
-            let stop = bus.filter(|_| stop);
-            let stopped = stop.map_or_else(Vec::new, |bus| bus.guard().with(action).stop_now());
+        let stopped = self.driven.close(py, |motors| {
+            let bus = motors.bus.into_bus();
+            let stopped = if stop { bus.guard().with(action).stop_now() } else { Vec::new() };
             self.threads.iter().for_each(Threads::end);
             stopped
         });

@@ -146,10 +146,9 @@ impl StMachine {
     /// that did not acknowledge it, and why. Again is no error.
     #[pyo3(signature = (*, stop))]
     fn close(&self, py: Python<'_>, stop: bool) -> Vec<(u8, PyErr)> {
-        let stopped = py.detach(|| {
-            let client = self.driven.take().map(|line| line.client.into_client());
-            let stop = client.filter(|_| stop);
-            stop.map_or_else(Vec::new, |client| client.guard().stop_now())
+        let stopped = self.driven.close(py, |line| {
+            let client = line.client.into_client();
+            if stop { client.guard().stop_now() } else { Vec::new() }
         });
         let failed = stopped.into_iter().filter_map(|one| {
             one.result.err().map(|error| (one.motor.number(), st_error(py, &error)))

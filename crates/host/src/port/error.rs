@@ -237,6 +237,13 @@ pub enum PortError {
         /// The port.
         port: String,
     },
+    /// The program is about to end: [`Client::retire`](crate::stmcp::Client::retire),
+    /// [`Bus::retire`](crate::rmd::Bus::retire).
+    #[error("`{port}`: this program is about to end, and only stops motors; nothing was sent")]
+    Retired {
+        /// The port.
+        port: String,
+    },
     /// Anything else that the system says.
     #[error("`{port}` failed: {source}")]
     Io {

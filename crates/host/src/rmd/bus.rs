@@ -12,7 +12,7 @@ use motorlink_proto::rmd::{
 use motorlink_proto::time;
 
 use super::session::{Output, Session, ends_motion};
-use super::{Error, Guard, MotorHandle, OnDrop};
+use super::{Error, Guard, MotorHandle, OnDrop, Stopped};
 use crate::Clock;
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{CanLink, PortError, PortName};
@@ -163,6 +163,14 @@ impl Bus {
     pub fn motor(&self, id: u8) -> Result<MotorHandle<'_>, Error> {
         let id = MotorId::new(id).ok_or(Error::NoSuchMotor(id))?;
         Ok(MotorHandle::new(self, id))
+    }
+
+    /// Switches off the motors that this bus was used to move; from now on every request but Off and
+    /// Stop is [`PortError::Retired`]. For a signal's handler with a thread of its own, beside a program
+    /// that would go on until the handler ends it. Waits for exchanges that are under way.
+    pub fn retire(&self) -> Vec<Stopped> {
+        self.line.take().session.retire();
+        self.guard().stop_now()
     }
 
     /// Switches off, when it goes out of scope, the motors that this bus was used to move.

@@ -9,6 +9,7 @@ use motorlink_proto::rmd::{
 use motorlink_proto::time::{Duration, Instant};
 
 use super::{Error, Options};
+use crate::port::PortError;
 
 /// How long a motor whose replies are in doubt may go on talking, beside the times of its exchanges.
 const SETTLE_LIMIT: Duration = Duration::from_millis(2_000);
@@ -30,6 +31,8 @@ pub(super) struct Session {
     insisting: MotorSet,
     /// Those of them whose request cannot leave yet.
     waiting: MotorSet,
+    /// Whether nothing is sent any more but what stops motors.
+    is_retired: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -69,6 +72,7 @@ impl Session {
             asked: [nothing; MotorId::COUNT],
             insisting: MotorSet::EMPTY,
             waiting: MotorSet::EMPTY,
+            is_retired: false,
         }
     }
 
@@ -108,7 +112,7 @@ impl Session {
         id: MotorId,
         request: [u8; 8],
     ) -> Result<(), Error> {
-        self.free(id)?;
+        self.free(id, &request)?;
         let begun = self.host.request(now, id, request);
         begun.map_err(|refused| self.refused(refused))?;
         self.asked[place(id)] = Asked { request, until: now };
@@ -120,7 +124,7 @@ impl Session {
     /// # Errors
     /// As [`request`](Self::request).
     pub(super) fn ask(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
-        self.free(id)?;
+        self.free(id, &request)?;
         match self.host.request(now, id, request) {
             Ok(()) => {}
             Err(Refused::Quarantined { .. }) => self.waiting.insert(id),
@@ -141,14 +145,14 @@ impl Session {
         torques: Torque4,
         expect: MotorSet,
     ) -> Result<(), Error> {
-        if let Some(id) = self.waiting.intersection(MotorSet::TORQUE4).next() {
-            return Err(Error::Twice(id));
+        let torque = Torque::default().encode();
+        for id in MotorSet::TORQUE4 {
+            self.free(id, &torque)?;
         }
         let begun = self.host.torque4(now, torques, expect);
         begun.map_err(|refused| self.refused(refused))?;
-        let request = Torque::default().encode();
         for id in expect {
-            self.asked[place(id)] = Asked { request, until: now };
+            self.asked[place(id)] = Asked { request: torque, until: now };
         }
         Ok(())
     }
@@ -208,7 +212,16 @@ impl Session {
         self.host.cancel(now, id);
     }
 
-    fn free(&self, id: MotorId) -> Result<(), Error> {
+    /// Sends nothing any more but what stops motors.
+    pub(super) fn retire(&mut self) {
+        self.is_retired = true;
+    }
+
+    /// Whether a motor may be sent this.
+    fn free(&self, id: MotorId, request: &[u8; 8]) -> Result<(), Error> {
+        if self.is_retired && !ends_motion(request) {
+            return Err(PortError::Retired { port: self.port.to_string() }.into());
+        }
         if self.waiting.contains(id) { Err(Error::Twice(id)) } else { Ok(()) }
     }
 

@@ -12,7 +12,7 @@ use motorlink_proto::time::{self, Instant};
 
 use super::session::{Rules, Session};
 use super::started::{Effect, Started};
-use super::{Error, Guard, Limits, MotorHandle};
+use super::{Error, Guard, Limits, MotorHandle, Stopped};
 use crate::Clock;
 use crate::line::{BackOff, LinkSign, LinkState, Opener, Reopening};
 use crate::port::{ByteLink, LineName, PortError, PortName};
@@ -185,6 +185,14 @@ impl Client {
     pub fn motor(&self, number: u8) -> Result<MotorHandle<'_>, Error> {
         let motor = Motor::new(number).ok_or(Error::NoSuchMotor(number))?;
         Ok(MotorHandle::new(self, motor))
+    }
+
+    /// Stops the motors that this client started; from now on every other request is
+    /// [`PortError::Retired`]. For a signal's handler with a thread of its own, beside a program that
+    /// would go on until the handler ends it. Waits for an exchange that is under way.
+    pub fn retire(&self) -> Vec<Stopped> {
+        self.line.take().session.retire();
+        self.guard().stop_now()
     }
 
     /// Stops, when it goes out of scope, the motors that this client started.

@@ -1,4 +1,4 @@
-//! Stops motors when their program ends, however it ends.
+//! Stops motors at the end of a scope, however it is left.
 
 use motorlink_proto::stmcp::{ErrorCode, Line, Motor};
 

@@ -14,6 +14,7 @@ use super::error::{Target, advice, hint};
 use super::ramped::Ramped;
 use super::started::{Effect, Started};
 use super::{Error, LimitError, Limits, Options};
+use crate::port::PortError;
 
 /// What a request is held to before it leaves.
 #[derive(Debug, Clone, Copy)]
@@ -41,6 +42,8 @@ pub(super) struct Session {
     /// What is sent before a lost line is recovered, and its size.
     ahead: [u8; MAX_FRAME],
     ahead_size: usize,
+    /// Whether nothing is sent any more but what stops motors.
+    is_retired: bool,
 }
 
 /// Losses of the line, and identifications that a drive sends when it was reset.
@@ -100,6 +103,7 @@ impl Session {
             asked,
             ahead: [0; MAX_FRAME],
             ahead_size: 0,
+            is_retired: false,
         }
     }
 
@@ -126,6 +130,7 @@ impl Session {
     pub(super) fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         self.rules.check(motor, request)?;
         let effect = Effect::of(Some(request));
+        self.check_retired(effect)?;
         self.check_start(motor, effect)?;
         self.ahead_size = match self.is_urgent(effect) {
             true => request.encode(motor, &mut self.ahead).map_or(0, <[u8]>::len),
@@ -143,6 +148,7 @@ impl Session {
         self.rules.check_raw(motor, code, payload)?;
         let frame = Frame { header: Frame::header(code, motor), payload };
         let effect = Effect::of_frame(&frame);
+        self.check_retired(effect)?;
         self.check_start(motor, effect)?;
         self.ahead_size = match self.is_urgent(effect) {
             true => frame.encode(&mut self.ahead).map_or(0, <[u8]>::len),
@@ -151,6 +157,18 @@ impl Session {
         let begun = self.master.request_raw(frame.header, payload);
         self.started.presume_within(frame.encode(&mut [0; MAX_FRAME]).unwrap_or(&[]));
         self.begun(begun, motor, effect, What::Raw(code))
+    }
+
+    /// Sends nothing any more but what stops motors.
+    pub(super) fn retire(&mut self) {
+        self.is_retired = true;
+    }
+
+    fn check_retired(&self, effect: Effect) -> Result<(), Error> {
+        match self.is_retired && effect != Effect::Stops {
+            true => Err(PortError::Retired { port: self.port.to_string() }.into()),
+            false => Ok(()),
+        }
     }
 
     /// Whether a request is sent before the line has recovered, and again afterwards. Its first reply

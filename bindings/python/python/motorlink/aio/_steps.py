@@ -8,7 +8,7 @@ from collections.abc import Callable, Coroutine, Generator
 from types import TracebackType
 from typing import Any, Generic, Protocol, TypeVar
 
-from motorlink._bus import Close, report, when_forgotten
+from motorlink._bus import Close, report, when_left_open
 from motorlink.errors import Closed, MotorlinkError
 
 Value = TypeVar("Value")
@@ -156,11 +156,11 @@ class Steps:
 class Ending:
     """What the buses of both protocols have in common: how they end."""
 
-    def __init__(self, steps: Steps, close: Close, port: str):
+    def __init__(self, steps: Steps, close: Close, port: str, *, stop_on_signals: bool):
         self._steps = steps
         self._close = close
         self._name = port
-        when_forgotten(self, close, port)
+        self._release = when_left_open(self, close, port, stop_on_signals=stop_on_signals)
 
     @property
     def port(self) -> str:
@@ -181,6 +181,7 @@ class Ending:
     async def _end(self, *, in_flight: bool) -> None:
         self._fail(self._steps.closed())
         failed, cancelled = await self._steps.close(self._close)
+        self._release()
         report(failed, self.port, in_flight=in_flight or cancelled is not None)
         if cancelled is not None:
             raise cancelled

@@ -45,10 +45,12 @@ def open(
     speed_limit: float | None = None,
     angle_limit: float | None = None,
     on_close: str = "stop",
+    stop_on_signals: bool = True,
 ) -> Opening[Bus]:
     """Opens a CAN bus: ``async with open(...) as bus``, or ``await open(...)``.
 
-    The arguments are those of :func:`motorlink.rmd.open`. Nothing is sent.
+    The arguments are those of :func:`motorlink.rmd.open`. Nothing is sent. On SIGTERM and SIGHUP the
+    motors are stopped in the main thread, with the event loop at rest; open the bus in that thread.
     """
     on_close_checked(on_close, _ON_CLOSE)
     name = port if isinstance(port, CanPort) else port_name(port)
@@ -65,7 +67,7 @@ def open(
 
     async def bus() -> Bus:
         came = await opened(machine, lambda late: late.close(stop=False, off=False))
-        return Bus(came, on_close=on_close)
+        return Bus(came, on_close=on_close, stop_on_signals=stop_on_signals)
 
     return Opening(bus)
 
@@ -77,12 +79,15 @@ class Bus(Ending):
     in which they were asked for, and each task gets its own answer.
     """
 
-    def __init__(self, machine: _core.RmdMachine, *, on_close: str = "stop"):
+    def __init__(
+        self, machine: _core.RmdMachine, *, on_close: str = "stop", stop_on_signals: bool = True
+    ):
         self._machine = machine
         on_close = on_close_checked(on_close, _ON_CLOSE)
         stop, off = on_close != "nothing", on_close == "off"
         close = functools.partial(machine.close, stop=stop, off=off)
-        super().__init__(Steps(machine, self._advance), close, machine.port)
+        steps, stops = Steps(machine, self._advance), stop_on_signals and stop
+        super().__init__(steps, close, machine.port, stop_on_signals=stops)
         self._turns: dict[int, asyncio.Lock] = {}
         self._answers: dict[int, asyncio.Future[Any]] = {}
 

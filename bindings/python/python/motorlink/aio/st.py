@@ -44,10 +44,12 @@ def open(
     full_scale_amps: float | None = None,
     recovery: str = "drain",
     on_close: str = "stop",
+    stop_on_signals: bool = True,
 ) -> Opening[Bus]:
     """Opens a serial line with a drive: ``async with open(...) as bus``, or ``await open(...)``.
 
-    The arguments are those of :func:`motorlink.st.open`. Nothing is sent.
+    The arguments are those of :func:`motorlink.st.open`. Nothing is sent. On SIGTERM and SIGHUP the
+    motors are stopped in the main thread, with the event loop at rest; open the bus in that thread.
     """
     on_close_checked(on_close, _ON_CLOSE)
     name = port_name(port)
@@ -65,7 +67,13 @@ def open(
 
     async def bus() -> Bus:
         came = await opened(machine, lambda late: late.close(stop=False))
-        return Bus(came, profile=profile, full_scale_amps=full_scale_amps, on_close=on_close)
+        return Bus(
+            came,
+            profile=profile,
+            full_scale_amps=full_scale_amps,
+            on_close=on_close,
+            stop_on_signals=stop_on_signals,
+        )
 
     return Opening(bus)
 
@@ -84,13 +92,15 @@ class Bus(Ending):
         profile: str = "spec",
         full_scale_amps: float | None = None,
         on_close: str = "stop",
+        stop_on_signals: bool = True,
     ):
         self._machine = machine
         self._profile = profile
         self._full_scale_amps = full_scale_amps
         stop = on_close_checked(on_close, _ON_CLOSE) == "stop"
         close = functools.partial(machine.close, stop=stop)
-        super().__init__(Steps(machine, self._advance), close, machine.port)
+        steps, stops = Steps(machine, self._advance), stop_on_signals and stop
+        super().__init__(steps, close, machine.port, stop_on_signals=stops)
         self._turn = asyncio.Lock()
         self._answer: asyncio.Future[Any] | None = None
         self._segments = Segments()

@@ -1,0 +1,272 @@
+"""SIGTERM and SIGHUP stop what a program started, and end it as they would have without."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import pytest
+
+from conftest import Served, eventually
+from drive import REGISTERS, START, STOP, Drive, frame
+from motorlink import aio, rmd, st
+
+SIGNALS = [signal.SIGTERM, signal.SIGHUP]
+
+BEGIN = """
+    import asyncio, signal, sys, threading, time, motorlink
+
+    def start(bus):
+        return bus.motor(1).start() if sys.argv[1] == "st" else bus.motor(1).speed(360)
+
+    def ready():
+        print("ready", flush=True)
+"""
+
+
+@contextmanager
+def program(script: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A Python program that said that it is ready; killed at the end if it is still there."""
+    words = [sys.executable, "-c", textwrap.dedent(BEGIN) + textwrap.dedent(script), *arguments]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout and process.stdout.readline() == "ready\n"
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def is_turning(served: Served, kind: str) -> bool:
+    if kind == "st":
+        return served.motor("stmcp", 1)["status"] not in ("IDLE", "STOP", "STOP_IDLE")
+    return served.motor("rmd", 1)["mode"] not in ("stopped", "off")
+
+
+def port(served: Served, kind: str) -> str:
+    return served.st if kind == "st" else served.can
+
+
+BLOCKING = """
+    bus = getattr(motorlink, sys.argv[1]).open(sys.argv[2])
+    start(bus)
+    ready()
+    time.sleep(600)
+"""
+
+BUSY = """
+    bus = getattr(motorlink, sys.argv[1]).open(sys.argv[2], timeout=2.0)
+    start(bus)
+    ready()
+    while True:
+        bus.motor(1).faults if sys.argv[1] == "st" else bus.motor(1).motion
+"""
+
+ASYNC = """
+    async def main():
+        async with getattr(motorlink.aio, sys.argv[1]).open(sys.argv[2], timeout=2.0) as bus:
+            await start(bus)
+            ready()
+            while True:
+                await (bus.motor(1).faults() if sys.argv[1] == "st" else bus.motor(1).motion())
+    asyncio.run(main())
+"""
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("script", [BLOCKING, BUSY, ASYNC], ids=["idle", "busy", "asyncio"])
+@pytest.mark.parametrize("kind", ["st", "rmd"])
+def test_a_signal_stops_the_motors_and_ends_the_program(
+    served: Served, kind: str, script: str, number: signal.Signals
+) -> None:
+    with program(script, kind, port(served, kind)) as running:
+        eventually(lambda: is_turning(served, kind), "a motor that turns")
+        running.send_signal(number)
+        assert running.wait(60) == -number
+        eventually(lambda: not is_turning(served, kind), "a motor at rest")
+
+
+DEAF = """
+    bus = motorlink.st.open(sys.argv[2], timeout=30.0)
+    bus.motor(1).start()
+    ready()
+    bus.motor(1).read("SPEED_REF")
+"""
+
+
+def test_a_signal_stops_the_motor_of_a_drive_that_is_waited_for(tmp_path: Path) -> None:
+    drive = Drive(tmp_path / "st0", 3)
+    drive.is_deaf_to = REGISTERS["SPEED_REF"]
+    try:
+        with program(DEAF, "st", str(drive.path)) as running:
+            eventually(lambda: drive.unanswered == 1, "a request without an answer")
+            running.send_signal(signal.SIGTERM)
+            assert running.wait(60) == -signal.SIGTERM
+        assert drive.executed == [(1, START), (1, STOP), (1, STOP)]
+    finally:
+        drive.unplug()
+
+
+CLOSING = """
+    bus = motorlink.st.open(sys.argv[2], timeout=0.2)
+    try:
+        bus.motor(1).start()
+    except motorlink.Timeout:
+        pass
+    threading.Thread(target=bus.close).start()
+    ready()
+    time.sleep(600)
+"""
+
+CLOSING_ASYNC = """
+    async def main():
+        bus = await motorlink.aio.st.open(sys.argv[2], timeout=0.2)
+        try:
+            await bus.motor(1).start()
+        except motorlink.Timeout:
+            pass
+        ready()
+        await bus.close()
+    asyncio.run(main())
+"""
+
+
+@pytest.mark.parametrize("script", [CLOSING, CLOSING_ASYNC], ids=["blocking", "asyncio"])
+def test_a_signal_lets_a_close_in_another_thread_finish(script: str) -> None:
+    ours, theirs = os.openpty()
+    stop = frame(0x23, bytes([STOP]))
+    heard = b""
+    try:
+        with program(script, "st", os.ttyname(theirs)) as running:
+            while stop not in heard:
+                heard += os.read(ours, 4096)
+            running.send_signal(signal.SIGTERM)
+            assert running.wait(60) == -signal.SIGTERM
+        os.set_blocking(ours, False)
+        heard += os.read(ours, 65536)
+        # A silent drive is told four times.
+        assert heard.count(stop) >= 4
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+OTHER_THREAD = """
+    def work():
+        bus = motorlink.st.open(sys.argv[2])
+        start(bus)
+        ready()
+        time.sleep(600)
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    thread.join()
+"""
+
+OPTED_OUT = """
+    bus = motorlink.st.open(sys.argv[2], stop_on_signals=False)
+    start(bus)
+    ready()
+    time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("script", [OTHER_THREAD, OPTED_OUT], ids=["other thread", "opted out"])
+def test_what_no_handler_covers_is_left_turning(served: Served, script: str) -> None:
+    with program(script, "st", served.st) as running:
+        eventually(lambda: served.motor("stmcp", 1)["status"] == "RUN", "a motor in RUN")
+        running.send_signal(signal.SIGTERM)
+        assert running.wait(60) == -signal.SIGTERM
+        assert is_turning(served, "st")
+
+
+BOTH_THREADS = """
+    first = motorlink.st.open("sim:")
+    opened = threading.Event()
+    def work():
+        global bus
+        bus = motorlink.st.open(sys.argv[2])
+        start(bus)
+        opened.set()
+    threading.Thread(target=work).start()
+    opened.wait()
+    ready()
+    time.sleep(600)
+"""
+
+
+def test_a_bus_of_another_thread_is_covered_by_one_of_the_main_thread(served: Served) -> None:
+    with program(BOTH_THREADS, "st", served.st) as running:
+        eventually(lambda: served.motor("stmcp", 1)["status"] == "RUN", "a motor in RUN")
+        running.send_signal(signal.SIGTERM)
+        assert running.wait(60) == -signal.SIGTERM
+        eventually(lambda: not is_turning(served, "st"), "a motor at rest")
+
+
+def handlers() -> list[Any]:
+    return [signal.getsignal(number) for number in SIGNALS]
+
+
+@pytest.fixture
+def default() -> Iterator[None]:
+    before = [signal.signal(number, signal.SIG_DFL) for number in SIGNALS]
+    yield
+    for number, handler in zip(SIGNALS, before):
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("default")
+def test_the_default_action_is_back_when_the_last_bus_is_closed() -> None:
+    default = [signal.SIG_DFL, signal.SIG_DFL]
+    with st.open("sim:"):
+        replaced = handlers()
+        assert signal.SIG_DFL not in replaced
+        with rmd.open("sim:"):
+            assert handlers() == replaced
+        assert handlers() == replaced
+    assert handlers() == default
+    for opened in (st.open("sim:", stop_on_signals=False), rmd.open("sim:", on_close="nothing")):
+        with opened:
+            assert handlers() == default
+    # Closed in another thread, which cannot restore it: the next one does.
+    bus = st.open("sim:")
+    thread = threading.Thread(target=bus.close)
+    thread.start()
+    thread.join()
+    with st.open("sim:"):
+        assert handlers() == replaced
+    assert handlers() == default
+
+
+@pytest.mark.usefixtures("default")
+def test_asyncio_restores_it_too() -> None:
+    async def main() -> None:
+        async with aio.st.open("sim:"), aio.rmd.open("sim:"):
+            assert signal.SIG_DFL not in handlers()
+        assert handlers() == [signal.SIG_DFL, signal.SIG_DFL]
+
+    asyncio.run(main())
+
+
+@pytest.mark.usefixtures("default")
+def test_other_handlers_are_left_alone() -> None:
+    def own(number: int, frame: FrameType | None) -> None: ...
+
+    signal.signal(signal.SIGTERM, own)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    with st.open("sim:"):
+        assert handlers() == [own, signal.SIG_IGN]
+    assert handlers() == [own, signal.SIG_IGN]
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    with st.open("sim:"):
+        signal.signal(signal.SIGTERM, own)
+    assert handlers() == [own, signal.SIG_IGN]

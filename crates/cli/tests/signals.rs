@@ -1,0 +1,111 @@
+//! A program that stops its motors at a signal, as README.md shows.
+
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{self, Command};
+use std::sync::Arc;
+use std::thread;
+
+use motorlink::port::PortError;
+use motorlink::rmd::{Bus, CanFrame};
+use motorlink::stmcp::{Client, Error, Options};
+use motorlink::{port::CanLink, rmd};
+use rustix::process::{Pid, Signal, kill_process};
+
+/// The port of the program that the test starts.
+const PORT: &str = "MOTORLINK_SIGNALS_TEST_PORT";
+
+const START: [u8; 4] = [0x23, 0x01, 0x01, 0x25];
+const STOP: [u8; 4] = [0x23, 0x01, 0x02, 0x26];
+const ACK: [u8; 3] = [0xF0, 0x00, 0xF0];
+
+/// The program: it starts a motor again and again, and never stops it.
+#[test]
+fn program() {
+    let Ok(port) = std::env::var(PORT) else { return };
+    let client = Arc::new(Client::open(&port.parse().unwrap(), Options::default()).unwrap());
+    let at_signal = Arc::clone(&client);
+    ctrlc::set_handler(move || {
+        at_signal.retire();
+        process::exit(130)
+    })
+    .unwrap();
+    let motor = client.motor(1).unwrap();
+    while !matches!(motor.start(), Err(Error::Port(PortError::Retired { .. }))) {}
+    loop {
+        thread::park();
+    }
+}
+
+/// Acknowledges commands until the line is closed; calls `after` with the number of each.
+fn drive(mut line: TcpStream, mut after: impl FnMut(usize)) -> Vec<[u8; 4]> {
+    let mut commands = Vec::new();
+    let mut command = [0; 4];
+    while line.read_exact(&mut command).is_ok() {
+        commands.push(command);
+        if line.write_all(&ACK).is_err() {
+            break;
+        }
+        after(commands.len());
+    }
+    commands
+}
+
+#[test]
+fn nothing_is_started_after_a_signal_has_stopped_the_motor() {
+    for signal in [Signal::INT, Signal::TERM, Signal::HUP] {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "program"])
+            .env(PORT, format!("tcp:{address}"))
+            .spawn()
+            .unwrap();
+        let pid = Pid::from_child(&child);
+        let commands = drive(listener.accept().unwrap().0, |number| {
+            if number == 20 {
+                kill_process(pid, signal).unwrap();
+            }
+        });
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        assert_eq!(commands[..20], [START; 20]);
+        assert_eq!(commands.last(), Some(&STOP), "{signal:?}");
+        assert_eq!(commands.iter().filter(|command| **command == STOP).count(), 1);
+    }
+}
+
+/// A bus on which every request comes back.
+struct Echo(Option<CanFrame>);
+
+impl CanLink for Echo {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.0 = Some(*frame);
+        Ok(())
+    }
+
+    fn receive(&mut self, _: Option<std::time::Duration>) -> Result<Option<CanFrame>, PortError> {
+        Ok(self.0.take())
+    }
+}
+
+#[test]
+fn a_retired_bus_only_stops_motors() {
+    let bus = Bus::over("echo", Box::new(Echo(None)), rmd::Options::default());
+    let motor = bus.motor(1).unwrap();
+    let speed = [0xA2, 0, 0, 0, 0x10, 0x27, 0, 0];
+    bus.raw(motor.id(), speed).unwrap();
+    assert_eq!(bus.moving().count(), 1);
+    assert_eq!(bus.retire().len(), 1);
+    assert!(bus.moving().is_empty());
+    let is_retired = |error: rmd::Error| match error {
+        rmd::Error::Port(error) => matches!(*error, PortError::Retired { .. }),
+        _ => false,
+    };
+    assert!(is_retired(bus.raw(motor.id(), speed).unwrap_err()));
+    assert!(is_retired(bus.torque4(rmd::Torque4::default(), bus.moving()).unwrap_err()));
+    let mut outcomes = Vec::new();
+    bus.cycle(&[(motor.id(), speed)], |_, outcome| outcomes.push(outcome.unwrap_err())).unwrap();
+    assert!(outcomes.into_iter().all(is_retired));
+    motor.off().unwrap();
+    motor.stop().unwrap();
+}
