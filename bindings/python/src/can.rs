@@ -23,7 +23,7 @@ use crate::sim::Port;
 
 /// How long a bus may take no frame at all before a sending fails.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
-/// How soon the reader of a bus notices that nobody listens any more.
+/// The longest wait in `recv`, after which the reader looks whether it has to end.
 const TURN: Duration = Duration::from_millis(100);
 /// How long a bus may go on giving what it received before it was opened.
 const BABBLE: Duration = Duration::from_millis(100);
@@ -66,22 +66,22 @@ impl CanPort {
         let (bell, ringer) = UnixStream::pair()?;
         bell.set_nonblocking(true)?;
         ringer.set_nonblocking(true)?;
-        let office = Arc::new(Office {
+        let hub = Arc::new(Hub {
             bus: Arc::clone(&self.bus),
-            desk: Mutex::new(Desk::default()),
+            state: Mutex::new(State::default()),
             changed: Condvar::new(),
             bell,
             ringer,
         });
-        let (reader, writer) = (Arc::clone(&office), Arc::clone(&office));
+        let (reader, writer) = (Arc::clone(&hub), Arc::clone(&hub));
         let threads = [thread::spawn(move || reader.read()), thread::spawn(move || writer.write())];
-        Ok(Threads { office, threads: Mutex::new(threads.into()), owner: Owner::new() })
+        Ok(Threads { hub, threads: Mutex::new(threads.into()), owner: Owner::new() })
     }
 }
 
 /// The threads of a bus. They end soon after this is dropped.
 pub(crate) struct Threads {
-    office: Arc<Office>,
+    hub: Arc<Hub>,
     threads: Mutex<Vec<JoinHandle<()>>>,
     owner: Owner,
 }
@@ -89,14 +89,14 @@ pub(crate) struct Threads {
 impl Threads {
     /// What makes a link: the first one, and another one after each failure.
     pub(crate) fn links(&self) -> impl FnMut() -> Link + Send + 'static {
-        let office = Arc::clone(&self.office);
-        move || Link::new(Arc::clone(&office))
+        let hub = Arc::clone(&self.hub);
+        move || Link::new(Arc::clone(&hub))
     }
 
-    /// Ends them, and waits for that: nobody uses a bus any more that its owner may shut down.
+    /// Ends them, and waits for that. The owner may shut the bus down afterwards.
     pub(crate) fn end(&self) {
         if self.owner.is_here() {
-            self.office.end();
+            self.hub.end();
             let threads =
                 std::mem::take(&mut *self.threads.lock().unwrap_or_else(PoisonError::into_inner));
             threads.into_iter().for_each(|thread| drop(thread.join()));
@@ -107,15 +107,15 @@ impl Threads {
 impl Drop for Threads {
     fn drop(&mut self) {
         if self.owner.is_here() {
-            self.office.end();
+            self.hub.end();
         }
     }
 }
 
-/// Where the threads of a bus and its links meet.
-struct Office {
+/// What the threads of a bus share with its link.
+struct Hub {
     bus: Arc<PythonCan>,
-    desk: Mutex<Desk>,
+    state: Mutex<State>,
     changed: Condvar,
     /// Readable when something was received.
     bell: UnixStream,
@@ -123,7 +123,7 @@ struct Office {
 }
 
 #[derive(Default)]
-struct Desk {
+struct State {
     /// The number of the link in use. What fails for an earlier one does not count.
     link: u64,
     reader: Reader,
@@ -143,17 +143,17 @@ enum Reader {
     Receiving,
 }
 
-impl Office {
-    fn lock(&self) -> MutexGuard<'_, Desk> {
-        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
+impl Hub {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn wait<'a>(
         &self,
-        desk: MutexGuard<'a, Desk>,
-        until: impl Fn(&Desk) -> bool,
-    ) -> MutexGuard<'a, Desk> {
-        let waited = self.changed.wait_while(desk, |desk| !desk.is_ended && !until(desk));
+        state: MutexGuard<'a, State>,
+        until: impl Fn(&State) -> bool,
+    ) -> MutexGuard<'a, State> {
+        let waited = self.changed.wait_while(state, |state| !state.is_ended && !until(state));
         waited.unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -165,24 +165,24 @@ impl Office {
     /// Receives, until the end.
     fn read(&self) {
         loop {
-            let desk = self.wait(self.lock(), |desk| desk.reader != Reader::Paused);
-            let (link, drains) = (desk.link, desk.reader == Reader::Draining);
-            if desk.is_ended {
+            let state = self.wait(self.lock(), |state| state.reader != Reader::Paused);
+            let (link, drains) = (state.link, state.reader == Reader::Draining);
+            if state.is_ended {
                 return;
             }
-            drop(desk);
+            drop(state);
             let came = if drains { self.drain() } else { self.bus.receive(TURN) };
-            let mut desk = self.lock();
+            let mut state = self.lock();
             match came {
-                Ok(None) if drains => desk.reader = Reader::Receiving,
+                Ok(None) if drains => state.reader = Reader::Receiving,
                 Ok(None) => continue,
-                Err(_) if drains => desk.reader = Reader::Paused,
-                Err(_) if link != desk.link => continue,
+                Err(_) if drains => state.reader = Reader::Paused,
+                Err(_) if link != state.link => continue,
                 came => {
                     if came.is_err() {
-                        desk.reader = Reader::Paused;
+                        state.reader = Reader::Paused;
                     }
-                    desk.inbox.extend(came.transpose());
+                    state.inbox.extend(came.transpose());
                 }
             }
             self.ring();
@@ -199,19 +199,20 @@ impl Office {
     /// Sends, until the end.
     fn write(&self) {
         loop {
-            let ready = |desk: &Desk| !desk.outbox.is_empty() && desk.reader != Reader::Draining;
-            let mut desk = self.wait(self.lock(), ready);
-            if desk.is_ended {
+            let ready =
+                |state: &State| !state.outbox.is_empty() && state.reader != Reader::Draining;
+            let mut state = self.wait(self.lock(), ready);
+            if state.is_ended {
                 return;
             }
-            let (link, frame) = (desk.link, desk.outbox.pop_front());
-            desk.reader = Reader::Receiving;
-            drop(desk);
+            let (link, frame) = (state.link, state.outbox.pop_front());
+            state.reader = Reader::Receiving;
+            drop(state);
             self.changed.notify_all();
             let Some(Err(error)) = frame.map(|frame| self.bus.send(&frame)) else { continue };
-            let mut desk = self.lock();
-            if link == desk.link {
-                desk.inbox.push_back(Err(error));
+            let mut state = self.lock();
+            if link == state.link {
+                state.inbox.push_back(Err(error));
                 self.ring();
             }
         }
@@ -286,20 +287,20 @@ fn frame(message: &Bound<'_, PyAny>) -> PyResult<Option<CanFrame>> {
 }
 
 /// A bus in use, until it fails.
-pub(crate) struct Link(Arc<Office>);
+pub(crate) struct Link(Arc<Hub>);
 
 impl Link {
-    fn new(office: Arc<Office>) -> Self {
-        let mut desk = office.lock();
-        desk.link += 1;
-        desk.inbox.clear();
-        desk.outbox.clear();
-        if desk.reader == Reader::Paused {
-            desk.reader = Reader::Draining;
-            office.changed.notify_all();
+    fn new(hub: Arc<Hub>) -> Self {
+        let mut state = hub.lock();
+        state.link += 1;
+        state.inbox.clear();
+        state.outbox.clear();
+        if state.reader == Reader::Paused {
+            state.reader = Reader::Draining;
+            hub.changed.notify_all();
         }
-        drop(desk);
-        Link(office)
+        drop(state);
+        Link(hub)
     }
 }
 
@@ -312,24 +313,24 @@ impl CanLink for Link {
     }
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        let office = &self.0;
+        let hub = &self.0;
         let end = timeout.and_then(|timeout| Instant::now().checked_add(timeout));
-        let mut desk = office.lock();
+        let mut state = hub.lock();
         loop {
-            if let Some(came) = desk.inbox.pop_front() {
+            if let Some(came) = state.inbox.pop_front() {
                 return came.map(Some);
             }
-            if desk.is_ended {
-                return Err(PortError::Closed { port: office.bus.name.clone() });
+            if state.is_ended {
+                return Err(PortError::Closed { port: hub.bus.name.clone() });
             }
             // From here on it rings for what comes.
-            while (&office.bell).read(&mut [0; 64]).is_ok_and(|size| size == 64) {}
+            while (&hub.bell).read(&mut [0; 64]).is_ok_and(|size| size == 64) {}
             let left = end.map(|end| end.saturating_duration_since(Instant::now()));
             if left == Some(Duration::ZERO) {
                 return Ok(None);
             }
-            let waited = office.changed.wait_timeout(desk, left.unwrap_or(TURN));
-            desk = waited.unwrap_or_else(PoisonError::into_inner).0;
+            let waited = hub.changed.wait_timeout(state, left.unwrap_or(TURN));
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 }

@@ -11,8 +11,8 @@ use crate::error::{closed, elsewhere};
 /// How soon a close notices that the last exchange is over.
 const TURN: Duration = Duration::from_millis(1);
 
-/// The process that made it. A fork has the memory of its parent, but none of its threads, and locks
-/// that nobody will ever release.
+/// The process that made it. A fork has the memory of its parent, but none of its other threads: a lock
+/// that one of them held is never released.
 pub(crate) struct Owner(u32);
 
 impl Owner {
@@ -84,10 +84,12 @@ impl<T: Send + Sync> Shared<T> {
         !matches!(*self.line.read().unwrap_or_else(PoisonError::into_inner), Line::Open(_))
     }
 
-    /// Closes it: `stop` stops what moves, at once, and again when exchanges that were under way are
-    /// over, for they may have set something moving. Those of this thread, whose signal's handler this
-    /// is then, are for `stop` to give up. Gives what the last `stop` gave; again is no error, and
-    /// while another thread is at it, stops as well. Nothing in a process that did not open it.
+    /// Closes it: `stop` stops what moves, at once, and again when the exchanges of other threads are
+    /// over, which may have set something moving. If this thread has one under way, this is a signal's
+    /// handler, and `stop` has to give that exchange up. Gives what the last `stop` gave.
+    ///
+    /// While another thread closes it, this one stops what moves as well. Once it is closed, or in a
+    /// process that did not open it, does nothing.
     pub(crate) fn close<R: Send>(
         &self,
         py: Python<'_>,

@@ -23,6 +23,8 @@ PATIENT = 2.0
 
 # Programs that a shell started in the background ignore Ctrl-C, and so would those that tests start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# So it is with `nohup` and SIGHUP.
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 T = TypeVar("T")
 

@@ -225,6 +225,32 @@ def test_a_handler_of_an_event_loop_cancels_a_wait_and_stops_the_motor(tmp_path:
         drive.unplug()
 
 
+ASYNC_ON_PYTHON_CAN = """
+    import asyncio, can
+    from test_can import Motor
+    other = Motor("looped handlers", 7)
+    done = []
+    async def main():
+        async with motorlink.aio.rmd.open(motorlink.can.from_python_can(line), timeout=0.02) as bus:
+            on_signal(lambda: done.append(bus.moving))
+            thread = signals_until(lambda: len(done) >= 50)
+            while thread.is_alive():
+                answered, silent = await asyncio.gather(
+                    bus.motor(7).motion(), bus.motor(3).motion(), return_exceptions=True
+                )
+                assert isinstance(silent, motorlink.Timeout), silent
+    with can.Bus("looped handlers", interface="virtual") as line:
+        asyncio.run(main())
+    other.end()
+    print(len(done) >= 50)
+"""
+
+
+def test_a_handler_may_ask_a_bus_of_asyncio_whenever_it_comes() -> None:
+    for _ in range(4):
+        assert ends(program(ASYNC_ON_PYTHON_CAN)) == ["True"]
+
+
 SECOND_SIGNAL = """
     with motorlink.st.open(sys.argv[1], timeout=30.0, on_close="nothing") as bus:
         motor = bus.motor(1)

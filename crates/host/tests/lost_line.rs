@@ -12,7 +12,7 @@ use wire::{ACK, GET_SPEED, START, STOP, Wire};
 const INFO: [u8; 3] = [0x06, 0x00, 0x06];
 const REVUP: [u8; 4] = [0x08, 0x01, 0x00, 0x09];
 
-/// Of a drive that nobody has to wait for.
+/// With short timeouts: this drive never answers in any case.
 fn options() -> Options {
     let mut options = Options::default();
     options.line.timeout = Duration::from_millis(20).into();

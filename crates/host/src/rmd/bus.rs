@@ -128,8 +128,9 @@ impl Bus {
     /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
     /// error from it ends the exchange with an interruption.
     ///
-    /// `look` may use this bus, as a signal's handler does. What waits is given up then, and ends with
-    /// [`PortError::Overtaken`]; otherwise it goes on. Other threads wait.
+    /// `look` may use this bus, as a signal's handler does. What waits is given up then and ends with
+    /// [`PortError::Overtaken`]. If `look` does not use the bus, it goes on. Other threads wait for their
+    /// turn.
     pub fn looking(
         mut self,
         look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,

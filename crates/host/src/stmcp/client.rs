@@ -141,7 +141,8 @@ impl Client {
     /// error from it ends the exchange with an interruption.
     ///
     /// `look` may use this client, as a signal's handler does. The exchange that waits is given up
-    /// then and ends with [`PortError::Overtaken`]; otherwise it goes on. Other threads wait.
+    /// then and ends with [`PortError::Overtaken`]. If `look` does not use the client, the exchange goes
+    /// on. Other threads wait for their turn.
     pub fn looking(
         mut self,
         look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
