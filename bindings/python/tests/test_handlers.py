@@ -235,9 +235,9 @@ ASYNC_ON_PYTHON_CAN = """
             on_signal(lambda: done.append(bus.moving))
             thread = signals_until(lambda: len(done) >= 50)
             while thread.is_alive():
-                answered, silent = await asyncio.gather(
-                    bus.motor(7).motion(), bus.motor(3).motion(), return_exceptions=True
-                )
+                # Sending and making an exception are what handlers may interrupt.
+                asks = [bus.motor(7 if n else 3).motion() for n in range(40)]
+                silent, *answers = await asyncio.gather(*asks, return_exceptions=True)
                 assert isinstance(silent, motorlink.Timeout), silent
     with can.Bus("looped handlers", interface="virtual") as line:
         asyncio.run(main())
