@@ -79,7 +79,7 @@ pub fn master(data: &[u8]) {
     let timeout = Duration(u64::from(input.word()) * 16);
     let quiet = Duration(u64::from(input.word()) * 4);
     let mut bench = MasterBench {
-        master: Master::new(Config { timeout, recovery, quiet }),
+        master: Master::new(Config { timeout, recovery, quiet, ..Config::default() }),
         now: Instant(0),
         recovery,
         asked: None,

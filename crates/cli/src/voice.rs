@@ -117,19 +117,19 @@ mod tests {
         }
         assert!(!voice.has_room());
         let mut reader = BufReader::new(far).lines().map(Result::unwrap);
-        let mut read = 0;
+        let mut lines = Vec::new();
         while !voice.has_room() {
-            let line = reader.next().unwrap();
-            assert!(line.starts_with(&format!("{read} ")), "{line}");
-            read += 1;
+            lines.extend(reader.next());
         }
         voice.say("last");
         drop(voice);
-        let rest: Vec<String> = reader.collect();
-        let missed = rest.iter().find_map(|line| line.strip_suffix(" missed"));
-        let missed: u64 = missed.expect("some were dropped").parse().unwrap();
-        assert_eq!(rest.last().map(String::as_str), Some("last"));
-        assert_eq!(read as u64 + rest.len() as u64 - 2 + missed, said);
+        lines.extend(reader);
+        let missed = lines.iter().filter_map(|line| line.strip_suffix(" missed"));
+        let missed: Vec<u64> = missed.map(|lines| lines.parse().unwrap()).collect();
+        assert!(missed.iter().sum::<u64>() > 0);
+        assert_eq!(lines.last().map(String::as_str), Some("last"));
+        let told = (lines.len() - missed.len() - 1) as u64;
+        assert_eq!(told + missed.iter().sum::<u64>(), said);
     }
 
     #[test]

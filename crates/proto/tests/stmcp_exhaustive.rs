@@ -82,7 +82,11 @@ fn the_master_takes_every_header_and_length_for_what_it_is() {
             let damaged = Error::Failed(Failure::Damaged(Bad::Length(length)));
             let expected = match (header, &payload[..]) {
                 (HEADER_ACK | HEADER_NACK | HEADER_ATR, _) if length > 128 => Err(damaged),
-                (HEADER_ACK, payload) => Ok(payload),
+                // STATUS has one byte.
+                (HEADER_ACK, payload) if payload.len() == 1 => Ok(payload),
+                (HEADER_ACK, _) => {
+                    Err(Error::Failed(Failure::Size { received: length, fits: None }))
+                }
                 (HEADER_NACK, []) => Err(Error::Refused(ErrorCode::None)),
                 (HEADER_NACK, [code, ..]) => Err(Error::Refused(ErrorCode::from(*code))),
                 (HEADER_ATR, _) => {

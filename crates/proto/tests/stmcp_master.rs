@@ -448,3 +448,65 @@ proptest! {
         }
     }
 }
+
+/// 4.5, 4.6 and table 3, SPEC-NOTES S17.
+#[test]
+fn a_reply_of_another_size_is_damage() {
+    let answered = |profile: Profile, request: &Request<'_>, size: usize| {
+        let mut master = Master::new(Config { profile, ..Config::default() });
+        master.request(1, request).unwrap();
+        assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+        let mut frame = [0; MAX_FRAME];
+        let reply = Frame { header: HEADER_ACK, payload: &vec![0x11; size] };
+        master.receive(Instant(1), reply.encode(&mut frame).unwrap());
+        let result = match master.poll(Instant(1)) {
+            Output::Done(result) => result.map(<[u8]>::len),
+            other => panic!("{other:?}"),
+        };
+        let line = if result.is_ok() { Line::Up } else { Line::Lost };
+        assert_eq!(master.line(), line, "{profile:?} {request:?} {size}");
+        result
+    };
+    let damage = |received: usize, fits| {
+        Err(Error::Failed(Failure::Size { received: received as u8, fits }))
+    };
+    for register in RegisterId::all().chain([RegisterId(0xF0)]) {
+        let sizes = Profile::ALL.map(|profile| {
+            let shape = register.shape();
+            shape.and_then(|shape| {
+                shape.read_size(profile, Features::NONE.with(shape.feature)).map(usize::from)
+            })
+        });
+        let takes =
+            |own: Option<usize>, size| own.map_or([1, 2, 4].contains(&size), |own| own == size);
+        for size in 0..=8 {
+            let request = Request::GetRegister(register);
+            let fits = takes(sizes[1], size).then_some(Profile::Mcsdk54);
+            let expected = if takes(sizes[0], size) { Ok(size) } else { damage(size, fits) };
+            assert_eq!(answered(Profile::Spec, &request, size), expected, "{register} {size}");
+            let fits = takes(sizes[0], size).then_some(Profile::Spec);
+            let is_value = [1, 2, 4].contains(&size);
+            let expected = if is_value { Ok(size) } else { damage(size, fits) };
+            assert_eq!(answered(Profile::Mcsdk54, &request, size), expected, "{register} {size}");
+        }
+    }
+    let nothing = [0; 4];
+    for acknowledged in [
+        Request::SetRegister { register: RegisterId::SPEED_KP, value: &nothing[..2] },
+        Request::Execute(Command::StartMotor),
+        Request::Execute(Command::StopMotor),
+        Request::Ramp(Ramp { speed_rpm: 1, duration_ms: 1 }),
+        Request::SetRevupData(0, RevupPhase::default()),
+        Request::CurrentReference(CurrentReference { iq_s16a: 1, id_s16a: 1 }),
+        Request::ConfigDynStruct { segment: 0, registers: &nothing },
+        Request::TorqueRamp(TorqueRamp { torque_s16a: 1, duration_ms: 1 }),
+        Request::Position(PositionMove { angle_rad: 1.0, duration_s: 1.0 }),
+    ] {
+        for profile in Profile::ALL {
+            assert_eq!(answered(profile, &acknowledged, 0), Ok(0));
+            for size in [1, 2, 4, 32] {
+                assert_eq!(answered(profile, &acknowledged, size), damage(size, None));
+            }
+        }
+    }
+}

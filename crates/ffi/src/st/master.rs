@@ -100,6 +100,7 @@ pub unsafe extern "C" fn motorlink_st_master_init(
             timeout: Duration(config.timeout_us.into()),
             recovery: recovery(config.recovery)?,
             quiet: Duration(config.quiet_us.into()),
+            profile,
         };
         master.init(size, State { master: Master::new(config), profile, asked: None })
     })
@@ -182,6 +183,7 @@ fn failed(error: Error) -> (motorlink_error, u8) {
         Failure::Incomplete { .. } => motorlink_error::Incomplete,
         Failure::Header(_) => motorlink_error::NotAReply,
         Failure::Ambiguous => motorlink_error::Ambiguous,
+        Failure::Size { .. } => motorlink_error::WrongReply,
         Failure::Lost => motorlink_error::Lost,
         Failure::Noise => motorlink_error::Noise,
         _ => motorlink_error::Damaged,

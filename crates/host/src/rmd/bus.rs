@@ -186,7 +186,7 @@ impl Bus {
 
     /// Takes motors over that somebody else set moving.
     pub(crate) fn take_over(&self, moving: MotorSet) {
-        self.lock().session.take_over(moving);
+        self.line.take().session.take_over(moving);
     }
 
     /// Sets what a motor may be told; it holds for every call, raw frames included.

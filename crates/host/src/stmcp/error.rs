@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use motorlink_proto::stmcp::{ErrorCode, Failure, Motor, RegisterId, Unverified};
+use motorlink_proto::stmcp::{ErrorCode, Failure, Motor, Profile, RegisterId, Unverified};
 
 use super::LimitError;
 use crate::port::PortError;
@@ -155,6 +155,15 @@ pub(super) fn advice(failure: Failure) -> &'static str {
             "a wrong baud rate looks like this; `motorlink st scan` tries the usual rates"
         }
         Failure::Incomplete { .. } => "the line lost bytes; try again",
+        Failure::Size { fits: Some(Profile::Mcsdk54), .. } => {
+            "if the drive speaks that, say so: --profile mcsdk-5.4"
+        }
+        Failure::Size { fits: Some(Profile::Spec), .. } => {
+            "if the drive speaks that, say so: --profile spec"
+        }
+        Failure::Size { fits: None, .. } => {
+            "the line is damaged, or this is another's reply; try again"
+        }
         Failure::NotUnderstood(_) => "the line to the drive loses or damages bytes; try again",
         Failure::Lost => "the next call tries again",
         Failure::Noise => "something else is sending on this line",

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
-    Command, Counters, Frame, FrameCode, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor, Output,
-    Profile, Recovery, RegisterId, Request, RequestError,
+    Command, Config, Counters, Frame, FrameCode, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor,
+    Output, Profile, Recovery, RegisterId, Request, RequestError,
 };
 use motorlink_proto::time::Instant;
 
@@ -75,14 +75,17 @@ impl Rules {
         self.limits.check(request).map_err(|why| Error::Limit { motor: Target(motor), why })
     }
 
-    /// As [`check`](Self::check), for any frame, in every profile.
-    pub(super) fn check_raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
+    /// As [`check`](Self::check), for any frame, in every profile; gives its effect.
+    pub(super) fn check_raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Effect, Error> {
         addressable(motor)?;
         if payload.len() > MAX_PAYLOAD {
             return Err(Error::TooLong(What::Raw(code).to_string()));
         }
         let frame = Frame { header: Frame::header(code, motor), payload };
-        self.limits.check_frame(&frame).map_err(|why| Error::Limit { motor: Target(motor), why })
+        match self.limits.check_frame(&frame) {
+            Ok(()) => Ok(Effect::of_frame(&frame)),
+            Err(why) => Err(Error::Limit { motor: Target(motor), why }),
+        }
     }
 }
 
@@ -92,7 +95,7 @@ impl Session {
         let rules = Rules { profile: options.profile, limits: options.limits };
         let what = What::Known(FrameCode::GetBoardInfo);
         let asked = Asked { motor: 0, addressed: None, effect: Effect::None, what };
-        let master = Master::new(options.line);
+        let master = Master::new(Config { profile: options.profile, ..options.line });
         Session {
             port,
             rules,
@@ -145,9 +148,8 @@ impl Session {
     /// # Errors
     /// Those of [`request`](Self::request).
     pub(super) fn raw(&mut self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
-        self.rules.check_raw(motor, code, payload)?;
+        let effect = self.rules.check_raw(motor, code, payload)?;
         let frame = Frame { header: Frame::header(code, motor), payload };
-        let effect = Effect::of_frame(&frame);
         self.check_retired(effect)?;
         self.check_start(motor, effect)?;
         self.ahead_size = match self.is_urgent(effect) {

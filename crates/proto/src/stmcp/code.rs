@@ -17,6 +17,14 @@ impl Profile {
     /// Every profile.
     pub const ALL: [Profile; 2] = [Profile::Spec, Profile::Mcsdk54];
 
+    /// The profile that this is not.
+    pub const fn other(self) -> Self {
+        match self {
+            Profile::Spec => Profile::Mcsdk54,
+            Profile::Mcsdk54 => Profile::Spec,
+        }
+    }
+
     /// The profile's name as the command line spells it.
     pub const fn name(self) -> &'static str {
         match self {

@@ -1,6 +1,6 @@
 //! Why an exchange did not end in a positive acknowledge.
 
-use super::{Bad, ErrorCode};
+use super::{Bad, ErrorCode, Profile};
 
 /// Why an exchange did not end in a positive acknowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +26,13 @@ pub enum Failure {
     Header(u8),
     /// A reply that is not a frame.
     Damaged(Bad),
+    /// A whole acknowledge, with a payload of another size than this request's has.
+    Size {
+        /// Bytes of its payload.
+        received: u8,
+        /// Another profile, whose size this is.
+        fits: Option<Profile>,
+    },
     /// The drive did not understand what it received. This may not even have been this request, but a
     /// stray byte from before (SPEC-NOTES S16).
     NotUnderstood(ErrorCode),
@@ -59,6 +66,13 @@ impl core::fmt::Display for Failure {
             }
             Failure::Damaged(Bad::Checksum { expected, received }) => {
                 write!(f, "the reply's checksum is {received:#04x}, its bytes give {expected:#04x}")
+            }
+            Failure::Size { received, fits: None } => {
+                write!(f, "the reply has {received} bytes, as no reply to this request has")
+            }
+            Failure::Size { received, fits: Some(profile) } => {
+                let name = profile.name();
+                write!(f, "the reply has {received} bytes, as in profile {name}")
             }
             Failure::NotUnderstood(code) => {
                 write!(f, "the drive did not understand what it received ({code}: {})", code.doc())

@@ -2,7 +2,7 @@
 
 use super::{
     Command, Error, ErrorCode, Failure, Frame, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
-    MAX_FRAME, MAX_PAYLOAD, Parse, Profile, Request, RevupPhase, frame,
+    MAX_FRAME, MAX_PAYLOAD, Parse, Profile, ReplySize, Request, RevupPhase, frame,
 };
 use crate::time::{Duration, Instant};
 
@@ -34,6 +34,8 @@ pub struct Config {
     pub recovery: Recovery,
     /// The silence after which nothing more is expected to come.
     pub quiet: Duration,
+    /// What the drive is expected to speak.
+    pub profile: Profile,
 }
 
 impl Config {
@@ -57,9 +59,14 @@ impl Config {
 }
 
 impl Default for Config {
-    /// The document's 1 s, `Drain`, 50 ms of silence.
+    /// The document's 1 s, `Drain`, 50 ms of silence, profile `spec`.
     fn default() -> Self {
-        Config { timeout: TIMEOUT, recovery: Recovery::default(), quiet: Duration::from_millis(50) }
+        Config {
+            timeout: TIMEOUT,
+            recovery: Recovery::default(),
+            quiet: Duration::from_millis(50),
+            profile: Profile::default(),
+        }
     }
 }
 
@@ -117,6 +124,8 @@ pub struct Master {
     buffer: [u8; MAX_FRAME],
     filled: u8,
     request: Asked,
+    /// The size of its reply, in the profile of the drive and in the other.
+    sizes: [ReplySize; 2],
     /// What was asked when the line was lost.
     lost: Asked,
     /// The frame that recovery sends.
@@ -197,6 +206,7 @@ impl Master {
             buffer: [0; MAX_FRAME],
             filled: 0,
             request: nothing,
+            sizes: [ReplySize::Any; 2],
             lost: nothing,
             probe: [0; 4],
             question: INFO,
@@ -236,6 +246,13 @@ impl Master {
         let frame = request.encode(motor, &mut self.buffer).ok_or(RequestError::TooLong)?;
         self.filled = frame.len() as u8;
         self.begin(motor, Some(request.code()));
+        let profile = self.config.profile;
+        let own = match (profile, request) {
+            // Builds of shipped firmware differ.
+            (Profile::Mcsdk54, Request::GetRegister(_)) => ReplySize::Value,
+            _ => request.reply_size(profile),
+        };
+        self.sizes = [own, request.reply_size(profile.other())];
         Ok(())
     }
 
@@ -264,7 +281,9 @@ impl Master {
             Some(FrameCode::GetDataElement | FrameCode::GetMpInfo) | None => INFO | REVUP,
             Some(_) => 0,
         };
-        self.request = Asked { motor, read: code.is_some_and(FrameCode::is_read), alike };
+        let read = code.is_some_and(FrameCode::is_read);
+        self.request = Asked { motor, read, alike };
+        self.sizes = [ReplySize::Any; 2];
         self.state = match (self.line, self.config.recovery) {
             (Line::Up, _) => State::Send,
             (Line::Lost, Recovery::None) => State::Done(Err(Error::Failed(Failure::Lost))),
@@ -482,8 +501,16 @@ impl Master {
                 if rest > 0 || damaged {
                     self.lose();
                 }
-                let ambiguous = Err(Error::Failed(Failure::Ambiguous));
-                return Some(Some(if contradicts { ambiguous } else { result }));
+                if contradicts {
+                    return Some(Some(Err(Error::Failed(Failure::Ambiguous))));
+                }
+                match (result, self.sizes) {
+                    (Ok(received), [own, other]) if !own.takes(received) => Failure::Size {
+                        received,
+                        fits: other.takes(received).then(|| self.config.profile.other()),
+                    },
+                    _ => return Some(Some(result)),
+                }
             }
         };
         self.lose();

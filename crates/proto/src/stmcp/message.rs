@@ -1,7 +1,8 @@
 //! Messages: what a frame's payload says (chapter 4), both ways.
 
 use super::{
-    Command, ErrorCode, Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Version, frame,
+    Command, ErrorCode, Features, Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Version,
+    frame, register::Shape,
 };
 
 /// Phases of the rev-up (4.10).
@@ -95,6 +96,28 @@ pub enum Request<'a> {
     TorqueRamp(TorqueRamp),
     /// SET_POSITION_CMD (profile `mcsdk-5.4`).
     Position(PositionMove),
+}
+
+/// How many bytes the payload of an acknowledge has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReplySize {
+    /// As many as this.
+    Exactly(u8),
+    /// 1, 2 or 4: those of a register whose size is not known.
+    Value,
+    /// The request does not tell.
+    Any,
+}
+
+impl ReplySize {
+    /// Whether `size` bytes are among it.
+    pub const fn takes(self, size: u8) -> bool {
+        match self {
+            ReplySize::Exactly(exactly) => size == exactly,
+            ReplySize::Value => matches!(size, 1 | 2 | 4),
+            ReplySize::Any => true,
+        }
+    }
 }
 
 impl<'a> Request<'a> {
@@ -206,6 +229,32 @@ impl<'a> Request<'a> {
             }
             _ => return None,
         })
+    }
+
+    /// How many bytes the acknowledge of a drive of `profile` has behind its header (4.4 to 4.12, and
+    /// SPEC-NOTES S17).
+    pub fn reply_size(&self, profile: Profile) -> ReplySize {
+        match self {
+            Request::GetRegister(register) => {
+                let shape = register.shape();
+                let read =
+                    |shape: &Shape| shape.read_size(profile, Features::NONE.with(shape.feature));
+                shape.and_then(read).map_or(ReplySize::Value, ReplySize::Exactly)
+            }
+            Request::RevupData(_) => ReplySize::Exactly(RevupPhase::SIZE as u8),
+            Request::BoardInfo
+            | Request::FirmwareVersion
+            | Request::DataElement(_)
+            | Request::ProfilerInfo(_) => ReplySize::Any,
+            Request::SetRegister { .. }
+            | Request::Execute(_)
+            | Request::Ramp(_)
+            | Request::SetRevupData(..)
+            | Request::CurrentReference(_)
+            | Request::ConfigDynStruct { .. }
+            | Request::TorqueRamp(_)
+            | Request::Position(_) => ReplySize::Exactly(0),
+        }
     }
 
     /// Whether the message only asks; anything else changes something in the drive.

@@ -76,8 +76,8 @@ pub use failure::{Error, Failure};
 pub use frame::{Bad, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
 pub use master::{Config, Counters, Line, Master, Output, Recovery, RequestError, TIMEOUT};
 pub use message::{
-    BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, Request,
-    RevupPhase, TorqueRamp,
+    BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, ReplySize,
+    Request, RevupPhase, TorqueRamp,
 };
 pub use register::{Feature, Features, RegisterId};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
