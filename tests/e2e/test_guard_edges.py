@@ -14,6 +14,7 @@ import stat
 import statistics
 import subprocess
 import sys
+import termios
 import threading
 import time
 import tty
@@ -31,6 +32,7 @@ RUNS = int(os.environ.get("GUARD_RUNS", "6"))
 ENDING = [
     *[signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT],
     *[signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGVTALRM, signal.SIGPROF],
+    *[signal.SIGPWR, signal.SIGRTMIN, signal.SIGRTMAX],
 ]
 SUSPENDING = [signal.SIGTSTP, signal.SIGTTOU, signal.SIGTTIN]
 
@@ -559,6 +561,80 @@ def test_rmd_motors_are_ended_as_told(sim, guard, client):
         drives.end()
 
 
+def test_an_acknowledge_of_the_programs_own_end_does_not_stand_for_the_guards(sim, start, tmp_path):
+    """The program switches off, moves on and dies; replies are late, and the guard's first 0x80 is lost."""
+    drives = sim(st=())
+    with Meddler(tmp_path / "bus", drives.can, delay=0.01) as bus:
+        serve = f"slcan-pty:{tmp_path}/held"
+        process = start("guard", "rmd", "-p", f"slcan:{bus.path}", "--serve", serve, "--json")
+        process.line(0)
+        with RawLine(tmp_path / "held") as line:
+            line.say(b"\rC\rS8\rO\r", b"\r")
+            os.write(line.end, b"t14188000000000000000\rt1418A2000000A08C0000\r")
+            eventually(lambda: bus.passed(b"t1418A2"), "the motor is told to turn")
+            bus.lose(b"t141880")
+        eventually(lambda: bus.is_lost(b"t141880"), "the guard's first 0x80 is lost")
+        process.says("motor 1 is stopped (0x80 acknowledged)")
+        assert drives.motor(1)["mode"] == "off"
+        assert not any("another node" in text for text in process.err), process.err
+
+
+class Meddler:
+    """A serial line to a drive on which replies are late and a line of slcan is lost."""
+
+    def __init__(self, path, drive, delay):
+        self.path, self.delay = path, delay
+        self.master, self.keep = os.openpty()
+        tty.setraw(self.keep)
+        os.symlink(os.ttyname(self.keep), path)
+        self.drive = os.open(drive, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self.drive)
+        self.sent, self.losing, self.lost = b"", [], []
+        self.running = True
+        self.threads = [
+            threading.Thread(target=self.carry, args=(self.master, self.drive, True), daemon=True),
+            threading.Thread(target=self.carry, args=(self.drive, self.master, False), daemon=True),
+        ]
+        for thread in self.threads:
+            thread.start()
+
+    def carry(self, source, target, is_sent):
+        pending = b""
+        while self.running:
+            if not select.select([source], [], [], 0.05)[0]:
+                continue
+            pending += os.read(source, 4096)
+            *lines, pending = pending.split(b"\r")
+            for line in lines:
+                if is_sent and self.losing and line.startswith(self.losing[0]):
+                    self.lost.append(self.losing.pop(0))
+                    continue
+                if is_sent:
+                    self.sent += line + b"\r"
+                else:
+                    time.sleep(self.delay)
+                os.write(target, line + b"\r")
+
+    def passed(self, beginning):
+        return beginning in self.sent
+
+    def lose(self, beginning):
+        self.losing.append(beginning)
+
+    def is_lost(self, beginning):
+        return beginning in self.lost
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.running = False
+        for thread in self.threads:
+            thread.join()
+        for end in (self.master, self.keep, self.drive):
+            os.close(end)
+
+
 def test_an_rmd_motor_that_its_program_ended_is_left_as_it_is(sim, guard):
     drives = sim(st=())
     process = guard("rmd", drives)
@@ -631,6 +707,56 @@ def test_a_guard_proves_that_it_stops_a_motor(bench, run, protocol):
 )
 def test_what_cannot_be_guarded_is_told(run, words, says):
     assert says in run("guard", *words).ended(2).err
+
+
+def test_two_requests_at_once_do_not_hide_which_motor_is_started(sim, guard):
+    """Motor number 0 is the motor of the request before, which is not answered yet."""
+    drives = sim(rmd=())
+    for before in ([0x22, 0x01, 0x02, 0x25], [0x22, 0x01, 0xFF, 0x23], [0x01, 0x02, 0x00, 0x00, 0x03]):
+        process = guard("st", drives)
+        with RawLine(process.port) as line:
+            line.say(bytes([0x42, 0x01, 0x02, 0x45]), b"\xf0\x01")
+            os.write(line.end, bytes([*before, 0x03, 0x01, 0x01, 0x05]))
+            turns(drives, "st")
+        process.says("motor 1 is stopped")
+        rests(drives, "st")
+        process.interrupt()
+        assert process.wait() == 0
+
+
+def test_a_supervisor_that_does_not_listen_does_not_hold_up_a_guard(bench, start, client, tmp_path):
+    drives = bench("st")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(str(tmp_path / "notify"))
+        variables = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "40000"}
+        serve = f"unix-listen:{tmp_path}/held"
+        process = start("guard", "-p", drives.st, "--serve", serve, **variables)
+        process.line(0)
+        assert systemd.recv(4096) == b"READY=1\n"
+        began = drives.do("state")["time"]
+        eventually(lambda: drives.do("state")["time"] > began + 1, "the socket is full")
+        for _ in range(2):
+            program = client("st", f"unix:{tmp_path}/held")
+            turns(drives, "st")
+            program.kill()
+            rests(drives, "st")
+        heard = {systemd.recv(4096).split(b"=")[0] for _ in range(10)}
+        assert b"WATCHDOG" in heard
+        process.interrupt()
+        assert process.wait() == 0
+
+
+def test_what_a_program_left_of_a_pty_does_not_harm_the_next(bench, guard, run):
+    drives = bench("st")
+    process = guard("st", drives)
+    line = os.open(process.port, os.O_RDWR | os.O_NOCTTY)
+    modes = termios.tcgetattr(line)
+    modes[3] |= termios.ECHO | termios.ICANON
+    termios.tcsetattr(line, termios.TCSANOW, modes)
+    termios.tcflow(line, termios.TCOOFF)
+    os.close(line)
+    process.says("has left")
+    run("st", "-p", process.port, "get", "SPEED_KP").ended(0)
 
 
 # A10: the power factor correction.

@@ -3,6 +3,7 @@
 //!
 //! A signal that is ignored when the program starts stays ignored, as `nohup` means it.
 
+use std::ops::RangeInclusive;
 use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, OnceLock, PoisonError};
@@ -19,9 +20,11 @@ const INTERRUPTED_CODE: i32 = 130;
 
 /// Ctrl-C, what supervisors send, and a terminal that is closed.
 const ENDING: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
-/// Others that end a program which does not handle them.
+/// Others that end a program which does not handle them, beside those that tell of a defect in it.
 const KILLING: [i32; 9] =
     [SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU, SIGXFSZ];
+/// So do Linux's SIGSTKFLT and SIGPWR, and its real-time signals.
+const LINUX: [RangeInclusive<i32>; 3] = [16..=16, 30..=30, 34..=64];
 /// Those that suspend one.
 const SUSPENDING: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];
 
@@ -59,7 +62,8 @@ pub fn hold() {
     HOLDS.store(true, Ordering::SeqCst);
     take_over();
     let Some(handle) = HANDLE.get() else { return };
-    for signal in obeyed(&KILLING).into_iter().chain(SUSPENDING) {
+    let killing: Vec<i32> = KILLING.into_iter().chain(LINUX.into_iter().flatten()).collect();
+    for signal in obeyed(&killing).into_iter().chain(SUSPENDING) {
         if let Err(error) = handle.add_signal(signal) {
             note(format!("warning: signal {signal} is not handled: {error}"));
         }

@@ -9,6 +9,7 @@ use std::time::Duration;
 use motorlink::port::{PortName, ServeName};
 use motorlink::relay::{Event, Relay, RelayError, RelayOptions};
 use motorlink::rmd::OnDrop;
+use motorlink::serve::Served;
 use serde_json::json;
 
 use crate::connection::Port;
@@ -19,13 +20,13 @@ use prove::{Proof, Spin};
 use supervisor::Supervisor;
 
 /// How soon a signal is noticed.
-const SIGNAL_PERIOD: Duration = Duration::from_millis(20);
+const SIGNAL_PERIOD: Duration = Duration::from_millis(50);
 
 #[derive(clap::Args)]
 #[command(
     args_conflicts_with_subcommands = true,
     after_help = "\
-Without `st` or `rmd` it guards an ST drive.
+Without `st` or `rmd` it guards an ST drive; options go behind that word.
 
 ST's protocol has no watchdog: a drive that was told START_MOTOR turns until it is told STOP_MOTOR, \
 whatever became of the program that started it. An RMD motor goes on until its shutdown time, if the \
@@ -72,7 +73,8 @@ struct StArgs {
     #[arg(long, value_name = "PORT", default_value = "pty:./drive")]
     serve: Vec<String>,
     /// The motor of --prove
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "prove")]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "prove",
+        value_parser = clap::value_parser!(u8).range(1..=7))]
     motor: u8,
     #[command(flatten)]
     common: Common,
@@ -91,7 +93,8 @@ struct RmdArgs {
     #[arg(long, value_name = "ACTION", default_value = "off")]
     on_loss: OnLoss,
     /// The motor of --prove
-    #[arg(long, value_name = "ID", default_value_t = 1, requires = "prove")]
+    #[arg(long, value_name = "ID", default_value_t = 1, requires = "prove",
+        value_parser = clap::value_parser!(u8).range(1..=32))]
     id: u8,
     #[command(flatten)]
     common: Common,
@@ -179,11 +182,12 @@ fn serve(
     names: &[String],
     json: bool,
 ) -> Result<(), Failure> {
-    for name in names {
-        let served = relay.serve(&name.parse::<ServeName>()?)?;
+    let names: Vec<ServeName> = names.iter().map(|name| name.parse()).collect::<Result<_, _>>()?;
+    let served: Vec<Served> =
+        names.iter().map(|name| relay.serve(name)).collect::<Result<_, _>>()?;
+    for Served { port: name, path } in served {
         output::line(&json!({
-            "port": served.port, "protocol": protocol, "path": served.path,
-            "guards": port.to_string(),
+            "port": name, "protocol": protocol, "path": path, "guards": port.to_string(),
         }))?;
     }
     let mut supervisor = Supervisor::ready();

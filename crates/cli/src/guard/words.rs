@@ -16,6 +16,14 @@ pub fn of(event: &Event) -> (String, Value) {
             format!("the program has left the line; {dropped} of what it sent were not passed on"),
             json!({ "event": "left", "dropped": dropped }),
         ),
+        // Nobody can be put out of a pty.
+        Event::TurnedAway { port } if port.contains("pty:") => (
+            format!(
+                "{port}: another program opened it as well; unless it looks for the lock, it shares \
+                 the line"
+            ),
+            json!({ "event": "shared", "port": port }),
+        ),
         Event::TurnedAway { port } => (
             format!("{port}: another program came and does not get the line"),
             json!({ "event": "turned-away", "port": port }),

@@ -193,9 +193,16 @@ static void heard_by_the_host(const json_t *vector) {
   motorlink_rmd_data reply = data_of(vector), asked = motorlink_rmd_torque(0);
   motorlink_can_frame frame;
   motorlink_rmd_action action;
-  if (command != 0) {
-    memset(asked.bytes, 0, sizeof asked.bytes);
-    asked.bytes[0] = command;
+  switch (command) {
+    case 0:
+      break;
+    case 0x31: case 0x32: case 0x34: case 0x80: case 0x81: case 0x88:
+      /* The reply repeats the request. */
+      asked = reply;
+      break;
+    default:
+      memset(asked.bytes, 0, sizeof asked.bytes);
+      asked.bytes[0] = command;
   }
   OK(motorlink_rmd_host_request(&host, 0, id, asked));
   next(0, MOTORLINK_ACTION_TRANSMIT);

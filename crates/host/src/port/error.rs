@@ -215,9 +215,7 @@ pub enum PortError {
         port: String,
     },
     /// The link of a served pty is another server's.
-    #[error(
-        "`{port}` is served already, perhaps by another simulator: end that or choose another path"
-    )]
+    #[error("`{port}` is served already: end that server or choose another path")]
     PathServed {
         /// The path.
         port: String,

@@ -176,7 +176,7 @@ trait Hold {
 
     /// Stops what was set turning, which takes as long as the drive needs to answer. What could not be
     /// stopped is owed still.
-    fn stop(&mut self) -> Vec<Halt>;
+    fn stop(&mut self, server: &Server) -> Vec<Halt>;
 }
 
 /// Serves a port to one client at a time, unchanged in both directions and without a thread, and stops
@@ -325,7 +325,7 @@ impl Relay {
     }
 
     fn stop(&mut self, reason: Reason) {
-        let halts = self.hold.stop();
+        let halts = self.hold.stop(&self.server);
         let has_failed = self.hold.owes();
         self.is_owing &= has_failed;
         if !(has_failed && self.has_complained) {

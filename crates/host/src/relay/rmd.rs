@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use motorlink_proto::rmd::{CanFrame, Code, MotorId};
+use motorlink_proto::rmd::{CanFrame, Code, Command, MotorId, Off, Stop};
 use motorlink_proto::time::{self, Instant};
 
 use super::pace::Pace;
@@ -26,6 +26,9 @@ const FRAMES_AHEAD: u64 = 64;
 const TURN: usize = 64;
 /// Nobody waits for a guard's exchanges but its motors, who are told first.
 const TIMEOUT: Duration = Duration::from_millis(200);
+/// How long motors that owe an acknowledge are listened to, and how long at most.
+const SILENCE: time::Duration = time::Duration::from_millis(150);
+const PATIENCE: time::Duration = time::Duration::from_millis(1_000);
 
 pub(super) struct RmdHold {
     port: Port<Box<dyn EventCan>>,
@@ -87,6 +90,37 @@ impl RmdHold {
     }
 }
 
+impl RmdHold {
+    /// Waits until no motor owes the client an acknowledge of an earlier end any more, or until those
+    /// that do are silent.
+    fn settle(&mut self, server: &Server) {
+        let begun = server.now();
+        let mut silent_since = begun;
+        loop {
+            let now = server.now();
+            let doubtful = self.follower.doubtful(now);
+            if doubtful.is_empty()
+                || now.since(silent_since) > SILENCE
+                || now.since(begun) > PATIENCE
+            {
+                return;
+            }
+            match self.port.receive(Some(SILENCE.into())) {
+                Ok(Some(frame)) => {
+                    let now = server.now();
+                    self.follower.heard(now, &frame);
+                    let id = MotorId::from_can_id(frame.id());
+                    if id.is_some_and(|id| doubtful.contains(id)) {
+                        silent_since = now;
+                    }
+                }
+                Ok(None) => {}
+                Err(_) => return,
+            }
+        }
+    }
+}
+
 impl Hold for RmdHold {
     fn serve(
         &self,
@@ -141,8 +175,17 @@ impl Hold for RmdHold {
     }
 
     /// Tells the motors first, then waits for their answers.
-    fn stop(&mut self) -> Vec<Halt> {
+    fn stop(&mut self, server: &Server) -> Vec<Halt> {
         let moving = self.follower.moving();
+        let (code, request) = match self.on_loss {
+            OnDrop::Off => (Code::Off, Off.encode()),
+            OnDrop::Stop => (Code::Stop, Stop.encode()),
+        };
+        for id in moving {
+            // If it fails, so does what follows, which says why.
+            let _ = self.port.send(&CanFrame::new(id.can_id(), request));
+        }
+        self.settle(server);
         let open = self.port.opener(|port| Box::new(port) as Box<dyn CanLink>);
         let options = Options { timeout: TIMEOUT, ..Options::default() };
         let Ok(bus) = Bus::open_with(&self.port.name(), open, options) else {
@@ -155,11 +198,7 @@ impl Hold for RmdHold {
         };
         bus.take_over(moving);
         let stopped = bus.guard().with(self.on_loss).stop_now();
-        self.follower = Follower::with(bus.moving());
-        let code = match self.on_loss {
-            OnDrop::Off => Code::Off,
-            OnDrop::Stop => Code::Stop,
-        };
+        self.follower.left_moving(bus.moving());
         let told = |Stopped { id, result }: Stopped| Halt {
             part: Part::Motor(id.number()),
             outcome: match result {

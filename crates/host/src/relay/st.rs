@@ -162,7 +162,7 @@ impl Hold for StHold {
     }
 
     /// Recovers the line, sends STOP_MOTOR to what was started, and looks whether it stops.
-    fn stop(&mut self) -> Vec<Halt> {
+    fn stop(&mut self, _: &Server) -> Vec<Halt> {
         // If the port is gone, so it is for the client below.
         let _ = self.pull();
         let (owed, pfc) = (self.follower.started(), self.follower.pfc());

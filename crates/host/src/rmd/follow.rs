@@ -42,14 +42,22 @@ pub(crate) struct Heard {
 }
 
 impl Follower {
-    /// On a bus where these motors were set moving before.
-    pub(crate) fn with(moving: MotorSet) -> Self {
-        Follower { moving, ..Follower::default() }
-    }
-
     /// Motors that were set moving and not stopped.
     pub(crate) fn moving(&self) -> MotorSet {
         self.moving
+    }
+
+    /// Of those that were moving, these are left.
+    pub(crate) fn left_moving(&mut self, moving: MotorSet) {
+        self.moving = moving;
+    }
+
+    /// Moving motors that may still acknowledge an end from before their last command: that must not
+    /// pass for the acknowledge of a later one.
+    pub(crate) fn doubtful(&self, now: Instant) -> MotorSet {
+        let owes_end = |asked: &Asked| is_end(asked.code) && now.since(asked.at) <= LATE;
+        let asked = |id: &MotorId| &self.asked[usize::from(id.number()) - 1];
+        self.moving.filter(|id| asked(id).iter().any(owes_end)).collect()
     }
 
     /// What other nodes do is told to the next client again.
@@ -70,8 +78,7 @@ impl Follower {
                 self.ask(id, Asked { code: Code::Torque.into(), at: now, number, ends: false });
             }
         } else if let Some(id) = MotorId::from_can_id(can_id.into()) {
-            let ends = matches!(Code::from(code), Code::Off | Code::Stop);
-            self.ask(id, Asked { code, at: now, number, ends });
+            self.ask(id, Asked { code, at: now, number, ends: is_end(code) });
         }
     }
 
@@ -106,6 +113,10 @@ impl Follower {
     fn of(&mut self, id: MotorId) -> &mut VecDeque<Asked> {
         &mut self.asked[usize::from(id.number()) - 1]
     }
+}
+
+fn is_end(code: u8) -> bool {
+    matches!(Code::from(code), Code::Off | Code::Stop)
 }
 
 #[cfg(test)]
@@ -163,6 +174,18 @@ mod tests {
         // Another motor's, and one that nobody asked for.
         assert_eq!(ids(&after(&[('>', 1, 0xA2), ('>', 1, 0x80), ('<', 2, 0x80)])), [1]);
         assert_eq!(ids(&after(&[('>', 1, 0xA2), ('<', 1, 0x80)])), [1]);
+    }
+
+    #[test]
+    fn a_motor_that_owes_an_acknowledge_of_its_end_is_in_doubt() {
+        let now = Instant(10_000);
+        let doubtful = |talk| after(talk).doubtful(now).map(MotorId::number).collect::<Vec<_>>();
+        assert_eq!(doubtful(&[('>', 1, 0x80), ('>', 1, 0xA2)]), [1]);
+        assert_eq!(doubtful(&[('>', 1, 0x80), ('>', 1, 0xA2), ('<', 1, 0x80)]), NONE);
+        assert_eq!(doubtful(&[('>', 1, 0xA2), ('>', 1, 0x9C)]), NONE);
+        assert_eq!(doubtful(&[('>', 1, 0x80)]), NONE, "it does not move");
+        let talk = after(&[('>', 1, 0x80), ('>', 1, 0xA2)]);
+        assert_eq!(talk.doubtful(now + LATE).count(), 0, "it is too late");
     }
 
     #[test]

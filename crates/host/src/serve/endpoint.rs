@@ -148,7 +148,7 @@ impl Endpoint {
         for mut client in self.clients.extract_if(.., |client| client.is_gone) {
             self.station.left(now);
             if let Door::Pty(pty, waiting) = &mut self.door {
-                pty.forget_unread(client.left_bytes);
+                pty.forget_client(client.left_bytes);
                 client.adapter.forget_line();
                 (client.is_gone, client.left_bytes) = (false, false);
                 *waiting = Some(client);

@@ -12,7 +12,9 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::inotify::{self, WatchFlags};
 use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use rustix::termios::{OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr};
+use rustix::termios::{
+    Action, OptionalActions, QueueSelector, tcflow, tcflush, tcgetattr, tcsetattr,
+};
 
 use crate::port::{MARKED_LINK, PortError, mark};
 
@@ -46,12 +48,17 @@ impl Pty {
         &self.comings
     }
 
-    /// Drops what the client that left did not read, and what it `left_bytes` of for the server.
-    /// Never while one is there: a reply to the first request may be among it.
-    pub(super) fn forget_unread(&self, left_bytes: bool) {
+    /// Drops what the client that left did not read, and what it `left_bytes` of for the server, and
+    /// sets the line up anew: it may have left it stopped (Ctrl-S), or echoing. Never while one is
+    /// there: a reply to the first request may be among it.
+    pub(super) fn forget_client(&self, left_bytes: bool) {
         let queues = if left_bytes { QueueSelector::IOFlush } else { QueueSelector::IFlush };
         // It cannot fail on a pty; if it did, the next client would see old bytes.
-        let _ = open_client_side(&self.path).and_then(|client_side| tcflush(&client_side, queues));
+        let _ = open_client_side(&self.path).and_then(|client_side| {
+            tcflow(&client_side, Action::OOn)?;
+            set_up(&client_side)?;
+            tcflush(&client_side, queues)
+        });
         self.forget_comings();
     }
 
@@ -87,11 +94,14 @@ fn open_pair() -> rustix::io::Result<(PathBuf, OwnedFd)> {
     // Spelled so that a link to it is known for a server's.
     let path = Path::new(MARKED_LINK).join(number);
     // The mode outlives this descriptor.
-    let client_side = open_client_side(&path)?;
-    let mut settings = tcgetattr(&client_side)?;
-    settings.make_raw();
-    tcsetattr(&client_side, OptionalActions::Now, &settings)?;
+    set_up(&open_client_side(&path)?)?;
     Ok((path, master))
+}
+
+fn set_up(client_side: &OwnedFd) -> rustix::io::Result<()> {
+    let mut settings = tcgetattr(client_side)?;
+    settings.make_raw();
+    tcsetattr(client_side, OptionalActions::Now, &settings)
 }
 
 fn open_client_side(path: &Path) -> rustix::io::Result<OwnedFd> {

@@ -1,17 +1,29 @@
 //! Clients that speak what browsers speak: a web page can make one connect to a served TCP port.
 
-/// How requests of HTTP begin.
-const METHODS: [&[u8]; 10] = [
-    b"GET ",
-    b"POST ",
-    b"PUT ",
-    b"HEAD ",
-    b"OPTIONS ",
-    b"DELETE ",
-    b"PATCH ",
-    b"TRACE ",
-    b"CONNECT ",
-    b"PRI * HTTP",
+/// Methods of HTTP, in whatever case: a client that begins like one of them is held.
+const METHODS: [&str; 22] = [
+    "GET",
+    "HEAD",
+    "POST",
+    "PUT",
+    "DELETE",
+    "CONNECT",
+    "OPTIONS",
+    "TRACE",
+    "PATCH",
+    "PRI",
+    "QUERY",
+    "PROPFIND",
+    "PROPPATCH",
+    "MKCOL",
+    "COPY",
+    "MOVE",
+    "LOCK",
+    "UNLOCK",
+    "REPORT",
+    "SEARCH",
+    "LINK",
+    "PURGE",
 ];
 
 /// What a byte has to be; `None`: anything.
@@ -44,7 +56,7 @@ const FRAMED_STUN: Pattern = &[
     Some(|byte| byte == 0x00),
     None,
     Some(|byte| byte == 0x00),
-    Some(|byte| byte == 0x01),
+    Some(|byte| byte == 0x01 || byte == 0x03),
     None,
     None,
     Some(|byte| byte == 0x21),
@@ -53,8 +65,8 @@ const FRAMED_STUN: Pattern = &[
     Some(|byte| byte == 0x42),
 ];
 
-/// As many bytes as decide, at most.
-pub(super) const HELD: usize = 10;
+/// As many bytes as are held, at most.
+pub(super) const HELD: usize = 16;
 
 /// Holds the first bytes of a client back until they are no beginning of what browsers speak.
 #[derive(Debug)]
@@ -105,23 +117,34 @@ enum Judgement {
 }
 
 fn judge(bytes: &[u8]) -> Judgement {
-    let methods = METHODS.iter().map(|method| {
-        let agrees = bytes.iter().zip(*method).all(|(byte, wanted)| byte == wanted);
-        (agrees, method.len())
-    });
-    let patterns = [TLS, STUN, FRAMED_STUN].into_iter().map(|pattern| {
+    let mut judgement = judge_method(bytes);
+    for pattern in [TLS, STUN, FRAMED_STUN] {
         let fits = |(&byte, place): (&u8, &Byte)| place.is_none_or(|is| is(byte));
-        (bytes.iter().zip(pattern).all(fits), pattern.len())
-    });
-    let mut judgement = Judgement::Welcome;
-    for (agrees, length) in methods.chain(patterns) {
-        match agrees {
-            true if bytes.len() >= length => return Judgement::Stranger,
-            true => judgement = Judgement::Undecided,
-            false => {}
+        match bytes.iter().zip(pattern).all(fits) {
+            true if bytes.len() >= pattern.len() => return Judgement::Stranger,
+            true if judgement == Judgement::Welcome => judgement = Judgement::Undecided,
+            _ => {}
         }
     }
     judgement
+}
+
+/// A browser sends its request in one piece: a word that nobody knows for a method needs no patience.
+fn judge_method(bytes: &[u8]) -> Judgement {
+    let is_token = |byte: &&u8| byte.is_ascii_alphanumeric() || b"!#$%&'*+-.^_`|~".contains(byte);
+    let (word, rest) = bytes.split_at(bytes.iter().take_while(is_token).count());
+    let begins = |method: &&str| {
+        let length = word.len().min(method.len());
+        word.len() <= method.len() && word.eq_ignore_ascii_case(&method.as_bytes()[..length])
+    };
+    let mut methods = METHODS.iter().filter(|method| begins(method));
+    match rest {
+        [] if methods.next().is_some() => Judgement::Undecided,
+        [b' ', ..] if methods.any(|method| method.len() == word.len()) => Judgement::Stranger,
+        // The space may be the length of an ST frame, of which no target follows.
+        [b' ', target, ..] if !word.is_empty() && target.is_ascii_graphic() => Judgement::Stranger,
+        _ => Judgement::Welcome,
+    }
 }
 
 #[cfg(test)]
@@ -151,8 +174,14 @@ mod tests {
     #[test]
     fn nothing_of_a_browser_passes_wherever_it_is_cut() {
         let framed = [&[0, 16], BINDING].concat();
-        let rest = b"/ HTTP/1.1\r\n\r\n\x23\x01\x01\x25";
-        let requests = METHODS.map(|method| [method, rest].concat());
+        let rest = &b"/ HTTP/1.1\r\n\r\n\x23\x01\x01\x25"[..];
+        let request = |method: &str| [method.as_bytes(), b" ", rest].concat();
+        let requests: Vec<Vec<u8>> =
+            METHODS.iter().chain(&["patch", "Get"]).map(|method| request(method)).collect();
+        // Methods that a page can make up come in one piece.
+        for method in ["FOO", "M-SEARCH", "a", "#", "ALONGERMETHODTHANANYBODYHASEVERUSEDYET"] {
+            assert_eq!(passed([&*request(method)]), None, "{method}");
+        }
         for sent in requests.iter().map(Vec::as_slice).chain([HELLO, BINDING, &framed]) {
             assert_eq!(passed(sent.chunks(1)), None, "{sent:02x?} byte by byte");
             for at in 0..=sent.len() {
@@ -168,9 +197,11 @@ mod tests {
     fn requests_to_drives_pass_whole_wherever_they_are_cut() {
         let frames =
             (0..=255u8).map(|header| vec![header, 0x02, 0x01, 0x01, header.wrapping_add(4)]);
-        let lines = ["\rC\rS8\rO\r", "C\r", "O\r", "T0000014180102030405060708\r", "t14180\r"];
+        let lines = ["\rC\rS8\rO\r", "C\r", "O\r", "T00000141801020304050607081234\r", "t14180\r"];
         let lines = lines.map(|line| line.as_bytes().to_vec());
-        for sent in frames.chain(lines) {
+        // CONFIG_DYN_STRUCT of motor 1 with 31 registers: `.`, a space, segment 0.
+        let segment = [&[0x2E, 0x20, 0x00][..], &[0x1E; 31], &[0x00]].concat();
+        for sent in frames.chain(lines).chain([segment]) {
             for at in 0..=sent.len() {
                 // Frame code 0 for motor 0, which the protocol does not have, may be held.
                 let whole = in_two(&sent, at).as_deref() == Some(&sent[..]);

@@ -262,6 +262,11 @@ impl Client {
         Ok(written?)
     }
 
+    /// What a stop ends in when the drive has just failed to answer another.
+    pub(super) fn unanswered(&self, motor: Motor, failure: proto::Failure) -> Error {
+        self.line.take().session.unanswered(motor, failure)
+    }
+
     /// The drive has no such motor, which may have been taken for started.
     pub(super) fn is_missing(&self, motor: Motor) {
         self.line.take().session.is_missing(motor);

@@ -144,11 +144,15 @@ impl Follower {
     /// Whether the bytes up to the last one end in what sets something going.
     fn look_for_start(&mut self) {
         for begin in 0..self.recent.len() {
-            let frame = match Frame::parse(&self.recent[begin..]) {
-                Parse::Frame(frame, size) if begin + size == self.recent.len() => frame,
+            let (frame, size) = match Frame::parse(&self.recent[begin..]) {
+                Parse::Frame(frame, size) if begin + size == self.recent.len() => (frame, size),
                 _ => continue,
             };
             if Effect::of_frame(&frame) == Effect::Starts {
+                // What is unanswered before it may change the current motor.
+                if self.out_of_step || self.request.len() != size {
+                    self.started.forget_current();
+                }
                 self.started.presume(frame.motor());
             }
             if command(&frame) == Some(Command::PfcEnable) {
@@ -287,6 +291,22 @@ mod tests {
             follower.heard(&ACK);
             assert_eq!(motors(&follower), [1], "{sent:02x?} {heard:02x?}");
             assert!(follower.unanswered().is_some());
+        }
+    }
+
+    #[test]
+    fn a_request_that_is_not_answered_yet_may_change_the_current_motor() {
+        let before: [Vec<u8>; 3] = [
+            frame(1, &Request::GetRegister(RegisterId::STATUS)),
+            frame(1, &Request::GetRegister(RegisterId(0xFF))),
+            frame(0, &Request::SetRegister { register: RegisterId::TARGET_MOTOR, value: &[0] }),
+        ];
+        for before in before {
+            let mut follower = Follower::default();
+            follower.sent(&frame(2, &Request::GetRegister(RegisterId::STATUS)));
+            follower.heard(&[0xF0, 0x01, 0x00, 0xF1]);
+            follower.sent(&[before.clone(), command(0, Command::StartMotor)].concat());
+            assert_eq!(motors(&follower).len(), 7, "{before:02x?}");
         }
     }
 

@@ -1,6 +1,6 @@
 //! Stops motors at the end of a scope, however it is left.
 
-use motorlink_proto::stmcp::{ErrorCode, Line, Motor};
+use motorlink_proto::stmcp::{ErrorCode, Failure, Line, Motor};
 
 use super::{Client, Error};
 use crate::line::STOP_ATTEMPTS;
@@ -64,16 +64,26 @@ impl<'a> Guard<'a> {
         for attempt in 1..=STOP_ATTEMPTS {
             let mut failed = Vec::new();
             let mut told = false;
+            // How the drive failed to answer: it would not answer for the others either.
+            let mut silent = None;
             for (n, &motor) in left.iter().enumerate() {
                 if !told && self.client.line() == Line::Lost {
                     told = true;
-                    // This motor's is the first thing that `stop` sends.
-                    for &motor in &left[n + 1..] {
+                    // That to this motor is the first thing that `stop` sends, unless it is skipped.
+                    for &motor in &left[n + usize::from(silent.is_none())..] {
                         // If it fails, so does the stop below, which says why.
                         let _ = self.client.stop_unheard(motor);
                     }
                 }
-                let result = self.stop(motor);
+                let result = match silent {
+                    Some(failure) => Err(self.client.unanswered(motor, failure)),
+                    None => self.stop(motor),
+                };
+                if let Err(Error::Failed { failure, .. }) = &result
+                    && matches!(failure, Failure::Timeout | Failure::Lost | Failure::Noise)
+                {
+                    silent = Some(*failure);
+                }
                 if result.is_err() && attempt < STOP_ATTEMPTS {
                     failed.push(motor);
                 } else {

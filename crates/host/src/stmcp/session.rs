@@ -284,6 +284,17 @@ impl Session {
         stop.encode(motor.number(), frame).unwrap_or(&[])
     }
 
+    /// What a stop ends in when the drive has just failed to answer another.
+    pub(super) fn unanswered(&self, motor: Motor, failure: proto::Failure) -> Error {
+        Error::Failed {
+            port: Arc::clone(&self.port),
+            motor: Target(motor.number()),
+            what: What::Executing(Command::StopMotor).to_string(),
+            failure,
+            hint: advice(failure),
+        }
+    }
+
     /// The drive has no such motor, which may have been taken for started.
     pub(super) fn is_missing(&mut self, motor: Motor) {
         self.started.is_missing(motor);

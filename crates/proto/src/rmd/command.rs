@@ -87,6 +87,23 @@ macro_rules! commands {
             }
         }
 
+        impl Code {
+            /// Whether the reply repeats the request byte for byte. Firmware does not carry the table
+            /// for it.
+            pub const fn is_repeated(self) -> bool {
+                match self {
+                    $( Code::$name => {
+                        const ROW: CommandInfo = CommandInfo {
+                            $( $flag: true, )*
+                            ..CommandInfo::new::<$name>(Code::$name, $paragraph)
+                        };
+                        ROW.echo
+                    } )+
+                    Code::Unknown(_) => false,
+                }
+            }
+        }
+
         $( impl Command for $name {
             const CODE: Code = Code::$name;
             type Reply = $reply;
@@ -225,6 +242,7 @@ mod tests {
             COMMANDS.iter().filter(move |row| flag(row)).map(|row| u8::from(row.code))
         };
         assert!(with(|row| row.echo).eq([0x31, 0x32, 0x34, 0x80, 0x81, 0x88]));
+        assert!(with(|row| row.code.is_repeated()).eq(with(|row| row.echo)));
         assert!(with(|row| row.rom).eq([0x32, 0x91, 0x19]));
         assert!(with(|row| row.moves).eq([0x88, 0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6]));
     }

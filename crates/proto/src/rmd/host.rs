@@ -294,8 +294,7 @@ impl Host {
         let slot = &mut self.slots[id.index()];
         if self.in_flight.contains(id) && answers(slot.data[0], data[0]) {
             self.in_flight.remove(id);
-            let is_echo = Code::from(data[0]).info().is_some_and(|row| row.echo);
-            if is_echo && slot.data != *data {
+            if Code::from(data[0]).is_repeated() && slot.data != *data {
                 slot.instead = Error::Altered;
                 self.failed.insert(id);
                 self.owes(now, id);
