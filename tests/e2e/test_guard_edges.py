@@ -871,7 +871,7 @@ def test_random_combinations_leave_nothing_turning(bench, motorlink, client, tmp
             eventually(lambda: is_told_to_stop(drives, protocol), what, within=20)
             times.append(time.monotonic() - began)
             if "end" in acts:
-                assert guard.process.wait(15) == 0, story
+                assert guard.process.wait(40) == 0, f"{story} (GUARD_SEED={seed}, run {number})"
             else:
                 assert guard.process.poll() is None, story
         finally:

@@ -84,7 +84,8 @@ def open(
     """Opens a serial line with a drive. Nothing is sent.
 
     ``port``
-        ``/dev/ttyACM0``, ``serial:/dev/ttyUSB0?baud=115200``, ``tcp:HOST:PORT``, the path of a pty,
+        ``/dev/ttyACM0``, ``serial:/dev/ttyUSB0?baud=115200``, ``tcp:HOST:PORT``, ``unix:PATH``,
+        the path of a pty,
         or ``sim:`` for a simulated drive inside the process.
     ``profile``
         ``spec``: the document; ``mcsdk-5.4``: what shipped firmware really does.

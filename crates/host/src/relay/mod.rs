@@ -199,6 +199,8 @@ pub struct Relay {
     retry_at: Instant,
     /// That motors could not be stopped was told.
     has_complained: bool,
+    /// The last stop was tried.
+    is_over: bool,
 }
 
 impl Relay {
@@ -234,6 +236,7 @@ impl Relay {
             is_owing: false,
             retry_at: Instant(0),
             has_complained: false,
+            is_over: false,
         }
     }
 
@@ -286,7 +289,7 @@ impl Relay {
     }
 
     fn stop_for_good(&mut self) {
-        if self.hold.owes() {
+        if !std::mem::replace(&mut self.is_over, true) && self.hold.owes() {
             self.hold.forget(self.server.now());
             self.has_complained = false;
             self.stop(Reason::Ending);

@@ -167,7 +167,7 @@ impl Hold for StHold {
         let _ = self.pull();
         let (owed, pfc) = (self.follower.started(), self.follower.pfc());
         let open = self.port.opener(|port| Box::new(port) as Box<dyn ByteLink>);
-        let mut halts: Vec<Halt> = match Client::open_with(&self.port.name(), open, self.options) {
+        let halts: Vec<Halt> = match Client::open_with(&self.port.name(), open, self.options) {
             Ok(client) => {
                 client.take_over(owed, self.follower.unanswered());
                 let stopped = client.guard().stop_now();
@@ -194,7 +194,6 @@ impl Hold for StHold {
             // What was tried may be answered yet.
             self.follower.lose();
         }
-        halts.dedup();
         halts
     }
 }
