@@ -18,6 +18,7 @@ import termios
 import threading
 import time
 import tty
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -368,20 +369,15 @@ class RawLine:
         os.close(self.end)
 
 
-class SlowLine:
-    """Drives behind a pty that carries 115200 baud and notes what passes."""
+class Between:
+    """A pty before a drive's line. A thread for each direction runs `carry` until the end."""
 
-    BYTES_PER_SECOND = 11_520
-
-    def __init__(self, path, protocol, drives):
-        self.protocol, self.drives = protocol, drives
+    def __init__(self, path, drive):
+        self.path = path
         self.master, self.keep = os.openpty()
         tty.setraw(self.keep)
         os.symlink(os.ttyname(self.keep), path)
-        self.st, self.can = str(path), str(path)
-        self.seen, self.lock = [], threading.Lock()
-        port = drives.st if protocol == "st" else drives.can
-        self.drive = os.open(port, os.O_RDWR | os.O_NOCTTY)
+        self.drive = os.open(drive, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self.drive)
         self.running = True
         self.threads = [
@@ -390,6 +386,28 @@ class SlowLine:
         ]
         for thread in self.threads:
             thread.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.running = False
+        for thread in self.threads:
+            thread.join()
+        for end in (self.master, self.keep, self.drive):
+            os.close(end)
+
+
+class SlowLine(Between):
+    """Drives behind a pty that carries 115200 baud and notes what passes."""
+
+    BYTES_PER_SECOND = 11_520
+
+    def __init__(self, path, protocol, drives):
+        self.protocol, self.drives = protocol, drives
+        self.st, self.can = str(path), str(path)
+        self.seen, self.lock = [], threading.Lock()
+        super().__init__(path, drives.st if protocol == "st" else drives.can)
 
     def carry(self, source, target, is_sent):
         while self.running:
@@ -420,26 +438,14 @@ class SlowLine:
     def bytes_since(self, began):
         return sum(len(data) for at, data in self.sent() if at > began)
 
-    def end(self):
-        self.running = False
-        for thread in self.threads:
-            thread.join()
-        for end in (self.master, self.keep, self.drive):
-            os.close(end)
-
 
 @pytest.fixture
 def slow(bench, tmp_path):
     """`slow("st")`: drives behind a slow line."""
-    lines = []
-
-    def slow(protocol):
-        lines.append(SlowLine(tmp_path / "slow", protocol, bench(protocol)))
-        return lines[-1]
-
-    yield slow
-    for line in lines:
-        line.end()
+    with ExitStack() as lines:
+        yield lambda protocol: lines.enter_context(
+            SlowLine(tmp_path / "slow", protocol, bench(protocol))
+        )
 
 
 # A5: web pages, and who may open a Unix socket.
@@ -579,24 +585,13 @@ def test_an_acknowledge_of_the_programs_own_end_does_not_stand_for_the_guards(si
         assert not any("another node" in text for text in process.err), process.err
 
 
-class Meddler:
+class Meddler(Between):
     """A serial line to a drive on which replies are late and a line of slcan is lost."""
 
     def __init__(self, path, drive, delay):
-        self.path, self.delay = path, delay
-        self.master, self.keep = os.openpty()
-        tty.setraw(self.keep)
-        os.symlink(os.ttyname(self.keep), path)
-        self.drive = os.open(drive, os.O_RDWR | os.O_NOCTTY)
-        tty.setraw(self.drive)
+        self.delay = delay
         self.sent, self.losing, self.lost = b"", [], []
-        self.running = True
-        self.threads = [
-            threading.Thread(target=self.carry, args=(self.master, self.drive, True), daemon=True),
-            threading.Thread(target=self.carry, args=(self.drive, self.master, False), daemon=True),
-        ]
-        for thread in self.threads:
-            thread.start()
+        super().__init__(path, drive)
 
     def carry(self, source, target, is_sent):
         pending = b""
@@ -623,16 +618,6 @@ class Meddler:
 
     def is_lost(self, beginning):
         return beginning in self.lost
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.running = False
-        for thread in self.threads:
-            thread.join()
-        for end in (self.master, self.keep, self.drive):
-            os.close(end)
 
 
 def test_an_rmd_motor_that_its_program_ended_is_left_as_it_is(sim, guard):

@@ -44,6 +44,16 @@ enum Protocol {
     Rmd,
 }
 
+impl Protocol {
+    /// Of speeds.
+    fn unit(self) -> &'static str {
+        match self {
+            Protocol::St => "rpm",
+            Protocol::Rmd => "°/s",
+        }
+    }
+}
+
 impl Spin {
     pub fn run(self) -> Result<(), Failure> {
         let drive = Drive::open(self.protocol, &self.port.parse()?, self.motor)?;
@@ -61,7 +71,7 @@ impl Spin {
                 return Err(Failure::Refused(format!(
                     "the motor turns at {speed} {unit} and was told {told} {unit}: does it have \
                      power, and is it free to turn?",
-                    unit = drive.unit(),
+                    unit = self.protocol.unit(),
                     told = self.speed,
                 )));
             }
@@ -110,13 +120,6 @@ impl Drive {
             Drive::Rmd { bus, id } => bus.motor(*id)?.status2()?.speed.dps(),
         })
     }
-
-    fn unit(&self) -> &'static str {
-        match self {
-            Drive::St { .. } => "rpm",
-            Drive::Rmd { .. } => "°/s",
-        }
-    }
 }
 
 /// What is to be proved.
@@ -145,10 +148,7 @@ impl Proof {
         relay.serve(&format!("unix-listen:{}", path.display()).parse::<ServeName>()?)?;
         let mut program = Program::start(self, &path)?;
         let reached = program.turning(&mut relay)?;
-        let unit = match self.protocol {
-            Protocol::St => "rpm",
-            Protocol::Rmd => "°/s",
-        };
+        let unit = self.protocol.unit();
         note(format!(
             "a program turns motor {} at {reached} {unit}; it is killed now (SIGKILL)",
             self.motor
@@ -183,7 +183,7 @@ impl Proof {
                     "motor {} still turns at {speed} {} although it acknowledged its stop: does \
                      something drive it?",
                     self.motor,
-                    drive.unit(),
+                    self.protocol.unit(),
                 )));
             }
             std::thread::sleep(LOOK);

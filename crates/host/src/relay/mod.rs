@@ -3,6 +3,7 @@
 //! [`Relay::st`] holds the serial line of an ST drive, [`Relay::rmd`] a CAN bus with RMD motors. The
 //! client sits behind a served port ([`Relay::serve`]) and notices nothing of the relay.
 
+mod held;
 mod pace;
 mod port;
 mod rmd;
@@ -263,7 +264,7 @@ impl Relay {
         let mut desk = self.desk.borrow_mut();
         if desk.has_left {
             desk.has_left = false;
-            let dropped = self.hold.forget(now) + std::mem::take(&mut desk.dropped);
+            let dropped = self.hold.forget(now);
             desk.events.push_back(Event::Left { dropped });
             self.is_owing = self.hold.owes();
         }

@@ -4,15 +4,15 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use motorlink_proto::rmd::{CanFrame, Code, Command, MotorId, Off, Stop};
+use motorlink_proto::rmd::{CanFrame, MotorId};
 use motorlink_proto::time::{self, Instant};
 
+use super::held::Held;
 use super::pace::Pace;
 use super::port::Port;
-use super::station::{Desk, Lane, Place};
+use super::station::Desk;
 use super::{Event, Halt, Hold, Outcome, Part};
-use crate::line::FULL;
-use crate::port::{CanLink, EventCan, Evented, PortError, PortName, ServeName};
+use crate::port::{CanLink, EventCan, PortError, PortName, ServeName};
 use crate::rmd::follow::Follower;
 use crate::rmd::{Bus, OnDrop, Options, Stopped};
 use crate::serve::{Served, Server};
@@ -31,13 +31,9 @@ const SILENCE: time::Duration = time::Duration::from_millis(150);
 const PATIENCE: time::Duration = time::Duration::from_millis(1_000);
 
 pub(super) struct RmdHold {
-    port: Port<Box<dyn EventCan>>,
+    held: Held<Box<dyn EventCan>, CanFrame>,
     on_loss: OnDrop,
-    lane: Rc<RefCell<Lane<CanFrame>>>,
     follower: Follower,
-    pace: Pace,
-    /// The port takes nothing at the moment.
-    is_full: bool,
 }
 
 impl RmdHold {
@@ -47,46 +43,38 @@ impl RmdHold {
             PortName::SocketCan(_) => time::Duration(0),
             _ => FRAME,
         };
-        Ok(RmdHold {
-            port: Port::open(name, Box::new(move || opened.open_event_can()))?,
-            on_loss,
-            lane: Rc::default(),
-            follower: Follower::default(),
-            pace: Pace::new(frame, time::Duration(frame.0 * FRAMES_AHEAD)),
-            is_full: false,
-        })
+        let port = Port::open(name, Box::new(move || opened.open_event_can()))?;
+        let pace = Pace::new(frame, time::Duration(frame.0 * FRAMES_AHEAD));
+        Ok(RmdHold { held: Held::new(port, pace), on_loss, follower: Follower::default() })
     }
 
     /// Takes what is on the bus.
     fn pull(&mut self, now: Instant, events: &mut dyn FnMut(Event)) -> Result<(), PortError> {
         for _ in 0..TURN {
-            let Some(frame) = self.port.receive(Some(Duration::ZERO))? else { break };
+            let Some(frame) = self.held.port.receive(Some(Duration::ZERO))? else { break };
             let heard = self.follower.heard(now, &frame);
             if let Some(number) = heard.reply_to {
-                self.pace.arrived(now, number);
+                self.held.pace.arrived(now, number);
             }
             if let (Some(id), [code, ..]) = (heard.unguarded, frame.data()) {
                 events(Event::Unguarded { motor: id.number(), code: *code });
             }
-            self.lane.borrow_mut().to_client.push_back(frame);
+            self.held.lane.borrow_mut().to_client.push_back(frame);
         }
         Ok(())
     }
 
     /// Hands over what the bus takes of what the client has sent.
     fn push(&mut self, now: Instant) -> Result<(), PortError> {
-        let mut lane = self.lane.borrow_mut();
-        loop {
-            self.is_full = self.port.with(|link| link.flush())?;
-            if self.is_full || self.pace.room(now) == 0 {
-                return Ok(());
-            }
-            let Some(frame) = lane.to_port.pop_front() else { return Ok(()) };
+        while self.held.room(now)? > 0 {
+            let next = self.held.lane.borrow_mut().to_port.pop_front();
+            let Some(frame) = next else { break };
             // What may set a motor turning is noted before it leaves.
-            let number = self.pace.hand(now, 1);
+            let number = self.held.pace.hand(now, 1);
             self.follower.sent(now, &frame, number);
-            self.port.with(|link| link.send(&frame))?;
+            self.held.port.with(|link| link.send(&frame))?;
         }
+        Ok(())
     }
 }
 
@@ -105,7 +93,7 @@ impl RmdHold {
             {
                 return;
             }
-            match self.port.receive(Some(SILENCE.into())) {
+            match self.held.port.receive(Some(SILENCE.into())) {
                 Ok(Some(frame)) => {
                     let now = server.now();
                     self.follower.heard(now, &frame);
@@ -135,39 +123,27 @@ impl Hold for RmdHold {
             let (port, wanted) = (name.to_string(), "CAN bus with one client");
             return Err(PortError::WrongKind { port, wanted, usable });
         }
-        let place = Place { desk: Rc::clone(desk), lane: Rc::clone(&self.lane), port };
-        server.serve_can(name, Box::new(place))
+        server.serve_can(name, Box::new(self.held.place(desk, port)))
     }
 
     fn turn(&self, server: &mut Server, most: Duration) -> Result<bool, PortError> {
-        self.port.turn(server, most)
+        self.held.port.turn(server, most)
     }
 
     fn pass(&mut self, now: Instant, desk: &mut Desk) -> Result<(), PortError> {
         let mut events = |event| desk.events.push_back(event);
         let passed = self.pull(now, &mut events).and_then(|()| self.push(now));
-        let mut lane = self.lane.borrow_mut();
-        if passed.is_err() {
-            lane.to_port.clear();
-        }
-        if desk.client.is_none() {
-            lane.to_client.clear();
-        }
+        self.held.drop_untaken(passed.is_err(), desk);
         passed
     }
 
     fn due(&self, now: Instant) -> Option<Instant> {
-        let is_waiting = !self.lane.borrow().to_port.is_empty();
-        match self.is_full {
-            true => Some(now + FULL.into()),
-            false => is_waiting.then(|| self.pace.next(now)),
-        }
+        self.held.due(now)
     }
 
     fn forget(&mut self, _: Instant) -> usize {
-        self.pace.rest();
         self.follower.client_left();
-        std::mem::take(&mut self.lane.borrow_mut().to_port).len()
+        self.held.forget()
     }
 
     fn owes(&self) -> bool {
@@ -177,19 +153,17 @@ impl Hold for RmdHold {
     /// Tells the motors first, then waits for their answers.
     fn stop(&mut self, server: &Server) -> Vec<Halt> {
         let moving = self.follower.moving();
-        let (code, request) = match self.on_loss {
-            OnDrop::Off => (Code::Off, Off.encode()),
-            OnDrop::Stop => (Code::Stop, Stop.encode()),
-        };
+        let request = self.on_loss.request();
         for id in moving {
             // If it fails, so does what follows, which says why.
-            let _ = self.port.send(&CanFrame::new(id.can_id(), request));
+            let _ = self.held.port.send(&CanFrame::new(id.can_id(), request));
         }
         self.settle(server);
-        let open = self.port.opener(|port| Box::new(port) as Box<dyn CanLink>);
+        let port = &self.held.port;
+        let open = port.opener(|port| Box::new(port) as Box<dyn CanLink>);
         let options = Options { timeout: TIMEOUT, ..Options::default() };
-        let Ok(bus) = Bus::open_with(&self.port.name(), open, options) else {
-            let why = self.port.closed().to_string();
+        let Ok(bus) = Bus::open_with(&port.name(), open, options) else {
+            let why = port.closed().to_string();
             let failed = |id: MotorId| Halt {
                 part: Part::Motor(id.number()),
                 outcome: Outcome::Failed(why.clone()),
@@ -202,7 +176,7 @@ impl Hold for RmdHold {
         let told = |Stopped { id, result }: Stopped| Halt {
             part: Part::Motor(id.number()),
             outcome: match result {
-                Ok(()) => Outcome::Stopped(format!("{:#04x} acknowledged", u8::from(code))),
+                Ok(()) => Outcome::Stopped(format!("{:#04x} acknowledged", request[0])),
                 Err(error) => Outcome::Failed(error.to_string()),
             },
         };

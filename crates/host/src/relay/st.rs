@@ -7,11 +7,11 @@ use std::time::Duration;
 use motorlink_proto::stmcp::{Command, Config, ErrorCode, Recovery, Request, Status};
 use motorlink_proto::time::{self, Instant};
 
+use super::held::Held;
 use super::pace::Pace;
 use super::port::Port;
-use super::station::{Desk, Lane, Place};
+use super::station::Desk;
 use super::{Halt, Hold, Outcome, Part};
-use crate::line::FULL;
 use crate::port::{
     ByteLink, DEFAULT_BAUD, EventLine, Evented, LineName, PortError, PortName, ServeName,
 };
@@ -28,13 +28,9 @@ const AHEAD: time::Duration = time::Duration::from_millis(20);
 const BITS: u64 = 10;
 
 pub(super) struct StHold {
-    port: Port<Box<dyn EventLine>>,
+    held: Held<Box<dyn EventLine>, u8>,
     options: Options,
-    lane: Rc<RefCell<Lane<u8>>>,
     follower: Follower,
-    pace: Pace,
-    /// The port takes nothing at the moment.
-    is_full: bool,
 }
 
 impl StHold {
@@ -52,41 +48,35 @@ impl StHold {
             _ => DEFAULT_BAUD,
         };
         let byte = time::Duration(BITS * 1_000_000 / u64::from(baud));
-        Ok(StHold {
-            port,
-            options,
-            lane: Rc::default(),
-            follower: Follower::default(),
-            pace: Pace::new(byte, AHEAD.max(byte)),
-            is_full: false,
-        })
+        let held = Held::new(port, Pace::new(byte, AHEAD.max(byte)));
+        Ok(StHold { held, options, follower: Follower::default() })
     }
 
     /// Takes what the drive has sent.
     fn pull(&mut self) -> Result<(), PortError> {
         let mut bytes = [0; 4096];
-        let size = self.port.read(&mut bytes, Some(Duration::ZERO))?;
+        let size = self.held.port.read(&mut bytes, Some(Duration::ZERO))?;
         self.follower.heard(&bytes[..size]);
         if self.follower.unanswered().is_none() {
-            self.pace.rest();
+            self.held.pace.rest();
         }
-        self.lane.borrow_mut().to_client.extend(&bytes[..size]);
+        self.held.lane.borrow_mut().to_client.extend(&bytes[..size]);
         Ok(())
     }
 
     /// Hands over what the line takes of what the client has sent.
     fn push(&mut self, now: Instant) -> Result<(), PortError> {
-        let mut lane = self.lane.borrow_mut();
-        self.is_full = self.port.with(|link| link.flush())?;
-        let room = self.pace.room(now).min(lane.to_port.len());
-        if self.is_full || room == 0 {
+        let room = self.held.room(now)?;
+        let mut lane = self.held.lane.borrow_mut();
+        let size = room.min(lane.to_port.len());
+        if size == 0 {
             return Ok(());
         }
-        let bytes: Vec<u8> = lane.to_port.drain(..room).collect();
+        let bytes: Vec<u8> = lane.to_port.drain(..size).collect();
         // What may start a motor is noted before it leaves.
         self.follower.sent(&bytes);
-        self.pace.hand(now, bytes.len());
-        self.port.with(|link| link.write(&bytes))
+        self.held.pace.hand(now, size);
+        self.held.port.with(|link| link.write(&bytes))
     }
 
     fn disable_pfc(&mut self, client: &Client) -> Option<Halt> {
@@ -119,42 +109,30 @@ impl Hold for StHold {
         desk: &Rc<RefCell<Desk>>,
         port: Rc<RefCell<String>>,
     ) -> Result<Served, PortError> {
-        let place = Place { desk: Rc::clone(desk), lane: Rc::clone(&self.lane), port };
-        server.serve_bytes(name, Box::new(place))
+        server.serve_bytes(name, Box::new(self.held.place(desk, port)))
     }
 
     fn turn(&self, server: &mut Server, most: Duration) -> Result<bool, PortError> {
-        self.port.turn(server, most)
+        self.held.port.turn(server, most)
     }
 
     fn pass(&mut self, now: Instant, desk: &mut Desk) -> Result<(), PortError> {
         let passed = self.pull().and_then(|()| self.push(now));
-        let mut lane = self.lane.borrow_mut();
-        if passed.is_err() {
-            lane.to_port.clear();
-        }
-        if desk.client.is_none() {
-            lane.to_client.clear();
-        }
+        self.held.drop_untaken(passed.is_err(), desk);
         passed
     }
 
     fn due(&self, now: Instant) -> Option<Instant> {
-        let is_waiting = !self.lane.borrow().to_port.is_empty();
-        match self.is_full {
-            true => Some(now + FULL.into()),
-            false => is_waiting.then(|| self.pace.next(now)),
-        }
+        self.held.due(now)
     }
 
     fn forget(&mut self, now: Instant) -> usize {
-        if self.pace.is_busy(now) {
+        if self.held.pace.is_busy(now) {
             // If it fails, so does whatever is sent next.
-            let _ = self.port.with(|link| link.discard());
+            let _ = self.held.port.with(|link| link.discard());
             self.follower.lose();
         }
-        self.pace.rest();
-        std::mem::take(&mut self.lane.borrow_mut().to_port).len()
+        self.held.forget()
     }
 
     fn owes(&self) -> bool {
@@ -166,8 +144,9 @@ impl Hold for StHold {
         // If the port is gone, so it is for the client below.
         let _ = self.pull();
         let (owed, pfc) = (self.follower.started(), self.follower.pfc());
-        let open = self.port.opener(|port| Box::new(port) as Box<dyn ByteLink>);
-        let halts: Vec<Halt> = match Client::open_with(&self.port.name(), open, self.options) {
+        let port = &self.held.port;
+        let open = port.opener(|port| Box::new(port) as Box<dyn ByteLink>);
+        let halts: Vec<Halt> = match Client::open_with(&port.name(), open, self.options) {
             Ok(client) => {
                 client.take_over(owed, self.follower.unanswered());
                 let stopped = client.guard().stop_now();
@@ -177,7 +156,7 @@ impl Hold for StHold {
                 halts.into_iter().chain(self.disable_pfc(&client)).collect()
             }
             Err(_) => {
-                let why = self.port.closed().to_string();
+                let why = port.closed().to_string();
                 let motors = owed.motors().map(|motor| Part::Motor(motor.number()));
                 motors
                     .chain(pfc.map(|_| Part::Pfc))

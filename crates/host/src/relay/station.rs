@@ -18,8 +18,6 @@ pub(super) struct Desk {
     pub(super) client: Option<String>,
     /// The client left since this was looked at last.
     pub(super) has_left: bool,
-    /// What it left behind.
-    pub(super) dropped: usize,
     /// When the client last sent something.
     pub(super) heard_at: Instant,
     /// Nobody is let in.
@@ -119,7 +117,6 @@ impl<T> Place<T> {
         if self.has_the_line() {
             let mut desk = self.desk.borrow_mut();
             (desk.client, desk.has_left) = (None, true);
-            desk.dropped += self.lane.take().to_port.len();
         }
     }
 

@@ -55,7 +55,8 @@ impl Follower {
     /// Moving motors that may still acknowledge an end from before their last command: that must not
     /// pass for the acknowledge of a later one.
     pub(crate) fn doubtful(&self, now: Instant) -> MotorSet {
-        let owes_end = |asked: &Asked| is_end(asked.code) && now.since(asked.at) <= LATE;
+        let owes_end =
+            |asked: &Asked| Code::from(asked.code).ends_motion() && now.since(asked.at) <= LATE;
         let asked = |id: &MotorId| &self.asked[usize::from(id.number()) - 1];
         self.moving.filter(|id| asked(id).iter().any(owes_end)).collect()
     }
@@ -78,7 +79,8 @@ impl Follower {
                 self.ask(id, Asked { code: Code::Torque.into(), at: now, number, ends: false });
             }
         } else if let Some(id) = MotorId::from_can_id(can_id.into()) {
-            self.ask(id, Asked { code, at: now, number, ends: is_end(code) });
+            let ends = Code::from(code).ends_motion();
+            self.ask(id, Asked { code, at: now, number, ends });
         }
     }
 
@@ -113,10 +115,6 @@ impl Follower {
     fn of(&mut self, id: MotorId) -> &mut VecDeque<Asked> {
         &mut self.asked[usize::from(id.number()) - 1]
     }
-}
-
-fn is_end(code: u8) -> bool {
-    matches!(Code::from(code), Code::Off | Code::Stop)
 }
 
 #[cfg(test)]

@@ -14,6 +14,16 @@ pub enum OnDrop {
     Stop,
 }
 
+impl OnDrop {
+    /// What the motors are sent.
+    pub(crate) fn request(self) -> [u8; 8] {
+        match self {
+            OnDrop::Off => Off.encode(),
+            OnDrop::Stop => Stop.encode(),
+        }
+    }
+}
+
 /// Stops the motors that a [`Bus`] was used to move when it is dropped: at the end of a scope, on
 /// an early return, on a panic. All are told before any answer is waited for.
 pub struct Guard<'a> {
@@ -63,10 +73,7 @@ impl<'a> Guard<'a> {
     fn stop_all(&self) -> Vec<Stopped> {
         let mut stopped: Vec<Stopped> = Vec::new();
         self.bus.abandon();
-        let request = match self.action {
-            OnDrop::Off => Off.encode(),
-            OnDrop::Stop => Stop.encode(),
-        };
+        let request = self.action.request();
         for attempt in 1..=STOP_ATTEMPTS {
             let requests: Vec<_> = self.bus.moving().map(|id| (id, request)).collect();
             if requests.is_empty() {

@@ -251,7 +251,7 @@ impl Session {
 
 /// Whether a frame, or the reply to it, is Off or Stop.
 pub(super) fn ends_motion([code, ..]: &[u8; 8]) -> bool {
-    matches!(Code::from(*code), Code::Off | Code::Stop)
+    Code::from(*code).ends_motion()
 }
 
 /// The place of a motor in a table of all.

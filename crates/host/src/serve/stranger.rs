@@ -51,19 +51,8 @@ const STUN: Pattern = &[
     Some(|byte| byte == 0xA4),
     Some(|byte| byte == 0x42),
 ];
-/// The same behind the length of two bytes that ICE puts before it (RFC 4571).
-const FRAMED_STUN: Pattern = &[
-    Some(|byte| byte == 0x00),
-    None,
-    Some(|byte| byte == 0x00),
-    Some(|byte| byte == 0x01 || byte == 0x03),
-    None,
-    None,
-    Some(|byte| byte == 0x21),
-    Some(|byte| byte == 0x12),
-    Some(|byte| byte == 0xA4),
-    Some(|byte| byte == 0x42),
-];
+/// The length that ICE puts before it (RFC 4571).
+const LENGTH: Pattern = &[Some(|byte| byte == 0x00), None];
 
 /// As many bytes as are held, at most.
 pub(super) const HELD: usize = 16;
@@ -118,10 +107,10 @@ enum Judgement {
 
 fn judge(bytes: &[u8]) -> Judgement {
     let mut judgement = judge_method(bytes);
-    for pattern in [TLS, STUN, FRAMED_STUN] {
+    for [before, pattern] in [[&[], TLS], [&[], STUN], [LENGTH, STUN]] {
         let fits = |(&byte, place): (&u8, &Byte)| place.is_none_or(|is| is(byte));
-        match bytes.iter().zip(pattern).all(fits) {
-            true if bytes.len() >= pattern.len() => return Judgement::Stranger,
+        match bytes.iter().zip(before.iter().chain(pattern)).all(fits) {
+            true if bytes.len() >= before.len() + pattern.len() => return Judgement::Stranger,
             true if judgement == Judgement::Welcome => judgement = Judgement::Undecided,
             _ => {}
         }

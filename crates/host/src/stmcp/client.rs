@@ -282,6 +282,7 @@ impl Client {
     pub(crate) fn hand_over(&self) -> Started {
         self.line.take().session.started()
     }
+
     /// Brings the exchange that was begun to its end.
     fn conclude<T>(
         &self,

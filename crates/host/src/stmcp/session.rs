@@ -133,12 +133,7 @@ impl Session {
     pub(super) fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         self.rules.check(motor, request)?;
         let effect = Effect::of(Some(request));
-        self.check_retired(effect)?;
-        self.check_start(motor, effect)?;
-        self.ahead_size = match self.is_urgent(effect) {
-            true => request.encode(motor, &mut self.ahead).map_or(0, <[u8]>::len),
-            false => 0,
-        };
+        self.admit(motor, effect, |ahead| request.encode(motor, ahead).map(<[u8]>::len))?;
         let begun = self.master.request(motor, request);
         self.begun(begun, motor, effect, What::of(request))
     }
@@ -150,12 +145,7 @@ impl Session {
     pub(super) fn raw(&mut self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
         let effect = self.rules.check_raw(motor, code, payload)?;
         let frame = Frame { header: Frame::header(code, motor), payload };
-        self.check_retired(effect)?;
-        self.check_start(motor, effect)?;
-        self.ahead_size = match self.is_urgent(effect) {
-            true => frame.encode(&mut self.ahead).map_or(0, <[u8]>::len),
-            false => 0,
-        };
+        self.admit(motor, effect, |ahead| frame.encode(ahead).map(<[u8]>::len))?;
         let begun = self.master.request_raw(frame.header, payload);
         self.started.presume_within(frame.encode(&mut [0; MAX_FRAME]).unwrap_or(&[]));
         self.begun(begun, motor, effect, What::Raw(code))
@@ -173,10 +163,22 @@ impl Session {
         }
     }
 
-    /// Whether a request is sent before the line has recovered, and again afterwards. Its first reply
-    /// comes before the answer to the question of recovery, so that it never counts.
-    fn is_urgent(&self, effect: Effect) -> bool {
-        effect == Effect::Stops && self.master.line() == Line::Lost
+    /// Whether a request may leave. On a lost line `encode` writes what stops a motor, which is sent before
+    /// the line has recovered and again afterwards. The reply to the first sending comes before the
+    /// recovery's own reply, so it never counts.
+    fn admit(
+        &mut self,
+        motor: u8,
+        effect: Effect,
+        encode: impl FnOnce(&mut [u8; MAX_FRAME]) -> Option<usize>,
+    ) -> Result<(), Error> {
+        self.check_retired(effect)?;
+        self.check_start(motor, effect)?;
+        self.ahead_size = match effect == Effect::Stops && self.master.line() == Line::Lost {
+            true => encode(&mut self.ahead).unwrap_or(0),
+            false => 0,
+        };
+        Ok(())
     }
 
     /// Whether the request may leave: under a speed limit no motor is started without a ramp.

@@ -51,6 +51,11 @@ impl Code {
         COMMANDS.iter().find(|row| row.code == self)
     }
 
+    /// Whether the motor is told to end its motion: Off or Stop.
+    pub const fn ends_motion(self) -> bool {
+        matches!(self, Code::Off | Code::Stop)
+    }
+
     /// Whether a motor may turn after it. Of the codes that the document does not name, those beside
     /// its motion commands (0xA0 to 0xAF) may: successors of this protocol have theirs there.
     pub fn may_move(self) -> bool {
@@ -92,17 +97,18 @@ macro_rules! commands {
             /// for it.
             pub const fn is_repeated(self) -> bool {
                 match self {
-                    $( Code::$name => {
-                        const ROW: CommandInfo = CommandInfo {
-                            $( $flag: true, )*
-                            ..CommandInfo::new::<$name>(Code::$name, $paragraph)
-                        };
-                        ROW.echo
-                    } )+
+                    $( Code::$name => $name::ROW.echo, )+
                     Code::Unknown(_) => false,
                 }
             }
         }
+
+        $( impl $name {
+            const ROW: CommandInfo = CommandInfo {
+                $( $flag: true, )*
+                ..CommandInfo::new::<$name>(Code::$name, $paragraph)
+            };
+        } )+
 
         $( impl Command for $name {
             const CODE: Code = Code::$name;
@@ -111,10 +117,7 @@ macro_rules! commands {
 
         /// Every command of the document, in the order of chapter 2.
         pub static COMMANDS: [CommandInfo; Code::ALL.len()] = [
-            $( CommandInfo {
-                $( $flag: true, )*
-                ..CommandInfo::new::<$name>(Code::$name, $paragraph)
-            }, )+
+            $( $name::ROW, )+
         ];
     };
 }
