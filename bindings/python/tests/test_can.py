@@ -147,7 +147,7 @@ def test_what_the_bus_raises_is_the_cause_of_a_lost_line() -> None:
         with pytest.raises(motorlink.LineLost) as lost:
             motors.motor(1).motion
         check(lost.value)
-        # It is tried again, and says so again.
+        # The next request tries again and fails with the same error.
         with pytest.raises(motorlink.LineLost) as lost:
             motors.motor(1).motion
         check(lost.value)
@@ -192,8 +192,8 @@ def test_a_bus_that_failed_once_is_used_again(flaky: Flaky, motor: Motor) -> Non
             assert one.motion.speed_dps == 7
             flaky.fails_to_receive = 1
             eventually(lambda: flaky.fails_to_receive == 0, "a failure while nothing is asked")
-            # What happened meanwhile does not keep the motor from being stopped. It may be told as
-            # late as now.
+            # The failure does not keep the motor from being stopped. The error may be raised as late
+            # as here.
             with contextlib.suppress(motorlink.LineLost):
                 one.stop()
             one.stop()

@@ -154,7 +154,7 @@ def test_a_signal_lets_a_close_in_another_thread_finish(script: str) -> None:
             assert running.wait(60) == -signal.SIGTERM
         os.set_blocking(ours, False)
         heard += os.read(ours, 65536)
-        # A silent drive is told four times.
+        # The stop is sent four times to a silent drive.
         assert heard.count(stop) >= 4
     finally:
         os.close(ours)

@@ -1,5 +1,5 @@
-//! Printing that nothing waits for: a thread of its own writes, and what nobody reads is dropped and
-//! counted.
+//! Printing that never blocks the program: a thread writes. Lines that the reader does not take in time
+//! are dropped and counted.
 
 use std::fmt::Display;
 use std::io::Write;

@@ -69,7 +69,7 @@ Close = Callable[[], "list[tuple[int, MotorlinkError]]"]
 def when_left_open(
     bus: object, close: Close, port: str, *, stop_on_signals: bool
 ) -> Callable[[], None]:
-    """Closes a bus that nobody closed, when it is collected or the program that opened it ends.
+    """Closes a bus that was left open, when it is collected or the program that opened it ends.
 
     With ``stop_on_signals`` SIGTERM and SIGHUP are such ends, until the result is called.
     """

@@ -24,11 +24,12 @@ const PATIENCE: Duration = Duration::from_secs(30);
 const LOOK: Duration = Duration::from_millis(10);
 /// RMD motors behind a busy machine.
 const TIMEOUT: Duration = Duration::from_millis(500);
-/// A motor turns as it was told from this part of the speed on, and stands still below that part.
+/// The part of the commanded speed from which on a motor counts as turning ...
 const TURNS: f64 = 0.8;
+/// ... and below which it counts as standing still.
 const RESTS: f64 = 0.01;
 
-/// The program that is killed: it turns a motor and goes on asking how fast that is.
+/// The program that is killed: it turns a motor and keeps reading its speed.
 #[derive(clap::Args)]
 pub struct Spin {
     protocol: Protocol,
@@ -169,7 +170,7 @@ impl Proof {
         if json { line(&object) } else { line(&text) }
     }
 
-    /// Waits until the motor stands still; gives the time since then, ms.
+    /// Waits until the motor stands still; gives the time from `since` until then, ms.
     fn at_rest(&self, since: Instant) -> Result<f64, Failure> {
         let drive = Drive::open(self.protocol, &self.port, self.motor)?;
         let slow = (f64::from(self.speed).abs() * RESTS).max(1.0);

@@ -1,12 +1,12 @@
-//! What systemd is told: that the guard is ready, alive, and about to end. A thread tells it, so that
-//! the guard does not wait for it.
+//! Notifies systemd that the guard is ready, alive, or about to end. A thread of its own sends the
+//! messages, so that the guard never waits for systemd.
 
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 use sd_notify::NotifyState;
 
-/// What waits to be told.
+/// Messages that may wait.
 const WAITING: usize = 8;
 
 /// systemd, if it started this process and asked to be told.

@@ -16,7 +16,7 @@ pub fn of(event: &Event) -> (String, Value) {
             format!("the program has left the line; {dropped} of what it sent were not passed on"),
             json!({ "event": "left", "dropped": dropped }),
         ),
-        // Nobody can be put out of a pty.
+        // A program cannot be disconnected from a pty.
         Event::TurnedAway { port } if port.contains("pty:") => (
             format!(
                 "{port}: another program opened it as well; unless it looks for the lock, it shares \

@@ -55,7 +55,7 @@ fn claim(fd: &OwnedFd, device: &Path) -> Result<(), Errno> {
 }
 
 /// How the target of a link to a pty begins when a server of ours made the link. The kernel takes it
-/// as it takes `/dev/pts/`; nobody else writes it so.
+/// as it takes `/dev/pts/`; no other program writes it so.
 pub(crate) const MARKED_LINK: &str = "/dev/pts/./";
 
 /// Marks the pty of a server as the one that `link` was made for: in the two sizes of its window that

@@ -36,8 +36,8 @@ pub(super) fn open(address: &TcpAddress, port: String) -> Result<FdLink, PortErr
     })
 }
 
-/// Lets the kernel find out that the machine at the other end is gone, whether it owes an
-/// acknowledge or nothing is under way. A system that knows none of this notices later.
+/// Lets the kernel notice that the machine at the other end is gone, both while data is under way and
+/// while nothing is. Where the system lacks these options it notices later.
 pub(crate) fn keep_alive(stream: &TcpStream) {
     let _ = sockopt::set_socket_keepalive(stream, true)
         .and_then(|()| sockopt::set_tcp_keepidle(stream, PROBE_PERIOD))

@@ -39,7 +39,7 @@ pub enum Reason {
     ClientGone,
     /// The client is connected and has been silent for too long.
     ClientSilent,
-    /// Whoever runs the relay ends it.
+    /// The relay's owner ends it.
     Ending,
 }
 
@@ -79,8 +79,8 @@ pub enum Event {
     PortLost(PortError),
     /// The drive's port is open again.
     PortBack,
-    /// Motors were stopped: all of them, if [`Halt::is_stopped`] says so of every one. What was not is
-    /// tried again.
+    /// Motors were sent their stop. All of them are stopped if [`Halt::is_stopped`] holds for each;
+    /// otherwise the relay tries again.
     Stopped {
         /// Why.
         reason: Reason,
@@ -123,7 +123,7 @@ pub enum Outcome {
     Stopped(String),
     /// It acknowledged its stop and was seen in this state afterwards.
     Unproven(String),
-    /// Nobody knows, for this reason.
+    /// Whether it rests is not known, for this reason.
     Failed(String),
 }
 
@@ -175,16 +175,16 @@ trait Hold {
     /// Whether something was set turning and not stopped.
     fn owes(&self) -> bool;
 
-    /// Stops what was set turning, which takes as long as the drive needs to answer. What could not be
-    /// stopped is owed still.
+    /// Stops what was set turning, which takes as long as the drive needs to answer. After a stop that
+    /// failed [`owes`](Self::owes) is true still.
     fn stop(&mut self, server: &Server) -> Vec<Halt>;
 }
 
 /// Serves a port to one client at a time, unchanged in both directions and without a thread, and stops
 /// what a client set turning when it is gone.
 ///
-/// Whoever owns it calls [`turn`](Self::turn) again and again, and [`end`](Self::end) at last; where it
-/// is dropped instead, a panic included, motors are stopped all the same. A client is gone when it has
+/// Its owner calls [`turn`](Self::turn) again and again, and [`end`](Self::end) at last. If it is
+/// dropped instead, by a panic too, it stops the motors all the same. A client is gone when it has
 /// closed the pty or the connection, which the kernel does for a process that is killed.
 ///
 /// What a client sends faster than the drive takes it waits with the client. What it left behind when
@@ -198,7 +198,7 @@ pub struct Relay {
     is_owing: bool,
     /// No stop is tried before.
     retry_at: Instant,
-    /// That motors could not be stopped was told.
+    /// The owner knows already that motors could not be stopped.
     has_complained: bool,
     /// The last stop was tried.
     is_over: bool,

@@ -3,8 +3,8 @@
 use motorlink_proto::time::{Duration, Instant};
 
 /// The time that a line needs for what was handed to it, so that little of it waits there when
-/// something urgent comes. Replies tell what has arrived; until one comes the line is taken for as
-/// fast as it is said to be.
+/// something urgent comes. A reply shows what has arrived. Until one comes, the line is assumed to be
+/// as fast as its configured rate.
 #[derive(Debug)]
 pub(super) struct Pace {
     /// The time of a byte, or of a frame.

@@ -24,10 +24,12 @@ const FRAME: time::Duration = time::Duration(2_344);
 const FRAMES_AHEAD: u64 = 64;
 /// Frames that are taken from the bus in one turn: the client has its turn as well.
 const TURN: usize = 64;
-/// Nobody waits for a guard's exchanges but its motors, who are told first.
+/// Longer than a client waits for a reply: every motor is sent its stop before the relay waits for any
+/// answer.
 const TIMEOUT: Duration = Duration::from_millis(200);
-/// How long motors that owe an acknowledge are listened to, and how long at most.
+/// An acknowledge that is owed from before a stop is given up after a silence of this length ...
 const SILENCE: time::Duration = time::Duration::from_millis(150);
+/// ... and in any case after this time.
 const PATIENCE: time::Duration = time::Duration::from_millis(1_000);
 
 pub(super) struct RmdHold {
