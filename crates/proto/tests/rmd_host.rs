@@ -5,7 +5,7 @@ mod rmd_bench;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::*;
-use rmd_bench::{Pair, motor};
+use rmd_bench::{Pair, motor, trusted_host};
 
 fn temperature(reply: &[u8; 8]) -> i8 {
     MotionStatus::decode(reply).temperature.0
@@ -33,7 +33,7 @@ fn a_cycle_over_many_motors_takes_as_long_as_one_exchange() {
 fn an_echo_with_another_content_promises_nothing() {
     for row in COMMANDS.iter().filter(|row| row.code != Code::ClearErrors) {
         for byte in 1..8 {
-            let (mut host, id) = (Host::new(), motor(1));
+            let (mut host, id) = (trusted_host(), motor(1));
             let request = [row.code.into(), 1, 2, 3, 4, 5, 6, 7];
             host.request(Instant(0), id, request).unwrap();
             assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
@@ -74,7 +74,7 @@ fn four_torques_in_one_frame_reach_their_motors_and_all_answer() {
 
 #[test]
 fn four_torques_are_refused_as_a_whole() {
-    let mut host = Host::new();
+    let mut host = trusted_host();
     let now = Instant(0);
     let none = Torque4::default();
     let beyond = host.torque4(now, none, MotorSet::from(motor(5)));
@@ -94,7 +94,7 @@ fn four_torques_are_refused_as_a_whole() {
 
 #[test]
 fn while_four_torques_wait_to_be_sent_their_motors_are_busy() {
-    let mut host = Host::new();
+    let mut host = trusted_host();
     host.torque4(Instant(0), Torque4::default(), MotorSet::from(motor(1))).unwrap();
     assert_eq!(host.busy(), MotorSet::TORQUE4);
     let data = ReadStatus2.encode();
@@ -128,7 +128,7 @@ fn a_motor_has_one_exchange_at_a_time() {
 
 #[test]
 fn the_time_for_a_reply_runs_from_the_moment_of_sending() {
-    let mut host = Host::new();
+    let mut host = trusted_host();
     host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
     let sent = Instant(1_000_000);
     assert!(matches!(host.poll(sent), Output::Transmit(_)));
@@ -142,7 +142,7 @@ fn the_time_for_a_reply_runs_from_the_moment_of_sending() {
 
 #[test]
 fn each_request_may_have_its_own_timeout() {
-    let mut host = Host::new();
+    let mut host = trusted_host();
     let (now, data) = (Instant(0), ReadStatus1.encode());
     host.set_timeout(Duration(500));
     host.request(now, motor(1), data).unwrap();
@@ -240,7 +240,7 @@ fn the_reply_to_clear_errors_may_have_either_code() {
         let reply = pair.run()[0].1.unwrap();
         assert_eq!(reply[0], if clear_reply_0x9b { 0x9B } else { 0x9A });
     }
-    let mut host = Host::new();
+    let mut host = trusted_host();
     host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
     assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
     host.receive(Instant(0), &CanFrame::new(0x141, [0x9B; 8]));
@@ -249,7 +249,7 @@ fn the_reply_to_clear_errors_may_have_either_code() {
 
 #[test]
 fn frames_that_answer_nothing_are_counted_and_dropped() {
-    let mut host = Host::new();
+    let mut host = trusted_host();
     host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
     assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
     let data = ReadStatus1.encode();
@@ -267,7 +267,7 @@ fn frames_that_answer_nothing_are_counted_and_dropped() {
 #[test]
 fn a_motor_of_another_protocol_is_named_when_the_exchange_fails() {
     for (base, dialect) in [(0x240, Dialect::V3), (0x180, Dialect::LkTech)] {
-        let mut host = Host::new();
+        let mut host = trusted_host();
         host.request(Instant(0), motor(7), ReadStatus1.encode()).unwrap();
         assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
         host.receive(Instant(0), &CanFrame::new(base + 7, ReadStatus1.encode()));
@@ -322,7 +322,7 @@ impl Standstill {
     fn new(stop: u32, go_on: u32) -> Self {
         let (stop, go_on) = (Duration::from_millis(stop), Duration::from_millis(go_on));
         let (stop, go_on) = (Instant(0) + stop, Instant(0) + go_on);
-        let (host, now) = (Host::new(), Instant(0));
+        let (host, now) = (trusted_host(), Instant(0));
         Standstill { host, now, stop, go_on, coming: vec![], number: 0 }
     }
 
@@ -341,7 +341,10 @@ impl Standstill {
                 Output::Transmit(frame) => {
                     let due = self.now + Duration(800);
                     let still = (self.stop..self.go_on).contains(&due);
-                    self.coming.push((if still { self.go_on } else { due }, frame));
+                    // A motor that answers is supplied: what comes is no echo.
+                    let &[code, _, _, _, a, b, c, d] = frame.usable().unwrap().1;
+                    let reply = CanFrame::new(0x141, [code, 25, 0, 240, a, b, c, d]);
+                    self.coming.push((if still { self.go_on } else { due }, reply));
                 }
                 Output::Done { result, .. } => return (self.number, result),
                 Output::Wait(until) => self.hear(until.expect("an exchange is open")),
@@ -391,7 +394,7 @@ fn a_motor_that_stands_still_and_then_answers_everything_at_once_confuses_nobody
 
 /// A host whose request to motor 1 with this code was not answered, after its guard time.
 fn unanswered(code: u8) -> (Host, Instant) {
-    let mut host = Host::new();
+    let mut host = trusted_host();
     host.request(Instant(0), motor(1), [code, 0, 0, 0, 0, 0, 0, 0]).unwrap();
     assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
     let timeout = Instant(0) + DEFAULT_TIMEOUT;
@@ -401,6 +404,7 @@ fn unanswered(code: u8) -> (Host, Instant) {
 }
 
 const QUESTION: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
+const ANSWER: [u8; 8] = [0x9A, 25, 0, 0xF0, 0, 0, 0, 0];
 
 #[test]
 fn a_motor_that_did_not_answer_is_asked_for_its_status_and_then_has_to_be_silent() {
@@ -409,7 +413,7 @@ fn a_motor_that_did_not_answer_is_asked_for_its_status_and_then_has_to_be_silent
     host.request(asked, motor(1), own).unwrap();
     assert_eq!(host.poll(asked), Output::Transmit(question));
     let heard = asked + Duration::from_millis(10);
-    host.receive(heard, &question);
+    host.receive(heard, &CanFrame::new(0x141, ANSWER));
     let answered = Output::Done { id: motor(1), result: Err(Error::Quarantined) };
     assert_eq!(host.poll(heard), answered);
 

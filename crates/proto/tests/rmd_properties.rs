@@ -5,7 +5,7 @@ mod rmd_bench;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use proptest::prelude::*;
-use rmd_bench::{Node, motor};
+use rmd_bench::{Node, motor, trusted_host};
 use std::collections::HashMap;
 
 fn any_frame() -> impl Strategy<Value = CanFrame> {
@@ -94,7 +94,7 @@ proptest! {
         asked in prop::collection::vec((1u8..=32, any::<u8>()), 1..8),
         frames in prop::collection::vec(any_frame(), 0..80),
     ) {
-        let mut host = Host::new();
+        let mut host = trusted_host();
         let mut open = HashMap::new();
         for (id, code) in asked {
             if host.request(Instant(0), motor(id), [code, 0, 0, 0, 0, 0, 0, 0]).is_ok() {
@@ -124,7 +124,7 @@ proptest! {
     fn a_late_reply_is_never_taken_for_the_reply_to_another_exchange(
         steps in prop::collection::vec((1u8..=4, 0u8..3, 1u64..140, any::<bool>(), 0u64..40), 1..150),
     ) {
-        let mut host = Host::new();
+        let mut host = trusted_host();
         host.set_timeout(Duration(50));
         host.set_guard(Duration(100));
         let mut now = Instant(0);
@@ -165,7 +165,7 @@ proptest! {
     fn a_motor_that_stands_still_is_never_taken_for_one_that_answers(
         steps in prop::collection::vec((0u8..2, any::<bool>(), 0u64..40, 0u64..2_000), 1..60),
     ) {
-        let mut host = Host::new();
+        let mut host = trusted_host();
         host.set_timeout(Duration(50));
         host.set_guard(Duration(100));
         let mut now = Instant(0);
@@ -213,7 +213,7 @@ proptest! {
     fn two_hosts_that_talk_to_different_motors_do_not_mix(
         steps in prop::collection::vec((1u8..=8, prop::sample::select(Code::ALL)), 1..60),
     ) {
-        let mut hosts = [Host::new(), Host::new()];
+        let mut hosts = [trusted_host(), trusted_host()];
         let mut nodes: Vec<Node> = (1..=8).map(Node::new).collect();
         for (id, code) in steps {
             let (own, other) = (usize::from(id % 2), usize::from((id + 1) % 2));

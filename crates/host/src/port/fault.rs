@@ -98,6 +98,10 @@ impl<B: ByteLink> ByteLink for FaultBytes<B> {
     fn clock(&self) -> Option<Clock> {
         self.link.clock()
     }
+
+    fn is_fresh(&self) -> bool {
+        self.link.is_fresh()
+    }
 }
 
 impl<C: CanLink> CanLink for FaultCan<C> {
@@ -126,6 +130,10 @@ impl<C: CanLink> CanLink for FaultCan<C> {
 
     fn clock(&self) -> Option<Clock> {
         self.link.clock()
+    }
+
+    fn is_fresh(&self) -> bool {
+        self.link.is_fresh()
     }
 }
 

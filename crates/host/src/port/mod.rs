@@ -60,6 +60,12 @@ pub trait ByteLink: Send {
     fn clock(&self) -> Option<Clock> {
         None
     }
+
+    /// Whether nothing that a former user of the port asked can be answered on it, because the drives
+    /// came with it. A wrapper has that of the link within.
+    fn is_fresh(&self) -> bool {
+        false
+    }
 }
 
 /// A CAN bus.
@@ -75,6 +81,11 @@ pub trait CanLink: Send {
     fn clock(&self) -> Option<Clock> {
         None
     }
+
+    /// As [`ByteLink::is_fresh`].
+    fn is_fresh(&self) -> bool {
+        false
+    }
 }
 
 impl<B: ByteLink + ?Sized> ByteLink for Box<B> {
@@ -89,6 +100,10 @@ impl<B: ByteLink + ?Sized> ByteLink for Box<B> {
     fn clock(&self) -> Option<Clock> {
         (**self).clock()
     }
+
+    fn is_fresh(&self) -> bool {
+        (**self).is_fresh()
+    }
 }
 
 impl<C: CanLink + ?Sized> CanLink for Box<C> {
@@ -102,6 +117,10 @@ impl<C: CanLink + ?Sized> CanLink for Box<C> {
 
     fn clock(&self) -> Option<Clock> {
         (**self).clock()
+    }
+
+    fn is_fresh(&self) -> bool {
+        (**self).is_fresh()
     }
 }
 

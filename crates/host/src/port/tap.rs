@@ -69,6 +69,10 @@ impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> ByteLink for TapB
     fn clock(&self) -> Option<Clock> {
         self.link.clock()
     }
+
+    fn is_fresh(&self) -> bool {
+        self.link.is_fresh()
+    }
 }
 
 impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for TapCan<C, F> {
@@ -89,6 +93,10 @@ impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for Ta
 
     fn clock(&self) -> Option<Clock> {
         self.link.clock()
+    }
+
+    fn is_fresh(&self) -> bool {
+        self.link.is_fresh()
     }
 }
 

@@ -177,7 +177,7 @@ trait Hold {
 
     /// Stops what was set turning, which takes as long as the drive needs to answer. After a stop that
     /// failed [`owes`](Self::owes) is true still.
-    fn stop(&mut self, server: &Server) -> Vec<Halt>;
+    fn stop(&mut self) -> Vec<Halt>;
 }
 
 /// Serves a port to one client at a time, unchanged in both directions and without a thread, and stops
@@ -329,7 +329,7 @@ impl Relay {
     }
 
     fn stop(&mut self, reason: Reason) {
-        let halts = self.hold.stop(&self.server);
+        let halts = self.hold.stop();
         let has_failed = self.hold.owes();
         self.is_owing &= has_failed;
         if !(has_failed && self.has_complained) {

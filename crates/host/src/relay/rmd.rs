@@ -27,10 +27,6 @@ const TURN: usize = 64;
 /// Longer than a client waits for a reply: every motor is sent its stop before the relay waits for any
 /// answer.
 const TIMEOUT: Duration = Duration::from_millis(200);
-/// An acknowledge that is owed from before a stop is given up after a silence of this length ...
-const SILENCE: time::Duration = time::Duration::from_millis(150);
-/// ... and in any case after this time.
-const PATIENCE: time::Duration = time::Duration::from_millis(1_000);
 
 pub(super) struct RmdHold {
     held: Held<Box<dyn EventCan>, CanFrame>,
@@ -80,37 +76,6 @@ impl RmdHold {
     }
 }
 
-impl RmdHold {
-    /// Waits until no motor owes the client an acknowledge of an earlier end any more, or until those
-    /// that do are silent.
-    fn settle(&mut self, server: &Server) {
-        let begun = server.now();
-        let mut silent_since = begun;
-        loop {
-            let now = server.now();
-            let doubtful = self.follower.doubtful(now);
-            if doubtful.is_empty()
-                || now.since(silent_since) > SILENCE
-                || now.since(begun) > PATIENCE
-            {
-                return;
-            }
-            match self.held.port.receive(Some(SILENCE.into())) {
-                Ok(Some(frame)) => {
-                    let now = server.now();
-                    self.follower.heard(now, &frame);
-                    let id = MotorId::from_can_id(frame.id());
-                    if id.is_some_and(|id| doubtful.contains(id)) {
-                        silent_since = now;
-                    }
-                }
-                Ok(None) => {}
-                Err(_) => return,
-            }
-        }
-    }
-}
-
 impl Hold for RmdHold {
     fn serve(
         &self,
@@ -152,15 +117,10 @@ impl Hold for RmdHold {
         !self.follower.moving().is_empty()
     }
 
-    /// Tells the motors first, then waits for their answers.
-    fn stop(&mut self, server: &Server) -> Vec<Halt> {
+    /// Tells the motors first, then waits for answers that can only be to what they are told again.
+    fn stop(&mut self) -> Vec<Halt> {
         let moving = self.follower.moving();
         let request = self.on_loss.request();
-        for id in moving {
-            // If it fails, so does what follows, which says why.
-            let _ = self.held.port.send(&CanFrame::new(id.can_id(), request));
-        }
-        self.settle(server);
         let port = &self.held.port;
         let open = port.opener(|port| Box::new(port) as Box<dyn CanLink>);
         let options = Options { timeout: TIMEOUT, ..Options::default() };

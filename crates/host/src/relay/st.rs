@@ -140,7 +140,7 @@ impl Hold for StHold {
     }
 
     /// Recovers the line, sends STOP_MOTOR to what was started, and looks whether it stops.
-    fn stop(&mut self, _: &Server) -> Vec<Halt> {
+    fn stop(&mut self) -> Vec<Halt> {
         // If the port is gone, so it is for the client below.
         let _ = self.pull();
         let (owed, pfc) = (self.follower.started(), self.follower.pfc());
@@ -148,7 +148,7 @@ impl Hold for StHold {
         let open = port.opener(|port| Box::new(port) as Box<dyn ByteLink>);
         let halts: Vec<Halt> = match Client::open_with(&port.name(), open, self.options) {
             Ok(client) => {
-                client.take_over(owed, self.follower.unanswered());
+                client.take_over(owed);
                 let stopped = client.guard().stop_now();
                 self.follower = Follower::with(client.hand_over(), pfc);
                 let halts: Vec<Halt> =

@@ -316,7 +316,10 @@ impl Bus {
 impl<L: CanLink> Driven<L> {
     pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
         let port = port.by(|link| link.clock());
-        let session = Session::new(port.name.clone(), options);
+        let mut session = Session::new(port.name.clone(), options);
+        if port.open_link().is_some_and(CanLink::is_fresh) {
+            session.trust();
+        }
         Driven { port, session, exchanges: 0 }
     }
 
@@ -350,8 +353,14 @@ impl<L: CanLink> Driven<L> {
     /// Makes sure that the port is open and that nothing is left in it: what came meanwhile would
     /// pass for a reply to what is sent now.
     pub(super) fn listen(&mut self) -> Result<(), Error> {
-        self.port.link()?;
         let now = self.port.now();
+        let (link, reopened) = self.port.link()?;
+        if reopened {
+            self.session.reopened(now);
+            if link.is_fresh() {
+                self.session.trust();
+            }
+        }
         loop {
             match self.port.link()?.0.receive(Some(Duration::ZERO)) {
                 // A bus that is never silent has to do: an Off must get through.
@@ -409,8 +418,7 @@ impl Found {
     /// What the outcome of a [`ReadStatus1`] tells of the motor that it was for.
     pub fn of(id: MotorId, outcome: Result<[u8; 8], Error>) -> Option<Self> {
         match outcome {
-            // A motor's reply has a voltage.
-            Ok(reply) if reply == ReadStatus1.encode() => Some(Found::Echo(id)),
+            Err(Error::Echo { .. }) => Some(Found::Echo(id)),
             Ok(reply) => Some(Found::Motor(id, proto::Status1::decode(&reply))),
             Err(Error::Foreign { dialect, .. }) => Some(Found::Foreign(id, dialect)),
             Err(_) => None,

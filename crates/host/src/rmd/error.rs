@@ -55,9 +55,31 @@ pub enum Error {
         /// What was asked for.
         code: Code,
     },
-    /// The motor may still answer an exchange that timed out; nothing was sent.
-    #[error("{port}: motor {id} may still answer an earlier request; nothing was sent")]
+    /// The motor may still answer an earlier request, of this host or another; what was asked for was
+    /// not sent, or what ends motion has no answer that can be trusted.
+    #[error("{port}: motor {id} may still answer an earlier request; ask again")]
     Quarantined {
+        /// The port.
+        port: Arc<str>,
+        /// The motor.
+        id: MotorId,
+    },
+    /// The motor does not cease to answer somebody else: what was asked for was not sent, or what ends
+    /// motion has no answer that can be trusted.
+    #[error(
+        "{port}: motor {id} goes on answering what this program did not ask, so that nothing tells which          reply is its own; does another program or host use this bus? end it, and ask again"
+    )]
+    Shared {
+        /// The port.
+        port: Arc<str>,
+        /// The motor.
+        id: MotorId,
+    },
+    /// What was sent came back; it is not known what the motor did.
+    #[error(
+        "{port}: what is sent to motor {id} comes back: the adapter echoes, or another host asks the          same. With an adapter that echoes add `echo=1` to the port, as in slcan:/dev/ttyACM0?echo=1"
+    )]
+    Echo {
         /// The port.
         port: Arc<str>,
         /// The motor.
@@ -99,7 +121,9 @@ impl Error {
             Error::Timeout { .. }
             | Error::Foreign { .. }
             | Error::Altered { .. }
-            | Error::Quarantined { .. } => true,
+            | Error::Quarantined { .. }
+            | Error::Shared { .. }
+            | Error::Echo { .. } => true,
             _ => false,
         }
     }

@@ -52,15 +52,6 @@ impl Follower {
         self.moving = moving;
     }
 
-    /// Moving motors that may still acknowledge an end from before their last command: that must not
-    /// pass for the acknowledge of a later one.
-    pub(crate) fn doubtful(&self, now: Instant) -> MotorSet {
-        let owes_end =
-            |asked: &Asked| Code::from(asked.code).ends_motion() && now.since(asked.at) <= LATE;
-        let asked = |id: &MotorId| &self.asked[usize::from(id.number()) - 1];
-        self.moving.filter(|id| asked(id).iter().any(owes_end)).collect()
-    }
-
     /// What other nodes do is told to the next client again.
     pub(crate) fn client_left(&mut self) {
         self.unguarded = MotorSet::EMPTY;
@@ -172,18 +163,6 @@ mod tests {
         // Another motor's, and one that nobody asked for.
         assert_eq!(ids(&after(&[('>', 1, 0xA2), ('>', 1, 0x80), ('<', 2, 0x80)])), [1]);
         assert_eq!(ids(&after(&[('>', 1, 0xA2), ('<', 1, 0x80)])), [1]);
-    }
-
-    #[test]
-    fn a_motor_that_owes_an_acknowledge_of_its_end_is_in_doubt() {
-        let now = Instant(10_000);
-        let doubtful = |talk| after(talk).doubtful(now).map(MotorId::number).collect::<Vec<_>>();
-        assert_eq!(doubtful(&[('>', 1, 0x80), ('>', 1, 0xA2)]), [1]);
-        assert_eq!(doubtful(&[('>', 1, 0x80), ('>', 1, 0xA2), ('<', 1, 0x80)]), NONE);
-        assert_eq!(doubtful(&[('>', 1, 0xA2), ('>', 1, 0x9C)]), NONE);
-        assert_eq!(doubtful(&[('>', 1, 0x80)]), NONE, "it does not move");
-        let talk = after(&[('>', 1, 0x80), ('>', 1, 0xA2)]);
-        assert_eq!(talk.doubtful(now + LATE).count(), 0, "it is too late");
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::port::PortError;
 /// How long a motor whose replies are in doubt may go on talking, beside the times of its exchanges.
 const SETTLE_LIMIT: Duration = Duration::from_millis(2_000);
 
-/// A host that waits for motors in quarantine, with the motors that it set moving, and its errors in
+/// A host that waits for motors in quarantine, and for those that it asks for the first time, with the motors that it set moving, and its errors in
 /// words: sans I/O. [`request`](Self::request), [`ask`](Self::ask) or [`torque4`](Self::torque4),
 /// then [`poll`](Self::poll) until it waits, handing in with [`receive`](Self::receive) what comes.
 #[derive(Debug, Clone)]
@@ -31,6 +31,10 @@ pub(super) struct Session {
     insisting: MotorSet,
     /// Those of them whose request cannot leave yet.
     waiting: MotorSet,
+    /// Torques whose motors are asked for the first time.
+    held: Option<Held>,
+    /// Motors whose torques were not sent, which is still to be told.
+    unsent: MotorSet,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
 }
@@ -39,6 +43,16 @@ pub(super) struct Session {
 struct Asked {
     request: [u8; 8],
     /// When a motor in quarantine is waited for no longer.
+    until: Instant,
+}
+
+/// Torques for motors 1 to 4 that wait until the motors can be trusted.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    torques: Torque4,
+    expect: MotorSet,
+    /// Those of them that have answered.
+    answered: MotorSet,
     until: Instant,
 }
 
@@ -72,6 +86,8 @@ impl Session {
             asked: [nothing; MotorId::COUNT],
             insisting: MotorSet::EMPTY,
             waiting: MotorSet::EMPTY,
+            held: None,
+            unsent: MotorSet::EMPTY,
             is_retired: false,
         }
     }
@@ -99,10 +115,25 @@ impl Session {
 
     /// The motors with an exchange under way.
     pub(super) fn busy(&self) -> MotorSet {
-        self.host.busy().union(self.waiting)
+        let held = if self.held.is_some() { MotorSet::TORQUE4 } else { MotorSet::EMPTY };
+        self.host.busy().union(self.waiting).union(self.unsent).union(held)
     }
 
-    /// Begins an exchange with a motor that is not in quarantine.
+    /// Tells that the bus was opened anew.
+    pub(super) fn reopened(&mut self, now: Instant) {
+        for id in self.busy() {
+            self.cancel(now, id);
+        }
+        self.host.reopened(now);
+    }
+
+    /// Tells that nobody asked the motors anything before.
+    pub(super) fn trust(&mut self) {
+        self.host.trust(MotorSet::ALL);
+    }
+
+    /// Begins an exchange with a motor that is not in quarantine. One that is asked for the first time is
+    /// waited for.
     ///
     /// # Errors
     /// Nothing is sent then.
@@ -115,7 +146,10 @@ impl Session {
         self.free(id, &request)?;
         let begun = self.host.request(now, id, request);
         begun.map_err(|refused| self.refused(refused))?;
-        self.asked[place(id)] = Asked { request, until: now };
+        self.asked[place(id)] = Asked { request, until: now + self.patience };
+        if self.host.is_unknown(id) {
+            self.insisting.insert(id);
+        }
         Ok(())
     }
 
@@ -135,7 +169,8 @@ impl Session {
         Ok(())
     }
 
-    /// Begins an exchange with those of motors 1 to 4 that are expected to answer.
+    /// Begins an exchange with those of motors 1 to 4 that are expected to answer. Those that are asked
+    /// for the first time are waited for.
     ///
     /// # Errors
     /// As [`request`](Self::request).
@@ -151,8 +186,12 @@ impl Session {
         }
         let begun = self.host.torque4(now, torques, expect);
         begun.map_err(|refused| self.refused(refused))?;
+        let until = now + self.patience;
         for id in expect {
-            self.asked[place(id)] = Asked { request: torque, until: now };
+            self.asked[place(id)] = Asked { request: torque, until };
+        }
+        if expect.into_iter().any(|id| self.host.is_unknown(id)) {
+            self.held = Some(Held { torques, expect, answered: MotorSet::EMPTY, until });
         }
         Ok(())
     }
@@ -163,18 +202,25 @@ impl Session {
 
     pub(super) fn poll(&mut self, now: Instant) -> Output {
         loop {
-            let mut again = None;
+            if let Some(id) = self.unsent.next() {
+                return Output::Done(id, Err(self.quarantined(id)));
+            }
+            let mut again = self.send_held(now);
             for id in self.waiting {
                 let Asked { request, until } = self.asked[place(id)];
                 match self.host.request(now, id, request) {
                     Err(Refused::Quarantined { until: free, .. }) if now < until => {
-                        again = Some(again.map_or(free, |again: Instant| again.min(free)));
+                        again = again.into_iter().chain([free]).min();
                     }
                     begun => {
                         self.waiting.remove(id);
                         if let Err(refused) = begun {
                             self.insisting.remove(id);
-                            return Output::Done(id, Err(self.refused(refused)));
+                            let error = match refused {
+                                Refused::Quarantined { id, .. } => self.shared(id),
+                                refused => self.refused(refused),
+                            };
+                            return Output::Done(id, Err(error));
                         }
                     }
                 }
@@ -189,14 +235,24 @@ impl Session {
                 {
                     self.waiting.insert(id);
                 }
+                proto::Output::Done { id, result } if self.is_held(id) => {
+                    if let Some(outcome) = self.held_answered(id, result) {
+                        return outcome;
+                    }
+                }
                 proto::Output::Done { id, result } => {
+                    let is_outlasted = self.insisting.contains(id);
                     self.insisting.remove(id);
                     // A motor counts as moving from the request on, whose reply may be lost, and
                     // until it has acknowledged that it is off or stopped.
                     if result.as_ref().is_ok_and(ends_motion) {
                         self.moving.remove(id);
                     }
-                    return Output::Done(id, result.map_err(|error| self.failed(id, error)));
+                    let failed = |error| match error {
+                        proto::Error::Quarantined if is_outlasted => self.shared(id),
+                        error => self.failed(id, error),
+                    };
+                    return Output::Done(id, result.map_err(failed));
                 }
                 proto::Output::Wait(until) => {
                     return Output::Wait(until.into_iter().chain(again).min());
@@ -205,10 +261,51 @@ impl Session {
         }
     }
 
+    fn is_held(&self, id: MotorId) -> bool {
+        self.held.is_some_and(|held| held.expect.contains(id))
+    }
+
+    /// A motor that torques are held for answered the questions, or failed to: then they are not sent.
+    fn held_answered(
+        &mut self,
+        id: MotorId,
+        result: Result<[u8; 8], proto::Error>,
+    ) -> Option<Output> {
+        let held = self.held.as_mut()?;
+        match result {
+            Ok(_) | Err(proto::Error::Quarantined) => {
+                held.answered.insert(id);
+                None
+            }
+            Err(error) => {
+                self.unsent = held.answered;
+                self.held = None;
+                Some(Output::Done(id, Err(self.failed(id, error))))
+            }
+        }
+    }
+
+    /// Sends the torques that are held, if their motors can be trusted; when to try again.
+    fn send_held(&mut self, now: Instant) -> Option<Instant> {
+        let Held { torques, expect, until, .. } =
+            self.held.filter(|held| held.answered == held.expect)?;
+        match self.host.torque4(now, torques, expect) {
+            Err(Refused::Quarantined { until: free, .. }) if now < until => return Some(free),
+            Ok(()) => {}
+            Err(_) => self.unsent = expect,
+        }
+        self.held = None;
+        None
+    }
+
     /// Gives up the exchange with a motor, if there is one. Its reply may still come.
     pub(super) fn cancel(&mut self, now: Instant, id: MotorId) {
         self.insisting.remove(id);
         self.waiting.remove(id);
+        self.unsent.remove(id);
+        if MotorSet::TORQUE4.contains(id) {
+            self.held = None;
+        }
         self.host.cancel(now, id);
     }
 
@@ -222,14 +319,25 @@ impl Session {
         if self.is_retired && !ends_motion(request) {
             return Err(PortError::Retired { port: self.port.to_string() }.into());
         }
-        if self.waiting.contains(id) { Err(Error::Twice(id)) } else { Ok(()) }
+        let is_held = self.held.is_some() && MotorSet::TORQUE4.contains(id);
+        match self.waiting.contains(id) || self.unsent.contains(id) || is_held {
+            true => Err(Error::Twice(id)),
+            false => Ok(()),
+        }
+    }
+
+    fn quarantined(&self, id: MotorId) -> Error {
+        Error::Quarantined { port: Arc::clone(&self.port), id }
+    }
+
+    /// Of a motor that was waited for: it would have been trusted if it had been silent.
+    fn shared(&self, id: MotorId) -> Error {
+        Error::Shared { port: Arc::clone(&self.port), id }
     }
 
     fn refused(&self, refused: Refused) -> Error {
         match refused {
-            Refused::Quarantined { id, .. } => {
-                Error::Quarantined { port: Arc::clone(&self.port), id }
-            }
+            Refused::Quarantined { id, .. } => self.quarantined(id),
             Refused::Limit { id, exceeded } => Error::Limit { id, exceeded },
             Refused::OutOfReach(id) => Error::OutOfReach(id),
             Refused::Busy(id) => Error::Twice(id),
@@ -242,6 +350,7 @@ impl Session {
         let code = Code::from(code);
         match error {
             proto::Error::Altered => Error::Altered { port, id, code },
+            proto::Error::Echo => Error::Echo { port, id },
             proto::Error::Foreign(dialect) => Error::Foreign { port, id, dialect },
             proto::Error::Quarantined => Error::Quarantined { port, id },
             _ => Error::Timeout { port, id, code },

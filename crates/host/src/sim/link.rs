@@ -55,6 +55,10 @@ impl ByteLink for SimLine {
     fn clock(&self) -> Option<Clock> {
         Some(self.clock.clone())
     }
+
+    fn is_fresh(&self) -> bool {
+        true
+    }
 }
 
 impl Evented for SimLine {
@@ -98,6 +102,10 @@ impl CanLink for SimCan {
 
     fn clock(&self) -> Option<Clock> {
         Some(self.clock.clone())
+    }
+
+    fn is_fresh(&self) -> bool {
+        true
     }
 }
 

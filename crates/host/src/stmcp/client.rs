@@ -272,10 +272,9 @@ impl Client {
         self.line.take().session.is_missing(motor);
     }
 
-    /// Takes the line over from another master, which started these motors. `unanswered` is what it
-    /// sent last, if the reply to that may still come.
-    pub(crate) fn take_over(&self, started: Started, unanswered: Option<&[u8]>) {
-        self.line.take().session.take_over(started, unanswered);
+    /// Takes the line over from another master, which started these motors.
+    pub(crate) fn take_over(&self, started: Started) {
+        self.line.take().session.take_over(started);
     }
 
     /// What [`take_over`](Self::take_over) was given and later calls left of it.
@@ -321,7 +320,10 @@ impl Client {
 impl<L: ByteLink> Driven<L> {
     pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
         let port = port.by(|link| link.clock());
-        let session = Session::new(port.name.clone(), options);
+        let mut session = Session::new(port.name.clone(), options);
+        if port.open_link().is_some_and(ByteLink::is_fresh) {
+            session.trust_line();
+        }
         Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
     }
 
@@ -358,6 +360,9 @@ impl<L: ByteLink> Driven<L> {
         let (link, reopened) = self.port.link()?;
         if reopened {
             self.session.reopened();
+            if link.is_fresh() {
+                self.session.trust_line();
+            }
         }
         if idle {
             let size = match link.read(&mut self.received, Some(Duration::ZERO)) {

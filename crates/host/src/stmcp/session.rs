@@ -6,7 +6,7 @@ use std::sync::Arc;
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
     Command, Config, Counters, Frame, FrameCode, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor,
-    Output, Profile, Recovery, RegisterId, Request, RequestError,
+    Output, Profile, RegisterId, Request, RequestError,
 };
 use motorlink_proto::time::Instant;
 
@@ -90,7 +90,7 @@ impl Rules {
 }
 
 impl Session {
-    /// On a line that is up. `port` is for messages.
+    /// On a line that was just opened. `port` is for messages.
     pub(super) fn new(port: Arc<str>, options: &Options) -> Self {
         let rules = Rules { profile: options.profile, limits: options.limits };
         let what = What::Known(FrameCode::GetBoardInfo);
@@ -270,9 +270,12 @@ impl Session {
     /// Tells that the line was closed and opened again.
     pub(super) fn reopened(&mut self) {
         self.forget_drive();
-        if self.master.config_mut().recovery == Recovery::None {
-            self.master.reopened();
-        }
+        self.master.reopened();
+    }
+
+    /// Tells that nothing is left in the line from before.
+    pub(super) fn trust_line(&mut self) {
+        self.master.trust_line();
     }
 
     /// A STOP_MOTOR to be sent beside the exchanges, without waiting for an answer.
@@ -302,17 +305,9 @@ impl Session {
         self.started.is_missing(motor);
     }
 
-    /// Takes the line over from another master, which started these motors. `unanswered` is what it
-    /// sent last, if the reply to that may still come.
-    pub(super) fn take_over(&mut self, started: Started, unanswered: Option<&[u8]>) {
+    /// Takes the line over from another master, which started these motors.
+    pub(super) fn take_over(&mut self, started: Started) {
         self.started = started;
-        if let Some(sent) = unanswered {
-            let payload = sent.get(2..).unwrap_or(&[]);
-            let payload = &payload[..payload.len().min(MAX_PAYLOAD)];
-            // It always fits; what matters is which question it was.
-            let _ = self.master.request_raw(sent.first().copied().unwrap_or(0), payload);
-            self.master.abandon();
-        }
     }
 }
 

@@ -3,7 +3,8 @@
 //! A reply carries a code and no number. When a motor or an adapter stands still and then answers
 //! everything at once, an old reply would pass for a new one. So a motor that owes a reply is left
 //! alone for the guard time and then asked for its status, and for nothing else, until the only
-//! reply that it owed came, or until it was heard and then silent for the guard time.
+//! reply that it owed came, or until it was heard and then silent for the guard time. What a motor
+//! owes a former host is not known: it has to answer two questions first, and then to be silent.
 
 use super::command::Code;
 use crate::time::{Duration, Instant};
@@ -30,6 +31,8 @@ enum Owed {
     Several(u8),
     /// Replies with different codes.
     Mixed,
+    /// Whatever a former host asked for.
+    Unknown,
 }
 
 /// What may be sent to a motor.
@@ -37,17 +40,26 @@ enum Owed {
 pub(super) enum Admitted {
     Request,
     Question,
+    /// The request, and behind it the question: the reply to the request may be an older one's.
+    Both,
 }
 
 impl Doubt {
     pub(super) const NONE: Doubt =
         Doubt { owed: Owed::Nothing, off: false, stop: false, until: Instant(0), heard: None };
+    pub(super) const UNKNOWN: Doubt = Doubt { owed: Owed::Unknown, ..Doubt::NONE };
+
+    /// Whether nothing is known of what the motor owes.
+    pub(super) const fn is_unknown(&self) -> bool {
+        matches!(self.owed, Owed::Unknown)
+    }
 
     /// The reply to a request with this code did not come in time.
     pub(super) fn owes(&mut self, now: Instant, guard: Duration, code: u8) {
         self.owed = match self.owed {
             Owed::Nothing => Owed::One(code),
             Owed::One(owed) | Owed::Several(owed) if owed == code => Owed::Several(code),
+            Owed::Unknown => Owed::Unknown,
             _ => Owed::Mixed,
         };
         match Code::from(code) {
@@ -70,6 +82,8 @@ impl Doubt {
             Owed::One(owed) if answers(owed, code) => *self = Doubt::NONE,
             Owed::Several(owed) if answers(owed, code) => self.heard = Some(now),
             Owed::Mixed => self.heard = Some(now),
+            // Before the motor was asked this may be another host's frame.
+            Owed::Unknown if self.heard.is_some() => self.heard = Some(now),
             _ => return false,
         }
         true
@@ -91,6 +105,7 @@ impl Doubt {
             return Ok(Admitted::Request);
         }
         let own = match Code::from(code) {
+            code if code.ends_motion() && self.is_unknown() => return Ok(Admitted::Both),
             Code::Off => self.off,
             Code::Stop => self.stop,
             _ => {

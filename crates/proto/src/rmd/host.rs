@@ -15,15 +15,21 @@
 //! request carried out makes it again on [`Error::Quarantined`], and at the time that
 //! [`Refused::Quarantined`] tells.
 //!
+//! A motor that was not asked before may owe a former host replies: it is in quarantine, and is asked
+//! for its status at once, by two different questions, each of which has the exchange's timeout. Off
+//! and Stop go out before these; their exchange ends in [`Error::Quarantined`] as well, because a reply
+//! to them may be an older one's.
+//!
 //! Some requests and their replies are the same bit for bit (0x31, 0x32, 0x34, 0x80, 0x81, 0x88). A
-//! reply with another content is [`Error::Altered`], and the motor is in quarantine. An adapter that echoes what it sends therefore looks like a motor that answers, which only the
-//! port can know: it has to drop its own frames.
+//! reply with another content is [`Error::Altered`], and the motor is in quarantine. An adapter that
+//! echoes what it sends looks like a motor that answers these. The reply to the question for the status
+//! has a voltage: if the question itself comes back, the exchange ends in [`Error::Echo`].
 
 use super::command::{Code, Command};
 use super::doubt::{Admitted, Doubt, answers};
 use super::frame::CanFrame;
 use super::limits::Limits;
-use super::message::{ReadStatus1, Torque, Torque4};
+use super::message::{ReadStatus1, ReadStatus2, Torque, Torque4};
 use super::motor::{Dialect, MotorId, MotorSet, TORQUE4_ID};
 use super::outcome::{Counters, Error, Output, Refused};
 use crate::time::{Duration, Instant};
@@ -70,14 +76,15 @@ pub struct Host {
 const NEVER: Instant = Instant(u64::MAX);
 
 impl Host {
-    /// A host with the default times and no limits.
+    /// A host with the default times and no limits, on a bus on which former hosts may have asked the
+    /// motors anything; [`trust`](Self::trust) says that they did not.
     pub const fn new() -> Self {
         const IDLE: Slot = Slot {
             data: [0; 8],
             timeout: DEFAULT_TIMEOUT,
             deadline: NEVER,
             instead: Error::Timeout,
-            doubt: Doubt::NONE,
+            doubt: Doubt::UNKNOWN,
             limits: Limits { current: None, speed: None, angle: None },
         };
         Host {
@@ -132,6 +139,10 @@ impl Host {
         match self.admit(now, id, data)? {
             Admitted::Request => self.open(id, data, timeout),
             Admitted::Question => self.question(id, timeout),
+            Admitted::Both => {
+                self.open(id, data, timeout);
+                self.questioned.insert(id);
+            }
         }
         self.queued.insert(id);
         Ok(())
@@ -164,7 +175,7 @@ impl Host {
         for (id, torque) in MotorSet::TORQUE4.zip(torques.0) {
             let checked = self.limits(id).current(torque);
             checked.map_err(|exceeded| Refused::Limit { id, exceeded })?;
-            if expect.contains(id) && self.admit(now, id, data)? == Admitted::Question {
+            if expect.contains(id) && self.admit(now, id, data)? != Admitted::Request {
                 admitted = Admitted::Question;
             }
         }
@@ -234,6 +245,27 @@ impl Host {
         }
     }
 
+    /// Tells that nobody asked these motors anything that they may still answer.
+    pub fn trust(&mut self, ids: MotorSet) {
+        for id in ids {
+            self.slot(id).doubt = Doubt::NONE;
+        }
+    }
+
+    /// Tells that the bus was opened anew: what the motors may still answer is not known. Exchanges
+    /// under way are given up.
+    pub fn reopened(&mut self, now: Instant) {
+        for id in MotorSet::ALL {
+            self.cancel(now, id);
+            self.slot(id).doubt = Doubt::UNKNOWN;
+        }
+    }
+
+    /// Whether it is not known yet what a motor owes a former host.
+    pub fn is_unknown(&self, id: MotorId) -> bool {
+        self.slots[id.index()].doubt.is_unknown()
+    }
+
     /// The motors with an exchange under way, those with an undrained result among them. While a
     /// frame of [`torque4`](Self::torque4) waits to be sent these are all that it reaches.
     pub const fn busy(&self) -> MotorSet {
@@ -294,10 +326,23 @@ impl Host {
         let slot = &mut self.slots[id.index()];
         if self.in_flight.contains(id) && answers(slot.data[0], data[0]) {
             self.in_flight.remove(id);
-            if Code::from(data[0]).is_repeated() && slot.data != *data {
-                slot.instead = Error::Altered;
+            let wrong = match (Code::from(data[0]), slot.data == *data) {
+                (Code::ReadStatus1, true) => Some(Error::Echo),
+                (code, false) if code.is_repeated() => Some(Error::Altered),
+                _ => None,
+            };
+            if let Some(wrong) = wrong {
+                slot.instead = wrong;
                 self.failed.insert(id);
                 self.owes(now, id);
+                return;
+            }
+            if self.questioned.contains(id)
+                && slot.doubt.is_unknown()
+                && let Some(question) = question_behind(Code::from(slot.data[0]))
+            {
+                slot.data = question;
+                self.queued.insert(id);
                 return;
             }
             slot.data = *data;
@@ -376,6 +421,16 @@ impl Host {
 
     fn slot(&mut self, id: MotorId) -> &mut Slot {
         &mut self.slots[id.index()]
+    }
+}
+
+/// What a motor that may owe a former host replies is asked next. Two different questions: what comes
+/// to the first may be the reply to a former host's.
+fn question_behind(asked: Code) -> Option<[u8; 8]> {
+    match asked {
+        Code::ReadStatus2 => None,
+        Code::ReadStatus1 => Some(ReadStatus2.encode()),
+        _ => Some(ReadStatus1.encode()),
     }
 }
 

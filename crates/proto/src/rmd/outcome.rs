@@ -33,9 +33,13 @@ pub enum Error {
     /// The reply is not the request bit for bit, which the document says it is. What the motor did is
     /// not known.
     Altered,
-    /// Nothing was done: the motor was asked for its status instead, because it had not answered
-    /// before, and it answered. Ask again; it is trusted when it was silent for the guard time.
+    /// The motor was asked for its status instead, because it had not answered before or was not asked
+    /// anything yet, and it answered. Ask again; it is trusted when it was silent for the guard time.
+    /// Nothing else was sent, unless it was an Off or a Stop to a motor that was not asked yet.
     Quarantined,
+    /// What was sent came back: an adapter echoes, or another host asks the same. It is not known what
+    /// the motor did.
+    Echo,
 }
 
 /// Why a request was not taken.
@@ -90,7 +94,10 @@ impl fmt::Display for Error {
                  the motor did",
             ),
             Error::Quarantined => f.write_str(
-                "the motor did not answer before and does now; nothing was sent, ask again",
+                "the motor was asked for its status first and answers; ask again after the guard time",
+            ),
+            Error::Echo => f.write_str(
+                "what was sent came back; the adapter echoes, or another host asks the same",
             ),
         }
     }

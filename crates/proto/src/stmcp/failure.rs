@@ -15,7 +15,8 @@ pub enum Error {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Failure {
-    /// Nothing came in time.
+    /// Nothing came in time: no reply to the request, or, on a line that was just opened, none to the
+    /// question that goes before it.
     Timeout,
     /// The beginning of a reply came, the rest did not come in time.
     Incomplete {
@@ -38,10 +39,12 @@ pub enum Failure {
     NotUnderstood(ErrorCode),
     /// Two replies that differ came at once: nothing tells which of them is the answer.
     Ambiguous,
-    /// The line was lost before; nothing was sent.
+    /// The line was lost before; the drive did not answer a question, and nothing else was sent.
     Lost,
-    /// The line was lost before and did not fall silent; nothing was sent.
+    /// The line was not in step and did not fall silent; nothing was sent.
     Noise,
+    /// What is sent comes back: an adapter or the wiring echoes. Only a question was sent.
+    Echo,
 }
 
 impl core::fmt::Display for Error {
@@ -80,6 +83,7 @@ impl core::fmt::Display for Failure {
             Failure::Ambiguous => f.write_str("two replies that differ came at once"),
             Failure::Lost => f.write_str("the line is lost and the drive does not answer"),
             Failure::Noise => f.write_str("the line does not fall silent"),
+            Failure::Echo => f.write_str("what is sent comes back"),
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The master: one exchange at a time, and a line that is trusted only while it answers in step.
 
 use super::{
-    Command, Error, ErrorCode, Failure, Frame, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
-    MAX_FRAME, MAX_PAYLOAD, Parse, Profile, ReplySize, Request, RevupPhase, frame,
+    Bad, Command, Error, ErrorCode, Failure, Frame, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
+    MAX_FRAME, MAX_PAYLOAD, Parse, Profile, RegisterId, ReplySize, Request, RevupPhase, frame,
 };
 use crate::time::{Duration, Instant};
 
@@ -12,7 +12,8 @@ pub const TIMEOUT: Duration = Duration::from_millis(1_000);
 /// How a lost line comes back (SPEC-NOTES S16).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Recovery {
-    /// Not by itself: [`Master::reopened`] says that the caller opened it anew.
+    /// Not by itself: the line counts as in step until it is lost, and [`Master::trust_line`] says
+    /// that it is so again.
     None,
     /// Before the next request: wait until the line is silent, ask a question whose reply cannot be
     /// taken for that of the lost request, and go on when it was answered and the line is silent
@@ -41,14 +42,19 @@ pub struct Config {
 impl Config {
     /// The longest that an exchange can take, however the line behaves, beside the time in which the
     /// port takes what is sent: the reply's timeout on a line that is up. On a lost line there come
-    /// before it silence, as long as may be waited for it, before and behind the question, and the
-    /// question's timeout; with `Pad` one silence more.
+    /// before it silence, as long as may be waited for it, before and behind the questions, and the
+    /// questions' timeouts, the first of which is answered at once where there is a second; with
+    /// `Pad` one silence more.
     pub const fn longest_exchange(&self) -> Duration {
         let (timeout, quiet) = (self.timeout.0, self.quiet.0);
         let silence = quiet.saturating_add(timeout);
         // Where the answer may be that to something else, nothing is sent for twice the timeout.
-        let answered = if quiet > timeout { silence } else { timeout.saturating_mul(2) };
-        let drained = silence.saturating_add(timeout).saturating_add(answered);
+        let (prompt, answered) = match quiet > timeout {
+            true => (timeout, silence),
+            false => (quiet, timeout.saturating_mul(2)),
+        };
+        let asked = prompt.saturating_add(timeout);
+        let drained = silence.saturating_add(asked).saturating_add(answered);
         let recovered = match self.recovery {
             Recovery::None => 0,
             Recovery::Drain => drained,
@@ -75,7 +81,7 @@ impl Default for Config {
 pub enum Line {
     /// The last exchange ended in step.
     Up,
-    /// An exchange failed; the next one has to recover the line first.
+    /// Just opened, or an exchange failed: the next one has to bring the line in step first.
     Lost,
 }
 
@@ -128,8 +134,18 @@ pub struct Master {
     sizes: [ReplySize; 2],
     /// What was asked when the line was lost.
     lost: Asked,
+    /// Whether everything that may still be answered is known. It is not before the line was in step
+    /// once: a former master may have asked something.
+    is_known: bool,
     /// The frame that recovery sends.
     probe: [u8; 4],
+    probe_size: u8,
+    /// How many of its bytes came back.
+    echoed: u8,
+    /// Whether nothing but its answer came.
+    is_alone: bool,
+    /// The first thing that came in its place and is no frame.
+    trouble: Option<Failure>,
     /// The question that recovery asked, and the questions that may still be answered late.
     question: u8,
     outstanding: u8,
@@ -150,6 +166,10 @@ struct Asked {
 const INFO: u8 = 1;
 /// The reply has 8 bytes, as that of GET_REVUP_DATA.
 const REVUP: u8 = 2;
+/// The reply has 1 byte, as that of GET_REG STATUS.
+const STATUS: u8 = 4;
+/// The reply has 4 bytes, as that of GET_REG FLAGS.
+const FLAGS: u8 = 8;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
@@ -164,11 +184,13 @@ enum State {
         limit: Instant,
         then: Then,
     },
+    /// Recovery: a question is to be sent.
+    Probe(u8),
     /// Recovery: the question has been sent.
     Probed,
     /// Recovery: the answer is awaited.
     Answer {
-        deadline: Instant,
+        asked: Instant,
     },
     Send,
     Sent,
@@ -196,19 +218,27 @@ static PADDING: [u8; MAX_FRAME + 1] = {
 };
 
 impl Master {
-    /// A master on a line that is up.
+    /// A master on a line that was just opened. A former master may have left something in it: where
+    /// the line can be recovered it is brought in step before the first request (SPEC-NOTES S16),
+    /// unless the caller knows better and says so with [`trust_line`](Self::trust_line).
     pub const fn new(config: Config) -> Self {
         let nothing = Asked { motor: 0, read: true, alike: 0 };
+        let is_trusted = matches!(config.recovery, Recovery::None);
         Master {
             config,
-            line: Line::Up,
+            line: if is_trusted { Line::Up } else { Line::Lost },
             state: State::Idle,
             buffer: [0; MAX_FRAME],
             filled: 0,
             request: nothing,
             sizes: [ReplySize::Any; 2],
             lost: nothing,
+            is_known: is_trusted,
             probe: [0; 4],
+            probe_size: 0,
+            echoed: 0,
+            is_alone: true,
+            trouble: None,
             question: INFO,
             outstanding: 0,
             scan: Scan::NONE,
@@ -305,14 +335,28 @@ impl Master {
         self.state = State::Idle;
     }
 
-    /// Tells that the line was closed and opened again, with nothing left in it from before.
+    /// Tells that the line was opened anew. What may still be answered is not known; without recovery
+    /// the caller vouches for there being nothing.
     pub fn reopened(&mut self) {
-        self.reopen();
+        match self.config.recovery {
+            Recovery::None => self.in_step(),
+            Recovery::Drain | Recovery::Pad => {
+                self.lose();
+                self.is_known = false;
+            }
+        }
         self.state = State::Idle;
     }
 
-    fn reopen(&mut self) {
+    /// Tells that nothing is left in the line from before: no drive has been asked anything on it.
+    pub fn trust_line(&mut self) {
+        self.in_step();
+        self.state = State::Idle;
+    }
+
+    fn in_step(&mut self) {
         self.line = Line::Up;
+        self.is_known = true;
         self.outstanding = 0;
     }
 
@@ -339,18 +383,15 @@ impl Master {
                 let stop = Request::Execute(Command::StopMotor);
                 Output::Transmit(stop.encode(self.lost.motor, &mut self.probe).unwrap_or(&[]))
             }
-            State::Quiet { then: Then::Probe, .. } => {
-                self.state = State::Probed;
-                Output::Transmit(self.probe())
-            }
+            State::Quiet { then: Then::Probe, .. } => self.probe(self.next_question()),
             State::Quiet { then: Then::Send, .. } => {
-                self.reopen();
+                self.in_step();
                 self.send()
             }
+            State::Probe(question) => self.probe(question),
             State::Probed => {
-                let deadline = now + self.config.timeout;
-                self.state = State::Answer { deadline };
-                Output::Wait(Some(deadline))
+                self.state = State::Answer { asked: now };
+                Output::Wait(Some(now + self.config.timeout))
             }
             State::Send => self.send(),
             State::Sent => {
@@ -358,13 +399,19 @@ impl Master {
                 self.state = State::Waiting { deadline };
                 Output::Wait(Some(deadline))
             }
-            State::Answer { deadline } | State::Waiting { deadline } if now < deadline => {
-                Output::Wait(Some(deadline))
+            State::Answer { .. } if self.is_echo() => self.fail(Failure::Echo),
+            State::Answer { asked } if now < asked + self.config.timeout => {
+                Output::Wait(Some(asked + self.config.timeout))
             }
             State::Answer { .. } => {
                 self.outstanding |= self.question;
-                self.fail(Failure::Lost)
+                self.fail(match (self.is_known, self.scan.taken) {
+                    (true, _) => Failure::Lost,
+                    (false, 0) => self.trouble.unwrap_or(Failure::Timeout),
+                    (false, received) => Failure::Incomplete { received },
+                })
             }
+            State::Waiting { deadline } if now < deadline => Output::Wait(Some(deadline)),
             State::Waiting { .. } => self.fail(match self.filled {
                 0 => Failure::Timeout,
                 received => Failure::Incomplete { received },
@@ -385,11 +432,10 @@ impl Master {
         match self.state {
             State::Sent | State::Waiting { .. } => self.reply(bytes),
             State::Probed => {
-                let deadline = now + self.config.timeout;
-                self.state = State::Answer { deadline };
-                self.answer(now, deadline, bytes);
+                self.state = State::Answer { asked: now };
+                self.answer(now, now, bytes);
             }
-            State::Answer { deadline } => self.answer(now, deadline, bytes),
+            State::Answer { asked } => self.answer(now, asked, bytes),
             State::Quiet { until, limit, then } => {
                 self.unasked(bytes.len());
                 let until = until.max(now + self.config.quiet);
@@ -410,30 +456,92 @@ impl Master {
 
     /// The question whose answer shows that the drive is in step again: one that is not
     /// outstanding, if there is one.
-    fn probe(&mut self) -> &[u8] {
-        self.question = match self.outstanding {
-            outstanding if outstanding & INFO == 0 => INFO,
+    fn next_question(&self) -> u8 {
+        match self.outstanding {
+            outstanding if outstanding & INFO == 0 || !self.is_known => INFO,
             outstanding if outstanding & REVUP == 0 => REVUP,
             _ if self.question == REVUP => INFO,
             _ => REVUP,
-        };
-        let request =
-            if self.question == INFO { Request::BoardInfo } else { Request::RevupData(0) };
-        self.scan = Scan::NONE;
-        request.encode(0, &mut self.probe).unwrap_or(&[])
+        }
     }
 
-    /// Looks for the reply to the question, whose timeout is over at `deadline`, among late ones.
-    /// Where something else that is answered alike is outstanding, this may be the reply to that:
-    /// the silence lasts until the question's own reply cannot come any more.
-    fn answer(&mut self, now: Instant, deadline: Instant, bytes: &[u8]) {
-        let size = if self.question == INFO { 32 } else { RevupPhase::SIZE as u8 };
+    fn probe(&mut self, question: u8) -> Output<'_> {
+        self.question = question;
+        self.scan = Scan::NONE;
+        self.is_alone = true;
+        self.trouble = None;
+        self.echoed = 0;
+        self.state = State::Probed;
+        let request = match question {
+            INFO => Request::BoardInfo,
+            REVUP => Request::RevupData(0),
+            STATUS => Request::GetRegister(RegisterId::STATUS),
+            _ => Request::GetRegister(RegisterId::FLAGS),
+        };
+        let bytes = request.encode(0, &mut self.probe).unwrap_or(&[]);
+        self.probe_size = bytes.len() as u8;
+        Output::Transmit(bytes)
+    }
+
+    /// Looks for the reply to the question, which was sent when it was `asked`, among late ones.
+    ///
+    /// What follows it is sent after a silence. Where something else that is answered alike may be
+    /// outstanding, this may be the reply to that: the silence lasts until the question's own reply
+    /// cannot come any more. On a line that was just opened anything may be outstanding, unless the
+    /// drive gives prompt answers to three different questions, and nothing else.
+    fn answer(&mut self, now: Instant, asked: Instant, bytes: &[u8]) {
+        let size = match self.question {
+            INFO => 32,
+            REVUP => RevupPhase::SIZE as u8,
+            STATUS => 1,
+            _ => 4,
+        };
+        let (mut answers, mut others) = (0, 0);
         for &byte in bytes {
-            if self.scan.take(byte) == Some((HEADER_ACK, size)) {
-                let unsure = self.outstanding & self.question != 0;
-                let expired = if unsure { deadline + self.config.timeout } else { now };
-                self.settle(expired.max(now + self.config.quiet), Then::Send);
+            self.compare(byte);
+            match self.scan.take(byte) {
+                Scanned::More | Scanned::Frame(HEADER_ATR, ..) => {}
+                Scanned::Frame(HEADER_ACK, length, _) if length == size => answers += 1,
+                Scanned::Frame(HEADER_NACK, 1, code) if !ErrorCode::from(code).is_damage() => {
+                    others += 1;
+                }
+                Scanned::Frame(HEADER_ACK, ..) if !self.is_known => others += 1,
+                scanned => {
+                    self.is_alone = false;
+                    if let (Scanned::Stray(failure), None) = (scanned, self.trouble) {
+                        self.trouble = Some(failure);
+                    }
+                }
             }
+        }
+        if answers + others == 0 || self.is_echo() {
+            return;
+        }
+        let is_prompt = self.is_alone
+            && self.outstanding == 0
+            && (answers, others) == (1, 0)
+            && self.scan.is_empty()
+            && now < asked + self.config.quiet;
+        let is_own = match self.question {
+            question if self.is_known => answers > 0 && self.outstanding & question == 0,
+            INFO if is_prompt => return self.state = State::Probe(STATUS),
+            STATUS if is_prompt => return self.state = State::Probe(FLAGS),
+            _ => is_prompt,
+        };
+        let expired = asked + self.config.timeout + self.config.timeout;
+        let until = if is_own { now } else { expired };
+        self.settle(until.max(now + self.config.quiet), Then::Send);
+    }
+
+    /// Whether what came is what was sent.
+    fn is_echo(&self) -> bool {
+        self.echoed == self.probe_size
+    }
+
+    fn compare(&mut self, byte: u8) {
+        if !self.is_echo() {
+            let sent = self.probe.get(usize::from(self.echoed));
+            self.echoed = if sent == Some(&byte) { self.echoed + 1 } else { 0 };
         }
     }
 
@@ -545,30 +653,50 @@ struct Scan {
     /// Bytes of the frame so far.
     taken: u8,
     sum: u16,
+    /// The byte before the checksum.
+    last: u8,
+}
+
+/// What a byte is to a [`Scan`].
+enum Scanned {
+    /// A part of a frame.
+    More,
+    /// The end of a frame: its header, its length, the last byte of its payload.
+    Frame(u8, u8, u8),
+    /// A part of none.
+    Stray(Failure),
 }
 
 impl Scan {
-    const NONE: Scan = Scan { header: 0, length: 0, taken: 0, sum: 0 };
+    const NONE: Scan = Scan { header: 0, length: 0, taken: 0, sum: 0, last: 0 };
 
-    /// Takes a byte; gives header and length when it completes a frame.
-    fn take(&mut self, byte: u8) -> Option<(u8, u8)> {
+    const fn is_empty(&self) -> bool {
+        self.taken == 0
+    }
+
+    fn take(&mut self, byte: u8) -> Scanned {
         let begins = matches!(byte, HEADER_ACK | HEADER_NACK | HEADER_ATR);
         match self.taken {
-            0 if !begins => return None,
+            0 if !begins => return Scanned::Stray(Failure::Header(byte)),
             0 => self.header = byte,
             1 if usize::from(byte) > MAX_PAYLOAD => {
                 *self = Scan::NONE;
-                return None;
+                return Scanned::Stray(Failure::Damaged(Bad::Length(byte)));
             }
             1 => self.length = byte,
             taken if taken == self.length.saturating_add(2) => {
-                let Scan { header, length, sum, .. } = core::mem::replace(self, Scan::NONE);
-                return (byte == frame::fold(sum)).then_some((header, length));
+                let Scan { header, length, sum, last, .. } = core::mem::replace(self, Scan::NONE);
+                return match frame::fold(sum) {
+                    expected if byte == expected => Scanned::Frame(header, length, last),
+                    expected => {
+                        Scanned::Stray(Failure::Damaged(Bad::Checksum { expected, received: byte }))
+                    }
+                };
             }
-            _ => {}
+            _ => self.last = byte,
         }
         self.taken = self.taken.saturating_add(1);
         self.sum = self.sum.wrapping_add(u16::from(byte));
-        None
+        Scanned::More
     }
 }

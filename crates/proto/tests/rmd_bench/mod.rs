@@ -9,6 +9,13 @@ pub fn motor(id: u8) -> MotorId {
     MotorId::new(id).expect("the test names an ID of 1 to 32")
 }
 
+/// A host on a bus on which nobody asked anything before.
+pub fn trusted_host() -> Host {
+    let mut host = Host::new();
+    host.trust(MotorSet::ALL);
+    host
+}
+
 /// A motor that remembers what it was told and senses what the test says.
 #[derive(Debug, Clone, Default)]
 pub struct TestMotor {
@@ -87,13 +94,22 @@ pub struct Pair {
     pub nodes: Vec<Node>,
     /// Identifiers of the frames that were on the bus.
     pub log: Vec<u32>,
+    /// The commands that the host sent.
+    pub codes: Vec<u8>,
     coming: Vec<(Instant, CanFrame)>,
 }
 
 impl Pair {
     pub fn new(ids: &[u8]) -> Self {
         let nodes = ids.iter().map(|id| Node::new(*id)).collect();
-        Pair { now: Instant(0), host: Host::new(), nodes, log: vec![], coming: vec![] }
+        Pair {
+            now: Instant(0),
+            host: trusted_host(),
+            nodes,
+            log: vec![],
+            codes: vec![],
+            coming: vec![],
+        }
     }
 
     pub fn request<C: Command>(&mut self, id: u8, command: C) -> Result<(), Refused> {
@@ -126,6 +142,7 @@ impl Pair {
         let urgent = matches!(frame.data(), [0x80 | 0x81, ..]);
         assert!(urgent || !taken, "a request to a motor that is about to answer");
         self.log.push(frame.id());
+        self.codes.push(frame.data()[0]);
         for node in &mut self.nodes {
             let reply = node.drive.receive(self.now, frame, &mut node.motor);
             self.coming.extend(reply.map(|reply| (self.now + node.turnaround, reply)));
