@@ -52,6 +52,11 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
             Found::Echo(_) => {}
         }
     }
+    if let (true, Some(trouble)) = (found.is_empty(), session.bus.trouble()) {
+        return Err(Failure::Line(format!(
+            "no motor answered, and the adapter may be the cause: {trouble}"
+        )));
+    }
     if found.is_empty() {
         return Err(Failure::Line(
             "no motor answered; is the supply on, the bus terminated, the bitrate 1 Mbit/s?".into(),

@@ -18,7 +18,6 @@ use crate::output::{hex, parse_hex};
 
 pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     let motor = session.motor()?;
-    let output = session.output;
     match act {
         Act::Set { register, value, verify } => {
             let attempts = verify.map(|attempts| attempts.unwrap_or(VERIFY_ATTEMPTS));
@@ -36,7 +35,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
         Act::Ramp { rpm, ms } => {
             motor.ramp(rpm, ms)?;
-            output.done(format!(
+            session.confirmed()?.done(format!(
                 "{}: ramp to {rpm} rpm in {ms} ms acknowledged; it executes while the motor runs",
                 motor.number()
             ))
@@ -44,7 +43,9 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         Act::TorqueRamp { iq, ms } => {
             session.wants(Profile::Mcsdk54, "torque ramps")?;
             motor.torque_ramp(iq, ms)?;
-            output.done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
+            session
+                .confirmed()?
+                .done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
         }
         Act::Move { rad, seconds } => {
             session.wants(Profile::Mcsdk54, "moves")?;
@@ -52,12 +53,13 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
                 return Err(Failure::Usage(format!("{rad} rad in {seconds} s is no move")));
             }
             motor.move_to(rad, seconds)?;
-            output
+            session
+                .confirmed()?
                 .done(format!("{}: move to {rad} rad in {seconds} s acknowledged", motor.number()))
         }
         Act::Current { iq, id } => {
             motor.current(iq, id)?;
-            output.done(format!("{}: references Iq {iq}, Id {id}", motor.number()))
+            session.confirmed()?.done(format!("{}: references Iq {iq}, Id {id}", motor.number()))
         }
         Act::Revup { phase: None, .. } => revup(session),
         Act::Revup { phase: Some(phase), rpm, torque, ms } => {
@@ -67,7 +69,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
                 duration_ms: ms.unwrap_or_default(),
             };
             motor.set_revup(phase, data)?;
-            output.done(format!("{}: rev-up phase {phase} is set", motor.number()))
+            session.confirmed()?.done(format!("{}: rev-up phase {phase} is set", motor.number()))
         }
         Act::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
     }
@@ -76,7 +78,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
 fn execute(session: &Session, command: Execute) -> Result<(), Failure> {
     let motor = session.motor()?;
     motor.execute(command)?;
-    session.output.done(format!("{}: {command} acknowledged", motor.number()))
+    session.confirmed()?.done(format!("{}: {command} acknowledged", motor.number()))
 }
 
 /// A drive acknowledges a START that has no effect, so its state is read back.
@@ -101,7 +103,7 @@ fn start(session: &Session) -> Result<(), Failure> {
         }
         _ => {
             let text = format!("{} starts: {status}", motor.number());
-            session.output.result(text, json!({ "ok": true, "STATUS": status.to_string() }))
+            session.confirmed()?.result(text, json!({ "ok": true, "STATUS": status.to_string() }))
         }
     }
 }
@@ -120,7 +122,7 @@ fn acknowledge(session: &Session) -> Result<(), Failure> {
         let faults = motor.faults()?;
         if faults == Flags::default() {
             let text = format!("{}: no faults", motor.number());
-            return session.output.result(text, json!({ "ok": true, "FLAGS": 0 }));
+            return session.confirmed()?.result(text, json!({ "ok": true, "FLAGS": 0 }));
         }
         if clock.now() > give_up || !interrupt::wait_by(&clock, Duration::from_millis(10)) {
             let why = explain(faults);
@@ -138,17 +140,21 @@ fn set(session: &Session, name: &str, text: &str, verify: Option<u8>) -> Result<
         let attempt = motor.write_raw_verified(register, bits, attempts)?;
         let again = if attempt == 1 { String::new() } else { format!(", at attempt {attempt}") };
         let text = format!("{}: {register} is written and reads back{again}", motor.number());
-        return session.output.result(text, json!({ "ok": true, "attempts": attempt }));
+        return session.confirmed()?.result(text, json!({ "ok": true, "attempts": attempt }));
     }
     motor.write_raw(register, bits, register.write_size(profile))?;
-    session.output.done(format!("{}: {register} is written", motor.number()))
+    session.confirmed()?.done(format!("{}: {register} is written", motor.number()))
 }
 
 fn revup(session: &Session) -> Result<(), Failure> {
     let motor = session.motor()?;
-    for phase in 0..REVUP_PHASES {
-        let RevupPhase { speed_rpm, torque_s16a, duration_ms } = motor.revup(phase)?;
-        session.output.result(
+    let phases: Vec<_> =
+        (0..REVUP_PHASES).map(|phase| motor.revup(phase)).collect::<Result<_, _>>()?;
+    let output = session.confirmed()?;
+    for (phase, RevupPhase { speed_rpm, torque_s16a, duration_ms }) in
+        phases.into_iter().enumerate()
+    {
+        output.result(
             format!(
                 "phase {phase}  {speed_rpm:>6} rpm  {torque_s16a:>6} s16A  {duration_ms:>5} ms"
             ),
@@ -172,5 +178,5 @@ fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
     };
     let reply = session.client.raw(session.motor, code, payload)?;
     let text = if reply.is_empty() { "ACK".to_owned() } else { format!("ACK {}", hex(&reply)) };
-    session.output.result(text, json!({ "ok": true, "payload": hex(&reply) }))
+    session.confirmed()?.result(text, json!({ "ok": true, "payload": hex(&reply) }))
 }

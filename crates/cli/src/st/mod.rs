@@ -76,6 +76,12 @@ impl Session {
         )))
     }
 
+    /// Where results go, which come from replies to their own requests.
+    fn confirmed(&self) -> Result<Output, Failure> {
+        self.client.confirm()?;
+        Ok(self.output)
+    }
+
     fn motor(&self) -> Result<MotorHandle<'_>, Failure> {
         Ok(self.client.motor(self.motor)?)
     }

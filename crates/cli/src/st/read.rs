@@ -50,7 +50,7 @@ pub fn info(session: &Session) -> Result<(), Failure> {
         }
         Err(error) => return Err(error.into()),
     }
-    session.output.rows(&rows)
+    session.confirmed()?.rows(&rows)
 }
 
 /// The registers that `status` shows.
@@ -79,7 +79,7 @@ pub fn status(session: &Session) -> Result<(), Failure> {
         let name = register.text().map_or("", |text| text.name);
         rows.push((name, text, value(session, &reading)));
     }
-    session.output.rows(&rows)
+    session.confirmed()?.rows(&rows)
 }
 
 /// Fault bits spelled out.
@@ -99,7 +99,12 @@ pub fn get(session: &Session, names: &[String], repeat: Repeat) -> Result<(), Fa
     repeated(
         &session.client.clock(),
         repeat,
-        || registers.iter().map(|&register| read(session, register)).collect(),
+        || {
+            let readings = registers.iter().map(|&register| read(session, register));
+            let readings = readings.collect::<Result<_, _>>()?;
+            session.client.confirm()?;
+            Ok(readings)
+        },
         |readings, at| print(session, readings, at),
     )
 }
@@ -122,6 +127,7 @@ pub fn segment(
             motor.read_segment(number, &registers, &mut values)?;
             configured = true;
         }
+        session.client.confirm()?;
         let profile = session.client.profile();
         let read = registers.iter().zip(values);
         Ok(read.map(|(&register, bits)| Reading { register, bits, profile }).collect())

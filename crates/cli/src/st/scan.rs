@@ -23,7 +23,7 @@ pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result
     let rates = if line.with_baud(rates[0]).is_some() { rates } else { &rates[..1] };
     let output = connection.output();
     let bar = crate::output::progress(rates.len());
-    let mut found = false;
+    let (mut found, mut echoes) = (false, false);
     for &rate in rates {
         bar.set_message(format!("{rate} baud"));
         let finding = scan_baud(line, rate, patience);
@@ -39,12 +39,18 @@ pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result
             continue;
         }
         let finding = finding?;
+        echoes |= matches!(finding, Finding::Echo);
         found |= matches!(finding, Finding::Drive(_) | Finding::Refuses(_));
         report(&bar, output, rate, &finding)?;
     }
     bar.finish_and_clear();
     if found {
         return Ok(());
+    }
+    if echoes {
+        return Err(Failure::Line(format!(
+            "no drive answered on {port}, and what is sent comes back: the adapter or the wiring echoes"
+        )));
     }
     Err(Failure::Line(format!(
         "no drive answered on {port}; is it powered, are RX and TX crossed, does another program \
@@ -60,6 +66,7 @@ fn report(bar: &ProgressBar, output: Output, rate: u32, finding: &Finding) -> Re
         }
         Finding::Refuses(code) => ("refuses", format!("a drive that answers {code}")),
         Finding::Garbage => ("garbage", "bytes that are no reply: another rate?".to_owned()),
+        Finding::Echo => ("echo", "what is sent comes back".to_owned()),
         Finding::Silence => ("silence", "silence".to_owned()),
     };
     bar.suspend(|| {

@@ -82,6 +82,14 @@ impl<C: CanLink> CanLink for EchoCanceller<C> {
     fn clock(&self) -> Option<Clock> {
         self.link.clock()
     }
+
+    fn is_fresh(&self) -> bool {
+        self.link.is_fresh()
+    }
+
+    fn trouble(&self) -> Option<&'static str> {
+        self.link.trouble()
+    }
 }
 
 #[cfg(test)]

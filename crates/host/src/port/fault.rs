@@ -135,6 +135,10 @@ impl<C: CanLink> CanLink for FaultCan<C> {
     fn is_fresh(&self) -> bool {
         self.link.is_fresh()
     }
+
+    fn trouble(&self) -> Option<&'static str> {
+        self.link.trouble()
+    }
 }
 
 fn fill(buffer: &mut [u8], mut next: impl FnMut() -> Option<u8>) -> usize {

@@ -86,6 +86,12 @@ pub trait CanLink: Send {
     fn is_fresh(&self) -> bool {
         false
     }
+
+    /// Why frames may not get to the bus, as far as an adapter tells. A wrapper has that of the link
+    /// within.
+    fn trouble(&self) -> Option<&'static str> {
+        None
+    }
 }
 
 impl<B: ByteLink + ?Sized> ByteLink for Box<B> {
@@ -121,6 +127,10 @@ impl<C: CanLink + ?Sized> CanLink for Box<C> {
 
     fn is_fresh(&self) -> bool {
         (**self).is_fresh()
+    }
+
+    fn trouble(&self) -> Option<&'static str> {
+        (**self).trouble()
     }
 }
 

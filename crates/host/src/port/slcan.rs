@@ -30,6 +30,8 @@ pub struct SlcanLink<B: ByteLink> {
     codec: HostCodec,
     refused: u64,
     refused_in_a_row: u32,
+    /// Whether the adapter ever said anything.
+    is_heard: bool,
     port: String,
 }
 
@@ -50,8 +52,15 @@ impl<B: ByteLink> SlcanLink<B> {
     pub fn open(line: B, port: impl Into<String>, bitrate: Bitrate) -> Result<Self, PortError> {
         let port = port.into();
         let (codec, clock) = (HostCodec::default(), line.clock().unwrap_or_default());
-        let mut link =
-            SlcanLink { line, clock, codec, refused: 0, refused_in_a_row: 0, port: port.clone() };
+        let mut link = SlcanLink {
+            line,
+            clock,
+            codec,
+            refused: 0,
+            refused_in_a_row: 0,
+            is_heard: false,
+            port: port.clone(),
+        };
         // A channel that was open still talks here, and may refuse the empty line.
         let close = link.command(b"\rC\r", 2)?;
         let select = link.command(&bitrate.command(), 1)?;
@@ -103,6 +112,7 @@ impl<B: ByteLink> SlcanLink<B> {
             return Ok(false);
         }
         let len = self.line.read(self.codec.spare(), self.clock.left(end))?;
+        self.is_heard |= len > 0;
         self.codec.filled(len);
         Ok(len > 0)
     }
@@ -156,6 +166,22 @@ impl<B: ByteLink> CanLink for SlcanLink<B> {
 
     fn clock(&self) -> Option<Clock> {
         self.line.clock()
+    }
+
+    fn is_fresh(&self) -> bool {
+        self.line.is_fresh()
+    }
+
+    fn trouble(&self) -> Option<&'static str> {
+        match (self.is_heard, self.refused_in_a_row) {
+            (false, _) => Some(
+                "it has not answered anything: is it an slcan adapter, and its baud rate right?",
+            ),
+            (true, 0) => None,
+            (true, _) => Some(
+                "it refused the frame (BEL): are the wires, the bit rate and the termination right?",
+            ),
+        }
     }
 }
 

@@ -98,6 +98,10 @@ impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for Ta
     fn is_fresh(&self) -> bool {
         self.link.is_fresh()
     }
+
+    fn trouble(&self) -> Option<&'static str> {
+        self.link.trouble()
+    }
 }
 
 /// Time since a tap was made.

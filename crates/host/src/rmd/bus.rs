@@ -155,6 +155,11 @@ impl Bus {
         self.sign.state()
     }
 
+    /// Why frames may not get to the bus, as far as its adapter tells.
+    pub fn trouble(&self) -> Option<&'static str> {
+        self.line.take().port.open_link().and_then(|link| link.trouble())
+    }
+
     /// Frames that belonged to no exchange.
     pub fn counters(&self) -> Counters {
         self.line.take().session.counters()
@@ -383,7 +388,14 @@ impl<L: CanLink> Driven<L> {
             let moved = match self.session.poll(now) {
                 Output::Transmit(frame) => self.port.link().and_then(|(link, _)| link.send(&frame)),
                 Output::Done(id, result) => {
-                    each(id, result);
+                    let link = self.port.open_link();
+                    each(
+                        id,
+                        result.map_err(|error| match link {
+                            Some(link) => error.behind(link),
+                            None => error,
+                        }),
+                    );
                     Ok(())
                 }
                 Output::Wait(None) => return Ok(true),

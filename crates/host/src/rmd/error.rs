@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use motorlink_proto::rmd::{Code, Dialect, Exceeded, MotorId};
 
-use crate::port::PortError;
+use crate::port::{CanLink, PortError};
 
 /// Why a call to a motor did not do what it says. This protocol has no refusal: a motor that does
 /// not know a command is silent.
@@ -24,6 +24,17 @@ pub enum Error {
         id: MotorId,
         /// What was asked for.
         code: Code,
+    },
+    /// No reply in time, and the adapter says why, or is as silent; it is not known whether the motor did
+    /// what was asked.
+    #[error("{port}: motor {id} does not answer, and the adapter may be the cause: {why}")]
+    Adapter {
+        /// The port.
+        port: Arc<str>,
+        /// The motor.
+        id: MotorId,
+        /// What the adapter did.
+        why: &'static str,
     },
     /// The motor answers in another protocol; it is not driven.
     #[error(
@@ -114,11 +125,20 @@ impl From<PortError> for Error {
 }
 
 impl Error {
+    /// With what the adapter of the bus tells.
+    pub(super) fn behind(self, link: &(impl CanLink + ?Sized)) -> Self {
+        match (self, link.trouble()) {
+            (Error::Timeout { port, id, .. }, Some(why)) => Error::Adapter { port, id, why },
+            (error, _) => error,
+        }
+    }
+
     /// Whether nothing can be said about the motor because it, or the line, was silent.
     pub fn is_line_failure(&self) -> bool {
         match self {
             Error::Port(error) => !error.is_interruption(),
             Error::Timeout { .. }
+            | Error::Adapter { .. }
             | Error::Foreign { .. }
             | Error::Altered { .. }
             | Error::Quarantined { .. }

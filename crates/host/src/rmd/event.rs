@@ -156,7 +156,9 @@ impl EventBus {
             let now = clock.now();
             match session.poll(now) {
                 Output::Transmit(frame) => link.send(&frame)?,
-                Output::Done(id, result) => each(id, result),
+                Output::Done(id, result) => {
+                    each(id, result.map_err(|error| error.behind(link.as_ref())));
+                }
                 Output::Wait(until) => {
                     let came = match listens {
                         0 => None,

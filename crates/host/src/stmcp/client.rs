@@ -248,6 +248,24 @@ impl Client {
         self.conclude(driven, |payload| Some(payload.to_vec()))
     }
 
+    /// Makes sure that the replies so far went to their own requests: reads a register whose value has
+    /// another size than the last reply. A reply that came twice, or late, has put each one behind it off
+    /// by one, which no single exchange can tell.
+    ///
+    /// # Errors
+    /// [`Error::Unconfirmed`]: what was read or acknowledged since the last confirmation cannot be
+    /// trusted. The line is lost. The port's.
+    pub fn confirm(&self) -> Result<(), Error> {
+        let (last, (register, size)) = {
+            let driven = self.line.take();
+            (driven.session.last_size(), driven.session.question())
+        };
+        let answer = self.exchange(0, &Request::GetRegister(register), |payload| {
+            (payload.len() == size).then_some(())
+        });
+        self.line.take().session.confirmed(last, answer)
+    }
+
     /// Sends STOP_MOTOR without waiting for an answer, as for the other motors of a drive that does
     /// not answer. Afterwards the line is lost.
     pub fn stop_unheard(&self, motor: Motor) -> Result<(), Error> {

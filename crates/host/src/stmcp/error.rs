@@ -59,6 +59,17 @@ pub enum Error {
         /// Bytes of the reply's payload.
         size: usize,
     },
+    /// The line was not in step behind the last reply: one came twice, or late. What was read or
+    /// acknowledged before may have been the reply to something else.
+    #[error(
+        "{port}: replies and requests do not go together: one came twice or late, so that nothing that          was read or acknowledged can be trusted ({why}); ask again"
+    )]
+    Unconfirmed {
+        /// The port.
+        port: Arc<str>,
+        /// What came in place of the answer.
+        why: Box<Error>,
+    },
     /// A verified write after whose last attempt the register has another value.
     #[error(
         "{motor}: {register} should be {expected} and reads {read}; does the drive take this value \
@@ -140,7 +151,10 @@ impl Error {
     pub fn is_line_failure(&self) -> bool {
         match self {
             Error::Port(error) => !error.is_interruption(),
-            _ => matches!(self, Error::Failed { .. } | Error::Reply { .. }),
+            _ => matches!(
+                self,
+                Error::Failed { .. } | Error::Reply { .. } | Error::Unconfirmed { .. }
+            ),
         }
     }
 }
@@ -167,6 +181,9 @@ pub(super) fn advice(failure: Failure) -> &'static str {
         Failure::NotUnderstood(_) => "the line to the drive loses or damages bytes; try again",
         Failure::Lost => "the next call tries again",
         Failure::Noise => "something else is sending on this line",
+        Failure::Echo => {
+            "the adapter or the wiring echoes: switch the echo off, or look whether TX touches RX"
+        }
         _ => "try again",
     }
 }

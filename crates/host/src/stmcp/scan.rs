@@ -20,6 +20,8 @@ pub enum Finding {
     Refuses(ErrorCode),
     /// Bytes that are no reply: something speaks, at another rate or another protocol.
     Garbage,
+    /// What is sent comes back.
+    Echo,
     /// Nothing.
     Silence,
 }
@@ -45,6 +47,7 @@ pub fn scan_baud(line: &LineName, baud: u32, patience: Duration) -> Result<Findi
             Err(Error::Refused { code, .. }) => return Ok(Finding::Refuses(code)),
             Err(Error::Port(error)) => return Err(error),
             Err(Error::Failed { failure: Failure::Timeout | Failure::Lost, .. }) => {}
+            Err(Error::Failed { failure: Failure::Echo, .. }) => heard = Finding::Echo,
             Err(Error::Failed { failure: Failure::NotUnderstood(code), .. }) => {
                 heard = Finding::Refuses(code);
             }

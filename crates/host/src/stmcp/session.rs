@@ -39,6 +39,8 @@ pub(super) struct Session {
     /// What the line had been through when a request began.
     history: History,
     asked: Asked,
+    /// The size of the last acknowledge's payload.
+    last_size: Option<usize>,
     /// What is sent before a lost line is recovered, and its size.
     ahead: [u8; MAX_FRAME],
     ahead_size: usize,
@@ -104,6 +106,7 @@ impl Session {
             ramped: Ramped::default(),
             history: History::default(),
             asked,
+            last_size: None,
             ahead: [0; MAX_FRAME],
             ahead_size: 0,
             is_retired: false,
@@ -238,6 +241,7 @@ impl Session {
         outcome: Result<(Option<T>, usize), proto::Error>,
     ) -> Result<T, Error> {
         let Asked { motor, addressed, effect, what } = self.asked;
+        self.last_size = outcome.as_ref().ok().map(|(_, size)| *size);
         let (port, target) = (Arc::clone(&self.port), Target(motor));
         match outcome {
             Ok((Some(value), _)) => {
@@ -259,6 +263,38 @@ impl Session {
                 Err(Error::Failed { port, motor: target, what, failure, hint })
             }
         }
+    }
+
+    /// A register to read whose value has another size than the last reply, and this size.
+    pub(super) fn question(&self) -> (RegisterId, usize) {
+        match self.last_size {
+            Some(1) => (RegisterId::FLAGS, 4),
+            _ => (RegisterId::STATUS, 1),
+        }
+    }
+
+    /// Whether the answer to the [`question`](Self::question), `asked` behind a reply of `last` bytes,
+    /// shows that replies and requests go together.
+    pub(super) fn confirmed(
+        &mut self,
+        last: Option<usize>,
+        answer: Result<(), Error>,
+    ) -> Result<(), Error> {
+        match answer {
+            // What refuses the question now did not refuse what was asked before.
+            Err(Error::Refused { .. }) if last.is_some() => Ok(()),
+            Err(why) if !matches!(why, Error::Port(_)) => {
+                self.master.lost();
+                let port = Arc::clone(&self.port);
+                Err(Error::Unconfirmed { port, why: Box::new(why) })
+            }
+            answer => answer,
+        }
+    }
+
+    /// The size of the last acknowledge's payload, if the last reply was one.
+    pub(super) fn last_size(&self) -> Option<usize> {
+        self.last_size
     }
 
     /// Gives up the exchange under way, if there is one. Its reply may still come.

@@ -105,7 +105,17 @@ impl Doubt {
             return Ok(Admitted::Request);
         }
         let own = match Code::from(code) {
-            code if code.ends_motion() && self.is_unknown() => return Ok(Admitted::Both),
+            code if code.ends_motion() && self.is_unknown() => {
+                let sent = if code == Code::Off { &mut self.off } else { &mut self.stop };
+                return match silent {
+                    Some(silent) if *sent => Err(silent),
+                    _ => {
+                        *sent = true;
+                        self.heard = None;
+                        Ok(Admitted::Both)
+                    }
+                };
+            }
             Code::Off => self.off,
             Code::Stop => self.stop,
             _ => {
