@@ -60,7 +60,7 @@ fn part(trial: &Trial, seed: u64, exchanges: u64) -> Result<Tally, Failed> {
     let faults = seeded(trial.faults, seed).map_err(Failed::Plan)?;
     let run = |traced| match trial.speaks {
         Speaks::St(setup) => st::run(setup, &faults, trial.beyond, exchanges, traced),
-        Speaks::Rmd => rmd::run(&faults, trial.beyond, exchanges, traced),
+        Speaks::Rmd(life) => rmd::run(life, &faults, trial.beyond, exchanges, traced),
     };
     let panicked = |_| {
         let what = "it panicked".to_owned();

@@ -14,8 +14,9 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use campaign::Failed;
-use plan::{GROUPS, SEEDS, Speaks, Trial, WRITES, seeded};
+use plan::{GROUPS, SEEDS, Speaks, TWICE, Trial, WRITES, seeded};
 use st::Setup;
+use st::twice::{self, Batches};
 use st::verified::{self, Writes};
 use tally::Tally;
 
@@ -59,13 +60,14 @@ fn measure(most: u64) -> Result<String, Failed> {
         let sum = tallies.iter().map(|tally| tally.exchanges).sum::<u64>();
         match group.speaks {
             Speaks::St(_) => st += sum,
-            Speaks::Rmd => rmd += sum,
+            Speaks::Rmd(_) => rmd += sum,
         }
         let mut rows: Vec<(Trial, Tally)> = trials.into_iter().zip(tallies).collect();
         tables += &report::trials(group.title, &mut rows).map_err(Failed::Plan)?;
         eprintln!("{}: {sum} exchanges", group.title);
     }
     tables += &report::writes(&writes(most)?);
+    tables += &report::twice(&twice(most));
     tables += &report::checksum();
     let version = env!("CARGO_PKG_VERSION");
     let head = format!(
@@ -82,6 +84,17 @@ fn writes(most: u64) -> Result<Vec<(String, [Writes; 2])>, Failed> {
         Ok((format!("{}, `{faults}`", setup.profile.name()), kinds))
     };
     WRITES.iter().map(row).collect()
+}
+
+/// Reads on lines where replies come twice.
+fn twice(most: u64) -> Vec<(f64, Batches)> {
+    let row = |&(share, count): &(f64, u64)| {
+        let seeds: Vec<u64> = (1..=SEEDS).collect();
+        let parts =
+            campaign::each(&seeds, |&seed| twice::run(share, count.min(most) / SEEDS, seed));
+        (share, parts.into_iter().sum())
+    };
+    TWICE.iter().map(row).collect()
 }
 
 /// Plain writes, then verified ones.
@@ -162,5 +175,15 @@ mod tests {
         assert!(plain.wrong > 0, "{plain:?}");
         assert_eq!(verified.wrong, 0, "{verified:?}");
         assert!(verified.done > 0);
+    }
+
+    /// What a confirmation is for.
+    #[test]
+    fn a_reply_that_comes_twice_is_found_by_the_confirmation() {
+        for (_, batches) in twice(4_000) {
+            assert!(batches.wrong > 0, "{batches:?}");
+            assert!(batches.detected >= batches.wrong, "{batches:?}");
+            assert!(batches.slipped * 1_000 <= batches.count, "{batches:?}");
+        }
     }
 }

@@ -11,7 +11,16 @@ use crate::{rmd, st};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Speaks {
     St(Setup),
-    Rmd,
+    Rmd(Life),
+}
+
+/// How long the programs live that speak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Life {
+    /// One for the whole trial.
+    Long,
+    /// One after the other, each for a few exchanges; half of them are killed in the middle of one.
+    Short,
 }
 
 /// A line.
@@ -38,7 +47,7 @@ pub struct Group {
 pub const SEEDS: u64 = 8;
 
 const fn st(profile: Profile, recovery: Recovery) -> Speaks {
-    Speaks::St(Setup { profile, recovery })
+    Speaks::St(Setup { profile, recovery, life: Life::Long })
 }
 
 /// What is tried with both profiles.
@@ -109,6 +118,33 @@ const BUS: &[(&str, u64)] = &[
 /// Replies of a motor with more than the guard time between them.
 const BUS_BEYOND: &[(&str, u64)] = &[("delay=0ms..200ms", 500_000)];
 
+/// What programs in turn are tried with.
+const SERIAL_TURNS: &[(&str, u64)] = &[
+    ("drop=0", 200_000),
+    ("delay=0ms..60ms", 200_000),
+    ("delay=75ms..75ms", 200_000),
+    ("delay=0ms..490ms", 200_000),
+    ("drop=1e-3", 200_000),
+    ("dup=1e-3", 200_000),
+    ("flip=1e-4", 200_000),
+    ("pause=40ms..60ms@1e-3", 200_000),
+    ("pause=900ms..990ms@1e-3", 200_000),
+    ("cut=100ms@1e-4", 200_000),
+];
+const BUS_TURNS: &[(&str, u64)] = &[
+    ("drop=0", 200_000),
+    ("delay=0ms..20ms", 200_000),
+    ("delay=24ms..26ms", 200_000),
+    ("drop=1e-2", 200_000),
+    ("dup=1e-2", 200_000),
+    ("flip=1e-4", 200_000),
+    ("pause=49ms..51ms@1e-3", 200_000),
+    ("cut=300ms@1e-4", 200_000),
+];
+
+/// Lines on which replies come twice: the share of them, and how many times registers are read.
+pub const TWICE: &[(f64, u64)] = &[(1e-2, 200_000), (1e-1, 200_000), (1.0, 50_000)];
+
 /// Everything that is tried.
 pub const GROUPS: &[Group] = &[
     Group {
@@ -135,13 +171,41 @@ pub const GROUPS: &[Group] = &[
         rows: SHORT,
         beyond: &[],
     },
-    Group { title: "RMD", speaks: Speaks::Rmd, rows: BUS, beyond: BUS_BEYOND },
+    Group { title: "RMD", speaks: Speaks::Rmd(Life::Long), rows: BUS, beyond: BUS_BEYOND },
+    Group {
+        title: "ST, profile spec, recovery Drain, programs in turn",
+        speaks: Speaks::St(Setup {
+            profile: Profile::Spec,
+            recovery: Recovery::Drain,
+            life: Life::Short,
+        }),
+        rows: SERIAL_TURNS,
+        beyond: &[("delay=0ms..3s", 100_000)],
+    },
+    Group {
+        title: "ST, profile mcsdk-5.4, recovery Pad, programs in turn",
+        speaks: Speaks::St(Setup {
+            profile: Profile::Mcsdk54,
+            recovery: Recovery::Pad,
+            life: Life::Short,
+        }),
+        rows: SERIAL_TURNS,
+        beyond: &[("delay=0ms..3s", 100_000)],
+    },
+    Group {
+        title: "RMD, programs in turn",
+        speaks: Speaks::Rmd(Life::Short),
+        rows: BUS_TURNS,
+        beyond: BUS_BEYOND,
+    },
 ];
 
 /// Lines on which plain and verified writes are compared, and how many of each there are.
 pub const WRITES: &[(Setup, &str, u64)] = {
-    const SPEC: Setup = Setup { profile: Profile::Spec, recovery: Recovery::Drain };
-    const FIRMWARE: Setup = Setup { profile: Profile::Mcsdk54, recovery: Recovery::Pad };
+    const SPEC: Setup =
+        Setup { profile: Profile::Spec, recovery: Recovery::Drain, life: Life::Long };
+    const FIRMWARE: Setup =
+        Setup { profile: Profile::Mcsdk54, recovery: Recovery::Pad, life: Life::Long };
     &[
         (SPEC, "flip=1e-4", 4_000_000),
         (SPEC, "flip=1e-3", 2_000_000),
@@ -175,7 +239,7 @@ impl Trial {
         let faults = self.faults.parse()?;
         Ok(match self.speaks {
             Speaks::St(setup) => st::expected(setup, &faults, tally),
-            Speaks::Rmd => rmd::expected(&faults, tally),
+            Speaks::Rmd(_) => rmd::expected(&faults, tally),
         })
     }
 }

@@ -8,6 +8,7 @@ use motorlink_proto::stmcp::{Frame, MAX_FRAME};
 
 use crate::plan::{Speaks, Trial};
 use crate::st::theory::share;
+use crate::st::twice::Batches;
 use crate::st::verified::Writes;
 use crate::tally::Tally;
 
@@ -37,7 +38,7 @@ impl Table {
 
 /// One group of trials.
 pub fn trials(title: &str, rows: &mut [(Trial, Tally)]) -> Result<String, FaultError> {
-    let can = rows.iter().all(|(trial, _)| trial.speaks == Speaks::Rmd);
+    let can = rows.iter().all(|(trial, _)| matches!(trial.speaks, Speaks::Rmd(_)));
     let mut columns = vec![
         "fault",
         "exchanges",
@@ -102,6 +103,23 @@ pub fn writes(rows: &[(String, [Writes; 2])]) -> String {
         table.row(cells.chain(kinds.into_iter().flatten().map(|n| n.to_string())).collect());
     }
     format!("### Plain and verified writes\n\n{}\n", table.text)
+}
+
+/// Reads of four registers on lines where replies come twice.
+pub fn twice(rows: &[(f64, Batches)]) -> String {
+    let mut table = Table::new(&[
+        "replies that come twice",
+        "reads of four registers",
+        "detected",
+        "wrong, without the confirmation",
+        "wrong, with it",
+    ]);
+    for (share, batches) in rows {
+        let cells = [batches.count, batches.detected, batches.wrong, batches.slipped];
+        let share = [format!("{:.0} %", share * 100.0)].into_iter();
+        table.row(share.chain(cells.map(|n| n.to_string())).collect());
+    }
+    format!("### Replies that come twice, 1 to 20 ms apart\n\n{}\n", table.text)
 }
 
 /// How many damaged frames the checksum lets through.

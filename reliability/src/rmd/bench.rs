@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use motorlink::fault::{Faults, Lane, Unit, Way};
 use motorlink::time::{Duration, Instant};
 use motorlink_proto::rmd::{
-    CanFrame, Code, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, MotorId, MotorSet, Output,
-    Refused, TORQUE4_ID, Torque4,
+    CanFrame, Code, Command, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, MotorId, MotorSet,
+    Output, ReadStatus1, Refused, TORQUE4_ID, Torque4,
 };
 
 use super::motor::{Node, reaches};
@@ -21,6 +21,9 @@ const TURNAROUND: Duration = Duration(300);
 /// How long an exchange takes at most: the motor is left alone for the guard time, asked for its
 /// status, silent for the guard time, and asked.
 const LONGEST: Duration = Duration(2 * (DEFAULT_GUARD.0 + DEFAULT_TIMEOUT.0 + FRAME.0));
+/// What a program that asks a motor for the first time may wait longer: for the answers to what ends
+/// motion, and to another question.
+const FIRST: Duration = Duration(2 * (DEFAULT_TIMEOUT.0 + FRAME.0));
 /// As the blocking client, the host takes what came meanwhile after a pause of this length.
 const IDLE: Duration = Duration(1_000);
 /// Frames that are remembered; more are never on their way.
@@ -109,32 +112,80 @@ impl Bench {
         self.trace.map(Vec::from).unwrap_or_default()
     }
 
+    /// The program ends, and another opens the bus.
+    pub fn next_program(&mut self) {
+        self.note(|| "a new program".to_owned());
+        self.host = Host::new();
+    }
+
+    /// An exchange in which the program is killed after this time.
+    pub fn killed_in(&mut self, id: MotorId, data: [u8; 8], life: Duration) {
+        let end = self.now + life;
+        self.exchanges += 1;
+        self.ready();
+        let mut is_asked = false;
+        while self.now < end {
+            match self.host.poll(self.now) {
+                Output::Transmit(frame) => self.transmit(frame),
+                Output::Done { result: Err(Error::Quarantined), .. } => is_asked = false,
+                Output::Done { .. } => return,
+                Output::Wait(until) if is_asked => self.hear(until.unwrap_or(end).min(end)),
+                Output::Wait(_) => match self.host.request(self.now, id, data) {
+                    Ok(()) => is_asked = true,
+                    Err(Refused::Quarantined { until, .. }) => self.hear(until.min(end)),
+                    Err(refused) => {
+                        return self.violates(format!("a request was refused: {refused}"));
+                    }
+                },
+            }
+        }
+    }
+
     /// One exchange with one motor, as the blocking client does it: a quarantine is waited for.
     pub fn ask(&mut self, id: MotorId, data: [u8; 8]) {
         let begun = self.now;
+        let longest = if self.host.is_unknown(id) { LONGEST + FIRST } else { LONGEST };
         self.exchanges += 1;
         self.ready();
-        let outcome = loop {
-            match self.host.request(self.now, id, data) {
-                Ok(()) => match self.run() {
-                    Some((_, Err(Error::Quarantined))) => {}
-                    outcome => break outcome,
-                },
-                Err(Refused::Quarantined { until, .. }) => self.hear(until),
-                Err(refused) => return self.violates(format!("a request was refused: {refused}")),
-            }
-        };
-        self.over(id, matches!(outcome, Some((_, Ok(_)))));
+        let answered = self.insist(id, data);
+        self.over(id, answered);
         let took = self.now.since(begun);
-        if took > LONGEST && !self.beyond {
+        if took > longest && !self.beyond {
             self.violates(format!("an exchange took {} ms", took.0 / 1_000));
         }
         self.tally.longest = self.tally.longest.max(took);
     }
 
+    /// Asks until the request was carried out, or failed; whether it was.
+    fn insist(&mut self, id: MotorId, data: [u8; 8]) -> bool {
+        loop {
+            match self.host.request(self.now, id, data) {
+                Ok(()) => match self.run() {
+                    Some((_, Err(Error::Quarantined))) => {}
+                    outcome => return matches!(outcome, Some((_, Ok(_)))),
+                },
+                Err(Refused::Quarantined { until, .. }) => self.hear(until),
+                Err(refused) => {
+                    self.violates(format!("a request was refused: {refused}"));
+                    return false;
+                }
+            }
+        }
+    }
+
+    /// As the blocking client, before many motors are asked at once.
+    fn introduce(&mut self) {
+        self.ready();
+        for id in MotorSet::TORQUE4 {
+            if self.host.is_unknown(id) {
+                self.insist(id, ReadStatus1.encode());
+            }
+        }
+    }
+
     /// A request to each motor at once. One in quarantine is told so.
     pub fn cycle(&mut self, requests: [[u8; 8]; MOTORS]) {
-        self.ready();
+        self.introduce();
         for (id, data) in MotorSet::TORQUE4.zip(requests) {
             self.exchanges += 1;
             if self.host.request(self.now, id, data).is_err() {
@@ -146,7 +197,7 @@ impl Bench {
 
     /// Four torques in one frame.
     pub fn torque4(&mut self, torques: Torque4) {
-        self.ready();
+        self.introduce();
         if self.host.torque4(self.now, torques, MotorSet::TORQUE4).is_err() {
             return;
         }
@@ -173,11 +224,13 @@ impl Bench {
     /// Moves frames until every exchange is over, which waits for no motor in quarantine.
     fn run_all(&mut self) {
         let begun = self.now;
+        let is_first = MotorSet::TORQUE4.into_iter().any(|id| self.host.is_unknown(id));
+        let longest = if is_first { DEFAULT_TIMEOUT + FIRST } else { DEFAULT_TIMEOUT };
         while let Some((id, result)) = self.run() {
             self.over(id, result.is_ok());
         }
         let took = self.now.since(begun);
-        if took > DEFAULT_TIMEOUT {
+        if took > longest {
             self.violates(format!("a cycle took {} ms", took.0 / 1_000));
         }
     }

@@ -10,17 +10,32 @@ use motorlink_proto::rmd::MotorId;
 
 use bench::{Bench, MOTORS};
 
+use crate::plan::Life;
 use crate::tally::{Tally, Violation};
 
 /// Runs at least `count` exchanges of the mix, one to each of four motors at most at a time. Those
 /// from `traced` on are written down in a violation.
-pub fn run(faults: &Faults, beyond: bool, count: u64, traced: u64) -> Result<Tally, Violation> {
+pub fn run(
+    life: Life,
+    faults: &Faults,
+    beyond: bool,
+    count: u64,
+    traced: u64,
+) -> Result<Tally, Violation> {
     let mut bench = Bench::new(faults, beyond);
     let mut rng = Rng::with_seed(faults.seed ^ 0x5EED);
     while bench.exchanges < count {
         let exchange = bench.exchanges;
         if exchange >= traced {
             bench.trace();
+        }
+        if life == Life::Short && rng.bool() {
+            if rng.bool() {
+                let id = MotorId::new(rng.u8(1..=MOTORS as u8)).expect("1 to 4");
+                bench.killed_in(id, traffic::next(&mut rng), Duration(rng.u64(..300_000)));
+            }
+            bench.rest(Duration(rng.u64(..50_000)));
+            bench.next_program();
         }
         match rng.u8(..10) {
             0 => bench.torque4(traffic::torques(&mut rng)),

@@ -4,7 +4,7 @@ use motorlink_proto::rmd::{
     Config, Drive, Gains, Mode, Motor, MotorId, Sense, Settings, TORQUE4_ID, Torque4,
 };
 use motorlink_proto::time::Instant;
-use motorlink_proto::units::DpsPerSecond;
+use motorlink_proto::units::{DeciVolts, DpsPerSecond};
 
 /// Counts the calls that change something; every look at its sensors shows something else.
 #[derive(Debug, Clone, Default)]
@@ -22,7 +22,7 @@ impl Motor for Counting {
     }
     fn sense(&mut self) -> Sense {
         self.looks += 1;
-        Sense { encoder: self.looks, ..Sense::default() }
+        Sense { encoder: self.looks, voltage: DeciVolts(240), ..Sense::default() }
     }
     fn save(&mut self, _: &Settings) {
         self.acts += 1;

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 
-use motorlink::fault::{Faults, Lane, Way};
+use motorlink::fault::{Faults, Lane, Rng, Way};
 use motorlink::time::{Duration, Instant};
 use motorlink_proto::stmcp::{
     Config, Error, ErrorCode, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, Line, MAX_FRAME,
@@ -12,6 +12,7 @@ use motorlink_proto::stmcp::{
 
 use super::drive::{MOTORS, Memory};
 use super::traffic::Ask;
+use crate::plan::Life;
 use crate::tally::Tally;
 use crate::wire::{Tagged, message};
 
@@ -33,6 +34,7 @@ const TRACED: usize = 60;
 pub struct Setup {
     pub profile: Profile,
     pub recovery: Recovery,
+    pub life: Life,
 }
 
 /// A transmission of the master.
@@ -66,6 +68,10 @@ pub struct Bench {
     config: Config,
     master: Master,
     slave: Slave,
+    /// How many replies come twice, and by which chance.
+    twice: Option<(f64, Rng)>,
+    /// Second copies, and when they come.
+    copies: VecDeque<(Instant, Vec<Tagged<u8>>)>,
     pub drive: Memory,
     out: Lane<Tagged<u8>>,
     back: Lane<Tagged<u8>>,
@@ -91,7 +97,7 @@ pub struct Bench {
 
 impl Bench {
     pub fn new(setup: Setup, faults: &Faults, beyond: bool) -> Self {
-        let Setup { profile, recovery } = setup;
+        let Setup { profile, recovery, .. } = setup;
         let config = Config { recovery, ..Config::default() };
         let motors = Motor::new(MOTORS).expect("1 to 7");
         Bench {
@@ -100,6 +106,8 @@ impl Bench {
             config,
             master: Master::new(config),
             slave: Slave::new(profile, motors),
+            twice: None,
+            copies: VecDeque::new(),
             drive: Memory::new(),
             out: Lane::new(faults, Way::Sent, BYTE),
             back: Lane::new(faults, Way::Received, BYTE),
@@ -128,8 +136,31 @@ impl Bench {
         self.trace.map(Vec::from).unwrap_or_default()
     }
 
+    /// Lets this share of the replies come twice from now on.
+    pub fn repeat(&mut self, share: f64, seed: u64) {
+        self.twice = Some((share, Rng::with_seed(seed)));
+    }
+
+    /// The program ends, and another opens the line.
+    pub fn next_program(&mut self) {
+        self.note(|| "a new program".to_owned());
+        self.master = Master::new(self.config);
+    }
+
     /// One exchange as the blocking client does it; gives the acknowledge's payload.
     pub fn exchange(&mut self, ask: &Ask) -> Result<&[u8], Error> {
+        let result = self.attempt(ask, Instant(u64::MAX)).expect("it ends");
+        self.judge(result);
+        result.map(|()| &self.payload[..])
+    }
+
+    /// An exchange in which the program is killed after this time.
+    pub fn killed_in(&mut self, ask: &Ask, life: Duration) {
+        self.attempt(ask, self.now + life);
+    }
+
+    /// An exchange, unless it lasts until `end`.
+    fn attempt(&mut self, ask: &Ask, end: Instant) -> Option<Result<(), Error>> {
         self.exchanges += 1;
         let begun = self.now;
         if self.now.since(self.ended) > IDLE {
@@ -153,8 +184,11 @@ impl Bench {
             let mut bytes = [0; MAX_FRAME + 1];
             let (request, size) = match self.master.poll(self.now) {
                 Output::Wait(until) => {
+                    if self.now >= end {
+                        return None;
+                    }
                     let until = until.expect("an exchange is under way");
-                    self.wait(until);
+                    self.wait(until.min(end));
                     continue;
                 }
                 Output::Done(result) => {
@@ -177,8 +211,7 @@ impl Bench {
             self.violates(format!("an exchange took {} ms", took.0 / 1_000));
         }
         self.tally.longest = self.tally.longest.max(self.now.since(begun));
-        self.judge(result);
-        result.map(|()| &self.payload[..])
+        Some(result)
     }
 
     /// Nothing is asked for a while.
@@ -230,7 +263,8 @@ impl Bench {
 
     fn next(&self) -> Option<Instant> {
         let heard = self.out.due().map(|due| due.max(self.deaf_until()));
-        [heard, self.back.due(), self.slave.deadline()].into_iter().flatten().min()
+        let copy = self.copies.front().map(|(at, _)| *at);
+        [heard, self.back.due(), self.slave.deadline(), copy].into_iter().flatten().min()
     }
 
     /// While the slave answers, bytes wait for it; shipped firmware throws them away.
@@ -244,6 +278,9 @@ impl Bench {
             let answers = Answer::Other(self.involved());
             self.frame.clear();
             self.reply(&nack, answers);
+        }
+        while let Some((_, copy)) = self.copies.pop_front_if(|(at, _)| *at <= self.now) {
+            self.back.push(self.now, copy);
         }
         while self.now >= self.deaf_until()
             && let Some(byte) = self.out.pop(self.now)
@@ -311,7 +348,15 @@ impl Bench {
         self.tally.answers += u64::from(matches!(answers, Answer::Exchange(_)));
         self.note(|| format!("   the drive answers {bytes:02x?}"));
         let message = self.replies.push(Reply { size: bytes.len(), answers });
-        self.back.push(self.now + TURNAROUND, tagged(bytes, message));
+        let sent = self.now + TURNAROUND;
+        self.back.push(sent, tagged(bytes, message));
+        if let Some((share, rng)) = &mut self.twice
+            && rng.f64() < *share
+        {
+            let apart = Duration(rng.u64(1_000..20_000));
+            self.copies.push_back((sent + apart, tagged(bytes, message).collect()));
+            self.copies.make_contiguous().sort_by_key(|(at, _)| *at);
+        }
     }
 
     /// Whether `frame` is made of nothing but what recovery sends.

@@ -4,6 +4,7 @@ mod bench;
 mod drive;
 pub mod theory;
 mod traffic;
+pub mod twice;
 pub mod verified;
 
 use motorlink::fault::{Faults, Rng};
@@ -13,6 +14,7 @@ use motorlink_proto::stmcp::Error;
 use bench::Bench;
 pub use bench::Setup;
 
+use crate::plan::Life;
 use crate::tally::{Tally, Trouble, Violation};
 
 /// Runs `count` exchanges of the mix. Those from `traced` on are written down in a violation.
@@ -29,6 +31,14 @@ pub fn run(
     for exchange in 0..count {
         if exchange == traced {
             bench.trace();
+        }
+        if setup.life == Life::Short && rng.bool() {
+            if rng.bool() {
+                let killed = traffic::next(setup.profile, &mut rng);
+                bench.killed_in(&killed, Duration(rng.u64(..1_500_000)));
+            }
+            bench.rest(Duration(rng.u64(..50_000)));
+            bench.next_program();
         }
         let ask = traffic::next(setup.profile, &mut rng);
         let failed = matches!(bench.exchange(&ask), Err(Error::Failed(_)));

@@ -7,6 +7,7 @@ use std::time::{self as machine, Duration};
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
     BoardInfo, Config, Counters, Line, MAX_FRAME, Master, Motor, Output, Profile, Request,
+    question_behind,
 };
 use motorlink_proto::time::{self, Instant};
 
@@ -256,10 +257,8 @@ impl Client {
     /// [`Error::Unconfirmed`]: what was read or acknowledged since the last confirmation cannot be
     /// trusted. The line is lost. The port's.
     pub fn confirm(&self) -> Result<(), Error> {
-        let (last, (register, size)) = {
-            let driven = self.line.take();
-            (driven.session.last_size(), driven.session.question())
-        };
+        let last = self.line.take().session.last_size();
+        let (register, size) = question_behind(last);
         let answer = self.exchange(0, &Request::GetRegister(register), |payload| {
             (payload.len() == size).then_some(())
         });

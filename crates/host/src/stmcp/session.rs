@@ -265,16 +265,8 @@ impl Session {
         }
     }
 
-    /// A register to read whose value has another size than the last reply, and this size.
-    pub(super) fn question(&self) -> (RegisterId, usize) {
-        match self.last_size {
-            Some(1) => (RegisterId::FLAGS, 4),
-            _ => (RegisterId::STATUS, 1),
-        }
-    }
-
-    /// Whether the answer to the [`question`](Self::question), `asked` behind a reply of `last` bytes,
-    /// shows that replies and requests go together.
+    /// Whether the answer to a question behind an acknowledge of `last` bytes shows that replies and
+    /// requests go together.
     pub(super) fn confirmed(
         &mut self,
         last: Option<usize>,

@@ -208,6 +208,15 @@ enum Then {
     Send,
 }
 
+/// A register to read behind an acknowledge of `size` bytes, or a refusal, and the size of its value. It
+/// has another size, so that the answer shows whether replies and requests go together.
+pub const fn question_behind(size: Option<usize>) -> (RegisterId, usize) {
+    match size {
+        Some(1) => (RegisterId::FLAGS, 4),
+        _ => (RegisterId::STATUS, 1),
+    }
+}
+
 /// Completes any frame. 5.x firmware drops 0xFF 0xFF as header and length, so it is left in step or
 /// with one 0xFF as header: 0x00 0xFF is dropped by the one and a frame of motor 7, which has no
 /// meaning, to the other.

@@ -74,7 +74,9 @@ pub use code::{
 pub use drive::{Drive, Motor, Version};
 pub use failure::{Error, Failure};
 pub use frame::{Bad, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
-pub use master::{Config, Counters, Line, Master, Output, Recovery, RequestError, TIMEOUT};
+pub use master::{
+    Config, Counters, Line, Master, Output, Recovery, RequestError, TIMEOUT, question_behind,
+};
 pub use message::{
     BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, ReplySize,
     Request, RevupPhase, TorqueRamp,
