@@ -112,8 +112,8 @@ def test_what_is_done_is_said(rmd, command):
         "speed -20.5",
         "move 10",
         "move -10.25 --max-speed 200",
-        "move 45.5 --direction cw",
-        "move 359.99 --direction ccw --max-speed 100",
+        "move 45.5 --direction cw --full-turn",
+        "move 359.99 --direction ccw --max-speed 100 --full-turn",
     ],
 )
 def test_a_motion_command_answers_with_what_the_motor_does(rmd, command):
@@ -122,7 +122,7 @@ def test_a_motion_command_answers_with_what_the_motor_does(rmd, command):
     rmd("-i", 3, "off").ended(0)
 
 
-@pytest.mark.parametrize("direction", [(), ("--direction", "cw")])
+@pytest.mark.parametrize("direction", [(), ("--direction", "cw", "--full-turn")])
 def test_a_max_speed_never_rounds_up_and_is_never_0(rmd, direction):
     def most(value, *options):
         return rmd("--trace", *options, "move", 10, *direction, f"--max-speed={value}")
@@ -136,6 +136,63 @@ def test_a_max_speed_never_rounds_up_and_is_never_0(rmd, direction):
         assert "give 1 °/s or more; nothing was sent" in refused and "->" not in refused
     assert "give 1 digits or more" in most("0.9", "--raw").ended(2).err
     assert "does not fit" in most("65536").ended(2).err
+
+
+@pytest.fixture
+def near(run, sim, tmp_path):
+    """Runs `motorlink rmd` on motor 1, which stands at 90.02°: one count past 90.00°."""
+    config = tmp_path / "bench.toml"
+    config.write_text("[[rmd.motor]]\nid = 1\nplant.angle_degrees = 90.034\n")
+    bus = sim(config, st=())
+    command = on(run, bus.port("slcan"))
+    assert command("--json", "angle").ended(0).json["circle_angle"] == 90.02
+    return bus, command
+
+
+def test_a_move_that_could_be_nearly_a_full_turn_is_refused(near):
+    bus, rmd = near
+    refused = rmd("--trace", "move", 90, "--direction", "cw").ended(2).err
+    assert "motor 1 is at 90.02°, 0.02° past 90.00° clockwise" in refused
+    assert "try `--direction ccw`, or `--full-turn`" in refused
+    assert "-> 141#94" in refused and "-> 141#a" not in refused
+    assert bus.motor(1)["mode"] == "off"
+
+    rmd("move", 90, "--direction", "ccw", "--max-speed", 100).ended(0)
+    eventually(lambda: abs(bus.motor(1)["angle_degrees"] - 90) < 0.022, "motor 1 is at 90°")
+    rmd("off").ended(0)
+    for direction in ("cw", "ccw"):
+        refused = rmd("move", 90.02, "--direction", direction, "--tolerance", 360).ended(2).err
+        assert "`--full-turn`" in refused
+    assert abs(bus.motor(1)["angle_degrees"] - 90) < 0.03
+
+
+def test_a_full_turn_is_made_on_an_explicit_word(near):
+    bus, rmd = near
+    sent = rmd("--trace", "move", 90, "--direction", "cw", "--full-turn").ended(0).err
+    assert "-> 141#94" not in sent
+    eventually(lambda: abs(bus.motor(1)["angle_degrees"] - 450) < 0.1, "motor 1 made a turn")
+
+
+def test_the_tolerance_of_a_full_turn_can_be_given(near):
+    bus, rmd = near
+    move = ("move", 89.8, "--direction", "cw", "--max-speed", 3)
+    rmd(*move).ended(2)
+    rmd(*move, "--tolerance", 0.3).ended(2)
+    # In digits of 0.01°, as the angle.
+    rmd("--raw", "move", 8980, "--direction", "cw", "--max-speed", 3, "--tolerance", 22).ended(2)
+    assert bus.motor(1)["mode"] == "off"
+    rmd(*move, "--tolerance", 0.2).ended(0)
+    assert bus.motor(1)["mode"] == "position"
+    for words, told in (("--tolerance=-1", "does not fit"), ("--tolerance=nan", "does not fit")):
+        assert told in rmd(*move, words).ended(2).err
+    assert "--direction" in rmd("move", 90, "--full-turn").ended(2).err
+    assert "cannot be used" in rmd(*move, "--full-turn", "--tolerance", 1).ended(2).err
+
+
+def test_raw_frames_are_sent_as_they_are(near):
+    bus, rmd = near
+    rmd("raw", *"a5 00 00 00 28 23".split()).ended(0)
+    eventually(lambda: bus.motor(1)["angle_degrees"] > 400, "motor 1 makes a turn")
 
 
 @on_every_port
@@ -168,7 +225,7 @@ def test_a_motor_turns_stops_and_resumes(run, sim):
     eventually(lambda: abs(bus.motor(1)["speed_dps"]) < 1, "motor 1 stands")
     rmd("run")
     eventually(lambda: bus.motor(1)["speed_dps"] > 350, "motor 1 turns again")
-    rmd("move", 45, "--direction", "cw", "--max-speed", 1000)
+    rmd("move", 45, "--direction", "cw", "--full-turn", "--max-speed", 1000)
     eventually(lambda: abs(bus.motor(1)["angle_degrees"] % 360 - 45) < 0.5, "motor 1 is at 45°")
     rmd("off")
     assert bus.motor(1)["mode"] == "off"

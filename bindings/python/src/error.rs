@@ -18,6 +18,7 @@ enum Kind {
     Timeout,
     PortError,
     BadValue,
+    FullTurn,
     NoSuchRegister,
     Closed,
 }
@@ -32,13 +33,14 @@ struct Facts<'a> {
 
 impl Kind {
     fn class(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
-        static CLASSES: [PyOnceLock<Py<PyType>>; 7] = [const { PyOnceLock::new() }; 7];
+        static CLASSES: [PyOnceLock<Py<PyType>>; 8] = [const { PyOnceLock::new() }; 8];
         let name = match self {
             Kind::Refused => "Refused",
             Kind::LineLost => "LineLost",
             Kind::Timeout => "Timeout",
             Kind::PortError => "PortError",
             Kind::BadValue => "BadValue",
+            Kind::FullTurn => "FullTurn",
             Kind::NoSuchRegister => "NoSuchRegister",
             Kind::Closed => "Closed",
         };
@@ -135,6 +137,11 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
         }
         Error::Twice(id) | Error::OutOfReach(id) | Error::Limit { id, .. } => {
             (Kind::BadValue, Facts { motor: Some(id.number()), ..Facts::default() })
+        }
+        Error::FullTurn { id, .. } => {
+            let facts = Facts { motor: Some(id.number()), ..Facts::default() };
+            let hint = "full_turn=True sends it all the same";
+            return Kind::FullTurn.raise(py, format_args!("{error}; {hint}"), facts);
         }
         Error::Port(error) => return port_error(py, error),
         _ => (Kind::BadValue, Facts::default()),

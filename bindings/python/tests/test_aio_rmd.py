@@ -247,6 +247,20 @@ def test_a_scan_finds_what_is_there(motors: Motors) -> None:
     asyncio.run(asyncio.wait_for(main(), 60))
 
 
+def test_a_move_that_could_be_nearly_a_full_turn_is_refused(served: Served) -> None:
+    async def main() -> None:
+        async with aio.rmd.open(served.can, timeout=2) as bus:
+            motor = bus.motor(1)
+            angle = await motor.circle_angle()
+            with pytest.raises(motorlink.FullTurn):
+                await motor.turn_to(angle)
+            assert bus.moving == []
+            await motor.turn_to(angle, full_turn=True)
+            assert bus.moving == [1]
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+
+
 def test_served_motors_turn_to_where_they_are_told(served: Served) -> None:
     async def main() -> None:
         async with aio.rmd.open(served.can, timeout=2) as bus:

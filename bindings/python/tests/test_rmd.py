@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,6 +26,47 @@ def test_a_motor_moves_to_an_angle(rmd_bus: rmd.Bus) -> None:
     assert rmd_bus.moving == []
     motor.run()
     motor.off()
+
+
+NEAR = """
+[[rmd.motor]]
+id = 1
+plant.angle_degrees = 90.034
+"""
+
+
+def test_a_move_that_could_be_nearly_a_full_turn_is_refused() -> None:
+    bench = sim.Bench(NEAR)
+    with rmd.open(bench) as bus:
+        motor = bus.motor(1)
+        assert motor.circle_angle == 90.02
+        for target, refused in ((90.02, True), (90, True), (89.52, True), (89.51, False)):
+            if refused:
+                with pytest.raises(motorlink.FullTurn, match="full_turn=True") as error:
+                    motor.turn_to(target, 500)
+                assert error.value.motor == 1 and isinstance(error.value, motorlink.BadValue)
+                assert bus.moving == []
+            else:
+                motor.turn_to(target, 500)
+                assert bus.moving == [1]
+
+
+def test_a_full_turn_and_its_tolerance_can_be_allowed() -> None:
+    allowances: list[dict[str, Any]] = [{"full_turn": True}, {"tolerance": 0.01}]
+    for allowed in allowances:
+        bench = sim.Bench(NEAR)
+        with rmd.open(bench) as bus:
+            motor = bus.motor(1)
+            motor.turn_to(90, 2000, **allowed)
+            bench.run(1)
+            assert motor.angle == pytest.approx(450, abs=0.1)
+    with rmd.open(sim.Bench(NEAR)) as bus:
+        bus.motor(1).turn_to(90, clockwise=False)
+        with pytest.raises(motorlink.FullTurn):
+            bus.motor(1).turn_to(80, tolerance=11)
+        for nonsense in (-1, float("nan")):
+            with pytest.raises(motorlink.BadValue, match="tolerance"):
+                bus.motor(1).turn_to(80, tolerance=nonsense)
 
 
 def test_speed_and_torque_do_what_they_say(rmd_bus: rmd.Bus) -> None:

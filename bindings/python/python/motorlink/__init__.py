@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 __all__ = [
     "BadValue",
     "Closed",
+    "FullTurn",
     "LineLost",
     "MotorlinkError",
     "PortError",
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from motorlink.errors import (
         BadValue,
         Closed,
+        FullTurn,
         LineLost,
         MotorlinkError,
         PortError,

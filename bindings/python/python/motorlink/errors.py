@@ -11,6 +11,7 @@ from typing import Any
 __all__ = [
     "BadValue",
     "Closed",
+    "FullTurn",
     "LineLost",
     "MotorlinkError",
     "NoSuchRegister",
@@ -79,6 +80,13 @@ class PortError(LineLost):
 
 class BadValue(MotorlinkError, ValueError):
     """A value that cannot be sent, or that a limit forbids; nothing was sent."""
+
+
+class FullTurn(BadValue):
+    """A move within the turn of an RMD motor that could be nearly a full turn; it was not sent.
+
+    The motor is at its target already, or just past it. Only its angle was read.
+    """
 
 
 class NoSuchRegister(BadValue, KeyError):

@@ -78,7 +78,7 @@ _ON_CLOSE = ("stop", "off", "nothing")
 #: What ``Bus.sample`` can read.
 QUANTITIES: tuple[str, ...] = tuple(_core.rmd_quantities())
 
-# Requests for ``Bus.cycle``.
+# Requests for ``Bus.cycle``, sent as they are: ``turn_to`` is not checked for a full turn.
 torque = Request.torque
 speed = Request.speed
 move_to = Request.move_to
@@ -347,16 +347,33 @@ class Motor:
         return status
 
     def turn_to(
-        self, degrees: float, max_speed: float | None = None, *, clockwise: bool = True
+        self,
+        degrees: float,
+        max_speed: float | None = None,
+        *,
+        clockwise: bool = True,
+        full_turn: bool = False,
+        tolerance: float = 0.5,
     ) -> MotionStatus:
         """Turns to an angle within the turn, 0 to 359.99 °, this way round.
 
         No faster than ``max_speed``, °/s, 1 at least, rounded down. Position control commands 3
         and 4.
+
+        The motor is asked for its angle first. At its target, or up to ``tolerance`` ° past it, the
+        move could be nearly a full turn: ``FullTurn`` is raised, and the motor is not moved. It
+        is not asked with ``full_turn=True``.
+
+        >>> import motorlink
+        >>> with motorlink.rmd.open("sim:") as bus:     # the motor is at 0 °
+        ...     bus.motor(1).turn_to(0)
+        Traceback (most recent call last):
+        motorlink.errors.FullTurn: motor 1 is at 0.00°, 0.00° past 0.00° clockwise: ...
         """
-        status: MotionStatus = self._perform(
-            Request.turn_to(degrees, max_speed, clockwise=clockwise)
-        )
+        request = Request.turn_to(degrees, max_speed, clockwise=clockwise)
+        if not full_turn:
+            request.check_full_turn(self._id, self.circle_angle, tolerance)
+        status: MotionStatus = self._perform(request)
         return status
 
     def off(self) -> None:

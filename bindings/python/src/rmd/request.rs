@@ -1,5 +1,6 @@
 //! One request to an RMD motor: checked when it is made, and able to read its reply.
 
+use motorlink::rmd::FullTurn;
 use motorlink_proto::rmd::{
     Acceleration, Circle, CirclePosition, CirclePositionLimited, ClearErrors, Code, Command,
     Encoder, EncoderOffset, Errors, FULL_TURN, Gains, MotionStatus, MotorId, MultiTurn, Off,
@@ -15,7 +16,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 
-use crate::error::bad_value;
+use crate::error::{bad_value, rmd_error};
 use crate::number::{digits, greatest_speed, physical};
 use crate::values;
 
@@ -162,6 +163,24 @@ impl RmdRequest {
                 Self::of(CirclePositionLimited { direction, max_speed, angle })
             }
         })
+    }
+
+    /// Refuses this `turn_to` for a motor at `angle`, °, from where it could be nearly a full turn.
+    fn check_full_turn(
+        &self,
+        py: Python<'_>,
+        motor: i64,
+        angle: f64,
+        tolerance: f64,
+    ) -> PyResult<()> {
+        let id = motor_id(py, motor)?;
+        let digits = |what, degrees| {
+            digits(py, what, degrees, CircleAngle::SCALE, CircleAngle::SYMBOL).map(CircleAngle)
+        };
+        let (at, tolerance) = (digits("an angle", angle)?, digits("a tolerance", tolerance)?);
+        let CirclePosition { direction, angle } = CirclePosition::decode(&self.data);
+        let checked = FullTurn::Refused { tolerance }.check(id, at, angle, direction);
+        checked.map_err(|error| rmd_error(py, &error))
     }
 
     /// Switches the motor off and forgets what it was doing (0x80).

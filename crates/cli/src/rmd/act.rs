@@ -1,13 +1,13 @@
 //! Commands that change something in a motor.
 
 use motorlink::rmd::{
-    CentiDegrees, CentiDps, CircleAngle, Code, DpsPerSecond, Gains, MotionStatus, MotorSet,
-    SpeedLimit, Spin, Torque, Torque4, TorqueCommand, inward,
+    CentiDegrees, CentiDps, CircleAngle, Code, DpsPerSecond, Error, FullTurn, Gains, MotionStatus,
+    MotorSet, SpeedLimit, Spin, Torque, Torque4, TorqueCommand, inward,
 };
 use serde_json::{Map, Value, json};
 
 use super::Session;
-use super::args::{Act, Direction};
+use super::args::{self, Act, Direction};
 use super::read::{motion, status1, value};
 use crate::failure::Failure;
 use crate::output::{hex, line, parse_hex};
@@ -62,8 +62,14 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             let speed = CentiDps(digits(session, dps, CentiDps::SCALE, "°/s")?);
             output.rows(&motion(session, &motor.speed(speed)?))
         }
-        Act::Move { degrees, max_speed, direction } => {
-            let status = go(session, degrees, max_speed, direction)?;
+        Act::Move { degrees, max_speed, direction: None, .. } => {
+            let angle = CentiDegrees(digits(session, degrees, CentiDegrees::SCALE, "°")?);
+            let status = motor.move_to(angle, greatest_speed(session, max_speed)?)?;
+            output.rows(&motion(session, &status))
+        }
+        Act::Move { degrees, max_speed, direction: Some(direction), full_turn } => {
+            let max_speed = greatest_speed(session, max_speed)?;
+            let status = turn(session, degrees, max_speed, direction, &full_turn)?;
             output.rows(&motion(session, &status))
         }
         Act::ClearError => {
@@ -130,27 +136,34 @@ fn encoder(session: &Session, offset: Option<u16>) -> Result<(), Failure> {
     ])
 }
 
-fn go(
+fn turn(
     session: &Session,
     degrees: f64,
-    max_speed: Option<f64>,
-    direction: Option<Direction>,
+    max_speed: Option<SpeedLimit>,
+    direction: Direction,
+    full_turn: &args::FullTurn,
 ) -> Result<MotionStatus, Failure> {
-    let motor = session.motor()?;
-    let max_speed = match max_speed {
-        Some(dps) => Some(greatest_speed(session, dps)?),
-        None => None,
-    };
-    let Some(direction) = direction else {
-        let angle = CentiDegrees(digits(session, degrees, CentiDegrees::SCALE, "°")?);
-        return Ok(motor.move_to(angle, max_speed)?);
-    };
-    let spin = match direction {
-        Direction::Cw => Spin::Clockwise,
-        Direction::Ccw => Spin::Counterclockwise,
-    };
     let angle = CircleAngle(digits(session, degrees, CircleAngle::SCALE, "°")?);
-    Ok(motor.turn_to(angle, spin, max_speed)?)
+    let (spin, other) = match direction {
+        Direction::Cw => (Spin::Clockwise, "ccw"),
+        Direction::Ccw => (Spin::Counterclockwise, "cw"),
+    };
+    let full_turn = match *full_turn {
+        args::FullTurn { full_turn: true, .. } => FullTurn::Allowed,
+        args::FullTurn { tolerance: None, .. } => FullTurn::default(),
+        args::FullTurn { tolerance: Some(degrees), .. } => FullTurn::Refused {
+            tolerance: CircleAngle(digits(session, degrees, CircleAngle::SCALE, "°")?),
+        },
+    };
+    session.motor()?.turn_to(angle, spin, max_speed, full_turn).map_err(|error| match error {
+        Error::FullTurn { past: CircleAngle(0), .. } => {
+            Failure::Usage(format!("{error}; `--full-turn` sends it all the same"))
+        }
+        Error::FullTurn { .. } => Failure::Usage(format!(
+            "{error}; try `--direction {other}`, or `--full-turn` if it may be a full turn"
+        )),
+        error => error.into(),
+    })
 }
 
 fn torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
@@ -225,7 +238,8 @@ fn digits<T: TryFrom<i64>>(
 
 /// A greatest speed in °/s, or with --raw in digits, rounded towards 0. What would be 0 is refused:
 /// to a drive it may mean any speed, or that the motor never moves.
-fn greatest_speed(session: &Session, value: f64) -> Result<SpeedLimit, Failure> {
+fn greatest_speed(session: &Session, value: Option<f64>) -> Result<Option<SpeedLimit>, Failure> {
+    let Some(value) = value else { return Ok(None) };
     let (scale, unit) = match session.raw {
         true => (1.0, "digits"),
         false => (SpeedLimit::SCALE, SpeedLimit::SYMBOL),
@@ -237,7 +251,7 @@ fn greatest_speed(session: &Session, value: f64) -> Result<SpeedLimit, Failure> 
              sent"
         )));
     }
-    let fits = u16::try_from(digits).map(SpeedLimit);
+    let fits = u16::try_from(digits).map(|digits| Some(SpeedLimit(digits)));
     fits.map_err(|_| too_large(session, value, SpeedLimit::SYMBOL))
 }
 

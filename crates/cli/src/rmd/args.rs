@@ -103,6 +103,9 @@ pub enum Act {
         dps: f64,
     },
     /// Turn to an angle
+    ///
+    /// With --direction the motor is asked for its angle first (0x94). At its target, or just past it,
+    /// the move could be nearly a full turn: it is refused. Then try the other direction, or --full-turn.
     Move {
         /// Degrees over all turns, positive is clockwise; 0 to 359.99 with --direction
         #[arg(allow_negative_numbers = true)]
@@ -113,6 +116,8 @@ pub enum Act {
         /// Turn to an angle within the turn, this way round
         #[arg(long, value_enum)]
         direction: Option<Direction>,
+        #[command(flatten)]
+        full_turn: FullTurn,
     },
     /// Clear the errors whose cause is gone
     ClearError,
@@ -128,6 +133,17 @@ pub enum Act {
         #[arg(required = true, value_name = "HEX")]
         bytes: Vec<String>,
     },
+}
+
+/// What becomes of a move with a direction that could be nearly a full turn.
+#[derive(clap::Args)]
+pub struct FullTurn {
+    /// Move even if the motor is at the angle or just past it, which may be nearly a full turn
+    #[arg(long, requires = "direction")]
+    pub full_turn: bool,
+    /// Up to how far past the angle the move is refused, degrees (default 0.5)
+    #[arg(long, value_name = "DEGREES", requires = "direction", conflicts_with = "full_turn")]
+    pub tolerance: Option<f64>,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy)]

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use motorlink_proto::rmd::{Code, Dialect, Exceeded, MotorId};
+use motorlink_proto::rmd::{Code, Dialect, Exceeded, MotorId, Spin};
+use motorlink_proto::units::CircleAngle;
 
 use crate::port::{CanLink, PortError};
 
@@ -106,6 +107,24 @@ pub enum Error {
         id: MotorId,
         /// The limit.
         exceeded: Exceeded,
+    },
+    /// A move within the turn could be nearly a full turn; it was not sent.
+    #[error(
+        "motor {id} is at {:.2}°, {:.2}° past {:.2}° {direction}: the move could be nearly a full turn; \
+         it was not sent",
+        at.degrees(), past.degrees(), target.degrees()
+    )]
+    FullTurn {
+        /// The motor.
+        id: MotorId,
+        /// Where it is (0x94).
+        at: CircleAngle,
+        /// How far past its target that is.
+        past: CircleAngle,
+        /// Where it should turn to.
+        target: CircleAngle,
+        /// Which way round.
+        direction: Spin,
     },
     /// There is no such motor; nothing was sent.
     #[error("motor {0} does not exist: motor IDs are 1 to 32")]

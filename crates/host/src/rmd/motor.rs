@@ -3,7 +3,7 @@
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::*;
 
-use super::{Bus, Error};
+use super::{Bus, Error, FullTurn};
 
 /// One motor on the bus. Every call is one exchange; its errors are those of [`Bus::ask`].
 #[derive(Clone, Copy)]
@@ -138,15 +138,29 @@ impl<'a> MotorHandle<'a> {
 
     /// Turns to an angle within the turn, this way round (0xA5), no faster than `max_speed` if
     /// there is one (0xA6).
+    ///
+    /// Two exchanges, unless a full turn is allowed: a motor that turns when it is asked for its angle
+    /// may be elsewhere when the move arrives. [`ask`](Self::ask) sends the command alone.
+    ///
+    /// # Errors
+    /// [`Error::FullTurn`] if the motor is at the angle or just past it. Of the caller's limits,
+    /// [`Limits::angle`] does not hold for this move, as it is about the angle over all turns.
     pub fn turn_to(
         &self,
         angle: CircleAngle,
         direction: Spin,
         max_speed: Option<SpeedLimit>,
+        full_turn: FullTurn,
     ) -> Result<MotionStatus, Error> {
-        match max_speed {
-            None => self.ask(CirclePosition { direction, angle }),
-            Some(max_speed) => self.ask(CirclePositionLimited { direction, max_speed, angle }),
+        let request = match max_speed {
+            None => CirclePosition { direction, angle }.encode(),
+            Some(max_speed) => CirclePositionLimited { direction, max_speed, angle }.encode(),
+        };
+        if full_turn != FullTurn::Allowed {
+            let in_range = Limits::default().check(&request);
+            in_range.map_err(|exceeded| Error::Limit { id: self.id, exceeded })?;
+            full_turn.check(self.id, self.circle_angle()?, angle, direction)?;
         }
+        self.bus.raw(self.id, request).map(|reply| MotionStatus::decode(&reply))
     }
 }

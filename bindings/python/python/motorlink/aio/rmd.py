@@ -360,13 +360,22 @@ class Motor:
         return status
 
     async def turn_to(
-        self, degrees: float, max_speed: float | None = None, *, clockwise: bool = True
+        self,
+        degrees: float,
+        max_speed: float | None = None,
+        *,
+        clockwise: bool = True,
+        full_turn: bool = False,
+        tolerance: float = 0.5,
     ) -> MotionStatus:
         """Turns to an angle within the turn, 0 to 359.99 °, this way round.
 
-        No faster than ``max_speed``, °/s, 1 at least, rounded down.
+        No faster than ``max_speed``, °/s, 1 at least, rounded down. The motor is asked for its angle
+        first: see :meth:`motorlink.rmd.Motor.turn_to`.
         """
         request = Request.turn_to(degrees, max_speed, clockwise=clockwise)
+        if not full_turn:
+            request.check_full_turn(self._id, await self.circle_angle(), tolerance)
         status: MotionStatus = await self._perform(request)
         return status
 

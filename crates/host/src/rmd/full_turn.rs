@@ -1,0 +1,119 @@
+//! Moves within the turn (0xA5, 0xA6) that could be nearly a full turn.
+
+use motorlink_proto::rmd::{FULL_TURN, MotorId, Spin};
+use motorlink_proto::units::CircleAngle;
+
+use super::Error;
+
+/// What becomes of a move within the turn to a motor that is at its target, or just past it: with the
+/// given direction that is nearly a full turn (docs/SPEC-NOTES.md R33).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum FullTurn {
+    /// The motor is asked for its angle (0x94) first. The move is refused if the motor is at its
+    /// target, or past it by `tolerance` at most.
+    Refused {
+        /// 0.01° a digit.
+        tolerance: CircleAngle,
+    },
+    /// The move is sent as it is; the motor is not asked for its angle.
+    Allowed,
+}
+
+impl Default for FullTurn {
+    /// Refused, with a tolerance of 0.5°.
+    fn default() -> Self {
+        FullTurn::Refused { tolerance: CircleAngle(50) }
+    }
+}
+
+impl FullTurn {
+    /// Whether a motor that reads the angle `at` may be moved to `target`. Angles are within the turn,
+    /// of the motor shaft, from the motor's zero; those of 360° and more are reduced to one turn.
+    ///
+    /// # Errors
+    /// [`Error::FullTurn`].
+    pub fn check(
+        self,
+        id: MotorId,
+        at: CircleAngle,
+        target: CircleAngle,
+        direction: Spin,
+    ) -> Result<(), Error> {
+        let FullTurn::Refused { tolerance } = self else { return Ok(()) };
+        let past = past(at, target, direction);
+        if past > tolerance {
+            return Ok(());
+        }
+        Err(Error::FullTurn { id, at, past, target, direction })
+    }
+}
+
+/// How far a motor is past its target, less than a turn.
+fn past(at: CircleAngle, target: CircleAngle, direction: Spin) -> CircleAngle {
+    let (from, to) = match direction {
+        Spin::Counterclockwise => (at, target),
+        _ => (target, at),
+    };
+    let way = (i32::from(to.0) - i32::from(from.0)).rem_euclid(FULL_TURN.into());
+    CircleAngle(way as u16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CW: Spin = Spin::Clockwise;
+    const CCW: Spin = Spin::Counterclockwise;
+
+    fn is_refused(tolerance: u16, at: u16, target: u16, direction: Spin) -> bool {
+        let full_turn = FullTurn::Refused { tolerance: CircleAngle(tolerance) };
+        let id = MotorId::new(1).unwrap();
+        full_turn.check(id, CircleAngle(at), CircleAngle(target), direction).is_err()
+    }
+
+    #[test]
+    fn a_move_is_refused_at_its_target_and_up_to_the_tolerance_past_it() {
+        for target in [0, 20, 9_000, 35_980, 35_999] {
+            for past in 0..FULL_TURN.into() {
+                let at = |way: i32| (i32::from(target) + way).rem_euclid(FULL_TURN.into()) as u16;
+                let refused = past <= 50;
+                assert_eq!(is_refused(50, at(past), target, CW), refused, "{target} {past}");
+                assert_eq!(is_refused(50, at(-past), target, CCW), refused, "{target} {past}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_other_direction_is_a_short_move() {
+        assert!(is_refused(50, 9_002, 9_000, CW) && !is_refused(50, 9_002, 9_000, CCW));
+        assert!(is_refused(50, 35_998, 0, CCW) && !is_refused(50, 35_998, 0, CW));
+    }
+
+    #[test]
+    fn a_tolerance_of_0_refuses_at_the_target_only() {
+        assert!(is_refused(0, 9_000, 9_000, CW));
+        assert!(!is_refused(0, 9_001, 9_000, CW));
+    }
+
+    #[test]
+    fn the_default_tolerance_is_half_a_degree() {
+        let id = MotorId::new(1).unwrap();
+        let check = |at| FullTurn::default().check(id, at, CircleAngle(9_000), CW);
+        assert!(check(CircleAngle::from_degrees(90.5)).is_err());
+        assert!(check(CircleAngle::from_degrees(90.51)).is_ok());
+    }
+
+    #[test]
+    fn an_angle_beyond_a_turn_is_reduced_to_one() {
+        assert!(is_refused(50, 45_002, 9_000, CW));
+        assert!(!is_refused(50, 44_998, 9_000, CW));
+        assert!(!is_refused(50, u16::MAX, 0, CW));
+    }
+
+    #[test]
+    fn an_allowed_full_turn_is_never_refused() {
+        let id = MotorId::new(1).unwrap();
+        let at = CircleAngle(9_000);
+        assert!(FullTurn::Allowed.check(id, at, at, CW).is_ok());
+    }
+}
