@@ -85,7 +85,7 @@ fn exchange(
                 }
             }
             Output::Wait(_) => master.receive(now, reply),
-            Output::Done(result) => return register.decode(result.ok()?),
+            Output::Done(result) => return register.decode(Profile::Spec, result.ok()?),
         }
     }
 }

@@ -59,7 +59,7 @@ fn message(profile: Profile, frame: &Frame<'_>) {
     assert!(version.name.len() + version.version.len() <= payload.len());
     assert_eq!(RevupPhase::decode(payload).is_some(), payload.len() >= RevupPhase::SIZE);
     let valued = matches!(payload.len(), 1 | 2 | 4);
-    assert_eq!(RegisterId(frame.header).decode(payload).is_some(), valued);
+    assert_eq!(RegisterId(frame.header).decode(profile, payload).is_some(), valued);
 
     let Ok(request) = Request::decode(profile, frame) else { return };
     let mut out = [0xA5; MAX_FRAME];

@@ -119,7 +119,7 @@ pub fn st_master(master: &mut Master) {
     if let Output::Done(Ok(payload)) = master.poll(now) {
         black_box(BoardInfo::decode(payload));
         black_box(FirmwareVersion::decode(payload));
-        black_box(RegisterId(unknown()).decode(payload));
+        black_box(RegisterId(unknown()).decode(unknown(), payload));
     }
     if unknown() {
         master.abandon();

@@ -23,7 +23,7 @@ pub(super) fn kinds() -> Vec<Kind> {
     vec![
         told(Request::SetRegister { register: RegisterId::SPEED_KP, value: &[0x10, 0x27] }),
         asked(Request::GetRegister(register), &[0xDC, 0x05, 0, 0], move |payload| {
-            black_box(register.decode(payload));
+            black_box(register.decode(Profile::Spec, payload));
         }),
         told(Request::Execute(Command::StartMotor)),
         asked(Request::BoardInfo, NAME, |payload| {

@@ -11,7 +11,7 @@ use motorlink_conformance::wire::{Line, Virtual};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::stmcp::{
     Command, Config, Error, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Master,
-    Output, Parse, RegisterId, Request, TIMEOUT, checksum,
+    Output, Parse, Profile, RegisterId, Request, TIMEOUT, checksum,
 };
 use motorlink_proto::time::Duration;
 
@@ -62,7 +62,9 @@ fn results(line: &mut dyn Line, task: Task) -> Result<Vec<Result<i32, String>>, 
         master.receive(line.now(), &unasked);
         results.push(match exchange(&mut master, line, &request)? {
             Ok(_) if task == Task::Start => Ok(0),
-            Ok(payload) => Ok(RegisterId::SPEED_MEAS.decode(&payload).expect("its size")),
+            Ok(payload) => {
+                Ok(RegisterId::SPEED_MEAS.decode(Profile::Spec, &payload).expect("its size"))
+            }
             Err(Error::Refused(code)) => Err(format!("refused {:#04x}", u8::from(code))),
             Err(Error::Failed(failure)) => Err(match failure {
                 Failure::Timeout => "timeout".to_owned(),

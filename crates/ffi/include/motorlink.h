@@ -97,8 +97,8 @@ enum motorlink_st_register {
   MOTORLINK_ST_REG_FLUXWK_KI             = 0x17, /**< RW i16 s16A/s16V²: Flux weakening regulator Ki */
   MOTORLINK_ST_REG_FLUXWK_BUS            = 0x18, /**< RW u16 %: Share of the bus voltage that flux weakening may use */
   MOTORLINK_ST_REG_BUS_VOLTAGE           = 0x19, /**< R  u16 V: Bus voltage */
-  MOTORLINK_ST_REG_HEATS_TEMP            = 0x1A, /**< R  i16 °C: Heatsink temperature */
-  MOTORLINK_ST_REG_MOTOR_POWER           = 0x1B, /**< R  i16 W: Electrical power into the motor */
+  MOTORLINK_ST_REG_HEATS_TEMP            = 0x1A, /**< R  u16 °C: Heatsink temperature (mcsdk-5.4: i16) */
+  MOTORLINK_ST_REG_MOTOR_POWER           = 0x1B, /**< R  u16 W: Electrical power into the motor (mcsdk-5.4: i16) */
   MOTORLINK_ST_REG_DAC_OUT1              = 0x1C, /**< RW u8: Register shown on DAC channel 1 */
   MOTORLINK_ST_REG_DAC_OUT2              = 0x1D, /**< RW u8: Register shown on DAC channel 2 */
   MOTORLINK_ST_REG_SPEED_MEAS            = 0x1E, /**< R  i32 rpm: Mechanical speed, averaged */
@@ -146,8 +146,8 @@ enum motorlink_st_register {
   MOTORLINK_ST_REG_FF_2                  = 0x48, /**< RW i32: Feed-forward constant C2 */
   MOTORLINK_ST_REG_FF_VQ                 = 0x49, /**< R  i16 s16V: Feed-forward part of Vq */
   MOTORLINK_ST_REG_FF_VD                 = 0x4A, /**< R  i16 s16V: Feed-forward part of Vd */
-  MOTORLINK_ST_REG_FF_VQ_PIOUT           = 0x4B, /**< R  i16 s16V/s16A: Regulator part of Vq */
-  MOTORLINK_ST_REG_FF_VD_PIOUT           = 0x4C, /**< R  i16 s16V/s16A: Regulator part of Vd */
+  MOTORLINK_ST_REG_FF_VQ_PIOUT           = 0x4B, /**< R  i16 s16V: Regulator part of Vq */
+  MOTORLINK_ST_REG_FF_VD_PIOUT           = 0x4C, /**< R  i16 s16V: Regulator part of Vd */
   MOTORLINK_ST_REG_PFC_STATUS            = 0x4D, /**< R  i8: PFC state */
   MOTORLINK_ST_REG_PFC_FAULTS            = 0x4E, /**< R  u32: PFC faults */
   MOTORLINK_ST_REG_PFC_DCBUS_REF         = 0x4F, /**< RW i16 V: PFC bus voltage reference */
@@ -185,8 +185,8 @@ enum motorlink_st_register {
   MOTORLINK_ST_REG_SPEED_KI_DIV          = 0x6F, /**< R  i16: Speed regulator Ki, divisor */
   MOTORLINK_ST_REG_UID                   = 0x70, /**< R  u32: Unique identification (firmware only) */
   MOTORLINK_ST_REG_HWTYPE                = 0x71, /**< -  i16: Hardware type (firmware only) */
-  MOTORLINK_ST_REG_CTRBID                = 0x72, /**< R  u32: Control board identification */
-  MOTORLINK_ST_REG_PWBDID                = 0x73, /**< R  u32: Power board identification */
+  MOTORLINK_ST_REG_CTRBID                = 0x72, /**< R  u32: Control board identification (mcsdk-5.4: u16) */
+  MOTORLINK_ST_REG_PWBDID                = 0x73, /**< R  u32: Power board identification (mcsdk-5.4: u16) */
   MOTORLINK_ST_REG_SC_PP                 = 0x74, /**< RW u8: Profiler: pole pairs (firmware only) */
   MOTORLINK_ST_REG_SC_CURRENT            = 0x75, /**< RW f32 A: Profiler: current (firmware only) */
   MOTORLINK_ST_REG_SC_SPDBANDWIDTH       = 0x76, /**< RW f32: Profiler: speed bandwidth (firmware only) */

@@ -267,7 +267,7 @@ proptest! {
             pair.delay = Duration::from_millis(delay);
             let register = registers[n % registers.len()];
             if let Ok(value) = pair.exchange(1, Request::GetRegister(register)) {
-                prop_assert_eq!(register.decode(&value), Some(i32::from(register.0)));
+                prop_assert_eq!(register.decode(Profile::Spec, &value), Some(i32::from(register.0)));
             }
         }
     }
@@ -318,7 +318,7 @@ proptest! {
                 pair.delay = until.since(pair.now);
                 let register = registers[n % 2];
                 if let Ok(value) = pair.exchange(1, Request::GetRegister(register)) {
-                    prop_assert_eq!(register.decode(&value), Some(i32::from(register.0)));
+                    prop_assert_eq!(register.decode(Profile::Spec, &value), Some(i32::from(register.0)));
                 }
             }
             prop_assert_eq!(pair.master.line(), Line::Up, "back within 20 tries");

@@ -143,6 +143,24 @@ fn an_overrun_drops_the_frame_and_says_so() {
 }
 
 #[test]
+fn temperature_and_power_have_a_sign_in_shipped_firmware_only() {
+    for register in [RegisterId::HEATS_TEMP, RegisterId::MOTOR_POWER] {
+        for (profile, value, read) in [
+            (Profile::Spec, 65_535, 65_535),
+            (Profile::Spec, -10, 0),
+            (Profile::Mcsdk54, 65_535, -1),
+            (Profile::Mcsdk54, -10, -10),
+        ] {
+            let mut bench = Bench::new(profile, 1, Memory::with(all_features()));
+            bench.drive.set(1, register, value);
+            let payload = bench.ask(1, Request::GetRegister(register)).unwrap();
+            assert_eq!(payload.len(), 2);
+            assert_eq!(register.decode(profile, &payload), Some(read), "{register} {profile:?}");
+        }
+    }
+}
+
+#[test]
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn every_register_is_read_and_written_as_table_3_says() {
     for features in [Features::NONE, all_features()] {
@@ -151,7 +169,7 @@ fn every_register_is_read_and_written_as_table_3_says() {
             let shape = id.shape().filter(|shape| shape.origin == Origin::Table3);
             let there = shape.filter(|shape| features.has(shape.feature));
             let access = there.map(|shape| shape.access);
-            let size = there.map_or(0, |shape| usize::from(shape.ty.size()));
+            let size = there.map_or(0, |shape| usize::from(shape.ty(Profile::Spec).size()));
 
             let read = bench.ask(0, Request::GetRegister(id)).map(|value| value.len());
             let readable = matches!(access, Some(Access::ReadWrite | Access::ReadOnly));
@@ -317,6 +335,7 @@ fn versions_come_as_integers_or_as_ascii() {
         text.resize(32, 0);
         text
     });
+    assert_eq!(FirmwareVersion::decode(b"X\tVer..5.4.4\0").version, "Ver..5.4.4");
 }
 
 #[test]

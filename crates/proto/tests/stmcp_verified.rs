@@ -25,7 +25,8 @@ fn write(
     troubles: &[Option<Trouble>],
 ) -> (Result<u8, Unverified<ErrorCode>>, usize) {
     let mut exchanges = 0;
-    let verified = match VerifiedWrite::new(bench.slave.profile(), register, value) {
+    let profile = bench.slave.profile();
+    let verified = match VerifiedWrite::new(profile, register, value) {
         Ok(verified) => verified,
         Err(error) => return (Err(error), 0),
     };
@@ -45,7 +46,7 @@ fn write(
             if trouble.is_some() {
                 return Err(ErrorCode::Timeout);
             }
-            answer.map(|payload| register.decode(&payload))
+            answer.map(|payload| register.decode(profile, &payload))
         },
         |code| *code != ErrorCode::Timeout,
     );

@@ -40,7 +40,7 @@ pub fn run(setup: Setup, faults: &Faults, verified: bool, count: u64) -> Result<
         let motor = rng.u8(1..=MOTORS);
         let register = SETTINGS[rng.usize(..SETTINGS.len())];
         let shape = register.shape().expect("a setting is in the table");
-        let value = shape.ty.fit(rng.i32(..));
+        let value = shape.ty(setup.profile).fit(rng.i32(..));
         let mut expected = bench.drive.banks;
         expected[usize::from(motor - 1)][usize::from(register.0)] = value;
         let done = if verified {
@@ -70,7 +70,7 @@ fn write_verified(
     let write = VerifiedWrite::new::<Error>(setup.profile, register, value);
     let exchange = |request: &Request<'_>| {
         let payload = bench.exchange(&Ask::of(motor, request))?;
-        Ok(register.decode(payload))
+        Ok(register.decode(setup.profile, payload))
     };
     let is_final = |error: &Error| matches!(error, Error::Refused(_));
     let result: Result<u8, Unverified<Error>> =

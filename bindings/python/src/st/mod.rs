@@ -52,7 +52,7 @@ pub(crate) fn st_register(
             register.0,
             text.name,
             scale.unit(register),
-            shape.ty.name(),
+            shape.ty(scale.profile).name(),
             shape.access.name(),
             text.doc,
             shape.feature.name(),

@@ -1,7 +1,7 @@
 //! Reading the reply to a request, in two steps: the first needs no interpreter.
 
 use motorlink_proto::stmcp::{
-    BoardInfo, ControlMode, FirmwareVersion, Flags, RegisterId, RevupPhase, Status,
+    BoardInfo, ControlMode, FirmwareVersion, Flags, Profile, RegisterId, RevupPhase, Status,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -39,13 +39,13 @@ pub(crate) enum Answer {
 
 impl Reply {
     /// Reads the payload of a positive acknowledge; `None` where it answers something else.
-    pub(super) fn understand(&self, payload: &[u8]) -> Option<Answer> {
+    pub(super) fn understand(&self, profile: Profile, payload: &[u8]) -> Option<Answer> {
         Some(match self {
             Reply::Nothing => Answer::Nothing,
-            Reply::Number { register, .. } => Answer::Bits(register.decode(payload)?),
-            Reply::State => Answer::Bits(RegisterId::STATUS.decode(payload)?),
-            Reply::Faults => Answer::Bits(RegisterId::FLAGS.decode(payload)?),
-            Reply::ControlMode => Answer::Bits(RegisterId::CONTROL_MODE.decode(payload)?),
+            Reply::Number { register, .. } => Answer::Bits(register.decode(profile, payload)?),
+            Reply::State => Answer::Bits(RegisterId::STATUS.decode(profile, payload)?),
+            Reply::Faults => Answer::Bits(RegisterId::FLAGS.decode(profile, payload)?),
+            Reply::ControlMode => Answer::Bits(RegisterId::CONTROL_MODE.decode(profile, payload)?),
             Reply::Info => {
                 let info = BoardInfo::decode(payload)?;
                 Answer::Info(info.version, info.name.to_owned())
@@ -131,10 +131,10 @@ impl Reply {
 /// Values of the registers of a segment; `None` where the payload is not theirs.
 pub(super) fn segment(registers: &[RegisterId], mut payload: &[u8]) -> Option<Vec<i32>> {
     let next = |register: &RegisterId| {
-        let size = usize::from(register.shape()?.ty.size());
+        let size = usize::from(register.shape()?.ty(Profile::Spec).size());
         let (bytes, rest) = payload.split_at_checked(size)?;
         payload = rest;
-        register.decode(bytes)
+        register.decode(Profile::Spec, bytes)
     };
     registers.iter().map(next).collect()
 }

@@ -50,7 +50,7 @@ impl StRequest {
 
     /// Reads the payload of a positive acknowledge; `None` where it answers something else.
     pub(crate) fn understand(&self, payload: &[u8]) -> Option<Answer> {
-        self.reply.understand(payload)
+        self.reply.understand(self.scale.profile, payload)
     }
 
     /// Reads a register.

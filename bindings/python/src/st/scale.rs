@@ -96,7 +96,7 @@ impl Scale {
         raw: bool,
     ) -> PyResult<Py<PyAny>> {
         let (digits, value) = (self.raw(register, bits), self.physical(register, bits));
-        let float = register.shape().is_some_and(|shape| shape.ty == Type::F32);
+        let float = register.shape().is_some_and(|shape| shape.ty(self.profile) == Type::F32);
         if raw || !float && self.is_whole(register) {
             return digits.into_py_any(py);
         }

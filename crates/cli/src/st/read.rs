@@ -15,15 +15,17 @@ pub fn registers(output: Output) -> Result<(), Failure> {
             register::Origin::Table3 => "",
             register::Origin::Firmware => " (mcsdk-5.4)",
         };
-        let (ty, unit) = (shape.ty.name(), shape.unit.symbol());
+        let unit = shape.unit.symbol();
+        let [ty, mcsdk] = [Profile::Spec, Profile::Mcsdk54].map(|profile| shape.ty(profile).name());
+        let differs = if ty == mcsdk { String::new() } else { format!(" (mcsdk-5.4: {mcsdk})") };
         let (access, name) = (shape.access.name(), text.name);
         output.result(
             format!(
-                "{:#04x}  {name:<21} {ty:<3}  {access:<2}  {unit:<11} {}{origin}",
+                "{:#04x}  {name:<21} {ty:<3}  {access:<2}  {unit:<11} {}{origin}{differs}",
                 id.0, text.doc
             ),
             json!({
-                "id": id.0, "name": name, "type": ty, "access": access, "unit": unit,
+                "id": id.0, "name": name, "type": ty, "mcsdk_type": mcsdk, "access": access, "unit": unit,
                 "needs": shape.feature.name(), "doc": text.doc,
                 "profile": if origin.is_empty() { Value::Null } else { "mcsdk-5.4".into() },
             }),

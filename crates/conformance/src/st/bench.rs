@@ -284,7 +284,9 @@ impl Bench {
     /// The value of a register.
     pub(super) fn value(&mut self, register: RegisterId) -> Result<i32, Stop> {
         let payload = self.get(register)?;
-        register.decode(&payload).ok_or_else(|| self.failed("ACK with 1, 2 or 4 bytes"))
+        register
+            .decode(self.profile(), &payload)
+            .ok_or_else(|| self.failed("ACK with 1, 2 or 4 bytes"))
     }
 
     /// Writes a register in the size that the profile has for it.

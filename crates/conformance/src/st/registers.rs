@@ -241,7 +241,7 @@ fn endian(bench: &mut Bench) -> Result<(), Stop> {
             .frame(FrameCode::SetReg.number(), &[RegisterId::RAMP_FINAL_SPEED.0, 0x40, 0x06, 0, 0]),
     )?;
     let payload = bench.get(RegisterId::RAMP_FINAL_SPEED)?;
-    let value = RegisterId::RAMP_FINAL_SPEED.decode(&payload);
+    let value = RegisterId::RAMP_FINAL_SPEED.decode(bench.profile(), &payload);
     let shown = values::as_kept(bench.profile(), 0x0640);
     bench.require(value == Some(shown), format!("ACK {shown} rpm, the low byte first"))
 }

@@ -266,7 +266,7 @@ impl Bench {
     }
 
     fn put_back_register(&mut self, register: RegisterId, bytes: &[u8]) -> Result<(), Stop> {
-        let Some(value) = register.decode(bytes) else { return Ok(()) };
+        let Some(value) = register.decode(self.profile(), bytes) else { return Ok(()) };
         self.set(register, value)?;
         let now = self.get(register)?;
         self.require(now == bytes, format!("{register} as it was found: {}", hex(bytes)))

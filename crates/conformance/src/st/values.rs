@@ -5,7 +5,7 @@ use motorlink_proto::stmcp::{Profile, RegisterId};
 
 /// Values that differ from what is there, that are harmless at rest and whose bytes differ.
 pub(super) fn samples(profile: Profile, register: RegisterId, before: &[u8]) -> Vec<i32> {
-    let before = register.decode(before).unwrap_or(0);
+    let before = register.decode(profile, before).unwrap_or(0);
     let Some(shape) = register.shape() else { return Vec::new() };
     let values: &[i32] = match register {
         RegisterId::CONTROL_MODE => &[0, 1, 0],
@@ -13,7 +13,7 @@ pub(super) fn samples(profile: Profile, register: RegisterId, before: &[u8]) -> 
         RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => &[0x25, 0x28],
         // Near what it is: a bus that is under voltage is not to be told anything else.
         RegisterId::PFC_DCBUS_REF => return vec![before + 1, before - 1],
-        _ => match (shape.ty, shape.unit) {
+        _ => match (shape.ty(profile), shape.unit) {
             (_, Unit::Percent) if profile == Profile::Spec => &[50, 91],
             (_, Unit::Percent) => &[500, 915],
             (Type::F32, _) => &[0x3FC0_0000, 0x4049_0FDB],
@@ -25,7 +25,7 @@ pub(super) fn samples(profile: Profile, register: RegisterId, before: &[u8]) -> 
         },
     };
     let kept = |&value: &i32| match shape.unit {
-        Unit::Rpm if shape.ty != Type::F32 => as_kept(profile, value),
+        Unit::Rpm if shape.ty(profile) != Type::F32 => as_kept(profile, value),
         _ => value,
     };
     values.iter().map(kept).collect()

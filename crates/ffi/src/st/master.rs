@@ -137,7 +137,7 @@ pub unsafe extern "C" fn motorlink_st_master_poll(
     answer(|| {
         let place = action.place()?;
         let mut state = master.enter()?;
-        let asked = state.asked;
+        let (asked, profile) = (state.asked, state.profile);
         let mut action = motorlink_st_action {
             until_us: MOTORLINK_NEVER,
             bytes: (&[][..]).into(),
@@ -157,7 +157,7 @@ pub unsafe extern "C" fn motorlink_st_master_poll(
                 match result {
                     Ok(payload) => {
                         action.bytes = payload.into();
-                        match asked.map(|register| register.decode(payload)) {
+                        match asked.map(|register| register.decode(profile, payload)) {
                             Some(Some(value)) => action.value = value,
                             Some(None) => action.result = motorlink_error::WrongReply,
                             None => {}

@@ -2,7 +2,7 @@
 
 use core::ffi::c_char;
 
-use motorlink_proto::stmcp::{BoardInfo, FirmwareVersion, RegisterId, RevupPhase};
+use motorlink_proto::stmcp::{BoardInfo, FirmwareVersion, Profile, RegisterId, RevupPhase};
 
 use crate::error::{answer, motorlink_error};
 use crate::pointer::{In, plain, promised};
@@ -148,7 +148,7 @@ pub unsafe extern "C" fn motorlink_st_decode_segment(
         let values = values.places(count)?;
         let sizes = registers.iter().map(|&id| {
             let shape = RegisterId(id).shape().ok_or(motorlink_error::BadArgument);
-            shape.map(|shape| usize::from(shape.ty.size()))
+            shape.map(|shape| usize::from(shape.ty(Profile::Spec).size()))
         });
         let mut total = 0usize;
         for size in sizes.clone() {
@@ -160,7 +160,7 @@ pub unsafe extern "C" fn motorlink_st_decode_segment(
         let mut rest = payload;
         for ((value, &id), size) in values.iter_mut().zip(registers).zip(sizes) {
             let (bytes, behind) = rest.split_at_checked(size?).unwrap_or((rest, &[]));
-            value.write(RegisterId(id).decode(bytes).unwrap_or_default());
+            value.write(RegisterId(id).decode(Profile::Spec, bytes).unwrap_or_default());
             rest = behind;
         }
         Ok(())

@@ -137,13 +137,17 @@ fn registers() -> impl Iterator<Item = (String, u32, String)> {
             Access::Dac => "D",
             Access::Never => "-",
         };
-        let mut doc = format!("{access:<2} {}", shape.ty.name());
+        let [ty, mcsdk] = [Profile::Spec, Profile::Mcsdk54].map(|profile| shape.ty(profile).name());
+        let mut doc = format!("{access:<2} {ty}");
         if !shape.unit.symbol().is_empty() {
             write!(doc, " {}", shape.unit.symbol()).expect("a string");
         }
         write!(doc, ": {}", text.doc).expect("a string");
         if shape.origin == Origin::Firmware {
             doc.push_str(" (firmware only)");
+        }
+        if mcsdk != ty {
+            write!(doc, " (mcsdk-5.4: {mcsdk})").expect("a string");
         }
         (format!("MOTORLINK_ST_REG_{}", text.name), u32::from(id.0), doc)
     })

@@ -169,8 +169,13 @@ impl Limits {
 
 /// The value that a drive takes from these bytes: it cuts what is too long.
 fn whole(register: RegisterId, value: &[u8]) -> Result<i32, LimitError> {
-    let size = register.shape().map_or(0, |shape| usize::from(shape.ty.size()));
-    value.get(..size).and_then(|value| register.decode(value)).ok_or(LimitError::Part(register))
+    // Limited registers have the same type in both profiles.
+    let profile = Profile::Spec;
+    let size = register.shape().map_or(0, |shape| usize::from(shape.ty(profile).size()));
+    value
+        .get(..size)
+        .and_then(|value| register.decode(profile, value))
+        .ok_or(LimitError::Part(register))
 }
 
 fn within(value: i32, limit: Option<u32>, unit: &'static str) -> Result<(), LimitError> {

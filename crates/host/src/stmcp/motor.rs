@@ -2,8 +2,8 @@
 
 use motorlink_proto::stmcp::register::{Readable, Register, Value, Writable};
 use motorlink_proto::stmcp::{
-    Command, CurrentReference, Flags, Motor, PositionMove, Ramp, RegisterId, Request, RevupPhase,
-    Status, TorqueRamp, VerifiedWrite, register,
+    Command, CurrentReference, Flags, Motor, PositionMove, Profile, Ramp, RegisterId, Request,
+    RevupPhase, Status, TorqueRamp, VerifiedWrite, register,
 };
 
 use super::{Client, Error};
@@ -41,9 +41,11 @@ impl<'a> MotorHandle<'a> {
         self.write_raw(register.id(), value.bits(), size)
     }
 
-    /// Reads any register, known or not. The value's size is the reply's, its sign the table's.
+    /// Reads any register, known or not. The value's size is the reply's, its sign that of the
+    /// register's type in the client's profile.
     pub fn read_raw(&self, register: RegisterId) -> Result<i32, Error> {
-        self.ask(&Request::GetRegister(register), |payload| register.decode(payload))
+        let profile = self.client.profile();
+        self.ask(&Request::GetRegister(register), |payload| register.decode(profile, payload))
     }
 
     /// Writes the low `size` bytes (at most 4) of `value` to any register.
@@ -167,9 +169,9 @@ impl<'a> MotorHandle<'a> {
     ) -> Result<(), Error> {
         self.ask(&Request::DataElement(segment), |mut payload| {
             for (register, value) in registers.iter().zip(values.iter_mut()) {
-                let size = register.shape()?.ty.size();
+                let size = register.shape()?.ty(Profile::Spec).size();
                 let (bytes, rest) = payload.split_at_checked(usize::from(size))?;
-                *value = register.decode(bytes)?;
+                *value = register.decode(Profile::Spec, bytes)?;
                 payload = rest;
             }
             Some(())

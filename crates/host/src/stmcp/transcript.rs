@@ -63,13 +63,15 @@ impl Transcript {
         let code = request.code().name();
         match request {
             Request::GetRegister(register) => format!("{code} {register}{motor}"),
-            Request::SetRegister { register, value } => match register.decode(value) {
-                Some(bits) => {
-                    let reading = Reading { register, bits, profile: self.profile };
-                    format!("{code} {register} = {reading}{motor}")
+            Request::SetRegister { register, value } => {
+                match register.decode(self.profile, value) {
+                    Some(bits) => {
+                        let reading = Reading { register, bits, profile: self.profile };
+                        format!("{code} {register} = {reading}{motor}")
+                    }
+                    None => format!("{code} {register}{motor}"),
                 }
-                None => format!("{code} {register}{motor}"),
-            },
+            }
             Request::Execute(command) => format!("{code} {command}{motor}"),
             Request::Ramp(ramp) => {
                 format!("{code} {} rpm in {} ms{motor}", ramp.speed_rpm, ramp.duration_ms)
@@ -106,7 +108,7 @@ impl Transcript {
         match self.asked {
             Asked::Nothing => None,
             Asked::Register(register) => {
-                let bits = register.decode(payload)?;
+                let bits = register.decode(self.profile, payload)?;
                 Some(Reading { register, bits, profile: self.profile }.to_string())
             }
             Asked::BoardInfo => {

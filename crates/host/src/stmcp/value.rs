@@ -133,7 +133,7 @@ impl Reading {
     }
 
     fn ty(&self) -> Option<Type> {
-        self.register.shape().map(|shape| shape.ty)
+        self.register.shape().map(|shape| shape.ty(self.profile))
     }
 }
 
@@ -162,7 +162,7 @@ pub fn parse_value(
     if let Some(bits) = named_value(register, text) {
         return Ok(bits);
     }
-    let ty = register.shape().map(|shape| shape.ty);
+    let ty = register.shape().map(|shape| shape.ty(profile));
     let not_a_value =
         || ValueError::NotAValue { text: text.to_owned(), register, usable: usable(register) };
     let value = match number(text) {

@@ -14,93 +14,10 @@ use super::Profile;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RegisterId(pub u8);
 
-/// Type of a register's value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[repr(u8)]
-#[allow(missing_docs)]
-pub enum Type {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    /// IEEE 754 single precision; firmware only.
-    F32,
-}
+#[path = "register_type.rs"]
+mod ty;
 
-impl Type {
-    /// The name that Rust and the table use: `i16`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Type::I8 => "i8",
-            Type::U8 => "u8",
-            Type::I16 => "i16",
-            Type::U16 => "u16",
-            Type::I32 => "i32",
-            Type::U32 => "u32",
-            Type::F32 => "f32",
-        }
-    }
-
-    /// Bytes on the wire: 1, 2 or 4.
-    pub const fn size(self) -> u8 {
-        match self {
-            Type::I8 | Type::U8 => 1,
-            Type::I16 | Type::U16 => 2,
-            Type::I32 | Type::U32 | Type::F32 => 4,
-        }
-    }
-
-    /// Keeps the low bytes that the type has, and its sign.
-    pub const fn fit(self, bits: i32) -> i32 {
-        match self {
-            Type::I8 => bits as i8 as i32,
-            Type::U8 => bits as u8 as i32,
-            Type::I16 => bits as i16 as i32,
-            Type::U16 => bits as u16 as i32,
-            Type::I32 | Type::U32 | Type::F32 => bits,
-        }
-    }
-
-    /// Whether negative values exist.
-    pub const fn signed(self) -> bool {
-        !matches!(self, Type::U8 | Type::U16 | Type::U32)
-    }
-}
-
-/// A Rust type that a register's value may have. The 32 bits that all calls carry are the value's
-/// two's complement, or the IEEE 754 bits of an `f32`.
-pub trait Value: Copy {
-    /// The table's type.
-    const TYPE: Type;
-    /// From the 32 bits that the calls carry.
-    fn from_bits(bits: i32) -> Self;
-    /// Into the 32 bits that the calls carry.
-    fn bits(self) -> i32;
-}
-
-macro_rules! integer_values {
-    ($($rust:ident $ty:ident),+) => { $(
-        impl Value for $rust {
-            const TYPE: Type = Type::$ty;
-            fn from_bits(bits: i32) -> Self { bits as $rust }
-            fn bits(self) -> i32 { self as i32 }
-        }
-    )+ };
-}
-
-integer_values!(i8 I8, u8 U8, i16 I16, u16 U16, i32 I32, u32 U32);
-
-impl Value for f32 {
-    const TYPE: Type = Type::F32;
-    fn from_bits(bits: i32) -> Self {
-        f32::from_bits(bits as u32)
-    }
-    fn bits(self) -> i32 {
-        self.to_bits() as i32
-    }
-}
+pub use ty::{Type, Value};
 
 macro_rules! units {
     ($( $name:ident $symbol:literal; )+) => {
@@ -249,8 +166,9 @@ pub enum Origin {
 /// What a slave has to know of a register; [`Text`] has the rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
-    /// Type of the value.
-    pub ty: Type,
+    /// Type of table 3, or of firmware where only that has the register. Registers that can be
+    /// written have it in both profiles.
+    pub(super) ty: Type,
     /// Unit of the value.
     pub unit: Unit,
     /// What table 3 allows.
@@ -259,8 +177,8 @@ pub struct Shape {
     pub feature: Feature,
     /// Whether table 3 has the row.
     pub origin: Origin,
-    /// Bytes of shipped firmware's replies to GET_REG, and in the low half those that it takes of a
-    /// SET_REG.
+    /// Bytes of shipped firmware's replies to GET_REG, in the low half those that it takes of a
+    /// SET_REG, and [`OTHER_SIGN`].
     mcsdk: u8,
 }
 
@@ -268,6 +186,8 @@ pub struct Shape {
 pub(super) const REFUSED: u8 = 8 * REFUSED_SIZE;
 /// The same in bytes; no value has so many.
 const REFUSED_SIZE: u8 = 0xF;
+/// The bit of [`Shape`]'s byte for shipped firmware which says that its type has another sign.
+const OTHER_SIGN: u8 = 0x80;
 
 /// What a slave does with a SET_REG for a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -283,15 +203,35 @@ pub enum Writing {
 impl Shape {
     pub(super) const fn new(
         (ty, unit, access, feature, origin): (Type, Unit, Access, Feature, Origin),
+        mcsdk_ty: Type,
         mcsdk: Option<(u8, u8)>,
     ) -> Self {
-        let bits = ty.size() * 8;
-        let (mcsdk_get, mcsdk_set) = match mcsdk {
+        let bits = mcsdk_ty.size() * 8;
+        let (get, set) = match mcsdk {
             Some(bits) => bits,
             None => (if access.reads() { bits } else { 0 }, if access.writes() { bits } else { 0 }),
         };
-        let mcsdk = ((mcsdk_get / 8) << 4) | (mcsdk_set / 8);
-        Shape { ty, unit, access, feature, origin, mcsdk }
+        assert!(ty as u8 == mcsdk_ty as u8 || set == 0, "what can be written has one type");
+        let sign = if ty.signed() == mcsdk_ty.signed() { 0 } else { OTHER_SIGN };
+        let mcsdk = sign | (get / 8) << 4 | set / 8;
+        let shape = Shape { ty, unit, access, feature, origin, mcsdk };
+        assert!(shape.ty(Profile::Mcsdk54) as u8 == mcsdk_ty as u8, "firmware has another type");
+        shape
+    }
+
+    /// Type of the value: that of table 3 in profile `spec`, that of shipped firmware in `mcsdk-5.4`.
+    pub const fn ty(&self, profile: Profile) -> Type {
+        match profile {
+            Profile::Spec => self.ty,
+            Profile::Mcsdk54 if matches!(self.ty, Type::F32) => Type::F32,
+            Profile::Mcsdk54 => {
+                let size = match self.mcsdk_reads() {
+                    0 => self.ty.size(),
+                    size => size,
+                };
+                Type::integer(size, self.ty.signed() != (self.mcsdk & OTHER_SIGN != 0))
+            }
+        }
     }
 
     /// Bytes of the reply to a GET_REG from a drive with `features`; `None` where it refuses.
@@ -300,7 +240,7 @@ impl Shape {
             Profile::Spec if matches!(self.origin, Origin::Firmware) => 0,
             Profile::Spec if self.access.reads() => self.ty.size(),
             Profile::Spec => 0,
-            Profile::Mcsdk54 => self.mcsdk >> 4,
+            Profile::Mcsdk54 => self.mcsdk_reads(),
         };
         if size == 0 || !features.has(self.feature) { None } else { Some(size) }
     }
@@ -325,6 +265,11 @@ impl Shape {
                 _ => Writing::Refused,
             },
         }
+    }
+
+    /// Bytes of shipped firmware's reply to a GET_REG; 0 where it refuses.
+    const fn mcsdk_reads(&self) -> u8 {
+        (self.mcsdk & !OTHER_SIGN) >> 4
     }
 
     /// Whether a drive with `features` can show the register on a DAC channel.
@@ -373,7 +318,7 @@ impl RegisterId {
         let Some(shape) = self.shape() else { return 4 };
         match shape.writing(profile, Features::NONE.with(shape.feature)) {
             Writing::Takes(size) => size,
-            Writing::ReadOnly | Writing::Refused => shape.ty.size(),
+            Writing::ReadOnly | Writing::Refused => shape.ty(profile).size(),
         }
     }
 
@@ -382,10 +327,11 @@ impl RegisterId {
         (0..SHAPES.len() as u8).map(RegisterId)
     }
 
-    /// The value in a reply. Its size is the reply's (SPEC-NOTES S17), its sign that of the table;
-    /// an unknown register is taken as unsigned. `None` unless there are 1, 2 or 4 bytes.
-    pub fn decode(self, payload: &[u8]) -> Option<i32> {
-        let signed = self.shape().is_some_and(|shape| shape.ty.signed());
+    /// The value in a reply. Its size is the reply's (SPEC-NOTES S17), its sign that of the type in
+    /// the drive's profile; an unknown register is taken as unsigned. `None` unless there are 1, 2 or
+    /// 4 bytes.
+    pub fn decode(self, profile: Profile, payload: &[u8]) -> Option<i32> {
+        let signed = self.shape().is_some_and(|shape| shape.ty(profile).signed());
         match *payload {
             [a] if signed => Some(i32::from(a as i8)),
             [a] => Some(i32::from(a)),
@@ -463,11 +409,11 @@ impl Writable for WriteOnly {}
 /// does not compile.
 macro_rules! registers {
     ($(
-        $id:literal $name:ident: $ty:ident, $unit:ident, $access:ident, $feature:ident,
+        $id:literal $name:ident: $ty:ident $(| $mcsdk:ident)?, $unit:ident, $access:ident, $feature:ident,
         $origin:ident $(mcsdk($get:expr, $set:expr))?, $doc:literal;
     )+) => {
         $( #[doc = concat!($doc, " (", stringify!($id), ")")]
-           pub const $name: Register<$ty, $access> = Register::new($id); )+
+           pub const $name: Register<rust_type!($ty $($mcsdk)?), $access> = Register::new($id); )+
 
         impl RegisterId {
             $( #[doc = concat!($doc, " (", stringify!($id), ")")]
@@ -479,6 +425,7 @@ macro_rules! registers {
             $( Shape::new(
                 (<$ty as Value>::TYPE, Unit::$unit, Access::$access, Feature::$feature,
                  Origin::$origin),
+                <mcsdk_type!($ty $($mcsdk)?) as Value>::TYPE,
                 optional_pair!($($get, $set)?),
             ), )+
         ];
@@ -494,6 +441,28 @@ macro_rules! registers {
                 index += 1;
             }
         };
+    };
+}
+
+/// The Rust type that holds a register's value in either profile.
+macro_rules! rust_type {
+    ($ty:ident) => {
+        $ty
+    };
+    (u16 i16) => {
+        i32
+    };
+    (u32 u16) => {
+        u32
+    };
+}
+
+macro_rules! mcsdk_type {
+    ($ty:ident) => {
+        $ty
+    };
+    ($ty:ident $mcsdk:ident) => {
+        $mcsdk
     };
 }
 

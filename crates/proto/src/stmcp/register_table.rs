@@ -1,8 +1,8 @@
 //! Table 3 row by row, and behind it the registers that only shipped firmware has.
 //!
 //! A row: id, name, type, unit, access, feature that the drive must be built with, where the row
-//! comes from, and, where `mcsdk-5.4` firmware differs from what the access says, the bits of its
-//! GET_REG reply and of its SET_REG value (0: not handled).
+//! comes from. `mcsdk-5.4` firmware has the type behind `|` where it differs, and where it differs from
+//! what the access says, the bits of its GET_REG reply and of its SET_REG value (0: not handled).
 
 use super::*;
 
@@ -33,8 +33,8 @@ registers! {
     0x17 FLUXWK_KI: i16, S16APerS16VSquared, ReadWrite, FluxWeakening, Table3, "Flux weakening regulator Ki";
     0x18 FLUXWK_BUS: u16, Percent, ReadWrite, FluxWeakening, Table3, "Share of the bus voltage that flux weakening may use";
     0x19 BUS_VOLTAGE: u16, Volt, ReadOnly, Core, Table3, "Bus voltage";
-    0x1A HEATS_TEMP: i16, Celsius, ReadOnly, Core, Table3, "Heatsink temperature";
-    0x1B MOTOR_POWER: i16, Watt, ReadOnly, Core, Table3, "Electrical power into the motor";
+    0x1A HEATS_TEMP: u16 | i16, Celsius, ReadOnly, Core, Table3, "Heatsink temperature";
+    0x1B MOTOR_POWER: u16 | i16, Watt, ReadOnly, Core, Table3, "Electrical power into the motor";
     0x1C DAC_OUT1: u8, None, ReadWrite, Dac, Table3, "Register shown on DAC channel 1";
     0x1D DAC_OUT2: u8, None, ReadWrite, Dac, Table3, "Register shown on DAC channel 2";
     0x1E SPEED_MEAS: i32, Rpm, ReadOnly, Core, Table3, "Mechanical speed, averaged";
@@ -82,8 +82,8 @@ registers! {
     0x48 FF_2: i32, None, ReadWrite, FeedForward, Table3, "Feed-forward constant C2";
     0x49 FF_VQ: i16, S16V, ReadOnly, FeedForward, Table3, "Feed-forward part of Vq";
     0x4A FF_VD: i16, S16V, ReadOnly, FeedForward, Table3, "Feed-forward part of Vd";
-    0x4B FF_VQ_PIOUT: i16, S16VPerS16A, ReadOnly, FeedForward, Table3, "Regulator part of Vq";
-    0x4C FF_VD_PIOUT: i16, S16VPerS16A, ReadOnly, FeedForward, Table3, "Regulator part of Vd";
+    0x4B FF_VQ_PIOUT: i16, S16V, ReadOnly, FeedForward, Table3, "Regulator part of Vq";
+    0x4C FF_VD_PIOUT: i16, S16V, ReadOnly, FeedForward, Table3, "Regulator part of Vd";
     0x4D PFC_STATUS: i8, None, ReadOnly, Pfc, Table3, "PFC state";
     0x4E PFC_FAULTS: u32, None, ReadOnly, Pfc, Table3, "PFC faults";
     0x4F PFC_DCBUS_REF: i16, Volt, ReadWrite, Pfc, Table3, "PFC bus voltage reference";
@@ -121,8 +121,8 @@ registers! {
     0x6F SPEED_KI_DIV: i16, None, ReadOnly, Core, Table3, "Speed regulator Ki, divisor";
     0x70 UID: u32, None, ReadOnly, Core, Firmware, "Unique identification";
     0x71 HWTYPE: i16, None, Never, Core, Firmware, "Hardware type";
-    0x72 CTRBID: u32, None, ReadOnly, Core, Table3 mcsdk(16, 0), "Control board identification";
-    0x73 PWBDID: u32, None, ReadOnly, Core, Table3 mcsdk(16, 0), "Power board identification";
+    0x72 CTRBID: u32 | u16, None, ReadOnly, Core, Table3, "Control board identification";
+    0x73 PWBDID: u32 | u16, None, ReadOnly, Core, Table3, "Power board identification";
     0x74 SC_PP: u8, None, ReadWrite, Profiler, Firmware, "Profiler: pole pairs";
     0x75 SC_CURRENT: f32, Ampere, ReadWrite, Profiler, Firmware, "Profiler: current";
     0x76 SC_SPDBANDWIDTH: f32, None, ReadWrite, Profiler, Firmware, "Profiler: speed bandwidth";

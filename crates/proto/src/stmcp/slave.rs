@@ -321,9 +321,11 @@ fn read(
         return i32::from(motor.number() - 1);
     }
     let bits = drive.read(motor, register);
-    match shape.unit {
-        Unit::Rpm if shape.ty != Type::F32 => speed(profile, bits),
-        Unit::Percent if profile == Profile::Spec => bits / 10,
+    match (profile, shape.unit) {
+        (Profile::Spec, Unit::Percent) => bits / 10,
+        // Table 3 has no sign for some values that can be negative (SPEC-NOTES S23).
+        (Profile::Spec, _) if shape.ty == Type::U16 => bits.max(0),
+        (Profile::Mcsdk54, Unit::Rpm) if shape.ty != Type::F32 => speed(profile, bits),
         _ => bits,
     }
 }

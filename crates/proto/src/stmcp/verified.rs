@@ -56,9 +56,9 @@ impl VerifiedWrite {
         if acts(register) {
             return Err(Unverified::Acts);
         }
-        let kept = shape.ty.fit(value);
+        let kept = shape.ty(profile).fit(value);
         let expected = match shape.unit {
-            Unit::Rpm if shape.ty != Type::F32 => speed(profile, kept),
+            Unit::Rpm if shape.ty(profile) != Type::F32 => speed(profile, kept),
             _ => kept,
         };
         Ok(VerifiedWrite { register, bytes: value.to_le_bytes(), size, expected })

@@ -237,7 +237,7 @@ impl Model {
         let row = self.row(id).ok_or(GET_WRITE_ONLY)?;
         let size = if self.spec() {
             let readable = matches!(row.access, Access::ReadOnly | Access::ReadWrite);
-            readable.then_some(row.ty.size())
+            readable.then_some(row.ty(Profile::Spec).size())
         } else {
             row.read_size(Profile::Mcsdk54, everything())
         };
@@ -254,7 +254,7 @@ impl Model {
         };
         let value = match row.unit {
             Unit::Percent if self.spec() => value / 10, // S12: tenths in the drive
-            Unit::Rpm if row.ty != Type::F32 => self.speed(value),
+            Unit::Rpm if row.ty(self.profile) != Type::F32 => self.speed(value),
             _ => value,
         };
         value.to_le_bytes()[..usize::from(size)].to_vec()
@@ -275,7 +275,7 @@ impl Model {
                 return Err(SET_READ_ONLY);
             }
             // S19: too much is cut, what is missing stays.
-            let mut bytes = self.on_the_wire(id, row.ty.size());
+            let mut bytes = self.on_the_wire(id, row.ty(Profile::Spec).size());
             for (slot, byte) in bytes.iter_mut().zip(value) {
                 *slot = *byte;
             }
@@ -290,7 +290,7 @@ impl Model {
             }
         };
         // Firmware takes four bytes for some registers of two.
-        let value = match (row.ty, &bytes[..]) {
+        let value = match (row.ty(self.profile), &bytes[..]) {
             (Type::I8, &[a, ..]) => i32::from(a as i8),
             (Type::U8, &[a, ..]) => i32::from(a),
             (Type::I16, &[a, b, ..]) => i32::from(i16::from_le_bytes([a, b])),
@@ -311,7 +311,7 @@ impl Model {
         }
         let value = match row.unit {
             Unit::Percent if self.spec() => value * 10,
-            Unit::Rpm if row.ty != Type::F32 => self.speed(value),
+            Unit::Rpm if row.ty(self.profile) != Type::F32 => self.speed(value),
             _ => value,
         };
         self.plant.set(self.current, id, value).map_err(u8::from)?;
@@ -413,7 +413,7 @@ impl Model {
         let mut reply = Vec::new();
         for &id in &self.segments[usize::from(segment)] {
             let row = self.row(id).ok_or(GET_WRITE_ONLY)?;
-            reply.extend(self.on_the_wire(id, row.ty.size()));
+            reply.extend(self.on_the_wire(id, row.ty(Profile::Spec).size()));
         }
         Ok(reply)
     }

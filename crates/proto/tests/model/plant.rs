@@ -28,7 +28,8 @@ impl Plant {
     /// What was written, or else bits that differ from register to register.
     pub fn value(&self, motor: u8, id: u8) -> i32 {
         let pattern = u32::from(id).wrapping_mul(0x9E37_79B9) ^ u32::from(motor) << 11;
-        let ty = RegisterId(id).shape().map_or(register::Type::U32, |shape| shape.ty);
+        let ty =
+            RegisterId(id).shape().map_or(register::Type::U32, |shape| shape.ty(Profile::Spec));
         self.registers.get(&(motor, id)).copied().unwrap_or(ty.fit(pattern as i32))
     }
 

@@ -60,7 +60,7 @@ impl Line {
 
     pub fn get_id(&mut self, motor: u8, id: RegisterId) -> Result<i32, Nack> {
         let payload = self.ask(motor, Request::GetRegister(id))?;
-        Ok(id.decode(&payload).expect("1, 2 or 4 bytes"))
+        Ok(id.decode(self.station.profile(), &payload).expect("1, 2 or 4 bytes"))
     }
 
     pub fn set_id(&mut self, motor: u8, register: RegisterId, value: &[u8]) -> Result<(), Nack> {

@@ -60,7 +60,7 @@ fn every_register_that_can_be_written_keeps_its_value() {
                 RegisterId::TARGET_MOTOR | RegisterId::CONTROL_MODE => 0,
                 RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => 0x27,
                 RegisterId::RAMP_FINAL_SPEED => -1200,
-                _ if shape.ty == Type::U16 => 90,
+                _ if shape.ty(profile) == Type::U16 => 90,
                 _ => -90,
             };
             line.set_id(1, id, &value.to_le_bytes()[..size.into()]).unwrap();
@@ -68,6 +68,21 @@ fn every_register_that_can_be_written_keeps_its_value() {
                 assert_eq!(line.get_id(1, id), Ok(value), "{id} in {}", profile.name());
             }
         }
+    }
+}
+
+#[test]
+fn the_stages_of_the_revup_are_counted_whatever_it_does() {
+    let mut line = Line::sensorless();
+    let stages = line.get(RUC_STAGE_NBR);
+    for phase in 0..stages {
+        line.ask(0, Request::RevupData(phase)).unwrap();
+    }
+    line.ask(0, Request::RevupData(stages)).unwrap_err();
+    line.execute(Command::StartMotor);
+    for _ in 0..20 {
+        line.wait(100);
+        assert_eq!(line.get(RUC_STAGE_NBR), stages);
     }
 }
 
@@ -88,9 +103,9 @@ fn sample<const N: usize>(line: &mut Line, registers: [RegisterId; N]) -> [i32; 
     let payload = line.ask(0, Request::DataElement(0)).unwrap();
     let mut rest = &payload[..];
     registers.map(|id| {
-        let (value, tail) = rest.split_at(id.shape().unwrap().ty.size().into());
+        let (value, tail) = rest.split_at(id.shape().unwrap().ty(Profile::Spec).size().into());
         rest = tail;
-        id.decode(value).unwrap()
+        id.decode(Profile::Spec, value).unwrap()
     })
 }
 

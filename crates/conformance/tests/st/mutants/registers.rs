@@ -1,6 +1,6 @@
 //! Deviations of registers: SET_REG, GET_REG, table 3.
 
-use motorlink_proto::stmcp::{ErrorCode, RegisterId};
+use motorlink_proto::stmcp::{ErrorCode, Profile, RegisterId};
 
 use super::{MCSDK, Mutant, ack, answers, caught, gives, mutant, nack, refuses, takes};
 use crate::peer::frame;
@@ -10,7 +10,7 @@ const GET: u8 = 0x02;
 
 /// Bytes that a register of table 3 has, for a value that is written.
 fn size(id: u8) -> usize {
-    RegisterId(id).shape().map_or(4, |shape| usize::from(shape.ty.size()))
+    RegisterId(id).shape().map_or(4, |shape| usize::from(shape.ty(Profile::Spec).size()))
 }
 
 const MUTANTS: [Mutant; 31] = [
