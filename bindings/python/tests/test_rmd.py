@@ -86,6 +86,9 @@ def test_gains_and_acceleration_are_kept(rmd_bus: rmd.Bus) -> None:
     assert motor.gains == gains
     motor.acceleration = 1234
     assert motor.acceleration == 1234
+    with pytest.raises(motorlink.BadValue, match="give 0 for none"):
+        motor.acceleration = -1
+    assert motor.acceleration == 1234
     for nonsense in (gains._replace(speed_kp=256), gains._replace(speed_kp=-1)):
         with pytest.raises(motorlink.BadValue, match="0 to 255"):
             motor.gains = nonsense

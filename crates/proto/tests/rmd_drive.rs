@@ -50,6 +50,7 @@ fn gains_in_ram_are_lost_at_power_off_and_those_in_rom_stay() {
 
     node.ask(WriteGainsToRom(OTHER));
     assert_eq!(node.ask(ReadGains), OTHER);
+    assert_eq!(node.motor.configured.gains, OTHER, "at once");
     assert_eq!(node.motor.saved.last(), Some(node.drive.rom()));
     node.power_cycle();
     assert_eq!(node.ask(ReadGains), OTHER);

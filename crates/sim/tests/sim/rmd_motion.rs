@@ -84,6 +84,61 @@ fn a_speed_is_reached_without_error_and_held_against_a_load() {
 }
 
 #[test]
+fn four_torques_are_not_limited_by_the_greatest_torque_current() {
+    let mut bench = Bench::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
+    bench.world().plant_mut().lock(true);
+    let torque = TorqueCommand::from_amps(10.0);
+    let torques = Torque4([torque, TorqueCommand(0), TorqueCommand(0), TorqueCommand(0)]);
+    bench.send(&CanFrame::new(TORQUE4_ID.into(), torques.encode()));
+    let current = bench.watch(20).current;
+    assert!((9.8..10.5).contains(&current), "{current} A");
+}
+
+#[test]
+fn positive_torque_speed_and_angle_are_clockwise() {
+    for (amps, dps, spin) in [(0.5, 360.0, Spin::Clockwise), (-0.5, -360.0, Spin::Counterclockwise)]
+    {
+        let mut bench = Bench::one();
+        let commands = [
+            Torque { torque: TorqueCommand::from_amps(amps) }.encode(),
+            speed(dps).encode(),
+            position(bench.angle() + dps).encode(),
+            CirclePosition { direction: spin, angle: CircleAngle(18_000) }.encode(),
+        ];
+        for command in commands {
+            bench.power_cycle();
+            let before = bench.angle();
+            bench.raw(command);
+            bench.wait(50);
+            let status = bench.ask(ReadStatus2);
+            let turned = bench.angle() - before;
+            for value in [turned, status.speed.dps()] {
+                assert!(value * dps > 0.0, "{value} after {command:02x?}");
+            }
+        }
+        bench.power_cycle();
+        bench.world().plant_mut().lock(true);
+        bench.ask(Torque { torque: TorqueCommand::from_amps(amps) });
+        bench.wait(50);
+        assert!(bench.ask(ReadStatus2).iq.amps() * amps > 0.0);
+    }
+}
+
+#[test]
+fn an_acceleration_of_0_or_less_is_no_limit() {
+    let fastest = |digits| {
+        let mut bench = Bench::one();
+        bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(digits) }));
+        bench.ask(speed(1000.0));
+        bench.watch(100).acceleration
+    };
+    let limited = fastest(1000);
+    let free = fastest(0);
+    assert!(free > 5.0 * limited, "{free} °/s², {limited} °/s² with a limit");
+    assert_eq!(free, fastest(-1000));
+}
+
+#[test]
 fn the_acceleration_limit_makes_a_trapezoid() {
     for config in [RmdConfig::default(), RmdConfig::x8()] {
         let mut bench = Bench::new([config]);

@@ -138,6 +138,22 @@ fn each_reference_can_be_written_alone() {
 }
 
 #[test]
+fn positive_current_accelerates_to_positive_speed() {
+    for sign in [1, -1] {
+        let mut line = Line::servo();
+        line.run();
+        line.wait(500);
+        currents(&mut line, 0, 0);
+        line.wait(20);
+        let before = line.truth().speed_rpm;
+        currents(&mut line, sign * 2000, 0);
+        line.wait(20);
+        let gained = line.truth().speed_rpm - before;
+        assert!(gained * f32::from(sign) > 10.0, "{gained} rpm");
+    }
+}
+
+#[test]
 fn the_id_reference_of_speed_mode_acts_in_speed_mode() {
     let mut line = Line::sensorless();
     line.run();
