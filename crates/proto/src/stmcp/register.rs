@@ -213,7 +213,7 @@ impl Shape {
         };
         assert!(ty as u8 == mcsdk_ty as u8 || set == 0, "what can be written has one type");
         let sign = if ty.signed() == mcsdk_ty.signed() { 0 } else { OTHER_SIGN };
-        let mcsdk = sign | (get / 8) << 4 | set / 8;
+        let mcsdk = sign | ((get / 8) << 4) | (set / 8);
         let shape = Shape { ty, unit, access, feature, origin, mcsdk };
         assert!(shape.ty(Profile::Mcsdk54) as u8 == mcsdk_ty as u8, "firmware has another type");
         shape

@@ -89,7 +89,7 @@ fn four_torques_are_not_limited_by_the_greatest_torque_current() {
     bench.world().plant_mut().lock(true);
     let torque = TorqueCommand::from_amps(10.0);
     let torques = Torque4([torque, TorqueCommand(0), TorqueCommand(0), TorqueCommand(0)]);
-    bench.send(&CanFrame::new(TORQUE4_ID.into(), torques.encode()));
+    bench.send(&CanFrame::new(TORQUE4_ID, torques.encode()));
     let current = bench.watch(20).current;
     assert!((9.8..10.5).contains(&current), "{current} A");
 }
