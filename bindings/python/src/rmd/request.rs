@@ -272,7 +272,7 @@ impl RmdRequest {
     fn write_acceleration(py: Python<'_>, dps2: f64) -> PyResult<Self> {
         let unit = DpsPerSecond::SYMBOL;
         if dps2 < 0.0 {
-            let why = format!("{dps2} {unit} is below 0, which is no limit to some motors");
+            let why = format!("{dps2} {unit} is below 0, which some motors take as no limit");
             return Err(bad_value(py, format_args!("{why}: give 0 for none; nothing was sent")));
         }
         let acceleration =
