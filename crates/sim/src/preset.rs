@@ -234,7 +234,7 @@ pub fn rmd_x8() -> PlantConfig {
             cogging_periods: 126,
             iron_hysteresis: 0.01,
             iron_eddy: 5e-5,
-            gear: GearConfig { ratio: 9.0, efficiency: 0.92 },
+            gear: GearConfig { ratio: 9.0, efficiency: 0.92, back_efficiency: None },
         },
         heat: HeatConfig {
             winding_capacity: 60.0,

@@ -6,11 +6,11 @@ use crate::plant::GearConfig;
 /// Acceleration of gravity, m/s².
 const GRAVITY: f32 = 9.806_65;
 
-/// What hangs on the output shaft; all of it acts at once. Torques are positive towards growing
-/// angles.
+/// What hangs on the output shaft; all of it acts at once. It opposes motion towards growing angles
+/// with
 ///
 /// ```text
-/// T = torque − viscous ω − fan |ω| ω − stiffness (θ − centre) − m g l sin θ − stops;   brake against the motion
+/// T = torque + viscous ω + fan |ω| ω + stiffness (θ − centre) + m g l sin θ + stops + brake sign ω
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(
@@ -21,7 +21,7 @@ const GRAVITY: f32 = 9.806_65;
 pub struct LoadConfig {
     /// Torque against the motion whatever the speed, Nm. It holds a shaft at rest.
     pub brake: f32,
-    /// Torque that turns the shaft, Nm; negative backwards.
+    /// Torque against growing angles, Nm; a negative one turns the shaft forwards.
     pub torque: f32,
     /// Torque against the motion per speed, Nm s/rad.
     pub viscous: f32,
@@ -89,8 +89,6 @@ pub(super) struct Load {
     config: LoadConfig,
     /// One over the gear's ratio.
     step_down: f32,
-    /// Torque that a gear loses per torque that it transmits.
-    gear_loss: f32,
     /// Whether a torque depends on the position.
     positional: bool,
 }
@@ -119,12 +117,7 @@ impl Load {
     pub(super) fn new(config: LoadConfig, gear: GearConfig) -> Self {
         let positional =
             config.spring.stiffness != 0.0 || config.pendulum.mass != 0.0 || config.stops.is_some();
-        Load {
-            config,
-            step_down: 1.0 / gear.ratio,
-            gear_loss: 1.0 / gear.efficiency - 1.0,
-            positional,
-        }
+        Load { config, step_down: 1.0 / gear.ratio, positional }
     }
 
     pub(super) const fn config(&self) -> &LoadConfig {
@@ -168,11 +161,9 @@ impl Load {
         }
     }
 
-    /// Torques of the brake and of the gear's loss against the motion, at the rotor, when the load
-    /// pulls with `torque` at the output.
-    pub(super) fn dry(&self, torque: f32) -> (f32, f32) {
-        let brake = self.config.brake * self.step_down;
-        (brake, self.gear_loss * (brake + (torque * self.step_down).abs()))
+    /// Torque of the brake at the rotor, Nm.
+    pub(super) fn brake(&self) -> f32 {
+        self.config.brake * self.step_down
     }
 
     /// Energy that springs and weights hold, J.

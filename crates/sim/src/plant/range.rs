@@ -66,7 +66,7 @@ impl PlantConfig {
             ("plant.machine.iron_hysteresis", machine.iron_hysteresis, 0.0, 1e3),
             ("plant.machine.iron_eddy", machine.iron_eddy, 0.0, 1e3),
             ("plant.machine.gear.ratio", machine.gear.ratio, 0.01, 1e4),
-            ("plant.machine.gear.efficiency", machine.gear.efficiency, 0.5, 1.0),
+            ("plant.machine.gear.efficiency", machine.gear.efficiency, 0.1, 1.0),
             ("plant.load.brake", load.brake, 0.0, 1e3),
             ("plant.load.torque", load.torque, -1e3, 1e3),
             ("plant.load.viscous", load.viscous, 0.0, 1e3),
@@ -99,6 +99,9 @@ impl PlantConfig {
         }
         for value in sensing.gain_error {
             check([("plant.sensing.gain_error", value, -0.5, 0.5)])?;
+        }
+        if let Some(value) = machine.gear.back_efficiency {
+            check([("plant.machine.gear.back_efficiency", value, 0.0, 1.0)])?;
         }
         if let Some(chopper) = supply.chopper {
             check([

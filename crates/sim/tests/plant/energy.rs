@@ -19,7 +19,7 @@ fn everything() -> PlantConfig {
             cogging_torque: 3e-3,
             iron_hysteresis: 1e-3,
             iron_eddy: 1e-5,
-            gear: GearConfig { ratio: 3.0, efficiency: 0.85 },
+            gear: GearConfig { ratio: 3.0, efficiency: 0.85, back_efficiency: None },
             ..plain().machine
         },
         load: LoadConfig {

@@ -2,6 +2,7 @@
 
 mod electrical;
 mod energy;
+mod gear;
 mod mechanics;
 mod presets;
 mod surroundings;

@@ -158,8 +158,10 @@ fn cogging_holds_a_rotor_in_its_nearest_place() {
 
 #[test]
 fn a_gear_turns_torque_up_and_loses_its_share_both_ways() {
-    let machine =
-        MachineConfig { gear: GearConfig { ratio: 6.0, efficiency: 0.8 }, ..plain().machine };
+    let machine = MachineConfig {
+        gear: GearConfig { ratio: 6.0, efficiency: 0.8, back_efficiency: None },
+        ..plain().machine
+    };
     let output = |torque: f32, speed_up: f32| {
         let load = LoadConfig { torque: speed_up, ..LoadConfig::default() };
         let mut plant = Plant::new(PlantConfig { machine, load, ..plain() });

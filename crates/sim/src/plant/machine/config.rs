@@ -51,13 +51,23 @@ pub struct MachineConfig {
 pub struct GearConfig {
     /// Turns of the rotor for a turn of the output; 1 without a gear.
     pub ratio: f32,
-    /// Share of the power that gets through, 0 to 1.
+    /// Share of the power that gets through while the motor drives the load.
     pub efficiency: f32,
+    /// Share that gets through while the load drives the motor; 0 locks itself. Without it
+    /// 2 − 1/`efficiency`, and no less than 0: a gear that loses the same torque both ways.
+    pub back_efficiency: Option<f32>,
 }
 
 impl Default for GearConfig {
     fn default() -> Self {
-        GearConfig { ratio: 1.0, efficiency: 1.0 }
+        GearConfig { ratio: 1.0, efficiency: 1.0, back_efficiency: None }
+    }
+}
+
+impl GearConfig {
+    /// Share of the power that gets through while the load drives the motor.
+    pub(super) fn back_efficiency(&self) -> f32 {
+        self.back_efficiency.unwrap_or((2.0 - 1.0 / self.efficiency).max(0.0))
     }
 }
 

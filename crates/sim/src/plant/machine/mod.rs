@@ -27,9 +27,16 @@
 //! Shaft, at the rotor, with gear ratio N and n periods of cogging a turn:
 //!
 //! ```text
-//! J dω/dt = T − Tcog sin(n θ) + T_load/N − (B + Beddy) ω − dry(ω) sign ω
-//! dry     = Tc + (Ts − Tc) / (1 + (ω/ωs)²) + hysteresis + (brake + (1/η − 1) |T_load|) / N
+//! J dω/dt   = T − Tcog sin(n θ) − (B + Beddy) ω − dry(ω) sign ω − k τ
+//! dry       = Tc + (Ts − Tc) / (1 + (ω/ωs)²) + hysteresis
+//! τ         = (J_load dω/dt / N − T_load + brake sign ω) / N
+//! k         = 1/η where τ ω > 0,   η' where τ ω < 0
 //! ```
+//!
+//! τ is what the gear has to transmit, the acceleration of the load included. Power that goes
+//! forwards arrives with the efficiency η, power that the load drives back with η' (see for example
+//! G. Niemann and H. Winter, *Maschinenelemente*, volume 2). A gear that loses the same torque both
+//! ways has η' = 2 − 1/η.
 //!
 //! Viscous friction is implicit, also the load's; dry friction takes away speed but never more than there is, so a
 //! rotor stays where what pulls it is less (stiction with the Stribeck effect, see B. Armstrong,
@@ -39,6 +46,7 @@
 //! currents are in proportion to it.
 
 mod config;
+mod shaft;
 mod step;
 
 pub use config::{GearConfig, MachineConfig};
@@ -47,6 +55,7 @@ use super::load::{Load, LoadConfig};
 use crate::angle::sin_cos;
 use crate::control::within;
 use crate::vector::Vector;
+use shaft::Shaft;
 use step::Decay;
 
 /// Growth of copper's resistance from 25 °C, 1/K: it would be nothing at -234.5 °C.
@@ -117,26 +126,6 @@ pub struct Machine {
     position: i64,
     /// Electromagnetic torque, mean of the last step, Nm.
     torque: f32,
-}
-
-/// What a step needs of all that turns.
-#[derive(Debug, Clone)]
-struct Shaft {
-    /// Inertia at the rotor, kg m².
-    inertia: f32,
-    /// Speed per torque of a step, rad/s/Nm.
-    gain: f32,
-    /// What viscous friction takes of a speed, per what it leaves.
-    viscous: f32,
-}
-
-impl Shaft {
-    fn new(config: &MachineConfig, load: &Load, period: f32) -> Self {
-        let inertia = config.inertia + load.inertia();
-        let gain = period / inertia;
-        let viscous = gain * (config.viscous_friction + config.iron_eddy);
-        Shaft { inertia, gain, viscous }
-    }
 }
 
 impl Machine {

@@ -1,9 +1,10 @@
 //! A step of the machine.
 
+use super::shaft::Torques;
 use super::{Flow, Machine, MachineConfig};
 use crate::angle::{self, TURN};
 use crate::control::within;
-use crate::plant::Feed;
+use crate::plant::{Feed, load};
 use crate::vector::Vector;
 
 /// Steps after which rounding has done nothing to the rotor's frame yet.
@@ -21,9 +22,8 @@ impl Machine {
         if self.speed != 0.0 || self.flux != Vector::ZERO {
             return false;
         }
-        let load = self.load.at(self.position, 0.0).total();
-        let pull = self.load.referred(load) + self.cogging(self.position);
-        self.locked || pull.abs() <= self.dry(0.0, load).total
+        let load = self.load.at(self.position, 0.0);
+        self.locked || self.shaft.rests(&self.torques(self.position, 0.0, &load, 0.0))
     }
 
     /// Lets a step pass with open terminals.
@@ -124,21 +124,12 @@ impl Machine {
         let MachineConfig { viscous_friction, iron_eddy, iron_hysteresis, .. } = self.config;
         let last = self.speed;
         let load = self.load.at(half.position, half.speed);
-        let turning = self.load.referred(load.turning);
-        let pull = turning + self.load.referred(load.kept) + self.cogging(half.position);
-        let damping = self.load.damping(&load);
-        let slower = self.shaft.viscous + self.shaft.gain * damping;
-        let gained = self.shaft.gain * (self.torque + pull);
+        let torques = self.torques(half.position, half.speed, &load, self.torque);
         // A flywheel's speed changes by less than its last digits: what they leave out is kept.
-        let pushed = (gained - slower * last) / (1.0 + slower) + self.rest;
-        let free = last + pushed;
-        let dry = self.dry(half.speed, load.total());
-        let held = self.shaft.gain * dry.total;
-        let slips = free.abs() > held;
-        let change = if slips { pushed - held.copysign(free) } else { -last };
-        self.speed = if slips { within(last + change, -FASTEST, FASTEST) } else { 0.0 };
+        let change = self.shaft.change(last, self.rest, &torques);
+        self.speed = within(last + change.speed, -FASTEST, FASTEST);
         self.change = self.speed - last;
-        self.rest = within(change - self.change, -1.0, 1.0);
+        self.rest = within(change.speed - self.change, -1.0, 1.0);
         let mean = 0.5 * (last + self.speed);
         let way = mean * self.period;
         self.position = self.position.wrapping_add(digits(way));
@@ -151,16 +142,25 @@ impl Machine {
         };
 
         // Each torque times the way is the kinetic energy's change, to the last digit.
-        let dry_way = if slips || dry.total == 0.0 {
-            way.copysign(free * way)
-        } else {
-            free * self.shaft.inertia * mean / dry.total
-        };
-        let slowed = free * way;
-        flow.friction += viscous_friction * slowed + dry.rotor * dry_way;
+        let ahead = change.direction * way;
+        let dry_way = change.dry_share * ahead;
+        let slowed = self.speed * way;
+        flow.friction += viscous_friction * slowed + (torques.dry - iron_hysteresis) * dry_way;
         flow.iron += iron_eddy * slowed + iron_hysteresis * dry_way;
-        flow.gear += dry.gear * dry_way;
-        flow.load += dry.brake * dry_way + damping * slowed - turning * way;
+        flow.gear += change.lost * ahead;
+        flow.load += torques.brake * dry_way + torques.damping * slowed
+            - self.load.referred(load.turning) * way;
+    }
+
+    /// Torques of a step at a position and speed, with that of the currents, Nm.
+    fn torques(&self, position: i64, speed: f32, load: &load::Torques, torque: f32) -> Torques {
+        Torques {
+            rotor: torque + self.cogging(position),
+            dry: self.dry(speed),
+            load: self.load.referred(load.turning + load.kept),
+            brake: self.load.brake(),
+            damping: self.load.damping(load),
+        }
     }
 
     /// Torque of the cogging, Nm.
@@ -176,14 +176,12 @@ impl Machine {
         (position as u32).wrapping_mul(self.config.cogging_periods.into())
     }
 
-    /// Torques that only brake, at a speed and with a load (Nm at the output).
-    fn dry(&self, speed: f32, load: f32) -> Dry {
-        let MachineConfig { coulomb_friction, stiction, .. } = self.config;
+    /// Torque that brakes the rotor whatever its direction, at a speed, Nm.
+    fn dry(&self, speed: f32) -> f32 {
+        let MachineConfig { coulomb_friction, stiction, iron_hysteresis, .. } = self.config;
         let relative = speed * self.inverse_stribeck;
         let extra = (stiction - coulomb_friction).max(0.0) / (1.0 + relative * relative);
-        let rotor = coulomb_friction + extra;
-        let (brake, gear) = self.load.dry(load);
-        Dry { rotor, brake, gear, total: rotor + brake + gear + self.config.iron_hysteresis }
+        coulomb_friction + extra + iron_hysteresis
     }
 }
 
@@ -221,14 +219,6 @@ impl Decay {
             salient: beyond != 0.0,
         }
     }
-}
-
-/// Torques against the motion whatever the speed, at the rotor, Nm.
-struct Dry {
-    rotor: f32,
-    brake: f32,
-    gear: f32,
-    total: f32,
 }
 
 /// The first half of a step.
