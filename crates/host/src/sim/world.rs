@@ -82,7 +82,7 @@ fn surround(plant: &mut Plant, command: &Command) {
         Command::Temperature { celsius, .. } => plant.force_temperature(celsius),
         Command::Load { newton_metres, .. } => plant.change_load(|load| load.brake = newton_metres),
         Command::Push { newton_metres, .. } => {
-            plant.change_load(|load| load.torque = newton_metres);
+            plant.change_load(|load| load.torque = -newton_metres);
         }
         Command::LockRotor { locked, .. } => plant.lock(locked),
         _ => {}

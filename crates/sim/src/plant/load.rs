@@ -93,11 +93,11 @@ pub(super) struct Load {
     positional: bool,
 }
 
-/// Torques of a load at the output, Nm, without the brake.
+/// Torques of a load at the output against growing angles, Nm, without the brake.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Torques {
-    /// What turns it, and takes or gives energy for good.
-    pub(super) turning: f32,
+    /// What is the same at each position, and takes or gives energy for good.
+    pub(super) constant: f32,
     /// What springs and weights give back.
     pub(super) kept: f32,
     /// Torque against the motion per speed, Nm s/rad.
@@ -109,7 +109,7 @@ pub(super) struct Torques {
 impl Torques {
     /// All of them together.
     pub(super) fn total(&self) -> f32 {
-        self.turning + self.kept - self.damping * self.speed
+        self.constant + self.kept + self.damping * self.speed
     }
 }
 
@@ -145,7 +145,7 @@ impl Load {
         let LoadConfig { torque, viscous, fan, .. } = self.config;
         let speed = speed * self.step_down;
         let damping = viscous + fan * speed.abs();
-        let plain = Torques { turning: torque, kept: 0.0, damping, speed };
+        let plain = Torques { constant: torque, kept: 0.0, damping, speed };
         if !self.positional {
             return plain;
         }
@@ -155,7 +155,7 @@ impl Load {
         let spring = self.config.spring.stiffness * self.stretch(angle);
         let weight = self.weight() * libm::sinf(angle);
         Torques {
-            kept: -spring - weight - stiffness * beyond,
+            kept: spring + weight + stiffness * beyond,
             damping: plain.damping + damping,
             ..plain
         }

@@ -82,7 +82,7 @@ pub struct PlantTruth {
     pub vq: f32,
     /// Electromagnetic torque, Nm.
     pub torque: f32,
-    /// Torque of the load on the output, Nm.
+    /// Torque of the load against growing angles of the output, Nm.
     pub load_torque: f32,
     /// Bus voltage, V.
     pub bus_voltage: f32,

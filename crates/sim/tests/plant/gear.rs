@@ -100,12 +100,12 @@ fn a_load_torque_costs_more_forwards_and_helps_less_backwards() {
         Driven::new(actuator(0.8, Some(0.7)), load, 200.0).acceleration(4.0)
     };
     // Against the motion, 4.5 Nm / 9: (0.8568 - 0.5 / 0.8) / (2.6e-4 + 1.2346e-3 / 0.8)
-    assert_near(gear(-4.5), 128.55, 2e-4);
+    assert_near(gear(4.5), 128.55, 2e-4);
     // It pulls a load of 0.1 kg m² less fast than that would fall: τ > 0.
     // (0.8568 + 0.5 / 0.8) / (2.6e-4 + 1.2346e-3 / 0.8)
-    assert_near(gear(4.5), 821.76, 2e-4);
+    assert_near(gear(-4.5), 821.76, 2e-4);
     // It pushes the rotor: (0.8568 + 0.7 · 5) / (2.6e-4 + 0.7 · 1.2346e-3)
-    assert_near(gear(45.0), 3875.5, 2e-4);
+    assert_near(gear(-45.0), 3875.5, 2e-4);
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn output_radians(plant: &Plant) -> f64 {
 
 #[test]
 fn a_torque_accelerates_the_inertia_of_rotor_and_load() {
-    let mut plant = with_load(LoadConfig { torque: 0.02, inertia: 1e-4, ..LoadConfig::default() });
+    let mut plant = with_load(LoadConfig { torque: -0.02, inertia: 1e-4, ..LoadConfig::default() });
     run(&mut plant, 0.05);
     // 0.02 Nm on 2e-4 kg m² for 50 ms.
     assert!((plant.machine().speed() - 5.0).abs() < 0.01, "{} rad/s", plant.machine().speed());
@@ -34,10 +34,22 @@ fn a_torque_accelerates_the_inertia_of_rotor_and_load() {
 }
 
 #[test]
+fn a_positive_load_torque_opposes_motion_towards_growing_angles() {
+    let mut plant = with_load(LoadConfig { torque: 0.02, ..LoadConfig::default() });
+    assert_eq!(plant.truth().load_torque, 0.02);
+    run(&mut plant, 0.05);
+    // 0.02 Nm on 1e-4 kg m² for 50 ms.
+    assert!((plant.machine().speed() + 10.0).abs() < 0.01, "{} rad/s", plant.machine().speed());
+    let braked = LoadConfig { brake: 0.005, ..LoadConfig::default() };
+    plant.change_load(|load| *load = braked);
+    assert_eq!(plant.truth().load_torque, -0.005, "it turns backwards");
+}
+
+#[test]
 fn a_flywheel_gains_speed_however_slowly() {
     for inertia in [0.01, 0.1, 1.0, 10.0] {
         let machine = MachineConfig { inertia, ..plain().machine };
-        let load = LoadConfig { torque: 1.0, ..LoadConfig::default() };
+        let load = LoadConfig { torque: -1.0, ..LoadConfig::default() };
         let mut flywheel = Machine::new(machine, load, 50e-6);
         flywheel.place(0, 300.0);
         for _ in 0..20_000 {
@@ -58,8 +70,8 @@ fn stiction_holds_until_it_breaks() {
         stribeck_speed: 5.0,
         ..plain().machine
     };
-    let after = |torque| {
-        let load = LoadConfig { torque, ..LoadConfig::default() };
+    let after = |push: f32| {
+        let load = LoadConfig { torque: -push, ..LoadConfig::default() };
         let mut plant = Plant::new(PlantConfig { machine, load, ..plain() });
         run(&mut plant, 1.0);
         plant.machine().speed()
@@ -71,7 +83,7 @@ fn stiction_holds_until_it_breaks() {
 
 #[test]
 fn a_brake_stops_a_rotor_and_does_not_turn_it_back() {
-    let mut plant = with_load(LoadConfig { torque: 0.02, ..LoadConfig::default() });
+    let mut plant = with_load(LoadConfig { torque: -0.02, ..LoadConfig::default() });
     run(&mut plant, 0.1);
     plant.change_load(|load| (load.torque, load.brake) = (0.0, 0.05));
     run(&mut plant, 0.1);
@@ -83,11 +95,11 @@ fn a_brake_stops_a_rotor_and_does_not_turn_it_back() {
 
 #[test]
 fn a_fan_and_a_viscous_load_settle_where_they_take_up_the_torque() {
-    let fan = LoadConfig { torque: 0.09, fan: 1e-5, ..LoadConfig::default() };
+    let fan = LoadConfig { torque: -0.09, fan: 1e-5, ..LoadConfig::default() };
     let mut plant = with_load(fan);
     run(&mut plant, 3.0);
     assert!((plant.machine().speed() - 94.87).abs() < 0.05, "{}", plant.machine().speed());
-    let viscous = LoadConfig { torque: 0.09, viscous: 1e-3, ..LoadConfig::default() };
+    let viscous = LoadConfig { torque: -0.09, viscous: 1e-3, ..LoadConfig::default() };
     let mut plant = with_load(viscous);
     run(&mut plant, 3.0);
     assert!((plant.machine().speed() - 90.0).abs() < 0.05, "{}", plant.machine().speed());
@@ -132,12 +144,12 @@ fn a_spring_and_a_pendulum_swing_at_their_frequencies() {
 fn stops_end_the_way() {
     let stops =
         StopsConfig { low_degrees: -90.0, high_degrees: 45.0, stiffness: 20.0, damping: 0.05 };
-    let load = LoadConfig { torque: 0.2, stops: Some(stops), ..LoadConfig::default() };
+    let load = LoadConfig { torque: -0.2, stops: Some(stops), ..LoadConfig::default() };
     let mut plant = with_load(load);
     run(&mut plant, 2.0);
     let expected = 45.0 + (0.2f64 / 20.0).to_degrees();
     assert!((plant.truth().output_degrees - expected).abs() < 0.05, "{:?}", plant.truth());
-    plant.change_load(|load| load.torque = -0.2);
+    plant.change_load(|load| load.torque = 0.2);
     run(&mut plant, 2.0);
     assert!((plant.truth().output_degrees + expected + 45.0).abs() < 0.05, "{:?}", plant.truth());
 }
@@ -162,12 +174,12 @@ fn a_gear_turns_torque_up_and_loses_its_share_both_ways() {
         gear: GearConfig { ratio: 6.0, efficiency: 0.8, back_efficiency: None },
         ..plain().machine
     };
-    let output = |torque: f32, speed_up: f32| {
-        let load = LoadConfig { torque: speed_up, ..LoadConfig::default() };
+    let output = |push: f32, speed_up: f32| {
+        let load = LoadConfig { torque: -speed_up, ..LoadConfig::default() };
         let mut plant = Plant::new(PlantConfig { machine, load, ..plain() });
         run(&mut plant, 0.02);
         let before = plant.machine().speed();
-        plant.change_load(|load| load.torque = torque);
+        plant.change_load(|load| load.torque = -push);
         run(&mut plant, 0.01);
         (plant.machine().speed() - before) / 0.01 * 1e-4 * 6.0
     };
@@ -179,7 +191,7 @@ fn a_gear_turns_torque_up_and_loses_its_share_both_ways() {
 
 #[test]
 fn a_locked_rotor_stays() {
-    let mut plant = with_load(LoadConfig { torque: 1.0, ..LoadConfig::default() });
+    let mut plant = with_load(LoadConfig { torque: -1.0, ..LoadConfig::default() });
     plant.lock(true);
     run(&mut plant, 0.1);
     assert_eq!((plant.machine().speed(), plant.machine().position()), (0.0, 0));
@@ -192,8 +204,8 @@ fn a_locked_rotor_stays() {
 #[test]
 fn a_load_that_damps_more_than_a_step_can_does_not_burst() {
     for load in [
-        LoadConfig { torque: 1.0, viscous: 255.0, ..LoadConfig::default() },
-        LoadConfig { torque: 1.0, fan: 255.0, ..LoadConfig::default() },
+        LoadConfig { torque: -1.0, viscous: 255.0, ..LoadConfig::default() },
+        LoadConfig { torque: -1.0, fan: 255.0, ..LoadConfig::default() },
     ] {
         let mut plant = with_load(load);
         run(&mut plant, 0.1);
@@ -206,7 +218,7 @@ fn a_load_that_damps_more_than_a_step_can_does_not_burst() {
 fn a_push_that_no_bearing_stands_ends_in_numbers() {
     let machine = preset::drone().machine;
     for fan in [0.0, 592.0] {
-        let load = LoadConfig { torque: 1000.0, fan, ..LoadConfig::default() };
+        let load = LoadConfig { torque: -1000.0, fan, ..LoadConfig::default() };
         let mut plant = Plant::new(PlantConfig { load, machine, ..plain() });
         for step in 0..20_000u32 {
             plant.step(Bridge::Drive(Vector::unit(step.wrapping_mul(40_000_000)) * 0.3));

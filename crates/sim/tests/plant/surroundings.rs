@@ -10,7 +10,7 @@ use crate::plain;
 
 /// A plant whose rotor is turned from outside at `speed` rad/s.
 fn turned_at(speed: f32, config: PlantConfig) -> Plant {
-    let load = LoadConfig { inertia: 10.0, torque: speed * 10.0, ..LoadConfig::default() };
+    let load = LoadConfig { inertia: 10.0, torque: -speed * 10.0, ..LoadConfig::default() };
     let mut plant = Plant::new(PlantConfig { load, ..config });
     plant.lock(false);
     for _ in 0..20_000 {
@@ -112,7 +112,7 @@ fn a_plant_at_rest_only_waits() {
     off(&mut plant, 20_000);
     let truth = plant.truth();
     assert_eq!((truth.speed, truth.iq, truth.bus_voltage), (0.0, 0.0, 24.0));
-    plant.change_load(|load| load.torque = 0.01);
+    plant.change_load(|load| load.torque = -0.01);
     off(&mut plant, 200);
     assert!(plant.truth().speed > 0.5, "it wakes up: {:?}", plant.truth());
 }

@@ -249,6 +249,20 @@ mod tests {
     }
 
     #[test]
+    fn a_load_opposes_forward_motion_wherever_it_is_written() {
+        let turned = |text: &str| {
+            let run = run(text);
+            let load = column(&run, "rmd1.load_newton_metres");
+            (load[1], column(&run, "rmd1.angle_degrees")[1000])
+        };
+        let push = "[[event]]\nat = 0\nrmd = 1\nworld = \"push\"\nnewton_metres = 0.125";
+        let (pushed, angle) = turned(&format!("[[rmd.motor]]\n{push}"));
+        assert!(pushed == -0.125 && angle > 0.0, "{pushed} Nm, {angle}°");
+        let (load, angle) = turned("[[rmd.motor]]\nplant.load.torque = 0.125");
+        assert!(load == 0.125 && angle < 0.0, "{load} Nm, {angle}°");
+    }
+
+    #[test]
     fn a_row_of_the_csv_is_a_sample_with_digits_enough_to_get_it_back() {
         let run = run(SPEED);
         let mut csv = Vec::new();

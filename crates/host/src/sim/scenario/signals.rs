@@ -172,7 +172,7 @@ signals!(ST, motorlink_sim::st::Truth, |truth| {
     vd_volts = truth.plant.vd;
     vq_volts = truth.plant.vq;
     torque_newton_metres = truth.plant.torque;
-    load_newton_metres = -truth.plant.load_torque;
+    load_newton_metres = truth.plant.load_torque;
     bus_volts = truth.plant.bus_voltage;
     heatsink_celsius = truth.temperature;
     winding_celsius = truth.plant.winding_temperature;
@@ -207,7 +207,7 @@ signals!(RMD, Rmd, |rmd| {
     vd_volts = rmd.truth.plant.vd;
     vq_volts = rmd.truth.plant.vq;
     torque_newton_metres = rmd.truth.plant.torque;
-    load_newton_metres = -rmd.truth.plant.load_torque;
+    load_newton_metres = rmd.truth.plant.load_torque;
     supply_volts = rmd.truth.plant.bus_voltage;
     motor_celsius = rmd.truth.temperature;
     winding_celsius = rmd.truth.plant.winding_temperature;

@@ -29,7 +29,7 @@
 //! ```text
 //! J dω/dt   = T − Tcog sin(n θ) − (B + Beddy) ω − dry(ω) sign ω − k τ
 //! dry       = Tc + (Ts − Tc) / (1 + (ω/ωs)²) + hysteresis
-//! τ         = (J_load dω/dt / N − T_load + brake sign ω) / N
+//! τ         = (J_load dω/dt / N + T_load + brake sign ω) / N
 //! k         = 1/η where τ ω > 0,   η' where τ ω < 0
 //! ```
 //!
@@ -232,10 +232,10 @@ impl Machine {
         self.torque
     }
 
-    /// Torque that the load puts on the output now, Nm, with the sign of positions.
+    /// Torque of the load against growing angles of the output now, Nm.
     pub fn load_torque(&self) -> f32 {
         let brake = if self.speed == 0.0 { 0.0 } else { self.load().brake.copysign(self.speed) };
-        self.load.at(self.position, self.speed).total() - brake
+        self.load.at(self.position, self.speed).total() + brake
     }
 
     /// Phase resistance at the present temperature, Ω.

@@ -36,7 +36,7 @@ pub(super) struct Torques {
     pub(super) rotor: f32,
     /// What brakes the rotor whatever its speed.
     pub(super) dry: f32,
-    /// What turns the load.
+    /// What the load has against growing angles.
     pub(super) load: f32,
     /// What brakes the load whatever its speed.
     pub(super) brake: f32,
@@ -84,7 +84,7 @@ impl Shaft {
     pub(super) fn rests(&self, torques: &Torques) -> bool {
         [1.0, -1.0].into_iter().all(|direction| {
             let Torques { rotor, dry, load, brake, .. } = torques.along(direction);
-            let passed = brake - load;
+            let passed = load + brake;
             rotor - dry <= self.passage(passed).share * passed
         })
     }
@@ -135,7 +135,7 @@ impl Shaft {
     #[inline]
     fn pushed(&self, passage: &Passage, speed: f32, torques: &Torques) -> f32 {
         let Torques { rotor, dry, load, brake, damping } = *torques;
-        let gained = passage.gain * (rotor - dry + passage.share * (load - brake));
+        let gained = passage.gain * (rotor - dry - passage.share * (load + brake));
         let slower = passage.gain * (self.viscous + passage.share * damping);
         (gained - slower * speed) / (1.0 + slower)
     }
@@ -144,7 +144,7 @@ impl Shaft {
     #[inline]
     fn passed(&self, speed: f32, change: f32, torques: &Torques) -> f32 {
         let Torques { load, brake, damping, .. } = *torques;
-        self.behind * change + brake - load + damping * (speed + change)
+        self.behind * change + load + brake + damping * (speed + change)
     }
 
     /// How a torque passes the gear that acts against the motion or, when it is negative, with it.

@@ -148,8 +148,9 @@ impl Machine {
         flow.friction += viscous_friction * slowed + (torques.dry - iron_hysteresis) * dry_way;
         flow.iron += iron_eddy * slowed + iron_hysteresis * dry_way;
         flow.gear += change.lost * ahead;
-        flow.load += torques.brake * dry_way + torques.damping * slowed
-            - self.load.referred(load.turning) * way;
+        flow.load += torques.brake * dry_way
+            + torques.damping * slowed
+            + self.load.referred(load.constant) * way;
     }
 
     /// Torques of a step at a position and speed, with that of the currents, Nm.
@@ -157,7 +158,7 @@ impl Machine {
         Torques {
             rotor: torque + self.cogging(position),
             dry: self.dry(speed),
-            load: self.load.referred(load.turning + load.kept),
+            load: self.load.referred(load.constant + load.kept),
             brake: self.load.brake(),
             damping: self.load.damping(load),
         }
