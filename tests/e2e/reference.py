@@ -7,10 +7,15 @@ amplitudes of phases; SI units, at the rotor.
     Ld did/dt = vd - R id + we Lq iq
     Lq diq/dt = vq - R iq - we (Ld id + psi)             we = p w
     T         = 1.5 p (psi iq + (Ld - Lq) id iq)
-    J dw/dt   = T - Tcog sin(n theta) - (B + Be) w - dry(w) sign(w)
+    J dw/dt   = T - Tcog sin(n theta) - (B + Be) w - dry(w) sign(w) - Tgear
     dry(w)    = Tc + (Ts - Tc) / (1 + (w/ws)^2) + Th
 
-A rotor at rest stays at rest while what pulls at it is at most dry(0). The motion is piecewise: a
+Behind a gear of the ratio N turns an inertia against a torque and a brake, all at the output:
+
+    tau       = (Jout dw/dt / N + Tout + Tbrake sign(w)) / N
+    Tgear     = tau / eta where the motor drives the load, eta' tau where the load drives the motor
+
+A rotor at rest stays at rest while it is accelerated in neither direction. The motion is piecewise: a
 rotor that comes to rest, and one that is pulled loose, are events at which integration stops and
 goes on with the equations of the other piece.
 """
@@ -27,7 +32,7 @@ PRECISE = 1e-7
 
 @dataclass(frozen=True)
 class Motor:
-    """What the simulator's `plant.machine` says, without the gear: nothing hangs on it here."""
+    """What the simulator's `plant.machine` says of the rotor."""
 
     pole_pairs: int
     resistance: float
@@ -59,6 +64,28 @@ class Motor:
 
 
 @dataclass(frozen=True)
+class Output:
+    """What the motor drives: `plant.machine.gear` and `plant.load`; nothing without a gear."""
+
+    ratio: float = 1.0
+    efficiency: float = 1.0
+    back_efficiency: float = 1.0
+    inertia: float = 0.0
+    torque: float = 0.0
+    brake: float = 0.0
+
+    def acceleration(self, motor, torque, direction):
+        """Of a rotor that turns in a direction, by a torque from which its own friction is gone."""
+        opposing = (self.torque + self.brake * direction) / self.ratio
+        inertia = self.inertia / self.ratio**2
+        forwards = (torque - opposing / self.efficiency) / (motor.inertia + inertia / self.efficiency)
+        if (inertia * forwards + opposing) * direction >= 0:
+            return forwards
+        back = self.back_efficiency
+        return (torque - opposing * back) / (motor.inertia + inertia * back)
+
+
+@dataclass(frozen=True)
 class Experiment:
     """From rest in the currents; a voltage (d, q) in the rotor's frame holds from the beginning."""
 
@@ -66,6 +93,7 @@ class Experiment:
     speed: float = 0.0
     angle: float = 0.0
     locked: bool = False
+    output: Output = Output()
 
 
 def solve(motor, experiment, times, tolerance=PRECISE):
@@ -102,11 +130,20 @@ def solve(motor, experiment, times, tolerance=PRECISE):
 
 def _loose(motor, experiment, state):
     """Where a rotor at rest turns to: 1, -1, or 0 where it stays."""
+    if experiment.locked:
+        return 0.0
+    # At the event it is on the point of moving but for the last digits.
+    slack = 1e-9 * motor.dry(0.0) / motor.inertia
+    starts = {way: _start(motor, experiment, state, way) for way in (1.0, -1.0)}
+    way = max(starts, key=starts.get)
+    return way if starts[way] > -slack else 0.0
+
+
+def _start(motor, experiment, state, direction):
+    """Acceleration in a direction of a rotor at rest, if it begins to turn there."""
     d, q, _, angle = state
-    pull = motor.pull(d, q, angle)
-    # At the event the pull is equal to the friction but for the last digits.
-    held = experiment.locked or abs(pull) < motor.dry(0.0) * (1 - 1e-9)
-    return 0.0 if held else math.copysign(1.0, pull)
+    torque = motor.pull(d, q, angle) - motor.dry(0.0) * direction
+    return direction * experiment.output.acceleration(motor, torque, direction)
 
 
 def _piece(motor, experiment, direction):
@@ -124,20 +161,23 @@ def _piece(motor, experiment, direction):
         if direction == 0.0:
             return change_d, change_q, 0.0, 0.0
         friction = viscous * speed + motor.dry(speed) * direction
-        return change_d, change_q, (motor.pull(d, q, angle) - friction) / motor.inertia, speed
+        torque = motor.pull(d, q, angle) - friction
+        change_speed = experiment.output.acceleration(motor, torque, direction)
+        return change_d, change_q, change_speed, speed
 
     if experiment.locked:
         return equations, lambda *_: 1.0
     if direction == 0.0:
-        # Its pull reaches the friction.
+        # What pulls reaches what holds.
         def end(_, state):
-            return abs(motor.pull(state[0], state[1], state[3])) - motor.dry(0.0)
+            return max(_start(motor, experiment, state, way) for way in (1.0, -1.0))
 
         end.direction = 1.0
     else:
 
+        # One that has just begun to turn has no speed yet.
         def end(_, state):
-            return state[2]
+            return state[2] + direction * 1e-9
 
         end.direction = -direction
     return equations, end
