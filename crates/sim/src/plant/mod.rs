@@ -76,10 +76,15 @@ pub struct PlantTruth {
     pub iq: f32,
     /// Currents of the phases, A.
     pub phase_currents: [f32; 3],
-    /// Voltage at the windings in the rotor's frame, V.
+    /// Voltage at the windings in the rotor's frame, mean of the last period, V.
     pub vd: f32,
-    /// Voltage at the windings in the rotor's frame, V.
+    /// The same of the q axis, V.
     pub vq: f32,
+    /// Voltage that the firmware commanded for the last period, in the rotor's frame in its middle,
+    /// V: before the hexagon, the dead time and the drop of the switches. 0 while they are open.
+    pub vd_command: f32,
+    /// The same of the q axis, V.
+    pub vq_command: f32,
     /// Electromagnetic torque, Nm.
     pub torque: f32,
     /// Torque of the load against growing angles of the output, Nm.
@@ -133,8 +138,8 @@ pub struct Plant {
     heat: Heat,
     /// What the power stage does in the coming step.
     pending: Bridge,
-    /// What the windings were fed with in the last step.
-    fed_with: Feed,
+    /// What was commanded for the last step, in the stator's frame, V.
+    commanded: Vector,
     /// Current that something feeds into the bus beside the source, A.
     fed: f32,
     /// What the encoder shows where the rotor's position is 0, 2^32 a turn.
@@ -164,7 +169,7 @@ impl Plant {
             supply: Supply::new(config.supply),
             heat: Heat::new(config.heat),
             pending: Bridge::Off,
-            fed_with: Feed::Stator(Vector::ZERO),
+            commanded: Vector::ZERO,
             fed: 0.0,
             encoder_zero: angle::position(config.encoder.offset_degrees.to_radians()),
             count: 0,
@@ -218,8 +223,10 @@ impl Plant {
         let bus = self.supply.voltage();
         let before = self.flow.electrical;
         let Plant { machine, flow, period, .. } = self;
+        self.commanded = Vector::ZERO;
         let (feed, ends) = match bridge {
             Bridge::Drive(share) => {
+                self.commanded = share * bus;
                 let share = self.modulator.modulate(share, machine.current());
                 (Some(Feed::Stator(share * bus)), false)
             }
@@ -232,7 +239,6 @@ impl Plant {
         if ends {
             machine.open();
         }
-        self.fed_with = feed.unwrap_or(Feed::Stator(machine.back_emf()));
         let taken = (self.flow.electrical - before) / (self.period * bus.max(1e-3));
         self.supply.step(self.period, taken, self.fed, &mut self.bus);
     }
@@ -352,11 +358,8 @@ impl Plant {
     /// What is really going on.
     pub fn truth(&self) -> PlantTruth {
         let current = self.machine.rotor_current();
-        let frame = Vector::unit(self.machine.electrical_angle());
-        let voltage = match self.fed_with {
-            Feed::Stator(voltage) => voltage.seen_from(frame),
-            Feed::Rotor(voltage) => voltage,
-        };
+        let (voltage, command) =
+            (self.machine.voltage(), self.machine.seen_in_last_step(self.commanded));
         let degrees = |position: i64| position as f64 * (360.0 / angle::TURN as f64);
         PlantTruth {
             speed: self.machine.speed(),
@@ -368,6 +371,8 @@ impl Plant {
             phase_currents: self.machine.current().phases(),
             vd: voltage.x,
             vq: voltage.y,
+            vd_command: command.x,
+            vq_command: command.y,
             torque: self.machine.torque(),
             load_torque: self.machine.load_torque(),
             bus_voltage: self.supply.voltage(),

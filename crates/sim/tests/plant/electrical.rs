@@ -1,8 +1,10 @@
 //! Currents and torque.
 
-use motorlink_sim::plant::{Feed, Flow, LoadConfig, Machine, MachineConfig};
-use motorlink_sim::preset;
+use motorlink_sim::plant::{
+    Bridge, Feed, Flow, InverterConfig, LoadConfig, Machine, MachineConfig, Plant, PlantConfig,
+};
 use motorlink_sim::vector::Vector;
+use motorlink_sim::{angle, preset};
 
 use crate::plain;
 
@@ -145,4 +147,43 @@ fn a_short_circuits_currents_are_those_of_park() {
             );
         }
     }
+}
+
+#[test]
+fn voltages_at_the_windings_are_those_of_the_currents_and_commands_are_told_apart() {
+    // Turned from outside at 250 rad/s, 1000 rad/s electrical: 2.9° a period.
+    let inverter = InverterConfig { on_resistance: 0.2, ..plain().inverter };
+    let machine = MachineConfig { inertia: 1.0, ..plain().machine };
+    let load = LoadConfig { torque: -1e3, ..LoadConfig::default() };
+    let mut plant = Plant::new(PlantConfig { inverter, machine, load, ..plain() });
+    for _ in 0..5000 {
+        plant.step(Bridge::Off);
+    }
+    plant.change_load(|load| load.torque = 0.0);
+    let MachineConfig { resistance, inductance_d, inductance_q, flux_linkage, .. } = machine;
+    // It acts a period late and is held for one: for where the rotor is in its middle.
+    for _ in 0..4000 {
+        let ahead = 1.5 * 50e-6 * 4.0 * plant.machine().speed();
+        let angle = angle::position(ahead) as u32;
+        let frame = Vector::unit(plant.machine().electrical_angle().wrapping_add(angle));
+        plant.step(Bridge::Drive((Vector::new(-1.0, 12.0) * (1.0 / 24.0)).turned(frame)));
+    }
+    let truth = plant.truth();
+    let electrical = 4.0 * truth.speed;
+    let expected = (
+        resistance * truth.id - electrical * inductance_q * truth.iq,
+        resistance * truth.iq + electrical * (inductance_d * truth.id + flux_linkage),
+    );
+    assert!(truth.iq > 0.5 && electrical > 990.0, "{truth:?}");
+    assert!((truth.vd - expected.0).abs() < 0.02, "{truth:?}, not {expected:?}");
+    assert!((truth.vq - expected.1).abs() < 0.02, "{truth:?}, not {expected:?}");
+    assert!((truth.vd_command + 1.0).abs() < 0.02, "{truth:?}");
+    assert!((truth.vq_command - 12.0).abs() < 0.02, "{truth:?}");
+    assert!((truth.vq_command - truth.vq - 0.2 * truth.iq).abs() < 0.02, "{truth:?}");
+    plant.lock(true);
+    for _ in 0..100 {
+        plant.step(Bridge::Off);
+    }
+    let truth = plant.truth();
+    assert_eq!((truth.vd, truth.vq, truth.vd_command, truth.vq_command), (0.0, 0.0, 0.0, 0.0));
 }

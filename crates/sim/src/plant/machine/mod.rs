@@ -52,7 +52,7 @@ mod step;
 pub use config::{GearConfig, MachineConfig};
 
 use super::load::{Load, LoadConfig};
-use crate::angle::sin_cos;
+use crate::angle::{self, sin_cos};
 use crate::control::within;
 use crate::vector::Vector;
 use shaft::Shaft;
@@ -126,6 +126,8 @@ pub struct Machine {
     position: i64,
     /// Electromagnetic torque, mean of the last step, Nm.
     torque: f32,
+    /// Voltage at the windings in the rotor's frame, mean of the last step, V.
+    voltage: Vector,
 }
 
 impl Machine {
@@ -153,6 +155,7 @@ impl Machine {
             rest: 0.0,
             position: 0,
             torque: 0.0,
+            voltage: Vector::ZERO,
             config,
         }
     }
@@ -225,6 +228,19 @@ impl Machine {
     pub fn back_emf(&self) -> Vector {
         let amplitude = self.speed * self.config.back_emf_constant();
         Vector::new(-self.frame.y, self.frame.x) * amplitude
+    }
+
+    /// Voltage at the windings in the rotor's frame, mean of the last step, V: Vd and Vq, behind what is
+    /// in series with them.
+    pub const fn voltage(&self) -> Vector {
+        self.voltage
+    }
+
+    /// A vector of the stator's frame as the rotor saw it in the middle of the last step.
+    pub fn seen_in_last_step(&self, vector: Vector) -> Vector {
+        let way = 0.5 * self.period * (self.speed - 0.5 * self.change);
+        let middle = self.position.wrapping_sub(angle::position(way));
+        vector.seen_from(Vector::unit(electrical(middle, &self.config)))
     }
 
     /// Electromagnetic torque, mean of the last step, Nm.

@@ -19,7 +19,7 @@ const FASTEST: f32 = 1e5;
 impl Machine {
     /// Whether nothing changes as long as no current flows.
     pub(in crate::plant) fn rests(&self) -> bool {
-        if self.speed != 0.0 || self.flux != Vector::ZERO {
+        if self.speed != 0.0 || self.flux != Vector::ZERO || self.voltage != Vector::ZERO {
             return false;
         }
         let load = self.load.at(self.position, 0.0);
@@ -32,6 +32,7 @@ impl Machine {
         let half = self.half();
         let end = self.frame.turned(half.turn).turned(half.turn);
         self.advance(half, end, flow);
+        self.voltage = Vector::new(0.0, self.poles * self.speed * self.config.flux_linkage);
     }
 
     /// Lets a voltage act for a step; adds where energy went.
@@ -68,7 +69,9 @@ impl Machine {
         flow.electrical += 1.5 * sixth * power;
         let square = i1.square() + 4.0 * i2.square() + i3.square();
         flow.copper += 1.5 * (self.resistance + self.series) * sixth * square;
-        let mut product = self.config.flux_linkage * (i1.y + 4.0 * i2.y + i3.y);
+        let current = i1 + i2 * 4.0 + i3;
+        self.voltage = (v1 + v2 * 4.0 + v3 - current * self.series) * (1.0 / 6.0);
+        let mut product = self.config.flux_linkage * current.y;
         if self.decay.salient {
             product += f1.cross(i1) + 4.0 * f2.cross(i2) + f3.cross(i3);
         }
