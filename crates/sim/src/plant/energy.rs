@@ -1,13 +1,15 @@
 //! Where energy came from and where it went.
 
 /// Energies since the beginning, J. Nothing is lost:
-/// `source = supply + chopper + copper + iron + friction + gear + load + stored`.
+/// `source = supply + board + chopper + copper + iron + friction + gear + load + stored`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy {
     /// Out of the source, and of what feeds the bus beside it.
     pub source: f64,
     /// Heat of the source's resistance.
     pub supply: f64,
+    /// Into the board's electronics.
+    pub board: f64,
     /// Heat of the brake resistor.
     pub chopper: f64,
     /// Through the motor's terminals; part of what follows.
@@ -26,10 +28,28 @@ pub struct Energy {
     pub stored: f64,
 }
 
+/// Power that becomes heat, mean of the last millisecond, W.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Losses {
+    /// In the windings.
+    pub winding: f32,
+    /// In the power stage.
+    pub inverter: f32,
+    /// Of the iron.
+    pub iron: f32,
+    /// Of the rotor's friction.
+    pub friction: f32,
+    /// In the gear.
+    pub gear: f32,
+    /// In the brake resistor.
+    pub chopper: f32,
+}
+
 impl Energy {
     /// All that was lost or given away.
     pub fn spent(&self) -> f64 {
-        self.supply + self.chopper + self.copper + self.iron + self.friction + self.gear + self.load
+        let bus = self.supply + self.board + self.chopper;
+        bus + self.copper + self.iron + self.friction + self.gear + self.load
     }
 
     /// What the account does not explain, as a share of all that was turned over.

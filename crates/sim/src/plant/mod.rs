@@ -14,19 +14,20 @@ pub(crate) mod range;
 mod sensing;
 mod supply;
 
-pub use energy::Energy;
+pub use energy::{Energy, Losses};
 pub use heat::{HeatConfig, HeatSensor};
 pub use inverter::{Bridge, InverterConfig};
 pub use load::{LoadConfig, PendulumConfig, SpringConfig, StopsConfig};
 pub use machine::{Feed, Flow, GearConfig, Machine, MachineConfig};
 pub use range::OutOfRange;
 pub use sensing::{EncoderConfig, Sample, SensingConfig};
+pub(crate) use supply::board_current;
 pub use supply::{ChopperConfig, SupplyConfig};
 
 use heat::Heat;
 use inverter::Modulator;
 use sensing::Sensor;
-use supply::Supply;
+use supply::{Currents, Supply};
 
 use crate::angle;
 use crate::vector::{INVERSE_SQRT_3, Vector};
@@ -91,8 +92,12 @@ pub struct PlantTruth {
     pub load_torque: f32,
     /// Bus voltage, V.
     pub bus_voltage: f32,
+    /// Current out of the source, mean of the last period, A; negative into it.
+    pub supply_current: f32,
     /// Whether the brake resistor is on.
     pub chopping: bool,
+    /// What becomes heat.
+    pub losses: Losses,
     /// Temperature of the winding, °C.
     pub winding_temperature: f32,
     /// Temperature of the housing, °C.
@@ -140,8 +145,9 @@ pub struct Plant {
     pending: Bridge,
     /// What was commanded for the last step, in the stator's frame, V.
     commanded: Vector,
-    /// Current that something feeds into the bus beside the source, A.
+    /// Currents that something feeds into the bus beside the source, and that the board takes, A.
     fed: f32,
+    board: f32,
     /// What the encoder shows where the rotor's position is 0, 2^32 a turn.
     encoder_zero: i64,
     /// Steps since the beginning.
@@ -152,6 +158,7 @@ pub struct Plant {
     flow: Flow,
     bus: supply::Flow,
     energy: Energy,
+    losses: Losses,
     /// Stored energy at the beginning, J.
     initial: f64,
 }
@@ -171,12 +178,14 @@ impl Plant {
             pending: Bridge::Off,
             commanded: Vector::ZERO,
             fed: 0.0,
+            board: 0.0,
             encoder_zero: angle::position(config.encoder.offset_degrees.to_radians()),
             count: 0,
             since_slow: 0,
             flow: Flow::default(),
             bus: supply::Flow::default(),
             energy: Energy::default(),
+            losses: Losses::default(),
             initial: 0.0,
             config,
         };
@@ -208,9 +217,11 @@ impl Plant {
     pub fn step(&mut self, next: Bridge) {
         let bridge = core::mem::replace(&mut self.pending, next);
         self.count = self.count.wrapping_add(1);
-        let idle = bridge == Bridge::Off && self.fed == 0.0;
-        if !(idle && self.machine.rests() && self.supply.rests()) {
+        let idle = bridge == Bridge::Off && self.machine.rests();
+        if !idle {
             self.move_on(bridge);
+        } else if self.fed != 0.0 || self.board != 0.0 || !self.supply.rests() {
+            self.feed_bus(0.0);
         }
         self.since_slow += u32::from(self.config.period_us);
         if self.since_slow >= SLOW_US {
@@ -239,8 +250,13 @@ impl Plant {
         if ends {
             machine.open();
         }
-        let taken = (self.flow.electrical - before) / (self.period * bus.max(1e-3));
-        self.supply.step(self.period, taken, self.fed, &mut self.bus);
+        self.feed_bus((self.flow.electrical - before) / (self.period * bus.max(1e-3)));
+    }
+
+    /// A step of the bus, of which the bridge takes a current, A.
+    fn feed_bus(&mut self, bridge: f32) {
+        let currents = Currents { bridge, board: self.board, fed: self.fed };
+        self.supply.step(self.period, currents, &mut self.bus);
     }
 
     /// What happens once a millisecond: heat, and the account of energy.
@@ -248,12 +264,22 @@ impl Plant {
         let dt = self.since_slow as f32 * 1e-6;
         self.since_slow = 0;
         self.energy = self.accounted();
-        self.bus = supply::Flow::default();
+        let bus = core::mem::take(&mut self.bus);
         let flow = core::mem::take(&mut self.flow);
         let series = self.config.inverter.on_resistance;
         let resistance = self.machine.resistance();
         let winding = flow.copper * resistance / (resistance + series);
-        let housing = flow.copper - winding + flow.iron + flow.friction;
+        let inverter = flow.copper - winding;
+        let watts = |joules: f32| joules / dt;
+        self.losses = Losses {
+            winding: watts(winding),
+            inverter: watts(inverter),
+            iron: watts(flow.iron),
+            friction: watts(flow.friction),
+            gear: watts(flow.gear),
+            chopper: watts(bus.braked),
+        };
+        let housing = inverter + flow.iron + flow.friction;
         self.heat.step(dt, winding, housing);
         self.machine.set_temperature(self.heat.winding());
     }
@@ -263,6 +289,7 @@ impl Plant {
         Energy {
             source: self.energy.source + f64::from(self.bus.source),
             supply: self.energy.supply + f64::from(self.bus.lost),
+            board: self.energy.board + f64::from(self.bus.board),
             chopper: self.energy.chopper + f64::from(self.bus.braked),
             electrical: self.energy.electrical + f64::from(self.flow.electrical),
             copper: self.energy.copper + f64::from(self.flow.copper),
@@ -322,6 +349,11 @@ impl Plant {
     pub fn feed(&mut self, current: f32) {
         self.fed = current;
     }
+
+    /// Takes a current (A) from the bus for the board, in every step until it is changed.
+    pub fn draw(&mut self, current: f32) {
+        self.board = current;
+    }
 }
 
 /// The world around the motor.
@@ -376,7 +408,9 @@ impl Plant {
             torque: self.machine.torque(),
             load_torque: self.machine.load_torque(),
             bus_voltage: self.supply.voltage(),
+            supply_current: self.supply.drawn(),
             chopping: self.supply.chopping(),
+            losses: self.losses,
             winding_temperature: self.heat.winding(),
             housing_temperature: self.heat.housing(),
             locked: self.machine.locked(),

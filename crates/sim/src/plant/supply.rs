@@ -1,7 +1,7 @@
 //! The supply: a source behind a resistance, the bus capacitor, a brake chopper.
 //!
 //! ```text
-//! C dV/dt = (V0 − V)/R + I_in − I_bridge − (chopper closed) V/R_brake
+//! C dV/dt = (V0 − V)/R + I_in − I_bridge − I_board − (chopper closed) V/R_brake
 //! ```
 //!
 //! A step is a trapezoid, which is stable for any R C and keeps account of energy exactly.
@@ -64,6 +64,27 @@ pub(super) struct Flow {
     pub(super) lost: f32,
     /// Heat of the brake resistor.
     pub(super) braked: f32,
+    /// Into the board.
+    pub(super) board: f32,
+}
+
+/// What flows through the bus beside the source and the brake resistor in a step, A.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Currents {
+    /// Into the bridge; negative when it gives.
+    pub(super) bridge: f32,
+    /// Into the board.
+    pub(super) board: f32,
+    /// Into the bus, from what feeds it beside the source.
+    pub(super) fed: f32,
+}
+
+/// Current that a board of a power (W) takes from a bus (V), A. Below the voltage that its converter
+/// needs it is less and less.
+pub(crate) fn board_current(power: f32, bus: f32) -> f32 {
+    const NEEDED: f32 = 5.0;
+    let most = bus.max(NEEDED);
+    power * bus / (most * most)
 }
 
 /// The bus.
@@ -73,6 +94,8 @@ pub(super) struct Supply {
     /// How far the bus is below the source, V: a small number keeps its digits.
     sag: f32,
     chopping: bool,
+    /// Current out of the source in the last step, A.
+    drawn: f32,
     /// One over the resistance, 1/Ω, and over twice the capacitance, 1/F.
     conductance: f32,
     half_inverse: f32,
@@ -83,6 +106,7 @@ impl Supply {
         Supply {
             sag: 0.0,
             chopping: false,
+            drawn: 0.0,
             conductance: 1.0 / config.resistance,
             half_inverse: 0.5 / config.capacitance,
             config,
@@ -109,6 +133,11 @@ impl Supply {
         self.chopping
     }
 
+    /// Current out of the source in the last step, A.
+    pub(super) const fn drawn(&self) -> f32 {
+        self.drawn
+    }
+
     /// Energy in the capacitor, J.
     pub(super) fn energy(&self) -> f32 {
         0.5 * self.config.capacitance * self.voltage() * self.voltage()
@@ -123,9 +152,9 @@ impl Supply {
         !self.chopping && quiet && (kept || self.sag.abs() <= NEAR * source)
     }
 
-    /// Lets the bridge take `taken` (A; negative when it gives) and something feed `fed` (A) for
-    /// `dt` (s); adds where energy went.
-    pub(super) fn step(&mut self, dt: f32, taken: f32, fed: f32, flow: &mut Flow) {
+    /// Lets currents flow for `dt` (s); adds where energy went.
+    pub(super) fn step(&mut self, dt: f32, currents: Currents, flow: &mut Flow) {
+        let Currents { bridge, board, fed } = currents;
         let SupplyConfig { voltage: source, takes_back, chopper, .. } = self.config;
         if let Some(chopper) = chopper {
             let threshold = if self.chopping { chopper.off_voltage } else { chopper.on_voltage };
@@ -137,19 +166,20 @@ impl Supply {
         };
         let gain = dt * self.half_inverse;
         // The mean sag of the step, with the source connected or not.
-        let pulled = self.sag + gain * (taken - fed + brake * source);
+        let pulled = self.sag + gain * (bridge + board - fed + brake * source);
         let connected = takes_back || pulled >= 0.0;
         let conductance = if connected { self.conductance } else { 0.0 };
         let share = 1.0 / (1.0 + gain * (conductance + brake));
         // The bridge takes power: what it took at the begin of the step is less where the bus rose.
         let ratio = (self.voltage() / (source - pulled * share).max(1e-3)).clamp(0.5, 2.0);
-        let middle = (pulled + gain * taken * (ratio - 1.0)) * share;
+        let middle = (pulled + gain * bridge * (ratio - 1.0)) * share;
         let middle = middle.min(source);
-        let drawn = middle * conductance;
+        self.drawn = middle * conductance;
         self.sag = (2.0 * middle - self.sag).min(source);
         let voltage = source - middle;
-        flow.source += (source * drawn + voltage * fed) * dt;
-        flow.lost += drawn * middle * dt;
+        flow.source += (source * self.drawn + voltage * fed) * dt;
+        flow.lost += self.drawn * middle * dt;
+        flow.board += voltage * board * dt;
         flow.braked += voltage * voltage * brake * dt;
     }
 }

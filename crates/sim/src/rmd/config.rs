@@ -39,6 +39,8 @@ pub struct RmdConfig {
     pub protect_voltage: f32,
     /// Over temperature protection above this temperature, °C.
     pub protect_temperature: f32,
+    /// What the drive's electronics take from the bus, W.
+    pub standby_power: f32,
     /// The machine, its load, supply, power stage and sensors.
     pub plant: PlantConfig,
 }
@@ -58,6 +60,7 @@ impl Default for RmdConfig {
             max_angle_degrees: 0.0,
             protect_voltage: 7.0,
             protect_temperature: 100.0,
+            standby_power: 1.2,
             plant: preset::rmd_l_5005(),
         }
     }
@@ -89,6 +92,7 @@ impl RmdConfig {
             ("max_angle_degrees", self.max_angle_degrees, 0.0, 1e6),
             ("protect_voltage", self.protect_voltage, -1e6, 1e6),
             ("protect_temperature", self.protect_temperature, -1e6, 1e6),
+            ("standby_power", self.standby_power, 0.0, 1e3),
         ])
     }
 

@@ -10,7 +10,7 @@ use super::current::CurrentLoop;
 use super::speed::Speedometer;
 use crate::angle;
 use crate::control::within;
-use crate::plant::{Bridge, OutOfRange, Plant, PlantTruth};
+use crate::plant::{Bridge, OutOfRange, Plant, PlantTruth, board_current};
 use crate::vector::INVERSE_SQRT_3;
 
 /// Time between two steps of the loops for speed and position, µs.
@@ -21,8 +21,6 @@ const GREATEST_CURRENT: f32 = 33.0;
 const PLANNED: f32 = 0.5;
 /// Share of the speed at which the back-EMF takes up the supply that references may reach.
 const REACHABLE: f32 = 0.9;
-/// What the drive's electronics take from the bus, A.
-const OWN_CURRENT: f32 = 0.05;
 
 /// An RMD motor behind its drive's protocol.
 #[derive(Debug, Clone)]
@@ -167,9 +165,7 @@ impl RmdMotor {
 
     fn slow_step(&mut self) {
         let bus = self.plant.bus_voltage();
-        // Where the source gives, the electronics' share is too small to see.
-        let own = if bus > self.plant.supply().voltage { OWN_CURRENT } else { 0.0 };
-        self.plant.feed(-own);
+        self.plant.draw(board_current(self.config.standby_power, bus));
         self.speedometer.read(self.plant.counts());
         let speed = self.speedometer.speed();
         let most = limit(self.config.max_torque_current)

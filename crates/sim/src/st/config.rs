@@ -37,8 +37,7 @@ pub struct MotorConfig {
     pub pfc_current: f32,
     /// Current that aligns the rotor, A.
     pub alignment_current: f32,
-    /// What the board takes for itself, W. It discharges a bus above its source; otherwise the
-    /// source gives it.
+    /// What the board takes from the bus for itself, W.
     pub standby_power: f32,
     /// Speed to go to when a motor starts before any command, rpm.
     pub target_speed_rpm: i32,

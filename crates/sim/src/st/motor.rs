@@ -58,8 +58,6 @@ pub(super) struct Firmware {
     pub(super) revup: [RevupPhase; REVUP_PHASES as usize],
     pub(super) control: Control,
     pub(super) pfc: Pfc,
-    /// What the board takes from the bus, A.
-    pub(super) standby: f32,
     pub(super) scale: Scale,
     pub(super) foc: Foc,
     pub(super) pll: Option<Observer>,
@@ -107,7 +105,6 @@ impl Firmware {
             revup: config.revup_phases(&scale),
             control: Control::new(config),
             pfc: Pfc::new(&config.plant, scale, config.pfc_current),
-            standby: 0.0,
             foc: Foc::new(&config.plant, &scale),
             pll: pll.then(|| observer(Tracking::Pll)),
             cordic: build.observer_cordic.then(|| observer(Tracking::Cordic)),
@@ -270,8 +267,7 @@ impl StMotor {
         };
         if self.firmware.pfc.enabled() {
             let (mains, bus) = (self.plant.supply().voltage, self.plant.bus_voltage());
-            let fed = self.firmware.pfc.feed(mains, bus);
-            self.plant.feed(fed - self.firmware.standby);
+            self.plant.feed(self.firmware.pfc.feed(mains, bus));
         }
         self.plant.step(bridge);
         if bridge != Bridge::Off {

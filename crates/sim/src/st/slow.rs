@@ -10,6 +10,7 @@ use super::scale::{FULL, RPM, RPM_PER_DIGIT, SPEED, divisor};
 use super::state::{self, Situation};
 use crate::angle::TURN;
 use crate::control::{Gains, within};
+use crate::plant::board_current;
 use crate::vector::Vector;
 
 /// Speed below which the rotor stands, rpm.
@@ -26,8 +27,6 @@ const SLIP: f32 = 0.15;
 const ALIGNMENT_DAMPING: f32 = 0.7;
 /// Share of a new value in the mean power.
 const POWER_SMOOTHING: f32 = 0.05;
-/// How far the bus must be above the source before the board lives on the capacitor, as a share.
-const ABOVE_SOURCE: f32 = 1e-4;
 
 impl StMotor {
     pub(super) fn millisecond(&mut self) {
@@ -303,11 +302,10 @@ impl StMotor {
             let firmware = &mut self.firmware;
             firmware.pfc.step(source, bus, &firmware.registers);
         }
-        let lives_on_bus = bus > source * (1.0 + ABOVE_SOURCE) && bus > 1.0;
-        self.firmware.standby = if lives_on_bus { self.config.standby_power / bus } else { 0.0 };
         if !self.firmware.pfc.enabled() {
-            self.plant.feed(-self.firmware.standby);
+            self.plant.feed(0.0);
         }
+        self.plant.draw(board_current(self.config.standby_power, bus));
     }
 
     /// Bus voltage per nominal bus voltage; at least a twentieth, so that it can be divided by.

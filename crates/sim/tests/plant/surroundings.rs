@@ -160,3 +160,27 @@ fn a_locked_rotor_heats_its_winding_as_two_bodies_do() {
     plant.force_temperature(Some(150.0));
     assert_eq!(plant.temperature(), 150.0);
 }
+
+#[test]
+fn losses_and_the_current_of_the_source_are_those_of_the_circuit() {
+    let supply = SupplyConfig { resistance: 0.5, ..SupplyConfig::default() };
+    let inverter = InverterConfig { on_resistance: 0.1, ..plain().inverter };
+    let mut plant = Plant::new(PlantConfig { supply, inverter, ..plain() });
+    plant.lock(true);
+    plant.draw(0.05);
+    for _ in 0..4000 {
+        plant.step(Bridge::Drive(Vector::new(0.1, 0.0)));
+    }
+    let truth = plant.truth();
+    // 1.5 R Id² in the windings, as much per ohm in the switches; the board takes its own.
+    let per_ohm = 1.5 * truth.id * truth.id;
+    let winding = per_ohm * plant.machine().resistance();
+    assert!((truth.losses.winding - winding).abs() < 0.01, "{truth:?}");
+    assert!((truth.losses.inverter - 0.1 * per_ohm).abs() < 0.01, "{truth:?}");
+    let current = (winding + 0.1 * per_ohm) / truth.bus_voltage + 0.05;
+    assert!((truth.supply_current - current).abs() < 2e-3, "{truth:?}, not {current} A");
+    assert!((truth.bus_voltage - (24.0 - 0.5 * truth.supply_current)).abs() < 1e-3, "{truth:?}");
+    let energy = plant.energy();
+    assert!((energy.board / (0.05 * 24.0 * 0.2) - 1.0).abs() < 0.03, "{energy:?}");
+    assert!(energy.imbalance().abs() < 1e-3, "{energy:?}");
+}

@@ -251,3 +251,16 @@ fn a_motor_that_oscillates_is_switched_off_when_it_is_too_hot() {
         "a speed loop too slow for its position loop"
     );
 }
+
+#[test]
+fn the_board_draws_its_power_from_the_source() {
+    let config = RmdConfig::default();
+    let mut bench = Bench::new([config]);
+    bench.wait(100);
+    let truth = bench.truth().plant;
+    // 1.2 W at 24 V.
+    assert!((truth.supply_current - 0.05).abs() < 1e-4, "{truth:?}");
+    let supply = config.plant.supply;
+    let bus = supply.voltage - supply.resistance * truth.supply_current;
+    assert!((truth.bus_voltage - bus).abs() < 1e-5, "{truth:?}");
+}

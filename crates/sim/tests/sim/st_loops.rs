@@ -434,3 +434,13 @@ fn feed_forward_takes_over_from_the_regulators() {
     assert!(with.abs() < 1000.0 && without > 12_000.0, "{with} s16V with, {without} without");
     assert_eq!(line.status(), Status::Run);
 }
+
+#[test]
+fn the_board_draws_its_power_from_the_source() {
+    let mut line = line(MotorConfig::mains());
+    line.wait(100);
+    let truth = line.truth().plant;
+    // 5 W at 325 V.
+    assert!((truth.supply_current - 15.4e-3).abs() < 1e-4, "{truth:?}");
+    assert!((truth.bus_voltage - (325.0 - 0.5 * 15.4e-3)).abs() < 1e-3, "{truth:?}");
+}

@@ -117,6 +117,7 @@ const UNITS: &[(&str, &str, &str)] = &[
     ("_amps", "Current", "A"),
     ("_volts", "Voltage", "V"),
     ("_celsius", "Temperature", "°C"),
+    ("_watts", "Power", "W"),
 ];
 
 /// A signal of a `T`: its name without the drive, and its value.
@@ -171,9 +172,18 @@ signals!(ST, motorlink_sim::st::Truth, |truth| {
     phase_c_amps = truth.plant.phase_currents[2];
     vd_volts = truth.plant.vd;
     vq_volts = truth.plant.vq;
+    vd_command_volts = truth.plant.vd_command;
+    vq_command_volts = truth.plant.vq_command;
     torque_newton_metres = truth.plant.torque;
     load_newton_metres = truth.plant.load_torque;
     bus_volts = truth.plant.bus_voltage;
+    supply_amps = truth.plant.supply_current;
+    winding_loss_watts = truth.plant.losses.winding;
+    inverter_loss_watts = truth.plant.losses.inverter;
+    iron_loss_watts = truth.plant.losses.iron;
+    friction_loss_watts = truth.plant.losses.friction;
+    gear_loss_watts = truth.plant.losses.gear;
+    chopper_loss_watts = truth.plant.losses.chopper;
     heatsink_celsius = truth.temperature;
     winding_celsius = truth.plant.winding_temperature;
     status[Names::Status] = u8::from(truth.status);
@@ -206,9 +216,18 @@ signals!(RMD, Rmd, |rmd| {
     phase_c_amps = rmd.truth.plant.phase_currents[2];
     vd_volts = rmd.truth.plant.vd;
     vq_volts = rmd.truth.plant.vq;
+    vd_command_volts = rmd.truth.plant.vd_command;
+    vq_command_volts = rmd.truth.plant.vq_command;
     torque_newton_metres = rmd.truth.plant.torque;
     load_newton_metres = rmd.truth.plant.load_torque;
     supply_volts = rmd.truth.plant.bus_voltage;
+    supply_amps = rmd.truth.plant.supply_current;
+    winding_loss_watts = rmd.truth.plant.losses.winding;
+    inverter_loss_watts = rmd.truth.plant.losses.inverter;
+    iron_loss_watts = rmd.truth.plant.losses.iron;
+    friction_loss_watts = rmd.truth.plant.losses.friction;
+    gear_loss_watts = rmd.truth.plant.losses.gear;
+    chopper_loss_watts = rmd.truth.plant.losses.chopper;
     motor_celsius = rmd.truth.temperature;
     winding_celsius = rmd.truth.plant.winding_temperature;
     mode[Names::Mode] = mode_number(rmd.truth.mode);
