@@ -14,6 +14,8 @@ import pytest
 from reference import Experiment, Motor, Output, solve
 
 PRESETS = ["drone", "shinano", "mains", "rmd-l-5005", "rmd-x8"]
+# Those with the same machine as another.
+SAME = {"servo": "shinano"}
 # No preset has a saliency: this is one of them with another Lq, H.
 SALIENT = {"shinano, salient": ("shinano", 1.8e-3)}
 MOTORS = [*PRESETS, *SALIENT]
@@ -150,7 +152,8 @@ def test_a_gear_agrees_with_scipy(simulate, plants, name):
 
 
 def test_every_preset_is_compared(plants):
-    assert list(plants) == MOTORS
+    assert set(plants) == {*MOTORS, *SAME}
+    assert all(plants[one]["machine"] == plants[other]["machine"] for one, other in SAME.items())
 
 
 # Enough to see a deviation of TOLERANCE.

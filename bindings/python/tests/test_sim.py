@@ -453,5 +453,5 @@ def test_what_was_not_expected_is_told() -> None:
 
 def test_presets_have_every_value() -> None:
     presets = sim.presets()
-    assert set(presets) == {"drone", "shinano", "mains", "rmd-l-5005", "rmd-x8"}
+    assert set(presets) == {"drone", "shinano", "servo", "mains", "rmd-l-5005", "rmd-x8"}
     assert presets["drone"]["machine"]["resistance"] == 0.11

@@ -5,17 +5,18 @@
 //! of what is measured between two terminals), flux linkage is the amplitude in a phase.
 
 use crate::plant::{
-    EncoderConfig, GearConfig, HeatConfig, HeatSensor, InverterConfig, LoadConfig, MachineConfig,
-    PlantConfig, SensingConfig, SupplyConfig,
+    ChopperConfig, EncoderConfig, GearConfig, HeatConfig, HeatSensor, InverterConfig, LoadConfig,
+    MachineConfig, PlantConfig, SensingConfig, SupplyConfig,
 };
 
 /// A preset: its name in files, and what it is.
 pub type Preset = (&'static str, fn() -> PlantConfig);
 
-/// Every preset.
-pub const ALL: [Preset; 5] = [
+/// Every preset: those of [ST drives](crate::st::MotorConfig::PRESETS), then RMD motors.
+pub const ALL: [Preset; 6] = [
     ("drone", drone),
     ("shinano", shinano),
+    ("servo", servo),
     ("mains", mains),
     ("rmd-l-5005", rmd_l_5005),
     ("rmd-x8", rmd_x8),
@@ -115,6 +116,13 @@ pub fn shinano() -> PlantConfig {
     }
 }
 
+/// The [24 V motor](shinano) with a brake chopper: what the drive `servo` runs on.
+pub fn servo() -> PlantConfig {
+    let chopper = ChopperConfig { resistance: 5.0, on_voltage: 30.0, off_voltage: 29.0 };
+    let supply = SupplyConfig { chopper: Some(chopper), ..SupplyConfig::default() };
+    PlantConfig { supply, ..shinano() }
+}
+
 /// A servo motor for the rectified mains: WITTENSTEIN premo SP, stator 2D, 320 V.
 ///
 /// | value | | from |
@@ -154,6 +162,11 @@ pub fn mains() -> PlantConfig {
             voltage: 325.0,
             resistance: 0.5,
             capacitance: 680e-6,
+            chopper: Some(ChopperConfig {
+                resistance: 100.0,
+                on_voltage: 415.0,
+                off_voltage: 410.0,
+            }),
             ..SupplyConfig::default()
         },
         inverter: InverterConfig { dead_time_us: 1.0, ripple_current: 0.3, on_resistance: 0.1 },

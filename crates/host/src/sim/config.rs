@@ -329,6 +329,8 @@ mod tests {
         assert!(why("[[st.motor]]\nplant.heat.ambient = inf").contains("heat.ambient"));
         assert!(why("[[st.motor]]\nalignment_current = 1e38").contains("alignment_current"));
         assert!(why("[[st.motor]]\nthresholds.over_voltage = nan").contains("over_voltage"));
+        let percent = why("[[st.motor]]\nregisters.fluxwk_bus = 70000");
+        assert!(percent.contains("registers.fluxwk_bus (in 0.1 %) is 0 to 1000, not 70000"));
         let phase = "{ speed_rpm = 0, current = inf, duration_ms = 0 }";
         let revup = format!("[[st.motor]]\nrevup = [{}]", [phase; 5].join(", "));
         assert!(why(&revup).contains("revup.current"));

@@ -5,7 +5,7 @@ use motorlink_proto::stmcp::{REVUP_PHASES, RevupPhase};
 
 use super::Registers;
 use super::scale::{Scale, s16};
-use crate::plant::{ChopperConfig, OutOfRange, PlantConfig, range};
+use crate::plant::{OutOfRange, PlantConfig, range};
 use crate::preset;
 
 /// A motor with its drive. The default is a mains-fed motor without sensor, with everything that
@@ -66,9 +66,7 @@ impl MotorConfig {
     /// A 325 V [servo motor](preset::mains) without sensor; observer with PLL, flux weakening,
     /// feed-forward, PFC, DAC, and a brake chopper.
     pub fn mains() -> Self {
-        let mut plant = preset::mains();
-        plant.supply.chopper =
-            Some(ChopperConfig { resistance: 100.0, on_voltage: 415.0, off_voltage: 410.0 });
+        let plant = preset::mains();
         MotorConfig {
             build: BuildConfig::default(),
             thresholds: ThresholdConfig::default(),
@@ -117,10 +115,9 @@ impl MotorConfig {
     /// The motor of [`shinano`](Self::shinano) with an encoder, CORDIC observer and position
     /// control, and a brake chopper; without what else the default has.
     pub fn servo() -> Self {
-        let mut shinano = MotorConfig::shinano();
-        shinano.plant.supply.chopper =
-            Some(ChopperConfig { resistance: 5.0, on_voltage: 30.0, off_voltage: 29.0 });
+        let shinano = MotorConfig::shinano();
         MotorConfig {
+            plant: preset::servo(),
             build: BuildConfig {
                 observer_pll: false,
                 observer_cordic: true,
@@ -183,6 +180,7 @@ impl MotorConfig {
             ("thresholds.over_temperature", limits.over_temperature, -ANY, ANY),
             ("thresholds.temperature_hysteresis", limits.temperature_hysteresis, 0.0, ANY),
             ("thresholds.over_current", limits.over_current, 0.0, ANY),
+            ("registers.fluxwk_bus (in 0.1 %)", self.registers.fluxwk_bus as f32, 0.0, 1000.0),
         ])?;
         range::check(self.revup.iter().map(|phase| ("revup.current", phase.current, -1e3, 1e3)))
     }

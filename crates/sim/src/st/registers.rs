@@ -60,7 +60,7 @@ stored! {
     PLL_KI pll_ki = 0, "PLL Ki, numerator, dpp/s16V.";
     FLUXWK_KP fluxwk_kp = 0, "Flux weakening Kp, s16A/s16V².";
     FLUXWK_KI fluxwk_ki = 0, "Flux weakening Ki, s16A/s16V².";
-    FLUXWK_BUS fluxwk_bus = 985, "Share of the bus voltage that flux weakening may use, 0.1 %.";
+    FLUXWK_BUS fluxwk_bus = 985, "Share of the bus voltage that flux weakening may use, 0 to 1000 tenths of a percent, whatever the profile.";
     IQ_SPEEDMODE iq_speedmode = 0, "Id reference in speed mode, s16A.";
     FF_1Q ff_1q = 0, "Feed-forward constant C1q.";
     FF_1D ff_1d = 0, "Feed-forward constant C1d.";

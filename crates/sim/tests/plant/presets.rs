@@ -2,12 +2,25 @@
 
 use motorlink_sim::plant::{MachineConfig, PlantConfig, SupplyConfig};
 use motorlink_sim::preset;
+use motorlink_sim::rmd::RmdConfig;
+use motorlink_sim::st::MotorConfig;
 
 #[test]
 fn every_preset_can_be() {
     for (name, config) in preset::ALL {
         config().check().unwrap_or_else(|odd| panic!("{name}: {odd}"));
     }
+}
+
+#[test]
+fn every_drive_that_has_a_name_has_the_plant_of_that_name() {
+    let st = MotorConfig::PRESETS.map(|(name, config)| (name, config().plant));
+    let rmd = [("rmd-l-5005", RmdConfig::default().plant), ("rmd-x8", RmdConfig::x8().plant)];
+    let drives: Vec<_> = st.into_iter().chain(rmd).collect();
+    for (name, plant) in &drives {
+        assert_eq!(preset::named(name), Some(*plant), "{name}");
+    }
+    assert_eq!(preset::ALL.len(), drives.len());
 }
 
 #[test]
