@@ -15,6 +15,11 @@ CONTROL_MODE = 0x03
 SPEED_MEAS = 0x1E
 
 
+def close_to(volts):
+    """The voltage of a bus from which only the board takes a current."""
+    return pytest.approx(volts, abs=0.01)
+
+
 def test_each_port_is_announced_when_it_can_be_opened(sim, tmp_path):
     drives = sim(st=("pty", "tcp"), rmd=("slcan-pty", "tcp"))
     st, st_tcp, rmd, rmd_tcp = drives.ports
@@ -48,7 +53,7 @@ def test_each_port_has_drives_of_its_own(sim, tmp_path):
         assert (a.get(0x05), b.get(0x05) == 77) == (77, False)
     drives.do("supply", port=ports[1], motor=2, volts=28)
     eventually(lambda: drives.motor(2, ports[1])["bus_volts"] > 27.9, "the capacitor is full")
-    assert drives.motor(2, ports[0])["bus_volts"] == 24
+    assert drives.motor(2, ports[0])["bus_volts"] == close_to(24)
 
 
 def test_a_serial_line_over_tcp_has_one_client_at_a_time(sim):
@@ -178,8 +183,8 @@ def test_the_configuration_says_what_the_drives_are(sim, tmp_path):
     drives = sim(config)
     st, rmd = drives.ports
     assert (st["motors"], st["profile"], rmd["ids"]) == (1, "mcsdk-5.4", [32])
-    assert drives.motor(1, st["port"])["bus_volts"] == 28
-    assert drives.motor(32, rmd["port"])["supply_volts"] == 36
+    assert drives.motor(1, st["port"])["bus_volts"] == close_to(28)
+    assert drives.motor(32, rmd["port"])["supply_volts"] == close_to(36)
     with Line(drives.st) as line:
         assert line.get(0x05) == 1234
 
@@ -337,7 +342,7 @@ def test_a_power_cycle_is_for_the_drive_or_for_a_motor_on_the_bus(st, rmd):
 def test_a_line_that_cannot_be_obeyed_says_why_and_changes_nothing(rmd, line, why):
     answer = rmd.say(line)
     assert not answer["ok"] and why in answer["error"]
-    assert rmd.motor(1)["supply_volts"] == 24
+    assert rmd.motor(1)["supply_volts"] == close_to(24)
 
 
 def test_among_several_ports_the_one_meant_has_to_be_named(sim):

@@ -9,6 +9,10 @@ use crate::plant::{
     MachineConfig, PlantConfig, SensingConfig, SupplyConfig,
 };
 
+/// What a magnet of neodymium, iron and boron loses of its remanence, 1/K: makers say 0.11 to 0.12 % for
+/// the usual grades.
+const NEODYMIUM: f32 = -0.0011;
+
 /// A preset: its name in files, and what it is.
 pub type Preset = (&'static str, fn() -> PlantConfig);
 
@@ -46,6 +50,7 @@ pub fn drone() -> PlantConfig {
             inductance_d: 18e-6,
             inductance_q: 18e-6,
             flux_linkage: 0.463e-3,
+            magnet_coefficient: NEODYMIUM,
             inertia: 2e-6,
             viscous_friction: 4e-7,
             coulomb_friction: 1.0e-3,
@@ -90,6 +95,7 @@ pub fn shinano() -> PlantConfig {
             inductance_d: 1.1e-3,
             inductance_q: 1.1e-3,
             flux_linkage: 16.06e-3,
+            magnet_coefficient: NEODYMIUM,
             inertia: 1.5e-5,
             viscous_friction: 5e-6,
             coulomb_friction: 3e-3,
@@ -140,6 +146,7 @@ pub fn mains() -> PlantConfig {
             inductance_d: 3.715e-3,
             inductance_q: 3.715e-3,
             flux_linkage: 61.6e-3,
+            magnet_coefficient: NEODYMIUM,
             inertia: 0.83e-4,
             viscous_friction: 2e-5,
             coulomb_friction: 0.02,
@@ -193,6 +200,7 @@ pub fn rmd_l_5005() -> PlantConfig {
             inductance_d: 0.325e-3,
             inductance_q: 0.325e-3,
             flux_linkage: 4.0e-3,
+            magnet_coefficient: NEODYMIUM,
             inertia: 1.36e-5,
             viscous_friction: 1e-5,
             coulomb_friction: 2.5e-3,
@@ -238,6 +246,7 @@ pub fn rmd_x8() -> PlantConfig {
             inductance_d: 0.11e-3,
             inductance_q: 0.11e-3,
             flux_linkage: 6.8e-3,
+            magnet_coefficient: NEODYMIUM,
             inertia: 2.6e-4,
             viscous_friction: 5e-5,
             coulomb_friction: 0.025,

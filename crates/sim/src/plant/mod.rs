@@ -114,7 +114,7 @@ fn through_diodes(machine: &Machine, period: f32, bus: f32) -> (Option<Feed>, bo
     const SIX_STEP: f32 = core::f32::consts::FRAC_2_PI;
     let MachineConfig { inductance_d, inductance_q, .. } = *machine.config();
     let current = machine.rotor_current();
-    let back_emf = machine.speed() * machine.config().back_emf_constant();
+    let back_emf = machine.back_emf_amplitude();
     let flows = current != Vector::ZERO;
     let most = if flows { SIX_STEP } else { INVERSE_SQRT_3 } * bus;
     if !flows && back_emf.abs() <= most {
@@ -191,7 +191,7 @@ impl Plant {
         };
         plant.machine.place(start, 0.0);
         plant.machine.set_series(config.inverter.on_resistance);
-        plant.machine.set_temperature(plant.heat.winding());
+        plant.machine.set_temperatures(plant.heat.winding(), plant.heat.housing());
         plant.initial = plant.stored();
         plant
     }
@@ -281,7 +281,7 @@ impl Plant {
         };
         let housing = inverter + flow.iron + flow.friction;
         self.heat.step(dt, winding, housing);
-        self.machine.set_temperature(self.heat.winding());
+        self.machine.set_temperatures(self.heat.winding(), self.heat.housing());
     }
 
     /// The account with what came since it was written, but for what is stored.

@@ -57,6 +57,7 @@ impl PlantConfig {
             ("plant.machine.inductance_d", machine.inductance_d, 1e-6, 10.0),
             ("plant.machine.inductance_q", machine.inductance_q, 1e-6, 10.0),
             ("plant.machine.flux_linkage", machine.flux_linkage, 1e-6, 10.0),
+            ("plant.machine.magnet_coefficient", machine.magnet_coefficient, -0.01, 0.01),
             ("plant.machine.inertia", machine.inertia, SMALL, 1e3),
             ("plant.machine.viscous_friction", machine.viscous_friction, 0.0, 1e3),
             ("plant.machine.coulomb_friction", machine.coulomb_friction, 0.0, 1e3),

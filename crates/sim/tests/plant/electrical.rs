@@ -1,7 +1,8 @@
 //! Currents and torque.
 
 use motorlink_sim::plant::{
-    Bridge, Feed, Flow, InverterConfig, LoadConfig, Machine, MachineConfig, Plant, PlantConfig,
+    Bridge, Feed, Flow, HeatConfig, InverterConfig, LoadConfig, Machine, MachineConfig, Plant,
+    PlantConfig,
 };
 use motorlink_sim::vector::Vector;
 use motorlink_sim::{angle, preset};
@@ -58,10 +59,42 @@ fn the_back_emf_is_the_voltage_of_open_terminals() {
 #[test]
 fn a_hot_winding_has_more_resistance() {
     let mut machine = machine();
-    machine.set_temperature(125.0);
+    machine.set_temperatures(125.0, 25.0);
     assert!((machine.resistance() / 0.5 - 1.385).abs() < 0.001);
-    machine.set_temperature(1e30);
+    machine.set_temperatures(1e30, 25.0);
     assert_eq!(machine.resistance(), 5.0, "copper that boils");
+}
+
+#[test]
+fn a_hot_magnet_has_less_torque_and_back_emf() {
+    // -0.11 % a kelvin: 8.8 % less at 105 °C.
+    let config = MachineConfig { magnet_coefficient: -0.0011, ..plain().machine };
+    let locked = |magnet| {
+        let mut machine = Machine::new(config, LoadConfig::default(), DT);
+        machine.set_temperatures(25.0, magnet);
+        machine.lock(true);
+        for _ in 0..2000 {
+            machine.step(Feed::Rotor(Vector::new(0.0, 2.0)), &mut Flow::default());
+        }
+        machine.torque()
+    };
+    // 4 A with 1.5 · 4 · 0.01 Nm/A.
+    assert!((locked(25.0) - 0.24).abs() < 1e-5, "{} Nm", locked(25.0));
+    assert!((locked(105.0) - 0.912 * 0.24).abs() < 1e-5, "{} Nm", locked(105.0));
+    let mut turned = Machine::new(config, LoadConfig::default(), DT);
+    turned.set_temperatures(25.0, 105.0);
+    turned.place(0, 100.0);
+    assert!((turned.back_emf().length() - 0.912 * 4.0).abs() < 1e-5);
+}
+
+#[test]
+fn a_magnet_has_the_temperature_of_the_housing() {
+    let config = preset::rmd_l_5005();
+    let heat = HeatConfig { ambient: 65.0, ..config.heat };
+    let plant = Plant::new(PlantConfig { heat, ..config });
+    // 40 K above 25 °C.
+    let expected = 4.0e-3 * (1.0 - 0.0011 * 40.0);
+    assert!((plant.machine().flux_linkage() / expected - 1.0).abs() < 1e-6);
 }
 
 /// Current, speed and angle of an accelerating motor at 20 ms, in steps of `dt`.

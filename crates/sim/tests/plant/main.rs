@@ -24,6 +24,7 @@ pub fn plain() -> PlantConfig {
             inductance_d: 1e-3,
             inductance_q: 1.5e-3,
             flux_linkage: 0.01,
+            magnet_coefficient: 0.0,
             inertia: 1e-4,
             viscous_friction: 0.0,
             coulomb_friction: 0.0,

@@ -17,8 +17,10 @@ pub struct MachineConfig {
     pub inductance_d: f32,
     /// Inductance across the magnet, H.
     pub inductance_q: f32,
-    /// Amplitude of the magnet's flux linkage in a phase, Wb.
+    /// Amplitude of the magnet's flux linkage in a phase at 25 °C, Wb.
     pub flux_linkage: f32,
+    /// Change of the flux linkage per kelvin of the magnet, as a share, 1/K.
+    pub magnet_coefficient: f32,
     /// Inertia of the rotor, kg m².
     pub inertia: f32,
     /// Friction that grows with speed, Nm s/rad.
@@ -72,12 +74,12 @@ impl GearConfig {
 }
 
 impl MachineConfig {
-    /// Torque at the rotor per Iq at Id = 0, Nm/A.
+    /// Torque at the rotor per Iq at Id = 0 and 25 °C, Nm/A.
     pub fn torque_constant(&self) -> f32 {
         1.5 * f32::from(self.pole_pairs) * self.flux_linkage
     }
 
-    /// Amplitude of a phase's back-EMF per speed of the rotor, V s/rad.
+    /// Amplitude of a phase's back-EMF per speed of the rotor at 25 °C, V s/rad.
     pub fn back_emf_constant(&self) -> f32 {
         f32::from(self.pole_pairs) * self.flux_linkage
     }

@@ -10,6 +10,9 @@
 //! T     = 1.5 p ψ × i        = 1.5 p (ψm iq + (Ld − Lq) id iq)
 //! ```
 //!
+//! R grows with the windings' temperature, by 1/259.5 of its value at 25 °C per kelvin, as copper's does;
+//! ψm falls with the magnet's.
+//!
 //! In the rotor's frame Ld id and Lq iq turn back with the electrical speed ω and die away with R/L.
 //! What the axes have in common of that, a = R (1/Ld + 1/Lq) / 2, and voltage and back-EMF are solved
 //! exactly for half a step of constant speed, as complex numbers:
@@ -64,6 +67,10 @@ const COPPER: f32 = 1.0 / 259.5;
 /// Greatest growth of the resistance: copper boils at 2560 °C.
 const VAPOUR: f32 = 10.0;
 
+/// Bounds of what is left of a magnet's flux: it is not followed up to where it has none.
+const LEAST_MAGNET: f32 = 0.1;
+const MOST_MAGNET: f32 = 2.0;
+
 /// What the windings are fed with for a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Feed {
@@ -101,6 +108,8 @@ pub struct Machine {
     /// Phase resistance now, Ω, and what is in series with it.
     resistance: f32,
     series: f32,
+    /// Flux linkage of the magnet now, Wb.
+    magnet: f32,
     decay: Decay,
     shaft: Shaft,
     /// Pairs of poles.
@@ -144,6 +153,7 @@ impl Machine {
             period,
             resistance: config.resistance,
             series: 0.0,
+            magnet: config.flux_linkage,
             inverse_stribeck: 1.0 / config.stribeck_speed,
             inverse,
             flux: Vector::ZERO,
@@ -226,8 +236,12 @@ impl Machine {
 
     /// Back-EMF in the stator's frame, V.
     pub fn back_emf(&self) -> Vector {
-        let amplitude = self.speed * self.config.back_emf_constant();
-        Vector::new(-self.frame.y, self.frame.x) * amplitude
+        Vector::new(-self.frame.y, self.frame.x) * self.back_emf_amplitude()
+    }
+
+    /// Amplitude of the back-EMF, negative backwards, V.
+    pub(super) fn back_emf_amplitude(&self) -> f32 {
+        self.poles * self.speed * self.magnet
     }
 
     /// Voltage at the windings in the rotor's frame, mean of the last step, V: Vd and Vq, behind what is
@@ -259,11 +273,18 @@ impl Machine {
         self.resistance
     }
 
-    /// Sets the windings' temperature, °C.
-    pub fn set_temperature(&mut self, celsius: f32) {
+    /// Flux linkage of the magnet at the present temperature, Wb.
+    pub const fn flux_linkage(&self) -> f32 {
+        self.magnet
+    }
+
+    /// Sets the temperatures of windings and magnet, °C.
+    pub fn set_temperatures(&mut self, windings: f32, magnet: f32) {
         /// Change of the resistance that is not worth a new exponential.
         const SAME: f32 = 1e-5;
-        let growth = within(1.0 + COPPER * (celsius - 25.0), 0.1, VAPOUR);
+        let left = 1.0 + self.config.magnet_coefficient * (magnet - 25.0);
+        self.magnet = self.config.flux_linkage * within(left, LEAST_MAGNET, MOST_MAGNET);
+        let growth = within(1.0 + COPPER * (windings - 25.0), 0.1, VAPOUR);
         let resistance = self.config.resistance * growth;
         if (resistance - self.resistance).abs() > SAME * resistance {
             self.resistance = resistance;

@@ -32,7 +32,7 @@ impl Machine {
         let half = self.half();
         let end = self.frame.turned(half.turn).turned(half.turn);
         self.advance(half, end, flow);
-        self.voltage = Vector::new(0.0, self.poles * self.speed * self.config.flux_linkage);
+        self.voltage = Vector::new(0.0, self.back_emf_amplitude());
     }
 
     /// Lets a voltage act for a step; adds where energy went.
@@ -40,7 +40,7 @@ impl Machine {
     pub fn step(&mut self, feed: Feed, flow: &mut Flow) {
         let half = self.half();
         let end = self.frame.turned(half.turn).turned(half.turn);
-        let emf = Vector::new(0.0, half.electrical * self.config.flux_linkage);
+        let emf = Vector::new(0.0, half.electrical * self.magnet);
         // The voltage as the rotor sees it, what of it is constant there, and what is not.
         let (v1, v2, v3, constant, still) = match feed {
             Feed::Stator(v) => {
@@ -71,7 +71,7 @@ impl Machine {
         flow.copper += 1.5 * (self.resistance + self.series) * sixth * square;
         let current = i1 + i2 * 4.0 + i3;
         self.voltage = (v1 + v2 * 4.0 + v3 - current * self.series) * (1.0 / 6.0);
-        let mut product = self.config.flux_linkage * current.y;
+        let mut product = self.magnet * current.y;
         if self.decay.salient {
             product += f1.cross(i1) + 4.0 * f2.cross(i2) + f3.cross(i3);
         }
