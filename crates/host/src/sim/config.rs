@@ -311,6 +311,28 @@ mod tests {
     }
 
     #[test]
+    fn every_value_of_a_plant_and_every_register_is_documented_with_its_unit() {
+        fn keys(value: &serde_json::Value, found: &mut Vec<String>) {
+            for (key, value) in value.as_object().into_iter().flatten() {
+                found.push(key.clone());
+                keys(value, found);
+            }
+        }
+        let document = include_str!("../../../../docs/PHYSICS.md");
+        let motor = serde_json::to_value(MotorConfig::mains()).unwrap();
+        let mut found = Vec::new();
+        for part in ["plant", "registers"] {
+            keys(&motor[part], &mut found);
+        }
+        assert!(found.len() > 100, "{found:?}");
+        for key in found {
+            let known = ["`KEY`", ".KEY`", "`KEY.", "`plant.KEY.`"];
+            let known = known.map(|pattern| pattern.replace("KEY", &key));
+            assert!(known.iter().any(|known| document.contains(known)), "{key} is not documented");
+        }
+    }
+
+    #[test]
     fn what_cannot_be_is_refused_with_its_place() {
         let why = |text: &str| BenchConfig::parse(text).unwrap_err().to_string();
         assert!(why("[[rmd.motor]]\nidd = 3").contains("idd"));
