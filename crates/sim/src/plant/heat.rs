@@ -5,6 +5,13 @@
 //! Ch dTh/dt = P_other + (Tw − Th)/Rwh − (Th − Ta)/Rha
 //! ```
 //!
+//! Each phase is a third of the winding. What it has above the winding's mean follows what it gets
+//! beyond a third of the heat:
+//!
+//! ```text
+//! Cw/3 dTk/dt = P_k − P_copper/3 − Tk (1/(3 Rwh) + 3/Rpp)
+//! ```
+//!
 //! The usual lumped model of a motor's data sheet (winding and stator; see for example Maxon,
 //! *Formulae Handbook*, thermal behaviour).
 
@@ -26,6 +33,8 @@ pub struct HeatConfig {
     pub winding_to_housing: f32,
     /// From housing to air, K/W.
     pub housing_to_air: f32,
+    /// From each phase of the winding to each other, K/W.
+    pub phase_to_phase: f32,
     /// Where the drive's sensor is.
     pub sensor: HeatSensor,
 }
@@ -38,7 +47,7 @@ pub struct HeatConfig {
     serde(rename_all = "lowercase")
 )]
 pub enum HeatSensor {
-    /// In the winding.
+    /// In the winding, at the mean of its phases.
     Winding,
     /// On the housing, which is the power stage's heatsink too.
     #[default]
@@ -53,6 +62,7 @@ impl Default for HeatConfig {
             housing_capacity: 250.0,
             winding_to_housing: 1.0,
             housing_to_air: 2.5,
+            phase_to_phase: 9.0,
             sensor: HeatSensor::Housing,
         }
     }
@@ -65,6 +75,8 @@ pub(super) struct Heat {
     /// °C, in more digits than the rest: what a large body warms up by in a step is little beside it.
     winding: f64,
     housing: f64,
+    /// What the phases have above the winding's mean, K.
+    apart: [f32; 3],
     /// What the sensor shows in place of the truth, °C.
     forced: Option<f32>,
 }
@@ -74,6 +86,7 @@ impl Heat {
         Heat {
             winding: config.ambient as f64,
             housing: config.ambient as f64,
+            apart: [0.0; 3],
             forced: None,
             config,
         }
@@ -89,6 +102,11 @@ impl Heat {
         self.housing as f32
     }
 
+    /// Temperatures of the phases, °C.
+    pub(super) fn phases(&self) -> [f32; 3] {
+        self.apart.map(|apart| self.winding() + apart)
+    }
+
     /// What the sensor shows, °C.
     pub(super) fn sensed(&self) -> f32 {
         self.forced.unwrap_or(match self.config.sensor {
@@ -101,9 +119,15 @@ impl Heat {
         self.forced = temperature;
     }
 
-    /// Lets heat in the winding and in the housing (J) act over `dt` (s).
-    pub(super) fn step(&mut self, dt: f32, winding: f32, housing: f32) {
+    /// Lets heat in the winding and in the housing (J) act over `dt` (s); `shares` are those of the
+    /// phases in the winding's.
+    pub(super) fn step(&mut self, dt: f32, winding: f32, shares: [f32; 3], housing: f32) {
         let HeatConfig { ambient, winding_to_housing, housing_to_air, .. } = self.config;
+        let leaking = 1.0 / (3.0 * winding_to_housing) + 3.0 / self.config.phase_to_phase;
+        for (apart, share) in self.apart.iter_mut().zip(shares) {
+            let gained = winding * (share - 1.0 / 3.0) - *apart * leaking * dt;
+            *apart += 3.0 * gained / self.config.winding_capacity;
+        }
         let inner = (self.winding() - self.housing()) / winding_to_housing * dt;
         let outer = (self.housing() - ambient) / housing_to_air * dt;
         self.winding += f64::from((winding - inner) / self.config.winding_capacity);
@@ -124,10 +148,11 @@ mod tests {
             winding_to_housing: 0.5,
             housing_to_air: 0.5,
             sensor: HeatSensor::Housing,
+            ..HeatConfig::default()
         };
         let mut heat = Heat::new(config);
         for _ in 0..10_000_000 {
-            heat.step(1e-3, 0.0, 3e-3);
+            heat.step(1e-3, 0.0, [0.0; 3], 3e-3);
         }
         // 3 W through 0.5 K/W, after ten time constants.
         assert!((heat.housing() - 41.5).abs() < 0.01, "{} °C", heat.housing());

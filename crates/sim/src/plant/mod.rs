@@ -98,8 +98,10 @@ pub struct PlantTruth {
     pub chopping: bool,
     /// What becomes heat.
     pub losses: Losses,
-    /// Temperature of the winding, °C.
+    /// Temperature of the winding, mean of its phases, °C.
     pub winding_temperature: f32,
+    /// Temperatures of the phases, °C.
+    pub phase_temperatures: [f32; 3],
     /// Temperature of the housing, °C.
     pub housing_temperature: f32,
     /// Whether the rotor is held.
@@ -154,6 +156,8 @@ pub struct Plant {
     count: u32,
     /// Time since the last slow step, µs.
     since_slow: u32,
+    /// Sum of the squares of the phase currents since the last slow step, A².
+    squares: [f32; 3],
     /// Energies since the last slow step.
     flow: Flow,
     bus: supply::Flow,
@@ -182,6 +186,7 @@ impl Plant {
             encoder_zero: angle::position(config.encoder.offset_degrees.to_radians()),
             count: 0,
             since_slow: 0,
+            squares: [0.0; 3],
             flow: Flow::default(),
             bus: supply::Flow::default(),
             energy: Energy::default(),
@@ -247,6 +252,9 @@ impl Plant {
             Some(feed) => machine.step(feed, flow),
             None => machine.coast(flow),
         }
+        for (sum, current) in self.squares.iter_mut().zip(machine.current().phases()) {
+            *sum += current * current;
+        }
         if ends {
             machine.open();
         }
@@ -280,8 +288,16 @@ impl Plant {
             chopper: watts(bus.braked),
         };
         let housing = inverter + flow.iron + flow.friction;
-        self.heat.step(dt, winding, housing);
+        let shares = self.phase_shares();
+        self.heat.step(dt, winding, shares, housing);
         self.machine.set_temperatures(self.heat.winding(), self.heat.housing());
+    }
+
+    /// Shares of the phases in the winding's heat since the last slow step.
+    fn phase_shares(&mut self) -> [f32; 3] {
+        let squares = core::mem::take(&mut self.squares);
+        let sum: f32 = squares.iter().sum();
+        if sum > 0.0 { squares.map(|square| square / sum) } else { [1.0 / 3.0; 3] }
     }
 
     /// The account with what came since it was written, but for what is stored.
@@ -412,6 +428,7 @@ impl Plant {
             chopping: self.supply.chopping(),
             losses: self.losses,
             winding_temperature: self.heat.winding(),
+            phase_temperatures: self.heat.phases(),
             housing_temperature: self.heat.housing(),
             locked: self.machine.locked(),
         }

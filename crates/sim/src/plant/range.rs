@@ -82,6 +82,7 @@ impl PlantConfig {
             ("plant.heat.housing_capacity", heat.housing_capacity, 0.1, 1e6),
             ("plant.heat.winding_to_housing", heat.winding_to_housing, 0.05, 1e4),
             ("plant.heat.housing_to_air", heat.housing_to_air, 0.05, 1e4),
+            ("plant.heat.phase_to_phase", heat.phase_to_phase, 0.1, 1e6),
             ("plant.supply.voltage", supply.voltage, 0.0, 1000.0),
             ("plant.supply.resistance", supply.resistance, 1e-3, 1e3),
             ("plant.supply.capacitance", supply.capacitance, 1e-6, 10.0),

@@ -136,6 +136,7 @@ fn a_locked_rotor_heats_its_winding_as_two_bodies_do() {
         winding_to_housing: 2.0,
         housing_to_air: 3.0,
         sensor: HeatSensor::Winding,
+        phase_to_phase: 30.0,
     };
     // The power depends on the temperature only through the resistance: take the voltage away.
     let machine = MachineConfig { resistance: 0.5, ..plain().machine };
@@ -183,4 +184,30 @@ fn losses_and_the_current_of_the_source_are_those_of_the_circuit() {
     let energy = plant.energy();
     assert!((energy.board / (0.05 * 24.0 * 0.2) - 1.0).abs() < 0.03, "{energy:?}");
     assert!(energy.imbalance().abs() < 1e-3, "{energy:?}");
+}
+
+#[test]
+fn a_stall_heats_the_phases_by_the_squares_of_their_currents() {
+    let heat = HeatConfig {
+        winding_capacity: 3.0,
+        housing_capacity: 1e6,
+        winding_to_housing: 1.0,
+        phase_to_phase: 9.0,
+        ..HeatConfig::default()
+    };
+    let mut plant = Plant::new(PlantConfig { heat, ..plain() });
+    plant.lock(true);
+    // Along phase A: it has the current, each of the others half of it. After ten time constants.
+    for _ in 0..600_000 {
+        plant.step(Bridge::Drive(Vector::new(0.05, 0.0)));
+    }
+    let truth = plant.truth();
+    let above = truth.phase_temperatures.map(|phase| phase - truth.housing_temperature);
+    let mean = truth.winding_temperature - truth.housing_temperature;
+    assert!((mean - truth.losses.winding).abs() < 0.01 * mean, "1 K/W: {truth:?}");
+    // 2/3 of the heat and 1/6: 1/3 more and 1/6 less than a third, against 1/3 + 3/9 W/K.
+    assert!((above[0] / mean - 1.5).abs() < 0.01, "{above:?} K, {mean} K");
+    assert!((above[1] / mean - 0.75).abs() < 0.01 && above[1] == above[2], "{above:?} K");
+    let sum: f32 = above.iter().sum();
+    assert!((sum - 3.0 * mean).abs() < 0.01 * mean);
 }

@@ -186,6 +186,9 @@ signals!(ST, motorlink_sim::st::Truth, |truth| {
     chopper_loss_watts = truth.plant.losses.chopper;
     heatsink_celsius = truth.temperature;
     winding_celsius = truth.plant.winding_temperature;
+    phase_a_celsius = truth.plant.phase_temperatures[0];
+    phase_b_celsius = truth.plant.phase_temperatures[1];
+    phase_c_celsius = truth.plant.phase_temperatures[2];
     status[Names::Status] = u8::from(truth.status);
     faults[Names::Faults] = (truth.flags.occurred() | truth.flags.present()) as u8;
 });
@@ -230,6 +233,9 @@ signals!(RMD, Rmd, |rmd| {
     chopper_loss_watts = rmd.truth.plant.losses.chopper;
     motor_celsius = rmd.truth.temperature;
     winding_celsius = rmd.truth.plant.winding_temperature;
+    phase_a_celsius = rmd.truth.plant.phase_temperatures[0];
+    phase_b_celsius = rmd.truth.plant.phase_temperatures[1];
+    phase_c_celsius = rmd.truth.plant.phase_temperatures[2];
     mode[Names::Mode] = mode_number(rmd.truth.mode);
     errors[Names::Errors] = u8::from(rmd.errors);
 });
