@@ -74,7 +74,12 @@ pub fn drone() -> PlantConfig {
             ..HeatConfig::default()
         },
         supply: SupplyConfig { voltage: 11.1, takes_back: true, ..SupplyConfig::default() },
-        inverter: InverterConfig { dead_time_us: 0.3, ripple_current: 0.5, on_resistance: 0.01 },
+        inverter: InverterConfig {
+            dead_time_us: 0.3,
+            ripple_current: 0.5,
+            on_resistance: 0.01,
+            switching_time_ns: 40.0,
+        },
         sensing: SensingConfig { full_scale: 20.0, noise: 0.01, ..SensingConfig::default() },
         encoder: EncoderConfig::default(),
     }
@@ -181,7 +186,12 @@ pub fn mains() -> PlantConfig {
             }),
             ..SupplyConfig::default()
         },
-        inverter: InverterConfig { dead_time_us: 1.0, ripple_current: 0.3, on_resistance: 0.1 },
+        inverter: InverterConfig {
+            dead_time_us: 1.0,
+            ripple_current: 0.3,
+            on_resistance: 0.1,
+            switching_time_ns: 200.0,
+        },
         sensing: SensingConfig { full_scale: 20.0, noise: 0.01, ..SensingConfig::default() },
         encoder: EncoderConfig::default(),
         ..shinano()

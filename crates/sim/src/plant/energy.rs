@@ -1,7 +1,7 @@
 //! Where energy came from and where it went.
 
 /// Energies since the beginning, J. Nothing is lost:
-/// `source = supply + board + chopper + copper + iron + friction + gear + load + stored`.
+/// `source = supply + board + chopper + switching + copper + iron + friction + gear + load + stored`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy {
     /// Out of the source, and of what feeds the bus beside it.
@@ -16,6 +16,8 @@ pub struct Energy {
     pub electrical: f64,
     /// Heat of windings and closed switches.
     pub copper: f64,
+    /// Switching losses of the power stage.
+    pub switching: f64,
     /// Iron losses.
     pub iron: f64,
     /// Heat of the rotor's friction.
@@ -33,7 +35,7 @@ pub struct Energy {
 pub struct Losses {
     /// In the windings.
     pub winding: f32,
-    /// In the power stage.
+    /// In the power stage: closed switches and switching.
     pub inverter: f32,
     /// Of the iron.
     pub iron: f32,
@@ -48,7 +50,7 @@ pub struct Losses {
 impl Energy {
     /// All that was lost or given away.
     pub fn spent(&self) -> f64 {
-        let bus = self.supply + self.board + self.chopper;
+        let bus = self.supply + self.board + self.chopper + self.switching;
         bus + self.copper + self.iron + self.friction + self.gear + self.load
     }
 

@@ -1,8 +1,9 @@
-//! Two bodies that losses heat: the winding, and the housing between it and the air.
+//! Bodies that losses heat: the winding and the inverter, and the housing between them and the air.
 //!
 //! ```text
 //! Cw dTw/dt = P_copper − (Tw − Th)/Rwh
-//! Ch dTh/dt = P_other + (Tw − Th)/Rwh − (Th − Ta)/Rha
+//! Ci dTi/dt = P_inverter − (Ti − Th)/Rih
+//! Ch dTh/dt = P_other + (Tw − Th)/Rwh + (Ti − Th)/Rih − (Th − Ta)/Rha
 //! ```
 //!
 //! Each phase is a third of the winding. What it has above the winding's mean follows what it gets
@@ -33,6 +34,10 @@ pub struct HeatConfig {
     pub winding_to_housing: f32,
     /// From housing to air, K/W.
     pub housing_to_air: f32,
+    /// Heat capacity of the inverter's switches, J/K.
+    pub inverter_capacity: f32,
+    /// From the inverter to the housing, K/W.
+    pub inverter_to_housing: f32,
     /// From each phase of the winding to each other, K/W.
     pub phase_to_phase: f32,
     /// Where the drive's sensor is.
@@ -49,6 +54,8 @@ pub struct HeatConfig {
 pub enum HeatSensor {
     /// In the winding, at the mean of its phases.
     Winding,
+    /// In the inverter, at its switches.
+    Inverter,
     /// On the housing, which is the power stage's heatsink too.
     #[default]
     Housing,
@@ -62,10 +69,22 @@ impl Default for HeatConfig {
             housing_capacity: 250.0,
             winding_to_housing: 1.0,
             housing_to_air: 2.5,
+            inverter_capacity: 5.0,
+            inverter_to_housing: 1.0,
             phase_to_phase: 9.0,
             sensor: HeatSensor::Housing,
         }
     }
+}
+
+/// Heat that bodies get in a step, J.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gained {
+    pub(super) winding: f32,
+    /// Shares of the phases in the winding's.
+    pub(super) shares: [f32; 3],
+    pub(super) inverter: f32,
+    pub(super) housing: f32,
 }
 
 /// The temperatures.
@@ -75,6 +94,7 @@ pub(super) struct Heat {
     /// °C, in more digits than the rest: what a large body warms up by in a step is little beside it.
     winding: f64,
     housing: f64,
+    inverter: f64,
     /// What the phases have above the winding's mean, K.
     apart: [f32; 3],
     /// What the sensor shows in place of the truth, °C.
@@ -86,6 +106,7 @@ impl Heat {
         Heat {
             winding: config.ambient as f64,
             housing: config.ambient as f64,
+            inverter: config.ambient as f64,
             apart: [0.0; 3],
             forced: None,
             config,
@@ -102,6 +123,11 @@ impl Heat {
         self.housing as f32
     }
 
+    /// Temperature of the inverter, °C.
+    pub(super) const fn inverter(&self) -> f32 {
+        self.inverter as f32
+    }
+
     /// Temperatures of the phases, °C.
     pub(super) fn phases(&self) -> [f32; 3] {
         self.apart.map(|apart| self.winding() + apart)
@@ -111,6 +137,7 @@ impl Heat {
     pub(super) fn sensed(&self) -> f32 {
         self.forced.unwrap_or(match self.config.sensor {
             HeatSensor::Winding => self.winding(),
+            HeatSensor::Inverter => self.inverter(),
             HeatSensor::Housing => self.housing(),
         })
     }
@@ -119,10 +146,13 @@ impl Heat {
         self.forced = temperature;
     }
 
-    /// Lets heat in the winding and in the housing (J) act over `dt` (s); `shares` are those of the
-    /// phases in the winding's.
-    pub(super) fn step(&mut self, dt: f32, winding: f32, shares: [f32; 3], housing: f32) {
+    /// Lets heat act over `dt` (s).
+    pub(super) fn step(&mut self, dt: f32, heat: &Gained) {
+        let Gained { winding, shares, inverter, housing } = *heat;
         let HeatConfig { ambient, winding_to_housing, housing_to_air, .. } = self.config;
+        let from_inverter =
+            (self.inverter() - self.housing()) / self.config.inverter_to_housing * dt;
+        self.inverter += f64::from((inverter - from_inverter) / self.config.inverter_capacity);
         let leaking = 1.0 / (3.0 * winding_to_housing) + 3.0 / self.config.phase_to_phase;
         for (apart, share) in self.apart.iter_mut().zip(shares) {
             let gained = winding * (share - 1.0 / 3.0) - *apart * leaking * dt;
@@ -131,7 +161,8 @@ impl Heat {
         let inner = (self.winding() - self.housing()) / winding_to_housing * dt;
         let outer = (self.housing() - ambient) / housing_to_air * dt;
         self.winding += f64::from((winding - inner) / self.config.winding_capacity);
-        self.housing += f64::from((housing + inner - outer) / self.config.housing_capacity);
+        self.housing +=
+            f64::from((housing + from_inverter + inner - outer) / self.config.housing_capacity);
     }
 }
 
@@ -151,8 +182,9 @@ mod tests {
             ..HeatConfig::default()
         };
         let mut heat = Heat::new(config);
+        let gained = Gained { winding: 0.0, shares: [0.0; 3], inverter: 0.0, housing: 3e-3 };
         for _ in 0..10_000_000 {
-            heat.step(1e-3, 0.0, [0.0; 3], 3e-3);
+            heat.step(1e-3, &gained);
         }
         // 3 W through 0.5 K/W, after ten time constants.
         assert!((heat.housing() - 41.5).abs() < 0.01, "{} °C", heat.housing());

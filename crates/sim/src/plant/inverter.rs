@@ -6,6 +6,9 @@
 //! 0 and 1: so what comes out is within the hexagon. During the dead time the current chooses the
 //! rail, which takes `dead time / period` of the bus voltage from a phase that gives current and
 //! adds it to one that takes it; around zero, within the current's ripple, in proportion to it.
+//! Each half bridge switches on and off once a period, with the bus voltage and the phase's current
+//! overlapping for half of the rise and of the fall time: that costs V |i| (tr + tf) / 2 (see for
+//! example N. Mohan and others, *Power Electronics*, on switching losses).
 //! A command within the circle that fits into the hexagon comes out as it is, so only the others are
 //! taken apart into duties.
 
@@ -25,11 +28,18 @@ pub struct InverterConfig {
     pub ripple_current: f32,
     /// Resistance of a closed switch, Ω.
     pub on_resistance: f32,
+    /// Rise and fall time of a switch together, ns: what its switching losses come from.
+    pub switching_time_ns: f32,
 }
 
 impl Default for InverterConfig {
     fn default() -> Self {
-        InverterConfig { dead_time_us: 0.5, ripple_current: 0.2, on_resistance: 0.02 }
+        InverterConfig {
+            dead_time_us: 0.5,
+            ripple_current: 0.2,
+            on_resistance: 0.02,
+            switching_time_ns: 50.0,
+        }
     }
 }
 
@@ -51,6 +61,8 @@ pub(super) struct Modulator {
     dead: f32,
     /// One over the current's ripple, 1/A.
     steepness: f32,
+    /// Share of a phase's current that switching takes from the bus.
+    switching: f32,
 }
 
 impl Modulator {
@@ -58,7 +70,14 @@ impl Modulator {
         Modulator {
             dead: config.dead_time_us * 1e-6 / period,
             steepness: 1.0 / config.ripple_current,
+            switching: 0.5e-9 * config.switching_time_ns / period,
         }
+    }
+
+    /// Current that switching takes from the bus with these currents of the phases, A.
+    pub(super) fn switching(&self, phases: [f32; 3]) -> f32 {
+        let [a, b, c] = phases;
+        self.switching * (a.abs() + b.abs() + c.abs())
     }
 
     /// Voltage per bus voltage that comes out of a command, with this current (A) flowing out.

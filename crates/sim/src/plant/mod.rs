@@ -24,7 +24,7 @@ pub use sensing::{EncoderConfig, Sample, SensingConfig};
 pub(crate) use supply::board_current;
 pub use supply::{ChopperConfig, SupplyConfig};
 
-use heat::Heat;
+use heat::{Gained, Heat};
 use inverter::Modulator;
 use sensing::Sensor;
 use supply::{Currents, Supply};
@@ -104,6 +104,8 @@ pub struct PlantTruth {
     pub phase_temperatures: [f32; 3],
     /// Temperature of the housing, °C.
     pub housing_temperature: f32,
+    /// Temperature of the inverter's switches, °C.
+    pub inverter_temperature: f32,
     /// Whether the rotor is held.
     pub locked: bool,
 }
@@ -161,6 +163,7 @@ pub struct Plant {
     /// Energies since the last slow step.
     flow: Flow,
     bus: supply::Flow,
+    switching: f32,
     energy: Energy,
     losses: Losses,
     /// Stored energy at the beginning, J.
@@ -189,6 +192,7 @@ impl Plant {
             squares: [0.0; 3],
             flow: Flow::default(),
             bus: supply::Flow::default(),
+            switching: 0.0,
             energy: Energy::default(),
             losses: Losses::default(),
             initial: 0.0,
@@ -252,13 +256,17 @@ impl Plant {
             Some(feed) => machine.step(feed, flow),
             None => machine.coast(flow),
         }
-        for (sum, current) in self.squares.iter_mut().zip(machine.current().phases()) {
+        let phases = machine.current().phases();
+        for (sum, current) in self.squares.iter_mut().zip(phases) {
             *sum += current * current;
         }
+        let switching = if bridge == Bridge::Off { 0.0 } else { self.modulator.switching(phases) };
         if ends {
             machine.open();
         }
-        self.feed_bus((self.flow.electrical - before) / (self.period * bus.max(1e-3)));
+        self.switching += switching * bus * self.period;
+        let taken = (self.flow.electrical - before) / (self.period * bus.max(1e-3));
+        self.feed_bus(taken + switching);
     }
 
     /// A step of the bus, of which the bridge takes a current, A.
@@ -277,7 +285,7 @@ impl Plant {
         let series = self.config.inverter.on_resistance;
         let resistance = self.machine.resistance();
         let winding = flow.copper * resistance / (resistance + series);
-        let inverter = flow.copper - winding;
+        let inverter = flow.copper - winding + core::mem::take(&mut self.switching);
         let watts = |joules: f32| joules / dt;
         self.losses = Losses {
             winding: watts(winding),
@@ -287,9 +295,9 @@ impl Plant {
             gear: watts(flow.gear),
             chopper: watts(bus.braked),
         };
-        let housing = inverter + flow.iron + flow.friction;
-        let shares = self.phase_shares();
-        self.heat.step(dt, winding, shares, housing);
+        let housing = flow.iron + flow.friction;
+        let gained = Gained { winding, shares: self.phase_shares(), inverter, housing };
+        self.heat.step(dt, &gained);
         self.machine.set_temperatures(self.heat.winding(), self.heat.housing());
     }
 
@@ -309,6 +317,7 @@ impl Plant {
             chopper: self.energy.chopper + f64::from(self.bus.braked),
             electrical: self.energy.electrical + f64::from(self.flow.electrical),
             copper: self.energy.copper + f64::from(self.flow.copper),
+            switching: self.energy.switching + f64::from(self.switching),
             iron: self.energy.iron + f64::from(self.flow.iron),
             friction: self.energy.friction + f64::from(self.flow.friction),
             gear: self.energy.gear + f64::from(self.flow.gear),
@@ -430,6 +439,7 @@ impl Plant {
             winding_temperature: self.heat.winding(),
             phase_temperatures: self.heat.phases(),
             housing_temperature: self.heat.housing(),
+            inverter_temperature: self.heat.inverter(),
             locked: self.machine.locked(),
         }
     }

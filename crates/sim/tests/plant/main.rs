@@ -39,7 +39,12 @@ pub fn plain() -> PlantConfig {
         load: LoadConfig::default(),
         heat: HeatConfig::default(),
         supply: SupplyConfig { resistance: 0.01, takes_back: true, ..SupplyConfig::default() },
-        inverter: InverterConfig { dead_time_us: 0.0, on_resistance: 0.0, ripple_current: 0.1 },
+        inverter: InverterConfig {
+            dead_time_us: 0.0,
+            on_resistance: 0.0,
+            ripple_current: 0.1,
+            switching_time_ns: 0.0,
+        },
         sensing: SensingConfig::default(),
         encoder: EncoderConfig::default(),
     }

@@ -137,6 +137,7 @@ fn a_locked_rotor_heats_its_winding_as_two_bodies_do() {
         housing_to_air: 3.0,
         sensor: HeatSensor::Winding,
         phase_to_phase: 30.0,
+        ..HeatConfig::default()
     };
     // The power depends on the temperature only through the resistance: take the voltage away.
     let machine = MachineConfig { resistance: 0.5, ..plain().machine };
@@ -210,4 +211,32 @@ fn a_stall_heats_the_phases_by_the_squares_of_their_currents() {
     assert!((above[1] / mean - 0.75).abs() < 0.01 && above[1] == above[2], "{above:?} K");
     let sum: f32 = above.iter().sum();
     assert!((sum - 3.0 * mean).abs() < 0.01 * mean);
+}
+
+#[test]
+fn switching_takes_power_from_the_bus_and_heats_the_inverter() {
+    let inverter = InverterConfig { switching_time_ns: 200.0, ..plain().inverter };
+    let heat = HeatConfig {
+        inverter_capacity: 0.1,
+        inverter_to_housing: 2.0,
+        housing_capacity: 1e6,
+        sensor: HeatSensor::Inverter,
+        ..HeatConfig::default()
+    };
+    let mut plant = Plant::new(PlantConfig { inverter, heat, ..plain() });
+    plant.lock(true);
+    // Along phase A: I, I/2 and I/2. After ten time constants.
+    for _ in 0..40_000 {
+        plant.step(Bridge::Drive(Vector::new(0.2, 0.0)));
+    }
+    let truth = plant.truth();
+    // V ΣI (tr + tf) / 2 each 50 µs.
+    let expected = 0.5 * truth.bus_voltage * 2.0 * truth.id * 200e-9 / 50e-6;
+    assert!((truth.losses.inverter / expected - 1.0).abs() < 0.01, "{truth:?}, not {expected} W");
+    assert!(expected > 0.3);
+    let above = truth.inverter_temperature - truth.housing_temperature;
+    assert!((above / (2.0 * expected) - 1.0).abs() < 0.01, "2 K/W: {above} K");
+    assert_eq!(plant.temperature(), truth.inverter_temperature);
+    let energy = plant.energy();
+    assert!(energy.switching > 0.3 && energy.imbalance().abs() < 1e-3, "{energy:?}");
 }

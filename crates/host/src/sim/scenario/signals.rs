@@ -189,6 +189,7 @@ signals!(ST, motorlink_sim::st::Truth, |truth| {
     phase_a_celsius = truth.plant.phase_temperatures[0];
     phase_b_celsius = truth.plant.phase_temperatures[1];
     phase_c_celsius = truth.plant.phase_temperatures[2];
+    inverter_celsius = truth.plant.inverter_temperature;
     status[Names::Status] = u8::from(truth.status);
     faults[Names::Faults] = (truth.flags.occurred() | truth.flags.present()) as u8;
 });
@@ -236,6 +237,7 @@ signals!(RMD, Rmd, |rmd| {
     phase_a_celsius = rmd.truth.plant.phase_temperatures[0];
     phase_b_celsius = rmd.truth.plant.phase_temperatures[1];
     phase_c_celsius = rmd.truth.plant.phase_temperatures[2];
+    inverter_celsius = rmd.truth.plant.inverter_temperature;
     mode[Names::Mode] = mode_number(rmd.truth.mode);
     errors[Names::Errors] = u8::from(rmd.errors);
 });
