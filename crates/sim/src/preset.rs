@@ -1,18 +1,19 @@
 //! Motors that exist, with where their values come from.
 //!
 //! A value marked P is the maker's, M was measured by somebody else, D follows from one of these, E
-//! is an estimate because nobody publishes it. What a stall makes of the phases is an estimate, too:
-//! the hottest is half as much again above the housing as the winding's mean is, as where makers
-//! allow four fifths of the current at standstill. Resistance and inductance are those of a phase (half
+//! is an estimate because nobody publishes it. Resistance and inductance are those of a phase (half
 //! of what is measured between two terminals), flux linkage is the amplitude in a phase.
+//!
+//! All `phase_to_phase` are E: at worst a phase of a stalled motor is 1.5 times as far above the housing
+//! as the winding's mean, which fits makers who allow 80 % of the current at standstill.
 
 use crate::plant::{
     ChopperConfig, EncoderConfig, GearConfig, HeatConfig, HeatSensor, InverterConfig, LoadConfig,
     MachineConfig, PlantConfig, SensingConfig, SupplyConfig,
 };
 
-/// What a magnet of neodymium, iron and boron loses of its remanence, 1/K: makers say 0.11 to 0.12 % for
-/// the usual grades.
+/// Temperature coefficient of the remanence of NdFeB magnets, 1/K: makers say -0.11 to -0.12 % for the
+/// usual grades.
 const NEODYMIUM: f32 = -0.0011;
 
 /// A preset: its name in files, and what it is.

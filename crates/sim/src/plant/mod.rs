@@ -149,7 +149,7 @@ pub struct Plant {
     pending: Bridge,
     /// What was commanded for the last step, in the stator's frame, V.
     commanded: Vector,
-    /// Currents that something feeds into the bus beside the source, and that the board takes, A.
+    /// Current of a second feed into the bus, and current that the board takes, A.
     fed: f32,
     board: f32,
     /// What the encoder shows where the rotor's position is 0, 2^32 a turn.

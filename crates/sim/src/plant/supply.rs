@@ -68,14 +68,14 @@ pub(super) struct Flow {
     pub(super) board: f32,
 }
 
-/// What flows through the bus beside the source and the brake resistor in a step, A.
+/// Currents of the bus in a step, other than those of the source and the brake resistor, A.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Currents {
     /// Into the bridge; negative when it gives.
     pub(super) bridge: f32,
     /// Into the board.
     pub(super) board: f32,
-    /// Into the bus, from what feeds it beside the source.
+    /// Into the bus from a second feed, such as a PFC.
     pub(super) fed: f32,
 }
 
