@@ -6,7 +6,7 @@ use motorlink_proto::stmcp::{Command, MAX_FRAME, Profile, Ramp, RegisterId, Requ
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{CentiDegrees, CentiDps};
 use motorlink_sim::hash::fingerprint;
-use motorlink_sim::rmd::RmdBus;
+use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 use motorlink_sim::st::{StDrive, StStation};
 
 fn main() {
@@ -42,7 +42,12 @@ fn st() {
 
 fn rmd() {
     let mut now = Instant(0);
-    let mut bus = RmdBus::demo(now);
+    let mut geared = RmdConfig { id: 2, ..RmdConfig::x8() };
+    geared.plant.load.inertia = 0.05;
+    let nodes = [RmdConfig::with_id(1), geared].map(|config| {
+        RmdNode::new(now, config, config.factory_rom()).expect("the presets are possible")
+    });
+    let mut bus = RmdBus::new(nodes).expect("the IDs differ");
     let mut said = Vec::new();
     for round in 0..30 {
         let spin = Speed { speed: CentiDps(round * 3000) }.encode();
