@@ -1,8 +1,9 @@
 //! The master: one exchange at a time, and a line that is trusted only while it answers in step.
 
+use super::question::{FLAGS, INFO, Question, REVUP, STATUS};
 use super::{
-    Bad, Command, Error, ErrorCode, Failure, Frame, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
-    MAX_FRAME, MAX_PAYLOAD, Parse, Profile, RegisterId, ReplySize, Request, RevupPhase, frame,
+    Error, ErrorCode, Failure, Frame, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME,
+    Parse, Profile, RegisterId, ReplySize, Request,
 };
 use crate::time::{Duration, Instant};
 
@@ -137,19 +138,9 @@ pub struct Master {
     /// Whether everything that may still be answered is known. It is not before the line was in step
     /// once: a former master may have asked something.
     is_known: bool,
-    /// The frame that recovery sends.
-    probe: [u8; 4],
-    probe_size: u8,
-    /// How many of its bytes came back.
-    echoed: u8,
-    /// Whether nothing but its answer came.
-    is_alone: bool,
-    /// The first thing that came in its place and is no frame.
-    trouble: Option<Failure>,
-    /// The question that recovery asked, and the questions that may still be answered late.
-    question: u8,
+    /// The question that recovery asked, and those that may still be answered late.
+    question: Question,
     outstanding: u8,
-    scan: Scan,
     counters: Counters,
 }
 
@@ -161,15 +152,6 @@ struct Asked {
     /// Questions whose reply looks like this request's.
     alike: u8,
 }
-
-/// The reply has 32 bytes, as that of GET_BOARD_INFO.
-const INFO: u8 = 1;
-/// The reply has 8 bytes, as that of GET_REVUP_DATA.
-const REVUP: u8 = 2;
-/// The reply has 1 byte, as that of GET_REG STATUS.
-const STATUS: u8 = 4;
-/// The reply has 4 bytes, as that of GET_REG FLAGS.
-const FLAGS: u8 = 8;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
@@ -243,14 +225,8 @@ impl Master {
             sizes: [ReplySize::Any; 2],
             lost: nothing,
             is_known: is_trusted,
-            probe: [0; 4],
-            probe_size: 0,
-            echoed: 0,
-            is_alone: true,
-            trouble: None,
-            question: INFO,
+            question: Question::NONE,
             outstanding: 0,
-            scan: Scan::NONE,
             counters: Counters { unasked_bytes: 0, identifications: 0, losses: 0 },
         }
     }
@@ -389,8 +365,7 @@ impl Master {
             State::Quiet { until, .. } if now < until => self.fail(Failure::Noise),
             State::Quiet { then: Then::Stop, .. } => {
                 self.state = State::Settle(Then::Probe);
-                let stop = Request::Execute(Command::StopMotor);
-                Output::Transmit(stop.encode(self.lost.motor, &mut self.probe).unwrap_or(&[]))
+                Output::Transmit(self.question.stop(self.lost.motor))
             }
             State::Quiet { then: Then::Probe, .. } => self.probe(self.next_question()),
             State::Quiet { then: Then::Send, .. } => {
@@ -408,16 +383,15 @@ impl Master {
                 self.state = State::Waiting { deadline };
                 Output::Wait(Some(deadline))
             }
-            State::Answer { .. } if self.is_echo() => self.fail(Failure::Echo),
+            State::Answer { .. } if self.question.is_echo() => self.fail(Failure::Echo),
             State::Answer { asked } if now < asked + self.config.timeout => {
                 Output::Wait(Some(asked + self.config.timeout))
             }
             State::Answer { .. } => {
-                self.outstanding |= self.question;
-                self.fail(match (self.is_known, self.scan.taken) {
-                    (true, _) => Failure::Lost,
-                    (false, 0) => self.trouble.unwrap_or(Failure::Timeout),
-                    (false, received) => Failure::Incomplete { received },
+                self.outstanding |= self.question.kind();
+                self.fail(match self.is_known {
+                    true => Failure::Lost,
+                    false => self.question.failure(),
                 })
             }
             State::Waiting { deadline } if now < deadline => Output::Wait(Some(deadline)),
@@ -469,27 +443,14 @@ impl Master {
         match self.outstanding {
             outstanding if outstanding & INFO == 0 || !self.is_known => INFO,
             outstanding if outstanding & REVUP == 0 => REVUP,
-            _ if self.question == REVUP => INFO,
+            _ if self.question.kind() == REVUP => INFO,
             _ => REVUP,
         }
     }
 
     fn probe(&mut self, question: u8) -> Output<'_> {
-        self.question = question;
-        self.scan = Scan::NONE;
-        self.is_alone = true;
-        self.trouble = None;
-        self.echoed = 0;
         self.state = State::Probed;
-        let request = match question {
-            INFO => Request::BoardInfo,
-            REVUP => Request::RevupData(0),
-            STATUS => Request::GetRegister(RegisterId::STATUS),
-            _ => Request::GetRegister(RegisterId::FLAGS),
-        };
-        let bytes = request.encode(0, &mut self.probe).unwrap_or(&[]);
-        self.probe_size = bytes.len() as u8;
-        Output::Transmit(bytes)
+        Output::Transmit(self.question.ask(question))
     }
 
     /// Looks for the reply to the question, which was sent when it was `asked`, among late ones.
@@ -499,40 +460,15 @@ impl Master {
     /// cannot come any more. On a line that was just opened anything may be outstanding, unless the
     /// drive gives prompt answers to three different questions, and nothing else.
     fn answer(&mut self, now: Instant, asked: Instant, bytes: &[u8]) {
-        let size = match self.question {
-            INFO => 32,
-            REVUP => RevupPhase::SIZE as u8,
-            STATUS => 1,
-            _ => 4,
-        };
-        let (mut answers, mut others) = (0, 0);
-        for &byte in bytes {
-            self.compare(byte);
-            match self.scan.take(byte) {
-                Scanned::More | Scanned::Frame(HEADER_ATR, ..) => {}
-                Scanned::Frame(HEADER_ACK, length, _) if length == size => answers += 1,
-                Scanned::Frame(HEADER_NACK, 1, code) if !ErrorCode::from(code).is_damage() => {
-                    others += 1;
-                }
-                Scanned::Frame(HEADER_ACK, ..) if !self.is_known => others += 1,
-                scanned => {
-                    self.is_alone = false;
-                    if let (Scanned::Stray(failure), None) = (scanned, self.trouble) {
-                        self.trouble = Some(failure);
-                    }
-                }
-            }
-        }
-        if answers + others == 0 || self.is_echo() {
+        let came = self.question.hear(bytes);
+        let is_answered = came.answers + came.refusals > 0 || (!self.is_known && came.others > 0);
+        if !is_answered || self.question.is_echo() {
             return;
         }
-        let is_prompt = self.is_alone
-            && self.outstanding == 0
-            && (answers, others) == (1, 0)
-            && self.scan.is_empty()
-            && now < asked + self.config.quiet;
-        let is_own = match self.question {
-            question if self.is_known => answers > 0 && self.outstanding & question == 0,
+        let is_prompt =
+            self.question.is_alone() && self.outstanding == 0 && now < asked + self.config.quiet;
+        let is_own = match self.question.kind() {
+            kind if self.is_known => came.answers > 0 && self.outstanding & kind == 0,
             INFO if is_prompt => return self.state = State::Probe(STATUS),
             STATUS if is_prompt => return self.state = State::Probe(FLAGS),
             _ => is_prompt,
@@ -540,18 +476,6 @@ impl Master {
         let expired = asked + self.config.timeout + self.config.timeout;
         let until = if is_own { now } else { expired };
         self.settle(until.max(now + self.config.quiet), Then::Send);
-    }
-
-    /// Whether what came is what was sent.
-    fn is_echo(&self) -> bool {
-        self.echoed == self.probe_size
-    }
-
-    fn compare(&mut self, byte: u8) {
-        if !self.is_echo() {
-            let sent = self.probe.get(usize::from(self.echoed));
-            self.echoed = if sent == Some(&byte) { self.echoed + 1 } else { 0 };
-        }
     }
 
     fn settle(&mut self, until: Instant, then: Then) {
@@ -651,61 +575,5 @@ impl Master {
 
     fn unasked(&mut self, bytes: usize) {
         self.counters.unasked_bytes = self.counters.unasked_bytes.wrapping_add(bytes as u32);
-    }
-}
-
-/// Finds frames in a stream without keeping them.
-#[derive(Debug, Clone, Copy)]
-struct Scan {
-    header: u8,
-    length: u8,
-    /// Bytes of the frame so far.
-    taken: u8,
-    sum: u16,
-    /// The byte before the checksum.
-    last: u8,
-}
-
-/// What a byte is to a [`Scan`].
-enum Scanned {
-    /// A part of a frame.
-    More,
-    /// The end of a frame: its header, its length, the last byte of its payload.
-    Frame(u8, u8, u8),
-    /// A part of none.
-    Stray(Failure),
-}
-
-impl Scan {
-    const NONE: Scan = Scan { header: 0, length: 0, taken: 0, sum: 0, last: 0 };
-
-    const fn is_empty(&self) -> bool {
-        self.taken == 0
-    }
-
-    fn take(&mut self, byte: u8) -> Scanned {
-        let begins = matches!(byte, HEADER_ACK | HEADER_NACK | HEADER_ATR);
-        match self.taken {
-            0 if !begins => return Scanned::Stray(Failure::Header(byte)),
-            0 => self.header = byte,
-            1 if usize::from(byte) > MAX_PAYLOAD => {
-                *self = Scan::NONE;
-                return Scanned::Stray(Failure::Damaged(Bad::Length(byte)));
-            }
-            1 => self.length = byte,
-            taken if taken == self.length.saturating_add(2) => {
-                let Scan { header, length, sum, last, .. } = core::mem::replace(self, Scan::NONE);
-                return match frame::fold(sum) {
-                    expected if byte == expected => Scanned::Frame(header, length, last),
-                    expected => {
-                        Scanned::Stray(Failure::Damaged(Bad::Checksum { expected, received: byte }))
-                    }
-                };
-            }
-            _ => self.last = byte,
-        }
-        self.taken = self.taken.saturating_add(1);
-        self.sum = self.sum.wrapping_add(u16::from(byte));
-        Scanned::More
     }
 }

@@ -63,6 +63,7 @@ mod failure;
 mod frame;
 mod master;
 pub mod message;
+mod question;
 pub mod register;
 mod slave;
 mod verified;
