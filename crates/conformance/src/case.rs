@@ -5,6 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use motorlink::port::PortError;
 
+use crate::reading::Reading;
 use crate::report::{Outcome, Report, Verdict};
 use crate::world::Unavailable;
 
@@ -30,6 +31,8 @@ pub struct Case<B> {
     pub clauses: &'static [&'static str],
     /// What it needs.
     pub needs: &'static [Need],
+    /// The reading that all of it demands; `None` where sentences of the document do.
+    pub reading: Option<Reading>,
     /// The test.
     pub run: Run<B>,
 }
@@ -69,6 +72,51 @@ pub struct Finding {
     pub expected: String,
     /// What came.
     pub received: String,
+    /// The reading that demands it; `None` where a sentence of the document does.
+    pub reading: Option<Reading>,
+}
+
+/// Says that what failed is demanded by a reading, not by a sentence.
+pub(crate) trait ReadAs {
+    /// The same with the reading, unless it has one.
+    fn read_as(self, reading: Reading) -> Self;
+}
+
+impl ReadAs for Stop {
+    fn read_as(mut self, reading: Reading) -> Self {
+        if let Stop::Failed(finding) = &mut self {
+            finding.reading.get_or_insert(reading);
+        }
+        self
+    }
+}
+
+impl<T> ReadAs for Result<T, Stop> {
+    fn read_as(self, reading: Reading) -> Self {
+        self.map_err(|stop| stop.read_as(reading))
+    }
+}
+
+/// Differences from readings that do not end a case.
+#[derive(Debug, Default)]
+pub(crate) struct Beside(Vec<Finding>);
+
+impl Beside {
+    /// Notes what failed, if anything, and lets the case go on.
+    pub(crate) fn note(&mut self, reading: Reading, result: Result<(), Stop>) -> Result<(), Stop> {
+        match result.read_as(reading) {
+            Err(Stop::Failed(finding)) => {
+                self.0.push(*finding);
+                Ok(())
+            }
+            other => other,
+        }
+    }
+
+    /// What was noted; it is forgotten.
+    pub(crate) fn take(&mut self) -> Vec<Finding> {
+        std::mem::take(&mut self.0)
+    }
 }
 
 /// A drive under test, as [`run`] sees it.
@@ -85,6 +133,9 @@ pub trait Subject {
 
     /// What passed the wire since [`begin`](Self::begin), a line each: `> 02 01 1e 21`.
     fn transcript(&self) -> Vec<String>;
+
+    /// Differences from readings that did not end the case; they are forgotten.
+    fn differences(&mut self) -> Vec<Finding>;
 }
 
 impl<B> Case<B> {
@@ -94,12 +145,17 @@ impl<B> Case<B> {
         clauses: &'static [&'static str],
         run: impl Fn(&mut B) -> Result<(), Stop> + 'static,
     ) -> Self {
-        Case { name: name.into(), clauses, needs: &[], run: Box::new(run) }
+        Case { name: name.into(), clauses, needs: &[], reading: None, run: Box::new(run) }
     }
 
     /// The same with needs.
     pub fn needs(self, needs: &'static [Need]) -> Self {
         Case { needs, ..self }
+    }
+
+    /// The same, all of which a reading demands.
+    pub(crate) fn reading(self, reading: Reading) -> Self {
+        Case { reading: Some(reading), ..self }
     }
 }
 
@@ -114,17 +170,18 @@ pub fn run<B: Subject>(
     let mut dead: Option<String> = None;
     for case in cases {
         let missing = case.needs.iter().find(|&&need| !bench.allows(need));
-        let verdict = match (&dead, missing) {
-            (Some(why), _) => Verdict::NotRun(why.clone()),
-            (None, Some(need)) => Verdict::Skipped(need.unmet().to_owned()),
+        let (verdict, differences) = match (&dead, missing) {
+            (Some(why), _) => (Verdict::NotRun(why.clone()), Vec::new()),
+            (None, Some(need)) => (Verdict::Skipped(need.unmet().to_owned()), Vec::new()),
             (None, None) => conduct(case, bench, &mut dead),
         };
         let transcript = match verdict {
-            Verdict::Failed(_) => bench.transcript(),
+            Verdict::Failed(_) | Verdict::Reading => bench.transcript(),
+            Verdict::NotRun(_) if !differences.is_empty() => bench.transcript(),
             _ => Vec::new(),
         };
-        let outcome =
-            Outcome { name: case.name.to_string(), clauses: case.clauses, verdict, transcript };
+        let (name, clauses) = (case.name.to_string(), case.clauses);
+        let outcome = Outcome { name, clauses, verdict, differences, transcript };
         progress(&outcome);
         report.outcomes.push(outcome);
     }
@@ -132,15 +189,27 @@ pub fn run<B: Subject>(
 }
 
 /// A case between `begin` and `restore`. A drive that cannot be restored fails the case, too: the
-/// user has to know. `dead` is told why nothing more can be run.
-fn conduct<B: Subject>(case: &Case<B>, bench: &mut B, dead: &mut Option<String>) -> Verdict {
-    let begun = bench.begin();
+/// user has to know. `dead` is told why nothing more can be run. Gives the differences from readings,
+/// the first of each.
+fn conduct<B: Subject>(
+    case: &Case<B>,
+    bench: &mut B,
+    dead: &mut Option<String>,
+) -> (Verdict, Vec<Finding>) {
+    let begun = bench.begin().map_err(Stop::without_reading);
     // What cannot be begun with has nothing to be restored.
-    let (outcome, restored) = match begun {
+    let (mut outcome, mut restored) = match begun {
         Err(stop @ (Stop::Port(_) | Stop::Lost(_))) => (Err(stop), Ok(())),
         begun => {
             // A fault of this kit must not leave a motor turning.
-            let ran = catch_unwind(AssertUnwindSafe(|| begun.and_then(|()| (case.run)(bench))));
+            let ran = catch_unwind(AssertUnwindSafe(|| {
+                begun?;
+                let done = (case.run)(bench);
+                match case.reading {
+                    Some(reading) => done.read_as(reading),
+                    None => done,
+                }
+            }));
             let restored = bench.restore();
             (ran.unwrap_or_else(|panic| resume_unwind(panic)), restored)
         }
@@ -150,9 +219,35 @@ fn conduct<B: Subject>(case: &Case<B>, bench: &mut B, dead: &mut Option<String>)
             dead.get_or_insert_with(|| stop.to_string());
         }
     }
+    let mut differences: Vec<Finding> = Vec::new();
+    let ended = [&mut outcome, &mut restored].into_iter().filter_map(take_difference);
+    for finding in bench.differences().into_iter().chain(ended) {
+        if differences.iter().all(|known| known.reading != finding.reading) {
+            differences.push(finding);
+        }
+    }
+    let verdict = match verdict(outcome, restored) {
+        Verdict::Passed | Verdict::Skipped(_) if !differences.is_empty() => Verdict::Reading,
+        verdict => verdict,
+    };
+    (verdict, differences)
+}
+
+/// The difference from a reading that ended a case, which is then no failure.
+fn take_difference(result: &mut Result<(), Stop>) -> Option<Finding> {
+    let finding = match result {
+        Err(Stop::Failed(finding)) if finding.reading.is_some() => (**finding).clone(),
+        _ => return None,
+    };
+    *result = Ok(());
+    Some(finding)
+}
+
+/// What came of a case, and of restoring the drive.
+fn verdict(outcome: Result<(), Stop>, restored: Result<(), Stop>) -> Verdict {
     match (outcome, restored) {
         (Err(Stop::Failed(mut finding)), Err(Stop::Failed(left))) => {
-            let Finding { sent, expected, received } = *left;
+            let Finding { sent, expected, received, .. } = *left;
             finding.received += &format!(
                 "; and it was not left as it was found: sent {sent}, expected {expected}, received \
                  {received}"
@@ -171,6 +266,16 @@ fn conduct<B: Subject>(case: &Case<B>, bench: &mut B, dead: &mut Option<String>)
     }
 }
 
+impl Stop {
+    /// The same, of which no reading is the reason.
+    fn without_reading(mut self) -> Self {
+        if let Stop::Failed(finding) = &mut self {
+            finding.reading = None;
+        }
+        self
+    }
+}
+
 impl Need {
     /// What to say where it is not met.
     pub const fn unmet(self) -> &'static str {
@@ -186,6 +291,7 @@ impl Need {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reading::{S5, S20};
 
     /// A drive whose `begin` and `restore` end as they are told to.
     #[derive(Default)]
@@ -193,6 +299,7 @@ mod tests {
         begin: Option<Stop>,
         restore: Option<Stop>,
         restored: u32,
+        beside: Beside,
     }
 
     impl Subject for Told {
@@ -212,12 +319,16 @@ mod tests {
         fn transcript(&self) -> Vec<String> {
             Vec::new()
         }
+
+        fn differences(&mut self) -> Vec<Finding> {
+            self.beside.take()
+        }
     }
 
     fn failed(what: &str) -> Stop {
         let [sent, expected, received] = ["sent", "expected", "received"].map(|s| s.to_owned());
         let expected = format!("{expected} {what}");
-        Stop::Failed(Box::new(Finding { sent, expected, received }))
+        Stop::Failed(Box::new(Finding { sent, expected, received, reading: None }))
     }
 
     fn lost() -> Stop {
@@ -287,5 +398,39 @@ mod tests {
         let report = run(&cases, &mut Told::default(), |_| {});
         let Verdict::Skipped(why) = &report.outcomes[0].verdict else { panic!("not skipped") };
         assert!(why.contains("--write-rom"), "{why}");
+    }
+
+    #[test]
+    fn a_difference_from_a_reading_is_no_failure_unless_readings_are_strict() {
+        let cases = [
+            Case::new("ends", &[], |_: &mut Told| Err(failed("S20").read_as(S20))),
+            Case::new("goes on", &[], |told: &mut Told| {
+                told.beside.note(S20, Err(failed("first")))?;
+                told.beside.note(S20, Err(failed("second")))?;
+                told.beside.note(S5, Err(failed("third")))?;
+                Err(Stop::Skipped("enough".to_owned()))
+            }),
+            Case::new("all of it", &[], |_: &mut Told| Err(failed("S5"))).reading(S5),
+            Case::new("fails", &[], |told: &mut Told| {
+                told.beside.note(S5, Err(failed("beside")))?;
+                Err(failed("a sentence"))
+            }),
+        ];
+        let report = run(&cases, &mut Told::default(), |_| {});
+        assert_eq!((report.count("reading"), report.failed().count()), (3, 1));
+        assert_eq!(report.outcomes[1].differences.len(), 2, "the first of each reading");
+        let clean = Report { outcomes: report.outcomes[..3].to_vec() };
+        assert!(clean.is_clean() && !report.is_clean());
+        let strict = clean.strict();
+        assert_eq!((strict.failed().count(), strict.is_clean()), (3, false));
+        let Verdict::Failed(finding) = &strict.outcomes[0].verdict else { panic!("not failed") };
+        assert_eq!(finding.reading, Some(S20));
+    }
+
+    #[test]
+    fn a_drive_that_cannot_be_begun_with_fails_whatever_the_case_reads() {
+        let mut told = Told { begin: Some(failed("to begin").read_as(S5)), ..Told::default() };
+        let cases = [Case::new("reading", &[], |_: &mut Told| Ok(())).reading(S5)];
+        assert_eq!(run(&cases, &mut told, |_| {}).failed().count(), 1);
     }
 }

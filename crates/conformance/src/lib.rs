@@ -7,6 +7,9 @@
 //! cases test a drive on the bench and, in milliseconds, this kit itself. [`run`] runs them and gives
 //! a [`Report`].
 //!
+//! Where a document is silent or contradicts itself, a case demands our [`Reading`] of it. A drive that
+//! differs from one has not failed, unless the user wants it so: [`Report::strict`].
+//!
 //! [`host`] is for the other end: drives that misbehave, and what a host makes of them.
 //!
 //! A drive is left as it was found: cases restore what they write, and nothing that may turn a motor,
@@ -17,6 +20,7 @@ mod clause;
 pub mod host;
 mod junit;
 mod markdown;
+mod reading;
 mod report;
 pub mod rmd;
 pub mod st;
@@ -26,5 +30,6 @@ mod world;
 pub use case::{Case, Finding, Need, Run, Stop, Subject, run};
 pub use clause::Clause;
 pub use markdown::scenario_table;
+pub use reading::{READINGS, Reading};
 pub use report::{Outcome, Report, Verdict};
 pub use world::{Unavailable, World};

@@ -5,23 +5,26 @@ use std::fmt::Write;
 use crate::case::Case;
 use crate::clause::Clause;
 use crate::host::Scenario;
+use crate::reading::Reading;
 
-/// The table of `clauses` with the cases of `suite` that test each. Cases that differ in their
-/// subject only stand as one.
+/// The table of `clauses` with the cases of `suite` that test each, and the reading that all of a
+/// case demands. Cases that differ in their subject only stand as one.
 pub fn markdown<'a, B: 'a>(
     clauses: &[Clause],
     suite: impl Iterator<Item = &'a Case<B>> + Clone,
 ) -> String {
     let mut table = String::from("| id | demands | on a drive | on a host |\n|---|---|---|---|\n");
     for clause in clauses {
-        let mut cases: Vec<&str> = Vec::new();
+        let mut cases: Vec<String> = Vec::new();
         for case in suite.clone().filter(|case| case.clauses.contains(&clause.id)) {
             let name = case.name.split('[').next().unwrap_or(&case.name);
-            if !cases.contains(&name) {
-                cases.push(name);
+            let row = case.reading.map(|Reading { row, .. }| format!(" (reading {row})"));
+            let text = format!("`{name}`{}", row.unwrap_or_default());
+            if !cases.contains(&text) {
+                cases.push(text);
             }
         }
-        let drive = if cases.is_empty() { clause.untested.to_owned() } else { code(&cases) };
+        let drive = if cases.is_empty() { clause.untested.to_owned() } else { cases.join(", ") };
         let host = code(clause.host);
         let text = clause.text.replace('|', "\\|");
         writeln!(table, "| {} | {text} | {drive} | {host} |", clause.id)

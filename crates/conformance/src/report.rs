@@ -1,8 +1,9 @@
 //! What came of a run.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::case::Finding;
+use crate::reading::Reading;
 
 /// What came of all cases.
 #[derive(Debug, Clone, Default)]
@@ -20,7 +21,9 @@ pub struct Outcome {
     pub clauses: &'static [&'static str],
     /// What came of it.
     pub verdict: Verdict,
-    /// What passed the wire, where it failed.
+    /// Differences from readings, one a reading.
+    pub differences: Vec<Finding>,
+    /// What passed the wire, where it failed or differs from a reading.
     pub transcript: Vec<String>,
 }
 
@@ -31,6 +34,8 @@ pub enum Verdict {
     Passed,
     /// It does something else.
     Failed(Box<Finding>),
+    /// It does what sentences demand, and differs from our reading of what they leave open.
+    Reading,
     /// Not tried, and why.
     Skipped(String),
     /// The port or the drive had failed before, or failed here; or this machine was too busy to judge.
@@ -43,6 +48,7 @@ impl Verdict {
         match self {
             Verdict::Passed => "passed",
             Verdict::Failed(_) => "FAILED",
+            Verdict::Reading => "reading",
             Verdict::Skipped(_) => "skipped",
             Verdict::NotRun(_) => "not run",
         }
@@ -50,11 +56,22 @@ impl Verdict {
 }
 
 impl Report {
-    /// Whether nothing failed and the port held.
+    /// Whether nothing failed and the port held. Differences from readings are no failures.
     pub fn is_clean(&self) -> bool {
-        let good =
-            |outcome: &Outcome| matches!(outcome.verdict, Verdict::Passed | Verdict::Skipped(_));
-        self.outcomes.iter().all(good)
+        let bad =
+            |outcome: &Outcome| matches!(outcome.verdict, Verdict::Failed(_) | Verdict::NotRun(_));
+        !self.outcomes.iter().any(bad)
+    }
+
+    /// The same with differences from readings as failures.
+    pub fn strict(mut self) -> Self {
+        for outcome in &mut self.outcomes {
+            let told = !outcome.differences.is_empty();
+            if told && matches!(outcome.verdict, Verdict::Reading | Verdict::NotRun(_)) {
+                outcome.verdict = Verdict::Failed(Box::new(outcome.differences.remove(0)));
+            }
+        }
+        self
     }
 
     /// How many cases ended with the verdict of this word.
@@ -82,6 +99,7 @@ impl Report {
         json!({
             "passed": self.count(Verdict::Passed.word()),
             "failed": self.failed().count(),
+            "reading": self.count(Verdict::Reading.word()),
             "skipped": self.count("skipped"),
             "not_run": self.count("not run"),
             "cases": cases,
@@ -95,15 +113,32 @@ impl Outcome {
             "name": self.name, "clauses": self.clauses, "verdict": self.verdict.word().to_lowercase(),
         });
         match &self.verdict {
-            Verdict::Passed => {}
+            Verdict::Passed | Verdict::Reading => {}
             Verdict::Failed(finding) => {
-                object["sent"] = json!(finding.sent);
-                object["expected"] = json!(finding.expected);
-                object["received"] = json!(finding.received);
-                object["transcript"] = json!(self.transcript);
+                let known = object.as_object_mut().expect("an object was made");
+                known.extend(finding.to_json());
             }
             Verdict::Skipped(why) | Verdict::NotRun(why) => object["why"] = json!(why),
         }
+        if !self.differences.is_empty() {
+            object["differences"] = self.differences.iter().map(Finding::to_json).collect();
+        }
+        if !self.transcript.is_empty() {
+            object["transcript"] = json!(self.transcript);
+        }
         object
+    }
+}
+
+impl Finding {
+    fn to_json(&self) -> Map<String, Value> {
+        let Finding { sent, expected, received, reading } = self;
+        let row =
+            reading.iter().flat_map(|Reading { row, text }| [("row", *row), ("reading", *text)]);
+        [("sent", &**sent), ("expected", expected), ("received", received)]
+            .into_iter()
+            .chain(row)
+            .map(|(name, text)| (name.to_owned(), json!(text)))
+            .collect()
     }
 }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use motorlink_conformance::{Clause, rmd, st};
+use motorlink_conformance::{Clause, READINGS, Reading, rmd, st};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -59,4 +59,13 @@ fn what_is_said_to_hold_hosts_to_a_clause_exists() {
     };
     let missing: Vec<String> = st::CLAUSES.iter().chain(rmd::CLAUSES).flat_map(missing).collect();
     assert!(missing.is_empty(), "no such tests:\n{}", missing.join("\n"));
+}
+
+#[test]
+fn every_reading_is_a_row_of_the_spec_notes() {
+    let notes = fs::read_to_string(root().join("docs/SPEC-NOTES.md")).expect("docs/SPEC-NOTES.md");
+    let rows: Vec<&str> = notes.lines().filter_map(|line| line.split('|').nth(1)).collect();
+    for Reading { row, text } in READINGS {
+        assert!(rows.iter().any(|known| known.trim() == *row), "{row} ({text}) is no row");
+    }
 }

@@ -16,7 +16,7 @@ use motorlink_conformance::{
 };
 
 pub use args::Args;
-use args::{Command, Results, Run, Which};
+use args::{Command, Readings, Results, Run, Which};
 use screen::Screen;
 use world::Commands;
 
@@ -77,7 +77,10 @@ fn conduct<B: Subject>(
     let results = &run.results;
     suite.retain(|case| results.wants(&case.name, case.clauses));
     let mut screen = results.screen(suite.len())?;
-    let report = run_cases(&suite, &mut bench, |outcome| screen.show(outcome));
+    let mut report = run_cases(&suite, &mut bench, |outcome| screen.show(outcome));
+    if run.readings == Readings::Strict {
+        report = report.strict();
+    }
     screen.summary(&report)?;
     results.save(name, &report)?;
     if interrupt::interrupted() {

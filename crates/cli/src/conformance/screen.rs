@@ -3,7 +3,7 @@
 
 use console::style;
 use indicatif::ProgressBar;
-use motorlink_conformance::{Outcome, Report, Verdict, rmd, st};
+use motorlink_conformance::{Finding, Outcome, Reading, Report, Verdict, rmd, st};
 
 use crate::failure::Failure;
 use crate::output;
@@ -37,6 +37,7 @@ impl Screen {
                 row(outcome)?;
             }
         }
+        readings(report)?;
         paragraphs(report)?;
         reasons(report)
     }
@@ -46,6 +47,7 @@ fn row(outcome: &Outcome) -> Result<(), Failure> {
     let word = outcome.verdict.word();
     let word = match outcome.verdict {
         Verdict::Passed => style(word).green(),
+        Verdict::Reading => style(word).yellow(),
         Verdict::Skipped(_) => style(word).dim(),
         Verdict::Failed(_) | Verdict::NotRun(_) => style(word).red().bold(),
     };
@@ -55,16 +57,50 @@ fn row(outcome: &Outcome) -> Result<(), Failure> {
         style(outcome.clauses.join(" ")).dim()
     ))?;
     match &outcome.verdict {
-        Verdict::Passed => Ok(()),
+        Verdict::Passed | Verdict::Reading => Ok(()),
         Verdict::Failed(finding) => {
-            output::line(&format!(
-                "           sent     {}\n           expected {}\n           received {}",
-                finding.sent, finding.expected, finding.received
-            ))?;
+            found(finding)?;
             demands(outcome.clauses)
         }
         Verdict::Skipped(why) | Verdict::NotRun(why) => output::line(&format!("           {why}")),
     }
+}
+
+/// What was sent, expected and received, and the reading that demands it.
+fn found(Finding { sent, expected, received, reading }: &Finding) -> Result<(), Failure> {
+    if let Some(Reading { row, text }) = reading {
+        output::line(&format!("           reading  {row}: {text}"))?;
+    }
+    output::line(&format!(
+        "           sent     {sent}\n           expected {expected}\n           received {received}"
+    ))
+}
+
+/// Differences from readings by their row, each with what a first case found.
+fn readings(report: &Report) -> Result<(), Failure> {
+    let mut rows: Vec<(Reading, &Outcome, &Finding, usize)> = Vec::new();
+    for outcome in &report.outcomes {
+        for finding in &outcome.differences {
+            let Some(reading) = finding.reading else { continue };
+            match rows.iter_mut().find(|(known, ..)| *known == reading) {
+                Some((.., count)) => *count += 1,
+                None => rows.push((reading, outcome, finding, 1)),
+            }
+        }
+    }
+    if rows.is_empty() {
+        return Ok(());
+    }
+    output::line(
+        &"Differences from our readings of what the document leaves open, which are no failures:",
+    )?;
+    for (Reading { row, text }, outcome, finding, count) in rows {
+        output::line(&format!("{:<8} {text}", style(row).yellow()))?;
+        let others = if count > 1 { format!(", and {} others", count - 1) } else { String::new() };
+        output::line(&format!("           case     {}{others}", outcome.name))?;
+        found(&Finding { reading: None, ..finding.clone() })?;
+    }
+    output::line(&"")
 }
 
 /// What the clauses of a case demand.
@@ -80,20 +116,21 @@ fn demands(clauses: &[&str]) -> Result<(), Failure> {
 
 /// A line a paragraph, in the order of the document.
 fn paragraphs(report: &Report) -> Result<(), Failure> {
-    let mut table: Vec<(&str, [usize; 4])> = Vec::new();
+    let mut table: Vec<(&str, [usize; 5])> = Vec::new();
     for outcome in &report.outcomes {
         let clause = outcome.clauses.first().copied().unwrap_or("");
         let paragraph = clause.rsplit_once('-').map_or(clause, |(paragraph, _)| paragraph);
         let column = match outcome.verdict {
             Verdict::Passed => 0,
             Verdict::Failed(_) => 1,
-            Verdict::Skipped(_) => 2,
-            Verdict::NotRun(_) => 3,
+            Verdict::Reading => 2,
+            Verdict::Skipped(_) => 3,
+            Verdict::NotRun(_) => 4,
         };
         match table.iter_mut().find(|(known, _)| *known == paragraph) {
             Some((_, counts)) => counts[column] += 1,
             None => {
-                let mut counts = [0; 4];
+                let mut counts = [0; 5];
                 counts[column] = 1;
                 table.push((paragraph, counts));
             }
@@ -101,10 +138,10 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
     }
     table.sort_by_key(|(paragraph, _)| place(paragraph));
     output::line(&format!(
-        "{:<10} {:>7} {:>7} {:>8} {:>8}",
-        "paragraph", "passed", "failed", "skipped", "not run"
+        "{:<10} {:>7} {:>7} {:>8} {:>8} {:>8}",
+        "paragraph", "passed", "failed", "reading", "skipped", "not run"
     ))?;
-    let mut total = [0; 4];
+    let mut total = [0; 5];
     for (paragraph, counts) in table {
         counted(paragraph, counts)?;
         total.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
@@ -119,12 +156,17 @@ fn place(paragraph: &str) -> Option<Vec<u32>> {
     numbers.split('.').map(|number| u32::from_str_radix(number, 16).ok()).collect()
 }
 
-fn counted(name: &str, [passed, failed, skipped, not_run]: [usize; 4]) -> Result<(), Failure> {
+fn counted(
+    name: &str,
+    [passed, failed, reading, skipped, not_run]: [usize; 5],
+) -> Result<(), Failure> {
     let failed = match failed {
         0 => style(failed),
         _ => style(failed).red().bold(),
     };
-    output::line(&format!("{name:<10} {passed:>7} {failed:>7} {skipped:>8} {not_run:>8}"))
+    output::line(&format!(
+        "{name:<10} {passed:>7} {failed:>7} {reading:>8} {skipped:>8} {not_run:>8}"
+    ))
 }
 
 /// Why cases were skipped, each reason once.

@@ -54,6 +54,7 @@ impl<S> Scenario<S> {
                 sent: journal.sent(),
                 expected: self.expected.to_owned(),
                 received: fault,
+                reading: None,
             }))
         };
         // A host that sent nothing did not notice.
@@ -70,14 +71,15 @@ impl<S> Scenario<S> {
             Verdict::Failed(_) => journal.transcript.clone(),
             _ => Vec::new(),
         };
-        Outcome { name: self.name.to_string(), clauses: self.clauses, verdict, transcript }
+        let (name, differences) = (self.name.to_string(), Vec::new());
+        Outcome { name, clauses: self.clauses, verdict, differences, transcript }
     }
 
     /// Why it was not run.
     pub fn skipped(&self, why: &str) -> Outcome {
         let verdict = Verdict::Skipped(why.to_owned());
-        let (name, transcript) = (self.name.to_string(), Vec::new());
-        Outcome { name, clauses: self.clauses, verdict, transcript }
+        let (name, differences, transcript) = (self.name.to_string(), Vec::new(), Vec::new());
+        Outcome { name, clauses: self.clauses, verdict, differences, transcript }
     }
 
     /// What is wrong however late the drive was served.

@@ -7,7 +7,8 @@ use motorlink_proto::time::{Duration, Instant};
 
 use super::kept::Kept;
 use super::words::{lines, words};
-use crate::case::{Finding, Need, Stop, Subject};
+use crate::case::{Beside, Finding, Need, Stop, Subject};
+use crate::reading::Reading;
 use crate::wire::Bus;
 use crate::world::World;
 
@@ -30,6 +31,9 @@ pub struct Bench {
     pub(super) world: Box<dyn World>,
     pub(super) options: Options,
     pub(super) kept: Kept,
+    beside: Beside,
+    /// Whether a motor that is off takes motion commands after 0x88 only (SPEC-NOTES R17).
+    pub(super) needs_run: bool,
     /// What of another protocol was heard.
     pub(super) foreign: Option<(Dialect, MotorId)>,
     /// Whether the motor did not come to rest when it was switched off.
@@ -57,6 +61,8 @@ impl Bench {
             world,
             options,
             kept: Kept::default(),
+            beside: Beside::default(),
+            needs_run: false,
             foreign: None,
             runaway: false,
             heard: false,
@@ -195,7 +201,13 @@ impl Bench {
             sent: lines(&self.sent, Direction::HostToDrive),
             expected: expected.into(),
             received: lines(&self.received, Direction::DriveToHost),
+            reading: None,
         }))
+    }
+
+    /// Notes what failed as a difference from a reading, and lets the case go on.
+    pub(super) fn note(&mut self, reading: Reading, result: Result<(), Stop>) -> Result<(), Stop> {
+        self.beside.note(reading, result)
     }
 
     /// Forgets what was said and heard.
@@ -297,5 +309,9 @@ impl Subject for Bench {
             format!("{arrow} {}", words(frame, *direction))
         };
         self.transcript.iter().map(line).collect()
+    }
+
+    fn differences(&mut self) -> Vec<Finding> {
+        self.beside.take()
     }
 }

@@ -6,7 +6,8 @@ use motorlink_proto::units::{CentiDegrees, SpeedLimit};
 use super::bench::Bench;
 use super::case;
 use super::frames::{filled, null_bytes_are_0, request};
-use crate::case::{Case, Need, Stop};
+use crate::case::{Case, Need, ReadAs, Stop};
+use crate::reading::{R4, R8, R9, R19, R20, R26, R31};
 
 /// What a rotor at rest may read apart from one reading to the next, degrees.
 const JITTER: f64 = 0.5;
@@ -66,7 +67,8 @@ fn readings() -> Vec<Case<Bench>> {
                 let angle = bench.read(ReadCircleAngle)?.angle.degrees();
                 near(bench, angle, position, "the angle of the encoder position in 0x90")
             },
-        ),
+        )
+        .reading(R31),
         case(
             "the_multi_turn_angle_within_the_turn_is_the_single_turn_angle",
             &["RMD-94-06", "RMD-92-05", "RMD-92-03"],
@@ -75,7 +77,8 @@ fn readings() -> Vec<Case<Bench>> {
                 let multi = bench.read(ReadMultiTurnAngle)?.angle.degrees();
                 near(bench, multi, circle, "modulo 360° the angle that 0x94 reads")
             },
-        ),
+        )
+        .reading(R20),
     ]
 }
 
@@ -83,13 +86,14 @@ fn offset() -> Vec<Case<Bench>> {
     vec![
         case(
             "a_written_offset_is_in_force",
-            &["RMD-91-02", "RMD-91-01", "RMD-91-04", "RMD-91-06", "RMD-2-07"],
+            &["RMD-91-02", "RMD-91-01", "RMD-91-04", "RMD-91-05", "RMD-91-06", "RMD-2-07"],
             |bench| {
                 let offset = bench.another_offset()?;
-                let reply = bench.ask_once(WriteEncoderOffset(offset).encode())?;
-                let reply = EncoderOffset::decode(&reply);
+                let data = bench.ask_once(WriteEncoderOffset(offset).encode())?;
+                null_bytes_are_0(bench, Code::WriteEncoderOffset, &data)?;
+                let reply = EncoderOffset::decode(&data);
                 bench.require(reply == offset, format!("the new offset {}", offset.offset))?;
-                offset_is(bench, offset)
+                offset_is(bench, offset).read_as(R8)
             },
         )
         .needs(&[Need::Rom]),
@@ -101,7 +105,8 @@ fn offset() -> Vec<Case<Bench>> {
             null_bytes_are_0(bench, code, &reply)?;
             offset_is(bench, offset)
         })
-        .needs(&[Need::Rom]),
+        .needs(&[Need::Rom])
+        .reading(R4),
         case("an_offset_beyond_the_encoder_is_cut", &["RMD-91-03"], |bench| {
             if bench.turn() > i32::from(u16::MAX) {
                 return Err(Stop::Skipped("nothing is beyond an encoder of 16 bits".into()));
@@ -112,14 +117,16 @@ fn offset() -> Vec<Case<Bench>> {
             within_turn(bench, &[offset])?;
             offset_is(bench, EncoderOffset { offset })
         })
-        .needs(&[Need::Rom]),
+        .needs(&[Need::Rom])
+        .reading(R19),
         case("a_written_offset_outlasts_the_power", &["RMD-91-07"], |bench| {
             let offset = bench.another_offset()?;
             bench.read(WriteEncoderOffset(offset))?;
             bench.power_cycle()?;
             offset_is(bench, offset)
         })
-        .needs(&[Need::Rom, Need::PowerCycle]),
+        .needs(&[Need::Rom, Need::PowerCycle])
+        .reading(R8),
         case("a_position_that_is_held_stays_when_the_offset_moves", &["RMD-91-02"], |bench| {
             bench.gently()?;
             let angle = CentiDegrees(bench.angle_in_reach()?);
@@ -132,7 +139,8 @@ fn offset() -> Vec<Case<Bench>> {
             let (after, before) = (bench.degrees(after), bench.degrees(before));
             near(bench, after, before, "the original position as it was")
         })
-        .needs(&[Need::Spin, Need::Rom]),
+        .needs(&[Need::Spin, Need::Rom])
+        .reading(R26),
     ]
 }
 
@@ -147,7 +155,9 @@ fn zero() -> Vec<Case<Bench>> {
                 bench.read(WriteEncoderOffset(elsewhere))?;
                 let raw = bench.keep_offset()?.raw;
                 let code = Code::WriteZeroToRom;
-                let reply = bench.ask_once(filled(request(code), code, 0xA5))?;
+                let stale = bench.ask_once(filled(request(code), code, 0xA5)).map(drop);
+                bench.note(R4, stale)?;
+                let reply = bench.ask_once(request(code))?;
                 null_bytes_are_0(bench, code, &reply)?;
                 let offset = EncoderOffset::decode(&reply).offset;
                 let (offset, raw) = (bench.degrees(offset), bench.degrees(raw));
@@ -158,8 +168,13 @@ fn zero() -> Vec<Case<Bench>> {
         case("a_new_zero_does_not_act_before_power_on", &["RMD-19-02"], |bench| {
             let offset = bench.another_offset()?;
             bench.read(WriteEncoderOffset(offset))?;
+            let before = bench.read(ReadEncoder)?;
             bench.read(WriteZeroToRom)?;
-            offset_is(bench, offset)
+            let after = bench.read(ReadEncoder)?;
+            let shown = bench.require(after.offset == before.offset, "the offset as before");
+            bench.note(R9, shown)?;
+            let (after, before) = (bench.degrees(after.position), bench.degrees(before.position));
+            near(bench, after, before, "the position as before")
         })
         .needs(&[Need::Rom]),
         case("a_new_zero_acts_from_power_on", &["RMD-19-02", "RMD-19-03"], |bench| {

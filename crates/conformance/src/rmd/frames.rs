@@ -4,7 +4,8 @@ use motorlink_proto::rmd::{Stop as Halt, *};
 
 use super::bench::Bench;
 use super::{Clauses, case, subject};
-use crate::case::{Case, Need, Stop};
+use crate::case::{Case, Need, ReadAs, Stop};
+use crate::reading::{R4, R11, R30};
 
 /// Commands that only ask: what tests that one reply comes, that its NULL bytes are 0, that those of
 /// the request do not matter.
@@ -85,25 +86,35 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             let status = ReadStatus1.encode();
             let short = (0..8).map(|len| CanFrame::data_frame(id, false, &status[..len]));
             silent(bench, &short.collect::<Vec<_>>())
-        }),
+        })
+        .reading(R11),
         case("frames_with_29_bits_are_ignored", &["RMD-1-04", "RMD-1-06"], |bench| {
             let id = bench.id().can_id().into();
             let status = ReadStatus1.encode();
             silent(bench, &[CanFrame::data_frame(id, true, &status)])
-        }),
+        })
+        .reading(R11),
         case("remote_frames_are_ignored", &["RMD-1-03", "RMD-1-06"], |bench| {
             let id = bench.id().can_id().into();
             silent(bench, &[CanFrame::remote_frame(id, false, 8)])
-        }),
+        })
+        .reading(R11),
         case("frames_to_others_are_ignored", &["RMD-1-01", "RMD-1-06"], |bench| {
-            let own = bench.id().can_id();
-            let others = (MOTOR_BASE..=MOTOR_BASE + 33).filter(|id| *id != own);
+            let own = bench.id();
+            let others = (1..=32).filter_map(MotorId::new).filter(|id| *id != own);
             let status = ReadStatus1.encode();
-            silent(bench, &others.map(|id| CanFrame::new(id, status)).collect::<Vec<_>>())
+            let frames = others.map(|id| CanFrame::new(id.can_id(), status));
+            silent(bench, &frames.collect::<Vec<_>>())
         }),
+        case("frames_to_ids_that_do_not_exist_are_ignored", &["RMD-1-06"], |bench| {
+            let status = ReadStatus1.encode();
+            silent(bench, &[0, 33].map(|id| CanFrame::new(MOTOR_BASE + id, status)))
+        })
+        .reading(R11),
         case("unknown_command_bytes_are_met_with_silence", &["RMD-2-24"], |bench| {
             unknown(bench, nobodys().collect())
-        }),
+        })
+        .reading(R30),
         case("command_bytes_of_related_protocols_are_met_with_silence", &["RMD-2-24"], |bench| {
             bench.keep_gains()?;
             bench.keep_acceleration()?;
@@ -112,7 +123,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             let ours = (0..=u8::MAX).filter(|code| !known(code));
             unknown(bench, ours.filter(|code| !nobodys().any(|free| free == *code)).collect())
         })
-        .needs(&[Need::Spin, Need::Rom]),
+        .needs(&[Need::Spin, Need::Rom])
+        .reading(R30),
     ];
     for (code, answered, null_reply, null_request) in QUESTIONS {
         cases.push(case(subject("a_question_gets_one_reply", code), answered, move |bench| {
@@ -130,32 +142,28 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
                 },
             ));
         }
-        cases.push(case(
-            subject("null_bytes_of_a_request_are_not_looked_at", code),
-            null_request,
-            move |bench| {
-                question(bench, code)?;
-                let plain = bench.ask(request(code))?;
-                for stale in STALE {
-                    let reply = bench.ask(filled(request(code), code, stale))?;
-                    null_bytes_are_0(bench, code, &reply)?;
-                    let steady = matches!(code, Code::ReadGains | Code::ReadAcceleration);
-                    bench.require(!steady || reply == plain, "the same reply as without them")?;
-                }
-                Ok(())
-            },
-        ));
+        let name = subject("null_bytes_of_a_request_are_not_looked_at", code);
+        let ignored = case(name, null_request, move |bench| {
+            question(bench, code)?;
+            let plain = bench.ask(request(code))?;
+            for stale in STALE {
+                let reply = bench.ask(filled(request(code), code, stale))?;
+                null_bytes_are_0(bench, code, &reply)?;
+                let steady = matches!(code, Code::ReadGains | Code::ReadAcceleration);
+                bench.require(!steady || reply == plain, "the same reply as without them")?;
+            }
+            Ok(())
+        });
+        cases.push(ignored.reading(R4));
     }
     for (code, make, clauses, needs) in ECHOES {
         let name = subject("the_reply_is_the_request", code);
         let echo = case(name, clauses, move |bench| {
             let request = make(bench)?;
-            for stale in [0x00, STALE[0], STALE[1]] {
-                let sent = filled(request, code, stale);
-                let reply = bench.ask(sent)?;
-                bench.require(reply == sent, "the frame that was sent")?;
-            }
-            Ok(())
+            is_echoed(bench, request)?;
+            STALE
+                .into_iter()
+                .try_for_each(|stale| is_echoed(bench, filled(request, code, stale)).read_as(R4))
         });
         let once = case(subject("an_echo_comes_once", code), &clauses[..1], move |bench| {
             let request = make(bench)?;
@@ -164,6 +172,11 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         cases.extend([echo.needs(needs), once.needs(needs)]);
     }
     cases
+}
+
+fn is_echoed(bench: &mut Bench, sent: [u8; 8]) -> Result<(), Stop> {
+    let reply = bench.ask(sent)?;
+    bench.require(reply == sent, "the frame that was sent")
 }
 
 /// The request without values.

@@ -5,7 +5,8 @@ use motorlink_proto::time::Duration;
 use motorlink_proto::units::DpsPerSecond;
 
 use super::bench::Bench;
-use crate::case::{Need, Stop};
+use crate::case::{Need, ReadAs, Stop};
+use crate::reading::R8;
 use crate::world::Unavailable;
 
 /// What was found and is put back, where a case touched it.
@@ -238,7 +239,8 @@ impl Bench {
         }
         if let Some(offset) = kept.offset {
             let read = self.read(ReadEncoder)?.offset;
-            self.require(read == offset, format!("the offset as it was: {offset}"))?;
+            let held = self.require(read == offset, format!("the offset as it was: {offset}"));
+            held.read_as(R8)?;
         }
         Ok(())
     }

@@ -7,6 +7,7 @@ use super::bench::Bench;
 use super::case;
 use super::torque::{pulses, torque, torque_is_an_ampere};
 use crate::case::{Case, Need, Stop};
+use crate::reading::R11;
 
 pub(super) fn cases() -> Vec<Case<Bench>> {
     vec![
@@ -61,7 +62,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
                 CanFrame::remote_frame(id, false, 8),
             ])?;
             bench.require(answers.is_empty(), "silence")
-        }),
+        })
+        .reading(R11),
         case("a_motor_beyond_4_does_not_hear_them", &["RMD-280-04"], |bench| {
             if MotorSet::TORQUE4.contains(bench.id()) {
                 return Err(Stop::Skipped("needs a motor with an ID beyond 4".to_owned()));

@@ -9,6 +9,7 @@ use super::frames::filled;
 use super::settings::accelerate;
 use super::{Clauses, case, subject};
 use crate::case::{Case, Need, Stop};
+use crate::reading::{R4, R92};
 
 /// The command, what tests its reply's code, the reply's values, and the NULL bytes of the request.
 const COMMANDS: [(Code, Clauses, Clauses, Clauses); 6] = [
@@ -78,19 +79,22 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             same(bench, &reply, &before)
         }));
         let name = subject("null_bytes_of_a_motion_command_do_not_matter", code);
-        cases.push(case(name, request, move |bench| {
-            bench.gently()?;
-            let start = bench.angle()?;
-            // Little even for a motor that takes them for torque: 0x0101 is 4 A.
-            let request = filled(ahead(bench, code, 0)?, code, 0x01);
-            bench.ask(request)?;
-            let gone = bench.watch(500, |seen| (seen.angle - start).abs() > 1_500)?;
-            bench.require(!gone, "no more than a few degrees of movement")
-        }));
+        cases.push(
+            case(name, request, move |bench| {
+                bench.gently()?;
+                let start = bench.angle()?;
+                // Little even for a motor that takes them for torque: 0x0101 is 4 A.
+                let request = filled(ahead(bench, code, 0)?, code, 0x01);
+                bench.ask(request)?;
+                let gone = bench.watch(500, |seen| (seen.angle - start).abs() > 1_500)?;
+                bench.require(!gone, "no more than a few degrees of movement")
+            })
+            .reading(R4),
+        );
     }
     for (code, clauses) in LIMITED {
         let name = subject("the_acceleration_limit_holds", code);
-        cases.push(case(name, clauses, move |bench| limited(bench, code)));
+        cases.push(case(name, clauses, move |bench| limited(bench, code)).reading(R92));
     }
     cases.into_iter().map(|case| case.needs(&[Need::Spin])).collect()
 }

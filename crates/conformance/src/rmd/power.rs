@@ -6,9 +6,13 @@ use super::bench::Bench;
 use super::case;
 use super::speed::{keeps_running, runs};
 use crate::case::{Case, Need, Stop};
+use crate::reading::{R17, R25};
 
 pub(super) fn cases() -> Vec<Case<Bench>> {
     vec![
+        // First what the others have to know.
+        case("a_motion_command_starts_a_motor_that_is_off", &["RMD-A2-01", "RMD-80-02"], starts)
+            .reading(R17),
         case("off_lets_the_motor_come_to_rest", &["RMD-80-02"], |bench| {
             runs(bench, 1)?;
             bench.ask(Off.encode())?;
@@ -44,22 +48,36 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             runs(bench, 1)?;
             bench.ask(Run.encode())?;
             keeps_running(bench, 1)
-        }),
+        })
+        .reading(R25),
         case("a_motion_command_ends_a_stop", &["RMD-88-02"], |bench| {
             runs(bench, 1)?;
             stops(bench)?;
             runs(bench, -1)
-        }),
+        })
+        .reading(R17),
     ]
     .into_iter()
     .map(|case| case.needs(&[Need::Spin]))
     .collect()
 }
 
+/// A motor that does not start is tried after 0x88.
+fn starts(bench: &mut Bench) -> Result<(), Stop> {
+    bench.may_move();
+    bench.ask(Off.encode())?;
+    let alone = runs(bench, 1);
+    if let Err(Stop::Failed(_)) = alone {
+        bench.needs_run = true;
+        bench.needs_run = runs(bench, 1).is_ok();
+    }
+    alone
+}
+
 fn stops(bench: &mut Bench) -> Result<(), Stop> {
     bench.ask(Halt.encode())?;
-    let stands = bench.comes_to_a_stand(3_000)?;
-    bench.require(stands, "a motor that stands within 3 s of 0x81")
+    let stands = bench.comes_to_a_stand(10_000)?;
+    bench.require(stands, "a motor that stands within 10 s of 0x81")
 }
 
 fn resumes_nothing(bench: &mut Bench) -> Result<(), Stop> {

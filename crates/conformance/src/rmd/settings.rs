@@ -6,6 +6,7 @@ use motorlink_proto::units::DpsPerSecond;
 use super::bench::Bench;
 use super::case;
 use crate::case::{Case, Need, Stop};
+use crate::reading::{R24, R90};
 
 pub(super) fn cases() -> Vec<Case<Bench>> {
     vec![
@@ -36,11 +37,18 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         case(
             "the_acceleration_is_read_as_it_was_written",
             &["RMD-34-02", "RMD-34-01", "RMD-33-04"],
-            |bench| accelerations_are_kept(bench, &[1, 0x0102_0304]),
+            |bench| accelerations_are_kept(bench, &[0x012C, 0x07D0]),
         ),
+        case(
+            "any_acceleration_is_read_as_it_was_written",
+            &["RMD-34-02", "RMD-34-01", "RMD-33-04"],
+            |bench| accelerations_are_kept(bench, &[1, 0x0102_0304]),
+        )
+        .reading(R90),
         case("no_acceleration_limit_can_be_written", &["RMD-34-02"], |bench| {
             accelerations_are_kept(bench, &[0, -1])
-        }),
+        })
+        .reading(R24),
         case("the_acceleration_is_lost_with_the_power", &["RMD-34-04"], |bench| {
             bench.power_cycle()?;
             let rom = bench.keep_acceleration()?;

@@ -8,6 +8,7 @@ use super::bench::Bench;
 use super::case;
 use super::settings::write;
 use crate::case::{Case, Need, Stop};
+use crate::reading::{R94, R95};
 
 /// Speed of the cases, °/s.
 pub(super) const SPEED: i16 = 60;
@@ -34,11 +35,11 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
                     bench.pause(Duration::from_millis(400))?;
                     let turned = bench.angle()? - from;
                     let due = i64::from(sign * SPEED) * (bench.millis() - begun) as i64 / 10;
-                    let near = (turned - due).abs() <= due.abs() / 4;
-                    bench.require(
-                        near,
-                        format!("{:.1}° further, not {:.1}°", deg(due), deg(turned)),
-                    )?;
+                    let words = format!("{:.1}° further, not {:.1}°", deg(due), deg(turned));
+                    let as_far = (turned.abs() - due.abs()).abs() <= due.abs() / 4;
+                    bench.require(as_far, &*words)?;
+                    let same_way = bench.require(turned.signum() == due.signum(), words);
+                    bench.note(R94, same_way)?;
                 }
                 Ok(())
             },
@@ -52,7 +53,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             let turned = bench.watch(700, |seen| seen.speed.abs() > 10)?;
             bench.require(!turned, "no way to a position without position gains")?;
             runs(bench, 1)
-        }),
+        })
+        .reading(R95),
     ]
     .into_iter()
     .map(|case| case.needs(&[Need::Spin]))

@@ -5,7 +5,8 @@ use motorlink_proto::time::Duration;
 
 use super::bench::Bench;
 use super::settings::accelerate;
-use crate::case::Stop;
+use crate::case::{ReadAs, Stop};
+use crate::reading::R92;
 
 /// Acceleration limit under which cases turn the motor, °/s².
 pub(super) const GENTLE: i32 = 360;
@@ -31,6 +32,9 @@ impl Bench {
     /// Limits the acceleration, for the sake of whatever the motor is mounted to.
     pub(super) fn gently(&mut self) -> Result<(), Stop> {
         self.may_move();
+        if self.needs_run {
+            self.ask(Run.encode())?;
+        }
         accelerate(self, GENTLE)
     }
 
@@ -61,7 +65,8 @@ impl Bench {
     }
 
     /// Looks at the motor until `done`, at most for `ms`; whether it became so. A motor that turns
-    /// faster than any move of this kit is switched off, and the case has failed.
+    /// faster than any move of this kit is switched off, and the case is over: its acceleration is not
+    /// limited (SPEC-NOTES R92).
     pub(super) fn watch(
         &mut self,
         ms: u64,
@@ -74,7 +79,7 @@ impl Bench {
             if status.speed.0.unsigned_abs() > FAST {
                 let failed = self.failed(format!("no more than {FAST} °/s in any move"));
                 self.ask(Off.encode())?;
-                return Err(failed);
+                return Err(failed).read_as(R92);
             }
             let angle = self.angle()?;
             let millis = self.millis() - begun;

@@ -5,7 +5,8 @@ use motorlink_proto::units::{Celsius, CentiDps, DeciVolts, TorqueFeedback};
 
 use super::bench::Bench;
 use super::case;
-use crate::case::{Case, Need, Stop};
+use crate::case::{Case, Need, ReadAs, Stop};
+use crate::reading::{R18, R91};
 
 /// What a motor that answers can be: colder and hotter ones do not.
 const TEMPERATURES: std::ops::RangeInclusive<i8> = -40..=127;
@@ -101,7 +102,8 @@ fn errors() -> Vec<Case<Bench>> {
             let turned = bench.watch(500, |seen| seen.speed.abs() > 10)?;
             bench.require(!turned, "a motor at rest")
         })
-        .needs(&[Need::Spin, Need::Fault]),
+        .needs(&[Need::Spin, Need::Fault])
+        .reading(R18),
     ]
 }
 
@@ -117,7 +119,9 @@ pub(super) fn phases(bench: &mut Bench) -> Result<[i32; 3], Stop> {
     let currents = [phase_a, phase_b, phase_c].map(|current| i32::from(current.0));
     let sum: i32 = currents.iter().sum();
     let size: i32 = currents.iter().map(|current| current.abs()).sum();
-    bench.require(sum.abs() <= SENSING + size / 10, "three currents whose sum is about 0")?;
+    bench
+        .require(sum.abs() <= SENSING + size / 10, "three currents whose sum is about 0")
+        .read_as(R91)?;
     Ok(currents)
 }
 

@@ -14,6 +14,7 @@ use super::bench::Bench;
 use super::case;
 use super::status::phases;
 use crate::case::{Case, Need, Stop};
+use crate::reading::R91;
 
 /// One ampere of torque current, digits of a command: next to nothing for motors of this family.
 pub(super) const AMPERE: i16 = 62;
@@ -49,7 +50,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
                 bench.require((0.6..1.6).contains(&amps), words)?;
             }
             Ok(())
-        }),
+        })
+        .reading(R91),
     ]
     .into_iter()
     .map(|case| case.needs(&[Need::Spin]))

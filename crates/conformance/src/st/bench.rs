@@ -11,7 +11,8 @@ use super::found::Found;
 use super::restore::Undo;
 use super::safety;
 use super::timing::RECEPTION;
-use crate::case::{Finding, Need, Stop};
+use crate::case::{Beside, Finding, Need, ReadAs, Stop};
+use crate::reading::{Reading, S1, S27, S92};
 use crate::wire::{Line, hex};
 use crate::world::World;
 
@@ -35,6 +36,7 @@ pub struct Bench {
     pub(super) options: Options,
     /// What was found out about the drive.
     pub(super) found: Found,
+    pub(super) beside: Beside,
     /// What is to be undone after the case, the last first.
     pub(super) undo: Vec<Undo>,
     /// The current motor before the case.
@@ -85,12 +87,13 @@ impl Bench {
     pub fn new(line: Box<dyn Line>, world: Box<dyn World>, options: Options) -> Self {
         let words = Transcript::new(options.profile);
         let sent_at = line.now();
-        let (found, undo, transcript, sent, received, pending) = Default::default();
+        let (found, beside, undo, transcript, sent, received, pending) = Default::default();
         Bench {
             line,
             world,
             options,
             found,
+            beside,
             undo,
             current: None,
             out_of_step: true,
@@ -144,7 +147,7 @@ impl Bench {
             }
             self.moved = true;
         }
-        self.note(true, bytes);
+        self.transcribe(true, bytes);
         self.sent.extend(bytes);
         self.line.send(bytes)?;
         self.sent_at = self.line.now();
@@ -160,7 +163,7 @@ impl Bench {
                     let delay = self.line.now().since(self.sent_at);
                     let reply = Reply { header, payload: payload.to_vec(), delay };
                     let bytes: Vec<u8> = self.pending.drain(..size).collect();
-                    self.note(false, &bytes);
+                    self.transcribe(false, &bytes);
                     return self.in_form(reply).map(Some);
                 }
                 Parse::Bad(bad) => {
@@ -190,8 +193,16 @@ impl Bench {
         }
     }
 
-    /// What is demanded of every reply (4.2, 4.3).
-    fn in_form(&self, reply: Reply) -> Result<Reply, Stop> {
+    /// What is demanded of every reply (4.2, 4.3). One whose motor bits are 0, as 3.2 says, passes for
+    /// what its frame code says (SPEC-NOTES S1).
+    fn in_form(&mut self, mut reply: Reply) -> Result<Reply, Stop> {
+        let whole =
+            [HEADER_ACK, HEADER_NACK].into_iter().find(|whole| whole & 0x1F == reply.header);
+        if let Some(header) = whole {
+            let differs = self.failed("a reply with header f0 (ACK) or ff (NACK)");
+            self.beside.note(S1, Err(differs))?;
+            reply.header = header;
+        }
         match (reply.header, &*reply.payload) {
             (HEADER_ACK, _) => Ok(reply),
             (HEADER_NACK, &[code]) if ErrorCode::from(code) != ErrorCode::None => Ok(reply),
@@ -276,9 +287,15 @@ impl Bench {
         frame(Frame::header(code, self.options.motor.number()), payload)
     }
 
-    /// The bytes of a register.
+    /// The bytes of a register that every drive with its feature has (SPEC-NOTES S27).
     pub(super) fn get(&mut self, register: RegisterId) -> Result<Vec<u8>, Stop> {
-        self.acknowledged(&Request::GetRegister(register))
+        let bytes = self.encode(&Request::GetRegister(register));
+        let reply = self.exchange(&bytes)?;
+        let there = !reply.is_nack(ErrorCode::GetWriteOnly);
+        self.require(there, format!("ACK, for every drive like this has {register}"))
+            .read_as(S27)?;
+        self.require(reply.header == HEADER_ACK, "ACK")?;
+        Ok(reply.payload)
     }
 
     /// The value of a register.
@@ -292,7 +309,43 @@ impl Bench {
     /// Writes a register in the size that the profile has for it.
     pub(super) fn set(&mut self, register: RegisterId, value: i32) -> Result<(), Stop> {
         let size = usize::from(register.write_size(self.profile()));
-        self.done(&Request::SetRegister { register, value: &value.to_le_bytes()[..size] })
+        self.set_bytes(register, &value.to_le_bytes()[..size])
+    }
+
+    /// Writes bytes to a register that can be written.
+    pub(super) fn set_bytes(&mut self, register: RegisterId, value: &[u8]) -> Result<(), Stop> {
+        let bytes = self.encode(&Request::SetRegister { register, value });
+        let reply = self.exchange(&bytes)?;
+        let empty_ack = "f0 00 f0  ACK without payload";
+        self.require(!reply.is_nack(ErrorCode::WrongSet), empty_ack).read_as(S92)?;
+        self.require(reply.header == HEADER_ACK && reply.payload.is_empty(), empty_ack)
+    }
+
+    /// Notes what failed as a difference from a reading, and lets the case go on.
+    pub(super) fn note(&mut self, reading: Reading, result: Result<(), Stop>) -> Result<(), Stop> {
+        self.beside.note(reading, result)
+    }
+
+    /// What a motor at rest has in STATUS.
+    pub(super) fn is_idle(&self, status: Status) -> bool {
+        status == self.found.idle
+    }
+
+    /// Fails the case unless the motor is at rest.
+    pub(super) fn require_idle(&mut self, why: &str) -> Result<(), Stop> {
+        let status = self.status()?;
+        let idle = self.found.idle;
+        self.require(self.is_idle(status), format!("ACK {}: {idle}, {why}", u8::from(idle)))
+    }
+
+    /// Ends the case as a difference from a reading unless `held`.
+    pub(super) fn require_read(
+        &self,
+        reading: Reading,
+        held: bool,
+        expected: impl Into<String>,
+    ) -> Result<(), Stop> {
+        self.require(held, expected).read_as(reading)
     }
 
     pub(super) fn execute(&mut self, command: Command) -> Result<(), Stop> {
@@ -346,7 +399,7 @@ impl Bench {
         };
         let sent = said(&self.sent, words.note(true, &self.sent));
         let received = said(&self.received, words.note(false, &self.received));
-        Stop::Failed(Box::new(Finding { sent, expected: expected.into(), received }))
+        Stop::Failed(Box::new(Finding { sent, expected: expected.into(), received, reading: None }))
     }
 
     /// How many bytes the line carries within the reception timeout, with something to spare.
@@ -374,12 +427,12 @@ impl Bench {
     fn give_up(&mut self) {
         let bytes = std::mem::take(&mut self.pending);
         if !bytes.is_empty() {
-            self.note(false, &bytes);
+            self.transcribe(false, &bytes);
             self.out_of_step = true;
         }
     }
 
-    fn note(&mut self, sent: bool, bytes: &[u8]) {
+    fn transcribe(&mut self, sent: bool, bytes: &[u8]) {
         let words = self.words.note(sent, bytes);
         let direction = if sent { '>' } else { '<' };
         self.transcript.push(format!("{direction} {}  {words}", hex(bytes)));

@@ -158,6 +158,27 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.4-23" "RAMP_FINAL_SPEED is the end of the ramp; writing it is a ramp of the last duration (S26).";
     "ST-4.4-24" "A SET_REG without a register is refused (S18).";
     "ST-4.4-25" "IQ_SPEEDMODE is the Id reference of speed mode (S22).";
+    "ST-4.4-26" "Table 3, units: BUS_VOLTAGE is in V."
+        host [values_are_shown_with_their_unit_or_their_name];
+    "ST-4.4-27" "Table 3, units: HEATS_TEMP is in °C (S23)."
+        host [values_are_shown_with_their_unit_or_their_name];
+    "ST-4.4-28" "Table 3, units: MOTOR_POWER is in W (S23)."
+        host [values_are_shown_with_their_unit_or_their_name];
+    "ST-4.4-29" "Table 3, units: FLUXWK_BUS and FLUXWK_BUS_MEAS are in % (S12: shipped firmware has tenths)."
+        host [values_are_shown_with_their_unit_or_their_name];
+    "ST-4.4-30" "Table 3, units: MAX_APP_SPEED and MIN_APP_SPEED are in rpm, without a sign.";
+    "ST-4.4-31" "TORQUE_REF is the Iq reference, FLUX_REF the Id reference, in s16A; at rest both read what was asked for last (S91).";
+    "ST-4.4-32" "Table 3, synonyms: I_Q, I_D, I_Q_REF and I_D_REF are TORQUE_MEAS, FLUX_MEAS, TORQUE_REF and FLUX_REF (S7: read in a data segment).";
+    "ST-4.4-33" "PFC_ENABLED is 1 while the PFC is enabled, and 0 otherwise (S93).";
+    "ST-4.4-34" "Table 3, units: PFC_DCBUS_REF and PFC_DCBUS_MEAS are in V.";
+    "ST-4.4-35" "Table 3, units: PFC_ACBUS_FREQ is in tenths of a hertz (S28).";
+    "ST-4.4-36" "Table 3, units: PFC_ACBUS_RMS is in V, from zero to peak (S37).";
+    "ST-4.4-37" "Table 3, units: PFC_STARTUP_DURATION is in ms."
+        untested "no register tells when the start-up of a PFC is over";
+    "ST-4.4-38" "PFC_STATUS and PFC_FAULTS are state and faults of the PFC (S28)."
+        untested "the document does not list their values";
+    "ST-4.4-39" "Table 3, units: s16A, s16V, s16degree, s16speed, dpp and what is made of them are shares of a full scale."
+        untested "the full scale is not on the wire";
 
     "ST-4.5-01" "GET_REG reads a register; its code is 0x02, as table 1 has it (S2).";
     "ST-4.5-02" "It carries the register's id.";

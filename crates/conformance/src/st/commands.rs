@@ -2,13 +2,14 @@
 
 use motorlink_proto::stmcp::register::Feature;
 use motorlink_proto::stmcp::{
-    Command, ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status,
+    Command, ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request,
 };
 
 use super::bench::Bench;
 use super::restore::Undo;
 use super::safety;
-use crate::case::{Case, Need, Stop};
+use crate::case::{Case, Need, ReadAs, Stop};
+use crate::reading::{S22, S34, S35, S93};
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
     let mut cases = vec![
@@ -26,7 +27,8 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                 let payload = bench.acknowledged_bytes(&bytes)?;
                 bench.require(payload.is_empty(), "f0 00 f0  ACK without payload")
             },
-        ),
+        )
+        .reading(S35),
     ];
     let harmless: [(Command, &'static [&'static str]); 4] = [
         (Command::StopMotor, &["ST-4.6-12", "ST-4.6-13", "ST-4.6-04"]),
@@ -56,7 +58,8 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
             bench.refused(&Request::Execute(Command::ScStart), ErrorCode::WrongCmd)
         })
         .needs(&[Need::Spin]),
-        Case::new("references_are_cleared_to_their_defaults", &["ST-4.6-27"], clear_references),
+        Case::new("references_are_cleared_to_their_defaults", &["ST-4.6-27"], clear_references)
+            .reading(S22),
         Case::new(
             "pfc_disable_needs_a_pfc",
             &["ST-4.6-34", "ST-4.6-33", "ST-4.6-05"],
@@ -69,7 +72,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         ),
         Case::new(
             "pfc_enable_needs_a_pfc",
-            &["ST-4.6-31", "ST-4.6-29", "ST-4.6-30", "ST-4.6-32"],
+            &["ST-4.6-31", "ST-4.6-29", "ST-4.6-30", "ST-4.6-32", "ST-4.4-33"],
             pfc_enable,
         )
         .needs(&[Need::Spin]),
@@ -99,8 +102,7 @@ fn at_rest(bench: &mut Bench, command: Command) -> Result<(), Stop> {
         bench.keep_setpoints()?;
     }
     bench.execute(command)?;
-    let status = bench.status()?;
-    bench.require(status == Status::Idle, "ACK 0: IDLE, as before")
+    bench.require_idle("as before")
 }
 
 fn clear_references(bench: &mut Bench) -> Result<(), Stop> {
@@ -123,9 +125,18 @@ fn pfc_command(bench: &mut Bench, command: Command) -> Result<(), Stop> {
         return bench.refused(&Request::Execute(command), ErrorCode::WrongCmd);
     }
     off_or_skip(bench)?;
-    bench.execute(command)?;
+    succeeds(bench, command)?;
     let enabled = bench.value(RegisterId::PFC_ENABLED)?;
     bench.require(enabled == 0, "ACK 0: the PFC is off")
+}
+
+/// A drive may have the registers of a PFC and none configured (SPEC-NOTES S93).
+fn succeeds(bench: &mut Bench, command: Command) -> Result<(), Stop> {
+    let bytes = bench.encode(&Request::Execute(command));
+    let reply = bench.exchange(&bytes)?;
+    let expected = "f0 00 f0  ACK, for the registers of a PFC are there";
+    bench.require(!reply.is_nack(ErrorCode::WrongCmd), expected).read_as(S93)?;
+    bench.require(reply.header == HEADER_ACK && reply.payload.is_empty(), expected)
 }
 
 fn off_or_skip(bench: &mut Bench) -> Result<(), Stop> {
@@ -140,16 +151,16 @@ fn pfc_enable(bench: &mut Bench) -> Result<(), Stop> {
         return bench.refused(&Request::Execute(Command::PfcEnable), ErrorCode::WrongCmd);
     }
     off_or_skip(bench)?;
+    succeeds(bench, Command::PfcEnable)?;
     bench.undo.push(Undo::Pfc);
-    bench.execute(Command::PfcEnable)?;
     let enabled = bench.value(RegisterId::PFC_ENABLED)?;
     // Once more: it is started already, and nothing happens.
     let again = bench.encode(&Request::Execute(Command::PfcEnable));
     let again = bench.exchange(&again)?;
     let still = bench.value(RegisterId::PFC_ENABLED)?;
     bench.execute(Command::PfcDisable)?;
-    bench.require(enabled == 1, "ACK 1: the PFC is enabled")?;
+    bench.require(enabled == 1, "ACK 1: the PFC is enabled").read_as(S93)?;
     bench.require(again.header == HEADER_ACK && still == 1, "ACK, and the PFC stays enabled")?;
     let enabled = bench.value(RegisterId::PFC_ENABLED)?;
-    bench.require(enabled == 0, "ACK 0: the PFC is off")
+    bench.require(enabled == 0, "ACK 0: the PFC is off").read_as(S34)
 }

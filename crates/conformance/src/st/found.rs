@@ -1,16 +1,28 @@
 //! What is found out about a drive while it is tested: how many motors, which features.
 
 use motorlink_proto::stmcp::register::{Feature, Features};
-use motorlink_proto::stmcp::{ErrorCode, Frame, FrameCode, HEADER_ACK, Motor, Profile, RegisterId};
+use motorlink_proto::stmcp::{
+    ErrorCode, Frame, FrameCode, HEADER_ACK, Motor, Profile, RegisterId, Status,
+};
 
 use super::bench::{Bench, frame};
 use crate::case::Stop;
 
 /// What is known so far.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Found {
     motors: Option<u8>,
     features: Vec<(Feature, bool)>,
+    /// What STATUS is at rest and in RUN, which the document does not say (SPEC-NOTES S14).
+    pub(super) idle: Status,
+    pub(super) run: Status,
+}
+
+impl Default for Found {
+    fn default() -> Self {
+        let (motors, features) = Default::default();
+        Found { motors, features, idle: Status::Idle, run: Status::Run }
+    }
 }
 
 impl Bench {

@@ -9,6 +9,7 @@ use motorlink_proto::time::Duration;
 use super::bench::{Bench, frame};
 use super::found::read_size;
 use crate::case::{Case, Stop};
+use crate::reading::{S1, S10, S90};
 
 /// How long it is watched that nothing comes.
 const WATCH: Duration = Duration::from_millis(100);
@@ -68,12 +69,14 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                 }
                 Ok(())
             },
-        ),
+        )
+        .reading(S90),
         Case::new(
             "acknowledges_are_no_commands",
             &["ST-3.1-14", "ST-4.1-01"],
             acknowledges_as_commands,
-        ),
+        )
+        .reading(S1),
         Case::new("a_frame_may_come_byte_by_byte", &["ST-4.1-02"], byte_by_byte),
         Case::new(
             "every_header_to_a_missing_motor_is_refused",
@@ -90,7 +93,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
     }));
     cases.extend((0..=0x1F).filter(|&code| FrameCode::from_number(code, profile).is_none()).map(
         |code| {
-            Case::new(
+            let case = Case::new(
                 format!("an_unknown_frame_code_is_refused[{code:#04x}]"),
                 &["ST-4.1-16", "ST-3.1-16", "ST-4.3-06", "ST-3-02"],
                 move |bench: &mut Bench| {
@@ -99,15 +102,19 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                     let bytes = bench.frame(code, &[0xEE]);
                     bench.refused_bytes(&bytes, ErrorCode::BadFrameId)
                 },
-            )
+            );
+            // The codes of the acknowledges without their high bits.
+            if [HEADER_ACK, HEADER_NACK].iter().any(|header| header & 0x1F == code) {
+                return case.reading(S1);
+            }
+            case
         },
     ));
     match profile {
-        Profile::Spec => cases.push(Case::new(
-            "a_length_over_128_is_answered_with_timeout",
-            &["ST-3-07"],
-            too_long_in_spec,
-        )),
+        Profile::Spec => cases.push(
+            Case::new("a_length_over_128_is_answered_with_timeout", &["ST-3-07"], too_long_in_spec)
+                .reading(S10),
+        ),
         Profile::Mcsdk54 => cases.push(Case::new(
             "a_length_over_127_is_dropped_with_its_header",
             &["ST-3-07"],
@@ -287,9 +294,10 @@ fn byte_by_byte(bench: &mut Bench) -> Result<(), Stop> {
 fn every_header(bench: &mut Bench) -> Result<(), Stop> {
     let missing = bench.missing_motor()?;
     for motor in missing..=Motor::MAX {
-        for code in 0..=0x1F {
-            let bytes = frame(Frame::header(code, motor), &[0xEE; 5]);
-            bench.refused_bytes(&bytes, ErrorCode::BadMotorSelected)?;
+        for header in (0..=0x1F).map(|code| Frame::header(code, motor)) {
+            if ![HEADER_ACK, HEADER_NACK].contains(&header) {
+                bench.refused_bytes(&frame(header, &[0xEE; 5]), ErrorCode::BadMotorSelected)?;
+            }
         }
     }
     Ok(())

@@ -3,12 +3,13 @@
 use motorlink_proto::stmcp::register::Feature;
 use motorlink_proto::stmcp::{
     CurrentReference, ErrorCode, FrameCode, HEADER_ACK, MAX_PAYLOAD, PositionMove, Profile,
-    REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, Status, TorqueRamp,
+    REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, TorqueRamp,
 };
 
 use super::bench::Bench;
 use super::values::as_kept;
-use crate::case::{Case, Stop};
+use crate::case::{Case, ReadAs, Stop};
+use crate::reading::{S7, S13, S24, S26, S91, S94, S95};
 use crate::wire::hex;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
@@ -62,7 +63,8 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                 }
                 Ok(())
             },
-        ),
+        )
+        .reading(S24),
     ];
     for phase in 0..REVUP_PHASES {
         cases.push(Case::new(
@@ -90,7 +92,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         ));
     }
     match profile {
-        Profile::Spec => cases.extend(segments()),
+        Profile::Spec => cases.extend(segments().into_iter().map(|case| case.reading(S7))),
         Profile::Mcsdk54 => cases.extend(firmware()),
     }
     cases
@@ -109,12 +111,19 @@ fn version(bench: &mut Bench) -> Result<[u32; 3], Stop> {
     let payload = bench.acknowledged(&Request::FirmwareVersion)?;
     let scheme = "NAME<tab>Ver.MAJOR.MINOR.PATCH, or that and -A, -B or -RC with a number from 1, \
                   MAJOR from 1";
-    terminated(&payload).and_then(parse).ok_or_else(|| bench.failed(scheme))
+    let text = terminated(&payload);
+    let numbers = text.and_then(parse).ok_or_else(|| bench.failed(scheme))?;
+    // The scheme is printed with a mark too many between "Ver" and the numbers.
+    let to_the_letter = text.is_some_and(|text| text.contains(&format!("\tVer.{}.", numbers[0])));
+    let held = bench.require(to_the_letter, scheme);
+    bench.note(S13, held)?;
+    Ok(numbers)
 }
 
+/// The numbers behind a name and a tab, with or without "Ver" and points before them.
 fn parse(text: &str) -> Option<[u32; 3]> {
     let (name, version) = text.split_once('\t')?;
-    let version = version.strip_prefix("Ver.")?;
+    let version = version.trim_start_matches("Ver").trim_start_matches('.').trim_start();
     let (numbers, pre_release) = match version.split_once('-') {
         Some((numbers, pre_release)) => (numbers, Some(pre_release)),
         None => (version, None),
@@ -149,7 +158,10 @@ fn board_version(bench: &mut Bench) -> Result<(), Stop> {
         _ => "",
     };
     let expected = format!("ACK that begins with {}, as in the version string{hint}", hex(&wanted));
-    bench.require(payload.starts_with(&wanted), expected)
+    match bench.profile() {
+        Profile::Spec => bench.require(payload.starts_with(&wanted), expected).read_as(S94),
+        Profile::Mcsdk54 => bench.require(payload.starts_with(&wanted), expected),
+    }
 }
 
 fn ramp_at_rest(bench: &mut Bench) -> Result<(), Stop> {
@@ -159,7 +171,9 @@ fn ramp_at_rest(bench: &mut Bench) -> Result<(), Stop> {
         bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 2_000 }))?;
         let now = bench.value(RegisterId::RAMP_FINAL_SPEED)?;
         let shown = as_kept(bench.profile(), speed_rpm);
-        bench.require(now == shown, format!("ACK {shown} rpm, the final speed of the ramp"))?;
+        let held =
+            bench.require(now == shown, format!("ACK {shown} rpm, the final speed of the ramp"));
+        bench.note(S26, held)?;
         nothing_started(bench)?;
     }
     Ok(())
@@ -167,22 +181,25 @@ fn ramp_at_rest(bench: &mut Bench) -> Result<(), Stop> {
 
 fn references_at_rest(bench: &mut Bench) -> Result<(), Stop> {
     bench.keep_setpoints()?;
-    let reference = CurrentReference { iq_s16a: 0x0123, id_s16a: -0x0045 };
+    const IQ: i16 = 0x0123;
+    let reference = CurrentReference { iq_s16a: IQ, id_s16a: -0x0045 };
     bench.done(&Request::CurrentReference(reference))?;
     nothing_started(bench)?;
     let measured = bench.value(RegisterId::TORQUE_MEAS)?;
-    bench.require(measured == 0, "ACK 0 s16A, for no current flows at rest")
+    let little = measured.abs() < i32::from(IQ / 2);
+    bench.require(little, "ACK about 0 s16A, for no current flows at rest")
 }
 
 fn nothing_started(bench: &mut Bench) -> Result<(), Stop> {
-    let status = bench.status()?;
-    bench.require(status == Status::Idle, "ACK 0: IDLE, for nothing was started")?;
+    bench.require_idle("for nothing was started")?;
     let reference = bench.value(RegisterId::SPEED_REF)?;
-    bench.require(reference == 0, "ACK 0 rpm, for a ramp waits until the motor runs")
+    let waits = bench.require(reference == 0, "ACK 0 rpm, for a ramp waits until the motor runs");
+    bench.note(S91, waits)
 }
 
 fn revup(bench: &mut Bench, phase: u8) -> Result<(), Stop> {
     bench.keep_revup(phase)?;
+    let sensorless = bench.has(Feature::ObserverPll)? || bench.has(Feature::ObserverCordic)?;
     let samples = [
         // More than 16 bits of speed; less than nothing.
         RevupPhase { speed_rpm: 70_002, torque_s16a: 0x0123, duration_ms: 0x0234 },
@@ -192,7 +209,9 @@ fn revup(bench: &mut Bench, phase: u8) -> Result<(), Stop> {
         bench.done(&Request::SetRevupData(phase, data))?;
         let payload = bench.acknowledged(&Request::RevupData(phase))?;
         let bytes = data.to_bytes();
-        bench.require(payload == bytes, format!("ACK {}, which was written", hex(&bytes)))?;
+        let held =
+            bench.require(payload == bytes, format!("ACK {}, which was written", hex(&bytes)));
+        if sensorless { held? } else { held.read_as(S95)? }
     }
     // The other phases are others.
     let data = samples[0];
@@ -253,7 +272,7 @@ fn segments() -> Vec<Case<Bench>> {
 }
 
 /// Segment 0, which has to be empty: what it holds cannot be read, so it could not be put back.
-fn empty_segment(bench: &mut Bench) -> Result<(), Stop> {
+pub(super) fn empty_segment(bench: &mut Bench) -> Result<(), Stop> {
     let bytes = bench.encode(&Request::DataElement(0));
     let reply = bench.exchange(&bytes)?;
     if reply.is_nack(ErrorCode::BadFrameId) {
@@ -314,12 +333,12 @@ mod tests {
     use super::parse;
 
     #[test]
-    fn the_version_scheme_is_read_to_the_letter() {
+    fn the_version_scheme_has_a_name_a_tab_and_numbers() {
         assert_eq!(parse("ST MC SDK\tVer.5.4.4"), Some([5, 4, 4]));
         assert_eq!(parse("Fan\tVer.1.0.12-RC2"), Some([1, 0, 12]));
+        assert_eq!(parse("Fan\tVer..1.0.12"), Some([1, 0, 12]), "as it is printed");
         for wrong in [
             "ST MC SDK Ver.5.4.4",
-            "ST MC SDK\t5.4.4",
             "\tVer.5.4.4",
             "x\tVer.0.4.4",
             "x\tVer.5.4",

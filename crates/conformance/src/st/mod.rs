@@ -14,6 +14,7 @@ mod restore;
 mod safety;
 mod sizes;
 mod timing;
+mod units;
 mod values;
 
 use motorlink_proto::stmcp::Profile;
@@ -37,6 +38,7 @@ pub fn suite(profile: Profile) -> Vec<Case<Bench>> {
         commands::cases,
         messages::cases,
         motion::cases,
+        units::cases,
         faults::cases,
     ];
     topics.into_iter().flat_map(|cases| cases(profile)).collect()

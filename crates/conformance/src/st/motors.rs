@@ -7,6 +7,8 @@ use motorlink_proto::stmcp::{
 use super::bench::{Bench, frame};
 use super::restore::current_motor;
 use crate::case::{Case, Need, Stop};
+use crate::reading::{S20, S90};
+use crate::wire::hex;
 
 pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
     vec![
@@ -39,6 +41,7 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
             "an_addressed_motor_becomes_the_current_one",
             &["ST-3.2-07", "ST-4.1-10", "ST-4.1-13"],
             |bench: &mut Bench| {
+                tell_apart(bench)?;
                 for motor in 1..=bench.motors()? {
                     bench.acknowledged_bytes(&question(motor))?;
                     current_is(bench, motor)?;
@@ -94,6 +97,7 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
             |bench: &mut Bench| {
                 let missing = bench.missing_motor()?;
                 let tested = bench.options.motor.number();
+                tell_apart(bench)?;
                 bench.acknowledged_bytes(&question(tested))?;
                 bench.refused_bytes(&question(missing), ErrorCode::BadMotorSelected)?;
                 current_is(bench, tested)
@@ -113,6 +117,7 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
             &["ST-4.1-10", "ST-4.1-15"],
             |bench: &mut Bench| {
                 let other = bench.other_motor()?;
+                tell_apart(bench)?;
                 bench.status()?;
                 let bytes = frame(Frame::header(0x1D, other), &[0xEE]);
                 bench.refused_bytes(&bytes, ErrorCode::BadFrameId)?;
@@ -131,7 +136,8 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
                 let tested = bench.options.motor.number();
                 current_is(bench, tested)
             },
-        ),
+        )
+        .reading(S90),
         Case::new(
             "target_motor_is_the_current_motor_from_0",
             &["ST-4.4-18"],
@@ -144,7 +150,8 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
                 }
                 Ok(())
             },
-        ),
+        )
+        .reading(S20),
         Case::new(
             "target_motor_refuses_a_motor_that_is_missing",
             &["ST-4.4-18", "ST-4.3-09"],
@@ -158,7 +165,8 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
                 let tested = bench.options.motor.number();
                 current_is(bench, tested)
             },
-        ),
+        )
+        .reading(S20),
         Case::new(
             "after_power_on_the_current_motor_is_1",
             &["ST-3.2-05", "ST-4.1-14"],
@@ -193,12 +201,38 @@ fn read_gain(motor: u8) -> Vec<u8> {
     frame(Frame::header(FrameCode::GetReg.number(), motor), &[RegisterId::SPEED_KD.0])
 }
 
+/// TARGET_MOTOR tells which motor is the current one (SPEC-NOTES S20); the document only lets it be
+/// told by what motor number 0 addresses.
 fn current_is(bench: &mut Bench, motor: u8) -> Result<(), Stop> {
     let reply = bench.exchange(&current_motor())?;
     let held = reply.header == HEADER_ACK && reply.payload == [motor - 1];
-    let bytes = frame(HEADER_ACK, &[motor - 1]);
-    let bytes = crate::wire::hex(&bytes);
-    bench.require(held, format!("{bytes}  ACK {}: motor {motor} is the current one", motor - 1))
+    if held {
+        return Ok(());
+    }
+    let bytes = hex(&frame(HEADER_ACK, &[motor - 1]));
+    let words = format!("{bytes}  ACK {}: motor {motor} is the current one", motor - 1);
+    let differs = bench.failed(words);
+    bench.note(S20, Err(differs))?;
+    let addressed = bench.acknowledged_bytes(&read_gain(0))?;
+    let own = bench.acknowledged_bytes(&read_gain(motor))?;
+    bench.require(
+        addressed == own,
+        format!("the gain that motor number 0 read: {}", hex(&addressed)),
+    )
+}
+
+/// Gives the motor under test another gain than the others have.
+fn tell_apart(bench: &mut Bench) -> Result<(), Stop> {
+    let tested = bench.options.motor.number();
+    let mut taken = Vec::new();
+    for motor in (1..=bench.motors()?).filter(|motor| *motor != tested) {
+        taken.push(bench.acknowledged_bytes(&read_gain(motor))?);
+    }
+    let own = bench.keep(RegisterId::SPEED_KD)?;
+    let other = |bits: u8| own.iter().map(|byte| byte ^ bits).collect::<Vec<u8>>();
+    let free = (0..=u8::MAX).map(other).find(|gain| !taken.contains(gain));
+    let value = free.expect("fewer motors than gains");
+    bench.set_bytes(RegisterId::SPEED_KD, &value)
 }
 
 /// What is written to one motor is not read from another.
@@ -210,7 +244,7 @@ fn own_registers(bench: &mut Bench) -> Result<(), Stop> {
     if value == others {
         value[0] ^= 0x10;
     }
-    bench.done(&Request::SetRegister { register: RegisterId::SPEED_KD, value: &value })?;
+    bench.set_bytes(RegisterId::SPEED_KD, &value)?;
     let now = bench.acknowledged_bytes(&read_gain(other))?;
     bench.require(now == others, "the value of the other motor as before")
 }

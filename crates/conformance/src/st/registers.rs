@@ -1,6 +1,6 @@
 //! Cases of 4.4 and 4.5 and of table 3, for every register: who reads it, who writes it.
 
-use motorlink_proto::stmcp::register::{Feature, Features, Writing};
+use motorlink_proto::stmcp::register::{Access, Feature, Features, Writing};
 use motorlink_proto::stmcp::{
     ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status,
 };
@@ -9,9 +9,12 @@ use super::bench::Bench;
 use super::found::read_size;
 use super::restore::is_setpoint;
 use super::values;
-use crate::case::{Case, Stop};
+use crate::case::{Case, ReadAs, Stop};
+use crate::reading::{Reading, S5, S14, S15, S27, S91, S92};
 use crate::wire::hex;
 
+/// A speed that any drive can be told, rpm.
+const MODEST: i32 = 2_000;
 /// Ids for a DAC channel that no register of access D has.
 const NOT_FOR_DAC: [RegisterId; 2] = [RegisterId::STATUS, RegisterId(0xEE)];
 
@@ -26,25 +29,31 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                 &["ST-4.5-04", "ST-4.5-05", "ST-4.4-11", "ST-4.4-13", "ST-4.4-16", "ST-4.2-04"],
                 move |bench: &mut Bench| read(bench, register, size),
             )),
-            None => cases.push(Case::new(
-                format!("a_register_that_cannot_be_read_is_refused[{register}]"),
-                &["ST-4.5-06", "ST-4.5-03", "ST-4.4-14", "ST-4.4-15", "ST-4.3-08"],
-                move |bench: &mut Bench| {
-                    bench.refused(&Request::GetRegister(register), ErrorCode::GetWriteOnly)
-                },
+            None => cases.push(read_by_access(
+                register,
+                Case::new(
+                    format!("a_register_that_cannot_be_read_is_refused[{register}]"),
+                    &["ST-4.5-06", "ST-4.5-03", "ST-4.4-14", "ST-4.4-15", "ST-4.3-08"],
+                    move |bench: &mut Bench| {
+                        bench.refused(&Request::GetRegister(register), ErrorCode::GetWriteOnly)
+                    },
+                ),
             )),
         }
         match writing(register, profile) {
             Writing::Takes(size) if writes => cases.push(Case::new(
                 format!("a_register_takes_a_value_and_gives_it_back[{register}]"),
-                &["ST-4.4-05", "ST-4.4-03", "ST-4.4-12", "ST-4.4-16", "ST-4.2-03"],
+                takes_clauses(register),
                 move |bench: &mut Bench| write(bench, register, size),
             )),
             Writing::Takes(_) => {}
-            refusal => cases.push(Case::new(
-                format!("a_register_that_cannot_be_written_is_refused[{register}]"),
-                &["ST-4.4-10", "ST-4.4-04", "ST-4.4-13", "ST-4.4-15", "ST-4.3-07"],
-                move |bench: &mut Bench| refuse(bench, register, refusal),
+            refusal => cases.push(read_by_access(
+                register,
+                Case::new(
+                    format!("a_register_that_cannot_be_written_is_refused[{register}]"),
+                    &["ST-4.4-10", "ST-4.4-04", "ST-4.4-13", "ST-4.4-15", "ST-4.3-07"],
+                    move |bench: &mut Bench| refuse(bench, register, refusal),
+                ),
             )),
         }
     }
@@ -62,9 +71,11 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
             &["ST-4.4-20", "ST-4.4-21"],
             |bench: &mut Bench| {
                 let status = bench.status()?;
-                bench.require(status == Status::Idle, "ACK 0: IDLE")?;
+                let idle = bench.require(status == Status::Idle, "ACK 0: IDLE");
+                bench.note(S14, idle)?;
                 let flags = bench.value(RegisterId::FLAGS)?;
-                bench.require(flags == 0, "ACK 0: no faults")?;
+                let none = bench.require(flags == 0, "ACK 0: no faults");
+                bench.note(S14, none)?;
                 let speed = bench.value(RegisterId::SPEED_MEAS)?;
                 bench.require(speed == 0, "ACK 0 rpm")
             },
@@ -82,14 +93,45 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                 }
                 Ok(())
             },
-        ),
+        )
+        .reading(S15),
         Case::new(
             "a_dac_channel_takes_registers_of_access_d_only",
             &["ST-4.4-22", "ST-4.4-15"],
             dac,
-        ),
+        )
+        .reading(S5),
     ]);
     cases
+}
+
+/// What a write that is read back tests.
+fn takes_clauses(register: RegisterId) -> &'static [&'static str] {
+    match register {
+        RegisterId::TORQUE_REF | RegisterId::FLUX_REF => {
+            &["ST-4.4-05", "ST-4.4-03", "ST-4.4-12", "ST-4.4-16", "ST-4.2-03", "ST-4.4-31"]
+        }
+        _ => &["ST-4.4-05", "ST-4.4-03", "ST-4.4-12", "ST-4.4-16", "ST-4.2-03"],
+    }
+}
+
+/// Access D is not explained, so what it means for a master is a reading.
+fn read_by_access(register: RegisterId, case: Case<Bench>) -> Case<Bench> {
+    match register.shape() {
+        Some(shape) if shape.access == Access::Dac => case.reading(S5),
+        _ => case,
+    }
+}
+
+/// The reading by which a register gives back what is written to it while the motor is at rest, where
+/// more is needed than that it is written (4.4): its values are not listed, or a regulator sets it.
+pub(super) fn kept_by(register: RegisterId) -> Option<Reading> {
+    match register {
+        RegisterId::CONTROL_MODE => Some(S15),
+        RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => Some(S5),
+        RegisterId::TORQUE_REF | RegisterId::FLUX_REF => Some(S91),
+        _ => None,
+    }
 }
 
 /// What a drive that has a register's feature does with a write.
@@ -119,8 +161,10 @@ fn read(bench: &mut Bench, register: RegisterId, size: u8) -> Result<(), Stop> {
         bench.refused_bytes(&bytes, ErrorCode::GetWriteOnly)?;
         return bench.need(feature(register));
     }
+    let expected = format!("ACK with {size} bytes");
+    bench.require(!reply.is_nack(ErrorCode::GetWriteOnly), &*expected).read_as(S27)?;
     let held = reply.header == HEADER_ACK && reply.payload.len() == usize::from(size);
-    bench.require(held, format!("ACK with {size} bytes"))
+    bench.require(held, expected)
 }
 
 /// A write of the value that the register has, in case the drive takes it.
@@ -199,11 +243,15 @@ fn write(bench: &mut Bench, register: RegisterId, size: u8) -> Result<(), Stop> 
         bench.set(register, value)?;
         let now = bench.value(register)?;
         let text = motorlink::stmcp::Reading { register, bits: value, profile: bench.profile() };
-        bench.require(now == value, format!("ACK {text}, which was written"))?;
+        let given_back = bench.require(now == value, format!("ACK {text}, which was written"));
+        let beyond = register == RegisterId::RAMP_FINAL_SPEED && value.abs() > MODEST;
+        match kept_by(register).or(beyond.then_some(S92)) {
+            Some(reading) => bench.note(reading, given_back)?,
+            None => given_back?,
+        }
         // What one write changes besides, such as the mode, is begun anew.
         if is_setpoint(register) {
-            let status = bench.status()?;
-            bench.require(status == Status::Idle, "ACK 0: IDLE, for nothing was started")?;
+            bench.require_idle("for nothing was started")?;
         }
     }
     Ok(())

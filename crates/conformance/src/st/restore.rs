@@ -7,7 +7,8 @@ use motorlink_proto::stmcp::{
 use motorlink_proto::time::Duration;
 
 use super::bench::{Bench, PATIENCE, Reply, frame};
-use crate::case::{Need, Stop, Subject};
+use crate::case::{Finding, Need, ReadAs, Stop, Subject};
+use crate::reading::S91;
 use crate::wire::hex;
 use crate::world::Unavailable;
 
@@ -61,9 +62,10 @@ impl Subject for Bench {
         if reply.is_nack(ErrorCode::BadMotorSelected) {
             return Err(Stop::Lost(format!("the drive has no {motor}")));
         }
-        let settled = |status| matches!(status, Status::Idle | Status::Run) || faulty(status);
+        let idle = self.found.idle;
+        let settled = |status| status == idle || status == Status::Run || faulty(status);
         let status = self.wait_for(REST, settled)?;
-        if status != Status::Idle {
+        if !self.is_idle(status) && !self.rests_as(status)? {
             return Err(Stop::Lost(format!(
                 "the motor is not at rest: STATUS is {status}, and the kit begins in IDLE; stop the \
                  motor and acknowledge faults first (`motorlink st stop`, `motorlink st fault-ack`)"
@@ -112,6 +114,10 @@ impl Subject for Bench {
 
     fn transcript(&self) -> Vec<String> {
         self.lines()
+    }
+
+    fn differences(&mut self) -> Vec<Finding> {
+        self.beside.take()
     }
 }
 
@@ -176,15 +182,28 @@ impl Bench {
         }
     }
 
+    /// Whether a drive that gives IDLE another number (SPEC-NOTES S14) is at rest: it has no fault
+    /// and does not turn. From then on this is its IDLE.
+    fn rests_as(&mut self, status: Status) -> Result<bool, Stop> {
+        let known = status == Status::Run || faulty(status) || self.found.idle != Status::Idle;
+        if known || self.value(RegisterId::FLAGS)? != 0 || self.value(RegisterId::SPEED_MEAS)? != 0
+        {
+            return Ok(false);
+        }
+        self.found.idle = status;
+        Ok(true)
+    }
+
     /// Stops the motor and waits until it is at rest and without a fault.
     pub(super) fn rest(&mut self) -> Result<(), Stop> {
         self.execute(Command::StopMotor)?;
-        let at_rest = |status| matches!(status, Status::Idle | Status::FaultOver);
+        let idle = self.found.idle;
+        let at_rest = |status| status == idle || status == Status::FaultOver;
         if self.wait_for(REST, at_rest)? == Status::FaultOver {
             self.execute(Command::FaultAck)?;
         }
-        let status = self.wait_for(REST, |status| status == Status::Idle)?;
-        if status == Status::Idle {
+        let status = self.wait_for(REST, |status| status == idle)?;
+        if self.is_idle(status) {
             return Ok(());
         }
         Err(Stop::Lost(format!("the motor did not come to rest: STATUS is {status}")))
@@ -194,7 +213,8 @@ impl Bench {
     /// done that may have started it.
     fn end_at_rest(&mut self, may_turn: bool) -> Result<Result<(), Stop>, Stop> {
         self.synchronise()?;
-        if self.status()? == Status::Idle {
+        let status = self.status()?;
+        if self.is_idle(status) {
             return Ok(Ok(()));
         }
         let expected = "ACK 0: IDLE, for nothing was sent that starts a motor";
@@ -250,7 +270,7 @@ impl Bench {
     fn put_back(&mut self, undo: Undo) -> Result<(), Stop> {
         match undo {
             Undo::Register(register, bytes) => self.put_back_register(register, &bytes),
-            Undo::Setpoints(setpoints) => self.put_back_setpoints(setpoints),
+            Undo::Setpoints(setpoints) => self.put_back_setpoints(setpoints).read_as(S91),
             Undo::Revup(phase, data) => {
                 self.done(&Request::SetRevupData(phase, data))?;
                 let now = self.acknowledged(&Request::RevupData(phase))?;

@@ -1,15 +1,14 @@
 //! Cases of 4.4 and SPEC-NOTES S18 and S19: values and messages that are too long or too short.
 
 use motorlink_proto::stmcp::register::Writing;
-use motorlink_proto::stmcp::{
-    ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status,
-};
+use motorlink_proto::stmcp::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
 
 use super::bench::Bench;
 use super::found::read_size;
-use super::registers::writing;
+use super::registers::{kept_by, writing};
 use super::values;
-use crate::case::{Case, Stop};
+use crate::case::{Case, ReadAs, Stop};
+use crate::reading::{S18, S19};
 use crate::wire::hex;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
@@ -54,11 +53,14 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
             FrameCode::SetCurrentRef => &["ST-4.11-07"],
             _ => &["ST-3.1-10"],
         };
-        cases.push(Case::new(
-            format!("a_message_that_is_too_short_is_refused[{}]", code.name()),
-            clauses,
-            move |bench: &mut Bench| too_short(bench, code, least, refusal),
-        ));
+        cases.push(
+            Case::new(
+                format!("a_message_that_is_too_short_is_refused[{}]", code.name()),
+                clauses,
+                move |bench: &mut Bench| too_short(bench, code, least, refusal),
+            )
+            .reading(S18),
+        );
     }
     cases
 }
@@ -90,9 +92,13 @@ fn longer(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), St
     for excess in [1, 4, 8] {
         let mut bytes = value.to_le_bytes()[..size].to_vec();
         bytes.resize(size + excess, 0xEE);
-        bench.done(&Request::SetRegister { register, value: &bytes })?;
+        bench.set_bytes(register, &bytes)?;
         let now = bench.value(register)?;
-        bench.require(now == value, format!("the low bytes: {}", hex(&bytes[..size])))?;
+        let cut = bench.require(now == value, format!("the low bytes: {}", hex(&bytes[..size])));
+        match kept_by(register) {
+            Some(reading) => bench.note(reading, cut)?,
+            None => cut?,
+        }
     }
     Ok(())
 }
@@ -106,10 +112,18 @@ fn shorter(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), S
         if kept > 0 {
             bytes[0] ^= 0x04;
         }
-        bench.done(&Request::SetRegister { register, value: &bytes[..kept] })?;
+        let taken = bench.set_bytes(register, &bytes[..kept]);
+        // Whether nothing at all is a value that is too short is a reading as well.
+        if kept == 0 {
+            taken.read_as(S19)?
+        } else {
+            taken?
+        }
         let now = bench.get(register)?;
         let shown = &bytes[..now.len().min(4)];
-        bench.require(now == shown, format!("ACK {}: new low bytes, old high ones", hex(shown)))?;
+        let words = format!("ACK {}: new low bytes, old high ones", hex(shown));
+        let held = bench.require(now == shown, words);
+        bench.note(S19, held)?;
         bench.set(register, value)?;
     }
     Ok(())
@@ -161,8 +175,7 @@ fn too_short(
         prime(bench)?;
         let bytes = bench.frame(code.number(), &[0; 16][..size]);
         refused_or_old_bytes(bench, &bytes, refusal)?;
-        let status = bench.status()?;
-        bench.require(status == Status::Idle, "ACK 0: IDLE, for nothing was started")?;
+        bench.require_idle("for nothing was started")?;
     }
     let now = setpoints(bench)?;
     bench.require(now == before, "mode and references as before the refused message")

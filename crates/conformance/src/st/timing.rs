@@ -5,6 +5,7 @@ use motorlink_proto::time::Duration;
 
 use super::bench::{Bench, Reply};
 use crate::case::{Case, Stop};
+use crate::reading::{S11, S29};
 
 /// In this time a whole command must have come (4.1).
 pub(super) const RECEPTION: Duration = Duration::from_millis(25);
@@ -38,9 +39,11 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                     "bytes_behind_a_timeout_begin_a_new_frame",
                     &["ST-4.1-08", "ST-4.1-18"],
                     late_bytes,
-                ),
+                )
+                .reading(S29),
                 Case::new("a_frame_within_25_ms_is_taken", &["ST-4.1-08"], in_time),
-                Case::new("the_timeout_counts_from_the_first_byte", &["ST-4.1-08"], trickle),
+                Case::new("the_timeout_counts_from_the_first_byte", &["ST-4.1-08"], trickle)
+                    .reading(S11),
             ]);
         }
         Profile::Mcsdk54 => cases.push(Case::new(

@@ -100,7 +100,7 @@ fn a_slow_line_fails_nothing_and_skips_what_it_cannot_carry_in_time() {
         let allowed = vec![Need::Spin];
         let options = Options { profile, motor: Motor::FIRST, allowed, byte_time };
         let mut bench = Bench::new(Box::new(uart), Box::new(()), options);
-        let report = run(&st::suite(profile), &mut bench, |_| {});
+        let report = run(&st::suite(profile), &mut bench, |_| {}).strict();
         assert!(report.is_clean(), "{baud}: {:#?}", report.failed().collect::<Vec<_>>());
         let slow = report.outcomes.iter().filter(
             |outcome| matches!(&outcome.verdict, Verdict::Skipped(why) if why.contains("25 ms")),

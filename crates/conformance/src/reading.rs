@@ -1,0 +1,76 @@
+//! How the kit reads what the documents leave open: rows of docs/SPEC-NOTES.md that a case demands.
+
+/// A row of docs/SPEC-NOTES.md. A drive that differs from it may still do all that its document
+/// says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reading {
+    /// The row's id.
+    pub row: &'static str,
+    /// The reading in a sentence.
+    pub text: &'static str,
+}
+
+macro_rules! readings {
+    ($( $row:ident $text:literal; )+) => {
+        $(
+            #[doc = $text]
+            pub(crate) const $row: Reading = Reading { row: stringify!($row), text: $text };
+        )+
+        /// Every reading that cases demand.
+        pub static READINGS: &[Reading] = &[$($row),+];
+    };
+}
+
+readings! {
+    S1 "Replies have the headers 0xF0 and 0xFF; sent as commands these address motor 7.";
+    S5 "A register of access D can be neither read nor written; its id is a value for a DAC channel.";
+    S7 "A data segment has the layout of SPEC-NOTES.";
+    S10 "A length over 128 is answered with TIMEOUT after 25 ms of silence.";
+    S11 "The 25 ms count from the first byte of the frame.";
+    S13 "The version text is the name, a tab, \"Ver.\" and the numbers.";
+    S14 "STATUS and FLAGS have the values of shipped firmware.";
+    S15 "CONTROL_MODE is 0 for torque and 1 for speed, and reads what was asked for last.";
+    S18 "A message that is too short is refused and has no effect.";
+    S19 "Bytes that a short value lacks keep what the register had.";
+    S20 "TARGET_MOTOR is the current motor, counted from 0; another is WRONG_SET.";
+    S22 "IQ_SPEEDMODE is the Id reference of speed mode.";
+    S23 "Temperatures and power have a sign.";
+    S24 "A rev-up phase over 4 is WRONG_SET.";
+    S25 "SET_CURRENT_REF changes to torque mode.";
+    S26 "RAMP_FINAL_SPEED is the end of the last ramp; a write is a ramp of the last duration.";
+    S27 "The registers of a feature exist together, those of no feature always.";
+    S28 "PFC_ACBUS_FREQ is in 0.1 Hz.";
+    S29 "A byte after the 25 ms begins a new frame.";
+    S34 "PFC_DISABLE disables a PFC that is enabled.";
+    S35 "Bytes behind a message are ignored.";
+    S90 "The checksum is checked before the motor and the frame code; a damaged frame selects no motor.";
+    S91 "At rest references read what was asked for last and SPEED_REF is 0; in RUN SPEED_REF follows the ramp.";
+    S92 "A register takes every value of its size.";
+    S93 "PFC_ENABLED is 0 or 1, and a PFC is there where its registers are.";
+    S94 "GET_BOARD_INFO and GET_FW_VERSION have the same version.";
+    S95 "A motor with a sensor keeps rev-up data, too.";
+    S96 "ENCODER_ALIGN acts at rest only, shows in STATUS and ends at rest.";
+
+    R4 "NULL bytes of a request are not looked at, and echoed as they came.";
+    R8 "An offset written with 0x91 is in force at once and in ROM.";
+    R9 "After 0x19 the old offset is read until power-on.";
+    R11 "A frame of another form, or to an ID that nobody can have, gets no reply.";
+    R13 "A greatest speed of 0 turns nothing.";
+    R15 "An angle over 35999 or a direction over 1 is answered and not carried out.";
+    R16 "The same single-turn command again starts no further turn.";
+    R17 "A motion command starts a motor that is stopped or off.";
+    R18 "While an error is active the motor is off.";
+    R19 "An offset beyond the encoder is cut to its width.";
+    R20 "The multi-turn angle modulo 360° is the single-turn angle.";
+    R24 "An acceleration of 0 or less is no limit, and is stored as it comes.";
+    R25 "0x88 without a stop changes nothing.";
+    R26 "A position that is held stays where it is when the offset changes.";
+    R30 "A command byte that chapter 2 does not list gets no reply.";
+    R31 "Single-turn angle and encoder are of the motor shaft.";
+    R90 "An acceleration of any size is stored as it comes.";
+    R91 "Phase currents sum to 0, and have about the size of the torque current.";
+    R92 "The acceleration of 0x34 is the Max Acceleration of the vendor's tool.";
+    R93 "A move is as fast as its greatest speed lets it be.";
+    R94 "Positive speed and torque turn clockwise.";
+    R95 "Without position gains a motor does not go to a position.";
+}
