@@ -141,7 +141,7 @@ fn limited(bench: &mut Bench, code: Code) -> Result<(), Stop> {
     const LIMIT: i32 = 100;
     /// ms by which the clock may have begun too late.
     const LATE: u64 = 50;
-    bench.may_move();
+    bench.ready()?;
     accelerate(bench, LIMIT)?;
     let request = ahead(bench, code, 60)?;
     bench.ask(request)?;

@@ -31,11 +31,17 @@ pub(super) struct Seen {
 impl Bench {
     /// Limits the acceleration, for the sake of whatever the motor is mounted to.
     pub(super) fn gently(&mut self) -> Result<(), Stop> {
+        self.ready()?;
+        accelerate(self, GENTLE)
+    }
+
+    /// Brings the motor to where it takes motion commands.
+    pub(super) fn ready(&mut self) -> Result<(), Stop> {
         self.may_move();
         if self.needs_run {
             self.ask(Run.encode())?;
         }
-        accelerate(self, GENTLE)
+        Ok(())
     }
 
     /// A command that may turn the motor; checks its reply.

@@ -65,6 +65,7 @@ fn one(bench: &Bench, torque: i16) -> CanFrame {
 
 /// Raises the torque until the motor turns; by how much it turned, 0.01°.
 fn break_away(bench: &mut Bench, sign: i16) -> Result<i64, Stop> {
+    bench.ready()?;
     let start = bench.angle()?;
     let mut turned = 0;
     let mut iq = 0;
@@ -97,7 +98,7 @@ pub(super) fn pulses(
 ) -> Result<f64, Stop> {
     const PULSES: i16 = 10;
     const SETTLES: Duration = Duration::from_millis(5);
-    bench.may_move();
+    bench.ready()?;
     // A motor that does not answer this is not left under torque for as long as that takes.
     look(bench, 1)?;
     let mut sum = 0.0;

@@ -159,7 +159,8 @@ fn pfc_enable(bench: &mut Bench) -> Result<(), Stop> {
     let again = bench.exchange(&again)?;
     let still = bench.value(RegisterId::PFC_ENABLED)?;
     bench.execute(Command::PfcDisable)?;
-    bench.require(enabled == 1, "ACK 1: the PFC is enabled").read_as(S93)?;
+    bench.require(enabled != 0, "ACK 1: the PFC is enabled")?;
+    bench.require_read(S93, enabled == 1, "ACK 1: the PFC is enabled")?;
     bench.require(again.header == HEADER_ACK && still == 1, "ACK, and the PFC stays enabled")?;
     let enabled = bench.value(RegisterId::PFC_ENABLED)?;
     bench.require(enabled == 0, "ACK 0: the PFC is off").read_as(S34)

@@ -7,7 +7,7 @@ use super::bench::Bench;
 use super::found::read_size;
 use super::registers::{kept_by, writing};
 use super::values;
-use crate::case::{Case, ReadAs, Stop};
+use crate::case::{Case, Stop};
 use crate::reading::{S18, S19};
 use crate::wire::hex;
 
@@ -89,10 +89,11 @@ fn prepare(bench: &mut Bench, register: RegisterId) -> Result<(Vec<u8>, i32), St
 
 fn longer(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), Stop> {
     let (_, value) = prepare(bench, register)?;
+    bench.set(register, value)?;
     for excess in [1, 4, 8] {
         let mut bytes = value.to_le_bytes()[..size].to_vec();
         bytes.resize(size + excess, 0xEE);
-        bench.set_bytes(register, &bytes)?;
+        bench.done(&Request::SetRegister { register, value: &bytes })?;
         let now = bench.value(register)?;
         let cut = bench.require(now == value, format!("the low bytes: {}", hex(&bytes[..size])));
         match kept_by(register) {
@@ -112,12 +113,12 @@ fn shorter(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), S
         if kept > 0 {
             bytes[0] ^= 0x04;
         }
-        let taken = bench.set_bytes(register, &bytes[..kept]);
+        let taken = bench.done(&Request::SetRegister { register, value: &bytes[..kept] });
         // Whether nothing at all is a value that is too short is a reading as well.
         if kept == 0 {
-            taken.read_as(S19)?
+            bench.note(S19, taken)?;
         } else {
-            taken?
+            taken?;
         }
         let now = bench.get(register)?;
         let shown = &bytes[..now.len().min(4)];

@@ -4,4 +4,5 @@ mod clauses;
 mod conditions;
 mod drive;
 mod mutants;
+mod readings;
 mod suite;

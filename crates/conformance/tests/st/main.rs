@@ -3,5 +3,6 @@
 mod clauses;
 mod mutants;
 mod peer;
+mod readings;
 mod slow;
 mod suite;

@@ -121,7 +121,7 @@ fn write_offset(motors: &mut Motors, offset: u16) -> [u8; 8] {
 }
 
 /// In RAM only.
-fn lost_offset() -> Behaviour {
+pub fn lost_offset() -> Behaviour {
     let mut rom = None;
     Box::new(move |motors, event| {
         match event {
@@ -141,7 +141,7 @@ fn lost_offset() -> Behaviour {
 }
 
 /// In ROM only.
-fn late_offset() -> Behaviour {
+pub fn late_offset() -> Behaviour {
     let mut rom = None;
     Box::new(move |motors, event| match event {
         Event::Frame(frame) => match frame.usable() {
@@ -150,6 +150,10 @@ fn late_offset() -> Behaviour {
                 let offset = u16_at(data, 6);
                 let reply = EncoderOffset { offset }.encode_as(Code::WriteEncoderOffset);
                 vec![CanFrame::new(id, reply)]
+            }
+            Some((_, data)) if data[0] == 0x19 => {
+                rom = None;
+                motors.pass(event)
             }
             _ => motors.pass(event),
         },

@@ -1,6 +1,6 @@
 //! Motors that differ from the document in one thing each: the case that names the clause fails.
 
-mod encoder;
+pub mod encoder;
 mod every_command;
 mod frames;
 mod motion;
@@ -99,7 +99,7 @@ fn without_a_mutation_the_same_wrappers_pass() {
 }
 
 /// Changes the data of replies, given the request's.
-fn replies(change: impl Fn(&[u8; 8], &mut [u8; 8]) + 'static) -> Behaviour {
+pub fn replies(change: impl Fn(&[u8; 8], &mut [u8; 8]) + 'static) -> Behaviour {
     frames(move |request, reply| {
         let Some((id, data)) = reply.usable() else { return vec![reply] };
         let (mut data, request) = (*data, *request.usable().expect("it was answered").1);
@@ -109,7 +109,7 @@ fn replies(change: impl Fn(&[u8; 8], &mut [u8; 8]) + 'static) -> Behaviour {
 }
 
 /// Changes replies to one command.
-fn on(to: Code, change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
+pub fn on(to: Code, change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
     replies(move |request, reply| {
         if code(request) == to {
             change(reply);
@@ -130,7 +130,7 @@ fn frames(change: impl Fn(&CanFrame, CanFrame) -> Vec<CanFrame> + 'static) -> Be
 
 /// Changes the data of requests to the first motor; its reply has the code that was sent, and an
 /// echo all of it.
-fn requests(change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
+pub fn requests(change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
     commands(move |motors, data| {
         let mut changed = *data;
         change(&mut changed);
@@ -139,7 +139,7 @@ fn requests(change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
 }
 
 /// What the first motor does to a command, as if it were another.
-fn obey(motors: &mut Motors, sent: &[u8; 8], done: [u8; 8]) -> Option<[u8; 8]> {
+pub fn obey(motors: &mut Motors, sent: &[u8; 8], done: [u8; 8]) -> Option<[u8; 8]> {
     let mut reply = motors.try_ask(done)?;
     let echoes = Code::from(sent[0]).info().is_some_and(|row| row.echo);
     if done != *sent {
@@ -163,7 +163,7 @@ fn taken_for(one: u8, other: u8) -> Behaviour {
 }
 
 /// Takes commands to the first motor away from it: `Some` is what is answered.
-fn commands(
+pub fn commands(
     mut take: impl FnMut(&mut Motors, &[u8; 8]) -> Option<Option<[u8; 8]>> + 'static,
 ) -> Behaviour {
     Box::new(move |motors, event| {
@@ -179,7 +179,7 @@ fn commands(
 }
 
 /// The code that begins a frame.
-fn code(data: &[u8; 8]) -> Code {
+pub fn code(data: &[u8; 8]) -> Code {
     Code::from(data[0])
 }
 

@@ -83,12 +83,12 @@ fn hears(
 }
 
 /// Changes a reply, whose request is given with it.
-fn says(change: impl FnMut(&[u8], &mut Vec<u8>) + 'static) -> Deviation {
+pub fn says(change: impl FnMut(&[u8], &mut Vec<u8>) + 'static) -> Deviation {
     Deviation { after: Some(Box::new(change)), ..Deviation::default() }
 }
 
 /// Answers some right commands itself: header and payload in, the reply out.
-fn answers(
+pub fn answers(
     mut answer: impl FnMut(&mut Station, Instant, u8, &[u8]) -> Option<Vec<u8>> + 'static,
 ) -> Deviation {
     hears(move |station, now, bytes| {
@@ -110,7 +110,7 @@ fn takes(code: u8, mut change: impl FnMut(&mut Station, &mut Vec<u8>) + 'static)
 }
 
 /// Changes the payload of ACKs to commands of a frame code, given the command's payload.
-fn gives(code: u8, mut change: impl FnMut(&[u8], &mut Vec<u8>) + 'static) -> Deviation {
+pub fn gives(code: u8, mut change: impl FnMut(&[u8], &mut Vec<u8>) + 'static) -> Deviation {
     says(move |request, reply| {
         let (Some((header, asked)), Some((HEADER_ACK, mut payload))) =
             (parsed(request), parsed(reply))
@@ -133,16 +133,16 @@ fn refuses(mut change: impl FnMut(&[u8], ErrorCode) -> ErrorCode + 'static) -> D
     })
 }
 
-fn ack() -> Vec<u8> {
+pub fn ack() -> Vec<u8> {
     frame(HEADER_ACK, &[])
 }
 
-fn nack(code: ErrorCode) -> Vec<u8> {
+pub fn nack(code: ErrorCode) -> Vec<u8> {
     frame(HEADER_NACK, &[code.number()])
 }
 
 /// Header and payload of bytes that are one whole frame.
-fn parsed(bytes: &[u8]) -> Option<(u8, Vec<u8>)> {
+pub fn parsed(bytes: &[u8]) -> Option<(u8, Vec<u8>)> {
     match Frame::parse(bytes) {
         Parse::Frame(frame, size) if size == bytes.len() => {
             Some((frame.header, frame.payload.to_vec()))
