@@ -49,10 +49,10 @@ def test_a_simulated_motor_passes_and_is_left_alone(check, sim, tmp_path):
     drives = sim(st=())
     before = drives.motor(1)
     junit, saved = tmp_path / "rmd.xml", tmp_path / "rmd.json"
-    done = check(drives.can, "--junit", junit, "--json", saved).ended(0)
+    done = check(drives.can, "--readings", "strict", "--junit", junit, "--json", saved).ended(0)
     assert "needs" in done.out and "--spin" in done.out, "what was skipped says why"
     report = json.loads(saved.read_text())
-    assert report["failed"] == report["not_run"] == 0
+    assert report["failed"] == report["reading"] == report["not_run"] == 0
     assert report["passed"] > 50 and len(report["cases"]) > 130
     suite = ElementTree.parse(junit).getroot().find("testsuite")
     assert (suite.get("name"), int(suite.get("failures"))) == ("rmd", 0)
@@ -105,6 +105,31 @@ def test_without_that_deviation_the_same_peer_passes(check, tmp_path):
     peer = Peer({"9A": STATUS_1_OF_24_V, "9C": STATUS_2})
     with device(tmp_path / "can", slcan_adapter(peer)) as port:
         check(port, "--only", "temperature_and_voltage").ended(0)
+
+
+class Lenient(Peer):
+    """Answers requests of any length, which the document does not forbid (SPEC-NOTES R11)."""
+
+    def __call__(self, frame):
+        return super().__call__(f"t1418{frame[5:]}" if frame.startswith("t141") else frame)
+
+
+def test_a_difference_from_a_reading_is_told_apart_and_fails_if_strict(check, tmp_path):
+    peer = Lenient({"9A": STATUS_1_OF_24_V, "9C": STATUS_2})
+    files = tmp_path / "rmd.xml", tmp_path / "rmd.json"
+    only = ("--only", "frames_of_other_lengths_are_ignored")
+    with device(tmp_path / "can", slcan_adapter(peer)) as port:
+        apart = check(port, *only, "--junit", files[0], "--json", files[1]).ended(0)
+        strict = check(port, *only, "--readings", "strict").ended(1)
+    assert "R11" in apart.out and "FAILED" not in apart.out
+    (case,) = ElementTree.parse(files[0]).getroot().iter("testcase")
+    assert case.find("failure") is None and case.find("skipped").get("type") == "reading"
+    assert "R11" in case.find("skipped").get("message")
+    report = json.loads(files[1].read_text())
+    assert (report["failed"], report["reading"], report["passed"]) == (0, 1, 0)
+    (difference,) = report["cases"][0]["differences"]
+    assert difference["row"] == "R11" and difference["expected"] == "silence"
+    assert "FAILED" in strict.out and "reading  R11" in strict.out
 
 
 def test_a_motor_of_another_protocol_is_named_and_left_alone(check, tmp_path):

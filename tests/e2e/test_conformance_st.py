@@ -22,11 +22,11 @@ def test_a_simulated_drive_passes_without_moving(sim, run, tmp_path, profile):
     drives = sim("--profile", profile, rmd=())
     before = drives.motor(1)
     files = tmp_path / "report.xml", tmp_path / "report.json"
-    words = ("--profile", profile, "--junit", files[0], "--json", files[1])
+    words = ("--readings", "strict", "--profile", profile, "--junit", files[0], "--json", files[1])
     done = kit(run, drives.st, *words).ended(0)
 
     report = json.loads(files[1].read_text())
-    assert report["failed"] == report["not_run"] == 0
+    assert report["failed"] == report["reading"] == report["not_run"] == 0
     assert report["passed"] > 390
     verdicts = {case["verdict"] for case in report["cases"]}
     assert verdicts == {"passed", "skipped"}
@@ -43,7 +43,7 @@ def test_a_simulated_drive_passes_without_moving(sim, run, tmp_path, profile):
 def test_a_drive_in_the_process_passes(run, tmp_path, profile):
     config = tmp_path / "bench.toml"
     config.write_text(f'profile = "{profile}"\n')
-    done = kit(run, f"sim:{config}", "--profile", profile, "--json").ended(0)
+    done = kit(run, f"sim:{config}", "--profile", profile, "--readings", "strict", "--json").ended(0)
     assert done.json["failed"] == 0
 
 
@@ -157,5 +157,5 @@ def test_a_port_that_dies_ends_the_run(run, tmp_path):
 def test_a_fault_that_cannot_be_ended_is_told(sim, run):
     hooks = ("--fault-on", "true", "--fault-off", "exit 4")
     report = kit(run, sim(rmd=()).st, *hooks, "--only", "ST-4.6-21", "--json").ended(1).json
-    told = [case["received"] for case in report["cases"] if case["verdict"] == "failed"]
+    told = [case["expected"] for case in report["cases"] if case["verdict"] == "failed"]
     assert told and all("end it by hand" in text and "exit 4" in text for text in told), told

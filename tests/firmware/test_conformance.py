@@ -6,6 +6,7 @@ import pytest
 @pytest.mark.parametrize("protocol", ["st", "rmd"])
 def test_the_kit_passes(board, run, protocol):
     port = {"st": board.st_port, "rmd": board.rmd_port}[protocol]
-    kit = run("conformance", protocol, "-p", port, "--spin", "--json", within=1800)
+    words = ("--spin", "--readings", "strict", "--json")
+    kit = run("conformance", protocol, "-p", port, *words, within=1800)
     result = kit.ended(0).json
     assert result["not_run"] == 0 and result["passed"] > 100, result

@@ -881,6 +881,10 @@ typedef struct motorlink_st_version {
  *
  * Every callback may be NULL. It is called from within `motorlink_st_slave_receive`, and may not
  * call for the same slave: such calls give `IN_USE`. `motor` is 1 to 7, and exists.
+ *
+ * `motorlink conformance st` checks such a drive. What it asks of a callback beyond the document is
+ * a reading: a row of docs/SPEC-NOTES.md, named in brackets. A drive that differs from readings
+ * passes, and fails with `--readings strict`.
  */
 typedef struct motorlink_st_drive {
   /**
@@ -900,16 +904,36 @@ typedef struct motorlink_st_drive {
    * The value of a register that exists with `features`. Not called for TARGET_MOTOR, which
    * the slave keeps. FLUXWK_BUS and FLUXWK_BUS_MEAS are tenths of a percent; the value of a
    * floating-point register is its bits. NULL: 0.
+   *
+   * STATUS is IDLE at rest and RUN once the motor runs, FAULT_NOW and FAULT_OVER in fault; FLAGS
+   * has the faults that occurred in the low half and those present in the high half (S14).
+   * CONTROL_MODE reads what was asked for last, at once: speed after a ramp, torque after
+   * current references (S15, S25). At rest TORQUE_REF and FLUX_REF read what was asked for last
+   * and SPEED_REF is 0; in RUN SPEED_REF follows the ramp (S91). In speed mode FLUX_REF reads what
+   * was written to IQ_SPEEDMODE (S22). RAMP_FINAL_SPEED is the end of the last ramp (S26).
+   * PFC_ENABLED is 0 or 1 (S93). Temperatures and power may be below 0 (S23).
    */
   int32_t (*read)(void *context, uint8_t motor, uint8_t reg);
   /**
    * Writes a register that may be written; gives 0, or why not: `MOTORLINK_ST_REFUSAL_*`,
    * WRONG_SET for a value that the register cannot take. NULL: WRONG_SET.
+   *
+   * Not called for TARGET_MOTOR, nor for a DAC channel with a register that it cannot show. Every
+   * value of the register's type is taken and read back, 70002 rpm too (S92): limit what the motor
+   * does, not what is kept. CONTROL_MODE from 2 on gives 0 and changes nothing (S15). IQ_SPEEDMODE
+   * is the Id reference of speed mode (S22), so that FLUX_REF reads it. RAMP_FINAL_SPEED begins a
+   * ramp of the last duration (S26). At rest nothing that is written starts the motor.
    */
   uint8_t (*write)(void *context, uint8_t motor, uint8_t reg, int32_t value);
   /**
    * Executes a `MOTORLINK_ST_COMMAND_*`. What the state does not allow has no effect (4.6).
    * NULL: none has.
+   *
+   * In fault START_MOTOR and START_STOP do nothing. While a fault is present FAULT_ACK changes
+   * neither STATUS nor FLAGS. STOP_RAMP leaves the motor at the speed it has. IQDREF_CLEAR brings
+   * TORQUE_REF, FLUX_REF and what IQ_SPEEDMODE was written back to their defaults. ENCODER_ALIGN
+   * does nothing in RUN, and STATUS is IDLE when it is over (S96). Commands of a PFC come with
+   * `MOTORLINK_ST_FEATURE_PFC` only.
    */
   void (*execute)(void *context, uint8_t motor, uint8_t command);
   /**
@@ -1254,6 +1278,10 @@ typedef struct motorlink_rmd_sense {
  *
  * Every callback may be NULL. It is called from within `motorlink_rmd_drive_power_on`, `_receive`
  * and `_poll`, and may not call for the same drive: such calls give `IN_USE`.
+ *
+ * `motorlink conformance rmd` checks such a drive. What it asks of a callback beyond the document is
+ * a reading: a row of docs/SPEC-NOTES.md, named in brackets. A drive that differs from readings
+ * passes, and fails with `--readings strict`.
  */
 typedef struct motorlink_rmd_motor {
   /**
@@ -1262,14 +1290,23 @@ typedef struct motorlink_rmd_motor {
   void *context;
   /**
    * Does this from now on. NULL: without effect.
+   *
+   * Positive speed and torque turn clockwise, to larger counts (R94). A move is as fast as
+   * `max_speed_dps` lets it be, and does not turn with 0 (R13, R93).
    */
   void (*set_mode)(void *context, const struct motorlink_rmd_motion *motion);
   /**
    * Uses these gains and this acceleration limit from now on. NULL: without effect.
+   *
+   * The limit holds for all motion commands but torque (R92); 0 and less is no limit (R24). Without
+   * position gains the motor does not go to a position (R95).
    */
   void (*configure)(void *context, const struct motorlink_rmd_settings *settings);
   /**
    * Tells what the sensors read; what is not set is 0. NULL: all is 0.
+   *
+   * Phase currents sum to 0 and have about the size of the torque current (R91). Within 5 ms of a
+   * torque command the torque current is as commanded.
    */
   void (*sense)(void *context, struct motorlink_rmd_sense *sense);
   /**

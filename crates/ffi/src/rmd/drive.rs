@@ -100,17 +100,30 @@ pub struct motorlink_rmd_drive_config {
 ///
 /// Every callback may be NULL. It is called from within `motorlink_rmd_drive_power_on`, `_receive`
 /// and `_poll`, and may not call for the same drive: such calls give `IN_USE`.
+///
+/// `motorlink conformance rmd` checks such a drive. What it asks of a callback beyond the document is
+/// a reading: a row of docs/SPEC-NOTES.md, named in brackets. A drive that differs from readings
+/// passes, and fails with `--readings strict`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_rmd_motor {
     /// Handed to each callback.
     pub context: *mut c_void,
     /// Does this from now on. NULL: without effect.
+    ///
+    /// Positive speed and torque turn clockwise, to larger counts (R94). A move is as fast as
+    /// `max_speed_dps` lets it be, and does not turn with 0 (R13, R93).
     pub set_mode: Option<extern "C" fn(context: *mut c_void, motion: *const motorlink_rmd_motion)>,
     /// Uses these gains and this acceleration limit from now on. NULL: without effect.
+    ///
+    /// The limit holds for all motion commands but torque (R92); 0 and less is no limit (R24). Without
+    /// position gains the motor does not go to a position (R95).
     pub configure:
         Option<extern "C" fn(context: *mut c_void, settings: *const motorlink_rmd_settings)>,
     /// Tells what the sensors read; what is not set is 0. NULL: all is 0.
+    ///
+    /// Phase currents sum to 0 and have about the size of the torque current (R91). Within 5 ms of a
+    /// torque command the torque current is as commanded.
     pub sense: Option<extern "C" fn(context: *mut c_void, sense: *mut motorlink_rmd_sense)>,
     /// Keeps what `motorlink_rmd_drive_init` gets after a power cycle. Wears a real ROM.
     /// NULL: forgotten at power-off.

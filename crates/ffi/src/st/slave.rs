@@ -37,6 +37,10 @@ pub struct motorlink_st_version {
 ///
 /// Every callback may be NULL. It is called from within `motorlink_st_slave_receive`, and may not
 /// call for the same slave: such calls give `IN_USE`. `motor` is 1 to 7, and exists.
+///
+/// `motorlink conformance st` checks such a drive. What it asks of a callback beyond the document is
+/// a reading: a row of docs/SPEC-NOTES.md, named in brackets. A drive that differs from readings
+/// passes, and fails with `--readings strict`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_st_drive {
@@ -50,12 +54,32 @@ pub struct motorlink_st_drive {
     /// The value of a register that exists with `features`. Not called for TARGET_MOTOR, which
     /// the slave keeps. FLUXWK_BUS and FLUXWK_BUS_MEAS are tenths of a percent; the value of a
     /// floating-point register is its bits. NULL: 0.
+    ///
+    /// STATUS is IDLE at rest and RUN once the motor runs, FAULT_NOW and FAULT_OVER in fault; FLAGS
+    /// has the faults that occurred in the low half and those present in the high half (S14).
+    /// CONTROL_MODE reads what was asked for last, at once: speed after a ramp, torque after
+    /// current references (S15, S25). At rest TORQUE_REF and FLUX_REF read what was asked for last
+    /// and SPEED_REF is 0; in RUN SPEED_REF follows the ramp (S91). In speed mode FLUX_REF reads what
+    /// was written to IQ_SPEEDMODE (S22). RAMP_FINAL_SPEED is the end of the last ramp (S26).
+    /// PFC_ENABLED is 0 or 1 (S93). Temperatures and power may be below 0 (S23).
     pub read: Option<extern "C" fn(context: *mut c_void, motor: u8, reg: u8) -> i32>,
     /// Writes a register that may be written; gives 0, or why not: `MOTORLINK_ST_REFUSAL_*`,
     /// WRONG_SET for a value that the register cannot take. NULL: WRONG_SET.
+    ///
+    /// Not called for TARGET_MOTOR, nor for a DAC channel with a register that it cannot show. Every
+    /// value of the register's type is taken and read back, 70002 rpm too (S92): limit what the motor
+    /// does, not what is kept. CONTROL_MODE from 2 on gives 0 and changes nothing (S15). IQ_SPEEDMODE
+    /// is the Id reference of speed mode (S22), so that FLUX_REF reads it. RAMP_FINAL_SPEED begins a
+    /// ramp of the last duration (S26). At rest nothing that is written starts the motor.
     pub write: Option<extern "C" fn(context: *mut c_void, motor: u8, reg: u8, value: i32) -> u8>,
     /// Executes a `MOTORLINK_ST_COMMAND_*`. What the state does not allow has no effect (4.6).
     /// NULL: none has.
+    ///
+    /// In fault START_MOTOR and START_STOP do nothing. While a fault is present FAULT_ACK changes
+    /// neither STATUS nor FLAGS. STOP_RAMP leaves the motor at the speed it has. IQDREF_CLEAR brings
+    /// TORQUE_REF, FLUX_REF and what IQ_SPEEDMODE was written back to their defaults. ENCODER_ALIGN
+    /// does nothing in RUN, and STATUS is IDLE when it is over (S96). Commands of a PFC come with
+    /// `MOTORLINK_ST_FEATURE_PFC` only.
     pub execute: Option<extern "C" fn(context: *mut c_void, motor: u8, command: u8)>,
     /// Programs a speed ramp: at once in RUN, else when RUN is reached (4.8). 0 ms is a step.
     /// NULL: without effect.
