@@ -4,6 +4,7 @@ mod frames;
 mod messages;
 mod motion;
 mod registers;
+mod units;
 
 use motorlink_conformance::{Need, Outcome, Verdict, st};
 use motorlink_proto::stmcp::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse, Profile};
