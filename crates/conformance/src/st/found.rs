@@ -1,5 +1,7 @@
 //! What is found out about a drive while it is tested: how many motors, which features.
 
+use std::ops::RangeInclusive;
+
 use motorlink_proto::stmcp::register::{Feature, Features};
 use motorlink_proto::stmcp::{
     ErrorCode, Frame, FrameCode, HEADER_ACK, Motor, Profile, RegisterId, Status,
@@ -8,11 +10,15 @@ use motorlink_proto::stmcp::{
 use super::bench::{Bench, frame};
 use crate::case::Stop;
 
+/// What a drive that does not say how fast it may turn can be told, rpm.
+const MODERATE: i32 = 2_000;
+
 /// What is known so far.
 #[derive(Debug)]
 pub(super) struct Found {
     motors: Option<u8>,
     features: Vec<(Feature, bool)>,
+    speeds: Option<RangeInclusive<i32>>,
     /// What STATUS is at rest and in RUN, which the document does not say (SPEC-NOTES S14).
     pub(super) idle: Status,
     pub(super) run: Status,
@@ -20,8 +26,8 @@ pub(super) struct Found {
 
 impl Default for Found {
     fn default() -> Self {
-        let (motors, features) = Default::default();
-        Found { motors, features, idle: Status::Idle, run: Status::Run }
+        let (motors, features, speeds) = Default::default();
+        Found { motors, features, speeds, idle: Status::Idle, run: Status::Run }
     }
 }
 
@@ -79,6 +85,26 @@ impl Bench {
         }
         self.found.features.push((feature, there));
         Ok(there)
+    }
+
+    /// Speeds that the motor can have, rpm, without their sign: those that the application says, or
+    /// moderate ones.
+    pub(super) fn speeds(&mut self) -> Result<RangeInclusive<i32>, Stop> {
+        if let Some(speeds) = &self.found.speeds {
+            return Ok(speeds.clone());
+        }
+        let mut bounds = [0, MODERATE];
+        for (bound, register) in
+            bounds.iter_mut().zip([RegisterId::MIN_APP_SPEED, RegisterId::MAX_APP_SPEED])
+        {
+            let request = self.frame(FrameCode::GetReg.number(), &[register.0]);
+            let reply = self.exchange(&request)?;
+            let value = register.decode(&reply.payload).filter(|_| reply.header == HEADER_ACK);
+            *bound = value.unwrap_or(*bound);
+        }
+        let speeds = bounds[0]..=bounds[1];
+        self.found.speeds = Some(speeds.clone());
+        Ok(speeds)
     }
 
     /// Skips the case unless the drive has a feature.

@@ -76,7 +76,8 @@ const SPIN: &[Need] = &[Need::Spin];
 /// A speed that the user's drive is set to anyway, within what registers allow.
 fn speed(bench: &mut Bench) -> Result<i32, Stop> {
     let told = bench.value(RegisterId::RAMP_FINAL_SPEED)?.saturating_abs();
-    Ok(if (300..=5_000).contains(&told) { told / 6 * 6 } else { SPEED })
+    let most = *bench.speeds()?.end();
+    Ok(if (300..=5_000).contains(&told) { told } else { SPEED.min(most) } / 6 * 6)
 }
 
 /// Programs a ramp and starts the motor; gives the speed when it is in RUN and at it.

@@ -13,8 +13,6 @@ use crate::case::{Case, ReadAs, Stop};
 use crate::reading::{Reading, S5, S14, S15, S27, S91, S92};
 use crate::wire::hex;
 
-/// A speed that any drive can be told, rpm.
-const MODEST: i32 = 2_000;
 /// Ids for a DAC channel that no register of access D has.
 const NOT_FOR_DAC: [RegisterId; 2] = [RegisterId::STATUS, RegisterId(0xEE)];
 
@@ -134,6 +132,11 @@ pub(super) fn kept_by(register: RegisterId) -> Option<Reading> {
     }
 }
 
+/// A speed that the motor cannot have may be limited (SPEC-NOTES S92).
+fn speed_is_kept(bench: &mut Bench, rpm: i32, held: Result<(), Stop>) -> Result<(), Stop> {
+    if bench.speeds()?.contains(&rpm.abs()) { held } else { bench.note(S92, held) }
+}
+
 /// What a drive that has a register's feature does with a write.
 pub(super) fn writing(register: RegisterId, profile: Profile) -> Writing {
     let shape = register.shape();
@@ -244,9 +247,11 @@ fn write(bench: &mut Bench, register: RegisterId, size: u8) -> Result<(), Stop> 
         let now = bench.value(register)?;
         let text = motorlink::stmcp::Reading { register, bits: value, profile: bench.profile() };
         let given_back = bench.require(now == value, format!("ACK {text}, which was written"));
-        let beyond = register == RegisterId::RAMP_FINAL_SPEED && value.abs() > MODEST;
-        match kept_by(register).or(beyond.then_some(S92)) {
+        match kept_by(register) {
             Some(reading) => bench.note(reading, given_back)?,
+            None if register == RegisterId::RAMP_FINAL_SPEED => {
+                speed_is_kept(bench, value, given_back)?;
+            }
             None => given_back?,
         }
         // What one write changes besides, such as the mode, is begun anew.
@@ -284,14 +289,11 @@ fn endian(bench: &mut Bench) -> Result<(), Stop> {
         }
     }
     bench.keep_setpoints()?;
-    bench.acknowledged_bytes(
-        &bench
-            .frame(FrameCode::SetReg.number(), &[RegisterId::RAMP_FINAL_SPEED.0, 0x40, 0x06, 0, 0]),
-    )?;
-    let payload = bench.get(RegisterId::RAMP_FINAL_SPEED)?;
-    let value = RegisterId::RAMP_FINAL_SPEED.decode(bench.profile(), &payload);
+    bench.set_bytes(RegisterId::RAMP_FINAL_SPEED, &[0x40, 0x06, 0, 0])?;
+    let value = bench.value(RegisterId::RAMP_FINAL_SPEED)?;
     let shown = values::as_kept(bench.profile(), 0x0640);
-    bench.require(value == Some(shown), format!("ACK {shown} rpm, the low byte first"))
+    let held = bench.require(value == shown, format!("ACK {shown} rpm, the low byte first"));
+    speed_is_kept(bench, 0x0640, held)
 }
 
 fn signed(bench: &mut Bench) -> Result<(), Stop> {
@@ -299,7 +301,8 @@ fn signed(bench: &mut Bench) -> Result<(), Stop> {
     for value in [-1_596, -6, 1_596] {
         bench.set(RegisterId::RAMP_FINAL_SPEED, value)?;
         let now = bench.value(RegisterId::RAMP_FINAL_SPEED)?;
-        bench.require(now == value, format!("ACK {value} rpm, in 4 bytes"))?;
+        let held = bench.require(now == value, format!("ACK {value} rpm, in 4 bytes"));
+        speed_is_kept(bench, value, held)?;
     }
     let before = bench.keep(RegisterId::SPEED_KD)?;
     bench.require(before.len() == 2, "ACK with 2 bytes")?;
@@ -315,7 +318,8 @@ fn rpm(bench: &mut Bench) -> Result<(), Stop> {
         bench.set(RegisterId::RAMP_FINAL_SPEED, value)?;
         let now = bench.value(RegisterId::RAMP_FINAL_SPEED)?;
         let shown = values::as_kept(bench.profile(), value);
-        bench.require(now == shown, format!("ACK {shown} rpm"))?;
+        let held = bench.require(now == shown, format!("ACK {shown} rpm"));
+        speed_is_kept(bench, value, held)?;
     }
     Ok(())
 }
