@@ -54,7 +54,7 @@ readings! {
     R4 "NULL bytes of a request are not looked at, and echoed as they came.";
     R8 "An offset written with 0x91 is in force at once and in ROM.";
     R9 "After 0x19 the old offset is read until power-on.";
-    R11 "A frame of another form, or to an ID that nobody can have, gets no reply.";
+    R11 "A frame of another form, or to an ID outside 1 to 32, gets no reply.";
     R13 "A greatest speed of 0 turns nothing.";
     R15 "An angle over 35999 or a direction over 1 is answered and not carried out.";
     R16 "The same single-turn command again starts no further turn.";
@@ -62,12 +62,12 @@ readings! {
     R18 "While an error is active the motor is off.";
     R19 "An offset beyond the encoder is cut to its width.";
     R20 "The multi-turn angle modulo 360° is the single-turn angle.";
-    R24 "An acceleration of 0 or less is no limit, and is stored as it comes.";
+    R24 "An acceleration of 0 or less means no limit and reads back as written.";
     R25 "0x88 without a stop changes nothing.";
     R26 "A position that is held stays where it is when the offset changes.";
     R30 "A command byte that chapter 2 does not list gets no reply.";
     R31 "Single-turn angle and encoder are of the motor shaft.";
-    R90 "An acceleration of any size is stored as it comes.";
+    R90 "An acceleration of any size reads back as written.";
     R91 "Phase currents sum to 0, and have about the size of the torque current.";
     R92 "The acceleration of 0x34 is the Max Acceleration of the vendor's tool.";
     R93 "A move is as fast as its greatest speed lets it be.";

@@ -123,7 +123,8 @@ impl Outcome {
         if !self.differences.is_empty() {
             object["differences"] = self.differences.iter().map(Finding::to_json).collect();
         }
-        if !self.transcript.is_empty() {
+        let told = matches!(self.verdict, Verdict::Failed(_)) || !self.differences.is_empty();
+        if told {
             object["transcript"] = json!(self.transcript);
         }
         object

@@ -1298,7 +1298,7 @@ typedef struct motorlink_rmd_motor {
   /**
    * Uses these gains and this acceleration limit from now on. NULL: without effect.
    *
-   * The limit holds for all motion commands but torque (R92); 0 and less is no limit (R24). Without
+   * The limit holds for all motion commands but torque (R92); 0 or less means no limit (R24). Without
    * position gains the motor does not go to a position (R95).
    */
   void (*configure)(void *context, const struct motorlink_rmd_settings *settings);

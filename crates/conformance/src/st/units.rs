@@ -10,7 +10,7 @@ use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{S7, S23, S28};
 use crate::wire::hex;
 
-/// A register, its clause, what it can be on a motor at rest, that in words.
+/// A register, its clause, its feature, the range of its values at rest, the range in words.
 type Row =
     (RegisterId, &'static [&'static str], Feature, std::ops::RangeInclusive<i32>, &'static str);
 

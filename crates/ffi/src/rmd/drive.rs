@@ -116,7 +116,7 @@ pub struct motorlink_rmd_motor {
     pub set_mode: Option<extern "C" fn(context: *mut c_void, motion: *const motorlink_rmd_motion)>,
     /// Uses these gains and this acceleration limit from now on. NULL: without effect.
     ///
-    /// The limit holds for all motion commands but torque (R92); 0 and less is no limit (R24). Without
+    /// The limit holds for all motion commands but torque (R92); 0 or less means no limit (R24). Without
     /// position gains the motor does not go to a position (R95).
     pub configure:
         Option<extern "C" fn(context: *mut c_void, settings: *const motorlink_rmd_settings)>,
