@@ -38,7 +38,6 @@ readings! {
     S24 "A rev-up phase over 4 is WRONG_SET.";
     S25 "SET_CURRENT_REF changes to torque mode.";
     S26 "RAMP_FINAL_SPEED is the end of the last ramp; a write is a ramp of the last duration.";
-    S27 "The registers of a feature exist together, those of no feature always.";
     S28 "PFC_ACBUS_FREQ is in 0.1 Hz.";
     S29 "A byte after the 25 ms begins a new frame.";
     S34 "PFC_DISABLE disables a PFC that is enabled.";
@@ -50,11 +49,12 @@ readings! {
     S94 "GET_BOARD_INFO and GET_FW_VERSION have the same version.";
     S95 "A motor with a sensor keeps rev-up data, too.";
     S96 "ENCODER_ALIGN acts at rest only, shows in STATUS and ends at rest.";
+    S97 "The registers of a feature exist together, those of no feature always.";
 
     R4 "NULL bytes of a request are not looked at, and echoed as they came.";
     R8 "An offset written with 0x91 is in force at once and in ROM.";
     R9 "After 0x19 the old offset is read until power-on.";
-    R11 "A frame of another form, or to an ID outside 1 to 32, gets no reply.";
+    R11 "A frame of another form gets no reply.";
     R13 "A greatest speed of 0 turns nothing.";
     R15 "An angle over 35999 or a direction over 1 is answered and not carried out.";
     R16 "The same single-turn command again starts no further turn.";
@@ -73,4 +73,5 @@ readings! {
     R93 "A move is as fast as its greatest speed lets it be.";
     R94 "Positive speed and torque turn clockwise.";
     R95 "Without position gains a motor does not go to a position.";
+    R96 "A frame to an ID outside 1 to 32 gets no reply.";
 }

@@ -139,7 +139,7 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.4-08" "A value that is too short leaves the rest undefined: its bytes are written, the others keep what the register had; shipped firmware refuses it (S19).";
     "ST-4.4-09" "Both are acknowledged.";
     "ST-4.4-10" "A register that cannot be written or does not exist is answered with SET_READ_ONLY.";
-    "ST-4.4-11" "Some registers exist in some builds only, those of a feature together (S27)."
+    "ST-4.4-11" "Some registers exist in some builds only, those of a feature together (S27, S97)."
         host [shipped_firmware_refuses_a_missing_feature_with_3_and_5];
     "ST-4.4-12" "Table 3, access RW: such a register is written, and read back.";
     "ST-4.4-13" "Table 3, access R: such a register is read, refuses to be written, and does not change.";

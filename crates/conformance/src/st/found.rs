@@ -10,7 +10,7 @@ use motorlink_proto::stmcp::{
 use super::bench::{Bench, frame};
 use crate::case::Stop;
 
-/// What a drive that does not say how fast it may turn can be told, rpm.
+/// Greatest speed of a drive without MAX_APP_SPEED, rpm.
 const MODERATE: i32 = 2_000;
 
 /// What is known so far.

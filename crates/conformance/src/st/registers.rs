@@ -10,7 +10,7 @@ use super::found::read_size;
 use super::restore::is_setpoint;
 use super::values;
 use crate::case::{Case, ReadAs, Stop};
-use crate::reading::{Reading, S5, S14, S15, S27, S91, S92};
+use crate::reading::{Reading, S5, S14, S15, S91, S92, S97};
 use crate::wire::hex;
 
 /// Ids for a DAC channel that no register of access D has.
@@ -165,7 +165,7 @@ fn read(bench: &mut Bench, register: RegisterId, size: u8) -> Result<(), Stop> {
         return bench.need(feature(register));
     }
     let expected = format!("ACK with {size} bytes");
-    bench.require(!reply.is_nack(ErrorCode::GetWriteOnly), &*expected).read_as(S27)?;
+    bench.require(!reply.is_nack(ErrorCode::GetWriteOnly), &*expected).read_as(S97)?;
     let held = reply.header == HEADER_ACK && reply.payload.len() == usize::from(size);
     bench.require(held, expected)
 }

@@ -96,7 +96,7 @@ fn a_register_may_be_missing() {
         (SET, [0x1B, ..]) => Some(nack(ErrorCode::SetReadOnly)),
         _ => None,
     });
-    assert_eq!(rows(make), BTreeSet::from(["S27"]));
+    assert_eq!(rows(make), BTreeSet::from(["S97"]));
 }
 
 #[test]
