@@ -42,14 +42,14 @@ readings! {
     S29 "A byte after the 25 ms begins a new frame.";
     S34 "PFC_DISABLE disables a PFC that is enabled.";
     S35 "Bytes behind a message are ignored.";
-    S90 "The checksum is checked before the motor and the frame code; a damaged frame selects no motor.";
-    S91 "At rest references read what was asked for last and SPEED_REF is 0; in RUN SPEED_REF follows the ramp.";
-    S92 "A register takes every value of its size.";
-    S93 "PFC_ENABLED is 0 or 1, and a PFC is there where its registers are.";
-    S94 "GET_BOARD_INFO and GET_FW_VERSION have the same version.";
-    S95 "A motor with a sensor keeps rev-up data, too.";
-    S96 "ENCODER_ALIGN acts at rest only, shows in STATUS and ends at rest.";
-    S97 "The registers of a feature exist together, those of no feature always.";
+    S47 "The checksum is checked before the motor and the frame code; a damaged frame selects no motor.";
+    S48 "At rest references read what was asked for last and SPEED_REF is 0; in RUN SPEED_REF follows the ramp.";
+    S49 "A register takes every value of its size.";
+    S50 "PFC_ENABLED is 0 or 1, and a PFC is there where its registers are.";
+    S51 "GET_BOARD_INFO and GET_FW_VERSION have the same version.";
+    S52 "A motor with a sensor keeps rev-up data, too.";
+    S53 "ENCODER_ALIGN acts at rest only, shows in STATUS and ends at rest.";
+    S54 "The registers of a feature exist together, those of no feature always.";
 
     R4 "NULL bytes of a request are not looked at, and echoed as they came.";
     R8 "An offset written with 0x91 is in force at once and in ROM.";
@@ -67,11 +67,11 @@ readings! {
     R26 "A position that is held stays where it is when the offset changes.";
     R30 "A command byte that chapter 2 does not list gets no reply.";
     R31 "Single-turn angle and encoder are of the motor shaft.";
-    R90 "An acceleration of any size reads back as written.";
-    R91 "Phase currents sum to 0, and have about the size of the torque current.";
-    R92 "The acceleration of 0x34 is the Max Acceleration of the vendor's tool.";
-    R93 "A move is as fast as its greatest speed lets it be.";
-    R94 "Positive speed and torque turn clockwise.";
-    R95 "Without position gains a motor does not go to a position.";
-    R96 "A frame to an ID outside 1 to 32 gets no reply.";
+    R37 "An acceleration of any size reads back as written.";
+    R38 "Phase currents sum to 0, and have about the size of the torque current.";
+    R39 "The acceleration of 0x34 is the Max Acceleration of the vendor's tool.";
+    R40 "A move is as fast as its greatest speed lets it be.";
+    R36 "Positive speed and torque turn clockwise.";
+    R41 "Without position gains a motor does not go to a position.";
+    R42 "A frame to an ID outside 1 to 32 gets no reply.";
 }

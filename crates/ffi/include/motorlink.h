@@ -909,9 +909,9 @@ typedef struct motorlink_st_drive {
    * has the faults that occurred in the low half and those present in the high half (S14).
    * CONTROL_MODE reads what was asked for last, at once: speed after a ramp, torque after
    * current references (S15, S25). At rest TORQUE_REF and FLUX_REF read what was asked for last
-   * and SPEED_REF is 0; in RUN SPEED_REF follows the ramp (S91). In speed mode FLUX_REF reads what
+   * and SPEED_REF is 0; in RUN SPEED_REF follows the ramp (S48). In speed mode FLUX_REF reads what
    * was written to IQ_SPEEDMODE (S22). RAMP_FINAL_SPEED is the end of the last ramp (S26).
-   * PFC_ENABLED is 0 or 1 (S93). Temperatures and power may be below 0 (S23).
+   * PFC_ENABLED is 0 or 1 (S50). Temperatures and power may be below 0 (S23).
    */
   int32_t (*read)(void *context, uint8_t motor, uint8_t reg);
   /**
@@ -919,7 +919,7 @@ typedef struct motorlink_st_drive {
    * WRONG_SET for a value that the register cannot take. NULL: WRONG_SET.
    *
    * Not called for TARGET_MOTOR, nor for a DAC channel with a register that it cannot show. Every
-   * value of the register's type is taken and read back, 70002 rpm too (S92): limit what the motor
+   * value of the register's type is taken and read back, 70002 rpm too (S49): limit what the motor
    * does, not what is kept. CONTROL_MODE from 2 on gives 0 and changes nothing (S15). IQ_SPEEDMODE
    * is the Id reference of speed mode (S22), so that FLUX_REF reads it. RAMP_FINAL_SPEED begins a
    * ramp of the last duration (S26). At rest nothing that is written starts the motor.
@@ -932,7 +932,7 @@ typedef struct motorlink_st_drive {
    * In fault START_MOTOR and START_STOP do nothing. While a fault is present FAULT_ACK changes
    * neither STATUS nor FLAGS. STOP_RAMP leaves the motor at the speed it has. IQDREF_CLEAR brings
    * TORQUE_REF, FLUX_REF and what IQ_SPEEDMODE was written back to their defaults. ENCODER_ALIGN
-   * does nothing in RUN, and STATUS is IDLE when it is over (S96). Commands of a PFC come with
+   * does nothing in RUN, and STATUS is IDLE when it is over (S53). Commands of a PFC come with
    * `MOTORLINK_ST_FEATURE_PFC` only.
    */
   void (*execute)(void *context, uint8_t motor, uint8_t command);
@@ -1291,21 +1291,21 @@ typedef struct motorlink_rmd_motor {
   /**
    * Does this from now on. NULL: without effect.
    *
-   * Positive speed and torque turn clockwise, to larger counts (R94). A move is as fast as
-   * `max_speed_dps` lets it be, and does not turn with 0 (R13, R93).
+   * Positive speed and torque turn clockwise, to larger counts (R36). A move is as fast as
+   * `max_speed_dps` lets it be, and does not turn with 0 (R13, R40).
    */
   void (*set_mode)(void *context, const struct motorlink_rmd_motion *motion);
   /**
    * Uses these gains and this acceleration limit from now on. NULL: without effect.
    *
-   * The limit holds for all motion commands but torque (R92); 0 or less means no limit (R24). Without
-   * position gains the motor does not go to a position (R95).
+   * The limit holds for all motion commands but torque (R39); 0 or less means no limit (R24). Without
+   * position gains the motor does not go to a position (R41).
    */
   void (*configure)(void *context, const struct motorlink_rmd_settings *settings);
   /**
    * Tells what the sensors read; what is not set is 0. NULL: all is 0.
    *
-   * Phase currents sum to 0 and have about the size of the torque current (R91). Within 5 ms of a
+   * Phase currents sum to 0 and have about the size of the torque current (R38). Within 5 ms of a
    * torque command the torque current is as commanded.
    */
   void (*sense)(void *context, struct motorlink_rmd_sense *sense);

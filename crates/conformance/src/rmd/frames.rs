@@ -5,7 +5,7 @@ use motorlink_proto::rmd::{Stop as Halt, *};
 use super::bench::Bench;
 use super::{Clauses, case, subject};
 use crate::case::{Case, Need, ReadAs, Stop};
-use crate::reading::{R4, R11, R30, R96};
+use crate::reading::{R4, R11, R30, R42};
 
 /// Commands that only ask: what tests that one reply comes, that its NULL bytes are 0, that those of
 /// the request do not matter.
@@ -110,7 +110,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             let status = ReadStatus1.encode();
             silent(bench, &[0, 33].map(|id| CanFrame::new(MOTOR_BASE + id, status)))
         })
-        .reading(R96),
+        .reading(R42),
         case("unknown_command_bytes_are_met_with_silence", &["RMD-2-24"], |bench| {
             unknown(bench, nobodys().collect())
         })

@@ -9,7 +9,7 @@ use super::frames::filled;
 use super::settings::accelerate;
 use super::{Clauses, case, subject};
 use crate::case::{Case, Need, Stop};
-use crate::reading::{R4, R92};
+use crate::reading::{R4, R39};
 
 /// The command, what tests its reply's code, the reply's values, and the NULL bytes of the request.
 const COMMANDS: [(Code, Clauses, Clauses, Clauses); 6] = [
@@ -94,7 +94,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
     }
     for (code, clauses) in LIMITED {
         let name = subject("the_acceleration_limit_holds", code);
-        cases.push(case(name, clauses, move |bench| limited(bench, code)).reading(R92));
+        cases.push(case(name, clauses, move |bench| limited(bench, code)).reading(R39));
     }
     cases.into_iter().map(|case| case.needs(&[Need::Spin])).collect()
 }

@@ -6,7 +6,7 @@ use motorlink_proto::units::{CentiDegrees, CircleAngle, SpeedLimit};
 use super::bench::Bench;
 use super::{Clauses, case, subject};
 use crate::case::{Case, Need, Stop};
-use crate::reading::{R13, R15, R16, R93};
+use crate::reading::{R13, R15, R16, R40};
 
 /// How near a position is reached, 0.01°: friction keeps a loop without integral from the rest.
 const NEAR: i64 = 200;
@@ -197,7 +197,7 @@ fn no_faster(bench: &mut Bench, command: [u8; 8]) -> Result<(), Stop> {
     let words = format!("a move at {most} °/s, not at {greatest} °/s");
     bench.require(greatest <= most + most / 8 + 3, &*words)?;
     let as_fast = bench.require(greatest >= most / 2, words);
-    bench.note(R93, as_fast)
+    bench.note(R40, as_fast)
 }
 
 impl Bench {

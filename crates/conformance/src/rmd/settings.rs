@@ -6,7 +6,7 @@ use motorlink_proto::units::DpsPerSecond;
 use super::bench::Bench;
 use super::case;
 use crate::case::{Case, Need, Stop};
-use crate::reading::{R24, R90};
+use crate::reading::{R24, R37};
 
 pub(super) fn cases() -> Vec<Case<Bench>> {
     vec![
@@ -44,7 +44,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             &["RMD-34-02", "RMD-34-01", "RMD-33-04"],
             |bench| accelerations_are_kept(bench, &[1, 0x0102_0304]),
         )
-        .reading(R90),
+        .reading(R37),
         case("no_acceleration_limit_can_be_written", &["RMD-34-02"], |bench| {
             accelerations_are_kept(bench, &[0, -1])
         })

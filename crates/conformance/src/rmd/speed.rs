@@ -8,7 +8,7 @@ use super::bench::Bench;
 use super::case;
 use super::settings::write;
 use crate::case::{Case, Need, Stop};
-use crate::reading::{R94, R95};
+use crate::reading::{R36, R41};
 
 /// Speed of the cases, °/s.
 pub(super) const SPEED: i16 = 60;
@@ -39,7 +39,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
                     let as_far = (turned.abs() - due.abs()).abs() <= due.abs() / 4;
                     bench.require(as_far, &*words)?;
                     let same_way = bench.require(turned.signum() == due.signum(), words);
-                    bench.note(R94, same_way)?;
+                    bench.note(R36, same_way)?;
                 }
                 Ok(())
             },
@@ -54,7 +54,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             bench.require(!turned, "no way to a position without position gains")?;
             runs(bench, 1)
         })
-        .reading(R95),
+        .reading(R41),
     ]
     .into_iter()
     .map(|case| case.needs(&[Need::Spin]))

@@ -6,7 +6,7 @@ use motorlink_proto::time::Duration;
 use super::bench::Bench;
 use super::settings::accelerate;
 use crate::case::{ReadAs, Stop};
-use crate::reading::R92;
+use crate::reading::R39;
 
 /// Acceleration limit under which cases turn the motor, °/s².
 pub(super) const GENTLE: i32 = 360;
@@ -72,7 +72,7 @@ impl Bench {
 
     /// Looks at the motor until `done`, at most for `ms`; whether it became so. A motor that turns
     /// faster than any move of this kit is switched off, and the case is over: its acceleration is not
-    /// limited (SPEC-NOTES R92).
+    /// limited (SPEC-NOTES R39).
     pub(super) fn watch(
         &mut self,
         ms: u64,
@@ -85,7 +85,7 @@ impl Bench {
             if status.speed.0.unsigned_abs() > FAST {
                 let failed = self.failed(format!("no more than {FAST} °/s in any move"));
                 self.ask(Off.encode())?;
-                return Err(failed).read_as(R92);
+                return Err(failed).read_as(R39);
             }
             let angle = self.angle()?;
             let millis = self.millis() - begun;

@@ -6,7 +6,7 @@ use motorlink_proto::units::{Celsius, CentiDps, DeciVolts, TorqueFeedback};
 use super::bench::Bench;
 use super::case;
 use crate::case::{Case, Need, ReadAs, Stop};
-use crate::reading::{R18, R91};
+use crate::reading::{R18, R38};
 
 /// What a motor that answers can be: colder and hotter ones do not.
 const TEMPERATURES: std::ops::RangeInclusive<i8> = -40..=127;
@@ -121,7 +121,7 @@ pub(super) fn phases(bench: &mut Bench) -> Result<[i32; 3], Stop> {
     let size: i32 = currents.iter().map(|current| current.abs()).sum();
     bench
         .require(sum.abs() <= SENSING + size / 10, "three currents whose sum is about 0")
-        .read_as(R91)?;
+        .read_as(R38)?;
     Ok(currents)
 }
 

@@ -14,7 +14,7 @@ use super::bench::Bench;
 use super::case;
 use super::status::phases;
 use crate::case::{Case, Need, Stop};
-use crate::reading::R91;
+use crate::reading::R38;
 
 /// One ampere of torque current, digits of a command: next to nothing for motors of this family.
 pub(super) const AMPERE: i16 = 62;
@@ -51,7 +51,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             }
             Ok(())
         })
-        .reading(R91),
+        .reading(R38),
     ]
     .into_iter()
     .map(|case| case.needs(&[Need::Spin]))

@@ -12,7 +12,7 @@ use super::restore::Undo;
 use super::safety;
 use super::timing::RECEPTION;
 use crate::case::{Beside, Finding, Need, ReadAs, Stop};
-use crate::reading::{Reading, S1, S92, S97};
+use crate::reading::{Reading, S1, S49, S54};
 use crate::wire::{Line, hex};
 use crate::world::World;
 
@@ -287,13 +287,13 @@ impl Bench {
         frame(Frame::header(code, self.options.motor.number()), payload)
     }
 
-    /// The bytes of a register that every drive with its feature has (SPEC-NOTES S97).
+    /// The bytes of a register that every drive with its feature has (SPEC-NOTES S54).
     pub(super) fn get(&mut self, register: RegisterId) -> Result<Vec<u8>, Stop> {
         let bytes = self.encode(&Request::GetRegister(register));
         let reply = self.exchange(&bytes)?;
         let there = !reply.is_nack(ErrorCode::GetWriteOnly);
         self.require(there, format!("ACK, for every drive like this has {register}"))
-            .read_as(S97)?;
+            .read_as(S54)?;
         self.require(reply.header == HEADER_ACK, "ACK")?;
         Ok(reply.payload)
     }
@@ -317,7 +317,7 @@ impl Bench {
         let bytes = self.encode(&Request::SetRegister { register, value });
         let reply = self.exchange(&bytes)?;
         let empty_ack = "f0 00 f0  ACK without payload";
-        self.require(!reply.is_nack(ErrorCode::WrongSet), empty_ack).read_as(S92)?;
+        self.require(!reply.is_nack(ErrorCode::WrongSet), empty_ack).read_as(S49)?;
         self.require(reply.header == HEADER_ACK && reply.payload.is_empty(), empty_ack)
     }
 

@@ -139,7 +139,7 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.4-08" "A value that is too short leaves the rest undefined: its bytes are written, the others keep what the register had; shipped firmware refuses it (S19).";
     "ST-4.4-09" "Both are acknowledged.";
     "ST-4.4-10" "A register that cannot be written or does not exist is answered with SET_READ_ONLY.";
-    "ST-4.4-11" "Some registers exist in some builds only, those of a feature together (S27, S97)."
+    "ST-4.4-11" "Some registers exist in some builds only, those of a feature together (S27, S54)."
         host [shipped_firmware_refuses_a_missing_feature_with_3_and_5];
     "ST-4.4-12" "Table 3, access RW: such a register is written, and read back.";
     "ST-4.4-13" "Table 3, access R: such a register is read, refuses to be written, and does not change.";
@@ -167,9 +167,9 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.4-29" "Table 3, units: FLUXWK_BUS and FLUXWK_BUS_MEAS are in % (S12: shipped firmware has tenths)."
         host [values_are_shown_with_their_unit_or_their_name];
     "ST-4.4-30" "Table 3, units: MAX_APP_SPEED and MIN_APP_SPEED are in rpm, without a sign.";
-    "ST-4.4-31" "TORQUE_REF is the Iq reference, FLUX_REF the Id reference, in s16A; at rest both read what was asked for last (S91).";
+    "ST-4.4-31" "TORQUE_REF is the Iq reference, FLUX_REF the Id reference, in s16A; at rest both read what was asked for last (S48).";
     "ST-4.4-32" "Table 3, synonyms: I_Q, I_D, I_Q_REF and I_D_REF are TORQUE_MEAS, FLUX_MEAS, TORQUE_REF and FLUX_REF (S7: read in a data segment).";
-    "ST-4.4-33" "PFC_ENABLED is 1 while the PFC is enabled, and 0 otherwise (S93).";
+    "ST-4.4-33" "PFC_ENABLED is 1 while the PFC is enabled, and 0 otherwise (S50).";
     "ST-4.4-34" "Table 3, units: PFC_DCBUS_REF and PFC_DCBUS_MEAS are in V.";
     "ST-4.4-35" "Table 3, units: PFC_ACBUS_FREQ is in tenths of a hertz (S28).";
     "ST-4.4-36" "Table 3, units: PFC_ACBUS_RMS is in V, from zero to peak (S37).";

@@ -9,7 +9,7 @@ use super::bench::Bench;
 use super::restore::Undo;
 use super::safety;
 use crate::case::{Case, Need, ReadAs, Stop};
-use crate::reading::{S22, S34, S35, S93};
+use crate::reading::{S22, S34, S35, S50};
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
     let mut cases = vec![
@@ -130,12 +130,12 @@ fn pfc_command(bench: &mut Bench, command: Command) -> Result<(), Stop> {
     bench.require(enabled == 0, "ACK 0: the PFC is off")
 }
 
-/// A drive may have the registers of a PFC and none configured (SPEC-NOTES S93).
+/// A drive may have the registers of a PFC and none configured (SPEC-NOTES S50).
 fn succeeds(bench: &mut Bench, command: Command) -> Result<(), Stop> {
     let bytes = bench.encode(&Request::Execute(command));
     let reply = bench.exchange(&bytes)?;
     let expected = "f0 00 f0  ACK, for the registers of a PFC are there";
-    bench.require(!reply.is_nack(ErrorCode::WrongCmd), expected).read_as(S93)?;
+    bench.require(!reply.is_nack(ErrorCode::WrongCmd), expected).read_as(S50)?;
     bench.require(reply.header == HEADER_ACK && reply.payload.is_empty(), expected)
 }
 
@@ -160,7 +160,7 @@ fn pfc_enable(bench: &mut Bench) -> Result<(), Stop> {
     let still = bench.value(RegisterId::PFC_ENABLED)?;
     bench.execute(Command::PfcDisable)?;
     bench.require(enabled != 0, "ACK 1: the PFC is enabled")?;
-    bench.require_read(S93, enabled == 1, "ACK 1: the PFC is enabled")?;
+    bench.require_read(S50, enabled == 1, "ACK 1: the PFC is enabled")?;
     bench.require(again.header == HEADER_ACK && still == 1, "ACK, and the PFC stays enabled")?;
     let enabled = bench.value(RegisterId::PFC_ENABLED)?;
     bench.require(enabled == 0, "ACK 0: the PFC is off").read_as(S34)

@@ -99,7 +99,9 @@ impl Bench {
         {
             let request = self.frame(FrameCode::GetReg.number(), &[register.0]);
             let reply = self.exchange(&request)?;
-            let value = register.decode(&reply.payload).filter(|_| reply.header == HEADER_ACK);
+            let value = register
+                .decode(self.profile(), &reply.payload)
+                .filter(|_| reply.header == HEADER_ACK);
             *bound = value.unwrap_or(*bound);
         }
         let speeds = bounds[0]..=bounds[1];

@@ -9,7 +9,7 @@ use motorlink_proto::time::Duration;
 use super::bench::{Bench, frame};
 use super::found::read_size;
 use crate::case::{Case, Stop};
-use crate::reading::{S1, S10, S90};
+use crate::reading::{S1, S10, S47};
 
 /// How long it is watched that nothing comes.
 const WATCH: Duration = Duration::from_millis(100);
@@ -70,7 +70,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                 Ok(())
             },
         )
-        .reading(S90),
+        .reading(S47),
         Case::new(
             "acknowledges_are_no_commands",
             &["ST-3.1-14", "ST-4.1-01"],

@@ -9,7 +9,7 @@ use motorlink_proto::stmcp::{
 use super::bench::Bench;
 use super::values::as_kept;
 use crate::case::{Case, ReadAs, Stop};
-use crate::reading::{S7, S13, S24, S26, S91, S94, S95};
+use crate::reading::{S7, S13, S24, S26, S48, S51, S52};
 use crate::wire::hex;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
@@ -159,7 +159,7 @@ fn board_version(bench: &mut Bench) -> Result<(), Stop> {
     };
     let expected = format!("ACK that begins with {}, as in the version string{hint}", hex(&wanted));
     match bench.profile() {
-        Profile::Spec => bench.require(payload.starts_with(&wanted), expected).read_as(S94),
+        Profile::Spec => bench.require(payload.starts_with(&wanted), expected).read_as(S51),
         Profile::Mcsdk54 => bench.require(payload.starts_with(&wanted), expected),
     }
 }
@@ -194,7 +194,7 @@ fn nothing_started(bench: &mut Bench) -> Result<(), Stop> {
     bench.require_idle("for nothing was started")?;
     let reference = bench.value(RegisterId::SPEED_REF)?;
     let waits = bench.require(reference == 0, "ACK 0 rpm, for a ramp waits until the motor runs");
-    bench.note(S91, waits)
+    bench.note(S48, waits)
 }
 
 fn revup(bench: &mut Bench, phase: u8) -> Result<(), Stop> {
@@ -211,7 +211,7 @@ fn revup(bench: &mut Bench, phase: u8) -> Result<(), Stop> {
         let bytes = data.to_bytes();
         let held =
             bench.require(payload == bytes, format!("ACK {}, which was written", hex(&bytes)));
-        if sensorless { held? } else { held.read_as(S95)? }
+        if sensorless { held? } else { held.read_as(S52)? }
     }
     // The other phases are others.
     let data = samples[0];

@@ -10,7 +10,7 @@ use motorlink_proto::time::Duration;
 use super::bench::Bench;
 use super::restore::faulty;
 use crate::case::{Case, Need, ReadAs, Stop};
-use crate::reading::{Reading, S14, S15, S22, S25, S26, S91, S96};
+use crate::reading::{Reading, S14, S15, S22, S25, S26, S48, S53};
 
 /// How long a start may take, the alignment of an encoder included.
 const START: Duration = Duration::from_millis(15_000);
@@ -55,7 +55,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         ("the_control_mode_is_changed_back_by_a_write", &["ST-4.8-06", "ST-4.4-19"], mode, S15),
         ("writing_the_final_speed_in_run_begins_a_ramp", &["ST-4.4-23"], final_speed, S26),
         ("the_id_reference_of_speed_mode_acts_in_run", &["ST-4.4-25"], speed_mode_id, S22),
-        ("encoder_align_in_run_does_nothing", &["ST-4.6-25", "ST-4.6-26"], align_in_run, S96),
+        ("encoder_align_in_run_does_nothing", &["ST-4.6-25", "ST-4.6-26"], align_in_run, S53),
     ];
     let mut cases: Vec<Case<Bench>> =
         tests.map(|(name, clauses, test)| Case::new(name, clauses, test).needs(SPIN)).into();
@@ -195,7 +195,7 @@ fn ramp_at_once(bench: &mut Bench) -> Result<(), Stop> {
     reaches(bench, speed_rpm)
 }
 
-/// SPEED_REF follows a straight line, and is there when the ramp is over (SPEC-NOTES S91); the motor has
+/// SPEED_REF follows a straight line, and is there when the ramp is over (SPEC-NOTES S48); the motor has
 /// gone three quarters of the way when three quarters of the duration are over.
 fn ramp_duration(bench: &mut Bench) -> Result<(), Stop> {
     let from = run(bench)?;
@@ -221,7 +221,7 @@ fn ramp_duration(bench: &mut Bench) -> Result<(), Stop> {
     let held = there.is_some_and(|took| (2_000..=5_000).contains(&took));
     let words = format!("SPEED_REF at {to} rpm after 3000 ms, not {}", after(there));
     let reference = bench.require(held, words);
-    bench.note(S91, reference)?;
+    bench.note(S48, reference)?;
     let held = passed.is_some_and(|took| (1_300..=4_000).contains(&took));
     let words = format!("{late_on} rpm after 2250 ms, not {}", after(passed));
     bench.require(held, words)
@@ -247,7 +247,7 @@ fn stop_ramp(bench: &mut Bench) -> Result<(), Stop> {
     bench.execute(Command::StopRamp)?;
     still_running(bench)?;
     let held = holds_reference(bench, from, to);
-    bench.note(S91, held)?;
+    bench.note(S48, held)?;
     still_running(bench)?;
     // The ramp would be over.
     bench.silence(Duration::from_millis(1_500))?;
@@ -370,10 +370,10 @@ fn speed_mode_id(bench: &mut Bench) -> Result<(), Stop> {
 }
 
 /// With an encoder it goes through the states of an alignment, without nothing happens: what STATUS
-/// shows of it is a reading (SPEC-NOTES S96).
+/// shows of it is a reading (SPEC-NOTES S53).
 fn align(bench: &mut Bench) -> Result<(), Stop> {
     bench.execute(Command::EncoderAlign)?;
-    aligns(bench).read_as(S96)
+    aligns(bench).read_as(S53)
 }
 
 fn aligns(bench: &mut Bench) -> Result<(), Stop> {

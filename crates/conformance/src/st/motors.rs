@@ -7,7 +7,7 @@ use motorlink_proto::stmcp::{
 use super::bench::{Bench, frame};
 use super::restore::current_motor;
 use crate::case::{Case, Need, Stop};
-use crate::reading::{S20, S90};
+use crate::reading::{S20, S47};
 use crate::wire::hex;
 
 pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
@@ -137,7 +137,7 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
                 current_is(bench, tested)
             },
         )
-        .reading(S90),
+        .reading(S47),
         Case::new(
             "target_motor_is_the_current_motor_from_0",
             &["ST-4.4-18"],

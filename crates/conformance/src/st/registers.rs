@@ -10,7 +10,7 @@ use super::found::read_size;
 use super::restore::is_setpoint;
 use super::values;
 use crate::case::{Case, ReadAs, Stop};
-use crate::reading::{Reading, S5, S14, S15, S91, S92, S97};
+use crate::reading::{Reading, S5, S14, S15, S48, S49, S54};
 use crate::wire::hex;
 
 /// Ids for a DAC channel that no register of access D has.
@@ -127,14 +127,14 @@ pub(super) fn kept_by(register: RegisterId) -> Option<Reading> {
     match register {
         RegisterId::CONTROL_MODE => Some(S15),
         RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => Some(S5),
-        RegisterId::TORQUE_REF | RegisterId::FLUX_REF => Some(S91),
+        RegisterId::TORQUE_REF | RegisterId::FLUX_REF => Some(S48),
         _ => None,
     }
 }
 
-/// A speed that the motor cannot have may be limited (SPEC-NOTES S92).
+/// A speed that the motor cannot have may be limited (SPEC-NOTES S49).
 fn speed_is_kept(bench: &mut Bench, rpm: i32, held: Result<(), Stop>) -> Result<(), Stop> {
-    if bench.speeds()?.contains(&rpm.abs()) { held } else { bench.note(S92, held) }
+    if bench.speeds()?.contains(&rpm.abs()) { held } else { bench.note(S49, held) }
 }
 
 /// What a drive that has a register's feature does with a write.
@@ -165,7 +165,7 @@ fn read(bench: &mut Bench, register: RegisterId, size: u8) -> Result<(), Stop> {
         return bench.need(feature(register));
     }
     let expected = format!("ACK with {size} bytes");
-    bench.require(!reply.is_nack(ErrorCode::GetWriteOnly), &*expected).read_as(S97)?;
+    bench.require(!reply.is_nack(ErrorCode::GetWriteOnly), &*expected).read_as(S54)?;
     let held = reply.header == HEADER_ACK && reply.payload.len() == usize::from(size);
     bench.require(held, expected)
 }

@@ -8,7 +8,7 @@ use motorlink_proto::time::Duration;
 
 use super::bench::{Bench, PATIENCE, Reply, frame};
 use crate::case::{Finding, Need, ReadAs, Stop, Subject};
-use crate::reading::S91;
+use crate::reading::S48;
 use crate::wire::hex;
 use crate::world::Unavailable;
 
@@ -270,7 +270,7 @@ impl Bench {
     fn put_back(&mut self, undo: Undo) -> Result<(), Stop> {
         match undo {
             Undo::Register(register, bytes) => self.put_back_register(register, &bytes),
-            Undo::Setpoints(setpoints) => self.put_back_setpoints(setpoints).read_as(S91),
+            Undo::Setpoints(setpoints) => self.put_back_setpoints(setpoints).read_as(S48),
             Undo::Revup(phase, data) => {
                 self.done(&Request::SetRevupData(phase, data))?;
                 let now = self.acknowledged(&Request::RevupData(phase))?;

@@ -81,5 +81,5 @@ fn an_acceleration_may_be_limited() {
             obey(motors, data, done)
         })
     });
-    assert_eq!(rows(behaviour), BTreeSet::from(["R24", "R90"]));
+    assert_eq!(rows(behaviour), BTreeSet::from(["R24", "R37"]));
 }

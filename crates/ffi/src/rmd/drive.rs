@@ -111,18 +111,18 @@ pub struct motorlink_rmd_motor {
     pub context: *mut c_void,
     /// Does this from now on. NULL: without effect.
     ///
-    /// Positive speed and torque turn clockwise, to larger counts (R94). A move is as fast as
-    /// `max_speed_dps` lets it be, and does not turn with 0 (R13, R93).
+    /// Positive speed and torque turn clockwise, to larger counts (R36). A move is as fast as
+    /// `max_speed_dps` lets it be, and does not turn with 0 (R13, R40).
     pub set_mode: Option<extern "C" fn(context: *mut c_void, motion: *const motorlink_rmd_motion)>,
     /// Uses these gains and this acceleration limit from now on. NULL: without effect.
     ///
-    /// The limit holds for all motion commands but torque (R92); 0 or less means no limit (R24). Without
-    /// position gains the motor does not go to a position (R95).
+    /// The limit holds for all motion commands but torque (R39); 0 or less means no limit (R24). Without
+    /// position gains the motor does not go to a position (R41).
     pub configure:
         Option<extern "C" fn(context: *mut c_void, settings: *const motorlink_rmd_settings)>,
     /// Tells what the sensors read; what is not set is 0. NULL: all is 0.
     ///
-    /// Phase currents sum to 0 and have about the size of the torque current (R91). Within 5 ms of a
+    /// Phase currents sum to 0 and have about the size of the torque current (R38). Within 5 ms of a
     /// torque command the torque current is as commanded.
     pub sense: Option<extern "C" fn(context: *mut c_void, sense: *mut motorlink_rmd_sense)>,
     /// Keeps what `motorlink_rmd_drive_init` gets after a power cycle. Wears a real ROM.

@@ -59,15 +59,15 @@ pub struct motorlink_st_drive {
     /// has the faults that occurred in the low half and those present in the high half (S14).
     /// CONTROL_MODE reads what was asked for last, at once: speed after a ramp, torque after
     /// current references (S15, S25). At rest TORQUE_REF and FLUX_REF read what was asked for last
-    /// and SPEED_REF is 0; in RUN SPEED_REF follows the ramp (S91). In speed mode FLUX_REF reads what
+    /// and SPEED_REF is 0; in RUN SPEED_REF follows the ramp (S48). In speed mode FLUX_REF reads what
     /// was written to IQ_SPEEDMODE (S22). RAMP_FINAL_SPEED is the end of the last ramp (S26).
-    /// PFC_ENABLED is 0 or 1 (S93). Temperatures and power may be below 0 (S23).
+    /// PFC_ENABLED is 0 or 1 (S50). Temperatures and power may be below 0 (S23).
     pub read: Option<extern "C" fn(context: *mut c_void, motor: u8, reg: u8) -> i32>,
     /// Writes a register that may be written; gives 0, or why not: `MOTORLINK_ST_REFUSAL_*`,
     /// WRONG_SET for a value that the register cannot take. NULL: WRONG_SET.
     ///
     /// Not called for TARGET_MOTOR, nor for a DAC channel with a register that it cannot show. Every
-    /// value of the register's type is taken and read back, 70002 rpm too (S92): limit what the motor
+    /// value of the register's type is taken and read back, 70002 rpm too (S49): limit what the motor
     /// does, not what is kept. CONTROL_MODE from 2 on gives 0 and changes nothing (S15). IQ_SPEEDMODE
     /// is the Id reference of speed mode (S22), so that FLUX_REF reads it. RAMP_FINAL_SPEED begins a
     /// ramp of the last duration (S26). At rest nothing that is written starts the motor.
@@ -78,7 +78,7 @@ pub struct motorlink_st_drive {
     /// In fault START_MOTOR and START_STOP do nothing. While a fault is present FAULT_ACK changes
     /// neither STATUS nor FLAGS. STOP_RAMP leaves the motor at the speed it has. IQDREF_CLEAR brings
     /// TORQUE_REF, FLUX_REF and what IQ_SPEEDMODE was written back to their defaults. ENCODER_ALIGN
-    /// does nothing in RUN, and STATUS is IDLE when it is over (S96). Commands of a PFC come with
+    /// does nothing in RUN, and STATUS is IDLE when it is over (S53). Commands of a PFC come with
     /// `MOTORLINK_ST_FEATURE_PFC` only.
     pub execute: Option<extern "C" fn(context: *mut c_void, motor: u8, command: u8)>,
     /// Programs a speed ramp: at once in RUN, else when RUN is reached (4.8). 0 ms is a step.
