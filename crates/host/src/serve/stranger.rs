@@ -54,6 +54,9 @@ const STUN: Pattern = &[
 /// The length that ICE puts before it (RFC 4571).
 const LENGTH: Pattern = &[Some(|byte| byte == 0x00), None];
 
+/// No message of a drive's protocol has as many letters, digits and such in a row at its beginning.
+const LONG_WORD: usize = 256;
+
 /// As many bytes as are held, at most.
 pub(super) const HELD: usize = 16;
 
@@ -129,6 +132,7 @@ fn judge_method(bytes: &[u8]) -> Judgement {
     let mut methods = METHODS.iter().filter(|method| begins(method));
     match rest {
         [] if methods.next().is_some() => Judgement::Undecided,
+        [] if word.len() >= LONG_WORD => Judgement::Stranger,
         [b' ', ..] if methods.any(|method| method.len() == word.len()) => Judgement::Stranger,
         // The space may be the length of an ST frame, of which no target follows.
         [b' ', target, ..] if !word.is_empty() && target.is_ascii_graphic() => Judgement::Stranger,
@@ -170,6 +174,10 @@ mod tests {
         // Methods that a page can make up come in one piece.
         for method in ["FOO", "M-SEARCH", "a", "#", "ALONGERMETHODTHANANYBODYHASEVERUSEDYET"] {
             assert_eq!(passed([&*request(method)]), None, "{method}");
+        }
+        let long = request(&"X".repeat(9_000));
+        for piece in [300, 1_448, 4_080] {
+            assert_eq!(passed(long.chunks(piece)), None, "in pieces of {piece} bytes");
         }
         for sent in requests.iter().map(Vec::as_slice).chain([HELLO, BINDING, &framed]) {
             assert_eq!(passed(sent.chunks(1)), None, "{sent:02x?} byte by byte");
