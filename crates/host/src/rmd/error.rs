@@ -79,7 +79,8 @@ pub enum Error {
     /// The motor does not cease to answer somebody else: what was asked for was not sent, or what ends
     /// motion has no answer that can be trusted.
     #[error(
-        "{port}: motor {id} goes on answering what this program did not ask, so that nothing tells which          reply is its own; does another program or host use this bus? end it, and ask again"
+        "{port}: motor {id} goes on answering what this program did not ask, so that nothing tells which \
+         reply is its own; does another program or host use this bus? end it, and ask again"
     )]
     Shared {
         /// The port.
@@ -89,7 +90,8 @@ pub enum Error {
     },
     /// What was sent came back; it is not known what the motor did.
     #[error(
-        "{port}: what is sent to motor {id} comes back: the adapter echoes, or another host asks the          same. With an adapter that echoes add `echo=1` to the port, as in slcan:/dev/ttyACM0?echo=1"
+        "{port}: what is sent to motor {id} comes back: the adapter echoes, or another host asks the \
+         same. With an adapter that echoes add `echo=1` to the port, as in slcan:/dev/ttyACM0?echo=1"
     )]
     Echo {
         /// The port.

@@ -33,7 +33,7 @@ pub(super) struct Session {
     waiting: MotorSet,
     /// Torques whose motors are asked for the first time.
     held: Option<Held>,
-    /// Motors whose torques were not sent, which is still to be told.
+    /// Motors whose torques were not sent; the caller is to be told.
     unsent: MotorSet,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
@@ -127,7 +127,7 @@ impl Session {
         self.host.reopened(now);
     }
 
-    /// Tells that nobody asked the motors anything before.
+    /// Says that the motors owe no host a reply.
     pub(super) fn trust(&mut self) {
         self.host.trust(MotorSet::ALL);
     }

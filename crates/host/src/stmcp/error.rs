@@ -62,7 +62,8 @@ pub enum Error {
     /// The line was not in step behind the last reply: one came twice, or late. What was read or
     /// acknowledged before may have been the reply to something else.
     #[error(
-        "{port}: replies and requests do not go together: one came twice or late, so that nothing that          was read or acknowledged can be trusted ({why}); ask again"
+        "{port}: replies and requests do not go together: one came twice or late, so that nothing that \
+         was read or acknowledged can be trusted ({why}); ask again"
     )]
     Unconfirmed {
         /// The port.

@@ -20,7 +20,7 @@ pub enum Finding {
     Refuses(ErrorCode),
     /// Bytes that are no reply: something speaks, at another rate or another protocol.
     Garbage,
-    /// What is sent comes back.
+    /// An echo of the question.
     Echo,
     /// Nothing.
     Silence,

@@ -3,8 +3,9 @@
 //! A reply carries a code and no number. When a motor or an adapter stands still and then answers
 //! everything at once, an old reply would pass for a new one. So a motor that owes a reply is left
 //! alone for the guard time and then asked for its status, and for nothing else, until the only
-//! reply that it owed came, or until it was heard and then silent for the guard time. What a motor
-//! owes a former host is not known: it has to answer two questions first, and then to be silent.
+//! reply that it owed came, or until it was heard and then silent for the guard time. A motor
+//! that was not asked before may owe a former host anything: it has to answer two questions first, and
+//! then to be silent.
 
 use super::command::Code;
 use crate::time::{Duration, Instant};
@@ -49,7 +50,7 @@ impl Doubt {
         Doubt { owed: Owed::Nothing, off: false, stop: false, until: Instant(0), heard: None };
     pub(super) const UNKNOWN: Doubt = Doubt { owed: Owed::Unknown, ..Doubt::NONE };
 
-    /// Whether nothing is known of what the motor owes.
+    /// Whether the motor may owe a former host anything.
     pub(super) const fn is_unknown(&self) -> bool {
         matches!(self.owed, Owed::Unknown)
     }

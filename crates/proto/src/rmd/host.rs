@@ -245,7 +245,7 @@ impl Host {
         }
     }
 
-    /// Tells that nobody asked these motors anything that they may still answer.
+    /// Says that these motors owe no host a reply.
     pub fn trust(&mut self, ids: MotorSet) {
         for id in ids {
             self.slot(id).doubt = Doubt::NONE;
@@ -261,7 +261,7 @@ impl Host {
         }
     }
 
-    /// Whether it is not known yet what a motor owes a former host.
+    /// Whether a motor may owe a former host anything.
     pub fn is_unknown(&self, id: MotorId) -> bool {
         self.slots[id.index()].doubt.is_unknown()
     }
@@ -424,8 +424,8 @@ impl Host {
     }
 }
 
-/// What a motor that may owe a former host replies is asked next. Two different questions: what comes
-/// to the first may be the reply to a former host's.
+/// The next question to a motor that may owe a former host replies. There are two different ones,
+/// because the reply to the first may be the reply to a former host.
 fn question_behind(asked: Code) -> Option<[u8; 8]> {
     match asked {
         Code::ReadStatus2 => None,

@@ -18,7 +18,7 @@
 //!
 //! let motor = MotorId::new(1).unwrap();
 //! let mut host = Host::new();
-//! host.trust(MotorSet::ALL); // Nobody asked these motors anything before.
+//! host.trust(MotorSet::ALL); // No other host spoke to these motors.
 //! let turn = PositionLimited { max_speed: SpeedLimit(360), angle: CentiDegrees::from_degrees(90.0) };
 //! host.request(Instant(0), motor, turn.encode())?;
 //! let Output::Transmit(frame) = host.poll(Instant(0)) else { unreachable!() };

@@ -43,7 +43,7 @@ pub enum Failure {
     Lost,
     /// The line was not in step and did not fall silent; nothing was sent.
     Noise,
-    /// What is sent comes back: an adapter or the wiring echoes. Only a question was sent.
+    /// An adapter or the wiring echoes. Only a question was sent.
     Echo,
 }
 

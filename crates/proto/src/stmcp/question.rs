@@ -26,7 +26,7 @@ pub(super) struct Question {
     /// Whether one frame came, which answers it, and nothing else.
     is_alone: bool,
     came: Came,
-    /// The first thing that came and is no frame.
+    /// The first bytes that are no frame.
     trouble: Option<Failure>,
 }
 
@@ -114,7 +114,7 @@ impl Question {
         self.echoed == self.size
     }
 
-    /// Why there is no answer.
+    /// The reason if there is no answer.
     pub(super) fn failure(&self) -> Failure {
         match self.scan.taken {
             0 => self.trouble.unwrap_or(Failure::Timeout),

@@ -9,7 +9,7 @@ pub fn motor(id: u8) -> MotorId {
     MotorId::new(id).expect("the test names an ID of 1 to 32")
 }
 
-/// A host on a bus on which nobody asked anything before.
+/// The first host on a bus.
 pub fn trusted_host() -> Host {
     let mut host = Host::new();
     host.trust(MotorSet::ALL);

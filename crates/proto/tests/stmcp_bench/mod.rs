@@ -11,7 +11,7 @@ use super::common::Memory;
 pub const MS: u64 = 1_000;
 pub const STATUS: Request<'static> = Request::GetRegister(RegisterId::STATUS);
 
-/// On a line that nobody asked anything before.
+/// The first master on a line.
 pub fn master(recovery: Recovery) -> Master {
     let mut master = Master::new(Config { recovery, ..Config::default() });
     master.trust_line();
