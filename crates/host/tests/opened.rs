@@ -1,0 +1,260 @@
+//! What a bus and a line that were just opened ask first, and what keeps them from an answer.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use motorlink::Clock;
+use motorlink::port::{ByteLink, CanLink, PortError, SlcanLink};
+use motorlink::rmd::{self, Bus, CanFrame, Error, MotorId, MotorSet, Torque4, TorqueCommand};
+use motorlink::slcan::Bitrate;
+use motorlink::stmcp::{self, Client, Failure, register};
+use motorlink::time::Instant;
+
+const MS: u64 = 1_000;
+
+/// Motors on a bus with a clock of its own, which answer after 1 ms what they are asked.
+#[derive(Clone)]
+struct Motors {
+    clock: Clock,
+    sent: Arc<Mutex<Vec<(u64, CanFrame)>>>,
+    coming: Arc<Mutex<VecDeque<(Instant, CanFrame)>>>,
+    /// Motor 1 answers somebody else each 20 ms.
+    is_shared: bool,
+}
+
+impl Motors {
+    fn new(is_shared: bool) -> Self {
+        let clock = Clock::standing();
+        Motors { clock, sent: Arc::default(), coming: Arc::default(), is_shared }
+    }
+
+    fn bus(&self) -> Bus {
+        Bus::over("bus", Box::new(self.clone()), rmd::Options::default())
+    }
+
+    /// When something was sent, ms, to which identifier, and its first byte.
+    fn sent(&self) -> Vec<(u64, u32, u8)> {
+        let sent = self.sent.lock().unwrap();
+        sent.iter().map(|(ms, frame)| (*ms, frame.id(), frame.data()[0])).collect()
+    }
+}
+
+impl CanLink for Motors {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let now = self.clock.now();
+        self.sent.lock().unwrap().push((now.0 / MS, *frame));
+        let ids = match MotorId::from_can_id(frame.id()) {
+            Some(id) => id.into(),
+            None => MotorSet::TORQUE4,
+        };
+        for id in ids {
+            let mut reply: [u8; 8] = frame.data().try_into().unwrap();
+            match frame.data()[0] {
+                _ if frame.id() == 0x280 => reply = [0xA1, 25, 0, 0, 0, 0, 0, 0],
+                // A temperature and a voltage.
+                0x9A | 0x9C => (reply[1], reply[3]) = (25, 240),
+                _ => {}
+            }
+            let at = now + Duration::from_millis(1).into();
+            self.coming.lock().unwrap().push_back((at, CanFrame::new(id.can_id(), reply)));
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        let end = self.clock.now() + timeout.expect("nobody waits for ever").into();
+        let mut coming = self.coming.lock().unwrap();
+        if let Some((at, frame)) = coming.pop_front_if(|(at, _)| *at <= end) {
+            self.clock.wait(at);
+            return Ok(Some(frame));
+        }
+        let next = Instant((self.clock.now().0 / (20 * MS) + 1) * 20 * MS);
+        if self.is_shared && next <= end {
+            self.clock.wait(next);
+            return Ok(Some(CanFrame::new(0x141, [0x92, 0, 0, 0, 0, 0, 0, 1])));
+        }
+        self.clock.wait(end);
+        Ok(None)
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
+    }
+}
+
+#[test]
+fn a_cycle_brings_all_its_motors_in_step_at_once() {
+    let motors = Motors::new(false);
+    let bus = motors.bus();
+    let ids = [1, 2, 9].map(|id| MotorId::new(id).unwrap());
+    let requests = ids.map(|id| (id, [0x92, 0, 0, 0, 0, 0, 0, 0]));
+    for _ in 0..2 {
+        let mut answered = 0;
+        bus.cycle(&requests, |_, outcome| answered += usize::from(outcome.is_ok())).unwrap();
+        assert_eq!(answered, 3);
+    }
+    let codes: Vec<u8> = motors.sent().into_iter().map(|(_, _, code)| code).collect();
+    assert_eq!(codes, [[0x9A; 3], [0x9C; 3], [0x92; 3], [0x92; 3]].concat(), "once");
+    assert!(motors.clock.now() < Instant(110 * MS), "{:?}", motors.clock.now());
+}
+
+#[test]
+fn torques_for_four_motors_are_sent_when_all_are_in_step() {
+    let motors = Motors::new(false);
+    let bus = motors.bus();
+    let ids: MotorSet = [1, 2, 4].into_iter().filter_map(MotorId::new).collect();
+    let torques = Torque4([7; 4].map(TorqueCommand));
+    let replies = bus.torque4(torques, ids).unwrap();
+    assert!(replies[0].is_some() && replies[1].is_some() && replies[2].is_none());
+    assert!(replies.into_iter().flatten().all(|reply| reply.is_ok()));
+    let sent: Vec<_> = motors.sent().into_iter().map(|(_, id, _)| id).collect();
+    assert_eq!(sent, [0x141, 0x142, 0x144, 0x141, 0x142, 0x144, 0x280]);
+}
+
+#[test]
+fn torques_for_four_motors_are_not_sent_if_one_is_silent() {
+    /// Motor 3 is not there.
+    struct Without3(Motors);
+    impl CanLink for Without3 {
+        fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+            if frame.id() == 0x143 {
+                return Ok(());
+            }
+            self.0.send(frame)
+        }
+        fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+            self.0.receive(timeout)
+        }
+        fn clock(&self) -> Option<Clock> {
+            self.0.clock()
+        }
+    }
+    let motors = Motors::new(false);
+    let bus = Bus::over("bus", Box::new(Without3(motors.clone())), rmd::Options::default());
+    let replies = bus.torque4(Torque4::default(), MotorSet::TORQUE4).unwrap();
+    let failed = replies.map(|reply| reply.unwrap().unwrap_err());
+    assert!(matches!(failed[2], Error::Timeout { .. }), "{failed:?}");
+    for unsent in [0, 1, 3] {
+        assert!(matches!(failed[unsent], Error::Quarantined { .. }), "{failed:?}");
+    }
+    assert!(motors.sent().iter().all(|(_, id, _)| *id != 0x280));
+}
+
+#[test]
+fn a_motor_that_answers_somebody_else_is_told_as_such() {
+    for request in [[0x92, 0, 0, 0, 0, 0, 0, 0], [0x80, 0, 0, 0, 0, 0, 0, 0]] {
+        let motors = Motors::new(true);
+        let shared = motors.bus().raw(MotorId::new(1).unwrap(), request).unwrap_err();
+        assert!(matches!(shared, Error::Shared { .. }), "{shared}");
+        assert!(motors.clock.now() < Instant(2_500 * MS), "{:?}", motors.clock.now());
+        let is_sent = motors.sent().contains(&(0, 0x141, request[0]));
+        assert_eq!(is_sent, request[0] == 0x80, "what ends motion does not wait");
+        assert!(motors.sent().len() < 10, "{:?}", motors.sent());
+    }
+}
+
+/// An adapter that says this to each frame, or never anything.
+struct Adapter {
+    says: Option<&'static [u8]>,
+    pending: VecDeque<u8>,
+}
+
+impl ByteLink for Adapter {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        let Some(says) = self.says else { return Ok(()) };
+        for command in bytes.split_inclusive(|byte| *byte == b'\r') {
+            self.pending.extend(if command[0] == b't' { says } else { b"\r" });
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, buffer: &mut [u8], _: Option<Duration>) -> Result<usize, PortError> {
+        let size = self.pending.len().min(buffer.len());
+        for (slot, byte) in buffer.iter_mut().zip(self.pending.drain(..size)) {
+            *slot = byte;
+        }
+        Ok(size)
+    }
+}
+
+#[test]
+fn an_adapter_that_refuses_or_is_mute_is_named_as_the_cause() {
+    for (says, cause) in [
+        (Some(&b"\x07"[..]), Some("it refused the frame (BEL)")),
+        (None, Some("it has not answered anything")),
+        (Some(b"z\r"), None),
+    ] {
+        let line = Adapter { says, pending: VecDeque::new() };
+        let link = SlcanLink::open(line, "adapter", Bitrate::DEFAULT).unwrap();
+        let bus = Bus::over("adapter", Box::new(link), rmd::Options::default());
+        let error = bus.raw(MotorId::new(1).unwrap(), [0x92, 0, 0, 0, 0, 0, 0, 0]).unwrap_err();
+        match cause {
+            Some(cause) => assert!(error.to_string().contains(cause), "{error}"),
+            None => assert!(matches!(error, Error::Timeout { .. }), "{error}"),
+        }
+        assert!(error.is_line_failure());
+        assert_eq!(bus.trouble().is_some(), cause.is_some());
+    }
+}
+
+/// A drive that answers a request for a register with its number, in two bytes, and STATUS and FLAGS with
+/// their sizes. What it says to the first register comes twice, the second time with the next reply.
+#[derive(Default)]
+struct Twice {
+    replies: VecDeque<Vec<u8>>,
+    copy: Option<Vec<u8>>,
+    is_doubling: bool,
+}
+
+impl ByteLink for Twice {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        let payload: &[u8] = match bytes[2] {
+            0x01 => &[0; 4],
+            0x02 => &[0; 1],
+            register => &[register, 0],
+        };
+        let mut reply = [&[0xF0, payload.len() as u8], payload].concat();
+        let sum: u32 = reply.iter().map(|byte| u32::from(*byte)).sum();
+        reply.push((sum + (sum >> 8)) as u8);
+        self.replies.extend(self.copy.take());
+        if self.is_doubling && payload.len() == 2 {
+            self.copy = Some(reply.clone());
+            self.is_doubling = false;
+        }
+        self.replies.push_back(reply);
+        Ok(())
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        // Nothing comes in a pause.
+        let is_waiting = timeout.is_none_or(|timeout| !timeout.is_zero());
+        let reply = self.replies.pop_front_if(|_| is_waiting).unwrap_or_default();
+        buffer[..reply.len()].copy_from_slice(&reply);
+        Ok(reply.len())
+    }
+
+    fn is_fresh(&self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn a_reply_that_came_twice_is_found_before_its_values_are_relied_on() {
+    for is_doubling in [false, true] {
+        let line = Twice { is_doubling, ..Twice::default() };
+        let client = Client::over("line", Box::new(line), stmcp::Options::default());
+        let motor = client.motor(1).unwrap();
+        let kp = motor.read(register::SPEED_KP).unwrap();
+        let ki = motor.read(register::SPEED_KI).unwrap();
+        assert_eq!(kp == ki, is_doubling, "nothing tells so far");
+        match client.confirm() {
+            Ok(()) => assert!(!is_doubling),
+            Err(stmcp::Error::Unconfirmed { why, .. }) => {
+                let size = Failure::Size { received: 2, fits: None };
+                assert!(matches!(*why, stmcp::Error::Failed { failure, .. } if failure == size));
+            }
+            Err(other) => panic!("{other}"),
+        }
+    }
+}
