@@ -21,12 +21,14 @@ struct Motors {
     coming: Arc<Mutex<VecDeque<(Instant, CanFrame)>>>,
     /// Motor 1 answers somebody else each 20 ms.
     is_shared: bool,
+    /// Replies to 0x92 come twice, the second time after so many ms.
+    twice: Option<u32>,
 }
 
 impl Motors {
     fn new(is_shared: bool) -> Self {
         let clock = Clock::standing();
-        Motors { clock, sent: Arc::default(), coming: Arc::default(), is_shared }
+        Motors { clock, sent: Arc::default(), coming: Arc::default(), is_shared, twice: None }
     }
 
     fn bus(&self) -> Bus {
@@ -57,7 +59,13 @@ impl CanLink for Motors {
                 _ => {}
             }
             let at = now + Duration::from_millis(1).into();
-            self.coming.lock().unwrap().push_back((at, CanFrame::new(id.can_id(), reply)));
+            let mut coming = self.coming.lock().unwrap();
+            coming.push_back((at, CanFrame::new(id.can_id(), reply)));
+            if let (Some(ms), 0x92) = (self.twice, reply[0]) {
+                let copy = at + motorlink::time::Duration::from_millis(ms);
+                coming.push_back((copy, CanFrame::new(id.can_id(), reply)));
+            }
+            coming.make_contiguous().sort_by_key(|(at, _)| *at);
         }
         Ok(())
     }
@@ -151,6 +159,24 @@ fn a_motor_that_answers_somebody_else_is_told_as_such() {
         let is_sent = motors.sent().contains(&(0, 0x141, request[0]));
         assert_eq!(is_sent, request[0] == 0x80, "what ends motion does not wait");
         assert!(motors.sent().len() < 10, "{:?}", motors.sent());
+    }
+}
+
+#[test]
+fn a_motors_reply_that_came_twice_is_found_by_the_confirmation() {
+    for twice in [None, Some(0), Some(1), Some(2)] {
+        let motors = Motors { twice, ..Motors::new(false) };
+        let (bus, id) = (motors.bus(), MotorId::new(1).unwrap());
+        for _ in 0..3 {
+            bus.raw(id, [0x92, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+        }
+        match bus.confirm(id) {
+            Ok(()) => assert_eq!(twice, None),
+            Err(error) => assert!(matches!(error, Error::Unconfirmed { .. }), "{error}"),
+        }
+        motors.clock.wait(motors.clock.now() + Duration::from_millis(50).into());
+        let _ = bus.confirm(id);
+        bus.confirm(id).expect("nothing comes any more");
     }
 }
 

@@ -89,7 +89,11 @@ fn show(
     repeated(
         &session.bus.clock(),
         repeat,
-        || sample(session),
+        || {
+            let rows = sample(session)?;
+            session.bus.confirm(session.motor()?.id())?;
+            Ok(rows)
+        },
         |rows, at| match at {
             None => session.output.rows(rows),
             Some(at) if session.output.json => {

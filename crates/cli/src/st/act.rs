@@ -148,9 +148,12 @@ fn set(session: &Session, name: &str, text: &str, verify: Option<u8>) -> Result<
 
 fn revup(session: &Session) -> Result<(), Failure> {
     let motor = session.motor()?;
-    let phases: Vec<_> =
-        (0..REVUP_PHASES).map(|phase| motor.revup(phase)).collect::<Result<_, _>>()?;
-    let output = session.confirmed()?;
+    let mut phases = Vec::new();
+    for phase in 0..REVUP_PHASES {
+        phases.push(motor.revup(phase)?);
+        session.client.confirm()?;
+    }
+    let output = session.output;
     for (phase, RevupPhase { speed_rpm, torque_s16a, duration_ms }) in
         phases.into_iter().enumerate()
     {

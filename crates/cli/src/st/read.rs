@@ -36,6 +36,7 @@ pub fn registers(output: Output) -> Result<(), Failure> {
 
 pub fn info(session: &Session) -> Result<(), Failure> {
     let info = session.client.info()?;
+    session.client.confirm()?;
     let [major, minor, patch] = info.version;
     let mut rows = vec![
         ("sdk", info.name.clone(), json!(info.name)),
@@ -81,7 +82,7 @@ pub fn status(session: &Session) -> Result<(), Failure> {
         let name = register.text().map_or("", |text| text.name);
         rows.push((name, text, value(session, &reading)));
     }
-    session.confirmed()?.rows(&rows)
+    session.output.rows(&rows)
 }
 
 /// Fault bits spelled out.
@@ -101,12 +102,7 @@ pub fn get(session: &Session, names: &[String], repeat: Repeat) -> Result<(), Fa
     repeated(
         &session.client.clock(),
         repeat,
-        || {
-            let readings = registers.iter().map(|&register| read(session, register));
-            let readings = readings.collect::<Result<_, _>>()?;
-            session.client.confirm()?;
-            Ok(readings)
-        },
+        || registers.iter().map(|&register| read(session, register)).collect(),
         |readings, at| print(session, readings, at),
     )
 }
@@ -145,6 +141,7 @@ fn find_all(names: &[String]) -> Result<Vec<RegisterId>, Failure> {
 
 fn read(session: &Session, register: RegisterId) -> Result<Reading, Failure> {
     let bits = session.motor()?.read_raw(register)?;
+    session.client.confirm()?;
     Ok(Reading { register, bits, profile: session.client.profile() })
 }
 

@@ -215,6 +215,18 @@ impl Bus {
         outcome.expect("an exchange that was begun ends")
     }
 
+    /// Makes sure that a motor's replies so far went to their own requests: asks for another code than the
+    /// last. If a reply came twice, that of the last request is still to come, and answers nothing.
+    ///
+    /// # Errors
+    /// [`Error::Unconfirmed`]: what was read since the last confirmation may be older than it looks. Those
+    /// of [`raw`](Self::raw).
+    pub fn confirm(&self, id: MotorId) -> Result<(), Error> {
+        let question = self.line.take().session.question(id);
+        self.raw(id, question)?;
+        self.line.take().session.confirmed(id)
+    }
+
     /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
     /// is called once a request, in the order in which the outcomes come. It must not call this bus,
     /// which is locked meanwhile.

@@ -88,6 +88,18 @@ pub enum Error {
         /// The motor.
         id: MotorId,
     },
+    /// The motor sent what answers no request: a reply that came twice, or one to another host. What was
+    /// read since the last confirmation may be older than it looks.
+    #[error(
+        "{port}: motor {id} sent a reply that nobody asked for, so that what was read may be an older \
+         value; ask again"
+    )]
+    Unconfirmed {
+        /// The port.
+        port: Arc<str>,
+        /// The motor.
+        id: MotorId,
+    },
     /// What was sent came back; it is not known what the motor did.
     #[error(
         "{port}: what is sent to motor {id} comes back: the adapter echoes, or another host asks the \
@@ -164,6 +176,7 @@ impl Error {
             | Error::Altered { .. }
             | Error::Quarantined { .. }
             | Error::Shared { .. }
+            | Error::Unconfirmed { .. }
             | Error::Echo { .. } => true,
             _ => false,
         }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use motorlink_proto::rmd::{
-    self as proto, CanFrame, Code, Command, Counters, Host, Limits, MotorId, MotorSet, Refused,
-    Torque, Torque4,
+    self as proto, CanFrame, Code, Command, Counters, Host, Limits, MotorId, MotorSet, ReadStatus1,
+    ReadStatus2, Refused, Torque, Torque4,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -125,6 +125,22 @@ impl Session {
             self.cancel(now, id);
         }
         self.host.reopened(now);
+    }
+
+    /// A question with another code than what a motor was asked last.
+    pub(super) fn question(&self, id: MotorId) -> [u8; 8] {
+        match self.asked[place(id)].request[0] {
+            0x9A => ReadStatus2.encode(),
+            _ => ReadStatus1.encode(),
+        }
+    }
+
+    /// Whether the motor's replies since the last confirmation went to their own requests.
+    pub(super) fn confirmed(&mut self, id: MotorId) -> Result<(), Error> {
+        match self.host.take_stray(id) {
+            true => Err(Error::Unconfirmed { port: Arc::clone(&self.port), id }),
+            false => Ok(()),
+        }
     }
 
     /// Says that the motors owe no host a reply.

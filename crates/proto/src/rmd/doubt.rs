@@ -50,6 +50,10 @@ impl Doubt {
         Doubt { owed: Owed::Nothing, off: false, stop: false, until: Instant(0), heard: None };
     pub(super) const UNKNOWN: Doubt = Doubt { owed: Owed::Unknown, ..Doubt::NONE };
 
+    pub(super) const fn is_none(&self) -> bool {
+        matches!(self.owed, Owed::Nothing)
+    }
+
     /// Whether the motor may owe a former host anything.
     pub(super) const fn is_unknown(&self) -> bool {
         matches!(self.owed, Owed::Unknown)

@@ -65,6 +65,8 @@ pub struct Host {
     failed: MotorSet,
     /// Motors that are asked for their status in place of what was requested.
     questioned: MotorSet,
+    /// Motors that sent what answers no request since they were trusted.
+    strays: MotorSet,
     torque4: Option<Torque4>,
     /// No deadline in flight is before this moment.
     earliest: Instant,
@@ -95,6 +97,7 @@ impl Host {
             replied: MotorSet::EMPTY,
             failed: MotorSet::EMPTY,
             questioned: MotorSet::EMPTY,
+            strays: MotorSet::EMPTY,
             torque4: None,
             earliest: NEVER,
             timeout: DEFAULT_TIMEOUT,
@@ -261,6 +264,14 @@ impl Host {
         }
     }
 
+    /// Whether a motor sent what answers no request, since it was trusted or since this was asked last. A
+    /// reply that came twice shows so, at the latest by the reply to a request with another code.
+    pub fn take_stray(&mut self, id: MotorId) -> bool {
+        let is_stray = self.strays.contains(id);
+        self.strays.remove(id);
+        is_stray
+    }
+
     /// Whether a motor may owe a former host anything.
     pub fn is_unknown(&self, id: MotorId) -> bool {
         self.slots[id.index()].doubt.is_unknown()
@@ -351,6 +362,9 @@ impl Host {
             return;
         }
         let late = slot.doubt.came(now, data[0]);
+        if !late {
+            self.strays.insert(id);
+        }
         count(if late { &mut self.counters.late } else { &mut self.counters.unasked });
     }
 
@@ -372,7 +386,12 @@ impl Host {
             return Err(Refused::Busy(id));
         }
         let guard = self.guard;
-        let admitted = self.slot(id).doubt.admit(now, guard, data[0]);
+        let doubt = &mut self.slot(id).doubt;
+        let was_trusted = doubt.is_none();
+        let admitted = doubt.admit(now, guard, data[0]);
+        if !was_trusted && admitted == Ok(Admitted::Request) {
+            self.strays.remove(id);
+        }
         admitted.map_err(|until| Refused::Quarantined { id, until })
     }
 
