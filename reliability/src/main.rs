@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
+use motorlink::fault::Faults;
 
 use campaign::Failed;
 use plan::{GROUPS, SEEDS, Speaks, TWICE, Trial, WRITES, seeded};
@@ -67,7 +68,7 @@ fn measure(most: u64) -> Result<String, Failed> {
         eprintln!("{}: {sum} exchanges", group.title);
     }
     tables += &report::writes(&writes(most)?);
-    tables += &report::twice(&twice(most));
+    tables += &report::twice(&twice(most)?);
     tables += &report::checksum();
     let version = env!("CARGO_PKG_VERSION");
     let head = format!(
@@ -86,13 +87,18 @@ fn writes(most: u64) -> Result<Vec<(String, [Writes; 2])>, Failed> {
     WRITES.iter().map(row).collect()
 }
 
-/// Reads on lines where replies come twice.
-fn twice(most: u64) -> Vec<(f64, Batches)> {
-    let row = |&(share, count): &(f64, u64)| {
-        let seeds: Vec<u64> = (1..=SEEDS).collect();
-        let parts =
-            campaign::each(&seeds, |&seed| twice::run(share, count.min(most) / SEEDS, seed));
-        (share, parts.into_iter().sum())
+/// Reads on lines where replies come twice, without and with confirmation.
+fn twice(most: u64) -> Result<Vec<(String, [Batches; 2])>, Failed> {
+    let row = |&(share, faults, count): &(f64, &str, u64)| {
+        let seeds: Vec<Faults> = (1..=SEEDS)
+            .map(|seed| seeded(faults, seed).map_err(Failed::Plan))
+            .collect::<Result<_, _>>()?;
+        let count = count.min(most) / SEEDS;
+        let kinds = [false, true].map(|confirms| {
+            let parts = campaign::each(&seeds, |faults| twice::run(share, faults, confirms, count));
+            parts.into_iter().sum()
+        });
+        Ok((format!("{:.0} % twice, `{faults}`", share * 100.0), kinds))
     };
     TWICE.iter().map(row).collect()
 }
@@ -177,13 +183,12 @@ mod tests {
         assert!(verified.done > 0);
     }
 
-    /// What a confirmation is for.
     #[test]
     fn a_reply_that_comes_twice_is_found_by_the_confirmation() {
-        for (_, batches) in twice(4_000) {
-            assert!(batches.wrong > 0, "{batches:?}");
-            assert!(batches.detected >= batches.wrong, "{batches:?}");
-            assert!(batches.slipped * 1_000 <= batches.count, "{batches:?}");
+        for (line, [plain, confirmed]) in twice(8_000).map_err(told).unwrap() {
+            assert!(plain.wrong > 0, "{line}: {plain:?}");
+            assert!(confirmed.wrong * 10 <= plain.wrong, "{line}: {confirmed:?}");
+            assert!(confirmed.detected < confirmed.count, "{line}: {confirmed:?}");
         }
     }
 }

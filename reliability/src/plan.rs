@@ -142,8 +142,15 @@ const BUS_TURNS: &[(&str, u64)] = &[
     ("cut=300ms@1e-4", 200_000),
 ];
 
-/// Lines on which replies come twice: the share of them, and how many times registers are read.
-pub const TWICE: &[(f64, u64)] = &[(1e-2, 200_000), (1e-1, 200_000), (1.0, 50_000)];
+/// Lines on which replies come twice: the share of them, further faults, and how many times registers are
+/// read.
+pub const TWICE: &[(f64, &str, u64)] = &[
+    (1e-2, "drop=0", 200_000),
+    (1e-1, "drop=0", 200_000),
+    (1.0, "drop=0", 50_000),
+    (1e-1, "drop=1e-3", 200_000),
+    (1e-1, "delay=5ms..5ms", 100_000),
+];
 
 /// Everything that is tried.
 pub const GROUPS: &[Group] = &[

@@ -105,19 +105,20 @@ pub fn writes(rows: &[(String, [Writes; 2])]) -> String {
     format!("### Plain and verified writes\n\n{}\n", table.text)
 }
 
-/// Reads of four registers on lines where replies come twice.
-pub fn twice(rows: &[(f64, Batches)]) -> String {
+/// Reads of four registers on lines where replies come twice, without and with confirmation.
+pub fn twice(rows: &[(String, [Batches; 2])]) -> String {
     let mut table = Table::new(&[
-        "replies that come twice",
+        "line",
         "reads of four registers",
-        "detected",
-        "wrong, without the confirmation",
-        "wrong, with it",
+        "plain: detected",
+        "wrong",
+        "confirmed: detected",
+        "wrong",
     ]);
-    for (share, batches) in rows {
-        let cells = [batches.count, batches.detected, batches.wrong, batches.slipped];
-        let share = [format!("{:.0} %", share * 100.0)].into_iter();
-        table.row(share.chain(cells.map(|n| n.to_string())).collect());
+    for (line, kinds) in rows {
+        let counts = kinds.map(|kind| [kind.detected, kind.wrong]);
+        let cells = [line.clone(), kinds[0].count.to_string()].into_iter();
+        table.row(cells.chain(counts.into_iter().flatten().map(|n| n.to_string())).collect());
     }
     format!("### Replies that come twice, 1 to 20 ms apart\n\n{}\n", table.text)
 }

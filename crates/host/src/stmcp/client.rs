@@ -7,7 +7,6 @@ use std::time::{self as machine, Duration};
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
     BoardInfo, Config, Counters, Line, MAX_FRAME, Master, Motor, Output, Profile, Request,
-    question_behind,
 };
 use motorlink_proto::time::{self, Instant};
 
@@ -249,19 +248,16 @@ impl Client {
         self.conclude(driven, |payload| Some(payload.to_vec()))
     }
 
-    /// Makes sure that the replies so far went to their own requests: reads a register whose value has
-    /// another size than the last reply. A reply that came twice, or late, has put each one behind it off
+    /// Makes sure that the replies so far went to their own requests: asks for STATUS, FLAGS or the board
+    /// information, whichever has another size than the last reply. A reply that came twice, or late, has put each one behind it off
     /// by one, which no single exchange can tell.
     ///
     /// # Errors
     /// [`Error::Unconfirmed`]: what was read or acknowledged since the last confirmation cannot be
     /// trusted. The line is lost. The port's.
     pub fn confirm(&self) -> Result<(), Error> {
-        let last = self.line.take().session.last_size();
-        let (register, size) = question_behind(last);
-        let answer = self.exchange(0, &Request::GetRegister(register), |payload| {
-            (payload.len() == size).then_some(())
-        });
+        let (last, (question, size)) = self.line.take().session.question();
+        let answer = self.exchange(0, &question, |payload| (payload.len() == size).then_some(()));
         self.line.take().session.confirmed(last, answer)
     }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
     Command, Config, Counters, Frame, FrameCode, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor,
-    Output, Profile, RegisterId, Request, RequestError,
+    Output, Profile, RegisterId, Request, RequestError, question_behind,
 };
 use motorlink_proto::time::Instant;
 
@@ -41,6 +41,8 @@ pub(super) struct Session {
     asked: Asked,
     /// The size of the last acknowledge's payload.
     last_size: Option<usize>,
+    /// Changes with each confirmation.
+    turn: bool,
     /// What is sent before a lost line is recovered, and its size.
     ahead: [u8; MAX_FRAME],
     ahead_size: usize,
@@ -107,6 +109,7 @@ impl Session {
             history: History::default(),
             asked,
             last_size: None,
+            turn: false,
             ahead: [0; MAX_FRAME],
             ahead_size: 0,
             is_retired: false,
@@ -284,9 +287,11 @@ impl Session {
         }
     }
 
-    /// The size of the last acknowledge's payload, if the last reply was one.
-    pub(super) fn last_size(&self) -> Option<usize> {
-        self.last_size
+    /// The size of the last acknowledge's payload, if the last reply was one, and a question behind it
+    /// with the size of its answer.
+    pub(super) fn question(&mut self) -> (Option<usize>, (Request<'static>, usize)) {
+        self.turn = !self.turn;
+        (self.last_size, question_behind(self.last_size, self.turn))
     }
 
     /// Gives up the exchange under way, if there is one. Its reply may still come.

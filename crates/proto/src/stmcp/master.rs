@@ -190,12 +190,14 @@ enum Then {
     Send,
 }
 
-/// A register to read behind an acknowledge of `size` bytes, or a refusal, and the size of its value. It
-/// has another size, so that the answer shows whether replies and requests go together.
-pub const fn question_behind(size: Option<usize>) -> (RegisterId, usize) {
-    match size {
-        Some(1) => (RegisterId::FLAGS, 4),
-        _ => (RegisterId::STATUS, 1),
+/// A question behind an acknowledge of `size` bytes, or a refusal, and the size of its answer. It has
+/// another size, so that the answer shows whether replies and requests go together. `turn` changes with
+/// each question: the answer to the one before has another size, too.
+pub const fn question_behind(size: Option<usize>, turn: bool) -> (Request<'static>, usize) {
+    match (size, turn) {
+        (Some(1 | 4), true) => (Request::BoardInfo, 32),
+        (Some(1), false) | (_, true) => (Request::GetRegister(RegisterId::FLAGS), 4),
+        _ => (Request::GetRegister(RegisterId::STATUS), 1),
     }
 }
 
