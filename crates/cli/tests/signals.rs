@@ -8,7 +8,7 @@ use std::thread;
 
 use motorlink::port::PortError;
 use motorlink::rmd::{Bus, CanFrame};
-use motorlink::stmcp::{Client, Error, Options};
+use motorlink::stmcp::{Client, Error, Frame, MAX_FRAME, Options};
 use motorlink::{port::CanLink, rmd};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -37,8 +37,23 @@ fn program() {
     }
 }
 
+/// Answers the questions that come first on a line that was just opened, with zeros.
+fn answer_questions(line: &mut TcpStream) {
+    let questions: [(&[u8], usize); 3] =
+        [(&[0x06, 0x00, 0x06], 32), (&[0x02, 0x01, 0x02, 0x05], 1), (&[0x02, 0x01, 0x01, 0x04], 4)];
+    for (question, size) in questions {
+        let mut heard = vec![0; question.len()];
+        line.read_exact(&mut heard).unwrap();
+        assert_eq!(heard, question);
+        let mut buffer = [0; MAX_FRAME];
+        let reply = Frame { header: 0xF0, payload: &[0; 32][..size] };
+        line.write_all(reply.encode(&mut buffer).unwrap()).unwrap();
+    }
+}
+
 /// Acknowledges commands until the line is closed; calls `after` with the number of each.
 fn drive(mut line: TcpStream, mut after: impl FnMut(usize)) -> Vec<[u8; 4]> {
+    answer_questions(&mut line);
     let mut commands = Vec::new();
     let mut command = [0; 4];
     while line.read_exact(&mut command).is_ok() {
@@ -85,6 +100,10 @@ impl CanLink for Echo {
 
     fn receive(&mut self, _: Option<std::time::Duration>) -> Result<Option<CanFrame>, PortError> {
         Ok(self.0.take())
+    }
+
+    fn is_fresh(&self) -> bool {
+        true
     }
 }
 

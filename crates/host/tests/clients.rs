@@ -1,6 +1,7 @@
 //! What the blocking clients promise: stop on drop, limits, loss and return of the line, threads.
 
 mod served;
+mod wire;
 
 use std::collections::VecDeque;
 use std::io::{Read, Write};
@@ -19,6 +20,7 @@ use motorlink::stmcp::{
 };
 use motorlink::{BackOff, LinkState};
 use served::Served;
+use wire::Fresh;
 
 fn until(what: &str, mut reached: impl FnMut() -> bool) {
     let give_up = Instant::now() + Duration::from_secs(20);
@@ -70,7 +72,7 @@ fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
     let (ours, theirs) = UnixStream::pair().unwrap();
     let line = Config { timeout: Duration::from_millis(100).into(), ..Config::default() };
     let options = stmcp::Options { line, ..stmcp::Options::default() };
-    let client = Client::over("pair", Box::new(FdLink::new(ours, "pair").unwrap()), options);
+    let client = Client::over("pair", Box::new(Fresh(FdLink::new(ours, "pair").unwrap())), options);
     let mut start = [0; 4];
     let drive = std::thread::spawn(move || {
         (&theirs).read_exact(&mut start).unwrap();
@@ -91,7 +93,7 @@ fn a_motor_whose_start_was_not_answered_is_stopped_too() {
     let (ours, theirs) = UnixStream::pair().unwrap();
     let line = Config { timeout: Duration::from_millis(50).into(), ..Config::default() };
     let options = stmcp::Options { line, ..stmcp::Options::default() };
-    let client = Client::over("pair", Box::new(FdLink::new(ours, "pair").unwrap()), options);
+    let client = Client::over("pair", Box::new(Fresh(FdLink::new(ours, "pair").unwrap())), options);
     assert!(client.motor(3).unwrap().start().is_err());
     assert!(client.exchange(0, &Request::Execute(Command::StartMotor), |_| Some(())).is_err());
     assert_eq!(client.started().count(), 7, "which motor is the current one is not known");
@@ -144,7 +146,7 @@ impl CanLink for Deaf {
 fn a_motor_that_does_not_answer_stays_one_that_moves() {
     let sent = Arc::new(Mutex::new(Vec::new()));
     let options = rmd::Options { timeout: Duration::from_millis(5), ..rmd::Options::default() };
-    let bus = Bus::over("deaf", Box::new(Deaf(Arc::clone(&sent))), options);
+    let bus = Bus::over("deaf", Box::new(Fresh(Deaf(Arc::clone(&sent)))), options);
     let motor = bus.motor(5).unwrap();
     assert!(motor.speed(CentiDps(100)).is_err());
     assert!(motor.off().is_err());
@@ -157,7 +159,7 @@ fn a_motor_that_does_not_answer_stays_one_that_moves() {
 #[test]
 fn a_drives_name_does_not_command_a_terminal() {
     let (ours, theirs) = UnixStream::pair().unwrap();
-    let link = FdLink::new(ours, "pair").unwrap();
+    let link = Fresh(FdLink::new(ours, "pair").unwrap());
     let client = Client::over("pair", Box::new(link), stmcp::Options::default());
     let drive = std::thread::spawn(move || {
         for _ in 0..2 {
@@ -231,7 +233,9 @@ fn a_guard_waits_for_a_port_that_comes_back() {
     let (ours, theirs) = UnixStream::pair().unwrap();
     let mut ports = vec![None, Some(ours)];
     let open = move || match ports.pop() {
-        Some(Some(stream)) => Ok(Box::new(FdLink::new(stream, "pair")?) as Box<dyn ByteLink>),
+        Some(Some(stream)) => {
+            Ok(Box::new(Fresh(FdLink::new(stream, "pair")?)) as Box<dyn ByteLink>)
+        }
         Some(None) => Err(PortError::Closed { port: "pair".to_owned() }),
         None => {
             let (ours, theirs) = UnixStream::pair().unwrap();
@@ -291,7 +295,7 @@ impl CanLink for Tardy {
 fn a_reply_that_waited_in_the_port_is_not_taken_for_the_next_one() {
     let ms = Duration::from_millis;
     let options = rmd::Options { timeout: ms(5), guard: ms(5), ..rmd::Options::default() };
-    let bus = Bus::over("tardy", Box::new(Tardy::default()), options);
+    let bus = Bus::over("tardy", Box::new(Fresh(Tardy::default())), options);
     let ask = || bus.raw(MotorId::new(1).unwrap(), [0x9C, 0, 0, 0, 0, 0, 0, 0]);
     assert!(matches!(ask(), Err(rmd::Error::Timeout { .. })));
     std::thread::sleep(ms(20));
@@ -306,8 +310,8 @@ struct Twice<T> {
 }
 
 impl<T> Twice<T> {
-    fn new() -> Box<Self> {
-        Box::new(Twice { unread: VecDeque::new(), asked: 0 })
+    fn new() -> Box<Fresh<Self>> {
+        Box::new(Fresh(Twice { unread: VecDeque::new(), asked: 0 }))
     }
 }
 
@@ -364,14 +368,14 @@ fn a_copy_of_a_reply_that_comes_in_a_pause_is_not_the_answer_to_the_next_questio
     assert!(!matches!(ask(), Ok(1)), "that is the copy");
 }
 
-/// A motor that misses the first request.
+/// A motor that misses the first request; what else it is asked it repeats, with another last byte.
 #[derive(Default)]
 struct Absent(u32, Vec<CanFrame>);
 
 impl CanLink for Absent {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         if self.0 > 0 {
-            self.1.push(*frame);
+            self.1.push(CanFrame::new(0x141, [frame.data()[0], 0, 0, 0, 0, 0, 0, 1]));
         }
         self.0 += 1;
         Ok(())
@@ -389,7 +393,7 @@ impl CanLink for Absent {
 fn the_answer_of_a_motor_in_doubt_is_nobodys_reply() {
     let ms = Duration::from_millis;
     let options = rmd::Options { timeout: ms(5), guard: ms(5), ..rmd::Options::default() };
-    let bus = Bus::over("absent", Box::new(Absent::default()), options);
+    let bus = Bus::over("absent", Box::new(Fresh(Absent::default())), options);
     let id = MotorId::new(1).unwrap();
     assert!(matches!(bus.raw(id, [0x9C, 0, 0, 0, 0, 0, 0, 0]), Err(rmd::Error::Timeout { .. })));
     std::thread::sleep(ms(20));
@@ -528,14 +532,29 @@ fn a_link_that_was_handed_in_is_not_opened_again() {
 
 #[test]
 fn a_silent_drive_is_a_failure_and_no_refusal() {
-    let (ours, _theirs) = UnixStream::pair().unwrap();
     let line = Config { timeout: Duration::from_millis(20).into(), ..Config::default() };
     let options = stmcp::Options { line, ..stmcp::Options::default() };
-    let client = Client::over("pair", Box::new(FdLink::new(ours, "pair").unwrap()), options);
+    let pair = || {
+        let (ours, theirs) = UnixStream::pair().unwrap();
+        (FdLink::new(ours, "pair").unwrap(), theirs)
+    };
+    let (link, _theirs) = pair();
+    let client = Client::over("pair", Box::new(Fresh(link)), options);
     let silent = client.info().unwrap_err();
     assert!(matches!(silent, stmcp::Error::Failed { failure: Failure::Timeout, .. }), "{silent}");
     let lost = client.info().unwrap_err();
     assert!(matches!(lost, stmcp::Error::Failed { failure: Failure::Lost, .. }), "{lost}");
+
+    // One that never answered has not been lost.
+    let (link, _theirs) = pair();
+    let client = Client::over("pair", Box::new(link), options);
+    for _ in 0..2 {
+        let silent = client.info().unwrap_err();
+        assert!(
+            matches!(silent, stmcp::Error::Failed { failure: Failure::Timeout, .. }),
+            "{silent}"
+        );
+    }
 }
 
 #[test]

@@ -84,6 +84,10 @@ impl ByteLink for Pair {
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
         self.0.read(buffer, timeout)
     }
+
+    fn is_fresh(&self) -> bool {
+        true
+    }
 }
 
 impl Evented for Pair {

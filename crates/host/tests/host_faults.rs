@@ -156,9 +156,9 @@ fn open_rmd(link: &Path) -> Bus {
 #[test]
 fn an_st_drive_unplugged_in_the_middle_of_a_reply_is_told_and_comes_back() {
     let link = path("unplug-st");
-    let device = Device::plug(&link, st_drive(1));
+    let device = Device::plug(&link, st_drive(4));
     let client = open_st(&link);
-    client.info().expect("it answers");
+    client.info().expect("it answers three questions, and then this");
     let lost = client.info().expect_err("half a reply");
     assert!(lost.to_string().contains("hung up or was unplugged"), "{lost}");
     assert!(matches!(client.link_state(), LinkState::Closed { .. }));

@@ -10,7 +10,7 @@ use std::time::Duration;
 use motorlink::port::PortError;
 use motorlink::rmd::{self, Bus, CanFrame};
 use motorlink::stmcp::{self, Client, register};
-use wire::{ACK, GET_SPEED, OFF, SPEED, START, STOP, Wire};
+use wire::{ACK, Fresh, GET_SPEED, OFF, SPEED, START, STOP, Wire};
 
 /// Longer than any test waits for a condition.
 const LONG: Duration = Duration::from_secs(60);
@@ -31,7 +31,7 @@ fn silent_client(
     let mut options = stmcp::Options::default();
     options.line.timeout = timeout.into();
     let (seen, looked) = (Arc::clone(&place), AtomicBool::new(false));
-    let client = Client::over("wire", Box::new(wire.clone()), options).looking(move || {
+    let client = Client::over("wire", Box::new(Fresh(wire.clone())), options).looking(move || {
         if !looked.swap(true, Ordering::SeqCst) {
             once(seen.get().expect("it is there"));
         }
@@ -80,7 +80,7 @@ fn a_look_that_leaves_the_line_alone_does_not_disturb_the_exchange() {
     let says = wire.clone();
     let looks = Arc::new(Mutex::new(0));
     let counted = Arc::clone(&looks);
-    let client = Client::over("wire", Box::new(wire.clone()), stmcp::Options::default());
+    let client = Client::over("wire", Box::new(Fresh(wire.clone())), stmcp::Options::default());
     let client = client.looking(move || {
         let mut looks = counted.lock().unwrap();
         *looks += 1;
@@ -99,7 +99,7 @@ fn other_threads_wait_while_one_looks() {
     let (wire, asks) = (Wire::<u8>::new(), Arc::new(AtomicU32::new(0)));
     let (says, asked) = (wire.clone(), Arc::clone(&asks));
     let looks = AtomicU32::new(0);
-    let client = Client::over("wire", Box::new(wire.clone()), stmcp::Options::default());
+    let client = Client::over("wire", Box::new(Fresh(wire.clone())), stmcp::Options::default());
     let client = client.looking(move || {
         // The other thread has some looks to get in, if it could.
         let asks = asked.load(Ordering::SeqCst) > 0;
@@ -132,7 +132,7 @@ fn an_off_from_within_a_cycle_is_sent_at_once_and_the_cycle_ends() {
     let options = rmd::Options { timeout: LONG, ..rmd::Options::default() };
     let seen = Arc::clone(&place);
     let looked = AtomicBool::new(false);
-    let bus = Bus::over("wire", Box::new(wire.clone()), options).looking(move || {
+    let bus = Bus::over("wire", Box::new(Fresh(wire.clone())), options).looking(move || {
         if !looked.swap(true, Ordering::SeqCst) {
             seen.get().unwrap().motor(1).unwrap().off().expect("it answers");
         }
@@ -158,7 +158,7 @@ fn an_off_from_within_a_cycle_is_sent_at_once_and_the_cycle_ends() {
 #[test]
 fn an_error_of_the_look_interrupts_the_exchange_and_nothing_else() {
     let wire = Wire::new();
-    let client = Client::over("wire", Box::new(wire), stmcp::Options::default());
+    let client = Client::over("wire", Box::new(Fresh(wire)), stmcp::Options::default());
     let client = client.looking(|| Err("enough".into()));
     let error = client.motor(1).unwrap().start().expect_err("no time");
     assert!(matches!(&error, stmcp::Error::Port(port) if port.is_interruption()), "{error}");

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use motorlink::port::{ByteLink, Evented, PortError};
 use motorlink::stmcp::{Client, Command, EventClient, Line, Options, Progress, Request, register};
-use wire::{ACK, GET_SPEED, START, STOP, Wire};
+use wire::{ACK, Fresh, GET_SPEED, START, STOP, Wire};
 
 /// GET_BOARD_INFO and GET_REVUP_DATA: the questions of recovery.
 const INFO: [u8; 3] = [0x06, 0x00, 0x06];
@@ -23,7 +23,7 @@ fn options() -> Options {
 #[test]
 fn a_stop_on_a_lost_line_is_sent_before_the_line_has_recovered() {
     let wire = Wire::new();
-    let client = Client::over("wire", Box::new(wire.clone()), options());
+    let client = Client::over("wire", Box::new(Fresh(wire.clone())), options());
     let motor = client.motor(1).unwrap();
     motor.read(register::SPEED_MEAS).expect_err("nothing answers");
     assert_eq!(client.line(), Line::Lost);
@@ -36,9 +36,21 @@ fn a_stop_on_a_lost_line_is_sent_before_the_line_has_recovered() {
 }
 
 #[test]
-fn only_the_reply_on_the_recovered_line_counts() {
+fn a_stop_on_a_line_that_was_just_opened_is_sent_before_the_questions() {
     let wire = Wire::new();
     let client = Client::over("wire", Box::new(wire.clone()), options());
+    let motor = client.motor(1).unwrap();
+    // The acknowledge of the first STOP_MOTOR, and nothing else any more.
+    wire.say_to(&STOP, &ACK);
+    motor.stop().expect_err("no question is answered");
+    motor.start().expect_err("no question is answered");
+    assert_eq!(wire.sent(), [&STOP[..], &INFO, &INFO].concat());
+}
+
+#[test]
+fn only_the_reply_on_the_recovered_line_counts() {
+    let wire = Wire::new();
+    let client = Client::over("wire", Box::new(Fresh(wire.clone())), options());
     let motor = client.motor(1).unwrap();
     motor.start().expect_err("nothing answers");
     // The acknowledge of the first STOP_MOTOR, and nothing else any more.
@@ -51,7 +63,7 @@ fn only_the_reply_on_the_recovered_line_counts() {
 #[test]
 fn a_guard_tells_every_motor_of_a_silent_drive_before_it_waits() {
     let wire = Wire::new();
-    let client = Client::over("wire", Box::new(wire.clone()), options());
+    let client = Client::over("wire", Box::new(Fresh(wire.clone())), options());
     for motor in 1..=3 {
         client.motor(motor).unwrap().start().expect_err("nothing answers");
     }
@@ -73,6 +85,10 @@ impl ByteLink for Polled {
 
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
         self.0.read(buffer, timeout)
+    }
+
+    fn is_fresh(&self) -> bool {
+        true
     }
 }
 

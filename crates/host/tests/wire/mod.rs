@@ -83,6 +83,37 @@ impl CanLink for Wire<CanFrame> {
     }
 }
 
+/// A link on which nothing was asked before it was opened.
+pub struct Fresh<L>(pub L);
+
+impl<L: ByteLink> ByteLink for Fresh<L> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.0.write(bytes)
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        self.0.read(buffer, timeout)
+    }
+
+    fn is_fresh(&self) -> bool {
+        true
+    }
+}
+
+impl<L: CanLink> CanLink for Fresh<L> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.0.send(frame)
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        self.0.receive(timeout)
+    }
+
+    fn is_fresh(&self) -> bool {
+        true
+    }
+}
+
 /// START_MOTOR for motor 1.
 pub const START: [u8; 4] = [0x23, 0x01, 0x01, 0x25];
 /// STOP_MOTOR for motor 1.
