@@ -8,7 +8,7 @@ use std::thread;
 
 use motorlink::port::PortError;
 use motorlink::rmd::{Bus, CanFrame};
-use motorlink::stmcp::{Client, Error, Frame, MAX_FRAME, Options};
+use motorlink::stmcp::{Client, Error, Options};
 use motorlink::{port::CanLink, rmd};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -39,15 +39,17 @@ fn program() {
 
 /// Answers the questions that come first on a line that was just opened, with zeros.
 fn answer_questions(line: &mut TcpStream) {
-    let questions: [(&[u8], usize); 3] =
-        [(&[0x06, 0x00, 0x06], 32), (&[0x02, 0x01, 0x02, 0x05], 1), (&[0x02, 0x01, 0x01, 0x04], 4)];
-    for (question, size) in questions {
+    let questions: [(&[u8], u8, u8); 3] = [
+        (&[0x06, 0x00, 0x06], 32, 0x11),
+        (&[0x02, 0x01, 0x02, 0x05], 1, 0xF1),
+        (&[0x02, 0x01, 0x01, 0x04], 4, 0xF4),
+    ];
+    for (question, size, checksum) in questions {
         let mut heard = vec![0; question.len()];
         line.read_exact(&mut heard).unwrap();
         assert_eq!(heard, question);
-        let mut buffer = [0; MAX_FRAME];
-        let reply = Frame { header: 0xF0, payload: &[0; 32][..size] };
-        line.write_all(reply.encode(&mut buffer).unwrap()).unwrap();
+        let reply = [&[0xF0, size], &[0; 32][..size.into()], &[checksum]].concat();
+        line.write_all(&reply).unwrap();
     }
 }
 
