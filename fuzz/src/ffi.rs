@@ -274,7 +274,8 @@ impl Bench {
                 15 => motorlink_st_master_receive(master, now, list, size),
                 16 => motorlink_st_master_abandon(master),
                 17 if one & 1 == 0 => motorlink_st_master_lost(master),
-                17 => motorlink_st_master_reopened(master),
+                17 if one & 2 == 0 => motorlink_st_master_reopened(master),
+                17 => motorlink_st_master_trust_line(master),
                 18 => motorlink_st_master_is_lost(master, &mut lost),
                 19 | 20 => {
                     let heard = &self.heard.bytes;
@@ -373,6 +374,8 @@ impl Bench {
                     let torques = [input.word() as i16, 0, -1, 2000];
                     motorlink_rmd_host_torque4(host, now, torques.as_ptr(), one & 31)
                 }
+                5 if one & 3 == 1 => motorlink_rmd_host_trust(host, u32::from(input.word()) << 1),
+                5 if one & 3 == 2 => motorlink_rmd_host_reopened(host, now),
                 5 => motorlink_rmd_host_retry(host, &mut at),
                 6 => motorlink_rmd_host_cancel(host, now, one),
                 7 => motorlink_rmd_host_busy(host, &mut motors),

@@ -124,6 +124,7 @@ pub fn st_master(master: &mut Master) {
     if unknown() {
         master.abandon();
         master.reopened();
+        master.trust_line();
     }
 }
 
@@ -152,6 +153,8 @@ pub fn rmd_host(host: &mut Host) {
     let _ = black_box(host.request(now, id(unknown()), unknown()));
     let _ = black_box(host.torque4(now, Torque4::default(), black_box(MotorSet::TORQUE4)));
     host.cancel(now, id(unknown()));
+    host.reopened(now);
+    host.trust(black_box(MotorSet::TORQUE4));
     if let RmdOutput::Done { id, result } = host.poll(now) {
         black_box((id, result.is_ok()));
     }

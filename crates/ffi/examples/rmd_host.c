@@ -5,6 +5,9 @@
  * Turns motor 1 to 90 degrees, no faster than 360 degrees per second; has motors 1 to 4 hold a
  * torque current of 0 in one frame; shows that a limit holds. Switches motor 1 off, also after a
  * failure. Ends with 0, with 3 where the line failed.
+ *
+ * What an earlier program asked a motor may still be answered: the first exchange with each motor
+ * ends in QUARANTINED, and it is asked again when it was silent for the guard time.
  */
 #define _POSIX_C_SOURCE 200809L
 #include "posix.h"
@@ -44,13 +47,12 @@ static void hear(int fd, uint64_t until_us) {
 }
 
 /* Conducts exchanges until one is over; gives what became of it. */
-static motorlink_rmd_action next_done(int fd) {
+static motorlink_rmd_action next_outcome(int fd) {
   for (;;) {
     motorlink_rmd_action action;
     motorlink_slcan_line line;
     check(fd, motorlink_rmd_host_poll(&host, now_us(), &action));
     if (action.kind == MOTORLINK_ACTION_DONE) {
-      check(fd, action.result);
       return action;
     }
     if (action.kind == MOTORLINK_ACTION_TRANSMIT) {
@@ -60,6 +62,12 @@ static motorlink_rmd_action next_done(int fd) {
       hear(fd, action.until_us);
     }
   }
+}
+
+static motorlink_rmd_action next_done(int fd) {
+  motorlink_rmd_action action = next_outcome(fd);
+  check(fd, action.result);
+  return action;
 }
 
 /* Ends the program, and the motor before it. */
@@ -73,9 +81,25 @@ static void leave(int fd) {
   exit(3);
 }
 
+/* Asks until the motor can be trusted, for 2 s at the most. */
 static motorlink_rmd_data exchange(int fd, uint8_t motor, motorlink_rmd_data request) {
-  check(fd, motorlink_rmd_host_request(&host, now_us(), motor, request));
-  return next_done(fd).reply;
+  uint64_t give_up = now_us() + 2000000U, retry_us;
+  for (;;) {
+    motorlink_error result = motorlink_rmd_host_request(&host, now_us(), motor, request);
+    if (result == MOTORLINK_OK) {
+      motorlink_rmd_action action = next_outcome(fd);
+      if (action.result == MOTORLINK_OK) {
+        return action.reply;
+      }
+      result = action.result;
+    } else if (result == MOTORLINK_ERROR_QUARANTINED) {
+      check(fd, motorlink_rmd_host_retry(&host, &retry_us));
+      hear(fd, retry_us);
+    }
+    if (result != MOTORLINK_ERROR_QUARANTINED || now_us() > give_up) {
+      check(fd, result);
+    }
+  }
 }
 
 int main(int argc, char **argv) {
@@ -86,6 +110,7 @@ int main(int argc, char **argv) {
   int64_t angle;
   uint64_t give_up;
   uint32_t busy;
+  uint8_t motor;
   int fd, left;
 
   if (argc < 2) {
@@ -115,6 +140,9 @@ int main(int argc, char **argv) {
   } while ((angle < 8900 || angle > 9100) && now_us() < give_up);
   printf("motor 1: %ld hundredths of a degree\n", (long)angle);
 
+  for (motor = 2; motor <= 4; motor++) {
+    exchange(fd, motor, motorlink_rmd_read_status());
+  }
   check(fd, motorlink_rmd_host_torque4(&host, now_us(), torques, 0x0F));
   for (left = 4; left > 0; left--) {
     motorlink_rmd_action action = next_done(fd);

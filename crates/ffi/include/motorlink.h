@@ -383,7 +383,7 @@ enum motorlink_rmd_can_id {
 /**
  * Words of 8 bytes in a `motorlink_st_master`.
  */
-#define MOTORLINK_ST_MASTER_WORDS 29
+#define MOTORLINK_ST_MASTER_WORDS 30
 
 /**
  * Words of 8 bytes in a `motorlink_rmd_host`.
@@ -508,11 +508,11 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_AMBIGUOUS = 26,
   /**
-   * The line was lost before, and the drive does not answer; nothing was sent (ST).
+   * The line was lost before, and the drive does not answer a question; nothing else was sent (ST).
    */
   MOTORLINK_ERROR_LOST = 27,
   /**
-   * The line was lost before, and does not fall silent; nothing was sent (ST).
+   * The line is not in step and does not fall silent; nothing was sent (ST).
    */
   MOTORLINK_ERROR_NOISE = 28,
   /**
@@ -520,7 +520,8 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_WRONG_REPLY = 29,
   /**
-   * The motor did not answer before and cannot be trusted yet; nothing was done. Ask again (RMD).
+   * The motor did not answer before, or was not asked before, and cannot be trusted yet. Nothing
+   * but a question was sent, unless it was an Off or a Stop. Ask again (RMD).
    */
   MOTORLINK_ERROR_QUARANTINED = 40,
   /**
@@ -536,6 +537,11 @@ enum motorlink_error
    * motor did (RMD).
    */
   MOTORLINK_ERROR_ALTERED = 43,
+  /**
+   * What was sent came back: an adapter or the wiring echoes, or another host asks the same. Only a
+   * question was sent to a drive (ST); what the motor did is not known (RMD).
+   */
+  MOTORLINK_ERROR_ECHO = 44,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -637,7 +643,7 @@ typedef uint8_t motorlink_st_profile;
 #endif // __cplusplus
 
 /**
- * How a line comes back on which an exchange failed.
+ * How a line is brought in step that was just opened, or on which an exchange failed.
  */
 enum motorlink_st_recovery
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -645,7 +651,8 @@ enum motorlink_st_recovery
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * Not by itself: `motorlink_st_master_reopened` says that the caller opened it anew.
+   * Not by itself: the line counts as in step until it is lost, and
+   * `motorlink_st_master_trust_line` says that it is so again.
    */
   MOTORLINK_ST_RECOVERY_NONE = 0,
   /**
@@ -1405,7 +1412,9 @@ motorlink_error motorlink_st_decode_segment(const uint8_t *payload,
 struct motorlink_st_master_config motorlink_st_master_defaults(void);
 
 /**
- * Begins a master on a line that is up, whatever the storage held before.
+ * Begins a master on a line that was just opened, whatever the storage held before. What a former
+ * master asked may still be answered: where the line can be recovered the first request follows
+ * behind silence, three questions and silence again; `motorlink_st_master_trust_line` skips that.
  *
  * `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
  *
@@ -1449,14 +1458,21 @@ motorlink_error motorlink_st_master_abandon(struct motorlink_st_master *master);
 motorlink_error motorlink_st_master_lost(struct motorlink_st_master *master);
 
 /**
- * Tells that the line was closed and opened again, with nothing left in it from before. An
+ * Tells that the line was opened anew. What may still be answered is not known, as after
+ * `motorlink_st_master_init`; with recovery NONE the caller vouches for there being nothing. An
  * exchange under way ends without a result.
  */
 motorlink_error motorlink_st_master_reopened(struct motorlink_st_master *master);
 
 /**
- * Sets `lost` to 1 where an exchange failed and the next one has to recover the line first, and to
- * 0 where the last one ended in step.
+ * Tells that nothing is left in the line from before: no drive has been asked anything on it. An
+ * exchange under way ends without a result.
+ */
+motorlink_error motorlink_st_master_trust_line(struct motorlink_st_master *master);
+
+/**
+ * Sets `lost` to 1 where the line was just opened or an exchange failed, and the next one has to
+ * bring it in step first, and to 0 where the last one ended in step.
  */
 motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, uint8_t *lost);
 
@@ -1839,7 +1855,8 @@ uint16_t motorlink_rmd_encoder_centidegrees(uint16_t counts, uint8_t encoder_bit
 
 /**
  * Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of guard time, no
- * limits. `size` is `sizeof *host`.
+ * limits. `size` is `sizeof *host`. Former hosts may have asked the motors anything;
+ * `motorlink_rmd_host_trust` says that they did not.
  */
 motorlink_error motorlink_rmd_host_init(struct motorlink_rmd_host *host, size_t size);
 
@@ -1866,8 +1883,10 @@ motorlink_error motorlink_rmd_host_set_limits(struct motorlink_rmd_host *host,
  * any eight bytes.
  *
  * A motor that did not answer before may be asked for its status instead; the exchange ends in
- * `QUARANTINED` then. Off and Stop are taken and sent during a quarantine, unless it is their own
- * late reply that is awaited.
+ * `QUARANTINED` then. So does the first one with each motor, in which it is asked for its status
+ * by two different questions; when it was silent for the guard time the request is taken. Off and
+ * Stop are taken and sent during a quarantine, unless it is their own late reply that is awaited;
+ * to a motor that was not asked before they go out ahead of the questions.
  *
  * `BAD_ARGUMENT`: `motor` is not 1 to 32. `BUSY`: its last exchange is not over. `LIMIT`: a limit
  * or the document's range is exceeded. `QUARANTINED`: ask again at the time that
@@ -1882,7 +1901,8 @@ motorlink_error motorlink_rmd_host_request(struct motorlink_rmd_host *host,
  * Begins an exchange with motors 1 to 4 in one frame (0x280): a torque current each, 0.016 A a
  * digit. `expect` has a bit a motor that has to answer, bit 0 for motor 1. Each of them ends in a
  * `DONE`. All four are told; those that are not expected to answer are in quarantine afterwards.
- * Where one of `expect` did not answer before, each of them is asked for its status instead.
+ * Where one of `expect` did not answer before or was not asked before, each of them is asked for
+ * its status instead.
  *
  * As `motorlink_rmd_host_request`: `BUSY` and `LIMIT` of any of the four, `QUARANTINED` of `expect`.
  * `BAD_ARGUMENT`: a bit above 3 is set.
@@ -1923,6 +1943,18 @@ motorlink_error motorlink_rmd_host_receive(struct motorlink_rmd_host *host,
 motorlink_error motorlink_rmd_host_cancel(struct motorlink_rmd_host *host,
                                           uint64_t now_us,
                                           uint8_t motor);
+
+/**
+ * Tells that nobody asked these motors anything that they may still answer: a bit each, bit 0 for
+ * motor 1.
+ */
+motorlink_error motorlink_rmd_host_trust(struct motorlink_rmd_host *host, uint32_t motors);
+
+/**
+ * Tells that the bus was opened anew: what the motors may still answer is not known, as after
+ * `motorlink_rmd_host_init`. Exchanges under way end without a result.
+ */
+motorlink_error motorlink_rmd_host_reopened(struct motorlink_rmd_host *host, uint64_t now_us);
 
 /**
  * The motors with an exchange under way: a bit each, bit 0 for motor 1.

@@ -43,13 +43,14 @@ pub enum motorlink_error {
     NotUnderstood = 25,
     /// Two replies that differ came at once (ST).
     Ambiguous = 26,
-    /// The line was lost before, and the drive does not answer; nothing was sent (ST).
+    /// The line was lost before, and the drive does not answer a question; nothing else was sent (ST).
     Lost = 27,
-    /// The line was lost before, and does not fall silent; nothing was sent (ST).
+    /// The line is not in step and does not fall silent; nothing was sent (ST).
     Noise = 28,
     /// The drive acknowledged, with something that is no value of a register (ST).
     WrongReply = 29,
-    /// The motor did not answer before and cannot be trusted yet; nothing was done. Ask again (RMD).
+    /// The motor did not answer before, or was not asked before, and cannot be trusted yet. Nothing
+    /// but a question was sent, unless it was an Off or a Stop. Ask again (RMD).
     Quarantined = 40,
     /// A limit that the caller set, or the document's range, is exceeded; nothing was sent (RMD).
     Limit = 41,
@@ -58,6 +59,9 @@ pub enum motorlink_error {
     /// The reply has another content than the request that it has to repeat. It is not known what the
     /// motor did (RMD).
     Altered = 43,
+    /// What was sent came back: an adapter or the wiring echoes, or another host asks the same. Only a
+    /// question was sent to a drive (ST); what the motor did is not known (RMD).
+    Echo = 44,
 }
 
 /// Success, as all functions give it.
@@ -86,14 +90,15 @@ impl motorlink_error {
             Self::Lost => c"the line is lost and the drive does not answer",
             Self::Noise => c"the line does not fall silent",
             Self::WrongReply => c"the reply has no value of a register",
-            Self::Quarantined => c"the motor did not answer before: ask again",
+            Self::Quarantined => c"the motor cannot be trusted yet: ask again",
             Self::Limit => c"beyond a limit of this motor",
             Self::Foreign => c"the motor answers in another protocol",
             Self::Altered => c"the reply does not repeat the request",
+            Self::Echo => c"what was sent came back",
         }
     }
 
-    const ALL: [Self; 24] = [
+    const ALL: [Self; 25] = [
         Self::Ok,
         Self::NullPointer,
         Self::Misaligned,
@@ -118,6 +123,7 @@ impl motorlink_error {
         Self::Limit,
         Self::Foreign,
         Self::Altered,
+        Self::Echo,
     ];
 }
 

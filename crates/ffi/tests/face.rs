@@ -98,6 +98,7 @@ impl StBench {
         let config = motorlink_st_master_config { profile, ..motorlink_st_master_defaults() };
         let StBench { master, slave } = &mut *bench;
         gives!(Ok, motorlink_st_master_init(master, size_of_val(master), &config));
+        gives!(Ok, motorlink_st_master_trust_line(master));
         gives!(Ok, motorlink_st_slave_init(slave, size_of_val(slave), profile, 1, drive));
         bench
     }
@@ -119,6 +120,32 @@ impl StBench {
             for byte in sent {
                 gives!(Ok, motorlink_st_slave_receive(slave, 0, byte, &mut reply));
                 gives!(Ok, motorlink_st_master_receive(master, 0, reply.data, reply.size));
+            }
+        }
+    }
+
+    /// Brings the line in step and conducts the exchange that was begun: what became of it, and the
+    /// headers of what was sent.
+    ///
+    /// A loop that hands in what came before it polls may have the answer before the poll that follows
+    /// the question.
+    fn done_in_time(&mut self) -> (Error, Vec<u8>) {
+        let StBench { master, slave } = self;
+        let (mut action, mut reply): (motorlink_st_action, motorlink_bytes) = (zeroed(), zeroed());
+        let (mut now, mut headers) = (0, Vec::new());
+        loop {
+            gives!(Ok, motorlink_st_master_poll(master, now, &mut action));
+            match action.kind {
+                motorlink_action::Done => return (action.result, headers),
+                motorlink_action::Wait => now = action.until_us,
+                motorlink_action::Transmit => {
+                    let sent = bytes(&action.bytes);
+                    headers.push(sent[0]);
+                    for byte in sent {
+                        gives!(Ok, motorlink_st_slave_receive(slave, now, byte, &mut reply));
+                    }
+                    gives!(Ok, motorlink_st_master_receive(master, now, reply.data, reply.size));
+                }
             }
         }
     }
@@ -215,30 +242,50 @@ fn a_request_that_is_refused_leaves_the_one_under_way_alone() {
     assert_eq!(bench.done(begun).0.value, 1500);
 }
 
-/// A loop that hands in what came before it polls may have the answer before the poll that follows
-/// the question.
 #[test]
 fn an_answer_that_comes_before_the_next_poll_recovers_the_line() {
     let nothing: motorlink_st_drive = zeroed();
     let mut bench = StBench::new(0, &nothing);
-    let StBench { master, slave } = &mut *bench;
-    let (mut action, mut reply): (motorlink_st_action, motorlink_bytes) = (zeroed(), zeroed());
+    let master: *mut motorlink_st_master = &mut bench.master;
     gives!(Ok, motorlink_st_master_lost(master), motorlink_st_master_get_register(master, 1, 2));
-    let mut now = 0;
+    assert_eq!(bench.done_in_time(), (OK, vec![0x06, 0x22]));
+}
+
+#[test]
+fn a_line_that_was_just_opened_is_brought_in_step_by_three_questions() {
+    let nothing: motorlink_st_drive = zeroed();
+    let mut bench = StBench::new(0, &nothing);
+    let master: *mut motorlink_st_master = &mut bench.master;
+    let mut lost = 0;
+    gives!(
+        Ok,
+        motorlink_st_master_reopened(master),
+        motorlink_st_master_is_lost(master, &mut lost),
+        motorlink_st_master_get_register(master, 1, 2),
+    );
+    assert_eq!(lost, 1);
+    assert_eq!(bench.done_in_time(), (OK, vec![0x06, 0x02, 0x02, 0x22]));
+}
+
+#[test]
+fn a_line_that_echoes_is_no_drive() {
+    let nothing: motorlink_st_drive = zeroed();
+    let mut bench = StBench::new(0, &nothing);
+    let master: *mut motorlink_st_master = &mut bench.master;
+    gives!(Ok, motorlink_st_master_lost(master), motorlink_st_master_execute(master, 1, 1));
+    let (mut action, mut now): (motorlink_st_action, u64) = (zeroed(), 0);
     loop {
         gives!(Ok, motorlink_st_master_poll(master, now, &mut action));
         match action.kind {
             motorlink_action::Done => break,
             motorlink_action::Wait => now = action.until_us,
             motorlink_action::Transmit => {
-                for byte in bytes(&action.bytes) {
-                    gives!(Ok, motorlink_st_slave_receive(slave, now, byte, &mut reply));
-                }
-                gives!(Ok, motorlink_st_master_receive(master, now, reply.data, reply.size));
+                let sent = bytes(&action.bytes);
+                gives!(Ok, motorlink_st_master_receive(master, now, sent.as_ptr(), sent.len()));
             }
         }
     }
-    assert_eq!(action.result, OK);
+    assert_eq!(action.result, Error::Echo);
 }
 
 #[test]
@@ -367,6 +414,7 @@ fn a_host_commands_a_drive_through_an_adapter() {
     gives!(
         Ok,
         motorlink_rmd_host_init(&mut host, size_of_val(&host)),
+        motorlink_rmd_host_trust(&mut host, 1 << 2),
         motorlink_rmd_drive_init(&mut drive, size_of_val(&drive), &config, null(), &motor),
         motorlink_rmd_drive_power_on(&mut drive, 0),
         motorlink_slcan_device_init(&mut adapter, size_of_val(&adapter)),
@@ -401,6 +449,28 @@ fn a_host_commands_a_drive_through_an_adapter() {
     let mut motion: motorlink_rmd_motion = zeroed();
     gives!(Ok, motorlink_rmd_drive_motion(&mut drive, &mut motion));
     assert_eq!((motion.kind, motion.torque_16ma), (2, 100));
+}
+
+#[test]
+fn a_motor_is_asked_for_its_status_first_unless_it_is_trusted() {
+    let mut host: motorlink_rmd_host = zeroed();
+    let mut action: motorlink_rmd_action = zeroed();
+    let host: *mut motorlink_rmd_host = &mut host;
+    gives!(Ok, motorlink_rmd_host_init(host, size_of::<motorlink_rmd_host>()));
+    gives!(Ok, motorlink_rmd_host_trust(host, !(1 << 2)));
+    for (motor, code) in [(1, 0xA1), (3, 0x9A), (32, 0xA1)] {
+        gives!(Ok, motorlink_rmd_host_request(host, 0, motor, motorlink_rmd_torque(100)));
+        gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut action));
+        assert_eq!((action.kind, action.frame.data[0]), (motorlink_action::Transmit, code));
+    }
+    gives!(Ok, motorlink_rmd_host_reopened(host, 0));
+    gives!(Ok, motorlink_rmd_host_request(host, 0, 1, motorlink_rmd_torque(100)));
+    gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut action));
+    assert_eq!((action.kind, action.frame.data[0]), (motorlink_action::Transmit, 0x9A));
+    // Its own frame, which is no motor's reply.
+    gives!(Ok, motorlink_rmd_host_receive(host, 0, &action.frame));
+    gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut action));
+    assert_eq!((action.kind, action.result), (motorlink_action::Done, Error::Echo));
 }
 
 #[test]

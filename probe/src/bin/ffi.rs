@@ -58,6 +58,7 @@ pub extern "C" fn probe() -> ! {
         motorlink_st_status_name
         motorlink_st_command_name
         motorlink_st_master_reopened
+        motorlink_st_master_trust_line
         motorlink_st_master_is_lost
         motorlink_st_decode_board_info
         motorlink_st_decode_firmware_version
@@ -109,6 +110,8 @@ pub extern "C" fn probe() -> ! {
         motorlink_rmd_host_poll
         motorlink_rmd_host_receive
         motorlink_rmd_host_cancel
+        motorlink_rmd_host_trust
+        motorlink_rmd_host_reopened
         motorlink_rmd_host_busy
         motorlink_rmd_drive_init
         motorlink_rmd_drive_power_on

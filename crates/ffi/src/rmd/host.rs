@@ -74,7 +74,8 @@ impl State {
 }
 
 /// Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of guard time, no
-/// limits. `size` is `sizeof *host`.
+/// limits. `size` is `sizeof *host`. Former hosts may have asked the motors anything;
+/// `motorlink_rmd_host_trust` says that they did not.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_init(
     host: *mut motorlink_rmd_host,
@@ -138,8 +139,10 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_limits(
 /// any eight bytes.
 ///
 /// A motor that did not answer before may be asked for its status instead; the exchange ends in
-/// `QUARANTINED` then. Off and Stop are taken and sent during a quarantine, unless it is their own
-/// late reply that is awaited.
+/// `QUARANTINED` then. So does the first one with each motor, in which it is asked for its status
+/// by two different questions; when it was silent for the guard time the request is taken. Off and
+/// Stop are taken and sent during a quarantine, unless it is their own late reply that is awaited;
+/// to a motor that was not asked before they go out ahead of the questions.
 ///
 /// `BAD_ARGUMENT`: `motor` is not 1 to 32. `BUSY`: its last exchange is not over. `LIMIT`: a limit
 /// or the document's range is exceeded. `QUARANTINED`: ask again at the time that
@@ -162,7 +165,8 @@ pub unsafe extern "C" fn motorlink_rmd_host_request(
 /// Begins an exchange with motors 1 to 4 in one frame (0x280): a torque current each, 0.016 A a
 /// digit. `expect` has a bit a motor that has to answer, bit 0 for motor 1. Each of them ends in a
 /// `DONE`. All four are told; those that are not expected to answer are in quarantine afterwards.
-/// Where one of `expect` did not answer before, each of them is asked for its status instead.
+/// Where one of `expect` did not answer before or was not asked before, each of them is asked for
+/// its status instead.
 ///
 /// As `motorlink_rmd_host_request`: `BUSY` and `LIMIT` of any of the four, `QUARANTINED` of `expect`.
 /// `BAD_ARGUMENT`: a bit above 3 is set.
@@ -237,6 +241,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_poll(
                     Err(Error::Foreign(_)) => action.result = motorlink_error::Foreign,
                     Err(Error::Altered) => action.result = motorlink_error::Altered,
                     Err(Error::Quarantined) => action.result = motorlink_error::Quarantined,
+                    Err(Error::Echo) => action.result = motorlink_error::Echo,
                     Err(_) => action.result = motorlink_error::Timeout,
                 }
             }
@@ -277,6 +282,35 @@ pub unsafe extern "C" fn motorlink_rmd_host_cancel(
     promised!(host);
     answer(|| {
         host.enter()?.host.cancel(Instant(now_us), id(motor)?);
+        Ok(())
+    })
+}
+
+/// Tells that nobody asked these motors anything that they may still answer: a bit each, bit 0 for
+/// motor 1.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_trust(
+    host: *mut motorlink_rmd_host,
+    motors: u32,
+) -> motorlink_error {
+    promised!(host);
+    answer(|| {
+        let bit = |id: MotorId| 1u32.wrapping_shl(u32::from(id.number()) - 1);
+        host.enter()?.host.trust(MotorSet::ALL.filter(|id| motors & bit(*id) != 0).collect());
+        Ok(())
+    })
+}
+
+/// Tells that the bus was opened anew: what the motors may still answer is not known, as after
+/// `motorlink_rmd_host_init`. Exchanges under way end without a result.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_rmd_host_reopened(
+    host: *mut motorlink_rmd_host,
+    now_us: u64,
+) -> motorlink_error {
+    promised!(host);
+    answer(|| {
+        host.enter()?.host.reopened(Instant(now_us));
         Ok(())
     })
 }

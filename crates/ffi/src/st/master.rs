@@ -11,11 +11,12 @@ use crate::bytes::{MOTORLINK_NEVER, motorlink_action, motorlink_bytes};
 use crate::error::{answer, motorlink_error};
 use crate::pointer::{plain, promised};
 
-/// How a line comes back on which an exchange failed.
+/// How a line is brought in step that was just opened, or on which an exchange failed.
 #[repr(u8)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum motorlink_st_recovery {
-    /// Not by itself: `motorlink_st_master_reopened` says that the caller opened it anew.
+    /// Not by itself: the line counts as in step until it is lost, and
+    /// `motorlink_st_master_trust_line` says that it is so again.
     None = 0,
     /// Waits for silence, asks a question, goes on when it was answered.
     Drain = 1,
@@ -81,7 +82,9 @@ pub extern "C" fn motorlink_st_master_defaults() -> motorlink_st_master_config {
     }
 }
 
-/// Begins a master on a line that is up, whatever the storage held before.
+/// Begins a master on a line that was just opened, whatever the storage held before. What a former
+/// master asked may still be answered: where the line can be recovered the first request follows
+/// behind silence, three questions and silence again; `motorlink_st_master_trust_line` skips that.
 ///
 /// `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
 ///
@@ -186,6 +189,7 @@ fn failed(error: Error) -> (motorlink_error, u8) {
         Failure::Size { .. } => motorlink_error::WrongReply,
         Failure::Lost => motorlink_error::Lost,
         Failure::Noise => motorlink_error::Noise,
+        Failure::Echo => motorlink_error::Echo,
         _ => motorlink_error::Damaged,
     };
     (result, 0)
@@ -232,7 +236,8 @@ pub unsafe extern "C" fn motorlink_st_master_lost(
     })
 }
 
-/// Tells that the line was closed and opened again, with nothing left in it from before. An
+/// Tells that the line was opened anew. What may still be answered is not known, as after
+/// `motorlink_st_master_init`; with recovery NONE the caller vouches for there being nothing. An
 /// exchange under way ends without a result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_reopened(
@@ -245,8 +250,21 @@ pub unsafe extern "C" fn motorlink_st_master_reopened(
     })
 }
 
-/// Sets `lost` to 1 where an exchange failed and the next one has to recover the line first, and to
-/// 0 where the last one ended in step.
+/// Tells that nothing is left in the line from before: no drive has been asked anything on it. An
+/// exchange under way ends without a result.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motorlink_st_master_trust_line(
+    master: *mut motorlink_st_master,
+) -> motorlink_error {
+    promised!(master);
+    answer(|| {
+        master.enter()?.master.trust_line();
+        Ok(())
+    })
+}
+
+/// Sets `lost` to 1 where the line was just opened or an exchange failed, and the next one has to
+/// bring it in step first, and to 0 where the last one ended in step.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_is_lost(
     master: *mut motorlink_st_master,

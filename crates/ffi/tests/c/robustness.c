@@ -47,6 +47,7 @@ static void st_master(motorlink_st_master *master, motorlink_error expected) {
   REFUSED(motorlink_st_master_abandon(master));
   REFUSED(motorlink_st_master_lost(master));
   REFUSED(motorlink_st_master_reopened(master));
+  REFUSED(motorlink_st_master_trust_line(master));
   REFUSED(motorlink_st_master_is_lost(master, &lost));
   groups++;
 }
@@ -76,6 +77,8 @@ static void rmd_host(motorlink_rmd_host *host, motorlink_error expected) {
   REFUSED(motorlink_rmd_host_poll(host, 0, &action));
   REFUSED(motorlink_rmd_host_receive(host, 0, &frame));
   REFUSED(motorlink_rmd_host_cancel(host, 0, 1));
+  REFUSED(motorlink_rmd_host_trust(host, 1));
+  REFUSED(motorlink_rmd_host_reopened(host, 0));
   REFUSED(motorlink_rmd_host_busy(host, &motors));
   groups++;
 }

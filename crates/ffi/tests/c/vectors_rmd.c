@@ -358,6 +358,7 @@ int main(int argc, char **argv) {
   json_array_foreach(vectors, index, vector) {
     subject = text(vector, "name");
     OK(motorlink_rmd_host_init(&host, sizeof host));
+    OK(motorlink_rmd_host_trust(&host, UINT32_MAX));
     if (strcmp(text(vector, "dir"), "request") == 0) {
       sent_by_the_host(vector);
       carried_out(vector);

@@ -205,6 +205,7 @@ static void through_the_master(const json_t *vector, uint8_t profile) {
   config.profile = profile;
   for (raw = 0; raw < 2; raw++) {
     OK(motorlink_st_master_init(&master, sizeof master, &config));
+    OK(motorlink_st_master_trust_line(&master));
     if (raw) {
       OK(motorlink_st_master_raw(&master, request.data[0], request.data + 2, request.size - 3));
     } else {
