@@ -159,7 +159,9 @@ impl<C: Can> HostPort<C> {
         Ok(true)
     }
 
-    /// The host, to make requests and to set limits.
+    /// The host, to make requests and to set limits. A new host's first exchange with each motor ends
+    /// in [`Error::Quarantined`]: it is made again when the motor was silent for the guard time.
+    /// [`Host::trust`] skips that on a board that starts with its motors.
     pub const fn host_mut(&mut self) -> &mut Host {
         &mut self.host
     }

@@ -87,7 +87,8 @@ pub struct MasterPort<U> {
 }
 
 impl<U: Read + Write + ReadReady> MasterPort<U> {
-    /// Puts `master` on a UART.
+    /// Puts `master` on a UART. A new master brings the line in step before its first request, which
+    /// takes two silences; [`Master::trust_line`] skips that on a board that starts with its drive.
     pub const fn new(uart: U, master: Master) -> Self {
         MasterPort { uart, master, sent: false }
     }
@@ -124,8 +125,8 @@ impl<U: Read + Write + ReadReady> MasterPort<U> {
         &mut self.master
     }
 
-    /// The UART, to configure it. One that was set to another baud rate calls for
-    /// [`Master::reopened`].
+    /// The UART, to configure it. One that was set to another baud rate or connected to another drive
+    /// calls for [`Master::reopened`].
     pub const fn uart_mut(&mut self) -> &mut U {
         &mut self.uart
     }

@@ -108,6 +108,13 @@ fn id(number: u8) -> MotorId {
 
 impl Bench {
     fn new() -> Self {
+        let mut bench = Bench::opened();
+        bench.host.host_mut().trust(MotorSet::ALL);
+        bench
+    }
+
+    /// With a bus on which a former host may have asked something.
+    fn opened() -> Self {
         let (ours, theirs) = bus();
         let configs = [1, 2].map(RmdConfig::with_id);
         let drive =
@@ -157,6 +164,21 @@ fn a_host_behind_one_controller_commands_drives_behind_another() {
     assert!(results.iter().all(|(_, result)| result.is_ok()), "{results:?}");
     let [one, two] = bench.drives.drives().each_ref().map(Drive::mode);
     assert_eq!((one, two), (Mode::Speed(CentiDps(36_000)), Mode::Off));
+}
+
+#[test]
+fn motors_that_were_not_asked_before_are_trusted_after_a_silence() {
+    let mut bench = Bench::opened();
+    for number in [1, 2] {
+        bench.ask(number, &Speed { speed: CentiDps(36_000) });
+    }
+    assert!(bench.run().into_iter().all(|(_, result)| result == Err(Error::Quarantined)));
+    assert!(bench.drives.drives().iter().all(|drive| drive.mode() == Mode::Off));
+    bench.now = bench.now + DEFAULT_GUARD;
+    for number in [1, 2] {
+        bench.ask(number, &Speed { speed: CentiDps(36_000) });
+    }
+    assert!(bench.run().into_iter().all(|(_, result)| result.is_ok()));
 }
 
 #[test]

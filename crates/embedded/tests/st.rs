@@ -20,6 +20,13 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
+        let mut bench = Bench::opened();
+        bench.master.master_mut().trust_line();
+        bench
+    }
+
+    /// With a line on which a former master may have asked something.
+    fn opened() -> Self {
         let (ours, theirs) = line();
         let drive = StDrive::demo(Instant(0));
         let slave = Slave::new(Profile::Spec, drive.last());
@@ -77,6 +84,14 @@ fn a_master_behind_one_uart_commands_a_drive_behind_another() {
     let unknown = bench.ask(Request::GetRegister(RegisterId(0xEE)));
     assert_eq!(unknown, Err(Error::Refused(ErrorCode::GetWriteOnly)));
     assert_eq!(bench.now, Instant(0), "nothing had to be waited for");
+}
+
+#[test]
+fn a_line_that_was_just_opened_costs_two_silences() {
+    let mut bench = Bench::opened();
+    assert_eq!(bench.ask(Request::BoardInfo).map(|info| info.len()), Ok(32));
+    let quiet = Config::default().quiet;
+    assert_eq!(bench.now, Instant(0) + quiet + quiet);
 }
 
 #[test]
