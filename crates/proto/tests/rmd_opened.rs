@@ -54,6 +54,38 @@ fn off_and_stop_go_out_before_the_questions_and_their_replies_do_not_count() {
 }
 
 #[test]
+fn an_off_that_was_answered_is_repeated_after_the_silence_that_its_acknowledge_needs() {
+    let mut pair = opened(&[1]);
+    pair.request(1, Off).unwrap();
+    assert_eq!(pair.run(), [(motor(1), Err(Error::Quarantined))]);
+    let until = pair.now + DEFAULT_GUARD;
+    assert_eq!(pair.request(1, Off), Err(Refused::Quarantined { id: motor(1), until }));
+    // The other one was not sent yet.
+    pair.request(1, Stop).unwrap();
+    pair.run();
+    pair.wait(DEFAULT_GUARD);
+    pair.request(1, Off).unwrap();
+    assert_eq!(pair.run(), [(motor(1), Ok(Off.encode()))]);
+    assert_eq!(pair.codes, [0x80, 0x9A, 0x9C, 0x81, 0x9A, 0x9C, 0x80]);
+}
+
+#[test]
+fn an_off_is_sent_again_to_a_motor_that_does_not_fall_silent() {
+    let mut pair = opened(&[1]);
+    pair.request(1, Off).unwrap();
+    let sent = pair.now;
+    pair.run();
+    while let Err(Refused::Quarantined { until, .. }) = pair.request(1, Off) {
+        assert!(until > pair.now && until <= sent + DEFAULT_GUARD + DEFAULT_GUARD);
+        pair.wait(Duration(until.since(pair.now).0 / 2 + 1));
+        pair.host.receive(pair.now, &CanFrame::new(0x141, ReadGains.encode()));
+    }
+    assert_eq!(pair.now, sent + DEFAULT_GUARD + DEFAULT_GUARD);
+    pair.run();
+    assert_eq!(pair.codes, [0x80, 0x9A, 0x9C, 0x80, 0x9A, 0x9C]);
+}
+
+#[test]
 fn off_goes_out_at_each_attempt_to_a_motor_that_is_silent() {
     let (mut host, mut now) = (Host::new(), Instant(0));
     for _ in 0..3 {

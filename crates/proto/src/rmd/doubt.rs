@@ -17,7 +17,8 @@ pub(super) struct Doubt {
     /// Whether replies to Off and to Stop are among it.
     off: bool,
     stop: bool,
-    /// The guard time after the last reply that did not come.
+    /// The guard time after the last reply that did not come. Of a motor that owes a former host replies
+    /// also: when Off and Stop are sent again to one that does not fall silent.
     until: Instant,
     /// When the motor was last heard since then.
     heard: Option<Instant>,
@@ -112,11 +113,12 @@ impl Doubt {
         let own = match Code::from(code) {
             code if code.ends_motion() && self.is_unknown() => {
                 let sent = if code == Code::Off { &mut self.off } else { &mut self.stop };
+                let again = core::mem::replace(sent, true);
                 return match silent {
-                    Some(silent) if *sent => Err(silent),
+                    // Sent again and again it would never let the motor fall silent.
+                    Some(silent) if again && now < self.until => Err(silent.min(self.until)),
                     _ => {
-                        *sent = true;
-                        self.heard = None;
+                        self.until = now + guard + guard;
                         Ok(Admitted::Both)
                     }
                 };
