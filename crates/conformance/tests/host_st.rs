@@ -142,7 +142,7 @@ const ENDS: &[(&str, &str)] = &[
     ("a_negative_acknowledge_with_an_unknown_code_is_an_error[0x06]", "refused 0x06"),
     ("a_negative_acknowledge_with_an_unknown_code_is_an_error[0x7f]", "refused 0x7f"),
     ("a_negative_acknowledge_with_an_unknown_code_is_an_error[0xff]", "refused 0xff"),
-    ("a_line_that_echoes_is_not_read_as_a_drive", "header"),
+    ("a_line_that_echoes_is_not_read_as_a_drive", "echo"),
 ];
 
 /// On these lines no reading succeeds any more.

@@ -239,7 +239,11 @@ fn many_motors() -> Vec<Scenario> {
             _ => &[IDENTIFIERS, ANSWER],
         };
         let mut add = |name: &str, expected, demand, trick: fn(&Turn) -> Sends| {
-            let scenario = scenario("", clauses, expected, task, demand, trick);
+            let script = move |turn: &Turn| match turn.code {
+                Code::ReadMultiTurnAngle | Code::Torque => trick(turn),
+                _ => vec![right(turn)],
+            };
+            let scenario = scenario("", clauses, expected, task, demand, script);
             all.push(Scenario { name: format!("{name}[{subject}]").into(), ..scenario });
         };
         add(
@@ -318,13 +322,17 @@ fn off(
     scenario(name, &[OFF], expected, Task::Off, demand, script)
 }
 
+/// A scenario in which 0x9B is disturbed.
 fn clear(
     name: &'static str,
     expected: &'static str,
     demand: Demand,
     trick: impl Fn(&Turn) -> Sends + 'static,
 ) -> Scenario {
-    scenario(name, &[CLEAR], expected, Task::Clear, demand, trick)
+    let script = move |turn: &Turn| {
+        if turn.code == Code::ClearErrors { trick(turn) } else { vec![right(turn)] }
+    };
+    scenario(name, &[CLEAR], expected, Task::Clear, demand, script)
 }
 
 fn scenario(
