@@ -374,7 +374,9 @@ impl Bench {
                     let torques = [input.word() as i16, 0, -1, 2000];
                     motorlink_rmd_host_torque4(host, now, torques.as_ptr(), one & 31)
                 }
-                5 if one & 3 == 1 => motorlink_rmd_host_trust(host, u32::from(input.word()) << 1),
+                5 if one & 3 == 1 => {
+                    motorlink_rmd_host_trust(host, u32::from_le_bytes(input.array()))
+                }
                 5 if one & 3 == 2 => motorlink_rmd_host_reopened(host, now),
                 5 => motorlink_rmd_host_retry(host, &mut at),
                 6 => motorlink_rmd_host_cancel(host, now, one),

@@ -71,7 +71,7 @@ pub fn host(data: &[u8]) {
     };
     while let Some(operation) = input.operation() {
         let id = MotorId::new(input.byte() % 32 + 1).expect("1 to 32");
-        match operation % 12 {
+        match operation % 14 {
             0..=2 => {
                 let data: [u8; 8] = input.array();
                 let busy = bench.host.busy().contains(id);
@@ -108,7 +108,17 @@ pub fn host(data: &[u8]) {
                 bench.host.set_limits(id, limits);
             }
             10 => bench.host.set_timeout(Duration(u64::from(input.word()))),
-            _ => bench.host.set_guard(Duration(u64::from(input.word()))),
+            11 => bench.host.set_guard(Duration(u64::from(input.word()))),
+            12 => {
+                bench.host.reopened(bench.now);
+                bench.torque4 = None;
+                assert!(bench.host.busy().is_empty());
+                assert!(MotorSet::ALL.into_iter().all(|id| bench.host.is_unknown(id)));
+            }
+            _ => {
+                bench.host.trust(id.into());
+                assert!(!bench.host.is_unknown(id));
+            }
         }
         if operation & 0x80 == 0 {
             bench.drain();

@@ -90,9 +90,9 @@ fn rmd() -> impl Iterator<Item = (u16, [u8; 8])> {
     })
 }
 
-/// A request, its reply, time, and the same request again.
+/// A trusted line, a request, its reply, time, and the same request again.
 fn master(request: &[u8], reply: &[u8]) -> Vec<u8> {
-    let mut seed = vec![1, 0xFF, 0xFF, 0xFF, 0];
+    let mut seed = vec![1, 0xFF, 0xFF, 0xFF, 0, 10];
     let payload = &request[2..request.len() - 1];
     for _ in 0..2 {
         seed.extend([2, request[0], payload.len() as u8]);
@@ -128,9 +128,9 @@ fn index(id: u16) -> u8 {
     id.checked_sub(0x141).filter(|index| *index < 32).unwrap_or(0) as u8
 }
 
-/// A request and a reply of the same bytes, time, and once more.
+/// A trusted motor, a request and a reply of the same bytes, time, and once more.
 fn host(id: u16, data: [u8; 8]) -> Vec<u8> {
-    let mut seed = Vec::new();
+    let mut seed = vec![13, index(id)];
     for operation in [0, 6, 0] {
         seed.extend([operation, index(id)]);
         seed.extend(data);
@@ -155,6 +155,8 @@ const CALL: u8 = 5 * 4;
 fn st_through_c(profile: u8, request: &[u8]) -> Vec<u8> {
     let payload = &request[2..request.len() - 1];
     let mut seed = vec![INIT, 0, 1, profile, 0, INIT + 1, 1, 1, profile, 7];
+    let trust = [CALL, 0, 17, 0, 3, 0];
+    seed.extend(trust);
     seed.extend([CALL, 0, 14, 0, request[0], payload.len() as u8]);
     seed.extend(payload);
     let poll = [CALL, 0, 21, 0, 0, 0];
@@ -166,6 +168,8 @@ fn st_through_c(profile: u8, request: &[u8]) -> Vec<u8> {
 fn rmd_through_c(id: u16, data: [u8; 8]) -> Vec<u8> {
     let motor = index(id) + 1;
     let mut seed = vec![INIT + 2, 2, 1, 0, 0, INIT + 3, 3, 1, motor, 0];
+    let trust = [CALL + 2, 2, 5, 1, 0xFF, 0xFF, 0xFF, 0xFF];
+    seed.extend(trust);
     seed.extend([CALL + 2, 2, 2, motor]);
     seed.extend(data);
     let poll = [CALL + 2, 2, 9, 0];

@@ -69,7 +69,7 @@ fn message(profile: Profile, frame: &Frame<'_>) {
     assert!(frame.payload.starts_with(same.payload), "what follows a message is dropped");
 }
 
-/// What recovery asks: GET_BOARD_INFO, and GET_REVUP_DATA of phase 0.
+/// What recovery asks first: GET_BOARD_INFO or GET_REVUP_DATA of phase 0.
 const QUESTIONS: [&[u8]; 2] = [&[0x06, 0x00, 0x06], &[0x08, 0x01, 0x00, 0x09]];
 
 /// A master under any sequence of calls, with time going on.
@@ -88,7 +88,7 @@ pub fn master(data: &[u8]) {
         heard: false,
     };
     while let Some(operation) = input.operation() {
-        match operation % 10 {
+        match operation % 11 {
             0 | 1 => bench.request(&mut input),
             2 => bench.raw(input.byte(), input.bytes()),
             3 | 4 => bench.receive(input.bytes()),
@@ -103,8 +103,14 @@ pub fn master(data: &[u8]) {
                 bench.asked = None;
                 assert_eq!(bench.master.line(), Line::Lost);
             }
-            _ => {
+            9 => {
                 bench.master.reopened();
+                bench.asked = None;
+                let expected = if recovery == Recovery::None { Line::Up } else { Line::Lost };
+                assert_eq!(bench.master.line(), expected);
+            }
+            _ => {
+                bench.master.trust_line();
                 bench.asked = None;
                 assert_eq!(bench.master.line(), Line::Up);
             }
