@@ -100,7 +100,11 @@ def test_raw_sends_any_frame(st):
 
 def test_trace_shows_both_directions_on_stderr(st):
     traced = st("--trace", "get", "MIN_APP_SPEED").ended(0)
-    sent, received = traced.err.splitlines()
+    *opening, sent, received = traced.err.splitlines()
+    # A line to a drive that may have been asked before is brought in step first.
+    questions = ["GET_BOARD_INFO", "GET_REG STATUS", "GET_REG FLAGS"]
+    asked = [line for line in opening if "->" in line]
+    assert all(question in line for question, line in zip(questions, asked, strict=True))
     assert "-> 22 01 40 63" in sent and "GET_REG MIN_APP_SPEED" in sent
     assert "<- f0 04 58 02 00 00" in received and "600 rpm" in received
     assert traced.out.split() == ["MIN_APP_SPEED", "600", "rpm"]
@@ -273,13 +277,19 @@ def test_scan_tells_silence_from_garbage(run, tmp_path):
         assert scanned.json["finding"] == "garbage"
 
 
-@pytest.mark.parametrize("answer", [noise, lambda received: b"\0" * 40, lambda received: received])
+@pytest.mark.parametrize("answer", [noise, lambda received: b"\0" * 40])
 def test_garbage_is_told_and_ends_in_time(run, tmp_path, answer):
     with device(tmp_path / "noisy", answer) as port:
         begun = time.monotonic()
         told = run("st", "-p", port, "--timeout", 200, "info").ended(3).err
         assert time.monotonic() - begun < 5
     assert "motorlink st scan" in told or "something else is sending" in told
+
+
+def test_a_line_that_echoes_is_told(run, tmp_path):
+    with device(tmp_path / "echo", lambda received: received) as port:
+        told = run("st", "-p", port, "--timeout", 200, "start").ended(3).err
+    assert "what is sent comes back" in told and "echoes" in told
 
 
 def test_a_device_that_is_unplugged_mid_exchange_is_told(run, tmp_path):
