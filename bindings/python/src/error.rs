@@ -129,12 +129,12 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
     let facts =
         |port, id: &rmd::MotorId| Facts { port: Some(port), motor: Some(id.number()), code: None };
     let (kind, facts) = match error {
-        Error::Timeout { port, id, .. } | Error::Quarantined { port, id } => {
-            (Kind::Timeout, facts(port, id))
-        }
-        Error::Foreign { port, id, .. } | Error::Altered { port, id, .. } => {
-            (Kind::LineLost, facts(port, id))
-        }
+        Error::Timeout { port, id, .. }
+        | Error::Quarantined { port, id }
+        | Error::Shared { port, id } => (Kind::Timeout, facts(port, id)),
+        Error::Foreign { port, id, .. }
+        | Error::Altered { port, id, .. }
+        | Error::Echo { port, id } => (Kind::LineLost, facts(port, id)),
         Error::Twice(id) | Error::OutOfReach(id) | Error::Limit { id, .. } => {
             (Kind::BadValue, Facts { motor: Some(id.number()), ..Facts::default() })
         }

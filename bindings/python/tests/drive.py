@@ -16,6 +16,9 @@ REGISTERS = {"SPEED_REF": 0x04, "SPEED_MEAS": 0x1E, "RAMP_FINAL_SPEED": 0x5B}
 SET_REG, GET_REG, EXECUTE, BOARD_INFO, REVUP = 0x01, 0x02, 0x03, 0x06, 0x08
 START, STOP = 0x01, 0x02
 
+#: Sizes of the registers that are asked for first on a line that was just opened: FLAGS and STATUS.
+QUESTIONS = {0x01: 4, 0x02: 1}
+
 
 def value(drive: int, motor: int, register: int) -> int:
     """What a drive says of a register: no two say the same."""
@@ -81,6 +84,8 @@ class Drive:
 
     def _reply(self, request: bytes) -> bytes:
         motor, code, payload = request[0] >> 5, request[0] & 0x1F, request[2:-1]
+        if motor == 0 and code == GET_REG and payload[0] in QUESTIONS:
+            return frame(0xF0, bytes(QUESTIONS[payload[0]]))
         if self.reads is not None and code in (SET_REG, GET_REG):
             kept = self.reads(payload[0]).to_bytes(2, "little") if code == GET_REG else b""
             return frame(0xF0, kept)
