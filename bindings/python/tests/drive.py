@@ -44,6 +44,9 @@ class Drive:
         #: A register that is never answered, and how often it was asked for.
         self.is_deaf_to: int | None = None
         self.unanswered = 0
+        #: After how many replies it falls silent.
+        self.answers: int | None = None
+        self.heard = b""
         #: What was executed: motor and command.
         self.executed: list[tuple[int, int]] = []
         self.plug()
@@ -71,12 +74,18 @@ class Drive:
     def _serve(self) -> None:
         heard = b""
         while not self._end in select.select([self._line, self._end], [], [])[0]:
-            heard += os.read(self._line, 4096)
+            received = os.read(self._line, 4096)
+            heard += received
+            self.heard += received
             while len(heard) >= 2 and len(heard) >= heard[1] + 3:
                 request, heard = heard[: heard[1] + 3], heard[heard[1] + 3 :]
                 if request[0] & 0x1F == GET_REG and request[2] == self.is_deaf_to:
                     self.unanswered += 1
                     continue
+                if self.answers is not None:
+                    if self.answers == 0:
+                        continue
+                    self.answers -= 1
                 reply = self._reply(request)
                 if self._ends(self.delay()):
                     return

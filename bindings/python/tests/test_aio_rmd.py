@@ -133,8 +133,10 @@ def test_cycles_and_four_torques_tell_what_each_motor_answered(motors: Motors) -
 
 def test_a_late_reply_to_a_cancelled_exchange_is_nobody_elses(motors: Motors) -> None:
     async def main() -> None:
-        async with aio.rmd.open(motors.port, timeout=30, guard=30) as bus:
+        async with aio.rmd.open(motors.port, timeout=30, guard=2) as bus:
             motor = bus.motor(1)
+            await motor.motion()
+            motors.heard.clear()
             motors.delay = lambda id: 0.02
             exchange = asyncio.ensure_future(motor.motion())
             while (1, 0x9C) not in motors.heard:

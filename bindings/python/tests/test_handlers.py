@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from conftest import Served, eventually
-from drive import REGISTERS, START, STOP, Drive, frame
+from drive import QUESTIONS, REGISTERS, START, STOP, Drive, frame
 
 #: How often what once hung in most runs, but not in all, is tried.
 RUNS = 20
@@ -106,6 +106,7 @@ def test_a_handler_stops_a_motor_while_an_answer_is_awaited(tmp_path: Path) -> N
 
 CLOSE_WHILE_SILENT = """
     bus = motorlink.st.open(sys.argv[1], timeout=0.2)
+    bus.motor(1).read("SPEED_MEAS")
     def close():
         try:
             bus.close()
@@ -118,17 +119,19 @@ CLOSE_WHILE_SILENT = """
 """
 
 
-def test_a_handler_closes_a_bus_whose_drive_is_silent() -> None:
+def test_a_handler_closes_a_bus_whose_drive_is_silent(tmp_path: Path) -> None:
     for _ in range(4):
-        ours, theirs = os.openpty()
+        drive = Drive(tmp_path / "st0", 3)
+        # What is asked first on a line that was just opened, and one reading.
+        drive.answers = len(QUESTIONS) + 2
         try:
-            said = ends(program(CLOSE_WHILE_SILENT, os.ttyname(theirs)))
+            said = ends(program(CLOSE_WHILE_SILENT, str(drive.path)))
             assert said == ["may still be running", "PortError True", "Closed False"]
             start, stop = frame(0x23, bytes([START])), frame(0x23, bytes([STOP]))
-            assert os.read(ours, 4096).startswith(start + stop)
+            _, _, behind = drive.heard.partition(start)
+            assert behind.startswith(stop)
         finally:
-            os.close(ours)
-            os.close(theirs)
+            drive.unplug()
 
 
 IDLE_HANDLER = """
@@ -144,7 +147,9 @@ IDLE_HANDLER = """
 
 
 def test_a_handler_that_sends_nothing_does_not_disturb_an_exchange(tmp_path: Path) -> None:
-    drive = Drive(tmp_path / "st0", 3, delay=lambda: 0.12)
+    # A late answer to the questions of an opened line would cost two timeouts.
+    prompt = iter([0.0] * (1 + len(QUESTIONS)))
+    drive = Drive(tmp_path / "st0", 3, delay=lambda: next(prompt, 0.12))
     try:
         said = ends(program(IDLE_HANDLER, str(drive.path)))
         assert len(set(said)) == 1 and len(said) == 20
@@ -265,6 +270,7 @@ def test_a_handler_may_ask_a_bus_of_asyncio_whenever_it_comes() -> None:
 SECOND_SIGNAL = """
     with motorlink.st.open(sys.argv[1], timeout=30.0, on_close="nothing") as bus:
         motor = bus.motor(1)
+        motor.read("SPEED_MEAS")
         def stop():
             signal.signal(signal.SIGUSR1, lambda *_: None)
             signal_later(0.1)

@@ -13,6 +13,7 @@ import pytest
 
 import motorlink
 from conftest import Served, eventually
+from drive import QUESTIONS, Drive
 from motorlink import st
 
 
@@ -356,11 +357,24 @@ def test_a_silent_drive_is_a_timeout() -> None:
                 bus.motor(3).read("STATUS")
             assert (silent.value.motor, silent.value.port) == (3, bus.port)
             assert isinstance(silent.value, TimeoutError)
-            with pytest.raises(motorlink.LineLost):
-                bus.motor(3).read("STATUS")
     finally:
         os.close(ours)
         os.close(theirs)
+
+
+def test_a_drive_that_falls_silent_is_a_timeout_and_then_a_lost_line(tmp_path: Path) -> None:
+    drive = Drive(tmp_path / "st0", 3)
+    # What is asked first on a line that was just opened, and one reading.
+    drive.answers = len(QUESTIONS) + 2
+    try:
+        with st.open(str(drive.path), timeout=0.05) as bus:
+            bus.motor(3).read("SPEED_MEAS")
+            with pytest.raises(motorlink.Timeout):
+                bus.motor(3).read("SPEED_MEAS")
+            with pytest.raises(motorlink.LineLost):
+                bus.motor(3).read("SPEED_MEAS")
+    finally:
+        drive.unplug()
 
 
 def test_a_command_that_does_not_exist_is_a_bad_value(st_bus: st.Bus) -> None:
