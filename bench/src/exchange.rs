@@ -63,7 +63,7 @@ pub fn kernels() -> [Kernel; 2] {
     [with_memory, with_simulation]
 }
 
-/// On a line that nobody used before.
+/// On a line that no other master has used.
 fn master() -> Master {
     let mut master = Master::new(Config::default());
     master.trust_line();

@@ -174,7 +174,7 @@ fn motors_that_were_not_asked_before_are_trusted_after_a_silence() {
     }
     assert!(bench.run().into_iter().all(|(_, result)| result == Err(Error::Quarantined)));
     assert!(bench.drives.drives().iter().all(|drive| drive.mode() == Mode::Off));
-    bench.now = bench.now + DEFAULT_GUARD;
+    bench.now += DEFAULT_GUARD;
     for number in [1, 2] {
         bench.ask(number, &Speed { speed: CentiDps(36_000) });
     }

@@ -1945,8 +1945,8 @@ motorlink_error motorlink_rmd_host_cancel(struct motorlink_rmd_host *host,
                                           uint8_t motor);
 
 /**
- * Tells that nobody asked these motors anything that they may still answer: a bit each, bit 0 for
- * motor 1.
+ * Tells that these motors owe no earlier host a reply, so that no question goes before the first
+ * request: a bit each, bit 0 for motor 1.
  */
 motorlink_error motorlink_rmd_host_trust(struct motorlink_rmd_host *host, uint32_t motors);
 

@@ -467,7 +467,7 @@ fn a_motor_is_asked_for_its_status_first_unless_it_is_trusted() {
     gives!(Ok, motorlink_rmd_host_request(host, 0, 1, motorlink_rmd_torque(100)));
     gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut action));
     assert_eq!((action.kind, action.frame.data[0]), (motorlink_action::Transmit, 0x9A));
-    // Its own frame, which is no motor's reply.
+    // The host's own frame comes back.
     gives!(Ok, motorlink_rmd_host_receive(host, 0, &action.frame));
     gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut action));
     assert_eq!((action.kind, action.result), (motorlink_action::Done, Error::Echo));

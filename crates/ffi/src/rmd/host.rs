@@ -286,8 +286,8 @@ pub unsafe extern "C" fn motorlink_rmd_host_cancel(
     })
 }
 
-/// Tells that nobody asked these motors anything that they may still answer: a bit each, bit 0 for
-/// motor 1.
+/// Tells that these motors owe no earlier host a reply, so that no question goes before the first
+/// request: a bit each, bit 0 for motor 1.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_trust(
     host: *mut motorlink_rmd_host,

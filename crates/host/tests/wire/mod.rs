@@ -83,7 +83,7 @@ impl CanLink for Wire<CanFrame> {
     }
 }
 
-/// A link on which nothing was asked before it was opened.
+/// A link whose drives owe no earlier host a reply.
 pub struct Fresh<L>(pub L);
 
 impl<L: ByteLink> ByteLink for Fresh<L> {

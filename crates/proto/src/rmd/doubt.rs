@@ -17,8 +17,8 @@ pub(super) struct Doubt {
     /// Whether replies to Off and to Stop are among it.
     off: bool,
     stop: bool,
-    /// The guard time after the last reply that did not come. Of a motor that owes a former host replies
-    /// also: when Off and Stop are sent again to one that does not fall silent.
+    /// The guard time after the last reply that did not come. For [`Owed::Unknown`] also the end of the
+    /// wait for silence behind an Off or a Stop.
     until: Instant,
     /// When the motor was last heard since then.
     heard: Option<Instant>,
