@@ -483,6 +483,7 @@ static void copied(void) {
   motorlink_st_action action;
   subject = "copies";
   OK(motorlink_st_master_init(&one, sizeof one, NULL));
+  OK(motorlink_st_master_trust_line(&one));
   two = one;
   OK(motorlink_st_master_board_info(&one, 0));
   OK(motorlink_st_master_poll(&two, 0, &action));
