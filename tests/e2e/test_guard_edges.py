@@ -489,6 +489,30 @@ def test_no_web_page_starts_a_motor_wherever_its_request_is_cut(sim, guard, prot
     rests(drives, protocol)
 
 
+@pytest.mark.parametrize("protocol", PORT)
+def test_the_body_behind_a_web_pages_request_does_not_reach_a_served_drive(sim, run, protocol):
+    """A browser sends a longer body after the request, while the server still lets go of it."""
+    drives = sim(st=("tcp",), rmd=("tcp",))
+    host, port = (drives.st_address if protocol == "st" else drives.can_address).split(":")
+    for number in range(60):
+        with socket.create_connection((host, int(port)), timeout=5) as page:
+            page.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            try:
+                page.sendall(b"POST / HTTP/1.1\r\nContent-Length: 40000\r\n\r\n")
+                for _ in range(number % 4):
+                    page.sendall(START[protocol] * 10)
+                page.sendall(START[protocol] * 1000)
+                page.recv(64)
+            except ConnectionError:
+                pass
+    if protocol == "st":
+        state = run("st", "-p", drives.port("tcp"), "--json", "get", "STATUS").ended(0).json
+        assert state["STATUS"]["name"] == "IDLE"
+    else:
+        motion = run("rmd", "-p", drives.port("slcan:tcp"), "--json", "status").ended(0).json
+        assert (motion["speed"], motion["angle"]) == (0, 0)
+
+
 def unsent(page):
     """Bytes that the other end's kernel has not acknowledged."""
     siocoutq = 0x5411

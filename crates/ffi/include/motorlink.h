@@ -383,7 +383,7 @@ enum motorlink_rmd_can_id {
 /**
  * Words of 8 bytes in a `motorlink_st_master`.
  */
-#define MOTORLINK_ST_MASTER_WORDS 30
+#define MOTORLINK_ST_MASTER_WORDS 31
 
 /**
  * Words of 8 bytes in a `motorlink_rmd_host`.

@@ -8,7 +8,7 @@ use crate::st::{master, slave};
 /// Words of 8 bytes in a `motorlink_st_slave`.
 pub const MOTORLINK_ST_SLAVE_WORDS: usize = 38;
 /// Words of 8 bytes in a `motorlink_st_master`.
-pub const MOTORLINK_ST_MASTER_WORDS: usize = 30;
+pub const MOTORLINK_ST_MASTER_WORDS: usize = 31;
 /// Words of 8 bytes in a `motorlink_rmd_host`.
 pub const MOTORLINK_RMD_HOST_WORDS: usize = 333;
 /// Words of 8 bytes in a `motorlink_rmd_drive`.

@@ -279,7 +279,9 @@ impl Bench {
             self.frame.clear();
             self.reply(&nack, answers);
         }
-        while let Some((_, copy)) = self.copies.pop_front_if(|(at, _)| *at <= self.now) {
+        while self.copies.front().is_some_and(|(at, _)| *at <= self.now)
+            && let Some((_, copy)) = self.copies.pop_front()
+        {
             self.back.push(self.now, copy);
         }
         while self.now >= self.deaf_until()

@@ -62,42 +62,42 @@ pub(super) const HELD: usize = 16;
 
 /// Holds the first bytes of a client back until they are no beginning of what browsers speak.
 #[derive(Debug)]
-pub(super) struct Gate {
-    is_open: bool,
-    held: Vec<u8>,
+pub(super) enum Gate {
+    Open,
+    Held(Vec<u8>),
+    /// For a stranger, whatever else it sends.
+    Closed,
 }
 
 impl Gate {
     /// Lets everything through.
     pub(super) fn open() -> Self {
-        Gate { is_open: true, held: Vec::new() }
+        Gate::Open
     }
 
     /// Looks at the first bytes.
     pub(super) fn held() -> Self {
-        Gate { is_open: false, held: Vec::new() }
+        Gate::Held(Vec::new())
     }
 
     /// Takes what the client sent, behind [`HELD`] bytes of room; gives what may pass now. `None`: it
     /// is a stranger.
     pub(super) fn pass<'a>(&mut self, chunk: &'a mut [u8]) -> Option<&'a [u8]> {
-        if self.is_open {
-            return Some(&chunk[HELD..]);
-        }
-        let start = HELD - self.held.len();
-        chunk[start..HELD].copy_from_slice(&self.held);
+        let held = match self {
+            Gate::Open => return Some(&chunk[HELD..]),
+            Gate::Closed => return None,
+            Gate::Held(held) => held,
+        };
+        let start = HELD - held.len();
+        chunk[start..HELD].copy_from_slice(held);
         let all = &chunk[start..];
-        match judge(all) {
-            Judgement::Stranger => None,
-            Judgement::Undecided => {
-                self.held = all.to_vec();
-                Some(&[])
-            }
-            Judgement::Welcome => {
-                (self.is_open, self.held) = (true, Vec::new());
-                Some(all)
-            }
-        }
+        let (gate, passed) = match judge(all) {
+            Judgement::Stranger => (Gate::Closed, None),
+            Judgement::Undecided => (Gate::Held(all.to_vec()), Some(&[][..])),
+            Judgement::Welcome => (Gate::Open, Some(all)),
+        };
+        *self = gate;
+        passed
     }
 }
 
@@ -187,6 +187,17 @@ mod tests {
                 let first = passed([&sent[..at]]).unwrap_or_default();
                 assert!(first.is_empty(), "{sent:02x?} cut at {at}");
             }
+        }
+    }
+
+    #[test]
+    fn nothing_passes_behind_a_strangers_first_piece() {
+        let mut gate = Gate::held();
+        for piece in
+            [&b"POST / HTTP/1.1\r\n\r\n"[..], b"\x23\x01\x01\x25", b"t1418A2000000A08C0000\r"]
+        {
+            let mut chunk = [&[0; HELD], piece].concat();
+            assert_eq!(gate.pass(&mut chunk), None, "{piece:02x?}");
         }
     }
 
