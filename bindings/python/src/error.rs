@@ -105,6 +105,9 @@ pub(crate) fn st_error(py: Python<'_>, error: &stmcp::Error) -> PyErr {
         Error::Reply { port, motor, .. } => {
             (Kind::LineLost, Facts { port: Some(port), motor: named(motor.0), code: None })
         }
+        Error::Unconfirmed { port, .. } => {
+            (Kind::LineLost, Facts { port: Some(port), ..Facts::default() })
+        }
         Error::Limit { motor, .. } => {
             (Kind::BadValue, Facts { motor: named(motor.0), ..Facts::default() })
         }
@@ -130,10 +133,12 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
         |port, id: &rmd::MotorId| Facts { port: Some(port), motor: Some(id.number()), code: None };
     let (kind, facts) = match error {
         Error::Timeout { port, id, .. }
+        | Error::Adapter { port, id, .. }
         | Error::Quarantined { port, id }
         | Error::Shared { port, id } => (Kind::Timeout, facts(port, id)),
         Error::Foreign { port, id, .. }
         | Error::Altered { port, id, .. }
+        | Error::Unconfirmed { port, id }
         | Error::Echo { port, id } => (Kind::LineLost, facts(port, id)),
         Error::Twice(id) | Error::OutOfReach(id) | Error::Limit { id, .. } => {
             (Kind::BadValue, Facts { motor: Some(id.number()), ..Facts::default() })

@@ -182,6 +182,17 @@ class Bus(Ending):
         """One exchange with a motor; gives what the request makes of the reply."""
         return self._core.perform(motor, request)
 
+    def confirm(self, motor: int = 1) -> None:
+        """Makes sure that a motor's replies so far went to their own requests, before you rely on what you read:
+        one exchange more. A reply that nobody asked for is ``LineLost``: read again.
+
+        >>> import motorlink
+        >>> with motorlink.rmd.open("sim:") as bus:
+        ...     angle = bus.motor(1).angle()
+        ...     bus.confirm(1)
+        """
+        self._core.confirm(motor)
+
     def cycle(self, requests: Mapping[int, Request]) -> dict[int, Any]:
         """Asks many motors at once; the exchanges overlap. Gives what each answered, by ID.
 

@@ -186,6 +186,17 @@ class Bus(Ending):
         """One exchange with a motor; gives what the request makes of the reply."""
         return self._client.perform(motor, request)
 
+    def confirm(self) -> None:
+        """Makes sure that the replies so far went to their own requests, before you rely on what you read: one
+        exchange more. A reply that came twice or late is ``LineLost``: read again.
+
+        >>> import motorlink
+        >>> with motorlink.st.open("sim:") as bus:
+        ...     volts = bus.motor(1).read("BUS_VOLTAGE")
+        ...     bus.confirm()
+        """
+        self._client.confirm()
+
     def exchange_raw(self, code: int, payload: bytes = b"", *, motor: int = 0) -> bytes:
         """One exchange with any frame code, 0 to 0x1f, and payload; gives the payload of the answer.
 

@@ -86,6 +86,12 @@ impl RmdBus {
         request.value(py, &reply.map_err(|error| rmd_error(py, &error))?)
     }
 
+    /// Makes sure that a motor's replies so far went to their own requests.
+    fn confirm(&self, py: Python<'_>, id: i64) -> PyResult<()> {
+        let id = motor_id(py, id)?;
+        self.bus.exchange(py, |bus| bus.confirm(id))?.map_err(|error| rmd_error(py, &error))
+    }
+
     /// Exchanges that overlap, one a motor; gives the value, or the exception, by ID.
     fn cycle<'py>(
         &self,

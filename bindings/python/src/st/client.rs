@@ -89,6 +89,11 @@ impl StClient {
         written.map_err(|error| st_error(py, &error))
     }
 
+    /// Makes sure that the replies so far went to their own requests.
+    fn confirm(&self, py: Python<'_>) -> PyResult<()> {
+        self.client.exchange(py, |client| client.confirm())?.map_err(|error| st_error(py, &error))
+    }
+
     /// One exchange with any frame code and payload; gives the acknowledge's payload.
     fn exchange_raw<'py>(
         &self,
