@@ -165,11 +165,14 @@ HANDLER_AT_RANDOM = """
         done.append(True)
     on_signal(stop)
     going = True
+    def ask():
+        bus.motor(1).read("STATUS") if kind == "st" else bus.motor(1).motion
     with getattr(motorlink, kind).open(port, timeout=2.0) as bus:
+        ask()
         thread = signals_until(lambda: not going)
         while len(done) < 50:
             try:
-                bus.motor(1).read("STATUS") if kind == "st" else bus.motor(1).motion
+                ask()
             except motorlink.PortError as error:
                 assert "given up" in str(error), error
         data = bus.sample(["SPEED_MEAS" if kind == "st" else "iq_a"], rate=200, seconds=0.3)
@@ -197,6 +200,8 @@ STOP_ON_PYTHON_CAN = """
                 motor.stop()
                 done.append(True)
             on_signal(stop)
+            # An exchange that brings the motor in step takes long: handlers would mostly meet each other.
+            motor.motion
             thread = signals_until(lambda: len(done) >= 10)
             while thread.is_alive():
                 try:
