@@ -694,7 +694,7 @@ def test_a_guard_proves_that_it_stops_a_motor(bench, run, protocol):
     speed = {"st": 1200, "rmd": 300}[protocol]
     words = ["guard", protocol, "-p", PORT[protocol](drives), "--prove", "--spin", speed]
     shown = run(*words, within=60).ended(0)
-    assert "was told to stop after" in shown.out and "stood still after" in shown.out
+    assert "acknowledged its stop after" in shown.out and "seen at rest after" in shown.out
     assert "SIGKILL" in shown.err
     proof = run(*words, "--json", within=60).ended(0).json
     assert proof["proved"] and proof["motor"] == 1

@@ -188,7 +188,7 @@ class Bus(Ending):
 
         >>> import motorlink
         >>> with motorlink.rmd.open("sim:") as bus:
-        ...     angle = bus.motor(1).angle()
+        ...     angle = bus.motor(1).angle
         ...     bus.confirm(1)
         """
         self._core.confirm(motor)

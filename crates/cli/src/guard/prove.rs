@@ -160,7 +160,7 @@ impl Proof {
         drop(relay);
         let rest = self.at_rest(killed)?;
         let text = format!(
-            "motor {} was told to stop after {stop:.1} ms and stood still after {rest:.0} ms",
+            "motor {} acknowledged its stop after {stop:.0} ms and was seen at rest after {rest:.0} ms",
             self.motor
         );
         let object = json!({

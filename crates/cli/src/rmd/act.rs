@@ -20,7 +20,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Pid { gains } => pid(session, &gains),
         Act::Accel { dps_per_second: None } => {
             let limit = motor.acceleration()?;
-            output.rows(&[value(
+            session.confirmed()?.rows(&[value(
                 session,
                 "acceleration",
                 limit.0.into(),
@@ -103,7 +103,7 @@ fn pid(session: &Session, gains: &[u8]) -> Result<(), Failure> {
     }
     let gains = motor.gains()?;
     let row = |name, gain: u8| (name, gain.to_string(), json!(gain));
-    session.output.rows(&[
+    session.confirmed()?.rows(&[
         row("position_kp", gains.position_kp),
         row("position_ki", gains.position_ki),
         row("speed_kp", gains.speed_kp),
@@ -129,7 +129,7 @@ fn encoder(session: &Session, offset: Option<u16>) -> Result<(), Failure> {
     }
     let encoder = motor.encoder()?;
     let row = |name, counts: u16| (name, counts.to_string(), json!(counts));
-    session.output.rows(&[
+    session.confirmed()?.rows(&[
         row("position", encoder.position),
         row("original", encoder.raw),
         row("offset", encoder.offset),

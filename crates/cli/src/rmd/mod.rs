@@ -45,6 +45,12 @@ fn connect(connection: &Connection, motor: &Motor) -> Result<Session, Failure> {
 }
 
 impl Session {
+    /// Where results go, which come from replies to their own requests.
+    fn confirmed(&self) -> Result<Output, Failure> {
+        self.bus.confirm(self.motor()?.id())?;
+        Ok(self.output)
+    }
+
     fn motor(&self) -> Result<MotorHandle<'_>, Failure> {
         Ok(self.bus.motor(self.id)?)
     }

@@ -91,7 +91,7 @@ fn show(
         repeat,
         || {
             let rows = sample(session)?;
-            session.bus.confirm(session.motor()?.id())?;
+            session.confirmed()?;
             Ok(rows)
         },
         |rows, at| match at {

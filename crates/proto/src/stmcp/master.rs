@@ -264,12 +264,7 @@ impl Master {
         self.filled = frame.len() as u8;
         self.begin(motor, Some(request.code()));
         let profile = self.config.profile;
-        let own = match (profile, request) {
-            // Builds of shipped firmware differ.
-            (Profile::Mcsdk54, Request::GetRegister(_)) => ReplySize::Value,
-            _ => request.reply_size(profile),
-        };
-        self.sizes = [own, request.reply_size(profile.other())];
+        self.sizes = [request.reply_size(profile), request.reply_size(profile.other())];
         Ok(())
     }
 
@@ -475,7 +470,12 @@ impl Master {
             STATUS if is_prompt => return self.state = State::Probe(FLAGS),
             _ => is_prompt,
         };
-        let expired = asked + self.config.timeout + self.config.timeout;
+        let patience = match self.is_known {
+            true => self.config.timeout,
+            // A former master waited as long as the document says, at most.
+            false => self.config.timeout.min(TIMEOUT),
+        };
+        let expired = asked + patience + patience;
         let until = if is_own { now } else { expired };
         self.settle(until.max(now + self.config.quiet), Then::Send);
     }
