@@ -250,7 +250,8 @@ impl Bus {
     }
 
     /// Sends torques to motors 1 to 4 in one frame and gathers the replies of those in `expect`;
-    /// place n of the result is motor n + 1.
+    /// place n of the result is motor n + 1. Motors that are used for the first time are asked for their
+    /// status before; if none of them answers, nothing is sent.
     ///
     /// # Errors
     /// The port's, a limit's, [`Error::OutOfReach`], [`Error::Quarantined`]: nothing was sent then. Nor

@@ -281,7 +281,8 @@ impl Session {
         self.held.is_some_and(|held| held.expect.contains(id))
     }
 
-    /// A motor that torques are held for answered the questions, or failed to: then they are not sent.
+    /// A motor that torques are held for answered the questions, or failed to: then they are sent for the
+    /// others.
     fn held_answered(
         &mut self,
         id: MotorId,
@@ -294,8 +295,8 @@ impl Session {
                 None
             }
             Err(error) => {
-                self.unsent = held.answered;
-                self.held = None;
+                held.expect.remove(id);
+                self.held = self.held.filter(|held| !held.expect.is_empty());
                 Some(Output::Done(id, Err(self.failed(id, error))))
             }
         }
