@@ -74,7 +74,7 @@ def test_with_leave_the_motor_turns_and_is_off_in_the_end(check, sim):
     done = check(drives.can, "--only", "RMD-88", "--spin", "--verbose").ended(0)
     assert "run_resumes_what_a_stop_has_interrupted" in done.out
     after = drives.motor(1)
-    assert after["mode"] == "off" and abs(after["angle_degrees"] - before) > 1
+    assert after["mode"] == "off" and abs(after["angle_degrees"] - before) > 1, (before, after["angle_degrees"])
 
 
 def test_ctrl_c_switches_the_motor_off(start, sim):
