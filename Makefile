@@ -143,7 +143,7 @@ soak: ## a million exchanges with a thousand reconnects
 	$(CARGO) test --release --locked -p motorlink --all-features --test soak -- --ignored --nocapture
 
 # Fails with a seed and a trace where a promise is broken.
-reliability: ## 90 million exchanges on bad lines, docs/RELIABILITY.md
+reliability: ## 100 million exchanges on bad lines, docs/RELIABILITY.md
 	$(CARGO) run --release --locked -p motorlink-reliability -- --update docs/RELIABILITY.md
 
 bench: $(BENCH_VENV)/ready bench-python ## ratios and instruction counts, as in docs/BENCHMARKS.md
