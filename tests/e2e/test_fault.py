@@ -46,7 +46,7 @@ def test_a_watch_goes_on_through_damage(run):
     fault = "drop=5e-2,seed=3"
     watch = run(
         *ST, "--json", "--timeout", 30, "--fault", fault, "get", "BUS_VOLTAGE", "--every", "2ms",
-        "--count", 40,
+        "--count", 12,
     ).ended(0)
     assert {line["BUS_VOLTAGE"]["value"] for line in watch.lines} == {325}
     assert "the line is lost" in watch.err and "the line is back" in watch.err

@@ -107,7 +107,7 @@ fn recovery_asks_what_cannot_be_answered_with_the_lost_reply() {
 #[test]
 fn the_longest_exchange_is_five_or_six_timeouts_and_the_silences() {
     for (recovery, ms) in
-        [(Recovery::None, 1_000), (Recovery::Drain, 5_100), (Recovery::Pad, 6_150)]
+        [(Recovery::None, 1_000), (Recovery::Drain, 5_150), (Recovery::Pad, 6_200)]
     {
         let config = Config { recovery, ..Config::default() };
         assert_eq!(config.longest_exchange(), Duration::from_millis(ms), "{recovery:?}");

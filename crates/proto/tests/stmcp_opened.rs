@@ -130,6 +130,22 @@ fn an_echo_is_no_answer_and_is_named() {
     }
 }
 
+/// GET_BOARD_INFO of a drive with version 6.0.6 begins with the bytes of the question.
+#[test]
+fn an_answer_that_looks_like_the_question_is_no_echo() {
+    let mut payload = [0; 32];
+    payload[..3].copy_from_slice(&INFO);
+    let mut frame = [0; MAX_FRAME];
+    let reply = Frame { header: HEADER_ACK, payload: &payload }.encode(&mut frame).unwrap();
+    let mut master = opened(Recovery::Drain);
+    master.request(0, &STATUS).unwrap();
+    for (ms, bytes) in [(0, &[][..]), (50, &[]), (51, reply)] {
+        let _ = master.poll(Instant(ms * MS));
+        master.receive(Instant(ms * MS), bytes);
+    }
+    assert_eq!(master.poll(Instant(51 * MS)), Output::Transmit(&GET_STATUS));
+}
+
 /// What a wrong baud rate looks like is said as on a line that is up.
 #[test]
 fn what_comes_in_place_of_an_answer_is_named() {

@@ -121,6 +121,10 @@ impl Hold for RmdHold {
     fn stop(&mut self) -> Vec<Halt> {
         let moving = self.follower.moving();
         let request = self.on_loss.request();
+        for id in moving {
+            // The bus below listens first. If this fails, so does what follows, which says why.
+            let _ = self.held.port.send(&CanFrame::new(id.can_id(), request));
+        }
         let port = &self.held.port;
         let open = port.opener(|port| Box::new(port) as Box<dyn CanLink>);
         let options = Options { timeout: TIMEOUT, ..Options::default() };

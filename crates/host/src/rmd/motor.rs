@@ -159,7 +159,9 @@ impl<'a> MotorHandle<'a> {
         if full_turn != FullTurn::Allowed {
             let in_range = Limits::default().check(&request);
             in_range.map_err(|exceeded| Error::Limit { id: self.id, exceeded })?;
-            full_turn.check(self.id, self.circle_angle()?, angle, direction)?;
+            let at = self.circle_angle()?;
+            self.bus.confirm(self.id)?;
+            full_turn.check(self.id, at, angle, direction)?;
         }
         self.bus.raw(self.id, request).map(|reply| MotionStatus::decode(&reply))
     }

@@ -33,8 +33,9 @@ pub(super) struct Session {
     waiting: MotorSet,
     /// Torques whose motors are asked for the first time.
     held: Option<Held>,
-    /// Motors whose torques were not sent; the caller is to be told.
+    /// Motors whose torques were not sent, of which the caller is to be told, and why.
     unsent: MotorSet,
+    unsent_for: Option<Refused>,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
 }
@@ -88,6 +89,7 @@ impl Session {
             waiting: MotorSet::EMPTY,
             held: None,
             unsent: MotorSet::EMPTY,
+            unsent_for: None,
             is_retired: false,
         }
     }
@@ -130,7 +132,8 @@ impl Session {
     /// A question with another code than what a motor was asked last.
     pub(super) fn question(&self, id: MotorId) -> [u8; 8] {
         match self.asked[place(id)].request[0] {
-            0x9A => ReadStatus2.encode(),
+            // 0x9A also answers 0x9B.
+            0x9A | 0x9B => ReadStatus2.encode(),
             _ => ReadStatus1.encode(),
         }
     }
@@ -159,6 +162,7 @@ impl Session {
         id: MotorId,
         request: [u8; 8],
     ) -> Result<(), Error> {
+        self.make_way(&request);
         self.free(id, &request)?;
         let begun = self.host.request(now, id, request);
         begun.map_err(|refused| self.refused(refused))?;
@@ -174,6 +178,7 @@ impl Session {
     /// # Errors
     /// As [`request`](Self::request).
     pub(super) fn ask(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
+        self.make_way(&request);
         self.free(id, &request)?;
         match self.host.request(now, id, request) {
             Ok(()) => {}
@@ -218,10 +223,10 @@ impl Session {
 
     pub(super) fn poll(&mut self, now: Instant) -> Output {
         loop {
-            if let Some(id) = self.unsent.next() {
-                return Output::Done(id, Err(self.quarantined(id)));
-            }
             let mut again = self.send_held(now);
+            if let Some(id) = self.unsent.next() {
+                return Output::Done(id, Err(self.unsent(id)));
+            }
             for id in self.waiting {
                 let Asked { request, until } = self.asked[place(id)];
                 match self.host.request(now, id, request) {
@@ -296,7 +301,10 @@ impl Session {
             }
             Err(error) => {
                 held.expect.remove(id);
-                self.held = self.held.filter(|held| !held.expect.is_empty());
+                // To a motor of another protocol the frame may mean anything.
+                if held.expect.is_empty() || matches!(error, proto::Error::Foreign(_)) {
+                    self.drop_held(None);
+                }
                 Some(Output::Done(id, Err(self.failed(id, error))))
             }
         }
@@ -308,11 +316,25 @@ impl Session {
             self.held.filter(|held| held.answered == held.expect)?;
         match self.host.torque4(now, torques, expect) {
             Err(Refused::Quarantined { until: free, .. }) if now < until => return Some(free),
-            Ok(()) => {}
-            Err(_) => self.unsent = expect,
+            Ok(()) => self.held = None,
+            Err(why) => self.drop_held(Some(why)),
         }
-        self.held = None;
         None
+    }
+
+    /// Gives the torques that are held up. Motors whose questions are under way end in quarantine.
+    fn drop_held(&mut self, why: Option<Refused>) {
+        if let Some(held) = self.held.take() {
+            (self.unsent, self.unsent_for) = (held.answered, why);
+        }
+    }
+
+    fn unsent(&self, id: MotorId) -> Error {
+        match self.unsent_for {
+            Some(Refused::Quarantined { .. }) => self.shared(id),
+            Some(why) => self.refused(why),
+            None => self.quarantined(id),
+        }
     }
 
     /// Gives up the exchange with a motor, if there is one. Its reply may still come.
@@ -321,7 +343,8 @@ impl Session {
         self.waiting.remove(id);
         self.unsent.remove(id);
         if MotorSet::TORQUE4.contains(id) {
-            self.held = None;
+            self.drop_held(None);
+            self.unsent.remove(id);
         }
         self.host.cancel(now, id);
     }
@@ -331,13 +354,20 @@ impl Session {
         self.is_retired = true;
     }
 
+    /// What ends motion goes before torques that are held.
+    fn make_way(&mut self, request: &[u8; 8]) {
+        if ends_motion(request) {
+            self.drop_held(None);
+        }
+    }
+
     /// Whether a motor may be sent this.
     fn free(&self, id: MotorId, request: &[u8; 8]) -> Result<(), Error> {
         if self.is_retired && !ends_motion(request) {
             return Err(PortError::Retired { port: self.port.to_string() }.into());
         }
         let is_held = self.held.is_some() && MotorSet::TORQUE4.contains(id);
-        match self.waiting.contains(id) || self.unsent.contains(id) || is_held {
+        match self.waiting.contains(id) || is_held {
             true => Err(Error::Twice(id)),
             false => Ok(()),
         }

@@ -165,6 +165,9 @@ impl Endpoint {
         // Each frame goes to all others: what is taken in a turn must not grow with their number.
         let most = (CHUNK / self.clients.len()).max(1);
         let client = &mut self.clients[index];
+        if client.is_gone {
+            return;
+        }
         let len = match read(&client.line, &mut scratch.chunk[HELD..][..most]) {
             Ok(len) if len > 0 => len,
             Err(Errno::AGAIN | Errno::INTR) => return,

@@ -256,9 +256,18 @@ impl Client {
     /// [`Error::Unconfirmed`]: what was read or acknowledged since the last confirmation cannot be
     /// trusted. The line is lost. The port's.
     pub fn confirm(&self) -> Result<(), Error> {
-        let (last, (question, size)) = self.line.take().session.question();
-        let answer = self.exchange(0, &question, |payload| (payload.len() == size).then_some(()));
-        self.line.take().session.confirmed(last, answer)
+        let (losses, mut asked) = self.line.take().session.question();
+        let mut answer = self.answers(asked);
+        if matches!(answer, Err(Error::Refused { .. })) {
+            // The refusal may be that of the last request: another question has another answer.
+            (_, asked) = self.line.take().session.question();
+            answer = self.answers(asked);
+        }
+        self.line.take().session.confirmed(losses, answer)
+    }
+
+    fn answers(&self, (question, size): (Request<'static>, usize)) -> Result<(), Error> {
+        self.exchange(0, &question, |payload| (payload.len() == size).then_some(()))
     }
 
     /// Sends STOP_MOTOR without waiting for an answer, as for the other motors of a drive that does

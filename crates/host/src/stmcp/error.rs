@@ -63,13 +63,14 @@ pub enum Error {
     /// acknowledged before may have been the reply to something else.
     #[error(
         "{port}: replies and requests do not go together: one came twice or late, so that nothing that \
-         was read or acknowledged can be trusted ({why}); ask again"
+         was read or acknowledged can be trusted{}; ask again",
+        .why.as_ref().map_or_else(String::new, |why| format!(" ({why})"))
     )]
     Unconfirmed {
         /// The port.
         port: Arc<str>,
-        /// What came in place of the answer.
-        why: Box<Error>,
+        /// What came in place of the answer; `None`: the line was lost before.
+        why: Option<Box<Error>>,
     },
     /// A verified write after whose last attempt the register has another value.
     #[error(

@@ -1,6 +1,6 @@
 //! Stops motors at the end of a scope, however it is left.
 
-use motorlink_proto::stmcp::{ErrorCode, Failure, Line, Motor};
+use motorlink_proto::stmcp::{ErrorCode, Line, Motor};
 
 use super::{Client, Error};
 use crate::line::STOP_ATTEMPTS;
@@ -80,7 +80,7 @@ impl<'a> Guard<'a> {
                     None => self.stop(motor),
                 };
                 if let Err(Error::Failed { failure, .. }) = &result
-                    && matches!(failure, Failure::Timeout | Failure::Lost | Failure::Noise)
+                    && self.client.line() == Line::Lost
                 {
                     silent = Some(*failure);
                 }

@@ -39,8 +39,10 @@ pub(super) struct Session {
     /// What the line had been through when a request began.
     history: History,
     asked: Asked,
-    /// The size of the last acknowledge's payload.
+    /// The size of the last acknowledge's payload, and how often the line had been lost when that was
+    /// asked for.
     last_size: Option<usize>,
+    losses: u32,
     /// Changes with each confirmation.
     turn: bool,
     /// What is sent before a lost line is recovered, and its size.
@@ -109,6 +111,7 @@ impl Session {
             history: History::default(),
             asked,
             last_size: None,
+            losses: 0,
             turn: false,
             ahead: [0; MAX_FRAME],
             ahead_size: 0,
@@ -220,6 +223,7 @@ impl Session {
         if begun.is_err() {
             return Err(Error::TooLong(what.to_string()));
         }
+        self.losses = self.master.counters().losses;
         let addressed = self.started.asked(motor, effect);
         self.ramped.asked(addressed, effect);
         self.asked = Asked { motor, addressed, effect, what };
@@ -268,30 +272,32 @@ impl Session {
         }
     }
 
-    /// Whether the answer to a question behind an acknowledge of `last` bytes shows that replies and
-    /// requests go together.
+    /// Whether the answer to a question shows that replies and requests go together: `losses` is what
+    /// [`question`](Self::question) gave. A line that was lost since then has been brought in step, which
+    /// says nothing of what was read before.
     pub(super) fn confirmed(
         &mut self,
-        last: Option<usize>,
+        losses: u32,
         answer: Result<(), Error>,
     ) -> Result<(), Error> {
+        let is_same_line = self.master.counters().losses == losses;
+        let port = Arc::clone(&self.port);
         match answer {
-            // What refuses the question now did not refuse what was asked before.
-            Err(Error::Refused { .. }) if last.is_some() => Ok(()),
-            Err(why) if !matches!(why, Error::Port(_)) => {
+            Ok(()) if is_same_line => Ok(()),
+            Ok(()) => Err(Error::Unconfirmed { port, why: None }),
+            Err(Error::Port(error)) => Err(Error::Port(error)),
+            Err(why) => {
                 self.master.lost();
-                let port = Arc::clone(&self.port);
-                Err(Error::Unconfirmed { port, why: Box::new(why) })
+                Err(Error::Unconfirmed { port, why: Some(Box::new(why)) })
             }
-            answer => answer,
         }
     }
 
-    /// The size of the last acknowledge's payload, if the last reply was one, and a question behind it
-    /// with the size of its answer.
-    pub(super) fn question(&mut self) -> (Option<usize>, (Request<'static>, usize)) {
+    /// A question behind the last reply, with the size of its answer, and how often the line had been lost
+    /// when that reply was asked for.
+    pub(super) fn question(&mut self) -> (u32, (Request<'static>, usize)) {
         self.turn = !self.turn;
-        (self.last_size, question_behind(self.last_size, self.turn))
+        (self.losses, question_behind(self.last_size, self.turn))
     }
 
     /// Gives up the exchange under way, if there is one. Its reply may still come.

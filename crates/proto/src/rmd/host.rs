@@ -10,9 +10,9 @@
 //! cannot pass for that to the next request: nothing is sent until the late reply came or the guard
 //! time passed. If it did not come, the motor is asked for its status in place of the next request,
 //! which ends in [`Error::Quarantined`] when the motor answers. That answer may be an old one too, so
-//! the motor then has to be silent for the guard time (docs/SPEC-NOTES.md R29). No exchange takes
-//! longer than its timeout, and exchanges with other motors wait for none of this: who has to have a
-//! request carried out makes it again on [`Error::Quarantined`], and at the time that
+//! the motor then has to be silent for the guard time (docs/SPEC-NOTES.md R29). No exchange with
+//! a motor that was asked before takes longer than its timeout, and exchanges with other motors wait for
+//! none of this: who has to have a request carried out makes it again on [`Error::Quarantined`], and at the time that
 //! [`Refused::Quarantined`] tells.
 //!
 //! A motor that was not asked before may owe a former host replies: it is in quarantine, and is asked
@@ -252,6 +252,7 @@ impl Host {
     pub fn trust(&mut self, ids: MotorSet) {
         for id in ids {
             self.slot(id).doubt = Doubt::NONE;
+            self.strays.remove(id);
         }
     }
 

@@ -44,7 +44,7 @@ impl Config {
     /// The longest that an exchange can take, however the line behaves, beside the time in which the
     /// port takes what is sent: the reply's timeout on a line that is up. On a lost line there come
     /// before it silence, as long as may be waited for it, before and behind the questions, and the
-    /// questions' timeouts, the first of which is answered at once where there is a second; with
+    /// questions' timeouts, of which all but the last are answered at once; with
     /// `Pad` one silence more.
     pub const fn longest_exchange(&self) -> Duration {
         let (timeout, quiet) = (self.timeout.0, self.quiet.0);
@@ -54,7 +54,7 @@ impl Config {
             true => (timeout, silence),
             false => (quiet, timeout.saturating_mul(2)),
         };
-        let asked = prompt.saturating_add(timeout);
+        let asked = prompt.saturating_mul(2).saturating_add(timeout);
         let drained = silence.saturating_add(asked).saturating_add(answered);
         let recovered = match self.recovery {
             Recovery::None => 0,
@@ -313,6 +313,9 @@ impl Master {
 
     /// Tells that the line is out of step: something was sent or received beside the master.
     pub fn lost(&mut self) {
+        if let State::Probed | State::Answer { .. } = self.state {
+            self.outstanding |= self.question.kind();
+        }
         self.lose();
         self.state = State::Idle;
     }
@@ -458,7 +461,8 @@ impl Master {
     /// drive gives prompt answers to three different questions, and nothing else.
     fn answer(&mut self, now: Instant, asked: Instant, bytes: &[u8]) {
         let came = self.question.hear(bytes);
-        let is_answered = came.answers + came.refusals > 0 || (!self.is_known && came.others > 0);
+        let is_answered =
+            came.answers > 0 || came.refusals > 0 || (!self.is_known && came.others > 0);
         if !is_answered || self.question.is_echo() {
             return;
         }

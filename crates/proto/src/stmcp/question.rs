@@ -80,11 +80,14 @@ impl Question {
     /// Takes what came; gives the replies so far.
     pub(super) fn hear(&mut self, bytes: &[u8]) -> Came {
         for &byte in bytes {
-            if !self.is_echo() {
-                let sent = self.frame.get(usize::from(self.echoed));
-                self.echoed = if sent == Some(&byte) { self.echoed + 1 } else { 0 };
+            let scanned = self.scan.take(byte);
+            // What belongs to a reply is no echo, whatever it looks like.
+            if let (Scanned::Stray(_), false) = (&scanned, self.is_echo()) {
+                let is_next = |at: u8| self.frame.get(usize::from(at)) == Some(&byte);
+                self.echoed =
+                    if is_next(self.echoed) { self.echoed + 1 } else { is_next(0).into() };
             }
-            match self.scan.take(byte) {
+            match scanned {
                 Scanned::More | Scanned::Frame(HEADER_ATR, ..) => {}
                 Scanned::Frame(HEADER_NACK, 1, code) if !ErrorCode::from(code).is_damage() => {
                     count(&mut self.came.refusals);
