@@ -100,10 +100,10 @@ def test_raw_sends_any_frame(st):
 
 def test_trace_shows_both_directions_on_stderr(st):
     traced = st("--trace", "get", "MIN_APP_SPEED").ended(0)
-    *opening, sent, received = traced.err.splitlines()
-    # A line to a drive that may have been asked before is brought in step first.
-    questions = ["GET_BOARD_INFO", "GET_REG STATUS", "GET_REG FLAGS"]
-    asked = [line for line in opening if "->" in line]
+    *opening, sent, received, confirmed, _ = traced.err.splitlines()
+    # A line to a drive that may have been asked before is brought in step first, and what was read is confirmed.
+    questions = ["GET_BOARD_INFO", "GET_REG STATUS", "GET_REG FLAGS", "GET_BOARD_INFO"]
+    asked = [line for line in [*opening, confirmed] if "->" in line]
     assert all(question in line for question, line in zip(questions, asked, strict=True))
     assert "-> 22 01 40 63" in sent and "GET_REG MIN_APP_SPEED" in sent
     assert "<- f0 04 58 02 00 00" in received and "600 rpm" in received
