@@ -463,6 +463,7 @@ fn a_late_reply_that_waited_in_the_socket_is_not_taken_for_the_next_one() {
             let data = [question, 25, 0, 240, 0, 0, 0, 0];
             let answer = CanDataFrame::new(StandardId::new(0x141).expect("11 bits"), &data);
             witness.write_frame(&answer.expect("8 bytes")).expect("room");
+            assert_eq!(witness.read_frame().expect("our own answer").data(), data);
         }
         first.join().expect("no panic")
     });
