@@ -213,6 +213,14 @@ fn a_motors_reply_that_came_twice_is_found_by_the_confirmation() {
     }
 }
 
+#[test]
+fn a_scan_tells_of_a_motor_that_answers_somebody_else() {
+    let mut found = vec![];
+    let id = MotorId::new(1).unwrap();
+    Motors::new(true).bus().scan(id.into(), |one| found.push(one), |_| {}).unwrap();
+    assert_eq!(found, [rmd::Found::Shared(id)]);
+}
+
 /// An adapter that says this to each frame, or never anything.
 struct Adapter {
     says: Option<&'static [u8]>,

@@ -154,6 +154,7 @@ class Found(NamedTuple):
     id: int
     #: ``motor`` of this protocol; ``foreign``: of a protocol that looks like it and is not driven;
     #: ``echo``: the request itself came back (option ``echo=1`` of an slcan port drops such).
+    #: ``shared``: it answers another program or host, too.
     kind: str
     #: Of a motor.
     status: MotorStatus | None

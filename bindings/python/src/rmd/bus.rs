@@ -288,6 +288,7 @@ pub(crate) fn finding(py: Python<'_>, found: Found) -> PyResult<Py<PyAny>> {
             (id.number(), "foreign", nothing(), dialect)
         }
         Found::Echo(id) => (id.number(), "echo", nothing(), nothing()),
+        Found::Shared(id) => (id.number(), "shared", nothing(), nothing()),
     };
     values::found(py, row)
 }

@@ -21,7 +21,7 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
     session.bus.scan(wanted, |motor| found.push(motor), |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     found.sort_by_key(|found| match found {
-        Found::Motor(id, _) | Found::Foreign(id, _) | Found::Echo(id) => *id,
+        Found::Motor(id, _) | Found::Foreign(id, _) | Found::Echo(id) | Found::Shared(id) => *id,
     });
     if found.iter().any(|found| matches!(found, Found::Echo(_))) {
         return Err(Failure::Line(
@@ -48,6 +48,10 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
             Found::Foreign(id, dialect) => session.output.result(
                 format!("motor {id:<2}  speaks {dialect}: it is not driven with this protocol"),
                 json!({ "id": id.number(), "protocol": dialect.to_string() }),
+            )?,
+            Found::Shared(id) => session.output.result(
+                format!("motor {id:<2}  answers another program or host, too"),
+                json!({ "id": id.number(), "shared": true }),
             )?,
             Found::Echo(_) => {}
         }

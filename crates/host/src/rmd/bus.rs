@@ -53,6 +53,8 @@ pub enum Found {
     /// The request itself came back: the adapter echoes what it sends, and nothing is known of a
     /// motor. Option `echo=1` of an slcan port drops such echoes.
     Echo(MotorId),
+    /// A motor that goes on answering somebody else, so that nothing tells which reply is ours.
+    Shared(MotorId),
 }
 
 /// How long what came meanwhile may go on coming.
@@ -444,6 +446,7 @@ impl Found {
     pub fn of(id: MotorId, outcome: Result<[u8; 8], Error>) -> Option<Self> {
         match outcome {
             Err(Error::Echo { .. }) => Some(Found::Echo(id)),
+            Err(Error::Shared { .. }) => Some(Found::Shared(id)),
             Ok(reply) => Some(Found::Motor(id, proto::Status1::decode(&reply))),
             Err(Error::Foreign { dialect, .. }) => Some(Found::Foreign(id, dialect)),
             Err(_) => None,
