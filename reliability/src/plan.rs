@@ -46,9 +46,10 @@ pub struct Group {
 /// Each trial is cut into runs with seeds of their own, from 1 on.
 pub const SEEDS: u64 = 8;
 
-const fn st(profile: Profile, recovery: Recovery) -> Speaks {
-    Speaks::St(Setup { profile, recovery, life: Life::Long })
-}
+pub const SPEC: Setup =
+    Setup { profile: Profile::Spec, recovery: Recovery::Drain, life: Life::Long };
+const FIRMWARE: Setup =
+    Setup { profile: Profile::Mcsdk54, recovery: Recovery::Pad, life: Life::Long };
 
 /// What is tried with both profiles.
 const SERIAL: &[(&str, u64)] = &[
@@ -156,46 +157,38 @@ pub const TWICE: &[(f64, &str, u64)] = &[
 pub const GROUPS: &[Group] = &[
     Group {
         title: "ST, profile spec, recovery Drain",
-        speaks: st(Profile::Spec, Recovery::Drain),
+        speaks: Speaks::St(SPEC),
         rows: SERIAL,
         beyond: SERIAL_BEYOND,
     },
     Group {
         title: "ST, profile mcsdk-5.4, recovery Pad",
-        speaks: st(Profile::Mcsdk54, Recovery::Pad),
+        speaks: Speaks::St(FIRMWARE),
         rows: SERIAL,
         beyond: SERIAL_BEYOND,
     },
     Group {
         title: "ST, profile mcsdk-5.4, recovery Drain",
-        speaks: st(Profile::Mcsdk54, Recovery::Drain),
+        speaks: Speaks::St(Setup { recovery: Recovery::Drain, ..FIRMWARE }),
         rows: SHORT,
         beyond: &[],
     },
     Group {
         title: "ST, profile spec, recovery None: opened again 3 s after each loss",
-        speaks: st(Profile::Spec, Recovery::None),
+        speaks: Speaks::St(Setup { recovery: Recovery::None, ..SPEC }),
         rows: SHORT,
         beyond: &[],
     },
     Group { title: "RMD", speaks: Speaks::Rmd(Life::Long), rows: BUS, beyond: BUS_BEYOND },
     Group {
         title: "ST, profile spec, recovery Drain, programs in turn",
-        speaks: Speaks::St(Setup {
-            profile: Profile::Spec,
-            recovery: Recovery::Drain,
-            life: Life::Short,
-        }),
+        speaks: Speaks::St(Setup { life: Life::Short, ..SPEC }),
         rows: SERIAL_TURNS,
         beyond: &[("delay=0ms..3s", 100_000)],
     },
     Group {
         title: "ST, profile mcsdk-5.4, recovery Pad, programs in turn",
-        speaks: Speaks::St(Setup {
-            profile: Profile::Mcsdk54,
-            recovery: Recovery::Pad,
-            life: Life::Short,
-        }),
+        speaks: Speaks::St(Setup { life: Life::Short, ..FIRMWARE }),
         rows: SERIAL_TURNS,
         beyond: &[("delay=0ms..3s", 100_000)],
     },
@@ -208,21 +201,15 @@ pub const GROUPS: &[Group] = &[
 ];
 
 /// Lines on which plain and verified writes are compared, and how many of each there are.
-pub const WRITES: &[(Setup, &str, u64)] = {
-    const SPEC: Setup =
-        Setup { profile: Profile::Spec, recovery: Recovery::Drain, life: Life::Long };
-    const FIRMWARE: Setup =
-        Setup { profile: Profile::Mcsdk54, recovery: Recovery::Pad, life: Life::Long };
-    &[
-        (SPEC, "flip=1e-4", 4_000_000),
-        (SPEC, "flip=1e-3", 2_000_000),
-        (SPEC, "flip=1e-2", 400_000),
-        (SPEC, "drop=1e-2", 400_000),
-        (SPEC, "insert=1e-2", 400_000),
-        (FIRMWARE, "flip=1e-3", 1_000_000),
-        (FIRMWARE, "drop=1e-2", 400_000),
-    ]
-};
+pub const WRITES: &[(Setup, &str, u64)] = &[
+    (SPEC, "flip=1e-4", 4_000_000),
+    (SPEC, "flip=1e-3", 2_000_000),
+    (SPEC, "flip=1e-2", 400_000),
+    (SPEC, "drop=1e-2", 400_000),
+    (SPEC, "insert=1e-2", 400_000),
+    (FIRMWARE, "flip=1e-3", 1_000_000),
+    (FIRMWARE, "drop=1e-2", 400_000),
+];
 
 impl Group {
     /// The trials, with a length for each cut to `most`.

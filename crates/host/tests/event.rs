@@ -1,6 +1,7 @@
 //! What the clients for event loops promise, driven by a loop of one descriptor.
 
 mod served;
+mod wire;
 
 use std::collections::VecDeque;
 use std::io::{Read, Write};
@@ -8,7 +9,7 @@ use std::os::fd::BorrowedFd;
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{ByteLink, EventLine, Evented, FdLink, PortError, PortName};
+use motorlink::port::{EventLine, FdLink, PortError, PortName};
 use motorlink::rmd::{self, Code, EventBus, MotorId, SpeedLimit};
 use motorlink::stmcp::{
     self, Command, Config, EventClient, LimitError, Limits, Progress, RegisterId, Request,
@@ -16,6 +17,7 @@ use motorlink::stmcp::{
 use motorlink::{BackOff, LinkState};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use served::Served;
+use wire::Fresh;
 
 /// Waits as an event loop does; what has no descriptor is asked again at once.
 fn wait(descriptor: Option<BorrowedFd<'_>>, time: Option<Duration>) {
@@ -67,38 +69,11 @@ fn over_pairs(
 ) -> Result<EventClient, stmcp::Error> {
     let open = move || match ends.pop_front() {
         Some(end) => {
-            Ok(Box::new(Pair(FdLink::new(end, "pair").expect("a link"))) as Box<dyn EventLine>)
+            Ok(Box::new(Fresh(FdLink::new(end, "pair").expect("a link"))) as Box<dyn EventLine>)
         }
         None => Err(PortError::NotFound { port: "pair".to_owned() }),
     };
     EventClient::open_with("pair", Box::new(open), options)
-}
-
-struct Pair(FdLink);
-
-impl ByteLink for Pair {
-    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        self.0.write(bytes)
-    }
-
-    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
-        self.0.read(buffer, timeout)
-    }
-
-    fn is_fresh(&self) -> bool {
-        true
-    }
-}
-
-impl Evented for Pair {
-    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        use std::os::fd::AsFd;
-        Some(self.0.as_fd())
-    }
-
-    fn flush(&mut self) -> Result<bool, PortError> {
-        Ok(false)
-    }
 }
 
 #[test]

@@ -4,7 +4,6 @@ mod wire;
 
 use std::time::Duration;
 
-use motorlink::port::{ByteLink, Evented, PortError};
 use motorlink::stmcp::{Client, Command, EventClient, Line, Options, Progress, Request, register};
 use wire::{ACK, Fresh, GET_SPEED, START, STOP, Wire};
 
@@ -75,38 +74,11 @@ fn a_guard_tells_every_motor_of_a_silent_drive_before_it_waits() {
     assert_eq!(told, [0x23, 0x43, 0x63]);
 }
 
-/// A wire for an event loop, which has nothing to wait for.
-struct Polled(Wire<u8>);
-
-impl ByteLink for Polled {
-    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        self.0.write(bytes)
-    }
-
-    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
-        self.0.read(buffer, timeout)
-    }
-
-    fn is_fresh(&self) -> bool {
-        true
-    }
-}
-
-impl Evented for Polled {
-    fn descriptor(&self) -> Option<std::os::fd::BorrowedFd<'_>> {
-        None
-    }
-
-    fn flush(&mut self) -> Result<bool, PortError> {
-        Ok(false)
-    }
-}
-
 #[test]
 fn so_it_is_for_event_loops() {
     let wire = Wire::new();
     let link = wire.clone();
-    let open = Box::new(move || Ok(Box::new(Polled(link.clone())) as _));
+    let open = Box::new(move || Ok(Box::new(Fresh(link.clone())) as _));
     let mut client = EventClient::open_with("wire", open, options()).unwrap();
     let stop = Request::Execute(Command::StopMotor);
     client.begin(1, &Request::Execute(Command::StartMotor)).unwrap();

@@ -4,11 +4,11 @@ use std::iter::Sum;
 
 use motorlink::fault::{Faults, Rng};
 use motorlink::time::Duration;
-use motorlink_proto::stmcp::{Profile, Recovery, RegisterId, Request, question_behind};
+use motorlink_proto::stmcp::{RegisterId, Request, question_behind};
 
 use super::bench::{Bench, Setup};
 use super::traffic::Ask;
-use crate::plan::Life;
+use crate::plan::{Life, SPEC};
 
 /// Values of one, two and four bytes.
 const READ: [RegisterId; 6] = [
@@ -43,7 +43,7 @@ impl Sum for Batches {
 /// Reads four registers `count` times, each time by a new program, on a line with `faults` where this share
 /// of the replies comes twice; `confirms` each value, or not.
 pub fn run(share: f64, faults: &Faults, confirms: bool, count: u64) -> Batches {
-    let setup = Setup { profile: Profile::Spec, recovery: Recovery::Drain, life: Life::Short };
+    let setup = Setup { life: Life::Short, ..SPEC };
     let mut bench = Bench::new(setup, faults, true);
     bench.repeat(share, faults.seed);
     let mut rng = Rng::with_seed(faults.seed ^ 0x5EED);

@@ -53,7 +53,7 @@ pub enum Found {
     /// The request itself came back: the adapter echoes what it sends, and nothing is known of a
     /// motor. Option `echo=1` of an slcan port drops such echoes.
     Echo(MotorId),
-    /// A motor that goes on answering somebody else, so that nothing tells which reply is ours.
+    /// A motor that answers another host all the time: its replies to us cannot be told apart.
     Shared(MotorId),
 }
 

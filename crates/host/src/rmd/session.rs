@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use motorlink_proto::rmd::{
-    self as proto, CanFrame, Code, Command, Counters, Host, Limits, MotorId, MotorSet, ReadStatus1,
-    ReadStatus2, Refused, Torque, Torque4,
+    self as proto, CanFrame, Code, Command, Counters, Host, Limits, MotorId, MotorSet, Refused,
+    Torque, Torque4, question_behind,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -33,7 +33,7 @@ pub(super) struct Session {
     waiting: MotorSet,
     /// Torques whose motors are asked for the first time.
     held: Option<Held>,
-    /// Motors whose torques were not sent, of which the caller is to be told, and why.
+    /// Motors whose torques were given up, and the reason. Each is an outcome of its own.
     unsent: MotorSet,
     unsent_for: Option<Refused>,
     /// Whether nothing is sent any more but what stops motors.
@@ -131,11 +131,7 @@ impl Session {
 
     /// A question with another code than what a motor was asked last.
     pub(super) fn question(&self, id: MotorId) -> [u8; 8] {
-        match self.asked[place(id)].request[0] {
-            // 0x9A also answers 0x9B.
-            0x9A | 0x9B => ReadStatus2.encode(),
-            _ => ReadStatus1.encode(),
-        }
+        question_behind(self.asked[place(id)].request[0])
     }
 
     /// Whether the motor's replies since the last confirmation went to their own requests.
@@ -225,7 +221,7 @@ impl Session {
         loop {
             let mut again = self.send_held(now);
             if let Some(id) = self.unsent.next() {
-                return Output::Done(id, Err(self.unsent(id)));
+                return Output::Done(id, Err(self.why_unsent(id)));
             }
             for id in self.waiting {
                 let Asked { request, until } = self.asked[place(id)];
@@ -329,7 +325,7 @@ impl Session {
         }
     }
 
-    fn unsent(&self, id: MotorId) -> Error {
+    fn why_unsent(&self, id: MotorId) -> Error {
         match self.unsent_for {
             Some(Refused::Quarantined { .. }) => self.shared(id),
             Some(why) => self.refused(why),

@@ -2,11 +2,12 @@
 #![allow(dead_code, reason = "no test needs all of it")]
 
 use std::collections::VecDeque;
+use std::os::fd::{AsFd, BorrowedFd};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{ByteLink, CanLink, PortError};
+use motorlink::port::{ByteLink, CanLink, Evented, FdLink, PortError};
 use motorlink::rmd::CanFrame;
 
 /// What a drive was sent, and what it will say.
@@ -111,6 +112,27 @@ impl<L: CanLink> CanLink for Fresh<L> {
 
     fn is_fresh(&self) -> bool {
         true
+    }
+}
+
+/// For an event loop, which has nothing to wait for.
+impl Evented for Fresh<Wire<u8>> {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        Ok(false)
+    }
+}
+
+impl Evented for Fresh<FdLink> {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        Some(self.0.as_fd())
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        Ok(false)
     }
 }
 

@@ -12,8 +12,8 @@
 //! which ends in [`Error::Quarantined`] when the motor answers. That answer may be an old one too, so
 //! the motor then has to be silent for the guard time (docs/SPEC-NOTES.md R29). No exchange with
 //! a motor that was asked before takes longer than its timeout, and exchanges with other motors wait for
-//! none of this: who has to have a request carried out makes it again on [`Error::Quarantined`], and at the time that
-//! [`Refused::Quarantined`] tells.
+//! none of this: who has to have a request carried out makes it again on [`Error::Quarantined`], and at
+//! the time that [`Refused::Quarantined`] tells.
 //!
 //! A motor that was not asked before may owe a former host replies: it is in quarantine, and is asked
 //! for its status at once, by two different questions, each of which has the exchange's timeout. Off
@@ -351,9 +351,10 @@ impl Host {
             }
             if self.questioned.contains(id)
                 && slot.doubt.is_unknown()
-                && let Some(question) = question_behind(Code::from(slot.data[0]))
+                && Code::from(slot.data[0]) != Code::ReadStatus2
             {
-                slot.data = question;
+                // Two different questions: the reply to the first may be the reply to a former host.
+                slot.data = question_behind(slot.data[0]);
                 self.queued.insert(id);
                 return;
             }
@@ -444,13 +445,11 @@ impl Host {
     }
 }
 
-/// The next question to a motor that may owe a former host replies. There are two different ones,
-/// because the reply to the first may be the reply to a former host.
-fn question_behind(asked: Code) -> Option<[u8; 8]> {
-    match asked {
-        Code::ReadStatus2 => None,
-        Code::ReadStatus1 => Some(ReadStatus2.encode()),
-        _ => Some(ReadStatus1.encode()),
+/// A question for the status that no reply to a request with the code `asked` can answer.
+pub fn question_behind(asked: u8) -> [u8; 8] {
+    match answers(asked, Code::ReadStatus1.into()) {
+        true => ReadStatus2.encode(),
+        false => ReadStatus1.encode(),
     }
 }
 

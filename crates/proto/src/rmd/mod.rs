@@ -51,7 +51,7 @@ pub use describe::{Described, Direction, describe};
 pub use drive::{Config, Drive, Ignored, Mode, Motor, Sense, Settings};
 pub use encoder::{EncoderBits, FULL_TURN};
 pub use frame::CanFrame;
-pub use host::{DEFAULT_GUARD, DEFAULT_TIMEOUT, Host};
+pub use host::{DEFAULT_GUARD, DEFAULT_TIMEOUT, Host, question_behind};
 pub use limits::{Exceeded, Limits};
 pub use message::*;
 pub use motor::{Dialect, MOTOR_BASE, MotorId, MotorSet, TORQUE4_ID};
