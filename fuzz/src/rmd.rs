@@ -1,5 +1,6 @@
 //! The RMD protocol: frames, the host, and simulated drives on a bus.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::*;
@@ -27,7 +28,7 @@ pub fn frame(data: &[u8]) {
     for direction in [Direction::HostToDrive, Direction::DriveToHost] {
         assert!(!describe(frame, direction).to_string().is_empty());
     }
-    let Some((_, data)) = frame.usable() else { return };
+    let Some((_, data)) = frame.eight_bytes() else { return };
     for row in &COMMANDS {
         for field in row.request.iter().chain(row.reply) {
             let (raw, bits) = (field.raw(data), u32::from(field.len) * 8);
@@ -153,7 +154,7 @@ impl HostBench {
             let busy = self.host.busy();
             match self.host.poll(self.now) {
                 Output::Transmit(frame) => {
-                    let (id, data) = frame.usable().expect("a request has eight bytes");
+                    let (id, data) = frame.eight_bytes().expect("a request has eight bytes");
                     match MotorId::from_can_id(u32::from(id)) {
                         Some(id) => assert!(busy.contains(id), "nothing is sent unasked"),
                         None => {
@@ -259,7 +260,7 @@ fn ask(bus: &mut RmdBus<[RmdNode; 4]>, now: Instant, frame: CanFrame) {
     let before = rom(bus);
     let mut replies = Vec::new();
     bus.receive(now, &frame, |reply| replies.push(reply));
-    let asked = frame.usable().map(|(id, data)| (id, *data));
+    let asked = frame.eight_bytes().map(|(id, data)| (id, *data));
     let code = match asked {
         Some((TORQUE4_ID, _)) => Some(Code::Torque),
         Some((id, data)) if (0x141..=0x144).contains(&id) => Some(Code::from(data[0])),
@@ -277,7 +278,7 @@ fn ask(bus: &mut RmdBus<[RmdNode; 4]>, now: Instant, frame: CanFrame) {
         return;
     };
     for reply in replies {
-        let (from, answer) = reply.usable().expect("a reply has eight bytes");
+        let (from, answer) = reply.eight_bytes().expect("a reply has eight bytes");
         assert!(from == id || id == TORQUE4_ID);
         let answered = Code::from(answer[0]);
         let cleared = row.code == Code::ClearErrors && answered == Code::ReadStatus1;

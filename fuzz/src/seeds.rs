@@ -4,7 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use motorlink::slcan;
-use motorlink_proto::rmd::{CanFrame, TORQUE4_ID};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::TORQUE4_ID;
 use motorlink_proto::stmcp::RegisterId;
 use motorlink_sim::{rmd::RmdConfig, st::MotorConfig};
 use serde_json::Value;

@@ -6,9 +6,10 @@
 use core::hint::black_box;
 use core::mem::size_of;
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    CanFrame, Config as RmdConfig, Drive as RmdDrive, Host, Mode, Motor as RmdMotor, MotorId,
-    MotorSet, Output as RmdOutput, Sense, Settings, Torque4,
+    Config as RmdConfig, Drive as RmdDrive, Host, Mode, Motor as RmdMotor, MotorId, MotorSet,
+    Output as RmdOutput, Sense, Settings, Torque4,
 };
 use motorlink_proto::stmcp::{
     BoardInfo, Command, CurrentReference, Drive, ErrorCode, Features, FirmwareVersion, Master,

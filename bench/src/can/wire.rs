@@ -1,6 +1,6 @@
 //! A bus at 1 Mbit/s: a bit is a microsecond, and the lowest identifier goes first.
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::{Duration, Instant};
 
 use super::bits::{INTERMISSION, frame_bits};

@@ -2,6 +2,7 @@
 
 use std::hint::black_box;
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 
 use super::Kind;
@@ -56,7 +57,7 @@ fn there_and_back<P: Payload + 'static>(id: u16, encode: impl Fn(&P) -> [u8; 8])
     let values = P::decode(&VALUES);
     move || {
         let frame = CanFrame::new(id, encode(black_box(&values)));
-        if let Some((_, data)) = black_box(&frame).usable() {
+        if let Some((_, data)) = black_box(&frame).eight_bytes() {
             black_box(P::decode(data));
         }
     }

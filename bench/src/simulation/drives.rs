@@ -2,7 +2,8 @@
 
 use std::hint::black_box;
 
-use motorlink_proto::rmd::{CanFrame, Command as _, Speed};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Command as _, Speed};
 use motorlink_proto::stmcp::{Command, Drive as _, Motor, Profile, Ramp};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::CentiDps;

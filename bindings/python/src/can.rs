@@ -13,7 +13,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use motorlink::port::{CanLink, Evented, PortError};
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};

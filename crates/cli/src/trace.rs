@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
+use motorlink::can::CanFrame;
 use motorlink::port::Direction;
-use motorlink::rmd::{self, CanFrame};
+use motorlink::rmd;
 use motorlink::stmcp::{Profile, Transcript};
 
 use crate::output::{hex, note};

@@ -6,8 +6,9 @@ use std::process::{self, Command};
 use std::sync::Arc;
 use std::thread;
 
+use motorlink::can::CanFrame;
 use motorlink::port::PortError;
-use motorlink::rmd::{Bus, CanFrame};
+use motorlink::rmd::Bus;
 use motorlink::stmcp::{Client, Error, Options};
 use motorlink::{port::CanLink, rmd};
 use rustix::process::{Pid, Signal, kill_process};

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use motorlink::Clock;
 use motorlink::port::{ByteLink, CanLink, PortError};
 use motorlink::serve::{ByteStation, CanStation};
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 /// A serial line with a clock.

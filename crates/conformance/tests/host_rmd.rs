@@ -9,9 +9,10 @@ use motorlink_conformance::host::rmd::{Scenario, scenarios};
 use motorlink_conformance::host::{READINGS, Reading, Said, Task};
 use motorlink_conformance::wire::{Bus, Virtual};
 use motorlink_conformance::{Outcome, Verdict};
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    CanFrame, Circle, ClearErrors, Code, Command, DEFAULT_TIMEOUT, Dialect, Error, Host,
-    MOTOR_BASE, MotionStatus, MotorId, MotorSet, MultiTurn, Off, Output, Payload, ReadCircleAngle,
+    Circle, ClearErrors, Code, Command, DEFAULT_TIMEOUT, Dialect, Error, Host, MOTOR_BASE,
+    MotionStatus, MotorId, MotorSet, MultiTurn, Off, Output, Payload, ReadCircleAngle,
     ReadMultiTurnAngle, Refused, Status1, TORQUE4_ID, Torque4,
 };
 use motorlink_proto::time::{Duration, Instant};
@@ -326,7 +327,7 @@ impl Simple<'_> {
     }
 
     fn answers(&self, frame: &CanFrame, id: MotorId, request: [u8; 8]) -> bool {
-        let shape = frame.usable().is_some()
+        let shape = frame.eight_bytes().is_some()
             || frame.is_extended() && self.has(Fault::TakesExtendedFrames)
             || frame.is_remote() && self.has(Fault::TakesRemoteFrames)
             || frame.len() < 8 && self.has(Fault::TakesShortFrames);

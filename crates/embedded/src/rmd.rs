@@ -2,7 +2,8 @@
 
 use embedded_can::nb::Can;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
-use motorlink_proto::rmd::{CanFrame, DEFAULT_TIMEOUT, Drive, Error, Host, Motor, MotorId, Output};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{DEFAULT_TIMEOUT, Drive, Error, Host, Motor, MotorId, Output};
 use motorlink_proto::time::Instant;
 
 /// The end of one or more drives that share a CAN controller, each with its own ID.

@@ -4,7 +4,7 @@
 use embedded_can::nb::Can;
 use embedded_can::{ErrorKind, Id};
 use embedded_io::{Read, ReadReady, Write};
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 use motorlink_slcan::Device;
 

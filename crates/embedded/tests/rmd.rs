@@ -6,6 +6,7 @@ use std::rc::Rc;
 
 use embedded_can::{ErrorKind, ExtendedId, Frame as _, Id, StandardId, nb::Can};
 use motorlink_embedded::rmd::{DrivePort, Event, HostPort, from_can, to_can};
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::*;

@@ -1,6 +1,6 @@
 //! CAN frames as C has them.
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 
 use crate::error::motorlink_error;
 use crate::pointer::plain;

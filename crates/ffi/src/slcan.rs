@@ -1,6 +1,6 @@
 //! slcan: CAN frames as lines of text on a serial line, both ends.
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 use motorlink_slcan::{Answer, AnswerParser, Bitrate, Device, LONGEST_FRAME, encode};
 

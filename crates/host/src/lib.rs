@@ -21,6 +21,6 @@ mod turn;
 
 pub use clock::Clock;
 pub use line::{BackOff, LinkState, Opener};
-pub use motorlink_proto::time;
+pub use motorlink_proto::{can, time};
 pub use motorlink_slcan as slcan;
 pub use turn::LOOK;

@@ -9,11 +9,10 @@ use std::os::unix::net::UnixStream;
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
+use motorlink::can::CanFrame;
 use motorlink::fault::Faults;
 use motorlink::port::{ByteLink, CanLink, FaultBytes, FdLink, PortError, SlcanLink};
-use motorlink::rmd::{
-    self, Bus, CanFrame, CentiDps, Code, MotorId, OnDrop, SpeedLimit, TorqueCommand,
-};
+use motorlink::rmd::{self, Bus, CentiDps, Code, MotorId, OnDrop, SpeedLimit, TorqueCommand};
 use motorlink::slcan::Bitrate;
 use motorlink::stmcp::{
     self, Client, Command, Config, Failure, Limits, Line, Request, Status, register,

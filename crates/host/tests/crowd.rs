@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use motorlink::port::ServeName;
 use motorlink::serve::{CanStation, MOST_CLIENTS, Server};
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 /// Listens, and says nothing.

@@ -8,8 +8,9 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
 use motorlink::LinkState;
+use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, PortError};
-use motorlink::rmd::{self, Bus, CanFrame};
+use motorlink::rmd::{self, Bus};
 use motorlink::stmcp::{Client, Error, Options, register};
 use served::Served;
 

@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex, OnceLock, mpsc};
 use std::thread;
 use std::time::Duration;
 
+use motorlink::can::CanFrame;
 use motorlink::port::PortError;
-use motorlink::rmd::{self, Bus, CanFrame};
+use motorlink::rmd::{self, Bus};
 use motorlink::stmcp::{self, Client, register};
 use wire::{ACK, Fresh, GET_SPEED, OFF, SPEED, START, STOP, Wire};
 

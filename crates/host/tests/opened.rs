@@ -5,8 +5,9 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use motorlink::Clock;
+use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, PortError, SlcanLink};
-use motorlink::rmd::{self, Bus, CanFrame, Error, MotorId, MotorSet, Torque4, TorqueCommand};
+use motorlink::rmd::{self, Bus, Error, MotorId, MotorSet, Torque4, TorqueCommand};
 use motorlink::slcan::Bitrate;
 use motorlink::stmcp::{self, Client, Failure, register};
 use motorlink::time::Instant;

@@ -1,7 +1,7 @@
 //! Two motor-drive protocols, both ends of each, without I/O.
 //!
 //! * [`stmcp`]: ST's serial Motor Control Protocol as MCSDK 5.x drives speak it, master and slave.
-//! * [`rmd`]: the RMD motor control protocol over CAN, V1.62, host and drive.
+//! * [`rmd`]: the RMD motor control protocol over CAN, V1.62, host and drive, on frames of [`can`].
 //!
 //! Nothing here reads a clock or touches a port. A caller hands in received bytes or frames together
 //! with the [`time::Instant`] at which they came, and takes out what is to be sent and how long to
@@ -12,6 +12,7 @@
 
 #[macro_use]
 mod table;
+pub mod can;
 pub mod rmd;
 pub mod stmcp;
 pub mod time;

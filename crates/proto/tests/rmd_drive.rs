@@ -2,6 +2,7 @@
 
 mod rmd_bench;
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::*;

@@ -2,6 +2,7 @@
 
 mod rmd_bench;
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::Instant;
 use rmd_bench::{Node, motor, trusted_host};

@@ -2,6 +2,7 @@
 
 mod rmd_bench;
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::*;
@@ -342,7 +343,7 @@ impl Standstill {
                     let due = self.now + Duration(800);
                     let still = (self.stop..self.go_on).contains(&due);
                     // A motor that answers is supplied: what comes is no echo.
-                    let &[code, _, _, _, a, b, c, d] = frame.usable().unwrap().1;
+                    let &[code, _, _, _, a, b, c, d] = frame.eight_bytes().unwrap().1;
                     let reply = CanFrame::new(0x141, [code, 25, 0, 240, a, b, c, d]);
                     self.coming.push((if still { self.go_on } else { due }, reply));
                 }

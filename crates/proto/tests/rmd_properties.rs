@@ -2,6 +2,7 @@
 
 mod rmd_bench;
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use proptest::prelude::*;
@@ -42,7 +43,7 @@ proptest! {
             let own = frame.id() == 0x140 + u32::from(id) || (frame.id() == 0x280 && id <= 4);
             match node.receive(Instant(at as u64), frame) {
                 Some(reply) => {
-                    prop_assert!(own && frame.usable().is_some());
+                    prop_assert!(own && frame.eight_bytes().is_some());
                     prop_assert_eq!(reply.id(), 0x140 + u32::from(id));
                     let (asked, came) = (frame.data()[0], reply.data()[0]);
                     prop_assert!(frame.id() == 0x280 && came == 0xA1
@@ -232,7 +233,7 @@ proptest! {
             hosts.iter_mut().for_each(|host| host.receive(Instant(0), &reply));
             prop_assert_eq!(
                 hosts[own].poll(Instant(0)),
-                Output::Done { id: motor(id), result: Ok(*reply.usable().unwrap().1) }
+                Output::Done { id: motor(id), result: Ok(*reply.eight_bytes().unwrap().1) }
             );
             prop_assert_eq!(hosts[other].poll(Instant(0)), Output::Wait(None));
         }

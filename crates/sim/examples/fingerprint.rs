@@ -1,7 +1,8 @@
 //! Prints a fingerprint of all that two simulated drives said and are, moment by moment. `make
 //! determinism` compares what it prints from builds with and without optimisation.
 
-use motorlink_proto::rmd::{CanFrame, Command as _, Position, ReadStatus3, Speed};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Command as _, Position, ReadStatus3, Speed};
 use motorlink_proto::stmcp::{Command, MAX_FRAME, Profile, Ramp, RegisterId, Request};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{CentiDegrees, CentiDps};

@@ -1,6 +1,6 @@
 //! The adapter's end of slcan: what a host asks for.
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 use super::{BEL, Bitrate, CR, LONGEST_FRAME, LONGEST_LINE, Line, Writer, decode, encode, is_hex};

@@ -1,6 +1,6 @@
 //! The host's end of slcan: what an adapter says.
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 
 use super::{BEL, CR, Line, decode, is_hex};
 

@@ -9,7 +9,7 @@
 //! speaks slcan itself, without an adapter:
 //!
 //! ```
-//! use motorlink_proto::{rmd::CanFrame, time::Instant};
+//! use motorlink_proto::{can::CanFrame, time::Instant};
 //! use motorlink_slcan::Device;
 //!
 //! let (mut device, mut sent) = (Device::default(), Vec::new());
@@ -32,7 +32,7 @@ mod host;
 pub use device::Device;
 pub use host::{Answer, AnswerParser, HostCodec};
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 
 /// Ends each line.
 const CR: u8 = 0x0D;

@@ -1,6 +1,6 @@
 //! Both ends of slcan: against the lines of the field notes, against garbage, against each other.
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 use motorlink_slcan::{Answer, Device, HostCodec, LONGEST_FRAME, encode};
 use proptest::prelude::*;

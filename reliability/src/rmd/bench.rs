@@ -4,9 +4,10 @@ use std::collections::VecDeque;
 
 use motorlink::fault::{Faults, Lane, Unit, Way};
 use motorlink::time::{Duration, Instant};
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    CanFrame, Code, Command, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, MotorId, MotorSet,
-    Output, ReadStatus1, Refused, TORQUE4_ID, Torque4,
+    Code, Command, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, MotorId, MotorSet, Output,
+    ReadStatus1, Refused, TORQUE4_ID, Torque4,
 };
 
 use super::motor::{Node, reaches};

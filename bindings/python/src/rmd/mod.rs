@@ -10,8 +10,9 @@ pub(crate) use quantity::rmd_quantities;
 pub(crate) use request::{RmdRequest, motor_id};
 pub(crate) use sample::RmdSampling;
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    CanFrame, Code, Direction, Errors, Field, MotorId, Payload, TORQUE4_ID, Torque4, describe,
+    Code, Direction, Errors, Field, MotorId, Payload, TORQUE4_ID, Torque4, describe,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

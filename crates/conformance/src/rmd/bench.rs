@@ -1,8 +1,7 @@
 //! A motor on a CAN bus: what is said to it and what it says.
 
-use motorlink_proto::rmd::{
-    CanFrame, Code, Command, Dialect, Direction, EncoderBits, MotorId, Off, Payload,
-};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Code, Command, Dialect, Direction, EncoderBits, MotorId, Off, Payload};
 use motorlink_proto::time::{Duration, Instant};
 
 use super::kept::Kept;
@@ -111,7 +110,7 @@ impl Bench {
 
     /// The data of a reply, which has to be a frame of the protocol.
     pub(super) fn in_form(&self, reply: &CanFrame) -> Result<[u8; 8], Stop> {
-        let usable = reply.usable().map(|(_, data)| *data);
+        let usable = reply.eight_bytes().map(|(_, data)| *data);
         usable.ok_or_else(|| self.failed("a standard data frame of 8 bytes"))
     }
 

@@ -1,5 +1,6 @@
 //! Identifiers, forms and command bytes (chapters 1 and 2), and what every command has in common.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Stop as Halt, *};
 
 use super::bench::Bench;

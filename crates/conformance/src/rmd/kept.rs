@@ -1,5 +1,6 @@
 //! What a motor is when a case begins, and how it becomes that again.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Stop as Halt, *};
 use motorlink_proto::time::Duration;
 use motorlink_proto::units::DpsPerSecond;

@@ -1,5 +1,6 @@
 //! Torque for motors 1 to 4 in one frame (0x280).
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::TorqueCommand;
 
@@ -18,7 +19,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
                 let (motors, replies) = ask_all(bench)?;
                 let mut ids: Vec<u32> = replies.iter().map(CanFrame::id).collect();
                 ids.sort_unstable();
-                let usable = replies.iter().all(|reply| reply.usable().is_some());
+                let usable = replies.iter().all(|reply| reply.eight_bytes().is_some());
                 let due: Vec<u32> = motors.map(|motor| motor.can_id().into()).collect();
                 bench.require(usable && ids == due, format!("a reply on each of {due:#05x?}"))
             },
@@ -99,7 +100,7 @@ fn ask_all(bench: &mut Bench) -> Result<(MotorSet, Vec<CanFrame>), Stop> {
     let there = bench.replies(&MotorSet::TORQUE4.map(question).collect::<Vec<_>>())?;
     let mut motors = MotorSet::EMPTY;
     for (frame, motor) in there.iter().filter_map(|frame| Some((frame, motor(frame)?))) {
-        let turns = frame.usable().is_none_or(|(_, data)| {
+        let turns = frame.eight_bytes().is_none_or(|(_, data)| {
             let MotionStatus { speed, iq, .. } = MotionStatus::decode(data);
             speed.0.abs() > 5 || iq.0.abs() > 31
         });

@@ -4,6 +4,7 @@
 //! 32 A and 2048 of feedback 33 A makes 0.7 %, less than an unloaded motor's current can be read to.
 //! And what is beyond ±2000 would put 32 A into a motor whose rating nobody told.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::Duration;
 use motorlink_proto::units::{

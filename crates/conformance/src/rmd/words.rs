@@ -1,6 +1,7 @@
 //! Frames as people read them.
 
-use motorlink_proto::rmd::{CanFrame, Direction, describe};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Direction, describe};
 
 /// `141 [8] 9A 00 00 00 00 00 00 00  motor 1 > 0x9A Read motor status 1 and error flag commands`.
 pub(super) fn words(frame: &CanFrame, direction: Direction) -> String {

@@ -2,7 +2,7 @@
 
 use motorlink::port::PortError;
 use motorlink_conformance::wire::{Bus, Line};
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 /// Longer than any correct host takes for a scenario.

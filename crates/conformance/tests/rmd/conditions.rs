@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use motorlink::port::PortError;
 use motorlink_conformance::Need;
 use motorlink_conformance::wire::Bus;
-use motorlink_proto::rmd::*;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::plant::PlantConfig;
 use motorlink_sim::rmd::RmdConfig;
@@ -121,7 +121,7 @@ fn noisy() -> Behaviour {
     Box::new(move |motors: &mut Motors, event: Event| {
         let mut replies = motors.pass(event);
         for reply in &mut replies {
-            let Some((id, data)) = reply.usable() else { continue };
+            let Some((id, data)) = reply.eight_bytes() else { continue };
             let mut data = *data;
             match data[0] {
                 0x9A => add(&mut data, 3, 3),

@@ -8,6 +8,7 @@ use motorlink::serve::CanStation;
 use motorlink_conformance::rmd::{Bench, Options, suite};
 use motorlink_conformance::wire::{Bus, Virtual};
 use motorlink_conformance::{Case, Need, Report, Unavailable, World, run};
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
@@ -48,7 +49,7 @@ impl Motors {
     /// The same for what may not be a command.
     pub fn try_ask(&mut self, data: [u8; 8]) -> Option<[u8; 8]> {
         let replies = self.pass(Event::Frame(&CanFrame::new(self.first.can_id(), data)));
-        replies.first().and_then(CanFrame::usable).map(|(_, data)| *data)
+        replies.first().and_then(CanFrame::eight_bytes).map(|(_, data)| *data)
     }
 
     /// The motor that is tested.

@@ -2,7 +2,8 @@
 
 use motorlink_conformance::rmd::suite;
 use motorlink_conformance::{Report, Verdict};
-use motorlink_proto::rmd::{CanFrame, Errors, Mode, Settings};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Errors, Mode, Settings};
 use motorlink_proto::time::Instant;
 
 use crate::drive::{Behaviour, Event, Setup, Tested, motor};

@@ -243,7 +243,7 @@ fn drawn(span: Span, rng: &mut Rng) -> Duration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use motorlink_proto::rmd::CanFrame;
+    use motorlink_proto::can::CanFrame;
 
     fn lane<T: Unit>(faults: &str, pace: u64) -> Lane<T> {
         Lane::new(&faults.parse().unwrap(), Way::Sent, Duration(pace))

@@ -1,6 +1,7 @@
 //! What a line carries: bytes or CAN frames, and how each takes damage.
 
-use motorlink_proto::rmd::{CanFrame, Dialect, MOTOR_BASE, MotorId, TORQUE4_ID};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Dialect, MOTOR_BASE, MotorId, TORQUE4_ID};
 
 use super::{Rng, Way};
 

@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use motorlink_proto::rmd::{CanFrame, MotorId};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::MotorId;
 
 use super::{CanLink, PortError};
 use crate::Clock;

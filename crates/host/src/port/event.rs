@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::time::{Duration, Instant};
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use rustix::io::Errno;
 
 use super::fd::WRITE_TIMEOUT;

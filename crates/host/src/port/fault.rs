@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 use super::{ByteLink, CanLink, PortError};

@@ -22,7 +22,7 @@ mod unix;
 
 use std::time::{Duration, Instant};
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 
 use crate::Clock;
 use emulated::EmulatedLine;

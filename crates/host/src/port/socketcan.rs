@@ -4,7 +4,7 @@ use std::os::fd::{AsFd, BorrowedFd};
 use std::path::Path;
 use std::time::Duration;
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use rustix::event::PollFlags;
 use rustix::io::Errno;
 use socketcan::{

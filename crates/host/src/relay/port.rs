@@ -4,7 +4,7 @@ use std::os::fd::BorrowedFd;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 
 use crate::line::{BackOff, FULL, Opener, Reopening};
 use crate::port::{ByteLink, CanLink, Evented, PortError, PortName};

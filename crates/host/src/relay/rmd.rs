@@ -4,7 +4,8 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use motorlink_proto::rmd::{CanFrame, MotorId};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time::{self, Instant};
 
 use super::held::Held;

@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use motorlink_proto::rmd::{CanFrame, Code, MotorId, MotorSet, TORQUE4_ID};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Code, MotorId, MotorSet, TORQUE4_ID};
 use motorlink_proto::time::{Duration, Instant};
 
 /// How long a request may wait for its reply.
@@ -59,7 +60,7 @@ impl Follower {
 
     /// The client sends `frame`, its frame of this `number`.
     pub(crate) fn sent(&mut self, now: Instant, frame: &CanFrame, number: u64) {
-        let Some((can_id, &[code, ..])) = frame.usable() else { return };
+        let Some((can_id, &[code, ..])) = frame.eight_bytes() else { return };
         let moved = MotorSet::moved_by(frame);
         self.moving = self.moving.union(moved);
         for id in moved {
@@ -78,7 +79,7 @@ impl Follower {
     /// The bus carries `frame`, which is not the client's.
     pub(crate) fn heard(&mut self, now: Instant, frame: &CanFrame) -> Heard {
         let moved = MotorSet::moved_by(frame);
-        let Some((can_id, &[code, ..])) = frame.usable() else {
+        let Some((can_id, &[code, ..])) = frame.eight_bytes() else {
             return Heard { reply_to: None, unguarded: None };
         };
         let reply = MotorId::from_can_id(can_id.into()).and_then(|id| {

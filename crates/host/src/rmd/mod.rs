@@ -22,10 +22,10 @@ mod motor;
 mod session;
 
 pub use motorlink_proto::rmd::{
-    Acceleration, CanFrame, Circle, CirclePosition, CirclePositionLimited, Code, Command,
-    CommandInfo, Counters, Dialect, Direction, Encoder, EncoderBits, EncoderOffset, Errors,
-    Exceeded, Gains, Limits, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, PhaseCurrents,
-    Spin, Status1, Torque, Torque4, describe,
+    Acceleration, Circle, CirclePosition, CirclePositionLimited, Code, Command, CommandInfo,
+    Counters, Dialect, Direction, Encoder, EncoderBits, EncoderOffset, Errors, Exceeded, Gains,
+    Limits, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, PhaseCurrents, Spin, Status1,
+    Torque, Torque4, describe,
 };
 pub use motorlink_proto::units::*;
 

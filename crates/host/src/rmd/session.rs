@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    self as proto, CanFrame, Code, Command, Counters, Host, Limits, MotorId, MotorSet, Refused,
-    Torque, Torque4, question_behind,
+    self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, Refused, Torque,
+    Torque4, question_behind,
 };
 use motorlink_proto::time::{Duration, Instant};
 

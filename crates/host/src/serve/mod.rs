@@ -25,7 +25,7 @@ use std::net::{TcpListener, ToSocketAddrs};
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags};
 

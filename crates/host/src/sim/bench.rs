@@ -6,7 +6,8 @@ use std::os::fd::BorrowedFd;
 use std::rc::Rc;
 use std::time::Duration;
 
-use motorlink_proto::rmd::{CanFrame, MotorId};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::RmdNode;
 use serde_json::{Value, json};

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use motorlink::port::{PortError, ServeName};
 use motorlink::serve::{ByteStation, CanStation, Served, Server};
-use motorlink_proto::rmd::CanFrame;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 /// Answers each chunk with itself.

@@ -10,7 +10,7 @@ use std::process::Command;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use motorlink::rmd::CanFrame;
+use motorlink::can::CanFrame;
 use motorlink::slcan::Device;
 use motorlink::time::Instant;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};

@@ -8,10 +8,11 @@ mod served;
 
 use std::time::Duration;
 
+use motorlink::can::CanFrame;
 use motorlink::list;
 use motorlink::port::{CanLink, PortError, PortName};
 use motorlink::rmd::{
-    self, Bus, CanFrame, CentiDps, Error, Found, Gains, MotorId, MotorSet, Torque4, TorqueCommand,
+    self, Bus, CentiDps, Error, Found, Gains, MotorId, MotorSet, Torque4, TorqueCommand,
 };
 use motorlink::serve::{CanStation, Server};
 use motorlink::time::Instant;

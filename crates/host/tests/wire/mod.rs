@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, Evented, FdLink, PortError};
-use motorlink::rmd::CanFrame;
 
 /// What a drive was sent, and what it will say.
 #[derive(Clone)]

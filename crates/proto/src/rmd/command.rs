@@ -1,10 +1,10 @@
 //! The command table: the one place where a command's number and name stand.
 
-use super::frame::CanFrame;
 use super::message::*;
 use super::motor::{MotorId, MotorSet, TORQUE4_ID};
 use super::payload::{Field, Payload};
 use super::reply::*;
+use crate::can::CanFrame;
 
 /// A request with its code and the type of its reply. A reply is `C::Reply::decode(&data)`.
 pub trait Command: Payload {
@@ -69,7 +69,7 @@ impl Code {
 impl MotorSet {
     /// The motors that may turn after a host's `frame`.
     pub fn moved_by(frame: &CanFrame) -> Self {
-        match frame.usable() {
+        match frame.eight_bytes() {
             Some((TORQUE4_ID, _)) => MotorSet::TORQUE4,
             Some((id, [code, ..])) if Code::from(*code).may_move() => {
                 MotorId::from_can_id(id.into()).map_or(MotorSet::EMPTY, MotorSet::from)

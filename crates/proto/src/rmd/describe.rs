@@ -2,10 +2,10 @@
 //! identifier, and for some commands they are the same bit for bit.
 
 use super::command::Code;
-use super::frame::CanFrame;
 use super::message::Torque4;
 use super::motor::{Dialect, MotorId, TORQUE4_ID};
 use super::payload::{Field, Payload};
+use crate::can::CanFrame;
 use core::fmt;
 
 /// Who sent a frame.
@@ -31,7 +31,7 @@ pub const fn describe(frame: CanFrame, direction: Direction) -> Described {
 
 impl fmt::Display for Described {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some((id, data)) = self.frame.usable() else {
+        let Some((id, data)) = self.frame.eight_bytes() else {
             return write!(f, "{:#05x}: not a standard data frame of 8 bytes", self.frame.id());
         };
         if id == TORQUE4_ID {

@@ -2,11 +2,11 @@
 
 use super::command::{Code, Command};
 use super::encoder::{EncoderBits, FULL_TURN};
-use super::frame::CanFrame;
 use super::message::*;
 use super::motor::{MotorId, MotorSet, TORQUE4_ID};
 use super::payload::Payload;
 use super::reply::*;
+use crate::can::CanFrame;
 use crate::time::{Duration, Instant};
 use crate::units::*;
 
@@ -167,7 +167,7 @@ impl Drive {
         if frame.id() != own && !everyones {
             return None;
         }
-        let Some((_, data)) = frame.usable() else {
+        let Some((_, data)) = frame.eight_bytes() else {
             count(&mut self.ignored.malformed);
             return None;
         };

@@ -27,11 +27,11 @@
 
 use super::command::{Code, Command};
 use super::doubt::{Admitted, Doubt, answers};
-use super::frame::CanFrame;
 use super::limits::Limits;
 use super::message::{ReadStatus1, ReadStatus2, Torque, Torque4};
 use super::motor::{Dialect, MotorId, MotorSet, TORQUE4_ID};
 use super::outcome::{Counters, Error, Output, Refused};
+use crate::can::CanFrame;
 use crate::time::{Duration, Instant};
 
 /// How long a reply may take unless told otherwise: real motors answer in 0.3 to 2 ms, and a USB
@@ -200,11 +200,11 @@ impl Host {
     /// Takes a frame from the bus. Frames that belong to no exchange are counted and dropped.
     pub fn receive(&mut self, now: Instant, frame: &CanFrame) {
         if let Some(id) = MotorId::from_can_id(frame.id()) {
-            match frame.usable() {
+            match frame.eight_bytes() {
                 Some((_, data)) => self.reply(now, id, data),
                 None => count(&mut self.counters.malformed),
             }
-        } else if let Some((_, data)) = frame.usable()
+        } else if let Some((_, data)) = frame.eight_bytes()
             && let Some((dialect, id)) = Dialect::from_can_id(frame.id())
         {
             self.foreign_reply(dialect, id, data);

@@ -14,7 +14,7 @@
 //! cite its rows as R1, R2 and so on.
 //!
 //! ```
-//! use motorlink_proto::{rmd::*, time::Instant, units::*};
+//! use motorlink_proto::{can::CanFrame, rmd::*, time::Instant, units::*};
 //!
 //! let motor = MotorId::new(1).unwrap();
 //! let mut host = Host::new();
@@ -37,7 +37,6 @@ mod describe;
 mod doubt;
 mod drive;
 mod encoder;
-mod frame;
 mod host;
 mod limits;
 mod message;
@@ -50,7 +49,6 @@ pub use command::{COMMANDS, Code, Command, CommandInfo};
 pub use describe::{Described, Direction, describe};
 pub use drive::{Config, Drive, Ignored, Mode, Motor, Sense, Settings};
 pub use encoder::{EncoderBits, FULL_TURN};
-pub use frame::CanFrame;
 pub use host::{DEFAULT_GUARD, DEFAULT_TIMEOUT, Host, question_behind};
 pub use limits::{Exceeded, Limits};
 pub use message::*;

@@ -1,8 +1,8 @@
 //! What a host tells its caller.
 
-use super::frame::CanFrame;
 use super::limits::Exceeded;
 use super::motor::{Dialect, MotorId};
+use crate::can::CanFrame;
 use crate::time::Instant;
 use core::fmt;
 

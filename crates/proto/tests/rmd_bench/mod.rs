@@ -1,6 +1,7 @@
 //! A host and drives on one simulated bus and a virtual clock.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::*;
@@ -74,7 +75,7 @@ impl Node {
     pub fn raw(&mut self, data: [u8; 8]) -> Option<[u8; 8]> {
         let id = self.drive.config.id.can_id();
         let reply = self.receive(Instant(1), &CanFrame::new(id, data))?;
-        let (from, data) = reply.usable().expect("a reply is a standard frame of eight bytes");
+        let (from, data) = reply.eight_bytes().expect("a reply is a standard frame of eight bytes");
         assert_eq!(from, id);
         Some(*data)
     }

@@ -1,6 +1,7 @@
 //! Motors on one bus.
 
-use motorlink_proto::rmd::{CanFrame, MotorId};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time::Instant;
 
 use super::{RmdConfig, RmdNode};

@@ -1,6 +1,7 @@
 //! A drive and its motor.
 
-use motorlink_proto::rmd::{CanFrame, Drive, MotorId, Settings};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Drive, MotorId, Settings};
 use motorlink_proto::time::{Duration, Instant};
 
 use super::{RmdConfig, RmdMotor};

@@ -1,5 +1,6 @@
 //! RMD motors on a bus, spoken to in frames.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdMotor, RmdNode, Truth};

@@ -1,5 +1,6 @@
 //! Torque, speed and position, and their limits.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::*;
 use motorlink_sim::rmd::RmdConfig;

@@ -1,5 +1,6 @@
 //! What lasts, what is forgotten and what is refused.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::Instant;
 use motorlink_proto::units::*;

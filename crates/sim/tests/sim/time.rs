@@ -47,13 +47,13 @@ fn rmd_run(piece: u64) -> (Vec<Vec<u8>>, String) {
         let angle = CentiDegrees::from_degrees(f64::from(round * 37 % 100));
         bench.raw(Position { angle }.encode());
         let spin = Speed { speed: CentiDps(round * 1000) };
-        bench.send(&motorlink_proto::rmd::CanFrame::new(0x142, spin.encode()));
+        bench.send(&motorlink_proto::can::CanFrame::new(0x142, spin.encode()));
         let (mut now, bus) = (bench.now, &mut bench.bus);
         cut(&mut now, 93_333, piece, |now| bus.advance_to(now));
         bench.now = now;
         for request in [ReadStatus2.encode(), ReadStatus3.encode(), ReadEncoder.encode()] {
             bench.raw(request);
-            bench.send(&motorlink_proto::rmd::CanFrame::new(0x142, request));
+            bench.send(&motorlink_proto::can::CanFrame::new(0x142, request));
         }
     }
     let end = format!("{:?} {:#x}", bench.truth(), bench.bus.state_hash());

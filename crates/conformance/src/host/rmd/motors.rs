@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use motorlink::serve::CanStation;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    CanFrame, Circle, Code, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, Status1,
-    TORQUE4_ID,
+    Circle, Code, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, Status1, TORQUE4_ID,
 };
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{
@@ -89,7 +89,7 @@ impl CanStation for Motors {
     fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
         let mut inner = self.0.borrow_mut();
         inner.outbox.journal.heard(now, &show(frame));
-        if let Some((can_id, data)) = frame.usable() {
+        if let Some((can_id, data)) = frame.eight_bytes() {
             if let Some(id) = MotorId::from_can_id(can_id.into()) {
                 inner.request(now, id, frame, Code::from(data[0]));
             } else if can_id == TORQUE4_ID {
@@ -133,7 +133,7 @@ impl Inner {
     /// What a motor of the document answers, with a value of its own each time.
     fn reply(&mut self, code: Code, request: &CanFrame) -> ([u8; 8], Option<i64>) {
         let Some(row) = code.info() else { return ([0; 8], None) };
-        if let Some((_, echoed)) = request.usable()
+        if let Some((_, echoed)) = request.eight_bytes()
             && row.echo
         {
             return (*echoed, None);

@@ -1,6 +1,7 @@
 //! What RMD hosts are put through.
 
-use motorlink_proto::rmd::{CanFrame, Code, Dialect};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Code, Dialect};
 use motorlink_proto::time::Duration;
 
 use super::motors::{Scenario, Script, Sends, Turn};

@@ -1,5 +1,6 @@
 //! Encoder, offset, zero, angles.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 
 use super::{Mutant, are_caught, code, commands, mutant, on, put_u16, replies, swap, u16_at};
@@ -144,7 +145,7 @@ pub fn lost_offset() -> Behaviour {
 pub fn late_offset() -> Behaviour {
     let mut rom = None;
     Box::new(move |motors, event| match event {
-        Event::Frame(frame) => match frame.usable() {
+        Event::Frame(frame) => match frame.eight_bytes() {
             Some((id, data)) if data[0] == 0x91 => {
                 rom = Some(u16_at(data, 6));
                 let offset = u16_at(data, 6);

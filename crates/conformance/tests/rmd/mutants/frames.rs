@@ -1,5 +1,6 @@
 //! Identifiers, forms, command bytes.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 
 use super::{Mutant, are_caught, code, commands, frames, mutant};
@@ -13,7 +14,7 @@ fn mutants_of_frames_and_command_bytes_are_caught() {
 fn mutants() -> Vec<Mutant> {
     let moved = |by: u16| {
         frames(move |_, reply| {
-            let (id, data) = reply.usable().expect("a reply");
+            let (id, data) = reply.eight_bytes().expect("a reply");
             vec![CanFrame::new(id + by, *data)]
         })
     };

@@ -9,6 +9,7 @@ mod settings;
 mod status;
 
 use motorlink_conformance::Verdict;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_sim::rmd::Truth;
 
@@ -101,8 +102,8 @@ fn without_a_mutation_the_same_wrappers_pass() {
 /// Changes the data of replies, given the request's.
 pub fn replies(change: impl Fn(&[u8; 8], &mut [u8; 8]) + 'static) -> Behaviour {
     frames(move |request, reply| {
-        let Some((id, data)) = reply.usable() else { return vec![reply] };
-        let (mut data, request) = (*data, *request.usable().expect("it was answered").1);
+        let Some((id, data)) = reply.eight_bytes() else { return vec![reply] };
+        let (mut data, request) = (*data, *request.eight_bytes().expect("it was answered").1);
         change(&request, &mut data);
         vec![CanFrame::new(id, data)]
     })
@@ -168,7 +169,7 @@ pub fn commands(
 ) -> Behaviour {
     Box::new(move |motors, event| {
         if let Event::Frame(frame) = event
-            && let Some((id, data)) = frame.usable()
+            && let Some((id, data)) = frame.eight_bytes()
             && id == motors.first_id().can_id()
             && let Some(reply) = take(motors, data)
         {

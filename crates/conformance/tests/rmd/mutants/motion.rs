@@ -1,6 +1,7 @@
 //! Off, stop, run; torque and speed; torque for four motors.
 
 use motorlink_conformance::rmd::suite;
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 
 use super::{
@@ -149,7 +150,7 @@ fn four() -> Vec<Mutant> {
             reordered(|replies| {
                 for reply in replies {
                     let (id, mut data) =
-                        reply.usable().map(|(id, data)| (id, *data)).expect("a reply");
+                        reply.eight_bytes().map(|(id, data)| (id, *data)).expect("a reply");
                     data[0] = 0x9C;
                     *reply = CanFrame::new(id, data);
                 }
@@ -199,7 +200,7 @@ fn four() -> Vec<Mutant> {
                     let mut replies = Vec::new();
                     if let Event::Frame(frame) = &event
                         && frame.id() == 0x280
-                        && frame.usable().is_some()
+                        && frame.eight_bytes().is_some()
                     {
                         let reply = motors.ask([0xA1, 0, 0, 0, 0, 0, 0, 0]);
                         replies.push(CanFrame::new(motors.first_id().can_id(), reply));
@@ -228,7 +229,7 @@ fn reordered(change: impl Fn(&mut Vec<CanFrame>) + 'static) -> Behaviour {
 fn torques(change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
     Box::new(move |motors, event| {
         if let Event::Frame(frame) = &event
-            && let Some((0x280, data)) = frame.usable()
+            && let Some((0x280, data)) = frame.eight_bytes()
         {
             let mut data = *data;
             change(&mut data);

@@ -1,5 +1,6 @@
 //! Gains and acceleration.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::DpsPerSecond;
 
@@ -78,7 +79,7 @@ fn lasting_acceleration() -> Behaviour {
     Box::new(move |motors, event| {
         match event {
             Event::Frame(frame) if frame.data().first() == Some(&0x34) => {
-                last = frame.usable().map(|(_, data)| *data);
+                last = frame.eight_bytes().map(|(_, data)| *data);
             }
             Event::PowerOn => {
                 last.map(|data| motors.ask(data));
@@ -98,7 +99,7 @@ fn scaled_acceleration(times: i32) -> Behaviour {
             return Vec::new();
         };
         let id = motors.first_id().can_id();
-        match frame.usable().filter(|(to, _)| *to == id) {
+        match frame.eight_bytes().filter(|(to, _)| *to == id) {
             Some((_, data)) if data[0] == 0x34 => {
                 let value = i32_at(data);
                 written = Some(value);

@@ -1,6 +1,7 @@
 //! What events do to the drives of a scenario.
 
-use motorlink_proto::rmd::{CanFrame, ClearErrors, Command as _, Payload, Status1};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{ClearErrors, Command as _, Payload, Status1};
 use motorlink_proto::stmcp::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse};
 use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::RmdConfig;
@@ -64,7 +65,7 @@ impl Drives {
     fn send_frame(&mut self, now: Instant, frame: &CanFrame) -> Option<String> {
         let mut reply = None;
         self.rmd.as_mut()?.receive(now, frame, |frame| reply = Some(frame));
-        let Some((_, data)) = reply.as_ref().and_then(CanFrame::usable) else {
+        let Some((_, data)) = reply.as_ref().and_then(CanFrame::eight_bytes) else {
             return Some(SILENT.to_owned());
         };
         let clears = frame.data().first() == Some(&ClearErrors::CODE.number());

@@ -1,9 +1,9 @@
 //! What a scenario sends: messages in words, and the bytes and frames that they become.
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    Acceleration, CanFrame, CirclePosition, CirclePositionLimited, ClearErrors, Command as _,
-    Gains, MotorId, Off, Position, PositionLimited, Run, Speed, Spin, Stop, Torque,
-    WriteAcceleration, WriteGains,
+    Acceleration, CirclePosition, CirclePositionLimited, ClearErrors, Command as _, Gains, MotorId,
+    Off, Position, PositionLimited, Run, Speed, Spin, Stop, Torque, WriteAcceleration, WriteGains,
 };
 use motorlink_proto::stmcp::{
     Command, CurrentReference, MAX_FRAME, Motor, PositionMove, Profile, REVUP_PHASES, Ramp,

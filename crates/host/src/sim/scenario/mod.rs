@@ -14,7 +14,8 @@ mod signals;
 
 use std::path::PathBuf;
 
-use motorlink_proto::rmd::{CanFrame, MotorId};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time::{Duration, Instant};
 
 pub use expect::Verdict;

@@ -1,4 +1,4 @@
-//! CAN frames as this protocol sees them.
+//! Frames of classic CAN.
 
 /// A classic CAN frame: any identifier, zero to eight bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -11,8 +11,7 @@ pub struct CanFrame {
 }
 
 impl CanFrame {
-    /// A standard data frame of eight bytes, the only kind that the protocol uses (chapter 1). The
-    /// identifier is cut to its 11 bits.
+    /// A standard data frame of eight bytes. The identifier is cut to its 11 bits.
     pub const fn new(id: u16, data: [u8; 8]) -> Self {
         CanFrame { id: (id & 0x7FF) as u32, extended: false, remote: false, len: 8, data }
     }
@@ -68,9 +67,8 @@ impl CanFrame {
         self.data.get(..len).unwrap_or(&self.data)
     }
 
-    /// Identifier and bytes when this is a frame that the protocol can use: standard, data, eight
-    /// bytes (chapter 1). Anything else is undefined there and is ignored.
-    pub const fn usable(&self) -> Option<(u16, &[u8; 8])> {
+    /// Identifier and bytes of a standard data frame of eight bytes; nothing for any other frame.
+    pub const fn eight_bytes(&self) -> Option<(u16, &[u8; 8])> {
         if self.extended || self.remote || self.len != 8 {
             return None;
         }
