@@ -159,7 +159,7 @@ bench-python:
 		echo "PYTHON IS NOT MEASURED: the package cannot be installed into $(BENCH_VENV)" >&2
 
 # The other simulators, for comparison. The benchmark goes on without them.
-$(BENCH_VENV)/ready: bench/requirements.txt
+$(BENCH_VENV)/ready: benchmarks/requirements.txt
 	rm -f $@
 	{ $(PYTHON) -m venv $(BENCH_VENV) && $(BENCH_VENV)/bin/python -m pip install --quiet -r $< && touch $@; } || \
 		echo "THE OTHER SIMULATORS ARE NOT MEASURED: they cannot be installed into $(BENCH_VENV)" >&2

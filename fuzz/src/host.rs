@@ -1,15 +1,16 @@
 //! What the host library reads: slcan, port names, configurations and commands of simulated drives.
 
-use motorlink::port::{PortName, ServeName};
-use motorlink::sim::{Bench, BenchConfig};
+use motorlink::port::PortName;
 use motorlink::slcan::{self, Answer, Device, HostCodec};
 use motorlink::stmcp::{Profile, Reading, RegisterId, find_register, parse_value};
+use motorlink_link::serve::ServeName;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{self, Command as _, MotorId};
 use motorlink_proto::stmcp::{self as st, MAX_FRAME, Request};
 use motorlink_proto::time::Instant;
 use motorlink_proto::units::CentiDps;
 use motorlink_sim::rmd::RmdConfig;
+use motorlink_testbench::{Bench, BenchConfig};
 
 use crate::input::Input;
 

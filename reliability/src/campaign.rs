@@ -4,7 +4,7 @@ use std::panic::catch_unwind;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use motorlink::fault::FaultError;
+use motorlink_link::fault::FaultError;
 
 use crate::plan::{Speaks, Trial, seeded};
 use crate::tally::{Tally, Violation};

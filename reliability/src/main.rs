@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use motorlink::fault::Faults;
+use motorlink_link::fault::Faults;
 
 use campaign::Failed;
 use plan::{GROUPS, SEEDS, Speaks, TWICE, Trial, WRITES, seeded};

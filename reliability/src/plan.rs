@@ -1,6 +1,6 @@
 //! Which lines are tried, and for how long.
 
-use motorlink::fault::{FaultError, Faults};
+use motorlink_link::fault::{FaultError, Faults};
 use motorlink_proto::stmcp::{Profile, Recovery};
 
 use crate::st::Setup;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use motorlink::fault::{FaultError, Rng};
+use motorlink_link::fault::{FaultError, Rng};
 use motorlink_proto::stmcp::{Frame, MAX_FRAME};
 
 use crate::plan::{Speaks, Trial};

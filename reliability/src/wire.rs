@@ -1,6 +1,6 @@
 //! Bytes and frames that know where they come from.
 
-use motorlink::fault::{Rng, Struck, Unit, Way};
+use motorlink_link::fault::{Rng, Struck, Unit, Way};
 
 /// A unit on the wire with its origin.
 #[derive(Debug, Clone, Copy)]
@@ -46,6 +46,7 @@ pub fn message<T>(units: &[Tagged<T>]) -> Option<u32> {
 impl<T: Unit> Unit for Tagged<T> {
     const BITS: u32 = T::BITS;
     const DATA_BITS: u32 = T::DATA_BITS;
+    type Protocol = T::Protocol;
 
     fn struck(self, bit: u32) -> Struck<Self> {
         match self.unit.struck(bit) {
@@ -63,8 +64,8 @@ impl<T: Unit> Unit for Tagged<T> {
         Tagged { copy: true, ..self }
     }
 
-    fn noise(way: Way, rng: &mut Rng) -> Self {
-        let unit = T::noise(way, rng);
+    fn noise(way: Way, protocol: &T::Protocol, rng: &mut Rng) -> Self {
+        let unit = T::noise(way, protocol, rng);
         Tagged { unit, source: None, changed: false, copy: false }
     }
 

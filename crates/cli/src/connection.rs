@@ -1,8 +1,9 @@
 //! What every command that opens a port takes.
 
-use motorlink::fault::Faults;
 use motorlink::port::{ByteLink, CanLink, FaultBytes, FaultCan, PortName, TapBytes, TapCan};
+use motorlink::rmd::IDENTIFIERS;
 use motorlink::stmcp::Profile;
+use motorlink_link::fault::Faults;
 
 use crate::failure::Failure;
 use crate::output::Output;
@@ -63,7 +64,7 @@ impl Connection {
         let (trace, mut faults) = (self.trace, self.fault.map(Faults::on_can).transpose()?);
         Ok(move |mut link: Box<dyn CanLink>| {
             if let Some(faults) = &mut faults {
-                link = Box::new(FaultCan::new(link, faults));
+                link = Box::new(FaultCan::new(link, faults, IDENTIFIERS));
                 faults.seed = faults.seed.wrapping_add(1);
             }
             if trace { Box::new(TapCan::new(link, trace::frames())) } else { link }

@@ -1,8 +1,8 @@
 //! How the program ends when it did not do what it was asked.
 
-use motorlink::fault::FaultError;
 use motorlink::port::{NameError, PortError};
 use motorlink::{rmd, stmcp};
+use motorlink_link::fault::FaultError;
 
 use crate::output::note;
 

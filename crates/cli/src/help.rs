@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use clap::Command;
+use motorlink::port::{Carries, schemes};
 
 use crate::failure::Failure;
 
@@ -12,13 +13,28 @@ Exit codes: 0 done, 1 the drive refused, 2 the command does not make sense, 3 th
 `motorlink demo` needs no hardware; `motorlink ports` shows what is connected.";
 
 /// Behind `motorlink st --help`.
-pub const ST_PORTS: &str = "\
-Ports:
-  /dev/ttyACM0, serial:/dev/ttyUSB0?baud=115200   a UART
-  tcp:HOST:PORT                                   a serial line behind a TCP server
-  unix:PATH                                       a serial line behind a Unix socket
-  tcp:HOST:PORT?clock=HOST:PORT                   the same on the time of an emulated board
-  sim:, sim:bench.toml                            simulated drives inside this process
+pub fn st_ports() -> String {
+    ports(Carries::Bytes) + ST_FAULTS
+}
+
+/// Behind `motorlink rmd --help`.
+pub fn rmd_ports() -> String {
+    ports(Carries::Frames) + RMD_FAULTS
+}
+
+/// How the names of ports that carry this are written.
+fn ports(carries: Carries) -> String {
+    let schemes = schemes();
+    let forms = || {
+        let forms = schemes.iter().flat_map(|scheme| scheme.forms());
+        forms.filter(|form| form.carries.serves(carries))
+    };
+    let width = forms().map(|form| form.text.len()).max().unwrap_or(0);
+    let rows = forms().map(|form| format!("  {:width$}   {}\n", form.text, form.help));
+    "Ports:\n".to_owned() + &rows.collect::<String>()
+}
+
+const ST_FAULTS: &str = "\
 MOTORLINK_PORT names the port where -p does not.
 --fault damages what passes the port, both ways unless only=sent or only=received:
   flip=RATE drop=RATE dup=RATE insert=RATE   a bit wrong, a byte lost, twice, or from nowhere
@@ -29,14 +45,7 @@ MOTORLINK_PORT names the port where -p does not.
 RATE is a chance a byte (flip: a bit). A damaged request may still pass for another one:
 rehearse on simulated drives, or with the motor free to turn.";
 
-/// Behind `motorlink rmd --help`.
-pub const RMD_PORTS: &str = "\
-Ports:
-  slcan:/dev/ttyACM0?bitrate=1000000   a CAN adapter that speaks slcan
-  slcan:tcp:HOST:PORT                  the same behind a TCP server
-  slcan:unix:PATH                      the same behind a Unix socket
-  socketcan:can0                       a CAN interface of Linux
-  sim:, sim:bench.toml                 simulated motors inside this process
+const RMD_FAULTS: &str = "\
 Behind slcan ports: baud=RATE for the adapter's own line, echo=1 if it sends back what it is sent,
 clock=HOST:PORT for the time of an emulated board.
 MOTORLINK_PORT names the port where -p does not.

@@ -41,10 +41,10 @@ enum Command {
     /// List serial devices and CAN interfaces, and what could be wrong with them
     Ports(ports::Args),
     /// Talk to a drive that speaks ST's Motor Control Protocol
-    #[command(after_help = help::ST_PORTS)]
+    #[command(after_help = help::st_ports())]
     St(st::Args),
     /// Talk to RMD motors on a CAN bus
-    #[command(after_help = help::RMD_PORTS)]
+    #[command(after_help = help::rmd_ports())]
     Rmd(rmd::Args),
     /// Check a drive against the document it claims to follow, sentence by sentence
     Conformance(conformance::Args),
@@ -67,6 +67,7 @@ enum Command {
 /// and end the process where nothing has to be tidied up.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
     interrupt::install();
+    motorlink_testbench::register();
     let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
         Err(error) => {

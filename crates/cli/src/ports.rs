@@ -1,6 +1,7 @@
 //! `motorlink ports`
 
-use motorlink::list::{self, PortInfo, PortKind};
+use motorlink::list::{self, PortInfo};
+use motorlink::port::Carries;
 use serde_json::json;
 
 use crate::failure::Failure;
@@ -27,9 +28,10 @@ pub fn run(args: Args) -> Result<(), Failure> {
 }
 
 fn kind(port: &PortInfo) -> &'static str {
-    match port.kind {
-        PortKind::Serial => "serial",
-        PortKind::Can => "CAN",
+    match port.carries {
+        Carries::Bytes => "serial",
+        Carries::Frames => "CAN",
+        Carries::Both => "both",
     }
 }
 

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use motorlink::Clock;
 use motorlink::port::{ByteLink, CanLink, PortError};
-use motorlink::serve::{ByteStation, CanStation};
+use motorlink_link::serve::{ByteStation, CanStation};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 

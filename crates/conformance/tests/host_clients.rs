@@ -8,11 +8,11 @@ use std::time::Duration;
 
 use motorlink::port::PortName;
 use motorlink::rmd::{Bus, Error, MotorId, MotorSet, Torque4, TorqueCommand};
-use motorlink::serve::Server;
 use motorlink::stmcp::{Client, register};
 use motorlink::{rmd, stmcp};
 use motorlink_conformance::Verdict;
 use motorlink_conformance::host::{self, Demand, Journal, READINGS, Reading, Said, Task};
+use motorlink_link::serve::Server;
 use motorlink_proto::rmd::{Command as _, MultiTurn, Payload as _, ReadMultiTurnAngle};
 
 /// Long against what a loaded machine adds, short for a test.

@@ -1,5 +1,7 @@
 //! Frames of classic CAN.
 
+use core::ops::Range;
+
 /// A classic CAN frame: any identifier, zero to eight bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
@@ -73,5 +75,21 @@ impl CanFrame {
             return None;
         }
         Some((self.id as u16, &self.data))
+    }
+}
+
+/// The standard identifiers that a protocol uses on a bus.
+#[derive(Debug, Clone)]
+pub struct Identifiers {
+    /// Those that replies come with.
+    pub replies: Range<u16>,
+    /// Whether one of them means something to a drive or a host.
+    pub is_used: fn(u16) -> bool,
+}
+
+impl Default for Identifiers {
+    /// None: of a bus whose protocol is not known.
+    fn default() -> Self {
+        Identifiers { replies: 0..0, is_used: |_| false }
     }
 }

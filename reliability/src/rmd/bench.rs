@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 
-use motorlink::fault::{Faults, Lane, Unit, Way};
 use motorlink::time::{Duration, Instant};
+use motorlink_link::fault::{Faults, Lane, Unit, Way};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    Code, Command, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, MotorId, MotorSet, Output,
-    ReadStatus1, Refused, TORQUE4_ID, Torque4,
+    Code, Command, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, IDENTIFIERS, MotorId, MotorSet,
+    Output, ReadStatus1, Refused, TORQUE4_ID, Torque4,
 };
 
 use super::motor::{Node, reaches};
@@ -86,8 +86,8 @@ impl Bench {
             beyond,
             host: Host::new(),
             nodes: MotorSet::TORQUE4.map(Node::new).collect(),
-            out: Lane::new(faults, Way::Sent, FRAME),
-            back: Lane::new(faults, Way::Received, FRAME),
+            out: Lane::new(faults, Way::Sent, FRAME, IDENTIFIERS),
+            back: Lane::new(faults, Way::Received, FRAME, IDENTIFIERS),
             now: Instant(0),
             ended: Instant(0),
             exchanges: 0,

@@ -4,8 +4,8 @@ mod bench;
 mod motor;
 mod traffic;
 
-use motorlink::fault::{Faults, Rng};
 use motorlink::time::Duration;
+use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::rmd::MotorId;
 
 use bench::{Bench, MOTORS};

@@ -1,6 +1,6 @@
 //! What a program asks of motors.
 
-use motorlink::fault::Rng;
+use motorlink_link::fault::Rng;
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::{CentiDegrees, CentiDps, DpsPerSecond, SpeedLimit, TorqueCommand};
 

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 
-use motorlink::fault::{Faults, Lane, Rng, Way};
 use motorlink::time::{Duration, Instant};
+use motorlink_link::fault::{Faults, Lane, Rng, Way};
 use motorlink_proto::stmcp::{
     Config, Error, ErrorCode, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, Line, MAX_FRAME,
     Master, Motor, Output, Parse, Profile, Recovery, Request, Slave,
@@ -109,8 +109,8 @@ impl Bench {
             twice: None,
             copies: VecDeque::new(),
             drive: Memory::new(),
-            out: Lane::new(faults, Way::Sent, BYTE),
-            back: Lane::new(faults, Way::Received, BYTE),
+            out: Lane::new(faults, Way::Sent, BYTE, ()),
+            back: Lane::new(faults, Way::Received, BYTE, ()),
             now: Instant(0),
             ended: Instant(0),
             exchanges: 0,

@@ -7,8 +7,8 @@ mod traffic;
 pub mod twice;
 pub mod verified;
 
-use motorlink::fault::{Faults, Rng};
 use motorlink::time::Duration;
+use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::stmcp::Error;
 
 use bench::Bench;

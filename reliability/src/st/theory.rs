@@ -1,6 +1,6 @@
 //! How often a damaged frame should pass for a whole one.
 
-use motorlink::fault::Rng;
+use motorlink_link::fault::Rng;
 use motorlink_proto::stmcp::{
     Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile, Slave,
 };

@@ -1,6 +1,6 @@
 //! What a program asks of a drive: reads, writes, commands, ramps, and frames of any kind.
 
-use motorlink::fault::Rng;
+use motorlink_link::fault::Rng;
 use motorlink_proto::stmcp::{
     Command, CurrentReference, Frame, MAX_FRAME, Profile, Ramp, RegisterId, Request, RevupPhase,
 };

@@ -2,8 +2,8 @@
 
 use std::iter::Sum;
 
-use motorlink::fault::{Faults, Rng};
 use motorlink::time::Duration;
+use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::stmcp::{RegisterId, Request, question_behind};
 
 use super::bench::{Bench, Setup};

@@ -1,6 +1,6 @@
 //! Plain writes beside verified ones: what was reported as done, and what the register has.
 
-use motorlink::fault::{Faults, Rng};
+use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::stmcp::{
     Error, RegisterId, Request, Unverified, VERIFY_ATTEMPTS, VerifiedWrite,
 };

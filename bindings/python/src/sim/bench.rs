@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant as Moment;
 
-use motorlink::sim::scenario::Kind;
-use motorlink::sim::{BenchConfig, Command, Recording, VirtualBench};
 use motorlink_proto::time::{Duration, Instant};
+use motorlink_testbench::scenario::Kind;
+use motorlink_testbench::{BenchConfig, Command, Recording, VirtualBench};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict};
 

@@ -10,7 +10,7 @@ pub(crate) use port::{Port, SimPort};
 pub(crate) use scenario::sim_run;
 pub(crate) use serving::SimServing;
 
-use motorlink::sim::preset;
+use motorlink_testbench::preset;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use motorlink::Clock;
-use motorlink::fault::{FaultError, Faults};
 use motorlink::port::{ByteLink, CanLink};
-use motorlink::sim::VirtualBench;
+use motorlink_link::fault::{FaultError, Faults};
+use motorlink_testbench::VirtualBench;
 use pyo3::prelude::*;
 
 use crate::error::bad_value;

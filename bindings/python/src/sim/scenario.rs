@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
-use motorlink::sim::scenario::{Run, Scenario};
+use motorlink_testbench::scenario::{Run, Scenario};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

@@ -2,9 +2,9 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use motorlink::port::ServeName;
-use motorlink::serve::Served;
-use motorlink::sim::{Serving, VirtualBench};
+use motorlink_link::serve::ServeName;
+use motorlink_link::serve::Served;
+use motorlink_testbench::{Serving, VirtualBench};
 use pyo3::prelude::*;
 
 use crate::error::{bad_value, port_error};

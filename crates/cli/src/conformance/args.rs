@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Subcommand;
-use motorlink::port::ServeName;
 use motorlink::rmd::{EncoderBits, MotorId};
 use motorlink::stmcp::{Motor, Profile};
+use motorlink_link::serve::ServeName;
 
 use crate::connection::Port;
 use crate::output::parse_span;

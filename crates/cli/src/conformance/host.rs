@@ -6,10 +6,11 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{PortError, ServeName};
-use motorlink::serve::{Served, Server};
+use motorlink::port::PortError;
 use motorlink_conformance::host::{Journal, Reading, Said, Scenario, Task, rmd, st};
 use motorlink_conformance::{Outcome, Report, Verdict};
+use motorlink_link::serve::ServeName;
+use motorlink_link::serve::{Served, Server};
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::args::{Host, Which};

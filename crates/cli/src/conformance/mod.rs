@@ -8,7 +8,7 @@ mod world;
 use std::io::Write;
 use std::path::Path;
 
-use motorlink::port::{LineName, PortName};
+use motorlink::port::PortName;
 use motorlink::time::Duration;
 use motorlink_conformance::wire::Real;
 use motorlink_conformance::{
@@ -60,12 +60,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
 
 /// How long a start bit, eight data bits and a stop bit take, where there is a baud rate.
 fn byte_time(name: &PortName) -> Duration {
-    match name {
-        PortName::Line(LineName::Serial { baud, .. }) => {
-            Duration(10_000_000 / u64::from((*baud).max(1)))
-        }
-        _ => Duration(0),
-    }
+    name.baud().map_or(Duration(0), |baud| Duration(10_000_000 / u64::from(baud)))
 }
 
 fn conduct<B: Subject>(

@@ -8,7 +8,7 @@ use std::slice::from_ref;
 use std::sync::Mutex;
 use std::thread::JoinHandle;
 
-use motorlink::sim::{Bench, BenchConfig};
+use motorlink_testbench::{Bench, BenchConfig};
 use serde_json::{Value, json};
 
 use crate::failure::Failure;

@@ -6,10 +6,11 @@ mod words;
 
 use std::time::Duration;
 
-use motorlink::port::{PortName, ServeName};
+use motorlink::port::PortName;
 use motorlink::relay::{Event, Relay, RelayError, RelayOptions};
 use motorlink::rmd::OnDrop;
-use motorlink::serve::Served;
+use motorlink_link::serve::ServeName;
+use motorlink_link::serve::Served;
 use serde_json::json;
 
 use crate::connection::Port;
@@ -134,7 +135,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
 
 fn guard_st(args: &StArgs) -> Result<(), Failure> {
     let port = args.port.name()?;
-    if let PortName::Slcan { .. } | PortName::SocketCan(_) = port {
+    if port.as_line().is_none() {
         return Err(Failure::Usage(format!(
             "`{port}` is a CAN bus, and an ST drive is on a serial line: for RMD motors use \
              `motorlink guard rmd -p {port}`"

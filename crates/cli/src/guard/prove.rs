@@ -7,10 +7,11 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{PortName, ServeName};
+use motorlink::port::PortName;
 use motorlink::relay::{Event, Relay};
 use motorlink::rmd::{self, Bus, CentiDps};
 use motorlink::stmcp::{self, Client, Ramp, Request, register};
+use motorlink_link::serve::ServeName;
 use serde_json::json;
 
 use super::{leaves_something_turning, words};

@@ -9,9 +9,9 @@ use std::os::fd::AsFd;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use motorlink::port::ServeName;
-use motorlink::sim::{Bench, BenchConfig, ConfigError, RomError, RomFolder, ServeError};
 use motorlink::stmcp::Profile;
+use motorlink_link::serve::ServeName;
+use motorlink_testbench::{Bench, BenchConfig, ConfigError, RomError, RomFolder, ServeError};
 use rustix::process::getpgrp;
 use rustix::termios::{isatty, tcgetpgrp};
 

@@ -1,6 +1,6 @@
 //! A run as a picture: panels over a common time, with what happened marked through all of them.
 
-use motorlink::sim::scenario::{Kind, Mark, Names, Panel, Run, Scenario, Signal, short};
+use motorlink_testbench::scenario::{Kind, Mark, Names, Panel, Run, Scenario, Signal, short};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;

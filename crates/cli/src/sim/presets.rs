@@ -1,6 +1,6 @@
 //! `motorlink sim presets`: the motors that are there to start from, with every value.
 
-use motorlink::sim::preset;
+use motorlink_testbench::preset;
 use serde_json::{Value, json};
 
 use crate::failure::Failure;

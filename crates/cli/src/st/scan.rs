@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use indicatif::ProgressBar;
-use motorlink::port::{PortError, PortName};
+use motorlink::port::PortError;
 use motorlink::stmcp::{BAUD_RATES, Finding, scan_baud};
 use serde_json::json;
 
@@ -13,20 +13,20 @@ use crate::output::Output;
 
 pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result<(), Failure> {
     let port = connection.port()?;
-    let PortName::Line(line) = &port else {
+    if port.as_line().is_none() || port.is_in_process() {
         return Err(Failure::Usage(format!("`{port}` has no baud rate to scan")));
-    };
+    }
     if connection.fault.is_some() {
         return Err(Failure::Usage("a scan of baud rates takes no --fault".to_owned()));
     }
     let rates = if rates.is_empty() { &BAUD_RATES[..] } else { rates };
-    let rates = if line.with_baud(rates[0]).is_some() { rates } else { &rates[..1] };
+    let rates = if port.at_baud(rates[0]).is_some() { rates } else { &rates[..1] };
     let output = connection.output();
     let bar = crate::output::progress(rates.len());
     let (mut found, mut echoes) = (false, false);
     for &rate in rates {
         bar.set_message(format!("{rate} baud"));
-        let finding = scan_baud(line, rate, patience);
+        let finding = scan_baud(&port, rate, patience);
         bar.inc(1);
         if let Err(error @ PortError::BaudRefused { .. }) = &finding {
             bar.suspend(|| {

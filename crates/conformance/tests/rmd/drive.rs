@@ -4,10 +4,10 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use motorlink::serve::CanStation;
 use motorlink_conformance::rmd::{Bench, Options, suite};
 use motorlink_conformance::wire::{Bus, Virtual};
 use motorlink_conformance::{Case, Need, Report, Unavailable, World, run};
+use motorlink_link::serve::CanStation;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};

@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 
 use motorlink::port::PortError;
-use motorlink::serve::ByteStation;
 use motorlink_conformance::st::{self, Bench, Options};
 use motorlink_conformance::wire::Line;
 use motorlink_conformance::{Need, Verdict, run};
+use motorlink_link::serve::ByteStation;
 use motorlink_proto::stmcp::{Motor, Profile};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::st::MotorConfig;

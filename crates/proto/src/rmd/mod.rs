@@ -52,7 +52,7 @@ pub use encoder::{EncoderBits, FULL_TURN};
 pub use host::{DEFAULT_GUARD, DEFAULT_TIMEOUT, Host, question_behind};
 pub use limits::{Exceeded, Limits};
 pub use message::*;
-pub use motor::{Dialect, MOTOR_BASE, MotorId, MotorSet, TORQUE4_ID};
+pub use motor::{Dialect, IDENTIFIERS, MOTOR_BASE, MotorId, MotorSet, TORQUE4_ID};
 pub use outcome::{Counters, Error, Output, Refused};
 pub use payload::{Field, Payload};
 pub use reply::*;

@@ -2,10 +2,22 @@
 
 use core::fmt;
 
+use crate::can::Identifiers;
+
 /// Request and reply of the motor with ID n have the identifier `0x140 + n` (chapter 1).
 pub const MOTOR_BASE: u16 = 0x140;
 /// Identifier of the torque command to motors 1 to 4 (chapter 4).
 pub const TORQUE4_ID: u16 = 0x280;
+
+/// What the protocol uses of a bus, in each [`Dialect`].
+pub const IDENTIFIERS: Identifiers = Identifiers {
+    replies: MOTOR_BASE + 1..MOTOR_BASE + 1 + MotorId::COUNT as u16,
+    is_used: |id| {
+        let replies = [Dialect::V3, Dialect::LkTech].map(Dialect::reply_base);
+        let mut bases = [MOTOR_BASE, replies[0], replies[1]].into_iter();
+        id == TORQUE4_ID || bases.any(|base| (base..=base + MotorId::COUNT as u16).contains(&id))
+    },
+};
 
 /// The ID of a motor, 1 to 32 (chapter 1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

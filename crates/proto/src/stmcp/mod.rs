@@ -66,6 +66,8 @@ pub mod message;
 mod question;
 pub mod register;
 mod slave;
+#[cfg(feature = "std")]
+mod value;
 mod verified;
 
 pub use code::{
@@ -84,4 +86,6 @@ pub use message::{
 };
 pub use register::{Feature, Features, RegisterId};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
+#[cfg(feature = "std")]
+pub use value::{Reading, UnknownRegister, ValueError, find_register, parse_value};
 pub use verified::{Unverified, VERIFY_ATTEMPTS, VerifiedWrite, Verifying};

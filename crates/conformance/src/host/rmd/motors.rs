@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use motorlink::serve::CanStation;
+use motorlink_link::serve::CanStation;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     Circle, Code, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, Status1, TORQUE4_ID,

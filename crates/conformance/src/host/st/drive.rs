@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use motorlink::serve::ByteStation;
+use motorlink_link::serve::ByteStation;
 use motorlink_proto::stmcp::{
     Command, CurrentReference, ErrorCode, Features, Frame, Motor, Parse, Profile, Ramp, RegisterId,
     Request, RevupPhase, Slave, Status, Version,

@@ -1,0 +1,357 @@
+//! What goes wrong with a port, told to a person.
+
+use std::io;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+use std::time::Duration;
+
+use rustix::io::Errno;
+
+use super::interface::up_hint;
+
+/// Why a port could not be opened or does not carry on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PortError {
+    /// No device has this name.
+    #[error("there is no `{port}`: is it plugged in? `motorlink ports` lists what is there")]
+    NotFound {
+        /// The port.
+        port: String,
+    },
+    /// The device exists and this user may not open it.
+    #[error("no permission to open `{port}`: {}", permission_hint(.group.as_deref()))]
+    PermissionDenied {
+        /// The port.
+        port: String,
+        /// The group that may open it, when the system names one.
+        group: Option<String>,
+    },
+    /// Another program holds the port.
+    #[error(
+        "`{port}` is in use by another program: close that one first (`fuser -v {port}` names it)"
+    )]
+    Busy {
+        /// The port.
+        port: String,
+    },
+    /// The path is a directory, a plain file or a device of another kind.
+    #[error("`{port}` is not a serial device: `motorlink ports` lists those that are")]
+    NotSerial {
+        /// The port.
+        port: String,
+    },
+    /// The device cannot run at this baud rate.
+    #[error("`{port}` cannot run at {baud} baud: choose another rate, such as 115200")]
+    BaudRefused {
+        /// The port.
+        port: String,
+        /// The baud rate that was asked for.
+        baud: u32,
+    },
+    /// The port is of the other kind: a serial line where CAN is needed, or the reverse.
+    #[error("`{port}` cannot be used as a {wanted}: use {usable}")]
+    WrongKind {
+        /// The port.
+        port: String,
+        /// What was needed of it.
+        wanted: &'static str,
+        /// The forms that can be used instead.
+        usable: String,
+    },
+    /// No machine has this name.
+    #[error("cannot find the host of `{port}`: check its name and the network ({source})")]
+    UnknownHost {
+        /// The port.
+        port: String,
+        /// What the resolver said.
+        source: io::Error,
+    },
+    /// The machine is there and nothing listens.
+    #[error("`{port}` refuses the connection: is the server started, on this TCP port?")]
+    Refused {
+        /// The port.
+        port: String,
+    },
+    /// No answer came from the machine.
+    #[error("`{port}` cannot be reached: check the address and the network ({source})")]
+    Unreachable {
+        /// The port.
+        port: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The far end hung up, or the adapter was unplugged.
+    #[error(
+        "`{port}` was closed: the far end hung up or was unplugged; open it again when it is back"
+    )]
+    Closed {
+        /// The port.
+        port: String,
+    },
+    /// The port could not be opened again, and the next attempt is not due yet.
+    #[error("{why}")]
+    Away {
+        /// The port.
+        port: String,
+        /// What the last attempt said.
+        why: String,
+    },
+    /// The port takes no bytes or frames any more.
+    #[error("`{port}` takes no more data: {hint}")]
+    Stalled {
+        /// The port.
+        port: String,
+        /// What to look at.
+        hint: &'static str,
+    },
+    /// The clock port of an emulated board does not answer.
+    #[error(
+        "`{port}`: the board's clock did not answer within {after:?}: does the emulator run, is this \
+         its clock port, and is no other program connected to that?"
+    )]
+    ClockStopped {
+        /// The clock port.
+        port: String,
+        /// How long an answer was awaited.
+        after: Duration,
+    },
+    /// The time of this port is that of an emulated board, and its user needs the machine's.
+    #[error(
+        "`{port}` goes by the time of an emulated board, and event loops and guards go by the \
+         machine's: leave out `clock=`, or use a blocking client"
+    )]
+    Emulated {
+        /// The port.
+        port: String,
+    },
+    /// This kernel has no CAN at all.
+    #[error(
+        "this kernel has no CAN support: load it with `sudo modprobe can-raw`, or use an slcan adapter"
+    )]
+    NoCan,
+    /// No CAN interface has this name.
+    #[error("there is no CAN interface `{port}`: `motorlink ports` lists what is there")]
+    NoSuchInterface {
+        /// The interface.
+        port: String,
+    },
+    /// The CAN interface exists and is not up.
+    #[error("CAN interface `{port}` is down: {hint}")]
+    InterfaceDown {
+        /// The interface.
+        port: String,
+        /// How it is brought up.
+        hint: String,
+    },
+    /// The CAN controller left the bus after too many errors.
+    #[error(
+        "`{port}` is bus-off after too many errors: check wiring, termination and bitrate, then \
+         `sudo ip link set {port} down && sudo ip link set {port} up`"
+    )]
+    BusOff {
+        /// The interface.
+        port: String,
+    },
+    /// What answers does not speak slcan.
+    #[error(
+        "`{port}` does not answer like an slcan adapter ({reason}): is this the right device and baud rate?"
+    )]
+    NotSlcan {
+        /// The port.
+        port: String,
+        /// What it did instead.
+        reason: &'static str,
+    },
+    /// The slcan adapter will not run at this bitrate.
+    #[error(
+        "the adapter on `{port}` refuses {bitrate} bit/s: unplug it and plug it in again, or ask for another bitrate"
+    )]
+    BitrateRefused {
+        /// The port.
+        port: String,
+        /// The bitrate that was asked for.
+        bitrate: u32,
+    },
+    /// The slcan adapter takes no frames any more.
+    #[error(
+        "the adapter on `{port}` refuses frames: was it reset, or is no other node on the bus? its \
+         channel is opened again with the next call"
+    )]
+    AdapterRefuses {
+        /// The port.
+        port: String,
+    },
+    /// What configures the port is not taken.
+    #[error("`{port}`: {why}")]
+    Configuration {
+        /// The port.
+        port: String,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A served port would replace something that no server left behind.
+    #[error("`{port}` exists and is no {wanted}: remove it or choose another path")]
+    PathTaken {
+        /// The path.
+        port: String,
+        /// What may be replaced.
+        wanted: &'static str,
+    },
+    /// The link to a served pty was left behind by a server that was killed, and the pty that it
+    /// points to is another program's by now.
+    #[error(
+        "`{port}` is stale: the server that made it is gone, and its pty belongs to another program \
+         by now. Nothing was sent; start the server again"
+    )]
+    Stale {
+        /// The link.
+        port: String,
+    },
+    /// The link of a served pty is another server's.
+    #[error("`{port}` is served already: end that server or choose another path")]
+    PathServed {
+        /// The path.
+        port: String,
+    },
+    /// The address to listen on is taken.
+    #[error("`{port}` is taken by another program: choose another TCP port, or 0 for any free one")]
+    AddressInUse {
+        /// The port.
+        port: String,
+    },
+    /// The thread that waited for an exchange used the port from within, as a signal's handler does.
+    #[error(
+        "`{port}`: an exchange was given up for another one of the same thread, such as a signal \
+         handler's; nobody knows what the drive did"
+    )]
+    Overtaken {
+        /// The port.
+        port: String,
+    },
+    /// The program is about to end: its client was retired.
+    #[error("`{port}`: this program is about to end, and only stops motors; nothing was sent")]
+    Retired {
+        /// The port.
+        port: String,
+    },
+    /// Anything else that the system says.
+    #[error("`{port}` failed: {source}")]
+    Io {
+        /// The port.
+        port: String,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+impl PortError {
+    /// Whether a link ended a wait because its caller wants to do something else. The port stays open,
+    /// and the exchange is abandoned.
+    pub fn is_interruption(&self) -> bool {
+        match self {
+            PortError::Overtaken { .. } => true,
+            PortError::Io { source, .. } => source.kind() == io::ErrorKind::Interrupted,
+            _ => false,
+        }
+    }
+
+    /// What an error means for a port that is open.
+    pub(crate) fn in_use(port: &str, error: impl Into<io::Error>) -> Self {
+        let source = error.into();
+        let port = port.to_owned();
+        match Errno::from_io_error(&source) {
+            Some(
+                Errno::IO
+                | Errno::NXIO
+                | Errno::NODEV
+                | Errno::PIPE
+                | Errno::CONNRESET
+                | Errno::CONNABORTED
+                | Errno::NOTCONN
+                | Errno::TIMEDOUT,
+            ) => PortError::Closed { port },
+            Some(Errno::NETDOWN) => Self::interface_down(port),
+            Some(Errno::NOBUFS) => PortError::Stalled {
+                port,
+                hint: "no other node acknowledges the frames; check wiring, power and bitrate",
+            },
+            _ => PortError::Io { port, source },
+        }
+    }
+
+    pub(crate) fn interface_down(port: String) -> Self {
+        PortError::InterfaceDown { hint: up_hint(&port, Path::new("/sys")), port }
+    }
+
+    /// What an error means when the device at `path` is being opened.
+    pub(crate) fn at_open(path: &Path, error: impl Into<io::Error>) -> Self {
+        let source = error.into();
+        let port = path.display().to_string();
+        match Errno::from_io_error(&source) {
+            Some(Errno::NOENT | Errno::NODEV | Errno::NXIO) => PortError::NotFound { port },
+            Some(Errno::ACCESS | Errno::PERM) => {
+                PortError::PermissionDenied { port, group: owning_group(path, Path::new("/")) }
+            }
+            Some(Errno::BUSY | Errno::WOULDBLOCK) => PortError::Busy { port },
+            Some(Errno::ISDIR | Errno::NOTTY | Errno::NOTDIR) => PortError::NotSerial { port },
+            _ => PortError::Io { port, source },
+        }
+    }
+}
+
+/// What a person does to be allowed to open a device that `group` owns.
+pub(super) fn permission_hint(group: Option<&str>) -> String {
+    match group {
+        Some("root") | None => {
+            "only root may; a udev rule with TAG+=\"uaccess\" lets other users".to_owned()
+        }
+        Some(group) => {
+            format!("join the group: sudo usermod -aG {group} $USER, then log in again")
+        }
+    }
+}
+
+/// The name of the group that owns `path`, from the group file below `root`.
+pub(super) fn owning_group(path: &Path, root: &Path) -> Option<String> {
+    let gid = std::fs::metadata(path).ok()?.gid().to_string();
+    let groups = std::fs::read_to_string(root.join("etc/group")).ok()?;
+    groups.lines().find_map(|line| {
+        let mut fields = line.split(':');
+        let name = fields.next()?;
+        (fields.nth(1)? == gid).then(|| name.to_owned())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_denied_device_names_the_group_to_join() {
+        let error = PortError::PermissionDenied {
+            port: "/dev/ttyACM0".into(),
+            group: Some("dialout".into()),
+        };
+        assert_eq!(
+            error.to_string(),
+            "no permission to open `/dev/ttyACM0`: join the group: \
+             sudo usermod -aG dialout $USER, then log in again"
+        );
+        // Only the kernel's root group may be named where nobody should join it.
+        assert!(permission_hint(Some("root")).contains("udev"));
+        assert_eq!(owning_group(Path::new("/dev/null"), Path::new("/")).as_deref(), Some("root"));
+    }
+
+    #[test]
+    fn a_lost_line_is_told_from_other_failures() {
+        for errno in [Errno::IO, Errno::NODEV, Errno::CONNRESET, Errno::PIPE] {
+            assert!(matches!(PortError::in_use("p", errno), PortError::Closed { .. }), "{errno}");
+        }
+        assert!(matches!(PortError::in_use("p", Errno::NOMEM), PortError::Io { .. }));
+        assert_eq!(
+            PortError::in_use("can1", Errno::NETDOWN).to_string(),
+            "CAN interface `can1` is down: sudo ip link set can1 up type can bitrate 1000000"
+        );
+    }
+}

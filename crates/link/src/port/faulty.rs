@@ -1,0 +1,278 @@
+//! Ports that misbehave: a program's handling of errors, rehearsed on any port.
+
+use std::time::Duration;
+
+use motorlink_proto::can::{CanFrame, Identifiers};
+use motorlink_proto::time::Instant;
+
+use super::error::PortError;
+use super::link::{ByteLink, CanLink};
+use crate::clock::Clock;
+use crate::fault::{Faults, Lane, Unit, Way};
+
+/// A byte line with faults in both directions.
+///
+/// There is no thread: what is late in either direction moves while the program reads or writes.
+#[derive(Debug)]
+pub struct FaultBytes<B> {
+    link: B,
+    lanes: Lanes<u8>,
+}
+
+/// A CAN port with faults in both directions, as [`FaultBytes`] is for bytes.
+#[derive(Debug)]
+pub struct FaultCan<C> {
+    link: C,
+    lanes: Lanes<CanFrame>,
+}
+
+impl<B: ByteLink> FaultBytes<B> {
+    /// Wraps `link`. [`Faults::on_serial`] finds what has no meaning here.
+    pub fn new(link: B, faults: &Faults) -> Self {
+        Self::paced(link, faults, Duration::ZERO)
+    }
+
+    /// Wraps a `link` that has no pace of its own: a byte takes so long, in either direction.
+    pub fn paced(link: B, faults: &Faults, byte: Duration) -> Self {
+        FaultBytes { lanes: Lanes::new(faults, byte, (), link.clock()), link }
+    }
+
+    fn transmit(&mut self) -> Result<(), PortError> {
+        let now = self.lanes.now();
+        let mut chunk = [0; 256];
+        loop {
+            let size = fill(&mut chunk, || self.lanes.sent.pop(now));
+            if size == 0 {
+                return Ok(());
+            }
+            self.link.write(&chunk[..size])?;
+        }
+    }
+}
+
+impl<C: CanLink> FaultCan<C> {
+    /// Wraps `link`. [`Faults::on_can`] finds what has no meaning here.
+    /// Noise spares the drives that use `identifiers`.
+    pub fn new(link: C, faults: &Faults, identifiers: Identifiers) -> Self {
+        Self::paced(link, faults, identifiers, Duration::ZERO)
+    }
+
+    /// Wraps a `link` that has no pace of its own: a frame takes so long, and both directions share
+    /// the bus.
+    pub fn paced(link: C, faults: &Faults, identifiers: Identifiers, frame: Duration) -> Self {
+        FaultCan { lanes: Lanes::new(faults, frame, identifiers, link.clock()), link }
+    }
+
+    fn transmit(&mut self) -> Result<(), PortError> {
+        let now = self.lanes.now();
+        while let Some(frame) = self.lanes.sent.pop(now) {
+            self.link.send(&frame)?;
+        }
+        Ok(())
+    }
+}
+
+impl<B: ByteLink> ByteLink for FaultBytes<B> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        let now = self.lanes.now();
+        self.lanes.sent.push(now, bytes.iter().copied());
+        self.transmit()
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        let deadline = self.lanes.deadline(timeout);
+        let mut chunk = [0; 256];
+        loop {
+            self.transmit()?;
+            let wait = self.lanes.patience(deadline);
+            let came = self.link.read(&mut chunk, wait)?;
+            let now = self.lanes.now();
+            if came > 0 {
+                self.lanes.received.push(now, chunk[..came].iter().copied());
+            }
+            let size = fill(buffer, || self.lanes.received.pop(now));
+            if size > 0 || deadline.is_some_and(|end| end <= now) {
+                return Ok(size);
+            }
+        }
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.link.clock()
+    }
+
+    fn is_fresh(&self) -> bool {
+        self.link.is_fresh()
+    }
+}
+
+impl<C: CanLink> CanLink for FaultCan<C> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let free = self.lanes.now().max(self.lanes.received.free());
+        self.lanes.sent.push(free, [*frame]);
+        self.transmit()
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        let deadline = self.lanes.deadline(timeout);
+        loop {
+            self.transmit()?;
+            let wait = self.lanes.patience(deadline);
+            let came = self.link.receive(wait)?;
+            let now = self.lanes.now();
+            if let Some(frame) = came {
+                self.lanes.received.push(now.max(self.lanes.sent.free()), [frame]);
+            }
+            let frame = self.lanes.received.pop(now);
+            if frame.is_some() || deadline.is_some_and(|end| end <= now) {
+                return Ok(frame);
+            }
+        }
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.link.clock()
+    }
+
+    fn is_fresh(&self) -> bool {
+        self.link.is_fresh()
+    }
+
+    fn trouble(&self) -> Option<&'static str> {
+        self.link.trouble()
+    }
+}
+
+fn fill(buffer: &mut [u8], mut next: impl FnMut() -> Option<u8>) -> usize {
+    let slots = buffer.iter_mut();
+    slots.map_while(|slot| next().map(|byte| *slot = byte)).count()
+}
+
+/// Both directions, and the clock they go by.
+#[derive(Debug)]
+struct Lanes<T: Unit> {
+    clock: Clock,
+    sent: Lane<T>,
+    received: Lane<T>,
+}
+
+impl<T: Unit> Lanes<T> {
+    fn new(faults: &Faults, pace: Duration, protocol: T::Protocol, clock: Option<Clock>) -> Self {
+        let lane = |way| Lane::new(faults, way, pace.into(), protocol.clone());
+        let clock = clock.unwrap_or_default();
+        Lanes { clock, sent: lane(Way::Sent), received: lane(Way::Received) }
+    }
+
+    fn now(&self) -> Instant {
+        self.clock.now()
+    }
+
+    /// The end of a wait that begins now.
+    fn deadline(&self, timeout: Option<Duration>) -> Option<Instant> {
+        timeout.map(|timeout| self.now() + timeout.into())
+    }
+
+    /// How long to wait for the port: not beyond the deadline nor past what is due meanwhile.
+    fn patience(&self, deadline: Option<Instant>) -> Option<Duration> {
+        let first = [self.sent.due(), self.received.due(), deadline].into_iter().flatten().min();
+        first.map(|first| first.since(self.now()).into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+    use std::time::Instant as Moment;
+
+    use super::*;
+
+    /// Sends back what it is sent, at once.
+    struct Loopback<T>(VecDeque<T>);
+
+    impl<T> Loopback<T> {
+        fn new() -> Self {
+            Loopback(VecDeque::new())
+        }
+    }
+
+    /// A port waits when it has nothing.
+    fn idle(timeout: Option<Duration>) {
+        std::thread::sleep(timeout.expect("nothing will ever come"));
+    }
+
+    impl ByteLink for Loopback<u8> {
+        fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+            self.0.extend(bytes);
+            Ok(())
+        }
+        fn read(
+            &mut self,
+            buffer: &mut [u8],
+            timeout: Option<Duration>,
+        ) -> Result<usize, PortError> {
+            let size = fill(buffer, || self.0.pop_front());
+            if size == 0 {
+                idle(timeout);
+            }
+            Ok(size)
+        }
+    }
+
+    impl CanLink for Loopback<CanFrame> {
+        fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+            self.0.push_back(*frame);
+            Ok(())
+        }
+        fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+            let frame = self.0.pop_front();
+            if frame.is_none() {
+                idle(timeout);
+            }
+            Ok(frame)
+        }
+    }
+
+    fn bytes(faults: &str) -> FaultBytes<Loopback<u8>> {
+        FaultBytes::new(Loopback::new(), &faults.parse().unwrap())
+    }
+
+    #[test]
+    fn bytes_that_are_late_both_ways_arrive_in_one_read() {
+        let mut port = bytes("delay=5ms");
+        let began = Moment::now();
+        port.write(&[1, 2, 3]).unwrap();
+        let mut buffer = [0; 8];
+        assert_eq!(port.read(&mut buffer, None).unwrap(), 3);
+        assert_eq!(buffer[..3], [1, 2, 3]);
+        assert!(began.elapsed() >= Duration::from_millis(10));
+    }
+
+    #[test]
+    fn a_read_ends_at_its_timeout_and_what_is_late_comes_with_the_next() {
+        let mut port = bytes("delay=1s,only=received");
+        port.write(&[1]).unwrap();
+        let mut buffer = [0; 8];
+        assert_eq!(port.read(&mut buffer, Some(Duration::ZERO)).unwrap(), 0);
+        assert_eq!(port.read(&mut buffer, Some(Duration::from_millis(1))).unwrap(), 0);
+        assert_eq!(port.read(&mut buffer, Some(Duration::from_secs(60))).unwrap(), 1);
+    }
+
+    #[test]
+    fn lost_bytes_never_come() {
+        let mut port = bytes("drop=1");
+        port.write(&[1, 2, 3]).unwrap();
+        assert_eq!(port.read(&mut [0; 8], Some(Duration::from_millis(1))).unwrap(), 0);
+    }
+
+    #[test]
+    fn frames_are_late_and_come_twice() {
+        let faults = "delay=1s,dup=1,only=sent".parse().unwrap();
+        let mut port = FaultCan::new(Loopback::new(), &faults, Identifiers::default());
+        let frame = CanFrame::new(0x141, [0x9A; 8]);
+        port.send(&frame).unwrap();
+        assert_eq!(port.receive(Some(Duration::ZERO)).unwrap(), None);
+        assert_eq!(port.receive(None).unwrap(), Some(frame));
+        assert_eq!(port.receive(None).unwrap(), Some(frame));
+        assert_eq!(port.receive(Some(Duration::from_millis(1))).unwrap(), None);
+    }
+}

@@ -1,0 +1,47 @@
+//! Ports: a serial line or a CAN bus, opened by name.
+//!
+//! [`PortName::open_line`] and [`PortName::open_can`] give a [`ByteLink`] or a [`CanLink`]. Links
+//! start no thread, allocate nothing in an exchange, and make one system call to send, one to wait
+//! and one to receive.
+//!
+//! A [`Scheme`] is one kind of port: how its names are written, what they open, what of it this
+//! machine has. Those of this crate are always there; [`register`] adds those of others.
+
+mod deadline;
+mod descriptors;
+mod echo;
+mod emulated;
+mod error;
+mod event;
+mod faulty;
+mod fd;
+mod interface;
+mod link;
+mod name;
+mod queued;
+mod registry;
+mod scheme;
+mod schemes;
+mod slcan;
+mod socketcan;
+mod system;
+mod tap;
+
+pub use descriptors::open_descriptors;
+pub use echo::EchoCanceller;
+pub use error::PortError;
+pub use event::{EventCan, EventLine, Evented};
+pub use faulty::{FaultBytes, FaultCan};
+pub use fd::FdLink;
+pub use link::{ByteLink, CanLink};
+pub use name::{Given, NameError};
+pub use registry::{register, schemes};
+pub use scheme::{CanPort, Carries, Form, LinePort, Port, PortInfo, PortName, Scheme};
+pub use schemes::DEFAULT_BAUD;
+pub use slcan::SlcanLink;
+pub use socketcan::SocketCanLink;
+pub use tap::{Direction, TapBytes, TapCan};
+
+pub(crate) use fd::timespec;
+pub(crate) use name::{host_and_port, present, unknown_form};
+pub(crate) use schemes::{MARKED_LINK, keep_alive, mark, unbracketed};

@@ -1,0 +1,147 @@
+//! What a port's name is made of.
+
+/// A name as it was given, on its way through a scheme.
+#[derive(Debug)]
+pub struct Given<'a> {
+    /// All of it, for messages.
+    pub name: &'a str,
+    /// What stands before the options, which follow the last `?`, so that a path may contain one.
+    pub body: &'a str,
+    options: Vec<(&'a str, &'a str)>,
+}
+
+impl<'a> Given<'a> {
+    pub(crate) fn new(name: &'a str) -> Self {
+        let (body, query) = name.rsplit_once('?').unwrap_or((name, ""));
+        let options = query.split('&').filter(|option| !option.is_empty());
+        let options = options.map(|option| option.split_once('=').unwrap_or((option, "")));
+        Given { name, body, options: options.collect() }
+    }
+
+    /// Takes the value of an option, if it was given; the last one where it was given twice.
+    pub fn take(&mut self, key: &str) -> Option<&'a str> {
+        let value = self.options.iter().rev().find(|(given, _)| *given == key)?.1;
+        self.options.retain(|(given, _)| *given != key);
+        Some(value)
+    }
+
+    /// Refuses options that nobody took; `known` are those there are.
+    pub fn refuse_others(&self, known: &[&str]) -> Result<(), NameError> {
+        let Some((key, _)) = self.options.first() else { return Ok(()) };
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        Err(NameError::UnknownOption { name: self.name.to_owned(), key: (*key).to_owned(), known })
+    }
+
+    /// A part that must not be empty; `example` shows how a name has it.
+    pub fn present<'p>(
+        &self,
+        part: &'p str,
+        what: &'static str,
+        example: &'static str,
+    ) -> Result<&'p str, NameError> {
+        present(self.name, part, what, example)
+    }
+
+    /// What to say about an option whose value cannot be.
+    pub fn bad_option(&self, key: &'static str, value: &str, usable: String) -> NameError {
+        let (name, value) = (self.name.to_owned(), value.to_owned());
+        NameError::BadOption { name, key, value, usable }
+    }
+}
+
+/// Why a string names no port.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NameError {
+    /// No form starts like this.
+    #[error("`{name}` names no port; did you mean `{nearest}`? {forms}")]
+    UnknownForm {
+        /// What was given.
+        name: String,
+        /// The form that it is most like.
+        nearest: String,
+        /// The forms there are.
+        forms: String,
+    },
+    /// A port of this form exists on other systems only.
+    #[error("`{name}`: `{scheme}:` is there on {systems} only")]
+    OtherSystem {
+        /// What was given.
+        name: String,
+        /// Its scheme.
+        scheme: &'static str,
+        /// The systems that have it.
+        systems: String,
+    },
+    /// The part after the scheme is missing.
+    #[error("`{name}` lacks {what}; write it like {example}")]
+    Incomplete {
+        /// What was given.
+        name: String,
+        /// What is missing.
+        what: &'static str,
+        /// How it is done.
+        example: &'static str,
+    },
+    /// What stands behind `slcan:` is a port without bytes.
+    #[error("`{name}`: there is no serial line at `{behind}` for the adapter")]
+    NoLineBehind {
+        /// What was given.
+        name: String,
+        /// The part behind the scheme.
+        behind: String,
+    },
+    /// An option that this form does not have.
+    #[error("`{name}` has the unknown option `{key}`; there is {known}")]
+    UnknownOption {
+        /// What was given.
+        name: String,
+        /// The option.
+        key: String,
+        /// The options there are.
+        known: String,
+    },
+    /// An option with a value that it cannot have.
+    #[error("`{name}`: {key} cannot be `{value}`; use {usable}")]
+    BadOption {
+        /// What was given.
+        name: String,
+        /// The option.
+        key: &'static str,
+        /// Its value.
+        value: String,
+        /// The values it can have.
+        usable: String,
+    },
+}
+
+pub(crate) fn unknown_form(name: &str, nearest: String, forms: String) -> NameError {
+    NameError::UnknownForm { name: name.to_owned(), nearest, forms }
+}
+
+pub(crate) fn present<'a>(
+    name: &str,
+    part: &'a str,
+    what: &'static str,
+    example: &'static str,
+) -> Result<&'a str, NameError> {
+    if part.is_empty() {
+        return Err(NameError::Incomplete { name: name.to_owned(), what, example });
+    }
+    Ok(part)
+}
+
+pub(crate) fn host_and_port(
+    name: &str,
+    address: &str,
+    example: &'static str,
+) -> Result<(String, u16), NameError> {
+    let lacks = |what| NameError::Incomplete { name: name.to_owned(), what, example };
+    let (host, port) = address.rsplit_once(':').ok_or_else(|| lacks("a TCP port"))?;
+    if host.contains(':') && !(host.starts_with('[') && host.ends_with(']')) {
+        return Err(lacks("the brackets around its IPv6 address"));
+    }
+    let host = present(name, host, "a host", example)?;
+    let port = port.parse().map_err(|_| lacks("a TCP port from 0 to 65535"))?;
+    Ok((host.to_owned(), port))
+}

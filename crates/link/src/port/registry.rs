@@ -1,0 +1,122 @@
+//! The schemes there are, and the ports that their names open.
+
+use std::str::FromStr;
+use std::sync::{PoisonError, RwLock};
+
+use super::error::PortError;
+use super::event::{EventCan, EventLine};
+use super::link::{ByteLink, CanLink};
+use super::name::{Given, NameError, unknown_form};
+use super::scheme::{CanPort, Carries, LinePort, PortName, Scheme, parse};
+use super::schemes::BUILT_IN;
+
+static REGISTERED: RwLock<Vec<&'static dyn Scheme>> = RwLock::new(Vec::new());
+
+/// Makes a scheme known to this process. One of the same name is replaced, so that it does no harm
+/// to register one twice.
+pub fn register(scheme: &'static dyn Scheme) {
+    let mut registered = REGISTERED.write().unwrap_or_else(PoisonError::into_inner);
+    registered.retain(|other| other.name() != scheme.name());
+    registered.push(scheme);
+}
+
+/// The schemes there are.
+pub fn schemes() -> Vec<&'static dyn Scheme> {
+    let registered = REGISTERED.read().unwrap_or_else(PoisonError::into_inner);
+    BUILT_IN.iter().chain(registered.iter()).copied().collect()
+}
+
+impl FromStr for PortName {
+    type Err = NameError;
+
+    fn from_str(name: &str) -> Result<Self, NameError> {
+        let schemes = schemes();
+        let mut given = Given::new(name);
+        let body = given.body;
+        match parse(body, &mut given, &schemes) {
+            Some((scheme, port)) => {
+                let port = port?;
+                given.refuse_others(scheme.options())?;
+                Ok(port)
+            }
+            None => {
+                let mut forms = format!("ports are {}", listed(&schemes, |_| true, "and"));
+                if name.contains(':') && schemes.len() == BUILT_IN.len() {
+                    forms += "; this program has registered no schemes of other crates, such as \
+                        `sim:` of motorlink-testbench";
+                }
+                Err(unknown_form(name, nearest(name, &schemes), forms))
+            }
+        }
+    }
+}
+
+impl PortName {
+    /// Opens the port as a serial line.
+    pub fn open_line(&self) -> Result<Box<dyn ByteLink>, PortError> {
+        self.line()?.open()
+    }
+
+    /// Opens the port as a CAN bus.
+    pub fn open_can(&self) -> Result<Box<dyn CanLink>, PortError> {
+        self.can()?.open()
+    }
+
+    /// Opens the port as a serial line for an event loop. Opening itself may wait.
+    pub fn open_event_line(&self) -> Result<Box<dyn EventLine>, PortError> {
+        self.line()?.open_event()
+    }
+
+    /// Opens the port as a CAN bus for an event loop. Opening itself may wait.
+    pub fn open_event_can(&self) -> Result<Box<dyn EventCan>, PortError> {
+        self.can()?.open_event()
+    }
+
+    fn line(&self) -> Result<&dyn LinePort, PortError> {
+        self.as_line().ok_or_else(|| self.unusable("serial line", Carries::Bytes))
+    }
+
+    fn can(&self) -> Result<&dyn CanPort, PortError> {
+        self.as_can().ok_or_else(|| self.unusable("CAN bus", Carries::Frames))
+    }
+
+    fn unusable(&self, wanted: &'static str, carries: Carries) -> PortError {
+        let usable = listed(&schemes(), |form| form.serves(carries), "or");
+        PortError::WrongKind { port: self.to_string(), wanted, usable }
+    }
+}
+
+/// The forms of all schemes that carry what is wanted.
+fn listed(
+    schemes: &[&'static dyn Scheme],
+    is_wanted: impl Fn(Carries) -> bool,
+    last: &str,
+) -> String {
+    let forms = schemes.iter().flat_map(|scheme| scheme.forms());
+    let mut texts: Vec<&str> =
+        forms.filter(|form| is_wanted(form.carries)).map(|form| form.text).collect();
+    let end = texts.pop().unwrap_or_default();
+    if texts.is_empty() { end.to_owned() } else { format!("{} {last} {end}", texts.join(", ")) }
+}
+
+/// The port that someone who wrote `name` may have meant.
+fn nearest(name: &str, schemes: &[&'static dyn Scheme]) -> String {
+    let Some((scheme, rest)) = name.split_once(':') else {
+        return match name {
+            _ if schemes.iter().any(|scheme| scheme.name() == name) => format!("{name}:"),
+            _ if name.contains("can") => format!("socketcan:{name}"),
+            _ => format!("./{name}"),
+        };
+    };
+    match scheme {
+        "can" | "socket" => format!("socketcan:{rest}"),
+        "sl" | "lawicel" | "slcand" | "slcan-pty" => format!("slcan:{rest}"),
+        "tcp-listen" => format!("tcp:{rest}"),
+        "unix-listen" => format!("unix:{rest}"),
+        _ if rest.parse::<u16>().is_ok() => format!("tcp:{name}"),
+        _ => format!("serial:{rest}"),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,16 @@
+//! The schemes of this crate: a file and a line each.
+
+mod serial;
+mod slcan;
+mod socketcan;
+mod tcp;
+mod unix;
+
+use super::scheme::Scheme;
+
+pub use serial::DEFAULT_BAUD;
+pub(crate) use serial::{MARKED_LINK, mark};
+pub(crate) use tcp::{keep_alive, unbracketed};
+
+pub(super) const BUILT_IN: [&dyn Scheme; 5] =
+    [&serial::Serial, &tcp::Tcp, &unix::Unix, &slcan::Slcan, &socketcan::SocketCan];

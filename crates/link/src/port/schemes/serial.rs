@@ -1,0 +1,264 @@
+//! UARTs, and ptys that stand for them.
+//!
+//! Eight data bits, no parity, one stop bit, no flow control. An FTDI adapter holds back received
+//! bytes for 16 ms as delivered; its timer is set to 1 ms where this user may. `ASYNC_LOW_LATENCY`
+//! would do the same for some other drivers and is not set: it can only be reached through an
+//! unsafe call.
+
+use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{Access, FlockOperation, Mode, OFlags, access, flock, open as open_fd};
+use rustix::io::Errno;
+use rustix::termios::{
+    ControlModes, OptionalActions, QueueSelector, ioctl_tiocexcl, tcflush, tcgetattr, tcgetwinsize,
+    tcsetattr, tcsetwinsize,
+};
+
+use super::super::error::{PortError, owning_group, permission_hint};
+use super::super::event::EventLine;
+use super::super::fd::FdLink;
+use super::super::link::ByteLink;
+use super::super::name::{Given, NameError};
+use super::super::queued::QueuedLine;
+use super::super::scheme::{Carries, Form, LinePort, Port, PortInfo, PortName, Scheme};
+use super::super::system;
+
+/// The baud rate of a serial line whose name gives none.
+pub const DEFAULT_BAUD: u32 = 115_200;
+
+/// `serial:/dev/ttyACM0?baud=115200`, or the bare path of a device.
+pub(super) struct Serial;
+
+impl Scheme for Serial {
+    fn name(&self) -> &'static str {
+        "serial"
+    }
+
+    fn forms(&self) -> &'static [Form] {
+        const FORM: Form = Form { text: "", help: "a UART", carries: Carries::Bytes };
+        &[
+            Form { text: "/dev/ttyACM0", ..FORM },
+            Form {
+                text: "serial:/dev/ttyUSB0?baud=9600",
+                help: "the same at another baud rate than 115200",
+                ..FORM
+            },
+        ]
+    }
+
+    fn is_bare(&self, name: &str) -> bool {
+        name.starts_with(['/', '.']) || (name.contains("tty") && !name.contains(':'))
+    }
+
+    fn parse(
+        &self,
+        rest: &str,
+        given: &mut Given<'_>,
+        _: &[&'static dyn Scheme],
+    ) -> Result<PortName, NameError> {
+        let path = given.present(rest, "a device", "serial:/dev/ttyACM0")?;
+        Device::at(path).with_options(given)
+    }
+
+    fn options(&self) -> &'static [&'static str] {
+        &["baud"]
+    }
+
+    fn list(&self, root: &Path) -> Vec<PortInfo> {
+        let ttys = system::names_in(&root.join("sys/class/tty"));
+        ttys.iter().filter_map(|name| listed(root, name)).collect()
+    }
+}
+
+/// A UART, or a pty that stands for one.
+#[derive(Debug, Clone)]
+pub(super) struct Device {
+    path: PathBuf,
+    baud: u32,
+}
+
+impl Device {
+    /// The device at `path`; a lone `ttyACM0` is the one in `/dev`.
+    pub(super) fn at(path: &str) -> Self {
+        let is_lone = path.starts_with("tty") && !path.contains('/');
+        let path = if is_lone { Path::new("/dev").join(path) } else { PathBuf::from(path) };
+        Device { path, baud: DEFAULT_BAUD }
+    }
+
+    pub(super) fn with_options(mut self, given: &mut Given<'_>) -> Result<PortName, NameError> {
+        if let Some(value) = given.take("baud") {
+            self.baud = value.parse().ok().filter(|&rate| rate > 0).ok_or_else(|| {
+                let usable = "a number like 9600, 115200 or 1843200".to_owned();
+                given.bad_option("baud", value, usable)
+            })?;
+        }
+        Ok(PortName::new(self))
+    }
+}
+
+impl Port for Device {
+    fn body(&self) -> String {
+        format!("serial:{}", self.path.display())
+    }
+
+    fn options(&self) -> Vec<String> {
+        let is_other = self.baud != DEFAULT_BAUD;
+        is_other.then(|| format!("baud={}", self.baud)).into_iter().collect()
+    }
+
+    fn as_line(&self) -> Option<&dyn LinePort> {
+        Some(self)
+    }
+}
+
+impl LinePort for Device {
+    fn open(&self) -> Result<Box<dyn ByteLink>, PortError> {
+        Ok(Box::new(open(&self.path, self.baud)?))
+    }
+
+    fn open_event(&self) -> Result<Box<dyn EventLine>, PortError> {
+        Ok(Box::new(QueuedLine::new(open(&self.path, self.baud)?)))
+    }
+
+    fn label(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    fn baud(&self) -> Option<u32> {
+        Some(self.baud)
+    }
+
+    fn at_baud(&self, baud: u32) -> Option<PortName> {
+        Some(PortName::new(Device { baud, ..self.clone() }))
+    }
+}
+
+/// Opens the device at `path`, for this process alone.
+fn open(path: &Path, baud: u32) -> Result<FdLink, PortError> {
+    let device = path.canonicalize().map_err(|error| PortError::at_open(path, error))?;
+    let fd = open_device(&device).map_err(|errno| PortError::at_open(path, errno))?;
+    if is_stale(path, &fd) {
+        return Err(PortError::Stale { port: path.display().to_string() });
+    }
+    claim(&fd, &device).map_err(|errno| PortError::at_open(path, errno))?;
+    let actual = configure(&fd, baud).map_err(|errno| PortError::at_open(path, errno))?;
+    let port = path.display().to_string();
+    // A divider rarely hits the rate exactly; a UART bears 2 % on each side.
+    if actual.abs_diff(baud) > baud / 25 {
+        return Err(PortError::BaudRefused { port, baud });
+    }
+    shorten_latency(&device);
+    FdLink::new(fd, port)
+}
+
+fn open_device(device: &Path) -> Result<OwnedFd, Errno> {
+    // Without NONBLOCK, opening would wait for a modem's carrier.
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+    open_fd(device, flags, Mode::empty())
+}
+
+/// Keeps others out.
+fn claim(fd: &OwnedFd, device: &Path) -> Result<(), Errno> {
+    flock(fd, FlockOperation::NonBlockingLockExclusive)?;
+    // The lock keeps out programs that lock too; a real device can keep out all others. Not a pty:
+    // whoever serves it holds it open, and the mark would outlive us.
+    if !device.starts_with("/dev/pts") {
+        ioctl_tiocexcl(fd)?;
+    }
+    Ok(())
+}
+
+/// What there is to say of a tty.
+fn listed(root: &Path, name: &str) -> Option<PortInfo> {
+    let class = root.join("sys/class/tty").join(name);
+    let device = class.join("device");
+    // A console has no device; the kernel's spare UARTs have type 0.
+    if !device.exists() || system::read(&class.join("type")).as_deref() == Some("0") {
+        return None;
+    }
+    let path = root.join("dev").join(name);
+    let problem = match access(&path, Access::READ_OK | Access::WRITE_OK) {
+        Ok(()) => None,
+        Err(rustix::io::Errno::NOENT) => Some("the device has no node in /dev".to_owned()),
+        Err(_) => {
+            let group = owning_group(&path, root);
+            Some(format!("no permission: {}", permission_hint(group.as_deref())))
+        }
+    };
+    Some(PortInfo {
+        name: format!("/dev/{name}"),
+        carries: Carries::Bytes,
+        description: system::description(&device),
+        stable_path: stable_path(root, name),
+        problem,
+    })
+}
+
+fn stable_path(root: &Path, name: &str) -> Option<PathBuf> {
+    let links = root.join("dev/serial/by-id");
+    let points_here = |link: &String| {
+        std::fs::read_link(links.join(link)).is_ok_and(|target| target.ends_with(name))
+    };
+    let link = system::names_in(&links).into_iter().find(points_here)?;
+    Some(Path::new("/dev/serial/by-id").join(link))
+}
+
+/// How the target of a link to a pty begins when a server of ours made the link. The kernel takes it
+/// as it takes `/dev/pts/`; no other program writes it so.
+pub(crate) const MARKED_LINK: &str = "/dev/pts/./";
+
+/// Marks the pty of a server as the one that `link` was made for: in the two sizes of its window that
+/// nothing uses. A later pty that gets the same number does not have them.
+pub(crate) fn mark(pty: impl AsFd, link: &Path) -> std::io::Result<()> {
+    let mut size = tcgetwinsize(&pty)?;
+    (size.ws_xpixel, size.ws_ypixel) = mark_of(link.symlink_metadata()?.ino());
+    Ok(tcsetwinsize(&pty, size)?)
+}
+
+/// Whether a server of ours made the link that `path` is or leads to, for another pty than this.
+fn is_stale(path: &Path, pty: &OwnedFd) -> bool {
+    let Some(inode) = marked_link(path) else { return false };
+    !tcgetwinsize(pty).is_ok_and(|size| (size.ws_xpixel, size.ws_ypixel) == mark_of(inode))
+}
+
+/// The inode of the link of a server of ours, if `path` is one or leads to one.
+fn marked_link(path: &Path) -> Option<u64> {
+    let mut link = PathBuf::from(path);
+    // A loop cannot be opened in the first place.
+    loop {
+        let target = std::fs::read_link(&link).ok()?;
+        if target.as_os_str().as_bytes().starts_with(MARKED_LINK.as_bytes()) {
+            return Some(link.symlink_metadata().ok()?.ino());
+        }
+        link = link.parent()?.join(target);
+    }
+}
+
+/// Never what an unmarked pty has, which is zero.
+fn mark_of(inode: u64) -> (u16, u16) {
+    let mixed = inode.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    ((mixed >> 48) as u16 | 1, (mixed >> 32) as u16)
+}
+
+/// Sets the line up, drops what came before, and returns the baud rate that the driver took.
+fn configure(fd: &OwnedFd, baud: u32) -> Result<u32, Errno> {
+    let mut settings = tcgetattr(fd)?;
+    settings.make_raw();
+    settings.control_modes |= ControlModes::CREAD | ControlModes::CLOCAL;
+    settings.control_modes -= ControlModes::CSTOPB | ControlModes::CRTSCTS;
+    settings.set_speed(baud)?;
+    tcsetattr(fd, OptionalActions::Now, &settings)?;
+    tcflush(fd, QueueSelector::IFlush)?;
+    Ok(tcgetattr(fd)?.output_speed())
+}
+
+/// Best effort: only FTDI adapters have this file, and only some systems let users write it.
+fn shorten_latency(device: &Path) {
+    if let Some(name) = device.file_name() {
+        let timer = Path::new("/sys/class/tty").join(name).join("device/latency_timer");
+        let _ = std::fs::write(timer, "1");
+    }
+}

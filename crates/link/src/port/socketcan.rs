@@ -1,0 +1,165 @@
+//! Linux CAN.
+
+use std::os::fd::{AsFd, BorrowedFd};
+use std::path::Path;
+use std::time::Duration;
+
+use motorlink_proto::can::CanFrame;
+use rustix::event::PollFlags;
+use rustix::io::Errno;
+use socketcan::{
+    CanDataFrame, CanRemoteFrame, CanSocket, EmbeddedFrame, ExtendedId, Id, Socket, SocketOptions,
+    StandardId,
+};
+
+use super::deadline::Deadline;
+use super::descriptors::Listed;
+use super::error::PortError;
+use super::fd::wait;
+use super::interface::Interface;
+use super::link::CanLink;
+
+/// The error class of a controller that left the bus, in the mask of the kernel's error frames.
+const BUS_OFF: u32 = 0x40;
+/// How long an interface may take no frame at all before a sending fails.
+const SEND_TIMEOUT: Duration = Duration::from_secs(1);
+/// The kernel does not tell when an interface's queue has room again.
+const ASK_AGAIN: Duration = Duration::from_micros(200);
+
+/// A [`CanLink`] on a CAN interface. Other programs on the same interface see the frames that it
+/// sends; it does not see them itself.
+#[derive(Debug)]
+pub struct SocketCanLink {
+    /// Before the descriptor: fields are dropped in order.
+    _listed: Listed,
+    socket: CanSocket,
+    interface: String,
+}
+
+impl SocketCanLink {
+    /// Opens the CAN interface of this name, which must be up.
+    pub fn open(interface: &str) -> Result<Self, PortError> {
+        let port = interface.to_owned();
+        let opened = CanSocket::open(interface).and_then(|socket| {
+            socket.set_nonblocking(true)?;
+            socket.set_error_filter(BUS_OFF)?;
+            Ok(socket)
+        });
+        let socket = opened.map_err(|error| match Errno::from_io_error(&error) {
+            Some(Errno::AFNOSUPPORT) => PortError::NoCan,
+            Some(Errno::NODEV | Errno::NXIO | Errno::INVAL) => {
+                PortError::NoSuchInterface { port: port.clone() }
+            }
+            _ => PortError::in_use(&port, error),
+        })?;
+        match Interface::read(interface, Path::new("/sys")) {
+            Some(Interface { is_up: false, .. }) => return Err(PortError::interface_down(port)),
+            // It would take frames and drop them.
+            Some(Interface { is_bus_off: true, .. }) => return Err(PortError::BusOff { port }),
+            _ => {}
+        }
+        Ok(SocketCanLink { _listed: Listed::new(socket.as_fd()), socket, interface: port })
+    }
+
+    /// Hands `frame` to the bus if the interface has room for it now.
+    pub(crate) fn offer(&mut self, frame: &CanFrame) -> Result<bool, PortError> {
+        let frame = to_kernel(frame);
+        loop {
+            let Err(error) = self.socket.write_frame(&frame) else { return Ok(true) };
+            match Errno::from_io_error(&error) {
+                Some(Errno::INTR) => {}
+                Some(Errno::AGAIN | Errno::NOBUFS) => return Ok(false),
+                _ => return Err(self.lost(error)),
+            }
+        }
+    }
+
+    pub(super) fn lost(&self, error: impl Into<std::io::Error>) -> PortError {
+        PortError::in_use(&self.interface, error)
+    }
+}
+
+impl AsFd for SocketCanLink {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+}
+
+impl CanLink for SocketCanLink {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let deadline = Deadline::after(Some(SEND_TIMEOUT));
+        while !self.offer(frame)? {
+            if deadline.remaining() == Some(Duration::ZERO) {
+                return Err(self.lost(Errno::NOBUFS));
+            }
+            std::thread::sleep(ASK_AGAIN);
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        let deadline = Deadline::after(timeout);
+        while wait(self.as_fd(), PollFlags::IN, deadline).map_err(|errno| self.lost(errno))? {
+            match self.socket.read_frame() {
+                Ok(socketcan::CanFrame::Error(_)) => {
+                    return Err(PortError::BusOff { port: self.interface.clone() });
+                }
+                Ok(frame) => return Ok(Some(from_kernel(&frame))),
+                Err(error) => match Errno::from_io_error(&error) {
+                    Some(Errno::INTR | Errno::AGAIN) => {}
+                    _ => return Err(self.lost(error)),
+                },
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn to_kernel(frame: &CanFrame) -> socketcan::CanFrame {
+    let id = if frame.is_extended() {
+        Id::Extended(ExtendedId::new(frame.id()).unwrap_or(ExtendedId::MAX))
+    } else {
+        Id::Standard(StandardId::new(frame.id() as u16).unwrap_or(StandardId::MAX))
+    };
+    if frame.is_remote() {
+        let remote = CanRemoteFrame::new_remote(id, frame.len().into());
+        remote.unwrap_or_default().into()
+    } else {
+        CanDataFrame::new(id, frame.data()).unwrap_or_default().into()
+    }
+}
+
+fn from_kernel(frame: &socketcan::CanFrame) -> CanFrame {
+    let (id, extended) = match frame.id() {
+        Id::Standard(id) => (id.as_raw().into(), false),
+        Id::Extended(id) => (id.as_raw(), true),
+    };
+    if frame.is_remote_frame() {
+        CanFrame::remote_frame(id, extended, frame.dlc() as u8)
+    } else {
+        CanFrame::data_frame(id, extended, frame.data())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_cross_to_the_kernel_and_back() {
+        for frame in [
+            CanFrame::new(0x141, [0x9C, 1, 2, 3, 4, 5, 6, 7]),
+            CanFrame::data_frame(0x1FFF_FFFF, true, &[1, 2]),
+            CanFrame::remote_frame(0x7FF, false, 8),
+            CanFrame::remote_frame(0, true, 0),
+        ] {
+            assert_eq!(from_kernel(&to_kernel(&frame)), frame);
+        }
+    }
+
+    #[test]
+    fn an_interface_that_is_not_there_is_named() {
+        let error = SocketCanLink::open("nocan9").expect_err("there is none");
+        assert!(matches!(error, PortError::NoSuchInterface { .. } | PortError::NoCan), "{error:?}");
+    }
+}

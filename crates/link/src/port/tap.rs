@@ -1,0 +1,121 @@
+//! Taps: whoever wants to see what passes a port.
+
+use std::time::Duration;
+
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::time::Instant;
+
+use super::error::PortError;
+use super::link::{ByteLink, CanLink};
+use crate::clock::Clock;
+
+/// Which way data went, as the program sees it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// From the program to the port.
+    Sent,
+    /// From the port to the program.
+    Received,
+}
+
+/// Shows an observer every chunk that passes a byte line.
+///
+/// The observer gets the direction, the time since the tap was made, and the bytes; what it is
+/// shown as sent was taken by the port.
+#[derive(Debug)]
+pub struct TapBytes<B, F> {
+    link: B,
+    observer: F,
+    time: Stopwatch,
+}
+
+/// Shows an observer every frame that passes a CAN port, as [`TapBytes`] does for bytes.
+#[derive(Debug)]
+pub struct TapCan<C, F> {
+    link: C,
+    observer: F,
+    time: Stopwatch,
+}
+
+impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> TapBytes<B, F> {
+    /// Wraps `link`.
+    pub fn new(link: B, observer: F) -> Self {
+        TapBytes { time: Stopwatch::on(link.clock().unwrap_or_default()), link, observer }
+    }
+}
+
+impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> TapCan<C, F> {
+    /// Wraps `link`.
+    pub fn new(link: C, observer: F) -> Self {
+        TapCan { time: Stopwatch::on(link.clock().unwrap_or_default()), link, observer }
+    }
+}
+
+impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> ByteLink for TapBytes<B, F> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        let at = self.time.elapsed();
+        self.link.write(bytes)?;
+        (self.observer)(Direction::Sent, at, bytes);
+        Ok(())
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        let len = self.link.read(buffer, timeout)?;
+        if len > 0 {
+            (self.observer)(Direction::Received, self.time.elapsed(), &buffer[..len]);
+        }
+        Ok(len)
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.link.clock()
+    }
+
+    fn is_fresh(&self) -> bool {
+        self.link.is_fresh()
+    }
+}
+
+impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for TapCan<C, F> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        let at = self.time.elapsed();
+        self.link.send(frame)?;
+        (self.observer)(Direction::Sent, at, frame);
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        let frame = self.link.receive(timeout)?;
+        if let Some(frame) = &frame {
+            (self.observer)(Direction::Received, self.time.elapsed(), frame);
+        }
+        Ok(frame)
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        self.link.clock()
+    }
+
+    fn is_fresh(&self) -> bool {
+        self.link.is_fresh()
+    }
+
+    fn trouble(&self) -> Option<&'static str> {
+        self.link.trouble()
+    }
+}
+
+/// Time since a tap was made.
+#[derive(Debug)]
+struct Stopwatch(Clock, Instant);
+
+impl Stopwatch {
+    fn on(clock: Clock) -> Self {
+        let now = clock.now();
+        Stopwatch(clock, now)
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.0.now().since(self.1).into()
+    }
+}

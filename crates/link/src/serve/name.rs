@@ -1,0 +1,107 @@
+//! The one string that names a served port, everywhere.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use crate::port::{NameError, host_and_port, present, unknown_form};
+
+const FORMS: &str = "served ports are pty:PATH, slcan-pty:PATH, unix-listen:PATH, \
+    tcp-listen:ADDR:PORT and socketcan:INTERFACE";
+
+/// A port to serve.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum ServeName {
+    /// `pty:PATH`: a serial line; PATH becomes a link to the pty.
+    Pty(PathBuf),
+    /// `slcan-pty:PATH`: a CAN adapter that speaks slcan on a pty.
+    SlcanPty(PathBuf),
+    /// `tcp-listen:ADDR:PORT`: the same behind a TCP server; port 0 takes any free one.
+    TcpListen {
+        /// The address to listen on.
+        host: String,
+        /// The TCP port.
+        port: u16,
+    },
+    /// `unix-listen:PATH`: the same behind a Unix socket, for the user who serves it.
+    UnixListen(PathBuf),
+    /// `socketcan:can1`: a CAN interface of this machine, for a bus of motors.
+    SocketCan(String),
+}
+
+impl FromStr for ServeName {
+    type Err = NameError;
+
+    fn from_str(name: &str) -> Result<Self, NameError> {
+        if let Some(path) = name.strip_prefix("pty:") {
+            return Ok(ServeName::Pty(present(name, path, "a path", "pty:./st0")?.into()));
+        }
+        if let Some(path) = name.strip_prefix("slcan-pty:") {
+            return Ok(ServeName::SlcanPty(
+                present(name, path, "a path", "slcan-pty:./can0")?.into(),
+            ));
+        }
+        if let Some(path) = name.strip_prefix("unix-listen:") {
+            let path = present(name, path, "a path", "unix-listen:./drive")?;
+            return Ok(ServeName::UnixListen(path.into()));
+        }
+        if let Some(address) = name.strip_prefix("tcp-listen:") {
+            let (host, port) = host_and_port(name, address, "tcp-listen:127.0.0.1:4000")?;
+            return Ok(ServeName::TcpListen { host, port });
+        }
+        if let Some(interface) = name.strip_prefix("socketcan:") {
+            let interface = present(name, interface, "an interface", "socketcan:can0")?;
+            return Ok(ServeName::SocketCan(interface.to_owned()));
+        }
+        let path = name.rsplit(':').next().filter(|path| !path.is_empty()).unwrap_or("./st0");
+        Err(unknown_form(name, format!("pty:{path}"), FORMS.to_owned()))
+    }
+}
+
+impl fmt::Display for ServeName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ServeName::Pty(path) => write!(f, "pty:{}", path.display()),
+            ServeName::SlcanPty(path) => write!(f, "slcan-pty:{}", path.display()),
+            ServeName::UnixListen(path) => write!(f, "unix-listen:{}", path.display()),
+            ServeName::TcpListen { host, port } => write!(f, "tcp-listen:{host}:{port}"),
+            ServeName::SocketCan(interface) => write!(f, "socketcan:{interface}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn a_name_that_is_wrong_says_how_it_is_right() {
+        for (name, says) in [
+            ("st0", "did you mean `pty:st0`?"),
+            ("can0", "tcp-listen:ADDR:PORT and socketcan:INTERFACE"),
+            ("socketcan:", "lacks an interface; write it like socketcan:can0"),
+        ] {
+            let message = name.parse::<ServeName>().expect_err("no served port").to_string();
+            assert!(message.contains(says), "{name:?} gave: {message}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_printed_serve_name_reads_back(path in "[./a-z0-9:]{1,20}", port: u16) {
+            let listen = ServeName::TcpListen { host: "[::]".into(), port };
+            let interface = ServeName::SocketCan(path.clone());
+            let pty = ServeName::Pty(path.clone().into());
+            for name in [pty, ServeName::SlcanPty(path.into()), listen, interface] {
+                prop_assert_eq!(name.to_string().parse(), Ok(name));
+            }
+        }
+
+        #[test]
+        fn any_text_is_taken_or_refused(text in "\\PC{0,40}") {
+            let _ = text.parse::<ServeName>().map_err(|error| error.to_string());
+        }
+    }
+}

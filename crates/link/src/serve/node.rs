@@ -1,0 +1,121 @@
+//! A CAN interface of the kernel as a served port: the station is one more node of its bus.
+
+use std::collections::VecDeque;
+
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::time::{Duration, Instant};
+use rustix::event::{PollFd, PollFlags};
+
+use super::station::CanStation;
+use crate::port::{CanLink, PortError, SocketCanLink};
+
+/// Frames that are taken from the bus in one turn; the other ports have their turn as well.
+const TURN: usize = 64;
+/// How soon an interface that has no room is offered the frame again.
+const FULL: Duration = Duration::from_millis(1);
+/// A frame that could not be sent by then is stale; it does not come out of the blue later.
+const STALE: Duration = Duration::from_millis(100);
+/// How soon an interface that is away is looked for again.
+const AWAY: Duration = Duration::from_millis(100);
+
+pub(super) struct Node {
+    interface: String,
+    station: Box<dyn CanStation>,
+    /// Nothing while the interface is away.
+    link: Option<SocketCanLink>,
+    outgoing: VecDeque<CanFrame>,
+    /// Since when the interface has had no room.
+    full_since: Option<Instant>,
+    /// When an interface that is away or full is tried again.
+    retry: Option<Instant>,
+    /// Room for what the station says.
+    said: Vec<CanFrame>,
+}
+
+impl Node {
+    /// Opens a CAN interface, which must be up now.
+    pub(super) fn open(interface: &str, station: Box<dyn CanStation>) -> Result<Self, PortError> {
+        Ok(Node {
+            interface: interface.to_owned(),
+            station,
+            link: Some(SocketCanLink::open(interface)?),
+            outgoing: VecDeque::new(),
+            full_since: None,
+            retry: None,
+            said: Vec::new(),
+        })
+    }
+
+    /// What is to be polled, if anything: nothing is taken while replies wait for room.
+    pub(super) fn watch(&self) -> Option<PollFd<'_>> {
+        let link = self.link.as_ref().filter(|_| self.outgoing.is_empty())?;
+        Some(PollFd::new(link, PollFlags::IN))
+    }
+
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        self.station.deadline().into_iter().chain(self.retry).min()
+    }
+
+    /// Does what is due; returns how many bytes the bus did not take. `ready` says whether there is
+    /// something on what is watched.
+    pub(super) fn serve(&mut self, now: Instant, ready: bool) -> u64 {
+        if self.retry.is_some_and(|retry| retry <= now) {
+            self.retry = None;
+            if self.link.is_none() {
+                self.reopen(now);
+            }
+        }
+        if ready {
+            self.receive(now);
+        }
+        if self.station.deadline().is_some_and(|deadline| deadline <= now) {
+            self.station.poll(now, &mut self.said);
+            self.outgoing.extend(self.said.drain(..));
+        }
+        self.send(now)
+    }
+
+    fn receive(&mut self, now: Instant) {
+        for _ in 0..TURN {
+            let Some(link) = &mut self.link else { return };
+            match link.receive(Some(std::time::Duration::ZERO)) {
+                Ok(Some(frame)) => self.station.receive(now, &frame, &mut self.said),
+                Ok(None) => break,
+                Err(_) => self.lose(now),
+            }
+            self.outgoing.extend(self.said.drain(..));
+        }
+    }
+
+    fn send(&mut self, now: Instant) -> u64 {
+        while let (Some(link), Some(frame)) = (&mut self.link, self.outgoing.front()) {
+            match link.offer(frame) {
+                Ok(true) => {
+                    self.outgoing.pop_front();
+                    self.full_since = None;
+                }
+                Ok(false) if now.since(*self.full_since.get_or_insert(now)) < STALE => {
+                    self.retry = Some(now + FULL);
+                    return 0;
+                }
+                Ok(false) => break,
+                Err(_) => self.lose(now),
+            }
+        }
+        self.full_since = None;
+        self.outgoing.drain(..).map(|frame| frame.data().len() as u64).sum()
+    }
+
+    /// Lets go of the interface, which is down, gone or bus-off.
+    fn lose(&mut self, now: Instant) {
+        self.link = None;
+        self.retry = Some(now + AWAY);
+    }
+
+    fn reopen(&mut self, now: Instant) {
+        match SocketCanLink::open(&self.interface) {
+            Ok(link) => self.link = Some(link),
+            Err(_) => self.lose(now),
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! All served ports in one poll loop.
+
+use std::net::{TcpListener, ToSocketAddrs};
+use std::os::fd::BorrowedFd;
+use std::time::Duration;
+
+use motorlink_proto::time::Instant;
+use rustix::event::{PollFd, PollFlags, poll};
+use rustix::io::Errno;
+
+use super::endpoint::{Endpoint, Scratch, Station};
+use super::name::ServeName;
+use super::node::Node;
+use super::pty::Pty;
+use super::station::{ByteStation, CanStation};
+use super::unix::UnixDoor;
+use crate::clock::Clock;
+use crate::port::{PortError, timespec, unbracketed};
+
+/// A port that can be opened now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Served {
+    /// The port as it was asked for, with the TCP port in use where any was asked for.
+    pub port: String,
+    /// Where it is: the pty, or the address with the TCP port in use.
+    pub path: String,
+}
+
+/// What a turn of the server has seen besides its ports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Turn {
+    /// Whether the extra descriptor has something to read, its end included.
+    pub extra_is_ready: bool,
+}
+
+/// Serves ports until it is dropped.
+pub struct Server {
+    clock: Clock,
+    endpoints: Vec<Endpoint>,
+    nodes: Vec<Node>,
+    ready: Vec<PollFlags>,
+    scratch: Scratch,
+}
+
+impl Default for Server {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Server {
+    /// A server without ports, whose time begins now.
+    pub fn new() -> Self {
+        Self::by(Clock::running())
+    }
+
+    /// A server without ports, whose time is that of `clock`.
+    pub fn by(clock: Clock) -> Self {
+        Server {
+            clock,
+            endpoints: Vec::new(),
+            nodes: Vec::new(),
+            ready: Vec::new(),
+            scratch: Scratch::default(),
+        }
+    }
+
+    /// Serves a serial line with `station` at its far end.
+    pub fn serve_bytes(
+        &mut self,
+        name: &ServeName,
+        station: Box<dyn ByteStation>,
+    ) -> Result<Served, PortError> {
+        self.serve(name, Station::Bytes(station))
+    }
+
+    /// Serves a CAN bus with `station` on it: through slcan, or as a node on a CAN interface.
+    pub fn serve_can(
+        &mut self,
+        name: &ServeName,
+        station: Box<dyn CanStation>,
+    ) -> Result<Served, PortError> {
+        self.serve(name, Station::Can(station))
+    }
+
+    fn serve(&mut self, name: &ServeName, station: Station) -> Result<Served, PortError> {
+        let mut port = name.to_string();
+        let path = match (name, station) {
+            (ServeName::Pty(link), station @ Station::Bytes(_))
+            | (ServeName::SlcanPty(link), station @ Station::Can(_)) => {
+                let (pty, master) = Pty::open(link)?;
+                let path = pty.path().display().to_string();
+                self.endpoints.push(Endpoint::on_pty(pty, master, station));
+                path
+            }
+            (ServeName::TcpListen { host, port: tcp_port }, station) => {
+                let (listener, path) = listen(host, *tcp_port, &port)?;
+                if *tcp_port == 0 {
+                    port = format!("tcp-listen:{path}");
+                }
+                self.endpoints.push(Endpoint::on_tcp(listener, station));
+                path
+            }
+            (ServeName::UnixListen(path), station) => {
+                self.endpoints.push(Endpoint::on_unix(UnixDoor::open(path)?, station));
+                path.display().to_string()
+            }
+            (ServeName::SocketCan(interface), Station::Can(station)) => {
+                self.nodes.push(Node::open(interface, station)?);
+                interface.clone()
+            }
+            (_, Station::Bytes(_)) => {
+                let usable = "pty:PATH, unix-listen:PATH or tcp-listen:ADDR:PORT".to_owned();
+                return Err(PortError::WrongKind { port, wanted: "serial line", usable });
+            }
+            (_, Station::Can(_)) => {
+                let usable = "slcan-pty:PATH, unix-listen:PATH, tcp-listen:ADDR:PORT or \
+                    socketcan:INTERFACE"
+                    .to_owned();
+                return Err(PortError::WrongKind { port, wanted: "CAN bus", usable });
+            }
+        };
+        Ok(Served { port, path })
+    }
+
+    /// The server's time.
+    pub fn now(&self) -> Instant {
+        self.clock.now()
+    }
+
+    /// Lets time stand still, or go on. Stations are served meanwhile, all at that one moment.
+    pub fn hold(&mut self, held: bool) {
+        self.clock.hold(held);
+    }
+
+    /// How many bytes were dropped because a client or a CAN bus did not take them.
+    pub fn dropped(&self) -> u64 {
+        self.scratch.dropped
+    }
+
+    /// Waits until something is to be done, at most for `max_wait`, and does it. A signal ends the
+    /// wait. `extra` is a descriptor to watch as well, such as standard input.
+    pub fn turn(
+        &mut self,
+        max_wait: Duration,
+        extra: Option<BorrowedFd<'_>>,
+    ) -> Result<Turn, PortError> {
+        let wait = timespec(self.wait_time(max_wait));
+        let mut fds = Vec::with_capacity(self.ready.capacity());
+        for endpoint in &self.endpoints {
+            endpoint.watch(&mut fds);
+        }
+        fds.extend(self.nodes.iter().filter_map(Node::watch));
+        fds.extend(extra.map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN)));
+        match poll(&mut fds, Some(&wait)) {
+            Ok(_) => {}
+            Err(Errno::INTR) => return Ok(Turn { extra_is_ready: false }),
+            Err(errno) => return Err(PortError::in_use("the served ports", errno)),
+        }
+        self.ready.clear();
+        self.ready.extend(fds.iter().map(PollFd::revents));
+
+        let now = self.now();
+        let mut ready = self.ready.as_slice();
+        for endpoint in &mut self.endpoints {
+            let (ours, others) = ready.split_at(endpoint.watched());
+            endpoint.serve(now, ours, &mut self.scratch);
+            ready = others;
+        }
+        for node in &mut self.nodes {
+            let (ours, others) = ready.split_at(usize::from(node.watch().is_some()));
+            let is_ready = ours.iter().any(|events| !events.is_empty());
+            self.scratch.dropped += node.serve(now, is_ready);
+            ready = others;
+        }
+        Ok(Turn { extra_is_ready: ready.iter().any(|events| !events.is_empty()) })
+    }
+
+    /// The time to the first deadline of a station.
+    fn wait_time(&self, max_wait: Duration) -> Duration {
+        if self.clock.stands() {
+            return max_wait;
+        }
+        let endpoints = self.endpoints.iter().filter_map(Endpoint::deadline);
+        let first = endpoints.chain(self.nodes.iter().filter_map(Node::deadline)).min();
+        first.map_or(max_wait, |deadline| max_wait.min(deadline.since(self.now()).into()))
+    }
+}
+
+/// Listens at `host`; returns the address in use as well.
+fn listen(host: &str, tcp_port: u16, port: &str) -> Result<(TcpListener, String), PortError> {
+    let addresses = (unbracketed(host), tcp_port)
+        .to_socket_addrs()
+        .map_err(|source| PortError::UnknownHost { port: port.to_owned(), source })?;
+    let bound = TcpListener::bind(addresses.collect::<Vec<_>>().as_slice());
+    let listening = bound.and_then(|listener| {
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?.to_string();
+        Ok((listener, address))
+    });
+    listening.map_err(|source| match source.kind() {
+        std::io::ErrorKind::AddrInUse => PortError::AddressInUse { port: port.to_owned() },
+        _ => PortError::Io { port: port.to_owned(), source },
+    })
+}

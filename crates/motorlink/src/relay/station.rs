@@ -1,0 +1,187 @@
+//! The served ports of a relay, where its one client comes and goes.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use motorlink_link::port::PortError;
+use motorlink_link::serve::{ByteStation, CanStation};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::time::Instant;
+
+use super::Event;
+
+/// Who has the line, and what happened.
+#[derive(Debug, Default)]
+pub(super) struct Desk {
+    /// The served port whose client has the line.
+    pub(super) client: Option<String>,
+    /// The client left since this was looked at last.
+    pub(super) has_left: bool,
+    /// When the client last sent something.
+    pub(super) heard_at: Instant,
+    /// Nobody is let in.
+    pub(super) is_shut: bool,
+    /// That the drive's port failed was told.
+    is_lost: bool,
+    pub(super) events: VecDeque<Event>,
+}
+
+impl Desk {
+    pub(super) fn port_failed(&mut self, error: PortError) {
+        if !self.is_lost {
+            self.is_lost = true;
+            self.events.push_back(Event::PortLost(error));
+        }
+    }
+
+    pub(super) fn port_is_open(&mut self) {
+        if self.is_lost {
+            self.is_lost = false;
+            self.events.push_back(Event::PortBack);
+        }
+    }
+
+    /// Gives the line to whoever is at `port`, if it is free.
+    fn admit(&mut self, now: Instant, port: &str) -> bool {
+        if self.client.is_some() || self.has_left || self.is_shut {
+            return false;
+        }
+        self.client = Some(port.to_owned());
+        self.heard_at = now;
+        self.events.push_back(Event::Came { port: port.to_owned() });
+        true
+    }
+}
+
+/// What waits between the client and the port: bytes, or frames.
+#[derive(Debug)]
+pub(super) struct Lane<T> {
+    pub(super) to_port: VecDeque<T>,
+    pub(super) to_client: VecDeque<T>,
+}
+
+impl<T> Default for Lane<T> {
+    fn default() -> Self {
+        Lane { to_port: VecDeque::new(), to_client: VecDeque::new() }
+    }
+}
+
+/// One served port.
+pub(super) struct Place<T> {
+    pub(super) desk: Rc<RefCell<Desk>>,
+    pub(super) lane: Rc<RefCell<Lane<T>>>,
+    pub(super) port: Rc<RefCell<String>>,
+}
+
+impl<T> Place<T> {
+    fn has_the_line(&self) -> bool {
+        self.desk.borrow().client.as_deref() == Some(&*self.port.borrow())
+    }
+
+    fn take(&mut self, now: Instant, sent: impl IntoIterator<Item = T>) {
+        let has_the_line = self.has_the_line();
+        let mut desk = self.desk.borrow_mut();
+        // Whoever was turned away on a pty has stayed, and may have the line when it is free.
+        if !has_the_line && !desk.admit(now, &self.port.borrow()) {
+            return;
+        }
+        desk.heard_at = now;
+        self.lane.borrow_mut().to_port.extend(sent);
+    }
+
+    /// At once while there is something for the client.
+    fn due(&self) -> Option<Instant> {
+        let is_waiting = self.has_the_line() && !self.lane.borrow().to_client.is_empty();
+        is_waiting.then_some(Instant(0))
+    }
+
+    /// No more than one reading of a client waits here: the rest stays where it can be dropped.
+    fn has_room(&self) -> bool {
+        !self.has_the_line() || self.lane.borrow().to_port.is_empty()
+    }
+
+    fn welcome(&mut self, now: Instant, others: usize) -> bool {
+        let mut desk = self.desk.borrow_mut();
+        let port = self.port.borrow();
+        let is_welcome = others == 0 && desk.admit(now, &port);
+        if is_welcome {
+            *self.lane.borrow_mut() = Lane::default();
+        } else {
+            desk.events.push_back(Event::TurnedAway { port: port.clone() });
+        }
+        is_welcome
+    }
+
+    fn see_off(&mut self) {
+        if self.has_the_line() {
+            let mut desk = self.desk.borrow_mut();
+            (desk.client, desk.has_left) = (None, true);
+        }
+    }
+
+    fn tell_of_browser(&mut self) {
+        let port = self.port.borrow().clone();
+        self.desk.borrow_mut().events.push_back(Event::Browser { port });
+    }
+}
+
+impl ByteStation for Place<u8> {
+    fn receive(&mut self, now: Instant, bytes: &[u8], _: &mut Vec<u8>) {
+        self.take(now, bytes.iter().copied());
+    }
+
+    fn poll(&mut self, _: Instant, reply: &mut Vec<u8>) {
+        reply.extend(self.lane.borrow_mut().to_client.drain(..));
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.due()
+    }
+
+    fn came(&mut self, now: Instant, others: usize) -> bool {
+        self.welcome(now, others)
+    }
+
+    fn left(&mut self, _: Instant) {
+        self.see_off();
+    }
+
+    fn wants(&self) -> bool {
+        self.has_room()
+    }
+
+    fn stranger(&mut self, _: Instant) {
+        self.tell_of_browser();
+    }
+}
+
+impl CanStation for Place<CanFrame> {
+    fn receive(&mut self, now: Instant, frame: &CanFrame, _: &mut Vec<CanFrame>) {
+        self.take(now, [*frame]);
+    }
+
+    fn poll(&mut self, _: Instant, replies: &mut Vec<CanFrame>) {
+        replies.extend(self.lane.borrow_mut().to_client.drain(..));
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.due()
+    }
+
+    fn came(&mut self, now: Instant, others: usize) -> bool {
+        self.welcome(now, others)
+    }
+
+    fn left(&mut self, _: Instant) {
+        self.see_off();
+    }
+
+    fn wants(&self) -> bool {
+        self.has_room()
+    }
+
+    fn stranger(&mut self, _: Instant) {
+        self.tell_of_browser();
+    }
+}

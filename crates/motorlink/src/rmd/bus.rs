@@ -1,0 +1,455 @@
+//! The blocking client: many motors, one lock around one exchange or cycle, no thread, no
+//! allocation in an exchange.
+
+use std::error;
+use std::sync::Arc;
+use std::time::{self as machine, Duration};
+
+use motorlink_link::Clock;
+use motorlink_link::port::{CanLink, PortError, PortName};
+use motorlink_link::reopening::{BackOff, LinkSign, LinkState, Opener, Reopening};
+use motorlink_proto::rmd::{
+    self as proto, Command, Counters, Dialect, Limits, MotionStatus, MotorId, MotorSet, Payload,
+    ReadStatus1, Torque4,
+};
+use motorlink_proto::time;
+
+use super::session::{Output, Session, ends_motion};
+use super::{Error, Guard, MotorHandle, OnDrop, Stopped};
+use crate::turn::{Turn, Turns};
+
+/// How a [`Bus`] behaves.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// How long a reply may take.
+    pub timeout: Duration,
+    /// How long after a timeout a late reply is awaited.
+    pub guard: Duration,
+    /// Attempts to open a port that went away.
+    pub back_off: BackOff,
+    /// What no request to any motor may exceed.
+    pub limits: Limits,
+}
+
+impl Default for Options {
+    /// 50 ms for a reply, 100 ms for a late one, no limits.
+    fn default() -> Self {
+        Options {
+            timeout: proto::DEFAULT_TIMEOUT.into(),
+            guard: proto::DEFAULT_GUARD.into(),
+            back_off: BackOff::default(),
+            limits: Limits::default(),
+        }
+    }
+}
+
+/// What a scan found under an ID.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Found {
+    /// A motor of this protocol, with its state.
+    Motor(MotorId, proto::Status1),
+    /// A motor of another protocol.
+    Foreign(MotorId, Dialect),
+    /// The request itself came back: the adapter echoes what it sends, and nothing is known of a
+    /// motor. Option `echo=1` of an slcan port drops such echoes.
+    Echo(MotorId),
+    /// A motor that answers another host all the time: its replies to us cannot be told apart.
+    Shared(MotorId),
+}
+
+/// How long what came meanwhile may go on coming.
+const BABBLE: time::Duration = time::Duration::from_millis(100);
+
+/// IDs that a scan asks at once.
+const SCAN_WIDTH: usize = 8;
+
+/// A CAN bus with RMD motors: shared by reference between threads.
+///
+/// A port that went away is opened again by the next call, behind a back-off; see
+/// [`link_state`](Self::link_state). Replies are matched on ID and command; a motor that did not
+/// answer in time is left alone until its late reply came or the guard time is over, and then asked
+/// for its status before anything else, in case its replies are later than that: [`Off`](proto::Off)
+/// and [`Stop`](proto::Stop) alone do not wait.
+pub struct Bus {
+    line: Turns<Driven<Box<dyn CanLink>>>,
+    sign: LinkSign,
+}
+
+/// A session and its port.
+pub(super) struct Driven<L> {
+    pub(super) port: Reopening<L>,
+    pub(super) session: Session,
+    /// Exchanges and cycles so far: another number says that the one before it was given up.
+    pub(super) exchanges: u64,
+}
+
+impl Bus {
+    /// Opens a port. No motor is asked anything.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened.
+    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        Self::open_wrapped(port, |link| link, options)
+    }
+
+    /// As [`open`](Self::open), through what `wrap` puts around the port each time it is opened: a
+    /// tap, or faults.
+    pub fn open_wrapped(
+        port: &PortName,
+        mut wrap: impl FnMut(Box<dyn CanLink>) -> Box<dyn CanLink> + Send + 'static,
+        options: Options,
+    ) -> Result<Self, Error> {
+        let name = port.clone();
+        let open = move || Ok(wrap(name.open_can()?));
+        Self::open_with(&port.to_string(), Box::new(open), options)
+    }
+
+    /// As [`open`](Self::open), through a link of the caller's making.
+    pub fn open_with(
+        name: &str,
+        open: Opener<Box<dyn CanLink>>,
+        options: Options,
+    ) -> Result<Self, Error> {
+        Ok(Self::on(Reopening::open(name, open, options.back_off)?, options))
+    }
+
+    /// Speaks through a link that is open already. It is not opened again when it closes.
+    pub fn over(name: &str, link: Box<dyn CanLink>, options: Options) -> Self {
+        Self::on(Reopening::over(name, link), options)
+    }
+
+    fn on(port: Reopening<Box<dyn CanLink>>, options: Options) -> Self {
+        Self::driving(Driven::new(port, &options))
+    }
+
+    pub(super) fn driving(driven: Driven<Box<dyn CanLink>>) -> Self {
+        let sign = driven.port.sign();
+        Bus { line: Turns::new(driven), sign }
+    }
+
+    /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
+    /// error from it ends the exchange with an interruption.
+    ///
+    /// `look` may use this bus, as a signal's handler does. What waits is given up then and ends with
+    /// [`PortError::Overtaken`]. If `look` does not use the bus, it goes on. Other threads wait for their
+    /// turn.
+    pub fn looking(
+        mut self,
+        look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
+    ) -> Self {
+        self.line.set_look(Box::new(look));
+        self
+    }
+
+    /// Gives up the exchanges that this thread has under way while it [looks](Self::looking); replies
+    /// may still come. Waits for exchanges of other threads.
+    pub fn abandon(&self) {
+        self.line.take().abandon();
+    }
+
+    /// The clock that the port goes by: the machine's, or that of drives on a time of their own.
+    pub fn clock(&self) -> Clock {
+        self.line.take().port.clock()
+    }
+
+    /// Whether the port is open. Never waits, not even while another thread opens it.
+    pub fn link_state(&self) -> LinkState {
+        self.sign.state()
+    }
+
+    /// Why frames may not get to the bus, as far as its adapter tells.
+    pub fn trouble(&self) -> Option<&'static str> {
+        self.line.take().port.open_link().and_then(|link| link.trouble())
+    }
+
+    /// Frames that belonged to no exchange.
+    pub fn counters(&self) -> Counters {
+        self.line.take().session.counters()
+    }
+
+    /// A motor of the bus, ID 1 to 32.
+    pub fn motor(&self, id: u8) -> Result<MotorHandle<'_>, Error> {
+        let id = MotorId::new(id).ok_or(Error::NoSuchMotor(id))?;
+        Ok(MotorHandle::new(self, id))
+    }
+
+    /// Switches off the motors that this bus was used to move; from now on every request but Off and
+    /// Stop is [`PortError::Retired`]. For a signal's handler with a thread of its own, beside a program
+    /// that would go on until the handler ends it. Waits for exchanges that are under way.
+    pub fn retire(&self) -> Vec<Stopped> {
+        self.line.take().session.retire();
+        self.guard().stop_now()
+    }
+
+    /// Switches off, when it goes out of scope, the motors that this bus was used to move.
+    pub fn guard(&self) -> Guard<'_> {
+        Guard::new(self, OnDrop::Off)
+    }
+
+    /// Motors that were given something to do and not switched off.
+    pub fn moving(&self) -> MotorSet {
+        self.line.take().session.moving()
+    }
+
+    /// Takes motors over that somebody else set moving.
+    pub(crate) fn take_over(&self, moving: MotorSet) {
+        self.line.take().session.take_over(moving);
+    }
+
+    /// Sets what a motor may be told; it holds for every call, raw frames included.
+    pub fn set_limits(&self, id: MotorId, limits: Limits) {
+        self.line.take().session.set_limits(id, limits);
+    }
+
+    /// One exchange with one motor. A motor in quarantine is waited for.
+    pub fn ask<C: Command>(&self, id: MotorId, command: &C) -> Result<C::Reply, Error> {
+        self.raw(id, command.encode()).map(|reply| C::Reply::decode(&reply))
+    }
+
+    /// One exchange with any bytes, known command or not. A motor in quarantine is waited for.
+    pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
+        let mut driven = self.line.take();
+        driven.ready([&request])?;
+        let now = driven.port.now();
+        driven.session.ask(now, id, request)?;
+        let mut outcome = None;
+        self.run(driven, |_, result| outcome = Some(result))?;
+        outcome.expect("an exchange that was begun ends")
+    }
+
+    /// Makes sure that a motor's replies so far went to their own requests: asks for another code than the
+    /// last. If a reply came twice, that of the last request is still to come, and answers nothing.
+    ///
+    /// # Errors
+    /// [`Error::Unconfirmed`]: what was read since the last confirmation may be older than it looks. Those
+    /// of [`raw`](Self::raw).
+    pub fn confirm(&self, id: MotorId) -> Result<(), Error> {
+        let question = self.line.take().session.question(id);
+        self.raw(id, question)?;
+        self.line.take().session.confirmed(id)
+    }
+
+    /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
+    /// is called once a request, in the order in which the outcomes come. It must not call this bus,
+    /// which is locked meanwhile.
+    ///
+    /// # Errors
+    /// The port's. What fails for one motor is told to `each`.
+    pub fn cycle(
+        &self,
+        requests: &[(MotorId, [u8; 8])],
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<(), Error> {
+        let mut driven = self.line.take();
+        driven.ready(requests.iter().map(|(_, request)| request))?;
+        for &(id, request) in requests {
+            let now = driven.port.now();
+            if let Err(error) = driven.session.request(now, id, request) {
+                each(id, Err(error));
+            }
+        }
+        self.run(driven, each)
+    }
+
+    /// Sends torques to motors 1 to 4 in one frame and gathers the replies of those in `expect`;
+    /// place n of the result is motor n + 1. Motors that are used for the first time are asked for their
+    /// status before; if none of them answers, nothing is sent.
+    ///
+    /// # Errors
+    /// The port's, a limit's, [`Error::OutOfReach`], [`Error::Quarantined`]: nothing was sent then. Nor
+    /// was it if the result of a motor is [`Error::Quarantined`].
+    pub fn torque4(
+        &self,
+        torques: Torque4,
+        expect: MotorSet,
+    ) -> Result<[Option<Result<MotionStatus, Error>>; 4], Error> {
+        let mut driven = self.line.take();
+        driven.ready([])?;
+        let now = driven.port.now();
+        driven.session.torque4(now, torques, expect)?;
+        let mut replies = [const { None }; 4];
+        self.run(driven, |id, result| {
+            if let Some(slot) = replies.get_mut(usize::from(id.number()) - 1) {
+                *slot = Some(result.map(|data| MotionStatus::decode(&data)));
+            }
+        })?;
+        Ok(replies)
+    }
+
+    /// Asks every ID in `ids` for its status, some at a time; calls `each` with what answered, and
+    /// `progress` with the number of IDs that are done.
+    pub fn scan(
+        &self,
+        ids: MotorSet,
+        mut each: impl FnMut(Found),
+        mut progress: impl FnMut(usize),
+    ) -> Result<(), Error> {
+        let mut left = ids;
+        let mut done = 0;
+        while !left.is_empty() {
+            let asked = left.by_ref().take(SCAN_WIDTH);
+            let requests: Vec<_> = asked.map(|id| (id, ReadStatus1.encode())).collect();
+            let mut doubtful = MotorSet::EMPTY;
+            self.cycle(&requests, |id, outcome| match outcome {
+                Err(Error::Quarantined { .. }) => doubtful.insert(id),
+                outcome => Found::of(id, outcome).into_iter().for_each(&mut each),
+            })?;
+            for id in doubtful {
+                let outcome = self.raw(id, ReadStatus1.encode());
+                if let Err(error @ Error::Port(_)) = outcome {
+                    return Err(error);
+                }
+                Found::of(id, outcome).into_iter().for_each(&mut each);
+            }
+            done += requests.len();
+            progress(done);
+        }
+        Ok(())
+    }
+
+    /// How long a late reply is awaited.
+    pub(super) fn guard_time(&self) -> Duration {
+        self.line.take().session.guard().into()
+    }
+
+    /// Moves frames until no exchange is open.
+    fn run(
+        &self,
+        mut driven: Turn<'_, Driven<Box<dyn CanLink>>>,
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<(), Error> {
+        let exchange = driven.exchanges;
+        while !driven.run(self.line.next_look(), &mut each)? {
+            let port = Arc::clone(&driven.port.name);
+            let looked;
+            (driven, looked) = driven.look(&port);
+            let overtaken = (driven.exchanges != exchange)
+                .then(|| PortError::Overtaken { port: port.to_string() });
+            if let Some(error) = looked.err().or(overtaken) {
+                return Err(driven.closed(error));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<L: CanLink> Driven<L> {
+    pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
+        let port = port.by(|link| link.clock());
+        let mut session = Session::new(port.name.clone(), options);
+        if port.open_link().is_some_and(CanLink::is_fresh) {
+            session.trust();
+        }
+        Driven { port, session, exchanges: 0 }
+    }
+
+    /// Makes ready for these requests.
+    fn ready<'a>(&mut self, requests: impl IntoIterator<Item = &'a [u8; 8]>) -> Result<(), Error> {
+        self.abandon();
+        self.listen_for(requests)
+    }
+
+    /// Gives up what is under way. Replies may still come.
+    fn abandon(&mut self) {
+        self.exchanges += 1;
+        let now = self.port.now();
+        for id in self.session.busy() {
+            self.session.cancel(now, id);
+        }
+    }
+
+    /// As [`listen`](Self::listen), before these requests are sent.
+    pub(super) fn listen_for<'a>(
+        &mut self,
+        requests: impl IntoIterator<Item = &'a [u8; 8]>,
+    ) -> Result<(), Error> {
+        match self.listen() {
+            // That the port failed since the last exchange must not keep a motor from being stopped.
+            Err(_) if requests.into_iter().any(ends_motion) => self.listen(),
+            done => done,
+        }
+    }
+
+    /// Makes sure that the port is open and that nothing is left in it: what came meanwhile would
+    /// pass for a reply to what is sent now.
+    pub(super) fn listen(&mut self) -> Result<(), Error> {
+        let now = self.port.now();
+        let (link, reopened) = self.port.link()?;
+        if reopened {
+            self.session.reopened(now);
+            if link.is_fresh() {
+                self.session.trust();
+            }
+        }
+        loop {
+            match self.port.link()?.0.receive(Some(Duration::ZERO)) {
+                // A bus that is never silent has to do: an Off must get through.
+                Ok(Some(_)) if self.port.now().since(now) > BABBLE => return Ok(()),
+                Ok(Some(frame)) => self.session.receive(now, &frame),
+                Ok(None) => return Ok(()),
+                Err(error) => return Err(self.closed(error)),
+            }
+        }
+    }
+
+    /// Moves frames until no exchange is open, or until `pause`: `false`.
+    fn run(
+        &mut self,
+        pause: Option<machine::Instant>,
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<bool, Error> {
+        loop {
+            let now = self.port.now();
+            let moved = match self.session.poll(now) {
+                Output::Transmit(frame) => self.port.link().and_then(|(link, _)| link.send(&frame)),
+                Output::Done(id, result) => {
+                    let link = self.port.open_link();
+                    each(
+                        id,
+                        result.map_err(|error| match link {
+                            Some(link) => error.behind(link),
+                            None => error,
+                        }),
+                    );
+                    Ok(())
+                }
+                Output::Wait(None) => return Ok(true),
+                Output::Wait(Some(until)) => {
+                    let left =
+                        pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
+                    if left == Some(Duration::ZERO) {
+                        return Ok(false);
+                    }
+                    let wait = [Some(until.since(now).into()), left].into_iter().flatten().min();
+                    let came = self.port.link().and_then(|(link, _)| link.receive(wait));
+                    came.map(|frame| {
+                        let now = self.port.now();
+                        frame.iter().for_each(|frame| self.session.receive(now, frame));
+                    })
+                }
+            };
+            moved.map_err(|error| self.closed(error))?;
+        }
+    }
+
+    /// The port failed, or did not want to wait; the next call cancels what is under way.
+    pub(super) fn closed(&mut self, error: PortError) -> Error {
+        if !error.is_interruption() {
+            self.port.close();
+        }
+        error.into()
+    }
+}
+
+impl Found {
+    /// What the outcome of a [`ReadStatus1`] tells of the motor that it was for.
+    pub fn of(id: MotorId, outcome: Result<[u8; 8], Error>) -> Option<Self> {
+        match outcome {
+            Err(Error::Echo { .. }) => Some(Found::Echo(id)),
+            Err(Error::Shared { .. }) => Some(Found::Shared(id)),
+            Ok(reply) => Some(Found::Motor(id, proto::Status1::decode(&reply))),
+            Err(Error::Foreign { dialect, .. }) => Some(Found::Foreign(id, dialect)),
+            Err(_) => None,
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! The bus for event loops: nothing in it waits, beside the opening of its port.
+
+use std::os::fd::BorrowedFd;
+use std::time::Duration;
+
+use motorlink_link::port::{CanLink, EventCan, PortError, PortName};
+use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
+use motorlink_proto::rmd::{Limits, MotorId, MotorSet, Torque4};
+
+use super::bus::Driven;
+use super::session::Output;
+use super::{Bus, Error, Options};
+
+/// Frames that are taken from the bus in one step: the loop has others to serve.
+const STEP: usize = 64;
+
+/// A CAN bus with RMD motors, driven in steps: an event loop calls [`advance`](Self::advance) when
+/// the descriptor is readable and when the time that it said has passed.
+///
+/// What holds for a [`Bus`] holds here: limits, quarantine, what is moving, errors. Exchanges with
+/// different motors overlap; a motor has one at a time.
+pub struct EventBus {
+    driven: Driven<Box<dyn EventCan>>,
+}
+
+impl EventBus {
+    /// Opens a port, which may wait. So may [`reopen`](Self::reopen), and what begins an exchange while
+    /// the port is closed; nothing else does.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened. No motor is asked anything.
+    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        let name = port.clone();
+        Self::open_with(&port.to_string(), Box::new(move || name.open_event_can()), options)
+    }
+
+    /// As [`open`](Self::open), through a link of the caller's making.
+    pub fn open_with(
+        name: &str,
+        open: Opener<Box<dyn EventCan>>,
+        options: Options,
+    ) -> Result<Self, Error> {
+        let port = Reopening::open(name, open, options.back_off)?;
+        Ok(EventBus { driven: Driven::new(port, &options) })
+    }
+
+    /// Speaks through a link that is open already. It is not opened again when it closes.
+    pub fn over(name: &str, link: Box<dyn EventCan>, options: Options) -> Self {
+        EventBus { driven: Driven::new(Reopening::over(name, link), &options) }
+    }
+
+    /// Whether the port is open.
+    pub fn link_state(&self) -> LinkState {
+        self.driven.port.sign().state()
+    }
+
+    /// Opens the port if it is closed and its back-off is over. May wait.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened.
+    pub fn reopen(&mut self) -> Result<(), Error> {
+        self.driven.listen()
+    }
+
+    /// What is readable when there is something to receive; `None` while the port is closed, or
+    /// where it has its answers at once.
+    pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.driven.port.open_link().and_then(|link| link.descriptor())
+    }
+
+    /// Motors that were given something to do and not switched off.
+    pub fn moving(&self) -> MotorSet {
+        self.driven.session.moving()
+    }
+
+    /// Motors with an exchange under way.
+    pub fn busy(&self) -> MotorSet {
+        self.driven.session.busy()
+    }
+
+    /// Sets what a motor may be told; it holds for every call, raw frames included.
+    pub fn set_limits(&mut self, id: MotorId, limits: Limits) {
+        self.driven.session.set_limits(id, limits);
+    }
+
+    /// Begins an exchange, as [`Bus::raw`]: a motor in quarantine is waited for.
+    ///
+    /// # Errors
+    /// The port, or what forbids the request; nothing is sent then.
+    pub fn ask(&mut self, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
+        self.driven.listen_for([&request])?;
+        let now = self.driven.port.now();
+        self.driven.session.ask(now, id, request)
+    }
+
+    /// Begins an exchange, as one of those of [`Bus::cycle`]: a motor in quarantine is an error.
+    ///
+    /// # Errors
+    /// Those of [`ask`](Self::ask).
+    pub fn request(&mut self, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
+        self.driven.listen_for([&request])?;
+        let now = self.driven.port.now();
+        self.driven.session.request(now, id, request)
+    }
+
+    /// Begins exchanges with those of motors 1 to 4 that are in `expect`, as [`Bus::torque4`].
+    ///
+    /// # Errors
+    /// Those of [`ask`](Self::ask).
+    pub fn torque4(&mut self, torques: Torque4, expect: MotorSet) -> Result<(), Error> {
+        self.driven.listen()?;
+        let now = self.driven.port.now();
+        self.driven.session.torque4(now, torques, expect)
+    }
+
+    /// Gives up the exchange with a motor, if there is one. Its reply is not taken for another's.
+    pub fn cancel(&mut self, id: MotorId) {
+        let now = self.driven.port.now();
+        self.driven.session.cancel(now, id);
+    }
+
+    /// Moves what can be moved without waiting; `each` is told the exchanges that are over. Gives the
+    /// time after which to go on if the descriptor is not readable before; `None`: no exchange is
+    /// under way.
+    ///
+    /// # Errors
+    /// The port's; it is closed, and the exchanges under way are given up.
+    pub fn advance(
+        &mut self,
+        each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<Option<Duration>, Error> {
+        self.moved(each).map_err(|error| {
+            for id in self.busy() {
+                self.cancel(id);
+            }
+            self.driven.closed(error)
+        })
+    }
+
+    /// The bus that waits, with what this one knows of the motors: to stop what is moving.
+    pub fn into_bus(self) -> Bus {
+        let Driven { port, session, exchanges } = self.driven;
+        let port = port.map(|link| link as Box<dyn CanLink>);
+        Bus::driving(Driven { port, session, exchanges })
+    }
+
+    fn moved(
+        &mut self,
+        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+    ) -> Result<Option<Duration>, PortError> {
+        let Driven { port, session, .. } = &mut self.driven;
+        let clock = port.clock();
+        let Some(link) = port.open_link_mut() else { return Ok(None) };
+        let mut listens = STEP;
+        loop {
+            let now = clock.now();
+            match session.poll(now) {
+                Output::Transmit(frame) => link.send(&frame)?,
+                Output::Done(id, result) => {
+                    each(id, result.map_err(|error| error.behind(link.as_ref())));
+                }
+                Output::Wait(until) => {
+                    let came = match listens {
+                        0 => None,
+                        _ => link.receive(Some(Duration::ZERO))?,
+                    };
+                    let Some(frame) = came else {
+                        let wait = until.map(|until| until.since(now).into());
+                        let full = link.flush()?.then_some(FULL);
+                        // Frames that the link holds already do not make the descriptor readable.
+                        let more = (listens == 0).then_some(Duration::ZERO);
+                        return Ok([wait, full, more].into_iter().flatten().min());
+                    };
+                    session.receive(now, &frame);
+                    listens -= 1;
+                }
+            }
+        }
+    }
+}

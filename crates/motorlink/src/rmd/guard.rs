@@ -1,0 +1,108 @@
+//! Stops motors at the end of a scope, however it is left.
+
+use motorlink_proto::rmd::{Command, MotorId, MotorSet, Off, Stop};
+
+use super::{Bus, Error};
+use crate::stopping::{STOP_ATTEMPTS, await_retry};
+
+/// What a [`Guard`] does to the motors that it finds moving.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnDrop {
+    /// Switches them off (0x80).
+    Off,
+    /// Stops them (0x81); they hold still and remember their command.
+    Stop,
+}
+
+impl OnDrop {
+    /// What the motors are sent.
+    pub(crate) fn request(self) -> [u8; 8] {
+        match self {
+            OnDrop::Off => Off.encode(),
+            OnDrop::Stop => Stop.encode(),
+        }
+    }
+}
+
+/// Stops the motors that a [`Bus`] was used to move when it is dropped: at the end of a scope, on
+/// an early return, on a panic. All are told before any answer is waited for.
+pub struct Guard<'a> {
+    bus: &'a Bus,
+    action: OnDrop,
+    armed: bool,
+    report: fn(&Stopped),
+}
+
+/// What a guard did to one motor.
+#[derive(Debug)]
+pub struct Stopped {
+    /// The motor.
+    pub id: MotorId,
+    /// Whether the motor acknowledged it.
+    pub result: Result<(), Error>,
+}
+
+impl<'a> Guard<'a> {
+    pub(super) fn new(bus: &'a Bus, action: OnDrop) -> Self {
+        Guard { bus, action, armed: true, report: |_| {} }
+    }
+
+    /// Chooses what is done to the motors.
+    pub fn with(mut self, action: OnDrop) -> Self {
+        self.action = action;
+        self
+    }
+
+    /// Calls `report` with what was done to each motor, when all is done.
+    pub fn reporting(mut self, report: fn(&Stopped)) -> Self {
+        self.report = report;
+        self
+    }
+
+    /// Leaves the motors as they are.
+    pub fn disarm(mut self) {
+        self.armed = false;
+    }
+
+    /// Stops the motors now; gives what was done to each.
+    pub fn stop_now(mut self) -> Vec<Stopped> {
+        self.armed = false;
+        self.stop_all()
+    }
+
+    fn stop_all(&self) -> Vec<Stopped> {
+        let mut stopped: Vec<Stopped> = Vec::new();
+        self.bus.abandon();
+        let request = self.action.request();
+        for attempt in 1..=STOP_ATTEMPTS {
+            let requests: Vec<_> = self.bus.moving().map(|id| (id, request)).collect();
+            if requests.is_empty() {
+                break;
+            }
+            let mut told = Vec::new();
+            let cycle = self.bus.cycle(&requests, |id, result| {
+                told.push(Stopped { id, result: result.map(drop) });
+            });
+            // Motors that the port kept from hearing are not among those told.
+            let told_ids: MotorSet = told.iter().map(|one| one.id).collect();
+            let unheard = self.bus.moving().without(told_ids);
+            let unheard = unheard.map(|id| Stopped { id, result: cycle.clone() });
+            let outcomes = unheard.chain(told);
+            let last = attempt == STOP_ATTEMPTS;
+            stopped.extend(outcomes.filter(|one| last || one.result.is_ok()));
+            if !await_retry(self.bus.link_state()) && !self.bus.moving().is_empty() {
+                let clock = self.bus.clock();
+                clock.wait(clock.now() + self.bus.guard_time().into());
+            }
+        }
+        stopped
+    }
+}
+
+impl Drop for Guard<'_> {
+    fn drop(&mut self) {
+        if self.armed {
+            self.stop_all().iter().for_each(self.report);
+        }
+    }
+}

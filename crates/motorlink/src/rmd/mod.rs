@@ -1,0 +1,37 @@
+//! RMD motors on a CAN bus.
+//!
+//! ```no_run
+//! use motorlink::rmd::{Bus, Options, SpeedLimit, CentiDegrees};
+//!
+//! let bus = Bus::open(&"slcan:/dev/ttyACM0".parse()?, Options::default())?;
+//! let guard = bus.guard();                 // switches off what was set moving
+//! let motor = bus.motor(1)?;
+//! motor.move_to(CentiDegrees::from_degrees(90.0), Some(SpeedLimit(500)))?;
+//! println!("{} °/s", motor.status2()?.speed.dps());
+//! # drop(guard);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod bus;
+mod error;
+mod event;
+pub(crate) mod follow;
+mod full_turn;
+mod guard;
+mod motor;
+mod session;
+
+pub use motorlink_proto::rmd::{
+    Acceleration, Circle, CirclePosition, CirclePositionLimited, Code, Command, CommandInfo,
+    Counters, Dialect, Direction, Encoder, EncoderBits, EncoderOffset, Errors, Exceeded, Gains,
+    IDENTIFIERS, Limits, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, PhaseCurrents, Spin,
+    Status1, Torque, Torque4, describe,
+};
+pub use motorlink_proto::units::*;
+
+pub use bus::{Bus, Found, Options};
+pub use error::Error;
+pub use event::EventBus;
+pub use full_turn::FullTurn;
+pub use guard::{Guard, OnDrop, Stopped};
+pub use motor::MotorHandle;

@@ -1,0 +1,413 @@
+//! The host's end of a CAN bus without the bus: what the blocking client and event loops share.
+
+use std::sync::Arc;
+
+use motorlink_link::port::PortError;
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{
+    self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, Refused, Torque,
+    Torque4, question_behind,
+};
+use motorlink_proto::time::{Duration, Instant};
+
+use super::{Error, Options};
+
+/// How long a motor whose replies are in doubt may go on talking, beside the times of its exchanges.
+const SETTLE_LIMIT: Duration = Duration::from_millis(2_000);
+
+/// A host that waits for motors in quarantine, and for those that it asks for the first time, with the motors that it set moving, and its errors in
+/// words: sans I/O. [`request`](Self::request), [`ask`](Self::ask) or [`torque4`](Self::torque4),
+/// then [`poll`](Self::poll) until it waits, handing in with [`receive`](Self::receive) what comes.
+#[derive(Debug, Clone)]
+pub(super) struct Session {
+    port: Arc<str>,
+    host: Host,
+    /// Motors that were given something to do and not switched off.
+    moving: MotorSet,
+    /// How long an exchange may be put off.
+    patience: Duration,
+    /// What each motor was asked last.
+    asked: [Asked; MotorId::COUNT],
+    /// Motors whose quarantine an exchange outlasts.
+    insisting: MotorSet,
+    /// Those of them whose request cannot leave yet.
+    waiting: MotorSet,
+    /// Torques whose motors are asked for the first time.
+    held: Option<Held>,
+    /// Motors whose torques were given up, and the reason. Each is an outcome of its own.
+    unsent: MotorSet,
+    unsent_for: Option<Refused>,
+    /// Whether nothing is sent any more but what stops motors.
+    is_retired: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    request: [u8; 8],
+    /// When a motor in quarantine is waited for no longer.
+    until: Instant,
+}
+
+/// Torques for motors 1 to 4 that wait until the motors can be trusted.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    torques: Torque4,
+    expect: MotorSet,
+    /// Those of them that have answered.
+    answered: MotorSet,
+    until: Instant,
+}
+
+/// What the caller has to do next.
+#[derive(Debug)]
+pub(super) enum Output {
+    /// Send this frame, then poll again.
+    Transmit(CanFrame),
+    /// The exchange with a motor is over.
+    Done(MotorId, Result<[u8; 8], Error>),
+    /// Hand in what comes until then; `None` while no exchange is under way.
+    Wait(Option<Instant>),
+}
+
+impl Session {
+    /// `port` is for messages.
+    pub(super) fn new(port: Arc<str>, options: &Options) -> Self {
+        let mut host = Host::new();
+        host.set_timeout(options.timeout.into());
+        host.set_guard(options.guard.into());
+        for id in MotorSet::ALL {
+            host.set_limits(id, options.limits);
+        }
+        let times = options.guard.saturating_mul(2).saturating_add(options.timeout);
+        let nothing = Asked { request: [0; 8], until: Instant(0) };
+        Session {
+            port,
+            host,
+            moving: MotorSet::EMPTY,
+            patience: SETTLE_LIMIT + times.into(),
+            asked: [nothing; MotorId::COUNT],
+            insisting: MotorSet::EMPTY,
+            waiting: MotorSet::EMPTY,
+            held: None,
+            unsent: MotorSet::EMPTY,
+            unsent_for: None,
+            is_retired: false,
+        }
+    }
+
+    pub(super) fn counters(&self) -> Counters {
+        *self.host.counters()
+    }
+
+    pub(super) fn moving(&self) -> MotorSet {
+        self.moving
+    }
+
+    /// Takes motors over that somebody else set moving.
+    pub(super) fn take_over(&mut self, moving: MotorSet) {
+        self.moving = self.moving.union(moving);
+    }
+
+    pub(super) fn guard(&self) -> Duration {
+        self.host.guard()
+    }
+
+    pub(super) fn set_limits(&mut self, id: MotorId, limits: Limits) {
+        self.host.set_limits(id, limits);
+    }
+
+    /// The motors with an exchange under way.
+    pub(super) fn busy(&self) -> MotorSet {
+        let held = if self.held.is_some() { MotorSet::TORQUE4 } else { MotorSet::EMPTY };
+        self.host.busy().union(self.waiting).union(self.unsent).union(held)
+    }
+
+    /// Tells that the bus was opened anew.
+    pub(super) fn reopened(&mut self, now: Instant) {
+        for id in self.busy() {
+            self.cancel(now, id);
+        }
+        self.host.reopened(now);
+    }
+
+    /// A question with another code than what a motor was asked last.
+    pub(super) fn question(&self, id: MotorId) -> [u8; 8] {
+        question_behind(self.asked[place(id)].request[0])
+    }
+
+    /// Whether the motor's replies since the last confirmation went to their own requests.
+    pub(super) fn confirmed(&mut self, id: MotorId) -> Result<(), Error> {
+        match self.host.take_stray(id) {
+            true => Err(Error::Unconfirmed { port: Arc::clone(&self.port), id }),
+            false => Ok(()),
+        }
+    }
+
+    /// Says that the motors owe no host a reply.
+    pub(super) fn trust(&mut self) {
+        self.host.trust(MotorSet::ALL);
+    }
+
+    /// Begins an exchange with a motor that is not in quarantine. One that is asked for the first time is
+    /// waited for.
+    ///
+    /// # Errors
+    /// Nothing is sent then.
+    pub(super) fn request(
+        &mut self,
+        now: Instant,
+        id: MotorId,
+        request: [u8; 8],
+    ) -> Result<(), Error> {
+        self.make_way(&request);
+        self.free(id, &request)?;
+        let begun = self.host.request(now, id, request);
+        begun.map_err(|refused| self.refused(refused))?;
+        self.asked[place(id)] = Asked { request, until: now + self.patience };
+        if self.host.is_unknown(id) {
+            self.insisting.insert(id);
+        }
+        Ok(())
+    }
+
+    /// Begins an exchange that waits for a motor in quarantine.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub(super) fn ask(&mut self, now: Instant, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
+        self.make_way(&request);
+        self.free(id, &request)?;
+        match self.host.request(now, id, request) {
+            Ok(()) => {}
+            Err(Refused::Quarantined { .. }) => self.waiting.insert(id),
+            Err(refused) => return Err(self.refused(refused)),
+        }
+        self.insisting.insert(id);
+        self.asked[place(id)] = Asked { request, until: now + self.patience };
+        Ok(())
+    }
+
+    /// Begins an exchange with those of motors 1 to 4 that are expected to answer. Those that are asked
+    /// for the first time are waited for.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub(super) fn torque4(
+        &mut self,
+        now: Instant,
+        torques: Torque4,
+        expect: MotorSet,
+    ) -> Result<(), Error> {
+        let torque = Torque::default().encode();
+        for id in MotorSet::TORQUE4 {
+            self.free(id, &torque)?;
+        }
+        let begun = self.host.torque4(now, torques, expect);
+        begun.map_err(|refused| self.refused(refused))?;
+        let until = now + self.patience;
+        for id in expect {
+            self.asked[place(id)] = Asked { request: torque, until };
+        }
+        if expect.into_iter().any(|id| self.host.is_unknown(id)) {
+            self.held = Some(Held { torques, expect, answered: MotorSet::EMPTY, until });
+        }
+        Ok(())
+    }
+
+    pub(super) fn receive(&mut self, now: Instant, frame: &CanFrame) {
+        self.host.receive(now, frame);
+    }
+
+    pub(super) fn poll(&mut self, now: Instant) -> Output {
+        loop {
+            let mut again = self.send_held(now);
+            if let Some(id) = self.unsent.next() {
+                return Output::Done(id, Err(self.why_unsent(id)));
+            }
+            for id in self.waiting {
+                let Asked { request, until } = self.asked[place(id)];
+                match self.host.request(now, id, request) {
+                    Err(Refused::Quarantined { until: free, .. }) if now < until => {
+                        again = again.into_iter().chain([free]).min();
+                    }
+                    begun => {
+                        self.waiting.remove(id);
+                        if let Err(refused) = begun {
+                            self.insisting.remove(id);
+                            let error = match refused {
+                                Refused::Quarantined { id, .. } => self.shared(id),
+                                refused => self.refused(refused),
+                            };
+                            return Output::Done(id, Err(error));
+                        }
+                    }
+                }
+            }
+            match self.host.poll(now) {
+                proto::Output::Transmit(frame) => {
+                    self.moving = self.moving.union(MotorSet::moved_by(&frame));
+                    return Output::Transmit(frame);
+                }
+                proto::Output::Done { id, result: Err(proto::Error::Quarantined) }
+                    if self.insisting.contains(id) && now < self.asked[place(id)].until =>
+                {
+                    self.waiting.insert(id);
+                }
+                proto::Output::Done { id, result } if self.is_held(id) => {
+                    if let Some(outcome) = self.held_answered(id, result) {
+                        return outcome;
+                    }
+                }
+                proto::Output::Done { id, result } => {
+                    let is_outlasted = self.insisting.contains(id);
+                    self.insisting.remove(id);
+                    // A motor counts as moving from the request on, whose reply may be lost, and
+                    // until it has acknowledged that it is off or stopped.
+                    if result.as_ref().is_ok_and(ends_motion) {
+                        self.moving.remove(id);
+                    }
+                    let failed = |error| match error {
+                        proto::Error::Quarantined if is_outlasted => self.shared(id),
+                        error => self.failed(id, error),
+                    };
+                    return Output::Done(id, result.map_err(failed));
+                }
+                proto::Output::Wait(until) => {
+                    return Output::Wait(until.into_iter().chain(again).min());
+                }
+            }
+        }
+    }
+
+    fn is_held(&self, id: MotorId) -> bool {
+        self.held.is_some_and(|held| held.expect.contains(id))
+    }
+
+    /// A motor that torques are held for answered the questions, or failed to: then they are sent for the
+    /// others.
+    fn held_answered(
+        &mut self,
+        id: MotorId,
+        result: Result<[u8; 8], proto::Error>,
+    ) -> Option<Output> {
+        let held = self.held.as_mut()?;
+        match result {
+            Ok(_) | Err(proto::Error::Quarantined) => {
+                held.answered.insert(id);
+                None
+            }
+            Err(error) => {
+                held.expect.remove(id);
+                // To a motor of another protocol the frame may mean anything.
+                if held.expect.is_empty() || matches!(error, proto::Error::Foreign(_)) {
+                    self.drop_held(None);
+                }
+                Some(Output::Done(id, Err(self.failed(id, error))))
+            }
+        }
+    }
+
+    /// Sends the torques that are held, if their motors can be trusted; when to try again.
+    fn send_held(&mut self, now: Instant) -> Option<Instant> {
+        let Held { torques, expect, until, .. } =
+            self.held.filter(|held| held.answered == held.expect)?;
+        match self.host.torque4(now, torques, expect) {
+            Err(Refused::Quarantined { until: free, .. }) if now < until => return Some(free),
+            Ok(()) => self.held = None,
+            Err(why) => self.drop_held(Some(why)),
+        }
+        None
+    }
+
+    /// Gives the torques that are held up. Motors whose questions are under way end in quarantine.
+    fn drop_held(&mut self, why: Option<Refused>) {
+        if let Some(held) = self.held.take() {
+            (self.unsent, self.unsent_for) = (held.answered, why);
+        }
+    }
+
+    fn why_unsent(&self, id: MotorId) -> Error {
+        match self.unsent_for {
+            Some(Refused::Quarantined { .. }) => self.shared(id),
+            Some(why) => self.refused(why),
+            None => self.quarantined(id),
+        }
+    }
+
+    /// Gives up the exchange with a motor, if there is one. Its reply may still come.
+    pub(super) fn cancel(&mut self, now: Instant, id: MotorId) {
+        self.insisting.remove(id);
+        self.waiting.remove(id);
+        self.unsent.remove(id);
+        if MotorSet::TORQUE4.contains(id) {
+            self.drop_held(None);
+            self.unsent.remove(id);
+        }
+        self.host.cancel(now, id);
+    }
+
+    /// Sends nothing any more but what stops motors.
+    pub(super) fn retire(&mut self) {
+        self.is_retired = true;
+    }
+
+    /// What ends motion goes before torques that are held.
+    fn make_way(&mut self, request: &[u8; 8]) {
+        if ends_motion(request) {
+            self.drop_held(None);
+        }
+    }
+
+    /// Whether a motor may be sent this.
+    fn free(&self, id: MotorId, request: &[u8; 8]) -> Result<(), Error> {
+        if self.is_retired && !ends_motion(request) {
+            return Err(PortError::Retired { port: self.port.to_string() }.into());
+        }
+        let is_held = self.held.is_some() && MotorSet::TORQUE4.contains(id);
+        match self.waiting.contains(id) || is_held {
+            true => Err(Error::Twice(id)),
+            false => Ok(()),
+        }
+    }
+
+    fn quarantined(&self, id: MotorId) -> Error {
+        Error::Quarantined { port: Arc::clone(&self.port), id }
+    }
+
+    /// Of a motor that was waited for: it would have been trusted if it had been silent.
+    fn shared(&self, id: MotorId) -> Error {
+        Error::Shared { port: Arc::clone(&self.port), id }
+    }
+
+    fn refused(&self, refused: Refused) -> Error {
+        match refused {
+            Refused::Quarantined { id, .. } => self.quarantined(id),
+            Refused::Limit { id, exceeded } => Error::Limit { id, exceeded },
+            Refused::OutOfReach(id) => Error::OutOfReach(id),
+            Refused::Busy(id) => Error::Twice(id),
+        }
+    }
+
+    fn failed(&self, id: MotorId, error: proto::Error) -> Error {
+        let port = Arc::clone(&self.port);
+        let [code, ..] = self.asked[place(id)].request;
+        let code = Code::from(code);
+        match error {
+            proto::Error::Altered => Error::Altered { port, id, code },
+            proto::Error::Echo => Error::Echo { port, id },
+            proto::Error::Foreign(dialect) => Error::Foreign { port, id, dialect },
+            proto::Error::Quarantined => Error::Quarantined { port, id },
+            _ => Error::Timeout { port, id, code },
+        }
+    }
+}
+
+/// Whether a frame, or the reply to it, is Off or Stop.
+pub(super) fn ends_motion([code, ..]: &[u8; 8]) -> bool {
+    Code::from(*code).ends_motion()
+}
+
+/// The place of a motor in a table of all.
+fn place(id: MotorId) -> usize {
+    usize::from(id.number()) - 1
+}

@@ -1,0 +1,106 @@
+//! Turns at a line: one exchange at a time, and a call of the owner's while an exchange waits.
+
+use std::error::Error;
+use std::io;
+use std::ops::{Deref, DerefMut};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, ThreadId};
+use std::time::{Duration, Instant};
+
+use motorlink_link::port::PortError;
+
+/// How often a client that waits makes the call of [`Client::looking`](crate::stmcp::Client::looking)
+/// or [`Bus::looking`](crate::rmd::Bus::looking).
+pub const LOOK: Duration = Duration::from_millis(50);
+
+/// Called while an exchange waits. An error ends the exchange.
+type Look = Box<dyn Fn() -> Result<(), Box<dyn Error + Send + Sync>> + Send + Sync>;
+
+/// A line that threads share.
+///
+/// While [`Look`] runs, the line is unlocked and belongs to its thread: that thread may use the line
+/// from within, and other threads wait.
+pub(crate) struct Turns<T> {
+    line: Mutex<Line<T>>,
+    is_free: Condvar,
+    look: Option<Look>,
+}
+
+struct Line<T> {
+    state: T,
+    /// The thread that is looking.
+    looking: Option<ThreadId>,
+}
+
+/// A line in the hands of one thread, until it is dropped.
+pub(crate) struct Turn<'a, T> {
+    turns: &'a Turns<T>,
+    line: MutexGuard<'a, Line<T>>,
+}
+
+impl<T> Turns<T> {
+    pub(crate) fn new(state: T) -> Self {
+        let line = Mutex::new(Line { state, looking: None });
+        Turns { line, is_free: Condvar::new(), look: None }
+    }
+
+    pub(crate) fn set_look(&mut self, look: Look) {
+        self.look = Some(look);
+    }
+
+    /// Waits until the line is free, or looked away from by this thread.
+    pub(crate) fn take(&self) -> Turn<'_, T> {
+        let mut line = self.lock();
+        while line.looking.is_some_and(|thread| thread != thread::current().id()) {
+            line = self.is_free.wait(line).unwrap_or_else(PoisonError::into_inner);
+        }
+        Turn { turns: self, line }
+    }
+
+    /// When an exchange that begins now has to look; `None`: never.
+    pub(crate) fn next_look(&self) -> Option<Instant> {
+        self.look.as_ref().map(|_| Instant::now() + LOOK)
+    }
+
+    /// A poisoned lock is taken all the same: an exchange that panicked left the line in a state
+    /// that the next one deals with.
+    fn lock(&self) -> MutexGuard<'_, Line<T>> {
+        self.line.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<T> Turn<'_, T> {
+    /// Looks, with the line unlocked. An error is an interruption of the port `port`.
+    pub(crate) fn look(mut self, port: &str) -> (Self, Result<(), PortError>) {
+        let turns = self.turns;
+        let Some(look) = &turns.look else { return (self, Ok(())) };
+        let before = self.line.looking.replace(thread::current().id());
+        drop(self);
+        let looked = catch_unwind(AssertUnwindSafe(look));
+        let mut line = turns.lock();
+        line.looking = before;
+        if before.is_none() {
+            turns.is_free.notify_all();
+        }
+        let looked = looked.unwrap_or_else(|panic| resume_unwind(panic)).map_err(|error| {
+            let source = io::Error::new(io::ErrorKind::Interrupted, error);
+            PortError::Io { port: port.to_owned(), source }
+        });
+        (Turn { turns, line }, looked)
+    }
+}
+
+impl<T> Deref for Turn<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.line.state
+    }
+}
+
+impl<T> DerefMut for Turn<'_, T> {
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.line.state
+    }
+}

@@ -1,0 +1,310 @@
+//! Register values for people: physical units, names for states, and back.
+
+use std::format;
+use std::string::{String, ToString};
+use std::{borrow::ToOwned, vec::Vec};
+
+use super::register::{Access, Type, Unit};
+use super::{ControlMode, Flags, Profile, RegisterId, Status};
+
+/// A register's value as it was read, with the profile that gives it its scale.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reading {
+    /// The register.
+    pub register: RegisterId,
+    /// The 32 bits that were read.
+    pub bits: i32,
+    /// The profile that the drive follows.
+    pub profile: Profile,
+}
+
+/// A register name or number that nobody knows.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no register `{text}`; {}`motorlink st registers` lists them", suggestion(.nearest))]
+pub struct UnknownRegister {
+    /// What was asked for.
+    pub text: String,
+    /// The name that looks most like it, if one does.
+    pub nearest: Option<&'static str>,
+}
+
+/// A value that a register cannot take; nothing was sent.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ValueError {
+    /// Not a number, nor a name that this register knows.
+    #[error("`{text}` is no value for {register}; {usable}")]
+    NotAValue {
+        /// What was given.
+        text: String,
+        /// The register.
+        register: RegisterId,
+        /// What it takes.
+        usable: String,
+    },
+    /// Between two digits of the register.
+    #[error("{text} falls between two values of {register}, which has steps of {step}{unit}")]
+    Between {
+        /// What was given.
+        text: String,
+        /// The register.
+        register: RegisterId,
+        /// One digit, in the physical unit.
+        step: f64,
+        /// A space and the unit, or nothing.
+        unit: String,
+    },
+    /// Outside what the register's type can hold.
+    #[error("{text} does not fit {register}: it takes {least} to {most}{unit}")]
+    OutOfRange {
+        /// What was given.
+        text: String,
+        /// The register.
+        register: RegisterId,
+        /// The least value, in the physical unit.
+        least: f64,
+        /// The greatest value, in the physical unit.
+        most: f64,
+        /// A space and the unit, or nothing.
+        unit: String,
+    },
+}
+
+/// The register of a name, or of a number such as `0x1E`.
+pub fn find_register(text: &str) -> Result<RegisterId, UnknownRegister> {
+    if let Some(register) = RegisterId::named(text) {
+        return Ok(register);
+    }
+    if let Some(Ok(id)) = number(text).map(u8::try_from) {
+        return Ok(RegisterId(id));
+    }
+    let wanted = text.to_uppercase();
+    let nearest = RegisterId::all()
+        .filter_map(|register| register.text().map(|text| text.name))
+        .map(|name| (strsim::jaro_winkler(&wanted, name), name))
+        .filter(|(likeness, _)| *likeness > 0.8)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name);
+    Err(UnknownRegister { text: text.to_owned(), nearest })
+}
+
+fn suggestion(nearest: &Option<&'static str>) -> String {
+    nearest.map(|name| format!("did you mean `{name}`? ")).unwrap_or_default()
+}
+
+fn number(text: &str) -> Option<i64> {
+    match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
+        Some(hex) => i64::from_str_radix(hex, 16).ok(),
+        None => text.parse().ok(),
+    }
+}
+
+impl Reading {
+    /// The value in [`unit`](Self::unit)s.
+    pub fn value(&self) -> f64 {
+        match self.ty() {
+            Some(Type::F32) => f64::from(f32::from_bits(self.bits as u32)),
+            Some(Type::U32) => f64::from(self.bits as u32),
+            _ => f64::from(self.bits) * scale(self.register, self.profile),
+        }
+    }
+
+    /// The value as the integer that was read; the bits of a float.
+    pub fn digits(&self) -> i64 {
+        match self.ty() {
+            Some(Type::U32 | Type::F32) | None => i64::from(self.bits as u32),
+            _ => i64::from(self.bits),
+        }
+    }
+
+    /// Symbol of the physical unit; empty when there is none.
+    pub fn unit(&self) -> &'static str {
+        unit(self.register)
+    }
+
+    /// The value in words, for registers whose values have names.
+    pub fn name(&self) -> Option<String> {
+        match self.register {
+            RegisterId::STATUS => Some(Status::from(self.bits as u8).to_string()),
+            RegisterId::CONTROL_MODE => Some(ControlMode::from(self.bits as u8).to_string()),
+            RegisterId::FLAGS => Some(Flags(self.bits as u32).to_string()),
+            RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
+                Some(RegisterId(self.bits as u8).to_string())
+            }
+            RegisterId::TARGET_MOTOR => Some(format!("motor {}", i64::from(self.bits) + 1)),
+            _ => None,
+        }
+    }
+
+    fn ty(&self) -> Option<Type> {
+        self.register.shape().map(|shape| shape.ty(self.profile))
+    }
+}
+
+impl std::fmt::Display for Reading {
+    /// The value with its unit, or its name.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(name) = self.name() {
+            return f.write_str(&name);
+        }
+        let (value, unit) = (self.value(), self.unit());
+        // Scaled integers have one decimal; adding 0.0 keeps a float from printing as -0.
+        let tenths = (value * 10.0).round() / 10.0 + 0.0;
+        let value = if self.ty() == Some(Type::F32) { value } else { tenths };
+        write!(f, "{value}{}{unit}", if unit.is_empty() { "" } else { " " })
+    }
+}
+
+/// Reads a value that a person wrote, in the register's physical unit or, with `raw`, in digits;
+/// names are taken where values have them. Gives the bits to write.
+pub fn parse_value(
+    register: RegisterId,
+    text: &str,
+    profile: Profile,
+    raw: bool,
+) -> Result<i32, ValueError> {
+    if let Some(bits) = named_value(register, text) {
+        return Ok(bits);
+    }
+    let ty = register.shape().map(|shape| shape.ty(profile));
+    let not_a_value =
+        || ValueError::NotAValue { text: text.to_owned(), register, usable: usable(register) };
+    let value = match number(text) {
+        Some(integer) => integer as f64,
+        None => {
+            text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(not_a_value)?
+        }
+    };
+    let unit = match unit(register) {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    let text = text.to_owned();
+    if ty == Some(Type::F32) && !raw {
+        let (least, most) = (f32::MIN.into(), f32::MAX.into());
+        return match value as f32 {
+            value if value.is_finite() => Ok(value.to_bits() as i32),
+            _ => Err(ValueError::OutOfRange { text, register, least, most, unit }),
+        };
+    }
+    let scale = if raw { 1.0 } else { scale(register, profile) };
+    let digits = value / scale;
+    let (least, most) = range(ty);
+    if digits < least as f64 || digits > most as f64 {
+        let (least, most) = (least as f64 * scale, most as f64 * scale);
+        return Err(ValueError::OutOfRange { text, register, least, most, unit });
+    }
+    if (digits - digits.round()).abs() > 1e-6 {
+        return Err(ValueError::Between { text, register, step: scale, unit });
+    }
+    Ok(digits.round() as i64 as i32)
+}
+
+fn range(ty: Option<Type>) -> (i64, i64) {
+    let Some(ty) = ty else { return (i32::MIN.into(), u32::MAX.into()) };
+    match ty {
+        Type::I8 => (i8::MIN.into(), i8::MAX.into()),
+        Type::U8 => (0, u8::MAX.into()),
+        Type::I16 => (i16::MIN.into(), i16::MAX.into()),
+        Type::U16 => (0, u16::MAX.into()),
+        Type::I32 => (i32::MIN.into(), i32::MAX.into()),
+        Type::U32 | Type::F32 => (0, u32::MAX.into()),
+    }
+}
+
+fn named_value(register: RegisterId, text: &str) -> Option<i32> {
+    match register {
+        RegisterId::CONTROL_MODE => ControlMode::ALL
+            .iter()
+            .find(|mode| mode.name().is_some_and(|name| name.eq_ignore_ascii_case(text)))
+            .map(|&mode| u8::from(mode).into()),
+        RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
+            RegisterId::named(text).map(|shown| shown.0.into())
+        }
+        _ => None,
+    }
+}
+
+fn usable(register: RegisterId) -> String {
+    match register {
+        RegisterId::CONTROL_MODE => "TORQUE and SPEED are".to_owned(),
+        RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
+            let shown = RegisterId::all()
+                .filter(|id| id.shape().is_some_and(|shape| shape.access == Access::Dac));
+            let names: Vec<String> = shown.map(|id| id.to_string()).collect();
+            format!("it shows one of {}", names.join(", "))
+        }
+        _ => "give a number, decimal or as 0x1F".to_owned(),
+    }
+}
+
+fn scale(register: RegisterId, profile: Profile) -> f64 {
+    match register.shape().map(|shape| shape.unit) {
+        Some(Unit::DeciHertz) => 0.1,
+        Some(Unit::Percent) if profile == Profile::Mcsdk54 => 0.1,
+        _ => 1.0,
+    }
+}
+
+fn unit(register: RegisterId) -> &'static str {
+    match register.shape().map(|shape| shape.unit) {
+        Some(Unit::DeciHertz) => "Hz",
+        Some(unit) => unit.symbol(),
+        None => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown(register: RegisterId, bits: i32, profile: Profile) -> String {
+        Reading { register, bits, profile }.to_string()
+    }
+
+    #[test]
+    fn values_are_shown_with_their_unit_or_their_name() {
+        let spec = Profile::Spec;
+        assert_eq!(shown(RegisterId::SPEED_MEAS, -1500, spec), "-1500 rpm");
+        assert_eq!(shown(RegisterId::STATUS, 6, spec), "RUN");
+        assert_eq!(shown(RegisterId::STATUS, 99, spec), "0x63");
+        assert_eq!(shown(RegisterId::FLAGS, 0x0002_0042, spec), "OVER_VOLT (present), BREAK_IN");
+        assert_eq!(shown(RegisterId::PFC_ACBUS_FREQ, 501, spec), "50.1 Hz");
+        assert_eq!(shown(RegisterId::FLUXWK_BUS, 98, spec), "98 %");
+        assert_eq!(shown(RegisterId::FLUXWK_BUS, 985, Profile::Mcsdk54), "98.5 %");
+        assert_eq!(shown(RegisterId::SC_RS, 0.25f32.to_bits() as i32, spec), "0.25 Ω");
+        assert_eq!(shown(RegisterId(0xC0), -1, spec), "-1");
+    }
+
+    #[test]
+    fn what_is_shown_can_be_written_back() {
+        let spec = Profile::Spec;
+        let parse = |register, text: &str| parse_value(register, text, spec, false);
+        assert_eq!(parse(RegisterId::SPEED_KP, "-32768"), Ok(-32768));
+        assert_eq!(parse(RegisterId::SPEED_KP, "0x10"), Ok(16));
+        assert!(parse(RegisterId::SPEED_KP, "32768").is_err());
+        assert!(parse(RegisterId::SPEED_KP, "fast").is_err());
+        assert!(parse(RegisterId::SPEED_KP, "NaN").is_err());
+        assert!(matches!(parse(RegisterId::SPEED_KP, "3.7"), Err(ValueError::Between { .. })));
+        let current = parse(RegisterId::SC_CURRENT, "1e39");
+        assert!(matches!(current, Err(ValueError::OutOfRange { .. })), "{current:?}");
+        assert_eq!(parse(RegisterId::SC_CURRENT, "0.25"), Ok(0.25f32.to_bits() as i32));
+        // Nobody knows the sign of an unnamed register.
+        assert_eq!(parse(RegisterId(0xC0), "0xFFFFFFFF"), Ok(-1));
+        assert_eq!(parse(RegisterId(0xC0), "-1"), Ok(-1));
+        assert_eq!(parse(RegisterId::CONTROL_MODE, "speed"), Ok(1));
+        assert_eq!(parse(RegisterId::DAC_OUT2, "I_ALPHA"), Ok(0x25));
+        let tenths = parse_value(RegisterId::FLUXWK_BUS, "98.5", Profile::Mcsdk54, false);
+        assert_eq!(tenths, Ok(985));
+        assert_eq!(parse_value(RegisterId::FLUXWK_BUS, "985", Profile::Mcsdk54, true), Ok(985));
+    }
+
+    #[test]
+    fn an_unknown_register_suggests_the_nearest() {
+        assert_eq!(find_register("speed_meas"), Ok(RegisterId::SPEED_MEAS));
+        assert_eq!(find_register("0x1e"), Ok(RegisterId::SPEED_MEAS));
+        assert_eq!(find_register("SPEED_MES").unwrap_err().nearest, Some("SPEED_MEAS"));
+        assert_eq!(find_register("zzz").unwrap_err().nearest, None);
+        assert!(find_register("256").is_err());
+    }
+}

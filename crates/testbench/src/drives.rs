@@ -1,0 +1,150 @@
+//! Simulated drives, and what is written down of them while time passes.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use motorlink_link::Clock;
+use motorlink_proto::time::{Duration, Instant};
+use motorlink_sim::rmd::{RmdBus, RmdNode};
+use motorlink_sim::st::{StMotor, StStation};
+
+use super::scenario::{rmd_values, st_values};
+use super::{Command, world};
+
+pub(super) type Station = StStation<Vec<StMotor>>;
+pub(super) type Bus = RmdBus<Vec<RmdNode>>;
+
+/// An ST drive on its line, RMD motors on their bus, or both.
+#[derive(Debug)]
+pub(super) struct Drives {
+    pub(super) st: Option<Station>,
+    pub(super) rmd: Option<Bus>,
+}
+
+impl Drives {
+    pub(super) fn advance_to(&mut self, now: Instant) {
+        if let Some(station) = &mut self.st {
+            station.advance_to(now);
+        }
+        if let Some(bus) = &mut self.rmd {
+            bus.advance_to(now);
+        }
+    }
+
+    /// Values of all signals, in the order of the motors and of the tables.
+    pub(super) fn values(&self) -> impl Iterator<Item = f64> {
+        let st = self.st.iter().flat_map(|station| station.drive().motors());
+        let rmd = self.rmd.iter().flat_map(|bus| bus.nodes());
+        st.flat_map(st_values).chain(rmd.flat_map(rmd_values))
+    }
+
+    /// Changes the world around the ST drive.
+    pub(super) fn change_st(&mut self, now: Instant, command: &Command) -> Result<(), String> {
+        let station = self.st.as_mut().ok_or("there is no ST drive")?;
+        world::st(station, now, command)
+    }
+
+    /// Changes the world around the RMD motors.
+    pub(super) fn change_rmd(&mut self, now: Instant, command: &Command) -> Result<(), String> {
+        let bus = self.rmd.as_mut().ok_or("there are no RMD motors")?;
+        world::rmd(bus, now, command)
+    }
+}
+
+/// Drives at which ports, commands and observers meet.
+#[derive(Clone)]
+pub(super) struct Stage(Arc<Mutex<Observed>>);
+
+/// Drives with those who write down what they do.
+pub(super) struct Observed {
+    pub(super) drives: Drives,
+    sheets: Vec<Sheet>,
+}
+
+/// What one observer writes down.
+struct Sheet {
+    key: u64,
+    /// Places of the signals.
+    columns: Vec<usize>,
+    every: Duration,
+    next: Instant,
+    rows: Vec<f64>,
+}
+
+impl Stage {
+    pub(super) fn new(drives: Drives) -> Self {
+        Stage(Arc::new(Mutex::new(Observed { drives, sheets: Vec::new() })))
+    }
+
+    /// The drives as they are `now`.
+    pub(super) fn at(&self, now: Instant) -> MutexGuard<'_, Observed> {
+        let mut observed = self.last();
+        observed.advance_to(now);
+        observed
+    }
+
+    /// The drives as they were last.
+    pub(super) fn last(&self) -> MutexGuard<'_, Observed> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins to write the signals at `columns` down, the first time now.
+    pub(super) fn record(&self, clock: &Clock, columns: Vec<usize>, every: Duration) -> Recording {
+        let now = clock.now();
+        let mut observed = self.at(now);
+        let key = observed.sheets.iter().map(|sheet| sheet.key + 1).max().unwrap_or(0);
+        observed.sheets.push(Sheet { key, columns, every, next: now, rows: Vec::new() });
+        Recording { stage: self.clone(), clock: clock.clone(), key, began: now, every }
+    }
+}
+
+impl Observed {
+    fn advance_to(&mut self, now: Instant) {
+        while let Some(next) = self.sheets.iter().map(|sheet| sheet.next).min()
+            && next <= now
+        {
+            self.drives.advance_to(next);
+            let values: Vec<f64> = self.drives.values().collect();
+            for sheet in self.sheets.iter_mut().filter(|sheet| sheet.next == next) {
+                sheet.rows.extend(sheet.columns.iter().map(|&column| values[column]));
+                sheet.next += sheet.every;
+            }
+        }
+        self.drives.advance_to(now);
+    }
+}
+
+/// Signals of a world that are written down at equal distances while time passes, until this is
+/// dropped.
+pub struct Recording {
+    stage: Stage,
+    clock: Clock,
+    key: u64,
+    began: Instant,
+    every: Duration,
+}
+
+impl Recording {
+    /// When the first sample was taken.
+    pub fn began(&self) -> Instant {
+        self.began
+    }
+
+    /// From sample to sample.
+    pub fn every(&self) -> Duration {
+        self.every
+    }
+
+    /// The samples that were taken since the last call: the signals of one moment side by side. A
+    /// sample is the state before what happens at its moment.
+    pub fn take(&self) -> Vec<f64> {
+        let mut observed = self.stage.at(self.clock.now());
+        let sheet = observed.sheets.iter_mut().find(|sheet| sheet.key == self.key);
+        sheet.map(|sheet| std::mem::take(&mut sheet.rows)).unwrap_or_default()
+    }
+}
+
+impl Drop for Recording {
+    fn drop(&mut self) {
+        self.stage.last().sheets.retain(|sheet| sheet.key != self.key);
+    }
+}

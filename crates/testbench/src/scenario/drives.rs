@@ -1,0 +1,80 @@
+//! What events do to the drives of a scenario.
+
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{ClearErrors, Command as _, Payload, Status1};
+use motorlink_proto::stmcp::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse};
+use motorlink_proto::time::Instant;
+use motorlink_sim::rmd::RmdConfig;
+
+use super::script::Cast;
+use super::{Action, Target};
+use crate::drives::Drives;
+use crate::{Command, ConfigError};
+
+impl Drives {
+    /// Powers the drives on at time 0.
+    pub(crate) fn new(cast: &Cast) -> Result<Self, ConfigError> {
+        let station = || cast.config.station(Instant(0));
+        let bus = || cast.config.bus(Instant(0), RmdConfig::factory_rom);
+        let (st, rmd) = (cast.st.then(station).transpose()?, cast.rmd.then(bus).transpose()?);
+        Ok(Drives { st, rmd })
+    }
+
+    /// Does what an event says. Gives how a drive refused it, if it did.
+    ///
+    /// # Errors
+    /// A command to the world that has no sense.
+    pub(super) fn act(
+        &mut self,
+        now: Instant,
+        target: Target,
+        action: &Action,
+    ) -> Result<Option<String>, String> {
+        match action {
+            Action::World(command) => self.change(now, target, command).map(|()| None),
+            Action::Bytes(bytes) => Ok(self.send_bytes(now, bytes)),
+            Action::Frame(frame) => Ok(self.send_frame(now, frame)),
+        }
+    }
+
+    /// Changes the world around a motor.
+    pub(super) fn change(
+        &mut self,
+        now: Instant,
+        target: Target,
+        command: &Command,
+    ) -> Result<(), String> {
+        match target {
+            Target::St(_) => self.change_st(now, command),
+            Target::Rmd(_) => self.change_rmd(now, command),
+        }
+    }
+
+    fn send_bytes(&mut self, now: Instant, bytes: &[u8]) -> Option<String> {
+        let mut reply = Vec::new();
+        self.st.as_mut()?.receive(now, bytes, |bytes| reply.extend_from_slice(bytes));
+        match Frame::parse(&reply) {
+            Parse::Frame(Frame { header: HEADER_ACK, .. }, _) => None,
+            Parse::Frame(Frame { header: HEADER_NACK, payload: [code, ..] }, _) => {
+                Some(ErrorCode::from(*code).to_string())
+            }
+            _ => Some(SILENT.to_owned()),
+        }
+    }
+
+    fn send_frame(&mut self, now: Instant, frame: &CanFrame) -> Option<String> {
+        let mut reply = None;
+        self.rmd.as_mut()?.receive(now, frame, |frame| reply = Some(frame));
+        let Some((_, data)) = reply.as_ref().and_then(CanFrame::eight_bytes) else {
+            return Some(SILENT.to_owned());
+        };
+        let clears = frame.data().first() == Some(&ClearErrors::CODE.number());
+        let remain = clears && !Status1::decode(data).errors.is_empty();
+        remain.then(|| ERRORS.to_owned())
+    }
+}
+
+/// How a drive refuses that says nothing.
+pub(super) const SILENT: &str = "silent";
+/// How an RMD motor refuses that keeps errors which it was to clear.
+pub(super) const ERRORS: &str = "errors";

@@ -1,0 +1,227 @@
+//! Drives in the process, on virtual time.
+
+use std::io::ErrorKind;
+use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream;
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use motorlink_link::Clock;
+use motorlink_link::fault::Faults;
+use motorlink_link::port::{ByteLink, CanLink, FaultBytes, FaultCan, PortError};
+use motorlink_link::serve::ServeName;
+use motorlink_link::serve::{Served, Server};
+use motorlink_proto::rmd::IDENTIFIERS;
+use motorlink_proto::stmcp::Profile;
+use motorlink_proto::time::{self, Instant};
+use motorlink_sim::hash;
+use serde_json::Value;
+
+use super::bench::{RmdLine, StLine};
+use super::drives::{Drives, Recording, Stage};
+use super::link::{SimCan, SimLine};
+use super::places::{Kind, Places};
+use super::scenario::{Cast, Signal, find_signal};
+use super::{BenchConfig, Command, ConfigError};
+
+/// A byte at 115200 baud.
+const BYTE: Duration = Duration::from_micros(87);
+/// A CAN frame of 8 bytes at 1 Mbit/s, with some stuffed bits.
+const FRAME: Duration = Duration::from_micros(125);
+/// Drives step at multiples of this.
+const STEP: time::Duration = time::Duration(50);
+/// How often drives on served ports follow the time, if nobody asks them anything.
+const FOLLOW: Duration = Duration::from_millis(20);
+
+/// An ST drive and a bus of RMD motors in the process, on virtual time: it passes when a client
+/// waits, when bytes are on a line, and in [`run`](Self::run). Nobody sleeps, and the same calls give
+/// the same answers, as long as they come from one thread.
+///
+/// [`serve`](Self::serve) lets time run for a while, with the same drives on ports.
+pub struct VirtualBench {
+    clock: Clock,
+    stage: Stage,
+    places: Places,
+    signals: Vec<Signal>,
+    profile: Profile,
+}
+
+impl VirtualBench {
+    /// Powers the drives on at time 0.
+    ///
+    /// # Errors
+    /// As [`BenchConfig::station`].
+    pub fn new(config: &BenchConfig) -> Result<Self, ConfigError> {
+        let cast = Cast { config: config.clone(), st: true, rmd: true };
+        let stage = Stage::new(Drives::new(&cast)?);
+        let mut places = Places::default();
+        places.add("st".to_owned(), Kind::St, stage.clone());
+        places.add("rmd".to_owned(), Kind::Rmd, stage.clone());
+        let (signals, profile) = (cast.signals(), config.profile);
+        Ok(VirtualBench { clock: Clock::standing(), stage, places, signals, profile })
+    }
+
+    /// What the ST drive speaks.
+    pub fn profile(&self) -> Profile {
+        self.profile
+    }
+
+    /// The bench's clock.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    /// The bench's time.
+    pub fn now(&self) -> Instant {
+        self.clock.now()
+    }
+
+    /// A serial line to the ST drive, with faults; a byte takes as long as at 115200 baud.
+    pub fn line(&self, faults: &Faults) -> Box<dyn ByteLink> {
+        let link = SimLine::new(self.stage.clone(), self.clock.clone());
+        Box::new(FaultBytes::paced(link, faults, BYTE))
+    }
+
+    /// A CAN bus to the RMD motors, with faults; a frame takes as long as at 1 Mbit/s.
+    pub fn can(&self, faults: &Faults) -> Box<dyn CanLink> {
+        let link = SimCan::new(self.stage.clone(), self.clock.clone());
+        Box::new(FaultCan::paced(link, faults, IDENTIFIERS, FRAME))
+    }
+
+    /// Lets time pass. While ports are served it takes as long.
+    pub fn run(&self, span: time::Duration) {
+        self.clock.wait(self.now() + span);
+        drop(self.stage.at(self.now()));
+    }
+
+    /// Executes a command of a bench, whose ports are `st` and `rmd`; gives the answer, or why nothing
+    /// was done.
+    pub fn execute(&self, command: &Command) -> Result<Value, String> {
+        if let Command::Pause {} | Command::Resume {} = command {
+            return Err("virtual time stands still by itself".to_owned());
+        }
+        self.places.execute(self.now(), command)
+    }
+
+    /// What can be looked at, motor by motor.
+    pub fn signals(&self) -> &[Signal] {
+        &self.signals
+    }
+
+    /// The values of all signals at this moment.
+    pub fn values(&self) -> Vec<f64> {
+        self.stage.at(self.now()).drives.values().collect()
+    }
+
+    /// FNV-1a over the state of all drives.
+    pub fn state_hash(&self) -> u64 {
+        hash::fingerprint(&self.stage.at(self.now()).drives)
+    }
+
+    /// Writes signals down from now on, at a distance of 50 µs at least.
+    ///
+    /// # Errors
+    /// Why that cannot be.
+    pub fn record(&self, signals: &[&str], every: time::Duration) -> Result<Recording, String> {
+        if every < STEP {
+            return Err(format!("drives step every {} µs: nothing is seen more often", STEP.0));
+        }
+        let columns = signals.iter().map(|name| find_signal(name, &self.signals));
+        Ok(self.stage.record(&self.clock, columns.collect::<Result<_, _>>()?, every))
+    }
+
+    /// Serves the drives on ports, in a thread. Time runs until what this gives is dropped; links of
+    /// this bench wait as long then.
+    ///
+    /// # Errors
+    /// A port that cannot be served, or a bench that is served already.
+    pub fn serve(
+        &self,
+        st: Option<ServeName>,
+        rmd: Option<ServeName>,
+    ) -> Result<Serving, PortError> {
+        if !self.clock.stands() {
+            let port = st.or(rmd).map(|port| port.to_string()).unwrap_or_default();
+            let why = "this bench is served already: end that first".to_owned();
+            return Err(PortError::Configuration { port, why });
+        }
+        let (stop, stopped) = UnixStream::pair().map_err(failed)?;
+        let (tell, told) = mpsc::channel();
+        let (clock, stage) = (self.clock.clone(), self.stage.clone());
+        // A server stays in its thread, so that its ports are opened there.
+        let serve = move || {
+            let mut server = Server::by(clock);
+            let open = || {
+                let line = || Box::new(StLine(stage.clone()));
+                let bus = || Box::new(RmdLine { stage: stage.clone(), rom: None });
+                let st = st.map(|port| server.serve_bytes(&port, line())).transpose()?;
+                let rmd = rmd.map(|port| server.serve_can(&port, bus())).transpose()?;
+                Ok((st, rmd))
+            };
+            let served: Result<_, PortError> = open();
+            let refused = served.is_err();
+            if tell.send(served).is_err() || refused {
+                return Ok(());
+            }
+            while !server.turn(FOLLOW, Some(stopped.as_fd()))?.extra_is_ready {
+                drop(stage.at(server.now()));
+            }
+            Ok(())
+        };
+        let thread = std::thread::Builder::new().name("motorlink-serve".to_owned()).spawn(serve);
+        let thread = thread.map_err(failed)?;
+        let (st, rmd) = told.recv().map_err(|_| failed(ErrorKind::BrokenPipe.into()))??;
+        self.clock.hold(false);
+        Ok(Serving { st, rmd, clock: self.clock.clone(), running: Some((stop, thread)) })
+    }
+}
+
+fn failed(source: std::io::Error) -> PortError {
+    PortError::Io { port: "the served ports".to_owned(), source }
+}
+
+/// Ports on which the drives of a [`VirtualBench`] are served until this is dropped.
+#[derive(Debug)]
+pub struct Serving {
+    st: Option<Served>,
+    rmd: Option<Served>,
+    clock: Clock,
+    /// What the thread watches for its end, and the thread.
+    running: Option<(UnixStream, JoinHandle<Result<(), PortError>>)>,
+}
+
+impl Serving {
+    /// The port of the ST drive.
+    pub fn st(&self) -> Option<&Served> {
+        self.st.as_ref()
+    }
+
+    /// The port of the RMD motors.
+    pub fn rmd(&self) -> Option<&Served> {
+        self.rmd.as_ref()
+    }
+
+    /// Closes the ports; time stands still again.
+    ///
+    /// # Errors
+    /// What kept the ports from being served to the end.
+    pub fn end(mut self) -> Result<(), PortError> {
+        self.close()
+    }
+
+    fn close(&mut self) -> Result<(), PortError> {
+        let Some((stop, thread)) = self.running.take() else { return Ok(()) };
+        drop(stop);
+        let ended = thread.join();
+        self.clock.hold(true);
+        ended.unwrap_or_else(|_| Err(failed(ErrorKind::Other.into())))
+    }
+}
+
+impl Drop for Serving {
+    fn drop(&mut self) {
+        // What failed was seen by the clients.
+        let _ = self.close();
+    }
+}
