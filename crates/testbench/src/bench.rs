@@ -15,7 +15,8 @@ use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::RmdNode;
 use serde_json::{Value, json};
 
-use super::drives::{Drives, Stage, Station};
+use super::config::Station;
+use super::drives::{Drives, Stage};
 use super::places::{Kind, Places};
 use super::{BenchConfig, Command, ConfigError, RomError, RomFolder};
 

@@ -12,6 +12,11 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
+/// An ST drive on its line.
+pub(crate) type Station = StStation<Vec<StMotor>>;
+/// RMD motors on their bus.
+pub(crate) type Bus = RmdBus<Vec<RmdNode>>;
+
 /// A serial line with an ST drive and a CAN bus with RMD motors. The default is one drive with two
 /// motors, and four motors with IDs 1 to 4.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -140,7 +145,7 @@ impl BenchConfig {
     ///
     /// # Errors
     /// A motor that cannot be; never with what [`parse`](Self::parse) gave.
-    pub fn station(&self, now: Instant) -> Result<StStation<Vec<StMotor>>, ConfigError> {
+    pub fn station(&self, now: Instant) -> Result<Station, ConfigError> {
         for (config, n) in self.st.0.iter().zip(1..) {
             config.check().map_err(impossible("st.motor", n))?;
         }
@@ -170,7 +175,7 @@ impl BenchConfig {
         &self,
         now: Instant,
         rom: impl Fn(&RmdConfig) -> Settings,
-    ) -> Result<RmdBus<Vec<RmdNode>>, ConfigError> {
+    ) -> Result<Bus, ConfigError> {
         for (config, n) in self.rmd.0.iter().zip(1..) {
             config.check().map_err(impossible("rmd.motor", n))?;
         }

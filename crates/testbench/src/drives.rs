@@ -4,14 +4,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use motorlink_link::Clock;
 use motorlink_proto::time::{Duration, Instant};
-use motorlink_sim::rmd::{RmdBus, RmdNode};
-use motorlink_sim::st::{StMotor, StStation};
+use motorlink_sim::rmd::RmdConfig;
 
-use super::scenario::{rmd_values, st_values};
-use super::{Command, world};
-
-pub(super) type Station = StStation<Vec<StMotor>>;
-pub(super) type Bus = RmdBus<Vec<RmdNode>>;
+use super::cast::Cast;
+use super::command::Command;
+use super::config::{Bus, ConfigError, Station};
+use super::signals::{rmd_values, st_values};
+use super::world;
 
 /// An ST drive on its line, RMD motors on their bus, or both.
 #[derive(Debug)]
@@ -21,6 +20,14 @@ pub(super) struct Drives {
 }
 
 impl Drives {
+    /// Powers the drives on at time 0.
+    pub(super) fn new(cast: &Cast) -> Result<Self, ConfigError> {
+        let station = || cast.config.station(Instant(0));
+        let bus = || cast.config.bus(Instant(0), RmdConfig::factory_rom);
+        let (st, rmd) = (cast.st.then(station).transpose()?, cast.rmd.then(bus).transpose()?);
+        Ok(Drives { st, rmd })
+    }
+
     pub(super) fn advance_to(&mut self, now: Instant) {
         if let Some(station) = &mut self.st {
             station.advance_to(now);

@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod cast;
 mod command;
 mod config;
 mod drives;
@@ -15,6 +16,7 @@ mod places;
 mod rom;
 pub mod scenario;
 mod scheme;
+mod signals;
 mod virtual_bench;
 mod world;
 

@@ -9,7 +9,8 @@ use motorlink_link::port::{ByteLink, CanLink, Evented, PortError};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
-use super::drives::{Stage, Station};
+use super::config::Station;
+use super::drives::Stage;
 
 /// The line of an ST drive. Bytes take no time on it.
 pub(super) struct SimLine {

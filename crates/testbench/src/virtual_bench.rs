@@ -19,10 +19,11 @@ use motorlink_sim::hash;
 use serde_json::Value;
 
 use super::bench::{RmdLine, StLine};
+use super::cast::Cast;
 use super::drives::{Drives, Recording, Stage};
 use super::link::{SimCan, SimLine};
 use super::places::{Kind, Places};
-use super::scenario::{Cast, Signal, find_signal};
+use super::signals::{Signal, find_signal};
 use super::{BenchConfig, Command, ConfigError};
 
 /// A byte at 115200 baud.

@@ -7,8 +7,8 @@ use motorlink_sim::plant::Plant;
 use motorlink_sim::rmd::RmdNode;
 use motorlink_sim::st::StMotor;
 
-use super::Command;
-use super::drives::{Bus, Station};
+use super::command::Command;
+use super::config::{Bus, Station};
 
 /// Faults of an RMD motor, with the names that commands have for them.
 pub(super) const RMD_FAULTS: [(Errors, &str); 2] =

@@ -3,7 +3,9 @@
 //! [`Relay::st`] holds the serial line of an ST drive, [`Relay::rmd`] a CAN bus with RMD motors. The
 //! client sits behind a served port ([`Relay::serve`]) and notices nothing of the relay.
 
+mod event;
 mod held;
+mod hold;
 mod pace;
 mod port;
 mod rmd;
@@ -11,7 +13,6 @@ mod st;
 mod station;
 
 use std::cell::RefCell;
-use std::fmt;
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -21,6 +22,9 @@ use motorlink_link::serve::{Served, Server};
 use motorlink_proto::time::Instant;
 
 use crate::rmd::OnDrop;
+pub use event::{Event, Halt, Outcome, Part, Reason};
+
+use hold::Hold;
 use station::Desk;
 
 /// How long after a stop that failed the next one is tried.
@@ -31,108 +35,6 @@ const RETRY: Duration = Duration::from_secs(1);
 pub struct RelayOptions {
     /// Stop the motors, too, when a connected client has sent nothing for so long.
     pub silence: Option<Duration>,
-}
-
-/// Why motors are stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reason {
-    /// The client closed its line, or died.
-    ClientGone,
-    /// The client is connected and has been silent for too long.
-    ClientSilent,
-    /// The relay's owner ends it.
-    Ending,
-}
-
-/// What happened in a turn of a [`Relay`].
-#[derive(Debug)]
-#[non_exhaustive]
-pub enum Event {
-    /// A client has the line now.
-    Came {
-        /// The served port.
-        port: String,
-    },
-    /// The client has left.
-    Left {
-        /// How many bytes, or frames, it left that were not sent any more.
-        dropped: usize,
-    },
-    /// Someone came while the line was another's, or while motors have yet to be stopped.
-    TurnedAway {
-        /// The served port.
-        port: String,
-    },
-    /// A client spoke HTTP, TLS or STUN, as a browser does for a web page. It was closed, and nothing
-    /// of what it sent was passed on.
-    Browser {
-        /// The served port.
-        port: String,
-    },
-    /// Another node of the bus commands a motor. What it sets turning is not stopped here.
-    Unguarded {
-        /// The motor's ID.
-        motor: u8,
-        /// DATA\[0\] of the frame.
-        code: u8,
-    },
-    /// The drive's port failed; it is opened again as soon as that can be done.
-    PortLost(PortError),
-    /// The drive's port is open again.
-    PortBack,
-    /// Motors were sent their stop. All of them are stopped if [`Halt::is_stopped`] holds for each;
-    /// otherwise the relay tries again.
-    Stopped {
-        /// Why.
-        reason: Reason,
-        /// How that went for each; none where the drive has none of the motors that were meant.
-        halts: Vec<Halt>,
-    },
-}
-
-/// What is stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// The motor of this number, or ID.
-    Motor(u8),
-    /// The power factor correction of an ST drive.
-    Pfc,
-}
-
-impl fmt::Display for Part {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Part::Motor(number) => write!(f, "motor {number}"),
-            Part::Pfc => f.write_str("the PFC"),
-        }
-    }
-}
-
-/// What came of stopping one part.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Halt {
-    /// The part.
-    pub part: Part,
-    /// What it said.
-    pub outcome: Outcome,
-}
-
-/// How a stop went.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Outcome {
-    /// It rests, or is about to: the state in which it was seen, or what it acknowledged.
-    Stopped(String),
-    /// It acknowledged its stop and was seen in this state afterwards.
-    Unproven(String),
-    /// Whether it rests is not known, for this reason.
-    Failed(String),
-}
-
-impl Halt {
-    /// Whether the part rests, or is about to.
-    pub fn is_stopped(&self) -> bool {
-        matches!(self.outcome, Outcome::Stopped(_))
-    }
 }
 
 /// Why a relay does not begin.
@@ -148,37 +50,6 @@ pub enum RelayError {
          `motorlink sim` and guard that port"
     )]
     Simulated(PortName),
-}
-
-/// The protocol's side of a relay: the port, what passes it, and what was set turning.
-trait Hold {
-    fn serve(
-        &self,
-        server: &mut Server,
-        name: &ServeName,
-        desk: &Rc<RefCell<Desk>>,
-        port: Rc<RefCell<String>>,
-    ) -> Result<Served, PortError>;
-
-    /// A turn of the server that ends when the port has something as well; whether the port is open.
-    fn turn(&self, server: &mut Server, most: Duration) -> Result<bool, PortError>;
-
-    /// Moves what can be moved between port and client. While the port is closed what the client
-    /// sends is dropped: it must not come out of the blue later.
-    fn pass(&mut self, now: Instant, desk: &mut Desk) -> Result<(), PortError>;
-
-    /// When [`pass`](Self::pass) has to be called again.
-    fn due(&self, now: Instant) -> Option<Instant>;
-
-    /// The client is gone: drops what it sent and the port has not taken. Gives how much that was.
-    fn forget(&mut self, now: Instant) -> usize;
-
-    /// Whether something was set turning and not stopped.
-    fn owes(&self) -> bool;
-
-    /// Stops what was set turning, which takes as long as the drive needs to answer. After a stop that
-    /// failed [`owes`](Self::owes) is true still.
-    fn stop(&mut self) -> Vec<Halt>;
 }
 
 /// Serves a port to one client at a time, unchanged in both directions and without a thread, and stops

@@ -11,11 +11,12 @@ use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time::{self, Instant};
 
+use super::event::{Event, Halt, Outcome, Part};
 use super::held::Held;
+use super::hold::Hold;
 use super::pace::Pace;
 use super::port::Port;
 use super::station::Desk;
-use super::{Event, Halt, Hold, Outcome, Part};
 use crate::rmd::follow::Follower;
 use crate::rmd::{Bus, OnDrop, Options, Stopped};
 

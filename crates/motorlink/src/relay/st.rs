@@ -10,11 +10,12 @@ use motorlink_link::serve::{Served, Server};
 use motorlink_proto::stmcp::{Command, Config, ErrorCode, Recovery, Request, Status};
 use motorlink_proto::time::{self, Instant};
 
+use super::event::{Halt, Outcome, Part};
 use super::held::Held;
+use super::hold::Hold;
 use super::pace::Pace;
 use super::port::Port;
 use super::station::Desk;
-use super::{Halt, Hold, Outcome, Part};
 use crate::stmcp::follow::Follower;
 use crate::stmcp::{Client, Error, Options, Stopped};
 

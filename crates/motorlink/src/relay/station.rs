@@ -9,7 +9,7 @@ use motorlink_link::serve::{ByteStation, CanStation};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
-use super::Event;
+use super::event::Event;
 
 /// Who has the line, and what happened.
 #[derive(Debug, Default)]

@@ -7,7 +7,7 @@ use std::time::{self as machine, Duration};
 
 use motorlink_link::Clock;
 use motorlink_link::port::{CanLink, PortError, PortName};
-use motorlink_link::reopening::{BackOff, LinkSign, LinkState, Opener, Reopening};
+use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{
     self as proto, Command, Counters, Dialect, Limits, MotionStatus, MotorId, MotorSet, Payload,
     ReadStatus1, Torque4,
@@ -15,33 +15,8 @@ use motorlink_proto::rmd::{
 use motorlink_proto::time;
 
 use super::session::{Output, Session, ends_motion};
-use super::{Error, Guard, MotorHandle, OnDrop, Stopped};
+use super::{Error, Options};
 use crate::turn::{Turn, Turns};
-
-/// How a [`Bus`] behaves.
-#[derive(Debug, Clone, Copy)]
-pub struct Options {
-    /// How long a reply may take.
-    pub timeout: Duration,
-    /// How long after a timeout a late reply is awaited.
-    pub guard: Duration,
-    /// Attempts to open a port that went away.
-    pub back_off: BackOff,
-    /// What no request to any motor may exceed.
-    pub limits: Limits,
-}
-
-impl Default for Options {
-    /// 50 ms for a reply, 100 ms for a late one, no limits.
-    fn default() -> Self {
-        Options {
-            timeout: proto::DEFAULT_TIMEOUT.into(),
-            guard: proto::DEFAULT_GUARD.into(),
-            back_off: BackOff::default(),
-            limits: Limits::default(),
-        }
-    }
-}
 
 /// What a scan found under an ID.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -167,23 +142,9 @@ impl Bus {
         self.line.take().session.counters()
     }
 
-    /// A motor of the bus, ID 1 to 32.
-    pub fn motor(&self, id: u8) -> Result<MotorHandle<'_>, Error> {
-        let id = MotorId::new(id).ok_or(Error::NoSuchMotor(id))?;
-        Ok(MotorHandle::new(self, id))
-    }
-
-    /// Switches off the motors that this bus was used to move; from now on every request but Off and
-    /// Stop is [`PortError::Retired`]. For a signal's handler with a thread of its own, beside a program
-    /// that would go on until the handler ends it. Waits for exchanges that are under way.
-    pub fn retire(&self) -> Vec<Stopped> {
+    /// Refuses from now on what stops no motor.
+    pub(super) fn refuse_motion(&self) {
         self.line.take().session.retire();
-        self.guard().stop_now()
-    }
-
-    /// Switches off, when it goes out of scope, the motors that this bus was used to move.
-    pub fn guard(&self) -> Guard<'_> {
-        Guard::new(self, OnDrop::Off)
     }
 
     /// Motors that were given something to do and not switched off.

@@ -5,6 +5,21 @@ use motorlink_proto::rmd::{Command, MotorId, MotorSet, Off, Stop};
 use super::{Bus, Error};
 use crate::stopping::{STOP_ATTEMPTS, await_retry};
 
+impl Bus {
+    /// Switches off the motors that this bus was used to move; from now on every request but Off and
+    /// Stop is [`PortError::Retired`]. For a signal's handler with a thread of its own, beside a program
+    /// that would go on until the handler ends it. Waits for exchanges that are under way.
+    pub fn retire(&self) -> Vec<Stopped> {
+        self.refuse_motion();
+        self.guard().stop_now()
+    }
+
+    /// Switches off, when it goes out of scope, the motors that this bus was used to move.
+    pub fn guard(&self) -> Guard<'_> {
+        Guard::new(self, OnDrop::Off)
+    }
+}
+
 /// What a [`Guard`] does to the motors that it finds moving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnDrop {

@@ -19,6 +19,7 @@ pub(crate) mod follow;
 mod full_turn;
 mod guard;
 mod motor;
+mod options;
 mod session;
 
 pub use motorlink_proto::rmd::{
@@ -29,9 +30,10 @@ pub use motorlink_proto::rmd::{
 };
 pub use motorlink_proto::units::*;
 
-pub use bus::{Bus, Found, Options};
+pub use bus::{Bus, Found};
 pub use error::Error;
 pub use event::EventBus;
 pub use full_turn::FullTurn;
 pub use guard::{Guard, OnDrop, Stopped};
 pub use motor::MotorHandle;
+pub use options::Options;

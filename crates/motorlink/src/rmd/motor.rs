@@ -12,11 +12,15 @@ pub struct MotorHandle<'a> {
     id: MotorId,
 }
 
-impl<'a> MotorHandle<'a> {
-    pub(super) fn new(bus: &'a Bus, id: MotorId) -> Self {
-        MotorHandle { bus, id }
+impl Bus {
+    /// A motor of the bus, ID 1 to 32.
+    pub fn motor(&self, id: u8) -> Result<MotorHandle<'_>, Error> {
+        let id = MotorId::new(id).ok_or(Error::NoSuchMotor(id))?;
+        Ok(MotorHandle { bus: self, id })
     }
+}
 
+impl MotorHandle<'_> {
     /// The motor's ID.
     pub fn id(&self) -> MotorId {
         self.id

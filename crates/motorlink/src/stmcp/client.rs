@@ -7,40 +7,17 @@ use std::time::{self as machine, Duration};
 use motorlink_link::Clock;
 use motorlink_link::port::{ByteLink, PortError, PortName};
 use motorlink_link::printable;
-use motorlink_link::reopening::{BackOff, LinkSign, LinkState, Opener, Reopening};
+use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::stmcp as proto;
 use motorlink_proto::stmcp::{
-    BoardInfo, Config, Counters, Line, MAX_FRAME, Master, Motor, Output, Profile, Request,
+    BoardInfo, Counters, Line, MAX_FRAME, Motor, Output, Profile, Request,
 };
 use motorlink_proto::time::{self, Instant};
 
 use super::session::{Rules, Session};
 use super::started::{Effect, Started};
-use super::{Error, Guard, Limits, MotorHandle, Stopped};
+use super::{Error, Options};
 use crate::turn::{Turn, Turns};
-
-/// How a [`Client`] behaves.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Options {
-    /// What the drive is expected to speak.
-    pub profile: Profile,
-    /// Timeout and recovery of the line.
-    pub line: Config,
-    /// Attempts to open a port that went away.
-    pub back_off: BackOff,
-    /// What no request may exceed.
-    pub limits: Limits,
-}
-
-impl Options {
-    /// What recovery sends has to be out of the port before silence can begin.
-    pub(crate) fn on(mut self, port: &PortName) -> Self {
-        if let Some(baud) = port.baud() {
-            self.line.quiet = self.line.quiet + Master::longest_transmission(baud);
-        }
-        self
-    }
-}
 
 /// After a pause of this length whatever came unasked is taken note of before the next request: a
 /// byte or so at 115200 baud. In a shorter one hardly anything can come, and looking is a system call.
@@ -179,23 +156,9 @@ impl Client {
         self.line.take().session.counters()
     }
 
-    /// A motor of the drive, 1 to 7.
-    pub fn motor(&self, number: u8) -> Result<MotorHandle<'_>, Error> {
-        let motor = Motor::new(number).ok_or(Error::NoSuchMotor(number))?;
-        Ok(MotorHandle::new(self, motor))
-    }
-
-    /// Stops the motors that this client started; from now on every other request is
-    /// [`PortError::Retired`]. For a signal's handler with a thread of its own, beside a program that
-    /// would go on until the handler ends it. Waits for an exchange that is under way.
-    pub fn retire(&self) -> Vec<Stopped> {
+    /// Refuses from now on what stops no motor.
+    pub(super) fn refuse_motion(&self) {
         self.line.take().session.retire();
-        self.guard().stop_now()
-    }
-
-    /// Stops, when it goes out of scope, the motors that this client started.
-    pub fn guard(&self) -> Guard<'_> {
-        Guard::new(self)
     }
 
     /// Motors that this client started and did not stop.

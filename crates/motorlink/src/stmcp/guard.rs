@@ -5,6 +5,21 @@ use motorlink_proto::stmcp::{ErrorCode, Line, Motor};
 use super::{Client, Error};
 use crate::stopping::{STOP_ATTEMPTS, await_retry};
 
+impl Client {
+    /// Stops the motors that this client started; from now on every other request is
+    /// [`PortError::Retired`]. For a signal's handler with a thread of its own, beside a program that
+    /// would go on until the handler ends it. Waits for an exchange that is under way.
+    pub fn retire(&self) -> Vec<Stopped> {
+        self.refuse_motion();
+        self.guard().stop_now()
+    }
+
+    /// Stops, when it goes out of scope, the motors that this client started.
+    pub fn guard(&self) -> Guard<'_> {
+        Guard::new(self)
+    }
+}
+
 /// Stops the motors that a [`Client`] started when it is dropped: at the end of a scope, on an
 /// early return, on a panic. Where the drive does not answer it may still hear, so that STOP_MOTOR
 /// is sent to every motor before any answer is waited for again.

@@ -20,6 +20,7 @@ pub(crate) mod follow;
 mod guard;
 mod limits;
 mod motor;
+mod options;
 mod ramped;
 mod scan;
 mod session;
@@ -33,7 +34,7 @@ pub use motorlink_proto::stmcp::{
     VERIFY_ATTEMPTS, register,
 };
 
-pub use client::{Client, FirmwareVersion, Info, Options};
+pub use client::{Client, FirmwareVersion, Info};
 pub use error::Error;
 pub use event::{EventClient, Progress};
 pub use guard::{Guard, Stopped};
@@ -42,5 +43,6 @@ pub use motor::MotorHandle;
 pub use motorlink_proto::stmcp::{
     Reading, UnknownRegister, ValueError, find_register, parse_value,
 };
+pub use options::Options;
 pub use scan::{BAUD_RATES, Finding, scan_baud};
 pub use transcript::Transcript;

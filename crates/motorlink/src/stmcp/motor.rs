@@ -16,11 +16,15 @@ pub struct MotorHandle<'a> {
     motor: Motor,
 }
 
-impl<'a> MotorHandle<'a> {
-    pub(super) fn new(client: &'a Client, motor: Motor) -> Self {
-        MotorHandle { client, motor }
+impl Client {
+    /// A motor of the drive, 1 to 7.
+    pub fn motor(&self, number: u8) -> Result<MotorHandle<'_>, Error> {
+        let motor = Motor::new(number).ok_or(Error::NoSuchMotor(number))?;
+        Ok(MotorHandle { client: self, motor })
     }
+}
 
+impl MotorHandle<'_> {
     /// The motor's number.
     pub fn number(&self) -> Motor {
         self.motor

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::signals::{Kind, Signal, short};
+use crate::signals::{Kind, Signal, find_signal, short};
 
 /// An expectation as the file has it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -78,7 +78,7 @@ impl Written {
         step: f64,
         count: usize,
     ) -> Result<Expectation, String> {
-        let signal = super::find_signal(&self.signal, signals)?;
+        let signal = find_signal(&self.signal, signals)?;
         let named = matches!(signals[signal].kind, Kind::Named(_));
         let bounds = match (self.min, self.max, self.value, self.within, self.is) {
             (None, None, None, None, Some(name)) if named => Bounds::Is(name),

@@ -1,19 +1,22 @@
 //! A scenario from its text.
 
 use std::mem::take;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use motorlink_proto::time::Duration;
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::event::Reader;
+use super::event::{Action, Event};
 use super::expect::Written;
 use super::machine::{BareMachine, WrittenMachine, WrittenVoltage};
-use super::script::{Cast, Script};
-use super::signals::{Kind, Signal};
-use super::{Action, Event, Panel, Scenario, ScenarioError, Subject, Target, find_signal};
-use crate::{BenchConfig, Command};
+use super::play::{Panel, Scenario, Subject};
+use super::reader::Reader;
+use super::script::Script;
+use crate::cast::{Cast, Target};
+use crate::command::Command;
+use crate::config::BenchConfig;
+use crate::signals::{Kind, Signal, find_signal};
 
 /// Drives step on multiples of this, µs.
 const STEP_US: u64 = 50;
@@ -56,6 +59,28 @@ struct WrittenPanel {
     title: Option<String>,
     signals: Vec<String>,
     range: Option<[f64; 2]>,
+}
+
+/// Why a scenario is not played.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScenarioError {
+    /// A file cannot be read.
+    #[error("cannot read `{}`: {error}", .path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
+    /// The file says something that cannot be.
+    #[error("{}: {why}", .path.display())]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// What, and where.
+        why: String,
+    },
 }
 
 impl Scenario {
@@ -223,7 +248,7 @@ impl WrittenPanel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::signals::ST;
+    use crate::signals::ST;
 
     const HEAD: &str = "title = \"t\"\nduration = 1.0\n";
     const SERVO: &str = "[[st.motor]]\npreset = \"servo\"\n[[rmd.motor]]\nid = 3\n";

@@ -7,10 +7,11 @@ use motorlink_sim::{angle, hash, preset};
 use serde::Deserialize;
 use toml::Table;
 
+use super::moment::{moment, seconds};
+use super::run::Mark;
 use super::run::Played;
-use super::signals::{MACHINE, Signal};
-use super::{Mark, seconds};
 use crate::config::overlay;
+use crate::signals::{MACHINE, Signal};
 
 /// The section `[machine]`.
 #[derive(Deserialize)]
@@ -108,7 +109,7 @@ impl WrittenVoltage {
             return Err("voltages are -10000 V to 10000 V".to_owned());
         }
         let whole = machine.step();
-        let at = super::moment(self.at, end)?;
+        let at = moment(self.at, end)?;
         if !at.0.is_multiple_of(whole.0) {
             return Err(format!("at {} s: moments are multiples of {} µs", self.at, whole.0));
         }

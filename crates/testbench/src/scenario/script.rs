@@ -1,17 +1,15 @@
 //! What drives are told and what happens to them, in the order of time.
 
-use motorlink_proto::rmd::MotorId;
-use motorlink_proto::stmcp::Motor;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::hash;
 
-use super::event::load;
+use super::event::{Event, load};
+use super::moment::seconds;
 use super::profile::LoadProfile;
-use super::run::Played;
-use super::signals::{RMD, ST, Signal};
-use super::{Event, Mark, Refusal, Target, seconds};
+use super::run::{Mark, Played, Refusal};
+use crate::cast::{Cast, Target};
+use crate::config::ConfigError;
 use crate::drives::Drives;
-use crate::{BenchConfig, ConfigError};
 
 /// How often a load that changes all the time is set.
 const LOAD_STEP: Duration = Duration(50);
@@ -23,40 +21,6 @@ pub(super) struct Script {
     /// In the order of their time.
     pub(super) events: Vec<Event>,
     pub(super) loads: Vec<(Target, LoadProfile)>,
-}
-
-/// The drives that are there.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Cast {
-    pub(crate) config: BenchConfig,
-    /// Whether there is an ST drive.
-    pub(crate) st: bool,
-    /// Whether there is a bus of RMD motors.
-    pub(crate) rmd: bool,
-}
-
-impl Cast {
-    /// The motors, in the order of their signals.
-    pub(super) fn targets(&self) -> Vec<Target> {
-        let st = (1..).map_while(Motor::new).take(self.config.st_motors()).map(Target::St);
-        let ids = self.config.rmd_motors().iter().filter_map(|motor| MotorId::new(motor.id));
-        let mut ids: Vec<MotorId> = ids.collect();
-        ids.sort_unstable();
-        let rmd = ids.into_iter().map(Target::Rmd);
-        st.filter(|_| self.st).chain(rmd.filter(|_| self.rmd)).collect()
-    }
-
-    /// What can be looked at.
-    pub(crate) fn signals(&self) -> Vec<Signal> {
-        let of = |target: Target| -> Vec<Signal> {
-            let name = target.to_string();
-            match target {
-                Target::St(_) => ST.iter().map(|row| row.signal(&name)).collect(),
-                Target::Rmd(_) => RMD.iter().map(|row| row.signal(&name)).collect(),
-            }
-        };
-        self.targets().into_iter().flat_map(of).collect()
-    }
 }
 
 impl Script {

@@ -121,14 +121,14 @@ const UNITS: &[(&str, &str, &str)] = &[
 ];
 
 /// A signal of a `T`: its name without the drive, and its value.
-pub(super) struct Row<T: 'static> {
+pub(crate) struct Row<T: 'static> {
     name: &'static str,
     names: Option<Names>,
     value: fn(&T) -> f64,
 }
 
 impl<T> Row<T> {
-    pub(super) fn signal(&self, drive: &str) -> Signal {
+    pub(crate) fn signal(&self, drive: &str) -> Signal {
         let kind = match self.names {
             Some(names) => Kind::Named(names),
             None => {
@@ -140,7 +140,7 @@ impl<T> Row<T> {
         Signal { name: format!("{drive}.{}", self.name), kind }
     }
 
-    pub(super) fn value(&self, of: &T) -> f64 {
+    pub(crate) fn value(&self, of: &T) -> f64 {
         (self.value)(of)
     }
 }
@@ -149,7 +149,7 @@ impl<T> Row<T> {
 /// values have some.
 macro_rules! signals {
     ($table:ident, $of:ty, |$truth:ident| { $($name:ident $([$names:expr])? = $value:expr;)+ }) => {
-        pub(super) static $table: &[Row<$of>] = &[$( Row {
+        pub(crate) static $table: &[Row<$of>] = &[$( Row {
             name: stringify!($name),
             names: signals!(@names $($names)?),
             value: |$truth| f64::from($value),
@@ -203,7 +203,7 @@ signals!(MACHINE, Machine, |machine| {
 });
 
 /// An RMD motor and the errors that its drive remembers.
-pub(super) struct Rmd {
+pub(crate) struct Rmd {
     truth: motorlink_sim::rmd::Truth,
     errors: Errors,
 }
@@ -274,13 +274,23 @@ const fn mode_number(mode: Mode) -> u8 {
     }
 }
 
+/// The place of a signal in the list.
+pub(crate) fn find_signal(name: &str, signals: &[Signal]) -> Result<usize, String> {
+    signals.iter().position(|signal| signal.name == name).ok_or_else(|| {
+        let likeness = |signal: &&Signal| strsim::jaro_winkler(name, &signal.name);
+        let nearest = signals.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+        let nearest = nearest.map_or("", |signal| &signal.name);
+        format!("there is no signal `{name}`; did you mean `{nearest}`?")
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn every_number_has_a_unit_and_every_signal_is_documented() {
-        let document = include_str!("../../../../docs/SCENARIOS.md");
+        let document = include_str!("../../../docs/SCENARIOS.md");
         let st = ST.iter().map(|row| row.signal("st1"));
         let rmd = RMD.iter().map(|row| row.signal("rmd1"));
         let machine = MACHINE.iter().map(|row| row.signal("machine"));

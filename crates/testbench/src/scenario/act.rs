@@ -4,22 +4,13 @@ use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{ClearErrors, Command as _, Payload, Status1};
 use motorlink_proto::stmcp::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse};
 use motorlink_proto::time::Instant;
-use motorlink_sim::rmd::RmdConfig;
 
-use super::script::Cast;
-use super::{Action, Target};
+use super::event::Action;
+use crate::cast::Target;
+use crate::command::Command;
 use crate::drives::Drives;
-use crate::{Command, ConfigError};
 
 impl Drives {
-    /// Powers the drives on at time 0.
-    pub(crate) fn new(cast: &Cast) -> Result<Self, ConfigError> {
-        let station = || cast.config.station(Instant(0));
-        let bus = || cast.config.bus(Instant(0), RmdConfig::factory_rom);
-        let (st, rmd) = (cast.st.then(station).transpose()?, cast.rmd.then(bus).transpose()?);
-        Ok(Drives { st, rmd })
-    }
-
     /// Does what an event says. Gives how a drive refused it, if it did.
     ///
     /// # Errors
