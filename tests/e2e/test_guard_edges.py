@@ -708,7 +708,7 @@ def test_a_guard_proves_that_it_stops_a_motor(bench, run, protocol):
     [
         (["st", "-p", "slcan:/dev/ttyACM0"], "guard rmd"),
         (["-p", "socketcan:can0"], "guard rmd"),
-        (["rmd", "-p", "/dev/ttyACM0"], "slcan:DEVICE"),
+        (["rmd", "-p", "/dev/ttyACM0"], "use slcan:"),
         (["st", "-p", "sim:"], "end with it"),
         (["rmd", "-p", "sim:"], "end with it"),
         (["rmd"], "which port?"),
