@@ -1,7 +1,6 @@
 //! Where each value stands in a frame: one row a field gives the struct, both directions and the
 //! table that decoders and generators read.
 
-use super::command::Code;
 use crate::units::*;
 use core::fmt;
 
@@ -18,8 +17,8 @@ pub trait Payload: Copy {
     fn unpack(word: u64) -> Self;
 
     /// The bytes of a frame with `code` in DATA\[0\].
-    fn encode_as(&self, code: Code) -> [u8; 8] {
-        (self.pack() | u64::from(u8::from(code))).to_le_bytes()
+    fn encode_as(&self, code: impl Into<u8>) -> [u8; 8] {
+        (self.pack() | u64::from(code.into())).to_le_bytes()
     }
 
     /// The values in the bytes of a frame, whatever its code.

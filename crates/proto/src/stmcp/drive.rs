@@ -2,7 +2,7 @@
 
 use super::{
     Command, CurrentReference, ErrorCode, Features, PositionMove, Ramp, RegisterId, RevupPhase,
-    TorqueRamp,
+    TorqueRamp, Version,
 };
 
 /// A motor of the drive: 1 is the first.
@@ -35,21 +35,6 @@ impl core::fmt::Display for Motor {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(f, "motor {}", self.0)
     }
-}
-
-/// The firmware's version, as GET_BOARD_INFO (4.7) and GET_FW_VERSION (4.12) tell it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Version<'a> {
-    /// Name of the SDK; cut where the reply's 32 bytes end.
-    pub name: &'a str,
-    /// Major version.
-    pub major: u8,
-    /// Minor version.
-    pub minor: u8,
-    /// Patch version.
-    pub patch: u8,
-    /// Type and number of a pre-release, such as `RC2`; empty for a release.
-    pub pre_release: &'a str,
 }
 
 /// A drive behind a [`Slave`](super::Slave). The slave has checked the frame, the motor, the

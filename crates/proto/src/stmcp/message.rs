@@ -1,8 +1,8 @@
 //! Messages: what a frame's payload says (chapter 4), both ways.
 
 use super::{
-    Command, ErrorCode, Features, Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Version,
-    frame, register::Shape,
+    Command, ErrorCode, Features, Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, frame,
+    register::Shape,
 };
 
 /// Phases of the rev-up (4.10).
@@ -299,6 +299,21 @@ impl RevupPhase {
             duration_ms: u16::from_le_bytes([d0, d1]),
         })
     }
+}
+
+/// The firmware's version, as GET_BOARD_INFO (4.7) and GET_FW_VERSION (4.12) tell it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Version<'a> {
+    /// Name of the SDK; cut where the reply's 32 bytes end.
+    pub name: &'a str,
+    /// Major version.
+    pub major: u8,
+    /// Minor version.
+    pub minor: u8,
+    /// Patch version.
+    pub patch: u8,
+    /// Type and number of a pre-release, such as `RC2`; empty for a release.
+    pub pre_release: &'a str,
 }
 
 /// Bytes of the replies to GET_BOARD_INFO and GET_FW_VERSION.

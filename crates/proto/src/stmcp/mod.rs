@@ -74,7 +74,7 @@ pub use code::{
     Command, ControlMode, ErrorCode, Flags, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
     Profile, Status,
 };
-pub use drive::{Drive, Motor, Version};
+pub use drive::{Drive, Motor};
 pub use failure::{Error, Failure};
 pub use frame::{Bad, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
 pub use master::{
@@ -82,7 +82,7 @@ pub use master::{
 };
 pub use message::{
     BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, ReplySize,
-    Request, RevupPhase, TorqueRamp,
+    Request, RevupPhase, TorqueRamp, Version,
 };
 pub use register::{Feature, Features, RegisterId};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};

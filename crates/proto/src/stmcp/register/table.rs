@@ -4,7 +4,82 @@
 //! comes from. `mcsdk-5.4` firmware has the type behind `|` where it differs, and where it differs from
 //! what the access says, the bits of its GET_REG reply and of its SET_REG value (0: not handled).
 
-use super::*;
+use super::feature::Feature;
+use super::id::RegisterId;
+use super::shape::{Access, Origin, REFUSED, Shape, Text};
+use super::typed::{Dac, Never, ReadOnly, ReadWrite, Register, WriteOnly};
+use super::unit::Unit;
+use super::value::Value;
+
+/// Declares the registers: typed constants, ids for matching, shapes and texts. A row out of order
+/// does not compile.
+macro_rules! registers {
+    ($(
+        $id:literal $name:ident: $ty:ident $(| $mcsdk:ident)?, $unit:ident, $access:ident, $feature:ident,
+        $origin:ident $(mcsdk($get:expr, $set:expr))?, $doc:literal;
+    )+) => {
+        $( #[doc = concat!($doc, " (", stringify!($id), ")")]
+           pub const $name: Register<rust_type!($ty $($mcsdk)?), $access> = Register::new($id); )+
+
+        impl RegisterId {
+            $( #[doc = concat!($doc, " (", stringify!($id), ")")]
+               pub const $name: RegisterId = RegisterId($id); )+
+        }
+
+        /// Every register, at the index that is its id.
+        pub static SHAPES: [Shape; [$($id),+].len()] = [
+            $( Shape::new(
+                (<$ty as Value>::TYPE, Unit::$unit, Access::$access, Feature::$feature,
+                 Origin::$origin),
+                <mcsdk_type!($ty $($mcsdk)?) as Value>::TYPE,
+                optional_pair!($($get, $set)?),
+            ), )+
+        ];
+
+        /// The words of every register, at the index that is its id.
+        pub static TEXTS: [Text; SHAPES.len()] = [$( Text { name: stringify!($name), doc: $doc }, )+];
+
+        const _: () = {
+            let ids = [$( $id ),+];
+            let mut index = 0;
+            while index < ids.len() {
+                assert!(ids[index] == index, "a register row is out of order");
+                index += 1;
+            }
+        };
+    };
+}
+
+/// The Rust type that holds a register's value in either profile.
+macro_rules! rust_type {
+    ($ty:ident) => {
+        $ty
+    };
+    (u16 i16) => {
+        i32
+    };
+    (u32 u16) => {
+        u32
+    };
+}
+
+macro_rules! mcsdk_type {
+    ($ty:ident) => {
+        $ty
+    };
+    ($ty:ident $mcsdk:ident) => {
+        $mcsdk
+    };
+}
+
+macro_rules! optional_pair {
+    () => {
+        None
+    };
+    ($get:expr, $set:expr) => {
+        Some(($get, $set))
+    };
+}
 
 registers! {
     0x00 TARGET_MOTOR: u8, None, ReadWrite, Core, Table3, "Motor that motor number 0 addresses, counted from 0";

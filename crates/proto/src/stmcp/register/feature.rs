@@ -1,0 +1,53 @@
+//! What a drive is built with.
+
+macro_rules! features {
+    ($( $name:ident $text:literal; )+) => {
+        /// What a drive must be built with to have a register.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        pub enum Feature { $( #[doc = $text] $name, )+ }
+
+        impl Feature {
+            /// Every feature.
+            pub const ALL: &'static [Feature] = &[$( Feature::$name, )+];
+
+            /// The feature in words.
+            pub const fn name(self) -> &'static str {
+                match self { $( Feature::$name => $text, )+ }
+            }
+        }
+    };
+}
+
+features! {
+    Core "any drive";
+    ObserverPll "state observer with PLL";
+    ObserverCordic "state observer with CORDIC";
+    PositionSensor "encoder or Hall sensors";
+    FluxWeakening "flux weakening";
+    FeedForward "feed-forward";
+    Pfc "power factor correction";
+    Dac "DAC";
+    Hfi "high-frequency injection";
+    Profiler "motor profiler";
+    PositionControl "position control";
+}
+
+/// A set of [`Feature`]s; [`Feature::Core`] is in every set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Features(u16);
+
+impl Features {
+    /// A drive without any option.
+    pub const NONE: Features = Features(1);
+
+    /// The set with one feature more.
+    pub const fn with(self, feature: Feature) -> Self {
+        Features(self.0 | 1 << feature as u16)
+    }
+
+    /// Whether the drive has `feature`.
+    pub const fn has(self, feature: Feature) -> bool {
+        self.0 & (1 << feature as u16) != 0
+    }
+}

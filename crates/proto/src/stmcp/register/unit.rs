@@ -1,0 +1,46 @@
+//! Units of registers' values.
+
+macro_rules! units {
+    ($( $name:ident $symbol:literal; )+) => {
+        /// Unit of a register's value. The `s16` units are the drive's own digits: 32767 is full
+        /// scale of its current or voltage measurement, 65536 one electrical turn.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        #[repr(u8)]
+        #[allow(missing_docs)]
+        pub enum Unit { $( #[doc = concat!("`", $symbol, "`")] $name, )+ }
+
+        impl Unit {
+            /// The symbol to print behind a value; empty when there is none.
+            pub const fn symbol(self) -> &'static str {
+                match self { $( Unit::$name => $symbol, )+ }
+            }
+        }
+    };
+}
+
+units! {
+    None "";
+    Rpm "rpm";
+    S16A "s16A";
+    S16V "s16V";
+    S16VSquared "s16V²";
+    S16Degree "s16degree";
+    S16Speed "s16speed";
+    S16APerUnit "s16A/unit";
+    S16VPerS16A "s16V/s16A";
+    DppPerS16V "dpp/s16V";
+    S16APerS16VSquared "s16A/s16V²";
+    S16APerVolt "s16A/V";
+    Percent "%";
+    Volt "V";
+    Ampere "A";
+    Ohm "Ω";
+    Henry "H";
+    Celsius "°C";
+    Watt "W";
+    Hertz "Hz";
+    DeciHertz "0.1 Hz";
+    Millisecond "ms";
+    Second "s";
+    Radian "rad";
+}
