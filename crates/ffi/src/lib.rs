@@ -26,6 +26,7 @@ pub mod rmd;
 pub mod slcan;
 pub mod st;
 mod storage;
+mod tag;
 
 pub use bytes::{MOTORLINK_NEVER, motorlink_action, motorlink_bytes};
 pub use error::{MOTORLINK_OK, motorlink_error, motorlink_error_text};

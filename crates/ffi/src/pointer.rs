@@ -7,6 +7,7 @@ use core::slice;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use crate::error::motorlink_error;
+use crate::tag;
 
 type Result<T> = core::result::Result<T, motorlink_error>;
 
@@ -203,26 +204,21 @@ pub(crate) struct Stored<S> {
     state: S,
 }
 
-/// Declares the storage of an object.
+/// Declares what the storage of an object holds.
 macro_rules! storage {
-    ($( $type:ident: $state:ty, $tag:literal; )+) => {
-        $(
-            const _: () = {
-                use core::mem::{align_of, size_of};
-                use $crate::pointer::Stored;
-                assert!(size_of::<Stored<$state>>() <= size_of::<$type>(), "storage too small");
-                assert!(align_of::<Stored<$state>>() <= align_of::<$type>());
-            };
+    ($type:ident: $state:ty, $tag:expr) => {
+        const _: () = {
+            use core::mem::{align_of, size_of};
+            use $crate::pointer::Stored;
+            assert!(size_of::<Stored<$state>>() <= size_of::<$type>(), "storage too small");
+            assert!(align_of::<Stored<$state>>() <= align_of::<$type>());
+        };
 
-            // SAFETY: asserted above.
-            unsafe impl $crate::pointer::Storage for $type {
-                type State = $state;
-                const TAG: u32 = $tag;
-            }
-        )+
-
-        /// The tags of all kinds.
-        pub(crate) const TAGS: [u32; [$($tag),+].len()] = [$($tag),+];
+        // SAFETY: asserted above.
+        unsafe impl $crate::pointer::Storage for $type {
+            type State = $state;
+            const TAG: u32 = $tag;
+        }
     };
 }
 pub(crate) use storage;
@@ -255,7 +251,7 @@ impl<K: Storage> Out<K> {
         if let Err(found) = take(tag, K::TAG) {
             return Err(match found {
                 busy if busy == !K::TAG => motorlink_error::InUse,
-                other if crate::storage::TAGS.iter().any(|&tag| other == tag || other == !tag) => {
+                other if tag::ALL.iter().any(|&tag| other == tag || other == !tag) => {
                     motorlink_error::WrongKind
                 }
                 _ => motorlink_error::Uninitialised,

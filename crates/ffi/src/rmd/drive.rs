@@ -13,7 +13,8 @@ use super::motorlink_rmd_drive;
 use crate::bytes::MOTORLINK_NEVER;
 use crate::error::{answer, motorlink_error};
 use crate::frame::{NO_FRAME, motorlink_can_frame};
-use crate::pointer::{Kept, plain, promised};
+use crate::pointer::{Kept, plain, promised, storage};
+use crate::tag;
 
 /// What a motor does.
 #[repr(u8)]
@@ -137,6 +138,8 @@ pub(crate) struct State {
     drive: Drive,
     motor: Kept<motorlink_rmd_motor>,
 }
+
+storage!(motorlink_rmd_drive: State, tag::RMD_DRIVE);
 
 impl From<Mode> for motorlink_rmd_motion {
     fn from(mode: Mode) -> Self {

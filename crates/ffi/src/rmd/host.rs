@@ -9,7 +9,8 @@ use super::motorlink_rmd_host;
 use crate::bytes::{MOTORLINK_NEVER, motorlink_action};
 use crate::error::{answer, motorlink_error};
 use crate::frame::{NO_FRAME, motorlink_can_frame};
-use crate::pointer::{plain, promised};
+use crate::pointer::{plain, promised, storage};
+use crate::tag;
 
 /// In `motorlink_rmd_limits`: no limit beyond the document's range.
 pub const MOTORLINK_RMD_NO_LIMIT: i32 = -1;
@@ -54,6 +55,8 @@ pub(crate) struct State {
     /// When what was last refused may be asked again.
     retry: Instant,
 }
+
+storage!(motorlink_rmd_host: State, tag::RMD_HOST);
 
 fn id(motor: u8) -> Result<MotorId, motorlink_error> {
     MotorId::new(motor).ok_or(motorlink_error::BadArgument)

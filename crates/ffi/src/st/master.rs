@@ -9,7 +9,8 @@ use super::motorlink_st_master;
 use super::profile::{motorlink_st_profile, profile};
 use crate::bytes::{MOTORLINK_NEVER, motorlink_action, motorlink_bytes};
 use crate::error::{answer, motorlink_error};
-use crate::pointer::{plain, promised};
+use crate::pointer::{plain, promised, storage};
+use crate::tag;
 
 /// How a line is brought in step that was just opened, or on which an exchange failed.
 #[repr(u8)]
@@ -69,6 +70,8 @@ pub(crate) struct State {
     /// The register whose value is asked for.
     pub(super) asked: Option<RegisterId>,
 }
+
+storage!(motorlink_st_master: State, tag::ST_MASTER);
 
 /// The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
 #[unsafe(no_mangle)]

@@ -13,7 +13,8 @@ use super::motorlink_st_slave;
 use super::profile::profile;
 use crate::bytes::{MOTORLINK_NEVER, motorlink_bytes};
 use crate::error::{answer, motorlink_error};
-use crate::pointer::{Kept, ascii, plain, promised};
+use crate::pointer::{Kept, ascii, plain, promised, storage};
+use crate::tag;
 
 /// The firmware's version, as board information (4.7) and firmware version (4.12) tell it.
 #[repr(C)]
@@ -126,6 +127,8 @@ pub(crate) struct State {
     slave: Slave,
     drive: Kept<motorlink_st_drive>,
 }
+
+storage!(motorlink_st_slave: State, tag::ST_SLAVE);
 
 impl Drive for Kept<motorlink_st_drive> {
     fn features(&self, motor: Motor) -> Features {
