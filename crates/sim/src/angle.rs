@@ -3,13 +3,11 @@
 
 use core::f32::consts::TAU;
 
-use crate::vector::Vector;
-
 /// A turn of a multi-turn position.
 pub const TURN: i64 = 1 << 32;
 
 /// Radians of one digit.
-const DIGIT: f32 = TAU / TURN as f32;
+pub(crate) const DIGIT: f32 = TAU / TURN as f32;
 
 /// Radians of a span of positions.
 pub fn radians(span: i64) -> f32 {
@@ -57,40 +55,9 @@ pub fn sin(angle: u32) -> f32 {
     x + x * z * (-1.0 / 6.0 + z * (1.0 / 120.0 + z * (-1.0 / 5040.0 + z * series)))
 }
 
-/// The angle of a vector, 2^32 a turn, within 1e-5 rad; 0 for the zero vector.
-///
-/// An eighth of a turn is left after folding; on it a polynomial stands for the arctangent
-/// (Abramowitz and Stegun, *Handbook of Mathematical Functions*, 4.4.49).
-pub fn of(vector: Vector) -> u32 {
-    const QUARTER: f32 = (1 << 30) as f32;
-    let (x, y) = (vector.x.abs(), vector.y.abs());
-    let (least, most) = if x < y { (x, y) } else { (y, x) };
-    if most == 0.0 {
-        return 0;
-    }
-    let t = least / most;
-    let z = t * t;
-    let series =
-        0.999_866 + z * (-0.330_299_5 + z * (0.180_141 + z * (-0.085_133 + z * 0.020_835_1)));
-    let folded = t * series * (1.0 / DIGIT);
-    let first = (if x < y { QUARTER - folded } else { folded }) as i32 as u32;
-    let ahead = if vector.x < 0.0 { (1u32 << 31).wrapping_sub(first) } else { first };
-    if vector.y < 0.0 { ahead.wrapping_neg() } else { ahead }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_vectors_angle_is_found_all_around() {
-        for angle in (0..100_000u32).map(|step| step.wrapping_mul(42_949_673)) {
-            let found = of(Vector::unit(angle) * 3.0);
-            let off = found.wrapping_sub(angle) as i32 as f32 * DIGIT;
-            assert!(off.abs() < 2e-5, "{angle:#x}: {off} rad");
-        }
-        assert_eq!(of(Vector::ZERO), 0);
-    }
 
     #[test]
     fn sine_and_cosine_are_the_librarys() {

@@ -2,6 +2,8 @@
 
 use core::ops::{Add, Mul, Neg, Sub};
 
+use crate::angle::{DIGIT, sin_cos};
+
 /// Half the square root of three.
 pub(crate) const HALF_SQRT_3: f32 = 0.866_025_4;
 /// One over the square root of three: the greatest phase voltage per bus voltage.
@@ -27,8 +29,29 @@ impl Vector {
 
     /// A unit vector at an angle of 2^32 a turn.
     pub fn unit(angle: u32) -> Self {
-        let (y, x) = crate::angle::sin_cos(angle);
+        let (y, x) = sin_cos(angle);
         Vector { x, y }
+    }
+
+    /// The angle, 2^32 a turn, within 1e-5 rad; 0 for the zero vector.
+    ///
+    /// An eighth of a turn is left after folding; on it a polynomial stands for the arctangent
+    /// (Abramowitz and Stegun, *Handbook of Mathematical Functions*, 4.4.49).
+    pub fn angle(self) -> u32 {
+        const QUARTER: f32 = (1 << 30) as f32;
+        let (x, y) = (self.x.abs(), self.y.abs());
+        let (least, most) = if x < y { (x, y) } else { (y, x) };
+        if most == 0.0 {
+            return 0;
+        }
+        let t = least / most;
+        let z = t * t;
+        let series =
+            0.999_866 + z * (-0.330_299_5 + z * (0.180_141 + z * (-0.085_133 + z * 0.020_835_1)));
+        let folded = t * series * (1.0 / DIGIT);
+        let first = (if x < y { QUARTER - folded } else { folded }) as i32 as u32;
+        let ahead = if self.x < 0.0 { (1u32 << 31).wrapping_sub(first) } else { first };
+        if self.y < 0.0 { ahead.wrapping_neg() } else { ahead }
     }
 
     /// Turned forward by the angle of the unit vector `frame`: from the rotor's frame into the
@@ -116,6 +139,16 @@ impl Mul<f32> for Vector {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_vectors_angle_is_found_all_around() {
+        for angle in (0..100_000u32).map(|step| step.wrapping_mul(42_949_673)) {
+            let found = (Vector::unit(angle) * 3.0).angle();
+            let off = found.wrapping_sub(angle) as i32 as f32 * DIGIT;
+            assert!(off.abs() < 2e-5, "{angle:#x}: {off} rad");
+        }
+        assert_eq!(Vector::ZERO.angle(), 0);
+    }
 
     #[test]
     fn transforms_keep_amplitudes_and_have_inverses() {

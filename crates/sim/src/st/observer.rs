@@ -183,7 +183,7 @@ impl Observer {
             Tracking::Cordic => {
                 // The back-EMF is a quarter turn ahead of the rotor.
                 self.rotor = Vector::new(self.emf.y, -self.emf.x) * self.sign;
-                let angle = angle::of(self.rotor);
+                let angle = self.rotor.angle();
                 let way = angle.wrapping_sub(self.angle) as i32 as f32;
                 if way.abs() < FASTEST {
                     self.way += way;

@@ -49,6 +49,7 @@
 //! currents are in proportion to it.
 
 mod config;
+mod decay;
 mod shaft;
 mod step;
 
@@ -58,8 +59,8 @@ use super::load::{Load, LoadConfig};
 use crate::angle::{self, sin_cos};
 use crate::control::within;
 use crate::vector::Vector;
+use decay::Decay;
 use shaft::Shaft;
-use step::Decay;
 
 /// Growth of copper's resistance from 25 °C, 1/K: it would be nothing at -234.5 °C.
 const COPPER: f32 = 1.0 / 259.5;
@@ -307,6 +308,11 @@ impl Machine {
         0.5 * self.shaft.inertia * self.speed * self.speed
             + self.load.potential(self.position)
             + cogging
+    }
+
+    /// Where a position is in a period of the cogging, 2^32 a period.
+    fn cogging_angle(&self, position: i64) -> u32 {
+        (position as u32).wrapping_mul(self.config.cogging_periods.into())
     }
 
     /// Stops the current, as open terminals do.

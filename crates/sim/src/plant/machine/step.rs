@@ -175,53 +175,12 @@ impl Machine {
         -self.config.cogging_torque * angle::sin(self.cogging_angle(position))
     }
 
-    /// Where a position is in a period of the cogging, 2^32 a period.
-    pub(super) fn cogging_angle(&self, position: i64) -> u32 {
-        (position as u32).wrapping_mul(self.config.cogging_periods.into())
-    }
-
     /// Torque that brakes the rotor whatever its direction, at a speed, Nm.
     fn dry(&self, speed: f32) -> f32 {
         let MachineConfig { coulomb_friction, stiction, iron_hysteresis, .. } = self.config;
         let relative = speed * self.inverse_stribeck;
         let extra = (stiction - coulomb_friction).max(0.0) / (1.0 + relative * relative);
         coulomb_friction + extra + iron_hysteresis
-    }
-}
-
-/// What the resistance does in a step.
-#[derive(Debug, Clone)]
-pub(super) struct Decay {
-    /// What the axes have in common: its rate, 1/s, what is gone of a flux linkage after half a step,
-    /// and the time for which a voltage that stands still acts in it, s.
-    rate: f32,
-    gone: f32,
-    drive: f32,
-    /// What they differ in: what a sixth and what two sixths of a step add, as a share.
-    outer: Vector,
-    inner: Vector,
-    /// Whether they differ at all.
-    salient: bool,
-}
-
-impl Decay {
-    pub(super) fn new(period: f32, resistance: f32, inverse: Vector) -> Self {
-        let rate = 0.5 * resistance * (inverse.x + inverse.y);
-        let gone = -libm::expm1f(-0.5 * rate * period);
-        let drive = if gone > 0.0 { gone / rate } else { 0.5 * period };
-        let beyond = 0.5 * resistance * (inverse.x - inverse.y);
-        let change = |share: f32| {
-            let exponent = beyond * period * share;
-            Vector::new(libm::expm1f(-exponent), libm::expm1f(exponent))
-        };
-        Decay {
-            rate,
-            gone,
-            drive,
-            outer: change(1.0 / 6.0),
-            inner: change(1.0 / 3.0),
-            salient: beyond != 0.0,
-        }
     }
 }
 
