@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, Config, CurrentReference, Drive, ErrorCode, Features, Master, Motor, Output,
     PositionMove, Profile, Ramp, RegisterId, Request, RevupPhase, Slave, TorqueRamp, Version,
 };

@@ -372,7 +372,7 @@ impl Bench {
                 }
                 4 => {
                     let torques = [input.word() as i16, 0, -1, 2000];
-                    motorlink_rmd_host_torque4(host, now, torques.as_ptr(), one & 31)
+                    motorlink_rmd_host_set_torque4(host, now, torques.as_ptr(), one & 31)
                 }
                 5 if one & 3 == 1 => {
                     motorlink_rmd_host_trust(host, u32::from_le_bytes(input.array()))

@@ -2,11 +2,11 @@
 
 use motorlink::port::PortName;
 use motorlink::slcan::{self, Answer, Device, HostCodec};
-use motorlink::stmcp::{Profile, Reading, RegisterId, find_register, parse_value};
+use motorlink::st::{Profile, Reading, RegisterId, find_register, parse_value};
 use motorlink_link::serve::ServeName;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{self, Command as _, MotorId};
-use motorlink_proto::stmcp::{self as st, MAX_FRAME, Request};
+use motorlink_proto::st::{self as st, MAX_FRAME, Request};
 use motorlink_proto::time::Instant;
 use motorlink_proto::units::CentiDps;
 use motorlink_sim::rmd::RmdConfig;
@@ -108,13 +108,13 @@ pub fn sim_config(data: &[u8]) {
     }
     let ids: Vec<MotorId> = bus.nodes().iter().map(|node| node.id()).collect();
     for id in ids {
-        let speed = rmd::Speed { speed: CentiDps(36_000) };
+        let speed = rmd::SetSpeed { speed: CentiDps(36_000) };
         bus.receive(Instant(0), &CanFrame::new(id.can_id(), speed.encode()), |_| {});
     }
     for end in [1_000, 40_000] {
         station.advance_to(Instant(end));
         bus.advance_to(Instant(end));
-        crate::stmcp::finite(station.drive().motors());
+        crate::st::finite(station.drive().motors());
         crate::rmd::finite(bus.nodes());
     }
 }

@@ -10,17 +10,17 @@ mod input;
 mod model;
 mod rmd;
 pub mod seeds;
-mod stmcp;
+mod st;
 
 /// A target: its name, and what it does with bytes.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// Every target, the cheapest executions first.
 pub const TARGETS: &[Target] = &[
-    ("st_frame", stmcp::frame),
-    ("st_master", stmcp::master),
-    ("st_model", stmcp::model),
-    ("st_slave", stmcp::slave),
+    ("st_frame", st::frame),
+    ("st_master", st::master),
+    ("st_model", st::model),
+    ("st_slave", st::slave),
     ("rmd_frame", rmd::frame),
     ("rmd_host", rmd::host),
     ("rmd_drive", rmd::drive),

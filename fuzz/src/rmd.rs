@@ -43,22 +43,22 @@ pub fn frame(data: &[u8]) {
             assert_eq!(field.raw(&bytes), field.raw(data), "{}", field.name);
         }
     }
-    stable::<Gains>(data);
+    stable::<Pid>(data);
     stable::<Acceleration>(data);
     stable::<Encoder>(data);
     stable::<EncoderOffset>(data);
-    stable::<MultiTurn>(data);
-    stable::<Circle>(data);
-    stable::<Status1>(data);
+    stable::<MultiTurnAngle>(data);
+    stable::<SingleTurnAngle>(data);
+    stable::<Status>(data);
     stable::<MotionStatus>(data);
     stable::<PhaseCurrents>(data);
-    stable::<Torque>(data);
-    stable::<Speed>(data);
-    stable::<Position>(data);
-    stable::<PositionLimited>(data);
-    stable::<CirclePosition>(data);
-    stable::<CirclePositionLimited>(data);
-    assert_eq!(Torque4::decode(data).encode(), *data);
+    stable::<SetTorque>(data);
+    stable::<SetSpeed>(data);
+    stable::<SetPosition>(data);
+    stable::<SetPositionLimited>(data);
+    stable::<SetSingleTurnPosition>(data);
+    stable::<SetSingleTurnPositionLimited>(data);
+    assert_eq!(SetTorque4::decode(data).encode(), *data);
 }
 
 /// A host under any sequence of calls and frames, with time going on.
@@ -85,7 +85,7 @@ pub fn host(data: &[u8]) {
                     bench.codes[usize::from(id.number())] = data[0];
                 }
             }
-            3 => bench.torque4(input.byte(), &input.array()),
+            3 => bench.set_torque4(input.byte(), &input.array()),
             4 | 5 => bench.host.receive(bench.now, &any_frame(&mut input)),
             6 => {
                 let data: [u8; 8] = input.array();
@@ -102,7 +102,7 @@ pub fn host(data: &[u8]) {
             9 => {
                 let limit = |word: u16| (word & 1 == 0).then_some(word >> 1);
                 let limits = Limits {
-                    current: limit(input.word()).map(|word| TorqueCommand(word as i16)),
+                    current: limit(input.word()).map(|word| IqCommand(word as i16)),
                     speed: limit(input.word()).map(SpeedLimit),
                     angle: limit(input.word()).map(|word| CentiDegrees(i32::from(word))),
                 };
@@ -137,15 +137,15 @@ struct HostBench {
 }
 
 impl HostBench {
-    fn torque4(&mut self, expected: u8, data: &[u8; 8]) {
+    fn set_torque4(&mut self, expected: u8, data: &[u8; 8]) {
         let ids = (1..=5).filter(|id| expected >> id & 1 == 1).filter_map(MotorId::new);
         let expected = MotorSet::from_iter(ids);
-        let torques = Torque4::decode(data);
-        if self.host.torque4(self.now, torques, expected).is_ok() {
+        let torques = SetTorque4::decode(data);
+        if self.host.set_torque4(self.now, torques, expected).is_ok() {
             assert!(torques.0.iter().all(|torque| torque.0.unsigned_abs() <= 2000));
             assert!(expected.without(MotorSet::TORQUE4).is_empty());
             self.torque4 = Some(*data);
-            expected.for_each(|id| self.codes[usize::from(id.number())] = Code::Torque.into());
+            expected.for_each(|id| self.codes[usize::from(id.number())] = Code::SetTorque.into());
         }
     }
 
@@ -262,7 +262,7 @@ fn ask(bus: &mut RmdBus<[RmdNode; 4]>, now: Instant, frame: CanFrame) {
     bus.receive(now, &frame, |reply| replies.push(reply));
     let asked = frame.eight_bytes().map(|(id, data)| (id, *data));
     let code = match asked {
-        Some((TORQUE4_ID, _)) => Some(Code::Torque),
+        Some((TORQUE4_ID, _)) => Some(Code::SetTorque),
         Some((id, data)) if (0x141..=0x144).contains(&id) => Some(Code::from(data[0])),
         _ => None,
     };
@@ -281,7 +281,7 @@ fn ask(bus: &mut RmdBus<[RmdNode; 4]>, now: Instant, frame: CanFrame) {
         let (from, answer) = reply.eight_bytes().expect("a reply has eight bytes");
         assert!(from == id || id == TORQUE4_ID);
         let answered = Code::from(answer[0]);
-        let cleared = row.code == Code::ClearErrors && answered == Code::ReadStatus1;
+        let cleared = row.code == Code::ClearErrors && answered == Code::ReadStatus;
         assert!(answered == row.code || cleared, "{frame:?}: {answer:02x?}");
         assert!(!row.echo || *answer == data, "{frame:?}: {answer:02x?}");
     }

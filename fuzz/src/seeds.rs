@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use motorlink::slcan;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::TORQUE4_ID;
-use motorlink_proto::stmcp::RegisterId;
+use motorlink_proto::st::RegisterId;
 use motorlink_sim::{rmd::RmdConfig, st::MotorConfig};
 use serde_json::Value;
 
@@ -76,7 +76,7 @@ fn hexadecimal(value: &Value) -> Vec<u8> {
 
 /// Profile (as the targets take it), request and reply of each vector.
 fn st() -> impl Iterator<Item = (u8, Vec<u8>, Vec<u8>)> {
-    vectors("vectors/stmcp.json").into_iter().map(|vector| {
+    vectors("vectors/st.json").into_iter().map(|vector| {
         let profile = u8::from(vector["profile"] == "mcsdk-5.4");
         (profile, hexadecimal(&vector["request"]), hexadecimal(&vector["reply"]))
     })

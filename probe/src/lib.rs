@@ -9,9 +9,9 @@ use core::mem::size_of;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     Config as RmdConfig, Drive as RmdDrive, Host, Mode, Motor as RmdMotor, MotorId, MotorSet,
-    Output as RmdOutput, Sense, Settings, Torque4,
+    Output as RmdOutput, Sense, SetTorque4, Settings,
 };
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     BoardInfo, Command, CurrentReference, Drive, ErrorCode, Features, FirmwareVersion, Master,
     Motor, Output, PositionMove, Ramp, RegisterId, Request, RevupPhase, Slave, TorqueRamp, Version,
 };
@@ -152,7 +152,7 @@ pub fn rmd_host(host: &mut Host) {
     let frame = CanFrame::data_frame(unknown(), unknown(), black_box(&[0; 8]));
     host.receive(now, &frame);
     let _ = black_box(host.request(now, id(unknown()), unknown()));
-    let _ = black_box(host.torque4(now, Torque4::default(), black_box(MotorSet::TORQUE4)));
+    let _ = black_box(host.set_torque4(now, SetTorque4::default(), black_box(MotorSet::TORQUE4)));
     host.cancel(now, id(unknown()));
     host.reopened(now);
     host.trust(black_box(MotorSet::TORQUE4));

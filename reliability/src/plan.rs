@@ -1,7 +1,7 @@
 //! Which lines are tried, and for how long.
 
 use motorlink_link::fault::{FaultError, Faults};
-use motorlink_proto::stmcp::{Profile, Recovery};
+use motorlink_proto::st::{Profile, Recovery};
 
 use crate::st::Setup;
 use crate::tally::Tally;

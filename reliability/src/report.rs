@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use motorlink_link::fault::{FaultError, Rng};
-use motorlink_proto::stmcp::{Frame, MAX_FRAME};
+use motorlink_proto::st::{Frame, MAX_FRAME};
 
 use crate::plan::{Speaks, Trial};
 use crate::st::theory::share;

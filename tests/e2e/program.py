@@ -153,12 +153,12 @@ class Sim(Running):
     @property
     def st(self):
         """The pty of the ST drive, by its link."""
-        return self._served("stmcp", "pty:")["port"].removeprefix("pty:")
+        return self._served("st", "pty:")["port"].removeprefix("pty:")
 
     @property
     def st_address(self):
         """HOST:PORT of the ST drive."""
-        return self._served("stmcp", "tcp-listen:")["path"]
+        return self._served("st", "tcp-listen:")["path"]
 
     @property
     def can(self):

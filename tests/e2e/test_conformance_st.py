@@ -6,7 +6,7 @@ import shlex
 import xml.etree.ElementTree as xml
 
 import pytest
-import stmcp
+import st_wire
 from peers import device
 from program import eventually
 
@@ -95,10 +95,10 @@ def one_motor(checksum):
     def answer(received):
         code, motor, payload = received[0] & 0x1F, received[0] >> 5, received[2:-1]
         if motor > 1:
-            return reply(stmcp.NACK, [stmcp.BAD_MOTOR_SELECTED])
-        if code == stmcp.GET_REG and payload in (b"\x00", b"\x02"):
-            return reply(stmcp.ACK, [0])
-        return reply(stmcp.NACK, [stmcp.BAD_FRAME_ID])
+            return reply(st_wire.NACK, [st_wire.BAD_MOTOR_SELECTED])
+        if code == st_wire.GET_REG and payload in (b"\x00", b"\x02"):
+            return reply(st_wire.ACK, [0])
+        return reply(st_wire.NACK, [st_wire.BAD_FRAME_ID])
 
     return answer
 
@@ -142,7 +142,7 @@ def test_a_silent_port_is_given_up(run, tmp_path):
 
 def test_a_port_that_dies_ends_the_run(run, tmp_path):
     left = iter(range(6))
-    right = one_motor(stmcp.checksum)
+    right = one_motor(st_wire.checksum)
 
     def answer(received):
         return right(received) if next(left, None) is not None else None

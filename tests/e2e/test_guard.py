@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from program import environment, eventually
-from stmcp import ACK, EXECUTE, GET_REG, Line, frame, header
+from st_wire import ACK, EXECUTE, GET_REG, Line, frame, header
 
 STATUS, SPEED_KP = 0x02, 0x05
 START, STOP = 1, 2
@@ -20,7 +20,7 @@ START, STOP = 1, 2
 # A program that starts motors and then does nothing; what it is given on stdin ends it.
 CLIENT = """
 import sys
-from stmcp import ACK, EXECUTE, Line, frame, header
+from st_wire import ACK, EXECUTE, Line, frame, header
 line = Line(sys.argv[1])
 for word in sys.argv[2:]:
     motor, command = map(int, word.split(":"))
@@ -37,7 +37,7 @@ def guard(start, tmp_path):
     def guard(port, *arguments, serve=None):
         process = start("guard", "-p", port, "--serve", serve or f"pty:{tmp_path}/drive", *arguments)
         announced = json.loads(process.line(0))
-        assert announced["protocol"] == "stmcp"
+        assert announced["protocol"] == "st"
         process.port = announced["port"].removeprefix("pty:").replace("tcp-listen:", "socket://")
         return process
 

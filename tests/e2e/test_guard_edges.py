@@ -24,7 +24,7 @@ from pathlib import Path
 import pytest
 
 from program import Sim, environment, eventually
-from stmcp import ACK, EXECUTE, frame, header
+from st_wire import ACK, EXECUTE, frame, header
 
 HOSTS = Path(__file__).parent / "hosts"
 #: Random combinations of each protocol.

@@ -9,7 +9,7 @@ import math
 import pytest
 
 from program import eventually
-from stmcp import ACK, EXECUTE, SET_RAMP, Line, frame, header
+from st_wire import ACK, EXECUTE, SET_RAMP, Line, frame, header
 
 STATUS, SPEED_REF, SPEED_MEAS, TORQUE_REF = 0x02, 0x04, 0x1E, 0x08
 TORQUE_MEAS, FLUX_MEAS, BUS_VOLTAGE, HEATS_TEMP, MOTOR_POWER = 0x1F, 0x20, 0x19, 0x1A, 0x1B

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from program import eventually
-from stmcp import EXECUTE, Line, frame
+from st_wire import EXECUTE, Line, frame
 
 CONTROL_MODE = 0x03
 SPEED_MEAS = 0x1E
@@ -25,7 +25,7 @@ def test_each_port_is_announced_when_it_can_be_opened(sim, tmp_path):
     st, st_tcp, rmd, rmd_tcp = drives.ports
     assert st["path"].startswith("/dev/pts/")
     assert st == {
-        **{"port": f"pty:{tmp_path}/st0", "protocol": "stmcp", "motors": 2, "profile": "spec"},
+        **{"port": f"pty:{tmp_path}/st0", "protocol": "st", "motors": 2, "profile": "spec"},
         "path": os.readlink(tmp_path / "st0"),
     }
     assert rmd == {

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from program import eventually
-from stmcp import (
+from st_wire import (
     ACK,
     BAD_CRC,
     BAD_FRAME_ID,
@@ -30,7 +30,7 @@ from stmcp import (
     nack,
 )
 
-VECTORS = json.loads((Path(__file__).parents[2] / "vectors/stmcp.json").read_text())
+VECTORS = json.loads((Path(__file__).parents[2] / "vectors/st.json").read_text())
 
 CONTROL_MODE, SPEED_KP, DAC_OUT2, SPEED_MEAS, I_ALPHA = 0x03, 0x05, 0x1D, 0x1E, 0x25
 RAMP_FINAL_SPEED, TARGET_MOTOR, FF_1Q = 0x5B, 0x00, 0x46

@@ -4,7 +4,7 @@ import threading
 import time
 
 from clock import connect
-from stmcp import ACK, GET_REG, frame
+from st_wire import ACK, GET_REG, frame
 
 EXCHANGES = 1000
 

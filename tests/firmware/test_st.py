@@ -4,7 +4,7 @@ import pytest
 
 import test_st_bytes
 from clock import MOST_TICKS
-from stmcp import ACK, EXECUTE, GET_REG, TIMEOUT, Line, frame, header, nack
+from st_wire import ACK, EXECUTE, GET_REG, TIMEOUT, Line, frame, header, nack
 from test_st_bytes import (  # noqa: F401  # tests that run here with this file's fixture
     test_a_cut_off_frame_is_answered_with_timeout_after_25_ms,
     test_a_frame_in_single_bytes_is_understood,

@@ -1,8 +1,10 @@
 //! One cycle after the other: the sans-IO host, the wire, simulated motors.
 
-use motorlink_proto::rmd::{Command, Host, MotorId, MotorSet, Output, Refused, Speed, Torque4};
+use motorlink_proto::rmd::{
+    Command, Host, MotorId, MotorSet, Output, Refused, SetSpeed, SetTorque4,
+};
 use motorlink_proto::time::{Duration, Instant};
-use motorlink_proto::units::{CentiDps, TorqueCommand};
+use motorlink_proto::units::{CentiDps, IqCommand};
 use motorlink_sim::rmd::{RmdBus, RmdNode};
 
 use super::wire::{Sender, Transfer, Wire};
@@ -12,7 +14,7 @@ use crate::Result;
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Cycle {
     /// A torque for each in one frame.
-    Torque4,
+    SetTorque4,
     /// A speed for each, all at once.
     Pipelined,
     /// A speed for each, one after the other.
@@ -20,11 +22,11 @@ pub(super) enum Cycle {
 }
 
 impl Cycle {
-    pub(super) const ALL: [Cycle; 3] = [Cycle::Torque4, Cycle::Pipelined, Cycle::Serial];
+    pub(super) const ALL: [Cycle; 3] = [Cycle::SetTorque4, Cycle::Pipelined, Cycle::Serial];
 
     pub(super) const fn name(self) -> &'static str {
         match self {
-            Cycle::Torque4 => "0x280 and 4 replies",
+            Cycle::SetTorque4 => "0x280 and 4 replies",
             Cycle::Pipelined => "4 motors, pipelined",
             Cycle::Serial => "4 motors, one by one",
         }
@@ -32,7 +34,7 @@ impl Cycle {
 
     /// Whether a share is asked for.
     pub(super) const fn is_required(self) -> bool {
-        matches!(self, Cycle::Torque4 | Cycle::Pipelined)
+        matches!(self, Cycle::SetTorque4 | Cycle::Pipelined)
     }
 
     /// Runs `cycles` of it with motors that answer `turnaround` after the request.
@@ -41,11 +43,11 @@ impl Cycle {
         for number in 0..cycles {
             // A swing of references, so that motors turn and frames differ.
             let swing = (number % 200) as i16 - 100;
-            let speed = Speed { speed: CentiDps(i32::from(swing) * 400) };
+            let speed = SetSpeed { speed: CentiDps(i32::from(swing) * 400) };
             match self {
-                Cycle::Torque4 => {
-                    let torques = [1, -2, 3, -4].map(|part| TorqueCommand(part * swing / 10));
-                    rig.host.torque4(rig.now, Torque4(torques), MotorSet::TORQUE4)?;
+                Cycle::SetTorque4 => {
+                    let torques = [1, -2, 3, -4].map(|part| IqCommand(part * swing / 10));
+                    rig.host.set_torque4(rig.now, SetTorque4(torques), MotorSet::TORQUE4)?;
                     rig.settle(4)?;
                 }
                 Cycle::Pipelined => {

@@ -1,7 +1,7 @@
 //! Time and instructions to encode and decode each message.
 
 mod rmd;
-mod stmcp;
+mod st;
 
 use crate::Result;
 use crate::kernel::{Counter, Kernel};
@@ -23,14 +23,14 @@ impl Kind {
 }
 
 pub fn kernels() -> impl Iterator<Item = Kernel> {
-    let kinds = stmcp::kinds().into_iter().chain(rmd::kinds());
+    let kinds = st::kinds().into_iter().chain(rmd::kinds());
     kinds.flat_map(|kind| [kind.request, kind.reply])
 }
 
 pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     let counter = Counter::find();
     let sections = vec![
-        section("ST Motor Control Protocol: encode and decode", stmcp::kinds(), counter.as_ref())?,
+        section("ST Motor Control Protocol: encode and decode", st::kinds(), counter.as_ref())?,
         section("RMD over CAN: encode and decode", rmd::kinds(), counter.as_ref())?,
     ];
     Ok((sections, Vec::new()))

@@ -15,9 +15,9 @@ const VALUES: [u8; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
 /// Every command of the table with its reply, and the torque frame.
 pub(super) fn kinds() -> Vec<Kind> {
     let torque4 = Kind::new(
-        format!("{TORQUE4_ID:#05x} Torque4"),
-        there_and_back(TORQUE4_ID, Torque4::encode),
-        reply::<Torque>(),
+        format!("{TORQUE4_ID:#05x} SetTorque4"),
+        there_and_back(TORQUE4_ID, SetTorque4::encode),
+        reply::<SetTorque>(),
     );
     let mut kinds = commands();
     kinds.push(torque4);
@@ -30,10 +30,10 @@ fn commands() -> Vec<Kind> {
         ($($command:ident)+) => { vec![$( kind::<$command>(), )+] };
     }
     of! {
-        ReadGains WriteGains WriteGainsToRom ReadAcceleration WriteAcceleration ReadEncoder
-        WriteEncoderOffset WriteZeroToRom ReadMultiTurnAngle ReadCircleAngle ReadStatus1
-        ClearErrors ReadStatus2 ReadStatus3 Off Stop Run Torque Speed Position PositionLimited
-        CirclePosition CirclePositionLimited
+        ReadPid WritePidRam WritePidRom ReadAcceleration WriteAccelerationRam ReadEncoder
+        WriteEncoderOffsetRom WriteZeroRom ReadMultiTurnAngle ReadSingleTurnAngle ReadStatus
+        ClearErrors ReadMotionStatus ReadPhaseCurrents Off Stop Run SetTorque SetSpeed SetPosition SetPositionLimited
+        SetSingleTurnPosition SetSingleTurnPositionLimited
     }
 }
 

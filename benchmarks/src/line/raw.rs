@@ -122,7 +122,7 @@ fn nonblocking(fd: OwnedFd) -> Result<OwnedFd> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use motorlink_proto::stmcp::{Frame, HEADER_ACK, RegisterId, Request};
+    use motorlink_proto::st::{Frame, HEADER_ACK, RegisterId, Request};
 
     #[test]
     fn the_bytes_are_those_of_the_exchange() {

@@ -10,9 +10,9 @@ use std::thread;
 use std::time::Instant;
 
 use motorlink::port::{ByteLink, FdLink};
-use motorlink::stmcp::{Client, Options};
-use motorlink_proto::stmcp::Profile;
-use motorlink_proto::stmcp::register::SPEED_MEAS;
+use motorlink::st::{Client, Options};
+use motorlink_proto::st::Profile;
+use motorlink_proto::st::register::SPEED_MEAS;
 use motorlink_proto::time::Instant as Moment;
 use motorlink_sim::st::{StDrive, StStation};
 use rustix::process::setpriority_process;

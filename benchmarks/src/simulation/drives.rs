@@ -3,8 +3,8 @@
 use std::hint::black_box;
 
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::{Command as _, Speed};
-use motorlink_proto::stmcp::{Command, Drive as _, Motor, Profile, Ramp};
+use motorlink_proto::rmd::{Command as _, SetSpeed};
+use motorlink_proto::st::{Command, Drive as _, Motor, Profile, Ramp};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::CentiDps;
 use motorlink_sim::plant::{Bridge, LoadConfig, Plant, PlantConfig};
@@ -153,7 +153,7 @@ fn rmd(name: &'static str, dps: i32) -> Kernel {
     let node = RmdNode::new(Instant(0), config, config.factory_rom()).expect("its ID exists");
     let id = node.id();
     let mut bus = RmdBus::new([node]).expect("one motor has an ID of its own");
-    let request = CanFrame::new(id.can_id(), Speed { speed: CentiDps(dps * 100) }.encode());
+    let request = CanFrame::new(id.can_id(), SetSpeed { speed: CentiDps(dps * 100) }.encode());
     bus.receive(Instant(0), &request, |_| ());
     bus.advance_to(SETTLED);
     let truth = bus.node(id).expect("the motor is there").motor().truth();

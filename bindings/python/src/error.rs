@@ -3,8 +3,8 @@
 use std::fmt::Display;
 
 use motorlink::port::PortError;
-use motorlink::stmcp::{ErrorCode, Failure};
-use motorlink::{rmd, stmcp};
+use motorlink::st::{ErrorCode, Failure};
+use motorlink::{rmd, st};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -86,8 +86,8 @@ pub(crate) fn elsewhere(py: Python<'_>, port: &str) -> PyErr {
 }
 
 /// What an ST client says.
-pub(crate) fn st_error(py: Python<'_>, error: &stmcp::Error) -> PyErr {
-    use stmcp::Error;
+pub(crate) fn st_error(py: Python<'_>, error: &st::Error) -> PyErr {
+    use st::Error;
     // Motor number 0 is whichever the drive has selected.
     let named = |number: u8| Some(number).filter(|number| *number != 0);
     let (kind, facts) = match error {

@@ -44,7 +44,7 @@ mod _core {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         motorlink_testbench::register();
-        module.add("ST_SEGMENTS", motorlink::stmcp::SEGMENTS)?;
+        module.add("ST_SEGMENTS", motorlink::st::SEGMENTS)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 

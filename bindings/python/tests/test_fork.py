@@ -103,9 +103,9 @@ def test_a_guard_stops_the_motors_of_a_killed_parent(
     guard: Guard, served: Served, kind: str, script: str, way: str
 ) -> None:
     with Family(script, guard.ports[kind], way) as family:
-        eventually(lambda: served.motor("stmcp", 1)["status"] == "RUN", "a motor in RUN")
+        eventually(lambda: served.motor("st", 1)["status"] == "RUN", "a motor in RUN")
         family.kill_parent()
-        eventually(lambda: served.motor("stmcp", 1)["status"] == "IDLE", "a motor at rest")
+        eventually(lambda: served.motor("st", 1)["status"] == "IDLE", "a motor at rest")
 
 
 def test_the_port_of_a_killed_parent_is_free(served: Served) -> None:

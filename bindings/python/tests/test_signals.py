@@ -49,7 +49,7 @@ def program(script: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
 
 def is_turning(served: Served, kind: str) -> bool:
     if kind == "st":
-        return served.motor("stmcp", 1)["status"] not in ("IDLE", "STOP", "STOP_IDLE")
+        return served.motor("st", 1)["status"] not in ("IDLE", "STOP", "STOP_IDLE")
     return served.motor("rmd", 1)["mode"] not in ("stopped", "off")
 
 
@@ -183,7 +183,7 @@ OPTED_OUT = """
 @pytest.mark.parametrize("script", [OTHER_THREAD, OPTED_OUT], ids=["other thread", "opted out"])
 def test_what_no_handler_covers_is_left_turning(served: Served, script: str) -> None:
     with program(script, "st", served.st) as running:
-        eventually(lambda: served.motor("stmcp", 1)["status"] == "RUN", "a motor in RUN")
+        eventually(lambda: served.motor("st", 1)["status"] == "RUN", "a motor in RUN")
         running.send_signal(signal.SIGTERM)
         assert running.wait(60) == -signal.SIGTERM
         assert is_turning(served, "st")
@@ -206,7 +206,7 @@ BOTH_THREADS = """
 
 def test_a_bus_of_another_thread_is_covered_by_one_of_the_main_thread(served: Served) -> None:
     with program(BOTH_THREADS, "st", served.st) as running:
-        eventually(lambda: served.motor("stmcp", 1)["status"] == "RUN", "a motor in RUN")
+        eventually(lambda: served.motor("st", 1)["status"] == "RUN", "a motor in RUN")
         running.send_signal(signal.SIGTERM)
         assert running.wait(60) == -signal.SIGTERM
         eventually(lambda: not is_turning(served, "st"), "a motor at rest")

@@ -319,12 +319,12 @@ def test_the_end_of_with_stops_what_was_started(served: Served) -> None:
         motor = bus.motor(1)
         motor.ramp(1500, 0.1)
         motor.start()
-        assert served.motor("stmcp", 1)["status"] != "IDLE"
+        assert served.motor("st", 1)["status"] != "IDLE"
         _ = 1 / 0
-    eventually(lambda: served.motor("stmcp", 1)["status"] == "IDLE", "a motor at rest")
+    eventually(lambda: served.motor("st", 1)["status"] == "IDLE", "a motor at rest")
     with st.open(served.st, on_close="nothing") as bus:
         bus.motor(1).start()
-    assert served.motor("stmcp", 1)["status"] not in ("IDLE", "STOP", "ANY_STOP")
+    assert served.motor("st", 1)["status"] not in ("IDLE", "STOP", "ANY_STOP")
     with st.open(served.st) as bus:
         bus.motor(1).stop()
 

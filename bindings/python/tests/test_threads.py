@@ -230,12 +230,12 @@ def test_ctrl_c_ends_a_wait_for_a_drive_and_the_next_exchange_is_right(tmp_path:
 
 def test_ctrl_c_ends_a_long_sampling_and_stops_the_motor(served: Served) -> None:
     with python(SAMPLE, served.st) as program:
-        eventually(lambda: served.motor("stmcp", 1)["status"] == "RUN", "a motor in RUN")
+        eventually(lambda: served.motor("st", 1)["status"] == "RUN", "a motor in RUN")
         program.send_signal(signal.SIGINT)
         out, err = program.communicate(timeout=10)
         assert int(out) > 0
         assert "KeyboardInterrupt" in err and program.returncode in (130, -signal.SIGINT)
-    eventually(lambda: served.motor("stmcp", 1)["status"] == "IDLE", "a motor at rest")
+    eventually(lambda: served.motor("st", 1)["status"] == "IDLE", "a motor at rest")
 
 
 def test_ctrl_c_ends_a_program_that_a_drive_keeps_waiting() -> None:

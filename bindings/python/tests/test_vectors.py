@@ -24,7 +24,7 @@ def vectors(name: str) -> list[Vector]:
     return found
 
 
-ST = vectors("stmcp")
+ST = vectors("st")
 RMD = vectors("rmd")
 
 
@@ -166,7 +166,7 @@ def rmd_request(frame: rmd.Frame, code: int) -> rmd.Request:
         0x80: rmd.Request.off,
         0x81: rmd.Request.stop,
         0x88: rmd.Request.run,
-        0xA1: lambda: rmd.Request.torque(values["torque_a"]),
+        0xA1: lambda: rmd.Request.torque(values["iq_a"]),
         0xA2: lambda: rmd.Request.speed(values["speed_dps"]),
         0xA3: lambda: rmd.Request.move_to(degrees),
         0xA4: lambda: rmd.Request.move_to(degrees, dps),
@@ -190,7 +190,7 @@ def test_an_rmd_request_encodes_to_its_bytes_and_decodes_from_them(vector: Vecto
     assert (decoded.code, decoded.encode()) == (code, data)
     # What the document does not allow is read, and never made; nor is a max speed of 0.
     if (
-        abs(frame.digits.get("torque", 0)) > 2000
+        abs(frame.digits.get("iq", 0)) > 2000
         or (code in (0xA5, 0xA6) and frame.digits["angle"] >= 36000)
         or frame.digits.get("max_speed") == 0
     ):

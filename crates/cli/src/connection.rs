@@ -2,7 +2,7 @@
 
 use motorlink::port::{ByteLink, CanLink, FaultBytes, FaultCan, PortName, TapBytes, TapCan};
 use motorlink::rmd::IDENTIFIERS;
-use motorlink::stmcp::Profile;
+use motorlink::st::Profile;
 use motorlink_link::fault::Faults;
 
 use crate::failure::Failure;

@@ -1,7 +1,7 @@
 //! How the program ends when it did not do what it was asked.
 
 use motorlink::port::{NameError, PortError};
-use motorlink::{rmd, stmcp};
+use motorlink::{rmd, st};
 use motorlink_link::fault::FaultError;
 
 use crate::output::note;
@@ -38,14 +38,12 @@ impl Failure {
     }
 }
 
-impl From<stmcp::Error> for Failure {
-    fn from(error: stmcp::Error) -> Self {
+impl From<st::Error> for Failure {
+    fn from(error: st::Error) -> Self {
         let message = error.to_string();
         match error {
-            stmcp::Error::Refused { .. } | stmcp::Error::Differs { .. } => {
-                Failure::Refused(message)
-            }
-            stmcp::Error::Port(error) => error.into(),
+            st::Error::Refused { .. } | st::Error::Differs { .. } => Failure::Refused(message),
+            st::Error::Port(error) => error.into(),
             error if error.is_line_failure() => Failure::Line(message),
             _ => Failure::Usage(message),
         }
@@ -90,14 +88,14 @@ impl From<FaultError> for Failure {
     }
 }
 
-impl From<stmcp::UnknownRegister> for Failure {
-    fn from(error: stmcp::UnknownRegister) -> Self {
+impl From<st::UnknownRegister> for Failure {
+    fn from(error: st::UnknownRegister) -> Self {
         Failure::Usage(error.to_string())
     }
 }
 
-impl From<stmcp::ValueError> for Failure {
-    fn from(error: stmcp::ValueError) -> Self {
+impl From<st::ValueError> for Failure {
+    fn from(error: st::ValueError) -> Self {
         Failure::Usage(error.to_string())
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use motorlink::can::CanFrame;
 use motorlink::port::Direction;
 use motorlink::rmd;
-use motorlink::stmcp::{Profile, Transcript};
+use motorlink::st::{Profile, Transcript};
 
 use crate::output::{hex, note};
 

@@ -9,7 +9,7 @@ use std::thread;
 use motorlink::can::CanFrame;
 use motorlink::port::PortError;
 use motorlink::rmd::Bus;
-use motorlink::stmcp::{Client, Error, Options};
+use motorlink::st::{Client, Error, Options};
 use motorlink::{port::CanLink, rmd};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -124,7 +124,7 @@ fn a_retired_bus_only_stops_motors() {
         _ => false,
     };
     assert!(is_retired(bus.raw(motor.id(), speed).unwrap_err()));
-    assert!(is_retired(bus.torque4(rmd::Torque4::default(), bus.moving()).unwrap_err()));
+    assert!(is_retired(bus.set_torque4(rmd::SetTorque4::default(), bus.moving()).unwrap_err()));
     let mut outcomes = Vec::new();
     bus.cycle(&[(motor.id(), speed)], |_, outcome| outcomes.push(outcome.unwrap_err())).unwrap();
     assert!(outcomes.into_iter().all(is_retired));

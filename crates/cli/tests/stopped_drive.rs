@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use motorlink::rmd::{self, Bus};
-use motorlink::stmcp::{self, Client, register};
+use motorlink::st::{self, Client, register};
 use rustix::process::{Pid, Signal, kill_process};
 
 /// How long a drive stands still.
@@ -102,7 +102,7 @@ fn an_st_drive_that_stood_still_confuses_nobody() {
 
 fn st_stands_still(pause: Duration) {
     let drive = Drive::new("--st", "pty");
-    let client = Client::open(&drive.port.parse().expect("a port"), stmcp::Options::default());
+    let client = Client::open(&drive.port.parse().expect("a port"), st::Options::default());
     let client = client.expect("opened");
     let motor = client.motor(1).expect("a motor");
     let mut number = 0i16;
@@ -133,7 +133,7 @@ fn rmd_stands_still(pause: Duration) {
             let motor = bus.motor(id).expect("an ID");
             let own = rmd::DpsPerSecond(number * 10 + i32::from(id));
             // Both are asked in any case, so that replies of either kind wait.
-            let (written, read) = (motor.write_acceleration(own), motor.acceleration());
+            let (written, read) = (motor.write_acceleration_ram(own), motor.acceleration());
             written.map_err(|error| error.to_string())?;
             assert_eq!(read.map_err(|error| error.to_string())?, own, "somebody else's reply");
         }

@@ -7,13 +7,13 @@ use std::thread;
 use std::time::Duration;
 
 use motorlink::port::PortName;
-use motorlink::rmd::{Bus, Error, MotorId, MotorSet, Torque4, TorqueCommand};
-use motorlink::stmcp::{Client, register};
-use motorlink::{rmd, stmcp};
+use motorlink::rmd::{Bus, Error, IqCommand, MotorId, MotorSet, SetTorque4};
+use motorlink::st::{Client, register};
+use motorlink::{rmd, st};
 use motorlink_conformance::Verdict;
 use motorlink_conformance::host::{self, Demand, Journal, READINGS, Reading, Said, Task};
 use motorlink_link::serve::Server;
-use motorlink_proto::rmd::{Command as _, MultiTurn, Payload as _, ReadMultiTurnAngle};
+use motorlink_proto::rmd::{Command as _, MultiTurnAngle, Payload as _, ReadMultiTurnAngle};
 
 /// Long against what a loaded machine adds, short for a test.
 const TIMEOUT: Duration = Duration::from_millis(500);
@@ -82,7 +82,7 @@ fn our_client_passes_every_scenario() {
 }
 
 fn ask_client(path: &str, task: Task) -> Said {
-    let mut options = stmcp::Options::default();
+    let mut options = st::Options::default();
     options.line.timeout = TIMEOUT.into();
     let client = Client::open(&path.parse().unwrap(), options).unwrap();
     let motor = client.motor(1).unwrap();
@@ -141,23 +141,25 @@ fn ask_bus(path: &str, task: Task) -> Said {
             Task::Read | Task::Echoed => note(motor.id(), motor.multi_turn_angle().map(|a| a.0)),
             Task::Alternate => {
                 note(motor.id(), motor.multi_turn_angle().map(|angle| angle.0));
-                note(motor.id(), motor.circle_angle().map(|angle| angle.0.into()));
+                note(motor.id(), motor.single_turn_angle().map(|angle| angle.0.into()));
             }
             Task::Clear => note(motor.id(), motor.clear_errors().map(|s| s.voltage.0.into())),
             Task::Cycle => {
                 let request = ReadMultiTurnAngle.encode();
                 let requests: Vec<_> = MotorSet::TORQUE4.map(|id| (id, request)).collect();
-                let angle = |reply| MultiTurn::decode(&reply).angle.0;
+                let angle = |reply| MultiTurnAngle::decode(&reply).angle.0;
                 bus.cycle(&requests, |id, reply| note(id, reply.map(angle))).unwrap();
             }
-            Task::Torque4 => match bus.torque4(Torque4([TorqueCommand(0); 4]), MotorSet::TORQUE4) {
-                Ok(replies) => {
-                    for (id, reply) in MotorSet::TORQUE4.zip(replies) {
-                        note(id, reply.unwrap().map(|status| status.iq.0.into()));
+            Task::SetTorque4 => {
+                match bus.set_torque4(SetTorque4([IqCommand(0); 4]), MotorSet::TORQUE4) {
+                    Ok(replies) => {
+                        for (id, reply) in MotorSet::TORQUE4.zip(replies) {
+                            note(id, reply.unwrap().map(|status| status.iq.0.into()));
+                        }
                     }
+                    Err(error) => note(motor.id(), Err(error)),
                 }
-                Err(error) => note(motor.id(), Err(error)),
-            },
+            }
             Task::Start | Task::Off => unreachable!("no readings"),
         }
     }

@@ -11,9 +11,9 @@ use motorlink_conformance::wire::{Bus, Virtual};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    Circle, ClearErrors, Code, Command, DEFAULT_TIMEOUT, Dialect, Error, Host, MOTOR_BASE,
-    MotionStatus, MotorId, MotorSet, MultiTurn, Off, Output, Payload, ReadCircleAngle,
-    ReadMultiTurnAngle, Refused, Status1, TORQUE4_ID, Torque4,
+    ClearErrors, Code, Command, DEFAULT_TIMEOUT, Dialect, Error, Host, MOTOR_BASE, MotionStatus,
+    MotorId, MotorSet, MultiTurnAngle, Off, Output, Payload, ReadMultiTurnAngle,
+    ReadSingleTurnAngle, Refused, SetTorque4, SingleTurnAngle, Status, TORQUE4_ID,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -36,9 +36,9 @@ fn play(
 /// The digits of the value in a reply.
 fn digits(request: Code, reply: &[u8; 8]) -> f64 {
     match request {
-        Code::ReadMultiTurnAngle => MultiTurn::decode(reply).angle.0 as f64,
-        Code::ReadCircleAngle => Circle::decode(reply).angle.0.into(),
-        Code::ClearErrors => Status1::decode(reply).voltage.0.into(),
+        Code::ReadMultiTurnAngle => MultiTurnAngle::decode(reply).angle.0 as f64,
+        Code::ReadSingleTurnAngle => SingleTurnAngle::decode(reply).angle.0.into(),
+        Code::ClearErrors => Status::decode(reply).voltage.0.into(),
         _ => MotionStatus::decode(reply).iq.0.into(),
     }
 }
@@ -49,13 +49,13 @@ fn requests(task: Task, turn: usize) -> Vec<(MotorId, [u8; 8])> {
     let first = MotorSet::TORQUE4.take(1);
     match task {
         Task::Alternate if turn % 2 == 1 => {
-            first.map(|id| (id, ReadCircleAngle.encode())).collect()
+            first.map(|id| (id, ReadSingleTurnAngle.encode())).collect()
         }
         Task::Read | Task::Echoed | Task::Alternate => first.map(|id| (id, angle)).collect(),
         Task::Clear => first.map(|id| (id, ClearErrors.encode())).collect(),
         Task::Cycle => MotorSet::TORQUE4.map(|id| (id, angle)).collect(),
         Task::Off => first.map(|id| (id, Off.encode())).collect(),
-        Task::Torque4 | Task::Start => Vec::new(),
+        Task::SetTorque4 | Task::Start => Vec::new(),
     }
 }
 
@@ -89,9 +89,9 @@ fn results(bus: &mut dyn Bus, task: Task) -> Result<Vec<Ended>, PortError> {
                     hear(bus, &mut host, until, &mut echoes)?;
                 }
             }
-            while task == Task::Torque4
+            while task == Task::SetTorque4
                 && let Err(Refused::Quarantined { until, .. }) =
-                    host.torque4(bus.now(), Torque4::default(), MotorSet::TORQUE4)
+                    host.set_torque4(bus.now(), SetTorque4::default(), MotorSet::TORQUE4)
             {
                 hear(bus, &mut host, until, &mut echoes)?;
             }
@@ -109,7 +109,7 @@ fn results(bus: &mut dyn Bus, task: Task) -> Result<Vec<Ended>, PortError> {
                     Output::Done { id, result: Err(Error::Quarantined) } => again.insert(id),
                     Output::Done { id, result } => {
                         let code =
-                            requests.first().map_or(Code::Torque, |(_, data)| data[0].into());
+                            requests.first().map_or(Code::SetTorque, |(_, data)| data[0].into());
                         results.push((id, turn, result.map(|reply| digits(code, &reply))));
                     }
                 }
@@ -286,10 +286,10 @@ impl Simple<'_> {
         let mut requests = requests(self.task, turn);
         let mut echoes: Vec<CanFrame> =
             requests.iter().map(|&(id, data)| CanFrame::new(id.can_id(), data)).collect();
-        if self.task == Task::Torque4 {
-            requests = MotorSet::TORQUE4.map(|id| (id, Torque4::default().encode())).collect();
-            requests.iter_mut().for_each(|(_, data)| data[0] = Code::Torque.into());
-            echoes = vec![CanFrame::new(TORQUE4_ID, Torque4::default().encode())];
+        if self.task == Task::SetTorque4 {
+            requests = MotorSet::TORQUE4.map(|id| (id, SetTorque4::default().encode())).collect();
+            requests.iter_mut().for_each(|(_, data)| data[0] = Code::SetTorque.into());
+            echoes = vec![CanFrame::new(TORQUE4_ID, SetTorque4::default().encode())];
         }
         for frame in &echoes {
             self.bus.send(frame)?;
@@ -348,8 +348,7 @@ impl Simple<'_> {
             _ if self.has(Fault::TakesAnyCode) || frame.is_remote() => true,
             asked if asked == clear && self.has(Fault::InsistsOn9B) => code == clear,
             asked if asked == clear => {
-                code == u8::from(Code::ReadStatus1)
-                    || code == clear && !self.has(Fault::InsistsOn9A)
+                code == u8::from(Code::ReadStatus) || code == clear && !self.has(Fault::InsistsOn9A)
             }
             asked => code == asked,
         };

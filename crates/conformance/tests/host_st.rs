@@ -9,7 +9,7 @@ use motorlink_conformance::host::st::{DIGIT, Scenario, scenarios};
 use motorlink_conformance::host::{READINGS, Reading, Said, Task};
 use motorlink_conformance::wire::{Line, Virtual};
 use motorlink_conformance::{Outcome, Verdict};
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, Config, Error, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Master,
     Output, Parse, Profile, RegisterId, Request, TIMEOUT, checksum,
 };

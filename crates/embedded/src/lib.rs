@@ -12,7 +12,7 @@
 //!
 //! ```
 //! use motorlink_embedded::st::SlavePort;
-//! use motorlink_proto::stmcp::{Drive, Motor, Profile, Slave};
+//! use motorlink_proto::st::{Drive, Motor, Profile, Slave};
 //! use motorlink_proto::time::Instant;
 //!
 //! fn serve<U>(uart: U, drive: &mut impl Drive, now: impl Fn() -> Instant, sleep: impl Fn(Option<Instant>))

@@ -5,7 +5,7 @@
 //! longest frame at once.
 
 use embedded_io::{Read, ReadReady, Write};
-use motorlink_proto::stmcp::{Drive, Error, Master, Output, Slave};
+use motorlink_proto::st::{Drive, Error, Master, Output, Slave};
 use motorlink_proto::time::Instant;
 
 /// Bytes that are read at once.

@@ -158,8 +158,8 @@ impl Bench {
 #[test]
 fn a_host_behind_one_controller_commands_drives_behind_another() {
     let mut bench = Bench::new();
-    bench.ask(1, &Speed { speed: CentiDps(36_000) });
-    bench.ask(2, &ReadStatus1);
+    bench.ask(1, &SetSpeed { speed: CentiDps(36_000) });
+    bench.ask(2, &ReadStatus);
     let results = bench.run();
     assert_eq!(results.len(), 2);
     assert!(results.iter().all(|(_, result)| result.is_ok()), "{results:?}");
@@ -171,13 +171,13 @@ fn a_host_behind_one_controller_commands_drives_behind_another() {
 fn motors_that_were_not_asked_before_are_trusted_after_a_silence() {
     let mut bench = Bench::opened();
     for number in [1, 2] {
-        bench.ask(number, &Speed { speed: CentiDps(36_000) });
+        bench.ask(number, &SetSpeed { speed: CentiDps(36_000) });
     }
     assert!(bench.run().into_iter().all(|(_, result)| result == Err(Error::Quarantined)));
     assert!(bench.drives.drives().iter().all(|drive| drive.mode() == Mode::Off));
     bench.now += DEFAULT_GUARD;
     for number in [1, 2] {
-        bench.ask(number, &Speed { speed: CentiDps(36_000) });
+        bench.ask(number, &SetSpeed { speed: CentiDps(36_000) });
     }
     assert!(bench.run().into_iter().all(|(_, result)| result.is_ok()));
 }
@@ -185,9 +185,9 @@ fn motors_that_were_not_asked_before_are_trusted_after_a_silence() {
 #[test]
 fn all_drives_answer_the_torque_frame_through_one_mailbox() {
     let mut bench = Bench::new();
-    let torque = Torque4::default();
+    let torque = SetTorque4::default();
     let both: MotorSet = [id(1), id(2)].into_iter().collect();
-    bench.host.host_mut().torque4(bench.now, torque, both).expect("IDs 1 and 2 are in reach");
+    bench.host.host_mut().set_torque4(bench.now, torque, both).expect("IDs 1 and 2 are in reach");
     let answered: Vec<_> =
         bench.run().into_iter().map(|(id, result)| (id, result.is_ok())).collect();
     assert_eq!(answered, [(id(1), true), (id(2), true)]);
@@ -197,9 +197,9 @@ fn all_drives_answer_the_torque_frame_through_one_mailbox() {
 fn a_frame_that_is_displaced_is_sent_later() {
     let mut bench = Bench::new();
     bench.host.can_mut().stuck = true;
-    bench.ask(2, &ReadStatus1);
+    bench.ask(2, &ReadStatus);
     bench.host.poll(bench.now).expect("in the mailbox");
-    bench.ask(1, &ReadStatus1);
+    bench.ask(1, &ReadStatus);
     bench.host.poll(bench.now).expect("takes the mailbox");
     bench.host.can_mut().stuck = false;
     assert!(bench.run().into_iter().all(|(_, result)| result.is_ok()));
@@ -209,8 +209,8 @@ fn a_frame_that_is_displaced_is_sent_later() {
 fn an_exchange_that_the_bus_does_not_take_times_out() {
     let mut bench = Bench::new();
     bench.host.can_mut().stuck = true;
-    bench.ask(1, &ReadStatus1);
-    bench.ask(2, &ReadStatus1);
+    bench.ask(1, &ReadStatus);
+    bench.ask(2, &ReadStatus);
     let results = bench.run();
     assert_eq!(results.len(), 2);
     assert!(results.iter().all(|(_, result)| *result == Err(Error::Timeout)));
@@ -223,7 +223,7 @@ fn drives_whose_replies_are_not_taken_read_no_further_frames() {
     let mut bench = Bench::new();
     bench.drives.can_mut().stuck = true;
     let ask = |bench: &mut Bench, number: u8| {
-        let frame = to_can(&CanFrame::new(id(number).can_id(), ReadStatus1.encode()));
+        let frame = to_can(&CanFrame::new(id(number).can_id(), ReadStatus.encode()));
         bench.drives.can_mut().received.borrow_mut().extend(frame);
         bench.drives.poll(bench.now, &mut bench.motors).expect("no error")
     };
@@ -247,7 +247,7 @@ fn the_shutdown_time_runs_on_a_bus_that_fails() {
     for drive in bench.drives.drives_mut() {
         drive.config.shutdown = Some(Duration::from_millis(200));
     }
-    bench.ask(1, &Speed { speed: CentiDps(100) });
+    bench.ask(1, &SetSpeed { speed: CentiDps(100) });
     bench.run();
     let Ok(Some(deadline)) = bench.drives.poll(bench.now, &mut bench.motors) else {
         panic!("the motor turns");
@@ -256,7 +256,7 @@ fn the_shutdown_time_runs_on_a_bus_that_fails() {
     assert_eq!(bench.drives.poll(deadline, &mut bench.motors), Err(ErrorKind::Bit));
     assert_eq!(bench.drives.drives()[0].mode(), Mode::Off);
     bench.drives.can_mut().failing = None;
-    bench.ask(1, &ReadStatus1);
+    bench.ask(1, &ReadStatus);
     assert!(bench.run().iter().all(|(_, result)| result.is_ok()), "the port goes on");
 }
 

@@ -4,7 +4,7 @@ mod uart;
 
 use embedded_io::{ErrorKind, Write};
 use motorlink_embedded::st::{Event, MasterPort, SlavePort};
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Config, Error, ErrorCode, Failure, Master, Profile, Ramp, RegisterId, Request, Slave,
 };
 use motorlink_proto::time::{Duration, Instant};

@@ -132,7 +132,7 @@ int main(int argc, char **argv) {
          (unsigned)status.errors);
 
   turning = 1;
-  exchange(fd, 1, motorlink_rmd_position_limited(9000, 360));
+  exchange(fd, 1, motorlink_rmd_set_position_limited(9000, 360));
   give_up = now_us() + 20000000U;
   do {
     motorlink_rmd_data reply = exchange(fd, 1, motorlink_rmd_read_multi_turn_angle());
@@ -143,7 +143,7 @@ int main(int argc, char **argv) {
   for (motor = 2; motor <= 4; motor++) {
     exchange(fd, motor, motorlink_rmd_read_status());
   }
-  check(fd, motorlink_rmd_host_torque4(&host, now_us(), torques, 0x0F));
+  check(fd, motorlink_rmd_host_set_torque4(&host, now_us(), torques, 0x0F));
   for (left = 4; left > 0; left--) {
     motorlink_rmd_action action = next_done(fd);
     motorlink_rmd_motion_status motion = motorlink_rmd_decode_motion_status(action.reply);
@@ -154,7 +154,7 @@ int main(int argc, char **argv) {
   limits.speed_dps = MOTORLINK_RMD_NO_LIMIT;
   limits.angle_centidegrees = MOTORLINK_RMD_NO_LIMIT;
   check(fd, motorlink_rmd_host_set_limits(&host, 2, &limits));
-  if (motorlink_rmd_host_request(&host, now_us(), 2, motorlink_rmd_torque(101)) !=
+  if (motorlink_rmd_host_request(&host, now_us(), 2, motorlink_rmd_set_torque(101)) !=
       MOTORLINK_ERROR_LIMIT) {
     fprintf(stderr, "the limit did not hold\n");
     leave(fd);

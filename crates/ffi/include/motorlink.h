@@ -320,29 +320,29 @@ enum motorlink_st_feature {
 
 /** Commands (chapter 2): the first byte of request and reply. */
 enum motorlink_rmd_code {
-  MOTORLINK_RMD_CODE_READ_GAINS              = 0x30, /**< reads the gains in RAM */
-  MOTORLINK_RMD_CODE_WRITE_GAINS             = 0x31, /**< sets the gains until power-off */
-  MOTORLINK_RMD_CODE_WRITE_GAINS_TO_ROM      = 0x32, /**< sets the gains for good; wears the ROM */
-  MOTORLINK_RMD_CODE_READ_ACCELERATION       = 0x33, /**< reads the acceleration limit */
-  MOTORLINK_RMD_CODE_WRITE_ACCELERATION      = 0x34, /**< sets the acceleration limit until power-off */
-  MOTORLINK_RMD_CODE_READ_ENCODER            = 0x90, /**< reads encoder position, original position and offset */
-  MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET    = 0x91, /**< sets the encoder offset, at once and for good; wears the ROM */
-  MOTORLINK_RMD_CODE_WRITE_ZERO_TO_ROM       = 0x19, /**< makes the current position the zero from the next power-on on; wears the ROM */
-  MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE   = 0x92, /**< reads the angle over all turns */
-  MOTORLINK_RMD_CODE_READ_CIRCLE_ANGLE       = 0x94, /**< reads the angle within the turn */
-  MOTORLINK_RMD_CODE_READ_STATUS_1           = 0x9A, /**< reads temperature, voltage and error flags */
-  MOTORLINK_RMD_CODE_CLEAR_ERRORS            = 0x9B, /**< clears the error flags whose cause is gone */
-  MOTORLINK_RMD_CODE_READ_STATUS_2           = 0x9C, /**< reads temperature, torque current, speed and encoder position */
-  MOTORLINK_RMD_CODE_READ_STATUS_3           = 0x9D, /**< reads the three phase currents */
-  MOTORLINK_RMD_CODE_OFF                     = 0x80, /**< switches the motor off and forgets what it was doing */
-  MOTORLINK_RMD_CODE_STOP                    = 0x81, /**< stops the motor and remembers what it was doing */
-  MOTORLINK_RMD_CODE_RUN                     = 0x88, /**< resumes what the motor was doing before the stop */
-  MOTORLINK_RMD_CODE_TORQUE                  = 0xA1, /**< holds a torque current */
-  MOTORLINK_RMD_CODE_SPEED                   = 0xA2, /**< holds a speed */
-  MOTORLINK_RMD_CODE_POSITION                = 0xA3, /**< turns to a multi-turn angle */
-  MOTORLINK_RMD_CODE_POSITION_LIMITED        = 0xA4, /**< turns to a multi-turn angle no faster than a limit */
-  MOTORLINK_RMD_CODE_CIRCLE_POSITION         = 0xA5, /**< turns to an angle within the turn, in a given direction */
-  MOTORLINK_RMD_CODE_CIRCLE_POSITION_LIMITED = 0xA6  /**< turns to an angle within the turn, in a given direction, no faster than a limit */
+  MOTORLINK_RMD_CODE_READ_PID                         = 0x30, /**< reads the gains in RAM */
+  MOTORLINK_RMD_CODE_WRITE_PID_RAM                    = 0x31, /**< sets the gains until power-off */
+  MOTORLINK_RMD_CODE_WRITE_PID_ROM                    = 0x32, /**< sets the gains for good; wears the ROM */
+  MOTORLINK_RMD_CODE_READ_ACCELERATION                = 0x33, /**< reads the acceleration limit */
+  MOTORLINK_RMD_CODE_WRITE_ACCELERATION_RAM           = 0x34, /**< sets the acceleration limit until power-off */
+  MOTORLINK_RMD_CODE_READ_ENCODER                     = 0x90, /**< reads encoder position, original position and offset */
+  MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET_ROM         = 0x91, /**< sets the encoder offset, at once and for good; wears the ROM */
+  MOTORLINK_RMD_CODE_WRITE_ZERO_ROM                   = 0x19, /**< makes the current position the zero from the next power-on on; wears the ROM */
+  MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE            = 0x92, /**< reads the angle over all turns */
+  MOTORLINK_RMD_CODE_READ_SINGLE_TURN_ANGLE           = 0x94, /**< reads the angle within the turn */
+  MOTORLINK_RMD_CODE_READ_STATUS                      = 0x9A, /**< reads temperature, voltage and error flags */
+  MOTORLINK_RMD_CODE_CLEAR_ERRORS                     = 0x9B, /**< clears the error flags whose cause is gone */
+  MOTORLINK_RMD_CODE_READ_MOTION_STATUS               = 0x9C, /**< reads temperature, torque current, speed and encoder position */
+  MOTORLINK_RMD_CODE_READ_PHASE_CURRENTS              = 0x9D, /**< reads the three phase currents */
+  MOTORLINK_RMD_CODE_OFF                              = 0x80, /**< switches the motor off and forgets what it was doing */
+  MOTORLINK_RMD_CODE_STOP                             = 0x81, /**< stops the motor and remembers what it was doing */
+  MOTORLINK_RMD_CODE_RUN                              = 0x88, /**< resumes what the motor was doing before the stop */
+  MOTORLINK_RMD_CODE_SET_TORQUE                       = 0xA1, /**< holds a torque current */
+  MOTORLINK_RMD_CODE_SET_SPEED                        = 0xA2, /**< holds a speed */
+  MOTORLINK_RMD_CODE_SET_POSITION                     = 0xA3, /**< turns to a multi-turn angle */
+  MOTORLINK_RMD_CODE_SET_POSITION_LIMITED             = 0xA4, /**< turns to a multi-turn angle no faster than a limit */
+  MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION         = 0xA5, /**< turns to an angle within the turn, in a given direction */
+  MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION_LIMITED = 0xA6  /**< turns to an angle within the turn, in a given direction, no faster than a limit */
 };
 
 /** Bits of the error state. */
@@ -992,14 +992,14 @@ typedef struct motorlink_rmd_data {
 /**
  * Gains of the three loops, without unit.
  */
-typedef struct motorlink_rmd_gains {
+typedef struct motorlink_rmd_pid {
   uint8_t position_kp;
   uint8_t position_ki;
   uint8_t speed_kp;
   uint8_t speed_ki;
   uint8_t torque_kp;
   uint8_t torque_ki;
-} motorlink_rmd_gains;
+} motorlink_rmd_pid;
 
 /**
  * What the encoder reads, in counts of its width, or of 16 bits when it is wider.
@@ -1212,7 +1212,7 @@ typedef struct motorlink_rmd_settings {
   /**
    * Gains of the three loops.
    */
-  struct motorlink_rmd_gains gains;
+  struct motorlink_rmd_pid gains;
 } motorlink_rmd_settings;
 
 /**
@@ -1686,7 +1686,7 @@ struct motorlink_bytes motorlink_st_command_name(uint8_t command);
 /**
  * Request 0x30: reads the gains in RAM.
  */
-struct motorlink_rmd_data motorlink_rmd_read_gains(void);
+struct motorlink_rmd_data motorlink_rmd_read_pid(void);
 
 /**
  * Request 0x33: reads the acceleration limit.
@@ -1701,7 +1701,7 @@ struct motorlink_rmd_data motorlink_rmd_read_encoder(void);
 /**
  * Request 0x19: makes the current position the zero from the next power-on on. Wears the ROM.
  */
-struct motorlink_rmd_data motorlink_rmd_write_zero_to_rom(void);
+struct motorlink_rmd_data motorlink_rmd_write_zero_rom(void);
 
 /**
  * Request 0x92: reads the angle over all turns.
@@ -1711,7 +1711,7 @@ struct motorlink_rmd_data motorlink_rmd_read_multi_turn_angle(void);
 /**
  * Request 0x94: reads the angle within the turn.
  */
-struct motorlink_rmd_data motorlink_rmd_read_circle_angle(void);
+struct motorlink_rmd_data motorlink_rmd_read_single_turn_angle(void);
 
 /**
  * Request 0x9A: reads temperature, voltage and errors.
@@ -1751,61 +1751,61 @@ struct motorlink_rmd_data motorlink_rmd_run(void);
 /**
  * Request 0x31: sets the gains until power-off.
  */
-struct motorlink_rmd_data motorlink_rmd_write_gains(struct motorlink_rmd_gains gains);
+struct motorlink_rmd_data motorlink_rmd_write_pid_ram(struct motorlink_rmd_pid gains);
 
 /**
  * Request 0x32: sets the gains for good. Wears the ROM.
  */
-struct motorlink_rmd_data motorlink_rmd_write_gains_to_rom(struct motorlink_rmd_gains gains);
+struct motorlink_rmd_data motorlink_rmd_write_pid_rom(struct motorlink_rmd_pid gains);
 
 /**
  * Request 0x34: sets the acceleration limit, °/s², until power-off.
  */
-struct motorlink_rmd_data motorlink_rmd_write_acceleration(int32_t acceleration_dps2);
+struct motorlink_rmd_data motorlink_rmd_write_acceleration_ram(int32_t acceleration_dps2);
 
 /**
  * Request 0x91: sets the encoder's zero point, in counts, at once and for good. Wears the ROM.
  */
-struct motorlink_rmd_data motorlink_rmd_write_encoder_offset(uint16_t offset);
+struct motorlink_rmd_data motorlink_rmd_write_encoder_offset_rom(uint16_t offset);
 
 /**
  * Request 0xA1: holds a torque current, 0.016 A a digit, -2000 to 2000.
  */
-struct motorlink_rmd_data motorlink_rmd_torque(int16_t torque_16ma);
+struct motorlink_rmd_data motorlink_rmd_set_torque(int16_t torque_16ma);
 
 /**
  * Request 0xA2: holds a speed, 0.01 °/s a digit, positive is clockwise.
  */
-struct motorlink_rmd_data motorlink_rmd_speed(int32_t speed_centidps);
+struct motorlink_rmd_data motorlink_rmd_set_speed(int32_t speed_centidps);
 
 /**
  * Request 0xA3: turns to a multi-turn angle, 0.01° a digit, positive is clockwise from zero.
  */
-struct motorlink_rmd_data motorlink_rmd_position(int32_t angle_centidegrees);
+struct motorlink_rmd_data motorlink_rmd_set_position(int32_t angle_centidegrees);
 
 /**
  * Request 0xA4: turns to a multi-turn angle, 0.01° a digit, no faster than a limit, °/s.
  */
-struct motorlink_rmd_data motorlink_rmd_position_limited(int32_t angle_centidegrees,
-                                                         uint16_t max_speed_dps);
+struct motorlink_rmd_data motorlink_rmd_set_position_limited(int32_t angle_centidegrees,
+                                                             uint16_t max_speed_dps);
 
 /**
  * Request 0xA5: turns to an angle within the turn, 0.01° a digit, 0 to 35999, in a direction of `motorlink_rmd_spin`.
  */
-struct motorlink_rmd_data motorlink_rmd_circle_position(uint8_t direction,
-                                                        uint16_t angle_centidegrees);
+struct motorlink_rmd_data motorlink_rmd_set_single_turn_position(uint8_t direction,
+                                                                 uint16_t angle_centidegrees);
 
 /**
  * Request 0xA6: as 0xA5, no faster than a limit, °/s.
  */
-struct motorlink_rmd_data motorlink_rmd_circle_position_limited(uint8_t direction,
-                                                                uint16_t angle_centidegrees,
-                                                                uint16_t max_speed_dps);
+struct motorlink_rmd_data motorlink_rmd_set_single_turn_position_limited(uint8_t direction,
+                                                                         uint16_t angle_centidegrees,
+                                                                         uint16_t max_speed_dps);
 
 /**
  * Reads the gains in the reply to 0x30, 0x31 and 0x32.
  */
-struct motorlink_rmd_gains motorlink_rmd_decode_gains(struct motorlink_rmd_data reply);
+struct motorlink_rmd_pid motorlink_rmd_decode_pid(struct motorlink_rmd_data reply);
 
 /**
  * Reads the acceleration limit in the reply to 0x33 and 0x34, °/s².
@@ -1830,7 +1830,7 @@ int64_t motorlink_rmd_decode_multi_turn_angle(struct motorlink_rmd_data reply);
 /**
  * Reads the angle within the turn in the reply to 0x94, 0.01° a digit, 0 to 35999.
  */
-uint16_t motorlink_rmd_decode_circle_angle(struct motorlink_rmd_data reply);
+uint16_t motorlink_rmd_decode_single_turn_angle(struct motorlink_rmd_data reply);
 
 /**
  * Reads temperature, voltage and errors in the reply to 0x9A and 0x9B.
@@ -1907,10 +1907,10 @@ motorlink_error motorlink_rmd_host_request(struct motorlink_rmd_host *host,
  * As `motorlink_rmd_host_request`: `BUSY` and `LIMIT` of any of the four, `QUARANTINED` of `expect`.
  * `BAD_ARGUMENT`: a bit above 3 is set.
  */
-motorlink_error motorlink_rmd_host_torque4(struct motorlink_rmd_host *host,
-                                           uint64_t now_us,
-                                           const int16_t *torques_16ma,
-                                           uint8_t expect);
+motorlink_error motorlink_rmd_host_set_torque4(struct motorlink_rmd_host *host,
+                                               uint64_t now_us,
+                                               const int16_t *torques_16ma,
+                                               uint8_t expect);
 
 /**
  * When to ask again what was last refused with `QUARANTINED`; a reply may make it sooner or later.
@@ -1936,7 +1936,7 @@ motorlink_error motorlink_rmd_host_receive(struct motorlink_rmd_host *host,
 
 /**
  * Gives up the exchange with a motor without a result, so that another request can be made. A frame
- * of `motorlink_rmd_host_torque4` that still waits and would reach the motor is given up for all.
+ * of `motorlink_rmd_host_set_torque4` that still waits and would reach the motor is given up for all.
  *
  * `BAD_ARGUMENT`: `motor` is not 1 to 32.
  */

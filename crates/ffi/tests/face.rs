@@ -429,7 +429,7 @@ fn a_host_commands_a_drive_through_an_adapter() {
         gives!(Ok, motorlink_slcan_device_receive(&mut adapter, *byte, &mut answer, &mut frame));
         assert_eq!(frame.id, MOTORLINK_NO_FRAME);
     }
-    gives!(Ok, motorlink_rmd_host_request(&mut host, 0, 3, motorlink_rmd_torque(100)));
+    gives!(Ok, motorlink_rmd_host_request(&mut host, 0, 3, motorlink_rmd_set_torque(100)));
     gives!(Ok, motorlink_rmd_host_poll(&mut host, 0, &mut action));
     gives!(Ok, motorlink_slcan_encode(&action.frame, &mut line));
     let mut reply: motorlink_can_frame = zeroed();
@@ -459,12 +459,12 @@ fn a_motor_is_asked_for_its_status_first_unless_it_is_trusted() {
     gives!(Ok, motorlink_rmd_host_init(host, size_of::<motorlink_rmd_host>()));
     gives!(Ok, motorlink_rmd_host_trust(host, !(1 << 2)));
     for (motor, code) in [(1, 0xA1), (3, 0x9A), (32, 0xA1)] {
-        gives!(Ok, motorlink_rmd_host_request(host, 0, motor, motorlink_rmd_torque(100)));
+        gives!(Ok, motorlink_rmd_host_request(host, 0, motor, motorlink_rmd_set_torque(100)));
         gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut action));
         assert_eq!((action.kind, action.frame.data[0]), (motorlink_action::Transmit, code));
     }
     gives!(Ok, motorlink_rmd_host_reopened(host, 0));
-    gives!(Ok, motorlink_rmd_host_request(host, 0, 1, motorlink_rmd_torque(100)));
+    gives!(Ok, motorlink_rmd_host_request(host, 0, 1, motorlink_rmd_set_torque(100)));
     gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut action));
     assert_eq!((action.kind, action.frame.data[0]), (motorlink_action::Transmit, 0x9A));
     // The host's own frame comes back.

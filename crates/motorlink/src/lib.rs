@@ -1,12 +1,12 @@
 //! Motor drives from a program: the clients of both protocols, and what keeps a motor safe.
 //!
-//! [`stmcp`] speaks ST's Motor Control Protocol, [`rmd`] the RMD protocol over CAN; both over ports
+//! [`st`] speaks ST's Motor Control Protocol, [`rmd`] the RMD protocol over CAN; both over ports
 //! of [`port`], which [`list`] finds. [`relay`] stands between another program and its motors.
 #![forbid(unsafe_code)]
 
 pub mod relay;
 pub mod rmd;
-pub mod stmcp;
+pub mod st;
 mod stopping;
 mod turn;
 

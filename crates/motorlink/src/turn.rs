@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use motorlink_link::port::PortError;
 
-/// How often a client that waits makes the call of [`Client::looking`](crate::stmcp::Client::looking)
+/// How often a client that waits makes the call of [`Client::looking`](crate::st::Client::looking)
 /// or [`Bus::looking`](crate::rmd::Bus::looking).
 pub const LOOK: Duration = Duration::from_millis(50);
 

@@ -5,14 +5,14 @@ mod served;
 use std::time::Duration;
 
 use allocation_counter::measure;
-use motorlink::rmd::{self, Bus, MotorId, MotorSet, Torque4};
-use motorlink::stmcp::{self, Client, RegisterId, register};
+use motorlink::rmd::{self, Bus, MotorId, MotorSet, SetTorque4};
+use motorlink::st::{self, Client, RegisterId, register};
 use served::Served;
 
 #[test]
 fn an_exchange_with_an_st_drive_allocates_nothing() {
-    let drives = Served::new("alloc-stmcp");
-    let client = Client::open(&drives.st.parse().unwrap(), stmcp::Options::default()).unwrap();
+    let drives = Served::new("alloc-st");
+    let client = Client::open(&drives.st.parse().unwrap(), st::Options::default()).unwrap();
     let motor = client.motor(1).unwrap();
     let segment = [RegisterId::STATUS, RegisterId::SPEED_MEAS, RegisterId::I_Q];
     motor.configure_segment(0, &segment).unwrap();
@@ -39,9 +39,10 @@ fn exchanges_and_cycles_on_a_bus_allocate_nothing() {
     let mut answered = 0;
     let counted = measure(|| {
         for _ in 0..100 {
-            motor.status2().unwrap();
+            motor.motion_status().unwrap();
             bus.cycle(&status, |_, reply| answered += u32::from(reply.is_ok())).unwrap();
-            for reply in bus.torque4(Torque4::default(), all).unwrap().into_iter().flatten() {
+            for reply in bus.set_torque4(SetTorque4::default(), all).unwrap().into_iter().flatten()
+            {
                 reply.unwrap();
             }
         }

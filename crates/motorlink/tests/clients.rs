@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 
 use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, FaultBytes, FdLink, PortError, SlcanLink};
-use motorlink::rmd::{self, Bus, CentiDps, Code, MotorId, OnDrop, SpeedLimit, TorqueCommand};
+use motorlink::rmd::{self, Bus, CentiDps, Code, IqCommand, MotorId, OnDrop, SpeedLimit};
 use motorlink::slcan::Bitrate;
-use motorlink::stmcp::{
+use motorlink::st::{
     self, Client, Command, Config, Failure, Limits, Line, Request, Status, register,
 };
 use motorlink::{BackOff, LinkState};
@@ -30,7 +30,7 @@ fn until(what: &str, mut reached: impl FnMut() -> bool) {
 }
 
 fn open_st(drives: &Served) -> Client {
-    Client::open(&drives.st.parse().unwrap(), stmcp::Options::default()).unwrap()
+    Client::open(&drives.st.parse().unwrap(), st::Options::default()).unwrap()
 }
 
 /// A loaded machine may hold the simulator up for longer than a motor would take.
@@ -70,7 +70,7 @@ fn a_disarmed_guard_leaves_the_motor_running() {
 fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
     let (ours, theirs) = UnixStream::pair().unwrap();
     let line = Config { timeout: Duration::from_millis(100).into(), ..Config::default() };
-    let options = stmcp::Options { line, ..stmcp::Options::default() };
+    let options = st::Options { line, ..st::Options::default() };
     let client = Client::over("pair", Box::new(Fresh(FdLink::new(ours, "pair").unwrap())), options);
     let mut start = [0; 4];
     let drive = std::thread::spawn(move || {
@@ -91,7 +91,7 @@ fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
 fn a_motor_whose_start_was_not_answered_is_stopped_too() {
     let (ours, theirs) = UnixStream::pair().unwrap();
     let line = Config { timeout: Duration::from_millis(50).into(), ..Config::default() };
-    let options = stmcp::Options { line, ..stmcp::Options::default() };
+    let options = st::Options { line, ..st::Options::default() };
     let client = Client::over("pair", Box::new(Fresh(FdLink::new(ours, "pair").unwrap())), options);
     assert!(client.motor(3).unwrap().start().is_err());
     assert!(client.exchange(0, &Request::Execute(Command::StartMotor), |_| Some(())).is_err());
@@ -113,7 +113,7 @@ fn a_verified_write_comes_through_a_line_that_loses_bytes() {
         quiet: Duration::from_millis(5).into(),
         ..Config::default()
     };
-    let options = stmcp::Options { line, ..stmcp::Options::default() };
+    let options = st::Options { line, ..st::Options::default() };
     let faults: Faults = "drop=2e-2,seed=1".parse().unwrap();
     let wrap = move |link| Box::new(FaultBytes::new(link, &faults)) as Box<dyn ByteLink>;
     motorlink_testbench::register();
@@ -124,7 +124,7 @@ fn a_verified_write_comes_through_a_line_that_loses_bytes() {
         .collect();
     assert!(attempts.contains(&1) && attempts.iter().any(|n| *n > 1), "{attempts:?}");
     let acts = motor.write_verified(register::RAMP_FINAL_SPEED, 600, 3).unwrap_err();
-    assert!(matches!(acts, stmcp::Error::NotVerifiable { .. }), "{acts}");
+    assert!(matches!(acts, st::Error::NotVerifiable { .. }), "{acts}");
 }
 
 /// A bus whose motors hear and are not heard.
@@ -148,7 +148,7 @@ fn a_motor_that_does_not_answer_stays_one_that_moves() {
     let options = rmd::Options { timeout: Duration::from_millis(5), ..rmd::Options::default() };
     let bus = Bus::over("deaf", Box::new(Fresh(Deaf(Arc::clone(&sent)))), options);
     let motor = bus.motor(5).unwrap();
-    assert!(motor.speed(CentiDps(100)).is_err());
+    assert!(motor.set_speed(CentiDps(100)).is_err());
     assert!(motor.off().is_err());
     assert!(bus.moving().map(MotorId::number).eq([5]));
     drop(bus.guard());
@@ -160,7 +160,7 @@ fn a_motor_that_does_not_answer_stays_one_that_moves() {
 fn a_drives_name_does_not_command_a_terminal() {
     let (ours, theirs) = UnixStream::pair().unwrap();
     let link = Fresh(FdLink::new(ours, "pair").unwrap());
-    let client = Client::over("pair", Box::new(link), stmcp::Options::default());
+    let client = Client::over("pair", Box::new(link), st::Options::default());
     let drive = std::thread::spawn(move || {
         for _ in 0..2 {
             (&theirs).read_exact(&mut [0; 3]).unwrap();
@@ -200,7 +200,7 @@ fn ends<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
 fn a_port_that_never_falls_silent_holds_nobody_up() {
     for noise in [&b"x"[..], b"z\r", b"\x07", b"t1418A100000000000000\r", b"\xF0\x00\xF0"] {
         let line = Config { timeout: Duration::from_millis(50).into(), ..Config::default() };
-        let options = stmcp::Options { line, ..stmcp::Options::default() };
+        let options = st::Options { line, ..st::Options::default() };
         let client = Client::over("flood", Box::new(Flood(noise)), options);
         ends(move || [client.info().is_ok(), client.info().is_ok()]);
         let Ok(adapter) = ends(|| SlcanLink::open(Flood(noise), "flood", Bitrate::DEFAULT)) else {
@@ -216,16 +216,16 @@ fn a_port_that_never_falls_silent_holds_nobody_up() {
 fn a_guard_follows_the_drives_current_motor() {
     let drives = Served::new("current");
     let client = open_st(&drives);
-    let refused = client.exchange(2, &Request::GetRegister(stmcp::RegisterId(0xFF)), |_| Some(()));
+    let refused = client.exchange(2, &Request::GetRegister(st::RegisterId(0xFF)), |_| Some(()));
     assert!(refused.is_err_and(|error| error.is_refusal()));
     client.exchange(0, &Request::Execute(Command::StartMotor), |_| Some(())).unwrap();
     drop(client.guard());
     until("motor 2 rests", || client.motor(2).unwrap().status().unwrap() == Status::Idle);
     assert!(matches!(
         client.exchange(8, &Request::BoardInfo, |_| Some(())),
-        Err(stmcp::Error::NoSuchMotor(8))
+        Err(st::Error::NoSuchMotor(8))
     ));
-    assert!(matches!(client.raw(9, 0x06, &[]), Err(stmcp::Error::NoSuchMotor(9))));
+    assert!(matches!(client.raw(9, 0x06, &[]), Err(st::Error::NoSuchMotor(9))));
 }
 
 #[test]
@@ -243,7 +243,7 @@ fn a_guard_waits_for_a_port_that_comes_back() {
             Ok(Box::new(FdLink::new(ours, "pair")?) as Box<dyn ByteLink>)
         }
     };
-    let client = Client::open_with("pair", Box::new(open), stmcp::Options::default()).unwrap();
+    let client = Client::open_with("pair", Box::new(open), st::Options::default()).unwrap();
     let drive = std::thread::spawn(move || {
         let mut start = [0; 4];
         (&theirs).read_exact(&mut start).unwrap();
@@ -257,7 +257,7 @@ fn a_guard_waits_for_a_port_that_comes_back() {
 
 /// A drive that acknowledges whatever it gets, and knows its name.
 fn answer_everything(stream: UnixStream) {
-    let mut slave = stmcp::Slave::new(stmcp::Profile::Spec, stmcp::Motor::FIRST);
+    let mut slave = st::Slave::new(st::Profile::Spec, st::Motor::FIRST);
     let mut drive = motorlink_sim::st::StDrive::demo(motorlink::time::Instant(0));
     let mut byte = [0];
     while (&stream).read_exact(&mut byte).is_ok() {
@@ -357,7 +357,7 @@ fn a_copy_of_a_reply_is_not_taken_for_the_next_one_however_soon_that_is_asked() 
 
 #[test]
 fn a_copy_of_a_reply_that_comes_in_a_pause_is_not_the_answer_to_the_next_question() {
-    let mut options = stmcp::Options::default();
+    let mut options = st::Options::default();
     options.line.timeout = Duration::from_millis(20).into();
     options.line.quiet = Duration::from_millis(5).into();
     let client = Client::over("twice", Twice::<Vec<u8>>::new(), options);
@@ -413,20 +413,20 @@ fn a_guard_switches_off_what_a_bus_was_used_to_move() {
     let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
     {
         let _guard = bus.guard().with(OnDrop::Stop);
-        bus.motor(1).unwrap().speed(CentiDps(36_000)).unwrap();
-        bus.motor(2).unwrap().torque(TorqueCommand(50)).unwrap();
+        bus.motor(1).unwrap().set_speed(CentiDps(36_000)).unwrap();
+        bus.motor(2).unwrap().set_torque(IqCommand(50)).unwrap();
         bus.motor(2).unwrap().off().unwrap();
         assert!(bus.moving().map(MotorId::number).eq([1]));
     }
     assert!(bus.moving().is_empty());
-    until("motor 1 stands", || bus.motor(1).unwrap().status2().unwrap().speed.0 == 0);
+    until("motor 1 stands", || bus.motor(1).unwrap().motion_status().unwrap().speed.0 == 0);
 }
 
 #[test]
 fn a_guard_tells_what_it_did_to_each_motor() {
     let drives = Served::new("guard-told");
     let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
-    bus.motor(3).unwrap().torque(TorqueCommand(50)).unwrap();
+    bus.motor(3).unwrap().set_torque(IqCommand(50)).unwrap();
     let stopped = bus.guard().stop_now();
     assert!(matches!(&stopped[..], [one] if one.id.number() == 3 && one.result.is_ok()));
     assert!(bus.guard().stop_now().is_empty());
@@ -436,12 +436,11 @@ fn a_guard_tells_what_it_did_to_each_motor() {
 fn limits_hold_for_typed_and_raw_requests() {
     let drives = Served::new("limits");
     let limits = Limits { speed_rpm: Some(1000), current_s16a: Some(2000) };
-    let options = stmcp::Options { limits, ..stmcp::Options::default() };
+    let options = st::Options { limits, ..st::Options::default() };
     let client = Client::open(&drives.st.parse().unwrap(), options).unwrap();
     let motor = client.motor(1).unwrap();
     motor.ramp(1000, 0).unwrap();
-    let refused =
-        |result: Result<(), stmcp::Error>| matches!(result, Err(stmcp::Error::Limit { .. }));
+    let refused = |result: Result<(), st::Error>| matches!(result, Err(st::Error::Limit { .. }));
     assert!(refused(motor.ramp(-1001, 0)));
     assert!(refused(motor.write(register::TORQUE_REF, 2001)));
     assert!(refused(client.raw(1, 0x07, &[0xE9, 3, 0, 0, 0, 0]).map(drop)));
@@ -449,22 +448,25 @@ fn limits_hold_for_typed_and_raw_requests() {
     let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
     let id = MotorId::new(1).unwrap();
     bus.set_limits(id, rmd::Limits { speed: Some(SpeedLimit(100)), ..rmd::Limits::default() });
-    assert!(matches!(bus.motor(1).unwrap().speed(CentiDps(10_001)), Err(rmd::Error::Limit { .. })));
+    assert!(matches!(
+        bus.motor(1).unwrap().set_speed(CentiDps(10_001)),
+        Err(rmd::Error::Limit { .. })
+    ));
     assert!(matches!(bus.raw(id, [0xA2, 0, 0, 0, 0, 0, 0, 1]), Err(rmd::Error::Limit { .. })));
-    bus.motor(1).unwrap().speed(CentiDps(10_000)).unwrap();
+    bus.motor(1).unwrap().set_speed(CentiDps(10_000)).unwrap();
     assert!(matches!(bus.motor(33), Err(rmd::Error::NoSuchMotor(33))));
 }
 
 #[test]
 fn a_typed_write_has_the_size_that_the_profile_wants() {
     motorlink_testbench::register();
-    for profile in [stmcp::Profile::Spec, stmcp::Profile::Mcsdk54] {
+    for profile in [st::Profile::Spec, st::Profile::Mcsdk54] {
         let name = "sim:".to_owned();
         let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
         let config = folder.join(format!("{}-{}.toml", profile.name(), std::process::id()));
         std::fs::write(&config, format!("profile = \"{}\"", profile.name())).unwrap();
         let port = (name + config.to_str().unwrap()).parse().unwrap();
-        let options = stmcp::Options { profile, ..stmcp::Options::default() };
+        let options = st::Options { profile, ..st::Options::default() };
         let client = Client::open(&port, options).unwrap();
         let motor = client.motor(1).unwrap();
         motor.write(register::OBSERVER_C1, -1234).unwrap();
@@ -476,7 +478,7 @@ fn a_typed_write_has_the_size_that_the_profile_wants() {
 fn a_port_that_goes_away_is_told_and_opened_again() {
     let drives = Served::new("away");
     let back_off = BackOff { first: Duration::from_millis(10), cap: Duration::from_millis(50) };
-    let options = stmcp::Options { back_off, ..stmcp::Options::default() };
+    let options = st::Options { back_off, ..st::Options::default() };
     let client = Client::open(&drives.st.parse().unwrap(), options).unwrap();
     let motor = client.motor(1).unwrap();
     motor.status().unwrap();
@@ -504,7 +506,7 @@ fn the_state_of_a_link_can_be_seen_while_it_is_being_opened() {
             Err(PortError::Closed { port: "pair".to_owned() })
         }
     };
-    let client = Client::open_with("pair", Box::new(open), stmcp::Options::default()).unwrap();
+    let client = Client::open_with("pair", Box::new(open), st::Options::default()).unwrap();
     assert_eq!(client.link_state(), LinkState::Open);
     drop(theirs);
     assert!(client.info().is_err());
@@ -519,22 +521,19 @@ fn the_state_of_a_link_can_be_seen_while_it_is_being_opened() {
 #[test]
 fn a_link_that_was_handed_in_is_not_opened_again() {
     let (ours, theirs) = UnixStream::pair().unwrap();
-    let client = Client::over(
-        "pair",
-        Box::new(FdLink::new(ours, "pair").unwrap()),
-        stmcp::Options::default(),
-    );
+    let client =
+        Client::over("pair", Box::new(FdLink::new(ours, "pair").unwrap()), st::Options::default());
     drop(theirs);
     for _ in 0..2 {
         let closed = client.info().unwrap_err();
-        assert!(matches!(closed, stmcp::Error::Port(PortError::Closed { .. })), "{closed}");
+        assert!(matches!(closed, st::Error::Port(PortError::Closed { .. })), "{closed}");
     }
 }
 
 #[test]
 fn a_silent_drive_is_a_failure_and_no_refusal() {
     let line = Config { timeout: Duration::from_millis(20).into(), ..Config::default() };
-    let options = stmcp::Options { line, ..stmcp::Options::default() };
+    let options = st::Options { line, ..st::Options::default() };
     let pair = || {
         let (ours, theirs) = UnixStream::pair().unwrap();
         (FdLink::new(ours, "pair").unwrap(), theirs)
@@ -542,19 +541,16 @@ fn a_silent_drive_is_a_failure_and_no_refusal() {
     let (link, _theirs) = pair();
     let client = Client::over("pair", Box::new(Fresh(link)), options);
     let silent = client.info().unwrap_err();
-    assert!(matches!(silent, stmcp::Error::Failed { failure: Failure::Timeout, .. }), "{silent}");
+    assert!(matches!(silent, st::Error::Failed { failure: Failure::Timeout, .. }), "{silent}");
     let lost = client.info().unwrap_err();
-    assert!(matches!(lost, stmcp::Error::Failed { failure: Failure::Lost, .. }), "{lost}");
+    assert!(matches!(lost, st::Error::Failed { failure: Failure::Lost, .. }), "{lost}");
 
     // One that never answered has not been lost.
     let (link, _theirs) = pair();
     let client = Client::over("pair", Box::new(link), options);
     for _ in 0..2 {
         let silent = client.info().unwrap_err();
-        assert!(
-            matches!(silent, stmcp::Error::Failed { failure: Failure::Timeout, .. }),
-            "{silent}"
-        );
+        assert!(matches!(silent, st::Error::Failed { failure: Failure::Timeout, .. }), "{silent}");
     }
 }
 
@@ -563,10 +559,10 @@ fn a_motor_that_is_not_there_is_told_with_what_it_was_asked() {
     let drives = Served::new("silent-rmd");
     let options = rmd::Options { timeout: Duration::from_millis(30), ..rmd::Options::default() };
     let bus = Bus::open(&drives.rmd.parse().unwrap(), options).unwrap();
-    let error = bus.motor(9).unwrap().status1().unwrap_err();
-    assert!(matches!(error, rmd::Error::Timeout { code: Code::ReadStatus1, .. }), "{error}");
+    let error = bus.motor(9).unwrap().status().unwrap_err();
+    assert!(matches!(error, rmd::Error::Timeout { code: Code::ReadStatus, .. }), "{error}");
     // The motor is in quarantine now; the next request waits for its end.
-    assert!(matches!(bus.motor(9).unwrap().status1(), Err(rmd::Error::Timeout { .. })));
+    assert!(matches!(bus.motor(9).unwrap().status(), Err(rmd::Error::Timeout { .. })));
 }
 
 #[test]

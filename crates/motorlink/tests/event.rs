@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use motorlink::port::{EventLine, FdLink, PortError, PortName};
 use motorlink::rmd::{self, Code, EventBus, MotorId, SpeedLimit};
-use motorlink::stmcp::{
+use motorlink::st::{
     self, Command, Config, EventClient, LimitError, Limits, Progress, RegisterId, Request,
 };
 use motorlink::{BackOff, LinkState};
@@ -27,7 +27,7 @@ fn wait(descriptor: Option<BorrowedFd<'_>>, time: Option<Duration>) {
     poll(&mut fds, Some(&time)).unwrap();
 }
 
-fn finish(client: &mut EventClient) -> Result<Vec<u8>, stmcp::Error> {
+fn finish(client: &mut EventClient) -> Result<Vec<u8>, st::Error> {
     loop {
         match client.advance(|payload| Some(payload.to_vec())) {
             Progress::Done(result) => return result,
@@ -36,7 +36,7 @@ fn finish(client: &mut EventClient) -> Result<Vec<u8>, stmcp::Error> {
     }
 }
 
-fn exchange(client: &mut EventClient, request: &Request<'_>) -> Result<Vec<u8>, stmcp::Error> {
+fn exchange(client: &mut EventClient, request: &Request<'_>) -> Result<Vec<u8>, st::Error> {
     client.begin(1, request)?;
     finish(client)
 }
@@ -53,7 +53,7 @@ fn exchanges_end_on_a_pty_and_inside_the_process() {
     motorlink_testbench::register();
     let drives = Served::new("event-st");
     for port in [drives.st.as_str(), "sim:"] {
-        let mut client = EventClient::open(&name(port), stmcp::Options::default()).unwrap();
+        let mut client = EventClient::open(&name(port), st::Options::default()).unwrap();
         let value = [0x34, 0x12];
         let write = Request::SetRegister { register: RegisterId::SPEED_KP, value: &value };
         exchange(&mut client, &write).unwrap();
@@ -66,8 +66,8 @@ fn exchanges_end_on_a_pty_and_inside_the_process() {
 /// A link whose other end the test holds, and gives anew at each opening.
 fn over_pairs(
     mut ends: VecDeque<UnixStream>,
-    options: stmcp::Options,
-) -> Result<EventClient, stmcp::Error> {
+    options: st::Options,
+) -> Result<EventClient, st::Error> {
     let open = move || match ends.pop_front() {
         Some(end) => {
             Ok(Box::new(Fresh(FdLink::new(end, "pair").expect("a link"))) as Box<dyn EventLine>)
@@ -81,12 +81,12 @@ fn over_pairs(
 fn a_limit_holds_before_a_byte_leaves() {
     let (ours, mut theirs) = UnixStream::pair().unwrap();
     let limits = Limits { speed_rpm: Some(1000), ..Limits::default() };
-    let options = stmcp::Options { limits, ..stmcp::Options::default() };
+    let options = st::Options { limits, ..st::Options::default() };
     let mut client = over_pairs([ours].into(), options).unwrap();
-    let ramp = Request::Ramp(stmcp::Ramp { speed_rpm: 1001, duration_ms: 0 });
+    let ramp = Request::Ramp(st::Ramp { speed_rpm: 1001, duration_ms: 0 });
     let refused = exchange(&mut client, &ramp).unwrap_err();
     assert!(
-        matches!(refused, stmcp::Error::Limit { why: LimitError::Exceeded { .. }, .. }),
+        matches!(refused, st::Error::Limit { why: LimitError::Exceeded { .. }, .. }),
         "{refused}"
     );
     let raw = client.begin_raw(1, 0x07, &[0xE9, 0x03, 0, 0, 0, 0]).unwrap_err();
@@ -99,7 +99,7 @@ fn a_limit_holds_before_a_byte_leaves() {
 fn the_reply_to_an_abandoned_exchange_is_not_taken_for_the_next_ones() {
     let (ours, theirs) = UnixStream::pair().unwrap();
     let line = Config { quiet: Duration::from_millis(20).into(), ..Config::default() };
-    let options = stmcp::Options { line, ..stmcp::Options::default() };
+    let options = st::Options { line, ..st::Options::default() };
     let mut client = over_pairs([ours].into(), options).unwrap();
     let drive = std::thread::spawn(move || {
         let mut request = [0; 4];
@@ -126,14 +126,14 @@ fn a_port_that_fails_ends_the_exchange_and_comes_back_behind_the_back_off() {
     let (first, theirs) = UnixStream::pair().unwrap();
     let hour = Duration::from_secs(3600);
     let back_off = BackOff { first: hour, cap: hour };
-    let options = stmcp::Options { back_off, ..stmcp::Options::default() };
+    let options = st::Options { back_off, ..st::Options::default() };
     let (second, other) = UnixStream::pair().unwrap();
     let mut client = over_pairs([first, second].into(), options).unwrap();
     client.begin(1, &SPEED_KP).unwrap();
     assert!(matches!(client.advance(|_| Some(())), Progress::Wait(Some(_))));
     drop(theirs);
     let lost = finish(&mut client).unwrap_err();
-    assert!(matches!(lost, stmcp::Error::Port(PortError::Closed { .. })), "{lost}");
+    assert!(matches!(lost, st::Error::Port(PortError::Closed { .. })), "{lost}");
     assert!(client.descriptor().is_none());
     assert!(matches!(client.advance(|_| Some(())), Progress::Wait(None)));
 
@@ -141,7 +141,7 @@ fn a_port_that_fails_ends_the_exchange_and_comes_back_behind_the_back_off() {
     assert_eq!(client.link_state(), LinkState::Open);
     drop(other);
     // The port that went away while nothing was asked is noticed as well.
-    assert!(matches!(client.advance(|_| Some(())), Progress::Done(Err(stmcp::Error::Port(_)))));
+    assert!(matches!(client.advance(|_| Some(())), Progress::Done(Err(st::Error::Port(_)))));
     let away = client.reopen().unwrap_err().to_string();
     assert!(matches!(client.link_state(), LinkState::Closed { retry_in } if !retry_in.is_zero()));
     let begun = Instant::now();
@@ -152,7 +152,7 @@ fn a_port_that_fails_ends_the_exchange_and_comes_back_behind_the_back_off() {
 #[test]
 fn what_was_started_in_steps_is_stopped_by_the_client_that_waits() {
     let drives = Served::new("event-guard");
-    let mut client = EventClient::open(&name(&drives.st), stmcp::Options::default()).unwrap();
+    let mut client = EventClient::open(&name(&drives.st), st::Options::default()).unwrap();
     exchange(&mut client, &Request::Execute(Command::StartMotor)).unwrap();
     client.begin(2, &Request::Execute(Command::StartMotor)).unwrap();
     assert!(matches!(client.advance(|_| Some(())), Progress::Wait(Some(_))));

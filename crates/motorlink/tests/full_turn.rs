@@ -1,14 +1,14 @@
 //! Moves within the turn, to motors that are near their target.
 
 use motorlink::rmd::{
-    self, Bus, CentiDegrees, CircleAngle, Error, FullTurn, Limits, SpeedLimit, Spin,
+    self, Bus, CentiDegrees, Error, FullTurn, Limits, SpeedLimit, SpinDirection, TurnCentiDegrees,
 };
 use motorlink::time::Duration;
 use motorlink_link::fault::Faults;
 use motorlink_testbench::{BenchConfig, VirtualBench};
 
-const CW: Spin = Spin::Clockwise;
-const CCW: Spin = Spin::Counterclockwise;
+const CW: SpinDirection = SpinDirection::Clockwise;
+const CCW: SpinDirection = SpinDirection::Counterclockwise;
 
 /// A motor that stands, and its bus.
 fn standing_at(degrees: f64, encoder_bits: u8) -> (VirtualBench, Bus) {
@@ -20,9 +20,17 @@ fn standing_at(degrees: f64, encoder_bits: u8) -> (VirtualBench, Bus) {
     (bench, bus)
 }
 
-fn turn(bus: &Bus, degrees: f64, direction: Spin, full_turn: FullTurn) -> Result<(), Error> {
-    let target = CircleAngle::from_degrees(degrees);
-    bus.motor(1).unwrap().turn_to(target, direction, Some(SpeedLimit(2_000)), full_turn).map(drop)
+fn turn(
+    bus: &Bus,
+    degrees: f64,
+    direction: SpinDirection,
+    full_turn: FullTurn,
+) -> Result<(), Error> {
+    let target = TurnCentiDegrees::from_degrees(degrees);
+    bus.motor(1)
+        .unwrap()
+        .set_single_turn_position(target, direction, Some(SpeedLimit(2_000)), full_turn)
+        .map(drop)
 }
 
 /// How far the motor turns within a second.
@@ -59,9 +67,9 @@ fn one_count_past_the_target_is_nearly_a_full_turn_and_refused() {
 fn at_the_target_a_move_is_refused() {
     for direction in [CW, CCW] {
         let (bench, bus) = standing_at(90.01, 14);
-        assert_eq!(bus.motor(1).unwrap().circle_angle().unwrap(), CircleAngle(9_000));
+        assert_eq!(bus.motor(1).unwrap().single_turn_angle().unwrap(), TurnCentiDegrees(9_000));
         let refused = turn(&bus, 90.0, direction, FullTurn::default()).unwrap_err();
-        assert!(matches!(refused, Error::FullTurn { past: CircleAngle(0), .. }), "{refused}");
+        assert!(matches!(refused, Error::FullTurn { past: TurnCentiDegrees(0), .. }), "{refused}");
         assert!(turned(&bench, 90.01).abs() < 0.1);
     }
 }
@@ -70,8 +78,8 @@ fn at_the_target_a_move_is_refused() {
 fn an_encoder_finer_than_the_angle_makes_a_full_turn_from_a_motor_that_reads_its_target() {
     // 90.003° reads 90.00°, and is two counts of 18 bits past it.
     let (bench, bus) = standing_at(90.003, 18);
-    assert_eq!(bus.motor(1).unwrap().circle_angle().unwrap(), CircleAngle(9_000));
-    assert!(turn(&bus, 90.0, CW, FullTurn::Refused { tolerance: CircleAngle(0) }).is_err());
+    assert_eq!(bus.motor(1).unwrap().single_turn_angle().unwrap(), TurnCentiDegrees(9_000));
+    assert!(turn(&bus, 90.0, CW, FullTurn::Refused { tolerance: TurnCentiDegrees(0) }).is_err());
     turn(&bus, 90.0, CW, FullTurn::Allowed).unwrap();
     assert!(turned(&bench, 90.003) > 350.0);
 }
@@ -90,7 +98,7 @@ fn the_same_move_again_is_refused_at_its_target() {
 fn beyond_the_tolerance_a_full_turn_is_what_was_asked_for() {
     for (at, direction) in [(90.6, CW), (89.4, CCW)] {
         let (bench, bus) = standing_at(at, 14);
-        let wide = FullTurn::Refused { tolerance: CircleAngle::from_degrees(0.7) };
+        let wide = FullTurn::Refused { tolerance: TurnCentiDegrees::from_degrees(0.7) };
         turn(&bus, 90.0, direction, wide).unwrap_err();
         turn(&bus, 90.0, direction, FullTurn::default()).unwrap();
         assert!(turned(&bench, at).abs() > 350.0);
@@ -124,8 +132,13 @@ fn what_the_protocol_does_not_allow_is_refused_before_the_motor_is_asked() {
     let (bench, bus) = standing_at(90.0, 14);
     let motor = bus.motor(1).unwrap();
     let before = bench.now();
-    for (target, direction) in [(36_000, CW), (0, Spin::Unknown(2))] {
-        let refused = motor.turn_to(CircleAngle(target), direction, None, FullTurn::default());
+    for (target, direction) in [(36_000, CW), (0, SpinDirection::Unknown(2))] {
+        let refused = motor.set_single_turn_position(
+            TurnCentiDegrees(target),
+            direction,
+            None,
+            FullTurn::default(),
+        );
         assert!(matches!(refused, Err(Error::Limit { .. })), "{refused:?}");
     }
     assert_eq!(bench.now(), before);

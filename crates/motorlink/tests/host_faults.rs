@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use motorlink::rmd::{self, Bus};
 use motorlink::slcan::Device as Adapter;
-use motorlink::stmcp::{self, Client, Motor, Profile, Slave};
+use motorlink::st::{self, Client, Motor, Profile, Slave};
 use motorlink::{LinkState, time};
 use motorlink_sim::rmd::RmdBus;
 use motorlink_sim::st::StDrive;
@@ -144,7 +144,7 @@ fn until(what: &str, mut reached: impl FnMut() -> bool) {
 
 fn open_st(link: &Path) -> Client {
     let port = link.to_str().expect("UTF-8").parse().expect("a port");
-    Client::open(&port, stmcp::Options::default()).expect("opened")
+    Client::open(&port, st::Options::default()).expect("opened")
 }
 
 fn open_rmd(link: &Path) -> Bus {
@@ -176,14 +176,14 @@ fn an_adapter_that_was_unplugged_is_set_up_anew() {
     let device = Device::plug(&link, new_adapter());
     let bus = open_rmd(&link);
     let motor = bus.motor(1).expect("an ID");
-    motor.status1().expect("it answers");
+    motor.status().expect("it answers");
     device.unplug();
-    let lost = motor.status1().expect_err("there is nothing");
+    let lost = motor.status().expect_err("there is nothing");
     assert!(lost.to_string().contains("hung up or was unplugged"), "{lost}");
 
     let opened = Arc::new(AtomicU32::new(0));
     let _device = Device::plug(&link, adapter(Arc::default(), Arc::clone(&opened)));
-    until("the motor answers again", || motor.status1().is_ok());
+    until("the motor answers again", || motor.status().is_ok());
     assert_eq!(opened.load(Ordering::SeqCst), 1);
 }
 
@@ -194,14 +194,14 @@ fn an_adapter_that_forgot_its_channel_is_told_and_set_up_anew() {
     let _device = Device::plug(&link, adapter(Arc::clone(&reset), Arc::clone(&opened)));
     let bus = open_rmd(&link);
     let motor = bus.motor(1).expect("an ID");
-    motor.status1().expect("it answers");
+    motor.status().expect("it answers");
     reset.store(true, Ordering::SeqCst);
     // One refusal may be a full queue.
-    let refused = motor.status1().expect_err("its channel is closed");
+    let refused = motor.status().expect_err("its channel is closed");
     assert!(refused.to_string().contains("does not answer"), "{refused}");
-    let refused = motor.status1().expect_err("its channel is closed");
+    let refused = motor.status().expect_err("its channel is closed");
     assert!(refused.to_string().contains("was it reset"), "{refused}");
-    motor.status1().expect("its channel is open again");
+    motor.status().expect("its channel is open again");
     assert_eq!(opened.load(Ordering::SeqCst), 2);
 }
 

@@ -11,7 +11,7 @@ use motorlink::LinkState;
 use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, PortError};
 use motorlink::rmd::{self, Bus};
-use motorlink::stmcp::{Client, Error, Options, register};
+use motorlink::st::{Client, Error, Options, register};
 use served::Served;
 
 /// Whoever is in a hurry, and how often the port was opened.
@@ -102,14 +102,14 @@ fn an_interrupted_cycle_leaves_the_bus_open_and_the_next_one_right() {
     let options = rmd::Options { timeout: Duration::from_secs(5), ..rmd::Options::default() };
     let bus = Bus::open_wrapped(&port, wrap, options).expect("opened");
     let motor = bus.motor(1).expect("a motor");
-    let gains = motor.gains().expect("an answer");
+    let gains = motor.pid().expect("an answer");
     for _ in 0..3 {
         hurry.set(true);
         let error = motor.acceleration().expect_err("no time");
         assert!(!error.is_line_failure(), "{error}");
         assert_eq!(bus.link_state(), LinkState::Open);
         hurry.set(false);
-        assert_eq!(motor.gains().expect("an answer"), gains);
+        assert_eq!(motor.pid().expect("an answer"), gains);
     }
     assert_eq!(hurry.opened(), 1);
 }

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use motorlink::port::{ByteLink, PortError};
-use motorlink::stmcp::{
+use motorlink::st::{
     Client, Command, Config, ControlMode, Error, EventClient, Limits, MotorHandle, Options,
     Profile, Progress, Ramp, RegisterId, Request, register,
 };

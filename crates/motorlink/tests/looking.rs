@@ -10,7 +10,7 @@ use std::time::Duration;
 use motorlink::can::CanFrame;
 use motorlink::port::PortError;
 use motorlink::rmd::{self, Bus};
-use motorlink::stmcp::{self, Client, register};
+use motorlink::st::{self, Client, register};
 use wire::{ACK, Fresh, GET_SPEED, OFF, SPEED, START, STOP, Wire};
 
 /// Longer than any test waits for a condition.
@@ -29,7 +29,7 @@ fn silent_client(
     once: impl Fn(&Client) + Send + Sync + 'static,
 ) -> (Wire<u8>, Arc<OnceLock<Client>>) {
     let (wire, place) = (Wire::new(), Arc::new(OnceLock::<Client>::new()));
-    let mut options = stmcp::Options::default();
+    let mut options = st::Options::default();
     options.line.timeout = timeout.into();
     let (seen, looked) = (Arc::clone(&place), AtomicBool::new(false));
     let client = Client::over("wire", Box::new(Fresh(wire.clone())), options).looking(move || {
@@ -52,7 +52,7 @@ fn a_stop_from_within_a_wait_is_sent_at_once_and_the_wait_ends() {
     let sent = wire.clone();
     in_time(move || {
         let error = client.get().unwrap().motor(1).unwrap().start().expect_err("it was given up");
-        assert!(matches!(error, stmcp::Error::Port(PortError::Overtaken { .. })), "{error}");
+        assert!(matches!(error, st::Error::Port(PortError::Overtaken { .. })), "{error}");
         assert!(error.to_string().contains("nobody knows what the drive did"), "{error}");
         assert!(!error.is_line_failure());
     });
@@ -69,7 +69,7 @@ fn a_whole_stop_from_within_a_wait_does_not_wait_for_recovery() {
     let started = Arc::clone(&client);
     in_time(move || {
         let error = client.get().unwrap().motor(1).unwrap().start().expect_err("it was given up");
-        assert!(matches!(error, stmcp::Error::Port(PortError::Overtaken { .. })), "{error}");
+        assert!(matches!(error, st::Error::Port(PortError::Overtaken { .. })), "{error}");
     });
     assert_eq!(wire.sent()[..8], [START, STOP].concat());
     assert_eq!(started.get().unwrap().started().count(), 1, "it is not known to have stopped");
@@ -81,7 +81,7 @@ fn a_look_that_leaves_the_line_alone_does_not_disturb_the_exchange() {
     let says = wire.clone();
     let looks = Arc::new(Mutex::new(0));
     let counted = Arc::clone(&looks);
-    let client = Client::over("wire", Box::new(Fresh(wire.clone())), stmcp::Options::default());
+    let client = Client::over("wire", Box::new(Fresh(wire.clone())), st::Options::default());
     let client = client.looking(move || {
         let mut looks = counted.lock().unwrap();
         *looks += 1;
@@ -100,7 +100,7 @@ fn other_threads_wait_while_one_looks() {
     let (wire, asks) = (Wire::<u8>::new(), Arc::new(AtomicU32::new(0)));
     let (says, asked) = (wire.clone(), Arc::clone(&asks));
     let looks = AtomicU32::new(0);
-    let client = Client::over("wire", Box::new(Fresh(wire.clone())), stmcp::Options::default());
+    let client = Client::over("wire", Box::new(Fresh(wire.clone())), st::Options::default());
     let client = client.looking(move || {
         // The other thread has some looks to get in, if it could.
         let asks = asked.load(Ordering::SeqCst) > 0;
@@ -159,10 +159,10 @@ fn an_off_from_within_a_cycle_is_sent_at_once_and_the_cycle_ends() {
 #[test]
 fn an_error_of_the_look_interrupts_the_exchange_and_nothing_else() {
     let wire = Wire::new();
-    let client = Client::over("wire", Box::new(Fresh(wire)), stmcp::Options::default());
+    let client = Client::over("wire", Box::new(Fresh(wire)), st::Options::default());
     let client = client.looking(|| Err("enough".into()));
     let error = client.motor(1).unwrap().start().expect_err("no time");
-    assert!(matches!(&error, stmcp::Error::Port(port) if port.is_interruption()), "{error}");
+    assert!(matches!(&error, st::Error::Port(port) if port.is_interruption()), "{error}");
     assert!(error.to_string().contains("enough"), "{error}");
     assert!(!error.is_line_failure(), "nobody tries again for such a reason");
     assert_eq!(client.link_state(), motorlink::LinkState::Open);

@@ -4,7 +4,7 @@ mod wire;
 
 use std::time::Duration;
 
-use motorlink::stmcp::{Client, Command, EventClient, Line, Options, Progress, Request, register};
+use motorlink::st::{Client, Command, EventClient, Line, Options, Progress, Request, register};
 use wire::{ACK, Fresh, GET_SPEED, START, STOP, Wire};
 
 /// GET_BOARD_INFO and GET_REVUP_DATA: the questions of recovery.

@@ -7,9 +7,9 @@ use std::time::Duration;
 use motorlink::Clock;
 use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, PortError, SlcanLink};
-use motorlink::rmd::{self, Bus, Error, MotorId, MotorSet, Torque4, TorqueCommand};
+use motorlink::rmd::{self, Bus, Error, IqCommand, MotorId, MotorSet, SetTorque4};
 use motorlink::slcan::Bitrate;
-use motorlink::stmcp::{self, Client, Failure, register};
+use motorlink::st::{self, Client, Failure, register};
 use motorlink::time::Instant;
 
 const MS: u64 = 1_000;
@@ -115,8 +115,8 @@ fn torques_for_four_motors_are_sent_when_all_are_in_step() {
     let motors = Motors::new(false);
     let bus = motors.bus();
     let ids: MotorSet = [1, 2, 4].into_iter().filter_map(MotorId::new).collect();
-    let torques = Torque4([7; 4].map(TorqueCommand));
-    let replies = bus.torque4(torques, ids).unwrap();
+    let torques = SetTorque4([7; 4].map(IqCommand));
+    let replies = bus.set_torque4(torques, ids).unwrap();
     assert!(replies[0].is_some() && replies[1].is_some() && replies[2].is_none());
     assert!(replies.into_iter().flatten().all(|reply| reply.is_ok()));
     let sent: Vec<_> = motors.sent().into_iter().map(|(_, id, _)| id).collect();
@@ -143,7 +143,7 @@ fn torques_for_four_motors_are_sent_to_those_that_answer() {
     }
     let motors = Motors::new(false);
     let bus = Bus::over("bus", Box::new(Without3(motors.clone())), rmd::Options::default());
-    let replies = bus.torque4(Torque4::default(), MotorSet::TORQUE4).unwrap();
+    let replies = bus.set_torque4(SetTorque4::default(), MotorSet::TORQUE4).unwrap();
     let replies = replies.map(|reply| reply.expect("all are expected"));
     assert!(matches!(replies[2], Err(Error::Timeout { .. })), "{replies:?}");
     assert_eq!(replies.iter().filter(|reply| reply.is_ok()).count(), 3, "{replies:?}");
@@ -153,7 +153,7 @@ fn torques_for_four_motors_are_sent_to_those_that_answer() {
 #[test]
 fn torques_for_a_motor_that_answers_somebody_else_are_an_error_for_each() {
     let motors = Motors::new(true);
-    let replies = motors.bus().torque4(Torque4::default(), MotorSet::TORQUE4).unwrap();
+    let replies = motors.bus().set_torque4(SetTorque4::default(), MotorSet::TORQUE4).unwrap();
     let failed = replies.map(|reply| reply.expect("each is told").unwrap_err());
     assert!(failed.iter().all(|error| matches!(error, Error::Shared { .. })), "{failed:?}");
     assert!(motors.sent().iter().all(|(_, id, _)| *id != 0x280));
@@ -177,7 +177,7 @@ fn torques_for_motors_that_are_all_silent_are_not_sent() {
     }
     let bus = Bus::over("bus", Box::new(Nobody(Motors::new(false))), rmd::Options::default());
     for _ in 0..3 {
-        let replies = bus.torque4(Torque4::default(), MotorSet::TORQUE4);
+        let replies = bus.set_torque4(SetTorque4::default(), MotorSet::TORQUE4);
         let is_error = |reply: Option<Result<_, Error>>| reply.is_some_and(|reply| reply.is_err());
         assert!(replies.is_err() || replies.is_ok_and(|replies| replies.into_iter().all(is_error)));
     }
@@ -313,7 +313,7 @@ impl ByteLink for Twice {
 fn a_reply_that_came_twice_is_found_before_its_values_are_relied_on() {
     for (is_doubling, is_talking) in [(false, false), (true, false), (true, true)] {
         let line = Twice { is_doubling, is_talking, ..Twice::default() };
-        let client = Client::over("line", Box::new(line), stmcp::Options::default());
+        let client = Client::over("line", Box::new(line), st::Options::default());
         let motor = client.motor(1).unwrap();
         let kp = motor.read(register::SPEED_KP).unwrap();
         let ki = motor.read(register::SPEED_KI).unwrap();
@@ -322,11 +322,11 @@ fn a_reply_that_came_twice_is_found_before_its_values_are_relied_on() {
         std::thread::sleep(Duration::from_millis(1));
         match client.confirm() {
             Ok(()) => assert!(!is_doubling),
-            Err(stmcp::Error::Unconfirmed { .. }) if is_talking => {}
-            Err(stmcp::Error::Unconfirmed { why, .. }) => {
+            Err(st::Error::Unconfirmed { .. }) if is_talking => {}
+            Err(st::Error::Unconfirmed { why, .. }) => {
                 let size = Failure::Size { received: 2, fits: None };
                 assert!(
-                    matches!(**why.as_ref().unwrap(), stmcp::Error::Failed { failure, .. } if failure == size)
+                    matches!(**why.as_ref().unwrap(), st::Error::Failed { failure, .. } if failure == size)
                 );
             }
             Err(other) => panic!("{other}"),

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use motorlink::relay::{Event, Part, Reason, Relay, RelayError, RelayOptions};
 use motorlink::rmd::OnDrop;
-use motorlink::stmcp::{Client, Options, Status};
+use motorlink::st::{Client, Options, Status};
 use served::Served;
 
 const START: [u8; 4] = [0x23, 0x01, 0x01, 0x25];

@@ -6,7 +6,7 @@ use std::fs;
 use std::time::{Duration, Instant};
 
 use motorlink::rmd::{self, Bus, DpsPerSecond};
-use motorlink::stmcp::{self, Client, Config, register};
+use motorlink::st::{self, Client, Config, register};
 use motorlink::{BackOff, LinkState};
 use served::Served;
 
@@ -83,7 +83,7 @@ fn soak(
 fn st(exchanges: u32, period: u32) {
     let first = Served::new("soak-st");
     let line = Config { quiet: Duration::from_millis(5).into(), ..Config::default() };
-    let options = stmcp::Options { back_off: BACK_OFF, line, ..stmcp::Options::default() };
+    let options = st::Options { back_off: BACK_OFF, line, ..st::Options::default() };
     let client = Client::open(&first.st.parse().expect("a port"), options).expect("opened");
     drop(first);
     // The port went away, which the first exchange finds out.
@@ -105,11 +105,11 @@ fn rmd(exchanges: u32, period: u32) {
     let options = rmd::Options { timeout, back_off: BACK_OFF, ..rmd::Options::default() };
     let bus = Bus::open(&first.rmd.parse().expect("a port"), options).expect("opened");
     drop(first);
-    assert!(bus.motor(1).and_then(|motor| motor.status1()).is_err());
+    assert!(bus.motor(1).and_then(|motor| motor.status()).is_err());
     soak("soak-rmd", exchanges, period, 2, |number| {
         let motor = bus.motor(1 + (number % 4) as u8).map_err(|error| error.to_string())?;
         let own = DpsPerSecond(number as i32);
-        motor.write_acceleration(own).map_err(|error| error.to_string())?;
+        motor.write_acceleration_ram(own).map_err(|error| error.to_string())?;
         let read = motor.acceleration().map_err(|error| error.to_string())?;
         assert_eq!(read, own);
         Ok(())

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant as Moment};
 
-use motorlink::rmd::{self, Bus, CentiDps, MotorId, MotorSet, Torque4, TorqueCommand};
-use motorlink::stmcp::{self, Client, Config, Failure, Status, register};
+use motorlink::rmd::{self, Bus, CentiDps, IqCommand, MotorId, MotorSet, SetTorque4};
+use motorlink::st::{self, Client, Config, Failure, Status, register};
 use motorlink::time;
 use motorlink_link::fault::Faults;
 use motorlink_link::serve::ServeName;
@@ -22,7 +22,7 @@ fn faults(text: &str) -> Faults {
 
 fn st(bench: &VirtualBench, faults: &str, timeout: Duration) -> Client {
     let line = Config { timeout: timeout.into(), ..Config::default() };
-    let options = stmcp::Options { line, ..stmcp::Options::default() };
+    let options = st::Options { line, ..st::Options::default() };
     Client::over("bench", bench.line(&self::faults(faults)), options)
 }
 
@@ -48,9 +48,9 @@ fn bytes_and_frames_take_their_time_on_the_line() {
     assert_eq!(bench.now(), time::Instant(8 * 87));
 
     let bus = rmd(&bench, "");
-    let torques = Torque4([TorqueCommand(0); 4]);
+    let torques = SetTorque4([IqCommand(0); 4]);
     let before = bench.now();
-    bus.torque4(torques, MotorSet::TORQUE4).unwrap();
+    bus.set_torque4(torques, MotorSet::TORQUE4).unwrap();
     assert_eq!(bench.now().since(before), time::Duration(5 * 125));
     let ask = |id| (MotorId::new(id).unwrap(), [0x9A, 0, 0, 0, 0, 0, 0, 0]);
     let before = bench.now();
@@ -65,7 +65,7 @@ fn a_long_timeout_is_over_at_once() {
     let client = st(&bench, "drop=1,only=received", timeout);
     let began = Moment::now();
     let error = client.motor(1).unwrap().status().unwrap_err();
-    assert!(matches!(error, stmcp::Error::Failed { failure: Failure::Timeout, .. }), "{error}");
+    assert!(matches!(error, st::Error::Failed { failure: Failure::Timeout, .. }), "{error}");
     assert_eq!(bench.now().since(time::Instant(0)), timeout.into());
     assert!(began.elapsed() < timeout / 10);
 }
@@ -93,14 +93,14 @@ fn a_motor_that_did_not_answer_is_asked_again_after_its_guard_time() {
     let bench = bench();
     let bus = rmd(&bench, "delay=60ms,only=received");
     let motor = bus.motor(1).unwrap();
-    motor.status1().unwrap_err();
+    motor.status().unwrap_err();
     let began = Moment::now();
     let before = bench.now();
-    motor.status1().unwrap_err();
+    motor.status().unwrap_err();
     assert!(bench.now().since(before) >= time::Duration::from_millis(50));
     assert!(began.elapsed() < Duration::from_secs(2));
     drop(bus);
-    rmd(&bench, "").motor(1).unwrap().status1().unwrap();
+    rmd(&bench, "").motor(1).unwrap().status().unwrap();
 }
 
 /// A start with a load step, through a bad line; what was read on the way and the state at the end.
@@ -115,7 +115,7 @@ fn run(faults: &str) -> (Vec<String>, Vec<f64>, u64) {
         told.push(match step {
             0 => format!("{:?}", motor.ramp(1000, 200)),
             1 => format!("{:?}", motor.start()),
-            2 => format!("{:?}", bus.motor(3).unwrap().speed(CentiDps(36_000))),
+            2 => format!("{:?}", bus.motor(3).unwrap().set_speed(CentiDps(36_000))),
             _ => format!("{:?} {:?}", motor.status(), motor.read(register::SPEED_MEAS)),
         });
         bench.run(time::Duration::from_millis(100));
@@ -194,7 +194,7 @@ fn what_was_taken_down_is_whole_up_to_this_moment() {
     let bus = rmd(&bench, "");
     let mut rows = 0;
     for _ in 0..5 {
-        bus.motor(1).unwrap().status1().unwrap();
+        bus.motor(1).unwrap().status().unwrap();
         rows += recording.take().len() as u64;
         assert_eq!(rows, bench.now().0 / 50 + 1);
     }
@@ -217,17 +217,17 @@ fn served_on_ports_the_same_drives_go_on_in_real_time() {
     let bench = bench();
     bench.run(time::Duration(100 * SECOND.0));
     let inside = rmd(&bench, "");
-    inside.motor(1).unwrap().speed(CentiDps(36_000)).unwrap();
+    inside.motor(1).unwrap().set_speed(CentiDps(36_000)).unwrap();
 
     let serving =
         bench.serve(port(format!("pty:{st0}")), port(format!("slcan-pty:{can0}"))).unwrap();
     assert_eq!(serving.st().unwrap().port, format!("pty:{st0}"));
     assert!(bench.serve(port(format!("pty:{st0}2")), None).is_err());
-    let client = Client::open(&st0.parse().unwrap(), stmcp::Options::default()).unwrap();
+    let client = Client::open(&st0.parse().unwrap(), st::Options::default()).unwrap();
     assert_eq!(client.motor(1).unwrap().status().unwrap(), Status::Idle);
     let options = rmd::Options { timeout: Duration::from_secs(5), ..rmd::Options::default() };
     let outside = Bus::open(&format!("slcan:{can0}").parse().unwrap(), options).unwrap();
-    while outside.motor(1).unwrap().status2().unwrap().speed.0 < 180 {}
+    while outside.motor(1).unwrap().motion_status().unwrap().speed.0 < 180 {}
     serving.end().unwrap();
 
     let stands = bench.now();

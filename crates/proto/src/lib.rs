@@ -1,6 +1,6 @@
 //! Two motor-drive protocols, both ends of each, without I/O.
 //!
-//! * [`stmcp`]: ST's serial Motor Control Protocol as MCSDK 5.x drives speak it, master and slave.
+//! * [`st`]: ST's serial Motor Control Protocol as MCSDK 5.x drives speak it, master and slave.
 //! * [`rmd`]: the RMD motor control protocol over CAN, V1.62, host and drive, on frames of [`can`].
 //!
 //! Nothing here reads a clock or touches a port. A caller hands in received bytes or frames together
@@ -17,6 +17,6 @@ extern crate std;
 mod table;
 pub mod can;
 pub mod rmd;
-pub mod stmcp;
+pub mod st;
 pub mod time;
 pub mod units;

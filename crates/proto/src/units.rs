@@ -54,11 +54,11 @@ unit!(
 );
 unit!(
     /// RMD multi-turn angle of 0x92: 56-bit two's complement on the wire, 0.01 degree a digit.
-    MultiTurnAngle(i64), degrees, from_degrees, 0.01, "°"
+    WideCentiDegrees(i64), degrees, from_degrees, 0.01, "°"
 );
 unit!(
     /// RMD single-turn angle of 0x94, 0xA5 and 0xA6: 0.01 degree a digit, 0 to 35999.
-    CircleAngle(u16), degrees, from_degrees, 0.01, "°"
+    TurnCentiDegrees(u16), degrees, from_degrees, 0.01, "°"
 );
 unit!(
     /// RMD speed command of 0xA2: 0.01 degree per second a digit.
@@ -78,11 +78,11 @@ unit!(
 );
 unit!(
     /// RMD torque current command of 0xA1 and 0x280: 2000 digits are 32 A.
-    TorqueCommand(i16), amps, from_amps, 32.0 / 2000.0, "A"
+    IqCommand(i16), amps, from_amps, 32.0 / 2000.0, "A"
 );
 unit!(
     /// RMD torque current feedback: 2048 digits are 33 A.
-    TorqueFeedback(i16), amps, from_amps, 33.0 / 2048.0, "A"
+    IqFeedback(i16), amps, from_amps, 33.0 / 2048.0, "A"
 );
 unit!(
     /// RMD phase current of 0x9D: 64 digits are 1 A.

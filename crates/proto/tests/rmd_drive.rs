@@ -8,7 +8,7 @@ use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::*;
 use rmd_bench::{Node, motor};
 
-const SHIPPED: Gains = Gains {
+const SHIPPED: Pid = Pid {
     position_kp: 100,
     position_ki: 100,
     speed_kp: 0,
@@ -16,15 +16,15 @@ const SHIPPED: Gains = Gains {
     torque_kp: 0,
     torque_ki: 0,
 };
-const OTHER: Gains =
-    Gains { position_kp: 1, position_ki: 2, speed_kp: 3, speed_ki: 4, torque_kp: 5, torque_ki: 6 };
+const OTHER: Pid =
+    Pid { position_kp: 1, position_ki: 2, speed_kp: 3, speed_ki: 4, torque_kp: 5, torque_ki: 6 };
 
-fn torque(digits: i16) -> Torque {
-    Torque { torque: TorqueCommand(digits) }
+fn torque(digits: i16) -> SetTorque {
+    SetTorque { iq: IqCommand(digits) }
 }
 
-fn circle(direction: Spin, degrees: f64) -> CirclePosition {
-    CirclePosition { direction, angle: CircleAngle::from_degrees(degrees) }
+fn circle(direction: SpinDirection, degrees: f64) -> SetSingleTurnPosition {
+    SetSingleTurnPosition { direction, angle: TurnCentiDegrees::from_degrees(degrees) }
 }
 
 fn position(mode: Mode) -> i64 {
@@ -40,21 +40,21 @@ fn turn_to(target: i64, max_speed: Option<SpeedLimit>) -> Mode {
 #[test]
 fn gains_in_ram_are_lost_at_power_off_and_those_in_rom_stay() {
     let mut node = Node::new(1);
-    assert_eq!(node.ask(ReadGains), SHIPPED);
-    assert_eq!(node.ask(WriteGains(OTHER)), WriteGains(OTHER));
+    assert_eq!(node.ask(ReadPid), SHIPPED);
+    assert_eq!(node.ask(WritePidRam(OTHER)), WritePidRam(OTHER));
     assert_eq!(node.motor.configured.gains, OTHER);
-    assert_eq!(node.ask(ReadGains), OTHER);
+    assert_eq!(node.ask(ReadPid), OTHER);
     assert!(node.motor.saved.is_empty());
     node.power_cycle();
-    assert_eq!(node.ask(ReadGains), SHIPPED);
+    assert_eq!(node.ask(ReadPid), SHIPPED);
     assert_eq!(node.motor.configured.gains, SHIPPED);
 
-    node.ask(WriteGainsToRom(OTHER));
-    assert_eq!(node.ask(ReadGains), OTHER);
+    node.ask(WritePidRom(OTHER));
+    assert_eq!(node.ask(ReadPid), OTHER);
     assert_eq!(node.motor.configured.gains, OTHER, "at once");
     assert_eq!(node.motor.saved.last(), Some(node.drive.rom()));
     node.power_cycle();
-    assert_eq!(node.ask(ReadGains), OTHER);
+    assert_eq!(node.ask(ReadPid), OTHER);
 }
 
 #[test]
@@ -62,11 +62,11 @@ fn acceleration_is_kept_in_ram_only_and_read_back_as_written() {
     let mut node = Node::new(1);
     for digits in [20_000, 0, -1] {
         let acceleration = Acceleration { acceleration: DpsPerSecond(digits) };
-        node.ask(WriteAcceleration(acceleration));
+        node.ask(WriteAccelerationRam(acceleration));
         assert_eq!(node.ask(ReadAcceleration), acceleration);
         assert_eq!(node.motor.configured.acceleration, DpsPerSecond(digits));
     }
-    node.ask(WriteGainsToRom(OTHER));
+    node.ask(WritePidRom(OTHER));
     node.power_cycle();
     let acceleration = DpsPerSecond(1000);
     assert_eq!(node.ask(ReadAcceleration), Acceleration { acceleration });
@@ -77,13 +77,13 @@ fn a_written_offset_holds_at_once_and_after_a_power_cycle() {
     let mut node = Node::new(1);
     node.motor.sense.encoder = 0x1000;
     let offset = EncoderOffset { offset: 0x1800 };
-    assert_eq!(node.ask(WriteEncoderOffset(offset)), offset);
+    assert_eq!(node.ask(WriteEncoderOffsetRom(offset)), offset);
     for _ in 0..2 {
         let encoder = Encoder { position: 0x3800, raw: 0x1000, offset: 0x1800 };
         assert_eq!(node.ask(ReadEncoder), encoder);
-        assert_eq!(node.ask(ReadStatus2).encoder, 0x3800);
-        assert_eq!(node.ask(ReadCircleAngle).angle, CircleAngle(31_500));
-        assert_eq!(node.ask(ReadMultiTurnAngle).angle, MultiTurnAngle(-4_500));
+        assert_eq!(node.ask(ReadMotionStatus).encoder, 0x3800);
+        assert_eq!(node.ask(ReadSingleTurnAngle).angle, TurnCentiDegrees(31_500));
+        assert_eq!(node.ask(ReadMultiTurnAngle).angle, WideCentiDegrees(-4_500));
         node.power_cycle();
     }
 }
@@ -92,21 +92,21 @@ fn a_written_offset_holds_at_once_and_after_a_power_cycle() {
 fn an_offset_beyond_the_encoder_is_cut_and_the_reply_says_so() {
     let mut node = Node::new(1);
     let offset = EncoderOffset { offset: 0xFFFF };
-    assert_eq!(node.ask(WriteEncoderOffset(offset)), EncoderOffset { offset: 0x3FFF });
+    assert_eq!(node.ask(WriteEncoderOffsetRom(offset)), EncoderOffset { offset: 0x3FFF });
 }
 
 #[test]
 fn a_new_zero_is_in_the_reply_and_holds_from_the_next_power_on() {
     let mut node = Node::new(1);
     node.motor.sense.encoder = 0x1234;
-    assert_eq!(node.ask(WriteZeroToRom), EncoderOffset { offset: 0x1234 });
+    assert_eq!(node.ask(WriteZeroRom), EncoderOffset { offset: 0x1234 });
     let before = Encoder { position: 0x1234, raw: 0x1234, offset: 0 };
     assert_eq!(node.ask(ReadEncoder), before);
     assert_eq!(node.motor.saved.len(), 1);
     node.power_cycle();
     let after = Encoder { position: 0, raw: 0x1234, offset: 0x1234 };
     assert_eq!(node.ask(ReadEncoder), after);
-    assert_eq!(node.ask(ReadMultiTurnAngle).angle, MultiTurnAngle(0));
+    assert_eq!(node.ask(ReadMultiTurnAngle).angle, WideCentiDegrees(0));
 }
 
 #[test]
@@ -117,8 +117,8 @@ fn of_an_18_bit_encoder_the_upper_16_bits_travel_and_the_angle_has_them_all() {
     let encoder = Encoder { position: 0x4000, raw: 0x4000, offset: 0 };
     assert_eq!(node.ask(ReadEncoder), encoder);
     node.motor.sense.encoder = (1 << 18) + 0x2_0000;
-    assert_eq!(node.ask(ReadMultiTurnAngle).angle, MultiTurnAngle(54_000));
-    node.ask(Position { angle: CentiDegrees(-9_000) });
+    assert_eq!(node.ask(ReadMultiTurnAngle).angle, WideCentiDegrees(54_000));
+    node.ask(SetPosition { angle: CentiDegrees(-9_000) });
     assert_eq!(position(node.motor.mode), -0x1_0000);
 }
 
@@ -129,31 +129,30 @@ fn status_carries_what_the_sensors_read() {
     node.motor.sense = Sense {
         temperature: Celsius(-7),
         voltage: DeciVolts(240),
-        iq: TorqueFeedback(-2048),
+        iq: IqFeedback(-2048),
         speed: Dps(-360),
         encoder: 77,
         phase_currents,
         faults: Errors::NONE,
     };
-    let status =
-        Status1 { temperature: Celsius(-7), voltage: DeciVolts(240), errors: Errors::NONE };
-    assert_eq!(node.ask(ReadStatus1), status);
+    let status = Status { temperature: Celsius(-7), voltage: DeciVolts(240), errors: Errors::NONE };
+    assert_eq!(node.ask(ReadStatus), status);
     let motion = MotionStatus {
         temperature: Celsius(-7),
-        iq: TorqueFeedback(-2048),
+        iq: IqFeedback(-2048),
         speed: Dps(-360),
         encoder: 77,
     };
-    assert_eq!(node.ask(ReadStatus2), motion);
+    assert_eq!(node.ask(ReadMotionStatus), motion);
     assert_eq!(node.ask(torque(1)), motion);
-    assert_eq!(node.ask(ReadStatus3), phase_currents);
+    assert_eq!(node.ask(ReadPhaseCurrents), phase_currents);
 }
 
 #[test]
 fn run_restores_what_stop_interrupted() {
     let mut node = Node::new(1);
     let speed = CentiDps(36_000);
-    node.ask(Speed { speed });
+    node.ask(SetSpeed { speed });
     node.ask(Stop);
     assert_eq!(node.motor.mode, Mode::Stopped);
     assert_eq!(node.drive.mode(), Mode::Stopped);
@@ -191,7 +190,7 @@ fn a_motion_command_ends_a_stop() {
     node.ask(torque(5));
     node.ask(Stop);
     node.ask(torque(6));
-    assert_eq!(node.motor.mode, Mode::Torque(TorqueCommand(6)));
+    assert_eq!(node.motor.mode, Mode::Torque(IqCommand(6)));
 }
 
 #[test]
@@ -199,18 +198,18 @@ fn torque_beyond_the_range_of_the_document_is_saturated() {
     let mut node = Node::new(1);
     for (asked, done) in [(2000, 2000), (2001, 2000), (i16::MAX, 2000), (i16::MIN, -2000)] {
         node.ask(torque(asked));
-        assert_eq!(node.motor.mode, Mode::Torque(TorqueCommand(done)));
+        assert_eq!(node.motor.mode, Mode::Torque(IqCommand(done)));
     }
 }
 
 #[test]
 fn position_targets_are_counted_from_the_zero_point() {
     let mut node = Node::new(1);
-    node.ask(WriteEncoderOffset(EncoderOffset { offset: 100 }));
-    node.ask(Position { angle: CentiDegrees(-36_000) });
+    node.ask(WriteEncoderOffsetRom(EncoderOffset { offset: 100 }));
+    node.ask(SetPosition { angle: CentiDegrees(-36_000) });
     assert_eq!(node.motor.mode, turn_to(100 - 16_384, None));
     let max_speed = SpeedLimit(0);
-    node.ask(PositionLimited { angle: CentiDegrees(9_000), max_speed });
+    node.ask(SetPositionLimited { angle: CentiDegrees(9_000), max_speed });
     let limited = turn_to(100 + 4_096, Some(max_speed));
     assert_eq!(node.motor.mode, limited, "a greatest speed of 0 is taken at its word");
 }
@@ -218,8 +217,8 @@ fn position_targets_are_counted_from_the_zero_point() {
 #[test]
 fn a_target_stays_in_its_place_when_the_zero_moves() {
     let mut node = Node::new(1);
-    node.ask(Position { angle: CentiDegrees(9_000) });
-    node.ask(WriteEncoderOffset(EncoderOffset { offset: 1_000 }));
+    node.ask(SetPosition { angle: CentiDegrees(9_000) });
+    node.ask(WriteEncoderOffsetRom(EncoderOffset { offset: 1_000 }));
     assert_eq!(node.motor.mode, turn_to(4_096, None));
 }
 
@@ -227,25 +226,25 @@ fn a_target_stays_in_its_place_when_the_zero_moves() {
 fn a_single_turn_command_turns_the_way_it_says() {
     let mut node = Node::new(1);
     node.motor.sense.encoder = 3 * 16_384 + 8_192;
-    node.ask(circle(Spin::Clockwise, 90.0));
+    node.ask(circle(SpinDirection::Clockwise, 90.0));
     assert_eq!(position(node.motor.mode), 4 * 16_384 + 4_096);
-    node.ask(circle(Spin::Counterclockwise, 90.0));
+    node.ask(circle(SpinDirection::Counterclockwise, 90.0));
     assert_eq!(position(node.motor.mode), 3 * 16_384 + 4_096);
-    node.ask(circle(Spin::Counterclockwise, 180.0));
+    node.ask(circle(SpinDirection::Counterclockwise, 180.0));
     assert_eq!(position(node.motor.mode), 3 * 16_384 + 8_192, "it is there already");
 }
 
 #[test]
 fn the_same_single_turn_command_again_does_not_start_another_turn() {
     let mut node = Node::new(1);
-    let command = circle(Spin::Clockwise, 90.0);
+    let command = circle(SpinDirection::Clockwise, 90.0);
     node.ask(command);
     node.motor.sense.encoder = 4_097;
     node.ask(command);
     assert_eq!(position(node.motor.mode), 4_096, "a count beyond is no reason for a turn");
-    let CirclePosition { direction, angle } = command;
+    let SetSingleTurnPosition { direction, angle } = command;
     let max_speed = SpeedLimit(7);
-    node.ask(CirclePositionLimited { direction, max_speed, angle });
+    node.ask(SetSingleTurnPositionLimited { direction, max_speed, angle });
     assert_eq!(
         node.motor.mode,
         Mode::Position { target: 4_096, max_speed: Some(max_speed), within_max_angle: false }
@@ -258,12 +257,12 @@ fn the_same_single_turn_command_again_does_not_start_another_turn() {
 #[test]
 fn a_single_turn_command_outside_the_range_of_the_document_is_answered_and_not_carried_out() {
     let mut node = Node::new(1);
-    let known = circle(Spin::Clockwise, 90.0);
+    let known = circle(SpinDirection::Clockwise, 90.0);
     node.ask(known);
     let set = node.motor.modes_set;
     for command in [
-        CirclePosition { angle: CircleAngle(36_000), ..known },
-        CirclePosition { direction: Spin::Unknown(2), ..known },
+        SetSingleTurnPosition { angle: TurnCentiDegrees(36_000), ..known },
+        SetSingleTurnPosition { direction: SpinDirection::Unknown(2), ..known },
     ] {
         for _ in 0..2 {
             assert!(node.raw(command.encode()).is_some());
@@ -276,12 +275,12 @@ fn a_single_turn_command_outside_the_range_of_the_document_is_answered_and_not_c
 fn an_error_stays_until_it_is_cleared_after_its_cause_is_gone() {
     let mut node = Node::new(1);
     node.motor.sense.faults = Errors::LOW_VOLTAGE;
-    assert_eq!(node.ask(ReadStatus1).errors, Errors::LOW_VOLTAGE);
+    assert_eq!(node.ask(ReadStatus).errors, Errors::LOW_VOLTAGE);
     assert_eq!(node.ask(ClearErrors).errors, Errors::LOW_VOLTAGE, "the cause lasts");
     node.motor.sense.faults = Errors::OVER_TEMPERATURE;
     assert_eq!(node.ask(ClearErrors).errors, Errors::OVER_TEMPERATURE, "only one cause is gone");
     node.motor.sense.faults = Errors::NONE;
-    assert_eq!(node.ask(ReadStatus1).errors, Errors::OVER_TEMPERATURE);
+    assert_eq!(node.ask(ReadStatus).errors, Errors::OVER_TEMPERATURE);
     assert_eq!(node.ask(ClearErrors).errors, Errors::NONE);
 }
 
@@ -301,7 +300,7 @@ fn while_an_error_is_latched_the_motor_is_off_and_motion_commands_are_only_answe
     node.ask(Run);
     assert_eq!(node.motor.mode, Mode::Off, "protection forgot the command");
     node.ask(torque(100));
-    assert_eq!(node.motor.mode, Mode::Torque(TorqueCommand(100)));
+    assert_eq!(node.motor.mode, Mode::Torque(IqCommand(100)));
 }
 
 #[test]
@@ -313,12 +312,12 @@ fn silence_for_the_shutdown_time_switches_the_motor_off() {
     let send = |node: &mut Node, at, data| node.receive(Instant(at), &CanFrame::new(0x141, data));
     send(&mut node, 100, torque(5).encode());
     assert_eq!(node.drive.deadline(), Some(Instant(1_100)));
-    send(&mut node, 900, ReadStatus1.encode());
+    send(&mut node, 900, ReadStatus.encode());
     assert_eq!(node.drive.deadline(), Some(Instant(1_900)), "any command counts");
     send(&mut node, 1_000, [0x60; 8]);
     assert_eq!(node.drive.deadline(), Some(Instant(1_900)), "an unknown code does not");
     node.drive.poll(Instant(1_899), &mut node.motor);
-    assert_eq!(node.motor.mode, Mode::Torque(TorqueCommand(5)));
+    assert_eq!(node.motor.mode, Mode::Torque(IqCommand(5)));
     node.drive.poll(Instant(1_900), &mut node.motor);
     assert_eq!(node.motor.mode, Mode::Off);
     send(&mut node, 1_950, Run.encode());

@@ -102,19 +102,19 @@ fn kept<P: Payload>(code: u8) {
 #[test]
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn every_payload_keeps_what_its_fields_cover() {
-    kept::<Gains>(0x30);
+    kept::<Pid>(0x30);
     kept::<Acceleration>(0x33);
     kept::<Encoder>(0x90);
     kept::<EncoderOffset>(0x91);
-    kept::<MultiTurn>(0x92);
-    kept::<Circle>(0x94);
-    kept::<Status1>(0x9A);
+    kept::<MultiTurnAngle>(0x92);
+    kept::<SingleTurnAngle>(0x94);
+    kept::<Status>(0x9A);
     kept::<MotionStatus>(0x9C);
     kept::<PhaseCurrents>(0x9D);
-    kept::<Torque>(0xA1);
-    kept::<Speed>(0xA2);
-    kept::<Position>(0xA3);
-    kept::<PositionLimited>(0xA4);
-    kept::<CirclePosition>(0xA5);
-    kept::<CirclePositionLimited>(0xA6);
+    kept::<SetTorque>(0xA1);
+    kept::<SetSpeed>(0xA2);
+    kept::<SetPosition>(0xA3);
+    kept::<SetPositionLimited>(0xA4);
+    kept::<SetSingleTurnPosition>(0xA5);
+    kept::<SetSingleTurnPositionLimited>(0xA6);
 }

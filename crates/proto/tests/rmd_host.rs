@@ -17,7 +17,7 @@ fn a_cycle_over_many_motors_takes_as_long_as_one_exchange() {
     let ids: Vec<u8> = (1..=32).collect();
     let mut pair = Pair::new(&ids);
     for id in &ids {
-        pair.request(*id, ReadStatus2).unwrap();
+        pair.request(*id, ReadMotionStatus).unwrap();
     }
     let outcomes = pair.run();
     assert_eq!(pair.now, Instant(800));
@@ -44,7 +44,7 @@ fn an_echo_with_another_content_promises_nothing() {
             let result = if row.echo { Err(Error::Altered) } else { Ok(reply) };
             assert_eq!(host.poll(Instant(500)), Output::Done { id, result }, "{}", row.paragraph);
             // The motor's own reply may come yet.
-            let next = host.request(Instant(600), id, ReadStatus2.encode());
+            let next = host.request(Instant(600), id, ReadMotionStatus.encode());
             let is_left_alone = matches!(next, Err(Refused::Quarantined { .. }));
             assert_eq!(is_left_alone, row.echo, "{}", row.paragraph);
         }
@@ -54,8 +54,8 @@ fn an_echo_with_another_content_promises_nothing() {
 #[test]
 fn four_torques_in_one_frame_reach_their_motors_and_all_answer() {
     let mut pair = Pair::new(&[1, 2, 3, 4, 5]);
-    let torques = Torque4([100, -100, 0, 2000].map(TorqueCommand));
-    pair.host.torque4(pair.now, torques, MotorSet::TORQUE4).unwrap();
+    let torques = SetTorque4([100, -100, 0, 2000].map(IqCommand));
+    pair.host.set_torque4(pair.now, torques, MotorSet::TORQUE4).unwrap();
     let outcomes = pair.run();
     assert!(outcomes.iter().map(|(id, _)| id.number()).eq([1, 2, 3, 4]));
     for (id, result) in outcomes {
@@ -66,7 +66,7 @@ fn four_torques_in_one_frame_reach_their_motors_and_all_answer() {
     let modes = pair.nodes.iter().map(|node| node.motor.mode);
     assert!(
         modes.eq([100, -100, 0, 2000]
-            .map(|digits| Mode::Torque(TorqueCommand(digits)))
+            .map(|digits| Mode::Torque(IqCommand(digits)))
             .into_iter()
             .chain([Mode::Off]))
     );
@@ -77,18 +77,18 @@ fn four_torques_in_one_frame_reach_their_motors_and_all_answer() {
 fn four_torques_are_refused_as_a_whole() {
     let mut host = trusted_host();
     let now = Instant(0);
-    let none = Torque4::default();
-    let beyond = host.torque4(now, none, MotorSet::from(motor(5)));
+    let none = SetTorque4::default();
+    let beyond = host.set_torque4(now, none, MotorSet::from(motor(5)));
     assert_eq!(beyond, Err(Refused::OutOfReach(motor(5))));
 
-    let current = Some(TorqueCommand(10));
+    let current = Some(IqCommand(10));
     host.set_limits(motor(3), Limits { current, ..Limits::default() });
-    let torques = Torque4([0, 0, 11, 0].map(TorqueCommand));
-    let limited = host.torque4(now, torques, MotorSet::TORQUE4);
+    let torques = SetTorque4([0, 0, 11, 0].map(IqCommand));
+    let limited = host.set_torque4(now, torques, MotorSet::TORQUE4);
     assert!(matches!(limited, Err(Refused::Limit { id, .. }) if id == motor(3)));
 
-    host.request(now, motor(4), ReadStatus2.encode()).unwrap();
-    let busy = host.torque4(now, none, MotorSet::from(motor(1)));
+    host.request(now, motor(4), ReadMotionStatus.encode()).unwrap();
+    let busy = host.set_torque4(now, none, MotorSet::from(motor(1)));
     assert_eq!(busy, Err(Refused::Busy(motor(4))));
     assert_eq!(host.busy(), MotorSet::from(motor(4)));
 }
@@ -96,9 +96,9 @@ fn four_torques_are_refused_as_a_whole() {
 #[test]
 fn while_four_torques_wait_to_be_sent_their_motors_are_busy() {
     let mut host = trusted_host();
-    host.torque4(Instant(0), Torque4::default(), MotorSet::from(motor(1))).unwrap();
+    host.set_torque4(Instant(0), SetTorque4::default(), MotorSet::from(motor(1))).unwrap();
     assert_eq!(host.busy(), MotorSet::TORQUE4);
-    let data = ReadStatus2.encode();
+    let data = ReadMotionStatus.encode();
     assert_eq!(host.request(Instant(0), motor(2), data), Err(Refused::Busy(motor(2))));
     assert_eq!(host.request(Instant(0), motor(5), data), Ok(()));
 }
@@ -108,10 +108,10 @@ fn an_unexpected_answer_to_four_torques_is_not_taken_for_another_exchange() {
     let mut pair = Pair::new(&[1, 2]);
     pair.nodes[1].turnaround = Duration(2_000);
     for _ in 0..2 {
-        pair.host.torque4(pair.now, Torque4::default(), MotorSet::from(motor(1))).unwrap();
+        pair.host.set_torque4(pair.now, SetTorque4::default(), MotorSet::from(motor(1))).unwrap();
         assert_eq!(pair.run().len(), 1);
     }
-    let torque = Torque { torque: TorqueCommand(1) };
+    let torque = SetTorque { iq: IqCommand(1) };
     assert!(matches!(pair.request(2, torque), Err(Refused::Quarantined { .. })));
     pair.wait(Duration(5_000));
     assert_eq!(pair.host.counters().late, 2);
@@ -121,16 +121,16 @@ fn an_unexpected_answer_to_four_torques_is_not_taken_for_another_exchange() {
 #[test]
 fn a_motor_has_one_exchange_at_a_time() {
     let mut pair = Pair::new(&[1]);
-    pair.request(1, ReadStatus1).unwrap();
-    assert_eq!(pair.request(1, ReadStatus2), Err(Refused::Busy(motor(1))));
+    pair.request(1, ReadStatus).unwrap();
+    assert_eq!(pair.request(1, ReadMotionStatus), Err(Refused::Busy(motor(1))));
     pair.run();
-    assert_eq!(pair.request(1, ReadStatus2), Ok(()));
+    assert_eq!(pair.request(1, ReadMotionStatus), Ok(()));
 }
 
 #[test]
 fn the_time_for_a_reply_runs_from_the_moment_of_sending() {
     let mut host = trusted_host();
-    host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
+    host.request(Instant(0), motor(1), ReadStatus.encode()).unwrap();
     let sent = Instant(1_000_000);
     assert!(matches!(host.poll(sent), Output::Transmit(_)));
     assert_eq!(host.poll(sent), Output::Wait(Some(sent + DEFAULT_TIMEOUT)));
@@ -144,7 +144,7 @@ fn the_time_for_a_reply_runs_from_the_moment_of_sending() {
 #[test]
 fn each_request_may_have_its_own_timeout() {
     let mut host = trusted_host();
-    let (now, data) = (Instant(0), ReadStatus1.encode());
+    let (now, data) = (Instant(0), ReadStatus.encode());
     host.set_timeout(Duration(500));
     host.request(now, motor(1), data).unwrap();
     host.request_within(now, motor(2), data, Duration(200)).unwrap();
@@ -165,17 +165,17 @@ fn each_request_may_have_its_own_timeout() {
 fn a_late_reply_is_counted_and_ends_the_quarantine() {
     let mut pair = Pair::new(&[1]);
     pair.nodes[0].turnaround = Duration::from_millis(60);
-    pair.request(1, ReadStatus2).unwrap();
+    pair.request(1, ReadMotionStatus).unwrap();
     assert_eq!(pair.run(), [(motor(1), Err(Error::Timeout))]);
     let until = pair.now + DEFAULT_GUARD;
     let refused = Err(Refused::Quarantined { id: motor(1), until });
-    assert_eq!(pair.request(1, ReadStatus2), refused);
+    assert_eq!(pair.request(1, ReadMotionStatus), refused);
 
     pair.wait(Duration::from_millis(10));
     assert_eq!(pair.host.counters().late, 1);
     pair.nodes[0].turnaround = Duration(800);
     pair.nodes[0].motor.sense.temperature = Celsius(77);
-    pair.request(1, ReadStatus2).unwrap();
+    pair.request(1, ReadMotionStatus).unwrap();
     assert_eq!(temperature(&pair.run()[0].1.unwrap()), 77);
 }
 
@@ -183,12 +183,12 @@ fn a_late_reply_is_counted_and_ends_the_quarantine() {
 fn a_quarantine_ends_with_its_guard_time_when_no_reply_comes() {
     let mut pair = Pair::new(&[]);
     pair.host.set_guard(Duration(300));
-    pair.request(1, ReadStatus2).unwrap();
+    pair.request(1, ReadMotionStatus).unwrap();
     pair.run();
     pair.now += Duration(299);
-    assert!(pair.request(1, ReadStatus2).is_err());
+    assert!(pair.request(1, ReadMotionStatus).is_err());
     pair.now += Duration(1);
-    assert_eq!(pair.request(1, ReadStatus2), Ok(()));
+    assert_eq!(pair.request(1, ReadMotionStatus), Ok(()));
     assert_eq!(pair.host.counters().late, 0);
 }
 
@@ -196,7 +196,7 @@ fn a_quarantine_ends_with_its_guard_time_when_no_reply_comes() {
 fn off_passes_a_quarantine_and_the_late_reply_is_told_apart() {
     let mut pair = Pair::new(&[1]);
     pair.nodes[0].turnaround = Duration::from_millis(60);
-    pair.request(1, ReadStatus2).unwrap();
+    pair.request(1, ReadMotionStatus).unwrap();
     pair.run();
     pair.request(1, Off).unwrap();
     assert_eq!(pair.run(), [(motor(1), Err(Error::Timeout))]);
@@ -208,22 +208,22 @@ fn off_passes_a_quarantine_and_the_late_reply_is_told_apart() {
 #[test]
 fn a_cancelled_exchange_makes_way_for_off_at_once() {
     let mut pair = Pair::new(&[1]);
-    pair.request(1, ReadStatus2).unwrap();
+    pair.request(1, ReadMotionStatus).unwrap();
     assert!(matches!(pair.host.poll(pair.now), Output::Transmit(_)));
     pair.host.cancel(pair.now, motor(1));
-    assert!(pair.request(1, ReadStatus2).is_err());
+    assert!(pair.request(1, ReadMotionStatus).is_err());
     pair.request(1, Off).unwrap();
     assert_eq!(pair.run(), [(motor(1), Ok(Off.encode()))]);
 
-    pair.request(2, ReadStatus2).unwrap();
+    pair.request(2, ReadMotionStatus).unwrap();
     pair.host.cancel(pair.now, motor(2));
-    assert_eq!(pair.request(2, ReadStatus2), Ok(()), "nothing was sent, nothing is owed");
+    assert_eq!(pair.request(2, ReadMotionStatus), Ok(()), "nothing was sent, nothing is owed");
 }
 
 #[test]
 fn cancelling_one_motor_holds_back_the_four_torques_that_would_reach_it() {
     let mut pair = Pair::new(&[1, 2]);
-    pair.host.torque4(pair.now, Torque4::default(), MotorSet::TORQUE4).unwrap();
+    pair.host.set_torque4(pair.now, SetTorque4::default(), MotorSet::TORQUE4).unwrap();
     pair.host.cancel(pair.now, motor(5));
     assert_eq!(pair.host.busy(), MotorSet::TORQUE4);
     pair.host.cancel(pair.now, motor(2));
@@ -242,7 +242,7 @@ fn the_reply_to_clear_errors_may_have_either_code() {
         assert_eq!(reply[0], if clear_reply_0x9b { 0x9B } else { 0x9A });
     }
     let mut host = trusted_host();
-    host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
+    host.request(Instant(0), motor(1), ReadStatus.encode()).unwrap();
     assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
     host.receive(Instant(0), &CanFrame::new(0x141, [0x9B; 8]));
     assert_eq!(host.counters().unasked, 1, "0x9B does not answer 0x9A");
@@ -251,11 +251,11 @@ fn the_reply_to_clear_errors_may_have_either_code() {
 #[test]
 fn frames_that_answer_nothing_are_counted_and_dropped() {
     let mut host = trusted_host();
-    host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
+    host.request(Instant(0), motor(1), ReadStatus.encode()).unwrap();
     assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
-    let data = ReadStatus1.encode();
+    let data = ReadStatus.encode();
     host.receive(Instant(0), &CanFrame::new(0x142, data));
-    host.receive(Instant(0), &CanFrame::new(0x141, ReadStatus2.encode()));
+    host.receive(Instant(0), &CanFrame::new(0x141, ReadMotionStatus.encode()));
     host.receive(Instant(0), &CanFrame::data_frame(0x141, false, &data[..7]));
     host.receive(Instant(0), &CanFrame::data_frame(0x141, true, &data));
     host.receive(Instant(0), &CanFrame::remote_frame(0x141, false, 8));
@@ -269,9 +269,9 @@ fn frames_that_answer_nothing_are_counted_and_dropped() {
 fn a_motor_of_another_protocol_is_named_when_the_exchange_fails() {
     for (base, dialect) in [(0x240, Dialect::V3), (0x180, Dialect::LkTech)] {
         let mut host = trusted_host();
-        host.request(Instant(0), motor(7), ReadStatus1.encode()).unwrap();
+        host.request(Instant(0), motor(7), ReadStatus.encode()).unwrap();
         assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
-        host.receive(Instant(0), &CanFrame::new(base + 7, ReadStatus1.encode()));
+        host.receive(Instant(0), &CanFrame::new(base + 7, ReadStatus.encode()));
         let Output::Done { result, .. } = host.poll(Instant(0) + DEFAULT_TIMEOUT) else {
             panic!("the time is over")
         };
@@ -285,11 +285,11 @@ fn a_motor_of_another_protocol_is_named_when_the_exchange_fails() {
 #[test]
 fn limits_hold_for_raw_frames_of_their_motor_only() {
     let mut pair = Pair::new(&[1, 2]);
-    let limits = Limits { current: Some(TorqueCommand(50)), ..Limits::default() };
+    let limits = Limits { current: Some(IqCommand(50)), ..Limits::default() };
     pair.host.set_limits(motor(1), limits);
     let raw = [0xA1, 0, 0, 0, 51, 0, 0, 0];
     let refused = pair.host.request(pair.now, motor(1), raw);
-    let exceeded = Exceeded::Current { asked: TorqueCommand(51), limit: TorqueCommand(50) };
+    let exceeded = Exceeded::Current { asked: IqCommand(51), limit: IqCommand(50) };
     assert_eq!(refused, Err(Refused::Limit { id: motor(1), exceeded }));
     assert_eq!(
         refused.unwrap_err().to_string(),
@@ -410,7 +410,7 @@ const ANSWER: [u8; 8] = [0x9A, 25, 0, 0xF0, 0, 0, 0, 0];
 #[test]
 fn a_motor_that_did_not_answer_is_asked_for_its_status_and_then_has_to_be_silent() {
     let (mut host, asked) = unanswered(0x9C);
-    let (own, question) = (ReadStatus2.encode(), CanFrame::new(0x141, QUESTION));
+    let (own, question) = (ReadMotionStatus.encode(), CanFrame::new(0x141, QUESTION));
     host.request(asked, motor(1), own).unwrap();
     assert_eq!(host.poll(asked), Output::Transmit(question));
     let heard = asked + Duration::from_millis(10);
@@ -438,14 +438,14 @@ fn a_motor_that_did_not_answer_is_asked_for_its_status_and_then_has_to_be_silent
 fn a_motor_that_does_not_answer_the_question_is_left_alone_and_asked_again() {
     let (mut host, mut now) = unanswered(0xA2);
     for _ in 0..3 {
-        host.request(now, motor(1), Speed::default().encode()).unwrap();
+        host.request(now, motor(1), SetSpeed::default().encode()).unwrap();
         assert_eq!(host.poll(now), Output::Transmit(CanFrame::new(0x141, QUESTION)));
         now += DEFAULT_TIMEOUT;
         let failed = Output::Done { id: motor(1), result: Err(Error::Timeout) };
         assert_eq!(host.poll(now), failed);
         let until = now + DEFAULT_GUARD;
         let refused = Err(Refused::Quarantined { id: motor(1), until });
-        assert_eq!(host.request(now, motor(1), Speed::default().encode()), refused);
+        assert_eq!(host.request(now, motor(1), SetSpeed::default().encode()), refused);
         // Two kinds of replies are owed, and neither is that to Off.
         for halt in [Off.encode(), Stop.encode()] {
             host.request(now, motor(1), halt).unwrap();
@@ -464,7 +464,7 @@ fn a_motor_that_goes_on_talking_is_switched_off_all_the_same() {
     host.poll(now);
     host.cancel(now, motor(1));
     while now < until {
-        host.receive(now, &CanFrame::new(0x141, ReadStatus2.encode()));
+        host.receive(now, &CanFrame::new(0x141, ReadMotionStatus.encode()));
         let refused = Err(Refused::Quarantined { id: motor(1), until });
         assert_eq!(host.request(now, motor(1), Off.encode()), refused, "at {}", now.0);
         now += Duration::from_millis(10);
@@ -480,14 +480,14 @@ fn four_torques_are_not_sent_while_one_of_the_motors_is_in_doubt() {
     let (mut host, now) = unanswered(0x9C);
     std::mem::swap(&mut pair.host, &mut host);
     pair.now = now;
-    let torques = Torque4([7; 4].map(TorqueCommand));
-    pair.host.torque4(now, torques, expect).unwrap();
+    let torques = SetTorque4([7; 4].map(IqCommand));
+    pair.host.set_torque4(now, torques, expect).unwrap();
     assert!(pair.run().iter().all(|(_, result)| *result == Err(Error::Quarantined)));
     assert_eq!(pair.log, [0x141, 0x142, 0x141, 0x142]);
-    let refused = pair.host.torque4(pair.now, torques, expect);
+    let refused = pair.host.set_torque4(pair.now, torques, expect);
     assert!(matches!(refused, Err(Refused::Quarantined { id, .. }) if id == motor(1)));
     pair.wait(DEFAULT_GUARD);
-    pair.host.torque4(pair.now, torques, expect).unwrap();
+    pair.host.set_torque4(pair.now, torques, expect).unwrap();
     assert!(pair.run().iter().all(|(_, result)| result.is_ok()));
-    assert!(pair.nodes.iter().all(|node| node.motor.mode == Mode::Torque(TorqueCommand(7))));
+    assert!(pair.nodes.iter().all(|node| node.motor.mode == Mode::Torque(IqCommand(7))));
 }

@@ -20,15 +20,15 @@ fn opened(ids: &[u8]) -> Pair {
 #[test]
 fn a_motor_that_was_not_asked_before_answers_two_questions_and_is_silent_first() {
     let mut pair = opened(&[1]);
-    pair.request(1, Speed::default()).unwrap();
+    pair.request(1, SetSpeed::default()).unwrap();
     assert_eq!(pair.run(), [(motor(1), Err(Error::Quarantined))]);
     assert_eq!(pair.codes, [0x9A, 0x9C]);
     let until = pair.now + DEFAULT_GUARD;
     let refused = Refused::Quarantined { id: motor(1), until };
-    assert_eq!(pair.request(1, Speed::default()), Err(refused));
+    assert_eq!(pair.request(1, SetSpeed::default()), Err(refused));
     pair.wait(DEFAULT_GUARD);
     for _ in 0..2 {
-        pair.request(1, Speed::default()).unwrap();
+        pair.request(1, SetSpeed::default()).unwrap();
         assert!(pair.run().iter().all(|(_, result)| result.is_ok()));
     }
     assert_eq!(pair.codes, [0x9A, 0x9C, 0xA2, 0xA2], "once");
@@ -79,7 +79,7 @@ fn an_off_is_sent_again_to_a_motor_that_does_not_fall_silent() {
     while let Err(Refused::Quarantined { until, .. }) = pair.request(1, Off) {
         assert!(until > pair.now && until <= sent + DEFAULT_GUARD + DEFAULT_GUARD);
         pair.wait(Duration(until.since(pair.now).0 / 2 + 1));
-        pair.host.receive(pair.now, &CanFrame::new(0x141, ReadGains.encode()));
+        pair.host.receive(pair.now, &CanFrame::new(0x141, ReadPid.encode()));
     }
     assert_eq!(pair.now, sent + DEFAULT_GUARD + DEFAULT_GUARD);
     pair.run();
@@ -102,7 +102,7 @@ fn off_goes_out_at_each_attempt_to_a_motor_that_is_silent() {
 #[test]
 fn the_question_itself_is_no_answer_and_an_echo_is_named() {
     for mut host in [Host::new(), trusted_host()] {
-        host.request(Instant(0), motor(1), ReadStatus1.encode()).unwrap();
+        host.request(Instant(0), motor(1), ReadStatus.encode()).unwrap();
         let Output::Transmit(frame) = host.poll(Instant(0)) else { panic!("it is sent") };
         host.receive(Instant(1), &frame);
         let echo = Output::Done { id: motor(1), result: Err(Error::Echo) };
@@ -116,10 +116,10 @@ fn the_question_itself_is_no_answer_and_an_echo_is_named() {
 #[test]
 fn a_bus_that_is_opened_again_is_not_trusted() {
     let mut pair = Pair::new(&[1]);
-    pair.request(1, Speed::default()).unwrap();
+    pair.request(1, SetSpeed::default()).unwrap();
     pair.host.reopened(pair.now);
     assert!(pair.host.busy().is_empty());
-    pair.request(1, Speed::default()).unwrap();
+    pair.request(1, SetSpeed::default()).unwrap();
     assert_eq!(pair.run(), [(motor(1), Err(Error::Quarantined))]);
 }
 
@@ -187,9 +187,9 @@ fn in_turn(delay: u32, timeout: u32, copy: Option<u32>, turns: &[(usize, u32, u3
         copy: copy.map(Duration::from_millis),
     };
     let requests = [
-        ReadGains.encode(),
-        ReadStatus1.encode(),
-        ReadStatus2.encode(),
+        ReadPid.encode(),
+        ReadStatus.encode(),
+        ReadMotionStatus.encode(),
         Off.encode(),
         ReadAcceleration.encode(),
     ];

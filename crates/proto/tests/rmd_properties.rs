@@ -70,16 +70,16 @@ proptest! {
         let mut node = Node::new(1);
         node.drive.config.encoder = EncoderBits::new(bits).unwrap();
         node.motor.sense.encoder = encoder % (1 << 36);
-        node.ask(WriteEncoderOffset(EncoderOffset { offset }));
+        node.ask(WriteEncoderOffsetRom(EncoderOffset { offset }));
         let multi = node.ask(ReadMultiTurnAngle).angle.0;
-        prop_assert_eq!(multi.rem_euclid(36_000), i64::from(node.ask(ReadCircleAngle).angle.0));
+        prop_assert_eq!(multi.rem_euclid(36_000), i64::from(node.ask(ReadSingleTurnAngle).angle.0));
         let Encoder { position, raw, offset } = node.ask(ReadEncoder);
         let travels = u32::from(bits.min(16));
         prop_assert_eq!(
             u32::from(position),
             u32::from(raw).wrapping_sub(u32::from(offset)) & ((1 << travels) - 1)
         );
-        prop_assert_eq!(node.ask(ReadStatus2).encoder, position);
+        prop_assert_eq!(node.ask(ReadMotionStatus).encoder, position);
     }
 
     #[test]

@@ -17,7 +17,7 @@ fn every_vector_reads_and_writes_as_its_fields_say() {
         let table = match (code.and_then(Code::info), request) {
             (Some(row), true) => row.request,
             (Some(row), false) => row.reply,
-            (None, true) => Torque4::FIELDS,
+            (None, true) => SetTorque4::FIELDS,
             (None, false) => MotionStatus::FIELDS,
         };
 
@@ -93,15 +93,15 @@ fn recode(code: Option<Code>, request: bool, data: &[u8; 8]) -> [u8; 8] {
             match code {
                 $( Some(Code::$name) => typed::<$name>(request, data), )+
                 Some(Code::Unknown(code)) => panic!("{code:#04x} is no command"),
-                None if request => Torque4::decode(data).encode(),
+                None if request => SetTorque4::decode(data).encode(),
                 None => reply::<MotionStatus>(data),
             }
         };
     }
     dispatch! {
-        ReadGains WriteGains WriteGainsToRom ReadAcceleration WriteAcceleration ReadEncoder
-        WriteEncoderOffset WriteZeroToRom ReadMultiTurnAngle ReadCircleAngle ReadStatus1 ClearErrors
-        ReadStatus2 ReadStatus3 Off Stop Run Torque Speed Position PositionLimited CirclePosition
-        CirclePositionLimited
+        ReadPid WritePidRam WritePidRom ReadAcceleration WriteAccelerationRam ReadEncoder
+        WriteEncoderOffsetRom WriteZeroRom ReadMultiTurnAngle ReadSingleTurnAngle ReadStatus ClearErrors
+        ReadMotionStatus ReadPhaseCurrents Off Stop Run SetTorque SetSpeed SetPosition SetPositionLimited SetSingleTurnPosition
+        SetSingleTurnPositionLimited
     }
 }

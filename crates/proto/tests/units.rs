@@ -1,13 +1,13 @@
 //! A limit in digits is never beyond the limit that was given.
 
-use motorlink_proto::units::{CentiDegrees, SpeedLimit, TorqueCommand, inward};
+use motorlink_proto::units::{CentiDegrees, IqCommand, SpeedLimit, inward};
 use proptest::prelude::*;
 
 /// What a value may be off for being a binary fraction, in digits.
 const TOLERANCE: f64 = 2e-6;
 
 fn any_scale() -> impl Strategy<Value = f64> {
-    let ours = [SpeedLimit::SCALE, TorqueCommand::SCALE, CentiDegrees::SCALE];
+    let ours = [SpeedLimit::SCALE, IqCommand::SCALE, CentiDegrees::SCALE];
     prop_oneof![
         prop::sample::select(ours.to_vec()),
         // One s16A digit of a drive whose full scale is 0.1 to 500 A.
@@ -43,8 +43,8 @@ proptest! {
 
 #[test]
 fn a_limit_rounds_towards_0() {
-    assert_eq!(inward(1.0, TorqueCommand::SCALE), 62);
-    assert_eq!(inward(-1.0, TorqueCommand::SCALE), -62);
+    assert_eq!(inward(1.0, IqCommand::SCALE), 62);
+    assert_eq!(inward(-1.0, IqCommand::SCALE), -62);
     assert_eq!(inward(0.3, 0.01), 30);
     assert_eq!(inward(0.999, 1.0), 0);
     assert_eq!(inward(f64::NAN, 1.0), 0);

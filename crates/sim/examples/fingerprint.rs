@@ -2,8 +2,8 @@
 //! determinism` compares what it prints from builds with and without optimisation.
 
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::{Command as _, Position, ReadStatus3, Speed};
-use motorlink_proto::stmcp::{Command, MAX_FRAME, Profile, Ramp, RegisterId, Request};
+use motorlink_proto::rmd::{Command as _, ReadPhaseCurrents, SetPosition, SetSpeed};
+use motorlink_proto::st::{Command, MAX_FRAME, Profile, Ramp, RegisterId, Request};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{CentiDegrees, CentiDps};
 use motorlink_sim::hash::fingerprint;
@@ -51,10 +51,10 @@ fn rmd() {
     let mut bus = RmdBus::new(nodes).expect("the IDs differ");
     let mut said = Vec::new();
     for round in 0..30 {
-        let spin = Speed { speed: CentiDps(round * 3000) }.encode();
+        let spin = SetSpeed { speed: CentiDps(round * 3000) }.encode();
         let angle = CentiDegrees::from_degrees(f64::from(round * 37 % 100));
-        let requests = [(0x141, spin), (0x142, Position { angle }.encode())];
-        let looks = [0x141, 0x142].map(|id| (id, ReadStatus3.encode()));
+        let requests = [(0x141, spin), (0x142, SetPosition { angle }.encode())];
+        let looks = [0x141, 0x142].map(|id| (id, ReadPhaseCurrents.encode()));
         for (id, data) in requests.into_iter().chain(looks) {
             bus.receive(now, &CanFrame::new(id, data), |reply| said.push(reply));
         }

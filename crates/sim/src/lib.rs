@@ -27,7 +27,7 @@
 //! * What is in front of a gear is of the rotor, unless it says output or load.
 //!
 //! ```
-//! use motorlink_proto::{stmcp::{Command, Profile, Request}, time::Instant};
+//! use motorlink_proto::{st::{Command, Profile, Request}, time::Instant};
 //! use motorlink_sim::st::{StDrive, StStation};
 //!
 //! let mut station = StStation::new(Profile::Spec, StDrive::demo(Instant(0)));

@@ -67,7 +67,7 @@ impl Bench {
         let motors = config.st_motors();
         let profile = config.profile.name();
         let announcement = json!({
-            "port": served.port, "protocol": "stmcp", "path": served.path, "motors": motors,
+            "port": served.port, "protocol": "st", "path": served.path, "motors": motors,
             "profile": profile,
         });
         self.places.add(served.port, Kind::St, stage);

@@ -1,7 +1,7 @@
 //! Which drives there are, and what can be looked at of them.
 
 use motorlink_proto::rmd::MotorId;
-use motorlink_proto::stmcp::Motor;
+use motorlink_proto::st::Motor;
 
 use crate::config::BenchConfig;
 use crate::signals::{RMD, ST, Signal};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use motorlink_proto::rmd::Settings;
-use motorlink_proto::stmcp::Profile;
+use motorlink_proto::st::Profile;
 use motorlink_proto::time::Instant;
 use motorlink_sim::plant::OutOfRange;
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};

@@ -7,7 +7,7 @@ use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use motorlink_proto::rmd::{Gains, Settings};
+use motorlink_proto::rmd::{Pid, Settings};
 use motorlink_proto::units::DpsPerSecond;
 use motorlink_sim::rmd::RmdConfig;
 use serde::{Deserialize, Serialize};
@@ -125,8 +125,7 @@ fn io_error(path: &Path) -> impl FnOnce(io::Error) -> RomError {
 
 impl Image {
     fn new(motor: &RmdConfig, rom: &Settings) -> Self {
-        let Gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki } =
-            rom.gains;
+        let Pid { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki } = rom.gains;
         Image {
             format: FORMAT.to_owned(),
             id: motor.id,
@@ -171,7 +170,7 @@ impl Image {
     fn settings(&self) -> Settings {
         let [position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki] = self.gains;
         Settings {
-            gains: Gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki },
+            gains: Pid { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki },
             acceleration: DpsPerSecond(self.acceleration_dps2),
             encoder_offset: self.encoder_offset,
         }

@@ -1,7 +1,7 @@
 //! What can be looked at: a row a signal.
 
 use motorlink_proto::rmd::{Errors, Mode};
-use motorlink_proto::stmcp::{Flags, Status};
+use motorlink_proto::st::{Flags, Status};
 use motorlink_sim::angle::TURN;
 use motorlink_sim::plant::Machine;
 use motorlink_sim::rmd::RmdNode;

@@ -13,7 +13,7 @@ use motorlink_link::port::{ByteLink, CanLink, FaultBytes, FaultCan, PortError};
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::{Served, Server};
 use motorlink_proto::rmd::IDENTIFIERS;
-use motorlink_proto::stmcp::Profile;
+use motorlink_proto::st::Profile;
 use motorlink_proto::time::{self, Instant};
 use motorlink_sim::hash;
 use serde_json::Value;

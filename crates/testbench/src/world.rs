@@ -1,7 +1,7 @@
 //! What commands do to the world around simulated drives.
 
 use motorlink_proto::rmd::{Errors, MotorId};
-use motorlink_proto::stmcp::{Flags, Motor};
+use motorlink_proto::st::{Flags, Motor};
 use motorlink_proto::time::Instant;
 use motorlink_sim::plant::Plant;
 use motorlink_sim::rmd::RmdNode;

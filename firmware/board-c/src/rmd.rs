@@ -5,9 +5,9 @@ use core::ffi::c_void;
 use motorlink_ffi::rmd::drive::{
     motorlink_rmd_mode as mode, motorlink_rmd_motion, motorlink_rmd_sense, motorlink_rmd_settings,
 };
-use motorlink_ffi::rmd::message::motorlink_rmd_gains;
-use motorlink_proto::rmd::{Gains, Mode, Motor, Settings};
-use motorlink_proto::units::{CentiDps, DpsPerSecond, SpeedLimit, TorqueCommand};
+use motorlink_ffi::rmd::message::motorlink_rmd_pid;
+use motorlink_proto::rmd::{Mode, Motor, Pid, Settings};
+use motorlink_proto::units::{CentiDps, DpsPerSecond, IqCommand, SpeedLimit};
 use motorlink_sim::rmd::RmdMotor;
 use plant::Plant;
 
@@ -20,7 +20,7 @@ unsafe fn motor<'a>(context: *mut c_void) -> &'a mut RmdMotor {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn plant_rmd_rom(rom: *mut motorlink_rmd_settings) {
     let Settings { gains, acceleration, encoder_offset } = Plant::rmd_rom();
-    let gains = motorlink_rmd_gains {
+    let gains = motorlink_rmd_pid {
         position_kp: gains.position_kp,
         position_ki: gains.position_ki,
         speed_kp: gains.speed_kp,
@@ -43,7 +43,7 @@ unsafe extern "C" fn plant_rmd_set_mode(context: *mut c_void, motion: *const mot
     const POSITION: u8 = mode::Position as u8;
     const STOPPED: u8 = mode::Stopped as u8;
     motor.set_mode(match motion.kind {
-        TORQUE => Mode::Torque(TorqueCommand(motion.torque_16ma)),
+        TORQUE => Mode::Torque(IqCommand(motion.torque_16ma)),
         SPEED => Mode::Speed(CentiDps(motion.speed_centidps)),
         POSITION => Mode::Position {
             target: motion.target_counts,
@@ -94,7 +94,7 @@ unsafe extern "C" fn plant_rmd_save(context: *mut c_void, rom: *const motorlink_
 fn from_c(settings: &motorlink_rmd_settings) -> Settings {
     let motorlink_rmd_settings { acceleration_dps2, encoder_offset, gains } = *settings;
     Settings {
-        gains: Gains {
+        gains: Pid {
             position_kp: gains.position_kp,
             position_ki: gains.position_ki,
             speed_kp: gains.speed_kp,

@@ -3,8 +3,8 @@
 use core::ffi::c_void;
 
 use motorlink_ffi::st::message::motorlink_st_revup_phase;
-use motorlink_proto::stmcp::register::Feature;
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::register::Feature;
+use motorlink_proto::st::{
     Command, CurrentReference, Drive, Motor, PositionMove, Ramp, RegisterId, RevupPhase, TorqueRamp,
 };
 use motorlink_sim::st::{StDrive, StMotor};

@@ -16,7 +16,7 @@ use embedded_io::ReadReady;
 use motorlink_embedded::rmd::DrivePort;
 use motorlink_embedded::slcan::Adapter;
 use motorlink_embedded::st::SlavePort;
-use motorlink_proto::stmcp::{Profile, Slave};
+use motorlink_proto::st::{Profile, Slave};
 use panic_halt as _;
 use plant::Plant;
 use stm32f4::stm32f405::{Interrupt, Peripherals, USART1, USART2, USART3, interrupt};

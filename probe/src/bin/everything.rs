@@ -5,7 +5,7 @@
 use core::hint::black_box;
 
 use motorlink_proto::rmd::{Drive, Host};
-use motorlink_proto::stmcp::{Config, Master, Motor, Profile, Slave};
+use motorlink_proto::st::{Config, Master, Motor, Profile, Slave};
 
 type Ends = (Slave, Master, Drive, Host);
 

@@ -68,12 +68,12 @@ pub extern "C" fn probe() -> ! {
         motorlink_st_slave_poll
         motorlink_st_slave_deadline
         motorlink_st_slave_overrun
-        motorlink_rmd_read_gains
+        motorlink_rmd_read_pid
         motorlink_rmd_read_acceleration
         motorlink_rmd_read_encoder
-        motorlink_rmd_write_zero_to_rom
+        motorlink_rmd_write_zero_rom
         motorlink_rmd_read_multi_turn_angle
-        motorlink_rmd_read_circle_angle
+        motorlink_rmd_read_single_turn_angle
         motorlink_rmd_read_status
         motorlink_rmd_clear_errors
         motorlink_rmd_read_motion_status
@@ -81,22 +81,22 @@ pub extern "C" fn probe() -> ! {
         motorlink_rmd_off
         motorlink_rmd_stop
         motorlink_rmd_run
-        motorlink_rmd_write_gains
-        motorlink_rmd_write_gains_to_rom
-        motorlink_rmd_write_acceleration
-        motorlink_rmd_write_encoder_offset
-        motorlink_rmd_torque
-        motorlink_rmd_speed
-        motorlink_rmd_position
-        motorlink_rmd_position_limited
-        motorlink_rmd_circle_position
-        motorlink_rmd_circle_position_limited
-        motorlink_rmd_decode_gains
+        motorlink_rmd_write_pid_ram
+        motorlink_rmd_write_pid_rom
+        motorlink_rmd_write_acceleration_ram
+        motorlink_rmd_write_encoder_offset_rom
+        motorlink_rmd_set_torque
+        motorlink_rmd_set_speed
+        motorlink_rmd_set_position
+        motorlink_rmd_set_position_limited
+        motorlink_rmd_set_single_turn_position
+        motorlink_rmd_set_single_turn_position_limited
+        motorlink_rmd_decode_pid
         motorlink_rmd_decode_acceleration
         motorlink_rmd_decode_encoder
         motorlink_rmd_decode_encoder_offset
         motorlink_rmd_decode_multi_turn_angle
-        motorlink_rmd_decode_circle_angle
+        motorlink_rmd_decode_single_turn_angle
         motorlink_rmd_decode_status
         motorlink_rmd_decode_motion_status
         motorlink_rmd_decode_phase_currents
@@ -105,7 +105,7 @@ pub extern "C" fn probe() -> ! {
         motorlink_rmd_host_set_times
         motorlink_rmd_host_set_limits
         motorlink_rmd_host_request
-        motorlink_rmd_host_torque4
+        motorlink_rmd_host_set_torque4
         motorlink_rmd_host_retry
         motorlink_rmd_host_poll
         motorlink_rmd_host_receive

@@ -2,6 +2,6 @@
 #![no_std]
 #![no_main]
 
-use motorlink_proto::stmcp::{Config, Master};
+use motorlink_proto::st::{Config, Master};
 
 probe::program!(Master, Master::new(Config::default()), probe::st_master);

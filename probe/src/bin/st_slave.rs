@@ -2,6 +2,6 @@
 #![no_std]
 #![no_main]
 
-use motorlink_proto::stmcp::{Motor, Profile, Slave};
+use motorlink_proto::st::{Motor, Profile, Slave};
 
 probe::program!(Slave, Slave::new(Profile::Spec, Motor::FIRST), probe::st_slave);

@@ -7,7 +7,7 @@ use motorlink_link::fault::{Faults, Lane, Unit, Way};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     Code, Command, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, IDENTIFIERS, MotorId, MotorSet,
-    Output, ReadStatus1, Refused, TORQUE4_ID, Torque4,
+    Output, ReadStatus, Refused, SetTorque4, TORQUE4_ID,
 };
 
 use super::motor::{Node, reaches};
@@ -179,7 +179,7 @@ impl Bench {
         self.ready();
         for id in MotorSet::TORQUE4 {
             if self.host.is_unknown(id) {
-                self.insist(id, ReadStatus1.encode());
+                self.insist(id, ReadStatus.encode());
             }
         }
     }
@@ -197,9 +197,9 @@ impl Bench {
     }
 
     /// Four torques in one frame.
-    pub fn torque4(&mut self, torques: Torque4) {
+    pub fn set_torque4(&mut self, torques: SetTorque4) {
         self.introduce();
-        if self.host.torque4(self.now, torques, MotorSet::TORQUE4).is_err() {
+        if self.host.set_torque4(self.now, torques, MotorSet::TORQUE4).is_err() {
             return;
         }
         self.exchanges += MOTORS as u64;
@@ -258,7 +258,7 @@ impl Bench {
         for id in MotorSet::TORQUE4.filter(|id| reaches(*id, frame.id())) {
             let Asked { number, moved, .. } = self.last[place(id)];
             let code = match frame.id() == u32::from(TORQUE4_ID) {
-                true => Code::Torque,
+                true => Code::SetTorque,
                 false => Code::from(frame.data()[0]),
             };
             let halts = matches!(code, Code::Off | Code::Stop);

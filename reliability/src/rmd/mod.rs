@@ -38,7 +38,7 @@ pub fn run(
             bench.next_program();
         }
         match rng.u8(..10) {
-            0 => bench.torque4(traffic::torques(&mut rng)),
+            0 => bench.set_torque4(traffic::torques(&mut rng)),
             1..4 => bench.cycle(std::array::from_fn(|_| traffic::next(&mut rng))),
             _ => {
                 let id = MotorId::new(rng.u8(1..=MOTORS as u8)).expect("1 to 4");

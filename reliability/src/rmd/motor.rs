@@ -1,7 +1,7 @@
 //! A motor that counts what it is told.
 
 use motorlink_proto::rmd::{
-    Config, Drive, Gains, Mode, Motor, MotorId, Sense, Settings, TORQUE4_ID, Torque4,
+    Config, Drive, Mode, Motor, MotorId, Pid, Sense, SetTorque4, Settings, TORQUE4_ID,
 };
 use motorlink_proto::time::Instant;
 use motorlink_proto::units::{DeciVolts, DpsPerSecond};
@@ -38,7 +38,7 @@ pub struct Node {
 impl Node {
     pub fn new(id: MotorId) -> Self {
         let rom = Settings {
-            gains: Gains::default(),
+            gains: Pid::default(),
             acceleration: DpsPerSecond(1_000),
             encoder_offset: 0,
         };
@@ -50,6 +50,6 @@ impl Node {
 
 /// Whether a frame with this identifier reaches a motor.
 pub fn reaches(id: MotorId, can_id: u32) -> bool {
-    let all = can_id == u32::from(TORQUE4_ID) && Torque4::default().of(id).is_some();
+    let all = can_id == u32::from(TORQUE4_ID) && SetTorque4::default().of(id).is_some();
     all || can_id == u32::from(id.can_id())
 }

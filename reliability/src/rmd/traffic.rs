@@ -2,37 +2,37 @@
 
 use motorlink_link::fault::Rng;
 use motorlink_proto::rmd::*;
-use motorlink_proto::units::{CentiDegrees, CentiDps, DpsPerSecond, SpeedLimit, TorqueCommand};
+use motorlink_proto::units::{CentiDegrees, CentiDps, DpsPerSecond, IqCommand, SpeedLimit};
 
 /// The next request of the mix: two thirds read, the others move, set and stop.
 pub fn next(rng: &mut Rng) -> [u8; 8] {
-    let torque = TorqueCommand(rng.i16(-2_000..=2_000));
+    let torque = IqCommand(rng.i16(-2_000..=2_000));
     let speed = CentiDps(rng.i32(-100_000..=100_000));
     let angle = CentiDegrees(rng.i32(-360_000..=360_000));
     let max_speed = SpeedLimit(rng.u16(..));
     match rng.u8(..100) {
-        0..30 => ReadStatus2.encode(),
-        30..40 => ReadStatus1.encode(),
-        40..45 => ReadStatus3.encode(),
+        0..30 => ReadMotionStatus.encode(),
+        30..40 => ReadStatus.encode(),
+        40..45 => ReadPhaseCurrents.encode(),
         45..52 => ReadMultiTurnAngle.encode(),
-        52..57 => ReadCircleAngle.encode(),
+        52..57 => ReadSingleTurnAngle.encode(),
         57..61 => ReadEncoder.encode(),
-        61..64 => ReadGains.encode(),
+        61..64 => ReadPid.encode(),
         64..66 => ReadAcceleration.encode(),
-        66..72 => Torque { torque }.encode(),
-        72..78 => Speed { speed }.encode(),
-        78..81 => Position { angle }.encode(),
-        81..84 => PositionLimited { max_speed, angle }.encode(),
+        66..72 => SetTorque { iq: torque }.encode(),
+        72..78 => SetSpeed { speed }.encode(),
+        78..81 => SetPosition { angle }.encode(),
+        81..84 => SetPositionLimited { max_speed, angle }.encode(),
         84..87 => Off.encode(),
         87..90 => Stop.encode(),
         90..93 => Run.encode(),
         93..95 => ClearErrors.encode(),
         95..97 => {
             let acceleration = DpsPerSecond(rng.i32(0..60_000));
-            WriteAcceleration(Acceleration { acceleration }).encode()
+            WriteAccelerationRam(Acceleration { acceleration }).encode()
         }
-        97..99 => gains(rng, Code::WriteGains),
-        _ => gains(rng, Code::WriteGainsToRom),
+        97..99 => gains(rng, Code::WritePidRam),
+        _ => gains(rng, Code::WritePidRom),
     }
 }
 
@@ -43,6 +43,6 @@ fn gains(rng: &mut Rng, code: Code) -> [u8; 8] {
     data
 }
 
-pub fn torques(rng: &mut Rng) -> Torque4 {
-    Torque4(std::array::from_fn(|_| TorqueCommand(rng.i16(-2_000..=2_000))))
+pub fn torques(rng: &mut Rng) -> SetTorque4 {
+    SetTorque4(std::array::from_fn(|_| IqCommand(rng.i16(-2_000..=2_000))))
 }

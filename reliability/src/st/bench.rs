@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use motorlink::time::{Duration, Instant};
 use motorlink_link::fault::{Faults, Lane, Rng, Way};
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Config, Error, ErrorCode, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, Line, MAX_FRAME,
     Master, Motor, Output, Parse, Profile, Recovery, Request, Slave,
 };

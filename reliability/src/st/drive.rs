@@ -1,6 +1,6 @@
 //! A drive whose registers are memory, and which counts what it does.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, Drive, ErrorCode, Feature, Features, Motor, PositionMove,
     REVUP_PHASES, Ramp, RegisterId, RevupPhase, TorqueRamp, Version,
 };

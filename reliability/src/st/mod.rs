@@ -9,7 +9,7 @@ pub mod verified;
 
 use motorlink::time::Duration;
 use motorlink_link::fault::{Faults, Rng};
-use motorlink_proto::stmcp::Error;
+use motorlink_proto::st::Error;
 
 use bench::Bench;
 pub use bench::Setup;

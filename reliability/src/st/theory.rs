@@ -1,7 +1,7 @@
 //! How often a damaged frame should pass for a whole one.
 
 use motorlink_link::fault::Rng;
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile, Slave,
 };
 use motorlink_proto::time::Instant;

@@ -1,7 +1,7 @@
 //! What a program asks of a drive: reads, writes, commands, ramps, and frames of any kind.
 
 use motorlink_link::fault::Rng;
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, Frame, MAX_FRAME, Profile, Ramp, RegisterId, Request, RevupPhase,
 };
 

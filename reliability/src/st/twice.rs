@@ -4,7 +4,7 @@ use std::iter::Sum;
 
 use motorlink::time::Duration;
 use motorlink_link::fault::{Faults, Rng};
-use motorlink_proto::stmcp::{RegisterId, Request, question_behind};
+use motorlink_proto::st::{RegisterId, Request, question_behind};
 
 use super::bench::{Bench, Setup};
 use super::traffic::Ask;

@@ -1,9 +1,7 @@
 //! Plain writes beside verified ones: what was reported as done, and what the register has.
 
 use motorlink_link::fault::{Faults, Rng};
-use motorlink_proto::stmcp::{
-    Error, RegisterId, Request, Unverified, VERIFY_ATTEMPTS, VerifiedWrite,
-};
+use motorlink_proto::st::{Error, RegisterId, Request, Unverified, VERIFY_ATTEMPTS, VerifiedWrite};
 
 use super::bench::{Bench, Setup};
 use super::drive::MOTORS;

@@ -3,7 +3,7 @@
 use motorlink::LinkState;
 use motorlink::port::PortName;
 use motorlink::rmd::{EventBus, Found, MotorId, OnDrop};
-use motorlink_proto::rmd::{Command, ReadStatus1, Torque};
+use motorlink_proto::rmd::{Command, ReadStatus, SetTorque};
 use pyo3::prelude::*;
 
 use super::{Driven, fileno, outcome, seconds};
@@ -125,7 +125,7 @@ impl RmdMachine {
     fn look_for(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
         let begun = self.driven.step(py, |motors| {
-            motors.bus.ask(id, ReadStatus1.encode())?;
+            motors.bus.ask(id, ReadStatus.encode())?;
             motors.expect(id, Asked::Found);
             Ok(())
         })?;
@@ -137,9 +137,9 @@ impl RmdMachine {
     fn torque4(&self, py: Python<'_>, amps: [f64; 4], expect: Vec<i64>) -> PyResult<()> {
         let (torques, expect) = (four_torques(py, amps)?, motor_ids(py, expect)?);
         let begun = self.driven.step(py, |motors| {
-            motors.bus.torque4(torques, expect)?;
+            motors.bus.set_torque4(torques, expect)?;
             for id in expect {
-                motors.expect(id, Asked::Value(RmdRequest::of(Torque::default())));
+                motors.expect(id, Asked::Value(RmdRequest::of(SetTorque::default())));
             }
             Ok(())
         })?;

@@ -2,7 +2,7 @@
 
 use motorlink::LinkState;
 use motorlink::port::PortName;
-use motorlink::stmcp::{EventClient, Progress};
+use motorlink::st::{EventClient, Progress};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;

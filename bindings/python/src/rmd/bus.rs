@@ -3,8 +3,8 @@
 use motorlink::Clock;
 use motorlink::port::PortName;
 use motorlink::rmd::{
-    Bus, CentiDegrees, Error, Found, Limits, MotorId, MotorSet, OnDrop, Options, SpeedLimit,
-    Torque4, TorqueCommand,
+    Bus, CentiDegrees, Error, Found, IqCommand, Limits, MotorId, MotorSet, OnDrop, Options,
+    SetTorque4, SpeedLimit,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -129,7 +129,7 @@ impl RmdBus {
         expect: Vec<i64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let (torques, expect) = (four_torques(py, amps)?, motor_ids(py, expect)?);
-        let replies = self.bus.exchange(py, |bus| bus.torque4(torques, expect))?;
+        let replies = self.bus.exchange(py, |bus| bus.set_torque4(torques, expect))?;
         let by_id = PyDict::new(py);
         for (reply, id) in replies.map_err(|error| rmd_error(py, &error))?.into_iter().zip(1..) {
             match reply {
@@ -252,24 +252,24 @@ pub(crate) fn limits(
     speed_dps: Option<f64>,
     angle_deg: Option<f64>,
 ) -> PyResult<Limits> {
-    let (ampere, degree) = (TorqueCommand::SCALE, CentiDegrees::SCALE);
-    let current = current_a.map(|amps| limit(py, amps, ampere, TorqueCommand::SYMBOL));
+    let (ampere, degree) = (IqCommand::SCALE, CentiDegrees::SCALE);
+    let current = current_a.map(|amps| limit(py, amps, ampere, IqCommand::SYMBOL));
     let speed = speed_dps.map(|dps| limit(py, dps, SpeedLimit::SCALE, SpeedLimit::SYMBOL));
     let angle = angle_deg.map(|degrees| limit(py, degrees, degree, CentiDegrees::SYMBOL));
     Ok(Limits {
-        current: current.transpose()?.map(TorqueCommand),
+        current: current.transpose()?.map(IqCommand),
         speed: speed.transpose()?.map(SpeedLimit),
         angle: angle.transpose()?.map(CentiDegrees),
     })
 }
 
 /// Torque currents of motors 1 to 4, A.
-pub(crate) fn four_torques(py: Python<'_>, amps: [f64; 4]) -> PyResult<Torque4> {
-    let mut torques = [TorqueCommand(0); 4];
+pub(crate) fn four_torques(py: Python<'_>, amps: [f64; 4]) -> PyResult<SetTorque4> {
+    let mut torques = [IqCommand(0); 4];
     for (slot, amps) in torques.iter_mut().zip(amps) {
         *slot = torque(py, amps)?;
     }
-    Ok(Torque4(torques))
+    Ok(SetTorque4(torques))
 }
 
 pub(crate) fn motor_ids(py: Python<'_>, ids: Vec<i64>) -> PyResult<MotorSet> {

@@ -12,7 +12,7 @@ pub(crate) use sample::RmdSampling;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    Code, Direction, Errors, Field, MotorId, Payload, TORQUE4_ID, Torque4, describe,
+    Code, Direction, Errors, Field, MotorId, Payload, SetTorque4, TORQUE4_ID, describe,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -41,7 +41,7 @@ pub(crate) fn rmd_decode(
     let motor = MotorId::from_can_id(can_id);
     let code = Code::from(data[0]);
     let (name, fields): (_, &[Field]) = match (motor, code.info()) {
-        (None, _) if id == TORQUE4_ID && !reply => (format!("{id:#x}"), Torque4::FIELDS),
+        (None, _) if id == TORQUE4_ID && !reply => (format!("{id:#x}"), SetTorque4::FIELDS),
         (None, _) => {
             return Err(bad_value(py, format_args!("{id:#05x} is no identifier of this protocol")));
         }

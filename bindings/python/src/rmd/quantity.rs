@@ -7,11 +7,11 @@ use crate::error::bad_value;
 
 /// Reads whose values a program may sample, the one that tells most first.
 const READS: [Code; 5] = [
-    Code::ReadStatus2,
-    Code::ReadStatus1,
-    Code::ReadStatus3,
+    Code::ReadMotionStatus,
+    Code::ReadStatus,
+    Code::ReadPhaseCurrents,
     Code::ReadMultiTurnAngle,
-    Code::ReadCircleAngle,
+    Code::ReadSingleTurnAngle,
 ];
 
 /// A value of a reply.
@@ -45,7 +45,7 @@ impl Quantity {
                 let taken = |name: &str| all.iter().any(|(known, _)| known == name);
                 let name = match taken(&name) {
                     false => name,
-                    true if code == Code::ReadCircleAngle => format!("circle_{name}"),
+                    true if code == Code::ReadSingleTurnAngle => format!("circle_{name}"),
                     true => continue,
                 };
                 all.push((name, Quantity { code, field }));

@@ -2,15 +2,15 @@
 
 use motorlink::rmd::FullTurn;
 use motorlink_proto::rmd::{
-    Acceleration, Circle, CirclePosition, CirclePositionLimited, ClearErrors, Code, Command,
-    Encoder, EncoderOffset, Errors, FULL_TURN, Gains, MotionStatus, MotorId, MultiTurn, Off,
-    Payload, PhaseCurrents, Position, PositionLimited, ReadAcceleration, ReadCircleAngle,
-    ReadEncoder, ReadGains, ReadMultiTurnAngle, ReadStatus1, ReadStatus2, ReadStatus3, Run, Speed,
-    Spin, Status1, Stop, Torque, WriteAcceleration, WriteEncoderOffset, WriteGains,
-    WriteGainsToRom, WriteZeroToRom,
+    Acceleration, ClearErrors, Code, Command, Encoder, EncoderOffset, Errors, FULL_TURN,
+    MotionStatus, MotorId, MultiTurnAngle, Off, Payload, PhaseCurrents, Pid, ReadAcceleration,
+    ReadEncoder, ReadMotionStatus, ReadMultiTurnAngle, ReadPhaseCurrents, ReadPid,
+    ReadSingleTurnAngle, ReadStatus, Run, SetPosition, SetPositionLimited, SetSingleTurnPosition,
+    SetSingleTurnPositionLimited, SetSpeed, SetTorque, SingleTurnAngle, SpinDirection, Status,
+    Stop, WriteAccelerationRam, WriteEncoderOffsetRom, WritePidRam, WritePidRom, WriteZeroRom,
 };
 use motorlink_proto::units::{
-    CentiDegrees, CentiDps, CircleAngle, DeciVolts, DpsPerSecond, MultiTurnAngle, TorqueCommand,
+    CentiDegrees, CentiDps, DeciVolts, DpsPerSecond, IqCommand, TurnCentiDegrees, WideCentiDegrees,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -51,44 +51,46 @@ impl RmdRequest {
             return PyBytes::new(py, reply).into_py_any(py);
         }
         match Code::from(self.data[0]) {
-            Code::ReadGains | Code::WriteGains | Code::WriteGainsToRom => {
-                let gains = Gains::decode(reply);
-                let Gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki } =
+            Code::ReadPid | Code::WritePidRam | Code::WritePidRom => {
+                let gains = Pid::decode(reply);
+                let Pid { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki } =
                     gains;
                 values::gains(
                     py,
                     (position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki),
                 )
             }
-            Code::ReadAcceleration | Code::WriteAcceleration => {
+            Code::ReadAcceleration | Code::WriteAccelerationRam => {
                 Acceleration::decode(reply).acceleration.0.into_py_any(py)
             }
             Code::ReadEncoder => {
                 let Encoder { position, raw, offset } = Encoder::decode(reply);
                 values::encoder(py, (position, raw, offset))
             }
-            Code::WriteEncoderOffset | Code::WriteZeroToRom => {
+            Code::WriteEncoderOffsetRom | Code::WriteZeroRom => {
                 EncoderOffset::decode(reply).offset.into_py_any(py)
             }
             Code::ReadMultiTurnAngle => {
-                physical(MultiTurn::decode(reply).angle.0, MultiTurnAngle::SCALE).into_py_any(py)
+                physical(MultiTurnAngle::decode(reply).angle.0, WideCentiDegrees::SCALE)
+                    .into_py_any(py)
             }
-            Code::ReadCircleAngle => {
-                physical(Circle::decode(reply).angle.0.into(), CircleAngle::SCALE).into_py_any(py)
+            Code::ReadSingleTurnAngle => {
+                physical(SingleTurnAngle::decode(reply).angle.0.into(), TurnCentiDegrees::SCALE)
+                    .into_py_any(py)
             }
-            Code::ReadStatus1 | Code::ClearErrors => motor_status(py, &Status1::decode(reply)),
-            Code::ReadStatus3 => {
+            Code::ReadStatus | Code::ClearErrors => motor_status(py, &Status::decode(reply)),
+            Code::ReadPhaseCurrents => {
                 let PhaseCurrents { phase_a, phase_b, phase_c } = PhaseCurrents::decode(reply);
                 values::phase_currents(py, (phase_a.amps(), phase_b.amps(), phase_c.amps()))
             }
             Code::Off | Code::Stop | Code::Run => Ok(py.None()),
-            Code::ReadStatus2
-            | Code::Torque
-            | Code::Speed
-            | Code::Position
-            | Code::PositionLimited
-            | Code::CirclePosition
-            | Code::CirclePositionLimited => motion_status(py, &MotionStatus::decode(reply)),
+            Code::ReadMotionStatus
+            | Code::SetTorque
+            | Code::SetSpeed
+            | Code::SetPosition
+            | Code::SetPositionLimited
+            | Code::SetSingleTurnPosition
+            | Code::SetSingleTurnPositionLimited => motion_status(py, &MotionStatus::decode(reply)),
             Code::Unknown(_) => PyBytes::new(py, reply).into_py_any(py),
         }
     }
@@ -101,7 +103,7 @@ pub(crate) fn motion_status(py: Python<'_>, status: &MotionStatus) -> PyResult<P
 }
 
 /// The reply to 0x9A.
-pub(crate) fn motor_status(py: Python<'_>, status: &Status1) -> PyResult<Py<PyAny>> {
+pub(crate) fn motor_status(py: Python<'_>, status: &Status) -> PyResult<Py<PyAny>> {
     let errors = values::motor_errors(py, (errors(py, status.errors)?, status.errors.0))?;
     let voltage = physical(status.voltage.0.into(), DeciVolts::SCALE);
     values::motor_status(py, (status.temperature.0, voltage, errors))
@@ -118,14 +120,14 @@ impl RmdRequest {
     /// Holds a torque current, A (0xA1).
     #[staticmethod]
     fn torque(py: Python<'_>, amps: f64) -> PyResult<Self> {
-        Ok(Self::of(Torque { torque: torque(py, amps)? }))
+        Ok(Self::of(SetTorque { iq: torque(py, amps)? }))
     }
 
     /// Holds a speed, °/s (0xA2).
     #[staticmethod]
     fn speed(py: Python<'_>, dps: f64) -> PyResult<Self> {
         let speed = CentiDps(digits(py, "a speed", dps, CentiDps::SCALE, CentiDps::SYMBOL)?);
-        Ok(Self::of(Speed { speed }))
+        Ok(Self::of(SetSpeed { speed }))
     }
 
     /// Turns to an angle over all turns, ° (0xA3), no faster than `max_speed`, °/s (0xA4).
@@ -135,8 +137,10 @@ impl RmdRequest {
         let angle = digits(py, "an angle", degrees, CentiDegrees::SCALE, CentiDegrees::SYMBOL)?;
         let angle = CentiDegrees(angle);
         Ok(match max_speed {
-            None => Self::of(Position { angle }),
-            Some(dps) => Self::of(PositionLimited { max_speed: greatest_speed(py, dps)?, angle }),
+            None => Self::of(SetPosition { angle }),
+            Some(dps) => {
+                Self::of(SetPositionLimited { max_speed: greatest_speed(py, dps)?, angle })
+            }
         })
     }
 
@@ -149,18 +153,20 @@ impl RmdRequest {
         max_speed: Option<f64>,
         clockwise: bool,
     ) -> PyResult<Self> {
-        let angle = digits(py, "an angle", degrees, CircleAngle::SCALE, CircleAngle::SYMBOL)?;
+        let angle =
+            digits(py, "an angle", degrees, TurnCentiDegrees::SCALE, TurnCentiDegrees::SYMBOL)?;
         if angle >= FULL_TURN {
             let why = format!("a single-turn angle is 0 to 359.99 °, not {degrees} °");
             return Err(bad_value(py, why));
         }
-        let angle = CircleAngle(angle);
-        let direction = if clockwise { Spin::Clockwise } else { Spin::Counterclockwise };
+        let angle = TurnCentiDegrees(angle);
+        let direction =
+            if clockwise { SpinDirection::Clockwise } else { SpinDirection::Counterclockwise };
         Ok(match max_speed {
-            None => Self::of(CirclePosition { direction, angle }),
+            None => Self::of(SetSingleTurnPosition { direction, angle }),
             Some(dps) => {
                 let max_speed = greatest_speed(py, dps)?;
-                Self::of(CirclePositionLimited { direction, max_speed, angle })
+                Self::of(SetSingleTurnPositionLimited { direction, max_speed, angle })
             }
         })
     }
@@ -175,10 +181,11 @@ impl RmdRequest {
     ) -> PyResult<()> {
         let id = motor_id(py, motor)?;
         let digits = |what, degrees| {
-            digits(py, what, degrees, CircleAngle::SCALE, CircleAngle::SYMBOL).map(CircleAngle)
+            digits(py, what, degrees, TurnCentiDegrees::SCALE, TurnCentiDegrees::SYMBOL)
+                .map(TurnCentiDegrees)
         };
         let (at, tolerance) = (digits("an angle", angle)?, digits("a tolerance", tolerance)?);
-        let CirclePosition { direction, angle } = CirclePosition::decode(&self.data);
+        let SetSingleTurnPosition { direction, angle } = SetSingleTurnPosition::decode(&self.data);
         let checked = FullTurn::Refused { tolerance }.check(id, at, angle, direction);
         checked.map_err(|error| rmd_error(py, &error))
     }
@@ -204,7 +211,7 @@ impl RmdRequest {
     /// Reads temperature, voltage and errors (0x9A).
     #[staticmethod]
     fn read_status() -> Self {
-        Self::of(ReadStatus1)
+        Self::of(ReadStatus)
     }
 
     /// Clears the errors whose cause is gone (0x9B).
@@ -216,19 +223,19 @@ impl RmdRequest {
     /// Reads temperature, torque current, speed and encoder (0x9C).
     #[staticmethod]
     fn read_motion() -> Self {
-        Self::of(ReadStatus2)
+        Self::of(ReadMotionStatus)
     }
 
     /// Reads the phase currents (0x9D).
     #[staticmethod]
     fn read_phase_currents() -> Self {
-        Self::of(ReadStatus3)
+        Self::of(ReadPhaseCurrents)
     }
 
     /// Reads the gains in RAM (0x30).
     #[staticmethod]
     fn read_gains() -> Self {
-        Self::of(ReadGains)
+        Self::of(ReadPid)
     }
 
     /// Sets the gains until power-off (0x31), or for good (0x32), which wears the ROM.
@@ -250,7 +257,7 @@ impl RmdRequest {
             let gain = u8::try_from(value);
             gain.map_err(|_| bad_value(py, format_args!("gains are 0 to 255, not {value}")))
         };
-        let gains = Gains {
+        let gains = Pid {
             position_kp: gain(position_kp)?,
             position_ki: gain(position_ki)?,
             speed_kp: gain(speed_kp)?,
@@ -258,7 +265,7 @@ impl RmdRequest {
             torque_kp: gain(torque_kp)?,
             torque_ki: gain(torque_ki)?,
         };
-        Ok(if rom { Self::of(WriteGainsToRom(gains)) } else { Self::of(WriteGains(gains)) })
+        Ok(if rom { Self::of(WritePidRom(gains)) } else { Self::of(WritePidRam(gains)) })
     }
 
     /// Reads the acceleration limit (0x33).
@@ -277,7 +284,7 @@ impl RmdRequest {
         }
         let acceleration =
             DpsPerSecond(digits(py, "an acceleration", dps2, DpsPerSecond::SCALE, unit)?);
-        Ok(Self::of(WriteAcceleration(Acceleration { acceleration })))
+        Ok(Self::of(WriteAccelerationRam(Acceleration { acceleration })))
     }
 
     /// Reads encoder position, original position and offset (0x90).
@@ -290,13 +297,13 @@ impl RmdRequest {
     #[staticmethod]
     fn write_encoder_offset_to_rom(py: Python<'_>, counts: f64) -> PyResult<Self> {
         let offset = digits(py, "an offset", counts, 1.0, "counts")?;
-        Ok(Self::of(WriteEncoderOffset(EncoderOffset { offset })))
+        Ok(Self::of(WriteEncoderOffsetRom(EncoderOffset { offset })))
     }
 
     /// Makes the current position the zero from the next power-on on (0x19). Wears the ROM.
     #[staticmethod]
     fn write_zero_to_rom() -> Self {
-        Self::of(WriteZeroToRom)
+        Self::of(WriteZeroRom)
     }
 
     /// Reads the angle over all turns (0x92).
@@ -308,7 +315,7 @@ impl RmdRequest {
     /// Reads the angle within the turn (0x94).
     #[staticmethod]
     fn read_circle_angle() -> Self {
-        Self::of(ReadCircleAngle)
+        Self::of(ReadSingleTurnAngle)
     }
 
     /// Eight bytes as they are, answered with eight bytes. `rom` allows those that wear the ROM.
@@ -371,12 +378,12 @@ pub(crate) fn motor_id(py: Python<'_>, id: i64) -> PyResult<MotorId> {
 }
 
 /// A torque current within the protocol's range.
-pub(crate) fn torque(py: Python<'_>, amps: f64) -> PyResult<TorqueCommand> {
-    let torque = TorqueCommand(digits(py, "a torque current", amps, TorqueCommand::SCALE, "A")?);
-    if torque.0.unsigned_abs() <= Torque::MAX.0.unsigned_abs() {
+pub(crate) fn torque(py: Python<'_>, amps: f64) -> PyResult<IqCommand> {
+    let torque = IqCommand(digits(py, "a torque current", amps, IqCommand::SCALE, "A")?);
+    if torque.0.unsigned_abs() <= SetTorque::MAX.0.unsigned_abs() {
         return Ok(torque);
     }
-    let most = Torque::MAX.amps();
+    let most = SetTorque::MAX.amps();
     Err(bad_value(py, format_args!("{amps} A is beyond ±{most} A; nothing was sent")))
 }
 

@@ -2,7 +2,7 @@
 
 use motorlink::Clock;
 use motorlink::port::PortName;
-use motorlink::stmcp::{Client, Limits, Motor, Options, Profile, Recovery};
+use motorlink::st::{Client, Limits, Motor, Options, Profile, Recovery};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyList};
 

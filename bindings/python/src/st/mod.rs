@@ -14,8 +14,8 @@ pub(crate) use sample::StSampling;
 pub(crate) use scale::Scale;
 pub(crate) use verified::StVerifiedWrite;
 
-use motorlink::stmcp::register::{Feature, Features, Writing};
-use motorlink::stmcp::{Flags, Profile, RegisterId};
+use motorlink::st::register::{Feature, Features, Writing};
+use motorlink::st::{Flags, Profile, RegisterId};
 use pyo3::prelude::*;
 
 use crate::error::{bad_value, no_such_register};

@@ -1,6 +1,6 @@
 //! Reading the reply to a request, in two steps: the first needs no interpreter.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     BoardInfo, ControlMode, FirmwareVersion, Flags, Profile, RegisterId, RevupPhase, Status,
 };
 use pyo3::IntoPyObjectExt;

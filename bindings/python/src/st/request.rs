@@ -1,6 +1,6 @@
 //! One request to an ST drive: checked when it is made, and able to read its reply.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse,
     PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENTS, TorqueRamp,
 };

@@ -4,8 +4,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use motorlink::Clock;
 use motorlink::port::PortError;
-use motorlink::stmcp::register::Access;
-use motorlink::stmcp::{Client, Error, Profile, RegisterId, SEGMENT_REGISTERS};
+use motorlink::st::register::Access;
+use motorlink::st::{Client, Error, Profile, RegisterId, SEGMENT_REGISTERS};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict};
 

@@ -1,7 +1,7 @@
 //! Register values between the wire and the units of the field.
 
-use motorlink::stmcp::register::{Type, Unit};
-use motorlink::stmcp::{Profile, Reading, RegisterId, find_register, parse_value};
+use motorlink::st::register::{Type, Unit};
+use motorlink::st::{Profile, Reading, RegisterId, find_register, parse_value};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyString;

@@ -2,8 +2,8 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use motorlink::stmcp::{Error, Motor, RegisterId};
-use motorlink_proto::stmcp::{Request, Unverified, VerifiedWrite, Verifying};
+use motorlink::st::{Error, Motor, RegisterId};
+use motorlink_proto::st::{Request, Unverified, VerifiedWrite, Verifying};
 use pyo3::prelude::*;
 
 use super::request::{StRequest, motor_number};

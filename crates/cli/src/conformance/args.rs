@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Subcommand;
 use motorlink::rmd::{EncoderBits, MotorId};
-use motorlink::stmcp::{Motor, Profile};
+use motorlink::st::{Motor, Profile};
 use motorlink_link::serve::ServeName;
 
 use crate::connection::Port;

@@ -147,7 +147,7 @@ fn program(args: &Host, task: Task) -> Result<Vec<String>, &'static str> {
         Task::Off => (&args.off, "switches a motor off: give a command with --off"),
         Task::Cycle => (&args.cycle, "asks four motors: give a command with --cycle"),
         Task::Echoed => (&args.echo, "needs a host that drops echoes: give a command with --echo"),
-        Task::Alternate | Task::Clear | Task::Torque4 => {
+        Task::Alternate | Task::Clear | Task::SetTorque4 => {
             return Err(
                 "is for hosts that the kit calls: see crates/conformance/tests/host_rmd.rs",
             );

@@ -5,7 +5,7 @@ mod screen;
 mod story;
 
 use motorlink::rmd::{self, Bus};
-use motorlink::stmcp::{self, Client};
+use motorlink::st::{self, Client};
 
 use bench::Drives;
 use screen::Screen;
@@ -25,7 +25,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<(), Failure> {
     interrupt::take_over();
     let drives = Drives::start()?;
-    let st = Client::open(&drives.st.parse()?, stmcp::Options::default())?;
+    let st = Client::open(&drives.st.parse()?, st::Options::default())?;
     let bus = Bus::open(
         &drives.rmd.parse()?,
         rmd::Options {

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use motorlink::rmd::{Bus, CentiDegrees, CentiDps, MotorId, SpeedLimit, Torque4, TorqueCommand};
-use motorlink::stmcp::{Client, MotorHandle, Status, register};
+use motorlink::rmd::{Bus, CentiDegrees, CentiDps, IqCommand, MotorId, SetTorque4, SpeedLimit};
+use motorlink::st::{Client, MotorHandle, Status, register};
 
 use super::bench::Drives;
 use super::screen::{Row, Screen};
@@ -85,7 +85,7 @@ impl<'a> Story<'a> {
         let [major, minor, patch] = info.version;
         let mut ids = Vec::new();
         for id in 1..=4 {
-            self.bus.motor(id)?.status1()?;
+            self.bus.motor(id)?.status()?;
             ids.push(id.to_string());
         }
         self.screen.say(&format!(
@@ -123,18 +123,18 @@ impl<'a> Story<'a> {
 
     fn turn_rmd(&mut self) -> Result<(), Failure> {
         self.screen.say("RMD motors 1 to 4: torque currents in one frame (0x280), then speeds.");
-        let torques = [0.5, -0.5, 0.4, -0.4].map(TorqueCommand::from_amps);
+        let torques = [0.5, -0.5, 0.4, -0.4].map(IqCommand::from_amps);
         let all = (1..=4).filter_map(MotorId::new).collect();
-        for reply in self.bus.torque4(Torque4(torques), all)?.into_iter().flatten() {
+        for reply in self.bus.set_torque4(SetTorque4(torques), all)?.into_iter().flatten() {
             reply?;
         }
         self.watch(Duration::from_millis(400))?;
         for (id, dps) in [(1, 360.0), (2, -360.0), (3, 720.0), (4, -720.0)] {
-            self.bus.motor(id)?.speed(CentiDps::from_dps(dps))?;
+            self.bus.motor(id)?.set_speed(CentiDps::from_dps(dps))?;
         }
         let bus = self.bus;
         self.until("RMD motor 3 turns with 720 °/s", |_| {
-            Ok((bus.motor(3)?.status2()?.speed.0 - 720).abs() <= 15)
+            Ok((bus.motor(3)?.motion_status()?.speed.0 - 720).abs() <= 15)
         })?;
         self.done.push("four RMD motors held torque, then speed".into());
         Ok(())
@@ -149,11 +149,11 @@ impl<'a> Story<'a> {
         }
         motor.stop()?;
         let target = CentiDegrees::from_degrees(810.0);
-        motor.move_to(target, Some(SpeedLimit(500)))?;
+        motor.set_position(target, Some(SpeedLimit(500)))?;
         let mut reached = 0.0;
         self.until("RMD motor 1 reaches 810°", |_| {
             reached = motor.multi_turn_angle()?.degrees();
-            Ok((reached - target.degrees()).abs() < 0.05 && motor.status2()?.speed.0 == 0)
+            Ok((reached - target.degrees()).abs() < 0.05 && motor.motion_status()?.speed.0 == 0)
         })?;
         self.done.push(format!("an RMD motor went to {reached:.2}° and stayed there"));
         Ok(())
@@ -239,7 +239,7 @@ impl<'a> Story<'a> {
 
     fn rmd_row(&self, id: u8) -> Result<Row, Failure> {
         let motor = self.bus.motor(id)?;
-        let (state, motion) = (motor.status1()?, motor.status2()?);
+        let (state, motion) = (motor.status()?, motor.motion_status()?);
         let turning = motion.speed.0 != 0 || motion.iq.0 != 0;
         let status = match (state.errors.is_empty(), turning) {
             (false, _) => state.errors.to_string(),

@@ -145,7 +145,7 @@ fn guard_st(args: &StArgs) -> Result<(), Failure> {
     let relay = Relay::st(&port, args.common.options())?;
     match args.common.spin {
         Some(speed) => Proof::st(port, args.motor, speed).show(relay, args.common.json),
-        None => serve(relay, "stmcp", &port, &args.serve, args.common.json),
+        None => serve(relay, "st", &port, &args.serve, args.common.json),
     }
 }
 

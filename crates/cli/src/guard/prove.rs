@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use motorlink::port::PortName;
 use motorlink::relay::{Event, Relay};
 use motorlink::rmd::{self, Bus, CentiDps};
-use motorlink::stmcp::{self, Client, Ramp, Request, register};
+use motorlink::st::{self, Client, Ramp, Request, register};
 use motorlink_link::serve::ServeName;
 use serde_json::json;
 
@@ -92,7 +92,7 @@ impl Drive {
     fn open(protocol: Protocol, port: &PortName, motor: u8) -> Result<Self, Failure> {
         Ok(match protocol {
             Protocol::St => {
-                let client = Client::open(port, stmcp::Options::default())?;
+                let client = Client::open(port, st::Options::default())?;
                 Drive::St { client: Box::new(client), motor }
             }
             Protocol::Rmd => {
@@ -110,7 +110,7 @@ impl Drive {
                 client.motor(*motor)?.start()?;
             }
             Drive::Rmd { bus, id } => {
-                bus.motor(*id)?.speed(CentiDps(speed.saturating_mul(100)))?;
+                bus.motor(*id)?.set_speed(CentiDps(speed.saturating_mul(100)))?;
             }
         }
         Ok(())
@@ -119,7 +119,7 @@ impl Drive {
     fn speed(&self) -> Result<f64, Failure> {
         Ok(match self {
             Drive::St { client, motor } => client.motor(*motor)?.read(register::SPEED_MEAS)?.into(),
-            Drive::Rmd { bus, id } => bus.motor(*id)?.status2()?.speed.dps(),
+            Drive::Rmd { bus, id } => bus.motor(*id)?.motion_status()?.speed.dps(),
         })
     }
 }

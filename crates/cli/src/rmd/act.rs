@@ -1,8 +1,8 @@
 //! Commands that change something in a motor.
 
 use motorlink::rmd::{
-    CentiDegrees, CentiDps, CircleAngle, Code, DpsPerSecond, Error, FullTurn, Gains, MotionStatus,
-    MotorSet, SpeedLimit, Spin, Torque, Torque4, TorqueCommand, inward,
+    CentiDegrees, CentiDps, Code, DpsPerSecond, Error, FullTurn, IqCommand, MotionStatus, MotorSet,
+    Pid, SetTorque, SetTorque4, SpeedLimit, SpinDirection, TurnCentiDegrees, inward,
 };
 use serde_json::{Map, Value, json};
 
@@ -30,13 +30,13 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             )])
         }
         Act::Accel { dps_per_second: Some(limit) } => {
-            motor.write_acceleration(DpsPerSecond(limit))?;
+            motor.write_acceleration_ram(DpsPerSecond(limit))?;
             output.done(format!("motor {id} accelerates with {limit} °/s² until power-off"))
         }
         Act::Encoder { offset } => encoder(session, offset),
         Act::Zero => {
             session.rom("setting the zero")?;
-            let offset = motor.write_zero_to_rom()?;
+            let offset = motor.write_zero_rom()?;
             output.result(
                 format!("motor {id} has its zero here from the next power-on on (offset {offset})"),
                 json!({ "ok": true, "offset": offset }),
@@ -56,15 +56,15 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         }
         Act::Torque { amps } => {
             let torque = torque(session, amps)?;
-            output.rows(&motion(session, &motor.torque(torque)?))
+            output.rows(&motion(session, &motor.set_torque(torque)?))
         }
         Act::Speed { dps } => {
             let speed = CentiDps(digits(session, dps, CentiDps::SCALE, "°/s")?);
-            output.rows(&motion(session, &motor.speed(speed)?))
+            output.rows(&motion(session, &motor.set_speed(speed)?))
         }
         Act::Move { degrees, max_speed, direction: None, .. } => {
             let angle = CentiDegrees(digits(session, degrees, CentiDegrees::SCALE, "°")?);
-            let status = motor.move_to(angle, greatest_speed(session, max_speed)?)?;
+            let status = motor.set_position(angle, greatest_speed(session, max_speed)?)?;
             output.rows(&motion(session, &status))
         }
         Act::Move { degrees, max_speed, direction: Some(direction), full_turn } => {
@@ -83,7 +83,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
                 status.errors
             )))
         }
-        Act::Torque4 { amps } => torque4(session, &amps),
+        Act::Torque4 { amps } => set_torque4(session, &amps),
         Act::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
     }
 }
@@ -91,17 +91,17 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
 fn pid(session: &Session, gains: &[u8]) -> Result<(), Failure> {
     let motor = session.motor()?;
     if let &[position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki] = gains {
-        let gains = Gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki };
+        let gains = Pid { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki };
         if session.write_rom {
-            motor.write_gains_to_rom(gains)?;
+            motor.write_pid_rom(gains)?;
             return session.output.done(format!("motor {} has these gains for good", motor.id()));
         }
-        motor.write_gains(gains)?;
+        motor.write_pid_ram(gains)?;
         return session
             .output
             .done(format!("motor {} has these gains until power-off", motor.id()));
     }
-    let gains = motor.gains()?;
+    let gains = motor.pid()?;
     let row = |name, gain: u8| (name, gain.to_string(), json!(gain));
     session.confirmed()?.rows(&[
         row("position_kp", gains.position_kp),
@@ -117,7 +117,7 @@ fn encoder(session: &Session, offset: Option<u16>) -> Result<(), Failure> {
     let motor = session.motor()?;
     if let Some(offset) = offset {
         session.rom("setting the encoder offset")?;
-        let taken = motor.write_encoder_offset_to_rom(offset)?;
+        let taken = motor.write_encoder_offset_rom(offset)?;
         if taken != offset {
             return Err(Failure::Refused(format!(
                 "motor {} took the offset {taken} instead of {offset}: its encoder is narrower",
@@ -143,35 +143,37 @@ fn turn(
     direction: Direction,
     full_turn: &args::FullTurn,
 ) -> Result<MotionStatus, Failure> {
-    let angle = CircleAngle(digits(session, degrees, CircleAngle::SCALE, "°")?);
+    let angle = TurnCentiDegrees(digits(session, degrees, TurnCentiDegrees::SCALE, "°")?);
     let (spin, other) = match direction {
-        Direction::Cw => (Spin::Clockwise, "ccw"),
-        Direction::Ccw => (Spin::Counterclockwise, "cw"),
+        Direction::Cw => (SpinDirection::Clockwise, "ccw"),
+        Direction::Ccw => (SpinDirection::Counterclockwise, "cw"),
     };
     let full_turn = match *full_turn {
         args::FullTurn { full_turn: true, .. } => FullTurn::Allowed,
         args::FullTurn { tolerance: None, .. } => FullTurn::default(),
         args::FullTurn { tolerance: Some(degrees), .. } => FullTurn::Refused {
-            tolerance: CircleAngle(digits(session, degrees, CircleAngle::SCALE, "°")?),
+            tolerance: TurnCentiDegrees(digits(session, degrees, TurnCentiDegrees::SCALE, "°")?),
         },
     };
-    session.motor()?.turn_to(angle, spin, max_speed, full_turn).map_err(|error| match error {
-        Error::FullTurn { past: CircleAngle(0), .. } => {
-            Failure::Usage(format!("{error}; `--full-turn` sends it all the same"))
+    session.motor()?.set_single_turn_position(angle, spin, max_speed, full_turn).map_err(|error| {
+        match error {
+            Error::FullTurn { past: TurnCentiDegrees(0), .. } => {
+                Failure::Usage(format!("{error}; `--full-turn` sends it all the same"))
+            }
+            Error::FullTurn { .. } => Failure::Usage(format!(
+                "{error}; try `--direction {other}`, or `--full-turn` if it may be a full turn"
+            )),
+            error => error.into(),
         }
-        Error::FullTurn { .. } => Failure::Usage(format!(
-            "{error}; try `--direction {other}`, or `--full-turn` if it may be a full turn"
-        )),
-        error => error.into(),
     })
 }
 
-fn torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
-    let mut torques = [TorqueCommand(0); 4];
+fn set_torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
+    let mut torques = [IqCommand(0); 4];
     for (slot, &amps) in torques.iter_mut().zip(amps) {
         *slot = torque(session, amps)?;
     }
-    let replies = session.bus.torque4(Torque4(torques), MotorSet::TORQUE4)?;
+    let replies = session.bus.set_torque4(SetTorque4(torques), MotorSet::TORQUE4)?;
     let mut silent = None;
     for (reply, id) in replies.into_iter().zip(1..) {
         match reply {
@@ -211,14 +213,14 @@ fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
     line(&hex(&reply))
 }
 
-fn torque(session: &Session, amps: f64) -> Result<TorqueCommand, Failure> {
-    let torque = TorqueCommand(digits(session, amps, TorqueCommand::SCALE, "A")?);
-    if torque.0.unsigned_abs() <= Torque::MAX.0.unsigned_abs() {
+fn torque(session: &Session, amps: f64) -> Result<IqCommand, Failure> {
+    let torque = IqCommand(digits(session, amps, IqCommand::SCALE, "A")?);
+    if torque.0.unsigned_abs() <= SetTorque::MAX.0.unsigned_abs() {
         return Ok(torque);
     }
     let (most, unit) = match session.raw {
-        true => (f64::from(Torque::MAX.0), "digits"),
-        false => (Torque::MAX.amps(), "A"),
+        true => (f64::from(SetTorque::MAX.0), "digits"),
+        false => (SetTorque::MAX.amps(), "A"),
     };
     Err(Failure::Usage(format!("{amps} {unit} is beyond ±{most} {unit}; nothing was sent")))
 }

@@ -1,7 +1,7 @@
 //! Commands that read.
 
 use motorlink::rmd::{
-    Celsius, Errors, Found, MotionStatus, MotorId, MotorSet, PhaseCurrents, Status1,
+    Celsius, Errors, Found, MotionStatus, MotorId, MotorSet, PhaseCurrents, Status,
 };
 use serde_json::{Value, json};
 
@@ -73,9 +73,9 @@ pub fn status(session: &Session, repeat: Repeat) -> Result<(), Failure> {
     show(session, repeat, |session| {
         let motor = session.motor()?;
         let mut rows = vec![("id", motor.id().to_string(), json!(motor.id().number()))];
-        rows.extend(status1(session, &motor.status1()?));
-        rows.extend(motion(session, &motor.status2()?).into_iter().skip(1));
-        rows.extend(phases(session, &motor.status3()?));
+        rows.extend(status1(session, &motor.status()?));
+        rows.extend(motion(session, &motor.motion_status()?).into_iter().skip(1));
+        rows.extend(phases(session, &motor.phase_currents()?));
         rows.extend(angles(session)?);
         Ok(rows)
     })
@@ -118,14 +118,14 @@ fn show(
 
 fn angles(session: &Session) -> Result<Vec<Row>, Failure> {
     let motor = session.motor()?;
-    let (multi, circle) = (motor.multi_turn_angle()?, motor.circle_angle()?);
+    let (multi, circle) = (motor.multi_turn_angle()?, motor.single_turn_angle()?);
     Ok(vec![
         value(session, "angle", multi.0, multi.degrees(), 2, "°"),
         value(session, "circle_angle", circle.0.into(), circle.degrees(), 2, "°"),
     ])
 }
 
-pub fn status1(session: &Session, status: &Status1) -> Vec<Row> {
+pub fn status1(session: &Session, status: &Status) -> Vec<Row> {
     let errors = if session.raw { json!(status.errors.0) } else { names(status.errors) };
     vec![
         temperature(session, status.temperature),

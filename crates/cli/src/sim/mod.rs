@@ -9,7 +9,7 @@ use std::os::fd::AsFd;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use motorlink::stmcp::Profile;
+use motorlink::st::Profile;
 use motorlink_link::serve::ServeName;
 use motorlink_testbench::{Bench, BenchConfig, ConfigError, RomError, RomFolder, ServeError};
 use rustix::process::getpgrp;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use motorlink::stmcp::{
+use motorlink::st::{
     Command as Execute, Flags, Profile, REVUP_PHASES, RevupPhase, Status, VERIFY_ATTEMPTS,
     find_register, parse_value,
 };

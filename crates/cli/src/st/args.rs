@@ -1,7 +1,7 @@
 //! What `motorlink st` takes.
 
 use clap::Subcommand;
-use motorlink::stmcp::Profile;
+use motorlink::st::Profile;
 
 use crate::connection::Connection;
 use crate::repeat::Repeat;

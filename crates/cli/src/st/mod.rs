@@ -7,7 +7,7 @@ mod scan;
 
 use std::time::Duration;
 
-use motorlink::stmcp::{Client, Config, MotorHandle, Options, Profile, Recovery};
+use motorlink::st::{Client, Config, MotorHandle, Options, Profile, Recovery};
 use motorlink::time;
 
 pub use args::{Args, parse_profile};

@@ -1,6 +1,6 @@
 //! Commands that read.
 
-use motorlink::stmcp::{Flags, Profile, Reading, RegisterId, Status, find_register, register};
+use motorlink::st::{Flags, Profile, Reading, RegisterId, Status, find_register, register};
 use serde_json::{Map, Value, json};
 
 use super::Session;

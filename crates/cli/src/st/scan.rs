@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 use motorlink::port::PortError;
-use motorlink::stmcp::{BAUD_RATES, Finding, scan_baud};
+use motorlink::st::{BAUD_RATES, Finding, scan_baud};
 use serde_json::json;
 
 use crate::connection::Connection;

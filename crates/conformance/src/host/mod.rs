@@ -43,7 +43,7 @@ pub enum Task {
     /// Read the multi-turn angles of motors 1 to 4 at once.
     Cycle,
     /// Send torques to motors 1 to 4 in one frame and read the torque currents from the replies.
-    Torque4,
+    SetTorque4,
 }
 
 impl Task {
@@ -53,7 +53,7 @@ impl Task {
             Task::Start | Task::Off => 0,
             Task::Read | Task::Echoed | Task::Clear => READINGS,
             Task::Alternate => 2 * READINGS,
-            Task::Cycle | Task::Torque4 => 4 * READINGS,
+            Task::Cycle | Task::SetTorque4 => 4 * READINGS,
         }
     }
 }

@@ -103,7 +103,7 @@ impl Bench {
 
     fn answers_to(&self, request: [u8; 8], data: [u8; 8]) -> Result<[u8; 8], Stop> {
         let code = request[0];
-        let printed = code == u8::from(Code::ClearErrors) && data[0] == u8::from(Code::ReadStatus1);
+        let printed = code == u8::from(Code::ClearErrors) && data[0] == u8::from(Code::ReadStatus);
         self.require(data[0] == code || printed, format!("a reply with DATA[0] = {code:02X}"))?;
         Ok(data)
     }

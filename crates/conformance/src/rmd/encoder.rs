@@ -44,18 +44,18 @@ fn readings() -> Vec<Case<Bench>> {
             |bench| {
                 let Encoder { position, raw, offset } = bench.read(ReadEncoder)?;
                 within_turn(bench, &[position, raw, offset])?;
-                let encoder = bench.read(ReadStatus2)?.encoder;
+                let encoder = bench.read(ReadMotionStatus)?.encoder;
                 within_turn(bench, &[encoder])
             },
         ),
         case("status_2_has_the_encoder_position", &["RMD-9C-06", "RMD-90-04"], |bench| {
             let position = bench.read_position()?;
             let read = bench.degrees(position);
-            let encoder = bench.read(ReadStatus2)?.encoder;
+            let encoder = bench.read(ReadMotionStatus)?.encoder;
             near(bench, bench.degrees(encoder), read, "the position that 0x90 reads")
         }),
         case("the_single_turn_angle_is_0_to_35999", &["RMD-94-04", "RMD-94-06"], |bench| {
-            let angle = bench.read(ReadCircleAngle)?.angle;
+            let angle = bench.read(ReadSingleTurnAngle)?.angle;
             bench.require(angle.0 < FULL_TURN, "an angle of 0 to 35999")
         }),
         case(
@@ -64,7 +64,7 @@ fn readings() -> Vec<Case<Bench>> {
             |bench| {
                 let position = bench.read_position()?;
                 let position = bench.degrees(position);
-                let angle = bench.read(ReadCircleAngle)?.angle.degrees();
+                let angle = bench.read(ReadSingleTurnAngle)?.angle.degrees();
                 near(bench, angle, position, "the angle of the encoder position in 0x90")
             },
         )
@@ -73,7 +73,7 @@ fn readings() -> Vec<Case<Bench>> {
             "the_multi_turn_angle_within_the_turn_is_the_single_turn_angle",
             &["RMD-94-06", "RMD-92-05", "RMD-92-03"],
             |bench| {
-                let circle = bench.read(ReadCircleAngle)?.angle.degrees();
+                let circle = bench.read(ReadSingleTurnAngle)?.angle.degrees();
                 let multi = bench.read(ReadMultiTurnAngle)?.angle.degrees();
                 near(bench, multi, circle, "modulo 360° the angle that 0x94 reads")
             },
@@ -89,8 +89,8 @@ fn offset() -> Vec<Case<Bench>> {
             &["RMD-91-02", "RMD-91-01", "RMD-91-04", "RMD-91-05", "RMD-91-06", "RMD-2-07"],
             |bench| {
                 let offset = bench.another_offset()?;
-                let data = bench.ask_once(WriteEncoderOffset(offset).encode())?;
-                null_bytes_are_0(bench, Code::WriteEncoderOffset, &data)?;
+                let data = bench.ask_once(WriteEncoderOffsetRom(offset).encode())?;
+                null_bytes_are_0(bench, Code::WriteEncoderOffsetRom, &data)?;
                 let reply = EncoderOffset::decode(&data);
                 bench.require(reply == offset, format!("the new offset {}", offset.offset))?;
                 offset_is(bench, offset).read_as(R8)
@@ -99,8 +99,8 @@ fn offset() -> Vec<Case<Bench>> {
         .needs(&[Need::Rom]),
         case("null_bytes_of_an_offset_do_not_matter", &["RMD-91-05", "RMD-91-01"], |bench| {
             let offset = bench.another_offset()?;
-            let code = Code::WriteEncoderOffset;
-            let sent = filled(WriteEncoderOffset(offset).encode(), code, 0xA5);
+            let code = Code::WriteEncoderOffsetRom;
+            let sent = filled(WriteEncoderOffsetRom(offset).encode(), code, 0xA5);
             let reply = bench.ask(sent)?;
             null_bytes_are_0(bench, code, &reply)?;
             offset_is(bench, offset)
@@ -113,7 +113,7 @@ fn offset() -> Vec<Case<Bench>> {
             }
             bench.keep_offset()?;
             let EncoderOffset { offset } =
-                bench.read(WriteEncoderOffset(EncoderOffset { offset: u16::MAX }))?;
+                bench.read(WriteEncoderOffsetRom(EncoderOffset { offset: u16::MAX }))?;
             within_turn(bench, &[offset])?;
             offset_is(bench, EncoderOffset { offset })
         })
@@ -121,7 +121,7 @@ fn offset() -> Vec<Case<Bench>> {
         .reading(R19),
         case("a_written_offset_outlasts_the_power", &["RMD-91-07"], |bench| {
             let offset = bench.another_offset()?;
-            bench.read(WriteEncoderOffset(offset))?;
+            bench.read(WriteEncoderOffsetRom(offset))?;
             bench.power_cycle()?;
             offset_is(bench, offset)
         })
@@ -130,10 +130,10 @@ fn offset() -> Vec<Case<Bench>> {
         case("a_position_that_is_held_stays_when_the_offset_moves", &["RMD-91-02"], |bench| {
             bench.gently()?;
             let angle = CentiDegrees(bench.angle_in_reach()?);
-            bench.command(PositionLimited { max_speed: SpeedLimit(30), angle })?;
+            bench.command(SetPositionLimited { max_speed: SpeedLimit(30), angle })?;
             let before = bench.keep_offset()?.raw;
             let offset = bench.another_offset()?;
-            bench.read(WriteEncoderOffset(offset))?;
+            bench.read(WriteEncoderOffsetRom(offset))?;
             bench.watch(500, |_| false)?;
             let after = bench.read(ReadEncoder)?.raw;
             let (after, before) = (bench.degrees(after), bench.degrees(before));
@@ -152,9 +152,9 @@ fn zero() -> Vec<Case<Bench>> {
             |bench| {
                 // Where the motor stands at its zero, the old offset would do as well.
                 let elsewhere = bench.another_offset()?;
-                bench.read(WriteEncoderOffset(elsewhere))?;
+                bench.read(WriteEncoderOffsetRom(elsewhere))?;
                 let raw = bench.keep_offset()?.raw;
-                let code = Code::WriteZeroToRom;
+                let code = Code::WriteZeroRom;
                 let stale = bench.ask_once(filled(request(code), code, 0xA5)).map(drop);
                 bench.note(R4, stale)?;
                 let reply = bench.ask_once(request(code))?;
@@ -167,9 +167,9 @@ fn zero() -> Vec<Case<Bench>> {
         .needs(&[Need::Rom]),
         case("a_new_zero_does_not_act_before_power_on", &["RMD-19-02"], |bench| {
             let offset = bench.another_offset()?;
-            bench.read(WriteEncoderOffset(offset))?;
+            bench.read(WriteEncoderOffsetRom(offset))?;
             let before = bench.read(ReadEncoder)?;
-            bench.read(WriteZeroToRom)?;
+            bench.read(WriteZeroRom)?;
             let after = bench.read(ReadEncoder)?;
             let shown = bench.require(after.offset == before.offset, "the offset as before");
             bench.note(R9, shown)?;
@@ -179,8 +179,8 @@ fn zero() -> Vec<Case<Bench>> {
         .needs(&[Need::Rom]),
         case("a_new_zero_acts_from_power_on", &["RMD-19-02", "RMD-19-03"], |bench| {
             let offset = bench.another_offset()?;
-            bench.read(WriteEncoderOffset(offset))?;
-            let zero = bench.read(WriteZeroToRom)?;
+            bench.read(WriteEncoderOffsetRom(offset))?;
+            let zero = bench.read(WriteZeroRom)?;
             bench.power_cycle()?;
             offset_is(bench, zero)
         })
@@ -200,7 +200,8 @@ fn below_0(bench: &mut Bench) -> Result<(), Stop> {
         )));
     }
     bench.gently()?;
-    bench.command(PositionLimited { max_speed: SpeedLimit(180), angle: CentiDegrees(TARGET) })?;
+    bench
+        .command(SetPositionLimited { max_speed: SpeedLimit(180), angle: CentiDegrees(TARGET) })?;
     let arrived = bench.watch(8_000, |seen| seen.angle < -500)?;
     bench.require(arrived, "an angle that falls to -10°")
 }

@@ -11,15 +11,15 @@ use crate::reading::{R4, R11, R30, R42};
 /// Commands that only ask: what tests that one reply comes, that its NULL bytes are 0, that those of
 /// the request do not matter.
 const QUESTIONS: [(Code, Clauses, Clauses, Clauses); 9] = [
-    (Code::ReadGains, &["RMD-30-02", "RMD-2-01"], &["RMD-30-03"], &["RMD-30-01"]),
+    (Code::ReadPid, &["RMD-30-02", "RMD-2-01"], &["RMD-30-03"], &["RMD-30-01"]),
     (Code::ReadAcceleration, &["RMD-33-02", "RMD-2-04"], &["RMD-33-03"], &["RMD-33-01"]),
     (Code::ReadEncoder, &["RMD-90-02", "RMD-2-06"], &["RMD-90-03"], &["RMD-90-01"]),
     (Code::ReadMultiTurnAngle, &["RMD-92-02", "RMD-2-09"], &[], &["RMD-92-01"]),
-    (Code::ReadCircleAngle, &["RMD-94-02", "RMD-2-10"], &["RMD-94-03"], &["RMD-94-01"]),
-    (Code::ReadStatus1, &["RMD-9A-02", "RMD-2-11"], &["RMD-9A-06"], &["RMD-9A-01"]),
+    (Code::ReadSingleTurnAngle, &["RMD-94-02", "RMD-2-10"], &["RMD-94-03"], &["RMD-94-01"]),
+    (Code::ReadStatus, &["RMD-9A-02", "RMD-2-11"], &["RMD-9A-06"], &["RMD-9A-01"]),
     (Code::ClearErrors, &["RMD-9B-03", "RMD-2-12"], &["RMD-9B-07"], &["RMD-9B-01"]),
-    (Code::ReadStatus2, &["RMD-9C-02", "RMD-2-13"], &[], &["RMD-9C-01"]),
-    (Code::ReadStatus3, &["RMD-9D-02", "RMD-2-14"], &["RMD-9D-03"], &["RMD-9D-01"]),
+    (Code::ReadMotionStatus, &["RMD-9C-02", "RMD-2-13"], &[], &["RMD-9C-01"]),
+    (Code::ReadPhaseCurrents, &["RMD-9D-02", "RMD-2-14"], &["RMD-9D-03"], &["RMD-9D-01"]),
 ];
 
 /// What a request is made of.
@@ -28,22 +28,22 @@ type Request = fn(&mut Bench) -> Result<[u8; 8], Stop>;
 /// Commands whose reply is the request: a request that changes nothing, and what tests the echo.
 const ECHOES: [(Code, Request, Clauses, &[Need]); 6] = [
     (
-        Code::WriteGains,
-        |bench| Ok(WriteGains(bench.keep_gains()?).encode()),
+        Code::WritePidRam,
+        |bench| Ok(WritePidRam(bench.keep_gains()?).encode()),
         &["RMD-31-04", "RMD-31-01", "RMD-2-02"],
         &[],
     ),
     (
-        Code::WriteGainsToRom,
-        |bench| Ok(WriteGainsToRom(bench.keep_rom_gains()?).encode()),
+        Code::WritePidRom,
+        |bench| Ok(WritePidRom(bench.keep_rom_gains()?).encode()),
         &["RMD-32-03", "RMD-32-01", "RMD-2-03"],
         &[Need::Rom],
     ),
     (
-        Code::WriteAcceleration,
+        Code::WriteAccelerationRam,
         |bench| {
             let acceleration = bench.keep_acceleration()?;
-            Ok(WriteAcceleration(Acceleration { acceleration }).encode())
+            Ok(WriteAccelerationRam(Acceleration { acceleration }).encode())
         },
         &["RMD-34-05", "RMD-34-01", "RMD-2-05"],
         &[],
@@ -72,7 +72,7 @@ fn nobodys() -> impl Iterator<Item = u8> {
 pub(super) fn cases() -> Vec<Case<Bench>> {
     let mut cases = vec![
         case("a_reply_has_the_identifier_of_its_motor", &["RMD-1-01"], |bench| {
-            let frames = bench.replies(&[bench.frame(ReadStatus1.encode())])?;
+            let frames = bench.replies(&[bench.frame(ReadStatus.encode())])?;
             let own = u32::from(bench.id().can_id());
             let same = frames.iter().any(|frame| frame.id() == own && !frame.is_extended());
             bench.require(same, format!("a reply on {own:#05x}"))
@@ -80,18 +80,18 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         case(
             "a_reply_is_a_standard_data_frame_of_8_bytes",
             &["RMD-1-03", "RMD-1-04", "RMD-1-05"],
-            |bench| bench.ask(ReadStatus1.encode()).map(|_| ()),
+            |bench| bench.ask(ReadStatus.encode()).map(|_| ()),
         ),
         case("frames_of_other_lengths_are_ignored", &["RMD-1-05", "RMD-1-06"], |bench| {
             let id = bench.id().can_id().into();
-            let status = ReadStatus1.encode();
+            let status = ReadStatus.encode();
             let short = (0..8).map(|len| CanFrame::data_frame(id, false, &status[..len]));
             silent(bench, &short.collect::<Vec<_>>())
         })
         .reading(R11),
         case("frames_with_29_bits_are_ignored", &["RMD-1-04", "RMD-1-06"], |bench| {
             let id = bench.id().can_id().into();
-            let status = ReadStatus1.encode();
+            let status = ReadStatus.encode();
             silent(bench, &[CanFrame::data_frame(id, true, &status)])
         })
         .reading(R11),
@@ -103,12 +103,12 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         case("frames_to_others_are_ignored", &["RMD-1-01", "RMD-1-06"], |bench| {
             let own = bench.id();
             let others = (1..=32).filter_map(MotorId::new).filter(|id| *id != own);
-            let status = ReadStatus1.encode();
+            let status = ReadStatus.encode();
             let frames = others.map(|id| CanFrame::new(id.can_id(), status));
             silent(bench, &frames.collect::<Vec<_>>())
         }),
         case("frames_to_ids_that_do_not_exist_are_ignored", &["RMD-1-06"], |bench| {
-            let status = ReadStatus1.encode();
+            let status = ReadStatus.encode();
             silent(bench, &[0, 33].map(|id| CanFrame::new(MOTOR_BASE + id, status)))
         })
         .reading(R42),
@@ -150,7 +150,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             for stale in STALE {
                 let reply = bench.ask(filled(request(code), code, stale))?;
                 null_bytes_are_0(bench, code, &reply)?;
-                let steady = matches!(code, Code::ReadGains | Code::ReadAcceleration);
+                let steady = matches!(code, Code::ReadPid | Code::ReadAcceleration);
                 bench.require(!steady || reply == plain, "the same reply as without them")?;
             }
             Ok(())
@@ -188,7 +188,7 @@ pub(super) fn request(code: Code) -> [u8; 8] {
 /// Clearing errors is only a question while there are none.
 fn question(bench: &mut Bench, code: Code) -> Result<(), Stop> {
     if code == Code::ClearErrors {
-        let errors = bench.read(ReadStatus1)?.errors;
+        let errors = bench.read(ReadStatus)?.errors;
         if !errors.is_empty() {
             return Err(Stop::Skipped(format!("the motor has an error that would go: {errors}")));
         }
@@ -223,7 +223,7 @@ fn nulls(fields: &'static [Field]) -> impl Iterator<Item = usize> {
 fn silent(bench: &mut Bench, frames: &[CanFrame]) -> Result<(), Stop> {
     let answers = bench.answers(frames)?;
     bench.require(answers.is_empty(), "silence")?;
-    bench.ask(ReadStatus1.encode()).map(|_| ())
+    bench.ask(ReadStatus.encode()).map(|_| ())
 }
 
 /// Sends command bytes that the motor must not know, a few at a time: a controller's mailboxes are

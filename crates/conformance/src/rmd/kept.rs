@@ -13,10 +13,10 @@ use crate::world::Unavailable;
 /// What was found and is put back, where a case touched it.
 #[derive(Debug, Default)]
 pub(super) struct Kept {
-    gains: Option<Gains>,
+    gains: Option<Pid>,
     acceleration: Option<DpsPerSecond>,
     /// The gains in ROM.
-    rom_gains: Option<Gains>,
+    rom_gains: Option<Pid>,
     offset: Option<u16>,
     fault: bool,
     moved: bool,
@@ -74,7 +74,7 @@ impl Bench {
 
     /// Status 2, of a motor that may not be there.
     fn status_of_somebody(&mut self) -> Result<MotionStatus, Stop> {
-        let status = self.read(ReadStatus2);
+        let status = self.read(ReadMotionStatus);
         if self.heard || self.foreign.is_some() || self.answers_at_all()? {
             return status;
         }
@@ -85,13 +85,13 @@ impl Bench {
     }
 
     fn answers_at_all(&mut self) -> Result<bool, Stop> {
-        let replies = self.replies(&[self.frame(ReadStatus1.encode())])?;
+        let replies = self.replies(&[self.frame(ReadStatus.encode())])?;
         Ok(replies.iter().any(|frame| self.is_own(frame)))
     }
 
     /// The gains; remembers them.
-    pub(super) fn keep_gains(&mut self) -> Result<Gains, Stop> {
-        let gains = self.read(ReadGains)?;
+    pub(super) fn keep_gains(&mut self) -> Result<Pid, Stop> {
+        let gains = self.read(ReadPid)?;
         self.kept.gains.get_or_insert(gains);
         Ok(gains)
     }
@@ -105,12 +105,12 @@ impl Bench {
 
     /// The gains in ROM, as far as they can be known: those that a power-on brings, or without one
     /// those that are in force. Remembers them.
-    pub(super) fn keep_rom_gains(&mut self) -> Result<Gains, Stop> {
+    pub(super) fn keep_rom_gains(&mut self) -> Result<Pid, Stop> {
         self.keep_gains()?;
         if self.options.allowed.contains(&Need::PowerCycle) {
             self.power_cycle()?;
         }
-        let gains = self.read(ReadGains)?;
+        let gains = self.read(ReadPid)?;
         self.kept.rom_gains.get_or_insert(gains);
         Ok(gains)
     }
@@ -226,16 +226,16 @@ impl Bench {
             return Ok(());
         }
         if let Some(gains) = kept.rom_gains {
-            self.ask(WriteGainsToRom(gains).encode())?;
+            self.ask(WritePidRom(gains).encode())?;
         }
         if let Some(offset) = kept.offset {
-            self.read(WriteEncoderOffset(EncoderOffset { offset }))?;
+            self.read(WriteEncoderOffsetRom(EncoderOffset { offset }))?;
         }
         if self.options.allowed.contains(&Need::PowerCycle) {
             self.cycle()?;
         }
         if let Some(gains) = kept.rom_gains {
-            let read = self.read(ReadGains)?;
+            let read = self.read(ReadPid)?;
             self.require(read == gains, format!("the gains in ROM as they were: {gains:?}"))?;
         }
         if let Some(offset) = kept.offset {
@@ -246,14 +246,14 @@ impl Bench {
         Ok(())
     }
 
-    fn put_back_gains(&mut self, gains: Gains) -> Result<(), Stop> {
-        self.ask(WriteGains(gains).encode())?;
-        let read = self.read(ReadGains)?;
+    fn put_back_gains(&mut self, gains: Pid) -> Result<(), Stop> {
+        self.ask(WritePidRam(gains).encode())?;
+        let read = self.read(ReadPid)?;
         self.require(read == gains, format!("the gains as they were: {gains:?}"))
     }
 
     fn put_back_acceleration(&mut self, acceleration: DpsPerSecond) -> Result<(), Stop> {
-        self.ask(WriteAcceleration(Acceleration { acceleration }).encode())?;
+        self.ask(WriteAccelerationRam(Acceleration { acceleration }).encode())?;
         let read = self.read(ReadAcceleration)?.acceleration;
         self.require(read == acceleration, format!("the limit as it was: {acceleration}"))
     }

@@ -2,7 +2,7 @@
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::units::TorqueCommand;
+use motorlink_proto::units::IqCommand;
 
 use super::bench::Bench;
 use super::case;
@@ -47,8 +47,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             reach(bench)?;
             let slot = usize::from(bench.id().number() - 1);
             let request = move |_: &Bench, digits| {
-                let mut torques = [TorqueCommand(0); 4];
-                torques[slot] = TorqueCommand(digits);
+                let mut torques = [IqCommand(0); 4];
+                torques[slot] = IqCommand(digits);
                 frame(torques)
             };
             let amps = pulses(bench, request, torque)?;
@@ -70,7 +70,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
                 return Err(Stop::Skipped("needs a motor with an ID beyond 4".to_owned()));
             }
             bench.may_move();
-            let answers = bench.answers(&[frame([TorqueCommand(0); 4])])?;
+            let answers = bench.answers(&[frame([IqCommand(0); 4])])?;
             bench.require(answers.is_empty(), "silence")
         }),
     ]
@@ -79,8 +79,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
     .collect()
 }
 
-fn frame(torques: [TorqueCommand; 4]) -> CanFrame {
-    CanFrame::new(TORQUE4_ID, Torque4(torques).encode())
+fn frame(torques: [IqCommand; 4]) -> CanFrame {
+    CanFrame::new(TORQUE4_ID, SetTorque4(torques).encode())
 }
 
 /// The frame has to reach the motor under test.
@@ -95,7 +95,7 @@ fn reach(bench: &Bench) -> Result<(), Stop> {
 /// at rest, and is switched off in the end.
 fn ask_all(bench: &mut Bench) -> Result<(MotorSet, Vec<CanFrame>), Stop> {
     reach(bench)?;
-    let status = ReadStatus2.encode();
+    let status = ReadMotionStatus.encode();
     let question = |motor: MotorId| CanFrame::new(motor.can_id(), status);
     let there = bench.replies(&MotorSet::TORQUE4.map(question).collect::<Vec<_>>())?;
     let mut motors = MotorSet::EMPTY;
@@ -111,7 +111,7 @@ fn ask_all(bench: &mut Bench) -> Result<(MotorSet, Vec<CanFrame>), Stop> {
     }
     bench.may_move();
     bench.may_move_too(motors);
-    let mut replies = bench.replies(&[frame([TorqueCommand(0); 4])])?;
+    let mut replies = bench.replies(&[frame([IqCommand(0); 4])])?;
     replies.retain(|frame| motor(frame).is_some());
     Ok((motors, replies))
 }

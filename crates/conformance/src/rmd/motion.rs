@@ -2,7 +2,7 @@
 //! limit.
 
 use motorlink_proto::rmd::*;
-use motorlink_proto::units::{CentiDegrees, CentiDps, CircleAngle, SpeedLimit, TorqueCommand};
+use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, SpeedLimit, TurnCentiDegrees};
 
 use super::bench::Bench;
 use super::frames::filled;
@@ -14,37 +14,37 @@ use crate::reading::{R4, R39};
 /// The command, what tests its reply's code, the reply's values, and the NULL bytes of the request.
 const COMMANDS: [(Code, Clauses, Clauses, Clauses); 6] = [
     (
-        Code::Torque,
+        Code::SetTorque,
         &["RMD-A1-05", "RMD-2-18"],
         &["RMD-A1-06", "RMD-A1-07", "RMD-A1-08", "RMD-A1-09"],
         &["RMD-A1-01"],
     ),
     (
-        Code::Speed,
+        Code::SetSpeed,
         &["RMD-A2-05", "RMD-2-19"],
         &["RMD-A2-06", "RMD-A2-07", "RMD-A2-08", "RMD-A2-09"],
         &["RMD-A2-01"],
     ),
     (
-        Code::Position,
+        Code::SetPosition,
         &["RMD-A3-08", "RMD-2-20"],
         &["RMD-A3-09", "RMD-A3-10", "RMD-A3-11", "RMD-A3-12"],
         &["RMD-A3-01"],
     ),
     (
-        Code::PositionLimited,
+        Code::SetPositionLimited,
         &["RMD-A4-08", "RMD-2-21"],
         &["RMD-A4-09", "RMD-A4-10", "RMD-A4-11", "RMD-A4-12"],
         &["RMD-A4-01"],
     ),
     (
-        Code::CirclePosition,
+        Code::SetSingleTurnPosition,
         &["RMD-A5-09", "RMD-2-22"],
         &["RMD-A5-10", "RMD-A5-11", "RMD-A5-12", "RMD-A5-13"],
         &["RMD-A5-01"],
     ),
     (
-        Code::CirclePositionLimited,
+        Code::SetSingleTurnPositionLimited,
         &["RMD-A6-09", "RMD-2-23"],
         &["RMD-A6-10", "RMD-A6-11", "RMD-A6-12", "RMD-A6-13"],
         &["RMD-A6-01"],
@@ -53,11 +53,11 @@ const COMMANDS: [(Code, Clauses, Clauses, Clauses); 6] = [
 
 /// What the acceleration limit holds.
 const LIMITED: [(Code, Clauses); 5] = [
-    (Code::Speed, &["RMD-A2-04", "RMD-34-03"]),
-    (Code::Position, &["RMD-A3-06", "RMD-34-03"]),
-    (Code::PositionLimited, &["RMD-A4-06", "RMD-34-03"]),
-    (Code::CirclePosition, &["RMD-A5-07", "RMD-34-03"]),
-    (Code::CirclePositionLimited, &["RMD-A6-07", "RMD-34-03"]),
+    (Code::SetSpeed, &["RMD-A2-04", "RMD-34-03"]),
+    (Code::SetPosition, &["RMD-A3-06", "RMD-34-03"]),
+    (Code::SetPositionLimited, &["RMD-A4-06", "RMD-34-03"]),
+    (Code::SetSingleTurnPosition, &["RMD-A5-07", "RMD-34-03"]),
+    (Code::SetSingleTurnPositionLimited, &["RMD-A6-07", "RMD-34-03"]),
 ];
 
 pub(super) fn cases() -> Vec<Case<Bench>> {
@@ -73,7 +73,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         cases.push(case(name, values, move |bench| {
             bench.gently()?;
             let request = ahead(bench, code, 0)?;
-            let before = bench.read(ReadStatus2)?;
+            let before = bench.read(ReadMotionStatus)?;
             let reply = MotionStatus::decode(&bench.ask(request)?);
             bench.plausible(&reply)?;
             same(bench, &reply, &before)
@@ -105,16 +105,16 @@ fn ahead(bench: &mut Bench, code: Code, degrees: i32) -> Result<[u8; 8], Stop> {
     let max_speed = SpeedLimit(180);
     let angle = CentiDegrees(bench.angle_in_reach()? + 100 * degrees);
     let nearly = 100 * degrees.max(2);
-    let circle = i32::from(bench.read(ReadCircleAngle)?.angle.0) + nearly;
-    let circle = CircleAngle((circle % i32::from(FULL_TURN)) as u16);
-    let direction = Spin::Clockwise;
+    let circle = i32::from(bench.read(ReadSingleTurnAngle)?.angle.0) + nearly;
+    let circle = TurnCentiDegrees((circle % i32::from(FULL_TURN)) as u16);
+    let direction = SpinDirection::Clockwise;
     Ok(match code {
-        Code::Torque => Torque { torque: TorqueCommand(0) }.encode(),
-        Code::Speed => Speed { speed: CentiDps(100 * degrees) }.encode(),
-        Code::Position => Position { angle }.encode(),
-        Code::PositionLimited => PositionLimited { max_speed, angle }.encode(),
-        Code::CirclePosition => CirclePosition { direction, angle: circle }.encode(),
-        _ => CirclePositionLimited { direction, max_speed, angle: circle }.encode(),
+        Code::SetTorque => SetTorque { iq: IqCommand(0) }.encode(),
+        Code::SetSpeed => SetSpeed { speed: CentiDps(100 * degrees) }.encode(),
+        Code::SetPosition => SetPosition { angle }.encode(),
+        Code::SetPositionLimited => SetPositionLimited { max_speed, angle }.encode(),
+        Code::SetSingleTurnPosition => SetSingleTurnPosition { direction, angle: circle }.encode(),
+        _ => SetSingleTurnPositionLimited { direction, max_speed, angle: circle }.encode(),
     })
 }
 

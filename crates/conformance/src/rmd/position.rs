@@ -1,7 +1,7 @@
 //! Positions (0xA3 to 0xA6).
 
 use motorlink_proto::rmd::*;
-use motorlink_proto::units::{CentiDegrees, CircleAngle, SpeedLimit};
+use motorlink_proto::units::{CentiDegrees, SpeedLimit, TurnCentiDegrees};
 
 use super::bench::Bench;
 use super::{Clauses, case, subject};
@@ -16,25 +16,25 @@ const BEYOND: i64 = 1_000;
 const SLOW: SpeedLimit = SpeedLimit(90);
 /// Greatest speed of moves that take most of a turn, °/s.
 const LONG: SpeedLimit = SpeedLimit(180);
-const CLOCKWISE: Spin = Spin::Clockwise;
-const COUNTERCLOCKWISE: Spin = Spin::Counterclockwise;
+const CLOCKWISE: SpinDirection = SpinDirection::Clockwise;
+const COUNTERCLOCKWISE: SpinDirection = SpinDirection::Counterclockwise;
 
 /// A single-turn command of either kind.
-type Turn = fn(Spin, CircleAngle) -> [u8; 8];
+type Turn = fn(SpinDirection, TurnCentiDegrees) -> [u8; 8];
 
 /// A multi-turn command of either kind.
 type Move = fn(i32) -> [u8; 8];
 
 const MOVES: [(Code, Move, Clauses, Clauses); 2] = [
     (
-        Code::Position,
-        |angle| Position { angle: CentiDegrees(angle) }.encode(),
+        Code::SetPosition,
+        |angle| SetPosition { angle: CentiDegrees(angle) }.encode(),
         &["RMD-A3-02", "RMD-A3-01"],
         &["RMD-A3-03"],
     ),
     (
-        Code::PositionLimited,
-        |angle| PositionLimited { max_speed: LONG, angle: CentiDegrees(angle) }.encode(),
+        Code::SetPositionLimited,
+        |angle| SetPositionLimited { max_speed: LONG, angle: CentiDegrees(angle) }.encode(),
         &["RMD-A4-02", "RMD-A4-01"],
         &["RMD-A4-03"],
     ),
@@ -42,8 +42,8 @@ const MOVES: [(Code, Move, Clauses, Clauses); 2] = [
 
 const TURNS: [(Code, Turn, [Clauses; 5]); 2] = [
     (
-        Code::CirclePosition,
-        |direction, angle| CirclePosition { direction, angle }.encode(),
+        Code::SetSingleTurnPosition,
+        |direction, angle| SetSingleTurnPosition { direction, angle }.encode(),
         [
             &["RMD-A5-03", "RMD-A5-02", "RMD-A5-01"],
             &["RMD-A5-04", "RMD-A5-02"],
@@ -53,8 +53,10 @@ const TURNS: [(Code, Turn, [Clauses; 5]); 2] = [
         ],
     ),
     (
-        Code::CirclePositionLimited,
-        |direction, angle| CirclePositionLimited { direction, max_speed: LONG, angle }.encode(),
+        Code::SetSingleTurnPositionLimited,
+        |direction, angle| {
+            SetSingleTurnPositionLimited { direction, max_speed: LONG, angle }.encode()
+        },
         [
             &["RMD-A6-03", "RMD-A6-02", "RMD-A6-01"],
             &["RMD-A6-04", "RMD-A6-02"],
@@ -77,7 +79,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
     cases.push(case("the_greatest_speed_of_a_turn_holds", &["RMD-A6-06"], |bench| {
         bench.gently()?;
         let angle = bench.circle(9_000)?;
-        let data = CirclePositionLimited { direction: CLOCKWISE, max_speed: SLOW, angle }.encode();
+        let data =
+            SetSingleTurnPositionLimited { direction: CLOCKWISE, max_speed: SLOW, angle }.encode();
         no_faster(bench, data)
     }));
     cases.into_iter().map(|case| case.needs(&[Need::Spin])).collect()
@@ -104,13 +107,13 @@ fn multi_turn() -> Vec<Case<Bench>> {
     cases.push(case("the_greatest_speed_of_a_move_holds", &["RMD-A4-04"], |bench| {
         bench.gently()?;
         let angle = CentiDegrees(bench.angle_in_reach()? + 9_000);
-        no_faster(bench, PositionLimited { max_speed: SLOW, angle }.encode())
+        no_faster(bench, SetPositionLimited { max_speed: SLOW, angle }.encode())
     }));
     let zero = case("with_a_greatest_speed_of_0_nothing_turns", &["RMD-A4-04"], |bench| {
         bench.gently()?;
         let start = bench.angle()?;
         let angle = CentiDegrees(bench.angle_in_reach()? + 2_000);
-        bench.command(PositionLimited { max_speed: SpeedLimit(0), angle })?;
+        bench.command(SetPositionLimited { max_speed: SpeedLimit(0), angle })?;
         stays(bench, start)
     });
     cases.push(zero.reading(R13));
@@ -139,7 +142,7 @@ fn single_turn(code: Code, turn: Turn, clauses: [Clauses; 5]) -> [Case<Bench>; 5
             bench.gently()?;
             let start = bench.angle()?;
             for angle in [FULL_TURN, u16::MAX] {
-                bench.ask(turn(CLOCKWISE, CircleAngle(angle)))?;
+                bench.ask(turn(CLOCKWISE, TurnCentiDegrees(angle)))?;
                 stays(bench, start)?;
             }
             Ok(())
@@ -149,7 +152,7 @@ fn single_turn(code: Code, turn: Turn, clauses: [Clauses; 5]) -> [Case<Bench>; 5
             bench.gently()?;
             let start = bench.angle()?;
             let angle = bench.circle(2_000)?;
-            bench.ask(turn(Spin::Unknown(2), angle))?;
+            bench.ask(turn(SpinDirection::Unknown(2), angle))?;
             stays(bench, start)
         })
         .reading(R15),
@@ -157,7 +160,13 @@ fn single_turn(code: Code, turn: Turn, clauses: [Clauses; 5]) -> [Case<Bench>; 5
 }
 
 /// A single-turn command to an angle that is `further` (0.01°) turns the motor by `by`.
-fn turns(bench: &mut Bench, turn: Turn, way: Spin, further: i32, by: i64) -> Result<(), Stop> {
+fn turns(
+    bench: &mut Bench,
+    turn: Turn,
+    way: SpinDirection,
+    further: i32,
+    by: i64,
+) -> Result<(), Stop> {
     bench.gently()?;
     let (start, angle) = (bench.angle()?, bench.circle(further)?);
     moves(bench, turn(way, angle), start, by)
@@ -202,8 +211,8 @@ fn no_faster(bench: &mut Bench, command: [u8; 8]) -> Result<(), Stop> {
 
 impl Bench {
     /// The single-turn angle `further` (0.01°) clockwise.
-    fn circle(&mut self, further: i32) -> Result<CircleAngle, Stop> {
-        let angle = i32::from(self.read(ReadCircleAngle)?.angle.0) + further;
-        Ok(CircleAngle(angle.rem_euclid(FULL_TURN.into()) as u16))
+    fn circle(&mut self, further: i32) -> Result<TurnCentiDegrees, Stop> {
+        let angle = i32::from(self.read(ReadSingleTurnAngle)?.angle.0) + further;
+        Ok(TurnCentiDegrees(angle.rem_euclid(FULL_TURN.into()) as u16))
     }
 }

@@ -29,7 +29,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         .needs(&[Need::PowerCycle]),
         case("gains_in_rom_outlast_the_power", &["RMD-32-02", "RMD-32-01"], |bench| {
             let gains = others(bench.keep_rom_gains()?);
-            bench.ask(WriteGainsToRom(gains).encode())?;
+            bench.ask(WritePidRom(gains).encode())?;
             bench.power_cycle()?;
             gains_are(bench, gains)
         })
@@ -61,8 +61,8 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
 }
 
 /// Six different gains, each another than it was.
-fn others(gains: Gains) -> Gains {
-    Gains {
+fn others(gains: Pid) -> Pid {
+    Pid {
         position_kp: gains.position_kp ^ 1,
         position_ki: gains.position_ki ^ 2,
         speed_kp: gains.speed_kp ^ 4,
@@ -72,21 +72,21 @@ fn others(gains: Gains) -> Gains {
     }
 }
 
-pub(super) fn write(bench: &mut Bench, gains: Gains) -> Result<(), Stop> {
+pub(super) fn write(bench: &mut Bench, gains: Pid) -> Result<(), Stop> {
     bench.keep_gains()?;
-    bench.ask(WriteGains(gains).encode()).map(|_| ())
+    bench.ask(WritePidRam(gains).encode()).map(|_| ())
 }
 
-fn gains_are(bench: &mut Bench, gains: Gains) -> Result<(), Stop> {
-    let data = bench.ask(ReadGains.encode())?;
-    let bytes = gains.encode_as(Code::ReadGains);
+fn gains_are(bench: &mut Bench, gains: Pid) -> Result<(), Stop> {
+    let data = bench.ask(ReadPid.encode())?;
+    let bytes = gains.encode_as(Code::ReadPid);
     bench.require(data[2..] == bytes[2..], format!("gains {:02X?} in DATA[2] on", &bytes[2..]))
 }
 
 pub(super) fn accelerate(bench: &mut Bench, digits: i32) -> Result<(), Stop> {
     bench.keep_acceleration()?;
     let acceleration = DpsPerSecond(digits);
-    bench.ask(WriteAcceleration(Acceleration { acceleration }).encode()).map(|_| ())
+    bench.ask(WriteAccelerationRam(Acceleration { acceleration }).encode()).map(|_| ())
 }
 
 fn accelerations_are_kept(bench: &mut Bench, values: &[i32]) -> Result<(), Stop> {

@@ -47,9 +47,9 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         case("position_gains_do_not_act_on_speed", &["RMD-31-01", "RMD-30-04"], |bench| {
             bench.gently()?;
             let gains = bench.keep_gains()?;
-            write(bench, Gains { position_kp: 0, position_ki: 0, ..gains })?;
+            write(bench, Pid { position_kp: 0, position_ki: 0, ..gains })?;
             let angle = CentiDegrees(bench.angle_in_reach()? + 3_000);
-            bench.command(PositionLimited { max_speed: SpeedLimit(30), angle })?;
+            bench.command(SetPositionLimited { max_speed: SpeedLimit(30), angle })?;
             let turned = bench.watch(700, |seen| seen.speed.abs() > 10)?;
             bench.require(!turned, "no way to a position without position gains")?;
             runs(bench, 1)
@@ -64,7 +64,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
 /// Gets the motor to 60 °/s, one way or the other.
 pub(super) fn runs(bench: &mut Bench, sign: i16) -> Result<(), Stop> {
     bench.gently()?;
-    bench.command(Speed { speed: CentiDps(100 * i32::from(sign * SPEED)) })?;
+    bench.command(SetSpeed { speed: CentiDps(100 * i32::from(sign * SPEED)) })?;
     keeps_running(bench, sign)
 }
 
@@ -78,7 +78,7 @@ pub(super) fn keeps_running(bench: &mut Bench, sign: i16) -> Result<(), Stop> {
     let mut sum = 0;
     for _ in 0..LOOKS {
         bench.pause(Duration::from_millis(10))?;
-        sum += i32::from(bench.read(ReadStatus2)?.speed.0);
+        sum += i32::from(bench.read(ReadMotionStatus)?.speed.0);
     }
     let words = format!("{} °/s still for 0.2 s, not {}", sign * SPEED, sum / LOOKS);
     bench.require(good((sum / LOOKS) as i16), words)

@@ -81,7 +81,7 @@ impl Bench {
         let begun = self.millis();
         loop {
             self.go_on()?;
-            let status = self.read(ReadStatus2)?;
+            let status = self.read(ReadMotionStatus)?;
             if status.speed.0.unsigned_abs() > FAST {
                 let failed = self.failed(format!("no more than {FAST} °/s in any move"));
                 self.ask(Off.encode())?;
@@ -107,7 +107,7 @@ impl Bench {
         const PATIENCE_MS: u64 = 2_000;
         self.pause(FOLLOWS)?;
         let begun = self.millis();
-        while self.read(ReadStatus2)?.speed.0.unsigned_abs() > FAST / 10
+        while self.read(ReadMotionStatus)?.speed.0.unsigned_abs() > FAST / 10
             && self.millis() - begun < PATIENCE_MS
         {
             self.pause(EVERY)?;

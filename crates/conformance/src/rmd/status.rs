@@ -1,7 +1,7 @@
 //! Temperature, voltage, errors, currents (0x9A to 0x9D).
 
 use motorlink_proto::rmd::*;
-use motorlink_proto::units::{Celsius, CentiDps, DeciVolts, TorqueFeedback};
+use motorlink_proto::units::{Celsius, CentiDps, DeciVolts, IqFeedback};
 
 use super::bench::Bench;
 use super::case;
@@ -20,14 +20,14 @@ const SENSING: i32 = 32;
 pub(super) fn cases() -> Vec<Case<Bench>> {
     let mut cases = vec![
         case("temperature_and_voltage_can_be", &["RMD-9A-03", "RMD-9A-04"], |bench| {
-            let status = bench.read(ReadStatus1)?;
+            let status = bench.read(ReadStatus)?;
             status_1_can_be(bench, status.temperature, status.voltage)
         }),
         case(
             "the_reply_to_clear_is_that_to_status_1",
             &["RMD-9B-04", "RMD-9B-05", "RMD-9B-06"],
             |bench| {
-                let before = bench.read(ReadStatus1)?;
+                let before = bench.read(ReadStatus)?;
                 if !before.errors.is_empty() {
                     let why = format!("the motor has an error that would go: {}", before.errors);
                     return Err(Stop::Skipped(why));
@@ -37,20 +37,20 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
                 let same = status.voltage.0.abs_diff(before.voltage.0) <= RIPPLE
                     && status.errors.active() == before.errors.active()
                     && status.temperature.0.abs_diff(before.temperature.0) <= 2;
-                let Status1 { temperature, voltage, .. } = before;
+                let Status { temperature, voltage, .. } = before;
                 bench.require(same, format!("{temperature}, {voltage} and no error, as in 0x9A"))
             },
         ),
         case("status_2_can_be", &["RMD-9C-03", "RMD-9C-04", "RMD-9C-05"], |bench| {
-            let status = bench.read(ReadStatus2)?;
+            let status = bench.read(ReadMotionStatus)?;
             bench.plausible(&status)
         }),
         case(
             "status_1_and_status_2_have_the_same_temperature",
             &["RMD-9C-03", "RMD-9A-03"],
             |bench| {
-                let one = bench.read(ReadStatus1)?.temperature;
-                let two = bench.read(ReadStatus2)?.temperature;
+                let one = bench.read(ReadStatus)?.temperature;
+                let two = bench.read(ReadMotionStatus)?.temperature;
                 bench.require(one.0.abs_diff(two.0) <= 2, format!("about {one}, as 0x9A has it"))
             },
         ),
@@ -67,7 +67,7 @@ fn errors() -> Vec<Case<Bench>> {
             &["RMD-9A-05", "RMD-9A-07", "RMD-9A-08"],
             |bench| {
                 bench.fault(true)?;
-                let status = bench.read(ReadStatus1)?;
+                let status = bench.read(ReadStatus)?;
                 let told = told(status.errors);
                 bench.require(told, "bit 0 (low voltage) or bit 3 (over temperature) in DATA[7]")
             },
@@ -80,25 +80,25 @@ fn errors() -> Vec<Case<Bench>> {
                 bench.fault(true)?;
                 let cleared = bench.read(ClearErrors)?.errors;
                 bench.require(told(cleared), "the flag still set, in the reply to 0x9B")?;
-                let after = bench.read(ReadStatus1)?.errors;
+                let after = bench.read(ReadStatus)?.errors;
                 bench.require(told(after), "the flag still set, in the reply to 0x9A")
             },
         )
         .needs(&[Need::Fault]),
         case("an_error_is_cleared_when_its_cause_is_gone", &["RMD-9B-02", "RMD-9B-06"], |bench| {
             bench.fault(true)?;
-            bench.read(ReadStatus1)?;
+            bench.read(ReadStatus)?;
             bench.fault(false)?;
             let cleared = bench.read(ClearErrors)?.errors;
             bench.require(!told(cleared), "no flag, in the reply to 0x9B")?;
-            let after = bench.read(ReadStatus1)?.errors;
+            let after = bench.read(ReadStatus)?.errors;
             bench.require(!told(after), "no flag, in the reply to 0x9A")
         })
         .needs(&[Need::Fault]),
         case("while_an_error_is_active_the_motor_stays_off", &["RMD-9A-10"], |bench| {
             bench.gently()?;
             bench.fault(true)?;
-            bench.command(Speed { speed: CentiDps(6_000) })?;
+            bench.command(SetSpeed { speed: CentiDps(6_000) })?;
             let turned = bench.watch(500, |seen| seen.speed.abs() > 10)?;
             bench.require(!turned, "a motor at rest")
         })
@@ -115,7 +115,7 @@ fn told(errors: Errors) -> bool {
 
 /// Phase currents, 1/64 A, that sum to zero.
 pub(super) fn phases(bench: &mut Bench) -> Result<[i32; 3], Stop> {
-    let PhaseCurrents { phase_a, phase_b, phase_c } = bench.read(ReadStatus3)?;
+    let PhaseCurrents { phase_a, phase_b, phase_c } = bench.read(ReadPhaseCurrents)?;
     let currents = [phase_a, phase_b, phase_c].map(|current| i32::from(current.0));
     let sum: i32 = currents.iter().sum();
     let size: i32 = currents.iter().map(|current| current.abs()).sum();
@@ -140,7 +140,7 @@ impl Bench {
         const MOST: u16 = 2048;
         let MotionStatus { temperature, iq, encoder, .. } = *status;
         temperature_can_be(self, temperature)?;
-        let TorqueFeedback(digits) = iq;
+        let IqFeedback(digits) = iq;
         let current = digits.unsigned_abs() <= MOST;
         self.require(current, format!("a torque current within ±{MOST} digits, not {digits}"))?;
         let turn = self.turn();

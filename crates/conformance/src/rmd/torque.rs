@@ -7,9 +7,7 @@
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::Duration;
-use motorlink_proto::units::{
-    CentiDegrees, PhaseCurrent, SpeedLimit, TorqueCommand, TorqueFeedback,
-};
+use motorlink_proto::units::{CentiDegrees, IqCommand, IqFeedback, PhaseCurrent, SpeedLimit};
 
 use super::bench::Bench;
 use super::case;
@@ -43,7 +41,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
             for _ in 0..4 {
                 bench.gently()?;
                 let angle = CentiDegrees(bench.angle_in_reach()? + 300);
-                bench.command(PositionLimited { max_speed: SpeedLimit(30), angle })?;
+                bench.command(SetPositionLimited { max_speed: SpeedLimit(30), angle })?;
                 bench.watch(300, |_| false)?;
                 let amps = pulses(bench, one, amplitude)?;
                 // Relatives name the amplitude or the effective value of the same current.
@@ -61,7 +59,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
 
 /// The request with this torque for the motor under test.
 fn one(bench: &Bench, torque: i16) -> CanFrame {
-    bench.frame(Torque { torque: TorqueCommand(torque) }.encode())
+    bench.frame(SetTorque { iq: IqCommand(torque) }.encode())
 }
 
 /// Raises the torque until the motor turns; by how much it turned, 0.01°.
@@ -71,7 +69,7 @@ fn break_away(bench: &mut Bench, sign: i16) -> Result<i64, Stop> {
     let mut turned = 0;
     let mut iq = 0;
     for digits in (5..=MOST).step_by(5) {
-        bench.command(Torque { torque: TorqueCommand(sign * digits) })?;
+        bench.command(SetTorque { iq: IqCommand(sign * digits) })?;
         let turns = bench.watch(50, |seen| {
             (turned, iq) = (seen.angle - start, seen.iq);
             turned.abs() > 100
@@ -85,7 +83,7 @@ fn break_away(bench: &mut Bench, sign: i16) -> Result<i64, Stop> {
         }
     }
     bench.ask(Off.encode())?;
-    let amps = TorqueFeedback(iq * sign).amps();
+    let amps = IqFeedback(iq * sign).amps();
     bench.require((1.5..2.5).contains(&amps), format!("about 2 A or movement, not {amps:.2} A"))?;
     Err(Stop::Skipped("the motor does not turn under 2 A: its load holds it".to_owned()))
 }
@@ -116,7 +114,7 @@ pub(super) fn pulses(
 
 /// Torque current along a sign, A.
 pub(super) fn torque(bench: &mut Bench, sign: i16) -> Result<f64, Stop> {
-    Ok(f64::from(sign) * bench.read(ReadStatus2)?.iq.amps())
+    Ok(f64::from(sign) * bench.read(ReadMotionStatus)?.iq.amps())
 }
 
 /// Amplitude of the phase currents, A.

@@ -1,7 +1,7 @@
 //! A drive on a serial line: exchanges, and what is wrong with them.
 
-use motorlink::stmcp::Transcript;
-use motorlink_proto::stmcp::{
+use motorlink::st::Transcript;
+use motorlink_proto::st::{
     Bad, Command, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile,
     RegisterId, Request, Status,
 };

@@ -1,7 +1,7 @@
 //! Cases of 4.6 that leave the motor at rest: EXECUTE_CMD.
 
-use motorlink_proto::stmcp::register::Feature;
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::register::Feature;
+use motorlink_proto::st::{
     Command, ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request,
 };
 

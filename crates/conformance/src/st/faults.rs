@@ -1,7 +1,7 @@
 //! Cases of 4.6 and of FLAGS with a fault that somebody causes. That a drive is in fault is known from
 //! STATUS and FLAGS, whose values the document does not list (SPEC-NOTES S14).
 
-use motorlink_proto::stmcp::{Command, Flags, Profile, RegisterId, Status};
+use motorlink_proto::st::{Command, Flags, Profile, RegisterId, Status};
 use motorlink_proto::time::Duration;
 
 use super::bench::Bench;

@@ -2,8 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use motorlink_proto::stmcp::register::{Feature, Features};
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::register::{Feature, Features};
+use motorlink_proto::st::{
     ErrorCode, Frame, FrameCode, HEADER_ACK, Motor, Profile, RegisterId, Status,
 };
 

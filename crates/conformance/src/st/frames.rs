@@ -1,6 +1,6 @@
 //! Cases of chapters 2 and 3 and of 4.1 to 4.3: frames, checksums, frame codes, replies.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, ErrorCode, Frame, FrameCode, HEADER_ACK, HEADER_NACK, MAX_PAYLOAD, Motor, OVERHEAD,
     Profile, RegisterId, Request,
 };

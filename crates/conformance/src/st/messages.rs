@@ -1,7 +1,7 @@
 //! Cases of 4.7 to 4.12 that leave the motor at rest.
 
-use motorlink_proto::stmcp::register::Feature;
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::register::Feature;
+use motorlink_proto::st::{
     CurrentReference, ErrorCode, FrameCode, HEADER_ACK, MAX_PAYLOAD, PositionMove, Profile,
     REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, TorqueRamp,
 };

@@ -17,7 +17,7 @@ mod timing;
 mod units;
 mod values;
 
-use motorlink_proto::stmcp::Profile;
+use motorlink_proto::st::Profile;
 
 use crate::case::Case;
 use crate::markdown::markdown;

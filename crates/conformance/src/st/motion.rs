@@ -1,7 +1,7 @@
 //! Cases of 4.6, 4.8 and 4.11 that turn the motor.
 
-use motorlink_proto::stmcp::register::Feature;
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::register::Feature;
+use motorlink_proto::st::{
     Command, ControlMode, CurrentReference, PositionMove, Profile, Ramp, RegisterId, Request,
     Status, TorqueRamp,
 };

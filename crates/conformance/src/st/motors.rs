@@ -1,6 +1,6 @@
 //! Cases of 3.2: motor numbers and the current motor.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     ErrorCode, Frame, FrameCode, HEADER_ACK, MAX_FRAME, Motor, Profile, RegisterId, Request,
 };
 

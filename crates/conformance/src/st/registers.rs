@@ -1,9 +1,7 @@
 //! Cases of 4.4 and 4.5 and of table 3, for every register: who reads it, who writes it.
 
-use motorlink_proto::stmcp::register::{Access, Feature, Features, Writing};
-use motorlink_proto::stmcp::{
-    ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status,
-};
+use motorlink_proto::st::register::{Access, Feature, Features, Writing};
+use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status};
 
 use super::bench::Bench;
 use super::found::read_size;
@@ -245,7 +243,7 @@ fn write(bench: &mut Bench, register: RegisterId, size: u8) -> Result<(), Stop> 
     for value in values::samples(bench.profile(), register, &before) {
         bench.set(register, value)?;
         let now = bench.value(register)?;
-        let text = motorlink::stmcp::Reading { register, bits: value, profile: bench.profile() };
+        let text = motorlink::st::Reading { register, bits: value, profile: bench.profile() };
         let given_back = bench.require(now == value, format!("ACK {text}, which was written"));
         match kept_by(register) {
             Some(reading) => bench.note(reading, given_back)?,

@@ -1,6 +1,6 @@
 //! Before and after a case: the drive at rest and the line in step, and everything as it was found.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, ErrorCode, Frame, FrameCode, HEADER_ACK, Motor, RegisterId, Request, RevupPhase,
     Status,
 };

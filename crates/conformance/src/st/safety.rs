@@ -1,6 +1,6 @@
 //! What may start a motor.
 
-use motorlink_proto::stmcp::{Command, Frame, FrameCode, Parse};
+use motorlink_proto::st::{Command, Frame, FrameCode, Parse};
 
 /// Commands after which something may turn or be under voltage.
 const STARTS: [Command; 5] = [

@@ -1,7 +1,7 @@
 //! Cases of 4.4 and SPEC-NOTES S18 and S19: values and messages that are too long or too short.
 
-use motorlink_proto::stmcp::register::Writing;
-use motorlink_proto::stmcp::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
+use motorlink_proto::st::register::Writing;
+use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
 
 use super::bench::Bench;
 use super::found::read_size;

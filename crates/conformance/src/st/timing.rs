@@ -1,6 +1,6 @@
 //! Cases of 4.1: how long a drive has for a reply, and a master for a frame.
 
-use motorlink_proto::stmcp::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
+use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
 use motorlink_proto::time::Duration;
 
 use super::bench::{Bench, Reply};

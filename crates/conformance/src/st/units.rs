@@ -1,7 +1,7 @@
 //! Cases of table 3's units, of its synonyms and of the PFC's registers.
 
-use motorlink_proto::stmcp::register::Feature;
-use motorlink_proto::stmcp::{Profile, RegisterId, Request};
+use motorlink_proto::st::register::Feature;
+use motorlink_proto::st::{Profile, RegisterId, Request};
 
 use super::bench::Bench;
 use super::messages::empty_segment;

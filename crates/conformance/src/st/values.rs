@@ -1,7 +1,7 @@
 //! Values to write into registers of a motor at rest.
 
-use motorlink_proto::stmcp::register::{Type, Unit};
-use motorlink_proto::stmcp::{Profile, RegisterId};
+use motorlink_proto::st::register::{Type, Unit};
+use motorlink_proto::st::{Profile, RegisterId};
 
 /// Values that differ from what is there, that are harmless at rest and whose bytes differ.
 pub(super) fn samples(profile: Profile, register: RegisterId, before: &[u8]) -> Vec<i32> {

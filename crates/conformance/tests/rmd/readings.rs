@@ -58,7 +58,7 @@ fn a_motor_that_is_off_may_need_0x88() {
             0x80 => off = true,
             0x88 => off = false,
             0xA1..=0xA6 if off => {
-                let status = motors.ask(Command::encode(&ReadStatus2));
+                let status = motors.ask(Command::encode(&ReadMotionStatus));
                 let [_, rest @ ..] = status;
                 let mut reply = [data[0]; 8];
                 reply[1..].copy_from_slice(&rest);

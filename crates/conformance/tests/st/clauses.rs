@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use motorlink_conformance::st;
-use motorlink_proto::stmcp::Profile;
+use motorlink_proto::st::Profile;
 
 /// Names and clauses of the cases of both profiles.
 fn cases() -> BTreeMap<String, &'static [&'static str]> {

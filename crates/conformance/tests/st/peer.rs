@@ -7,8 +7,8 @@ use motorlink_conformance::st::{self, Bench, Options};
 use motorlink_conformance::wire::{Line, Virtual};
 use motorlink_conformance::{Need, Report, Unavailable, World, run};
 use motorlink_link::serve::ByteStation;
-use motorlink_proto::stmcp::register::Features;
-use motorlink_proto::stmcp::{Flags, Frame, Motor, Profile, RegisterId};
+use motorlink_proto::st::register::Features;
+use motorlink_proto::st::{Flags, Frame, Motor, Profile, RegisterId};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
 

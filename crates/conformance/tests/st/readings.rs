@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use motorlink_conformance::Report;
-use motorlink_proto::stmcp::{ErrorCode, HEADER_ACK, HEADER_NACK, Profile, RegisterId, Status};
+use motorlink_proto::st::{ErrorCode, HEADER_ACK, HEADER_NACK, Profile, RegisterId, Status};
 use motorlink_sim::st::MotorConfig;
 
 use crate::mutants::{ack, answers, gives, nack, parsed, says};

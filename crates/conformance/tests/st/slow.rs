@@ -7,7 +7,7 @@ use motorlink_conformance::st::{self, Bench, Options};
 use motorlink_conformance::wire::Line;
 use motorlink_conformance::{Need, Verdict, run};
 use motorlink_link::serve::ByteStation;
-use motorlink_proto::stmcp::{Motor, Profile};
+use motorlink_proto::st::{Motor, Profile};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::st::MotorConfig;
 

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use motorlink_conformance::st::may_start;
 use motorlink_conformance::wire::Line;
 use motorlink_conformance::{Need, Report, Verdict};
-use motorlink_proto::stmcp::Profile;
+use motorlink_proto::st::Profile;
 use motorlink_proto::time::Duration;
 use motorlink_sim::st::{BuildConfig, MotorConfig};
 

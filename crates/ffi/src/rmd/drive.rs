@@ -6,9 +6,9 @@ use motorlink_proto::rmd::{
     Config, Drive, EncoderBits, Errors, Mode, Motor, MotorId, PhaseCurrents, Sense, Settings,
 };
 use motorlink_proto::time::{Duration, Instant};
-use motorlink_proto::units::{Celsius, DeciVolts, Dps, DpsPerSecond, PhaseCurrent, TorqueFeedback};
+use motorlink_proto::units::{Celsius, DeciVolts, Dps, DpsPerSecond, IqFeedback, PhaseCurrent};
 
-use super::message::motorlink_rmd_gains;
+use super::message::motorlink_rmd_pid;
 use super::motorlink_rmd_drive;
 use crate::bytes::MOTORLINK_NEVER;
 use crate::error::{answer, motorlink_error};
@@ -80,7 +80,7 @@ pub struct motorlink_rmd_settings {
     /// Encoder value that is zero, as it travels: at most 16 bits.
     pub encoder_offset: u16,
     /// Gains of the three loops.
-    pub gains: motorlink_rmd_gains,
+    pub gains: motorlink_rmd_pid,
 }
 
 /// What the vendor's tool or a switch sets, not the bus.
@@ -226,7 +226,7 @@ impl Motor for Kept<motorlink_rmd_motor> {
         Sense {
             temperature: Celsius(sense.temperature_celsius),
             voltage: DeciVolts(sense.voltage_decivolts),
-            iq: TorqueFeedback(sense.iq_digits),
+            iq: IqFeedback(sense.iq_digits),
             speed: Dps(sense.speed_dps),
             encoder: sense.encoder_counts,
             phase_currents: PhaseCurrents { phase_a, phase_b, phase_c },

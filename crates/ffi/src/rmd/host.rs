@@ -1,8 +1,8 @@
 //! The host's end: many motors, an exchange each.
 
-use motorlink_proto::rmd::{Error, Host, Limits, MotorId, MotorSet, Output, Refused, Torque4};
+use motorlink_proto::rmd::{Error, Host, Limits, MotorId, MotorSet, Output, Refused, SetTorque4};
 use motorlink_proto::time::{Duration, Instant};
-use motorlink_proto::units::{CentiDegrees, SpeedLimit, TorqueCommand};
+use motorlink_proto::units::{CentiDegrees, IqCommand, SpeedLimit};
 
 use super::message::motorlink_rmd_data;
 use super::motorlink_rmd_host;
@@ -129,7 +129,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_limits(
     answer(|| {
         let limits = limits.read()?;
         let limits = Limits {
-            current: limit(limits.torque_16ma)?.map(TorqueCommand),
+            current: limit(limits.torque_16ma)?.map(IqCommand),
             speed: limit(limits.speed_dps)?.map(SpeedLimit),
             angle: limit(limits.angle_centidegrees)?.map(CentiDegrees),
         };
@@ -174,7 +174,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_request(
 /// As `motorlink_rmd_host_request`: `BUSY` and `LIMIT` of any of the four, `QUARANTINED` of `expect`.
 /// `BAD_ARGUMENT`: a bit above 3 is set.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_rmd_host_torque4(
+pub unsafe extern "C" fn motorlink_rmd_host_set_torque4(
     host: *mut motorlink_rmd_host,
     now_us: u64,
     torques_16ma: *const i16,
@@ -188,12 +188,12 @@ pub unsafe extern "C" fn motorlink_rmd_host_torque4(
         if expect > 0b1111 {
             return Err(motorlink_error::BadArgument);
         }
-        let torques = Torque4([one, two, three, four].map(TorqueCommand));
+        let torques = SetTorque4([one, two, three, four].map(IqCommand));
         let expect =
             MotorSet::TORQUE4.filter(|id| expect & 1u8.wrapping_shl(id.number() as u32 - 1) != 0);
         let expect = expect.collect();
         let mut state = host.enter()?;
-        let taken = state.host.torque4(Instant(now_us), torques, expect);
+        let taken = state.host.set_torque4(Instant(now_us), torques, expect);
         taken.map_err(|refused| state.refused(refused))
     })
 }
@@ -273,7 +273,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_receive(
 }
 
 /// Gives up the exchange with a motor without a result, so that another request can be made. A frame
-/// of `motorlink_rmd_host_torque4` that still waits and would reach the motor is given up for all.
+/// of `motorlink_rmd_host_set_torque4` that still waits and would reach the motor is given up for all.
 ///
 /// `BAD_ARGUMENT`: `motor` is not 1 to 32.
 #[unsafe(no_mangle)]

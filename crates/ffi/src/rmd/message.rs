@@ -1,15 +1,15 @@
 //! Requests and replies, by value: what goes in a frame as numbers with their units.
 
 use motorlink_proto::rmd::{
-    Acceleration, Circle, CirclePosition, CirclePositionLimited, ClearErrors, Command, Encoder,
-    EncoderBits, EncoderOffset, FULL_TURN, Gains, MotionStatus, MultiTurn, Off, Payload,
-    PhaseCurrents, Position, PositionLimited, ReadAcceleration, ReadCircleAngle, ReadEncoder,
-    ReadGains, ReadMultiTurnAngle, ReadStatus1, ReadStatus2, ReadStatus3, Run, Speed, Spin,
-    Status1, Stop, Torque, WriteAcceleration, WriteEncoderOffset, WriteGains, WriteGainsToRom,
-    WriteZeroToRom,
+    Acceleration, ClearErrors, Command, Encoder, EncoderBits, EncoderOffset, FULL_TURN,
+    MotionStatus, MultiTurnAngle, Off, Payload, PhaseCurrents, Pid, ReadAcceleration, ReadEncoder,
+    ReadMotionStatus, ReadMultiTurnAngle, ReadPhaseCurrents, ReadPid, ReadSingleTurnAngle,
+    ReadStatus, Run, SetPosition, SetPositionLimited, SetSingleTurnPosition,
+    SetSingleTurnPositionLimited, SetSpeed, SetTorque, SingleTurnAngle, SpinDirection, Status,
+    Stop, WriteAccelerationRam, WriteEncoderOffsetRom, WritePidRam, WritePidRom, WriteZeroRom,
 };
 use motorlink_proto::units::{
-    CentiDegrees, CentiDps, CircleAngle, DpsPerSecond, SpeedLimit, TorqueCommand,
+    CentiDegrees, CentiDps, DpsPerSecond, IqCommand, SpeedLimit, TurnCentiDegrees,
 };
 
 /// The eight bytes of a request or a reply.
@@ -24,7 +24,7 @@ pub struct motorlink_rmd_data {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)]
-pub struct motorlink_rmd_gains {
+pub struct motorlink_rmd_pid {
     pub position_kp: u8,
     pub position_ki: u8,
     pub speed_kp: u8,
@@ -83,16 +83,16 @@ pub struct motorlink_rmd_phase_currents {
     pub c_digits: i16,
 }
 
-impl From<Gains> for motorlink_rmd_gains {
-    fn from(gains: Gains) -> Self {
-        let Gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki } = gains;
-        motorlink_rmd_gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki }
+impl From<Pid> for motorlink_rmd_pid {
+    fn from(gains: Pid) -> Self {
+        let Pid { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki } = gains;
+        motorlink_rmd_pid { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki }
     }
 }
 
-impl From<motorlink_rmd_gains> for Gains {
-    fn from(gains: motorlink_rmd_gains) -> Self {
-        let motorlink_rmd_gains {
+impl From<motorlink_rmd_pid> for Pid {
+    fn from(gains: motorlink_rmd_pid) -> Self {
+        let motorlink_rmd_pid {
             position_kp,
             position_ki,
             speed_kp,
@@ -100,7 +100,7 @@ impl From<motorlink_rmd_gains> for Gains {
             torque_kp,
             torque_ki,
         } = gains;
-        Gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki }
+        Pid { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki }
     }
 }
 
@@ -110,8 +110,8 @@ fn data(command: impl Command) -> motorlink_rmd_data {
 
 /// Request 0x30: reads the gains in RAM.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_read_gains() -> motorlink_rmd_data {
-    data(ReadGains)
+pub extern "C" fn motorlink_rmd_read_pid() -> motorlink_rmd_data {
+    data(ReadPid)
 }
 
 /// Request 0x33: reads the acceleration limit.
@@ -128,8 +128,8 @@ pub extern "C" fn motorlink_rmd_read_encoder() -> motorlink_rmd_data {
 
 /// Request 0x19: makes the current position the zero from the next power-on on. Wears the ROM.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_write_zero_to_rom() -> motorlink_rmd_data {
-    data(WriteZeroToRom)
+pub extern "C" fn motorlink_rmd_write_zero_rom() -> motorlink_rmd_data {
+    data(WriteZeroRom)
 }
 
 /// Request 0x92: reads the angle over all turns.
@@ -140,14 +140,14 @@ pub extern "C" fn motorlink_rmd_read_multi_turn_angle() -> motorlink_rmd_data {
 
 /// Request 0x94: reads the angle within the turn.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_read_circle_angle() -> motorlink_rmd_data {
-    data(ReadCircleAngle)
+pub extern "C" fn motorlink_rmd_read_single_turn_angle() -> motorlink_rmd_data {
+    data(ReadSingleTurnAngle)
 }
 
 /// Request 0x9A: reads temperature, voltage and errors.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_rmd_read_status() -> motorlink_rmd_data {
-    data(ReadStatus1)
+    data(ReadStatus)
 }
 
 /// Request 0x9B: clears the errors whose cause is gone. The reply is that to 0x9A.
@@ -159,13 +159,13 @@ pub extern "C" fn motorlink_rmd_clear_errors() -> motorlink_rmd_data {
 /// Request 0x9C: reads temperature, torque current, speed and encoder.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_rmd_read_motion_status() -> motorlink_rmd_data {
-    data(ReadStatus2)
+    data(ReadMotionStatus)
 }
 
 /// Request 0x9D: reads the phase currents.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_rmd_read_phase_currents() -> motorlink_rmd_data {
-    data(ReadStatus3)
+    data(ReadPhaseCurrents)
 }
 
 /// Request 0x80: switches the motor off and forgets what it was doing.
@@ -188,55 +188,55 @@ pub extern "C" fn motorlink_rmd_run() -> motorlink_rmd_data {
 
 /// Request 0x31: sets the gains until power-off.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_write_gains(gains: motorlink_rmd_gains) -> motorlink_rmd_data {
-    data(WriteGains(gains.into()))
+pub extern "C" fn motorlink_rmd_write_pid_ram(gains: motorlink_rmd_pid) -> motorlink_rmd_data {
+    data(WritePidRam(gains.into()))
 }
 
 /// Request 0x32: sets the gains for good. Wears the ROM.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_write_gains_to_rom(
-    gains: motorlink_rmd_gains,
-) -> motorlink_rmd_data {
-    data(WriteGainsToRom(gains.into()))
+pub extern "C" fn motorlink_rmd_write_pid_rom(gains: motorlink_rmd_pid) -> motorlink_rmd_data {
+    data(WritePidRom(gains.into()))
 }
 
 /// Request 0x34: sets the acceleration limit, °/s², until power-off.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_write_acceleration(acceleration_dps2: i32) -> motorlink_rmd_data {
-    data(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(acceleration_dps2) }))
+pub extern "C" fn motorlink_rmd_write_acceleration_ram(
+    acceleration_dps2: i32,
+) -> motorlink_rmd_data {
+    data(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(acceleration_dps2) }))
 }
 
 /// Request 0x91: sets the encoder's zero point, in counts, at once and for good. Wears the ROM.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_write_encoder_offset(offset: u16) -> motorlink_rmd_data {
-    data(WriteEncoderOffset(EncoderOffset { offset }))
+pub extern "C" fn motorlink_rmd_write_encoder_offset_rom(offset: u16) -> motorlink_rmd_data {
+    data(WriteEncoderOffsetRom(EncoderOffset { offset }))
 }
 
 /// Request 0xA1: holds a torque current, 0.016 A a digit, -2000 to 2000.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_torque(torque_16ma: i16) -> motorlink_rmd_data {
-    data(Torque { torque: TorqueCommand(torque_16ma) })
+pub extern "C" fn motorlink_rmd_set_torque(torque_16ma: i16) -> motorlink_rmd_data {
+    data(SetTorque { iq: IqCommand(torque_16ma) })
 }
 
 /// Request 0xA2: holds a speed, 0.01 °/s a digit, positive is clockwise.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_speed(speed_centidps: i32) -> motorlink_rmd_data {
-    data(Speed { speed: CentiDps(speed_centidps) })
+pub extern "C" fn motorlink_rmd_set_speed(speed_centidps: i32) -> motorlink_rmd_data {
+    data(SetSpeed { speed: CentiDps(speed_centidps) })
 }
 
 /// Request 0xA3: turns to a multi-turn angle, 0.01° a digit, positive is clockwise from zero.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_position(angle_centidegrees: i32) -> motorlink_rmd_data {
-    data(Position { angle: CentiDegrees(angle_centidegrees) })
+pub extern "C" fn motorlink_rmd_set_position(angle_centidegrees: i32) -> motorlink_rmd_data {
+    data(SetPosition { angle: CentiDegrees(angle_centidegrees) })
 }
 
 /// Request 0xA4: turns to a multi-turn angle, 0.01° a digit, no faster than a limit, °/s.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_position_limited(
+pub extern "C" fn motorlink_rmd_set_position_limited(
     angle_centidegrees: i32,
     max_speed_dps: u16,
 ) -> motorlink_rmd_data {
-    data(PositionLimited {
+    data(SetPositionLimited {
         max_speed: SpeedLimit(max_speed_dps),
         angle: CentiDegrees(angle_centidegrees),
     })
@@ -244,34 +244,34 @@ pub extern "C" fn motorlink_rmd_position_limited(
 
 /// Request 0xA5: turns to an angle within the turn, 0.01° a digit, 0 to 35999, in a direction of `motorlink_rmd_spin`.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_circle_position(
+pub extern "C" fn motorlink_rmd_set_single_turn_position(
     direction: u8,
     angle_centidegrees: u16,
 ) -> motorlink_rmd_data {
-    data(CirclePosition {
-        direction: Spin::from(direction),
-        angle: CircleAngle(angle_centidegrees),
+    data(SetSingleTurnPosition {
+        direction: SpinDirection::from(direction),
+        angle: TurnCentiDegrees(angle_centidegrees),
     })
 }
 
 /// Request 0xA6: as 0xA5, no faster than a limit, °/s.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_circle_position_limited(
+pub extern "C" fn motorlink_rmd_set_single_turn_position_limited(
     direction: u8,
     angle_centidegrees: u16,
     max_speed_dps: u16,
 ) -> motorlink_rmd_data {
-    data(CirclePositionLimited {
-        direction: Spin::from(direction),
+    data(SetSingleTurnPositionLimited {
+        direction: SpinDirection::from(direction),
         max_speed: SpeedLimit(max_speed_dps),
-        angle: CircleAngle(angle_centidegrees),
+        angle: TurnCentiDegrees(angle_centidegrees),
     })
 }
 
 /// Reads the gains in the reply to 0x30, 0x31 and 0x32.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_decode_gains(reply: motorlink_rmd_data) -> motorlink_rmd_gains {
-    Gains::decode(&reply.bytes).into()
+pub extern "C" fn motorlink_rmd_decode_pid(reply: motorlink_rmd_data) -> motorlink_rmd_pid {
+    Pid::decode(&reply.bytes).into()
 }
 
 /// Reads the acceleration limit in the reply to 0x33 and 0x34, °/s².
@@ -296,19 +296,19 @@ pub extern "C" fn motorlink_rmd_decode_encoder_offset(reply: motorlink_rmd_data)
 /// Reads the angle over all turns in the reply to 0x92, 0.01° a digit, positive is clockwise.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_rmd_decode_multi_turn_angle(reply: motorlink_rmd_data) -> i64 {
-    MultiTurn::decode(&reply.bytes).angle.0
+    MultiTurnAngle::decode(&reply.bytes).angle.0
 }
 
 /// Reads the angle within the turn in the reply to 0x94, 0.01° a digit, 0 to 35999.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_decode_circle_angle(reply: motorlink_rmd_data) -> u16 {
-    Circle::decode(&reply.bytes).angle.0
+pub extern "C" fn motorlink_rmd_decode_single_turn_angle(reply: motorlink_rmd_data) -> u16 {
+    SingleTurnAngle::decode(&reply.bytes).angle.0
 }
 
 /// Reads temperature, voltage and errors in the reply to 0x9A and 0x9B.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_rmd_decode_status(reply: motorlink_rmd_data) -> motorlink_rmd_status {
-    let Status1 { temperature, voltage, errors } = Status1::decode(&reply.bytes);
+    let Status { temperature, voltage, errors } = Status::decode(&reply.bytes);
     motorlink_rmd_status {
         voltage_decivolts: voltage.0,
         temperature_celsius: temperature.0,

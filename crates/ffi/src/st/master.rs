@@ -1,6 +1,6 @@
 //! The master's end: one exchange at a time.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Config, Error, Failure, Line, MAX_PAYLOAD, Master, Output, Profile, Recovery, RegisterId,
 };
 use motorlink_proto::time::{Duration, Instant};

@@ -2,7 +2,7 @@
 
 use core::ffi::c_char;
 
-use motorlink_proto::stmcp::{BoardInfo, FirmwareVersion, Profile, RegisterId, RevupPhase};
+use motorlink_proto::st::{BoardInfo, FirmwareVersion, Profile, RegisterId, RevupPhase};
 
 use crate::error::{answer, motorlink_error};
 use crate::pointer::{In, plain, promised};

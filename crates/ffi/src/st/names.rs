@@ -1,6 +1,6 @@
 //! The document's names, for programs that print. One that calls none of this carries no names.
 
-use motorlink_proto::stmcp::{Command, ErrorCode, RegisterId, Status};
+use motorlink_proto::st::{Command, ErrorCode, RegisterId, Status};
 
 use crate::bytes::motorlink_bytes;
 

@@ -1,6 +1,6 @@
 //! What differs between drives.
 
-use motorlink_proto::stmcp::Profile;
+use motorlink_proto::st::Profile;
 
 use crate::error::motorlink_error;
 

@@ -1,6 +1,6 @@
 //! What a master asks: every function begins an exchange.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, Motor, PositionMove, REVUP_PHASES, Ramp, RegisterId, Request,
     RequestError, TorqueRamp,
 };

@@ -2,7 +2,7 @@
 
 use core::ffi::{c_char, c_void};
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, Drive, ErrorCode, Feature, Features, Motor, PositionMove, Ramp,
     RegisterId, RevupPhase, Slave, TorqueRamp, Version,
 };

@@ -72,7 +72,7 @@ static void rmd_host(motorlink_rmd_host *host, motorlink_error expected) {
   REFUSED(motorlink_rmd_host_set_times(host, 1, 1));
   REFUSED(motorlink_rmd_host_set_limits(host, 1, &limits));
   REFUSED(motorlink_rmd_host_request(host, 0, 1, motorlink_rmd_off()));
-  REFUSED(motorlink_rmd_host_torque4(host, 0, torques, 0x0F));
+  REFUSED(motorlink_rmd_host_set_torque4(host, 0, torques, 0x0F));
   REFUSED(motorlink_rmd_host_retry(host, &at));
   REFUSED(motorlink_rmd_host_poll(host, 0, &action));
   REFUSED(motorlink_rmd_host_receive(host, 0, &frame));
@@ -256,8 +256,8 @@ static void wrong_pointers(void) {
   OK(motorlink_st_decode_segment(NULL, 0, NULL, 0, NULL));
 
   GIVES(NULL_POINTER, motorlink_rmd_host_set_limits(&host, 1, NULL));
-  GIVES(NULL_POINTER, motorlink_rmd_host_torque4(&host, 0, NULL, 0));
-  GIVES(MISALIGNED, motorlink_rmd_host_torque4(&host, 0, (int16_t *)(void *)odd, 0));
+  GIVES(NULL_POINTER, motorlink_rmd_host_set_torque4(&host, 0, NULL, 0));
+  GIVES(MISALIGNED, motorlink_rmd_host_set_torque4(&host, 0, (int16_t *)(void *)odd, 0));
   GIVES(NULL_POINTER, motorlink_rmd_host_retry(&host, NULL));
   GIVES(NULL_POINTER, motorlink_rmd_host_poll(&host, 0, NULL));
   GIVES(NULL_POINTER, motorlink_rmd_host_receive(&host, 0, NULL));
@@ -349,10 +349,10 @@ static void wrong_numbers(void) {
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_request(&host, 0, 0, motorlink_rmd_off()));
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_request(&host, 0, 33, motorlink_rmd_off()));
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_cancel(&host, 0, 33));
-  GIVES(BAD_ARGUMENT, motorlink_rmd_host_torque4(&host, 0, torques, 0x10));
-  GIVES(LIMIT, motorlink_rmd_host_torque4(&host, 0, torques, 0x0F));
-  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_torque(-2001)));
-  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_circle_position(7, 0)));
+  GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_torque4(&host, 0, torques, 0x10));
+  GIVES(LIMIT, motorlink_rmd_host_set_torque4(&host, 0, torques, 0x0F));
+  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_set_torque(-2001)));
+  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_set_single_turn_position(7, 0)));
   limits.torque_16ma = 32768;
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 1, &limits));
   limits.torque_16ma = -2;
@@ -363,8 +363,8 @@ static void wrong_numbers(void) {
   limits.speed_dps = 100;
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 33, &limits));
   OK(motorlink_rmd_host_set_limits(&host, 1, &limits));
-  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_speed(10001)));
-  OK(motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_speed(10000)));
+  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_set_speed(10001)));
+  OK(motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_set_speed(10000)));
   GIVES(BUSY, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_off()));
 
   OK(motorlink_rmd_drive_init(&drive, sizeof drive, &drive_config, NULL, &no_motor));
@@ -471,7 +471,7 @@ static void reentered(void) {
   OK(motorlink_rmd_drive_init(&calling_drive, sizeof calling_drive, &config, NULL, &motor));
   OK(motorlink_rmd_drive_power_on(&calling_drive, 0));
   CHECK(called == 2);
-  memcpy(frame.data, motorlink_rmd_torque(5).bytes, sizeof frame.data);
+  memcpy(frame.data, motorlink_rmd_set_torque(5).bytes, sizeof frame.data);
   OK(motorlink_rmd_drive_receive(&calling_drive, 0, &frame, &reply));
   CHECK(called >= 4 && reply.size == 8);
   OK(motorlink_rmd_drive_poll(&calling_drive, 0));

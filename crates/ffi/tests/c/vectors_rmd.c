@@ -43,8 +43,8 @@ static int same(motorlink_rmd_data one, motorlink_rmd_data other) {
   return memcmp(one.bytes, other.bytes, sizeof one.bytes) == 0;
 }
 
-static motorlink_rmd_gains gains_of(const json_t *f) {
-  motorlink_rmd_gains gains;
+static motorlink_rmd_pid gains_of(const json_t *f) {
+  motorlink_rmd_pid gains;
   gains.position_kp = (uint8_t)number(f, "position_kp");
   gains.position_ki = (uint8_t)number(f, "position_ki");
   gains.speed_kp = (uint8_t)number(f, "speed_kp");
@@ -57,37 +57,37 @@ static motorlink_rmd_gains gains_of(const json_t *f) {
 /* The request that a vector's fields describe. */
 static motorlink_rmd_data request_of(uint8_t command, const json_t *f) {
   switch (command) {
-    case MOTORLINK_RMD_CODE_READ_GAINS: return motorlink_rmd_read_gains();
-    case MOTORLINK_RMD_CODE_WRITE_GAINS: return motorlink_rmd_write_gains(gains_of(f));
-    case MOTORLINK_RMD_CODE_WRITE_GAINS_TO_ROM: return motorlink_rmd_write_gains_to_rom(gains_of(f));
+    case MOTORLINK_RMD_CODE_READ_PID: return motorlink_rmd_read_pid();
+    case MOTORLINK_RMD_CODE_WRITE_PID_RAM: return motorlink_rmd_write_pid_ram(gains_of(f));
+    case MOTORLINK_RMD_CODE_WRITE_PID_ROM: return motorlink_rmd_write_pid_rom(gains_of(f));
     case MOTORLINK_RMD_CODE_READ_ACCELERATION: return motorlink_rmd_read_acceleration();
-    case MOTORLINK_RMD_CODE_WRITE_ACCELERATION:
-      return motorlink_rmd_write_acceleration((int32_t)number(f, "acceleration"));
+    case MOTORLINK_RMD_CODE_WRITE_ACCELERATION_RAM:
+      return motorlink_rmd_write_acceleration_ram((int32_t)number(f, "acceleration"));
     case MOTORLINK_RMD_CODE_READ_ENCODER: return motorlink_rmd_read_encoder();
-    case MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET:
-      return motorlink_rmd_write_encoder_offset((uint16_t)number(f, "offset"));
-    case MOTORLINK_RMD_CODE_WRITE_ZERO_TO_ROM: return motorlink_rmd_write_zero_to_rom();
+    case MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET_ROM:
+      return motorlink_rmd_write_encoder_offset_rom((uint16_t)number(f, "offset"));
+    case MOTORLINK_RMD_CODE_WRITE_ZERO_ROM: return motorlink_rmd_write_zero_rom();
     case MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE: return motorlink_rmd_read_multi_turn_angle();
-    case MOTORLINK_RMD_CODE_READ_CIRCLE_ANGLE: return motorlink_rmd_read_circle_angle();
-    case MOTORLINK_RMD_CODE_READ_STATUS_1: return motorlink_rmd_read_status();
+    case MOTORLINK_RMD_CODE_READ_SINGLE_TURN_ANGLE: return motorlink_rmd_read_single_turn_angle();
+    case MOTORLINK_RMD_CODE_READ_STATUS: return motorlink_rmd_read_status();
     case MOTORLINK_RMD_CODE_CLEAR_ERRORS: return motorlink_rmd_clear_errors();
-    case MOTORLINK_RMD_CODE_READ_STATUS_2: return motorlink_rmd_read_motion_status();
-    case MOTORLINK_RMD_CODE_READ_STATUS_3: return motorlink_rmd_read_phase_currents();
+    case MOTORLINK_RMD_CODE_READ_MOTION_STATUS: return motorlink_rmd_read_motion_status();
+    case MOTORLINK_RMD_CODE_READ_PHASE_CURRENTS: return motorlink_rmd_read_phase_currents();
     case MOTORLINK_RMD_CODE_OFF: return motorlink_rmd_off();
     case MOTORLINK_RMD_CODE_STOP: return motorlink_rmd_stop();
     case MOTORLINK_RMD_CODE_RUN: return motorlink_rmd_run();
-    case MOTORLINK_RMD_CODE_TORQUE: return motorlink_rmd_torque((int16_t)number(f, "torque"));
-    case MOTORLINK_RMD_CODE_SPEED: return motorlink_rmd_speed((int32_t)number(f, "speed"));
-    case MOTORLINK_RMD_CODE_POSITION: return motorlink_rmd_position((int32_t)number(f, "angle"));
-    case MOTORLINK_RMD_CODE_POSITION_LIMITED:
-      return motorlink_rmd_position_limited((int32_t)number(f, "angle"),
+    case MOTORLINK_RMD_CODE_SET_TORQUE: return motorlink_rmd_set_torque((int16_t)number(f, "iq"));
+    case MOTORLINK_RMD_CODE_SET_SPEED: return motorlink_rmd_set_speed((int32_t)number(f, "speed"));
+    case MOTORLINK_RMD_CODE_SET_POSITION: return motorlink_rmd_set_position((int32_t)number(f, "angle"));
+    case MOTORLINK_RMD_CODE_SET_POSITION_LIMITED:
+      return motorlink_rmd_set_position_limited((int32_t)number(f, "angle"),
                                             (uint16_t)number(f, "max_speed"));
-    case MOTORLINK_RMD_CODE_CIRCLE_POSITION:
-      return motorlink_rmd_circle_position((uint8_t)number(f, "direction"),
+    case MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION:
+      return motorlink_rmd_set_single_turn_position((uint8_t)number(f, "direction"),
                                            (uint16_t)number(f, "angle"));
     default:
-      CHECK(command == MOTORLINK_RMD_CODE_CIRCLE_POSITION_LIMITED);
-      return motorlink_rmd_circle_position_limited((uint8_t)number(f, "direction"),
+      CHECK(command == MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION_LIMITED);
+      return motorlink_rmd_set_single_turn_position_limited((uint8_t)number(f, "direction"),
                                                    (uint16_t)number(f, "angle"),
                                                    (uint16_t)number(f, "max_speed"));
   }
@@ -96,15 +96,15 @@ static motorlink_rmd_data request_of(uint8_t command, const json_t *f) {
 /* What is read from a reply is what its fields say. */
 static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) {
   switch (command) {
-    case MOTORLINK_RMD_CODE_READ_GAINS:
-    case MOTORLINK_RMD_CODE_WRITE_GAINS:
-    case MOTORLINK_RMD_CODE_WRITE_GAINS_TO_ROM: {
-      motorlink_rmd_gains gains = motorlink_rmd_decode_gains(reply), expected = gains_of(f);
+    case MOTORLINK_RMD_CODE_READ_PID:
+    case MOTORLINK_RMD_CODE_WRITE_PID_RAM:
+    case MOTORLINK_RMD_CODE_WRITE_PID_ROM: {
+      motorlink_rmd_pid gains = motorlink_rmd_decode_pid(reply), expected = gains_of(f);
       CHECK(memcmp(&gains, &expected, sizeof gains) == 0);
       break;
     }
     case MOTORLINK_RMD_CODE_READ_ACCELERATION:
-    case MOTORLINK_RMD_CODE_WRITE_ACCELERATION:
+    case MOTORLINK_RMD_CODE_WRITE_ACCELERATION_RAM:
       CHECK(motorlink_rmd_decode_acceleration(reply) == number(f, "acceleration"));
       break;
     case MOTORLINK_RMD_CODE_READ_ENCODER: {
@@ -113,17 +113,17 @@ static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) 
       CHECK(encoder.offset == number(f, "offset"));
       break;
     }
-    case MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET:
-    case MOTORLINK_RMD_CODE_WRITE_ZERO_TO_ROM:
+    case MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET_ROM:
+    case MOTORLINK_RMD_CODE_WRITE_ZERO_ROM:
       CHECK(motorlink_rmd_decode_encoder_offset(reply) == number(f, "offset"));
       break;
     case MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE:
       CHECK(motorlink_rmd_decode_multi_turn_angle(reply) == number(f, "angle"));
       break;
-    case MOTORLINK_RMD_CODE_READ_CIRCLE_ANGLE:
-      CHECK(motorlink_rmd_decode_circle_angle(reply) == number(f, "angle"));
+    case MOTORLINK_RMD_CODE_READ_SINGLE_TURN_ANGLE:
+      CHECK(motorlink_rmd_decode_single_turn_angle(reply) == number(f, "angle"));
       break;
-    case MOTORLINK_RMD_CODE_READ_STATUS_1:
+    case MOTORLINK_RMD_CODE_READ_STATUS:
     case MOTORLINK_RMD_CODE_CLEAR_ERRORS: {
       motorlink_rmd_status status = motorlink_rmd_decode_status(reply);
       CHECK(status.temperature_celsius == number(f, "temperature"));
@@ -131,7 +131,7 @@ static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) 
       CHECK(status.errors == number(f, "errors"));
       break;
     }
-    case MOTORLINK_RMD_CODE_READ_STATUS_3: {
+    case MOTORLINK_RMD_CODE_READ_PHASE_CURRENTS: {
       motorlink_rmd_phase_currents currents = motorlink_rmd_decode_phase_currents(reply);
       CHECK(currents.a_digits == number(f, "phase_a") && currents.b_digits == number(f, "phase_b"));
       CHECK(currents.c_digits == number(f, "phase_c"));
@@ -170,9 +170,9 @@ static void sent_by_the_host(const json_t *vector) {
   uint8_t command = command_of(vector);
   motorlink_rmd_action action;
   if (command == 0) {
-    const int16_t torques[4] = {(int16_t)number(f, "torque_1"), (int16_t)number(f, "torque_2"),
-                                (int16_t)number(f, "torque_3"), (int16_t)number(f, "torque_4")};
-    OK(motorlink_rmd_host_torque4(&host, 0, torques, 0x0F));
+    const int16_t torques[4] = {(int16_t)number(f, "iq_1"), (int16_t)number(f, "iq_2"),
+                                (int16_t)number(f, "iq_3"), (int16_t)number(f, "iq_4")};
+    OK(motorlink_rmd_host_set_torque4(&host, 0, torques, 0x0F));
   } else {
     motorlink_rmd_data request = request_of(command, f);
     motorlink_error taken = motorlink_rmd_host_request(&host, 0, motor_of(vector), request);
@@ -190,7 +190,7 @@ static void sent_by_the_host(const json_t *vector) {
 /* The reply of the vector ends an exchange with its motor. */
 static void heard_by_the_host(const json_t *vector) {
   uint8_t command = command_of(vector), id = motor_of(vector);
-  motorlink_rmd_data reply = data_of(vector), asked = motorlink_rmd_torque(0);
+  motorlink_rmd_data reply = data_of(vector), asked = motorlink_rmd_set_torque(0);
   motorlink_can_frame frame;
   motorlink_rmd_action action;
   switch (command) {
@@ -252,21 +252,21 @@ static void carried_out(const json_t *vector) {
   }
   switch (command) {
     case 0:
-      CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.torque_16ma == number(f, "torque_1"));
+      CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.torque_16ma == number(f, "iq_1"));
       break;
-    case MOTORLINK_RMD_CODE_TORQUE:
-      CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.torque_16ma == number(f, "torque"));
+    case MOTORLINK_RMD_CODE_SET_TORQUE:
+      CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.torque_16ma == number(f, "iq"));
       break;
-    case MOTORLINK_RMD_CODE_SPEED:
+    case MOTORLINK_RMD_CODE_SET_SPEED:
       CHECK(told.kind == MOTORLINK_RMD_MODE_SPEED && told.speed_centidps == number(f, "speed"));
       break;
-    case MOTORLINK_RMD_CODE_POSITION_LIMITED:
-    case MOTORLINK_RMD_CODE_CIRCLE_POSITION_LIMITED:
+    case MOTORLINK_RMD_CODE_SET_POSITION_LIMITED:
+    case MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION_LIMITED:
       CHECK(told.max_speed_dps == number(f, "max_speed"));
       CHECK(told.kind == MOTORLINK_RMD_MODE_POSITION);
       break;
-    case MOTORLINK_RMD_CODE_POSITION:
-    case MOTORLINK_RMD_CODE_CIRCLE_POSITION:
+    case MOTORLINK_RMD_CODE_SET_POSITION:
+    case MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION:
       CHECK(told.max_speed_dps == -1 && told.kind == MOTORLINK_RMD_MODE_POSITION);
       break;
     default:
@@ -293,7 +293,7 @@ static int given_by_the_drive(const json_t *vector) {
   memset(&rom, 0, sizeof rom);
   memset(&sensed, 0, sizeof sensed);
   switch (command) {
-    case MOTORLINK_RMD_CODE_READ_GAINS:
+    case MOTORLINK_RMD_CODE_READ_PID:
       rom.gains = gains_of(f);
       break;
     case MOTORLINK_RMD_CODE_READ_ACCELERATION:
@@ -304,11 +304,11 @@ static int given_by_the_drive(const json_t *vector) {
       sensed.encoder_counts = number(f, "raw");
       rom.encoder_offset = (uint16_t)number(f, "offset");
       break;
-    case MOTORLINK_RMD_CODE_WRITE_ZERO_TO_ROM:
+    case MOTORLINK_RMD_CODE_WRITE_ZERO_ROM:
       sensed.encoder_counts = number(f, "offset");
       break;
     case MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE:
-    case MOTORLINK_RMD_CODE_READ_CIRCLE_ANGLE: {
+    case MOTORLINK_RMD_CODE_READ_SINGLE_TURN_ANGLE: {
       int64_t angle = number(f, "angle");
       encoder_bits = 18;
       if (angle > INT64_C(1) << 40 || angle < -(INT64_C(1) << 40)) {
@@ -318,13 +318,13 @@ static int given_by_the_drive(const json_t *vector) {
       sensed.encoder_counts = (angle * (INT64_C(1) << 18) + (angle < 0 ? 0 : 35999)) / 36000;
       break;
     }
-    case MOTORLINK_RMD_CODE_READ_STATUS_1:
+    case MOTORLINK_RMD_CODE_READ_STATUS:
     case MOTORLINK_RMD_CODE_CLEAR_ERRORS:
       sensed.temperature_celsius = (int8_t)number(f, "temperature");
       sensed.voltage_decivolts = (uint16_t)number(f, "voltage");
       sensed.faults = (uint8_t)number(f, "errors");
       break;
-    case MOTORLINK_RMD_CODE_READ_STATUS_3:
+    case MOTORLINK_RMD_CODE_READ_PHASE_CURRENTS:
       sensed.phase_digits[0] = (int16_t)number(f, "phase_a");
       sensed.phase_digits[1] = (int16_t)number(f, "phase_b");
       sensed.phase_digits[2] = (int16_t)number(f, "phase_c");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
-/* vectors_st stmcp.json: each vector through the master and through the slave. */
+/* vectors_st st.json: each vector through the master and through the slave. */
 #include "vectors.h"
 
 static motorlink_st_master master;
@@ -383,7 +383,7 @@ int main(int argc, char **argv) {
     count++;
   }
   CHECK(count == (int)json_array_size(vectors));
-  printf("stmcp: %d vectors, %d replies from a slave\n", count, replies);
+  printf("st: %d vectors, %d replies from a slave\n", count, replies);
   json_decref(vectors);
   return 0;
 }

@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use motorlink_proto::rmd::{COMMANDS, Errors, MOTOR_BASE, Spin, TORQUE4_ID};
-use motorlink_proto::stmcp::register::{Access, Origin};
-use motorlink_proto::stmcp::{
+use motorlink_proto::rmd::{COMMANDS, Errors, MOTOR_BASE, SpinDirection, TORQUE4_ID};
+use motorlink_proto::st::register::{Access, Origin};
+use motorlink_proto::st::{
     Command, ControlMode, ErrorCode, Feature, Flags, FrameCode, Profile, RegisterId, Status,
 };
 
@@ -106,7 +106,7 @@ pub fn text() -> String {
         (format!("MOTORLINK_RMD_FAULT_{name}"), u32::from(bits.0), (*text).to_owned())
     });
     group(&mut out, "motorlink_rmd_fault", "Bits of the error state.", errors);
-    let spins = Spin::ALL.iter().map(|spin| {
+    let spins = SpinDirection::ALL.iter().map(|spin| {
         let name = spin.name().expect("named").to_uppercase();
         (format!("MOTORLINK_RMD_SPIN_{name}"), u32::from(spin.number()), spin.doc().to_owned())
     });
@@ -171,7 +171,7 @@ fn group(
     out.push_str("};\n\n");
 }
 
-/// `FluxWeakening` as `FLUX_WEAKENING`, `ReadStatus1` as `READ_STATUS_1`.
+/// `FluxWeakening` as `FLUX_WEAKENING`, `ReadStatus` as `READ_STATUS_1`.
 fn screaming(camel: &str) -> String {
     let mut out = String::new();
     for (index, letter) in camel.char_indices() {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use motorlink_link::port::{ByteLink, DEFAULT_BAUD, EventLine, Evented, PortError, PortName};
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::{Served, Server};
-use motorlink_proto::stmcp::{Command, Config, ErrorCode, Recovery, Request, Status};
+use motorlink_proto::st::{Command, Config, ErrorCode, Recovery, Request, Status};
 use motorlink_proto::time::{self, Instant};
 
 use super::event::{Halt, Outcome, Part};
@@ -16,8 +16,8 @@ use super::hold::Hold;
 use super::pace::Pace;
 use super::port::Port;
 use super::station::Desk;
-use crate::stmcp::follow::Follower;
-use crate::stmcp::{Client, Error, Options, Stopped};
+use crate::st::follow::Follower;
+use crate::st::{Client, Error, Options, Stopped};
 
 /// How long a motor has to show that it stops, and how often it is asked.
 const STATUS_PATIENCE: Duration = Duration::from_millis(500);

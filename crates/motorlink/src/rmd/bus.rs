@@ -10,7 +10,7 @@ use motorlink_link::port::{CanLink, PortError, PortName};
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{
     self as proto, Command, Counters, Dialect, Limits, MotionStatus, MotorId, MotorSet, Payload,
-    ReadStatus1, Torque4,
+    ReadStatus, SetTorque4,
 };
 use motorlink_proto::time;
 
@@ -22,7 +22,7 @@ use crate::turn::{Turn, Turns};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Found {
     /// A motor of this protocol, with its state.
-    Motor(MotorId, proto::Status1),
+    Motor(MotorId, proto::Status),
     /// A motor of another protocol.
     Foreign(MotorId, Dialect),
     /// The request itself came back: the adapter echoes what it sends, and nothing is known of a
@@ -219,15 +219,15 @@ impl Bus {
     /// # Errors
     /// The port's, a limit's, [`Error::OutOfReach`], [`Error::Quarantined`]: nothing was sent then. Nor
     /// was it if the result of a motor is [`Error::Quarantined`].
-    pub fn torque4(
+    pub fn set_torque4(
         &self,
-        torques: Torque4,
+        torques: SetTorque4,
         expect: MotorSet,
     ) -> Result<[Option<Result<MotionStatus, Error>>; 4], Error> {
         let mut driven = self.line.take();
         driven.ready([])?;
         let now = driven.port.now();
-        driven.session.torque4(now, torques, expect)?;
+        driven.session.set_torque4(now, torques, expect)?;
         let mut replies = [const { None }; 4];
         self.run(driven, |id, result| {
             if let Some(slot) = replies.get_mut(usize::from(id.number()) - 1) {
@@ -249,14 +249,14 @@ impl Bus {
         let mut done = 0;
         while !left.is_empty() {
             let asked = left.by_ref().take(SCAN_WIDTH);
-            let requests: Vec<_> = asked.map(|id| (id, ReadStatus1.encode())).collect();
+            let requests: Vec<_> = asked.map(|id| (id, ReadStatus.encode())).collect();
             let mut doubtful = MotorSet::EMPTY;
             self.cycle(&requests, |id, outcome| match outcome {
                 Err(Error::Quarantined { .. }) => doubtful.insert(id),
                 outcome => Found::of(id, outcome).into_iter().for_each(&mut each),
             })?;
             for id in doubtful {
-                let outcome = self.raw(id, ReadStatus1.encode());
+                let outcome = self.raw(id, ReadStatus.encode());
                 if let Err(error @ Error::Port(_)) = outcome {
                     return Err(error);
                 }
@@ -403,12 +403,12 @@ impl<L: CanLink> Driven<L> {
 }
 
 impl Found {
-    /// What the outcome of a [`ReadStatus1`] tells of the motor that it was for.
+    /// What the outcome of a [`ReadStatus`] tells of the motor that it was for.
     pub fn of(id: MotorId, outcome: Result<[u8; 8], Error>) -> Option<Self> {
         match outcome {
             Err(Error::Echo { .. }) => Some(Found::Echo(id)),
             Err(Error::Shared { .. }) => Some(Found::Shared(id)),
-            Ok(reply) => Some(Found::Motor(id, proto::Status1::decode(&reply))),
+            Ok(reply) => Some(Found::Motor(id, proto::Status::decode(&reply))),
             Err(Error::Foreign { dialect, .. }) => Some(Found::Foreign(id, dialect)),
             Err(_) => None,
         }

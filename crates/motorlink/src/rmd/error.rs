@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use motorlink_link::port::{CanLink, PortError};
-use motorlink_proto::rmd::{Code, Dialect, Exceeded, MotorId, Spin};
-use motorlink_proto::units::CircleAngle;
+use motorlink_proto::rmd::{Code, Dialect, Exceeded, MotorId, SpinDirection};
+use motorlink_proto::units::TurnCentiDegrees;
 
 /// Why a call to a motor did not do what it says. This protocol has no refusal: a motor that does
 /// not know a command is silent.
@@ -131,13 +131,13 @@ pub enum Error {
         /// The motor.
         id: MotorId,
         /// Where it is (0x94).
-        at: CircleAngle,
+        at: TurnCentiDegrees,
         /// How far past its target that is.
-        past: CircleAngle,
+        past: TurnCentiDegrees,
         /// Where it should turn to.
-        target: CircleAngle,
+        target: TurnCentiDegrees,
         /// Which way round.
-        direction: Spin,
+        direction: SpinDirection,
     },
     /// There is no such motor; nothing was sent.
     #[error("motor {0} does not exist: motor IDs are 1 to 32")]

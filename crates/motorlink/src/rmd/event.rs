@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use motorlink_link::port::{CanLink, EventCan, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
-use motorlink_proto::rmd::{Limits, MotorId, MotorSet, Torque4};
+use motorlink_proto::rmd::{Limits, MotorId, MotorSet, SetTorque4};
 
 use super::bus::Driven;
 use super::session::Output;
@@ -103,14 +103,14 @@ impl EventBus {
         self.driven.session.request(now, id, request)
     }
 
-    /// Begins exchanges with those of motors 1 to 4 that are in `expect`, as [`Bus::torque4`].
+    /// Begins exchanges with those of motors 1 to 4 that are in `expect`, as [`Bus::set_torque4`].
     ///
     /// # Errors
     /// Those of [`ask`](Self::ask).
-    pub fn torque4(&mut self, torques: Torque4, expect: MotorSet) -> Result<(), Error> {
+    pub fn set_torque4(&mut self, torques: SetTorque4, expect: MotorSet) -> Result<(), Error> {
         self.driven.listen()?;
         let now = self.driven.port.now();
-        self.driven.session.torque4(now, torques, expect)
+        self.driven.session.set_torque4(now, torques, expect)
     }
 
     /// Gives up the exchange with a motor, if there is one. Its reply is not taken for another's.

@@ -68,7 +68,7 @@ impl Follower {
         }
         if can_id == TORQUE4_ID {
             for id in MotorSet::TORQUE4 {
-                self.ask(id, Asked { code: Code::Torque.into(), at: now, number, ends: false });
+                self.ask(id, Asked { code: Code::SetTorque.into(), at: now, number, ends: false });
             }
         } else if let Some(id) = MotorId::from_can_id(can_id.into()) {
             let ends = Code::from(code).ends_motion();

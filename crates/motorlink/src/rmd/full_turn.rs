@@ -1,7 +1,7 @@
 //! Moves within the turn (0xA5, 0xA6) that could be nearly a full turn.
 
-use motorlink_proto::rmd::{FULL_TURN, MotorId, Spin};
-use motorlink_proto::units::CircleAngle;
+use motorlink_proto::rmd::{FULL_TURN, MotorId, SpinDirection};
+use motorlink_proto::units::TurnCentiDegrees;
 
 use super::Error;
 
@@ -13,7 +13,7 @@ pub enum FullTurn {
     /// target, or past it by `tolerance` at most.
     Refused {
         /// 0.01° a digit.
-        tolerance: CircleAngle,
+        tolerance: TurnCentiDegrees,
     },
     /// The move is sent as it is; the motor is not asked for its angle.
     Allowed,
@@ -22,7 +22,7 @@ pub enum FullTurn {
 impl Default for FullTurn {
     /// Refused, with a tolerance of 0.5°.
     fn default() -> Self {
-        FullTurn::Refused { tolerance: CircleAngle(50) }
+        FullTurn::Refused { tolerance: TurnCentiDegrees(50) }
     }
 }
 
@@ -35,9 +35,9 @@ impl FullTurn {
     pub fn check(
         self,
         id: MotorId,
-        at: CircleAngle,
-        target: CircleAngle,
-        direction: Spin,
+        at: TurnCentiDegrees,
+        target: TurnCentiDegrees,
+        direction: SpinDirection,
     ) -> Result<(), Error> {
         let FullTurn::Refused { tolerance } = self else { return Ok(()) };
         let past = past(at, target, direction);
@@ -49,26 +49,30 @@ impl FullTurn {
 }
 
 /// How far a motor is past its target, less than a turn.
-fn past(at: CircleAngle, target: CircleAngle, direction: Spin) -> CircleAngle {
+fn past(
+    at: TurnCentiDegrees,
+    target: TurnCentiDegrees,
+    direction: SpinDirection,
+) -> TurnCentiDegrees {
     let (from, to) = match direction {
-        Spin::Counterclockwise => (at, target),
+        SpinDirection::Counterclockwise => (at, target),
         _ => (target, at),
     };
     let way = (i32::from(to.0) - i32::from(from.0)).rem_euclid(FULL_TURN.into());
-    CircleAngle(way as u16)
+    TurnCentiDegrees(way as u16)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const CW: Spin = Spin::Clockwise;
-    const CCW: Spin = Spin::Counterclockwise;
+    const CW: SpinDirection = SpinDirection::Clockwise;
+    const CCW: SpinDirection = SpinDirection::Counterclockwise;
 
-    fn is_refused(tolerance: u16, at: u16, target: u16, direction: Spin) -> bool {
-        let full_turn = FullTurn::Refused { tolerance: CircleAngle(tolerance) };
+    fn is_refused(tolerance: u16, at: u16, target: u16, direction: SpinDirection) -> bool {
+        let full_turn = FullTurn::Refused { tolerance: TurnCentiDegrees(tolerance) };
         let id = MotorId::new(1).unwrap();
-        full_turn.check(id, CircleAngle(at), CircleAngle(target), direction).is_err()
+        full_turn.check(id, TurnCentiDegrees(at), TurnCentiDegrees(target), direction).is_err()
     }
 
     #[test]
@@ -98,9 +102,9 @@ mod tests {
     #[test]
     fn the_default_tolerance_is_half_a_degree() {
         let id = MotorId::new(1).unwrap();
-        let check = |at| FullTurn::default().check(id, at, CircleAngle(9_000), CW);
-        assert!(check(CircleAngle::from_degrees(90.5)).is_err());
-        assert!(check(CircleAngle::from_degrees(90.51)).is_ok());
+        let check = |at| FullTurn::default().check(id, at, TurnCentiDegrees(9_000), CW);
+        assert!(check(TurnCentiDegrees::from_degrees(90.5)).is_err());
+        assert!(check(TurnCentiDegrees::from_degrees(90.51)).is_ok());
     }
 
     #[test]
@@ -113,7 +117,7 @@ mod tests {
     #[test]
     fn an_allowed_full_turn_is_never_refused() {
         let id = MotorId::new(1).unwrap();
-        let at = CircleAngle(9_000);
+        let at = TurnCentiDegrees(9_000);
         assert!(FullTurn::Allowed.check(id, at, at, CW).is_ok());
     }
 }

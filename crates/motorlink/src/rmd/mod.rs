@@ -6,8 +6,8 @@
 //! let bus = Bus::open(&"slcan:/dev/ttyACM0".parse()?, Options::default())?;
 //! let guard = bus.guard();                 // switches off what was set moving
 //! let motor = bus.motor(1)?;
-//! motor.move_to(CentiDegrees::from_degrees(90.0), Some(SpeedLimit(500)))?;
-//! println!("{} °/s", motor.status2()?.speed.dps());
+//! motor.set_position(CentiDegrees::from_degrees(90.0), Some(SpeedLimit(500)))?;
+//! println!("{} °/s", motor.motion_status()?.speed.dps());
 //! # drop(guard);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -23,10 +23,11 @@ mod options;
 mod session;
 
 pub use motorlink_proto::rmd::{
-    Acceleration, Circle, CirclePosition, CirclePositionLimited, Code, Command, CommandInfo,
-    Counters, Dialect, Direction, Encoder, EncoderBits, EncoderOffset, Errors, Exceeded, Gains,
-    IDENTIFIERS, Limits, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, PhaseCurrents, Spin,
-    Status1, Torque, Torque4, describe,
+    Acceleration, Code, Command, CommandInfo, Counters, Dialect, Direction, Encoder, EncoderBits,
+    EncoderOffset, Errors, Exceeded, IDENTIFIERS, Limits, MotionStatus, MotorId, MotorSet,
+    MultiTurnAngle, Payload, PhaseCurrents, Pid, SetSingleTurnPosition,
+    SetSingleTurnPositionLimited, SetTorque, SetTorque4, SingleTurnAngle, SpinDirection, Status,
+    describe,
 };
 pub use motorlink_proto::units::*;
 

@@ -32,38 +32,38 @@ impl MotorHandle<'_> {
     }
 
     /// Temperature, voltage and error flags (0x9A).
-    pub fn status1(&self) -> Result<Status1, Error> {
-        self.ask(ReadStatus1)
+    pub fn status(&self) -> Result<Status, Error> {
+        self.ask(ReadStatus)
     }
 
     /// Temperature, torque current, speed and encoder position (0x9C).
-    pub fn status2(&self) -> Result<MotionStatus, Error> {
-        self.ask(ReadStatus2)
+    pub fn motion_status(&self) -> Result<MotionStatus, Error> {
+        self.ask(ReadMotionStatus)
     }
 
     /// Phase currents (0x9D).
-    pub fn status3(&self) -> Result<PhaseCurrents, Error> {
-        self.ask(ReadStatus3)
+    pub fn phase_currents(&self) -> Result<PhaseCurrents, Error> {
+        self.ask(ReadPhaseCurrents)
     }
 
     /// Clears the error flags whose cause is gone (0x9B).
-    pub fn clear_errors(&self) -> Result<Status1, Error> {
+    pub fn clear_errors(&self) -> Result<Status, Error> {
         self.ask(ClearErrors)
     }
 
     /// The gains in RAM (0x30).
-    pub fn gains(&self) -> Result<Gains, Error> {
-        self.ask(ReadGains)
+    pub fn pid(&self) -> Result<Pid, Error> {
+        self.ask(ReadPid)
     }
 
     /// Sets the gains until power-off (0x31).
-    pub fn write_gains(&self, gains: Gains) -> Result<(), Error> {
-        self.ask(WriteGains(gains)).map(drop)
+    pub fn write_pid_ram(&self, gains: Pid) -> Result<(), Error> {
+        self.ask(WritePidRam(gains)).map(drop)
     }
 
     /// Sets the gains for good (0x32). Wears the ROM.
-    pub fn write_gains_to_rom(&self, gains: Gains) -> Result<(), Error> {
-        self.ask(WriteGainsToRom(gains)).map(drop)
+    pub fn write_pid_rom(&self, gains: Pid) -> Result<(), Error> {
+        self.ask(WritePidRom(gains)).map(drop)
     }
 
     /// The acceleration limit (0x33).
@@ -72,8 +72,8 @@ impl MotorHandle<'_> {
     }
 
     /// Sets the acceleration limit until power-off (0x34).
-    pub fn write_acceleration(&self, acceleration: DpsPerSecond) -> Result<(), Error> {
-        self.ask(WriteAcceleration(Acceleration { acceleration })).map(drop)
+    pub fn write_acceleration_ram(&self, acceleration: DpsPerSecond) -> Result<(), Error> {
+        self.ask(WriteAccelerationRam(Acceleration { acceleration })).map(drop)
     }
 
     /// Encoder position, original position and offset (0x90).
@@ -83,24 +83,24 @@ impl MotorHandle<'_> {
 
     /// Sets the encoder offset, at once and for good (0x91); gives the offset that the motor took.
     /// Wears the ROM.
-    pub fn write_encoder_offset_to_rom(&self, offset: u16) -> Result<u16, Error> {
-        self.ask(WriteEncoderOffset(EncoderOffset { offset })).map(|reply| reply.offset)
+    pub fn write_encoder_offset_rom(&self, offset: u16) -> Result<u16, Error> {
+        self.ask(WriteEncoderOffsetRom(EncoderOffset { offset })).map(|reply| reply.offset)
     }
 
     /// Makes the current position the zero from the next power-on on (0x19); gives the new offset.
     /// Wears the ROM.
-    pub fn write_zero_to_rom(&self) -> Result<u16, Error> {
-        self.ask(WriteZeroToRom).map(|reply| reply.offset)
+    pub fn write_zero_rom(&self) -> Result<u16, Error> {
+        self.ask(WriteZeroRom).map(|reply| reply.offset)
     }
 
     /// The angle over all turns (0x92).
-    pub fn multi_turn_angle(&self) -> Result<MultiTurnAngle, Error> {
+    pub fn multi_turn_angle(&self) -> Result<WideCentiDegrees, Error> {
         self.ask(ReadMultiTurnAngle).map(|reply| reply.angle)
     }
 
     /// The angle within the turn (0x94).
-    pub fn circle_angle(&self) -> Result<CircleAngle, Error> {
-        self.ask(ReadCircleAngle).map(|reply| reply.angle)
+    pub fn single_turn_angle(&self) -> Result<TurnCentiDegrees, Error> {
+        self.ask(ReadSingleTurnAngle).map(|reply| reply.angle)
     }
 
     /// Switches the motor off and forgets what it was doing (0x80).
@@ -119,24 +119,24 @@ impl MotorHandle<'_> {
     }
 
     /// Holds a torque current (0xA1).
-    pub fn torque(&self, torque: TorqueCommand) -> Result<MotionStatus, Error> {
-        self.ask(Torque { torque })
+    pub fn set_torque(&self, torque: IqCommand) -> Result<MotionStatus, Error> {
+        self.ask(SetTorque { iq: torque })
     }
 
     /// Holds a speed (0xA2).
-    pub fn speed(&self, speed: CentiDps) -> Result<MotionStatus, Error> {
-        self.ask(Speed { speed })
+    pub fn set_speed(&self, speed: CentiDps) -> Result<MotionStatus, Error> {
+        self.ask(SetSpeed { speed })
     }
 
     /// Turns to a multi-turn angle (0xA3), no faster than `max_speed` if there is one (0xA4).
-    pub fn move_to(
+    pub fn set_position(
         &self,
         angle: CentiDegrees,
         max_speed: Option<SpeedLimit>,
     ) -> Result<MotionStatus, Error> {
         match max_speed {
-            None => self.ask(Position { angle }),
-            Some(max_speed) => self.ask(PositionLimited { max_speed, angle }),
+            None => self.ask(SetPosition { angle }),
+            Some(max_speed) => self.ask(SetPositionLimited { max_speed, angle }),
         }
     }
 
@@ -149,21 +149,23 @@ impl MotorHandle<'_> {
     /// # Errors
     /// [`Error::FullTurn`] if the motor is at the angle or just past it. Of the caller's limits,
     /// [`Limits::angle`] does not hold for this move, as it is about the angle over all turns.
-    pub fn turn_to(
+    pub fn set_single_turn_position(
         &self,
-        angle: CircleAngle,
-        direction: Spin,
+        angle: TurnCentiDegrees,
+        direction: SpinDirection,
         max_speed: Option<SpeedLimit>,
         full_turn: FullTurn,
     ) -> Result<MotionStatus, Error> {
         let request = match max_speed {
-            None => CirclePosition { direction, angle }.encode(),
-            Some(max_speed) => CirclePositionLimited { direction, max_speed, angle }.encode(),
+            None => SetSingleTurnPosition { direction, angle }.encode(),
+            Some(max_speed) => {
+                SetSingleTurnPositionLimited { direction, max_speed, angle }.encode()
+            }
         };
         if full_turn != FullTurn::Allowed {
             let in_range = Limits::default().check(&request);
             in_range.map_err(|exceeded| Error::Limit { id: self.id, exceeded })?;
-            let at = self.circle_angle()?;
+            let at = self.single_turn_angle()?;
             self.bus.confirm(self.id)?;
             full_turn.check(self.id, at, angle, direction)?;
         }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use motorlink_link::port::PortError;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, Refused, Torque,
-    Torque4, question_behind,
+    self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, Refused, SetTorque,
+    SetTorque4, question_behind,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -16,7 +16,7 @@ use super::{Error, Options};
 const SETTLE_LIMIT: Duration = Duration::from_millis(2_000);
 
 /// A host that waits for motors in quarantine, and for those that it asks for the first time, with the motors that it set moving, and its errors in
-/// words: sans I/O. [`request`](Self::request), [`ask`](Self::ask) or [`torque4`](Self::torque4),
+/// words: sans I/O. [`request`](Self::request), [`ask`](Self::ask) or [`set_torque4`](Self::set_torque4),
 /// then [`poll`](Self::poll) until it waits, handing in with [`receive`](Self::receive) what comes.
 #[derive(Debug, Clone)]
 pub(super) struct Session {
@@ -51,7 +51,7 @@ struct Asked {
 /// Torques for motors 1 to 4 that wait until the motors can be trusted.
 #[derive(Debug, Clone, Copy)]
 struct Held {
-    torques: Torque4,
+    torques: SetTorque4,
     expect: MotorSet,
     /// Those of them that have answered.
     answered: MotorSet,
@@ -192,17 +192,17 @@ impl Session {
     ///
     /// # Errors
     /// As [`request`](Self::request).
-    pub(super) fn torque4(
+    pub(super) fn set_torque4(
         &mut self,
         now: Instant,
-        torques: Torque4,
+        torques: SetTorque4,
         expect: MotorSet,
     ) -> Result<(), Error> {
-        let torque = Torque::default().encode();
+        let torque = SetTorque::default().encode();
         for id in MotorSet::TORQUE4 {
             self.free(id, &torque)?;
         }
-        let begun = self.host.torque4(now, torques, expect);
+        let begun = self.host.set_torque4(now, torques, expect);
         begun.map_err(|refused| self.refused(refused))?;
         let until = now + self.patience;
         for id in expect {
@@ -311,7 +311,7 @@ impl Session {
     fn send_held(&mut self, now: Instant) -> Option<Instant> {
         let Held { torques, expect, until, .. } =
             self.held.filter(|held| held.answered == held.expect)?;
-        match self.host.torque4(now, torques, expect) {
+        match self.host.set_torque4(now, torques, expect) {
             Err(Refused::Quarantined { until: free, .. }) if now < until => return Some(free),
             Ok(()) => self.held = None,
             Err(why) => self.drop_held(Some(why)),

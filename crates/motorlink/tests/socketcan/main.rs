@@ -12,7 +12,7 @@ use motorlink::can::CanFrame;
 use motorlink::list;
 use motorlink::port::{CanLink, PortError, PortName};
 use motorlink::rmd::{
-    self, Bus, CentiDps, Error, Found, Gains, MotorId, MotorSet, Torque4, TorqueCommand,
+    self, Bus, CentiDps, Error, Found, IqCommand, MotorId, MotorSet, Pid, SetTorque4,
 };
 use motorlink::time::Instant;
 use motorlink::{BackOff, LinkState};
@@ -76,20 +76,19 @@ fn drive(host: &str, drives: &str) {
     assert!(found.iter().all(|motor| matches!(motor, Found::Motor(..))), "{found:?}");
 
     let motor = bus.motor(3).expect("1 to 32");
-    assert!(motor.status1().expect("an answer").voltage.volts() > 1.0);
-    let gains =
-        Gains { position_kp: 1, position_ki: 2, speed_kp: 3, ..motor.gains().expect("old") };
-    motor.write_gains(gains).expect("an answer");
-    assert_eq!(motor.gains().expect("an answer"), gains);
-    motor.speed(CentiDps(36_000)).expect("an answer");
+    assert!(motor.status().expect("an answer").voltage.volts() > 1.0);
+    let gains = Pid { position_kp: 1, position_ki: 2, speed_kp: 3, ..motor.pid().expect("old") };
+    motor.write_pid_ram(gains).expect("an answer");
+    assert_eq!(motor.pid().expect("an answer"), gains);
+    motor.set_speed(CentiDps(36_000)).expect("an answer");
     until("motor 3 turns with 360 °/s", || {
-        (355..=365).contains(&motor.status2().expect("an answer").speed.0)
+        (355..=365).contains(&motor.motion_status().expect("an answer").speed.0)
     });
     motor.off().expect("an answer");
     assert!(motors.state().contains("\"motor\":3,\"mode\":\"off\""));
 
-    let torques = [100, -100, 0, 50].map(TorqueCommand);
-    let replies = bus.torque4(Torque4(torques), MotorSet::TORQUE4).expect("the port");
+    let torques = [100, -100, 0, 50].map(IqCommand);
+    let replies = bus.set_torque4(SetTorque4(torques), MotorSet::TORQUE4).expect("the port");
     assert!(replies.iter().all(|reply| matches!(reply, Some(Ok(_)))), "{replies:?}");
     assert_eq!(motors.state().matches("\"mode\":\"torque\"").count(), 4);
 }
@@ -152,16 +151,16 @@ fn the_hosts_interface_goes_down_and_comes_back() {
     let _motors = Served::on("can1", 1);
     let bus = bus("can0");
     let motor = bus.motor(1).expect("1 to 32");
-    motor.status1().expect("an answer");
+    motor.status().expect("an answer");
     ip("link set can0 down");
-    let lost = motor.status1().expect_err("the interface is down").to_string();
+    let lost = motor.status().expect_err("the interface is down").to_string();
     assert!(lost.contains("`can0` is down: sudo ip link set can0 up type can"), "{lost}");
     for _ in 0..100 {
-        assert_eq!(motor.status1().expect_err("the interface is down").to_string(), lost);
+        assert_eq!(motor.status().expect_err("the interface is down").to_string(), lost);
     }
     assert!(matches!(bus.link_state(), LinkState::Closed { .. }));
     ip("link set can0 up");
-    until("the motor answers again", || motor.status1().is_ok());
+    until("the motor answers again", || motor.status().is_ok());
 }
 
 #[test]
@@ -170,7 +169,7 @@ fn an_exchange_ends_when_the_interface_goes_down_in_it() {
     let bus = bus("vcan0");
     let witness = neighbour("vcan0");
     let lost = std::thread::scope(|scope| {
-        let exchange = scope.spawn(|| bus.motor(1).expect("1 to 32").status1());
+        let exchange = scope.spawn(|| bus.motor(1).expect("1 to 32").status());
         witness.read_frame().expect("the request");
         ip("link set vcan0 down");
         exchange.join().expect("no panic").expect_err("nobody answers")
@@ -185,11 +184,11 @@ fn the_motors_interface_goes_down_and_comes_back() {
     let mut motors = Served::on("can1", 1);
     let bus = hasty("can0");
     let motor = bus.motor(1).expect("1 to 32");
-    until("the motor turns", || motor.speed(CentiDps(36_000)).is_ok());
+    until("the motor turns", || motor.set_speed(CentiDps(36_000)).is_ok());
     ip("link set can1 down");
-    assert!(matches!(motor.status2(), Err(Error::Timeout { .. })));
+    assert!(matches!(motor.motion_status(), Err(Error::Timeout { .. })));
     ip("link set can1 up");
-    until("the motor answers again", || motor.status2().is_ok());
+    until("the motor answers again", || motor.motion_status().is_ok());
     assert!(motors.state().contains("\"mode\":\"speed\""), "it went on turning");
 }
 
@@ -204,17 +203,17 @@ fn an_interface_that_is_unplugged_is_told_and_used_when_it_is_back() {
     let _motors = Served::on("vcan9", 1);
     let bus = hasty("vcan9");
     let motor = bus.motor(1).expect("1 to 32");
-    until("the motor answers", || motor.status1().is_ok());
+    until("the motor answers", || motor.status().is_ok());
     ip("link del vcan9");
-    let lost = motor.status1().expect_err("there is no interface").to_string();
+    let lost = motor.status().expect_err("there is no interface").to_string();
     assert!(lost.contains("`vcan9`"), "{lost}");
     let mut gone = String::new();
     until("the next attempt says that it is gone", || {
-        gone = motor.status1().expect_err("there is no interface").to_string();
+        gone = motor.status().expect_err("there is no interface").to_string();
         gone.contains("there is no CAN interface `vcan9`")
     });
     plug();
-    until("the motor answers again", || motor.status1().is_ok());
+    until("the motor answers again", || motor.status().is_ok());
     ip("link del vcan9");
 }
 
@@ -243,7 +242,7 @@ fn error_frames_short_of_bus_off_disturb_nobody() {
         report_error("vcan0", class, data);
         let seen = witness.read_frame().expect("the kernel hands it on");
         assert!(matches!(seen, socketcan::CanFrame::Error(_)), "{name}: {seen:?}");
-        motor.status1().unwrap_or_else(|error| panic!("{name}: {error}"));
+        motor.status().unwrap_or_else(|error| panic!("{name}: {error}"));
     }
     assert_eq!(bus.counters().malformed, 0);
 }
@@ -254,12 +253,12 @@ fn bus_off_is_told_and_the_port_is_opened_again() {
     let _motors = Served::on("vcan0", 1);
     let bus = hasty("vcan0");
     let motor = bus.motor(1).expect("1 to 32");
-    until("the motor answers", || motor.status1().is_ok());
+    until("the motor answers", || motor.status().is_ok());
     report_error("vcan0", BUS_OFF, [0; 8]);
-    let lost = motor.status1().expect_err("the controller is off the bus").to_string();
+    let lost = motor.status().expect_err("the controller is off the bus").to_string();
     assert!(lost.starts_with("`vcan0` is bus-off after too many errors: check wiring"), "{lost}");
     // The motors lost the bus too, and look for it ten times a second.
-    until("the motor answers again", || motor.status1().is_ok());
+    until("the motor answers again", || motor.status().is_ok());
 }
 
 #[test]
@@ -268,9 +267,9 @@ fn a_controller_that_is_bus_off_takes_no_request_until_it_is_restarted() {
     let adapter = Adapter::with_motors(Duration::ZERO);
     let bus = bus("slcan0");
     let motor = bus.motor(1).expect("1 to 32");
-    motor.status1().expect("an answer");
+    motor.status().expect("an answer");
     adapter.report('p');
-    motor.status1().expect("error-passive is still on the bus");
+    motor.status().expect("error-passive is still on the bus");
 
     adapter.report('b');
     until("the kernel knows it", || {
@@ -281,17 +280,17 @@ fn a_controller_that_is_bus_off_takes_no_request_until_it_is_restarted() {
         };
         list::ports().iter().any(|port| port.name == "socketcan:slcan0" && is_told(port))
     });
-    until("the host is told", || motor.status1().is_err());
+    until("the host is told", || motor.status().is_err());
     // The interface would take frames and drop them.
     for _ in 0..100 {
-        let lost = motor.status1().expect_err("the controller is off the bus").to_string();
+        let lost = motor.status().expect_err("the controller is off the bus").to_string();
         assert!(lost.starts_with("`slcan0` is bus-off after too many errors"), "{lost}");
     }
     assert!(matches!(refusal("slcan0"), PortError::BusOff { .. }));
 
     ip("link set slcan0 down");
     ip("link set slcan0 up");
-    until("the motor answers again", || motor.status1().is_ok());
+    until("the motor answers again", || motor.status().is_ok());
 }
 
 #[test]
@@ -387,9 +386,9 @@ fn hosts_that_ask_different_motors_share_an_interface() {
                 let bus = bus("can0");
                 let motor = bus.motor(number).expect("1 to 32");
                 for k in 0..100 {
-                    let gains = Gains { position_kp: k, ..Gains::default() };
-                    motor.write_gains(gains).expect("an answer");
-                    assert_eq!(motor.gains().expect("an answer"), gains);
+                    let gains = Pid { position_kp: k, ..Pid::default() };
+                    motor.write_pid_ram(gains).expect("an answer");
+                    assert_eq!(motor.pid().expect("an answer"), gains);
                 }
             });
         }
@@ -424,7 +423,7 @@ fn extended_remote_short_and_fd_frames_are_ignored_by_both_ends() {
             let frame = CanFdFrame::new(standard, &data).expect("up to 64 bytes");
             stranger.write_frame(&frame).expect("room");
         }
-        assert_eq!(motor.status2().expect("an answer").speed.0, 0);
+        assert_eq!(motor.motion_status().expect("an answer").speed.0, 0);
     }
     assert!(motors.state().contains("\"mode\":\"off\""), "{}", motors.state());
     let counters = bus.counters();
@@ -445,11 +444,9 @@ fn a_flood_of_other_frames_is_survived() {
         "vcan0",
         vec![frame(0x7FF, [0xFF; 8]), frame(0x161, [0x9A; 8]), frame(0, [0; 8])],
     );
-    until("some exchanges get through", || {
-        (0..20).filter(|_| motor.status1().is_ok()).count() > 10
-    });
+    until("some exchanges get through", || (0..20).filter(|_| motor.status().is_ok()).count() > 10);
     drop(flood);
-    until("every exchange gets through", || (0..20).all(|_| motor.status1().is_ok()));
+    until("every exchange gets through", || (0..20).all(|_| motor.status().is_ok()));
 }
 
 #[test]

@@ -123,48 +123,48 @@ macro_rules! commands {
 }
 
 commands! {
-    0x30 ReadGains -> Gains []
+    0x30 ReadPid -> Pid []
         "Read PID data command", "Read PID parameter command",
         "reads the gains in RAM";
-    0x31 WriteGains -> WriteGains [echo]
+    0x31 WritePidRam -> WritePidRam [echo]
         "Write PID to RAM command", "Write PID to RAM parameter command",
         "sets the gains until power-off";
-    0x32 WriteGainsToRom -> WriteGainsToRom [echo rom]
+    0x32 WritePidRom -> WritePidRom [echo rom]
         "Write PID to ROM command", "Write PID to ROM parameter command",
         "sets the gains for good";
     0x33 ReadAcceleration -> Acceleration []
         "Read acceleration data command", "Read acceleration data command",
         "reads the acceleration limit";
-    0x34 WriteAcceleration -> WriteAcceleration [echo]
+    0x34 WriteAccelerationRam -> WriteAccelerationRam [echo]
         "Write acceleration data to RAM command", "Write acceleration data to RAM command",
         "sets the acceleration limit until power-off";
     0x90 ReadEncoder -> Encoder []
         "Read encoder data command", "Read encoder data command",
         "reads encoder position, original position and offset";
-    0x91 WriteEncoderOffset -> EncoderOffset [rom]
+    0x91 WriteEncoderOffsetRom -> EncoderOffset [rom]
         "Write encoder offset command", "Write encoder offset command",
         "sets the encoder offset, at once and for good";
-    0x19 WriteZeroToRom -> EncoderOffset [rom]
+    0x19 WriteZeroRom -> EncoderOffset [rom]
         "Write current position to ROM as motor zero command",
         "Write current position to ROM as motor zero position command",
         "makes the current position the zero from the next power-on on";
-    0x92 ReadMultiTurnAngle -> MultiTurn []
+    0x92 ReadMultiTurnAngle -> MultiTurnAngle []
         "Read multi turns angle command", "Read multi turns angle command",
         "reads the angle over all turns";
-    0x94 ReadCircleAngle -> Circle []
+    0x94 ReadSingleTurnAngle -> SingleTurnAngle []
         "Read single circle angle command", "Read single circle angle command",
         "reads the angle within the turn";
-    0x9A ReadStatus1 -> Status1 []
+    0x9A ReadStatus -> Status []
         "Read motor status 1 and error flag commands",
         "Read motor status 1 and error flag commands",
         "reads temperature, voltage and error flags";
-    0x9B ClearErrors -> Status1 []
+    0x9B ClearErrors -> Status []
         "Clear motor error flag command", "Clear motor error flag command",
         "clears the error flags whose cause is gone";
-    0x9C ReadStatus2 -> MotionStatus []
+    0x9C ReadMotionStatus -> MotionStatus []
         "Read motor status 2", "Read motor status 2",
         "reads temperature, torque current, speed and encoder position";
-    0x9D ReadStatus3 -> PhaseCurrents []
+    0x9D ReadPhaseCurrents -> PhaseCurrents []
         "Read motor status 3", "Read motor status 3",
         "reads the three phase currents";
     0x80 Off -> Off [echo]
@@ -176,22 +176,22 @@ commands! {
     0x88 Run -> Run [echo moves]
         "Motor running command", "Motor running command",
         "resumes what the motor was doing before the stop";
-    0xA1 Torque -> MotionStatus [moves]
+    0xA1 SetTorque -> MotionStatus [moves]
         "Torque closed-loop command", "Torque current control command",
         "holds a torque current";
-    0xA2 Speed -> MotionStatus [moves]
+    0xA2 SetSpeed -> MotionStatus [moves]
         "Speed closed-loop command", "Speed control command",
         "holds a speed";
-    0xA3 Position -> MotionStatus [moves]
+    0xA3 SetPosition -> MotionStatus [moves]
         "Position closed-loop command 1", "Position control command 1",
         "turns to a multi-turn angle";
-    0xA4 PositionLimited -> MotionStatus [moves]
+    0xA4 SetPositionLimited -> MotionStatus [moves]
         "Position closed-loop command 2", "Position control command 2",
         "turns to a multi-turn angle no faster than a limit";
-    0xA5 CirclePosition -> MotionStatus [moves]
+    0xA5 SetSingleTurnPosition -> MotionStatus [moves]
         "Position closed-loop command 3", "Position control command 3",
         "turns to an angle within the turn, in a given direction";
-    0xA6 CirclePositionLimited -> MotionStatus [moves]
+    0xA6 SetSingleTurnPositionLimited -> MotionStatus [moves]
         "Position closed-loop command 4", "Position control command 4",
         "turns to an angle within the turn, in a given direction, no faster than a limit";
 }

@@ -2,7 +2,7 @@
 //! identifier, and for some commands they are the same bit for bit.
 
 use super::command::Code;
-use super::message::Torque4;
+use super::message::SetTorque4;
 use super::motor::{Dialect, MotorId, TORQUE4_ID};
 use super::payload::{Field, Payload};
 use crate::can::CanFrame;
@@ -36,7 +36,7 @@ impl fmt::Display for Described {
         };
         if id == TORQUE4_ID {
             f.write_str("motors 1 to 4: Multiple motor torque closed loop control")?;
-            return fields(Torque4::FIELDS, data, f);
+            return fields(SetTorque4::FIELDS, data, f);
         }
         if let Some(motor) = MotorId::from_can_id(u32::from(id)) {
             return self.exchange(motor, data, f);
@@ -133,8 +133,8 @@ mod tests {
     fn the_four_torques_are_named() {
         assert_eq!(
             sent(0x280, [0x64, 0, 0x9C, 0xFF, 0, 0, 0xD0, 0x07]),
-            "motors 1 to 4: Multiple motor torque closed loop control: torque_1 1.600 A, \
-             torque_2 -1.600 A, torque_3 0.000 A, torque_4 32.000 A"
+            "motors 1 to 4: Multiple motor torque closed loop control: iq_1 1.600 A, \
+             iq_2 -1.600 A, iq_3 0.000 A, iq_4 32.000 A"
         );
     }
 

@@ -139,5 +139,5 @@ impl Doubt {
 /// Whether a reply with the code `came` answers a request with the code `asked`.
 pub(super) fn answers(asked: u8, came: u8) -> bool {
     let (asked, came) = (Code::from(asked), Code::from(came));
-    asked == came || (asked == Code::ClearErrors && came == Code::ReadStatus1)
+    asked == came || (asked == Code::ClearErrors && came == Code::ReadStatus)
 }

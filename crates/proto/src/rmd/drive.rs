@@ -34,9 +34,9 @@ pub enum Mode {
     Off,
     /// Brought to a stand and kept there (3, Motor stop command).
     Stopped,
-    /// Holds a torque current within ±[`Torque::MAX`]; the drive's greatest torque current does
+    /// Holds a torque current within ±[`SetTorque::MAX`]; the drive's greatest torque current does
     /// not limit it (3, Torque current control command).
-    Torque(TorqueCommand),
+    Torque(IqCommand),
     /// Holds a speed (3, Speed control command).
     Speed(CentiDps),
     /// Turns to a position and holds it (3, Position control command 1 to 4).
@@ -58,7 +58,7 @@ pub struct Sense {
     /// Supply voltage.
     pub voltage: DeciVolts,
     /// Torque current.
-    pub iq: TorqueFeedback,
+    pub iq: IqFeedback,
     /// Speed, positive is clockwise.
     pub speed: Dps,
     /// Encoder counts in the encoder's own width, growing clockwise and counted on beyond each end
@@ -74,7 +74,7 @@ pub struct Sense {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Settings {
     /// Gains of the three loops (0x30 to 0x32).
-    pub gains: Gains,
+    pub gains: Pid,
     /// Acceleration limit (0x33, 0x34), 1 °/s² a digit. No command writes it to ROM. 0 and less are
     /// no limit, as in the vendor's tool.
     pub acceleration: DpsPerSecond,
@@ -123,7 +123,7 @@ pub struct Drive {
     mode: Mode,
     stopped: bool,
     /// The single-turn command behind `mode`.
-    circle: Option<CirclePosition>,
+    circle: Option<SetSingleTurnPosition>,
     errors: Errors,
     last_command: Instant,
     ignored: Ignored,
@@ -174,8 +174,8 @@ impl Drive {
         let sense = self.watch(now, motor);
         let reply = if everyones {
             // Carried out and answered as the single command (chapter 4).
-            let torque = Torque4::decode(data).of(id)?;
-            self.answer(&Torque { torque }.encode(), &sense, motor)?
+            let torque = SetTorque4::decode(data).of(id)?;
+            self.answer(&SetTorque { iq: torque }.encode(), &sense, motor)?
         } else {
             self.answer(data, &sense, motor)?
         };
@@ -225,11 +225,11 @@ impl Drive {
         let code = Code::from(code);
         let position = sense.encoder.wrapping_sub(self.zero());
         Some(match code {
-            Code::ReadGains => self.ram.gains.encode_as(code),
-            Code::WriteGains | Code::WriteGainsToRom => {
-                self.ram.gains = Gains::decode(data);
+            Code::ReadPid => self.ram.gains.encode_as(code),
+            Code::WritePidRam | Code::WritePidRom => {
+                self.ram.gains = Pid::decode(data);
                 motor.configure(&self.ram);
-                if code == Code::WriteGainsToRom {
+                if code == Code::WritePidRom {
                     self.rom.gains = self.ram.gains;
                     motor.save(&self.rom);
                 }
@@ -238,7 +238,7 @@ impl Drive {
             Code::ReadAcceleration => {
                 Acceleration { acceleration: self.ram.acceleration }.encode_as(code)
             }
-            Code::WriteAcceleration => {
+            Code::WriteAccelerationRam => {
                 self.ram.acceleration = Acceleration::decode(data).acceleration;
                 motor.configure(&self.ram);
                 *data
@@ -248,30 +248,30 @@ impl Drive {
                 let (position, raw) = (bits.narrow(position), bits.narrow(sense.encoder));
                 Encoder { position, raw, offset: self.ram.encoder_offset }.encode_as(code)
             }
-            Code::WriteEncoderOffset => {
+            Code::WriteEncoderOffsetRom => {
                 let offset = self.config.encoder.cut(EncoderOffset::decode(data).offset);
                 self.ram.encoder_offset = offset;
                 self.circle = None;
                 self.store_offset(code, offset, motor)
             }
-            Code::WriteZeroToRom => {
+            Code::WriteZeroRom => {
                 let offset = self.config.encoder.narrow(sense.encoder);
                 self.store_offset(code, offset, motor)
             }
             Code::ReadMultiTurnAngle => {
-                MultiTurn { angle: self.config.encoder.multi_turn(position) }.encode_as(code)
+                MultiTurnAngle { angle: self.config.encoder.multi_turn(position) }.encode_as(code)
             }
-            Code::ReadCircleAngle => {
-                Circle { angle: self.config.encoder.circle(position) }.encode_as(code)
+            Code::ReadSingleTurnAngle => {
+                SingleTurnAngle { angle: self.config.encoder.circle(position) }.encode_as(code)
             }
-            Code::ReadStatus1 => self.status1(code, sense),
+            Code::ReadStatus => self.status1(code, sense),
             Code::ClearErrors => {
                 self.errors = self.errors.intersection(sense.faults);
-                let printed = if self.config.clear_reply_0x9b { code } else { Code::ReadStatus1 };
+                let printed = if self.config.clear_reply_0x9b { code } else { Code::ReadStatus };
                 self.status1(printed, sense)
             }
-            Code::ReadStatus2 => self.motion_status(code, sense),
-            Code::ReadStatus3 => sense.phase_currents.encode_as(code),
+            Code::ReadMotionStatus => self.motion_status(code, sense),
+            Code::ReadPhaseCurrents => sense.phase_currents.encode_as(code),
             Code::Off => {
                 self.off(motor);
                 *data
@@ -290,12 +290,12 @@ impl Drive {
                 }
                 *data
             }
-            Code::Torque
-            | Code::Speed
-            | Code::Position
-            | Code::PositionLimited
-            | Code::CirclePosition
-            | Code::CirclePositionLimited => {
+            Code::SetTorque
+            | Code::SetSpeed
+            | Code::SetPosition
+            | Code::SetPositionLimited
+            | Code::SetSingleTurnPosition
+            | Code::SetSingleTurnPositionLimited => {
                 if let Some((mode, circle)) = self.asked(code, data, sense) {
                     self.circle = circle;
                     self.go(mode, motor);
@@ -317,22 +317,22 @@ impl Drive {
         code: Code,
         data: &[u8; 8],
         sense: &Sense,
-    ) -> Option<(Mode, Option<CirclePosition>)> {
+    ) -> Option<(Mode, Option<SetSingleTurnPosition>)> {
         let max_speed = match code {
-            Code::PositionLimited | Code::CirclePositionLimited => {
-                Some(PositionLimited::decode(data).max_speed)
+            Code::SetPositionLimited | Code::SetSingleTurnPositionLimited => {
+                Some(SetPositionLimited::decode(data).max_speed)
             }
             _ => None,
         };
         Some(match code {
-            Code::Torque => (Mode::Torque(saturated(Torque::decode(data).torque)), None),
-            Code::Speed => (Mode::Speed(Speed::decode(data).speed), None),
-            Code::Position | Code::PositionLimited => {
-                let target = self.counts(Position::decode(data).angle);
+            Code::SetTorque => (Mode::Torque(saturated(SetTorque::decode(data).iq)), None),
+            Code::SetSpeed => (Mode::Speed(SetSpeed::decode(data).speed), None),
+            Code::SetPosition | Code::SetPositionLimited => {
+                let target = self.counts(SetPosition::decode(data).angle);
                 (Mode::Position { target, max_speed, within_max_angle: true }, None)
             }
             _ => {
-                let command = CirclePosition::decode(data);
+                let command = SetSingleTurnPosition::decode(data);
                 let target = match self.mode {
                     // The same command again does not start another turn (R16).
                     Mode::Position { target, .. } if self.circle == Some(command) => target,
@@ -343,19 +343,19 @@ impl Drive {
         })
     }
 
-    fn circle_target(&self, command: CirclePosition, sense: &Sense) -> Option<i64> {
-        let CirclePosition { direction, angle } = command;
+    fn circle_target(&self, command: SetSingleTurnPosition, sense: &Sense) -> Option<i64> {
+        let SetSingleTurnPosition { direction, angle } = command;
         if angle.0 >= FULL_TURN {
             return None;
         }
         let way = self.counts(CentiDegrees(i32::from(angle.0))).wrapping_sub(sense.encoder);
         let bits = self.config.encoder;
         match direction {
-            Spin::Clockwise => Some(sense.encoder.wrapping_add(bits.within_turn(way))),
-            Spin::Counterclockwise => {
+            SpinDirection::Clockwise => Some(sense.encoder.wrapping_add(bits.within_turn(way))),
+            SpinDirection::Counterclockwise => {
                 Some(sense.encoder.wrapping_sub(bits.within_turn(way.wrapping_neg())))
             }
-            Spin::Unknown(_) => None,
+            SpinDirection::Unknown(_) => None,
         }
     }
 
@@ -395,7 +395,7 @@ impl Drive {
 
     fn status1(&self, code: Code, sense: &Sense) -> [u8; 8] {
         let Sense { temperature, voltage, .. } = *sense;
-        Status1 { temperature, voltage, errors: self.errors }.encode_as(code)
+        Status { temperature, voltage, errors: self.errors }.encode_as(code)
     }
 
     fn motion_status(&self, code: Code, sense: &Sense) -> [u8; 8] {
@@ -422,9 +422,9 @@ fn reached(id: MotorId) -> bool {
 }
 
 /// Held to the document's range (docs/SPEC-NOTES.md R3).
-fn saturated(torque: TorqueCommand) -> TorqueCommand {
-    let TorqueCommand(most) = Torque::MAX;
-    TorqueCommand(torque.0.min(most).max(most.wrapping_neg()))
+fn saturated(torque: IqCommand) -> IqCommand {
+    let IqCommand(most) = SetTorque::MAX;
+    IqCommand(torque.0.min(most).max(most.wrapping_neg()))
 }
 
 fn count(counter: &mut u32) {

@@ -1,7 +1,7 @@
 //! Encoder counts and angles. All arithmetic with the zero point is here, so that encoder position,
 //! single-turn and multi-turn angle agree.
 
-use crate::units::{CentiDegrees, CircleAngle, MultiTurnAngle};
+use crate::units::{CentiDegrees, TurnCentiDegrees, WideCentiDegrees};
 
 /// Digits of 0.01° in a turn.
 pub const FULL_TURN: u16 = 36_000;
@@ -47,13 +47,13 @@ impl EncoderBits {
     }
 
     /// Counts from zero as an angle; the digit below.
-    pub(super) fn multi_turn(self, counts: i64) -> MultiTurnAngle {
-        MultiTurnAngle(counts.wrapping_mul(i64::from(FULL_TURN)).wrapping_shr(self.width()))
+    pub(super) fn multi_turn(self, counts: i64) -> WideCentiDegrees {
+        WideCentiDegrees(counts.wrapping_mul(i64::from(FULL_TURN)).wrapping_shr(self.width()))
     }
 
     /// Counts from zero as an angle within the turn; the digit below.
-    pub(super) fn circle(self, counts: i64) -> CircleAngle {
-        CircleAngle(self.multi_turn(self.within_turn(counts)).0 as u16)
+    pub(super) fn circle(self, counts: i64) -> TurnCentiDegrees {
+        TurnCentiDegrees(self.multi_turn(self.within_turn(counts)).0 as u16)
     }
 
     /// The nearest counts from zero to an angle.

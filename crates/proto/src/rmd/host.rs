@@ -28,7 +28,7 @@
 use super::command::{Code, Command};
 use super::doubt::{Admitted, Doubt, answers};
 use super::limits::Limits;
-use super::message::{ReadStatus1, ReadStatus2, Torque, Torque4};
+use super::message::{ReadMotionStatus, ReadStatus, SetTorque, SetTorque4};
 use super::motor::{Dialect, MotorId, MotorSet, TORQUE4_ID};
 use super::outcome::{Counters, Error, Output, Refused};
 use crate::can::CanFrame;
@@ -67,7 +67,7 @@ pub struct Host {
     questioned: MotorSet,
     /// Motors that sent what answers no request since they were trusted.
     strays: MotorSet,
-    torque4: Option<Torque4>,
+    torque4: Option<SetTorque4>,
     /// No deadline in flight is before this moment.
     earliest: Instant,
     timeout: Duration,
@@ -161,10 +161,10 @@ impl Host {
     ///
     /// # Errors
     /// [`Refused`]; nothing is sent then.
-    pub fn torque4(
+    pub fn set_torque4(
         &mut self,
         now: Instant,
-        torques: Torque4,
+        torques: SetTorque4,
         expect: MotorSet,
     ) -> Result<(), Refused> {
         if let Some(id) = expect.without(MotorSet::TORQUE4).next() {
@@ -173,7 +173,7 @@ impl Host {
         if let Some(id) = self.busy().intersection(MotorSet::TORQUE4).next() {
             return Err(Refused::Busy(id));
         }
-        let data = Torque::default().encode();
+        let data = SetTorque::default().encode();
         let mut admitted = Admitted::Request;
         for (id, torque) in MotorSet::TORQUE4.zip(torques.0) {
             let checked = self.limits(id).current(torque);
@@ -234,7 +234,7 @@ impl Host {
 
     /// Gives up the exchange with a motor without a result, so that another request can be made: an
     /// Off at once. A reply that is still to come is treated as after a timeout. A frame of
-    /// [`torque4`](Self::torque4) that still waits and would reach the motor is given up for all.
+    /// [`set_torque4`](Self::set_torque4) that still waits and would reach the motor is given up for all.
     pub fn cancel(&mut self, now: Instant, id: MotorId) {
         if MotorSet::TORQUE4.contains(id) {
             self.torque4 = None;
@@ -279,7 +279,7 @@ impl Host {
     }
 
     /// The motors with an exchange under way, those with an undrained result among them. While a
-    /// frame of [`torque4`](Self::torque4) waits to be sent these are all that it reaches.
+    /// frame of [`set_torque4`](Self::set_torque4) waits to be sent these are all that it reaches.
     pub const fn busy(&self) -> MotorSet {
         let asked = self.queued.union(self.queued_torque4).union(self.in_flight);
         let busy = asked.union(self.replied).union(self.failed);
@@ -323,7 +323,7 @@ impl Host {
                 self.start(now, id);
             }
             for id in MotorSet::TORQUE4.without(self.queued_torque4) {
-                self.slot(id).data = Torque::default().encode();
+                self.slot(id).data = SetTorque::default().encode();
                 self.owes(now, id);
             }
             self.queued_torque4 = MotorSet::EMPTY;
@@ -339,7 +339,7 @@ impl Host {
         if self.in_flight.contains(id) && answers(slot.data[0], data[0]) {
             self.in_flight.remove(id);
             let wrong = match (Code::from(data[0]), slot.data == *data) {
-                (Code::ReadStatus1, true) => Some(Error::Echo),
+                (Code::ReadStatus, true) => Some(Error::Echo),
                 (code, false) if code.is_repeated() => Some(Error::Altered),
                 _ => None,
             };
@@ -351,7 +351,7 @@ impl Host {
             }
             if self.questioned.contains(id)
                 && slot.doubt.is_unknown()
-                && Code::from(slot.data[0]) != Code::ReadStatus2
+                && Code::from(slot.data[0]) != Code::ReadMotionStatus
             {
                 // Two different questions: the reply to the first may be the reply to a former host.
                 slot.data = question_behind(slot.data[0]);
@@ -398,7 +398,7 @@ impl Host {
     }
 
     fn question(&mut self, id: MotorId, timeout: Duration) {
-        self.open(id, ReadStatus1.encode(), timeout);
+        self.open(id, ReadStatus.encode(), timeout);
         self.questioned.insert(id);
     }
 
@@ -447,9 +447,9 @@ impl Host {
 
 /// A question for the status that no reply to a request with the code `asked` can answer.
 pub fn question_behind(asked: u8) -> [u8; 8] {
-    match answers(asked, Code::ReadStatus1.into()) {
-        true => ReadStatus2.encode(),
-        false => ReadStatus1.encode(),
+    match answers(asked, Code::ReadStatus.into()) {
+        true => ReadMotionStatus.encode(),
+        false => ReadStatus.encode(),
     }
 }
 

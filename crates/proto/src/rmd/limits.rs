@@ -5,7 +5,7 @@ use super::command::Code;
 use super::encoder::FULL_TURN;
 use super::message::*;
 use super::payload::Payload;
-use crate::units::{CentiDegrees, CentiDps, CircleAngle, SpeedLimit, TorqueCommand};
+use crate::units::{CentiDegrees, CentiDps, IqCommand, SpeedLimit, TurnCentiDegrees};
 use core::fmt;
 
 /// The most that may be commanded to a motor, either way round; `None` is no limit beyond the
@@ -16,7 +16,7 @@ use core::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Limits {
     /// Greatest torque current of 0xA1 and 0x280, 0.016 A a digit.
-    pub current: Option<TorqueCommand>,
+    pub current: Option<IqCommand>,
     /// Greatest speed of 0xA2, 0xA4 and 0xA6, 1 °/s a digit. 0xA3 and 0xA5 carry no speed and are
     /// refused while this is set, as are 0xA4 and 0xA6 with 0, which may mean any speed to a drive
     /// (docs/SPEC-NOTES.md R13, R14).
@@ -29,12 +29,12 @@ pub struct Limits {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Exceeded {
-    /// More torque current than `limit`, which is at most [`Torque::MAX`] (docs/SPEC-NOTES.md R3).
+    /// More torque current than `limit`, which is at most [`SetTorque::MAX`] (docs/SPEC-NOTES.md R3).
     Current {
         /// Torque current of the frame.
-        asked: TorqueCommand,
+        asked: IqCommand,
         /// The limit.
-        limit: TorqueCommand,
+        limit: IqCommand,
     },
     /// More speed than `limit`.
     Speed {
@@ -56,9 +56,9 @@ pub enum Exceeded {
         limit: CentiDegrees,
     },
     /// A single-turn angle beyond 359.99° (3, Position control command 3).
-    Circle(CircleAngle),
+    SingleTurnAngle(TurnCentiDegrees),
     /// A direction that the document does not name (3, Position control command 3).
-    Direction(Spin),
+    Direction(SpinDirection),
 }
 
 impl Limits {
@@ -69,24 +69,24 @@ impl Limits {
     pub fn check(&self, data: &[u8; 8]) -> Result<(), Exceeded> {
         let [code, ..] = *data;
         match Code::from(code) {
-            Code::Torque => self.current(Torque::decode(data).torque),
-            Code::Speed => self.speed(Speed::decode(data).speed),
-            Code::Position => {
+            Code::SetTorque => self.current(SetTorque::decode(data).iq),
+            Code::SetSpeed => self.speed(SetSpeed::decode(data).speed),
+            Code::SetPosition => {
                 self.no_speed()?;
-                self.angle(Position::decode(data).angle)
+                self.angle(SetPosition::decode(data).angle)
             }
-            Code::PositionLimited => {
-                let command = PositionLimited::decode(data);
+            Code::SetPositionLimited => {
+                let command = SetPositionLimited::decode(data);
                 self.max_speed(command.max_speed)?;
                 self.angle(command.angle)
             }
-            Code::CirclePosition => {
-                let command = CirclePosition::decode(data);
+            Code::SetSingleTurnPosition => {
+                let command = SetSingleTurnPosition::decode(data);
                 self.no_speed()?;
                 circle(command.angle, command.direction)
             }
-            Code::CirclePositionLimited => {
-                let command = CirclePositionLimited::decode(data);
+            Code::SetSingleTurnPositionLimited => {
+                let command = SetSingleTurnPositionLimited::decode(data);
                 self.max_speed(command.max_speed)?;
                 circle(command.angle, command.direction)
             }
@@ -98,8 +98,8 @@ impl Limits {
     ///
     /// # Errors
     /// [`Exceeded::Current`].
-    pub fn current(&self, asked: TorqueCommand) -> Result<(), Exceeded> {
-        let limit = self.current.unwrap_or(Torque::MAX).min(Torque::MAX);
+    pub fn current(&self, asked: IqCommand) -> Result<(), Exceeded> {
+        let limit = self.current.unwrap_or(SetTorque::MAX).min(SetTorque::MAX);
         if i32::from(asked.0).abs() <= i32::from(limit.0) {
             return Ok(());
         }
@@ -140,13 +140,13 @@ fn centi(speed: SpeedLimit) -> CentiDps {
     CentiDps(i32::from(speed.0).saturating_mul(100))
 }
 
-fn circle(angle: CircleAngle, direction: Spin) -> Result<(), Exceeded> {
+fn circle(angle: TurnCentiDegrees, direction: SpinDirection) -> Result<(), Exceeded> {
     if angle.0 >= FULL_TURN {
-        return Err(Exceeded::Circle(angle));
+        return Err(Exceeded::SingleTurnAngle(angle));
     }
     match direction {
-        Spin::Clockwise | Spin::Counterclockwise => Ok(()),
-        Spin::Unknown(_) => Err(Exceeded::Direction(direction)),
+        SpinDirection::Clockwise | SpinDirection::Counterclockwise => Ok(()),
+        SpinDirection::Unknown(_) => Err(Exceeded::Direction(direction)),
     }
 }
 
@@ -174,7 +174,7 @@ impl fmt::Display for Exceeded {
                 asked.degrees(),
                 limit.degrees()
             ),
-            Exceeded::Circle(angle) => {
+            Exceeded::SingleTurnAngle(angle) => {
                 write!(f, "single-turn angle {:.2}° is not 0 to 359.99°", angle.degrees())
             }
             Exceeded::Direction(spin) => {
@@ -192,13 +192,13 @@ mod tests {
     use crate::rmd::command::{COMMANDS, Command};
 
     const LIMITS: Limits = Limits {
-        current: Some(TorqueCommand(100)),
+        current: Some(IqCommand(100)),
         speed: Some(SpeedLimit(360)),
         angle: Some(CentiDegrees(9000)),
     };
 
     fn torque(digits: i16) -> [u8; 8] {
-        Torque { torque: TorqueCommand(digits) }.encode()
+        SetTorque { iq: IqCommand(digits) }.encode()
     }
 
     #[test]
@@ -207,14 +207,14 @@ mod tests {
         assert_eq!(none.check(&torque(2000)), Ok(()));
         assert_eq!(none.check(&torque(-2000)), Ok(()));
         for digits in [2001, -2001, i16::MIN, i16::MAX] {
-            let (asked, limit) = (TorqueCommand(digits), Torque::MAX);
+            let (asked, limit) = (IqCommand(digits), SetTorque::MAX);
             assert_eq!(none.check(&torque(digits)), Err(Exceeded::Current { asked, limit }));
         }
     }
 
     #[test]
     fn a_limit_above_the_range_of_the_document_does_not_widen_it() {
-        let wide = Limits { current: Some(TorqueCommand(i16::MAX)), ..Limits::default() };
+        let wide = Limits { current: Some(IqCommand(i16::MAX)), ..Limits::default() };
         assert!(wide.check(&torque(2001)).is_err());
     }
 
@@ -222,12 +222,12 @@ mod tests {
     fn each_limit_holds_both_ways_round() {
         assert!(LIMITS.check(&torque(100)).is_ok());
         assert!(LIMITS.check(&torque(-101)).is_err());
-        let speed = |digits| Speed { speed: CentiDps(digits) }.encode();
+        let speed = |digits| SetSpeed { speed: CentiDps(digits) }.encode();
         assert!(LIMITS.check(&speed(-36_000)).is_ok());
         assert!(LIMITS.check(&speed(-36_001)).is_err());
         assert!(LIMITS.check(&speed(i32::MIN)).is_err());
         let turn = |max, angle| {
-            PositionLimited { max_speed: SpeedLimit(max), angle: CentiDegrees(angle) }.encode()
+            SetPositionLimited { max_speed: SpeedLimit(max), angle: CentiDegrees(angle) }.encode()
         };
         assert!(LIMITS.check(&turn(360, -9000)).is_ok());
         assert!(matches!(LIMITS.check(&turn(361, 0)), Err(Exceeded::Speed { .. })));
@@ -239,8 +239,8 @@ mod tests {
     fn a_command_without_a_speed_is_refused_while_speed_is_limited() {
         let angle = CentiDegrees(0);
         let limit = SpeedLimit(360);
-        assert_eq!(LIMITS.check(&Position { angle }.encode()), Err(Exceeded::NoSpeed { limit }));
-        let circle = CirclePosition::default().encode();
+        assert_eq!(LIMITS.check(&SetPosition { angle }.encode()), Err(Exceeded::NoSpeed { limit }));
+        let circle = SetSingleTurnPosition::default().encode();
         assert_eq!(LIMITS.check(&circle), Err(Exceeded::NoSpeed { limit }));
         assert_eq!(Limits::default().check(&circle), Ok(()));
     }
@@ -248,8 +248,8 @@ mod tests {
     #[test]
     fn a_max_speed_of_0_is_no_speed_while_speed_is_limited() {
         let limit = SpeedLimit(360);
-        let turn = PositionLimited::default().encode();
-        let circle = CirclePositionLimited::default().encode();
+        let turn = SetPositionLimited::default().encode();
+        let circle = SetSingleTurnPositionLimited::default().encode();
         for data in [turn, circle] {
             assert_eq!(LIMITS.check(&data), Err(Exceeded::NoSpeed { limit }));
             assert_eq!(Limits::default().check(&data), Ok(()));
@@ -259,15 +259,15 @@ mod tests {
     #[test]
     fn a_single_turn_command_outside_the_range_of_the_document_is_refused() {
         let turn = |direction, angle| {
-            let angle = CircleAngle(angle);
-            CirclePositionLimited { direction, max_speed: SpeedLimit(1), angle }.encode()
+            let angle = TurnCentiDegrees(angle);
+            SetSingleTurnPositionLimited { direction, max_speed: SpeedLimit(1), angle }.encode()
         };
         let none = Limits::default();
-        assert_eq!(none.check(&turn(Spin::Counterclockwise, 35_999)), Ok(()));
-        let beyond = none.check(&turn(Spin::Clockwise, 36_000));
-        assert_eq!(beyond, Err(Exceeded::Circle(CircleAngle(36_000))));
-        let unknown = none.check(&turn(Spin::Unknown(2), 0));
-        assert_eq!(unknown, Err(Exceeded::Direction(Spin::Unknown(2))));
+        assert_eq!(none.check(&turn(SpinDirection::Counterclockwise, 35_999)), Ok(()));
+        let beyond = none.check(&turn(SpinDirection::Clockwise, 36_000));
+        assert_eq!(beyond, Err(Exceeded::SingleTurnAngle(TurnCentiDegrees(36_000))));
+        let unknown = none.check(&turn(SpinDirection::Unknown(2), 0));
+        assert_eq!(unknown, Err(Exceeded::Direction(SpinDirection::Unknown(2))));
     }
 
     #[test]

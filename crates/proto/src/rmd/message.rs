@@ -2,36 +2,36 @@
 
 use super::motor::MotorId;
 use super::payload::{Field, Payload, byte, payload, place, take};
-use super::reply::{Acceleration, EncoderOffset, Gains};
-use crate::units::{CentiDegrees, CentiDps, CircleAngle, SpeedLimit, TorqueCommand};
+use super::reply::{Acceleration, EncoderOffset, Pid};
+use crate::units::{CentiDegrees, CentiDps, IqCommand, SpeedLimit, TurnCentiDegrees};
 
 named_numbers! {
     /// Which way to turn to a single-turn angle (3, Position control command 3).
-    pub enum Spin: u8 {
+    pub enum SpinDirection: u8 {
         0x00 Clockwise "clockwise" "towards growing angles";
         0x01 Counterclockwise "counterclockwise" "towards falling angles";
     }
 }
-byte!(Spin);
+byte!(SpinDirection);
 
 #[expect(clippy::derivable_impls, reason = "the enum comes from a macro")]
-impl Default for Spin {
+impl Default for SpinDirection {
     fn default() -> Self {
-        Spin::Clockwise
+        SpinDirection::Clockwise
     }
 }
 
 payload! {
     /// 0x30: reads the gains in RAM (3, Read PID parameter command).
-    pub struct ReadGains;
+    pub struct ReadPid;
 }
 payload! {
     /// 0x31: sets the gains until power-off (3, Write PID to RAM parameter command).
-    pub struct WriteGains(Gains);
+    pub struct WritePidRam(Pid);
 }
 payload! {
     /// 0x32: sets the gains for good (3, Write PID to ROM parameter command). Wears the ROM.
-    pub struct WriteGainsToRom(Gains);
+    pub struct WritePidRom(Pid);
 }
 payload! {
     /// 0x33: reads the acceleration limit (3, Read acceleration data command).
@@ -40,7 +40,7 @@ payload! {
 payload! {
     /// 0x34: sets the acceleration limit until power-off (3, Write acceleration data to RAM
     /// command).
-    pub struct WriteAcceleration(Acceleration);
+    pub struct WriteAccelerationRam(Acceleration);
 }
 payload! {
     /// 0x90: reads the encoder (3, Read encoder data command).
@@ -49,12 +49,12 @@ payload! {
 payload! {
     /// 0x91: sets the encoder offset, at once and for good (3, Write encoder offset command;
     /// docs/SPEC-NOTES.md R8). Wears the ROM.
-    pub struct WriteEncoderOffset(EncoderOffset);
+    pub struct WriteEncoderOffsetRom(EncoderOffset);
 }
 payload! {
     /// 0x19: makes the current position the zero from the next power-on on (3, Write current
     /// position to ROM as motor zero position command; docs/SPEC-NOTES.md R9). Wears the ROM.
-    pub struct WriteZeroToRom;
+    pub struct WriteZeroRom;
 }
 payload! {
     /// 0x92: reads the angle over all turns (3, Read multi turns angle command).
@@ -62,11 +62,11 @@ payload! {
 }
 payload! {
     /// 0x94: reads the angle within the turn (3, Read single circle angle command).
-    pub struct ReadCircleAngle;
+    pub struct ReadSingleTurnAngle;
 }
 payload! {
     /// 0x9A: reads temperature, voltage and errors (3, Read motor status 1 and error flag commands).
-    pub struct ReadStatus1;
+    pub struct ReadStatus;
 }
 payload! {
     /// 0x9B: clears the errors whose cause is gone (3, Clear motor error flag command). The reply
@@ -75,11 +75,11 @@ payload! {
 }
 payload! {
     /// 0x9C: reads temperature, torque current, speed and encoder (3, Read motor status 2).
-    pub struct ReadStatus2;
+    pub struct ReadMotionStatus;
 }
 payload! {
     /// 0x9D: reads the phase currents (3, Read motor status 3).
-    pub struct ReadStatus3;
+    pub struct ReadPhaseCurrents;
 }
 payload! {
     /// 0x80: switches the motor off and forgets mode and command (3, Motor off command).
@@ -95,21 +95,21 @@ payload! {
 }
 payload! {
     /// 0xA1: holds a torque current (3, Torque current control command).
-    pub struct Torque {
-        /// 0.016 A a digit, within ±[`Torque::MAX`].
-        4 torque: TorqueCommand,
+    pub struct SetTorque {
+        /// 0.016 A a digit, within ±[`SetTorque::MAX`].
+        4 iq: IqCommand,
     }
 }
 payload! {
     /// 0xA2: holds a speed (3, Speed control command).
-    pub struct Speed {
+    pub struct SetSpeed {
         /// 0.01 °/s a digit, positive is clockwise.
         4 speed: CentiDps,
     }
 }
 payload! {
     /// 0xA3: turns to a multi-turn angle (3, Position control command 1).
-    pub struct Position {
+    pub struct SetPosition {
         /// 0.01° a digit, positive is clockwise from zero.
         4 angle: CentiDegrees,
     }
@@ -117,7 +117,7 @@ payload! {
 payload! {
     /// 0xA4: turns to a multi-turn angle no faster than a limit (3, Position control command 2;
     /// the first column holds for the bytes, docs/SPEC-NOTES.md R5).
-    pub struct PositionLimited {
+    pub struct SetPositionLimited {
         /// 1 °/s a digit.
         2 max_speed: SpeedLimit,
         /// 0.01° a digit, positive is clockwise from zero.
@@ -126,57 +126,57 @@ payload! {
 }
 payload! {
     /// 0xA5: turns to an angle within the turn (3, Position control command 3).
-    pub struct CirclePosition {
+    pub struct SetSingleTurnPosition {
         /// Which way to turn.
-        1 direction: Spin,
+        1 direction: SpinDirection,
         /// 0.01° a digit, 0 to 35999.
-        4 angle: CircleAngle,
+        4 angle: TurnCentiDegrees,
     }
 }
 payload! {
     /// 0xA6: turns to an angle within the turn no faster than a limit (3, Position control
     /// command 4).
-    pub struct CirclePositionLimited {
+    pub struct SetSingleTurnPositionLimited {
         /// Which way to turn.
-        1 direction: Spin,
+        1 direction: SpinDirection,
         /// 1 °/s a digit.
         2 max_speed: SpeedLimit,
         /// 0.01° a digit, 0 to 35999.
-        4 angle: CircleAngle,
+        4 angle: TurnCentiDegrees,
     }
 }
 
-impl Torque {
+impl SetTorque {
     /// The greatest torque current of the document: 32 A (3, Torque current control command).
-    pub const MAX: TorqueCommand = TorqueCommand(2000);
+    pub const MAX: IqCommand = IqCommand(2000);
 }
 
 /// 0x280: torque currents for motors 1 to 4 in one frame, which has no code (4, Multiple motor
-/// torque closed loop control commands). Each motor answers as to [`Torque`].
+/// torque closed loop control commands). Each motor answers as to [`SetTorque`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Torque4(
-    /// For motors 1 to 4 in this order; 0.016 A a digit, within ±[`Torque::MAX`].
-    pub [TorqueCommand; 4],
+pub struct SetTorque4(
+    /// For motors 1 to 4 in this order; 0.016 A a digit, within ±[`SetTorque::MAX`].
+    pub [IqCommand; 4],
 );
 
-impl Torque4 {
+impl SetTorque4 {
     /// The eight bytes of the frame.
     pub fn encode(&self) -> [u8; 8] {
         self.pack().to_le_bytes()
     }
 
     /// The torque for a motor; `None` for those that the frame does not reach.
-    pub fn of(&self, id: MotorId) -> Option<TorqueCommand> {
+    pub fn of(&self, id: MotorId) -> Option<IqCommand> {
         self.0.get(id.index()).copied()
     }
 }
 
-impl Payload for Torque4 {
+impl Payload for SetTorque4 {
     const FIELDS: &'static [Field] = &[
-        Field::new::<TorqueCommand>("torque_1", 0),
-        Field::new::<TorqueCommand>("torque_2", 2),
-        Field::new::<TorqueCommand>("torque_3", 4),
-        Field::new::<TorqueCommand>("torque_4", 6),
+        Field::new::<IqCommand>("iq_1", 0),
+        Field::new::<IqCommand>("iq_2", 2),
+        Field::new::<IqCommand>("iq_3", 4),
+        Field::new::<IqCommand>("iq_4", 6),
     ];
 
     fn pack(&self) -> u64 {
@@ -185,7 +185,7 @@ impl Payload for Torque4 {
     }
 
     fn unpack(word: u64) -> Self {
-        Torque4([take(word, 0), take(word, 2), take(word, 4), take(word, 6)])
+        SetTorque4([take(word, 0), take(word, 2), take(word, 4), take(word, 6)])
     }
 }
 
@@ -196,35 +196,36 @@ mod tests {
 
     #[test]
     fn position_limited_is_laid_out_by_the_first_column() {
-        let command = PositionLimited { max_speed: SpeedLimit(500), angle: CentiDegrees(-36000) };
+        let command =
+            SetPositionLimited { max_speed: SpeedLimit(500), angle: CentiDegrees(-36000) };
         let data = [0xA4, 0x00, 0xF4, 0x01, 0x60, 0x73, 0xFF, 0xFF];
         assert_eq!(command.encode(), data);
-        assert_eq!(PositionLimited::decode(&data), command);
+        assert_eq!(SetPositionLimited::decode(&data), command);
     }
 
     #[test]
     fn null_bytes_of_a_request_are_ignored_and_sent_as_zero() {
         let stale = [0xA1, 0x55, 0x55, 0x55, 0x64, 0x00, 0x55, 0x55];
-        let command = Torque::decode(&stale);
-        assert_eq!(command.torque, TorqueCommand(100));
+        let command = SetTorque::decode(&stale);
+        assert_eq!(command.iq, IqCommand(100));
         assert_eq!(command.encode(), [0xA1, 0, 0, 0, 0x64, 0, 0, 0]);
     }
 
     #[test]
     fn an_unknown_direction_survives() {
         let data = [0xA5, 0x02, 0, 0, 0x28, 0x23, 0, 0];
-        let command = CirclePosition::decode(&data);
-        assert_eq!(command.direction, Spin::Unknown(0x02));
+        let command = SetSingleTurnPosition::decode(&data);
+        assert_eq!(command.direction, SpinDirection::Unknown(0x02));
         assert_eq!(command.encode(), data);
     }
 
     #[test]
     fn the_four_torques_go_to_the_motors_one_to_four() {
         let data = [0x01, 0x00, 0xFF, 0xFF, 0xD0, 0x07, 0x30, 0xF8];
-        let torques = Torque4::decode(&data);
+        let torques = SetTorque4::decode(&data);
         let of = |id| torques.of(MotorId::new(id).unwrap());
-        assert_eq!([of(1), of(2)], [Some(TorqueCommand(1)), Some(TorqueCommand(-1))]);
-        assert_eq!([of(3), of(4)], [Some(TorqueCommand(2000)), Some(TorqueCommand(-2000))]);
+        assert_eq!([of(1), of(2)], [Some(IqCommand(1)), Some(IqCommand(-1))]);
+        assert_eq!([of(3), of(4)], [Some(IqCommand(2000)), Some(IqCommand(-2000))]);
         assert_eq!(of(5), None);
         assert_eq!(torques.encode(), data);
     }

@@ -19,7 +19,7 @@
 //! let motor = MotorId::new(1).unwrap();
 //! let mut host = Host::new();
 //! host.trust(MotorSet::ALL); // No other host spoke to these motors.
-//! let turn = PositionLimited { max_speed: SpeedLimit(360), angle: CentiDegrees::from_degrees(90.0) };
+//! let turn = SetPositionLimited { max_speed: SpeedLimit(360), angle: CentiDegrees::from_degrees(90.0) };
 //! host.request(Instant(0), motor, turn.encode())?;
 //! let Output::Transmit(frame) = host.poll(Instant(0)) else { unreachable!() };
 //! assert_eq!(frame.data(), [0xA4, 0x00, 0x68, 0x01, 0x28, 0x23, 0x00, 0x00]);

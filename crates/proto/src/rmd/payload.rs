@@ -195,16 +195,16 @@ macro_rules! units {
 units! {
     Celsius(i8, 1) 0 celsius;
     DeciVolts(u16, 2) 1 volts;
-    TorqueCommand(i16, 2) 3 amps;
-    TorqueFeedback(i16, 2) 3 amps;
+    IqCommand(i16, 2) 3 amps;
+    IqFeedback(i16, 2) 3 amps;
     PhaseCurrent(i16, 2) 3 amps;
     Dps(i16, 2) 0 dps;
     CentiDps(i32, 4) 2 dps;
     SpeedLimit(u16, 2) 0 dps;
     DpsPerSecond(i32, 4) 0 dps_per_second;
-    CircleAngle(u16, 2) 2 degrees;
+    TurnCentiDegrees(u16, 2) 2 degrees;
     CentiDegrees(i32, 4) 2 degrees;
-    MultiTurnAngle(i64, 7) 2 degrees;
+    WideCentiDegrees(i64, 7) 2 degrees;
 }
 
 /// For a type that converts to and from `u8` and displays itself.

@@ -2,14 +2,14 @@
 
 use super::payload::{Field, Payload, byte, payload, place, take};
 use crate::units::{
-    Celsius, CircleAngle, DeciVolts, Dps, DpsPerSecond, MultiTurnAngle, PhaseCurrent,
-    TorqueFeedback,
+    Celsius, DeciVolts, Dps, DpsPerSecond, IqFeedback, PhaseCurrent, TurnCentiDegrees,
+    WideCentiDegrees,
 };
 use core::fmt;
 
 payload! {
     /// Gains of the three loops (3, Read PID parameter command). V3 and V4 use the reverse order.
-    pub struct Gains {
+    pub struct Pid {
         /// `anglePidKp`, no unit.
         2 position_kp: u8,
         /// `anglePidKi`, no unit.
@@ -52,21 +52,21 @@ payload! {
 }
 payload! {
     /// Angle over all turns (3, Read multi turns angle command).
-    pub struct MultiTurn {
+    pub struct MultiTurnAngle {
         /// 0.01° a digit, positive is clockwise; 56 bits travel (docs/SPEC-NOTES.md R2).
-        1 angle: MultiTurnAngle,
+        1 angle: WideCentiDegrees,
     }
 }
 payload! {
     /// Angle within the turn (3, Read single circle angle command).
-    pub struct Circle {
+    pub struct SingleTurnAngle {
         /// 0.01° a digit, 0 to 35999, growing clockwise from the encoder's zero.
-        6 angle: CircleAngle,
+        6 angle: TurnCentiDegrees,
     }
 }
 payload! {
     /// Temperature, voltage and errors (3, Read motor status 1 and error flag commands).
-    pub struct Status1 {
+    pub struct Status {
         /// 1 °C a digit.
         1 temperature: Celsius,
         /// 0.1 V a digit.
@@ -81,7 +81,7 @@ payload! {
         /// 1 °C a digit.
         1 temperature: Celsius,
         /// Torque current, 33/2048 A a digit.
-        2 iq: TorqueFeedback,
+        2 iq: IqFeedback,
         /// 1 °/s a digit, positive is clockwise.
         4 speed: Dps,
         /// Encoder position in counts of its width, the upper 16 bits of a wider one.
@@ -211,7 +211,7 @@ mod tests {
         }
         assert_eq!(Errors(0xF6).to_string(), "no error (bits 0xf6 mean nothing)");
         assert_eq!(Errors::LOW_VOLTAGE.to_string(), "low voltage protection");
-        let errors = Status1::decode(&[0x9A, 0, 0, 0, 0, 0, 0, 0x89]).errors;
+        let errors = Status::decode(&[0x9A, 0, 0, 0, 0, 0, 0, 0x89]).errors;
         assert_eq!(
             errors.to_string(),
             "low voltage protection, over temperature protection (bits 0x80 mean nothing)"
@@ -221,11 +221,11 @@ mod tests {
     #[test]
     fn a_multi_turn_angle_of_seven_bytes_has_its_sign_extended() {
         let data = [0x92, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF];
-        let reply = MultiTurn::decode(&data);
-        assert_eq!(reply.angle, MultiTurnAngle(-1));
+        let reply = MultiTurnAngle::decode(&data);
+        assert_eq!(reply.angle, WideCentiDegrees(-1));
         assert_eq!(reply.encode_as(Code::ReadMultiTurnAngle), data);
-        let least = MultiTurn::decode(&[0x92, 0, 0, 0, 0, 0, 0, 0x80]);
-        assert_eq!(least.angle, MultiTurnAngle(-(1 << 55)));
+        let least = MultiTurnAngle::decode(&[0x92, 0, 0, 0, 0, 0, 0, 0x80]);
+        assert_eq!(least.angle, WideCentiDegrees(-(1 << 55)));
     }
 
     #[test]
@@ -239,13 +239,13 @@ mod tests {
             assert_eq!(value.pack(), bits & mask);
         }
         for bits in [0, u64::MAX, 0xA5A5_A5A5_A5A5_A5A5, 0x8000_7F01_80FF_017F] {
-            check::<Gains>(bits);
+            check::<Pid>(bits);
             check::<Acceleration>(bits);
             check::<Encoder>(bits);
             check::<EncoderOffset>(bits);
-            check::<MultiTurn>(bits);
-            check::<Circle>(bits);
-            check::<Status1>(bits);
+            check::<MultiTurnAngle>(bits);
+            check::<SingleTurnAngle>(bits);
+            check::<Status>(bits);
             check::<MotionStatus>(bits);
             check::<PhaseCurrents>(bits);
         }

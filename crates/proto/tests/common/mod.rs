@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use motorlink_proto::stmcp::*;
+use motorlink_proto::st::*;
 use motorlink_proto::time::Instant;
 
 /// Registers are plain memory; everything else is written down.

@@ -5,10 +5,10 @@
 
 mod plant;
 
-use motorlink_proto::stmcp::register::{
+use motorlink_proto::st::register::{
     Access, Feature, Features, Origin, Shape, Type, Unit, Writing,
 };
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     CurrentReference, Motor, PositionMove, Profile, Ramp, RegisterId, RevupPhase, Slave, TorqueRamp,
 };
 use motorlink_proto::time::Instant;

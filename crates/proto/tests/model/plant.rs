@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use motorlink_proto::stmcp::*;
+use motorlink_proto::st::*;
 
 /// A value that no register takes.
 const UNFIT: i32 = 0x0000_00BD;

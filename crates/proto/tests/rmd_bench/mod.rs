@@ -52,7 +52,7 @@ pub struct Node {
 
 impl Node {
     pub fn new(id: u8) -> Self {
-        let gains = Gains { position_kp: 100, position_ki: 100, ..Gains::default() };
+        let gains = Pid { position_kp: 100, position_ki: 100, ..Pid::default() };
         let rom = Settings { gains, acceleration: DpsPerSecond(1000), encoder_offset: 0 };
         let mut drive = Drive::new(Config::new(motor(id)), rom);
         let mut motor = TestMotor::default();

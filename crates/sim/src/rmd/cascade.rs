@@ -1,6 +1,6 @@
 //! The loops for position and speed, which give the torque loop its reference.
 
-use motorlink_proto::rmd::Gains;
+use motorlink_proto::rmd::Pid;
 
 use crate::control::{self, Regulator, within};
 use crate::plant::MachineConfig;
@@ -74,7 +74,7 @@ impl Cascade {
         }
     }
 
-    pub(super) fn tune(&mut self, gains: &Gains, machine: &MachineConfig) {
+    pub(super) fn tune(&mut self, gains: &Pid, machine: &MachineConfig) {
         let current_per_acceleration = machine.inertia / machine.torque_constant();
         let speed_kp = SPEED_BANDWIDTH * current_per_acceleration;
         self.tuning = Tuning {

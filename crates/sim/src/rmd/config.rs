@@ -1,6 +1,6 @@
 //! What a motor and its drive are built from.
 
-use motorlink_proto::rmd::{Config, EncoderBits, Gains, MotorId, Settings};
+use motorlink_proto::rmd::{Config, EncoderBits, MotorId, Pid, Settings};
 use motorlink_proto::time::Duration;
 use motorlink_proto::units::DpsPerSecond;
 
@@ -111,7 +111,7 @@ impl RmdConfig {
     pub fn factory_rom(&self) -> Settings {
         let [position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki] = self.gains;
         Settings {
-            gains: Gains { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki },
+            gains: Pid { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki },
             acceleration: DpsPerSecond(self.acceleration_dps2),
             encoder_offset: self.encoder_offset,
         }

@@ -7,7 +7,7 @@
 
 use core::f32::consts::TAU;
 
-use motorlink_proto::rmd::Gains;
+use motorlink_proto::rmd::Pid;
 
 use super::cascade::factor;
 use crate::angle::{self, TURN};
@@ -84,7 +84,7 @@ impl CurrentLoop {
         }
     }
 
-    pub(super) fn tune(&mut self, gains: &Gains) {
+    pub(super) fn tune(&mut self, gains: &Pid) {
         self.gains = control::Gains {
             kp: factor(gains.torque_kp) * self.shipped.kp,
             ki: factor(gains.torque_ki) * self.shipped.ki,

@@ -1,7 +1,7 @@
 //! A motor with its loops.
 
 use motorlink_proto::rmd::{Errors, Mode, Motor, PhaseCurrents, Sense, Settings};
-use motorlink_proto::units::{Celsius, DeciVolts, Dps, PhaseCurrent, TorqueFeedback};
+use motorlink_proto::units::{Celsius, DeciVolts, Dps, IqFeedback, PhaseCurrent};
 
 use super::RmdConfig;
 use super::cascade::{Cascade, Task};
@@ -279,7 +279,7 @@ impl Motor for RmdMotor {
         Sense {
             temperature: Celsius::from_celsius(self.plant.temperature().into()),
             voltage: DeciVolts::from_volts(self.plant.bus_voltage().into()),
-            iq: TorqueFeedback::from_amps(iq.into()),
+            iq: IqFeedback::from_amps(iq.into()),
             speed: Dps::from_dps(self.speedometer.shown().to_degrees().into()),
             encoder: self.encoder(),
             phase_currents: PhaseCurrents { phase_a, phase_b, phase_c },

@@ -1,7 +1,7 @@
 //! What a motor and its drive are built from.
 
-use motorlink_proto::stmcp::register::{Feature, Features};
-use motorlink_proto::stmcp::{REVUP_PHASES, RevupPhase};
+use motorlink_proto::st::register::{Feature, Features};
+use motorlink_proto::st::{REVUP_PHASES, RevupPhase};
 
 use super::Registers;
 use super::scale::{Scale, s16};

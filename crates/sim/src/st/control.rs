@@ -1,6 +1,6 @@
 //! References and regulators: from what was commanded to an Iq reference.
 
-use motorlink_proto::stmcp::{ControlMode, CurrentReference, PositionMove, Ramp, TorqueRamp};
+use motorlink_proto::st::{ControlMode, CurrentReference, PositionMove, Ramp, TorqueRamp};
 
 use super::scale::{RPM, RPM_PER_DIGIT, s16};
 use super::{MotorConfig, Registers};

@@ -1,6 +1,6 @@
 //! The drive: motors behind one slave.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, Drive, ErrorCode, Features, Motor, PositionMove, Ramp, RegisterId,
     RevupPhase, TorqueRamp, Version,
 };

@@ -1,6 +1,6 @@
 //! A motor with its power stage and firmware.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, Flags, PositionMove, REVUP_PHASES, Ramp, RevupPhase, Status,
     TorqueRamp,
 };

@@ -14,7 +14,7 @@
 
 use core::f32::consts::{FRAC_1_SQRT_2, TAU};
 
-use motorlink_proto::stmcp::Flags;
+use motorlink_proto::st::Flags;
 
 use super::Registers;
 use super::scale::{Scale, divisor};

@@ -1,7 +1,7 @@
 //! Registers: what a host reads and writes.
 
-use motorlink_proto::stmcp::register::Value;
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::register::Value;
+use motorlink_proto::st::{
     ControlMode, CurrentReference, ErrorCode, REVUP_PHASES, Ramp, RegisterId,
 };
 

@@ -2,7 +2,7 @@
 //!
 //! Gains begin as the machine needs them ([`Registers::tuned`]); the table says what the others are.
 
-use motorlink_proto::stmcp::RegisterId;
+use motorlink_proto::st::RegisterId;
 
 /// Declares the registers: id, field, value at power-on without a motor, what it is.
 macro_rules! stored {

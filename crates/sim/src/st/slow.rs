@@ -2,7 +2,7 @@
 
 use core::f32::consts::TAU;
 
-use motorlink_proto::stmcp::{Flags, Status};
+use motorlink_proto::st::{Flags, Status};
 
 use super::control::Feedback;
 use super::motor::{Frame, StMotor};

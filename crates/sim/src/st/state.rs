@@ -1,6 +1,6 @@
 //! The state machine: which state follows which, and when.
 
-use motorlink_proto::stmcp::{RevupPhase, Status};
+use motorlink_proto::st::{RevupPhase, Status};
 
 use super::config::DurationConfig;
 

@@ -1,6 +1,6 @@
 //! A drive on its serial line.
 
-use motorlink_proto::stmcp::{Profile, Slave};
+use motorlink_proto::st::{Profile, Slave};
 use motorlink_proto::time::Instant;
 
 use super::{StDrive, StMotor};

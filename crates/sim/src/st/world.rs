@@ -1,6 +1,6 @@
 //! The world around a motor.
 
-use motorlink_proto::stmcp::{Flags, Status};
+use motorlink_proto::st::{Flags, Status};
 
 use super::MotorConfig;
 use super::motor::{Firmware, StMotor};

@@ -7,25 +7,25 @@ use motorlink_sim::rmd::RmdConfig;
 
 use crate::rmd_bench::{Bench, with_bits};
 
-fn position(degrees: f64) -> Position {
-    Position { angle: CentiDegrees::from_degrees(degrees) }
+fn position(degrees: f64) -> SetPosition {
+    SetPosition { angle: CentiDegrees::from_degrees(degrees) }
 }
 
-fn speed(dps: f64) -> Speed {
-    Speed { speed: CentiDps::from_dps(dps) }
+fn speed(dps: f64) -> SetSpeed {
+    SetSpeed { speed: CentiDps::from_dps(dps) }
 }
 
 #[test]
 fn torque_accelerates_the_rotor() {
     let mut bench = Bench::new([RmdConfig::x8()]);
-    bench.ask(Torque { torque: TorqueCommand::from_amps(1.6) });
+    bench.ask(SetTorque { iq: IqCommand::from_amps(1.6) });
     bench.wait(50);
-    let status = bench.ask(ReadStatus2);
+    let status = bench.ask(ReadMotionStatus);
     assert!((status.iq.amps() - 1.6).abs() < 0.05, "{} A", status.iq.amps());
     // 0.31 Nm after friction and iron on 2.6e-4 kg m² are 1170 rad/s² for 50 ms.
     let speed = bench.truth().speed_dps;
     assert!((3200.0..3500.0).contains(&speed), "{speed} °/s");
-    bench.ask(Torque { torque: TorqueCommand::from_amps(-1.6) });
+    bench.ask(SetTorque { iq: IqCommand::from_amps(-1.6) });
     bench.wait(150);
     assert!(bench.truth().speed_dps < -1000.0);
 }
@@ -36,13 +36,13 @@ fn torque_is_the_torque_constant_times_the_current() {
         for amps in [0.5, -2.0, 5.0] {
             let mut bench = Bench::new([config]);
             bench.world().plant_mut().lock(true);
-            bench.ask(Torque { torque: TorqueCommand::from_amps(amps) });
+            bench.ask(SetTorque { iq: IqCommand::from_amps(amps) });
             bench.wait(20);
             let (mut torque, mut read) = (0.0, 0.0);
             for _ in 0..100 {
                 bench.wait(1);
                 torque += f64::from(bench.truth().plant.torque) / 100.0;
-                read += bench.ask(ReadStatus2).iq.amps() / 100.0;
+                read += bench.ask(ReadMotionStatus).iq.amps() / 100.0;
             }
             let told = amps * f64::from(config.plant.machine.torque_constant());
             assert!((torque / told - 1.0).abs() < 0.02, "{torque} for {told} Nm");
@@ -55,7 +55,7 @@ fn torque_is_the_torque_constant_times_the_current() {
 fn torque_is_not_limited_by_the_greatest_torque_current() {
     let mut bench = Bench::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
     bench.world().plant_mut().lock(true);
-    bench.ask(Torque { torque: TorqueCommand::from_amps(10.0) });
+    bench.ask(SetTorque { iq: IqCommand::from_amps(10.0) });
     let current = bench.watch(20).current;
     assert!((9.8..10.5).contains(&current), "{current} A");
     bench.ask(speed(-3000.0));
@@ -88,8 +88,8 @@ fn a_speed_is_reached_without_error_and_held_against_a_load() {
 fn four_torques_are_not_limited_by_the_greatest_torque_current() {
     let mut bench = Bench::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
     bench.world().plant_mut().lock(true);
-    let torque = TorqueCommand::from_amps(10.0);
-    let torques = Torque4([torque, TorqueCommand(0), TorqueCommand(0), TorqueCommand(0)]);
+    let torque = IqCommand::from_amps(10.0);
+    let torques = SetTorque4([torque, IqCommand(0), IqCommand(0), IqCommand(0)]);
     bench.send(&CanFrame::new(TORQUE4_ID, torques.encode()));
     let current = bench.watch(20).current;
     assert!((9.8..10.5).contains(&current), "{current} A");
@@ -97,21 +97,22 @@ fn four_torques_are_not_limited_by_the_greatest_torque_current() {
 
 #[test]
 fn positive_torque_speed_and_angle_are_clockwise() {
-    for (amps, dps, spin) in [(0.5, 360.0, Spin::Clockwise), (-0.5, -360.0, Spin::Counterclockwise)]
+    for (amps, dps, spin) in
+        [(0.5, 360.0, SpinDirection::Clockwise), (-0.5, -360.0, SpinDirection::Counterclockwise)]
     {
         let mut bench = Bench::one();
         let commands = [
-            Torque { torque: TorqueCommand::from_amps(amps) }.encode(),
+            SetTorque { iq: IqCommand::from_amps(amps) }.encode(),
             speed(dps).encode(),
             position(bench.angle() + dps).encode(),
-            CirclePosition { direction: spin, angle: CircleAngle(18_000) }.encode(),
+            SetSingleTurnPosition { direction: spin, angle: TurnCentiDegrees(18_000) }.encode(),
         ];
         for command in commands {
             bench.power_cycle();
             let before = bench.angle();
             bench.raw(command);
             bench.wait(50);
-            let status = bench.ask(ReadStatus2);
+            let status = bench.ask(ReadMotionStatus);
             let turned = bench.angle() - before;
             for value in [turned, status.speed.dps()] {
                 assert!(value * dps > 0.0, "{value} after {command:02x?}");
@@ -119,9 +120,9 @@ fn positive_torque_speed_and_angle_are_clockwise() {
         }
         bench.power_cycle();
         bench.world().plant_mut().lock(true);
-        bench.ask(Torque { torque: TorqueCommand::from_amps(amps) });
+        bench.ask(SetTorque { iq: IqCommand::from_amps(amps) });
         bench.wait(50);
-        assert!(bench.ask(ReadStatus2).iq.amps() * amps > 0.0);
+        assert!(bench.ask(ReadMotionStatus).iq.amps() * amps > 0.0);
     }
 }
 
@@ -129,7 +130,7 @@ fn positive_torque_speed_and_angle_are_clockwise() {
 fn an_acceleration_of_0_or_less_is_no_limit() {
     let fastest = |digits| {
         let mut bench = Bench::one();
-        bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(digits) }));
+        bench.ask(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(digits) }));
         bench.ask(speed(1000.0));
         bench.watch(100).acceleration
     };
@@ -143,7 +144,7 @@ fn an_acceleration_of_0_or_less_is_no_limit() {
 fn the_acceleration_limit_makes_a_trapezoid() {
     for config in [RmdConfig::default(), RmdConfig::x8()] {
         let mut bench = Bench::new([config]);
-        bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(2000) }));
+        bench.ask(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(2000) }));
         bench.ask(speed(1000.0));
         for ms in (50..500).step_by(50) {
             bench.wait(50);
@@ -161,10 +162,10 @@ fn a_move_is_a_trapezoid_that_never_goes_back() {
         for (angle, acceleration) in [(90.0, 3000), (-720.0, 20_000)] {
             let mut bench = Bench::new([config]);
             let acceleration = Acceleration { acceleration: DpsPerSecond(acceleration) };
-            bench.ask(WriteAcceleration(acceleration));
+            bench.ask(WriteAccelerationRam(acceleration));
             let max_speed = SpeedLimit(400);
             let target = CentiDegrees::from_degrees(angle);
-            bench.ask(PositionLimited { max_speed, angle: target });
+            bench.ask(SetPositionLimited { max_speed, angle: target });
             let limit = acceleration.acceleration.0 as f32;
             let (mut last_speed, mut last, mut cruised) = (0.0, 0.0, 0);
             let mut ms = 0;
@@ -227,8 +228,9 @@ fn the_drives_own_limits_hold_a_position_command() {
     bench.ask(position(-1000.0));
     bench.wait(3000);
     assert!((bench.angle() + 180.0).abs() < 0.1, "{}°", bench.angle());
-    let (direction, angle) = (Spin::Counterclockwise, CircleAngle::from_degrees(90.0));
-    bench.ask(CirclePosition { direction, angle });
+    let (direction, angle) =
+        (SpinDirection::Counterclockwise, TurnCentiDegrees::from_degrees(90.0));
+    bench.ask(SetSingleTurnPosition { direction, angle });
     bench.wait(3000);
     assert!((bench.angle() + 270.0).abs() < 0.1, "Max Angle is not for single-turn commands");
 }
@@ -236,33 +238,33 @@ fn the_drives_own_limits_hold_a_position_command() {
 #[test]
 fn a_single_turn_position_is_reached_in_the_direction_that_is_told() {
     let mut bench = Bench::one();
-    let circle = |degrees, direction| CirclePosition {
+    let circle = |degrees, direction| SetSingleTurnPosition {
         direction,
-        angle: CircleAngle::from_degrees(degrees),
+        angle: TurnCentiDegrees::from_degrees(degrees),
     };
-    bench.ask(circle(90.0, Spin::Clockwise));
+    bench.ask(circle(90.0, SpinDirection::Clockwise));
     bench.wait(1500);
     assert!((bench.angle() - 90.0).abs() < 0.1);
-    bench.ask(circle(45.0, Spin::Clockwise));
+    bench.ask(circle(45.0, SpinDirection::Clockwise));
     bench.wait(1500);
     assert!((bench.angle() - 405.0).abs() < 0.1, "on beyond zero: {}°", bench.angle());
-    let slow = CirclePositionLimited {
-        direction: Spin::Counterclockwise,
+    let slow = SetSingleTurnPositionLimited {
+        direction: SpinDirection::Counterclockwise,
         max_speed: SpeedLimit(100),
-        angle: CircleAngle::from_degrees(50.0),
+        angle: TurnCentiDegrees::from_degrees(50.0),
     };
     bench.ask(slow);
     let seen = bench.watch(2000);
     assert!((95.0..130.0).contains(&seen.speed), "{} °/s", seen.speed);
     bench.wait(2500);
     assert!((bench.angle() - 50.0).abs() < 0.1, "{}°", bench.angle());
-    assert!((bench.ask(ReadCircleAngle).angle.degrees() - 50.0).abs() < 0.1);
+    assert!((bench.ask(ReadSingleTurnAngle).angle.degrees() - 50.0).abs() < 0.1);
 }
 
 /// How a motor with these gains has followed a command after `ms`.
-fn follow(gains: Gains, ms: u32, command: impl FnOnce(&mut Bench)) -> (f64, f32, f32) {
+fn follow(gains: Pid, ms: u32, command: impl FnOnce(&mut Bench)) -> (f64, f32, f32) {
     let mut bench = Bench::one();
-    bench.ask(WriteGains(gains));
+    bench.ask(WritePidRam(gains));
     command(&mut bench);
     bench.wait(ms);
     let truth = bench.truth();
@@ -273,7 +275,7 @@ fn follow(gains: Gains, ms: u32, command: impl FnOnce(&mut Bench)) -> (f64, f32,
 fn each_gain_acts() {
     let shipped = RmdConfig::default().factory_rom().gains;
     let step = |gains| follow(gains, 60, |bench| _ = bench.ask(position(2.0))).0;
-    assert!(step(Gains { position_kp: 20, ..shipped }) < 0.7 * step(shipped));
+    assert!(step(Pid { position_kp: 20, ..shipped }) < 0.7 * step(shipped));
 
     let dip = |gains| {
         let (_, speed, _) = follow(gains, 8, |bench| {
@@ -283,11 +285,11 @@ fn each_gain_acts() {
         });
         1000.0 - speed
     };
-    assert!(dip(Gains { speed_kp: 25, ..shipped }) > 1.4 * dip(shipped));
+    assert!(dip(Pid { speed_kp: 25, ..shipped }) > 1.4 * dip(shipped));
 
-    let torque = TorqueCommand::from_amps(5.0);
-    let push = |gains| follow(gains, 1, |bench| _ = bench.ask(Torque { torque })).2;
-    assert!(push(Gains { torque_kp: 10, torque_ki: 10, ..shipped }) < 0.7 * push(shipped));
+    let torque = IqCommand::from_amps(5.0);
+    let push = |gains| follow(gains, 1, |bench| _ = bench.ask(SetTorque { iq: torque })).2;
+    assert!(push(Pid { torque_kp: 10, torque_ki: 10, ..shipped }) < 0.7 * push(shipped));
 
     let loaded = |gains| {
         follow(gains, 1000, |bench| {
@@ -296,23 +298,23 @@ fn each_gain_acts() {
         })
     };
     let (_, with, _) = loaded(shipped);
-    let (_, without, _) = loaded(Gains { speed_ki: 0, ..shipped });
+    let (_, without, _) = loaded(Pid { speed_ki: 0, ..shipped });
     assert!((with - 2000.0).abs() < 20.0 && without < 1700.0, "{with} and {without} °/s");
 
-    let (.., current) = follow(Gains { torque_ki: 0, ..shipped }, 5, |bench| {
+    let (.., current) = follow(Pid { torque_ki: 0, ..shipped }, 5, |bench| {
         bench.world().plant_mut().lock(true);
-        bench.ask(Torque { torque });
+        bench.ask(SetTorque { iq: torque });
     });
     assert!(current < 4.5, "{current} A without Ki");
 
     let held = |position_ki| {
-        let gains = Gains { position_ki, speed_kp: 255, speed_ki: 0, ..shipped };
+        let gains = Pid { position_ki, speed_kp: 255, speed_ki: 0, ..shipped };
         follow(gains, 20_000, |bench| _ = bench.ask(position(0.5))).0
     };
     assert!((held(255) - 0.5).abs() < (held(0) - 0.5).abs(), "{} and {}", held(255), held(0));
 
-    let no_speed_loop = Gains { speed_kp: 0, speed_ki: 0, ..shipped };
-    for dead in [Gains::default(), Gains { position_kp: 0, ..shipped }, no_speed_loop] {
+    let no_speed_loop = Pid { speed_kp: 0, speed_ki: 0, ..shipped };
+    for dead in [Pid::default(), Pid { position_kp: 0, ..shipped }, no_speed_loop] {
         let (angle, ..) = follow(dead, 500, |bench| _ = bench.ask(position(90.0)));
         assert_eq!(angle, 0.0, "without gains nothing moves");
     }
@@ -343,9 +345,9 @@ fn stop_brings_the_rotor_to_a_stand_and_off_lets_it_coast() {
 fn phase_currents_sum_to_zero_and_follow_the_electrical_angle() {
     let mut bench = Bench::one();
     bench.world().plant_mut().lock(true);
-    bench.ask(Torque { torque: TorqueCommand::from_amps(8.0) });
+    bench.ask(SetTorque { iq: IqCommand::from_amps(8.0) });
     bench.wait(50);
-    let PhaseCurrents { phase_a, phase_b, phase_c } = bench.ask(ReadStatus3);
+    let PhaseCurrents { phase_a, phase_b, phase_c } = bench.ask(ReadPhaseCurrents);
     assert_eq!(phase_a.0 + phase_b.0 + phase_c.0, 0);
     // Iq at an electrical angle of zero leaves phase A alone; half a count is 0.6° of it.
     assert!(phase_a.amps().abs() < 0.15, "{phase_a}");
@@ -355,7 +357,7 @@ fn phase_currents_sum_to_zero_and_follow_the_electrical_angle() {
     bench.ask(speed(77.0));
     for _ in 0..100 {
         bench.wait(7);
-        let PhaseCurrents { phase_a, phase_b, phase_c } = bench.ask(ReadStatus3);
+        let PhaseCurrents { phase_a, phase_b, phase_c } = bench.ask(ReadPhaseCurrents);
         assert_eq!(phase_a.0 + phase_b.0 + phase_c.0, 0);
         let truth = bench.truth().plant;
         for (read, real) in [phase_a, phase_b, phase_c].iter().zip(truth.phase_currents) {

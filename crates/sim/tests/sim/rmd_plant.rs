@@ -7,13 +7,13 @@ use motorlink_sim::rmd::RmdConfig;
 
 use crate::rmd_bench::Bench;
 
-fn output(config: &RmdConfig, degrees: f64) -> Position {
+fn output(config: &RmdConfig, degrees: f64) -> SetPosition {
     let ratio = f64::from(config.plant.machine.gear.ratio);
-    Position { angle: CentiDegrees::from_degrees(degrees * ratio) }
+    SetPosition { angle: CentiDegrees::from_degrees(degrees * ratio) }
 }
 
 fn accelerate(bench: &mut Bench, dps2: i32) {
-    bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(dps2) }));
+    bench.ask(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(dps2) }));
 }
 
 /// The two bodies of the heat model, by themselves: when the winding is at `limit` under a
@@ -43,12 +43,12 @@ fn a_motor_is_switched_off_when_the_heat_model_says() {
     for (config, amps) in [(RmdConfig::default(), 4.0), (RmdConfig::x8(), 25.0)] {
         let mut bench = Bench::new([config]);
         bench.world().plant_mut().lock(true);
-        bench.ask(Torque { torque: TorqueCommand::from_amps(amps) });
+        bench.ask(SetTorque { iq: IqCommand::from_amps(amps) });
         let due = predicted(&config, amps, f64::from(config.protect_temperature));
         bench.wait((due * 980.0) as u32);
-        assert!(bench.ask(ReadStatus1).errors.is_empty(), "before {due} s");
+        assert!(bench.ask(ReadStatus).errors.is_empty(), "before {due} s");
         bench.wait((due * 40.0) as u32);
-        assert_eq!(bench.ask(ReadStatus1).errors, Errors::OVER_TEMPERATURE, "after {due} s");
+        assert_eq!(bench.ask(ReadStatus).errors, Errors::OVER_TEMPERATURE, "after {due} s");
         assert_eq!(bench.truth().plant.iq, 0.0);
     }
 }
@@ -61,9 +61,9 @@ fn a_stalled_motor_pushes_with_its_limit_until_it_is_too_hot() {
     bench.wait(2000);
     let current = bench.watch(1000).current;
     assert!((4.9..5.2).contains(&current), "{current} A");
-    assert!(bench.ask(ReadStatus1).errors.is_empty(), "the document has no flag for it");
+    assert!(bench.ask(ReadStatus).errors.is_empty(), "the document has no flag for it");
     bench.wait(30_000);
-    assert_eq!(bench.ask(ReadStatus1).errors, Errors::OVER_TEMPERATURE);
+    assert_eq!(bench.ask(ReadStatus).errors, Errors::OVER_TEMPERATURE);
     assert_eq!(bench.truth().mode, Mode::Off);
 }
 
@@ -73,15 +73,15 @@ fn braking_raises_the_bus_where_nothing_takes_it_and_a_chopper_holds_it() {
         let mut config = RmdConfig::x8();
         config.plant.supply.chopper = chopper;
         let mut bench = Bench::new([config]);
-        bench.ask(Speed { speed: CentiDps::from_dps(8000.0) });
+        bench.ask(SetSpeed { speed: CentiDps::from_dps(8000.0) });
         bench.wait(500);
         bench.ask(Stop);
         let mut highest = 0.0f64;
         for _ in 0..200 {
             bench.wait(1);
-            highest = highest.max(bench.ask(ReadStatus1).voltage.volts());
+            highest = highest.max(bench.ask(ReadStatus).voltage.volts());
             let real = f64::from(bench.truth().plant.bus_voltage);
-            assert!((bench.ask(ReadStatus1).voltage.volts() - real).abs() < 0.06);
+            assert!((bench.ask(ReadStatus).voltage.volts() - real).abs() < 0.06);
         }
         highest
     };
@@ -99,13 +99,13 @@ fn a_supply_that_sags_under_load_is_low() {
     config.protect_voltage = 40.0;
     let mut bench = Bench::new([config]);
     accelerate(&mut bench, 10_000);
-    bench.ask(Speed { speed: CentiDps::from_dps(8000.0) });
+    bench.ask(SetSpeed { speed: CentiDps::from_dps(8000.0) });
     bench.wait(1500);
-    assert!(bench.ask(ReadStatus1).errors.is_empty());
+    assert!(bench.ask(ReadStatus).errors.is_empty());
     // 140 W at 48 V behind 4 Ω: 12 V are lost.
     bench.brake(9.0);
     bench.wait(500);
-    assert_eq!(bench.ask(ReadStatus1).errors, Errors::LOW_VOLTAGE);
+    assert_eq!(bench.ask(ReadStatus).errors, Errors::LOW_VOLTAGE);
     assert_eq!(bench.truth().mode, Mode::Off);
 }
 
@@ -159,13 +159,13 @@ fn angles_and_speeds_are_those_of_the_motor_shaft() {
     bench.wait(1000);
     assert!((bench.angle() - 360.0).abs() < 0.1, "{}°", bench.angle());
     assert!((bench.truth().plant.output_degrees - 40.0).abs() < 0.05);
-    bench.ask(Speed { speed: CentiDps::from_dps(900.0) });
+    bench.ask(SetSpeed { speed: CentiDps::from_dps(900.0) });
     bench.wait(500);
     let before = bench.truth().plant.output_degrees;
     bench.wait(1000);
     let turned = bench.truth().plant.output_degrees - before;
     assert!((turned - 100.0).abs() < 0.5, "{turned}° at the output in a second");
-    let shown = bench.ask(ReadStatus2).speed.0;
+    let shown = bench.ask(ReadMotionStatus).speed.0;
     assert!((890..=910).contains(&shown), "{shown} °/s");
 }
 
@@ -178,7 +178,7 @@ fn torque_is_the_same_wherever_the_encoders_zero_is() {
         bench.world().plant_mut().lock(true);
         let angle = f64::from(offset).rem_euclid(360.0);
         assert!((bench.angle() - angle).abs() < 0.03, "{}° for {offset}°", bench.angle());
-        bench.ask(Torque { torque: TorqueCommand::from_amps(5.0) });
+        bench.ask(SetTorque { iq: IqCommand::from_amps(5.0) });
         bench.wait(50);
         let torque = bench.truth().plant.torque / config.plant.machine.torque_constant();
         assert!((torque / 5.0 - 1.0).abs() < 0.03, "that of {torque} A with {offset}°");
@@ -186,10 +186,10 @@ fn torque_is_the_same_wherever_the_encoders_zero_is() {
 }
 
 /// Time to nine tenths of a speed, ms, and how far Iq and speed then go up and down, A and °/s.
-fn step(config: RmdConfig, gains: Gains) -> (u32, f32, f32) {
+fn step(config: RmdConfig, gains: Pid) -> (u32, f32, f32) {
     let mut bench = Bench::new([config]);
-    bench.ask(WriteGains(gains));
-    bench.ask(Speed { speed: CentiDps::from_dps(2000.0) });
+    bench.ask(WritePidRam(gains));
+    bench.ask(SetSpeed { speed: CentiDps::from_dps(2000.0) });
     let mut rise = 0;
     while bench.truth().speed_dps < 1800.0 && rise < 500 {
         bench.wait(1);
@@ -211,7 +211,7 @@ fn gains_change_how_fast_a_speed_is_reached() {
     for config in [RmdConfig::default(), RmdConfig::x8()] {
         let shipped = config.factory_rom().gains;
         let [fast, slower, slowest] = [100, 50, 20]
-            .map(|speed_kp| step(config, Gains { speed_kp, speed_ki: speed_kp, ..shipped }).0);
+            .map(|speed_kp| step(config, Pid { speed_kp, speed_ki: speed_kp, ..shipped }).0);
         assert!(
             3 * fast < 2 * slower && 3 * slower < 2 * slowest,
             "{fast}, {slower} and {slowest} ms"
@@ -225,9 +225,9 @@ fn gains_that_are_too_high_oscillate() {
         let shipped = config.factory_rom().gains;
         let (_, quiet, smooth) = step(config, shipped);
         assert!(quiet < 0.1 && smooth < 30.0, "{quiet} A and {smooth} °/s as shipped");
-        let (_, noise, _) = step(config, Gains { speed_kp: 255, torque_kp: 255, ..shipped });
+        let (_, noise, _) = step(config, Pid { speed_kp: 255, torque_kp: 255, ..shipped });
         assert!(noise > 1.5 * quiet, "{noise} A of noise with much Kp, {quiet} A as shipped");
-        let (_, swing, hunting) = step(config, Gains { speed_kp: 10, speed_ki: 255, ..shipped });
+        let (_, swing, hunting) = step(config, Pid { speed_kp: 10, speed_ki: 255, ..shipped });
         let most = config.max_torque_current;
         assert!(swing > most && hunting > 3000.0, "{swing} A, {hunting} °/s with much Ki of speed");
     }
@@ -238,10 +238,10 @@ fn a_motor_that_oscillates_is_switched_off_when_it_is_too_hot() {
     let errors = |speed_kp| {
         let mut bench = Bench::one();
         let shipped = RmdConfig::default().factory_rom().gains;
-        bench.ask(WriteGains(Gains { position_kp: 255, speed_kp, ..shipped }));
+        bench.ask(WritePidRam(Pid { position_kp: 255, speed_kp, ..shipped }));
         bench.ask(output(&RmdConfig::default(), 360.0));
         bench.wait(160_000);
-        (bench.ask(ReadStatus1).errors, bench.truth().plant.output_degrees)
+        (bench.ask(ReadStatus).errors, bench.truth().plant.output_degrees)
     };
     let (cool, at) = errors(100);
     assert!(cool.is_empty() && (at - 360.0).abs() < 0.05, "{cool} at {at}°");

@@ -11,17 +11,17 @@ use crate::rmd_bench::Bench;
 #[test]
 fn gains_survive_a_power_cycle_only_in_rom() {
     let mut bench = Bench::one();
-    let ram = Gains { position_kp: 1, position_ki: 2, ..bench.ask(ReadGains) };
-    let rom = Gains { speed_kp: 3, torque_ki: 4, ..ram };
-    bench.ask(WriteGains(ram));
-    assert_eq!(bench.ask(ReadGains), ram);
+    let ram = Pid { position_kp: 1, position_ki: 2, ..bench.ask(ReadPid) };
+    let rom = Pid { speed_kp: 3, torque_ki: 4, ..ram };
+    bench.ask(WritePidRam(ram));
+    assert_eq!(bench.ask(ReadPid), ram);
     bench.power_cycle();
-    assert_eq!(bench.ask(ReadGains), RmdConfig::default().factory_rom().gains);
+    assert_eq!(bench.ask(ReadPid), RmdConfig::default().factory_rom().gains);
 
-    bench.ask(WriteGainsToRom(rom));
-    bench.ask(WriteAcceleration(Acceleration { acceleration: DpsPerSecond(700) }));
+    bench.ask(WritePidRom(rom));
+    bench.ask(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(700) }));
     bench.power_cycle();
-    assert_eq!(bench.ask(ReadGains), rom);
+    assert_eq!(bench.ask(ReadPid), rom);
     assert_eq!(bench.ask(ReadAcceleration).acceleration, DpsPerSecond(0));
     assert_eq!(bench.world().rom_writes(), 1);
     assert_eq!(bench.node().drive().rom().gains, rom);
@@ -30,9 +30,9 @@ fn gains_survive_a_power_cycle_only_in_rom() {
 #[test]
 fn a_zero_position_takes_effect_with_the_next_power_on() {
     let mut bench = Bench::one();
-    bench.ask(Position { angle: CentiDegrees::from_degrees(1000.0) });
+    bench.ask(SetPosition { angle: CentiDegrees::from_degrees(1000.0) });
     bench.wait(3000);
-    let zero = bench.ask(WriteZeroToRom).offset;
+    let zero = bench.ask(WriteZeroRom).offset;
     assert!((bench.angle() - 1000.0).abs() < 0.1, "reads keep the old zero");
     bench.power_cycle();
     assert!(bench.angle().abs() < 0.1, "{}°", bench.angle());
@@ -43,7 +43,7 @@ fn a_zero_position_takes_effect_with_the_next_power_on() {
 #[test]
 fn turns_are_counted_until_the_power_goes() {
     let mut bench = Bench::one();
-    bench.ask(Position { angle: CentiDegrees::from_degrees(-2000.0) });
+    bench.ask(SetPosition { angle: CentiDegrees::from_degrees(-2000.0) });
     bench.wait(3000);
     assert!((bench.angle() + 2000.0).abs() < 0.1);
     bench.power_cycle();
@@ -53,7 +53,7 @@ fn turns_are_counted_until_the_power_goes() {
 #[test]
 fn stop_and_run_resume_what_off_forgets() {
     let mut bench = Bench::one();
-    bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
+    bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
     bench.wait(300);
     bench.ask(Stop);
     bench.wait(300);
@@ -70,28 +70,28 @@ fn stop_and_run_resume_what_off_forgets() {
 #[test]
 fn protections_switch_off_and_stay_while_the_cause_lasts() {
     let mut bench = Bench::one();
-    bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
+    bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
     bench.wait(300);
     bench.world().plant_mut().set_source(6.9);
     bench.wait(1);
-    assert!(bench.ask(ReadStatus1).errors.is_empty(), "the capacitor holds for a while");
+    assert!(bench.ask(ReadStatus).errors.is_empty(), "the capacitor holds for a while");
     bench.wait(300);
     bench.world().plant_mut().set_source(24.0);
     bench.wait(1);
-    assert_eq!(bench.ask(ReadStatus1).errors, Errors::LOW_VOLTAGE);
+    assert_eq!(bench.ask(ReadStatus).errors, Errors::LOW_VOLTAGE);
     assert_eq!(bench.truth().mode, Mode::Off);
 
     bench.world().plant_mut().force_temperature(Some(101.0));
     bench.wait(1);
     assert_eq!(bench.ask(ClearErrors).errors, Errors::OVER_TEMPERATURE);
-    bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
+    bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
     assert_eq!(bench.truth().mode, Mode::Off);
     bench.world().plant_mut().force_temperature(Some(60.0));
     bench.wait(300);
     let status = bench.ask(ClearErrors);
     assert_eq!((status.errors, status.temperature), (Errors::NONE, Celsius(60)));
     assert_eq!(status.voltage.volts(), 24.0);
-    bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
+    bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
     assert_ne!(bench.truth().mode, Mode::Off);
 }
 
@@ -100,7 +100,7 @@ fn injected_faults_happen_once_or_last() {
     let mut bench = Bench::one();
     bench.world().inject(Errors::OVER_TEMPERATURE);
     bench.wait(1);
-    assert_eq!(bench.ask(ReadStatus1).errors, Errors::OVER_TEMPERATURE);
+    assert_eq!(bench.ask(ReadStatus).errors, Errors::OVER_TEMPERATURE);
     assert_eq!(bench.ask(ClearErrors).errors, Errors::NONE);
     bench.world().hold_faults(Errors::LOW_VOLTAGE);
     bench.world().hold_faults(Errors::OVER_TEMPERATURE);
@@ -116,10 +116,10 @@ fn injected_faults_happen_once_or_last() {
 #[test]
 fn silence_for_the_shutdown_time_switches_off() {
     let mut bench = Bench::new([RmdConfig { shutdown_ms: 200, ..RmdConfig::default() }]);
-    bench.ask(Speed { speed: CentiDps::from_dps(500.0) });
+    bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
     for _ in 0..5 {
         bench.wait(150);
-        bench.ask(ReadStatus2);
+        bench.ask(ReadMotionStatus);
     }
     assert_ne!(bench.truth().mode, Mode::Off);
     bench.wait(200);
@@ -132,7 +132,7 @@ fn four_torques_are_answered_lowest_id_first() {
     for id in (1..=4).filter_map(MotorId::new) {
         bench.bus.node_mut(id).unwrap().motor_mut().plant_mut().lock(true);
     }
-    let torques = Torque4([100, -100, 200, -200].map(TorqueCommand));
+    let torques = SetTorque4([100, -100, 200, -200].map(IqCommand));
     bench.send(&CanFrame::new(0x280, torques.encode()));
     bench.wait(50);
     let replies = bench.send(&CanFrame::new(0x280, torques.encode()));
@@ -148,7 +148,7 @@ fn four_torques_are_answered_lowest_id_first() {
 #[test]
 fn what_is_not_for_a_motor_gets_no_reply() {
     let mut bench = Bench::one();
-    assert!(bench.send(&CanFrame::new(0x142, ReadStatus1.encode())).is_empty());
+    assert!(bench.send(&CanFrame::new(0x142, ReadStatus.encode())).is_empty());
     assert!(bench.send(&CanFrame::new(0x141, [0x77; 8])).is_empty());
     assert!(bench.send(&CanFrame::data_frame(0x141, false, &[0x9A])).is_empty());
 }

@@ -1,7 +1,7 @@
 //! An ST drive on a serial line, spoken to in frames.
 
-use motorlink_proto::stmcp::register::{Register, Value};
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::register::{Register, Value};
+use motorlink_proto::st::{
     Command, Flags, Frame, HEADER_ACK, MAX_FRAME, Motor, Parse, Profile, REVUP_PHASES, Ramp,
     RegisterId, Request, RevupPhase, Status, register,
 };

@@ -1,6 +1,6 @@
 //! References, ramps and regulators.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, ControlMode, CurrentReference, Flags, PositionMove, Profile, Request, RevupPhase,
     Status, TorqueRamp, register::*,
 };

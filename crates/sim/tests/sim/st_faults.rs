@@ -1,6 +1,6 @@
 //! Faults: what causes them, how they latch, how they go.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, Flags, Profile, Request, Status, register::*,
 };
 use motorlink_sim::st::{MotorConfig, PfcState, pfc_fault};

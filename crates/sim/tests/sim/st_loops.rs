@@ -1,6 +1,6 @@
 //! Closed loops of the ST drive on every motor that it is delivered with.
 
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, Flags, Profile, Request, RevupPhase, Status, register::*,
 };
 use motorlink_sim::plant::{ChopperConfig, HeatSensor, MachineConfig, PlantConfig};
@@ -373,7 +373,7 @@ fn observer_gains_decide_whether_the_rotor_is_seen() {
 #[test]
 fn an_observer_beside_an_encoder_sees_the_same_rotor() {
     let mut line = turning(MotorConfig::servo(), 2000.0);
-    use motorlink_proto::stmcp::RegisterId as R;
+    use motorlink_proto::st::RegisterId as R;
     let motor = line.world();
     let off =
         (motor.read(R::OBS_CR_EL_ANGLE) as i16).wrapping_sub(motor.read(R::MEAS_EL_ANGLE) as i16);

@@ -1,8 +1,8 @@
 //! Every register of the table, in both profiles, on a motor that has its feature and one that has
 //! not.
 
-use motorlink_proto::stmcp::register::{Features, Type, Writing};
-use motorlink_proto::stmcp::{Command, ErrorCode, Profile, RegisterId, Request, register::*};
+use motorlink_proto::st::register::{Features, Type, Writing};
+use motorlink_proto::st::{Command, ErrorCode, Profile, RegisterId, Request, register::*};
 use motorlink_sim::st::{BuildConfig, MotorConfig};
 
 use crate::st_bench::Line;

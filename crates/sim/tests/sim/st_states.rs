@@ -1,6 +1,6 @@
 //! The state machine: which states, in which order, for how long.
 
-use motorlink_proto::stmcp::{Command, Profile, Status, register};
+use motorlink_proto::st::{Command, Profile, Status, register};
 use motorlink_sim::st::{DurationConfig, MotorConfig};
 
 use crate::st_bench::Line;
@@ -159,7 +159,7 @@ fn an_inrush_limiter_delays_the_first_start() {
 #[test]
 fn motors_of_a_drive_run_apart() {
     let mut line = Line::demo(Profile::Spec);
-    line.ask(2, motorlink_proto::stmcp::Request::Execute(Command::StartMotor)).unwrap();
+    line.ask(2, motorlink_proto::st::Request::Execute(Command::StartMotor)).unwrap();
     line.until(Run, 2000);
     assert_eq!(line.get_id(1, register::STATUS.id()), Ok(u8::from(Idle).into()));
     assert_eq!(line.get_id(2, register::STATUS.id()), Ok(u8::from(Run).into()));

@@ -1,7 +1,9 @@
 //! The same commands at the same times give the same bytes, however finely time is cut.
 
-use motorlink_proto::rmd::{Command as _, Position, ReadEncoder, ReadStatus2, ReadStatus3, Speed};
-use motorlink_proto::stmcp::{Command, Profile, RegisterId, Request};
+use motorlink_proto::rmd::{
+    Command as _, ReadEncoder, ReadMotionStatus, ReadPhaseCurrents, SetPosition, SetSpeed,
+};
+use motorlink_proto::st::{Command, Profile, RegisterId, Request};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{CentiDegrees, CentiDps};
 use motorlink_sim::rmd::RmdConfig;
@@ -45,13 +47,14 @@ fn rmd_run(piece: u64) -> (Vec<Vec<u8>>, String) {
     let mut bench = Bench::new([RmdConfig::default(), short]);
     for round in 0..40 {
         let angle = CentiDegrees::from_degrees(f64::from(round * 37 % 100));
-        bench.raw(Position { angle }.encode());
-        let spin = Speed { speed: CentiDps(round * 1000) };
+        bench.raw(SetPosition { angle }.encode());
+        let spin = SetSpeed { speed: CentiDps(round * 1000) };
         bench.send(&motorlink_proto::can::CanFrame::new(0x142, spin.encode()));
         let (mut now, bus) = (bench.now, &mut bench.bus);
         cut(&mut now, 93_333, piece, |now| bus.advance_to(now));
         bench.now = now;
-        for request in [ReadStatus2.encode(), ReadStatus3.encode(), ReadEncoder.encode()] {
+        for request in [ReadMotionStatus.encode(), ReadPhaseCurrents.encode(), ReadEncoder.encode()]
+        {
             bench.raw(request);
             bench.send(&motorlink_proto::can::CanFrame::new(0x142, request));
         }

@@ -1,8 +1,8 @@
 //! What events do to the drives of a scenario.
 
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::{ClearErrors, Command as _, Payload, Status1};
-use motorlink_proto::stmcp::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse};
+use motorlink_proto::rmd::{ClearErrors, Command as _, Payload, Status};
+use motorlink_proto::st::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse};
 use motorlink_proto::time::Instant;
 
 use super::event::Action;
@@ -60,7 +60,7 @@ impl Drives {
             return Some(SILENT.to_owned());
         };
         let clears = frame.data().first() == Some(&ClearErrors::CODE.number());
-        let remain = clears && !Status1::decode(data).errors.is_empty();
+        let remain = clears && !Status::decode(data).errors.is_empty();
         remain.then(|| ERRORS.to_owned())
     }
 }

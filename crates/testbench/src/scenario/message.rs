@@ -2,15 +2,16 @@
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    Acceleration, CirclePosition, CirclePositionLimited, ClearErrors, Command as _, Gains, MotorId,
-    Off, Position, PositionLimited, Run, Speed, Spin, Stop, Torque, WriteAcceleration, WriteGains,
+    Acceleration, ClearErrors, Command as _, MotorId, Off, Pid, Run, SetPosition,
+    SetPositionLimited, SetSingleTurnPosition, SetSingleTurnPositionLimited, SetSpeed, SetTorque,
+    SpinDirection, Stop, WriteAccelerationRam, WritePidRam,
 };
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, MAX_FRAME, Motor, PositionMove, Profile, REVUP_PHASES, Ramp,
     Request, RevupPhase, TorqueRamp, find_register, parse_value,
 };
 use motorlink_proto::units::{
-    CentiDegrees, CentiDps, CircleAngle, DpsPerSecond, SpeedLimit, TorqueCommand,
+    CentiDegrees, CentiDps, DpsPerSecond, IqCommand, SpeedLimit, TurnCentiDegrees,
 };
 use serde::Deserialize;
 
@@ -148,43 +149,44 @@ impl RmdMessage {
             RmdMessage::Run {} => Run.encode(),
             RmdMessage::ClearError {} => ClearErrors.encode(),
             RmdMessage::Torque { amps } => {
-                let torque = TorqueCommand(digits(amps, TorqueCommand::SCALE, "A")?);
-                if torque.0.unsigned_abs() > Torque::MAX.0.unsigned_abs() {
-                    return Err(format!("{amps} A is beyond ±{} A", Torque::MAX.amps()));
+                let torque = IqCommand(digits(amps, IqCommand::SCALE, "A")?);
+                if torque.0.unsigned_abs() > SetTorque::MAX.0.unsigned_abs() {
+                    return Err(format!("{amps} A is beyond ±{} A", SetTorque::MAX.amps()));
                 }
-                Torque { torque }.encode()
+                SetTorque { iq: torque }.encode()
             }
             RmdMessage::Speed { dps } => {
-                Speed { speed: CentiDps(digits(dps, CentiDps::SCALE, "°/s")?) }.encode()
+                SetSpeed { speed: CentiDps(digits(dps, CentiDps::SCALE, "°/s")?) }.encode()
             }
             RmdMessage::Move { degrees, max_speed_dps, direction: None } => {
                 let angle = CentiDegrees(digits(degrees, CentiDegrees::SCALE, "°")?);
                 match max_speed_dps {
-                    None => Position { angle }.encode(),
-                    Some(dps) => PositionLimited { max_speed: limit(dps)?, angle }.encode(),
+                    None => SetPosition { angle }.encode(),
+                    Some(dps) => SetPositionLimited { max_speed: limit(dps)?, angle }.encode(),
                 }
             }
             RmdMessage::Move { degrees, max_speed_dps, direction: Some(direction) } => {
                 let direction = match direction {
-                    Direction::Cw => Spin::Clockwise,
-                    Direction::Ccw => Spin::Counterclockwise,
+                    Direction::Cw => SpinDirection::Clockwise,
+                    Direction::Ccw => SpinDirection::Counterclockwise,
                 };
-                let angle = CircleAngle(digits(degrees, CircleAngle::SCALE, "°")?);
-                if angle > CircleAngle(35_999) {
+                let angle = TurnCentiDegrees(digits(degrees, TurnCentiDegrees::SCALE, "°")?);
+                if angle > TurnCentiDegrees(35_999) {
                     return Err(format!(
                         "an angle within the turn is 0° to 359.99°, not {degrees}"
                     ));
                 }
                 match max_speed_dps {
-                    None => CirclePosition { direction, angle }.encode(),
+                    None => SetSingleTurnPosition { direction, angle }.encode(),
                     Some(dps) => {
-                        CirclePositionLimited { direction, max_speed: limit(dps)?, angle }.encode()
+                        SetSingleTurnPositionLimited { direction, max_speed: limit(dps)?, angle }
+                            .encode()
                     }
                 }
             }
             RmdMessage::Gains { gains } => {
                 let [position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki] = gains;
-                WriteGains(Gains {
+                WritePidRam(Pid {
                     position_kp,
                     position_ki,
                     speed_kp,
@@ -195,7 +197,7 @@ impl RmdMessage {
                 .encode()
             }
             RmdMessage::Acceleration { dps2 } => {
-                WriteAcceleration(Acceleration { acceleration: DpsPerSecond(dps2) }).encode()
+                WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(dps2) }).encode()
             }
         };
         Ok(CanFrame::new(motor.can_id(), data))

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use motorlink_proto::rmd::MotorId;
-use motorlink_proto::stmcp::{ErrorCode, Motor};
+use motorlink_proto::st::{ErrorCode, Motor};
 use motorlink_proto::time::{Duration, Instant};
 use serde::de::DeserializeOwned;
 use toml::Table;

@@ -7,11 +7,12 @@ use std::rc::Rc;
 use motorlink_link::serve::CanStation;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    Circle, Code, MotionStatus, MotorId, MotorSet, MultiTurn, Payload, Status1, TORQUE4_ID,
+    Code, MotionStatus, MotorId, MotorSet, MultiTurnAngle, Payload, SingleTurnAngle, Status,
+    TORQUE4_ID,
 };
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{
-    Celsius, CircleAngle, DeciVolts, Dps, MultiTurnAngle, TorqueFeedback,
+    Celsius, DeciVolts, Dps, IqFeedback, TurnCentiDegrees, WideCentiDegrees,
 };
 
 use crate::host::journal::{Exchange, Journal};
@@ -94,7 +95,7 @@ impl CanStation for Motors {
                 inner.request(now, id, frame, Code::from(data[0]));
             } else if can_id == TORQUE4_ID {
                 for id in MotorSet::TORQUE4 {
-                    inner.request(now, id, frame, Code::Torque);
+                    inner.request(now, id, frame, Code::SetTorque);
                 }
             }
         }
@@ -143,15 +144,17 @@ impl Inner {
         let temperature = Celsius(30);
         let reply = match code {
             Code::ReadMultiTurnAngle => {
-                MultiTurn { angle: MultiTurnAngle(digits.into()) }.encode_as(code)
+                MultiTurnAngle { angle: WideCentiDegrees(digits.into()) }.encode_as(code)
             }
-            Code::ReadCircleAngle => Circle { angle: CircleAngle(digits) }.encode_as(code),
-            Code::ReadStatus1 | Code::ClearErrors => {
+            Code::ReadSingleTurnAngle => {
+                SingleTurnAngle { angle: TurnCentiDegrees(digits) }.encode_as(code)
+            }
+            Code::ReadStatus | Code::ClearErrors => {
                 let (voltage, errors) = (DeciVolts(digits), Default::default());
-                Status1 { temperature, voltage, errors }.encode_as(Code::ReadStatus1)
+                Status { temperature, voltage, errors }.encode_as(Code::ReadStatus)
             }
-            _ if row.moves || code == Code::ReadStatus2 => {
-                let (iq, speed) = (TorqueFeedback(digits as i16), Dps(0));
+            _ if row.moves || code == Code::ReadMotionStatus => {
+                let (iq, speed) = (IqFeedback(digits as i16), Dps(0));
                 MotionStatus { temperature, iq, speed, encoder: 0 }.encode_as(code)
             }
             _ => return ([code.into(), 0, 0, 0, 0, 0, 0, 0], None),

@@ -98,7 +98,7 @@ fn reading() -> Vec<Scenario> {
             &[ANSWER],
             "drops the frame, whose DATA[0] is another, and says that there was no reply",
             Demand::Truth,
-            |turn| vec![unasked(turn.id.can_id(), Code::ReadStatus2)],
+            |turn| vec![unasked(turn.id.can_id(), Code::ReadMotionStatus)],
         ),
         read(
             "a_reply_of_another_motor_is_not_the_answer",
@@ -223,7 +223,7 @@ fn reading() -> Vec<Scenario> {
                     return vec![right(turn)];
                 }
                 let mut reply = turn.reply;
-                reply[0] = Code::ReadStatus2.into();
+                reply[0] = Code::ReadMotionStatus.into();
                 let why = "DATA[0] of the frame was 0x9C";
                 vec![Send::reply(frame(turn.id.can_id(), reply)).lying(value(turn), why)]
             },
@@ -234,14 +234,14 @@ fn reading() -> Vec<Scenario> {
 /// With four motors at once.
 fn many_motors() -> Vec<Scenario> {
     let mut all = Vec::new();
-    for (task, subject) in [(Task::Cycle, "a cycle"), (Task::Torque4, "0x280")] {
+    for (task, subject) in [(Task::Cycle, "a cycle"), (Task::SetTorque4, "0x280")] {
         let clauses: &[&str] = match task {
-            Task::Torque4 => &[FOUR, IDENTIFIERS],
+            Task::SetTorque4 => &[FOUR, IDENTIFIERS],
             _ => &[IDENTIFIERS, ANSWER],
         };
         let mut add = |name: &str, expected, demand, trick: fn(&Turn) -> Sends| {
             let script = move |turn: &Turn| match turn.code {
-                Code::ReadMultiTurnAngle | Code::Torque => trick(turn),
+                Code::ReadMultiTurnAngle | Code::SetTorque => trick(turn),
                 _ => vec![right(turn)],
             };
             let scenario = scenario("", clauses, expected, task, demand, script);
@@ -376,7 +376,7 @@ fn frame(can_id: u16, data: [u8; 8]) -> CanFrame {
 fn unasked(can_id: u16, code: Code) -> Send<CanFrame> {
     let [low, high] = UNASKED.to_le_bytes();
     let data = match code {
-        Code::Torque => [code.into(), 30, low, high, 0, 0, 0, 0],
+        Code::SetTorque => [code.into(), 30, low, high, 0, 0, 0, 0],
         _ => [code.into(), low, high, 0, 0, 0, 0, 0],
     };
     let why = "that came in a frame which is no answer to it";

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use motorlink_link::serve::ByteStation;
-use motorlink_proto::stmcp::{
+use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Features, Frame, Motor, Parse, Profile, Ramp, RegisterId,
     Request, RevupPhase, Slave, Status, Version,
 };
@@ -155,7 +155,7 @@ impl Engine {
     }
 }
 
-impl motorlink_proto::stmcp::Drive for Engine {
+impl motorlink_proto::st::Drive for Engine {
     fn features(&self, _: Motor) -> Features {
         Features::NONE
     }

@@ -4,7 +4,7 @@ mod drive;
 mod scenarios;
 
 /// How long a host waits for a reply unless it is said otherwise.
-pub use motorlink_proto::stmcp::TIMEOUT;
+pub use motorlink_proto::st::TIMEOUT;
 
 pub use drive::{Drive, Scenario};
 pub use scenarios::scenarios;

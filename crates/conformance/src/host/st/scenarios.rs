@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use motorlink_proto::stmcp::{Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD};
+use motorlink_proto::st::{Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD};
 use motorlink_proto::time::Duration;
 
 use super::drive::{Scenario, Script, Sends, Turn};

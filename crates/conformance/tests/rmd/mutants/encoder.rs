@@ -12,16 +12,16 @@ fn mutants_of_encoder_and_angles_are_caught() {
 }
 
 fn mutants() -> Vec<Mutant> {
-    use Code::{ReadCircleAngle, ReadEncoder, ReadMultiTurnAngle};
+    use Code::{ReadEncoder, ReadMultiTurnAngle, ReadSingleTurnAngle};
     let multi = |change: fn(i64) -> i64| {
         on(ReadMultiTurnAngle, move |data| {
-            let MultiTurn { angle } = MultiTurn::decode(data);
-            let angle = motorlink_proto::units::MultiTurnAngle(change(angle.0));
-            *data = MultiTurn { angle }.encode_as(ReadMultiTurnAngle);
+            let MultiTurnAngle { angle } = MultiTurnAngle::decode(data);
+            let angle = motorlink_proto::units::WideCentiDegrees(change(angle.0));
+            *data = MultiTurnAngle { angle }.encode_as(ReadMultiTurnAngle);
         })
     };
     let circle = |change: fn(u16) -> u16| {
-        on(ReadCircleAngle, move |data| put_u16(data, 6, change(u16_at(data, 6))))
+        on(ReadSingleTurnAngle, move |data| put_u16(data, 6, change(u16_at(data, 6))))
     };
     vec![
         mutant(
@@ -40,7 +40,7 @@ fn mutants() -> Vec<Mutant> {
         }),
         mutant("status_2_has_the_raw_position", "RMD-9C-06", {
             commands(|motors, data| {
-                (code(data) == Code::ReadStatus2).then(|| {
+                (code(data) == Code::ReadMotionStatus).then(|| {
                     let raw = u16_at(&motors.ask(Command::encode(&ReadEncoder_)), 4);
                     let mut reply = motors.ask(*data);
                     put_u16(&mut reply, 6, raw);
@@ -83,12 +83,12 @@ fn mutants() -> Vec<Mutant> {
             commands(|motors, data| {
                 (data[0] == 0x19).then(|| {
                     let raw = u16_at(&motors.ask(Command::encode(&ReadEncoder_)), 4);
-                    Some(EncoderOffset { offset: raw }.encode_as(Code::WriteZeroToRom))
+                    Some(EncoderOffset { offset: raw }.encode_as(Code::WriteZeroRom))
                 })
             })
         }),
         mutant("the_reply_to_a_zero_has_none", "RMD-19-07", {
-            on(Code::WriteZeroToRom, |data| put_u16(data, 6, 0))
+            on(Code::WriteZeroRom, |data| put_u16(data, 6, 0))
         }),
         mutant("the_reply_to_a_zero_has_the_old_one", "RMD-19-07", {
             commands(|motors, data| {
@@ -118,7 +118,7 @@ fn mutants() -> Vec<Mutant> {
 use motorlink_proto::rmd::ReadEncoder as ReadEncoder_;
 
 fn write_offset(motors: &mut Motors, offset: u16) -> [u8; 8] {
-    motors.ask(Command::encode(&WriteEncoderOffset(EncoderOffset { offset })))
+    motors.ask(Command::encode(&WriteEncoderOffsetRom(EncoderOffset { offset })))
 }
 
 /// In RAM only.
@@ -149,7 +149,7 @@ pub fn late_offset() -> Behaviour {
             Some((id, data)) if data[0] == 0x91 => {
                 rom = Some(u16_at(data, 6));
                 let offset = u16_at(data, 6);
-                let reply = EncoderOffset { offset }.encode_as(Code::WriteEncoderOffset);
+                let reply = EncoderOffset { offset }.encode_as(Code::WriteEncoderOffsetRom);
                 vec![CanFrame::new(id, reply)]
             }
             Some((_, data)) if data[0] == 0x19 => {

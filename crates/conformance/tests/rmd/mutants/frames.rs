@@ -60,13 +60,13 @@ fn mutants() -> Vec<Mutant> {
         mutant(
             "a_code_is_not_known",
             "RMD-2-14",
-            commands(|_, data| (code(data) == Code::ReadStatus3).then_some(None)),
+            commands(|_, data| (code(data) == Code::ReadPhaseCurrents).then_some(None)),
         ),
         mutant(
             "a_reply_has_another_code",
             "RMD-94-02",
             commands(|motors, data| {
-                (code(data) == Code::ReadCircleAngle).then(|| {
+                (code(data) == Code::ReadSingleTurnAngle).then(|| {
                     let [_, rest @ ..] = motors.ask(*data);
                     let [a, b, c, d, e, f, g] = rest;
                     Some([0x93, a, b, c, d, e, f, g])
@@ -100,7 +100,7 @@ fn mutants() -> Vec<Mutant> {
 fn lenient(takes: impl Fn(&CanFrame) -> bool + 'static) -> Behaviour {
     Box::new(move |motors, event| match event {
         Event::Frame(frame) if frame.id() & 0x1C0 == 0x140 && takes(frame) => {
-            let mut data = Command::encode(&ReadStatus1);
+            let mut data = Command::encode(&ReadStatus);
             data[..frame.data().len()].copy_from_slice(frame.data());
             let own = motors.first_id().can_id();
             motors.try_ask(data).map(|reply| CanFrame::new(own, reply)).into_iter().collect()

@@ -62,7 +62,7 @@ fn off_and_on() -> Vec<Mutant> {
                 let stopped = motors.first().drive().mode() == Mode::Stopped;
                 let moves = data[0] == 0xA2;
                 (stopped && moves).then(|| {
-                    let mut reply = motors.ask(Command::encode(&ReadStatus2));
+                    let mut reply = motors.ask(Command::encode(&ReadMotionStatus));
                     reply[0] = data[0];
                     Some(reply)
                 })
@@ -74,7 +74,7 @@ fn off_and_on() -> Vec<Mutant> {
 fn torque_and_speed() -> Vec<Mutant> {
     let torque = |change: fn(i16) -> i16| {
         requests(move |data| {
-            if code(data) == Code::Torque {
+            if code(data) == Code::SetTorque {
                 let torque = u16_at(data, 4) as i16;
                 put_u16(data, 4, change(torque) as u16);
             }
@@ -82,7 +82,7 @@ fn torque_and_speed() -> Vec<Mutant> {
     };
     let speed = |change: fn(&mut [u8; 8])| {
         requests(move |data| {
-            if code(data) == Code::Speed {
+            if code(data) == Code::SetSpeed {
                 change(data);
             }
         })
@@ -92,19 +92,19 @@ fn torque_and_speed() -> Vec<Mutant> {
         mutant("torque_without_its_sign", "RMD-A1-01", torque(i16::saturating_abs)),
         mutant("torque_in_data_2", "RMD-A1-01", {
             requests(|data| {
-                if code(data) == Code::Torque {
+                if code(data) == Code::SetTorque {
                     (data[4], data[5]) = (data[2], data[3]);
                 }
             })
         }),
         mutant("torque_is_answered_as_status_2", "RMD-A1-05", {
-            on(Code::Torque, |data| data[0] = 0x9C)
+            on(Code::SetTorque, |data| data[0] = 0x9C)
         }),
         mutant("torque_is_answered_with_another_temperature", "RMD-A1-06", {
-            on(Code::Torque, |data| data[1] += 50)
+            on(Code::SetTorque, |data| data[1] += 50)
         }),
         mutant("torque_is_answered_with_speed_first", "RMD-A1-07", {
-            on(Code::Torque, |data| put_u16(data, 2, 100))
+            on(Code::SetTorque, |data| put_u16(data, 2, 100))
         }),
         mutant("speed_in_degrees", "RMD-A2-02", speed(|d| put_i32(d, i32_at(d) * 100))),
         mutant("speed_high_byte_first", "RMD-A2-01", speed(|data| data[4..].reverse())),
@@ -116,13 +116,13 @@ fn torque_and_speed() -> Vec<Mutant> {
             })
         }),
         mutant("speed_is_answered_with_a_raw_position", "RMD-A2-09", {
-            on(Code::Speed, |data| put_u16(data, 6, (u16_at(data, 6) + 1_000) % 0x4000))
+            on(Code::SetSpeed, |data| put_u16(data, 6, (u16_at(data, 6) + 1_000) % 0x4000))
         }),
         mutant("speed_is_answered_twice", "RMD-A2-05", {
             frames(|_, reply| vec![reply; 1 + usize::from(reply.data()[0] == 0xA2)])
         }),
         mutant("speed_is_answered_with_another_speed", "RMD-A2-08", {
-            on(Code::Speed, |data| put_u16(data, 4, 6_000))
+            on(Code::SetSpeed, |data| put_u16(data, 4, 6_000))
         }),
     ]
 }

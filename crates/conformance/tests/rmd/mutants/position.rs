@@ -92,7 +92,7 @@ fn on(to: u8, change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
 /// The multi-turn angle, 0.01°.
 fn angle(motors: &mut Motors) -> i32 {
     let data = motors.ask(Command::encode(&ReadMultiTurnAngle));
-    MultiTurn::decode(&data).angle.0 as i32
+    MultiTurnAngle::decode(&data).angle.0 as i32
 }
 
 /// Turns by less than half a turn, whatever the difference.
@@ -116,7 +116,7 @@ fn again(to: u8) -> Behaviour {
         last = (data[0] == to).then_some(*data).or(last);
         (same && data[0] == to).then(|| {
             let further = CentiDegrees(angle(motors) + 36_000);
-            obey(motors, data, Command::encode(&Position { angle: further }))
+            obey(motors, data, Command::encode(&SetPosition { angle: further }))
         })
     })
 }

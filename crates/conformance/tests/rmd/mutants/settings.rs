@@ -15,14 +15,14 @@ fn mutants_of_gains_and_acceleration_are_caught() {
 fn mutants() -> Vec<Mutant> {
     vec![
         mutant("gains_in_the_order_of_v3", "RMD-31-01", reversed_gains()),
-        mutant("ki_before_kp_in_replies", "RMD-30-05", on(Code::ReadGains, |d| d.swap(4, 5))),
-        mutant("data_1_is_not_0", "RMD-30-03", on(Code::ReadGains, |data| data[1] = 0x30)),
+        mutant("ki_before_kp_in_replies", "RMD-30-05", on(Code::ReadPid, |d| d.swap(4, 5))),
+        mutant("data_1_is_not_0", "RMD-30-03", on(Code::ReadPid, |data| data[1] = 0x30)),
         mutant(
             "gains_are_read_from_rom",
             "RMD-30-07",
             commands(|motors, data| {
                 let rom = motors.first().drive().rom().gains;
-                (code(data) == Code::ReadGains).then(|| Some(rom.encode_as(Code::ReadGains)))
+                (code(data) == Code::ReadPid).then(|| Some(rom.encode_as(Code::ReadPid)))
             }),
         ),
         mutant("gains_for_ram_go_to_rom", "RMD-31-03", taken_for(0x31, 0x32)),

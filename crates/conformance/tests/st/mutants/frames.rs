@@ -1,6 +1,6 @@
 //! Deviations of frames, replies, timing and motor numbers.
 
-use motorlink_proto::stmcp::{ErrorCode, HEADER_ACK, HEADER_NACK};
+use motorlink_proto::st::{ErrorCode, HEADER_ACK, HEADER_NACK};
 use motorlink_proto::time::Duration;
 
 use super::{MCSDK, Mutant, ack, answers, caught, hears, mutant, nack, parsed, refuses, says};
@@ -15,7 +15,7 @@ fn low_byte(bytes: &[u8]) -> u8 {
 
 fn mend(bytes: &mut [u8]) {
     if let Some((check, body)) = bytes.split_last_mut() {
-        *check = motorlink_proto::stmcp::checksum(body);
+        *check = motorlink_proto::st::checksum(body);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Deviations of messages and commands of a motor at rest.
 
-use motorlink_proto::stmcp::ErrorCode;
+use motorlink_proto::st::ErrorCode;
 
 use super::{MCSDK, Mutant, ack, answers, caught, gives, mutant, nack, refuses, takes};
 use crate::peer::frame;

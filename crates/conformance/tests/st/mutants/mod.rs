@@ -7,7 +7,7 @@ mod registers;
 mod units;
 
 use motorlink_conformance::{Need, Outcome, Verdict, st};
-use motorlink_proto::stmcp::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse, Profile};
+use motorlink_proto::st::{ErrorCode, Frame, HEADER_ACK, HEADER_NACK, Parse, Profile};
 use motorlink_proto::time::Instant;
 use motorlink_sim::st::MotorConfig;
 

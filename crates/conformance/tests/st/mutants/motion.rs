@@ -1,6 +1,6 @@
 //! Deviations of a motor that turns, or has a fault.
 
-use motorlink_proto::stmcp::{Flags, Motor, RegisterId, Status};
+use motorlink_proto::st::{Flags, Motor, RegisterId, Status};
 
 use super::{Mutant, ack, answers, caught, gives, hears, mutant, parsed, takes};
 use crate::peer::{Station, frame};

@@ -1,6 +1,6 @@
 //! Deviations of registers: SET_REG, GET_REG, table 3.
 
-use motorlink_proto::stmcp::{ErrorCode, Profile, RegisterId};
+use motorlink_proto::st::{ErrorCode, Profile, RegisterId};
 
 use super::{MCSDK, Mutant, ack, answers, caught, gives, mutant, nack, refuses, takes};
 use crate::peer::frame;

@@ -1,6 +1,6 @@
 //! Deviations of table 3's units and synonyms, and of the PFC's registers.
 
-use motorlink_proto::stmcp::RegisterId;
+use motorlink_proto::st::RegisterId;
 
 use super::{Mutant, caught, gives, mutant};
 use crate::peer::Deviation;

@@ -1,0 +1,405 @@
+//! The blocking client: one lock around one exchange, no thread, no allocation in an exchange.
+
+use std::error;
+use std::sync::Arc;
+use std::time::{self as machine, Duration};
+
+use motorlink_link::Clock;
+use motorlink_link::port::{ByteLink, PortError, PortName};
+use motorlink_link::printable;
+use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
+use motorlink_proto::st as proto;
+use motorlink_proto::st::{BoardInfo, Counters, Line, MAX_FRAME, Motor, Output, Profile, Request};
+use motorlink_proto::time::{self, Instant};
+
+use super::session::{Rules, Session};
+use super::started::{Effect, Started};
+use super::{Error, Options};
+use crate::turn::{Turn, Turns};
+
+/// After a pause of this length whatever came unasked is taken note of before the next request: a
+/// byte or so at 115200 baud. In a shorter one hardly anything can come, and looking is a system call.
+const IDLE: time::Duration = time::Duration(100);
+
+/// What GET_BOARD_INFO tells (4.7).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Info {
+    /// Major, minor, patch.
+    pub version: [u8; 3],
+    /// Name of the SDK.
+    pub name: String,
+}
+
+/// What GET_FW_VERSION tells (4.12).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FirmwareVersion {
+    /// Name of the firmware.
+    pub name: String,
+    /// Its version, such as `Ver.5.4.4`.
+    pub version: String,
+}
+
+/// A master on a serial line: shared by reference between threads, one exchange at a time.
+///
+/// A port that went away is opened again by the next call, behind a back-off; see
+/// [`link_state`](Self::link_state). A failed exchange loses the line, which the next call recovers
+/// as [`Config::recovery`] says. What stops a motor does not wait for that: it is sent at once and
+/// again on the recovered line, and only the second reply counts.
+pub struct Client {
+    line: Turns<Driven<Box<dyn ByteLink>>>,
+    sign: LinkSign,
+    rules: Rules,
+}
+
+/// How an exchange ended: with what was made of the acknowledge's payload, and its size.
+type Outcome<T> = Result<(Option<T>, usize), proto::Error>;
+
+/// A session and its port.
+pub(super) struct Driven<L> {
+    pub(super) port: Reopening<L>,
+    pub(super) session: Session,
+    pub(super) received: [u8; 256],
+    /// When the last exchange ended.
+    pub(super) ended: Instant,
+    /// Exchanges so far: another number says that the one before it was given up.
+    pub(super) exchanges: u64,
+}
+
+impl Client {
+    /// Opens a port and speaks to the drive behind it.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened. The drive is not asked anything.
+    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        Self::open_wrapped(port, |link| link, options)
+    }
+
+    /// As [`open`](Self::open), through what `wrap` puts around the port each time it is opened: a
+    /// tap, or faults.
+    pub fn open_wrapped(
+        port: &PortName,
+        mut wrap: impl FnMut(Box<dyn ByteLink>) -> Box<dyn ByteLink> + Send + 'static,
+        options: Options,
+    ) -> Result<Self, Error> {
+        let name = port.clone();
+        let open = move || Ok(wrap(name.open_line()?));
+        Self::open_with(&port.to_string(), Box::new(open), options.on(port))
+    }
+
+    /// As [`open`](Self::open), through a link of the caller's making.
+    pub fn open_with(
+        name: &str,
+        open: Opener<Box<dyn ByteLink>>,
+        options: Options,
+    ) -> Result<Self, Error> {
+        Ok(Self::on(Reopening::open(name, open, options.back_off)?, options))
+    }
+
+    /// Speaks through a link that is open already. It is not opened again when it closes.
+    pub fn over(name: &str, link: Box<dyn ByteLink>, options: Options) -> Self {
+        Self::on(Reopening::over(name, link), options)
+    }
+
+    fn on(port: Reopening<Box<dyn ByteLink>>, options: Options) -> Self {
+        Self::driving(Driven::new(port, &options))
+    }
+
+    pub(super) fn driving(driven: Driven<Box<dyn ByteLink>>) -> Self {
+        let (sign, rules) = (driven.port.sign(), driven.session.rules());
+        Client { line: Turns::new(driven), sign, rules }
+    }
+
+    /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
+    /// error from it ends the exchange with an interruption.
+    ///
+    /// `look` may use this client, as a signal's handler does. The exchange that waits is given up
+    /// then and ends with [`PortError::Overtaken`]. If `look` does not use the client, the exchange goes
+    /// on. Other threads wait for their turn.
+    pub fn looking(
+        mut self,
+        look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
+    ) -> Self {
+        self.line.set_look(Box::new(look));
+        self
+    }
+
+    /// Gives up the exchange that this thread has under way while it
+    /// [looks](Self::looking); its reply may still come. Waits for exchanges of other threads.
+    pub fn abandon(&self) {
+        self.line.take().abandon();
+    }
+
+    /// The profile that the drive is expected to follow.
+    pub fn profile(&self) -> Profile {
+        self.rules.profile
+    }
+
+    /// Whether the port is open. Never waits, not even while another thread opens it.
+    pub fn link_state(&self) -> LinkState {
+        self.sign.state()
+    }
+
+    /// The clock that the port goes by: the machine's, or that of drives on a time of their own.
+    pub fn clock(&self) -> Clock {
+        self.line.take().port.clock()
+    }
+
+    /// Whether the last exchange ended in step.
+    pub fn line(&self) -> Line {
+        self.line.take().session.line()
+    }
+
+    /// What came without being asked for.
+    pub fn counters(&self) -> Counters {
+        self.line.take().session.counters()
+    }
+
+    /// Refuses from now on what stops no motor.
+    pub(super) fn refuse_motion(&self) {
+        self.line.take().session.retire();
+    }
+
+    /// Motors that this client started and did not stop.
+    pub fn started(&self) -> impl Iterator<Item = Motor> + use<> {
+        self.line.take().session.started().motors()
+    }
+
+    /// Name and version of the SDK (4.7).
+    pub fn info(&self) -> Result<Info, Error> {
+        self.exchange(0, &Request::BoardInfo, |payload| {
+            let info = BoardInfo::decode(payload)?;
+            Some(Info { version: info.version, name: printable(info.name) })
+        })
+    }
+
+    /// Name and version of the firmware (4.12).
+    pub fn firmware_version(&self) -> Result<FirmwareVersion, Error> {
+        self.exchange(0, &Request::FirmwareVersion, |payload| {
+            let version = proto::FirmwareVersion::decode(payload);
+            Some(FirmwareVersion {
+                name: printable(version.name),
+                version: printable(version.version),
+            })
+        })
+    }
+
+    /// One exchange with motor number `motor`, where 0 is the drive's current motor. `reply` reads
+    /// the acknowledge's payload; `None` from it is [`Error::Reply`]. It must not call this client,
+    /// which is locked meanwhile.
+    pub fn exchange<T>(
+        &self,
+        motor: u8,
+        request: &Request<'_>,
+        reply: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Result<T, Error> {
+        self.rules.check(motor, request)?;
+        let mut driven = self.line.take();
+        driven.begin(motor, request)?;
+        self.conclude(driven, reply)
+    }
+
+    /// One exchange with any frame code and payload; gives the acknowledge's payload.
+    pub fn raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Vec<u8>, Error> {
+        let effect = self.rules.check_raw(motor, code, payload)?;
+        let mut driven = self.line.take();
+        driven.begin_raw(motor, code, payload, effect)?;
+        self.conclude(driven, |payload| Some(payload.to_vec()))
+    }
+
+    /// Makes sure that the replies so far went to their own requests: asks for STATUS, FLAGS or the board
+    /// information, whichever has another size than the last reply. A reply that came twice, or late, has put each one behind it off
+    /// by one, which no single exchange can tell.
+    ///
+    /// # Errors
+    /// [`Error::Unconfirmed`]: what was read or acknowledged since the last confirmation cannot be
+    /// trusted. The line is lost. The port's.
+    pub fn confirm(&self) -> Result<(), Error> {
+        let (losses, mut asked) = self.line.take().session.question();
+        let mut answer = self.answers(asked);
+        if matches!(answer, Err(Error::Refused { .. })) {
+            // The refusal may be that of the last request: another question has another answer.
+            (_, asked) = self.line.take().session.question();
+            answer = self.answers(asked);
+        }
+        self.line.take().session.confirmed(losses, answer)
+    }
+
+    fn answers(&self, (question, size): (Request<'static>, usize)) -> Result<(), Error> {
+        self.exchange(0, &question, |payload| (payload.len() == size).then_some(()))
+    }
+
+    /// Sends STOP_MOTOR without waiting for an answer, as for the other motors of a drive that does
+    /// not answer. Afterwards the line is lost.
+    pub fn stop_unheard(&self, motor: Motor) -> Result<(), Error> {
+        let mut frame = [0; MAX_FRAME];
+        let mut driven = self.line.take();
+        driven.abandon();
+        let stop = driven.session.stop_unheard(motor, &mut frame);
+        let written = driven.port.link().and_then(|(link, _)| link.write(stop));
+        if written.is_err() {
+            driven.port.close();
+        }
+        Ok(written?)
+    }
+
+    /// What a stop ends in when the drive has just failed to answer another.
+    pub(super) fn unanswered(&self, motor: Motor, failure: proto::Failure) -> Error {
+        self.line.take().session.unanswered(motor, failure)
+    }
+
+    /// The drive has no such motor, which may have been taken for started.
+    pub(super) fn is_missing(&self, motor: Motor) {
+        self.line.take().session.is_missing(motor);
+    }
+
+    /// Takes the line over from another master, which started these motors.
+    pub(crate) fn take_over(&self, started: Started) {
+        self.line.take().session.take_over(started);
+    }
+
+    /// What [`take_over`](Self::take_over) was given and later calls left of it.
+    pub(crate) fn hand_over(&self) -> Started {
+        self.line.take().session.started()
+    }
+
+    /// Brings the exchange that was begun to its end.
+    fn conclude<T>(
+        &self,
+        mut driven: Turn<'_, Driven<Box<dyn ByteLink>>>,
+        reply: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Result<T, Error> {
+        let mut reply = Some(reply);
+        let mut reply = |payload: &[u8]| reply.take()?(payload);
+        let exchange = driven.exchanges;
+        let outcome = loop {
+            match driven.run(self.line.next_look(), &mut reply) {
+                Ok(Some(outcome)) => break Ok(outcome),
+                Ok(None) => {}
+                Err(error) => break Err(error),
+            }
+            let port = Arc::clone(&driven.port.name);
+            let looked;
+            (driven, looked) = driven.look(&port);
+            let overtaken = driven.exchanges != exchange;
+            if overtaken {
+                let overtaken = PortError::Overtaken { port: port.to_string() };
+                return Err(looked.err().unwrap_or(overtaken).into());
+            }
+            if let Err(error) = looked {
+                break Err(error);
+            }
+        };
+        driven.ended = driven.port.now();
+        match outcome {
+            Ok(outcome) => driven.session.conclude(outcome),
+            Err(error) => Err(driven.lost(error)),
+        }
+    }
+}
+
+impl<L: ByteLink> Driven<L> {
+    pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
+        let port = port.by(|link| link.clock());
+        let mut session = Session::new(port.name.clone(), options);
+        if port.open_link().is_some_and(ByteLink::is_fresh) {
+            session.trust_line();
+        }
+        Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }
+    }
+
+    /// Begins an exchange with motor number `motor`.
+    pub(super) fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
+        self.ready_for(Effect::of(Some(request)))?;
+        self.session.request(motor, request)
+    }
+
+    /// Begins an exchange with any frame code and payload, which has this effect.
+    pub(super) fn begin_raw(
+        &mut self,
+        motor: u8,
+        code: u8,
+        payload: &[u8],
+        effect: Effect,
+    ) -> Result<(), Error> {
+        self.ready_for(effect)?;
+        self.session.raw(motor, code, payload)
+    }
+
+    fn ready_for(&mut self, effect: Effect) -> Result<(), PortError> {
+        match self.ready() {
+            // That the port failed since the last exchange must not keep a motor from being stopped.
+            Err(_) if effect == Effect::Stops => self.ready(),
+            done => done,
+        }
+    }
+
+    /// Makes sure that the port is open and no abandoned exchange is under way.
+    pub(super) fn ready(&mut self) -> Result<(), PortError> {
+        let idle = self.port.now().since(self.ended) > IDLE;
+        self.abandon();
+        let (link, reopened) = self.port.link()?;
+        if reopened {
+            self.session.reopened();
+            if link.is_fresh() {
+                self.session.trust_line();
+            }
+        }
+        if idle {
+            let size = match link.read(&mut self.received, Some(Duration::ZERO)) {
+                Ok(size) => size,
+                Err(error) => {
+                    self.port.close();
+                    return Err(error);
+                }
+            };
+            let now = self.port.now();
+            self.session.receive(now, &self.received[..size]);
+        }
+        Ok(())
+    }
+
+    /// Gives up the exchange under way, if there is one. Its reply may still come.
+    pub(super) fn abandon(&mut self) {
+        self.session.abandon();
+        self.exchanges += 1;
+    }
+
+    /// The port failed in the middle of an exchange, or did not want to wait for its end.
+    pub(super) fn lost(&mut self, error: PortError) -> Error {
+        self.session.abandon();
+        if !error.is_interruption() {
+            self.port.close();
+        }
+        error.into()
+    }
+
+    /// Moves bytes until the exchange is over, or until `pause`; gives what `reply` made of the
+    /// payload, and its size.
+    fn run<T>(
+        &mut self,
+        pause: Option<machine::Instant>,
+        reply: &mut impl FnMut(&[u8]) -> Option<T>,
+    ) -> Result<Option<Outcome<T>>, PortError> {
+        loop {
+            let now = self.port.now();
+            match self.session.poll(now) {
+                Output::Transmit(bytes) => self.port.link()?.0.write(bytes)?,
+                Output::Wait(until) => {
+                    let left =
+                        pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
+                    if left == Some(Duration::ZERO) {
+                        return Ok(None);
+                    }
+                    let wait = until.map(|until| until.since(now).into());
+                    let wait = wait.into_iter().chain(left).min();
+                    let size = self.port.link()?.0.read(&mut self.received, wait)?;
+                    let now = self.port.now();
+                    self.session.receive(now, &self.received[..size]);
+                }
+                Output::Done(result) => {
+                    return Ok(Some(result.map(|payload| (reply(payload), payload.len()))));
+                }
+            }
+        }
+    }
+}

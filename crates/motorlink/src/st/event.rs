@@ -1,0 +1,158 @@
+//! The client for event loops: nothing in it waits, beside the opening of its port.
+
+use std::os::fd::BorrowedFd;
+use std::time::Duration;
+
+use motorlink_link::port::{ByteLink, EventLine, PortError, PortName};
+use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
+use motorlink_proto::st::{Motor, Output, Request};
+
+use super::client::Driven;
+use super::{Client, Error, Options};
+
+/// A master on a serial line, driven in steps: an event loop calls [`advance`](Self::advance) when
+/// the descriptor is readable and when the time that it said has passed.
+///
+/// What holds for a [`Client`] holds here: limits, recovery, what was started, errors. An exchange
+/// that is abandoned loses the line, and the next one recovers it.
+pub struct EventClient {
+    driven: Driven<Box<dyn EventLine>>,
+}
+
+/// How far an exchange is.
+#[derive(Debug)]
+pub enum Progress<T> {
+    /// It is over.
+    Done(Result<T, Error>),
+    /// It goes on when the descriptor is readable, or when this time has passed. `None`: no exchange
+    /// is under way.
+    Wait(Option<Duration>),
+}
+
+impl EventClient {
+    /// Opens a port, which may wait. So may [`reopen`](Self::reopen), and what begins an exchange while
+    /// the port is closed; nothing else does.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened. The drive is not asked anything.
+    pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
+        let name = port.clone();
+        let open = Box::new(move || name.open_event_line());
+        Self::open_with(&port.to_string(), open, options.on(port))
+    }
+
+    /// As [`open`](Self::open), through a link of the caller's making.
+    pub fn open_with(
+        name: &str,
+        open: Opener<Box<dyn EventLine>>,
+        options: Options,
+    ) -> Result<Self, Error> {
+        let port = Reopening::open(name, open, options.back_off)?;
+        Ok(EventClient { driven: Driven::new(port, &options) })
+    }
+
+    /// Whether the port is open.
+    pub fn link_state(&self) -> LinkState {
+        self.driven.port.sign().state()
+    }
+
+    /// Opens the port if it is closed and its back-off is over. May wait.
+    ///
+    /// # Errors
+    /// What keeps the port from being opened.
+    pub fn reopen(&mut self) -> Result<(), Error> {
+        Ok(self.driven.ready()?)
+    }
+
+    /// What is readable when there is something to receive; `None` while the port is closed, or
+    /// where it has its answers at once.
+    pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.driven.port.open_link().and_then(|link| link.descriptor())
+    }
+
+    /// Motors that this client started and did not stop.
+    pub fn started(&self) -> impl Iterator<Item = Motor> + use<> {
+        self.driven.session.started().motors()
+    }
+
+    /// Begins an exchange, as [`Client::exchange`]; one that is under way is abandoned.
+    ///
+    /// # Errors
+    /// The port, or what forbids the request; no exchange is under way then.
+    pub fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
+        self.driven.session.rules().check(motor, request)?;
+        self.driven.begin(motor, request)
+    }
+
+    /// Begins an exchange with any frame code and payload, as [`Client::raw`].
+    ///
+    /// # Errors
+    /// Those of [`begin`](Self::begin).
+    pub fn begin_raw(&mut self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
+        let effect = self.driven.session.rules().check_raw(motor, code, payload)?;
+        self.driven.begin_raw(motor, code, payload, effect)
+    }
+
+    /// Moves what can be moved without waiting. `reply` reads the acknowledge's payload; `None` from
+    /// it is [`Error::Reply`]. A port that fails ends the exchange, and is closed.
+    pub fn advance<T>(&mut self, reply: impl FnOnce(&[u8]) -> Option<T>) -> Progress<T> {
+        let progress = match self.moved(reply) {
+            Ok(progress) => progress,
+            Err(error) => Progress::Done(Err(self.driven.lost(error))),
+        };
+        if matches!(progress, Progress::Done(_)) {
+            self.driven.ended = self.driven.port.now();
+        }
+        progress
+    }
+
+    /// Gives up the exchange under way, if there is one. Its reply is not taken for another's.
+    pub fn abandon(&mut self) {
+        self.driven.session.abandon();
+    }
+
+    /// The client that waits, with what this one knows of the line: to stop what was started.
+    pub fn into_client(mut self) -> Client {
+        self.abandon();
+        let Driven { port, session, received, ended, exchanges } = self.driven;
+        let port = port.map(|link| link as Box<dyn ByteLink>);
+        Client::driving(Driven { port, session, received, ended, exchanges })
+    }
+
+    fn moved<T>(
+        &mut self,
+        reply: impl FnOnce(&[u8]) -> Option<T>,
+    ) -> Result<Progress<T>, PortError> {
+        let Driven { port, session, received, .. } = &mut self.driven;
+        let clock = port.clock();
+        let Some(link) = port.open_link_mut() else { return Ok(Progress::Wait(None)) };
+        // What is left in the port wakes the loop again; it has others to serve.
+        let mut listens = true;
+        loop {
+            let now = clock.now();
+            match session.poll(now) {
+                Output::Transmit(bytes) => {
+                    link.write(bytes)?;
+                    listens = link.descriptor().is_none();
+                }
+                Output::Wait(until) => {
+                    let size = match listens {
+                        true => link.read(received, Some(Duration::ZERO))?,
+                        false => 0,
+                    };
+                    if size == 0 {
+                        let wait = until.map(|until| until.since(now).into());
+                        let full = link.flush()?.then_some(FULL);
+                        return Ok(Progress::Wait(wait.into_iter().chain(full).min()));
+                    }
+                    session.receive(now, &received[..size]);
+                    listens = false;
+                }
+                Output::Done(result) => {
+                    let outcome = result.map(|payload| (reply(payload), payload.len()));
+                    return Ok(Progress::Done(session.conclude(outcome)));
+                }
+            }
+        }
+    }
+}

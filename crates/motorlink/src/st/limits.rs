@@ -1,0 +1,307 @@
+//! Limits that the caller sets; they are checked before a frame leaves.
+
+use motorlink_proto::st::{Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Request};
+
+/// What no request may exceed, whatever call or raw frame it comes from. `None` is unlimited.
+///
+/// While `speed_rpm` is set, a motor is started only after a speed ramp to it was acknowledged, as
+/// the drive otherwise goes to a target of its own. The ramp may be SET_RAMP or a write of
+/// RAMP_FINAL_SPEED. It no longer counts after a later ramp that was not acknowledged, after a torque
+/// command, a write of CONTROL_MODE or a RESET, and after the drive identified itself anew, the line
+/// was lost or the port was opened again. Position commands carry no speed and are refused.
+///
+/// A limit bounds what is asked for. `speed_rpm` does not bound:
+/// * a torque command: the motor then turns as fast as its load allows;
+/// * the rev-up of a drive without sensor, its alignment, and the motor profiler (SC_START), whose
+///   speeds are the drive's own. [`MotorHandle::set_revup`](super::MotorHandle::set_revup) sets the
+///   rev-up's;
+/// * what the drive's regulator overshoots, and a motor that was running before;
+/// * a start after the drive was reset without a sign on the line, as a power cycle between the ramp
+///   and the start can be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Limits {
+    /// Highest speed in either direction, rpm.
+    pub speed_rpm: Option<u32>,
+    /// Highest Iq or Id reference in either direction, s16A digits.
+    pub current_s16a: Option<u16>,
+}
+
+/// A request that does not keep the limits; it was not sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LimitError {
+    /// It exceeds a limit.
+    #[error(
+        "{value} {unit} is over the limit of {limit} {unit} that was set; nothing was sent; ask for \
+         {limit} {unit} at most"
+    )]
+    Exceeded {
+        /// What was asked for.
+        value: i64,
+        /// What the caller allows.
+        limit: i64,
+        /// Unit of both.
+        unit: &'static str,
+    },
+    /// It writes a part of a limited register, the rest of which is not known.
+    #[error(
+        "a part of {0} cannot be written while it is limited; nothing was sent; write the whole \
+         value"
+    )]
+    Part(RegisterId),
+    /// It is too short for the values that are limited; shipped firmware takes old bytes for the
+    /// missing ones (docs/SPEC-NOTES.md S18).
+    #[error(
+        "the payload is too short for {}, whose values are limited; nothing was sent; send all of \
+         its bytes", .0.name()
+    )]
+    Short(FrameCode),
+    /// Its payload has 128 bytes, which shipped firmware reads as further frames
+    /// (docs/SPEC-NOTES.md S10).
+    #[error(
+        "shipped firmware reads a payload of 128 bytes as further frames, which cannot be limited; \
+         nothing was sent; send 127 bytes at most"
+    )]
+    Longest,
+    /// A position command carries no speed.
+    #[error(
+        "a position command carries no speed to hold to the limit of {limit_rpm} rpm that was set; \
+         nothing was sent; use speed ramps, or set no speed limit"
+    )]
+    Position {
+        /// What the caller allows.
+        limit_rpm: u32,
+    },
+    /// It starts a motor that may go to any speed.
+    #[error(
+        "a start goes to the drive's own speed unless a ramp within the limit of {limit_rpm} rpm was \
+         acknowledged before; nothing was sent; first `ramp(...)` within the limit, for this motor \
+         by its number"
+    )]
+    NoRamp {
+        /// What the caller allows.
+        limit_rpm: u32,
+    },
+}
+
+impl Limits {
+    /// Whether `request` keeps the limits. Whether a start had its ramp is checked by the client.
+    ///
+    /// # Errors
+    /// Why it does not.
+    pub fn check(&self, request: &Request<'_>) -> Result<(), LimitError> {
+        match *request {
+            Request::Ramp(ramp) => self.speed(ramp.speed_rpm),
+            Request::SetRevupData(_, phase) => {
+                self.speed(phase.speed_rpm)?;
+                self.current(phase.torque_s16a.into())
+            }
+            Request::CurrentReference(reference) => {
+                self.current(reference.iq_s16a.into())?;
+                self.current(reference.id_s16a.into())
+            }
+            Request::TorqueRamp(ramp) => self.current(ramp.torque_s16a),
+            Request::Position(_) => {
+                self.speed_rpm.map_or(Ok(()), |limit_rpm| Err(LimitError::Position { limit_rpm }))
+            }
+            Request::SetRegister { register, value } => {
+                self.size(value.len() + 1)?;
+                self.write(register, value)
+            }
+            Request::ConfigDynStruct { registers, .. } => self.size(registers.len() + 1),
+            Request::ProfilerInfo(steps) => self.size(steps.len()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a raw frame keeps the limits in every profile, as [`check`](Self::check).
+    ///
+    /// # Errors
+    /// Why it does not.
+    pub fn check_frame(&self, frame: &Frame<'_>) -> Result<(), LimitError> {
+        self.size(frame.payload.len())?;
+        Profile::ALL.into_iter().try_for_each(|profile| match Request::decode(profile, frame) {
+            Ok(request) => self.check(&request),
+            Err(_) => FrameCode::from_number(frame.code(), profile)
+                .map_or(Ok(()), |code| self.short(code)),
+        })
+    }
+
+    fn write(&self, register: RegisterId, value: &[u8]) -> Result<(), LimitError> {
+        match register {
+            RegisterId::RAMP_FINAL_SPEED if self.speed_rpm.is_some() => {
+                self.speed(whole(register, value)?)
+            }
+            RegisterId::TORQUE_REF | RegisterId::FLUX_REF | RegisterId::IQ_SPEEDMODE
+                if self.current_s16a.is_some() =>
+            {
+                self.current(whole(register, value)?)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn size(&self, payload: usize) -> Result<(), LimitError> {
+        let is_limited = *self != Limits::default();
+        if is_limited && payload >= MAX_PAYLOAD { Err(LimitError::Longest) } else { Ok(()) }
+    }
+
+    fn short(&self, code: FrameCode) -> Result<(), LimitError> {
+        let is_limited = match code {
+            FrameCode::SetRamp | FrameCode::SetPositionCmd | FrameCode::ExecuteCmd => {
+                self.speed_rpm.is_some()
+            }
+            FrameCode::SetCurrentRef | FrameCode::SetTorqueRamp => self.current_s16a.is_some(),
+            FrameCode::SetReg | FrameCode::SetRevupData => *self != Limits::default(),
+            _ => false,
+        };
+        if is_limited { Err(LimitError::Short(code)) } else { Ok(()) }
+    }
+
+    fn speed(&self, rpm: i32) -> Result<(), LimitError> {
+        within(rpm, self.speed_rpm, "rpm")
+    }
+
+    fn current(&self, digits: i32) -> Result<(), LimitError> {
+        within(digits, self.current_s16a.map(u32::from), "s16A")
+    }
+}
+
+/// The value that a drive takes from these bytes: it cuts what is too long.
+fn whole(register: RegisterId, value: &[u8]) -> Result<i32, LimitError> {
+    // Limited registers have the same type in both profiles.
+    let profile = Profile::Spec;
+    let size = register.shape().map_or(0, |shape| usize::from(shape.ty(profile).size()));
+    value
+        .get(..size)
+        .and_then(|value| register.decode(profile, value))
+        .ok_or(LimitError::Part(register))
+}
+
+fn within(value: i32, limit: Option<u32>, unit: &'static str) -> Result<(), LimitError> {
+    match limit {
+        Some(limit) if value.unsigned_abs() > limit => {
+            Err(LimitError::Exceeded { value: value.into(), limit: limit.into(), unit })
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use motorlink_proto::st::{CurrentReference, PositionMove, Ramp, TorqueRamp};
+
+    const SPEED: Limits = Limits { speed_rpm: Some(1000), current_s16a: None };
+    const CURRENT: Limits = Limits { speed_rpm: None, current_s16a: Some(500) };
+
+    fn checked(limits: Limits, code: u8, payload: &[u8]) -> Result<(), LimitError> {
+        limits.check_frame(&Frame { header: Frame::header(code, 1), payload })
+    }
+
+    #[test]
+    fn limits_hold_in_both_directions_and_for_registers() {
+        let limits = Limits { speed_rpm: Some(1000), current_s16a: Some(500) };
+        let ramp = |speed_rpm| Request::Ramp(Ramp { speed_rpm, duration_ms: 0 });
+        assert!(limits.check(&ramp(-1000)).is_ok());
+        assert!(limits.check(&ramp(-1001)).is_err());
+        assert!(limits.check(&ramp(i32::MIN)).is_err());
+        let currents = CurrentReference { iq_s16a: 0, id_s16a: -501 };
+        assert!(limits.check(&Request::CurrentReference(currents)).is_err());
+        let write = Request::SetRegister { register: RegisterId::TORQUE_REF, value: &[0xF5, 0x01] };
+        let exceeded = LimitError::Exceeded { value: 501, limit: 500, unit: "s16A" };
+        assert_eq!(limits.check(&write), Err(exceeded));
+        let torque = |value| Request::SetRegister { register: RegisterId::TORQUE_REF, value };
+        assert_eq!(limits.check(&torque(&[0xF5, 0x01, 0x00])), Err(exceeded));
+        let part = Err(LimitError::Part(RegisterId::TORQUE_REF));
+        assert_eq!(limits.check(&torque(&[0xFF])), part);
+        assert!(Limits::default().check(&ramp(i32::MIN)).is_ok());
+    }
+
+    #[test]
+    fn what_is_not_limited_is_not_refused() {
+        let part = |register| Request::SetRegister { register, value: &[0xFF] };
+        for register in [RegisterId::TORQUE_REF, RegisterId::RAMP_FINAL_SPEED] {
+            assert_eq!(Limits::default().check(&part(register)), Ok(()));
+        }
+        assert_eq!(SPEED.check(&part(RegisterId::TORQUE_REF)), Ok(()));
+        assert_eq!(CURRENT.check(&part(RegisterId::RAMP_FINAL_SPEED)), Ok(()));
+        let torque = TorqueRamp { torque_s16a: 32_767, duration_ms: 0 };
+        assert_eq!(SPEED.check(&Request::TorqueRamp(torque)), Ok(()));
+        let turn = PositionMove { angle_rad: 1e9, duration_s: 0.0 };
+        assert_eq!(CURRENT.check(&Request::Position(turn)), Ok(()));
+        for code in 0..0x20 {
+            for payload in [&[][..], &[0xFF; 12], &[0xFF; MAX_PAYLOAD]] {
+                assert_eq!(checked(Limits::default(), code, payload), Ok(()), "{code:#04x}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_position_command_has_no_speed_to_be_limited() {
+        let turn = PositionMove { angle_rad: 0.1, duration_s: 10.0 };
+        let refused = Err(LimitError::Position { limit_rpm: 1000 });
+        assert_eq!(SPEED.check(&Request::Position(turn)), refused);
+        assert_eq!(checked(SPEED, 0x12, &[0; 8]), refused);
+    }
+
+    #[test]
+    fn a_raw_frame_is_held_to_what_it_means_in_either_profile() {
+        // A data segment in one profile, a torque ramp to 501 in the other.
+        let ramp = [0xF5, 0x01, 0, 0, 0, 0];
+        let exceeded = LimitError::Exceeded { value: 501, limit: 500, unit: "s16A" };
+        assert_eq!(checked(CURRENT, 0x0D, &ramp), Err(exceeded));
+        assert_eq!(checked(SPEED, 0x0D, &ramp), Ok(()));
+    }
+
+    #[test]
+    fn a_frame_of_any_length_is_checked_or_refused() {
+        let exceeded = LimitError::Exceeded { value: 1001, limit: 1000, unit: "rpm" };
+        for size in 0..=MAX_PAYLOAD {
+            let mut payload = [0; MAX_PAYLOAD];
+            payload[..2].copy_from_slice(&[0xE9, 0x03]);
+            let ramp = checked(SPEED, 0x07, &payload[..size]);
+            match size {
+                0..6 => assert_eq!(ramp, Err(LimitError::Short(FrameCode::SetRamp))),
+                6..128 => assert_eq!(ramp, Err(exceeded), "{size} bytes"),
+                _ => assert_eq!(ramp, Err(LimitError::Longest)),
+            }
+            // What the frame hides behind its length does not matter as long as it is one frame.
+            let read = checked(SPEED, 0x02, &payload[..size]);
+            assert_eq!(read.is_ok(), size < MAX_PAYLOAD, "{size} bytes");
+        }
+        let ids = [0; MAX_PAYLOAD - 1];
+        let longest = Err(LimitError::Longest);
+        let write = Request::SetRegister { register: RegisterId::SPEED_KP, value: &ids };
+        assert_eq!(CURRENT.check(&write), longest);
+        assert_eq!(
+            CURRENT.check(&Request::ConfigDynStruct { segment: 0, registers: &ids }),
+            longest
+        );
+        assert_eq!(CURRENT.check(&Request::ProfilerInfo(&[0; MAX_PAYLOAD])), longest);
+        assert_eq!(CURRENT.check(&Request::ProfilerInfo(&ids)), Ok(()));
+    }
+
+    #[test]
+    fn what_firmware_would_complete_from_old_bytes_is_refused() {
+        let short = |code: FrameCode| Err(LimitError::Short(code));
+        let both = [SPEED, CURRENT];
+        for (code, number, limited) in [
+            (FrameCode::SetReg, 0x01, both),
+            (FrameCode::ExecuteCmd, 0x03, [SPEED; 2]),
+            (FrameCode::SetRamp, 0x07, [SPEED; 2]),
+            (FrameCode::SetRevupData, 0x09, both),
+            (FrameCode::SetCurrentRef, 0x0A, [CURRENT; 2]),
+            (FrameCode::SetTorqueRamp, 0x0D, [CURRENT; 2]),
+            (FrameCode::SetPositionCmd, 0x12, [SPEED; 2]),
+        ] {
+            for limits in both {
+                let expected = if limited.contains(&limits) { short(code) } else { Ok(()) };
+                assert_eq!(checked(limits, number, &[]), expected, "{}", code.name());
+            }
+        }
+        for reads in [0x02, 0x06, 0x08, 0x0B, 0x0C, 0x0E] {
+            assert_eq!(checked(SPEED, reads, &[]), Ok(()), "{reads:#04x}");
+        }
+    }
+}

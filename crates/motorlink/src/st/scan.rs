@@ -1,0 +1,58 @@
+//! Which baud rate does the drive speak?
+
+use std::time::Duration;
+
+use motorlink_link::port::{PortError, PortName};
+use motorlink_proto::st::{Config, ErrorCode, Failure, Profile, Recovery};
+
+use super::{Client, Error, Info, Options};
+
+/// The rates that drives are built with, the most frequent first.
+pub const BAUD_RATES: [u32; 9] =
+    [115_200, 1_843_200, 921_600, 460_800, 230_400, 57_600, 38_400, 19_200, 9_600];
+
+/// What a rate was answered with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Finding {
+    /// A drive that speaks the protocol.
+    Drive(Info),
+    /// A drive that speaks the protocol and refuses GET_BOARD_INFO.
+    Refuses(ErrorCode),
+    /// Bytes that are no reply: something speaks, at another rate or another protocol.
+    Garbage,
+    /// An echo of the question.
+    Echo,
+    /// Nothing.
+    Silence,
+}
+
+/// Asks for the board information at one rate, where the port has one, twice; waits `patience` for each answer.
+///
+/// # Errors
+/// What keeps the port from being opened.
+pub fn scan_baud(port: &PortName, baud: u32, patience: Duration) -> Result<Finding, PortError> {
+    let port = port.at_baud(baud).unwrap_or_else(|| port.clone());
+    let link = Config { timeout: patience.into(), recovery: Recovery::Pad, ..Config::default() };
+    let options = Options { profile: Profile::Spec, line: link, ..Options::default() };
+    let client = match Client::open(&port, options) {
+        Ok(client) => client,
+        Err(Error::Port(error)) => return Err(error),
+        Err(_) => return Ok(Finding::Silence),
+    };
+    // A drive that waits for the rest of a cut-off frame answers the second question.
+    let mut heard = Finding::Silence;
+    for _ in 0..2 {
+        match client.info() {
+            Ok(info) => return Ok(Finding::Drive(info)),
+            Err(Error::Refused { code, .. }) => return Ok(Finding::Refuses(code)),
+            Err(Error::Port(error)) => return Err(error),
+            Err(Error::Failed { failure: Failure::Timeout | Failure::Lost, .. }) => {}
+            Err(Error::Failed { failure: Failure::Echo, .. }) => heard = Finding::Echo,
+            Err(Error::Failed { failure: Failure::NotUnderstood(code), .. }) => {
+                heard = Finding::Refuses(code);
+            }
+            Err(_) => heard = Finding::Garbage,
+        }
+    }
+    Ok(heard)
+}

@@ -1,0 +1,379 @@
+//! One end of a line to an ST drive without the line: what the blocking client and event loops share.
+
+use std::fmt;
+use std::sync::Arc;
+
+use motorlink_link::port::PortError;
+use motorlink_proto::st as proto;
+use motorlink_proto::st::{
+    Command, Config, Counters, Frame, FrameCode, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor,
+    Output, Profile, RegisterId, Request, RequestError, question_behind,
+};
+use motorlink_proto::time::Instant;
+
+use super::error::{Target, advice, hint};
+use super::ramped::Ramped;
+use super::started::{Effect, Started};
+use super::{Error, LimitError, Limits, Options};
+
+/// What a request is held to before it leaves.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rules {
+    pub(super) profile: Profile,
+    pub(super) limits: Limits,
+}
+
+/// A master with the limits of its caller, the motors that it started, and its errors in words: sans
+/// I/O. [`request`](Self::request) or [`raw`](Self::raw), then [`poll`](Self::poll) until it says
+/// [`Output::Done`], handing in with [`receive`](Self::receive) what comes meanwhile, then
+/// [`conclude`](Self::conclude).
+#[derive(Debug, Clone)]
+pub(super) struct Session {
+    port: Arc<str>,
+    rules: Rules,
+    master: Master,
+    /// Motors that were started and not stopped.
+    started: Started,
+    /// Motors that a speed ramp was acknowledged for.
+    ramped: Ramped,
+    /// What the line had been through when a request began.
+    history: History,
+    asked: Asked,
+    /// The size of the last acknowledge's payload, and how often the line had been lost when that was
+    /// asked for.
+    last_size: Option<usize>,
+    losses: u32,
+    /// Changes with each confirmation.
+    turn: bool,
+    /// What is sent before a lost line is recovered, and its size.
+    ahead: [u8; MAX_FRAME],
+    ahead_size: usize,
+    /// Whether nothing is sent any more but what stops motors.
+    is_retired: bool,
+}
+
+/// Losses of the line, and identifications that a drive sends when it was reset.
+type History = (u32, u32);
+
+/// The request under way.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    motor: u8,
+    /// The motor that this addresses, where it is known.
+    addressed: Option<Motor>,
+    effect: Effect,
+    what: What,
+}
+
+/// A request in words, for messages.
+#[derive(Debug, Clone, Copy)]
+enum What {
+    Writing(RegisterId),
+    Reading(RegisterId),
+    Executing(Command),
+    Known(FrameCode),
+    Raw(u8),
+}
+
+impl Rules {
+    pub(super) fn check(&self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
+        addressable(motor)?;
+        self.limits.check(request).map_err(|why| Error::Limit { motor: Target(motor), why })
+    }
+
+    /// As [`check`](Self::check), for any frame, in every profile; gives its effect.
+    pub(super) fn check_raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Effect, Error> {
+        addressable(motor)?;
+        if payload.len() > MAX_PAYLOAD {
+            return Err(Error::TooLong(What::Raw(code).to_string()));
+        }
+        let frame = Frame { header: Frame::header(code, motor), payload };
+        match self.limits.check_frame(&frame) {
+            Ok(()) => Ok(Effect::of_frame(&frame)),
+            Err(why) => Err(Error::Limit { motor: Target(motor), why }),
+        }
+    }
+}
+
+impl Session {
+    /// On a line that was just opened. `port` is for messages.
+    pub(super) fn new(port: Arc<str>, options: &Options) -> Self {
+        let rules = Rules { profile: options.profile, limits: options.limits };
+        let what = What::Known(FrameCode::GetBoardInfo);
+        let asked = Asked { motor: 0, addressed: None, effect: Effect::None, what };
+        let master = Master::new(Config { profile: options.profile, ..options.line });
+        Session {
+            port,
+            rules,
+            master,
+            started: Started::default(),
+            ramped: Ramped::default(),
+            history: History::default(),
+            asked,
+            last_size: None,
+            losses: 0,
+            turn: false,
+            ahead: [0; MAX_FRAME],
+            ahead_size: 0,
+            is_retired: false,
+        }
+    }
+
+    pub(super) fn rules(&self) -> Rules {
+        self.rules
+    }
+
+    pub(super) fn line(&self) -> Line {
+        self.master.line()
+    }
+
+    pub(super) fn counters(&self) -> Counters {
+        self.master.counters()
+    }
+
+    pub(super) fn started(&self) -> Started {
+        self.started
+    }
+
+    /// Begins an exchange with motor number `motor`, where 0 is the drive's current motor.
+    ///
+    /// # Errors
+    /// What the limits forbid; nothing is sent then.
+    pub(super) fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
+        self.rules.check(motor, request)?;
+        let effect = Effect::of(Some(request));
+        self.admit(motor, effect, |ahead| request.encode(motor, ahead).map(<[u8]>::len))?;
+        let begun = self.master.request(motor, request);
+        self.begun(begun, motor, effect, What::of(request))
+    }
+
+    /// Begins an exchange with any frame code and payload.
+    ///
+    /// # Errors
+    /// Those of [`request`](Self::request).
+    pub(super) fn raw(&mut self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
+        let effect = self.rules.check_raw(motor, code, payload)?;
+        let frame = Frame { header: Frame::header(code, motor), payload };
+        self.admit(motor, effect, |ahead| frame.encode(ahead).map(<[u8]>::len))?;
+        let begun = self.master.request_raw(frame.header, payload);
+        self.started.presume_within(frame.encode(&mut [0; MAX_FRAME]).unwrap_or(&[]));
+        self.begun(begun, motor, effect, What::Raw(code))
+    }
+
+    /// Sends nothing any more but what stops motors.
+    pub(super) fn retire(&mut self) {
+        self.is_retired = true;
+    }
+
+    fn check_retired(&self, effect: Effect) -> Result<(), Error> {
+        match self.is_retired && effect != Effect::Stops {
+            true => Err(PortError::Retired { port: self.port.to_string() }.into()),
+            false => Ok(()),
+        }
+    }
+
+    /// Whether a request may leave. On a lost line `encode` writes what stops a motor, which is sent before
+    /// the line has recovered and again afterwards. The reply to the first sending comes before the
+    /// recovery's own reply, so it never counts.
+    fn admit(
+        &mut self,
+        motor: u8,
+        effect: Effect,
+        encode: impl FnOnce(&mut [u8; MAX_FRAME]) -> Option<usize>,
+    ) -> Result<(), Error> {
+        self.check_retired(effect)?;
+        self.check_start(motor, effect)?;
+        self.ahead_size = match effect == Effect::Stops && self.master.line() == Line::Lost {
+            true => encode(&mut self.ahead).unwrap_or(0),
+            false => 0,
+        };
+        Ok(())
+    }
+
+    /// Whether the request may leave: under a speed limit no motor is started without a ramp.
+    fn check_start(&mut self, motor: u8, effect: Effect) -> Result<(), Error> {
+        let Counters { losses, identifications, .. } = self.master.counters();
+        if self.history != (losses, identifications) {
+            self.history = (losses, identifications);
+            self.forget_drive();
+        }
+        match self.rules.limits.speed_rpm {
+            Some(limit_rpm)
+                if effect == Effect::Starts && !self.ramped.has(self.started.addressed(motor)) =>
+            {
+                Err(Error::Limit { motor: Target(motor), why: LimitError::NoRamp { limit_rpm } })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The drive may be another one, or have been reset.
+    fn forget_drive(&mut self) {
+        self.ramped.forget();
+        self.started.forget_current();
+    }
+
+    fn begun(
+        &mut self,
+        begun: Result<(), RequestError>,
+        motor: u8,
+        effect: Effect,
+        what: What,
+    ) -> Result<(), Error> {
+        if begun.is_err() {
+            return Err(Error::TooLong(what.to_string()));
+        }
+        self.losses = self.master.counters().losses;
+        let addressed = self.started.asked(motor, effect);
+        self.ramped.asked(addressed, effect);
+        self.asked = Asked { motor, addressed, effect, what };
+        Ok(())
+    }
+
+    pub(super) fn receive(&mut self, now: Instant, bytes: &[u8]) {
+        self.master.receive(now, bytes);
+    }
+
+    pub(super) fn poll(&mut self, now: Instant) -> Output<'_> {
+        match std::mem::take(&mut self.ahead_size) {
+            0 => self.master.poll(now),
+            size => Output::Transmit(&self.ahead[..size]),
+        }
+    }
+
+    /// The exchange is over: with what the reader of replies made of the acknowledge's payload, and
+    /// its size, or without an acknowledge.
+    pub(super) fn conclude<T>(
+        &mut self,
+        outcome: Result<(Option<T>, usize), proto::Error>,
+    ) -> Result<T, Error> {
+        let Asked { motor, addressed, effect, what } = self.asked;
+        self.last_size = outcome.as_ref().ok().map(|(_, size)| *size);
+        let (port, target) = (Arc::clone(&self.port), Target(motor));
+        match outcome {
+            Ok((Some(value), _)) => {
+                self.started.acknowledged(addressed, effect);
+                self.ramped.acknowledged(addressed, effect);
+                Ok(value)
+            }
+            Ok((None, size)) => {
+                // A reply that fits no request: somebody else's, perhaps.
+                self.master.lost();
+                Err(Error::Reply { port, motor: target, what: what.to_string(), size })
+            }
+            Err(proto::Error::Refused(code)) => {
+                let what = what.to_string();
+                Err(Error::Refused { port, motor: target, what, code, hint: hint(code) })
+            }
+            Err(proto::Error::Failed(failure)) => {
+                let (what, hint) = (what.to_string(), advice(failure));
+                Err(Error::Failed { port, motor: target, what, failure, hint })
+            }
+        }
+    }
+
+    /// Whether the answer to a question shows that replies and requests go together: `losses` is what
+    /// [`question`](Self::question) gave. A line that was lost since then has been brought in step, which
+    /// says nothing of what was read before.
+    pub(super) fn confirmed(
+        &mut self,
+        losses: u32,
+        answer: Result<(), Error>,
+    ) -> Result<(), Error> {
+        let is_same_line = self.master.counters().losses == losses;
+        let port = Arc::clone(&self.port);
+        match answer {
+            Ok(()) if is_same_line => Ok(()),
+            Ok(()) => Err(Error::Unconfirmed { port, why: None }),
+            Err(Error::Port(error)) => Err(Error::Port(error)),
+            Err(why) => {
+                self.master.lost();
+                Err(Error::Unconfirmed { port, why: Some(Box::new(why)) })
+            }
+        }
+    }
+
+    /// A question behind the last reply, with the size of its answer, and how often the line had been lost
+    /// when that reply was asked for.
+    pub(super) fn question(&mut self) -> (u32, (Request<'static>, usize)) {
+        self.turn = !self.turn;
+        (self.losses, question_behind(self.last_size, self.turn))
+    }
+
+    /// Gives up the exchange under way, if there is one. Its reply may still come.
+    pub(super) fn abandon(&mut self) {
+        self.ahead_size = 0;
+        self.master.abandon();
+    }
+
+    /// Tells that the line was closed and opened again.
+    pub(super) fn reopened(&mut self) {
+        self.forget_drive();
+        self.master.reopened();
+    }
+
+    /// Tells that nothing is left in the line from before.
+    pub(super) fn trust_line(&mut self) {
+        self.master.trust_line();
+    }
+
+    /// A STOP_MOTOR to be sent beside the exchanges, without waiting for an answer.
+    pub(super) fn stop_unheard<'a>(
+        &mut self,
+        motor: Motor,
+        frame: &'a mut [u8; MAX_FRAME],
+    ) -> &'a [u8] {
+        self.master.lost();
+        let stop = Request::Execute(Command::StopMotor);
+        stop.encode(motor.number(), frame).unwrap_or(&[])
+    }
+
+    /// What a stop ends in when the drive has just failed to answer another.
+    pub(super) fn unanswered(&self, motor: Motor, failure: proto::Failure) -> Error {
+        Error::Failed {
+            port: Arc::clone(&self.port),
+            motor: Target(motor.number()),
+            what: What::Executing(Command::StopMotor).to_string(),
+            failure,
+            hint: advice(failure),
+        }
+    }
+
+    /// The drive has no such motor, which may have been taken for started.
+    pub(super) fn is_missing(&mut self, motor: Motor) {
+        self.started.is_missing(motor);
+    }
+
+    /// Takes the line over from another master, which started these motors.
+    pub(super) fn take_over(&mut self, started: Started) {
+        self.started = started;
+    }
+}
+
+impl What {
+    fn of(request: &Request<'_>) -> Self {
+        match request {
+            Request::SetRegister { register, .. } => What::Writing(*register),
+            Request::GetRegister(register) => What::Reading(*register),
+            Request::Execute(command) => What::Executing(*command),
+            other => What::Known(other.code()),
+        }
+    }
+}
+
+impl fmt::Display for What {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            What::Writing(register) => write!(f, "writing {register}"),
+            What::Reading(register) => write!(f, "reading {register}"),
+            What::Executing(command) => command.fmt(f),
+            What::Known(code) => f.write_str(code.name()),
+            What::Raw(code) => write!(f, "frame code {code:#04x}"),
+        }
+    }
+}
+
+/// Motor numbers have three bits.
+fn addressable(motor: u8) -> Result<(), Error> {
+    if motor <= Motor::MAX { Ok(()) } else { Err(Error::NoSuchMotor(motor)) }
+}

@@ -1,0 +1,160 @@
+//! What passes a serial line, in words: requests by themselves, replies with the request before.
+
+use motorlink_link::printable;
+use motorlink_proto::st::{
+    BoardInfo, ErrorCode, FirmwareVersion, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, Parse,
+    Profile, RegisterId, Request, RevupPhase,
+};
+
+use super::Reading;
+
+/// Puts the chunks of one line into words. A chunk that is not one whole frame is said to be so.
+pub struct Transcript {
+    profile: Profile,
+    asked: Asked,
+}
+
+/// What the last request's reply will hold.
+#[derive(Clone, Copy)]
+enum Asked {
+    Nothing,
+    Register(RegisterId),
+    BoardInfo,
+    Version,
+    Revup,
+}
+
+impl Transcript {
+    /// A transcript of a line whose drive follows `profile`.
+    pub fn new(profile: Profile) -> Self {
+        Transcript { profile, asked: Asked::Nothing }
+    }
+
+    /// Puts a chunk into words; `sent` when it goes to the drive.
+    pub fn note(&mut self, sent: bool, bytes: &[u8]) -> String {
+        let frame = match Frame::parse(bytes) {
+            Parse::Frame(frame, size) if size == bytes.len() => frame,
+            Parse::Frame(..) => return "more than one frame".to_owned(),
+            Parse::More => return "the beginning of a frame".to_owned(),
+            Parse::Bad(_) => return "not a frame".to_owned(),
+        };
+        if sent { self.request(&frame) } else { self.reply(&frame) }
+    }
+
+    fn request(&mut self, frame: &Frame<'_>) -> String {
+        let motor = match frame.motor() {
+            0 => String::new(),
+            motor => format!(", motor {motor}"),
+        };
+        let request = match Request::decode(self.profile, frame) {
+            Ok(request) => request,
+            Err(_) => {
+                self.asked = Asked::Nothing;
+                return format!("frame code {:#04x}{motor}", frame.code());
+            }
+        };
+        self.asked = match request {
+            Request::GetRegister(register) => Asked::Register(register),
+            Request::BoardInfo => Asked::BoardInfo,
+            Request::FirmwareVersion => Asked::Version,
+            Request::RevupData(_) => Asked::Revup,
+            _ => Asked::Nothing,
+        };
+        let code = request.code().name();
+        match request {
+            Request::GetRegister(register) => format!("{code} {register}{motor}"),
+            Request::SetRegister { register, value } => {
+                match register.decode(self.profile, value) {
+                    Some(bits) => {
+                        let reading = Reading { register, bits, profile: self.profile };
+                        format!("{code} {register} = {reading}{motor}")
+                    }
+                    None => format!("{code} {register}{motor}"),
+                }
+            }
+            Request::Execute(command) => format!("{code} {command}{motor}"),
+            Request::Ramp(ramp) => {
+                format!("{code} {} rpm in {} ms{motor}", ramp.speed_rpm, ramp.duration_ms)
+            }
+            Request::CurrentReference(reference) => {
+                let (iq, id) = (reference.iq_s16a, reference.id_s16a);
+                format!("{code} Iq {iq} Id {id} s16A{motor}")
+            }
+            Request::RevupData(phase) | Request::SetRevupData(phase, _) => {
+                format!("{code} phase {phase}{motor}")
+            }
+            _ => format!("{code}{motor}"),
+        }
+    }
+
+    fn reply(&mut self, frame: &Frame<'_>) -> String {
+        match (frame.header, frame.payload) {
+            (HEADER_NACK, [code, ..]) => {
+                let code = ErrorCode::from(*code);
+                format!("NACK {code}: {}", code.doc())
+            }
+            (HEADER_NACK, []) => "NACK without a code".to_owned(),
+            (HEADER_ATR, _) => "identification, unasked".to_owned(),
+            (HEADER_ACK, payload) => match self.value(payload) {
+                Some(value) => format!("ACK {value}"),
+                None if payload.is_empty() => "ACK".to_owned(),
+                None => format!("ACK, {} bytes", payload.len()),
+            },
+            (header, _) => format!("header {header:#04x}, which begins no reply"),
+        }
+    }
+
+    fn value(&self, payload: &[u8]) -> Option<String> {
+        match self.asked {
+            Asked::Nothing => None,
+            Asked::Register(register) => {
+                let bits = register.decode(self.profile, payload)?;
+                Some(Reading { register, bits, profile: self.profile }.to_string())
+            }
+            Asked::BoardInfo => {
+                let BoardInfo { version: [major, minor, patch], name } =
+                    BoardInfo::decode(payload)?;
+                Some(format!("{} {major}.{minor}.{patch}", printable(name)))
+            }
+            Asked::Version => {
+                let version = FirmwareVersion::decode(payload);
+                Some(printable(&format!("{} {}", version.name, version.version)))
+            }
+            Asked::Revup => {
+                let RevupPhase { speed_rpm, torque_s16a, duration_ms } =
+                    RevupPhase::decode(payload)?;
+                Some(format!("{speed_rpm} rpm, {torque_s16a} s16A, {duration_ms} ms"))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dialogue_reads_like_one() {
+        let mut transcript = Transcript::new(Profile::Spec);
+        let ask = transcript.note(true, &[0x22, 0x01, 0x1E, 0x41]);
+        assert_eq!(ask, "GET_REG SPEED_MEAS, motor 1");
+        let reply = transcript.note(false, &[0xF0, 0x04, 0xCE, 0x07, 0x00, 0x00, 0xCA]);
+        assert_eq!(reply, "ACK 1998 rpm");
+        assert_eq!(transcript.note(true, &[0x02, 0x01]), "the beginning of a frame");
+        assert_eq!(transcript.note(true, &[0x02, 0x01, 0x1E, 0x00]), "not a frame");
+        let refusal = transcript.note(false, &[0xFF, 0x01, 0x0B, 0x0C]);
+        assert!(refusal.starts_with("NACK BAD_MOTOR_SELECTED"), "{refusal}");
+    }
+
+    #[test]
+    fn a_drives_name_does_not_command_a_terminal() {
+        let mut transcript = Transcript::new(Profile::Spec);
+        for code in [0x06, 0x0C] {
+            transcript.note(true, &[code, 0, code]);
+            let mut out = [0; 32];
+            let reply = Frame { header: HEADER_ACK, payload: b"\x05\x04\x03A\x1B[2J\x07" };
+            let note = transcript.note(false, reply.encode(&mut out).unwrap());
+            assert!(note.contains("[2J") && !note.contains(char::is_control), "{note:?}");
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! ST's serial Motor Control Protocol, both ends.
+//!
+//! Paragraph numbers are those of the document "Motor Control Protocol"; where it is silent or
+//! contradicts itself, `docs/SPEC-NOTES.md` has the reading (`S1`, `S2`, …).
+//!
+//! * [`Frame`] turns bytes into header, payload and checksum and back (chapter 3).
+//! * [`Request`] and the reply types of [`message`] are the messages (chapter 4).
+//! * [`register`] is table 3 as typed constants, [`RegisterId`] the same by number.
+//! * [`Master`] conducts one exchange at a time; [`Slave`] answers for a [`Drive`].
+
+//!
+//! A drive with one motor and nothing but a speed, as firmware or a test would have it:
+//!
+//! ```
+//! use motorlink_proto::st::*;
+//! use motorlink_proto::time::Instant;
+//!
+//! struct Fan { rpm: i32, running: bool }
+//!
+//! impl Drive for Fan {
+//!     fn features(&self, _: Motor) -> Features { Features::NONE }
+//!     fn version(&self) -> Version<'_> {
+//!         Version { name: "Fan", major: 1, minor: 0, patch: 0, pre_release: "" }
+//!     }
+//!     // Registers that this drive has nothing to say about read as 0.
+//!     fn read(&mut self, _: Motor, register: RegisterId) -> i32 {
+//!         match register {
+//!             RegisterId::STATUS if self.running => u8::from(Status::Run).into(),
+//!             RegisterId::STATUS => u8::from(Status::Idle).into(),
+//!             RegisterId::SPEED_REF | RegisterId::SPEED_MEAS => self.rpm,
+//!             _ => 0,
+//!         }
+//!     }
+//!     fn write(&mut self, _: Motor, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
+//!         Err(ErrorCode::WrongSet)
+//!     }
+//!     fn execute(&mut self, _: Motor, command: Command) {
+//!         match command {
+//!             Command::StartMotor => self.running = true,
+//!             Command::StopMotor => self.running = false,
+//!             _ => {}
+//!         }
+//!     }
+//!     fn ramp(&mut self, _: Motor, ramp: Ramp) { self.rpm = ramp.speed_rpm; }
+//!     fn revup(&mut self, _: Motor, _: u8) -> RevupPhase { RevupPhase::default() }
+//!     fn set_revup(&mut self, _: Motor, _: u8, _: RevupPhase) {}
+//!     fn current_reference(&mut self, _: Motor, _: CurrentReference) {}
+//! }
+//!
+//! let mut fan = Fan { rpm: 0, running: false };
+//! let mut slave = Slave::new(Profile::Spec, Motor::FIRST);
+//! // For each byte of the UART: send what comes back. When `deadline` has passed: `poll`.
+//! let mut sent = Vec::new();
+//! for byte in [0x07, 0x06, 0xDC, 0x05, 0x00, 0x00, 0xE8, 0x03, 0xDA] {
+//!     sent.extend_from_slice(slave.receive(Instant(0), byte, &mut fan).unwrap_or(&[]));
+//! }
+//! assert_eq!((fan.rpm, &sent[..]), (1500, &[0xF0, 0x00, 0xF0][..]));
+//! ```
+
+mod code;
+mod drive;
+mod failure;
+mod frame;
+mod master;
+pub mod message;
+mod question;
+pub mod register;
+mod slave;
+#[cfg(feature = "std")]
+mod value;
+mod verified;
+
+pub use code::{
+    Command, ControlMode, ErrorCode, Flags, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
+    Profile, Status,
+};
+pub use drive::{Drive, Motor};
+pub use failure::{Error, Failure};
+pub use frame::{Bad, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
+pub use master::{
+    Config, Counters, Line, Master, Output, Recovery, RequestError, TIMEOUT, question_behind,
+};
+pub use message::{
+    BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, ReplySize,
+    Request, RevupPhase, TorqueRamp, Version,
+};
+pub use register::{Feature, Features, RegisterId};
+pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
+#[cfg(feature = "std")]
+pub use value::{Reading, UnknownRegister, ValueError, find_register, parse_value};
+pub use verified::{Unverified, VERIFY_ATTEMPTS, VerifiedWrite, Verifying};

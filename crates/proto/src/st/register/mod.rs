@@ -1,0 +1,24 @@
+//! Registers: table 3 as typed constants ([`SPEED_MEAS`]) and by number ([`RegisterId`]).
+//!
+//! ```compile_fail
+//! use motorlink_proto::st::register::{self, Writable};
+//! fn write<T, A: Writable>(_: register::Register<T, A>, _: T) {}
+//! write(register::SPEED_MEAS, 1500); // SPEED_MEAS is read-only: this does not compile
+//! ```
+
+mod feature;
+mod id;
+mod lookup;
+mod shape;
+mod table;
+mod typed;
+mod unit;
+mod value;
+
+pub use feature::{Feature, Features};
+pub use id::RegisterId;
+pub use shape::{Access, Origin, Shape, Text, Writing};
+pub use table::*;
+pub use typed::{Dac, Never, ReadOnly, ReadWrite, Readable, Register, Writable, WriteOnly};
+pub use unit::Unit;
+pub use value::{Type, Value};

@@ -1,0 +1,422 @@
+//! The master alone and joined with a slave, on a virtual clock.
+
+mod common;
+mod st_bench;
+
+use motorlink_proto::st::*;
+use motorlink_proto::time::{Duration, Instant};
+use proptest::prelude::*;
+use st_bench::{MS, Pair, STATUS, master};
+
+#[test]
+fn an_exchange_is_sent_once_and_ends_with_the_payload() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::None);
+    pair.drive.set(2, RegisterId::STATUS, 6);
+    assert_eq!(pair.exchange(2, STATUS), Ok(vec![6]));
+    assert_eq!(pair.sent, [[0x42, 0x01, 0x02, 0x45]]);
+    assert_eq!(pair.master.line(), Line::Up);
+}
+
+#[test]
+fn a_refusal_keeps_its_code_and_the_line_unless_the_frame_was_damaged() {
+    let mut master = master(Recovery::None);
+    for code in 0..=255 {
+        master.request(0, &STATUS).unwrap();
+        assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+        let mut out = [0; 8];
+        let nack = Frame { header: HEADER_NACK, payload: &[code] }.encode(&mut out).unwrap();
+        master.receive(Instant(1), nack);
+        let damaged = matches!(code, 0x08..=0x0A);
+        let code_of = ErrorCode::from(code);
+        let error = if damaged {
+            Error::Failed(Failure::NotUnderstood(code_of))
+        } else {
+            Error::Refused(code_of)
+        };
+        assert_eq!(master.poll(Instant(1)), Output::Done(Err(error)));
+        assert_eq!(u8::from(code_of), code);
+        assert_eq!(master.line(), if damaged { Line::Lost } else { Line::Up }, "{code:#04x}");
+        master.reopened();
+    }
+}
+
+#[test]
+fn only_one_exchange_is_under_way() {
+    let mut master = master(Recovery::None);
+    master.request(0, &STATUS).unwrap();
+    assert_eq!(master.request(0, &STATUS), Err(RequestError::Busy));
+    assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+    assert_eq!(master.request(0, &STATUS), Err(RequestError::Busy));
+}
+
+#[test]
+fn the_timer_starts_when_the_request_is_out_and_lasts_a_second() {
+    let mut master = master(Recovery::None);
+    master.request(0, &STATUS).unwrap();
+    assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+    let sent = Instant(136 * MS);
+    assert_eq!(master.poll(sent), Output::Wait(Some(Instant(1136 * MS))));
+    assert_eq!(master.poll(Instant(1136 * MS - 1)), Output::Wait(Some(Instant(1136 * MS))));
+    let failed = Error::Failed(Failure::Timeout);
+    assert_eq!(master.poll(Instant(1136 * MS)), Output::Done(Err(failed)));
+    assert_eq!(master.line(), Line::Lost);
+}
+
+#[test]
+fn without_recovery_a_lost_line_sends_nothing_until_it_is_reopened() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::None);
+    pair.cut = Some(0);
+    assert_eq!(pair.exchange(0, STATUS), Err(Error::Failed(Failure::Timeout)));
+    let sent = pair.sent.len();
+    assert_eq!(pair.exchange(0, STATUS), Err(Error::Failed(Failure::Lost)));
+    assert_eq!(pair.sent.len(), sent, "nothing goes into a lost line");
+    pair.master.reopened();
+    assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+}
+
+#[test]
+fn a_lost_line_comes_back_behind_silence_and_a_question() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+    pair.cut = Some(0);
+    pair.exchange(0, STATUS).unwrap_err();
+    let lost = pair.now;
+    assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+    assert_eq!(pair.sent[1..], [vec![0x06, 0x00, 0x06], vec![0x02, 0x01, 0x02, 0x05]]);
+    assert_eq!(pair.now.since(lost), Duration(100 * MS), "two silences of 50 ms");
+    assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+    assert_eq!(pair.sent.len(), 4, "recovered once");
+}
+
+#[test]
+fn recovery_asks_what_cannot_be_answered_with_the_lost_reply() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+    for (lost, probe) in [
+        (Request::BoardInfo, [0x08, 0x01, 0x00, 0x09].as_slice()),
+        (Request::FirmwareVersion, &[0x08, 0x01, 0x00, 0x09]),
+        (Request::RevupData(0), &[0x06, 0x00, 0x06]),
+        (Request::BoardInfo, &[0x08, 0x01, 0x00, 0x09]),
+    ] {
+        pair.cut = Some(0);
+        pair.exchange(0, lost).unwrap_err();
+        pair.sent.clear();
+        pair.exchange(0, STATUS).unwrap();
+        assert_eq!(pair.sent[0], probe, "behind a lost {lost:?}");
+    }
+}
+
+#[test]
+fn the_longest_exchange_is_five_or_six_timeouts_and_the_silences() {
+    for (recovery, ms) in
+        [(Recovery::None, 1_000), (Recovery::Drain, 5_150), (Recovery::Pad, 6_200)]
+    {
+        let config = Config { recovery, ..Config::default() };
+        assert_eq!(config.longest_exchange(), Duration::from_millis(ms), "{recovery:?}");
+    }
+}
+
+#[test]
+fn nothing_but_questions_go_into_a_line_that_does_not_answer() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+    pair.delay = Duration::from_millis(60_000);
+    let start = Request::Execute(Command::StartMotor);
+    assert_eq!(pair.exchange(1, STATUS), Err(Error::Failed(Failure::Timeout)));
+    for _ in 0..3 {
+        assert_eq!(pair.exchange(1, start), Err(Error::Failed(Failure::Lost)));
+    }
+    assert!(pair.drive.log.is_empty(), "START_MOTOR must not wait in the line");
+}
+
+#[test]
+fn a_line_that_never_falls_silent_is_given_up() {
+    let mut master = master(Recovery::Drain);
+    master.request(0, &STATUS).unwrap();
+    assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+    master.receive(Instant(0), &[0x55]);
+    assert_eq!(master.poll(Instant(0)), Output::Done(Err(Error::Failed(Failure::Header(0x55)))));
+    master.request(0, &STATUS).unwrap();
+    let mut now = Instant(0);
+    let result = loop {
+        match master.poll(now) {
+            Output::Wait(_) => {}
+            Output::Transmit(bytes) => panic!("sent {bytes:02x?} into the noise"),
+            Output::Done(result) => break result,
+        }
+        now += Duration::from_millis(10);
+        master.receive(now, &[0x55]);
+    };
+    assert_eq!(result, Err(Error::Failed(Failure::Noise)));
+    assert!(now <= Instant(1_100 * MS));
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
+fn padding_brings_back_shipped_firmware_from_every_cut() {
+    let write = Request::SetRegister { register: RegisterId::SPEED_KP, value: &[0x10, 0x00] };
+    let start = Request::Execute(Command::StartMotor);
+    for (request, size) in [(STATUS, 4), (write, 6), (start, 4)] {
+        for cut in 0..size {
+            let mut pair = Pair::new(Profile::Mcsdk54, Recovery::Pad);
+            pair.cut = Some(cut);
+            pair.exchange(2, request).unwrap_err();
+            assert_eq!(pair.exchange(2, STATUS), Ok(vec![0]), "{request:?} cut at {cut}");
+            let stopped = pair.drive.log.last().is_some_and(|entry| entry == "STOP_MOTOR 2");
+            assert_eq!(stopped, request != STATUS, "a cut-off command is followed by a stop");
+        }
+    }
+}
+
+#[test]
+fn an_unasked_identification_is_skipped() {
+    let mut master = master(Recovery::Drain);
+    let mut out = [0; MAX_FRAME];
+    let ident = Frame { header: HEADER_ATR, payload: &[7; 13] }.encode(&mut out).unwrap().to_vec();
+    let ack = Frame { header: HEADER_ACK, payload: &[6] }.encode(&mut out).unwrap().to_vec();
+    for cut in 0..ident.len() {
+        master.request(0, &STATUS).unwrap();
+        assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+        master.receive(Instant(1), &ident[..cut]);
+        assert!(matches!(master.poll(Instant(1)), Output::Wait(_)));
+        master.receive(Instant(2), &[&ident[cut..], &ack].concat());
+        assert_eq!(master.poll(Instant(2)), Output::Done(Ok(&[6])));
+    }
+    assert_eq!(master.counters().identifications, ident.len() as u32);
+}
+
+#[test]
+fn every_prefix_of_a_reply_waits_for_more() {
+    let mut out = [0; MAX_FRAME];
+    let reply = Frame { header: HEADER_ACK, payload: &[1; 128] }.encode(&mut out).unwrap();
+    for cut in 1..reply.len() {
+        let mut master = master(Recovery::Drain);
+        master.request(0, &STATUS).unwrap();
+        assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+        master.receive(Instant(0), &reply[..cut]);
+        assert!(matches!(master.poll(Instant(0)), Output::Wait(Some(_))));
+        let failed = Error::Failed(Failure::Incomplete { received: cut as u8 });
+        assert_eq!(master.poll(Instant(1000 * MS)), Output::Done(Err(failed)));
+    }
+}
+
+#[test]
+fn bytes_behind_a_reply_lose_the_line_but_not_the_reply() {
+    let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+    pair.master.request(0, &STATUS).unwrap();
+    assert!(matches!(pair.master.poll(pair.now), Output::Transmit(_)));
+    pair.master.receive(pair.now, &[0xF0, 0x01, 0x06, 0xF7, 0xF0, 0x01]);
+    assert_eq!(pair.master.poll(pair.now), Output::Done(Ok(&[6])));
+    assert_eq!(pair.master.line(), Line::Lost);
+    assert_eq!(pair.master.counters().unasked_bytes, 2);
+    assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+}
+
+#[test]
+fn two_replies_that_differ_are_no_answer() {
+    let (mut first, mut second) = ([0; MAX_FRAME], [0; MAX_FRAME]);
+    let ack = Frame { header: HEADER_ACK, payload: &[6] }.encode(&mut first).unwrap();
+    let other = Frame { header: HEADER_ACK, payload: &[8] }.encode(&mut second).unwrap();
+    for (copy, end) in [(ack, Ok(&[6][..])), (other, Err(Error::Failed(Failure::Ambiguous)))] {
+        let mut master = master(Recovery::Drain);
+        master.request(0, &STATUS).unwrap();
+        assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+        master.receive(Instant(1), &[ack, copy].concat());
+        assert_eq!(master.poll(Instant(1)), Output::Done(end));
+        assert_eq!(master.line(), Line::Lost);
+    }
+}
+
+/// Flips one bit of the next request on its way, and asks twice.
+#[test]
+#[cfg_attr(miri, ignore = "an interpreter takes long")]
+fn no_bit_flip_of_a_request_puts_the_line_off_by_one() {
+    let write = Request::SetRegister { register: RegisterId::TORQUE_KP, value: &[0x22, 0x11] };
+    for (request, size) in [(STATUS, 4), (write, 6), (Request::BoardInfo, 3)] {
+        for (bit, pause) in (0..size * 8).flat_map(|bit| [0, 30].map(|pause| (bit, pause))) {
+            let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+            pair.delay = Duration::from_millis(3);
+            pair.drive.set(1, RegisterId::SPEED_KP, 0x0102);
+            pair.drive.set(1, RegisterId::SPEED_KI, 0x0304);
+            pair.flip = Some(bit);
+            let _ = pair.exchange(1, request);
+            pair.rest(Duration::from_millis(pause));
+            for (register, value) in
+                [(RegisterId::SPEED_KP, [2, 1]), (RegisterId::SPEED_KI, [4, 3])]
+            {
+                if let Ok(read) = pair.exchange(1, Request::GetRegister(register)) {
+                    assert_eq!(read, value, "{request:?}, bit {bit}");
+                }
+            }
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
+    fn a_late_reply_is_never_taken_for_another_exchanges(
+        delays in proptest::collection::vec(0u32..2_000, 1..40),
+        pad in any::<bool>(),
+    ) {
+        let recovery = if pad { Recovery::Pad } else { Recovery::Drain };
+        let mut pair = Pair::new(Profile::Spec, recovery);
+        let registers = [RegisterId::SPEED_KP, RegisterId::SPEED_KI, RegisterId::TORQUE_KP,
+                         RegisterId::TORQUE_KI, RegisterId::FLUX_KP];
+        for register in registers {
+            pair.drive.set(1, register, i32::from(register.0));
+        }
+        for (n, delay) in delays.into_iter().enumerate() {
+            pair.delay = Duration::from_millis(delay);
+            let register = registers[n % registers.len()];
+            if let Ok(value) = pair.exchange(1, Request::GetRegister(register)) {
+                prop_assert_eq!(register.decode(Profile::Spec, &value), Some(i32::from(register.0)));
+            }
+        }
+    }
+
+    /// Also where requests are answered with what recovery's questions are answered with.
+    #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
+    fn a_late_reply_is_never_taken_for_another_kinds(
+        steps in proptest::collection::vec((0u32..2_000, 0usize..5), 1..40),
+        pad in any::<bool>(),
+    ) {
+        let recovery = if pad { Recovery::Pad } else { Recovery::Drain };
+        let mut pair = Pair::new(Profile::Spec, recovery);
+        pair.drive.set(1, RegisterId::SPEED_KP, 0x1234);
+        let write = Request::SetRegister { register: RegisterId::SPEED_KI, value: &[1, 0] };
+        let requests = [
+            Request::GetRegister(RegisterId::SPEED_KP),
+            Request::BoardInfo,
+            Request::FirmwareVersion,
+            Request::RevupData(0),
+            write,
+        ];
+        let mut clean = Pair::new(Profile::Spec, recovery);
+        clean.drive.set(1, RegisterId::SPEED_KP, 0x1234);
+        let expected = requests.map(|request| clean.exchange(1, request));
+        for (delay, n) in steps {
+            pair.delay = Duration::from_millis(delay);
+            let result = pair.exchange(1, requests[n]);
+            if result.is_ok() {
+                prop_assert_eq!(&result, &expected[n], "{:?}", requests[n]);
+            }
+        }
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
+    fn a_drive_that_was_stopped_and_answers_everything_at_once_confuses_nobody(
+        stops in proptest::collection::vec(0u32..9_000, 1..10),
+    ) {
+        let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
+        let registers = [RegisterId::SPEED_KP, RegisterId::SPEED_KI];
+        for register in registers {
+            pair.drive.set(1, register, i32::from(register.0));
+        }
+        for stop in stops {
+            let until = pair.now + Duration::from_millis(stop);
+            for n in 0..20 {
+                pair.delay = until.since(pair.now);
+                let register = registers[n % 2];
+                if let Ok(value) = pair.exchange(1, Request::GetRegister(register)) {
+                    prop_assert_eq!(register.decode(Profile::Spec, &value), Some(i32::from(register.0)));
+                }
+            }
+            prop_assert_eq!(pair.master.line(), Line::Up, "back within 20 tries");
+        }
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
+    fn noise_never_panics_and_an_exchange_always_ends(
+        chunks in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..40), 1..60),
+        pad in any::<bool>(),
+    ) {
+        let recovery = if pad { Recovery::Pad } else { Recovery::Drain };
+        let mut master = master(recovery);
+        // Noise comes every 7 ms, so that each wait may end that much later.
+        let late = Duration::from_millis(50);
+        let bound = Config { recovery, ..Config::default() }.longest_exchange() + late;
+        let mut chunks = chunks.into_iter();
+        let mut now = Instant(0);
+        for _ in 0..8 {
+            let begun = now;
+            master.request(1, &STATUS).unwrap();
+            loop {
+                match master.poll(now) {
+                    Output::Done(_) => break,
+                    Output::Transmit(_) => {}
+                    Output::Wait(until) => match chunks.next() {
+                        Some(noise) => {
+                            now += Duration::from_millis(7);
+                            master.receive(now, &noise);
+                        }
+                        None => now = until.unwrap(),
+                    },
+                }
+            }
+            prop_assert!(now.since(begun) <= bound);
+        }
+    }
+}
+
+/// 4.5, 4.6 and table 3, SPEC-NOTES S17.
+#[test]
+fn a_reply_of_another_size_is_damage() {
+    let answered = |profile: Profile, request: &Request<'_>, size: usize| {
+        let mut master = Master::new(Config { profile, ..Config::default() });
+        master.trust_line();
+        master.request(1, request).unwrap();
+        assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
+        let mut frame = [0; MAX_FRAME];
+        let reply = Frame { header: HEADER_ACK, payload: &vec![0x11; size] };
+        master.receive(Instant(1), reply.encode(&mut frame).unwrap());
+        let result = match master.poll(Instant(1)) {
+            Output::Done(result) => result.map(<[u8]>::len),
+            other => panic!("{other:?}"),
+        };
+        let line = if result.is_ok() { Line::Up } else { Line::Lost };
+        assert_eq!(master.line(), line, "{profile:?} {request:?} {size}");
+        result
+    };
+    let damage = |received: usize, fits| {
+        Err(Error::Failed(Failure::Size { received: received as u8, fits }))
+    };
+    for register in RegisterId::all().chain([RegisterId(0xF0)]) {
+        let sizes = Profile::ALL.map(|profile| {
+            let shape = register.shape();
+            shape.and_then(|shape| {
+                shape.read_size(profile, Features::NONE.with(shape.feature)).map(usize::from)
+            })
+        });
+        let takes =
+            |own: Option<usize>, size| own.map_or([1, 2, 4].contains(&size), |own| own == size);
+        for size in 0..=8 {
+            let request = Request::GetRegister(register);
+            let fits = takes(sizes[1], size).then_some(Profile::Mcsdk54);
+            let expected = if takes(sizes[0], size) { Ok(size) } else { damage(size, fits) };
+            assert_eq!(answered(Profile::Spec, &request, size), expected, "{register} {size}");
+            let fits = takes(sizes[0], size).then_some(Profile::Spec);
+            let expected = if takes(sizes[1], size) { Ok(size) } else { damage(size, fits) };
+            assert_eq!(answered(Profile::Mcsdk54, &request, size), expected, "{register} {size}");
+        }
+    }
+    let nothing = [0; 4];
+    for acknowledged in [
+        Request::SetRegister { register: RegisterId::SPEED_KP, value: &nothing[..2] },
+        Request::Execute(Command::StartMotor),
+        Request::Execute(Command::StopMotor),
+        Request::Ramp(Ramp { speed_rpm: 1, duration_ms: 1 }),
+        Request::SetRevupData(0, RevupPhase::default()),
+        Request::CurrentReference(CurrentReference { iq_s16a: 1, id_s16a: 1 }),
+        Request::ConfigDynStruct { segment: 0, registers: &nothing },
+        Request::TorqueRamp(TorqueRamp { torque_s16a: 1, duration_ms: 1 }),
+        Request::Position(PositionMove { angle_rad: 1.0, duration_s: 1.0 }),
+    ] {
+        for profile in Profile::ALL {
+            assert_eq!(answered(profile, &acknowledged, 0), Ok(0));
+            for size in [1, 2, 4, 32] {
+                assert_eq!(answered(profile, &acknowledged, size), damage(size, None));
+            }
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! A line that was just opened: what a former master left in it, and what echoes (SPEC-NOTES S16).
+
+mod common;
+mod st_bench;
+
+use motorlink_proto::st::*;
+use motorlink_proto::time::{Duration, Instant};
+use proptest::prelude::*;
+use st_bench::{MS, Pair, STATUS};
+
+const INFO: [u8; 3] = [0x06, 0x00, 0x06];
+const GET_STATUS: [u8; 4] = [0x02, 0x01, 0x02, 0x05];
+const GET_FLAGS: [u8; 4] = [0x02, 0x01, 0x01, 0x04];
+
+fn opened(recovery: Recovery) -> Master {
+    Master::new(Config { recovery, ..Config::default() })
+}
+
+/// A line that was just opened, to a drive that answers `delay` late.
+fn pair(recovery: Recovery, delay: Duration) -> Pair {
+    let mut pair = Pair::new(Profile::Spec, recovery);
+    pair.master = opened(recovery);
+    pair.delay = delay;
+    pair
+}
+
+#[test]
+fn a_line_that_was_just_opened_is_brought_in_step_by_three_questions() {
+    let mut pair = pair(Recovery::Drain, Duration::from_millis(3));
+    pair.drive.set(2, RegisterId::STATUS, 6);
+    assert_eq!(pair.exchange(2, STATUS), Ok(vec![6]));
+    assert_eq!(pair.sent, [INFO.as_slice(), &GET_STATUS, &GET_FLAGS, &[0x42, 1, 2, 0x45]]);
+    assert_eq!(pair.now, Instant(112 * MS), "two silences of 50 ms and four replies");
+    assert_eq!(pair.exchange(2, STATUS), Ok(vec![6]));
+    assert_eq!(pair.sent.len(), 5, "once");
+    assert_eq!(pair.master.counters().losses, 0);
+}
+
+#[test]
+fn a_line_that_is_trusted_is_asked_at_once() {
+    for master in [opened(Recovery::None), st_bench::master(Recovery::Drain)] {
+        let mut pair = pair(Recovery::Drain, Duration(0));
+        pair.master = master;
+        assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+        assert_eq!(pair.sent.len(), 1);
+    }
+}
+
+#[test]
+fn a_line_that_is_opened_again_is_not_in_step() {
+    let mut pair = pair(Recovery::Drain, Duration::from_millis(3));
+    for _ in 0..2 {
+        pair.sent.clear();
+        assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
+        assert_eq!(pair.sent[..3], [INFO.as_slice(), &GET_STATUS, &GET_FLAGS]);
+        pair.master.reopened();
+    }
+}
+
+/// The case: 150 ms, a former master that waited for 100.
+#[test]
+fn the_reply_to_a_former_master_is_not_taken_for_the_next_ones() {
+    for ms in [1, 20, 49, 51, 150, 400, 900, 1_900] {
+        for former in [STATUS, Request::BoardInfo, Request::FirmwareVersion] {
+            let mut pair = pair(Recovery::Drain, Duration::from_millis(ms));
+            pair.drive.set(1, RegisterId::SPEED_KP, 0x1234);
+            pair.drive.set(1, RegisterId::SPEED_KI, 0x5678);
+            pair.master.trust_line();
+            pair.master.config_mut().timeout = Duration::from_millis(100);
+            let late = ms > 100;
+            assert_eq!(pair.exchange(1, former).is_err(), late);
+            assert_eq!(pair.exchange(1, former).is_err(), late);
+            pair.master = opened(Recovery::Drain);
+            let read = pair.exchange(1, Request::GetRegister(RegisterId::SPEED_KI));
+            if ms < 1_000 {
+                assert_eq!(read, Ok(vec![0x78, 0x56]), "{ms} ms behind {former:?}");
+            } else {
+                assert_eq!(read, Err(Error::Failed(Failure::Timeout)));
+            }
+        }
+    }
+}
+
+#[test]
+fn no_command_waits_in_a_line_whose_drive_does_not_answer() {
+    let mut pair = pair(Recovery::Drain, Duration::from_millis(60_000));
+    for _ in 0..3 {
+        let start = Request::Execute(Command::StartMotor);
+        assert_eq!(pair.exchange(1, start), Err(Error::Failed(Failure::Timeout)));
+    }
+    assert!(pair.drive.log.is_empty());
+}
+
+/// Of what is not known what it answers, it is waited for as long as it may be late.
+#[test]
+fn a_drive_that_refuses_the_question_is_taken_for_slow() {
+    let mut master = opened(Recovery::Drain);
+    master.request(0, &STATUS).unwrap();
+    assert_eq!(master.poll(Instant(0)), Output::Wait(Some(Instant(50 * MS))));
+    assert_eq!(master.poll(Instant(50 * MS)), Output::Transmit(&INFO));
+    assert_eq!(master.poll(Instant(50 * MS)), Output::Wait(Some(Instant(1_050 * MS))));
+    master.receive(Instant(51 * MS), &[0xFF, 0x01, 0x01, 0x02]);
+    assert_eq!(master.poll(Instant(51 * MS)), Output::Wait(Some(Instant(2_050 * MS))));
+    assert_eq!(master.poll(Instant(2_050 * MS)), Output::Transmit(&GET_STATUS));
+}
+
+/// An adapter that echoes, a wire from TX to RX: with a drive behind it or without.
+#[test]
+fn an_echo_is_no_answer_and_is_named() {
+    for (drive, cut) in [(false, 0), (false, 1), (true, 0), (true, 2)] {
+        let mut master = opened(Recovery::Drain);
+        master.request(1, &STATUS).unwrap();
+        let mut now = Instant(0);
+        let end = loop {
+            let echo = match master.poll(now) {
+                Output::Wait(until) => {
+                    now = until.unwrap();
+                    continue;
+                }
+                Output::Transmit(sent) => sent.to_vec(),
+                Output::Done(result) => break result.map(<[u8]>::to_vec),
+            };
+            let mut frame = [0; MAX_FRAME];
+            let reply = Frame { header: HEADER_ACK, payload: &[0; 32] }.encode(&mut frame).unwrap();
+            let came = if drive { [&echo, reply].concat() } else { echo };
+            master.receive(now, &came[..cut]);
+            master.receive(now, &came[cut..]);
+        };
+        assert_eq!(end, Err(Error::Failed(Failure::Echo)), "a drive: {drive}, cut at {cut}");
+    }
+}
+
+/// GET_BOARD_INFO of a drive with version 6.0.6 begins with the bytes of the question.
+#[test]
+fn an_answer_that_looks_like_the_question_is_no_echo() {
+    let mut payload = [0; 32];
+    payload[..3].copy_from_slice(&INFO);
+    let mut frame = [0; MAX_FRAME];
+    let reply = Frame { header: HEADER_ACK, payload: &payload }.encode(&mut frame).unwrap();
+    let mut master = opened(Recovery::Drain);
+    master.request(0, &STATUS).unwrap();
+    for (ms, bytes) in [(0, &[][..]), (50, &[]), (51, reply)] {
+        let _ = master.poll(Instant(ms * MS));
+        master.receive(Instant(ms * MS), bytes);
+    }
+    assert_eq!(master.poll(Instant(51 * MS)), Output::Transmit(&GET_STATUS));
+}
+
+/// What a wrong baud rate looks like is said as on a line that is up.
+#[test]
+fn what_comes_in_place_of_an_answer_is_named() {
+    let cases = [
+        (vec![0x55], Failure::Header(0x55)),
+        (vec![0xF0, 0x90], Failure::Damaged(Bad::Length(0x90))),
+        (vec![0xF0, 0x00, 0x01], Failure::Damaged(Bad::Checksum { expected: 0xF0, received: 1 })),
+        (vec![0xF0, 0x20, 0x00], Failure::Incomplete { received: 3 }),
+        (vec![], Failure::Timeout),
+    ];
+    for (came, failure) in cases {
+        let mut master = opened(Recovery::Drain);
+        master.request(0, &STATUS).unwrap();
+        for (ms, bytes) in [(0, &[][..]), (50, &[]), (51, &came)] {
+            let _ = master.poll(Instant(ms * MS));
+            master.receive(Instant(ms * MS), bytes);
+        }
+        let end = Instant(1_051 * MS);
+        assert_eq!(master.poll(end), Output::Done(Err(Error::Failed(failure))), "{came:02x?}");
+    }
+}
+
+proptest! {
+    /// A former master of any kind, gone in the middle of whatever it did.
+    #[test]
+    #[cfg_attr(miri, ignore = "an interpreter takes long")]
+    fn masters_in_turn_never_take_each_others_replies(
+        delay in 1u32..1_900,
+        turns in proptest::collection::vec((0usize..6, 1u32..4_000, 10u32..1_000), 1..8),
+    ) {
+        let write = Request::SetRegister { register: RegisterId::TORQUE_KI, value: &[1, 0] };
+        let requests = [
+            Request::GetRegister(RegisterId::SPEED_KP),
+            Request::GetRegister(RegisterId::SPEED_KI),
+            STATUS,
+            Request::FirmwareVersion,
+            Request::RevupData(0),
+            write,
+        ];
+        let prepared = |pair: &mut Pair| {
+            pair.drive.set(1, RegisterId::SPEED_KP, 0x1234);
+            pair.drive.set(1, RegisterId::SPEED_KI, 0x5678);
+            pair.drive.set(1, RegisterId::STATUS, 6);
+        };
+        let mut clean = Pair::new(Profile::Spec, Recovery::Drain);
+        prepared(&mut clean);
+        let expected = requests.map(|request| clean.exchange(1, request));
+        let mut pair = pair(Recovery::Drain, Duration::from_millis(delay));
+        prepared(&mut pair);
+        for (n, life, timeout) in turns {
+            pair.master = opened(Recovery::Drain);
+            pair.master.config_mut().timeout = Duration::from_millis(timeout.max(delay / 2 + 1));
+            pair.until = Some(pair.now + Duration::from_millis(life));
+            for n in n.. {
+                let n = n % requests.len();
+                match pair.attempt(1, requests[n]) {
+                    Some(Ok(reply)) => prop_assert_eq!(&Ok(reply), &expected[n], "{:?}", requests[n]),
+                    Some(Err(_)) => {}
+                    None => break,
+                }
+            }
+        }
+    }
+}
