@@ -5,6 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use motorlink::port::PortError;
 
+use crate::finding::Finding;
 use crate::reading::Reading;
 use crate::report::{Outcome, Report, Verdict};
 use crate::world::Unavailable;
@@ -61,19 +62,6 @@ impl From<Unavailable> for Stop {
     fn from(error: Unavailable) -> Self {
         Stop::Skipped(error.0)
     }
-}
-
-/// What a drive did instead of what it must do.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Finding {
-    /// What was sent, in bytes or frames.
-    pub sent: String,
-    /// What must come of it, in bytes and words.
-    pub expected: String,
-    /// What came.
-    pub received: String,
-    /// The reading that demands it; `None` where a sentence of the document does.
-    pub reading: Option<Reading>,
 }
 
 /// Says that what failed is demanded by a reading, not by a sentence.

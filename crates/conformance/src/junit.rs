@@ -2,7 +2,7 @@
 
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 
-use crate::case::Finding;
+use crate::finding::Finding;
 use crate::reading::Reading;
 use crate::report::{Outcome, Report, Verdict};
 

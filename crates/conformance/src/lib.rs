@@ -17,6 +17,7 @@
 
 mod case;
 mod clause;
+mod finding;
 pub mod host;
 mod junit;
 mod markdown;
@@ -27,8 +28,9 @@ pub mod st;
 pub mod wire;
 mod world;
 
-pub use case::{Case, Finding, Need, Run, Stop, Subject, run};
+pub use case::{Case, Need, Run, Stop, Subject, run};
 pub use clause::Clause;
+pub use finding::Finding;
 pub use markdown::scenario_table;
 pub use reading::{READINGS, Reading};
 pub use report::{Outcome, Report, Verdict};

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::case::Finding;
+use crate::finding::Finding;
 use crate::reading::Reading;
 
 /// What came of all cases.

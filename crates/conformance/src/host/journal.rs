@@ -2,7 +2,7 @@
 
 use motorlink_proto::time::{Duration, Instant};
 
-use super::script::{Send, When};
+use super::script::{Claim, Send, When};
 
 /// Lines that a transcript keeps; a drive that never stops would fill memory.
 const TRANSCRIPT: usize = 120;
@@ -31,13 +31,6 @@ pub(super) struct Told {
     pub value: i64,
     /// Why it is not the answer to the request that it reached; `None` when it is.
     pub wrong: Option<String>,
-}
-
-/// A value that a drive sends.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Claim {
-    pub value: i64,
-    pub lie: Option<&'static str>,
 }
 
 /// An exchange: the motor, what its reply is known by, and its number on this line.

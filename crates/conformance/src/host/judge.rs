@@ -2,21 +2,11 @@
 
 use std::time::Duration;
 
-use crate::case::Finding;
+use crate::finding::Finding;
 use crate::report::{Outcome, Verdict};
 
-use super::{Journal, Scenario, Task};
-
-/// What a host must bring home.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Demand {
-    /// Every reading: the disturbance is none of its business.
-    Everything,
-    /// Nothing false. A reading may fail, if it says so, or be made again.
-    Truth,
-    /// That it failed.
-    Error,
-}
+use super::journal::Journal;
+use super::scenario::{Demand, Scenario, Task};
 
 /// What a host said.
 #[derive(Debug, Clone, Default)]

@@ -6,7 +6,8 @@ use motorlink_proto::time::{Duration, Instant};
 
 use super::kept::Kept;
 use super::words::{lines, words};
-use crate::case::{Beside, Finding, Need, Stop, Subject};
+use crate::case::{Beside, Need, Stop};
+use crate::finding::Finding;
 use crate::reading::Reading;
 use crate::wire::Bus;
 use crate::world::World;
@@ -30,7 +31,7 @@ pub struct Bench {
     pub(super) world: Box<dyn World>,
     pub(super) options: Options,
     pub(super) kept: Kept,
-    beside: Beside,
+    pub(super) beside: Beside,
     /// Whether a motor that is off takes motion commands after 0x88 only (SPEC-NOTES R17).
     pub(super) needs_run: bool,
     /// What of another protocol was heard.
@@ -209,6 +210,15 @@ impl Bench {
         self.beside.note(reading, result)
     }
 
+    /// What was said and heard, a line a frame.
+    pub(super) fn lines(&self) -> Vec<String> {
+        let line = |(direction, frame): &(Direction, CanFrame)| {
+            let arrow = if *direction == Direction::HostToDrive { '>' } else { '<' };
+            format!("{arrow} {}", words(frame, *direction))
+        };
+        self.transcript.iter().map(line).collect()
+    }
+
     /// Forgets what was said and heard.
     pub(super) fn forget(&mut self) {
         self.transcript.clear();
@@ -273,44 +283,5 @@ impl Bench {
     /// Whether a frame has the motor's identifier.
     pub(super) fn is_own(&self, frame: &CanFrame) -> bool {
         frame.id() == u32::from(self.id().can_id())
-    }
-}
-
-impl Subject for Bench {
-    fn begin(&mut self) -> Result<(), Stop> {
-        self.go_on()?;
-        if let Some((dialect, id)) = self.foreign {
-            return Err(Stop::Lost(format!(
-                "motor {id} answers as {dialect} motors do: it does not speak V1.62 and is not driven"
-            )));
-        }
-        if self.runaway {
-            let id = self.id();
-            return Err(Stop::Lost(format!("motor {id} cannot be switched off: it is not driven")));
-        }
-        self.settle(Duration::from_millis(5))?;
-        self.at_rest()?;
-        self.forget();
-        Ok(())
-    }
-
-    fn restore(&mut self) -> Result<(), Stop> {
-        self.put_back()
-    }
-
-    fn allows(&self, need: Need) -> bool {
-        self.options.allowed.contains(&need)
-    }
-
-    fn transcript(&self) -> Vec<String> {
-        let line = |(direction, frame): &(Direction, CanFrame)| {
-            let arrow = if *direction == Direction::HostToDrive { '>' } else { '<' };
-            format!("{arrow} {}", words(frame, *direction))
-        };
-        self.transcript.iter().map(line).collect()
-    }
-
-    fn differences(&mut self) -> Vec<Finding> {
-        self.beside.take()
     }
 }

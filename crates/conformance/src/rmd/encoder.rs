@@ -4,7 +4,7 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::units::{CentiDegrees, SpeedLimit};
 
 use super::bench::Bench;
-use super::case;
+use super::case::case;
 use super::frames::{filled, null_bytes_are_0, request};
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{R4, R8, R9, R19, R20, R26, R31};

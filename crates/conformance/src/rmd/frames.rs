@@ -4,7 +4,7 @@ use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Stop as Halt, *};
 
 use super::bench::Bench;
-use super::{Clauses, case, subject};
+use super::case::{Clauses, case, subject};
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{R4, R11, R30, R42};
 

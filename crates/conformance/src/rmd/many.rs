@@ -5,7 +5,7 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::units::IqCommand;
 
 use super::bench::Bench;
-use super::case;
+use super::case::case;
 use super::torque::{pulses, torque, torque_is_an_ampere};
 use crate::case::{Case, Need, Stop};
 use crate::reading::R11;

@@ -13,6 +13,7 @@
 //! for them: try [`Need::Rom`](crate::Need::Rom) on a motor that was just switched on.
 
 mod bench;
+mod case;
 mod clauses;
 mod encoder;
 mod frames;
@@ -21,6 +22,7 @@ mod many;
 mod motion;
 mod position;
 mod power;
+mod restore;
 mod settings;
 mod speed;
 mod spin;
@@ -28,18 +30,11 @@ mod status;
 mod torque;
 mod words;
 
-use std::borrow::Cow;
-
-use motorlink_proto::rmd::Code;
-
-use crate::case::{Case, Stop};
+use crate::case::Case;
 use crate::markdown::markdown;
 
 pub use bench::{Bench, Options};
 pub use clauses::CLAUSES;
-
-/// Ids of clauses.
-type Clauses = &'static [&'static str];
 
 /// What a motor is put through: first what leaves it alone, then whether it can be switched off.
 pub fn suite() -> Vec<Case<Bench>> {
@@ -56,20 +51,6 @@ pub fn suite() -> Vec<Case<Bench>> {
         many::cases(),
     ];
     topics.into_iter().flatten().collect()
-}
-
-/// A case on a motor.
-fn case(
-    name: impl Into<Cow<'static, str>>,
-    clauses: Clauses,
-    run: impl Fn(&mut Bench) -> Result<(), Stop> + 'static,
-) -> Case<Bench> {
-    Case::new(name, clauses, run)
-}
-
-/// The name of a case about a command.
-fn subject(name: &str, code: Code) -> String {
-    format!("{name}[{:#04X}]", u8::from(code))
 }
 
 /// Every clause and what tests it, as a Markdown table.

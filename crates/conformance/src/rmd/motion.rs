@@ -5,9 +5,9 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, SpeedLimit, TurnCentiDegrees};
 
 use super::bench::Bench;
+use super::case::{Clauses, case, subject};
 use super::frames::filled;
 use super::settings::accelerate;
-use super::{Clauses, case, subject};
 use crate::case::{Case, Need, Stop};
 use crate::reading::{R4, R39};
 

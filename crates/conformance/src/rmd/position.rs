@@ -4,7 +4,7 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::units::{CentiDegrees, SpeedLimit, TurnCentiDegrees};
 
 use super::bench::Bench;
-use super::{Clauses, case, subject};
+use super::case::{Clauses, case, subject};
 use crate::case::{Case, Need, Stop};
 use crate::reading::{R13, R15, R16, R40};
 

@@ -3,7 +3,7 @@
 use motorlink_proto::rmd::{Command, Off, Run, Stop as Halt};
 
 use super::bench::Bench;
-use super::case;
+use super::case::case;
 use super::speed::{keeps_running, runs};
 use crate::case::{Case, Need, Stop};
 use crate::reading::{R17, R25};

@@ -4,7 +4,7 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::units::DpsPerSecond;
 
 use super::bench::Bench;
-use super::case;
+use super::case::case;
 use crate::case::{Case, Need, Stop};
 use crate::reading::{R24, R37};
 

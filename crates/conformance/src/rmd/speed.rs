@@ -5,7 +5,7 @@ use motorlink_proto::time::Duration;
 use motorlink_proto::units::{CentiDegrees, CentiDps, SpeedLimit};
 
 use super::bench::Bench;
-use super::case;
+use super::case::case;
 use super::settings::write;
 use crate::case::{Case, Need, Stop};
 use crate::reading::{R36, R41};

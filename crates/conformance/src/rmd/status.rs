@@ -4,7 +4,7 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::units::{Celsius, CentiDps, DeciVolts, IqFeedback};
 
 use super::bench::Bench;
-use super::case;
+use super::case::case;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{R18, R38};
 

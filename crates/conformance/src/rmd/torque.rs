@@ -10,7 +10,7 @@ use motorlink_proto::time::Duration;
 use motorlink_proto::units::{CentiDegrees, IqCommand, IqFeedback, PhaseCurrent, SpeedLimit};
 
 use super::bench::Bench;
-use super::case;
+use super::case::case;
 use super::status::phases;
 use crate::case::{Case, Need, Stop};
 use crate::reading::R38;

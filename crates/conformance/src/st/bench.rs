@@ -8,10 +8,10 @@ use motorlink_proto::st::{
 use motorlink_proto::time::{Duration, Instant};
 
 use super::found::Found;
-use super::restore::Undo;
 use super::safety;
-use super::timing::RECEPTION;
-use crate::case::{Beside, Finding, Need, ReadAs, Stop};
+use super::undo::Undo;
+use crate::case::{Beside, Need, ReadAs, Stop};
+use crate::finding::Finding;
 use crate::reading::{Reading, S1, S49, S54};
 use crate::wire::{Line, hex};
 use crate::world::World;
@@ -74,6 +74,8 @@ impl Reply {
     }
 }
 
+/// In this time a whole command must have come (4.1).
+pub(super) const RECEPTION: Duration = Duration::from_millis(25);
 /// How long a reply is waited for. A drive has one second (4.1); what comes later is told from what
 /// never comes.
 pub(super) const PATIENCE: Duration = Duration::from_millis(2_000);

@@ -6,8 +6,8 @@ use motorlink_proto::st::{
 };
 
 use super::bench::Bench;
-use super::restore::Undo;
 use super::safety;
+use super::undo::Undo;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{S22, S34, S35, S50};
 

@@ -1,24 +1,16 @@
-//! What is found out about a drive while it is tested: how many motors, which features.
+//! What is known of a drive.
 
 use std::ops::RangeInclusive;
 
-use motorlink_proto::st::register::{Feature, Features};
-use motorlink_proto::st::{
-    ErrorCode, Frame, FrameCode, HEADER_ACK, Motor, Profile, RegisterId, Status,
-};
-
-use super::bench::{Bench, frame};
-use crate::case::Stop;
-
-/// Greatest speed of a drive without MAX_APP_SPEED, rpm.
-const MODERATE: i32 = 2_000;
+use motorlink_proto::st::Status;
+use motorlink_proto::st::register::Feature;
 
 /// What is known so far.
 #[derive(Debug)]
 pub(super) struct Found {
-    motors: Option<u8>,
-    features: Vec<(Feature, bool)>,
-    speeds: Option<RangeInclusive<i32>>,
+    pub(super) motors: Option<u8>,
+    pub(super) features: Vec<(Feature, bool)>,
+    pub(super) speeds: Option<RangeInclusive<i32>>,
     /// What STATUS is at rest and in RUN, which the document does not say (SPEC-NOTES S14).
     pub(super) idle: Status,
     pub(super) run: Status,
@@ -29,110 +21,4 @@ impl Default for Found {
         let (motors, features, speeds) = Default::default();
         Found { motors, features, speeds, idle: Status::Idle, run: Status::Run }
     }
-}
-
-impl Bench {
-    /// How many motors the drive has: the last number before the first that it refuses.
-    pub(super) fn motors(&mut self) -> Result<u8, Stop> {
-        if let Some(motors) = self.found.motors {
-            return Ok(motors);
-        }
-        let mut motors = 0;
-        for number in 1..=Motor::MAX {
-            let header = Frame::header(FrameCode::GetReg.number(), number);
-            let reply = self.exchange(&frame(header, &[RegisterId::STATUS.0]))?;
-            if reply.is_nack(ErrorCode::BadMotorSelected) {
-                break;
-            }
-            motors = number;
-        }
-        self.found.motors = Some(motors);
-        Ok(motors)
-    }
-
-    /// A motor number that the drive has to refuse; a drive with seven motors has none.
-    pub(super) fn missing_motor(&mut self) -> Result<u8, Stop> {
-        match self.motors()? {
-            Motor::MAX => Err(Stop::Skipped("the drive has seven motors".to_owned())),
-            motors => Ok(motors + 1),
-        }
-    }
-
-    /// A motor beside the one under test.
-    pub(super) fn other_motor(&mut self) -> Result<u8, Stop> {
-        let tested = self.options.motor.number();
-        match self.motors()? {
-            1 => Err(Stop::Skipped("the drive has one motor".to_owned())),
-            _ => Ok(if tested == 1 { 2 } else { 1 }),
-        }
-    }
-
-    /// Whether the drive is built with a feature: whether it lets any register of it be read. One
-    /// whose registers cannot be read counts as missing.
-    pub(super) fn has(&mut self, feature: Feature) -> Result<bool, Stop> {
-        if let Some((_, there)) = self.found.features.iter().find(|(known, _)| *known == feature) {
-            return Ok(*there);
-        }
-        let mut there = feature == Feature::Core;
-        let profile = self.profile();
-        let of = |id: RegisterId| id.shape().is_some_and(|shape| shape.feature == feature);
-        for register in RegisterId::all().filter(|&id| of(id) && read_size(id, profile).is_some()) {
-            if there {
-                break;
-            }
-            let request = self.frame(FrameCode::GetReg.number(), &[register.0]);
-            there = self.exchange(&request)?.header == HEADER_ACK;
-        }
-        self.found.features.push((feature, there));
-        Ok(there)
-    }
-
-    /// Speeds that the motor can have, rpm, without their sign: those that the application says, or
-    /// moderate ones.
-    pub(super) fn speeds(&mut self) -> Result<RangeInclusive<i32>, Stop> {
-        if let Some(speeds) = &self.found.speeds {
-            return Ok(speeds.clone());
-        }
-        let mut bounds = [0, MODERATE];
-        for (bound, register) in
-            bounds.iter_mut().zip([RegisterId::MIN_APP_SPEED, RegisterId::MAX_APP_SPEED])
-        {
-            let request = self.frame(FrameCode::GetReg.number(), &[register.0]);
-            let reply = self.exchange(&request)?;
-            let value = register
-                .decode(self.profile(), &reply.payload)
-                .filter(|_| reply.header == HEADER_ACK);
-            *bound = value.unwrap_or(*bound);
-        }
-        let speeds = bounds[0]..=bounds[1];
-        self.found.speeds = Some(speeds.clone());
-        Ok(speeds)
-    }
-
-    /// Skips the case unless the drive has a feature.
-    pub(super) fn need(&mut self, feature: Feature) -> Result<(), Stop> {
-        match self.has(feature)? {
-            true => Ok(()),
-            false => Err(Stop::Skipped(format!("not built in: {}", feature.name()))),
-        }
-    }
-
-    /// Skips the case if the drive has a feature.
-    pub(super) fn need_no(&mut self, feature: Feature) -> Result<(), Stop> {
-        match self.has(feature)? {
-            true => Err(Stop::Skipped(format!("built in: {}", feature.name()))),
-            false => Ok(()),
-        }
-    }
-
-    /// Whether a drive that has the register's feature lets it be read.
-    pub(super) fn readable(&self, register: RegisterId) -> bool {
-        read_size(register, self.profile()).is_some()
-    }
-}
-
-/// The size of a register in a reply of a drive that has its feature; `None` where it refuses.
-pub(super) fn read_size(register: RegisterId, profile: Profile) -> Option<u8> {
-    let shape = register.shape()?;
-    shape.read_size(profile, Features::NONE.with(shape.feature))
 }

@@ -7,7 +7,7 @@ use motorlink_proto::st::{
 use motorlink_proto::time::Duration;
 
 use super::bench::{Bench, frame};
-use super::found::read_size;
+use super::explore::read_size;
 use crate::case::{Case, Stop};
 use crate::reading::{S1, S10, S47};
 

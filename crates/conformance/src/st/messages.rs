@@ -283,7 +283,7 @@ pub(super) fn empty_segment(bench: &mut Bench) -> Result<(), Stop> {
     if !reply.payload.is_empty() {
         return Err(Stop::Skipped("data segment 0 is in use".to_owned()));
     }
-    bench.undo.push(super::restore::Undo::Segment(0));
+    bench.undo.push(super::undo::Undo::Segment(0));
     Ok(())
 }
 

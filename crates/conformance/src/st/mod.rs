@@ -3,6 +3,7 @@
 mod bench;
 mod clauses;
 mod commands;
+mod explore;
 mod faults;
 mod found;
 mod frames;
@@ -14,6 +15,7 @@ mod restore;
 mod safety;
 mod sizes;
 mod timing;
+mod undo;
 mod units;
 mod values;
 

@@ -4,7 +4,7 @@ use motorlink_proto::st::register::{Access, Feature, Features, Writing};
 use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status};
 
 use super::bench::Bench;
-use super::found::read_size;
+use super::explore::read_size;
 use super::restore::is_setpoint;
 use super::values;
 use crate::case::{Case, ReadAs, Stop};

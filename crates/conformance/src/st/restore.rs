@@ -7,38 +7,12 @@ use motorlink_proto::st::{
 use motorlink_proto::time::Duration;
 
 use super::bench::{Bench, PATIENCE, Reply, frame};
-use crate::case::{Finding, Need, ReadAs, Stop, Subject};
+use super::undo::{Setpoints, Undo};
+use crate::case::{Need, ReadAs, Stop, Subject};
+use crate::finding::Finding;
 use crate::reading::S48;
 use crate::wire::hex;
 use crate::world::Unavailable;
-
-/// Something that a case changes and that is put back after it.
-#[derive(Debug, Clone)]
-pub(super) enum Undo {
-    /// A register that keeps what it is given, and its bytes.
-    Register(RegisterId, Vec<u8>),
-    /// What the next start is to do.
-    Setpoints(Setpoints),
-    /// A rev-up phase.
-    Revup(u8, RevupPhase),
-    /// A data segment that was empty.
-    Segment(u8),
-    /// A PFC that was off.
-    Pfc,
-    /// A fault condition that the world was asked to cause.
-    Fault,
-}
-
-/// Mode and references. Writing one may change another, so they are kept and put back together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Setpoints {
-    mode: i32,
-    speed: i32,
-    iq: i32,
-    id: i32,
-    /// The Id reference of speed mode, which FLUX_REF shows while a speed is what a start goes to.
-    speed_mode_id: i32,
-}
 
 /// How long a line is silent before it counts as silent: four times the reception timeout.
 const SILENCE: Duration = Duration::from_millis(100);

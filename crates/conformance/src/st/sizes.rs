@@ -4,7 +4,7 @@ use motorlink_proto::st::register::Writing;
 use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
 
 use super::bench::Bench;
-use super::found::read_size;
+use super::explore::read_size;
 use super::registers::{kept_by, writing};
 use super::values;
 use crate::case::{Case, Stop};

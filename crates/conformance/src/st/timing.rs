@@ -3,12 +3,10 @@
 use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
 use motorlink_proto::time::Duration;
 
-use super::bench::{Bench, Reply};
+use super::bench::{Bench, RECEPTION, Reply};
 use crate::case::{Case, Stop};
 use crate::reading::{S11, S29};
 
-/// In this time a whole command must have come (4.1).
-pub(super) const RECEPTION: Duration = Duration::from_millis(25);
 /// In this time a reply must have come (4.1).
 const ANSWER: Duration = Duration::from_millis(1_000);
 /// How late after the reception timeout its NACK may come: for a drive that looks at its timer

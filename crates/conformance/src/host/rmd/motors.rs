@@ -16,7 +16,8 @@ use motorlink_proto::units::{
 };
 
 use crate::host::journal::{Exchange, Journal};
-use crate::host::script::{Outbox, Send};
+use crate::host::outbox::Outbox;
+use crate::host::script::Send;
 use crate::wire::hex;
 
 /// A scenario for an RMD host.

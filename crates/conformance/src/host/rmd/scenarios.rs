@@ -5,8 +5,8 @@ use motorlink_proto::rmd::{Code, Dialect};
 use motorlink_proto::time::Duration;
 
 use super::motors::{Scenario, Script, Sends, Turn};
+use crate::host::scenario::{DISTURBED, Demand, Task};
 use crate::host::script::{Send, share};
-use crate::host::{DISTURBED, Demand, Task};
 
 /// Request and reply are on 0x140 + ID.
 const IDENTIFIERS: &str = "RMD-1-01";

@@ -11,7 +11,8 @@ use motorlink_proto::st::{
 use motorlink_proto::time::{Duration, Instant};
 
 use crate::host::journal::Journal;
-use crate::host::script::{Outbox, Send, share};
+use crate::host::outbox::Outbox;
+use crate::host::script::{Send, share};
 use crate::wire::hex;
 
 /// A scenario for an ST host.

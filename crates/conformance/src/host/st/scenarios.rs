@@ -6,8 +6,8 @@ use motorlink_proto::st::{Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME,
 use motorlink_proto::time::Duration;
 
 use super::drive::{Scenario, Script, Sends, Turn};
+use crate::host::scenario::{DISTURBED, Demand, Task};
 use crate::host::script::{Send, share};
-use crate::host::{DISTURBED, Demand, Task};
 
 /// A slave sends nothing unasked.
 const UNASKED_IS_NOTHING: &str = "ST-2-01";

@@ -1,0 +1,25 @@
+//! Cases on a motor.
+
+use std::borrow::Cow;
+
+use motorlink_proto::rmd::Code;
+
+use super::bench::Bench;
+use crate::case::{Case, Stop};
+
+/// Ids of clauses.
+pub(super) type Clauses = &'static [&'static str];
+
+/// A case on a motor.
+pub(super) fn case(
+    name: impl Into<Cow<'static, str>>,
+    clauses: Clauses,
+    run: impl Fn(&mut Bench) -> Result<(), Stop> + 'static,
+) -> Case<Bench> {
+    Case::new(name, clauses, run)
+}
+
+/// The name of a case about a command.
+pub(super) fn subject(name: &str, code: Code) -> String {
+    format!("{name}[{:#04X}]", u8::from(code))
+}

@@ -1,0 +1,283 @@
+//! Before and after a case: the motor at rest, and everything as it was found.
+
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::rmd::{Stop as Halt, *};
+use motorlink_proto::time::Duration;
+use motorlink_proto::units::DpsPerSecond;
+
+use super::bench::Bench;
+use super::kept::Kept;
+use crate::case::{Need, ReadAs, Stop, Subject};
+use crate::finding::Finding;
+use crate::reading::R8;
+use crate::world::Unavailable;
+
+/// A motor this slow (°/s) is at rest.
+const REST: u16 = 5;
+/// A motor with less torque current than this (digits: half an ampere) is at rest.
+const CURRENTLESS: u16 = 31;
+/// A motor that has become faster by this (°/s) does not come to rest.
+const FASTER: u16 = 30;
+/// How often something is tried that puts back what was found.
+const ATTEMPTS: u32 = 3;
+/// How long a motor may take to come to rest, ms.
+const COASTING: u64 = 10_000;
+/// What is around a motor changes more slowly than what is on its bus.
+const CHANGE: Duration = Duration::from_millis(100);
+/// How long a motor may take until it answers when its power came back, ms.
+const STARTING: u64 = 5_000;
+
+impl Subject for Bench {
+    fn begin(&mut self) -> Result<(), Stop> {
+        self.go_on()?;
+        if let Some((dialect, id)) = self.foreign {
+            return Err(Stop::Lost(format!(
+                "motor {id} answers as {dialect} motors do: it does not speak V1.62 and is not driven"
+            )));
+        }
+        if self.runaway {
+            let id = self.id();
+            return Err(Stop::Lost(format!("motor {id} cannot be switched off: it is not driven")));
+        }
+        self.settle(Duration::from_millis(5))?;
+        self.at_rest()?;
+        self.forget();
+        Ok(())
+    }
+
+    fn restore(&mut self) -> Result<(), Stop> {
+        self.put_back()
+    }
+
+    fn allows(&self, need: Need) -> bool {
+        self.options.allowed.contains(&need)
+    }
+
+    fn transcript(&self) -> Vec<String> {
+        self.lines()
+    }
+
+    fn differences(&mut self) -> Vec<Finding> {
+        self.beside.take()
+    }
+}
+
+impl Bench {
+    /// Waits until the motor is at rest. One that never is, is not tested: what turns it is not
+    /// this kit's to stop.
+    pub(super) fn at_rest(&mut self) -> Result<(), Stop> {
+        let MotionStatus { speed, iq, .. } = match self.comes_to_rest()? {
+            Ok(()) => return Ok(()),
+            Err(status) => status,
+        };
+        Err(Stop::Lost(format!(
+            "motor {} is not at rest: it turns at {speed} with {:.1} A; switch it off first",
+            self.id(),
+            iq.amps()
+        )))
+    }
+
+    /// Waits until the motor is at rest, or gives what it does instead.
+    fn comes_to_rest(&mut self) -> Result<Result<(), MotionStatus>, Stop> {
+        let begun = self.millis();
+        let mut slowest = u16::MAX;
+        loop {
+            let status = self.status_of_somebody()?;
+            let (speed, iq) = (status.speed.0.unsigned_abs(), status.iq.0.unsigned_abs());
+            if speed <= REST && iq <= CURRENTLESS {
+                return Ok(Ok(()));
+            }
+            slowest = slowest.min(speed);
+            if speed > slowest.saturating_add(FASTER) || self.millis() - begun > COASTING {
+                return Ok(Err(status));
+            }
+            self.pause(Duration::from_millis(50))?;
+        }
+    }
+
+    /// Status 2, of a motor that may not be there.
+    fn status_of_somebody(&mut self) -> Result<MotionStatus, Stop> {
+        let status = self.read(ReadMotionStatus);
+        if self.heard || self.foreign.is_some() || self.answers_at_all()? {
+            return status;
+        }
+        Err(Stop::Lost(format!(
+            "motor {} does not answer; `motorlink rmd scan` tells who does",
+            self.id()
+        )))
+    }
+
+    fn answers_at_all(&mut self) -> Result<bool, Stop> {
+        let replies = self.replies(&[self.frame(ReadStatus.encode())])?;
+        Ok(replies.iter().any(|frame| self.is_own(frame)))
+    }
+
+    /// The gains; remembers them.
+    pub(super) fn keep_gains(&mut self) -> Result<Pid, Stop> {
+        let gains = self.read(ReadPid)?;
+        self.kept.gains.get_or_insert(gains);
+        Ok(gains)
+    }
+
+    /// The acceleration limit; remembers it.
+    pub(super) fn keep_acceleration(&mut self) -> Result<DpsPerSecond, Stop> {
+        let acceleration = self.read(ReadAcceleration)?.acceleration;
+        self.kept.acceleration.get_or_insert(acceleration);
+        Ok(acceleration)
+    }
+
+    /// The gains in ROM, as far as they can be known: those that a power-on brings, or without one
+    /// those that are in force. Remembers them.
+    pub(super) fn keep_rom_gains(&mut self) -> Result<Pid, Stop> {
+        self.keep_gains()?;
+        if self.options.allowed.contains(&Need::PowerCycle) {
+            self.power_cycle()?;
+        }
+        let gains = self.read(ReadPid)?;
+        self.kept.rom_gains.get_or_insert(gains);
+        Ok(gains)
+    }
+
+    /// What the encoder reads; remembers its offset.
+    pub(super) fn keep_offset(&mut self) -> Result<Encoder, Stop> {
+        let encoder = self.read(ReadEncoder)?;
+        self.kept.offset.get_or_insert(encoder.offset);
+        Ok(encoder)
+    }
+
+    /// From here on the motor may turn, and is switched off in the end.
+    pub(super) fn may_move(&mut self) {
+        self.kept.moved = true;
+    }
+
+    /// These motors may move, too.
+    pub(super) fn may_move_too(&mut self, motors: MotorSet) {
+        self.kept.others = self.kept.others.union(motors);
+    }
+
+    /// Takes the motor's power away and gives it back.
+    pub(super) fn power_cycle(&mut self) -> Result<(), Stop> {
+        self.keep_gains()?;
+        self.keep_acceleration()?;
+        self.cycle()
+    }
+
+    fn cycle(&mut self) -> Result<(), Stop> {
+        self.world.power_cycle()?;
+        let begun = self.millis();
+        while !self.answers_at_all()? {
+            self.require(self.millis() - begun < STARTING, "an answer within 5 s of power-on")?;
+        }
+        Ok(())
+    }
+
+    /// Makes a fault condition present, or ends it.
+    pub(super) fn fault(&mut self, present: bool) -> Result<(), Stop> {
+        self.kept.fault = true;
+        self.world.fault(present)?;
+        self.pause(CHANGE)
+    }
+
+    /// Switches off what was moved, ends a fault, writes back what was written. Each is tried
+    /// whatever came of the others.
+    fn put_back(&mut self) -> Result<(), Stop> {
+        let kept = std::mem::take(&mut self.kept);
+        if self.foreign.is_some() {
+            let own = kept.moved.then(|| self.id());
+            return self.off_unheard(own.into_iter().chain(kept.others));
+        }
+        let off = if kept.moved { self.switch_off() } else { Ok(()) };
+        let others = self.switch_others_off(kept.others);
+        let fault = if kept.fault { self.insist(Self::end_fault) } else { Ok(()) };
+        let rom = self.insist(|bench| bench.put_back_rom(&kept));
+        let gains = kept.gains.map_or(Ok(()), |gains| self.insist(|b| b.put_back_gains(gains)));
+        let acceleration = kept
+            .acceleration
+            .map_or(Ok(()), |limit| self.insist(|b| b.put_back_acceleration(limit)));
+        off.and(others).and(fault).and(rom).and(gains).and(acceleration)
+    }
+
+    /// Tries a few times: a bus that is bad now and then must not leave a motor changed.
+    fn insist(&mut self, act: impl Fn(&mut Self) -> Result<(), Stop>) -> Result<(), Stop> {
+        let mut done = act(self);
+        for _ in 1..ATTEMPTS {
+            if let Err(Stop::Failed(_)) = done {
+                done = act(self);
+            }
+        }
+        done
+    }
+
+    /// Off, and then a look whether it is. A motor that goes on is told to stop instead, and is not
+    /// turned again.
+    fn switch_off(&mut self) -> Result<(), Stop> {
+        let told = self.insist(|bench| bench.ask(Off.encode()).map(|_| ()));
+        if told.is_err() {
+            self.off_unheard([self.id()])?;
+        }
+        if self.comes_to_rest()?.is_err() {
+            let failed = self.failed("a motor at rest within 10 s of 0x80");
+            self.runaway = true;
+            self.ask(Halt.encode())?;
+            return Err(failed);
+        }
+        told
+    }
+
+    fn switch_others_off(&mut self, motors: MotorSet) -> Result<(), Stop> {
+        if motors.is_empty() {
+            return Ok(());
+        }
+        let off = motors.map(|motor| CanFrame::new(motor.can_id(), Off.encode()));
+        let told = self.replies(&off.collect::<Vec<_>>());
+        if told.is_err() {
+            self.off_unheard(motors)?;
+        }
+        told.map(|_| ())
+    }
+
+    fn end_fault(&mut self) -> Result<(), Stop> {
+        self.world.fault(false).map_err(|Unavailable(why)| {
+            self.failed(format!("the fault to be ended; end it by hand ({why})"))
+        })?;
+        self.pause(CHANGE)?;
+        self.read(ClearErrors).map(|_| ())
+    }
+
+    fn put_back_rom(&mut self, kept: &Kept) -> Result<(), Stop> {
+        if kept.rom_gains.is_none() && kept.offset.is_none() {
+            return Ok(());
+        }
+        if let Some(gains) = kept.rom_gains {
+            self.ask(WritePidRom(gains).encode())?;
+        }
+        if let Some(offset) = kept.offset {
+            self.read(WriteEncoderOffsetRom(EncoderOffset { offset }))?;
+        }
+        if self.options.allowed.contains(&Need::PowerCycle) {
+            self.cycle()?;
+        }
+        if let Some(gains) = kept.rom_gains {
+            let read = self.read(ReadPid)?;
+            self.require(read == gains, format!("the gains in ROM as they were: {gains:?}"))?;
+        }
+        if let Some(offset) = kept.offset {
+            let read = self.read(ReadEncoder)?.offset;
+            let held = self.require(read == offset, format!("the offset as it was: {offset}"));
+            held.read_as(R8)?;
+        }
+        Ok(())
+    }
+
+    fn put_back_gains(&mut self, gains: Pid) -> Result<(), Stop> {
+        self.ask(WritePidRam(gains).encode())?;
+        let read = self.read(ReadPid)?;
+        self.require(read == gains, format!("the gains as they were: {gains:?}"))
+    }
+
+    fn put_back_acceleration(&mut self, acceleration: DpsPerSecond) -> Result<(), Stop> {
+        self.ask(WriteAccelerationRam(Acceleration { acceleration }).encode())?;
+        let read = self.read(ReadAcceleration)?.acceleration;
+        self.require(read == acceleration, format!("the limit as it was: {acceleration}"))
+    }
+}
