@@ -1,10 +1,9 @@
 //! How the program ends when it did not do what it was asked.
 
 use motorlink::port::{NameError, PortError};
+use motorlink::relay::RelayError;
 use motorlink::{rmd, st};
 use motorlink_link::fault::FaultError;
-
-use crate::output::note;
 
 /// Why, and with which exit code.
 #[derive(Debug)]
@@ -24,17 +23,15 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// Says why on stderr; gives the exit code.
-    pub fn report(self) -> u8 {
-        let (code, message) = match self {
-            Failure::Refused(message) => (1, message),
-            Failure::Usage(message) => (2, message),
-            Failure::Line(message) | Failure::Silent(message) => (3, message),
-            Failure::Interrupted => return 130,
-            Failure::OutputClosed => return 0,
-        };
-        note(format!("{} {message}", console::style("error:").red().bold().for_stderr()));
-        code
+    /// The exit code, and the message for stderr if there is one.
+    pub fn into_parts(self) -> (u8, Option<String>) {
+        match self {
+            Failure::Refused(message) => (1, Some(message)),
+            Failure::Usage(message) => (2, Some(message)),
+            Failure::Line(message) | Failure::Silent(message) => (3, Some(message)),
+            Failure::Interrupted => (130, None),
+            Failure::OutputClosed => (0, None),
+        }
     }
 }
 
@@ -97,6 +94,15 @@ impl From<st::UnknownRegister> for Failure {
 impl From<st::ValueError> for Failure {
     fn from(error: st::ValueError) -> Self {
         Failure::Usage(error.to_string())
+    }
+}
+
+impl From<RelayError> for Failure {
+    fn from(error: RelayError) -> Self {
+        match error {
+            RelayError::Port(error) => error.into(),
+            other => Failure::Usage(other.to_string()),
+        }
     }
 }
 

@@ -93,7 +93,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
     };
     let code = match result {
         Ok(()) => 0,
-        Err(failure) => failure.report(),
+        Err(failure) => output::report(failure),
     };
     output::finish();
     code

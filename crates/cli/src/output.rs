@@ -83,6 +83,15 @@ pub fn note(text: impl std::fmt::Display) {
     }
 }
 
+/// Says on stderr why the program fails; gives the exit code.
+pub fn report(failure: Failure) -> u8 {
+    let (code, message) = failure.into_parts();
+    if let Some(message) = message {
+        note(format!("{} {message}", console::style("error:").red().bold().for_stderr()));
+    }
+    code
+}
+
 /// Prints a line at once; a reader that is gone ends the program quietly.
 pub fn line(text: &dyn std::fmt::Display) -> Result<(), Failure> {
     if let Some((results, _)) = VOICES.get() {

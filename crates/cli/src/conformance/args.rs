@@ -12,6 +12,22 @@ use crate::connection::Port;
 use crate::output::parse_span;
 use crate::st::parse_profile;
 
+/// Behind `motorlink conformance host --help`.
+const CONTRACT: &str = "\
+Your program is run once for each scenario, before a drive that misbehaves in its own way. It opens \
+the port once, reads a value 4 times and prints each on a line of its own. Where a reading fails it \
+prints something without a number, on stdout or stderr, or ends with another exit code than 0; it \
+may go on or end.
+  st   SPEED_MEAS (0x1E) of motor 1, in rpm
+  rmd  the multi-turn angle (0x92) of motor 1, in degrees
+{port} in its arguments becomes the port as motorlink names it, {path} the device or HOST:PORT; \
+MOTORLINK_PORT and MOTORLINK_PATH are the same. Each reading has a value of its own, so what your \
+program prints tells which reply it took for which request.
+With --start, --off, --echo and --cycle other commands are run as well. Those of --start and --off \
+end with 0 only when the drive acknowledged it.
+  motorlink conformance host st --serve pty:./st0 -- python3 my_host.py {path}
+docs/HOST-CONFORMANCE.md has an example in Python and what each scenario expects.";
+
 #[derive(clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -59,7 +75,7 @@ pub enum Command {
         encoder: EncoderBits,
     },
     /// Check a host: serve a drive that misbehaves and see what your program makes of it
-    #[command(after_help = super::host::CONTRACT)]
+    #[command(after_help = CONTRACT)]
     Host(Host),
     /// Print every scenario that a host is put through, as a Markdown table
     Scenarios {

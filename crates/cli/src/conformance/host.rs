@@ -14,25 +14,9 @@ use motorlink_link::serve::{Served, Server};
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::args::{Host, Which};
-use super::{refused, verdict};
+use super::results::{refused, verdict};
 use crate::failure::Failure;
 use crate::interrupt;
-
-/// Behind `motorlink conformance host --help`.
-pub const CONTRACT: &str = "\
-Your program is run once for each scenario, before a drive that misbehaves in its own way. It opens \
-the port once, reads a value 4 times and prints each on a line of its own. Where a reading fails it \
-prints something without a number, on stdout or stderr, or ends with another exit code than 0; it \
-may go on or end.
-  st   SPEED_MEAS (0x1E) of motor 1, in rpm
-  rmd  the multi-turn angle (0x92) of motor 1, in degrees
-{port} in its arguments becomes the port as motorlink names it, {path} the device or HOST:PORT; \
-MOTORLINK_PORT and MOTORLINK_PATH are the same. Each reading has a value of its own, so what your \
-program prints tells which reply it took for which request.
-With --start, --off, --echo and --cycle other commands are run as well. Those of --start and --off \
-end with 0 only when the drive acknowledged it.
-  motorlink conformance host st --serve pty:./st0 -- python3 my_host.py {path}
-docs/HOST-CONFORMANCE.md has an example in Python and what each scenario expects.";
 
 /// How long the server waits for something to do before it looks at the program.
 const TURN: Duration = Duration::from_millis(5);

@@ -2,22 +2,20 @@
 
 mod args;
 mod host;
+mod results;
 mod screen;
 mod world;
-
-use std::io::Write;
-use std::path::Path;
 
 use motorlink::port::PortName;
 use motorlink::time::Duration;
 use motorlink_conformance::wire::Real;
 use motorlink_conformance::{
-    Case, Need, Report, Subject, host as hosts, rmd, run as run_cases, scenario_table, st,
+    Case, Need, Subject, host as hosts, rmd, run as run_cases, scenario_table, st,
 };
 
 pub use args::Args;
-use args::{Command, Readings, Results, Run, Which};
-use screen::Screen;
+use args::{Command, Readings, Run, Which};
+use results::verdict;
 use world::Commands;
 
 use crate::failure::Failure;
@@ -82,63 +80,6 @@ fn conduct<B: Subject>(
         return Err(Failure::Interrupted);
     }
     verdict(&report, "the drive")
-}
-
-impl Results {
-    fn wants(&self, name: &str, clauses: &[&str]) -> bool {
-        let Some(only) = &self.only else { return true };
-        name.contains(only) || clauses.iter().any(|clause| clause.contains(only))
-    }
-
-    /// A screen for so many cases.
-    fn screen(&self, cases: usize) -> Result<Screen, Failure> {
-        match &self.only {
-            Some(only) if cases == 0 => {
-                Err(Failure::Usage(format!("no case has `{only}` in its name or its clauses")))
-            }
-            _ => Ok(Screen::new(cases, self.json_to_stdout(), self.verbose)),
-        }
-    }
-
-    fn save(&self, name: &str, report: &Report) -> Result<(), Failure> {
-        if let Some(path) = &self.junit {
-            write(path, &report.to_junit(name))?;
-        }
-        match &self.json {
-            Some(_) if self.json_to_stdout() => output::line(&report.to_json()),
-            Some(path) => write(path, &format!("{:#}\n", report.to_json())),
-            None => Ok(()),
-        }
-    }
-
-    /// `--json` without a file.
-    fn json_to_stdout(&self) -> bool {
-        self.json.as_deref() == Some(Path::new("-"))
-    }
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    let written = std::fs::File::create(path).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|error| Failure::Usage(format!("cannot write `{}`: {error}", path.display())))
-}
-
-/// `who` is what was tested.
-fn verdict(report: &Report, who: &str) -> Result<(), Failure> {
-    if report.is_clean() {
-        return Ok(());
-    }
-    match report.count("not run") {
-        0 => Err(refused(report, who)),
-        count => Err(Failure::Line(format!("{count} cases were not run: {}", report.lost()))),
-    }
-}
-
-fn refused(report: &Report, who: &str) -> Failure {
-    Failure::Refused(format!(
-        "{} of {} cases failed: {who} does not do what its document says",
-        report.failed().count(),
-        report.outcomes.len()
-    ))
 }
 
 impl Run {

@@ -7,7 +7,7 @@ mod words;
 use std::time::Duration;
 
 use motorlink::port::PortName;
-use motorlink::relay::{Event, Relay, RelayError, RelayOptions};
+use motorlink::relay::{Event, Relay, RelayOptions};
 use motorlink::rmd::OnDrop;
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::Served;
@@ -204,14 +204,10 @@ fn serve(
     // Whatever ended it, the motors come first.
     let last = relay.end();
     let told = last.iter().try_for_each(|event| tell(event, json, &supervisor));
-    if last.iter().any(leaves_something_turning) {
+    if last.iter().any(words::leaves_something_turning) {
         return Err(Failure::Line("motors may still turn: not all said that they stop".into()));
     }
     outcome.and(told)
-}
-
-fn leaves_something_turning(event: &Event) -> bool {
-    matches!(event, Event::Stopped { halts, .. } if halts.iter().any(|halt| !halt.is_stopped()))
 }
 
 fn tell(event: &Event, json: bool, supervisor: &Supervisor) -> Result<(), Failure> {
@@ -219,13 +215,4 @@ fn tell(event: &Event, json: bool, supervisor: &Supervisor) -> Result<(), Failur
     supervisor.status(&text);
     note(text);
     if json { output::line(&object) } else { Ok(()) }
-}
-
-impl From<RelayError> for Failure {
-    fn from(error: RelayError) -> Self {
-        match error {
-            RelayError::Port(error) => error.into(),
-            other => Failure::Usage(other.to_string()),
-        }
-    }
 }

@@ -14,7 +14,7 @@ use motorlink::st::{self, Client, Ramp, Request, register};
 use motorlink_link::serve::ServeName;
 use serde_json::json;
 
-use super::{leaves_something_turning, words};
+use super::words;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
 use crate::output::{line, note};
@@ -199,7 +199,7 @@ fn stopped(relay: &mut Relay, since: Instant) -> Result<f64, Failure> {
         for event in relay.turn(LOOK)? {
             let (text, _) = words::of(&event);
             note(text);
-            if matches!(event, Event::Stopped { .. }) && !leaves_something_turning(&event) {
+            if matches!(event, Event::Stopped { .. }) && !words::leaves_something_turning(&event) {
                 return Ok(since.elapsed().as_secs_f64() * 1e3);
             }
         }

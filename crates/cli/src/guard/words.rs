@@ -52,6 +52,11 @@ pub fn of(event: &Event) -> (String, Value) {
     }
 }
 
+/// Whether a motor did not confirm that it stops.
+pub fn leaves_something_turning(event: &Event) -> bool {
+    matches!(event, Event::Stopped { halts, .. } if halts.iter().any(|halt| !halt.is_stopped()))
+}
+
 fn stopped(reason: Reason, halts: &[Halt]) -> (String, Value) {
     let (why, word) = match reason {
         Reason::ClientGone => ("the program is gone", "client-gone"),

@@ -6,9 +6,9 @@ use motorlink::rmd::{
 };
 use serde_json::{Map, Value, json};
 
-use super::Session;
 use super::args::{self, Act, Direction};
 use super::read::{motion, status1, value};
+use super::session::Session;
 use crate::failure::Failure;
 use crate::output::{hex, line, parse_hex};
 

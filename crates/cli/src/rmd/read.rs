@@ -5,7 +5,7 @@ use motorlink::rmd::{
 };
 use serde_json::{Value, json};
 
-use super::Session;
+use super::session::Session;
 use crate::failure::Failure;
 use crate::output::{line, progress};
 use crate::repeat::{Repeat, repeated};

@@ -9,9 +9,9 @@ use motorlink::st::{
 use motorlink::time;
 use serde_json::json;
 
-use super::Session;
 use super::args::{Act, Pfc};
 use super::read::explain;
+use super::session::Session;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{hex, parse_hex};

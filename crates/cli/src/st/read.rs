@@ -3,7 +3,7 @@
 use motorlink::st::{Flags, Profile, Reading, RegisterId, Status, find_register, register};
 use serde_json::{Map, Value, json};
 
-use super::Session;
+use super::session::Session;
 use crate::failure::Failure;
 use crate::output::{Output, line};
 use crate::repeat::{Repeat, repeated};

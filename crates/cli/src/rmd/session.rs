@@ -1,0 +1,50 @@
+//! What commands to a motor work on.
+
+use std::time::Duration;
+
+use motorlink::rmd::{Bus, MotorHandle, Options};
+
+use super::args::Motor;
+use crate::connection::Connection;
+use crate::failure::Failure;
+use crate::output::Output;
+
+/// An open bus, the motor that is meant, and how to show what it says.
+pub struct Session {
+    pub bus: Bus,
+    pub id: u8,
+    pub output: Output,
+    pub raw: bool,
+    pub write_rom: bool,
+}
+
+pub fn connect(connection: &Connection, motor: &Motor) -> Result<Session, Failure> {
+    let port = connection.port()?;
+    let timeout = Duration::from_millis(motor.timeout.into());
+    let options = Options { timeout, ..Options::default() };
+    let bus = Bus::open_wrapped(&port, connection.around_bus()?, options)?;
+    let (output, raw) = (connection.output(), connection.raw);
+    Ok(Session { bus, id: motor.id, output, raw, write_rom: motor.write_rom })
+}
+
+impl Session {
+    /// Where results go, which come from replies to their own requests.
+    pub fn confirmed(&self) -> Result<Output, Failure> {
+        self.bus.confirm(self.motor()?.id())?;
+        Ok(self.output)
+    }
+
+    pub fn motor(&self) -> Result<MotorHandle<'_>, Failure> {
+        Ok(self.bus.motor(self.id)?)
+    }
+
+    /// What wears the ROM needs the explicit word.
+    pub fn rom(&self, what: &str) -> Result<(), Failure> {
+        if self.write_rom {
+            return Ok(());
+        }
+        Err(Failure::Usage(format!(
+            "{what} writes to the motor's ROM, which wears; add --write-rom if that is meant"
+        )))
+    }
+}
