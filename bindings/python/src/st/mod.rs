@@ -1,6 +1,7 @@
 //! ST's Motor Control Protocol.
 
 mod client;
+mod profile;
 mod reply;
 mod request;
 mod sample;
@@ -15,20 +16,12 @@ pub(crate) use scale::Scale;
 pub(crate) use verified::StVerifiedWrite;
 
 use motorlink::st::register::{Feature, Features, Writing};
-use motorlink::st::{Flags, Profile, RegisterId};
+use motorlink::st::{Flags, RegisterId};
 use pyo3::prelude::*;
 
-use crate::error::{bad_value, no_such_register};
+use crate::error::no_such_register;
 use crate::values;
 use scale::register;
-
-/// The profile of this name.
-fn profile(py: Python<'_>, name: &str) -> PyResult<Profile> {
-    Profile::ALL.into_iter().find(|profile| profile.name() == name).ok_or_else(|| {
-        let names = Profile::ALL.map(Profile::name).join("` and `");
-        bad_value(py, format_args!("there is no profile `{name}`; there are `{names}`"))
-    })
-}
 
 /// A register by name or number, with the unit that a motor of this full scale has it in.
 #[pyfunction]
@@ -78,7 +71,7 @@ pub(crate) fn st_register_name(#[pyo3(from_py_with = register)] name: RegisterId
 #[pyfunction]
 #[pyo3(signature = (profile = "spec"))]
 pub(crate) fn st_registers(py: Python<'_>, profile: &str) -> PyResult<Vec<&'static str>> {
-    let profile = self::profile(py, profile)?;
+    let profile = profile::named(py, profile)?;
     let every = Feature::ALL.iter().fold(Features::NONE, |all, &feature| all.with(feature));
     let there = |register: &RegisterId| {
         register.shape().is_some_and(|shape| {

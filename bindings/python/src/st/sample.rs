@@ -9,6 +9,7 @@ use motorlink::st::{Client, Error, Profile, RegisterId, SEGMENT_REGISTERS};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict};
 
+use super::profile;
 use super::request::{StRequest, motor_number};
 use super::scale::{Scale, register};
 use crate::error::st_error;
@@ -221,7 +222,7 @@ impl StSampling {
         raw: bool,
     ) -> PyResult<Self> {
         let stepped = Stepped::new(Plan::new(py, rate, seconds)?);
-        let reading = Reading::new(py, super::profile(py, profile)?, motors, segments, raw)?;
+        let reading = Reading::new(py, profile::named(py, profile)?, motors, segments, raw)?;
         Ok(StSampling(Mutex::new((stepped, reading))))
     }
 

@@ -6,6 +6,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
+use super::profile;
 use crate::error::{bad_value, no_such_register};
 use crate::number::digits;
 
@@ -26,7 +27,7 @@ impl Scale {
         profile: &str,
         full_scale_amps: Option<f64>,
     ) -> PyResult<Self> {
-        let profile = super::profile(py, profile)?;
+        let profile = profile::named(py, profile)?;
         Scale { profile, ampere: None }.with_full_scale(py, full_scale_amps)
     }
 

@@ -6,6 +6,7 @@ use motorlink::st::{Error, Motor, RegisterId};
 use motorlink_proto::st::{Request, Unverified, VerifiedWrite, Verifying};
 use pyo3::prelude::*;
 
+use super::profile;
 use super::request::{StRequest, motor_number};
 use super::scale::Scale;
 use crate::error::st_error;
@@ -32,7 +33,7 @@ impl StVerifiedWrite {
         let number = motor_number(py, motor)?;
         let motor = Motor::new(number).ok_or_else(|| st_error(py, &Error::NoSuchMotor(number)))?;
         let (register, bits) = request.verifiable(py)?;
-        let write = VerifiedWrite::new(super::profile(py, profile)?, register, bits);
+        let write = VerifiedWrite::new(profile::named(py, profile)?, register, bits);
         let write = write.map_err(|why| unverified(py, motor, register, why))?;
         Ok(StVerifiedWrite { motor, register, verifying: Mutex::new(write.begin(attempts)) })
     }
