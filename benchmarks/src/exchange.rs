@@ -9,9 +9,9 @@ use motorlink_proto::st::{
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::st::StDrive;
 
-use crate::Result;
 use crate::kernel::{Counter, Kernel};
 use crate::report::{Goal, Section};
+use crate::result::Result;
 
 /// Instructions that an exchange has to stay below.
 const MOST: f64 = 1_500.0;

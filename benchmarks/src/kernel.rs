@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
-use crate::Result;
+use crate::result::Result;
 
 const BATCHES: usize = 201;
 /// Repetitions in a batch.

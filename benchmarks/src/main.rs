@@ -9,15 +9,13 @@ mod line;
 mod machine;
 mod python;
 mod report;
+mod result;
 mod simulation;
-
-use std::error::Error;
 
 use clap::{Parser, Subcommand};
 
 use report::{Goal, Section, Style};
-
-type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
+use result::Result;
 
 /// Measures Motorlink on this machine. A goal that is missed is said so; the exit code stays 0.
 #[derive(Parser)]

@@ -6,9 +6,9 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::Result;
 use crate::line::Spread;
 use crate::report::{Goal, Section};
+use crate::result::Result;
 
 /// Rounds of every contestant in turn.
 const ROUNDS: u32 = 400;

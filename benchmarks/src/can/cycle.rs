@@ -8,7 +8,7 @@ use motorlink_proto::units::{CentiDps, IqCommand};
 use motorlink_sim::rmd::{RmdBus, RmdNode};
 
 use super::wire::{Sender, Transfer, Wire};
-use crate::Result;
+use crate::result::Result;
 
 /// What a cycle asks of the motors 1 to 4.
 #[derive(Debug, Clone, Copy)]

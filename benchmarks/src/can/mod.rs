@@ -6,8 +6,8 @@ mod wire;
 
 use motorlink_proto::time::Duration;
 
-use crate::Result;
 use crate::report::{Goal, Section};
+use crate::result::Result;
 use cycle::{Cycle, Outcome};
 
 const CYCLES: u32 = 2_000;

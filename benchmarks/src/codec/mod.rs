@@ -1,26 +1,13 @@
 //! Time and instructions to encode and decode each message.
 
+mod kind;
 mod rmd;
 mod st;
 
-use crate::Result;
 use crate::kernel::{Counter, Kernel};
 use crate::report::{Goal, Section};
-
-/// A request and its reply, each as a kernel that encodes and decodes it.
-struct Kind {
-    name: String,
-    request: Kernel,
-    reply: Kernel,
-}
-
-impl Kind {
-    fn new(name: String, request: impl FnMut() + 'static, reply: impl FnMut() + 'static) -> Self {
-        let request = Kernel::new(format!("{name} request"), request);
-        let reply = Kernel::new(format!("{name} reply"), reply);
-        Kind { name, request, reply }
-    }
-}
+use crate::result::Result;
+use kind::Kind;
 
 pub fn kernels() -> impl Iterator<Item = Kernel> {
     let kinds = st::kinds().into_iter().chain(rmd::kinds());

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 
-use super::Kind;
+use super::kind::Kind;
 
 /// The identifier of motor 1.
 const FIRST: u16 = MOTOR_BASE + 1;

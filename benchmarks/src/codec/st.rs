@@ -7,7 +7,7 @@ use motorlink_proto::st::{
     Parse, PositionMove, Profile, Ramp, RegisterId, Request, RevupPhase, TorqueRamp,
 };
 
-use super::Kind;
+use super::kind::Kind;
 
 const PHASE: RevupPhase = RevupPhase { speed_rpm: 1500, torque_s16a: 4000, duration_ms: 250 };
 const NAME: &[u8; 32] = b"ST MC SDK\tVer.5.4.4\0\0\0\0\0\0\0\0\0\0\0\0\0";

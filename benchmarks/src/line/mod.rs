@@ -11,8 +11,8 @@ use std::thread;
 
 use rustix::termios::ttyname;
 
-use crate::Result;
 use crate::report::{Goal, Section};
+use crate::result::Result;
 use raw::{Far, Functions};
 use sitting::{Rates, sit, yielding};
 use transport::Transport;

@@ -5,9 +5,9 @@ mod peers;
 
 use rustix::time::{ClockId, clock_gettime};
 
-use crate::Result;
 use crate::kernel::{Counter, Kernel};
 use crate::report::{Goal, Section};
+use crate::result::Result;
 
 use drives::Rig;
 use peers::{Peer, Peers};

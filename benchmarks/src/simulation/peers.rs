@@ -7,7 +7,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use serde_json::Value;
 
 use super::drives::{self, ENCODER, PLANT, Rig, SENSORLESS};
-use crate::Result;
+use crate::result::Result;
 
 const GEM: &str = "gym-electric-motor";
 const MOTULATOR: &str = "motulator";

@@ -1,0 +1,5 @@
+//! What comes of a measurement.
+
+use std::error::Error;
+
+pub type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
