@@ -1,6 +1,7 @@
 //! Both protocols through lines that misbehave, on virtual time. See docs/RELIABILITY.md.
 
 mod campaign;
+mod life;
 mod plan;
 mod report;
 mod rmd;

@@ -3,6 +3,7 @@
 use motorlink_link::fault::{FaultError, Faults};
 use motorlink_proto::st::{Profile, Recovery};
 
+use crate::life::Life;
 use crate::st::Setup;
 use crate::tally::Tally;
 use crate::{rmd, st};
@@ -12,15 +13,6 @@ use crate::{rmd, st};
 pub enum Speaks {
     St(Setup),
     Rmd(Life),
-}
-
-/// How long the programs live that speak.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Life {
-    /// One for the whole trial.
-    Long,
-    /// One after the other, each for a few exchanges; half of them are killed in the middle of one.
-    Short,
 }
 
 /// A line.

@@ -10,7 +10,7 @@ use motorlink_proto::rmd::MotorId;
 
 use bench::{Bench, MOTORS};
 
-use crate::plan::Life;
+use crate::life::Life;
 use crate::tally::{Tally, Violation};
 
 /// Runs at least `count` exchanges of the mix, one to each of four motors at most at a time. Those

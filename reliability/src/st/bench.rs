@@ -12,7 +12,7 @@ use motorlink_proto::st::{
 
 use super::drive::{MOTORS, Memory};
 use super::traffic::Ask;
-use crate::plan::Life;
+use crate::life::Life;
 use crate::tally::Tally;
 use crate::wire::{Tagged, message};
 

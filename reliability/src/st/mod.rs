@@ -14,7 +14,7 @@ use motorlink_proto::st::Error;
 use bench::Bench;
 pub use bench::Setup;
 
-use crate::plan::Life;
+use crate::life::Life;
 use crate::tally::{Tally, Trouble, Violation};
 
 /// Runs `count` exchanges of the mix. Those from `traced` on are written down in a violation.

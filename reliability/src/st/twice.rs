@@ -8,7 +8,8 @@ use motorlink_proto::st::{RegisterId, Request, question_behind};
 
 use super::bench::{Bench, Setup};
 use super::traffic::Ask;
-use crate::plan::{Life, SPEC};
+use crate::life::Life;
+use crate::plan::SPEC;
 
 /// Values of one, two and four bytes.
 const READ: [RegisterId; 6] = [
