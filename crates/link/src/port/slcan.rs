@@ -24,7 +24,7 @@ const REFUSALS: u32 = 2;
 
 /// A [`CanLink`] through an slcan adapter. The channel is closed when the link is dropped.
 ///
-/// An adapter's refusal of a single frame is counted and does not end the line: the frame's sender
+/// An adapter's refusal of a single frame does not end the line: the frame's sender
 /// notices that no motor answered. One that refuses frame after frame has lost its channel, as after
 /// a reset, and is an error, so that it is opened anew.
 #[derive(Debug)]
@@ -32,7 +32,6 @@ pub struct SlcanLink<B: ByteLink> {
     line: B,
     clock: Clock,
     codec: HostCodec,
-    refused: u64,
     refused_in_a_row: u32,
     /// Whether the adapter ever said anything.
     is_heard: bool,
@@ -60,7 +59,6 @@ impl<B: ByteLink> SlcanLink<B> {
             line,
             clock,
             codec,
-            refused: 0,
             refused_in_a_row: 0,
             is_heard: false,
             port: port.clone(),
@@ -128,16 +126,6 @@ impl<B: ByteLink> SlcanLink<B> {
     pub(super) fn line_mut(&mut self) -> &mut B {
         &mut self.line
     }
-
-    /// How many frames the adapter refused.
-    pub fn refused(&self) -> u64 {
-        self.refused
-    }
-
-    /// How many lines came that are not slcan.
-    pub fn garbage(&self) -> u64 {
-        self.codec.garbage()
-    }
 }
 
 impl<B: ByteLink> CanLink for SlcanLink<B> {
@@ -154,7 +142,6 @@ impl<B: ByteLink> CanLink for SlcanLink<B> {
                     return Ok(Some(frame));
                 }
                 Some(Answer::Refused) => {
-                    self.refused += 1;
                     self.refused_in_a_row += 1;
                     if self.refused_in_a_row >= REFUSALS {
                         return Err(PortError::AdapterRefuses { port: self.port.clone() });

@@ -355,11 +355,6 @@ impl Plant {
         angle::TURN.trailing_zeros() - u32::from(self.config.encoder.bits)
     }
 
-    /// Hall sensors A, B and C as bits 0 to 2.
-    pub fn hall(&self) -> u8 {
-        sensing::hall(self.machine.electrical_angle())
-    }
-
     /// Voltage of the bus, V.
     pub fn bus_voltage(&self) -> f32 {
         self.supply.voltage()

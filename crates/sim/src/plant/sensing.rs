@@ -1,4 +1,4 @@
-//! What the drive sees: phase currents, the encoder, Hall sensors.
+//! What the drive sees: phase currents, the encoder.
 
 use super::noise;
 use crate::vector::Vector;
@@ -109,17 +109,6 @@ impl Default for EncoderConfig {
     }
 }
 
-/// Hall sensors A, B and C, as bits 0 to 2: each is on for the half turn of which its phase's axis
-/// is the middle.
-pub(super) fn hall(electrical_angle: u32) -> u8 {
-    const THIRD: u32 = 0x5555_5555;
-    const QUARTER: u32 = 1 << 30;
-    (0..3).fold(0, |bits, phase| {
-        let from_axis = electrical_angle.wrapping_sub(THIRD.wrapping_mul(phase));
-        bits | (u8::from(from_axis.wrapping_add(QUARTER) < 1 << 31) << phase)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,14 +126,5 @@ mod tests {
         assert_eq!(sample(&odd, current), Sample { a: 10_500, b: -4_400 });
         let over = sample(&ideal, Vector::from_phases(50.0, -50.0));
         assert_eq!(over, Sample { a: i16::MAX, b: i16::MIN });
-    }
-
-    #[test]
-    fn hall_sensors_have_six_places_and_change_one_at_a_time() {
-        let places: [u8; 6] = core::array::from_fn(|sixth| hall(sixth as u32 * 0x2AAA_AAAA));
-        for (at, place) in places.iter().enumerate() {
-            assert!((1..=6).contains(place), "{places:?}");
-            assert_eq!((place ^ places[(at + 1) % 6]).count_ones(), 1, "{places:?}");
-        }
     }
 }

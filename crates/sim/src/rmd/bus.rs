@@ -5,7 +5,6 @@ use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time::Instant;
 
 use super::{RmdConfig, RmdNode};
-use crate::hash;
 
 /// A CAN bus with RMD motors, kept in an array or a vector. A motor only speaks when it is asked,
 /// so there is nothing to poll: time that passed meanwhile is made up for.
@@ -46,11 +45,6 @@ impl<N: AsRef<[RmdNode]> + AsMut<[RmdNode]>> RmdBus<N> {
     /// Lets time pass until `now`.
     pub fn advance_to(&mut self, now: Instant) {
         self.nodes.as_mut().iter_mut().for_each(|node| node.advance_to(now));
-    }
-
-    /// A fingerprint of everything that the motors are: two buses with the same behave the same.
-    pub fn state_hash(&self) -> u64 {
-        hash::fingerprint(&self.nodes.as_ref())
     }
 
     /// The motors, lowest ID first.

@@ -7,7 +7,6 @@ use motorlink_proto::st::{
 use motorlink_proto::time::{Duration, Instant};
 
 use super::{MotorConfig, StMotor};
-use crate::hash;
 
 /// An ST drive with its motors, kept in an array or a vector.
 #[derive(Debug, Clone)]
@@ -58,12 +57,6 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
     /// Takes the drive's power away and gives it back; see [`StMotor::power_cycle`].
     pub fn power_cycle(&mut self) {
         self.motors.as_mut().iter_mut().for_each(StMotor::power_cycle);
-    }
-
-    /// A fingerprint of all motors with their plants and firmware: two drives with the same one are
-    /// in the same state.
-    pub fn state_hash(&self) -> u64 {
-        hash::fingerprint(&self.motors.as_ref())
     }
 
     fn motor(&mut self, motor: Motor) -> &mut StMotor {

@@ -6,6 +6,7 @@ use motorlink_proto::rmd::{
 use motorlink_proto::st::{Command, Profile, RegisterId, Request};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{CentiDegrees, CentiDps};
+use motorlink_sim::hash;
 use motorlink_sim::rmd::RmdConfig;
 use motorlink_sim::st::{StDrive, StStation};
 
@@ -38,7 +39,7 @@ fn st_run(piece: u64) -> (Vec<u8>, u64) {
             }
         }
     }
-    (line.log, line.station.drive().state_hash())
+    (line.log, hash::fingerprint(line.station.drive()))
 }
 
 /// Every frame that two RMD motors send in a run, and where motor 1 is at its end.
@@ -59,7 +60,7 @@ fn rmd_run(piece: u64) -> (Vec<Vec<u8>>, String) {
             bench.send(&motorlink_proto::can::CanFrame::new(0x142, request));
         }
     }
-    let end = format!("{:?} {:#x}", bench.truth(), bench.bus.state_hash());
+    let end = format!("{:?} {:#x}", bench.truth(), hash::fingerprint(bench.bus.nodes()));
     (bench.log.iter().map(|frame| frame.data().to_vec()).collect(), end)
 }
 
