@@ -28,7 +28,7 @@ PYTEST_FLAGS = -q -rs -n $(WORKERS) --dist worksteal
 PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 
 # The program with the features of the whole workspace: built once for all parts.
-PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --locked
+PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example machine --locked
 
 # The parts of `make test`, the longest first: two run at a time.
 ALL_PARTS := unit python e2e miri firmware-test lint ffi-test fuzz-replay test-socketcan probe determinism deny

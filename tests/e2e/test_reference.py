@@ -5,8 +5,12 @@ gear that drive and are driven: half a second, in which currents, speed and angl
 """
 
 import functools
+import io
+import json
 import math
+import subprocess
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +24,7 @@ SAME = {"servo": "shinano"}
 SALIENT = {"shinano, salient": ("shinano", 1.8e-3)}
 MOTORS = [*PRESETS, *SALIENT]
 TOLERANCE = 0.002
-SIGNALS = ["id_amps", "iq_amps", "speed_radians_per_second", "angle_radians"]
+SIGNALS = ["id", "iq", "speed", "angle"]
 
 
 @pytest.fixture(scope="module")
@@ -76,52 +80,49 @@ GEARED = {
 EXPERIMENTS = ["locked rotor", "start", "start that hardly breaks loose", "short circuit"]
 
 
-def scenario(motor, experiment):
-    preset, inductance_q = SALIENT.get(motor, (motor, None))
-    change = f"plant.machine.inductance_q = {inductance_q}" if inductance_q else ""
-    output = experiment.output
-    if output != Output():
-        gear = f"ratio = {output.ratio}, efficiency = {output.efficiency}"
-        # Said only where the simulator has no other.
-        if not math.isclose(output.back_efficiency, 2 - 1 / output.efficiency):
-            gear += f", back_efficiency = {output.back_efficiency}"
-        load = f"inertia = {output.inertia}, torque = {output.torque}, brake = {output.brake}"
-        change = f"plant.machine.gear = {{ {gear} }}\nplant.load = {{ {load} }}"
-    vd, vq = experiment.voltage
-    return f"""
-title = "For comparison"
-duration = 0.5
-sample_us = 50
-
-[machine]
-preset = "{preset}"
-{change}
-speed = {experiment.speed}
-angle = {experiment.angle}
-locked = {str(experiment.locked).lower()}
-
-[[voltage]]
-at = 0.0
-vd = {vd}
-vq = {vq}
-"""
-
-
 @pytest.fixture(scope="module")
-def simulate(run, plants, tmp_path_factory):
+def simulate(motorlink, plants):
     """Rows of time, Id, Iq, speed and angle, by motor and experiment; each is run once."""
-    folder = tmp_path_factory.mktemp("reference")
+    machine = Path(motorlink).parent / "examples/machine"
+    if not machine.exists():
+        pytest.fail(f"{machine} is not built: `cargo build -p motorlink-sim --all-features --example machine`")
 
     @functools.cache
     def simulate(motor, name):
-        file, rows = folder / "scenario.toml", folder / "rows.csv"
         known = GEARED if name in GEARED else experiments(plants[motor])
-        file.write_text(scenario(motor, known[name]))
-        run("sim", "run", file, "--csv", rows).ended(0)
-        table = np.genfromtxt(rows, delimiter=",", names=True, deletechars="")
-        return np.array([table["time_s"], *(table[f"machine.{signal}"] for signal in SIGNALS)])
+        done = subprocess.run(
+            [machine],
+            input=json.dumps(in_words(plants[motor]["machine"], known[name])),
+            stdout=subprocess.PIPE,
+            check=True,
+            text=True,
+            timeout=20,
+        )
+        return np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1).T
 
     return simulate
+
+
+def in_words(machine, experiment):
+    """What crates/sim/examples/machine.rs reads."""
+    output = experiment.output
+    load = {}
+    if output != Output():
+        gear = {"ratio": output.ratio, "efficiency": output.efficiency}
+        # Said only where the simulator has no other.
+        if not math.isclose(output.back_efficiency, 2 - 1 / output.efficiency):
+            gear["back_efficiency"] = output.back_efficiency
+        machine = {**machine, "gear": gear}
+        load = {"inertia": output.inertia, "torque": output.torque, "brake": output.brake}
+    return {
+        "machine": machine,
+        "load": load,
+        "voltage": experiment.voltage,
+        "speed": experiment.speed,
+        "angle": experiment.angle,
+        "locked": experiment.locked,
+        "steps": 10_000,
+    }
 
 
 def deviations(rows, solution):

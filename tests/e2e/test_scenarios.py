@@ -116,19 +116,6 @@ def test_a_refusal_that_was_not_announced_fails_the_run(run, write):
     assert other.json["refusals"][0]["reply"] == "SET_READ_ONLY"
 
 
-def test_a_bare_machine_is_that_of_its_equations(run, write, tmp_path):
-    """The current of a locked rotor has the time constant L/R of its winding."""
-    scenario = write(
-        "[[voltage]]\nat = 0.1\nvd = 0.32\nvq = 0",
-        motor='sample_us = 500\n[machine]\npreset = "shinano"\nlocked = true',
-    )
-    run("sim", "run", scenario, "--csv", tmp_path / "run.csv").ended(0)
-    samples = columns(tmp_path / "run.csv")
-    for time, current in zip(samples["time_s"], samples["machine.id_amps"]):
-        expected = 1 - math.exp(-(time - 0.1) * 0.32 / 1.1e-3) if time > 0.1 else 0
-        assert abs(current - expected) < 1e-4, time
-
-
 def test_a_load_comes_from_a_file_beside_the_scenario(run, write, tmp_path):
     (tmp_path / "pump.csv").write_text("t_s,newton_metres\n0,0\n1,0.1\n")
     scenario = write(
@@ -192,7 +179,6 @@ def test_events_stand_in_the_picture(run, write, tmp_path):
         ("[[event]]\nat = 0\nst = 1\nsend = 'set'\nregister = 'SPEED_MES'\nvalue = 1", "SPEED_MEAS"),
         ("[[expect]]\nwhy = ''\nsignal = 'st1.speed_rpm'\nat = 3\nmin = 0", "expect 1"),
         ("[[load_profile]]\nst = 1\nfile = 'none.csv'", "none.csv"),
-        ("[machine]\npreset = 'mains'", "[[st.motor]]"),
         ("title = 'twice'", "title"),
     ],
 )

@@ -2,8 +2,6 @@
 
 use motorlink_proto::rmd::{Errors, Mode};
 use motorlink_proto::st::{Flags, Status};
-use motorlink_sim::angle::TURN;
-use motorlink_sim::plant::Machine;
 use motorlink_sim::rmd::RmdNode;
 use motorlink_sim::st::StMotor;
 
@@ -108,9 +106,7 @@ pub fn short(value: f64) -> String {
 
 /// Endings of names that say a unit: ending, quantity, symbol. The first that fits counts.
 const UNITS: &[(&str, &str, &str)] = &[
-    ("_radians_per_second", "Speed", "rad/s"),
     ("_newton_metres", "Torque", "Nm"),
-    ("_radians", "Angle", "rad"),
     ("_degrees", "Angle", "°"),
     ("_rpm", "Speed", "rpm"),
     ("_dps", "Speed", "°/s"),
@@ -192,14 +188,6 @@ signals!(ST, motorlink_sim::st::Truth, |truth| {
     inverter_celsius = truth.plant.inverter_temperature;
     status[Names::Status] = u8::from(truth.status);
     faults[Names::Faults] = (truth.flags.occurred() | truth.flags.present()) as u8;
-});
-
-signals!(MACHINE, Machine, |machine| {
-    id_amps = machine.rotor_current().x;
-    iq_amps = machine.rotor_current().y;
-    speed_radians_per_second = machine.speed();
-    angle_radians = machine.position() as f64 * (core::f64::consts::TAU / TURN as f64);
-    torque_newton_metres = machine.torque();
 });
 
 /// An RMD motor and the errors that its drive remembers.
@@ -293,8 +281,7 @@ mod tests {
         let document = include_str!("../../../docs/SCENARIOS.md");
         let st = ST.iter().map(|row| row.signal("st1"));
         let rmd = RMD.iter().map(|row| row.signal("rmd1"));
-        let machine = MACHINE.iter().map(|row| row.signal("machine"));
-        for signal in st.chain(rmd).chain(machine) {
+        for signal in st.chain(rmd) {
             let quantity = signal.name.split_once('.').unwrap().1;
             assert!(document.contains(&format!("`{quantity}`")), "{quantity} is not documented");
             assert!(

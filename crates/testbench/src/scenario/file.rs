@@ -9,8 +9,7 @@ use toml::{Table, Value};
 
 use super::event::{Action, Event};
 use super::expect::Written;
-use super::machine::{BareMachine, WrittenMachine, WrittenVoltage};
-use super::play::{Panel, Scenario, Subject};
+use super::play::{Panel, Scenario};
 use super::reader::Reader;
 use super::script::Script;
 use crate::cast::{Cast, Target};
@@ -36,9 +35,6 @@ struct File {
     profile: Option<Value>,
     st: Option<Value>,
     rmd: Option<Value>,
-    machine: Option<WrittenMachine>,
-    #[serde(default)]
-    voltage: Vec<WrittenVoltage>,
     #[serde(default)]
     event: Vec<Table>,
     #[serde(default)]
@@ -100,10 +96,8 @@ impl Scenario {
     pub fn parse(text: &str, folder: &Path) -> Result<Self, String> {
         let mut file: File = toml::from_str(text).map_err(|error| error.to_string())?;
         let (duration, sample) = times(file.duration, file.sample_us)?;
-        let (subject, signals) = match file.machine.take() {
-            Some(machine) => file.machine(machine, duration, sample)?,
-            None => file.drives(folder, duration)?,
-        };
+        let script = file.script(folder, duration)?;
+        let signals = script.cast.signals();
         let count = duration.0 / sample.0 + 1;
         if count.saturating_mul(signals.len() as u64) > MOST_VALUES {
             return Err(format!(
@@ -117,53 +111,16 @@ impl Scenario {
             written.resolve(&signals, step, count as usize)
         })?;
         let (title, about) = (file.title, file.about);
-        Ok(Scenario { title, about, duration, sample, panels, subject, signals, expectations })
+        Ok(Scenario { title, about, duration, sample, panels, script, signals, expectations })
     }
 }
 
 impl File {
-    /// A bare machine.
-    fn machine(
-        &mut self,
-        machine: WrittenMachine,
-        duration: Duration,
-        sample: Duration,
-    ) -> Result<(Subject, Vec<Signal>), String> {
-        let odd = [
-            ("profile", self.profile.is_some()),
-            ("[[st.motor]]", self.st.is_some()),
-            ("[[rmd.motor]]", self.rmd.is_some()),
-            ("[[event]]", !self.event.is_empty()),
-            ("[[load_profile]]", !self.load_profile.is_empty()),
-        ];
-        if let Some((name, _)) = odd.iter().find(|(_, there)| *there) {
-            return Err(format!("a bare machine has no {name}; leave it or [machine] out"));
-        }
-        let machine = machine.resolve()?;
-        if !sample.0.is_multiple_of(machine.step().0) {
-            return Err(format!("sample_us is a multiple of the step, {} µs", machine.step().0));
-        }
-        let voltages = numbered("voltage", take(&mut self.voltage), |voltage| {
-            voltage.resolve(&machine, duration)
-        })?;
-        let machine = machine.fed_with(voltages);
-        Ok((Subject::Machine(Box::new(machine)), BareMachine::signals()))
-    }
-
     /// Drives and what happens to them.
-    fn drives(
-        &mut self,
-        folder: &Path,
-        duration: Duration,
-    ) -> Result<(Subject, Vec<Signal>), String> {
-        if !self.voltage.is_empty() {
-            return Err("only a bare [machine] is fed with a [[voltage]]".to_owned());
-        }
+    fn script(&mut self, folder: &Path, duration: Duration) -> Result<Script, String> {
         let (st, rmd) = (self.st.is_some(), self.rmd.is_some());
         if !st && !rmd {
-            return Err(
-                "there is no motor: add [[st.motor]], [[rmd.motor]] or [machine]".to_owned()
-            );
+            return Err("there is no motor: add [[st.motor]] or [[rmd.motor]]".to_owned());
         }
         let sections =
             [("profile", self.profile.take()), ("st", self.st.take()), ("rmd", self.rmd.take())];
@@ -189,8 +146,7 @@ impl File {
             return Err(format!("the load of {} comes from its load_profile", event.target));
         }
         events.sort_by_key(|event| event.at);
-        let signals = cast.signals();
-        Ok((Subject::Drives(Script { cast, events, loads }), signals))
+        Ok(Script { cast, events, loads })
     }
 }
 
@@ -277,8 +233,7 @@ mod tests {
             label = \"\"
         ";
         let scenario = parse(text).unwrap();
-        let Subject::Drives(script) = scenario.subject else { panic!("there are drives") };
-        let labels: Vec<&str> = script.events.iter().map(|event| &*event.label).collect();
+        let labels: Vec<&str> = scenario.script.events.iter().map(|event| &*event.label).collect();
         assert_eq!(labels, ["rmd3 90 °/s", "st1 start", ""]);
         let names: Vec<&str> = scenario.signals.iter().map(|signal| &*signal.name).collect();
         assert_eq!((names[0], names[ST.len()]), ("st1.speed_rpm", "rmd3.speed_dps"));

@@ -5,7 +5,6 @@ mod act;
 mod event;
 mod expect;
 mod file;
-mod machine;
 mod message;
 mod moment;
 mod play;

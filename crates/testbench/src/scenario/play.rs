@@ -3,7 +3,6 @@
 use motorlink_proto::time::Duration;
 
 use super::expect::Expectation;
-use super::machine::BareMachine;
 use super::run::{Played, Run};
 use super::script::Script;
 use crate::config::ConfigError;
@@ -22,16 +21,9 @@ pub struct Scenario {
     pub sample: Duration,
     /// What is plotted, from top to bottom.
     pub panels: Vec<Panel>,
-    pub(super) subject: Subject,
+    pub(super) script: Script,
     pub(super) signals: Vec<Signal>,
     pub(super) expectations: Vec<Expectation>,
-}
-
-/// What a scenario is about.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Subject {
-    Drives(Script),
-    Machine(Box<BareMachine>),
 }
 
 /// A part of the plot.
@@ -51,10 +43,8 @@ impl Scenario {
     /// # Errors
     /// Drives that cannot be; never those of a scenario that was read.
     pub fn run(&self) -> Result<Run, ConfigError> {
-        let Played { columns, marks, refusals, state_hash } = match &self.subject {
-            Subject::Drives(script) => script.play(self.duration, self.sample)?,
-            Subject::Machine(machine) => machine.play(self.duration, self.sample),
-        };
+        let Played { columns, marks, refusals, state_hash } =
+            self.script.play(self.duration, self.sample)?;
         let step = self.sample.0 as f64 / 1e6;
         let check = |expectation: &Expectation| expectation.check(&self.signals, &columns, step);
         Ok(Run {
