@@ -1,0 +1,145 @@
+"""Which motors a guard stops and how, on either protocol."""
+
+import json
+import os
+
+import pytest
+
+from guarded import PORT, rests, turns
+from lines import Meddler, RawLine
+from program import eventually
+from st_wire import ACK, EXECUTE, frame, header
+
+
+def test_rmd_motors_are_ended_as_told(sim, guard, client):
+    for on_loss, mode in (("off", "off"), ("stop", "stopped")):
+        drives = sim(st=())
+        process = guard("rmd", drives, "--on-loss", on_loss, "--json")
+        program = client("rmd", process.port)
+        turns(drives, "rmd")
+        program.kill()
+        eventually(lambda: drives.motor(1)["mode"] == mode, f"the motor is {mode}")
+        process.until(lambda: any('"stopped"' in text for text in process.out), "the event")
+        event = next(json.loads(text) for text in process.out if '"stopped"' in text)
+        assert event["reason"] == "client-gone"
+        assert [(motor["motor"], motor["stopped"]) for motor in event["motors"]] == [(1, True)]
+        process.interrupt()
+        assert process.wait() == 0
+        drives.end()
+
+
+def test_an_acknowledge_of_the_programs_own_end_does_not_stand_for_the_guards(sim, start, tmp_path):
+    """The program switches off, moves on and dies; replies are late, and the guard's first 0x80 is lost."""
+    drives = sim(st=())
+    with Meddler(tmp_path / "bus", drives.can, delay=0.01) as bus:
+        serve = f"slcan-pty:{tmp_path}/held"
+        process = start("guard", "rmd", "-p", f"slcan:{bus.path}", "--serve", serve, "--json")
+        process.line(0)
+        with RawLine(tmp_path / "held") as line:
+            line.say(b"\rC\rS8\rO\r", b"\r")
+            os.write(line.end, b"t14188000000000000000\rt1418A2000000A08C0000\r")
+            eventually(lambda: bus.passed(b"t1418A2"), "the motor is told to turn")
+            bus.lose(b"t141880")
+        eventually(lambda: bus.is_lost(b"t141880"), "the guard's first 0x80 is lost")
+        process.says("motor 1 is stopped (0x80 acknowledged)")
+        assert drives.motor(1)["mode"] == "off"
+        assert not any("another node" in text for text in process.err), process.err
+
+
+def test_an_rmd_motor_that_its_program_ended_is_left_as_it_is(sim, guard):
+    drives = sim(st=())
+    process = guard("rmd", drives)
+    # It held motor 2 still by itself, and left motor 1 turning.
+    with RawLine(process.port) as line:
+        line.say(b"\rC\rS8\rO\r", b"\r")
+        line.say(b"t1428A2000000A08C0000\r", b"t1428A2")
+        line.say(b"t14288100000000000000\r", b"t142881")
+        line.say(b"t1418A2000000A08C0000\r", b"t1418A2")
+    process.says("motor 1 is stopped (0x80 acknowledged)")
+    assert not any("motor 2" in text for text in process.err), process.err
+    assert drives.motor(2)["mode"] == "stopped"
+
+
+def test_what_other_nodes_command_is_reported(sim, start, client, run, tmp_path):
+    drives = sim(st=(), rmd=("tcp",))
+    port = f"slcan:tcp:{drives.can_address}"
+    process = start("guard", "rmd", "-p", port, "--serve", f"slcan-pty:{tmp_path}/held", "--json")
+    process.line(0)
+    program = client("rmd", f"{tmp_path}/held", "poll")
+    other = ("rmd", "-p", port, "--timeout", 500, "--id", 3)
+    run(*other, "status").ended(0)
+    assert not any("another node" in text for text in process.err), process.err
+    run(*other, "speed", 100).ended(0)
+    process.says("motor 3 is commanded by another node of the bus (0xa2)")
+    program.kill()
+    process.says("motor 1 is stopped")
+    assert drives.motor(3)["mode"] == "speed", "it is another's"
+
+
+def test_an_rmd_guard_over_a_lost_port_goes_on_when_it_is_back(sim, guard, client):
+    drives = sim(st=())
+    process = guard("rmd", drives)
+    program = client("rmd", process.port)
+    turns(drives, "rmd")
+    drives.kill()
+    process.says("the drive's port is lost")
+    program.kill()
+    process.says("motor 1 MAY STILL TURN")
+    drives = sim(st=())
+    process.says("the drive's port is back")
+    process.says("motor 1 is stopped (0x80 acknowledged)")
+
+
+@pytest.mark.parametrize("protocol", PORT)
+def test_a_guard_proves_that_it_stops_a_motor(bench, run, protocol):
+    drives = bench(protocol)
+    speed = {"st": 1200, "rmd": 300}[protocol]
+    words = ["guard", protocol, "-p", PORT[protocol](drives), "--prove", "--spin", speed]
+    shown = run(*words, within=60).ended(0)
+    assert "acknowledged its stop after" in shown.out and "seen at rest after" in shown.out
+    assert "SIGKILL" in shown.err
+    proof = run(*words, "--json", within=60).ended(0).json
+    assert proof["proved"] and proof["motor"] == 1
+    assert proof["speed"] >= 0.8 * speed
+    assert 0 < proof["stopped_after_ms"] < proof["still_after_ms"]
+    rests(drives, protocol)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["st", "-p", "slcan:/dev/ttyACM0"], "guard rmd"),
+        (["-p", "socketcan:can0"], "guard rmd"),
+        (["rmd", "-p", "/dev/ttyACM0"], "use slcan:"),
+        (["st", "-p", "sim:"], "end with it"),
+        (["rmd", "-p", "sim:"], "end with it"),
+        (["rmd"], "which port?"),
+    ],
+)
+def test_what_cannot_be_guarded_is_told(run, words, says):
+    assert says in run("guard", *words).ended(2).err
+
+
+def test_two_requests_at_once_do_not_hide_which_motor_is_started(sim, guard):
+    """Motor number 0 is the motor of the request before, which is not answered yet."""
+    drives = sim(rmd=())
+    for before in ([0x22, 0x01, 0x02, 0x25], [0x22, 0x01, 0xFF, 0x23], [0x01, 0x02, 0x00, 0x00, 0x03]):
+        process = guard("st", drives)
+        with RawLine(process.port) as line:
+            line.say(bytes([0x42, 0x01, 0x02, 0x45]), b"\xf0\x01")
+            os.write(line.end, bytes([*before, 0x03, 0x01, 0x01, 0x05]))
+            turns(drives, "st")
+        process.says("motor 1 is stopped")
+        rests(drives, "st")
+        process.interrupt()
+        assert process.wait() == 0
+
+
+def test_the_pfc_that_a_program_enabled_is_disabled(sim, guard, tmp_path):
+    drives = sim(rmd=())
+    process = guard("st", drives)
+    line = os.open(process.port, os.O_RDWR | os.O_NOCTTY)
+    os.write(line, frame(header(EXECUTE, 1), [0x0A]))
+    assert os.read(line, 16)[0] == ACK
+    os.close(line)
+    process.says("the PFC is stopped (PFC_DISABLE acknowledged)")

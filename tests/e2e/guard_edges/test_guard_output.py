@@ -1,0 +1,93 @@
+"""Output that nobody reads, and a supervisor that does not listen."""
+
+import json
+import os
+import socket
+import subprocess
+
+import pytest
+
+from guarded import PORT, rests, turns
+from program import environment, eventually
+from unread import UNREAD
+
+
+@pytest.mark.parametrize("output", UNREAD)
+@pytest.mark.parametrize("protocol", PORT)
+def test_a_guard_whose_output_nobody_reads_guards_on_and_ends(bench, mute, client, protocol, output):
+    drives = bench(protocol)
+    process = mute(protocol, drives, output)
+    for _ in range(3):
+        program = client(protocol, process.port, "poll")
+        turns(drives, protocol)
+        program.kill()
+        rests(drives, protocol)
+    client(protocol, process.port)
+    turns(drives, protocol)
+    process.process.terminate()
+    assert process.process.wait(15) == 0
+    rests(drives, protocol)
+
+
+def test_a_thousand_refused_programs_freeze_no_guard(bench, start, client, tmp_path):
+    """Each is a line on stderr, and nobody reads them."""
+    drives = bench("st")
+    words = ["guard", "-p", drives.st, "--serve", "tcp-listen:127.0.0.1:0"]
+    process = start(*words)
+    announced = json.loads(process.line(0))
+    host, _, number = announced["path"].rpartition(":")
+    program = client("st", announced["path"])
+    turns(drives, "st")
+    # The reader of this test stands still, as a shell does that nobody looks at.
+    with process._news:
+        for _ in range(1500):
+            socket.create_connection((host, int(number)), timeout=5).close()
+        program.kill()
+        rests(drives, "st")
+    process.says("lines were dropped here")
+    process.interrupt()
+    assert process.wait() == 0
+
+
+@pytest.mark.parametrize("output", ["full", "terminal"])
+def test_simulated_drives_go_on_while_nobody_reads_what_they_answer(motorlink, run, tmp_path, output):
+    ends = UNREAD[output]()
+    process = subprocess.Popen(
+        [motorlink, "sim", "--st", f"pty:{tmp_path}/st0"],
+        stdin=subprocess.PIPE, stdout=ends[1], stderr=ends[1], env=environment(),
+    )
+    os.close(ends[1])
+    try:
+        eventually(lambda: os.path.lexists(tmp_path / "st0"), "the served port")
+        process.stdin.write(b'{"command":"state"}\n' * 500)
+        process.stdin.flush()
+        for _ in range(3):
+            run("st", "-p", tmp_path / "st0", "info").ended(0)
+    finally:
+        process.terminate()
+        code = process.wait(15)
+        process.stdin.close()
+        os.close(ends[0])
+    assert code == 0
+
+
+def test_a_supervisor_that_does_not_listen_does_not_hold_up_a_guard(bench, start, client, tmp_path):
+    drives = bench("st")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(str(tmp_path / "notify"))
+        variables = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "40000"}
+        serve = f"unix-listen:{tmp_path}/held"
+        process = start("guard", "-p", drives.st, "--serve", serve, **variables)
+        process.line(0)
+        assert systemd.recv(4096) == b"READY=1\n"
+        began = drives.do("state")["time"]
+        eventually(lambda: drives.do("state")["time"] > began + 1, "the socket is full")
+        for _ in range(2):
+            program = client("st", f"unix:{tmp_path}/held")
+            turns(drives, "st")
+            program.kill()
+            rests(drives, "st")
+        heard = {systemd.recv(4096).split(b"=")[0] for _ in range(10)}
+        assert b"WATCHDOG" in heard
+        process.interrupt()
+        assert process.wait() == 0
