@@ -43,21 +43,13 @@ pub fn frame(data: &[u8]) {
             assert_eq!(field.raw(&bytes), field.raw(data), "{}", field.name);
         }
     }
-    stable::<Pid>(data);
-    stable::<Acceleration>(data);
-    stable::<Encoder>(data);
-    stable::<EncoderOffset>(data);
-    stable::<MultiTurnAngle>(data);
-    stable::<SingleTurnAngle>(data);
-    stable::<Status>(data);
-    stable::<MotionStatus>(data);
-    stable::<PhaseCurrents>(data);
-    stable::<SetTorque>(data);
-    stable::<SetSpeed>(data);
-    stable::<SetPosition>(data);
-    stable::<SetPositionLimited>(data);
-    stable::<SetSingleTurnPosition>(data);
-    stable::<SetSingleTurnPositionLimited>(data);
+    macro_rules! all_stable {
+        ($($name:ident)+) => { $(
+            stable::<$name>(data);
+            stable::<<$name as Command>::Reply>(data);
+        )+ };
+    }
+    motorlink_proto::for_each_rmd_command!(all_stable);
     assert_eq!(SetTorque4::decode(data).encode(), *data);
 }
 

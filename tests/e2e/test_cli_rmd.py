@@ -9,7 +9,7 @@ from program import eventually
 
 PORTS = ["slcan", "slcan:tcp", "sim"]
 OK = {"ok": True}
-MOTION = {"temperature", "torque_current", "speed", "encoder"}
+MOTION = {"temperature", "iq", "speed", "encoder"}
 GAINS = ["position_kp", "position_ki", "speed_kp", "speed_ki", "torque_kp", "torque_ki"]
 SHIPPED_GAINS = "100 100 100 100 100 100"
 
@@ -52,7 +52,7 @@ def test_scan_asks_all_32_ids(run, sim, tmp_path):
 def test_status_tells_everything_about_a_motor(rmd):
     status = rmd("-i", 4, "--json", "status").ended(0).json
     assert set(status) == MOTION | {
-        *("id", "voltage", "errors", "phase_a", "phase_b", "phase_c", "angle", "circle_angle")
+        *("id", "voltage", "errors", "phase_a", "phase_b", "phase_c", "multi_turn_angle", "single_turn_angle")
     }
     assert (status["id"], status["voltage"], status["errors"]) == (4, 24.0, [])
     assert "24.0 V" in rmd("-i", 4, "status").ended(0).out
@@ -67,16 +67,16 @@ def test_what_is_read_has_its_keys(rmd):
     assert list(rmd("-i", 4, "--json", "pid").ended(0).json) == GAINS
     assert set(rmd("-i", 4, "--json", "accel").ended(0).json) == {"acceleration"}
     assert set(rmd("-i", 4, "--json", "encoder").ended(0).json) == {
-        *("position", "original", "offset")
+        *("position", "raw", "offset")
     }
-    assert set(rmd("-i", 4, "--json", "angle").ended(0).json) == {"angle", "circle_angle"}
+    assert set(rmd("-i", 4, "--json", "angle").ended(0).json) == {"multi_turn_angle", "single_turn_angle"}
     for command in ("pid", "accel", "encoder", "angle"):
         assert rmd("-i", 4, command).ended(0).out
 
 
 def test_angle_reads_again_and_again(rmd):
     readings = rmd("--json", "angle", "--every", "10ms", "--count", 4).ended(0).lines
-    assert [set(reading) for reading in readings] == [{"t", "angle", "circle_angle"}] * 4
+    assert [set(reading) for reading in readings] == [{"t", "multi_turn_angle", "single_turn_angle"}] * 4
 
 
 @on_every_port
@@ -135,9 +135,9 @@ def test_a_max_speed_never_rounds_up_and_is_never_0(rmd, direction):
     assert next(line for line in most("2.9", "--raw").ended(0).err.splitlines() if " 02 00 " in line)
     for value in ("0", "0.999", "-1", "nan"):
         refused = most(value).ended(2).err
-        assert "give 1 °/s or more; nothing was sent" in refused and "->" not in refused
-    assert "give 1 digits or more" in most("0.9", "--raw").ended(2).err
-    assert "does not fit" in most("65536").ended(2).err
+        assert "outside 1 to 65535 °/s; nothing was sent" in refused and "->" not in refused
+    assert "outside 1 to 65535 digits" in most("0.9", "--raw").ended(2).err
+    assert "outside 1 to" in most("65536").ended(2).err
 
 
 @pytest.fixture
@@ -147,7 +147,7 @@ def near(run, sim, tmp_path):
     config.write_text("[[rmd.motor]]\nid = 1\nplant.angle_degrees = 90.034\n")
     bus = sim(config, st=())
     command = on(run, bus.port("slcan"))
-    assert command("--json", "angle").ended(0).json["circle_angle"] == 90.02
+    assert command("--json", "angle").ended(0).json["single_turn_angle"] == 90.02
     return bus, command
 
 
@@ -163,7 +163,7 @@ def test_a_move_that_could_be_nearly_a_full_turn_is_refused(near):
     eventually(lambda: abs(bus.motor(1)["angle_degrees"] - 90) < 0.022, "motor 1 is at 90°")
     rmd("off").ended(0)
     for direction in ("cw", "ccw"):
-        refused = rmd("move", 90.02, "--direction", direction, "--tolerance", 360).ended(2).err
+        refused = rmd("move", 90.02, "--direction", direction, "--tolerance", 359.99).ended(2).err
         assert "`--full-turn`" in refused
     assert abs(bus.motor(1)["angle_degrees"] - 90) < 0.03
 
@@ -185,7 +185,7 @@ def test_the_tolerance_of_a_full_turn_can_be_given(near):
     assert bus.motor(1)["mode"] == "off"
     rmd(*move, "--tolerance", 0.2).ended(0)
     assert bus.motor(1)["mode"] == "position"
-    for words, told in (("--tolerance=-1", "does not fit"), ("--tolerance=nan", "does not fit")):
+    for words, told in (("--tolerance=-1", "outside 0 to"), ("--tolerance=nan", "outside 0 to")):
         assert told in rmd(*move, words).ended(2).err
     assert "--direction" in rmd("move", 90, "--full-turn").ended(2).err
     assert "cannot be used" in rmd(*move, "--full-turn", "--tolerance", 1).ended(2).err

@@ -29,12 +29,7 @@ fn commands() -> Vec<Kind> {
     macro_rules! of {
         ($($command:ident)+) => { vec![$( kind::<$command>(), )+] };
     }
-    of! {
-        ReadPid WritePidRam WritePidRom ReadAcceleration WriteAccelerationRam ReadEncoder
-        WriteEncoderOffsetRom WriteZeroRom ReadMultiTurnAngle ReadSingleTurnAngle ReadStatus
-        ClearErrors ReadMotionStatus ReadPhaseCurrents Off Stop Run SetTorque SetSpeed SetPosition SetPositionLimited
-        SetSingleTurnPosition SetSingleTurnPositionLimited
-    }
+    motorlink_proto::for_each_rmd_command!(of)
 }
 
 fn kind<C: Command + 'static>() -> Kind {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use motorlink_proto::units::{SpeedLimit, inward};
+use motorlink_proto::units::{Quantity, inward};
 use pyo3::prelude::*;
 
 use crate::error::bad_value;
@@ -35,16 +35,6 @@ fn fitting<T: TryFrom<i64>>(
     })
 }
 
-/// Digits of `scale` in the physical unit: 239 of 0.1 are 23.9, and not 23.900000000000002.
-pub(crate) fn physical(digits: i64, scale: f64) -> f64 {
-    let parts = scale.recip().round();
-    if parts > 1.0 && parts.recip() == scale {
-        digits as f64 / parts
-    } else {
-        digits as f64 * scale
-    }
-}
-
 /// A limit, which no value may exceed; rounded towards 0, so that no digit does.
 pub(crate) fn limit<T: TryFrom<i64>>(
     py: Python<'_>,
@@ -58,16 +48,9 @@ pub(crate) fn limit<T: TryFrom<i64>>(
     fitting(py, "a limit", value, Some(inward(value, scale)), unit)
 }
 
-/// A greatest speed in °/s, rounded towards 0. What would be 0 is refused: to a drive it may mean any
-/// speed, or that the motor never moves.
-pub(crate) fn greatest_speed(py: Python<'_>, dps: f64) -> PyResult<SpeedLimit> {
-    let digits = inward(dps, SpeedLimit::SCALE);
-    if digits < 1 {
-        let (least, unit) = (SpeedLimit(1).dps(), SpeedLimit::SYMBOL);
-        let why = format!("a max speed of {dps} {unit} is too small: give {least} {unit} or more");
-        return Err(bad_value(py, format_args!("{why}; nothing was sent")));
-    }
-    fitting(py, "a max speed", dps, Some(digits), SpeedLimit::SYMBOL).map(SpeedLimit)
+/// The quantity that a program wants, in its unit. What no frame of the protocol says is refused.
+pub(crate) fn wanted<Q: Quantity>(py: Python<'_>, value: f64) -> PyResult<Q> {
+    Q::wanted(value).map_err(|error| bad_value(py, format_args!("{error}; nothing was sent")))
 }
 
 /// A duration in s as the wire's ms.

@@ -21,6 +21,9 @@ macro_rules! named_numbers {
             /// Every named value, in the order of the table.
             pub const ALL: &'static [$name] = &[$( $name::$variant, )+];
 
+            /// Each number with the document's name for it.
+            pub const NAMES: &'static [($repr, &'static str)] = &[$( ($value, $text), )+];
+
             /// The document's name; `None` for a number that it does not name.
             pub const fn name(self) -> Option<&'static str> {
                 match self {

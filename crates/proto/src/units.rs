@@ -1,4 +1,4 @@
-//! Wire integers with their unit in the type. The integer is kept exactly; conversions to and from
+//! Wire integers with their unit in the type: a row each has scale, symbols and range. The integer is kept exactly; conversions to and from
 //! physical values round to the nearest digit and saturate at the ends of the integer.
 
 /// How far a value may be from a digit and still count as it, in digits: more than what division of
@@ -14,18 +14,145 @@ pub fn inward(value: f64, scale: f64) -> i64 {
     (digits + tolerance) as i64
 }
 
-/// Declares a wire integer with its scale: `digits * NUMERATOR / DENOMINATOR` in the physical unit.
+/// A value that a message cannot carry, or that the protocol does not allow there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutOfRange {
+    /// What was given.
+    pub value: f64,
+    /// The least that can be, in [`unit`](Self::unit).
+    pub least: f64,
+    /// The most that can be.
+    pub most: f64,
+    /// Symbol of the unit; `digits` where digits were given.
+    pub unit: &'static str,
+}
+
+impl core::fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let OutOfRange { value, least, most, unit } = self;
+        if *least == -most {
+            return write!(f, "{value} {unit} is beyond ±{most} {unit}");
+        }
+        write!(f, "{value} {unit} is outside {least} to {most} {unit}")
+    }
+}
+
+impl core::error::Error for OutOfRange {}
+
+/// How a value that somebody wants becomes a digit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rounding {
+    /// The nearest digit.
+    Nearest,
+    /// Towards 0, as [`inward`]: no digit exceeds the value.
+    Inward,
+}
+
+/// What a digit is, and which there are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// One digit in the physical unit.
+    pub digit: f64,
+    /// Symbol of the physical unit; empty for a plain number.
+    pub symbol: &'static str,
+    /// The unit in a name: `amps` of `iq_amps`; empty for a plain number.
+    pub suffix: &'static str,
+    /// Digits behind the point that tell every value.
+    pub decimals: u8,
+    /// The least digit that may be asked for.
+    pub least: i64,
+    /// The greatest digit that may be asked for.
+    pub most: i64,
+    /// How a wanted value becomes a digit.
+    pub rounding: Rounding,
+}
+
+impl Scale {
+    /// A number without a unit.
+    pub const fn plain(least: i64, most: i64) -> Self {
+        let (symbol, rounding) = ("", Rounding::Nearest);
+        Scale { digit: 1.0, symbol, suffix: "", decimals: 0, least, most, rounding }
+    }
+
+    /// The digits of a value in the physical unit that somebody wants; never cut.
+    ///
+    /// # Errors
+    /// Not a number, or outside the range.
+    pub fn wanted(&self, value: f64) -> Result<i64, OutOfRange> {
+        let digits = match self.rounding {
+            Rounding::Nearest => nearest(value / self.digit),
+            Rounding::Inward => inward(value, self.digit),
+        };
+        if value.is_finite() && (self.least..=self.most).contains(&digits) {
+            return Ok(digits);
+        }
+        let (least, most) = (self.value(self.least), self.value(self.most));
+        Err(OutOfRange { value, least, most, unit: self.symbol })
+    }
+
+    /// The same scale for who gives digits.
+    pub const fn raw(self) -> Self {
+        Scale { digit: 1.0, symbol: "digits", decimals: 0, ..self }
+    }
+
+    /// Digits in the physical unit: 239 of 0.1 are 23.9, and not 23.900000000000002.
+    pub fn value(&self, digits: i64) -> f64 {
+        let parts = nearest(self.digit.recip()) as f64;
+        if parts > 1.0 && parts.recip() == self.digit {
+            return digits as f64 / parts;
+        }
+        digits as f64 * self.digit
+    }
+}
+
+/// A wire integer with a unit.
+pub trait Quantity: Sized {
+    /// What a digit is, and which may be asked for.
+    const UNIT: Scale;
+
+    /// The quantity of these digits, which are cut to what the integer holds.
+    fn from_digits(digits: i64) -> Self;
+
+    /// The digit for a value in the physical unit that somebody wants; never cut.
+    ///
+    /// # Errors
+    /// Not a number, or outside what may be asked for.
+    fn wanted(value: f64) -> Result<Self, OutOfRange> {
+        Self::UNIT.wanted(value).map(Self::from_digits)
+    }
+
+    /// As [`wanted`](Self::wanted), for who gives digits.
+    ///
+    /// # Errors
+    /// Not a number, or outside what may be asked for.
+    fn wanted_digits(digits: f64) -> Result<Self, OutOfRange> {
+        Self::UNIT.raw().wanted(digits).map(Self::from_digits)
+    }
+}
+
+/// The nearest whole number; saturates, and NaN is 0.
+fn nearest(value: f64) -> i64 {
+    (value + if value < 0.0 { -0.5 } else { 0.5 }) as i64
+}
+
+/// Declares a wire integer:
+/// `Name(integer) value from_value, digit, "symbol", decimals, least..=most, rounding`.
 macro_rules! unit {
-    ($(#[$meta:meta])* $name:ident($repr:ty), $value:ident, $from:ident, $scale:expr, $symbol:literal) => {
+    (
+        $(#[$meta:meta])* $name:ident($repr:ty), $value:ident, $from:ident, $digit:expr, $symbol:literal,
+        $decimals:literal, $least:expr => $most:expr, $rounding:ident
+    ) => {
         $(#[$meta])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
         pub struct $name(pub $repr);
 
         impl $name {
             /// One digit in the physical unit.
-            pub const SCALE: f64 = $scale;
+            pub const SCALE: f64 = $digit;
             /// Symbol of the physical unit.
             pub const SYMBOL: &'static str = $symbol;
+            /// The greatest value that may be asked for.
+            pub const MAX: Self = $name($most);
 
             #[doc = concat!("The physical value in ", $symbol, ".")]
             pub fn $value(self) -> f64 {
@@ -40,6 +167,22 @@ macro_rules! unit {
             }
         }
 
+        impl Quantity for $name {
+            const UNIT: Scale = Scale {
+                digit: $digit,
+                symbol: $symbol,
+                suffix: stringify!($value),
+                decimals: $decimals,
+                least: $least as i64,
+                most: $most as i64,
+                rounding: Rounding::$rounding,
+            };
+
+            fn from_digits(digits: i64) -> Self {
+                $name(digits as $repr)
+            }
+        }
+
         impl core::fmt::Display for $name {
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
                 write!(f, "{} {}", self.$value(), Self::SYMBOL)
@@ -50,49 +193,61 @@ macro_rules! unit {
 
 unit!(
     /// RMD multi-turn angle of 0xA3 and 0xA4: 0.01 degree a digit, positive is clockwise.
-    CentiDegrees(i32), degrees, from_degrees, 0.01, "°"
+    CentiDegrees(i32), degrees, from_degrees, 0.01, "°",
+    2, i32::MIN => i32::MAX, Nearest
 );
 unit!(
     /// RMD multi-turn angle of 0x92: 56-bit two's complement on the wire, 0.01 degree a digit.
-    WideCentiDegrees(i64), degrees, from_degrees, 0.01, "°"
+    WideCentiDegrees(i64), degrees, from_degrees, 0.01, "°",
+    2, -(1_i64 << 55) => (1_i64 << 55) - 1, Nearest
 );
 unit!(
     /// RMD single-turn angle of 0x94, 0xA5 and 0xA6: 0.01 degree a digit, 0 to 35999.
-    TurnCentiDegrees(u16), degrees, from_degrees, 0.01, "°"
+    TurnCentiDegrees(u16), degrees, from_degrees, 0.01, "°",
+    2, 0 => 35_999, Nearest
 );
 unit!(
     /// RMD speed command of 0xA2: 0.01 degree per second a digit.
-    CentiDps(i32), dps, from_dps, 0.01, "°/s"
+    CentiDps(i32), dps, from_dps, 0.01, "°/s",
+    2, i32::MIN => i32::MAX, Nearest
 );
 unit!(
     /// RMD speed feedback: 1 degree per second a digit.
-    Dps(i16), dps, from_dps, 1.0, "°/s"
+    Dps(i16), dps, from_dps, 1.0, "°/s",
+    0, i16::MIN => i16::MAX, Nearest
 );
 unit!(
     /// RMD speed limit of 0xA4 and 0xA6: 1 degree per second a digit.
-    SpeedLimit(u16), dps, from_dps, 1.0, "°/s"
+    SpeedLimit(u16), dps, from_dps, 1.0, "°/s",
+    0, 1 => u16::MAX, Inward
 );
 unit!(
     /// RMD acceleration of 0x33 and 0x34: 1 degree per second squared a digit.
-    DpsPerSecond(i32), dps_per_second, from_dps_per_second, 1.0, "°/s²"
+    DpsPerSecond(i32), dps_per_second, from_dps_per_second, 1.0, "°/s²",
+    0, 0 => i32::MAX, Nearest
 );
 unit!(
     /// RMD torque current command of 0xA1 and 0x280: 2000 digits are 32 A.
-    IqCommand(i16), amps, from_amps, 32.0 / 2000.0, "A"
+    IqCommand(i16), amps, from_amps, 32.0 / 2000.0, "A",
+    3, -2000 => 2000, Nearest
 );
 unit!(
     /// RMD torque current feedback: 2048 digits are 33 A.
-    IqFeedback(i16), amps, from_amps, 33.0 / 2048.0, "A"
+    IqFeedback(i16), amps, from_amps, 33.0 / 2048.0, "A",
+    3, i16::MIN => i16::MAX, Nearest
 );
 unit!(
     /// RMD phase current of 0x9D: 64 digits are 1 A.
-    PhaseCurrent(i16), amps, from_amps, 1.0 / 64.0, "A"
+    PhaseCurrent(i16), amps, from_amps, 1.0 / 64.0, "A",
+    3, i16::MIN => i16::MAX, Nearest
 );
 unit!(
     /// RMD supply voltage of 0x9A: 0.1 V a digit.
-    DeciVolts(u16), volts, from_volts, 0.1, "V"
+    DeciVolts(u16), volts, from_volts, 0.1, "V",
+    1, u16::MIN => u16::MAX, Nearest
 );
 unit!(
     /// RMD motor temperature: 1 degree Celsius a digit.
-    Celsius(i8), celsius, from_celsius, 1.0, "°C"
+    Celsius(i8), celsius, from_celsius, 1.0, "°C",
+    0, i8::MIN => i8::MAX, Nearest
 );

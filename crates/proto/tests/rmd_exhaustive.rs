@@ -102,19 +102,11 @@ fn kept<P: Payload>(code: u8) {
 #[test]
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn every_payload_keeps_what_its_fields_cover() {
-    kept::<Pid>(0x30);
-    kept::<Acceleration>(0x33);
-    kept::<Encoder>(0x90);
-    kept::<EncoderOffset>(0x91);
-    kept::<MultiTurnAngle>(0x92);
-    kept::<SingleTurnAngle>(0x94);
-    kept::<Status>(0x9A);
-    kept::<MotionStatus>(0x9C);
-    kept::<PhaseCurrents>(0x9D);
-    kept::<SetTorque>(0xA1);
-    kept::<SetSpeed>(0xA2);
-    kept::<SetPosition>(0xA3);
-    kept::<SetPositionLimited>(0xA4);
-    kept::<SetSingleTurnPosition>(0xA5);
-    kept::<SetSingleTurnPositionLimited>(0xA6);
+    macro_rules! all_kept {
+        ($($name:ident)+) => { $(
+            kept::<$name>($name::CODE.into());
+            kept::<<$name as Command>::Reply>($name::CODE.into());
+        )+ };
+    }
+    motorlink_proto::for_each_rmd_command!(all_kept);
 }

@@ -98,10 +98,5 @@ fn recode(code: Option<Code>, request: bool, data: &[u8; 8]) -> [u8; 8] {
             }
         };
     }
-    dispatch! {
-        ReadPid WritePidRam WritePidRom ReadAcceleration WriteAccelerationRam ReadEncoder
-        WriteEncoderOffsetRom WriteZeroRom ReadMultiTurnAngle ReadSingleTurnAngle ReadStatus ClearErrors
-        ReadMotionStatus ReadPhaseCurrents Off Stop Run SetTorque SetSpeed SetPosition SetPositionLimited SetSingleTurnPosition
-        SetSingleTurnPositionLimited
-    }
+    motorlink_proto::for_each_rmd_command!(dispatch)
 }

@@ -10,11 +10,11 @@ use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict, PyList};
 
-use super::request::{RmdRequest, motion_status, motor_id, motor_status, torque};
+use super::request::{RmdRequest, motion_status, motor_id, motor_status};
 use super::sample::{Questions, sample};
 use crate::can::{AnyPort, Threads};
 use crate::error::{bad_value, rmd_error};
-use crate::number::{limit, span};
+use crate::number::{limit, span, wanted};
 use crate::sampling::Plan;
 use crate::shared::Shared;
 use crate::signals::Deafness;
@@ -267,7 +267,7 @@ pub(crate) fn limits(
 pub(crate) fn four_torques(py: Python<'_>, amps: [f64; 4]) -> PyResult<SetTorque4> {
     let mut torques = [IqCommand(0); 4];
     for (slot, amps) in torques.iter_mut().zip(amps) {
-        *slot = torque(py, amps)?;
+        *slot = wanted(py, amps)?;
     }
     Ok(SetTorque4(torques))
 }

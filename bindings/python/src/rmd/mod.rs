@@ -18,7 +18,6 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::error::bad_value;
-use crate::number::physical;
 
 /// A motor's ID, 1 to 32.
 #[pyfunction]
@@ -52,7 +51,7 @@ pub(crate) fn rmd_decode(
     for field in fields {
         let raw = field.raw(&data);
         digits.set_item(field.name, raw)?;
-        values.set_item(quantity::named(field), physical(raw, field.scale))?;
+        values.set_item(quantity::named(field), field.scale.value(raw))?;
     }
     let direction = if reply { Direction::DriveToHost } else { Direction::HostToDrive };
     let text = describe(CanFrame::new(id, data), direction).to_string();

@@ -23,7 +23,7 @@ pub(crate) struct Quantity {
 
 /// The name of a value with its unit behind it: `speed_dps`.
 pub(crate) fn named(field: &Field) -> String {
-    let unit = match field.unit {
+    let unit = match field.scale.symbol {
         "°C" => "_c",
         "V" => "_v",
         "A" => "_a",

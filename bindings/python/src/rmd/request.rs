@@ -2,22 +2,20 @@
 
 use motorlink::rmd::FullTurn;
 use motorlink_proto::rmd::{
-    Acceleration, ClearErrors, Code, Command, Encoder, EncoderOffset, Errors, FULL_TURN,
-    MotionStatus, MotorId, MultiTurnAngle, Off, Payload, PhaseCurrents, Pid, ReadAcceleration,
-    ReadEncoder, ReadMotionStatus, ReadMultiTurnAngle, ReadPhaseCurrents, ReadPid,
-    ReadSingleTurnAngle, ReadStatus, Run, SetPosition, SetPositionLimited, SetSingleTurnPosition,
+    Acceleration, ClearErrors, Code, Command, Encoder, EncoderOffset, Errors, MotionStatus,
+    MotorId, MultiTurnAngle, Off, Payload, PhaseCurrents, Pid, ReadAcceleration, ReadEncoder,
+    ReadMotionStatus, ReadMultiTurnAngle, ReadPhaseCurrents, ReadPid, ReadSingleTurnAngle,
+    ReadStatus, Run, SetPosition, SetPositionLimited, SetSingleTurnPosition,
     SetSingleTurnPositionLimited, SetSpeed, SetTorque, SingleTurnAngle, SpinDirection, Status,
     Stop, WriteAccelerationRam, WriteEncoderOffsetRom, WritePidRam, WritePidRom, WriteZeroRom,
 };
-use motorlink_proto::units::{
-    CentiDegrees, CentiDps, DeciVolts, DpsPerSecond, IqCommand, TurnCentiDegrees, WideCentiDegrees,
-};
+use motorlink_proto::units::{DeciVolts, Quantity, TurnCentiDegrees, WideCentiDegrees};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};
 
 use crate::error::{bad_value, rmd_error};
-use crate::number::{digits, greatest_speed, physical};
+use crate::number::{digits, wanted};
 use crate::values;
 
 /// A request to an RMD motor.
@@ -71,13 +69,11 @@ impl RmdRequest {
                 EncoderOffset::decode(reply).offset.into_py_any(py)
             }
             Code::ReadMultiTurnAngle => {
-                physical(MultiTurnAngle::decode(reply).angle.0, WideCentiDegrees::SCALE)
-                    .into_py_any(py)
+                WideCentiDegrees::UNIT.value(MultiTurnAngle::decode(reply).angle.0).into_py_any(py)
             }
-            Code::ReadSingleTurnAngle => {
-                physical(SingleTurnAngle::decode(reply).angle.0.into(), TurnCentiDegrees::SCALE)
-                    .into_py_any(py)
-            }
+            Code::ReadSingleTurnAngle => TurnCentiDegrees::UNIT
+                .value(SingleTurnAngle::decode(reply).angle.0.into())
+                .into_py_any(py),
             Code::ReadStatus | Code::ClearErrors => motor_status(py, &Status::decode(reply)),
             Code::ReadPhaseCurrents => {
                 let PhaseCurrents { phase_a, phase_b, phase_c } = PhaseCurrents::decode(reply);
@@ -105,7 +101,7 @@ pub(crate) fn motion_status(py: Python<'_>, status: &MotionStatus) -> PyResult<P
 /// The reply to 0x9A.
 pub(crate) fn motor_status(py: Python<'_>, status: &Status) -> PyResult<Py<PyAny>> {
     let errors = values::motor_errors(py, (errors(py, status.errors)?, status.errors.0))?;
-    let voltage = physical(status.voltage.0.into(), DeciVolts::SCALE);
+    let voltage = DeciVolts::UNIT.value(status.voltage.0.into());
     values::motor_status(py, (status.temperature.0, voltage, errors))
 }
 
@@ -120,27 +116,23 @@ impl RmdRequest {
     /// Holds a torque current, A (0xA1).
     #[staticmethod]
     fn torque(py: Python<'_>, amps: f64) -> PyResult<Self> {
-        Ok(Self::of(SetTorque { iq: torque(py, amps)? }))
+        Ok(Self::of(SetTorque { iq: wanted(py, amps)? }))
     }
 
     /// Holds a speed, °/s (0xA2).
     #[staticmethod]
     fn speed(py: Python<'_>, dps: f64) -> PyResult<Self> {
-        let speed = CentiDps(digits(py, "a speed", dps, CentiDps::SCALE, CentiDps::SYMBOL)?);
-        Ok(Self::of(SetSpeed { speed }))
+        Ok(Self::of(SetSpeed { speed: wanted(py, dps)? }))
     }
 
     /// Turns to an angle over all turns, ° (0xA3), no faster than `max_speed`, °/s (0xA4).
     #[staticmethod]
     #[pyo3(signature = (degrees, max_speed = None))]
     fn move_to(py: Python<'_>, degrees: f64, max_speed: Option<f64>) -> PyResult<Self> {
-        let angle = digits(py, "an angle", degrees, CentiDegrees::SCALE, CentiDegrees::SYMBOL)?;
-        let angle = CentiDegrees(angle);
+        let angle = wanted(py, degrees)?;
         Ok(match max_speed {
             None => Self::of(SetPosition { angle }),
-            Some(dps) => {
-                Self::of(SetPositionLimited { max_speed: greatest_speed(py, dps)?, angle })
-            }
+            Some(dps) => Self::of(SetPositionLimited { max_speed: wanted(py, dps)?, angle }),
         })
     }
 
@@ -153,19 +145,13 @@ impl RmdRequest {
         max_speed: Option<f64>,
         clockwise: bool,
     ) -> PyResult<Self> {
-        let angle =
-            digits(py, "an angle", degrees, TurnCentiDegrees::SCALE, TurnCentiDegrees::SYMBOL)?;
-        if angle >= FULL_TURN {
-            let why = format!("a single-turn angle is 0 to 359.99 °, not {degrees} °");
-            return Err(bad_value(py, why));
-        }
-        let angle = TurnCentiDegrees(angle);
+        let angle = wanted(py, degrees)?;
         let direction =
             if clockwise { SpinDirection::Clockwise } else { SpinDirection::Counterclockwise };
         Ok(match max_speed {
             None => Self::of(SetSingleTurnPosition { direction, angle }),
             Some(dps) => {
-                let max_speed = greatest_speed(py, dps)?;
+                let max_speed = wanted(py, dps)?;
                 Self::of(SetSingleTurnPositionLimited { direction, max_speed, angle })
             }
         })
@@ -180,11 +166,7 @@ impl RmdRequest {
         tolerance: f64,
     ) -> PyResult<()> {
         let id = motor_id(py, motor)?;
-        let digits = |what, degrees| {
-            digits(py, what, degrees, TurnCentiDegrees::SCALE, TurnCentiDegrees::SYMBOL)
-                .map(TurnCentiDegrees)
-        };
-        let (at, tolerance) = (digits("an angle", angle)?, digits("a tolerance", tolerance)?);
+        let (at, tolerance) = (wanted(py, angle)?, wanted(py, tolerance)?);
         let SetSingleTurnPosition { direction, angle } = SetSingleTurnPosition::decode(&self.data);
         let checked = FullTurn::Refused { tolerance }.check(id, at, angle, direction);
         checked.map_err(|error| rmd_error(py, &error))
@@ -277,13 +259,7 @@ impl RmdRequest {
     /// Sets the acceleration limit until power-off, °/s² (0x34).
     #[staticmethod]
     fn write_acceleration(py: Python<'_>, dps2: f64) -> PyResult<Self> {
-        let unit = DpsPerSecond::SYMBOL;
-        if dps2 < 0.0 {
-            let why = format!("{dps2} {unit} is below 0, which some motors take as no limit");
-            return Err(bad_value(py, format_args!("{why}: give 0 for none; nothing was sent")));
-        }
-        let acceleration =
-            DpsPerSecond(digits(py, "an acceleration", dps2, DpsPerSecond::SCALE, unit)?);
+        let acceleration = wanted(py, dps2)?;
         Ok(Self::of(WriteAccelerationRam(Acceleration { acceleration })))
     }
 
@@ -375,16 +351,6 @@ pub(crate) fn motor_id(py: Python<'_>, id: i64) -> PyResult<MotorId> {
     u8::try_from(id).ok().and_then(MotorId::new).ok_or_else(|| {
         bad_value(py, format_args!("motor {id} does not exist: motor IDs are 1 to 32"))
     })
-}
-
-/// A torque current within the protocol's range.
-pub(crate) fn torque(py: Python<'_>, amps: f64) -> PyResult<IqCommand> {
-    let torque = IqCommand(digits(py, "a torque current", amps, IqCommand::SCALE, "A")?);
-    if torque.0.unsigned_abs() <= SetTorque::MAX.0.unsigned_abs() {
-        return Ok(torque);
-    }
-    let most = SetTorque::MAX.amps();
-    Err(bad_value(py, format_args!("{amps} A is beyond ±{most} A; nothing was sent")))
 }
 
 pub(crate) fn eight(py: Python<'_>, data: &[u8]) -> PyResult<[u8; 8]> {

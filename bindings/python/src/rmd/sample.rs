@@ -13,7 +13,6 @@ use pyo3::types::PyByteArray;
 use super::quantity::Quantity;
 use super::request::{RmdRequest, motor_id};
 use crate::error::rmd_error;
-use crate::number::physical;
 use crate::sampling::{Plan, Rows, Stepped, cell};
 
 /// The quantities of one motor.
@@ -70,7 +69,7 @@ impl Questions {
                 let reply = replies.iter().find(|(id, of, _)| *id == lane.id && of == code);
                 // Every request was answered, or the row has failed before.
                 let digits = reply.map_or(0, |(.., reply)| field.raw(reply));
-                values.push(cell(self.raw, digits, physical(digits, field.scale)));
+                values.push(cell(self.raw, digits, field.scale.value(digits)));
             }
         }
         values

@@ -73,8 +73,8 @@ pub enum Act {
     /// Show the acceleration limit, or set it until power-off
     Accel {
         /// °/s²; 0 is unlimited
-        #[arg(value_parser = clap::value_parser!(i32).range(0..))]
-        dps_per_second: Option<i32>,
+        #[arg(allow_negative_numbers = true)]
+        dps_per_second: Option<f64>,
     },
     /// Show the encoder, or set its offset for good (needs --write-rom)
     Encoder {

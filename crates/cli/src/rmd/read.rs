@@ -1,7 +1,7 @@
 //! Commands that read.
 
 use motorlink::rmd::{
-    Celsius, Errors, Found, MotionStatus, MotorId, MotorSet, PhaseCurrents, Status,
+    Errors, Field, Found, Meaning, MotorId, MotorSet, MultiTurnAngle, Payload, SingleTurnAngle,
 };
 use serde_json::{Value, json};
 
@@ -72,12 +72,13 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
 pub fn status(session: &Session, repeat: Repeat) -> Result<(), Failure> {
     show(session, repeat, |session| {
         let motor = session.motor()?;
-        let mut rows = vec![("id", motor.id().to_string(), json!(motor.id().number()))];
-        rows.extend(status1(session, &motor.status()?));
-        rows.extend(motion(session, &motor.motion_status()?).into_iter().skip(1));
-        rows.extend(phases(session, &motor.phase_currents()?));
-        rows.extend(angles(session)?);
-        Ok(rows)
+        let mut all = vec![("id", motor.id().to_string(), json!(motor.id().number()))];
+        all.extend(rows(session, &motor.status()?));
+        // The temperature stands there already.
+        all.extend(rows(session, &motor.motion_status()?).into_iter().skip(1));
+        all.extend(rows(session, &motor.phase_currents()?));
+        all.extend(angles(session)?);
+        Ok(all)
     })
 }
 
@@ -118,60 +119,36 @@ fn show(
 
 fn angles(session: &Session) -> Result<Vec<Row>, Failure> {
     let motor = session.motor()?;
-    let (multi, circle) = (motor.multi_turn_angle()?, motor.single_turn_angle()?);
-    Ok(vec![
-        value(session, "angle", multi.0, multi.degrees(), 2, "°"),
-        value(session, "circle_angle", circle.0.into(), circle.degrees(), 2, "°"),
-    ])
+    let multi_turn = MultiTurnAngle { angle: motor.multi_turn_angle()? };
+    let single_turn = SingleTurnAngle { angle: motor.single_turn_angle()? };
+    let named =
+        |name, rows: Vec<Row>| rows.into_iter().map(move |(_, text, value)| (name, text, value));
+    let multi_turn = named("multi_turn_angle", rows(session, &multi_turn));
+    Ok(multi_turn.chain(named("single_turn_angle", rows(session, &single_turn))).collect())
 }
 
-pub fn status1(session: &Session, status: &Status) -> Vec<Row> {
-    let errors = if session.raw { json!(status.errors.0) } else { names(status.errors) };
-    vec![
-        temperature(session, status.temperature),
-        value(session, "voltage", status.voltage.0.into(), status.voltage.volts(), 1, "V"),
-        ("errors", status.errors.to_string(), errors),
-    ]
+/// The values of a message, as the command table has them.
+pub fn rows<P: Payload>(session: &Session, message: &P) -> Vec<Row> {
+    let data = message.encode_as(0);
+    P::FIELDS.iter().map(|field| row(session, field, &data)).collect()
 }
 
-pub fn motion(session: &Session, status: &MotionStatus) -> Vec<Row> {
-    vec![
-        temperature(session, status.temperature),
-        value(session, "torque_current", status.iq.0.into(), status.iq.amps(), 3, "A"),
-        value(session, "speed", status.speed.0.into(), status.speed.dps(), 0, "°/s"),
-        ("encoder", status.encoder.to_string(), json!(status.encoder)),
-    ]
-}
-
-fn temperature(session: &Session, temperature: Celsius) -> Row {
-    value(session, "temperature", temperature.0.into(), temperature.celsius(), 0, "°C")
-}
-
-fn phases(session: &Session, currents: &PhaseCurrents) -> Vec<Row> {
-    [("phase_a", currents.phase_a), ("phase_b", currents.phase_b), ("phase_c", currents.phase_c)]
-        .map(|(name, current)| value(session, name, current.0.into(), current.amps(), 3, "A"))
-        .into()
-}
-
-/// A wire integer as digits or in its physical unit.
-pub fn value(
-    session: &Session,
-    name: &'static str,
-    digits: i64,
-    physical: f64,
-    decimals: u8,
-    unit: &str,
-) -> Row {
+fn row(session: &Session, field: &Field, data: &[u8; 8]) -> Row {
+    let digits = field.raw(data);
     if session.raw {
-        return (name, digits.to_string(), json!(digits));
+        return (field.name, digits.to_string(), json!(digits));
     }
-    let decimals_wide = usize::from(decimals);
-    let text = format!("{physical:.decimals_wide$} {unit}");
-    let number = match decimals {
-        0 => json!(physical.round() as i64),
-        _ => json!(rounded(physical, decimals)),
+    let value = match (field.meaning, field.scale.decimals) {
+        (Meaning::Bits(bits), _) => bits
+            .iter()
+            .filter(|(bit, _)| digits & i64::from(*bit) != 0)
+            .map(|(_, word)| *word)
+            .collect(),
+        (Meaning::Words(_), _) => json!(field.shown(data).to_string()),
+        (Meaning::Number, 0) => json!(digits),
+        (Meaning::Number, decimals) => json!(rounded(field.value(data), decimals)),
     };
-    (name, text, number)
+    (field.name, field.shown(data).to_string(), value)
 }
 
 fn rounded(value: f64, decimals: u8) -> f64 {

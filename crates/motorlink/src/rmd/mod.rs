@@ -22,13 +22,7 @@ mod motor;
 mod options;
 mod session;
 
-pub use motorlink_proto::rmd::{
-    Acceleration, Code, Command, CommandInfo, Counters, Dialect, Direction, Encoder, EncoderBits,
-    EncoderOffset, Errors, Exceeded, IDENTIFIERS, Limits, MotionStatus, MotorId, MotorSet,
-    MultiTurnAngle, Payload, PhaseCurrents, Pid, SetSingleTurnPosition,
-    SetSingleTurnPositionLimited, SetTorque, SetTorque4, SingleTurnAngle, SpinDirection, Status,
-    describe,
-};
+pub use motorlink_proto::rmd::*;
 pub use motorlink_proto::units::*;
 
 pub use bus::{Bus, Found};

@@ -1,10 +1,11 @@
 //! The command table: the one place where a command's number and name stand.
 
-use super::message::*;
+use super::message::SpinDirection;
 use super::motor::{MotorId, MotorSet, TORQUE4_ID};
-use super::payload::{Field, Payload};
+use super::payload::{Field, Payload, payload, place, take};
 use super::reply::*;
 use crate::can::CanFrame;
+use crate::units::{CentiDegrees, CentiDps, IqCommand, SpeedLimit, TurnCentiDegrees};
 
 /// A request with its code and the type of its reply. A reply is `C::Reply::decode(&data)`.
 pub trait Command: Payload {
@@ -19,11 +20,23 @@ pub trait Command: Payload {
     }
 }
 
+/// A version of the protocol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Version {
+    /// V1.62, the document.
+    V1_62,
+}
+
 /// One row of the command table.
 #[derive(Debug, Clone, Copy)]
 pub struct CommandInfo {
     /// The code, with the name of chapter 2 and a description.
     pub code: Code,
+    /// The name from which the names in all languages are derived: a verb and what it is about.
+    pub stem: &'static str,
+    /// The versions of the protocol that have it.
+    pub versions: &'static [Version],
     /// Heading of the paragraph in chapter 3 that describes the command.
     pub paragraph: &'static str,
     /// Whether the reply repeats the request byte for byte.
@@ -39,9 +52,18 @@ pub struct CommandInfo {
 }
 
 impl CommandInfo {
-    const fn new<C: Command>(code: Code, paragraph: &'static str) -> Self {
-        let (request, reply) = (C::FIELDS, C::Reply::FIELDS);
-        CommandInfo { code, paragraph, echo: false, rom: false, moves: false, request, reply }
+    const fn new<C: Command>(code: Code, stem: &'static str, paragraph: &'static str) -> Self {
+        CommandInfo {
+            code,
+            stem,
+            versions: &[],
+            paragraph,
+            echo: false,
+            rom: false,
+            moves: false,
+            request: C::FIELDS,
+            reply: C::Reply::FIELDS,
+        }
     }
 }
 
@@ -79,10 +101,15 @@ impl MotorSet {
     }
 }
 
-/// `CODE Struct -> Reply [echo rom moves] "name in chapter 2", "heading in chapter 3", "what it does"`
+/// A row a command:
+///
+/// `CODE stem Struct -> Reply [echo rom moves] VERSIONS "name in chapter 2", "heading in chapter 3",
+/// "what it does";`, with the fields of the request behind `Struct`, as [`payload!`] has them.
 macro_rules! commands {
-    ($(
-        $code:literal $name:ident -> $reply:ident [$($flag:ident)*]
+    ($d:tt $(
+        $(#[$meta:meta])*
+        $code:literal $stem:ident $name:ident $( ($inner:ty) )? $( { $($fields:tt)* } )?
+        -> $reply:ident [$($flag:ident)*] $($version:ident)+
         $text:literal, $paragraph:literal, $doc:literal;
     )+) => {
         named_numbers! {
@@ -103,10 +130,17 @@ macro_rules! commands {
             }
         }
 
+        $( payload! {
+            #[doc = concat!(stringify!($code), ": ", $doc, " (3, ", $paragraph, ").")]
+            $(#[$meta])*
+            pub struct $name $( ($inner) )? $( { $($fields)* } )?
+        } )+
+
         $( impl $name {
             const ROW: CommandInfo = CommandInfo {
+                versions: &[$( Version::$version, )+],
                 $( $flag: true, )*
-                ..CommandInfo::new::<$name>(Code::$name, $paragraph)
+                ..CommandInfo::new::<$name>(Code::$name, stringify!($stem), $paragraph)
             };
         } )+
 
@@ -119,85 +153,124 @@ macro_rules! commands {
         pub static COMMANDS: [CommandInfo; Code::ALL.len()] = [
             $( $name::ROW, )+
         ];
+
+        /// Calls a macro with the types of all commands, in the order of [`COMMANDS`](rmd::COMMANDS):
+        /// `for_each_rmd_command!(with)` is `with! { ReadPid WritePidRam .. }`.
+        #[macro_export]
+        macro_rules! for_each_rmd_command {
+            ($d with:ident) => { $d with! { $( $name )+ } };
+        }
     };
 }
 
-commands! {
-    0x30 ReadPid -> Pid []
+commands! { $
+    0x30 read_pid ReadPid -> Pid [] V1_62
         "Read PID data command", "Read PID parameter command",
         "reads the gains in RAM";
-    0x31 WritePidRam -> WritePidRam [echo]
+    0x31 write_pid_ram WritePidRam(Pid) -> WritePidRam [echo] V1_62
         "Write PID to RAM command", "Write PID to RAM parameter command",
         "sets the gains until power-off";
-    0x32 WritePidRom -> WritePidRom [echo rom]
+    /// Wears the ROM.
+    0x32 write_pid_rom WritePidRom(Pid) -> WritePidRom [echo rom] V1_62
         "Write PID to ROM command", "Write PID to ROM parameter command",
         "sets the gains for good";
-    0x33 ReadAcceleration -> Acceleration []
+    0x33 read_acceleration ReadAcceleration -> Acceleration [] V1_62
         "Read acceleration data command", "Read acceleration data command",
         "reads the acceleration limit";
-    0x34 WriteAccelerationRam -> WriteAccelerationRam [echo]
+    0x34 write_acceleration_ram WriteAccelerationRam(Acceleration) -> WriteAccelerationRam [echo] V1_62
         "Write acceleration data to RAM command", "Write acceleration data to RAM command",
         "sets the acceleration limit until power-off";
-    0x90 ReadEncoder -> Encoder []
+    0x90 read_encoder ReadEncoder -> Encoder [] V1_62
         "Read encoder data command", "Read encoder data command",
         "reads encoder position, original position and offset";
-    0x91 WriteEncoderOffsetRom -> EncoderOffset [rom]
+    /// docs/SPEC-NOTES.md R8. Wears the ROM.
+    0x91 write_encoder_offset_rom WriteEncoderOffsetRom(EncoderOffset) -> EncoderOffset [rom] V1_62
         "Write encoder offset command", "Write encoder offset command",
         "sets the encoder offset, at once and for good";
-    0x19 WriteZeroRom -> EncoderOffset [rom]
+    /// docs/SPEC-NOTES.md R9. Wears the ROM.
+    0x19 write_zero_rom WriteZeroRom -> EncoderOffset [rom] V1_62
         "Write current position to ROM as motor zero command",
         "Write current position to ROM as motor zero position command",
         "makes the current position the zero from the next power-on on";
-    0x92 ReadMultiTurnAngle -> MultiTurnAngle []
+    0x92 read_multi_turn_angle ReadMultiTurnAngle -> MultiTurnAngle [] V1_62
         "Read multi turns angle command", "Read multi turns angle command",
         "reads the angle over all turns";
-    0x94 ReadSingleTurnAngle -> SingleTurnAngle []
+    0x94 read_single_turn_angle ReadSingleTurnAngle -> SingleTurnAngle [] V1_62
         "Read single circle angle command", "Read single circle angle command",
         "reads the angle within the turn";
-    0x9A ReadStatus -> Status []
+    0x9A read_status ReadStatus -> Status [] V1_62
         "Read motor status 1 and error flag commands",
         "Read motor status 1 and error flag commands",
         "reads temperature, voltage and error flags";
-    0x9B ClearErrors -> Status []
+    /// The reply may carry the code 0x9A (docs/SPEC-NOTES.md R1).
+    0x9B clear_errors ClearErrors -> Status [] V1_62
         "Clear motor error flag command", "Clear motor error flag command",
         "clears the error flags whose cause is gone";
-    0x9C ReadMotionStatus -> MotionStatus []
+    0x9C read_motion_status ReadMotionStatus -> MotionStatus [] V1_62
         "Read motor status 2", "Read motor status 2",
         "reads temperature, torque current, speed and encoder position";
-    0x9D ReadPhaseCurrents -> PhaseCurrents []
+    0x9D read_phase_currents ReadPhaseCurrents -> PhaseCurrents [] V1_62
         "Read motor status 3", "Read motor status 3",
         "reads the three phase currents";
-    0x80 Off -> Off [echo]
+    0x80 off Off -> Off [echo] V1_62
         "Motor off command", "Motor off command",
         "switches the motor off and forgets what it was doing";
-    0x81 Stop -> Stop [echo]
+    0x81 stop Stop -> Stop [echo] V1_62
         "Motor stop command", "Motor stop command",
         "stops the motor and remembers what it was doing";
-    0x88 Run -> Run [echo moves]
+    0x88 run Run -> Run [echo moves] V1_62
         "Motor running command", "Motor running command",
         "resumes what the motor was doing before the stop";
-    0xA1 SetTorque -> MotionStatus [moves]
+    0xA1 set_torque SetTorque {
+        /// 0.016 A a digit, within ±[`IqCommand::MAX`].
+        4 iq: IqCommand,
+    } -> MotionStatus [moves] V1_62
         "Torque closed-loop command", "Torque current control command",
         "holds a torque current";
-    0xA2 SetSpeed -> MotionStatus [moves]
+    0xA2 set_speed SetSpeed {
+        /// 0.01 °/s a digit, positive is clockwise.
+        4 speed: CentiDps,
+    } -> MotionStatus [moves] V1_62
         "Speed closed-loop command", "Speed control command",
         "holds a speed";
-    0xA3 SetPosition -> MotionStatus [moves]
+    0xA3 set_position SetPosition {
+        /// 0.01° a digit, positive is clockwise from zero.
+        4 angle: CentiDegrees,
+    } -> MotionStatus [moves] V1_62
         "Position closed-loop command 1", "Position control command 1",
         "turns to a multi-turn angle";
-    0xA4 SetPositionLimited -> MotionStatus [moves]
+    /// The first column of the document holds for the bytes (docs/SPEC-NOTES.md R5).
+    0xA4 set_position_limited SetPositionLimited {
+        /// 1 °/s a digit.
+        2 max_speed: SpeedLimit,
+        /// 0.01° a digit, positive is clockwise from zero.
+        4 angle: CentiDegrees,
+    } -> MotionStatus [moves] V1_62
         "Position closed-loop command 2", "Position control command 2",
         "turns to a multi-turn angle no faster than a limit";
-    0xA5 SetSingleTurnPosition -> MotionStatus [moves]
+    0xA5 set_single_turn_position SetSingleTurnPosition {
+        /// Which way to turn.
+        1 direction: SpinDirection,
+        /// 0.01° a digit, 0 to 35999.
+        4 angle: TurnCentiDegrees,
+    } -> MotionStatus [moves] V1_62
         "Position closed-loop command 3", "Position control command 3",
         "turns to an angle within the turn, in a given direction";
-    0xA6 SetSingleTurnPositionLimited -> MotionStatus [moves]
+    0xA6 set_single_turn_position_limited SetSingleTurnPositionLimited {
+        /// Which way to turn.
+        1 direction: SpinDirection,
+        /// 1 °/s a digit.
+        2 max_speed: SpeedLimit,
+        /// 0.01° a digit, 0 to 35999.
+        4 angle: TurnCentiDegrees,
+    } -> MotionStatus [moves] V1_62
         "Position closed-loop command 4", "Position control command 4",
         "turns to an angle within the turn, in a given direction, no faster than a limit";
 }
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
     use super::*;
 
     #[test]
@@ -208,6 +281,21 @@ mod tests {
             assert_eq!(Code::from(u8::from(row.code)), row.code);
         }
         assert!(Code::from(0x35).info().is_none());
+    }
+
+    #[test]
+    fn the_stem_is_the_name_of_the_type() {
+        for row in &COMMANDS {
+            let mut name = std::string::String::new();
+            for letter in std::format!("{:?}", row.code).chars() {
+                if letter.is_uppercase() && !name.is_empty() {
+                    name.push('_');
+                }
+                name.extend(letter.to_lowercase());
+            }
+            assert_eq!(row.stem, name);
+            assert_eq!(row.versions, [Version::V1_62]);
+        }
     }
 
     #[test]

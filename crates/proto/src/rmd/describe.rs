@@ -72,8 +72,7 @@ impl Described {
 fn fields(fields: &[Field], data: &[u8; 8], f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let mut separator = ':';
     for field in fields {
-        write!(f, "{separator} {} ", field.name)?;
-        field.show(data, f)?;
+        write!(f, "{separator} {} {}", field.name, field.shown(data))?;
         separator = ',';
     }
     Ok(())

@@ -1,8 +1,10 @@
 //! The drive: answers the host and tells the motor what to do, without I/O.
 
-use super::command::{Code, Command};
+use super::command::{
+    Code, Command, SetPosition, SetPositionLimited, SetSingleTurnPosition, SetSpeed, SetTorque,
+};
 use super::encoder::{EncoderBits, FULL_TURN};
-use super::message::*;
+use super::message::{SetTorque4, SpinDirection};
 use super::motor::{MotorId, MotorSet, TORQUE4_ID};
 use super::payload::Payload;
 use super::reply::*;
@@ -34,7 +36,7 @@ pub enum Mode {
     Off,
     /// Brought to a stand and kept there (3, Motor stop command).
     Stopped,
-    /// Holds a torque current within ±[`SetTorque::MAX`]; the drive's greatest torque current does
+    /// Holds a torque current within ±[`IqCommand::MAX`]; the drive's greatest torque current does
     /// not limit it (3, Torque current control command).
     Torque(IqCommand),
     /// Holds a speed (3, Speed control command).
@@ -423,7 +425,7 @@ fn reached(id: MotorId) -> bool {
 
 /// Held to the document's range (docs/SPEC-NOTES.md R3).
 fn saturated(torque: IqCommand) -> IqCommand {
-    let IqCommand(most) = SetTorque::MAX;
+    let IqCommand(most) = IqCommand::MAX;
     IqCommand(torque.0.min(most).max(most.wrapping_neg()))
 }
 

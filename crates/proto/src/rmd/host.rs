@@ -25,10 +25,10 @@
 //! echoes what it sends looks like a motor that answers these. The reply to the question for the status
 //! has a voltage: if the question itself comes back, the exchange ends in [`Error::Echo`].
 
-use super::command::{Code, Command};
+use super::command::{Code, Command, ReadMotionStatus, ReadStatus, SetTorque};
 use super::doubt::{Admitted, Doubt, answers};
 use super::limits::Limits;
-use super::message::{ReadMotionStatus, ReadStatus, SetTorque, SetTorque4};
+use super::message::SetTorque4;
 use super::motor::{Dialect, MotorId, MotorSet, TORQUE4_ID};
 use super::outcome::{Counters, Error, Output, Refused};
 use crate::can::CanFrame;

@@ -1,9 +1,12 @@
 //! What the caller allows a motor to be told. Checked on the bytes that leave, so that a raw frame
 //! is held to it as well.
 
-use super::command::Code;
+use super::command::{
+    Code, SetPosition, SetPositionLimited, SetSingleTurnPosition, SetSingleTurnPositionLimited,
+    SetSpeed, SetTorque,
+};
 use super::encoder::FULL_TURN;
-use super::message::*;
+use super::message::SpinDirection;
 use super::payload::Payload;
 use crate::units::{CentiDegrees, CentiDps, IqCommand, SpeedLimit, TurnCentiDegrees};
 use core::fmt;
@@ -29,7 +32,7 @@ pub struct Limits {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Exceeded {
-    /// More torque current than `limit`, which is at most [`SetTorque::MAX`] (docs/SPEC-NOTES.md R3).
+    /// More torque current than `limit`, which is at most [`IqCommand::MAX`] (docs/SPEC-NOTES.md R3).
     Current {
         /// Torque current of the frame.
         asked: IqCommand,
@@ -99,7 +102,7 @@ impl Limits {
     /// # Errors
     /// [`Exceeded::Current`].
     pub fn current(&self, asked: IqCommand) -> Result<(), Exceeded> {
-        let limit = self.current.unwrap_or(SetTorque::MAX).min(SetTorque::MAX);
+        let limit = self.current.unwrap_or(IqCommand::MAX).min(IqCommand::MAX);
         if i32::from(asked.0).abs() <= i32::from(limit.0) {
             return Ok(());
         }
@@ -207,7 +210,7 @@ mod tests {
         assert_eq!(none.check(&torque(2000)), Ok(()));
         assert_eq!(none.check(&torque(-2000)), Ok(()));
         for digits in [2001, -2001, i16::MIN, i16::MAX] {
-            let (asked, limit) = (IqCommand(digits), SetTorque::MAX);
+            let (asked, limit) = (IqCommand(digits), IqCommand::MAX);
             assert_eq!(none.check(&torque(digits)), Err(Exceeded::Current { asked, limit }));
         }
     }

@@ -45,7 +45,7 @@ mod outcome;
 mod payload;
 mod reply;
 
-pub use command::{COMMANDS, Code, Command, CommandInfo};
+pub use command::*;
 pub use describe::{Described, Direction, describe};
 pub use drive::{Config, Drive, Ignored, Mode, Motor, Sense, Settings};
 pub use encoder::{EncoderBits, FULL_TURN};
@@ -54,5 +54,5 @@ pub use limits::{Exceeded, Limits};
 pub use message::*;
 pub use motor::{Dialect, IDENTIFIERS, MOTOR_BASE, MotorId, MotorSet, TORQUE4_ID};
 pub use outcome::{Counters, Error, Output, Refused};
-pub use payload::{Field, Payload};
+pub use payload::{Field, Meaning, Payload};
 pub use reply::*;

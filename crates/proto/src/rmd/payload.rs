@@ -38,11 +38,22 @@ pub struct Field {
     pub len: u8,
     /// Whether it is two's complement.
     pub signed: bool,
-    /// One digit in [`unit`](Self::unit).
-    pub scale: f64,
-    /// Symbol of the physical unit; empty for a plain number.
-    pub unit: &'static str,
+    /// What a digit is, and which may be asked for.
+    pub scale: Scale,
+    /// What the digits mean where they are no quantity.
+    pub meaning: Meaning,
     show: Show,
+}
+
+/// What the digits of a field mean.
+#[derive(Debug, Clone, Copy)]
+pub enum Meaning {
+    /// A quantity in the field's unit, or a plain number.
+    Number,
+    /// One of these, by number.
+    Words(&'static [(u8, &'static str)]),
+    /// Any of these, a bit each.
+    Bits(&'static [(u8, &'static str)]),
 }
 
 type Show = fn(u64, &mut fmt::Formatter<'_>) -> fmt::Result;
@@ -57,17 +68,31 @@ impl Field {
         if self.signed { (top as i64).wrapping_shr(down) } else { top.wrapping_shr(down) as i64 }
     }
 
-    /// Writes the value in words and physical units.
-    ///
-    /// # Errors
-    /// Those of the formatter.
-    pub fn show(&self, data: &[u8; 8], f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        (self.show)(self.raw(data) as u64, f)
+    /// The value in words and physical units.
+    pub fn shown<'a>(&'a self, data: &'a [u8; 8]) -> impl fmt::Display + 'a {
+        Shown { field: self, data }
+    }
+
+    /// The value in its physical unit, or the plain number.
+    pub fn value(&self, data: &[u8; 8]) -> f64 {
+        self.scale.value(self.raw(data))
     }
 
     pub(super) const fn new<T: Wire>(name: &'static str, offset: u8) -> Self {
         let show: Show = |low, f| T::from_low(low).show(f);
-        Field { name, offset, len: T::LEN, signed: T::SIGNED, scale: T::SCALE, unit: T::UNIT, show }
+        let (len, signed, scale, meaning) = (T::LEN, T::SIGNED, T::UNIT, T::MEANING);
+        Field { name, offset, len, signed, scale, meaning, show }
+    }
+}
+
+struct Shown<'a> {
+    field: &'a Field,
+    data: &'a [u8; 8],
+}
+
+impl fmt::Display for Shown<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        (self.field.show)(self.field.raw(self.data) as u64, f)
     }
 }
 
@@ -75,8 +100,8 @@ impl Field {
 pub(super) trait Wire: Copy {
     const LEN: u8;
     const SIGNED: bool = false;
-    const SCALE: f64 = 1.0;
-    const UNIT: &'static str = "";
+    const UNIT: Scale;
+    const MEANING: Meaning = Meaning::Number;
 
     /// The digits; bits above `LEN` bytes do not count.
     fn digits(self) -> u64;
@@ -99,7 +124,7 @@ pub(super) fn take<T: Wire>(word: u64, offset: u32) -> T {
 /// Declares frames: `OFFSET name: Type` a field, a unit struct for a frame that only has a code, a
 /// tuple struct for one with the fields of another.
 macro_rules! payload {
-    ($(#[$meta:meta])* pub struct $name:ident;) => {
+    ($(#[$meta:meta])* pub struct $name:ident) => {
         $(#[$meta])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
         pub struct $name;
@@ -114,7 +139,7 @@ macro_rules! payload {
             }
         }
     };
-    ($(#[$meta:meta])* pub struct $name:ident($inner:ty);) => {
+    ($(#[$meta:meta])* pub struct $name:ident($inner:ty)) => {
         $(#[$meta])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
         pub struct $name(pub $inner);
@@ -156,6 +181,7 @@ macro_rules! plain {
     ($($type:ty)+) => { $(
         impl Wire for $type {
             const LEN: u8 = size_of::<$type>() as u8;
+            const UNIT: Scale = Scale::plain(0, <$type>::MAX as i64);
             fn digits(self) -> u64 {
                 u64::from(self)
             }
@@ -170,14 +196,13 @@ macro_rules! plain {
 }
 plain! { u8 u16 }
 
-/// `Unit(integer, bytes on the wire) digits behind the point`.
+/// `Unit(integer, bytes on the wire) value`.
 macro_rules! units {
-    ($( $name:ident($repr:ty, $len:literal) $decimals:literal $value:ident; )+) => { $(
+    ($( $name:ident($repr:ty, $len:literal) $value:ident; )+) => { $(
         impl Wire for $name {
             const LEN: u8 = $len;
             const SIGNED: bool = <$repr>::MIN != 0;
-            const SCALE: f64 = $name::SCALE;
-            const UNIT: &'static str = $name::SYMBOL;
+            const UNIT: Scale = <$name as Quantity>::UNIT;
             fn digits(self) -> u64 {
                 self.0 as u64
             }
@@ -187,31 +212,34 @@ macro_rules! units {
                 $name((low.wrapping_shl(ABOVE) as i64).wrapping_shr(ABOVE) as $repr)
             }
             fn show(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                write!(f, "{:.*} {}", $decimals, self.$value(), $name::SYMBOL)
+                let decimals = usize::from(<$name as Quantity>::UNIT.decimals);
+                write!(f, "{:.*} {}", decimals, self.$value(), $name::SYMBOL)
             }
         }
     )+ };
 }
 units! {
-    Celsius(i8, 1) 0 celsius;
-    DeciVolts(u16, 2) 1 volts;
-    IqCommand(i16, 2) 3 amps;
-    IqFeedback(i16, 2) 3 amps;
-    PhaseCurrent(i16, 2) 3 amps;
-    Dps(i16, 2) 0 dps;
-    CentiDps(i32, 4) 2 dps;
-    SpeedLimit(u16, 2) 0 dps;
-    DpsPerSecond(i32, 4) 0 dps_per_second;
-    TurnCentiDegrees(u16, 2) 2 degrees;
-    CentiDegrees(i32, 4) 2 degrees;
-    WideCentiDegrees(i64, 7) 2 degrees;
+    Celsius(i8, 1) celsius;
+    DeciVolts(u16, 2) volts;
+    IqCommand(i16, 2) amps;
+    IqFeedback(i16, 2) amps;
+    PhaseCurrent(i16, 2) amps;
+    Dps(i16, 2) dps;
+    CentiDps(i32, 4) dps;
+    SpeedLimit(u16, 2) dps;
+    DpsPerSecond(i32, 4) dps_per_second;
+    TurnCentiDegrees(u16, 2) degrees;
+    CentiDegrees(i32, 4) degrees;
+    WideCentiDegrees(i64, 7) degrees;
 }
 
 /// For a type that converts to and from `u8` and displays itself.
 macro_rules! byte {
-    ($type:ty) => {
+    ($type:ty, $meaning:expr) => {
         impl $crate::rmd::payload::Wire for $type {
             const LEN: u8 = 1;
+            const UNIT: $crate::units::Scale = $crate::units::Scale::plain(0, 255);
+            const MEANING: $crate::rmd::payload::Meaning = $meaning;
             fn digits(self) -> u64 {
                 u64::from(u8::from(self))
             }

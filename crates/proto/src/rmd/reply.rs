@@ -1,6 +1,6 @@
 //! The replies, a type each (chapter 3).
 
-use super::payload::{Field, Payload, byte, payload, place, take};
+use super::payload::{Field, Meaning, Payload, byte, payload, place, take};
 use crate::units::{
     Celsius, DeciVolts, Dps, DpsPerSecond, IqFeedback, PhaseCurrent, TurnCentiDegrees,
     WideCentiDegrees,
@@ -114,6 +114,7 @@ macro_rules! error_bits {
             /// Each named bit with the document's words for it.
             pub const NAMES: &'static [(Errors, &'static str)] = &[$( (Errors::$name, $text), )+];
 
+            const BITS: &[(u8, &str)] = &[$( (1 << $bit, $text), )+];
             const VALID: u8 = $( 1 << $bit )|+;
         }
     };
@@ -169,7 +170,7 @@ impl From<Errors> for u8 {
         errors.0
     }
 }
-byte!(Errors);
+byte!(Errors, Meaning::Bits(Errors::BITS));
 
 impl fmt::Display for Errors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -10,9 +10,7 @@ use motorlink_proto::st::{
     Command, CurrentReference, MAX_FRAME, Motor, PositionMove, Profile, REVUP_PHASES, Ramp,
     Request, RevupPhase, TorqueRamp, find_register, parse_value,
 };
-use motorlink_proto::units::{
-    CentiDegrees, CentiDps, DpsPerSecond, IqCommand, SpeedLimit, TurnCentiDegrees,
-};
+use motorlink_proto::units::Quantity;
 use serde::Deserialize;
 
 /// A message to an ST motor.
@@ -55,7 +53,7 @@ pub(super) enum RmdMessage {
     Speed { dps: f64 },
     Move { degrees: f64, max_speed_dps: Option<f64>, direction: Option<Direction> },
     Gains { gains: [u8; 6] },
-    Acceleration { dps2: i32 },
+    Acceleration { dps2: f64 },
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -148,21 +146,13 @@ impl RmdMessage {
             RmdMessage::Stop {} => Stop.encode(),
             RmdMessage::Run {} => Run.encode(),
             RmdMessage::ClearError {} => ClearErrors.encode(),
-            RmdMessage::Torque { amps } => {
-                let torque = IqCommand(digits(amps, IqCommand::SCALE, "A")?);
-                if torque.0.unsigned_abs() > SetTorque::MAX.0.unsigned_abs() {
-                    return Err(format!("{amps} A is beyond ±{} A", SetTorque::MAX.amps()));
-                }
-                SetTorque { iq: torque }.encode()
-            }
-            RmdMessage::Speed { dps } => {
-                SetSpeed { speed: CentiDps(digits(dps, CentiDps::SCALE, "°/s")?) }.encode()
-            }
+            RmdMessage::Torque { amps } => SetTorque { iq: wanted(amps)? }.encode(),
+            RmdMessage::Speed { dps } => SetSpeed { speed: wanted(dps)? }.encode(),
             RmdMessage::Move { degrees, max_speed_dps, direction: None } => {
-                let angle = CentiDegrees(digits(degrees, CentiDegrees::SCALE, "°")?);
+                let angle = wanted(degrees)?;
                 match max_speed_dps {
                     None => SetPosition { angle }.encode(),
-                    Some(dps) => SetPositionLimited { max_speed: limit(dps)?, angle }.encode(),
+                    Some(dps) => SetPositionLimited { max_speed: wanted(dps)?, angle }.encode(),
                 }
             }
             RmdMessage::Move { degrees, max_speed_dps, direction: Some(direction) } => {
@@ -170,17 +160,12 @@ impl RmdMessage {
                     Direction::Cw => SpinDirection::Clockwise,
                     Direction::Ccw => SpinDirection::Counterclockwise,
                 };
-                let angle = TurnCentiDegrees(digits(degrees, TurnCentiDegrees::SCALE, "°")?);
-                if angle > TurnCentiDegrees(35_999) {
-                    return Err(format!(
-                        "an angle within the turn is 0° to 359.99°, not {degrees}"
-                    ));
-                }
+                let angle = wanted(degrees)?;
                 match max_speed_dps {
                     None => SetSingleTurnPosition { direction, angle }.encode(),
                     Some(dps) => {
-                        SetSingleTurnPositionLimited { direction, max_speed: limit(dps)?, angle }
-                            .encode()
+                        let max_speed = wanted(dps)?;
+                        SetSingleTurnPositionLimited { direction, max_speed, angle }.encode()
                     }
                 }
             }
@@ -197,7 +182,7 @@ impl RmdMessage {
                 .encode()
             }
             RmdMessage::Acceleration { dps2 } => {
-                WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(dps2) }).encode()
+                WriteAccelerationRam(Acceleration { acceleration: wanted(dps2)? }).encode()
             }
         };
         Ok(CanFrame::new(motor.can_id(), data))
@@ -235,15 +220,9 @@ fn text(value: &toml::Value) -> String {
     }
 }
 
-fn limit(dps: f64) -> Result<SpeedLimit, String> {
-    digits(dps, SpeedLimit::SCALE, "°/s").map(SpeedLimit)
-}
-
-/// A physical value as the wire's integer. What does not fit is refused, never cut.
-fn digits<T: TryFrom<i64>>(value: f64, scale: f64, unit: &str) -> Result<T, String> {
-    let digits = (value / scale).round();
-    let fits = digits.is_finite().then_some(digits as i64).and_then(|n| T::try_from(n).ok());
-    fits.ok_or_else(|| format!("{value} {unit} does not fit the frame"))
+/// A physical value as the wire's integer. What no frame says is refused, never cut.
+fn wanted<Q: Quantity>(value: f64) -> Result<Q, String> {
+    Q::wanted(value).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]
