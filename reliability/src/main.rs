@@ -1,5 +1,6 @@
 //! Both protocols through lines that misbehave, on virtual time. See docs/RELIABILITY.md.
 
+mod bench;
 mod campaign;
 mod life;
 mod plan;

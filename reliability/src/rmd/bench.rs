@@ -1,20 +1,19 @@
 //! Host and drives on a bus that misbehaves, and a judge that knows where every frame came from.
 
-use std::collections::VecDeque;
-
 use motorlink::time::{Duration, Instant};
-use motorlink_link::fault::{Faults, Lane, Unit, Way};
+use motorlink_link::fault::{Faults, Rng, Unit};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     Code, Command, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, IDENTIFIERS, MotorId, MotorSet,
     Output, ReadStatus, Refused, SetTorque4, TORQUE4_ID,
 };
 
-use super::motor::{Node, reaches};
-use crate::tally::{Tally, Trouble};
+use super::motor::{MOTORS, Node, reaches};
+use super::traffic;
+use crate::bench::{self, Ends, Log};
+use crate::tally::Trouble;
 use crate::wire::Tagged;
 
-pub const MOTORS: usize = 4;
 /// A frame at 1 Mbit/s.
 const FRAME: Duration = Duration(120);
 /// How long a motor thinks.
@@ -27,9 +26,6 @@ const LONGEST: Duration = Duration(2 * (DEFAULT_GUARD.0 + DEFAULT_TIMEOUT.0 + FR
 const FIRST: Duration = Duration(2 * (DEFAULT_TIMEOUT.0 + FRAME.0));
 /// As the blocking client, the host takes what came meanwhile after a pause of this length.
 const IDLE: Duration = Duration(1_000);
-/// Frames that are remembered; more are never on their way.
-const REMEMBERED: usize = 1 << 14;
-const TRACED: usize = 60;
 
 /// A frame of the host to a motor.
 #[derive(Clone, Copy, Default)]
@@ -55,85 +51,103 @@ struct Reply {
     again: bool,
 }
 
-pub struct Bench {
-    /// Whether the line does what nobody promises to survive.
-    beyond: bool,
+pub type Bench = bench::Bench<Rmd>;
+
+/// Host and motors.
+pub struct Rmd {
     host: Host,
     nodes: Vec<Node>,
-    out: Lane<Tagged<CanFrame>>,
-    back: Lane<Tagged<CanFrame>>,
-    pub now: Instant,
-    ended: Instant,
-    pub exchanges: u64,
     /// What each motor was sent last.
     last: Sent,
     trouble: [Trouble; MOTORS],
     /// Motors whose last reply was not that to the exchange which took it.
     behind: [bool; MOTORS],
-    sent: Vec<Sent>,
-    replies: Vec<Reply>,
-    inbox: VecDeque<Tagged<CanFrame>>,
+    sent: Log<Sent>,
+    replies: Log<Reply>,
     /// The frame that the host was given last.
     heard: Option<Tagged<CanFrame>>,
-    pub tally: Tally,
-    pub violation: Option<String>,
-    trace: Option<VecDeque<String>>,
 }
 
-impl Bench {
-    pub fn new(faults: &Faults, beyond: bool) -> Self {
-        Bench {
-            beyond,
-            host: Host::new(),
-            nodes: MotorSet::TORQUE4.map(Node::new).collect(),
-            out: Lane::new(faults, Way::Sent, FRAME, IDENTIFIERS),
-            back: Lane::new(faults, Way::Received, FRAME, IDENTIFIERS),
-            now: Instant(0),
-            ended: Instant(0),
-            exchanges: 0,
-            last: Sent::default(),
-            trouble: [Trouble::default(); MOTORS],
-            behind: [false; MOTORS],
-            sent: Vec::new(),
-            replies: Vec::new(),
-            inbox: VecDeque::new(),
-            heard: None,
-            tally: Tally::default(),
-            violation: None,
-            trace: None,
+/// Host and motors on a bus with faults.
+pub fn bench(faults: &Faults, beyond: bool) -> Bench {
+    let ends = Rmd {
+        host: Host::new(),
+        nodes: MotorSet::TORQUE4.map(Node::new).collect(),
+        last: Sent::default(),
+        trouble: [Trouble::default(); MOTORS],
+        behind: [false; MOTORS],
+        sent: Log::new(),
+        replies: Log::new(),
+        heard: None,
+    };
+    Bench::new(ends, faults, beyond, FRAME, IDENTIFIERS)
+}
+
+impl Ends for Rmd {
+    type Unit = CanFrame;
+
+    const RESTS: [u64; 2] = [200_000, 2_000];
+
+    fn due(bench: &Bench) -> Option<Instant> {
+        [bench.out.due(), bench.back.due()].into_iter().flatten().min()
+    }
+
+    fn step(bench: &mut Bench) {
+        while let Some(frame) = bench.out.pop(bench.now) {
+            for id in MotorSet::TORQUE4 {
+                bench.deliver(id, frame);
+            }
+        }
+        while let Some(frame) = bench.back.pop(bench.now) {
+            bench.inbox.push_back(frame);
         }
     }
 
-    /// Writes down from now on what passes the bus.
-    pub fn trace(&mut self) {
-        self.trace = Some(VecDeque::new());
+    /// Gives the host the next frame.
+    fn read(bench: &mut Bench) {
+        let Some(frame) = bench.inbox.pop_front() else { return };
+        bench.note(|| format!("<- {:03x} {:02x?}", frame.unit.id(), frame.unit.data()));
+        bench.ends.host.receive(bench.now, &frame.unit);
+        bench.ends.heard = Some(frame);
     }
 
-    pub fn traced(self) -> Vec<String> {
-        self.trace.map(Vec::from).unwrap_or_default()
-    }
-
-    /// The program ends, and another opens the bus.
-    pub fn next_program(&mut self) {
-        self.note(|| "a new program".to_owned());
+    fn next_program(&mut self) {
         self.host = Host::new();
     }
 
+    fn exchange(bench: &mut Bench, rng: &mut Rng) {
+        match rng.u8(..10) {
+            0 => bench.set_torque4(traffic::torques(rng)),
+            1..4 => bench.cycle(std::array::from_fn(|_| traffic::next(rng))),
+            _ => {
+                let id = traffic::motor(rng);
+                bench.ask(id, traffic::next(rng));
+            }
+        }
+    }
+
+    fn killed_in(bench: &mut Bench, rng: &mut Rng) {
+        let id = traffic::motor(rng);
+        bench.killed_in(id, traffic::next(rng), Duration(rng.u64(..300_000)));
+    }
+}
+
+impl Bench {
     /// An exchange in which the program is killed after this time.
     pub fn killed_in(&mut self, id: MotorId, data: [u8; 8], life: Duration) {
         let end = self.now + life;
-        self.exchanges += 1;
+        self.tally.exchanges += 1;
         self.ready();
         let mut is_asked = false;
         while self.now < end {
-            match self.host.poll(self.now) {
+            match self.ends.host.poll(self.now) {
                 Output::Transmit(frame) => self.transmit(frame),
                 Output::Done { result: Err(Error::Quarantined), .. } => is_asked = false,
                 Output::Done { .. } => return,
-                Output::Wait(until) if is_asked => self.hear(until.unwrap_or(end).min(end)),
-                Output::Wait(_) => match self.host.request(self.now, id, data) {
+                Output::Wait(until) if is_asked => self.wait(until.unwrap_or(end).min(end)),
+                Output::Wait(_) => match self.ends.host.request(self.now, id, data) {
                     Ok(()) => is_asked = true,
-                    Err(Refused::Quarantined { until, .. }) => self.hear(until.min(end)),
+                    Err(Refused::Quarantined { until, .. }) => self.wait(until.min(end)),
                     Err(refused) => {
                         return self.violates(format!("a request was refused: {refused}"));
                     }
@@ -145,8 +159,8 @@ impl Bench {
     /// One exchange with one motor, as the blocking client does it: a quarantine is waited for.
     pub fn ask(&mut self, id: MotorId, data: [u8; 8]) {
         let begun = self.now;
-        let longest = if self.host.is_unknown(id) { LONGEST + FIRST } else { LONGEST };
-        self.exchanges += 1;
+        let longest = if self.ends.host.is_unknown(id) { LONGEST + FIRST } else { LONGEST };
+        self.tally.exchanges += 1;
         self.ready();
         let answered = self.insist(id, data);
         self.over(id, answered);
@@ -160,12 +174,12 @@ impl Bench {
     /// Asks until the request was carried out, or failed; whether it was.
     fn insist(&mut self, id: MotorId, data: [u8; 8]) -> bool {
         loop {
-            match self.host.request(self.now, id, data) {
-                Ok(()) => match self.run() {
+            match self.ends.host.request(self.now, id, data) {
+                Ok(()) => match self.outcome() {
                     Some((_, Err(Error::Quarantined))) => {}
                     outcome => return matches!(outcome, Some((_, Ok(_)))),
                 },
-                Err(Refused::Quarantined { until, .. }) => self.hear(until),
+                Err(Refused::Quarantined { until, .. }) => self.wait(until),
                 Err(refused) => {
                     self.violates(format!("a request was refused: {refused}"));
                     return false;
@@ -178,7 +192,7 @@ impl Bench {
     fn introduce(&mut self) {
         self.ready();
         for id in MotorSet::TORQUE4 {
-            if self.host.is_unknown(id) {
+            if self.ends.host.is_unknown(id) {
                 self.insist(id, ReadStatus.encode());
             }
         }
@@ -188,8 +202,8 @@ impl Bench {
     pub fn cycle(&mut self, requests: [[u8; 8]; MOTORS]) {
         self.introduce();
         for (id, data) in MotorSet::TORQUE4.zip(requests) {
-            self.exchanges += 1;
-            if self.host.request(self.now, id, data).is_err() {
+            self.tally.exchanges += 1;
+            if self.ends.host.request(self.now, id, data).is_err() {
                 self.over(id, false);
             }
         }
@@ -199,35 +213,27 @@ impl Bench {
     /// Four torques in one frame.
     pub fn set_torque4(&mut self, torques: SetTorque4) {
         self.introduce();
-        if self.host.set_torque4(self.now, torques, MotorSet::TORQUE4).is_err() {
+        if self.ends.host.set_torque4(self.now, torques, MotorSet::TORQUE4).is_err() {
             return;
         }
-        self.exchanges += MOTORS as u64;
+        self.tally.exchanges += MOTORS as u64;
         self.run_all();
-    }
-
-    /// Nothing is asked for a while.
-    pub fn rest(&mut self, pause: Duration) {
-        let until = self.now + pause;
-        while let Some(next) = self.next().filter(|next| *next <= until) {
-            self.now = self.now.max(next);
-            self.step();
-        }
-        self.now = until;
     }
 
     fn ready(&mut self) {
         if self.now.since(self.ended) > IDLE {
-            while self.take() {}
+            while !self.inbox.is_empty() {
+                Rmd::read(self);
+            }
         }
     }
 
     /// Moves frames until every exchange is over, which waits for no motor in quarantine.
     fn run_all(&mut self) {
         let begun = self.now;
-        let is_first = MotorSet::TORQUE4.into_iter().any(|id| self.host.is_unknown(id));
+        let is_first = MotorSet::TORQUE4.into_iter().any(|id| self.ends.host.is_unknown(id));
         let longest = if is_first { DEFAULT_TIMEOUT + FIRST } else { DEFAULT_TIMEOUT };
-        while let Some((id, result)) = self.run() {
+        while let Some((id, result)) = self.outcome() {
             self.over(id, result.is_ok());
         }
         let took = self.now.since(begun);
@@ -237,26 +243,25 @@ impl Bench {
     }
 
     /// Moves frames until an exchange is over.
-    fn run(&mut self) -> Option<(MotorId, Result<[u8; 8], Error>)> {
+    fn outcome(&mut self) -> Option<(MotorId, Result<[u8; 8], Error>)> {
         loop {
             self.ended = self.now;
-            match self.host.poll(self.now) {
+            match self.ends.host.poll(self.now) {
                 Output::Transmit(frame) => self.transmit(frame),
                 Output::Done { id, result } => {
                     self.judge(id, result);
                     return Some((id, result));
                 }
-                Output::Wait(Some(until)) => self.hear(until),
+                Output::Wait(Some(until)) => self.wait(until),
                 Output::Wait(None) => return None,
             }
         }
     }
 
     fn transmit(&mut self, frame: CanFrame) {
-        self.forget();
         let mut sent = Sent::default();
         for id in MotorSet::TORQUE4.filter(|id| reaches(*id, frame.id())) {
-            let Asked { number, moved, .. } = self.last[place(id)];
+            let Asked { number, moved, .. } = self.ends.last[place(id)];
             let code = match frame.id() == u32::from(TORQUE4_ID) {
                 true => Code::SetTorque,
                 false => Code::from(frame.data()[0]),
@@ -266,53 +271,16 @@ impl Bench {
             let number = number + 1;
             let moved = if moves { number } else { moved };
             sent[place(id)] = Asked { number, at: self.now, halts, moved };
-            self.last[place(id)] = sent[place(id)];
+            self.ends.last[place(id)] = sent[place(id)];
             self.tally.requests += 1;
         }
         self.note(|| format!("-> {:03x} {:02x?}", frame.id(), frame.data()));
-        let message = self.sent.len() as u32;
-        self.sent.push(sent);
+        let message = self.ends.sent.push(sent);
         self.out.push(self.now, [Tagged::new(frame, message, 0)]);
     }
 
-    /// Gives the host the next frame, waiting until then.
-    fn hear(&mut self, until: Instant) {
-        while self.inbox.is_empty() {
-            let Some(next) = self.next().filter(|next| *next <= until) else {
-                self.now = self.now.max(until);
-                return;
-            };
-            self.now = self.now.max(next);
-            self.step();
-        }
-        self.take();
-    }
-
-    fn take(&mut self) -> bool {
-        let Some(frame) = self.inbox.pop_front() else { return false };
-        self.note(|| format!("<- {:03x} {:02x?}", frame.unit.id(), frame.unit.data()));
-        self.host.receive(self.now, &frame.unit);
-        self.heard = Some(frame);
-        true
-    }
-
-    fn next(&self) -> Option<Instant> {
-        [self.out.due(), self.back.due()].into_iter().flatten().min()
-    }
-
-    fn step(&mut self) {
-        while let Some(frame) = self.out.pop(self.now) {
-            for id in MotorSet::TORQUE4 {
-                self.deliver(id, frame);
-            }
-        }
-        while let Some(frame) = self.back.pop(self.now) {
-            self.inbox.push_back(frame);
-        }
-    }
-
     fn deliver(&mut self, id: MotorId, frame: Tagged<CanFrame>) {
-        let node = &mut self.nodes[place(id)];
+        let node = &mut self.ends.nodes[place(id)];
         let acts = node.motor.acts;
         let reply = node.drive.receive(self.now, &frame.unit, &mut node.motor);
         let acted = node.motor.acts > acts;
@@ -331,9 +299,8 @@ impl Bench {
         }
         self.tally.repeated += u64::from(frame.copy && acted);
         self.tally.answers += 1;
-        let asked = self.sent[source.message as usize][place(id)];
-        let message = self.replies.len() as u32;
-        self.replies.push(Reply { asked, again: frame.copy });
+        let asked = self.ends.sent.get(source.message).expect("it is on its way")[place(id)];
+        let message = self.ends.replies.push(Reply { asked, again: frame.copy });
         self.back.push(self.now + TURNAROUND, [Tagged::new(reply, message, 0)]);
     }
 
@@ -346,20 +313,21 @@ impl Bench {
 
     /// Finds out where the reply came from that the host took.
     fn trace_back(&mut self, id: MotorId) {
-        let Some(frame) = self.heard.filter(|frame| frame.unit.order() == u32::from(id.can_id()))
+        let Some(frame) =
+            self.ends.heard.filter(|frame| frame.unit.order() == u32::from(id.can_id()))
         else {
             return self.violates("the host took a reply that did not come".into());
         };
         if frame.changed || frame.source.is_none() {
             self.tally.undetected += 1;
             // The reply is still to come, and nobody waits for it.
-            self.behind[place(id)] |= frame.source.is_none();
+            self.ends.behind[place(id)] |= frame.source.is_none();
             return;
         }
-        let reply = frame.source.map(|source| self.replies[source.message as usize]);
-        let Some(Reply { asked, again }) = reply else { return };
-        let last = self.last[place(id)];
-        let behind = &mut self.behind[place(id)];
+        let reply = frame.source.and_then(|source| self.ends.replies.get(source.message));
+        let Some(&Reply { asked, again }) = reply else { return };
+        let last = self.ends.last[place(id)];
+        let behind = &mut self.ends.behind[place(id)];
         if asked.number == last.number {
             *behind = false;
             return;
@@ -382,29 +350,7 @@ impl Bench {
 
     fn over(&mut self, id: MotorId, answered: bool) {
         self.tally.detected += u64::from(!answered);
-        self.trouble[place(id)].note(&mut self.tally, self.now, !answered);
-    }
-
-    /// Drops what has long arrived, when nothing is on its way.
-    fn forget(&mut self) {
-        if self.sent.len() > REMEMBERED && self.next().is_none() && self.inbox.is_empty() {
-            self.sent.clear();
-            self.replies.clear();
-        }
-    }
-
-    fn violates(&mut self, what: String) {
-        self.note(|| format!("VIOLATION: {what}"));
-        self.violation.get_or_insert(what);
-    }
-
-    fn note(&mut self, what: impl FnOnce() -> String) {
-        if let Some(trace) = &mut self.trace {
-            if trace.len() == TRACED {
-                trace.pop_front();
-            }
-            trace.push_back(format!("{:>14.3} ms  {}", self.now.0 as f64 / 1e3, what()));
-        }
+        self.ends.trouble[place(id)].note(&mut self.tally, self.now, !answered);
     }
 }
 

@@ -6,6 +6,8 @@ use motorlink_proto::rmd::{
 use motorlink_proto::time::Instant;
 use motorlink_proto::units::{DeciVolts, DpsPerSecond};
 
+pub const MOTORS: usize = 4;
+
 /// Counts the calls that change something; every look at its sensors shows something else.
 #[derive(Debug, Clone, Default)]
 pub struct Counting {

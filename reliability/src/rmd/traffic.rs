@@ -4,6 +4,8 @@ use motorlink_link::fault::Rng;
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::{CentiDegrees, CentiDps, DpsPerSecond, IqCommand, SpeedLimit};
 
+use super::motor::MOTORS;
+
 /// The next request of the mix: two thirds read, the others move, set and stop.
 pub fn next(rng: &mut Rng) -> [u8; 8] {
     let torque = IqCommand(rng.i16(-2_000..=2_000));
@@ -45,4 +47,9 @@ fn gains(rng: &mut Rng, code: Code) -> [u8; 8] {
 
 pub fn torques(rng: &mut Rng) -> SetTorque4 {
     SetTorque4(std::array::from_fn(|_| IqCommand(rng.i16(-2_000..=2_000))))
+}
+
+/// One of the four.
+pub fn motor(rng: &mut Rng) -> MotorId {
+    MotorId::new(rng.u8(1..=MOTORS as u8)).expect("1 to 4")
 }

@@ -4,16 +4,17 @@ use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 
 use motorlink::time::{Duration, Instant};
-use motorlink_link::fault::{Faults, Lane, Rng, Way};
+use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::st::{
     Config, Error, ErrorCode, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, Line, MAX_FRAME,
     Master, Motor, Output, Parse, Profile, Recovery, Request, Slave,
 };
 
 use super::drive::{MOTORS, Memory};
-use super::traffic::Ask;
+use super::traffic::{self, Ask};
+use crate::bench::{self, Ends, Log};
 use crate::life::Life;
-use crate::tally::Tally;
+use crate::tally::Trouble;
 use crate::wire::{Tagged, message};
 
 /// A byte at 115200 baud.
@@ -24,11 +25,6 @@ const TURNAROUND: Duration = Duration(100);
 const IDLE: Duration = Duration::from_millis(20);
 /// Where a lost line does not recover by itself, the program opens it again this much later.
 const REOPENING: Duration = Duration::from_millis(3_000);
-/// Messages that are remembered; more are never on their way.
-const REMEMBERED: usize = 1 << 14;
-/// Lines that a trace keeps.
-const TRACED: usize = 60;
-
 /// Who speaks, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Setup {
@@ -61,10 +57,11 @@ enum Answer {
     Other(Option<RangeInclusive<u64>>),
 }
 
-pub struct Bench {
+pub type Bench = bench::Bench<St>;
+
+/// Master and slave.
+pub struct St {
     setup: Setup,
-    /// Whether the line does what nobody promises to survive.
-    beyond: bool,
     config: Config,
     master: Master,
     slave: Slave,
@@ -73,294 +70,107 @@ pub struct Bench {
     /// Second copies, and when they come.
     copies: VecDeque<(Instant, Vec<Tagged<u8>>)>,
     pub drive: Memory,
-    out: Lane<Tagged<u8>>,
-    back: Lane<Tagged<u8>>,
-    pub now: Instant,
-    /// When the last exchange ended.
-    ended: Instant,
-    pub exchanges: u64,
+    /// The number of the exchange under way.
+    exchange: u64,
     /// The last exchange whose request was sent.
     asked: u64,
     sent: Log<Sent>,
     replies: Log<Reply>,
     /// What the slave takes for a command at the moment.
     frame: Vec<Tagged<u8>>,
-    /// What has reached the master's port and was not read.
-    inbox: Vec<Tagged<u8>>,
     /// What the master read since it sent its request.
     heard: Vec<Tagged<u8>>,
     payload: Vec<u8>,
-    pub tally: Tally,
-    pub violation: Option<String>,
-    trace: Option<VecDeque<String>>,
+    trouble: Trouble,
 }
 
-impl Bench {
-    pub fn new(setup: Setup, faults: &Faults, beyond: bool) -> Self {
-        let Setup { profile, recovery, .. } = setup;
-        let config = Config { recovery, ..Config::default() };
-        let motors = Motor::new(MOTORS).expect("1 to 7");
-        Bench {
-            setup,
-            beyond,
-            config,
-            master: Master::new(config),
-            slave: Slave::new(profile, motors),
-            twice: None,
-            copies: VecDeque::new(),
-            drive: Memory::new(),
-            out: Lane::new(faults, Way::Sent, BYTE, ()),
-            back: Lane::new(faults, Way::Received, BYTE, ()),
-            now: Instant(0),
-            ended: Instant(0),
-            exchanges: 0,
-            asked: 0,
-            sent: Log::new(),
-            replies: Log::new(),
-            frame: Vec::new(),
-            inbox: Vec::new(),
-            heard: Vec::new(),
-            payload: Vec::new(),
-            tally: Tally::default(),
-            violation: None,
-            trace: None,
+/// Master and slave on a line with faults.
+pub fn bench(setup: Setup, faults: &Faults, beyond: bool) -> Bench {
+    let Setup { profile, recovery, .. } = setup;
+    let config = Config { recovery, ..Config::default() };
+    let motors = Motor::new(MOTORS).expect("1 to 7");
+    let ends = St {
+        setup,
+        config,
+        master: Master::new(config),
+        slave: Slave::new(profile, motors),
+        twice: None,
+        copies: VecDeque::new(),
+        drive: Memory::new(),
+        exchange: 0,
+        asked: 0,
+        sent: Log::new(),
+        replies: Log::new(),
+        frame: Vec::new(),
+        heard: Vec::new(),
+        payload: Vec::new(),
+        trouble: Trouble::default(),
+    };
+    Bench::new(ends, faults, beyond, BYTE, ())
+}
+
+impl Ends for St {
+    type Unit = u8;
+
+    const RESTS: [u64; 2] = [60_000, 5_000];
+
+    fn due(bench: &Bench) -> Option<Instant> {
+        let heard = bench.out.due().map(|due| due.max(bench.deaf_until()));
+        let copy = bench.ends.copies.front().map(|(at, _)| *at);
+        [heard, bench.back.due(), bench.ends.slave.deadline(), copy].into_iter().flatten().min()
+    }
+
+    fn step(bench: &mut Bench) {
+        if let Some(nack) = bench.ends.slave.poll(bench.now) {
+            let nack = nack.to_vec();
+            let answers = Answer::Other(bench.ends.involved());
+            bench.ends.frame.clear();
+            bench.reply(&nack, answers);
+        }
+        while bench.ends.copies.front().is_some_and(|(at, _)| *at <= bench.now)
+            && let Some((_, copy)) = bench.ends.copies.pop_front()
+        {
+            bench.back.push(bench.now, copy);
+        }
+        while bench.now >= bench.deaf_until()
+            && let Some(byte) = bench.out.pop(bench.now)
+        {
+            if bench.ends.setup.profile == Profile::Spec || bench.now >= bench.back.free() {
+                bench.deliver(byte);
+            }
+        }
+        while let Some(byte) = bench.back.pop(bench.now) {
+            bench.inbox.push_back(byte);
         }
     }
 
-    /// Writes down from now on what passes the line.
-    pub fn trace(&mut self) {
-        self.trace = Some(VecDeque::new());
+    fn read(bench: &mut Bench) {
+        let bytes: Vec<u8> = bench.inbox.iter().map(|byte| byte.unit).collect();
+        if !bytes.is_empty() {
+            bench.note(|| format!("<- {bytes:02x?}"));
+        }
+        bench.ends.heard.extend(bench.inbox.drain(..));
+        bench.ends.master.receive(bench.now, &bytes);
     }
 
-    pub fn traced(self) -> Vec<String> {
-        self.trace.map(Vec::from).unwrap_or_default()
-    }
-
-    /// Lets this share of the replies come twice from now on.
-    pub fn repeat(&mut self, share: f64, seed: u64) {
-        self.twice = Some((share, Rng::with_seed(seed)));
-    }
-
-    /// The program ends, and another opens the line.
-    pub fn next_program(&mut self) {
-        self.note(|| "a new program".to_owned());
+    fn next_program(&mut self) {
         self.master = Master::new(self.config);
     }
 
-    /// One exchange as the blocking client does it; gives the acknowledge's payload.
-    pub fn exchange(&mut self, ask: &Ask) -> Result<&[u8], Error> {
-        let result = self.attempt(ask, Instant(u64::MAX)).expect("it ends");
-        self.judge(result);
-        result.map(|()| &self.payload[..])
+    fn exchange(bench: &mut Bench, rng: &mut Rng) {
+        let ask = traffic::next(bench.ends.setup.profile, rng);
+        let failed = matches!(bench.exchange(&ask), Err(Error::Failed(_)));
+        bench.ends.trouble.note(&mut bench.tally, bench.now, failed);
     }
 
-    /// An exchange in which the program is killed after this time.
-    pub fn killed_in(&mut self, ask: &Ask, life: Duration) {
-        self.attempt(ask, self.now + life);
+    fn killed_in(bench: &mut Bench, rng: &mut Rng) {
+        let ask = traffic::next(bench.ends.setup.profile, rng);
+        let life = Duration(rng.u64(..1_500_000));
+        bench.attempt(&ask, bench.now + life);
     }
+}
 
-    /// An exchange, unless it lasts until `end`.
-    fn attempt(&mut self, ask: &Ask, end: Instant) -> Option<Result<(), Error>> {
-        self.exchanges += 1;
-        let begun = self.now;
-        if self.now.since(self.ended) > IDLE {
-            self.read();
-        }
-        if self.setup.recovery == Recovery::None && self.master.line() == Line::Lost {
-            self.advance(self.now + REOPENING);
-            self.inbox.clear();
-            self.master.reopened();
-        }
-        let started = self.now;
-        let frame = Frame { header: ask.header, payload: ask.payload() };
-        let known = Request::decode(self.setup.profile, &frame);
-        let begins = match &known {
-            Ok(request) => self.master.request(frame.motor(), request),
-            Err(_) => self.master.request_raw(ask.header, ask.payload()),
-        };
-        begins.expect("no exchange is under way");
-        let mut sending = Duration(0);
-        let result = loop {
-            let mut bytes = [0; MAX_FRAME + 1];
-            let (request, size) = match self.master.poll(self.now) {
-                Output::Wait(until) => {
-                    if self.now >= end {
-                        return None;
-                    }
-                    let until = until.expect("an exchange is under way");
-                    self.wait(until.min(end));
-                    continue;
-                }
-                Output::Done(result) => {
-                    self.payload.clear();
-                    break result.map(|payload| self.payload.extend_from_slice(payload));
-                }
-                Output::Transmit(given) => {
-                    let size = given.len();
-                    bytes[..size].copy_from_slice(given);
-                    (self.master.line() == Line::Up, size)
-                }
-            };
-            sending = sending + Duration(BYTE.0 * size as u64);
-            self.transmit(&bytes[..size], request);
-        };
-        self.ended = self.now;
-        self.note(|| format!("exchange is over: {result:?}"));
-        let took = self.now.since(started);
-        if took > self.config.longest_exchange() + sending {
-            self.violates(format!("an exchange took {} ms", took.0 / 1_000));
-        }
-        self.tally.longest = self.tally.longest.max(self.now.since(begun));
-        Some(result)
-    }
-
-    /// Nothing is asked for a while.
-    pub fn rest(&mut self, pause: Duration) {
-        self.advance(self.now + pause);
-    }
-
-    fn transmit(&mut self, bytes: &[u8], request: bool) {
-        let message = self.sent.push(Sent { exchange: self.exchanges, request, size: bytes.len() });
-        if request {
-            self.asked = self.exchanges;
-            self.tally.requests += 1;
-            self.heard.clear();
-        }
-        self.note(|| format!("-> {bytes:02x?}{}", if request { "" } else { " (recovery)" }));
-        self.out.push(self.now, tagged(bytes, message));
-        self.advance(self.out.free());
-    }
-
-    /// Reads the port until then, or until something came.
-    fn wait(&mut self, until: Instant) {
-        while self.inbox.is_empty() {
-            let Some(next) = self.next().filter(|next| *next <= until) else {
-                self.now = self.now.max(until);
-                return;
-            };
-            self.now = self.now.max(next);
-            self.step();
-        }
-        self.read();
-    }
-
-    fn read(&mut self) {
-        let bytes: Vec<u8> = self.inbox.iter().map(|byte| byte.unit).collect();
-        if !bytes.is_empty() {
-            self.note(|| format!("<- {bytes:02x?}"));
-        }
-        self.heard.append(&mut self.inbox);
-        self.master.receive(self.now, &bytes);
-    }
-
-    fn advance(&mut self, until: Instant) {
-        while let Some(next) = self.next().filter(|next| *next <= until) {
-            self.now = self.now.max(next);
-            self.step();
-        }
-        self.now = self.now.max(until);
-    }
-
-    fn next(&self) -> Option<Instant> {
-        let heard = self.out.due().map(|due| due.max(self.deaf_until()));
-        let copy = self.copies.front().map(|(at, _)| *at);
-        [heard, self.back.due(), self.slave.deadline(), copy].into_iter().flatten().min()
-    }
-
-    /// While the slave answers, bytes wait for it; shipped firmware throws them away.
-    fn deaf_until(&self) -> Instant {
-        if self.setup.profile == Profile::Spec { self.back.free() } else { Instant(0) }
-    }
-
-    fn step(&mut self) {
-        if let Some(nack) = self.slave.poll(self.now) {
-            let nack = nack.to_vec();
-            let answers = Answer::Other(self.involved());
-            self.frame.clear();
-            self.reply(&nack, answers);
-        }
-        while self.copies.front().is_some_and(|(at, _)| *at <= self.now)
-            && let Some((_, copy)) = self.copies.pop_front()
-        {
-            self.back.push(self.now, copy);
-        }
-        while self.now >= self.deaf_until()
-            && let Some(byte) = self.out.pop(self.now)
-        {
-            if self.setup.profile == Profile::Spec || self.now >= self.back.free() {
-                self.deliver(byte);
-            }
-        }
-        while let Some(byte) = self.back.pop(self.now) {
-            self.inbox.push(byte);
-        }
-    }
-
-    fn deliver(&mut self, byte: Tagged<u8>) {
-        if !self.slave.is_receiving() {
-            self.frame.clear();
-        }
-        self.frame.push(byte);
-        let acts = self.drive.acts;
-        if let Some(reply) = self.slave.receive(self.now, byte.unit, &mut self.drive) {
-            let mut bytes = [0; MAX_FRAME];
-            let size = reply.len();
-            bytes[..size].copy_from_slice(reply);
-            self.take(&bytes[..size], self.drive.acts > acts);
-        }
-    }
-
-    /// The slave has taken `frame` for a command.
-    fn take(&mut self, reply: &[u8], acted: bool) {
-        let refused = reply[0] == HEADER_NACK && reply[2] == u8::from(ErrorCode::BadCrc);
-        let whole = message(&self.frame)
-            .and_then(|message| self.sent.get(message))
-            .filter(|sent| sent.size == self.frame.len())
-            .map(|sent| (sent.exchange, sent.request));
-        let answers = match whole {
-            Some((exchange, request)) => {
-                if refused {
-                    self.violates("a command that arrived as it was sent counts as damaged".into());
-                }
-                if request && exchange != self.asked && !self.beyond {
-                    self.violates(format!("the command of exchange {exchange} came after others"));
-                }
-                if request { Answer::Exchange(exchange) } else { Answer::Recovery }
-            }
-            // What padding is for: its own end is a frame of a motor that is not there.
-            None if self.is_padding() => Answer::Recovery,
-            // A frame with code 0, which nobody knows: what a line that is stuck at 0 says all the
-            // time. Its checksum fits always.
-            None if self.frame.iter().all(|byte| byte.unit == 0) => Answer::Other(self.involved()),
-            None => {
-                self.tally.judged += 1;
-                if !refused {
-                    let frame: Vec<u8> = self.frame.iter().map(|byte| byte.unit).collect();
-                    self.note(|| format!("   the drive takes {frame:02x?} for a command"));
-                    self.slip(&frame);
-                    self.tally.executed += u64::from(acted);
-                }
-                Answer::Other(self.involved())
-            }
-        };
-        self.reply(reply, answers);
-    }
-
-    fn reply(&mut self, bytes: &[u8], answers: Answer) {
-        self.tally.answers += u64::from(matches!(answers, Answer::Exchange(_)));
-        self.note(|| format!("   the drive answers {bytes:02x?}"));
-        let message = self.replies.push(Reply { size: bytes.len(), answers });
-        let sent = self.now + TURNAROUND;
-        self.back.push(sent, tagged(bytes, message));
-        if let Some((share, rng)) = &mut self.twice
-            && rng.f64() < *share
-        {
-            let apart = Duration(rng.u64(1_000..20_000));
-            self.copies.push_back((sent + apart, tagged(bytes, message).collect()));
-            self.copies.make_contiguous().sort_by_key(|(at, _)| *at);
-        }
-    }
-
+impl St {
     /// Whether `frame` is made of nothing but what recovery sends.
     fn is_padding(&self) -> bool {
         let sent = |byte: &Tagged<u8>| self.sent.get(byte.source?.message);
@@ -374,6 +184,161 @@ impl Bench {
         let mut exchanges = messages.filter(|sent| sent.request).map(|sent| sent.exchange);
         let first = exchanges.next()?;
         Some(first..=exchanges.next_back().unwrap_or(first))
+    }
+}
+
+impl Bench {
+    /// Lets this share of the replies come twice from now on.
+    pub fn repeat(&mut self, share: f64, seed: u64) {
+        self.ends.twice = Some((share, Rng::with_seed(seed)));
+    }
+
+    /// One exchange as the blocking client does it; gives the acknowledge's payload.
+    pub fn exchange(&mut self, ask: &Ask) -> Result<&[u8], Error> {
+        let result = self.attempt(ask, Instant(u64::MAX)).expect("it ends");
+        self.tally.exchanges += 1;
+        self.judge(result);
+        result.map(|()| &self.ends.payload[..])
+    }
+
+    /// An exchange, unless it lasts until `end`.
+    fn attempt(&mut self, ask: &Ask, end: Instant) -> Option<Result<(), Error>> {
+        self.ends.exchange += 1;
+        let begun = self.now;
+        if self.now.since(self.ended) > IDLE {
+            St::read(self);
+        }
+        if self.ends.setup.recovery == Recovery::None && self.ends.master.line() == Line::Lost {
+            self.advance(self.now + REOPENING);
+            self.inbox.clear();
+            self.ends.master.reopened();
+        }
+        let started = self.now;
+        let frame = Frame { header: ask.header, payload: ask.payload() };
+        let known = Request::decode(self.ends.setup.profile, &frame);
+        let begins = match &known {
+            Ok(request) => self.ends.master.request(frame.motor(), request),
+            Err(_) => self.ends.master.request_raw(ask.header, ask.payload()),
+        };
+        begins.expect("no exchange is under way");
+        let mut sending = Duration(0);
+        let result = loop {
+            let mut bytes = [0; MAX_FRAME + 1];
+            let (request, size) = match self.ends.master.poll(self.now) {
+                Output::Wait(until) => {
+                    if self.now >= end {
+                        return None;
+                    }
+                    let until = until.expect("an exchange is under way");
+                    self.wait(until.min(end));
+                    continue;
+                }
+                Output::Done(result) => {
+                    self.ends.payload.clear();
+                    break result.map(|payload| self.ends.payload.extend_from_slice(payload));
+                }
+                Output::Transmit(given) => {
+                    let size = given.len();
+                    bytes[..size].copy_from_slice(given);
+                    (self.ends.master.line() == Line::Up, size)
+                }
+            };
+            sending = sending + Duration(BYTE.0 * size as u64);
+            self.transmit(&bytes[..size], request);
+        };
+        self.ended = self.now;
+        self.note(|| format!("exchange is over: {result:?}"));
+        let took = self.now.since(started);
+        if took > self.ends.config.longest_exchange() + sending {
+            self.violates(format!("an exchange took {} ms", took.0 / 1_000));
+        }
+        self.tally.longest = self.tally.longest.max(self.now.since(begun));
+        Some(result)
+    }
+
+    fn transmit(&mut self, bytes: &[u8], request: bool) {
+        let message =
+            self.ends.sent.push(Sent { exchange: self.ends.exchange, request, size: bytes.len() });
+        if request {
+            self.ends.asked = self.ends.exchange;
+            self.tally.requests += 1;
+            self.ends.heard.clear();
+        }
+        self.note(|| format!("-> {bytes:02x?}{}", if request { "" } else { " (recovery)" }));
+        self.out.push(self.now, tagged(bytes, message));
+        self.advance(self.out.free());
+    }
+
+    /// While the slave answers, bytes wait for it; shipped firmware throws them away.
+    fn deaf_until(&self) -> Instant {
+        if self.ends.setup.profile == Profile::Spec { self.back.free() } else { Instant(0) }
+    }
+
+    fn deliver(&mut self, byte: Tagged<u8>) {
+        if !self.ends.slave.is_receiving() {
+            self.ends.frame.clear();
+        }
+        self.ends.frame.push(byte);
+        let acts = self.ends.drive.acts;
+        if let Some(reply) = self.ends.slave.receive(self.now, byte.unit, &mut self.ends.drive) {
+            let mut bytes = [0; MAX_FRAME];
+            let size = reply.len();
+            bytes[..size].copy_from_slice(reply);
+            self.take(&bytes[..size], self.ends.drive.acts > acts);
+        }
+    }
+
+    /// The slave has taken `frame` for a command.
+    fn take(&mut self, reply: &[u8], acted: bool) {
+        let refused = reply[0] == HEADER_NACK && reply[2] == u8::from(ErrorCode::BadCrc);
+        let whole = message(&self.ends.frame)
+            .and_then(|message| self.ends.sent.get(message))
+            .filter(|sent| sent.size == self.ends.frame.len())
+            .map(|sent| (sent.exchange, sent.request));
+        let answers = match whole {
+            Some((exchange, request)) => {
+                if refused {
+                    self.violates("a command that arrived as it was sent counts as damaged".into());
+                }
+                if request && exchange != self.ends.asked && !self.beyond {
+                    self.violates(format!("the command of exchange {exchange} came after others"));
+                }
+                if request { Answer::Exchange(exchange) } else { Answer::Recovery }
+            }
+            // What padding is for: its own end is a frame of a motor that is not there.
+            None if self.ends.is_padding() => Answer::Recovery,
+            // A frame with code 0, which nobody knows: what a line that is stuck at 0 says all the
+            // time. Its checksum fits always.
+            None if self.ends.frame.iter().all(|byte| byte.unit == 0) => {
+                Answer::Other(self.ends.involved())
+            }
+            None => {
+                self.tally.judged += 1;
+                if !refused {
+                    let frame: Vec<u8> = self.ends.frame.iter().map(|byte| byte.unit).collect();
+                    self.note(|| format!("   the drive takes {frame:02x?} for a command"));
+                    self.slip(&frame);
+                    self.tally.executed += u64::from(acted);
+                }
+                Answer::Other(self.ends.involved())
+            }
+        };
+        self.reply(reply, answers);
+    }
+
+    fn reply(&mut self, bytes: &[u8], answers: Answer) {
+        self.tally.answers += u64::from(matches!(answers, Answer::Exchange(_)));
+        self.note(|| format!("   the drive answers {bytes:02x?}"));
+        let message = self.ends.replies.push(Reply { size: bytes.len(), answers });
+        let sent = self.now + TURNAROUND;
+        self.back.push(sent, tagged(bytes, message));
+        if let Some((share, rng)) = &mut self.ends.twice
+            && rng.f64() < *share
+        {
+            let apart = Duration(rng.u64(1_000..20_000));
+            self.ends.copies.push_back((sent + apart, tagged(bytes, message).collect()));
+            self.ends.copies.make_contiguous().sort_by_key(|(at, _)| *at);
+        }
     }
 
     fn judge(&mut self, result: Result<(), Error>) {
@@ -389,7 +354,7 @@ impl Bench {
 
     /// Finds out where the reply came from that the master took.
     fn trace_back(&mut self) {
-        let heard: Vec<u8> = self.heard.iter().map(|byte| byte.unit).collect();
+        let heard: Vec<u8> = self.ends.heard.iter().map(|byte| byte.unit).collect();
         let mut start = 0;
         let size = loop {
             match Frame::parse(&heard[start..]) {
@@ -398,11 +363,11 @@ impl Bench {
                 _ => return self.violates("the master took a reply that did not come".into()),
             }
         };
-        let taken = &self.heard[start..start + size];
+        let taken = &self.ends.heard[start..start + size];
         let reply = message(taken)
-            .and_then(|message| self.replies.get(message))
+            .and_then(|message| self.ends.replies.get(message))
             .filter(|reply| reply.size == size);
-        let current = self.exchanges;
+        let current = self.ends.exchange;
         match reply.map(|reply| &reply.answers) {
             Some(Answer::Exchange(exchange)) if *exchange == current => {}
             Some(Answer::Other(Some(involved))) if involved.contains(&current) => {}
@@ -441,48 +406,8 @@ impl Bench {
             self.violates(format!("{frame:02x?} was taken although its length is wrong"));
         }
     }
-
-    fn violates(&mut self, what: String) {
-        self.note(|| format!("VIOLATION: {what}"));
-        self.violation.get_or_insert(what);
-    }
-
-    fn note(&mut self, what: impl FnOnce() -> String) {
-        if let Some(trace) = &mut self.trace {
-            if trace.len() == TRACED {
-                trace.pop_front();
-            }
-            let (exchange, ms) = (self.exchanges, self.now.0 as f64 / 1e3);
-            trace.push_back(format!("{ms:>14.3} ms  #{exchange}  {}", what()));
-        }
-    }
 }
 
 fn tagged(bytes: &[u8], message: u32) -> impl Iterator<Item = Tagged<u8>> {
     bytes.iter().enumerate().map(move |(n, byte)| Tagged::new(*byte, message, n as u16))
-}
-
-/// The last messages, by number.
-struct Log<T> {
-    first: u32,
-    kept: VecDeque<T>,
-}
-
-impl<T> Log<T> {
-    fn new() -> Self {
-        Log { first: 0, kept: VecDeque::with_capacity(REMEMBERED) }
-    }
-
-    fn push(&mut self, value: T) -> u32 {
-        if self.kept.len() == REMEMBERED {
-            self.kept.pop_front();
-            self.first += 1;
-        }
-        self.kept.push_back(value);
-        self.first + self.kept.len() as u32 - 1
-    }
-
-    fn get(&self, number: u32) -> Option<&T> {
-        self.kept.get(number.checked_sub(self.first)? as usize)
-    }
 }

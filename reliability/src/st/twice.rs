@@ -6,7 +6,7 @@ use motorlink::time::Duration;
 use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::st::{RegisterId, Request, question_behind};
 
-use super::bench::{Bench, Setup};
+use super::bench::{self, Bench, Setup};
 use super::traffic::Ask;
 use crate::life::Life;
 use crate::plan::SPEC;
@@ -45,7 +45,7 @@ impl Sum for Batches {
 /// of the replies comes twice; `confirms` each value, or not.
 pub fn run(share: f64, faults: &Faults, confirms: bool, count: u64) -> Batches {
     let setup = Setup { life: Life::Short, ..SPEC };
-    let mut bench = Bench::new(setup, faults, true);
+    let mut bench = bench::bench(setup, faults, true);
     bench.repeat(share, faults.seed);
     let mut rng = Rng::with_seed(faults.seed ^ 0x5EED);
     let mut batches = Batches { count, ..Batches::default() };
@@ -55,7 +55,7 @@ pub fn run(share: f64, faults: &Faults, confirms: bool, count: u64) -> Batches {
         let (mut is_wrong, mut turn) = (false, false);
         let is_read = (0..4).all(|_| {
             let register = READ[rng.usize(..READ.len())];
-            let value = bench.drive.banks[0][usize::from(register.0)].to_le_bytes();
+            let value = bench.ends.drive.banks[0][usize::from(register.0)].to_le_bytes();
             let reply = bench.exchange(&Ask::of(1, &Request::GetRegister(register)));
             let size = reply.as_ref().ok().map(|payload| payload.len());
             is_wrong |= reply.is_ok_and(|payload| !value.starts_with(payload));

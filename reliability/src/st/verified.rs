@@ -3,7 +3,7 @@
 use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::st::{Error, RegisterId, Request, Unverified, VERIFY_ATTEMPTS, VerifiedWrite};
 
-use super::bench::{Bench, Setup};
+use super::bench::{self, Bench, Setup};
 use super::drive::MOTORS;
 use super::traffic::{self, Ask, SETTINGS};
 use crate::tally::Violation;
@@ -31,7 +31,7 @@ impl Writes {
 
 /// Writes `count` random values to settings, each register read back and repeated if `verified`.
 pub fn run(setup: Setup, faults: &Faults, verified: bool, count: u64) -> Result<Writes, Violation> {
-    let mut bench = Bench::new(setup, faults, false);
+    let mut bench = bench::bench(setup, faults, false);
     let mut rng = Rng::with_seed(faults.seed ^ 0x5EED);
     let mut writes = Writes { writes: count, ..Writes::default() };
     for exchange in 0..count {
@@ -39,7 +39,7 @@ pub fn run(setup: Setup, faults: &Faults, verified: bool, count: u64) -> Result<
         let register = SETTINGS[rng.usize(..SETTINGS.len())];
         let shape = register.shape().expect("a setting is in the table");
         let value = shape.ty(setup.profile).fit(rng.i32(..));
-        let mut expected = bench.drive.banks;
+        let mut expected = bench.ends.drive.banks;
         expected[usize::from(motor - 1)][usize::from(register.0)] = value;
         let done = if verified {
             write_verified(&mut bench, setup, motor, register, value)
@@ -49,11 +49,11 @@ pub fn run(setup: Setup, faults: &Faults, verified: bool, count: u64) -> Result<
         if let Some(what) = bench.violation.take() {
             return Err(Violation { exchange, what, trace: Vec::new() });
         }
-        let kept = bench.drive.banks[usize::from(motor - 1)][usize::from(register.0)];
+        let kept = bench.ends.drive.banks[usize::from(motor - 1)][usize::from(register.0)];
         writes.done += u64::from(done);
         writes.wrong += u64::from(done && kept != value);
         expected[usize::from(motor - 1)][usize::from(register.0)] = kept;
-        writes.beside += u64::from(expected != bench.drive.banks);
+        writes.beside += u64::from(expected != bench.ends.drive.banks);
     }
     Ok(writes)
 }
