@@ -93,7 +93,7 @@ class SlowLine(Between):
         eventually(lambda: sum(len(data) for _, data in self.sent()) > 6_000, "a flood", within=30)
 
     def stopped(self):
-        stop = bytes([0x23, 0x01, 0x02, 0x26]) if self.protocol == "st" else b"t141880"
+        stop = bytes([0x23, 0x01, 0x02, 0x26]) if self.protocol == "st" else b"t141881"
         eventually(lambda: stop in b"".join(data for _, data in self.sent()), "the stop", within=30)
 
     def bytes_since(self, began):

@@ -29,7 +29,7 @@ def test_rmd_motors_are_ended_as_told(sim, guard, client):
 
 
 def test_an_acknowledge_of_the_programs_own_end_does_not_stand_for_the_guards(sim, start, tmp_path):
-    """The program switches off, moves on and dies; replies are late, and the guard's first 0x80 is lost."""
+    """The program stops, moves on and dies; replies are late, and the guard's first 0x81 is lost."""
     drives = sim(st=())
     with Meddler(tmp_path / "bus", drives.can, delay=0.01) as bus:
         serve = f"slcan-pty:{tmp_path}/held"
@@ -37,12 +37,12 @@ def test_an_acknowledge_of_the_programs_own_end_does_not_stand_for_the_guards(si
         process.line(0)
         with RawLine(tmp_path / "held") as line:
             line.say(b"\rC\rS8\rO\r", b"\r")
-            os.write(line.end, b"t14188000000000000000\rt1418A2000000A08C0000\r")
+            os.write(line.end, b"t14188100000000000000\rt1418A2000000A08C0000\r")
             eventually(lambda: bus.passed(b"t1418A2"), "the motor is told to turn")
-            bus.lose(b"t141880")
-        eventually(lambda: bus.is_lost(b"t141880"), "the guard's first 0x80 is lost")
-        process.says("motor 1 is stopped (0x80 acknowledged)")
-        assert drives.motor(1)["mode"] == "off"
+            bus.lose(b"t141881")
+        eventually(lambda: bus.is_lost(b"t141881"), "the guard's first 0x81 is lost")
+        process.says("motor 1 is stopped (0x81 acknowledged)")
+        assert drives.motor(1)["mode"] == "stopped"
         assert not any("another node" in text for text in process.err), process.err
 
 
@@ -55,7 +55,7 @@ def test_an_rmd_motor_that_its_program_ended_is_left_as_it_is(sim, guard):
         line.say(b"t1428A2000000A08C0000\r", b"t1428A2")
         line.say(b"t14288100000000000000\r", b"t142881")
         line.say(b"t1418A2000000A08C0000\r", b"t1418A2")
-    process.says("motor 1 is stopped (0x80 acknowledged)")
+    process.says("motor 1 is stopped (0x81 acknowledged)")
     assert not any("motor 2" in text for text in process.err), process.err
     assert drives.motor(2)["mode"] == "stopped"
 
@@ -87,7 +87,7 @@ def test_an_rmd_guard_over_a_lost_port_goes_on_when_it_is_back(sim, guard, clien
     process.says("motor 1 MAY STILL TURN")
     drives = sim(st=())
     process.says("the drive's port is back")
-    process.says("motor 1 is stopped (0x80 acknowledged)")
+    process.says("motor 1 is stopped (0x81 acknowledged)")
 
 
 @pytest.mark.parametrize("protocol", PORT)

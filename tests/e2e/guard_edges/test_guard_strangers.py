@@ -70,7 +70,7 @@ def test_the_body_behind_a_web_pages_request_does_not_reach_a_served_drive(sim, 
         assert state["STATUS"]["name"] == "IDLE"
     else:
         motion = run("rmd", "-p", drives.port("slcan:tcp"), "--json", "status").ended(0).json
-        assert (motion["speed"], motion["angle"]) == (0, 0)
+        assert (motion["speed"], motion["multi_turn_angle"]) == (0, 0)
 
 
 def unsent(page):

@@ -91,7 +91,7 @@ struct RmdArgs {
     serve: Vec<String>,
     /// What is done to motors whose program is gone: off (0x80) lets go, so that a load drops; stop
     /// (0x81) holds still
-    #[arg(long, value_name = "ACTION", default_value = "off")]
+    #[arg(long, value_name = "ACTION", default_value = "stop")]
     on_loss: OnLoss,
     /// The motor of --prove
     #[arg(long, value_name = "ID", default_value_t = 1, requires = "prove",

@@ -20,7 +20,7 @@ pub struct Journal {
     /// How often the host started the motor.
     pub starts: usize,
     sent: Vec<String>,
-    exchanges: Vec<Asked>,
+    exchanges: Vec<JournalEntry>,
     told: Vec<Told>,
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Exchange {
 }
 
 #[derive(Debug, Clone)]
-struct Asked {
+struct JournalEntry {
     exchange: Exchange,
     at: Instant,
     /// Parts of the reply that are still to come.
@@ -83,7 +83,7 @@ impl Journal {
         }
         let exchange = Exchange { motor, code, number: self.exchanges.len() + 1 };
         let (owed, answered, confused) = Default::default();
-        self.exchanges.push(Asked { exchange, at: now, owed, answered, confused });
+        self.exchanges.push(JournalEntry { exchange, at: now, owed, answered, confused });
         exchange
     }
 
@@ -158,7 +158,7 @@ impl Journal {
         }
     }
 
-    fn of(&mut self, exchange: Exchange) -> &mut Asked {
+    fn of(&mut self, exchange: Exchange) -> &mut JournalEntry {
         &mut self.exchanges[exchange.number - 1]
     }
 }

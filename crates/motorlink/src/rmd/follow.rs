@@ -19,13 +19,13 @@ const WAITING: usize = 64;
 pub(crate) struct Follower {
     moving: MotorSet,
     /// Requests without a reply yet, by motor, oldest first.
-    asked: [VecDeque<Asked>; MotorId::COUNT],
+    asked: [VecDeque<SeenRequest>; MotorId::COUNT],
     /// Motors whose commands by other nodes were told.
     unguarded: MotorSet,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Asked {
+struct SeenRequest {
     code: u8,
     at: Instant,
     number: u64,
@@ -68,11 +68,14 @@ impl Follower {
         }
         if can_id == TORQUE4_ID {
             for id in MotorSet::TORQUE4 {
-                self.ask(id, Asked { code: Code::SetTorque.into(), at: now, number, ends: false });
+                self.ask(
+                    id,
+                    SeenRequest { code: Code::SetTorque.into(), at: now, number, ends: false },
+                );
             }
         } else if let Some(id) = MotorId::from_can_id(can_id.into()) {
             let ends = Code::from(code).ends_motion();
-            self.ask(id, Asked { code, at: now, number, ends });
+            self.ask(id, SeenRequest { code, at: now, number, ends });
         }
     }
 
@@ -88,7 +91,7 @@ impl Follower {
             let place = asked.iter().position(|asked| asked.code == code)?;
             Some((id, asked.remove(place)?))
         });
-        if let Some((id, Asked { ends: true, .. })) = reply {
+        if let Some((id, SeenRequest { ends: true, .. })) = reply {
             self.moving.remove(id);
         }
         let news = if reply.is_some() { MotorSet::EMPTY } else { moved.without(self.unguarded) };
@@ -96,7 +99,7 @@ impl Follower {
         Heard { reply_to: reply.map(|(_, asked)| asked.number), unguarded: news.into_iter().next() }
     }
 
-    fn ask(&mut self, id: MotorId, asked: Asked) {
+    fn ask(&mut self, id: MotorId, asked: SeenRequest) {
         let waiting = self.of(id);
         if waiting.len() == WAITING {
             waiting.pop_front();
@@ -104,7 +107,7 @@ impl Follower {
         waiting.push_back(asked);
     }
 
-    fn of(&mut self, id: MotorId) -> &mut VecDeque<Asked> {
+    fn of(&mut self, id: MotorId) -> &mut VecDeque<SeenRequest> {
         &mut self.asked[usize::from(id.number()) - 1]
     }
 }

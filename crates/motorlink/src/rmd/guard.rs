@@ -6,7 +6,7 @@ use super::{Bus, Error};
 use crate::stopping::{STOP_ATTEMPTS, await_retry};
 
 impl Bus {
-    /// Switches off the motors that this bus was used to move; from now on every request but Off and
+    /// Stops the motors that this bus was used to move; from now on every request but Off and
     /// Stop is [`PortError::Retired`]. For a signal's handler with a thread of its own, beside a program
     /// that would go on until the handler ends it. Waits for exchanges that are under way.
     pub fn retire(&self) -> Vec<Stopped> {
@@ -14,18 +14,19 @@ impl Bus {
         self.guard().stop_now()
     }
 
-    /// Switches off, when it goes out of scope, the motors that this bus was used to move.
+    /// Stops, when it goes out of scope, the motors that this bus was used to move.
     pub fn guard(&self) -> Guard<'_> {
-        Guard::new(self, OnDrop::Off)
+        Guard { bus: self, action: OnDrop::default(), armed: true, report: |_| {} }
     }
 }
 
 /// What a [`Guard`] does to the motors that it finds moving.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum OnDrop {
-    /// Switches them off (0x80).
+    /// Switches them off (0x80): a load that they hold falls.
     Off,
     /// Stops them (0x81); they hold still and remember their command.
+    #[default]
     Stop,
 }
 
@@ -57,11 +58,7 @@ pub struct Stopped {
     pub result: Result<(), Error>,
 }
 
-impl<'a> Guard<'a> {
-    pub(super) fn new(bus: &'a Bus, action: OnDrop) -> Self {
-        Guard { bus, action, armed: true, report: |_| {} }
-    }
-
+impl Guard<'_> {
     /// Chooses what is done to the motors.
     pub fn with(mut self, action: OnDrop) -> Self {
         self.action = action;

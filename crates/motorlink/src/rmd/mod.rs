@@ -4,7 +4,7 @@
 //! use motorlink::rmd::{Bus, Options, SpeedLimit, CentiDegrees};
 //!
 //! let bus = Bus::open(&"slcan:/dev/ttyACM0".parse()?, Options::default())?;
-//! let guard = bus.guard();                 // switches off what was set moving
+//! let guard = bus.guard();                 // stops what was set moving
 //! let motor = bus.motor(1)?;
 //! motor.set_position(CentiDegrees::from_degrees(90.0), Some(SpeedLimit(500)))?;
 //! println!("{} °/s", motor.motion_status()?.speed.dps());

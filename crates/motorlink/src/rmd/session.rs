@@ -27,7 +27,7 @@ pub(super) struct Session {
     /// How long an exchange may be put off.
     patience: Duration,
     /// What each motor was asked last.
-    asked: [Asked; MotorId::COUNT],
+    asked: [PendingRequest; MotorId::COUNT],
     /// Motors whose quarantine an exchange outlasts.
     insisting: MotorSet,
     /// Those of them whose request cannot leave yet.
@@ -42,7 +42,7 @@ pub(super) struct Session {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Asked {
+struct PendingRequest {
     request: [u8; 8],
     /// When a motor in quarantine is waited for no longer.
     until: Instant,
@@ -79,7 +79,7 @@ impl Session {
             host.set_limits(id, options.limits);
         }
         let times = options.guard.saturating_mul(2).saturating_add(options.timeout);
-        let nothing = Asked { request: [0; 8], until: Instant(0) };
+        let nothing = PendingRequest { request: [0; 8], until: Instant(0) };
         Session {
             port,
             host,
@@ -163,7 +163,7 @@ impl Session {
         self.free(id, &request)?;
         let begun = self.host.request(now, id, request);
         begun.map_err(|refused| self.refused(refused))?;
-        self.asked[place(id)] = Asked { request, until: now + self.patience };
+        self.asked[place(id)] = PendingRequest { request, until: now + self.patience };
         if self.host.is_unknown(id) {
             self.insisting.insert(id);
         }
@@ -183,7 +183,7 @@ impl Session {
             Err(refused) => return Err(self.refused(refused)),
         }
         self.insisting.insert(id);
-        self.asked[place(id)] = Asked { request, until: now + self.patience };
+        self.asked[place(id)] = PendingRequest { request, until: now + self.patience };
         Ok(())
     }
 
@@ -206,7 +206,7 @@ impl Session {
         begun.map_err(|refused| self.refused(refused))?;
         let until = now + self.patience;
         for id in expect {
-            self.asked[place(id)] = Asked { request: torque, until };
+            self.asked[place(id)] = PendingRequest { request: torque, until };
         }
         if expect.into_iter().any(|id| self.host.is_unknown(id)) {
             self.held = Some(Held { torques, expect, answered: MotorSet::EMPTY, until });
@@ -225,7 +225,7 @@ impl Session {
                 return Output::Done(id, Err(self.why_unsent(id)));
             }
             for id in self.waiting {
-                let Asked { request, until } = self.asked[place(id)];
+                let PendingRequest { request, until } = self.asked[place(id)];
                 match self.host.request(now, id, request) {
                     Err(Refused::Quarantined { until: free, .. }) if now < until => {
                         again = again.into_iter().chain([free]).min();

@@ -248,8 +248,8 @@ impl Client {
     }
 
     /// The drive has no such motor, which may have been taken for started.
-    pub(super) fn is_missing(&self, motor: Motor) {
-        self.line.take().session.is_missing(motor);
+    pub(super) fn forget_motor(&self, motor: Motor) {
+        self.line.take().session.forget_motor(motor);
     }
 
     /// Takes the line over from another master, which started these motors.

@@ -65,7 +65,7 @@ impl<'a> Guard<'a> {
         match self.client.motor(motor.number())?.stop() {
             // What is not there does not turn.
             Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) => {
-                self.client.is_missing(motor);
+                self.client.forget_motor(motor);
                 Ok(())
             }
             result => result,

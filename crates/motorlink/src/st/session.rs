@@ -38,7 +38,7 @@ pub(super) struct Session {
     ramped: Ramped,
     /// What the line had been through when a request began.
     history: History,
-    asked: Asked,
+    asked: PendingRequest,
     /// The size of the last acknowledge's payload, and how often the line had been lost when that was
     /// asked for.
     last_size: Option<usize>,
@@ -57,7 +57,7 @@ type History = (u32, u32);
 
 /// The request under way.
 #[derive(Debug, Clone, Copy)]
-struct Asked {
+struct PendingRequest {
     motor: u8,
     /// The motor that this addresses, where it is known.
     addressed: Option<Motor>,
@@ -100,7 +100,7 @@ impl Session {
     pub(super) fn new(port: Arc<str>, options: &Options) -> Self {
         let rules = Rules { profile: options.profile, limits: options.limits };
         let what = What::Known(FrameCode::GetBoardInfo);
-        let asked = Asked { motor: 0, addressed: None, effect: Effect::None, what };
+        let asked = PendingRequest { motor: 0, addressed: None, effect: Effect::None, what };
         let master = Master::new(Config { profile: options.profile, ..options.line });
         Session {
             port,
@@ -226,7 +226,7 @@ impl Session {
         self.losses = self.master.counters().losses;
         let addressed = self.started.asked(motor, effect);
         self.ramped.asked(addressed, effect);
-        self.asked = Asked { motor, addressed, effect, what };
+        self.asked = PendingRequest { motor, addressed, effect, what };
         Ok(())
     }
 
@@ -247,7 +247,7 @@ impl Session {
         &mut self,
         outcome: Result<(Option<T>, usize), proto::Error>,
     ) -> Result<T, Error> {
-        let Asked { motor, addressed, effect, what } = self.asked;
+        let PendingRequest { motor, addressed, effect, what } = self.asked;
         self.last_size = outcome.as_ref().ok().map(|(_, size)| *size);
         let (port, target) = (Arc::clone(&self.port), Target(motor));
         match outcome {
@@ -340,8 +340,8 @@ impl Session {
     }
 
     /// The drive has no such motor, which may have been taken for started.
-    pub(super) fn is_missing(&mut self, motor: Motor) {
-        self.started.is_missing(motor);
+    pub(super) fn forget_motor(&mut self, motor: Motor) {
+        self.started.forget_motor(motor);
     }
 
     /// Takes the line over from another master, which started these motors.

@@ -133,7 +133,7 @@ impl Started {
     }
 
     /// The drive has no such motor.
-    pub(super) fn is_missing(&mut self, motor: Motor) {
+    pub(super) fn forget_motor(&mut self, motor: Motor) {
         self.motors &= !bit(motor);
     }
 

@@ -11,12 +11,12 @@ use super::Reading;
 /// Puts the chunks of one line into words. A chunk that is not one whole frame is said to be so.
 pub struct Transcript {
     profile: Profile,
-    asked: Asked,
+    asked: ReplyKind,
 }
 
 /// What the last request's reply will hold.
 #[derive(Clone, Copy)]
-enum Asked {
+enum ReplyKind {
     Nothing,
     Register(RegisterId),
     BoardInfo,
@@ -27,7 +27,7 @@ enum Asked {
 impl Transcript {
     /// A transcript of a line whose drive follows `profile`.
     pub fn new(profile: Profile) -> Self {
-        Transcript { profile, asked: Asked::Nothing }
+        Transcript { profile, asked: ReplyKind::Nothing }
     }
 
     /// Puts a chunk into words; `sent` when it goes to the drive.
@@ -49,16 +49,16 @@ impl Transcript {
         let request = match Request::decode(self.profile, frame) {
             Ok(request) => request,
             Err(_) => {
-                self.asked = Asked::Nothing;
+                self.asked = ReplyKind::Nothing;
                 return format!("frame code {:#04x}{motor}", frame.code());
             }
         };
         self.asked = match request {
-            Request::GetRegister(register) => Asked::Register(register),
-            Request::BoardInfo => Asked::BoardInfo,
-            Request::FirmwareVersion => Asked::Version,
-            Request::RevupData(_) => Asked::Revup,
-            _ => Asked::Nothing,
+            Request::GetRegister(register) => ReplyKind::Register(register),
+            Request::BoardInfo => ReplyKind::BoardInfo,
+            Request::FirmwareVersion => ReplyKind::Version,
+            Request::RevupData(_) => ReplyKind::Revup,
+            _ => ReplyKind::Nothing,
         };
         let code = request.code().name();
         match request {
@@ -106,21 +106,21 @@ impl Transcript {
 
     fn value(&self, payload: &[u8]) -> Option<String> {
         match self.asked {
-            Asked::Nothing => None,
-            Asked::Register(register) => {
+            ReplyKind::Nothing => None,
+            ReplyKind::Register(register) => {
                 let bits = register.decode(self.profile, payload)?;
                 Some(Reading { register, bits, profile: self.profile }.to_string())
             }
-            Asked::BoardInfo => {
+            ReplyKind::BoardInfo => {
                 let BoardInfo { version: [major, minor, patch], name } =
                     BoardInfo::decode(payload)?;
                 Some(format!("{} {major}.{minor}.{patch}", printable(name)))
             }
-            Asked::Version => {
+            ReplyKind::Version => {
                 let version = FirmwareVersion::decode(payload);
                 Some(printable(&format!("{} {}", version.name, version.version)))
             }
-            Asked::Revup => {
+            ReplyKind::Revup => {
                 let RevupPhase { speed_rpm, torque_s16a, duration_ms } =
                     RevupPhase::decode(payload)?;
                 Some(format!("{speed_rpm} rpm, {torque_s16a} s16A, {duration_ms} ms"))

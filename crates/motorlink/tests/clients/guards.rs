@@ -107,8 +107,8 @@ fn a_motor_that_does_not_answer_stays_one_that_moves() {
     assert!(motor.off().is_err());
     assert!(bus.moving().map(MotorId::number).eq([5]));
     drop(bus.guard());
-    let offs = sent.lock().unwrap().iter().filter(|frame| frame.data()[0] == 0x80).count();
-    assert!(offs >= 3, "{offs}");
+    let stops = sent.lock().unwrap().iter().filter(|frame| frame.data()[0] == 0x81).count();
+    assert!(stops >= 3, "{stops}");
 }
 
 #[test]
