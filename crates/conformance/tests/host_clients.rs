@@ -13,7 +13,7 @@ use motorlink::{rmd, st};
 use motorlink_conformance::Verdict;
 use motorlink_conformance::host::{self, Demand, Journal, READINGS, Reading, Said, Task};
 use motorlink_link::serve::Server;
-use motorlink_proto::rmd::{Command as _, MultiTurnAngle, Payload as _, ReadMultiTurnAngle};
+use motorlink_proto::rmd::{MultiTurnAngle, ReadMultiTurnAngle};
 
 /// Long against what a loaded machine adds, short for a test.
 const TIMEOUT: Duration = Duration::from_millis(500);
@@ -145,9 +145,9 @@ fn ask_bus(path: &str, task: Task) -> Said {
             }
             Task::Clear => note(motor.id(), motor.clear_errors().map(|s| s.voltage.0.into())),
             Task::Cycle => {
-                let request = ReadMultiTurnAngle.encode();
-                let requests: Vec<_> = MotorSet::TORQUE4.map(|id| (id, request)).collect();
-                let angle = |reply| MultiTurnAngle::decode(&reply).angle.0;
+                let requests: Vec<_> =
+                    MotorSet::TORQUE4.map(|id| (id, ReadMultiTurnAngle)).collect();
+                let angle = |reply: MultiTurnAngle| reply.angle.0;
                 bus.cycle(&requests, |id, reply| note(id, reply.map(angle))).unwrap();
             }
             Task::SetTorque4 => {

@@ -5,7 +5,7 @@ mod served;
 use std::time::Duration;
 
 use allocation_counter::measure;
-use motorlink::rmd::{self, Bus, MotorId, MotorSet, SetTorque4};
+use motorlink::rmd::{self, Bus, MotorId, MotorSet, ReadMotionStatus, SetTorque4};
 use motorlink::st::{self, Client, RegisterId, register};
 use served::Served;
 
@@ -35,7 +35,7 @@ fn exchanges_and_cycles_on_a_bus_allocate_nothing() {
     let bus = Bus::open(&drives.rmd.parse().unwrap(), options).unwrap();
     let motor = bus.motor(1).unwrap();
     let all: MotorSet = (1..=4).filter_map(MotorId::new).collect();
-    let status = [1, 2, 3, 4].map(|id| (MotorId::new(id).unwrap(), [0x9C, 0, 0, 0, 0, 0, 0, 0]));
+    let status = [1, 2, 3, 4].map(|id| (MotorId::new(id).unwrap(), ReadMotionStatus));
     let mut answered = 0;
     let counted = measure(|| {
         for _ in 0..100 {

@@ -52,9 +52,10 @@ fn bytes_and_frames_take_their_time_on_the_line() {
     let before = bench.now();
     bus.set_torque4(torques, MotorSet::TORQUE4).unwrap();
     assert_eq!(bench.now().since(before), time::Duration(5 * 125));
-    let ask = |id| (MotorId::new(id).unwrap(), [0x9A, 0, 0, 0, 0, 0, 0, 0]);
+    let ask = |id| (MotorId::new(id).unwrap(), rmd::ReadStatus);
     let before = bench.now();
-    bus.cycle(&[1, 2, 3, 4].map(ask), |_, reply| assert!(reply.is_ok())).unwrap();
+    let volts = |reply: Result<rmd::Status, rmd::Error>| reply.unwrap().voltage.volts();
+    bus.cycle(&[1, 2, 3, 4].map(ask), |_, reply| assert_eq!(volts(reply), 24.0)).unwrap();
     assert_eq!(bench.now().since(before), time::Duration(8 * 125));
 }
 

@@ -9,8 +9,8 @@ use motorlink_link::Clock;
 use motorlink_link::port::{CanLink, PortError, PortName};
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{
-    self as proto, Command, Counters, Dialect, Limits, MotionStatus, MotorId, MotorSet, Payload,
-    ReadStatus, SetTorque4,
+    self as proto, Command, Counters, Dialect, Exchange, Limits, MotionStatus, MotorId, MotorSet,
+    Payload, ReadStatus, SetTorque4,
 };
 use motorlink_proto::time;
 
@@ -170,7 +170,7 @@ impl Bus {
     /// One exchange with any bytes, known command or not. A motor in quarantine is waited for.
     pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
         let mut driven = self.line.take();
-        driven.ready([&request])?;
+        driven.ready([request])?;
         let now = driven.port.now();
         driven.session.ask(now, id, request)?;
         let mut outcome = None;
@@ -192,24 +192,24 @@ impl Bus {
 
     /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
     /// is called once a request, in the order in which the outcomes come. It must not call this bus,
-    /// which is locked meanwhile.
+    /// which is locked meanwhile. Requests are of one command, or eight bytes each.
     ///
     /// # Errors
     /// The port's. What fails for one motor is told to `each`.
-    pub fn cycle(
+    pub fn cycle<X: Exchange>(
         &self,
-        requests: &[(MotorId, [u8; 8])],
-        mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
+        requests: &[(MotorId, X)],
+        mut each: impl FnMut(MotorId, Result<X::Reply, Error>),
     ) -> Result<(), Error> {
         let mut driven = self.line.take();
-        driven.ready(requests.iter().map(|(_, request)| request))?;
-        for &(id, request) in requests {
+        driven.ready(requests.iter().map(|(_, exchange)| exchange.request()))?;
+        for (id, exchange) in requests {
             let now = driven.port.now();
-            if let Err(error) = driven.session.request(now, id, request) {
-                each(id, Err(error));
+            if let Err(error) = driven.session.request(now, *id, exchange.request()) {
+                each(*id, Err(error));
             }
         }
-        self.run(driven, each)
+        self.run(driven, |id, result| each(id, result.map(|reply| X::reply(&reply))))
     }
 
     /// Sends torques to motors 1 to 4 in one frame and gathers the replies of those in `expect`;
@@ -305,7 +305,7 @@ impl<L: CanLink> Driven<L> {
     }
 
     /// Makes ready for these requests.
-    fn ready<'a>(&mut self, requests: impl IntoIterator<Item = &'a [u8; 8]>) -> Result<(), Error> {
+    fn ready(&mut self, requests: impl IntoIterator<Item = [u8; 8]>) -> Result<(), Error> {
         self.abandon();
         self.listen_for(requests)
     }
@@ -320,13 +320,13 @@ impl<L: CanLink> Driven<L> {
     }
 
     /// As [`listen`](Self::listen), before these requests are sent.
-    pub(super) fn listen_for<'a>(
+    pub(super) fn listen_for(
         &mut self,
-        requests: impl IntoIterator<Item = &'a [u8; 8]>,
+        requests: impl IntoIterator<Item = [u8; 8]>,
     ) -> Result<(), Error> {
         match self.listen() {
             // That the port failed since the last exchange must not keep a motor from being stopped.
-            Err(_) if requests.into_iter().any(ends_motion) => self.listen(),
+            Err(_) if requests.into_iter().any(|request| ends_motion(&request)) => self.listen(),
             done => done,
         }
     }

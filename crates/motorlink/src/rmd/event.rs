@@ -88,7 +88,7 @@ impl EventBus {
     /// # Errors
     /// The port, or what forbids the request; nothing is sent then.
     pub fn ask(&mut self, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
-        self.driven.listen_for([&request])?;
+        self.driven.listen_for([request])?;
         let now = self.driven.port.now();
         self.driven.session.ask(now, id, request)
     }
@@ -98,7 +98,7 @@ impl EventBus {
     /// # Errors
     /// Those of [`ask`](Self::ask).
     pub fn request(&mut self, id: MotorId, request: [u8; 8]) -> Result<(), Error> {
-        self.driven.listen_for([&request])?;
+        self.driven.listen_for([request])?;
         let now = self.driven.port.now();
         self.driven.session.request(now, id, request)
     }

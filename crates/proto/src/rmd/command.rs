@@ -20,6 +20,42 @@ pub trait Command: Payload {
     }
 }
 
+/// What is sent to a motor, with how its reply is read: a command, or eight bytes as they are.
+pub trait Exchange {
+    /// What the reply says.
+    type Reply;
+
+    /// The eight bytes of the request.
+    fn request(&self) -> [u8; 8];
+
+    /// What eight bytes say as the reply.
+    fn reply(data: &[u8; 8]) -> Self::Reply;
+}
+
+impl<C: Command> Exchange for C {
+    type Reply = C::Reply;
+
+    fn request(&self) -> [u8; 8] {
+        self.encode()
+    }
+
+    fn reply(data: &[u8; 8]) -> C::Reply {
+        C::Reply::decode(data)
+    }
+}
+
+impl Exchange for [u8; 8] {
+    type Reply = [u8; 8];
+
+    fn request(&self) -> [u8; 8] {
+        *self
+    }
+
+    fn reply(data: &[u8; 8]) -> [u8; 8] {
+        *data
+    }
+}
+
 /// A version of the protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
