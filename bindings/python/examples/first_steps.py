@@ -28,7 +28,7 @@ with motorlink.st.open(st_port) as bus:
     motor.ramp(1000, 0.5)  # rpm, within so many s
     motor.start()
     wait(3.0)
-    print("status  ", motor.status)
+    print("status  ", motor.status())
 
     # Registers by name. Tab completion knows them all, and so does `motor.registers`.
     print("speed   ", motor.read("SPEED_MEAS"), motor.registers.info("SPEED_MEAS").unit)
@@ -58,9 +58,9 @@ with motorlink.rmd.open(rmd_port) as bus:
     first = bus.motor(1)
     first.move_to(90, max_speed=500)  # degrees, degrees per second
     wait(1.0)
-    print(f"angle    {first.angle:.1f} degrees at {first.status.voltage_v} V")
+    print(f"angle    {first.angle():.1f} degrees at {first.status().voltage_v} V")
     answers = bus.cycle({1: motorlink.rmd.speed(100), 2: motorlink.rmd.torque(0.2)})
     for number, answer in answers.items():
         print(f"motor {number}  {answer}")
     wait(0.5)
-    print("speed   ", first.motion.speed_dps, "degrees per second")
+    print("speed   ", first.motion().speed_dps, "degrees per second")

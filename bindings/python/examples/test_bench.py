@@ -39,7 +39,7 @@ class Conveyor:
 
     def recover(self):
         """Acknowledges what made the drive switch off; gives its name."""
-        names = self._motor.faults.occurred
+        names = self._motor.faults().occurred
         self._motor.acknowledge_faults()
         return names
 

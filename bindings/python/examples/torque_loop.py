@@ -30,8 +30,8 @@ COUNTS = 2**14  # of the encoder in a turn
 # %% Angles
 # A reply tells the position within the turn. Over the turns it is followed by its smallest change,
 # which holds below half a turn from cycle to cycle: 180 000 degrees per second.
-angles = [bus.motor(n).angle for n in (1, 2, 3, 4)]
-counts = [bus.motor(n).motion.encoder for n in (1, 2, 3, 4)]
+angles = [bus.motor(n).angle() for n in (1, 2, 3, 4)]
+counts = [bus.motor(n).motion().encoder for n in (1, 2, 3, 4)]
 
 
 def follow(motor, encoder):

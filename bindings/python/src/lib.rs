@@ -31,14 +31,15 @@ mod _core {
     use super::machine::{RmdMachine, StMachine};
     #[pymodule_export]
     use super::rmd::{
-        RmdBus, RmdRequest, RmdSampling, rmd_decode, rmd_errors_text, rmd_motor, rmd_quantities,
+        RmdBus, RmdOptions, RmdRequest, RmdSampling, rmd_decode, rmd_errors_text, rmd_motor,
+        rmd_quantities,
     };
     #[pymodule_export]
     use super::sim::{SimBench, SimPort, SimRecording, SimServing, sim_presets, sim_run};
     #[pymodule_export]
     use super::st::{
-        StClient, StRequest, StSampling, StVerifiedWrite, st_flags_text, st_motor, st_register,
-        st_register_name, st_registers,
+        StClient, StOptions, StRequest, StSampling, StVerifiedWrite, st_flags_text, st_motor,
+        st_register, st_register_name, st_registers,
     };
 
     #[pymodule_init]

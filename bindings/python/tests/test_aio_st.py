@@ -106,7 +106,7 @@ def test_cancelled_exchanges_leave_nothing_behind_for_others(
         await within(60, asyncio.gather(*callers))
         for bus, drive in zip(buses, drives):
             await within(10, asked(bus, drive, rng))
-            descriptor = bus._machine.fileno()
+            descriptor = bus._core.fileno()
             assert descriptor is not None
             await bus.close()
             assert not loop.remove_reader(descriptor), "nothing watches it any more"
@@ -251,7 +251,7 @@ def test_a_port_that_went_away_is_lost_and_then_opened_again(drive: Drive) -> No
                     await asyncio.sleep(0.01)
             # Noticed also while nobody asks for anything.
             drive.unplug()
-            while bus._machine.is_open:
+            while bus._core.is_open:
                 await asyncio.sleep(0.001)
             drive.plug()
             while True:

@@ -80,7 +80,7 @@ def bus(request: pytest.FixtureRequest) -> Iterator[can.BusABC]:
 
 def test_a_motor_on_a_bus_of_python_can_is_commanded(bus: can.BusABC, motor: Motor) -> None:
     with rmd.open(from_python_can(bus), timeout=2) as motors:
-        assert motors.motor(7).motion.speed_dps == 7
+        assert motors.motor(7).motion().speed_dps == 7
         # Answered with the very bytes of the request, as the bus's own echo would be.
         motors.motor(7).stop()
         assert motors.cycle({7: rmd.speed(100)})[7].speed_dps == 7
@@ -146,11 +146,11 @@ def test_what_the_bus_raises_is_the_cause_of_a_lost_line() -> None:
     bus = Broken(1)
     with rmd.open(from_python_can(bus), timeout=5, on_close="nothing") as motors:
         with pytest.raises(motorlink.LineLost) as lost:
-            motors.motor(1).motion
+            motors.motor(1).motion()
         check(lost.value)
         # The next request tries again and fails with the same error.
         with pytest.raises(motorlink.LineLost) as lost:
-            motors.motor(1).motion
+            motors.motor(1).motion()
         check(lost.value)
     bus.shutdown()
 
@@ -189,8 +189,8 @@ def test_a_bus_that_failed_once_is_used_again(flaky: Flaky, motor: Motor) -> Non
         for _ in range(5):
             flaky.fails_to_send = 1
             with pytest.raises(motorlink.LineLost, match="no room"):
-                one.motion
-            assert one.motion.speed_dps == 7
+                one.motion()
+            assert one.motion().speed_dps == 7
             flaky.fails_to_receive = 1
             eventually(lambda: flaky.fails_to_receive == 0, "a failure while nothing is asked")
             # The failure does not keep the motor from being stopped. The error may be raised as late
@@ -249,11 +249,11 @@ with can.Bus("interrupted", interface="virtual") as line:
                 bus.motor(7).speed(100)
                 try:
                     print("asks", flush=True)
-                    bus.motor(3).motion
+                    bus.motor(3).motion()
                 except KeyboardInterrupt:
-                    print("interrupted", bus.motor(7).motion.speed_dps, flush=True)
+                    print("interrupted", bus.motor(7).motion().speed_dps, flush=True)
             print("asks", flush=True)
-            bus.motor(3).motion
+            bus.motor(3).motion()
     finally:
         print(other.heard[-1] == 0x81, flush=True)
         other.end()
@@ -294,7 +294,7 @@ def test_served_motors_through_python_cans_own_slcan(served: Served) -> None:
     with can.Bus(path, interface="slcan", bitrate=1_000_000, sleep_after_open=0) as bus:
         with rmd.open(from_python_can(bus), timeout=2) as motors:
             motors.motor(1).speed(180)
-            while motors.motor(1).motion.speed_dps < 100:
+            while motors.motor(1).motion().speed_dps < 100:
                 pass
             assert [one.id for one in motors.scan([1, 2, 3, 4])] == [1, 2, 3, 4]
     assert served.motor("rmd", 1)["mode"] == "stopped"

@@ -131,7 +131,7 @@ CHILD_ENDS = """
                 gc.collect()
             sys.exit(0)
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
-        print(bus.motor(1).motion.temperature_c > 0, bus.moving)
+        print(bus.motor(1).motion().temperature_c > 0, bus.moving)
     bus.close()
 """
 

@@ -166,7 +166,7 @@ HANDLER_AT_RANDOM = """
     on_signal(stop)
     going = True
     def ask():
-        bus.motor(1).read("STATUS") if kind == "st" else bus.motor(1).motion
+        bus.motor(1).read("STATUS") if kind == "st" else bus.motor(1).motion()
     with getattr(motorlink, kind).open(port, timeout=2.0) as bus:
         ask()
         thread = signals_until(lambda: not going)
@@ -201,12 +201,12 @@ STOP_ON_PYTHON_CAN = """
                 done.append(True)
             on_signal(stop)
             # An exchange that brings the motor in step takes long: handlers would mostly meet each other.
-            motor.motion
+            motor.motion()
             thread = signals_until(lambda: len(done) >= 10)
             while thread.is_alive():
                 try:
                     motor.speed(100)
-                    motor.motion
+                    motor.motion()
                 except motorlink.PortError as error:
                     assert "given up" in str(error), error
             print(0x81 in other.heard)

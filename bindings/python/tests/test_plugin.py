@@ -23,7 +23,7 @@ ARM = """
             motor = self.bus.motor(1)
             motor.move_to(90, max_speed=720)
             deadline = time.monotonic() + 2
-            while abs(motor.angle - 90) > 1:
+            while abs(motor.angle() - 90) > 1:
                 if time.monotonic() > deadline:
                     raise RuntimeError("the arm is stuck")
                 time.sleep(0.01)
@@ -83,7 +83,7 @@ def test_a_marker_says_what_the_bench_is(pytester: pytest.Pytester) -> None:
         def test_a_file_and_faults(motorlink_bench):
             assert motorlink_bench.motors[-1] == "rmd9"
             with pytest.raises(motorlink.Timeout):
-                motorlink_bench.rmd.motor(9).status
+                motorlink_bench.rmd.motor(9).status()
 
         @pytest.mark.motorlink("nowhere.toml")
         def test_a_file_that_is_not_there(motorlink_bench):

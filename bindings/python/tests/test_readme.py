@@ -12,9 +12,9 @@ from conftest import PATIENT, REPOSITORY, Served
 
 #: A simulator answers, in a process of its own: a busy machine delays it.
 PREPARED = f"""\
-import motorlink
+import inspect, motorlink
 for protocol in motorlink.st, motorlink.rmd:
-    protocol.open.__kwdefaults__["timeout"] = {PATIENT}
+    inspect.unwrap(protocol.open).__kwdefaults__["timeout"] = {PATIENT}
 """
 
 

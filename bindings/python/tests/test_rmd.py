@@ -19,9 +19,9 @@ def test_a_motor_moves_to_an_angle(rmd_bus: rmd.Bus) -> None:
     status = motor.move_to(90, max_speed=500)
     assert isinstance(status, rmd.MotionStatus) and status.temperature_c == 25
     assert rmd_bus.moving == [1]
-    eventually(lambda: abs(motor.angle - 90) < 1, "90 °")
+    eventually(lambda: abs(motor.angle() - 90) < 1, "90 °")
     motor.turn_to(45, 500, clockwise=False)
-    eventually(lambda: abs(motor.circle_angle - 45) < 1, "45 °")
+    eventually(lambda: abs(motor.circle_angle() - 45) < 1, "45 °")
     motor.stop()
     assert rmd_bus.moving == []
     motor.run()
@@ -39,7 +39,7 @@ def test_a_move_that_could_be_nearly_a_full_turn_is_refused() -> None:
     bench = sim.Bench(NEAR)
     with rmd.open(bench) as bus:
         motor = bus.motor(1)
-        assert motor.circle_angle == 90.02
+        assert motor.circle_angle() == 90.02
         for target, refused in ((90.02, True), (90, True), (89.52, True), (89.51, False)):
             if refused:
                 with pytest.raises(motorlink.FullTurn, match="full_turn=True") as error:
@@ -59,7 +59,7 @@ def test_a_full_turn_and_its_tolerance_can_be_allowed() -> None:
             motor = bus.motor(1)
             motor.turn_to(90, 2000, **allowed)
             bench.run(1)
-            assert motor.angle == pytest.approx(450, abs=0.1)
+            assert motor.angle() == pytest.approx(450, abs=0.1)
     with rmd.open(sim.Bench(NEAR)) as bus:
         bus.motor(1).turn_to(90, clockwise=False)
         with pytest.raises(motorlink.FullTurn):
@@ -72,27 +72,27 @@ def test_a_full_turn_and_its_tolerance_can_be_allowed() -> None:
 def test_speed_and_torque_do_what_they_say(rmd_bus: rmd.Bus) -> None:
     motor = rmd_bus.motor(2)
     motor.speed(-360)
-    eventually(lambda: abs(motor.motion.speed_dps + 360) < 20, "-360 °/s")
+    eventually(lambda: abs(motor.motion().speed_dps + 360) < 20, "-360 °/s")
     motor.torque(0.5)
-    eventually(lambda: abs(motor.motion.iq_a - 0.5) < 0.1, "0.5 A")
-    assert sum(motor.phase_currents) == pytest.approx(0, abs=0.1)
-    assert motor.status == (motor.status.temperature_c, 24.0, ((), 0))
+    eventually(lambda: abs(motor.motion().iq_a - 0.5) < 0.1, "0.5 A")
+    assert sum(motor.phase_currents()) == pytest.approx(0, abs=0.1)
+    assert motor.status() == (motor.status().temperature_c, 24.0, ((), 0))
 
 
 def test_gains_and_acceleration_are_kept(rmd_bus: rmd.Bus) -> None:
     motor = rmd_bus.motor(1)
-    gains = motor.gains._replace(position_kp=1, torque_ki=255)
-    motor.gains = gains
-    assert motor.gains == gains
-    motor.acceleration = 1234
-    assert motor.acceleration == 1234
+    gains = motor.gains()._replace(position_kp=1, torque_ki=255)
+    motor.write_gains(gains)
+    assert motor.gains() == gains
+    motor.write_acceleration(1234)
+    assert motor.acceleration() == 1234
     with pytest.raises(motorlink.BadValue, match="give 0 for none"):
-        motor.acceleration = -1
-    assert motor.acceleration == 1234
+        motor.write_acceleration(-1)
+    assert motor.acceleration() == 1234
     for nonsense in (gains._replace(speed_kp=256), gains._replace(speed_kp=-1)):
         with pytest.raises(motorlink.BadValue, match="0 to 255"):
-            motor.gains = nonsense
-    assert motor.gains == gains
+            motor.write_gains(nonsense)
+    assert motor.gains() == gains
 
 
 def test_rom_is_written_with_an_explicit_word_only(served: Served) -> None:
@@ -108,10 +108,10 @@ def test_rom_is_written_with_an_explicit_word_only(served: Served) -> None:
             motor.write_encoder_offset(7, rom=False)
         with pytest.raises(motorlink.BadValue, match="rom=True"):
             motor.exchange_raw(bytes([0x19, 0, 0, 0, 0, 0, 0, 0]))
-        motor.write_gains(motor.gains)
+        motor.write_gains(motor.gains())
         assert writes() == 0
-        motor.write_gains(motor.gains, rom=True)
-        assert motor.write_encoder_offset(7, rom=True) == motor.encoder.offset == 7
+        motor.write_gains(motor.gains(), rom=True)
+        assert motor.write_encoder_offset(7, rom=True) == motor.encoder().offset == 7
         assert isinstance(motor.write_zero(rom=True), int)
         assert writes() == 3
 
@@ -120,7 +120,7 @@ def test_errors_are_named_and_cleared(served: Served) -> None:
     with rmd.open(served.can, timeout=PATIENT) as bus:
         motor, port = bus.motor(3), f"slcan-pty:{served.can.removeprefix('slcan:')}"
         served.do("fault", port=port, motor=3, fault="OVER_TEMPERATURE")
-        errors = eventually(lambda: motor.status.errors, "the error")
+        errors = eventually(lambda: motor.status().errors, "the error")
         assert errors.names == ("over temperature protection",) and str(errors) == errors.names[0]
         assert not motor.clear_errors().errors
 
@@ -253,7 +253,7 @@ def test_nonsense_is_refused_before_it_is_sent(rmd_bus: rmd.Bus) -> None:
 
 def test_a_motor_that_is_not_there_is_a_timeout(brief_bus: rmd.Bus) -> None:
     with pytest.raises(motorlink.Timeout) as silent:
-        _ = brief_bus.motor(20).angle
+        _ = brief_bus.motor(20).angle()
     assert silent.value.motor == 20 and "0x92" in str(silent.value)
 
 
@@ -303,7 +303,7 @@ def test_after_its_end_a_bus_says_that_it_is_closed(tmp_path: Path) -> None:
 
 
 def test_values_and_requests_are_values(rmd_bus: rmd.Bus) -> None:
-    status = rmd_bus.motor(1).status
+    status = rmd_bus.motor(1).status()
     assert pickle.loads(pickle.dumps(status)) == status
     assert rmd.speed(1) == rmd.speed(1.0) != rmd.speed(2)
     assert len({rmd.off(), rmd.off(), rmd.stop()}) == 2

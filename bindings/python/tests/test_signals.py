@@ -69,7 +69,7 @@ BUSY = """
     start(bus)
     ready()
     while True:
-        bus.motor(1).faults if sys.argv[1] == "st" else bus.motor(1).motion
+        bus.motor(1).faults() if sys.argv[1] == "st" else bus.motor(1).motion()
 """
 
 ASYNC = """

@@ -33,7 +33,7 @@ def test_time_passes_only_when_it_is_waited_for() -> None:
     bench = sim.Bench()
     assert bench.now == 0.0
     assert repr(bench) == "<motorlink.sim.Bench st1, st2, rmd1, rmd2, rmd3, rmd4 at 0 s>"
-    bench.st.motor(1).status
+    bench.st.motor(1).status()
     assert bench.now == pytest.approx(8 * 87e-6)  # eight bytes at 115200 baud
     before = bench.now
     bench.rmd.torque4(0, 0, 0, 0)
@@ -128,20 +128,20 @@ def test_faults_temperatures_supplies_and_power_cycles() -> None:
     bench.inject("st1", "BREAK_IN", hold=True)
     bench.run(1.0)
     assert motor.read("HEATS_TEMP") == 60
-    assert (motor.status, motor.faults.present) == ("FAULT_NOW", ("BREAK_IN",))
+    assert (motor.status(), motor.faults().present) == ("FAULT_NOW", ("BREAK_IN",))
     assert bench.truth("st1")["faults"] == "BREAK_IN"
     bench.inject("st1", "BREAK_IN", hold=False)
     bench.run(0.1)
     motor.acknowledge_faults()
     bench.run(0.1)
-    assert motor.status == "IDLE"
+    assert motor.status() == "IDLE"
     bench.temperature("st1", None)
     assert motor.read("HEATS_TEMP") == 25
 
-    gains = bench.rmd.motor(1).gains._replace(speed_kp=7)
-    bench.rmd.motor(1).gains = gains
+    gains = bench.rmd.motor(1).gains()._replace(speed_kp=7)
+    bench.rmd.motor(1).write_gains(gains)
     bench.power_cycle("rmd1")
-    assert bench.rmd.motor(1).gains.speed_kp != 7
+    assert bench.rmd.motor(1).gains().speed_kp != 7
     bench.power_cycle("st")
 
     bench.lock_rotor("rmd2")
@@ -208,7 +208,7 @@ def test_a_recording_is_the_same_whoever_lets_time_pass() -> None:
             end = bench.now + 0.5
             while bench.now < end:
                 if through_the_line:
-                    bench.st.motor(1).status
+                    bench.st.motor(1).status()
                 else:
                     bench.run(0.1)
         return recording.data[:100]
@@ -257,7 +257,7 @@ def test_the_end_of_a_bench_stops_its_motors() -> None:
     bench.run(5.0)
     assert bench.truth("st1")["status"] == "IDLE"
     assert bench.truth("rmd1")["mode"] == "stopped"
-    assert bench.st.motor(1).status == "IDLE"  # another bus
+    assert bench.st.motor(1).status() == "IDLE"  # another bus
 
 
 def test_a_motor_that_cannot_be_stopped_does_not_hide_why_a_bench_ended() -> None:
@@ -319,7 +319,7 @@ try:
     {long}
     print("to the end")
 except KeyboardInterrupt:
-    print("interrupted", bench.now < 86400, bench.st.motor(1).status != "")
+    print("interrupted", bench.now < 86400, bench.st.motor(1).status() != "")
 """
     program = subprocess.Popen(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -363,9 +363,9 @@ def test_served_on_ptys_the_drives_go_on_in_real_time(tmp_path: Path) -> None:
         with pytest.raises(motorlink.PortError, match="served already"):
             bench.serve()
         with motorlink.st.open(serving.st) as st, motorlink.rmd.open(serving.rmd, timeout=5) as rmd:
-            assert st.motor(1).status == "IDLE"
+            assert st.motor(1).status() == "IDLE"
             bench.push("rmd1", 0.5)
-            while rmd.motor(1).motion.speed_dps < 180:
+            while rmd.motor(1).motion().speed_dps < 180:
                 assert bench.now < 70
             before = bench.now
             with bench.recording(["rmd1.angle_degrees"], every=0.01) as recording:
@@ -388,7 +388,7 @@ def test_served_without_a_name_or_over_tcp() -> None:
     with sim.Bench().serve(st="tcp-listen:127.0.0.1:0") as serving:
         assert serving.rmd == ""
         with motorlink.st.open(serving.st) as st:
-            assert st.motor(1).status == "IDLE"
+            assert st.motor(1).status() == "IDLE"
     serving.close()
     with pytest.raises(motorlink.BadValue):
         sim.Bench().serve(st="nonsense")

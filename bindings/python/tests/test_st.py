@@ -31,19 +31,19 @@ def test_what_is_written_is_read(st_bus: st.Bus) -> None:
 
 def test_a_motor_runs_and_stops(st_bus: st.Bus) -> None:
     motor = st_bus.motor(2)
-    assert motor.status == "IDLE" and not motor.faults
+    assert motor.status() == "IDLE" and not motor.faults()
     motor.ramp(500, 0.1)
     motor.start()
     assert st_bus.started == [2]
-    eventually(lambda: motor.status == "RUN", "RUN")
-    assert motor.control_mode == "SPEED"
+    eventually(lambda: motor.status() == "RUN", "RUN")
+    assert motor.control_mode() == "SPEED"
     motor.stop()
     assert st_bus.started == []
-    eventually(lambda: motor.status == "IDLE", "IDLE")
+    eventually(lambda: motor.status() == "IDLE", "IDLE")
 
 
 def test_words_keep_their_numbers_and_survive_a_trip(st_bus: st.Bus) -> None:
-    state = st_bus.motor(1).status
+    state = st_bus.motor(1).status()
     assert isinstance(state, st.State) and isinstance(state, str)
     assert (str(state), state.number) == ("IDLE", 0)
     assert state.doc
@@ -56,14 +56,14 @@ def test_faults_are_named(served: Served) -> None:
     with st.open(served.st) as bus:
         motor = bus.motor(1)
         served.do("fault", port=f"pty:{served.st}", motor=1, fault="OVER_TEMP", hold=True)
-        faults = eventually(lambda: motor.faults, "the fault")
+        faults = eventually(lambda: motor.faults(), "the fault")
         assert faults.present == ("OVER_TEMP",) == faults.occurred
         assert str(faults) == "OVER_TEMP (present)"
-        assert motor.status == "FAULT_NOW"
+        assert motor.status() == "FAULT_NOW"
         served.do("fault", port=f"pty:{served.st}", motor=1, fault="OVER_TEMP", hold=False)
-        eventually(lambda: not motor.faults.present, "the end of the cause")
+        eventually(lambda: not motor.faults().present, "the end of the cause")
         motor.acknowledge_faults()
-        eventually(lambda: not motor.faults, "no faults")
+        eventually(lambda: not motor.faults(), "no faults")
 
 
 def test_registers_are_a_mapping_with_names_and_units(st_bus: st.Bus) -> None:

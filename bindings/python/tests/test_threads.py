@@ -71,8 +71,8 @@ def test_eight_threads_on_a_can_bus_get_their_own_answers(served: Served) -> Non
             def run() -> None:
                 for n in range(ROUNDS // 2):
                     mine = rmd.Gains(id, n, id, n, id, n)
-                    motor.gains = mine
-                    assert motor.gains == mine
+                    motor.write_gains(mine)
+                    assert motor.gains() == mine
 
             return run
 
@@ -81,8 +81,8 @@ def test_eight_threads_on_a_can_bus_get_their_own_answers(served: Served) -> Non
 
             def run() -> None:
                 for n in range(ROUNDS // 2):
-                    motor.acceleration = id * 1000 + n
-                    assert motor.acceleration == id * 1000 + n
+                    motor.write_acceleration(id * 1000 + n)
+                    assert motor.acceleration() == id * 1000 + n
 
             return run
 

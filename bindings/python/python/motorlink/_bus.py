@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import warnings
 import weakref
 from collections.abc import Callable
 from types import TracebackType
-from typing import Protocol, TypeVar, Union
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar, Union
 
 from motorlink import _core
+from motorlink._apis import Blocking, Exchanges, Function, both_apis, carried_out, described
 from motorlink._signals import before_signals
 from motorlink.errors import BadValue, LineLost, MotorlinkError
+
+if TYPE_CHECKING:
+    from typing_extensions import ParamSpec, Self
+
+    Arguments = ParamSpec("Arguments")
+
+Opened = TypeVar("Opened", bound="AnyBus")
 
 
 class HasPort(Protocol):
@@ -47,20 +56,6 @@ def opened(port: Port) -> str | _core.SimPort:
         raise TypeError(f"{port!r} is no port: give a name, a path or a bench")
     return port._port
 
-
-def opened_can(port: Port | _core.CanPort) -> str | _core.SimPort | _core.CanPort:
-    """What the extension opens as a CAN bus."""
-    return port if isinstance(port, _core.CanPort) else opened(port)
-
-
-def on_close_checked(on_close: str, known: tuple[str, ...]) -> str:
-    """What is done at the end, if it is known."""
-    if on_close not in known:
-        raise BadValue(f"on_close={on_close!r}: give one of {', '.join(map(repr, known))}")
-    return on_close
-
-
-Entered = TypeVar("Entered", bound="Ending")
 
 #: Closes the port; gives the motors that could not be stopped before, and why.
 Close = Callable[[], "list[tuple[int, MotorlinkError]]"]
@@ -101,37 +96,14 @@ def report(failed: list[tuple[int, MotorlinkError]], port: str, *, in_flight: bo
     raise LineLost(motors, port=port, motor=failed[0][0]) from failed[0][1]
 
 
-class Ending:
-    """What the blocking buses of both protocols have in common: how they end."""
+class Closing:
+    """What the end of a ``with`` ends."""
 
-    def __init__(self, close: Close, port: str, *, stop_on_signals: bool):
-        self._close = close
-        self._name = port
-        self._release = when_left_open(self, close, port, stop_on_signals=stop_on_signals)
+    def _end(self, *, in_flight: bool) -> Any:
+        """Ends it; ``in_flight``: while an exception is on its way."""
+        raise NotImplementedError
 
-    @property
-    def port(self) -> str:
-        """The port's name."""
-        return self._name
-
-    def close(self) -> None:
-        """Stops the motors that this bus set moving, as it was opened to; closes the port.
-
-        Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
-        port is closed all the same. Exchanges of other threads that are under way are waited for.
-
-        A bus that nobody closed is closed when it is collected, or when the program ends. In a process
-        that was forked it is of no use (``Closed``), and its port is not open: that is the parent's.
-        """
-        self._end(in_flight=False)
-
-    def _end(self, *, in_flight: bool) -> None:
-        try:
-            report(self._close(), self.port, in_flight=in_flight)
-        finally:
-            self._release()
-
-    def __enter__(self: Entered) -> Entered:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -143,18 +115,107 @@ class Ending:
         self._end(in_flight=error is not None)
 
 
-def worn(rom: bool, what: str) -> None:
-    """Asks for the word that allows a write to a motor's ROM."""
-    if not rom:
-        raise BadValue(f"{what} goes to the motor's ROM, which wears: say rom=True")
+class AnyBus:
+    """What the buses of both protocols and both APIs have in common: how they are opened, and how they end."""
 
+    #: What ``on_close`` may be, and how the client is closed then.
+    _ENDS: ClassVar[dict[str, dict[str, bool]]]
+    #: The client of the extension module, and its class.
+    _core: Any
+    _Core: ClassVar[Any]
+    # Each API's: what the extension opens, the exchange that opens it, and the one that ends the bus.
+    _named: Any
+    _opened: Any
+    _end: Any
+    _is_closed: Any
 
-def only(profile: str, what: str, *, of: str, port: str, motor: int) -> None:
-    """Refuses what another profile than that of the bus has."""
-    if of != profile:
-        raise BadValue(
-            f"{what} are of profile {profile}, and {port} was opened with profile {of};"
-            " nothing was sent",
-            port=port,
-            motor=motor,
+    def __init__(self, core: Any, *, on_close: str, stop_on_signals: bool):
+        ends = self._ends(on_close)
+        self._core = core
+        self._close: Close = functools.partial(core.close, **ends)
+        self._name: str = core.port
+        self._release = when_left_open(
+            self, self._close, self._name, stop_on_signals=stop_on_signals and ends["stop"]
         )
+
+    @classmethod
+    def _opening(
+        cls, core: Callable[[], Any], *, on_close: str, **options: Any
+    ) -> Callable[[], Exchanges[Self]]:
+        """Opens a client and then its bus, when the result is called."""
+        cls._ends(on_close)
+
+        def bus() -> Exchanges[Self]:
+            opened = yield cls._opened(core)
+            return cls(opened, on_close=on_close, **options)
+
+        return bus
+
+    @classmethod
+    def _ends(cls, on_close: str) -> dict[str, bool]:
+        if on_close not in cls._ENDS:
+            known = ", ".join(map(repr, cls._ENDS))
+            raise BadValue(f"on_close={on_close!r}: give one of {known}")
+        return cls._ENDS[on_close]
+
+    @property
+    def port(self) -> str:
+        """The port's name."""
+        return self._name
+
+    @both_apis
+    def close(self) -> Exchanges[None]:
+        """Stops the motors that this bus set moving, as it was opened to; closes the port.
+
+        Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
+        port is closed all the same. Exchanges of other threads that are under way are waited for, and
+        those of other tasks end in ``Closed``. A task that is cancelled meanwhile is cancelled when all
+        is done.
+
+        A bus that nobody closed is closed when it is collected, or when the program ends. In a process
+        that was forked it is of no use (``Closed``), and its port is not open: that is the parent's.
+        """
+        yield self._end(in_flight=False)
+
+    def _text(self, more: str = "") -> str:
+        closed = ", closed" if self._is_closed else ""
+        return f"<{type(self).__module__}.Bus {self.port}{more}{closed}>"
+
+
+class BlockingBus(Closing, Blocking, AnyBus):
+    """What the blocking buses of both protocols have in common."""
+
+    _named = staticmethod(opened)
+
+    @classmethod
+    def _opened(cls, core: Callable[[], Any]) -> Any:
+        return core()
+
+    def _end(self, *, in_flight: bool) -> None:
+        try:
+            report(self._close(), self.port, in_flight=in_flight)
+        finally:
+            self._release()
+
+    @property
+    def _is_closed(self) -> bool:
+        return bool(self._core.is_closed)
+
+
+def opens(
+    opening: Callable[Arguments, Callable[[], Exchanges[Opened]]],
+) -> Callable[Arguments, Opened]:
+    """The function ``open`` of a protocol."""
+
+    def open(*arguments: Arguments.args, **named: Arguments.kwargs) -> Opened:
+        return carried_out(opening(*arguments, **named)())
+
+    return open_described(open, opening, "Bus")
+
+
+def open_described(open: Function, opening: Callable[..., object], returned: str) -> Function:
+    """The function ``open`` of a protocol and an API with its arguments and its text."""
+    described(open, opening, returned)
+    open.__name__ = open.__qualname__ = "open"
+    open.__module__ = opening.__self__.__module__  # type: ignore[attr-defined]
+    return open

@@ -10,6 +10,7 @@ __all__ = [
     "CanPort",
     "RmdBus",
     "RmdMachine",
+    "RmdOptions",
     "RmdRequest",
     "RmdSampling",
     "SimBench",
@@ -19,6 +20,7 @@ __all__ = [
     "ST_SEGMENTS",
     "StClient",
     "StMachine",
+    "StOptions",
     "StRequest",
     "StSampling",
     "StVerifiedWrite",
@@ -137,20 +139,26 @@ class StRequest:
     def fields(self) -> dict[str, int | float | bytes]: ...
 
 @final
+class StOptions:
+    """What a line with an ST drive is opened with, checked when it is made."""
+
+    def __new__(
+        cls,
+        *,
+        profile: str,
+        timeout: float,
+        recovery: str,
+        speed_limit: float | None,
+        current_limit: float | None,
+        full_scale_amps: float | None,
+    ) -> StOptions: ...
+
+@final
 class StClient:
     """A master on a serial line."""
 
     @staticmethod
-    def open(
-        port: str | SimPort,
-        *,
-        profile: str = "spec",
-        timeout: float = 1.0,
-        recovery: str = "drain",
-        speed_limit: float | None = None,
-        current_limit: float | None = None,
-        full_scale_amps: float | None = None,
-    ) -> StClient: ...
+    def open(port: str | SimPort, options: StOptions) -> StClient: ...
     def perform(self, motor: int, request: StRequest) -> Any: ...
     def write_verified(self, motor: int, request: StRequest, attempts: int) -> int: ...
     def confirm(self) -> None: ...
@@ -240,19 +248,25 @@ class RmdRequest:
     def is_rom(self) -> bool: ...
 
 @final
+class RmdOptions:
+    """What a CAN bus with RMD motors is opened with, checked when it is made."""
+
+    def __new__(
+        cls,
+        *,
+        timeout: float,
+        guard: float,
+        current_limit_a: float | None,
+        speed_limit_dps: float | None,
+        angle_limit_deg: float | None,
+    ) -> RmdOptions: ...
+
+@final
 class RmdBus:
     """A CAN bus with RMD motors."""
 
     @staticmethod
-    def open(
-        port: str | SimPort | CanPort,
-        *,
-        timeout: float = 0.05,
-        guard: float = 0.1,
-        current_limit_a: float | None = None,
-        speed_limit_dps: float | None = None,
-        angle_limit_deg: float | None = None,
-    ) -> RmdBus: ...
+    def open(port: str | SimPort | CanPort, options: RmdOptions) -> RmdBus: ...
     def perform(self, id: int, request: RmdRequest) -> Any: ...
     def confirm(self, id: int) -> None: ...
     def cycle(self, requests: Sequence[tuple[int, RmdRequest]]) -> dict[int, Any]: ...
@@ -341,16 +355,7 @@ class StMachine:
     """A master on a serial line, driven by an event loop."""
 
     @staticmethod
-    def open(
-        port: str,
-        *,
-        profile: str = "spec",
-        timeout: float = 1.0,
-        recovery: str = "drain",
-        speed_limit: float | None = None,
-        current_limit: float | None = None,
-        full_scale_amps: float | None = None,
-    ) -> StMachine: ...
+    def open(port: str, options: StOptions) -> StMachine: ...
     @property
     def is_open(self) -> bool: ...
     def reopen(self) -> None: ...
@@ -414,15 +419,7 @@ class RmdMachine:
     """A CAN bus with RMD motors, driven by an event loop."""
 
     @staticmethod
-    def open(
-        port: str | CanPort,
-        *,
-        timeout: float = 0.05,
-        guard: float = 0.1,
-        current_limit_a: float | None = None,
-        speed_limit_dps: float | None = None,
-        angle_limit_deg: float | None = None,
-    ) -> RmdMachine: ...
+    def open(port: str | CanPort, options: RmdOptions) -> RmdMachine: ...
     @property
     def is_open(self) -> bool: ...
     def reopen(self) -> None: ...

@@ -23,7 +23,7 @@ def from_python_can(bus: Any) -> CanPort:
     ...     port = motorlink.can.from_python_can(bus)
     ...     with motorlink.rmd.open(port, timeout=0.01) as motors:
     ...         try:
-    ...             motors.motor(1).status
+    ...             motors.motor(1).status()
     ...         except motorlink.Timeout as error:
     ...             print("nobody is on this bus")
     nobody is on this bus

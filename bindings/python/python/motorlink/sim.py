@@ -97,14 +97,14 @@ class Bench:
     @property
     def st(self) -> st.Bus:
         """The bus of the ST drive, open, with the drive's profile. For other options, ``st.open(bench, ...)``."""
-        if self._st is None or self._st._client.is_closed:
+        if self._st is None or self._st._is_closed:
             self._st = st.open(self, profile=self._core.profile)
         return self._st
 
     @property
     def rmd(self) -> rmd.Bus:
         """The bus of the RMD motors, open. For other options, ``rmd.open(bench, ...)``."""
-        if self._rmd is None or self._rmd._core.is_closed:
+        if self._rmd is None or self._rmd._is_closed:
             self._rmd = rmd.open(self)
         return self._rmd
 
@@ -114,7 +114,7 @@ class Bench:
         >>> import motorlink
         >>> bench = Bench()
         >>> bus = motorlink.st.open(bench.port(fault="drop=1,only=received"), timeout=30)
-        >>> bus.motor(1).status                      # 30 s pass at once
+        >>> bus.motor(1).status()                    # 30 s pass at once
         Traceback (most recent call last):
             ...
         motorlink.errors.Timeout: ...
@@ -211,7 +211,7 @@ class Bench:
         >>> bench = Bench()
         >>> bench.inject("st1", "OVER_VOLT", hold=True)
         >>> bench.run(0.01)
-        >>> bench.st.motor(1).status
+        >>> bench.st.motor(1).status()
         State('FAULT_NOW')
         """
         self._do("fault", motor, fault=fault, hold=hold)
@@ -325,7 +325,7 @@ class Bench:
 
         >>> import motorlink
         >>> with Bench().serve() as ports, motorlink.st.open(ports.st) as bus:
-        ...     bus.motor(1).status
+        ...     bus.motor(1).status()
         State('IDLE')
         """
         return Serving(self._core, st, rmd)

@@ -9,7 +9,9 @@ use pyo3::prelude::*;
 use super::{Driven, fileno, outcome, seconds};
 use crate::can::{CanPort, Threads};
 use crate::error::{bad_value, rmd_error};
-use crate::rmd::{RmdRequest, finding, four_torques, limits, motor_id, motor_ids, options};
+use crate::rmd::{
+    RmdOptions, RmdRequest, finding, four_torques, limits, motor_id, motor_ids, not_stopped,
+};
 
 /// A CAN bus, one exchange a motor at a time: `ask`, then `advance` when the descriptor is readable
 /// and when the time that it gave has passed.
@@ -56,21 +58,8 @@ impl RmdMachine {
     /// Opens a port, by its name or from another program's bus, which may wait. No motor is asked
     /// anything.
     #[staticmethod]
-    #[pyo3(signature = (
-        port, *, timeout = 0.05, guard = 0.1, current_limit_a = None, speed_limit_dps = None,
-        angle_limit_deg = None,
-    ))]
-    fn open(
-        py: Python<'_>,
-        port: CanBus,
-        timeout: f64,
-        guard: f64,
-        current_limit_a: Option<f64>,
-        speed_limit_dps: Option<f64>,
-        angle_limit_deg: Option<f64>,
-    ) -> PyResult<Self> {
-        let limits = limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?;
-        let options = options(py, timeout, guard, limits)?;
+    fn open(py: Python<'_>, port: CanBus, options: &RmdOptions) -> PyResult<Self> {
+        let options = options.0;
         match port {
             CanBus::Port(port) => {
                 let port = port.get();
@@ -152,7 +141,7 @@ impl RmdMachine {
         let (wait, over) = self.driven.step(py, |Motors { bus, asked }| {
             let mut over = Vec::new();
             let wait = bus.advance(|id, result| {
-                over.push((id, asked[usize::from(id.number()) - 1].clone(), result));
+                over.push((id, asked[id.index()].clone(), result));
             });
             (wait, over)
         })?;
@@ -213,10 +202,7 @@ impl RmdMachine {
             self.threads.iter().for_each(Threads::end);
             stopped
         });
-        let failed = stopped.into_iter().filter_map(|one| {
-            one.result.err().map(|error| (one.id.number(), rmd_error(py, &error)))
-        });
-        failed.collect()
+        not_stopped(py, stopped)
     }
 
     /// The port's name.
@@ -228,6 +214,6 @@ impl RmdMachine {
 
 impl Motors {
     fn expect(&mut self, id: MotorId, asked: Asked) {
-        self.asked[usize::from(id.number()) - 1] = asked;
+        self.asked[id.index()] = asked;
     }
 }

@@ -9,7 +9,7 @@ use pyo3::types::PyBytes;
 
 use super::{Driven, fileno, outcome, seconds};
 use crate::error::{bad_value, st_error};
-use crate::st::{Answer, Scale, StRequest, frame_code, limits, motor_number, options};
+use crate::st::{Answer, StOptions, StRequest, frame_code, motor_number, not_stopped};
 
 /// A master on a serial line, one exchange at a time: `begin`, then `advance` when the descriptor is
 /// readable and when the time that it gave has passed, until it is done.
@@ -39,26 +39,9 @@ fn understand(py: Python<'_>, asked: Option<&Py<StRequest>>, payload: &[u8]) -> 
 impl StMachine {
     /// Opens a port, which may wait. The drive is not asked anything.
     #[staticmethod]
-    #[pyo3(signature = (
-        port, *, profile = "spec", timeout = 1.0, recovery = "drain", speed_limit = None,
-        current_limit = None, full_scale_amps = None,
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "named in Python")]
-    fn open(
-        py: Python<'_>,
-        port: &str,
-        profile: &str,
-        timeout: f64,
-        recovery: &str,
-        speed_limit: Option<f64>,
-        current_limit: Option<f64>,
-        full_scale_amps: Option<f64>,
-    ) -> PyResult<Self> {
-        let scale = Scale::new(py, profile, full_scale_amps)?;
-        let limits = limits(py, scale, speed_limit, current_limit)?;
-        let options = options(py, scale.profile, timeout, recovery, limits)?;
+    fn open(py: Python<'_>, port: &str, options: &StOptions) -> PyResult<Self> {
         let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
-        let client = py.detach(|| EventClient::open(&name, options));
+        let client = py.detach(|| EventClient::open(&name, options.0));
         let client = client.map_err(|error| st_error(py, &error))?;
         let line = Line { client, asked: None };
         Ok(StMachine { driven: Driven::new(line, name.to_string()) })
@@ -150,10 +133,7 @@ impl StMachine {
             let client = line.client.into_client();
             if stop { client.guard().stop_now() } else { Vec::new() }
         });
-        let failed = stopped.into_iter().filter_map(|one| {
-            one.result.err().map(|error| (one.motor.number(), st_error(py, &error)))
-        });
-        failed.collect()
+        not_stopped(py, stopped)
     }
 
     /// The port's name.

@@ -3,18 +3,18 @@
 use motorlink::Clock;
 use motorlink::port::PortName;
 use motorlink::rmd::{
-    Bus, CentiDegrees, Error, Found, IqCommand, Limits, MotorId, MotorSet, OnDrop, Options,
-    SetTorque4, SpeedLimit,
+    Bus, Error, Found, IqCommand, MotorId, MotorSet, OnDrop, SetTorque4, Stopped,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict, PyList};
 
+use super::options::{RmdOptions, limits};
 use super::request::{RmdRequest, motion_status, motor_id, motor_status};
 use super::sample::{Questions, sample};
 use crate::can::{AnyPort, Threads};
 use crate::error::{bad_value, rmd_error};
-use crate::number::{limit, span, wanted};
+use crate::number::wanted;
 use crate::sampling::Plan;
 use crate::shared::Shared;
 use crate::signals::Deafness;
@@ -38,21 +38,8 @@ pub(crate) struct RmdBus {
 impl RmdBus {
     /// Opens a port. No motor is asked anything.
     #[staticmethod]
-    #[pyo3(signature = (
-        port, *, timeout = 0.05, guard = 0.1, current_limit_a = None, speed_limit_dps = None,
-        angle_limit_deg = None,
-    ))]
-    fn open(
-        py: Python<'_>,
-        port: AnyPort<'_>,
-        timeout: f64,
-        guard: f64,
-        current_limit_a: Option<f64>,
-        speed_limit_dps: Option<f64>,
-        angle_limit_deg: Option<f64>,
-    ) -> PyResult<Self> {
-        let limits = limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?;
-        let options = options(py, timeout, guard, limits)?;
+    fn open(py: Python<'_>, port: AnyPort<'_>, options: &RmdOptions) -> PyResult<Self> {
+        let options = options.0;
         let deafness = Deafness::default();
         let mut threads = None;
         let (bus, port) = match port {
@@ -211,10 +198,7 @@ impl RmdBus {
         };
         let stopped = self.bus.close(py, halt);
         py.detach(|| self.threads.iter().for_each(Threads::end));
-        let failed = stopped.into_iter().filter_map(|one| {
-            one.result.err().map(|error| (one.id.number(), rmd_error(py, &error)))
-        });
-        failed.collect()
+        not_stopped(py, stopped)
     }
 
     /// Whether it was closed.
@@ -230,37 +214,12 @@ impl RmdBus {
     }
 }
 
-/// What the arguments of `open` say.
-pub(crate) fn options(
-    py: Python<'_>,
-    timeout: f64,
-    guard: f64,
-    limits: Limits,
-) -> PyResult<Options> {
-    Ok(Options {
-        timeout: span(py, "a timeout", timeout)?,
-        guard: span(py, "a guard time", guard)?,
-        limits,
-        ..Options::default()
-    })
-}
-
-/// Limits in the units of the field. A limit is rounded towards 0.
-pub(crate) fn limits(
-    py: Python<'_>,
-    current_a: Option<f64>,
-    speed_dps: Option<f64>,
-    angle_deg: Option<f64>,
-) -> PyResult<Limits> {
-    let (ampere, degree) = (IqCommand::SCALE, CentiDegrees::SCALE);
-    let current = current_a.map(|amps| limit(py, amps, ampere, IqCommand::SYMBOL));
-    let speed = speed_dps.map(|dps| limit(py, dps, SpeedLimit::SCALE, SpeedLimit::SYMBOL));
-    let angle = angle_deg.map(|degrees| limit(py, degrees, degree, CentiDegrees::SYMBOL));
-    Ok(Limits {
-        current: current.transpose()?.map(IqCommand),
-        speed: speed.transpose()?.map(SpeedLimit),
-        angle: angle.transpose()?.map(CentiDegrees),
-    })
+/// The motors that may still be moving, and why.
+pub(crate) fn not_stopped(py: Python<'_>, stopped: Vec<Stopped>) -> Vec<(u8, PyErr)> {
+    let failed = stopped
+        .into_iter()
+        .filter_map(|one| one.result.err().map(|error| (one.id.number(), rmd_error(py, &error))));
+    failed.collect()
 }
 
 /// Torque currents of motors 1 to 4, A.

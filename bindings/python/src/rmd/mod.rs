@@ -1,11 +1,13 @@
 //! The RMD protocol over CAN, V1.62.
 
 mod bus;
+mod options;
 mod quantity;
 mod request;
 mod sample;
 
-pub(crate) use bus::{RmdBus, finding, four_torques, limits, motor_ids, options};
+pub(crate) use bus::{RmdBus, finding, four_torques, motor_ids, not_stopped};
+pub(crate) use options::{RmdOptions, limits};
 pub(crate) use quantity::rmd_quantities;
 pub(crate) use request::{RmdRequest, motor_id};
 pub(crate) use sample::RmdSampling;

@@ -2,15 +2,14 @@
 
 use motorlink::Clock;
 use motorlink::port::PortName;
-use motorlink::st::{Client, Limits, Motor, Options, Profile, Recovery};
+use motorlink::st::{Client, Motor, Stopped};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyList};
 
+use super::options::StOptions;
 use super::request::{StRequest, motor_number};
 use super::sample::{self, Reading, sample};
-use super::scale::Scale;
 use crate::error::{bad_value, st_error};
-use crate::number::{limit, span};
 use crate::sampling::Plan;
 use crate::shared::Shared;
 use crate::signals::Deafness;
@@ -28,23 +27,8 @@ pub(crate) struct StClient {
 impl StClient {
     /// Opens a port. The drive is not asked anything.
     #[staticmethod]
-    #[pyo3(signature = (
-        port, *, profile = "spec", timeout = 1.0, recovery = "drain", speed_limit = None,
-        current_limit = None, full_scale_amps = None,
-    ))]
-    fn open(
-        py: Python<'_>,
-        port: Port<'_>,
-        profile: &str,
-        timeout: f64,
-        recovery: &str,
-        speed_limit: Option<f64>,
-        current_limit: Option<f64>,
-        full_scale_amps: Option<f64>,
-    ) -> PyResult<Self> {
-        let scale = Scale::new(py, profile, full_scale_amps)?;
-        let limits = limits(py, scale, speed_limit, current_limit)?;
-        let options = options(py, scale.profile, timeout, recovery, limits)?;
+    fn open(py: Python<'_>, port: Port<'_>, options: &StOptions) -> PyResult<Self> {
+        let options = options.0;
         let deafness = Deafness::default();
         let (client, port, clock) = match port {
             Port::Name(name) => {
@@ -146,10 +130,7 @@ impl StClient {
             let stop_now = || client.guard().stop_now();
             if stop { self.deafness.during(stop_now) } else { Vec::new() }
         };
-        let failed = self.client.close(py, halt).into_iter().filter_map(|one| {
-            one.result.err().map(|error| (one.motor.number(), st_error(py, &error)))
-        });
-        failed.collect()
+        not_stopped(py, self.client.close(py, halt))
     }
 
     /// Whether it was closed.
@@ -165,44 +146,16 @@ impl StClient {
     }
 }
 
+/// The motors that may still be running, and why.
+pub(crate) fn not_stopped(py: Python<'_>, stopped: Vec<Stopped>) -> Vec<(u8, PyErr)> {
+    let failed = stopped
+        .into_iter()
+        .filter_map(|one| one.result.err().map(|error| (one.motor.number(), st_error(py, &error))));
+    failed.collect()
+}
+
 /// A frame code, 5 bits.
 pub(crate) fn frame_code(py: Python<'_>, code: i64) -> PyResult<u8> {
     let code = u8::try_from(code).ok().filter(|code| *code < 0x20);
     code.ok_or_else(|| bad_value(py, "frame codes are 0 to 0x1f"))
-}
-
-/// What the arguments of `open` say.
-pub(crate) fn options(
-    py: Python<'_>,
-    profile: Profile,
-    timeout: f64,
-    recovery: &str,
-    limits: Limits,
-) -> PyResult<Options> {
-    let mut options = Options { profile, limits, ..Options::default() };
-    options.line.timeout = span(py, "a timeout", timeout)?.into();
-    options.line.recovery = match recovery {
-        "drain" => Recovery::Drain,
-        "pad" => Recovery::Pad,
-        "none" => Recovery::None,
-        other => {
-            let known = "there are `drain`, `pad` and `none`";
-            return Err(bad_value(py, format_args!("there is no recovery `{other}`; {known}")));
-        }
-    };
-    Ok(options)
-}
-
-/// Limits in rpm and in the unit that the scale gives currents. A limit is rounded
-/// towards 0.
-pub(crate) fn limits(
-    py: Python<'_>,
-    scale: Scale,
-    speed: Option<f64>,
-    current: Option<f64>,
-) -> PyResult<Limits> {
-    let (ampere, unit) = scale.current();
-    let speed_rpm = speed.map(|speed| limit(py, speed, 1.0, "rpm")).transpose()?;
-    let current_s16a = current.map(|current| limit(py, current, ampere, unit)).transpose()?;
-    Ok(Limits { speed_rpm, current_s16a })
 }

@@ -1,6 +1,7 @@
 //! ST's Motor Control Protocol.
 
 mod client;
+mod options;
 mod profile;
 mod reply;
 mod request;
@@ -8,7 +9,8 @@ mod sample;
 mod scale;
 mod verified;
 
-pub(crate) use client::{StClient, frame_code, limits, options};
+pub(crate) use client::{StClient, frame_code, not_stopped};
+pub(crate) use options::StOptions;
 pub(crate) use reply::Answer;
 pub(crate) use request::{StRequest, motor_number};
 pub(crate) use sample::StSampling;

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable
 from typing import Protocol
 
-from motorlink._sampling import Samples, array
 from motorlink.errors import LineLost, Timeout
 
 
@@ -24,13 +23,11 @@ async def nothing() -> None:
 async def sampled(
     sampling: Sampling,
     row: Callable[[], Awaitable[None]],
-    names: Sequence[str],
     *,
-    raw: bool,
     skip: bool,
     prepare: Callable[[], Awaitable[None]] = nothing,
-) -> Samples:
-    """Takes a row at each instant; raises what ends it early, with the rows in its ``samples``."""
+) -> tuple[bytearray, BaseException | None]:
+    """Takes a row at each instant; gives the rows, and what ended them early."""
     loop = asyncio.get_running_loop()
     ended: BaseException | None = None
     try:
@@ -47,4 +44,4 @@ async def sampled(
                     raise
     except BaseException as error:
         ended = error
-    return array((sampling.rows(), ended), names, raw=raw)
+    return sampling.rows(), ended

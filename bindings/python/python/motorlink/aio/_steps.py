@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import os
 from collections.abc import Callable, Coroutine, Generator
 from types import TracebackType
-from typing import Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from motorlink._bus import Close, report, when_left_open
+from motorlink._apis import Awaited, Exchanges, awaiting
+from motorlink._bus import AnyBus, open_described, report
 from motorlink.errors import Closed, MotorlinkError
 
 Value = TypeVar("Value")
-Entered = TypeVar("Entered", bound="Ending")
+Entered = TypeVar("Entered", bound="AwaitedBus")
+
+if TYPE_CHECKING:
+    from typing_extensions import ParamSpec, Self
+
+    Arguments = ParamSpec("Arguments")
 
 
 def port_name(port: str | os.PathLike[str]) -> str:
@@ -153,30 +160,31 @@ class Steps:
         return closing.result(), cancelled
 
 
-class Ending:
-    """What the buses of both protocols have in common: how they end."""
+class AwaitedBus(Awaited, AnyBus):
+    """What the buses of both protocols have in common."""
 
-    def __init__(self, steps: Steps, close: Close, port: str, *, stop_on_signals: bool):
-        self._steps = steps
-        self._close = close
-        self._name = port
-        self._release = when_left_open(self, close, port, stop_on_signals=stop_on_signals)
+    _named = staticmethod(port_name)
 
-    @property
-    def port(self) -> str:
-        """The port's name."""
-        return self._name
+    def __init__(self, core: Any, **options: Any):
+        self._steps = Steps(core, self._advance)
+        super().__init__(core, **options)
 
-    async def close(self) -> None:
-        """Stops the motors that this bus set moving, as it was opened to; closes the port.
+    @classmethod
+    async def _opened(cls, core: Callable[[], Any]) -> Any:
+        """Opens in another thread; what comes when nobody waits for it any more is closed."""
+        loop = asyncio.get_running_loop()
+        opening = loop.run_in_executor(None, core)
+        try:
+            return await asyncio.shield(opening)
+        except asyncio.CancelledError:
 
-        Exchanges that are under way end in ``Closed``. A task that is cancelled meanwhile is cancelled
-        when all is done.
+            def came(opening: asyncio.Future[Any]) -> None:
+                if not opening.cancelled() and opening.exception() is None:
+                    close = functools.partial(opening.result().close, **cls._ends("nothing"))
+                    loop.run_in_executor(None, close)
 
-        Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
-        port is closed all the same.
-        """
-        await self._end(in_flight=False)
+            opening.add_done_callback(came)
+            raise
 
     async def _end(self, *, in_flight: bool) -> None:
         self._fail(self._steps.closed())
@@ -186,11 +194,19 @@ class Ending:
         if cancelled is not None:
             raise cancelled
 
+    def _advance(self) -> float | None:
+        """Moves what can be moved at once; gives after how many s to go on."""
+        raise NotImplementedError
+
     def _fail(self, error: MotorlinkError) -> None:
         """Ends the exchanges under way."""
         raise NotImplementedError
 
-    async def __aenter__(self: Entered) -> Entered:
+    @property
+    def _is_closed(self) -> bool:
+        return self._steps.is_closed
+
+    async def __aenter__(self) -> Self:
         return self
 
     async def __aexit__(
@@ -226,20 +242,16 @@ class Opening(Generic[Entered]):
             await self._bus.__aexit__(kind, error, traceback)
 
 
-async def opened(open: Callable[[], Value], discard: Callable[[Value], object]) -> Value:
-    """Opens in another thread; what comes when nobody waits for it any more is discarded."""
-    loop = asyncio.get_running_loop()
-    opening = loop.run_in_executor(None, open)
-    try:
-        return await asyncio.shield(opening)
-    except asyncio.CancelledError:
+def opens(
+    opening: Callable[Arguments, Callable[[], Exchanges[Entered]]],
+) -> Callable[Arguments, Opening[Entered]]:
+    """The function ``open`` of a protocol."""
 
-        def came(opening: asyncio.Future[Value]) -> None:
-            if not opening.cancelled() and opening.exception() is None:
-                loop.run_in_executor(None, discard, opening.result())
+    def open(*arguments: Arguments.args, **named: Arguments.kwargs) -> Opening[Entered]:
+        bus = opening(*arguments, **named)
+        return Opening(lambda: awaiting(bus()))
 
-        opening.add_done_callback(came)
-        raise
+    return open_described(open, opening, "Opening[Bus]")
 
 
 def tell(answer: asyncio.Future[Any] | None, value: Any) -> None:

@@ -1,0 +1,190 @@
+"""Makes the blocking and the asyncio API from one definition of each method.
+
+A definition returns what an exchange gave. A definition with several exchanges, or with something to do
+behind one, is a generator: it yields what each exchange gave, and is sent its value. In the blocking API an
+exchange gives its value; in asyncio's it gives something to await.
+
+>>> class Shared:
+...     @both_apis
+...     def twice(self, number: int) -> Exchanges[int]:
+...         "Twice a number."
+...         answer: int = yield self.ask(number)
+...         return 2 * answer
+
+>>> class Motor(Blocking, Shared):
+...     def ask(self, number: int) -> int:
+...         return number
+>>> Motor().twice(3)
+6
+
+>>> import asyncio
+>>> class AwaitedMotor(Awaited, Shared):
+...     async def ask(self, number: int) -> int:
+...         return number
+>>> asyncio.run(AwaitedMotor().twice(3))
+6
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Coroutine, Generator
+from types import FunctionType
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
+
+Value = TypeVar("Value")
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+#: What a definition is: exchanges, and the value that the method gives.
+Exchanges = Generator[Any, Any, Value]
+
+if TYPE_CHECKING:
+    from typing_extensions import Concatenate, ParamSpec
+
+    Arguments = ParamSpec("Arguments")
+
+    class Method(Generic[Arguments, Value]):
+        """What a definition is to type checkers: one method for each API."""
+
+        @overload
+        def __get__(self, owner: Blocking, kind: Any) -> Callable[Arguments, Value]: ...
+        @overload
+        def __get__(
+            self, owner: Awaited, kind: Any
+        ) -> Callable[Arguments, Coroutine[Any, Any, Value]]: ...
+        @overload
+        def __get__(
+            self, owner: None, kind: type[Blocking]
+        ) -> Callable[Concatenate[Any, Arguments], Value]: ...
+        @overload
+        def __get__(
+            self, owner: None, kind: type[Awaited]
+        ) -> Callable[Concatenate[Any, Arguments], Coroutine[Any, Any, Value]]: ...
+        def __get__(self, owner: Any, kind: Any) -> Any: ...
+
+
+def both_apis(
+    definition: Callable[Concatenate[Any, Arguments], Exchanges[Value]],
+) -> Method[Arguments, Value]:
+    """Has each API make its own method of a definition."""
+    definition._both_apis = True  # type: ignore[attr-defined]
+    return definition  # type: ignore[return-value]
+
+
+def one(exchange: Any) -> Exchanges[Any]:
+    """What one exchange gave, for a definition to return."""
+    given: Exchanges[Any] = exchange
+    return given
+
+
+class Blocking:
+    """A class of the blocking API: its methods return when their exchanges are over."""
+
+    __slots__ = ()
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        _make(cls, blocking)
+
+
+class Awaited:
+    """A class of asyncio's API: its methods are coroutines."""
+
+    __slots__ = ()
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        _make(cls, awaited)
+
+
+def blocking(
+    definition: Callable[Arguments, Exchanges[Value]],
+) -> Callable[Arguments, Value]:
+    """A definition as a function that returns when its exchanges are over."""
+    if not inspect.isgeneratorfunction(definition):
+        copy: Callable[Arguments, Value] = _copy(definition)
+        return described(copy, definition)
+
+    def method(*arguments: Arguments.args, **named: Arguments.kwargs) -> Value:
+        return carried_out(definition(*arguments, **named))
+
+    return described(method, definition)
+
+
+def awaited(
+    definition: Callable[Arguments, Exchanges[Value]],
+) -> Callable[Arguments, Coroutine[Any, Any, Value]]:
+    """A definition as a coroutine function."""
+    several = inspect.isgeneratorfunction(definition)
+
+    async def method(*arguments: Arguments.args, **named: Arguments.kwargs) -> Value:
+        given: Any = definition(*arguments, **named)
+        result: Value = await (awaiting(given) if several else given)
+        return result
+
+    return described(method, definition)
+
+
+def carried_out(exchanges: Exchanges[Value]) -> Value:
+    """What comes of exchanges that give values."""
+    value = None
+    try:
+        while True:
+            value = exchanges.send(value)
+    except StopIteration as end:
+        result: Value = end.value
+        return result
+
+
+async def awaiting(exchanges: Exchanges[Value]) -> Value:
+    """What comes of exchanges that give something to await."""
+    try:
+        exchange = next(exchanges)
+        while True:
+            try:
+                value = await exchange
+            except BaseException as error:
+                exchange = exchanges.throw(error)
+            else:
+                exchange = exchanges.send(value)
+    except StopIteration as end:
+        result: Value = end.value
+        return result
+
+
+def described(
+    function: Function, definition: Callable[..., object], returned: str | None = None
+) -> Function:
+    """The function with the name, the arguments and the text of its definition."""
+    signature = inspect.signature(definition)
+    if returned is None:
+        returned = str(signature.return_annotation).removeprefix("Exchanges[").removesuffix("]")
+    functools.update_wrapper(function, definition, updated=())
+    function.__signature__ = signature.replace(return_annotation=returned)  # type: ignore[attr-defined]
+    return function
+
+
+def _copy(function: Any) -> Any:
+    """The same function again, to be given another description."""
+    copy = FunctionType(
+        function.__code__,
+        function.__globals__,
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
+    )
+    copy.__kwdefaults__ = function.__kwdefaults__
+    return copy
+
+
+def _make(cls: type, api: Callable[[Callable[..., Exchanges[Any]]], object]) -> None:
+    """Replaces every definition that a class inherits with the method of its API."""
+    found: dict[str, Any] = {}
+    for base in reversed(cls.__mro__):
+        found.update(vars(base))
+    for name, definition in found.items():
+        if getattr(definition, "_both_apis", False):
+            method: Any = api(definition)
+            method.__module__, method.__qualname__ = cls.__module__, f"{cls.__qualname__}.{name}"
+            setattr(cls, name, method)

@@ -1,0 +1,51 @@
+//! How a CAN bus with RMD motors is opened: for threads that may wait and for event loops.
+
+use motorlink::rmd::{CentiDegrees, IqCommand, Limits, Options, SpeedLimit};
+use pyo3::prelude::*;
+
+use crate::number::{limit, span};
+
+/// What `open` was told, checked.
+#[pyclass(frozen, module = "motorlink._core")]
+pub(crate) struct RmdOptions(pub(crate) Options);
+
+#[pymethods]
+impl RmdOptions {
+    #[new]
+    #[pyo3(signature = (
+        *, timeout, guard, current_limit_a, speed_limit_dps, angle_limit_deg,
+    ))]
+    fn new(
+        py: Python<'_>,
+        timeout: f64,
+        guard: f64,
+        current_limit_a: Option<f64>,
+        speed_limit_dps: Option<f64>,
+        angle_limit_deg: Option<f64>,
+    ) -> PyResult<Self> {
+        Ok(RmdOptions(Options {
+            timeout: span(py, "a timeout", timeout)?,
+            guard: span(py, "a guard time", guard)?,
+            limits: limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?,
+            ..Options::default()
+        }))
+    }
+}
+
+/// Limits in the units of the field. A limit is rounded towards 0.
+pub(crate) fn limits(
+    py: Python<'_>,
+    current_a: Option<f64>,
+    speed_dps: Option<f64>,
+    angle_deg: Option<f64>,
+) -> PyResult<Limits> {
+    let (ampere, degree) = (IqCommand::SCALE, CentiDegrees::SCALE);
+    let current = current_a.map(|amps| limit(py, amps, ampere, IqCommand::SYMBOL));
+    let speed = speed_dps.map(|dps| limit(py, dps, SpeedLimit::SCALE, SpeedLimit::SYMBOL));
+    let angle = angle_deg.map(|degrees| limit(py, degrees, degree, CentiDegrees::SYMBOL));
+    Ok(Limits {
+        current: current.transpose()?.map(IqCommand),
+        speed: speed.transpose()?.map(SpeedLimit),
+        angle: angle.transpose()?.map(CentiDegrees),
+    })
+}

@@ -1,0 +1,154 @@
+"""The blocking and the asyncio API are one: the same methods, arguments and texts, and each its types."""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+from collections.abc import Coroutine
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import motorlink
+from motorlink import aio, rmd, st
+from motorlink._apis import Awaited, Blocking, Exchanges, both_apis
+
+if TYPE_CHECKING:
+    from typing_extensions import assert_type
+
+#: What one API alone has.
+BLOCKING_ONLY = {"confirm"}
+
+PAIRS = [
+    (st.Bus, aio.st.Bus),
+    (st.Motor, aio.st.Motor),
+    (rmd.Bus, aio.rmd.Bus),
+    (rmd.Motor, aio.rmd.Motor),
+]
+
+
+def public(kind: type) -> dict[str, Any]:
+    """The public members of a class."""
+    members = inspect.getmembers(kind)
+    return {name: member for name, member in members if not name.startswith("_")}
+
+
+@pytest.mark.parametrize(("blocking", "awaited"), PAIRS)
+def test_both_apis_have_the_same_methods(blocking: type, awaited: type) -> None:
+    ours, theirs = public(blocking), public(awaited)
+    assert set(ours) - BLOCKING_ONLY == set(theirs)
+    coroutines = 0
+    for name, method in theirs.items():
+        if not inspect.isfunction(method):
+            assert type(ours[name]) is type(method), name
+            continue
+        assert inspect.signature(ours[name]) == inspect.signature(method), name
+        assert inspect.getdoc(ours[name]) == inspect.getdoc(method), name
+        assert not inspect.iscoroutinefunction(ours[name]), name
+        coroutines += inspect.iscoroutinefunction(method)
+    assert coroutines >= 6
+
+
+@pytest.mark.parametrize(("blocking", "awaited"), [(st, aio.st), (rmd, aio.rmd)])
+def test_both_apis_open_with_the_same_arguments(blocking: Any, awaited: Any) -> None:
+    ours, theirs = inspect.signature(blocking.open), inspect.signature(awaited.open)
+    assert ours.parameters == theirs.parameters
+    assert (ours.return_annotation, theirs.return_annotation) == ("Bus", "Opening[Bus]")
+    assert inspect.getdoc(blocking.open) == inspect.getdoc(awaited.open)
+    assert (blocking.open.__name__, blocking.open.__module__) == ("open", blocking.__name__)
+
+
+class Shared:
+    """A definition whose exchanges fail, and its remedy."""
+
+    def __init__(self) -> None:
+        self.tried = 0
+
+    @both_apis
+    def stubborn(self, fails: int) -> Exchanges[str]:
+        """Tries until it does not fail."""
+        while True:
+            try:
+                answer: str = yield self.exchange(fails)
+            except ValueError:
+                self.tried += 1
+            else:
+                return answer
+
+    def exchange(self, fails: int) -> Any:
+        raise NotImplementedError
+
+
+class BlockingOne(Blocking, Shared):
+    def exchange(self, fails: int) -> str:
+        if self.tried < fails:
+            raise ValueError
+        return "done"
+
+
+class AwaitedOne(Awaited, Shared):
+    async def exchange(self, fails: int) -> str:
+        await asyncio.sleep(0)
+        if self.tried < fails:
+            raise ValueError
+        return "done"
+
+
+def test_a_definition_can_handle_what_an_exchange_raises() -> None:
+    assert BlockingOne().stubborn(3) == "done"
+    assert asyncio.run(AwaitedOne().stubborn(3)) == "done"
+
+
+def test_cancellation_ends_a_definition() -> None:
+    async def main() -> None:
+        task = asyncio.ensure_future(AwaitedOne().stubborn(10**9))
+        await asyncio.sleep(0.01)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    asyncio.run(main())
+
+
+def test_a_method_that_a_subclass_replaces_stays_replaced() -> None:
+    class Quiet(BlockingOne):
+        def stubborn(self, fails: int) -> str:
+            return "replaced"
+
+    class Quieter(Quiet):
+        pass
+
+    assert Quieter().stubborn(1) == "replaced"
+    assert motorlink.st.Motor.stop.__qualname__ == "Motor.stop"
+
+
+def test_a_read_cannot_be_assigned() -> None:
+    with rmd.open("sim:") as bus:
+        with pytest.raises(AttributeError, match="read-only"):
+            bus.motor(1).gains = bus.motor(1).gains()  # type: ignore[misc, assignment]
+
+
+def types_of_the_blocking_api(bus: st.Bus, motors: rmd.Bus) -> None:
+    """Read by mypy, never run."""
+    assert_type(st.open("sim:"), st.Bus)
+    assert_type(bus.motor(1), st.Motor)
+    assert_type(bus.motor(1).bus, st.Bus)
+    assert_type(bus.motor(1).read("STATUS"), float)
+    assert_type(bus.motor(1).status(), st.State)
+    assert_type(motors.motor(1).gains(), rmd.Gains)
+    assert_type(motors.motor(1).speed(1), rmd.MotionStatus)
+    bus.motor(1).ramp("fast", 1)  # type: ignore[arg-type]
+    bus.motor(1).ramp(1)  # type: ignore[call-arg]
+    st.open("sim:", profil="spec")  # type: ignore[call-arg]
+
+
+async def types_of_asyncio(bus: aio.st.Bus, motors: aio.rmd.Bus) -> None:
+    """Read by mypy, never run."""
+    assert_type(await aio.st.open("sim:"), aio.st.Bus)
+    assert_type(bus.motor(1).bus, aio.st.Bus)
+    assert_type(await bus.motor(1).read("STATUS"), float)
+    assert_type(await motors.motor(1).gains(), rmd.Gains)
+    status: Coroutine[Any, Any, st.State] = bus.motor(1).status()
+    assert_type(await status, st.State)
+    bus.motor(1).stop()  # type: ignore[unused-coroutine]
+    aio.st.open(motorlink.sim.Bench())  # type: ignore[arg-type]
