@@ -87,6 +87,6 @@ def motorlink_ports(motorlink_bench: Bench, tmp_path: Path) -> Iterator[Serving]
 
 def _beside(folder: Path, config: Any) -> Any:
     """A path is relative to ``folder``; everything else is as it is."""
-    from motorlink.sim import is_path
+    from motorlink.sim._source import is_path
 
     return folder / config if is_path(config) else config

@@ -1,0 +1,40 @@
+"""Simulated drives in the process: motors that behave like motors, without hardware.
+
+>>> from motorlink import sim
+>>> bench = sim.Bench()
+>>> motor = bench.st.motor(2)                # a 24 V servo; motor 1 is a bigger one
+>>> motor.ramp(1000, 0.2)                    # rpm, s
+>>> motor.start()
+>>> bench.run(3.0)                           # s of virtual time, over at once
+>>> round(motor.read("SPEED_MEAS"), -1)      # rpm
+1000
+>>> bench.brake("st2", 0.05)                 # Nm
+>>> bench.run(1.0)
+>>> round(bench.truth("st2")["torque_newton_metres"], 2)     # with friction
+0.06
+
+Time is *virtual*: it passes while an exchange is on the line, while a timeout is waited for, and in
+:meth:`Bench.run`. Nothing sleeps, and the same calls give the same answers each time, noise and faults
+of the line included, as long as they come from one thread.
+
+Motors are called as their signals are: ``st2`` is motor 2 of the ST drive, ``rmd3`` the RMD motor with
+ID 3. docs/SIMULATOR.md says what a configuration may contain, docs/SCENARIOS.md what signals there are.
+"""
+
+from motorlink.sim._bench import Bench, Port
+from motorlink.sim._recording import Recording
+from motorlink.sim._scenario import Expectation, Mark, Refusal, Run, presets, run
+from motorlink.sim._serving import Serving
+
+__all__ = [
+    "Bench",
+    "Expectation",
+    "Mark",
+    "Port",
+    "Recording",
+    "Refusal",
+    "Run",
+    "Serving",
+    "presets",
+    "run",
+]

@@ -1,0 +1,291 @@
+"""Benches: simulated drives, their time and the world around them."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import Any
+
+from motorlink import _core, rmd, st
+from motorlink._bus import Closing
+from motorlink._sampling import Samples
+from motorlink.errors import BadValue
+from motorlink.sim._recording import Recording
+from motorlink.sim._serving import Serving
+from motorlink.sim._source import Source, text_or_path
+from motorlink.sim._time import patched_time
+
+
+class Bench(Closing):
+    """An ST drive on a serial line and RMD motors on a CAN bus, on virtual time.
+
+    ``config``: what there is. TOML text, the path of a TOML file (a ``str`` with a ``[``, a ``=`` or a
+    line break is text), or the same as a ``dict``. Without it there are two ST motors and RMD motors 1 to 4.
+
+    ``seed``: of the noise in the sensors; without it, as the configuration says. ``fault``: what the
+    lines of this bench do, in the words of ``motorlink --fault``, such as ``"drop=1e-3,seed=7"``.
+
+    A bench is a port: ``motorlink.st.open(bench)``, ``motorlink.rmd.open(bench, timeout=0.1)``.
+    Raises :class:`~motorlink.BadValue` where a configuration is impossible, with the place.
+
+    >>> bench = Bench("[[st.motor]]\\npreset = 'drone'")
+    >>> bench.motors
+    ('st1', 'rmd1', 'rmd2', 'rmd3', 'rmd4')
+    >>> Bench({"st": {"motor": [{"preset": "big"}]}})
+    Traceback (most recent call last):
+        ...
+    motorlink.errors.BadValue: st.motor 1: the presets are mains, servo, shinano, drone, not "big"
+    """
+
+    def __init__(
+        self,
+        config: Source | Mapping[str, Any] | None = None,
+        *,
+        seed: int | None = None,
+        fault: str | None = None,
+    ):
+        if isinstance(config, Mapping):
+            self._core = _core.SimBench(json=json.dumps(config), seed=seed)
+        else:
+            text, path = text_or_path("" if config is None else config)
+            self._core = _core.SimBench(toml=text, path=path, seed=seed)
+        self._port = self._core.port(fault)
+        self._st: st.Bus | None = None
+        self._rmd: rmd.Bus | None = None
+
+    @property
+    def st(self) -> st.Bus:
+        """The bus of the ST drive, open, with the drive's profile. For other options, ``st.open(bench, ...)``."""
+        if self._st is None or self._st._is_closed:
+            self._st = st.open(self, profile=self._core.profile)
+        return self._st
+
+    @property
+    def rmd(self) -> rmd.Bus:
+        """The bus of the RMD motors, open. For other options, ``rmd.open(bench, ...)``."""
+        if self._rmd is None or self._rmd._is_closed:
+            self._rmd = rmd.open(self)
+        return self._rmd
+
+    def port(self, *, fault: str | None) -> Port:
+        """The bench as a port with other faults than its own.
+
+        >>> import motorlink
+        >>> bench = Bench()
+        >>> bus = motorlink.st.open(bench.port(fault="drop=1,only=received"), timeout=30)
+        >>> bus.motor(1).status()                    # 30 s pass at once
+        Traceback (most recent call last):
+            ...
+        motorlink.errors.Timeout: ...
+        >>> bench.now
+        30.0
+        """
+        return Port(self._core.port(fault))
+
+    # Time
+
+    @property
+    def now(self) -> float:
+        """Time since the drives were powered on, s."""
+        return self._core.now
+
+    def run(self, seconds: float) -> None:
+        """Lets time pass, s. Ctrl-C ends it.
+
+        While the bench is served it takes that long.
+        """
+        self._core.run(seconds)
+
+    def patch_time(self) -> AbstractContextManager[None]:
+        """Code of this thread that calls ``time.sleep`` lets time of the bench pass meanwhile.
+
+        ``time.monotonic``, ``time.perf_counter``, ``time.time`` and their like in ns go by the bench, too. A
+        name that was imported before (``from time import sleep``) stays as it is.
+
+        >>> import time
+        >>> bench = Bench()
+        >>> with bench.patch_time():
+        ...     began = time.monotonic()
+        ...     time.sleep(60)
+        ...     round(time.monotonic() - began)
+        60
+        """
+        return patched_time(lambda: round(self.now * 1e6) * 1000, self.run)
+
+    # The world around the motors
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """What the motors are called."""
+        return tuple(dict.fromkeys(name.partition(".")[0] for name, _ in self._core.signals))
+
+    def brake(self, motor: str, newton_metres: float) -> None:
+        """Sets the braking torque of the load, Nm, 0 to 1000. It only ever slows down."""
+        self._do("load", motor, newton_metres=newton_metres)
+
+    def push(self, motor: str, newton_metres: float) -> None:
+        """Sets the torque with which something turns the output, Nm; negative backwards."""
+        self._do("push", motor, newton_metres=newton_metres)
+
+    def supply(self, motor: str, volts: float) -> None:
+        """Sets the voltage of the source, V, 0 to 1000. The bus follows as its capacitor lets it."""
+        self._do("supply", motor, volts=volts)
+
+    def temperature(self, motor: str, celsius: float | None) -> None:
+        """Makes the drive's sensor show a temperature, °C; ``None``: the motor's own again."""
+        self._do("temperature", motor, celsius=celsius)
+
+    def lock_rotor(self, motor: str, locked: bool = True) -> None:
+        """Holds the rotor, or lets it go."""
+        self._do("lock-rotor", motor, locked=locked)
+
+    def inject(self, motor: str, fault: str, *, hold: bool | None = None) -> None:
+        """Lets a fault happen: ``"BREAK_IN"`` (ST), ``"LOW_VOLTAGE"`` (RMD).
+
+        It happens once; with ``hold=True`` its cause stays until ``hold=False``.
+
+        >>> bench = Bench()
+        >>> bench.inject("st1", "OVER_VOLT", hold=True)
+        >>> bench.run(0.01)
+        >>> bench.st.motor(1).status()
+        State('FAULT_NOW')
+        """
+        self._do("fault", motor, fault=fault, hold=hold)
+
+    def power_cycle(self, which: str) -> None:
+        """Takes the power away and gives it back: RAM, turns and faults are gone, ROM stays.
+
+        ``which``: ``"st"``, ``"rmd"``, or one RMD motor. An ST drive has one supply for its motors.
+        """
+        if which in ("st", "rmd"):
+            self.execute({"command": "power-cycle", "port": which})
+        else:
+            self._do("power-cycle", which)
+
+    def execute(self, command: Mapping[str, Any]) -> dict[str, Any]:
+        """Executes a command of a bench (docs/SIMULATOR.md); its ports are ``st`` and ``rmd``.
+
+        Raises :class:`~motorlink.BadValue` where nothing was done.
+
+        >>> Bench().execute({"command": "supply", "port": "rmd", "motor": 2, "volts": 6.5})
+        {'ok': True}
+        """
+        try:
+            text = json.dumps(dict(command), allow_nan=False)
+        except (TypeError, ValueError) as error:
+            raise BadValue(f"not a command: {error} in {dict(command)}") from error
+        answer: dict[str, Any] = json.loads(self._core.execute(text))
+        return answer
+
+    def _do(self, command: str, motor: str, **members: Any) -> None:
+        place = re.fullmatch(r"(st|rmd)(\d+)", motor)
+        if place is None or motor not in self.motors:
+            raise BadValue(f"there is no motor {motor!r}; there are {', '.join(self.motors)}")
+        port, number = place[1], int(place[2])
+        told = {name: value for name, value in members.items() if value is not None}
+        self.execute({"command": command, "port": port, "motor": number, **told})
+
+    # The truth
+
+    @property
+    def signals(self) -> dict[str, str]:
+        """What can be looked at: the unit of each signal by its name; states and the like have none.
+
+        >>> Bench().signals["rmd3.angle_degrees"]
+        '°'
+        """
+        return dict(self._core.signals)
+
+    def truth(self, motor: str) -> dict[str, Any]:
+        """What really happens in a motor now: its signals by their names, which end with the unit.
+
+        States, modes and faults are words.
+
+        >>> truth = Bench().truth("rmd1")
+        >>> truth["speed_dps"], truth["mode"], truth["errors"]
+        (0.0, 'off', 'none')
+        """
+        truth = self._core.truth(motor)
+        if not truth:
+            raise BadValue(f"there is no motor {motor!r}; there are {', '.join(self.motors)}")
+        return truth
+
+    def record(
+        self, signals: Sequence[str], *, seconds: float, every: float = 1e-3
+    ) -> Samples:
+        """Lets time pass, s, and gives what happened, a row ``every`` s.
+
+        A structured array: ``t`` in s since the first row, the other fields are the signals as
+        ``float64``. States, modes and faults are their numbers. ``motorlink.to_pandas`` takes it.
+
+        >>> bench = Bench()
+        >>> bench.rmd.motor(1).speed(360)
+        MotionStatus(...)
+        >>> data = bench.record(["rmd1.speed_dps"], seconds=0.5)
+        >>> len(data), data.dtype.names
+        (501, ('t', 'rmd1.speed_dps'))
+        >>> round(float(data["rmd1.speed_dps"][-200:].mean()), -1)
+        360.0
+        """
+        with self.recording(signals, every=every) as recording:
+            self.run(seconds)
+        return recording.data
+
+    def recording(self, signals: Sequence[str], *, every: float = 1e-3) -> Recording:
+        """Writes signals down, a row ``every`` s, whatever lets time pass meanwhile.
+
+        >>> bench = Bench()
+        >>> with bench.recording(["rmd1.speed_dps"], every=0.01) as recording:
+        ...     for speed in (90, 180):
+        ...         status = bench.rmd.motor(1).speed(speed)
+        ...         bench.run(0.5)
+        >>> len(recording.data)
+        101
+        """
+        return Recording(self._core, signals, every)
+
+    @property
+    def state_hash(self) -> str:
+        """A fingerprint of the state of all drives: benches with the same did the same."""
+        return f"{self._core.state_hash:016x}"
+
+    # Ports
+
+    def serve(self, *, st: str | None = None, rmd: str | None = None) -> Serving:
+        """Serves the drives on ports of this machine, on real time: for programs that open ports.
+
+        ``st``: ``pty:PATH`` or ``tcp-listen:ADDRESS:PORT``; ``rmd``: ``slcan-pty:PATH``,
+        ``tcp-listen:ADDRESS:PORT`` or ``socketcan:INTERFACE``. Without either, both are ptys in a
+        temporary folder. A thread does it; the end of the ``with`` closes the ports, and time is
+        virtual again.
+
+        >>> import motorlink
+        >>> with Bench().serve() as ports, motorlink.st.open(ports.st) as bus:
+        ...     bus.motor(1).status()
+        State('IDLE')
+        """
+        return Serving(self._core, st, rmd)
+
+    def close(self) -> None:
+        """Closes :attr:`st` and :attr:`rmd`, which stops what they started."""
+        self._end(in_flight=False)
+
+    def _end(self, *, in_flight: bool) -> None:
+        try:
+            if self._st is not None:
+                self._st._end(in_flight=in_flight)
+        finally:
+            if self._rmd is not None:
+                self._rmd._end(in_flight=in_flight)
+
+    def __repr__(self) -> str:
+        return f"<motorlink.sim.Bench {', '.join(self.motors)} at {self.now:g} s>"
+
+
+class Port:
+    """A bench as a port, from :meth:`Bench.port`."""
+
+    def __init__(self, core: _core.SimPort):
+        self._port = core
