@@ -1,6 +1,7 @@
 //! ST's Motor Control Protocol.
 
 mod client;
+mod frame;
 mod options;
 mod profile;
 mod reply;

@@ -1,13 +1,13 @@
 //! One request to an ST drive: checked when it is made, and able to read its reply.
 
 use motorlink_proto::st::{
-    Command, CurrentReference, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse,
-    PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENTS, TorqueRamp,
+    Command, CurrentReference, ErrorCode, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, PositionMove,
+    REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENTS, TorqueRamp,
 };
-use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyString};
 
+use super::frame;
 use super::reply::{Answer, Reply};
 use super::scale::{Scale, register};
 use crate::error::{bad_value, refusal};
@@ -293,7 +293,7 @@ impl StRequest {
     #[pyo3(signature = (frame, *, profile = "spec"))]
     fn decode(py: Python<'_>, frame: &[u8], profile: &str) -> PyResult<(u8, Self)> {
         let scale = Scale::new(py, profile, None)?;
-        let parsed = parse(py, frame)?;
+        let parsed = frame::parse(py, frame)?;
         let request = Request::decode(scale.profile, &parsed).map_err(|code| {
             let header = parsed.header;
             bad_value(
@@ -311,7 +311,7 @@ impl StRequest {
         let mut out = [0; MAX_FRAME];
         match self.request().encode(motor, &mut out) {
             Some(frame) => Ok(PyBytes::new(py, frame)),
-            None => Err(too_long(py)),
+            None => Err(frame::too_long(py)),
         }
     }
 
@@ -319,7 +319,7 @@ impl StRequest {
     ///
     /// Raises `Refused` for a negative acknowledge, `BadValue` for what is no reply to it.
     fn decode_reply(&self, py: Python<'_>, frame: &[u8]) -> PyResult<Py<PyAny>> {
-        let parsed = parse(py, frame)?;
+        let parsed = frame::parse(py, frame)?;
         let answer = match (parsed.header, parsed.payload) {
             (HEADER_ACK, payload) => self.understand(payload),
             (HEADER_NACK, [code, ..]) => return Err(refusal(py, ErrorCode::from(*code))),
@@ -347,49 +347,7 @@ impl StRequest {
     /// The values of the request as they travel, by name.
     #[getter]
     fn fields<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let fields = PyDict::new(py);
-        let set = |name: &str, value: Py<PyAny>| fields.set_item(name, value);
-        match self.request() {
-            Request::SetRegister { register, value } => {
-                set("register", register.0.into_py_any(py)?)?;
-                set("value", PyBytes::new(py, value).into_py_any(py)?)?;
-            }
-            Request::GetRegister(register) => set("register", register.0.into_py_any(py)?)?,
-            Request::Execute(command) => set("command", command.number().into_py_any(py)?)?,
-            Request::BoardInfo | Request::FirmwareVersion => {}
-            Request::Ramp(ramp) => {
-                set("speed_rpm", ramp.speed_rpm.into_py_any(py)?)?;
-                set("duration_ms", ramp.duration_ms.into_py_any(py)?)?;
-            }
-            Request::RevupData(phase) => set("phase", phase.into_py_any(py)?)?,
-            Request::SetRevupData(phase, data) => {
-                set("phase", phase.into_py_any(py)?)?;
-                set("speed_rpm", data.speed_rpm.into_py_any(py)?)?;
-                set("torque_s16a", data.torque_s16a.into_py_any(py)?)?;
-                set("duration_ms", data.duration_ms.into_py_any(py)?)?;
-            }
-            Request::CurrentReference(reference) => {
-                set("iq_s16a", reference.iq_s16a.into_py_any(py)?)?;
-                set("id_s16a", reference.id_s16a.into_py_any(py)?)?;
-            }
-            Request::ProfilerInfo(steps) => {
-                set("steps", PyBytes::new(py, steps).into_py_any(py)?)?;
-            }
-            Request::DataElement(segment) => set("segment", segment.into_py_any(py)?)?,
-            Request::ConfigDynStruct { segment, registers } => {
-                set("segment", segment.into_py_any(py)?)?;
-                set("registers", PyBytes::new(py, registers).into_py_any(py)?)?;
-            }
-            Request::TorqueRamp(ramp) => {
-                set("torque_s16a", ramp.torque_s16a.into_py_any(py)?)?;
-                set("duration_ms", ramp.duration_ms.into_py_any(py)?)?;
-            }
-            Request::Position(target) => {
-                set("angle_rad", target.angle_rad.into_py_any(py)?)?;
-                set("duration_s", target.duration_s.into_py_any(py)?)?;
-            }
-        }
-        Ok(fields)
+        frame::fields(py, self.request())
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -400,41 +358,14 @@ impl StRequest {
 impl StRequest {
     /// What a decoded request is answered with; its numbers are digits.
     fn decoded(scale: Scale, request: Request<'_>) -> Self {
-        let (request, bytes): (Request<'static>, &[u8]) = match request {
-            Request::SetRegister { register, value } => {
-                (Request::SetRegister { register, value: &[] }, value)
-            }
-            Request::ProfilerInfo(steps) => (Request::ProfilerInfo(&[]), steps),
-            Request::ConfigDynStruct { segment, registers } => {
-                (Request::ConfigDynStruct { segment, registers: &[] }, registers)
-            }
-            Request::GetRegister(register) => (Request::GetRegister(register), &[]),
-            Request::Execute(command) => (Request::Execute(command), &[]),
-            Request::BoardInfo => (Request::BoardInfo, &[]),
-            Request::Ramp(ramp) => (Request::Ramp(ramp), &[]),
-            Request::RevupData(phase) => (Request::RevupData(phase), &[]),
-            Request::SetRevupData(phase, data) => (Request::SetRevupData(phase, data), &[]),
-            Request::CurrentReference(both) => (Request::CurrentReference(both), &[]),
-            Request::FirmwareVersion => (Request::FirmwareVersion, &[]),
-            Request::DataElement(segment) => (Request::DataElement(segment), &[]),
-            Request::TorqueRamp(ramp) => (Request::TorqueRamp(ramp), &[]),
-            Request::Position(target) => (Request::Position(target), &[]),
-        };
-        let reply = match request {
-            Request::GetRegister(register) => Reply::Number { register, raw: true },
-            Request::BoardInfo => Reply::Info,
-            Request::FirmwareVersion => Reply::FirmwareVersion,
-            Request::RevupData(_) => Reply::Revup,
-            Request::DataElement(_) | Request::ProfilerInfo(_) => Reply::Bytes,
-            _ => Reply::Nothing,
-        };
-        StRequest { bytes: bytes.to_vec(), ..Self::asked(scale, request, reply) }
+        let (request, bytes) = frame::owned(request);
+        StRequest { bytes, ..Self::asked(scale, request, frame::reply(request)) }
     }
 
     /// The request, if it fits a frame.
     fn fitting(self, py: Python<'_>) -> PyResult<Self> {
         let fits = self.request().encode(0, &mut [0; MAX_FRAME]).is_some();
-        if fits { Ok(self) } else { Err(too_long(py)) }
+        if fits { Ok(self) } else { Err(frame::too_long(py)) }
     }
 
     /// The register and the bits of a write, which alone can be verified.
@@ -488,20 +419,4 @@ fn segment_registers(py: Python<'_>, names: &[Bound<'_, PyAny>]) -> PyResult<Vec
         }
     };
     names.iter().map(known).collect()
-}
-
-fn parse<'a>(py: Python<'_>, frame: &'a [u8]) -> PyResult<Frame<'a>> {
-    match Frame::parse(frame) {
-        Parse::Frame(parsed, size) if size == frame.len() => Ok(parsed),
-        Parse::Frame(_, size) => {
-            let more = frame.len() - size;
-            Err(bad_value(py, format_args!("the frame ends {more} bytes before its bytes do")))
-        }
-        Parse::More => Err(bad_value(py, "the frame is not complete")),
-        Parse::Bad(why) => Err(bad_value(py, format_args!("this is no frame: {why:?}"))),
-    }
-}
-
-fn too_long(py: Python<'_>) -> PyErr {
-    bad_value(py, "the request does not fit a frame: a payload has at most 128 bytes")
 }
