@@ -10,7 +10,6 @@ use motorlink_link::serve::ServeName;
 
 use crate::connection::Port;
 use crate::output::parse_span;
-use crate::st::parse_profile;
 
 /// Behind `motorlink conformance host --help`.
 const CONTRACT: &str = "\
@@ -51,7 +50,7 @@ pub enum Command {
         #[arg(short, long, default_value = "1", value_parser = parse_motor)]
         motor: Motor,
         /// What the drive is held to: the document as written, or what MCSDK 5.4 firmware does
-        #[arg(long, default_value = "spec", value_parser = parse_profile)]
+        #[arg(long, default_value = "spec")]
         profile: Profile,
     },
     /// Check a motor that speaks the RMD protocol V1.62

@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, value_name = "PORT")]
     rmd: Vec<String>,
     /// What the ST drive speaks, instead of what the configuration says
-    #[arg(long, value_parser = crate::st::parse_profile)]
+    #[arg(long)]
     profile: Option<Profile>,
     /// Keep the ROM of RMD motors in this folder; without it their ROM ends with the process
     #[arg(long, value_name = "DIR")]

@@ -24,7 +24,7 @@ pub struct Drive {
           value_parser = clap::value_parser!(u8).range(1..=7))]
     pub motor: u8,
     /// What the drive speaks: the document as written, or what MCSDK 5.4 firmware does
-    #[arg(long, default_value = "spec", global = true, value_parser = parse_profile)]
+    #[arg(long, default_value = "spec", global = true)]
     pub profile: Profile,
     /// How long to wait for a reply, ms [default: 1000, in a scan 200]
     #[arg(long, global = true, value_name = "MS",
@@ -174,11 +174,4 @@ pub enum Pfc {
     Enable,
     Disable,
     FaultAck,
-}
-
-pub fn parse_profile(text: &str) -> Result<Profile, String> {
-    Profile::ALL
-        .into_iter()
-        .find(|profile| profile.name() == text)
-        .ok_or_else(|| "the profiles are spec and mcsdk-5.4".to_owned())
 }

@@ -8,7 +8,7 @@ mod session;
 
 use std::time::Duration;
 
-pub use args::{Args, parse_profile};
+pub use args::Args;
 use args::{Command, Read};
 use session::connect;
 

@@ -29,9 +29,9 @@ mod transcript;
 
 pub use motorlink_proto::st::{
     Command, Config, ControlMode, Counters, CurrentReference, ErrorCode, Failure, Feature,
-    Features, Flags, FrameCode, Line, Motor, PositionMove, Profile, REVUP_PHASES, Ramp, Recovery,
-    RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Slave, Status, TorqueRamp,
-    VERIFY_ATTEMPTS, register,
+    Features, Flags, FrameCode, Line, Motor, NoSuchProfile, PositionMove, Profile, REVUP_PHASES,
+    Ramp, Recovery, RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Slave, Status,
+    TorqueRamp, VERIFY_ATTEMPTS, register,
 };
 
 pub use client::{Client, FirmwareVersion, Info};

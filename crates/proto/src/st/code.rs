@@ -34,6 +34,36 @@ impl Profile {
     }
 }
 
+impl core::str::FromStr for Profile {
+    type Err = NoSuchProfile;
+
+    /// The profile of this [`name`](Profile::name).
+    fn from_str(name: &str) -> Result<Self, NoSuchProfile> {
+        Profile::ALL.into_iter().find(|profile| profile.name() == name).ok_or(NoSuchProfile)
+    }
+}
+
+/// A name that no [`Profile`] has.
+///
+/// ```
+/// use motorlink_proto::st::Profile;
+///
+/// assert_eq!("mcsdk-5.4".parse(), Ok(Profile::Mcsdk54));
+/// let unknown = "v9".parse::<Profile>().unwrap_err();
+/// assert_eq!(unknown.to_string(), "the profiles are spec and mcsdk-5.4");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NoSuchProfile;
+
+impl core::error::Error for NoSuchProfile {}
+
+impl core::fmt::Display for NoSuchProfile {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let [first, last] = Profile::ALL.map(Profile::name);
+        write!(f, "the profiles are {first} and {last}")
+    }
+}
+
 /// Header of a positive acknowledge: the whole byte (4.2, SPEC-NOTES S1).
 pub const HEADER_ACK: u8 = 0xF0;
 /// Header of a negative acknowledge: the whole byte (4.3, SPEC-NOTES S1).

@@ -72,7 +72,7 @@ mod verified;
 
 pub use code::{
     Command, ControlMode, ErrorCode, Flags, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
-    Profile, Status,
+    NoSuchProfile, Profile, Status,
 };
 pub use drive::{Drive, Motor};
 pub use failure::{Error, Failure};
