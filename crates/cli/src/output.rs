@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use motorlink::Hex;
 use serde_json::{Map, Value, json};
 
 use crate::failure::Failure;
@@ -114,7 +115,7 @@ pub fn progress(steps: usize) -> ProgressBar {
 
 /// Bytes as people write them: `02 01 1e 21`.
 pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+    Hex(bytes).to_string()
 }
 
 /// Reads bytes as people write them, with or without spaces, colons and `0x`.

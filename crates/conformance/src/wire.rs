@@ -7,6 +7,7 @@ use std::rc::Rc;
 use motorlink::Clock;
 use motorlink::port::{ByteLink, CanLink, PortError};
 use motorlink_link::serve::{ByteStation, CanStation};
+use motorlink_proto::Hex;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
@@ -32,7 +33,7 @@ pub trait Bus {
 
 /// Bytes as people write them: `02 01 1e 21`.
 pub(crate) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+    Hex(bytes).to_string()
 }
 
 /// A port of this machine, and the clock that it goes by.

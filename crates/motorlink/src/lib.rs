@@ -12,4 +12,5 @@ mod turn;
 
 pub use motorlink_link::reopening::{BackOff, LinkState, Opener};
 pub use motorlink_link::{Clock, can, list, port, slcan, time};
+pub use motorlink_proto::Hex;
 pub use turn::LOOK;

@@ -16,7 +16,10 @@ extern crate std;
 #[macro_use]
 mod table;
 pub mod can;
+mod hex;
 pub mod rmd;
 pub mod st;
 pub mod time;
 pub mod units;
+
+pub use hex::Hex;

@@ -261,7 +261,7 @@ impl Bench {
     fn transmit(&mut self, frame: CanFrame) {
         let mut sent = Sent::default();
         for id in MotorSet::TORQUE4.filter(|id| reaches(*id, frame.id())) {
-            let Asked { number, moved, .. } = self.ends.last[place(id)];
+            let Asked { number, moved, .. } = self.ends.last[id.index()];
             let code = match frame.id() == u32::from(TORQUE4_ID) {
                 true => Code::SetTorque,
                 false => Code::from(frame.data()[0]),
@@ -270,8 +270,8 @@ impl Bench {
             let moves = code.info().is_some_and(|row| row.moves);
             let number = number + 1;
             let moved = if moves { number } else { moved };
-            sent[place(id)] = Asked { number, at: self.now, halts, moved };
-            self.ends.last[place(id)] = sent[place(id)];
+            sent[id.index()] = Asked { number, at: self.now, halts, moved };
+            self.ends.last[id.index()] = sent[id.index()];
             self.tally.requests += 1;
         }
         self.note(|| format!("-> {:03x} {:02x?}", frame.id(), frame.data()));
@@ -280,7 +280,7 @@ impl Bench {
     }
 
     fn deliver(&mut self, id: MotorId, frame: Tagged<CanFrame>) {
-        let node = &mut self.ends.nodes[place(id)];
+        let node = &mut self.ends.nodes[id.index()];
         let acts = node.motor.acts;
         let reply = node.drive.receive(self.now, &frame.unit, &mut node.motor);
         let acted = node.motor.acts > acts;
@@ -299,7 +299,7 @@ impl Bench {
         }
         self.tally.repeated += u64::from(frame.copy && acted);
         self.tally.answers += 1;
-        let asked = self.ends.sent.get(source.message).expect("it is on its way")[place(id)];
+        let asked = self.ends.sent.get(source.message).expect("it is on its way")[id.index()];
         let message = self.ends.replies.push(Reply { asked, again: frame.copy });
         self.back.push(self.now + TURNAROUND, [Tagged::new(reply, message, 0)]);
     }
@@ -321,13 +321,13 @@ impl Bench {
         if frame.changed || frame.source.is_none() {
             self.tally.undetected += 1;
             // The reply is still to come, and nobody waits for it.
-            self.ends.behind[place(id)] |= frame.source.is_none();
+            self.ends.behind[id.index()] |= frame.source.is_none();
             return;
         }
         let reply = frame.source.and_then(|source| self.ends.replies.get(source.message));
         let Some(&Reply { asked, again }) = reply else { return };
-        let last = self.ends.last[place(id)];
-        let behind = &mut self.ends.behind[place(id)];
+        let last = self.ends.last[id.index()];
+        let behind = &mut self.ends.behind[id.index()];
         if asked.number == last.number {
             *behind = false;
             return;
@@ -350,10 +350,6 @@ impl Bench {
 
     fn over(&mut self, id: MotorId, answered: bool) {
         self.tally.detected += u64::from(!answered);
-        self.ends.trouble[place(id)].note(&mut self.tally, self.now, !answered);
+        self.ends.trouble[id.index()].note(&mut self.tally, self.now, !answered);
     }
-}
-
-fn place(id: MotorId) -> usize {
-    usize::from(id.number()) - 1
 }

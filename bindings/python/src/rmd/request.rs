@@ -1,6 +1,7 @@
 //! One request to an RMD motor: checked when it is made, and able to read its reply.
 
 use motorlink::rmd::FullTurn;
+use motorlink_proto::Hex;
 use motorlink_proto::rmd::{
     Acceleration, ClearErrors, Code, Command, Encoder, EncoderOffset, Errors, MotionStatus,
     MotorId, MultiTurnAngle, Off, Payload, PhaseCurrents, Pid, ReadAcceleration, ReadEncoder,
@@ -340,9 +341,7 @@ impl RmdRequest {
     }
 
     fn __repr__(&self) -> String {
-        let [code, rest @ ..] = self.data;
-        let rest: Vec<_> = rest.iter().map(|byte| format!("{byte:02x}")).collect();
-        format!("<Request {code:02x} {} ({})>", rest.join(" "), Code::from(code))
+        format!("<Request {} ({})>", Hex(&self.data), Code::from(self.data[0]))
     }
 }
 

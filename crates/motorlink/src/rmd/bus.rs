@@ -230,7 +230,7 @@ impl Bus {
         driven.session.set_torque4(now, torques, expect)?;
         let mut replies = [const { None }; 4];
         self.run(driven, |id, result| {
-            if let Some(slot) = replies.get_mut(usize::from(id.number()) - 1) {
+            if let Some(slot) = replies.get_mut(id.index()) {
                 *slot = Some(result.map(|data| MotionStatus::decode(&data)));
             }
         })?;

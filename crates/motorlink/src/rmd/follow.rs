@@ -108,7 +108,7 @@ impl Follower {
     }
 
     fn of(&mut self, id: MotorId) -> &mut VecDeque<SeenRequest> {
-        &mut self.asked[usize::from(id.number()) - 1]
+        &mut self.asked[id.index()]
     }
 }
 

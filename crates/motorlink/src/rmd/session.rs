@@ -132,7 +132,7 @@ impl Session {
 
     /// A question with another code than what a motor was asked last.
     pub(super) fn question(&self, id: MotorId) -> [u8; 8] {
-        question_behind(self.asked[place(id)].request[0])
+        question_behind(self.asked[id.index()].request[0])
     }
 
     /// Whether the motor's replies since the last confirmation went to their own requests.
@@ -163,7 +163,7 @@ impl Session {
         self.free(id, &request)?;
         let begun = self.host.request(now, id, request);
         begun.map_err(|refused| self.refused(refused))?;
-        self.asked[place(id)] = PendingRequest { request, until: now + self.patience };
+        self.asked[id.index()] = PendingRequest { request, until: now + self.patience };
         if self.host.is_unknown(id) {
             self.insisting.insert(id);
         }
@@ -183,7 +183,7 @@ impl Session {
             Err(refused) => return Err(self.refused(refused)),
         }
         self.insisting.insert(id);
-        self.asked[place(id)] = PendingRequest { request, until: now + self.patience };
+        self.asked[id.index()] = PendingRequest { request, until: now + self.patience };
         Ok(())
     }
 
@@ -206,7 +206,7 @@ impl Session {
         begun.map_err(|refused| self.refused(refused))?;
         let until = now + self.patience;
         for id in expect {
-            self.asked[place(id)] = PendingRequest { request: torque, until };
+            self.asked[id.index()] = PendingRequest { request: torque, until };
         }
         if expect.into_iter().any(|id| self.host.is_unknown(id)) {
             self.held = Some(Held { torques, expect, answered: MotorSet::EMPTY, until });
@@ -225,7 +225,7 @@ impl Session {
                 return Output::Done(id, Err(self.why_unsent(id)));
             }
             for id in self.waiting {
-                let PendingRequest { request, until } = self.asked[place(id)];
+                let PendingRequest { request, until } = self.asked[id.index()];
                 match self.host.request(now, id, request) {
                     Err(Refused::Quarantined { until: free, .. }) if now < until => {
                         again = again.into_iter().chain([free]).min();
@@ -249,7 +249,7 @@ impl Session {
                     return Output::Transmit(frame);
                 }
                 proto::Output::Done { id, result: Err(proto::Error::Quarantined) }
-                    if self.insisting.contains(id) && now < self.asked[place(id)].until =>
+                    if self.insisting.contains(id) && now < self.asked[id.index()].until =>
                 {
                     self.waiting.insert(id);
                 }
@@ -390,7 +390,7 @@ impl Session {
 
     fn failed(&self, id: MotorId, error: proto::Error) -> Error {
         let port = Arc::clone(&self.port);
-        let [code, ..] = self.asked[place(id)].request;
+        let [code, ..] = self.asked[id.index()].request;
         let code = Code::from(code);
         match error {
             proto::Error::Altered => Error::Altered { port, id, code },
@@ -405,9 +405,4 @@ impl Session {
 /// Whether a frame, or the reply to it, is Off or Stop.
 pub(super) fn ends_motion([code, ..]: &[u8; 8]) -> bool {
     Code::from(*code).ends_motion()
-}
-
-/// The place of a motor in a table of all.
-fn place(id: MotorId) -> usize {
-    usize::from(id.number()) - 1
 }

@@ -53,7 +53,7 @@ impl MotorId {
     }
 
     /// Place of this motor in a table of [`COUNT`](Self::COUNT), 0 to 31.
-    pub(super) const fn index(self) -> usize {
+    pub const fn index(self) -> usize {
         self.0.wrapping_sub(1) as usize & (Self::COUNT - 1)
     }
 }
