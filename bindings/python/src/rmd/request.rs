@@ -167,7 +167,9 @@ impl RmdRequest {
         tolerance: f64,
     ) -> PyResult<()> {
         let id = motor_id(py, motor)?;
-        let (at, tolerance) = (wanted(py, angle)?, wanted(py, tolerance)?);
+        let at = wanted(py, angle)?;
+        let tolerance = TurnCentiDegrees::wanted(tolerance)
+            .map_err(|error| bad_value(py, format_args!("tolerance: {error}; nothing was sent")))?;
         let SetSingleTurnPosition { direction, angle } = SetSingleTurnPosition::decode(&self.data);
         let checked = FullTurn::Refused { tolerance }.check(id, at, angle, direction);
         checked.map_err(|error| rmd_error(py, &error))
