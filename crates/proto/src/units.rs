@@ -251,3 +251,52 @@ unit!(
     Celsius(i8), celsius, from_celsius, 1.0, "°C",
     0, i8::MIN => i8::MAX, Nearest
 );
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn a_wanted_value_is_the_nearest_digit_and_never_cut() {
+        assert_eq!(IqCommand::wanted(-32.0), Ok(IqCommand(-2000)));
+        assert_eq!(IqCommand::wanted(32.007), Ok(IqCommand(2000)));
+        let beyond = IqCommand::wanted(32.01).unwrap_err().to_string();
+        assert_eq!(beyond, "32.01 A is beyond ±32 A");
+        assert_eq!(TurnCentiDegrees::wanted(359.99), Ok(TurnCentiDegrees(35_999)));
+        let full = TurnCentiDegrees::wanted(360.0).unwrap_err().to_string();
+        assert_eq!(full, "360 ° is outside 0 to 359.99 °");
+        for odd in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300] {
+            assert!(CentiDps::wanted(odd).is_err() && WideCentiDegrees::wanted(odd).is_err());
+            assert!(DpsPerSecond::wanted_digits(odd).is_err(), "{odd}");
+        }
+        assert_eq!(DpsPerSecond::wanted(-0.4), Ok(DpsPerSecond(0)));
+        assert!(DpsPerSecond::wanted(-0.6).is_err());
+    }
+
+    #[test]
+    fn a_greatest_speed_is_rounded_towards_0_and_1_at_least() {
+        assert_eq!(SpeedLimit::wanted(360.999), Ok(SpeedLimit(360)));
+        assert_eq!(SpeedLimit::wanted_digits(2.9), Ok(SpeedLimit(2)));
+        assert_eq!(SpeedLimit::wanted(65_535.5), Ok(SpeedLimit(65_535)));
+        for odd in [0.0, 0.999, -1.0, 65_536.0] {
+            assert!(SpeedLimit::wanted(odd).is_err(), "{odd}");
+        }
+        let digits = SpeedLimit::wanted_digits(0.9).unwrap_err().to_string();
+        assert_eq!(digits, "0.9 digits is outside 1 to 65535 digits");
+    }
+
+    #[test]
+    fn digits_are_shown_without_the_dust_of_binary_fractions() {
+        assert_eq!(DeciVolts::UNIT.value(239), 23.9);
+        assert_eq!(CentiDegrees::UNIT.value(-1), -0.01);
+        assert_eq!(PhaseCurrent::UNIT.value(64), 1.0);
+        for digits in -2000..=2000 {
+            assert_eq!(
+                IqCommand::wanted(IqCommand::UNIT.value(digits)),
+                Ok(IqCommand(digits as i16))
+            );
+        }
+    }
+}

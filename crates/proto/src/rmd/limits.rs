@@ -274,6 +274,16 @@ mod tests {
     }
 
     #[test]
+    fn every_command_that_moves_a_motor_is_held_to_the_limits() {
+        // 0x88 carries nothing: it resumes what was allowed before.
+        for row in COMMANDS.iter().filter(|row| row.moves && row.code != Code::Run) {
+            let mut data = [0x7F; 8];
+            data[0] = row.code.into();
+            assert!(LIMITS.check(&data).is_err(), "{}", row.code);
+        }
+    }
+
+    #[test]
     fn commands_that_do_not_move_the_motor_are_never_refused() {
         for row in COMMANDS.iter().filter(|row| !row.moves) {
             let mut data = [0xFF; 8];

@@ -10,7 +10,7 @@ use crate::drive::Behaviour;
 /// reply are 0; that those of the request do not matter.
 struct Row(u8, &'static str, &'static str, &'static str, &'static str);
 
-const ROWS: [Row; 23] = [
+const ROWS: [Row; Code::ALL.len()] = [
     Row(0x30, "RMD-2-01", "RMD-30-02", "RMD-30-03", "RMD-30-01"),
     Row(0x31, "RMD-2-02", "RMD-31-04", "", "RMD-31-01"),
     Row(0x32, "RMD-2-03", "RMD-32-03", "", "RMD-32-01"),
