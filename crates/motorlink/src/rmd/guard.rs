@@ -6,9 +6,10 @@ use super::{Bus, Error};
 use crate::stopping::{STOP_ATTEMPTS, await_retry};
 
 impl Bus {
-    /// Stops the motors that this bus was used to move; from now on every request but Off and
-    /// Stop is [`PortError::Retired`]. For a signal's handler with a thread of its own, beside a program
-    /// that would go on until the handler ends it. Waits for exchanges that are under way.
+    /// Stops the motors that this bus was used to move. From now on every request but Off and Stop is
+    /// [`PortError::Retired`](motorlink_link::port::PortError::Retired). For a signal's handler with a
+    /// thread of its own, beside a program that would go on until the handler ends it. Waits for
+    /// exchanges that are under way.
     pub fn retire(&self) -> Vec<Stopped> {
         self.refuse_motion();
         self.guard().stop_now()

@@ -43,7 +43,7 @@ pub struct FirmwareVersion {
 ///
 /// A port that went away is opened again by the next call, behind a back-off; see
 /// [`link_state`](Self::link_state). A failed exchange loses the line, which the next call recovers
-/// as [`Config::recovery`] says. What stops a motor does not wait for that: it is sent at once and
+/// as [`Config::recovery`](proto::Config::recovery) says. What stops a motor does not wait for that: it is sent at once and
 /// again on the recovered line, and only the second reply counts.
 pub struct Client {
     line: Turns<Driven<Box<dyn ByteLink>>>,

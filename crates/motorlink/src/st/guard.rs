@@ -6,9 +6,10 @@ use super::{Client, Error};
 use crate::stopping::{STOP_ATTEMPTS, await_retry};
 
 impl Client {
-    /// Stops the motors that this client started; from now on every other request is
-    /// [`PortError::Retired`]. For a signal's handler with a thread of its own, beside a program that
-    /// would go on until the handler ends it. Waits for an exchange that is under way.
+    /// Stops the motors that this client started. From now on every other request is
+    /// [`PortError::Retired`](motorlink_link::port::PortError::Retired). For a signal's handler with a
+    /// thread of its own, beside a program that would go on until the handler ends it. Waits for an
+    /// exchange that is under way.
     pub fn retire(&self) -> Vec<Stopped> {
         self.refuse_motion();
         self.guard().stop_now()

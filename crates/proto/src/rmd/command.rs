@@ -190,7 +190,7 @@ macro_rules! commands {
             $( $name::ROW, )+
         ];
 
-        /// Calls a macro with the types of all commands, in the order of [`COMMANDS`](rmd::COMMANDS):
+        /// Calls a macro with the types of all commands, in the order of `rmd::COMMANDS`:
         /// `for_each_rmd_command!(with)` is `with! { ReadPid WritePidRam .. }`.
         #[macro_export]
         macro_rules! for_each_rmd_command {
