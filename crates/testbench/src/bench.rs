@@ -8,15 +8,15 @@ use std::time::Duration;
 
 use motorlink_link::port::PortError;
 use motorlink_link::serve::ServeName;
-use motorlink_link::serve::{ByteStation, CanStation, Server, Turn};
+use motorlink_link::serve::{CanStation, Server, Turn};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::RmdNode;
 use serde_json::{Value, json};
 
-use super::config::Station;
 use super::drives::{Drives, Stage};
+use super::line::{RmdLine, StLine};
 use super::places::{Kind, Places};
 use super::{BenchConfig, Command, ConfigError, RomError, RomFolder};
 
@@ -90,14 +90,16 @@ impl Bench {
         let bus = config.bus(self.server.now(), |motor| roms[&motor.id])?;
         let ids: Vec<u8> = bus.nodes().iter().map(|node| node.id().number()).collect();
         let stage = Stage::new(Drives { st: None, rmd: Some(bus) });
-        let rom = self.rom.as_ref().map(|folder| BusRom {
-            folder: Rc::clone(folder),
-            number,
-            seen: HashMap::new(),
-            failure: Rc::clone(&self.failure),
-        });
-        let served =
-            self.server.serve_can(port, Box::new(RmdLine { stage: stage.clone(), rom }))?;
+        let line = RmdLine(stage.clone());
+        let station: Box<dyn CanStation> = match &self.rom {
+            None => Box::new(line),
+            Some(folder) => {
+                let (folder, failure) = (Rc::clone(folder), Rc::clone(&self.failure));
+                let rom = BusRom { folder, number, seen: HashMap::new(), failure };
+                Box::new(StoredLine { line, rom })
+            }
+        };
+        let served = self.server.serve_can(port, station)?;
         let announcement = json!({
             "port": served.port, "protocol": "rmd", "path": served.path, "motors": ids.len(),
             "ids": ids,
@@ -144,35 +146,14 @@ impl Bench {
     }
 }
 
-/// An ST drive at the far end of a served line.
-pub(super) struct StLine(pub(super) Stage);
-
-impl ByteStation for StLine {
-    fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
-        if let Some(station) = &mut self.0.at(now).drives.st {
-            station.receive(now, bytes, |bytes| reply.extend_from_slice(bytes));
-        }
-    }
-
-    fn poll(&mut self, now: Instant, reply: &mut Vec<u8>) {
-        if let Some(station) = &mut self.0.at(now).drives.st {
-            station.poll(now, |bytes| reply.extend_from_slice(bytes));
-        }
-    }
-
-    fn deadline(&self) -> Option<Instant> {
-        self.0.last().drives.st.as_ref().and_then(Station::deadline)
-    }
-}
-
-/// RMD motors on a served bus.
-pub(super) struct RmdLine {
-    pub(super) stage: Stage,
-    pub(super) rom: Option<BusRom>,
+/// RMD motors whose ROM is on disk.
+struct StoredLine {
+    line: RmdLine,
+    rom: BusRom,
 }
 
 /// The ROM of a bus on disk.
-pub(super) struct BusRom {
+struct BusRom {
     folder: Rc<RomFolder>,
     /// Which bus of the bench, from 1.
     number: usize,
@@ -202,21 +183,23 @@ impl BusRom {
     }
 }
 
-impl CanStation for RmdLine {
+impl CanStation for StoredLine {
     /// A write to ROM is answered when it is on the disk.
     fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
         let before = replies.len();
-        let mut observed = self.stage.at(now);
-        let Some(bus) = &mut observed.drives.rmd else { return };
-        bus.receive(now, frame, |reply| replies.push(reply));
-        if self.rom.as_mut().is_some_and(|rom| !rom.keep(bus.nodes())) {
+        self.line.receive(now, frame, replies);
+        let stage = self.line.0.last();
+        let kept = stage.drives.rmd.as_ref().is_none_or(|bus| self.rom.keep(bus.nodes()));
+        if !kept {
             replies.truncate(before);
         }
     }
 
-    fn poll(&mut self, _now: Instant, _replies: &mut Vec<CanFrame>) {}
+    fn poll(&mut self, now: Instant, replies: &mut Vec<CanFrame>) {
+        self.line.poll(now, replies);
+    }
 
     fn deadline(&self) -> Option<Instant> {
-        None
+        self.line.deadline()
     }
 }

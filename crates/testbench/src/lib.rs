@@ -11,7 +11,7 @@ mod cast;
 mod command;
 mod config;
 mod drives;
-mod link;
+mod line;
 mod places;
 mod rom;
 pub mod scenario;

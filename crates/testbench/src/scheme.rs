@@ -12,7 +12,7 @@ use motorlink_sim::rmd::RmdConfig;
 
 use super::config::{BenchConfig, ConfigError};
 use super::drives::{Drives, Stage};
-use super::link::{SimCan, SimLine};
+use super::line::{RmdLine, SimCan, SimLine, StLine};
 
 /// Makes `sim:` a port that every client of this process can open.
 pub fn register() {
@@ -63,7 +63,7 @@ impl SimPort {
         let station = self.config().and_then(|config| config.station(Instant(0)));
         let station = station.map_err(|error| self.refused(&error))?;
         let stage = Stage::new(Drives { st: Some(station), rmd: None });
-        Ok(SimLine::new(stage, Clock::running()))
+        Ok(SimLine::new(StLine(stage), Clock::running()))
     }
 
     fn open_rmd(&self) -> Result<SimCan, PortError> {
@@ -71,7 +71,7 @@ impl SimPort {
         let bus = bus.and_then(|config| config.bus(Instant(0), RmdConfig::factory_rom));
         let bus = bus.map_err(|error| self.refused(&error))?;
         let stage = Stage::new(Drives { st: None, rmd: Some(bus) });
-        Ok(SimCan::new(stage, Clock::running()))
+        Ok(SimCan::new(RmdLine(stage), Clock::running()))
     }
 }
 

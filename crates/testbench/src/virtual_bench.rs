@@ -18,10 +18,9 @@ use motorlink_proto::time::{self, Instant};
 use motorlink_sim::hash;
 use serde_json::Value;
 
-use super::bench::{RmdLine, StLine};
 use super::cast::Cast;
 use super::drives::{Drives, Recording, Stage};
-use super::link::{SimCan, SimLine};
+use super::line::{RmdLine, SimCan, SimLine, StLine};
 use super::places::{Kind, Places};
 use super::signals::{Signal, find_signal};
 use super::{BenchConfig, Command, ConfigError};
@@ -80,13 +79,13 @@ impl VirtualBench {
 
     /// A serial line to the ST drive, with faults; a byte takes as long as at 115200 baud.
     pub fn line(&self, faults: &Faults) -> Box<dyn ByteLink> {
-        let link = SimLine::new(self.stage.clone(), self.clock.clone());
+        let link = SimLine::new(StLine(self.stage.clone()), self.clock.clone());
         Box::new(FaultBytes::paced(link, faults, BYTE))
     }
 
     /// A CAN bus to the RMD motors, with faults; a frame takes as long as at 1 Mbit/s.
     pub fn can(&self, faults: &Faults) -> Box<dyn CanLink> {
-        let link = SimCan::new(self.stage.clone(), self.clock.clone());
+        let link = SimCan::new(RmdLine(self.stage.clone()), self.clock.clone());
         Box::new(FaultCan::paced(link, faults, IDENTIFIERS, FRAME))
     }
 
@@ -155,7 +154,7 @@ impl VirtualBench {
             let mut server = Server::by(clock);
             let open = || {
                 let line = || Box::new(StLine(stage.clone()));
-                let bus = || Box::new(RmdLine { stage: stage.clone(), rom: None });
+                let bus = || Box::new(RmdLine(stage.clone()));
                 let st = st.map(|port| server.serve_bytes(&port, line())).transpose()?;
                 let rmd = rmd.map(|port| server.serve_can(&port, bus())).transpose()?;
                 Ok((st, rmd))

@@ -14,8 +14,11 @@
 //!
 //! Web pages can make a browser connect to TCP ports of this machine. A client that begins with an
 //! HTTP request, a TLS handshake or a STUN message is closed; a station gets none of its bytes.
+//!
+//! Without a port, a [`StationLink`] reaches a station in the process, on virtual time if its clock stands.
 
 mod endpoint;
+mod link;
 mod name;
 mod node;
 mod pty;
@@ -24,6 +27,7 @@ mod station;
 mod stranger;
 mod unix;
 
+pub use link::StationLink;
 pub use name::ServeName;
 pub use server::{Served, Server, Turn};
 pub use station::{ByteStation, CanStation, MOST_CLIENTS};

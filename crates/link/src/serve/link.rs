@@ -1,0 +1,105 @@
+//! Links to stations in the process.
+
+use std::os::fd::BorrowedFd;
+use std::time::Duration;
+
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::time::Instant;
+
+use super::station::{ByteStation, CanStation};
+use crate::Clock;
+use crate::port::{ByteLink, CanLink, Evented, PortError};
+
+/// The link to a station in the process, without a port. Bytes (`T` is `u8`) and frames (`T` is
+/// [`CanFrame`]) take no time on it. The station is polled while something is waited for.
+#[derive(Debug)]
+pub struct StationLink<S, T> {
+    station: S,
+    clock: Clock,
+    /// What was not read yet.
+    received: Vec<T>,
+}
+
+impl<S, T> StationLink<S, T> {
+    /// A link to `station` that goes by `clock`.
+    pub fn new(station: S, clock: Clock) -> Self {
+        StationLink { station, clock, received: Vec::with_capacity(256) }
+    }
+
+    /// Waits until the station has said something.
+    fn wait(
+        &mut self,
+        timeout: Option<Duration>,
+        deadline: fn(&S) -> Option<Instant>,
+        poll: fn(&mut S, Instant, &mut Vec<T>),
+    ) {
+        let end = self.clock.end_of(timeout);
+        loop {
+            let (now, due) = (self.clock.now(), deadline(&self.station));
+            if due.is_some_and(|due| due <= now) {
+                poll(&mut self.station, now, &mut self.received);
+            }
+            if !self.received.is_empty() || end.is_some_and(|end| end <= now) {
+                return;
+            }
+            match deadline(&self.station).into_iter().chain(end).min() {
+                Some(next) => self.clock.wait(next),
+                None => std::thread::park(),
+            }
+        }
+    }
+}
+
+impl<S: ByteStation + Send> ByteLink for StationLink<S, u8> {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.station.receive(self.clock.now(), bytes, &mut self.received);
+        Ok(())
+    }
+
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
+        self.wait(timeout, S::deadline, S::poll);
+        let size = buffer.len().min(self.received.len());
+        buffer[..size].copy_from_slice(&self.received[..size]);
+        self.received.drain(..size);
+        Ok(size)
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
+    }
+
+    fn is_fresh(&self) -> bool {
+        true
+    }
+}
+
+impl<S: CanStation + Send> CanLink for StationLink<S, CanFrame> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.station.receive(self.clock.now(), frame, &mut self.received);
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
+        self.wait(timeout, S::deadline, S::poll);
+        Ok((!self.received.is_empty()).then(|| self.received.remove(0)))
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
+    }
+
+    fn is_fresh(&self) -> bool {
+        true
+    }
+}
+
+/// An event loop has nothing to wait for.
+impl<S: Send, T: Send> Evented for StationLink<S, T> {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
+
+    fn flush(&mut self) -> Result<bool, PortError> {
+        Ok(false)
+    }
+}

@@ -1,0 +1,51 @@
+//! Drives at the far end of a line.
+
+use motorlink_link::serve::{ByteStation, CanStation, StationLink};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::time::Instant;
+
+use super::config::Station;
+use super::drives::Stage;
+
+/// A link to the ST drive of a stage.
+pub(super) type SimLine = StationLink<StLine, u8>;
+/// A link to the RMD motors of a stage.
+pub(super) type SimCan = StationLink<RmdLine, CanFrame>;
+
+/// An ST drive at the far end of a line.
+pub(super) struct StLine(pub(super) Stage);
+
+impl ByteStation for StLine {
+    fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
+        if let Some(station) = &mut self.0.at(now).drives.st {
+            station.receive(now, bytes, |bytes| reply.extend_from_slice(bytes));
+        }
+    }
+
+    fn poll(&mut self, now: Instant, reply: &mut Vec<u8>) {
+        if let Some(station) = &mut self.0.at(now).drives.st {
+            station.poll(now, |bytes| reply.extend_from_slice(bytes));
+        }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.0.last().drives.st.as_ref().and_then(Station::deadline)
+    }
+}
+
+/// RMD motors on a bus.
+pub(super) struct RmdLine(pub(super) Stage);
+
+impl CanStation for RmdLine {
+    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+        if let Some(bus) = &mut self.0.at(now).drives.rmd {
+            bus.receive(now, frame, |reply| replies.push(reply));
+        }
+    }
+
+    fn poll(&mut self, _now: Instant, _replies: &mut Vec<CanFrame>) {}
+
+    fn deadline(&self) -> Option<Instant> {
+        None
+    }
+}
