@@ -3,7 +3,7 @@
 //!
 //! [`st::CLAUSES`] and [`rmd::CLAUSES`] are the sentences, each with an id. [`st::suite`] and
 //! [`rmd::suite`] are the cases that a drive is put through; each names the clauses it tests. A case
-//! speaks through a [`wire`], which is a real port or a simulated drive on virtual time, so the same
+//! speaks through a link, which is a real port or a simulated drive on virtual time, so the same
 //! cases test a drive on the bench and, in milliseconds, this kit itself. [`run`] runs them and gives
 //! a [`Report`].
 //!
@@ -25,7 +25,6 @@ mod reading;
 mod report;
 pub mod rmd;
 pub mod st;
-pub mod wire;
 mod world;
 
 pub use case::{Case, Need, Run, Stop, Subject, run};

@@ -5,9 +5,8 @@ mod finite;
 
 use finite::Finite;
 use motorlink::port::PortError;
-use motorlink_conformance::host::rmd::{Scenario, scenarios};
+use motorlink_conformance::host::rmd::{Motors, Scenario, scenarios};
 use motorlink_conformance::host::{READINGS, Reading, Said, Task};
-use motorlink_conformance::wire::{Bus, Virtual};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
@@ -17,15 +16,14 @@ use motorlink_proto::rmd::{
 };
 use motorlink_proto::time::{Duration, Instant};
 
+type Bus = Finite<Motors, CanFrame>;
+
 /// Values are compared as digits.
 const DIGIT: f64 = 1.0;
 
-fn play(
-    scenario: &Scenario,
-    host: impl Fn(&mut dyn Bus, Task) -> Result<Said, PortError>,
-) -> Outcome {
+fn play(scenario: &Scenario, host: impl Fn(&mut Bus, Task) -> Result<Said, PortError>) -> Outcome {
     let motors = scenario.motors(DEFAULT_TIMEOUT);
-    let mut bus = Finite::new(Virtual::new(motors.clone()));
+    let mut bus = Bus::new(motors.clone());
     let said = host(&mut bus, scenario.task).unwrap_or_else(|error| Said {
         ended_badly: Some(format!("the host does not end: {error}")),
         ..Said::default()
@@ -71,7 +69,7 @@ fn turns(task: Task) -> usize {
 type Ended = (MotorId, usize, Result<f64, Error>);
 
 /// Our host: what each request ended in, in the order in which it did.
-fn results(bus: &mut dyn Bus, task: Task) -> Result<Vec<Ended>, PortError> {
+fn results(bus: &mut Bus, task: Task) -> Result<Vec<Ended>, PortError> {
     let mut host = Host::new();
     let mut results = Vec::new();
     for turn in 0..turns(task) {
@@ -125,7 +123,7 @@ fn results(bus: &mut dyn Bus, task: Task) -> Result<Vec<Ended>, PortError> {
 
 /// Hands the host the next frame until then that it did not send itself.
 fn hear(
-    bus: &mut dyn Bus,
+    bus: &mut Bus,
     host: &mut Host,
     until: Instant,
     echoes: &mut Vec<CanFrame>,
@@ -143,7 +141,7 @@ fn reading(id: MotorId, digits: f64) -> Reading {
     Reading { motor: id.number(), value: digits }
 }
 
-fn ours(bus: &mut dyn Bus, task: Task) -> Result<Said, PortError> {
+fn ours(bus: &mut Bus, task: Task) -> Result<Said, PortError> {
     let results = results(bus, task)?;
     Ok(Said {
         values: results
@@ -192,7 +190,7 @@ const SECOND: &[Failed] = &[(2, 1, Error::Timeout)];
 #[test]
 fn our_host_loses_the_disturbed_reading_only_and_says_how() {
     for scenario in scenarios() {
-        let mut bus = Finite::new(Virtual::new(scenario.motors(DEFAULT_TIMEOUT)));
+        let mut bus = Bus::new(scenario.motors(DEFAULT_TIMEOUT));
         let results = results(&mut bus, scenario.task).unwrap();
         assert_eq!(results.len(), scenario.task.values().max(1), "{}", scenario.name);
         let failed = results
@@ -234,7 +232,7 @@ enum Fault {
 
 /// A host as people write it: requests out, replies in. Without a fault it ends at the first error.
 struct Simple<'a> {
-    bus: &'a mut dyn Bus,
+    bus: &'a mut Bus,
     task: Task,
     fault: Fault,
     said: Said,
@@ -357,7 +355,7 @@ impl Simple<'_> {
 }
 
 fn failing(fault: Fault) -> Vec<String> {
-    let simple = |bus: &mut dyn Bus, task| Simple { bus, task, fault, said: Said::default() }.run();
+    let simple = |bus: &mut Bus, task| Simple { bus, task, fault, said: Said::default() }.run();
     let outcomes = scenarios().into_iter().map(|scenario| play(&scenario, simple));
     let failed = outcomes.filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)));
     failed.map(|outcome| outcome.name).collect()

@@ -5,9 +5,8 @@ mod finite;
 
 use finite::Finite;
 use motorlink::port::PortError;
-use motorlink_conformance::host::st::{DIGIT, Scenario, scenarios};
+use motorlink_conformance::host::st::{DIGIT, Drive, Scenario, scenarios};
 use motorlink_conformance::host::{READINGS, Reading, Said, Task};
-use motorlink_conformance::wire::{Line, Virtual};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::st::{
     Command, Config, Error, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Master,
@@ -15,15 +14,14 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::time::Duration;
 
+type Line = Finite<Drive, u8>;
+
 const ASK: Request<'_> = Request::GetRegister(RegisterId::SPEED_MEAS);
 const START: Request<'_> = Request::Execute(Command::StartMotor);
 
-fn play(
-    scenario: &Scenario,
-    host: impl Fn(&mut dyn Line, Task) -> Result<Said, PortError>,
-) -> Outcome {
+fn play(scenario: &Scenario, host: impl Fn(&mut Line, Task) -> Result<Said, PortError>) -> Outcome {
     let drive = scenario.drive(TIMEOUT);
-    let mut line = Finite::new(Virtual::new(drive.clone()));
+    let mut line = Line::new(drive.clone());
     let said = host(&mut line, scenario.task).unwrap_or_else(|error| Said {
         ended_badly: Some(format!("the host does not end: {error}")),
         ..Said::default()
@@ -34,7 +32,7 @@ fn play(
 /// What an exchange of our master ends in.
 fn exchange(
     master: &mut Master,
-    line: &mut dyn Line,
+    line: &mut Line,
     request: &Request<'_>,
 ) -> Result<Result<Vec<u8>, Error>, PortError> {
     master.request(1, request).unwrap();
@@ -51,7 +49,7 @@ fn exchange(
 }
 
 /// Every result of our master.
-fn results(line: &mut dyn Line, task: Task) -> Result<Vec<Result<i32, String>>, PortError> {
+fn results(line: &mut Line, task: Task) -> Result<Vec<Result<i32, String>>, PortError> {
     let mut master = Master::new(Config::default());
     let (request, count) = if task == Task::Start { (START, 1) } else { (ASK, READINGS) };
     let mut results = Vec::new();
@@ -84,7 +82,7 @@ fn reading(rpm: i32) -> Reading {
     Reading { motor: 1, value: rpm.into() }
 }
 
-fn ours(line: &mut dyn Line, task: Task) -> Result<Said, PortError> {
+fn ours(line: &mut Line, task: Task) -> Result<Said, PortError> {
     let results = results(line, task)?;
     Ok(Said {
         values: match task {
@@ -157,7 +155,7 @@ fn our_master_says_what_is_wrong_and_reads_on_as_soon_as_the_line_allows() {
     let readings = scenarios().into_iter().filter(|scenario| scenario.task == Task::Read);
     for scenario in readings {
         let name: &str = &scenario.name;
-        let mut line = Finite::new(Virtual::new(scenario.drive(TIMEOUT)));
+        let mut line = Line::new(scenario.drive(TIMEOUT));
         let results = results(&mut line, Task::Read).unwrap();
         let disturbed = results[1].as_ref().map_or_else(String::as_str, |_| "ok");
         let expected = ENDS.iter().find(|(known, _)| *known == name);
@@ -195,7 +193,7 @@ enum Fault {
 /// A host as people write it: one frame in, one frame out. Without a fault it ends at the first
 /// error, which is what the document asks for (4.1).
 struct Simple<'a> {
-    line: &'a mut dyn Line,
+    line: &'a mut Line,
     task: Task,
     fault: Fault,
     received: Vec<u8>,
@@ -332,7 +330,7 @@ impl Simple<'_> {
     }
 }
 
-fn simple(fault: Fault) -> impl Fn(&mut dyn Line, Task) -> Result<Said, PortError> {
+fn simple(fault: Fault) -> impl Fn(&mut Line, Task) -> Result<Said, PortError> {
     move |line, task| Simple { line, task, fault, received: Vec::new() }.run()
 }
 

@@ -8,7 +8,6 @@ mod world;
 
 use motorlink::port::PortName;
 use motorlink::time::Duration;
-use motorlink_conformance::wire::Real;
 use motorlink_conformance::{
     Case, Need, Subject, host as hosts, rmd, run as run_cases, scenario_table, st,
 };
@@ -30,7 +29,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             let byte_time = byte_time(&name);
             let options = st::Options { profile, motor, allowed: run.allowed(), byte_time };
             let world = Box::new(Commands::new(&run));
-            let bench = st::Bench::new(Box::new(Real::on_line(link)), world, options);
+            let bench = st::Bench::new(link, world, options);
             interrupt::hold();
             conduct("st", &run, st::suite(profile), bench)
         }
@@ -40,7 +39,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             allowed.extend(write_rom.then_some(Need::Rom));
             let options = rmd::Options { id, encoder, allowed };
             let world = Box::new(Commands::new(&run));
-            let bench = rmd::Bench::new(Box::new(Real::on_bus(link)), world, options);
+            let bench = rmd::Bench::new(link, world, options);
             interrupt::hold();
             conduct("rmd", &run, rmd::suite(), bench)
         }

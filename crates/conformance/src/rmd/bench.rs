@@ -1,5 +1,7 @@
 //! A motor on a CAN bus: what is said to it and what it says.
 
+use motorlink::Clock;
+use motorlink::port::CanLink;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Code, Command, Dialect, Direction, EncoderBits, MotorId, Off, Payload};
 use motorlink_proto::time::{Duration, Instant};
@@ -9,7 +11,6 @@ use super::words::{lines, words};
 use crate::case::{Beside, Need, Stop};
 use crate::finding::Finding;
 use crate::reading::Reading;
-use crate::wire::Bus;
 use crate::world::World;
 
 /// How a motor is tested.
@@ -27,7 +28,9 @@ pub struct Options {
 ///
 /// A motor that answers on the identifiers of another protocol is not spoken to any further.
 pub struct Bench {
-    bus: Box<dyn Bus>,
+    bus: Box<dyn CanLink>,
+    /// That of the bus.
+    clock: Clock,
     pub(super) world: Box<dyn World>,
     pub(super) options: Options,
     pub(super) kept: Kept,
@@ -55,8 +58,9 @@ const CROWD: usize = 1000;
 
 impl Bench {
     /// A bench for a motor on `bus`.
-    pub fn new(bus: Box<dyn Bus>, world: Box<dyn World>, options: Options) -> Self {
+    pub fn new(bus: Box<dyn CanLink>, world: Box<dyn World>, options: Options) -> Self {
         Bench {
+            clock: bus.clock().unwrap_or_default(),
             bus,
             world,
             options,
@@ -118,11 +122,11 @@ impl Bench {
     /// The reply to a frame, whatever its code.
     pub(super) fn ask_frame(&mut self, frame: &CanFrame) -> Result<[u8; 8], Stop> {
         self.say(&[*frame])?;
-        let until = self.bus.now() + PATIENCE;
+        let until = self.clock.now() + PATIENCE;
         let reply = loop {
             match self.hear(until)? {
                 Some(frame) if self.is_own(&frame) => break frame,
-                Some(_) if self.bus.now() < until => {}
+                Some(_) if self.clock.now() < until => {}
                 _ => return Err(self.failed("a reply within 1 s")),
             }
         };
@@ -150,12 +154,12 @@ impl Bench {
         frames: &[CanFrame],
     ) -> Result<Vec<CanFrame>, Stop> {
         self.say(frames)?;
-        let mut until = self.bus.now() + first;
+        let mut until = self.clock.now() + first;
         while self.received.len() < CROWD
             && let Some(frame) = self.hear(until)?
         {
             if self.is_own(&frame) {
-                until = self.bus.now() + SILENCE;
+                until = self.clock.now() + SILENCE;
             }
         }
         Ok(self.received.clone())
@@ -170,8 +174,8 @@ impl Bench {
 
     /// Lets time pass.
     pub(super) fn pause(&mut self, span: Duration) -> Result<(), Stop> {
-        let until = self.bus.now() + span;
-        while self.bus.now() < until {
+        let until = self.clock.now() + span;
+        while self.clock.now() < until {
             self.hear(until)?;
         }
         Ok(())
@@ -187,7 +191,7 @@ impl Bench {
 
     /// The time on the bus, ms.
     pub(super) fn millis(&self) -> u64 {
-        self.bus.now().0 / 1000
+        self.clock.now().0 / 1000
     }
 
     /// Fails the case unless `held`.
@@ -229,7 +233,7 @@ impl Bench {
     /// Waits until the bus is silent; what came was not asked for.
     pub(super) fn settle(&mut self, span: Duration) -> Result<(), Stop> {
         for _ in 0..CROWD {
-            if self.hear(self.bus.now() + span)?.is_none() {
+            if self.hear(self.clock.now() + span)?.is_none() {
                 return Ok(());
             }
         }
@@ -267,7 +271,8 @@ impl Bench {
 
     /// The next frame.
     fn hear(&mut self, until: Instant) -> Result<Option<CanFrame>, Stop> {
-        let Some(frame) = self.bus.receive(until)? else { return Ok(None) };
+        let wait = until.since(self.clock.now()).into();
+        let Some(frame) = self.bus.receive(Some(wait))? else { return Ok(None) };
         self.transcript.push((Direction::DriveToHost, frame));
         self.received.push(frame);
         self.heard |= self.is_own(&frame);

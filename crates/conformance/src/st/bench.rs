@@ -1,6 +1,9 @@
 //! A drive on a serial line: exchanges, and what is wrong with them.
 
+use motorlink::Clock;
+use motorlink::port::ByteLink;
 use motorlink::st::Transcript;
+use motorlink_proto::Hex;
 use motorlink_proto::st::{
     Bad, Command, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile,
     RegisterId, Request, Status,
@@ -13,7 +16,6 @@ use super::undo::Undo;
 use crate::case::{Beside, Need, ReadAs, Stop};
 use crate::finding::Finding;
 use crate::reading::{Reading, S1, S49, S54};
-use crate::wire::{Line, hex};
 use crate::world::World;
 
 /// How a drive is tested.
@@ -31,7 +33,9 @@ pub struct Options {
 
 /// A drive behind a line.
 pub struct Bench {
-    pub(super) line: Box<dyn Line>,
+    line: Box<dyn ByteLink>,
+    /// That of the line.
+    pub(super) clock: Clock,
     pub(super) world: Box<dyn World>,
     pub(super) options: Options,
     /// What was found out about the drive.
@@ -86,12 +90,14 @@ const TRANSCRIPT: usize = 60;
 
 impl Bench {
     /// A bench for the drive behind `line`.
-    pub fn new(line: Box<dyn Line>, world: Box<dyn World>, options: Options) -> Self {
+    pub fn new(line: Box<dyn ByteLink>, world: Box<dyn World>, options: Options) -> Self {
         let words = Transcript::new(options.profile);
-        let sent_at = line.now();
+        let clock = line.clock().unwrap_or_default();
+        let sent_at = clock.now();
         let (found, beside, undo, transcript, sent, received, pending) = Default::default();
         Bench {
             line,
+            clock,
             world,
             options,
             found,
@@ -151,8 +157,8 @@ impl Bench {
         }
         self.transcribe(true, bytes);
         self.sent.extend(bytes);
-        self.line.send(bytes)?;
-        self.sent_at = self.line.now();
+        self.line.write(bytes)?;
+        self.sent_at = self.clock.now();
         Ok(())
     }
 
@@ -162,7 +168,7 @@ impl Bench {
         loop {
             match Frame::parse(&self.pending) {
                 Parse::Frame(Frame { header, payload }, size) => {
-                    let delay = self.line.now().since(self.sent_at);
+                    let delay = self.clock.now().since(self.sent_at);
                     let reply = Reply { header, payload: payload.to_vec(), delay };
                     let bytes: Vec<u8> = self.pending.drain(..size).collect();
                     self.transcribe(false, &bytes);
@@ -181,10 +187,10 @@ impl Bench {
                 Parse::More => {}
             }
             // The clock is looked at first, so that a busy host does not pass for a late drive.
-            let last = self.line.now() >= until;
+            let last = self.clock.now() >= until;
             let came = self.take(until)?;
             if came {
-                until = until.max(self.line.now() + GRACE);
+                until = until.max(self.clock.now() + GRACE);
             } else if last {
                 if self.pending.is_empty() {
                     return Ok(None);
@@ -256,7 +262,7 @@ impl Bench {
     /// Fails the case unless the reply is a NACK with this code.
     pub(super) fn require_nack(&self, reply: &Reply, code: ErrorCode) -> Result<(), Stop> {
         let bytes = frame(HEADER_NACK, &[code.number()]);
-        self.require(reply.is_nack(code), format!("{}  NACK {code}", hex(&bytes)))
+        self.require(reply.is_nack(code), format!("{}  NACK {code}", Hex(&bytes)))
     }
 
     /// The payload of the ACK to a request to the motor under test.
@@ -361,13 +367,13 @@ impl Bench {
 
     /// Nothing comes for a time; zero only looks at what is there.
     pub(super) fn silence(&mut self, span: Duration) -> Result<(), Stop> {
-        let until = self.line.now() + span;
+        let until = self.clock.now() + span;
         loop {
             if self.take(until)? || !self.pending.is_empty() {
                 self.give_up();
                 return Err(self.failed("nothing that was not asked for"));
             }
-            if self.line.now() >= until {
+            if self.clock.now() >= until {
                 return Ok(());
             }
         }
@@ -376,11 +382,11 @@ impl Bench {
     /// Waits until the line was silent for a time, whatever comes; a line that never falls silent
     /// is not waited for for ever.
     pub(super) fn drain(&mut self, span: Duration) -> Result<(), Stop> {
-        let last = self.line.now() + span + PATIENCE;
-        let mut until = self.line.now() + span;
-        while self.line.now() < until {
+        let last = self.clock.now() + span + PATIENCE;
+        let mut until = self.clock.now() + span;
+        while self.clock.now() < until {
             if self.take(until)? {
-                until = last.min(self.line.now() + span);
+                until = last.min(self.clock.now() + span);
             }
         }
         self.give_up();
@@ -397,7 +403,7 @@ impl Bench {
         let mut words = Transcript::new(self.profile());
         let said = |bytes: &[u8], words: String| match bytes {
             [] => "nothing".to_owned(),
-            bytes => format!("{}  {words}", hex(bytes)),
+            bytes => format!("{}  {words}", Hex(bytes)),
         };
         let sent = said(&self.sent, words.note(true, &self.sent));
         let received = said(&self.received, words.note(false, &self.received));
@@ -419,10 +425,12 @@ impl Bench {
 
     /// Takes what comes until a moment; whether anything did.
     fn take(&mut self, until: Instant) -> Result<bool, Stop> {
-        let bytes = self.line.receive(until)?;
-        self.received.extend(&bytes);
-        self.pending.extend(&bytes);
-        Ok(!bytes.is_empty())
+        let mut buffer = [0; 256];
+        let wait = until.since(self.clock.now()).into();
+        let size = self.line.read(&mut buffer, Some(wait))?;
+        self.received.extend(&buffer[..size]);
+        self.pending.extend(&buffer[..size]);
+        Ok(size > 0)
     }
 
     /// Notes what is no reply; what comes next has to be waited for.
@@ -437,7 +445,7 @@ impl Bench {
     fn transcribe(&mut self, sent: bool, bytes: &[u8]) {
         let words = self.words.note(sent, bytes);
         let direction = if sent { '>' } else { '<' };
-        self.transcript.push(format!("{direction} {}  {words}", hex(bytes)));
+        self.transcript.push(format!("{direction} {}  {words}", Hex(bytes)));
     }
 }
 

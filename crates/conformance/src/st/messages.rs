@@ -1,5 +1,6 @@
 //! Cases of 4.7 to 4.12 that leave the motor at rest.
 
+use motorlink_proto::Hex;
 use motorlink_proto::st::register::Feature;
 use motorlink_proto::st::{
     CurrentReference, ErrorCode, FrameCode, HEADER_ACK, MAX_PAYLOAD, PositionMove, Profile,
@@ -10,7 +11,6 @@ use super::bench::Bench;
 use super::values::as_kept;
 use crate::case::{Case, ReadAs, Stop};
 use crate::reading::{S7, S13, S24, S26, S48, S51, S52};
-use crate::wire::hex;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
     let mut cases = vec![
@@ -157,7 +157,7 @@ fn board_version(bench: &mut Bench) -> Result<(), Stop> {
         }
         _ => "",
     };
-    let expected = format!("ACK that begins with {}, as in the version string{hint}", hex(&wanted));
+    let expected = format!("ACK that begins with {}, as in the version string{hint}", Hex(&wanted));
     match bench.profile() {
         Profile::Spec => bench.require(payload.starts_with(&wanted), expected).read_as(S51),
         Profile::Mcsdk54 => bench.require(payload.starts_with(&wanted), expected),
@@ -210,7 +210,7 @@ fn revup(bench: &mut Bench, phase: u8) -> Result<(), Stop> {
         let payload = bench.acknowledged(&Request::RevupData(phase))?;
         let bytes = data.to_bytes();
         let held =
-            bench.require(payload == bytes, format!("ACK {}, which was written", hex(&bytes)));
+            bench.require(payload == bytes, format!("ACK {}, which was written", Hex(&bytes)));
         if sensorless { held? } else { held.read_as(S52)? }
     }
     // The other phases are others.
@@ -219,7 +219,7 @@ fn revup(bench: &mut Bench, phase: u8) -> Result<(), Stop> {
     let before = bench.acknowledged(&Request::RevupData(other))?;
     bench.done(&Request::SetRevupData(phase, data))?;
     let now = bench.acknowledged(&Request::RevupData(other))?;
-    bench.require(now == before, format!("phase {other} as before: {}", hex(&before)))
+    bench.require(now == before, format!("phase {other} as before: {}", Hex(&before)))
 }
 
 /// Data segments, whose layout is ours, for the document has lost its own (SPEC-NOTES S7).

@@ -100,7 +100,7 @@ fn running(bench: &mut Bench) -> Result<(), Stop> {
 /// Waits until the motor is in RUN and at a speed. A drive that gives RUN another number is known by
 /// the speed (SPEC-NOTES S14); from then on this is its RUN.
 fn comes_to(bench: &mut Bench, speed: i32) -> Result<(), Stop> {
-    let until = bench.line.now() + START;
+    let until = bench.clock.now() + START;
     let mut stays = 0;
     loop {
         let status = bench.status()?;
@@ -114,7 +114,7 @@ fn comes_to(bench: &mut Bench, speed: i32) -> Result<(), Stop> {
             bench.found.run = status;
             return bench.note(S14, Err(differs));
         }
-        if faulty(status) || bench.line.now() >= until {
+        if faulty(status) || bench.clock.now() >= until {
             let words = format!("ACK 6: RUN, within 15 s, and {speed} rpm");
             return Err(bench.failed(words));
         }
@@ -128,7 +128,7 @@ fn is_near(measured: i32, speed: i32) -> bool {
 
 /// Waits until SPEED_MEAS is within a tenth of a speed, and stays there.
 fn reaches(bench: &mut Bench, speed: i32) -> Result<(), Stop> {
-    let until = bench.line.now() + SETTLE;
+    let until = bench.clock.now() + SETTLE;
     let mut stays = 0;
     loop {
         let measured = bench.value(RegisterId::SPEED_MEAS)?;
@@ -136,7 +136,7 @@ fn reaches(bench: &mut Bench, speed: i32) -> Result<(), Stop> {
         if stays == STEADY {
             return Ok(());
         }
-        if bench.line.now() >= until {
+        if bench.clock.now() >= until {
             return Err(bench.failed(format!("ACK {speed} rpm, give or take a tenth")));
         }
         bench.silence(LOOK)?;
@@ -201,12 +201,12 @@ fn ramp_duration(bench: &mut Bench) -> Result<(), Stop> {
     let from = run(bench)?;
     let (to, duration_ms) = (from * 4 / 5, 3_000);
     bench.done(&Request::Ramp(Ramp { speed_rpm: to, duration_ms }))?;
-    let began = bench.line.now();
+    let began = bench.clock.now();
     let near = |reference: i32| (reference - to).abs() <= (from - to).abs() / 20 + 6;
     let late_on = to + (from - to) / 4;
     let (mut passed, mut there) = (None, None);
     while passed.is_none() || there.is_none() {
-        let took = bench.line.now().since(began).as_micros() / 1_000;
+        let took = bench.clock.now().since(began).as_micros() / 1_000;
         if took > 6_000 {
             break;
         }

@@ -1,5 +1,6 @@
 //! Cases of 3.2: motor numbers and the current motor.
 
+use motorlink_proto::Hex;
 use motorlink_proto::st::{
     ErrorCode, Frame, FrameCode, HEADER_ACK, MAX_FRAME, Motor, Profile, RegisterId, Request,
 };
@@ -8,7 +9,6 @@ use super::bench::{Bench, frame};
 use super::restore::current_motor;
 use crate::case::{Case, Need, Stop};
 use crate::reading::{S20, S47};
-use crate::wire::hex;
 
 pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
     vec![
@@ -209,7 +209,7 @@ fn current_is(bench: &mut Bench, motor: u8) -> Result<(), Stop> {
     if held {
         return Ok(());
     }
-    let bytes = hex(&frame(HEADER_ACK, &[motor - 1]));
+    let bytes = Hex(&frame(HEADER_ACK, &[motor - 1]));
     let words = format!("{bytes}  ACK {}: motor {motor} is the current one", motor - 1);
     let differs = bench.failed(words);
     bench.note(S20, Err(differs))?;
@@ -217,7 +217,7 @@ fn current_is(bench: &mut Bench, motor: u8) -> Result<(), Stop> {
     let own = bench.acknowledged_bytes(&read_gain(motor))?;
     bench.require(
         addressed == own,
-        format!("the gain that motor number 0 read: {}", hex(&addressed)),
+        format!("the gain that motor number 0 read: {}", Hex(&addressed)),
     )
 }
 

@@ -1,5 +1,6 @@
 //! Cases of 4.4 and 4.5 and of table 3, for every register: who reads it, who writes it.
 
+use motorlink_proto::Hex;
 use motorlink_proto::st::register::{Access, Feature, Features, Writing};
 use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request, Status};
 
@@ -9,7 +10,6 @@ use super::restore::is_setpoint;
 use super::values;
 use crate::case::{Case, ReadAs, Stop};
 use crate::reading::{Reading, S5, S14, S15, S48, S49, S54};
-use crate::wire::hex;
 
 /// Ids for a DAC channel that no register of access D has.
 const NOT_FOR_DAC: [RegisterId; 2] = [RegisterId::STATUS, RegisterId(0xEE)];
@@ -85,7 +85,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                     bench.set(RegisterId::CONTROL_MODE, mode)?;
                     let now = bench.get(RegisterId::CONTROL_MODE)?;
                     bench
-                        .require(now == before, format!("the mode as before: {}", hex(&before)))?;
+                        .require(now == before, format!("the mode as before: {}", Hex(&before)))?;
                 }
                 Ok(())
             },
@@ -193,7 +193,7 @@ fn refuse(bench: &mut Bench, register: RegisterId, refusal: Writing) -> Result<(
         let bytes = bench.frame(FrameCode::SetReg.number(), &payload);
         bench.refused_bytes(&bytes, code)?;
         let now = bench.get(register)?;
-        bench.require(now == before, format!("the value as before: {}", hex(&before)))?;
+        bench.require(now == before, format!("the value as before: {}", Hex(&before)))?;
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Before and after a case: the drive at rest and the line in step, and everything as it was found.
 
+use motorlink_proto::Hex;
 use motorlink_proto::st::{
     Command, ErrorCode, Frame, FrameCode, HEADER_ACK, Motor, RegisterId, Request, RevupPhase,
     Status,
@@ -11,7 +12,6 @@ use super::undo::{Setpoints, Undo};
 use crate::case::{Need, ReadAs, Stop, Subject};
 use crate::finding::Finding;
 use crate::reading::S48;
-use crate::wire::hex;
 use crate::world::Unavailable;
 
 /// How long a line is silent before it counts as silent: four times the reception timeout.
@@ -146,10 +146,10 @@ impl Bench {
         patience: Duration,
         wanted: impl Fn(Status) -> bool,
     ) -> Result<Status, Stop> {
-        let until = self.line.now() + patience;
+        let until = self.clock.now() + patience;
         loop {
             let status = self.status()?;
-            if wanted(status) || self.line.now() >= until {
+            if wanted(status) || self.clock.now() >= until {
                 return Ok(status);
             }
             self.silence(LOOK)?;
@@ -248,7 +248,7 @@ impl Bench {
             Undo::Revup(phase, data) => {
                 self.done(&Request::SetRevupData(phase, data))?;
                 let now = self.acknowledged(&Request::RevupData(phase))?;
-                let left = format!("phase {phase} as it was found: {}", hex(&data.to_bytes()));
+                let left = format!("phase {phase} as it was found: {}", Hex(&data.to_bytes()));
                 self.require(now == data.to_bytes(), left)
             }
             Undo::Segment(segment) => {
@@ -263,7 +263,7 @@ impl Bench {
         let Some(value) = register.decode(self.profile(), bytes) else { return Ok(()) };
         self.set(register, value)?;
         let now = self.get(register)?;
-        self.require(now == bytes, format!("{register} as it was found: {}", hex(bytes)))
+        self.require(now == bytes, format!("{register} as it was found: {}", Hex(bytes)))
     }
 
     fn put_back_setpoints(&mut self, before: Setpoints) -> Result<(), Stop> {

@@ -1,5 +1,6 @@
 //! Cases of 4.4 and SPEC-NOTES S18 and S19: values and messages that are too long or too short.
 
+use motorlink_proto::Hex;
 use motorlink_proto::st::register::Writing;
 use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
 
@@ -9,7 +10,6 @@ use super::registers::{kept_by, writing};
 use super::values;
 use crate::case::{Case, Stop};
 use crate::reading::{S18, S19};
-use crate::wire::hex;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
     let mut cases: Vec<Case<Bench>> = Vec::new();
@@ -95,7 +95,7 @@ fn longer(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), St
         bytes.resize(size + excess, 0xEE);
         bench.done(&Request::SetRegister { register, value: &bytes })?;
         let now = bench.value(register)?;
-        let cut = bench.require(now == value, format!("the low bytes: {}", hex(&bytes[..size])));
+        let cut = bench.require(now == value, format!("the low bytes: {}", Hex(&bytes[..size])));
         match kept_by(register) {
             Some(reading) => bench.note(reading, cut)?,
             None => cut?,
@@ -122,7 +122,7 @@ fn shorter(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), S
         }
         let now = bench.get(register)?;
         let shown = &bytes[..now.len().min(4)];
-        let words = format!("ACK {}: new low bytes, old high ones", hex(shown));
+        let words = format!("ACK {}: new low bytes, old high ones", Hex(shown));
         let held = bench.require(now == shown, words);
         bench.note(S19, held)?;
         bench.set(register, value)?;
@@ -138,7 +138,7 @@ fn short_refused(bench: &mut Bench, register: RegisterId, size: usize) -> Result
         let bytes = bench.encode(&Request::SetRegister { register, value });
         refused_or_old_bytes(bench, &bytes, ErrorCode::WrongSet)?;
         let now = bench.get(register)?;
-        bench.require(now == before, format!("the value as before: {}", hex(&before)))?;
+        bench.require(now == before, format!("the value as before: {}", Hex(&before)))?;
     }
     Ok(())
 }

@@ -128,9 +128,9 @@ fn on_time(bench: &mut Bench) -> Result<(), Stop> {
     let mut outcome = Ok(());
     for _ in 0..TRIES {
         // What this host does between two looks at its clock makes a drive look late, never early.
-        let began = bench.line.now();
+        let began = bench.clock.now();
         let reply = timed_out(bench, 2)?;
-        let took = bench.line.now().since(began);
+        let took = bench.clock.now().since(began);
         let late = reply.delay > RECEPTION + SLACK + bench.on_the_line(6);
         if took + EARLY >= RECEPTION && !late {
             return Ok(());
@@ -176,11 +176,11 @@ fn in_time(bench: &mut Bench) -> Result<(), Stop> {
     let mut outcome = Err(Stop::Skipped(too_slow));
     bench.out_of_step = true;
     for _ in 0..TRIES {
-        let began = bench.line.now();
+        let began = bench.clock.now();
         bench.send(&bytes[..2])?;
         bench.silence(Duration(RECEPTION.as_micros() * 6 / 10))?;
         bench.send_more(&bytes[2..])?;
-        let took = bench.line.now().since(began);
+        let took = bench.clock.now().since(began);
         let reply = bench.awaited()?;
         if reply.header == HEADER_ACK {
             bench.out_of_step = false;

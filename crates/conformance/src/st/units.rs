@@ -1,5 +1,6 @@
 //! Cases of table 3's units, of its synonyms and of the PFC's registers.
 
+use motorlink_proto::Hex;
 use motorlink_proto::st::register::Feature;
 use motorlink_proto::st::{Profile, RegisterId, Request};
 
@@ -8,7 +9,6 @@ use super::messages::empty_segment;
 use super::motion;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{S7, S23, S28};
-use crate::wire::hex;
 
 /// A register, its clause, its feature, the range of its values at rest, the range in words.
 type Row =
@@ -104,7 +104,7 @@ fn synonyms(bench: &mut Bench) -> Result<(), Stop> {
     let payload = bench.acknowledged(&Request::DataElement(0))?;
     bench.require(payload.len() == 2 * registers.len(), "ACK with 2 bytes a register")?;
     for (pair, (one, other)) in payload.chunks(4).zip(SYNONYMS) {
-        let words = format!("{one} as {other}: {}", hex(&pair[2..]));
+        let words = format!("{one} as {other}: {}", Hex(&pair[2..]));
         bench.require(pair[..2] == pair[2..], words)?;
     }
     Ok(())

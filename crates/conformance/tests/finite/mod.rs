@@ -1,55 +1,70 @@
-//! A wire whose time runs out: a host that would wait for ever gets an error.
+//! Links whose time runs out: a host that would wait for ever gets an error.
+#![allow(dead_code, reason = "a host has a line or a bus")]
 
-use motorlink::port::PortError;
-use motorlink_conformance::wire::{Bus, Line};
+use motorlink::Clock;
+use motorlink::port::{ByteLink, CanLink, PortError};
+use motorlink_link::serve::{ByteStation, CanStation, StationLink};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 /// Longer than any correct host takes for a scenario.
 const END: Instant = Instant(60_000_000);
 
-pub struct Finite<W>(W);
+/// A link to a station on virtual time.
+pub struct Finite<S, T> {
+    link: StationLink<S, T>,
+    clock: Clock,
+}
 
-impl<W> Finite<W> {
-    pub fn new(wire: W) -> Self {
-        Finite(wire)
+impl<S, T> Finite<S, T> {
+    pub fn new(station: S) -> Self {
+        let clock = Clock::standing();
+        Finite { link: StationLink::new(station, clock.clone()), clock }
+    }
+
+    pub fn now(&self) -> Instant {
+        self.clock.now()
+    }
+
+    fn alive(&self) -> Result<(), PortError> {
+        match self.now() < END {
+            true => Ok(()),
+            false => Err(PortError::Closed { port: "a minute is over".to_owned() }),
+        }
+    }
+
+    fn left(&self, until: Instant) -> Option<std::time::Duration> {
+        Some(until.min(END).since(self.now()).into())
     }
 }
 
-fn alive(now: Instant) -> Result<(), PortError> {
-    if now < END { Ok(()) } else { Err(PortError::Closed { port: "a minute is over".to_owned() }) }
-}
-
-impl<W: Line> Line for Finite<W> {
-    fn now(&self) -> Instant {
-        self.0.now()
+impl<S: ByteStation + Send> Finite<S, u8> {
+    pub fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+        self.alive()?;
+        self.link.write(bytes)
     }
 
-    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
-        alive(self.0.now())?;
-        self.0.send(bytes)
-    }
-
-    fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
-        let received = self.0.receive(until.min(END))?;
-        alive(self.0.now())?;
-        Ok(received)
+    /// What comes until a moment.
+    pub fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
+        let mut buffer = [0; 1024];
+        let wait = self.left(until);
+        let size = self.link.read(&mut buffer, wait)?;
+        self.alive()?;
+        Ok(buffer[..size].to_vec())
     }
 }
 
-impl<W: Bus> Bus for Finite<W> {
-    fn now(&self) -> Instant {
-        self.0.now()
+impl<S: CanStation + Send> Finite<S, CanFrame> {
+    pub fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
+        self.alive()?;
+        CanLink::send(&mut self.link, frame)
     }
 
-    fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        alive(self.0.now())?;
-        self.0.send(frame)
-    }
-
-    fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
-        let received = self.0.receive(until.min(END))?;
-        alive(self.0.now())?;
+    /// The next frame that comes until a moment.
+    pub fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
+        let wait = self.left(until);
+        let received = CanLink::receive(&mut self.link, wait)?;
+        self.alive()?;
         Ok(received)
     }
 }

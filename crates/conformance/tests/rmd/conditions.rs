@@ -2,16 +2,17 @@
 //! sensors add.
 
 use std::collections::VecDeque;
+use std::time::Duration as Span;
 
-use motorlink::port::PortError;
+use motorlink::Clock;
+use motorlink::port::{CanLink, PortError};
 use motorlink_conformance::Need;
-use motorlink_conformance::wire::Bus;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::plant::PlantConfig;
 use motorlink_sim::rmd::RmdConfig;
 
-use crate::drive::{Behaviour, Event, Motors, Setup, Shared, Tested, motor};
+use crate::drive::{Behaviour, Event, Motors, Setup, Tested, Wire, motor};
 
 fn passes(tested: &Tested) {
     let failed: Vec<_> = tested.report.failed().collect();
@@ -20,7 +21,8 @@ fn passes(tested: &Tested) {
 
 /// A USB adapter: frames wait for the next turn of the bus.
 struct Adapter {
-    bus: Shared,
+    bus: Box<dyn CanLink>,
+    clock: Clock,
     received: VecDeque<(Instant, CanFrame)>,
 }
 
@@ -29,35 +31,39 @@ const BACK: Duration = Duration::from_millis(16);
 
 impl Adapter {
     fn pass(&mut self, until: Instant) -> Result<(), PortError> {
-        while let Some(frame) = self.bus.receive(until)? {
-            self.received.push_back((self.bus.now() + BACK, frame));
+        while let Some(frame) = self.bus.receive(Some(until.since(self.clock.now()).into()))? {
+            self.received.push_back((self.clock.now() + BACK, frame));
         }
         Ok(())
     }
 }
 
-impl Bus for Adapter {
-    fn now(&self) -> Instant {
-        self.bus.now()
-    }
-
+impl CanLink for Adapter {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        self.pass(self.now() + OUT)?;
+        self.pass(self.clock.now() + OUT)?;
         self.bus.send(frame)?;
-        self.pass(self.now())
+        self.pass(self.clock.now())
     }
 
-    fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
+    fn receive(&mut self, timeout: Option<Span>) -> Result<Option<CanFrame>, PortError> {
+        let until = self.clock.now() + timeout.expect("the kit waits for a while").into();
         let due = self.received.front().map(|(due, _)| *due).filter(|due| *due <= until);
-        self.pass(due.unwrap_or(until).max(self.now()))?;
+        self.pass(due.unwrap_or(until).max(self.clock.now()))?;
         Ok(due.and_then(|_| self.received.pop_front()).map(|(_, frame)| frame))
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
     }
 }
 
 #[test]
 fn a_motor_behind_a_slow_adapter_passes() {
     let slow = || {
-        let port = |bus| Box::new(Adapter { bus, received: VecDeque::new() }) as Box<dyn Bus>;
+        let port = |wire: &Wire| {
+            let (bus, clock) = (wire.bus(), wire.clock.clone());
+            Box::new(Adapter { bus, clock, received: VecDeque::new() }) as Box<dyn CanLink>
+        };
         Setup { port, ..Setup::new(vec![motor(1), motor(2)]) }
     };
     passes(&slow().run());

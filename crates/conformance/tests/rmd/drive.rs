@@ -1,17 +1,16 @@
 //! Simulated motors on virtual time, the world around them, and what may be put between them and
 //! the bus.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-
+use motorlink::port::CanLink;
 use motorlink_conformance::rmd::{Bench, Options, suite};
-use motorlink_conformance::wire::{Bus, Virtual};
 use motorlink_conformance::{Case, Need, Report, Unavailable, World, run};
 use motorlink_link::serve::CanStation;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
+
+use crate::shared::Shared;
 
 pub const EVERYTHING: [Need; 4] = [Need::Spin, Need::Rom, Need::PowerCycle, Need::Fault];
 
@@ -22,7 +21,7 @@ pub enum Event<'a> {
 }
 
 /// What is done in place of what the motors do.
-pub type Behaviour = Box<dyn FnMut(&mut Motors, Event) -> Vec<CanFrame>>;
+pub type Behaviour = Box<dyn FnMut(&mut Motors, Event) -> Vec<CanFrame> + Send>;
 
 /// Motors on a bus.
 pub struct Motors {
@@ -99,19 +98,18 @@ impl CanStation for Station {
     }
 }
 
-pub type Shared = Rc<RefCell<Virtual<Station, CanFrame>>>;
+pub type Wire = Shared<Station>;
 
 /// The hand at the power switch.
 struct Around {
-    bus: Shared,
+    bus: Wire,
     interrupted: Option<Instant>,
 }
 
 impl World for Around {
     fn power_cycle(&mut self) -> Result<(), Unavailable> {
-        let mut bus = self.bus.borrow_mut();
-        let now = bus.now();
-        let Station { motors, behaviour, powered_on, .. } = &mut bus.station;
+        let now = self.bus.clock.now();
+        let Station { motors, behaviour, powered_on, .. } = &mut *self.bus.station();
         motors.now = now;
         motors.bus.advance_to(now);
         for id in motors.ids() {
@@ -123,8 +121,7 @@ impl World for Around {
     }
 
     fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
-        let mut bus = self.bus.borrow_mut();
-        let motors = &mut bus.station.motors;
+        let motors = &mut self.bus.station().motors;
         for id in motors.ids() {
             let motor = motors.bus.node_mut(id).expect("it is there").motor_mut();
             match present {
@@ -136,7 +133,7 @@ impl World for Around {
     }
 
     fn interrupted(&self) -> bool {
-        self.interrupted.is_some_and(|moment| self.bus.borrow().now() >= moment)
+        self.interrupted.is_some_and(|moment| self.bus.clock.now() >= moment)
     }
 }
 
@@ -158,17 +155,17 @@ pub fn motor(id: u8) -> RmdConfig {
 /// What came of the suite, and the motors afterwards.
 pub struct Tested {
     pub report: Report,
-    bus: Shared,
+    bus: Wire,
 }
 
 impl Tested {
     pub fn station<T>(&self, look: impl FnOnce(&Station) -> T) -> T {
-        look(&self.bus.borrow().station)
+        look(&self.bus.station())
     }
 
     /// The time that the run took, s.
     pub fn seconds(&self) -> u64 {
-        self.bus.borrow().now().0 / 1_000_000
+        self.bus.clock.now().0 / 1_000_000
     }
 }
 
@@ -180,14 +177,14 @@ pub struct Setup {
     pub behaviour: Behaviour,
     pub suite: Vec<Case<Bench>>,
     /// What is between the kit and the bus.
-    pub port: fn(Shared) -> Box<dyn Bus>,
+    pub port: fn(&Wire) -> Box<dyn CanLink>,
     /// When the user has had enough.
     pub interrupted: Option<Instant>,
 }
 
 impl Setup {
     pub fn new(motors: Vec<RmdConfig>) -> Self {
-        let port: fn(Shared) -> Box<dyn Bus> = |bus| Box::new(bus);
+        let port: fn(&Wire) -> Box<dyn CanLink> = Wire::bus;
         Setup {
             motors,
             allowed: &EVERYTHING,
@@ -215,13 +212,13 @@ impl Setup {
         let encoder = EncoderBits::new(motors[0].plant.encoder.bits).expect("a width");
         let motors = Motors { bus, now: Instant(0), first: id };
         let station = Station { motors, behaviour, energised: false, powered_on: 0, fastest: 0.0 };
-        let bus = Rc::new(RefCell::new(Virtual::new(station)));
+        let bus = Shared::new(station);
         let options = Options { id, encoder, allowed: allowed.to_vec() };
-        let world = Box::new(Around { bus: Rc::clone(&bus), interrupted });
-        let report = run(&suite, &mut Bench::new(port(Rc::clone(&bus)), world, options), |_| {});
+        let world = Box::new(Around { bus: bus.clone(), interrupted });
+        let report = run(&suite, &mut Bench::new(port(&bus), world, options), |_| {});
         // What was told last gets its time.
-        let now = bus.borrow().now();
-        bus.borrow_mut().station.motors.bus.advance_to(now + Duration::from_millis(1_000));
+        let now = bus.clock.now();
+        bus.station().motors.bus.advance_to(now + Duration::from_millis(1_000));
         Tested { report, bus }
     }
 }

@@ -5,4 +5,6 @@ mod conditions;
 mod drive;
 mod mutants;
 mod readings;
+#[path = "../shared/mod.rs"]
+mod shared;
 mod suite;

@@ -4,5 +4,7 @@ mod clauses;
 mod mutants;
 mod peer;
 mod readings;
+#[path = "../shared/mod.rs"]
+mod shared;
 mod slow;
 mod suite;

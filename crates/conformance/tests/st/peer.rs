@@ -1,10 +1,6 @@
 //! The drive under test: a simulated one on virtual time, as it is or with one deviation.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-
 use motorlink_conformance::st::{self, Bench, Options};
-use motorlink_conformance::wire::{Line, Virtual};
 use motorlink_conformance::{Need, Report, Unavailable, World, run};
 use motorlink_link::serve::ByteStation;
 use motorlink_proto::st::register::Features;
@@ -12,15 +8,17 @@ use motorlink_proto::st::{Flags, Frame, Motor, Profile, RegisterId};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
 
+use crate::shared::Shared;
+
 pub type Station = StStation<Vec<StMotor>>;
-pub type Wire = Rc<RefCell<Virtual<Peer, u8>>>;
+pub type Wire = Shared<Peer>;
 
 pub const ALL: [Need; 4] = [Need::Spin, Need::Rom, Need::PowerCycle, Need::Fault];
 
 /// Looks at bytes from the master and may change them, or answer them itself.
-pub type Before = Box<dyn FnMut(&mut Station, Instant, &mut Vec<u8>) -> Option<Vec<u8>>>;
+pub type Before = Box<dyn FnMut(&mut Station, Instant, &mut Vec<u8>) -> Option<Vec<u8>> + Send>;
 /// Looks at a reply, with the bytes it answers, and may change it.
-pub type After = Box<dyn FnMut(&[u8], &mut Vec<u8>)>;
+pub type After = Box<dyn FnMut(&[u8], &mut Vec<u8>) + Send>;
 
 /// What a drive does otherwise than the simulated one.
 #[derive(Default)]
@@ -150,7 +148,7 @@ struct Hands(Wire);
 
 impl World for Hands {
     fn power_cycle(&mut self) -> Result<(), Unavailable> {
-        let peer = &mut self.0.borrow_mut().station;
+        let peer = &mut *self.0.station();
         peer.station.power_cycle();
         if peer.deviation.remembers {
             // Its last motor, which the kit has selected.
@@ -162,7 +160,7 @@ impl World for Hands {
     }
 
     fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
-        let station = &mut self.0.borrow_mut().station.station;
+        let station = &mut self.0.station().station;
         let motors = station.drive().last().number();
         for motor in (1..=motors).filter_map(Motor::new) {
             let motor = station.drive_mut().motor_mut(motor).expect("a motor of the drive");
@@ -176,7 +174,7 @@ impl World for Hands {
 }
 
 pub fn wire(peer: Peer) -> Wire {
-    Rc::new(RefCell::new(Virtual::new(peer)))
+    Shared::new(peer)
 }
 
 /// Puts the drive on a wire through the whole suite, readings and all.
@@ -186,24 +184,22 @@ pub fn test(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
 
 /// The same, what differs from a reading apart.
 pub fn test_apart(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
-    let profile = wire.borrow().station.station.profile();
+    let profile = wire.station().station.profile();
     let motor = Motor::new(motor).expect("1 to 7");
     let byte_time = Duration(0);
     let options = Options { profile, motor, allowed: allowed.to_vec(), byte_time };
     let world = Box::new(Hands(wire.clone()));
-    let mut bench = Bench::new(Box::new(wire.clone()), world, options);
+    let mut bench = Bench::new(wire.line(), world, options);
     run(&st::suite(profile), &mut bench, |_| {})
 }
 
 /// The current motor, every register of a motor as it reads, and its rev-up phases.
 pub fn dump(wire: &Wire, motor: u8) -> Vec<(String, Vec<u8>)> {
-    let profile = wire.borrow().station.station.profile();
+    let profile = wire.station().station.profile();
     let mut all = Vec::new();
     let mut ask = |name: String, bytes: Vec<u8>| {
-        let mut line = wire.clone();
-        line.send(&bytes).expect("a virtual line does not fail");
-        let now = line.now();
-        let reply = line.receive(now).expect("a virtual line does not fail");
+        let mut reply = Vec::new();
+        wire.station().receive(wire.clock.now(), &bytes, &mut reply);
         all.push((name, reply.clone()));
         reply
     };

@@ -1,10 +1,11 @@
 //! A slow line: bytes take their time both ways, and the suite knows.
 
 use std::collections::VecDeque;
+use std::time::Duration as Span;
 
-use motorlink::port::PortError;
+use motorlink::Clock;
+use motorlink::port::{ByteLink, PortError};
 use motorlink_conformance::st::{self, Bench, Options};
-use motorlink_conformance::wire::Line;
 use motorlink_conformance::{Need, Verdict, run};
 use motorlink_link::serve::ByteStation;
 use motorlink_proto::st::{Motor, Profile};
@@ -17,7 +18,7 @@ use crate::peer::{Deviation, Peer};
 struct Uart {
     peer: Peer,
     byte_time: Duration,
-    now: Instant,
+    clock: Clock,
     /// Bytes on the way to the drive, and when each is there.
     outward: VecDeque<(Instant, u8)>,
     /// Bytes on the way back.
@@ -37,46 +38,50 @@ impl Uart {
         let arrival = self.outward.front().map(|(at, _)| *at);
         let deadline = self.peer.deadline();
         let due = [arrival, deadline].into_iter().flatten().min().filter(|due| *due <= until);
-        self.now = self.now.max(due.unwrap_or(until));
+        self.clock.wait(due.unwrap_or(until));
+        let now = self.clock.now();
         let mut reply = Vec::new();
-        if arrival.is_some_and(|at| at <= self.now) {
+        if arrival.is_some_and(|at| at <= now) {
             let (at, byte) = self.outward.pop_front().expect("it has just been there");
             self.peer.receive(at, &[byte], &mut reply);
-        } else if deadline.is_some_and(|at| at <= self.now) {
-            self.peer.poll(self.now, &mut reply);
+        } else if deadline.is_some_and(|at| at <= now) {
+            self.peer.poll(now, &mut reply);
         }
-        self.answer(self.now, reply);
+        self.answer(now, reply);
     }
 }
 
-impl Line for Uart {
-    fn now(&self) -> Instant {
-        self.now
-    }
-
-    fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
+impl ByteLink for Uart {
+    fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         for &byte in bytes {
-            let before = self.outward.back().map_or(self.now, |(last, _)| self.now.max(*last));
+            let now = self.clock.now();
+            let before = self.outward.back().map_or(now, |(last, _)| now.max(*last));
             self.outward.push_back((before + self.byte_time, byte));
         }
         Ok(())
     }
 
-    fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
+    fn read(&mut self, buffer: &mut [u8], timeout: Option<Span>) -> Result<usize, PortError> {
+        let until = self.clock.now() + timeout.expect("the kit waits for a while").into();
         loop {
             let came = self.inward.front().map(|(at, _)| *at);
             if let Some(at) = came.filter(|at| *at <= until) {
-                while self.now < at {
+                while self.clock.now() < at {
                     self.step(at);
                 }
                 let (_, byte) = self.inward.pop_front().expect("it has just been there");
-                return Ok(vec![byte]);
+                buffer[0] = byte;
+                return Ok(1);
             }
-            if self.now >= until {
-                return Ok(Vec::new());
+            if self.clock.now() >= until {
+                return Ok(0);
             }
             self.step(until);
         }
+    }
+
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
     }
 }
 
@@ -96,7 +101,7 @@ fn a_slow_line_fails_nothing_and_skips_what_it_cannot_carry_in_time() {
         let byte_time = Duration(10_000_000 / baud);
         let peer = Peer::new(profile, &MotorConfig::demo(), Deviation::default());
         let (outward, inward) = Default::default();
-        let uart = Uart { peer, byte_time, now: Instant(0), outward, inward };
+        let uart = Uart { peer, byte_time, clock: Clock::standing(), outward, inward };
         let allowed = vec![Need::Spin];
         let options = Options { profile, motor: Motor::FIRST, allowed, byte_time };
         let mut bench = Bench::new(Box::new(uart), Box::new(()), options);

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use motorlink_conformance::st::may_start;
-use motorlink_conformance::wire::Line;
 use motorlink_conformance::{Need, Report, Verdict};
 use motorlink_proto::st::Profile;
 use motorlink_proto::time::Duration;
@@ -151,7 +150,7 @@ fn without_leave_the_motor_never_moves_and_nothing_that_could_start_it_is_sent()
                 assert!(skipped || outcome.verdict == Verdict::Passed, "{outcome:?}");
             }
             {
-                let peer = &wire.borrow().station;
+                let peer = wire.station();
                 assert_eq!(peer.fastest, 0.0, "the motor turned");
                 // The stream as a whole, as a drive that has lost step would see it.
                 let heard = &peer.heard;
@@ -185,7 +184,7 @@ fn cases_that_need_leave_say_so() {
 fn a_motor_that_is_not_at_rest_is_not_tested() {
     let wire = drive(Profile::Spec, &MotorConfig::demo());
     {
-        let peer = &mut wire.borrow_mut().station;
+        let mut peer = wire.station();
         let start = crate::peer::frame(0x23, &[1]);
         peer.station.receive(motorlink_proto::time::Instant(0), &start, |_| {});
     }
@@ -242,7 +241,7 @@ fn what_a_case_wrote_is_put_back_after_a_line_that_was_bad_for_a_while() {
 }
 
 /// A drive that goes wrong `after` so many replies, the first of them that to START_MOTOR.
-fn wrong_behind_a_start(after: u32, reply: impl Fn(u32, &mut Vec<u8>) + 'static) -> Wire {
+fn wrong_behind_a_start(after: u32, reply: impl Fn(u32, &mut Vec<u8>) + Send + 'static) -> Wire {
     let mut since: Option<u32> = None;
     let deviation = Deviation {
         after: Some(Box::new(move |request, bytes| {
@@ -263,9 +262,8 @@ fn wrong_behind_a_start(after: u32, reply: impl Fn(u32, &mut Vec<u8>) + 'static)
 
 /// Whether motor 1 is at rest a minute later.
 fn rests(wire: &Wire) -> bool {
-    let later = wire.borrow().now() + Duration::from_millis(60_000);
-    let _ = wire.borrow_mut().receive(later).expect("a virtual line does not fail");
-    let peer = &mut wire.borrow_mut().station;
+    let later = wire.clock.now() + Duration::from_millis(60_000);
+    let mut peer = wire.station();
     peer.station.advance_to(later);
     let motors = peer.station.drive().motors();
     motors.iter().all(|motor| motor.truth().speed_rpm.abs() < 1.0)
@@ -277,7 +275,7 @@ fn a_motor_is_stopped_although_the_drive_says_nothing_any_more() {
         let wire = wrong_behind_a_start(after, |_, reply| reply.clear());
         let report = test(&wire, 1, &ALL);
         assert!(report.count("not run") > 0, "it was lost");
-        assert!(wire.borrow().station.fastest > 0.0, "it turned");
+        assert!(wire.station().fastest > 0.0, "it turned");
         assert!(rests(&wire), "after {after} replies");
     }
 }
@@ -294,7 +292,7 @@ fn a_motor_is_stopped_and_the_run_goes_on_when_replies_are_lost() {
         };
         let wire = wrong_behind_a_start(50, lost);
         let report = test(&wire, 1, &ALL);
-        assert!(wire.borrow().station.fastest > 0.0, "it turned");
+        assert!(wire.station().fastest > 0.0, "it turned");
         assert_eq!(report.count("not run"), 0, "reply {second}: {}", report.lost());
         assert!(report.failed().count() <= 2, "reply {second}: {}", not_clean(&report));
         assert!(rests(&wire), "reply {second}");

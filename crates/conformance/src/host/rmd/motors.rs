@@ -1,10 +1,11 @@
 //! Motors that answer as their script says.
 
-use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::marker;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use motorlink_link::serve::CanStation;
+use motorlink_proto::Hex;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
     Code, MotionStatus, MotorId, MotorSet, MultiTurnAngle, Payload, SingleTurnAngle, Status,
@@ -18,7 +19,6 @@ use motorlink_proto::units::{
 use crate::host::journal::{Exchange, Journal};
 use crate::host::outbox::Outbox;
 use crate::host::script::Send;
-use crate::wire::hex;
 
 /// A scenario for an RMD host.
 pub type Scenario = crate::host::Scenario<Script>;
@@ -27,11 +27,11 @@ pub(super) type Sends = Vec<Send<CanFrame>>;
 
 /// What the motors send for a request.
 #[derive(Clone)]
-pub struct Script(Rc<dyn Fn(&Turn) -> Sends>);
+pub struct Script(Arc<dyn Fn(&Turn) -> Sends + marker::Send + Sync>);
 
 impl Script {
-    pub(super) fn new(script: impl Fn(&Turn) -> Sends + 'static) -> Self {
-        Script(Rc::new(script))
+    pub(super) fn new(script: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static) -> Self {
+        Script(Arc::new(script))
     }
 }
 
@@ -51,7 +51,7 @@ pub(super) struct Turn {
 
 /// Four motors, IDs 1 to 4, and a script. Clones are the same motors.
 #[derive(Clone)]
-pub struct Motors(Rc<RefCell<Inner>>);
+pub struct Motors(Arc<Mutex<Inner>>);
 
 struct Inner {
     script: Script,
@@ -70,7 +70,7 @@ impl Scenario {
     pub fn motors(&self, timeout: Duration) -> Motors {
         let (asked, readings) = Default::default();
         let script = self.script.clone();
-        Motors(Rc::new(RefCell::new(Inner {
+        Motors(Arc::new(Mutex::new(Inner {
             script,
             outbox: Outbox::new(),
             asked,
@@ -81,15 +81,19 @@ impl Scenario {
 }
 
 impl Motors {
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// What passed so far.
     pub fn journal(&self) -> Journal {
-        self.0.borrow().outbox.journal.clone()
+        self.inner().outbox.journal.clone()
     }
 }
 
 impl CanStation for Motors {
     fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
-        let mut inner = self.0.borrow_mut();
+        let mut inner = self.inner();
         inner.outbox.journal.heard(now, &show(frame));
         if let Some((can_id, data)) = frame.eight_bytes() {
             if let Some(id) = MotorId::from_can_id(can_id.into()) {
@@ -104,11 +108,11 @@ impl CanStation for Motors {
     }
 
     fn poll(&mut self, now: Instant, replies: &mut Vec<CanFrame>) {
-        self.0.borrow_mut().flush(now, replies);
+        self.inner().flush(now, replies);
     }
 
     fn deadline(&self) -> Option<Instant> {
-        self.0.borrow().outbox.deadline()
+        self.inner().outbox.deadline()
     }
 }
 
@@ -175,5 +179,5 @@ fn show(frame: &CanFrame) -> String {
         (false, true) => " remote",
         (false, false) => "",
     };
-    format!("{:03x}#{}{kind}", frame.id(), hex(frame.data()))
+    format!("{:03x}#{}{kind}", frame.id(), Hex(frame.data()))
 }

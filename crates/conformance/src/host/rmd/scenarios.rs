@@ -1,5 +1,7 @@
 //! What RMD hosts are put through.
 
+use std::marker;
+
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Code, Dialect};
 use motorlink_proto::time::Duration;
@@ -301,7 +303,7 @@ fn read(
     clauses: &'static [&'static str],
     expected: &'static str,
     demand: Demand,
-    trick: impl Fn(&Turn) -> Sends + 'static,
+    trick: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
 ) -> Scenario {
     let script = move |turn: &Turn| {
         let is_meant = turn.code == Code::ReadMultiTurnAngle && turn.asked == DISTURBED;
@@ -315,7 +317,7 @@ fn off(
     name: &'static str,
     expected: &'static str,
     demand: Demand,
-    trick: impl Fn(&Turn) -> Sends + 'static,
+    trick: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
 ) -> Scenario {
     let script = move |turn: &Turn| {
         if turn.code == Code::Off { trick(turn) } else { vec![right(turn)] }
@@ -328,7 +330,7 @@ fn clear(
     name: &'static str,
     expected: &'static str,
     demand: Demand,
-    trick: impl Fn(&Turn) -> Sends + 'static,
+    trick: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
 ) -> Scenario {
     let script = move |turn: &Turn| {
         if turn.code == Code::ClearErrors { trick(turn) } else { vec![right(turn)] }
@@ -342,7 +344,7 @@ fn scenario(
     expected: &'static str,
     task: Task,
     demand: Demand,
-    script: impl Fn(&Turn) -> Sends + 'static,
+    script: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
 ) -> Scenario {
     Scenario { name: name.into(), clauses, expected, task, demand, script: Script::new(script) }
 }

@@ -1,9 +1,10 @@
 //! A drive that answers as its script says.
 
-use std::cell::RefCell;
-use std::rc::Rc;
+use std::marker;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use motorlink_link::serve::ByteStation;
+use motorlink_proto::Hex;
 use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Features, Frame, Motor, Parse, Profile, Ramp, RegisterId,
     Request, RevupPhase, Slave, Status, Version,
@@ -13,7 +14,6 @@ use motorlink_proto::time::{Duration, Instant};
 use crate::host::journal::Journal;
 use crate::host::outbox::Outbox;
 use crate::host::script::{Send, share};
-use crate::wire::hex;
 
 /// A scenario for an ST host.
 pub type Scenario = crate::host::Scenario<Script>;
@@ -22,11 +22,11 @@ pub(super) type Sends = Vec<Send<Vec<u8>>>;
 
 /// What the drive sends for a request.
 #[derive(Clone)]
-pub struct Script(Rc<dyn Fn(&Turn) -> Sends>);
+pub struct Script(Arc<dyn Fn(&Turn) -> Sends + marker::Send + Sync>);
 
 impl Script {
-    pub(super) fn new(script: impl Fn(&Turn) -> Sends + 'static) -> Self {
-        Script(Rc::new(script))
+    pub(super) fn new(script: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static) -> Self {
+        Script(Arc::new(script))
     }
 }
 
@@ -44,7 +44,7 @@ pub(super) struct Turn {
 
 /// A drive with one motor and a script. Clones are the same drive.
 #[derive(Clone)]
-pub struct Drive(Rc<RefCell<Inner>>);
+pub struct Drive(Arc<Mutex<Inner>>);
 
 struct Inner {
     slave: Slave,
@@ -58,7 +58,7 @@ struct Inner {
 impl Scenario {
     /// The drive of this scenario, for a host that waits `timeout` for a reply.
     pub fn drive(&self, timeout: Duration) -> Drive {
-        Drive(Rc::new(RefCell::new(Inner {
+        Drive(Arc::new(Mutex::new(Inner {
             slave: Slave::new(Profile::Spec, Motor::FIRST),
             engine: Engine::default(),
             incoming: Vec::new(),
@@ -70,15 +70,19 @@ impl Scenario {
 }
 
 impl Drive {
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// What passed so far.
     pub fn journal(&self) -> Journal {
-        self.0.borrow().outbox.journal.clone()
+        self.inner().outbox.journal.clone()
     }
 }
 
 impl ByteStation for Drive {
     fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
-        let mut inner = self.0.borrow_mut();
+        let mut inner = self.inner();
         for &byte in bytes {
             inner.byte(now, byte);
         }
@@ -86,7 +90,7 @@ impl ByteStation for Drive {
     }
 
     fn poll(&mut self, now: Instant, reply: &mut Vec<u8>) {
-        let mut inner = self.0.borrow_mut();
+        let mut inner = self.inner();
         if let Some(nack) = inner.slave.poll(now).map(<[u8]>::to_vec) {
             inner.answer(now, nack);
         }
@@ -94,7 +98,7 @@ impl ByteStation for Drive {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        let inner = self.0.borrow();
+        let inner = self.inner();
         inner.slave.deadline().into_iter().chain(inner.outbox.deadline()).min()
     }
 }
@@ -111,7 +115,7 @@ impl Inner {
     fn answer(&mut self, now: Instant, reply: Vec<u8>) {
         let request = std::mem::take(&mut self.incoming);
         let patience = share(self.timeout, 1, 2);
-        let shown = hex(&request);
+        let shown = Hex(&request).to_string();
         self.outbox.journal.heard(now, &shown);
         let motor = Motor::FIRST.number();
         let exchange = self.outbox.journal.asked(now, motor, 0, &shown, patience);
@@ -137,7 +141,7 @@ impl Inner {
     }
 
     fn flush(&mut self, now: Instant, out: &mut Vec<u8>) {
-        self.outbox.flush(now, |bytes| hex(bytes), |bytes| out.extend(bytes));
+        self.outbox.flush(now, |bytes| Hex(bytes).to_string(), |bytes| out.extend(bytes));
     }
 }
 

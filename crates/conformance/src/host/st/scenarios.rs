@@ -1,6 +1,7 @@
 //! What ST hosts are put through.
 
 use std::borrow::Cow;
+use std::marker;
 
 use motorlink_proto::st::{Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD};
 use motorlink_proto::time::Duration;
@@ -322,7 +323,7 @@ fn scenario(
     clauses: Clauses,
     expected: &'static str,
     demand: Demand,
-    trick: impl Fn(&Turn) -> Sends + 'static,
+    trick: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
 ) -> Scenario {
     disturbed(Some(DISTURBED), name.into(), clauses, expected, demand, Task::Read, trick)
 }
@@ -333,7 +334,7 @@ fn start(
     clauses: Clauses,
     expected: &'static str,
     demand: Demand,
-    trick: impl Fn(&Turn) -> Sends + 'static,
+    trick: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
 ) -> Scenario {
     disturbed(Some(0), name.into(), clauses, expected, demand, Task::Start, trick)
 }
@@ -346,7 +347,7 @@ fn disturbed(
     expected: &'static str,
     demand: Demand,
     task: Task,
-    trick: impl Fn(&Turn) -> Sends + 'static,
+    trick: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
 ) -> Scenario {
     let script = move |turn: &Turn| {
         let is_meant = number.is_none() || turn.asked == number;

@@ -97,7 +97,7 @@ fn mutants() -> Vec<Mutant> {
 }
 
 /// Takes these frames as well, for what they would be if they were in order.
-fn lenient(takes: impl Fn(&CanFrame) -> bool + 'static) -> Behaviour {
+fn lenient(takes: impl Fn(&CanFrame) -> bool + Send + 'static) -> Behaviour {
     Box::new(move |motors, event| match event {
         Event::Frame(frame) if frame.id() & 0x1C0 == 0x140 && takes(frame) => {
             let mut data = Command::encode(&ReadStatus);

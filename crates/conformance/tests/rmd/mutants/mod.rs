@@ -100,7 +100,7 @@ fn without_a_mutation_the_same_wrappers_pass() {
 }
 
 /// Changes the data of replies, given the request's.
-pub fn replies(change: impl Fn(&[u8; 8], &mut [u8; 8]) + 'static) -> Behaviour {
+pub fn replies(change: impl Fn(&[u8; 8], &mut [u8; 8]) + Send + 'static) -> Behaviour {
     frames(move |request, reply| {
         let Some((id, data)) = reply.eight_bytes() else { return vec![reply] };
         let (mut data, request) = (*data, *request.eight_bytes().expect("it was answered").1);
@@ -110,7 +110,7 @@ pub fn replies(change: impl Fn(&[u8; 8], &mut [u8; 8]) + 'static) -> Behaviour {
 }
 
 /// Changes replies to one command.
-pub fn on(to: Code, change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
+pub fn on(to: Code, change: impl Fn(&mut [u8; 8]) + Send + 'static) -> Behaviour {
     replies(move |request, reply| {
         if code(request) == to {
             change(reply);
@@ -119,7 +119,7 @@ pub fn on(to: Code, change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
 }
 
 /// Changes replies, given the request.
-fn frames(change: impl Fn(&CanFrame, CanFrame) -> Vec<CanFrame> + 'static) -> Behaviour {
+fn frames(change: impl Fn(&CanFrame, CanFrame) -> Vec<CanFrame> + Send + 'static) -> Behaviour {
     Box::new(move |motors, event| match event {
         Event::Frame(request) => {
             let replies = motors.pass(Event::Frame(request));
@@ -131,7 +131,7 @@ fn frames(change: impl Fn(&CanFrame, CanFrame) -> Vec<CanFrame> + 'static) -> Be
 
 /// Changes the data of requests to the first motor; its reply has the code that was sent, and an
 /// echo all of it.
-pub fn requests(change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
+pub fn requests(change: impl Fn(&mut [u8; 8]) + Send + 'static) -> Behaviour {
     commands(move |motors, data| {
         let mut changed = *data;
         change(&mut changed);
@@ -165,7 +165,7 @@ fn taken_for(one: u8, other: u8) -> Behaviour {
 
 /// Takes commands to the first motor away from it: `Some` is what is answered.
 pub fn commands(
-    mut take: impl FnMut(&mut Motors, &[u8; 8]) -> Option<Option<[u8; 8]>> + 'static,
+    mut take: impl FnMut(&mut Motors, &[u8; 8]) -> Option<Option<[u8; 8]>> + Send + 'static,
 ) -> Behaviour {
     Box::new(move |motors, event| {
         if let Event::Frame(frame) = event

@@ -214,7 +214,7 @@ fn four() -> Vec<Mutant> {
 }
 
 /// Changes what comes of 0x280.
-fn reordered(change: impl Fn(&mut Vec<CanFrame>) + 'static) -> Behaviour {
+fn reordered(change: impl Fn(&mut Vec<CanFrame>) + Send + 'static) -> Behaviour {
     Box::new(move |motors, event| {
         let four = matches!(&event, Event::Frame(frame) if frame.id() == 0x280);
         let mut replies = motors.pass(event);
@@ -226,7 +226,7 @@ fn reordered(change: impl Fn(&mut Vec<CanFrame>) + 'static) -> Behaviour {
 }
 
 /// Changes what 0x280 says.
-fn torques(change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
+fn torques(change: impl Fn(&mut [u8; 8]) + Send + 'static) -> Behaviour {
     Box::new(move |motors, event| {
         if let Event::Frame(frame) = &event
             && let Some((0x280, data)) = frame.eight_bytes()

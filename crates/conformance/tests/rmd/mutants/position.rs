@@ -80,7 +80,7 @@ fn mutants() -> Vec<Mutant> {
 }
 
 /// Changes one command.
-fn on(to: u8, change: impl Fn(&mut [u8; 8]) + 'static) -> Behaviour {
+fn on(to: u8, change: impl Fn(&mut [u8; 8]) + Send + 'static) -> Behaviour {
     requests(move |data| {
         if data[0] == to {
             change(data);

@@ -75,7 +75,7 @@ fn caught(mutants: &[Mutant]) {
 
 /// Changes what the drive hears.
 fn hears(
-    mut change: impl FnMut(&mut Station, Instant, &mut Vec<u8>) -> Option<Vec<u8>> + 'static,
+    mut change: impl FnMut(&mut Station, Instant, &mut Vec<u8>) -> Option<Vec<u8>> + Send + 'static,
 ) -> Deviation {
     let before = Box::new(move |station: &mut Station, now, bytes: &mut Vec<u8>| {
         change(station, now, bytes)
@@ -84,13 +84,13 @@ fn hears(
 }
 
 /// Changes a reply, whose request is given with it.
-pub fn says(change: impl FnMut(&[u8], &mut Vec<u8>) + 'static) -> Deviation {
+pub fn says(change: impl FnMut(&[u8], &mut Vec<u8>) + Send + 'static) -> Deviation {
     Deviation { after: Some(Box::new(change)), ..Deviation::default() }
 }
 
 /// Answers some right commands itself: header and payload in, the reply out.
 pub fn answers(
-    mut answer: impl FnMut(&mut Station, Instant, u8, &[u8]) -> Option<Vec<u8>> + 'static,
+    mut answer: impl FnMut(&mut Station, Instant, u8, &[u8]) -> Option<Vec<u8>> + Send + 'static,
 ) -> Deviation {
     hears(move |station, now, bytes| {
         let (header, payload) = parsed(bytes)?;
@@ -99,7 +99,10 @@ pub fn answers(
 }
 
 /// Changes the payload of right commands of a frame code.
-fn takes(code: u8, mut change: impl FnMut(&mut Station, &mut Vec<u8>) + 'static) -> Deviation {
+fn takes(
+    code: u8,
+    mut change: impl FnMut(&mut Station, &mut Vec<u8>) + Send + 'static,
+) -> Deviation {
     hears(move |station, _, bytes| {
         let (header, mut payload) = parsed(bytes)?;
         if header & 0x1F == code {
@@ -111,7 +114,7 @@ fn takes(code: u8, mut change: impl FnMut(&mut Station, &mut Vec<u8>) + 'static)
 }
 
 /// Changes the payload of ACKs to commands of a frame code, given the command's payload.
-pub fn gives(code: u8, mut change: impl FnMut(&[u8], &mut Vec<u8>) + 'static) -> Deviation {
+pub fn gives(code: u8, mut change: impl FnMut(&[u8], &mut Vec<u8>) + Send + 'static) -> Deviation {
     says(move |request, reply| {
         let (Some((header, asked)), Some((HEADER_ACK, mut payload))) =
             (parsed(request), parsed(reply))
@@ -126,7 +129,7 @@ pub fn gives(code: u8, mut change: impl FnMut(&[u8], &mut Vec<u8>) + 'static) ->
 }
 
 /// Changes the error code of NACKs, given the command.
-fn refuses(mut change: impl FnMut(&[u8], ErrorCode) -> ErrorCode + 'static) -> Deviation {
+fn refuses(mut change: impl FnMut(&[u8], ErrorCode) -> ErrorCode + Send + 'static) -> Deviation {
     says(move |request, reply| {
         if let Some((HEADER_NACK, payload)) = parsed(reply) {
             *reply = nack(change(request, ErrorCode::from(payload[0])));

@@ -1,0 +1,72 @@
+//! A station on virtual time that a test looks at while the kit speaks to it.
+#![allow(dead_code, reason = "no test needs all of it")]
+
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use motorlink::Clock;
+use motorlink::port::{ByteLink, CanLink};
+use motorlink_link::serve::{ByteStation, CanStation, StationLink};
+use motorlink_proto::can::CanFrame;
+use motorlink_proto::time::Instant;
+
+/// Clones are the same station.
+pub struct Shared<S> {
+    station: Arc<Mutex<S>>,
+    pub clock: Clock,
+}
+
+impl<S> Clone for Shared<S> {
+    fn clone(&self) -> Self {
+        Shared { station: Arc::clone(&self.station), clock: self.clock.clone() }
+    }
+}
+
+impl<S> Shared<S> {
+    pub fn new(station: S) -> Self {
+        Shared { station: Arc::new(Mutex::new(station)), clock: Clock::standing() }
+    }
+
+    pub fn station(&self) -> MutexGuard<'_, S> {
+        self.station.lock().expect("nobody panicked with it")
+    }
+}
+
+impl<S: ByteStation + Send + 'static> Shared<S> {
+    pub fn line(&self) -> Box<dyn ByteLink> {
+        Box::new(StationLink::<_, u8>::new(self.clone(), self.clock.clone()))
+    }
+}
+
+impl<S: CanStation + Send + 'static> Shared<S> {
+    pub fn bus(&self) -> Box<dyn CanLink> {
+        Box::new(StationLink::<_, CanFrame>::new(self.clone(), self.clock.clone()))
+    }
+}
+
+impl<S: ByteStation> ByteStation for Shared<S> {
+    fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
+        self.station().receive(now, bytes, reply);
+    }
+
+    fn poll(&mut self, now: Instant, reply: &mut Vec<u8>) {
+        self.station().poll(now, reply);
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.station().deadline()
+    }
+}
+
+impl<S: CanStation> CanStation for Shared<S> {
+    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+        self.station().receive(now, frame, replies);
+    }
+
+    fn poll(&mut self, now: Instant, replies: &mut Vec<CanFrame>) {
+        self.station().poll(now, replies);
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.station().deadline()
+    }
+}
