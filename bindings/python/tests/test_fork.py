@@ -25,9 +25,13 @@ BEGIN = """
             child = multiprocessing.get_context("fork").Process(target=signal.pause)
             child.start()
             return child.pid
+        ready, alive = os.pipe()
         child = os.fork()
         if child == 0:
+            os.write(alive, b"x")
             signal.pause()
+        # A busy machine may not have run the child yet: until then it has the ports of its parent.
+        os.read(ready, 1)
         return child
 """
 
