@@ -6,7 +6,7 @@ use motorlink::st::{Profile, Reading, RegisterId, find_register, parse_value};
 use motorlink_link::serve::ServeName;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{self, Command as _, MotorId};
-use motorlink_proto::st::{self as st, MAX_FRAME, Request};
+use motorlink_proto::st::{self as st, Frame, MAX_FRAME, Request};
 use motorlink_proto::time::Instant;
 use motorlink_proto::units::CentiDps;
 use motorlink_sim::rmd::RmdConfig;
@@ -102,7 +102,7 @@ pub fn sim_config(data: &[u8]) {
     for number in 1..=station.drive().last().number() {
         for request in [Request::Execute(st::Command::StartMotor), Request::BoardInfo] {
             let mut out = [0; MAX_FRAME];
-            let frame = request.encode(number, &mut out).expect("it fits");
+            let frame = Frame::command(number, &request, &mut out).expect("it fits");
             station.receive(Instant(0), frame, |_| {});
         }
     }

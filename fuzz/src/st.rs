@@ -61,9 +61,9 @@ fn message(profile: Profile, frame: &Frame<'_>) {
     let valued = matches!(payload.len(), 1 | 2 | 4);
     assert_eq!(RegisterId(frame.header).decode(profile, payload).is_some(), valued);
 
-    let Ok(request) = Request::decode(profile, frame) else { return };
+    let Ok(request) = frame.request(profile) else { return };
     let mut out = [0xA5; MAX_FRAME];
-    let again = request.encode(frame.motor(), &mut out).expect("it came in a frame");
+    let again = Frame::command(frame.motor(), &request, &mut out).expect("it came in a frame");
     let Parse::Frame(same, size) = Frame::parse(again) else { panic!("{again:02x?}") };
     assert_eq!((same.header, size), (frame.header, again.len()));
     assert!(frame.payload.starts_with(same.payload), "what follows a message is dropped");
@@ -138,9 +138,9 @@ impl MasterBench {
         let (motor, code) = (input.byte() % 8, input.byte());
         let profile = PROFILES[usize::from(code) % 2];
         let frame = Frame { header: Frame::header(code >> 1, motor), payload: input.bytes() };
-        let Ok(request) = Request::decode(profile, &frame) else { return };
+        let Ok(request) = frame.request(profile) else { return };
         let mut out = [0; MAX_FRAME];
-        let bytes = request.encode(motor, &mut out).map(<[u8]>::to_vec);
+        let bytes = Frame::command(motor, &request, &mut out).map(<[u8]>::to_vec);
         let result = self.master.request(motor, &request);
         self.begun(result, bytes);
     }

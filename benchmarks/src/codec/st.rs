@@ -64,8 +64,8 @@ fn asked(request: Request<'static>, payload: &[u8], decode: impl Fn(&[u8]) + 'st
     Kind::new(
         code.name().to_owned(),
         move || {
-            if let Some(frame) = read(black_box(&request).encode(1, &mut sent)) {
-                let _ = black_box(Request::decode(profile, &frame));
+            if let Some(frame) = read(Frame::command(1, black_box(&request), &mut sent)) {
+                let _ = black_box(frame.request(profile));
             }
         },
         move || {

@@ -128,7 +128,7 @@ mod tests {
     fn the_bytes_are_those_of_the_exchange() {
         let mut room = [0; 16];
         let request = Request::GetRegister(RegisterId::SPEED_MEAS);
-        assert_eq!(request.encode(1, &mut room), Some(REQUEST));
+        assert_eq!(Frame::command(1, &request, &mut room), Some(REQUEST));
         let reply = Frame { header: HEADER_ACK, payload: &[0; 4] };
         assert_eq!(reply.encode(&mut room), Some(REPLY));
     }

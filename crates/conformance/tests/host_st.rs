@@ -260,7 +260,7 @@ impl Simple<'_> {
             self.received.clear();
         }
         let mut frame = [0; MAX_FRAME];
-        let frame = request.encode(1, &mut frame).unwrap();
+        let frame = Frame::command(1, request, &mut frame).unwrap();
         self.line.send(frame)?;
         if self.has(Fault::SendsTwoAtOnce) {
             self.line.send(frame)?;

@@ -123,8 +123,8 @@ proptest! {
         let profile = if firmware { Profile::Mcsdk54 } else { Profile::Spec };
         let header = Frame::header(code, motor);
         let mut out = [0; MAX_FRAME];
-        if let Ok(request) = Request::decode(profile, &Frame { header, payload: &payload }) {
-            let bytes = request.encode(motor, &mut out).expect("it came from a frame").to_vec();
+        if let Ok(request) = (Frame { header, payload: &payload }).request(profile) {
+            let bytes = Frame::command(motor, &request, &mut out).expect("it came from a frame").to_vec();
             let Parse::Frame(frame, _) = Frame::parse(&bytes) else { panic!("not a frame") };
             // Bytes behind a message are ignored, those of a NaN compare unequal as numbers.
             prop_assert!(payload.starts_with(frame.payload));

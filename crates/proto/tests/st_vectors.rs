@@ -84,15 +84,20 @@ fn every_request_encodes_to_its_bytes_and_decodes_from_them() {
         let motor = vector["motor"].as_u64().unwrap() as u8;
 
         let mut out = [0xA5; MAX_FRAME + 1];
-        assert_eq!(expected.encode(motor, &mut out), Some(&bytes[..]), "{vector}");
+        assert_eq!(Frame::command(motor, &expected, &mut out), Some(&bytes[..]), "{vector}");
         assert!(out[bytes.len()..].iter().all(|&byte| byte == 0xA5), "wrote past the frame");
 
         let Parse::Frame(frame, size) = Frame::parse(&bytes) else { panic!("{vector}") };
         assert_eq!((size, frame.motor()), (bytes.len(), motor), "{vector}");
+        let mut payload = [0xA5; MAX_PAYLOAD];
+        assert_eq!(expected.payload(&mut payload), Some(frame.payload), "{vector}");
+        let short = frame.payload.len().saturating_sub(1);
+        let fits = frame.payload.is_empty();
+        assert_eq!(expected.payload(&mut payload[..short]).is_some(), fits, "{vector}");
         for &profile in profiles(&vector) {
             let code = FrameCode::from_number(frame.code(), profile).map(FrameCode::name);
             assert_eq!(code, vector["code"].as_str(), "{vector}");
-            assert_eq!(Request::decode(profile, &frame), Ok(expected), "{vector}");
+            assert_eq!(frame.request(profile), Ok(expected), "{vector}");
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Command as _, ReadPhaseCurrents, SetPosition, SetSpeed};
-use motorlink_proto::st::{Command, MAX_FRAME, Profile, Ramp, RegisterId, Request};
+use motorlink_proto::st::{Command, Frame, MAX_FRAME, Profile, Ramp, RegisterId, Request};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{CentiDegrees, CentiDps};
 use motorlink_sim::hash::fingerprint;
@@ -21,7 +21,7 @@ fn st() {
     let mut said = Vec::new();
     let mut ask = |station: &mut StStation<_>, now, motor, request: Request<'_>| {
         let mut frame = [0; MAX_FRAME];
-        let frame = request.encode(motor, &mut frame).expect("the request fits");
+        let frame = Frame::command(motor, &request, &mut frame).expect("the request fits");
         station.receive(now, frame, |reply| said.extend_from_slice(reply));
     };
     for motor in [1, 2] {

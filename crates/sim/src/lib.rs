@@ -27,12 +27,13 @@
 //! * What is in front of a gear is of the rotor, unless it says output or load.
 //!
 //! ```
-//! use motorlink_proto::{st::{Command, Profile, Request}, time::Instant};
+//! use motorlink_proto::{st::{Command, Frame, Profile, Request}, time::Instant};
 //! use motorlink_sim::st::{StDrive, StStation};
 //!
 //! let mut station = StStation::new(Profile::Spec, StDrive::demo(Instant(0)));
 //! let mut frame = [0; 131];
-//! let start = Request::Execute(Command::StartMotor).encode(1, &mut frame).unwrap();
+//! let start = Request::Execute(Command::StartMotor);
+//! let start = Frame::command(1, &start, &mut frame).unwrap();
 //! station.receive(Instant(0), start, |reply| assert_eq!(reply, [0xF0, 0x00, 0xF0]));
 //! station.advance_to(Instant(3_000_000));
 //! let [motor, _] = station.drive().motors() else { unreachable!() };

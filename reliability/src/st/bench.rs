@@ -7,7 +7,7 @@ use motorlink::time::{Duration, Instant};
 use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::st::{
     Config, Error, ErrorCode, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, Line, MAX_FRAME,
-    Master, Motor, Output, Parse, Profile, Recovery, Request, Slave,
+    Master, Motor, Output, Parse, Profile, Recovery, Slave,
 };
 
 use super::drive::{MOTORS, Memory};
@@ -215,7 +215,7 @@ impl Bench {
         }
         let started = self.now;
         let frame = Frame { header: ask.header, payload: ask.payload() };
-        let known = Request::decode(self.ends.setup.profile, &frame);
+        let known = frame.request(self.ends.setup.profile);
         let begins = match &known {
             Ok(request) => self.ends.master.request(frame.motor(), request),
             Err(_) => self.ends.master.request_raw(ask.header, ask.payload()),

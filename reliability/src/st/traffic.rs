@@ -18,7 +18,8 @@ pub struct Ask {
 impl Ask {
     pub fn of(motor: u8, request: &Request<'_>) -> Self {
         let mut out = [0; MAX_FRAME];
-        let bytes = request.encode(motor, &mut out).expect("requests of the mix fit a frame");
+        let bytes =
+            Frame::command(motor, request, &mut out).expect("requests of the mix fit a frame");
         Ask::raw(bytes[0], &bytes[2..bytes.len() - 1])
     }
 

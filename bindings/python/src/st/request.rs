@@ -1,8 +1,8 @@
 //! One request to an ST drive: checked when it is made, and able to read its reply.
 
 use motorlink_proto::st::{
-    Command, CurrentReference, ErrorCode, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, PositionMove,
-    REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENTS, TorqueRamp,
+    Command, CurrentReference, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor,
+    PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENTS, TorqueRamp,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyString};
@@ -294,7 +294,7 @@ impl StRequest {
     fn decode(py: Python<'_>, frame: &[u8], profile: &str) -> PyResult<(u8, Self)> {
         let scale = Scale::new(py, profile, None)?;
         let parsed = frame::parse(py, frame)?;
-        let request = Request::decode(scale.profile, &parsed).map_err(|code| {
+        let request = parsed.request(scale.profile).map_err(|code| {
             let header = parsed.header;
             bad_value(
                 py,
@@ -309,7 +309,7 @@ impl StRequest {
     fn encode<'py>(&self, py: Python<'py>, motor: i64) -> PyResult<Bound<'py, PyBytes>> {
         let motor = motor_number(py, motor)?;
         let mut out = [0; MAX_FRAME];
-        match self.request().encode(motor, &mut out) {
+        match Frame::command(motor, &self.request(), &mut out) {
             Some(frame) => Ok(PyBytes::new(py, frame)),
             None => Err(frame::too_long(py)),
         }
@@ -364,7 +364,7 @@ impl StRequest {
 
     /// The request, if it fits a frame.
     fn fitting(self, py: Python<'_>) -> PyResult<Self> {
-        let fits = self.request().encode(0, &mut [0; MAX_FRAME]).is_some();
+        let fits = Frame::command(0, &self.request(), &mut [0; MAX_FRAME]).is_some();
         if fits { Ok(self) } else { Err(frame::too_long(py)) }
     }
 

@@ -286,7 +286,7 @@ impl Bench {
     /// The frame of a request to the motor under test.
     pub(super) fn encode(&self, request: &Request<'_>) -> Vec<u8> {
         let mut frame = [0; MAX_FRAME];
-        let bytes = request.encode(self.options.motor.number(), &mut frame);
+        let bytes = Frame::command(self.options.motor.number(), request, &mut frame);
         bytes.expect("the kit's requests fit a frame").to_vec()
     }
 

@@ -188,7 +188,7 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
 
 fn to_the_current(request: &Request<'_>) -> Vec<u8> {
     let mut room = [0; MAX_FRAME];
-    request.encode(0, &mut room).expect("the kit's requests fit a frame").to_vec()
+    Frame::command(0, request, &mut room).expect("the kit's requests fit a frame").to_vec()
 }
 
 /// GET_REG STATUS of a motor.

@@ -164,7 +164,7 @@ impl Follower {
 
 /// Commands are the same in every profile.
 fn command(frame: &Frame<'_>) -> Option<Command> {
-    match Request::decode(Profile::Spec, frame) {
+    match frame.request(Profile::Spec) {
         Ok(Request::Execute(command)) => Some(command),
         _ => None,
     }
@@ -180,7 +180,7 @@ mod tests {
 
     fn frame(motor: u8, request: &Request<'_>) -> Vec<u8> {
         let mut bytes = [0; MAX_FRAME];
-        request.encode(motor, &mut bytes).unwrap().to_vec()
+        Frame::command(motor, request, &mut bytes).unwrap().to_vec()
     }
 
     fn command(motor: u8, command: Command) -> Vec<u8> {

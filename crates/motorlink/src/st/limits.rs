@@ -120,7 +120,7 @@ impl Limits {
     /// Why it does not.
     pub fn check_frame(&self, frame: &Frame<'_>) -> Result<(), LimitError> {
         self.size(frame.payload.len())?;
-        Profile::ALL.into_iter().try_for_each(|profile| match Request::decode(profile, frame) {
+        Profile::ALL.into_iter().try_for_each(|profile| match frame.request(profile) {
             Ok(request) => self.check(&request),
             Err(_) => FrameCode::from_number(frame.code(), profile)
                 .map_or(Ok(()), |code| self.short(code)),

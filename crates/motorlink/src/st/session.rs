@@ -142,7 +142,7 @@ impl Session {
     pub(super) fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         self.rules.check(motor, request)?;
         let effect = Effect::of(Some(request));
-        self.admit(motor, effect, |ahead| request.encode(motor, ahead).map(<[u8]>::len))?;
+        self.admit(motor, effect, |ahead| Frame::command(motor, request, ahead).map(<[u8]>::len))?;
         let begun = self.master.request(motor, request);
         self.begun(begun, motor, effect, What::of(request))
     }
@@ -325,7 +325,7 @@ impl Session {
     ) -> &'a [u8] {
         self.master.lost();
         let stop = Request::Execute(Command::StopMotor);
-        stop.encode(motor.number(), frame).unwrap_or(&[])
+        Frame::command(motor.number(), &stop, frame).unwrap_or(&[])
     }
 
     /// What a stop ends in when the drive has just failed to answer another.

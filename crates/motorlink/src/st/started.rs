@@ -51,7 +51,7 @@ impl Effect {
     /// What a raw frame does in the profile in which it does something.
     pub(super) fn of_frame(frame: &Frame<'_>) -> Self {
         let code = |profile| FrameCode::from_number(frame.code(), profile);
-        let effects = Profile::ALL.map(|profile| match Request::decode(profile, frame) {
+        let effects = Profile::ALL.map(|profile| match frame.request(profile) {
             // Shipped firmware takes an old byte for the command (docs/SPEC-NOTES.md S18).
             Err(_) if code(profile) == Some(FrameCode::ExecuteCmd) => Effect::Starts,
             request => Effect::of(request.ok().as_ref()),

@@ -46,7 +46,7 @@ impl Transcript {
             0 => String::new(),
             motor => format!(", motor {motor}"),
         };
-        let request = match Request::decode(self.profile, frame) {
+        let request = match frame.request(self.profile) {
             Ok(request) => request,
             Err(_) => {
                 self.asked = ReplyKind::Nothing;

@@ -94,12 +94,17 @@ impl<'a> Frame<'a> {
         if size > MAX_PAYLOAD {
             return None;
         }
-        out.get_mut(2..size + 2)?.copy_from_slice(self.payload);
+        room(out)?.get_mut(..size)?.copy_from_slice(self.payload);
         seal(out, self.header, size)
     }
 }
 
-/// Completes a frame whose payload of `size` bytes already stands at `out[2..]`.
+/// Where the payload of the frame in `out` goes.
+pub(super) fn room(out: &mut [u8]) -> Option<&mut [u8]> {
+    out.get_mut(2..)
+}
+
+/// Completes the frame whose payload of `size` bytes is in its [`room`].
 pub(super) fn seal(out: &mut [u8], header: u8, size: usize) -> Option<&[u8]> {
     let frame = out.get_mut(..size.checked_add(OVERHEAD)?)?;
     let (check, body) = frame.split_last_mut()?;

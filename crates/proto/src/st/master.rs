@@ -260,7 +260,8 @@ impl Master {
         if self.state != State::Idle {
             return Err(RequestError::Busy);
         }
-        let frame = request.encode(motor, &mut self.buffer).ok_or(RequestError::TooLong)?;
+        let frame =
+            Frame::command(motor, request, &mut self.buffer).ok_or(RequestError::TooLong)?;
         self.filled = frame.len() as u8;
         self.begin(motor, Some(request.code()));
         let profile = self.config.profile;

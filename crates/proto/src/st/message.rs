@@ -1,9 +1,8 @@
-//! Messages: what a frame's payload says (chapter 4), both ways.
+//! Messages: what a payload says (chapter 4), both ways. A framing carries them: see `Frame::command`.
 
-use super::{
-    Command, ErrorCode, Features, Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, frame,
-    register::Shape,
-};
+use super::payload::Payload;
+use super::register::{RegisterId, Shape};
+use super::{Command, ErrorCode, Features, FrameCode, Profile};
 
 /// Phases of the rev-up (4.10).
 pub const REVUP_PHASES: u8 = 5;
@@ -98,6 +97,18 @@ pub enum Request<'a> {
     Position(PositionMove),
 }
 
+/// What a drive replied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reply<'a> {
+    /// The positive acknowledge (ACK), with its payload.
+    Acknowledged(&'a [u8]),
+    /// The negative acknowledge (NACK), with its error code; one without is
+    /// [`ErrorCode::None`].
+    Refused(ErrorCode),
+    /// An identification (ATR), which follows no request.
+    Identification,
+}
+
 /// How many bytes the payload of an acknowledge has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReplySize {
@@ -141,10 +152,10 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Writes the frame for motor number `motor` (0 to 7) into `out` and gives its bytes; `None`
-    /// when it does not fit a frame or `out`.
-    pub fn encode<'o>(&self, motor: u8, out: &'o mut [u8]) -> Option<&'o [u8]> {
-        let mut payload = Payload::new(out.get_mut(2..)?);
+    /// Writes the payload into `out` and gives its bytes; `None` when `out` is too short.
+    /// [`Frame::command`](super::Frame::command) writes the whole frame.
+    pub fn payload<'o>(&self, out: &'o mut [u8]) -> Option<&'o [u8]> {
+        let mut payload = Payload::new(&mut *out);
         match *self {
             Request::SetRegister { register, value } => payload.byte(register.0).bytes(value),
             Request::GetRegister(register) => payload.byte(register.0),
@@ -171,14 +182,13 @@ impl<'a> Request<'a> {
                 .bytes(&target.duration_s.to_le_bytes()),
         };
         let size = payload.finish()?;
-        frame::seal(out, Frame::header(self.code().number(), motor), size)
+        out.get(..size)
     }
 
-    /// Understands a command frame as a slave of `profile` does. Bytes behind the message are
+    /// Understands the message with this frame code as a slave of `profile` does. Bytes behind it are
     /// ignored; a message that is too short is refused with the code given (SPEC-NOTES S18).
-    pub fn decode(profile: Profile, frame: &Frame<'a>) -> Result<Self, ErrorCode> {
-        let code = FrameCode::from_number(frame.code(), profile).ok_or(ErrorCode::BadFrameId)?;
-        let payload = frame.payload;
+    pub fn decode(profile: Profile, code: u8, payload: &'a [u8]) -> Result<Self, ErrorCode> {
+        let code = FrameCode::from_number(code, profile).ok_or(ErrorCode::BadFrameId)?;
         let too_short = match code {
             FrameCode::GetReg => ErrorCode::GetWriteOnly,
             FrameCode::ExecuteCmd => ErrorCode::WrongCmd,
@@ -390,66 +400,5 @@ fn text(bytes: &[u8]) -> &str {
             .get(..error.valid_up_to())
             .and_then(|valid| core::str::from_utf8(valid).ok())
             .unwrap_or(""),
-    }
-}
-
-/// Writes a payload at its place in a frame, behind header and length. What does not fit makes `finish` fail.
-pub(super) struct Payload<'o> {
-    room: &'o mut [u8],
-    len: usize,
-}
-
-impl<'o> Payload<'o> {
-    pub(super) fn new(room: &'o mut [u8]) -> Self {
-        Payload { room, len: 0 }
-    }
-
-    // A call is smaller than what it does, and replies are short.
-    #[inline(never)]
-    pub(super) fn byte(&mut self, byte: u8) -> &mut Self {
-        if let Some(slot) = self.room.get_mut(self.len) {
-            *slot = byte;
-        }
-        self.len = self.len.saturating_add(1);
-        self
-    }
-
-    #[inline(never)]
-    pub(super) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
-        for &byte in bytes {
-            self.byte(byte);
-        }
-        self
-    }
-
-    /// The low `size` bytes of a register's value.
-    pub(super) fn value(&mut self, bits: i32, size: u8) -> &mut Self {
-        let bytes = bits.to_le_bytes();
-        self.bytes(bytes.get(..usize::from(size)).unwrap_or(&bytes))
-    }
-
-    fn bytes_up_to(&mut self, bytes: &[u8], most: usize) -> &mut Self {
-        self.bytes(bytes.get(..most).unwrap_or(bytes))
-    }
-
-    fn decimal(&mut self, number: u8) -> &mut Self {
-        if number >= 10 {
-            self.decimal(number / 10);
-        }
-        self.byte(b'0' + number % 10)
-    }
-
-    /// Text, cut and padded with NUL so that the payload ends, NUL-terminated, at `end`.
-    fn text(&mut self, text: &str, end: usize) {
-        let most = end.saturating_sub(1).saturating_sub(self.len);
-        self.bytes_up_to(text.as_bytes(), most);
-        while self.len < end {
-            self.byte(0);
-        }
-    }
-
-    /// The payload's size; `None` when it did not fit.
-    pub(super) fn finish(self) -> Option<usize> {
-        (self.len <= self.room.len() && self.len <= MAX_PAYLOAD).then_some(self.len)
     }
 }

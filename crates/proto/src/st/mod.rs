@@ -4,10 +4,10 @@
 //! contradicts itself, `docs/SPEC-NOTES.md` has the reading (`S1`, `S2`, …).
 //!
 //! * [`Frame`] turns bytes into header, payload and checksum and back (chapter 3).
-//! * [`Request`] and the reply types of [`message`] are the messages (chapter 4).
+//! * [`Request`], [`Reply`] and the types of [`message`] are the messages, which know nothing of frames
+//!   (chapter 4). [`Frame::command`] puts a request into its frame.
 //! * [`register`] is table 3 as typed constants, [`RegisterId`] the same by number.
 //! * [`Master`] conducts one exchange at a time; [`Slave`] answers for a [`Drive`].
-
 //!
 //! A drive with one motor and nothing but a speed, as firmware or a test would have it:
 //!
@@ -58,11 +58,13 @@
 //! ```
 
 mod code;
+mod command;
 mod drive;
 mod failure;
 mod frame;
 mod master;
 pub mod message;
+mod payload;
 mod question;
 pub mod register;
 mod slave;
@@ -81,8 +83,8 @@ pub use master::{
     Config, Counters, Line, Master, Output, Recovery, RequestError, TIMEOUT, question_behind,
 };
 pub use message::{
-    BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, ReplySize,
-    Request, RevupPhase, TorqueRamp, Version,
+    BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, Reply,
+    ReplySize, Request, RevupPhase, TorqueRamp, Version,
 };
 pub use register::{Feature, Features, RegisterId};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};

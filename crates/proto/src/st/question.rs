@@ -1,8 +1,8 @@
 //! The questions by which a line comes in step, and what comes instead of their answers.
 
 use super::{
-    Bad, Command, ErrorCode, Failure, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_PAYLOAD, RegisterId,
-    Request, RevupPhase, frame,
+    Bad, Command, ErrorCode, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_PAYLOAD,
+    RegisterId, Request, RevupPhase, frame,
 };
 
 /// The reply has 32 bytes, as that of GET_BOARD_INFO.
@@ -62,7 +62,7 @@ impl Question {
             STATUS => Request::GetRegister(RegisterId::STATUS),
             _ => Request::GetRegister(RegisterId::FLAGS),
         };
-        let bytes = request.encode(0, &mut self.frame).unwrap_or(&[]);
+        let bytes = Frame::command(0, &request, &mut self.frame).unwrap_or(&[]);
         self.size = bytes.len() as u8;
         bytes
     }
@@ -70,7 +70,7 @@ impl Question {
     /// A STOP_MOTOR, which goes before a question.
     pub(super) fn stop(&mut self, motor: u8) -> &[u8] {
         let stop = Request::Execute(Command::StopMotor);
-        stop.encode(motor, &mut self.frame).unwrap_or(&[])
+        Frame::command(motor, &stop, &mut self.frame).unwrap_or(&[])
     }
 
     pub(super) const fn kind(&self) -> u8 {

@@ -1,6 +1,6 @@
 //! The slave: bytes in, replies out (4.1).
 
-use super::message::Payload;
+use super::payload::Payload;
 use super::register::{Shape, Type, Unit, Writing};
 use super::{
     BoardInfo, Command, Drive, ErrorCode, Feature, Features, FirmwareVersion, Frame, FrameCode,
@@ -151,8 +151,8 @@ impl Slave {
         if code == Some(FrameCode::SetPositionCmd) && !features.has(Feature::PositionControl) {
             return Err(ErrorCode::BadFrameId);
         }
-        let request = Request::decode(self.profile, frame)?;
-        let [_, _, room @ ..] = &mut self.buffer;
+        let request = frame.request(self.profile)?;
+        let [_, _, room @ .., _] = &mut self.buffer;
         let mut out = Payload::new(room);
         match request {
             Request::SetRegister { register, value } => {

@@ -113,7 +113,7 @@ impl Bench {
 
     pub fn ask(&mut self, motor: u8, request: Request<'_>) -> Result<Vec<u8>, ErrorCode> {
         let mut out = [0; MAX_FRAME];
-        let frame = request.encode(motor, &mut out).unwrap().to_vec();
+        let frame = Frame::command(motor, &request, &mut out).unwrap().to_vec();
         answer(&self.bytes(&frame))
     }
 }

@@ -49,7 +49,7 @@ impl Line {
     /// Sends a request to a motor (0 is the current one); the ACK's payload, or the NACK's code.
     pub fn ask(&mut self, motor: u8, request: Request<'_>) -> Result<Vec<u8>, Nack> {
         let mut frame = [0; MAX_FRAME];
-        let frame = request.encode(motor, &mut frame).expect("the request fits");
+        let frame = Frame::command(motor, &request, &mut frame).expect("the request fits");
         let mut reply = Vec::new();
         self.station.receive(self.now, frame, |bytes| reply.extend_from_slice(bytes));
         self.log.extend_from_slice(&reply);

@@ -7,7 +7,7 @@ use motorlink_proto::rmd::{
     SpinDirection, Stop, WriteAccelerationRam, WritePidRam,
 };
 use motorlink_proto::st::{
-    Command, CurrentReference, MAX_FRAME, Motor, PositionMove, Profile, REVUP_PHASES, Ramp,
+    Command, CurrentReference, Frame, MAX_FRAME, Motor, PositionMove, Profile, REVUP_PHASES, Ramp,
     Request, RevupPhase, TorqueRamp, find_register, parse_value,
 };
 use motorlink_proto::units::Quantity;
@@ -110,7 +110,7 @@ impl StMessage {
             }
         };
         let mut frame = [0; MAX_FRAME];
-        let sent = request.encode(motor.number(), &mut frame);
+        let sent = Frame::command(motor.number(), &request, &mut frame);
         sent.map(<[u8]>::to_vec).ok_or_else(|| "the message does not fit a frame".to_owned())
     }
 

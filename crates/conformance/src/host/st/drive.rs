@@ -120,7 +120,7 @@ impl Inner {
         let motor = Motor::FIRST.number();
         let exchange = self.outbox.journal.asked(now, motor, 0, &shown, patience);
         let decoded = match Frame::parse(&request) {
-            Parse::Frame(frame, _) => Request::decode(Profile::Spec, &frame).ok(),
+            Parse::Frame(frame, _) => frame.request(Profile::Spec).ok(),
             Parse::More | Parse::Bad(_) => None,
         };
         let (asked, value) = match decoded {

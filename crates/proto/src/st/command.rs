@@ -1,0 +1,30 @@
+//! Messages in frames: where this framing puts code, motor and payload of a message.
+
+use super::frame::{self, Frame};
+use super::message::{Reply, Request};
+use super::{ErrorCode, HEADER_ACK, HEADER_ATR, HEADER_NACK, Profile};
+
+impl<'a> Frame<'a> {
+    /// Writes the frame that carries `request` to motor number `motor` (0 to 7, where 0 is the current
+    /// motor) into `out` and gives its bytes; `None` when it does not fit a frame or `out`.
+    pub fn command<'o>(motor: u8, request: &Request<'_>, out: &'o mut [u8]) -> Option<&'o [u8]> {
+        let size = request.payload(frame::room(out)?)?.len();
+        frame::seal(out, Frame::header(request.code().number(), motor), size)
+    }
+
+    /// The message of a command frame, or the code with which a slave of `profile` refuses it.
+    pub fn request(&self, profile: Profile) -> Result<Request<'a>, ErrorCode> {
+        Request::decode(profile, self.code(), self.payload)
+    }
+
+    /// The message of a reply frame; `None` where its header is not that of a reply.
+    pub fn reply(&self) -> Option<Reply<'a>> {
+        Some(match (self.header, self.payload) {
+            (HEADER_ACK, payload) => Reply::Acknowledged(payload),
+            (HEADER_NACK, [code, ..]) => Reply::Refused(ErrorCode::from(*code)),
+            (HEADER_NACK, []) => Reply::Refused(ErrorCode::None),
+            (HEADER_ATR, _) => Reply::Identification,
+            _ => return None,
+        })
+    }
+}

@@ -1,0 +1,62 @@
+//! Writes payloads.
+
+/// Writes a payload into the room that a framing has for it. What does not fit makes `finish` fail.
+pub(super) struct Payload<'o> {
+    room: &'o mut [u8],
+    len: usize,
+}
+
+impl<'o> Payload<'o> {
+    pub(super) fn new(room: &'o mut [u8]) -> Self {
+        Payload { room, len: 0 }
+    }
+
+    // A call is smaller than what it does, and replies are short.
+    #[inline(never)]
+    pub(super) fn byte(&mut self, byte: u8) -> &mut Self {
+        if let Some(slot) = self.room.get_mut(self.len) {
+            *slot = byte;
+        }
+        self.len = self.len.saturating_add(1);
+        self
+    }
+
+    #[inline(never)]
+    pub(super) fn bytes(&mut self, bytes: &[u8]) -> &mut Self {
+        for &byte in bytes {
+            self.byte(byte);
+        }
+        self
+    }
+
+    /// The low `size` bytes of a register's value.
+    pub(super) fn value(&mut self, bits: i32, size: u8) -> &mut Self {
+        let bytes = bits.to_le_bytes();
+        self.bytes(bytes.get(..usize::from(size)).unwrap_or(&bytes))
+    }
+
+    pub(super) fn bytes_up_to(&mut self, bytes: &[u8], most: usize) -> &mut Self {
+        self.bytes(bytes.get(..most).unwrap_or(bytes))
+    }
+
+    pub(super) fn decimal(&mut self, number: u8) -> &mut Self {
+        if number >= 10 {
+            self.decimal(number / 10);
+        }
+        self.byte(b'0' + number % 10)
+    }
+
+    /// Text, cut and padded with NUL so that the payload ends, NUL-terminated, at `end`.
+    pub(super) fn text(&mut self, text: &str, end: usize) {
+        let most = end.saturating_sub(1).saturating_sub(self.len);
+        self.bytes_up_to(text.as_bytes(), most);
+        while self.len < end {
+            self.byte(0);
+        }
+    }
+
+    /// The payload's size; `None` when it did not fit.
+    pub(super) fn finish(self) -> Option<usize> {
+        (self.len <= self.room.len()).then_some(self.len)
+    }
+}
