@@ -65,7 +65,6 @@ mod frame;
 mod master;
 pub mod message;
 mod payload;
-mod question;
 pub mod register;
 mod slave;
 #[cfg(feature = "std")]

@@ -1,8 +1,10 @@
-//! The questions by which a line comes in step, and what comes instead of their answers.
+//! What recovery sends: padding, questions by which a line comes in step, and what comes instead of
+//! their answers.
 
-use super::{
-    Bad, Command, ErrorCode, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_PAYLOAD,
-    RegisterId, Request, RevupPhase, frame,
+use super::scan::{Scan, Scanned};
+use crate::st::{
+    Command, ErrorCode, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, RegisterId,
+    Request, RevupPhase,
 };
 
 /// The reply has 32 bytes, as that of GET_BOARD_INFO.
@@ -13,6 +15,26 @@ pub(super) const REVUP: u8 = 2;
 pub(super) const STATUS: u8 = 4;
 /// The reply has 4 bytes, as that of GET_REG FLAGS.
 pub(super) const FLAGS: u8 = 8;
+
+/// A question behind an acknowledge of `size` bytes, or a refusal, and the size of its answer. It has
+/// another size, so that the answer shows whether replies and requests go together. `turn` changes with
+/// each question: the answer to the one before has another size, too.
+pub const fn question_behind(size: Option<usize>, turn: bool) -> (Request<'static>, usize) {
+    match (size, turn) {
+        (Some(1 | 4), true) => (Request::BoardInfo, 32),
+        (Some(1), false) | (_, true) => (Request::GetRegister(RegisterId::FLAGS), 4),
+        _ => (Request::GetRegister(RegisterId::STATUS), 1),
+    }
+}
+
+/// Completes any frame. 5.x firmware drops 0xFF 0xFF as header and length, so it is left in step or
+/// with one 0xFF as header: 0x00 0xFF is dropped by the one and a frame of motor 7, which has no
+/// meaning, to the other.
+pub(super) static PADDING: [u8; MAX_FRAME + 1] = {
+    let mut bytes = [0xFF; MAX_FRAME + 1];
+    bytes[MAX_FRAME - 1] = 0x00;
+    bytes
+};
 
 /// A question, and what came since it was asked.
 #[derive(Debug, Clone)]
@@ -109,7 +131,7 @@ impl Question {
     /// Whether the answer came, and nothing else.
     pub(super) const fn is_alone(&self) -> bool {
         let Came { answers, refusals, others } = self.came;
-        self.is_alone && answers == 1 && refusals == 0 && others == 0 && self.scan.taken == 0
+        self.is_alone && answers == 1 && refusals == 0 && others == 0 && self.scan.taken() == 0
     }
 
     /// Whether what came is what was sent.
@@ -119,7 +141,7 @@ impl Question {
 
     /// The reason if there is no answer.
     pub(super) fn failure(&self) -> Failure {
-        match self.scan.taken {
+        match self.scan.taken() {
             0 => self.trouble.unwrap_or(Failure::Timeout),
             received => Failure::Incomplete { received },
         }
@@ -137,56 +159,4 @@ impl Question {
 
 fn count(replies: &mut u8) {
     *replies = replies.saturating_add(1);
-}
-
-/// Finds frames in a stream without keeping them.
-#[derive(Debug, Clone, Copy)]
-struct Scan {
-    header: u8,
-    length: u8,
-    /// Bytes of the frame so far.
-    taken: u8,
-    sum: u16,
-    /// The byte before the checksum.
-    last: u8,
-}
-
-/// What a byte is to a [`Scan`].
-enum Scanned {
-    /// A part of a frame.
-    More,
-    /// The end of a frame: its header, its length, the last byte of its payload.
-    Frame(u8, u8, u8),
-    /// A part of none.
-    Stray(Failure),
-}
-
-impl Scan {
-    const NONE: Scan = Scan { header: 0, length: 0, taken: 0, sum: 0, last: 0 };
-
-    fn take(&mut self, byte: u8) -> Scanned {
-        let begins = matches!(byte, HEADER_ACK | HEADER_NACK | HEADER_ATR);
-        match self.taken {
-            0 if !begins => return Scanned::Stray(Failure::Header(byte)),
-            0 => self.header = byte,
-            1 if usize::from(byte) > MAX_PAYLOAD => {
-                *self = Scan::NONE;
-                return Scanned::Stray(Failure::Damaged(Bad::Length(byte)));
-            }
-            1 => self.length = byte,
-            taken if taken == self.length.saturating_add(2) => {
-                let Scan { header, length, sum, last, .. } = core::mem::replace(self, Scan::NONE);
-                return match frame::fold(sum) {
-                    expected if byte == expected => Scanned::Frame(header, length, last),
-                    expected => {
-                        Scanned::Stray(Failure::Damaged(Bad::Checksum { expected, received: byte }))
-                    }
-                };
-            }
-            _ => self.last = byte,
-        }
-        self.taken = self.taken.saturating_add(1);
-        self.sum = self.sum.wrapping_add(u16::from(byte));
-        Scanned::More
-    }
 }

@@ -1,0 +1,133 @@
+//! One request and its reply, as bytes.
+
+use crate::st::{
+    Error, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Parse, Profile, Reply,
+    ReplySize, Request,
+};
+
+/// A request until it is sent, then what is received of the reply.
+#[derive(Debug, Clone)]
+pub(super) struct Exchange {
+    buffer: [u8; MAX_FRAME],
+    filled: u8,
+    /// The size of the reply, in the profile of the drive and in the other.
+    sizes: [ReplySize; 2],
+}
+
+/// What was received.
+pub(super) enum Received {
+    /// An identification, which was skipped.
+    Identification,
+    /// The end of the exchange, and how many bytes there are behind the reply. The payload has this
+    /// many bytes.
+    End(Result<u8, Error>, u8),
+}
+
+impl Exchange {
+    pub(super) const NONE: Exchange =
+        Exchange { buffer: [0; MAX_FRAME], filled: 0, sizes: [ReplySize::Any; 2] };
+
+    /// Stores the frame to send; `None` when the request does not fit one.
+    pub(super) fn store(
+        &mut self,
+        motor: u8,
+        request: &Request<'_>,
+        profile: Profile,
+    ) -> Option<()> {
+        self.filled = Frame::command(motor, request, &mut self.buffer)?.len() as u8;
+        self.sizes = [request.reply_size(profile), request.reply_size(profile.other())];
+        Some(())
+    }
+
+    /// Stores any frame to send; `None` when its payload is too long.
+    pub(super) fn store_raw(&mut self, frame: &Frame<'_>) -> Option<()> {
+        self.filled = frame.encode(&mut self.buffer)?.len() as u8;
+        self.sizes = [ReplySize::Any; 2];
+        Some(())
+    }
+
+    /// The frame to send; what is received from now on is the reply.
+    pub(super) fn send(&mut self) -> &[u8] {
+        let size = usize::from(core::mem::take(&mut self.filled));
+        self.buffer.get(..size).unwrap_or(&[])
+    }
+
+    /// Stores what was received; returns how many bytes did not fit.
+    pub(super) fn receive(&mut self, bytes: &[u8]) -> usize {
+        let filled = usize::from(self.filled);
+        let room = self.buffer.get_mut(filled..).unwrap_or(&mut []);
+        let taken = room.iter_mut().zip(bytes).map(|(slot, &byte)| *slot = byte).count();
+        self.filled = self.filled.saturating_add(taken as u8);
+        bytes.len() - taken
+    }
+
+    /// What the stored bytes are; `None` while the reply is incomplete.
+    pub(super) fn next(&mut self, profile: Profile) -> Option<Received> {
+        let received = self.buffer.get(..usize::from(self.filled))?;
+        let header = *received.first()?;
+        let (failure, surplus) = match Frame::parse(received) {
+            _ if !matches!(header, HEADER_ACK | HEADER_NACK | HEADER_ATR) => {
+                (Failure::Header(header), 0)
+            }
+            Parse::More => return None,
+            Parse::Bad(bad) => (Failure::Damaged(bad), 0),
+            Parse::Frame(frame, size) => {
+                let surplus = self.filled.saturating_sub(size as u8);
+                let reply = frame.reply()?;
+                if matches!(reply, Reply::Identification) {
+                    self.skip(size, surplus);
+                    return Some(Received::Identification);
+                }
+                let failure = match (reply, self.sizes) {
+                    _ if contradicts(&frame, received.get(size..)?) => Failure::Ambiguous,
+                    // The drive did not understand the frame: it may take the rest of it for
+                    // another one, and answer that too.
+                    (Reply::Refused(code), _) if code.is_damage() => Failure::NotUnderstood(code),
+                    (Reply::Refused(code), _) => {
+                        return Some(Received::End(Err(Error::Refused(code)), surplus));
+                    }
+                    (_, [own, other]) => {
+                        let received = frame.payload.len() as u8;
+                        if own.takes(received) {
+                            return Some(Received::End(Ok(received), surplus));
+                        }
+                        let fits = other.takes(received).then(|| profile.other());
+                        Failure::Size { received, fits }
+                    }
+                };
+                (failure, surplus)
+            }
+        };
+        Some(Received::End(Err(Error::Failed(failure)), surplus))
+    }
+
+    /// The failure when nothing more is received in time.
+    pub(super) const fn timeout(&self) -> Failure {
+        match self.filled {
+            0 => Failure::Timeout,
+            received => Failure::Incomplete { received },
+        }
+    }
+
+    /// The payload of the reply, which has `size` bytes.
+    pub(super) fn payload(&self, size: u8) -> &[u8] {
+        let [_, _, payload @ ..] = &self.buffer;
+        payload.get(..usize::from(size)).unwrap_or(&[])
+    }
+
+    /// Moves the `rest` bytes behind the first `size` to the front.
+    fn skip(&mut self, size: usize, rest: u8) {
+        let mut rest_first = [0; MAX_FRAME];
+        for (slot, byte) in rest_first.iter_mut().zip(self.buffer.iter().skip(size)) {
+            *slot = *byte;
+        }
+        self.buffer = rest_first;
+        self.filled = rest;
+    }
+}
+
+/// Whether another reply stands behind a reply.
+fn contradicts(reply: &Frame<'_>, behind: &[u8]) -> bool {
+    matches!(Frame::parse(behind), Parse::Frame(other, _)
+        if matches!(other.header, HEADER_ACK | HEADER_NACK) && other != *reply)
+}
