@@ -3,25 +3,29 @@
 use super::feature::Features;
 use super::id::RegisterId;
 use super::shape::{Shape, Text, Writing};
-use super::table::{SHAPES, TEXTS};
+use super::table::{IDS, INDEX, SHAPES, TEXTS};
 use crate::st::Profile;
 use core::fmt;
 
 impl RegisterId {
     /// The register of this name; case does not matter.
     pub fn named(name: &str) -> Option<Self> {
-        let index = TEXTS.iter().position(|text| text.name.eq_ignore_ascii_case(name))?;
-        u8::try_from(index).ok().map(RegisterId)
+        let row = TEXTS.iter().position(|text| text.name.eq_ignore_ascii_case(name))?;
+        IDS.get(row).copied()
     }
 
     /// Type, unit, access and feature; `None` for an id that nobody names.
     pub fn shape(self) -> Option<&'static Shape> {
-        SHAPES.get(usize::from(self.0))
+        SHAPES.get(self.row()?)
     }
 
     /// Name and meaning; `None` for an id that nobody names.
     pub fn text(self) -> Option<&'static Text> {
-        TEXTS.get(usize::from(self.0))
+        TEXTS.get(self.row()?)
+    }
+
+    fn row(self) -> Option<usize> {
+        INDEX.row(u16::from(self.0))
     }
 
     /// Bytes that a drive of `profile` takes for the value of a SET_REG: those of the type where it
@@ -34,9 +38,9 @@ impl RegisterId {
         }
     }
 
-    /// Every register of the table.
+    /// Every register of the table, in the order of the ids.
     pub fn all() -> impl Iterator<Item = RegisterId> {
-        (0..SHAPES.len() as u8).map(RegisterId)
+        IDS.into_iter()
     }
 
     /// The value in a reply. Its size is the reply's (SPEC-NOTES S17), its sign that of the type in

@@ -8,6 +8,7 @@
 
 mod feature;
 mod id;
+mod index;
 mod lookup;
 mod shape;
 mod table;

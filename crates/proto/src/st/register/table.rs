@@ -6,13 +6,14 @@
 
 use super::feature::Feature;
 use super::id::RegisterId;
+use super::index::{Index, runs};
 use super::shape::{Access, Origin, REFUSED, Shape, Text};
 use super::typed::{Dac, Never, ReadOnly, ReadWrite, Register, WriteOnly};
 use super::unit::Unit;
 use super::value::Value;
 
-/// Declares the registers: typed constants, ids for matching, shapes and texts. A row out of order
-/// does not compile.
+/// Declares the registers: typed constants, ids for matching, shapes and texts. Ids ascend and may be
+/// sparse; a row out of order does not compile.
 macro_rules! registers {
     ($(
         $id:literal $name:ident: $ty:ident $(| $mcsdk:ident)?, $unit:ident, $access:ident, $feature:ident,
@@ -26,8 +27,14 @@ macro_rules! registers {
                pub const $name: RegisterId = RegisterId($id); )+
         }
 
-        /// Every register, at the index that is its id.
-        pub static SHAPES: [Shape; [$($id),+].len()] = [
+        /// The id of every row.
+        pub(super) const IDS: [RegisterId; [$($id),+].len()] = [$( RegisterId($id) ),+];
+
+        /// The row of every id.
+        pub(super) const INDEX: Index<{ runs(&[$($id),+]) }> = Index::new(&[$($id),+]);
+
+        /// Every register, in the order of the ids.
+        pub static SHAPES: [Shape; IDS.len()] = [
             $( Shape::new(
                 (<$ty as Value>::TYPE, Unit::$unit, Access::$access, Feature::$feature,
                  Origin::$origin),
@@ -36,17 +43,8 @@ macro_rules! registers {
             ), )+
         ];
 
-        /// The words of every register, at the index that is its id.
-        pub static TEXTS: [Text; SHAPES.len()] = [$( Text { name: stringify!($name), doc: $doc }, )+];
-
-        const _: () = {
-            let ids = [$( $id ),+];
-            let mut index = 0;
-            while index < ids.len() {
-                assert!(ids[index] == index, "a register row is out of order");
-                index += 1;
-            }
-        };
+        /// The words of every register, in the order of the ids.
+        pub static TEXTS: [Text; IDS.len()] = [$( Text { name: stringify!($name), doc: $doc }, )+];
     };
 }
 
