@@ -6,6 +6,7 @@ import signal
 import subprocess
 import threading
 import time
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 
@@ -24,6 +25,25 @@ def eventually(condition, what, within=10):
             return value
         assert time.monotonic() < deadline, f"{what} was expected within {within} s"
         time.sleep(0.005)
+
+
+@contextmanager
+def children():
+    """Programs of a test's own: `start(words, said)` gives one that has said a line. They are ended."""
+    started = []
+
+    def start(words, said, **options):
+        process = subprocess.Popen(
+            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, **options
+        )
+        started.append(process)
+        assert process.stdout.readline() == f"{said}\n"
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
 
 
 @dataclass

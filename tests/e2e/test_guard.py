@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from program import environment, eventually
+from program import children, environment, eventually
 from st_wire import ACK, EXECUTE, GET_REG, Line, frame, header
 
 STATUS, SPEED_KP = 0x02, 0x05
@@ -47,24 +47,11 @@ def guard(start, tmp_path):
 @pytest.fixture
 def client():
     """A program of its own that sends commands: `client(port, "1:1")` starts motor 1."""
-    started = []
-
-    def client(port, *commands):
-        process = subprocess.Popen(
-            [sys.executable, "-c", CLIENT, port, *commands],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=environment({"PYTHONPATH": str(Path(__file__).parent)}),
+    found = environment({"PYTHONPATH": str(Path(__file__).parent)})
+    with children() as start:
+        yield lambda port, *commands: start(
+            [sys.executable, "-c", CLIENT, port, *commands], "done", env=found
         )
-        started.append(process)
-        assert process.stdout.readline() == "done\n"
-        return process
-
-    yield client
-    for process in started:
-        process.kill()
-        process.communicate()
 
 
 def runs(drives, number):

@@ -10,6 +10,7 @@ import pytest
 
 from guarded import PORT, PTY, where
 from lines import SlowLine
+from program import children
 from unread import UNREAD, Mute
 
 HOSTS = Path(__file__).parents[1] / "hosts"
@@ -43,24 +44,12 @@ def guard(start, tmp_path):
 @pytest.fixture
 def client():
     """A program of its own that turns a motor: `client("st", port, "hold")`."""
-    started = []
-
-    def client(protocol, port, mode="hold"):
-        process = subprocess.Popen(
+    with children() as start:
+        yield lambda protocol, port, mode="hold": start(
             [sys.executable, HOSTS / "turning.py", protocol, port, mode],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+            "turns",
             stderr=subprocess.DEVNULL,
-            text=True,
         )
-        started.append(process)
-        assert process.stdout.readline() == "turns\n"
-        return process
-
-    yield client
-    for process in started:
-        process.kill()
-        process.communicate()
 
 
 @pytest.fixture

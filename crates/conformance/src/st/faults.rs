@@ -76,6 +76,11 @@ fn present(bench: &mut Bench) -> Result<(), Stop> {
 /// A fault whose cause is gone.
 fn over(bench: &mut Bench) -> Result<(), Stop> {
     present(bench)?;
+    ends(bench)
+}
+
+/// The cause of the fault goes away.
+fn ends(bench: &mut Bench) -> Result<(), Stop> {
     bench.world.fault(false)?;
     let status = bench.wait_for(SEEN, |status| status == Status::FaultOver)?;
     bench.require_read(
@@ -91,13 +96,7 @@ fn shown(bench: &mut Bench) -> Result<(), Stop> {
     bench.require(now.present() != 0, "ACK with a fault present in the high half")?;
     let occurred = now.occurred() & now.present() == now.present();
     bench.require(occurred, "ACK with the same fault in the low half")?;
-    bench.world.fault(false)?;
-    let status = bench.wait_for(SEEN, |status| status == Status::FaultOver)?;
-    bench.require_read(
-        S14,
-        status == Status::FaultOver,
-        "ACK 11: FAULT_OVER, for its cause is gone",
-    )?;
+    ends(bench)?;
     let now = flags(bench)?;
     bench.require(now.present() == 0, "ACK with no fault present in the high half")?;
     bench.require(now.occurred() != 0, "ACK with the fault that occurred in the low half")
@@ -106,13 +105,7 @@ fn shown(bench: &mut Bench) -> Result<(), Stop> {
 fn no_start(bench: &mut Bench, command: Command) -> Result<(), Stop> {
     present(bench)?;
     stays_in_fault(bench, command)?;
-    bench.world.fault(false)?;
-    let status = bench.wait_for(SEEN, |status| status == Status::FaultOver)?;
-    bench.require_read(
-        S14,
-        status == Status::FaultOver,
-        "ACK 11: FAULT_OVER, for its cause is gone",
-    )?;
+    ends(bench)?;
     stays_in_fault(bench, command)
 }
 

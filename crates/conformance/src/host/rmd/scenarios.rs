@@ -303,7 +303,7 @@ fn read(
     clauses: &'static [&'static str],
     expected: &'static str,
     demand: Demand,
-    trick: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
+    trick: fn(&Turn) -> Sends,
 ) -> Scenario {
     let script = move |turn: &Turn| {
         let is_meant = turn.code == Code::ReadMultiTurnAngle && turn.asked == DISTURBED;
@@ -317,12 +317,9 @@ fn off(
     name: &'static str,
     expected: &'static str,
     demand: Demand,
-    trick: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
+    trick: fn(&Turn) -> Sends,
 ) -> Scenario {
-    let script = move |turn: &Turn| {
-        if turn.code == Code::Off { trick(turn) } else { vec![right(turn)] }
-    };
-    scenario(name, &[OFF], expected, Task::Off, demand, script)
+    scenario(name, &[OFF], expected, Task::Off, demand, always(Code::Off, trick))
 }
 
 /// A scenario in which 0x9B is disturbed.
@@ -330,12 +327,14 @@ fn clear(
     name: &'static str,
     expected: &'static str,
     demand: Demand,
-    trick: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
+    trick: fn(&Turn) -> Sends,
 ) -> Scenario {
-    let script = move |turn: &Turn| {
-        if turn.code == Code::ClearErrors { trick(turn) } else { vec![right(turn)] }
-    };
-    scenario(name, &[CLEAR], expected, Task::Clear, demand, script)
+    scenario(name, &[CLEAR], expected, Task::Clear, demand, always(Code::ClearErrors, trick))
+}
+
+/// Disturbs every reply to a command.
+fn always(code: Code, trick: fn(&Turn) -> Sends) -> impl Fn(&Turn) -> Sends {
+    move |turn| if turn.code == code { trick(turn) } else { vec![right(turn)] }
 }
 
 fn scenario(

@@ -334,7 +334,7 @@ fn start(
     clauses: Clauses,
     expected: &'static str,
     demand: Demand,
-    trick: impl Fn(&Turn) -> Sends + marker::Send + Sync + 'static,
+    trick: fn(&Turn) -> Sends,
 ) -> Scenario {
     disturbed(Some(0), name.into(), clauses, expected, demand, Task::Start, trick)
 }
