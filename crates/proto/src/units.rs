@@ -16,28 +16,49 @@ pub fn inward(value: f64, scale: f64) -> i64 {
 
 /// A value that a message cannot carry, or that the protocol does not allow there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OutOfRange {
-    /// What was given.
-    pub value: f64,
-    /// The least that can be, in [`unit`](Self::unit).
-    pub least: f64,
-    /// The most that can be.
-    pub most: f64,
-    /// Symbol of the unit; `digits` where digits were given.
-    pub unit: &'static str,
+#[non_exhaustive]
+pub enum Unfit {
+    /// Not a number, or outside the range.
+    OutOfRange {
+        /// What was given.
+        value: f64,
+        /// The least that can be, in `unit`.
+        least: f64,
+        /// The most that can be.
+        most: f64,
+        /// Symbol of the unit; `digits` where digits were given.
+        unit: &'static str,
+    },
+    /// It would be sent as 0, which has a meaning of its own.
+    BecomesZero {
+        /// What was given.
+        value: f64,
+        /// The least that is not 0, in `unit`.
+        digit: f64,
+        /// Symbol of the unit; `digits` where digits were given.
+        unit: &'static str,
+    },
 }
 
-impl core::fmt::Display for OutOfRange {
+impl core::fmt::Display for Unfit {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let OutOfRange { value, least, most, unit } = self;
-        if *least == -most {
-            return write!(f, "{value} {unit} is beyond ±{most} {unit}");
+        match self {
+            Unfit::OutOfRange { value, least, most, unit } if *least == -most => {
+                write!(f, "{value} {unit} is beyond ±{most} {unit}")
+            }
+            Unfit::OutOfRange { value, least, most, unit } => {
+                write!(f, "{value} {unit} is outside {least} to {most} {unit}")
+            }
+            Unfit::BecomesZero { value, digit, unit } => write!(
+                f,
+                "{value} {unit} would be sent as 0, which means no limit: give 0, or {digit} {unit} at \
+                 least"
+            ),
         }
-        write!(f, "{value} {unit} is outside {least} to {most} {unit}")
     }
 }
 
-impl core::error::Error for OutOfRange {}
+impl core::error::Error for Unfit {}
 
 /// How a value that somebody wants becomes a digit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +67,8 @@ pub enum Rounding {
     Nearest,
     /// Towards 0, as [`inward`]: no digit exceeds the value.
     Inward,
+    /// The nearest digit, and 0 only of 0, which means no limit.
+    NoLimitOfZero,
 }
 
 /// What a digit is, and which there are.
@@ -78,16 +101,21 @@ impl Scale {
     ///
     /// # Errors
     /// Not a number, or outside the range.
-    pub fn wanted(&self, value: f64) -> Result<i64, OutOfRange> {
+    pub fn wanted(&self, value: f64) -> Result<i64, Unfit> {
         let digits = match self.rounding {
-            Rounding::Nearest => nearest(value / self.digit),
+            Rounding::Nearest | Rounding::NoLimitOfZero => nearest(value / self.digit),
             Rounding::Inward => inward(value, self.digit),
         };
-        if value.is_finite() && (self.least..=self.most).contains(&digits) {
+        let unit = self.symbol;
+        if self.rounding == Rounding::NoLimitOfZero && digits == 0 && value > 0.0 {
+            return Err(Unfit::BecomesZero { value, digit: self.digit, unit });
+        }
+        let is_below = self.least == 0 && value < 0.0;
+        if value.is_finite() && !is_below && (self.least..=self.most).contains(&digits) {
             return Ok(digits);
         }
         let (least, most) = (self.value(self.least), self.value(self.most));
-        Err(OutOfRange { value, least, most, unit: self.symbol })
+        Err(Unfit::OutOfRange { value, least, most, unit })
     }
 
     /// The same scale for who gives digits.
@@ -117,7 +145,7 @@ pub trait Quantity: Sized {
     ///
     /// # Errors
     /// Not a number, or outside what may be asked for.
-    fn wanted(value: f64) -> Result<Self, OutOfRange> {
+    fn wanted(value: f64) -> Result<Self, Unfit> {
         Self::UNIT.wanted(value).map(Self::from_digits)
     }
 
@@ -125,7 +153,7 @@ pub trait Quantity: Sized {
     ///
     /// # Errors
     /// Not a number, or outside what may be asked for.
-    fn wanted_digits(digits: f64) -> Result<Self, OutOfRange> {
+    fn wanted_digits(digits: f64) -> Result<Self, Unfit> {
         Self::UNIT.raw().wanted(digits).map(Self::from_digits)
     }
 }
@@ -224,7 +252,7 @@ unit!(
 unit!(
     /// RMD acceleration of 0x33 and 0x34: 1 degree per second squared a digit.
     DpsPerSecond(i32), dps_per_second, from_dps_per_second, 1.0, "°/s²",
-    0, 0 => i32::MAX, Nearest
+    0, 0 => i32::MAX, NoLimitOfZero
 );
 unit!(
     /// RMD torque current command of 0xA1 and 0x280: 2000 digits are 32 A.
@@ -271,8 +299,8 @@ mod tests {
             assert!(CentiDps::wanted(odd).is_err() && WideCentiDegrees::wanted(odd).is_err());
             assert!(DpsPerSecond::wanted_digits(odd).is_err(), "{odd}");
         }
-        assert_eq!(DpsPerSecond::wanted(-0.4), Ok(DpsPerSecond(0)));
-        assert!(DpsPerSecond::wanted(-0.6).is_err());
+        assert!(TurnCentiDegrees::wanted(-0.001).is_err());
+        assert_eq!(CentiDps::wanted(-0.001), Ok(CentiDps(0)));
     }
 
     #[test]
@@ -285,6 +313,19 @@ mod tests {
         }
         let digits = SpeedLimit::wanted_digits(0.9).unwrap_err().to_string();
         assert_eq!(digits, "0.9 digits is outside 1 to 65535 digits");
+    }
+
+    #[test]
+    fn no_limit_comes_of_0_only() {
+        assert_eq!(DpsPerSecond::wanted(0.0), Ok(DpsPerSecond(0)));
+        assert_eq!(DpsPerSecond::wanted(-0.0), Ok(DpsPerSecond(0)));
+        assert_eq!(DpsPerSecond::wanted(0.5), Ok(DpsPerSecond(1)));
+        let little = DpsPerSecond::wanted(0.4).unwrap_err().to_string();
+        assert!(little.ends_with("which means no limit: give 0, or 1 °/s² at least"), "{little}");
+        for odd in [1e-300, 0.499, -0.4, -1e-300, -1.0, f64::NAN] {
+            assert!(DpsPerSecond::wanted(odd).is_err(), "{odd}");
+            assert!(DpsPerSecond::wanted_digits(odd).is_err(), "{odd}");
+        }
     }
 
     #[test]

@@ -18,16 +18,19 @@ impl<'a> Given<'a> {
         Given { name, body, options: options.collect() }
     }
 
-    /// Takes the value of an option, if it was given; the last one where it was given twice.
+    /// Takes the value of an option, if it was given.
     pub fn take(&mut self, key: &str) -> Option<&'a str> {
-        let value = self.options.iter().rev().find(|(given, _)| *given == key)?.1;
-        self.options.retain(|(given, _)| *given != key);
-        Some(value)
+        let place = self.options.iter().position(|(given, _)| *given == key)?;
+        Some(self.options.remove(place).1)
     }
 
     /// Refuses options that nobody took; `known` are those there are.
     pub fn refuse_others(&self, known: &[&str]) -> Result<(), NameError> {
         let Some((key, _)) = self.options.first() else { return Ok(()) };
+        if known.contains(key) {
+            let (name, key) = (self.name.to_owned(), (*key).to_owned());
+            return Err(NameError::OptionTwice { name, key });
+        }
         let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
         Err(NameError::UnknownOption { name: self.name.to_owned(), key: (*key).to_owned(), known })
     }
@@ -100,6 +103,14 @@ pub enum NameError {
         key: String,
         /// The options there are.
         known: String,
+    },
+    /// An option that is given twice.
+    #[error("`{name}` has the option `{key}` twice")]
+    OptionTwice {
+        /// What was given.
+        name: String,
+        /// The option.
+        key: String,
     },
     /// An option with a value that it cannot have.
     #[error("`{name}`: {key} cannot be `{value}`; use {usable}")]

@@ -62,6 +62,9 @@ pub enum Exceeded {
     SingleTurnAngle(TurnCentiDegrees),
     /// A direction that the document does not name (3, Position control command 3).
     Direction(SpinDirection),
+    /// A code beside the motion commands (0xA0 to 0xAF) that the document does not name, while there
+    /// is a limit: what its bytes mean is not known.
+    UnknownMotion(u8),
 }
 
 impl Limits {
@@ -92,6 +95,9 @@ impl Limits {
                 let command = SetSingleTurnPositionLimited::decode(data);
                 self.max_speed(command.max_speed)?;
                 circle(command.angle, command.direction)
+            }
+            Code::Unknown(code @ 0xA0..=0xAF) if *self != Self::default() => {
+                Err(Exceeded::UnknownMotion(code))
             }
             _ => Ok(()),
         }
@@ -180,6 +186,11 @@ impl fmt::Display for Exceeded {
             Exceeded::SingleTurnAngle(angle) => {
                 write!(f, "single-turn angle {:.2}° is not 0 to 359.99°", angle.degrees())
             }
+            Exceeded::UnknownMotion(code) => write!(
+                f,
+                "{code:#04x} may move the motor, and V1.62 does not say how: it is not sent while there is a \
+                 limit"
+            ),
             Exceeded::Direction(spin) => {
                 write!(f, "direction {spin} is neither 0 (clockwise) nor 1 (counterclockwise)")
             }
@@ -280,6 +291,21 @@ mod tests {
             let mut data = [0x7F; 8];
             data[0] = row.code.into();
             assert!(LIMITS.check(&data).is_err(), "{}", row.code);
+        }
+    }
+
+    #[test]
+    fn an_unknown_motion_command_is_refused_while_there_is_a_limit() {
+        for code in (0xA0..=0xAF).filter(|code| Code::from(*code).info().is_none()) {
+            let data = [code, 0, 0, 0, 0, 0, 0, 0];
+            for limited in [
+                Limits { current: LIMITS.current, ..Limits::default() },
+                Limits { speed: LIMITS.speed, ..Limits::default() },
+                Limits { angle: LIMITS.angle, ..Limits::default() },
+            ] {
+                assert_eq!(limited.check(&data), Err(Exceeded::UnknownMotion(code)));
+            }
+            assert_eq!(Limits::default().check(&data), Ok(()));
         }
     }
 

@@ -65,6 +65,8 @@ fn a_name_that_is_wrong_says_how_it_is_right() {
         ("/dev/ttyACM0?baud=0", "baud cannot be `0`"),
         ("/dev/ttyACM0?boud=9600", "unknown option `boud`; there is baud"),
         ("tcp:host:1?baud=9600", "unknown option `baud`"),
+        ("/dev/ttyACM0?baud=9600&baud=19200", "has the option `baud` twice"),
+        ("slcan:/dev/ttyACM0?echo=1&bitrate=500000&echo=1", "has the option `echo` twice"),
         ("tcp:host:1?clock=5003", "lacks a TCP port; write it like tcp:127.0.0.1:4000?clock="),
         ("tcp:host:1?clock=", "lacks a TCP port"),
         ("tcp:host:1?clock=host:0", "the port cannot be `0`"),
