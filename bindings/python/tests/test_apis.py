@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+import threading
 from collections.abc import Coroutine
 from typing import TYPE_CHECKING, Any
 
@@ -126,6 +127,31 @@ def test_a_read_cannot_be_assigned() -> None:
     with rmd.open("sim:") as bus:
         with pytest.raises(AttributeError, match="read-only"):
             bus.motor(1).gains = bus.motor(1).gains()  # type: ignore[misc, assignment]
+
+
+def test_a_read_without_brackets_is_no_value() -> None:
+    """`while motor.status != "RUN":` would go on for ever, with the motor turning."""
+    with st.open("sim:") as drive, rmd.open("sim:") as bus:
+        reads: list[Any] = [drive.motor(1).status, drive.motor(1).faults, drive.info]
+        reads += [bus.motor(1).angle, bus.motor(1).status, bus.motor(1).motion]
+        for read in reads:
+            for taken in (
+                lambda read: read == "RUN",
+                lambda read: read != 90,
+                lambda read: read in ("RUN", 1),
+                lambda read: not read,
+                lambda read: f"{read}",
+                str,
+            ):
+                with pytest.raises(TypeError, match="is a method: write"):
+                    taken(read)
+            assert callable(read) and read.__doc__ and read() is not None
+            assert threading.Thread(target=read).start() is None
+        drive.motor(1).start()
+        turning = threading.Thread(target=drive.motor(1).stop)
+        turning.start()
+        turning.join()
+        assert drive.motor(1).status() != "RUN"
 
 
 def types_of_the_blocking_api(bus: st.Bus, motors: rmd.Bus) -> None:

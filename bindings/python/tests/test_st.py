@@ -367,7 +367,7 @@ def test_a_drive_that_falls_silent_is_a_timeout_and_then_a_lost_line(tmp_path: P
     # What is asked first on a line that was just opened, and one reading.
     drive.answers = len(QUESTIONS) + 2
     try:
-        with st.open(str(drive.path), timeout=0.05) as bus:
+        with st.open(str(drive.path), timeout=0.3) as bus:
             bus.motor(3).read("SPEED_MEAS")
             with pytest.raises(motorlink.Timeout):
                 bus.motor(3).read("SPEED_MEAS")

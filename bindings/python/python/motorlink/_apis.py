@@ -187,4 +187,50 @@ def _make(cls: type, api: Callable[[Callable[..., Exchanges[Any]]], object]) -> 
         if getattr(definition, "_both_apis", False):
             method: Any = api(definition)
             method.__module__, method.__qualname__ = cls.__module__, f"{cls.__qualname__}.{name}"
-            setattr(cls, name, method)
+            setattr(cls, name, _Reading(method) if _reads(method) else method)
+
+
+def _reads(method: Callable[..., object]) -> bool:
+    """Whether a method takes nothing and gives something."""
+    signature = inspect.signature(method)
+    return len(signature.parameters) == 1 and signature.return_annotation != "None"
+
+
+class _Reading:
+    """A method that reads. A program may forget its brackets: see `_Uncalled`."""
+
+    def __init__(self, method: Callable[..., object]) -> None:
+        self._method = method
+
+    def __get__(self, owner: object, kind: type | None = None) -> object:
+        return self._method if owner is None else _Uncalled(self._method, owner)
+
+
+# Python compares a method with anything and finds that it differs: `while motor.status != "RUN":` would go
+# on for ever, and the motor turn. So a method that reads refuses what only its value can answer.
+class _Uncalled:
+    __slots__ = ("__func__", "__self__")
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, method: Callable[..., object], owner: object) -> None:
+        self.__func__ = method
+        self.__self__ = owner
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        return self.__func__(self.__self__, *arguments, **named)
+
+    @property
+    def __doc__(self) -> str | None:  # type: ignore[override]
+        return self.__func__.__doc__
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.__func__, name)
+
+    def __repr__(self) -> str:
+        return f"<method {self.__func__.__qualname__} of {self.__self__!r}>"
+
+    def _refuse(self, *_: object) -> Any:
+        name = self.__func__.__name__
+        raise TypeError(f"`{name}` is a method: write `{name}()` for what it reads")
+
+    __eq__ = __ne__ = __bool__ = __str__ = __format__ = _refuse
