@@ -2,12 +2,12 @@
 
 import csv
 import math
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
-from conftest import REPOSITORY
-
+REPOSITORY = Path(__file__).parents[2]
 SHIPPED = sorted((REPOSITORY / "scenarios").glob("*.toml"))
 PICTURES = REPOSITORY / "docs" / "pictures"
 SVG = "{http://www.w3.org/2000/svg}"
