@@ -46,7 +46,7 @@ def test_a_scan_finds_the_motors(rmd):
 
 def test_a_motor_moves_holds_a_torque_and_is_switched_off(rmd, eventually):
     def angle():
-        return rmd("-i", 2, "--json", "angle").ended(0).json["angle"]
+        return rmd("-i", 2, "--json", "angle").ended(0).json["multi_turn_angle"]
 
     rmd("-i", 2, "move", 90, "--max-speed", 500).ended(0)
     eventually(lambda: abs(angle() - 90) < 1, "90°")
