@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import inspect
 import threading
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -129,6 +129,12 @@ def test_a_read_cannot_be_assigned() -> None:
             bus.motor(1).gains = bus.motor(1).gains()  # type: ignore[misc, assignment]
 
 
+def in_a_thread(method: Callable[[], object]) -> None:
+    thread = threading.Thread(target=method)
+    thread.start()
+    thread.join()
+
+
 def test_a_read_without_brackets_is_no_value() -> None:
     """`while motor.status != "RUN":` would go on for ever, with the motor turning."""
     with st.open("sim:") as drive, rmd.open("sim:") as bus:
@@ -146,11 +152,9 @@ def test_a_read_without_brackets_is_no_value() -> None:
                 with pytest.raises(TypeError, match="is a method: write"):
                     taken(read)
             assert callable(read) and read.__doc__ and read() is not None
-            assert threading.Thread(target=read).start() is None
+            in_a_thread(read)
         drive.motor(1).start()
-        turning = threading.Thread(target=drive.motor(1).stop)
-        turning.start()
-        turning.join()
+        in_a_thread(drive.motor(1).stop)
         assert drive.motor(1).status() != "RUN"
 
 
