@@ -50,7 +50,7 @@ demo: toolchain ## 1 min: simulated drives, driven through real ports
 
 WHOLE = $(if $(T),$(error T= is for one part: make PART T="..."))\
 $(if $(filter-out $(ALL_PARTS),$(PARTS)),$(error there is no part $(filter-out $(ALL_PARTS),$(PARTS))))
-test: toolchain $(if $(SUDO),packages) ## 12 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
+test: toolchain $(if $(SUDO),packages) ## 16 min: all parts below; PARTS="unit e2e"; STRICT=1: no skips
 	$(WHOLE)
 	@$(PYTHON) tests/parts.py $(if $(STRICT),--strict) $(PARTS)
 

@@ -17,7 +17,9 @@ const PORTS: &[&str] = &[
     "tcp:drive.local:4000",
     "tcp:[::1]:4000",
     "tcp:h:1?clock=h:3",
+    "unix:./drive",
     "slcan:/dev/ttyACM0?bitrate=1000000&baud=115200&echo=1",
+    "slcan:unix:./drive",
     "slcan:tcp:h:1?bitrate=500000",
     "slcan:serial:serial:x?echo=0",
     "socketcan:can0",
@@ -26,6 +28,7 @@ const PORTS: &[&str] = &[
     "pty:./st0",
     "slcan-pty:./can0",
     "tcp-listen:127.0.0.1:0",
+    "unix-listen:./drive",
 ];
 
 /// Where the project is.

@@ -12,7 +12,7 @@ const REQUESTS: &[&str] = &[
 /// What stands between the fields of a reply.
 const REPLIES: &[&str] = &["every_reply_keeps_its_values_and_leaves_null_bytes_zero"];
 /// The codes and what they do.
-const LIST: &[&str] = &["the_table_has_the_23_commands_once_each"];
+const LIST: &[&str] = &["the_table_has_every_command_once"];
 /// Why what the vendor's tool sets is not tested.
 const TOOL: &str = "depends on a setting of the vendor's tool, which the wire cannot read";
 

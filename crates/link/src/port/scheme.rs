@@ -28,8 +28,8 @@ pub trait Scheme: Sync {
         &[]
     }
 
-    /// The port of a name; `rest` is what stands between the colon and the options, which are taken
-    /// from `given`. `all` is there for a scheme whose ports lie behind those of others.
+    /// The port of a name; `rest` is what stands between the colon and the options, which follow the
+    /// last `?` and are taken from `given`. `all` is there for a scheme whose ports lie behind those of others.
     fn parse(
         &self,
         rest: &str,

@@ -310,7 +310,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_has_the_23_commands_once_each() {
+    fn the_table_has_every_command_once() {
         assert_eq!(COMMANDS.len(), 23);
         for row in &COMMANDS {
             assert_eq!(row.code.info().map(|found| found.paragraph), Some(row.paragraph));

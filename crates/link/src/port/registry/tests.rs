@@ -37,6 +37,8 @@ fn every_form_has_one_spelling_without_what_is_the_default() {
         ("slcan:./odd?name?echo=0", "slcan:./odd?name?"),
         ("slcan:serial:serial:x", "slcan:serial:serial:x"),
         ("slcan:serial:tcp:h:1", "slcan:serial:tcp:h:1"),
+        ("unix:./drive", "unix:./drive"),
+        ("slcan:unix:./drive?echo=1", "slcan:unix:./drive?echo=1"),
         ("socketcan:vcan0", "socketcan:vcan0"),
     ] {
         assert_eq!(port(given).to_string(), spelled);
@@ -55,6 +57,8 @@ fn a_name_that_is_wrong_says_how_it_is_right() {
         ("st0", "did you mean `./st0`?"),
         ("", "ports are /dev/ttyACM0"),
         ("serial:", "lacks a device"),
+        ("unix:", "lacks a path"),
+        ("unix:./drive?baud=9600", "unknown option `baud`; there is none"),
         ("socketcan:", "lacks an interface"),
         ("tcp:host", "lacks a TCP port"),
         ("tcp::4000", "lacks a host"),

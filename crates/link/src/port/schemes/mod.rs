@@ -12,5 +12,5 @@ pub use serial::DEFAULT_BAUD;
 pub(crate) use serial::{MARKED_LINK, mark};
 pub(crate) use tcp::{keep_alive, unbracketed};
 
-pub(super) const BUILT_IN: [&dyn Scheme; 5] =
-    [&serial::Serial, &tcp::Tcp, &unix::Unix, &slcan::Slcan, &socketcan::SocketCan];
+pub(super) const BUILT_IN: &[&dyn Scheme] =
+    &[&serial::Serial, &tcp::Tcp, &unix::Unix, &slcan::Slcan, &socketcan::SocketCan];
