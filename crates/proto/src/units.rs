@@ -138,6 +138,14 @@ pub trait Quantity: Sized {
     /// What a digit is, and which may be asked for.
     const UNIT: Scale;
 
+    /// Its bytes on the wire.
+    const BYTES: u8;
+    /// Whether it is two's complement.
+    const SIGNED: bool;
+
+    /// The wire integer.
+    fn digits(self) -> i64;
+
     /// The quantity of these digits, which are cut to what the integer holds.
     fn from_digits(digits: i64) -> Self;
 
@@ -164,10 +172,11 @@ fn nearest(value: f64) -> i64 {
 }
 
 /// Declares a wire integer:
-/// `Name(integer) value from_value, digit, "symbol", decimals, least..=most, rounding`.
+/// `Name(integer, bytes on the wire), value, from_value, digit, "symbol", decimals, least => most,
+/// rounding`.
 macro_rules! unit {
     (
-        $(#[$meta:meta])* $name:ident($repr:ty), $value:ident, $from:ident, $digit:expr, $symbol:literal,
+        $(#[$meta:meta])* $name:ident($repr:ty, $bytes:literal), $value:ident, $from:ident, $digit:expr, $symbol:literal,
         $decimals:literal, $least:expr => $most:expr, $rounding:ident
     ) => {
         $(#[$meta])*
@@ -206,6 +215,13 @@ macro_rules! unit {
                 rounding: Rounding::$rounding,
             };
 
+            const BYTES: u8 = $bytes;
+            const SIGNED: bool = <$repr>::MIN != 0;
+
+            fn digits(self) -> i64 {
+                self.0.into()
+            }
+
             fn from_digits(digits: i64) -> Self {
                 $name(digits as $repr)
             }
@@ -221,62 +237,62 @@ macro_rules! unit {
 
 unit!(
     /// RMD multi-turn angle of 0xA3 and 0xA4: 0.01 degree a digit, positive is clockwise.
-    CentiDegrees(i32), degrees, from_degrees, 0.01, "°",
+    CentiDegrees(i32, 4), degrees, from_degrees, 0.01, "°",
     2, i32::MIN => i32::MAX, Nearest
 );
 unit!(
     /// RMD multi-turn angle of 0x92: 56-bit two's complement on the wire, 0.01 degree a digit.
-    WideCentiDegrees(i64), degrees, from_degrees, 0.01, "°",
+    WideCentiDegrees(i64, 7), degrees, from_degrees, 0.01, "°",
     2, -(1_i64 << 55) => (1_i64 << 55) - 1, Nearest
 );
 unit!(
     /// RMD single-turn angle of 0x94, 0xA5 and 0xA6: 0.01 degree a digit, 0 to 35999.
-    TurnCentiDegrees(u16), degrees, from_degrees, 0.01, "°",
+    TurnCentiDegrees(u16, 2), degrees, from_degrees, 0.01, "°",
     2, 0 => 35_999, Nearest
 );
 unit!(
     /// RMD speed command of 0xA2: 0.01 degree per second a digit.
-    CentiDps(i32), dps, from_dps, 0.01, "°/s",
+    CentiDps(i32, 4), dps, from_dps, 0.01, "°/s",
     2, i32::MIN => i32::MAX, Nearest
 );
 unit!(
     /// RMD speed feedback: 1 degree per second a digit.
-    Dps(i16), dps, from_dps, 1.0, "°/s",
+    Dps(i16, 2), dps, from_dps, 1.0, "°/s",
     0, i16::MIN => i16::MAX, Nearest
 );
 unit!(
     /// RMD speed limit of 0xA4 and 0xA6: 1 degree per second a digit.
-    SpeedLimit(u16), dps, from_dps, 1.0, "°/s",
+    SpeedLimit(u16, 2), dps, from_dps, 1.0, "°/s",
     0, 1 => u16::MAX, Inward
 );
 unit!(
     /// RMD acceleration of 0x33 and 0x34: 1 degree per second squared a digit.
-    DpsPerSecond(i32), dps_per_second, from_dps_per_second, 1.0, "°/s²",
+    DpsPerSecond(i32, 4), dps_per_second, from_dps_per_second, 1.0, "°/s²",
     0, 0 => i32::MAX, NoLimitOfZero
 );
 unit!(
     /// RMD torque current command of 0xA1 and 0x280: 2000 digits are 32 A.
-    IqCommand(i16), amps, from_amps, 32.0 / 2000.0, "A",
+    IqCommand(i16, 2), amps, from_amps, 32.0 / 2000.0, "A",
     3, -2000 => 2000, Nearest
 );
 unit!(
     /// RMD torque current feedback: 2048 digits are 33 A.
-    IqFeedback(i16), amps, from_amps, 33.0 / 2048.0, "A",
+    IqFeedback(i16, 2), amps, from_amps, 33.0 / 2048.0, "A",
     3, i16::MIN => i16::MAX, Nearest
 );
 unit!(
     /// RMD phase current of 0x9D: 64 digits are 1 A.
-    PhaseCurrent(i16), amps, from_amps, 1.0 / 64.0, "A",
+    PhaseCurrent(i16, 2), amps, from_amps, 1.0 / 64.0, "A",
     3, i16::MIN => i16::MAX, Nearest
 );
 unit!(
     /// RMD supply voltage of 0x9A: 0.1 V a digit.
-    DeciVolts(u16), volts, from_volts, 0.1, "V",
+    DeciVolts(u16, 2), volts, from_volts, 0.1, "V",
     1, u16::MIN => u16::MAX, Nearest
 );
 unit!(
     /// RMD motor temperature: 1 degree Celsius a digit.
-    Celsius(i8), celsius, from_celsius, 1.0, "°C",
+    Celsius(i8, 1), celsius, from_celsius, 1.0, "°C",
     0, i8::MIN => i8::MAX, Nearest
 );
 

@@ -108,8 +108,7 @@ pub(crate) fn motor_status(py: Python<'_>, status: &Status) -> PyResult<Py<PyAny
 
 /// The document's words for error bits; the number of a bit that has none.
 fn errors(py: Python<'_>, errors: Errors) -> PyResult<Bound<'_, PyTuple>> {
-    let active = Errors::NAMES.iter().filter(|(bit, _)| errors.contains(*bit));
-    PyTuple::new(py, active.map(|(_, name)| *name).collect::<Vec<_>>())
+    PyTuple::new(py, errors.words().collect::<Vec<_>>())
 }
 
 #[pymethods]

@@ -1,7 +1,7 @@
 //! Commands that read.
 
 use motorlink::rmd::{
-    Errors, Field, Found, Meaning, MotorId, MotorSet, MultiTurnAngle, Payload, SingleTurnAngle,
+    Field, Found, Meaning, MotorId, MotorSet, MultiTurnAngle, Payload, SingleTurnAngle,
 };
 use serde_json::{Value, json};
 
@@ -42,7 +42,7 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
                 json!({
                     "id": id.number(), "protocol": "V1.62",
                     "voltage": rounded(status.voltage.volts(), 1),
-                    "temperature": status.temperature.0, "errors": names(status.errors),
+                    "temperature": status.temperature.0, "errors": status.errors.words().collect::<Value>(),
                 }),
             )?,
             Found::Foreign(id, dialect) => session.output.result(
@@ -154,9 +154,4 @@ fn row(session: &Session, field: &Field, data: &[u8; 8]) -> Row {
 fn rounded(value: f64, decimals: u8) -> f64 {
     let scale = 10f64.powi(decimals.into());
     (value * scale).round() / scale
-}
-
-fn names(errors: Errors) -> Value {
-    let active = Errors::NAMES.iter().filter(|(bit, _)| errors.contains(*bit));
-    active.map(|(_, name)| *name).collect()
 }

@@ -45,7 +45,7 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
         }),
         case("each_motor_takes_its_own_of_four_torques", &["RMD-280-02", "RMD-280-03"], |bench| {
             reach(bench)?;
-            let slot = usize::from(bench.id().number() - 1);
+            let slot = bench.id().index();
             let request = move |_: &Bench, digits| {
                 let mut torques = [IqCommand(0); 4];
                 torques[slot] = IqCommand(digits);

@@ -298,8 +298,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_trust(
 ) -> motorlink_error {
     promised!(host);
     answer(|| {
-        let bit = |id: MotorId| 1u32.wrapping_shl(u32::from(id.number()) - 1);
-        host.enter()?.host.trust(MotorSet::ALL.filter(|id| motors & bit(*id) != 0).collect());
+        host.enter()?.host.trust(MotorSet::from_bits(motors));
         Ok(())
     })
 }
@@ -327,8 +326,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_busy(
     promised!(host, motors);
     answer(|| {
         let place = motors.place()?;
-        let busy = host.enter()?.host.busy();
-        place.set(busy.fold(0, |bits, id| bits | 1u32.wrapping_shl(u32::from(id.number()) - 1)));
+        place.set(host.enter()?.host.busy().bits());
         Ok(())
     })
 }

@@ -17,7 +17,7 @@ impl Client {
 
     /// Stops, when it goes out of scope, the motors that this client started.
     pub fn guard(&self) -> Guard<'_> {
-        Guard::new(self)
+        Guard { client: self, armed: true, report: |_| {} }
     }
 }
 
@@ -39,11 +39,7 @@ pub struct Stopped {
     pub result: Result<(), Error>,
 }
 
-impl<'a> Guard<'a> {
-    pub(super) fn new(client: &'a Client) -> Self {
-        Guard { client, armed: true, report: |_| {} }
-    }
-
+impl Guard<'_> {
     /// Calls `report` with what was done to each motor, when all is done.
     pub fn reporting(mut self, report: fn(&Stopped)) -> Self {
         self.report = report;

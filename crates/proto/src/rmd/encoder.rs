@@ -4,7 +4,7 @@
 use crate::units::{CentiDegrees, TurnCentiDegrees, WideCentiDegrees};
 
 /// Digits of 0.01° in a turn.
-pub const FULL_TURN: u16 = 36_000;
+pub const FULL_TURN: u16 = TurnCentiDegrees::MAX.0 + 1;
 
 /// Width of an encoder: 12 to 18 bits a turn (chapter 4, note), 14 as the document's frames say.
 ///

@@ -76,6 +76,16 @@ impl MotorSet {
     /// Every ID there is.
     pub const ALL: Self = MotorSet(u32::MAX);
 
+    /// The set of these bits, bit 0 for motor 1.
+    pub const fn from_bits(bits: u32) -> Self {
+        MotorSet(bits)
+    }
+
+    /// A bit for each ID, bit 0 for motor 1.
+    pub const fn bits(self) -> u32 {
+        self.0
+    }
+
     /// Whether the set has no motor.
     pub const fn is_empty(self) -> bool {
         self.0 == 0

@@ -1,7 +1,7 @@
 //! Where each value stands in a frame: one row a field gives the struct, both directions and the
 //! table that decoders and generators read.
 
-use crate::units::*;
+use crate::units::{Quantity, Scale};
 use core::fmt;
 
 /// The eight bytes of one kind of frame, as values. Bytes that no field covers are ignored when
@@ -196,41 +196,26 @@ macro_rules! plain {
 }
 plain! { u8 u16 }
 
-/// `Unit(integer, bytes on the wire) value`.
-macro_rules! units {
-    ($( $name:ident($repr:ty, $len:literal) $value:ident; )+) => { $(
-        impl Wire for $name {
-            const LEN: u8 = $len;
-            const SIGNED: bool = <$repr>::MIN != 0;
-            const UNIT: Scale = <$name as Quantity>::UNIT;
-            fn digits(self) -> u64 {
-                self.0 as u64
-            }
-            fn from_low(low: u64) -> Self {
-                // Drops what is above the value and extends its sign.
-                const ABOVE: u32 = 64 - 8 * $len;
-                $name((low.wrapping_shl(ABOVE) as i64).wrapping_shr(ABOVE) as $repr)
-            }
-            fn show(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                let decimals = usize::from(<$name as Quantity>::UNIT.decimals);
-                write!(f, "{:.*} {}", decimals, self.$value(), $name::SYMBOL)
-            }
-        }
-    )+ };
-}
-units! {
-    Celsius(i8, 1) celsius;
-    DeciVolts(u16, 2) volts;
-    IqCommand(i16, 2) amps;
-    IqFeedback(i16, 2) amps;
-    PhaseCurrent(i16, 2) amps;
-    Dps(i16, 2) dps;
-    CentiDps(i32, 4) dps;
-    SpeedLimit(u16, 2) dps;
-    DpsPerSecond(i32, 4) dps_per_second;
-    TurnCentiDegrees(u16, 2) degrees;
-    CentiDegrees(i32, 4) degrees;
-    WideCentiDegrees(i64, 7) degrees;
+impl<Q: Quantity + Copy> Wire for Q {
+    const LEN: u8 = Q::BYTES;
+    const SIGNED: bool = Q::SIGNED;
+    const UNIT: Scale = Q::UNIT;
+
+    fn digits(self) -> u64 {
+        Quantity::digits(self) as u64
+    }
+
+    fn from_low(low: u64) -> Self {
+        // Drops what is above the value and extends its sign.
+        let above = 64 - 8 * u32::from(Q::BYTES);
+        Q::from_digits((low.wrapping_shl(above) as i64).wrapping_shr(above))
+    }
+
+    fn show(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Scale { digit, symbol, decimals, .. } = Q::UNIT;
+        let value = Quantity::digits(self) as f64 * digit;
+        write!(f, "{value:.*} {symbol}", usize::from(decimals))
+    }
 }
 
 /// For a type that converts to and from `u8` and displays itself.

@@ -128,6 +128,11 @@ impl Errors {
     /// No error.
     pub const NONE: Self = Errors(0);
 
+    /// The document's words for the protections that are active.
+    pub fn words(self) -> impl Iterator<Item = &'static str> {
+        Self::NAMES.iter().filter(move |(bit, _)| self.contains(*bit)).map(|(_, words)| *words)
+    }
+
     /// Those whose meaning the document names.
     pub const fn active(self) -> Self {
         Errors(self.0 & Self::VALID)
@@ -178,8 +183,8 @@ impl fmt::Display for Errors {
             f.write_str("no error")?;
         }
         let mut separator = "";
-        for (_, name) in Self::NAMES.iter().filter(|(bit, _)| self.contains(*bit)) {
-            write!(f, "{separator}{name}")?;
+        for words in self.words() {
+            write!(f, "{separator}{words}")?;
             separator = ", ";
         }
         match self.0 & !Self::VALID {
