@@ -164,7 +164,8 @@ static void clock_start(void)
 }
 
 /* Microseconds since the start. To be asked at least once an hour, or a turn of the counter is
- * missed. */
+ * missed. A host's first byte stops the timer's time, even where the motors' time is behind it and
+ * clock_serve is not called: on a slow machine they would never catch up with it. */
 static uint64_t now_us(void)
 {
     static uint32_t high, last;
@@ -177,7 +178,9 @@ static uint64_t now_us(void)
         high++;
     }
     last = low;
-    return (uint64_t)high << 32 | low;
+    board_clock.now = (uint64_t)high << 32 | low;
+    board_clock.stepped = port_waits(&clock_port);
+    return board_clock.now;
 }
 
 /* A number of bytes, 254 for more. */

@@ -42,7 +42,8 @@ class Board:
     """A board in QEMU with its UARTs on TCP ports of this machine, which QEMU chooses. Its time stands
     still from the first use of the clock port on, except while somebody steps it."""
 
-    def __init__(self, language):
+    def __init__(self, language, *machine):
+        """`machine` are further options of QEMU."""
         self.language = language
         uarts = []
         for name in ("st", "rmd", "clock"):
@@ -51,7 +52,7 @@ class Board:
             uarts += ["-chardev", f"socket,id={name},{options}", "-serial", f"chardev:{name}"]
         self.process = subprocess.Popen(
             ["qemu-system-arm", "-M", "netduinoplus2", "-kernel", str(elf(language)), "-S"]
-            + ["-display", "none", "-monitor", "none", "-qmp", "stdio", *uarts],
+            + ["-display", "none", "-monitor", "none", "-qmp", "stdio", *uarts, *machine],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -3,7 +3,9 @@
 import threading
 import time
 
+import pytest
 from clock import connect
+from conftest import Board
 from st_wire import ACK, GET_REG, frame
 
 EXCHANGES = 1000
@@ -87,3 +89,13 @@ def test_motors_of_both_kinds_turn_at_once(board, st, rmd, eventually, capsys):
     assert abs(turned - 360 * (2 + 0.1)) < 4
     with capsys.disabled():
         print(f"\n{board.language}: with five motors turning, time passes at {2 / took:.0%} of real time")
+
+
+@pytest.mark.parametrize("language", ["rust", "c"])
+def test_a_host_can_stop_the_time_of_a_board_that_is_too_slow_for_it(language):
+    # An instruction takes 1.024 us: the motors' time cannot follow the timer's.
+    board = Board(language, "-icount", "shift=10,sleep=off")
+    try:
+        board.advance(0.1)
+    finally:
+        board.end()

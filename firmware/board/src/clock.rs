@@ -80,12 +80,17 @@ impl<R: Deref<Target = RegisterBlock>> Clock<R> {
         Clock { timer, port, stepped: None, step: None, answered: Traffic::default() }
     }
 
-    /// The time.
+    /// The time. A host's first byte stops the timer's, even where the motors' time is behind it and
+    /// [`serve`](Clock::serve) is not called: on a slow machine they would never catch up with it.
     pub fn now(&mut self) -> Instant {
-        match self.stepped {
-            Some(now) => now,
-            None => self.timer.now(),
+        if let Some(now) = self.stepped {
+            return now;
         }
+        let now = self.timer.now();
+        if self.port.read_ready().unwrap_or(true) {
+            self.stepped = Some(now);
+        }
+        now
     }
 
     /// Obeys the clock port. To be called when everything that is due now is done; `traffic` is what
@@ -107,7 +112,7 @@ impl<R: Deref<Target = RegisterBlock>> Clock<R> {
                 if !waits || !matches!(self.port.read(&mut command), Ok(1)) {
                     return false;
                 }
-                self.stepped = Some(self.now());
+                self.stepped.get_or_insert(self.timer.now());
                 match command {
                     [SYNC] => self.answer(SYNC, traffic),
                     [COUNT] => self.answer(traffic.taken_since(self.answered), traffic),
