@@ -28,6 +28,10 @@
  *
  * What holds for every function:
  *
+ * Version. MOTORLINK_VERSION and its numbers are those of this header, for `#if`. Before 1.0 another
+ * minor version is another interface. Where header and library may differ, compare:
+ * `strcmp(motorlink_version(), MOTORLINK_VERSION) == 0`.
+ *
  * Ownership. The caller owns the storage of every object, which may be static, on the stack or on
  * the heap, and which is opaque: `_init` begins an object there, whatever the storage held before.
  * There is nothing to release. A pointer is used during the call only, where its function does not
@@ -68,6 +72,13 @@
 
 #include <stddef.h>
 #include <stdint.h>
+
+/** Version of this header. `motorlink_version` tells the library's. */
+#define MOTORLINK_VERSION_MAJOR 0
+#define MOTORLINK_VERSION_MINOR 1
+#define MOTORLINK_VERSION_PATCH 0
+/** The same as text. */
+#define MOTORLINK_VERSION "0.1.0"
 
 /** Registers (table 3): `reg` in calls. A comment has access (D: for the DAC only), type and unit. */
 enum motorlink_st_register {
@@ -1360,6 +1371,12 @@ typedef struct motorlink_slcan_device {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/**
+ * The version of the library that is linked, such as "0.1.0": NUL-terminated, constant. A header of
+ * another version has another `MOTORLINK_VERSION`.
+ */
+const char *motorlink_version(void);
 
 /**
  * The error in words, in English, without a full stop. Never NULL; any number is taken. The text

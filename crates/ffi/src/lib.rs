@@ -27,7 +27,9 @@ pub mod slcan;
 pub mod st;
 mod storage;
 mod tag;
+mod version;
 
 pub use bytes::{MOTORLINK_NEVER, motorlink_action, motorlink_bytes};
 pub use error::{MOTORLINK_OK, motorlink_error, motorlink_error_text};
 pub use frame::{MOTORLINK_NO_FRAME, motorlink_can_frame};
+pub use version::motorlink_version;

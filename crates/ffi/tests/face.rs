@@ -212,6 +212,12 @@ fn a_master_and_a_slave_understand_each_other() {
 }
 
 #[test]
+fn the_version_is_a_text_of_c() {
+    let version = unsafe { std::ffi::CStr::from_ptr(motorlink_version()) };
+    assert_eq!(version.to_str(), Ok(env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
 fn a_drive_without_callbacks_answers() {
     let nothing: motorlink_st_drive = zeroed();
     let mut bench = StBench::new(0, &nothing);

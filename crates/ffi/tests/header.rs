@@ -10,7 +10,8 @@ use std::path::Path;
 use std::{env, fs};
 
 /// In the order in which a reader wants them. None declares another: that would be read twice.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 15] = [
+    "version.rs",
     "error.rs",
     "bytes.rs",
     "storage.rs",

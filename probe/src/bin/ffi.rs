@@ -4,7 +4,7 @@
 
 use core::hint::black_box;
 
-use motorlink_ffi::motorlink_error_text;
+use motorlink_ffi::{motorlink_error_text, motorlink_version};
 use motorlink_ffi::rmd::{drive::*, host::*, message::*};
 use motorlink_ffi::slcan::*;
 use motorlink_ffi::st::{master::*, message::*, names::*, request::*, slave::*};
@@ -29,6 +29,7 @@ macro_rules! link {
 pub extern "C" fn probe() -> ! {
     link! {
         motorlink_error_text
+        motorlink_version
         motorlink_st_master_defaults
         motorlink_st_master_init
         motorlink_st_master_get_register

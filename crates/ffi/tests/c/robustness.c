@@ -376,7 +376,17 @@ static void copied(void) {
   CHECK(action.kind == MOTORLINK_ACTION_TRANSMIT && action.bytes.size == 3);
 }
 
+static void versions(void) {
+  char numbers[32];
+  subject = "version";
+  CHECK(strcmp(motorlink_version(), MOTORLINK_VERSION) == 0);
+  sprintf(numbers, "%d.%d.%d", MOTORLINK_VERSION_MAJOR, MOTORLINK_VERSION_MINOR,
+          MOTORLINK_VERSION_PATCH);
+  CHECK(strcmp(numbers, MOTORLINK_VERSION) == 0);
+}
+
 int main(void) {
+  versions();
   wrong_storage();
   wrong_sizes();
   wrong_pointers();

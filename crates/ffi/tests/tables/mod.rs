@@ -9,7 +9,7 @@ use motorlink_proto::st::{
 };
 
 pub fn text() -> String {
-    let mut out = String::new();
+    let mut out = version();
     group(
         &mut out,
         "motorlink_st_register",
@@ -125,6 +125,20 @@ pub fn text() -> String {
     ];
     group(&mut out, "motorlink_rmd_can_id", "CAN identifiers.", ids.into_iter());
     out
+}
+
+fn version() -> String {
+    let mut out =
+        String::from("/** Version of this header. `motorlink_version` tells the library's. */\n");
+    for (part, number) in [
+        ("_MAJOR", env!("CARGO_PKG_VERSION_MAJOR")),
+        ("_MINOR", env!("CARGO_PKG_VERSION_MINOR")),
+        ("_PATCH", env!("CARGO_PKG_VERSION_PATCH")),
+    ] {
+        writeln!(out, "#define MOTORLINK_VERSION{part} {number}").expect("a string");
+    }
+    let text = env!("CARGO_PKG_VERSION");
+    out + &format!("/** The same as text. */\n#define MOTORLINK_VERSION \"{text}\"\n\n")
 }
 
 fn registers() -> impl Iterator<Item = (String, u32, String)> {
