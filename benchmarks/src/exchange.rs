@@ -3,8 +3,9 @@
 use std::hint::black_box;
 
 use motorlink_proto::st::{
-    Command, Config, CurrentReference, Drive, ErrorCode, Features, Master, Motor, Output,
-    PositionMove, Profile, Ramp, RegisterId, Request, RevupPhase, Slave, TorqueRamp, Version,
+    Command, CurrentReference, ErrorCode, Features, Master, MasterConfig, MotorControl,
+    MotorNumber, Output, PositionMove, Profile, Ramp, RegisterId, Request, RevupPhase, Slave,
+    TorqueRamp, Version,
 };
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::st::StDrive;
@@ -45,14 +46,14 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
 }
 
 pub fn kernels() -> [Kernel; 2] {
-    let (mut master, mut slave) = (master(), slave(Motor::FIRST));
+    let (mut master, mut slave) = (master(), slave(MotorNumber::FIRST));
     let mut memory = Memory { registers: [1_500; 256] };
     let with_memory = Kernel::new("exchange with memory", move || {
         black_box(exchange(Instant(0), &mut master, &mut slave, &mut memory));
     });
 
     let mut simulated = StDrive::demo(Instant(0));
-    simulated.execute(Motor::FIRST, Command::StartMotor);
+    simulated.execute(MotorNumber::FIRST, Command::StartMotor);
     let (mut master, mut slave) = (self::master(), self::slave(simulated.last()));
     let mut now = Instant(0);
     let with_simulation = Kernel::new("exchange with simulation", move || {
@@ -65,12 +66,12 @@ pub fn kernels() -> [Kernel; 2] {
 
 /// On a line that no other master has used.
 fn master() -> Master {
-    let mut master = Master::new(Config::default());
+    let mut master = Master::new(MasterConfig::default());
     master.trust_line();
     master
 }
 
-fn slave(last: Motor) -> Slave {
+fn slave(last: MotorNumber) -> Slave {
     Slave::new(Profile::Spec, last)
 }
 
@@ -79,7 +80,7 @@ fn exchange(
     now: Instant,
     master: &mut Master,
     slave: &mut Slave,
-    drive: &mut impl Drive,
+    drive: &mut impl MotorControl,
 ) -> Option<i32> {
     let register = RegisterId::SPEED_MEAS;
     master.request(1, &Request::GetRegister(register)).ok()?;
@@ -102,34 +103,34 @@ struct Memory {
     registers: [i32; 256],
 }
 
-impl Drive for Memory {
-    fn features(&self, _: Motor) -> Features {
+impl MotorControl for Memory {
+    fn features(&self, _: MotorNumber) -> Features {
         Features::NONE
     }
     fn version(&self) -> Version<'_> {
         Version { name: "memory", major: 0, minor: 0, patch: 0, pre_release: "" }
     }
-    fn read(&mut self, _: Motor, register: RegisterId) -> i32 {
+    fn read(&mut self, _: MotorNumber, register: RegisterId) -> i32 {
         self.registers[usize::from(register.0)]
     }
     fn write(
         &mut self,
-        _: Motor,
+        _: MotorNumber,
         register: RegisterId,
         value: i32,
     ) -> std::result::Result<(), ErrorCode> {
         self.registers[usize::from(register.0)] = value;
         Ok(())
     }
-    fn execute(&mut self, _: Motor, _: Command) {}
-    fn ramp(&mut self, _: Motor, _: Ramp) {}
-    fn revup(&mut self, _: Motor, _: u8) -> RevupPhase {
+    fn execute(&mut self, _: MotorNumber, _: Command) {}
+    fn ramp(&mut self, _: MotorNumber, _: Ramp) {}
+    fn revup(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
         RevupPhase::default()
     }
-    fn set_revup(&mut self, _: Motor, _: u8, _: RevupPhase) {}
-    fn current_reference(&mut self, _: Motor, _: CurrentReference) {}
-    fn torque_ramp(&mut self, _: Motor, _: TorqueRamp) {}
-    fn position(&mut self, _: Motor, _: PositionMove) {}
+    fn set_revup(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
+    fn current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
+    fn torque_ramp(&mut self, _: MotorNumber, _: TorqueRamp) {}
+    fn position(&mut self, _: MotorNumber, _: PositionMove) {}
 }
 
 #[cfg(test)]
@@ -138,7 +139,7 @@ mod tests {
 
     #[test]
     fn an_exchange_reads_the_register_again_and_again() {
-        let (mut master, mut slave) = (master(), slave(Motor::FIRST));
+        let (mut master, mut slave) = (master(), slave(MotorNumber::FIRST));
         let mut memory = Memory { registers: [0; 256] };
         for value in [-1, 0, 1_500] {
             memory.registers[usize::from(RegisterId::SPEED_MEAS.0)] = value;

@@ -39,7 +39,7 @@ struct Heard {
     frame: Option<motorlink_can_frame>,
 }
 
-struct Bench {
+struct Objects {
     blocks: [*mut u64; BLOCKS],
     kinds: [Kind; BLOCKS],
     now: u64,
@@ -121,7 +121,7 @@ pub fn ffi(data: &[u8]) {
     motor.set_mode = Some(set_mode);
     motor.sense = Some(sense);
     let blocks = [(); BLOCKS].map(|()| Box::into_raw(vec![0u64; WORDS].into_boxed_slice()));
-    let mut bench = Bench {
+    let mut bench = Objects {
         blocks: blocks.map(|block| block.cast()),
         kinds: [Kind::Nothing; BLOCKS],
         now: 0,
@@ -139,7 +139,7 @@ pub fn ffi(data: &[u8]) {
     }
 }
 
-impl Bench {
+impl Objects {
     fn operate(&mut self, operation: u8, input: &mut Input<'_>) {
         let at = usize::from(operation) % BLOCKS;
         let storage = self.blocks[at];

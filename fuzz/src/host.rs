@@ -10,7 +10,7 @@ use motorlink_proto::st::{self as st, Frame, MAX_FRAME, Request};
 use motorlink_proto::time::Instant;
 use motorlink_proto::units::CentiDps;
 use motorlink_sim::rmd::RmdConfig;
-use motorlink_testbench::{Bench, BenchConfig};
+use motorlink_testbench::{BenchConfig, SimServer};
 
 use crate::input::Input;
 
@@ -100,7 +100,7 @@ pub fn sim_config(data: &[u8]) {
     let mut bus =
         config.bus(Instant(0), RmdConfig::factory_rom).expect("what was taken can be built");
     for number in 1..=station.drive().last().number() {
-        for request in [Request::Execute(st::Command::StartMotor), Request::BoardInfo] {
+        for request in [Request::ExecuteCommand(st::Command::StartMotor), Request::GetBoardInfo] {
             let mut out = [0; MAX_FRAME];
             let frame = Frame::command(number, &request, &mut out).expect("it fits");
             station.receive(Instant(0), frame, |_| {});
@@ -123,7 +123,7 @@ pub fn sim_config(data: &[u8]) {
 /// is made of numbers.
 pub fn sim_command(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    let (mut st, mut rmd) = (Bench::new(), Bench::new());
+    let (mut st, mut rmd) = (SimServer::new(), SimServer::new());
     let config = BenchConfig::default();
     let free = ServeName::TcpListen { host: "127.0.0.1".to_owned(), port: 0 };
     st.serve_st(&free, &config).expect("loopback has a free port");

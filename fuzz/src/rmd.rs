@@ -56,7 +56,7 @@ pub fn frame(data: &[u8]) {
 /// A host under any sequence of calls and frames, with time going on.
 pub fn host(data: &[u8]) {
     let mut input = Input::new(data);
-    let mut bench = HostBench {
+    let mut bench = HostFixture {
         host: Host::new(),
         now: Instant(0),
         codes: [0; MotorId::COUNT + 1],
@@ -101,7 +101,7 @@ pub fn host(data: &[u8]) {
                 bench.host.set_limits(id, limits);
             }
             10 => bench.host.set_timeout(Duration(u64::from(input.word()))),
-            11 => bench.host.set_guard(Duration(u64::from(input.word()))),
+            11 => bench.host.set_quarantine(Duration(u64::from(input.word()))),
             12 => {
                 bench.host.reopened(bench.now);
                 bench.torque4 = None;
@@ -120,7 +120,7 @@ pub fn host(data: &[u8]) {
     bench.finish();
 }
 
-struct HostBench {
+struct HostFixture {
     host: Host,
     now: Instant,
     /// What each motor was asked last.
@@ -128,7 +128,7 @@ struct HostBench {
     torque4: Option<[u8; 8]>,
 }
 
-impl HostBench {
+impl HostFixture {
     fn set_torque4(&mut self, expected: u8, data: &[u8; 8]) {
         let ids = (1..=5).filter(|id| expected >> id & 1 == 1).filter_map(MotorId::new);
         let expected = MotorSet::from_iter(ids);

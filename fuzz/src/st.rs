@@ -78,8 +78,8 @@ pub fn master(data: &[u8]) {
     let recovery = [Recovery::None, Recovery::Drain, Recovery::Pad][usize::from(input.byte()) % 3];
     let timeout = Duration(u64::from(input.word()) * 16);
     let quiet = Duration(u64::from(input.word()) * 4);
-    let mut bench = MasterBench {
-        master: Master::new(Config { timeout, recovery, quiet, ..Config::default() }),
+    let mut bench = MasterFixture {
+        master: Master::new(MasterConfig { timeout, recovery, quiet, ..MasterConfig::default() }),
         now: Instant(0),
         recovery,
         asked: None,
@@ -96,23 +96,26 @@ pub fn master(data: &[u8]) {
             6 => bench.now += Duration(u64::from(input.word()) * 16),
             7 => {
                 bench.master.abandon();
-                assert!(bench.asked.take().is_none() || bench.master.line() == Line::Lost);
+                assert!(
+                    bench.asked.take().is_none() || bench.master.sync_state() == SyncState::Lost
+                );
             }
             8 => {
                 bench.master.lost();
                 bench.asked = None;
-                assert_eq!(bench.master.line(), Line::Lost);
+                assert_eq!(bench.master.sync_state(), SyncState::Lost);
             }
             9 => {
                 bench.master.reopened();
                 bench.asked = None;
-                let expected = if recovery == Recovery::None { Line::Up } else { Line::Lost };
-                assert_eq!(bench.master.line(), expected);
+                let expected =
+                    if recovery == Recovery::None { SyncState::InSync } else { SyncState::Lost };
+                assert_eq!(bench.master.sync_state(), expected);
             }
             _ => {
                 bench.master.trust_line();
                 bench.asked = None;
-                assert_eq!(bench.master.line(), Line::Up);
+                assert_eq!(bench.master.sync_state(), SyncState::InSync);
             }
         }
         bench.drain();
@@ -120,7 +123,7 @@ pub fn master(data: &[u8]) {
     bench.finish();
 }
 
-struct MasterBench {
+struct MasterFixture {
     master: Master,
     now: Instant,
     recovery: Recovery,
@@ -133,7 +136,7 @@ struct MasterBench {
     heard: bool,
 }
 
-impl MasterBench {
+impl MasterFixture {
     fn request(&mut self, input: &mut Input<'_>) {
         let (motor, code) = (input.byte() % 8, input.byte());
         let profile = PROFILES[usize::from(code) % 2];
@@ -159,7 +162,7 @@ impl MasterBench {
             (Ok(()), bytes) => {
                 assert!(self.asked.is_none(), "two exchanges at a time");
                 self.asked = Some(bytes.expect("it was taken, so it fits a frame"));
-                self.lost = self.master.line() == Line::Lost;
+                self.lost = self.master.sync_state() == SyncState::Lost;
                 (self.sent, self.heard) = (false, false);
             }
         }
@@ -199,7 +202,7 @@ impl MasterBench {
                 }
                 Output::Done(result) => {
                     assert!(self.asked.take().is_some(), "done with nothing");
-                    let answered = matches!(result, Ok(_) | Err(Error::Refused(_)));
+                    let answered = matches!(result, Ok(_) | Err(ExchangeError::Refused(_)));
                     assert!(self.sent || !answered, "answered before it was sent");
                     assert!(result.is_err() || result.is_ok_and(|payload| payload.len() <= 128));
                 }
@@ -300,7 +303,7 @@ fn reply(bytes: &[u8]) {
 /// Does what the simulator's commands can do, with values that it takes.
 fn world(station: &mut StStation<[StMotor; 2]>, input: &mut Input<'_>) {
     let (what, value) = (input.byte(), f32::from(input.word()) / 65.0);
-    let number = Motor::new(what % 2 + 1).expect("1 or 2");
+    let number = MotorNumber::new(what % 2 + 1).expect("1 or 2");
     let motor = station.drive_mut().motor_mut(number).expect("there are two");
     match what / 2 % 6 {
         0 => motor.plant_mut().set_source(value.min(1000.0)),

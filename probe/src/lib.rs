@@ -8,12 +8,13 @@ use core::mem::size_of;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    Config as RmdConfig, Drive as RmdDrive, Host, Mode, Motor as RmdMotor, MotorId, MotorSet,
-    Output as RmdOutput, Sense, SetTorque4, Settings,
+    Drive as RmdDrive, DriveConfig as RmdConfig, Host, Mode, MotorControl as RmdMotor, MotorId,
+    MotorSet, Output as RmdOutput, Sense, SetTorque4, Settings,
 };
 use motorlink_proto::st::{
-    BoardInfo, Command, CurrentReference, Drive, ErrorCode, Features, FirmwareVersion, Master,
-    Motor, Output, PositionMove, Ramp, RegisterId, Request, RevupPhase, Slave, TorqueRamp, Version,
+    BoardInfo, Command, CurrentReference, ErrorCode, Features, FirmwareVersion, Master,
+    MotorControl, MotorNumber, Output, PositionMove, Ramp, RegisterId, Request, RevupPhase, Slave,
+    TorqueRamp, Version,
 };
 use motorlink_proto::time::Instant;
 use motorlink_slcan::{AnswerParser, Bitrate, Device};
@@ -39,39 +40,39 @@ fn unknown<T: Default>() -> T {
 
 struct Plant;
 
-impl Drive for Plant {
-    fn features(&self, _: Motor) -> Features {
+impl MotorControl for Plant {
+    fn features(&self, _: MotorNumber) -> Features {
         black_box(Features::NONE)
     }
     fn version(&self) -> Version<'_> {
         black_box(Version { name: "probe", major: 1, minor: 2, patch: 3, pre_release: "RC1" })
     }
-    fn read(&mut self, _: Motor, _: RegisterId) -> i32 {
+    fn read(&mut self, _: MotorNumber, _: RegisterId) -> i32 {
         unknown()
     }
-    fn write(&mut self, _: Motor, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
+    fn write(&mut self, _: MotorNumber, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
         black_box(Ok(()))
     }
-    fn execute(&mut self, _: Motor, _: Command) {}
-    fn ramp(&mut self, _: Motor, ramp: Ramp) {
+    fn execute(&mut self, _: MotorNumber, _: Command) {}
+    fn ramp(&mut self, _: MotorNumber, ramp: Ramp) {
         black_box(ramp);
     }
-    fn revup(&mut self, _: Motor, _: u8) -> RevupPhase {
+    fn revup(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
         unknown()
     }
-    fn set_revup(&mut self, _: Motor, _: u8, data: RevupPhase) {
+    fn set_revup(&mut self, _: MotorNumber, _: u8, data: RevupPhase) {
         black_box(data);
     }
-    fn current_reference(&mut self, _: Motor, reference: CurrentReference) {
+    fn current_reference(&mut self, _: MotorNumber, reference: CurrentReference) {
         black_box(reference);
     }
-    fn torque_ramp(&mut self, _: Motor, ramp: TorqueRamp) {
+    fn torque_ramp(&mut self, _: MotorNumber, ramp: TorqueRamp) {
         black_box(ramp);
     }
-    fn position(&mut self, _: Motor, target: PositionMove) {
+    fn position(&mut self, _: MotorNumber, target: PositionMove) {
         black_box(target);
     }
-    fn profiler_step(&self, _: Motor, _: u8) -> &[u8] {
+    fn profiler_step(&self, _: MotorNumber, _: u8) -> &[u8] {
         black_box(&[1, 2, 3])
     }
 }
@@ -109,10 +110,10 @@ pub fn st_master(master: &mut Master) {
     let request = match unknown::<u8>() {
         0 => Request::GetRegister(RegisterId(unknown())),
         1 => Request::SetRegister { register: RegisterId(unknown()), value: black_box(&received) },
-        2 => Request::Execute(Command::from(unknown::<u8>())),
+        2 => Request::ExecuteCommand(Command::from(unknown::<u8>())),
         3 => Request::SetRevupData(unknown(), unknown()),
-        4 => Request::ConfigDynStruct { segment: unknown(), registers: black_box(&received) },
-        _ => Request::BoardInfo,
+        4 => Request::ConfigureSegment { segment: unknown(), registers: black_box(&received) },
+        _ => Request::GetBoardInfo,
     };
     let _ = black_box(master.request(unknown(), &request));
     let _ = black_box(master.request_raw(unknown(), black_box(&received)));

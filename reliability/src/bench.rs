@@ -24,25 +24,25 @@ pub trait Ends: Sized {
     const RESTS: [u64; 2];
 
     /// When something arrives or is due.
-    fn due(bench: &Bench<Self>) -> Option<Instant>;
+    fn due(bench: &Run<Self>) -> Option<Instant>;
 
     /// Does what is due.
-    fn step(bench: &mut Bench<Self>);
+    fn step(bench: &mut Run<Self>);
 
     /// Reads the program's port.
-    fn read(bench: &mut Bench<Self>);
+    fn read(bench: &mut Run<Self>);
 
     /// The program ends, and another opens the line.
     fn next_program(&mut self);
 
     /// Makes exchanges of the mix.
-    fn exchange(bench: &mut Bench<Self>, rng: &mut Rng);
+    fn exchange(bench: &mut Run<Self>, rng: &mut Rng);
 
     /// Makes an exchange in which the program is killed.
-    fn killed_in(bench: &mut Bench<Self>, rng: &mut Rng);
+    fn killed_in(bench: &mut Run<Self>, rng: &mut Rng);
 }
 
-pub struct Bench<E: Ends> {
+pub struct Run<E: Ends> {
     pub ends: E,
     /// Whether the line does what nobody promises to survive.
     pub beyond: bool,
@@ -58,7 +58,7 @@ pub struct Bench<E: Ends> {
     trace: Option<VecDeque<String>>,
 }
 
-impl<E: Ends> Bench<E> {
+impl<E: Ends> Run<E> {
     /// A line on which a unit takes so long.
     pub fn new(
         ends: E,
@@ -70,7 +70,7 @@ impl<E: Ends> Bench<E> {
     where
         <E::Unit as Unit>::Protocol: Clone,
     {
-        Bench {
+        Run {
             ends,
             beyond,
             out: Lane::new(faults, Way::Sent, unit, protocol.clone()),

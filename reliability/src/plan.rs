@@ -108,7 +108,7 @@ const BUS: &[(&str, u64)] = &[
     ("flip=1e-5,drop=1e-4,dup=1e-4,insert=1e-3,pause=30ms..70ms@1e-4,cut=50ms@1e-5", 1_000_000),
 ];
 
-/// Replies of a motor with more than the guard time between them.
+/// Replies of a motor with more than the quarantine time between them.
 const BUS_BEYOND: &[(&str, u64)] = &[("delay=0ms..200ms", 500_000)];
 
 /// What programs in turn are tried with.

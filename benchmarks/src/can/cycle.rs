@@ -1,7 +1,7 @@
 //! One cycle after the other: the sans-IO host, the wire, simulated motors.
 
 use motorlink_proto::rmd::{
-    Command, Host, MotorId, MotorSet, Output, Refused, SetSpeed, SetTorque4,
+    Command, Host, MotorId, MotorSet, Output, RequestError, SetSpeed, SetTorque4,
 };
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{CentiDps, IqCommand};
@@ -115,7 +115,7 @@ impl Rig {
         Rig { now: START, host, wire: Wire::default(), motors, turnaround }
     }
 
-    fn ask(&mut self, id: MotorId, command: impl Command) -> std::result::Result<(), Refused> {
+    fn ask(&mut self, id: MotorId, command: impl Command) -> std::result::Result<(), RequestError> {
         self.host.request(self.now, id, command.encode())
     }
 

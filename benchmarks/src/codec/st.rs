@@ -25,24 +25,24 @@ pub(super) fn kinds() -> Vec<Kind> {
         asked(Request::GetRegister(register), &[0xDC, 0x05, 0, 0], move |payload| {
             black_box(register.decode(Profile::Spec, payload));
         }),
-        told(Request::Execute(Command::StartMotor)),
-        asked(Request::BoardInfo, NAME, |payload| {
+        told(Request::ExecuteCommand(Command::StartMotor)),
+        asked(Request::GetBoardInfo, NAME, |payload| {
             black_box(BoardInfo::decode(payload));
         }),
-        told(Request::Ramp(Ramp { speed_rpm: 1500, duration_ms: 250 })),
-        asked(Request::RevupData(0), &PHASE.to_bytes(), |payload| {
+        told(Request::SetRamp(Ramp { speed_rpm: 1500, duration_ms: 250 })),
+        asked(Request::GetRevupData(0), &PHASE.to_bytes(), |payload| {
             black_box(RevupPhase::decode(payload));
         }),
         told(Request::SetRevupData(0, PHASE)),
-        told(Request::CurrentReference(currents)),
-        asked(Request::ProfilerInfo(&[1]), &[2, 0x66, 0x67], plain),
-        asked(Request::FirmwareVersion, NAME, |payload| {
+        told(Request::SetCurrentReference(currents)),
+        asked(Request::GetProfilerInfo(&[1]), &[2, 0x66, 0x67], plain),
+        asked(Request::GetFirmwareVersion, NAME, |payload| {
             black_box(FirmwareVersion::decode(payload));
         }),
-        asked(Request::DataElement(0), &[0; 8], plain),
-        told(Request::TorqueRamp(torque_ramp)),
-        told(Request::ConfigDynStruct { segment: 0, registers: REGISTERS }),
-        told(Request::Position(position)),
+        asked(Request::GetSegment(0), &[0; 8], plain),
+        told(Request::SetTorqueRamp(torque_ramp)),
+        told(Request::ConfigureSegment { segment: 0, registers: REGISTERS }),
+        told(Request::SetPosition(position)),
     ]
 }
 

@@ -66,7 +66,7 @@ pub(super) fn sit(transport: Transport, rounds: usize, exchanges: u32) -> Result
 
         let round = || {
             Ok(Rates {
-                client: rate(exchanges, || Ok(motor.read(SPEED_MEAS).map(drop)?))?,
+                client: rate(exchanges, || Ok(motor.get(SPEED_MEAS).map(drop)?))?,
                 raw: rate(exchanges, || raw.exchange::<Functions>())?,
                 inlined: rate(exchanges, || inlined.exchange::<Inlined>())?,
             })

@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Command as _, SetSpeed};
-use motorlink_proto::st::{Command, Drive as _, Motor, Profile, Ramp};
+use motorlink_proto::st::{Command, MotorControl as _, MotorNumber, Profile, Ramp};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::CentiDps;
 use motorlink_sim::plant::{Bridge, LoadConfig, Plant, PlantConfig};
@@ -131,8 +131,8 @@ fn st(name: &'static str, mut config: MotorConfig, rpm: i32) -> Kernel {
     let mut station = StStation::new(Profile::Spec, drive);
     if rpm != 0 {
         let drive = station.drive_mut();
-        drive.ramp(Motor::FIRST, Ramp { speed_rpm: rpm, duration_ms: 500 });
-        drive.execute(Motor::FIRST, Command::StartMotor);
+        drive.ramp(MotorNumber::FIRST, Ramp { speed_rpm: rpm, duration_ms: 500 });
+        drive.execute(MotorNumber::FIRST, Command::StartMotor);
     }
     station.advance_to(SETTLED);
     let [motor] = station.drive().motors();

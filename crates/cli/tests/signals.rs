@@ -7,10 +7,10 @@ use std::sync::Arc;
 use std::thread;
 
 use motorlink::can::CanFrame;
+use motorlink::port::CanLink;
 use motorlink::port::PortError;
-use motorlink::rmd::Bus;
-use motorlink::st::{Client, Error, Options};
-use motorlink::{port::CanLink, rmd};
+use motorlink::rmd;
+use motorlink::st::{self, Error, Options};
 use rustix::process::{Pid, Signal, kill_process};
 
 /// The port of the program that the test starts.
@@ -24,7 +24,7 @@ const ACK: [u8; 3] = [0xF0, 0x00, 0xF0];
 #[test]
 fn program() {
     let Ok(port) = std::env::var(PORT) else { return };
-    let client = Arc::new(Client::open(&port.parse().unwrap(), Options::default()).unwrap());
+    let client = Arc::new(st::Client::open(&port.parse().unwrap(), Options::default()).unwrap());
     let at_signal = Arc::clone(&client);
     ctrlc::set_handler(move || {
         at_signal.retire();
@@ -112,7 +112,7 @@ impl CanLink for Echo {
 
 #[test]
 fn a_retired_bus_only_stops_motors() {
-    let bus = Bus::over("echo", Box::new(Echo(None)), rmd::Options::default());
+    let bus = rmd::Client::over("echo", Box::new(Echo(None)), rmd::Options::default());
     let motor = bus.motor(1).unwrap();
     let speed = [0xA2, 0, 0, 0, 0x10, 0x27, 0, 0];
     bus.raw(motor.id(), speed).unwrap();

@@ -7,8 +7,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-use motorlink::rmd::{self, Bus};
-use motorlink::st::{self, Client, register};
+use motorlink::rmd::{self};
+use motorlink::st::{self, register};
 use rustix::process::{Pid, Signal, kill_process};
 
 /// How long a drive stands still.
@@ -102,15 +102,15 @@ fn an_st_drive_that_stood_still_confuses_nobody() {
 
 fn st_stands_still(pause: Duration) {
     let drive = Drive::new("--st", "pty");
-    let client = Client::open(&drive.port.parse().expect("a port"), st::Options::default());
+    let client = st::Client::open(&drive.port.parse().expect("a port"), st::Options::default());
     let client = client.expect("opened");
     let motor = client.motor(1).expect("a motor");
     let mut number = 0i16;
     drive.stand_still(pause, Duration::from_secs(3), || {
         number = number.wrapping_add(1);
         // Both are asked in any case, so that replies of either kind wait.
-        let written = motor.write(register::SPEED_KP, number);
-        let read = motor.read(register::SPEED_KP);
+        let written = motor.set(register::SPEED_KP, number);
+        let read = motor.get(register::SPEED_KP);
         written.map_err(|error| error.to_string())?;
         assert_eq!(read.map_err(|error| error.to_string())?, number, "somebody else's reply");
         Ok(())
@@ -125,7 +125,7 @@ fn rmd_motors_that_stood_still_confuse_nobody() {
 fn rmd_stands_still(pause: Duration) {
     let drive = Drive::new("--rmd", "slcan-pty");
     let port = format!("slcan:{}", drive.port).parse().expect("a port");
-    let bus = Bus::open(&port, rmd::Options::default()).expect("opened");
+    let bus = rmd::Client::open(&port, rmd::Options::default()).expect("opened");
     let mut number = 0;
     drive.stand_still(pause, Duration::from_secs(1), || {
         number += 1;

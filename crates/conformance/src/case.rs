@@ -23,7 +23,7 @@ pub enum Need {
     Fault,
 }
 
-/// A test of one or a few clauses on a drive behind a bench `B`.
+/// A test of one or a few clauses on a drive behind a harness `B`.
 pub struct Case<B> {
     /// What must hold, as a sentence in snake case; a subject may follow in brackets:
     /// `registers_read_in_their_size[SPEED_MEAS]`.
@@ -151,21 +151,21 @@ impl<B> Case<B> {
 /// the drive is lost, the rest is not run, and the report says so.
 pub fn run<B: Subject>(
     cases: &[Case<B>],
-    bench: &mut B,
+    harness: &mut B,
     mut progress: impl FnMut(&Outcome),
 ) -> Report {
     let mut report = Report::default();
     let mut dead: Option<String> = None;
     for case in cases {
-        let missing = case.needs.iter().find(|&&need| !bench.allows(need));
+        let missing = case.needs.iter().find(|&&need| !harness.allows(need));
         let (verdict, differences) = match (&dead, missing) {
             (Some(why), _) => (Verdict::NotRun(why.clone()), Vec::new()),
             (None, Some(need)) => (Verdict::Skipped(need.unmet().to_owned()), Vec::new()),
-            (None, None) => conduct(case, bench, &mut dead),
+            (None, None) => conduct(case, harness, &mut dead),
         };
         let transcript = match verdict {
-            Verdict::Failed(_) | Verdict::Reading => bench.transcript(),
-            Verdict::NotRun(_) if !differences.is_empty() => bench.transcript(),
+            Verdict::Failed(_) | Verdict::Reading => harness.transcript(),
+            Verdict::NotRun(_) if !differences.is_empty() => harness.transcript(),
             _ => Vec::new(),
         };
         let (name, clauses) = (case.name.to_string(), case.clauses);
@@ -181,10 +181,10 @@ pub fn run<B: Subject>(
 /// the first of each.
 fn conduct<B: Subject>(
     case: &Case<B>,
-    bench: &mut B,
+    harness: &mut B,
     dead: &mut Option<String>,
 ) -> (Verdict, Vec<Finding>) {
-    let begun = bench.begin().map_err(Stop::without_reading);
+    let begun = harness.begin().map_err(Stop::without_reading);
     // What cannot be begun with has nothing to be restored.
     let (mut outcome, mut restored) = match begun {
         Err(stop @ (Stop::Port(_) | Stop::Lost(_))) => (Err(stop), Ok(())),
@@ -192,13 +192,13 @@ fn conduct<B: Subject>(
             // A fault of this kit must not leave a motor turning.
             let ran = catch_unwind(AssertUnwindSafe(|| {
                 begun?;
-                let done = (case.run)(bench);
+                let done = (case.run)(harness);
                 match case.reading {
                     Some(reading) => done.read_as(reading),
                     None => done,
                 }
             }));
-            let restored = bench.restore();
+            let restored = harness.restore();
             (ran.unwrap_or_else(|panic| resume_unwind(panic)), restored)
         }
     };
@@ -209,7 +209,7 @@ fn conduct<B: Subject>(
     }
     let mut differences: Vec<Finding> = Vec::new();
     let ended = [&mut outcome, &mut restored].into_iter().filter_map(take_difference);
-    for finding in bench.differences().into_iter().chain(ended) {
+    for finding in harness.differences().into_iter().chain(ended) {
         if differences.iter().all(|known| known.reading != finding.reading) {
             differences.push(finding);
         }

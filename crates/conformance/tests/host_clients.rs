@@ -7,9 +7,8 @@ use std::thread;
 use std::time::Duration;
 
 use motorlink::port::PortName;
-use motorlink::rmd::{Bus, Error, IqCommand, MotorId, MotorSet, SetTorque4};
-use motorlink::st::{Client, register};
-use motorlink::{rmd, st};
+use motorlink::rmd::{self, Error, IqCommand, MotorId, MotorSet, SetTorque4};
+use motorlink::st::{self, register};
 use motorlink_conformance::Verdict;
 use motorlink_conformance::host::{self, Demand, Journal, READINGS, Reading, Said, Task};
 use motorlink_link::serve::Server;
@@ -83,8 +82,8 @@ fn our_client_passes_every_scenario() {
 
 fn ask_client(path: &str, task: Task) -> Said {
     let mut options = st::Options::default();
-    options.line.timeout = TIMEOUT.into();
-    let client = Client::open(&path.parse().unwrap(), options).unwrap();
+    options.master.timeout = TIMEOUT.into();
+    let client = st::Client::open(&path.parse().unwrap(), options).unwrap();
     let motor = client.motor(1).unwrap();
     let mut said = Said::default();
     if task == Task::Start {
@@ -93,7 +92,7 @@ fn ask_client(path: &str, task: Task) -> Said {
         return said;
     }
     for _ in 0..READINGS {
-        match motor.read(register::SPEED_MEAS) {
+        match motor.get(register::SPEED_MEAS) {
             Ok(rpm) => said.values.push(Reading { motor: 1, value: rpm.into() }),
             Err(_) => said.complained = true,
         }
@@ -124,7 +123,10 @@ fn ask_bus(path: &str, task: Task) -> Said {
     let echo = if task == Task::Echoed { "?echo=1" } else { "" };
     let port: PortName = format!("slcan:{path}{echo}").parse().unwrap();
     let guard = Duration::from_millis(300);
-    let bus = Bus::open(&port, rmd::Options { timeout: TIMEOUT, guard, ..Default::default() });
+    let bus = rmd::Client::open(
+        &port,
+        rmd::Options { timeout: TIMEOUT, quarantine: guard, ..Default::default() },
+    );
     let bus = bus.unwrap();
     let motor = bus.motor(1).unwrap();
     let mut said = Said::default();

@@ -11,9 +11,9 @@ use motorlink_conformance::host::{READINGS, Reading, Said, Task};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    ClearErrors, Code, Command, DEFAULT_TIMEOUT, Dialect, Error, Host, MOTOR_BASE, MotionStatus,
+    ClearErrors, Code, Command, DEFAULT_TIMEOUT, Dialect, Failure, Host, MOTOR_BASE, MotionStatus,
     MotorId, MotorSet, MultiTurnAngle, Off, Output, Payload, ReadMultiTurnAngle,
-    ReadSingleTurnAngle, Refused, SetTorque4, SingleTurnAngle, Status, TORQUE4_ID,
+    ReadSingleTurnAngle, RequestError, SetTorque4, SingleTurnAngle, Status, TORQUE4_ID,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -67,7 +67,7 @@ fn turns(task: Task) -> usize {
 }
 
 /// What a request to a motor, in the turn of this number, ended in.
-type Ended = (MotorId, usize, Result<f64, Error>);
+type Ended = (MotorId, usize, Result<f64, Failure>);
 
 /// Our host: what each request ended in, in the order in which it did.
 fn results(bus: &mut Bus, task: Task) -> Result<Vec<Ended>, PortError> {
@@ -82,14 +82,14 @@ fn results(bus: &mut Bus, task: Task) -> Result<Vec<Ended>, PortError> {
         // Again for motors that were asked for their status instead.
         loop {
             for &(id, data) in &requests {
-                while let Err(Refused::Quarantined { until, .. }) =
+                while let Err(RequestError::Quarantined { until, .. }) =
                     host.request(bus.now(), id, data)
                 {
                     hear(bus, &mut host, until, &mut echoes)?;
                 }
             }
             while task == Task::SetTorque4
-                && let Err(Refused::Quarantined { until, .. }) =
+                && let Err(RequestError::Quarantined { until, .. }) =
                     host.set_torque4(bus.now(), SetTorque4::default(), MotorSet::TORQUE4)
             {
                 hear(bus, &mut host, until, &mut echoes)?;
@@ -105,7 +105,7 @@ fn results(bus: &mut Bus, task: Task) -> Result<Vec<Ended>, PortError> {
                     }
                     Output::Wait(Some(until)) => hear(bus, &mut host, until, &mut echoes)?,
                     Output::Wait(None) => break,
-                    Output::Done { id, result: Err(Error::Quarantined) } => again.insert(id),
+                    Output::Done { id, result: Err(Failure::Quarantined) } => again.insert(id),
                     Output::Done { id, result } => {
                         let code =
                             requests.first().map_or(Code::SetTorque, |(_, data)| data[0].into());
@@ -164,29 +164,29 @@ fn our_host_passes_every_scenario() {
 }
 
 /// The motor, the turn, and how it failed.
-type Failed = (u8, usize, Error);
+type Failed = (u8, usize, Failure);
 
 /// What fails for our host in each scenario where anything does.
 const ENDS: &[(&str, &[Failed])] = &[
     ("a_late_reply_is_not_the_next_ones", TIMEOUT),
     // Angle, circle angle, angle: the second reading is in the third turn.
-    ("a_late_reply_is_not_that_of_another_command", &[(1, 2, Error::Timeout)]),
+    ("a_late_reply_is_not_that_of_another_command", &[(1, 2, Failure::Timeout)]),
     ("silence_is_an_error", TIMEOUT),
     ("a_reply_to_another_command_is_not_the_answer", TIMEOUT),
     ("a_frame_of_seven_bytes_is_no_reply", TIMEOUT),
     ("an_extended_frame_is_no_reply", TIMEOUT),
-    ("a_motor_of_v3_is_not_understood", &[(1, 1, Error::Foreign(Dialect::V3))]),
-    ("a_motor_of_lk_tech_is_not_understood", &[(1, 1, Error::Foreign(Dialect::LkTech))]),
-    ("an_off_with_another_content_is_no_acknowledge", &[(1, 0, Error::Altered)]),
-    ("an_off_without_an_answer_is_an_error", &[(1, 0, Error::Timeout)]),
+    ("a_motor_of_v3_is_not_understood", &[(1, 1, Failure::Foreign(Dialect::V3))]),
+    ("a_motor_of_lk_tech_is_not_understood", &[(1, 1, Failure::Foreign(Dialect::LkTech))]),
+    ("an_off_with_another_content_is_no_acknowledge", &[(1, 0, Failure::Altered)]),
+    ("an_off_without_an_answer_is_an_error", &[(1, 0, Failure::Timeout)]),
     ("errors_cleared_are_not_answered_with_anything_else", TIMEOUT),
     ("a_silent_motor_does_not_cost_the_others_their_replies[a cycle]", SECOND),
     ("a_silent_motor_does_not_cost_the_others_their_replies[0x280]", SECOND),
     ("a_late_reply_is_not_the_next_cycles[a cycle]", SECOND),
     ("a_late_reply_is_not_the_next_cycles[0x280]", SECOND),
 ];
-const TIMEOUT: &[Failed] = &[(1, 1, Error::Timeout)];
-const SECOND: &[Failed] = &[(2, 1, Error::Timeout)];
+const TIMEOUT: &[Failed] = &[(1, 1, Failure::Timeout)];
+const SECOND: &[Failed] = &[(2, 1, Failure::Timeout)];
 
 #[test]
 fn our_host_loses_the_disturbed_reading_only_and_says_how() {

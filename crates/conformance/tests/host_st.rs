@@ -10,15 +10,15 @@ use motorlink_conformance::host::st::{DIGIT, Drive, Scenario, scenarios};
 use motorlink_conformance::host::{READINGS, Reading, Said, Task};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::st::{
-    Command, Config, Error, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Master,
-    Output, Parse, Profile, RegisterId, Request, TIMEOUT, checksum,
+    Command, ExchangeError, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Master,
+    MasterConfig, Output, Parse, Profile, RegisterId, Request, TIMEOUT, checksum,
 };
 use motorlink_proto::time::Duration;
 
 type Line = Finite<Drive, u8>;
 
 const ASK: Request<'_> = Request::GetRegister(RegisterId::SPEED_MEAS);
-const START: Request<'_> = Request::Execute(Command::StartMotor);
+const START: Request<'_> = Request::ExecuteCommand(Command::StartMotor);
 
 fn play(scenario: &Scenario, host: impl Fn(&mut Line, Task) -> Result<Said, PortError>) -> Outcome {
     let drive = scenario.drive(TIMEOUT);
@@ -35,7 +35,7 @@ fn exchange(
     master: &mut Master,
     line: &mut Line,
     request: &Request<'_>,
-) -> Result<Result<Vec<u8>, Error>, PortError> {
+) -> Result<Result<Vec<u8>, ExchangeError>, PortError> {
     master.request(1, request).unwrap();
     loop {
         match master.poll(line.now()) {
@@ -51,7 +51,7 @@ fn exchange(
 
 /// Every result of our master.
 fn results(line: &mut Line, task: Task) -> Result<Vec<Result<i32, String>>, PortError> {
-    let mut master = Master::new(Config::default());
+    let mut master = Master::new(MasterConfig::default());
     let (request, count) = if task == Task::Start { (START, 1) } else { (ASK, READINGS) };
     let mut results = Vec::new();
     for _ in 0..count {
@@ -64,8 +64,8 @@ fn results(line: &mut Line, task: Task) -> Result<Vec<Result<i32, String>>, Port
             Ok(payload) => {
                 Ok(RegisterId::SPEED_MEAS.decode(Profile::Spec, &payload).expect("its size"))
             }
-            Err(Error::Refused(code)) => Err(format!("refused {:#04x}", u8::from(code))),
-            Err(Error::Failed(failure)) => Err(match failure {
+            Err(ExchangeError::Refused(code)) => Err(format!("refused {:#04x}", u8::from(code))),
+            Err(ExchangeError::Failed(failure)) => Err(match failure {
                 Failure::Timeout => "timeout".to_owned(),
                 Failure::Incomplete { .. } => "incomplete".to_owned(),
                 Failure::Header(_) => "header".to_owned(),

@@ -12,14 +12,14 @@
 //!
 //! ```
 //! use motorlink_embedded::st::SlavePort;
-//! use motorlink_proto::st::{Drive, Motor, Profile, Slave};
+//! use motorlink_proto::st::{MotorControl, MotorNumber, Profile, Slave};
 //! use motorlink_proto::time::Instant;
 //!
-//! fn serve<U>(uart: U, drive: &mut impl Drive, now: impl Fn() -> Instant, sleep: impl Fn(Option<Instant>))
+//! fn serve<U>(uart: U, drive: &mut impl MotorControl, now: impl Fn() -> Instant, sleep: impl Fn(Option<Instant>))
 //! where
 //!     U: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
 //! {
-//!     let mut port = SlavePort::new(uart, Slave::new(Profile::Spec, Motor::FIRST));
+//!     let mut port = SlavePort::new(uart, Slave::new(Profile::Spec, MotorNumber::FIRST));
 //!     loop {
 //!         // A receiver that overran has been answered for; there is nothing more to do.
 //!         let next = port.poll(now(), drive).unwrap_or_default();

@@ -3,7 +3,7 @@
 use embedded_can::nb::Can;
 use embedded_can::{ExtendedId, Frame, Id, StandardId};
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::{DEFAULT_TIMEOUT, Drive, Error, Host, Motor, MotorId, Output};
+use motorlink_proto::rmd::{DEFAULT_TIMEOUT, Drive, Failure, Host, MotorControl, MotorId, Output};
 use motorlink_proto::time::Instant;
 
 /// The end of one or more drives that share a CAN controller, each with its own ID.
@@ -23,7 +23,7 @@ impl<C: Can, const N: usize> DrivePort<C, N> {
     }
 
     /// Starts the drives, also after a power cycle.
-    pub fn power_on(&mut self, now: Instant, motors: &mut [impl Motor; N]) {
+    pub fn power_on(&mut self, now: Instant, motors: &mut [impl MotorControl; N]) {
         for (drive, motor) in self.drives.iter_mut().zip(motors) {
             drive.power_on(now, motor);
         }
@@ -42,7 +42,7 @@ impl<C: Can, const N: usize> DrivePort<C, N> {
     pub fn poll(
         &mut self,
         now: Instant,
-        motors: &mut [impl Motor; N],
+        motors: &mut [impl MotorControl; N],
     ) -> Result<Option<Instant>, C::Error> {
         for (drive, motor) in self.drives.iter_mut().zip(motors.iter_mut()) {
             drive.poll(now, motor);
@@ -101,7 +101,7 @@ pub enum Event {
         /// The motor.
         id: MotorId,
         /// The eight bytes of its reply.
-        result: Result<[u8; 8], Error>,
+        result: Result<[u8; 8], Failure>,
     },
     /// Nothing yet. Call again when a frame comes, or then; `None` while no exchange is under way.
     Wait(Option<Instant>),
@@ -161,7 +161,7 @@ impl<C: Can> HostPort<C> {
     }
 
     /// The host, to make requests and to set limits. A new host's first exchange with each motor ends
-    /// in [`Error::Quarantined`]: it is made again when the motor was silent for the guard time.
+    /// in [`Failure::Quarantined`]: it is made again when the motor was silent for the quarantine time.
     /// [`Host::trust`] skips that on a board that starts with its motors.
     pub const fn host_mut(&mut self) -> &mut Host {
         &mut self.host

@@ -5,7 +5,7 @@
 //! longest frame at once.
 
 use embedded_io::{Read, ReadReady, Write};
-use motorlink_proto::st::{Drive, Error, Master, Output, Slave};
+use motorlink_proto::st::{ExchangeError, Master, MotorControl, Output, Slave};
 use motorlink_proto::time::Instant;
 
 /// Bytes that are read at once.
@@ -35,7 +35,7 @@ impl<U: Read + Write + ReadReady> SlavePort<U> {
     pub fn poll(
         &mut self,
         now: Instant,
-        drive: &mut impl Drive,
+        drive: &mut impl MotorControl,
     ) -> Result<Option<Instant>, U::Error> {
         let mut chunk = [0; CHUNK];
         match read_some(&mut self.uart, &mut chunk) {
@@ -72,7 +72,7 @@ impl<U: Read + Write + ReadReady> SlavePort<U> {
 #[derive(Debug, PartialEq, Eq)]
 pub enum Event<'a> {
     /// The exchange is over: the payload of the positive acknowledge, or why there is none.
-    Done(Result<&'a [u8], Error>),
+    Done(Result<&'a [u8], ExchangeError>),
     /// Nothing yet. Call again when a byte comes, or then; `None` while no exchange is under way.
     Wait(Option<Instant>),
 }

@@ -96,7 +96,7 @@ impl Can for Controller {
     }
 }
 
-struct Bench {
+struct Pair {
     now: Instant,
     host: HostPort<Controller>,
     drives: DrivePort<Controller, 2>,
@@ -107,9 +107,9 @@ fn id(number: u8) -> MotorId {
     MotorId::new(number).expect("1 to 32")
 }
 
-impl Bench {
+impl Pair {
     fn new() -> Self {
-        let mut bench = Bench::opened();
+        let mut bench = Pair::opened();
         bench.host.host_mut().trust(MotorSet::ALL);
         bench
     }
@@ -119,8 +119,8 @@ impl Bench {
         let (ours, theirs) = bus();
         let configs = [1, 2].map(RmdConfig::with_id);
         let drive =
-            |config: RmdConfig| Drive::new(Config::new(id(config.id)), config.factory_rom());
-        let mut bench = Bench {
+            |config: RmdConfig| Drive::new(DriveConfig::new(id(config.id)), config.factory_rom());
+        let mut bench = Pair {
             now: Instant(0),
             host: HostPort::new(ours, Host::new()),
             drives: DrivePort::new(theirs, configs.map(drive)),
@@ -136,7 +136,7 @@ impl Bench {
     }
 
     /// Both ends, and the bus between them, until no exchange is under way.
-    fn run(&mut self) -> Vec<(MotorId, Result<[u8; 8], Error>)> {
+    fn run(&mut self) -> Vec<(MotorId, Result<[u8; 8], Failure>)> {
         let mut results = Vec::new();
         loop {
             let served = self.drives.poll(self.now, &mut self.motors).expect("no error");
@@ -157,7 +157,7 @@ impl Bench {
 
 #[test]
 fn a_host_behind_one_controller_commands_drives_behind_another() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     bench.ask(1, &SetSpeed { speed: CentiDps(36_000) });
     bench.ask(2, &ReadStatus);
     let results = bench.run();
@@ -169,13 +169,13 @@ fn a_host_behind_one_controller_commands_drives_behind_another() {
 
 #[test]
 fn motors_that_were_not_asked_before_are_trusted_after_a_silence() {
-    let mut bench = Bench::opened();
+    let mut bench = Pair::opened();
     for number in [1, 2] {
         bench.ask(number, &SetSpeed { speed: CentiDps(36_000) });
     }
-    assert!(bench.run().into_iter().all(|(_, result)| result == Err(Error::Quarantined)));
+    assert!(bench.run().into_iter().all(|(_, result)| result == Err(Failure::Quarantined)));
     assert!(bench.drives.drives().iter().all(|drive| drive.mode() == Mode::Off));
-    bench.now += DEFAULT_GUARD;
+    bench.now += DEFAULT_QUARANTINE;
     for number in [1, 2] {
         bench.ask(number, &SetSpeed { speed: CentiDps(36_000) });
     }
@@ -184,7 +184,7 @@ fn motors_that_were_not_asked_before_are_trusted_after_a_silence() {
 
 #[test]
 fn all_drives_answer_the_torque_frame_through_one_mailbox() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     let torque = SetTorque4::default();
     let both: MotorSet = [id(1), id(2)].into_iter().collect();
     bench.host.host_mut().set_torque4(bench.now, torque, both).expect("IDs 1 and 2 are in reach");
@@ -195,7 +195,7 @@ fn all_drives_answer_the_torque_frame_through_one_mailbox() {
 
 #[test]
 fn a_frame_that_is_displaced_is_sent_later() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     bench.host.can_mut().stuck = true;
     bench.ask(2, &ReadStatus);
     bench.host.poll(bench.now).expect("in the mailbox");
@@ -207,22 +207,22 @@ fn a_frame_that_is_displaced_is_sent_later() {
 
 #[test]
 fn an_exchange_that_the_bus_does_not_take_times_out() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     bench.host.can_mut().stuck = true;
     bench.ask(1, &ReadStatus);
     bench.ask(2, &ReadStatus);
     let results = bench.run();
     assert_eq!(results.len(), 2);
-    assert!(results.iter().all(|(_, result)| *result == Err(Error::Timeout)));
+    assert!(results.iter().all(|(_, result)| *result == Err(Failure::Timeout)));
     let most = Duration(3 * DEFAULT_TIMEOUT.0);
     assert!(bench.now.since(Instant(0)) < most, "{:?}", bench.now);
 }
 
 #[test]
 fn drives_whose_replies_are_not_taken_read_no_further_frames() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     bench.drives.can_mut().stuck = true;
-    let ask = |bench: &mut Bench, number: u8| {
+    let ask = |bench: &mut Pair, number: u8| {
         let frame = to_can(&CanFrame::new(id(number).can_id(), ReadStatus.encode()));
         bench.drives.can_mut().received.borrow_mut().extend(frame);
         bench.drives.poll(bench.now, &mut bench.motors).expect("no error")
@@ -243,7 +243,7 @@ fn drives_whose_replies_are_not_taken_read_no_further_frames() {
 
 #[test]
 fn the_shutdown_time_runs_on_a_bus_that_fails() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     for drive in bench.drives.drives_mut() {
         drive.config.shutdown = Some(Duration::from_millis(200));
     }

@@ -7,25 +7,25 @@ use embedded_io::{ErrorKind, Write};
 use motorlink_embedded::rmd::{DrivePort, from_can, to_can};
 use motorlink_embedded::slcan::{Adapter, Error, Frame};
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::{Config, Drive, MotorId};
+use motorlink_proto::rmd::{Drive, DriveConfig, MotorId};
 use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::{RmdConfig, RmdMotor};
 use uart::{Uart, line};
 
-struct Bench {
+struct Pair {
     host: Uart,
     port: DrivePort<Adapter<Uart>, 1>,
     motors: [RmdMotor; 1],
 }
 
-impl Bench {
+impl Pair {
     fn new() -> Self {
         let (host, board) = line();
         let config = RmdConfig::default();
         let id = MotorId::new(config.id).expect("ID 1");
-        let drive = Drive::new(Config::new(id), config.factory_rom());
+        let drive = Drive::new(DriveConfig::new(id), config.factory_rom());
         let motors = [RmdMotor::new(config).expect("a preset")];
-        Bench { host, port: DrivePort::new(Adapter::new(board), [drive]), motors }
+        Pair { host, port: DrivePort::new(Adapter::new(board), [drive]), motors }
     }
 
     fn say(&mut self, text: &str) {
@@ -47,7 +47,7 @@ impl Bench {
 
 #[test]
 fn a_host_opens_the_channel_and_asks_the_drive() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     bench.say("t14189C00000000000000\r");
     bench.serve().unwrap();
     assert_eq!(bench.heard(), "\u{7}", "the channel is closed");
@@ -62,7 +62,7 @@ fn a_host_opens_the_channel_and_asks_the_drive() {
 
 #[test]
 fn a_line_in_which_bytes_were_lost_is_refused_and_the_next_is_understood() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     bench.say("O\rt14188");
     bench.serve().unwrap();
     assert_eq!(bench.heard(), "\r");

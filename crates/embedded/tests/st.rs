@@ -5,22 +5,23 @@ mod uart;
 use embedded_io::{ErrorKind, Write};
 use motorlink_embedded::st::{Event, MasterPort, SlavePort};
 use motorlink_proto::st::{
-    Config, Error, ErrorCode, Failure, Master, Profile, Ramp, RegisterId, Request, Slave,
+    ErrorCode, ExchangeError, Failure, Master, MasterConfig, Profile, Ramp, RegisterId, Request,
+    Slave,
 };
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::st::{StDrive, StMotor};
 use uart::{Uart, line};
 
-struct Bench {
+struct Pair {
     now: Instant,
     master: MasterPort<Uart>,
     slave: SlavePort<Uart>,
     drive: StDrive<[StMotor; 2]>,
 }
 
-impl Bench {
+impl Pair {
     fn new() -> Self {
-        let mut bench = Bench::opened();
+        let mut bench = Pair::opened();
         bench.master.master_mut().trust_line();
         bench
     }
@@ -30,8 +31,8 @@ impl Bench {
         let (ours, theirs) = line();
         let drive = StDrive::demo(Instant(0));
         let slave = Slave::new(Profile::Spec, drive.last());
-        let master = Master::new(Config::default());
-        Bench {
+        let master = Master::new(MasterConfig::default());
+        Pair {
             now: Instant(0),
             master: MasterPort::new(ours, master),
             slave: SlavePort::new(theirs, slave),
@@ -49,7 +50,7 @@ impl Bench {
     }
 
     /// Both ends until the exchange is over; time passes where both wait.
-    fn exchange(&mut self) -> Result<Vec<u8>, Error> {
+    fn exchange(&mut self) -> Result<Vec<u8>, ExchangeError> {
         loop {
             let served = self.serve();
             match self.master.poll(self.now).expect("nothing was lost") {
@@ -62,7 +63,7 @@ impl Bench {
         }
     }
 
-    fn ask(&mut self, request: Request<'_>) -> Result<Vec<u8>, Error> {
+    fn ask(&mut self, request: Request<'_>) -> Result<Vec<u8>, ExchangeError> {
         self.master.master_mut().request(1, &request).expect("the last exchange is over");
         self.exchange()
     }
@@ -76,27 +77,27 @@ impl Bench {
 
 #[test]
 fn a_master_behind_one_uart_commands_a_drive_behind_another() {
-    let mut bench = Bench::new();
-    assert_eq!(bench.ask(Request::Ramp(Ramp { speed_rpm: 1200, duration_ms: 0 })), Ok(vec![]));
+    let mut bench = Pair::new();
+    assert_eq!(bench.ask(Request::SetRamp(Ramp { speed_rpm: 1200, duration_ms: 0 })), Ok(vec![]));
     let reference = bench.ask(Request::GetRegister(RegisterId::RAMP_FINAL_SPEED));
     assert_eq!(reference, Ok(1200_i32.to_le_bytes().to_vec()));
-    assert_eq!(bench.ask(Request::BoardInfo).map(|info| info.len()), Ok(32));
+    assert_eq!(bench.ask(Request::GetBoardInfo).map(|info| info.len()), Ok(32));
     let unknown = bench.ask(Request::GetRegister(RegisterId(0xEE)));
-    assert_eq!(unknown, Err(Error::Refused(ErrorCode::GetWriteOnly)));
+    assert_eq!(unknown, Err(ExchangeError::Refused(ErrorCode::GetWriteOnly)));
     assert_eq!(bench.now, Instant(0), "nothing had to be waited for");
 }
 
 #[test]
 fn a_line_that_was_just_opened_costs_two_silences() {
-    let mut bench = Bench::opened();
-    assert_eq!(bench.ask(Request::BoardInfo).map(|info| info.len()), Ok(32));
-    let quiet = Config::default().quiet;
+    let mut bench = Pair::opened();
+    assert_eq!(bench.ask(Request::GetBoardInfo).map(|info| info.len()), Ok(32));
+    let quiet = MasterConfig::default().quiet;
     assert_eq!(bench.now, Instant(0) + quiet + quiet);
 }
 
 #[test]
 fn a_command_that_does_not_come_whole_is_answered_when_its_time_is_over() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     assert_eq!(bench.serve(), None, "an idle line waits for bytes alone");
     bench.master.uart_mut().write_all(&[0x22, 0x01]).unwrap();
     let deadline = bench.serve().expect("a command is under way");
@@ -109,18 +110,18 @@ fn a_command_that_does_not_come_whole_is_answered_when_its_time_is_over() {
 
 #[test]
 fn lost_bytes_are_answered_with_overrun_and_the_next_command_is_understood() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     bench.master.uart_mut().write_all(&[0x22, 0x01]).unwrap();
     bench.serve();
     bench.slave.uart_mut().received.borrow_mut().push_back(Err(ErrorKind::Other));
     assert_eq!(bench.slave.poll(bench.now, &mut bench.drive), Err(ErrorKind::Other));
     assert_eq!(bench.sent(), [0xFF, 0x01, 0x08, 0x09]);
-    assert_eq!(bench.ask(Request::BoardInfo).map(|info| info.len()), Ok(32));
+    assert_eq!(bench.ask(Request::GetBoardInfo).map(|info| info.len()), Ok(32));
 }
 
 #[test]
 fn a_call_does_a_bounded_amount_of_work_on_a_line_full_of_garbage() {
-    let mut bench = Bench::new();
+    let mut bench = Pair::new();
     bench.slave.uart_mut().received.borrow_mut().extend([Ok(0xA5); 1000]);
     assert_eq!(bench.slave.poll(bench.now, &mut bench.drive), Ok(Some(bench.now)));
     assert_eq!(bench.slave.uart_mut().received.borrow().len(), 1000 - 32);
@@ -128,24 +129,24 @@ fn a_call_does_a_bounded_amount_of_work_on_a_line_full_of_garbage() {
 
 #[test]
 fn a_drive_that_is_silent_costs_the_timeout_and_the_line_recovers() {
-    let mut bench = Bench::new();
-    bench.master.master_mut().request(1, &Request::BoardInfo).unwrap();
+    let mut bench = Pair::new();
+    bench.master.master_mut().request(1, &Request::GetBoardInfo).unwrap();
     let Ok(Event::Wait(Some(_))) = bench.master.poll(bench.now) else { panic!("sent") };
     bench.slave.uart_mut().received.borrow_mut().clear();
-    assert_eq!(bench.exchange(), Err(Error::Failed(Failure::Timeout)));
+    assert_eq!(bench.exchange(), Err(ExchangeError::Failed(Failure::Timeout)));
     assert_eq!(bench.now, Instant(0) + Duration::from_millis(1000));
-    assert_eq!(bench.ask(Request::FirmwareVersion).map(|text| text.len()), Ok(32));
+    assert_eq!(bench.ask(Request::GetFirmwareVersion).map(|text| text.len()), Ok(32));
 }
 
 #[test]
 fn bytes_of_a_reply_that_are_lost_end_the_exchange_and_not_the_port() {
-    let mut bench = Bench::new();
-    bench.master.master_mut().request(1, &Request::BoardInfo).unwrap();
+    let mut bench = Pair::new();
+    bench.master.master_mut().request(1, &Request::GetBoardInfo).unwrap();
     bench.master.poll(bench.now).expect("sent");
     bench.master.uart_mut().received.borrow_mut().push_back(Err(ErrorKind::Other));
     assert_eq!(bench.master.poll(bench.now), Err(ErrorKind::Other));
     bench.serve();
     bench.master.uart_mut().received.borrow_mut().drain(..10);
     assert!(bench.exchange().is_err(), "half a reply is none");
-    assert_eq!(bench.ask(Request::BoardInfo).map(|info| info.len()), Ok(32));
+    assert_eq!(bench.ask(Request::GetBoardInfo).map(|info| info.len()), Ok(32));
 }

@@ -1871,7 +1871,7 @@ struct motorlink_rmd_phase_currents motorlink_rmd_decode_phase_currents(struct m
 uint16_t motorlink_rmd_encoder_centidegrees(uint16_t counts, uint8_t encoder_bits);
 
 /**
- * Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of guard time, no
+ * Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of quarantine time, no
  * limits. `size` is `sizeof *host`. Former hosts may have asked the motors anything;
  * `motorlink_rmd_host_trust` says that they did not.
  */
@@ -1901,7 +1901,7 @@ motorlink_error motorlink_rmd_host_set_limits(struct motorlink_rmd_host *host,
  *
  * A motor that did not answer before may be asked for its status instead; the exchange ends in
  * `QUARANTINED` then. So does the first one with each motor, in which it is asked for its status
- * by two different questions; when it was silent for the guard time the request is taken. Off and
+ * by two different questions; when it was silent for the quarantine time the request is taken. Off and
  * Stop are taken and sent during a quarantine, unless it is their own late reply that is awaited;
  * to a motor that was not asked before they go out ahead of the questions.
  *

@@ -155,13 +155,13 @@ impl<T: Plain> Kept<T> {
 }
 
 /// A place for a result.
-pub(crate) struct Place<T>(*mut T);
+pub(crate) struct OutParam<T>(*mut T);
 
 impl<T> Out<T> {
     /// The place, of which it is known that it can be written.
-    pub(crate) fn place(&self) -> Result<Place<T>> {
+    pub(crate) fn place(&self) -> Result<OutParam<T>> {
         check(self.0)?;
-        Ok(Place(self.0))
+        Ok(OutParam(self.0))
     }
 }
 
@@ -179,7 +179,7 @@ impl<T: Plain> Out<T> {
     }
 }
 
-impl<T> Place<T> {
+impl<T> OutParam<T> {
     pub(crate) fn set(self, value: T) {
         // SAFETY: neither NULL nor misaligned, and promised to be writable.
         unsafe { self.0.write(value) };

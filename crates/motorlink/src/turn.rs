@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use motorlink_link::port::PortError;
 
 /// How often a client that waits makes the call of [`Client::looking`](crate::st::Client::looking)
-/// or [`Bus::looking`](crate::rmd::Bus::looking).
+/// or [`rmd::Client::looking`](crate::rmd::Client::looking).
 pub const LOOK: Duration = Duration::from_millis(50);
 
 /// Called while an exchange waits. An error ends the exchange.
@@ -22,12 +22,12 @@ type Look = Box<dyn Fn() -> Result<(), Box<dyn Error + Send + Sync>> + Send + Sy
 /// While [`Look`] runs, the line is unlocked and belongs to its thread: that thread may use the line
 /// from within, and other threads wait.
 pub(crate) struct Turns<T> {
-    line: Mutex<Line<T>>,
+    shared: Mutex<Shared<T>>,
     is_free: Condvar,
     look: Option<Look>,
 }
 
-struct Line<T> {
+struct Shared<T> {
     state: T,
     /// The thread that is looking.
     looking: Option<ThreadId>,
@@ -36,13 +36,13 @@ struct Line<T> {
 /// A line in the hands of one thread, until it is dropped.
 pub(crate) struct Turn<'a, T> {
     turns: &'a Turns<T>,
-    line: MutexGuard<'a, Line<T>>,
+    shared: MutexGuard<'a, Shared<T>>,
 }
 
 impl<T> Turns<T> {
     pub(crate) fn new(state: T) -> Self {
-        let line = Mutex::new(Line { state, looking: None });
-        Turns { line, is_free: Condvar::new(), look: None }
+        let line = Mutex::new(Shared { state, looking: None });
+        Turns { shared: line, is_free: Condvar::new(), look: None }
     }
 
     pub(crate) fn set_look(&mut self, look: Look) {
@@ -55,7 +55,7 @@ impl<T> Turns<T> {
         while line.looking.is_some_and(|thread| thread != thread::current().id()) {
             line = self.is_free.wait(line).unwrap_or_else(PoisonError::into_inner);
         }
-        Turn { turns: self, line }
+        Turn { turns: self, shared: line }
     }
 
     /// When an exchange that begins now has to look; `None`: never.
@@ -65,8 +65,8 @@ impl<T> Turns<T> {
 
     /// A poisoned lock is taken all the same: an exchange that panicked left the line in a state
     /// that the next one deals with.
-    fn lock(&self) -> MutexGuard<'_, Line<T>> {
-        self.line.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Shared<T>> {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -75,7 +75,7 @@ impl<T> Turn<'_, T> {
     pub(crate) fn look(mut self, port: &str) -> (Self, Result<(), PortError>) {
         let turns = self.turns;
         let Some(look) = &turns.look else { return (self, Ok(())) };
-        let before = self.line.looking.replace(thread::current().id());
+        let before = self.shared.looking.replace(thread::current().id());
         drop(self);
         let looked = catch_unwind(AssertUnwindSafe(look));
         let mut line = turns.lock();
@@ -87,7 +87,7 @@ impl<T> Turn<'_, T> {
             let source = io::Error::new(io::ErrorKind::Interrupted, error);
             PortError::Io { port: port.to_owned(), source }
         });
-        (Turn { turns, line }, looked)
+        (Turn { turns, shared: line }, looked)
     }
 }
 
@@ -95,12 +95,12 @@ impl<T> Deref for Turn<'_, T> {
     type Target = T;
 
     fn deref(&self) -> &T {
-        &self.line.state
+        &self.shared.state
     }
 }
 
 impl<T> DerefMut for Turn<'_, T> {
     fn deref_mut(&mut self) -> &mut T {
-        &mut self.line.state
+        &mut self.shared.state
     }
 }

@@ -5,24 +5,24 @@ mod served;
 use std::time::Duration;
 
 use allocation_counter::measure;
-use motorlink::rmd::{self, Bus, MotorId, MotorSet, ReadMotionStatus, SetTorque4};
-use motorlink::st::{self, Client, RegisterId, register};
+use motorlink::rmd::{self, MotorId, MotorSet, ReadMotionStatus, SetTorque4};
+use motorlink::st::{self, RegisterId, register};
 use served::Served;
 
 #[test]
 fn an_exchange_with_an_st_drive_allocates_nothing() {
     let drives = Served::new("alloc-st");
-    let client = Client::open(&drives.st.parse().unwrap(), st::Options::default()).unwrap();
+    let client = st::Client::open(&drives.st.parse().unwrap(), st::Options::default()).unwrap();
     let motor = client.motor(1).unwrap();
     let segment = [RegisterId::STATUS, RegisterId::SPEED_MEAS, RegisterId::I_Q];
     motor.configure_segment(0, &segment).unwrap();
     let counted = measure(|| {
         for n in 0..100 {
-            motor.read(register::SPEED_MEAS).unwrap();
-            motor.write(register::SPEED_KP, n).unwrap();
-            motor.ramp(1000, 10).unwrap();
+            motor.get(register::SPEED_MEAS).unwrap();
+            motor.set(register::SPEED_KP, n).unwrap();
+            motor.set_ramp(1000, 10).unwrap();
             let mut values = [0; 3];
-            motor.read_segment(0, &segment, &mut values).unwrap();
+            motor.segment(0, &segment, &mut values).unwrap();
         }
     });
     assert_eq!(counted.count_total, 0);
@@ -32,7 +32,7 @@ fn an_exchange_with_an_st_drive_allocates_nothing() {
 fn exchanges_and_cycles_on_a_bus_allocate_nothing() {
     let drives = Served::new("alloc-rmd");
     let options = rmd::Options { timeout: Duration::from_secs(2), ..rmd::Options::default() };
-    let bus = Bus::open(&drives.rmd.parse().unwrap(), options).unwrap();
+    let bus = rmd::Client::open(&drives.rmd.parse().unwrap(), options).unwrap();
     let motor = bus.motor(1).unwrap();
     let all: MotorSet = (1..=4).filter_map(MotorId::new).collect();
     let status = [1, 2, 3, 4].map(|id| (MotorId::new(id).unwrap(), ReadMotionStatus));

@@ -9,10 +9,10 @@ use std::os::fd::BorrowedFd;
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{EventLine, FdLink, PortError, PortName};
-use motorlink::rmd::{self, Code, EventBus, MotorId, SpeedLimit};
+use motorlink::port::{EventBytes, FdLink, PortError, PortName};
+use motorlink::rmd::{self, Code, MotorId, SpeedLimit};
 use motorlink::st::{
-    self, Command, Config, EventClient, LimitError, Limits, Progress, RegisterId, Request,
+    self, Command, LimitError, Limits, MasterConfig, Progress, RegisterId, Request,
 };
 use motorlink::{BackOff, LinkState};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -27,7 +27,7 @@ fn wait(descriptor: Option<BorrowedFd<'_>>, time: Option<Duration>) {
     poll(&mut fds, Some(&time)).unwrap();
 }
 
-fn finish(client: &mut EventClient) -> Result<Vec<u8>, st::Error> {
+fn finish(client: &mut st::EventClient) -> Result<Vec<u8>, st::Error> {
     loop {
         match client.advance(|payload| Some(payload.to_vec())) {
             Progress::Done(result) => return result,
@@ -36,7 +36,7 @@ fn finish(client: &mut EventClient) -> Result<Vec<u8>, st::Error> {
     }
 }
 
-fn exchange(client: &mut EventClient, request: &Request<'_>) -> Result<Vec<u8>, st::Error> {
+fn exchange(client: &mut st::EventClient, request: &Request<'_>) -> Result<Vec<u8>, st::Error> {
     client.begin(1, request)?;
     finish(client)
 }
@@ -53,7 +53,7 @@ fn exchanges_end_on_a_pty_and_inside_the_process() {
     motorlink_testbench::register();
     let drives = Served::new("event-st");
     for port in [drives.st.as_str(), "sim:"] {
-        let mut client = EventClient::open(&name(port), st::Options::default()).unwrap();
+        let mut client = st::EventClient::open(&name(port), st::Options::default()).unwrap();
         let value = [0x34, 0x12];
         let write = Request::SetRegister { register: RegisterId::SPEED_KP, value: &value };
         exchange(&mut client, &write).unwrap();
@@ -67,14 +67,14 @@ fn exchanges_end_on_a_pty_and_inside_the_process() {
 fn over_pairs(
     mut ends: VecDeque<UnixStream>,
     options: st::Options,
-) -> Result<EventClient, st::Error> {
+) -> Result<st::EventClient, st::Error> {
     let open = move || match ends.pop_front() {
         Some(end) => {
-            Ok(Box::new(Fresh(FdLink::new(end, "pair").expect("a link"))) as Box<dyn EventLine>)
+            Ok(Box::new(Fresh(FdLink::new(end, "pair").expect("a link"))) as Box<dyn EventBytes>)
         }
         None => Err(PortError::NotFound { port: "pair".to_owned() }),
     };
-    EventClient::open_with("pair", Box::new(open), options)
+    st::EventClient::open_with("pair", Box::new(open), options)
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn a_limit_holds_before_a_byte_leaves() {
     let limits = Limits { speed_rpm: Some(1000), ..Limits::default() };
     let options = st::Options { limits, ..st::Options::default() };
     let mut client = over_pairs([ours].into(), options).unwrap();
-    let ramp = Request::Ramp(st::Ramp { speed_rpm: 1001, duration_ms: 0 });
+    let ramp = Request::SetRamp(st::Ramp { speed_rpm: 1001, duration_ms: 0 });
     let refused = exchange(&mut client, &ramp).unwrap_err();
     assert!(
         matches!(refused, st::Error::Limit { why: LimitError::Exceeded { .. }, .. }),
@@ -98,8 +98,8 @@ fn a_limit_holds_before_a_byte_leaves() {
 #[test]
 fn the_reply_to_an_abandoned_exchange_is_not_taken_for_the_next_ones() {
     let (ours, theirs) = UnixStream::pair().unwrap();
-    let line = Config { quiet: Duration::from_millis(20).into(), ..Config::default() };
-    let options = st::Options { line, ..st::Options::default() };
+    let line = MasterConfig { quiet: Duration::from_millis(20).into(), ..MasterConfig::default() };
+    let options = st::Options { master: line, ..st::Options::default() };
     let mut client = over_pairs([ours].into(), options).unwrap();
     let drive = std::thread::spawn(move || {
         let mut request = [0; 4];
@@ -152,13 +152,13 @@ fn a_port_that_fails_ends_the_exchange_and_comes_back_behind_the_back_off() {
 #[test]
 fn what_was_started_in_steps_is_stopped_by_the_client_that_waits() {
     let drives = Served::new("event-guard");
-    let mut client = EventClient::open(&name(&drives.st), st::Options::default()).unwrap();
-    exchange(&mut client, &Request::Execute(Command::StartMotor)).unwrap();
-    client.begin(2, &Request::Execute(Command::StartMotor)).unwrap();
+    let mut client = st::EventClient::open(&name(&drives.st), st::Options::default()).unwrap();
+    exchange(&mut client, &Request::ExecuteCommand(Command::StartMotor)).unwrap();
+    client.begin(2, &Request::ExecuteCommand(Command::StartMotor)).unwrap();
     assert!(matches!(client.advance(|_| Some(())), Progress::Wait(Some(_))));
     assert_eq!(client.started().count(), 2);
     let client = client.into_client();
-    let stopped = client.guard().stop_now();
+    let stopped = client.stop_on_drop().stop_now();
     assert!(stopped.len() == 2 && stopped.iter().all(|one| one.result.is_ok()), "{stopped:?}");
 }
 
@@ -170,7 +170,7 @@ const STATUS1: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
 const STATUS2: [u8; 8] = [0x9C, 0, 0, 0, 0, 0, 0, 0];
 type Outcome = (MotorId, Result<[u8; 8], rmd::Error>);
 
-fn gather(bus: &mut EventBus) -> Vec<Outcome> {
+fn gather(bus: &mut rmd::EventClient) -> Vec<Outcome> {
     let mut outcomes = Vec::new();
     while !bus.busy().is_empty() {
         let time = bus.advance(|id, result| outcomes.push((id, result))).unwrap();
@@ -187,7 +187,7 @@ fn exchanges_with_motors_overlap_on_a_pty_and_inside_the_process() {
     let drives = Served::new("event-rmd");
     let options = rmd::Options { timeout: Duration::from_secs(5), ..rmd::Options::default() };
     for port in [drives.rmd.as_str(), "sim:"] {
-        let mut bus = EventBus::open(&name(port), options).unwrap();
+        let mut bus = rmd::EventClient::open(&name(port), options).unwrap();
         for n in 1..=4 {
             bus.ask(id(n), STATUS2).unwrap();
         }
@@ -205,7 +205,7 @@ fn a_motor_whose_exchange_was_given_up_is_waited_for() {
     let limits = rmd::Limits { speed: Some(SpeedLimit(360)), ..rmd::Limits::default() };
     let options =
         rmd::Options { timeout: Duration::from_secs(5), limits, ..rmd::Options::default() };
-    let mut bus = EventBus::open(&name(&drives.rmd), options).unwrap();
+    let mut bus = rmd::EventClient::open(&name(&drives.rmd), options).unwrap();
     // 0xA2, 360.01 °/s.
     let fast = [0xA2, 0, 0, 0, 0xA1, 0x8C, 0, 0];
     assert!(matches!(bus.ask(id(1), fast), Err(rmd::Error::Limit { .. })));
@@ -230,7 +230,7 @@ fn a_line_on_a_boards_time_is_refused_before_it_is_opened() {
         let port: PortName = name.parse().unwrap();
         let error = match name.starts_with("slcan") {
             true => port.open_event_can().err(),
-            false => port.open_event_line().err(),
+            false => port.open_event_bytes().err(),
         };
         assert!(matches!(error, Some(PortError::Emulated { .. })), "{error:?}");
         assert!(error.unwrap().to_string().contains("leave out `clock=`"));

@@ -1,27 +1,28 @@
 //! Moves within the turn, to motors that are near their target.
 
 use motorlink::rmd::{
-    self, Bus, CentiDegrees, Error, FullTurn, Limits, SpeedLimit, SpinDirection, TurnCentiDegrees,
+    self, CentiDegrees, Client, Error, FullTurn, Limits, SpeedLimit, SpinDirection,
+    TurnCentiDegrees,
 };
 use motorlink::time::Duration;
 use motorlink_link::fault::Faults;
-use motorlink_testbench::{BenchConfig, VirtualBench};
+use motorlink_testbench::{Bench, BenchConfig};
 
 const CW: SpinDirection = SpinDirection::Clockwise;
 const CCW: SpinDirection = SpinDirection::Counterclockwise;
 
 /// A motor that stands, and its bus.
-fn standing_at(degrees: f64, encoder_bits: u8) -> (VirtualBench, Bus) {
+fn standing_at(degrees: f64, encoder_bits: u8) -> (Bench, Client) {
     let config = format!(
         "[[rmd.motor]]\nid = 1\nplant.angle_degrees = {degrees}\nplant.encoder.bits = {encoder_bits}"
     );
-    let bench = VirtualBench::new(&BenchConfig::parse(&config).unwrap()).unwrap();
-    let bus = Bus::over("bench", bench.can(&Faults::NONE), rmd::Options::default());
+    let bench = Bench::new(&BenchConfig::parse(&config).unwrap()).unwrap();
+    let bus = Client::over("bench", bench.can(&Faults::NONE), rmd::Options::default());
     (bench, bus)
 }
 
 fn turn(
-    bus: &Bus,
+    bus: &Client,
     degrees: f64,
     direction: SpinDirection,
     full_turn: FullTurn,
@@ -34,7 +35,7 @@ fn turn(
 }
 
 /// How far the motor turns within a second.
-fn turned(bench: &VirtualBench, from: f64) -> f64 {
+fn turned(bench: &Bench, from: f64) -> f64 {
     bench.run(Duration::from_millis(1_000));
     let place = bench.signals().iter().position(|known| known.name == "rmd1.angle_degrees");
     bench.values()[place.unwrap()] - from

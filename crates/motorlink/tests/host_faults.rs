@@ -12,9 +12,9 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use motorlink::rmd::{self, Bus};
+use motorlink::rmd::{self};
 use motorlink::slcan::Device as Adapter;
-use motorlink::st::{self, Client, Motor, Profile, Slave};
+use motorlink::st::{self, MotorNumber, Profile, Slave};
 use motorlink::{LinkState, time};
 use motorlink_sim::rmd::RmdBus;
 use motorlink_sim::st::StDrive;
@@ -90,7 +90,7 @@ fn path(name: &str) -> PathBuf {
 
 /// An ST drive; after `requests` replies it is unplugged in the middle of one.
 fn st_drive(mut requests: u32) -> Answer {
-    let mut slave = Slave::new(Profile::Spec, Motor::FIRST);
+    let mut slave = Slave::new(Profile::Spec, MotorNumber::FIRST);
     let mut drive = StDrive::demo(time::Instant(0));
     Box::new(move |bytes, reply| {
         for &byte in bytes {
@@ -142,15 +142,15 @@ fn until(what: &str, mut reached: impl FnMut() -> bool) {
     }
 }
 
-fn open_st(link: &Path) -> Client {
+fn open_st(link: &Path) -> st::Client {
     let port = link.to_str().expect("UTF-8").parse().expect("a port");
-    Client::open(&port, st::Options::default()).expect("opened")
+    st::Client::open(&port, st::Options::default()).expect("opened")
 }
 
-fn open_rmd(link: &Path) -> Bus {
+fn open_rmd(link: &Path) -> rmd::Client {
     let port = format!("slcan:{}", link.display()).parse().expect("a port");
     let options = rmd::Options { timeout: Duration::from_secs(1), ..rmd::Options::default() };
-    Bus::open(&port, options).expect("opened")
+    rmd::Client::open(&port, options).expect("opened")
 }
 
 #[test]
@@ -158,16 +158,16 @@ fn an_st_drive_unplugged_in_the_middle_of_a_reply_is_told_and_comes_back() {
     let link = path("unplug-st");
     let device = Device::plug(&link, st_drive(4));
     let client = open_st(&link);
-    client.info().expect("it answers three questions, and then this");
-    let lost = client.info().expect_err("half a reply");
+    client.board_info().expect("it answers three questions, and then this");
+    let lost = client.board_info().expect_err("half a reply");
     assert!(lost.to_string().contains("hung up or was unplugged"), "{lost}");
     assert!(matches!(client.link_state(), LinkState::Closed { .. }));
     device.unplug();
-    let absent = client.info().expect_err("there is nothing");
+    let absent = client.board_info().expect_err("there is nothing");
     assert!(absent.to_string().contains("is it plugged in?"), "{absent}");
 
     let _device = Device::plug(&link, st_drive(u32::MAX));
-    until("the drive answers again", || client.info().is_ok());
+    until("the drive answers again", || client.board_info().is_ok());
 }
 
 #[test]
@@ -211,14 +211,14 @@ fn a_device_that_comes_back_under_another_name_is_found_by_its_link() {
     let device = Device::plug(&first, st_drive(u32::MAX));
     symlink(&first, &by_id).expect("linked");
     let client = open_st(&by_id);
-    client.info().expect("it answers");
+    client.board_info().expect("it answers");
     device.unplug();
-    assert!(client.info().is_err());
+    assert!(client.board_info().is_err());
 
     let _device = Device::plug(&second, st_drive(u32::MAX));
     fs::remove_file(&by_id).expect("removed");
     symlink(&second, &by_id).expect("linked");
-    until("the drive answers again", || client.info().is_ok());
+    until("the drive answers again", || client.board_info().is_ok());
     assert!(client.motor(1).and_then(|motor| motor.status()).is_ok());
     fs::remove_file(&by_id).expect("removed");
 }

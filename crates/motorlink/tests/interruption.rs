@@ -10,8 +10,8 @@ use std::time::Duration;
 use motorlink::LinkState;
 use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, PortError};
-use motorlink::rmd::{self, Bus};
-use motorlink::st::{Client, Error, Options, register};
+use motorlink::rmd::{self};
+use motorlink::st::{self, Error, Options, register};
 use served::Served;
 
 /// Whoever is in a hurry, and how often the port was opened.
@@ -74,22 +74,22 @@ fn an_interrupted_exchange_leaves_the_line_open_and_the_next_one_right() {
     let hasty = hurry.clone();
     let wrap = move |link| Box::new(hasty.around(link)) as Box<dyn ByteLink>;
     let port = drives.st.parse().expect("a port");
-    let client = Client::open_wrapped(&port, wrap, Options::default()).expect("opened");
+    let client = st::Client::open_wrapped(&port, wrap, Options::default()).expect("opened");
     let motor = client.motor(1).expect("a motor");
-    motor.write(register::SPEED_KP, 1234).expect("written");
-    motor.write(register::SPEED_KI, -7).expect("written");
+    motor.set(register::SPEED_KP, 1234).expect("written");
+    motor.set(register::SPEED_KI, -7).expect("written");
     motor.start().expect("started");
     for _ in 0..3 {
         hurry.set(true);
-        let error = motor.read(register::SPEED_KP).expect_err("no time");
+        let error = motor.get(register::SPEED_KP).expect_err("no time");
         assert!(matches!(&error, Error::Port(port) if port.is_interruption()), "{error}");
         assert!(!error.is_line_failure(), "nobody tries again for such a reason");
         assert_eq!(client.link_state(), LinkState::Open);
         hurry.set(false);
-        assert_eq!(motor.read(register::SPEED_KI).expect("an answer"), -7);
+        assert_eq!(motor.get(register::SPEED_KI).expect("an answer"), -7);
     }
     assert_eq!(hurry.opened(), 1);
-    assert!(client.guard().stop_now().iter().all(|one| one.result.is_ok()));
+    assert!(client.stop_on_drop().stop_now().iter().all(|one| one.result.is_ok()));
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn an_interrupted_cycle_leaves_the_bus_open_and_the_next_one_right() {
     let wrap = move |link| Box::new(hasty.around(link)) as Box<dyn CanLink>;
     let port = drives.rmd.parse().expect("a port");
     let options = rmd::Options { timeout: Duration::from_secs(5), ..rmd::Options::default() };
-    let bus = Bus::open_wrapped(&port, wrap, options).expect("opened");
+    let bus = rmd::Client::open_wrapped(&port, wrap, options).expect("opened");
     let motor = bus.motor(1).expect("a motor");
     let gains = motor.pid().expect("an answer");
     for _ in 0..3 {

@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use motorlink::port::{ByteLink, PortError};
 use motorlink::st::{
-    Client, Command, Config, ControlMode, Error, EventClient, Limits, MotorHandle, Options,
+    Client, Command, ControlMode, Error, EventClient, Limits, MasterConfig, Motor, Options,
     Profile, Progress, Ramp, RegisterId, Request, register,
 };
 use motorlink::{BackOff, Clock, time};
 use motorlink_link::fault::Faults;
-use motorlink_testbench::{BenchConfig, VirtualBench};
+use motorlink_testbench::{Bench, BenchConfig};
 
 const LIMIT_RPM: u32 = 300;
 /// What the motors are told: the speed regulator overshoots a step by up to 7 %.
@@ -24,8 +24,8 @@ const POSITION: u8 = 0x12;
 type Ramping = fn(&Client, i32) -> Result<(), Error>;
 
 const RAMPINGS: [Ramping; 4] = [
-    |client, rpm| client.motor(1)?.ramp(rpm, 200),
-    |client, rpm| client.motor(1)?.write(register::RAMP_FINAL_SPEED, rpm),
+    |client, rpm| client.motor(1)?.set_ramp(rpm, 200),
+    |client, rpm| client.motor(1)?.set(register::RAMP_FINAL_SPEED, rpm),
     |client, rpm| {
         let payload = [&rpm.to_le_bytes()[..], &[200, 0]].concat();
         client.raw(1, 0x07, &payload).map(drop)
@@ -50,10 +50,10 @@ const STARTINGS: [Starting; 4] = [
 ];
 
 /// Drives whose motors have encoders: no rev-up turns them at speeds of its own.
-fn bench(profile: Profile) -> VirtualBench {
+fn bench(profile: Profile) -> Bench {
     let motor = "[[st.motor]]\npreset = 'servo'\nbuild.position_control = true\n";
     let config = format!("profile = '{}'\n{motor}{motor}", profile.name());
-    VirtualBench::new(&BenchConfig::parse(&config).unwrap()).unwrap()
+    Bench::new(&BenchConfig::parse(&config).unwrap()).unwrap()
 }
 
 fn options(profile: Profile) -> Options {
@@ -61,8 +61,8 @@ fn options(profile: Profile) -> Options {
     Options { profile, limits, ..Options::default() }
 }
 
-fn limited(bench: &VirtualBench) -> Client {
-    Client::over("bench", bench.line(&Faults::NONE), options(bench.profile()))
+fn limited(bench: &Bench) -> Client {
+    Client::over("bench", bench.bytes(&Faults::NONE), options(bench.profile()))
 }
 
 fn is_limited<T>(result: &Result<T, Error>) -> bool {
@@ -70,7 +70,7 @@ fn is_limited<T>(result: &Result<T, Error>) -> bool {
 }
 
 /// The motor's greatest true speed in the next seconds, rpm.
-fn top_speed(bench: &VirtualBench) -> f64 {
+fn top_speed(bench: &Bench) -> f64 {
     let recording = bench.record(&["st1.speed_rpm"], time::Duration::from_millis(1)).unwrap();
     bench.run(time::Duration::from_millis(2_500));
     recording.take().into_iter().map(f64::abs).fold(0.0, f64::max)
@@ -81,7 +81,7 @@ fn without_a_limit_a_start_goes_to_the_drives_own_target() {
     for profile in Profile::ALL {
         let bench = bench(profile);
         let options = Options { profile, ..Options::default() };
-        let client = Client::over("bench", bench.line(&Faults::NONE), options);
+        let client = Client::over("bench", bench.bytes(&Faults::NONE), options);
         client.motor(1).unwrap().start().unwrap();
         assert!(top_speed(&bench) > 1000.0);
     }
@@ -135,10 +135,10 @@ fn a_position_command_is_refused_in_either_profile() {
     let payload = [6000f32.to_le_bytes(), 0.5f32.to_le_bytes()].concat();
     for profile in Profile::ALL {
         let bench = bench(Profile::Mcsdk54);
-        let client = Client::over("bench", bench.line(&Faults::NONE), options(profile));
-        client.motor(1).unwrap().ramp(100, 0).unwrap();
+        let client = Client::over("bench", bench.bytes(&Faults::NONE), options(profile));
+        client.motor(1).unwrap().set_ramp(100, 0).unwrap();
         client.motor(1).unwrap().start().unwrap();
-        assert!(is_limited(&client.motor(1).unwrap().move_to(6000.0, 0.5)));
+        assert!(is_limited(&client.motor(1).unwrap().set_position(6000.0, 0.5)));
         assert!(is_limited(&client.raw(1, POSITION, &payload)));
         assert!(top_speed(&bench) <= f64::from(LIMIT_RPM));
     }
@@ -150,9 +150,10 @@ fn a_frame_of_any_length_hides_no_start() {
     let start = [0x23, 0x01, 0x01, 0x25];
     for size in [0, 3, 4, 5, 64, 126, 127, 128] {
         let bench = bench(Profile::Mcsdk54);
-        let line = Config { timeout: time::Duration::from_millis(50), ..Config::default() };
-        let options = Options { line, ..options(Profile::Mcsdk54) };
-        let client = Client::over("bench", bench.line(&Faults::NONE), options);
+        let line =
+            MasterConfig { timeout: time::Duration::from_millis(50), ..MasterConfig::default() };
+        let options = Options { master: line, ..options(Profile::Mcsdk54) };
+        let client = Client::over("bench", bench.bytes(&Faults::NONE), options);
         let payload: Vec<u8> = start.into_iter().chain([0; 124]).take(size).collect();
         // A question, to which the payload does not matter.
         let asked = client.raw(1, 0x0C, &payload);
@@ -167,7 +168,7 @@ fn a_start_that_any_profile_reads_in_a_raw_frame_counts_as_started() {
     for profile in Profile::ALL {
         let bench = bench(Profile::Mcsdk54);
         let options = Options { profile, ..Options::default() };
-        let client = Client::over("bench", bench.line(&Faults::NONE), options);
+        let client = Client::over("bench", bench.bytes(&Faults::NONE), options);
         let started = || client.started().map(|motor| motor.number()).collect::<Vec<_>>();
         // Firmware may complete a command that has no byte with an old one.
         let _ = client.raw(2, EXECUTE, &[]);
@@ -181,7 +182,7 @@ fn a_start_that_any_profile_reads_in_a_raw_frame_counts_as_started() {
 fn what_was_acknowledged_for_one_motor_counts_for_no_other() {
     let bench = bench(Profile::Spec);
     let client = limited(&bench);
-    client.motor(1).unwrap().ramp(100, 0).unwrap();
+    client.motor(1).unwrap().set_ramp(100, 0).unwrap();
     assert!(is_limited(&client.motor(2).unwrap().start()));
     client.motor(1).unwrap().start().unwrap();
 }
@@ -190,8 +191,8 @@ fn what_was_acknowledged_for_one_motor_counts_for_no_other() {
 fn motor_number_0_counts_where_it_is_known_which_motor_it_is() {
     let bench = bench(Profile::Spec);
     let client = limited(&bench);
-    let ramp = Request::Ramp(Ramp { speed_rpm: 100, duration_ms: 0 });
-    let start = Request::Execute(Command::StartMotor);
+    let ramp = Request::SetRamp(Ramp { speed_rpm: 100, duration_ms: 0 });
+    let start = Request::ExecuteCommand(Command::StartMotor);
     let ask = |motor, request| client.exchange(motor, request, |_| Some(()));
     // The drive's current motor is not known yet.
     ask(0, &ramp).unwrap();
@@ -207,7 +208,7 @@ fn motor_number_0_counts_where_it_is_known_which_motor_it_is() {
     ask(2, &start).unwrap();
     // Where it is not known which motor got a ramp, it may have been any.
     ask(1, &ramp).unwrap();
-    client.motor(1).unwrap().write(register::TARGET_MOTOR, 1).unwrap();
+    client.motor(1).unwrap().set(register::TARGET_MOTOR, 1).unwrap();
     ask(0, &ramp).unwrap();
     assert!(is_limited(&ask(1, &start)));
 }
@@ -260,11 +261,11 @@ impl ByteLink for Disturbed {
 }
 
 /// A limited client of a bench's motor 1, and what disturbs its line.
-fn disturbed(bench: &Arc<VirtualBench>) -> (Client, Arc<Mutex<Disturbance>>) {
+fn disturbed(bench: &Arc<Bench>) -> (Client, Arc<Mutex<Disturbance>>) {
     let disturbance = Arc::new(Mutex::new(Disturbance::default()));
     let (opened, drive) = (Arc::clone(&disturbance), Arc::clone(bench));
     let open = move || {
-        let inner = drive.line(&Faults::NONE);
+        let inner = drive.bytes(&Faults::NONE);
         let disturbance = Arc::clone(&opened);
         let link = Disturbed { inner, disturbance };
         link.look()?;
@@ -276,7 +277,7 @@ fn disturbed(bench: &Arc<VirtualBench>) -> (Client, Arc<Mutex<Disturbance>>) {
 }
 
 /// Something after which the drive may be another one, or go to another speed.
-type Upset = fn(&MotorHandle<'_>, &Mutex<Disturbance>);
+type Upset = fn(&Motor<'_>, &Mutex<Disturbance>);
 
 #[test]
 fn a_ramp_counts_until_the_drive_may_have_forgotten_it() {
@@ -303,22 +304,22 @@ fn a_ramp_counts_until_the_drive_may_have_forgotten_it() {
         ("RESET", |motor, _| drop(motor.execute(Command::Reset))),
         ("a ramp was not acknowledged", |motor, disturbance| {
             disturbance.lock().unwrap().deafens = true;
-            motor.ramp(50, 0).unwrap_err();
+            motor.set_ramp(50, 0).unwrap_err();
             disturbance.lock().unwrap().deafens = false;
         }),
         ("a ramp was acknowledged behind a reset", |motor, disturbance| {
             disturbance.lock().unwrap().first = vec![0xE0, 0x00, 0xE0];
-            motor.ramp(50, 0).unwrap();
+            motor.set_ramp(50, 0).unwrap();
         }),
-        ("a current reference", |motor, _| motor.current(100, 0).unwrap()),
-        ("a torque ramp", |motor, _| drop(motor.torque_ramp(100, 0))),
-        ("an Iq reference", |motor, _| motor.write(register::TORQUE_REF, 100).unwrap()),
+        ("a current reference", |motor, _| motor.set_current_reference(100, 0).unwrap()),
+        ("a torque ramp", |motor, _| drop(motor.set_torque_ramp(100, 0))),
+        ("an Iq reference", |motor, _| motor.set(register::TORQUE_REF, 100).unwrap()),
         ("torque control", |motor, _| {
-            motor.write(register::CONTROL_MODE, u8::from(ControlMode::Torque)).unwrap();
+            motor.set(register::CONTROL_MODE, u8::from(ControlMode::Torque)).unwrap();
         }),
         // Firmware makes this a ramp to a reference of its own.
         ("speed control", |motor, _| {
-            motor.write(register::CONTROL_MODE, u8::from(ControlMode::Speed)).unwrap();
+            motor.set(register::CONTROL_MODE, u8::from(ControlMode::Speed)).unwrap();
         }),
     ];
     for profile in Profile::ALL {
@@ -326,13 +327,13 @@ fn a_ramp_counts_until_the_drive_may_have_forgotten_it() {
             let bench = Arc::new(bench(profile));
             let (client, disturbance) = disturbed(&bench);
             let motor = client.motor(1).unwrap();
-            motor.ramp(100, 0).unwrap();
+            motor.set_ramp(100, 0).unwrap();
             motor.start().unwrap();
             motor.stop().unwrap();
             upset(&motor, &disturbance);
             let start = motor.start();
             assert!(is_limited(&start), "{what}: {start:?}");
-            motor.ramp(100, 0).unwrap();
+            motor.set_ramp(100, 0).unwrap();
             motor.start().unwrap();
         }
     }
@@ -343,7 +344,7 @@ fn a_ramp_that_the_drive_refused_does_not_count() {
     let bench = bench(Profile::Mcsdk54);
     let client = limited(&bench);
     let missing = client.motor(7).unwrap();
-    assert!(missing.ramp(100, 0).unwrap_err().is_refusal());
+    assert!(missing.set_ramp(100, 0).unwrap_err().is_refusal());
     assert!(is_limited(&missing.start()));
 }
 
@@ -352,11 +353,11 @@ fn torque_commands_pass_under_a_speed_limit() {
     let bench = bench(Profile::Mcsdk54);
     let client = limited(&bench);
     let motor = client.motor(1).unwrap();
-    motor.torque_ramp(500, 0).unwrap();
-    motor.ramp(100, 0).unwrap();
+    motor.set_torque_ramp(500, 0).unwrap();
+    motor.set_ramp(100, 0).unwrap();
     motor.start().unwrap();
-    motor.current(500, 0).unwrap();
-    motor.write(register::TORQUE_REF, 500).unwrap();
+    motor.set_current_reference(500, 0).unwrap();
+    motor.set(register::TORQUE_REF, 500).unwrap();
 }
 
 fn finish(client: &mut EventClient) -> Result<(), Error> {
@@ -371,12 +372,12 @@ fn finish(client: &mut EventClient) -> Result<(), Error> {
 fn a_client_for_event_loops_needs_the_ramp_too() {
     motorlink_testbench::register();
     let mut client = EventClient::open(&"sim:".parse().unwrap(), options(Profile::Spec)).unwrap();
-    let start = Request::Execute(Command::StartMotor);
+    let start = Request::ExecuteCommand(Command::StartMotor);
     assert!(is_limited(&client.begin(1, &start)));
     assert!(is_limited(&client.begin_raw(1, EXECUTE, &[u8::from(Command::StartMotor)])));
     assert!(is_limited(&client.begin_raw(1, POSITION, &[0; 8])));
     assert_eq!(client.started().count(), 0);
-    client.begin(1, &Request::Ramp(Ramp { speed_rpm: 100, duration_ms: 0 })).unwrap();
+    client.begin(1, &Request::SetRamp(Ramp { speed_rpm: 100, duration_ms: 0 })).unwrap();
     finish(&mut client).unwrap();
     client.begin(1, &start).unwrap();
     finish(&mut client).unwrap();

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use motorlink::can::CanFrame;
 use motorlink::port::PortError;
-use motorlink::rmd::{self, Bus};
-use motorlink::st::{self, Client, register};
+use motorlink::rmd::{self};
+use motorlink::st::{self, register};
 use wire::{ACK, Fresh, GET_SPEED, OFF, SPEED, START, STOP, Wire};
 
 /// Longer than any test waits for a condition.
@@ -26,18 +26,19 @@ fn in_time<T: Send + 'static>(act: impl FnOnce() -> T + Send + 'static) -> T {
 /// A client on a silent wire that calls `once` when it looks for the first time.
 fn silent_client(
     timeout: Duration,
-    once: impl Fn(&Client) + Send + Sync + 'static,
-) -> (Wire<u8>, Arc<OnceLock<Client>>) {
-    let (wire, place) = (Wire::new(), Arc::new(OnceLock::<Client>::new()));
+    once: impl Fn(&st::Client) + Send + Sync + 'static,
+) -> (Wire<u8>, Arc<OnceLock<st::Client>>) {
+    let (wire, place) = (Wire::new(), Arc::new(OnceLock::<st::Client>::new()));
     let mut options = st::Options::default();
-    options.line.timeout = timeout.into();
+    options.master.timeout = timeout.into();
     let (seen, looked) = (Arc::clone(&place), AtomicBool::new(false));
-    let client = Client::over("wire", Box::new(Fresh(wire.clone())), options).looking(move || {
-        if !looked.swap(true, Ordering::SeqCst) {
-            once(seen.get().expect("it is there"));
-        }
-        Ok(())
-    });
+    let client =
+        st::Client::over("wire", Box::new(Fresh(wire.clone())), options).looking(move || {
+            if !looked.swap(true, Ordering::SeqCst) {
+                once(seen.get().expect("it is there"));
+            }
+            Ok(())
+        });
     assert!(place.set(client).is_ok());
     (wire, place)
 }
@@ -81,7 +82,7 @@ fn a_look_that_leaves_the_line_alone_does_not_disturb_the_exchange() {
     let says = wire.clone();
     let looks = Arc::new(Mutex::new(0));
     let counted = Arc::clone(&looks);
-    let client = Client::over("wire", Box::new(Fresh(wire.clone())), st::Options::default());
+    let client = st::Client::over("wire", Box::new(Fresh(wire.clone())), st::Options::default());
     let client = client.looking(move || {
         let mut looks = counted.lock().unwrap();
         *looks += 1;
@@ -90,7 +91,7 @@ fn a_look_that_leaves_the_line_alone_does_not_disturb_the_exchange() {
         }
         Ok(())
     });
-    let speed = in_time(move || client.motor(1).unwrap().read(register::SPEED_MEAS));
+    let speed = in_time(move || client.motor(1).unwrap().get(register::SPEED_MEAS));
     assert_eq!(speed.expect("an answer"), 42);
     assert_eq!((wire.sent(), *looks.lock().unwrap()), (GET_SPEED.to_vec(), 3));
 }
@@ -100,7 +101,7 @@ fn other_threads_wait_while_one_looks() {
     let (wire, asks) = (Wire::<u8>::new(), Arc::new(AtomicU32::new(0)));
     let (says, asked) = (wire.clone(), Arc::clone(&asks));
     let looks = AtomicU32::new(0);
-    let client = Client::over("wire", Box::new(Fresh(wire.clone())), st::Options::default());
+    let client = st::Client::over("wire", Box::new(Fresh(wire.clone())), st::Options::default());
     let client = client.looking(move || {
         // The other thread has some looks to get in, if it could.
         let asks = asked.load(Ordering::SeqCst) > 0;
@@ -120,7 +121,7 @@ fn other_threads_wait_while_one_looks() {
             thread::yield_now();
         }
         asks.store(1, Ordering::SeqCst);
-        other.motor(1).unwrap().read(register::SPEED_MEAS)
+        other.motor(1).unwrap().get(register::SPEED_MEAS)
     });
     first.join().unwrap().expect("an answer");
     assert_eq!(second.join().unwrap().expect("an answer"), 42);
@@ -129,16 +130,17 @@ fn other_threads_wait_while_one_looks() {
 
 #[test]
 fn an_off_from_within_a_cycle_is_sent_at_once_and_the_cycle_ends() {
-    let (wire, place) = (Wire::<CanFrame>::new(), Arc::new(OnceLock::<Bus>::new()));
+    let (wire, place) = (Wire::<CanFrame>::new(), Arc::new(OnceLock::<rmd::Client>::new()));
     let options = rmd::Options { timeout: LONG, ..rmd::Options::default() };
     let seen = Arc::clone(&place);
     let looked = AtomicBool::new(false);
-    let bus = Bus::over("wire", Box::new(Fresh(wire.clone())), options).looking(move || {
-        if !looked.swap(true, Ordering::SeqCst) {
-            seen.get().unwrap().motor(1).unwrap().off().expect("it answers");
-        }
-        Ok(())
-    });
+    let bus =
+        rmd::Client::over("wire", Box::new(Fresh(wire.clone())), options).looking(move || {
+            if !looked.swap(true, Ordering::SeqCst) {
+                seen.get().unwrap().motor(1).unwrap().off().expect("it answers");
+            }
+            Ok(())
+        });
     assert!(place.set(bus).is_ok());
     let off = CanFrame::new(0x141, [OFF, 0, 0, 0, 0, 0, 0, 0]);
     wire.say_to(&[off], &[off]);
@@ -159,7 +161,7 @@ fn an_off_from_within_a_cycle_is_sent_at_once_and_the_cycle_ends() {
 #[test]
 fn an_error_of_the_look_interrupts_the_exchange_and_nothing_else() {
     let wire = Wire::new();
-    let client = Client::over("wire", Box::new(Fresh(wire)), st::Options::default());
+    let client = st::Client::over("wire", Box::new(Fresh(wire)), st::Options::default());
     let client = client.looking(|| Err("enough".into()));
     let error = client.motor(1).unwrap().start().expect_err("no time");
     assert!(matches!(&error, st::Error::Port(port) if port.is_interruption()), "{error}");

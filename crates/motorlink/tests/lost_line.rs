@@ -4,7 +4,9 @@ mod wire;
 
 use std::time::Duration;
 
-use motorlink::st::{Client, Command, EventClient, Line, Options, Progress, Request, register};
+use motorlink::st::{
+    Client, Command, EventClient, Options, Progress, Request, SyncState, register,
+};
 use wire::{ACK, Fresh, GET_SPEED, START, STOP, Wire};
 
 /// GET_BOARD_INFO and GET_REVUP_DATA: the questions of recovery.
@@ -14,8 +16,8 @@ const REVUP: [u8; 4] = [0x08, 0x01, 0x00, 0x09];
 /// With short timeouts: this drive never answers in any case.
 fn options() -> Options {
     let mut options = Options::default();
-    options.line.timeout = Duration::from_millis(20).into();
-    options.line.quiet = Duration::from_millis(5).into();
+    options.master.timeout = Duration::from_millis(20).into();
+    options.master.quiet = Duration::from_millis(5).into();
     options
 }
 
@@ -24,8 +26,8 @@ fn a_stop_on_a_lost_line_is_sent_before_the_line_has_recovered() {
     let wire = Wire::new();
     let client = Client::over("wire", Box::new(Fresh(wire.clone())), options());
     let motor = client.motor(1).unwrap();
-    motor.read(register::SPEED_MEAS).expect_err("nothing answers");
-    assert_eq!(client.line(), Line::Lost);
+    motor.get(register::SPEED_MEAS).expect_err("nothing answers");
+    assert_eq!(client.sync_state(), SyncState::Lost);
     motor.stop().expect_err("nothing answers");
     client.raw(1, 0x03, &[0x02]).expect_err("nothing answers");
     // What starts a motor waits, as everything else does.
@@ -67,7 +69,7 @@ fn a_guard_tells_every_motor_of_a_silent_drive_before_it_waits() {
         client.motor(motor).unwrap().start().expect_err("nothing answers");
     }
     let before = wire.sent().len();
-    let stopped = client.guard().stop_now();
+    let stopped = client.stop_on_drop().stop_now();
     assert_eq!(stopped.iter().filter(|one| one.result.is_err()).count(), 3);
     let mut told: Vec<u8> = wire.sent()[before..].chunks(4).take(3).map(|stop| stop[0]).collect();
     told.sort_unstable();
@@ -80,8 +82,8 @@ fn so_it_is_for_event_loops() {
     let link = wire.clone();
     let open = Box::new(move || Ok(Box::new(Fresh(link.clone())) as _));
     let mut client = EventClient::open_with("wire", open, options()).unwrap();
-    let stop = Request::Execute(Command::StopMotor);
-    client.begin(1, &Request::Execute(Command::StartMotor)).unwrap();
+    let stop = Request::ExecuteCommand(Command::StopMotor);
+    client.begin(1, &Request::ExecuteCommand(Command::StartMotor)).unwrap();
     assert!(matches!(client.advance(|_| Some(())), Progress::Wait(Some(_))));
     // The START is given up, and the line with it.
     client.begin(1, &stop).unwrap();
@@ -90,7 +92,7 @@ fn so_it_is_for_event_loops() {
     // One that is given up itself is not sent later.
     client.begin(1, &stop).unwrap();
     client.abandon();
-    client.begin(1, &Request::BoardInfo).unwrap();
+    client.begin(1, &Request::GetBoardInfo).unwrap();
     assert!(matches!(client.advance(|_| Some(())), Progress::Wait(Some(_))));
     assert_eq!(wire.sent(), [START, STOP].concat());
 }

@@ -7,9 +7,9 @@ use std::time::Duration;
 use motorlink::Clock;
 use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, PortError, SlcanLink};
-use motorlink::rmd::{self, Bus, Error, IqCommand, MotorId, MotorSet, SetTorque4};
+use motorlink::rmd::{self, Error, IqCommand, MotorId, MotorSet, SetTorque4};
 use motorlink::slcan::Bitrate;
-use motorlink::st::{self, Client, Failure, register};
+use motorlink::st::{self, Failure, register};
 use motorlink::time::Instant;
 
 const MS: u64 = 1_000;
@@ -32,8 +32,8 @@ impl Motors {
         Motors { clock, sent: Arc::default(), coming: Arc::default(), is_shared, twice: None }
     }
 
-    fn bus(&self) -> Bus {
-        Bus::over("bus", Box::new(self.clone()), rmd::Options::default())
+    fn bus(&self) -> rmd::Client {
+        rmd::Client::over("bus", Box::new(self.clone()), rmd::Options::default())
     }
 
     /// When something was sent, ms, to which identifier, and its first byte.
@@ -142,7 +142,7 @@ fn torques_for_four_motors_are_sent_to_those_that_answer() {
         }
     }
     let motors = Motors::new(false);
-    let bus = Bus::over("bus", Box::new(Without3(motors.clone())), rmd::Options::default());
+    let bus = rmd::Client::over("bus", Box::new(Without3(motors.clone())), rmd::Options::default());
     let replies = bus.set_torque4(SetTorque4::default(), MotorSet::TORQUE4).unwrap();
     let replies = replies.map(|reply| reply.expect("all are expected"));
     assert!(matches!(replies[2], Err(Error::Timeout { .. })), "{replies:?}");
@@ -175,7 +175,8 @@ fn torques_for_motors_that_are_all_silent_are_not_sent() {
             self.0.clock()
         }
     }
-    let bus = Bus::over("bus", Box::new(Nobody(Motors::new(false))), rmd::Options::default());
+    let bus =
+        rmd::Client::over("bus", Box::new(Nobody(Motors::new(false))), rmd::Options::default());
     for _ in 0..3 {
         let replies = bus.set_torque4(SetTorque4::default(), MotorSet::TORQUE4);
         let is_error = |reply: Option<Result<_, Error>>| reply.is_some_and(|reply| reply.is_err());
@@ -219,7 +220,7 @@ fn a_scan_tells_of_a_motor_that_answers_somebody_else() {
     let mut found = vec![];
     let id = MotorId::new(1).unwrap();
     Motors::new(true).bus().scan(id.into(), |one| found.push(one), |_| {}).unwrap();
-    assert_eq!(found, [rmd::Found::Shared(id)]);
+    assert_eq!(found, [rmd::ScanResult::Shared(id)]);
 }
 
 /// An adapter that says this to each frame, or never anything.
@@ -255,7 +256,7 @@ fn an_adapter_that_refuses_or_is_mute_is_named_as_the_cause() {
     ] {
         let line = Adapter { says, pending: VecDeque::new() };
         let link = SlcanLink::open(line, "adapter", Bitrate::DEFAULT).unwrap();
-        let bus = Bus::over("adapter", Box::new(link), rmd::Options::default());
+        let bus = rmd::Client::over("adapter", Box::new(link), rmd::Options::default());
         let error = bus.raw(MotorId::new(1).unwrap(), [0x92, 0, 0, 0, 0, 0, 0, 0]).unwrap_err();
         match cause {
             Some(cause) => assert!(error.to_string().contains(cause), "{error}"),
@@ -313,10 +314,10 @@ impl ByteLink for Twice {
 fn a_reply_that_came_twice_is_found_before_its_values_are_relied_on() {
     for (is_doubling, is_talking) in [(false, false), (true, false), (true, true)] {
         let line = Twice { is_doubling, is_talking, ..Twice::default() };
-        let client = Client::over("line", Box::new(line), st::Options::default());
+        let client = st::Client::over("line", Box::new(line), st::Options::default());
         let motor = client.motor(1).unwrap();
-        let kp = motor.read(register::SPEED_KP).unwrap();
-        let ki = motor.read(register::SPEED_KI).unwrap();
+        let kp = motor.get(register::SPEED_KP).unwrap();
+        let ki = motor.get(register::SPEED_KI).unwrap();
         assert_eq!(kp == ki, is_doubling, "nothing tells so far");
         // Longer than a program may take without looking what came.
         std::thread::sleep(Duration::from_millis(1));

@@ -7,7 +7,7 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use motorlink::relay::{Event, Part, Reason, Relay, RelayError, RelayOptions};
-use motorlink::rmd::OnDrop;
+use motorlink::rmd::StopAction;
 use motorlink::st::{Client, Options, Status};
 use served::Served;
 
@@ -146,7 +146,8 @@ fn a_port_of_the_other_kind_and_drives_within_the_process_are_refused() {
     use motorlink::port::PortError::{NotFound, WrongKind};
     let options = RelayOptions::default();
     let st = |name: &str| Relay::st(&name.parse().expect("a name"), options).err();
-    let rmd = |name: &str| Relay::rmd(&name.parse().expect("a name"), OnDrop::Off, options).err();
+    let rmd =
+        |name: &str| Relay::rmd(&name.parse().expect("a name"), StopAction::Off, options).err();
     assert!(matches!(st("slcan:/dev/ttyACM0"), Some(RelayError::Port(WrongKind { .. }))));
     assert!(matches!(st("socketcan:can0"), Some(RelayError::Port(WrongKind { .. }))));
     assert!(matches!(rmd("/dev/ttyACM0"), Some(RelayError::Port(WrongKind { .. }))));

@@ -5,8 +5,8 @@ mod served;
 use std::fs;
 use std::time::{Duration, Instant};
 
-use motorlink::rmd::{self, Bus, DpsPerSecond};
-use motorlink::st::{self, Client, Config, register};
+use motorlink::rmd::{self, DpsPerSecond};
+use motorlink::st::{self, MasterConfig, register};
 use motorlink::{BackOff, LinkState};
 use served::Served;
 
@@ -82,18 +82,18 @@ fn soak(
 
 fn st(exchanges: u32, period: u32) {
     let first = Served::new("soak-st");
-    let line = Config { quiet: Duration::from_millis(5).into(), ..Config::default() };
-    let options = st::Options { back_off: BACK_OFF, line, ..st::Options::default() };
-    let client = Client::open(&first.st.parse().expect("a port"), options).expect("opened");
+    let line = MasterConfig { quiet: Duration::from_millis(5).into(), ..MasterConfig::default() };
+    let options = st::Options { back_off: BACK_OFF, master: line, ..st::Options::default() };
+    let client = st::Client::open(&first.st.parse().expect("a port"), options).expect("opened");
     drop(first);
     // The port went away, which the first exchange finds out.
-    assert!(client.info().is_err());
+    assert!(client.board_info().is_err());
     assert!(matches!(client.link_state(), LinkState::Closed { .. }));
     soak("soak-st", exchanges, period, 2, |number| {
         let motor = client.motor(1).map_err(|error| error.to_string())?;
         let own = number as i16;
-        motor.write(register::SPEED_KP, own).map_err(|error| error.to_string())?;
-        let read = motor.read(register::SPEED_KP).map_err(|error| error.to_string())?;
+        motor.set(register::SPEED_KP, own).map_err(|error| error.to_string())?;
+        let read = motor.get(register::SPEED_KP).map_err(|error| error.to_string())?;
         assert_eq!(read, own);
         Ok(())
     });
@@ -103,7 +103,7 @@ fn rmd(exchanges: u32, period: u32) {
     let first = Served::new("soak-rmd");
     let timeout = Duration::from_secs(2);
     let options = rmd::Options { timeout, back_off: BACK_OFF, ..rmd::Options::default() };
-    let bus = Bus::open(&first.rmd.parse().expect("a port"), options).expect("opened");
+    let bus = rmd::Client::open(&first.rmd.parse().expect("a port"), options).expect("opened");
     drop(first);
     assert!(bus.motor(1).and_then(|motor| motor.status()).is_err());
     soak("soak-rmd", exchanges, period, 2, |number| {

@@ -2,17 +2,17 @@
 
 use std::time::{Duration, Instant as Moment};
 
-use motorlink::rmd::{self, Bus, CentiDps, IqCommand, MotorId, MotorSet, SetTorque4};
-use motorlink::st::{self, Client, Config, Failure, Status, register};
+use motorlink::rmd::{self, CentiDps, IqCommand, MotorId, MotorSet, SetTorque4};
+use motorlink::st::{self, Failure, MasterConfig, Status, register};
 use motorlink::time;
 use motorlink_link::fault::Faults;
 use motorlink_link::serve::ServeName;
-use motorlink_testbench::{BenchConfig, Command, VirtualBench};
+use motorlink_testbench::{Bench, BenchConfig, Command};
 
 const SECOND: time::Duration = time::Duration(1_000_000);
 
-fn bench() -> VirtualBench {
-    VirtualBench::new(&BenchConfig::default()).unwrap()
+fn bench() -> Bench {
+    Bench::new(&BenchConfig::default()).unwrap()
 }
 
 /// A text of faults; none where it is empty.
@@ -20,17 +20,17 @@ fn faults(text: &str) -> Faults {
     if text.is_empty() { Faults::NONE } else { text.parse().unwrap() }
 }
 
-fn st(bench: &VirtualBench, faults: &str, timeout: Duration) -> Client {
-    let line = Config { timeout: timeout.into(), ..Config::default() };
-    let options = st::Options { line, ..st::Options::default() };
-    Client::over("bench", bench.line(&self::faults(faults)), options)
+fn st(bench: &Bench, faults: &str, timeout: Duration) -> st::Client {
+    let line = MasterConfig { timeout: timeout.into(), ..MasterConfig::default() };
+    let options = st::Options { master: line, ..st::Options::default() };
+    st::Client::over("bench", bench.bytes(&self::faults(faults)), options)
 }
 
-fn rmd(bench: &VirtualBench, faults: &str) -> Bus {
-    Bus::over("bench", bench.can(&self::faults(faults)), rmd::Options::default())
+fn rmd(bench: &Bench, faults: &str) -> rmd::Client {
+    rmd::Client::over("bench", bench.can(&self::faults(faults)), rmd::Options::default())
 }
 
-fn value(bench: &VirtualBench, signal: &str) -> f64 {
+fn value(bench: &Bench, signal: &str) -> f64 {
     let place = bench.signals().iter().position(|known| known.name == signal).unwrap();
     bench.values()[place]
 }
@@ -79,8 +79,8 @@ fn a_line_recovers_on_virtual_time_and_no_late_reply_is_taken_for_another() {
     let mut heard = [0; 2];
     for n in 0..100 {
         let (answered, right) = match n % 2 {
-            0 => motor.read(register::BUS_VOLTAGE).map(|volts| volts == 325),
-            _ => motor.read(register::SPEED_MEAS).map(|speed| speed == 0),
+            0 => motor.get(register::BUS_VOLTAGE).map(|volts| volts == 325),
+            _ => motor.get(register::SPEED_MEAS).map(|speed| speed == 0),
         }
         .map_or((false, true), |right| (true, right));
         assert!(right, "exchange {n}");
@@ -114,10 +114,10 @@ fn run(faults: &str) -> (Vec<String>, Vec<f64>, u64) {
     let motor = client.motor(2).unwrap();
     for step in 0..30 {
         told.push(match step {
-            0 => format!("{:?}", motor.ramp(1000, 200)),
+            0 => format!("{:?}", motor.set_ramp(1000, 200)),
             1 => format!("{:?}", motor.start()),
             2 => format!("{:?}", bus.motor(3).unwrap().set_speed(CentiDps(36_000))),
-            _ => format!("{:?} {:?}", motor.status(), motor.read(register::SPEED_MEAS)),
+            _ => format!("{:?} {:?}", motor.status(), motor.get(register::SPEED_MEAS)),
         });
         bench.run(time::Duration::from_millis(100));
         if step == 15 {
@@ -224,10 +224,10 @@ fn served_on_ports_the_same_drives_go_on_in_real_time() {
         bench.serve(port(format!("pty:{st0}")), port(format!("slcan-pty:{can0}"))).unwrap();
     assert_eq!(serving.st().unwrap().port, format!("pty:{st0}"));
     assert!(bench.serve(port(format!("pty:{st0}2")), None).is_err());
-    let client = Client::open(&st0.parse().unwrap(), st::Options::default()).unwrap();
+    let client = st::Client::open(&st0.parse().unwrap(), st::Options::default()).unwrap();
     assert_eq!(client.motor(1).unwrap().status().unwrap(), Status::Idle);
     let options = rmd::Options { timeout: Duration::from_secs(5), ..rmd::Options::default() };
-    let outside = Bus::open(&format!("slcan:{can0}").parse().unwrap(), options).unwrap();
+    let outside = rmd::Client::open(&format!("slcan:{can0}").parse().unwrap(), options).unwrap();
     while outside.motor(1).unwrap().motion_status().unwrap().speed.0 < 180 {}
     serving.end().unwrap();
 

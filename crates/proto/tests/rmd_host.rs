@@ -41,11 +41,11 @@ fn an_echo_with_another_content_promises_nothing() {
             let mut reply = request;
             reply[byte] ^= 0x10;
             host.receive(Instant(500), &CanFrame::new(id.can_id(), reply));
-            let result = if row.echo { Err(Error::Altered) } else { Ok(reply) };
+            let result = if row.echo { Err(Failure::Altered) } else { Ok(reply) };
             assert_eq!(host.poll(Instant(500)), Output::Done { id, result }, "{}", row.paragraph);
             // The motor's own reply may come yet.
             let next = host.request(Instant(600), id, ReadMotionStatus.encode());
-            let is_left_alone = matches!(next, Err(Refused::Quarantined { .. }));
+            let is_left_alone = matches!(next, Err(RequestError::Quarantined { .. }));
             assert_eq!(is_left_alone, row.echo, "{}", row.paragraph);
         }
     }
@@ -79,17 +79,17 @@ fn four_torques_are_refused_as_a_whole() {
     let now = Instant(0);
     let none = SetTorque4::default();
     let beyond = host.set_torque4(now, none, MotorSet::from(motor(5)));
-    assert_eq!(beyond, Err(Refused::OutOfReach(motor(5))));
+    assert_eq!(beyond, Err(RequestError::OutOfReach(motor(5))));
 
     let current = Some(IqCommand(10));
     host.set_limits(motor(3), Limits { current, ..Limits::default() });
     let torques = SetTorque4([0, 0, 11, 0].map(IqCommand));
     let limited = host.set_torque4(now, torques, MotorSet::TORQUE4);
-    assert!(matches!(limited, Err(Refused::Limit { id, .. }) if id == motor(3)));
+    assert!(matches!(limited, Err(RequestError::Limit { id, .. }) if id == motor(3)));
 
     host.request(now, motor(4), ReadMotionStatus.encode()).unwrap();
     let busy = host.set_torque4(now, none, MotorSet::from(motor(1)));
-    assert_eq!(busy, Err(Refused::Busy(motor(4))));
+    assert_eq!(busy, Err(RequestError::Busy(motor(4))));
     assert_eq!(host.busy(), MotorSet::from(motor(4)));
 }
 
@@ -99,7 +99,7 @@ fn while_four_torques_wait_to_be_sent_their_motors_are_busy() {
     host.set_torque4(Instant(0), SetTorque4::default(), MotorSet::from(motor(1))).unwrap();
     assert_eq!(host.busy(), MotorSet::TORQUE4);
     let data = ReadMotionStatus.encode();
-    assert_eq!(host.request(Instant(0), motor(2), data), Err(Refused::Busy(motor(2))));
+    assert_eq!(host.request(Instant(0), motor(2), data), Err(RequestError::Busy(motor(2))));
     assert_eq!(host.request(Instant(0), motor(5), data), Ok(()));
 }
 
@@ -112,7 +112,7 @@ fn an_unexpected_answer_to_four_torques_is_not_taken_for_another_exchange() {
         assert_eq!(pair.run().len(), 1);
     }
     let torque = SetTorque { iq: IqCommand(1) };
-    assert!(matches!(pair.request(2, torque), Err(Refused::Quarantined { .. })));
+    assert!(matches!(pair.request(2, torque), Err(RequestError::Quarantined { .. })));
     pair.wait(Duration(5_000));
     assert_eq!(pair.host.counters().late, 2);
     assert_eq!(pair.request(2, Off), Ok(()), "a motor can be switched off all the same");
@@ -122,7 +122,7 @@ fn an_unexpected_answer_to_four_torques_is_not_taken_for_another_exchange() {
 fn a_motor_has_one_exchange_at_a_time() {
     let mut pair = Pair::new(&[1]);
     pair.request(1, ReadStatus).unwrap();
-    assert_eq!(pair.request(1, ReadMotionStatus), Err(Refused::Busy(motor(1))));
+    assert_eq!(pair.request(1, ReadMotionStatus), Err(RequestError::Busy(motor(1))));
     pair.run();
     assert_eq!(pair.request(1, ReadMotionStatus), Ok(()));
 }
@@ -137,7 +137,7 @@ fn the_time_for_a_reply_runs_from_the_moment_of_sending() {
     let Output::Done { result, .. } = host.poll(sent + DEFAULT_TIMEOUT) else {
         panic!("the time is over")
     };
-    assert_eq!(result, Err(Error::Timeout));
+    assert_eq!(result, Err(Failure::Timeout));
     assert_eq!(host.poll(sent + DEFAULT_TIMEOUT), Output::Wait(None));
 }
 
@@ -166,9 +166,9 @@ fn a_late_reply_is_counted_and_ends_the_quarantine() {
     let mut pair = Pair::new(&[1]);
     pair.nodes[0].turnaround = Duration::from_millis(60);
     pair.request(1, ReadMotionStatus).unwrap();
-    assert_eq!(pair.run(), [(motor(1), Err(Error::Timeout))]);
-    let until = pair.now + DEFAULT_GUARD;
-    let refused = Err(Refused::Quarantined { id: motor(1), until });
+    assert_eq!(pair.run(), [(motor(1), Err(Failure::Timeout))]);
+    let until = pair.now + DEFAULT_QUARANTINE;
+    let refused = Err(RequestError::Quarantined { id: motor(1), until });
     assert_eq!(pair.request(1, ReadMotionStatus), refused);
 
     pair.wait(Duration::from_millis(10));
@@ -182,7 +182,7 @@ fn a_late_reply_is_counted_and_ends_the_quarantine() {
 #[test]
 fn a_quarantine_ends_with_its_guard_time_when_no_reply_comes() {
     let mut pair = Pair::new(&[]);
-    pair.host.set_guard(Duration(300));
+    pair.host.set_quarantine(Duration(300));
     pair.request(1, ReadMotionStatus).unwrap();
     pair.run();
     pair.now += Duration(299);
@@ -199,7 +199,7 @@ fn off_passes_a_quarantine_and_the_late_reply_is_told_apart() {
     pair.request(1, ReadMotionStatus).unwrap();
     pair.run();
     pair.request(1, Off).unwrap();
-    assert_eq!(pair.run(), [(motor(1), Err(Error::Timeout))]);
+    assert_eq!(pair.run(), [(motor(1), Err(Failure::Timeout))]);
     assert_eq!(pair.host.counters().late, 1);
     assert!(pair.request(1, Off).is_err(), "its own late reply is awaited");
     assert_eq!(pair.request(1, Stop), Ok(()));
@@ -275,7 +275,7 @@ fn a_motor_of_another_protocol_is_named_when_the_exchange_fails() {
         let Output::Done { result, .. } = host.poll(Instant(0) + DEFAULT_TIMEOUT) else {
             panic!("the time is over")
         };
-        assert_eq!(result, Err(Error::Foreign(dialect)));
+        assert_eq!(result, Err(Failure::Foreign(dialect)));
         let Counters { foreign_v3, foreign_lk, last_foreign, .. } = *host.counters();
         assert_eq!(foreign_v3 + foreign_lk, 1);
         assert_eq!(last_foreign, Some((dialect, motor(7))));
@@ -290,7 +290,7 @@ fn limits_hold_for_raw_frames_of_their_motor_only() {
     let raw = [0xA1, 0, 0, 0, 51, 0, 0, 0];
     let refused = pair.host.request(pair.now, motor(1), raw);
     let exceeded = Exceeded::Current { asked: IqCommand(51), limit: IqCommand(50) };
-    assert_eq!(refused, Err(Refused::Limit { id: motor(1), exceeded }));
+    assert_eq!(refused, Err(RequestError::Limit { id: motor(1), exceeded }));
     assert_eq!(
         refused.unwrap_err().to_string(),
         "motor 1: torque current 0.816 A is beyond the limit of 0.800 A"
@@ -304,7 +304,7 @@ fn limits_hold_for_raw_frames_of_their_motor_only() {
 fn a_code_that_nobody_knows_is_sent_and_answered_by_silence() {
     let mut pair = Pair::new(&[1]);
     pair.host.request(pair.now, motor(1), [0x60; 8]).unwrap();
-    assert_eq!(pair.run(), [(motor(1), Err(Error::Timeout))]);
+    assert_eq!(pair.run(), [(motor(1), Err(Failure::Timeout))]);
     assert_eq!(pair.nodes[0].drive.ignored().unknown, 1);
 }
 
@@ -328,12 +328,12 @@ impl Standstill {
     }
 
     /// One exchange, which begins when the host takes the request. Its number and how it ended.
-    fn ask(&mut self, code: u8) -> (u32, Result<[u8; 8], Error>) {
+    fn ask(&mut self, code: u8) -> (u32, Result<[u8; 8], Failure>) {
         self.number += 1;
         let [a, b, c, d] = self.number.to_le_bytes();
         let data = [code, 0, 0, 0, a, b, c, d];
         while let Err(refused) = self.host.request(self.now, motor(1), data) {
-            let Refused::Quarantined { until, .. } = refused else { panic!("{refused}") };
+            let RequestError::Quarantined { until, .. } = refused else { panic!("{refused}") };
             assert!(until > self.now, "refused until now");
             self.hear(until);
         }
@@ -387,21 +387,21 @@ fn a_motor_that_stands_still_and_then_answers_everything_at_once_confuses_nobody
             }
             assert!(failed > 0, "a motor that stands still does not answer");
             let took = back.expect("the motor is back").since(bench.go_on);
-            let stated = DEFAULT_GUARD + DEFAULT_GUARD + DEFAULT_TIMEOUT;
+            let stated = DEFAULT_QUARANTINE + DEFAULT_QUARANTINE + DEFAULT_TIMEOUT;
             assert!(took <= stated, "{} us to come back from {still} ms", took.0);
         }
     }
 }
 
-/// A host whose request to motor 1 with this code was not answered, after its guard time.
+/// A host whose request to motor 1 with this code was not answered, after its quarantine time.
 fn unanswered(code: u8) -> (Host, Instant) {
     let mut host = trusted_host();
     host.request(Instant(0), motor(1), [code, 0, 0, 0, 0, 0, 0, 0]).unwrap();
     assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
     let timeout = Instant(0) + DEFAULT_TIMEOUT;
-    let failed = Output::Done { id: motor(1), result: Err(Error::Timeout) };
+    let failed = Output::Done { id: motor(1), result: Err(Failure::Timeout) };
     assert_eq!(host.poll(timeout), failed);
-    (host, timeout + DEFAULT_GUARD)
+    (host, timeout + DEFAULT_QUARANTINE)
 }
 
 const QUESTION: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
@@ -415,23 +415,23 @@ fn a_motor_that_did_not_answer_is_asked_for_its_status_and_then_has_to_be_silent
     assert_eq!(host.poll(asked), Output::Transmit(question));
     let heard = asked + Duration::from_millis(10);
     host.receive(heard, &CanFrame::new(0x141, ANSWER));
-    let answered = Output::Done { id: motor(1), result: Err(Error::Quarantined) };
+    let answered = Output::Done { id: motor(1), result: Err(Failure::Quarantined) };
     assert_eq!(host.poll(heard), answered);
 
     // A late reply that is not the only one owed makes it longer.
-    let again = |until| Err(Refused::Quarantined { id: motor(1), until });
-    assert_eq!(host.request(heard, motor(1), own), again(heard + DEFAULT_GUARD));
+    let again = |until| Err(RequestError::Quarantined { id: motor(1), until });
+    assert_eq!(host.request(heard, motor(1), own), again(heard + DEFAULT_QUARANTINE));
     host.request(heard, motor(1), Off.encode()).unwrap();
     assert_eq!(host.poll(heard), Output::Transmit(CanFrame::new(0x141, Off.encode())));
     let timeout = heard + DEFAULT_TIMEOUT;
-    assert!(matches!(host.poll(timeout), Output::Done { result: Err(Error::Timeout), .. }));
+    assert!(matches!(host.poll(timeout), Output::Done { result: Err(Failure::Timeout), .. }));
     let late = timeout + Duration::from_millis(90);
     host.receive(late, &CanFrame::new(0x141, own));
     assert_eq!(host.counters().late, 1);
-    assert_eq!(host.request(late, motor(1), own), again(late + DEFAULT_GUARD));
-    assert_eq!(host.request(late + DEFAULT_GUARD, motor(1), own), Ok(()));
+    assert_eq!(host.request(late, motor(1), own), again(late + DEFAULT_QUARANTINE));
+    assert_eq!(host.request(late + DEFAULT_QUARANTINE, motor(1), own), Ok(()));
     let sent = Output::Transmit(CanFrame::new(0x141, own));
-    assert_eq!(host.poll(late + DEFAULT_GUARD), sent);
+    assert_eq!(host.poll(late + DEFAULT_QUARANTINE), sent);
 }
 
 #[test]
@@ -441,10 +441,10 @@ fn a_motor_that_does_not_answer_the_question_is_left_alone_and_asked_again() {
         host.request(now, motor(1), SetSpeed::default().encode()).unwrap();
         assert_eq!(host.poll(now), Output::Transmit(CanFrame::new(0x141, QUESTION)));
         now += DEFAULT_TIMEOUT;
-        let failed = Output::Done { id: motor(1), result: Err(Error::Timeout) };
+        let failed = Output::Done { id: motor(1), result: Err(Failure::Timeout) };
         assert_eq!(host.poll(now), failed);
-        let until = now + DEFAULT_GUARD;
-        let refused = Err(Refused::Quarantined { id: motor(1), until });
+        let until = now + DEFAULT_QUARANTINE;
+        let refused = Err(RequestError::Quarantined { id: motor(1), until });
         assert_eq!(host.request(now, motor(1), SetSpeed::default().encode()), refused);
         // Two kinds of replies are owed, and neither is that to Off.
         for halt in [Off.encode(), Stop.encode()] {
@@ -459,13 +459,13 @@ fn a_motor_that_does_not_answer_the_question_is_left_alone_and_asked_again() {
 fn a_motor_that_goes_on_talking_is_switched_off_all_the_same() {
     let (mut host, _) = unanswered(0x80);
     let mut now = Instant(0) + DEFAULT_TIMEOUT;
-    let until = now + DEFAULT_GUARD;
+    let until = now + DEFAULT_QUARANTINE;
     host.request(now, motor(1), Stop.encode()).unwrap();
     host.poll(now);
     host.cancel(now, motor(1));
     while now < until {
         host.receive(now, &CanFrame::new(0x141, ReadMotionStatus.encode()));
-        let refused = Err(Refused::Quarantined { id: motor(1), until });
+        let refused = Err(RequestError::Quarantined { id: motor(1), until });
         assert_eq!(host.request(now, motor(1), Off.encode()), refused, "at {}", now.0);
         now += Duration::from_millis(10);
     }
@@ -482,11 +482,11 @@ fn four_torques_are_not_sent_while_one_of_the_motors_is_in_doubt() {
     pair.now = now;
     let torques = SetTorque4([7; 4].map(IqCommand));
     pair.host.set_torque4(now, torques, expect).unwrap();
-    assert!(pair.run().iter().all(|(_, result)| *result == Err(Error::Quarantined)));
+    assert!(pair.run().iter().all(|(_, result)| *result == Err(Failure::Quarantined)));
     assert_eq!(pair.log, [0x141, 0x142, 0x141, 0x142]);
     let refused = pair.host.set_torque4(pair.now, torques, expect);
-    assert!(matches!(refused, Err(Refused::Quarantined { id, .. }) if id == motor(1)));
-    pair.wait(DEFAULT_GUARD);
+    assert!(matches!(refused, Err(RequestError::Quarantined { id, .. }) if id == motor(1)));
+    pair.wait(DEFAULT_QUARANTINE);
     pair.host.set_torque4(pair.now, torques, expect).unwrap();
     assert!(pair.run().iter().all(|(_, result)| result.is_ok()));
     assert!(pair.nodes.iter().all(|node| node.motor.mode == Mode::Torque(IqCommand(7))));

@@ -21,12 +21,12 @@ fn opened(ids: &[u8]) -> Pair {
 fn a_motor_that_was_not_asked_before_answers_two_questions_and_is_silent_first() {
     let mut pair = opened(&[1]);
     pair.request(1, SetSpeed::default()).unwrap();
-    assert_eq!(pair.run(), [(motor(1), Err(Error::Quarantined))]);
+    assert_eq!(pair.run(), [(motor(1), Err(Failure::Quarantined))]);
     assert_eq!(pair.codes, [0x9A, 0x9C]);
-    let until = pair.now + DEFAULT_GUARD;
-    let refused = Refused::Quarantined { id: motor(1), until };
+    let until = pair.now + DEFAULT_QUARANTINE;
+    let refused = RequestError::Quarantined { id: motor(1), until };
     assert_eq!(pair.request(1, SetSpeed::default()), Err(refused));
-    pair.wait(DEFAULT_GUARD);
+    pair.wait(DEFAULT_QUARANTINE);
     for _ in 0..2 {
         pair.request(1, SetSpeed::default()).unwrap();
         assert!(pair.run().iter().all(|(_, result)| result.is_ok()));
@@ -46,10 +46,10 @@ fn off_and_stop_go_out_before_the_questions_and_their_replies_do_not_count() {
         assert_eq!(pair.codes, [code, code, 0x9A, 0x9A, 0x9C, 0x9C]);
 
         let mut pair = opened(&[1]);
-        for end in [Err(Error::Quarantined), Ok(halt)] {
+        for end in [Err(Failure::Quarantined), Ok(halt)] {
             pair.host.request(pair.now, motor(1), halt).unwrap();
             assert_eq!(pair.run(), [(motor(1), end)]);
-            pair.wait(DEFAULT_GUARD);
+            pair.wait(DEFAULT_QUARANTINE);
         }
     }
 }
@@ -58,13 +58,13 @@ fn off_and_stop_go_out_before_the_questions_and_their_replies_do_not_count() {
 fn an_off_that_was_answered_is_repeated_after_the_silence_that_its_acknowledge_needs() {
     let mut pair = opened(&[1]);
     pair.request(1, Off).unwrap();
-    assert_eq!(pair.run(), [(motor(1), Err(Error::Quarantined))]);
-    let until = pair.now + DEFAULT_GUARD;
-    assert_eq!(pair.request(1, Off), Err(Refused::Quarantined { id: motor(1), until }));
+    assert_eq!(pair.run(), [(motor(1), Err(Failure::Quarantined))]);
+    let until = pair.now + DEFAULT_QUARANTINE;
+    assert_eq!(pair.request(1, Off), Err(RequestError::Quarantined { id: motor(1), until }));
     // The other one was not sent yet.
     pair.request(1, Stop).unwrap();
     pair.run();
-    pair.wait(DEFAULT_GUARD);
+    pair.wait(DEFAULT_QUARANTINE);
     pair.request(1, Off).unwrap();
     assert_eq!(pair.run(), [(motor(1), Ok(Off.encode()))]);
     assert_eq!(pair.codes, [0x80, 0x9A, 0x9C, 0x81, 0x9A, 0x9C, 0x80]);
@@ -76,12 +76,12 @@ fn an_off_is_sent_again_to_a_motor_that_does_not_fall_silent() {
     pair.request(1, Off).unwrap();
     let sent = pair.now;
     pair.run();
-    while let Err(Refused::Quarantined { until, .. }) = pair.request(1, Off) {
-        assert!(until > pair.now && until <= sent + DEFAULT_GUARD + DEFAULT_GUARD);
+    while let Err(RequestError::Quarantined { until, .. }) = pair.request(1, Off) {
+        assert!(until > pair.now && until <= sent + DEFAULT_QUARANTINE + DEFAULT_QUARANTINE);
         pair.wait(Duration(until.since(pair.now).0 / 2 + 1));
         pair.host.receive(pair.now, &CanFrame::new(0x141, ReadPid.encode()));
     }
-    assert_eq!(pair.now, sent + DEFAULT_GUARD + DEFAULT_GUARD);
+    assert_eq!(pair.now, sent + DEFAULT_QUARANTINE + DEFAULT_QUARANTINE);
     pair.run();
     assert_eq!(pair.codes, [0x80, 0x9A, 0x9C, 0x80, 0x9A, 0x9C]);
 }
@@ -94,7 +94,7 @@ fn off_goes_out_at_each_attempt_to_a_motor_that_is_silent() {
         let sent = Output::Transmit(CanFrame::new(0x141, Off.encode()));
         assert_eq!(host.poll(now), sent);
         now += DEFAULT_TIMEOUT;
-        let silent = Output::Done { id: motor(1), result: Err(Error::Timeout) };
+        let silent = Output::Done { id: motor(1), result: Err(Failure::Timeout) };
         assert_eq!(host.poll(now), silent);
     }
 }
@@ -105,9 +105,9 @@ fn the_question_itself_is_no_answer_and_an_echo_is_named() {
         host.request(Instant(0), motor(1), ReadStatus.encode()).unwrap();
         let Output::Transmit(frame) = host.poll(Instant(0)) else { panic!("it is sent") };
         host.receive(Instant(1), &frame);
-        let echo = Output::Done { id: motor(1), result: Err(Error::Echo) };
+        let echo = Output::Done { id: motor(1), result: Err(Failure::Echo) };
         assert_eq!(host.poll(Instant(1)), echo);
-        let now = Instant(1) + DEFAULT_GUARD;
+        let now = Instant(1) + DEFAULT_QUARANTINE;
         host.request(now, motor(1), SPEED).unwrap();
         assert!(matches!(host.poll(now), Output::Transmit(frame) if frame.data()[0] == 0x9A));
     }
@@ -120,7 +120,7 @@ fn a_bus_that_is_opened_again_is_not_trusted() {
     pair.host.reopened(pair.now);
     assert!(pair.host.busy().is_empty());
     pair.request(1, SetSpeed::default()).unwrap();
-    assert_eq!(pair.run(), [(motor(1), Err(Error::Quarantined))]);
+    assert_eq!(pair.run(), [(motor(1), Err(Failure::Quarantined))]);
 }
 
 /// A host, the replies to former ones that are under way, and a motor that answers late.
@@ -142,7 +142,7 @@ impl Late {
             if !is_asked {
                 match self.host.request(self.now, motor(1), request) {
                     Ok(()) => is_asked = true,
-                    Err(Refused::Quarantined { until, .. }) => self.pass(until.min(end)),
+                    Err(RequestError::Quarantined { until, .. }) => self.pass(until.min(end)),
                     Err(other) => panic!("{other:?}"),
                 }
                 continue;
@@ -156,7 +156,7 @@ impl Late {
                     self.coming.sort_by_key(|(at, _)| *at);
                 }
                 Output::Done { result: Ok(reply), .. } => return Some(reply),
-                Output::Done { result: Err(Error::Quarantined), .. } => is_asked = false,
+                Output::Done { result: Err(Failure::Quarantined), .. } => is_asked = false,
                 Output::Done { .. } => return None,
                 Output::Wait(until) => self.pass(until.unwrap().min(end)),
             }
@@ -222,7 +222,7 @@ proptest! {
         in_turn(delay, timeout, None, &turns);
     }
 
-    /// Replies that are not later than the guard time, or come twice.
+    /// Replies that are not later than the quarantine time, or come twice.
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn hosts_in_turn_never_take_each_others_replies(

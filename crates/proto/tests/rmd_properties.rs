@@ -113,8 +113,8 @@ proptest! {
                     let came = frame.data()[0];
                     match result {
                         Ok(reply) => prop_assert_eq!(frame.data(), reply),
-                        Err(Error::Altered) => prop_assert!(!is_request && came == code),
-                        Err(Error::Echo) => prop_assert!(is_request && code == 0x9A),
+                        Err(Failure::Altered) => prop_assert!(!is_request && came == code),
+                        Err(Failure::Echo) => prop_assert!(is_request && code == 0x9A),
                         Err(other) => prop_assert!(false, "{other}"),
                     }
                     prop_assert!(came == code || (code, came) == (0x9B, 0x9A));
@@ -133,7 +133,7 @@ proptest! {
     ) {
         let mut host = trusted_host();
         host.set_timeout(Duration(50));
-        host.set_guard(Duration(100));
+        host.set_quarantine(Duration(100));
         let mut now = Instant(0);
         let mut coming: Vec<(Instant, CanFrame)> = vec![];
         let mut last = HashMap::new();
@@ -174,7 +174,7 @@ proptest! {
     ) {
         let mut host = trusted_host();
         host.set_timeout(Duration(50));
-        host.set_guard(Duration(100));
+        host.set_quarantine(Duration(100));
         let mut now = Instant(0);
         let mut still = Instant(0);
         let mut coming: Vec<(Instant, CanFrame)> = vec![];

@@ -70,7 +70,7 @@ fn every_register_command_and_segment_does_as_the_model_does() {
 fn the_master_takes_every_header_and_length_for_what_it_is() {
     for header in 0..=255u8 {
         for length in 0..=255u8 {
-            let mut master = Master::new(Config::default());
+            let mut master = Master::new(MasterConfig::default());
             master.trust_line();
             master.request(0, &Request::GetRegister(RegisterId::STATUS)).unwrap();
             assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
@@ -80,22 +80,22 @@ fn the_master_takes_every_header_and_length_for_what_it_is() {
             for byte in reply {
                 master.receive(Instant(1), &[*byte]);
             }
-            let damaged = Error::Failed(Failure::Damaged(Bad::Length(length)));
+            let damaged = ExchangeError::Failed(Failure::Damaged(Bad::Length(length)));
             let expected = match (header, &payload[..]) {
                 (HEADER_ACK | HEADER_NACK | HEADER_ATR, _) if length > 128 => Err(damaged),
                 // STATUS has one byte.
                 (HEADER_ACK, payload) if payload.len() == 1 => Ok(payload),
                 (HEADER_ACK, _) => {
-                    Err(Error::Failed(Failure::Size { received: length, fits: None }))
+                    Err(ExchangeError::Failed(Failure::Size { received: length, fits: None }))
                 }
-                (HEADER_NACK, []) => Err(Error::Refused(ErrorCode::None)),
-                (HEADER_NACK, [code, ..]) => Err(Error::Refused(ErrorCode::from(*code))),
+                (HEADER_NACK, []) => Err(ExchangeError::Refused(ErrorCode::None)),
+                (HEADER_NACK, [code, ..]) => Err(ExchangeError::Refused(ErrorCode::from(*code))),
                 (HEADER_ATR, _) => {
                     assert!(matches!(master.poll(Instant(1)), Output::Wait(Some(_))));
                     assert_eq!(master.counters().identifications, 1);
                     continue;
                 }
-                _ => Err(Error::Failed(Failure::Header(header))),
+                _ => Err(ExchangeError::Failed(Failure::Header(header))),
             };
             assert_eq!(master.poll(Instant(1)), Output::Done(expected), "{header:#x} {length}");
         }

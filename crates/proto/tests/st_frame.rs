@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Bench, Memory, answer};
+use common::{Memory, SlaveFixture, answer};
 use motorlink_proto::st::*;
 use motorlink_proto::time::Duration;
 use proptest::prelude::*;
@@ -103,7 +103,7 @@ proptest! {
     fn noise_never_panics_and_25_ms_of_silence_bring_the_slave_back(
         noise in proptest::collection::vec((any::<u8>(), 0u64..40_000), 0..400),
     ) {
-        let mut bench = Bench::new(Profile::Spec, 3, Memory::usual());
+        let mut bench = SlaveFixture::new(Profile::Spec, 3, Memory::usual());
         for (byte, pause) in noise {
             bench.now += Duration(pause);
             bench.bytes(&[byte]);

@@ -14,7 +14,7 @@ fn an_exchange_is_sent_once_and_ends_with_the_payload() {
     pair.drive.set(2, RegisterId::STATUS, 6);
     assert_eq!(pair.exchange(2, STATUS), Ok(vec![6]));
     assert_eq!(pair.sent, [[0x42, 0x01, 0x02, 0x45]]);
-    assert_eq!(pair.master.line(), Line::Up);
+    assert_eq!(pair.master.sync_state(), SyncState::InSync);
 }
 
 #[test]
@@ -29,13 +29,17 @@ fn a_refusal_keeps_its_code_and_the_line_unless_the_frame_was_damaged() {
         let damaged = matches!(code, 0x08..=0x0A);
         let code_of = ErrorCode::from(code);
         let error = if damaged {
-            Error::Failed(Failure::NotUnderstood(code_of))
+            ExchangeError::Failed(Failure::NotUnderstood(code_of))
         } else {
-            Error::Refused(code_of)
+            ExchangeError::Refused(code_of)
         };
         assert_eq!(master.poll(Instant(1)), Output::Done(Err(error)));
         assert_eq!(u8::from(code_of), code);
-        assert_eq!(master.line(), if damaged { Line::Lost } else { Line::Up }, "{code:#04x}");
+        assert_eq!(
+            master.sync_state(),
+            if damaged { SyncState::Lost } else { SyncState::InSync },
+            "{code:#04x}"
+        );
         master.reopened();
     }
 }
@@ -57,18 +61,18 @@ fn the_timer_starts_when_the_request_is_out_and_lasts_a_second() {
     let sent = Instant(136 * MS);
     assert_eq!(master.poll(sent), Output::Wait(Some(Instant(1136 * MS))));
     assert_eq!(master.poll(Instant(1136 * MS - 1)), Output::Wait(Some(Instant(1136 * MS))));
-    let failed = Error::Failed(Failure::Timeout);
+    let failed = ExchangeError::Failed(Failure::Timeout);
     assert_eq!(master.poll(Instant(1136 * MS)), Output::Done(Err(failed)));
-    assert_eq!(master.line(), Line::Lost);
+    assert_eq!(master.sync_state(), SyncState::Lost);
 }
 
 #[test]
 fn without_recovery_a_lost_line_sends_nothing_until_it_is_reopened() {
     let mut pair = Pair::new(Profile::Spec, Recovery::None);
     pair.cut = Some(0);
-    assert_eq!(pair.exchange(0, STATUS), Err(Error::Failed(Failure::Timeout)));
+    assert_eq!(pair.exchange(0, STATUS), Err(ExchangeError::Failed(Failure::Timeout)));
     let sent = pair.sent.len();
-    assert_eq!(pair.exchange(0, STATUS), Err(Error::Failed(Failure::Lost)));
+    assert_eq!(pair.exchange(0, STATUS), Err(ExchangeError::Failed(Failure::Lost)));
     assert_eq!(pair.sent.len(), sent, "nothing goes into a lost line");
     pair.master.reopened();
     assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
@@ -91,10 +95,10 @@ fn a_lost_line_comes_back_behind_silence_and_a_question() {
 fn recovery_asks_what_cannot_be_answered_with_the_lost_reply() {
     let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
     for (lost, probe) in [
-        (Request::BoardInfo, [0x08, 0x01, 0x00, 0x09].as_slice()),
-        (Request::FirmwareVersion, &[0x08, 0x01, 0x00, 0x09]),
-        (Request::RevupData(0), &[0x06, 0x00, 0x06]),
-        (Request::BoardInfo, &[0x08, 0x01, 0x00, 0x09]),
+        (Request::GetBoardInfo, [0x08, 0x01, 0x00, 0x09].as_slice()),
+        (Request::GetFirmwareVersion, &[0x08, 0x01, 0x00, 0x09]),
+        (Request::GetRevupData(0), &[0x06, 0x00, 0x06]),
+        (Request::GetBoardInfo, &[0x08, 0x01, 0x00, 0x09]),
     ] {
         pair.cut = Some(0);
         pair.exchange(0, lost).unwrap_err();
@@ -109,7 +113,7 @@ fn the_longest_exchange_is_five_or_six_timeouts_and_the_silences() {
     for (recovery, ms) in
         [(Recovery::None, 1_000), (Recovery::Drain, 5_150), (Recovery::Pad, 6_200)]
     {
-        let config = Config { recovery, ..Config::default() };
+        let config = MasterConfig { recovery, ..MasterConfig::default() };
         assert_eq!(config.longest_exchange(), Duration::from_millis(ms), "{recovery:?}");
     }
 }
@@ -118,10 +122,10 @@ fn the_longest_exchange_is_five_or_six_timeouts_and_the_silences() {
 fn nothing_but_questions_go_into_a_line_that_does_not_answer() {
     let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
     pair.delay = Duration::from_millis(60_000);
-    let start = Request::Execute(Command::StartMotor);
-    assert_eq!(pair.exchange(1, STATUS), Err(Error::Failed(Failure::Timeout)));
+    let start = Request::ExecuteCommand(Command::StartMotor);
+    assert_eq!(pair.exchange(1, STATUS), Err(ExchangeError::Failed(Failure::Timeout)));
     for _ in 0..3 {
-        assert_eq!(pair.exchange(1, start), Err(Error::Failed(Failure::Lost)));
+        assert_eq!(pair.exchange(1, start), Err(ExchangeError::Failed(Failure::Lost)));
     }
     assert!(pair.drive.log.is_empty(), "START_MOTOR must not wait in the line");
 }
@@ -132,7 +136,10 @@ fn a_line_that_never_falls_silent_is_given_up() {
     master.request(0, &STATUS).unwrap();
     assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
     master.receive(Instant(0), &[0x55]);
-    assert_eq!(master.poll(Instant(0)), Output::Done(Err(Error::Failed(Failure::Header(0x55)))));
+    assert_eq!(
+        master.poll(Instant(0)),
+        Output::Done(Err(ExchangeError::Failed(Failure::Header(0x55))))
+    );
     master.request(0, &STATUS).unwrap();
     let mut now = Instant(0);
     let result = loop {
@@ -144,7 +151,7 @@ fn a_line_that_never_falls_silent_is_given_up() {
         now += Duration::from_millis(10);
         master.receive(now, &[0x55]);
     };
-    assert_eq!(result, Err(Error::Failed(Failure::Noise)));
+    assert_eq!(result, Err(ExchangeError::Failed(Failure::Noise)));
     assert!(now <= Instant(1_100 * MS));
 }
 
@@ -152,7 +159,7 @@ fn a_line_that_never_falls_silent_is_given_up() {
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn padding_brings_back_shipped_firmware_from_every_cut() {
     let write = Request::SetRegister { register: RegisterId::SPEED_KP, value: &[0x10, 0x00] };
-    let start = Request::Execute(Command::StartMotor);
+    let start = Request::ExecuteCommand(Command::StartMotor);
     for (request, size) in [(STATUS, 4), (write, 6), (start, 4)] {
         for cut in 0..size {
             let mut pair = Pair::new(Profile::Mcsdk54, Recovery::Pad);
@@ -192,7 +199,7 @@ fn every_prefix_of_a_reply_waits_for_more() {
         assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
         master.receive(Instant(0), &reply[..cut]);
         assert!(matches!(master.poll(Instant(0)), Output::Wait(Some(_))));
-        let failed = Error::Failed(Failure::Incomplete { received: cut as u8 });
+        let failed = ExchangeError::Failed(Failure::Incomplete { received: cut as u8 });
         assert_eq!(master.poll(Instant(1000 * MS)), Output::Done(Err(failed)));
     }
 }
@@ -204,7 +211,7 @@ fn bytes_behind_a_reply_lose_the_line_but_not_the_reply() {
     assert!(matches!(pair.master.poll(pair.now), Output::Transmit(_)));
     pair.master.receive(pair.now, &[0xF0, 0x01, 0x06, 0xF7, 0xF0, 0x01]);
     assert_eq!(pair.master.poll(pair.now), Output::Done(Ok(&[6])));
-    assert_eq!(pair.master.line(), Line::Lost);
+    assert_eq!(pair.master.sync_state(), SyncState::Lost);
     assert_eq!(pair.master.counters().unasked_bytes, 2);
     assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
 }
@@ -214,13 +221,15 @@ fn two_replies_that_differ_are_no_answer() {
     let (mut first, mut second) = ([0; MAX_FRAME], [0; MAX_FRAME]);
     let ack = Frame { header: HEADER_ACK, payload: &[6] }.encode(&mut first).unwrap();
     let other = Frame { header: HEADER_ACK, payload: &[8] }.encode(&mut second).unwrap();
-    for (copy, end) in [(ack, Ok(&[6][..])), (other, Err(Error::Failed(Failure::Ambiguous)))] {
+    for (copy, end) in
+        [(ack, Ok(&[6][..])), (other, Err(ExchangeError::Failed(Failure::Ambiguous)))]
+    {
         let mut master = master(Recovery::Drain);
         master.request(0, &STATUS).unwrap();
         assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
         master.receive(Instant(1), &[ack, copy].concat());
         assert_eq!(master.poll(Instant(1)), Output::Done(end));
-        assert_eq!(master.line(), Line::Lost);
+        assert_eq!(master.sync_state(), SyncState::Lost);
     }
 }
 
@@ -229,7 +238,7 @@ fn two_replies_that_differ_are_no_answer() {
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn no_bit_flip_of_a_request_puts_the_line_off_by_one() {
     let write = Request::SetRegister { register: RegisterId::TORQUE_KP, value: &[0x22, 0x11] };
-    for (request, size) in [(STATUS, 4), (write, 6), (Request::BoardInfo, 3)] {
+    for (request, size) in [(STATUS, 4), (write, 6), (Request::GetBoardInfo, 3)] {
         for (bit, pause) in (0..size * 8).flat_map(|bit| [0, 30].map(|pause| (bit, pause))) {
             let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
             pair.delay = Duration::from_millis(3);
@@ -285,9 +294,9 @@ proptest! {
         let write = Request::SetRegister { register: RegisterId::SPEED_KI, value: &[1, 0] };
         let requests = [
             Request::GetRegister(RegisterId::SPEED_KP),
-            Request::BoardInfo,
-            Request::FirmwareVersion,
-            Request::RevupData(0),
+            Request::GetBoardInfo,
+            Request::GetFirmwareVersion,
+            Request::GetRevupData(0),
             write,
         ];
         let mut clean = Pair::new(Profile::Spec, recovery);
@@ -321,7 +330,7 @@ proptest! {
                     prop_assert_eq!(register.decode(Profile::Spec, &value), Some(i32::from(register.0)));
                 }
             }
-            prop_assert_eq!(pair.master.line(), Line::Up, "back within 20 tries");
+            prop_assert_eq!(pair.master.sync_state(), SyncState::InSync, "back within 20 tries");
         }
     }
 
@@ -335,7 +344,7 @@ proptest! {
         let mut master = master(recovery);
         // Noise comes every 7 ms, so that each wait may end that much later.
         let late = Duration::from_millis(50);
-        let bound = Config { recovery, ..Config::default() }.longest_exchange() + late;
+        let bound = MasterConfig { recovery, ..MasterConfig::default() }.longest_exchange() + late;
         let mut chunks = chunks.into_iter();
         let mut now = Instant(0);
         for _ in 0..8 {
@@ -363,7 +372,7 @@ proptest! {
 #[test]
 fn a_reply_of_another_size_is_damage() {
     let answered = |profile: Profile, request: &Request<'_>, size: usize| {
-        let mut master = Master::new(Config { profile, ..Config::default() });
+        let mut master = Master::new(MasterConfig { profile, ..MasterConfig::default() });
         master.trust_line();
         master.request(1, request).unwrap();
         assert!(matches!(master.poll(Instant(0)), Output::Transmit(_)));
@@ -374,12 +383,12 @@ fn a_reply_of_another_size_is_damage() {
             Output::Done(result) => result.map(<[u8]>::len),
             other => panic!("{other:?}"),
         };
-        let line = if result.is_ok() { Line::Up } else { Line::Lost };
-        assert_eq!(master.line(), line, "{profile:?} {request:?} {size}");
+        let line = if result.is_ok() { SyncState::InSync } else { SyncState::Lost };
+        assert_eq!(master.sync_state(), line, "{profile:?} {request:?} {size}");
         result
     };
     let damage = |received: usize, fits| {
-        Err(Error::Failed(Failure::Size { received: received as u8, fits }))
+        Err(ExchangeError::Failed(Failure::Size { received: received as u8, fits }))
     };
     for register in RegisterId::all().chain([RegisterId(0xF0)]) {
         let sizes = Profile::ALL.map(|profile| {
@@ -403,14 +412,14 @@ fn a_reply_of_another_size_is_damage() {
     let nothing = [0; 4];
     for acknowledged in [
         Request::SetRegister { register: RegisterId::SPEED_KP, value: &nothing[..2] },
-        Request::Execute(Command::StartMotor),
-        Request::Execute(Command::StopMotor),
-        Request::Ramp(Ramp { speed_rpm: 1, duration_ms: 1 }),
+        Request::ExecuteCommand(Command::StartMotor),
+        Request::ExecuteCommand(Command::StopMotor),
+        Request::SetRamp(Ramp { speed_rpm: 1, duration_ms: 1 }),
         Request::SetRevupData(0, RevupPhase::default()),
-        Request::CurrentReference(CurrentReference { iq_s16a: 1, id_s16a: 1 }),
-        Request::ConfigDynStruct { segment: 0, registers: &nothing },
-        Request::TorqueRamp(TorqueRamp { torque_s16a: 1, duration_ms: 1 }),
-        Request::Position(PositionMove { angle_rad: 1.0, duration_s: 1.0 }),
+        Request::SetCurrentReference(CurrentReference { iq_s16a: 1, id_s16a: 1 }),
+        Request::ConfigureSegment { segment: 0, registers: &nothing },
+        Request::SetTorqueRamp(TorqueRamp { torque_s16a: 1, duration_ms: 1 }),
+        Request::SetPosition(PositionMove { angle_rad: 1.0, duration_s: 1.0 }),
     ] {
         for profile in Profile::ALL {
             assert_eq!(answered(profile, &acknowledged, 0), Ok(0));

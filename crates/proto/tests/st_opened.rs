@@ -13,7 +13,7 @@ const GET_STATUS: [u8; 4] = [0x02, 0x01, 0x02, 0x05];
 const GET_FLAGS: [u8; 4] = [0x02, 0x01, 0x01, 0x04];
 
 fn opened(recovery: Recovery) -> Master {
-    Master::new(Config { recovery, ..Config::default() })
+    Master::new(MasterConfig { recovery, ..MasterConfig::default() })
 }
 
 /// A line that was just opened, to a drive that answers `delay` late.
@@ -61,7 +61,7 @@ fn a_line_that_is_opened_again_is_not_in_step() {
 #[test]
 fn the_reply_to_a_former_master_is_not_taken_for_the_next_ones() {
     for ms in [1, 20, 49, 51, 150, 400, 900, 1_900] {
-        for former in [STATUS, Request::BoardInfo, Request::FirmwareVersion] {
+        for former in [STATUS, Request::GetBoardInfo, Request::GetFirmwareVersion] {
             let mut pair = pair(Recovery::Drain, Duration::from_millis(ms));
             pair.drive.set(1, RegisterId::SPEED_KP, 0x1234);
             pair.drive.set(1, RegisterId::SPEED_KI, 0x5678);
@@ -75,7 +75,7 @@ fn the_reply_to_a_former_master_is_not_taken_for_the_next_ones() {
             if ms < 1_000 {
                 assert_eq!(read, Ok(vec![0x78, 0x56]), "{ms} ms behind {former:?}");
             } else {
-                assert_eq!(read, Err(Error::Failed(Failure::Timeout)));
+                assert_eq!(read, Err(ExchangeError::Failed(Failure::Timeout)));
             }
         }
     }
@@ -85,8 +85,8 @@ fn the_reply_to_a_former_master_is_not_taken_for_the_next_ones() {
 fn no_command_waits_in_a_line_whose_drive_does_not_answer() {
     let mut pair = pair(Recovery::Drain, Duration::from_millis(60_000));
     for _ in 0..3 {
-        let start = Request::Execute(Command::StartMotor);
-        assert_eq!(pair.exchange(1, start), Err(Error::Failed(Failure::Timeout)));
+        let start = Request::ExecuteCommand(Command::StartMotor);
+        assert_eq!(pair.exchange(1, start), Err(ExchangeError::Failed(Failure::Timeout)));
     }
     assert!(pair.drive.log.is_empty());
 }
@@ -126,7 +126,11 @@ fn an_echo_is_no_answer_and_is_named() {
             master.receive(now, &came[..cut]);
             master.receive(now, &came[cut..]);
         };
-        assert_eq!(end, Err(Error::Failed(Failure::Echo)), "a drive: {drive}, cut at {cut}");
+        assert_eq!(
+            end,
+            Err(ExchangeError::Failed(Failure::Echo)),
+            "a drive: {drive}, cut at {cut}"
+        );
     }
 }
 
@@ -164,7 +168,11 @@ fn what_comes_in_place_of_an_answer_is_named() {
             master.receive(Instant(ms * MS), bytes);
         }
         let end = Instant(1_051 * MS);
-        assert_eq!(master.poll(end), Output::Done(Err(Error::Failed(failure))), "{came:02x?}");
+        assert_eq!(
+            master.poll(end),
+            Output::Done(Err(ExchangeError::Failed(failure))),
+            "{came:02x?}"
+        );
     }
 }
 
@@ -181,8 +189,8 @@ proptest! {
             Request::GetRegister(RegisterId::SPEED_KP),
             Request::GetRegister(RegisterId::SPEED_KI),
             STATUS,
-            Request::FirmwareVersion,
-            Request::RevupData(0),
+            Request::GetFirmwareVersion,
+            Request::GetRevupData(0),
             write,
         ];
         let prepared = |pair: &mut Pair| {

@@ -2,19 +2,19 @@
 
 mod common;
 
-use common::{Bench, Memory, all_features, answer};
+use common::{Memory, SlaveFixture, all_features, answer};
 use motorlink_proto::st::register::{Access, Origin};
 use motorlink_proto::st::*;
 use motorlink_proto::time::{Duration, Instant};
 
 const GET_STATUS: [u8; 4] = [0x02, 0x01, 0x02, 0x05];
 
-fn spec() -> Bench {
-    Bench::new(Profile::Spec, 2, Memory::usual())
+fn spec() -> SlaveFixture {
+    SlaveFixture::new(Profile::Spec, 2, Memory::usual())
 }
 
-fn mcsdk() -> Bench {
-    Bench::new(Profile::Mcsdk54, 2, Memory::usual())
+fn mcsdk() -> SlaveFixture {
+    SlaveFixture::new(Profile::Mcsdk54, 2, Memory::usual())
 }
 
 fn set(register: RegisterId, value: &[u8]) -> Request<'_> {
@@ -35,7 +35,7 @@ fn checks_come_in_order_checksum_motor_frame_code() {
 fn acknowledges_sent_as_commands_address_motor_7() {
     for header in [HEADER_ACK, HEADER_NACK] {
         assert_eq!(spec().raw(header, &[]), Err(ErrorCode::BadMotorSelected));
-        let mut seven = Bench::new(Profile::Spec, 7, Memory::usual());
+        let mut seven = SlaveFixture::new(Profile::Spec, 7, Memory::usual());
         assert_eq!(seven.raw(header, &[]), Err(ErrorCode::BadFrameId));
     }
 }
@@ -151,7 +151,7 @@ fn temperature_and_power_have_a_sign_in_shipped_firmware_only() {
             (Profile::Mcsdk54, 65_535, -1),
             (Profile::Mcsdk54, -10, -10),
         ] {
-            let mut bench = Bench::new(profile, 1, Memory::with(all_features()));
+            let mut bench = SlaveFixture::new(profile, 1, Memory::with(all_features()));
             bench.drive.set(1, register, value);
             let payload = bench.ask(1, Request::GetRegister(register)).unwrap();
             assert_eq!(payload.len(), 2);
@@ -164,7 +164,7 @@ fn temperature_and_power_have_a_sign_in_shipped_firmware_only() {
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn every_register_is_read_and_written_as_table_3_says() {
     for features in [Features::NONE, all_features()] {
-        let mut bench = Bench::new(Profile::Spec, 1, Memory::with(features));
+        let mut bench = SlaveFixture::new(Profile::Spec, 1, Memory::with(features));
         for id in (0..=255).map(RegisterId) {
             let shape = id.shape().filter(|shape| shape.origin == Origin::Table3);
             let there = shape.filter(|shape| features.has(shape.feature));
@@ -185,7 +185,7 @@ fn every_register_is_read_and_written_as_table_3_says() {
 
 #[test]
 fn shipped_firmware_refuses_a_missing_feature_with_3_and_5() {
-    let mut bench = Bench::new(Profile::Mcsdk54, 1, Memory::with(Features::NONE));
+    let mut bench = SlaveFixture::new(Profile::Mcsdk54, 1, Memory::with(Features::NONE));
     let kp = RegisterId::FLUXWK_KP;
     assert_eq!(bench.ask(0, Request::GetRegister(kp)), Err(ErrorCode::GetWriteOnly));
     assert_eq!(bench.ask(0, set(kp, &[1, 0])), Err(ErrorCode::WrongSet));
@@ -200,8 +200,9 @@ fn shipped_firmware_refuses_a_missing_feature_with_3_and_5() {
 
 #[test]
 fn shipped_firmware_differs_from_table_3_in_sizes_and_access() {
-    let mut bench = Bench::new(Profile::Mcsdk54, 1, Memory::with(all_features()));
-    let size = |bench: &mut Bench, id| bench.ask(0, Request::GetRegister(id)).map(|v| v.len());
+    let mut bench = SlaveFixture::new(Profile::Mcsdk54, 1, Memory::with(all_features()));
+    let size =
+        |bench: &mut SlaveFixture, id| bench.ask(0, Request::GetRegister(id)).map(|v| v.len());
     assert_eq!(size(&mut bench, RegisterId::CTRBID), Ok(2));
     assert_eq!(size(&mut bench, RegisterId::IQ_SPEEDMODE), Ok(2));
     assert_eq!(size(&mut bench, RegisterId::CURRENT_POSITION), Ok(4));
@@ -267,44 +268,44 @@ fn dac_channels_show_registers_of_access_d() {
 #[test]
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
 fn commands_are_acknowledged_as_table_4_says() {
-    let log = |bench: &Bench| bench.drive.log.join(", ");
+    let log = |bench: &SlaveFixture| bench.drive.log.join(", ");
     for number in 0..=255u8 {
         let command = Command::from(number);
         let documented = matches!(number, 1..=3 | 6..=12);
         let mut bench = spec();
         let expected = if documented { Ok(vec![]) } else { Err(ErrorCode::WrongCmd) };
-        assert_eq!(bench.ask(2, Request::Execute(command)), expected, "{command}");
+        assert_eq!(bench.ask(2, Request::ExecuteCommand(command)), expected, "{command}");
         assert_eq!(log(&bench), if documented { format!("{command} 2") } else { String::new() });
 
         let mut bench = mcsdk();
         let known = documented || matches!(number, 4 | 5 | 14);
         let expected = if known { Ok(vec![]) } else { Err(ErrorCode::WrongCmd) };
-        assert_eq!(bench.ask(2, Request::Execute(command)), expected, "{command}");
+        assert_eq!(bench.ask(2, Request::ExecuteCommand(command)), expected, "{command}");
     }
     let mut bench = mcsdk();
-    bench.ask(1, Request::Execute(Command::ScStop)).unwrap();
+    bench.ask(1, Request::ExecuteCommand(Command::ScStop)).unwrap();
     assert_eq!(log(&bench), "STOP_MOTOR 1");
 }
 
 #[test]
 fn pfc_commands_fail_without_pfc() {
-    let mut bench = Bench::new(Profile::Spec, 1, Memory::with(Features::NONE));
+    let mut bench = SlaveFixture::new(Profile::Spec, 1, Memory::with(Features::NONE));
     for command in [Command::PfcEnable, Command::PfcDisable, Command::PfcFaultAck] {
-        assert_eq!(bench.ask(0, Request::Execute(command)), Err(ErrorCode::WrongCmd));
+        assert_eq!(bench.ask(0, Request::ExecuteCommand(command)), Err(ErrorCode::WrongCmd));
     }
 }
 
 #[test]
 fn ramps_references_and_revup_reach_the_motor() {
     let mut bench = spec();
-    bench.ask(2, Request::Ramp(Ramp { speed_rpm: -605, duration_ms: 9 })).unwrap();
+    bench.ask(2, Request::SetRamp(Ramp { speed_rpm: -605, duration_ms: 9 })).unwrap();
     let reference = CurrentReference { iq_s16a: 1000, id_s16a: -5 };
-    bench.ask(0, Request::CurrentReference(reference)).unwrap();
+    bench.ask(0, Request::SetCurrentReference(reference)).unwrap();
     assert_eq!(bench.drive.log, ["ramp 2 -605 9", "current 2 1000 -5"]);
     let data = RevupPhase { speed_rpm: 1000, torque_s16a: -7, duration_ms: 300 };
     assert_eq!(bench.ask(1, Request::SetRevupData(4, data)), Ok(vec![]));
-    assert_eq!(bench.ask(1, Request::RevupData(4)), Ok(data.to_bytes().to_vec()));
-    assert_eq!(bench.ask(1, Request::RevupData(5)), Err(ErrorCode::WrongSet));
+    assert_eq!(bench.ask(1, Request::GetRevupData(4)), Ok(data.to_bytes().to_vec()));
+    assert_eq!(bench.ask(1, Request::GetRevupData(5)), Err(ErrorCode::WrongSet));
     assert_eq!(bench.ask(1, Request::SetRevupData(5, data)), Err(ErrorCode::WrongSet));
 }
 
@@ -313,7 +314,7 @@ fn shipped_firmware_keeps_speeds_in_tenths_of_a_hertz() {
     let mut bench = mcsdk();
     bench.ask(1, set(RegisterId::RAMP_FINAL_SPEED, &1000i32.to_le_bytes())).unwrap();
     assert_eq!(bench.drive.value(1, RegisterId::RAMP_FINAL_SPEED), 996);
-    bench.ask(1, Request::Ramp(Ramp { speed_rpm: -605, duration_ms: 9 })).unwrap();
+    bench.ask(1, Request::SetRamp(Ramp { speed_rpm: -605, duration_ms: 9 })).unwrap();
     assert_eq!(bench.drive.log, ["ramp 1 -600 9"]);
     bench.drive.set(1, RegisterId::SPEED_MEAS, 2003);
     let read = bench.ask(1, Request::GetRegister(RegisterId::SPEED_MEAS)).unwrap();
@@ -325,11 +326,11 @@ fn shipped_firmware_keeps_speeds_in_tenths_of_a_hertz() {
 
 #[test]
 fn versions_come_as_integers_or_as_ascii() {
-    let info = spec().ask(0, Request::BoardInfo).unwrap();
+    let info = spec().ask(0, Request::GetBoardInfo).unwrap();
     assert_eq!((&info[..3], info.len()), (&[5, 4, 3][..], 32));
-    let info = mcsdk().ask(0, Request::BoardInfo).unwrap();
+    let info = mcsdk().ask(0, Request::GetBoardInfo).unwrap();
     assert_eq!((&info[..12], info.len()), (&b"543ST MC SDK"[..], 32));
-    let version = spec().ask(0, Request::FirmwareVersion).unwrap();
+    let version = spec().ask(0, Request::GetFirmwareVersion).unwrap();
     assert_eq!(version, {
         let mut text = b"ST MC SDK\tVer.5.4.3".to_vec();
         text.resize(32, 0);
@@ -344,22 +345,18 @@ fn a_data_segment_samples_its_registers_in_one_exchange() {
     bench.drive.set(1, RegisterId::STATUS, 6);
     bench.drive.set(1, RegisterId::SPEED_MEAS, 1500);
     bench.drive.set(1, RegisterId::I_Q, -77);
-    let choose = |registers| Request::ConfigDynStruct { segment: 3, registers };
-    assert_eq!(bench.ask(1, Request::DataElement(3)), Ok(vec![]), "empty until it is chosen");
+    let choose = |registers| Request::ConfigureSegment { segment: 3, registers };
+    assert_eq!(bench.ask(1, Request::GetSegment(3)), Ok(vec![]), "empty until it is chosen");
     assert_eq!(bench.ask(1, choose(&[0x02, 0x1E, 0x27])), Ok(vec![]));
     let expected = vec![6, 0xDC, 0x05, 0, 0, 0xB3, 0xFF];
-    assert_eq!(bench.ask(1, Request::DataElement(3)), Ok(expected.clone()));
+    assert_eq!(bench.ask(1, Request::GetSegment(3)), Ok(expected.clone()));
     for unfit in [&[0x02, 0x99][..], &[0x41], &[0x5C], &[0x02; 33]] {
         assert_eq!(bench.ask(1, choose(unfit)), Err(ErrorCode::WrongSet), "{unfit:?}");
-        assert_eq!(
-            bench.ask(1, Request::DataElement(3)),
-            Ok(expected.clone()),
-            "the old one stays"
-        );
+        assert_eq!(bench.ask(1, Request::GetSegment(3)), Ok(expected.clone()), "the old one stays");
     }
     assert_eq!(bench.ask(1, choose(&[0x1E; 32])), Ok(vec![]));
-    assert_eq!(bench.ask(1, Request::DataElement(3)).map(|values| values.len()), Ok(128));
-    assert_eq!(bench.ask(1, Request::DataElement(4)), Err(ErrorCode::WrongSet));
+    assert_eq!(bench.ask(1, Request::GetSegment(3)).map(|values| values.len()), Ok(128));
+    assert_eq!(bench.ask(1, Request::GetSegment(4)), Err(ErrorCode::WrongSet));
 }
 
 #[test]
@@ -372,16 +369,16 @@ fn codes_of_the_other_profile_are_unknown_or_mean_something_else() {
     assert_eq!(bench.raw(0x04, &[]), Err(ErrorCode::BadFrameId));
     assert_eq!(bench.raw(0x0D, &[0x30, 0xF8, 0xFF, 0xFF, 100, 0]), Ok(vec![]));
     let target = PositionMove { angle_rad: 1.5, duration_s: 0.25 };
-    assert_eq!(bench.ask(1, Request::Position(target)), Ok(vec![]));
+    assert_eq!(bench.ask(1, Request::SetPosition(target)), Ok(vec![]));
     assert_eq!(bench.drive.log, ["torque ramp 1 -2000 100", "position 1 1.5 0.25"]);
     bench.drive.features = Some(Features::NONE);
-    assert_eq!(bench.ask(1, Request::Position(target)), Err(ErrorCode::BadFrameId));
+    assert_eq!(bench.ask(1, Request::SetPosition(target)), Err(ErrorCode::BadFrameId));
     assert_eq!(bench.raw(0x12, &[]), Err(ErrorCode::BadFrameId), "whatever the payload");
 }
 
 #[test]
 fn profiler_information_needs_a_profiler() {
     assert_eq!(mcsdk().raw(0x0B, &[0, 1, 2]), Err(ErrorCode::MpNotEnabled));
-    let mut bench = Bench::new(Profile::Mcsdk54, 1, Memory::with(all_features()));
+    let mut bench = SlaveFixture::new(Profile::Mcsdk54, 1, Memory::with(all_features()));
     assert_eq!(bench.raw(0x0B, &[0, 1]), Ok(vec![0, 2, 0x66, 0x67]));
 }

@@ -33,29 +33,29 @@ fn request<'a>(vector: &Value, bytes: &'a [u8]) -> Request<'a> {
             Request::SetRegister { register: RegisterId(int("register") as u8), value: bytes }
         }
         "GET_REG" => Request::GetRegister(RegisterId(int("register") as u8)),
-        "EXECUTE_CMD" => Request::Execute(Command::from(int("command") as u8)),
-        "GET_BOARD_INFO" => Request::BoardInfo,
-        "SET_RAMP" => Request::Ramp(Ramp {
+        "EXECUTE_CMD" => Request::ExecuteCommand(Command::from(int("command") as u8)),
+        "GET_BOARD_INFO" => Request::GetBoardInfo,
+        "SET_RAMP" => Request::SetRamp(Ramp {
             speed_rpm: int("speed") as i32,
             duration_ms: int("duration") as u16,
         }),
-        "GET_REVUP_DATA" => Request::RevupData(int("phase") as u8),
+        "GET_REVUP_DATA" => Request::GetRevupData(int("phase") as u8),
         "SET_REVUP_DATA" => Request::SetRevupData(int("phase") as u8, revup(fields)),
-        "SET_CURRENT_REF" => Request::CurrentReference(CurrentReference {
+        "SET_CURRENT_REF" => Request::SetCurrentReference(CurrentReference {
             iq_s16a: int("iq") as i16,
             id_s16a: int("id") as i16,
         }),
-        "GET_MP_INFO" => Request::ProfilerInfo(bytes),
-        "GET_FW_VERSION" => Request::FirmwareVersion,
-        "GET_DATA_ELEMENT" => Request::DataElement(int("segment") as u8),
+        "GET_MP_INFO" => Request::GetProfilerInfo(bytes),
+        "GET_FW_VERSION" => Request::GetFirmwareVersion,
+        "GET_DATA_ELEMENT" => Request::GetSegment(int("segment") as u8),
         "CONFIG_DYN_STRUCT" => {
-            Request::ConfigDynStruct { segment: int("segment") as u8, registers: bytes }
+            Request::ConfigureSegment { segment: int("segment") as u8, registers: bytes }
         }
-        "SET_TORQUE_RAMP" => Request::TorqueRamp(TorqueRamp {
+        "SET_TORQUE_RAMP" => Request::SetTorqueRamp(TorqueRamp {
             torque_s16a: int("torque") as i32,
             duration_ms: int("duration") as u16,
         }),
-        "SET_POSITION_CMD" => Request::Position(PositionMove {
+        "SET_POSITION_CMD" => Request::SetPosition(PositionMove {
             angle_rad: fields["angle"].as_f64().unwrap() as f32,
             duration_s: fields["duration"].as_f64().unwrap() as f32,
         }),

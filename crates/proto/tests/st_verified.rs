@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Bench, Memory};
+use common::{Memory, SlaveFixture};
 use motorlink_proto::st::*;
 
 const KP: RegisterId = RegisterId::SPEED_KP;
@@ -19,7 +19,7 @@ enum Trouble {
 
 /// A verified write through a line with the given trouble, exchange by exchange.
 fn write(
-    bench: &mut Bench,
+    bench: &mut SlaveFixture,
     (register, value): (RegisterId, i32),
     attempts: u8,
     troubles: &[Option<Trouble>],
@@ -53,8 +53,8 @@ fn write(
     (result, exchanges)
 }
 
-fn bench(profile: Profile) -> Bench {
-    Bench::new(profile, 2, Memory::with(common::all_features()))
+fn bench(profile: Profile) -> SlaveFixture {
+    SlaveFixture::new(profile, 2, Memory::with(common::all_features()))
 }
 
 #[test]
@@ -91,7 +91,7 @@ fn a_value_that_went_wrong_on_the_way_is_put_right_or_told() {
 
 #[test]
 fn a_drive_that_refuses_is_not_asked_again() {
-    let mut bench = Bench::new(Profile::Spec, 1, Memory::with(Features::NONE));
+    let mut bench = SlaveFixture::new(Profile::Spec, 1, Memory::with(Features::NONE));
     let refused = Err(Unverified::Exchange(ErrorCode::SetReadOnly));
     assert_eq!(write(&mut bench, (RegisterId::PFC_I_KP, 1), 3, &[]), (refused, 1));
 }

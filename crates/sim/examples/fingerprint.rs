@@ -25,13 +25,13 @@ fn st() {
         station.receive(now, frame, |reply| said.extend_from_slice(reply));
     };
     for motor in [1, 2] {
-        ask(&mut station, now, motor, Request::Execute(Command::StartMotor));
+        ask(&mut station, now, motor, Request::ExecuteCommand(Command::StartMotor));
     }
     for round in 0..30 {
         now += Duration::from_millis(100);
         for motor in [1, 2] {
             let ramp = Ramp { speed_rpm: 1000 + 50 * round, duration_ms: 80 };
-            ask(&mut station, now, motor, Request::Ramp(ramp));
+            ask(&mut station, now, motor, Request::SetRamp(ramp));
             for id in RegisterId::all() {
                 ask(&mut station, now, motor, Request::GetRegister(id));
             }

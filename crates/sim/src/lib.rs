@@ -32,7 +32,7 @@
 //!
 //! let mut station = StStation::new(Profile::Spec, StDrive::demo(Instant(0)));
 //! let mut frame = [0; 131];
-//! let start = Request::Execute(Command::StartMotor);
+//! let start = Request::ExecuteCommand(Command::StartMotor);
 //! let start = Frame::command(1, &start, &mut frame).unwrap();
 //! station.receive(Instant(0), start, |reply| assert_eq!(reply, [0xF0, 0x00, 0xF0]));
 //! station.advance_to(Instant(3_000_000));

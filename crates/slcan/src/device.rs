@@ -3,7 +3,9 @@
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
-use super::{BEL, Bitrate, CR, LONGEST_FRAME, LONGEST_LINE, Line, Writer, decode, encode, is_hex};
+use super::{
+    BEL, Bitrate, CR, LONGEST_FRAME, LONGEST_LINE, TextLine, Writer, decode, encode, is_hex,
+};
 
 /// Timestamps count milliseconds and start again after a minute.
 const TIMESTAMP_PERIOD_MS: u64 = 60_000;
@@ -14,7 +16,7 @@ const TIMESTAMP_PERIOD_MS: u64 = 60_000;
 /// codes and masks are taken and have no effect.
 #[derive(Debug, Default)]
 pub struct Device {
-    line: Line,
+    line: TextLine,
     channel: Channel,
     timestamps: bool,
 }
@@ -50,7 +52,7 @@ impl Device {
 
     /// Drops a line that its host began and did not end, so that the next host does not end it.
     pub fn forget_line(&mut self) {
-        self.line = Line::default();
+        self.line = TextLine::default();
     }
 
     /// Does what `line` says; nothing when it is refused.

@@ -2,7 +2,7 @@
 
 use motorlink_proto::can::CanFrame;
 
-use super::{BEL, CR, Line, decode, is_hex};
+use super::{BEL, CR, TextLine, decode, is_hex};
 
 /// Bytes of one read that wait to be looked at: some twenty frames.
 const BUFFERED: usize = 512;
@@ -23,7 +23,7 @@ pub enum Answer {
 /// Takes an adapter's bytes apart, one at a time. A line that is no answer is counted and left out.
 #[derive(Debug, Default)]
 pub struct AnswerParser {
-    line: Line,
+    line: TextLine,
     garbage: u64,
 }
 

@@ -180,12 +180,12 @@ fn is_hex(text: &[u8], digits: usize) -> bool {
 
 /// A line that is being received. One that is too long is remembered as such and not kept.
 #[derive(Debug, Default)]
-struct Line {
+struct TextLine {
     bytes: [u8; LONGEST_LINE],
     len: usize,
 }
 
-impl Line {
+impl TextLine {
     fn push(&mut self, byte: u8) {
         if let Some(slot) = self.bytes.get_mut(self.len) {
             *slot = byte;

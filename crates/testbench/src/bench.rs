@@ -1,205 +1,227 @@
-//! Drives on served ports, and the world around them.
+//! Drives in the process, on virtual time.
 
-use std::cell::RefCell;
-use std::collections::HashMap;
-use std::os::fd::BorrowedFd;
-use std::rc::Rc;
+use std::io::ErrorKind;
+use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream;
+use std::sync::mpsc;
+use std::thread::JoinHandle;
 use std::time::Duration;
 
-use motorlink_link::port::PortError;
+use motorlink_link::Clock;
+use motorlink_link::fault::Faults;
+use motorlink_link::port::{ByteLink, CanLink, FaultBytes, FaultCan, PortError};
 use motorlink_link::serve::ServeName;
-use motorlink_link::serve::{CanStation, Server, Turn};
-use motorlink_proto::can::CanFrame;
-use motorlink_proto::rmd::MotorId;
-use motorlink_proto::time::Instant;
-use motorlink_sim::rmd::RmdNode;
-use serde_json::{Value, json};
+use motorlink_link::serve::{Served, Server};
+use motorlink_proto::rmd::IDENTIFIERS;
+use motorlink_proto::st::Profile;
+use motorlink_proto::time::{self, Instant};
+use motorlink_sim::hash;
+use serde_json::Value;
 
-use super::drives::{Drives, Stage};
-use super::line::{RmdLine, StLine};
+use super::cast::Cast;
+use super::drives::{Drives, Recording, Stage};
+use super::line::{RmdStage, SimBytes, SimCan, StStage};
 use super::places::{Kind, Places};
-use super::{BenchConfig, Command, ConfigError, RomError, RomFolder};
+use super::signals::{Signal, find_signal};
+use super::{BenchConfig, Command, ConfigError};
 
-/// Simulated drives, each on a served port of its own, advanced to real time.
-#[derive(Default)]
+/// A byte at 115200 baud.
+const BYTE: Duration = Duration::from_micros(87);
+/// A CAN frame of 8 bytes at 1 Mbit/s, with some stuffed bits.
+const FRAME: Duration = Duration::from_micros(125);
+/// Drives step at multiples of this.
+const STEP: time::Duration = time::Duration(50);
+/// How often drives on served ports follow the time, if nobody asks them anything.
+const FOLLOW: Duration = Duration::from_millis(20);
+
+/// An ST drive and a bus of RMD motors in the process, on virtual time: it passes when a client
+/// waits, when bytes are on a line, and in [`run`](Self::run). Nobody sleeps, and the same calls give
+/// the same answers, as long as they come from one thread.
+///
+/// [`serve`](Self::serve) lets time run for a while, with the same drives on ports.
 pub struct Bench {
-    server: Server,
+    clock: Clock,
+    stage: Stage,
     places: Places,
-    rom: Option<Rc<RomFolder>>,
-    /// A ROM that could not be written.
-    failure: Rc<RefCell<Option<RomError>>>,
-}
-
-/// Why a port is not served.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ServeError {
-    /// The port.
-    #[error(transparent)]
-    Port(#[from] PortError),
-    /// The configuration.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The ROM on disk.
-    #[error(transparent)]
-    Rom(#[from] RomError),
+    signals: Vec<Signal>,
+    profile: Profile,
 }
 
 impl Bench {
-    /// A bench without drives, whose time begins now.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Keeps the ROM of RMD motors that are served from now on in `folder`.
-    pub fn keep_rom(&mut self, folder: RomFolder) {
-        self.rom = Some(Rc::new(folder));
-    }
-
-    /// Powers an ST drive on and serves it; gives what the port is, for programs to read.
-    pub fn serve_st(
-        &mut self,
-        port: &ServeName,
-        config: &BenchConfig,
-    ) -> Result<Value, ServeError> {
-        let stage = Stage::new(Drives { st: Some(config.station(self.server.now())?), rmd: None });
-        let served = self.server.serve_bytes(port, Box::new(StLine(stage.clone())))?;
-        let motors = config.st_motors();
-        let profile = config.profile.name();
-        let announcement = json!({
-            "port": served.port, "protocol": "st", "path": served.path, "motors": motors,
-            "profile": profile,
-        });
-        self.places.add(served.port, Kind::St, stage);
-        Ok(announcement)
-    }
-
-    /// Powers RMD motors on and serves their bus; gives what the port is, for programs to read.
-    pub fn serve_rmd(
-        &mut self,
-        port: &ServeName,
-        config: &BenchConfig,
-    ) -> Result<Value, ServeError> {
-        let others = self.places.iter().filter(|place| place.kind == Kind::Rmd);
-        let number = others.count() + 1;
-        let mut roms = HashMap::new();
-        for motor in config.rmd_motors() {
-            let rom = self.rom.as_ref().map(|folder| folder.load(number, motor)).transpose()?;
-            roms.insert(motor.id, rom.unwrap_or_else(|| motor.factory_rom()));
-        }
-        let bus = config.bus(self.server.now(), |motor| roms[&motor.id])?;
-        let ids: Vec<u8> = bus.nodes().iter().map(|node| node.id().number()).collect();
-        let stage = Stage::new(Drives { st: None, rmd: Some(bus) });
-        let line = RmdLine(stage.clone());
-        let station: Box<dyn CanStation> = match &self.rom {
-            None => Box::new(line),
-            Some(folder) => {
-                let (folder, failure) = (Rc::clone(folder), Rc::clone(&self.failure));
-                let rom = BusRom { folder, number, seen: HashMap::new(), failure };
-                Box::new(StoredLine { line, rom })
-            }
-        };
-        let served = self.server.serve_can(port, station)?;
-        let announcement = json!({
-            "port": served.port, "protocol": "rmd", "path": served.path, "motors": ids.len(),
-            "ids": ids,
-        });
-        self.places.add(served.port, Kind::Rmd, stage);
-        Ok(announcement)
-    }
-
-    /// Serves the ports once; waits at most `most` for something to do. `extra` is waited for too.
+    /// Powers the drives on at time 0.
     ///
     /// # Errors
-    /// A ROM that could not be written to its folder. The write is not acknowledged to the host.
-    pub fn turn(
-        &mut self,
-        most: Duration,
-        extra: Option<BorrowedFd<'_>>,
-    ) -> Result<Turn, ServeError> {
-        let turn = self.server.turn(most, extra)?;
-        if let Some(failure) = self.failure.take() {
-            return Err(failure.into());
-        }
-        let now = self.server.now();
-        for place in self.places.iter() {
-            drop(place.stage.at(now));
-        }
-        Ok(turn)
+    /// As [`BenchConfig::station`].
+    pub fn new(config: &BenchConfig) -> Result<Self, ConfigError> {
+        let cast = Cast { config: config.clone(), st: true, rmd: true };
+        let stage = Stage::new(Drives::new(&cast)?);
+        let mut places = Places::default();
+        places.add("st".to_owned(), Kind::St, stage.clone());
+        places.add("rmd".to_owned(), Kind::Rmd, stage.clone());
+        let (signals, profile) = (cast.signals(), config.profile);
+        Ok(Bench { clock: Clock::standing(), stage, places, signals, profile })
     }
 
-    /// Obeys a command written as JSON; gives the answer, one line of JSON.
-    pub fn obey(&mut self, line: &str) -> Value {
-        match Command::read(line).and_then(|command| self.execute(&command)) {
-            Ok(answer) => answer,
-            Err(why) => json!({ "ok": false, "error": why }),
-        }
+    /// What the ST drive speaks.
+    pub fn profile(&self) -> Profile {
+        self.profile
     }
 
-    /// Executes a command; gives the answer, or why nothing was done.
-    pub fn execute(&mut self, command: &Command) -> Result<Value, String> {
+    /// The bench's clock.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    /// The bench's time.
+    pub fn now(&self) -> Instant {
+        self.clock.now()
+    }
+
+    /// A serial line to the ST drive, with faults; a byte takes as long as at 115200 baud.
+    pub fn bytes(&self, faults: &Faults) -> Box<dyn ByteLink> {
+        let link = SimBytes::new(StStage(self.stage.clone()), self.clock.clone());
+        Box::new(FaultBytes::paced(link, faults, BYTE))
+    }
+
+    /// A CAN bus to the RMD motors, with faults; a frame takes as long as at 1 Mbit/s.
+    pub fn can(&self, faults: &Faults) -> Box<dyn CanLink> {
+        let link = SimCan::new(RmdStage(self.stage.clone()), self.clock.clone());
+        Box::new(FaultCan::paced(link, faults, IDENTIFIERS, FRAME))
+    }
+
+    /// Lets time pass. While ports are served it takes as long.
+    pub fn run(&self, span: time::Duration) {
+        self.clock.wait(self.now() + span);
+        drop(self.stage.at(self.now()));
+    }
+
+    /// Executes a command of a bench, whose ports are `st` and `rmd`; gives the answer, or why nothing
+    /// was done.
+    pub fn execute(&self, command: &Command) -> Result<Value, String> {
         if let Command::Pause {} | Command::Resume {} = command {
-            self.server.hold(matches!(command, Command::Pause {}));
-            return Ok(json!({ "ok": true }));
+            return Err("virtual time stands still by itself".to_owned());
         }
-        self.places.execute(self.server.now(), command)
+        self.places.execute(self.now(), command)
     }
-}
 
-/// RMD motors whose ROM is on disk.
-struct StoredLine {
-    line: RmdLine,
-    rom: BusRom,
-}
+    /// What can be looked at, motor by motor.
+    pub fn signals(&self) -> &[Signal] {
+        &self.signals
+    }
 
-/// The ROM of a bus on disk.
-struct BusRom {
-    folder: Rc<RomFolder>,
-    /// Which bus of the bench, from 1.
-    number: usize,
-    /// How often each motor's ROM had been written when it was brought to the disk.
-    seen: HashMap<MotorId, u32>,
-    failure: Rc<RefCell<Option<RomError>>>,
-}
+    /// The values of all signals at this moment.
+    pub fn values(&self) -> Vec<f64> {
+        self.stage.at(self.now()).drives.values().collect()
+    }
 
-impl BusRom {
-    /// Brings what was written to the disk; false when that failed.
-    fn keep(&mut self, nodes: &[RmdNode]) -> bool {
-        for node in nodes {
-            let writes = node.motor().rom_writes();
-            let seen = self.seen.entry(node.id()).or_default();
-            if *seen == writes {
-                continue;
+    /// FNV-1a over the state of all drives.
+    pub fn state_hash(&self) -> u64 {
+        hash::fingerprint(&self.stage.at(self.now()).drives)
+    }
+
+    /// Writes signals down from now on, at a distance of 50 µs at least.
+    ///
+    /// # Errors
+    /// Why that cannot be.
+    pub fn record(&self, signals: &[&str], every: time::Duration) -> Result<Recording, String> {
+        if every < STEP {
+            return Err(format!("drives step every {} µs: nothing is seen more often", STEP.0));
+        }
+        let columns = signals.iter().map(|name| find_signal(name, &self.signals));
+        Ok(self.stage.record(&self.clock, columns.collect::<Result<_, _>>()?, every))
+    }
+
+    /// Serves the drives on ports, in a thread. Time runs until what this gives is dropped; links of
+    /// this bench wait as long then.
+    ///
+    /// # Errors
+    /// A port that cannot be served, or a bench that is served already.
+    pub fn serve(
+        &self,
+        st: Option<ServeName>,
+        rmd: Option<ServeName>,
+    ) -> Result<Serving, PortError> {
+        if !self.clock.stands() {
+            let port = st.or(rmd).map(|port| port.to_string()).unwrap_or_default();
+            let why = "this bench is served already: end that first".to_owned();
+            return Err(PortError::Configuration { port, why });
+        }
+        let (stop, stopped) = UnixStream::pair().map_err(failed)?;
+        let (tell, told) = mpsc::channel();
+        let (clock, stage) = (self.clock.clone(), self.stage.clone());
+        // A server stays in its thread, so that its ports are opened there.
+        let serve = move || {
+            let mut server = Server::by(clock);
+            let open = || {
+                let line = || Box::new(StStage(stage.clone()));
+                let bus = || Box::new(RmdStage(stage.clone()));
+                let st = st.map(|port| server.serve_bytes(&port, line())).transpose()?;
+                let rmd = rmd.map(|port| server.serve_can(&port, bus())).transpose()?;
+                Ok((st, rmd))
+            };
+            let served: Result<_, PortError> = open();
+            let refused = served.is_err();
+            if tell.send(served).is_err() || refused {
+                return Ok(());
             }
-            match self.folder.store(self.number, node.motor().config(), node.drive().rom()) {
-                Ok(()) => *seen = writes,
-                Err(error) => {
-                    *self.failure.borrow_mut() = Some(error);
-                    return false;
-                }
+            while !server.turn(FOLLOW, Some(stopped.as_fd()))?.extra_is_ready {
+                drop(stage.at(server.now()));
             }
-        }
-        true
+            Ok(())
+        };
+        let thread = std::thread::Builder::new().name("motorlink-serve".to_owned()).spawn(serve);
+        let thread = thread.map_err(failed)?;
+        let (st, rmd) = told.recv().map_err(|_| failed(ErrorKind::BrokenPipe.into()))??;
+        self.clock.hold(false);
+        Ok(Serving { st, rmd, clock: self.clock.clone(), running: Some((stop, thread)) })
     }
 }
 
-impl CanStation for StoredLine {
-    /// A write to ROM is answered when it is on the disk.
-    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
-        let before = replies.len();
-        self.line.receive(now, frame, replies);
-        let stage = self.line.0.last();
-        let kept = stage.drives.rmd.as_ref().is_none_or(|bus| self.rom.keep(bus.nodes()));
-        if !kept {
-            replies.truncate(before);
-        }
+fn failed(source: std::io::Error) -> PortError {
+    PortError::Io { port: "the served ports".to_owned(), source }
+}
+
+/// Ports on which the drives of a [`Bench`] are served until this is dropped.
+#[derive(Debug)]
+pub struct Serving {
+    st: Option<Served>,
+    rmd: Option<Served>,
+    clock: Clock,
+    /// What the thread watches for its end, and the thread.
+    running: Option<(UnixStream, JoinHandle<Result<(), PortError>>)>,
+}
+
+impl Serving {
+    /// The port of the ST drive.
+    pub fn st(&self) -> Option<&Served> {
+        self.st.as_ref()
     }
 
-    fn poll(&mut self, now: Instant, replies: &mut Vec<CanFrame>) {
-        self.line.poll(now, replies);
+    /// The port of the RMD motors.
+    pub fn rmd(&self) -> Option<&Served> {
+        self.rmd.as_ref()
     }
 
-    fn deadline(&self) -> Option<Instant> {
-        self.line.deadline()
+    /// Closes the ports; time stands still again.
+    ///
+    /// # Errors
+    /// What kept the ports from being served to the end.
+    pub fn end(mut self) -> Result<(), PortError> {
+        self.close()
+    }
+
+    fn close(&mut self) -> Result<(), PortError> {
+        let Some((stop, thread)) = self.running.take() else { return Ok(()) };
+        drop(stop);
+        let ended = thread.join();
+        self.clock.hold(true);
+        ended.unwrap_or_else(|_| Err(failed(ErrorKind::Other.into())))
+    }
+}
+
+impl Drop for Serving {
+    fn drop(&mut self) {
+        // What failed was seen by the clients.
+        let _ = self.close();
     }
 }

@@ -1,7 +1,7 @@
 //! Which drives there are, and what can be looked at of them.
 
 use motorlink_proto::rmd::MotorId;
-use motorlink_proto::st::Motor;
+use motorlink_proto::st::MotorNumber;
 
 use crate::config::BenchConfig;
 use crate::signals::{RMD, ST, Signal};
@@ -19,7 +19,7 @@ pub(crate) struct Cast {
 impl Cast {
     /// The motors, in the order of their signals.
     pub(crate) fn targets(&self) -> Vec<Target> {
-        let st = (1..).map_while(Motor::new).take(self.config.st_motors()).map(Target::St);
+        let st = (1..).map_while(MotorNumber::new).take(self.config.st_motors()).map(Target::St);
         let ids = self.config.rmd_motors().iter().filter_map(|motor| MotorId::new(motor.id));
         let mut ids: Vec<MotorId> = ids.collect();
         ids.sort_unstable();
@@ -44,7 +44,7 @@ impl Cast {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Target {
     /// By number, from 1.
-    St(Motor),
+    St(MotorNumber),
     Rmd(MotorId),
 }
 

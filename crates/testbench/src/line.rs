@@ -8,14 +8,14 @@ use super::config::Station;
 use super::drives::Stage;
 
 /// A link to the ST drive of a stage.
-pub(super) type SimLine = StationLink<StLine, u8>;
+pub(super) type SimBytes = StationLink<StStage, u8>;
 /// A link to the RMD motors of a stage.
-pub(super) type SimCan = StationLink<RmdLine, CanFrame>;
+pub(super) type SimCan = StationLink<RmdStage, CanFrame>;
 
 /// An ST drive at the far end of a line.
-pub(super) struct StLine(pub(super) Stage);
+pub(super) struct StStage(pub(super) Stage);
 
-impl ByteStation for StLine {
+impl ByteStation for StStage {
     fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
         if let Some(station) = &mut self.0.at(now).drives.st {
             station.receive(now, bytes, |bytes| reply.extend_from_slice(bytes));
@@ -34,9 +34,9 @@ impl ByteStation for StLine {
 }
 
 /// RMD motors on a bus.
-pub(super) struct RmdLine(pub(super) Stage);
+pub(super) struct RmdStage(pub(super) Stage);
 
-impl CanStation for RmdLine {
+impl CanStation for RmdStage {
     fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
         if let Some(bus) = &mut self.0.at(now).drives.rmd {
             bus.receive(now, frame, |reply| replies.push(reply));

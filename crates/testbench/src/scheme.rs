@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use motorlink_link::Clock;
 use motorlink_link::port::{
-    self, ByteLink, CanLink, CanPort, Carries, EventCan, EventLine, Form, Given, LinePort,
+    self, ByteLink, CanLink, CanPort, Carries, EventBytes, EventCan, Form, Given, LinePort,
     NameError, Port, PortError, PortName, Scheme,
 };
 use motorlink_proto::time::Instant;
@@ -12,7 +12,7 @@ use motorlink_sim::rmd::RmdConfig;
 
 use super::config::{BenchConfig, ConfigError};
 use super::drives::{Drives, Stage};
-use super::line::{RmdLine, SimCan, SimLine, StLine};
+use super::line::{RmdStage, SimBytes, SimCan, StStage};
 
 /// Makes `sim:` a port that every client of this process can open.
 pub fn register() {
@@ -59,11 +59,11 @@ impl SimPort {
         PortError::Configuration { port: self.body(), why: error.to_string() }
     }
 
-    fn open_st(&self) -> Result<SimLine, PortError> {
+    fn open_st(&self) -> Result<SimBytes, PortError> {
         let station = self.config().and_then(|config| config.station(Instant(0)));
         let station = station.map_err(|error| self.refused(&error))?;
         let stage = Stage::new(Drives { st: Some(station), rmd: None });
-        Ok(SimLine::new(StLine(stage), Clock::running()))
+        Ok(SimBytes::new(StStage(stage), Clock::running()))
     }
 
     fn open_rmd(&self) -> Result<SimCan, PortError> {
@@ -71,7 +71,7 @@ impl SimPort {
         let bus = bus.and_then(|config| config.bus(Instant(0), RmdConfig::factory_rom));
         let bus = bus.map_err(|error| self.refused(&error))?;
         let stage = Stage::new(Drives { st: None, rmd: Some(bus) });
-        Ok(SimCan::new(RmdLine(stage), Clock::running()))
+        Ok(SimCan::new(RmdStage(stage), Clock::running()))
     }
 }
 
@@ -98,7 +98,7 @@ impl LinePort for SimPort {
         Ok(Box::new(self.open_st()?))
     }
 
-    fn open_event(&self) -> Result<Box<dyn EventLine>, PortError> {
+    fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
         Ok(Box::new(self.open_st()?))
     }
 

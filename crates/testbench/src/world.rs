@@ -1,7 +1,7 @@
 //! What commands do to the world around simulated drives.
 
 use motorlink_proto::rmd::{Errors, MotorId};
-use motorlink_proto::st::{Flags, Motor};
+use motorlink_proto::st::{Flags, MotorNumber};
 use motorlink_proto::time::Instant;
 use motorlink_sim::plant::Plant;
 use motorlink_sim::rmd::RmdNode;
@@ -103,7 +103,7 @@ fn named<'n, T>(
 
 fn st_motor(station: &mut Station, number: u8) -> Result<&mut StMotor, String> {
     let count = station.drive().motors().len();
-    Motor::new(number)
+    MotorNumber::new(number)
         .and_then(|motor| station.drive_mut().motor_mut(motor))
         .ok_or_else(|| format!("there is no motor {number}: this drive has {count}"))
 }

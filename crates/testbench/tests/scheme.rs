@@ -20,14 +20,14 @@ fn simulated_drives_are_a_port_after_they_are_registered() {
     let meant = "sim".parse::<PortName>().expect_err("it has no colon").to_string();
     assert!(meant.contains("did you mean `sim:`?") && meant.contains("sim:FILE.toml"), "{meant}");
 
-    let mut line = "sim:".parse::<PortName>().unwrap().open_line().expect("an ST drive");
+    let mut line = "sim:".parse::<PortName>().unwrap().open_bytes().expect("an ST drive");
     line.write(&[0x02, 0x01, 0x1E, 0x21]).expect("GET_REG of SPEED_MEAS");
     let mut reply = [0; 16];
     let size = line.read(&mut reply, Some(Duration::from_secs(1))).expect("an answer");
     assert_eq!(reply[..size], [0xF0, 4, 0, 0, 0, 0, 0xF4]);
     "sim:".parse::<PortName>().unwrap().open_event_can().expect("a bus of RMD motors");
 
-    let error = "sim:./never.toml".parse::<PortName>().unwrap().open_line();
+    let error = "sim:./never.toml".parse::<PortName>().unwrap().open_bytes();
     let error = error.err().expect("there is no such file").to_string();
     assert!(error.contains("cannot read `./never.toml`"), "{error}");
 }

@@ -6,7 +6,7 @@ use motorlink_ffi::rmd::drive::{
     motorlink_rmd_mode as mode, motorlink_rmd_motion, motorlink_rmd_sense, motorlink_rmd_settings,
 };
 use motorlink_ffi::rmd::message::motorlink_rmd_pid;
-use motorlink_proto::rmd::{Mode, Motor, Pid, Settings};
+use motorlink_proto::rmd::{Mode, MotorControl, Pid, Settings};
 use motorlink_proto::units::{CentiDps, DpsPerSecond, IqCommand, SpeedLimit};
 use motorlink_sim::rmd::RmdMotor;
 use plant::Plant;

@@ -5,16 +5,20 @@ use core::ffi::c_void;
 use motorlink_ffi::st::message::motorlink_st_revup_phase;
 use motorlink_proto::st::register::Feature;
 use motorlink_proto::st::{
-    Command, CurrentReference, Drive, Motor, PositionMove, Ramp, RegisterId, RevupPhase, TorqueRamp,
+    Command, CurrentReference, MotorControl, MotorNumber, PositionMove, Ramp, RegisterId,
+    RevupPhase, TorqueRamp,
 };
 use motorlink_sim::st::{StDrive, StMotor};
 use plant::Plant;
 
 /// The drive behind a context, and the motor of this number.
-unsafe fn drive<'a>(context: *mut c_void, motor: u8) -> (&'a mut StDrive<[StMotor; 2]>, Motor) {
+unsafe fn drive<'a>(
+    context: *mut c_void,
+    motor: u8,
+) -> (&'a mut StDrive<[StMotor; 2]>, MotorNumber) {
     // SAFETY: the contract of the crate, which the caller passes on.
     let plant = unsafe { &mut *context.cast::<Plant>() };
-    (&mut plant.st, Motor::new(motor).unwrap_or(Motor::FIRST))
+    (&mut plant.st, MotorNumber::new(motor).unwrap_or(MotorNumber::FIRST))
 }
 
 #[unsafe(no_mangle)]

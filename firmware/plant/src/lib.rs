@@ -6,7 +6,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-use motorlink_proto::rmd::{Config, Drive, MotorId, Settings};
+use motorlink_proto::rmd::{Drive, DriveConfig, MotorId, Settings};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::plant::OutOfRange;
 use motorlink_sim::rmd::{RmdConfig, RmdMotor};
@@ -48,7 +48,7 @@ impl Plant {
     pub fn rmd_drives() -> [Drive; RMD_IDS.len()] {
         RMD_IDS.map(|id| {
             let id = MotorId::new(id).expect("IDs 1 to 4 exist");
-            Drive::new(Config::new(id), Self::rmd_rom())
+            Drive::new(DriveConfig::new(id), Self::rmd_rom())
         })
     }
 

@@ -5,13 +5,13 @@
 use core::hint::black_box;
 
 use motorlink_proto::rmd::{Drive, Host};
-use motorlink_proto::st::{Config, Master, Motor, Profile, Slave};
+use motorlink_proto::st::{Master, MasterConfig, MotorNumber, Profile, Slave};
 
 type Ends = (Slave, Master, Drive, Host);
 
 fn new() -> Ends {
-    let slave = Slave::new(black_box(Profile::Mcsdk54), black_box(Motor::FIRST));
-    (slave, Master::new(Config::default()), probe::new_rmd_drive(), Host::new())
+    let slave = Slave::new(black_box(Profile::Mcsdk54), black_box(MotorNumber::FIRST));
+    (slave, Master::new(MasterConfig::default()), probe::new_rmd_drive(), Host::new())
 }
 
 fn calls((slave, master, drive, host): &mut Ends) {

@@ -4,10 +4,10 @@
 
 use core::hint::black_box;
 
-use motorlink_ffi::{motorlink_error_text, motorlink_version};
 use motorlink_ffi::rmd::{drive::*, host::*, message::*};
 use motorlink_ffi::slcan::*;
 use motorlink_ffi::st::{master::*, message::*, names::*, request::*, slave::*};
+use motorlink_ffi::{motorlink_error_text, motorlink_version};
 
 unsafe extern "C" {
     fn a_path_of_the_c_face_can_panic() -> !;

@@ -2,6 +2,6 @@
 #![no_std]
 #![no_main]
 
-use motorlink_proto::st::{Config, Master};
+use motorlink_proto::st::{Master, MasterConfig};
 
-probe::program!(Master, Master::new(Config::default()), probe::st_master);
+probe::program!(Master, Master::new(MasterConfig::default()), probe::st_master);

@@ -2,6 +2,6 @@
 #![no_std]
 #![no_main]
 
-use motorlink_proto::st::{Motor, Profile, Slave};
+use motorlink_proto::st::{MotorNumber, Profile, Slave};
 
-probe::program!(Slave, Slave::new(Profile::Spec, Motor::FIRST), probe::st_slave);
+probe::program!(Slave, Slave::new(Profile::Spec, MotorNumber::FIRST), probe::st_slave);

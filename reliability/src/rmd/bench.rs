@@ -4,8 +4,8 @@ use motorlink::time::{Duration, Instant};
 use motorlink_link::fault::{Faults, Rng, Unit};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    Code, Command, DEFAULT_GUARD, DEFAULT_TIMEOUT, Error, Host, IDENTIFIERS, MotorId, MotorSet,
-    Output, ReadStatus, Refused, SetTorque4, TORQUE4_ID,
+    Code, Command, DEFAULT_QUARANTINE, DEFAULT_TIMEOUT, Failure, Host, IDENTIFIERS, MotorId,
+    MotorSet, Output, ReadStatus, RequestError, SetTorque4, TORQUE4_ID,
 };
 
 use super::motor::{MOTORS, Node, reaches};
@@ -18,9 +18,9 @@ use crate::wire::Tagged;
 const FRAME: Duration = Duration(120);
 /// How long a motor thinks.
 const TURNAROUND: Duration = Duration(300);
-/// How long an exchange takes at most: the motor is left alone for the guard time, asked for its
-/// status, silent for the guard time, and asked.
-const LONGEST: Duration = Duration(2 * (DEFAULT_GUARD.0 + DEFAULT_TIMEOUT.0 + FRAME.0));
+/// How long an exchange takes at most: the motor is left alone for the quarantine time, asked for its
+/// status, silent for the quarantine time, and asked.
+const LONGEST: Duration = Duration(2 * (DEFAULT_QUARANTINE.0 + DEFAULT_TIMEOUT.0 + FRAME.0));
 /// What a program that asks a motor for the first time may wait longer: for the answers to what ends
 /// motion, and to another question.
 const FIRST: Duration = Duration(2 * (DEFAULT_TIMEOUT.0 + FRAME.0));
@@ -51,7 +51,7 @@ struct Reply {
     again: bool,
 }
 
-pub type Bench = bench::Bench<Rmd>;
+pub type RmdRun = bench::Run<Rmd>;
 
 /// Host and motors.
 pub struct Rmd {
@@ -69,7 +69,7 @@ pub struct Rmd {
 }
 
 /// Host and motors on a bus with faults.
-pub fn bench(faults: &Faults, beyond: bool) -> Bench {
+pub fn bench(faults: &Faults, beyond: bool) -> RmdRun {
     let ends = Rmd {
         host: Host::new(),
         nodes: MotorSet::TORQUE4.map(Node::new).collect(),
@@ -80,7 +80,7 @@ pub fn bench(faults: &Faults, beyond: bool) -> Bench {
         replies: Log::new(),
         heard: None,
     };
-    Bench::new(ends, faults, beyond, FRAME, IDENTIFIERS)
+    RmdRun::new(ends, faults, beyond, FRAME, IDENTIFIERS)
 }
 
 impl Ends for Rmd {
@@ -88,11 +88,11 @@ impl Ends for Rmd {
 
     const RESTS: [u64; 2] = [200_000, 2_000];
 
-    fn due(bench: &Bench) -> Option<Instant> {
+    fn due(bench: &RmdRun) -> Option<Instant> {
         [bench.out.due(), bench.back.due()].into_iter().flatten().min()
     }
 
-    fn step(bench: &mut Bench) {
+    fn step(bench: &mut RmdRun) {
         while let Some(frame) = bench.out.pop(bench.now) {
             for id in MotorSet::TORQUE4 {
                 bench.deliver(id, frame);
@@ -104,7 +104,7 @@ impl Ends for Rmd {
     }
 
     /// Gives the host the next frame.
-    fn read(bench: &mut Bench) {
+    fn read(bench: &mut RmdRun) {
         let Some(frame) = bench.inbox.pop_front() else { return };
         bench.note(|| format!("<- {:03x} {:02x?}", frame.unit.id(), frame.unit.data()));
         bench.ends.host.receive(bench.now, &frame.unit);
@@ -115,7 +115,7 @@ impl Ends for Rmd {
         self.host = Host::new();
     }
 
-    fn exchange(bench: &mut Bench, rng: &mut Rng) {
+    fn exchange(bench: &mut RmdRun, rng: &mut Rng) {
         match rng.u8(..10) {
             0 => bench.set_torque4(traffic::torques(rng)),
             1..4 => bench.cycle(std::array::from_fn(|_| traffic::next(rng))),
@@ -126,13 +126,13 @@ impl Ends for Rmd {
         }
     }
 
-    fn killed_in(bench: &mut Bench, rng: &mut Rng) {
+    fn killed_in(bench: &mut RmdRun, rng: &mut Rng) {
         let id = traffic::motor(rng);
         bench.killed_in(id, traffic::next(rng), Duration(rng.u64(..300_000)));
     }
 }
 
-impl Bench {
+impl RmdRun {
     /// An exchange in which the program is killed after this time.
     pub fn killed_in(&mut self, id: MotorId, data: [u8; 8], life: Duration) {
         let end = self.now + life;
@@ -142,12 +142,12 @@ impl Bench {
         while self.now < end {
             match self.ends.host.poll(self.now) {
                 Output::Transmit(frame) => self.transmit(frame),
-                Output::Done { result: Err(Error::Quarantined), .. } => is_asked = false,
+                Output::Done { result: Err(Failure::Quarantined), .. } => is_asked = false,
                 Output::Done { .. } => return,
                 Output::Wait(until) if is_asked => self.wait(until.unwrap_or(end).min(end)),
                 Output::Wait(_) => match self.ends.host.request(self.now, id, data) {
                     Ok(()) => is_asked = true,
-                    Err(Refused::Quarantined { until, .. }) => self.wait(until.min(end)),
+                    Err(RequestError::Quarantined { until, .. }) => self.wait(until.min(end)),
                     Err(refused) => {
                         return self.violates(format!("a request was refused: {refused}"));
                     }
@@ -176,10 +176,10 @@ impl Bench {
         loop {
             match self.ends.host.request(self.now, id, data) {
                 Ok(()) => match self.outcome() {
-                    Some((_, Err(Error::Quarantined))) => {}
+                    Some((_, Err(Failure::Quarantined))) => {}
                     outcome => return matches!(outcome, Some((_, Ok(_)))),
                 },
-                Err(Refused::Quarantined { until, .. }) => self.wait(until),
+                Err(RequestError::Quarantined { until, .. }) => self.wait(until),
                 Err(refused) => {
                     self.violates(format!("a request was refused: {refused}"));
                     return false;
@@ -243,7 +243,7 @@ impl Bench {
     }
 
     /// Moves frames until an exchange is over.
-    fn outcome(&mut self) -> Option<(MotorId, Result<[u8; 8], Error>)> {
+    fn outcome(&mut self) -> Option<(MotorId, Result<[u8; 8], Failure>)> {
         loop {
             self.ended = self.now;
             match self.ends.host.poll(self.now) {
@@ -304,7 +304,7 @@ impl Bench {
         self.back.push(self.now + TURNAROUND, [Tagged::new(reply, message, 0)]);
     }
 
-    fn judge(&mut self, id: MotorId, result: Result<[u8; 8], Error>) {
+    fn judge(&mut self, id: MotorId, result: Result<[u8; 8], Failure>) {
         self.note(|| format!("exchange with motor {id} is over: {result:02x?}"));
         if result.is_ok() {
             self.trace_back(id);
@@ -332,9 +332,9 @@ impl Bench {
             *behind = false;
             return;
         }
-        // Off and Stop are sent again after the guard time and may be acknowledged by the reply to an
+        // Off and Stop are sent again after the quarantine time and may be acknowledged by the reply to an
         // earlier one, behind which nothing moved the motor.
-        let late = self.now.since(asked.at) > DEFAULT_TIMEOUT + DEFAULT_GUARD;
+        let late = self.now.since(asked.at) > DEFAULT_TIMEOUT + DEFAULT_QUARANTINE;
         let halted = late && last.halts && asked.number > last.moved;
         // Nothing tells the second copy of a reply from the reply to the next request, whose own
         // reply then passes for that of the one behind it.

@@ -1,7 +1,7 @@
 //! A motor that counts what it is told.
 
 use motorlink_proto::rmd::{
-    Config, Drive, Mode, Motor, MotorId, Pid, Sense, SetTorque4, Settings, TORQUE4_ID,
+    Drive, DriveConfig, Mode, MotorControl, MotorId, Pid, Sense, SetTorque4, Settings, TORQUE4_ID,
 };
 use motorlink_proto::time::Instant;
 use motorlink_proto::units::{DeciVolts, DpsPerSecond};
@@ -15,7 +15,7 @@ pub struct Counting {
     looks: i64,
 }
 
-impl Motor for Counting {
+impl MotorControl for Counting {
     fn set_mode(&mut self, _: Mode) {
         self.acts += 1;
     }
@@ -44,7 +44,8 @@ impl Node {
             acceleration: DpsPerSecond(1_000),
             encoder_offset: 0,
         };
-        let mut node = Node { drive: Drive::new(Config::new(id), rom), motor: Counting::default() };
+        let mut node =
+            Node { drive: Drive::new(DriveConfig::new(id), rom), motor: Counting::default() };
         node.drive.power_on(Instant(0), &mut node.motor);
         node
     }

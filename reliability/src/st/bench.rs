@@ -6,8 +6,8 @@ use std::ops::RangeInclusive;
 use motorlink::time::{Duration, Instant};
 use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::st::{
-    Config, Error, ErrorCode, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, Line, MAX_FRAME,
-    Master, Motor, Output, Parse, Profile, Recovery, Slave,
+    ErrorCode, ExchangeError, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME,
+    Master, MasterConfig, MotorNumber, Output, Parse, Profile, Recovery, Slave, SyncState,
 };
 
 use super::drive::{MOTORS, Memory};
@@ -57,12 +57,12 @@ enum Answer {
     Other(Option<RangeInclusive<u64>>),
 }
 
-pub type Bench = bench::Bench<St>;
+pub type StRun = bench::Run<St>;
 
 /// Master and slave.
 pub struct St {
     setup: Setup,
-    config: Config,
+    config: MasterConfig,
     master: Master,
     slave: Slave,
     /// How many replies come twice, and by which chance.
@@ -85,10 +85,10 @@ pub struct St {
 }
 
 /// Master and slave on a line with faults.
-pub fn bench(setup: Setup, faults: &Faults, beyond: bool) -> Bench {
+pub fn bench(setup: Setup, faults: &Faults, beyond: bool) -> StRun {
     let Setup { profile, recovery, .. } = setup;
-    let config = Config { recovery, ..Config::default() };
-    let motors = Motor::new(MOTORS).expect("1 to 7");
+    let config = MasterConfig { recovery, ..MasterConfig::default() };
+    let motors = MotorNumber::new(MOTORS).expect("1 to 7");
     let ends = St {
         setup,
         config,
@@ -106,7 +106,7 @@ pub fn bench(setup: Setup, faults: &Faults, beyond: bool) -> Bench {
         payload: Vec::new(),
         trouble: Trouble::default(),
     };
-    Bench::new(ends, faults, beyond, BYTE, ())
+    StRun::new(ends, faults, beyond, BYTE, ())
 }
 
 impl Ends for St {
@@ -114,13 +114,13 @@ impl Ends for St {
 
     const RESTS: [u64; 2] = [60_000, 5_000];
 
-    fn due(bench: &Bench) -> Option<Instant> {
+    fn due(bench: &StRun) -> Option<Instant> {
         let heard = bench.out.due().map(|due| due.max(bench.deaf_until()));
         let copy = bench.ends.copies.front().map(|(at, _)| *at);
         [heard, bench.back.due(), bench.ends.slave.deadline(), copy].into_iter().flatten().min()
     }
 
-    fn step(bench: &mut Bench) {
+    fn step(bench: &mut StRun) {
         if let Some(nack) = bench.ends.slave.poll(bench.now) {
             let nack = nack.to_vec();
             let answers = Answer::Other(bench.ends.involved());
@@ -144,7 +144,7 @@ impl Ends for St {
         }
     }
 
-    fn read(bench: &mut Bench) {
+    fn read(bench: &mut StRun) {
         let bytes: Vec<u8> = bench.inbox.iter().map(|byte| byte.unit).collect();
         if !bytes.is_empty() {
             bench.note(|| format!("<- {bytes:02x?}"));
@@ -157,13 +157,13 @@ impl Ends for St {
         self.master = Master::new(self.config);
     }
 
-    fn exchange(bench: &mut Bench, rng: &mut Rng) {
+    fn exchange(bench: &mut StRun, rng: &mut Rng) {
         let ask = traffic::next(bench.ends.setup.profile, rng);
-        let failed = matches!(bench.exchange(&ask), Err(Error::Failed(_)));
+        let failed = matches!(bench.exchange(&ask), Err(ExchangeError::Failed(_)));
         bench.ends.trouble.note(&mut bench.tally, bench.now, failed);
     }
 
-    fn killed_in(bench: &mut Bench, rng: &mut Rng) {
+    fn killed_in(bench: &mut StRun, rng: &mut Rng) {
         let ask = traffic::next(bench.ends.setup.profile, rng);
         let life = Duration(rng.u64(..1_500_000));
         bench.attempt(&ask, bench.now + life);
@@ -187,14 +187,14 @@ impl St {
     }
 }
 
-impl Bench {
+impl StRun {
     /// Lets this share of the replies come twice from now on.
     pub fn repeat(&mut self, share: f64, seed: u64) {
         self.ends.twice = Some((share, Rng::with_seed(seed)));
     }
 
     /// One exchange as the blocking client does it; gives the acknowledge's payload.
-    pub fn exchange(&mut self, ask: &Ask) -> Result<&[u8], Error> {
+    pub fn exchange(&mut self, ask: &Ask) -> Result<&[u8], ExchangeError> {
         let result = self.attempt(ask, Instant(u64::MAX)).expect("it ends");
         self.tally.exchanges += 1;
         self.judge(result);
@@ -202,13 +202,15 @@ impl Bench {
     }
 
     /// An exchange, unless it lasts until `end`.
-    fn attempt(&mut self, ask: &Ask, end: Instant) -> Option<Result<(), Error>> {
+    fn attempt(&mut self, ask: &Ask, end: Instant) -> Option<Result<(), ExchangeError>> {
         self.ends.exchange += 1;
         let begun = self.now;
         if self.now.since(self.ended) > IDLE {
             St::read(self);
         }
-        if self.ends.setup.recovery == Recovery::None && self.ends.master.line() == Line::Lost {
+        if self.ends.setup.recovery == Recovery::None
+            && self.ends.master.sync_state() == SyncState::Lost
+        {
             self.advance(self.now + REOPENING);
             self.inbox.clear();
             self.ends.master.reopened();
@@ -240,7 +242,7 @@ impl Bench {
                 Output::Transmit(given) => {
                     let size = given.len();
                     bytes[..size].copy_from_slice(given);
-                    (self.ends.master.line() == Line::Up, size)
+                    (self.ends.master.sync_state() == SyncState::InSync, size)
                 }
             };
             sending = sending + Duration(BYTE.0 * size as u64);
@@ -341,10 +343,10 @@ impl Bench {
         }
     }
 
-    fn judge(&mut self, result: Result<(), Error>) {
+    fn judge(&mut self, result: Result<(), ExchangeError>) {
         match result {
-            Ok(()) | Err(Error::Refused(_)) => self.trace_back(),
-            Err(Error::Failed(Failure::Damaged(_))) => {
+            Ok(()) | Err(ExchangeError::Refused(_)) => self.trace_back(),
+            Err(ExchangeError::Failed(Failure::Damaged(_))) => {
                 self.tally.judged += 1;
                 self.tally.detected += 1;
             }

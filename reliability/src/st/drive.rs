@@ -1,8 +1,8 @@
 //! A drive whose registers are memory, and which counts what it does.
 
 use motorlink_proto::st::{
-    Command, CurrentReference, Drive, ErrorCode, Feature, Features, Motor, PositionMove,
-    REVUP_PHASES, Ramp, RegisterId, RevupPhase, TorqueRamp, Version,
+    Command, CurrentReference, ErrorCode, Feature, Features, MotorControl, MotorNumber,
+    PositionMove, REVUP_PHASES, Ramp, RegisterId, RevupPhase, TorqueRamp, Version,
 };
 
 pub const MOTORS: u8 = 2;
@@ -27,47 +27,52 @@ impl Memory {
         Memory { banks, revup: [RevupPhase::default(); REVUP_PHASES as usize], acts: 0 }
     }
 
-    fn slot(&mut self, motor: Motor, register: RegisterId) -> &mut i32 {
+    fn slot(&mut self, motor: MotorNumber, register: RegisterId) -> &mut i32 {
         &mut self.banks[motor.index()][usize::from(register.0)]
     }
 }
 
-impl Drive for Memory {
-    fn features(&self, _: Motor) -> Features {
+impl MotorControl for Memory {
+    fn features(&self, _: MotorNumber) -> Features {
         let built = Feature::ALL.iter().filter(|feature| **feature != Feature::Profiler);
         built.fold(Features::NONE, |set, &feature| set.with(feature))
     }
     fn version(&self) -> Version<'_> {
         Version { name: "ST MC SDK", major: 5, minor: 4, patch: 3, pre_release: "" }
     }
-    fn read(&mut self, motor: Motor, register: RegisterId) -> i32 {
+    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         *self.slot(motor, register)
     }
-    fn write(&mut self, motor: Motor, register: RegisterId, value: i32) -> Result<(), ErrorCode> {
+    fn write(
+        &mut self,
+        motor: MotorNumber,
+        register: RegisterId,
+        value: i32,
+    ) -> Result<(), ErrorCode> {
         self.acts += 1;
         *self.slot(motor, register) = value;
         Ok(())
     }
-    fn execute(&mut self, _: Motor, _: Command) {
+    fn execute(&mut self, _: MotorNumber, _: Command) {
         self.acts += 1;
     }
-    fn ramp(&mut self, _: Motor, _: Ramp) {
+    fn ramp(&mut self, _: MotorNumber, _: Ramp) {
         self.acts += 1;
     }
-    fn revup(&mut self, _: Motor, phase: u8) -> RevupPhase {
+    fn revup(&mut self, _: MotorNumber, phase: u8) -> RevupPhase {
         self.revup[usize::from(phase)]
     }
-    fn set_revup(&mut self, _: Motor, phase: u8, data: RevupPhase) {
+    fn set_revup(&mut self, _: MotorNumber, phase: u8, data: RevupPhase) {
         self.acts += 1;
         self.revup[usize::from(phase)] = data;
     }
-    fn current_reference(&mut self, _: Motor, _: CurrentReference) {
+    fn current_reference(&mut self, _: MotorNumber, _: CurrentReference) {
         self.acts += 1;
     }
-    fn torque_ramp(&mut self, _: Motor, _: TorqueRamp) {
+    fn torque_ramp(&mut self, _: MotorNumber, _: TorqueRamp) {
         self.acts += 1;
     }
-    fn position(&mut self, _: Motor, _: PositionMove) {
+    fn position(&mut self, _: MotorNumber, _: PositionMove) {
         self.acts += 1;
     }
 }

@@ -2,7 +2,7 @@
 
 use motorlink_link::fault::Rng;
 use motorlink_proto::st::{
-    Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile, Slave,
+    Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, MotorNumber, Parse, Profile, Slave,
 };
 use motorlink_proto::time::Instant;
 
@@ -20,7 +20,7 @@ const MANY: usize = 8;
 /// error rate: the chance of k wrong bits, times the share of k-bit patterns that pass.
 pub fn undetected(profile: Profile, rate: f64) -> (f64, f64) {
     let mut rng = Rng::with_seed(1);
-    let mut slave = Slave::new(profile, Motor::new(MOTORS).expect("1 to 7"));
+    let mut slave = Slave::new(profile, MotorNumber::new(MOTORS).expect("1 to 7"));
     let mut drive = Memory::new();
     let (mut requests, mut replies) = (0.0, 0.0);
     for _ in 0..FRAMES {

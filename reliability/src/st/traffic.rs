@@ -75,17 +75,17 @@ pub fn next(profile: Profile, rng: &mut Rng) -> Ask {
     let request = match rng.u8(..100) {
         0..50 => Request::GetRegister(WATCHED[rng.usize(..WATCHED.len())]),
         50..70 => return write(motor, profile, SETTINGS[rng.usize(..SETTINGS.len())], rng.i32(..)),
-        70..80 => Request::Execute(COMMANDS[rng.usize(..COMMANDS.len())]),
+        70..80 => Request::ExecuteCommand(COMMANDS[rng.usize(..COMMANDS.len())]),
         80..86 => {
-            Request::Ramp(Ramp { speed_rpm: rng.i32(-6_000..6_000), duration_ms: rng.u16(..) })
+            Request::SetRamp(Ramp { speed_rpm: rng.i32(-6_000..6_000), duration_ms: rng.u16(..) })
         }
-        86..89 => Request::CurrentReference(CurrentReference {
+        86..89 => Request::SetCurrentReference(CurrentReference {
             iq_s16a: rng.i16(..),
             id_s16a: rng.i16(..),
         }),
-        89..91 => Request::BoardInfo,
-        91..92 => Request::FirmwareVersion,
-        92..94 => Request::RevupData(rng.u8(..5)),
+        89..91 => Request::GetBoardInfo,
+        91..92 => Request::GetFirmwareVersion,
+        92..94 => Request::GetRevupData(rng.u8(..5)),
         94..96 => {
             let speed_rpm = rng.i32(-6_000..6_000);
             let data = RevupPhase { speed_rpm, torque_s16a: rng.i16(..), duration_ms: rng.u16(..) };

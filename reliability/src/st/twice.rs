@@ -6,7 +6,7 @@ use motorlink::time::Duration;
 use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::st::{RegisterId, Request, question_behind};
 
-use super::bench::{self, Bench, Setup};
+use super::bench::{self, Setup, StRun};
 use super::traffic::Ask;
 use crate::life::Life;
 use crate::plan::SPEC;
@@ -69,7 +69,7 @@ pub fn run(share: f64, faults: &Faults, confirms: bool, count: u64) -> Batches {
 }
 
 /// As `Client::confirm`.
-fn confirm(bench: &mut Bench, last: Option<usize>, turn: bool) -> bool {
+fn confirm(bench: &mut StRun, last: Option<usize>, turn: bool) -> bool {
     let (question, size) = question_behind(last, turn);
     let answer = bench.exchange(&Ask::of(0, &question));
     answer.is_ok_and(|payload| payload.len() == size)

@@ -1,9 +1,11 @@
 //! Plain writes beside verified ones: what was reported as done, and what the register has.
 
 use motorlink_link::fault::{Faults, Rng};
-use motorlink_proto::st::{Error, RegisterId, Request, Unverified, VERIFY_ATTEMPTS, VerifiedWrite};
+use motorlink_proto::st::{
+    ExchangeError, RegisterId, Request, Unverified, VERIFY_ATTEMPTS, VerifiedWrite,
+};
 
-use super::bench::{self, Bench, Setup};
+use super::bench::{self, Setup, StRun};
 use super::drive::MOTORS;
 use super::traffic::{self, Ask, SETTINGS};
 use crate::tally::Violation;
@@ -59,19 +61,19 @@ pub fn run(setup: Setup, faults: &Faults, verified: bool, count: u64) -> Result<
 }
 
 fn write_verified(
-    bench: &mut Bench,
+    bench: &mut StRun,
     setup: Setup,
     motor: u8,
     register: RegisterId,
     value: i32,
 ) -> bool {
-    let write = VerifiedWrite::new::<Error>(setup.profile, register, value);
+    let write = VerifiedWrite::new::<ExchangeError>(setup.profile, register, value);
     let exchange = |request: &Request<'_>| {
         let payload = bench.exchange(&Ask::of(motor, request))?;
         Ok(register.decode(setup.profile, payload))
     };
-    let is_final = |error: &Error| matches!(error, Error::Refused(_));
-    let result: Result<u8, Unverified<Error>> =
+    let is_final = |error: &ExchangeError| matches!(error, ExchangeError::Refused(_));
+    let result: Result<u8, Unverified<ExchangeError>> =
         write.and_then(|write| write.run(VERIFY_ATTEMPTS, exchange, is_final));
     result.is_ok()
 }

@@ -2,7 +2,7 @@
 
 use motorlink::LinkState;
 use motorlink::port::PortName;
-use motorlink::rmd::{EventBus, Found, MotorId, OnDrop};
+use motorlink::rmd::{EventClient, MotorId, ScanResult, StopAction};
 use motorlink_proto::rmd::{Command, ReadStatus, SetTorque};
 use pyo3::prelude::*;
 
@@ -23,7 +23,7 @@ pub(crate) struct RmdMachine {
 }
 
 struct Motors {
-    bus: EventBus,
+    bus: EventClient,
     /// What each motor was asked.
     asked: [Asked; MotorId::COUNT],
 }
@@ -47,7 +47,7 @@ enum Asked {
 }
 
 impl RmdMachine {
-    fn new(bus: EventBus, port: String, threads: Option<Threads>) -> Self {
+    fn new(bus: EventClient, port: String, threads: Option<Threads>) -> Self {
         let motors = Motors { bus, asked: [const { Asked::Found }; MotorId::COUNT] };
         RmdMachine { driven: Driven::new(motors, port), threads }
     }
@@ -66,13 +66,13 @@ impl RmdMachine {
                 let threads = port.start()?;
                 let mut links = threads.links();
                 let open = Box::new(move || Ok(Box::new(links()) as _));
-                let bus = EventBus::open_with(port.name(), open, options);
+                let bus = EventClient::open_with(port.name(), open, options);
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
                 Ok(Self::new(bus, port.name().to_owned(), Some(threads)))
             }
             CanBus::Name(port) => {
                 let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
-                let bus = py.detach(|| EventBus::open(&name, options));
+                let bus = py.detach(|| EventClient::open(&name, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
                 Ok(Self::new(bus, name.to_string(), None))
             }
@@ -148,9 +148,8 @@ impl RmdMachine {
         let wait = wait.map_err(|error| rmd_error(py, &error))?;
         let value = |(id, asked, result)| {
             let value = match asked {
-                Asked::Found => {
-                    Found::of(id, result).map_or_else(|| Ok(py.None()), |found| finding(py, found))
-                }
+                Asked::Found => ScanResult::of(id, result)
+                    .map_or_else(|| Ok(py.None()), |found| finding(py, found)),
                 Asked::Value(request) => result
                     .map_err(|error| rmd_error(py, &error))
                     .and_then(|reply| request.value(py, &reply)),
@@ -195,10 +194,11 @@ impl RmdMachine {
     /// and gives the motors that did not acknowledge it, and why. Again is no error.
     #[pyo3(signature = (*, stop, off))]
     fn close(&self, py: Python<'_>, stop: bool, off: bool) -> Vec<(u8, PyErr)> {
-        let action = if off { OnDrop::Off } else { OnDrop::Stop };
+        let action = if off { StopAction::Off } else { StopAction::Stop };
         let stopped = self.driven.close(py, |motors| {
-            let bus = motors.bus.into_bus();
-            let stopped = if stop { bus.guard().with(action).stop_now() } else { Vec::new() };
+            let bus = motors.bus.into_client();
+            let stopped =
+                if stop { bus.stop_on_drop().with(action).stop_now() } else { Vec::new() };
             self.threads.iter().for_each(Threads::end);
             stopped
         });

@@ -131,7 +131,7 @@ impl StMachine {
     fn close(&self, py: Python<'_>, stop: bool) -> Vec<(u8, PyErr)> {
         let stopped = self.driven.close(py, |line| {
             let client = line.client.into_client();
-            if stop { client.guard().stop_now() } else { Vec::new() }
+            if stop { client.stop_on_drop().stop_now() } else { Vec::new() }
         });
         not_stopped(py, stopped)
     }

@@ -3,7 +3,7 @@
 use motorlink::Clock;
 use motorlink::port::PortName;
 use motorlink::rmd::{
-    Bus, Error, Found, IqCommand, MotorId, MotorSet, OnDrop, SetTorque4, Stopped,
+    Client, Error, IqCommand, MotorId, MotorSet, ScanResult, SetTorque4, StopAction, Stopped,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -27,7 +27,7 @@ const SCAN_STEP: usize = 8;
 /// A CAN bus with RMD motors. Every call lets other Python threads run while it waits.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdBus {
-    bus: Shared<Bus>,
+    bus: Shared<Client>,
     clock: Clock,
     deafness: Deafness,
     /// Those of a bus of python-can.
@@ -45,19 +45,19 @@ impl RmdBus {
         let (bus, port) = match port {
             AnyPort::Other(Port::Name(name)) => {
                 let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
-                let bus = py.detach(|| Bus::open(&name, options));
+                let bus = py.detach(|| Client::open(&name, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
                 (bus.looking(deafness.look()), name.to_string())
             }
             AnyPort::Other(Port::Sim(port)) => {
-                let bus = Bus::over(SimPort::NAME, port.can(py)?, options);
+                let bus = Client::over(SimPort::NAME, port.can(py)?, options);
                 (bus, SimPort::NAME.to_owned())
             }
             AnyPort::Can(port) => {
                 let port = port.get();
                 let mut links = threads.insert(port.start()?).links();
                 let open = Box::new(move || Ok(Box::new(links()) as _));
-                let bus = Bus::open_with(port.name(), open, options);
+                let bus = Client::open_with(port.name(), open, options);
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
                 (bus.looking(deafness.look()), port.name().to_owned())
             }
@@ -190,10 +190,10 @@ impl RmdBus {
     /// Again is no error.
     #[pyo3(signature = (*, stop, off))]
     fn close(&self, py: Python<'_>, stop: bool, off: bool) -> Vec<(u8, PyErr)> {
-        let action = if off { OnDrop::Off } else { OnDrop::Stop };
-        let halt = |bus: &Bus| {
+        let action = if off { StopAction::Off } else { StopAction::Stop };
+        let halt = |bus: &Client| {
             bus.abandon();
-            let stop_now = || bus.guard().with(action).stop_now();
+            let stop_now = || bus.stop_on_drop().with(action).stop_now();
             if stop { self.deafness.during(stop_now) } else { Vec::new() }
         };
         let stopped = self.bus.close(py, halt);
@@ -235,19 +235,19 @@ pub(crate) fn motor_ids(py: Python<'_>, ids: Vec<i64>) -> PyResult<MotorSet> {
     ids.into_iter().map(|id| motor_id(py, id)).collect()
 }
 
-pub(crate) fn finding(py: Python<'_>, found: Found) -> PyResult<Py<PyAny>> {
+pub(crate) fn finding(py: Python<'_>, found: ScanResult) -> PyResult<Py<PyAny>> {
     let nothing = || py.None();
     let row = match found {
-        Found::Motor(id, status) => {
+        ScanResult::Motor(id, status) => {
             let status = motor_status(py, &status)?;
             (id.number(), "motor", status, nothing())
         }
-        Found::Foreign(id, dialect) => {
+        ScanResult::Foreign(id, dialect) => {
             let dialect = dialect.to_string().into_py_any(py)?;
             (id.number(), "foreign", nothing(), dialect)
         }
-        Found::Echo(id) => (id.number(), "echo", nothing(), nothing()),
-        Found::Shared(id) => (id.number(), "shared", nothing(), nothing()),
+        ScanResult::Echo(id) => (id.number(), "echo", nothing(), nothing()),
+        ScanResult::Shared(id) => (id.number(), "shared", nothing(), nothing()),
     };
     values::found(py, row)
 }

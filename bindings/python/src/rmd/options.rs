@@ -25,7 +25,7 @@ impl RmdOptions {
     ) -> PyResult<Self> {
         Ok(RmdOptions(Options {
             timeout: span(py, "a timeout", timeout)?,
-            guard: span(py, "a guard time", guard)?,
+            quarantine: span(py, "a quarantine time", guard)?,
             limits: limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?,
             ..Options::default()
         }))

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use motorlink::Clock;
 use motorlink::port::PortError;
-use motorlink::rmd::{Bus, Error, MotorId};
+use motorlink::rmd::{Client, Error, MotorId};
 use motorlink_proto::rmd::Code;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
@@ -80,7 +80,7 @@ impl Questions {
 /// `skip` a motor that fails to answer costs the row and nothing else; so does a signal's handler that
 /// uses the bus.
 pub(super) fn sample(
-    bus: &Bus,
+    bus: &Client,
     clock: &Clock,
     look: impl Fn(Python<'_>) -> PyResult<()>,
     plan: Plan,
@@ -102,7 +102,7 @@ pub(super) fn sample(
     (rows, outcome)
 }
 
-fn replies(bus: &Bus, questions: &Questions) -> Result<Replies, Error> {
+fn replies(bus: &Client, questions: &Questions) -> Result<Replies, Error> {
     let mut replies = Replies::new();
     for requests in &questions.cycles {
         let mut failed = None;

@@ -6,7 +6,7 @@ use std::time::Instant as Moment;
 
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_testbench::scenario::Kind;
-use motorlink_testbench::{BenchConfig, Command, Recording, VirtualBench};
+use motorlink_testbench::{Bench, BenchConfig, Command, Recording};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict};
 
@@ -23,7 +23,7 @@ const LOOK: std::time::Duration = std::time::Duration::from_millis(20);
 
 /// An ST drive and a bus of RMD motors, whose time passes when it is waited for.
 #[pyclass(frozen, module = "motorlink._core")]
-pub(crate) struct SimBench(Arc<VirtualBench>);
+pub(crate) struct SimBench(Arc<Bench>);
 
 #[pymethods]
 impl SimBench {
@@ -46,7 +46,7 @@ impl SimBench {
             Some(seed) => config.seeded(seed),
             None => config,
         });
-        let bench = config.and_then(|config| VirtualBench::new(&config));
+        let bench = config.and_then(|config| Bench::new(&config));
         Ok(SimBench(Arc::new(bench.map_err(|error| bad_value(py, error))?)))
     }
 

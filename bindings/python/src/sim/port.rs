@@ -5,7 +5,7 @@ use std::sync::Arc;
 use motorlink::Clock;
 use motorlink::port::{ByteLink, CanLink};
 use motorlink_link::fault::{FaultError, Faults};
-use motorlink_testbench::VirtualBench;
+use motorlink_testbench::Bench;
 use pyo3::prelude::*;
 
 use crate::error::bad_value;
@@ -22,7 +22,7 @@ pub(crate) enum Port<'py> {
 /// The line and the bus of a bench, with faults.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct SimPort {
-    pub(super) bench: Arc<VirtualBench>,
+    pub(super) bench: Arc<Bench>,
     pub(super) fault: Option<String>,
 }
 
@@ -32,7 +32,7 @@ impl SimPort {
 
     /// A serial line to the ST drive.
     pub(crate) fn line(&self, py: Python<'_>) -> PyResult<Box<dyn ByteLink>> {
-        Ok(self.bench.line(&self.faults(py, Faults::on_serial)?))
+        Ok(self.bench.bytes(&self.faults(py, Faults::on_serial)?))
     }
 
     /// A CAN bus with the RMD motors.

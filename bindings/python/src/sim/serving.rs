@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::Served;
-use motorlink_testbench::{Serving, VirtualBench};
+use motorlink_testbench::{Bench, Serving};
 use pyo3::prelude::*;
 
 use crate::error::{bad_value, port_error};
@@ -20,7 +20,7 @@ pub(crate) struct SimServing {
 impl SimServing {
     pub(super) fn new(
         py: Python<'_>,
-        bench: &VirtualBench,
+        bench: &Bench,
         st: Option<&str>,
         rmd: Option<&str>,
     ) -> PyResult<Self> {

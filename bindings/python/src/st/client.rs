@@ -2,7 +2,7 @@
 
 use motorlink::Clock;
 use motorlink::port::PortName;
-use motorlink::st::{Client, Motor, Stopped};
+use motorlink::st::{Client, MotorNumber, Stopped};
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes, PyList};
 
@@ -68,7 +68,7 @@ impl StClient {
         let motor = motor_number(py, motor)?;
         let (register, bits) = request.verifiable(py)?;
         let written = self.client.exchange(py, |client| {
-            client.motor(motor)?.write_raw_verified(register, bits, attempts)
+            client.motor(motor)?.set_raw_verified(register, bits, attempts)
         })?;
         written.map_err(|error| st_error(py, &error))
     }
@@ -117,7 +117,7 @@ impl StClient {
     #[getter]
     fn started<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let client = self.client.get(py)?;
-        let numbers: Vec<u8> = py.detach(|| client.started().map(Motor::number).collect());
+        let numbers: Vec<u8> = py.detach(|| client.started().map(MotorNumber::number).collect());
         PyList::new(py, numbers)
     }
 
@@ -127,7 +127,7 @@ impl StClient {
     fn close(&self, py: Python<'_>, stop: bool) -> Vec<(u8, PyErr)> {
         let halt = |client: &Client| {
             client.abandon();
-            let stop_now = || client.guard().stop_now();
+            let stop_now = || client.stop_on_drop().stop_now();
             if stop { self.deafness.during(stop_now) } else { Vec::new() }
         };
         not_stopped(py, self.client.close(py, halt))

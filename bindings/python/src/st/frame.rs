@@ -32,21 +32,21 @@ pub(super) fn owned(request: Request<'_>) -> (Request<'static>, Vec<u8>) {
         Request::SetRegister { register, value } => {
             (Request::SetRegister { register, value: &[] }, value)
         }
-        Request::ProfilerInfo(steps) => (Request::ProfilerInfo(&[]), steps),
-        Request::ConfigDynStruct { segment, registers } => {
-            (Request::ConfigDynStruct { segment, registers: &[] }, registers)
+        Request::GetProfilerInfo(steps) => (Request::GetProfilerInfo(&[]), steps),
+        Request::ConfigureSegment { segment, registers } => {
+            (Request::ConfigureSegment { segment, registers: &[] }, registers)
         }
         Request::GetRegister(register) => (Request::GetRegister(register), &[]),
-        Request::Execute(command) => (Request::Execute(command), &[]),
-        Request::BoardInfo => (Request::BoardInfo, &[]),
-        Request::Ramp(ramp) => (Request::Ramp(ramp), &[]),
-        Request::RevupData(phase) => (Request::RevupData(phase), &[]),
+        Request::ExecuteCommand(command) => (Request::ExecuteCommand(command), &[]),
+        Request::GetBoardInfo => (Request::GetBoardInfo, &[]),
+        Request::SetRamp(ramp) => (Request::SetRamp(ramp), &[]),
+        Request::GetRevupData(phase) => (Request::GetRevupData(phase), &[]),
         Request::SetRevupData(phase, data) => (Request::SetRevupData(phase, data), &[]),
-        Request::CurrentReference(both) => (Request::CurrentReference(both), &[]),
-        Request::FirmwareVersion => (Request::FirmwareVersion, &[]),
-        Request::DataElement(segment) => (Request::DataElement(segment), &[]),
-        Request::TorqueRamp(ramp) => (Request::TorqueRamp(ramp), &[]),
-        Request::Position(target) => (Request::Position(target), &[]),
+        Request::SetCurrentReference(both) => (Request::SetCurrentReference(both), &[]),
+        Request::GetFirmwareVersion => (Request::GetFirmwareVersion, &[]),
+        Request::GetSegment(segment) => (Request::GetSegment(segment), &[]),
+        Request::SetTorqueRamp(ramp) => (Request::SetTorqueRamp(ramp), &[]),
+        Request::SetPosition(target) => (Request::SetPosition(target), &[]),
     };
     (request, bytes.to_vec())
 }
@@ -55,10 +55,10 @@ pub(super) fn owned(request: Request<'_>) -> (Request<'static>, Vec<u8>) {
 pub(super) fn reply(request: Request<'_>) -> Reply {
     match request {
         Request::GetRegister(register) => Reply::Number { register, raw: true },
-        Request::BoardInfo => Reply::Info,
-        Request::FirmwareVersion => Reply::FirmwareVersion,
-        Request::RevupData(_) => Reply::Revup,
-        Request::DataElement(_) | Request::ProfilerInfo(_) => Reply::Bytes,
+        Request::GetBoardInfo => Reply::Info,
+        Request::GetFirmwareVersion => Reply::FirmwareVersion,
+        Request::GetRevupData(_) => Reply::Revup,
+        Request::GetSegment(_) | Request::GetProfilerInfo(_) => Reply::Bytes,
         _ => Reply::Nothing,
     }
 }
@@ -73,36 +73,36 @@ pub(super) fn fields<'py>(py: Python<'py>, request: Request<'_>) -> PyResult<Bou
             set("value", PyBytes::new(py, value).into_py_any(py)?)?;
         }
         Request::GetRegister(register) => set("register", register.0.into_py_any(py)?)?,
-        Request::Execute(command) => set("command", command.number().into_py_any(py)?)?,
-        Request::BoardInfo | Request::FirmwareVersion => {}
-        Request::Ramp(ramp) => {
+        Request::ExecuteCommand(command) => set("command", command.number().into_py_any(py)?)?,
+        Request::GetBoardInfo | Request::GetFirmwareVersion => {}
+        Request::SetRamp(ramp) => {
             set("speed_rpm", ramp.speed_rpm.into_py_any(py)?)?;
             set("duration_ms", ramp.duration_ms.into_py_any(py)?)?;
         }
-        Request::RevupData(phase) => set("phase", phase.into_py_any(py)?)?,
+        Request::GetRevupData(phase) => set("phase", phase.into_py_any(py)?)?,
         Request::SetRevupData(phase, data) => {
             set("phase", phase.into_py_any(py)?)?;
             set("speed_rpm", data.speed_rpm.into_py_any(py)?)?;
             set("torque_s16a", data.torque_s16a.into_py_any(py)?)?;
             set("duration_ms", data.duration_ms.into_py_any(py)?)?;
         }
-        Request::CurrentReference(reference) => {
+        Request::SetCurrentReference(reference) => {
             set("iq_s16a", reference.iq_s16a.into_py_any(py)?)?;
             set("id_s16a", reference.id_s16a.into_py_any(py)?)?;
         }
-        Request::ProfilerInfo(steps) => {
+        Request::GetProfilerInfo(steps) => {
             set("steps", PyBytes::new(py, steps).into_py_any(py)?)?;
         }
-        Request::DataElement(segment) => set("segment", segment.into_py_any(py)?)?,
-        Request::ConfigDynStruct { segment, registers } => {
+        Request::GetSegment(segment) => set("segment", segment.into_py_any(py)?)?,
+        Request::ConfigureSegment { segment, registers } => {
             set("segment", segment.into_py_any(py)?)?;
             set("registers", PyBytes::new(py, registers).into_py_any(py)?)?;
         }
-        Request::TorqueRamp(ramp) => {
+        Request::SetTorqueRamp(ramp) => {
             set("torque_s16a", ramp.torque_s16a.into_py_any(py)?)?;
             set("duration_ms", ramp.duration_ms.into_py_any(py)?)?;
         }
-        Request::Position(target) => {
+        Request::SetPosition(target) => {
             set("angle_rad", target.angle_rad.into_py_any(py)?)?;
             set("duration_s", target.duration_s.into_py_any(py)?)?;
         }

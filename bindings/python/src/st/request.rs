@@ -1,7 +1,7 @@
 //! One request to an ST drive: checked when it is made, and able to read its reply.
 
 use motorlink_proto::st::{
-    Command, CurrentReference, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor,
+    Command, CurrentReference, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, MotorNumber,
     PositionMove, REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, SEGMENTS, TorqueRamp,
 };
 use pyo3::prelude::*;
@@ -40,9 +40,9 @@ impl StRequest {
             Request::SetRegister { register, .. } => {
                 Request::SetRegister { register, value: &self.bytes }
             }
-            Request::ProfilerInfo(_) => Request::ProfilerInfo(&self.bytes),
-            Request::ConfigDynStruct { segment, .. } => {
-                Request::ConfigDynStruct { segment, registers: &self.bytes }
+            Request::GetProfilerInfo(_) => Request::GetProfilerInfo(&self.bytes),
+            Request::ConfigureSegment { segment, .. } => {
+                Request::ConfigureSegment { segment, registers: &self.bytes }
             }
             other => other,
         }
@@ -66,7 +66,7 @@ impl StRequest {
 
     /// Chooses the registers of a data segment.
     pub(super) fn choosing(segment: u8, registers: &[RegisterId]) -> Self {
-        let request = Request::ConfigDynStruct { segment, registers: &[] };
+        let request = Request::ConfigureSegment { segment, registers: &[] };
         let bytes = registers.iter().map(|register| register.0).collect();
         StRequest { bytes, ..Self::told(Scale::plain(), request) }
     }
@@ -74,7 +74,7 @@ impl StRequest {
     /// Reads a data segment that has these registers.
     pub(super) fn sampling(scale: Scale, segment: u8, registers: &[RegisterId], raw: bool) -> Self {
         let reply = Reply::Segment { registers: registers.to_vec(), raw };
-        Self::asked(scale, Request::DataElement(segment), reply)
+        Self::asked(scale, Request::GetSegment(segment), reply)
     }
 
     /// The numbers of an answer as a sample has them.
@@ -163,19 +163,19 @@ impl StRequest {
                 })?)
             }
         };
-        Ok(Self::told(Scale::plain(), Request::Execute(command)))
+        Ok(Self::told(Scale::plain(), Request::ExecuteCommand(command)))
     }
 
     /// Version and name of the SDK (4.7).
     #[staticmethod]
     fn info() -> Self {
-        Self::asked(Scale::plain(), Request::BoardInfo, Reply::Info)
+        Self::asked(Scale::plain(), Request::GetBoardInfo, Reply::Info)
     }
 
     /// Name and version of the firmware (4.12).
     #[staticmethod]
     fn firmware_version() -> Self {
-        Self::asked(Scale::plain(), Request::FirmwareVersion, Reply::FirmwareVersion)
+        Self::asked(Scale::plain(), Request::GetFirmwareVersion, Reply::FirmwareVersion)
     }
 
     /// Programs a speed ramp: rpm, s (4.8).
@@ -183,7 +183,7 @@ impl StRequest {
     fn ramp(py: Python<'_>, speed_rpm: f64, duration_s: f64) -> PyResult<Self> {
         let speed_rpm = rpm(py, speed_rpm)?;
         let ramp = Ramp { speed_rpm, duration_ms: milliseconds(py, duration_s)? };
-        Ok(Self::told(Scale::plain(), Request::Ramp(ramp)))
+        Ok(Self::told(Scale::plain(), Request::SetRamp(ramp)))
     }
 
     /// Programs a torque ramp: Iq, s (profile `mcsdk-5.4`).
@@ -198,7 +198,7 @@ impl StRequest {
         let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
         let torque_s16a = scale.digits(py, iq)?;
         let ramp = TorqueRamp { torque_s16a, duration_ms: milliseconds(py, duration_s)? };
-        Ok(Self::told(scale, Request::TorqueRamp(ramp)))
+        Ok(Self::told(scale, Request::SetTorqueRamp(ramp)))
     }
 
     /// Sets the current references Iq and Id (4.11).
@@ -207,7 +207,7 @@ impl StRequest {
     fn current(py: Python<'_>, iq: f64, id: f64, full_scale_amps: Option<f64>) -> PyResult<Self> {
         let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
         let (iq_s16a, id_s16a) = (scale.digits(py, iq)?, scale.digits(py, id)?);
-        let request = Request::CurrentReference(CurrentReference { iq_s16a, id_s16a });
+        let request = Request::SetCurrentReference(CurrentReference { iq_s16a, id_s16a });
         Ok(Self::told(scale, request))
     }
 
@@ -220,7 +220,7 @@ impl StRequest {
             return Err(bad_value(py, move_));
         }
         let target = PositionMove { angle_rad: angle, duration_s: duration };
-        Ok(Self::told(Scale::plain(), Request::Position(target)))
+        Ok(Self::told(Scale::plain(), Request::SetPosition(target)))
     }
 
     /// Reads a rev-up phase, 0 to 4 (4.9).
@@ -229,7 +229,7 @@ impl StRequest {
     fn revup(py: Python<'_>, phase: i64, full_scale_amps: Option<f64>) -> PyResult<Self> {
         let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
         let phase = below(py, "rev-up phase", phase, REVUP_PHASES.into())?;
-        Ok(Self::asked(scale, Request::RevupData(phase), Reply::Revup))
+        Ok(Self::asked(scale, Request::GetRevupData(phase), Reply::Revup))
     }
 
     /// Sets a rev-up phase, 0 to 4: rpm, Iq, s (4.10).
@@ -284,7 +284,7 @@ impl StRequest {
     /// Lists the registers of motor profiler steps (profile `mcsdk-5.4`).
     #[staticmethod]
     fn profiler_info(py: Python<'_>, steps: Vec<u8>) -> PyResult<Self> {
-        let request = Self::asked(Scale::plain(), Request::ProfilerInfo(&[]), Reply::Bytes);
+        let request = Self::asked(Scale::plain(), Request::GetProfilerInfo(&[]), Reply::Bytes);
         StRequest { bytes: steps, ..request }.fitting(py)
     }
 
@@ -381,7 +381,7 @@ impl StRequest {
 
 /// A motor number, 0 to 7, where 0 is the motor that the drive has selected.
 pub(crate) fn motor_number(py: Python<'_>, motor: i64) -> PyResult<u8> {
-    let number = u8::try_from(motor).ok().filter(|number| *number <= Motor::MAX);
+    let number = u8::try_from(motor).ok().filter(|number| *number <= MotorNumber::MAX);
     number.ok_or_else(|| {
         bad_value(py, format_args!("motor {motor} does not exist: motor numbers are 1 to 7"))
     })

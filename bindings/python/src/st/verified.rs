@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use motorlink::st::{Error, Motor, RegisterId};
+use motorlink::st::{Error, MotorNumber, RegisterId};
 use motorlink_proto::st::{Request, Unverified, VerifiedWrite, Verifying};
 use pyo3::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::error::st_error;
 /// A verified write: what is to be asked, one request after the other.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct StVerifiedWrite {
-    motor: Motor,
+    motor: MotorNumber,
     register: RegisterId,
     verifying: Mutex<Verifying>,
 }
@@ -31,7 +31,8 @@ impl StVerifiedWrite {
         profile: &str,
     ) -> PyResult<Self> {
         let number = motor_number(py, motor)?;
-        let motor = Motor::new(number).ok_or_else(|| st_error(py, &Error::NoSuchMotor(number)))?;
+        let motor =
+            MotorNumber::new(number).ok_or_else(|| st_error(py, &Error::NoSuchMotor(number)))?;
         let (register, bits) = request.verifiable(py)?;
         let write = VerifiedWrite::new(profile::named(py, profile)?, register, bits);
         let write = write.map_err(|why| unverified(py, motor, register, why))?;
@@ -67,7 +68,12 @@ impl StVerifiedWrite {
     }
 }
 
-fn unverified(py: Python<'_>, motor: Motor, register: RegisterId, why: Unverified<PyErr>) -> PyErr {
+fn unverified(
+    py: Python<'_>,
+    motor: MotorNumber,
+    register: RegisterId,
+    why: Unverified<PyErr>,
+) -> PyErr {
     let error = Error::unverified(motor, register, why);
     error.map_or_else(|exchange| exchange, |error| st_error(py, &error))
 }

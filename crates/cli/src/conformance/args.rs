@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Subcommand;
 use motorlink::rmd::{EncoderBits, MotorId};
-use motorlink::st::{Motor, Profile};
+use motorlink::st::{MotorNumber, Profile};
 use motorlink_link::serve::ServeName;
 
 use crate::connection::Port;
@@ -48,7 +48,7 @@ pub enum Command {
         run: Run,
         /// The motor, 1 to 7
         #[arg(short, long, default_value = "1", value_parser = parse_motor)]
-        motor: Motor,
+        motor: MotorNumber,
         /// What the drive is held to: the document as written, or what MCSDK 5.4 firmware does
         #[arg(long, default_value = "spec")]
         profile: Profile,
@@ -186,8 +186,8 @@ pub struct Host {
     pub command: Vec<String>,
 }
 
-fn parse_motor(text: &str) -> Result<Motor, String> {
-    let motor = text.parse().ok().and_then(Motor::new);
+fn parse_motor(text: &str) -> Result<MotorNumber, String> {
+    let motor = text.parse().ok().and_then(MotorNumber::new);
     motor.ok_or_else(|| "motors have the numbers 1 to 7".to_owned())
 }
 

@@ -25,11 +25,11 @@ pub fn run(args: Args) -> Result<(), Failure> {
     match args.command {
         Command::St { port, run, motor, profile } => {
             let name = port.name()?;
-            let link = name.open_line()?;
+            let link = name.open_bytes()?;
             let byte_time = byte_time(&name);
             let options = st::Options { profile, motor, allowed: run.allowed(), byte_time };
             let world = Box::new(Commands::new(&run));
-            let bench = st::Bench::new(link, world, options);
+            let bench = st::Harness::new(link, world, options);
             interrupt::hold();
             conduct("st", &run, st::suite(profile), bench)
         }
@@ -39,7 +39,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
             allowed.extend(write_rom.then_some(Need::Rom));
             let options = rmd::Options { id, encoder, allowed };
             let world = Box::new(Commands::new(&run));
-            let bench = rmd::Bench::new(link, world, options);
+            let bench = rmd::Harness::new(link, world, options);
             interrupt::hold();
             conduct("rmd", &run, rmd::suite(), bench)
         }

@@ -8,7 +8,7 @@ use std::slice::from_ref;
 use std::sync::Mutex;
 use std::thread::JoinHandle;
 
-use motorlink_testbench::{Bench, BenchConfig};
+use motorlink_testbench::{BenchConfig, SimServer};
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
@@ -74,7 +74,7 @@ impl Drives {
 }
 
 fn serve([st, rmd]: &[String; 2], stream: &UnixStream) -> Result<(), Failure> {
-    let mut bench = Bench::new();
+    let mut bench = SimServer::new();
     let out = Voice::new(stream.try_clone()?, missed);
     sim::serve(&mut bench, &drives(), from_ref(st), from_ref(rmd), &out)?;
     // A signal ends the demo first, which still has to stop its motors.

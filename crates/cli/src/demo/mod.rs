@@ -4,8 +4,7 @@ mod bench;
 mod screen;
 mod story;
 
-use motorlink::rmd::{self, Bus};
-use motorlink::st::{self, Client};
+use motorlink::{rmd, st};
 
 use bench::Drives;
 use screen::Screen;
@@ -25,8 +24,8 @@ pub struct Args {
 pub fn run(args: Args) -> Result<(), Failure> {
     interrupt::take_over();
     let drives = Drives::start()?;
-    let st = Client::open(&drives.st.parse()?, st::Options::default())?;
-    let bus = Bus::open(
+    let st = st::Client::open(&drives.st.parse()?, st::Options::default())?;
+    let bus = rmd::Client::open(
         &drives.rmd.parse()?,
         rmd::Options {
             // A loaded machine may hold the simulator up for longer than a motor would take.
@@ -35,11 +34,11 @@ pub fn run(args: Args) -> Result<(), Failure> {
         },
     )?;
     // Whatever happens below, these stop the motors.
-    let _st_guard = st.guard().reporting(|stopped| match &stopped.result {
+    let _st_guard = st.stop_on_drop().reporting(|stopped| match &stopped.result {
         Ok(()) => note(format!("ST {} is stopped", stopped.motor)),
         Err(error) => note(format!("ST {} may still turn: {error}", stopped.motor)),
     });
-    let _rmd_guard = bus.guard().reporting(|stopped| match &stopped.result {
+    let _rmd_guard = bus.stop_on_drop().reporting(|stopped| match &stopped.result {
         Ok(()) => note(format!("RMD motor {} is off", stopped.id)),
         Err(error) => note(format!("RMD motor {} may still turn: {error}", stopped.id)),
     });

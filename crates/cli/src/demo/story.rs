@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use motorlink::rmd::{Bus, CentiDegrees, CentiDps, IqCommand, MotorId, SetTorque4, SpeedLimit};
-use motorlink::st::{Client, MotorHandle, Status, register};
+use motorlink::rmd::{self, CentiDegrees, CentiDps, IqCommand, MotorId, SetTorque4, SpeedLimit};
+use motorlink::st::{self, Status, register};
 
 use super::bench::Drives;
 use super::screen::{Row, Screen};
@@ -18,8 +18,8 @@ const PATIENCE: Duration = Duration::from_secs(6);
 
 pub struct Story<'a> {
     drives: &'a Drives,
-    st: &'a Client,
-    bus: &'a Bus,
+    st: &'a st::Client,
+    bus: &'a rmd::Client,
     screen: &'a mut Screen,
     rows: Vec<Row>,
     began: Instant,
@@ -34,7 +34,12 @@ pub struct Summary {
 }
 
 impl<'a> Story<'a> {
-    pub fn new(drives: &'a Drives, st: &'a Client, bus: &'a Bus, screen: &'a mut Screen) -> Self {
+    pub fn new(
+        drives: &'a Drives,
+        st: &'a st::Client,
+        bus: &'a rmd::Client,
+        screen: &'a mut Screen,
+    ) -> Self {
         Story {
             drives,
             st,
@@ -81,7 +86,7 @@ impl<'a> Story<'a> {
     }
 
     fn meet(&mut self) -> Result<(), Failure> {
-        let info = self.st.info()?;
+        let info = self.st.board_info()?;
         let [major, minor, patch] = info.version;
         let mut ids = Vec::new();
         for id in 1..=4 {
@@ -99,12 +104,12 @@ impl<'a> Story<'a> {
     fn spin(&mut self) -> Result<(), Failure> {
         self.screen.say("ST motor 1: START_MOTOR, then a ramp to 1500 rpm in 800 ms.");
         let motor = self.st.motor(1)?;
-        motor.ramp(1500, 800)?;
+        motor.set_ramp(1500, 800)?;
         motor.start()?;
         self.until("ST motor 1 reaches 1500 rpm", |_| near(&motor, 1500))?;
         self.screen.say("ST motor 2: the same, with its encoder aligned first.");
         let second = self.st.motor(2)?;
-        second.ramp(1000, 800)?;
+        second.set_ramp(1000, 800)?;
         second.start()?;
         self.until("ST motor 2 reaches 1000 rpm", |_| near(&second, 1000))?;
         self.done
@@ -115,7 +120,7 @@ impl<'a> Story<'a> {
     fn reverse(&mut self) -> Result<(), Failure> {
         self.screen.say("ST motor 2 reverses: a ramp to -1000 rpm in 1 s.");
         let motor = self.st.motor(2)?;
-        motor.ramp(-1000, 1000)?;
+        motor.set_ramp(-1000, 1000)?;
         self.until("ST motor 2 reaches -1000 rpm", |_| near(&motor, -1000))?;
         self.done.push("one of them reversed".into());
         Ok(())
@@ -166,16 +171,13 @@ impl<'a> Story<'a> {
         self.until("ST motor 1 is in fault", |_| {
             Ok(matches!(motor.status()?, Status::FaultNow | Status::FaultOver))
         })?;
-        let faults = motor.faults()?;
+        let faults = motor.flags()?;
         self.watch(Duration::from_millis(500))?;
         self.screen.say(&format!("Its FLAGS say {faults}. FAULT_ACK, and it starts again."));
-        self.until(
-            "ST motor 1 stands still",
-            |_| Ok(motor.read(register::SPEED_MEAS)?.abs() < 30),
-        )?;
-        motor.acknowledge_faults()?;
+        self.until("ST motor 1 stands still", |_| Ok(motor.get(register::SPEED_MEAS)?.abs() < 30))?;
+        motor.fault_ack()?;
         self.until("ST motor 1 is idle", |_| Ok(motor.status()? == Status::Idle))?;
-        motor.ramp(1200, 500)?;
+        motor.set_ramp(1200, 500)?;
         motor.start()?;
         self.until("ST motor 1 reaches 1200 rpm", |_| near(&motor, 1200))?;
         self.done
@@ -258,23 +260,23 @@ impl<'a> Story<'a> {
     }
 }
 
-fn st_row(motor: &MotorHandle<'_>) -> Result<Row, Failure> {
-    let (status, faults) = (motor.status()?, motor.faults()?);
+fn st_row(motor: &st::Motor<'_>) -> Result<Row, Failure> {
+    let (status, faults) = (motor.status()?, motor.flags()?);
     let alarm = faults.occurred() != 0;
     let state = if alarm { format!("{status} {faults}") } else { status.to_string() };
     Ok(Row {
         motor: format!("ST {}", motor.number().number()),
         state,
-        speed: format!("{} rpm", motor.read(register::SPEED_MEAS)?),
-        current: format!("{} s16A", motor.read(register::TORQUE_MEAS)?),
-        temperature: format!("{} °C", motor.read(register::HEATS_TEMP)?),
-        voltage: format!("{} V", motor.read(register::BUS_VOLTAGE)?),
+        speed: format!("{} rpm", motor.get(register::SPEED_MEAS)?),
+        current: format!("{} s16A", motor.get(register::TORQUE_MEAS)?),
+        temperature: format!("{} °C", motor.get(register::HEATS_TEMP)?),
+        voltage: format!("{} V", motor.get(register::BUS_VOLTAGE)?),
         alarm,
     })
 }
 
-fn near(motor: &MotorHandle<'_>, rpm: i32) -> Result<bool, Failure> {
-    Ok((motor.read(register::SPEED_MEAS)? - rpm).abs() <= 30)
+fn near(motor: &st::Motor<'_>, rpm: i32) -> Result<bool, Failure> {
+    Ok((motor.get(register::SPEED_MEAS)? - rpm).abs() <= 30)
 }
 
 impl Summary {

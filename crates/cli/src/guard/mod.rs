@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use motorlink::port::PortName;
 use motorlink::relay::{Event, Relay, RelayOptions};
-use motorlink::rmd::OnDrop;
+use motorlink::rmd::StopAction;
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::Served;
 use serde_json::json;
@@ -152,8 +152,8 @@ fn guard_st(args: &StArgs) -> Result<(), Failure> {
 fn guard_rmd(args: &RmdArgs) -> Result<(), Failure> {
     let port = args.port.name()?;
     let on_loss = match args.on_loss {
-        OnLoss::Off => OnDrop::Off,
-        OnLoss::Stop => OnDrop::Stop,
+        OnLoss::Off => StopAction::Off,
+        OnLoss::Stop => StopAction::Stop,
     };
     hold();
     let relay = Relay::rmd(&port, on_loss, args.common.options())?;

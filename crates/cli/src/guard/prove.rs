@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 
 use motorlink::port::PortName;
 use motorlink::relay::{Event, Relay};
-use motorlink::rmd::{self, Bus, CentiDps};
-use motorlink::st::{self, Client, Ramp, Request, register};
+use motorlink::rmd::{self, CentiDps};
+use motorlink::st::{self, Ramp, Request, register};
 use motorlink_link::serve::ServeName;
 use serde_json::json;
 
@@ -84,20 +84,20 @@ impl Spin {
 
 /// A client of the motor that is turned.
 enum Drive {
-    St { client: Box<Client>, motor: u8 },
-    Rmd { bus: Box<Bus>, id: u8 },
+    St { client: Box<st::Client>, motor: u8 },
+    Rmd { bus: Box<rmd::Client>, id: u8 },
 }
 
 impl Drive {
     fn open(protocol: Protocol, port: &PortName, motor: u8) -> Result<Self, Failure> {
         Ok(match protocol {
             Protocol::St => {
-                let client = Client::open(port, st::Options::default())?;
+                let client = st::Client::open(port, st::Options::default())?;
                 Drive::St { client: Box::new(client), motor }
             }
             Protocol::Rmd => {
                 let options = rmd::Options { timeout: TIMEOUT, ..rmd::Options::default() };
-                Drive::Rmd { bus: Box::new(Bus::open(port, options)?), id: motor }
+                Drive::Rmd { bus: Box::new(rmd::Client::open(port, options)?), id: motor }
             }
         })
     }
@@ -105,7 +105,7 @@ impl Drive {
     fn turn(&self, speed: i32) -> Result<(), Failure> {
         match self {
             Drive::St { client, motor } => {
-                let ramp = Request::Ramp(Ramp { speed_rpm: speed, duration_ms: 500 });
+                let ramp = Request::SetRamp(Ramp { speed_rpm: speed, duration_ms: 500 });
                 client.exchange(*motor, &ramp, |_| Some(()))?;
                 client.motor(*motor)?.start()?;
             }
@@ -118,7 +118,7 @@ impl Drive {
 
     fn speed(&self) -> Result<f64, Failure> {
         Ok(match self {
-            Drive::St { client, motor } => client.motor(*motor)?.read(register::SPEED_MEAS)?.into(),
+            Drive::St { client, motor } => client.motor(*motor)?.get(register::SPEED_MEAS)?.into(),
             Drive::Rmd { bus, id } => bus.motor(*id)?.motion_status()?.speed.dps(),
         })
     }

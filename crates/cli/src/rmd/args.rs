@@ -10,14 +10,14 @@ pub struct Args {
     #[command(flatten)]
     pub connection: Connection,
     #[command(flatten)]
-    pub motor: Motor,
+    pub motor: MotorArgs,
     #[command(subcommand)]
     pub command: Command,
 }
 
 /// Which motor, and how to speak to it.
 #[derive(clap::Args)]
-pub struct Motor {
+pub struct MotorArgs {
     /// The motor's ID, 1 to 32
     #[arg(short, long, default_value_t = 1, global = true,
           value_parser = clap::value_parser!(u8).range(1..=32))]

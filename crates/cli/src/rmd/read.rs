@@ -1,7 +1,7 @@
 //! Commands that read.
 
 use motorlink::rmd::{
-    Field, Found, Meaning, MotorId, MotorSet, MultiTurnAngle, Payload, SingleTurnAngle,
+    Field, Meaning, MotorId, MotorSet, MultiTurnAngle, Payload, ScanResult, SingleTurnAngle,
 };
 use serde_json::{Value, json};
 
@@ -21,9 +21,12 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
     session.bus.scan(wanted, |motor| found.push(motor), |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     found.sort_by_key(|found| match found {
-        Found::Motor(id, _) | Found::Foreign(id, _) | Found::Echo(id) | Found::Shared(id) => *id,
+        ScanResult::Motor(id, _)
+        | ScanResult::Foreign(id, _)
+        | ScanResult::Echo(id)
+        | ScanResult::Shared(id) => *id,
     });
-    if found.iter().any(|found| matches!(found, Found::Echo(_))) {
+    if found.iter().any(|found| matches!(found, ScanResult::Echo(_))) {
         return Err(Failure::Line(
             "what was sent came back: the adapter echoes, which looks like motors that answer; add \
              echo=1 to the port, as in slcan:/dev/ttyACM0?echo=1"
@@ -32,7 +35,7 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
     }
     for motor in &found {
         match motor {
-            Found::Motor(id, status) => session.output.result(
+            ScanResult::Motor(id, status) => session.output.result(
                 format!(
                     "motor {id:<2}  V1.62  {:>5.1} V  {:>3} °C  errors: {}",
                     status.voltage.volts(),
@@ -45,15 +48,15 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
                     "temperature": status.temperature.0, "errors": status.errors.words().collect::<Value>(),
                 }),
             )?,
-            Found::Foreign(id, dialect) => session.output.result(
+            ScanResult::Foreign(id, dialect) => session.output.result(
                 format!("motor {id:<2}  speaks {dialect}: it is not driven with this protocol"),
                 json!({ "id": id.number(), "protocol": dialect.to_string() }),
             )?,
-            Found::Shared(id) => session.output.result(
+            ScanResult::Shared(id) => session.output.result(
                 format!("motor {id:<2}  answers another program or host, too"),
                 json!({ "id": id.number(), "shared": true }),
             )?,
-            Found::Echo(_) => {}
+            ScanResult::Echo(_) => {}
         }
     }
     if let (true, Some(trouble)) = (found.is_empty(), session.bus.trouble()) {

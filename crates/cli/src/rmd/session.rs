@@ -2,27 +2,27 @@
 
 use std::time::Duration;
 
-use motorlink::rmd::{Bus, MotorHandle, Options};
+use motorlink::rmd::{Client, Motor, Options};
 
-use super::args::Motor;
+use super::args::MotorArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::output::Output;
 
 /// An open bus, the motor that is meant, and how to show what it says.
 pub struct Session {
-    pub bus: Bus,
+    pub bus: Client,
     pub id: u8,
     pub output: Output,
     pub raw: bool,
     pub write_rom: bool,
 }
 
-pub fn connect(connection: &Connection, motor: &Motor) -> Result<Session, Failure> {
+pub fn connect(connection: &Connection, motor: &MotorArgs) -> Result<Session, Failure> {
     let port = connection.port()?;
     let timeout = Duration::from_millis(motor.timeout.into());
     let options = Options { timeout, ..Options::default() };
-    let bus = Bus::open_wrapped(&port, connection.around_bus()?, options)?;
+    let bus = Client::open_wrapped(&port, connection.around_bus()?, options)?;
     let (output, raw) = (connection.output(), connection.raw);
     Ok(Session { bus, id: motor.id, output, raw, write_rom: motor.write_rom })
 }
@@ -34,7 +34,7 @@ impl Session {
         Ok(self.output)
     }
 
-    pub fn motor(&self) -> Result<MotorHandle<'_>, Failure> {
+    pub fn motor(&self) -> Result<Motor<'_>, Failure> {
         Ok(self.bus.motor(self.id)?)
     }
 

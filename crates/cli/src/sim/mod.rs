@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use motorlink::st::Profile;
 use motorlink_link::serve::ServeName;
-use motorlink_testbench::{Bench, BenchConfig, ConfigError, RomError, RomFolder, ServeError};
+use motorlink_testbench::{BenchConfig, ConfigError, RomError, RomFolder, ServeError, SimServer};
 use rustix::process::getpgrp;
 use rustix::termios::{isatty, tcgetpgrp};
 
@@ -82,7 +82,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
     } else {
         (args.st, args.rmd)
     };
-    let mut bench = Bench::new();
+    let mut bench = SimServer::new();
     if let Some(folder) = &args.rom {
         bench.keep_rom(RomFolder::open(folder).map_err(ServeError::from)?);
     }
@@ -93,7 +93,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
 
 /// Serves the ports and says so on `out`, a JSON line each.
 pub fn serve(
-    bench: &mut Bench,
+    bench: &mut SimServer,
     config: &BenchConfig,
     st: &[String],
     rmd: &[String],
@@ -112,7 +112,7 @@ pub fn serve(
 /// command and is answered with a line on `out`; while nobody reads the answers, no command is taken
 /// and the drives go on.
 pub fn obey(
-    bench: &mut Bench,
+    bench: &mut SimServer,
     mut input: impl Read + AsFd,
     out: &Voice,
     ended: impl Fn(bool) -> bool,

@@ -34,7 +34,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Pfc { action: Pfc::Disable } => execute(session, Execute::PfcDisable),
         Act::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
         Act::Ramp { rpm, ms } => {
-            motor.ramp(rpm, ms)?;
+            motor.set_ramp(rpm, ms)?;
             session.confirmed()?.done(format!(
                 "{}: ramp to {rpm} rpm in {ms} ms acknowledged; it executes while the motor runs",
                 motor.number()
@@ -42,7 +42,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         }
         Act::TorqueRamp { iq, ms } => {
             session.wants(Profile::Mcsdk54, "torque ramps")?;
-            motor.torque_ramp(iq, ms)?;
+            motor.set_torque_ramp(iq, ms)?;
             session
                 .confirmed()?
                 .done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
@@ -52,13 +52,13 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             if !rad.is_finite() || !seconds.is_finite() || seconds < 0.0 {
                 return Err(Failure::Usage(format!("{rad} rad in {seconds} s is no move")));
             }
-            motor.move_to(rad, seconds)?;
+            motor.set_position(rad, seconds)?;
             session
                 .confirmed()?
                 .done(format!("{}: move to {rad} rad in {seconds} s acknowledged", motor.number()))
         }
         Act::Current { iq, id } => {
-            motor.current(iq, id)?;
+            motor.set_current_reference(iq, id)?;
             session.confirmed()?.done(format!("{}: references Iq {iq}, Id {id}", motor.number()))
         }
         Act::Revup { phase: None, .. } => revup(session),
@@ -68,7 +68,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
                 torque_s16a: torque.unwrap_or_default(),
                 duration_ms: ms.unwrap_or_default(),
             };
-            motor.set_revup(phase, data)?;
+            motor.set_revup_data(phase, data)?;
             session.confirmed()?.done(format!("{}: rev-up phase {phase} is set", motor.number()))
         }
         Act::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
@@ -88,7 +88,7 @@ fn start(session: &Session) -> Result<(), Failure> {
     let status = motor.status()?;
     match status {
         Status::FaultNow | Status::FaultOver => {
-            let faults = explain(motor.faults()?);
+            let faults = explain(motor.flags()?);
             Err(Failure::Refused(format!(
                 "{} did not start, it is in {status}: {faults}\nclear it with \
                  `motorlink st fault-ack` when the cause is gone",
@@ -115,11 +115,11 @@ const ACKNOWLEDGED_WITHIN: time::Duration = time::Duration::from_millis(200);
 /// moment to follow.
 fn acknowledge(session: &Session) -> Result<(), Failure> {
     let motor = session.motor()?;
-    motor.acknowledge_faults()?;
+    motor.fault_ack()?;
     let clock = session.client.clock();
     let give_up = clock.now() + ACKNOWLEDGED_WITHIN;
     loop {
-        let faults = motor.faults()?;
+        let faults = motor.flags()?;
         if faults == Flags::default() {
             let text = format!("{}: no faults", motor.number());
             return session.confirmed()?.result(text, json!({ "ok": true, "FLAGS": 0 }));
@@ -137,12 +137,12 @@ fn set(session: &Session, name: &str, text: &str, verify: Option<u8>) -> Result<
     let bits = parse_value(register, text, profile, session.raw)?;
     let motor = session.motor()?;
     if let Some(attempts) = verify {
-        let attempt = motor.write_raw_verified(register, bits, attempts)?;
+        let attempt = motor.set_raw_verified(register, bits, attempts)?;
         let again = if attempt == 1 { String::new() } else { format!(", at attempt {attempt}") };
         let text = format!("{}: {register} is written and reads back{again}", motor.number());
         return session.output.result(text, json!({ "ok": true, "attempts": attempt }));
     }
-    motor.write_raw(register, bits, register.write_size(profile))?;
+    motor.set_raw(register, bits, register.write_size(profile))?;
     session.confirmed()?.done(format!("{}: {register} is written", motor.number()))
 }
 
@@ -150,7 +150,7 @@ fn revup(session: &Session) -> Result<(), Failure> {
     let motor = session.motor()?;
     let mut phases = Vec::new();
     for phase in 0..REVUP_PHASES {
-        phases.push(motor.revup(phase)?);
+        phases.push(motor.revup_data(phase)?);
         session.client.confirm()?;
     }
     let output = session.output;

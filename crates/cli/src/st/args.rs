@@ -11,14 +11,14 @@ pub struct Args {
     #[command(flatten)]
     pub connection: Connection,
     #[command(flatten)]
-    pub drive: Drive,
+    pub drive: DriveArgs,
     #[command(subcommand)]
     pub command: Command,
 }
 
 /// Which drive, and how to speak to it.
 #[derive(clap::Args)]
-pub struct Drive {
+pub struct DriveArgs {
     /// The motor, 1 to 7
     #[arg(short, long, default_value_t = 1, global = true,
           value_parser = clap::value_parser!(u8).range(1..=7))]

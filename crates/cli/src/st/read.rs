@@ -35,7 +35,7 @@ pub fn registers(output: Output) -> Result<(), Failure> {
 }
 
 pub fn info(session: &Session) -> Result<(), Failure> {
-    let info = session.client.info()?;
+    let info = session.client.board_info()?;
     session.client.confirm()?;
     let [major, minor, patch] = info.version;
     let mut rows = vec![
@@ -120,9 +120,9 @@ pub fn segment(
     let mut sample = || {
         // A drive that was restarted has forgotten the segment.
         let mut values = vec![0; registers.len()];
-        if !configured || motor.read_segment(number, &registers, &mut values).is_err() {
+        if !configured || motor.segment(number, &registers, &mut values).is_err() {
             motor.configure_segment(number, &registers)?;
-            motor.read_segment(number, &registers, &mut values)?;
+            motor.segment(number, &registers, &mut values)?;
             configured = true;
         }
         session.client.confirm()?;
@@ -140,7 +140,7 @@ fn find_all(names: &[String]) -> Result<Vec<RegisterId>, Failure> {
 }
 
 fn read(session: &Session, register: RegisterId) -> Result<Reading, Failure> {
-    let bits = session.motor()?.read_raw(register)?;
+    let bits = session.motor()?.get_raw(register)?;
     session.client.confirm()?;
     Ok(Reading { register, bits, profile: session.client.profile() })
 }

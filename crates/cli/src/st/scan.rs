@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 use motorlink::port::PortError;
-use motorlink::st::{BAUD_RATES, Finding, scan_baud};
+use motorlink::st::{BAUD_RATES, ScanResult, scan_baud};
 use serde_json::json;
 
 use crate::connection::Connection;
@@ -39,8 +39,8 @@ pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result
             continue;
         }
         let finding = finding?;
-        echoes |= matches!(finding, Finding::Echo);
-        found |= matches!(finding, Finding::Drive(_) | Finding::Refuses(_));
+        echoes |= matches!(finding, ScanResult::Echo);
+        found |= matches!(finding, ScanResult::Drive(_) | ScanResult::Refuses(_));
         report(&bar, output, rate, &finding)?;
     }
     bar.finish_and_clear();
@@ -58,16 +58,21 @@ pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result
     )))
 }
 
-fn report(bar: &ProgressBar, output: Output, rate: u32, finding: &Finding) -> Result<(), Failure> {
+fn report(
+    bar: &ProgressBar,
+    output: Output,
+    rate: u32,
+    finding: &ScanResult,
+) -> Result<(), Failure> {
     let (word, text) = match finding {
-        Finding::Drive(info) => {
+        ScanResult::Drive(info) => {
             let [major, minor, patch] = info.version;
             ("drive", format!("{} {major}.{minor}.{patch}", info.name))
         }
-        Finding::Refuses(code) => ("refuses", format!("a drive that answers {code}")),
-        Finding::Garbage => ("garbage", "bytes that are no reply: another rate?".to_owned()),
-        Finding::Echo => ("echo", "what is sent comes back".to_owned()),
-        Finding::Silence => ("silence", "silence".to_owned()),
+        ScanResult::Refuses(code) => ("refuses", format!("a drive that answers {code}")),
+        ScanResult::Garbage => ("garbage", "bytes that are no reply: another rate?".to_owned()),
+        ScanResult::Echo => ("echo", "what is sent comes back".to_owned()),
+        ScanResult::Silence => ("silence", "silence".to_owned()),
     };
     bar.suspend(|| {
         output.result(

@@ -1,9 +1,9 @@
 //! What commands to a drive work on.
 
-use motorlink::st::{Client, Config, MotorHandle, Options, Profile, Recovery};
+use motorlink::st::{Client, MasterConfig, Motor, Options, Profile, Recovery};
 use motorlink::time;
 
-use super::args::Drive;
+use super::args::DriveArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
 use crate::output::Output;
@@ -16,14 +16,15 @@ pub struct Session {
     pub raw: bool,
 }
 
-pub fn connect(connection: &Connection, drive: &Drive) -> Result<Session, Failure> {
+pub fn connect(connection: &Connection, drive: &DriveArgs) -> Result<Session, Failure> {
     let port = connection.port()?;
-    let timeout = drive.timeout.map_or(Config::default().timeout, time::Duration::from_millis);
+    let timeout =
+        drive.timeout.map_or(MasterConfig::default().timeout, time::Duration::from_millis);
     let recovery = if drive.pad { Recovery::Pad } else { Recovery::Drain };
     let profile = drive.profile;
     let options = Options {
         profile,
-        line: Config { timeout, recovery, ..Config::default() },
+        master: MasterConfig { timeout, recovery, ..MasterConfig::default() },
         ..Options::default()
     };
     let client = Client::open_wrapped(&port, connection.around_line(profile)?, options)?;
@@ -49,7 +50,7 @@ impl Session {
         Ok(self.output)
     }
 
-    pub fn motor(&self) -> Result<MotorHandle<'_>, Failure> {
+    pub fn motor(&self) -> Result<Motor<'_>, Failure> {
         Ok(self.client.motor(self.motor)?)
     }
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use motorlink_proto::rmd::Code;
 
-use super::bench::Bench;
+use super::harness::Harness;
 use crate::case::{Case, Stop};
 
 /// Ids of clauses.
@@ -14,8 +14,8 @@ pub(super) type Clauses = &'static [&'static str];
 pub(super) fn case(
     name: impl Into<Cow<'static, str>>,
     clauses: Clauses,
-    run: impl Fn(&mut Bench) -> Result<(), Stop> + 'static,
-) -> Case<Bench> {
+    run: impl Fn(&mut Harness) -> Result<(), Stop> + 'static,
+) -> Case<Harness> {
     Case::new(name, clauses, run)
 }
 

@@ -3,210 +3,211 @@
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::{CentiDegrees, SpeedLimit};
 
-use super::bench::Bench;
 use super::case::case;
 use super::frames::{filled, null_bytes_are_0, request};
+use super::harness::Harness;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{R4, R8, R9, R19, R20, R26, R31};
 
 /// What a rotor at rest may read apart from one reading to the next, degrees.
 const JITTER: f64 = 0.5;
 
-pub(super) fn cases() -> Vec<Case<Bench>> {
+pub(super) fn cases() -> Vec<Case<Harness>> {
     let mut cases = readings();
     cases.extend(offset());
     cases.extend(zero());
     cases.push(
-        case("the_multi_turn_angle_falls_below_0", &["RMD-92-03", "RMD-92-04"], |bench| {
-            below_0(bench)
+        case("the_multi_turn_angle_falls_below_0", &["RMD-92-03", "RMD-92-04"], |harness| {
+            below_0(harness)
         })
         .needs(&[Need::Spin]),
     );
     cases
 }
 
-fn readings() -> Vec<Case<Bench>> {
+fn readings() -> Vec<Case<Harness>> {
     vec![
         case(
             "the_position_is_the_original_position_minus_the_offset",
             &["RMD-90-05", "RMD-90-04", "RMD-90-06", "RMD-90-07"],
-            |bench| {
-                let encoder = bench.read(ReadEncoder)?;
+            |harness| {
+                let encoder = harness.read(ReadEncoder)?;
                 let Encoder { position, raw, offset } = encoder;
-                let due = (i32::from(raw) - i32::from(offset)).rem_euclid(bench.turn());
+                let due = (i32::from(raw) - i32::from(offset)).rem_euclid(harness.turn());
                 let words = format!("position {due}, that is {raw} - {offset}");
-                bench.require(i32::from(position) == due, words)
+                harness.require(i32::from(position) == due, words)
             },
         ),
         case(
             "encoder_values_are_within_the_encoders_width",
             &["RMD-90-08", "RMD-280-08", "RMD-9C-06"],
-            |bench| {
-                let Encoder { position, raw, offset } = bench.read(ReadEncoder)?;
-                within_turn(bench, &[position, raw, offset])?;
-                let encoder = bench.read(ReadMotionStatus)?.encoder;
-                within_turn(bench, &[encoder])
+            |harness| {
+                let Encoder { position, raw, offset } = harness.read(ReadEncoder)?;
+                within_turn(harness, &[position, raw, offset])?;
+                let encoder = harness.read(ReadMotionStatus)?.encoder;
+                within_turn(harness, &[encoder])
             },
         ),
-        case("status_2_has_the_encoder_position", &["RMD-9C-06", "RMD-90-04"], |bench| {
-            let position = bench.read_position()?;
-            let read = bench.degrees(position);
-            let encoder = bench.read(ReadMotionStatus)?.encoder;
-            near(bench, bench.degrees(encoder), read, "the position that 0x90 reads")
+        case("status_2_has_the_encoder_position", &["RMD-9C-06", "RMD-90-04"], |harness| {
+            let position = harness.read_position()?;
+            let read = harness.degrees(position);
+            let encoder = harness.read(ReadMotionStatus)?.encoder;
+            near(harness, harness.degrees(encoder), read, "the position that 0x90 reads")
         }),
-        case("the_single_turn_angle_is_0_to_35999", &["RMD-94-04", "RMD-94-06"], |bench| {
-            let angle = bench.read(ReadSingleTurnAngle)?.angle;
-            bench.require(angle.0 < FULL_TURN, "an angle of 0 to 35999")
+        case("the_single_turn_angle_is_0_to_35999", &["RMD-94-04", "RMD-94-06"], |harness| {
+            let angle = harness.read(ReadSingleTurnAngle)?.angle;
+            harness.require(angle.0 < FULL_TURN, "an angle of 0 to 35999")
         }),
         case(
             "the_single_turn_angle_is_that_of_the_encoder",
             &["RMD-94-05", "RMD-94-04"],
-            |bench| {
-                let position = bench.read_position()?;
-                let position = bench.degrees(position);
-                let angle = bench.read(ReadSingleTurnAngle)?.angle.degrees();
-                near(bench, angle, position, "the angle of the encoder position in 0x90")
+            |harness| {
+                let position = harness.read_position()?;
+                let position = harness.degrees(position);
+                let angle = harness.read(ReadSingleTurnAngle)?.angle.degrees();
+                near(harness, angle, position, "the angle of the encoder position in 0x90")
             },
         )
         .reading(R31),
         case(
             "the_multi_turn_angle_within_the_turn_is_the_single_turn_angle",
             &["RMD-94-06", "RMD-92-05", "RMD-92-03"],
-            |bench| {
-                let circle = bench.read(ReadSingleTurnAngle)?.angle.degrees();
-                let multi = bench.read(ReadMultiTurnAngle)?.angle.degrees();
-                near(bench, multi, circle, "modulo 360° the angle that 0x94 reads")
+            |harness| {
+                let circle = harness.read(ReadSingleTurnAngle)?.angle.degrees();
+                let multi = harness.read(ReadMultiTurnAngle)?.angle.degrees();
+                near(harness, multi, circle, "modulo 360° the angle that 0x94 reads")
             },
         )
         .reading(R20),
     ]
 }
 
-fn offset() -> Vec<Case<Bench>> {
+fn offset() -> Vec<Case<Harness>> {
     vec![
         case(
             "a_written_offset_is_in_force",
             &["RMD-91-02", "RMD-91-01", "RMD-91-04", "RMD-91-05", "RMD-91-06", "RMD-2-07"],
-            |bench| {
-                let offset = bench.another_offset()?;
-                let data = bench.ask_once(WriteEncoderOffsetRom(offset).encode())?;
-                null_bytes_are_0(bench, Code::WriteEncoderOffsetRom, &data)?;
+            |harness| {
+                let offset = harness.another_offset()?;
+                let data = harness.ask_once(WriteEncoderOffsetRom(offset).encode())?;
+                null_bytes_are_0(harness, Code::WriteEncoderOffsetRom, &data)?;
                 let reply = EncoderOffset::decode(&data);
-                bench.require(reply == offset, format!("the new offset {}", offset.offset))?;
-                offset_is(bench, offset).read_as(R8)
+                harness.require(reply == offset, format!("the new offset {}", offset.offset))?;
+                offset_is(harness, offset).read_as(R8)
             },
         )
         .needs(&[Need::Rom]),
-        case("null_bytes_of_an_offset_do_not_matter", &["RMD-91-05", "RMD-91-01"], |bench| {
-            let offset = bench.another_offset()?;
+        case("null_bytes_of_an_offset_do_not_matter", &["RMD-91-05", "RMD-91-01"], |harness| {
+            let offset = harness.another_offset()?;
             let code = Code::WriteEncoderOffsetRom;
             let sent = filled(WriteEncoderOffsetRom(offset).encode(), code, 0xA5);
-            let reply = bench.ask(sent)?;
-            null_bytes_are_0(bench, code, &reply)?;
-            offset_is(bench, offset)
+            let reply = harness.ask(sent)?;
+            null_bytes_are_0(harness, code, &reply)?;
+            offset_is(harness, offset)
         })
         .needs(&[Need::Rom])
         .reading(R4),
-        case("an_offset_beyond_the_encoder_is_cut", &["RMD-91-03"], |bench| {
-            if bench.turn() > i32::from(u16::MAX) {
+        case("an_offset_beyond_the_encoder_is_cut", &["RMD-91-03"], |harness| {
+            if harness.turn() > i32::from(u16::MAX) {
                 return Err(Stop::Skipped("nothing is beyond an encoder of 16 bits".into()));
             }
-            bench.keep_offset()?;
+            harness.keep_offset()?;
             let EncoderOffset { offset } =
-                bench.read(WriteEncoderOffsetRom(EncoderOffset { offset: u16::MAX }))?;
-            within_turn(bench, &[offset])?;
-            offset_is(bench, EncoderOffset { offset })
+                harness.read(WriteEncoderOffsetRom(EncoderOffset { offset: u16::MAX }))?;
+            within_turn(harness, &[offset])?;
+            offset_is(harness, EncoderOffset { offset })
         })
         .needs(&[Need::Rom])
         .reading(R19),
-        case("a_written_offset_outlasts_the_power", &["RMD-91-07"], |bench| {
-            let offset = bench.another_offset()?;
-            bench.read(WriteEncoderOffsetRom(offset))?;
-            bench.power_cycle()?;
-            offset_is(bench, offset)
+        case("a_written_offset_outlasts_the_power", &["RMD-91-07"], |harness| {
+            let offset = harness.another_offset()?;
+            harness.read(WriteEncoderOffsetRom(offset))?;
+            harness.power_cycle()?;
+            offset_is(harness, offset)
         })
         .needs(&[Need::Rom, Need::PowerCycle])
         .reading(R8),
-        case("a_position_that_is_held_stays_when_the_offset_moves", &["RMD-91-02"], |bench| {
-            bench.gently()?;
-            let angle = CentiDegrees(bench.angle_in_reach()?);
-            bench.command(SetPositionLimited { max_speed: SpeedLimit(30), angle })?;
-            let before = bench.keep_offset()?.raw;
-            let offset = bench.another_offset()?;
-            bench.read(WriteEncoderOffsetRom(offset))?;
-            bench.watch(500, |_| false)?;
-            let after = bench.read(ReadEncoder)?.raw;
-            let (after, before) = (bench.degrees(after), bench.degrees(before));
-            near(bench, after, before, "the original position as it was")
+        case("a_position_that_is_held_stays_when_the_offset_moves", &["RMD-91-02"], |harness| {
+            harness.gently()?;
+            let angle = CentiDegrees(harness.angle_in_reach()?);
+            harness.command(SetPositionLimited { max_speed: SpeedLimit(30), angle })?;
+            let before = harness.keep_offset()?.raw;
+            let offset = harness.another_offset()?;
+            harness.read(WriteEncoderOffsetRom(offset))?;
+            harness.watch(500, |_| false)?;
+            let after = harness.read(ReadEncoder)?.raw;
+            let (after, before) = (harness.degrees(after), harness.degrees(before));
+            near(harness, after, before, "the original position as it was")
         })
         .needs(&[Need::Spin, Need::Rom])
         .reading(R26),
     ]
 }
 
-fn zero() -> Vec<Case<Bench>> {
+fn zero() -> Vec<Case<Harness>> {
     vec![
         case(
             "a_new_zero_is_the_present_position",
             &["RMD-19-05", "RMD-19-03", "RMD-19-06", "RMD-19-07", "RMD-19-01", "RMD-2-08"],
-            |bench| {
+            |harness| {
                 // Where the motor stands at its zero, the old offset would do as well.
-                let elsewhere = bench.another_offset()?;
-                bench.read(WriteEncoderOffsetRom(elsewhere))?;
-                let raw = bench.keep_offset()?.raw;
+                let elsewhere = harness.another_offset()?;
+                harness.read(WriteEncoderOffsetRom(elsewhere))?;
+                let raw = harness.keep_offset()?.raw;
                 let code = Code::WriteZeroRom;
-                let stale = bench.ask_once(filled(request(code), code, 0xA5)).map(drop);
-                bench.note(R4, stale)?;
-                let reply = bench.ask_once(request(code))?;
-                null_bytes_are_0(bench, code, &reply)?;
+                let stale = harness.ask_once(filled(request(code), code, 0xA5)).map(drop);
+                harness.note(R4, stale)?;
+                let reply = harness.ask_once(request(code))?;
+                null_bytes_are_0(harness, code, &reply)?;
                 let offset = EncoderOffset::decode(&reply).offset;
-                let (offset, raw) = (bench.degrees(offset), bench.degrees(raw));
-                near(bench, offset, raw, "the original position that 0x90 read")
+                let (offset, raw) = (harness.degrees(offset), harness.degrees(raw));
+                near(harness, offset, raw, "the original position that 0x90 read")
             },
         )
         .needs(&[Need::Rom]),
-        case("a_new_zero_does_not_act_before_power_on", &["RMD-19-02"], |bench| {
-            let offset = bench.another_offset()?;
-            bench.read(WriteEncoderOffsetRom(offset))?;
-            let before = bench.read(ReadEncoder)?;
-            bench.read(WriteZeroRom)?;
-            let after = bench.read(ReadEncoder)?;
-            let shown = bench.require(after.offset == before.offset, "the offset as before");
-            bench.note(R9, shown)?;
-            let (after, before) = (bench.degrees(after.position), bench.degrees(before.position));
-            near(bench, after, before, "the position as before")
+        case("a_new_zero_does_not_act_before_power_on", &["RMD-19-02"], |harness| {
+            let offset = harness.another_offset()?;
+            harness.read(WriteEncoderOffsetRom(offset))?;
+            let before = harness.read(ReadEncoder)?;
+            harness.read(WriteZeroRom)?;
+            let after = harness.read(ReadEncoder)?;
+            let shown = harness.require(after.offset == before.offset, "the offset as before");
+            harness.note(R9, shown)?;
+            let (after, before) =
+                (harness.degrees(after.position), harness.degrees(before.position));
+            near(harness, after, before, "the position as before")
         })
         .needs(&[Need::Rom]),
-        case("a_new_zero_acts_from_power_on", &["RMD-19-02", "RMD-19-03"], |bench| {
-            let offset = bench.another_offset()?;
-            bench.read(WriteEncoderOffsetRom(offset))?;
-            let zero = bench.read(WriteZeroRom)?;
-            bench.power_cycle()?;
-            offset_is(bench, zero)
+        case("a_new_zero_acts_from_power_on", &["RMD-19-02", "RMD-19-03"], |harness| {
+            let offset = harness.another_offset()?;
+            harness.read(WriteEncoderOffsetRom(offset))?;
+            let zero = harness.read(WriteZeroRom)?;
+            harness.power_cycle()?;
+            offset_is(harness, zero)
         })
         .needs(&[Need::Rom, Need::PowerCycle]),
     ]
 }
 
 /// A move to an angle just below zero, which has a sign to carry.
-fn below_0(bench: &mut Bench) -> Result<(), Stop> {
+fn below_0(harness: &mut Harness) -> Result<(), Stop> {
     const NEAR: i64 = 36_000;
     const TARGET: i32 = -1_000;
-    let angle = bench.angle()?;
+    let angle = harness.angle()?;
     if angle.abs() > NEAR {
         return Err(Stop::Skipped(format!(
             "the motor is at {}°: switch it off and on, which makes it forget its turns",
             angle / 100
         )));
     }
-    bench.gently()?;
-    bench
+    harness.gently()?;
+    harness
         .command(SetPositionLimited { max_speed: SpeedLimit(180), angle: CentiDegrees(TARGET) })?;
-    let arrived = bench.watch(8_000, |seen| seen.angle < -500)?;
-    bench.require(arrived, "an angle that falls to -10°")
+    let arrived = harness.watch(8_000, |seen| seen.angle < -500)?;
+    harness.require(arrived, "an angle that falls to -10°")
 }
 
-impl Bench {
+impl Harness {
     /// Values in a turn of the encoder, as they travel.
     pub(super) fn turn(&self) -> i32 {
         1 << self.options.encoder.bits().min(16)
@@ -231,23 +232,23 @@ impl Bench {
     }
 }
 
-fn offset_is(bench: &mut Bench, EncoderOffset { offset }: EncoderOffset) -> Result<(), Stop> {
-    let read = bench.read(ReadEncoder)?;
-    bench.require(read.offset == offset, format!("the offset {offset}"))?;
-    let due = (i32::from(read.raw) - i32::from(offset)).rem_euclid(bench.turn());
-    bench.require(i32::from(read.position) == due, format!("the position {due}"))
+fn offset_is(harness: &mut Harness, EncoderOffset { offset }: EncoderOffset) -> Result<(), Stop> {
+    let read = harness.read(ReadEncoder)?;
+    harness.require(read.offset == offset, format!("the offset {offset}"))?;
+    let due = (i32::from(read.raw) - i32::from(offset)).rem_euclid(harness.turn());
+    harness.require(i32::from(read.position) == due, format!("the position {due}"))
 }
 
-fn within_turn(bench: &Bench, values: &[u16]) -> Result<(), Stop> {
-    let turn = bench.turn();
+fn within_turn(harness: &Harness, values: &[u16]) -> Result<(), Stop> {
+    let turn = harness.turn();
     let within = values.iter().all(|value| i32::from(*value) < turn);
-    let bits = bench.options.encoder.bits();
-    bench.require(within, format!("values of 0 to {} with {bits} bits (--encoder)", turn - 1))
+    let bits = harness.options.encoder.bits();
+    harness.require(within, format!("values of 0 to {} with {bits} bits (--encoder)", turn - 1))
 }
 
 /// Two angles (degrees) that are the same within the turn.
-fn near(bench: &Bench, one: f64, other: f64, expected: &str) -> Result<(), Stop> {
+fn near(harness: &Harness, one: f64, other: f64, expected: &str) -> Result<(), Stop> {
     let apart = (one - other + 180.0).rem_euclid(360.0) - 180.0;
     let words = format!("{expected}, {other:.2}° within {JITTER}°; not {one:.2}°");
-    bench.require(apart.abs() <= JITTER, words)
+    harness.require(apart.abs() <= JITTER, words)
 }

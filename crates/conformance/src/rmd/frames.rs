@@ -3,8 +3,8 @@
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Stop as Halt, *};
 
-use super::bench::Bench;
 use super::case::{Clauses, case, subject};
+use super::harness::Harness;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{R4, R11, R30, R42};
 
@@ -23,26 +23,26 @@ const QUESTIONS: [(Code, Clauses, Clauses, Clauses); 9] = [
 ];
 
 /// What a request is made of.
-type Request = fn(&mut Bench) -> Result<[u8; 8], Stop>;
+type Request = fn(&mut Harness) -> Result<[u8; 8], Stop>;
 
 /// Commands whose reply is the request: a request that changes nothing, and what tests the echo.
 const ECHOES: [(Code, Request, Clauses, &[Need]); 6] = [
     (
         Code::WritePidRam,
-        |bench| Ok(WritePidRam(bench.keep_gains()?).encode()),
+        |harness| Ok(WritePidRam(harness.keep_gains()?).encode()),
         &["RMD-31-04", "RMD-31-01", "RMD-2-02"],
         &[],
     ),
     (
         Code::WritePidRom,
-        |bench| Ok(WritePidRom(bench.keep_rom_gains()?).encode()),
+        |harness| Ok(WritePidRom(harness.keep_rom_gains()?).encode()),
         &["RMD-32-03", "RMD-32-01", "RMD-2-03"],
         &[Need::Rom],
     ),
     (
         Code::WriteAccelerationRam,
-        |bench| {
-            let acceleration = bench.keep_acceleration()?;
+        |harness| {
+            let acceleration = harness.keep_acceleration()?;
             Ok(WriteAccelerationRam(Acceleration { acceleration }).encode())
         },
         &["RMD-34-05", "RMD-34-01", "RMD-2-05"],
@@ -52,8 +52,8 @@ const ECHOES: [(Code, Request, Clauses, &[Need]); 6] = [
     (Code::Stop, |_| Ok(Halt.encode()), &["RMD-81-04", "RMD-81-01", "RMD-2-16"], &[]),
     (
         Code::Run,
-        |bench| {
-            bench.may_move();
+        |harness| {
+            harness.may_move();
             Ok(Run.encode())
         },
         &["RMD-88-04", "RMD-88-01", "RMD-2-17"],
@@ -69,89 +69,89 @@ fn nobodys() -> impl Iterator<Item = u8> {
     (0x00..=0x0F).chain(0x50..=0x5F).chain(0xD0..=0xFF)
 }
 
-pub(super) fn cases() -> Vec<Case<Bench>> {
+pub(super) fn cases() -> Vec<Case<Harness>> {
     let mut cases = vec![
-        case("a_reply_has_the_identifier_of_its_motor", &["RMD-1-01"], |bench| {
-            let frames = bench.replies(&[bench.frame(ReadStatus.encode())])?;
-            let own = u32::from(bench.id().can_id());
+        case("a_reply_has_the_identifier_of_its_motor", &["RMD-1-01"], |harness| {
+            let frames = harness.replies(&[harness.frame(ReadStatus.encode())])?;
+            let own = u32::from(harness.id().can_id());
             let same = frames.iter().any(|frame| frame.id() == own && !frame.is_extended());
-            bench.require(same, format!("a reply on {own:#05x}"))
+            harness.require(same, format!("a reply on {own:#05x}"))
         }),
         case(
             "a_reply_is_a_standard_data_frame_of_8_bytes",
             &["RMD-1-03", "RMD-1-04", "RMD-1-05"],
-            |bench| bench.ask(ReadStatus.encode()).map(|_| ()),
+            |harness| harness.ask(ReadStatus.encode()).map(|_| ()),
         ),
-        case("frames_of_other_lengths_are_ignored", &["RMD-1-05", "RMD-1-06"], |bench| {
-            let id = bench.id().can_id().into();
+        case("frames_of_other_lengths_are_ignored", &["RMD-1-05", "RMD-1-06"], |harness| {
+            let id = harness.id().can_id().into();
             let status = ReadStatus.encode();
             let short = (0..8).map(|len| CanFrame::data_frame(id, false, &status[..len]));
-            silent(bench, &short.collect::<Vec<_>>())
+            silent(harness, &short.collect::<Vec<_>>())
         })
         .reading(R11),
-        case("frames_with_29_bits_are_ignored", &["RMD-1-04", "RMD-1-06"], |bench| {
-            let id = bench.id().can_id().into();
+        case("frames_with_29_bits_are_ignored", &["RMD-1-04", "RMD-1-06"], |harness| {
+            let id = harness.id().can_id().into();
             let status = ReadStatus.encode();
-            silent(bench, &[CanFrame::data_frame(id, true, &status)])
+            silent(harness, &[CanFrame::data_frame(id, true, &status)])
         })
         .reading(R11),
-        case("remote_frames_are_ignored", &["RMD-1-03", "RMD-1-06"], |bench| {
-            let id = bench.id().can_id().into();
-            silent(bench, &[CanFrame::remote_frame(id, false, 8)])
+        case("remote_frames_are_ignored", &["RMD-1-03", "RMD-1-06"], |harness| {
+            let id = harness.id().can_id().into();
+            silent(harness, &[CanFrame::remote_frame(id, false, 8)])
         })
         .reading(R11),
-        case("frames_to_others_are_ignored", &["RMD-1-01", "RMD-1-06"], |bench| {
-            let own = bench.id();
+        case("frames_to_others_are_ignored", &["RMD-1-01", "RMD-1-06"], |harness| {
+            let own = harness.id();
             let others = (1..=32).filter_map(MotorId::new).filter(|id| *id != own);
             let status = ReadStatus.encode();
             let frames = others.map(|id| CanFrame::new(id.can_id(), status));
-            silent(bench, &frames.collect::<Vec<_>>())
+            silent(harness, &frames.collect::<Vec<_>>())
         }),
-        case("frames_to_ids_that_do_not_exist_are_ignored", &["RMD-1-06"], |bench| {
+        case("frames_to_ids_that_do_not_exist_are_ignored", &["RMD-1-06"], |harness| {
             let status = ReadStatus.encode();
-            silent(bench, &[0, 33].map(|id| CanFrame::new(MOTOR_BASE + id, status)))
+            silent(harness, &[0, 33].map(|id| CanFrame::new(MOTOR_BASE + id, status)))
         })
         .reading(R42),
-        case("unknown_command_bytes_are_met_with_silence", &["RMD-2-24"], |bench| {
-            unknown(bench, nobodys().collect())
+        case("unknown_command_bytes_are_met_with_silence", &["RMD-2-24"], |harness| {
+            unknown(harness, nobodys().collect())
         })
         .reading(R30),
-        case("command_bytes_of_related_protocols_are_met_with_silence", &["RMD-2-24"], |bench| {
-            bench.keep_gains()?;
-            bench.keep_acceleration()?;
-            bench.may_move();
+        case("command_bytes_of_related_protocols_are_met_with_silence", &["RMD-2-24"], |harness| {
+            harness.keep_gains()?;
+            harness.keep_acceleration()?;
+            harness.may_move();
             let known = |code: &u8| Code::from(*code).info().is_some();
             let ours = (0..=u8::MAX).filter(|code| !known(code));
-            unknown(bench, ours.filter(|code| !nobodys().any(|free| free == *code)).collect())
+            unknown(harness, ours.filter(|code| !nobodys().any(|free| free == *code)).collect())
         })
         .needs(&[Need::Spin, Need::Rom])
         .reading(R30),
     ];
     for (code, answered, null_reply, null_request) in QUESTIONS {
-        cases.push(case(subject("a_question_gets_one_reply", code), answered, move |bench| {
-            question(bench, code)?;
-            bench.ask_once(request(code)).map(|_| ())
+        cases.push(case(subject("a_question_gets_one_reply", code), answered, move |harness| {
+            question(harness, code)?;
+            harness.ask_once(request(code)).map(|_| ())
         }));
         if !null_reply.is_empty() {
             cases.push(case(
                 subject("null_bytes_of_a_reply_are_0", code),
                 null_reply,
-                move |bench| {
-                    question(bench, code)?;
-                    let reply = bench.ask(request(code))?;
-                    null_bytes_are_0(bench, code, &reply)
+                move |harness| {
+                    question(harness, code)?;
+                    let reply = harness.ask(request(code))?;
+                    null_bytes_are_0(harness, code, &reply)
                 },
             ));
         }
         let name = subject("null_bytes_of_a_request_are_not_looked_at", code);
-        let ignored = case(name, null_request, move |bench| {
-            question(bench, code)?;
-            let plain = bench.ask(request(code))?;
+        let ignored = case(name, null_request, move |harness| {
+            question(harness, code)?;
+            let plain = harness.ask(request(code))?;
             for stale in STALE {
-                let reply = bench.ask(filled(request(code), code, stale))?;
-                null_bytes_are_0(bench, code, &reply)?;
+                let reply = harness.ask(filled(request(code), code, stale))?;
+                null_bytes_are_0(harness, code, &reply)?;
                 let steady = matches!(code, Code::ReadPid | Code::ReadAcceleration);
-                bench.require(!steady || reply == plain, "the same reply as without them")?;
+                harness.require(!steady || reply == plain, "the same reply as without them")?;
             }
             Ok(())
         });
@@ -159,25 +159,25 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
     }
     for (code, make, clauses, needs) in ECHOES {
         let name = subject("the_reply_is_the_request", code);
-        let echo = case(name, clauses, move |bench| {
-            let request = make(bench)?;
-            is_echoed(bench, request)?;
+        let echo = case(name, clauses, move |harness| {
+            let request = make(harness)?;
+            is_echoed(harness, request)?;
             STALE
                 .into_iter()
-                .try_for_each(|stale| is_echoed(bench, filled(request, code, stale)).read_as(R4))
+                .try_for_each(|stale| is_echoed(harness, filled(request, code, stale)).read_as(R4))
         });
-        let once = case(subject("an_echo_comes_once", code), &clauses[..1], move |bench| {
-            let request = make(bench)?;
-            bench.ask_once(request).map(|_| ())
+        let once = case(subject("an_echo_comes_once", code), &clauses[..1], move |harness| {
+            let request = make(harness)?;
+            harness.ask_once(request).map(|_| ())
         });
         cases.extend([echo.needs(needs), once.needs(needs)]);
     }
     cases
 }
 
-fn is_echoed(bench: &mut Bench, sent: [u8; 8]) -> Result<(), Stop> {
-    let reply = bench.ask(sent)?;
-    bench.require(reply == sent, "the frame that was sent")
+fn is_echoed(harness: &mut Harness, sent: [u8; 8]) -> Result<(), Stop> {
+    let reply = harness.ask(sent)?;
+    harness.require(reply == sent, "the frame that was sent")
 }
 
 /// The request without values.
@@ -186,9 +186,9 @@ pub(super) fn request(code: Code) -> [u8; 8] {
 }
 
 /// Clearing errors is only a question while there are none.
-fn question(bench: &mut Bench, code: Code) -> Result<(), Stop> {
+fn question(harness: &mut Harness, code: Code) -> Result<(), Stop> {
     if code == Code::ClearErrors {
-        let errors = bench.read(ReadStatus)?.errors;
+        let errors = harness.read(ReadStatus)?.errors;
         if !errors.is_empty() {
             return Err(Stop::Skipped(format!("the motor has an error that would go: {errors}")));
         }
@@ -204,11 +204,11 @@ pub(super) fn filled(mut data: [u8; 8], code: Code, stale: u8) -> [u8; 8] {
 }
 
 /// Checks the bytes of a reply that no value covers.
-pub(super) fn null_bytes_are_0(bench: &Bench, code: Code, reply: &[u8; 8]) -> Result<(), Stop> {
+pub(super) fn null_bytes_are_0(harness: &Harness, code: Code, reply: &[u8; 8]) -> Result<(), Stop> {
     let fields = code.info().map_or(&[][..], |row| row.reply);
     let wrong: Vec<_> = nulls(fields).filter(|byte| reply[*byte] != 0).collect();
     let bytes = wrong.iter().map(|byte| format!("DATA[{byte}] = 00")).collect::<Vec<_>>();
-    bench.require(wrong.is_empty(), bytes.join(", "))
+    harness.require(wrong.is_empty(), bytes.join(", "))
 }
 
 /// Bytes behind the code that no field covers.
@@ -220,18 +220,18 @@ fn nulls(fields: &'static [Field]) -> impl Iterator<Item = usize> {
 }
 
 /// Sends what the motor must not answer.
-fn silent(bench: &mut Bench, frames: &[CanFrame]) -> Result<(), Stop> {
-    let answers = bench.answers(frames)?;
-    bench.require(answers.is_empty(), "silence")?;
-    bench.ask(ReadStatus.encode()).map(|_| ())
+fn silent(harness: &mut Harness, frames: &[CanFrame]) -> Result<(), Stop> {
+    let answers = harness.answers(frames)?;
+    harness.require(answers.is_empty(), "silence")?;
+    harness.ask(ReadStatus.encode()).map(|_| ())
 }
 
 /// Sends command bytes that the motor must not know, a few at a time: a controller's mailboxes are
 /// few.
-fn unknown(bench: &mut Bench, codes: Vec<u8>) -> Result<(), Stop> {
+fn unknown(harness: &mut Harness, codes: Vec<u8>) -> Result<(), Stop> {
     for codes in codes.chunks(8) {
-        let frames = codes.iter().map(|&code| bench.frame([code, 0, 0, 0, 0, 0, 0, 0]));
-        silent(bench, &frames.collect::<Vec<_>>())?;
+        let frames = codes.iter().map(|&code| harness.frame([code, 0, 0, 0, 0, 0, 0, 0]));
+        silent(harness, &frames.collect::<Vec<_>>())?;
     }
     Ok(())
 }

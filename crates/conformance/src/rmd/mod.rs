@@ -12,11 +12,11 @@
 //! Gains in ROM cannot be read without a power cycle. Where none is at hand, those in RAM are taken
 //! for them: try [`Need::Rom`](crate::Need::Rom) on a motor that was just switched on.
 
-mod bench;
 mod case;
 mod clauses;
 mod encoder;
 mod frames;
+mod harness;
 mod kept;
 mod many;
 mod motion;
@@ -33,11 +33,11 @@ mod words;
 use crate::case::Case;
 use crate::markdown::markdown;
 
-pub use bench::{Bench, Options};
 pub use clauses::CLAUSES;
+pub use harness::{Harness, Options};
 
 /// What a motor is put through: first what leaves it alone, then whether it can be switched off.
-pub fn suite() -> Vec<Case<Bench>> {
+pub fn suite() -> Vec<Case<Harness>> {
     let topics = [
         frames::cases(),
         settings::cases(),

@@ -4,9 +4,9 @@
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::{CentiDegrees, CentiDps, IqCommand, SpeedLimit, TurnCentiDegrees};
 
-use super::bench::Bench;
 use super::case::{Clauses, case, subject};
 use super::frames::filled;
+use super::harness::Harness;
 use super::settings::accelerate;
 use crate::case::{Case, Need, Stop};
 use crate::reading::{R4, R39};
@@ -60,52 +60,52 @@ const LIMITED: [(Code, Clauses); 5] = [
     (Code::SetSingleTurnPositionLimited, &["RMD-A6-07", "RMD-34-03"]),
 ];
 
-pub(super) fn cases() -> Vec<Case<Bench>> {
+pub(super) fn cases() -> Vec<Case<Harness>> {
     let mut cases = Vec::new();
     for (code, once, values, request) in COMMANDS {
         let name = subject("a_motion_command_gets_one_reply", code);
-        cases.push(case(name, once, move |bench| {
-            bench.gently()?;
-            let request = ahead(bench, code, 0)?;
-            bench.ask_once(request).map(|_| ())
+        cases.push(case(name, once, move |harness| {
+            harness.gently()?;
+            let request = ahead(harness, code, 0)?;
+            harness.ask_once(request).map(|_| ())
         }));
         let name = subject("a_motion_reply_has_the_values_of_status_2", code);
-        cases.push(case(name, values, move |bench| {
-            bench.gently()?;
-            let request = ahead(bench, code, 0)?;
-            let before = bench.read(ReadMotionStatus)?;
-            let reply = MotionStatus::decode(&bench.ask(request)?);
-            bench.plausible(&reply)?;
-            same(bench, &reply, &before)
+        cases.push(case(name, values, move |harness| {
+            harness.gently()?;
+            let request = ahead(harness, code, 0)?;
+            let before = harness.read(ReadMotionStatus)?;
+            let reply = MotionStatus::decode(&harness.ask(request)?);
+            harness.plausible(&reply)?;
+            same(harness, &reply, &before)
         }));
         let name = subject("null_bytes_of_a_motion_command_do_not_matter", code);
         cases.push(
-            case(name, request, move |bench| {
-                bench.gently()?;
-                let start = bench.angle()?;
+            case(name, request, move |harness| {
+                harness.gently()?;
+                let start = harness.angle()?;
                 // Little even for a motor that takes them for torque: 0x0101 is 4 A.
-                let request = filled(ahead(bench, code, 0)?, code, 0x01);
-                bench.ask(request)?;
-                let gone = bench.watch(500, |seen| (seen.angle - start).abs() > 1_500)?;
-                bench.require(!gone, "no more than a few degrees of movement")
+                let request = filled(ahead(harness, code, 0)?, code, 0x01);
+                harness.ask(request)?;
+                let gone = harness.watch(500, |seen| (seen.angle - start).abs() > 1_500)?;
+                harness.require(!gone, "no more than a few degrees of movement")
             })
             .reading(R4),
         );
     }
     for (code, clauses) in LIMITED {
         let name = subject("the_acceleration_limit_holds", code);
-        cases.push(case(name, clauses, move |bench| limited(bench, code)).reading(R39));
+        cases.push(case(name, clauses, move |harness| limited(harness, code)).reading(R39));
     }
     cases.into_iter().map(|case| case.needs(&[Need::Spin])).collect()
 }
 
 /// The command that goes `degrees` further than the motor is; 0 is next to nothing, which for
 /// commands with a direction must not be nothing.
-fn ahead(bench: &mut Bench, code: Code, degrees: i32) -> Result<[u8; 8], Stop> {
+fn ahead(harness: &mut Harness, code: Code, degrees: i32) -> Result<[u8; 8], Stop> {
     let max_speed = SpeedLimit(180);
-    let angle = CentiDegrees(bench.angle_in_reach()? + 100 * degrees);
+    let angle = CentiDegrees(harness.angle_in_reach()? + 100 * degrees);
     let nearly = 100 * degrees.max(2);
-    let circle = i32::from(bench.read(ReadSingleTurnAngle)?.angle.0) + nearly;
+    let circle = i32::from(harness.read(ReadSingleTurnAngle)?.angle.0) + nearly;
     let circle = TurnCentiDegrees((circle % i32::from(FULL_TURN)) as u16);
     let direction = SpinDirection::Clockwise;
     Ok(match code {
@@ -119,34 +119,34 @@ fn ahead(bench: &mut Bench, code: Code, degrees: i32) -> Result<[u8; 8], Stop> {
 }
 
 /// Two looks at a motor that is at rest.
-fn same(bench: &Bench, one: &MotionStatus, other: &MotionStatus) -> Result<(), Stop> {
+fn same(harness: &Harness, one: &MotionStatus, other: &MotionStatus) -> Result<(), Stop> {
     let turned = one.encoder.wrapping_sub(other.encoder) as i16;
-    let jitter = bench.turn() / 90;
-    let apart = i32::from(turned).rem_euclid(bench.turn());
+    let jitter = harness.turn() / 90;
+    let apart = i32::from(turned).rem_euclid(harness.turn());
     let same = one.temperature.0.abs_diff(other.temperature.0) <= 2
         && one.speed.0.abs_diff(other.speed.0) <= 10
         && one.iq.0.abs_diff(other.iq.0) <= 62
-        && (apart <= jitter || apart >= bench.turn() - jitter);
+        && (apart <= jitter || apart >= harness.turn() - jitter);
     let MotionStatus { temperature, iq, speed, encoder } = other;
     let words = format!(
         "about {temperature}, {:.1} A, {speed}, encoder {encoder}, as 0x9C had it",
         iq.amps()
     );
-    bench.require(same, words)
+    harness.require(same, words)
 }
 
 /// Speeds up under a limit, and looks whether it is faster than the limit allows.
-fn limited(bench: &mut Bench, code: Code) -> Result<(), Stop> {
+fn limited(harness: &mut Harness, code: Code) -> Result<(), Stop> {
     /// °/s².
     const LIMIT: i32 = 100;
     /// ms by which the clock may have begun too late.
     const LATE: u64 = 50;
-    bench.ready()?;
-    accelerate(bench, LIMIT)?;
-    let request = ahead(bench, code, 60)?;
-    bench.ask(request)?;
+    harness.ready()?;
+    accelerate(harness, LIMIT)?;
+    let request = ahead(harness, code, 60)?;
+    harness.ask(request)?;
     let mut too_fast = None;
-    let fast = bench.watch(4_000, |seen| {
+    let fast = harness.watch(4_000, |seen| {
         let allowed = 5 + LIMIT as u64 * (seen.millis + LATE) * 5 / 4 / 1000;
         if u64::from(seen.speed.unsigned_abs()) > allowed {
             too_fast = Some(*seen);
@@ -156,7 +156,7 @@ fn limited(bench: &mut Bench, code: Code) -> Result<(), Stop> {
     if let Some(seen) = too_fast {
         let (speed, millis) = (seen.speed, seen.millis);
         let words = format!("no more than {LIMIT} °/s² (0x34), not {speed} °/s after {millis} ms");
-        return Err(bench.failed(words));
+        return Err(harness.failed(words));
     }
-    bench.require(fast, "a motor that speeds up beyond 45 °/s within 4 s")
+    harness.require(fast, "a motor that speeds up beyond 45 °/s within 4 s")
 }

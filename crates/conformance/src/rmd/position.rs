@@ -3,8 +3,8 @@
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::{CentiDegrees, SpeedLimit, TurnCentiDegrees};
 
-use super::bench::Bench;
 use super::case::{Clauses, case, subject};
+use super::harness::Harness;
 use crate::case::{Case, Need, Stop};
 use crate::reading::{R13, R15, R16, R40};
 
@@ -67,93 +67,97 @@ const TURNS: [(Code, Turn, [Clauses; 5]); 2] = [
     ),
 ];
 
-pub(super) fn cases() -> Vec<Case<Bench>> {
+pub(super) fn cases() -> Vec<Case<Harness>> {
     let mut cases = multi_turn();
     for (code, turn, clauses) in TURNS {
         cases.extend(single_turn(code, turn, clauses));
     }
-    cases.push(case("the_long_way_is_turned_when_it_is_told", &["RMD-A6-04"], |bench| {
+    cases.push(case("the_long_way_is_turned_when_it_is_told", &["RMD-A6-04"], |harness| {
         let (_, turn, _) = TURNS[1];
-        turns(bench, turn, COUNTERCLOCKWISE, 2_000, -34_000)
+        turns(harness, turn, COUNTERCLOCKWISE, 2_000, -34_000)
     }));
-    cases.push(case("the_greatest_speed_of_a_turn_holds", &["RMD-A6-06"], |bench| {
-        bench.gently()?;
-        let angle = bench.circle(9_000)?;
+    cases.push(case("the_greatest_speed_of_a_turn_holds", &["RMD-A6-06"], |harness| {
+        harness.gently()?;
+        let angle = harness.circle(9_000)?;
         let data =
             SetSingleTurnPositionLimited { direction: CLOCKWISE, max_speed: SLOW, angle }.encode();
-        no_faster(bench, data)
+        no_faster(harness, data)
     }));
     cases.into_iter().map(|case| case.needs(&[Need::Spin])).collect()
 }
 
-fn multi_turn() -> Vec<Case<Bench>> {
+fn multi_turn() -> Vec<Case<Harness>> {
     let mut cases = Vec::new();
     for (code, command, small, wide) in MOVES {
         let name = subject("a_position_is_reached", code);
-        cases.push(case(name, small, move |bench| {
-            bench.gently()?;
-            let start = bench.angle_in_reach()?;
-            moves(bench, command(start + 1_000), start.into(), 1_000)?;
-            moves(bench, command(start), i64::from(start) + 1_000, -1_000)
+        cases.push(case(name, small, move |harness| {
+            harness.gently()?;
+            let start = harness.angle_in_reach()?;
+            moves(harness, command(start + 1_000), start.into(), 1_000)?;
+            moves(harness, command(start), i64::from(start) + 1_000, -1_000)
         }));
         let name = subject("a_position_is_reached_the_way_of_the_difference", code);
-        cases.push(case(name, wide, move |bench| {
-            bench.gently()?;
-            let start = bench.angle_in_reach()?;
-            moves(bench, command(start + 20_000), start.into(), 20_000)?;
-            moves(bench, command(start), i64::from(start) + 20_000, -20_000)
+        cases.push(case(name, wide, move |harness| {
+            harness.gently()?;
+            let start = harness.angle_in_reach()?;
+            moves(harness, command(start + 20_000), start.into(), 20_000)?;
+            moves(harness, command(start), i64::from(start) + 20_000, -20_000)
         }));
     }
-    cases.push(case("the_greatest_speed_of_a_move_holds", &["RMD-A4-04"], |bench| {
-        bench.gently()?;
-        let angle = CentiDegrees(bench.angle_in_reach()? + 9_000);
-        no_faster(bench, SetPositionLimited { max_speed: SLOW, angle }.encode())
+    cases.push(case("the_greatest_speed_of_a_move_holds", &["RMD-A4-04"], |harness| {
+        harness.gently()?;
+        let angle = CentiDegrees(harness.angle_in_reach()? + 9_000);
+        no_faster(harness, SetPositionLimited { max_speed: SLOW, angle }.encode())
     }));
-    let zero = case("with_a_greatest_speed_of_0_nothing_turns", &["RMD-A4-04"], |bench| {
-        bench.gently()?;
-        let start = bench.angle()?;
-        let angle = CentiDegrees(bench.angle_in_reach()? + 2_000);
-        bench.command(SetPositionLimited { max_speed: SpeedLimit(0), angle })?;
-        stays(bench, start)
+    let zero = case("with_a_greatest_speed_of_0_nothing_turns", &["RMD-A4-04"], |harness| {
+        harness.gently()?;
+        let start = harness.angle()?;
+        let angle = CentiDegrees(harness.angle_in_reach()? + 2_000);
+        harness.command(SetPositionLimited { max_speed: SpeedLimit(0), angle })?;
+        stays(harness, start)
     });
     cases.push(zero.reading(R13));
     cases
 }
 
-fn single_turn(code: Code, turn: Turn, clauses: [Clauses; 5]) -> [Case<Bench>; 5] {
+fn single_turn(code: Code, turn: Turn, clauses: [Clauses; 5]) -> [Case<Harness>; 5] {
     let [clockwise, counterclockwise, again, outside, other] = clauses;
     [
-        case(subject("a_turn_goes_clockwise", code), clockwise, move |bench| {
-            turns(bench, turn, CLOCKWISE, 2_000, 2_000)
+        case(subject("a_turn_goes_clockwise", code), clockwise, move |harness| {
+            turns(harness, turn, CLOCKWISE, 2_000, 2_000)
         }),
-        case(subject("a_turn_goes_counterclockwise", code), counterclockwise, move |bench| {
-            turns(bench, turn, COUNTERCLOCKWISE, -2_000, -2_000)
+        case(subject("a_turn_goes_counterclockwise", code), counterclockwise, move |harness| {
+            turns(harness, turn, COUNTERCLOCKWISE, -2_000, -2_000)
         }),
-        case(subject("the_same_turn_again_is_none", code), again, move |bench| {
-            bench.gently()?;
-            let (start, angle) = (bench.angle()?, bench.circle(1_500)?);
-            moves(bench, turn(CLOCKWISE, angle), start, 1_500)?;
-            let there = bench.angle()?;
-            bench.ask(turn(CLOCKWISE, angle))?;
-            stays(bench, there)
+        case(subject("the_same_turn_again_is_none", code), again, move |harness| {
+            harness.gently()?;
+            let (start, angle) = (harness.angle()?, harness.circle(1_500)?);
+            moves(harness, turn(CLOCKWISE, angle), start, 1_500)?;
+            let there = harness.angle()?;
+            harness.ask(turn(CLOCKWISE, angle))?;
+            stays(harness, there)
         })
         .reading(R16),
-        case(subject("an_angle_beyond_the_turn_is_not_carried_out", code), outside, move |bench| {
-            bench.gently()?;
-            let start = bench.angle()?;
-            for angle in [FULL_TURN, u16::MAX] {
-                bench.ask(turn(CLOCKWISE, TurnCentiDegrees(angle)))?;
-                stays(bench, start)?;
-            }
-            Ok(())
-        })
+        case(
+            subject("an_angle_beyond_the_turn_is_not_carried_out", code),
+            outside,
+            move |harness| {
+                harness.gently()?;
+                let start = harness.angle()?;
+                for angle in [FULL_TURN, u16::MAX] {
+                    harness.ask(turn(CLOCKWISE, TurnCentiDegrees(angle)))?;
+                    stays(harness, start)?;
+                }
+                Ok(())
+            },
+        )
         .reading(R15),
-        case(subject("a_direction_that_is_none_is_not_carried_out", code), other, move |bench| {
-            bench.gently()?;
-            let start = bench.angle()?;
-            let angle = bench.circle(2_000)?;
-            bench.ask(turn(SpinDirection::Unknown(2), angle))?;
-            stays(bench, start)
+        case(subject("a_direction_that_is_none_is_not_carried_out", code), other, move |harness| {
+            harness.gently()?;
+            let start = harness.angle()?;
+            let angle = harness.circle(2_000)?;
+            harness.ask(turn(SpinDirection::Unknown(2), angle))?;
+            stays(harness, start)
         })
         .reading(R15),
     ]
@@ -161,55 +165,55 @@ fn single_turn(code: Code, turn: Turn, clauses: [Clauses; 5]) -> [Case<Bench>; 5
 
 /// A single-turn command to an angle that is `further` (0.01°) turns the motor by `by`.
 fn turns(
-    bench: &mut Bench,
+    harness: &mut Harness,
     turn: Turn,
     way: SpinDirection,
     further: i32,
     by: i64,
 ) -> Result<(), Stop> {
-    bench.gently()?;
-    let (start, angle) = (bench.angle()?, bench.circle(further)?);
-    moves(bench, turn(way, angle), start, by)
+    harness.gently()?;
+    let (start, angle) = (harness.angle()?, harness.circle(further)?);
+    moves(harness, turn(way, angle), start, by)
 }
 
 /// The command turns the motor from `start` by `by` (0.01°) and no other way.
-fn moves(bench: &mut Bench, command: [u8; 8], start: i64, by: i64) -> Result<(), Stop> {
-    bench.ask(command)?;
+fn moves(harness: &mut Harness, command: [u8; 8], start: i64, by: i64) -> Result<(), Stop> {
+    harness.ask(command)?;
     let target = start + by;
     let way = start.min(target) - BEYOND..=start.max(target) + BEYOND;
     let mut astray = false;
-    let reached = bench.watch(10_000, |seen| {
+    let reached = harness.watch(10_000, |seen| {
         astray = !way.contains(&seen.angle);
         astray || ((seen.angle - target).abs() <= NEAR && seen.speed.abs() <= 5)
     })?;
     let (from, to) = (start as f64 / 100.0, target as f64 / 100.0);
     let words =
         format!("a move from {from:.1}° to {to:.1}° (within Max Angle of the vendor's tool)");
-    bench.require(reached && !astray, words)
+    harness.require(reached && !astray, words)
 }
 
 /// The motor does not turn.
-fn stays(bench: &mut Bench, start: i64) -> Result<(), Stop> {
-    let turned = bench.watch(500, |seen| (seen.angle - start).abs() > NEAR)?;
-    bench.require(!turned, format!("no movement from {:.1}°", start as f64 / 100.0))
+fn stays(harness: &mut Harness, start: i64) -> Result<(), Stop> {
+    let turned = harness.watch(500, |seen| (seen.angle - start).abs() > NEAR)?;
+    harness.require(!turned, format!("no movement from {:.1}°", start as f64 / 100.0))
 }
 
 /// A move by 90° is no faster than it may be, and as fast.
-fn no_faster(bench: &mut Bench, command: [u8; 8]) -> Result<(), Stop> {
+fn no_faster(harness: &mut Harness, command: [u8; 8]) -> Result<(), Stop> {
     let most = SLOW.0 as i16;
-    bench.ask(command)?;
+    harness.ask(command)?;
     let mut greatest = 0;
-    bench.watch(4_000, |seen| {
+    harness.watch(4_000, |seen| {
         greatest = greatest.max(seen.speed.abs());
         greatest > most / 2 && seen.speed.abs() <= 5
     })?;
     let words = format!("a move at {most} °/s, not at {greatest} °/s");
-    bench.require(greatest <= most + most / 8 + 3, &*words)?;
-    let as_fast = bench.require(greatest >= most / 2, words);
-    bench.note(R40, as_fast)
+    harness.require(greatest <= most + most / 8 + 3, &*words)?;
+    let as_fast = harness.require(greatest >= most / 2, words);
+    harness.note(R40, as_fast)
 }
 
-impl Bench {
+impl Harness {
     /// The single-turn angle `further` (0.01°) clockwise.
     fn circle(&mut self, further: i32) -> Result<TurnCentiDegrees, Stop> {
         let angle = i32::from(self.read(ReadSingleTurnAngle)?.angle.0) + further;

@@ -5,7 +5,7 @@ use motorlink_proto::rmd::{Stop as Halt, *};
 use motorlink_proto::time::Duration;
 use motorlink_proto::units::DpsPerSecond;
 
-use super::bench::Bench;
+use super::harness::Harness;
 use super::kept::Kept;
 use crate::case::{Need, ReadAs, Stop, Subject};
 use crate::finding::Finding;
@@ -27,7 +27,7 @@ const CHANGE: Duration = Duration::from_millis(100);
 /// How long a motor may take until it answers when its power came back, ms.
 const STARTING: u64 = 5_000;
 
-impl Subject for Bench {
+impl Subject for Harness {
     fn begin(&mut self) -> Result<(), Stop> {
         self.go_on()?;
         if let Some((dialect, id)) = self.foreign {
@@ -62,7 +62,7 @@ impl Subject for Bench {
     }
 }
 
-impl Bench {
+impl Harness {
     /// Waits until the motor is at rest. One that never is, is not tested: what turns it is not
     /// this kit's to stop.
     pub(super) fn at_rest(&mut self) -> Result<(), Stop> {
@@ -189,7 +189,7 @@ impl Bench {
         let off = if kept.moved { self.switch_off() } else { Ok(()) };
         let others = self.switch_others_off(kept.others);
         let fault = if kept.fault { self.insist(Self::end_fault) } else { Ok(()) };
-        let rom = self.insist(|bench| bench.put_back_rom(&kept));
+        let rom = self.insist(|harness| harness.put_back_rom(&kept));
         let gains = kept.gains.map_or(Ok(()), |gains| self.insist(|b| b.put_back_gains(gains)));
         let acceleration = kept
             .acceleration
@@ -211,7 +211,7 @@ impl Bench {
     /// Off, and then a look whether it is. A motor that goes on is told to stop instead, and is not
     /// turned again.
     fn switch_off(&mut self) -> Result<(), Stop> {
-        let told = self.insist(|bench| bench.ask(Off.encode()).map(|_| ()));
+        let told = self.insist(|harness| harness.ask(Off.encode()).map(|_| ()));
         if told.is_err() {
             self.off_unheard([self.id()])?;
         }

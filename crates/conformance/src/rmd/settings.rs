@@ -3,58 +3,58 @@
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::DpsPerSecond;
 
-use super::bench::Bench;
 use super::case::case;
+use super::harness::Harness;
 use crate::case::{Case, Need, Stop};
 use crate::reading::{R24, R37};
 
-pub(super) fn cases() -> Vec<Case<Bench>> {
+pub(super) fn cases() -> Vec<Case<Harness>> {
     vec![
         case(
             "gains_in_ram_are_read_as_they_were_written",
             &["RMD-31-02", "RMD-31-01", "RMD-30-04", "RMD-30-05", "RMD-30-06", "RMD-30-07"],
-            |bench| {
-                let gains = others(bench.keep_gains()?);
-                write(bench, gains)?;
-                gains_are(bench, gains)
+            |harness| {
+                let gains = others(harness.keep_gains()?);
+                write(harness, gains)?;
+                gains_are(harness, gains)
             },
         ),
-        case("gains_in_ram_are_lost_with_the_power", &["RMD-31-03"], |bench| {
-            bench.power_cycle()?;
-            let rom = bench.keep_gains()?;
-            write(bench, others(rom))?;
-            bench.power_cycle()?;
-            gains_are(bench, rom)
+        case("gains_in_ram_are_lost_with_the_power", &["RMD-31-03"], |harness| {
+            harness.power_cycle()?;
+            let rom = harness.keep_gains()?;
+            write(harness, others(rom))?;
+            harness.power_cycle()?;
+            gains_are(harness, rom)
         })
         .needs(&[Need::PowerCycle]),
-        case("gains_in_rom_outlast_the_power", &["RMD-32-02", "RMD-32-01"], |bench| {
-            let gains = others(bench.keep_rom_gains()?);
-            bench.ask(WritePidRom(gains).encode())?;
-            bench.power_cycle()?;
-            gains_are(bench, gains)
+        case("gains_in_rom_outlast_the_power", &["RMD-32-02", "RMD-32-01"], |harness| {
+            let gains = others(harness.keep_rom_gains()?);
+            harness.ask(WritePidRom(gains).encode())?;
+            harness.power_cycle()?;
+            gains_are(harness, gains)
         })
         .needs(&[Need::Rom, Need::PowerCycle]),
         case(
             "the_acceleration_is_read_as_it_was_written",
             &["RMD-34-02", "RMD-34-01", "RMD-33-04"],
-            |bench| accelerations_are_kept(bench, &[0x012C, 0x07D0]),
+            |harness| accelerations_are_kept(harness, &[0x012C, 0x07D0]),
         ),
         case(
             "any_acceleration_is_read_as_it_was_written",
             &["RMD-34-02", "RMD-34-01", "RMD-33-04"],
-            |bench| accelerations_are_kept(bench, &[1, 0x0102_0304]),
+            |harness| accelerations_are_kept(harness, &[1, 0x0102_0304]),
         )
         .reading(R37),
-        case("no_acceleration_limit_can_be_written", &["RMD-34-02"], |bench| {
-            accelerations_are_kept(bench, &[0, -1])
+        case("no_acceleration_limit_can_be_written", &["RMD-34-02"], |harness| {
+            accelerations_are_kept(harness, &[0, -1])
         })
         .reading(R24),
-        case("the_acceleration_is_lost_with_the_power", &["RMD-34-04"], |bench| {
-            bench.power_cycle()?;
-            let rom = bench.keep_acceleration()?;
-            accelerate(bench, rom.0 ^ 0x40)?;
-            bench.power_cycle()?;
-            acceleration_is(bench, rom.0)
+        case("the_acceleration_is_lost_with_the_power", &["RMD-34-04"], |harness| {
+            harness.power_cycle()?;
+            let rom = harness.keep_acceleration()?;
+            accelerate(harness, rom.0 ^ 0x40)?;
+            harness.power_cycle()?;
+            acceleration_is(harness, rom.0)
         })
         .needs(&[Need::PowerCycle]),
     ]
@@ -72,33 +72,33 @@ fn others(gains: Pid) -> Pid {
     }
 }
 
-pub(super) fn write(bench: &mut Bench, gains: Pid) -> Result<(), Stop> {
-    bench.keep_gains()?;
-    bench.ask(WritePidRam(gains).encode()).map(|_| ())
+pub(super) fn write(harness: &mut Harness, gains: Pid) -> Result<(), Stop> {
+    harness.keep_gains()?;
+    harness.ask(WritePidRam(gains).encode()).map(|_| ())
 }
 
-fn gains_are(bench: &mut Bench, gains: Pid) -> Result<(), Stop> {
-    let data = bench.ask(ReadPid.encode())?;
+fn gains_are(harness: &mut Harness, gains: Pid) -> Result<(), Stop> {
+    let data = harness.ask(ReadPid.encode())?;
     let bytes = gains.encode_as(Code::ReadPid);
-    bench.require(data[2..] == bytes[2..], format!("gains {:02X?} in DATA[2] on", &bytes[2..]))
+    harness.require(data[2..] == bytes[2..], format!("gains {:02X?} in DATA[2] on", &bytes[2..]))
 }
 
-pub(super) fn accelerate(bench: &mut Bench, digits: i32) -> Result<(), Stop> {
-    bench.keep_acceleration()?;
+pub(super) fn accelerate(harness: &mut Harness, digits: i32) -> Result<(), Stop> {
+    harness.keep_acceleration()?;
     let acceleration = DpsPerSecond(digits);
-    bench.ask(WriteAccelerationRam(Acceleration { acceleration }).encode()).map(|_| ())
+    harness.ask(WriteAccelerationRam(Acceleration { acceleration }).encode()).map(|_| ())
 }
 
-fn accelerations_are_kept(bench: &mut Bench, values: &[i32]) -> Result<(), Stop> {
+fn accelerations_are_kept(harness: &mut Harness, values: &[i32]) -> Result<(), Stop> {
     for &digits in values {
-        accelerate(bench, digits)?;
-        acceleration_is(bench, digits)?;
+        accelerate(harness, digits)?;
+        acceleration_is(harness, digits)?;
     }
     Ok(())
 }
 
-fn acceleration_is(bench: &mut Bench, digits: i32) -> Result<(), Stop> {
-    let data = bench.ask(ReadAcceleration.encode())?;
+fn acceleration_is(harness: &mut Harness, digits: i32) -> Result<(), Stop> {
+    let data = harness.ask(ReadAcceleration.encode())?;
     let bytes = digits.to_le_bytes();
-    bench.require(data[4..] == bytes, format!("{digits} °/s², {bytes:02X?} in DATA[4] on"))
+    harness.require(data[4..] == bytes, format!("{digits} °/s², {bytes:02X?} in DATA[4] on"))
 }

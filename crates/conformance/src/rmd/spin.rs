@@ -3,7 +3,7 @@
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::Duration;
 
-use super::bench::Bench;
+use super::harness::Harness;
 use super::settings::accelerate;
 use crate::case::{ReadAs, Stop};
 use crate::reading::R39;
@@ -28,7 +28,7 @@ pub(super) struct Seen {
     pub millis: u64,
 }
 
-impl Bench {
+impl Harness {
     /// Limits the acceleration, for the sake of whatever the motor is mounted to.
     pub(super) fn gently(&mut self) -> Result<(), Stop> {
         self.ready()?;

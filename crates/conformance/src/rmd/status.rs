@@ -3,8 +3,8 @@
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::{Celsius, CentiDps, DeciVolts, IqFeedback};
 
-use super::bench::Bench;
 use super::case::case;
+use super::harness::Harness;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{R18, R38};
 
@@ -17,90 +17,94 @@ const RIPPLE: u16 = 10;
 /// Currents of the three phases sum to 0 within this and a tenth of them, 1/64 A.
 const SENSING: i32 = 32;
 
-pub(super) fn cases() -> Vec<Case<Bench>> {
+pub(super) fn cases() -> Vec<Case<Harness>> {
     let mut cases = vec![
-        case("temperature_and_voltage_can_be", &["RMD-9A-03", "RMD-9A-04"], |bench| {
-            let status = bench.read(ReadStatus)?;
-            status_1_can_be(bench, status.temperature, status.voltage)
+        case("temperature_and_voltage_can_be", &["RMD-9A-03", "RMD-9A-04"], |harness| {
+            let status = harness.read(ReadStatus)?;
+            status_1_can_be(harness, status.temperature, status.voltage)
         }),
         case(
             "the_reply_to_clear_is_that_to_status_1",
             &["RMD-9B-04", "RMD-9B-05", "RMD-9B-06"],
-            |bench| {
-                let before = bench.read(ReadStatus)?;
+            |harness| {
+                let before = harness.read(ReadStatus)?;
                 if !before.errors.is_empty() {
                     let why = format!("the motor has an error that would go: {}", before.errors);
                     return Err(Stop::Skipped(why));
                 }
-                let status = bench.read(ClearErrors)?;
-                status_1_can_be(bench, status.temperature, status.voltage)?;
+                let status = harness.read(ClearErrors)?;
+                status_1_can_be(harness, status.temperature, status.voltage)?;
                 let same = status.voltage.0.abs_diff(before.voltage.0) <= RIPPLE
                     && status.errors.active() == before.errors.active()
                     && status.temperature.0.abs_diff(before.temperature.0) <= 2;
                 let Status { temperature, voltage, .. } = before;
-                bench.require(same, format!("{temperature}, {voltage} and no error, as in 0x9A"))
+                harness.require(same, format!("{temperature}, {voltage} and no error, as in 0x9A"))
             },
         ),
-        case("status_2_can_be", &["RMD-9C-03", "RMD-9C-04", "RMD-9C-05"], |bench| {
-            let status = bench.read(ReadMotionStatus)?;
-            bench.plausible(&status)
+        case("status_2_can_be", &["RMD-9C-03", "RMD-9C-04", "RMD-9C-05"], |harness| {
+            let status = harness.read(ReadMotionStatus)?;
+            harness.plausible(&status)
         }),
         case(
             "status_1_and_status_2_have_the_same_temperature",
             &["RMD-9C-03", "RMD-9A-03"],
-            |bench| {
-                let one = bench.read(ReadStatus)?.temperature;
-                let two = bench.read(ReadMotionStatus)?.temperature;
-                bench.require(one.0.abs_diff(two.0) <= 2, format!("about {one}, as 0x9A has it"))
+            |harness| {
+                let one = harness.read(ReadStatus)?.temperature;
+                let two = harness.read(ReadMotionStatus)?.temperature;
+                harness.require(one.0.abs_diff(two.0) <= 2, format!("about {one}, as 0x9A has it"))
             },
         ),
-        case("phase_currents_sum_to_0", &["RMD-9D-04"], |bench| phases(bench).map(|_| ())),
+        case("phase_currents_sum_to_0", &["RMD-9D-04"], |harness| phases(harness).map(|_| ())),
     ];
     cases.extend(errors());
     cases
 }
 
-fn errors() -> Vec<Case<Bench>> {
+fn errors() -> Vec<Case<Harness>> {
     vec![
         case(
             "a_fault_is_told_in_the_error_state",
             &["RMD-9A-05", "RMD-9A-07", "RMD-9A-08"],
-            |bench| {
-                bench.fault(true)?;
-                let status = bench.read(ReadStatus)?;
+            |harness| {
+                harness.fault(true)?;
+                let status = harness.read(ReadStatus)?;
                 let told = told(status.errors);
-                bench.require(told, "bit 0 (low voltage) or bit 3 (over temperature) in DATA[7]")
+                harness.require(told, "bit 0 (low voltage) or bit 3 (over temperature) in DATA[7]")
             },
         )
         .needs(&[Need::Fault]),
         case(
             "an_error_stays_while_its_cause_lasts",
             &["RMD-9B-11", "RMD-9B-06", "RMD-9B-08", "RMD-9B-09"],
-            |bench| {
-                bench.fault(true)?;
-                let cleared = bench.read(ClearErrors)?.errors;
-                bench.require(told(cleared), "the flag still set, in the reply to 0x9B")?;
-                let after = bench.read(ReadStatus)?.errors;
-                bench.require(told(after), "the flag still set, in the reply to 0x9A")
+            |harness| {
+                harness.fault(true)?;
+                let cleared = harness.read(ClearErrors)?.errors;
+                harness.require(told(cleared), "the flag still set, in the reply to 0x9B")?;
+                let after = harness.read(ReadStatus)?.errors;
+                harness.require(told(after), "the flag still set, in the reply to 0x9A")
             },
         )
         .needs(&[Need::Fault]),
-        case("an_error_is_cleared_when_its_cause_is_gone", &["RMD-9B-02", "RMD-9B-06"], |bench| {
-            bench.fault(true)?;
-            bench.read(ReadStatus)?;
-            bench.fault(false)?;
-            let cleared = bench.read(ClearErrors)?.errors;
-            bench.require(!told(cleared), "no flag, in the reply to 0x9B")?;
-            let after = bench.read(ReadStatus)?.errors;
-            bench.require(!told(after), "no flag, in the reply to 0x9A")
-        })
+        case(
+            "an_error_is_cleared_when_its_cause_is_gone",
+            &["RMD-9B-02", "RMD-9B-06"],
+            |harness| {
+                harness.fault(true)?;
+                harness.read(ReadStatus)?;
+                harness.fault(false)?;
+                let cleared = harness.read(ClearErrors)?.errors;
+                harness.require(!told(cleared), "no flag, in the reply to 0x9B")?;
+                let after = harness.read(ReadStatus)?.errors;
+                harness.require(!told(after), "no flag, in the reply to 0x9A")
+            },
+        )
         .needs(&[Need::Fault]),
-        case("while_an_error_is_active_the_motor_stays_off", &["RMD-9A-10"], |bench| {
-            bench.gently()?;
-            bench.fault(true)?;
-            bench.command(SetSpeed { speed: CentiDps(6_000) })?;
-            let turned = bench.watch(500, |seen| seen.speed.abs() > 10)?;
-            bench.require(!turned, "a motor at rest")
+        case("while_an_error_is_active_the_motor_stays_off", &["RMD-9A-10"], |harness| {
+            harness.gently()?;
+            harness.fault(true)?;
+            harness.command(SetSpeed { speed: CentiDps(6_000) })?;
+            let turned = harness.watch(500, |seen| seen.speed.abs() > 10)?;
+            harness.require(!turned, "a motor at rest")
         })
         .needs(&[Need::Spin, Need::Fault])
         .reading(R18),
@@ -114,27 +118,31 @@ fn told(errors: Errors) -> bool {
 }
 
 /// Phase currents, 1/64 A, that sum to zero.
-pub(super) fn phases(bench: &mut Bench) -> Result<[i32; 3], Stop> {
-    let PhaseCurrents { phase_a, phase_b, phase_c } = bench.read(ReadPhaseCurrents)?;
+pub(super) fn phases(harness: &mut Harness) -> Result<[i32; 3], Stop> {
+    let PhaseCurrents { phase_a, phase_b, phase_c } = harness.read(ReadPhaseCurrents)?;
     let currents = [phase_a, phase_b, phase_c].map(|current| i32::from(current.0));
     let sum: i32 = currents.iter().sum();
     let size: i32 = currents.iter().map(|current| current.abs()).sum();
-    bench
+    harness
         .require(sum.abs() <= SENSING + size / 10, "three currents whose sum is about 0")
         .read_as(R38)?;
     Ok(currents)
 }
 
-fn status_1_can_be(bench: &Bench, temperature: Celsius, voltage: DeciVolts) -> Result<(), Stop> {
-    temperature_can_be(bench, temperature)?;
-    bench.require(VOLTAGES.contains(&voltage.0), format!("5 V to 100 V, not {voltage}"))
+fn status_1_can_be(
+    harness: &Harness,
+    temperature: Celsius,
+    voltage: DeciVolts,
+) -> Result<(), Stop> {
+    temperature_can_be(harness, temperature)?;
+    harness.require(VOLTAGES.contains(&voltage.0), format!("5 V to 100 V, not {voltage}"))
 }
 
-fn temperature_can_be(bench: &Bench, temperature: Celsius) -> Result<(), Stop> {
-    bench.require(TEMPERATURES.contains(&temperature.0), format!("-40 °C up, not {temperature}"))
+fn temperature_can_be(harness: &Harness, temperature: Celsius) -> Result<(), Stop> {
+    harness.require(TEMPERATURES.contains(&temperature.0), format!("-40 °C up, not {temperature}"))
 }
 
-impl Bench {
+impl Harness {
     /// A reply to 0x9C or to a motion command has values that can be.
     pub(super) fn plausible(&self, status: &MotionStatus) -> Result<(), Stop> {
         const MOST: u16 = 2048;

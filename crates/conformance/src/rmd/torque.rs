@@ -9,8 +9,8 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::time::Duration;
 use motorlink_proto::units::{CentiDegrees, IqCommand, IqFeedback, PhaseCurrent, SpeedLimit};
 
-use super::bench::Bench;
 use super::case::case;
+use super::harness::Harness;
 use super::status::phases;
 use crate::case::{Case, Need, Stop};
 use crate::reading::R38;
@@ -20,33 +20,33 @@ pub(super) const AMPERE: i16 = 62;
 /// The most that is tried to get a motor off its friction, digits.
 const MOST: i16 = 2 * AMPERE;
 
-pub(super) fn cases() -> Vec<Case<Bench>> {
+pub(super) fn cases() -> Vec<Case<Harness>> {
     vec![
         case(
             "torque_has_the_sign_of_its_command",
             &["RMD-A1-01", "RMD-A1-07", "RMD-A1-08"],
-            |bench| {
-                let clockwise = break_away(bench, 1)?;
-                let counterclockwise = break_away(bench, -1)?;
+            |harness| {
+                let clockwise = break_away(harness, 1)?;
+                let counterclockwise = break_away(harness, -1)?;
                 let apart = clockwise.signum() != counterclockwise.signum();
-                bench.require(apart, "movement the other way under torque of the other sign")
+                harness.require(apart, "movement the other way under torque of the other sign")
             },
         ),
-        case("a_torque_digit_is_16_milliamperes", &["RMD-A1-02", "RMD-9C-04"], |bench| {
-            let amps = pulses(bench, one, torque)?;
-            torque_is_an_ampere(bench, amps)
+        case("a_torque_digit_is_16_milliamperes", &["RMD-A1-02", "RMD-9C-04"], |harness| {
+            let amps = pulses(harness, one, torque)?;
+            torque_is_an_ampere(harness, amps)
         }),
-        case("phase_currents_have_64_digits_an_ampere", &["RMD-9D-05", "RMD-9D-04"], |bench| {
+        case("phase_currents_have_64_digits_an_ampere", &["RMD-9D-05", "RMD-9D-04"], |harness| {
             // Where the rotor stands each phase may happen to have no current.
             for _ in 0..4 {
-                bench.gently()?;
-                let angle = CentiDegrees(bench.angle_in_reach()? + 300);
-                bench.command(SetPositionLimited { max_speed: SpeedLimit(30), angle })?;
-                bench.watch(300, |_| false)?;
-                let amps = pulses(bench, one, amplitude)?;
+                harness.gently()?;
+                let angle = CentiDegrees(harness.angle_in_reach()? + 300);
+                harness.command(SetPositionLimited { max_speed: SpeedLimit(30), angle })?;
+                harness.watch(300, |_| false)?;
+                let amps = pulses(harness, one, amplitude)?;
                 // Relatives name the amplitude or the effective value of the same current.
                 let words = format!("phase currents of about 1 A under 1 A, not {amps:.2} A");
-                bench.require((0.6..1.6).contains(&amps), words)?;
+                harness.require((0.6..1.6).contains(&amps), words)?;
             }
             Ok(())
         })
@@ -58,72 +58,73 @@ pub(super) fn cases() -> Vec<Case<Bench>> {
 }
 
 /// The request with this torque for the motor under test.
-fn one(bench: &Bench, torque: i16) -> CanFrame {
-    bench.frame(SetTorque { iq: IqCommand(torque) }.encode())
+fn one(harness: &Harness, torque: i16) -> CanFrame {
+    harness.frame(SetTorque { iq: IqCommand(torque) }.encode())
 }
 
 /// Raises the torque until the motor turns; by how much it turned, 0.01°.
-fn break_away(bench: &mut Bench, sign: i16) -> Result<i64, Stop> {
-    bench.ready()?;
-    let start = bench.angle()?;
+fn break_away(harness: &mut Harness, sign: i16) -> Result<i64, Stop> {
+    harness.ready()?;
+    let start = harness.angle()?;
     let mut turned = 0;
     let mut iq = 0;
     for digits in (5..=MOST).step_by(5) {
-        bench.command(SetTorque { iq: IqCommand(sign * digits) })?;
-        let turns = bench.watch(50, |seen| {
+        harness.command(SetTorque { iq: IqCommand(sign * digits) })?;
+        let turns = harness.watch(50, |seen| {
             (turned, iq) = (seen.angle - start, seen.iq);
             turned.abs() > 100
         })?;
         if turns {
             let told = digits < 10 || iq * sign > 0;
-            bench.require(told, format!("torque current with the sign of {}", sign * digits))?;
-            bench.ask(Off.encode())?;
-            bench.comes_to_a_stand(5_000)?;
+            harness.require(told, format!("torque current with the sign of {}", sign * digits))?;
+            harness.ask(Off.encode())?;
+            harness.comes_to_a_stand(5_000)?;
             return Ok(turned);
         }
     }
-    bench.ask(Off.encode())?;
+    harness.ask(Off.encode())?;
     let amps = IqFeedback(iq * sign).amps();
-    bench.require((1.5..2.5).contains(&amps), format!("about 2 A or movement, not {amps:.2} A"))?;
+    harness
+        .require((1.5..2.5).contains(&amps), format!("about 2 A or movement, not {amps:.2} A"))?;
     Err(Stop::Skipped("the motor does not turn under 2 A: its load holds it".to_owned()))
 }
 
 /// Torque of an ampere this way and that way, so shortly that the motor hardly turns; the mean of
 /// what `look` gives meanwhile for one or the other sign.
 pub(super) fn pulses(
-    bench: &mut Bench,
-    request: impl Fn(&Bench, i16) -> CanFrame,
-    look: impl Fn(&mut Bench, i16) -> Result<f64, Stop>,
+    harness: &mut Harness,
+    request: impl Fn(&Harness, i16) -> CanFrame,
+    look: impl Fn(&mut Harness, i16) -> Result<f64, Stop>,
 ) -> Result<f64, Stop> {
     const PULSES: i16 = 10;
     const SETTLES: Duration = Duration::from_millis(5);
-    bench.ready()?;
+    harness.ready()?;
     // A motor that does not answer this is not left under torque for as long as that takes.
-    look(bench, 1)?;
+    look(harness, 1)?;
     let mut sum = 0.0;
     for sign in (0..PULSES).map(|n| if n % 2 == 0 { 1 } else { -1 }) {
-        let frame = request(bench, sign * AMPERE);
-        bench.ask_frame(&frame)?;
-        bench.pause(SETTLES)?;
-        sum += look(bench, sign)?;
+        let frame = request(harness, sign * AMPERE);
+        harness.ask_frame(&frame)?;
+        harness.pause(SETTLES)?;
+        sum += look(harness, sign)?;
     }
-    bench.ask(Off.encode())?;
-    bench.slows_down()?;
+    harness.ask(Off.encode())?;
+    harness.slows_down()?;
     Ok(sum / f64::from(PULSES))
 }
 
 /// Torque current along a sign, A.
-pub(super) fn torque(bench: &mut Bench, sign: i16) -> Result<f64, Stop> {
-    Ok(f64::from(sign) * bench.read(ReadMotionStatus)?.iq.amps())
+pub(super) fn torque(harness: &mut Harness, sign: i16) -> Result<f64, Stop> {
+    Ok(f64::from(sign) * harness.read(ReadMotionStatus)?.iq.amps())
 }
 
 /// Amplitude of the phase currents, A.
-fn amplitude(bench: &mut Bench, _: i16) -> Result<f64, Stop> {
-    let squares: i32 = phases(bench)?.iter().map(|digits| digits * digits).sum();
+fn amplitude(harness: &mut Harness, _: i16) -> Result<f64, Stop> {
+    let squares: i32 = phases(harness)?.iter().map(|digits| digits * digits).sum();
     Ok((f64::from(squares) * 2.0 / 3.0).sqrt() * PhaseCurrent::SCALE)
 }
 
-pub(super) fn torque_is_an_ampere(bench: &Bench, amps: f64) -> Result<(), Stop> {
+pub(super) fn torque_is_an_ampere(harness: &Harness, amps: f64) -> Result<(), Stop> {
     let words = format!("about 1 A in the middle of ten pulses of ±1 A, not {amps:.2} A");
-    bench.require((0.85..1.15).contains(&amps), words)
+    harness.require((0.85..1.15).contains(&amps), words)
 }

@@ -5,27 +5,27 @@ use motorlink_proto::st::{
     Command, ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request,
 };
 
-use super::bench::Bench;
+use super::harness::Harness;
 use super::safety;
 use super::undo::Undo;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{S22, S34, S35, S50};
 
-pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
+pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     let mut cases = vec![
         Case::new(
             "unknown_commands_are_refused",
             &["ST-4.6-03", "ST-4.6-02", "ST-4.3-10"],
-            move |bench: &mut Bench| unknown(bench, profile),
+            move |harness: &mut Harness| unknown(harness, profile),
         ),
         Case::new(
             "a_command_that_takes_no_parameters_ignores_them",
             &["ST-4.6-06"],
-            |bench: &mut Bench| {
+            |harness: &mut Harness| {
                 let code = FrameCode::ExecuteCmd.number();
-                let bytes = bench.frame(code, &[Command::StopRamp.into(), 0xEE, 0xEE]);
-                let payload = bench.acknowledged_bytes(&bytes)?;
-                bench.require(payload.is_empty(), "f0 00 f0  ACK without payload")
+                let bytes = harness.frame(code, &[Command::StopRamp.into(), 0xEE, 0xEE]);
+                let payload = harness.acknowledged_bytes(&bytes)?;
+                harness.require(payload.is_empty(), "f0 00 f0  ACK without payload")
             },
         )
         .reading(S35),
@@ -40,7 +40,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         cases.push(Case::new(
             format!("a_command_at_rest_is_acknowledged[{command}]"),
             clauses,
-            move |bench: &mut Bench| at_rest(bench, command),
+            move |harness: &mut Harness| at_rest(harness, command),
         ));
     }
     if profile == Profile::Mcsdk54 {
@@ -48,27 +48,31 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
             cases.push(Case::new(
                 format!("a_command_at_rest_is_acknowledged[{command}]"),
                 &["ST-4.6-38", "ST-4.6-04"],
-                move |bench: &mut Bench| at_rest(bench, command),
+                move |harness: &mut Harness| at_rest(harness, command),
             ));
         }
     }
     cases.extend([
-        Case::new("sc_start_needs_a_profiler", &["ST-4.6-38", "ST-4.6-03"], |bench: &mut Bench| {
-            bench.need_no(Feature::Profiler)?;
-            bench.refused(&Request::Execute(Command::ScStart), ErrorCode::WrongCmd)
-        })
+        Case::new(
+            "sc_start_needs_a_profiler",
+            &["ST-4.6-38", "ST-4.6-03"],
+            |harness: &mut Harness| {
+                harness.need_no(Feature::Profiler)?;
+                harness.refused(&Request::ExecuteCommand(Command::ScStart), ErrorCode::WrongCmd)
+            },
+        )
         .needs(&[Need::Spin]),
         Case::new("references_are_cleared_to_their_defaults", &["ST-4.6-27"], clear_references)
             .reading(S22),
         Case::new(
             "pfc_disable_needs_a_pfc",
             &["ST-4.6-34", "ST-4.6-33", "ST-4.6-05"],
-            |bench: &mut Bench| pfc_command(bench, Command::PfcDisable),
+            |harness: &mut Harness| pfc_command(harness, Command::PfcDisable),
         ),
         Case::new(
             "pfc_fault_ack_needs_a_pfc",
             &["ST-4.6-37", "ST-4.6-36", "ST-4.6-05"],
-            |bench: &mut Bench| pfc_command(bench, Command::PfcFaultAck),
+            |harness: &mut Harness| pfc_command(harness, Command::PfcFaultAck),
         ),
         Case::new(
             "pfc_enable_needs_a_pfc",
@@ -81,87 +85,87 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
 }
 
 /// Every id that table 4 lacks, but those that would start something in a drive that knows them.
-fn unknown(bench: &mut Bench, profile: Profile) -> Result<(), Stop> {
+fn unknown(harness: &mut Harness, profile: Profile) -> Result<(), Stop> {
     for id in 0..=255 {
         let known = match Command::from(id) {
             Command::Unknown(_) => false,
             Command::Reset | Command::Ping | Command::ScStop => profile == Profile::Mcsdk54,
             _ => true,
         };
-        let bytes = bench.frame(FrameCode::ExecuteCmd.number(), &[id]);
+        let bytes = harness.frame(FrameCode::ExecuteCmd.number(), &[id]);
         if !known && !safety::may_start(&bytes) {
-            bench.refused_bytes(&bytes, ErrorCode::WrongCmd)?;
+            harness.refused_bytes(&bytes, ErrorCode::WrongCmd)?;
         }
     }
     Ok(())
 }
 
 /// The command has no effect on a motor at rest without a fault, and succeeds.
-fn at_rest(bench: &mut Bench, command: Command) -> Result<(), Stop> {
+fn at_rest(harness: &mut Harness, command: Command) -> Result<(), Stop> {
     if command == Command::IqdrefClear {
-        bench.keep_setpoints()?;
+        harness.keep_setpoints()?;
     }
-    bench.execute(command)?;
-    bench.require_idle("as before")
+    harness.execute(command)?;
+    harness.require_idle("as before")
 }
 
-fn clear_references(bench: &mut Bench) -> Result<(), Stop> {
-    bench.keep_setpoints()?;
-    bench.execute(Command::IqdrefClear)?;
-    let default = bench.value(RegisterId::FLUX_REF)?;
-    bench.set(RegisterId::IQ_SPEEDMODE, default ^ 0x0123)?;
-    let other = bench.value(RegisterId::FLUX_REF)?;
+fn clear_references(harness: &mut Harness) -> Result<(), Stop> {
+    harness.keep_setpoints()?;
+    harness.execute(Command::IqdrefClear)?;
+    let default = harness.value(RegisterId::FLUX_REF)?;
+    harness.set(RegisterId::IQ_SPEEDMODE, default ^ 0x0123)?;
+    let other = harness.value(RegisterId::FLUX_REF)?;
     if other == default {
         return Err(Stop::Skipped("FLUX_REF does not show the Id reference at rest".to_owned()));
     }
-    bench.execute(Command::IqdrefClear)?;
-    let now = bench.value(RegisterId::FLUX_REF)?;
-    bench.require(now == default, format!("ACK {default} s16A, the default"))
+    harness.execute(Command::IqdrefClear)?;
+    let now = harness.value(RegisterId::FLUX_REF)?;
+    harness.require(now == default, format!("ACK {default} s16A, the default"))
 }
 
 /// A PFC command without PFC is refused; with a PFC that is off it does nothing.
-fn pfc_command(bench: &mut Bench, command: Command) -> Result<(), Stop> {
-    if !bench.has(Feature::Pfc)? {
-        return bench.refused(&Request::Execute(command), ErrorCode::WrongCmd);
+fn pfc_command(harness: &mut Harness, command: Command) -> Result<(), Stop> {
+    if !harness.has(Feature::Pfc)? {
+        return harness.refused(&Request::ExecuteCommand(command), ErrorCode::WrongCmd);
     }
-    off_or_skip(bench)?;
-    succeeds(bench, command)?;
-    let enabled = bench.value(RegisterId::PFC_ENABLED)?;
-    bench.require(enabled == 0, "ACK 0: the PFC is off")
+    off_or_skip(harness)?;
+    succeeds(harness, command)?;
+    let enabled = harness.value(RegisterId::PFC_ENABLED)?;
+    harness.require(enabled == 0, "ACK 0: the PFC is off")
 }
 
 /// A drive may have the registers of a PFC and none configured (SPEC-NOTES S50).
-fn succeeds(bench: &mut Bench, command: Command) -> Result<(), Stop> {
-    let bytes = bench.encode(&Request::Execute(command));
-    let reply = bench.exchange(&bytes)?;
+fn succeeds(harness: &mut Harness, command: Command) -> Result<(), Stop> {
+    let bytes = harness.encode(&Request::ExecuteCommand(command));
+    let reply = harness.exchange(&bytes)?;
     let expected = "f0 00 f0  ACK, for the registers of a PFC are there";
-    bench.require(!reply.is_nack(ErrorCode::WrongCmd), expected).read_as(S50)?;
-    bench.require(reply.header == HEADER_ACK && reply.payload.is_empty(), expected)
+    harness.require(!reply.is_nack(ErrorCode::WrongCmd), expected).read_as(S50)?;
+    harness.require(reply.header == HEADER_ACK && reply.payload.is_empty(), expected)
 }
 
-fn off_or_skip(bench: &mut Bench) -> Result<(), Stop> {
-    match bench.value(RegisterId::PFC_ENABLED)? {
+fn off_or_skip(harness: &mut Harness) -> Result<(), Stop> {
+    match harness.value(RegisterId::PFC_ENABLED)? {
         0 => Ok(()),
         _ => Err(Stop::Skipped("the PFC is enabled, and is left so".to_owned())),
     }
 }
 
-fn pfc_enable(bench: &mut Bench) -> Result<(), Stop> {
-    if !bench.has(Feature::Pfc)? {
-        return bench.refused(&Request::Execute(Command::PfcEnable), ErrorCode::WrongCmd);
+fn pfc_enable(harness: &mut Harness) -> Result<(), Stop> {
+    if !harness.has(Feature::Pfc)? {
+        return harness.refused(&Request::ExecuteCommand(Command::PfcEnable), ErrorCode::WrongCmd);
     }
-    off_or_skip(bench)?;
-    succeeds(bench, Command::PfcEnable)?;
-    bench.undo.push(Undo::Pfc);
-    let enabled = bench.value(RegisterId::PFC_ENABLED)?;
+    off_or_skip(harness)?;
+    succeeds(harness, Command::PfcEnable)?;
+    harness.undo.push(Undo::Pfc);
+    let enabled = harness.value(RegisterId::PFC_ENABLED)?;
     // Once more: it is started already, and nothing happens.
-    let again = bench.encode(&Request::Execute(Command::PfcEnable));
-    let again = bench.exchange(&again)?;
-    let still = bench.value(RegisterId::PFC_ENABLED)?;
-    bench.execute(Command::PfcDisable)?;
-    bench.require(enabled != 0, "ACK 1: the PFC is enabled")?;
-    bench.require_read(S50, enabled == 1, "ACK 1: the PFC is enabled")?;
-    bench.require(again.header == HEADER_ACK && still == 1, "ACK, and the PFC stays enabled")?;
-    let enabled = bench.value(RegisterId::PFC_ENABLED)?;
-    bench.require(enabled == 0, "ACK 0: the PFC is off").read_as(S34)
+    let again = harness.encode(&Request::ExecuteCommand(Command::PfcEnable));
+    let again = harness.exchange(&again)?;
+    let still = harness.value(RegisterId::PFC_ENABLED)?;
+    harness.execute(Command::PfcDisable)?;
+    harness.require(enabled != 0, "ACK 1: the PFC is enabled")?;
+    harness.require_read(S50, enabled == 1, "ACK 1: the PFC is enabled")?;
+    harness.require(again.header == HEADER_ACK && still == 1, "ACK, and the PFC stays enabled")?;
+    let enabled = harness.value(RegisterId::PFC_ENABLED)?;
+    harness.require(enabled == 0, "ACK 0: the PFC is off").read_as(S34)
 }

@@ -3,22 +3,24 @@
 use std::ops::RangeInclusive;
 
 use motorlink_proto::st::register::{Feature, Features};
-use motorlink_proto::st::{ErrorCode, Frame, FrameCode, HEADER_ACK, Motor, Profile, RegisterId};
+use motorlink_proto::st::{
+    ErrorCode, Frame, FrameCode, HEADER_ACK, MotorNumber, Profile, RegisterId,
+};
 
-use super::bench::{Bench, frame};
+use super::harness::{Harness, frame};
 use crate::case::Stop;
 
 /// Greatest speed of a drive without MAX_APP_SPEED, rpm.
 const MODERATE: i32 = 2_000;
 
-impl Bench {
+impl Harness {
     /// How many motors the drive has: the last number before the first that it refuses.
     pub(super) fn motors(&mut self) -> Result<u8, Stop> {
         if let Some(motors) = self.found.motors {
             return Ok(motors);
         }
         let mut motors = 0;
-        for number in 1..=Motor::MAX {
+        for number in 1..=MotorNumber::MAX {
             let header = Frame::header(FrameCode::GetReg.number(), number);
             let reply = self.exchange(&frame(header, &[RegisterId::STATUS.0]))?;
             if reply.is_nack(ErrorCode::BadMotorSelected) {
@@ -33,7 +35,7 @@ impl Bench {
     /// A motor number that the drive has to refuse; a drive with seven motors has none.
     pub(super) fn missing_motor(&mut self) -> Result<u8, Stop> {
         match self.motors()? {
-            Motor::MAX => Err(Stop::Skipped("the drive has seven motors".to_owned())),
+            MotorNumber::MAX => Err(Stop::Skipped("the drive has seven motors".to_owned())),
             motors => Ok(motors + 1),
         }
     }

@@ -4,7 +4,7 @@
 use motorlink_proto::st::{Command, Flags, Profile, RegisterId, Status};
 use motorlink_proto::time::Duration;
 
-use super::bench::Bench;
+use super::harness::Harness;
 use super::restore::faulty;
 use crate::case::{Case, Need, Stop};
 use crate::reading::S14;
@@ -14,20 +14,20 @@ const SEEN: Duration = Duration::from_millis(5_000);
 /// How long it is watched that a command has no effect.
 const WATCH: Duration = Duration::from_millis(100);
 
-pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
+pub(super) fn cases(_profile: Profile) -> Vec<Case<Harness>> {
     vec![
         // First what ends every other.
         Case::new(
             "a_fault_that_is_over_is_acknowledged",
             &["ST-4.6-21", "ST-4.6-23", "ST-4.4-20"],
-            |bench: &mut Bench| {
-                over(bench)?;
-                bench.execute(Command::FaultAck)?;
-                let idle = bench.found.idle;
-                bench.wait_for(SEEN, |status| status == idle)?;
-                bench.require_idle("for the fault is acknowledged")?;
-                let flags = flags(bench)?;
-                bench.require(flags.0 == 0, "ACK 0: no faults")
+            |harness: &mut Harness| {
+                over(harness)?;
+                harness.execute(Command::FaultAck)?;
+                let idle = harness.found.idle;
+                harness.wait_for(SEEN, |status| status == idle)?;
+                harness.require_idle("for the fault is acknowledged")?;
+                let flags = flags(harness)?;
+                harness.require(flags.0 == 0, "ACK 0: no faults")
             },
         )
         .needs(&[Need::Fault]),
@@ -37,85 +37,85 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Bench>> {
         Case::new(
             "a_fault_that_is_present_is_not_acknowledged",
             &["ST-4.6-22", "ST-4.6-23"],
-            |bench: &mut Bench| {
-                present(bench)?;
-                let before = (bench.status()?, flags(bench)?.0);
-                bench.execute(Command::FaultAck)?;
-                bench.silence(WATCH)?;
-                let now = (bench.status()?, flags(bench)?.0);
+            |harness: &mut Harness| {
+                present(harness)?;
+                let before = (harness.status()?, flags(harness)?.0);
+                harness.execute(Command::FaultAck)?;
+                harness.silence(WATCH)?;
+                let now = (harness.status()?, flags(harness)?.0);
                 let words = format!("STATUS {} and FLAGS {:#x}, as before", before.0, before.1);
-                bench.require(now == before, words)
+                harness.require(now == before, words)
             },
         )
         .needs(&[Need::Fault]),
-        Case::new("a_motor_in_fault_does_not_start", &["ST-4.6-09", "ST-4.6-10"], |bench| {
-            no_start(bench, Command::StartMotor)
+        Case::new("a_motor_in_fault_does_not_start", &["ST-4.6-09", "ST-4.6-10"], |harness| {
+            no_start(harness, Command::StartMotor)
         })
         .needs(&[Need::Fault, Need::Spin]),
         Case::new(
             "start_stop_does_nothing_in_fault",
             &["ST-4.6-19", "ST-4.6-20"],
-            |bench: &mut Bench| no_start(bench, Command::StartStop),
+            |harness: &mut Harness| no_start(harness, Command::StartStop),
         )
         .needs(&[Need::Fault, Need::Spin]),
     ]
 }
 
-fn flags(bench: &mut Bench) -> Result<Flags, Stop> {
-    Ok(Flags(bench.value(RegisterId::FLAGS)? as u32))
+fn flags(harness: &mut Harness) -> Result<Flags, Stop> {
+    Ok(Flags(harness.value(RegisterId::FLAGS)? as u32))
 }
 
 /// A fault whose cause is there.
-fn present(bench: &mut Bench) -> Result<(), Stop> {
-    bench.fault()?;
-    let status = bench.wait_for(SEEN, |status| status == Status::FaultNow)?;
+fn present(harness: &mut Harness) -> Result<(), Stop> {
+    harness.fault()?;
+    let status = harness.wait_for(SEEN, |status| status == Status::FaultNow)?;
     let told = status == Status::FaultNow;
-    bench.require_read(S14, told, "ACK 10: FAULT_NOW, for a fault was caused")
+    harness.require_read(S14, told, "ACK 10: FAULT_NOW, for a fault was caused")
 }
 
 /// A fault whose cause is gone.
-fn over(bench: &mut Bench) -> Result<(), Stop> {
-    present(bench)?;
-    ends(bench)
+fn over(harness: &mut Harness) -> Result<(), Stop> {
+    present(harness)?;
+    ends(harness)
 }
 
 /// The cause of the fault goes away.
-fn ends(bench: &mut Bench) -> Result<(), Stop> {
-    bench.world.fault(false)?;
-    let status = bench.wait_for(SEEN, |status| status == Status::FaultOver)?;
-    bench.require_read(
+fn ends(harness: &mut Harness) -> Result<(), Stop> {
+    harness.world.fault(false)?;
+    let status = harness.wait_for(SEEN, |status| status == Status::FaultOver)?;
+    harness.require_read(
         S14,
         status == Status::FaultOver,
         "ACK 11: FAULT_OVER, for its cause is gone",
     )
 }
 
-fn shown(bench: &mut Bench) -> Result<(), Stop> {
-    present(bench)?;
-    let now = flags(bench)?;
-    bench.require(now.present() != 0, "ACK with a fault present in the high half")?;
+fn shown(harness: &mut Harness) -> Result<(), Stop> {
+    present(harness)?;
+    let now = flags(harness)?;
+    harness.require(now.present() != 0, "ACK with a fault present in the high half")?;
     let occurred = now.occurred() & now.present() == now.present();
-    bench.require(occurred, "ACK with the same fault in the low half")?;
-    ends(bench)?;
-    let now = flags(bench)?;
-    bench.require(now.present() == 0, "ACK with no fault present in the high half")?;
-    bench.require(now.occurred() != 0, "ACK with the fault that occurred in the low half")
+    harness.require(occurred, "ACK with the same fault in the low half")?;
+    ends(harness)?;
+    let now = flags(harness)?;
+    harness.require(now.present() == 0, "ACK with no fault present in the high half")?;
+    harness.require(now.occurred() != 0, "ACK with the fault that occurred in the low half")
 }
 
-fn no_start(bench: &mut Bench, command: Command) -> Result<(), Stop> {
-    present(bench)?;
-    stays_in_fault(bench, command)?;
-    ends(bench)?;
-    stays_in_fault(bench, command)
+fn no_start(harness: &mut Harness, command: Command) -> Result<(), Stop> {
+    present(harness)?;
+    stays_in_fault(harness, command)?;
+    ends(harness)?;
+    stays_in_fault(harness, command)
 }
 
-fn stays_in_fault(bench: &mut Bench, command: Command) -> Result<(), Stop> {
-    let before = bench.status()?;
-    bench.execute(command)?;
-    bench.silence(WATCH)?;
-    let measured = bench.value(RegisterId::SPEED_MEAS)?;
-    bench.require(measured.abs() <= 30, "ACK 0 rpm, for a motor in fault does not start")?;
-    let status = bench.status()?;
+fn stays_in_fault(harness: &mut Harness, command: Command) -> Result<(), Stop> {
+    let before = harness.status()?;
+    harness.execute(command)?;
+    harness.silence(WATCH)?;
+    let measured = harness.value(RegisterId::SPEED_MEAS)?;
+    harness.require(measured.abs() <= 30, "ACK 0 rpm, for a motor in fault does not start")?;
+    let status = harness.status()?;
     let held = faulty(status) && status == before;
-    bench.require(held, format!("ACK: {before}, as before"))
+    harness.require(held, format!("ACK: {before}, as before"))
 }

@@ -1,13 +1,13 @@
 //! Cases of chapters 2 and 3 and of 4.1 to 4.3: frames, checksums, frame codes, replies.
 
 use motorlink_proto::st::{
-    Command, ErrorCode, Frame, FrameCode, HEADER_ACK, HEADER_NACK, MAX_PAYLOAD, Motor, OVERHEAD,
-    Profile, RegisterId, Request,
+    Command, ErrorCode, Frame, FrameCode, HEADER_ACK, HEADER_NACK, MAX_PAYLOAD, MotorNumber,
+    OVERHEAD, Profile, RegisterId, Request,
 };
 use motorlink_proto::time::Duration;
 
-use super::bench::{Bench, frame};
 use super::explore::read_size;
+use super::harness::{Harness, frame};
 use crate::case::{Case, Stop};
 use crate::reading::{S1, S10, S47};
 
@@ -16,9 +16,11 @@ const WATCH: Duration = Duration::from_millis(100);
 /// A register that keeps whatever it is given and exists in every drive.
 const KEEPER: RegisterId = RegisterId::SPEED_KD;
 
-pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
+pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     let mut cases = vec![
-        Case::new("nothing_comes_unasked", &["ST-2-01"], |bench: &mut Bench| bench.silence(WATCH)),
+        Case::new("nothing_comes_unasked", &["ST-2-01"], |harness: &mut Harness| {
+            harness.silence(WATCH)
+        }),
         Case::new(
             "a_command_is_answered_once",
             &["ST-2-02", "ST-2-03", "ST-4.1-18", "ST-4.2-02"],
@@ -37,15 +39,15 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         Case::new(
             "an_error_reply_has_one_error_code",
             &["ST-4.3-04", "ST-4.3-05", "ST-4.3-02"],
-            |bench: &mut Bench| {
+            |harness: &mut Harness| {
                 // In form is what every reply is checked for; this is one on purpose.
-                bench.refused(&Request::GetRegister(RegisterId(0xEE)), ErrorCode::GetWriteOnly)
+                harness.refused(&Request::GetRegister(RegisterId(0xEE)), ErrorCode::GetWriteOnly)
             },
         ),
         Case::new(
             "payloads_of_every_length_are_taken",
             &["ST-3-05", "ST-3.3-02", "ST-3.3-03"],
-            move |bench: &mut Bench| lengths(bench, profile),
+            move |harness: &mut Harness| lengths(harness, profile),
         ),
         Case::new("checksums_that_carry_are_taken", &["ST-3.3-04", "ST-4.1-06"], carries),
         Case::new(
@@ -61,11 +63,11 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         Case::new(
             "the_checksum_is_checked_before_the_motor_and_the_frame_code",
             &["ST-4.1-09"],
-            |bench: &mut Bench| {
+            |harness: &mut Harness| {
                 for code in [FrameCode::GetReg.number(), 0x1D] {
-                    let mut bytes = frame(Frame::header(code, Motor::MAX), &[0x1E]);
+                    let mut bytes = frame(Frame::header(code, MotorNumber::MAX), &[0x1E]);
                     damage(&mut bytes, 0x55);
-                    bench.refused_bytes(&bytes, ErrorCode::BadCrc)?;
+                    harness.refused_bytes(&bytes, ErrorCode::BadCrc)?;
                 }
                 Ok(())
             },
@@ -88,7 +90,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         Case::new(
             format!("a_known_frame_code_is_processed[{}]", code.name()),
             clauses,
-            move |bench: &mut Bench| known(bench, code),
+            move |harness: &mut Harness| known(harness, code),
         )
     }));
     cases.extend((0..=0x1F).filter(|&code| FrameCode::from_number(code, profile).is_none()).map(
@@ -96,11 +98,11 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
             let case = Case::new(
                 format!("an_unknown_frame_code_is_refused[{code:#04x}]"),
                 &["ST-4.1-16", "ST-3.1-16", "ST-4.3-06", "ST-3-02"],
-                move |bench: &mut Bench| {
+                move |harness: &mut Harness| {
                     // A drive of the other profile may know it.
-                    bench.keep_setpoints()?;
-                    let bytes = bench.frame(code, &[0xEE]);
-                    bench.refused_bytes(&bytes, ErrorCode::BadFrameId)
+                    harness.keep_setpoints()?;
+                    let bytes = harness.frame(code, &[0xEE]);
+                    harness.refused_bytes(&bytes, ErrorCode::BadFrameId)
                 },
             );
             // The codes of the acknowledges without their high bits.
@@ -118,11 +120,11 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         Profile::Mcsdk54 => cases.push(Case::new(
             "a_length_over_127_is_dropped_with_its_header",
             &["ST-3-07"],
-            |bench: &mut Bench| {
+            |harness: &mut Harness| {
                 for length in [MAX_PAYLOAD as u8, 0xFF] {
-                    bench.send(&[0x02, length])?;
-                    bench.silence(WATCH)?;
-                    bench.status()?;
+                    harness.send(&[0x02, length])?;
+                    harness.silence(WATCH)?;
+                    harness.status()?;
                 }
                 Ok(())
             },
@@ -145,79 +147,79 @@ const KNOWN: [(FrameCode, &[&str]); 9] = [
 ];
 
 /// A message of this code that the drive can carry out.
-fn known(bench: &mut Bench, code: FrameCode) -> Result<(), Stop> {
+fn known(harness: &mut Harness, code: FrameCode) -> Result<(), Stop> {
     let payload = match code {
-        FrameCode::SetReg => [&[KEEPER.0], &*bench.keep(KEEPER)?].concat(),
+        FrameCode::SetReg => [&[KEEPER.0], &*harness.keep(KEEPER)?].concat(),
         FrameCode::GetReg => vec![RegisterId::STATUS.0],
         FrameCode::ExecuteCmd => vec![Command::StopRamp.into()],
         FrameCode::SetRamp => {
-            bench.keep_setpoints()?;
+            harness.keep_setpoints()?;
             vec![0xE8, 0x03, 0, 0, 0xD0, 0x07]
         }
         FrameCode::GetRevupData => vec![0],
-        FrameCode::SetRevupData => [&[0], &bench.keep_revup(0)?.to_bytes()[..]].concat(),
+        FrameCode::SetRevupData => [&[0], &harness.keep_revup(0)?.to_bytes()[..]].concat(),
         FrameCode::SetCurrentRef => {
-            bench.keep_setpoints()?;
+            harness.keep_setpoints()?;
             vec![0; 4]
         }
         _ => Vec::new(),
     };
-    let bytes = bench.frame(code.number(), &payload);
-    bench.acknowledged_bytes(&bytes).map(drop)
+    let bytes = harness.frame(code.number(), &payload);
+    harness.acknowledged_bytes(&bytes).map(drop)
 }
 
-fn once(bench: &mut Bench) -> Result<(), Stop> {
-    bench.status()?;
-    bench.silence(WATCH)?;
-    bench.refused(&Request::GetRegister(RegisterId(0xEE)), ErrorCode::GetWriteOnly)?;
-    bench.silence(WATCH)
+fn once(harness: &mut Harness) -> Result<(), Stop> {
+    harness.status()?;
+    harness.silence(WATCH)?;
+    harness.refused(&Request::GetRegister(RegisterId(0xEE)), ErrorCode::GetWriteOnly)?;
+    harness.silence(WATCH)
 }
 
 /// Replies long and short whose sums carry or not; `reply` refuses a wrong checksum.
-fn reply_checksums(bench: &mut Bench) -> Result<(), Stop> {
-    bench.acknowledged(&Request::BoardInfo)?;
-    bench.acknowledged(&Request::FirmwareVersion)?;
-    let profile = bench.profile();
+fn reply_checksums(harness: &mut Harness) -> Result<(), Stop> {
+    harness.acknowledged(&Request::GetBoardInfo)?;
+    harness.acknowledged(&Request::GetFirmwareVersion)?;
+    let profile = harness.profile();
     for register in RegisterId::all().filter(|&id| read_size(id, profile).is_some()) {
-        let bytes = bench.encode(&Request::GetRegister(register));
-        bench.exchange(&bytes)?;
+        let bytes = harness.encode(&Request::GetRegister(register));
+        harness.exchange(&bytes)?;
     }
     Ok(())
 }
 
-fn motor_bits(bench: &mut Bench) -> Result<(), Stop> {
-    for motor in 0..=Motor::MAX {
+fn motor_bits(harness: &mut Harness) -> Result<(), Stop> {
+    for motor in 0..=MotorNumber::MAX {
         let header = Frame::header(FrameCode::GetReg.number(), motor);
-        bench.exchange(&frame(header, &[RegisterId::STATUS.0]))?;
-        bench.exchange(&frame(header, &[0xEE]))?;
+        harness.exchange(&frame(header, &[RegisterId::STATUS.0]))?;
+        harness.exchange(&frame(header, &[0xEE]))?;
         let long = Frame::header(FrameCode::GetBoardInfo.number(), motor);
-        bench.exchange(&frame(long, &[]))?;
+        harness.exchange(&frame(long, &[]))?;
     }
     Ok(())
 }
 
 /// A value that is longer than its register is cut (4.4), so a write takes any length.
-fn long_write(bench: &Bench, value: &[u8], length: usize, filler: u8) -> Vec<u8> {
+fn long_write(harness: &Harness, value: &[u8], length: usize, filler: u8) -> Vec<u8> {
     let mut payload = vec![KEEPER.0];
     payload.extend(value);
     payload.resize(length, filler);
-    bench.frame(FrameCode::SetReg.number(), &payload)
+    harness.frame(FrameCode::SetReg.number(), &payload)
 }
 
 /// The longest payload that the line carries within the reception timeout.
-fn longest(bench: &Bench, profile: Profile) -> usize {
+fn longest(harness: &Harness, profile: Profile) -> usize {
     let most = MAX_PAYLOAD - usize::from(profile == Profile::Mcsdk54);
-    most.min(bench.in_time().saturating_sub(OVERHEAD))
+    most.min(harness.in_time().saturating_sub(OVERHEAD))
 }
 
-fn lengths(bench: &mut Bench, profile: Profile) -> Result<(), Stop> {
-    let value = bench.keep(KEEPER)?;
-    bench.acknowledged(&Request::BoardInfo)?;
-    let longest = longest(bench, profile);
+fn lengths(harness: &mut Harness, profile: Profile) -> Result<(), Stop> {
+    let value = harness.keep(KEEPER)?;
+    harness.acknowledged(&Request::GetBoardInfo)?;
+    let longest = longest(harness, profile);
     for length in 3..=longest {
-        let bytes = long_write(bench, &value, length, 0xFF);
-        let payload = bench.acknowledged_bytes(&bytes)?;
-        bench.require(payload.is_empty(), "f0 00 f0  ACK without payload")?;
+        let bytes = long_write(harness, &value, length, 0xFF);
+        let payload = harness.acknowledged_bytes(&bytes)?;
+        harness.require(payload.is_empty(), "f0 00 f0  ACK without payload")?;
     }
     if longest < MAX_PAYLOAD - 1 {
         return Err(Stop::Skipped(format!(
@@ -229,12 +231,12 @@ fn lengths(bench: &mut Bench, profile: Profile) -> Result<(), Stop> {
 
 /// With 256 fillers the sum takes every low byte and many high bytes: those whose halves add up to
 /// more than 255 are among them.
-fn carries(bench: &mut Bench) -> Result<(), Stop> {
-    let value = bench.keep(KEEPER)?;
-    let longest = longest(bench, bench.profile()).min(24);
+fn carries(harness: &mut Harness) -> Result<(), Stop> {
+    let value = harness.keep(KEEPER)?;
+    let longest = longest(harness, harness.profile()).min(24);
     for filler in 0..=255 {
-        let bytes = long_write(bench, &value, longest, filler);
-        bench.acknowledged_bytes(&bytes)?;
+        let bytes = long_write(harness, &value, longest, filler);
+        harness.acknowledged_bytes(&bytes)?;
     }
     Ok(())
 }
@@ -245,58 +247,58 @@ fn damage(bytes: &mut [u8], bits: u8) {
     }
 }
 
-fn wrong_checksums(bench: &mut Bench) -> Result<(), Stop> {
-    let question = bench.encode(&Request::GetRegister(RegisterId::SPEED_MEAS));
+fn wrong_checksums(harness: &mut Harness) -> Result<(), Stop> {
+    let question = harness.encode(&Request::GetRegister(RegisterId::SPEED_MEAS));
     for bit in 0..8 {
         let mut bytes = question.clone();
         damage(&mut bytes, 1 << bit);
-        bench.refused_bytes(&bytes, ErrorCode::BadCrc)?;
+        harness.refused_bytes(&bytes, ErrorCode::BadCrc)?;
     }
     // The low byte alone, without the high byte added to it, is wrong where the sum carries.
-    let mut bytes = bench.frame(FrameCode::GetReg.number(), &[RegisterId::STATUS.0, 0xFF, 0xFF]);
+    let mut bytes = harness.frame(FrameCode::GetReg.number(), &[RegisterId::STATUS.0, 0xFF, 0xFF]);
     let last = bytes.len() - 1;
     bytes[last] = bytes[..last].iter().fold(0u8, |sum, &byte| sum.wrapping_add(byte));
-    bench.refused_bytes(&bytes, ErrorCode::BadCrc)
+    harness.refused_bytes(&bytes, ErrorCode::BadCrc)
 }
 
-fn not_processed(bench: &mut Bench) -> Result<(), Stop> {
-    let before = bench.keep(KEEPER)?;
+fn not_processed(harness: &mut Harness) -> Result<(), Stop> {
+    let before = harness.keep(KEEPER)?;
     let value: Vec<u8> = before.iter().map(|byte| byte ^ 0x20).collect();
-    let mut bytes = long_write(bench, &value, 1 + value.len(), 0);
+    let mut bytes = long_write(harness, &value, 1 + value.len(), 0);
     damage(&mut bytes, 0x10);
-    bench.refused_bytes(&bytes, ErrorCode::BadCrc)?;
-    let now = bench.get(KEEPER)?;
-    bench.require(now == before, "the value as before the refused write")
+    harness.refused_bytes(&bytes, ErrorCode::BadCrc)?;
+    let now = harness.get(KEEPER)?;
+    harness.require(now == before, "the value as before the refused write")
 }
 
-fn acknowledges_as_commands(bench: &mut Bench) -> Result<(), Stop> {
+fn acknowledges_as_commands(harness: &mut Harness) -> Result<(), Stop> {
     // Their motor bits say 7 (SPEC-NOTES S1).
-    let code = match bench.motors()? {
-        Motor::MAX => ErrorCode::BadFrameId,
+    let code = match harness.motors()? {
+        MotorNumber::MAX => ErrorCode::BadFrameId,
         _ => ErrorCode::BadMotorSelected,
     };
-    bench.refused_bytes(&frame(HEADER_ACK, &[]), code)?;
-    bench.refused_bytes(&frame(HEADER_NACK, &[ErrorCode::BadCrc.number()]), code)
+    harness.refused_bytes(&frame(HEADER_ACK, &[]), code)?;
+    harness.refused_bytes(&frame(HEADER_NACK, &[ErrorCode::BadCrc.number()]), code)
 }
 
-fn byte_by_byte(bench: &mut Bench) -> Result<(), Stop> {
-    let bytes = bench.encode(&Request::GetRegister(RegisterId::STATUS));
+fn byte_by_byte(harness: &mut Harness) -> Result<(), Stop> {
+    let bytes = harness.encode(&Request::GetRegister(RegisterId::STATUS));
     let (first, rest) = bytes.split_first().expect("a frame has a header");
-    bench.send(&[*first])?;
+    harness.send(&[*first])?;
     for byte in rest {
-        bench.send_more(&[*byte])?;
+        harness.send_more(&[*byte])?;
     }
-    let reply = bench.awaited()?;
-    bench.require(reply.header == HEADER_ACK, "ACK")
+    let reply = harness.awaited()?;
+    harness.require(reply.header == HEADER_ACK, "ACK")
 }
 
 /// Whatever the frame code says: the motor comes first.
-fn every_header(bench: &mut Bench) -> Result<(), Stop> {
-    let missing = bench.missing_motor()?;
-    for motor in missing..=Motor::MAX {
+fn every_header(harness: &mut Harness) -> Result<(), Stop> {
+    let missing = harness.missing_motor()?;
+    for motor in missing..=MotorNumber::MAX {
         for header in (0..=0x1F).map(|code| Frame::header(code, motor)) {
             if ![HEADER_ACK, HEADER_NACK].contains(&header) {
-                bench.refused_bytes(&frame(header, &[0xEE; 5]), ErrorCode::BadMotorSelected)?;
+                harness.refused_bytes(&frame(header, &[0xEE; 5]), ErrorCode::BadMotorSelected)?;
             }
         }
     }
@@ -304,14 +306,14 @@ fn every_header(bench: &mut Bench) -> Result<(), Stop> {
 }
 
 /// SPEC-NOTES S10: nothing is understood until 25 ms of silence, then one NACK TIMEOUT.
-fn too_long_in_spec(bench: &mut Bench) -> Result<(), Stop> {
+fn too_long_in_spec(harness: &mut Harness) -> Result<(), Stop> {
     for length in [MAX_PAYLOAD as u8 + 1, 0xFF] {
         let mut bytes = vec![0x02, length];
-        bytes.extend(bench.encode(&Request::GetRegister(RegisterId::STATUS)));
-        let reply = bench.exchange(&bytes)?;
-        bench.require_nack(&reply, ErrorCode::Timeout)?;
-        bench.silence(WATCH)?;
-        bench.status()?;
+        bytes.extend(harness.encode(&Request::GetRegister(RegisterId::STATUS)));
+        let reply = harness.exchange(&bytes)?;
+        harness.require_nack(&reply, ErrorCode::Timeout)?;
+        harness.silence(WATCH)?;
+        harness.status()?;
     }
     Ok(())
 }

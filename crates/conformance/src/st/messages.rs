@@ -7,40 +7,44 @@ use motorlink_proto::st::{
     REVUP_PHASES, Ramp, RegisterId, Request, RevupPhase, TorqueRamp,
 };
 
-use super::bench::Bench;
+use super::harness::Harness;
 use super::values::as_kept;
 use crate::case::{Case, ReadAs, Stop};
 use crate::reading::{S7, S13, S24, S26, S48, S51, S52};
 
-pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
+pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     let mut cases = vec![
-        Case::new("board_info_has_32_bytes", &["ST-4.7-02", "ST-4.7-03"], |bench: &mut Bench| {
-            let payload = bench.acknowledged(&Request::BoardInfo)?;
-            bench.require(payload.len() == 32, "ACK with 32 bytes")
-        }),
+        Case::new(
+            "board_info_has_32_bytes",
+            &["ST-4.7-02", "ST-4.7-03"],
+            |harness: &mut Harness| {
+                let payload = harness.acknowledged(&Request::GetBoardInfo)?;
+                harness.require(payload.len() == 32, "ACK with 32 bytes")
+            },
+        ),
         Case::new("board_info_begins_with_the_version", &["ST-4.7-04"], board_version),
-        Case::new("board_info_ends_in_a_name", &["ST-4.7-05"], |bench: &mut Bench| {
-            let payload = bench.acknowledged(&Request::BoardInfo)?;
+        Case::new("board_info_ends_in_a_name", &["ST-4.7-05"], |harness: &mut Harness| {
+            let payload = harness.acknowledged(&Request::GetBoardInfo)?;
             let name = payload.get(3..).and_then(terminated);
-            bench.require(name.is_some(), "printable characters and a NUL from byte 3 on")
+            harness.require(name.is_some(), "printable characters and a NUL from byte 3 on")
         }),
         Case::new(
             "firmware_version_has_32_bytes",
             &["ST-4.12-02", "ST-4.12-03"],
-            |bench: &mut Bench| {
-                let payload = bench.acknowledged(&Request::FirmwareVersion)?;
-                bench.require(payload.len() == 32, "ACK with 32 bytes")
+            |harness: &mut Harness| {
+                let payload = harness.acknowledged(&Request::GetFirmwareVersion)?;
+                harness.require(payload.len() == 32, "ACK with 32 bytes")
             },
         ),
-        Case::new("firmware_version_is_terminated", &["ST-4.12-04"], |bench: &mut Bench| {
-            let payload = bench.acknowledged(&Request::FirmwareVersion)?;
+        Case::new("firmware_version_is_terminated", &["ST-4.12-04"], |harness: &mut Harness| {
+            let payload = harness.acknowledged(&Request::GetFirmwareVersion)?;
             let text = terminated(&payload);
-            bench.require(text.is_some(), "printable characters, a tab among them, and a NUL")
+            harness.require(text.is_some(), "printable characters, a tab among them, and a NUL")
         }),
         Case::new(
             "firmware_version_follows_its_scheme",
             &["ST-4.12-05", "ST-4.12-06", "ST-4.12-07", "ST-4.12-08", "ST-4.12-09", "ST-4.12-10"],
-            |bench: &mut Bench| version(bench).map(drop),
+            |harness: &mut Harness| version(harness).map(drop),
         ),
         Case::new(
             "a_ramp_at_rest_is_kept_and_starts_nothing",
@@ -55,11 +59,11 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         Case::new(
             "revup_phases_beyond_4_are_refused",
             &["ST-4.9-02", "ST-4.10-03", "ST-4.3-09"],
-            |bench: &mut Bench| {
+            |harness: &mut Harness| {
                 let data = RevupPhase { speed_rpm: 600, torque_s16a: 1_000, duration_ms: 100 };
                 for phase in REVUP_PHASES..=255 {
-                    bench.refused(&Request::RevupData(phase), ErrorCode::WrongSet)?;
-                    bench.refused(&Request::SetRevupData(phase, data), ErrorCode::WrongSet)?;
+                    harness.refused(&Request::GetRevupData(phase), ErrorCode::WrongSet)?;
+                    harness.refused(&Request::SetRevupData(phase, data), ErrorCode::WrongSet)?;
                 }
                 Ok(())
             },
@@ -70,10 +74,10 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         cases.push(Case::new(
             format!("a_revup_phase_is_read[{phase}]"),
             &["ST-4.9-06", "ST-4.9-02", "ST-4.9-07"],
-            move |bench: &mut Bench| {
-                let payload = bench.acknowledged(&Request::RevupData(phase))?;
+            move |harness: &mut Harness| {
+                let payload = harness.acknowledged(&Request::GetRevupData(phase))?;
                 let size = RevupPhase::SIZE;
-                bench.require(payload.len() == size, "ACK with 8 bytes: speed, torque, duration")
+                harness.require(payload.len() == size, "ACK with 8 bytes: speed, torque, duration")
             },
         ));
         cases.push(Case::new(
@@ -88,7 +92,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                 "ST-4.9-04",
                 "ST-4.9-05",
             ],
-            move |bench: &mut Bench| revup(bench, phase),
+            move |harness: &mut Harness| revup(harness, phase),
         ));
     }
     match profile {
@@ -107,16 +111,16 @@ fn terminated(bytes: &[u8]) -> Option<&str> {
 }
 
 /// Major, minor and patch of the version string, which has to follow the scheme of 4.12.
-fn version(bench: &mut Bench) -> Result<[u32; 3], Stop> {
-    let payload = bench.acknowledged(&Request::FirmwareVersion)?;
+fn version(harness: &mut Harness) -> Result<[u32; 3], Stop> {
+    let payload = harness.acknowledged(&Request::GetFirmwareVersion)?;
     let scheme = "NAME<tab>Ver.MAJOR.MINOR.PATCH, or that and -A, -B or -RC with a number from 1, \
                   MAJOR from 1";
     let text = terminated(&payload);
-    let numbers = text.and_then(parse).ok_or_else(|| bench.failed(scheme))?;
+    let numbers = text.and_then(parse).ok_or_else(|| harness.failed(scheme))?;
     // The scheme is printed with a mark too many between "Ver" and the numbers.
     let to_the_letter = text.is_some_and(|text| text.contains(&format!("\tVer.{}.", numbers[0])));
-    let held = bench.require(to_the_letter, scheme);
-    bench.note(S13, held)?;
+    let held = harness.require(to_the_letter, scheme);
+    harness.note(S13, held)?;
     Ok(numbers)
 }
 
@@ -144,185 +148,193 @@ fn number(text: &str) -> Option<u32> {
 
 /// As integers, or in shipped firmware as ASCII digits (SPEC-NOTES S13): the version that the
 /// version string has.
-fn board_version(bench: &mut Bench) -> Result<(), Stop> {
-    let numbers = version(bench)?;
-    let payload = bench.acknowledged(&Request::BoardInfo)?;
-    let wanted = numbers.map(|number| match bench.profile() {
+fn board_version(harness: &mut Harness) -> Result<(), Stop> {
+    let numbers = version(harness)?;
+    let payload = harness.acknowledged(&Request::GetBoardInfo)?;
+    let wanted = numbers.map(|number| match harness.profile() {
         Profile::Spec => number as u8,
         Profile::Mcsdk54 => b'0' + (number % 10) as u8,
     });
-    let hint = match (bench.profile(), payload.get(..3)) {
+    let hint = match (harness.profile(), payload.get(..3)) {
         (Profile::Spec, Some(digits)) if digits.iter().all(u8::is_ascii_digit) => {
             "; digits are what shipped firmware sends, which --profile mcsdk-5.4 is for"
         }
         _ => "",
     };
     let expected = format!("ACK that begins with {}, as in the version string{hint}", Hex(&wanted));
-    match bench.profile() {
-        Profile::Spec => bench.require(payload.starts_with(&wanted), expected).read_as(S51),
-        Profile::Mcsdk54 => bench.require(payload.starts_with(&wanted), expected),
+    match harness.profile() {
+        Profile::Spec => harness.require(payload.starts_with(&wanted), expected).read_as(S51),
+        Profile::Mcsdk54 => harness.require(payload.starts_with(&wanted), expected),
     }
 }
 
-fn ramp_at_rest(bench: &mut Bench) -> Result<(), Stop> {
-    bench.keep_setpoints()?;
+fn ramp_at_rest(harness: &mut Harness) -> Result<(), Stop> {
+    harness.keep_setpoints()?;
     // The duration cannot be read back, so that a gentle one stays.
     for speed_rpm in [0x0640, -1_002, 70_002] {
-        bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 2_000 }))?;
-        let now = bench.value(RegisterId::RAMP_FINAL_SPEED)?;
-        let shown = as_kept(bench.profile(), speed_rpm);
+        harness.done(&Request::SetRamp(Ramp { speed_rpm, duration_ms: 2_000 }))?;
+        let now = harness.value(RegisterId::RAMP_FINAL_SPEED)?;
+        let shown = as_kept(harness.profile(), speed_rpm);
         let held =
-            bench.require(now == shown, format!("ACK {shown} rpm, the final speed of the ramp"));
-        bench.note(S26, held)?;
-        nothing_started(bench)?;
+            harness.require(now == shown, format!("ACK {shown} rpm, the final speed of the ramp"));
+        harness.note(S26, held)?;
+        nothing_started(harness)?;
     }
     Ok(())
 }
 
-fn references_at_rest(bench: &mut Bench) -> Result<(), Stop> {
-    bench.keep_setpoints()?;
+fn references_at_rest(harness: &mut Harness) -> Result<(), Stop> {
+    harness.keep_setpoints()?;
     const IQ: i16 = 0x0123;
     let reference = CurrentReference { iq_s16a: IQ, id_s16a: -0x0045 };
-    bench.done(&Request::CurrentReference(reference))?;
-    nothing_started(bench)?;
-    let measured = bench.value(RegisterId::TORQUE_MEAS)?;
+    harness.done(&Request::SetCurrentReference(reference))?;
+    nothing_started(harness)?;
+    let measured = harness.value(RegisterId::TORQUE_MEAS)?;
     let little = measured.abs() < i32::from(IQ / 2);
-    bench.require(little, "ACK about 0 s16A, for no current flows at rest")
+    harness.require(little, "ACK about 0 s16A, for no current flows at rest")
 }
 
-fn nothing_started(bench: &mut Bench) -> Result<(), Stop> {
-    bench.require_idle("for nothing was started")?;
-    let reference = bench.value(RegisterId::SPEED_REF)?;
-    let waits = bench.require(reference == 0, "ACK 0 rpm, for a ramp waits until the motor runs");
-    bench.note(S48, waits)
+fn nothing_started(harness: &mut Harness) -> Result<(), Stop> {
+    harness.require_idle("for nothing was started")?;
+    let reference = harness.value(RegisterId::SPEED_REF)?;
+    let waits = harness.require(reference == 0, "ACK 0 rpm, for a ramp waits until the motor runs");
+    harness.note(S48, waits)
 }
 
-fn revup(bench: &mut Bench, phase: u8) -> Result<(), Stop> {
-    bench.keep_revup(phase)?;
-    let sensorless = bench.has(Feature::ObserverPll)? || bench.has(Feature::ObserverCordic)?;
+fn revup(harness: &mut Harness, phase: u8) -> Result<(), Stop> {
+    harness.keep_revup(phase)?;
+    let sensorless = harness.has(Feature::ObserverPll)? || harness.has(Feature::ObserverCordic)?;
     let samples = [
         // More than 16 bits of speed; less than nothing.
         RevupPhase { speed_rpm: 70_002, torque_s16a: 0x0123, duration_ms: 0x0234 },
         RevupPhase { speed_rpm: -798, torque_s16a: -0x0216, duration_ms: 0x8001 },
     ];
     for data in samples {
-        bench.done(&Request::SetRevupData(phase, data))?;
-        let payload = bench.acknowledged(&Request::RevupData(phase))?;
+        harness.done(&Request::SetRevupData(phase, data))?;
+        let payload = harness.acknowledged(&Request::GetRevupData(phase))?;
         let bytes = data.to_bytes();
         let held =
-            bench.require(payload == bytes, format!("ACK {}, which was written", Hex(&bytes)));
+            harness.require(payload == bytes, format!("ACK {}, which was written", Hex(&bytes)));
         if sensorless { held? } else { held.read_as(S52)? }
     }
     // The other phases are others.
     let data = samples[0];
     let other = (phase + 1) % REVUP_PHASES;
-    let before = bench.acknowledged(&Request::RevupData(other))?;
-    bench.done(&Request::SetRevupData(phase, data))?;
-    let now = bench.acknowledged(&Request::RevupData(other))?;
-    bench.require(now == before, format!("phase {other} as before: {}", Hex(&before)))
+    let before = harness.acknowledged(&Request::GetRevupData(other))?;
+    harness.done(&Request::SetRevupData(phase, data))?;
+    let now = harness.acknowledged(&Request::GetRevupData(other))?;
+    harness.require(now == before, format!("phase {other} as before: {}", Hex(&before)))
 }
 
 /// Data segments, whose layout is ours, for the document has lost its own (SPEC-NOTES S7).
-fn segments() -> Vec<Case<Bench>> {
+fn segments() -> Vec<Case<Harness>> {
     vec![
         Case::new(
             "a_data_segment_gives_the_values_of_its_registers",
             &["ST-3.1-10", "ST-3.1-11"],
-            |bench: &mut Bench| {
-                empty_segment(bench)?;
+            |harness: &mut Harness| {
+                empty_segment(harness)?;
                 let registers = [
                     RegisterId::STATUS.0,
                     RegisterId::SPEED_MEAS.0,
                     RegisterId::I_A.0,
                     RegisterId::BUS_VOLTAGE.0,
                 ];
-                bench.done(&Request::ConfigDynStruct { segment: 0, registers: &registers })?;
-                let payload = bench.acknowledged(&Request::DataElement(0))?;
-                bench.require(payload.len() == 9, "ACK with 1, 4, 2 and 2 bytes")?;
-                bench.require(payload[..7] == [0; 7], "ACK with STATUS, speed and current 0")
+                harness.done(&Request::ConfigureSegment { segment: 0, registers: &registers })?;
+                let payload = harness.acknowledged(&Request::GetSegment(0))?;
+                harness.require(payload.len() == 9, "ACK with 1, 4, 2 and 2 bytes")?;
+                harness.require(payload[..7] == [0; 7], "ACK with STATUS, speed and current 0")
             },
         ),
         Case::new(
             "what_no_data_segment_can_hold_is_refused",
             &["ST-3.1-11", "ST-4.3-09"],
-            |bench: &mut Bench| {
-                empty_segment(bench)?;
+            |harness: &mut Harness| {
+                empty_segment(harness)?;
                 let status = [RegisterId::STATUS.0];
-                bench.done(&Request::ConfigDynStruct { segment: 0, registers: &status })?;
+                harness.done(&Request::ConfigureSegment { segment: 0, registers: &status })?;
                 let many = [RegisterId::STATUS.0; 33];
                 for registers in [&[0xEE][..], &many] {
-                    let request = Request::ConfigDynStruct { segment: 0, registers };
-                    bench.refused(&request, ErrorCode::WrongSet)?;
+                    let request = Request::ConfigureSegment { segment: 0, registers };
+                    harness.refused(&request, ErrorCode::WrongSet)?;
                 }
-                let none = Request::ConfigDynStruct { segment: 0xEE, registers: &status };
-                bench.refused(&none, ErrorCode::WrongSet)?;
-                bench.refused(&Request::DataElement(0xEE), ErrorCode::WrongSet)?;
-                let payload = bench.acknowledged(&Request::DataElement(0))?;
-                bench.require(payload.len() == 1, "ACK with the segment as before, 1 byte")
+                let none = Request::ConfigureSegment { segment: 0xEE, registers: &status };
+                harness.refused(&none, ErrorCode::WrongSet)?;
+                harness.refused(&Request::GetSegment(0xEE), ErrorCode::WrongSet)?;
+                let payload = harness.acknowledged(&Request::GetSegment(0))?;
+                harness.require(payload.len() == 1, "ACK with the segment as before, 1 byte")
             },
         ),
-        Case::new("a_reply_may_have_128_bytes", &["ST-3-05", "ST-3.1-10"], |bench: &mut Bench| {
-            empty_segment(bench)?;
-            let registers = [RegisterId::SPEED_MEAS.0; 32];
-            bench.done(&Request::ConfigDynStruct { segment: 0, registers: &registers })?;
-            let payload = bench.acknowledged(&Request::DataElement(0))?;
-            bench.require(payload.len() == MAX_PAYLOAD, "ACK with 128 bytes")
-        }),
+        Case::new(
+            "a_reply_may_have_128_bytes",
+            &["ST-3-05", "ST-3.1-10"],
+            |harness: &mut Harness| {
+                empty_segment(harness)?;
+                let registers = [RegisterId::SPEED_MEAS.0; 32];
+                harness.done(&Request::ConfigureSegment { segment: 0, registers: &registers })?;
+                let payload = harness.acknowledged(&Request::GetSegment(0))?;
+                harness.require(payload.len() == MAX_PAYLOAD, "ACK with 128 bytes")
+            },
+        ),
     ]
 }
 
 /// Segment 0, which has to be empty: what it holds cannot be read, so it could not be put back.
-pub(super) fn empty_segment(bench: &mut Bench) -> Result<(), Stop> {
-    let bytes = bench.encode(&Request::DataElement(0));
-    let reply = bench.exchange(&bytes)?;
+pub(super) fn empty_segment(harness: &mut Harness) -> Result<(), Stop> {
+    let bytes = harness.encode(&Request::GetSegment(0));
+    let reply = harness.exchange(&bytes)?;
     if reply.is_nack(ErrorCode::BadFrameId) {
         let why = "the drive has no data segments, whose section the document has lost";
         return Err(Stop::Skipped(why.to_owned()));
     }
-    bench.require(reply.header == HEADER_ACK, "ACK")?;
+    harness.require(reply.header == HEADER_ACK, "ACK")?;
     if !reply.payload.is_empty() {
         return Err(Stop::Skipped("data segment 0 is in use".to_owned()));
     }
-    bench.undo.push(super::undo::Undo::Segment(0));
+    harness.undo.push(super::undo::Undo::Segment(0));
     Ok(())
 }
 
 /// Messages that only shipped firmware has.
-fn firmware() -> Vec<Case<Bench>> {
+fn firmware() -> Vec<Case<Harness>> {
     vec![
         Case::new(
             "profiler_information_needs_a_profiler",
             &["ST-4.3-15", "ST-3.1-16"],
-            |bench: &mut Bench| {
-                bench.need_no(Feature::Profiler)?;
+            |harness: &mut Harness| {
+                harness.need_no(Feature::Profiler)?;
                 for steps in [&[][..], &[0, 1, 2]] {
-                    bench.refused(&Request::ProfilerInfo(steps), ErrorCode::MpNotEnabled)?;
+                    harness.refused(&Request::GetProfilerInfo(steps), ErrorCode::MpNotEnabled)?;
                 }
                 Ok(())
             },
         ),
-        Case::new("a_torque_ramp_at_rest_starts_nothing", &["ST-3.1-10"], |bench: &mut Bench| {
-            bench.keep_setpoints()?;
-            let ramp = TorqueRamp { torque_s16a: 0x0123, duration_ms: 500 };
-            bench.done(&Request::TorqueRamp(ramp))?;
-            nothing_started(bench)
-        }),
+        Case::new(
+            "a_torque_ramp_at_rest_starts_nothing",
+            &["ST-3.1-10"],
+            |harness: &mut Harness| {
+                harness.keep_setpoints()?;
+                let ramp = TorqueRamp { torque_s16a: 0x0123, duration_ms: 500 };
+                harness.done(&Request::SetTorqueRamp(ramp))?;
+                nothing_started(harness)
+            },
+        ),
         Case::new(
             "position_commands_need_position_control",
             &["ST-3.1-16", "ST-4.1-16"],
-            |bench: &mut Bench| {
-                bench.need_no(Feature::PositionControl)?;
+            |harness: &mut Harness| {
+                harness.need_no(Feature::PositionControl)?;
                 let target = PositionMove { angle_rad: 0.0, duration_s: 1.0 };
-                bench.refused(&Request::Position(target), ErrorCode::BadFrameId)
+                harness.refused(&Request::SetPosition(target), ErrorCode::BadFrameId)
             },
         ),
         Case::new(
             "codes_that_firmware_lacks_are_refused",
             &["ST-3.1-11", "ST-4.1-16"],
-            |bench: &mut Bench| {
+            |harness: &mut Harness| {
                 let code = FrameCode::ConfigDynStruct.number();
-                let bytes = bench.frame(code, &[0, RegisterId::STATUS.0]);
-                bench.refused_bytes(&bytes, ErrorCode::BadFrameId)
+                let bytes = harness.frame(code, &[0, RegisterId::STATUS.0]);
+                harness.refused_bytes(&bytes, ErrorCode::BadFrameId)
             },
         ),
     ]

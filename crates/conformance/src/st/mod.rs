@@ -1,12 +1,12 @@
 //! Drives that speak ST's Motor Control Protocol.
 
-mod bench;
 mod clauses;
 mod commands;
 mod explore;
 mod faults;
 mod found;
 mod frames;
+mod harness;
 mod messages;
 mod motion;
 mod motors;
@@ -24,13 +24,13 @@ use motorlink_proto::st::Profile;
 use crate::case::Case;
 use crate::markdown::markdown;
 
-pub use bench::{Bench, Options};
 pub use clauses::CLAUSES;
+pub use harness::{Harness, Options};
 pub use safety::may_start;
 
 /// What a drive of this profile is put through: from the frame to the message, then what turns the
 /// motor or needs help.
-pub fn suite(profile: Profile) -> Vec<Case<Bench>> {
+pub fn suite(profile: Profile) -> Vec<Case<Harness>> {
     let topics = [
         frames::cases,
         timing::cases,

@@ -7,7 +7,7 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::time::Duration;
 
-use super::bench::Bench;
+use super::harness::Harness;
 use super::restore::faulty;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{Reading, S14, S15, S22, S25, S26, S48, S53};
@@ -23,9 +23,9 @@ const STEADY: u32 = 40;
 /// What the motor turns at where the drive does not tell what it was last told, rpm.
 const SPEED: i32 = 1_500;
 
-type Test = fn(&mut Bench) -> Result<(), Stop>;
+type Test = fn(&mut Harness) -> Result<(), Stop>;
 
-pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
+pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     let tests: [(&'static str, &'static [&'static str], Test); 11] = [
         // First what ends every other.
         ("a_stop_brings_the_motor_to_rest", &["ST-4.6-11", "ST-4.6-13"], stop),
@@ -57,7 +57,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         ("the_id_reference_of_speed_mode_acts_in_run", &["ST-4.4-25"], speed_mode_id, S22),
         ("encoder_align_in_run_does_nothing", &["ST-4.6-25", "ST-4.6-26"], align_in_run, S53),
     ];
-    let mut cases: Vec<Case<Bench>> =
+    let mut cases: Vec<Case<Harness>> =
         tests.map(|(name, clauses, test)| Case::new(name, clauses, test).needs(SPIN)).into();
     cases.extend(readings.map(|(name, clauses, test, reading)| {
         Case::new(name, clauses, test).needs(SPIN).reading(reading)
@@ -74,51 +74,51 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
 const SPIN: &[Need] = &[Need::Spin];
 
 /// A speed that the user's drive is set to anyway, within what registers allow.
-fn speed(bench: &mut Bench) -> Result<i32, Stop> {
-    let told = bench.value(RegisterId::RAMP_FINAL_SPEED)?.saturating_abs();
-    let most = *bench.speeds()?.end();
+fn speed(harness: &mut Harness) -> Result<i32, Stop> {
+    let told = harness.value(RegisterId::RAMP_FINAL_SPEED)?.saturating_abs();
+    let most = *harness.speeds()?.end();
     Ok(if (300..=5_000).contains(&told) { told } else { SPEED.min(most) } / 6 * 6)
 }
 
 /// Programs a ramp and starts the motor; gives the speed when it is in RUN and at it.
-pub(super) fn run(bench: &mut Bench) -> Result<i32, Stop> {
-    bench.keep_setpoints()?;
-    let speed_rpm = speed(bench)?;
-    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 500 }))?;
-    bench.execute(Command::StartMotor)?;
-    comes_to(bench, speed_rpm)?;
+pub(super) fn run(harness: &mut Harness) -> Result<i32, Stop> {
+    harness.keep_setpoints()?;
+    let speed_rpm = speed(harness)?;
+    harness.done(&Request::SetRamp(Ramp { speed_rpm, duration_ms: 500 }))?;
+    harness.execute(Command::StartMotor)?;
+    comes_to(harness, speed_rpm)?;
     Ok(speed_rpm)
 }
 
 /// Waits until the motor is in RUN.
-fn running(bench: &mut Bench) -> Result<(), Stop> {
-    let run = bench.found.run;
-    let status = bench.wait_for(START, |status| status == run || faulty(status))?;
-    bench.require(status == run, format!("ACK {}: {run}, within 15 s", u8::from(run)))
+fn running(harness: &mut Harness) -> Result<(), Stop> {
+    let run = harness.found.run;
+    let status = harness.wait_for(START, |status| status == run || faulty(status))?;
+    harness.require(status == run, format!("ACK {}: {run}, within 15 s", u8::from(run)))
 }
 
 /// Waits until the motor is in RUN and at a speed. A drive that gives RUN another number is known by
 /// the speed (SPEC-NOTES S14); from then on this is its RUN.
-fn comes_to(bench: &mut Bench, speed: i32) -> Result<(), Stop> {
-    let until = bench.clock.now() + START;
+fn comes_to(harness: &mut Harness, speed: i32) -> Result<(), Stop> {
+    let until = harness.clock.now() + START;
     let mut stays = 0;
     loop {
-        let status = bench.status()?;
-        if status == bench.found.run {
-            return reaches(bench, speed);
+        let status = harness.status()?;
+        if status == harness.found.run {
+            return reaches(harness, speed);
         }
-        let measured = bench.value(RegisterId::SPEED_MEAS)?;
+        let measured = harness.value(RegisterId::SPEED_MEAS)?;
         stays = if is_near(measured, speed) { stays + 1 } else { 0 };
         if stays == STEADY {
-            let differs = bench.failed("ACK 6: RUN, for the motor is at its speed");
-            bench.found.run = status;
-            return bench.note(S14, Err(differs));
+            let differs = harness.failed("ACK 6: RUN, for the motor is at its speed");
+            harness.found.run = status;
+            return harness.note(S14, Err(differs));
         }
-        if faulty(status) || bench.clock.now() >= until {
+        if faulty(status) || harness.clock.now() >= until {
             let words = format!("ACK 6: RUN, within 15 s, and {speed} rpm");
-            return Err(bench.failed(words));
+            return Err(harness.failed(words));
         }
-        bench.silence(LOOK)?;
+        harness.silence(LOOK)?;
     }
 }
 
@@ -127,161 +127,161 @@ fn is_near(measured: i32, speed: i32) -> bool {
 }
 
 /// Waits until SPEED_MEAS is within a tenth of a speed, and stays there.
-fn reaches(bench: &mut Bench, speed: i32) -> Result<(), Stop> {
-    let until = bench.clock.now() + SETTLE;
+fn reaches(harness: &mut Harness, speed: i32) -> Result<(), Stop> {
+    let until = harness.clock.now() + SETTLE;
     let mut stays = 0;
     loop {
-        let measured = bench.value(RegisterId::SPEED_MEAS)?;
+        let measured = harness.value(RegisterId::SPEED_MEAS)?;
         stays = if is_near(measured, speed) { stays + 1 } else { 0 };
         if stays == STEADY {
             return Ok(());
         }
-        if bench.clock.now() >= until {
-            return Err(bench.failed(format!("ACK {speed} rpm, give or take a tenth")));
+        if harness.clock.now() >= until {
+            return Err(harness.failed(format!("ACK {speed} rpm, give or take a tenth")));
         }
-        bench.silence(LOOK)?;
+        harness.silence(LOOK)?;
     }
 }
 
-fn still_running(bench: &mut Bench) -> Result<(), Stop> {
-    let (status, run) = (bench.status()?, bench.found.run);
-    bench.require(status == run, format!("ACK {}: {run}, as before", u8::from(run)))
+fn still_running(harness: &mut Harness) -> Result<(), Stop> {
+    let (status, run) = (harness.status()?, harness.found.run);
+    harness.require(status == run, format!("ACK {}: {run}, as before", u8::from(run)))
 }
 
-fn comes_to_rest(bench: &mut Bench) -> Result<(), Stop> {
-    let idle = bench.found.idle;
-    let status = bench.wait_for(START, |status| status == idle)?;
-    bench.require(status == idle, format!("ACK {}: {idle}", u8::from(idle)))
+fn comes_to_rest(harness: &mut Harness) -> Result<(), Stop> {
+    let idle = harness.found.idle;
+    let status = harness.wait_for(START, |status| status == idle)?;
+    harness.require(status == idle, format!("ACK {}: {idle}", u8::from(idle)))
 }
 
-fn start(bench: &mut Bench) -> Result<(), Stop> {
-    run(bench)?;
-    bench.silence(Duration::from_millis(300))?;
-    still_running(bench)
+fn start(harness: &mut Harness) -> Result<(), Stop> {
+    run(harness)?;
+    harness.silence(Duration::from_millis(300))?;
+    still_running(harness)
 }
 
-fn stop(bench: &mut Bench) -> Result<(), Stop> {
-    run(bench)?;
-    bench.execute(Command::StopMotor)?;
-    comes_to_rest(bench)?;
-    let measured = bench.value(RegisterId::SPEED_MEAS)?;
-    bench.require(measured.abs() <= 30, "ACK 0 rpm")
+fn stop(harness: &mut Harness) -> Result<(), Stop> {
+    run(harness)?;
+    harness.execute(Command::StopMotor)?;
+    comes_to_rest(harness)?;
+    let measured = harness.value(RegisterId::SPEED_MEAS)?;
+    harness.require(measured.abs() <= 30, "ACK 0 rpm")
 }
 
-fn start_again(bench: &mut Bench) -> Result<(), Stop> {
-    let speed = run(bench)?;
-    bench.execute(Command::StartMotor)?;
+fn start_again(harness: &mut Harness) -> Result<(), Stop> {
+    let speed = run(harness)?;
+    harness.execute(Command::StartMotor)?;
     for _ in 0..10 {
-        still_running(bench)?;
-        bench.silence(LOOK)?;
+        still_running(harness)?;
+        harness.silence(LOOK)?;
     }
-    reaches(bench, speed)
+    reaches(harness, speed)
 }
 
-fn start_stop(bench: &mut Bench) -> Result<(), Stop> {
-    bench.keep_setpoints()?;
-    let speed_rpm = speed(bench)?;
-    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 500 }))?;
-    bench.execute(Command::StartStop)?;
-    comes_to(bench, speed_rpm)?;
-    bench.execute(Command::StartStop)?;
-    comes_to_rest(bench)
+fn start_stop(harness: &mut Harness) -> Result<(), Stop> {
+    harness.keep_setpoints()?;
+    let speed_rpm = speed(harness)?;
+    harness.done(&Request::SetRamp(Ramp { speed_rpm, duration_ms: 500 }))?;
+    harness.execute(Command::StartStop)?;
+    comes_to(harness, speed_rpm)?;
+    harness.execute(Command::StartStop)?;
+    comes_to_rest(harness)
 }
 
-fn ramp_at_once(bench: &mut Bench) -> Result<(), Stop> {
-    let speed_rpm = run(bench)? * 4 / 5;
-    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 400 }))?;
-    still_running(bench)?;
-    reaches(bench, speed_rpm)
+fn ramp_at_once(harness: &mut Harness) -> Result<(), Stop> {
+    let speed_rpm = run(harness)? * 4 / 5;
+    harness.done(&Request::SetRamp(Ramp { speed_rpm, duration_ms: 400 }))?;
+    still_running(harness)?;
+    reaches(harness, speed_rpm)
 }
 
 /// SPEED_REF follows a straight line, and is there when the ramp is over (SPEC-NOTES S48); the motor has
 /// gone three quarters of the way when three quarters of the duration are over.
-fn ramp_duration(bench: &mut Bench) -> Result<(), Stop> {
-    let from = run(bench)?;
+fn ramp_duration(harness: &mut Harness) -> Result<(), Stop> {
+    let from = run(harness)?;
     let (to, duration_ms) = (from * 4 / 5, 3_000);
-    bench.done(&Request::Ramp(Ramp { speed_rpm: to, duration_ms }))?;
-    let began = bench.clock.now();
+    harness.done(&Request::SetRamp(Ramp { speed_rpm: to, duration_ms }))?;
+    let began = harness.clock.now();
     let near = |reference: i32| (reference - to).abs() <= (from - to).abs() / 20 + 6;
     let late_on = to + (from - to) / 4;
     let (mut passed, mut there) = (None, None);
     while passed.is_none() || there.is_none() {
-        let took = bench.clock.now().since(began).as_micros() / 1_000;
+        let took = harness.clock.now().since(began).as_micros() / 1_000;
         if took > 6_000 {
             break;
         }
-        if bench.value(RegisterId::SPEED_MEAS)? <= late_on {
+        if harness.value(RegisterId::SPEED_MEAS)? <= late_on {
             passed.get_or_insert(took);
         }
-        if near(bench.value(RegisterId::SPEED_REF)?) {
+        if near(harness.value(RegisterId::SPEED_REF)?) {
             there.get_or_insert(took);
         }
-        bench.silence(LOOK)?;
+        harness.silence(LOOK)?;
     }
     let held = there.is_some_and(|took| (2_000..=5_000).contains(&took));
     let words = format!("SPEED_REF at {to} rpm after 3000 ms, not {}", after(there));
-    let reference = bench.require(held, words);
-    bench.note(S48, reference)?;
+    let reference = harness.require(held, words);
+    harness.note(S48, reference)?;
     let held = passed.is_some_and(|took| (1_300..=4_000).contains(&took));
     let words = format!("{late_on} rpm after 2250 ms, not {}", after(passed));
-    bench.require(held, words)
+    harness.require(held, words)
 }
 
 fn after(took: Option<u64>) -> String {
     took.map_or("within 6 s".to_owned(), |took| format!("after {took} ms"))
 }
 
-fn backwards(bench: &mut Bench) -> Result<(), Stop> {
-    bench.keep_setpoints()?;
-    let speed_rpm = -speed(bench)?;
-    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 500 }))?;
-    bench.execute(Command::StartMotor)?;
-    comes_to(bench, speed_rpm)
+fn backwards(harness: &mut Harness) -> Result<(), Stop> {
+    harness.keep_setpoints()?;
+    let speed_rpm = -speed(harness)?;
+    harness.done(&Request::SetRamp(Ramp { speed_rpm, duration_ms: 500 }))?;
+    harness.execute(Command::StartMotor)?;
+    comes_to(harness, speed_rpm)
 }
 
-fn stop_ramp(bench: &mut Bench) -> Result<(), Stop> {
-    let from = run(bench)?;
+fn stop_ramp(harness: &mut Harness) -> Result<(), Stop> {
+    let from = run(harness)?;
     let to = from * 4 / 5;
-    bench.done(&Request::Ramp(Ramp { speed_rpm: to, duration_ms: 2_000 }))?;
-    bench.silence(Duration::from_millis(600))?;
-    bench.execute(Command::StopRamp)?;
-    still_running(bench)?;
-    let held = holds_reference(bench, from, to);
-    bench.note(S48, held)?;
-    still_running(bench)?;
+    harness.done(&Request::SetRamp(Ramp { speed_rpm: to, duration_ms: 2_000 }))?;
+    harness.silence(Duration::from_millis(600))?;
+    harness.execute(Command::StopRamp)?;
+    still_running(harness)?;
+    let held = holds_reference(harness, from, to);
+    harness.note(S48, held)?;
+    still_running(harness)?;
     // The ramp would be over.
-    bench.silence(Duration::from_millis(1_500))?;
-    let measured = bench.value(RegisterId::SPEED_MEAS)?;
+    harness.silence(Duration::from_millis(1_500))?;
+    let measured = harness.value(RegisterId::SPEED_MEAS)?;
     let short_of_it = (measured - to).abs() > (from - to) / 4;
-    bench.require(short_of_it, format!("ACK with a speed short of {to} rpm"))
+    harness.require(short_of_it, format!("ACK with a speed short of {to} rpm"))
 }
 
-fn holds_reference(bench: &mut Bench, from: i32, to: i32) -> Result<(), Stop> {
-    let held = bench.value(RegisterId::SPEED_REF)?;
+fn holds_reference(harness: &mut Harness, from: i32, to: i32) -> Result<(), Stop> {
+    let held = harness.value(RegisterId::SPEED_REF)?;
     let between = held < from - 6 && held > to + 6;
-    bench.require(between, format!("ACK with a speed between {from} and {to} rpm"))?;
-    bench.silence(Duration::from_millis(500))?;
-    let now = bench.value(RegisterId::SPEED_REF)?;
-    bench.require((now - held).abs() <= 12, format!("ACK {held} rpm, held"))
+    harness.require(between, format!("ACK with a speed between {from} and {to} rpm"))?;
+    harness.silence(Duration::from_millis(500))?;
+    let now = harness.value(RegisterId::SPEED_REF)?;
+    harness.require((now - held).abs() <= 12, format!("ACK {held} rpm, held"))
 }
 
-fn stop_no_ramp(bench: &mut Bench) -> Result<(), Stop> {
-    let speed = run(bench)?;
-    bench.silence(Duration::from_millis(300))?;
-    bench.execute(Command::StopRamp)?;
-    bench.silence(Duration::from_millis(200))?;
-    still_running(bench)?;
-    reaches(bench, speed)
+fn stop_no_ramp(harness: &mut Harness) -> Result<(), Stop> {
+    let speed = run(harness)?;
+    harness.silence(Duration::from_millis(300))?;
+    harness.execute(Command::StopRamp)?;
+    harness.silence(Duration::from_millis(200))?;
+    still_running(harness)?;
+    reaches(harness, speed)
 }
 
 /// The current that the motor needs to keep its speed: the mean of a few looks, rounded to what
 /// keeps it turning.
-fn keeping_current(bench: &mut Bench) -> Result<i16, Stop> {
-    bench.silence(Duration::from_millis(500))?;
+fn keeping_current(harness: &mut Harness) -> Result<i16, Stop> {
+    harness.silence(Duration::from_millis(500))?;
     let mut sum = 0;
     for _ in 0..16 {
-        sum += bench.value(RegisterId::TORQUE_MEAS)?;
-        bench.silence(LOOK)?;
+        sum += harness.value(RegisterId::TORQUE_MEAS)?;
+        harness.silence(LOOK)?;
     }
     Ok((sum / 16).clamp(-32_000, 32_000) as i16)
 }
@@ -291,95 +291,95 @@ fn reference(iq_s16a: i16) -> CurrentReference {
     CurrentReference { iq_s16a, id_s16a: if iq_s16a == -60 { -90 } else { -60 } }
 }
 
-fn references_are(bench: &mut Bench, wanted: CurrentReference) -> Result<(), Stop> {
+fn references_are(harness: &mut Harness, wanted: CurrentReference) -> Result<(), Stop> {
     let CurrentReference { iq_s16a, id_s16a } = wanted;
-    let iq = bench.value(RegisterId::TORQUE_REF)?;
-    bench.require(iq == i32::from(iq_s16a), format!("ACK {iq_s16a} s16A, the Iq reference"))?;
-    let id = bench.value(RegisterId::FLUX_REF)?;
-    bench.require(id == i32::from(id_s16a), format!("ACK {id_s16a} s16A, the Id reference"))
+    let iq = harness.value(RegisterId::TORQUE_REF)?;
+    harness.require(iq == i32::from(iq_s16a), format!("ACK {iq_s16a} s16A, the Iq reference"))?;
+    let id = harness.value(RegisterId::FLUX_REF)?;
+    harness.require(id == i32::from(id_s16a), format!("ACK {id_s16a} s16A, the Id reference"))
 }
 
-fn references_at_once(bench: &mut Bench) -> Result<(), Stop> {
-    let speed_rpm = run(bench)?;
-    let reference = reference(keeping_current(bench)?);
-    bench.done(&Request::CurrentReference(reference))?;
-    let outcome = references_are(bench, reference).and_then(|()| still_running(bench));
+fn references_at_once(harness: &mut Harness) -> Result<(), Stop> {
+    let speed_rpm = run(harness)?;
+    let reference = reference(keeping_current(harness)?);
+    harness.done(&Request::SetCurrentReference(reference))?;
+    let outcome = references_are(harness, reference).and_then(|()| still_running(harness));
     // Back under speed control, whatever came of it.
-    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 100 }))?;
+    harness.done(&Request::SetRamp(Ramp { speed_rpm, duration_ms: 100 }))?;
     outcome
 }
 
-fn references_deferred(bench: &mut Bench) -> Result<(), Stop> {
-    run(bench)?;
-    let reference = reference(keeping_current(bench)?);
-    bench.rest()?;
-    bench.done(&Request::CurrentReference(reference))?;
-    bench.require_idle("for nothing was started")?;
-    bench.execute(Command::StartMotor)?;
-    running(bench)?;
-    let outcome = references_are(bench, reference);
-    bench.execute(Command::StopMotor)?;
+fn references_deferred(harness: &mut Harness) -> Result<(), Stop> {
+    run(harness)?;
+    let reference = reference(keeping_current(harness)?);
+    harness.rest()?;
+    harness.done(&Request::SetCurrentReference(reference))?;
+    harness.require_idle("for nothing was started")?;
+    harness.execute(Command::StartMotor)?;
+    running(harness)?;
+    let outcome = references_are(harness, reference);
+    harness.execute(Command::StopMotor)?;
     outcome
 }
 
 /// In torque mode, with the current that keeps the speed.
-fn torque_mode(bench: &mut Bench) -> Result<(), Stop> {
-    bench.set(RegisterId::CONTROL_MODE, u8::from(ControlMode::Torque).into())?;
-    mode_is(bench, ControlMode::Torque)
+fn torque_mode(harness: &mut Harness) -> Result<(), Stop> {
+    harness.set(RegisterId::CONTROL_MODE, u8::from(ControlMode::Torque).into())?;
+    mode_is(harness, ControlMode::Torque)
 }
 
-fn mode_is(bench: &mut Bench, mode: ControlMode) -> Result<(), Stop> {
-    let now = bench.value(RegisterId::CONTROL_MODE)?;
+fn mode_is(harness: &mut Harness, mode: ControlMode) -> Result<(), Stop> {
+    let now = harness.value(RegisterId::CONTROL_MODE)?;
     let held = now == i32::from(u8::from(mode));
-    bench.require(held, format!("ACK {}: {mode}", u8::from(mode)))
+    harness.require(held, format!("ACK {}: {mode}", u8::from(mode)))
 }
 
 /// What CONTROL_MODE reads is a reading (SPEC-NOTES S15); that the ramp is executed is not.
-fn ramp_in_torque_mode(bench: &mut Bench) -> Result<(), Stop> {
-    let speed_rpm = run(bench)? * 4 / 5;
-    let torque = torque_mode(bench);
-    bench.note(S15, torque)?;
-    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 300 }))?;
-    bench.silence(LOOK)?;
-    let speed = mode_is(bench, ControlMode::Speed);
-    bench.note(S15, speed)?;
-    still_running(bench)?;
-    reaches(bench, speed_rpm)
+fn ramp_in_torque_mode(harness: &mut Harness) -> Result<(), Stop> {
+    let speed_rpm = run(harness)? * 4 / 5;
+    let torque = torque_mode(harness);
+    harness.note(S15, torque)?;
+    harness.done(&Request::SetRamp(Ramp { speed_rpm, duration_ms: 300 }))?;
+    harness.silence(LOOK)?;
+    let speed = mode_is(harness, ControlMode::Speed);
+    harness.note(S15, speed)?;
+    still_running(harness)?;
+    reaches(harness, speed_rpm)
 }
 
-fn mode(bench: &mut Bench) -> Result<(), Stop> {
-    run(bench)?;
-    torque_mode(bench)?;
-    bench.set(RegisterId::CONTROL_MODE, u8::from(ControlMode::Speed).into())?;
-    mode_is(bench, ControlMode::Speed)?;
-    still_running(bench)
+fn mode(harness: &mut Harness) -> Result<(), Stop> {
+    run(harness)?;
+    torque_mode(harness)?;
+    harness.set(RegisterId::CONTROL_MODE, u8::from(ControlMode::Speed).into())?;
+    mode_is(harness, ControlMode::Speed)?;
+    still_running(harness)
 }
 
-fn final_speed(bench: &mut Bench) -> Result<(), Stop> {
-    let speed = run(bench)? * 4 / 5;
-    bench.set(RegisterId::RAMP_FINAL_SPEED, speed)?;
-    reaches(bench, speed)
+fn final_speed(harness: &mut Harness) -> Result<(), Stop> {
+    let speed = run(harness)? * 4 / 5;
+    harness.set(RegisterId::RAMP_FINAL_SPEED, speed)?;
+    reaches(harness, speed)
 }
 
-fn speed_mode_id(bench: &mut Bench) -> Result<(), Stop> {
-    run(bench)?;
-    bench.set(RegisterId::IQ_SPEEDMODE, -60)?;
-    let id = bench.value(RegisterId::FLUX_REF)?;
-    bench.require(id == -60, "ACK -60 s16A, the Id reference that was written")?;
-    still_running(bench)
+fn speed_mode_id(harness: &mut Harness) -> Result<(), Stop> {
+    run(harness)?;
+    harness.set(RegisterId::IQ_SPEEDMODE, -60)?;
+    let id = harness.value(RegisterId::FLUX_REF)?;
+    harness.require(id == -60, "ACK -60 s16A, the Id reference that was written")?;
+    still_running(harness)
 }
 
 /// With an encoder it goes through the states of an alignment, without nothing happens: what STATUS
 /// shows of it is a reading (SPEC-NOTES S53).
-fn align(bench: &mut Bench) -> Result<(), Stop> {
-    bench.execute(Command::EncoderAlign)?;
-    aligns(bench).read_as(S53)
+fn align(harness: &mut Harness) -> Result<(), Stop> {
+    harness.execute(Command::EncoderAlign)?;
+    aligns(harness).read_as(S53)
 }
 
-fn aligns(bench: &mut Bench) -> Result<(), Stop> {
+fn aligns(harness: &mut Harness) -> Result<(), Stop> {
     let mut aligning = false;
     for _ in 0..10 {
-        let status = bench.status()?;
+        let status = harness.status()?;
         aligning |= matches!(
             status,
             Status::IdleAlignment
@@ -388,51 +388,51 @@ fn aligns(bench: &mut Bench) -> Result<(), Stop> {
                 | Status::AlignClear
                 | Status::Alignment
         );
-        let held = aligning || bench.is_idle(status);
-        bench.require(held, "ACK: IDLE, or aligning")?;
-        bench.silence(LOOK)?;
+        let held = aligning || harness.is_idle(status);
+        harness.require(held, "ACK: IDLE, or aligning")?;
+        harness.silence(LOOK)?;
     }
-    comes_to_rest(bench)
+    comes_to_rest(harness)
 }
 
-fn align_in_run(bench: &mut Bench) -> Result<(), Stop> {
-    let speed = run(bench)?;
-    bench.execute(Command::EncoderAlign)?;
+fn align_in_run(harness: &mut Harness) -> Result<(), Stop> {
+    let speed = run(harness)?;
+    harness.execute(Command::EncoderAlign)?;
     for _ in 0..10 {
-        still_running(bench)?;
-        bench.silence(LOOK)?;
+        still_running(harness)?;
+        harness.silence(LOOK)?;
     }
-    reaches(bench, speed)
+    reaches(harness, speed)
 }
 
 /// SPEC-NOTES S7: from what the motor needs to a little more, in a straight line.
-fn torque_ramp(bench: &mut Bench) -> Result<(), Stop> {
-    let speed_rpm = run(bench)?;
-    let from = i32::from(keeping_current(bench)?);
+fn torque_ramp(harness: &mut Harness) -> Result<(), Stop> {
+    let speed_rpm = run(harness)?;
+    let from = i32::from(keeping_current(harness)?);
     let ramp = TorqueRamp { torque_s16a: from / 2, duration_ms: 300 };
-    bench.done(&Request::TorqueRamp(ramp))?;
-    bench.silence(LOOK)?;
-    let outcome = mode_is(bench, ControlMode::Torque).and_then(|()| {
-        bench.silence(Duration::from_millis(400))?;
-        let now = bench.value(RegisterId::TORQUE_REF)?;
-        bench.require(now == from / 2, format!("ACK {} s16A, the end of the ramp", from / 2))
+    harness.done(&Request::SetTorqueRamp(ramp))?;
+    harness.silence(LOOK)?;
+    let outcome = mode_is(harness, ControlMode::Torque).and_then(|()| {
+        harness.silence(Duration::from_millis(400))?;
+        let now = harness.value(RegisterId::TORQUE_REF)?;
+        harness.require(now == from / 2, format!("ACK {} s16A, the end of the ramp", from / 2))
     });
-    bench.done(&Request::Ramp(Ramp { speed_rpm, duration_ms: 100 }))?;
+    harness.done(&Request::SetRamp(Ramp { speed_rpm, duration_ms: 100 }))?;
     outcome
 }
 
 /// SPEC-NOTES S8: half a turn on from where the motor is.
-fn position(bench: &mut Bench) -> Result<(), Stop> {
-    bench.need(Feature::PositionControl)?;
-    bench.keep_setpoints()?;
+fn position(harness: &mut Harness) -> Result<(), Stop> {
+    harness.need(Feature::PositionControl)?;
+    harness.keep_setpoints()?;
     let hold = PositionMove { angle_rad: 0.0, duration_s: 1.0 };
-    bench.done(&Request::Position(hold))?;
-    bench.execute(Command::StartMotor)?;
-    running(bench)?;
-    bench.silence(Duration::from_millis(1_500))?;
+    harness.done(&Request::SetPosition(hold))?;
+    harness.execute(Command::StartMotor)?;
+    running(harness)?;
+    harness.silence(Duration::from_millis(1_500))?;
     let target = PositionMove { angle_rad: std::f32::consts::PI, duration_s: 1.0 };
-    bench.done(&Request::Position(target))?;
-    bench.silence(Duration::from_millis(2_500))?;
-    let now = f32::from_bits(bench.value(RegisterId::CURRENT_POSITION)? as u32);
-    bench.require((now - target.angle_rad).abs() < 0.2, "ACK 3.14 rad, give or take 0.2")
+    harness.done(&Request::SetPosition(target))?;
+    harness.silence(Duration::from_millis(2_500))?;
+    let now = f32::from_bits(harness.value(RegisterId::CURRENT_POSITION)? as u32);
+    harness.require((now - target.angle_rad).abs() < 0.2, "ACK 3.14 rad, give or take 0.2")
 }

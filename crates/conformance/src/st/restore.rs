@@ -2,12 +2,12 @@
 
 use motorlink_proto::Hex;
 use motorlink_proto::st::{
-    Command, ErrorCode, Frame, FrameCode, HEADER_ACK, Motor, RegisterId, Request, RevupPhase,
+    Command, ErrorCode, Frame, FrameCode, HEADER_ACK, MotorNumber, RegisterId, Request, RevupPhase,
     Status,
 };
 use motorlink_proto::time::Duration;
 
-use super::bench::{Bench, PATIENCE, Reply, frame};
+use super::harness::{Harness, PATIENCE, Reply, frame};
 use super::undo::{Setpoints, Undo};
 use crate::case::{Need, ReadAs, Stop, Subject};
 use crate::finding::Finding;
@@ -23,7 +23,7 @@ const STOPS: u32 = 3;
 /// Between two looks at a register.
 const LOOK: Duration = Duration::from_millis(10);
 
-impl Subject for Bench {
+impl Subject for Harness {
     fn begin(&mut self) -> Result<(), Stop> {
         self.forget();
         (self.moved, self.restoring, self.current) = (false, false, None);
@@ -95,7 +95,7 @@ impl Subject for Bench {
     }
 }
 
-impl Bench {
+impl Harness {
     /// Remembers a register, to be put back; gives its bytes.
     pub(super) fn keep(&mut self, register: RegisterId) -> Result<Vec<u8>, Stop> {
         if is_setpoint(register) {
@@ -121,7 +121,7 @@ impl Bench {
 
     /// Remembers a rev-up phase, to be put back; gives it.
     pub(super) fn keep_revup(&mut self, phase: u8) -> Result<RevupPhase, Stop> {
-        let payload = self.acknowledged(&Request::RevupData(phase))?;
+        let payload = self.acknowledged(&Request::GetRevupData(phase))?;
         let data = RevupPhase::decode(&payload);
         let data = data.ok_or_else(|| self.failed("ACK with 8 bytes: speed, torque, duration"))?;
         self.undo.push(Undo::Revup(phase, data));
@@ -199,7 +199,7 @@ impl Bench {
 
     /// Tells a drive to stop the motor that may hear although it does not answer.
     fn stop_unheard(&mut self) -> Result<(), Stop> {
-        let stop = self.encode(&Request::Execute(Command::StopMotor));
+        let stop = self.encode(&Request::ExecuteCommand(Command::StopMotor));
         for _ in 0..STOPS {
             self.drain(SILENCE)?;
             self.send_more(&stop)?;
@@ -247,12 +247,12 @@ impl Bench {
             Undo::Setpoints(setpoints) => self.put_back_setpoints(setpoints).read_as(S48),
             Undo::Revup(phase, data) => {
                 self.done(&Request::SetRevupData(phase, data))?;
-                let now = self.acknowledged(&Request::RevupData(phase))?;
+                let now = self.acknowledged(&Request::GetRevupData(phase))?;
                 let left = format!("phase {phase} as it was found: {}", Hex(&data.to_bytes()));
                 self.require(now == data.to_bytes(), left)
             }
             Undo::Segment(segment) => {
-                self.done(&Request::ConfigDynStruct { segment, registers: &[] })
+                self.done(&Request::ConfigureSegment { segment, registers: &[] })
             }
             Undo::Pfc => self.execute(Command::PfcDisable),
             Undo::Fault => Ok(()),
@@ -293,7 +293,7 @@ impl Bench {
     /// Any frame makes its motor the current one.
     fn put_back_current(&mut self) -> Result<(), Stop> {
         let Some(index) = self.current else { return Ok(()) };
-        let Some(motor) = Motor::new(index.saturating_add(1)) else { return Ok(()) };
+        let Some(motor) = MotorNumber::new(index.saturating_add(1)) else { return Ok(()) };
         let header = Frame::header(FrameCode::GetReg.number(), motor.number());
         self.exchange(&frame(header, &[RegisterId::STATUS.0])).map(drop)
     }

@@ -4,15 +4,15 @@ use motorlink_proto::Hex;
 use motorlink_proto::st::register::Writing;
 use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
 
-use super::bench::Bench;
 use super::explore::read_size;
+use super::harness::Harness;
 use super::registers::{kept_by, writing};
 use super::values;
 use crate::case::{Case, Stop};
 use crate::reading::{S18, S19};
 
-pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
-    let mut cases: Vec<Case<Bench>> = Vec::new();
+pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
+    let mut cases: Vec<Case<Harness>> = Vec::new();
     for register in RegisterId::all().filter(|&id| id != RegisterId::TARGET_MOTOR) {
         // What cannot be read back does not show what was kept of a value.
         let readable = read_size(register, profile).is_some();
@@ -24,18 +24,18 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         cases.push(Case::new(
             format!("a_longer_value_is_cut_to_its_low_bytes[{register}]"),
             &["ST-4.4-07", "ST-4.4-06", "ST-4.4-09"],
-            move |bench: &mut Bench| longer(bench, register, size),
+            move |harness: &mut Harness| longer(harness, register, size),
         ));
         cases.push(match profile {
             Profile::Spec => Case::new(
                 format!("a_shorter_value_keeps_the_other_bytes[{register}]"),
                 &["ST-4.4-08", "ST-4.4-06", "ST-4.4-09"],
-                move |bench: &mut Bench| shorter(bench, register, size),
+                move |harness: &mut Harness| shorter(harness, register, size),
             ),
             Profile::Mcsdk54 => Case::new(
                 format!("a_shorter_value_is_refused[{register}]"),
                 &["ST-4.4-08"],
-                move |bench: &mut Bench| short_refused(bench, register, size),
+                move |harness: &mut Harness| short_refused(harness, register, size),
             ),
         });
     }
@@ -57,7 +57,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
             Case::new(
                 format!("a_message_that_is_too_short_is_refused[{}]", code.name()),
                 clauses,
-                move |bench: &mut Bench| too_short(bench, code, least, refusal),
+                move |harness: &mut Harness| too_short(harness, code, least, refusal),
             )
             .reading(S18),
         );
@@ -78,112 +78,112 @@ const SHORT: [(FrameCode, usize, ErrorCode); 8] = [
 ];
 
 /// A register that is there and can be read back, kept; its value, and one to write.
-fn prepare(bench: &mut Bench, register: RegisterId) -> Result<(Vec<u8>, i32), Stop> {
+fn prepare(harness: &mut Harness, register: RegisterId) -> Result<(Vec<u8>, i32), Stop> {
     if let Some(shape) = register.shape() {
-        bench.need(shape.feature)?;
+        harness.need(shape.feature)?;
     }
-    let before = bench.keep(register)?;
-    let value = values::samples(bench.profile(), register, &before).first().copied();
+    let before = harness.keep(register)?;
+    let value = values::samples(harness.profile(), register, &before).first().copied();
     Ok((before, value.unwrap_or_default()))
 }
 
-fn longer(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), Stop> {
-    let (_, value) = prepare(bench, register)?;
-    bench.set(register, value)?;
+fn longer(harness: &mut Harness, register: RegisterId, size: usize) -> Result<(), Stop> {
+    let (_, value) = prepare(harness, register)?;
+    harness.set(register, value)?;
     for excess in [1, 4, 8] {
         let mut bytes = value.to_le_bytes()[..size].to_vec();
         bytes.resize(size + excess, 0xEE);
-        bench.done(&Request::SetRegister { register, value: &bytes })?;
-        let now = bench.value(register)?;
-        let cut = bench.require(now == value, format!("the low bytes: {}", Hex(&bytes[..size])));
+        harness.done(&Request::SetRegister { register, value: &bytes })?;
+        let now = harness.value(register)?;
+        let cut = harness.require(now == value, format!("the low bytes: {}", Hex(&bytes[..size])));
         match kept_by(register) {
-            Some(reading) => bench.note(reading, cut)?,
+            Some(reading) => harness.note(reading, cut)?,
             None => cut?,
         }
     }
     Ok(())
 }
 
-fn shorter(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), Stop> {
-    let (_, value) = prepare(bench, register)?;
-    bench.set(register, value)?;
+fn shorter(harness: &mut Harness, register: RegisterId, size: usize) -> Result<(), Stop> {
+    let (_, value) = prepare(harness, register)?;
+    harness.set(register, value)?;
     for kept in 0..size {
         // One bit of the low byte differs, so that speeds and shares stay what they can be.
         let mut bytes = value.to_le_bytes();
         if kept > 0 {
             bytes[0] ^= 0x04;
         }
-        let taken = bench.done(&Request::SetRegister { register, value: &bytes[..kept] });
+        let taken = harness.done(&Request::SetRegister { register, value: &bytes[..kept] });
         // Whether nothing at all is a value that is too short is a reading as well.
         if kept == 0 {
-            bench.note(S19, taken)?;
+            harness.note(S19, taken)?;
         } else {
             taken?;
         }
-        let now = bench.get(register)?;
+        let now = harness.get(register)?;
         let shown = &bytes[..now.len().min(4)];
         let words = format!("ACK {}: new low bytes, old high ones", Hex(shown));
-        let held = bench.require(now == shown, words);
-        bench.note(S19, held)?;
-        bench.set(register, value)?;
+        let held = harness.require(now == shown, words);
+        harness.note(S19, held)?;
+        harness.set(register, value)?;
     }
     Ok(())
 }
 
-fn short_refused(bench: &mut Bench, register: RegisterId, size: usize) -> Result<(), Stop> {
-    let (before, value) = prepare(bench, register)?;
+fn short_refused(harness: &mut Harness, register: RegisterId, size: usize) -> Result<(), Stop> {
+    let (before, value) = prepare(harness, register)?;
     for kept in 0..size {
-        prime(bench)?;
+        prime(harness)?;
         let value = &value.to_le_bytes()[..kept];
-        let bytes = bench.encode(&Request::SetRegister { register, value });
-        refused_or_old_bytes(bench, &bytes, ErrorCode::WrongSet)?;
-        let now = bench.get(register)?;
-        bench.require(now == before, format!("the value as before: {}", Hex(&before)))?;
+        let bytes = harness.encode(&Request::SetRegister { register, value });
+        refused_or_old_bytes(harness, &bytes, ErrorCode::WrongSet)?;
+        let now = harness.get(register)?;
+        harness.require(now == before, format!("the value as before: {}", Hex(&before)))?;
     }
     Ok(())
 }
 
 /// Fills the drive's receive buffer with bytes that are harmless in any message: stock firmware
 /// takes them for those that a short message does not carry (SPEC-NOTES S18).
-fn prime(bench: &mut Bench) -> Result<(), Stop> {
-    let bytes = bench.frame(0x1D, &[0xEE; 16]);
-    bench.refused_bytes(&bytes, ErrorCode::BadFrameId)
+fn prime(harness: &mut Harness) -> Result<(), Stop> {
+    let bytes = harness.frame(0x1D, &[0xEE; 16]);
+    harness.refused_bytes(&bytes, ErrorCode::BadFrameId)
 }
 
 /// A refusal; in profile `mcsdk-5.4` an ACK only means that the drive is stock firmware.
-fn refused_or_old_bytes(bench: &mut Bench, bytes: &[u8], code: ErrorCode) -> Result<(), Stop> {
-    let reply = bench.exchange(bytes)?;
-    if bench.profile() == Profile::Mcsdk54 && reply.header == HEADER_ACK {
+fn refused_or_old_bytes(harness: &mut Harness, bytes: &[u8], code: ErrorCode) -> Result<(), Stop> {
+    let reply = harness.exchange(bytes)?;
+    if harness.profile() == Profile::Mcsdk54 && reply.header == HEADER_ACK {
         return Err(Stop::Skipped(
             "the drive takes old bytes for missing ones, as shipped firmware does".to_owned(),
         ));
     }
-    bench.require_nack(&reply, code)
+    harness.require_nack(&reply, code)
 }
 
 fn too_short(
-    bench: &mut Bench,
+    harness: &mut Harness,
     code: FrameCode,
     least: usize,
     refusal: ErrorCode,
 ) -> Result<(), Stop> {
-    bench.keep_setpoints()?;
+    harness.keep_setpoints()?;
     if code == FrameCode::SetRevupData {
-        bench.keep_revup(0)?;
+        harness.keep_revup(0)?;
     }
-    let before = setpoints(bench)?;
+    let before = setpoints(harness)?;
     for size in 0..least {
-        prime(bench)?;
-        let bytes = bench.frame(code.number(), &[0; 16][..size]);
-        refused_or_old_bytes(bench, &bytes, refusal)?;
-        bench.require_idle("for nothing was started")?;
+        prime(harness)?;
+        let bytes = harness.frame(code.number(), &[0; 16][..size]);
+        refused_or_old_bytes(harness, &bytes, refusal)?;
+        harness.require_idle("for nothing was started")?;
     }
-    let now = setpoints(bench)?;
-    bench.require(now == before, "mode and references as before the refused message")
+    let now = setpoints(harness)?;
+    harness.require(now == before, "mode and references as before the refused message")
 }
 
 /// What the messages that are too short would change.
-fn setpoints(bench: &mut Bench) -> Result<Vec<Vec<u8>>, Stop> {
+fn setpoints(harness: &mut Harness) -> Result<Vec<Vec<u8>>, Stop> {
     let registers = [
         RegisterId::CONTROL_MODE,
         RegisterId::RAMP_FINAL_SPEED,
@@ -192,8 +192,8 @@ fn setpoints(bench: &mut Bench) -> Result<Vec<Vec<u8>>, Stop> {
     ];
     let mut values = Vec::new();
     for register in registers {
-        values.push(bench.get(register)?);
+        values.push(harness.get(register)?);
     }
-    values.push(bench.acknowledged(&Request::RevupData(0))?);
+    values.push(harness.acknowledged(&Request::GetRevupData(0))?);
     Ok(values)
 }

@@ -3,7 +3,7 @@
 use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
 use motorlink_proto::time::Duration;
 
-use super::bench::{Bench, RECEPTION, Reply};
+use super::harness::{Harness, RECEPTION, Reply};
 use crate::case::{Case, Stop};
 use crate::reading::{S11, S29};
 
@@ -19,7 +19,7 @@ const WATCH: Duration = Duration::from_millis(100);
 /// How often what depends on this host's own timing is tried.
 const TRIES: usize = 5;
 
-pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
+pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     let mut cases = vec![Case::new("a_reply_comes_within_a_second", &["ST-4.1-04"], in_a_second)];
     match profile {
         Profile::Spec => {
@@ -27,7 +27,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
                 cases.push(Case::new(
                     format!("a_cut_frame_is_answered_with_timeout[{what}]"),
                     &["ST-4.1-08", "ST-4.3-12"],
-                    move |bench: &mut Bench| cut(bench, size),
+                    move |harness: &mut Harness| cut(harness, size),
                 ));
             }
             cases.extend([
@@ -47,15 +47,15 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
         Profile::Mcsdk54 => cases.push(Case::new(
             "a_frame_may_take_as_long_as_it_likes",
             &["ST-4.1-08"],
-            |bench: &mut Bench| {
-                let bytes = bench.encode(&Request::GetRegister(RegisterId::STATUS));
+            |harness: &mut Harness| {
+                let bytes = harness.encode(&Request::GetRegister(RegisterId::STATUS));
                 for size in 1..bytes.len() {
-                    bench.send(&bytes[..size])?;
-                    bench.silence(WATCH)?;
-                    bench.send_more(&bytes[size..])?;
-                    let reply = bench.reply(ANSWER)?;
+                    harness.send(&bytes[..size])?;
+                    harness.silence(WATCH)?;
+                    harness.send_more(&bytes[size..])?;
+                    let reply = harness.reply(ANSWER)?;
                     let held = reply.is_some_and(|reply| reply.header == HEADER_ACK);
-                    bench
+                    harness
                         .require(held, "ACK, for this firmware has no timeout (SPEC-NOTES S11)")?;
                 }
                 Ok(())
@@ -74,18 +74,18 @@ const CUTS: [(&str, usize); 5] = [
     ("before the checksum", 8),
 ];
 
-fn in_a_second(bench: &mut Bench) -> Result<(), Stop> {
+fn in_a_second(harness: &mut Harness) -> Result<(), Stop> {
     // The quickest of several: a host that is busy once is no slow drive.
     let mut quickest = None;
     for _ in 0..3 {
         for request in [
             Request::GetRegister(RegisterId::STATUS),
-            Request::BoardInfo,
+            Request::GetBoardInfo,
             Request::GetRegister(RegisterId(0xEE)),
         ] {
-            let bytes = bench.encode(&request);
-            let reply = bench.exchange(&bytes)?;
-            let flight = bench.on_the_line(bytes.len() + 40);
+            let bytes = harness.encode(&request);
+            let reply = harness.exchange(&bytes)?;
+            let flight = harness.on_the_line(bytes.len() + 40);
             if reply.delay <= ANSWER + flight {
                 return Ok(());
             }
@@ -93,50 +93,50 @@ fn in_a_second(bench: &mut Bench) -> Result<(), Stop> {
         }
     }
     let delay = quickest.map_or(0, |delay| delay.as_micros() / 1_000);
-    Err(bench.failed(format!("a reply within 1 s, not after {delay} ms")))
+    Err(harness.failed(format!("a reply within 1 s, not after {delay} ms")))
 }
 
 /// A question that is longer than it need be, its beginning.
-fn beginning(bench: &Bench, size: usize) -> Vec<u8> {
+fn beginning(harness: &Harness, size: usize) -> Vec<u8> {
     let payload = [RegisterId::STATUS.0, 0xEE, 0xEE, 0xEE, 0xEE, 0xEE];
-    let mut bytes = bench.frame(FrameCode::GetReg.number(), &payload);
+    let mut bytes = harness.frame(FrameCode::GetReg.number(), &payload);
     bytes.truncate(size);
     bytes
 }
 
 /// Sends the beginning of a frame; the NACK TIMEOUT that must come of it.
-fn timed_out(bench: &mut Bench, size: usize) -> Result<Reply, Stop> {
-    bench.out_of_step = true;
-    let bytes = beginning(bench, size);
-    let reply = bench.exchange(&bytes)?;
-    bench.require_nack(&reply, ErrorCode::Timeout)?;
-    bench.out_of_step = false;
+fn timed_out(harness: &mut Harness, size: usize) -> Result<Reply, Stop> {
+    harness.out_of_step = true;
+    let bytes = beginning(harness, size);
+    let reply = harness.exchange(&bytes)?;
+    harness.require_nack(&reply, ErrorCode::Timeout)?;
+    harness.out_of_step = false;
     Ok(reply)
 }
 
-fn cut(bench: &mut Bench, size: usize) -> Result<(), Stop> {
-    timed_out(bench, size)?;
-    bench.status().map(drop)
+fn cut(harness: &mut Harness, size: usize) -> Result<(), Stop> {
+    timed_out(harness, size)?;
+    harness.status().map(drop)
 }
 
-fn once(bench: &mut Bench) -> Result<(), Stop> {
-    timed_out(bench, 2)?;
-    bench.silence(WATCH)
+fn once(harness: &mut Harness) -> Result<(), Stop> {
+    timed_out(harness, 2)?;
+    harness.silence(WATCH)
 }
 
-fn on_time(bench: &mut Bench) -> Result<(), Stop> {
+fn on_time(harness: &mut Harness) -> Result<(), Stop> {
     let mut outcome = Ok(());
     for _ in 0..TRIES {
         // What this host does between two looks at its clock makes a drive look late, never early.
-        let began = bench.clock.now();
-        let reply = timed_out(bench, 2)?;
-        let took = bench.clock.now().since(began);
-        let late = reply.delay > RECEPTION + SLACK + bench.on_the_line(6);
+        let began = harness.clock.now();
+        let reply = timed_out(harness, 2)?;
+        let took = harness.clock.now().since(began);
+        let late = reply.delay > RECEPTION + SLACK + harness.on_the_line(6);
         if took + EARLY >= RECEPTION && !late {
             return Ok(());
         }
         let ms = took.as_micros() as f64 / 1e3;
-        outcome = Err(bench.failed(format!("NACK TIMEOUT after 25 ms, not after {ms} ms")));
+        outcome = Err(harness.failed(format!("NACK TIMEOUT after 25 ms, not after {ms} ms")));
         if !late {
             break;
         }
@@ -145,51 +145,51 @@ fn on_time(bench: &mut Bench) -> Result<(), Stop> {
 }
 
 /// The rest of a frame that timed out is the beginning of another (SPEC-NOTES S29).
-fn late_bytes(bench: &mut Bench) -> Result<(), Stop> {
-    let bytes = bench.encode(&Request::GetRegister(RegisterId::STATUS));
-    timed_out(bench, 2)?;
-    bench.out_of_step = true;
-    let reply = bench.exchange(&bytes[2..])?;
-    bench.require_nack(&reply, ErrorCode::Timeout)?;
-    bench.out_of_step = false;
-    bench.status().map(drop)
+fn late_bytes(harness: &mut Harness) -> Result<(), Stop> {
+    let bytes = harness.encode(&Request::GetRegister(RegisterId::STATUS));
+    timed_out(harness, 2)?;
+    harness.out_of_step = true;
+    let reply = harness.exchange(&bytes[2..])?;
+    harness.require_nack(&reply, ErrorCode::Timeout)?;
+    harness.out_of_step = false;
+    harness.status().map(drop)
 }
 
 /// Bytes that come one by one are timed from the first (SPEC-NOTES S11): the NACK comes while they
 /// still come.
-fn trickle(bench: &mut Bench) -> Result<(), Stop> {
-    let bytes = beginning(bench, 8);
-    bench.out_of_step = true;
-    bench.send(&bytes[..1])?;
+fn trickle(harness: &mut Harness) -> Result<(), Stop> {
+    let bytes = beginning(harness, 8);
+    harness.out_of_step = true;
+    harness.send(&bytes[..1])?;
     for byte in &bytes[1..] {
-        if let Some(reply) = bench.reply(Duration(RECEPTION.as_micros() * 6 / 10))? {
-            return bench.require_nack(&reply, ErrorCode::Timeout);
+        if let Some(reply) = harness.reply(Duration(RECEPTION.as_micros() * 6 / 10))? {
+            return harness.require_nack(&reply, ErrorCode::Timeout);
         }
-        bench.send_more(&[*byte])?;
+        harness.send_more(&[*byte])?;
     }
-    Err(bench.failed("NACK TIMEOUT 25 ms after the first byte, while others still come"))
+    Err(harness.failed("NACK TIMEOUT 25 ms after the first byte, while others still come"))
 }
 
-fn in_time(bench: &mut Bench) -> Result<(), Stop> {
-    let bytes = bench.encode(&Request::GetRegister(RegisterId::STATUS));
+fn in_time(harness: &mut Harness) -> Result<(), Stop> {
+    let bytes = harness.encode(&Request::GetRegister(RegisterId::STATUS));
     let too_slow = "this host cannot send the parts of a frame within 25 ms".to_owned();
     let mut outcome = Err(Stop::Skipped(too_slow));
-    bench.out_of_step = true;
+    harness.out_of_step = true;
     for _ in 0..TRIES {
-        let began = bench.clock.now();
-        bench.send(&bytes[..2])?;
-        bench.silence(Duration(RECEPTION.as_micros() * 6 / 10))?;
-        bench.send_more(&bytes[2..])?;
-        let took = bench.clock.now().since(began);
-        let reply = bench.awaited()?;
+        let began = harness.clock.now();
+        harness.send(&bytes[..2])?;
+        harness.silence(Duration(RECEPTION.as_micros() * 6 / 10))?;
+        harness.send_more(&bytes[2..])?;
+        let took = harness.clock.now().since(began);
+        let reply = harness.awaited()?;
         if reply.header == HEADER_ACK {
-            bench.out_of_step = false;
+            harness.out_of_step = false;
             return Ok(());
         }
         if took < Duration(RECEPTION.as_micros() * 9 / 10) {
-            outcome = Err(bench.failed("ACK, for the frame was whole after 15 ms"));
+            outcome = Err(harness.failed("ACK, for the frame was whole after 15 ms"));
         }
-        bench.drain(WATCH)?;
+        harness.drain(WATCH)?;
     }
     outcome
 }

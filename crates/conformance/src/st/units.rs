@@ -4,7 +4,7 @@ use motorlink_proto::Hex;
 use motorlink_proto::st::register::Feature;
 use motorlink_proto::st::{Profile, RegisterId, Request};
 
-use super::bench::Bench;
+use super::harness::Harness;
 use super::messages::empty_segment;
 use super::motion;
 use crate::case::{Case, Need, ReadAs, Stop};
@@ -31,17 +31,17 @@ const SYNONYMS: [(RegisterId, RegisterId); 4] = [
     (RegisterId::I_D_REF, RegisterId::FLUX_REF),
 ];
 
-pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
-    let mut cases: Vec<Case<Bench>> = AT_REST
+pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
+    let mut cases: Vec<Case<Harness>> = AT_REST
         .into_iter()
         .map(|(register, clauses, feature, range, words)| {
             Case::new(
                 format!("a_value_is_in_its_unit[{register}]"),
                 clauses,
-                move |bench: &mut Bench| {
-                    bench.need(feature)?;
-                    let value = bench.value(register)?;
-                    let held = bench.require(range.contains(&value), format!("ACK with {words}"));
+                move |harness: &mut Harness| {
+                    harness.need(feature)?;
+                    let value = harness.value(register)?;
+                    let held = harness.require(range.contains(&value), format!("ACK with {words}"));
                     // Below zero is a value of a type that table 3 does not name.
                     if value < 0 { held.read_as(S23) } else { held }
                 },
@@ -58,11 +58,11 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
             Case::new(
                 "the_speeds_of_the_application_are_in_rpm",
                 &["ST-4.4-30"],
-                |bench: &mut Bench| {
-                    let least = bench.value(RegisterId::MIN_APP_SPEED)?;
-                    let most = bench.value(RegisterId::MAX_APP_SPEED)?;
+                |harness: &mut Harness| {
+                    let least = harness.value(RegisterId::MIN_APP_SPEED)?;
+                    let most = harness.value(RegisterId::MAX_APP_SPEED)?;
                     let ordered = least <= most && (1..=200_000).contains(&most);
-                    bench.require(ordered, format!("ACK with {least} to 200000 rpm"))
+                    harness.require(ordered, format!("ACK with {least} to 200000 rpm"))
                 },
             ),
             Case::new("synonyms_have_one_value", &["ST-4.4-32"], synonyms)
@@ -74,38 +74,38 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Bench>> {
     cases
 }
 
-fn shares(bench: &mut Bench) -> Result<(), Stop> {
-    bench.need(Feature::FluxWeakening)?;
-    let most = match bench.profile() {
+fn shares(harness: &mut Harness) -> Result<(), Stop> {
+    harness.need(Feature::FluxWeakening)?;
+    let most = match harness.profile() {
         Profile::Spec => 100,
         Profile::Mcsdk54 => 1_000,
     };
     for register in [RegisterId::FLUXWK_BUS, RegisterId::FLUXWK_BUS_MEAS] {
-        let value = bench.value(register)?;
-        bench.require((0..=most).contains(&value), format!("ACK with at most {most}: 100 %"))?;
+        let value = harness.value(register)?;
+        harness.require((0..=most).contains(&value), format!("ACK with at most {most}: 100 %"))?;
     }
     Ok(())
 }
 
 /// Mains of any country, or none.
-fn mains(bench: &mut Bench) -> Result<(), Stop> {
-    bench.need(Feature::Pfc)?;
-    let frequency = bench.value(RegisterId::PFC_ACBUS_FREQ)?;
+fn mains(harness: &mut Harness) -> Result<(), Stop> {
+    harness.need(Feature::Pfc)?;
+    let frequency = harness.value(RegisterId::PFC_ACBUS_FREQ)?;
     let held = frequency == 0 || (450..=650).contains(&frequency);
-    bench.require(held, "ACK with 450 to 650, or 0 without mains")
+    harness.require(held, "ACK with 450 to 650, or 0 without mains")
 }
 
 /// What has two names has one value. Registers of access D are only read in a data segment.
-fn synonyms(bench: &mut Bench) -> Result<(), Stop> {
-    empty_segment(bench)?;
+fn synonyms(harness: &mut Harness) -> Result<(), Stop> {
+    empty_segment(harness)?;
     let registers: Vec<u8> = SYNONYMS.iter().flat_map(|(one, other)| [one.0, other.0]).collect();
-    bench.done(&Request::ConfigDynStruct { segment: 0, registers: &registers })?;
-    motion::run(bench)?;
-    let payload = bench.acknowledged(&Request::DataElement(0))?;
-    bench.require(payload.len() == 2 * registers.len(), "ACK with 2 bytes a register")?;
+    harness.done(&Request::ConfigureSegment { segment: 0, registers: &registers })?;
+    motion::run(harness)?;
+    let payload = harness.acknowledged(&Request::GetSegment(0))?;
+    harness.require(payload.len() == 2 * registers.len(), "ACK with 2 bytes a register")?;
     for (pair, (one, other)) in payload.chunks(4).zip(SYNONYMS) {
         let words = format!("{one} as {other}: {}", Hex(&pair[2..]));
-        bench.require(pair[..2] == pair[2..], words)?;
+        harness.require(pair[..2] == pair[2..], words)?;
     }
     Ok(())
 }

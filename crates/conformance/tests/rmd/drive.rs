@@ -2,7 +2,7 @@
 //! the bus.
 
 use motorlink::port::CanLink;
-use motorlink_conformance::rmd::{Bench, Options, suite};
+use motorlink_conformance::rmd::{Harness, Options, suite};
 use motorlink_conformance::{Case, Need, Report, Unavailable, World, run};
 use motorlink_link::serve::CanStation;
 use motorlink_proto::can::CanFrame;
@@ -175,7 +175,7 @@ pub struct Setup {
     pub motors: Vec<RmdConfig>,
     pub allowed: &'static [Need],
     pub behaviour: Behaviour,
-    pub suite: Vec<Case<Bench>>,
+    pub suite: Vec<Case<Harness>>,
     /// What is between the kit and the bus.
     pub port: fn(&Wire) -> Box<dyn CanLink>,
     /// When the user has had enough.
@@ -215,7 +215,7 @@ impl Setup {
         let bus = Shared::new(station);
         let options = Options { id, encoder, allowed: allowed.to_vec() };
         let world = Box::new(Around { bus: bus.clone(), interrupted });
-        let report = run(&suite, &mut Bench::new(port(&bus), world, options), |_| {});
+        let report = run(&suite, &mut Harness::new(port(&bus), world, options), |_| {});
         // What was told last gets its time.
         let now = bus.clock.now();
         bus.station().motors.bus.advance_to(now + Duration::from_millis(1_000));

@@ -1,10 +1,10 @@
 //! The drive under test: a simulated one on virtual time, as it is or with one deviation.
 
-use motorlink_conformance::st::{self, Bench, Options};
+use motorlink_conformance::st::{self, Harness, Options};
 use motorlink_conformance::{Need, Report, Unavailable, World, run};
 use motorlink_link::serve::ByteStation;
 use motorlink_proto::st::register::Features;
-use motorlink_proto::st::{Flags, Frame, Motor, Profile, RegisterId};
+use motorlink_proto::st::{Flags, Frame, MotorNumber, Profile, RegisterId};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
 
@@ -162,7 +162,7 @@ impl World for Hands {
     fn fault(&mut self, present: bool) -> Result<(), Unavailable> {
         let station = &mut self.0.station().station;
         let motors = station.drive().last().number();
-        for motor in (1..=motors).filter_map(Motor::new) {
+        for motor in (1..=motors).filter_map(MotorNumber::new) {
             let motor = station.drive_mut().motor_mut(motor).expect("a motor of the drive");
             match present {
                 true => motor.hold_faults(Flags::OVER_TEMP),
@@ -185,12 +185,12 @@ pub fn test(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
 /// The same, what differs from a reading apart.
 pub fn test_apart(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
     let profile = wire.station().station.profile();
-    let motor = Motor::new(motor).expect("1 to 7");
+    let motor = MotorNumber::new(motor).expect("1 to 7");
     let byte_time = Duration(0);
     let options = Options { profile, motor, allowed: allowed.to_vec(), byte_time };
     let world = Box::new(Hands(wire.clone()));
-    let mut bench = Bench::new(wire.line(), world, options);
-    run(&st::suite(profile), &mut bench, |_| {})
+    let mut harness = Harness::new(wire.line(), world, options);
+    run(&st::suite(profile), &mut harness, |_| {})
 }
 
 /// The current motor, every register of a motor as it reads, and its rev-up phases.

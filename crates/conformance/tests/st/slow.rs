@@ -5,10 +5,10 @@ use std::time::Duration as Span;
 
 use motorlink::Clock;
 use motorlink::port::{ByteLink, PortError};
-use motorlink_conformance::st::{self, Bench, Options};
+use motorlink_conformance::st::{self, Harness, Options};
 use motorlink_conformance::{Need, Verdict, run};
 use motorlink_link::serve::ByteStation;
-use motorlink_proto::st::{Motor, Profile};
+use motorlink_proto::st::{MotorNumber, Profile};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_sim::st::MotorConfig;
 
@@ -103,9 +103,9 @@ fn a_slow_line_fails_nothing_and_skips_what_it_cannot_carry_in_time() {
         let (outward, inward) = Default::default();
         let uart = Uart { peer, byte_time, clock: Clock::standing(), outward, inward };
         let allowed = vec![Need::Spin];
-        let options = Options { profile, motor: Motor::FIRST, allowed, byte_time };
-        let mut bench = Bench::new(Box::new(uart), Box::new(()), options);
-        let report = run(&st::suite(profile), &mut bench, |_| {}).strict();
+        let options = Options { profile, motor: MotorNumber::FIRST, allowed, byte_time };
+        let mut harness = Harness::new(Box::new(uart), Box::new(()), options);
+        let report = run(&st::suite(profile), &mut harness, |_| {}).strict();
         assert!(report.is_clean(), "{baud}: {:#?}", report.failed().collect::<Vec<_>>());
         let slow = report.outcomes.iter().filter(
             |outcome| matches!(&outcome.verdict, Verdict::Skipped(why) if why.contains("25 ms")),

@@ -3,7 +3,8 @@
 use core::ffi::c_void;
 
 use motorlink_proto::rmd::{
-    Config, Drive, EncoderBits, Errors, Mode, Motor, MotorId, PhaseCurrents, Sense, Settings,
+    Drive, DriveConfig, EncoderBits, Errors, Mode, MotorControl, MotorId, PhaseCurrents, Sense,
+    Settings,
 };
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{Celsius, DeciVolts, Dps, DpsPerSecond, IqFeedback, PhaseCurrent};
@@ -193,7 +194,7 @@ impl From<motorlink_rmd_settings> for Settings {
     }
 }
 
-impl Motor for Kept<motorlink_rmd_motor> {
+impl MotorControl for Kept<motorlink_rmd_motor> {
     fn set_mode(&mut self, mode: Mode) {
         let motor = self.now();
         if let Some(call) = motor.set_mode {
@@ -267,7 +268,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_init(
             0 => Some(EncoderBits::default()),
             bits => EncoderBits::new(bits),
         };
-        let config = Config {
+        let config = DriveConfig {
             id: MotorId::new(config.id).ok_or(motorlink_error::BadArgument)?,
             encoder: encoder.ok_or(motorlink_error::BadArgument)?,
             shutdown: (config.shutdown_us != 0).then_some(Duration(config.shutdown_us)),

@@ -1,6 +1,8 @@
 //! The host's end: many motors, an exchange each.
 
-use motorlink_proto::rmd::{Error, Host, Limits, MotorId, MotorSet, Output, Refused, SetTorque4};
+use motorlink_proto::rmd::{
+    Failure, Host, Limits, MotorId, MotorSet, Output, RequestError, SetTorque4,
+};
 use motorlink_proto::time::{Duration, Instant};
 use motorlink_proto::units::{CentiDegrees, IqCommand, SpeedLimit};
 
@@ -63,20 +65,20 @@ fn id(motor: u8) -> Result<MotorId, motorlink_error> {
 }
 
 impl State {
-    fn refused(&mut self, refused: Refused) -> motorlink_error {
+    fn refused(&mut self, refused: RequestError) -> motorlink_error {
         match refused {
-            Refused::Busy(_) => motorlink_error::Busy,
-            Refused::Quarantined { until, .. } => {
+            RequestError::Busy(_) => motorlink_error::Busy,
+            RequestError::Quarantined { until, .. } => {
                 self.retry = until;
                 motorlink_error::Quarantined
             }
-            Refused::Limit { .. } => motorlink_error::Limit,
-            Refused::OutOfReach(_) => motorlink_error::BadArgument,
+            RequestError::Limit { .. } => motorlink_error::Limit,
+            RequestError::OutOfReach(_) => motorlink_error::BadArgument,
         }
     }
 }
 
-/// Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of guard time, no
+/// Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of quarantine time, no
 /// limits. `size` is `sizeof *host`. Former hosts may have asked the motors anything;
 /// `motorlink_rmd_host_trust` says that they did not.
 #[unsafe(no_mangle)]
@@ -100,7 +102,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_times(
     answer(|| {
         let mut state = host.enter()?;
         state.host.set_timeout(Duration(timeout_us.into()));
-        state.host.set_guard(Duration(guard_us.into()));
+        state.host.set_quarantine(Duration(guard_us.into()));
         Ok(())
     })
 }
@@ -143,7 +145,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_limits(
 ///
 /// A motor that did not answer before may be asked for its status instead; the exchange ends in
 /// `QUARANTINED` then. So does the first one with each motor, in which it is asked for its status
-/// by two different questions; when it was silent for the guard time the request is taken. Off and
+/// by two different questions; when it was silent for the quarantine time the request is taken. Off and
 /// Stop are taken and sent during a quarantine, unless it is their own late reply that is awaited;
 /// to a motor that was not asked before they go out ahead of the questions.
 ///
@@ -241,10 +243,10 @@ pub unsafe extern "C" fn motorlink_rmd_host_poll(
                 action.motor = id.number();
                 match result {
                     Ok(bytes) => action.reply = motorlink_rmd_data { bytes },
-                    Err(Error::Foreign(_)) => action.result = motorlink_error::Foreign,
-                    Err(Error::Altered) => action.result = motorlink_error::Altered,
-                    Err(Error::Quarantined) => action.result = motorlink_error::Quarantined,
-                    Err(Error::Echo) => action.result = motorlink_error::Echo,
+                    Err(Failure::Foreign(_)) => action.result = motorlink_error::Foreign,
+                    Err(Failure::Altered) => action.result = motorlink_error::Altered,
+                    Err(Failure::Quarantined) => action.result = motorlink_error::Quarantined,
+                    Err(Failure::Echo) => action.result = motorlink_error::Echo,
                     Err(_) => action.result = motorlink_error::Timeout,
                 }
             }

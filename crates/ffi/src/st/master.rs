@@ -1,7 +1,8 @@
 //! The master's end: one exchange at a time.
 
 use motorlink_proto::st::{
-    Config, Error, Failure, Line, MAX_PAYLOAD, Master, Output, Profile, Recovery, RegisterId,
+    ExchangeError, Failure, MAX_PAYLOAD, Master, MasterConfig, Output, Profile, Recovery,
+    RegisterId, SyncState,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -76,7 +77,7 @@ storage!(motorlink_st_master: State, tag::ST_MASTER);
 /// The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_st_master_defaults() -> motorlink_st_master_config {
-    let Config { timeout, quiet, .. } = Config::default();
+    let MasterConfig { timeout, quiet, .. } = MasterConfig::default();
     motorlink_st_master_config {
         timeout_us: timeout.0 as u32,
         quiet_us: quiet.0 as u32,
@@ -102,7 +103,7 @@ pub unsafe extern "C" fn motorlink_st_master_init(
     answer(|| {
         let config = config.read_optional()?.unwrap_or_else(|| motorlink_st_master_defaults());
         let profile = self::profile(config.profile)?;
-        let config = Config {
+        let config = MasterConfig {
             timeout: Duration(config.timeout_us.into()),
             recovery: recovery(config.recovery)?,
             quiet: Duration(config.quiet_us.into()),
@@ -178,10 +179,10 @@ pub unsafe extern "C" fn motorlink_st_master_poll(
     })
 }
 
-fn failed(error: Error) -> (motorlink_error, u8) {
+fn failed(error: ExchangeError) -> (motorlink_error, u8) {
     let failure = match error {
-        Error::Refused(code) => return (motorlink_error::Refused, code.number()),
-        Error::Failed(failure) => failure,
+        ExchangeError::Refused(code) => return (motorlink_error::Refused, code.number()),
+        ExchangeError::Failed(failure) => failure,
     };
     let result = match failure {
         Failure::NotUnderstood(code) => return (motorlink_error::NotUnderstood, code.number()),
@@ -276,7 +277,7 @@ pub unsafe extern "C" fn motorlink_st_master_is_lost(
     promised!(master, lost);
     answer(|| {
         let place = lost.place()?;
-        place.set(u8::from(master.enter()?.master.line() == Line::Lost));
+        place.set(u8::from(master.enter()?.master.sync_state() == SyncState::Lost));
         Ok(())
     })
 }

@@ -1,7 +1,7 @@
 //! What a master asks: every function begins an exchange.
 
 use motorlink_proto::st::{
-    Command, CurrentReference, Motor, PositionMove, REVUP_PHASES, Ramp, RegisterId, Request,
+    Command, CurrentReference, MotorNumber, PositionMove, REVUP_PHASES, Ramp, RegisterId, Request,
     RequestError, TorqueRamp,
 };
 
@@ -33,7 +33,7 @@ fn begin(state: &mut State, motor: u8, request: &Request<'_>) -> Result<(), moto
 }
 
 fn check_motor(motor: u8) -> Result<(), motorlink_error> {
-    if motor <= Motor::MAX { Ok(()) } else { Err(motorlink_error::BadArgument) }
+    if motor <= MotorNumber::MAX { Ok(()) } else { Err(motorlink_error::BadArgument) }
 }
 
 fn refused(error: RequestError) -> motorlink_error {
@@ -82,7 +82,7 @@ pub unsafe extern "C" fn motorlink_st_master_execute(
     command: u8,
 ) -> motorlink_error {
     promised!(master);
-    answer(|| request(master, motor, &Request::Execute(Command::from(command))))
+    answer(|| request(master, motor, &Request::ExecuteCommand(Command::from(command))))
 }
 
 /// Begins to program a speed ramp (4.8): to `speed_rpm` in `duration_ms`; 0 ms is a step.
@@ -94,7 +94,7 @@ pub unsafe extern "C" fn motorlink_st_master_ramp(
     duration_ms: u16,
 ) -> motorlink_error {
     promised!(master);
-    answer(|| request(master, motor, &Request::Ramp(Ramp { speed_rpm, duration_ms })))
+    answer(|| request(master, motor, &Request::SetRamp(Ramp { speed_rpm, duration_ms })))
 }
 
 /// Begins to set the references of Iq and Id (4.11), s16A digits.
@@ -107,7 +107,7 @@ pub unsafe extern "C" fn motorlink_st_master_current(
 ) -> motorlink_error {
     promised!(master);
     let reference = CurrentReference { iq_s16a, id_s16a };
-    answer(|| request(master, motor, &Request::CurrentReference(reference)))
+    answer(|| request(master, motor, &Request::SetCurrentReference(reference)))
 }
 
 /// Begins to program a torque ramp (profile MCSDK 5.4): to `torque_s16a` in `duration_ms`; 0 ms is
@@ -120,7 +120,9 @@ pub unsafe extern "C" fn motorlink_st_master_torque_ramp(
     duration_ms: u16,
 ) -> motorlink_error {
     promised!(master);
-    answer(|| request(master, motor, &Request::TorqueRamp(TorqueRamp { torque_s16a, duration_ms })))
+    answer(|| {
+        request(master, motor, &Request::SetTorqueRamp(TorqueRamp { torque_s16a, duration_ms }))
+    })
 }
 
 /// Begins a move to `angle_rad` in `duration_s` (profile MCSDK 5.4).
@@ -138,7 +140,7 @@ pub unsafe extern "C" fn motorlink_st_master_move(
         if !angle_rad.is_finite() || !duration_s.is_finite() {
             return Err(motorlink_error::BadArgument);
         }
-        request(master, motor, &Request::Position(PositionMove { angle_rad, duration_s }))
+        request(master, motor, &Request::SetPosition(PositionMove { angle_rad, duration_s }))
     })
 }
 
@@ -152,7 +154,7 @@ pub unsafe extern "C" fn motorlink_st_master_revup(
     phase: u8,
 ) -> motorlink_error {
     promised!(master);
-    answer(|| request(master, motor, &Request::RevupData(check_phase(phase)?)))
+    answer(|| request(master, motor, &Request::GetRevupData(check_phase(phase)?)))
 }
 
 fn check_phase(phase: u8) -> Result<u8, motorlink_error> {
@@ -184,7 +186,7 @@ pub unsafe extern "C" fn motorlink_st_master_board_info(
     motor: u8,
 ) -> motorlink_error {
     promised!(master);
-    answer(|| request(master, motor, &Request::BoardInfo))
+    answer(|| request(master, motor, &Request::GetBoardInfo))
 }
 
 /// Begins to read the firmware's version (4.12); `motorlink_st_decode_firmware_version` reads the
@@ -195,7 +197,7 @@ pub unsafe extern "C" fn motorlink_st_master_firmware_version(
     motor: u8,
 ) -> motorlink_error {
     promised!(master);
-    answer(|| request(master, motor, &Request::FirmwareVersion))
+    answer(|| request(master, motor, &Request::GetFirmwareVersion))
 }
 
 /// Begins to choose the registers of a data segment (profile SPEC): `count` numbers, which are
@@ -213,7 +215,7 @@ pub unsafe extern "C" fn motorlink_st_master_configure_segment(
     promised!(master, registers);
     answer(|| {
         let registers = registers.slice(count)?;
-        request(master, motor, &Request::ConfigDynStruct { segment, registers })
+        request(master, motor, &Request::ConfigureSegment { segment, registers })
     })
 }
 
@@ -226,7 +228,7 @@ pub unsafe extern "C" fn motorlink_st_master_read_segment(
     segment: u8,
 ) -> motorlink_error {
     promised!(master);
-    answer(|| request(master, motor, &Request::DataElement(segment)))
+    answer(|| request(master, motor, &Request::GetSegment(segment)))
 }
 
 /// Begins to ask which registers steps of the motor profiler show (profile MCSDK 5.4): `count`
@@ -241,7 +243,7 @@ pub unsafe extern "C" fn motorlink_st_master_profiler_info(
     count: usize,
 ) -> motorlink_error {
     promised!(master, steps);
-    answer(|| request(master, motor, &Request::ProfilerInfo(steps.slice(count)?)))
+    answer(|| request(master, motor, &Request::GetProfilerInfo(steps.slice(count)?)))
 }
 
 /// Begins an exchange with any header (5 bits of `motorlink_st_frame`, 3 bits of motor) and any

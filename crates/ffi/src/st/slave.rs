@@ -3,8 +3,8 @@
 use core::ffi::{c_char, c_void};
 
 use motorlink_proto::st::{
-    Command, CurrentReference, Drive, ErrorCode, Feature, Features, Motor, PositionMove, Ramp,
-    RegisterId, RevupPhase, Slave, TorqueRamp, Version,
+    Command, CurrentReference, ErrorCode, Feature, Features, MotorControl, MotorNumber,
+    PositionMove, Ramp, RegisterId, RevupPhase, Slave, TorqueRamp, Version,
 };
 use motorlink_proto::time::Instant;
 
@@ -130,8 +130,8 @@ pub(crate) struct State {
 
 storage!(motorlink_st_slave: State, tag::ST_SLAVE);
 
-impl Drive for Kept<motorlink_st_drive> {
-    fn features(&self, motor: Motor) -> Features {
+impl MotorControl for Kept<motorlink_st_drive> {
+    fn features(&self, motor: MotorNumber) -> Features {
         let drive = self.now();
         let bits = drive.features.map_or(0, |call| call(drive.context, motor.number()));
         let has = |feature: &&Feature| bits & 1u16.wrapping_shl(**feature as u32) != 0;
@@ -147,12 +147,17 @@ impl Drive for Kept<motorlink_st_drive> {
         Version { name, major, minor, patch, pre_release }
     }
 
-    fn read(&mut self, motor: Motor, register: RegisterId) -> i32 {
+    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         let drive = self.now();
         drive.read.map_or(0, |call| call(drive.context, motor.number(), register.0))
     }
 
-    fn write(&mut self, motor: Motor, register: RegisterId, value: i32) -> Result<(), ErrorCode> {
+    fn write(
+        &mut self,
+        motor: MotorNumber,
+        register: RegisterId,
+        value: i32,
+    ) -> Result<(), ErrorCode> {
         let drive = self.now();
         let call = drive.write.ok_or(ErrorCode::WrongSet)?;
         match call(drive.context, motor.number(), register.0, value) {
@@ -161,21 +166,21 @@ impl Drive for Kept<motorlink_st_drive> {
         }
     }
 
-    fn execute(&mut self, motor: Motor, command: Command) {
+    fn execute(&mut self, motor: MotorNumber, command: Command) {
         let drive = self.now();
         if let Some(call) = drive.execute {
             call(drive.context, motor.number(), command.number());
         }
     }
 
-    fn ramp(&mut self, motor: Motor, ramp: Ramp) {
+    fn ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
         let drive = self.now();
         if let Some(call) = drive.ramp {
             call(drive.context, motor.number(), ramp.speed_rpm, ramp.duration_ms);
         }
     }
 
-    fn revup(&mut self, motor: Motor, phase: u8) -> RevupPhase {
+    fn revup(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
         let drive = self.now();
         let mut data = motorlink_st_revup_phase::from(RevupPhase::default());
         if let Some(call) = drive.revup {
@@ -184,35 +189,35 @@ impl Drive for Kept<motorlink_st_drive> {
         data.into()
     }
 
-    fn set_revup(&mut self, motor: Motor, phase: u8, data: RevupPhase) {
+    fn set_revup(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
         let drive = self.now();
         if let Some(call) = drive.set_revup {
             call(drive.context, motor.number(), phase, &motorlink_st_revup_phase::from(data));
         }
     }
 
-    fn current_reference(&mut self, motor: Motor, reference: CurrentReference) {
+    fn current_reference(&mut self, motor: MotorNumber, reference: CurrentReference) {
         let drive = self.now();
         if let Some(call) = drive.current {
             call(drive.context, motor.number(), reference.iq_s16a, reference.id_s16a);
         }
     }
 
-    fn torque_ramp(&mut self, motor: Motor, ramp: TorqueRamp) {
+    fn torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
         let drive = self.now();
         if let Some(call) = drive.torque_ramp {
             call(drive.context, motor.number(), ramp.torque_s16a, ramp.duration_ms);
         }
     }
 
-    fn position(&mut self, motor: Motor, target: PositionMove) {
+    fn position(&mut self, motor: MotorNumber, target: PositionMove) {
         let drive = self.now();
         if let Some(call) = drive.position {
             call(drive.context, motor.number(), target.angle_rad, target.duration_s);
         }
     }
 
-    fn profiler_step(&self, motor: Motor, step: u8) -> &[u8] {
+    fn profiler_step(&self, motor: MotorNumber, step: u8) -> &[u8] {
         let drive = self.now();
         let mut registers = core::ptr::null();
         let call = drive.profiler_step;
@@ -241,7 +246,7 @@ pub unsafe extern "C" fn motorlink_st_slave_init(
     answer(|| {
         let drive = drive.keep()?;
         let profile = self::profile(profile)?;
-        let motors = Motor::new(motors).ok_or(motorlink_error::BadArgument)?;
+        let motors = MotorNumber::new(motors).ok_or(motorlink_error::BadArgument)?;
         slave.init(size, State { slave: Slave::new(profile, motors), drive })
     })
 }

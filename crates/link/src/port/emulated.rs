@@ -35,7 +35,7 @@ const CHUNK: usize = 128;
 /// Bytes are with the board before time goes on, and a write takes a tick, so that a client which
 /// asks without pause sees time pass, too.
 #[derive(Debug)]
-pub(super) struct EmulatedLine {
+pub(super) struct EmulatedBytes {
     data: FdLink,
     board: FdLink,
     clock: Clock,
@@ -49,7 +49,7 @@ pub(super) struct EmulatedLine {
     name: String,
 }
 
-impl EmulatedLine {
+impl EmulatedBytes {
     /// The line `data` of the board whose clock port is `board`. `name` is the clock port in messages
     /// and what tells this board from others.
     pub(super) fn new(data: FdLink, board: FdLink, name: String) -> Result<Self, PortError> {
@@ -64,7 +64,7 @@ impl EmulatedLine {
     ) -> Result<Self, PortError> {
         let clock = clock_of(&name);
         let reached = clock.now();
-        let mut line = EmulatedLine { data, board, clock, reached, due: 0, patience, name };
+        let mut line = EmulatedBytes { data, board, clock, reached, due: 0, patience, name };
         line.synchronise()?;
         Ok(line)
     }
@@ -142,7 +142,7 @@ impl EmulatedLine {
     }
 }
 
-impl ByteLink for EmulatedLine {
+impl ByteLink for EmulatedBytes {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.step_to(self.clock.now() + TICK)?;
         for chunk in bytes.chunks(CHUNK) {
@@ -263,11 +263,11 @@ mod tests {
     }
 
     /// A line to a board of its own.
-    fn line(delay: u64) -> (EmulatedLine, JoinHandle<u64>) {
+    fn line(delay: u64) -> (EmulatedBytes, JoinHandle<u64>) {
         let ((data, far_data), (clock, far_clock)) = (pair(), pair());
         let board = board(far_clock, far_data, delay);
         let data = FdLink::new(data, "data").unwrap();
-        (EmulatedLine::new(data, link(clock), name()).unwrap(), board)
+        (EmulatedBytes::new(data, link(clock), name()).unwrap(), board)
     }
 
     fn link(stream: TcpStream) -> FdLink {
@@ -287,7 +287,7 @@ mod tests {
         far_clock.write_all(&[7, 250, 3]).unwrap();
         let board = board(far_clock, far_data, 250);
         let data = FdLink::new(data, "data").unwrap();
-        let mut line = EmulatedLine::new(data, link(clock), name()).unwrap();
+        let mut line = EmulatedBytes::new(data, link(clock), name()).unwrap();
         line.write(&[7]).unwrap();
         let mut byte = [0];
         assert_eq!(line.read(&mut byte, None).unwrap(), 1);
@@ -364,7 +364,7 @@ mod tests {
         let ((data, far_data), (pulse, far_pulse)) = (pair(), pair());
         let _board = board(far_pulse, far_data, 0);
         let data = FdLink::new(data, "data").unwrap();
-        let mut again = EmulatedLine::new(data, link(pulse), name).unwrap();
+        let mut again = EmulatedBytes::new(data, link(pulse), name).unwrap();
         again.read(&mut [0], Some(MS)).unwrap();
         assert_eq!(clock.now(), Instant(2_000));
     }
@@ -374,7 +374,7 @@ mod tests {
         let (data, _far) = pair();
         let (clock, far_clock) = pair();
         let data = FdLink::new(data, "data").unwrap();
-        let error = EmulatedLine::patient(data, link(clock), "clock=h:1".to_owned(), MS);
+        let error = EmulatedBytes::patient(data, link(clock), "clock=h:1".to_owned(), MS);
         let error = error.expect_err("silence").to_string();
         assert!(error.contains("`clock=h:1`: the board's clock did not answer"), "{error}");
         drop(far_clock);
@@ -382,7 +382,7 @@ mod tests {
         let ((data, _far), (clock, far_clock)) = (pair(), pair());
         drop(far_clock);
         let data = FdLink::new(data, "data").unwrap();
-        let error = EmulatedLine::new(data, link(clock), name()).expect_err("closed");
+        let error = EmulatedBytes::new(data, link(clock), name()).expect_err("closed");
         assert!(matches!(error, PortError::Closed { .. }), "{error}");
     }
 
@@ -392,7 +392,7 @@ mod tests {
         let (_near, elsewhere) = pair();
         let _board = board(far_clock, elsewhere, 0);
         let data = FdLink::new(data, "data").unwrap();
-        let mut line = EmulatedLine::patient(data, link(clock), name(), 100 * MS).unwrap();
+        let mut line = EmulatedBytes::patient(data, link(clock), name(), 100 * MS).unwrap();
         let error = line.write(&[1]).expect_err("nobody reads");
         assert!(matches!(error, PortError::Stalled { .. }), "{error}");
         drop(far_data);

@@ -38,10 +38,10 @@ impl<E: Evented + ?Sized> Evented for Box<E> {
 
 /// A byte line whose writes wait for nothing: what the port does not take at once is kept for
 /// [`Evented::flush`], and for the next read or write.
-pub trait EventLine: ByteLink + Evented {}
+pub trait EventBytes: ByteLink + Evented {}
 
-/// A CAN bus whose sendings wait for nothing, as the writes of an [`EventLine`] do.
+/// A CAN bus whose sendings wait for nothing, as the writes of [`EventBytes`] do.
 pub trait EventCan: CanLink + Evented {}
 
-impl<T: ByteLink + Evented> EventLine for T {}
+impl<T: ByteLink + Evented> EventBytes for T {}
 impl<T: CanLink + Evented> EventCan for T {}

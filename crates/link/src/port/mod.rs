@@ -1,6 +1,6 @@
 //! Ports: a serial line or a CAN bus, opened by name.
 //!
-//! [`PortName::open_line`] and [`PortName::open_can`] give a [`ByteLink`] or a [`CanLink`]. Links
+//! [`PortName::open_bytes`] and [`PortName::open_can`] give a [`ByteLink`] or a [`CanLink`]. Links
 //! start no thread, allocate nothing in an exchange, and make one system call to send, one to wait
 //! and one to receive.
 //!
@@ -30,7 +30,7 @@ mod tap;
 pub use descriptors::open_descriptors;
 pub use echo::EchoCanceller;
 pub use error::PortError;
-pub use event::{EventCan, EventLine, Evented};
+pub use event::{EventBytes, EventCan, Evented};
 pub use faulty::{FaultBytes, FaultCan};
 pub use fd::FdLink;
 pub use link::{ByteLink, CanLink};

@@ -15,20 +15,20 @@ use super::socketcan::SocketCanLink;
 
 /// A line on a descriptor with what it has not taken yet.
 #[derive(Debug)]
-pub(super) struct QueuedLine {
+pub(super) struct QueuedBytes {
     link: FdLink,
     queue: Vec<u8>,
     /// Since when the far end has taken nothing.
     stuck: Instant,
 }
 
-impl QueuedLine {
+impl QueuedBytes {
     pub(super) fn new(link: FdLink) -> Self {
-        QueuedLine { link, queue: Vec::new(), stuck: Instant::now() }
+        QueuedBytes { link, queue: Vec::new(), stuck: Instant::now() }
     }
 }
 
-impl ByteLink for QueuedLine {
+impl ByteLink for QueuedBytes {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         if self.queue.is_empty() {
             self.stuck = Instant::now();
@@ -43,7 +43,7 @@ impl ByteLink for QueuedLine {
     }
 }
 
-impl Evented for QueuedLine {
+impl Evented for QueuedBytes {
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         Some(self.link.as_fd())
     }
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn what_the_far_end_does_not_take_at_once_follows_in_order() {
         let (near, mut far) = UnixStream::pair().unwrap();
-        let mut line = QueuedLine::new(FdLink::new(near, "pair").unwrap());
+        let mut line = QueuedBytes::new(FdLink::new(near, "pair").unwrap());
         let sent: Vec<u8> = (0..1_000_000_u32).map(|n| (n % 251) as u8).collect();
         sent.chunks(1000).for_each(|chunk| line.write(chunk).unwrap());
         assert!(line.flush().unwrap(), "a socket takes no megabyte at once");

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use std::sync::{PoisonError, RwLock};
 
 use super::error::PortError;
-use super::event::{EventCan, EventLine};
+use super::event::{EventBytes, EventCan};
 use super::link::{ByteLink, CanLink};
 use super::name::{Given, NameError, unknown_form};
 use super::scheme::{CanPort, Carries, LinePort, PortName, Scheme, parse};
@@ -53,7 +53,7 @@ impl FromStr for PortName {
 
 impl PortName {
     /// Opens the port as a serial line.
-    pub fn open_line(&self) -> Result<Box<dyn ByteLink>, PortError> {
+    pub fn open_bytes(&self) -> Result<Box<dyn ByteLink>, PortError> {
         self.line()?.open()
     }
 
@@ -63,7 +63,7 @@ impl PortName {
     }
 
     /// Opens the port as a serial line for an event loop. Opening itself may wait.
-    pub fn open_event_line(&self) -> Result<Box<dyn EventLine>, PortError> {
+    pub fn open_event_bytes(&self) -> Result<Box<dyn EventBytes>, PortError> {
         self.line()?.open_event()
     }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::PortError;
-use super::event::{EventCan, EventLine};
+use super::event::{EventBytes, EventCan};
 use super::link::{ByteLink, CanLink};
 use super::name::{Given, NameError};
 
@@ -110,7 +110,7 @@ pub trait LinePort {
     fn open(&self) -> Result<Box<dyn ByteLink>, PortError>;
 
     /// Opens it for an event loop, whose time is the machine's.
-    fn open_event(&self) -> Result<Box<dyn EventLine>, PortError>;
+    fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError>;
 
     /// What messages call it.
     fn label(&self) -> String;

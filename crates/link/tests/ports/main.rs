@@ -32,7 +32,7 @@ const PATIENCE: Option<Duration> = Some(Duration::from_secs(5));
 const BRIEFLY: Option<Duration> = Some(Duration::from_millis(30));
 
 fn open_line(name: &str) -> Result<Box<dyn ByteLink>, Box<dyn Error>> {
-    Ok(name.parse::<PortName>()?.open_line()?)
+    Ok(name.parse::<PortName>()?.open_bytes()?)
 }
 
 fn open_can(name: &str) -> Result<Box<dyn CanLink>, Box<dyn Error>> {
@@ -40,7 +40,7 @@ fn open_can(name: &str) -> Result<Box<dyn CanLink>, Box<dyn Error>> {
 }
 
 fn refusal(name: &str) -> PortError {
-    match name.parse::<PortName>().expect("a good name").open_line() {
+    match name.parse::<PortName>().expect("a good name").open_bytes() {
         Ok(_) => panic!("{name} was opened"),
         Err(error) => error,
     }

@@ -21,7 +21,7 @@ use motorlink_link::serve::ServeName;
 use motorlink_link::serve::{Served, Server};
 use motorlink_proto::time::Instant;
 
-use crate::rmd::OnDrop;
+use crate::rmd::StopAction;
 pub use event::{Event, Halt, Outcome, Part, Reason};
 
 use hold::Hold;
@@ -93,7 +93,7 @@ impl Relay {
     /// What keeps the port from being opened.
     pub fn rmd(
         port: &PortName,
-        on_loss: OnDrop,
+        on_loss: StopAction,
         options: RelayOptions,
     ) -> Result<Self, RelayError> {
         refuse_simulated(port)?;

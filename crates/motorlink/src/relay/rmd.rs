@@ -18,7 +18,7 @@ use super::pace::Pace;
 use super::port::Port;
 use super::station::Desk;
 use crate::rmd::follow::Follower;
-use crate::rmd::{Bus, OnDrop, Options, Stopped};
+use crate::rmd::{Client, Options, StopAction, Stopped};
 
 /// What a frame takes behind a serial adapter at 115200 baud: 27 bytes. A CAN interface of the kernel
 /// has a short queue of its own.
@@ -33,12 +33,12 @@ const TIMEOUT: Duration = Duration::from_millis(200);
 
 pub(super) struct RmdHold {
     held: Held<Box<dyn EventCan>, CanFrame>,
-    on_loss: OnDrop,
+    on_loss: StopAction,
     follower: Follower,
 }
 
 impl RmdHold {
-    pub(super) fn open(name: &PortName, on_loss: OnDrop) -> Result<Self, PortError> {
+    pub(super) fn open(name: &PortName, on_loss: StopAction) -> Result<Self, PortError> {
         let opened = name.clone();
         let is_paced = name.as_can().is_some_and(|bus| bus.is_paced());
         let frame = if is_paced { time::Duration(0) } else { FRAME };
@@ -129,7 +129,7 @@ impl Hold for RmdHold {
         let port = &self.held.port;
         let open = port.opener(|port| Box::new(port) as Box<dyn CanLink>);
         let options = Options { timeout: TIMEOUT, ..Options::default() };
-        let Ok(bus) = Bus::open_with(&port.name(), open, options) else {
+        let Ok(bus) = Client::open_with(&port.name(), open, options) else {
             let why = port.closed().to_string();
             let failed = |id: MotorId| Halt {
                 part: Part::Motor(id.number()),
@@ -138,7 +138,7 @@ impl Hold for RmdHold {
             return moving.map(failed).collect();
         };
         bus.take_over(moving);
-        let stopped = bus.guard().with(self.on_loss).stop_now();
+        let stopped = bus.stop_on_drop().with(self.on_loss).stop_now();
         self.follower.left_moving(bus.moving());
         let told = |Stopped { id, result }: Stopped| Halt {
             part: Part::Motor(id.number()),

@@ -4,10 +4,10 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use motorlink_link::port::{ByteLink, DEFAULT_BAUD, EventLine, Evented, PortError, PortName};
+use motorlink_link::port::{ByteLink, DEFAULT_BAUD, EventBytes, Evented, PortError, PortName};
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::{Served, Server};
-use motorlink_proto::st::{Command, Config, ErrorCode, Recovery, Request, Status};
+use motorlink_proto::st::{Command, ErrorCode, MasterConfig, Recovery, Request, Status};
 use motorlink_proto::time::{self, Instant};
 
 use super::event::{Halt, Outcome, Part};
@@ -28,7 +28,7 @@ const AHEAD: time::Duration = time::Duration::from_millis(20);
 const BITS: u64 = 10;
 
 pub(super) struct StHold {
-    held: Held<Box<dyn EventLine>, u8>,
+    held: Held<Box<dyn EventBytes>, u8>,
     options: Options,
     follower: Follower,
 }
@@ -36,9 +36,9 @@ pub(super) struct StHold {
 impl StHold {
     pub(super) fn open(name: &PortName) -> Result<Self, PortError> {
         let opened = name.clone();
-        let port = Port::open(name, Box::new(move || opened.open_event_line()))?;
-        let config = Config { recovery: Recovery::Pad, ..Config::default() };
-        let options = Options { line: config, ..Options::default() }.on(name);
+        let port = Port::open(name, Box::new(move || opened.open_event_bytes()))?;
+        let config = MasterConfig { recovery: Recovery::Pad, ..MasterConfig::default() };
+        let options = Options { master: config, ..Options::default() }.on(name);
         // What is behind a socket is taken for as fast as a serial line usually is.
         let baud = name.baud().unwrap_or(DEFAULT_BAUD);
         let byte = time::Duration(BITS * 1_000_000 / u64::from(baud));
@@ -75,7 +75,7 @@ impl StHold {
 
     fn disable_pfc(&mut self, client: &Client) -> Option<Halt> {
         let motor = self.follower.pfc()?;
-        let disable = Request::Execute(Command::PfcDisable);
+        let disable = Request::ExecuteCommand(Command::PfcDisable);
         let outcome = match client.exchange(motor, &disable, |_| Some(())) {
             Ok(()) => Outcome::Stopped("PFC_DISABLE acknowledged".into()),
             // What the drive does not have draws no current.
@@ -143,7 +143,7 @@ impl Hold for StHold {
         let halts: Vec<Halt> = match Client::open_with(&port.name(), open, self.options) {
             Ok(client) => {
                 client.take_over(owed);
-                let stopped = client.guard().stop_now();
+                let stopped = client.stop_on_drop().stop_now();
                 self.follower = Follower::with(client.hand_over(), pfc);
                 let halts: Vec<Halt> =
                     stopped.into_iter().filter_map(|one| seen_to_stop(&client, one)).collect();

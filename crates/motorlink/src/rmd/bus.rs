@@ -20,7 +20,7 @@ use crate::turn::{Turn, Turns};
 
 /// What a scan found under an ID.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Found {
+pub enum ScanResult {
     /// A motor of this protocol, with its state.
     Motor(MotorId, proto::Status),
     /// A motor of another protocol.
@@ -42,11 +42,11 @@ const SCAN_WIDTH: usize = 8;
 ///
 /// A port that went away is opened again by the next call, behind a back-off; see
 /// [`link_state`](Self::link_state). Replies are matched on ID and command; a motor that did not
-/// answer in time is left alone until its late reply came or the guard time is over, and then asked
+/// answer in time is left alone until its late reply came or the quarantine time is over, and then asked
 /// for its status before anything else, in case its replies are later than that: [`Off`](proto::Off)
 /// and [`Stop`](proto::Stop) alone do not wait.
-pub struct Bus {
-    line: Turns<Driven<Box<dyn CanLink>>>,
+pub struct Client {
+    turns: Turns<Driven<Box<dyn CanLink>>>,
     sign: LinkSign,
 }
 
@@ -58,7 +58,7 @@ pub(super) struct Driven<L> {
     pub(super) exchanges: u64,
 }
 
-impl Bus {
+impl Client {
     /// Opens a port. No motor is asked anything.
     ///
     /// # Errors
@@ -99,7 +99,7 @@ impl Bus {
 
     pub(super) fn driving(driven: Driven<Box<dyn CanLink>>) -> Self {
         let sign = driven.port.sign();
-        Bus { line: Turns::new(driven), sign }
+        Client { turns: Turns::new(driven), sign }
     }
 
     /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
@@ -112,19 +112,19 @@ impl Bus {
         mut self,
         look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
     ) -> Self {
-        self.line.set_look(Box::new(look));
+        self.turns.set_look(Box::new(look));
         self
     }
 
     /// Gives up the exchanges that this thread has under way while it [looks](Self::looking); replies
     /// may still come. Waits for exchanges of other threads.
     pub fn abandon(&self) {
-        self.line.take().abandon();
+        self.turns.take().abandon();
     }
 
     /// The clock that the port goes by: the machine's, or that of drives on a time of their own.
     pub fn clock(&self) -> Clock {
-        self.line.take().port.clock()
+        self.turns.take().port.clock()
     }
 
     /// Whether the port is open. Never waits, not even while another thread opens it.
@@ -134,32 +134,32 @@ impl Bus {
 
     /// Why frames may not get to the bus, as far as its adapter tells.
     pub fn trouble(&self) -> Option<&'static str> {
-        self.line.take().port.open_link().and_then(|link| link.trouble())
+        self.turns.take().port.open_link().and_then(|link| link.trouble())
     }
 
     /// Frames that belonged to no exchange.
     pub fn counters(&self) -> Counters {
-        self.line.take().session.counters()
+        self.turns.take().session.counters()
     }
 
     /// Refuses from now on what stops no motor.
     pub(super) fn refuse_motion(&self) {
-        self.line.take().session.retire();
+        self.turns.take().session.retire();
     }
 
     /// Motors that were given something to do and not switched off.
     pub fn moving(&self) -> MotorSet {
-        self.line.take().session.moving()
+        self.turns.take().session.moving()
     }
 
     /// Takes motors over that somebody else set moving.
     pub(crate) fn take_over(&self, moving: MotorSet) {
-        self.line.take().session.take_over(moving);
+        self.turns.take().session.take_over(moving);
     }
 
     /// Sets what a motor may be told; it holds for every call, raw frames included.
     pub fn set_limits(&self, id: MotorId, limits: Limits) {
-        self.line.take().session.set_limits(id, limits);
+        self.turns.take().session.set_limits(id, limits);
     }
 
     /// One exchange with one motor. A motor in quarantine is waited for.
@@ -169,7 +169,7 @@ impl Bus {
 
     /// One exchange with any bytes, known command or not. A motor in quarantine is waited for.
     pub fn raw(&self, id: MotorId, request: [u8; 8]) -> Result<[u8; 8], Error> {
-        let mut driven = self.line.take();
+        let mut driven = self.turns.take();
         driven.ready([request])?;
         let now = driven.port.now();
         driven.session.ask(now, id, request)?;
@@ -185,9 +185,9 @@ impl Bus {
     /// [`Error::Unconfirmed`]: what was read since the last confirmation may be older than it looks. Those
     /// of [`raw`](Self::raw).
     pub fn confirm(&self, id: MotorId) -> Result<(), Error> {
-        let question = self.line.take().session.question(id);
+        let question = self.turns.take().session.question(id);
         self.raw(id, question)?;
-        self.line.take().session.confirmed(id)
+        self.turns.take().session.confirmed(id)
     }
 
     /// Sends a request to each of many motors and gathers all replies; the exchanges overlap. `each`
@@ -201,7 +201,7 @@ impl Bus {
         requests: &[(MotorId, X)],
         mut each: impl FnMut(MotorId, Result<X::Reply, Error>),
     ) -> Result<(), Error> {
-        let mut driven = self.line.take();
+        let mut driven = self.turns.take();
         driven.ready(requests.iter().map(|(_, exchange)| exchange.request()))?;
         for (id, exchange) in requests {
             let now = driven.port.now();
@@ -224,7 +224,7 @@ impl Bus {
         torques: SetTorque4,
         expect: MotorSet,
     ) -> Result<[Option<Result<MotionStatus, Error>>; 4], Error> {
-        let mut driven = self.line.take();
+        let mut driven = self.turns.take();
         driven.ready([])?;
         let now = driven.port.now();
         driven.session.set_torque4(now, torques, expect)?;
@@ -242,7 +242,7 @@ impl Bus {
     pub fn scan(
         &self,
         ids: MotorSet,
-        mut each: impl FnMut(Found),
+        mut each: impl FnMut(ScanResult),
         mut progress: impl FnMut(usize),
     ) -> Result<(), Error> {
         let mut left = ids;
@@ -253,14 +253,14 @@ impl Bus {
             let mut doubtful = MotorSet::EMPTY;
             self.cycle(&requests, |id, outcome| match outcome {
                 Err(Error::Quarantined { .. }) => doubtful.insert(id),
-                outcome => Found::of(id, outcome).into_iter().for_each(&mut each),
+                outcome => ScanResult::of(id, outcome).into_iter().for_each(&mut each),
             })?;
             for id in doubtful {
                 let outcome = self.raw(id, ReadStatus.encode());
                 if let Err(error @ Error::Port(_)) = outcome {
                     return Err(error);
                 }
-                Found::of(id, outcome).into_iter().for_each(&mut each);
+                ScanResult::of(id, outcome).into_iter().for_each(&mut each);
             }
             done += requests.len();
             progress(done);
@@ -269,8 +269,8 @@ impl Bus {
     }
 
     /// How long a late reply is awaited.
-    pub(super) fn guard_time(&self) -> Duration {
-        self.line.take().session.guard().into()
+    pub(super) fn quarantine(&self) -> Duration {
+        self.turns.take().session.quarantine().into()
     }
 
     /// Moves frames until no exchange is open.
@@ -280,7 +280,7 @@ impl Bus {
         mut each: impl FnMut(MotorId, Result<[u8; 8], Error>),
     ) -> Result<(), Error> {
         let exchange = driven.exchanges;
-        while !driven.run(self.line.next_look(), &mut each)? {
+        while !driven.run(self.turns.next_look(), &mut each)? {
             let port = Arc::clone(&driven.port.name);
             let looked;
             (driven, looked) = driven.look(&port);
@@ -402,14 +402,14 @@ impl<L: CanLink> Driven<L> {
     }
 }
 
-impl Found {
+impl ScanResult {
     /// What the outcome of a [`ReadStatus`] tells of the motor that it was for.
     pub fn of(id: MotorId, outcome: Result<[u8; 8], Error>) -> Option<Self> {
         match outcome {
-            Err(Error::Echo { .. }) => Some(Found::Echo(id)),
-            Err(Error::Shared { .. }) => Some(Found::Shared(id)),
-            Ok(reply) => Some(Found::Motor(id, proto::Status::decode(&reply))),
-            Err(Error::Foreign { dialect, .. }) => Some(Found::Foreign(id, dialect)),
+            Err(Error::Echo { .. }) => Some(ScanResult::Echo(id)),
+            Err(Error::Shared { .. }) => Some(ScanResult::Shared(id)),
+            Ok(reply) => Some(ScanResult::Motor(id, proto::Status::decode(&reply))),
+            Err(Error::Foreign { dialect, .. }) => Some(ScanResult::Foreign(id, dialect)),
             Err(_) => None,
         }
     }

@@ -9,7 +9,7 @@ use motorlink_proto::rmd::{Limits, MotorId, MotorSet, SetTorque4};
 
 use super::bus::Driven;
 use super::session::Output;
-use super::{Bus, Error, Options};
+use super::{Client, Error, Options};
 
 /// Frames that are taken from the bus in one step: the loop has others to serve.
 const STEP: usize = 64;
@@ -17,13 +17,13 @@ const STEP: usize = 64;
 /// A CAN bus with RMD motors, driven in steps: an event loop calls [`advance`](Self::advance) when
 /// the descriptor is readable and when the time that it said has passed.
 ///
-/// What holds for a [`Bus`] holds here: limits, quarantine, what is moving, errors. Exchanges with
+/// What holds for a [`Client`] holds here: limits, quarantine, what is moving, errors. Exchanges with
 /// different motors overlap; a motor has one at a time.
-pub struct EventBus {
+pub struct EventClient {
     driven: Driven<Box<dyn EventCan>>,
 }
 
-impl EventBus {
+impl EventClient {
     /// Opens a port, which may wait. So may [`reopen`](Self::reopen), and what begins an exchange while
     /// the port is closed; nothing else does.
     ///
@@ -41,12 +41,12 @@ impl EventBus {
         options: Options,
     ) -> Result<Self, Error> {
         let port = Reopening::open(name, open, options.back_off)?;
-        Ok(EventBus { driven: Driven::new(port, &options) })
+        Ok(EventClient { driven: Driven::new(port, &options) })
     }
 
     /// Speaks through a link that is open already. It is not opened again when it closes.
     pub fn over(name: &str, link: Box<dyn EventCan>, options: Options) -> Self {
-        EventBus { driven: Driven::new(Reopening::over(name, link), &options) }
+        EventClient { driven: Driven::new(Reopening::over(name, link), &options) }
     }
 
     /// Whether the port is open.
@@ -83,7 +83,7 @@ impl EventBus {
         self.driven.session.set_limits(id, limits);
     }
 
-    /// Begins an exchange, as [`Bus::raw`]: a motor in quarantine is waited for.
+    /// Begins an exchange, as [`Client::raw`]: a motor in quarantine is waited for.
     ///
     /// # Errors
     /// The port, or what forbids the request; nothing is sent then.
@@ -93,7 +93,7 @@ impl EventBus {
         self.driven.session.ask(now, id, request)
     }
 
-    /// Begins an exchange, as one of those of [`Bus::cycle`]: a motor in quarantine is an error.
+    /// Begins an exchange, as one of those of [`Client::cycle`]: a motor in quarantine is an error.
     ///
     /// # Errors
     /// Those of [`ask`](Self::ask).
@@ -103,7 +103,7 @@ impl EventBus {
         self.driven.session.request(now, id, request)
     }
 
-    /// Begins exchanges with those of motors 1 to 4 that are in `expect`, as [`Bus::set_torque4`].
+    /// Begins exchanges with those of motors 1 to 4 that are in `expect`, as [`Client::set_torque4`].
     ///
     /// # Errors
     /// Those of [`ask`](Self::ask).
@@ -138,10 +138,10 @@ impl EventBus {
     }
 
     /// The bus that waits, with what this one knows of the motors: to stop what is moving.
-    pub fn into_bus(self) -> Bus {
+    pub fn into_client(self) -> Client {
         let Driven { port, session, exchanges } = self.driven;
         let port = port.map(|link| link as Box<dyn CanLink>);
-        Bus::driving(Driven { port, session, exchanges })
+        Client::driving(Driven { port, session, exchanges })
     }
 
     fn moved(

@@ -2,28 +2,28 @@
 
 use motorlink_proto::rmd::{Command, MotorId, MotorSet, Off, Stop};
 
-use super::{Bus, Error};
+use super::{Client, Error};
 use crate::stopping::{STOP_ATTEMPTS, await_retry};
 
-impl Bus {
+impl Client {
     /// Stops the motors that this bus was used to move. From now on every request but Off and Stop is
     /// [`PortError::Retired`](motorlink_link::port::PortError::Retired). For a signal's handler with a
     /// thread of its own, beside a program that would go on until the handler ends it. Waits for
     /// exchanges that are under way.
     pub fn retire(&self) -> Vec<Stopped> {
         self.refuse_motion();
-        self.guard().stop_now()
+        self.stop_on_drop().stop_now()
     }
 
     /// Stops, when it goes out of scope, the motors that this bus was used to move.
-    pub fn guard(&self) -> Guard<'_> {
-        Guard { bus: self, action: OnDrop::default(), armed: true, report: |_| {} }
+    pub fn stop_on_drop(&self) -> StopOnDrop<'_> {
+        StopOnDrop { bus: self, action: StopAction::default(), armed: true, report: |_| {} }
     }
 }
 
-/// What a [`Guard`] does to the motors that it finds moving.
+/// What a [`StopOnDrop`] does to the motors that it finds moving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum OnDrop {
+pub enum StopAction {
     /// Switches them off (0x80): a load that they hold falls.
     Off,
     /// Stops them (0x81); they hold still and remember their command.
@@ -31,21 +31,21 @@ pub enum OnDrop {
     Stop,
 }
 
-impl OnDrop {
+impl StopAction {
     /// What the motors are sent.
     pub(crate) fn request(self) -> [u8; 8] {
         match self {
-            OnDrop::Off => Off.encode(),
-            OnDrop::Stop => Stop.encode(),
+            StopAction::Off => Off.encode(),
+            StopAction::Stop => Stop.encode(),
         }
     }
 }
 
-/// Stops the motors that a [`Bus`] was used to move when it is dropped: at the end of a scope, on
+/// Stops the motors that a [`Client`] was used to move when it is dropped: at the end of a scope, on
 /// an early return, on a panic. All are told before any answer is waited for.
-pub struct Guard<'a> {
-    bus: &'a Bus,
-    action: OnDrop,
+pub struct StopOnDrop<'a> {
+    bus: &'a Client,
+    action: StopAction,
     armed: bool,
     report: fn(&Stopped),
 }
@@ -59,9 +59,9 @@ pub struct Stopped {
     pub result: Result<(), Error>,
 }
 
-impl Guard<'_> {
+impl StopOnDrop<'_> {
     /// Chooses what is done to the motors.
-    pub fn with(mut self, action: OnDrop) -> Self {
+    pub fn with(mut self, action: StopAction) -> Self {
         self.action = action;
         self
     }
@@ -105,14 +105,14 @@ impl Guard<'_> {
             stopped.extend(outcomes.filter(|one| last || one.result.is_ok()));
             if !await_retry(self.bus.link_state()) && !self.bus.moving().is_empty() {
                 let clock = self.bus.clock();
-                clock.wait(clock.now() + self.bus.guard_time().into());
+                clock.wait(clock.now() + self.bus.quarantine().into());
             }
         }
         stopped
     }
 }
 
-impl Drop for Guard<'_> {
+impl Drop for StopOnDrop<'_> {
     fn drop(&mut self) {
         if self.armed {
             self.stop_all().iter().for_each(self.report);

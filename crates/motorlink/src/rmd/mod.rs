@@ -1,11 +1,11 @@
 //! RMD motors on a CAN bus.
 //!
 //! ```no_run
-//! use motorlink::rmd::{Bus, Options, SpeedLimit, CentiDegrees};
+//! use motorlink::rmd::{Client, Options, SpeedLimit, CentiDegrees};
 //!
-//! let bus = Bus::open(&"slcan:/dev/ttyACM0".parse()?, Options::default())?;
-//! let guard = bus.guard();                 // stops what was set moving
-//! let motor = bus.motor(1)?;
+//! let client = Client::open(&"slcan:/dev/ttyACM0".parse()?, Options::default())?;
+//! let guard = client.stop_on_drop();       // stops what was set moving
+//! let motor = client.motor(1)?;
 //! motor.set_position(CentiDegrees::from_degrees(90.0), Some(SpeedLimit(500)))?;
 //! println!("{} °/s", motor.motion_status()?.speed.dps());
 //! # drop(guard);
@@ -25,10 +25,10 @@ mod session;
 pub use motorlink_proto::rmd::*;
 pub use motorlink_proto::units::*;
 
-pub use bus::{Bus, Found};
+pub use bus::{Client, ScanResult};
 pub use error::Error;
-pub use event::EventBus;
+pub use event::EventClient;
 pub use full_turn::FullTurn;
-pub use guard::{Guard, OnDrop, Stopped};
-pub use motor::MotorHandle;
+pub use guard::{StopAction, StopOnDrop, Stopped};
+pub use motor::Motor;
 pub use options::Options;

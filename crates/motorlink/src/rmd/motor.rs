@@ -3,24 +3,24 @@
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::*;
 
-use super::{Bus, Error, FullTurn};
+use super::{Client, Error, FullTurn};
 
-/// One motor on the bus. Every call is one exchange; its errors are those of [`Bus::ask`].
+/// One motor on the bus. Every call is one exchange; its errors are those of [`Client::ask`].
 #[derive(Clone, Copy)]
-pub struct MotorHandle<'a> {
-    bus: &'a Bus,
+pub struct Motor<'a> {
+    bus: &'a Client,
     id: MotorId,
 }
 
-impl Bus {
+impl Client {
     /// A motor of the bus, ID 1 to 32.
-    pub fn motor(&self, id: u8) -> Result<MotorHandle<'_>, Error> {
+    pub fn motor(&self, id: u8) -> Result<Motor<'_>, Error> {
         let id = MotorId::new(id).ok_or(Error::NoSuchMotor(id))?;
-        Ok(MotorHandle { bus: self, id })
+        Ok(Motor { bus: self, id })
     }
 }
 
-impl MotorHandle<'_> {
+impl Motor<'_> {
     /// The motor's ID.
     pub fn id(&self) -> MotorId {
         self.id

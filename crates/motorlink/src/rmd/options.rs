@@ -5,13 +5,13 @@ use std::time::Duration;
 use motorlink_link::reopening::BackOff;
 use motorlink_proto::rmd::{self as proto, Limits};
 
-/// How a [`Bus`](super::Bus) behaves.
+/// How a [`Client`](super::Client) behaves.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// How long a reply may take.
     pub timeout: Duration,
     /// How long after a timeout a late reply is awaited.
-    pub guard: Duration,
+    pub quarantine: Duration,
     /// Attempts to open a port that went away.
     pub back_off: BackOff,
     /// What no request to any motor may exceed.
@@ -23,7 +23,7 @@ impl Default for Options {
     fn default() -> Self {
         Options {
             timeout: proto::DEFAULT_TIMEOUT.into(),
-            guard: proto::DEFAULT_GUARD.into(),
+            quarantine: proto::DEFAULT_QUARANTINE.into(),
             back_off: BackOff::default(),
             limits: Limits::default(),
         }

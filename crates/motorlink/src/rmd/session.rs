@@ -5,8 +5,8 @@ use std::sync::Arc;
 use motorlink_link::port::PortError;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
-    self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, Refused, SetTorque,
-    SetTorque4, question_behind,
+    self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, RequestError,
+    SetTorque, SetTorque4, question_behind,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -36,7 +36,7 @@ pub(super) struct Session {
     held: Option<Held>,
     /// Motors whose torques were given up, and the reason. Each is an outcome of its own.
     unsent: MotorSet,
-    unsent_for: Option<Refused>,
+    unsent_for: Option<RequestError>,
     /// Whether nothing is sent any more but what stops motors.
     is_retired: bool,
 }
@@ -74,11 +74,11 @@ impl Session {
     pub(super) fn new(port: Arc<str>, options: &Options) -> Self {
         let mut host = Host::new();
         host.set_timeout(options.timeout.into());
-        host.set_guard(options.guard.into());
+        host.set_quarantine(options.quarantine.into());
         for id in MotorSet::ALL {
             host.set_limits(id, options.limits);
         }
-        let times = options.guard.saturating_mul(2).saturating_add(options.timeout);
+        let times = options.quarantine.saturating_mul(2).saturating_add(options.timeout);
         let nothing = PendingRequest { request: [0; 8], until: Instant(0) };
         Session {
             port,
@@ -108,8 +108,8 @@ impl Session {
         self.moving = self.moving.union(moving);
     }
 
-    pub(super) fn guard(&self) -> Duration {
-        self.host.guard()
+    pub(super) fn quarantine(&self) -> Duration {
+        self.host.quarantine()
     }
 
     pub(super) fn set_limits(&mut self, id: MotorId, limits: Limits) {
@@ -179,7 +179,7 @@ impl Session {
         self.free(id, &request)?;
         match self.host.request(now, id, request) {
             Ok(()) => {}
-            Err(Refused::Quarantined { .. }) => self.waiting.insert(id),
+            Err(RequestError::Quarantined { .. }) => self.waiting.insert(id),
             Err(refused) => return Err(self.refused(refused)),
         }
         self.insisting.insert(id);
@@ -227,7 +227,7 @@ impl Session {
             for id in self.waiting {
                 let PendingRequest { request, until } = self.asked[id.index()];
                 match self.host.request(now, id, request) {
-                    Err(Refused::Quarantined { until: free, .. }) if now < until => {
+                    Err(RequestError::Quarantined { until: free, .. }) if now < until => {
                         again = again.into_iter().chain([free]).min();
                     }
                     begun => {
@@ -235,7 +235,7 @@ impl Session {
                         if let Err(refused) = begun {
                             self.insisting.remove(id);
                             let error = match refused {
-                                Refused::Quarantined { id, .. } => self.shared(id),
+                                RequestError::Quarantined { id, .. } => self.shared(id),
                                 refused => self.refused(refused),
                             };
                             return Output::Done(id, Err(error));
@@ -248,7 +248,7 @@ impl Session {
                     self.moving = self.moving.union(MotorSet::moved_by(&frame));
                     return Output::Transmit(frame);
                 }
-                proto::Output::Done { id, result: Err(proto::Error::Quarantined) }
+                proto::Output::Done { id, result: Err(proto::Failure::Quarantined) }
                     if self.insisting.contains(id) && now < self.asked[id.index()].until =>
                 {
                     self.waiting.insert(id);
@@ -267,7 +267,7 @@ impl Session {
                         self.moving.remove(id);
                     }
                     let failed = |error| match error {
-                        proto::Error::Quarantined if is_outlasted => self.shared(id),
+                        proto::Failure::Quarantined if is_outlasted => self.shared(id),
                         error => self.failed(id, error),
                     };
                     return Output::Done(id, result.map_err(failed));
@@ -288,18 +288,18 @@ impl Session {
     fn held_answered(
         &mut self,
         id: MotorId,
-        result: Result<[u8; 8], proto::Error>,
+        result: Result<[u8; 8], proto::Failure>,
     ) -> Option<Output> {
         let held = self.held.as_mut()?;
         match result {
-            Ok(_) | Err(proto::Error::Quarantined) => {
+            Ok(_) | Err(proto::Failure::Quarantined) => {
                 held.answered.insert(id);
                 None
             }
             Err(error) => {
                 held.expect.remove(id);
                 // To a motor of another protocol the frame may mean anything.
-                if held.expect.is_empty() || matches!(error, proto::Error::Foreign(_)) {
+                if held.expect.is_empty() || matches!(error, proto::Failure::Foreign(_)) {
                     self.drop_held(None);
                 }
                 Some(Output::Done(id, Err(self.failed(id, error))))
@@ -312,7 +312,7 @@ impl Session {
         let Held { torques, expect, until, .. } =
             self.held.filter(|held| held.answered == held.expect)?;
         match self.host.set_torque4(now, torques, expect) {
-            Err(Refused::Quarantined { until: free, .. }) if now < until => return Some(free),
+            Err(RequestError::Quarantined { until: free, .. }) if now < until => return Some(free),
             Ok(()) => self.held = None,
             Err(why) => self.drop_held(Some(why)),
         }
@@ -320,7 +320,7 @@ impl Session {
     }
 
     /// Gives the torques that are held up. Motors whose questions are under way end in quarantine.
-    fn drop_held(&mut self, why: Option<Refused>) {
+    fn drop_held(&mut self, why: Option<RequestError>) {
         if let Some(held) = self.held.take() {
             (self.unsent, self.unsent_for) = (held.answered, why);
         }
@@ -328,7 +328,7 @@ impl Session {
 
     fn why_unsent(&self, id: MotorId) -> Error {
         match self.unsent_for {
-            Some(Refused::Quarantined { .. }) => self.shared(id),
+            Some(RequestError::Quarantined { .. }) => self.shared(id),
             Some(why) => self.refused(why),
             None => self.quarantined(id),
         }
@@ -379,24 +379,24 @@ impl Session {
         Error::Shared { port: Arc::clone(&self.port), id }
     }
 
-    fn refused(&self, refused: Refused) -> Error {
+    fn refused(&self, refused: RequestError) -> Error {
         match refused {
-            Refused::Quarantined { id, .. } => self.quarantined(id),
-            Refused::Limit { id, exceeded } => Error::Limit { id, exceeded },
-            Refused::OutOfReach(id) => Error::OutOfReach(id),
-            Refused::Busy(id) => Error::Twice(id),
+            RequestError::Quarantined { id, .. } => self.quarantined(id),
+            RequestError::Limit { id, exceeded } => Error::Limit { id, exceeded },
+            RequestError::OutOfReach(id) => Error::OutOfReach(id),
+            RequestError::Busy(id) => Error::Twice(id),
         }
     }
 
-    fn failed(&self, id: MotorId, error: proto::Error) -> Error {
+    fn failed(&self, id: MotorId, error: proto::Failure) -> Error {
         let port = Arc::clone(&self.port);
         let [code, ..] = self.asked[id.index()].request;
         let code = Code::from(code);
         match error {
-            proto::Error::Altered => Error::Altered { port, id, code },
-            proto::Error::Echo => Error::Echo { port, id },
-            proto::Error::Foreign(dialect) => Error::Foreign { port, id, dialect },
-            proto::Error::Quarantined => Error::Quarantined { port, id },
+            proto::Failure::Altered => Error::Altered { port, id, code },
+            proto::Failure::Echo => Error::Echo { port, id },
+            proto::Failure::Foreign(dialect) => Error::Foreign { port, id, dialect },
+            proto::Failure::Quarantined => Error::Quarantined { port, id },
             _ => Error::Timeout { port, id, code },
         }
     }

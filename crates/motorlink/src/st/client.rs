@@ -9,7 +9,7 @@ use motorlink_link::port::{ByteLink, PortError, PortName};
 use motorlink_link::printable;
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::st as proto;
-use motorlink_proto::st::{BoardInfo, Counters, Line, MAX_FRAME, Motor, Output, Profile, Request};
+use motorlink_proto::st::{Counters, MAX_FRAME, MotorNumber, Output, Profile, Request, SyncState};
 use motorlink_proto::time::{self, Instant};
 
 use super::session::{Rules, Session};
@@ -23,7 +23,7 @@ const IDLE: time::Duration = time::Duration(100);
 
 /// What GET_BOARD_INFO tells (4.7).
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Info {
+pub struct BoardInfo {
     /// Major, minor, patch.
     pub version: [u8; 3],
     /// Name of the SDK.
@@ -43,16 +43,16 @@ pub struct FirmwareVersion {
 ///
 /// A port that went away is opened again by the next call, behind a back-off; see
 /// [`link_state`](Self::link_state). A failed exchange loses the line, which the next call recovers
-/// as [`Config::recovery`](proto::Config::recovery) says. What stops a motor does not wait for that: it is sent at once and
+/// as [`MasterConfig::recovery`](proto::MasterConfig::recovery) says. What stops a motor does not wait for that: it is sent at once and
 /// again on the recovered line, and only the second reply counts.
 pub struct Client {
-    line: Turns<Driven<Box<dyn ByteLink>>>,
+    turns: Turns<Driven<Box<dyn ByteLink>>>,
     sign: LinkSign,
     rules: Rules,
 }
 
 /// How an exchange ended: with what was made of the acknowledge's payload, and its size.
-type Outcome<T> = Result<(Option<T>, usize), proto::Error>;
+type Outcome<T> = Result<(Option<T>, usize), proto::ExchangeError>;
 
 /// A session and its port.
 pub(super) struct Driven<L> {
@@ -82,7 +82,7 @@ impl Client {
         options: Options,
     ) -> Result<Self, Error> {
         let name = port.clone();
-        let open = move || Ok(wrap(name.open_line()?));
+        let open = move || Ok(wrap(name.open_bytes()?));
         Self::open_with(&port.to_string(), Box::new(open), options.on(port))
     }
 
@@ -106,7 +106,7 @@ impl Client {
 
     pub(super) fn driving(driven: Driven<Box<dyn ByteLink>>) -> Self {
         let (sign, rules) = (driven.port.sign(), driven.session.rules());
-        Client { line: Turns::new(driven), sign, rules }
+        Client { turns: Turns::new(driven), sign, rules }
     }
 
     /// Calls `look` every [`LOOK`](crate::LOOK) while an exchange waits, in the thread that waits; an
@@ -119,14 +119,14 @@ impl Client {
         mut self,
         look: impl Fn() -> Result<(), Box<dyn error::Error + Send + Sync>> + Send + Sync + 'static,
     ) -> Self {
-        self.line.set_look(Box::new(look));
+        self.turns.set_look(Box::new(look));
         self
     }
 
     /// Gives up the exchange that this thread has under way while it
     /// [looks](Self::looking); its reply may still come. Waits for exchanges of other threads.
     pub fn abandon(&self) {
-        self.line.take().abandon();
+        self.turns.take().abandon();
     }
 
     /// The profile that the drive is expected to follow.
@@ -141,40 +141,40 @@ impl Client {
 
     /// The clock that the port goes by: the machine's, or that of drives on a time of their own.
     pub fn clock(&self) -> Clock {
-        self.line.take().port.clock()
+        self.turns.take().port.clock()
     }
 
     /// Whether the last exchange ended in step.
-    pub fn line(&self) -> Line {
-        self.line.take().session.line()
+    pub fn sync_state(&self) -> SyncState {
+        self.turns.take().session.sync_state()
     }
 
     /// What came without being asked for.
     pub fn counters(&self) -> Counters {
-        self.line.take().session.counters()
+        self.turns.take().session.counters()
     }
 
     /// Refuses from now on what stops no motor.
     pub(super) fn refuse_motion(&self) {
-        self.line.take().session.retire();
+        self.turns.take().session.retire();
     }
 
     /// Motors that this client started and did not stop.
-    pub fn started(&self) -> impl Iterator<Item = Motor> + use<> {
-        self.line.take().session.started().motors()
+    pub fn started(&self) -> impl Iterator<Item = MotorNumber> + use<> {
+        self.turns.take().session.started().motors()
     }
 
     /// Name and version of the SDK (4.7).
-    pub fn info(&self) -> Result<Info, Error> {
-        self.exchange(0, &Request::BoardInfo, |payload| {
-            let info = BoardInfo::decode(payload)?;
-            Some(Info { version: info.version, name: printable(info.name) })
+    pub fn board_info(&self) -> Result<BoardInfo, Error> {
+        self.exchange(0, &Request::GetBoardInfo, |payload| {
+            let info = proto::BoardInfo::decode(payload)?;
+            Some(BoardInfo { version: info.version, name: printable(info.name) })
         })
     }
 
     /// Name and version of the firmware (4.12).
     pub fn firmware_version(&self) -> Result<FirmwareVersion, Error> {
-        self.exchange(0, &Request::FirmwareVersion, |payload| {
+        self.exchange(0, &Request::GetFirmwareVersion, |payload| {
             let version = proto::FirmwareVersion::decode(payload);
             Some(FirmwareVersion {
                 name: printable(version.name),
@@ -193,7 +193,7 @@ impl Client {
         reply: impl FnOnce(&[u8]) -> Option<T>,
     ) -> Result<T, Error> {
         self.rules.check(motor, request)?;
-        let mut driven = self.line.take();
+        let mut driven = self.turns.take();
         driven.begin(motor, request)?;
         self.conclude(driven, reply)
     }
@@ -201,7 +201,7 @@ impl Client {
     /// One exchange with any frame code and payload; gives the acknowledge's payload.
     pub fn raw(&self, motor: u8, code: u8, payload: &[u8]) -> Result<Vec<u8>, Error> {
         let effect = self.rules.check_raw(motor, code, payload)?;
-        let mut driven = self.line.take();
+        let mut driven = self.turns.take();
         driven.begin_raw(motor, code, payload, effect)?;
         self.conclude(driven, |payload| Some(payload.to_vec()))
     }
@@ -214,14 +214,14 @@ impl Client {
     /// [`Error::Unconfirmed`]: what was read or acknowledged since the last confirmation cannot be
     /// trusted. The line is lost. The port's.
     pub fn confirm(&self) -> Result<(), Error> {
-        let (losses, mut asked) = self.line.take().session.question();
+        let (losses, mut asked) = self.turns.take().session.question();
         let mut answer = self.answers(asked);
         if matches!(answer, Err(Error::Refused { .. })) {
             // The refusal may be that of the last request: another question has another answer.
-            (_, asked) = self.line.take().session.question();
+            (_, asked) = self.turns.take().session.question();
             answer = self.answers(asked);
         }
-        self.line.take().session.confirmed(losses, answer)
+        self.turns.take().session.confirmed(losses, answer)
     }
 
     fn answers(&self, (question, size): (Request<'static>, usize)) -> Result<(), Error> {
@@ -230,9 +230,9 @@ impl Client {
 
     /// Sends STOP_MOTOR without waiting for an answer, as for the other motors of a drive that does
     /// not answer. Afterwards the line is lost.
-    pub fn stop_unheard(&self, motor: Motor) -> Result<(), Error> {
+    pub fn stop_unheard(&self, motor: MotorNumber) -> Result<(), Error> {
         let mut frame = [0; MAX_FRAME];
-        let mut driven = self.line.take();
+        let mut driven = self.turns.take();
         driven.abandon();
         let stop = driven.session.stop_unheard(motor, &mut frame);
         let written = driven.port.link().and_then(|(link, _)| link.write(stop));
@@ -243,23 +243,23 @@ impl Client {
     }
 
     /// What a stop ends in when the drive has just failed to answer another.
-    pub(super) fn unanswered(&self, motor: Motor, failure: proto::Failure) -> Error {
-        self.line.take().session.unanswered(motor, failure)
+    pub(super) fn unanswered(&self, motor: MotorNumber, failure: proto::Failure) -> Error {
+        self.turns.take().session.unanswered(motor, failure)
     }
 
     /// The drive has no such motor, which may have been taken for started.
-    pub(super) fn forget_motor(&self, motor: Motor) {
-        self.line.take().session.forget_motor(motor);
+    pub(super) fn forget_motor(&self, motor: MotorNumber) {
+        self.turns.take().session.forget_motor(motor);
     }
 
     /// Takes the line over from another master, which started these motors.
     pub(crate) fn take_over(&self, started: Started) {
-        self.line.take().session.take_over(started);
+        self.turns.take().session.take_over(started);
     }
 
     /// What [`take_over`](Self::take_over) was given and later calls left of it.
     pub(crate) fn hand_over(&self) -> Started {
-        self.line.take().session.started()
+        self.turns.take().session.started()
     }
 
     /// Brings the exchange that was begun to its end.
@@ -272,7 +272,7 @@ impl Client {
         let mut reply = |payload: &[u8]| reply.take()?(payload);
         let exchange = driven.exchanges;
         let outcome = loop {
-            match driven.run(self.line.next_look(), &mut reply) {
+            match driven.run(self.turns.next_look(), &mut reply) {
                 Ok(Some(outcome)) => break Ok(outcome),
                 Ok(None) => {}
                 Err(error) => break Err(error),

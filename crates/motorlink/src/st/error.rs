@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use motorlink_link::port::PortError;
-use motorlink_proto::st::{ErrorCode, Failure, Motor, Profile, RegisterId, Unverified};
+use motorlink_proto::st::{ErrorCode, Failure, MotorNumber, Profile, RegisterId, Unverified};
 
 use super::LimitError;
 
@@ -79,7 +79,7 @@ pub enum Error {
     )]
     Differs {
         /// The motor.
-        motor: Motor,
+        motor: MotorNumber,
         /// The register.
         register: RegisterId,
         /// What it should have, in digits.
@@ -130,7 +130,7 @@ impl std::fmt::Display for Target {
 impl Error {
     /// Why a write was not verified; `Err` has what its last exchange failed with.
     pub fn unverified<E>(
-        motor: Motor,
+        motor: MotorNumber,
         register: RegisterId,
         why: Unverified<E>,
     ) -> Result<Self, E> {

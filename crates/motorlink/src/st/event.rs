@@ -3,9 +3,9 @@
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
-use motorlink_link::port::{ByteLink, EventLine, PortError, PortName};
+use motorlink_link::port::{ByteLink, EventBytes, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
-use motorlink_proto::st::{Motor, Output, Request};
+use motorlink_proto::st::{MotorNumber, Output, Request};
 
 use super::client::Driven;
 use super::{Client, Error, Options};
@@ -16,7 +16,7 @@ use super::{Client, Error, Options};
 /// What holds for a [`Client`] holds here: limits, recovery, what was started, errors. An exchange
 /// that is abandoned loses the line, and the next one recovers it.
 pub struct EventClient {
-    driven: Driven<Box<dyn EventLine>>,
+    driven: Driven<Box<dyn EventBytes>>,
 }
 
 /// How far an exchange is.
@@ -37,14 +37,14 @@ impl EventClient {
     /// What keeps the port from being opened. The drive is not asked anything.
     pub fn open(port: &PortName, options: Options) -> Result<Self, Error> {
         let name = port.clone();
-        let open = Box::new(move || name.open_event_line());
+        let open = Box::new(move || name.open_event_bytes());
         Self::open_with(&port.to_string(), open, options.on(port))
     }
 
     /// As [`open`](Self::open), through a link of the caller's making.
     pub fn open_with(
         name: &str,
-        open: Opener<Box<dyn EventLine>>,
+        open: Opener<Box<dyn EventBytes>>,
         options: Options,
     ) -> Result<Self, Error> {
         let port = Reopening::open(name, open, options.back_off)?;
@@ -71,7 +71,7 @@ impl EventClient {
     }
 
     /// Motors that this client started and did not stop.
-    pub fn started(&self) -> impl Iterator<Item = Motor> + use<> {
+    pub fn started(&self) -> impl Iterator<Item = MotorNumber> + use<> {
         self.driven.session.started().motors()
     }
 

@@ -165,7 +165,7 @@ impl Follower {
 /// Commands are the same in every profile.
 fn command(frame: &Frame<'_>) -> Option<Command> {
     match frame.request(Profile::Spec) {
-        Ok(Request::Execute(command)) => Some(command),
+        Ok(Request::ExecuteCommand(command)) => Some(command),
         _ => None,
     }
 }
@@ -184,7 +184,7 @@ mod tests {
     }
 
     fn command(motor: u8, command: Command) -> Vec<u8> {
-        frame(motor, &Request::Execute(command))
+        frame(motor, &Request::ExecuteCommand(command))
     }
 
     fn motors(follower: &Follower) -> Vec<u8> {

@@ -1,6 +1,6 @@
 //! Stops motors at the end of a scope, however it is left.
 
-use motorlink_proto::st::{ErrorCode, Line, Motor};
+use motorlink_proto::st::{ErrorCode, MotorNumber, SyncState};
 
 use super::{Client, Error};
 use crate::stopping::{STOP_ATTEMPTS, await_retry};
@@ -12,19 +12,19 @@ impl Client {
     /// exchange that is under way.
     pub fn retire(&self) -> Vec<Stopped> {
         self.refuse_motion();
-        self.guard().stop_now()
+        self.stop_on_drop().stop_now()
     }
 
     /// Stops, when it goes out of scope, the motors that this client started.
-    pub fn guard(&self) -> Guard<'_> {
-        Guard { client: self, armed: true, report: |_| {} }
+    pub fn stop_on_drop(&self) -> StopOnDrop<'_> {
+        StopOnDrop { client: self, armed: true, report: |_| {} }
     }
 }
 
 /// Stops the motors that a [`Client`] started when it is dropped: at the end of a scope, on an
 /// early return, on a panic. Where the drive does not answer it may still hear, so that STOP_MOTOR
 /// is sent to every motor before any answer is waited for again.
-pub struct Guard<'a> {
+pub struct StopOnDrop<'a> {
     client: &'a Client,
     armed: bool,
     report: fn(&Stopped),
@@ -34,12 +34,12 @@ pub struct Guard<'a> {
 #[derive(Debug)]
 pub struct Stopped {
     /// The motor.
-    pub motor: Motor,
+    pub motor: MotorNumber,
     /// Whether the drive acknowledged STOP_MOTOR.
     pub result: Result<(), Error>,
 }
 
-impl Guard<'_> {
+impl StopOnDrop<'_> {
     /// Calls `report` with what was done to each motor, when all is done.
     pub fn reporting(mut self, report: fn(&Stopped)) -> Self {
         self.report = report;
@@ -58,7 +58,7 @@ impl Guard<'_> {
     }
 
     /// Stops a motor; `Err` leaves it to the next attempt.
-    fn stop(&self, motor: Motor) -> Result<(), Error> {
+    fn stop(&self, motor: MotorNumber) -> Result<(), Error> {
         match self.client.motor(motor.number())?.stop() {
             // What is not there does not turn.
             Err(Error::Refused { code: ErrorCode::BadMotorSelected, .. }) => {
@@ -72,14 +72,14 @@ impl Guard<'_> {
     fn stop_all(&self) -> Vec<Stopped> {
         let mut stopped: Vec<Stopped> = Vec::new();
         self.client.abandon();
-        let mut left: Vec<Motor> = self.client.started().collect();
+        let mut left: Vec<MotorNumber> = self.client.started().collect();
         for attempt in 1..=STOP_ATTEMPTS {
             let mut failed = Vec::new();
             let mut told = false;
             // How the drive failed to answer: it would not answer for the others either.
             let mut silent = None;
             for (n, &motor) in left.iter().enumerate() {
-                if !told && self.client.line() == Line::Lost {
+                if !told && self.client.sync_state() == SyncState::Lost {
                     told = true;
                     // That to this motor is the first thing that `stop` sends, unless it is skipped.
                     for &motor in &left[n + usize::from(silent.is_none())..] {
@@ -92,7 +92,7 @@ impl Guard<'_> {
                     None => self.stop(motor),
                 };
                 if let Err(Error::Failed { failure, .. }) = &result
-                    && self.client.line() == Line::Lost
+                    && self.client.sync_state() == SyncState::Lost
                 {
                     silent = Some(*failure);
                 }
@@ -112,7 +112,7 @@ impl Guard<'_> {
     }
 }
 
-impl Drop for Guard<'_> {
+impl Drop for StopOnDrop<'_> {
     fn drop(&mut self) {
         if self.armed {
             self.stop_all().iter().for_each(self.report);

@@ -13,7 +13,7 @@ use motorlink_proto::st::{Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Re
 /// A limit bounds what is asked for. `speed_rpm` does not bound:
 /// * a torque command: the motor then turns as fast as its load allows;
 /// * the rev-up of a drive without sensor, its alignment, and the motor profiler (SC_START), whose
-///   speeds are the drive's own. [`MotorHandle::set_revup`](super::MotorHandle::set_revup) sets the
+///   speeds are the drive's own. [`Motor::set_revup_data`](super::Motor::set_revup_data) sets the
 ///   rev-up's;
 /// * what the drive's regulator overshoots, and a motor that was running before;
 /// * a start after the drive was reset without a sign on the line, as a power cycle between the ramp
@@ -91,25 +91,25 @@ impl Limits {
     /// Why it does not.
     pub fn check(&self, request: &Request<'_>) -> Result<(), LimitError> {
         match *request {
-            Request::Ramp(ramp) => self.speed(ramp.speed_rpm),
+            Request::SetRamp(ramp) => self.speed(ramp.speed_rpm),
             Request::SetRevupData(_, phase) => {
                 self.speed(phase.speed_rpm)?;
                 self.current(phase.torque_s16a.into())
             }
-            Request::CurrentReference(reference) => {
+            Request::SetCurrentReference(reference) => {
                 self.current(reference.iq_s16a.into())?;
                 self.current(reference.id_s16a.into())
             }
-            Request::TorqueRamp(ramp) => self.current(ramp.torque_s16a),
-            Request::Position(_) => {
+            Request::SetTorqueRamp(ramp) => self.current(ramp.torque_s16a),
+            Request::SetPosition(_) => {
                 self.speed_rpm.map_or(Ok(()), |limit_rpm| Err(LimitError::Position { limit_rpm }))
             }
             Request::SetRegister { register, value } => {
                 self.size(value.len() + 1)?;
                 self.write(register, value)
             }
-            Request::ConfigDynStruct { registers, .. } => self.size(registers.len() + 1),
-            Request::ProfilerInfo(steps) => self.size(steps.len()),
+            Request::ConfigureSegment { registers, .. } => self.size(registers.len() + 1),
+            Request::GetProfilerInfo(steps) => self.size(steps.len()),
             _ => Ok(()),
         }
     }
@@ -202,12 +202,12 @@ mod tests {
     #[test]
     fn limits_hold_in_both_directions_and_for_registers() {
         let limits = Limits { speed_rpm: Some(1000), current_s16a: Some(500) };
-        let ramp = |speed_rpm| Request::Ramp(Ramp { speed_rpm, duration_ms: 0 });
+        let ramp = |speed_rpm| Request::SetRamp(Ramp { speed_rpm, duration_ms: 0 });
         assert!(limits.check(&ramp(-1000)).is_ok());
         assert!(limits.check(&ramp(-1001)).is_err());
         assert!(limits.check(&ramp(i32::MIN)).is_err());
         let currents = CurrentReference { iq_s16a: 0, id_s16a: -501 };
-        assert!(limits.check(&Request::CurrentReference(currents)).is_err());
+        assert!(limits.check(&Request::SetCurrentReference(currents)).is_err());
         let write = Request::SetRegister { register: RegisterId::TORQUE_REF, value: &[0xF5, 0x01] };
         let exceeded = LimitError::Exceeded { value: 501, limit: 500, unit: "s16A" };
         assert_eq!(limits.check(&write), Err(exceeded));
@@ -227,9 +227,9 @@ mod tests {
         assert_eq!(SPEED.check(&part(RegisterId::TORQUE_REF)), Ok(()));
         assert_eq!(CURRENT.check(&part(RegisterId::RAMP_FINAL_SPEED)), Ok(()));
         let torque = TorqueRamp { torque_s16a: 32_767, duration_ms: 0 };
-        assert_eq!(SPEED.check(&Request::TorqueRamp(torque)), Ok(()));
+        assert_eq!(SPEED.check(&Request::SetTorqueRamp(torque)), Ok(()));
         let turn = PositionMove { angle_rad: 1e9, duration_s: 0.0 };
-        assert_eq!(CURRENT.check(&Request::Position(turn)), Ok(()));
+        assert_eq!(CURRENT.check(&Request::SetPosition(turn)), Ok(()));
         for code in 0..0x20 {
             for payload in [&[][..], &[0xFF; 12], &[0xFF; MAX_PAYLOAD]] {
                 assert_eq!(checked(Limits::default(), code, payload), Ok(()), "{code:#04x}");
@@ -241,7 +241,7 @@ mod tests {
     fn a_position_command_has_no_speed_to_be_limited() {
         let turn = PositionMove { angle_rad: 0.1, duration_s: 10.0 };
         let refused = Err(LimitError::Position { limit_rpm: 1000 });
-        assert_eq!(SPEED.check(&Request::Position(turn)), refused);
+        assert_eq!(SPEED.check(&Request::SetPosition(turn)), refused);
         assert_eq!(checked(SPEED, 0x12, &[0; 8]), refused);
     }
 
@@ -275,11 +275,11 @@ mod tests {
         let write = Request::SetRegister { register: RegisterId::SPEED_KP, value: &ids };
         assert_eq!(CURRENT.check(&write), longest);
         assert_eq!(
-            CURRENT.check(&Request::ConfigDynStruct { segment: 0, registers: &ids }),
+            CURRENT.check(&Request::ConfigureSegment { segment: 0, registers: &ids }),
             longest
         );
-        assert_eq!(CURRENT.check(&Request::ProfilerInfo(&[0; MAX_PAYLOAD])), longest);
-        assert_eq!(CURRENT.check(&Request::ProfilerInfo(&ids)), Ok(()));
+        assert_eq!(CURRENT.check(&Request::GetProfilerInfo(&[0; MAX_PAYLOAD])), longest);
+        assert_eq!(CURRENT.check(&Request::GetProfilerInfo(&ids)), Ok(()));
     }
 
     #[test]

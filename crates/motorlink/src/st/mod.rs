@@ -4,11 +4,11 @@
 //! use motorlink::st::{Client, Options, register};
 //!
 //! let client = Client::open(&"/dev/ttyACM0".parse()?, Options::default())?;
-//! let guard = client.guard();              // stops what was started when it goes out of scope
+//! let guard = client.stop_on_drop();       // stops what was started when it goes out of scope
 //! let motor = client.motor(1)?;
 //! motor.start()?;
-//! motor.ramp(1500, 1000)?;
-//! println!("{} rpm", motor.read(register::SPEED_MEAS)?);
+//! motor.set_ramp(1500, 1000)?;
+//! println!("{} rpm", motor.get(register::SPEED_MEAS)?);
 //! # drop(guard);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -28,19 +28,19 @@ mod started;
 mod transcript;
 
 pub use motorlink_proto::st::{
-    Command, Config, ControlMode, Counters, CurrentReference, ErrorCode, Failure, Feature,
-    Features, Flags, FrameCode, Line, Motor, NoSuchProfile, PositionMove, Profile, REVUP_PHASES,
-    Ramp, Recovery, RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Slave, Status,
-    TorqueRamp, VERIFY_ATTEMPTS, register,
+    Command, ControlMode, Counters, CurrentReference, ErrorCode, Failure, Feature, Features, Flags,
+    FrameCode, MasterConfig, MotorNumber, NoSuchProfile, PositionMove, Profile, REVUP_PHASES, Ramp,
+    Recovery, RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Slave, Status,
+    SyncState, TorqueRamp, VERIFY_ATTEMPTS, register,
 };
 
-pub use client::{Client, FirmwareVersion, Info};
+pub use client::{BoardInfo, Client, FirmwareVersion};
 pub use error::Error;
 pub use event::{EventClient, Progress};
-pub use guard::{Guard, Stopped};
+pub use guard::{StopOnDrop, Stopped};
 pub use limits::{LimitError, Limits};
-pub use motor::MotorHandle;
+pub use motor::Motor;
 pub use motorlink_proto::st::{Reading, UnknownRegister, ValueError, find_register, parse_value};
 pub use options::Options;
-pub use scan::{BAUD_RATES, Finding, scan_baud};
+pub use scan::{BAUD_RATES, ScanResult, scan_baud};
 pub use transcript::Transcript;

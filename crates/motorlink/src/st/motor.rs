@@ -2,8 +2,8 @@
 
 use motorlink_proto::st::register::{Readable, Register, Value, Writable};
 use motorlink_proto::st::{
-    Command, CurrentReference, Flags, Motor, PositionMove, Profile, Ramp, RegisterId, Request,
-    RevupPhase, Status, TorqueRamp, VerifiedWrite, register,
+    Command, CurrentReference, Flags, MotorNumber, PositionMove, Profile, Ramp, RegisterId,
+    Request, RevupPhase, Status, TorqueRamp, VerifiedWrite, register,
 };
 
 use super::{Client, Error};
@@ -11,49 +11,49 @@ use super::{Client, Error};
 /// One motor of a drive. Every call is one exchange; its errors are those of
 /// [`Client::exchange`].
 #[derive(Clone, Copy)]
-pub struct MotorHandle<'a> {
+pub struct Motor<'a> {
     client: &'a Client,
-    motor: Motor,
+    motor: MotorNumber,
 }
 
 impl Client {
     /// A motor of the drive, 1 to 7.
-    pub fn motor(&self, number: u8) -> Result<MotorHandle<'_>, Error> {
-        let motor = Motor::new(number).ok_or(Error::NoSuchMotor(number))?;
-        Ok(MotorHandle { client: self, motor })
+    pub fn motor(&self, number: u8) -> Result<Motor<'_>, Error> {
+        let motor = MotorNumber::new(number).ok_or(Error::NoSuchMotor(number))?;
+        Ok(Motor { client: self, motor })
     }
 }
 
-impl MotorHandle<'_> {
+impl Motor<'_> {
     /// The motor's number.
-    pub fn number(&self) -> Motor {
+    pub fn number(&self) -> MotorNumber {
         self.motor
     }
 
     /// Reads a register (4.5), in the unit of table 3.
-    pub fn read<T: Value>(&self, register: Register<T, impl Readable>) -> Result<T, Error> {
-        self.read_raw(register.id()).map(T::from_bits)
+    pub fn get<T: Value>(&self, register: Register<T, impl Readable>) -> Result<T, Error> {
+        self.get_raw(register.id()).map(T::from_bits)
     }
 
     /// Writes a register (4.4), in the unit of table 3.
-    pub fn write<T: Value>(
+    pub fn set<T: Value>(
         &self,
         register: Register<T, impl Writable>,
         value: T,
     ) -> Result<(), Error> {
         let size = register.id().write_size(self.client.profile());
-        self.write_raw(register.id(), value.bits(), size)
+        self.set_raw(register.id(), value.bits(), size)
     }
 
     /// Reads any register, known or not. The value's size is the reply's, its sign that of the
     /// register's type in the client's profile.
-    pub fn read_raw(&self, register: RegisterId) -> Result<i32, Error> {
+    pub fn get_raw(&self, register: RegisterId) -> Result<i32, Error> {
         let profile = self.client.profile();
         self.ask(&Request::GetRegister(register), |payload| register.decode(profile, payload))
     }
 
     /// Writes the low `size` bytes (at most 4) of `value` to any register.
-    pub fn write_raw(&self, register: RegisterId, value: i32, size: u8) -> Result<(), Error> {
+    pub fn set_raw(&self, register: RegisterId, value: i32, size: u8) -> Result<(), Error> {
         let bytes = value.to_le_bytes();
         let value = &bytes[..usize::from(size.min(4))];
         self.tell(&Request::SetRegister { register, value })
@@ -67,24 +67,24 @@ impl MotorHandle<'_> {
     /// [`Error::NotVerifiable`] for a register that cannot be read back, or whose write makes the
     /// motor do something; nothing is sent then. [`Error::Differs`]. Those of [`Client::exchange`],
     /// which say nothing about the register.
-    pub fn write_verified<T: Value>(
+    pub fn set_verified<T: Value>(
         &self,
         register: Register<T, impl Readable + Writable>,
         value: T,
         attempts: u8,
     ) -> Result<u8, Error> {
-        self.write_raw_verified(register.id(), value.bits(), attempts)
+        self.set_raw_verified(register.id(), value.bits(), attempts)
     }
 
-    /// As [`write_verified`](Self::write_verified), for any register.
-    pub fn write_raw_verified(
+    /// As [`set_verified`](Self::set_verified), for any register.
+    pub fn set_raw_verified(
         &self,
         register: RegisterId,
         value: i32,
         attempts: u8,
     ) -> Result<u8, Error> {
         let exchange = |request: &Request<'_>| match request {
-            Request::GetRegister(_) => self.read_raw(register).map(Some),
+            Request::GetRegister(_) => self.get_raw(register).map(Some),
             _ => self.tell(request).map(|()| None),
         };
         VerifiedWrite::new(self.client.profile(), register, value)
@@ -96,18 +96,18 @@ impl MotorHandle<'_> {
 
     /// The state of its state machine.
     pub fn status(&self) -> Result<Status, Error> {
-        self.read(register::STATUS).map(Status::from)
+        self.get(register::STATUS).map(Status::from)
     }
 
     /// Its faults.
-    pub fn faults(&self) -> Result<Flags, Error> {
-        self.read(register::FLAGS).map(Flags)
+    pub fn flags(&self) -> Result<Flags, Error> {
+        self.get(register::FLAGS).map(Flags)
     }
 
     /// Executes a command (4.6). An acknowledge does not say that it had an effect: a START_MOTOR
     /// with a fault pending has none.
     pub fn execute(&self, command: Command) -> Result<(), Error> {
-        self.tell(&Request::Execute(command))
+        self.tell(&Request::ExecuteCommand(command))
     }
 
     /// START_MOTOR.
@@ -121,37 +121,37 @@ impl MotorHandle<'_> {
     }
 
     /// Acknowledges past faults (FAULT_ACK).
-    pub fn acknowledge_faults(&self) -> Result<(), Error> {
+    pub fn fault_ack(&self) -> Result<(), Error> {
         self.execute(Command::FaultAck)
     }
 
     /// Goes to `speed_rpm` within `duration_ms`: at once in RUN, else when RUN is reached (4.8).
-    pub fn ramp(&self, speed_rpm: i32, duration_ms: u16) -> Result<(), Error> {
-        self.tell(&Request::Ramp(Ramp { speed_rpm, duration_ms }))
+    pub fn set_ramp(&self, speed_rpm: i32, duration_ms: u16) -> Result<(), Error> {
+        self.tell(&Request::SetRamp(Ramp { speed_rpm, duration_ms }))
     }
 
     /// Sets the current references, s16A digits (4.11).
-    pub fn current(&self, iq_s16a: i16, id_s16a: i16) -> Result<(), Error> {
-        self.tell(&Request::CurrentReference(CurrentReference { iq_s16a, id_s16a }))
+    pub fn set_current_reference(&self, iq_s16a: i16, id_s16a: i16) -> Result<(), Error> {
+        self.tell(&Request::SetCurrentReference(CurrentReference { iq_s16a, id_s16a }))
     }
 
     /// Goes to an Iq of `torque_s16a` within `duration_ms` (profile `mcsdk-5.4` only).
-    pub fn torque_ramp(&self, torque_s16a: i32, duration_ms: u16) -> Result<(), Error> {
-        self.tell(&Request::TorqueRamp(TorqueRamp { torque_s16a, duration_ms }))
+    pub fn set_torque_ramp(&self, torque_s16a: i32, duration_ms: u16) -> Result<(), Error> {
+        self.tell(&Request::SetTorqueRamp(TorqueRamp { torque_s16a, duration_ms }))
     }
 
     /// Turns to `angle_rad` within `duration_s` (profile `mcsdk-5.4` with position control only).
-    pub fn move_to(&self, angle_rad: f32, duration_s: f32) -> Result<(), Error> {
-        self.tell(&Request::Position(PositionMove { angle_rad, duration_s }))
+    pub fn set_position(&self, angle_rad: f32, duration_s: f32) -> Result<(), Error> {
+        self.tell(&Request::SetPosition(PositionMove { angle_rad, duration_s }))
     }
 
     /// A rev-up phase, 0 to 4 (4.9).
-    pub fn revup(&self, phase: u8) -> Result<RevupPhase, Error> {
-        self.ask(&Request::RevupData(phase), RevupPhase::decode)
+    pub fn revup_data(&self, phase: u8) -> Result<RevupPhase, Error> {
+        self.ask(&Request::GetRevupData(phase), RevupPhase::decode)
     }
 
     /// Sets a rev-up phase, 0 to 4 (4.10).
-    pub fn set_revup(&self, phase: u8, data: RevupPhase) -> Result<(), Error> {
+    pub fn set_revup_data(&self, phase: u8, data: RevupPhase) -> Result<(), Error> {
         self.tell(&Request::SetRevupData(phase, data))
     }
 
@@ -160,18 +160,18 @@ impl MotorHandle<'_> {
         let mut ids = [0; 127];
         let count = registers.len().min(ids.len());
         ids.iter_mut().zip(registers).for_each(|(slot, register)| *slot = register.0);
-        self.tell(&Request::ConfigDynStruct { segment, registers: &ids[..count] })
+        self.tell(&Request::ConfigureSegment { segment, registers: &ids[..count] })
     }
 
     /// Samples a data segment in one exchange. `registers` are those that it was configured with;
     /// `values` receives theirs, in this order, as many as fit.
-    pub fn read_segment(
+    pub fn segment(
         &self,
         segment: u8,
         registers: &[RegisterId],
         values: &mut [i32],
     ) -> Result<(), Error> {
-        self.ask(&Request::DataElement(segment), |mut payload| {
+        self.ask(&Request::GetSegment(segment), |mut payload| {
             for (register, value) in registers.iter().zip(values.iter_mut()) {
                 let size = register.shape()?.ty(Profile::Spec).size();
                 let (bytes, rest) = payload.split_at_checked(usize::from(size))?;

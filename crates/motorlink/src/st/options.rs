@@ -2,7 +2,7 @@
 
 use motorlink_link::port::PortName;
 use motorlink_link::reopening::BackOff;
-use motorlink_proto::st::{Config, Master, Profile};
+use motorlink_proto::st::{Master, MasterConfig, Profile};
 
 use super::Limits;
 
@@ -12,7 +12,7 @@ pub struct Options {
     /// What the drive is expected to speak.
     pub profile: Profile,
     /// Timeout and recovery of the line.
-    pub line: Config,
+    pub master: MasterConfig,
     /// Attempts to open a port that went away.
     pub back_off: BackOff,
     /// What no request may exceed.
@@ -23,7 +23,7 @@ impl Options {
     /// What recovery sends has to be out of the port before silence can begin.
     pub(crate) fn on(mut self, port: &PortName) -> Self {
         if let Some(baud) = port.baud() {
-            self.line.quiet = self.line.quiet + Master::longest_transmission(baud);
+            self.master.quiet = self.master.quiet + Master::longest_transmission(baud);
         }
         self
     }

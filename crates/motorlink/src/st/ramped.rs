@@ -1,6 +1,6 @@
 //! Which motors go to a speed that this client commanded when they are started.
 
-use motorlink_proto::st::Motor;
+use motorlink_proto::st::MotorNumber;
 
 use super::started::{Effect, bit};
 
@@ -11,7 +11,7 @@ pub(super) struct Ramped(u8);
 impl Ramped {
     /// A request for `motor` leaves; `None` while that motor is not known. Unless the drive
     /// acknowledges a ramp, its setpoint may have changed or not.
-    pub(super) fn asked(&mut self, motor: Option<Motor>, effect: Effect) {
+    pub(super) fn asked(&mut self, motor: Option<MotorNumber>, effect: Effect) {
         match effect {
             Effect::Ramps | Effect::Supersedes => self.0 &= !motor.map_or(u8::MAX, bit),
             Effect::Resets => self.forget(),
@@ -20,7 +20,7 @@ impl Ramped {
     }
 
     /// The request that was [`asked`](Self::asked) last was acknowledged.
-    pub(super) fn acknowledged(&mut self, motor: Option<Motor>, effect: Effect) {
+    pub(super) fn acknowledged(&mut self, motor: Option<MotorNumber>, effect: Effect) {
         if effect == Effect::Ramps {
             self.0 |= motor.map_or(0, bit);
         }
@@ -32,7 +32,7 @@ impl Ramped {
     }
 
     /// Whether a start of `motor` goes to a speed that this client commanded.
-    pub(super) fn has(self, motor: Option<Motor>) -> bool {
+    pub(super) fn has(self, motor: Option<MotorNumber>) -> bool {
         motor.is_some_and(|motor| self.0 & bit(motor) != 0)
     }
 }

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use motorlink_link::port::{PortError, PortName};
-use motorlink_proto::st::{Config, ErrorCode, Failure, Profile, Recovery};
+use motorlink_proto::st::{ErrorCode, Failure, MasterConfig, Profile, Recovery};
 
-use super::{Client, Error, Info, Options};
+use super::{BoardInfo, Client, Error, Options};
 
 /// The rates that drives are built with, the most frequent first.
 pub const BAUD_RATES: [u32; 9] =
@@ -13,9 +13,9 @@ pub const BAUD_RATES: [u32; 9] =
 
 /// What a rate was answered with.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Finding {
+pub enum ScanResult {
     /// A drive that speaks the protocol.
-    Drive(Info),
+    Drive(BoardInfo),
     /// A drive that speaks the protocol and refuses GET_BOARD_INFO.
     Refuses(ErrorCode),
     /// Bytes that are no reply: something speaks, at another rate or another protocol.
@@ -30,28 +30,32 @@ pub enum Finding {
 ///
 /// # Errors
 /// What keeps the port from being opened.
-pub fn scan_baud(port: &PortName, baud: u32, patience: Duration) -> Result<Finding, PortError> {
+pub fn scan_baud(port: &PortName, baud: u32, patience: Duration) -> Result<ScanResult, PortError> {
     let port = port.at_baud(baud).unwrap_or_else(|| port.clone());
-    let link = Config { timeout: patience.into(), recovery: Recovery::Pad, ..Config::default() };
-    let options = Options { profile: Profile::Spec, line: link, ..Options::default() };
+    let link = MasterConfig {
+        timeout: patience.into(),
+        recovery: Recovery::Pad,
+        ..MasterConfig::default()
+    };
+    let options = Options { profile: Profile::Spec, master: link, ..Options::default() };
     let client = match Client::open(&port, options) {
         Ok(client) => client,
         Err(Error::Port(error)) => return Err(error),
-        Err(_) => return Ok(Finding::Silence),
+        Err(_) => return Ok(ScanResult::Silence),
     };
     // A drive that waits for the rest of a cut-off frame answers the second question.
-    let mut heard = Finding::Silence;
+    let mut heard = ScanResult::Silence;
     for _ in 0..2 {
-        match client.info() {
-            Ok(info) => return Ok(Finding::Drive(info)),
-            Err(Error::Refused { code, .. }) => return Ok(Finding::Refuses(code)),
+        match client.board_info() {
+            Ok(info) => return Ok(ScanResult::Drive(info)),
+            Err(Error::Refused { code, .. }) => return Ok(ScanResult::Refuses(code)),
             Err(Error::Port(error)) => return Err(error),
             Err(Error::Failed { failure: Failure::Timeout | Failure::Lost, .. }) => {}
-            Err(Error::Failed { failure: Failure::Echo, .. }) => heard = Finding::Echo,
+            Err(Error::Failed { failure: Failure::Echo, .. }) => heard = ScanResult::Echo,
             Err(Error::Failed { failure: Failure::NotUnderstood(code), .. }) => {
-                heard = Finding::Refuses(code);
+                heard = ScanResult::Refuses(code);
             }
-            Err(_) => heard = Finding::Garbage,
+            Err(_) => heard = ScanResult::Garbage,
         }
     }
     Ok(heard)

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use motorlink_link::port::PortError;
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
-    Command, Config, Counters, Frame, FrameCode, Line, MAX_FRAME, MAX_PAYLOAD, Master, Motor,
-    Output, Profile, RegisterId, Request, RequestError, question_behind,
+    Command, Counters, Frame, FrameCode, MAX_FRAME, MAX_PAYLOAD, Master, MasterConfig, MotorNumber,
+    Output, Profile, RegisterId, Request, RequestError, SyncState, question_behind,
 };
 use motorlink_proto::time::Instant;
 
@@ -60,7 +60,7 @@ type History = (u32, u32);
 struct PendingRequest {
     motor: u8,
     /// The motor that this addresses, where it is known.
-    addressed: Option<Motor>,
+    addressed: Option<MotorNumber>,
     effect: Effect,
     what: What,
 }
@@ -101,7 +101,7 @@ impl Session {
         let rules = Rules { profile: options.profile, limits: options.limits };
         let what = What::Known(FrameCode::GetBoardInfo);
         let asked = PendingRequest { motor: 0, addressed: None, effect: Effect::None, what };
-        let master = Master::new(Config { profile: options.profile, ..options.line });
+        let master = Master::new(MasterConfig { profile: options.profile, ..options.master });
         Session {
             port,
             rules,
@@ -123,8 +123,8 @@ impl Session {
         self.rules
     }
 
-    pub(super) fn line(&self) -> Line {
-        self.master.line()
+    pub(super) fn sync_state(&self) -> SyncState {
+        self.master.sync_state()
     }
 
     pub(super) fn counters(&self) -> Counters {
@@ -183,10 +183,11 @@ impl Session {
     ) -> Result<(), Error> {
         self.check_retired(effect)?;
         self.check_start(motor, effect)?;
-        self.ahead_size = match effect == Effect::Stops && self.master.line() == Line::Lost {
-            true => encode(&mut self.ahead).unwrap_or(0),
-            false => 0,
-        };
+        self.ahead_size =
+            match effect == Effect::Stops && self.master.sync_state() == SyncState::Lost {
+                true => encode(&mut self.ahead).unwrap_or(0),
+                false => 0,
+            };
         Ok(())
     }
 
@@ -245,7 +246,7 @@ impl Session {
     /// its size, or without an acknowledge.
     pub(super) fn conclude<T>(
         &mut self,
-        outcome: Result<(Option<T>, usize), proto::Error>,
+        outcome: Result<(Option<T>, usize), proto::ExchangeError>,
     ) -> Result<T, Error> {
         let PendingRequest { motor, addressed, effect, what } = self.asked;
         self.last_size = outcome.as_ref().ok().map(|(_, size)| *size);
@@ -261,11 +262,11 @@ impl Session {
                 self.master.lost();
                 Err(Error::Reply { port, motor: target, what: what.to_string(), size })
             }
-            Err(proto::Error::Refused(code)) => {
+            Err(proto::ExchangeError::Refused(code)) => {
                 let what = what.to_string();
                 Err(Error::Refused { port, motor: target, what, code, hint: hint(code) })
             }
-            Err(proto::Error::Failed(failure)) => {
+            Err(proto::ExchangeError::Failed(failure)) => {
                 let (what, hint) = (what.to_string(), advice(failure));
                 Err(Error::Failed { port, motor: target, what, failure, hint })
             }
@@ -320,16 +321,16 @@ impl Session {
     /// A STOP_MOTOR to be sent beside the exchanges, without waiting for an answer.
     pub(super) fn stop_unheard<'a>(
         &mut self,
-        motor: Motor,
+        motor: MotorNumber,
         frame: &'a mut [u8; MAX_FRAME],
     ) -> &'a [u8] {
         self.master.lost();
-        let stop = Request::Execute(Command::StopMotor);
+        let stop = Request::ExecuteCommand(Command::StopMotor);
         Frame::command(motor.number(), &stop, frame).unwrap_or(&[])
     }
 
     /// What a stop ends in when the drive has just failed to answer another.
-    pub(super) fn unanswered(&self, motor: Motor, failure: proto::Failure) -> Error {
+    pub(super) fn unanswered(&self, motor: MotorNumber, failure: proto::Failure) -> Error {
         Error::Failed {
             port: Arc::clone(&self.port),
             motor: Target(motor.number()),
@@ -340,7 +341,7 @@ impl Session {
     }
 
     /// The drive has no such motor, which may have been taken for started.
-    pub(super) fn forget_motor(&mut self, motor: Motor) {
+    pub(super) fn forget_motor(&mut self, motor: MotorNumber) {
         self.started.forget_motor(motor);
     }
 
@@ -355,7 +356,7 @@ impl What {
         match request {
             Request::SetRegister { register, .. } => What::Writing(*register),
             Request::GetRegister(register) => What::Reading(*register),
-            Request::Execute(command) => What::Executing(*command),
+            Request::ExecuteCommand(command) => What::Executing(*command),
             other => What::Known(other.code()),
         }
     }
@@ -375,5 +376,5 @@ impl fmt::Display for What {
 
 /// Motor numbers have three bits.
 fn addressable(motor: u8) -> Result<(), Error> {
-    if motor <= Motor::MAX { Ok(()) } else { Err(Error::NoSuchMotor(motor)) }
+    if motor <= MotorNumber::MAX { Ok(()) } else { Err(Error::NoSuchMotor(motor)) }
 }

@@ -1,6 +1,8 @@
 //! Which motors were started and not stopped, as far as requests and replies tell.
 
-use motorlink_proto::st::{Command, Frame, FrameCode, Motor, Parse, Profile, RegisterId, Request};
+use motorlink_proto::st::{
+    Command, Frame, FrameCode, MotorNumber, Parse, Profile, RegisterId, Request,
+};
 
 /// Every motor that a drive can have.
 const ALL: u8 = 0x7F;
@@ -25,7 +27,7 @@ pub(super) enum Effect {
 impl Effect {
     pub(super) fn of(request: Option<&Request<'_>>) -> Self {
         match request {
-            Some(Request::Execute(command)) => match command {
+            Some(Request::ExecuteCommand(command)) => match command {
                 Command::StartMotor | Command::StartStop | Command::ScStart => Effect::Starts,
                 Command::StopMotor | Command::ScStop => Effect::Stops,
                 Command::Reset => Effect::Resets,
@@ -40,10 +42,12 @@ impl Effect {
                 }
                 _ => Effect::None,
             },
-            Some(Request::Ramp(_)) => Effect::Ramps,
-            Some(Request::CurrentReference(_) | Request::TorqueRamp(_) | Request::Position(_)) => {
-                Effect::Supersedes
-            }
+            Some(Request::SetRamp(_)) => Effect::Ramps,
+            Some(
+                Request::SetCurrentReference(_)
+                | Request::SetTorqueRamp(_)
+                | Request::SetPosition(_),
+            ) => Effect::Supersedes,
             _ => Effect::None,
         }
     }
@@ -67,7 +71,7 @@ pub(crate) struct Started {
     /// Bit n: motor n + 1.
     motors: u8,
     /// What motor number 0 addresses; `None` while that is not known.
-    current: Option<Motor>,
+    current: Option<MotorNumber>,
     /// The motors that counted as started before a START to motor number 0, while that still addresses
     /// the same one.
     before_zero: Option<u8>,
@@ -76,7 +80,7 @@ pub(crate) struct Started {
 impl Started {
     /// A request for motor number `motor` leaves. Gives the motor that it addresses, where that is
     /// known, for [`acknowledged`](Self::acknowledged).
-    pub(super) fn asked(&mut self, motor: u8, effect: Effect) -> Option<Motor> {
+    pub(super) fn asked(&mut self, motor: u8, effect: Effect) -> Option<MotorNumber> {
         if motor != 0 || matches!(effect, Effect::Retargets | Effect::Resets) {
             self.before_zero = None;
         }
@@ -90,12 +94,12 @@ impl Started {
     }
 
     /// The motor that motor number `motor` addresses, where it is known.
-    pub(super) fn addressed(&self, motor: u8) -> Option<Motor> {
-        Motor::new(motor).or(self.current)
+    pub(super) fn addressed(&self, motor: u8) -> Option<MotorNumber> {
+        MotorNumber::new(motor).or(self.current)
     }
 
     /// The request that was [`asked`](Self::asked) last was acknowledged.
-    pub(super) fn acknowledged(&mut self, addressed: Option<Motor>, effect: Effect) {
+    pub(super) fn acknowledged(&mut self, addressed: Option<MotorNumber>, effect: Effect) {
         match effect {
             Effect::Retargets | Effect::Resets => return,
             Effect::Stops => {
@@ -112,7 +116,7 @@ impl Started {
     /// Takes motor number `motor` for started. For number 0 that is every motor: a drive whose supply
     /// failed for a moment has another current motor than before.
     pub(super) fn presume(&mut self, motor: u8) {
-        if let Some(motor) = Motor::new(motor) {
+        if let Some(motor) = MotorNumber::new(motor) {
             self.motors |= bit(motor);
         } else {
             self.before_zero.get_or_insert(self.motors);
@@ -133,7 +137,7 @@ impl Started {
     }
 
     /// The drive has no such motor.
-    pub(super) fn forget_motor(&mut self, motor: Motor) {
+    pub(super) fn forget_motor(&mut self, motor: MotorNumber) {
         self.motors &= !bit(motor);
     }
 
@@ -146,12 +150,14 @@ impl Started {
         self.motors == 0
     }
 
-    pub(crate) fn motors(self) -> impl Iterator<Item = Motor> {
-        (1..=Motor::MAX).filter_map(Motor::new).filter(move |motor| self.motors & bit(*motor) != 0)
+    pub(crate) fn motors(self) -> impl Iterator<Item = MotorNumber> {
+        (1..=MotorNumber::MAX)
+            .filter_map(MotorNumber::new)
+            .filter(move |motor| self.motors & bit(*motor) != 0)
     }
 }
 
 /// Bit n: motor n + 1.
-pub(super) const fn bit(motor: Motor) -> u8 {
+pub(super) const fn bit(motor: MotorNumber) -> u8 {
     1 << motor.index()
 }

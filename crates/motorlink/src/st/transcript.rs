@@ -55,9 +55,9 @@ impl Transcript {
         };
         self.asked = match request {
             Request::GetRegister(register) => ReplyKind::Register(register),
-            Request::BoardInfo => ReplyKind::BoardInfo,
-            Request::FirmwareVersion => ReplyKind::Version,
-            Request::RevupData(_) => ReplyKind::Revup,
+            Request::GetBoardInfo => ReplyKind::BoardInfo,
+            Request::GetFirmwareVersion => ReplyKind::Version,
+            Request::GetRevupData(_) => ReplyKind::Revup,
             _ => ReplyKind::Nothing,
         };
         let code = request.code().name();
@@ -72,15 +72,15 @@ impl Transcript {
                     None => format!("{code} {register}{motor}"),
                 }
             }
-            Request::Execute(command) => format!("{code} {command}{motor}"),
-            Request::Ramp(ramp) => {
+            Request::ExecuteCommand(command) => format!("{code} {command}{motor}"),
+            Request::SetRamp(ramp) => {
                 format!("{code} {} rpm in {} ms{motor}", ramp.speed_rpm, ramp.duration_ms)
             }
-            Request::CurrentReference(reference) => {
+            Request::SetCurrentReference(reference) => {
                 let (iq, id) = (reference.iq_s16a, reference.id_s16a);
                 format!("{code} Iq {iq} Id {id} s16A{motor}")
             }
-            Request::RevupData(phase) | Request::SetRevupData(phase, _) => {
+            Request::GetRevupData(phase) | Request::SetRevupData(phase, _) => {
                 format!("{code} phase {phase}{motor}")
             }
             _ => format!("{code}{motor}"),

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, FdLink, PortError};
-use motorlink::rmd::{self, Bus, CentiDps, IqCommand, MotorId, OnDrop};
-use motorlink::st::{self, Client, Command, Config, Request, Status};
+use motorlink::rmd::{self, CentiDps, IqCommand, MotorId, StopAction};
+use motorlink::st::{self, Command, MasterConfig, Request, Status};
 
 use crate::served::Served;
 use crate::wire::Fresh;
@@ -19,7 +19,7 @@ fn a_guard_stops_the_motors_that_its_client_started_even_in_a_panic() {
     let drives = Served::new("guard-st");
     let client = open_st(&drives);
     let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-        let _guard = client.guard();
+        let _guard = client.stop_on_drop();
         client.motor(1).unwrap().start().unwrap();
         let motor = client.motor(2).unwrap();
         motor.start().unwrap();
@@ -35,7 +35,7 @@ fn a_guard_stops_the_motors_that_its_client_started_even_in_a_panic() {
 fn a_disarmed_guard_leaves_the_motor_running() {
     let drives = Served::new("guard-disarmed");
     let client = open_st(&drives);
-    let guard = client.guard();
+    let guard = client.stop_on_drop();
     let motor = client.motor(1).unwrap();
     motor.start().unwrap();
     guard.disarm();
@@ -45,9 +45,11 @@ fn a_disarmed_guard_leaves_the_motor_running() {
 #[test]
 fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
     let (ours, theirs) = UnixStream::pair().unwrap();
-    let line = Config { timeout: Duration::from_millis(100).into(), ..Config::default() };
-    let options = st::Options { line, ..st::Options::default() };
-    let client = Client::over("pair", Box::new(Fresh(FdLink::new(ours, "pair").unwrap())), options);
+    let line =
+        MasterConfig { timeout: Duration::from_millis(100).into(), ..MasterConfig::default() };
+    let options = st::Options { master: line, ..st::Options::default() };
+    let client =
+        st::Client::over("pair", Box::new(Fresh(FdLink::new(ours, "pair").unwrap())), options);
     let mut start = [0; 4];
     let drive = std::thread::spawn(move || {
         (&theirs).read_exact(&mut start).unwrap();
@@ -57,7 +59,7 @@ fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
         heard
     });
     client.motor(1).unwrap().start().unwrap();
-    drop(client.guard());
+    drop(client.stop_on_drop());
     drop(client);
     let stops = drive.join().unwrap().windows(4).filter(|w| *w == [0x23, 0x01, 0x02, 0x26]).count();
     assert!(stops >= 2, "{stops}");
@@ -66,13 +68,17 @@ fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
 #[test]
 fn a_motor_whose_start_was_not_answered_is_stopped_too() {
     let (ours, theirs) = UnixStream::pair().unwrap();
-    let line = Config { timeout: Duration::from_millis(50).into(), ..Config::default() };
-    let options = st::Options { line, ..st::Options::default() };
-    let client = Client::over("pair", Box::new(Fresh(FdLink::new(ours, "pair").unwrap())), options);
+    let line =
+        MasterConfig { timeout: Duration::from_millis(50).into(), ..MasterConfig::default() };
+    let options = st::Options { master: line, ..st::Options::default() };
+    let client =
+        st::Client::over("pair", Box::new(Fresh(FdLink::new(ours, "pair").unwrap())), options);
     assert!(client.motor(3).unwrap().start().is_err());
-    assert!(client.exchange(0, &Request::Execute(Command::StartMotor), |_| Some(())).is_err());
+    assert!(
+        client.exchange(0, &Request::ExecuteCommand(Command::StartMotor), |_| Some(())).is_err()
+    );
     assert_eq!(client.started().count(), 7, "which motor is the current one is not known");
-    drop(client.guard());
+    drop(client.stop_on_drop());
     drop(client);
     let mut heard = Vec::new();
     (&theirs).read_to_end(&mut heard).unwrap();
@@ -101,12 +107,12 @@ impl CanLink for Deaf {
 fn a_motor_that_does_not_answer_stays_one_that_moves() {
     let sent = Arc::new(Mutex::new(Vec::new()));
     let options = rmd::Options { timeout: Duration::from_millis(5), ..rmd::Options::default() };
-    let bus = Bus::over("deaf", Box::new(Fresh(Deaf(Arc::clone(&sent)))), options);
+    let bus = rmd::Client::over("deaf", Box::new(Fresh(Deaf(Arc::clone(&sent)))), options);
     let motor = bus.motor(5).unwrap();
     assert!(motor.set_speed(CentiDps(100)).is_err());
     assert!(motor.off().is_err());
     assert!(bus.moving().map(MotorId::number).eq([5]));
-    drop(bus.guard());
+    drop(bus.stop_on_drop());
     let stops = sent.lock().unwrap().iter().filter(|frame| frame.data()[0] == 0x81).count();
     assert!(stops >= 3, "{stops}");
 }
@@ -117,11 +123,11 @@ fn a_guard_follows_the_drives_current_motor() {
     let client = open_st(&drives);
     let refused = client.exchange(2, &Request::GetRegister(st::RegisterId(0xFF)), |_| Some(()));
     assert!(refused.is_err_and(|error| error.is_refusal()));
-    client.exchange(0, &Request::Execute(Command::StartMotor), |_| Some(())).unwrap();
-    drop(client.guard());
+    client.exchange(0, &Request::ExecuteCommand(Command::StartMotor), |_| Some(())).unwrap();
+    drop(client.stop_on_drop());
     until("motor 2 rests", || client.motor(2).unwrap().status().unwrap() == Status::Idle);
     assert!(matches!(
-        client.exchange(8, &Request::BoardInfo, |_| Some(())),
+        client.exchange(8, &Request::GetBoardInfo, |_| Some(())),
         Err(st::Error::NoSuchMotor(8))
     ));
     assert!(matches!(client.raw(9, 0x06, &[]), Err(st::Error::NoSuchMotor(9))));
@@ -142,7 +148,7 @@ fn a_guard_waits_for_a_port_that_comes_back() {
             Ok(Box::new(FdLink::new(ours, "pair")?) as Box<dyn ByteLink>)
         }
     };
-    let client = Client::open_with("pair", Box::new(open), st::Options::default()).unwrap();
+    let client = st::Client::open_with("pair", Box::new(open), st::Options::default()).unwrap();
     let drive = std::thread::spawn(move || {
         let mut start = [0; 4];
         (&theirs).read_exact(&mut start).unwrap();
@@ -150,13 +156,13 @@ fn a_guard_waits_for_a_port_that_comes_back() {
     });
     client.motor(1).unwrap().start().unwrap();
     drive.join().unwrap();
-    drop(client.guard());
+    drop(client.stop_on_drop());
     assert_eq!(client.started().count(), 0);
 }
 
 /// A drive that acknowledges whatever it gets, and knows its name.
 fn answer_everything(stream: UnixStream) {
-    let mut slave = st::Slave::new(st::Profile::Spec, st::Motor::FIRST);
+    let mut slave = st::Slave::new(st::Profile::Spec, st::MotorNumber::FIRST);
     let mut drive = motorlink_sim::st::StDrive::demo(motorlink::time::Instant(0));
     let mut byte = [0];
     while (&stream).read_exact(&mut byte).is_ok() {
@@ -169,9 +175,9 @@ fn answer_everything(stream: UnixStream) {
 #[test]
 fn a_guard_switches_off_what_a_bus_was_used_to_move() {
     let drives = Served::new("guard-rmd");
-    let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
+    let bus = rmd::Client::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
     {
-        let _guard = bus.guard().with(OnDrop::Stop);
+        let _guard = bus.stop_on_drop().with(StopAction::Stop);
         bus.motor(1).unwrap().set_speed(CentiDps(36_000)).unwrap();
         bus.motor(2).unwrap().set_torque(IqCommand(50)).unwrap();
         bus.motor(2).unwrap().off().unwrap();
@@ -184,9 +190,9 @@ fn a_guard_switches_off_what_a_bus_was_used_to_move() {
 #[test]
 fn a_guard_tells_what_it_did_to_each_motor() {
     let drives = Served::new("guard-told");
-    let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
+    let bus = rmd::Client::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
     bus.motor(3).unwrap().set_torque(IqCommand(50)).unwrap();
-    let stopped = bus.guard().stop_now();
+    let stopped = bus.stop_on_drop().stop_now();
     assert!(matches!(&stopped[..], [one] if one.id.number() == 3 && one.result.is_ok()));
-    assert!(bus.guard().stop_now().is_empty());
+    assert!(bus.stop_on_drop().stop_now().is_empty());
 }

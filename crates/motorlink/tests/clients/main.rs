@@ -13,9 +13,9 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use motorlink::port::{ByteLink, FaultBytes, FdLink, PortError, SlcanLink};
-use motorlink::rmd::{self, Bus, CentiDps, Code, MotorId, SpeedLimit};
+use motorlink::rmd::{self, CentiDps, Code, MotorId, SpeedLimit};
 use motorlink::slcan::Bitrate;
-use motorlink::st::{self, Client, Config, Failure, Limits, Line, register};
+use motorlink::st::{self, Failure, Limits, MasterConfig, SyncState, register};
 use motorlink::{BackOff, LinkState};
 use motorlink_link::fault::Faults;
 use served::Served;
@@ -29,8 +29,8 @@ fn until(what: &str, mut reached: impl FnMut() -> bool) {
     }
 }
 
-fn open_st(drives: &Served) -> Client {
-    Client::open(&drives.st.parse().unwrap(), st::Options::default()).unwrap()
+fn open_st(drives: &Served) -> st::Client {
+    st::Client::open(&drives.st.parse().unwrap(), st::Options::default()).unwrap()
 }
 
 /// A loaded machine may hold the simulator up for longer than a motor would take.
@@ -40,22 +40,21 @@ fn patient() -> rmd::Options {
 
 #[test]
 fn a_verified_write_comes_through_a_line_that_loses_bytes() {
-    let line = Config {
+    let line = MasterConfig {
         timeout: Duration::from_millis(30).into(),
         quiet: Duration::from_millis(5).into(),
-        ..Config::default()
+        ..MasterConfig::default()
     };
-    let options = st::Options { line, ..st::Options::default() };
+    let options = st::Options { master: line, ..st::Options::default() };
     let faults: Faults = "drop=2e-2,seed=1".parse().unwrap();
     let wrap = move |link| Box::new(FaultBytes::new(link, &faults)) as Box<dyn ByteLink>;
     motorlink_testbench::register();
-    let client = Client::open_wrapped(&"sim:".parse().unwrap(), wrap, options).unwrap();
+    let client = st::Client::open_wrapped(&"sim:".parse().unwrap(), wrap, options).unwrap();
     let motor = client.motor(1).unwrap();
-    let attempts: Vec<u8> = (1..=20)
-        .map(|value| motor.write_verified(register::SPEED_KI, value, 20).unwrap())
-        .collect();
+    let attempts: Vec<u8> =
+        (1..=20).map(|value| motor.set_verified(register::SPEED_KI, value, 20).unwrap()).collect();
     assert!(attempts.contains(&1) && attempts.iter().any(|n| *n > 1), "{attempts:?}");
-    let acts = motor.write_verified(register::RAMP_FINAL_SPEED, 600, 3).unwrap_err();
+    let acts = motor.set_verified(register::RAMP_FINAL_SPEED, 600, 3).unwrap_err();
     assert!(matches!(acts, st::Error::NotVerifiable { .. }), "{acts}");
 }
 
@@ -63,7 +62,7 @@ fn a_verified_write_comes_through_a_line_that_loses_bytes() {
 fn a_drives_name_does_not_command_a_terminal() {
     let (ours, theirs) = UnixStream::pair().unwrap();
     let link = Fresh(FdLink::new(ours, "pair").unwrap());
-    let client = Client::over("pair", Box::new(link), st::Options::default());
+    let client = st::Client::over("pair", Box::new(link), st::Options::default());
     let drive = std::thread::spawn(move || {
         for _ in 0..2 {
             (&theirs).read_exact(&mut [0; 3]).unwrap();
@@ -73,7 +72,7 @@ fn a_drives_name_does_not_command_a_terminal() {
             (&theirs).write_all(&reply).unwrap();
         }
     });
-    assert_eq!(client.info().unwrap().name, "\u{FFFD}[2J\u{FFFD}A");
+    assert_eq!(client.board_info().unwrap().name, "\u{FFFD}[2J\u{FFFD}A");
     let firmware = client.firmware_version().unwrap();
     assert_eq!((&firmware.name[..], &firmware.version[..]), ("543\u{FFFD}[2J", "A"));
     drive.join().unwrap();
@@ -102,14 +101,15 @@ fn ends<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
 #[test]
 fn a_port_that_never_falls_silent_holds_nobody_up() {
     for noise in [&b"x"[..], b"z\r", b"\x07", b"t1418A100000000000000\r", b"\xF0\x00\xF0"] {
-        let line = Config { timeout: Duration::from_millis(50).into(), ..Config::default() };
-        let options = st::Options { line, ..st::Options::default() };
-        let client = Client::over("flood", Box::new(Flood(noise)), options);
-        ends(move || [client.info().is_ok(), client.info().is_ok()]);
+        let line =
+            MasterConfig { timeout: Duration::from_millis(50).into(), ..MasterConfig::default() };
+        let options = st::Options { master: line, ..st::Options::default() };
+        let client = st::Client::over("flood", Box::new(Flood(noise)), options);
+        ends(move || [client.board_info().is_ok(), client.board_info().is_ok()]);
         let Ok(adapter) = ends(|| SlcanLink::open(Flood(noise), "flood", Bitrate::DEFAULT)) else {
             continue;
         };
-        let bus = Bus::over("flood", Box::new(adapter), rmd::Options::default());
+        let bus = rmd::Client::over("flood", Box::new(adapter), rmd::Options::default());
         std::thread::sleep(Duration::from_millis(5));
         ends(move || assert!(bus.motor(2).unwrap().off().is_err()));
     }
@@ -120,15 +120,15 @@ fn limits_hold_for_typed_and_raw_requests() {
     let drives = Served::new("limits");
     let limits = Limits { speed_rpm: Some(1000), current_s16a: Some(2000) };
     let options = st::Options { limits, ..st::Options::default() };
-    let client = Client::open(&drives.st.parse().unwrap(), options).unwrap();
+    let client = st::Client::open(&drives.st.parse().unwrap(), options).unwrap();
     let motor = client.motor(1).unwrap();
-    motor.ramp(1000, 0).unwrap();
+    motor.set_ramp(1000, 0).unwrap();
     let refused = |result: Result<(), st::Error>| matches!(result, Err(st::Error::Limit { .. }));
-    assert!(refused(motor.ramp(-1001, 0)));
-    assert!(refused(motor.write(register::TORQUE_REF, 2001)));
+    assert!(refused(motor.set_ramp(-1001, 0)));
+    assert!(refused(motor.set(register::TORQUE_REF, 2001)));
     assert!(refused(client.raw(1, 0x07, &[0xE9, 3, 0, 0, 0, 0]).map(drop)));
 
-    let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
+    let bus = rmd::Client::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
     let id = MotorId::new(1).unwrap();
     bus.set_limits(id, rmd::Limits { speed: Some(SpeedLimit(100)), ..rmd::Limits::default() });
     assert!(matches!(
@@ -150,10 +150,10 @@ fn a_typed_write_has_the_size_that_the_profile_wants() {
         std::fs::write(&config, format!("profile = \"{}\"", profile.name())).unwrap();
         let port = (name + config.to_str().unwrap()).parse().unwrap();
         let options = st::Options { profile, ..st::Options::default() };
-        let client = Client::open(&port, options).unwrap();
+        let client = st::Client::open(&port, options).unwrap();
         let motor = client.motor(1).unwrap();
-        motor.write(register::OBSERVER_C1, -1234).unwrap();
-        assert_eq!(motor.read(register::OBSERVER_C1).unwrap(), -1234);
+        motor.set(register::OBSERVER_C1, -1234).unwrap();
+        assert_eq!(motor.get(register::OBSERVER_C1).unwrap(), -1234);
     }
 }
 
@@ -162,7 +162,7 @@ fn a_port_that_goes_away_is_told_and_opened_again() {
     let drives = Served::new("away");
     let back_off = BackOff { first: Duration::from_millis(10), cap: Duration::from_millis(50) };
     let options = st::Options { back_off, ..st::Options::default() };
-    let client = Client::open(&drives.st.parse().unwrap(), options).unwrap();
+    let client = st::Client::open(&drives.st.parse().unwrap(), options).unwrap();
     let motor = client.motor(1).unwrap();
     motor.status().unwrap();
     drop(drives);
@@ -172,7 +172,7 @@ fn a_port_that_goes_away_is_told_and_opened_again() {
     assert!(motor.status().is_err(), "nobody serves it");
     let _drives = Served::new("away");
     until("the drive is back", || motor.status().is_ok());
-    assert_eq!((client.link_state(), client.line()), (LinkState::Open, Line::Up));
+    assert_eq!((client.link_state(), client.sync_state()), (LinkState::Open, SyncState::InSync));
 }
 
 #[test]
@@ -189,12 +189,12 @@ fn the_state_of_a_link_can_be_seen_while_it_is_being_opened() {
             Err(PortError::Closed { port: "pair".to_owned() })
         }
     };
-    let client = Client::open_with("pair", Box::new(open), st::Options::default()).unwrap();
+    let client = st::Client::open_with("pair", Box::new(open), st::Options::default()).unwrap();
     assert_eq!(client.link_state(), LinkState::Open);
     drop(theirs);
-    assert!(client.info().is_err());
+    assert!(client.board_info().is_err());
     std::thread::scope(|scope| {
-        scope.spawn(|| client.info());
+        scope.spawn(|| client.board_info());
         reach.recv().unwrap();
         assert!(matches!(client.link_state(), LinkState::Closed { .. }));
         drop(go_on);
@@ -204,35 +204,39 @@ fn the_state_of_a_link_can_be_seen_while_it_is_being_opened() {
 #[test]
 fn a_link_that_was_handed_in_is_not_opened_again() {
     let (ours, theirs) = UnixStream::pair().unwrap();
-    let client =
-        Client::over("pair", Box::new(FdLink::new(ours, "pair").unwrap()), st::Options::default());
+    let client = st::Client::over(
+        "pair",
+        Box::new(FdLink::new(ours, "pair").unwrap()),
+        st::Options::default(),
+    );
     drop(theirs);
     for _ in 0..2 {
-        let closed = client.info().unwrap_err();
+        let closed = client.board_info().unwrap_err();
         assert!(matches!(closed, st::Error::Port(PortError::Closed { .. })), "{closed}");
     }
 }
 
 #[test]
 fn a_silent_drive_is_a_failure_and_no_refusal() {
-    let line = Config { timeout: Duration::from_millis(20).into(), ..Config::default() };
-    let options = st::Options { line, ..st::Options::default() };
+    let line =
+        MasterConfig { timeout: Duration::from_millis(20).into(), ..MasterConfig::default() };
+    let options = st::Options { master: line, ..st::Options::default() };
     let pair = || {
         let (ours, theirs) = UnixStream::pair().unwrap();
         (FdLink::new(ours, "pair").unwrap(), theirs)
     };
     let (link, _theirs) = pair();
-    let client = Client::over("pair", Box::new(Fresh(link)), options);
-    let silent = client.info().unwrap_err();
+    let client = st::Client::over("pair", Box::new(Fresh(link)), options);
+    let silent = client.board_info().unwrap_err();
     assert!(matches!(silent, st::Error::Failed { failure: Failure::Timeout, .. }), "{silent}");
-    let lost = client.info().unwrap_err();
+    let lost = client.board_info().unwrap_err();
     assert!(matches!(lost, st::Error::Failed { failure: Failure::Lost, .. }), "{lost}");
 
     // One that never answered has not been lost.
     let (link, _theirs) = pair();
-    let client = Client::over("pair", Box::new(link), options);
+    let client = st::Client::over("pair", Box::new(link), options);
     for _ in 0..2 {
-        let silent = client.info().unwrap_err();
+        let silent = client.board_info().unwrap_err();
         assert!(matches!(silent, st::Error::Failed { failure: Failure::Timeout, .. }), "{silent}");
     }
 }
@@ -241,7 +245,7 @@ fn a_silent_drive_is_a_failure_and_no_refusal() {
 fn a_motor_that_is_not_there_is_told_with_what_it_was_asked() {
     let drives = Served::new("silent-rmd");
     let options = rmd::Options { timeout: Duration::from_millis(30), ..rmd::Options::default() };
-    let bus = Bus::open(&drives.rmd.parse().unwrap(), options).unwrap();
+    let bus = rmd::Client::open(&drives.rmd.parse().unwrap(), options).unwrap();
     let error = bus.motor(9).unwrap().status().unwrap_err();
     assert!(matches!(error, rmd::Error::Timeout { code: Code::ReadStatus, .. }), "{error}");
     // The motor is in quarantine now; the next request waits for its end.
@@ -252,7 +256,7 @@ fn a_motor_that_is_not_there_is_told_with_what_it_was_asked() {
 fn threads_share_a_client_and_get_their_own_answers() {
     let drives = Served::new("threads");
     let client = open_st(&drives);
-    let bus = Bus::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
+    let bus = rmd::Client::open(&drives.rmd.parse().unwrap(), patient()).unwrap();
     std::thread::scope(|scope| {
         for n in 0..8u8 {
             let (client, bus) = (&client, &bus);
@@ -266,8 +270,8 @@ fn threads_share_a_client_and_get_their_own_answers() {
                 ];
                 let own = numerators[usize::from(n / 2)];
                 for k in 0..50 {
-                    motor.write(own, k * 8 + i16::from(n)).unwrap();
-                    assert_eq!(motor.read(own).unwrap(), k * 8 + i16::from(n));
+                    motor.set(own, k * 8 + i16::from(n)).unwrap();
+                    assert_eq!(motor.get(own).unwrap(), k * 8 + i16::from(n));
                     let angle = bus.motor(1 + n % 4).unwrap().multi_turn_angle().unwrap();
                     assert_eq!(angle.0, 0, "nothing moves");
                 }

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, PortError};
-use motorlink::rmd::{self, Bus, MotorId};
-use motorlink::st::{self, Client, register};
+use motorlink::rmd::{self, MotorId};
+use motorlink::st::{self, register};
 
 use crate::wire::Fresh;
 
@@ -37,8 +37,8 @@ impl CanLink for Tardy {
 #[test]
 fn a_reply_that_waited_in_the_port_is_not_taken_for_the_next_one() {
     let ms = Duration::from_millis;
-    let options = rmd::Options { timeout: ms(5), guard: ms(5), ..rmd::Options::default() };
-    let bus = Bus::over("tardy", Box::new(Fresh(Tardy::default())), options);
+    let options = rmd::Options { timeout: ms(5), quarantine: ms(5), ..rmd::Options::default() };
+    let bus = rmd::Client::over("tardy", Box::new(Fresh(Tardy::default())), options);
     let ask = || bus.raw(MotorId::new(1).unwrap(), [0x9C, 0, 0, 0, 0, 0, 0, 0]);
     assert!(matches!(ask(), Err(rmd::Error::Timeout { .. })));
     std::thread::sleep(ms(20));
@@ -91,7 +91,7 @@ impl ByteLink for Twice<Vec<u8>> {
 
 #[test]
 fn a_copy_of_a_reply_is_not_taken_for_the_next_one_however_soon_that_is_asked() {
-    let bus = Bus::over("twice", Twice::<CanFrame>::new(), rmd::Options::default());
+    let bus = rmd::Client::over("twice", Twice::<CanFrame>::new(), rmd::Options::default());
     for number in 1..=3 {
         let reply = bus.raw(MotorId::new(1).unwrap(), [0x9C, 0, 0, 0, 0, 0, 0, 0]).unwrap();
         assert_eq!(reply[7], number);
@@ -101,10 +101,10 @@ fn a_copy_of_a_reply_is_not_taken_for_the_next_one_however_soon_that_is_asked() 
 #[test]
 fn a_copy_of_a_reply_that_comes_in_a_pause_is_not_the_answer_to_the_next_question() {
     let mut options = st::Options::default();
-    options.line.timeout = Duration::from_millis(20).into();
-    options.line.quiet = Duration::from_millis(5).into();
-    let client = Client::over("twice", Twice::<Vec<u8>>::new(), options);
-    let ask = || client.motor(1).unwrap().read(register::CONTROL_MODE);
+    options.master.timeout = Duration::from_millis(20).into();
+    options.master.quiet = Duration::from_millis(5).into();
+    let client = st::Client::over("twice", Twice::<Vec<u8>>::new(), options);
+    let ask = || client.motor(1).unwrap().get(register::CONTROL_MODE);
     assert_eq!(ask().unwrap(), 1);
     // Long for bytes, short for a program.
     std::thread::sleep(Duration::from_millis(2));
@@ -135,8 +135,8 @@ impl CanLink for Absent {
 #[test]
 fn the_answer_of_a_motor_in_doubt_is_nobodys_reply() {
     let ms = Duration::from_millis;
-    let options = rmd::Options { timeout: ms(5), guard: ms(5), ..rmd::Options::default() };
-    let bus = Bus::over("absent", Box::new(Fresh(Absent::default())), options);
+    let options = rmd::Options { timeout: ms(5), quarantine: ms(5), ..rmd::Options::default() };
+    let bus = rmd::Client::over("absent", Box::new(Fresh(Absent::default())), options);
     let id = MotorId::new(1).unwrap();
     assert!(matches!(bus.raw(id, [0x9C, 0, 0, 0, 0, 0, 0, 0]), Err(rmd::Error::Timeout { .. })));
     std::thread::sleep(ms(20));

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use motorlink_testbench::{Bench, BenchConfig};
+use motorlink_testbench::{BenchConfig, SimServer};
 
 /// Drives that are gone when it is dropped.
 pub struct Served {
@@ -46,7 +46,7 @@ impl Served {
     ) -> Self {
         let (control, theirs) = UnixStream::pair().expect("a socket pair");
         let thread = std::thread::spawn(move || {
-            let mut bench = Bench::new();
+            let mut bench = SimServer::new();
             if let Some(port) = st_served {
                 bench.serve_st(&port.parse().expect("a port"), &config).expect("served");
             }
@@ -74,7 +74,7 @@ impl Served {
     }
 }
 
-fn run(mut bench: Bench, control: &UnixStream) {
+fn run(mut bench: SimServer, control: &UnixStream) {
     let mut lines = BufReader::new(control).lines();
     loop {
         let turn = bench.turn(Duration::from_millis(10), Some(control.as_fd())).expect("a turn");

@@ -12,7 +12,7 @@ use motorlink::can::CanFrame;
 use motorlink::list;
 use motorlink::port::{CanLink, PortError, PortName};
 use motorlink::rmd::{
-    self, Bus, CentiDps, Error, Found, IqCommand, MotorId, MotorSet, Pid, SetTorque4,
+    self, CentiDps, Client, Error, IqCommand, MotorId, MotorSet, Pid, ScanResult, SetTorque4,
 };
 use motorlink::time::Instant;
 use motorlink::{BackOff, LinkState};
@@ -34,20 +34,20 @@ const PATIENCE: Option<Duration> = Some(Duration::from_secs(5));
 const STATUS_1: [u8; 8] = [0x9A, 0, 0, 0, 0, 0, 0, 0];
 
 /// A virtual machine may hold a motor up for longer than a motor would take.
-fn bus(interface: &str) -> Bus {
+fn bus(interface: &str) -> Client {
     bus_within(Duration::from_secs(5), interface)
 }
 
 /// A bus that soon takes a motor for silent.
-fn hasty(interface: &str) -> Bus {
+fn hasty(interface: &str) -> Client {
     bus_within(Duration::from_millis(50), interface)
 }
 
-fn bus_within(timeout: Duration, interface: &str) -> Bus {
+fn bus_within(timeout: Duration, interface: &str) -> Client {
     let ms = Duration::from_millis;
     let back_off = BackOff { first: ms(1), cap: ms(10) };
-    let options = rmd::Options { timeout, guard: ms(1), back_off, ..rmd::Options::default() };
-    Bus::open(&port(interface), options).expect("the interface is up")
+    let options = rmd::Options { timeout, quarantine: ms(1), back_off, ..rmd::Options::default() };
+    Client::open(&port(interface), options).expect("the interface is up")
 }
 
 fn port(interface: &str) -> PortName {
@@ -73,7 +73,7 @@ fn drive(host: &str, drives: &str) {
     let mut found = Vec::new();
     bus.scan(MotorSet::TORQUE4, |motor| found.push(motor), |_| {}).expect("the port");
     assert_eq!(found.len(), 4);
-    assert!(found.iter().all(|motor| matches!(motor, Found::Motor(..))), "{found:?}");
+    assert!(found.iter().all(|motor| matches!(motor, ScanResult::Motor(..))), "{found:?}");
 
     let motor = bus.motor(3).expect("1 to 32");
     assert!(motor.status().expect("an answer").voltage.volts() > 1.0);

@@ -2,8 +2,8 @@
 //!
 //! A reply carries a code and no number. When a motor or an adapter stands still and then answers
 //! everything at once, an old reply would pass for a new one. So a motor that owes a reply is left
-//! alone for the guard time and then asked for its status, and for nothing else, until the only
-//! reply that it owed came, or until it was heard and then silent for the guard time. A motor
+//! alone for the quarantine time and then asked for its status, and for nothing else, until the only
+//! reply that it owed came, or until it was heard and then silent for the quarantine time. A motor
 //! that was not asked before may owe a former host anything: it has to answer two questions first, and
 //! then to be silent.
 
@@ -17,7 +17,7 @@ pub(super) struct Doubt {
     /// Whether replies to Off and to Stop are among it.
     off: bool,
     stop: bool,
-    /// The guard time after the last reply that did not come. For [`Owed::Unknown`] also the end of the
+    /// The quarantine time after the last reply that did not come. For [`Owed::Unknown`] also the end of the
     /// wait for silence behind an Off or a Stop.
     until: Instant,
     /// When the motor was last heard since then.

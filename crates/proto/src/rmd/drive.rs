@@ -14,7 +14,7 @@ use crate::units::*;
 
 /// What the drive needs of its motor: the power stage, its control loops and its sensors. Angles
 /// are encoder counts; the drive alone knows where zero is.
-pub trait Motor {
+pub trait MotorControl {
     /// Does `mode` from now on. Called once for each command that asks for it.
     fn set_mode(&mut self, mode: Mode);
 
@@ -86,7 +86,7 @@ pub struct Settings {
 
 /// What the vendor's tool or a switch sets, not the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Config {
+pub struct DriveConfig {
     /// The ID that the drive answers to.
     pub id: MotorId,
     /// Width of the encoder (docs/SPEC-NOTES.md R6).
@@ -98,11 +98,11 @@ pub struct Config {
     pub clear_reply_0x9b: bool,
 }
 
-impl Config {
+impl DriveConfig {
     /// A drive as the document describes it: 14-bit encoder, no shutdown.
     pub fn new(id: MotorId) -> Self {
         let encoder = EncoderBits::default();
-        Config { id, encoder, shutdown: None, clear_reply_0x9b: false }
+        DriveConfig { id, encoder, shutdown: None, clear_reply_0x9b: false }
     }
 }
 
@@ -119,7 +119,7 @@ pub struct Ignored {
 #[derive(Debug, Clone)]
 pub struct Drive {
     /// What the vendor's tool set; may change at any time.
-    pub config: Config,
+    pub config: DriveConfig,
     ram: Settings,
     rom: Settings,
     mode: Mode,
@@ -133,7 +133,7 @@ pub struct Drive {
 
 impl Drive {
     /// A drive with what its ROM holds. Not running before [`power_on`](Self::power_on).
-    pub fn new(config: Config, rom: Settings) -> Self {
+    pub fn new(config: DriveConfig, rom: Settings) -> Self {
         Drive {
             config,
             ram: rom,
@@ -149,7 +149,7 @@ impl Drive {
 
     /// Starts, also after a power cycle: settings come from ROM, the motor is off, no error is
     /// latched and nothing is left to resume.
-    pub fn power_on(&mut self, now: Instant, motor: &mut impl Motor) {
+    pub fn power_on(&mut self, now: Instant, motor: &mut impl MotorControl) {
         *self = Drive { last_command: now, ..Drive::new(self.config, self.rom) };
         motor.configure(&self.ram);
         motor.set_mode(Mode::Off);
@@ -161,7 +161,7 @@ impl Drive {
         &mut self,
         now: Instant,
         frame: &CanFrame,
-        motor: &mut impl Motor,
+        motor: &mut impl MotorControl,
     ) -> Option<CanFrame> {
         let id = self.config.id;
         let own = u32::from(id.can_id());
@@ -187,7 +187,7 @@ impl Drive {
 
     /// Latches faults and keeps the shutdown time. Call at [`deadline`](Self::deadline), and often
     /// enough for a fault to switch the motor off in time.
-    pub fn poll(&mut self, now: Instant, motor: &mut impl Motor) {
+    pub fn poll(&mut self, now: Instant, motor: &mut impl MotorControl) {
         self.watch(now, motor);
     }
 
@@ -222,7 +222,12 @@ impl Drive {
         &self.ignored
     }
 
-    fn answer(&mut self, data: &[u8; 8], sense: &Sense, motor: &mut impl Motor) -> Option<[u8; 8]> {
+    fn answer(
+        &mut self,
+        data: &[u8; 8],
+        sense: &Sense,
+        motor: &mut impl MotorControl,
+    ) -> Option<[u8; 8]> {
         let [code, ..] = *data;
         let code = Code::from(code);
         let position = sense.encoder.wrapping_sub(self.zero());
@@ -363,7 +368,7 @@ impl Drive {
 
     /// Starts a mode, also out of a stop (docs/SPEC-NOTES.md R17); never while an error is latched
     /// (R18).
-    fn go(&mut self, mode: Mode, motor: &mut impl Motor) {
+    fn go(&mut self, mode: Mode, motor: &mut impl MotorControl) {
         if !self.errors.is_empty() {
             return;
         }
@@ -372,14 +377,14 @@ impl Drive {
         motor.set_mode(mode);
     }
 
-    fn off(&mut self, motor: &mut impl Motor) {
+    fn off(&mut self, motor: &mut impl MotorControl) {
         self.mode = Mode::Off;
         self.stopped = false;
         self.circle = None;
         motor.set_mode(Mode::Off);
     }
 
-    fn watch(&mut self, now: Instant, motor: &mut impl Motor) -> Sense {
+    fn watch(&mut self, now: Instant, motor: &mut impl MotorControl) -> Sense {
         let sense = motor.sense();
         self.errors = self.errors.union(sense.faults);
         let silent = self.deadline().is_some_and(|deadline| now >= deadline);
@@ -389,7 +394,7 @@ impl Drive {
         sense
     }
 
-    fn store_offset(&mut self, code: Code, offset: u16, motor: &mut impl Motor) -> [u8; 8] {
+    fn store_offset(&mut self, code: Code, offset: u16, motor: &mut impl MotorControl) -> [u8; 8] {
         self.rom.encoder_offset = offset;
         motor.save(&self.rom);
         EncoderOffset { offset }.encode_as(code)

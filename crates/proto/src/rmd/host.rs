@@ -9,28 +9,28 @@
 //! motor has one exchange at a time. After a timeout the motor is in quarantine, so that a late reply
 //! cannot pass for that to the next request: nothing is sent until the late reply came or the guard
 //! time passed. If it did not come, the motor is asked for its status in place of the next request,
-//! which ends in [`Error::Quarantined`] when the motor answers. That answer may be an old one too, so
-//! the motor then has to be silent for the guard time (docs/SPEC-NOTES.md R29). No exchange with
+//! which ends in [`Failure::Quarantined`] when the motor answers. That answer may be an old one too, so
+//! the motor then has to be silent for the quarantine time (docs/SPEC-NOTES.md R29). No exchange with
 //! a motor that was asked before takes longer than its timeout, and exchanges with other motors wait for
-//! none of this: who has to have a request carried out makes it again on [`Error::Quarantined`], and at
-//! the time that [`Refused::Quarantined`] tells.
+//! none of this: who has to have a request carried out makes it again on [`Failure::Quarantined`], and at
+//! the time that [`RequestError::Quarantined`] tells.
 //!
 //! A motor that was not asked before may owe a former host replies: it is in quarantine, and is asked
 //! for its status at once, by two different questions, each of which has the exchange's timeout. Off
-//! and Stop go out before these; their exchange ends in [`Error::Quarantined`] as well, because a reply
+//! and Stop go out before these; their exchange ends in [`Failure::Quarantined`] as well, because a reply
 //! to them may be an older one's.
 //!
 //! Some requests and their replies are the same bit for bit (0x31, 0x32, 0x34, 0x80, 0x81, 0x88). A
-//! reply with another content is [`Error::Altered`], and the motor is in quarantine. An adapter that
+//! reply with another content is [`Failure::Altered`], and the motor is in quarantine. An adapter that
 //! echoes what it sends looks like a motor that answers these. The reply to the question for the status
-//! has a voltage: if the question itself comes back, the exchange ends in [`Error::Echo`].
+//! has a voltage: if the question itself comes back, the exchange ends in [`Failure::Echo`].
 
 use super::command::{Code, Command, ReadMotionStatus, ReadStatus, SetTorque};
 use super::doubt::{Admitted, Doubt, answers};
 use super::limits::Limits;
 use super::message::SetTorque4;
 use super::motor::{Dialect, MotorId, MotorSet, TORQUE4_ID};
-use super::outcome::{Counters, Error, Output, Refused};
+use super::outcome::{Counters, Failure, Output, RequestError};
 use crate::can::CanFrame;
 use crate::time::{Duration, Instant};
 
@@ -39,7 +39,7 @@ use crate::time::{Duration, Instant};
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_millis(50);
 /// How long after a timeout a late reply is awaited, and how long a motor that did not answer has to
 /// be silent, unless told otherwise.
-pub const DEFAULT_GUARD: Duration = Duration::from_millis(100);
+pub const DEFAULT_QUARANTINE: Duration = Duration::from_millis(100);
 
 #[derive(Debug, Clone, Copy)]
 struct Slot {
@@ -48,7 +48,7 @@ struct Slot {
     timeout: Duration,
     deadline: Instant,
     /// What came instead of the reply to this request: nothing, so far.
-    instead: Error,
+    instead: Failure,
     doubt: Doubt,
     limits: Limits,
 }
@@ -85,7 +85,7 @@ impl Host {
             data: [0; 8],
             timeout: DEFAULT_TIMEOUT,
             deadline: NEVER,
-            instead: Error::Timeout,
+            instead: Failure::Timeout,
             doubt: Doubt::UNKNOWN,
             limits: Limits { current: None, speed: None, angle: None },
         };
@@ -101,7 +101,7 @@ impl Host {
             torque4: None,
             earliest: NEVER,
             timeout: DEFAULT_TIMEOUT,
-            guard: DEFAULT_GUARD,
+            guard: DEFAULT_QUARANTINE,
             counters: Counters {
                 late: 0,
                 unasked: 0,
@@ -118,12 +118,17 @@ impl Host {
     /// taken as well.
     ///
     /// A motor that did not answer before may be asked for its status instead; the exchange ends in
-    /// [`Error::Quarantined`] then, or in a timeout.
+    /// [`Failure::Quarantined`] then, or in a timeout.
     ///
     /// # Errors
-    /// [`Refused`]; nothing is sent then. Off and Stop are taken and sent during a quarantine, unless
-    /// it is their own late reply that is awaited, for the guard time (docs/SPEC-NOTES.md R22).
-    pub fn request(&mut self, now: Instant, id: MotorId, data: [u8; 8]) -> Result<(), Refused> {
+    /// [`RequestError`]; nothing is sent then. Off and Stop are taken and sent during a quarantine, unless
+    /// it is their own late reply that is awaited, for the quarantine time (docs/SPEC-NOTES.md R22).
+    pub fn request(
+        &mut self,
+        now: Instant,
+        id: MotorId,
+        data: [u8; 8],
+    ) -> Result<(), RequestError> {
         self.request_within(now, id, data, self.timeout)
     }
 
@@ -137,8 +142,8 @@ impl Host {
         id: MotorId,
         data: [u8; 8],
         timeout: Duration,
-    ) -> Result<(), Refused> {
-        self.limits(id).check(&data).map_err(|exceeded| Refused::Limit { id, exceeded })?;
+    ) -> Result<(), RequestError> {
+        self.limits(id).check(&data).map_err(|exceeded| RequestError::Limit { id, exceeded })?;
         match self.admit(now, id, data)? {
             Admitted::Request => self.open(id, data, timeout),
             Admitted::Question => self.question(id, timeout),
@@ -160,24 +165,24 @@ impl Host {
     /// nothing else is sent.
     ///
     /// # Errors
-    /// [`Refused`]; nothing is sent then.
+    /// [`RequestError`]; nothing is sent then.
     pub fn set_torque4(
         &mut self,
         now: Instant,
         torques: SetTorque4,
         expect: MotorSet,
-    ) -> Result<(), Refused> {
+    ) -> Result<(), RequestError> {
         if let Some(id) = expect.without(MotorSet::TORQUE4).next() {
-            return Err(Refused::OutOfReach(id));
+            return Err(RequestError::OutOfReach(id));
         }
         if let Some(id) = self.busy().intersection(MotorSet::TORQUE4).next() {
-            return Err(Refused::Busy(id));
+            return Err(RequestError::Busy(id));
         }
         let data = SetTorque::default().encode();
         let mut admitted = Admitted::Request;
         for (id, torque) in MotorSet::TORQUE4.zip(torques.0) {
             let checked = self.limits(id).current(torque);
-            checked.map_err(|exceeded| Refused::Limit { id, exceeded })?;
+            checked.map_err(|exceeded| RequestError::Limit { id, exceeded })?;
             if expect.contains(id) && self.admit(now, id, data)? != Admitted::Request {
                 admitted = Admitted::Question;
             }
@@ -222,7 +227,7 @@ impl Host {
         if let Some(id) = self.replied.next() {
             let answer = self.slot(id).data;
             let result =
-                if self.questioned.contains(id) { Err(Error::Quarantined) } else { Ok(answer) };
+                if self.questioned.contains(id) { Err(Failure::Quarantined) } else { Ok(answer) };
             return Output::Done { id, result };
         }
         if let Some(id) = self.failed.next() {
@@ -301,14 +306,14 @@ impl Host {
         self.timeout = timeout;
     }
 
-    /// Sets the guard time: how long a motor is left alone from the next timeout on, and how long it
+    /// Sets the quarantine: how long a motor is left alone from the next timeout on, and how long it
     /// has to be silent.
-    pub const fn set_guard(&mut self, guard: Duration) {
+    pub const fn set_quarantine(&mut self, guard: Duration) {
         self.guard = guard;
     }
 
-    /// The guard time.
-    pub const fn guard(&self) -> Duration {
+    /// The quarantine time.
+    pub const fn quarantine(&self) -> Duration {
         self.guard
     }
 
@@ -339,8 +344,8 @@ impl Host {
         if self.in_flight.contains(id) && answers(slot.data[0], data[0]) {
             self.in_flight.remove(id);
             let wrong = match (Code::from(data[0]), slot.data == *data) {
-                (Code::ReadStatus, true) => Some(Error::Echo),
-                (code, false) if code.is_repeated() => Some(Error::Altered),
+                (Code::ReadStatus, true) => Some(Failure::Echo),
+                (code, false) if code.is_repeated() => Some(Failure::Altered),
                 _ => None,
             };
             if let Some(wrong) = wrong {
@@ -379,13 +384,18 @@ impl Host {
         let asked = self.in_flight.contains(id);
         let slot = self.slot(id);
         if asked && slot.data[0] == data[0] {
-            slot.instead = Error::Foreign(dialect);
+            slot.instead = Failure::Foreign(dialect);
         }
     }
 
-    fn admit(&mut self, now: Instant, id: MotorId, data: [u8; 8]) -> Result<Admitted, Refused> {
+    fn admit(
+        &mut self,
+        now: Instant,
+        id: MotorId,
+        data: [u8; 8],
+    ) -> Result<Admitted, RequestError> {
         if self.busy().contains(id) {
-            return Err(Refused::Busy(id));
+            return Err(RequestError::Busy(id));
         }
         let guard = self.guard;
         let doubt = &mut self.slot(id).doubt;
@@ -394,7 +404,7 @@ impl Host {
         if !was_trusted && admitted == Ok(Admitted::Request) {
             self.strays.remove(id);
         }
-        admitted.map_err(|until| Refused::Quarantined { id, until })
+        admitted.map_err(|until| RequestError::Quarantined { id, until })
     }
 
     fn question(&mut self, id: MotorId, timeout: Duration) {
@@ -406,7 +416,7 @@ impl Host {
         let slot = self.slot(id);
         slot.data = data;
         slot.timeout = timeout;
-        slot.instead = Error::Timeout;
+        slot.instead = Failure::Timeout;
         self.questioned.remove(id);
     }
 

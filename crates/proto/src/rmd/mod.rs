@@ -5,7 +5,7 @@
 //! currents for motors 1 to 4 at once (chapter 4).
 //!
 //! * [`Host`] sends requests to many motors and finds the reply to each.
-//! * [`Drive`] answers, and tells a [`Motor`] what to do.
+//! * [`Drive`] answers, and tells a [`MotorControl`] what to do.
 //! * [`COMMANDS`] is the list of commands with the place and unit of each value; there is a type
 //!   for each request and reply, which [`Command`] ties together.
 //! * [`describe`] puts a frame into words.
@@ -29,7 +29,7 @@
 //! let status = MotionStatus::decode(&reply);
 //! assert_eq!(status.iq.amps(), 16.5);
 //! assert_eq!(EncoderBits::default().degrees(status.encoder), 90.0);
-//! # Ok::<(), Refused>(())
+//! # Ok::<(), RequestError>(())
 //! ```
 
 mod command;
@@ -47,12 +47,12 @@ mod reply;
 
 pub use command::*;
 pub use describe::{Described, Direction, describe};
-pub use drive::{Config, Drive, Ignored, Mode, Motor, Sense, Settings};
+pub use drive::{Drive, DriveConfig, Ignored, Mode, MotorControl, Sense, Settings};
 pub use encoder::{EncoderBits, FULL_TURN};
-pub use host::{DEFAULT_GUARD, DEFAULT_TIMEOUT, Host, question_behind};
+pub use host::{DEFAULT_QUARANTINE, DEFAULT_TIMEOUT, Host, question_behind};
 pub use limits::{Exceeded, Limits};
 pub use message::*;
 pub use motor::{Dialect, IDENTIFIERS, MOTOR_BASE, MotorId, MotorSet, TORQUE4_ID};
-pub use outcome::{Counters, Error, Output, Refused};
+pub use outcome::{Counters, Failure, Output, RequestError};
 pub use payload::{Field, Meaning, Payload};
 pub use reply::*;

@@ -16,7 +16,7 @@ pub enum Output {
         /// The motor.
         id: MotorId,
         /// The eight bytes of its reply.
-        result: Result<[u8; 8], Error>,
+        result: Result<[u8; 8], Failure>,
     },
     /// Nothing more to do until a frame comes or this moment, at which to poll again.
     Wait(Option<Instant>),
@@ -25,7 +25,7 @@ pub enum Output {
 /// Why an exchange failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Error {
+pub enum Failure {
     /// No reply in time. An unknown command gets none either.
     Timeout,
     /// No reply of this protocol, and a reply to the same command in another one.
@@ -34,7 +34,7 @@ pub enum Error {
     /// not known.
     Altered,
     /// The motor was asked for its status instead, because it had not answered before or was not asked
-    /// anything yet, and it answered. Ask again; it is trusted when it was silent for the guard time.
+    /// anything yet, and it answered. Ask again; it is trusted when it was silent for the quarantine time.
     /// Nothing else was sent, unless it was an Off or a Stop to a motor that was not asked yet.
     Quarantined,
     /// What was sent came back: an adapter echoes, or another host asks the same. It is not known what
@@ -44,7 +44,7 @@ pub enum Error {
 
 /// Why a request was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Refused {
+pub enum RequestError {
     /// This motor's exchange is not over.
     Busy(MotorId),
     /// This motor may still answer an exchange that timed out.
@@ -82,44 +82,44 @@ pub struct Counters {
     pub last_foreign: Option<(Dialect, MotorId)>,
 }
 
-impl fmt::Display for Error {
+impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Error::Timeout => f.write_str("no reply in time; check supply, ID and bit rate"),
-            Error::Foreign(dialect) => {
+            Failure::Timeout => f.write_str("no reply in time; check supply, ID and bit rate"),
+            Failure::Foreign(dialect) => {
                 write!(f, "the motor answers in {dialect}, not V1.62; use a host of that protocol")
             }
-            Error::Altered => f.write_str(
+            Failure::Altered => f.write_str(
                 "the reply has another content than the request that it repeats; it is not known what \
                  the motor did",
             ),
-            Error::Quarantined => f.write_str(
-                "the motor was asked for its status first and answers; ask again after the guard time",
+            Failure::Quarantined => f.write_str(
+                "the motor was asked for its status first and answers; ask again after the quarantine time",
             ),
-            Error::Echo => f.write_str(
+            Failure::Echo => f.write_str(
                 "what was sent came back; the adapter echoes, or another host asks the same",
             ),
         }
     }
 }
 
-impl core::error::Error for Error {}
+impl core::error::Error for Failure {}
 
-impl fmt::Display for Refused {
+impl fmt::Display for RequestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Refused::Busy(id) => {
+            RequestError::Busy(id) => {
                 write!(f, "motor {id} has an exchange under way; wait for its result")
             }
-            Refused::Quarantined { id, .. } => {
-                write!(f, "motor {id} may still answer late; try again after the guard time")
+            RequestError::Quarantined { id, .. } => {
+                write!(f, "motor {id} may still answer late; try again after the quarantine time")
             }
-            Refused::Limit { id, exceeded } => write!(f, "motor {id}: {exceeded}"),
-            Refused::OutOfReach(id) => {
+            RequestError::Limit { id, exceeded } => write!(f, "motor {id}: {exceeded}"),
+            RequestError::OutOfReach(id) => {
                 write!(f, "the torque frame does not reach motor {id}; use IDs 1 to 4")
             }
         }
     }
 }
 
-impl core::error::Error for Refused {}
+impl core::error::Error for RequestError {}

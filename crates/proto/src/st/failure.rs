@@ -4,7 +4,7 @@ use super::{Bad, ErrorCode, Profile};
 
 /// Why an exchange did not end in a positive acknowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Error {
+pub enum ExchangeError {
     /// The drive said no.
     Refused(ErrorCode),
     /// There is no answer to trust: it is not known whether the drive did what was asked.
@@ -47,11 +47,11 @@ pub enum Failure {
     Echo,
 }
 
-impl core::fmt::Display for Error {
+impl core::fmt::Display for ExchangeError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Error::Refused(code) => write!(f, "refused with {code}: {}", code.doc()),
-            Error::Failed(failure) => failure.fmt(f),
+            ExchangeError::Refused(code) => write!(f, "refused with {code}: {}", code.doc()),
+            ExchangeError::Failed(failure) => failure.fmt(f),
         }
     }
 }
@@ -88,4 +88,4 @@ impl core::fmt::Display for Failure {
     }
 }
 
-impl core::error::Error for Error {}
+impl core::error::Error for ExchangeError {}

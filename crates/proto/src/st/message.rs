@@ -67,34 +67,34 @@ pub enum Request<'a> {
     /// GET_REG (4.5).
     GetRegister(RegisterId),
     /// EXECUTE_CMD (4.6).
-    Execute(Command),
+    ExecuteCommand(Command),
     /// GET_BOARD_INFO (4.7).
-    BoardInfo,
+    GetBoardInfo,
     /// SET_RAMP (4.8).
-    Ramp(Ramp),
+    SetRamp(Ramp),
     /// GET_REVUP_DATA (4.9): the phase, 0 to 4.
-    RevupData(u8),
+    GetRevupData(u8),
     /// SET_REVUP_DATA (4.10): the phase, 0 to 4, and its data.
     SetRevupData(u8, RevupPhase),
     /// SET_CURRENT_REF (4.11).
-    CurrentReference(CurrentReference),
+    SetCurrentReference(CurrentReference),
     /// GET_MP_INFO (profile `mcsdk-5.4`): numbers of profiler steps.
-    ProfilerInfo(&'a [u8]),
+    GetProfilerInfo(&'a [u8]),
     /// GET_FW_VERSION (4.12).
-    FirmwareVersion,
+    GetFirmwareVersion,
     /// GET_DATA_ELEMENT (profile `spec`): the segment.
-    DataElement(u8),
+    GetSegment(u8),
     /// CONFIG_DYN_STRUCT (profile `spec`).
-    ConfigDynStruct {
+    ConfigureSegment {
         /// Which segment.
         segment: u8,
         /// The ids of its registers, at most 32.
         registers: &'a [u8],
     },
     /// SET_TORQUE_RAMP (profile `mcsdk-5.4`).
-    TorqueRamp(TorqueRamp),
+    SetTorqueRamp(TorqueRamp),
     /// SET_POSITION_CMD (profile `mcsdk-5.4`).
-    Position(PositionMove),
+    SetPosition(PositionMove),
 }
 
 /// What a drive replied.
@@ -137,18 +137,18 @@ impl<'a> Request<'a> {
         match self {
             Request::SetRegister { .. } => FrameCode::SetReg,
             Request::GetRegister(_) => FrameCode::GetReg,
-            Request::Execute(_) => FrameCode::ExecuteCmd,
-            Request::BoardInfo => FrameCode::GetBoardInfo,
-            Request::Ramp(_) => FrameCode::SetRamp,
-            Request::RevupData(_) => FrameCode::GetRevupData,
+            Request::ExecuteCommand(_) => FrameCode::ExecuteCmd,
+            Request::GetBoardInfo => FrameCode::GetBoardInfo,
+            Request::SetRamp(_) => FrameCode::SetRamp,
+            Request::GetRevupData(_) => FrameCode::GetRevupData,
             Request::SetRevupData(..) => FrameCode::SetRevupData,
-            Request::CurrentReference(_) => FrameCode::SetCurrentRef,
-            Request::ProfilerInfo(_) => FrameCode::GetMpInfo,
-            Request::FirmwareVersion => FrameCode::GetFwVersion,
-            Request::DataElement(_) => FrameCode::GetDataElement,
-            Request::ConfigDynStruct { .. } => FrameCode::ConfigDynStruct,
-            Request::TorqueRamp(_) => FrameCode::SetTorqueRamp,
-            Request::Position(_) => FrameCode::SetPositionCmd,
+            Request::SetCurrentReference(_) => FrameCode::SetCurrentRef,
+            Request::GetProfilerInfo(_) => FrameCode::GetMpInfo,
+            Request::GetFirmwareVersion => FrameCode::GetFwVersion,
+            Request::GetSegment(_) => FrameCode::GetDataElement,
+            Request::ConfigureSegment { .. } => FrameCode::ConfigDynStruct,
+            Request::SetTorqueRamp(_) => FrameCode::SetTorqueRamp,
+            Request::SetPosition(_) => FrameCode::SetPositionCmd,
         }
     }
 
@@ -159,25 +159,25 @@ impl<'a> Request<'a> {
         match *self {
             Request::SetRegister { register, value } => payload.byte(register.0).bytes(value),
             Request::GetRegister(register) => payload.byte(register.0),
-            Request::Execute(command) => payload.byte(command.into()),
-            Request::BoardInfo | Request::FirmwareVersion => &mut payload,
-            Request::Ramp(ramp) => {
+            Request::ExecuteCommand(command) => payload.byte(command.into()),
+            Request::GetBoardInfo | Request::GetFirmwareVersion => &mut payload,
+            Request::SetRamp(ramp) => {
                 payload.bytes(&ramp.speed_rpm.to_le_bytes()).bytes(&ramp.duration_ms.to_le_bytes())
             }
-            Request::TorqueRamp(ramp) => payload
+            Request::SetTorqueRamp(ramp) => payload
                 .bytes(&ramp.torque_s16a.to_le_bytes())
                 .bytes(&ramp.duration_ms.to_le_bytes()),
-            Request::RevupData(phase) => payload.byte(phase),
+            Request::GetRevupData(phase) => payload.byte(phase),
             Request::SetRevupData(phase, data) => payload.byte(phase).bytes(&data.to_bytes()),
-            Request::CurrentReference(reference) => payload
+            Request::SetCurrentReference(reference) => payload
                 .bytes(&reference.iq_s16a.to_le_bytes())
                 .bytes(&reference.id_s16a.to_le_bytes()),
-            Request::ProfilerInfo(steps) => payload.bytes(steps),
-            Request::DataElement(segment) => payload.byte(segment),
-            Request::ConfigDynStruct { segment, registers } => {
+            Request::GetProfilerInfo(steps) => payload.bytes(steps),
+            Request::GetSegment(segment) => payload.byte(segment),
+            Request::ConfigureSegment { segment, registers } => {
                 payload.byte(segment).bytes(registers)
             }
-            Request::Position(target) => payload
+            Request::SetPosition(target) => payload
                 .bytes(&target.angle_rad.to_le_bytes())
                 .bytes(&target.duration_s.to_le_bytes()),
         };
@@ -203,36 +203,36 @@ impl<'a> Request<'a> {
                 Request::SetRegister { register: RegisterId(*id), value }
             }
             (FrameCode::GetReg, [id, ..]) => Request::GetRegister(RegisterId(*id)),
-            (FrameCode::ExecuteCmd, [id, ..]) => Request::Execute(Command::from(*id)),
-            (FrameCode::GetBoardInfo, _) => Request::BoardInfo,
-            (FrameCode::GetFwVersion, _) => Request::FirmwareVersion,
-            (FrameCode::SetRamp, &[a, b, c, d, e, f, ..]) => Request::Ramp(Ramp {
+            (FrameCode::ExecuteCmd, [id, ..]) => Request::ExecuteCommand(Command::from(*id)),
+            (FrameCode::GetBoardInfo, _) => Request::GetBoardInfo,
+            (FrameCode::GetFwVersion, _) => Request::GetFirmwareVersion,
+            (FrameCode::SetRamp, &[a, b, c, d, e, f, ..]) => Request::SetRamp(Ramp {
                 speed_rpm: i32::from_le_bytes([a, b, c, d]),
                 duration_ms: u16::from_le_bytes([e, f]),
             }),
             (FrameCode::SetTorqueRamp, &[a, b, c, d, e, f, ..]) => {
-                Request::TorqueRamp(TorqueRamp {
+                Request::SetTorqueRamp(TorqueRamp {
                     torque_s16a: i32::from_le_bytes([a, b, c, d]),
                     duration_ms: u16::from_le_bytes([e, f]),
                 })
             }
-            (FrameCode::GetRevupData, [phase, ..]) => Request::RevupData(*phase),
+            (FrameCode::GetRevupData, [phase, ..]) => Request::GetRevupData(*phase),
             (FrameCode::SetRevupData, [phase, data @ ..]) => {
                 Request::SetRevupData(*phase, RevupPhase::decode(data)?)
             }
             (FrameCode::SetCurrentRef, &[a, b, c, d, ..]) => {
-                Request::CurrentReference(CurrentReference {
+                Request::SetCurrentReference(CurrentReference {
                     iq_s16a: i16::from_le_bytes([a, b]),
                     id_s16a: i16::from_le_bytes([c, d]),
                 })
             }
-            (FrameCode::GetMpInfo, steps) => Request::ProfilerInfo(steps),
-            (FrameCode::GetDataElement, [segment, ..]) => Request::DataElement(*segment),
+            (FrameCode::GetMpInfo, steps) => Request::GetProfilerInfo(steps),
+            (FrameCode::GetDataElement, [segment, ..]) => Request::GetSegment(*segment),
             (FrameCode::ConfigDynStruct, [segment, registers @ ..]) => {
-                Request::ConfigDynStruct { segment: *segment, registers }
+                Request::ConfigureSegment { segment: *segment, registers }
             }
             (FrameCode::SetPositionCmd, &[a, b, c, d, e, f, g, h, ..]) => {
-                Request::Position(PositionMove {
+                Request::SetPosition(PositionMove {
                     angle_rad: f32::from_le_bytes([a, b, c, d]),
                     duration_s: f32::from_le_bytes([e, f, g, h]),
                 })
@@ -251,19 +251,19 @@ impl<'a> Request<'a> {
                     |shape: &Shape| shape.read_size(profile, Features::NONE.with(shape.feature));
                 shape.and_then(read).map_or(ReplySize::Value, ReplySize::Exactly)
             }
-            Request::RevupData(_) => ReplySize::Exactly(RevupPhase::SIZE as u8),
-            Request::BoardInfo
-            | Request::FirmwareVersion
-            | Request::DataElement(_)
-            | Request::ProfilerInfo(_) => ReplySize::Any,
+            Request::GetRevupData(_) => ReplySize::Exactly(RevupPhase::SIZE as u8),
+            Request::GetBoardInfo
+            | Request::GetFirmwareVersion
+            | Request::GetSegment(_)
+            | Request::GetProfilerInfo(_) => ReplySize::Any,
             Request::SetRegister { .. }
-            | Request::Execute(_)
-            | Request::Ramp(_)
+            | Request::ExecuteCommand(_)
+            | Request::SetRamp(_)
             | Request::SetRevupData(..)
-            | Request::CurrentReference(_)
-            | Request::ConfigDynStruct { .. }
-            | Request::TorqueRamp(_)
-            | Request::Position(_) => ReplySize::Exactly(0),
+            | Request::SetCurrentReference(_)
+            | Request::ConfigureSegment { .. }
+            | Request::SetTorqueRamp(_)
+            | Request::SetPosition(_) => ReplySize::Exactly(0),
         }
     }
 

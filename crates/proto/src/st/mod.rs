@@ -7,7 +7,7 @@
 //! * [`Request`], [`Reply`] and the types of [`message`] are the messages, which know nothing of frames
 //!   (chapter 4). [`Frame::command`] puts a request into its frame.
 //! * [`register`] is table 3 as typed constants, [`RegisterId`] the same by number.
-//! * [`Master`] conducts one exchange at a time; [`Slave`] answers for a [`Drive`].
+//! * [`Master`] conducts one exchange at a time; [`Slave`] answers for a [`MotorControl`].
 //!
 //! A drive with one motor and nothing but a speed, as firmware or a test would have it:
 //!
@@ -17,13 +17,13 @@
 //!
 //! struct Fan { rpm: i32, running: bool }
 //!
-//! impl Drive for Fan {
-//!     fn features(&self, _: Motor) -> Features { Features::NONE }
+//! impl MotorControl for Fan {
+//!     fn features(&self, _: MotorNumber) -> Features { Features::NONE }
 //!     fn version(&self) -> Version<'_> {
 //!         Version { name: "Fan", major: 1, minor: 0, patch: 0, pre_release: "" }
 //!     }
 //!     // Registers that this drive has nothing to say about read as 0.
-//!     fn read(&mut self, _: Motor, register: RegisterId) -> i32 {
+//!     fn read(&mut self, _: MotorNumber, register: RegisterId) -> i32 {
 //!         match register {
 //!             RegisterId::STATUS if self.running => u8::from(Status::Run).into(),
 //!             RegisterId::STATUS => u8::from(Status::Idle).into(),
@@ -31,24 +31,24 @@
 //!             _ => 0,
 //!         }
 //!     }
-//!     fn write(&mut self, _: Motor, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
+//!     fn write(&mut self, _: MotorNumber, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
 //!         Err(ErrorCode::WrongSet)
 //!     }
-//!     fn execute(&mut self, _: Motor, command: Command) {
+//!     fn execute(&mut self, _: MotorNumber, command: Command) {
 //!         match command {
 //!             Command::StartMotor => self.running = true,
 //!             Command::StopMotor => self.running = false,
 //!             _ => {}
 //!         }
 //!     }
-//!     fn ramp(&mut self, _: Motor, ramp: Ramp) { self.rpm = ramp.speed_rpm; }
-//!     fn revup(&mut self, _: Motor, _: u8) -> RevupPhase { RevupPhase::default() }
-//!     fn set_revup(&mut self, _: Motor, _: u8, _: RevupPhase) {}
-//!     fn current_reference(&mut self, _: Motor, _: CurrentReference) {}
+//!     fn ramp(&mut self, _: MotorNumber, ramp: Ramp) { self.rpm = ramp.speed_rpm; }
+//!     fn revup(&mut self, _: MotorNumber, _: u8) -> RevupPhase { RevupPhase::default() }
+//!     fn set_revup(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
+//!     fn current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
 //! }
 //!
 //! let mut fan = Fan { rpm: 0, running: false };
-//! let mut slave = Slave::new(Profile::Spec, Motor::FIRST);
+//! let mut slave = Slave::new(Profile::Spec, MotorNumber::FIRST);
 //! // For each byte of the UART: send what comes back. When `deadline` has passed: `poll`.
 //! let mut sent = Vec::new();
 //! for byte in [0x07, 0x06, 0xDC, 0x05, 0x00, 0x00, 0xE8, 0x03, 0xDA] {
@@ -75,11 +75,12 @@ pub use code::{
     Command, ControlMode, ErrorCode, Flags, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
     NoSuchProfile, Profile, Status,
 };
-pub use drive::{Drive, Motor};
-pub use failure::{Error, Failure};
+pub use drive::{MotorControl, MotorNumber};
+pub use failure::{ExchangeError, Failure};
 pub use frame::{Bad, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
 pub use master::{
-    Config, Counters, Line, Master, Output, Recovery, RequestError, TIMEOUT, question_behind,
+    Counters, Master, MasterConfig, Output, Recovery, RequestError, SyncState, TIMEOUT,
+    question_behind,
 };
 pub use message::{
     BoardInfo, CurrentReference, FirmwareVersion, PositionMove, REVUP_PHASES, Ramp, Reply,

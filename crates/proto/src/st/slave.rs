@@ -3,9 +3,9 @@
 use super::payload::Payload;
 use super::register::{Shape, Type, Unit, Writing};
 use super::{
-    BoardInfo, Command, Drive, ErrorCode, Feature, Features, FirmwareVersion, Frame, FrameCode,
-    HEADER_ACK, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD, Motor, Parse, Profile, REVUP_PHASES,
-    RegisterId, Request, frame,
+    BoardInfo, Command, ErrorCode, Feature, Features, FirmwareVersion, Frame, FrameCode,
+    HEADER_ACK, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD, MotorControl, MotorNumber, Parse, Profile,
+    REVUP_PHASES, RegisterId, Request, frame,
 };
 use crate::time::{Duration, Instant};
 
@@ -17,7 +17,7 @@ pub const SEGMENTS: usize = 4;
 pub const SEGMENT_REGISTERS: usize = 32;
 
 /// The slave's end of the protocol: collects a command, checks checksum, motor and frame code in
-/// this order (4.1), lets the [`Drive`] work, answers.
+/// this order (4.1), lets the [`MotorControl`] work, answers.
 ///
 /// The caller hands in every byte with the time at which it came, calls [`poll`](Self::poll) at
 /// [`deadline`](Self::deadline), and sends each returned reply before it hands in the next byte:
@@ -26,7 +26,7 @@ pub const SEGMENT_REGISTERS: usize = 32;
 pub struct Slave {
     profile: Profile,
     motors: u8,
-    current: Motor,
+    current: MotorNumber,
     /// The command so far, then the reply to it.
     buffer: [u8; MAX_FRAME],
     received: u8,
@@ -38,11 +38,11 @@ pub struct Slave {
 
 impl Slave {
     /// A slave for a drive with motors 1 to `motors`. Motor 1 is the current one (3.2).
-    pub const fn new(profile: Profile, motors: Motor) -> Self {
+    pub const fn new(profile: Profile, motors: MotorNumber) -> Self {
         Slave {
             profile,
             motors: motors.number(),
-            current: Motor::FIRST,
+            current: MotorNumber::FIRST,
             buffer: [0; MAX_FRAME],
             received: 0,
             deaf: false,
@@ -57,7 +57,7 @@ impl Slave {
     }
 
     /// The motor that motor number 0 addresses (3.2).
-    pub const fn current_motor(&self) -> Motor {
+    pub const fn current_motor(&self) -> MotorNumber {
         self.current
     }
 
@@ -83,7 +83,12 @@ impl Slave {
 
     /// Takes a byte that came at `now`; gives the reply when it completes a command. A byte that
     /// comes after the deadline begins a new command, behind the NACK that the old one is owed.
-    pub fn receive(&mut self, now: Instant, byte: u8, drive: &mut impl Drive) -> Option<&[u8]> {
+    pub fn receive(
+        &mut self,
+        now: Instant,
+        byte: u8,
+        drive: &mut impl MotorControl,
+    ) -> Option<&[u8]> {
         let expired = self.poll(now).is_some();
         let size = self.take(now, byte);
         if expired {
@@ -141,7 +146,11 @@ impl Slave {
 
     /// Motor, frame code, work: in this order (4.1). Gives the size of the ACK's payload, which
     /// then stands in the buffer.
-    fn process(&mut self, frame: &Frame<'_>, drive: &mut impl Drive) -> Result<usize, ErrorCode> {
+    fn process(
+        &mut self,
+        frame: &Frame<'_>,
+        drive: &mut impl MotorControl,
+    ) -> Result<usize, ErrorCode> {
         if frame.motor() != 0 {
             self.select(frame.motor()).ok_or(ErrorCode::BadMotorSelected)?;
         }
@@ -165,14 +174,16 @@ impl Slave {
                 let size = size.ok_or(ErrorCode::GetWriteOnly)?;
                 out.value(read(self.profile, motor, register, shape, drive), size);
             }
-            Request::Execute(command) => execute(self.profile, motor, command, features, drive)?,
-            Request::BoardInfo => BoardInfo::encode(self.profile, &drive.version(), &mut out),
-            Request::FirmwareVersion => FirmwareVersion::encode(&drive.version(), &mut out),
-            Request::Ramp(mut ramp) => {
+            Request::ExecuteCommand(command) => {
+                execute(self.profile, motor, command, features, drive)?
+            }
+            Request::GetBoardInfo => BoardInfo::encode(self.profile, &drive.version(), &mut out),
+            Request::GetFirmwareVersion => FirmwareVersion::encode(&drive.version(), &mut out),
+            Request::SetRamp(mut ramp) => {
                 ramp.speed_rpm = speed(self.profile, ramp.speed_rpm);
                 drive.ramp(motor, ramp);
             }
-            Request::RevupData(phase) => {
+            Request::GetRevupData(phase) => {
                 let phase = revup_phase(phase)?;
                 let mut data = drive.revup(motor, phase);
                 data.speed_rpm = speed(self.profile, data.speed_rpm);
@@ -182,8 +193,8 @@ impl Slave {
                 data.speed_rpm = speed(self.profile, data.speed_rpm);
                 drive.set_revup(motor, revup_phase(phase)?, data);
             }
-            Request::CurrentReference(reference) => drive.current_reference(motor, reference),
-            Request::ProfilerInfo(steps) => {
+            Request::SetCurrentReference(reference) => drive.current_reference(motor, reference),
+            Request::GetProfilerInfo(steps) => {
                 if !features.has(Feature::Profiler) {
                     return Err(ErrorCode::MpNotEnabled);
                 }
@@ -192,7 +203,7 @@ impl Slave {
                     out.byte(registers.len() as u8).bytes(registers);
                 }
             }
-            Request::DataElement(segment) => {
+            Request::GetSegment(segment) => {
                 let segment = self.segments.get(usize::from(segment)).ok_or(ErrorCode::WrongSet)?;
                 for register in segment.registers() {
                     let shape = register.shape().ok_or(ErrorCode::GetWriteOnly)?;
@@ -200,7 +211,7 @@ impl Slave {
                     out.value(read(self.profile, motor, register, shape, drive), size);
                 }
             }
-            Request::ConfigDynStruct { segment, registers } => {
+            Request::ConfigureSegment { segment, registers } => {
                 let slot = self.segments.get_mut(usize::from(segment));
                 let fits = |&id: &u8| {
                     RegisterId(id)
@@ -210,15 +221,15 @@ impl Slave {
                 let chosen = Segment::of(registers).filter(|_| registers.iter().all(fits));
                 *slot.ok_or(ErrorCode::WrongSet)? = chosen.ok_or(ErrorCode::WrongSet)?;
             }
-            Request::TorqueRamp(ramp) => drive.torque_ramp(motor, ramp),
-            Request::Position(target) => drive.position(motor, target),
+            Request::SetTorqueRamp(ramp) => drive.torque_ramp(motor, ramp),
+            Request::SetPosition(target) => drive.position(motor, target),
         }
         out.finish().ok_or(ErrorCode::WrongSet)
     }
 
     /// Makes a motor the current one, if it exists (3.2).
     fn select(&mut self, number: u8) -> Option<()> {
-        let motor = Motor::new(number).filter(|motor| motor.number() <= self.motors)?;
+        let motor = MotorNumber::new(number).filter(|motor| motor.number() <= self.motors)?;
         self.current = motor;
         Some(())
     }
@@ -227,10 +238,10 @@ impl Slave {
     /// not carry keep what the register had in profile `spec` and refuse it in `mcsdk-5.4`.
     fn write(
         &mut self,
-        motor: Motor,
+        motor: MotorNumber,
         register: RegisterId,
         value: &[u8],
-        drive: &mut impl Drive,
+        drive: &mut impl MotorControl,
     ) -> Result<(), ErrorCode> {
         let shape = register.shape().ok_or(ErrorCode::SetReadOnly)?;
         let features = drive.features(motor);
@@ -286,10 +297,10 @@ impl Slave {
 /// EXECUTE_CMD (4.6).
 fn execute(
     profile: Profile,
-    motor: Motor,
+    motor: MotorNumber,
     command: Command,
     features: Features,
-    drive: &mut impl Drive,
+    drive: &mut impl MotorControl,
 ) -> Result<(), ErrorCode> {
     let firmware = profile == Profile::Mcsdk54;
     let (possible, command) = match command {
@@ -312,10 +323,10 @@ fn execute(
 /// A register's value as it goes on the wire.
 fn read(
     profile: Profile,
-    motor: Motor,
+    motor: MotorNumber,
     register: RegisterId,
     shape: &Shape,
-    drive: &mut impl Drive,
+    drive: &mut impl MotorControl,
 ) -> i32 {
     if register == RegisterId::TARGET_MOTOR {
         return i32::from(motor.number() - 1);

@@ -40,59 +40,64 @@ impl Memory {
     }
 }
 
-impl Drive for Memory {
-    fn features(&self, _: Motor) -> Features {
+impl MotorControl for Memory {
+    fn features(&self, _: MotorNumber) -> Features {
         self.features.unwrap_or_else(all_features)
     }
     fn version(&self) -> Version<'_> {
         Version { name: "ST MC SDK", major: 5, minor: 4, patch: 3, pre_release: "" }
     }
-    fn read(&mut self, motor: Motor, register: RegisterId) -> i32 {
+    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         self.value(motor.number(), register)
     }
-    fn write(&mut self, motor: Motor, register: RegisterId, value: i32) -> Result<(), ErrorCode> {
+    fn write(
+        &mut self,
+        motor: MotorNumber,
+        register: RegisterId,
+        value: i32,
+    ) -> Result<(), ErrorCode> {
         self.set(motor.number(), register, value);
         Ok(())
     }
-    fn execute(&mut self, motor: Motor, command: Command) {
+    fn execute(&mut self, motor: MotorNumber, command: Command) {
         self.log.push(format!("{command} {}", motor.number()));
     }
-    fn ramp(&mut self, motor: Motor, ramp: Ramp) {
+    fn ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
         self.log.push(format!("ramp {} {} {}", motor.number(), ramp.speed_rpm, ramp.duration_ms));
     }
-    fn revup(&mut self, _: Motor, phase: u8) -> RevupPhase {
+    fn revup(&mut self, _: MotorNumber, phase: u8) -> RevupPhase {
         self.revup[usize::from(phase)]
     }
-    fn set_revup(&mut self, _: Motor, phase: u8, data: RevupPhase) {
+    fn set_revup(&mut self, _: MotorNumber, phase: u8, data: RevupPhase) {
         self.revup[usize::from(phase)] = data;
     }
-    fn current_reference(&mut self, motor: Motor, r: CurrentReference) {
+    fn current_reference(&mut self, motor: MotorNumber, r: CurrentReference) {
         self.log.push(format!("current {} {} {}", motor.number(), r.iq_s16a, r.id_s16a));
     }
-    fn torque_ramp(&mut self, motor: Motor, ramp: TorqueRamp) {
+    fn torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
         let TorqueRamp { torque_s16a, duration_ms } = ramp;
         self.log.push(format!("torque ramp {} {torque_s16a} {duration_ms}", motor.number()));
     }
-    fn position(&mut self, motor: Motor, target: PositionMove) {
+    fn position(&mut self, motor: MotorNumber, target: PositionMove) {
         let PositionMove { angle_rad, duration_s } = target;
         self.log.push(format!("position {} {angle_rad} {duration_s}", motor.number()));
     }
-    fn profiler_step(&self, _: Motor, step: u8) -> &[u8] {
+    fn profiler_step(&self, _: MotorNumber, step: u8) -> &[u8] {
         if step == 1 { &[0x66, 0x67] } else { &[] }
     }
 }
 
 /// A slave and its drive on a line where bytes take no time.
-pub struct Bench {
+pub struct SlaveFixture {
     pub slave: Slave,
     pub drive: Memory,
     pub now: Instant,
 }
 
-impl Bench {
+impl SlaveFixture {
     pub fn new(profile: Profile, motors: u8, drive: Memory) -> Self {
-        let slave = Slave::new(profile, Motor::new(motors).unwrap());
-        Bench { slave, drive, now: Instant(0) }
+        let slave = Slave::new(profile, MotorNumber::new(motors).unwrap());
+        SlaveFixture { slave, drive, now: Instant(0) }
     }
 
     /// What the slave answers to bytes that come at once.

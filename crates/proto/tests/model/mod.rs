@@ -9,7 +9,8 @@ use motorlink_proto::st::register::{
     Access, Feature, Features, Origin, Shape, Type, Unit, Writing,
 };
 use motorlink_proto::st::{
-    CurrentReference, Motor, PositionMove, Profile, Ramp, RegisterId, RevupPhase, Slave, TorqueRamp,
+    CurrentReference, MotorNumber, PositionMove, Profile, Ramp, RegisterId, RevupPhase, Slave,
+    TorqueRamp,
 };
 use motorlink_proto::time::Instant;
 pub use plant::Plant;
@@ -38,7 +39,7 @@ pub struct Twins {
 
 impl Twins {
     pub fn new(profile: Profile, motors: u8) -> Self {
-        let slave = Slave::new(profile, Motor::new(motors).expect("1 to 7"));
+        let slave = Slave::new(profile, MotorNumber::new(motors).expect("1 to 7"));
         Twins { slave, drive: Plant::default(), model: Model::new(profile, motors), now: 0 }
     }
 

@@ -63,42 +63,47 @@ impl Plant {
     }
 }
 
-impl Drive for Plant {
-    fn features(&self, motor: Motor) -> Features {
+impl MotorControl for Plant {
+    fn features(&self, motor: MotorNumber) -> Features {
         let there = Feature::ALL.iter().filter(|feature| Plant::has(motor.number(), **feature));
         there.fold(Features::NONE, |set, &feature| set.with(feature))
     }
     fn version(&self) -> Version<'_> {
         Version { name: "ST MC SDK", major: 5, minor: 4, patch: 3, pre_release: "RC2" }
     }
-    fn read(&mut self, motor: Motor, register: RegisterId) -> i32 {
+    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         self.value(motor.number(), register.0)
     }
-    fn write(&mut self, motor: Motor, register: RegisterId, value: i32) -> Result<(), ErrorCode> {
+    fn write(
+        &mut self,
+        motor: MotorNumber,
+        register: RegisterId,
+        value: i32,
+    ) -> Result<(), ErrorCode> {
         self.set(motor.number(), register.0, value)
     }
-    fn execute(&mut self, motor: Motor, command: Command) {
+    fn execute(&mut self, motor: MotorNumber, command: Command) {
         self.note(motor.number(), ("command", command.number()));
     }
-    fn ramp(&mut self, motor: Motor, ramp: Ramp) {
+    fn ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
         self.note(motor.number(), ramp);
     }
-    fn revup(&mut self, motor: Motor, phase: u8) -> RevupPhase {
+    fn revup(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
         self.phase(motor.number(), phase)
     }
-    fn set_revup(&mut self, motor: Motor, phase: u8, data: RevupPhase) {
+    fn set_revup(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
         self.set_phase(motor.number(), phase, data);
     }
-    fn current_reference(&mut self, motor: Motor, reference: CurrentReference) {
+    fn current_reference(&mut self, motor: MotorNumber, reference: CurrentReference) {
         self.note(motor.number(), reference);
     }
-    fn torque_ramp(&mut self, motor: Motor, ramp: TorqueRamp) {
+    fn torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
         self.note(motor.number(), ramp);
     }
-    fn position(&mut self, motor: Motor, target: PositionMove) {
+    fn position(&mut self, motor: MotorNumber, target: PositionMove) {
         self.note(motor.number(), target);
     }
-    fn profiler_step(&self, _: Motor, step: u8) -> &[u8] {
+    fn profiler_step(&self, _: MotorNumber, step: u8) -> &[u8] {
         Plant::step(step)
     }
 }

@@ -27,7 +27,7 @@ pub struct TestMotor {
     pub saved: Vec<Settings>,
 }
 
-impl Motor for TestMotor {
+impl MotorControl for TestMotor {
     fn set_mode(&mut self, mode: Mode) {
         self.mode = mode;
         self.modes_set += 1;
@@ -54,7 +54,7 @@ impl Node {
     pub fn new(id: u8) -> Self {
         let gains = Pid { position_kp: 100, position_ki: 100, ..Pid::default() };
         let rom = Settings { gains, acceleration: DpsPerSecond(1000), encoder_offset: 0 };
-        let mut drive = Drive::new(Config::new(motor(id)), rom);
+        let mut drive = Drive::new(DriveConfig::new(motor(id)), rom);
         let mut motor = TestMotor::default();
         motor.sense.temperature = Celsius(20 + id as i8);
         drive.power_on(Instant(0), &mut motor);
@@ -85,7 +85,7 @@ impl Node {
     }
 }
 
-pub type Outcome = (MotorId, Result<[u8; 8], Error>);
+pub type Outcome = (MotorId, Result<[u8; 8], Failure>);
 
 /// A host and its drives. Fails the test on a request to a motor whose reply is still to come:
 /// both have the same identifier, and two nodes that send it at once is a bus error.
@@ -113,7 +113,7 @@ impl Pair {
         }
     }
 
-    pub fn request<C: Command>(&mut self, id: u8, command: C) -> Result<(), Refused> {
+    pub fn request<C: Command>(&mut self, id: u8, command: C) -> Result<(), RequestError> {
         self.host.request(self.now, motor(id), command.encode())
     }
 

@@ -13,7 +13,7 @@ pub const STATUS: Request<'static> = Request::GetRegister(RegisterId::STATUS);
 
 /// The first master on a line.
 pub fn master(recovery: Recovery) -> Master {
-    let mut master = Master::new(Config { recovery, ..Config::default() });
+    let mut master = Master::new(MasterConfig { recovery, ..MasterConfig::default() });
     master.trust_line();
     master
 }
@@ -40,7 +40,7 @@ impl Pair {
     pub fn new(profile: Profile, recovery: Recovery) -> Self {
         Pair {
             master: master(recovery),
-            slave: Slave::new(profile, Motor::new(2).unwrap()),
+            slave: Slave::new(profile, MotorNumber::new(2).unwrap()),
             drive: Memory::usual(),
             now: Instant(0),
             line: VecDeque::new(),
@@ -52,12 +52,16 @@ impl Pair {
         }
     }
 
-    pub fn exchange(&mut self, motor: u8, request: Request<'_>) -> Result<Vec<u8>, Error> {
+    pub fn exchange(&mut self, motor: u8, request: Request<'_>) -> Result<Vec<u8>, ExchangeError> {
         self.attempt(motor, request).expect("the master lives on")
     }
 
     /// `None`: the master is gone before the exchange was over.
-    pub fn attempt(&mut self, motor: u8, request: Request<'_>) -> Option<Result<Vec<u8>, Error>> {
+    pub fn attempt(
+        &mut self,
+        motor: u8,
+        request: Request<'_>,
+    ) -> Option<Result<Vec<u8>, ExchangeError>> {
         self.master.request(motor, &request).unwrap();
         loop {
             if self.until.is_some_and(|until| self.now >= until) {

@@ -1,6 +1,6 @@
 //! What a motor and its drive are built from.
 
-use motorlink_proto::rmd::{Config, EncoderBits, MotorId, Pid, Settings};
+use motorlink_proto::rmd::{DriveConfig, EncoderBits, MotorId, Pid, Settings};
 use motorlink_proto::time::Duration;
 use motorlink_proto::units::DpsPerSecond;
 
@@ -97,9 +97,9 @@ impl RmdConfig {
     }
 
     /// What the drive needs; `None` unless ID and encoder are in their ranges.
-    pub(super) fn drive(&self) -> Option<Config> {
+    pub(super) fn drive(&self) -> Option<DriveConfig> {
         let shutdown = Duration::from_millis(self.shutdown_ms);
-        Some(Config {
+        Some(DriveConfig {
             id: MotorId::new(self.id)?,
             encoder: EncoderBits::new(self.plant.encoder.bits)?,
             shutdown: (self.shutdown_ms > 0).then_some(shutdown),

@@ -1,6 +1,6 @@
 //! A motor with its loops.
 
-use motorlink_proto::rmd::{Errors, Mode, Motor, PhaseCurrents, Sense, Settings};
+use motorlink_proto::rmd::{Errors, Mode, MotorControl, PhaseCurrents, Sense, Settings};
 use motorlink_proto::units::{Celsius, DeciVolts, Dps, IqFeedback, PhaseCurrent};
 
 use super::RmdConfig;
@@ -251,7 +251,7 @@ impl RmdMotor {
     }
 }
 
-impl Motor for RmdMotor {
+impl MotorControl for RmdMotor {
     fn set_mode(&mut self, mode: Mode) {
         if self.mode == Mode::Off {
             self.current.reset();

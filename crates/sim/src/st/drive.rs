@@ -1,8 +1,8 @@
 //! The drive: motors behind one slave.
 
 use motorlink_proto::st::{
-    Command, CurrentReference, Drive, ErrorCode, Features, Motor, PositionMove, Ramp, RegisterId,
-    RevupPhase, TorqueRamp, Version,
+    Command, CurrentReference, ErrorCode, Features, MotorControl, MotorNumber, PositionMove, Ramp,
+    RegisterId, RevupPhase, TorqueRamp, Version,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -27,14 +27,14 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
     /// A drive that is powered on `now`; `None` unless it has 1 to 7 motors.
     pub fn new(now: Instant, motors: M) -> Option<Self> {
         let count = motors.as_ref().len();
-        let fits = (1..=usize::from(Motor::MAX)).contains(&count);
+        let fits = (1..=usize::from(MotorNumber::MAX)).contains(&count);
         fits.then(|| StDrive { motors, now })
     }
 
     /// The last motor, whose number is how many there are.
-    pub fn last(&self) -> Motor {
+    pub fn last(&self) -> MotorNumber {
         let count = self.motors.as_ref().len();
-        u8::try_from(count).ok().and_then(Motor::new).expect("a drive has 1 to 7 motors")
+        u8::try_from(count).ok().and_then(MotorNumber::new).expect("a drive has 1 to 7 motors")
     }
 
     /// The motors, motor 1 first.
@@ -43,7 +43,7 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
     }
 
     /// A motor, to change the world around it; `None` when the drive has none of this number.
-    pub fn motor_mut(&mut self, motor: Motor) -> Option<&mut StMotor> {
+    pub fn motor_mut(&mut self, motor: MotorNumber) -> Option<&mut StMotor> {
         self.motors.as_mut().get_mut(motor.index())
     }
 
@@ -59,13 +59,13 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
         self.motors.as_mut().iter_mut().for_each(StMotor::power_cycle);
     }
 
-    fn motor(&mut self, motor: Motor) -> &mut StMotor {
+    fn motor(&mut self, motor: MotorNumber) -> &mut StMotor {
         self.motor_mut(motor).expect("the slave asks for motors that the drive has")
     }
 }
 
-impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> Drive for StDrive<M> {
-    fn features(&self, motor: Motor) -> Features {
+impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> MotorControl for StDrive<M> {
+    fn features(&self, motor: MotorNumber) -> Features {
         let motor = self.motors.as_ref().get(motor.index());
         motor.map_or(Features::NONE, |motor| motor.config().build.features())
     }
@@ -74,45 +74,50 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> Drive for StDrive<M> {
         Version { name: "ST MC SDK", major: 5, minor: 4, patch: 4, pre_release: "" }
     }
 
-    fn read(&mut self, motor: Motor, register: RegisterId) -> i32 {
+    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         self.motor(motor).read(register)
     }
 
-    fn write(&mut self, motor: Motor, register: RegisterId, value: i32) -> Result<(), ErrorCode> {
+    fn write(
+        &mut self,
+        motor: MotorNumber,
+        register: RegisterId,
+        value: i32,
+    ) -> Result<(), ErrorCode> {
         self.motor(motor).write(register, value)
     }
 
-    fn execute(&mut self, motor: Motor, command: Command) {
+    fn execute(&mut self, motor: MotorNumber, command: Command) {
         self.motor(motor).execute(command);
     }
 
-    fn ramp(&mut self, motor: Motor, ramp: Ramp) {
+    fn ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
         self.motor(motor).ramp(ramp);
     }
 
-    fn revup(&mut self, motor: Motor, phase: u8) -> RevupPhase {
+    fn revup(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
         let phases = &self.motor(motor).firmware.revup;
         phases.get(usize::from(phase)).copied().unwrap_or_default()
     }
 
-    fn set_revup(&mut self, motor: Motor, phase: u8, data: RevupPhase) {
+    fn set_revup(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
         let phases = &mut self.motor(motor).firmware.revup;
         if let Some(slot) = phases.get_mut(usize::from(phase)) {
             *slot = data;
         }
     }
 
-    fn current_reference(&mut self, motor: Motor, reference: CurrentReference) {
+    fn current_reference(&mut self, motor: MotorNumber, reference: CurrentReference) {
         self.motor(motor).currents(reference);
     }
 
-    fn torque_ramp(&mut self, motor: Motor, ramp: TorqueRamp) {
+    fn torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
         let motor = self.motor(motor);
         let id = motor.flux_reference() as i16;
         motor.torque(ramp, id);
     }
 
-    fn position(&mut self, motor: Motor, target: PositionMove) {
+    fn position(&mut self, motor: MotorNumber, target: PositionMove) {
         self.motor(motor).position(target);
     }
 }

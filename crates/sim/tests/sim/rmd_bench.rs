@@ -12,21 +12,21 @@ pub fn with_bits(bits: u8) -> RmdConfig {
     config
 }
 
-pub struct Bench {
+pub struct NodeFixture {
     pub bus: RmdBus<Vec<RmdNode>>,
     pub now: Instant,
     /// Every frame that was sent back.
     pub log: Vec<CanFrame>,
 }
 
-impl Bench {
+impl NodeFixture {
     pub fn new(configs: impl IntoIterator<Item = RmdConfig>) -> Self {
         let node = |config: RmdConfig| {
             RmdNode::new(Instant(0), config, config.factory_rom()).expect("a fair configuration")
         };
         let nodes = configs.into_iter().map(node).collect();
         let bus = RmdBus::new(nodes).expect("IDs differ");
-        Bench { bus, now: Instant(0), log: Vec::new() }
+        NodeFixture { bus, now: Instant(0), log: Vec::new() }
     }
 
     /// One default motor with ID 1.

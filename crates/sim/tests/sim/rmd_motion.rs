@@ -5,7 +5,7 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::units::*;
 use motorlink_sim::rmd::RmdConfig;
 
-use crate::rmd_bench::{Bench, with_bits};
+use crate::rmd_bench::{NodeFixture, with_bits};
 
 fn position(degrees: f64) -> SetPosition {
     SetPosition { angle: CentiDegrees::from_degrees(degrees) }
@@ -17,7 +17,7 @@ fn speed(dps: f64) -> SetSpeed {
 
 #[test]
 fn torque_accelerates_the_rotor() {
-    let mut bench = Bench::new([RmdConfig::x8()]);
+    let mut bench = NodeFixture::new([RmdConfig::x8()]);
     bench.ask(SetTorque { iq: IqCommand::from_amps(1.6) });
     bench.wait(50);
     let status = bench.ask(ReadMotionStatus);
@@ -34,7 +34,7 @@ fn torque_accelerates_the_rotor() {
 fn torque_is_the_torque_constant_times_the_current() {
     for config in [RmdConfig::default(), RmdConfig::x8()] {
         for amps in [0.5, -2.0, 5.0] {
-            let mut bench = Bench::new([config]);
+            let mut bench = NodeFixture::new([config]);
             bench.world().plant_mut().lock(true);
             bench.ask(SetTorque { iq: IqCommand::from_amps(amps) });
             bench.wait(20);
@@ -53,7 +53,8 @@ fn torque_is_the_torque_constant_times_the_current() {
 
 #[test]
 fn torque_is_not_limited_by_the_greatest_torque_current() {
-    let mut bench = Bench::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
+    let mut bench =
+        NodeFixture::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
     bench.world().plant_mut().lock(true);
     bench.ask(SetTorque { iq: IqCommand::from_amps(10.0) });
     let current = bench.watch(20).current;
@@ -68,7 +69,7 @@ fn torque_is_not_limited_by_the_greatest_torque_current() {
 fn a_speed_is_reached_without_error_and_held_against_a_load() {
     // A load of 1.2 A, at the output.
     for (config, brake) in [(RmdConfig::default(), 0.1), (RmdConfig::x8(), 2.1)] {
-        let mut bench = Bench::new([config]);
+        let mut bench = NodeFixture::new([config]);
         bench.ask(speed(1234.5));
         let seen = bench.watch(300);
         assert!(seen.speed < 1234.5 * 1.05, "{} °/s on the way", seen.speed);
@@ -86,7 +87,8 @@ fn a_speed_is_reached_without_error_and_held_against_a_load() {
 
 #[test]
 fn four_torques_are_not_limited_by_the_greatest_torque_current() {
-    let mut bench = Bench::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
+    let mut bench =
+        NodeFixture::new([RmdConfig { max_torque_current: 2.0, ..RmdConfig::default() }]);
     bench.world().plant_mut().lock(true);
     let torque = IqCommand::from_amps(10.0);
     let torques = SetTorque4([torque, IqCommand(0), IqCommand(0), IqCommand(0)]);
@@ -100,7 +102,7 @@ fn positive_torque_speed_and_angle_are_clockwise() {
     for (amps, dps, spin) in
         [(0.5, 360.0, SpinDirection::Clockwise), (-0.5, -360.0, SpinDirection::Counterclockwise)]
     {
-        let mut bench = Bench::one();
+        let mut bench = NodeFixture::one();
         let commands = [
             SetTorque { iq: IqCommand::from_amps(amps) }.encode(),
             speed(dps).encode(),
@@ -129,7 +131,7 @@ fn positive_torque_speed_and_angle_are_clockwise() {
 #[test]
 fn an_acceleration_of_0_or_less_is_no_limit() {
     let fastest = |digits| {
-        let mut bench = Bench::one();
+        let mut bench = NodeFixture::one();
         bench.ask(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(digits) }));
         bench.ask(speed(1000.0));
         bench.watch(100).acceleration
@@ -143,7 +145,7 @@ fn an_acceleration_of_0_or_less_is_no_limit() {
 #[test]
 fn the_acceleration_limit_makes_a_trapezoid() {
     for config in [RmdConfig::default(), RmdConfig::x8()] {
-        let mut bench = Bench::new([config]);
+        let mut bench = NodeFixture::new([config]);
         bench.ask(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(2000) }));
         bench.ask(speed(1000.0));
         for ms in (50..500).step_by(50) {
@@ -160,7 +162,7 @@ fn the_acceleration_limit_makes_a_trapezoid() {
 fn a_move_is_a_trapezoid_that_never_goes_back() {
     for config in [RmdConfig::default(), RmdConfig::x8()] {
         for (angle, acceleration) in [(90.0, 3000), (-720.0, 20_000)] {
-            let mut bench = Bench::new([config]);
+            let mut bench = NodeFixture::new([config]);
             let acceleration = Acceleration { acceleration: DpsPerSecond(acceleration) };
             bench.ask(WriteAccelerationRam(acceleration));
             let max_speed = SpeedLimit(400);
@@ -197,7 +199,7 @@ fn a_position_is_reached_within_a_tenth_of_a_degree_without_swinging() {
     for bits in 12..=18 {
         for degrees in [0.5, 90.0, -3600.0, 36_000.0] {
             let config = with_bits(bits);
-            let mut bench = Bench::new([config]);
+            let mut bench = NodeFixture::new([config]);
             bench.ask(position(degrees));
             let seen = bench.watch(5000);
             let end = bench.truth().plant.angle_degrees;
@@ -218,7 +220,7 @@ fn the_drives_own_limits_hold_a_position_command() {
         encoder_offset: 4096,
         ..RmdConfig::default()
     };
-    let mut bench = Bench::new([config]);
+    let mut bench = NodeFixture::new([config]);
     assert!((bench.angle() + 90.0).abs() < 0.1, "the offset is a quarter of a turn");
     bench.ask(position(1000.0));
     let seen = bench.watch(2000);
@@ -237,7 +239,7 @@ fn the_drives_own_limits_hold_a_position_command() {
 
 #[test]
 fn a_single_turn_position_is_reached_in_the_direction_that_is_told() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     let circle = |degrees, direction| SetSingleTurnPosition {
         direction,
         angle: TurnCentiDegrees::from_degrees(degrees),
@@ -262,8 +264,8 @@ fn a_single_turn_position_is_reached_in_the_direction_that_is_told() {
 }
 
 /// How a motor with these gains has followed a command after `ms`.
-fn follow(gains: Pid, ms: u32, command: impl FnOnce(&mut Bench)) -> (f64, f32, f32) {
-    let mut bench = Bench::one();
+fn follow(gains: Pid, ms: u32, command: impl FnOnce(&mut NodeFixture)) -> (f64, f32, f32) {
+    let mut bench = NodeFixture::one();
     bench.ask(WritePidRam(gains));
     command(&mut bench);
     bench.wait(ms);
@@ -323,7 +325,7 @@ fn each_gain_acts() {
 #[test]
 fn stop_brings_the_rotor_to_a_stand_and_off_lets_it_coast() {
     let coasting = |stop: bool| {
-        let mut bench = Bench::new([RmdConfig::x8()]);
+        let mut bench = NodeFixture::new([RmdConfig::x8()]);
         bench.ask(speed(3000.0));
         bench.wait(500);
         if stop {
@@ -343,7 +345,7 @@ fn stop_brings_the_rotor_to_a_stand_and_off_lets_it_coast() {
 
 #[test]
 fn phase_currents_sum_to_zero_and_follow_the_electrical_angle() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     bench.world().plant_mut().lock(true);
     bench.ask(SetTorque { iq: IqCommand::from_amps(8.0) });
     bench.wait(50);

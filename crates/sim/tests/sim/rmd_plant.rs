@@ -5,14 +5,14 @@ use motorlink_proto::units::*;
 use motorlink_sim::plant::{ChopperConfig, HeatConfig, StopsConfig};
 use motorlink_sim::rmd::RmdConfig;
 
-use crate::rmd_bench::Bench;
+use crate::rmd_bench::NodeFixture;
 
 fn output(config: &RmdConfig, degrees: f64) -> SetPosition {
     let ratio = f64::from(config.plant.machine.gear.ratio);
     SetPosition { angle: CentiDegrees::from_degrees(degrees * ratio) }
 }
 
-fn accelerate(bench: &mut Bench, dps2: i32) {
+fn accelerate(bench: &mut NodeFixture, dps2: i32) {
     bench.ask(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(dps2) }));
 }
 
@@ -41,7 +41,7 @@ fn predicted(config: &RmdConfig, current: f64, limit: f64) -> f64 {
 #[test]
 fn a_motor_is_switched_off_when_the_heat_model_says() {
     for (config, amps) in [(RmdConfig::default(), 4.0), (RmdConfig::x8(), 25.0)] {
-        let mut bench = Bench::new([config]);
+        let mut bench = NodeFixture::new([config]);
         bench.world().plant_mut().lock(true);
         bench.ask(SetTorque { iq: IqCommand::from_amps(amps) });
         let due = predicted(&config, amps, f64::from(config.protect_temperature));
@@ -55,7 +55,7 @@ fn a_motor_is_switched_off_when_the_heat_model_says() {
 
 #[test]
 fn a_stalled_motor_pushes_with_its_limit_until_it_is_too_hot() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     bench.world().plant_mut().lock(true);
     bench.ask(output(&RmdConfig::default(), 90.0));
     bench.wait(2000);
@@ -72,7 +72,7 @@ fn braking_raises_the_bus_where_nothing_takes_it_and_a_chopper_holds_it() {
     let braked = |chopper| {
         let mut config = RmdConfig::x8();
         config.plant.supply.chopper = chopper;
-        let mut bench = Bench::new([config]);
+        let mut bench = NodeFixture::new([config]);
         bench.ask(SetSpeed { speed: CentiDps::from_dps(8000.0) });
         bench.wait(500);
         bench.ask(Stop);
@@ -97,7 +97,7 @@ fn a_supply_that_sags_under_load_is_low() {
     let mut config = RmdConfig::x8();
     config.plant.supply.resistance = 4.0;
     config.protect_voltage = 40.0;
-    let mut bench = Bench::new([config]);
+    let mut bench = NodeFixture::new([config]);
     accelerate(&mut bench, 10_000);
     bench.ask(SetSpeed { speed: CentiDps::from_dps(8000.0) });
     bench.wait(1500);
@@ -114,7 +114,7 @@ fn a_weight_is_lifted_and_held() {
     let mut config = RmdConfig::x8();
     config.plant.load.pendulum.mass = 1.0;
     config.plant.load.pendulum.length = 0.2;
-    let mut bench = Bench::new([config]);
+    let mut bench = NodeFixture::new([config]);
     accelerate(&mut bench, 3000);
     bench.ask(output(&config, 90.0));
     bench.wait(3000);
@@ -137,7 +137,7 @@ fn an_end_stop_ends_a_move_and_the_way_back_is_free() {
     let (stiffness, damping) = (200.0, 0.5);
     let stops = StopsConfig { low_degrees: -30.0, high_degrees: 30.0, stiffness, damping };
     config.plant.load.stops = Some(stops);
-    let mut bench = Bench::new([config]);
+    let mut bench = NodeFixture::new([config]);
     accelerate(&mut bench, 5000);
     bench.ask(output(&config, 90.0));
     bench.wait(2000);
@@ -154,7 +154,7 @@ fn an_end_stop_ends_a_move_and_the_way_back_is_free() {
 #[test]
 fn angles_and_speeds_are_those_of_the_motor_shaft() {
     let config = RmdConfig::x8();
-    let mut bench = Bench::new([config]);
+    let mut bench = NodeFixture::new([config]);
     bench.ask(output(&config, 40.0));
     bench.wait(1000);
     assert!((bench.angle() - 360.0).abs() < 0.1, "{}°", bench.angle());
@@ -174,7 +174,7 @@ fn torque_is_the_same_wherever_the_encoders_zero_is() {
     for offset in [-120.0, -0.01, 200.0] {
         let mut config = RmdConfig::x8();
         config.plant.encoder.offset_degrees = offset;
-        let mut bench = Bench::new([config]);
+        let mut bench = NodeFixture::new([config]);
         bench.world().plant_mut().lock(true);
         let angle = f64::from(offset).rem_euclid(360.0);
         assert!((bench.angle() - angle).abs() < 0.03, "{}° for {offset}°", bench.angle());
@@ -187,7 +187,7 @@ fn torque_is_the_same_wherever_the_encoders_zero_is() {
 
 /// Time to nine tenths of a speed, ms, and how far Iq and speed then go up and down, A and °/s.
 fn step(config: RmdConfig, gains: Pid) -> (u32, f32, f32) {
-    let mut bench = Bench::new([config]);
+    let mut bench = NodeFixture::new([config]);
     bench.ask(WritePidRam(gains));
     bench.ask(SetSpeed { speed: CentiDps::from_dps(2000.0) });
     let mut rise = 0;
@@ -236,7 +236,7 @@ fn gains_that_are_too_high_oscillate() {
 #[test]
 fn a_motor_that_oscillates_is_switched_off_when_it_is_too_hot() {
     let errors = |speed_kp| {
-        let mut bench = Bench::one();
+        let mut bench = NodeFixture::one();
         let shipped = RmdConfig::default().factory_rom().gains;
         bench.ask(WritePidRam(Pid { position_kp: 255, speed_kp, ..shipped }));
         bench.ask(output(&RmdConfig::default(), 360.0));
@@ -255,7 +255,7 @@ fn a_motor_that_oscillates_is_switched_off_when_it_is_too_hot() {
 #[test]
 fn the_board_draws_its_power_from_the_source() {
     let config = RmdConfig::default();
-    let mut bench = Bench::new([config]);
+    let mut bench = NodeFixture::new([config]);
     bench.wait(100);
     let truth = bench.truth().plant;
     // 1.2 W at 24 V.

@@ -6,11 +6,11 @@ use motorlink_proto::time::Instant;
 use motorlink_proto::units::*;
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 
-use crate::rmd_bench::Bench;
+use crate::rmd_bench::NodeFixture;
 
 #[test]
 fn gains_survive_a_power_cycle_only_in_rom() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     let ram = Pid { position_kp: 1, position_ki: 2, ..bench.ask(ReadPid) };
     let rom = Pid { speed_kp: 3, torque_ki: 4, ..ram };
     bench.ask(WritePidRam(ram));
@@ -29,7 +29,7 @@ fn gains_survive_a_power_cycle_only_in_rom() {
 
 #[test]
 fn a_zero_position_takes_effect_with_the_next_power_on() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     bench.ask(SetPosition { angle: CentiDegrees::from_degrees(1000.0) });
     bench.wait(3000);
     let zero = bench.ask(WriteZeroRom).offset;
@@ -42,7 +42,7 @@ fn a_zero_position_takes_effect_with_the_next_power_on() {
 
 #[test]
 fn turns_are_counted_until_the_power_goes() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     bench.ask(SetPosition { angle: CentiDegrees::from_degrees(-2000.0) });
     bench.wait(3000);
     assert!((bench.angle() + 2000.0).abs() < 0.1);
@@ -52,7 +52,7 @@ fn turns_are_counted_until_the_power_goes() {
 
 #[test]
 fn stop_and_run_resume_what_off_forgets() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
     bench.wait(300);
     bench.ask(Stop);
@@ -69,7 +69,7 @@ fn stop_and_run_resume_what_off_forgets() {
 
 #[test]
 fn protections_switch_off_and_stay_while_the_cause_lasts() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
     bench.wait(300);
     bench.world().plant_mut().set_source(6.9);
@@ -97,7 +97,7 @@ fn protections_switch_off_and_stay_while_the_cause_lasts() {
 
 #[test]
 fn injected_faults_happen_once_or_last() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     bench.world().inject(Errors::OVER_TEMPERATURE);
     bench.wait(1);
     assert_eq!(bench.ask(ReadStatus).errors, Errors::OVER_TEMPERATURE);
@@ -115,7 +115,7 @@ fn injected_faults_happen_once_or_last() {
 
 #[test]
 fn silence_for_the_shutdown_time_switches_off() {
-    let mut bench = Bench::new([RmdConfig { shutdown_ms: 200, ..RmdConfig::default() }]);
+    let mut bench = NodeFixture::new([RmdConfig { shutdown_ms: 200, ..RmdConfig::default() }]);
     bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
     for _ in 0..5 {
         bench.wait(150);
@@ -128,7 +128,7 @@ fn silence_for_the_shutdown_time_switches_off() {
 
 #[test]
 fn four_torques_are_answered_lowest_id_first() {
-    let mut bench = Bench::new([4, 2, 7, 1, 3].map(RmdConfig::with_id));
+    let mut bench = NodeFixture::new([4, 2, 7, 1, 3].map(RmdConfig::with_id));
     for id in (1..=4).filter_map(MotorId::new) {
         bench.bus.node_mut(id).unwrap().motor_mut().plant_mut().lock(true);
     }
@@ -147,7 +147,7 @@ fn four_torques_are_answered_lowest_id_first() {
 
 #[test]
 fn what_is_not_for_a_motor_gets_no_reply() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     assert!(bench.send(&CanFrame::new(0x142, ReadStatus.encode())).is_empty());
     assert!(bench.send(&CanFrame::new(0x141, [0x77; 8])).is_empty());
     assert!(bench.send(&CanFrame::data_frame(0x141, false, &[0x9A])).is_empty());
@@ -155,7 +155,7 @@ fn what_is_not_for_a_motor_gets_no_reply() {
 
 #[test]
 fn every_command_is_answered_with_its_code() {
-    let mut bench = Bench::one();
+    let mut bench = NodeFixture::one();
     for command in COMMANDS {
         let code = u8::from(command.code);
         let reply = bench.raw([code, 0, 0, 0, 0, 0, 0, 0]);

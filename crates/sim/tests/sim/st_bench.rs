@@ -2,7 +2,7 @@
 
 use motorlink_proto::st::register::{Register, Value};
 use motorlink_proto::st::{
-    Command, Flags, Frame, HEADER_ACK, MAX_FRAME, Motor, Parse, Profile, REVUP_PHASES, Ramp,
+    Command, Flags, Frame, HEADER_ACK, MAX_FRAME, MotorNumber, Parse, Profile, REVUP_PHASES, Ramp,
     RegisterId, Request, RevupPhase, Status, register,
 };
 use motorlink_proto::time::{Duration, Instant};
@@ -12,18 +12,18 @@ use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation, Truth};
 /// The code of a NACK.
 pub type Nack = u8;
 
-pub struct Line {
+pub struct NodeFixture {
     pub station: StStation<Vec<StMotor>>,
     pub now: Instant,
     /// Everything that was sent back.
     pub log: Vec<u8>,
 }
 
-impl Line {
+impl NodeFixture {
     pub fn new(profile: Profile, motors: impl IntoIterator<Item = MotorConfig>) -> Self {
         let motors = motors.into_iter().map(StMotor::new).collect();
         let drive = StDrive::new(Instant(0), motors).expect("1 to 7 motors");
-        Line { station: StStation::new(profile, drive), now: Instant(0), log: Vec::new() }
+        NodeFixture { station: StStation::new(profile, drive), now: Instant(0), log: Vec::new() }
     }
 
     /// The two motors of the demonstration.
@@ -79,17 +79,17 @@ impl Line {
     }
 
     pub fn execute(&mut self, command: Command) {
-        self.ask(0, Request::Execute(command)).expect("the command is possible");
+        self.ask(0, Request::ExecuteCommand(command)).expect("the command is possible");
     }
 
     pub fn ramp(&mut self, speed_rpm: i32, duration_ms: u16) {
-        self.ask(0, Request::Ramp(Ramp { speed_rpm, duration_ms })).expect("a ramp never fails");
+        self.ask(0, Request::SetRamp(Ramp { speed_rpm, duration_ms })).expect("a ramp never fails");
     }
 
     /// Changes the rev-up table of the current motor.
     pub fn change_revup(&mut self, change: impl Fn(RevupPhase) -> RevupPhase) {
         for phase in 0..REVUP_PHASES {
-            let data = self.ask(0, Request::RevupData(phase)).expect("there are five phases");
+            let data = self.ask(0, Request::GetRevupData(phase)).expect("there are five phases");
             let data = change(RevupPhase::decode(&data).expect("a phase is 8 bytes"));
             self.ask(0, Request::SetRevupData(phase, data)).expect("a phase can be set");
         }
@@ -171,7 +171,7 @@ impl Line {
 
     /// Motor 1, to change the world around it.
     pub fn world(&mut self) -> &mut StMotor {
-        self.station.drive_mut().motor_mut(Motor::FIRST).expect("motor 1 exists")
+        self.station.drive_mut().motor_mut(MotorNumber::FIRST).expect("motor 1 exists")
     }
 
     /// What surrounds motor 1.

@@ -5,14 +5,14 @@ use motorlink_proto::st::{
     Status, TorqueRamp, register::*,
 };
 
-use crate::st_bench::Line;
+use crate::st_bench::NodeFixture;
 
-fn currents(line: &mut Line, iq_s16a: i16, id_s16a: i16) {
+fn currents(line: &mut NodeFixture, iq_s16a: i16, id_s16a: i16) {
     let reference = CurrentReference { iq_s16a, id_s16a };
-    line.ask(0, Request::CurrentReference(reference)).unwrap();
+    line.ask(0, Request::SetCurrentReference(reference)).unwrap();
 }
 
-fn mode(line: &mut Line) -> ControlMode {
+fn mode(line: &mut NodeFixture) -> ControlMode {
     ControlMode::from(line.get(CONTROL_MODE))
 }
 
@@ -29,7 +29,7 @@ macro_rules! assert_current {
 
 #[test]
 fn a_ramp_of_1000_rpm_in_500_ms_is_2_rpm_per_ms() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.ramp(1000, 0);
     line.run();
     line.wait(1000);
@@ -46,7 +46,7 @@ fn a_ramp_of_1000_rpm_in_500_ms_is_2_rpm_per_ms() {
 
 #[test]
 fn the_last_ramp_before_run_is_the_one_that_is_executed() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.ramp(900, 100);
     line.execute(Command::StartMotor);
     line.wait(100);
@@ -60,7 +60,7 @@ fn the_last_ramp_before_run_is_the_one_that_is_executed() {
 
 #[test]
 fn current_references_given_before_run_wait_for_it() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.ramp(900, 100);
     line.brake(0.3);
     line.set_revup_current(3.0);
@@ -75,7 +75,7 @@ fn current_references_given_before_run_wait_for_it() {
 
 #[test]
 fn a_ramp_in_torque_mode_goes_on_from_the_present_speed() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.run();
     currents(&mut line, ONE_AMPERE / 5, 0);
     line.wait(100);
@@ -90,7 +90,7 @@ fn a_ramp_in_torque_mode_goes_on_from_the_present_speed() {
 #[test]
 fn control_mode_reads_the_mode_that_was_asked_for_last() {
     for profile in Profile::ALL {
-        let mut line = Line::demo(profile);
+        let mut line = NodeFixture::demo(profile);
         // At rest, where nothing of it is applied yet.
         assert_eq!(mode(&mut line), ControlMode::Speed);
         currents(&mut line, ONE_AMPERE, 0);
@@ -106,7 +106,7 @@ fn control_mode_reads_the_mode_that_was_asked_for_last() {
 
 #[test]
 fn writing_the_control_mode_keeps_what_the_motor_does() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.run();
     line.wait(2500);
     let iq = line.get(TORQUE_REF);
@@ -122,7 +122,7 @@ fn writing_the_control_mode_keeps_what_the_motor_does() {
 
 #[test]
 fn each_reference_can_be_written_alone() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.run();
     line.set(FLUX_REF, -300);
     line.set(TORQUE_REF, 400);
@@ -140,7 +140,7 @@ fn each_reference_can_be_written_alone() {
 #[test]
 fn positive_current_accelerates_to_positive_speed() {
     for sign in [1, -1] {
-        let mut line = Line::servo();
+        let mut line = NodeFixture::servo();
         line.run();
         line.wait(500);
         currents(&mut line, 0, 0);
@@ -155,7 +155,7 @@ fn positive_current_accelerates_to_positive_speed() {
 
 #[test]
 fn the_id_reference_of_speed_mode_acts_in_speed_mode() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.run();
     line.set(IQ_SPEEDMODE, -800);
     line.wait(20);
@@ -165,13 +165,13 @@ fn the_id_reference_of_speed_mode_acts_in_speed_mode() {
 
 #[test]
 fn a_torque_ramp_is_linear() {
-    let mut line = Line::servo();
+    let mut line = NodeFixture::servo();
     line.run();
     line.plant().lock(true);
     line.wait(200);
     let from = i32::from(line.get(TORQUE_REF));
     let ramp = TorqueRamp { torque_s16a: from + 1000, duration_ms: 100 };
-    line.ask(0, Request::TorqueRamp(ramp)).unwrap();
+    line.ask(0, Request::SetTorqueRamp(ramp)).unwrap();
     for ms in (0..=100).step_by(20) {
         assert!((i32::from(line.get(TORQUE_REF)) - from - 10 * ms).abs() <= 1);
         line.wait(20);
@@ -180,7 +180,7 @@ fn a_torque_ramp_is_linear() {
 
 #[test]
 fn stop_ramp_holds_what_was_reached() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.ramp(1000, 0);
     line.run();
     line.ramp(3000, 1000);
@@ -194,7 +194,7 @@ fn stop_ramp_holds_what_was_reached() {
 
 #[test]
 fn writing_the_final_speed_starts_a_ramp_of_the_last_duration() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.ramp(1000, 200);
     line.run();
     line.wait(500);
@@ -207,7 +207,7 @@ fn writing_the_final_speed_starts_a_ramp_of_the_last_duration() {
 
 #[test]
 fn a_negative_ramp_starts_backwards() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.ramp(-1500, 500);
     line.run();
     line.wait(1500);
@@ -217,7 +217,7 @@ fn a_negative_ramp_starts_backwards() {
 
 #[test]
 fn an_encoder_sees_the_rotor_reverse_and_an_observer_does_not() {
-    let reversed = |mut line: Line| {
+    let reversed = |mut line: NodeFixture| {
         line.ramp(-1500, 500);
         line.run();
         line.wait(1500);
@@ -225,16 +225,16 @@ fn an_encoder_sees_the_rotor_reverse_and_an_observer_does_not() {
         line.wait(3000);
         (line.status(), line.flags().occurred(), line.truth().speed_rpm)
     };
-    let (status, _, speed) = reversed(Line::servo());
+    let (status, _, speed) = reversed(NodeFixture::servo());
     assert_eq!(status, Status::Run);
     assert!((speed - 1500.0).abs() < 5.0, "{speed} rpm");
-    let (status, faults, _) = reversed(Line::sensorless());
+    let (status, faults, _) = reversed(NodeFixture::sensorless());
     assert_eq!((status, faults), (Status::FaultOver, Flags::SPEED_FDBK), "no back-EMF at rest");
 }
 
 #[test]
 fn a_ramp_beyond_the_highest_speed_ends_there() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.ramp(20_000, 2000);
     line.run();
     line.wait(4000);
@@ -245,7 +245,7 @@ fn a_ramp_beyond_the_highest_speed_ends_there() {
 
 /// Milliseconds from 1500 rpm to 90 % of a step to 2000 rpm.
 fn rise_time(divisor: i16) -> u32 {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.run();
     line.wait(3000);
     let (kp, ki) = (line.get(SPEED_KP), line.get(SPEED_KI));
@@ -270,7 +270,7 @@ fn the_speed_gains_change_the_rise_time() {
 #[test]
 fn without_ki_a_load_leaves_a_speed_error() {
     let error = |ki| {
-        let mut line = Line::sensorless();
+        let mut line = NodeFixture::sensorless();
         line.run();
         line.wait(3000);
         line.set(SPEED_KI, ki);
@@ -285,11 +285,11 @@ fn without_ki_a_load_leaves_a_speed_error() {
 
 #[test]
 fn a_position_move_takes_its_time_and_arrives() {
-    let mut line = Line::servo();
+    let mut line = NodeFixture::servo();
     line.ramp(0, 0);
     line.run();
     let target = PositionMove { angle_rad: 25.0, duration_s: 0.5 };
-    line.ask(0, Request::Position(target)).unwrap();
+    line.ask(0, Request::SetPosition(target)).unwrap();
     let mut last = line.get(CURRENT_POSITION);
     for _ in 0..50 {
         line.wait(10);
@@ -307,12 +307,12 @@ fn a_position_move_takes_its_time_and_arrives() {
 #[test]
 fn the_position_gain_changes_how_a_step_is_followed() {
     let after_100_ms = |kp| {
-        let mut line = Line::servo();
+        let mut line = NodeFixture::servo();
         line.ramp(0, 0);
         line.run();
         line.set(POSITION_KP, kp);
         let step = PositionMove { angle_rad: 1.0, duration_s: 0.0 };
-        line.ask(0, Request::Position(step)).unwrap();
+        line.ask(0, Request::SetPosition(step)).unwrap();
         line.wait(100);
         line.get(CURRENT_POSITION)
     };
@@ -322,19 +322,19 @@ fn the_position_gain_changes_how_a_step_is_followed() {
 
 #[test]
 fn an_angle_that_is_no_number_is_not_gone_to() {
-    let mut line = Line::servo();
+    let mut line = NodeFixture::servo();
     line.run();
     for angle_rad in [f32::NAN, f32::INFINITY] {
         let target = PositionMove { angle_rad, duration_s: f32::NAN };
-        line.ask(0, Request::Position(target)).unwrap();
+        line.ask(0, Request::SetPosition(target)).unwrap();
         assert_eq!(line.get(TARGET_POSITION), 0.0);
     }
 }
 
 #[test]
 fn the_rev_up_table_sets_how_long_the_start_takes() {
-    let mut line = Line::sensorless();
-    let phase = line.ask(0, Request::RevupData(1)).unwrap();
+    let mut line = NodeFixture::sensorless();
+    let phase = line.ask(0, Request::GetRevupData(1)).unwrap();
     let phase = RevupPhase::decode(&phase).unwrap();
     assert_eq!((phase.speed_rpm, phase.duration_ms), (500, 200));
     let slower = RevupPhase { duration_ms: 450, ..phase };

@@ -5,10 +5,10 @@ use motorlink_proto::st::{
 };
 use motorlink_sim::st::{MotorConfig, PfcState, pfc_fault};
 
-use crate::st_bench::Line;
+use crate::st_bench::NodeFixture;
 
-fn running() -> Line {
-    let mut line = Line::sensorless();
+fn running() -> NodeFixture {
+    let mut line = NodeFixture::sensorless();
     line.run();
     line.wait(2000);
     line
@@ -90,7 +90,7 @@ fn injected_faults_happen_once_or_last() {
 
 #[test]
 fn a_load_beyond_the_rev_up_torque_is_a_start_up_fault() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.brake(0.9);
     line.execute(Command::StartMotor);
     line.until(Status::FaultNow, 2000);
@@ -110,7 +110,7 @@ fn a_rotor_that_is_locked_in_run_loses_its_feedback() {
     assert!(faulted < 100, "{faulted} ms until there is no back-EMF to be found");
     assert_eq!(line.flags().occurred(), Flags::SPEED_FDBK);
 
-    let mut line = Line::servo();
+    let mut line = NodeFixture::servo();
     line.run();
     line.wait(2000);
     line.plant().lock(true);
@@ -123,7 +123,7 @@ fn a_rotor_that_is_locked_in_run_loses_its_feedback() {
 fn running_away_in_torque_mode_loses_the_feedback() {
     let mut line = running();
     let all = CurrentReference { iq_s16a: i16::MAX, id_s16a: 0 };
-    line.ask(0, Request::CurrentReference(all)).unwrap();
+    line.ask(0, Request::SetCurrentReference(all)).unwrap();
     line.wait(5);
     let iq = line.truth().plant.iq;
     assert!((5.0..5.8).contains(&iq), "{iq} A: held to the rated current");
@@ -134,7 +134,7 @@ fn running_away_in_torque_mode_loses_the_feedback() {
 
 #[test]
 fn the_pfc_raises_the_bus_voltage() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.set(PFC_STARTUP_DURATION, 100);
     line.set(PFC_DCBUS_REF, 385);
     assert_eq!((line.get(PFC_ENABLED), line.get(BUS_VOLTAGE)), (0, 325));
@@ -176,7 +176,7 @@ fn a_load_makes_the_bus_of_a_pfc_dip_and_it_comes_back() {
 
 #[test]
 fn the_pfc_faults_when_the_mains_fail_and_takes_an_acknowledge() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.execute(Command::PfcEnable);
     line.wait(500);
     line.plant().set_source(220.0);
@@ -198,7 +198,7 @@ fn the_pfc_faults_when_the_mains_fail_and_takes_an_acknowledge() {
 
 #[test]
 fn a_pfc_whose_gains_run_away_switches_itself_off() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.execute(Command::PfcEnable);
     line.wait(500);
     assert_eq!(line.get(PFC_STATUS), PfcState::Run as i8);
@@ -223,7 +223,7 @@ fn a_pfc_that_is_told_too_much_trips_the_motor() {
 fn a_highest_speed_has_no_direction() {
     let mut config = MotorConfig::shinano();
     config.registers.max_app_speed = -4000;
-    let mut line = Line::new(Profile::Spec, [config]);
+    let mut line = NodeFixture::new(Profile::Spec, [config]);
     line.run();
     line.wait(2000);
     assert_eq!((line.status(), line.get(SPEED_REF)), (Status::Run, 1500));

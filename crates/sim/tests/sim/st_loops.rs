@@ -6,10 +6,10 @@ use motorlink_proto::st::{
 use motorlink_sim::plant::{ChopperConfig, HeatSensor, MachineConfig, PlantConfig};
 use motorlink_sim::st::{MotorConfig, Registers};
 
-use crate::st_bench::Line;
+use crate::st_bench::NodeFixture;
 
-fn line(config: MotorConfig) -> Line {
-    Line::new(Profile::Spec, [config])
+fn line(config: MotorConfig) -> NodeFixture {
+    NodeFixture::new(Profile::Spec, [config])
 }
 
 /// Every motor, with a speed in the middle of its range.
@@ -21,7 +21,7 @@ fn motors() -> impl Iterator<Item = (&'static str, MotorConfig, f64)> {
 }
 
 /// A motor that has run at a speed for a while.
-fn turning(config: MotorConfig, rpm: f64) -> Line {
+fn turning(config: MotorConfig, rpm: f64) -> NodeFixture {
     let mut line = line(config);
     line.ramp(rpm as i32, 500);
     line.run();
@@ -124,7 +124,7 @@ fn torque_is_what_was_commanded_within_2_percent() {
         let full_scale = config.plant.sensing.full_scale;
         let iq_s16a = (0.4 * config.rated_current / full_scale * 32767.0) as i16;
         let reference = CurrentReference { iq_s16a, id_s16a: 0 };
-        line.ask(0, Request::CurrentReference(reference)).unwrap();
+        line.ask(0, Request::SetCurrentReference(reference)).unwrap();
         line.wait(1000);
         let mean: f64 =
             (0..20).map(|_| line.mean_of(|line| line.truth().plant.torque.into())).sum::<f64>()
@@ -398,7 +398,7 @@ fn a_current_beyond_the_trip_level_is_a_break_in_at_once() {
     let mut line = turning(config, 1000.0);
     let five_amperes = (5.0 / config.plant.sensing.full_scale * 32767.0) as i16;
     let reference = CurrentReference { iq_s16a: five_amperes, id_s16a: 0 };
-    line.ask(0, Request::CurrentReference(reference)).unwrap();
+    line.ask(0, Request::SetCurrentReference(reference)).unwrap();
     line.wait(2);
     assert_eq!(line.flags().occurred(), Flags::BREAK_IN);
     line.until(Status::FaultOver, 2);

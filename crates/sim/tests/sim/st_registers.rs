@@ -5,7 +5,7 @@ use motorlink_proto::st::register::{Features, Type, Writing};
 use motorlink_proto::st::{Command, ErrorCode, Profile, RegisterId, Request, register::*};
 use motorlink_sim::st::{BuildConfig, MotorConfig};
 
-use crate::st_bench::Line;
+use crate::st_bench::NodeFixture;
 
 const BARE: BuildConfig = BuildConfig {
     observer_pll: false,
@@ -18,11 +18,11 @@ const BARE: BuildConfig = BuildConfig {
     position_control: false,
 };
 
-fn lines() -> impl Iterator<Item = (Profile, Features, Line)> {
+fn lines() -> impl Iterator<Item = (Profile, Features, NodeFixture)> {
     let bare = MotorConfig { build: BARE, ..MotorConfig::default() };
     let motors = [MotorConfig::default(), MotorConfig::servo(), bare];
     [Profile::Spec, Profile::Mcsdk54].into_iter().flat_map(move |profile| {
-        motors.map(|config| (profile, config.build.features(), Line::new(profile, [config])))
+        motors.map(|config| (profile, config.build.features(), NodeFixture::new(profile, [config])))
     })
 }
 
@@ -73,12 +73,12 @@ fn every_register_that_can_be_written_keeps_its_value() {
 
 #[test]
 fn the_stages_of_the_revup_are_counted_whatever_it_does() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     let stages = line.get(RUC_STAGE_NBR);
     for phase in 0..stages {
-        line.ask(0, Request::RevupData(phase)).unwrap();
+        line.ask(0, Request::GetRevupData(phase)).unwrap();
     }
-    line.ask(0, Request::RevupData(stages)).unwrap_err();
+    line.ask(0, Request::GetRevupData(stages)).unwrap_err();
     line.execute(Command::StartMotor);
     for _ in 0..20 {
         line.wait(100);
@@ -89,18 +89,18 @@ fn the_stages_of_the_revup_are_counted_whatever_it_does() {
 #[test]
 fn commands_for_a_pfc_need_one() {
     for command in [Command::PfcEnable, Command::PfcDisable, Command::PfcFaultAck] {
-        let mut line = Line::demo(Profile::Spec);
-        assert_eq!(line.ask(1, Request::Execute(command)), Ok(vec![]));
+        let mut line = NodeFixture::demo(Profile::Spec);
+        assert_eq!(line.ask(1, Request::ExecuteCommand(command)), Ok(vec![]));
         let refused = Err(ErrorCode::WrongCmd.into());
-        assert_eq!(line.ask(2, Request::Execute(command)), refused);
+        assert_eq!(line.ask(2, Request::ExecuteCommand(command)), refused);
     }
 }
 
 /// Registers at one instant, as a data segment gives them: those of access D too.
-fn sample<const N: usize>(line: &mut Line, registers: [RegisterId; N]) -> [i32; N] {
+fn sample<const N: usize>(line: &mut NodeFixture, registers: [RegisterId; N]) -> [i32; N] {
     let ids = registers.map(|id| id.0);
-    line.ask(0, Request::ConfigDynStruct { segment: 0, registers: &ids }).unwrap();
-    let payload = line.ask(0, Request::DataElement(0)).unwrap();
+    line.ask(0, Request::ConfigureSegment { segment: 0, registers: &ids }).unwrap();
+    let payload = line.ask(0, Request::GetSegment(0)).unwrap();
     let mut rest = &payload[..];
     registers.map(|id| {
         let (value, tail) = rest.split_at(id.shape().unwrap().ty(Profile::Spec).size().into());
@@ -111,7 +111,7 @@ fn sample<const N: usize>(line: &mut Line, registers: [RegisterId; N]) -> [i32; 
 
 #[test]
 fn the_signals_of_a_running_motor_belong_together() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.run();
     line.wait(2000);
     line.brake(0.6);
@@ -160,7 +160,7 @@ fn the_signals_of_a_running_motor_belong_together() {
 
 #[test]
 fn a_dac_channel_shows_the_register_that_was_chosen() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.set(DAC_OUT1, RegisterId::I_Q.0);
     line.set(DAC_OUT2, RegisterId::DAC_USER2.0);
     line.run();
@@ -173,7 +173,7 @@ fn a_dac_channel_shows_the_register_that_was_chosen() {
 
 #[test]
 fn a_power_cycle_brings_every_register_back() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     let shipped = line.get(SPEED_KP);
     line.set(SPEED_KP, 1);
     line.ramp(-3000, 7);

@@ -3,12 +3,12 @@
 use motorlink_proto::st::{Command, Profile, Status, register};
 use motorlink_sim::st::{DurationConfig, MotorConfig};
 
-use crate::st_bench::Line;
+use crate::st_bench::NodeFixture;
 
 use Status::*;
 
 /// The states on the way, without the last, which stays.
-fn on_the_way(line: &mut Line) -> Vec<(Status, u32)> {
+fn on_the_way(line: &mut NodeFixture) -> Vec<(Status, u32)> {
     let mut states = line.states();
     states.pop();
     states
@@ -16,11 +16,11 @@ fn on_the_way(line: &mut Line) -> Vec<(Status, u32)> {
 
 #[test]
 fn a_motor_without_sensor_starts_through_its_rev_up() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.execute(Command::StartMotor);
     assert_eq!(line.states().last().unwrap().0, Run);
 
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.execute(Command::StartMotor);
     let way = [
         (IdleStart, 1),
@@ -36,7 +36,7 @@ fn a_motor_without_sensor_starts_through_its_rev_up() {
 
 #[test]
 fn a_motor_with_encoder_aligns_at_its_first_start_only() {
-    let mut line = Line::servo();
+    let mut line = NodeFixture::servo();
     line.execute(Command::StartMotor);
     let aligning = [
         (IdleStart, 1),
@@ -68,7 +68,7 @@ fn a_motor_with_encoder_aligns_at_its_first_start_only() {
 
 #[test]
 fn the_encoder_aligns_on_command_and_only_from_idle() {
-    let mut line = Line::servo();
+    let mut line = NodeFixture::servo();
     line.execute(Command::EncoderAlign);
     let way = [
         (IdleAlignment, 1),
@@ -87,7 +87,7 @@ fn the_encoder_aligns_on_command_and_only_from_idle() {
     line.wait(5);
     assert_eq!(line.status(), Run);
 
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.execute(Command::EncoderAlign);
     line.wait(5);
     assert_eq!(line.status(), Idle, "there is nothing to align");
@@ -95,7 +95,7 @@ fn the_encoder_aligns_on_command_and_only_from_idle() {
 
 #[test]
 fn a_stop_waits_until_the_rotor_stands() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.run();
     line.wait(1500);
     line.execute(Command::StopMotor);
@@ -113,7 +113,7 @@ fn a_stop_waits_until_the_rotor_stands() {
 #[test]
 fn a_stop_interrupts_a_start() {
     for after in [0, 5, 20, 300, 835] {
-        let mut line = Line::sensorless();
+        let mut line = NodeFixture::sensorless();
         line.execute(Command::StartMotor);
         line.wait(after);
         line.execute(Command::StopMotor);
@@ -124,7 +124,7 @@ fn a_stop_interrupts_a_start() {
 
 #[test]
 fn start_stop_starts_an_idle_motor_and_stops_a_running_one() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.execute(Command::StartStop);
     line.until(Run, 2000);
     line.execute(Command::StartStop);
@@ -135,7 +135,7 @@ fn start_stop_starts_an_idle_motor_and_stops_a_running_one() {
 
 #[test]
 fn starting_a_running_motor_and_stopping_an_idle_one_do_nothing() {
-    let mut line = Line::sensorless();
+    let mut line = NodeFixture::sensorless();
     line.execute(Command::StopMotor);
     assert_eq!(line.status(), Idle);
     line.run();
@@ -150,7 +150,7 @@ fn starting_a_running_motor_and_stopping_an_idle_one_do_nothing() {
 fn an_inrush_limiter_delays_the_first_start() {
     let durations = DurationConfig { inrush_ms: 30, ..DurationConfig::default() };
     let config = MotorConfig { durations, ..MotorConfig::default() };
-    let mut line = Line::new(Profile::Spec, [config]);
+    let mut line = NodeFixture::new(Profile::Spec, [config]);
     assert_eq!(line.status(), IclWait);
     line.execute(Command::StartMotor);
     assert_eq!(line.until(Idle, 100), 30);
@@ -158,8 +158,8 @@ fn an_inrush_limiter_delays_the_first_start() {
 
 #[test]
 fn motors_of_a_drive_run_apart() {
-    let mut line = Line::demo(Profile::Spec);
-    line.ask(2, motorlink_proto::st::Request::Execute(Command::StartMotor)).unwrap();
+    let mut line = NodeFixture::demo(Profile::Spec);
+    line.ask(2, motorlink_proto::st::Request::ExecuteCommand(Command::StartMotor)).unwrap();
     line.until(Run, 2000);
     assert_eq!(line.get_id(1, register::STATUS.id()), Ok(u8::from(Idle).into()));
     assert_eq!(line.get_id(2, register::STATUS.id()), Ok(u8::from(Run).into()));
@@ -170,7 +170,7 @@ fn a_rotor_with_a_load_behind_a_gear_comes_to_rest_in_the_alignment() {
     let mut config = MotorConfig::servo();
     config.plant.machine.gear.ratio = 30.0;
     config.plant.load.inertia = 0.02;
-    let mut line = Line::new(Profile::Spec, [config]);
+    let mut line = NodeFixture::new(Profile::Spec, [config]);
     line.execute(Command::EncoderAlign);
     line.until(Status::Alignment, 100);
     line.wait(600);

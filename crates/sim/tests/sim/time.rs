@@ -10,8 +10,7 @@ use motorlink_sim::hash;
 use motorlink_sim::rmd::RmdConfig;
 use motorlink_sim::st::{StDrive, StStation};
 
-use crate::rmd_bench::Bench;
-use crate::st_bench::Line;
+use crate::{rmd_bench, st_bench};
 
 /// Lets `us` pass in pieces of at most `piece`.
 fn cut(now: &mut Instant, us: u64, piece: u64, mut advance: impl FnMut(Instant)) {
@@ -24,9 +23,9 @@ fn cut(now: &mut Instant, us: u64, piece: u64, mut advance: impl FnMut(Instant))
 
 /// Everything that two ST motors send in a run, and where they are at its end.
 fn st_run(piece: u64) -> (Vec<u8>, u64) {
-    let mut line = Line::demo(Profile::Mcsdk54);
+    let mut line = st_bench::NodeFixture::demo(Profile::Mcsdk54);
     for motor in [1, 2] {
-        line.ask(motor, Request::Execute(Command::StartMotor)).unwrap();
+        line.ask(motor, Request::ExecuteCommand(Command::StartMotor)).unwrap();
     }
     for round in 0..40 {
         let (mut now, station) = (line.now, &mut line.station);
@@ -45,7 +44,7 @@ fn st_run(piece: u64) -> (Vec<u8>, u64) {
 /// Every frame that two RMD motors send in a run, and where motor 1 is at its end.
 fn rmd_run(piece: u64) -> (Vec<Vec<u8>>, String) {
     let short = RmdConfig { shutdown_ms: 90, ..RmdConfig::with_id(2) };
-    let mut bench = Bench::new([RmdConfig::default(), short]);
+    let mut bench = rmd_bench::NodeFixture::new([RmdConfig::default(), short]);
     for round in 0..40 {
         let angle = CentiDegrees::from_degrees(f64::from(round * 37 % 100));
         bench.raw(SetPosition { angle }.encode());

@@ -7,8 +7,8 @@ use motorlink_proto::rmd::{
     SpinDirection, Stop, WriteAccelerationRam, WritePidRam,
 };
 use motorlink_proto::st::{
-    Command, CurrentReference, Frame, MAX_FRAME, Motor, PositionMove, Profile, REVUP_PHASES, Ramp,
-    Request, RevupPhase, TorqueRamp, find_register, parse_value,
+    Command, CurrentReference, Frame, MAX_FRAME, MotorNumber, PositionMove, Profile, REVUP_PHASES,
+    Ramp, Request, RevupPhase, TorqueRamp, find_register, parse_value,
 };
 use motorlink_proto::units::Quantity;
 use serde::Deserialize;
@@ -65,27 +65,33 @@ pub(super) enum Direction {
 
 impl StMessage {
     /// The frame to a motor of a drive that speaks `profile`.
-    pub(super) fn encode(&self, motor: Motor, profile: Profile) -> Result<Vec<u8>, String> {
+    pub(super) fn encode(&self, motor: MotorNumber, profile: Profile) -> Result<Vec<u8>, String> {
         let bytes;
         let request = match *self {
-            StMessage::Start {} => Request::Execute(Command::StartMotor),
-            StMessage::Stop {} => Request::Execute(Command::StopMotor),
-            StMessage::StartStop {} => Request::Execute(Command::StartStop),
-            StMessage::StopRamp {} => Request::Execute(Command::StopRamp),
-            StMessage::FaultAck {} => Request::Execute(Command::FaultAck),
-            StMessage::EncoderAlign {} => Request::Execute(Command::EncoderAlign),
-            StMessage::IqdrefClear {} => Request::Execute(Command::IqdrefClear),
-            StMessage::Pfc { action: PfcAction::Enable } => Request::Execute(Command::PfcEnable),
-            StMessage::Pfc { action: PfcAction::Disable } => Request::Execute(Command::PfcDisable),
-            StMessage::Pfc { action: PfcAction::FaultAck } => {
-                Request::Execute(Command::PfcFaultAck)
+            StMessage::Start {} => Request::ExecuteCommand(Command::StartMotor),
+            StMessage::Stop {} => Request::ExecuteCommand(Command::StopMotor),
+            StMessage::StartStop {} => Request::ExecuteCommand(Command::StartStop),
+            StMessage::StopRamp {} => Request::ExecuteCommand(Command::StopRamp),
+            StMessage::FaultAck {} => Request::ExecuteCommand(Command::FaultAck),
+            StMessage::EncoderAlign {} => Request::ExecuteCommand(Command::EncoderAlign),
+            StMessage::IqdrefClear {} => Request::ExecuteCommand(Command::IqdrefClear),
+            StMessage::Pfc { action: PfcAction::Enable } => {
+                Request::ExecuteCommand(Command::PfcEnable)
             }
-            StMessage::Ramp { rpm, ms } => Request::Ramp(Ramp { speed_rpm: rpm, duration_ms: ms }),
+            StMessage::Pfc { action: PfcAction::Disable } => {
+                Request::ExecuteCommand(Command::PfcDisable)
+            }
+            StMessage::Pfc { action: PfcAction::FaultAck } => {
+                Request::ExecuteCommand(Command::PfcFaultAck)
+            }
+            StMessage::Ramp { rpm, ms } => {
+                Request::SetRamp(Ramp { speed_rpm: rpm, duration_ms: ms })
+            }
             StMessage::TorqueRamp { iq_s16a, ms } => {
-                Request::TorqueRamp(TorqueRamp { torque_s16a: iq_s16a, duration_ms: ms })
+                Request::SetTorqueRamp(TorqueRamp { torque_s16a: iq_s16a, duration_ms: ms })
             }
             StMessage::Current { iq_s16a, id_s16a } => {
-                Request::CurrentReference(CurrentReference { iq_s16a, id_s16a })
+                Request::SetCurrentReference(CurrentReference { iq_s16a, id_s16a })
             }
             StMessage::Revup { phase, .. } if phase >= REVUP_PHASES => {
                 return Err(format!("phases of the rev-up are 0 to {}", REVUP_PHASES - 1));
@@ -98,7 +104,7 @@ impl StMessage {
                 return Err("a move has a finite angle and time".to_owned());
             }
             StMessage::Move { rad, seconds } => {
-                Request::Position(PositionMove { angle_rad: rad, duration_s: seconds })
+                Request::SetPosition(PositionMove { angle_rad: rad, duration_s: seconds })
             }
             StMessage::Set { ref register, ref value } => {
                 let register = find_register(register).map_err(|error| error.to_string())?;
@@ -231,7 +237,7 @@ mod tests {
 
     fn st(text: &str) -> Result<Vec<u8>, String> {
         let message: StMessage = toml::from_str(text).map_err(|error| error.to_string())?;
-        message.encode(Motor::FIRST, Profile::Spec)
+        message.encode(MotorNumber::FIRST, Profile::Spec)
     }
 
     fn rmd(text: &str) -> Result<CanFrame, String> {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use motorlink_proto::rmd::MotorId;
-use motorlink_proto::st::{ErrorCode, Motor};
+use motorlink_proto::st::{ErrorCode, MotorNumber};
 use motorlink_proto::time::{Duration, Instant};
 use serde::de::DeserializeOwned;
 use toml::Table;
@@ -52,7 +52,7 @@ impl Reader<'_> {
         let st: Option<u8> = take(table, "st")?;
         let rmd: Option<u8> = take(table, "rmd")?;
         let target = match (st, rmd) {
-            (Some(number), None) => Motor::new(number).map(Target::St),
+            (Some(number), None) => MotorNumber::new(number).map(Target::St),
             (None, Some(id)) => MotorId::new(id).map(Target::Rmd),
             _ => return Err("say which motor: `st = 1`, or `rmd = 1`".to_owned()),
         };

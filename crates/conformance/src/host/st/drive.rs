@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use motorlink_link::serve::ByteStation;
 use motorlink_proto::Hex;
 use motorlink_proto::st::{
-    Command, CurrentReference, ErrorCode, Features, Frame, Motor, Parse, Profile, Ramp, RegisterId,
-    Request, RevupPhase, Slave, Status, Version,
+    Command, CurrentReference, ErrorCode, Features, Frame, MotorNumber, Parse, Profile, Ramp,
+    RegisterId, Request, RevupPhase, Slave, Status, Version,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -59,7 +59,7 @@ impl Scenario {
     /// The drive of this scenario, for a host that waits `timeout` for a reply.
     pub fn drive(&self, timeout: Duration) -> Drive {
         Drive(Arc::new(Mutex::new(Inner {
-            slave: Slave::new(Profile::Spec, Motor::FIRST),
+            slave: Slave::new(Profile::Spec, MotorNumber::FIRST),
             engine: Engine::default(),
             incoming: Vec::new(),
             script: self.script.clone(),
@@ -117,7 +117,7 @@ impl Inner {
         let patience = share(self.timeout, 1, 2);
         let shown = Hex(&request).to_string();
         self.outbox.journal.heard(now, &shown);
-        let motor = Motor::FIRST.number();
+        let motor = MotorNumber::FIRST.number();
         let exchange = self.outbox.journal.asked(now, motor, 0, &shown, patience);
         let decoded = match Frame::parse(&request) {
             Parse::Frame(frame, _) => frame.request(Profile::Spec).ok(),
@@ -127,7 +127,7 @@ impl Inner {
             Some(Request::GetRegister(RegisterId::SPEED_MEAS)) => {
                 (self.engine.readings.checked_sub(1), Some(self.engine.speed()))
             }
-            Some(Request::Execute(Command::StartMotor)) => {
+            Some(Request::ExecuteCommand(Command::StartMotor)) => {
                 (self.engine.starts.checked_sub(1), None)
             }
             _ => (None, None),
@@ -160,8 +160,8 @@ impl Engine {
     }
 }
 
-impl motorlink_proto::st::Drive for Engine {
-    fn features(&self, _: Motor) -> Features {
+impl motorlink_proto::st::MotorControl for Engine {
+    fn features(&self, _: MotorNumber) -> Features {
         Features::NONE
     }
 
@@ -169,7 +169,7 @@ impl motorlink_proto::st::Drive for Engine {
         Version { name: "Adversary", major: 1, minor: 0, patch: 0, pre_release: "" }
     }
 
-    fn read(&mut self, _: Motor, register: RegisterId) -> i32 {
+    fn read(&mut self, _: MotorNumber, register: RegisterId) -> i32 {
         match register {
             RegisterId::SPEED_MEAS => {
                 self.readings += 1;
@@ -181,23 +181,23 @@ impl motorlink_proto::st::Drive for Engine {
         }
     }
 
-    fn write(&mut self, _: Motor, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
+    fn write(&mut self, _: MotorNumber, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
         Ok(())
     }
 
-    fn execute(&mut self, _: Motor, command: Command) {
+    fn execute(&mut self, _: MotorNumber, command: Command) {
         if command == Command::StartMotor {
             self.starts += 1;
         }
     }
 
-    fn ramp(&mut self, _: Motor, _: Ramp) {}
+    fn ramp(&mut self, _: MotorNumber, _: Ramp) {}
 
-    fn revup(&mut self, _: Motor, _: u8) -> RevupPhase {
+    fn revup(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
         RevupPhase::default()
     }
 
-    fn set_revup(&mut self, _: Motor, _: u8, _: RevupPhase) {}
+    fn set_revup(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
 
-    fn current_reference(&mut self, _: Motor, _: CurrentReference) {}
+    fn current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
 }

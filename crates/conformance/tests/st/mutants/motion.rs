@@ -1,6 +1,6 @@
 //! Deviations of a motor that turns, or has a fault.
 
-use motorlink_proto::st::{Flags, Motor, RegisterId, Status};
+use motorlink_proto::st::{Flags, MotorNumber, RegisterId, Status};
 
 use super::{Mutant, ack, answers, caught, gives, hears, mutant, parsed, takes};
 use crate::peer::{Station, frame};
@@ -61,7 +61,7 @@ const MUTANTS: [Mutant; 27] = [
             let cleared =
                 parsed(bytes) == Some((0x23, vec![7])) && status(station) == Status::FaultNow;
             if cleared {
-                let motor = station.drive_mut().motor_mut(Motor::FIRST).expect("motor 1");
+                let motor = station.drive_mut().motor_mut(MotorNumber::FIRST).expect("motor 1");
                 motor.release_faults(Flags::OVER_TEMP);
                 let until = now + motorlink_proto::time::Duration::from_millis(5);
                 station.advance_to(until);

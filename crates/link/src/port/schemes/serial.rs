@@ -18,11 +18,11 @@ use rustix::termios::{
 };
 
 use super::super::error::{PortError, owning_group, permission_hint};
-use super::super::event::EventLine;
+use super::super::event::EventBytes;
 use super::super::fd::FdLink;
 use super::super::link::ByteLink;
 use super::super::name::{Given, NameError};
-use super::super::queued::QueuedLine;
+use super::super::queued::QueuedBytes;
 use super::super::scheme::{Carries, Form, LinePort, Port, PortInfo, PortName, Scheme};
 use super::super::system;
 
@@ -119,8 +119,8 @@ impl LinePort for Device {
         Ok(Box::new(open(&self.path, self.baud)?))
     }
 
-    fn open_event(&self) -> Result<Box<dyn EventLine>, PortError> {
-        Ok(Box::new(QueuedLine::new(open(&self.path, self.baud)?)))
+    fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
+        Ok(Box::new(QueuedBytes::new(open(&self.path, self.baud)?)))
     }
 
     fn label(&self) -> String {

@@ -6,13 +6,13 @@ use std::{fmt, io};
 
 use rustix::net::sockopt;
 
-use super::super::emulated::EmulatedLine;
+use super::super::emulated::EmulatedBytes;
 use super::super::error::PortError;
-use super::super::event::EventLine;
+use super::super::event::EventBytes;
 use super::super::fd::FdLink;
 use super::super::link::ByteLink;
 use super::super::name::{Given, NameError, host_and_port};
-use super::super::queued::QueuedLine;
+use super::super::queued::QueuedBytes;
 use super::super::scheme::{Carries, Form, LinePort, Port, PortName, Scheme};
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
@@ -53,7 +53,7 @@ impl Scheme for Tcp {
         let clock = clock.map(|clock| {
             TcpAddress::parse(given, clock, "tcp:127.0.0.1:4000?clock=127.0.0.1:4002")
         });
-        Ok(PortName::new(TcpLine { address, clock: clock.transpose()? }))
+        Ok(PortName::new(TcpBytes { address, clock: clock.transpose()? }))
     }
 
     fn options(&self) -> &'static [&'static str] {
@@ -87,13 +87,13 @@ impl fmt::Display for TcpAddress {
 
 /// A serial line behind a TCP server.
 #[derive(Debug)]
-struct TcpLine {
+struct TcpBytes {
     address: TcpAddress,
     /// The clock port of the emulated board behind it, whose time is then the line's.
     clock: Option<TcpAddress>,
 }
 
-impl Port for TcpLine {
+impl Port for TcpBytes {
     fn body(&self) -> String {
         format!("tcp:{}", self.address)
     }
@@ -107,7 +107,7 @@ impl Port for TcpLine {
     }
 }
 
-impl LinePort for TcpLine {
+impl LinePort for TcpBytes {
     fn open(&self) -> Result<Box<dyn ByteLink>, PortError> {
         let Some(clock) = &self.clock else {
             return Ok(Box::new(connect(&self.address, self.label())?));
@@ -116,14 +116,14 @@ impl LinePort for TcpLine {
         let name = format!("clock={clock}");
         let board = connect(clock, name.clone())?;
         let data = connect(&self.address, self.label())?;
-        Ok(Box::new(EmulatedLine::new(data, board, name)?))
+        Ok(Box::new(EmulatedBytes::new(data, board, name)?))
     }
 
-    fn open_event(&self) -> Result<Box<dyn EventLine>, PortError> {
+    fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
         if self.clock.is_some() {
             return Err(PortError::Emulated { port: self.label() });
         }
-        Ok(Box::new(QueuedLine::new(connect(&self.address, self.label())?)))
+        Ok(Box::new(QueuedBytes::new(connect(&self.address, self.label())?)))
     }
 
     fn label(&self) -> String {

@@ -5,11 +5,11 @@ use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 
 use super::super::error::PortError;
-use super::super::event::EventLine;
+use super::super::event::EventBytes;
 use super::super::fd::FdLink;
 use super::super::link::ByteLink;
 use super::super::name::{Given, NameError};
-use super::super::queued::QueuedLine;
+use super::super::queued::QueuedBytes;
 use super::super::scheme::{Carries, Form, LinePort, Port, PortName, Scheme};
 
 /// `unix:PATH`.
@@ -66,8 +66,8 @@ impl LinePort for Socket {
         Ok(Box::new(self.connect()?))
     }
 
-    fn open_event(&self) -> Result<Box<dyn EventLine>, PortError> {
-        Ok(Box::new(QueuedLine::new(self.connect()?)))
+    fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError> {
+        Ok(Box::new(QueuedBytes::new(self.connect()?)))
     }
 
     fn label(&self) -> String {

@@ -25,7 +25,7 @@ pub enum Recovery {
 
 /// How a [`Master`](super::Master) behaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Config {
+pub struct MasterConfig {
     /// How long to wait for a reply.
     pub timeout: Duration,
     /// How a lost line comes back.
@@ -36,7 +36,7 @@ pub struct Config {
     pub profile: Profile,
 }
 
-impl Config {
+impl MasterConfig {
     /// The longest that an exchange can take, however the line behaves, beside the time in which the
     /// port takes what is sent: the reply's timeout on a line that is up. On a lost line there come
     /// before it silence, as long as may be waited for it, before and behind the questions, and the
@@ -61,10 +61,10 @@ impl Config {
     }
 }
 
-impl Default for Config {
+impl Default for MasterConfig {
     /// The document's 1 s, `Drain`, 50 ms of silence, profile `spec`.
     fn default() -> Self {
-        Config {
+        MasterConfig {
             timeout: TIMEOUT,
             recovery: Recovery::default(),
             quiet: Duration::from_millis(50),

@@ -1,8 +1,8 @@
 //! One request and its reply, as bytes.
 
 use crate::st::{
-    Error, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Parse, Profile, Reply,
-    ReplySize, Request,
+    ExchangeError, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Parse, Profile,
+    Reply, ReplySize, Request,
 };
 
 /// A request until it is sent, then what is received of the reply.
@@ -20,7 +20,7 @@ pub(super) enum Received {
     Identification,
     /// The end of the exchange, and how many bytes there are behind the reply. The payload has this
     /// many bytes.
-    End(Result<u8, Error>, u8),
+    End(Result<u8, ExchangeError>, u8),
 }
 
 impl Exchange {
@@ -84,7 +84,7 @@ impl Exchange {
                     // another one, and answer that too.
                     (Reply::Refused(code), _) if code.is_damage() => Failure::NotUnderstood(code),
                     (Reply::Refused(code), _) => {
-                        return Some(Received::End(Err(Error::Refused(code)), surplus));
+                        return Some(Received::End(Err(ExchangeError::Refused(code)), surplus));
                     }
                     (_, [own, other]) => {
                         let received = frame.payload.len() as u8;
@@ -98,7 +98,7 @@ impl Exchange {
                 (failure, surplus)
             }
         };
-        Some(Received::End(Err(Error::Failed(failure)), surplus))
+        Some(Received::End(Err(ExchangeError::Failed(failure)), surplus))
     }
 
     /// The failure when nothing more is received in time.

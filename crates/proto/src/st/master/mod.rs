@@ -10,11 +10,11 @@ mod question;
 mod resync;
 mod scan;
 
-pub use config::{Config, Recovery, TIMEOUT};
+pub use config::{MasterConfig, Recovery, TIMEOUT};
 pub use question::question_behind;
-pub use resync::Line;
+pub use resync::SyncState;
 
-use super::{Error, Failure, Frame, FrameCode, Profile, Request};
+use super::{ExchangeError, Failure, Frame, FrameCode, Profile, Request};
 use crate::time::{Duration, Instant};
 use exchange::{Exchange, Received};
 use resync::{Resync, Stage, Step, Summary};
@@ -25,7 +25,7 @@ pub enum Output<'a> {
     /// Send these bytes, then poll again.
     Transmit(&'a [u8]),
     /// The exchange is over: the payload of the positive acknowledge, or why there is none.
-    Done(Result<&'a [u8], Error>),
+    Done(Result<&'a [u8], ExchangeError>),
     /// Hand in what comes until then; `None` while no exchange is under way.
     Wait(Option<Instant>),
 }
@@ -57,7 +57,7 @@ pub enum RequestError {
 /// poll that follows the transmission (4.1).
 #[derive(Debug, Clone)]
 pub struct Master {
-    config: Config,
+    config: MasterConfig,
     state: State,
     exchange: Exchange,
     /// The request of the exchange.
@@ -78,14 +78,14 @@ enum State {
     Waiting {
         deadline: Instant,
     },
-    Done(Result<u8, Error>),
+    Done(Result<u8, ExchangeError>),
 }
 
 impl Master {
     /// A master on a line that was just opened. A former master may have left something in it: where
     /// the line can be recovered it is brought in step before the first request (SPEC-NOTES S16),
     /// unless the caller knows better and says so with [`trust_line`](Self::trust_line).
-    pub const fn new(config: Config) -> Self {
+    pub const fn new(config: MasterConfig) -> Self {
         Master {
             config,
             state: State::Idle,
@@ -97,14 +97,14 @@ impl Master {
     }
 
     /// How long the longest thing that a master sends takes at `baud`, with 10 bits a byte. A caller
-    /// whose port takes bytes faster than the line carries them adds this to [`Config::quiet`].
+    /// whose port takes bytes faster than the line carries them adds this to [`MasterConfig::quiet`].
     pub const fn longest_transmission(baud: u32) -> Duration {
         let bits = question::PADDING.len() as u64 * 10;
         Duration(bits * 1_000_000 / if baud == 0 { 1 } else { baud as u64 })
     }
 
     /// Whether the line can be used.
-    pub const fn line(&self) -> Line {
+    pub const fn sync_state(&self) -> SyncState {
         self.resync.line()
     }
 
@@ -114,7 +114,7 @@ impl Master {
     }
 
     /// How the master behaves from the next request on.
-    pub const fn config_mut(&mut self) -> &mut Config {
+    pub const fn config_mut(&mut self) -> &mut MasterConfig {
         &mut self.config
     }
 
@@ -150,10 +150,10 @@ impl Master {
     #[inline(never)]
     fn begin(&mut self, request: Summary) {
         self.request = request;
-        self.state = match (self.line(), Stage::first(self.config.recovery)) {
-            (Line::Up, _) => State::Send,
-            (Line::Lost, Some(stage)) => State::Recovering(stage),
-            (Line::Lost, None) => State::Done(Err(Error::Failed(Failure::Lost))),
+        self.state = match (self.sync_state(), Stage::first(self.config.recovery)) {
+            (SyncState::InSync, _) => State::Send,
+            (SyncState::Lost, Some(stage)) => State::Recovering(stage),
+            (SyncState::Lost, None) => State::Done(Err(ExchangeError::Failed(Failure::Lost))),
         };
     }
 
@@ -205,7 +205,7 @@ impl Master {
                 }
                 Step::Failed(failure) => {
                     self.state = State::Idle;
-                    Output::Done(Err(Error::Failed(failure)))
+                    Output::Done(Err(ExchangeError::Failed(failure)))
                 }
             },
             State::Send => {
@@ -221,7 +221,7 @@ impl Master {
             State::Waiting { .. } => {
                 self.lose();
                 self.state = State::Idle;
-                Output::Done(Err(Error::Failed(self.exchange.timeout())))
+                Output::Done(Err(ExchangeError::Failed(self.exchange.timeout())))
             }
             State::Done(result) => {
                 let result = *result;
@@ -259,7 +259,7 @@ impl Master {
                 }
                 Received::End(result, surplus) => {
                     self.unasked(usize::from(surplus));
-                    if surplus > 0 || matches!(result, Err(Error::Failed(_))) {
+                    if surplus > 0 || matches!(result, Err(ExchangeError::Failed(_))) {
                         self.lose();
                     }
                     self.state = State::Done(result);

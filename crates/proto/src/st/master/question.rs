@@ -21,7 +21,7 @@ pub(super) const FLAGS: u8 = 8;
 /// each question: the answer to the one before has another size, too.
 pub const fn question_behind(size: Option<usize>, turn: bool) -> (Request<'static>, usize) {
     match (size, turn) {
-        (Some(1 | 4), true) => (Request::BoardInfo, 32),
+        (Some(1 | 4), true) => (Request::GetBoardInfo, 32),
         (Some(1), false) | (_, true) => (Request::GetRegister(RegisterId::FLAGS), 4),
         _ => (Request::GetRegister(RegisterId::STATUS), 1),
     }
@@ -79,8 +79,8 @@ impl Question {
     pub(super) fn ask(&mut self, kind: u8) -> &[u8] {
         *self = Question { kind, ..Question::NONE };
         let request = match kind {
-            INFO => Request::BoardInfo,
-            REVUP => Request::RevupData(0),
+            INFO => Request::GetBoardInfo,
+            REVUP => Request::GetRevupData(0),
             STATUS => Request::GetRegister(RegisterId::STATUS),
             _ => Request::GetRegister(RegisterId::FLAGS),
         };
@@ -91,7 +91,7 @@ impl Question {
 
     /// A STOP_MOTOR, which goes before a question.
     pub(super) fn stop(&mut self, motor: u8) -> &[u8] {
-        let stop = Request::Execute(Command::StopMotor);
+        let stop = Request::ExecuteCommand(Command::StopMotor);
         Frame::command(motor, &stop, &mut self.frame).unwrap_or(&[])
     }
 

@@ -1,16 +1,16 @@
 //! Recovery: brings a line in step that was just opened, or on which an exchange failed
 //! (SPEC-NOTES S16).
 
-use super::config::{Config, Recovery, TIMEOUT};
+use super::config::{MasterConfig, Recovery, TIMEOUT};
 use super::question::{FLAGS, INFO, PADDING, Question, REVUP, STATUS};
 use crate::st::{Failure, FrameCode};
 use crate::time::Instant;
 
 /// Whether the line can be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Line {
+pub enum SyncState {
     /// The last exchange ended in step.
-    Up,
+    InSync,
     /// Just opened, or an exchange failed: the next one has to bring the line in step first.
     Lost,
 }
@@ -43,7 +43,7 @@ impl Summary {
 /// Whether the line is in step, and what may still be received if it is not.
 #[derive(Debug, Clone)]
 pub(super) struct Resync {
-    line: Line,
+    line: SyncState,
     /// The request when the line was lost.
     lost: Summary,
     /// Whether everything that may still be answered is known. It is not before the line was in step
@@ -89,7 +89,7 @@ impl Stage {
         }
     }
 
-    fn quiet(until: Instant, then: Then, config: &Config) -> Self {
+    fn quiet(until: Instant, then: Then, config: &MasterConfig) -> Self {
         Stage::Quiet { until, limit: until + config.timeout, then }
     }
 }
@@ -110,7 +110,7 @@ impl Resync {
     /// A line that was just opened.
     pub(super) const fn new(is_trusted: bool) -> Self {
         Resync {
-            line: if is_trusted { Line::Up } else { Line::Lost },
+            line: if is_trusted { SyncState::InSync } else { SyncState::Lost },
             lost: Summary::NONE,
             is_known: is_trusted,
             question: Question::NONE,
@@ -118,13 +118,13 @@ impl Resync {
         }
     }
 
-    pub(super) const fn line(&self) -> Line {
+    pub(super) const fn line(&self) -> SyncState {
         self.line
     }
 
     /// Nothing is left in the line.
     pub(super) fn in_step(&mut self) {
-        self.line = Line::Up;
+        self.line = SyncState::InSync;
         self.is_known = true;
         self.outstanding = 0;
     }
@@ -132,9 +132,9 @@ impl Resync {
     /// The reply to `request` may still be received, or something else is out of step. Returns whether
     /// the line was in step before.
     pub(super) fn lose(&mut self, request: Summary) -> bool {
-        let was_up = self.line == Line::Up;
+        let was_up = self.line == SyncState::InSync;
         if was_up {
-            self.line = Line::Lost;
+            self.line = SyncState::Lost;
             self.lost = request;
             self.outstanding |= request.alike;
         }
@@ -154,7 +154,12 @@ impl Resync {
     }
 
     /// What to do next.
-    pub(super) fn poll(&mut self, stage: &mut Stage, now: Instant, config: &Config) -> Step<'_> {
+    pub(super) fn poll(
+        &mut self,
+        stage: &mut Stage,
+        now: Instant,
+        config: &MasterConfig,
+    ) -> Step<'_> {
         match *stage {
             Stage::Pad => {
                 let then = if self.lost.is_read { Then::Probe } else { Then::Stop };
@@ -204,7 +209,7 @@ impl Resync {
         stage: &mut Stage,
         now: Instant,
         bytes: &[u8],
-        config: &Config,
+        config: &MasterConfig,
     ) -> usize {
         let asked = match *stage {
             Stage::Probed => now,
@@ -248,7 +253,7 @@ impl Resync {
         now: Instant,
         asked: Instant,
         bytes: &[u8],
-        config: &Config,
+        config: &MasterConfig,
     ) -> Option<Stage> {
         let came = self.question.hear(bytes);
         let is_answered =

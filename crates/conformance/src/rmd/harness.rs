@@ -27,7 +27,7 @@ pub struct Options {
 /// A motor on a bus.
 ///
 /// A motor that answers on the identifiers of another protocol is not spoken to any further.
-pub struct Bench {
+pub struct Harness {
     bus: Box<dyn CanLink>,
     /// That of the bus.
     clock: Clock,
@@ -56,10 +56,10 @@ pub(super) const SILENCE: Duration = Duration::from_millis(50);
 /// More than this many frames that nobody asked for, one behind the other, is no bus to test on.
 const CROWD: usize = 1000;
 
-impl Bench {
-    /// A bench for a motor on `bus`.
+impl Harness {
+    /// A harness for a motor on `bus`.
     pub fn new(bus: Box<dyn CanLink>, world: Box<dyn World>, options: Options) -> Self {
-        Bench {
+        Harness {
             clock: bus.clock().unwrap_or_default(),
             bus,
             world,

@@ -5,8 +5,8 @@ use motorlink::port::ByteLink;
 use motorlink::st::Transcript;
 use motorlink_proto::Hex;
 use motorlink_proto::st::{
-    Bad, Command, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, Motor, Parse, Profile,
-    RegisterId, Request, Status,
+    Bad, Command, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, MotorNumber, Parse,
+    Profile, RegisterId, Request, Status,
 };
 use motorlink_proto::time::{Duration, Instant};
 
@@ -24,7 +24,7 @@ pub struct Options {
     /// What the drive is held to.
     pub profile: Profile,
     /// The motor that is tested.
-    pub motor: Motor,
+    pub motor: MotorNumber,
     /// What the user allowed.
     pub allowed: Vec<Need>,
     /// How long a byte takes on the line; zero where that does not matter.
@@ -32,7 +32,7 @@ pub struct Options {
 }
 
 /// A drive behind a line.
-pub struct Bench {
+pub struct Harness {
     line: Box<dyn ByteLink>,
     /// That of the line.
     pub(super) clock: Clock,
@@ -88,14 +88,14 @@ const GRACE: Duration = Duration::from_millis(50);
 /// Lines of a transcript that are kept.
 const TRANSCRIPT: usize = 60;
 
-impl Bench {
-    /// A bench for the drive behind `line`.
+impl Harness {
+    /// A harness for the drive behind `line`.
     pub fn new(line: Box<dyn ByteLink>, world: Box<dyn World>, options: Options) -> Self {
         let words = Transcript::new(options.profile);
         let clock = line.clock().unwrap_or_default();
         let sent_at = clock.now();
         let (found, beside, undo, transcript, sent, received, pending) = Default::default();
-        Bench {
+        Harness {
             line,
             clock,
             world,
@@ -357,7 +357,7 @@ impl Bench {
     }
 
     pub(super) fn execute(&mut self, command: Command) -> Result<(), Stop> {
-        self.done(&Request::Execute(command))
+        self.done(&Request::ExecuteCommand(command))
     }
 
     pub(super) fn status(&mut self) -> Result<Status, Stop> {
