@@ -7,7 +7,7 @@ use motorlink_proto::st::{
     MotorNumber, Output, PositionMove, Profile, Ramp, RegisterId, Request, RevupPhase, Slave,
     TorqueRamp, Version,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::st::StDrive;
 
 use crate::kernel::{Counter, Kernel};
@@ -17,7 +17,7 @@ use crate::result::Result;
 /// Instructions that an exchange has to stay below.
 const MOST: f64 = 1_500.0;
 /// Time between two exchanges, for the simulated drive.
-const PERIOD: Duration = Duration(100);
+const PERIOD: Micros = Micros(100);
 
 pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     let counter = Counter::find();

@@ -2,7 +2,7 @@
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::*;
 use motorlink_sim::rmd::{RmdBus, RmdNode};
 
@@ -83,7 +83,7 @@ pub fn host(data: &[u8]) {
                 let data: [u8; 8] = input.array();
                 bench.host.receive(bench.now, &CanFrame::new(id.can_id(), data));
             }
-            7 => bench.now += Duration(u64::from(input.word()) * 4),
+            7 => bench.now += Micros(u64::from(input.word()) * 4),
             8 => {
                 bench.host.cancel(bench.now, id);
                 assert!(!bench.host.busy().contains(id));
@@ -100,8 +100,8 @@ pub fn host(data: &[u8]) {
                 };
                 bench.host.set_limits(id, limits);
             }
-            10 => bench.host.set_timeout(Duration(u64::from(input.word()))),
-            11 => bench.host.set_quarantine(Duration(u64::from(input.word()))),
+            10 => bench.host.set_timeout(Micros(u64::from(input.word()))),
+            11 => bench.host.set_quarantine(Micros(u64::from(input.word()))),
             12 => {
                 bench.host.reopened(bench.now);
                 bench.torque4 = None;
@@ -207,9 +207,9 @@ pub fn drive(data: &[u8]) {
                 ask(&mut bus, now, CanFrame::new(id.can_id(), data));
             }
             3 => ask(&mut bus, now, any_frame(&mut input)),
-            4 => now += Duration(u64::from(input.byte()) * 50),
+            4 => now += Micros(u64::from(input.byte()) * 50),
             5 => {
-                now += Duration(u64::from(input.word()) * 2);
+                now += Micros(u64::from(input.word()) * 2);
                 bus.advance_to(now);
             }
             6 => {
@@ -227,7 +227,7 @@ pub fn drive(data: &[u8]) {
             _ => bus.node_mut(id).expect("1 to 4 are there").power_cycle(now),
         }
     }
-    bus.advance_to(now + Duration::from_millis(10));
+    bus.advance_to(now + Micros::from_millis(10));
     finite(bus.nodes());
 }
 

@@ -2,7 +2,7 @@
 
 use motorlink::st::Transcript;
 use motorlink_proto::st::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::st::{StDrive, StMotor, StStation};
 
 use crate::input::Input;
@@ -76,8 +76,8 @@ const QUESTIONS: [&[u8]; 2] = [&[0x06, 0x00, 0x06], &[0x08, 0x01, 0x00, 0x09]];
 pub fn master(data: &[u8]) {
     let mut input = Input::new(data);
     let recovery = [Recovery::None, Recovery::Drain, Recovery::Pad][usize::from(input.byte()) % 3];
-    let timeout = Duration(u64::from(input.word()) * 16);
-    let quiet = Duration(u64::from(input.word()) * 4);
+    let timeout = Micros(u64::from(input.word()) * 16);
+    let quiet = Micros(u64::from(input.word()) * 4);
     let mut bench = MasterFixture {
         master: Master::new(MasterConfig { timeout, recovery, quiet, ..MasterConfig::default() }),
         now: Instant(0),
@@ -93,7 +93,7 @@ pub fn master(data: &[u8]) {
             2 => bench.raw(input.byte(), input.bytes()),
             3 | 4 => bench.receive(input.bytes()),
             5 => bench.reply(input.byte(), input.bytes()),
-            6 => bench.now += Duration(u64::from(input.word()) * 16),
+            6 => bench.now += Micros(u64::from(input.word()) * 16),
             7 => {
                 bench.master.abandon();
                 assert!(
@@ -250,9 +250,9 @@ pub fn slave(data: &[u8]) {
                 let frame = Frame { header, payload }.encode(&mut out).expect("128 bytes fit");
                 station.receive(now, frame, reply);
             }
-            4 => now += Duration(u64::from(input.byte()) * 100),
+            4 => now += Micros(u64::from(input.byte()) * 100),
             5 => {
-                now += Duration::from_millis(u32::from(input.byte()));
+                now += Micros::from_millis(u32::from(input.byte()));
                 station.poll(now, reply);
                 assert!(station.deadline().is_none_or(|deadline| deadline > now));
             }
@@ -260,7 +260,7 @@ pub fn slave(data: &[u8]) {
             _ => station.power_cycle(),
         }
     }
-    station.advance_to(now + Duration::from_millis(20));
+    station.advance_to(now + Micros::from_millis(20));
     finite(station.drive().motors());
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use motorlink::time::{Duration, Instant};
+use motorlink::time::{Instant, Micros};
 use motorlink_link::fault::{Faults, Lane, Rng, Unit, Way};
 
 use crate::life::Life;
@@ -64,7 +64,7 @@ impl<E: Ends> Run<E> {
         ends: E,
         faults: &Faults,
         beyond: bool,
-        unit: Duration,
+        unit: Micros,
         protocol: <E::Unit as Unit>::Protocol,
     ) -> Self
     where
@@ -103,7 +103,7 @@ impl<E: Ends> Run<E> {
                 if rng.bool() {
                     E::killed_in(&mut self, &mut rng);
                 }
-                self.rest(Duration(rng.u64(..50_000)));
+                self.rest(Micros(rng.u64(..50_000)));
                 self.next_program();
             }
             E::exchange(&mut self, &mut rng);
@@ -113,8 +113,8 @@ impl<E: Ends> Run<E> {
             }
             // Most programs ask at once; some pause.
             match rng.u8(..10) {
-                0 => self.rest(Duration(rng.u64(..E::RESTS[0]))),
-                1 | 2 => self.rest(Duration(rng.u64(..E::RESTS[1]))),
+                0 => self.rest(Micros(rng.u64(..E::RESTS[0]))),
+                1 | 2 => self.rest(Micros(rng.u64(..E::RESTS[1]))),
                 _ => {}
             }
         }
@@ -128,7 +128,7 @@ impl<E: Ends> Run<E> {
     }
 
     /// Nothing is asked for a while.
-    pub fn rest(&mut self, pause: Duration) {
+    pub fn rest(&mut self, pause: Micros) {
         self.advance(self.now + pause);
     }
 

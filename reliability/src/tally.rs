@@ -1,6 +1,6 @@
 //! What became of the exchanges of a run.
 
-use motorlink::time::{Duration, Instant};
+use motorlink::time::{Instant, Micros};
 
 /// What became of the exchanges of a run, or of several.
 #[derive(Debug, Clone, Default)]
@@ -25,7 +25,7 @@ pub struct Tally {
     /// From the end of an exchange that failed to the end of the next one that did not, us.
     recoveries: Vec<u32>,
     /// The longest exchange.
-    pub longest: Duration,
+    pub longest: Micros,
 }
 
 impl Tally {

@@ -3,7 +3,7 @@
 use motorlink_proto::rmd::{
     Command, Host, MotorId, MotorSet, Output, RequestError, SetSpeed, SetTorque4,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::{CentiDps, IqCommand};
 use motorlink_sim::rmd::{RmdBus, RmdNode};
 
@@ -38,7 +38,7 @@ impl Cycle {
     }
 
     /// Runs `cycles` of it with motors that answer `turnaround` after the request.
-    pub(super) fn run(self, cycles: u32, turnaround: Duration) -> Result<Outcome> {
+    pub(super) fn run(self, cycles: u32, turnaround: Micros) -> Result<Outcome> {
         let mut rig = Rig::new(turnaround);
         for number in 0..cycles {
             // A swing of references, so that motors turn and frames differ.
@@ -74,7 +74,7 @@ pub(super) struct Outcome {
     cycles: u32,
     /// Bits, of which the wire carries one a microsecond.
     carried: u64,
-    took: Duration,
+    took: Micros,
 }
 
 impl Outcome {
@@ -105,11 +105,11 @@ struct Rig {
     host: Host,
     wire: Wire,
     motors: RmdBus<[RmdNode; 4]>,
-    turnaround: Duration,
+    turnaround: Micros,
 }
 
 impl Rig {
-    fn new(turnaround: Duration) -> Self {
+    fn new(turnaround: Micros) -> Self {
         let (mut host, motors) = (Host::new(), RmdBus::demo(START));
         host.trust(MotorSet::ALL);
         Rig { now: START, host, wire: Wire::default(), motors, turnaround }
@@ -162,14 +162,14 @@ mod tests {
     #[test]
     fn cycles_fill_the_wire_when_motors_answer_at_once() {
         for cycle in Cycle::ALL {
-            let outcome = cycle.run(50, Duration(0)).unwrap();
+            let outcome = cycle.run(50, Micros(0)).unwrap();
             assert!(outcome.share() >= 0.98, "{cycle:?}: {outcome:?}");
         }
     }
 
     #[test]
     fn overlapping_exchanges_hide_a_turnaround_and_others_wait_for_it() {
-        let turnaround = Duration(250);
+        let turnaround = Micros(250);
         let pipelined = Cycle::Pipelined.run(50, turnaround).unwrap();
         let serial = Cycle::Serial.run(50, turnaround).unwrap();
         assert!(pipelined.share() > 0.98, "{pipelined:?}");
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn an_outcome_counts_bits_and_time() {
-        let outcome = Outcome { cycles: 10, carried: 5_000, took: Duration(10_000) };
+        let outcome = Outcome { cycles: 10, carried: 5_000, took: Micros(10_000) };
         assert_eq!(outcome.bits_per_cycle(), 500.0);
         assert_eq!(outcome.ceiling(), 2_000.0);
         assert_eq!(outcome.rate(), 1_000.0);

@@ -4,7 +4,7 @@ mod bits;
 mod cycle;
 mod wire;
 
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use crate::report::{Goal, Section};
 use crate::result::Result;
@@ -12,7 +12,7 @@ use cycle::{Cycle, Outcome};
 
 const CYCLES: u32 = 2_000;
 /// What real motors may take to answer.
-const TURNAROUND: Duration = Duration(250);
+const TURNAROUND: Micros = Micros(250);
 /// The share of the wire's ceiling that a cycle has to reach when motors answer at once.
 const LEAST: f64 = 0.98;
 
@@ -20,7 +20,7 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     let mut rows = Vec::new();
     let mut goals = Vec::new();
     for cycle in Cycle::ALL {
-        let at_once = cycle.run(CYCLES, Duration(0))?;
+        let at_once = cycle.run(CYCLES, Micros(0))?;
         let later = cycle.run(CYCLES, TURNAROUND)?;
         rows.push(vec![
             cycle.name().to_owned(),

@@ -1,7 +1,7 @@
 //! A bus at 1 Mbit/s: a bit is a microsecond, and the lowest identifier goes first.
 
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::bits::{INTERMISSION, frame_bits};
 
@@ -43,8 +43,8 @@ impl Wire {
         let (winner, _) = contenders.min_by_key(|(_, transfer)| transfer.frame.id())?;
         let mut transfer = self.queued.remove(winner);
         let bits = frame_bits(transfer.frame.id() as u16, transfer.frame.data());
-        transfer.at = start + Duration(bits.into());
-        self.idle_from = transfer.at + Duration(INTERMISSION.into());
+        transfer.at = start + Micros(bits.into());
+        self.idle_from = transfer.at + Micros(INTERMISSION.into());
         self.carried += u64::from(bits + INTERMISSION);
         Some(transfer)
     }

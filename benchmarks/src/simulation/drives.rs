@@ -5,7 +5,7 @@ use std::hint::black_box;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Command as _, SetSpeed};
 use motorlink_proto::st::{Command, MotorControl as _, MotorNumber, Profile, Ramp};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::CentiDps;
 use motorlink_sim::plant::{Bridge, LoadConfig, Plant, PlantConfig};
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use crate::kernel::Kernel;
 
 /// A period of the pulse width modulation.
-const PERIOD: Duration = Duration(50);
+const PERIOD: Micros = Micros(50);
 pub(super) const PERIOD_S: f64 = 50e-6;
 
 /// Time to get to the speed.

@@ -261,7 +261,7 @@ impl PythonCan {
     }
 
     fn failed(&self, error: PyErr) -> PortError {
-        PortError::Io { port: self.name.clone(), source: Error::other(error) }
+        PortError::Io { port: self.name.clone(), source: Error::other(error).into() }
     }
 }
 

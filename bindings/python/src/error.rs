@@ -132,18 +132,18 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
     let facts =
         |port, id: &rmd::MotorId| Facts { port: Some(port), motor: Some(id.number()), code: None };
     let (kind, facts) = match error {
-        Error::Timeout { port, id, .. }
-        | Error::Adapter { port, id, .. }
-        | Error::Quarantined { port, id }
-        | Error::Shared { port, id } => (Kind::Timeout, facts(port, id)),
-        Error::Foreign { port, id, .. }
-        | Error::Altered { port, id, .. }
-        | Error::Unconfirmed { port, id }
-        | Error::Echo { port, id } => (Kind::LineLost, facts(port, id)),
-        Error::Twice(id) | Error::OutOfReach(id) | Error::Limit { id, .. } => {
+        Error::Timeout { port, motor: id, .. }
+        | Error::Adapter { port, motor: id, .. }
+        | Error::Quarantined { port, motor: id }
+        | Error::Shared { port, motor: id } => (Kind::Timeout, facts(port, id)),
+        Error::Foreign { port, motor: id, .. }
+        | Error::Altered { port, motor: id, .. }
+        | Error::Unconfirmed { port, motor: id }
+        | Error::Echo { port, motor: id } => (Kind::LineLost, facts(port, id)),
+        Error::Twice(id) | Error::OutOfReach(id) | Error::Limit { motor: id, .. } => {
             (Kind::BadValue, Facts { motor: Some(id.number()), ..Facts::default() })
         }
-        Error::FullTurn { id, .. } => {
+        Error::FullTurn { motor: id, .. } => {
             let facts = Facts { motor: Some(id.number()), ..Facts::default() };
             let hint = "full_turn=True sends it all the same";
             return Kind::FullTurn.raise(py, format_args!("{error}; {hint}"), facts);

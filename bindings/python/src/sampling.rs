@@ -59,7 +59,7 @@ impl Plan {
 fn pass(clock: &Clock, span: Duration) {
     // A part of a microsecond is one: virtual time would never pass it.
     let micros = span.as_nanos().div_ceil(1000);
-    clock.wait(clock.now() + time::Duration(micros.try_into().unwrap_or(u64::MAX)));
+    clock.wait(clock.now() + time::Micros(micros.try_into().unwrap_or(u64::MAX)));
 }
 
 /// The instants of a plan, one after the other. One whose period has passed is left out.

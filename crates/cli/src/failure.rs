@@ -51,7 +51,7 @@ impl From<rmd::Error> for Failure {
     fn from(error: rmd::Error) -> Self {
         let message = error.to_string();
         match &error {
-            rmd::Error::Port(error) => Failure::from(&**error),
+            rmd::Error::Port(error) => error.into(),
             error if error.is_line_failure() => Failure::Silent(message),
             _ => Failure::Usage(message),
         }

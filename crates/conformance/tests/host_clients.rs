@@ -81,8 +81,7 @@ fn our_client_passes_every_scenario() {
 }
 
 fn ask_client(path: &str, task: Task) -> Said {
-    let mut options = st::Options::default();
-    options.master.timeout = TIMEOUT.into();
+    let options = st::Options { timeout: TIMEOUT, ..st::Options::default() };
     let client = st::Client::open(&path.parse().unwrap(), options).unwrap();
     let motor = client.motor(1).unwrap();
     let mut said = Said::default();

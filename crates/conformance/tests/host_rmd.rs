@@ -15,7 +15,7 @@ use motorlink_proto::rmd::{
     MotorId, MotorSet, MultiTurnAngle, Off, Output, Payload, ReadMultiTurnAngle,
     ReadSingleTurnAngle, RequestError, SetTorque4, SingleTurnAngle, Status, TORQUE4_ID,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 type Bus = Finite<Motors, CanFrame>;
 
@@ -76,7 +76,7 @@ fn results(bus: &mut Bus, task: Task) -> Result<Vec<Ended>, PortError> {
     for turn in 0..turns(task) {
         // A program does something else between two readings, and meanwhile hears what comes.
         let mut echoes = Vec::new();
-        let pause = bus.now() + Duration::from_millis(1);
+        let pause = bus.now() + Micros::from_millis(1);
         hear(bus, &mut host, pause, &mut echoes)?;
         let mut requests = requests(task, turn);
         // Again for motors that were asked for their status instead.
@@ -299,8 +299,7 @@ impl Simple<'_> {
         if self.task != Task::Echoed || self.has(Fault::TakesEchoes) {
             echoes.clear();
         }
-        let timeout =
-            if self.has(Fault::GivesUpEarly) { Duration(10_000) } else { DEFAULT_TIMEOUT };
+        let timeout = if self.has(Fault::GivesUpEarly) { Micros(10_000) } else { DEFAULT_TIMEOUT };
         let until = self.bus.now() + timeout;
         while !requests.is_empty() {
             let Some(frame) = self.bus.receive(until)? else { break };

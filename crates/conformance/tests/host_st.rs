@@ -13,7 +13,7 @@ use motorlink_proto::st::{
     Command, ExchangeError, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Master,
     MasterConfig, Output, Parse, Profile, RegisterId, Request, TIMEOUT, checksum,
 };
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 type Line = Finite<Drive, u8>;
 
@@ -56,7 +56,7 @@ fn results(line: &mut Line, task: Task) -> Result<Vec<Result<i32, String>>, Port
     let mut results = Vec::new();
     for _ in 0..count {
         // A program does something else between two readings, and meanwhile hears what comes.
-        let pause = line.now() + Duration::from_millis(1);
+        let pause = line.now() + Micros::from_millis(1);
         let unasked = line.receive(pause)?;
         master.receive(line.now(), &unasked);
         results.push(match exchange(&mut master, line, &request)? {
@@ -235,7 +235,7 @@ impl Simple<'_> {
                     continue;
                 }
                 Ending::Silent if self.has(Fault::WaitsALittleAfterATimeout) => {
-                    let pause = self.line.now() + Duration::from_millis(50);
+                    let pause = self.line.now() + Micros::from_millis(50);
                     self.line.receive(pause)?;
                     true
                 }
@@ -267,8 +267,8 @@ impl Simple<'_> {
             self.line.send(frame)?;
         }
         let timeout = match self.fault {
-            Fault::GivesUpEarly => Duration::from_millis(300),
-            Fault::WaitsForEver => Duration::from_millis(1_000_000),
+            Fault::GivesUpEarly => Micros::from_millis(300),
+            Fault::WaitsForEver => Micros::from_millis(1_000_000),
             _ => TIMEOUT,
         };
         let until = self.line.now() + timeout;
@@ -279,7 +279,7 @@ impl Simple<'_> {
                 self.received = received;
                 if self.has(Fault::WaitsForSilenceForEver) {
                     loop {
-                        let quiet = self.line.now() + Duration::from_millis(20);
+                        let quiet = self.line.now() + Micros::from_millis(20);
                         if self.line.receive(quiet)?.is_empty() {
                             break;
                         }

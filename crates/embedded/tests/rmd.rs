@@ -8,7 +8,7 @@ use embedded_can::{ErrorKind, ExtendedId, Frame as _, Id, StandardId, nb::Can};
 use motorlink_embedded::rmd::{DrivePort, Event, HostPort, from_can, to_can};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::*;
 use motorlink_sim::rmd::{RmdConfig, RmdMotor};
 
@@ -145,9 +145,9 @@ impl Pair {
                 Event::Done { id, result } => results.push((id, result)),
                 Event::Wait(None) => return results,
                 Event::Wait(Some(until)) => {
-                    let soon = self.now + Duration(100);
+                    let soon = self.now + Micros(100);
                     let next = until.min(served.unwrap_or(until)).min(soon);
-                    self.now = self.now.max(next) + Duration(1);
+                    self.now = self.now.max(next) + Micros(1);
                 }
             }
             self.host.can_mut().run();
@@ -214,7 +214,7 @@ fn an_exchange_that_the_bus_does_not_take_times_out() {
     let results = bench.run();
     assert_eq!(results.len(), 2);
     assert!(results.iter().all(|(_, result)| *result == Err(Failure::Timeout)));
-    let most = Duration(3 * DEFAULT_TIMEOUT.0);
+    let most = Micros(3 * DEFAULT_TIMEOUT.0);
     assert!(bench.now.since(Instant(0)) < most, "{:?}", bench.now);
 }
 
@@ -245,7 +245,7 @@ fn drives_whose_replies_are_not_taken_read_no_further_frames() {
 fn the_shutdown_time_runs_on_a_bus_that_fails() {
     let mut bench = Pair::new();
     for drive in bench.drives.drives_mut() {
-        drive.config.shutdown = Some(Duration::from_millis(200));
+        drive.config.shutdown = Some(Micros::from_millis(200));
     }
     bench.ask(1, &SetSpeed { speed: CentiDps(100) });
     bench.run();

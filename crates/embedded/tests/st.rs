@@ -8,7 +8,7 @@ use motorlink_proto::st::{
     ErrorCode, ExchangeError, Failure, Master, MasterConfig, Profile, Ramp, RegisterId, Request,
     Slave,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::st::{StDrive, StMotor};
 use uart::{Uart, line};
 
@@ -134,7 +134,7 @@ fn a_drive_that_is_silent_costs_the_timeout_and_the_line_recovers() {
     let Ok(Event::Wait(Some(_))) = bench.master.poll(bench.now) else { panic!("sent") };
     bench.slave.uart_mut().received.borrow_mut().clear();
     assert_eq!(bench.exchange(), Err(ExchangeError::Failed(Failure::Timeout)));
-    assert_eq!(bench.now, Instant(0) + Duration::from_millis(1000));
+    assert_eq!(bench.now, Instant(0) + Micros::from_millis(1000));
     assert_eq!(bench.ask(Request::GetFirmwareVersion).map(|text| text.len()), Ok(32));
 }
 

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration as Span, Instant as Moment};
 
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 /// A clock that begins at 0 when it is made. Clones of it are the same clock.
 ///
@@ -101,7 +101,7 @@ impl WeakClock {
 impl Pace {
     fn now(self) -> Instant {
         match self {
-            Pace::Running { since, from } => from + Duration::from(since.elapsed()),
+            Pace::Running { since, from } => from + Micros::from(since.elapsed()),
             Pace::Standing(now) => now,
         }
     }

@@ -85,7 +85,7 @@ impl<T> Turn<'_, T> {
         }
         let looked = looked.unwrap_or_else(|panic| resume_unwind(panic)).map_err(|error| {
             let source = io::Error::new(io::ErrorKind::Interrupted, error);
-            PortError::Io { port: port.to_owned(), source }
+            PortError::Io { port: port.to_owned(), source: source.into() }
         });
         (Turn { turns, shared: line }, looked)
     }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use allocation_counter::measure;
 use motorlink::rmd::{self, MotorId, MotorSet, ReadMotionStatus, SetTorque4};
-use motorlink::st::{self, RegisterId, register};
+use motorlink::st::{self, Ramp, RegisterId, register};
 use served::Served;
 
 #[test]
@@ -20,7 +20,7 @@ fn an_exchange_with_an_st_drive_allocates_nothing() {
         for n in 0..100 {
             motor.get(register::SPEED_MEAS).unwrap();
             motor.set(register::SPEED_KP, n).unwrap();
-            motor.set_ramp(1000, 10).unwrap();
+            motor.set_ramp(Ramp { speed_rpm: 1000, duration_ms: 10 }).unwrap();
             let mut values = [0; 3];
             motor.segment(0, &segment, &mut values).unwrap();
         }

@@ -11,9 +11,7 @@ use std::time::{Duration, Instant};
 
 use motorlink::port::{EventBytes, FdLink, PortError, PortName};
 use motorlink::rmd::{self, Code, MotorId, SpeedLimit};
-use motorlink::st::{
-    self, Command, LimitError, Limits, MasterConfig, Progress, RegisterId, Request,
-};
+use motorlink::st::{self, Command, LimitError, Limits, Progress, RegisterId, Request};
 use motorlink::{BackOff, LinkState};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use served::Served;
@@ -86,7 +84,7 @@ fn a_limit_holds_before_a_byte_leaves() {
     let ramp = Request::SetRamp(st::Ramp { speed_rpm: 1001, duration_ms: 0 });
     let refused = exchange(&mut client, &ramp).unwrap_err();
     assert!(
-        matches!(refused, st::Error::Limit { why: LimitError::Exceeded { .. }, .. }),
+        matches!(refused, st::Error::Limit { exceeded: LimitError::Exceeded { .. }, .. }),
         "{refused}"
     );
     let raw = client.begin_raw(1, 0x07, &[0xE9, 0x03, 0, 0, 0, 0]).unwrap_err();
@@ -98,8 +96,7 @@ fn a_limit_holds_before_a_byte_leaves() {
 #[test]
 fn the_reply_to_an_abandoned_exchange_is_not_taken_for_the_next_ones() {
     let (ours, theirs) = UnixStream::pair().unwrap();
-    let line = MasterConfig { quiet: Duration::from_millis(20).into(), ..MasterConfig::default() };
-    let options = st::Options { master: line, ..st::Options::default() };
+    let options = st::Options { quiet: Duration::from_millis(20), ..st::Options::default() };
     let mut client = over_pairs([ours].into(), options).unwrap();
     let drive = std::thread::spawn(move || {
         let mut request = [0; 4];

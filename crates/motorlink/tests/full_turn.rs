@@ -4,7 +4,7 @@ use motorlink::rmd::{
     self, CentiDegrees, Client, Error, FullTurn, Limits, SpeedLimit, SpinDirection,
     TurnCentiDegrees,
 };
-use motorlink::time::Duration;
+use motorlink::time::Micros;
 use motorlink_link::fault::Faults;
 use motorlink_testbench::{Bench, BenchConfig};
 
@@ -36,7 +36,7 @@ fn turn(
 
 /// How far the motor turns within a second.
 fn turned(bench: &Bench, from: f64) -> f64 {
-    bench.run(Duration::from_millis(1_000));
+    bench.run(Micros::from_millis(1_000));
     let place = bench.signals().iter().position(|known| known.name == "rmd1.angle_degrees");
     bench.values()[place.unwrap()] - from
 }

@@ -41,7 +41,7 @@ impl<L> Hasty<L> {
             return Ok(());
         }
         let source = io::Error::new(io::ErrorKind::Interrupted, "enough");
-        Err(PortError::Io { port: "the wait".to_owned(), source })
+        Err(PortError::Io { port: "the wait".to_owned(), source: source.into() })
     }
 }
 

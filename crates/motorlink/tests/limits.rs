@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use motorlink::port::{ByteLink, PortError};
 use motorlink::st::{
-    Client, Command, ControlMode, Error, EventClient, Limits, MasterConfig, Motor, Options,
-    Profile, Progress, Ramp, RegisterId, Request, register,
+    Client, Command, ControlMode, CurrentReference, Error, EventClient, Limits, Motor, Options,
+    PositionMove, Profile, Progress, Ramp, RegisterId, Request, TorqueRamp, register,
 };
 use motorlink::{BackOff, Clock, time};
 use motorlink_link::fault::Faults;
@@ -24,7 +24,7 @@ const POSITION: u8 = 0x12;
 type Ramping = fn(&Client, i32) -> Result<(), Error>;
 
 const RAMPINGS: [Ramping; 4] = [
-    |client, rpm| client.motor(1)?.set_ramp(rpm, 200),
+    |client, rpm| client.motor(1)?.set_ramp(Ramp { speed_rpm: rpm, duration_ms: 200 }),
     |client, rpm| client.motor(1)?.set(register::RAMP_FINAL_SPEED, rpm),
     |client, rpm| {
         let payload = [&rpm.to_le_bytes()[..], &[200, 0]].concat();
@@ -71,8 +71,8 @@ fn is_limited<T>(result: &Result<T, Error>) -> bool {
 
 /// The motor's greatest true speed in the next seconds, rpm.
 fn top_speed(bench: &Bench) -> f64 {
-    let recording = bench.record(&["st1.speed_rpm"], time::Duration::from_millis(1)).unwrap();
-    bench.run(time::Duration::from_millis(2_500));
+    let recording = bench.record(&["st1.speed_rpm"], time::Micros::from_millis(1)).unwrap();
+    bench.run(time::Micros::from_millis(2_500));
     recording.take().into_iter().map(f64::abs).fold(0.0, f64::max)
 }
 
@@ -136,9 +136,14 @@ fn a_position_command_is_refused_in_either_profile() {
     for profile in Profile::ALL {
         let bench = bench(Profile::Mcsdk54);
         let client = Client::over("bench", bench.bytes(&Faults::NONE), options(profile));
-        client.motor(1).unwrap().set_ramp(100, 0).unwrap();
+        client.motor(1).unwrap().set_ramp(Ramp { speed_rpm: 100, duration_ms: 0 }).unwrap();
         client.motor(1).unwrap().start().unwrap();
-        assert!(is_limited(&client.motor(1).unwrap().set_position(6000.0, 0.5)));
+        assert!(is_limited(
+            &client
+                .motor(1)
+                .unwrap()
+                .set_position(PositionMove { angle_rad: 6000.0, duration_s: 0.5 })
+        ));
         assert!(is_limited(&client.raw(1, POSITION, &payload)));
         assert!(top_speed(&bench) <= f64::from(LIMIT_RPM));
     }
@@ -150,9 +155,7 @@ fn a_frame_of_any_length_hides_no_start() {
     let start = [0x23, 0x01, 0x01, 0x25];
     for size in [0, 3, 4, 5, 64, 126, 127, 128] {
         let bench = bench(Profile::Mcsdk54);
-        let line =
-            MasterConfig { timeout: time::Duration::from_millis(50), ..MasterConfig::default() };
-        let options = Options { master: line, ..options(Profile::Mcsdk54) };
+        let options = Options { timeout: Duration::from_millis(50), ..options(Profile::Mcsdk54) };
         let client = Client::over("bench", bench.bytes(&Faults::NONE), options);
         let payload: Vec<u8> = start.into_iter().chain([0; 124]).take(size).collect();
         // A question, to which the payload does not matter.
@@ -182,7 +185,7 @@ fn a_start_that_any_profile_reads_in_a_raw_frame_counts_as_started() {
 fn what_was_acknowledged_for_one_motor_counts_for_no_other() {
     let bench = bench(Profile::Spec);
     let client = limited(&bench);
-    client.motor(1).unwrap().set_ramp(100, 0).unwrap();
+    client.motor(1).unwrap().set_ramp(Ramp { speed_rpm: 100, duration_ms: 0 }).unwrap();
     assert!(is_limited(&client.motor(2).unwrap().start()));
     client.motor(1).unwrap().start().unwrap();
 }
@@ -304,15 +307,19 @@ fn a_ramp_counts_until_the_drive_may_have_forgotten_it() {
         ("RESET", |motor, _| drop(motor.execute(Command::Reset))),
         ("a ramp was not acknowledged", |motor, disturbance| {
             disturbance.lock().unwrap().deafens = true;
-            motor.set_ramp(50, 0).unwrap_err();
+            motor.set_ramp(Ramp { speed_rpm: 50, duration_ms: 0 }).unwrap_err();
             disturbance.lock().unwrap().deafens = false;
         }),
         ("a ramp was acknowledged behind a reset", |motor, disturbance| {
             disturbance.lock().unwrap().first = vec![0xE0, 0x00, 0xE0];
-            motor.set_ramp(50, 0).unwrap();
+            motor.set_ramp(Ramp { speed_rpm: 50, duration_ms: 0 }).unwrap();
         }),
-        ("a current reference", |motor, _| motor.set_current_reference(100, 0).unwrap()),
-        ("a torque ramp", |motor, _| drop(motor.set_torque_ramp(100, 0))),
+        ("a current reference", |motor, _| {
+            motor.set_current_reference(CurrentReference { iq_s16a: 100, id_s16a: 0 }).unwrap()
+        }),
+        ("a torque ramp", |motor, _| {
+            drop(motor.set_torque_ramp(TorqueRamp { torque_s16a: 100, duration_ms: 0 }))
+        }),
         ("an Iq reference", |motor, _| motor.set(register::TORQUE_REF, 100).unwrap()),
         ("torque control", |motor, _| {
             motor.set(register::CONTROL_MODE, u8::from(ControlMode::Torque)).unwrap();
@@ -327,13 +334,13 @@ fn a_ramp_counts_until_the_drive_may_have_forgotten_it() {
             let bench = Arc::new(bench(profile));
             let (client, disturbance) = disturbed(&bench);
             let motor = client.motor(1).unwrap();
-            motor.set_ramp(100, 0).unwrap();
+            motor.set_ramp(Ramp { speed_rpm: 100, duration_ms: 0 }).unwrap();
             motor.start().unwrap();
             motor.stop().unwrap();
             upset(&motor, &disturbance);
             let start = motor.start();
             assert!(is_limited(&start), "{what}: {start:?}");
-            motor.set_ramp(100, 0).unwrap();
+            motor.set_ramp(Ramp { speed_rpm: 100, duration_ms: 0 }).unwrap();
             motor.start().unwrap();
         }
     }
@@ -344,7 +351,7 @@ fn a_ramp_that_the_drive_refused_does_not_count() {
     let bench = bench(Profile::Mcsdk54);
     let client = limited(&bench);
     let missing = client.motor(7).unwrap();
-    assert!(missing.set_ramp(100, 0).unwrap_err().is_refusal());
+    assert!(missing.set_ramp(Ramp { speed_rpm: 100, duration_ms: 0 }).unwrap_err().is_refusal());
     assert!(is_limited(&missing.start()));
 }
 
@@ -353,10 +360,10 @@ fn torque_commands_pass_under_a_speed_limit() {
     let bench = bench(Profile::Mcsdk54);
     let client = limited(&bench);
     let motor = client.motor(1).unwrap();
-    motor.set_torque_ramp(500, 0).unwrap();
-    motor.set_ramp(100, 0).unwrap();
+    motor.set_torque_ramp(TorqueRamp { torque_s16a: 500, duration_ms: 0 }).unwrap();
+    motor.set_ramp(Ramp { speed_rpm: 100, duration_ms: 0 }).unwrap();
     motor.start().unwrap();
-    motor.set_current_reference(500, 0).unwrap();
+    motor.set_current_reference(CurrentReference { iq_s16a: 500, id_s16a: 0 }).unwrap();
     motor.set(register::TORQUE_REF, 500).unwrap();
 }
 

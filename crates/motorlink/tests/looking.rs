@@ -29,8 +29,7 @@ fn silent_client(
     once: impl Fn(&st::Client) + Send + Sync + 'static,
 ) -> (Wire<u8>, Arc<OnceLock<st::Client>>) {
     let (wire, place) = (Wire::new(), Arc::new(OnceLock::<st::Client>::new()));
-    let mut options = st::Options::default();
-    options.master.timeout = timeout.into();
+    let options = st::Options { timeout, ..st::Options::default() };
     let (seen, looked) = (Arc::clone(&place), AtomicBool::new(false));
     let client =
         st::Client::over("wire", Box::new(Fresh(wire.clone())), options).looking(move || {
@@ -150,7 +149,7 @@ fn an_off_from_within_a_cycle_is_sent_at_once_and_the_cycle_ends() {
         let error = bus.cycle(&[(rmd::MotorId::new(1).unwrap(), speed)], |_, _| {});
         let error = error.expect_err("it was given up");
         let rmd::Error::Port(error) = error else { panic!("{error}") };
-        assert!(matches!(*error, PortError::Overtaken { .. }), "{error}");
+        assert!(matches!(error, PortError::Overtaken { .. }), "{error}");
         bus.moving()
     });
     assert!(moving.is_empty());

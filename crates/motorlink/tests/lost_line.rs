@@ -15,10 +15,11 @@ const REVUP: [u8; 4] = [0x08, 0x01, 0x00, 0x09];
 
 /// With short timeouts: this drive never answers in any case.
 fn options() -> Options {
-    let mut options = Options::default();
-    options.master.timeout = Duration::from_millis(20).into();
-    options.master.quiet = Duration::from_millis(5).into();
-    options
+    Options {
+        timeout: Duration::from_millis(20),
+        quiet: Duration::from_millis(5),
+        ..Options::default()
+    }
 }
 
 #[test]

@@ -63,7 +63,7 @@ impl CanLink for Motors {
             let mut coming = self.coming.lock().unwrap();
             coming.push_back((at, CanFrame::new(id.can_id(), reply)));
             if let (Some(ms), 0x92) = (self.twice, reply[0]) {
-                let copy = at + motorlink::time::Duration::from_millis(ms);
+                let copy = at + motorlink::time::Micros::from_millis(ms);
                 coming.push_back((copy, CanFrame::new(id.can_id(), reply)));
             }
             coming.make_contiguous().sort_by_key(|(at, _)| *at);

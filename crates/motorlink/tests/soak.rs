@@ -6,7 +6,7 @@ use std::fs;
 use std::time::{Duration, Instant};
 
 use motorlink::rmd::{self, DpsPerSecond};
-use motorlink::st::{self, MasterConfig, register};
+use motorlink::st::{self, register};
 use motorlink::{BackOff, LinkState};
 use served::Served;
 
@@ -82,8 +82,11 @@ fn soak(
 
 fn st(exchanges: u32, period: u32) {
     let first = Served::new("soak-st");
-    let line = MasterConfig { quiet: Duration::from_millis(5).into(), ..MasterConfig::default() };
-    let options = st::Options { back_off: BACK_OFF, master: line, ..st::Options::default() };
+    let options = st::Options {
+        quiet: Duration::from_millis(5),
+        back_off: BACK_OFF,
+        ..st::Options::default()
+    };
     let client = st::Client::open(&first.st.parse().expect("a port"), options).expect("opened");
     drop(first);
     // The port went away, which the first exchange finds out.

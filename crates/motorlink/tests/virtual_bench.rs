@@ -3,13 +3,13 @@
 use std::time::{Duration, Instant as Moment};
 
 use motorlink::rmd::{self, CentiDps, IqCommand, MotorId, MotorSet, SetTorque4};
-use motorlink::st::{self, Failure, MasterConfig, Status, register};
+use motorlink::st::{self, Failure, Ramp, Status, register};
 use motorlink::time;
 use motorlink_link::fault::Faults;
 use motorlink_link::serve::ServeName;
 use motorlink_testbench::{Bench, BenchConfig, Command};
 
-const SECOND: time::Duration = time::Duration(1_000_000);
+const SECOND: time::Micros = time::Micros(1_000_000);
 
 fn bench() -> Bench {
     Bench::new(&BenchConfig::default()).unwrap()
@@ -21,8 +21,7 @@ fn faults(text: &str) -> Faults {
 }
 
 fn st(bench: &Bench, faults: &str, timeout: Duration) -> st::Client {
-    let line = MasterConfig { timeout: timeout.into(), ..MasterConfig::default() };
-    let options = st::Options { master: line, ..st::Options::default() };
+    let options = st::Options { timeout, ..st::Options::default() };
     st::Client::over("bench", bench.bytes(&self::faults(faults)), options)
 }
 
@@ -51,12 +50,12 @@ fn bytes_and_frames_take_their_time_on_the_line() {
     let torques = SetTorque4([IqCommand(0); 4]);
     let before = bench.now();
     bus.set_torque4(torques, MotorSet::TORQUE4).unwrap();
-    assert_eq!(bench.now().since(before), time::Duration(5 * 125));
+    assert_eq!(bench.now().since(before), time::Micros(5 * 125));
     let ask = |id| (MotorId::new(id).unwrap(), rmd::ReadStatus);
     let before = bench.now();
     let volts = |reply: Result<rmd::Status, rmd::Error>| reply.unwrap().voltage.volts();
     bus.cycle(&[1, 2, 3, 4].map(ask), |_, reply| assert_eq!(volts(reply), 24.0)).unwrap();
-    assert_eq!(bench.now().since(before), time::Duration(8 * 125));
+    assert_eq!(bench.now().since(before), time::Micros(8 * 125));
 }
 
 #[test]
@@ -98,7 +97,7 @@ fn a_motor_that_did_not_answer_is_asked_again_after_its_guard_time() {
     let began = Moment::now();
     let before = bench.now();
     motor.status().unwrap_err();
-    assert!(bench.now().since(before) >= time::Duration::from_millis(50));
+    assert!(bench.now().since(before) >= time::Micros::from_millis(50));
     assert!(began.elapsed() < Duration::from_secs(2));
     drop(bus);
     rmd(&bench, "").motor(1).unwrap().status().unwrap();
@@ -114,12 +113,12 @@ fn run(faults: &str) -> (Vec<String>, Vec<f64>, u64) {
     let motor = client.motor(2).unwrap();
     for step in 0..30 {
         told.push(match step {
-            0 => format!("{:?}", motor.set_ramp(1000, 200)),
+            0 => format!("{:?}", motor.set_ramp(Ramp { speed_rpm: 1000, duration_ms: 200 })),
             1 => format!("{:?}", motor.start()),
             2 => format!("{:?}", bus.motor(3).unwrap().set_speed(CentiDps(36_000))),
             _ => format!("{:?} {:?}", motor.status(), motor.get(register::SPEED_MEAS)),
         });
-        bench.run(time::Duration::from_millis(100));
+        bench.run(time::Micros::from_millis(100));
         if step == 15 {
             let load = r#"{"command":"load","port":"st","motor":2,"newton_metres":0.05}"#;
             bench.execute(&command(load)).unwrap();
@@ -170,8 +169,8 @@ fn what_is_recorded_does_not_depend_on_who_lets_time_pass() {
         let client = st(&bench, "", Duration::from_secs(1));
         let motor = client.motor(2).unwrap();
         motor.start().unwrap();
-        bench.run(time::Duration(SECOND.0 - bench.now().0));
-        let every = time::Duration::from_millis(10);
+        bench.run(time::Micros(SECOND.0 - bench.now().0));
+        let every = time::Micros::from_millis(10);
         let recording = bench.record(&["st2.angle_degrees", "st2.status"], every).unwrap();
         assert_eq!((recording.began(), recording.every()), (time::Instant(SECOND.0), every));
         while bench.now() < time::Instant(3 * SECOND.0) {
@@ -191,7 +190,7 @@ fn what_is_recorded_does_not_depend_on_who_lets_time_pass() {
 #[test]
 fn what_was_taken_down_is_whole_up_to_this_moment() {
     let bench = bench();
-    let recording = bench.record(&["st1.bus_volts"], time::Duration(50)).unwrap();
+    let recording = bench.record(&["st1.bus_volts"], time::Micros(50)).unwrap();
     let bus = rmd(&bench, "");
     let mut rows = 0;
     for _ in 0..5 {
@@ -206,7 +205,7 @@ fn a_recording_is_refused_with_the_nearest_name() {
     let bench = bench();
     let why = |name, every| bench.record(&[name], every).err().unwrap();
     assert!(why("st1.speed", SECOND).contains("`st1.speed_rpm`"));
-    assert!(why("st1.speed_rpm", time::Duration(49)).contains("50 µs"));
+    assert!(why("st1.speed_rpm", time::Micros(49)).contains("50 µs"));
 }
 
 #[test]
@@ -216,7 +215,7 @@ fn served_on_ports_the_same_drives_go_on_in_real_time() {
     let [st0, can0] = ["st0", "can0"].map(|name| folder.join(name).display().to_string());
     let port = |text: String| Some(text.parse::<ServeName>().unwrap());
     let bench = bench();
-    bench.run(time::Duration(100 * SECOND.0));
+    bench.run(time::Micros(100 * SECOND.0));
     let inside = rmd(&bench, "");
     inside.motor(1).unwrap().set_speed(CentiDps(36_000)).unwrap();
 

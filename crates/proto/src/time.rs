@@ -8,19 +8,19 @@ pub struct Instant(pub u64);
 
 /// A span of time in microseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct Duration(pub u64);
+pub struct Micros(pub u64);
 
 impl Instant {
     /// The span from `earlier` to `self`; zero when `earlier` is later.
-    pub const fn since(self, earlier: Instant) -> Duration {
-        Duration(self.0.saturating_sub(earlier.0))
+    pub const fn since(self, earlier: Instant) -> Micros {
+        Micros(self.0.saturating_sub(earlier.0))
     }
 }
 
-impl Duration {
+impl Micros {
     /// A span of `ms` milliseconds.
     pub const fn from_millis(ms: u32) -> Self {
-        Duration(ms as u64 * 1_000)
+        Micros(ms as u64 * 1_000)
     }
 
     /// The span in microseconds.
@@ -29,30 +29,30 @@ impl Duration {
     }
 }
 
-impl Add<Duration> for Instant {
+impl Add<Micros> for Instant {
     type Output = Instant;
-    fn add(self, span: Duration) -> Instant {
+    fn add(self, span: Micros) -> Instant {
         Instant(self.0.saturating_add(span.0))
     }
 }
 
-impl Add for Duration {
-    type Output = Duration;
-    fn add(self, other: Duration) -> Duration {
-        Duration(self.0.saturating_add(other.0))
+impl Add for Micros {
+    type Output = Micros;
+    fn add(self, other: Micros) -> Micros {
+        Micros(self.0.saturating_add(other.0))
     }
 }
 
-impl AddAssign<Duration> for Instant {
-    fn add_assign(&mut self, span: Duration) {
+impl AddAssign<Micros> for Instant {
+    fn add_assign(&mut self, span: Micros) {
         *self = *self + span;
     }
 }
 
-impl From<core::time::Duration> for Duration {
+impl From<core::time::Duration> for Micros {
     /// Saturates beyond half a million years.
     fn from(span: core::time::Duration) -> Self {
-        Duration(
+        Micros(
             span.as_secs()
                 .saturating_mul(1_000_000)
                 .saturating_add(u64::from(span.subsec_micros())),
@@ -60,8 +60,8 @@ impl From<core::time::Duration> for Duration {
     }
 }
 
-impl From<Duration> for core::time::Duration {
-    fn from(span: Duration) -> Self {
+impl From<Micros> for core::time::Duration {
+    fn from(span: Micros) -> Self {
         core::time::Duration::from_micros(span.0)
     }
 }

@@ -4,7 +4,7 @@ mod rmd_bench;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::*;
 use rmd_bench::{Node, motor};
 
@@ -307,7 +307,7 @@ fn while_an_error_is_latched_the_motor_is_off_and_motion_commands_are_only_answe
 fn silence_for_the_shutdown_time_switches_the_motor_off() {
     let mut node = Node::new(1);
     assert_eq!(node.drive.deadline(), None);
-    node.drive.config.shutdown = Some(Duration(1_000));
+    node.drive.config.shutdown = Some(Micros(1_000));
     assert_eq!(node.drive.deadline(), None, "an idle motor has nothing to switch off");
     let send = |node: &mut Node, at, data| node.receive(Instant(at), &CanFrame::new(0x141, data));
     send(&mut node, 100, torque(5).encode());

@@ -4,7 +4,7 @@ mod rmd_bench;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::*;
 use rmd_bench::{Pair, motor, trusted_host};
 
@@ -106,14 +106,14 @@ fn while_four_torques_wait_to_be_sent_their_motors_are_busy() {
 #[test]
 fn an_unexpected_answer_to_four_torques_is_not_taken_for_another_exchange() {
     let mut pair = Pair::new(&[1, 2]);
-    pair.nodes[1].turnaround = Duration(2_000);
+    pair.nodes[1].turnaround = Micros(2_000);
     for _ in 0..2 {
         pair.host.set_torque4(pair.now, SetTorque4::default(), MotorSet::from(motor(1))).unwrap();
         assert_eq!(pair.run().len(), 1);
     }
     let torque = SetTorque { iq: IqCommand(1) };
     assert!(matches!(pair.request(2, torque), Err(RequestError::Quarantined { .. })));
-    pair.wait(Duration(5_000));
+    pair.wait(Micros(5_000));
     assert_eq!(pair.host.counters().late, 2);
     assert_eq!(pair.request(2, Off), Ok(()), "a motor can be switched off all the same");
 }
@@ -145,9 +145,9 @@ fn the_time_for_a_reply_runs_from_the_moment_of_sending() {
 fn each_request_may_have_its_own_timeout() {
     let mut host = trusted_host();
     let (now, data) = (Instant(0), ReadStatus.encode());
-    host.set_timeout(Duration(500));
+    host.set_timeout(Micros(500));
     host.request(now, motor(1), data).unwrap();
-    host.request_within(now, motor(2), data, Duration(200)).unwrap();
+    host.request_within(now, motor(2), data, Micros(200)).unwrap();
     let mut failed = vec![];
     let mut now = now;
     loop {
@@ -164,16 +164,16 @@ fn each_request_may_have_its_own_timeout() {
 #[test]
 fn a_late_reply_is_counted_and_ends_the_quarantine() {
     let mut pair = Pair::new(&[1]);
-    pair.nodes[0].turnaround = Duration::from_millis(60);
+    pair.nodes[0].turnaround = Micros::from_millis(60);
     pair.request(1, ReadMotionStatus).unwrap();
     assert_eq!(pair.run(), [(motor(1), Err(Failure::Timeout))]);
     let until = pair.now + DEFAULT_QUARANTINE;
     let refused = Err(RequestError::Quarantined { id: motor(1), until });
     assert_eq!(pair.request(1, ReadMotionStatus), refused);
 
-    pair.wait(Duration::from_millis(10));
+    pair.wait(Micros::from_millis(10));
     assert_eq!(pair.host.counters().late, 1);
-    pair.nodes[0].turnaround = Duration(800);
+    pair.nodes[0].turnaround = Micros(800);
     pair.nodes[0].motor.sense.temperature = Celsius(77);
     pair.request(1, ReadMotionStatus).unwrap();
     assert_eq!(temperature(&pair.run()[0].1.unwrap()), 77);
@@ -182,12 +182,12 @@ fn a_late_reply_is_counted_and_ends_the_quarantine() {
 #[test]
 fn a_quarantine_ends_with_its_guard_time_when_no_reply_comes() {
     let mut pair = Pair::new(&[]);
-    pair.host.set_quarantine(Duration(300));
+    pair.host.set_quarantine(Micros(300));
     pair.request(1, ReadMotionStatus).unwrap();
     pair.run();
-    pair.now += Duration(299);
+    pair.now += Micros(299);
     assert!(pair.request(1, ReadMotionStatus).is_err());
-    pair.now += Duration(1);
+    pair.now += Micros(1);
     assert_eq!(pair.request(1, ReadMotionStatus), Ok(()));
     assert_eq!(pair.host.counters().late, 0);
 }
@@ -195,7 +195,7 @@ fn a_quarantine_ends_with_its_guard_time_when_no_reply_comes() {
 #[test]
 fn off_passes_a_quarantine_and_the_late_reply_is_told_apart() {
     let mut pair = Pair::new(&[1]);
-    pair.nodes[0].turnaround = Duration::from_millis(60);
+    pair.nodes[0].turnaround = Micros::from_millis(60);
     pair.request(1, ReadMotionStatus).unwrap();
     pair.run();
     pair.request(1, Off).unwrap();
@@ -321,7 +321,7 @@ struct Standstill {
 
 impl Standstill {
     fn new(stop: u32, go_on: u32) -> Self {
-        let (stop, go_on) = (Duration::from_millis(stop), Duration::from_millis(go_on));
+        let (stop, go_on) = (Micros::from_millis(stop), Micros::from_millis(go_on));
         let (stop, go_on) = (Instant(0) + stop, Instant(0) + go_on);
         let (host, now) = (trusted_host(), Instant(0));
         Standstill { host, now, stop, go_on, coming: vec![], number: 0 }
@@ -340,7 +340,7 @@ impl Standstill {
         loop {
             match self.host.poll(self.now) {
                 Output::Transmit(frame) => {
-                    let due = self.now + Duration(800);
+                    let due = self.now + Micros(800);
                     let still = (self.stop..self.go_on).contains(&due);
                     // A motor that answers is supplied: what comes is no echo.
                     let &[code, _, _, _, a, b, c, d] = frame.eight_bytes().unwrap().1;
@@ -372,7 +372,7 @@ fn a_motor_that_stands_still_and_then_answers_everything_at_once_confuses_nobody
         for still in [60, 140, 160, 300, 1_000, 30_000] {
             let mut bench = Standstill::new(100, 100 + still);
             let (mut failed, mut back) = (0, None);
-            while bench.now < bench.go_on + Duration::from_millis(500) {
+            while bench.now < bench.go_on + Micros::from_millis(500) {
                 let (number, result) = bench.ask(code);
                 match result {
                     Ok(reply) => {
@@ -383,7 +383,7 @@ fn a_motor_that_stands_still_and_then_answers_everything_at_once_confuses_nobody
                 if result.is_ok() && bench.now > bench.go_on {
                     back.get_or_insert(bench.now);
                 }
-                bench.now += Duration::from_millis(7);
+                bench.now += Micros::from_millis(7);
             }
             assert!(failed > 0, "a motor that stands still does not answer");
             let took = back.expect("the motor is back").since(bench.go_on);
@@ -413,7 +413,7 @@ fn a_motor_that_did_not_answer_is_asked_for_its_status_and_then_has_to_be_silent
     let (own, question) = (ReadMotionStatus.encode(), CanFrame::new(0x141, QUESTION));
     host.request(asked, motor(1), own).unwrap();
     assert_eq!(host.poll(asked), Output::Transmit(question));
-    let heard = asked + Duration::from_millis(10);
+    let heard = asked + Micros::from_millis(10);
     host.receive(heard, &CanFrame::new(0x141, ANSWER));
     let answered = Output::Done { id: motor(1), result: Err(Failure::Quarantined) };
     assert_eq!(host.poll(heard), answered);
@@ -425,7 +425,7 @@ fn a_motor_that_did_not_answer_is_asked_for_its_status_and_then_has_to_be_silent
     assert_eq!(host.poll(heard), Output::Transmit(CanFrame::new(0x141, Off.encode())));
     let timeout = heard + DEFAULT_TIMEOUT;
     assert!(matches!(host.poll(timeout), Output::Done { result: Err(Failure::Timeout), .. }));
-    let late = timeout + Duration::from_millis(90);
+    let late = timeout + Micros::from_millis(90);
     host.receive(late, &CanFrame::new(0x141, own));
     assert_eq!(host.counters().late, 1);
     assert_eq!(host.request(late, motor(1), own), again(late + DEFAULT_QUARANTINE));
@@ -467,7 +467,7 @@ fn a_motor_that_goes_on_talking_is_switched_off_all_the_same() {
         host.receive(now, &CanFrame::new(0x141, ReadMotionStatus.encode()));
         let refused = Err(RequestError::Quarantined { id: motor(1), until });
         assert_eq!(host.request(now, motor(1), Off.encode()), refused, "at {}", now.0);
-        now += Duration::from_millis(10);
+        now += Micros::from_millis(10);
     }
     assert_eq!(host.request(now, motor(1), Off.encode()), Ok(()));
     assert_eq!(host.poll(now), Output::Transmit(CanFrame::new(0x141, Off.encode())));

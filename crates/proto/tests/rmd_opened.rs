@@ -4,7 +4,7 @@ mod rmd_bench;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::Celsius;
 use proptest::prelude::*;
 use rmd_bench::{Node, Pair, motor, trusted_host};
@@ -78,7 +78,7 @@ fn an_off_is_sent_again_to_a_motor_that_does_not_fall_silent() {
     pair.run();
     while let Err(RequestError::Quarantined { until, .. }) = pair.request(1, Off) {
         assert!(until > pair.now && until <= sent + DEFAULT_QUARANTINE + DEFAULT_QUARANTINE);
-        pair.wait(Duration(until.since(pair.now).0 / 2 + 1));
+        pair.wait(Micros(until.since(pair.now).0 / 2 + 1));
         pair.host.receive(pair.now, &CanFrame::new(0x141, ReadPid.encode()));
     }
     assert_eq!(pair.now, sent + DEFAULT_QUARANTINE + DEFAULT_QUARANTINE);
@@ -128,10 +128,10 @@ struct Late {
     host: Host,
     node: Node,
     now: Instant,
-    delay: Duration,
+    delay: Micros,
     coming: Vec<(Instant, CanFrame)>,
     /// Each reply comes twice, this much apart.
-    copy: Option<Duration>,
+    copy: Option<Micros>,
 }
 
 impl Late {
@@ -182,9 +182,9 @@ fn in_turn(delay: u32, timeout: u32, copy: Option<u32>, turns: &[(usize, u32, u3
         host: Host::new(),
         node: Node::new(1),
         now: Instant(0),
-        delay: Duration::from_millis(delay),
+        delay: Micros::from_millis(delay),
         coming: vec![],
-        copy: copy.map(Duration::from_millis),
+        copy: copy.map(Micros::from_millis),
     };
     let requests = [
         ReadPid.encode(),
@@ -195,10 +195,10 @@ fn in_turn(delay: u32, timeout: u32, copy: Option<u32>, turns: &[(usize, u32, u3
     ];
     for (temperature, &(n, life, pause)) in (1..).zip(turns) {
         late.host = Host::new();
-        late.host.set_timeout(Duration::from_millis(timeout));
+        late.host.set_timeout(Micros::from_millis(timeout));
         // What the motor says tells which host asked.
         late.node.motor.sense.temperature = Celsius(temperature);
-        let end = late.now + Duration::from_millis(life);
+        let end = late.now + Micros::from_millis(life);
         for n in n.. {
             let request = requests[n % requests.len()];
             let Some(reply) = late.ask(request, end) else { break };
@@ -207,7 +207,7 @@ fn in_turn(delay: u32, timeout: u32, copy: Option<u32>, turns: &[(usize, u32, u3
                 assert_eq!(reply[1], temperature as u8, "a reply to a former host");
             }
         }
-        late.now += Duration::from_millis(pause);
+        late.now += Micros::from_millis(pause);
     }
 }
 

@@ -4,7 +4,7 @@ mod rmd_bench;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use proptest::prelude::*;
 use rmd_bench::{Node, motor, trusted_host};
 use std::collections::HashMap;
@@ -132,8 +132,8 @@ proptest! {
         steps in prop::collection::vec((1u8..=4, 0u8..3, 1u64..140, any::<bool>(), 0u64..40), 1..150),
     ) {
         let mut host = trusted_host();
-        host.set_timeout(Duration(50));
-        host.set_quarantine(Duration(100));
+        host.set_timeout(Micros(50));
+        host.set_quarantine(Micros(100));
         let mut now = Instant(0);
         let mut coming: Vec<(Instant, CanFrame)> = vec![];
         let mut last = HashMap::new();
@@ -142,12 +142,12 @@ proptest! {
             if host.request(now, motor(id), [code, number, 0, 0, 0, 0, 0, 0]).is_ok() {
                 last.insert(id, number);
             }
-            let until = now + Duration(pause);
+            let until = now + Micros(pause);
             while now < until {
                 loop {
                     match host.poll(now) {
                         Output::Transmit(frame) if !lost => {
-                            coming.push((now + Duration(delay), frame));
+                            coming.push((now + Micros(delay), frame));
                         }
                         Output::Transmit(_) => {}
                         Output::Done { id, result: Ok(reply) } => {
@@ -157,7 +157,7 @@ proptest! {
                         Output::Wait(_) => break,
                     }
                 }
-                now += Duration(1);
+                now += Micros(1);
                 for (_, frame) in coming.extract_if(.., |(at, _)| *at <= now) {
                     host.receive(now, &frame);
                 }
@@ -173,8 +173,8 @@ proptest! {
         steps in prop::collection::vec((0u8..2, any::<bool>(), 0u64..40, 0u64..2_000), 1..60),
     ) {
         let mut host = trusted_host();
-        host.set_timeout(Duration(50));
-        host.set_quarantine(Duration(100));
+        host.set_timeout(Micros(50));
+        host.set_quarantine(Micros(100));
         let mut now = Instant(0);
         let mut still = Instant(0);
         let mut coming: Vec<(Instant, CanFrame)> = vec![];
@@ -182,17 +182,17 @@ proptest! {
             let code = [0x9A, 0x9C][usize::from(code)];
             // Most of the time the motor goes on.
             if stand < 600 {
-                still = still.max(now + Duration(stand));
+                still = still.max(now + Micros(stand));
                 coming.iter_mut().for_each(|(at, _)| *at = still.max(*at));
             }
             let request = [code, number, 0, 0, 0, 0, 0, 0];
             let mut asked = host.request(now, motor(1), request).is_ok();
-            let until = now + Duration(60 + pause);
+            let until = now + Micros(60 + pause);
             while now < until {
                 loop {
                     match host.poll(now) {
                         Output::Transmit(frame) if !lost => {
-                            coming.push((still.max(now + Duration(1)), frame));
+                            coming.push((still.max(now + Micros(1)), frame));
                         }
                         Output::Transmit(_) => {}
                         Output::Done { result, .. } => {
@@ -205,7 +205,7 @@ proptest! {
                         Output::Wait(_) => break,
                     }
                 }
-                now += Duration(1);
+                now += Micros(1);
                 for (_, frame) in coming.extract_if(.., |(at, _)| *at <= now) {
                     host.receive(now, &frame);
                 }

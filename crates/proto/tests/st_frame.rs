@@ -4,7 +4,7 @@ mod common;
 
 use common::{Memory, SlaveFixture, answer};
 use motorlink_proto::st::*;
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 use proptest::prelude::*;
 
 fn encoded(header: u8, payload: &[u8]) -> Vec<u8> {
@@ -105,7 +105,7 @@ proptest! {
     ) {
         let mut bench = SlaveFixture::new(Profile::Spec, 3, Memory::usual());
         for (byte, pause) in noise {
-            bench.now += Duration(pause);
+            bench.now += Micros(pause);
             bench.bytes(&[byte]);
         }
         bench.now += RECEPTION_TIMEOUT;

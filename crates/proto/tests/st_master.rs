@@ -4,7 +4,7 @@ mod common;
 mod st_bench;
 
 use motorlink_proto::st::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use proptest::prelude::*;
 use st_bench::{MS, Pair, STATUS, master};
 
@@ -86,7 +86,7 @@ fn a_lost_line_comes_back_behind_silence_and_a_question() {
     let lost = pair.now;
     assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
     assert_eq!(pair.sent[1..], [vec![0x06, 0x00, 0x06], vec![0x02, 0x01, 0x02, 0x05]]);
-    assert_eq!(pair.now.since(lost), Duration(100 * MS), "two silences of 50 ms");
+    assert_eq!(pair.now.since(lost), Micros(100 * MS), "two silences of 50 ms");
     assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
     assert_eq!(pair.sent.len(), 4, "recovered once");
 }
@@ -114,14 +114,14 @@ fn the_longest_exchange_is_five_or_six_timeouts_and_the_silences() {
         [(Recovery::None, 1_000), (Recovery::Drain, 5_150), (Recovery::Pad, 6_200)]
     {
         let config = MasterConfig { recovery, ..MasterConfig::default() };
-        assert_eq!(config.longest_exchange(), Duration::from_millis(ms), "{recovery:?}");
+        assert_eq!(config.longest_exchange(), Micros::from_millis(ms), "{recovery:?}");
     }
 }
 
 #[test]
 fn nothing_but_questions_go_into_a_line_that_does_not_answer() {
     let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
-    pair.delay = Duration::from_millis(60_000);
+    pair.delay = Micros::from_millis(60_000);
     let start = Request::ExecuteCommand(Command::StartMotor);
     assert_eq!(pair.exchange(1, STATUS), Err(ExchangeError::Failed(Failure::Timeout)));
     for _ in 0..3 {
@@ -148,7 +148,7 @@ fn a_line_that_never_falls_silent_is_given_up() {
             Output::Transmit(bytes) => panic!("sent {bytes:02x?} into the noise"),
             Output::Done(result) => break result,
         }
-        now += Duration::from_millis(10);
+        now += Micros::from_millis(10);
         master.receive(now, &[0x55]);
     };
     assert_eq!(result, Err(ExchangeError::Failed(Failure::Noise)));
@@ -241,12 +241,12 @@ fn no_bit_flip_of_a_request_puts_the_line_off_by_one() {
     for (request, size) in [(STATUS, 4), (write, 6), (Request::GetBoardInfo, 3)] {
         for (bit, pause) in (0..size * 8).flat_map(|bit| [0, 30].map(|pause| (bit, pause))) {
             let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
-            pair.delay = Duration::from_millis(3);
+            pair.delay = Micros::from_millis(3);
             pair.drive.set(1, RegisterId::SPEED_KP, 0x0102);
             pair.drive.set(1, RegisterId::SPEED_KI, 0x0304);
             pair.flip = Some(bit);
             let _ = pair.exchange(1, request);
-            pair.rest(Duration::from_millis(pause));
+            pair.rest(Micros::from_millis(pause));
             for (register, value) in
                 [(RegisterId::SPEED_KP, [2, 1]), (RegisterId::SPEED_KI, [4, 3])]
             {
@@ -273,7 +273,7 @@ proptest! {
             pair.drive.set(1, register, i32::from(register.0));
         }
         for (n, delay) in delays.into_iter().enumerate() {
-            pair.delay = Duration::from_millis(delay);
+            pair.delay = Micros::from_millis(delay);
             let register = registers[n % registers.len()];
             if let Ok(value) = pair.exchange(1, Request::GetRegister(register)) {
                 prop_assert_eq!(register.decode(Profile::Spec, &value), Some(i32::from(register.0)));
@@ -303,7 +303,7 @@ proptest! {
         clean.drive.set(1, RegisterId::SPEED_KP, 0x1234);
         let expected = requests.map(|request| clean.exchange(1, request));
         for (delay, n) in steps {
-            pair.delay = Duration::from_millis(delay);
+            pair.delay = Micros::from_millis(delay);
             let result = pair.exchange(1, requests[n]);
             if result.is_ok() {
                 prop_assert_eq!(&result, &expected[n], "{:?}", requests[n]);
@@ -322,7 +322,7 @@ proptest! {
             pair.drive.set(1, register, i32::from(register.0));
         }
         for stop in stops {
-            let until = pair.now + Duration::from_millis(stop);
+            let until = pair.now + Micros::from_millis(stop);
             for n in 0..20 {
                 pair.delay = until.since(pair.now);
                 let register = registers[n % 2];
@@ -343,7 +343,7 @@ proptest! {
         let recovery = if pad { Recovery::Pad } else { Recovery::Drain };
         let mut master = master(recovery);
         // Noise comes every 7 ms, so that each wait may end that much later.
-        let late = Duration::from_millis(50);
+        let late = Micros::from_millis(50);
         let bound = MasterConfig { recovery, ..MasterConfig::default() }.longest_exchange() + late;
         let mut chunks = chunks.into_iter();
         let mut now = Instant(0);
@@ -356,7 +356,7 @@ proptest! {
                     Output::Transmit(_) => {}
                     Output::Wait(until) => match chunks.next() {
                         Some(noise) => {
-                            now += Duration::from_millis(7);
+                            now += Micros::from_millis(7);
                             master.receive(now, &noise);
                         }
                         None => now = until.unwrap(),

@@ -4,7 +4,7 @@ mod common;
 mod st_bench;
 
 use motorlink_proto::st::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use proptest::prelude::*;
 use st_bench::{MS, Pair, STATUS};
 
@@ -17,7 +17,7 @@ fn opened(recovery: Recovery) -> Master {
 }
 
 /// A line that was just opened, to a drive that answers `delay` late.
-fn pair(recovery: Recovery, delay: Duration) -> Pair {
+fn pair(recovery: Recovery, delay: Micros) -> Pair {
     let mut pair = Pair::new(Profile::Spec, recovery);
     pair.master = opened(recovery);
     pair.delay = delay;
@@ -26,7 +26,7 @@ fn pair(recovery: Recovery, delay: Duration) -> Pair {
 
 #[test]
 fn a_line_that_was_just_opened_is_brought_in_step_by_three_questions() {
-    let mut pair = pair(Recovery::Drain, Duration::from_millis(3));
+    let mut pair = pair(Recovery::Drain, Micros::from_millis(3));
     pair.drive.set(2, RegisterId::STATUS, 6);
     assert_eq!(pair.exchange(2, STATUS), Ok(vec![6]));
     assert_eq!(pair.sent, [INFO.as_slice(), &GET_STATUS, &GET_FLAGS, &[0x42, 1, 2, 0x45]]);
@@ -39,7 +39,7 @@ fn a_line_that_was_just_opened_is_brought_in_step_by_three_questions() {
 #[test]
 fn a_line_that_is_trusted_is_asked_at_once() {
     for master in [opened(Recovery::None), st_bench::master(Recovery::Drain)] {
-        let mut pair = pair(Recovery::Drain, Duration(0));
+        let mut pair = pair(Recovery::Drain, Micros(0));
         pair.master = master;
         assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
         assert_eq!(pair.sent.len(), 1);
@@ -48,7 +48,7 @@ fn a_line_that_is_trusted_is_asked_at_once() {
 
 #[test]
 fn a_line_that_is_opened_again_is_not_in_step() {
-    let mut pair = pair(Recovery::Drain, Duration::from_millis(3));
+    let mut pair = pair(Recovery::Drain, Micros::from_millis(3));
     for _ in 0..2 {
         pair.sent.clear();
         assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
@@ -62,11 +62,11 @@ fn a_line_that_is_opened_again_is_not_in_step() {
 fn the_reply_to_a_former_master_is_not_taken_for_the_next_ones() {
     for ms in [1, 20, 49, 51, 150, 400, 900, 1_900] {
         for former in [STATUS, Request::GetBoardInfo, Request::GetFirmwareVersion] {
-            let mut pair = pair(Recovery::Drain, Duration::from_millis(ms));
+            let mut pair = pair(Recovery::Drain, Micros::from_millis(ms));
             pair.drive.set(1, RegisterId::SPEED_KP, 0x1234);
             pair.drive.set(1, RegisterId::SPEED_KI, 0x5678);
             pair.master.trust_line();
-            pair.master.config_mut().timeout = Duration::from_millis(100);
+            pair.master.config_mut().timeout = Micros::from_millis(100);
             let late = ms > 100;
             assert_eq!(pair.exchange(1, former).is_err(), late);
             assert_eq!(pair.exchange(1, former).is_err(), late);
@@ -83,7 +83,7 @@ fn the_reply_to_a_former_master_is_not_taken_for_the_next_ones() {
 
 #[test]
 fn no_command_waits_in_a_line_whose_drive_does_not_answer() {
-    let mut pair = pair(Recovery::Drain, Duration::from_millis(60_000));
+    let mut pair = pair(Recovery::Drain, Micros::from_millis(60_000));
     for _ in 0..3 {
         let start = Request::ExecuteCommand(Command::StartMotor);
         assert_eq!(pair.exchange(1, start), Err(ExchangeError::Failed(Failure::Timeout)));
@@ -201,12 +201,12 @@ proptest! {
         let mut clean = Pair::new(Profile::Spec, Recovery::Drain);
         prepared(&mut clean);
         let expected = requests.map(|request| clean.exchange(1, request));
-        let mut pair = pair(Recovery::Drain, Duration::from_millis(delay));
+        let mut pair = pair(Recovery::Drain, Micros::from_millis(delay));
         prepared(&mut pair);
         for (n, life, timeout) in turns {
             pair.master = opened(Recovery::Drain);
-            pair.master.config_mut().timeout = Duration::from_millis(timeout.max(delay / 2 + 1));
-            pair.until = Some(pair.now + Duration::from_millis(life));
+            pair.master.config_mut().timeout = Micros::from_millis(timeout.max(delay / 2 + 1));
+            pair.until = Some(pair.now + Micros::from_millis(life));
             for n in n.. {
                 let n = n % requests.len();
                 match pair.attempt(1, requests[n]) {

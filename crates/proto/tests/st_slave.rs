@@ -5,7 +5,7 @@ mod common;
 use common::{Memory, SlaveFixture, all_features, answer};
 use motorlink_proto::st::register::{Access, Origin};
 use motorlink_proto::st::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 const GET_STATUS: [u8; 4] = [0x02, 0x01, 0x02, 0x05];
 
@@ -98,10 +98,10 @@ fn a_length_over_128_is_answered_with_timeout_after_25_ms_of_silence() {
     for length in 129..=255u8 {
         assert_eq!(bench.bytes(&[0x02, length]), []);
         for _ in 0..20 {
-            bench.now += Duration::from_millis(20);
+            bench.now += Micros::from_millis(20);
             assert_eq!(bench.bytes(&GET_STATUS), [], "the slave is deaf until silence");
         }
-        bench.now += Duration::from_millis(25);
+        bench.now += Micros::from_millis(25);
         let reply = bench.slave.poll(bench.now).expect("a NACK is due").to_vec();
         assert_eq!(answer(&reply), Err(ErrorCode::Timeout));
     }
@@ -116,7 +116,7 @@ fn a_payload_of_128_bytes_is_taken() {
 fn shipped_firmware_never_times_out_and_drops_a_length_over_127() {
     let mut bench = mcsdk();
     bench.bytes(&GET_STATUS[..3]);
-    bench.now += Duration::from_millis(60_000);
+    bench.now += Micros::from_millis(60_000);
     assert_eq!((bench.slave.deadline(), bench.slave.is_receiving()), (None, true));
     assert_eq!(answer(&bench.bytes(&GET_STATUS[3..])), Ok(vec![0]));
     assert!(!bench.slave.is_receiving());

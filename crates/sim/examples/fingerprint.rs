@@ -4,7 +4,7 @@
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Command as _, ReadPhaseCurrents, SetPosition, SetSpeed};
 use motorlink_proto::st::{Command, Frame, MAX_FRAME, Profile, Ramp, RegisterId, Request};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::{CentiDegrees, CentiDps};
 use motorlink_sim::hash::fingerprint;
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
@@ -28,7 +28,7 @@ fn st() {
         ask(&mut station, now, motor, Request::ExecuteCommand(Command::StartMotor));
     }
     for round in 0..30 {
-        now += Duration::from_millis(100);
+        now += Micros::from_millis(100);
         for motor in [1, 2] {
             let ramp = Ramp { speed_rpm: 1000 + 50 * round, duration_ms: 80 };
             ask(&mut station, now, motor, Request::SetRamp(ramp));
@@ -58,7 +58,7 @@ fn rmd() {
         for (id, data) in requests.into_iter().chain(looks) {
             bus.receive(now, &CanFrame::new(id, data), |reply| said.push(reply));
         }
-        now += Duration::from_millis(100);
+        now += Micros::from_millis(100);
         bus.advance_to(now);
         println!("rmd {} {:016x}", now.0, fingerprint(&bus));
     }

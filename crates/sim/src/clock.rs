@@ -1,16 +1,16 @@
 //! Virtual time in steps of fixed length.
 
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 /// Counts the steps that a moment completes.
 #[derive(Debug, Clone)]
 pub(crate) struct Clock {
-    step: Duration,
+    step: Micros,
     last: Instant,
 }
 
 impl Clock {
-    pub(crate) const fn new(step: Duration, start: Instant) -> Self {
+    pub(crate) const fn new(step: Micros, start: Instant) -> Self {
         Clock { step, last: start }
     }
 
@@ -18,7 +18,7 @@ impl Clock {
     pub(crate) fn steps_until(&mut self, now: Instant) -> impl Iterator<Item = Instant> + use<> {
         let (start, step) = (self.last, self.step);
         let count = now.since(start).0 / step.0;
-        self.last += Duration(count * step.0);
-        (1..=count).map(move |n| start + Duration(n * step.0))
+        self.last += Micros(count * step.0);
+        (1..=count).map(move |n| start + Micros(n * step.0))
     }
 }

@@ -30,7 +30,7 @@ const BYTE: Duration = Duration::from_micros(87);
 /// A CAN frame of 8 bytes at 1 Mbit/s, with some stuffed bits.
 const FRAME: Duration = Duration::from_micros(125);
 /// Drives step at multiples of this.
-const STEP: time::Duration = time::Duration(50);
+const STEP: time::Micros = time::Micros(50);
 /// How often drives on served ports follow the time, if nobody asks them anything.
 const FOLLOW: Duration = Duration::from_millis(20);
 
@@ -90,7 +90,7 @@ impl Bench {
     }
 
     /// Lets time pass. While ports are served it takes as long.
-    pub fn run(&self, span: time::Duration) {
+    pub fn run(&self, span: time::Micros) {
         self.clock.wait(self.now() + span);
         drop(self.stage.at(self.now()));
     }
@@ -123,7 +123,7 @@ impl Bench {
     ///
     /// # Errors
     /// Why that cannot be.
-    pub fn record(&self, signals: &[&str], every: time::Duration) -> Result<Recording, String> {
+    pub fn record(&self, signals: &[&str], every: time::Micros) -> Result<Recording, String> {
         if every < STEP {
             return Err(format!("drives step every {} µs: nothing is seen more often", STEP.0));
         }
@@ -178,7 +178,7 @@ impl Bench {
 }
 
 fn failed(source: std::io::Error) -> PortError {
-    PortError::Io { port: "the served ports".to_owned(), source }
+    PortError::Io { port: "the served ports".to_owned(), source: source.into() }
 }
 
 /// Ports on which the drives of a [`Bench`] are served until this is dropped.

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use motorlink_link::Clock;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::rmd::RmdConfig;
 
 use super::cast::Cast;
@@ -72,7 +72,7 @@ struct Sheet {
     key: u64,
     /// Places of the signals.
     columns: Vec<usize>,
-    every: Duration,
+    every: Micros,
     next: Instant,
     rows: Vec<f64>,
 }
@@ -95,7 +95,7 @@ impl Stage {
     }
 
     /// Begins to write the signals at `columns` down, the first time now.
-    pub(super) fn record(&self, clock: &Clock, columns: Vec<usize>, every: Duration) -> Recording {
+    pub(super) fn record(&self, clock: &Clock, columns: Vec<usize>, every: Micros) -> Recording {
         let now = clock.now();
         let mut observed = self.at(now);
         let key = observed.sheets.iter().map(|sheet| sheet.key + 1).max().unwrap_or(0);
@@ -127,7 +127,7 @@ pub struct Recording {
     clock: Clock,
     key: u64,
     began: Instant,
-    every: Duration,
+    every: Micros,
 }
 
 impl Recording {
@@ -137,7 +137,7 @@ impl Recording {
     }
 
     /// From sample to sample.
-    pub fn every(&self) -> Duration {
+    pub fn every(&self) -> Micros {
         self.every
     }
 

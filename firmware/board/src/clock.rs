@@ -5,7 +5,7 @@ use core::ops::Deref;
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use embedded_io::{Read, ReadReady, Write};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use stm32f4::stm32f405::TIM2;
 use stm32f4::stm32f405::usart1::RegisterBlock;
 
@@ -17,7 +17,7 @@ const CORE_HZ: u32 = 168_000_000;
 const TIMER_HZ: u32 = 1_000_000_000;
 
 /// Time advances in ticks of this length once a host steps it.
-const TICK: Duration = Duration(100);
+const TICK: Micros = Micros(100);
 /// The command that asks how many bytes were taken.
 const COUNT: u8 = 0;
 /// The command that a new host begins with, and both bytes of its answer.

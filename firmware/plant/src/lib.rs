@@ -7,7 +7,7 @@
 #![forbid(unsafe_code)]
 
 use motorlink_proto::rmd::{Drive, DriveConfig, MotorId, Settings};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::plant::OutOfRange;
 use motorlink_sim::rmd::{RmdConfig, RmdMotor};
 use motorlink_sim::st::{StDrive, StMotor};
@@ -16,9 +16,9 @@ use motorlink_sim::st::{StDrive, StMotor};
 pub const RMD_IDS: [u8; 4] = [1, 2, 3, 4];
 
 /// Motors advance by so much between two looks at the ports.
-const SLICE: Duration = Duration(500);
+const SLICE: Micros = Micros(500);
 /// What the motors' time may be behind the board's before it stays behind.
-const LAG: Duration = Duration(20_000);
+const LAG: Micros = Micros(20_000);
 
 /// The motors and their time.
 pub struct Plant {
@@ -61,7 +61,7 @@ impl Plant {
     pub fn advance(&mut self, now: Instant) -> bool {
         let behind = now.since(self.at);
         if behind > LAG {
-            self.at += Duration(behind.0 - LAG.0);
+            self.at += Micros(behind.0 - LAG.0);
         }
         if now.since(self.at) < SLICE {
             return true;

@@ -1,6 +1,6 @@
 //! Host and drives on a bus that misbehaves, and a judge that knows where every frame came from.
 
-use motorlink::time::{Duration, Instant};
+use motorlink::time::{Instant, Micros};
 use motorlink_link::fault::{Faults, Rng, Unit};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
@@ -15,17 +15,17 @@ use crate::tally::Trouble;
 use crate::wire::Tagged;
 
 /// A frame at 1 Mbit/s.
-const FRAME: Duration = Duration(120);
+const FRAME: Micros = Micros(120);
 /// How long a motor thinks.
-const TURNAROUND: Duration = Duration(300);
+const TURNAROUND: Micros = Micros(300);
 /// How long an exchange takes at most: the motor is left alone for the quarantine time, asked for its
 /// status, silent for the quarantine time, and asked.
-const LONGEST: Duration = Duration(2 * (DEFAULT_QUARANTINE.0 + DEFAULT_TIMEOUT.0 + FRAME.0));
+const LONGEST: Micros = Micros(2 * (DEFAULT_QUARANTINE.0 + DEFAULT_TIMEOUT.0 + FRAME.0));
 /// What a program that asks a motor for the first time may wait longer: for the answers to what ends
 /// motion, and to another question.
-const FIRST: Duration = Duration(2 * (DEFAULT_TIMEOUT.0 + FRAME.0));
+const FIRST: Micros = Micros(2 * (DEFAULT_TIMEOUT.0 + FRAME.0));
 /// As the blocking client, the host takes what came meanwhile after a pause of this length.
-const IDLE: Duration = Duration(1_000);
+const IDLE: Micros = Micros(1_000);
 
 /// A frame of the host to a motor.
 #[derive(Clone, Copy, Default)]
@@ -128,13 +128,13 @@ impl Ends for Rmd {
 
     fn killed_in(bench: &mut RmdRun, rng: &mut Rng) {
         let id = traffic::motor(rng);
-        bench.killed_in(id, traffic::next(rng), Duration(rng.u64(..300_000)));
+        bench.killed_in(id, traffic::next(rng), Micros(rng.u64(..300_000)));
     }
 }
 
 impl RmdRun {
     /// An exchange in which the program is killed after this time.
-    pub fn killed_in(&mut self, id: MotorId, data: [u8; 8], life: Duration) {
+    pub fn killed_in(&mut self, id: MotorId, data: [u8; 8], life: Micros) {
         let end = self.now + life;
         self.tally.exchanges += 1;
         self.ready();

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
 
-use motorlink::time::{Duration, Instant};
+use motorlink::time::{Instant, Micros};
 use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::st::{
     ErrorCode, ExchangeError, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME,
@@ -18,13 +18,13 @@ use crate::tally::Trouble;
 use crate::wire::{Tagged, message};
 
 /// A byte at 115200 baud.
-const BYTE: Duration = Duration(87);
+const BYTE: Micros = Micros(87);
 /// How long the slave thinks.
-const TURNAROUND: Duration = Duration(100);
+const TURNAROUND: Micros = Micros(100);
 /// As the blocking client, the master looks for what came unasked after a pause of this length.
-const IDLE: Duration = Duration::from_millis(20);
+const IDLE: Micros = Micros::from_millis(20);
 /// Where a lost line does not recover by itself, the program opens it again this much later.
-const REOPENING: Duration = Duration::from_millis(3_000);
+const REOPENING: Micros = Micros::from_millis(3_000);
 /// Who speaks, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Setup {
@@ -165,7 +165,7 @@ impl Ends for St {
 
     fn killed_in(bench: &mut StRun, rng: &mut Rng) {
         let ask = traffic::next(bench.ends.setup.profile, rng);
-        let life = Duration(rng.u64(..1_500_000));
+        let life = Micros(rng.u64(..1_500_000));
         bench.attempt(&ask, bench.now + life);
     }
 }
@@ -223,7 +223,7 @@ impl StRun {
             Err(_) => self.ends.master.request_raw(ask.header, ask.payload()),
         };
         begins.expect("no exchange is under way");
-        let mut sending = Duration(0);
+        let mut sending = Micros(0);
         let result = loop {
             let mut bytes = [0; MAX_FRAME + 1];
             let (request, size) = match self.ends.master.poll(self.now) {
@@ -245,7 +245,7 @@ impl StRun {
                     (self.ends.master.sync_state() == SyncState::InSync, size)
                 }
             };
-            sending = sending + Duration(BYTE.0 * size as u64);
+            sending = sending + Micros(BYTE.0 * size as u64);
             self.transmit(&bytes[..size], request);
         };
         self.ended = self.now;
@@ -337,7 +337,7 @@ impl StRun {
         if let Some((share, rng)) = &mut self.ends.twice
             && rng.f64() < *share
         {
-            let apart = Duration(rng.u64(1_000..20_000));
+            let apart = Micros(rng.u64(1_000..20_000));
             self.ends.copies.push_back((sent + apart, tagged(bytes, message).collect()));
             self.ends.copies.make_contiguous().sort_by_key(|(at, _)| *at);
         }

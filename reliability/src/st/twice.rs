@@ -2,7 +2,7 @@
 
 use std::iter::Sum;
 
-use motorlink::time::Duration;
+use motorlink::time::Micros;
 use motorlink_link::fault::{Faults, Rng};
 use motorlink_proto::st::{RegisterId, Request, question_behind};
 
@@ -50,7 +50,7 @@ pub fn run(share: f64, faults: &Faults, confirms: bool, count: u64) -> Batches {
     let mut rng = Rng::with_seed(faults.seed ^ 0x5EED);
     let mut batches = Batches { count, ..Batches::default() };
     for _ in 0..count {
-        bench.rest(Duration(rng.u64(..50_000)));
+        bench.rest(Micros(rng.u64(..50_000)));
         bench.next_program();
         let (mut is_wrong, mut turn) = (false, false);
         let is_read = (0..4).all(|_| {

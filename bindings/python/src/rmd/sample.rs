@@ -94,7 +94,7 @@ pub(super) fn sample(
             Ok(())
         }
         Err(error) if skip && error.is_line_failure() => Ok(()),
-        Err(Error::Port(error)) if matches!(*error, PortError::Overtaken { .. }) => {
+        Err(Error::Port(PortError::Overtaken { .. })) => {
             Python::attach(&look)
         }
         Err(error) => Err(Python::attach(|py| rmd_error(py, &error))),

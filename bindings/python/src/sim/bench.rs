@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant as Moment;
 
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_testbench::scenario::Kind;
 use motorlink_testbench::{Bench, BenchConfig, Command, Recording};
 use pyo3::prelude::*;
@@ -17,7 +17,7 @@ use crate::error::bad_value;
 use crate::number::digits;
 
 /// How much time passes before the machine's is looked at.
-const SLICE: Duration = Duration::from_millis(20);
+const SLICE: Micros = Micros::from_millis(20);
 /// How long signals wait: Ctrl-C is one.
 const LOOK: std::time::Duration = std::time::Duration::from_millis(20);
 
@@ -135,8 +135,8 @@ impl SimBench {
         let began = Moment::now();
         loop {
             let left = end.since(self.0.now());
-            if left == Duration(0) || began.elapsed() > LOOK {
-                return left > Duration(0);
+            if left == Micros(0) || began.elapsed() > LOOK {
+                return left > Micros(0);
             }
             self.0.run(left.min(SLICE));
         }
@@ -144,10 +144,10 @@ impl SimBench {
 }
 
 /// A time in s, up to a day.
-fn microseconds(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Duration> {
+fn microseconds(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Micros> {
     const DAY: u64 = 86_400_000_000;
     let span = digits(py, what, seconds, 1e-6, "s").ok().filter(|span: &u64| *span <= DAY);
-    span.map(Duration).ok_or_else(|| {
+    span.map(Micros).ok_or_else(|| {
         bad_value(py, format_args!("{what} of {seconds} s: give 0 to 86400 s, a day"))
     })
 }

@@ -29,8 +29,8 @@ impl StOptions {
         let scale = Scale::new(py, profile, full_scale_amps)?;
         let limits = limits(py, scale, speed_limit, current_limit)?;
         let mut options = Options { profile: scale.profile, limits, ..Options::default() };
-        options.master.timeout = span(py, "a timeout", timeout)?.into();
-        options.master.recovery = match recovery {
+        options.timeout = span(py, "a timeout", timeout)?;
+        options.recovery = match recovery {
             "drain" => Recovery::Drain,
             "pad" => Recovery::Pad,
             "none" => Recovery::None,

@@ -7,7 +7,7 @@ mod screen;
 mod world;
 
 use motorlink::port::PortName;
-use motorlink::time::Duration;
+use motorlink::time::Micros;
 use motorlink_conformance::{
     Case, Need, Subject, host as hosts, rmd, run as run_cases, scenario_table, st,
 };
@@ -56,8 +56,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
 }
 
 /// How long a start bit, eight data bits and a stop bit take, where there is a baud rate.
-fn byte_time(name: &PortName) -> Duration {
-    name.baud().map_or(Duration(0), |baud| Duration(10_000_000 / u64::from(baud)))
+fn byte_time(name: &PortName) -> Micros {
+    name.baud().map_or(Micros(0), |baud| Micros(10_000_000 / u64::from(baud)))
 }
 
 fn conduct<B: Subject>(

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use motorlink::rmd::{self, CentiDegrees, CentiDps, IqCommand, MotorId, SetTorque4, SpeedLimit};
-use motorlink::st::{self, Status, register};
+use motorlink::st::{self, Ramp, Status, register};
 
 use super::bench::Drives;
 use super::screen::{Row, Screen};
@@ -104,12 +104,12 @@ impl<'a> Story<'a> {
     fn spin(&mut self) -> Result<(), Failure> {
         self.screen.say("ST motor 1: START_MOTOR, then a ramp to 1500 rpm in 800 ms.");
         let motor = self.st.motor(1)?;
-        motor.set_ramp(1500, 800)?;
+        motor.set_ramp(Ramp { speed_rpm: 1500, duration_ms: 800 })?;
         motor.start()?;
         self.until("ST motor 1 reaches 1500 rpm", |_| near(&motor, 1500))?;
         self.screen.say("ST motor 2: the same, with its encoder aligned first.");
         let second = self.st.motor(2)?;
-        second.set_ramp(1000, 800)?;
+        second.set_ramp(Ramp { speed_rpm: 1000, duration_ms: 800 })?;
         second.start()?;
         self.until("ST motor 2 reaches 1000 rpm", |_| near(&second, 1000))?;
         self.done
@@ -120,7 +120,7 @@ impl<'a> Story<'a> {
     fn reverse(&mut self) -> Result<(), Failure> {
         self.screen.say("ST motor 2 reverses: a ramp to -1000 rpm in 1 s.");
         let motor = self.st.motor(2)?;
-        motor.set_ramp(-1000, 1000)?;
+        motor.set_ramp(Ramp { speed_rpm: -1000, duration_ms: 1000 })?;
         self.until("ST motor 2 reaches -1000 rpm", |_| near(&motor, -1000))?;
         self.done.push("one of them reversed".into());
         Ok(())
@@ -177,7 +177,7 @@ impl<'a> Story<'a> {
         self.until("ST motor 1 stands still", |_| Ok(motor.get(register::SPEED_MEAS)?.abs() < 30))?;
         motor.fault_ack()?;
         self.until("ST motor 1 is idle", |_| Ok(motor.status()? == Status::Idle))?;
-        motor.set_ramp(1200, 500)?;
+        motor.set_ramp(Ramp { speed_rpm: 1200, duration_ms: 500 })?;
         motor.start()?;
         self.until("ST motor 1 reaches 1200 rpm", |_| near(&motor, 1200))?;
         self.done

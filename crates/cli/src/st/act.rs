@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use motorlink::st::{
-    Command as Execute, Flags, Profile, REVUP_PHASES, RevupPhase, Status, VERIFY_ATTEMPTS,
-    find_register, parse_value,
+    Command as Execute, CurrentReference, Flags, PositionMove, Profile, REVUP_PHASES, Ramp,
+    RevupPhase, Status, TorqueRamp, VERIFY_ATTEMPTS, find_register, parse_value,
 };
 use motorlink::time;
 use serde_json::json;
@@ -34,7 +34,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Pfc { action: Pfc::Disable } => execute(session, Execute::PfcDisable),
         Act::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
         Act::Ramp { rpm, ms } => {
-            motor.set_ramp(rpm, ms)?;
+            motor.set_ramp(Ramp { speed_rpm: rpm, duration_ms: ms })?;
             session.confirmed()?.done(format!(
                 "{}: ramp to {rpm} rpm in {ms} ms acknowledged; it executes while the motor runs",
                 motor.number()
@@ -42,7 +42,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         }
         Act::TorqueRamp { iq, ms } => {
             session.wants(Profile::Mcsdk54, "torque ramps")?;
-            motor.set_torque_ramp(iq, ms)?;
+            motor.set_torque_ramp(TorqueRamp { torque_s16a: iq, duration_ms: ms })?;
             session
                 .confirmed()?
                 .done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
@@ -52,13 +52,13 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             if !rad.is_finite() || !seconds.is_finite() || seconds < 0.0 {
                 return Err(Failure::Usage(format!("{rad} rad in {seconds} s is no move")));
             }
-            motor.set_position(rad, seconds)?;
+            motor.set_position(PositionMove { angle_rad: rad, duration_s: seconds })?;
             session
                 .confirmed()?
                 .done(format!("{}: move to {rad} rad in {seconds} s acknowledged", motor.number()))
         }
         Act::Current { iq, id } => {
-            motor.set_current_reference(iq, id)?;
+            motor.set_current_reference(CurrentReference { iq_s16a: iq, id_s16a: id })?;
             session.confirmed()?.done(format!("{}: references Iq {iq}, Id {id}", motor.number()))
         }
         Act::Revup { phase: None, .. } => revup(session),
@@ -109,7 +109,7 @@ fn start(session: &Session) -> Result<(), Failure> {
 }
 
 /// How long the state machine may take to follow FAULT_ACK.
-const ACKNOWLEDGED_WITHIN: time::Duration = time::Duration::from_millis(200);
+const ACKNOWLEDGED_WITHIN: time::Micros = time::Micros::from_millis(200);
 
 /// As with START, an acknowledged FAULT_ACK may have had no effect. The state machine takes a
 /// moment to follow.

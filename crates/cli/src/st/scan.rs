@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use indicatif::ProgressBar;
 use motorlink::port::PortError;
-use motorlink::st::{BAUD_RATES, ScanResult, scan_baud};
+use motorlink::st::{BAUD_RATES, Error, ScanResult, scan_baud};
 use serde_json::json;
 
 use crate::connection::Connection;
@@ -28,7 +28,7 @@ pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result
         bar.set_message(format!("{rate} baud"));
         let finding = scan_baud(&port, rate, patience);
         bar.inc(1);
-        if let Err(error @ PortError::BaudRefused { .. }) = &finding {
+        if let Err(Error::Port(error @ PortError::BaudRefused { .. })) = &finding {
             bar.suspend(|| {
                 let text = format!("{rate:>8} baud  not possible on this port");
                 output.result(

@@ -1,7 +1,8 @@
 //! What commands to a drive work on.
 
-use motorlink::st::{Client, MasterConfig, Motor, Options, Profile, Recovery};
-use motorlink::time;
+use std::time::Duration;
+
+use motorlink::st::{Client, Motor, Options, Profile, Recovery};
 
 use super::args::DriveArgs;
 use crate::connection::Connection;
@@ -18,15 +19,11 @@ pub struct Session {
 
 pub fn connect(connection: &Connection, drive: &DriveArgs) -> Result<Session, Failure> {
     let port = connection.port()?;
-    let timeout =
-        drive.timeout.map_or(MasterConfig::default().timeout, time::Duration::from_millis);
+    let defaults = Options::default();
+    let timeout = drive.timeout.map_or(defaults.timeout, |ms| Duration::from_millis(ms.into()));
     let recovery = if drive.pad { Recovery::Pad } else { Recovery::Drain };
     let profile = drive.profile;
-    let options = Options {
-        profile,
-        master: MasterConfig { timeout, recovery, ..MasterConfig::default() },
-        ..Options::default()
-    };
+    let options = Options { profile, timeout, recovery, ..defaults };
     let client = Client::open_wrapped(&port, connection.around_line(profile)?, options)?;
     Ok(Session { client, motor: drive.motor, output: connection.output(), raw: connection.raw })
 }

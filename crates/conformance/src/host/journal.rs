@@ -1,6 +1,6 @@
 //! What passed between a host and an adversarial drive, and which of it was true.
 
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::script::{Claim, Send, When};
 
@@ -68,7 +68,7 @@ impl Journal {
         motor: u8,
         code: u8,
         shown: &str,
-        patience: Duration,
+        patience: Micros,
     ) -> Exchange {
         let last = self.exchanges.iter().rev().find(|asked| asked.exchange.motor == motor);
         if let Some(last) = last

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::journal::{Exchange, Journal};
 use super::script::{Send, When};
 
 /// Between the replies to two requests: a drive that was late does not answer the next one at once.
-const GAP: Duration = Duration::from_millis(2);
+const GAP: Micros = Micros::from_millis(2);
 
 /// What is on its way to the host.
 pub(super) struct Outbox<D> {

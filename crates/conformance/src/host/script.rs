@@ -1,6 +1,6 @@
 //! What an adversarial drive sends, when, and what it means by it.
 
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 /// Something that a drive sends.
 #[derive(Debug, Clone)]
@@ -15,11 +15,11 @@ pub(super) struct Send<D> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum When {
     /// This long after the request, though not before what the motor still has to send.
-    After(Duration),
+    After(Micros),
     /// When the host sends something again.
     NextRequest,
     /// Again and again, for ever.
-    Every(Duration),
+    Every(Micros),
 }
 
 /// A value that a drive sends.
@@ -32,7 +32,7 @@ pub(super) struct Claim {
 impl<D> Send<D> {
     /// A reply, or a part of it, without a value.
     pub fn reply(data: D) -> Self {
-        Send { when: When::After(Duration(0)), data, is_reply: true, claim: None }
+        Send { when: When::After(Micros(0)), data, is_reply: true, claim: None }
     }
 
     /// Something that belongs to no request.
@@ -50,7 +50,7 @@ impl<D> Send<D> {
         Send { claim: Some(Claim { value, lie: Some(why) }), ..self }
     }
 
-    pub fn after(self, delay: Duration) -> Self {
+    pub fn after(self, delay: Micros) -> Self {
         Send { when: When::After(delay), ..self }
     }
 
@@ -58,12 +58,12 @@ impl<D> Send<D> {
         Send { when: When::NextRequest, ..self }
     }
 
-    pub fn every(self, period: Duration) -> Self {
+    pub fn every(self, period: Micros) -> Self {
         Send { when: When::Every(period), ..self }
     }
 }
 
 /// A part of a stated time.
-pub(super) fn share(time: Duration, numerator: u64, denominator: u64) -> Duration {
-    Duration(time.as_micros() * numerator / denominator)
+pub(super) fn share(time: Micros, numerator: u64, denominator: u64) -> Micros {
+    Micros(time.as_micros() * numerator / denominator)
 }

@@ -4,7 +4,7 @@ use motorlink::Clock;
 use motorlink::port::CanLink;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Code, Command, Dialect, Direction, EncoderBits, MotorId, Off, Payload};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::kept::Kept;
 use super::words::{lines, words};
@@ -50,9 +50,9 @@ pub struct Harness {
 
 /// How long a reply is waited for. The document sets no limit, real motors take 2 ms, and a computer
 /// with other work may notice a reply much later.
-pub(super) const PATIENCE: Duration = Duration::from_millis(1_000);
+pub(super) const PATIENCE: Micros = Micros::from_millis(1_000);
 /// Silence for this long means that nothing more comes: what a motor takes, and an adapter's delay.
-pub(super) const SILENCE: Duration = Duration::from_millis(50);
+pub(super) const SILENCE: Micros = Micros::from_millis(50);
 /// More than this many frames that nobody asked for, one behind the other, is no bus to test on.
 const CROWD: usize = 1000;
 
@@ -150,7 +150,7 @@ impl Harness {
 
     fn collect_within(
         &mut self,
-        first: Duration,
+        first: Micros,
         frames: &[CanFrame],
     ) -> Result<Vec<CanFrame>, Stop> {
         self.say(frames)?;
@@ -173,7 +173,7 @@ impl Harness {
     }
 
     /// Lets time pass.
-    pub(super) fn pause(&mut self, span: Duration) -> Result<(), Stop> {
+    pub(super) fn pause(&mut self, span: Micros) -> Result<(), Stop> {
         let until = self.clock.now() + span;
         while self.clock.now() < until {
             self.hear(until)?;
@@ -231,7 +231,7 @@ impl Harness {
     }
 
     /// Waits until the bus is silent; what came was not asked for.
-    pub(super) fn settle(&mut self, span: Duration) -> Result<(), Stop> {
+    pub(super) fn settle(&mut self, span: Micros) -> Result<(), Stop> {
         for _ in 0..CROWD {
             if self.hear(self.clock.now() + span)?.is_none() {
                 return Ok(());
@@ -245,7 +245,7 @@ impl Harness {
 
     /// Sends frames after what is waiting was taken.
     fn say(&mut self, frames: &[CanFrame]) -> Result<(), Stop> {
-        self.settle(Duration(0))?;
+        self.settle(Micros(0))?;
         self.sent.clear();
         self.received.clear();
         for frame in frames {

@@ -2,7 +2,7 @@
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Stop as Halt, *};
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 use motorlink_proto::units::DpsPerSecond;
 
 use super::harness::Harness;
@@ -23,7 +23,7 @@ const ATTEMPTS: u32 = 3;
 /// How long a motor may take to come to rest, ms.
 const COASTING: u64 = 10_000;
 /// What is around a motor changes more slowly than what is on its bus.
-const CHANGE: Duration = Duration::from_millis(100);
+const CHANGE: Micros = Micros::from_millis(100);
 /// How long a motor may take until it answers when its power came back, ms.
 const STARTING: u64 = 5_000;
 
@@ -39,7 +39,7 @@ impl Subject for Harness {
             let id = self.id();
             return Err(Stop::Lost(format!("motor {id} cannot be switched off: it is not driven")));
         }
-        self.settle(Duration::from_millis(5))?;
+        self.settle(Micros::from_millis(5))?;
         self.at_rest()?;
         self.forget();
         Ok(())
@@ -91,7 +91,7 @@ impl Harness {
             if speed > slowest.saturating_add(FASTER) || self.millis() - begun > COASTING {
                 return Ok(Err(status));
             }
-            self.pause(Duration::from_millis(50))?;
+            self.pause(Micros::from_millis(50))?;
         }
     }
 

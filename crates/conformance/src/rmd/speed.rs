@@ -1,7 +1,7 @@
 //! Speed (0xA2), and what gains act on it.
 
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 use motorlink_proto::units::{CentiDegrees, CentiDps, SpeedLimit};
 
 use super::case::case;
@@ -32,7 +32,7 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
                 for sign in [1, -1] {
                     runs(harness, sign)?;
                     let (from, begun) = (harness.angle()?, harness.millis());
-                    harness.pause(Duration::from_millis(400))?;
+                    harness.pause(Micros::from_millis(400))?;
                     let turned = harness.angle()? - from;
                     let due = i64::from(sign * SPEED) * (harness.millis() - begun) as i64 / 10;
                     let words = format!("{:.1}° further, not {:.1}°", deg(due), deg(turned));
@@ -77,7 +77,7 @@ pub(super) fn keeps_running(harness: &mut Harness, sign: i16) -> Result<(), Stop
     const LOOKS: i32 = 20;
     let mut sum = 0;
     for _ in 0..LOOKS {
-        harness.pause(Duration::from_millis(10))?;
+        harness.pause(Micros::from_millis(10))?;
         sum += i32::from(harness.read(ReadMotionStatus)?.speed.0);
     }
     let words = format!("{} °/s still for 0.2 s, not {}", sign * SPEED, sum / LOOKS);

@@ -1,7 +1,7 @@
 //! Moves: slow ones, watched, and ended when they are not what was asked for.
 
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use super::harness::Harness;
 use super::settings::accelerate;
@@ -13,7 +13,7 @@ pub(super) const GENTLE: i32 = 360;
 /// No move of this kit goes beyond this speed, °/s.
 const FAST: u16 = 500;
 /// How often a move is looked at.
-const EVERY: Duration = Duration::from_millis(10);
+const EVERY: Micros = Micros::from_millis(10);
 
 /// What a look at a move has seen.
 #[derive(Debug, Clone, Copy)]
@@ -103,7 +103,7 @@ impl Harness {
     /// Lets the motor lose the speed that pulses of torque have left it, which on a real line are
     /// not of one length, and lets what it shows of its speed follow.
     pub(super) fn slows_down(&mut self) -> Result<(), Stop> {
-        const FOLLOWS: Duration = Duration::from_millis(100);
+        const FOLLOWS: Micros = Micros::from_millis(100);
         const PATIENCE_MS: u64 = 2_000;
         self.pause(FOLLOWS)?;
         let begun = self.millis();

@@ -6,7 +6,7 @@
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 use motorlink_proto::units::{CentiDegrees, IqCommand, IqFeedback, PhaseCurrent, SpeedLimit};
 
 use super::case::case;
@@ -97,7 +97,7 @@ pub(super) fn pulses(
     look: impl Fn(&mut Harness, i16) -> Result<f64, Stop>,
 ) -> Result<f64, Stop> {
     const PULSES: i16 = 10;
-    const SETTLES: Duration = Duration::from_millis(5);
+    const SETTLES: Micros = Micros::from_millis(5);
     harness.ready()?;
     // A motor that does not answer this is not left under torque for as long as that takes.
     look(harness, 1)?;

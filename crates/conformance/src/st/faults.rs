@@ -2,7 +2,7 @@
 //! STATUS and FLAGS, whose values the document does not list (SPEC-NOTES S14).
 
 use motorlink_proto::st::{Command, Flags, Profile, RegisterId, Status};
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use super::harness::Harness;
 use super::restore::faulty;
@@ -10,9 +10,9 @@ use crate::case::{Case, Need, Stop};
 use crate::reading::S14;
 
 /// How long a drive may take to see a fault, or that it is gone.
-const SEEN: Duration = Duration::from_millis(5_000);
+const SEEN: Micros = Micros::from_millis(5_000);
 /// How long it is watched that a command has no effect.
-const WATCH: Duration = Duration::from_millis(100);
+const WATCH: Micros = Micros::from_millis(100);
 
 pub(super) fn cases(_profile: Profile) -> Vec<Case<Harness>> {
     vec![

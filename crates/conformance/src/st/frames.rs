@@ -4,7 +4,7 @@ use motorlink_proto::st::{
     Command, ErrorCode, Frame, FrameCode, HEADER_ACK, HEADER_NACK, MAX_PAYLOAD, MotorNumber,
     OVERHEAD, Profile, RegisterId, Request,
 };
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use super::explore::read_size;
 use super::harness::{Harness, frame};
@@ -12,7 +12,7 @@ use crate::case::{Case, Stop};
 use crate::reading::{S1, S10, S47};
 
 /// How long it is watched that nothing comes.
-const WATCH: Duration = Duration::from_millis(100);
+const WATCH: Micros = Micros::from_millis(100);
 /// A register that keeps whatever it is given and exists in every drive.
 const KEEPER: RegisterId = RegisterId::SPEED_KD;
 

@@ -8,7 +8,7 @@ use motorlink_proto::st::{
     Bad, Command, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, MotorNumber, Parse,
     Profile, RegisterId, Request, Status,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::found::Found;
 use super::safety;
@@ -28,7 +28,7 @@ pub struct Options {
     /// What the user allowed.
     pub allowed: Vec<Need>,
     /// How long a byte takes on the line; zero where that does not matter.
-    pub byte_time: Duration,
+    pub byte_time: Micros,
 }
 
 /// A drive behind a line.
@@ -68,7 +68,7 @@ pub(super) struct Reply {
     pub(super) header: u8,
     pub(super) payload: Vec<u8>,
     /// How long after the last byte was sent it was whole.
-    pub(super) delay: Duration,
+    pub(super) delay: Micros,
 }
 
 impl Reply {
@@ -79,12 +79,12 @@ impl Reply {
 }
 
 /// In this time a whole command must have come (4.1).
-pub(super) const RECEPTION: Duration = Duration::from_millis(25);
+pub(super) const RECEPTION: Micros = Micros::from_millis(25);
 /// How long a reply is waited for. A drive has one second (4.1); what comes later is told from what
 /// never comes.
-pub(super) const PATIENCE: Duration = Duration::from_millis(2_000);
+pub(super) const PATIENCE: Micros = Micros::from_millis(2_000);
 /// How long the rest of a reply is waited for once it has begun.
-const GRACE: Duration = Duration::from_millis(50);
+const GRACE: Micros = Micros::from_millis(50);
 /// Lines of a transcript that are kept.
 const TRANSCRIPT: usize = 60;
 
@@ -137,7 +137,7 @@ impl Harness {
 
     /// Sends bytes as they are. Whatever came before and was not waited for fails the case.
     pub(super) fn send(&mut self, bytes: &[u8]) -> Result<(), Stop> {
-        self.silence(Duration(0))?;
+        self.silence(Micros(0))?;
         self.sent.clear();
         self.received.clear();
         self.send_more(bytes)
@@ -163,7 +163,7 @@ impl Harness {
     }
 
     /// The next reply in form, if one comes within `patience` from the last byte sent.
-    pub(super) fn reply(&mut self, patience: Duration) -> Result<Option<Reply>, Stop> {
+    pub(super) fn reply(&mut self, patience: Micros) -> Result<Option<Reply>, Stop> {
         let mut until = self.sent_at + patience;
         loop {
             match Frame::parse(&self.pending) {
@@ -366,7 +366,7 @@ impl Harness {
     }
 
     /// Nothing comes for a time; zero only looks at what is there.
-    pub(super) fn silence(&mut self, span: Duration) -> Result<(), Stop> {
+    pub(super) fn silence(&mut self, span: Micros) -> Result<(), Stop> {
         let until = self.clock.now() + span;
         loop {
             if self.take(until)? || !self.pending.is_empty() {
@@ -381,7 +381,7 @@ impl Harness {
 
     /// Waits until the line was silent for a time, whatever comes; a line that never falls silent
     /// is not waited for for ever.
-    pub(super) fn drain(&mut self, span: Duration) -> Result<(), Stop> {
+    pub(super) fn drain(&mut self, span: Micros) -> Result<(), Stop> {
         let last = self.clock.now() + span + PATIENCE;
         let mut until = self.clock.now() + span;
         while self.clock.now() < until {
@@ -419,8 +419,8 @@ impl Harness {
     }
 
     /// How long `bytes` take on the line.
-    pub(super) fn on_the_line(&self, bytes: usize) -> Duration {
-        Duration(self.options.byte_time.as_micros() * bytes as u64)
+    pub(super) fn on_the_line(&self, bytes: usize) -> Micros {
+        Micros(self.options.byte_time.as_micros() * bytes as u64)
     }
 
     /// Takes what comes until a moment; whether anything did.

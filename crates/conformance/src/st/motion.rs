@@ -5,7 +5,7 @@ use motorlink_proto::st::{
     Command, ControlMode, CurrentReference, PositionMove, Profile, Ramp, RegisterId, Request,
     Status, TorqueRamp,
 };
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use super::harness::Harness;
 use super::restore::faulty;
@@ -13,11 +13,11 @@ use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{Reading, S14, S15, S22, S25, S26, S48, S53};
 
 /// How long a start may take, the alignment of an encoder included.
-const START: Duration = Duration::from_millis(15_000);
+const START: Micros = Micros::from_millis(15_000);
 /// How long a speed may take to settle behind its ramp.
-const SETTLE: Duration = Duration::from_millis(5_000);
+const SETTLE: Micros = Micros::from_millis(5_000);
 /// Between two looks at a register.
-const LOOK: Duration = Duration::from_millis(10);
+const LOOK: Micros = Micros::from_millis(10);
 /// In how many looks on end a speed is what it shall be.
 const STEADY: u32 = 40;
 /// What the motor turns at where the drive does not tell what it was last told, rpm.
@@ -156,7 +156,7 @@ fn comes_to_rest(harness: &mut Harness) -> Result<(), Stop> {
 
 fn start(harness: &mut Harness) -> Result<(), Stop> {
     run(harness)?;
-    harness.silence(Duration::from_millis(300))?;
+    harness.silence(Micros::from_millis(300))?;
     still_running(harness)
 }
 
@@ -243,14 +243,14 @@ fn stop_ramp(harness: &mut Harness) -> Result<(), Stop> {
     let from = run(harness)?;
     let to = from * 4 / 5;
     harness.done(&Request::SetRamp(Ramp { speed_rpm: to, duration_ms: 2_000 }))?;
-    harness.silence(Duration::from_millis(600))?;
+    harness.silence(Micros::from_millis(600))?;
     harness.execute(Command::StopRamp)?;
     still_running(harness)?;
     let held = holds_reference(harness, from, to);
     harness.note(S48, held)?;
     still_running(harness)?;
     // The ramp would be over.
-    harness.silence(Duration::from_millis(1_500))?;
+    harness.silence(Micros::from_millis(1_500))?;
     let measured = harness.value(RegisterId::SPEED_MEAS)?;
     let short_of_it = (measured - to).abs() > (from - to) / 4;
     harness.require(short_of_it, format!("ACK with a speed short of {to} rpm"))
@@ -260,16 +260,16 @@ fn holds_reference(harness: &mut Harness, from: i32, to: i32) -> Result<(), Stop
     let held = harness.value(RegisterId::SPEED_REF)?;
     let between = held < from - 6 && held > to + 6;
     harness.require(between, format!("ACK with a speed between {from} and {to} rpm"))?;
-    harness.silence(Duration::from_millis(500))?;
+    harness.silence(Micros::from_millis(500))?;
     let now = harness.value(RegisterId::SPEED_REF)?;
     harness.require((now - held).abs() <= 12, format!("ACK {held} rpm, held"))
 }
 
 fn stop_no_ramp(harness: &mut Harness) -> Result<(), Stop> {
     let speed = run(harness)?;
-    harness.silence(Duration::from_millis(300))?;
+    harness.silence(Micros::from_millis(300))?;
     harness.execute(Command::StopRamp)?;
-    harness.silence(Duration::from_millis(200))?;
+    harness.silence(Micros::from_millis(200))?;
     still_running(harness)?;
     reaches(harness, speed)
 }
@@ -277,7 +277,7 @@ fn stop_no_ramp(harness: &mut Harness) -> Result<(), Stop> {
 /// The current that the motor needs to keep its speed: the mean of a few looks, rounded to what
 /// keeps it turning.
 fn keeping_current(harness: &mut Harness) -> Result<i16, Stop> {
-    harness.silence(Duration::from_millis(500))?;
+    harness.silence(Micros::from_millis(500))?;
     let mut sum = 0;
     for _ in 0..16 {
         sum += harness.value(RegisterId::TORQUE_MEAS)?;
@@ -413,7 +413,7 @@ fn torque_ramp(harness: &mut Harness) -> Result<(), Stop> {
     harness.done(&Request::SetTorqueRamp(ramp))?;
     harness.silence(LOOK)?;
     let outcome = mode_is(harness, ControlMode::Torque).and_then(|()| {
-        harness.silence(Duration::from_millis(400))?;
+        harness.silence(Micros::from_millis(400))?;
         let now = harness.value(RegisterId::TORQUE_REF)?;
         harness.require(now == from / 2, format!("ACK {} s16A, the end of the ramp", from / 2))
     });
@@ -429,10 +429,10 @@ fn position(harness: &mut Harness) -> Result<(), Stop> {
     harness.done(&Request::SetPosition(hold))?;
     harness.execute(Command::StartMotor)?;
     running(harness)?;
-    harness.silence(Duration::from_millis(1_500))?;
+    harness.silence(Micros::from_millis(1_500))?;
     let target = PositionMove { angle_rad: std::f32::consts::PI, duration_s: 1.0 };
     harness.done(&Request::SetPosition(target))?;
-    harness.silence(Duration::from_millis(2_500))?;
+    harness.silence(Micros::from_millis(2_500))?;
     let now = f32::from_bits(harness.value(RegisterId::CURRENT_POSITION)? as u32);
     harness.require((now - target.angle_rad).abs() < 0.2, "ACK 3.14 rad, give or take 0.2")
 }

@@ -5,7 +5,7 @@ use motorlink_proto::st::{
     Command, ErrorCode, Frame, FrameCode, HEADER_ACK, MotorNumber, RegisterId, Request, RevupPhase,
     Status,
 };
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use super::harness::{Harness, PATIENCE, Reply, frame};
 use super::undo::{Setpoints, Undo};
@@ -15,13 +15,13 @@ use crate::reading::S48;
 use crate::world::Unavailable;
 
 /// How long a line is silent before it counts as silent: four times the reception timeout.
-const SILENCE: Duration = Duration::from_millis(100);
+const SILENCE: Micros = Micros::from_millis(100);
 /// How long a drive has to come to rest.
-const REST: Duration = Duration::from_millis(30_000);
+const REST: Micros = Micros::from_millis(30_000);
 /// How often a motor is told to stop that cannot be seen to.
 const STOPS: u32 = 3;
 /// Between two looks at a register.
-const LOOK: Duration = Duration::from_millis(10);
+const LOOK: Micros = Micros::from_millis(10);
 
 impl Subject for Harness {
     fn begin(&mut self) -> Result<(), Stop> {
@@ -143,7 +143,7 @@ impl Harness {
     /// Reads STATUS until it is as wanted, or the time is over; gives what it was last.
     pub(super) fn wait_for(
         &mut self,
-        patience: Duration,
+        patience: Micros,
         wanted: impl Fn(Status) -> bool,
     ) -> Result<Status, Stop> {
         let until = self.clock.now() + patience;

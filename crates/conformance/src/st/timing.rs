@@ -1,21 +1,21 @@
 //! Cases of 4.1: how long a drive has for a reply, and a master for a frame.
 
 use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use super::harness::{Harness, RECEPTION, Reply};
 use crate::case::{Case, Stop};
 use crate::reading::{S11, S29};
 
 /// In this time a reply must have come (4.1).
-const ANSWER: Duration = Duration::from_millis(1_000);
+const ANSWER: Micros = Micros::from_millis(1_000);
 /// How late after the reception timeout its NACK may come: for a drive that looks at its timer
 /// every few milliseconds, an adapter that keeps bytes back, and a host with other things to do.
-const SLACK: Duration = Duration::from_millis(45);
+const SLACK: Micros = Micros::from_millis(45);
 /// How much earlier than 25 ms a timer of another clock may be.
-const EARLY: Duration = Duration::from_millis(3);
+const EARLY: Micros = Micros::from_millis(3);
 /// How long it is watched that nothing comes.
-const WATCH: Duration = Duration::from_millis(100);
+const WATCH: Micros = Micros::from_millis(100);
 /// How often what depends on this host's own timing is tried.
 const TRIES: usize = 5;
 
@@ -162,7 +162,7 @@ fn trickle(harness: &mut Harness) -> Result<(), Stop> {
     harness.out_of_step = true;
     harness.send(&bytes[..1])?;
     for byte in &bytes[1..] {
-        if let Some(reply) = harness.reply(Duration(RECEPTION.as_micros() * 6 / 10))? {
+        if let Some(reply) = harness.reply(Micros(RECEPTION.as_micros() * 6 / 10))? {
             return harness.require_nack(&reply, ErrorCode::Timeout);
         }
         harness.send_more(&[*byte])?;
@@ -178,7 +178,7 @@ fn in_time(harness: &mut Harness) -> Result<(), Stop> {
     for _ in 0..TRIES {
         let began = harness.clock.now();
         harness.send(&bytes[..2])?;
-        harness.silence(Duration(RECEPTION.as_micros() * 6 / 10))?;
+        harness.silence(Micros(RECEPTION.as_micros() * 6 / 10))?;
         harness.send_more(&bytes[2..])?;
         let took = harness.clock.now().since(began);
         let reply = harness.awaited()?;
@@ -186,7 +186,7 @@ fn in_time(harness: &mut Harness) -> Result<(), Stop> {
             harness.out_of_step = false;
             return Ok(());
         }
-        if took < Duration(RECEPTION.as_micros() * 9 / 10) {
+        if took < Micros(RECEPTION.as_micros() * 9 / 10) {
             outcome = Err(harness.failed("ACK, for the frame was whole after 15 ms"));
         }
         harness.drain(WATCH)?;

@@ -8,7 +8,7 @@ use motorlink::Clock;
 use motorlink::port::{CanLink, PortError};
 use motorlink_conformance::Need;
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::plant::PlantConfig;
 use motorlink_sim::rmd::RmdConfig;
 
@@ -26,8 +26,8 @@ struct Adapter {
     received: VecDeque<(Instant, CanFrame)>,
 }
 
-const OUT: Duration = Duration::from_millis(2);
-const BACK: Duration = Duration::from_millis(16);
+const OUT: Micros = Micros::from_millis(2);
+const BACK: Micros = Micros::from_millis(16);
 
 impl Adapter {
     fn pass(&mut self, until: Instant) -> Result<(), PortError> {

@@ -7,7 +7,7 @@ use motorlink_conformance::{Case, Need, Report, Unavailable, World, run};
 use motorlink_link::serve::CanStation;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdNode};
 
 use crate::shared::Shared;
@@ -218,7 +218,7 @@ impl Setup {
         let report = run(&suite, &mut Harness::new(port(&bus), world, options), |_| {});
         // What was told last gets its time.
         let now = bus.clock.now();
-        bus.station().motors.bus.advance_to(now + Duration::from_millis(1_000));
+        bus.station().motors.bus.advance_to(now + Micros::from_millis(1_000));
         Tested { report, bus }
     }
 }

@@ -5,7 +5,7 @@ use motorlink_conformance::{Need, Report, Unavailable, World, run};
 use motorlink_link::serve::ByteStation;
 use motorlink_proto::st::register::Features;
 use motorlink_proto::st::{Flags, Frame, MotorNumber, Profile, RegisterId};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation};
 
 use crate::shared::Shared;
@@ -28,13 +28,13 @@ pub struct Deviation {
     /// Behind it.
     pub after: Option<After>,
     /// How late a reply is.
-    pub late: Option<fn(&[u8]) -> Duration>,
+    pub late: Option<fn(&[u8]) -> Micros>,
     /// Whether a frame that timed out is gone on with.
     pub glue: bool,
     /// Whether a power cycle leaves the slave alone.
     pub remembers: bool,
     /// What is said unasked, and how often.
-    pub chatter: Option<(Duration, Vec<u8>)>,
+    pub chatter: Option<(Micros, Vec<u8>)>,
 }
 
 /// A simulated drive on a line.
@@ -82,7 +82,7 @@ impl Peer {
             after(&self.request, &mut reply);
         }
         self.request.clear();
-        let late = self.deviation.late.map_or(Duration(0), |late| late(&reply));
+        let late = self.deviation.late.map_or(Micros(0), |late| late(&reply));
         self.outbox.push((now + late, reply));
     }
 
@@ -186,7 +186,7 @@ pub fn test(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
 pub fn test_apart(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
     let profile = wire.station().station.profile();
     let motor = MotorNumber::new(motor).expect("1 to 7");
-    let byte_time = Duration(0);
+    let byte_time = Micros(0);
     let options = Options { profile, motor, allowed: allowed.to_vec(), byte_time };
     let world = Box::new(Hands(wire.clone()));
     let mut harness = Harness::new(wire.line(), world, options);

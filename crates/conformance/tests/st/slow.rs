@@ -9,7 +9,7 @@ use motorlink_conformance::st::{self, Harness, Options};
 use motorlink_conformance::{Need, Verdict, run};
 use motorlink_link::serve::ByteStation;
 use motorlink_proto::st::{MotorNumber, Profile};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::st::MotorConfig;
 
 use crate::peer::{Deviation, Peer};
@@ -17,7 +17,7 @@ use crate::peer::{Deviation, Peer};
 /// A UART with a drive at its end. `send` returns at once, as a driver with a buffer does.
 struct Uart {
     peer: Peer,
-    byte_time: Duration,
+    byte_time: Micros,
     clock: Clock,
     /// Bytes on the way to the drive, and when each is there.
     outward: VecDeque<(Instant, u8)>,
@@ -98,7 +98,7 @@ fn a_slow_line_fails_nothing_and_skips_what_it_cannot_carry_in_time() {
         (Profile::Mcsdk54, 9_600, &[]),
     ];
     for (profile, baud, skipped) in lines {
-        let byte_time = Duration(10_000_000 / baud);
+        let byte_time = Micros(10_000_000 / baud);
         let peer = Peer::new(profile, &MotorConfig::demo(), Deviation::default());
         let (outward, inward) = Default::default();
         let uart = Uart { peer, byte_time, clock: Clock::standing(), outward, inward };

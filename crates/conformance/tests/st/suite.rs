@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use motorlink_conformance::st::may_start;
 use motorlink_conformance::{Need, Report, Verdict};
 use motorlink_proto::st::Profile;
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 use motorlink_sim::st::{BuildConfig, MotorConfig};
 
 use crate::peer::{ALL, Deviation, Peer, Wire, dump, test, wire};
@@ -262,7 +262,7 @@ fn wrong_behind_a_start(after: u32, reply: impl Fn(u32, &mut Vec<u8>) + Send + '
 
 /// Whether motor 1 is at rest a minute later.
 fn rests(wire: &Wire) -> bool {
-    let later = wire.clock.now() + Duration::from_millis(60_000);
+    let later = wire.clock.now() + Micros::from_millis(60_000);
     let mut peer = wire.station();
     peer.station.advance_to(later);
     let motors = peer.station.drive().motors();

@@ -6,7 +6,7 @@ use motorlink_proto::rmd::{
     Drive, DriveConfig, EncoderBits, Errors, Mode, MotorControl, MotorId, PhaseCurrents, Sense,
     Settings,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::{Celsius, DeciVolts, Dps, DpsPerSecond, IqFeedback, PhaseCurrent};
 
 use super::message::motorlink_rmd_pid;
@@ -271,7 +271,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_init(
         let config = DriveConfig {
             id: MotorId::new(config.id).ok_or(motorlink_error::BadArgument)?,
             encoder: encoder.ok_or(motorlink_error::BadArgument)?,
-            shutdown: (config.shutdown_us != 0).then_some(Duration(config.shutdown_us)),
+            shutdown: (config.shutdown_us != 0).then_some(Micros(config.shutdown_us)),
             clear_reply_0x9b: config.clear_reply_0x9b != 0,
         };
         drive.init(size, State { drive: Drive::new(config, rom), motor })

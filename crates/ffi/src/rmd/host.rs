@@ -3,7 +3,7 @@
 use motorlink_proto::rmd::{
     Failure, Host, Limits, MotorId, MotorSet, Output, RequestError, SetTorque4,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::{CentiDegrees, IqCommand, SpeedLimit};
 
 use super::message::motorlink_rmd_data;
@@ -101,8 +101,8 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_times(
     promised!(host);
     answer(|| {
         let mut state = host.enter()?;
-        state.host.set_timeout(Duration(timeout_us.into()));
-        state.host.set_quarantine(Duration(guard_us.into()));
+        state.host.set_timeout(Micros(timeout_us.into()));
+        state.host.set_quarantine(Micros(guard_us.into()));
         Ok(())
     })
 }

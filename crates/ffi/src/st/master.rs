@@ -4,7 +4,7 @@ use motorlink_proto::st::{
     ExchangeError, Failure, MAX_PAYLOAD, Master, MasterConfig, Output, Profile, Recovery,
     RegisterId, SyncState,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::motorlink_st_master;
 use super::profile::{motorlink_st_profile, profile};
@@ -104,9 +104,9 @@ pub unsafe extern "C" fn motorlink_st_master_init(
         let config = config.read_optional()?.unwrap_or_else(|| motorlink_st_master_defaults());
         let profile = self::profile(config.profile)?;
         let config = MasterConfig {
-            timeout: Duration(config.timeout_us.into()),
+            timeout: Micros(config.timeout_us.into()),
             recovery: recovery(config.recovery)?,
-            quiet: Duration(config.quiet_us.into()),
+            quiet: Micros(config.quiet_us.into()),
             profile,
         };
         master.init(size, State { master: Master::new(config), profile, asked: None })

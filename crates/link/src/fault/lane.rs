@@ -3,12 +3,12 @@
 use std::collections::VecDeque;
 
 use fastrand::Rng;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::{Faults, Span, Struck, Unit, Way};
 
 /// Bytes of a stuck or flooded line come at least this far apart: as at 115200 baud.
-const NOISE_PACE: Duration = Duration(87);
+const NOISE_PACE: Micros = Micros(87);
 
 /// One direction of a line: units in with the time at which they are sent, units out with the time
 /// at which they arrive.
@@ -17,7 +17,7 @@ pub struct Lane<T: Unit> {
     way: Way,
     protocol: T::Protocol,
     rng: Rng,
-    pace: Duration,
+    pace: Micros,
     delay: Span,
     flip: Chance,
     corrupt: Chance,
@@ -44,7 +44,7 @@ pub struct Lane<T: Unit> {
 impl<T: Unit> Lane<T> {
     /// A lane for one way, on which a unit takes `pace`; zero where something else sets the pace.
     /// Noise spares the `protocol` on it.
-    pub fn new(faults: &Faults, way: Way, pace: Duration, protocol: T::Protocol) -> Self {
+    pub fn new(faults: &Faults, way: Way, pace: Micros, protocol: T::Protocol) -> Self {
         let mut rng = Rng::with_seed(faults.seed);
         if way == Way::Received {
             rng = rng.fork();
@@ -177,14 +177,14 @@ impl<T: Unit> Lane<T> {
         if self.duplicate.hits(&mut self.rng) {
             copies = 2;
         }
-        self.arrive(due, unit, Duration(0));
+        self.arrive(due, unit, Micros(0));
         if copies == 2 {
             self.arrive(due, unit.copied(), self.pace);
         }
     }
 
     /// Puts a unit where its time and its order say, at least `gap` behind the one before it.
-    fn arrive(&mut self, due: Instant, unit: T, gap: Duration) {
+    fn arrive(&mut self, due: Instant, unit: T, gap: Micros) {
         let before = self.coming.iter().rev().find(|(_, other)| other.order() == unit.order());
         let due = before.map_or(due, |(last, _)| due.max(*last + gap));
         let later = self.coming.iter().rev().take_while(|(other, _)| *other > due).count();
@@ -239,8 +239,8 @@ fn gap(rate: f64, rng: &mut Rng) -> u64 {
     ((1.0 - rng.f64()).ln() / (-rate).ln_1p()) as u64
 }
 
-fn drawn(span: Span, rng: &mut Rng) -> Duration {
-    if span.least == span.most { span.least } else { Duration(rng.u64(span.least.0..=span.most.0)) }
+fn drawn(span: Span, rng: &mut Rng) -> Micros {
+    if span.least == span.most { span.least } else { Micros(rng.u64(span.least.0..=span.most.0)) }
 }
 
 #[cfg(test)]
@@ -249,7 +249,7 @@ mod tests {
     use motorlink_proto::can::CanFrame;
 
     fn lane<T: Unit<Protocol: Default>>(faults: &str, pace: u64) -> Lane<T> {
-        Lane::new(&faults.parse().unwrap(), Way::Sent, Duration(pace), T::Protocol::default())
+        Lane::new(&faults.parse().unwrap(), Way::Sent, Micros(pace), T::Protocol::default())
     }
 
     /// Everything that comes of `units` that are pushed at 0, with its time.
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_line_without_faults_carries_everything_at_its_pace() {
-        let mut lane = Lane::new(&Faults::NONE, Way::Sent, Duration(87), ());
+        let mut lane = Lane::new(&Faults::NONE, Way::Sent, Micros(87), ());
         assert_eq!(outcome(&mut lane, [1u8, 2, 3]), [(87, 1), (174, 2), (261, 3)]);
         assert_eq!(lane.free(), Instant(261));
     }
@@ -278,7 +278,7 @@ mod tests {
         let run = |seed: u64, way| {
             let text =
                 format!("flip=1e-2,drop=1e-2,dup=1e-2,insert=1e-2,delay=0ms..9ms,seed={seed}");
-            let mut lane = Lane::new(&text.parse().unwrap(), way, Duration(87), ());
+            let mut lane = Lane::new(&text.parse().unwrap(), way, Micros(87), ());
             outcome(&mut lane, bytes(1_000))
         };
         assert_eq!(run(7, Way::Sent), run(7, Way::Sent));

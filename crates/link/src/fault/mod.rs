@@ -7,10 +7,10 @@
 //!
 //! ```
 //! use motorlink_link::fault::{Faults, Lane, Way};
-//! use motorlink_link::time::{Duration, Instant};
+//! use motorlink_link::time::{Micros, Instant};
 //!
 //! let faults: Faults = "drop=1,delay=5ms,only=received".parse()?;
-//! let mut sent = Lane::new(&faults, Way::Sent, Duration(87), ());
+//! let mut sent = Lane::new(&faults, Way::Sent, Micros(87), ());
 //! sent.push(Instant(0), [0x22, 0x01]);
 //! assert_eq!(sent.due(), Some(Instant(87)));      // only what is received suffers
 //! assert_eq!(sent.pop(Instant(87)), Some(0x22));

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 /// What goes wrong on a line. Rates are chances from 0 to 1; a unit is a byte of a serial line or a
 /// frame of a CAN bus.
@@ -58,9 +58,9 @@ pub struct Faults {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Span {
     /// The shortest.
-    pub least: Duration,
+    pub least: Micros,
     /// The longest.
-    pub most: Duration,
+    pub most: Micros,
 }
 
 /// Something that begins by chance and lasts.
@@ -137,13 +137,13 @@ const RATE: &str = "a rate from 0 to 1, such as 1e-4";
 const TIME: &str = "a time such as 5ms, or 5ms..30ms, up to an hour";
 const SPELL: &str = "a time and a rate, such as 500ms@1e-3 or 10ms..2s@1e-3";
 const FLOOD: &str = "a count up to 10000 and a rate, such as 200@1e-3";
-const LONGEST: Duration = Duration(3_600_000_000);
+const LONGEST: Micros = Micros(3_600_000_000);
 const MOST: u32 = 10_000;
 
 impl Faults {
     /// A line on which nothing goes wrong.
     pub const NONE: Self = {
-        let never = Span { least: Duration(0), most: Duration(0) };
+        let never = Span { least: Micros(0), most: Micros(0) };
         let spell = Spell { rate: 0.0, length: never };
         Faults {
             flip: 0.0,
@@ -293,7 +293,7 @@ impl fmt::Display for Faults {
 
 impl fmt::Display for Span {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let time = |Duration(us): Duration| match us {
+        let time = |Micros(us): Micros| match us {
             0 => "0ms".to_owned(),
             _ if us % 1_000_000 == 0 => format!("{}s", us / 1_000_000),
             _ if us % 1_000 == 0 => format!("{}ms", us / 1_000),
@@ -333,12 +333,12 @@ fn span(text: &str) -> Option<Span> {
     (least <= most && most <= LONGEST).then_some(Span { least, most })
 }
 
-fn time(text: &str) -> Option<Duration> {
+fn time(text: &str) -> Option<Micros> {
     let units = [("us", 1.0), ("ms", 1e3), ("s", 1e6)];
     let (number, unit) =
         units.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, unit)))?;
     let us = number.parse::<f64>().ok()? * unit;
-    (0.0..=LONGEST.0 as f64).contains(&us).then_some(Duration(us.round() as u64))
+    (0.0..=LONGEST.0 as f64).contains(&us).then_some(Micros(us.round() as u64))
 }
 
 #[cfg(test)]
@@ -361,8 +361,8 @@ mod tests {
         let faults = read(text).unwrap();
         assert_eq!(faults.to_string(), text);
         assert_eq!(read(&faults.to_string()), Ok(faults));
-        assert_eq!(faults.delay.least, Duration::from_millis(5));
-        assert_eq!(faults.pause.length.most, Duration(1_500));
+        assert_eq!(faults.delay.least, Micros::from_millis(5));
+        assert_eq!(faults.pause.length.most, Micros(1_500));
         assert_eq!(faults.only, Some(Way::Sent));
         let plain = read(" drop = 0.25 , seed=18446744073709551615 ").unwrap();
         assert_eq!(plain.to_string(), "drop=2.5e-1,seed=18446744073709551615");

@@ -6,7 +6,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::time;
 
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::error::PortError;
 use super::fd::FdLink;
@@ -15,7 +15,7 @@ use crate::clock::Clock;
 use crate::clock::WeakClock;
 
 /// How far a board's time advances by one.
-const TICK: Duration = Duration(100);
+const TICK: Micros = Micros(100);
 /// The most ticks that one command asks for.
 const MOST_TICKS: u64 = 254;
 /// The command that asks how many bytes the board has taken.
@@ -113,7 +113,7 @@ impl EmulatedBytes {
     fn step(&mut self, end: Instant) -> Result<(), PortError> {
         let ticks = end.since(self.reached).0.div_ceil(TICK.0).min(MOST_TICKS) as u8;
         let done = self.ask(ticks)?;
-        self.reached += Duration(u64::from(done) * TICK.0);
+        self.reached += Micros(u64::from(done) * TICK.0);
         self.clock.wait(self.reached);
         Ok(())
     }
@@ -164,7 +164,7 @@ impl ByteLink for EmulatedBytes {
         let end = timeout.map_or(Instant(u64::MAX), |timeout| {
             // A part of a microsecond is one.
             let part = u64::from(!timeout.subsec_nanos().is_multiple_of(1000));
-            now + timeout.into() + Duration(part)
+            now + timeout.into() + Micros(part)
         });
         self.step_to(now)?;
         loop {

@@ -3,6 +3,7 @@
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use rustix::io::Errno;
@@ -10,7 +11,7 @@ use rustix::io::Errno;
 use super::interface::up_hint;
 
 /// Why a port could not be opened or does not carry on.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum PortError {
     /// No device has this name.
@@ -65,7 +66,7 @@ pub enum PortError {
         /// The port.
         port: String,
         /// What the resolver said.
-        source: io::Error,
+        source: Arc<io::Error>,
     },
     /// The machine is there and nothing listens.
     #[error("`{port}` refuses the connection: is the server started, on this TCP port?")]
@@ -79,7 +80,7 @@ pub enum PortError {
         /// The port.
         port: String,
         /// What the system said.
-        source: io::Error,
+        source: Arc<io::Error>,
     },
     /// The far end hung up, or the adapter was unplugged.
     #[error(
@@ -241,7 +242,7 @@ pub enum PortError {
         /// The port.
         port: String,
         /// What the system said.
-        source: io::Error,
+        source: Arc<io::Error>,
     },
 }
 
@@ -276,7 +277,7 @@ impl PortError {
                 port,
                 hint: "no other node acknowledges the frames; check wiring, power and bitrate",
             },
-            _ => PortError::Io { port, source },
+            _ => PortError::Io { port, source: source.into() },
         }
     }
 
@@ -295,7 +296,7 @@ impl PortError {
             }
             Some(Errno::BUSY | Errno::WOULDBLOCK) => PortError::Busy { port },
             Some(Errno::ISDIR | Errno::NOTTY | Errno::NOTDIR) => PortError::NotSerial { port },
-            _ => PortError::Io { port, source },
+            _ => PortError::Io { port, source: source.into() },
         }
     }
 }

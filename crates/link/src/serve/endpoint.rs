@@ -5,7 +5,7 @@ use std::net::TcpListener;
 use std::os::fd::OwnedFd;
 
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_slcan::Device;
 use rustix::event::{PollFd, PollFlags};
 use rustix::io::{Errno, read, write};
@@ -20,7 +20,7 @@ use crate::port::keep_alive;
 const CHUNK: usize = 4096;
 
 /// How long the door stays shut when a newcomer cannot be let in for want of descriptors.
-const PAUSE: Duration = Duration::from_millis(100);
+const PAUSE: Micros = Micros::from_millis(100);
 
 /// Where clients come from.
 enum Door {

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use rustix::event::{PollFd, PollFlags};
 
 use super::station::CanStation;
@@ -12,11 +12,11 @@ use crate::port::{CanLink, PortError, SocketCanLink};
 /// Frames that are taken from the bus in one turn; the other ports have their turn as well.
 const TURN: usize = 64;
 /// How soon an interface that has no room is offered the frame again.
-const FULL: Duration = Duration::from_millis(1);
+const FULL: Micros = Micros::from_millis(1);
 /// A frame that could not be sent by then is stale; it does not come out of the blue later.
-const STALE: Duration = Duration::from_millis(100);
+const STALE: Micros = Micros::from_millis(100);
 /// How soon an interface that is away is looked for again.
-const AWAY: Duration = Duration::from_millis(100);
+const AWAY: Micros = Micros::from_millis(100);
 
 pub(super) struct Node {
     interface: String,

@@ -29,7 +29,10 @@ pub(super) struct Pty {
 impl Pty {
     /// Makes a pty with `link` pointing to it, and returns the server's side as well.
     pub(super) fn open(link: &Path) -> Result<(Self, OwnedFd), PortError> {
-        let failed = |source| PortError::Io { port: link.display().to_string(), source };
+        let failed = |source: io::Error| PortError::Io {
+            port: link.display().to_string(),
+            source: source.into(),
+        };
         clear_link(link)?;
         let (path, master) = open_pair().map_err(|errno| failed(errno.into()))?;
         let comings = watch_comings(&path).map_err(|errno| failed(errno.into()))?;
@@ -129,12 +132,12 @@ fn clear_link(link: &Path) -> Result<(), PortError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         // Not a link at all.
         Err(error) if error.kind() == io::ErrorKind::InvalidInput => false,
-        Err(source) => return Err(PortError::Io { port, source }),
+        Err(source) => return Err(PortError::Io { port, source: source.into() }),
     };
     if !is_ours {
         return Err(PortError::PathTaken { port, wanted: "link to a pty that a server left" });
     }
-    std::fs::remove_file(link).map_err(|source| PortError::Io { port, source })
+    std::fs::remove_file(link).map_err(|source| PortError::Io { port, source: source.into() })
 }
 
 /// Whether the pty that `link` points to is a later one that got the number of the link's own, whose

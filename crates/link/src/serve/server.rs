@@ -189,9 +189,9 @@ impl Server {
 
 /// Listens at `host`; returns the address in use as well.
 fn listen(host: &str, tcp_port: u16, port: &str) -> Result<(TcpListener, String), PortError> {
-    let addresses = (unbracketed(host), tcp_port)
-        .to_socket_addrs()
-        .map_err(|source| PortError::UnknownHost { port: port.to_owned(), source })?;
+    let addresses = (unbracketed(host), tcp_port).to_socket_addrs().map_err(|source| {
+        PortError::UnknownHost { port: port.to_owned(), source: source.into() }
+    })?;
     let bound = TcpListener::bind(addresses.collect::<Vec<_>>().as_slice());
     let listening = bound.and_then(|listener| {
         listener.set_nonblocking(true)?;
@@ -200,6 +200,6 @@ fn listen(host: &str, tcp_port: u16, port: &str) -> Result<(TcpListener, String)
     });
     listening.map_err(|source| match source.kind() {
         std::io::ErrorKind::AddrInUse => PortError::AddressInUse { port: port.to_owned() },
-        _ => PortError::Io { port: port.to_owned(), source },
+        _ => PortError::Io { port: port.to_owned(), source: source.into() },
     })
 }

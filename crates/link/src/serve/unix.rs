@@ -30,7 +30,8 @@ impl UnixDoor {
     pub(super) fn open(path: &Path) -> Result<Self, PortError> {
         let port = path.display().to_string();
         clear(path)?;
-        let failed = |source| PortError::Io { port: port.clone(), source };
+        let failed =
+            |source: io::Error| PortError::Io { port: port.clone(), source: source.into() };
         let fd = listening(path).map_err(failed)?;
         let inode = path.symlink_metadata().map_err(failed)?.ino();
         Ok(UnixDoor { listener: fd.into(), path: path.to_owned(), inode })
@@ -63,7 +64,7 @@ fn clear(path: &Path) -> Result<(), PortError> {
     let port = path.display().to_string();
     match path.symlink_metadata() {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        Err(source) => return Err(PortError::Io { port, source }),
+        Err(source) => return Err(PortError::Io { port, source: source.into() }),
         Ok(file) if !file.file_type().is_socket() => {
             return Err(PortError::PathTaken { port, wanted: "socket" });
         }
@@ -71,9 +72,8 @@ fn clear(path: &Path) -> Result<(), PortError> {
     }
     let knock = || connect(&socket()?, &SocketAddrUnix::new(path)?);
     match knock() {
-        Err(Errno::CONNREFUSED) => {
-            std::fs::remove_file(path).map_err(|source| PortError::Io { port, source })
-        }
+        Err(Errno::CONNREFUSED) => std::fs::remove_file(path)
+            .map_err(|source| PortError::Io { port, source: source.into() }),
         _ => Err(PortError::PathServed { port }),
     }
 }

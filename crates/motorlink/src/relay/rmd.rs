@@ -22,7 +22,7 @@ use crate::rmd::{Client, Options, StopAction, Stopped};
 
 /// What a frame takes behind a serial adapter at 115200 baud: 27 bytes. A CAN interface of the kernel
 /// has a short queue of its own.
-const FRAME: time::Duration = time::Duration(2_344);
+const FRAME: time::Micros = time::Micros(2_344);
 /// A request to every motor, and as many to all of 1 to 4.
 const FRAMES_AHEAD: u64 = 64;
 /// Frames that are taken from the bus in one turn: the client has its turn as well.
@@ -41,9 +41,9 @@ impl RmdHold {
     pub(super) fn open(name: &PortName, on_loss: StopAction) -> Result<Self, PortError> {
         let opened = name.clone();
         let is_paced = name.as_can().is_some_and(|bus| bus.is_paced());
-        let frame = if is_paced { time::Duration(0) } else { FRAME };
+        let frame = if is_paced { time::Micros(0) } else { FRAME };
         let port = Port::open(name, Box::new(move || opened.open_event_can()))?;
-        let pace = Pace::new(frame, time::Duration(frame.0 * FRAMES_AHEAD));
+        let pace = Pace::new(frame, time::Micros(frame.0 * FRAMES_AHEAD));
         Ok(RmdHold { held: Held::new(port, pace), on_loss, follower: Follower::default() })
     }
 

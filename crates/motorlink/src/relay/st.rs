@@ -7,7 +7,7 @@ use std::time::Duration;
 use motorlink_link::port::{ByteLink, DEFAULT_BAUD, EventBytes, Evented, PortError, PortName};
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::{Served, Server};
-use motorlink_proto::st::{Command, ErrorCode, MasterConfig, Recovery, Request, Status};
+use motorlink_proto::st::{Command, ErrorCode, Recovery, Request, Status};
 use motorlink_proto::time::{self, Instant};
 
 use super::event::{Halt, Outcome, Part};
@@ -23,7 +23,7 @@ use crate::st::{Client, Error, Options, Stopped};
 const STATUS_PATIENCE: Duration = Duration::from_millis(500);
 const STATUS_PERIOD: Duration = Duration::from_millis(10);
 /// How far a client may be ahead of the line: more than the longest frame at 115200 baud.
-const AHEAD: time::Duration = time::Duration::from_millis(20);
+const AHEAD: time::Micros = time::Micros::from_millis(20);
 /// A start bit, eight data bits and a stop bit.
 const BITS: u64 = 10;
 
@@ -37,11 +37,10 @@ impl StHold {
     pub(super) fn open(name: &PortName) -> Result<Self, PortError> {
         let opened = name.clone();
         let port = Port::open(name, Box::new(move || opened.open_event_bytes()))?;
-        let config = MasterConfig { recovery: Recovery::Pad, ..MasterConfig::default() };
-        let options = Options { master: config, ..Options::default() }.on(name);
+        let options = Options { recovery: Recovery::Pad, ..Options::default() }.on(name);
         // What is behind a socket is taken for as fast as a serial line usually is.
         let baud = name.baud().unwrap_or(DEFAULT_BAUD);
-        let byte = time::Duration(BITS * 1_000_000 / u64::from(baud));
+        let byte = time::Micros(BITS * 1_000_000 / u64::from(baud));
         let held = Held::new(port, Pace::new(byte, AHEAD.max(byte)));
         Ok(StHold { held, options, follower: Follower::default() })
     }

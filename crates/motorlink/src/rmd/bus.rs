@@ -33,7 +33,7 @@ pub enum ScanResult {
 }
 
 /// How long what came meanwhile may go on coming.
-const BABBLE: time::Duration = time::Duration::from_millis(100);
+const BABBLE: time::Micros = time::Micros::from_millis(100);
 
 /// IDs that a scan asks at once.
 const SCAN_WIDTH: usize = 8;

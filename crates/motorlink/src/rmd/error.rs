@@ -13,123 +13,123 @@ use motorlink_proto::units::TurnCentiDegrees;
 pub enum Error {
     /// No reply in time; it is not known whether the motor did what was asked.
     #[error(
-        "{port}: motor {id} does not answer {:#04x} ({code}); is it powered, is its ID right and the \
+        "{port}: motor {motor} does not answer {:#04x} ({request}); is it powered, is its ID right and the \
          bitrate 1 Mbit/s? `motorlink rmd scan` lists the motors that answer",
-        u8::from(*code)
+        u8::from(*request)
     )]
     Timeout {
         /// The port.
         port: Arc<str>,
         /// The motor.
-        id: MotorId,
+        motor: MotorId,
         /// What was asked for.
-        code: Code,
+        request: Code,
     },
     /// No reply in time, and the adapter says why, or is as silent; it is not known whether the motor did
     /// what was asked.
-    #[error("{port}: motor {id} does not answer, and the adapter may be the cause: {why}")]
+    #[error("{port}: motor {motor} does not answer, and the adapter may be the cause: {why}")]
     Adapter {
         /// The port.
         port: Arc<str>,
         /// The motor.
-        id: MotorId,
+        motor: MotorId,
         /// What the adapter did.
         why: &'static str,
     },
     /// The motor answers in another protocol; it is not driven.
     #[error(
-        "{port}: motor {id} answers as {dialect} motors do, on {:#05x}; it does not speak V1.62, \
+        "{port}: motor {motor} answers as {dialect} motors do, on {:#05x}; it does not speak V1.62, \
          where the same bytes mean something else, so it is not driven",
-        .dialect.reply_base() + u16::from(.id.number())
+        .dialect.reply_base() + u16::from(.motor.number())
     )]
     Foreign {
         /// The port.
         port: Arc<str>,
         /// The motor.
-        id: MotorId,
+        motor: MotorId,
         /// What it speaks.
         dialect: Dialect,
     },
     /// The reply is not the request bit for bit, which it is in this protocol; it is not known what
     /// the motor did.
     #[error(
-        "{port}: motor {id} answered {:#04x} ({code}) with another content than it was sent, and has to \
+        "{port}: motor {motor} answered {:#04x} ({request}) with another content than it was sent, and has to \
          repeat it; it is not known what it did. Is another host on the bus, or an old reply in the \
          adapter? ask again",
-        u8::from(*code)
+        u8::from(*request)
     )]
     Altered {
         /// The port.
         port: Arc<str>,
         /// The motor.
-        id: MotorId,
+        motor: MotorId,
         /// What was asked for.
-        code: Code,
+        request: Code,
     },
     /// The motor may still answer an earlier request, of this host or another; what was asked for was
     /// not sent, or what ends motion has no answer that can be trusted.
-    #[error("{port}: motor {id} may still answer an earlier request; ask again")]
+    #[error("{port}: motor {motor} may still answer an earlier request; ask again")]
     Quarantined {
         /// The port.
         port: Arc<str>,
         /// The motor.
-        id: MotorId,
+        motor: MotorId,
     },
     /// The motor does not cease to answer somebody else: what was asked for was not sent, or what ends
     /// motion has no answer that can be trusted.
     #[error(
-        "{port}: motor {id} goes on answering what this program did not ask, so that nothing tells which \
+        "{port}: motor {motor} goes on answering what this program did not ask, so that nothing tells which \
          reply is its own; does another program or host use this bus? end it, and ask again"
     )]
     Shared {
         /// The port.
         port: Arc<str>,
         /// The motor.
-        id: MotorId,
+        motor: MotorId,
     },
     /// The motor sent what answers no request: a reply that came twice, or one to another host. What was
     /// read since the last confirmation may be older than it looks.
     #[error(
-        "{port}: motor {id} sent a reply that nobody asked for, so that what was read may be an older \
+        "{port}: motor {motor} sent a reply that nobody asked for, so that what was read may be an older \
          value; ask again"
     )]
     Unconfirmed {
         /// The port.
         port: Arc<str>,
         /// The motor.
-        id: MotorId,
+        motor: MotorId,
     },
     /// What was sent came back; it is not known what the motor did.
     #[error(
-        "{port}: what is sent to motor {id} comes back: the adapter echoes, or another host asks the \
+        "{port}: what is sent to motor {motor} comes back: the adapter echoes, or another host asks the \
          same. With an adapter that echoes add `echo=1` to the port, as in slcan:/dev/ttyACM0?echo=1"
     )]
     Echo {
         /// The port.
         port: Arc<str>,
         /// The motor.
-        id: MotorId,
+        motor: MotorId,
     },
     /// Two requests of one cycle are for the same motor; the second was not sent.
     #[error("motor {0} is asked twice in one cycle; the second request was not sent")]
     Twice(MotorId),
     /// A limit forbids it; nothing was sent.
-    #[error("motor {id}: {exceeded}; nothing was sent")]
+    #[error("motor {motor}: {exceeded}; nothing was sent")]
     Limit {
         /// The motor.
-        id: MotorId,
+        motor: MotorId,
         /// The limit.
         exceeded: Exceeded,
     },
     /// A move within the turn could be nearly a full turn; it was not sent.
     #[error(
-        "motor {id} is at {:.2}°, {:.2}° past {:.2}° {direction}: the move could be nearly a full turn; \
+        "motor {motor} is at {:.2}°, {:.2}° past {:.2}° {direction}: the move could be nearly a full turn; \
          it was not sent",
         at.degrees(), past.degrees(), target.degrees()
     )]
     FullTurn {
         /// The motor.
-        id: MotorId,
+        motor: MotorId,
         /// Where it is (0x94).
         at: TurnCentiDegrees,
         /// How far past its target that is.
@@ -147,20 +147,16 @@ pub enum Error {
     OutOfReach(MotorId),
     /// The port.
     #[error(transparent)]
-    Port(Arc<PortError>),
-}
-
-impl From<PortError> for Error {
-    fn from(error: PortError) -> Self {
-        Error::Port(Arc::new(error))
-    }
+    Port(#[from] PortError),
 }
 
 impl Error {
     /// With what the adapter of the bus tells.
     pub(super) fn behind(self, link: &(impl CanLink + ?Sized)) -> Self {
         match (self, link.trouble()) {
-            (Error::Timeout { port, id, .. }, Some(why)) => Error::Adapter { port, id, why },
+            (Error::Timeout { port, motor: id, .. }, Some(why)) => {
+                Error::Adapter { port, motor: id, why }
+            }
             (error, _) => error,
         }
     }

@@ -4,10 +4,10 @@ use std::collections::VecDeque;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Code, MotorId, MotorSet, TORQUE4_ID};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 /// How long a request may wait for its reply.
-const LATE: Duration = Duration::from_millis(2_000);
+const LATE: Micros = Micros::from_millis(2_000);
 /// Requests to a motor that wait for their reply.
 const WAITING: usize = 64;
 

@@ -44,7 +44,7 @@ impl FullTurn {
         if past > tolerance {
             return Ok(());
         }
-        Err(Error::FullTurn { id, at, past, target, direction })
+        Err(Error::FullTurn { motor: id, at, past, target, direction })
     }
 }
 

@@ -8,12 +8,12 @@ use motorlink_proto::rmd::{
     self as proto, Code, Command, Counters, Host, Limits, MotorId, MotorSet, RequestError,
     SetTorque, SetTorque4, question_behind,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::{Error, Options};
 
 /// How long a motor whose replies are in doubt may go on talking, beside the times of its exchanges.
-const SETTLE_LIMIT: Duration = Duration::from_millis(2_000);
+const SETTLE_LIMIT: Micros = Micros::from_millis(2_000);
 
 /// A host that waits for motors in quarantine, and for those that it asks for the first time, with the motors that it set moving, and its errors in
 /// words: sans I/O. [`request`](Self::request), [`ask`](Self::ask) or [`set_torque4`](Self::set_torque4),
@@ -25,7 +25,7 @@ pub(super) struct Session {
     /// Motors that were given something to do and not switched off.
     moving: MotorSet,
     /// How long an exchange may be put off.
-    patience: Duration,
+    patience: Micros,
     /// What each motor was asked last.
     asked: [PendingRequest; MotorId::COUNT],
     /// Motors whose quarantine an exchange outlasts.
@@ -108,7 +108,7 @@ impl Session {
         self.moving = self.moving.union(moving);
     }
 
-    pub(super) fn quarantine(&self) -> Duration {
+    pub(super) fn quarantine(&self) -> Micros {
         self.host.quarantine()
     }
 
@@ -138,7 +138,7 @@ impl Session {
     /// Whether the motor's replies since the last confirmation went to their own requests.
     pub(super) fn confirmed(&mut self, id: MotorId) -> Result<(), Error> {
         match self.host.take_stray(id) {
-            true => Err(Error::Unconfirmed { port: Arc::clone(&self.port), id }),
+            true => Err(Error::Unconfirmed { port: Arc::clone(&self.port), motor: id }),
             false => Ok(()),
         }
     }
@@ -371,18 +371,18 @@ impl Session {
     }
 
     fn quarantined(&self, id: MotorId) -> Error {
-        Error::Quarantined { port: Arc::clone(&self.port), id }
+        Error::Quarantined { port: Arc::clone(&self.port), motor: id }
     }
 
     /// Of a motor that was waited for: it would have been trusted if it had been silent.
     fn shared(&self, id: MotorId) -> Error {
-        Error::Shared { port: Arc::clone(&self.port), id }
+        Error::Shared { port: Arc::clone(&self.port), motor: id }
     }
 
     fn refused(&self, refused: RequestError) -> Error {
         match refused {
             RequestError::Quarantined { id, .. } => self.quarantined(id),
-            RequestError::Limit { id, exceeded } => Error::Limit { id, exceeded },
+            RequestError::Limit { id, exceeded } => Error::Limit { motor: id, exceeded },
             RequestError::OutOfReach(id) => Error::OutOfReach(id),
             RequestError::Busy(id) => Error::Twice(id),
         }
@@ -393,11 +393,11 @@ impl Session {
         let [code, ..] = self.asked[id.index()].request;
         let code = Code::from(code);
         match error {
-            proto::Failure::Altered => Error::Altered { port, id, code },
-            proto::Failure::Echo => Error::Echo { port, id },
-            proto::Failure::Foreign(dialect) => Error::Foreign { port, id, dialect },
-            proto::Failure::Quarantined => Error::Quarantined { port, id },
-            _ => Error::Timeout { port, id, code },
+            proto::Failure::Altered => Error::Altered { port, motor: id, request: code },
+            proto::Failure::Echo => Error::Echo { port, motor: id },
+            proto::Failure::Foreign(dialect) => Error::Foreign { port, motor: id, dialect },
+            proto::Failure::Quarantined => Error::Quarantined { port, motor: id },
+            _ => Error::Timeout { port, motor: id, request: code },
         }
     }
 }

@@ -19,7 +19,7 @@ use crate::turn::{Turn, Turns};
 
 /// After a pause of this length whatever came unasked is taken note of before the next request: a
 /// byte or so at 115200 baud. In a shorter one hardly anything can come, and looking is a system call.
-const IDLE: time::Duration = time::Duration(100);
+const IDLE: time::Micros = time::Micros(100);
 
 /// What GET_BOARD_INFO tells (4.7).
 #[derive(Debug, Clone, PartialEq, Eq)]

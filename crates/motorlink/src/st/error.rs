@@ -13,32 +13,32 @@ const NOT_READABLE: &str =
     "it cannot be both written and read in this profile; `motorlink st registers` says what can";
 
 /// Why a call to a drive did not do what it says.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The drive understood and said no. Nothing was changed.
-    #[error("{port}: {motor} refused {what}: {code} ({}){hint}", .code.doc())]
+    #[error("{port}: {motor} refused {request}: {code} ({}){hint}", .code.doc())]
     Refused {
         /// The port.
         port: Arc<str>,
         /// The motor, in words.
         motor: Target,
         /// What was asked for.
-        what: String,
+        request: String,
         /// The drive's reason.
         code: ErrorCode,
         /// What to try, behind a semicolon; may be empty.
         hint: &'static str,
     },
     /// There is no answer to trust; it is not known whether the drive did what was asked.
-    #[error("{port}: {what} for {motor} failed: {failure}; {hint}")]
+    #[error("{port}: {request} for {motor} failed: {failure}; {hint}")]
     Failed {
         /// The port.
         port: Arc<str>,
         /// The motor, in words.
         motor: Target,
         /// What was asked for.
-        what: String,
+        request: String,
         /// How it failed.
         failure: Failure,
         /// What to try.
@@ -46,7 +46,7 @@ pub enum Error {
     },
     /// The drive acknowledged with something that this request is not answered with.
     #[error(
-        "{port}: {motor} answered {what} with {size} bytes, which is none of its replies; \
+        "{port}: {motor} answered {request} with {size} bytes, which is none of its replies; \
          is the profile right?"
     )]
     Reply {
@@ -55,7 +55,7 @@ pub enum Error {
         /// The motor, in words.
         motor: Target,
         /// What was asked for.
-        what: String,
+        request: String,
         /// Bytes of the reply's payload.
         size: usize,
     },
@@ -99,12 +99,12 @@ pub enum Error {
     #[error(transparent)]
     Port(#[from] PortError),
     /// A limit of the caller forbids it; nothing was sent.
-    #[error("{motor}: {why}")]
+    #[error("{motor}: {exceeded}")]
     Limit {
         /// The motor, in words.
         motor: Target,
         /// Which limit, and what to do.
-        why: LimitError,
+        exceeded: LimitError,
     },
     /// There is no such motor number; nothing was sent.
     #[error("motor {0} does not exist: motor numbers are 1 to 7")]

@@ -1,13 +1,13 @@
 //! ST's Motor Control Protocol over a serial line.
 //!
 //! ```no_run
-//! use motorlink::st::{Client, Options, register};
+//! use motorlink::st::{Client, Options, Ramp, register};
 //!
 //! let client = Client::open(&"/dev/ttyACM0".parse()?, Options::default())?;
 //! let guard = client.stop_on_drop();       // stops what was started when it goes out of scope
 //! let motor = client.motor(1)?;
 //! motor.start()?;
-//! motor.set_ramp(1500, 1000)?;
+//! motor.set_ramp(Ramp { speed_rpm: 1500, duration_ms: 1000 })?;
 //! println!("{} rpm", motor.get(register::SPEED_MEAS)?);
 //! # drop(guard);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -24,6 +24,16 @@ impl Client {
     }
 }
 
+/// A method for each command of table 4.
+macro_rules! commands {
+    ($( $method:ident $command:ident, )+) => {$(
+        #[doc = concat!("[`execute`](Self::execute)s [`Command::", stringify!($command), "`].")]
+        pub fn $method(&self) -> Result<(), Error> {
+            self.execute(Command::$command)
+        }
+    )+};
+}
+
 impl Motor<'_> {
     /// The motor's number.
     pub fn number(&self) -> MotorNumber {
@@ -110,39 +120,30 @@ impl Motor<'_> {
         self.tell(&Request::ExecuteCommand(command))
     }
 
-    /// START_MOTOR.
-    pub fn start(&self) -> Result<(), Error> {
-        self.execute(Command::StartMotor)
+    commands! {
+        start StartMotor, stop StopMotor, stop_ramp StopRamp, start_stop StartStop, fault_ack FaultAck,
+        encoder_align EncoderAlign, iqdref_clear IqdrefClear, pfc_enable PfcEnable,
+        pfc_disable PfcDisable, pfc_fault_ack PfcFaultAck,
     }
 
-    /// STOP_MOTOR.
-    pub fn stop(&self) -> Result<(), Error> {
-        self.execute(Command::StopMotor)
+    /// Goes to a speed: at once in RUN, else when RUN is reached (4.8).
+    pub fn set_ramp(&self, ramp: Ramp) -> Result<(), Error> {
+        self.tell(&Request::SetRamp(ramp))
     }
 
-    /// Acknowledges past faults (FAULT_ACK).
-    pub fn fault_ack(&self) -> Result<(), Error> {
-        self.execute(Command::FaultAck)
+    /// Sets the current references (4.11).
+    pub fn set_current_reference(&self, reference: CurrentReference) -> Result<(), Error> {
+        self.tell(&Request::SetCurrentReference(reference))
     }
 
-    /// Goes to `speed_rpm` within `duration_ms`: at once in RUN, else when RUN is reached (4.8).
-    pub fn set_ramp(&self, speed_rpm: i32, duration_ms: u16) -> Result<(), Error> {
-        self.tell(&Request::SetRamp(Ramp { speed_rpm, duration_ms }))
+    /// Goes to an Iq (profile `mcsdk-5.4` only).
+    pub fn set_torque_ramp(&self, ramp: TorqueRamp) -> Result<(), Error> {
+        self.tell(&Request::SetTorqueRamp(ramp))
     }
 
-    /// Sets the current references, s16A digits (4.11).
-    pub fn set_current_reference(&self, iq_s16a: i16, id_s16a: i16) -> Result<(), Error> {
-        self.tell(&Request::SetCurrentReference(CurrentReference { iq_s16a, id_s16a }))
-    }
-
-    /// Goes to an Iq of `torque_s16a` within `duration_ms` (profile `mcsdk-5.4` only).
-    pub fn set_torque_ramp(&self, torque_s16a: i32, duration_ms: u16) -> Result<(), Error> {
-        self.tell(&Request::SetTorqueRamp(TorqueRamp { torque_s16a, duration_ms }))
-    }
-
-    /// Turns to `angle_rad` within `duration_s` (profile `mcsdk-5.4` with position control only).
-    pub fn set_position(&self, angle_rad: f32, duration_s: f32) -> Result<(), Error> {
-        self.tell(&Request::SetPosition(PositionMove { angle_rad, duration_s }))
+    /// Turns to an angle (profile `mcsdk-5.4` with position control only).
+    pub fn set_position(&self, target: PositionMove) -> Result<(), Error> {
+        self.tell(&Request::SetPosition(target))
     }
 
     /// A rev-up phase, 0 to 4 (4.9).

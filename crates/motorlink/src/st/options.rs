@@ -1,18 +1,24 @@
 //! How a client of an ST drive behaves.
 
+use std::time::Duration;
+
 use motorlink_link::port::PortName;
 use motorlink_link::reopening::BackOff;
-use motorlink_proto::st::{Master, MasterConfig, Profile};
+use motorlink_proto::st::{Master, MasterConfig, Profile, Recovery};
 
 use super::Limits;
 
 /// How a [`Client`](super::Client) behaves.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// What the drive is expected to speak.
     pub profile: Profile,
-    /// Timeout and recovery of the line.
-    pub master: MasterConfig,
+    /// How long a reply may take.
+    pub timeout: Duration,
+    /// How a lost line comes back.
+    pub recovery: Recovery,
+    /// The silence after which nothing more is expected to come.
+    pub quiet: Duration,
     /// Attempts to open a port that went away.
     pub back_off: BackOff,
     /// What no request may exceed.
@@ -23,8 +29,32 @@ impl Options {
     /// What recovery sends has to be out of the port before silence can begin.
     pub(crate) fn on(mut self, port: &PortName) -> Self {
         if let Some(baud) = port.baud() {
-            self.master.quiet = self.master.quiet + Master::longest_transmission(baud);
+            self.quiet += Duration::from(Master::longest_transmission(baud));
         }
         self
+    }
+
+    pub(super) fn config(&self) -> MasterConfig {
+        MasterConfig {
+            timeout: self.timeout.into(),
+            recovery: self.recovery,
+            quiet: self.quiet.into(),
+            profile: self.profile,
+        }
+    }
+}
+
+impl Default for Options {
+    /// What [`MasterConfig`] has, no limits.
+    fn default() -> Self {
+        let MasterConfig { timeout, recovery, quiet, profile } = MasterConfig::default();
+        Options {
+            profile,
+            timeout: timeout.into(),
+            recovery,
+            quiet: quiet.into(),
+            back_off: BackOff::default(),
+            limits: Limits::default(),
+        }
     }
 }

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use motorlink_link::port::{PortError, PortName};
-use motorlink_proto::st::{ErrorCode, Failure, MasterConfig, Profile, Recovery};
+use motorlink_link::port::PortName;
+use motorlink_proto::st::{ErrorCode, Failure, Profile, Recovery};
 
 use super::{BoardInfo, Client, Error, Options};
 
@@ -30,17 +30,17 @@ pub enum ScanResult {
 ///
 /// # Errors
 /// What keeps the port from being opened.
-pub fn scan_baud(port: &PortName, baud: u32, patience: Duration) -> Result<ScanResult, PortError> {
+pub fn scan_baud(port: &PortName, baud: u32, patience: Duration) -> Result<ScanResult, Error> {
     let port = port.at_baud(baud).unwrap_or_else(|| port.clone());
-    let link = MasterConfig {
-        timeout: patience.into(),
+    let options = Options {
+        profile: Profile::Spec,
+        timeout: patience,
         recovery: Recovery::Pad,
-        ..MasterConfig::default()
+        ..Options::default()
     };
-    let options = Options { profile: Profile::Spec, master: link, ..Options::default() };
     let client = match Client::open(&port, options) {
         Ok(client) => client,
-        Err(Error::Port(error)) => return Err(error),
+        Err(error @ Error::Port(_)) => return Err(error),
         Err(_) => return Ok(ScanResult::Silence),
     };
     // A drive that waits for the rest of a cut-off frame answers the second question.
@@ -49,7 +49,7 @@ pub fn scan_baud(port: &PortName, baud: u32, patience: Duration) -> Result<ScanR
         match client.board_info() {
             Ok(info) => return Ok(ScanResult::Drive(info)),
             Err(Error::Refused { code, .. }) => return Ok(ScanResult::Refuses(code)),
-            Err(Error::Port(error)) => return Err(error),
+            Err(error @ Error::Port(_)) => return Err(error),
             Err(Error::Failed { failure: Failure::Timeout | Failure::Lost, .. }) => {}
             Err(Error::Failed { failure: Failure::Echo, .. }) => heard = ScanResult::Echo,
             Err(Error::Failed { failure: Failure::NotUnderstood(code), .. }) => {

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use motorlink_link::port::PortError;
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
-    Command, Counters, Frame, FrameCode, MAX_FRAME, MAX_PAYLOAD, Master, MasterConfig, MotorNumber,
-    Output, Profile, RegisterId, Request, RequestError, SyncState, question_behind,
+    Command, Counters, Frame, FrameCode, MAX_FRAME, MAX_PAYLOAD, Master, MotorNumber, Output,
+    Profile, RegisterId, Request, RequestError, SyncState, question_behind,
 };
 use motorlink_proto::time::Instant;
 
@@ -78,7 +78,9 @@ enum What {
 impl Rules {
     pub(super) fn check(&self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         addressable(motor)?;
-        self.limits.check(request).map_err(|why| Error::Limit { motor: Target(motor), why })
+        self.limits
+            .check(request)
+            .map_err(|why| Error::Limit { motor: Target(motor), exceeded: why })
     }
 
     /// As [`check`](Self::check), for any frame, in every profile; gives its effect.
@@ -90,7 +92,7 @@ impl Rules {
         let frame = Frame { header: Frame::header(code, motor), payload };
         match self.limits.check_frame(&frame) {
             Ok(()) => Ok(Effect::of_frame(&frame)),
-            Err(why) => Err(Error::Limit { motor: Target(motor), why }),
+            Err(why) => Err(Error::Limit { motor: Target(motor), exceeded: why }),
         }
     }
 }
@@ -101,7 +103,7 @@ impl Session {
         let rules = Rules { profile: options.profile, limits: options.limits };
         let what = What::Known(FrameCode::GetBoardInfo);
         let asked = PendingRequest { motor: 0, addressed: None, effect: Effect::None, what };
-        let master = Master::new(MasterConfig { profile: options.profile, ..options.master });
+        let master = Master::new(options.config());
         Session {
             port,
             rules,
@@ -202,7 +204,10 @@ impl Session {
             Some(limit_rpm)
                 if effect == Effect::Starts && !self.ramped.has(self.started.addressed(motor)) =>
             {
-                Err(Error::Limit { motor: Target(motor), why: LimitError::NoRamp { limit_rpm } })
+                Err(Error::Limit {
+                    motor: Target(motor),
+                    exceeded: LimitError::NoRamp { limit_rpm },
+                })
             }
             _ => Ok(()),
         }
@@ -260,15 +265,15 @@ impl Session {
             Ok((None, size)) => {
                 // A reply that fits no request: somebody else's, perhaps.
                 self.master.lost();
-                Err(Error::Reply { port, motor: target, what: what.to_string(), size })
+                Err(Error::Reply { port, motor: target, request: what.to_string(), size })
             }
             Err(proto::ExchangeError::Refused(code)) => {
                 let what = what.to_string();
-                Err(Error::Refused { port, motor: target, what, code, hint: hint(code) })
+                Err(Error::Refused { port, motor: target, request: what, code, hint: hint(code) })
             }
             Err(proto::ExchangeError::Failed(failure)) => {
                 let (what, hint) = (what.to_string(), advice(failure));
-                Err(Error::Failed { port, motor: target, what, failure, hint })
+                Err(Error::Failed { port, motor: target, request: what, failure, hint })
             }
         }
     }
@@ -334,7 +339,7 @@ impl Session {
         Error::Failed {
             port: Arc::clone(&self.port),
             motor: Target(motor.number()),
-            what: What::Executing(Command::StopMotor).to_string(),
+            request: What::Executing(Command::StopMotor).to_string(),
             failure,
             hint: advice(failure),
         }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use motorlink::can::CanFrame;
 use motorlink::port::{ByteLink, CanLink, FdLink, PortError};
 use motorlink::rmd::{self, CentiDps, IqCommand, MotorId, StopAction};
-use motorlink::st::{self, Command, MasterConfig, Request, Status};
+use motorlink::st::{self, Command, Request, Status};
 
 use crate::served::Served;
 use crate::wire::Fresh;
@@ -45,9 +45,7 @@ fn a_disarmed_guard_leaves_the_motor_running() {
 #[test]
 fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
     let (ours, theirs) = UnixStream::pair().unwrap();
-    let line =
-        MasterConfig { timeout: Duration::from_millis(100).into(), ..MasterConfig::default() };
-    let options = st::Options { master: line, ..st::Options::default() };
+    let options = st::Options { timeout: Duration::from_millis(100), ..st::Options::default() };
     let client =
         st::Client::over("pair", Box::new(Fresh(FdLink::new(ours, "pair").unwrap())), options);
     let mut start = [0; 4];
@@ -68,9 +66,7 @@ fn a_guard_sends_the_stop_to_a_drive_that_does_not_answer() {
 #[test]
 fn a_motor_whose_start_was_not_answered_is_stopped_too() {
     let (ours, theirs) = UnixStream::pair().unwrap();
-    let line =
-        MasterConfig { timeout: Duration::from_millis(50).into(), ..MasterConfig::default() };
-    let options = st::Options { master: line, ..st::Options::default() };
+    let options = st::Options { timeout: Duration::from_millis(50), ..st::Options::default() };
     let client =
         st::Client::over("pair", Box::new(Fresh(FdLink::new(ours, "pair").unwrap())), options);
     assert!(client.motor(3).unwrap().start().is_err());

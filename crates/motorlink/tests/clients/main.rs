@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use motorlink::port::{ByteLink, FaultBytes, FdLink, PortError, SlcanLink};
 use motorlink::rmd::{self, CentiDps, Code, MotorId, SpeedLimit};
 use motorlink::slcan::Bitrate;
-use motorlink::st::{self, Failure, Limits, MasterConfig, SyncState, register};
+use motorlink::st::{self, Failure, Limits, Ramp, SyncState, register};
 use motorlink::{BackOff, LinkState};
 use motorlink_link::fault::Faults;
 use served::Served;
@@ -40,12 +40,11 @@ fn patient() -> rmd::Options {
 
 #[test]
 fn a_verified_write_comes_through_a_line_that_loses_bytes() {
-    let line = MasterConfig {
-        timeout: Duration::from_millis(30).into(),
-        quiet: Duration::from_millis(5).into(),
-        ..MasterConfig::default()
+    let options = st::Options {
+        timeout: Duration::from_millis(30),
+        quiet: Duration::from_millis(5),
+        ..st::Options::default()
     };
-    let options = st::Options { master: line, ..st::Options::default() };
     let faults: Faults = "drop=2e-2,seed=1".parse().unwrap();
     let wrap = move |link| Box::new(FaultBytes::new(link, &faults)) as Box<dyn ByteLink>;
     motorlink_testbench::register();
@@ -101,9 +100,7 @@ fn ends<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
 #[test]
 fn a_port_that_never_falls_silent_holds_nobody_up() {
     for noise in [&b"x"[..], b"z\r", b"\x07", b"t1418A100000000000000\r", b"\xF0\x00\xF0"] {
-        let line =
-            MasterConfig { timeout: Duration::from_millis(50).into(), ..MasterConfig::default() };
-        let options = st::Options { master: line, ..st::Options::default() };
+        let options = st::Options { timeout: Duration::from_millis(50), ..st::Options::default() };
         let client = st::Client::over("flood", Box::new(Flood(noise)), options);
         ends(move || [client.board_info().is_ok(), client.board_info().is_ok()]);
         let Ok(adapter) = ends(|| SlcanLink::open(Flood(noise), "flood", Bitrate::DEFAULT)) else {
@@ -122,9 +119,9 @@ fn limits_hold_for_typed_and_raw_requests() {
     let options = st::Options { limits, ..st::Options::default() };
     let client = st::Client::open(&drives.st.parse().unwrap(), options).unwrap();
     let motor = client.motor(1).unwrap();
-    motor.set_ramp(1000, 0).unwrap();
+    motor.set_ramp(Ramp { speed_rpm: 1000, duration_ms: 0 }).unwrap();
     let refused = |result: Result<(), st::Error>| matches!(result, Err(st::Error::Limit { .. }));
-    assert!(refused(motor.set_ramp(-1001, 0)));
+    assert!(refused(motor.set_ramp(Ramp { speed_rpm: -1001, duration_ms: 0 })));
     assert!(refused(motor.set(register::TORQUE_REF, 2001)));
     assert!(refused(client.raw(1, 0x07, &[0xE9, 3, 0, 0, 0, 0]).map(drop)));
 
@@ -218,9 +215,7 @@ fn a_link_that_was_handed_in_is_not_opened_again() {
 
 #[test]
 fn a_silent_drive_is_a_failure_and_no_refusal() {
-    let line =
-        MasterConfig { timeout: Duration::from_millis(20).into(), ..MasterConfig::default() };
-    let options = st::Options { master: line, ..st::Options::default() };
+    let options = st::Options { timeout: Duration::from_millis(20), ..st::Options::default() };
     let pair = || {
         let (ours, theirs) = UnixStream::pair().unwrap();
         (FdLink::new(ours, "pair").unwrap(), theirs)
@@ -247,7 +242,7 @@ fn a_motor_that_is_not_there_is_told_with_what_it_was_asked() {
     let options = rmd::Options { timeout: Duration::from_millis(30), ..rmd::Options::default() };
     let bus = rmd::Client::open(&drives.rmd.parse().unwrap(), options).unwrap();
     let error = bus.motor(9).unwrap().status().unwrap_err();
-    assert!(matches!(error, rmd::Error::Timeout { code: Code::ReadStatus, .. }), "{error}");
+    assert!(matches!(error, rmd::Error::Timeout { request: Code::ReadStatus, .. }), "{error}");
     // The motor is in quarantine now; the next request waits for its end.
     assert!(matches!(bus.motor(9).unwrap().status(), Err(rmd::Error::Timeout { .. })));
 }

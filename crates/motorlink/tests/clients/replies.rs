@@ -100,9 +100,11 @@ fn a_copy_of_a_reply_is_not_taken_for_the_next_one_however_soon_that_is_asked() 
 
 #[test]
 fn a_copy_of_a_reply_that_comes_in_a_pause_is_not_the_answer_to_the_next_question() {
-    let mut options = st::Options::default();
-    options.master.timeout = Duration::from_millis(20).into();
-    options.master.quiet = Duration::from_millis(5).into();
+    let options = st::Options {
+        timeout: Duration::from_millis(20),
+        quiet: Duration::from_millis(5),
+        ..st::Options::default()
+    };
     let client = st::Client::over("twice", Twice::<Vec<u8>>::new(), options);
     let ask = || client.motor(1).unwrap().get(register::CONTROL_MODE);
     assert_eq!(ask().unwrap(), 1);

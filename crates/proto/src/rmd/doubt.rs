@@ -8,7 +8,7 @@
 //! then to be silent.
 
 use super::command::Code;
-use crate::time::{Duration, Instant};
+use crate::time::{Instant, Micros};
 
 /// What may still come from a motor.
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +61,7 @@ impl Doubt {
     }
 
     /// The reply to a request with this code did not come in time.
-    pub(super) fn owes(&mut self, now: Instant, guard: Duration, code: u8) {
+    pub(super) fn owes(&mut self, now: Instant, guard: Micros, code: u8) {
         self.owed = match self.owed {
             Owed::Nothing => Owed::One(code),
             Owed::One(owed) | Owed::Several(owed) if owed == code => Owed::Several(code),
@@ -99,7 +99,7 @@ impl Doubt {
     pub(super) fn admit(
         &mut self,
         now: Instant,
-        guard: Duration,
+        guard: Micros,
         code: u8,
     ) -> Result<Admitted, Instant> {
         if self.owed == Owed::Nothing {

@@ -9,7 +9,7 @@ use super::motor::{MotorId, MotorSet, TORQUE4_ID};
 use super::payload::Payload;
 use super::reply::*;
 use crate::can::CanFrame;
-use crate::time::{Duration, Instant};
+use crate::time::{Instant, Micros};
 use crate::units::*;
 
 /// What the drive needs of its motor: the power stage, its control loops and its sensors. Angles
@@ -92,7 +92,7 @@ pub struct DriveConfig {
     /// Width of the encoder (docs/SPEC-NOTES.md R6).
     pub encoder: EncoderBits,
     /// Switches the motor off after this long without a command (docs/SPEC-NOTES.md R12).
-    pub shutdown: Option<Duration>,
+    pub shutdown: Option<Micros>,
     /// Answers 0x9B with 0x9B, as relatives do, and not with 0x9A as printed (3, Clear motor error
     /// flag command; docs/SPEC-NOTES.md R1).
     pub clear_reply_0x9b: bool,

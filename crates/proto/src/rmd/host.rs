@@ -32,20 +32,20 @@ use super::message::SetTorque4;
 use super::motor::{Dialect, MotorId, MotorSet, TORQUE4_ID};
 use super::outcome::{Counters, Failure, Output, RequestError};
 use crate::can::CanFrame;
-use crate::time::{Duration, Instant};
+use crate::time::{Instant, Micros};
 
 /// How long a reply may take unless told otherwise: real motors answer in 0.3 to 2 ms, and a USB
 /// adapter may hold a frame for 16 ms.
-pub const DEFAULT_TIMEOUT: Duration = Duration::from_millis(50);
+pub const DEFAULT_TIMEOUT: Micros = Micros::from_millis(50);
 /// How long after a timeout a late reply is awaited, and how long a motor that did not answer has to
 /// be silent, unless told otherwise.
-pub const DEFAULT_QUARANTINE: Duration = Duration::from_millis(100);
+pub const DEFAULT_QUARANTINE: Micros = Micros::from_millis(100);
 
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     /// The request, and from its arrival on the reply.
     data: [u8; 8],
-    timeout: Duration,
+    timeout: Micros,
     deadline: Instant,
     /// What came instead of the reply to this request: nothing, so far.
     instead: Failure,
@@ -70,8 +70,8 @@ pub struct Host {
     torque4: Option<SetTorque4>,
     /// No deadline in flight is before this moment.
     earliest: Instant,
-    timeout: Duration,
-    guard: Duration,
+    timeout: Micros,
+    guard: Micros,
     counters: Counters,
 }
 
@@ -141,7 +141,7 @@ impl Host {
         now: Instant,
         id: MotorId,
         data: [u8; 8],
-        timeout: Duration,
+        timeout: Micros,
     ) -> Result<(), RequestError> {
         self.limits(id).check(&data).map_err(|exceeded| RequestError::Limit { id, exceeded })?;
         match self.admit(now, id, data)? {
@@ -302,18 +302,18 @@ impl Host {
     }
 
     /// Sets how long a reply may take from the next request on.
-    pub const fn set_timeout(&mut self, timeout: Duration) {
+    pub const fn set_timeout(&mut self, timeout: Micros) {
         self.timeout = timeout;
     }
 
     /// Sets the quarantine: how long a motor is left alone from the next timeout on, and how long it
     /// has to be silent.
-    pub const fn set_quarantine(&mut self, guard: Duration) {
+    pub const fn set_quarantine(&mut self, guard: Micros) {
         self.guard = guard;
     }
 
     /// The quarantine time.
-    pub const fn quarantine(&self) -> Duration {
+    pub const fn quarantine(&self) -> Micros {
         self.guard
     }
 
@@ -407,12 +407,12 @@ impl Host {
         admitted.map_err(|until| RequestError::Quarantined { id, until })
     }
 
-    fn question(&mut self, id: MotorId, timeout: Duration) {
+    fn question(&mut self, id: MotorId, timeout: Micros) {
         self.open(id, ReadStatus.encode(), timeout);
         self.questioned.insert(id);
     }
 
-    fn open(&mut self, id: MotorId, data: [u8; 8], timeout: Duration) {
+    fn open(&mut self, id: MotorId, data: [u8; 8], timeout: Micros) {
         let slot = self.slot(id);
         slot.data = data;
         slot.timeout = timeout;

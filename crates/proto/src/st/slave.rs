@@ -7,10 +7,10 @@ use super::{
     HEADER_ACK, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD, MotorControl, MotorNumber, Parse, Profile,
     REVUP_PHASES, RegisterId, Request, frame,
 };
-use crate::time::{Duration, Instant};
+use crate::time::{Instant, Micros};
 
 /// The time in which a whole command must have come (4.1).
-pub const RECEPTION_TIMEOUT: Duration = Duration::from_millis(25);
+pub const RECEPTION_TIMEOUT: Micros = Micros::from_millis(25);
 /// Data segments that a slave keeps (profile `spec`, SPEC-NOTES S7).
 pub const SEGMENTS: usize = 4;
 /// The most registers in a data segment: their values always fit a reply.

@@ -3,7 +3,7 @@
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::*;
 
 pub fn motor(id: u8) -> MotorId {
@@ -47,7 +47,7 @@ impl MotorControl for TestMotor {
 pub struct Node {
     pub drive: Drive,
     pub motor: TestMotor,
-    pub turnaround: Duration,
+    pub turnaround: Micros,
 }
 
 impl Node {
@@ -58,7 +58,7 @@ impl Node {
         let mut motor = TestMotor::default();
         motor.sense.temperature = Celsius(20 + id as i8);
         drive.power_on(Instant(0), &mut motor);
-        Node { drive, motor, turnaround: Duration(800) }
+        Node { drive, motor, turnaround: Micros(800) }
     }
 
     pub fn receive(&mut self, now: Instant, frame: &CanFrame) -> Option<CanFrame> {
@@ -131,7 +131,7 @@ impl Pair {
     }
 
     /// Lets time pass; what is on its way arrives.
-    pub fn wait(&mut self, span: Duration) {
+    pub fn wait(&mut self, span: Micros) {
         let until = self.now + span;
         while self.now < until {
             self.pass(until);

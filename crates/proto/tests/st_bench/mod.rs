@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use motorlink_proto::st::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::common::Memory;
 
@@ -26,7 +26,7 @@ pub struct Pair {
     pub now: Instant,
     /// Replies under way: when they arrive and what they are.
     pub line: VecDeque<(Instant, Vec<u8>)>,
-    pub delay: Duration,
+    pub delay: Micros,
     /// How many bytes of the next transmission reach the slave.
     pub cut: Option<usize>,
     /// Which bit of the next transmission is flipped.
@@ -44,7 +44,7 @@ impl Pair {
             drive: Memory::usual(),
             now: Instant(0),
             line: VecDeque::new(),
-            delay: Duration(0),
+            delay: Micros(0),
             cut: None,
             flip: None,
             sent: Vec::new(),
@@ -90,7 +90,7 @@ impl Pair {
     }
 
     /// Nothing is asked for a while.
-    pub fn rest(&mut self, pause: Duration) {
+    pub fn rest(&mut self, pause: Micros) {
         let end = self.now + pause;
         if let Some(deadline) = self.slave.deadline().filter(|deadline| *deadline <= end) {
             let nack = self.slave.poll(deadline).expect("a NACK is due").to_vec();

@@ -1,7 +1,7 @@
 //! What a motor and its drive are built from.
 
 use motorlink_proto::rmd::{DriveConfig, EncoderBits, MotorId, Pid, Settings};
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 use motorlink_proto::units::DpsPerSecond;
 
 use crate::plant::range::check;
@@ -98,7 +98,7 @@ impl RmdConfig {
 
     /// What the drive needs; `None` unless ID and encoder are in their ranges.
     pub(super) fn drive(&self) -> Option<DriveConfig> {
-        let shutdown = Duration::from_millis(self.shutdown_ms);
+        let shutdown = Micros::from_millis(self.shutdown_ms);
         Some(DriveConfig {
             id: MotorId::new(self.id)?,
             encoder: EncoderBits::new(self.plant.encoder.bits)?,

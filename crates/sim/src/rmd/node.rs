@@ -2,7 +2,7 @@
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Drive, MotorId, Settings};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::{RmdConfig, RmdMotor};
 use crate::clock::Clock;
@@ -21,7 +21,7 @@ impl RmdNode {
     pub fn new(now: Instant, config: RmdConfig, rom: Settings) -> Option<Self> {
         let motor = RmdMotor::new(config).ok()?;
         let drive = Drive::new(config.drive()?, rom);
-        let period = Duration(config.plant.period_us.into());
+        let period = Micros(config.plant.period_us.into());
         let clock = Clock::new(period, now);
         let mut node = RmdNode { drive, motor, clock };
         node.power_cycle(now);

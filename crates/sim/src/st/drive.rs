@@ -4,7 +4,7 @@ use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Features, MotorControl, MotorNumber, PositionMove, Ramp,
     RegisterId, RevupPhase, TorqueRamp, Version,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::{MotorConfig, StMotor};
 
@@ -50,7 +50,7 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
     /// Lets time pass until `now`.
     pub fn advance_to(&mut self, now: Instant) {
         let passed = now.since(self.now).0;
-        self.now += Duration(passed);
+        self.now += Micros(passed);
         self.motors.as_mut().iter_mut().for_each(|motor| motor.advance(passed));
     }
 

@@ -2,7 +2,7 @@
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::rmd::{RmdBus, RmdConfig, RmdMotor, RmdNode, Truth};
 
 /// A default motor with an encoder of this width.
@@ -35,7 +35,7 @@ impl NodeFixture {
     }
 
     pub fn wait(&mut self, ms: u32) {
-        self.now += Duration::from_millis(ms);
+        self.now += Micros::from_millis(ms);
         self.bus.advance_to(self.now);
     }
 

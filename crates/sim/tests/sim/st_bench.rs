@@ -5,7 +5,7 @@ use motorlink_proto::st::{
     Command, Flags, Frame, HEADER_ACK, MAX_FRAME, MotorNumber, Parse, Profile, REVUP_PHASES, Ramp,
     RegisterId, Request, RevupPhase, Status, register,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::plant::Plant;
 use motorlink_sim::st::{MotorConfig, StDrive, StMotor, StStation, Truth};
 
@@ -42,7 +42,7 @@ impl NodeFixture {
     }
 
     pub fn wait(&mut self, ms: u32) {
-        self.now += Duration::from_millis(ms);
+        self.now += Micros::from_millis(ms);
         self.station.advance_to(self.now);
     }
 

@@ -4,7 +4,7 @@ use motorlink_proto::rmd::{
     Command as _, ReadEncoder, ReadMotionStatus, ReadPhaseCurrents, SetPosition, SetSpeed,
 };
 use motorlink_proto::st::{Command, Profile, RegisterId, Request};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::{CentiDegrees, CentiDps};
 use motorlink_sim::hash;
 use motorlink_sim::rmd::RmdConfig;
@@ -14,7 +14,7 @@ use crate::{rmd_bench, st_bench};
 
 /// Lets `us` pass in pieces of at most `piece`.
 fn cut(now: &mut Instant, us: u64, piece: u64, mut advance: impl FnMut(Instant)) {
-    let end = *now + Duration(us);
+    let end = *now + Micros(us);
     while *now < end {
         *now = Instant((now.0 + piece).min(end.0));
         advance(*now);

@@ -3,7 +3,7 @@
 use std::mem::take;
 use std::path::{Path, PathBuf};
 
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 use serde::Deserialize;
 use toml::{Table, Value};
 
@@ -117,7 +117,7 @@ impl Scenario {
 
 impl File {
     /// Drives and what happens to them.
-    fn script(&mut self, folder: &Path, duration: Duration) -> Result<Script, String> {
+    fn script(&mut self, folder: &Path, duration: Micros) -> Result<Script, String> {
         let (st, rmd) = (self.st.is_some(), self.rmd.is_some());
         if !st && !rmd {
             return Err("there is no motor: add [[st.motor]] or [[rmd.motor]]".to_owned());
@@ -151,7 +151,7 @@ impl File {
 }
 
 /// Length of the run and of a sample.
-fn times(duration: f64, sample_us: u64) -> Result<(Duration, Duration), String> {
+fn times(duration: f64, sample_us: u64) -> Result<(Micros, Micros), String> {
     if sample_us == 0 || !sample_us.is_multiple_of(STEP_US) {
         return Err(format!("sample_us is a multiple of {STEP_US}, not {sample_us}"));
     }
@@ -167,7 +167,7 @@ fn times(duration: f64, sample_us: u64) -> Result<(Duration, Duration), String> 
             "duration {duration} s is no whole number of samples of {sample_us} µs"
         ));
     }
-    Ok((Duration(micros), Duration(sample_us)))
+    Ok((Micros(micros), Micros(sample_us)))
 }
 
 /// Reads each table of a list; says which one is wrong.

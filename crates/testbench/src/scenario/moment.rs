@@ -1,9 +1,9 @@
 //! Moments of a run.
 
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 /// A moment of a run that lasts so long, from s.
-pub(super) fn moment(at: f64, duration: Duration) -> Result<Instant, String> {
+pub(super) fn moment(at: f64, duration: Micros) -> Result<Instant, String> {
     let end = seconds(Instant(duration.0));
     if !(0.0..=end).contains(&at) {
         return Err(format!("at {at} s: the run lasts from 0 to {end} s"));

@@ -1,6 +1,6 @@
 //! A scenario, and playing it.
 
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use super::expect::Expectation;
 use super::run::{Played, Run};
@@ -16,9 +16,9 @@ pub struct Scenario {
     /// What a reader should look at.
     pub about: Option<String>,
     /// Length of the run, a whole number of samples.
-    pub duration: Duration,
+    pub duration: Micros,
     /// From sample to sample.
-    pub sample: Duration,
+    pub sample: Micros,
     /// What is plotted, from top to bottom.
     pub panels: Vec<Panel>,
     pub(super) script: Script,

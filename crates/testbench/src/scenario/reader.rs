@@ -4,7 +4,7 @@ use std::path::Path;
 
 use motorlink_proto::rmd::MotorId;
 use motorlink_proto::st::{ErrorCode, MotorNumber};
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use serde::de::DeserializeOwned;
 use toml::Table;
 
@@ -22,7 +22,7 @@ pub(super) struct Reader<'a> {
     pub(super) cast: &'a Cast,
     pub(super) targets: &'a [Target],
     pub(super) folder: &'a Path,
-    pub(super) duration: Duration,
+    pub(super) duration: Micros,
 }
 
 impl Reader<'_> {

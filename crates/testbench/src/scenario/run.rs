@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use super::expect::Verdict;
 use super::moment::seconds;
@@ -16,7 +16,7 @@ pub struct Run {
     /// The samples of each signal; the first is at time 0.
     pub columns: Vec<Vec<f64>>,
     /// From sample to sample.
-    pub sample: Duration,
+    pub sample: Micros,
     /// What happened when.
     pub marks: Vec<Mark>,
     /// Replies that were not as announced, in the order of time.

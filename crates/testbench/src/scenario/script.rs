@@ -1,6 +1,6 @@
 //! What drives are told and what happens to them, in the order of time.
 
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::hash;
 
 use super::event::{Event, load};
@@ -12,7 +12,7 @@ use crate::config::ConfigError;
 use crate::drives::Drives;
 
 /// How often a load that changes all the time is set.
-const LOAD_STEP: Duration = Duration(50);
+const LOAD_STEP: Micros = Micros(50);
 
 /// Drives with their script.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +25,7 @@ pub(super) struct Script {
 
 impl Script {
     /// Powers the drives on and lets everything happen.
-    pub(super) fn play(&self, duration: Duration, sample: Duration) -> Result<Played, ConfigError> {
+    pub(super) fn play(&self, duration: Micros, sample: Micros) -> Result<Played, ConfigError> {
         let mut drives = Drives::new(&self.cast)?;
         let end = Instant(duration.0);
         let mut columns = vec![Vec::new(); self.cast.signals().len()];

@@ -11,7 +11,7 @@ use motorlink_proto::rmd::{
     Code, MotionStatus, MotorId, MotorSet, MultiTurnAngle, Payload, SingleTurnAngle, Status,
     TORQUE4_ID,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 use motorlink_proto::units::{
     Celsius, DeciVolts, Dps, IqFeedback, TurnCentiDegrees, WideCentiDegrees,
 };
@@ -46,7 +46,7 @@ pub(super) struct Turn {
     /// The value in the reply, in digits.
     pub value: Option<i64>,
     /// How long the host waits for a reply.
-    pub timeout: Duration,
+    pub timeout: Micros,
 }
 
 /// Four motors, IDs 1 to 4, and a script. Clones are the same motors.
@@ -58,16 +58,16 @@ struct Inner {
     outbox: Outbox<CanFrame>,
     asked: BTreeMap<(MotorId, u8), usize>,
     readings: u16,
-    timeout: Duration,
+    timeout: Micros,
 }
 
 /// Two requests to one motor within this time are in flight at once: no motor answers faster, and no
 /// host has given up by then.
-const AT_ONCE: Duration = Duration(100);
+const AT_ONCE: Micros = Micros(100);
 
 impl Scenario {
     /// The motors of this scenario, for a host that waits `timeout` for a reply.
-    pub fn motors(&self, timeout: Duration) -> Motors {
+    pub fn motors(&self, timeout: Micros) -> Motors {
         let (asked, readings) = Default::default();
         let script = self.script.clone();
         Motors(Arc::new(Mutex::new(Inner {

@@ -4,7 +4,7 @@ use std::marker;
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Code, Dialect};
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use super::motors::{Scenario, Script, Sends, Turn};
 use crate::host::scenario::{DISTURBED, Demand, Task};
@@ -167,7 +167,7 @@ fn reading() -> Vec<Scenario> {
             Demand::Everything,
             |turn| {
                 let other = unasked(turn.id.can_id() + 8, Code::ReadMultiTurnAngle);
-                vec![other.every(Duration::from_millis(2)), right(turn)]
+                vec![other.every(Micros::from_millis(2)), right(turn)]
             },
         ),
         scenario(
@@ -366,7 +366,7 @@ fn value(turn: &Turn) -> i64 {
 
 /// The motor is busy until a little after the host has given up, and then answers everything in order.
 fn late(turn: &Turn) -> Sends {
-    vec![right(turn).after(turn.timeout + Duration::from_millis(20))]
+    vec![right(turn).after(turn.timeout + Micros::from_millis(20))]
 }
 
 fn frame(can_id: u16, data: [u8; 8]) -> CanFrame {

@@ -9,7 +9,7 @@ use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Features, Frame, MotorNumber, Parse, Profile, Ramp,
     RegisterId, Request, RevupPhase, Slave, Status, Version,
 };
-use motorlink_proto::time::{Duration, Instant};
+use motorlink_proto::time::{Instant, Micros};
 
 use crate::host::journal::Journal;
 use crate::host::outbox::Outbox;
@@ -39,7 +39,7 @@ pub(super) struct Turn {
     /// The speed in the reply.
     pub value: Option<i64>,
     /// How long the host waits for a reply.
-    pub timeout: Duration,
+    pub timeout: Micros,
 }
 
 /// A drive with one motor and a script. Clones are the same drive.
@@ -52,12 +52,12 @@ struct Inner {
     incoming: Vec<u8>,
     script: Script,
     outbox: Outbox<Vec<u8>>,
-    timeout: Duration,
+    timeout: Micros,
 }
 
 impl Scenario {
     /// The drive of this scenario, for a host that waits `timeout` for a reply.
-    pub fn drive(&self, timeout: Duration) -> Drive {
+    pub fn drive(&self, timeout: Micros) -> Drive {
         Drive(Arc::new(Mutex::new(Inner {
             slave: Slave::new(Profile::Spec, MotorNumber::FIRST),
             engine: Engine::default(),

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::marker;
 
 use motorlink_proto::st::{Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, MAX_PAYLOAD};
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use super::drive::{Scenario, Script, Sends, Turn};
 use crate::host::scenario::{DISTURBED, Demand, Task};
@@ -253,7 +253,7 @@ pub fn scenarios() -> Vec<Scenario> {
                 let second = Send::stray(frame(HEADER_NACK, &[0x09]));
                 vec![
                     Send::reply(frame(HEADER_NACK, &[0x0A])),
-                    second.after(Duration::from_millis(25)),
+                    second.after(Micros::from_millis(25)),
                 ]
             },
         ),

@@ -1,7 +1,7 @@
 //! Deviations of frames, replies, timing and motor numbers.
 
 use motorlink_proto::st::{ErrorCode, HEADER_ACK, HEADER_NACK};
-use motorlink_proto::time::Duration;
+use motorlink_proto::time::Micros;
 
 use super::{MCSDK, Mutant, ack, answers, caught, hears, mutant, nack, parsed, refuses, says};
 use crate::peer::{Deviation, frame};
@@ -122,11 +122,11 @@ const REPLIES: [Mutant; 11] = [
         says(|_, reply| *reply = [reply.clone(), reply.clone()].concat())
     }),
     mutant("a reply comes after 1.5 s", "ST-4.1-04", || Deviation {
-        late: Some(|_| Duration::from_millis(1_500)),
+        late: Some(|_| Micros::from_millis(1_500)),
         ..Deviation::default()
     }),
     mutant("something is said unasked", "ST-2-01", || Deviation {
-        chatter: Some((Duration::from_millis(50), vec![0xF0, 0x00, 0xF0])),
+        chatter: Some((Micros::from_millis(50), vec![0xF0, 0x00, 0xF0])),
         ..Deviation::default()
     }),
     mutant("acknowledges are commands of no motor", "ST-3.1-14", || {
@@ -154,7 +154,7 @@ const TIMING: [Mutant; 10] = [
     mutant("the timeout is 100 ms", "ST-4.1-08", || Deviation {
         late: Some(|reply| {
             let timeout = *reply == *nack(ErrorCode::Timeout);
-            Duration::from_millis(if timeout { 75 } else { 0 })
+            Micros::from_millis(if timeout { 75 } else { 0 })
         }),
         ..Deviation::default()
     }),
@@ -178,7 +178,7 @@ const TIMING: [Mutant; 10] = [
         let mut last = None;
         hears(move |_, now, bytes| {
             // Bytes are kept until the frame is whole, or 25 ms were silent.
-            if last.is_some_and(|last| now.since(last) >= Duration::from_millis(25)) {
+            if last.is_some_and(|last| now.since(last) >= Micros::from_millis(25)) {
                 part.clear();
             }
             last = Some(now);
@@ -194,7 +194,7 @@ const TIMING: [Mutant; 10] = [
         let mut last = None;
         let mut part = 0;
         hears(move |station, now, bytes| {
-            if part > 0 && last.is_some_and(|last| now.since(last) >= Duration::from_millis(25)) {
+            if part > 0 && last.is_some_and(|last| now.since(last) >= Micros::from_millis(25)) {
                 let padding: Vec<u8> = [0xFF; 130].into_iter().chain([0x00, 0xFF]).collect();
                 station.receive(now, &padding, |_| {});
                 part = 0;

@@ -63,7 +63,7 @@ const MUTANTS: [Mutant; 27] = [
             if cleared {
                 let motor = station.drive_mut().motor_mut(MotorNumber::FIRST).expect("motor 1");
                 motor.release_faults(Flags::OVER_TEMP);
-                let until = now + motorlink_proto::time::Duration::from_millis(5);
+                let until = now + motorlink_proto::time::Micros::from_millis(5);
                 station.advance_to(until);
             }
             None

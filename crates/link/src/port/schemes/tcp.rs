@@ -136,7 +136,7 @@ impl LinePort for TcpBytes {
 fn connect(address: &TcpAddress, port: String) -> Result<FdLink, PortError> {
     let addresses = match (unbracketed(&address.host), address.port).to_socket_addrs() {
         Ok(addresses) => addresses,
-        Err(source) => return Err(PortError::UnknownHost { port, source }),
+        Err(source) => return Err(PortError::UnknownHost { port, source: source.into() }),
     };
     let mut failure = io::Error::from(io::ErrorKind::NotFound);
     for address in addresses {
@@ -151,7 +151,7 @@ fn connect(address: &TcpAddress, port: String) -> Result<FdLink, PortError> {
     }
     Err(match failure.kind() {
         io::ErrorKind::ConnectionRefused => PortError::Refused { port },
-        _ => PortError::Unreachable { port, source: failure },
+        _ => PortError::Unreachable { port, source: failure.into() },
     })
 }
 

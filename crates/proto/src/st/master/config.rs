@@ -1,10 +1,10 @@
 //! How a master behaves.
 
 use crate::st::Profile;
-use crate::time::Duration;
+use crate::time::Micros;
 
 /// How long a master waits for a reply (4.1).
-pub const TIMEOUT: Duration = Duration::from_millis(1_000);
+pub const TIMEOUT: Micros = Micros::from_millis(1_000);
 
 /// How a lost line comes back (SPEC-NOTES S16).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -27,11 +27,11 @@ pub enum Recovery {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MasterConfig {
     /// How long to wait for a reply.
-    pub timeout: Duration,
+    pub timeout: Micros,
     /// How a lost line comes back.
     pub recovery: Recovery,
     /// The silence after which nothing more is expected to come.
-    pub quiet: Duration,
+    pub quiet: Micros,
     /// What the drive is expected to speak.
     pub profile: Profile,
 }
@@ -42,7 +42,7 @@ impl MasterConfig {
     /// before it silence, as long as may be waited for it, before and behind the questions, and the
     /// questions' timeouts, of which all but the last are answered at once; with
     /// `Pad` one silence more.
-    pub const fn longest_exchange(&self) -> Duration {
+    pub const fn longest_exchange(&self) -> Micros {
         let (timeout, quiet) = (self.timeout.0, self.quiet.0);
         let silence = quiet.saturating_add(timeout);
         // Where the answer may be that to something else, nothing is sent for twice the timeout.
@@ -57,7 +57,7 @@ impl MasterConfig {
             Recovery::Drain => drained,
             Recovery::Pad => drained.saturating_add(silence),
         };
-        Duration(recovered.saturating_add(timeout))
+        Micros(recovered.saturating_add(timeout))
     }
 }
 
@@ -67,7 +67,7 @@ impl Default for MasterConfig {
         MasterConfig {
             timeout: TIMEOUT,
             recovery: Recovery::default(),
-            quiet: Duration::from_millis(50),
+            quiet: Micros::from_millis(50),
             profile: Profile::default(),
         }
     }
