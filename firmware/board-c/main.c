@@ -240,18 +240,18 @@ static bool clock_serve(void)
 /* ---- The ST drive ---- */
 
 static motorlink_st_slave slave;
-static motorlink_st_drive st_drive = {
+static motorlink_st_motor_control st_drive = {
     .version = { .name = "ST MC SDK", .major = 5, .minor = 4, .patch = 4 },
     .features = plant_st_features,
-    .read = plant_st_read,
-    .write = plant_st_write,
+    .get_register = plant_st_get_register,
+    .set_register = plant_st_set_register,
     .execute = plant_st_execute,
-    .ramp = plant_st_ramp,
-    .revup = plant_st_revup,
-    .set_revup = plant_st_set_revup,
-    .current = plant_st_current,
-    .torque_ramp = plant_st_torque_ramp,
-    .position = plant_st_position,
+    .set_ramp = plant_st_set_ramp,
+    .get_revup_data = plant_st_get_revup_data,
+    .set_revup_data = plant_st_set_revup_data,
+    .set_current_reference = plant_st_set_current_reference,
+    .set_torque_ramp = plant_st_set_torque_ramp,
+    .set_position = plant_st_set_position,
 };
 
 static motorlink_error st_start(plant *motors)
@@ -283,7 +283,7 @@ static void st_serve(uint64_t now)
 
 static motorlink_slcan_device adapter;
 static motorlink_rmd_drive rmd_drives[PLANT_RMD_MOTORS];
-static motorlink_rmd_motor rmd_motors[PLANT_RMD_MOTORS];
+static motorlink_rmd_motor_control rmd_motors[PLANT_RMD_MOTORS];
 
 static motorlink_error rmd_start(plant *motors, uint64_t now)
 {
@@ -294,7 +294,7 @@ static motorlink_error rmd_start(plant *motors, uint64_t now)
     for (uint8_t i = 0; i < PLANT_RMD_MOTORS && error == MOTORLINK_OK; i++) {
         const motorlink_rmd_drive_config config = { .id = (uint8_t)(i + 1) };
 
-        rmd_motors[i] = (motorlink_rmd_motor){
+        rmd_motors[i] = (motorlink_rmd_motor_control){
             .context = plant_rmd(motors, i),
             .set_mode = plant_rmd_set_mode,
             .configure = plant_rmd_configure,

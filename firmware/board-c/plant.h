@@ -31,16 +31,16 @@ void *plant_rmd(plant *motors, uint8_t index);
 void plant_rmd_rom(motorlink_rmd_settings *rom);
 
 uint16_t plant_st_features(void *context, uint8_t motor);
-int32_t plant_st_read(void *context, uint8_t motor, uint8_t reg);
-uint8_t plant_st_write(void *context, uint8_t motor, uint8_t reg, int32_t value);
-void plant_st_execute(void *context, uint8_t motor, uint8_t command);
-void plant_st_ramp(void *context, uint8_t motor, int32_t speed_rpm, uint16_t duration_ms);
-void plant_st_revup(void *context, uint8_t motor, uint8_t phase, motorlink_st_revup_phase *data);
-void plant_st_set_revup(void *context, uint8_t motor, uint8_t phase,
+int32_t plant_st_get_register(void *context, uint8_t motor, motorlink_st_reg reg);
+motorlink_st_error_code plant_st_set_register(void *context, uint8_t motor, motorlink_st_reg reg, int32_t value);
+void plant_st_execute(void *context, uint8_t motor, motorlink_st_command command);
+void plant_st_set_ramp(void *context, uint8_t motor, int32_t speed_rpm, uint16_t duration_ms);
+void plant_st_get_revup_data(void *context, uint8_t motor, uint8_t phase, motorlink_st_revup_phase *data);
+void plant_st_set_revup_data(void *context, uint8_t motor, uint8_t phase,
                         const motorlink_st_revup_phase *data);
-void plant_st_current(void *context, uint8_t motor, int16_t iq_s16a, int16_t id_s16a);
-void plant_st_torque_ramp(void *context, uint8_t motor, int32_t torque_s16a, uint16_t duration_ms);
-void plant_st_position(void *context, uint8_t motor, float angle_rad, float duration_s);
+void plant_st_set_current_reference(void *context, uint8_t motor, int16_t iq_s16a, int16_t id_s16a);
+void plant_st_set_torque_ramp(void *context, uint8_t motor, int32_t torque_s16a, uint16_t duration_ms);
+void plant_st_set_position(void *context, uint8_t motor, float angle_rad, float duration_s);
 
 void plant_rmd_set_mode(void *context, const motorlink_rmd_motion *motion);
 void plant_rmd_configure(void *context, const motorlink_rmd_settings *settings);

@@ -44,8 +44,8 @@ struct Objects {
     kinds: [Kind; BLOCKS],
     now: u64,
     heard: Heard,
-    st: *const motorlink_st_drive,
-    motor: *const motorlink_rmd_motor,
+    st: *const motorlink_st_motor_control,
+    motor: *const motorlink_rmd_motor_control,
 }
 
 thread_local! {
@@ -94,7 +94,7 @@ extern "C" fn profiler_step(_: *mut c_void, _: u8, step: u8, registers: *mut *co
 extern "C" fn set_mode(_: *mut c_void, motion: *const motorlink_rmd_motion) {
     call_back();
     // SAFETY: it points to a motion.
-    assert!(unsafe { (*motion).kind } <= 4);
+    assert!(unsafe { (*motion).kind } as u8 <= 4);
 }
 extern "C" fn sense(_: *mut c_void, sense: *mut motorlink_rmd_sense) {
     call_back();
@@ -110,14 +110,14 @@ fn zeroed<T>() -> T {
 
 /// Any calls for any storage.
 pub fn ffi(data: &[u8]) {
-    let mut st: motorlink_st_drive = zeroed();
+    let mut st: motorlink_st_motor_control = zeroed();
     (st.version.name, st.version.pre_release) = (c"fuzz\xFF".as_ptr(), c"".as_ptr());
     st.features = Some(features);
-    st.read = Some(read);
-    st.write = Some(write);
-    st.revup = Some(revup);
+    st.get_register = Some(read);
+    st.set_register = Some(write);
+    st.get_revup_data = Some(revup);
     st.profiler_step = Some(profiler_step);
-    let mut motor: motorlink_rmd_motor = zeroed();
+    let mut motor: motorlink_rmd_motor_control = zeroed();
     motor.set_mode = Some(set_mode);
     motor.sense = Some(sense);
     let blocks = [(); BLOCKS].map(|()| Box::into_raw(vec![0u64; WORDS].into_boxed_slice()));
@@ -259,18 +259,23 @@ impl Objects {
                 0 => motorlink_st_master_get_register(master, motor, one),
                 1 => motorlink_st_master_set_register(master, motor, one, value),
                 2 => motorlink_st_master_execute(master, motor, one),
-                3 => motorlink_st_master_ramp(master, motor, value, word),
-                4 => motorlink_st_master_current(master, motor, -1, 1),
-                5 => motorlink_st_master_torque_ramp(master, motor, value, word),
-                6 => motorlink_st_master_move(master, motor, f32::from_bits(value as u32), 1.0),
-                7 => motorlink_st_master_revup(master, motor, one & 7),
-                8 => motorlink_st_master_set_revup(master, motor, one & 7, &phase),
-                9 => motorlink_st_master_board_info(master, motor),
-                10 => motorlink_st_master_firmware_version(master, motor),
+                3 => motorlink_st_master_set_ramp(master, motor, value, word),
+                4 => motorlink_st_master_set_current_reference(master, motor, -1, 1),
+                5 => motorlink_st_master_set_torque_ramp(master, motor, value, word),
+                6 => motorlink_st_master_set_position(
+                    master,
+                    motor,
+                    f32::from_bits(value as u32),
+                    1.0,
+                ),
+                7 => motorlink_st_master_get_revup_data(master, motor, one & 7),
+                8 => motorlink_st_master_set_revup_data(master, motor, one & 7, &phase),
+                9 => motorlink_st_master_get_board_info(master, motor),
+                10 => motorlink_st_master_get_firmware_version(master, motor),
                 11 => motorlink_st_master_configure_segment(master, motor, one, list, size),
-                12 => motorlink_st_master_read_segment(master, motor, one),
-                13 => motorlink_st_master_profiler_info(master, motor, list, size),
-                14 => motorlink_st_master_raw(master, one, list, size),
+                12 => motorlink_st_master_get_segment(master, motor, one),
+                13 => motorlink_st_master_get_profiler_info(master, motor, list, size),
+                14 => motorlink_st_master_raw(master, motor, one, list, size),
                 15 => motorlink_st_master_receive(master, now, list, size),
                 16 => motorlink_st_master_abandon(master),
                 17 if one & 1 == 0 => motorlink_st_master_lost(master),
@@ -287,19 +292,19 @@ impl Objects {
     }
 
     unsafe fn poll_master(&mut self, master: *mut motorlink_st_master) -> Error {
-        let mut action: motorlink_st_action = zeroed();
+        let mut output: motorlink_st_output = zeroed();
         // SAFETY: the caller's.
-        let result = unsafe { motorlink_st_master_poll(master, self.now, &mut action) };
+        let result = unsafe { motorlink_st_master_poll(master, self.now, &mut output) };
         if result == Error::Ok {
-            self.hear(&action.bytes);
-            let (at, size) = (action.bytes.data, action.bytes.size);
+            self.hear(&output.bytes);
+            let (at, size) = (output.bytes.data, output.bytes.size);
             let (mut info, mut version, mut phase) = (zeroed(), zeroed(), zeroed());
             // SAFETY: the bytes are there until the next call for the master.
             let read = unsafe {
                 [
                     motorlink_st_decode_board_info(at, size, &mut info),
                     motorlink_st_decode_firmware_version(at, size, &mut version),
-                    motorlink_st_decode_revup(at, size, &mut phase),
+                    motorlink_st_decode_revup_data(at, size, &mut phase),
                 ]
             };
             assert_eq!(read[1], Error::Ok);
@@ -355,12 +360,12 @@ impl Objects {
     unsafe fn host(&mut self, host: *mut motorlink_rmd_host, input: &mut Input<'_>) -> Error {
         let (which, one) = (input.byte(), input.byte());
         let limits = motorlink_rmd_limits {
-            torque_16ma: i32::from(one) - 2,
+            current_16ma: i32::from(one) - 2,
             speed_dps: i32::from(one) << 9,
             angle_centidegrees: -1,
         };
         let (mut at, mut motors, now) = (0, 0, self.now);
-        let mut action: motorlink_rmd_action = zeroed();
+        let mut output: motorlink_rmd_output = zeroed();
         // SAFETY: the caller's.
         unsafe {
             match which % 12 {
@@ -383,9 +388,9 @@ impl Objects {
                 7 => motorlink_rmd_host_busy(host, &mut motors),
                 8 => motorlink_rmd_host_receive(host, now, &self.frame(input)),
                 _ => {
-                    let result = motorlink_rmd_host_poll(host, now, &mut action);
-                    if action.kind == motorlink_action::Transmit {
-                        self.heard.frame = Some(action.frame);
+                    let result = motorlink_rmd_host_poll(host, now, &mut output);
+                    if output.kind == motorlink_output::Transmit {
+                        self.heard.frame = Some(output.frame);
                     }
                     result
                 }

@@ -60,14 +60,14 @@ static void sense(void *context, motorlink_rmd_sense *out) {
   out->temperature_celsius = 25;
   if (motor->motion.kind == MOTORLINK_RMD_MODE_TORQUE) {
     /* 0.016 A a digit became 33/2048 A a digit. */
-    out->iq_digits = (int16_t)((int32_t)motor->motion.torque_16ma * 2048 * 16 / 33000);
+    out->iq_digits = (int16_t)((int32_t)motor->motion.iq_16ma * 2048 * 16 / 33000);
   }
 }
 
 static motorlink_slcan_device adapter;
 static motorlink_rmd_drive drive;
 static struct motor motor;
-static motorlink_rmd_motor callbacks;
+static motorlink_rmd_motor_control callbacks;
 
 static void check(motorlink_error error) {
   if (error != MOTORLINK_OK) {

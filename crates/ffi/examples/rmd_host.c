@@ -7,7 +7,7 @@
  * failure. Ends with 0, with 3 where the line failed.
  *
  * What an earlier program asked a motor may still be answered: the first exchange with each motor
- * ends in QUARANTINED, and it is asked again when it was silent for the guard time.
+ * ends in QUARANTINED, and it is asked again when it was silent for the quarantine time.
  */
 #define _POSIX_C_SOURCE 200809L
 #include "posix.h"
@@ -47,27 +47,27 @@ static void hear(int fd, uint64_t until_us) {
 }
 
 /* Conducts exchanges until one is over; gives what became of it. */
-static motorlink_rmd_action next_outcome(int fd) {
+static motorlink_rmd_output next_outcome(int fd) {
   for (;;) {
-    motorlink_rmd_action action;
+    motorlink_rmd_output output;
     motorlink_slcan_line line;
-    check(fd, motorlink_rmd_host_poll(&host, now_us(), &action));
-    if (action.kind == MOTORLINK_ACTION_DONE) {
-      return action;
+    check(fd, motorlink_rmd_host_poll(&host, now_us(), &output));
+    if (output.kind == MOTORLINK_OUTPUT_DONE) {
+      return output;
     }
-    if (action.kind == MOTORLINK_ACTION_TRANSMIT) {
-      check(fd, motorlink_slcan_encode(&action.frame, &line));
+    if (output.kind == MOTORLINK_OUTPUT_TRANSMIT) {
+      check(fd, motorlink_slcan_encode(&output.frame, &line));
       send_line(fd, &line);
     } else {
-      hear(fd, action.until_us);
+      hear(fd, output.until_us);
     }
   }
 }
 
-static motorlink_rmd_action next_done(int fd) {
-  motorlink_rmd_action action = next_outcome(fd);
-  check(fd, action.result);
-  return action;
+static motorlink_rmd_output next_done(int fd) {
+  motorlink_rmd_output output = next_outcome(fd);
+  check(fd, output.result);
+  return output;
 }
 
 /* Ends the program, and the motor before it. */
@@ -87,11 +87,11 @@ static motorlink_rmd_data exchange(int fd, uint8_t motor, motorlink_rmd_data req
   for (;;) {
     motorlink_error result = motorlink_rmd_host_request(&host, now_us(), motor, request);
     if (result == MOTORLINK_OK) {
-      motorlink_rmd_action action = next_outcome(fd);
-      if (action.result == MOTORLINK_OK) {
-        return action.reply;
+      motorlink_rmd_output output = next_outcome(fd);
+      if (output.result == MOTORLINK_OK) {
+        return output.reply;
       }
-      result = action.result;
+      result = output.result;
     } else if (result == MOTORLINK_ERROR_QUARANTINED) {
       check(fd, motorlink_rmd_host_retry(&host, &retry_us));
       hear(fd, retry_us);
@@ -145,12 +145,12 @@ int main(int argc, char **argv) {
   }
   check(fd, motorlink_rmd_host_set_torque4(&host, now_us(), torques, 0x0F));
   for (left = 4; left > 0; left--) {
-    motorlink_rmd_action action = next_done(fd);
-    motorlink_rmd_motion_status motion = motorlink_rmd_decode_motion_status(action.reply);
-    printf("motor %u: %d degrees per second\n", (unsigned)action.motor, (int)motion.speed_dps);
+    motorlink_rmd_output output = next_done(fd);
+    motorlink_rmd_motion_status motion = motorlink_rmd_decode_motion_status(output.reply);
+    printf("motor %u: %d degrees per second\n", (unsigned)output.motor, (int)motion.speed_dps);
   }
 
-  limits.torque_16ma = 100;
+  limits.current_16ma = 100;
   limits.speed_dps = MOTORLINK_RMD_NO_LIMIT;
   limits.angle_centidegrees = MOTORLINK_RMD_NO_LIMIT;
   check(fd, motorlink_rmd_host_set_limits(&host, 2, &limits));

@@ -17,22 +17,22 @@ static motorlink_st_master master;
 static int started;
 
 /* Conducts the exchange that was begun; gives what became of it. */
-static motorlink_st_action exchange(int fd, motorlink_error begun) {
-  motorlink_st_action action;
+static motorlink_st_output exchange(int fd, motorlink_error begun) {
+  motorlink_st_output output;
   if (begun != MOTORLINK_OK) {
     fprintf(stderr, "%s\n", motorlink_error_text(begun));
     exit(2);
   }
   for (;;) {
-    motorlink_st_master_poll(&master, now_us(), &action);
-    if (action.kind == MOTORLINK_ACTION_DONE) {
-      return action;
+    motorlink_st_master_poll(&master, now_us(), &output);
+    if (output.kind == MOTORLINK_OUTPUT_DONE) {
+      return output;
     }
-    if (action.kind == MOTORLINK_ACTION_TRANSMIT) {
-      send_all(fd, action.bytes.data, action.bytes.size);
+    if (output.kind == MOTORLINK_OUTPUT_TRANSMIT) {
+      send_all(fd, output.bytes.data, output.bytes.size);
     } else {
       uint8_t bytes[256];
-      size_t size = receive_until(fd, action.until_us, bytes, sizeof bytes);
+      size_t size = receive_until(fd, output.until_us, bytes, sizeof bytes);
       motorlink_st_master_receive(&master, now_us(), bytes, size);
     }
   }
@@ -47,20 +47,20 @@ static void leave(int fd, int code) {
 }
 
 /* As `exchange`, for those that have to succeed. */
-static motorlink_st_action done(int fd, const char *what, motorlink_error begun) {
-  motorlink_st_action action = exchange(fd, begun);
-  if (action.result == MOTORLINK_ERROR_REFUSED) {
-    fprintf(stderr, "%s: refused with code %u\n", what, (unsigned)action.refusal);
+static motorlink_st_output done(int fd, const char *what, motorlink_error begun) {
+  motorlink_st_output output = exchange(fd, begun);
+  if (output.result == MOTORLINK_ERROR_REFUSED) {
+    fprintf(stderr, "%s: refused with code %u\n", what, (unsigned)output.error_code);
     leave(fd, 1);
   }
-  if (action.result != MOTORLINK_OK) {
-    fprintf(stderr, "%s: %s\n", what, motorlink_error_text(action.result));
+  if (output.result != MOTORLINK_OK) {
+    fprintf(stderr, "%s: %s\n", what, motorlink_error_text(output.result));
     leave(fd, 3);
   }
-  return action;
+  return output;
 }
 
-static int32_t read_register(int fd, uint8_t reg) {
+static int32_t read_register(int fd, motorlink_st_reg reg) {
   return done(fd, "read", motorlink_st_master_get_register(&master, MOTOR, reg)).value;
 }
 
@@ -68,7 +68,7 @@ int main(int argc, char **argv) {
   int32_t rpm = argc > 2 ? (int32_t)strtol(argv[2], NULL, 10) : 1000;
   int32_t speed = 0;
   uint64_t give_up;
-  motorlink_st_action action;
+  motorlink_st_output output;
   motorlink_st_board_info info;
   int fd;
 
@@ -79,15 +79,15 @@ int main(int argc, char **argv) {
   fd = open_line(argv[1]);
   motorlink_st_master_init(&master, sizeof master, NULL);
 
-  action = done(fd, "board information", motorlink_st_master_board_info(&master, MOTOR));
-  if (motorlink_st_decode_board_info(action.bytes.data, action.bytes.size, &info) != MOTORLINK_OK) {
+  output = done(fd, "board information", motorlink_st_master_get_board_info(&master, MOTOR));
+  if (motorlink_st_decode_board_info(output.bytes.data, output.bytes.size, &info) != MOTORLINK_OK) {
     fprintf(stderr, "the board information is too short\n");
     return 3;
   }
   printf("%s %u.%u.%u\n", info.name, (unsigned)info.major, (unsigned)info.minor,
          (unsigned)info.patch);
 
-  done(fd, "ramp", motorlink_st_master_ramp(&master, MOTOR, rpm, 1000));
+  done(fd, "ramp", motorlink_st_master_set_ramp(&master, MOTOR, rpm, 1000));
   started = 1;
   done(fd, "start", motorlink_st_master_execute(&master, MOTOR, MOTORLINK_ST_COMMAND_START_MOTOR));
   give_up = now_us() + 20000000U;
@@ -101,10 +101,10 @@ int main(int argc, char **argv) {
   started = 0;
 
   /* What is read-only is refused, and the line stays in step. */
-  action = exchange(fd, motorlink_st_master_set_register(&master, MOTOR,
+  output = exchange(fd, motorlink_st_master_set_register(&master, MOTOR,
                                                          MOTORLINK_ST_REG_SPEED_MEAS, 1));
-  if (action.result != MOTORLINK_ERROR_REFUSED ||
-      action.refusal != MOTORLINK_ST_REFUSAL_SET_READ_ONLY) {
+  if (output.result != MOTORLINK_ERROR_REFUSED ||
+      output.error_code != MOTORLINK_ST_ERROR_CODE_SET_READ_ONLY) {
     fprintf(stderr, "the drive let a read-only register be written\n");
     return 3;
   }

@@ -31,7 +31,7 @@ static int32_t speed(const struct fan *fan) {
   return (int32_t)(fan->from_rpm + way * (int64_t)passed / (int64_t)fan->length_us);
 }
 
-static int32_t read_register(void *context, uint8_t motor, uint8_t reg) {
+static int32_t read_register(void *context, uint8_t motor, motorlink_st_reg reg) {
   const struct fan *fan = (const struct fan *)context;
   (void)motor;
   switch (reg) {
@@ -63,11 +63,12 @@ static void go(struct fan *fan, int32_t speed_rpm, uint16_t duration_ms) {
   fan->began_us = now_us();
 }
 
-static uint8_t write_register(void *context, uint8_t motor, uint8_t reg, int32_t value) {
+static motorlink_st_error_code write_register(void *context, uint8_t motor, motorlink_st_reg reg,
+                                              int32_t value) {
   struct fan *fan = (struct fan *)context;
   (void)motor;
   if (reg == MOTORLINK_ST_REG_CONTROL_MODE && value > MOTORLINK_ST_CONTROL_MODE_SPEED) {
-    return MOTORLINK_ST_REFUSAL_NONE; /* taken, and changes nothing */
+    return MOTORLINK_ST_ERROR_CODE_NONE; /* taken, and changes nothing */
   }
   fan->values[reg] = value;
   if (reg == MOTORLINK_ST_REG_RAMP_FINAL_SPEED) {
@@ -75,7 +76,7 @@ static uint8_t write_register(void *context, uint8_t motor, uint8_t reg, int32_t
   } else if (reg == MOTORLINK_ST_REG_IQ_SPEEDMODE) {
     fan->values[MOTORLINK_ST_REG_FLUX_REF] = value;
   }
-  return MOTORLINK_ST_REFUSAL_NONE;
+  return MOTORLINK_ST_ERROR_CODE_NONE;
 }
 
 /* A ramp begins when the motor does. */
@@ -87,7 +88,7 @@ static void start(struct fan *fan, int running) {
   fan->running = running;
 }
 
-static void execute(void *context, uint8_t motor, uint8_t command) {
+static void execute(void *context, uint8_t motor, motorlink_st_command command) {
   struct fan *fan = (struct fan *)context;
   (void)motor;
   switch (command) {
@@ -139,7 +140,7 @@ static void set_revup(void *context, uint8_t motor, uint8_t phase,
 
 static motorlink_st_slave slave;
 static struct fan fan;
-static motorlink_st_drive drive;
+static motorlink_st_motor_control drive;
 
 static void check(motorlink_error error) {
   if (error != MOTORLINK_OK) {
@@ -161,13 +162,13 @@ int main(void) {
   drive.version.name = "Fan in C";
   drive.version.major = 1;
   drive.version.minor = 2;
-  drive.read = read_register;
-  drive.write = write_register;
+  drive.get_register = read_register;
+  drive.set_register = write_register;
   drive.execute = execute;
-  drive.ramp = ramp;
-  drive.revup = revup;
-  drive.set_revup = set_revup;
-  drive.current = current;
+  drive.set_ramp = ramp;
+  drive.get_revup_data = revup;
+  drive.set_revup_data = set_revup;
+  drive.set_current_reference = current;
   check(motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, 1, &drive));
   printf("%s\n", ptsname(fd));
   fflush(stdout);

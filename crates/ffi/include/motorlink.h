@@ -11,20 +11,20 @@
  * or frames with the time at which they came, and polls for what to do: send, wait until, done.
  *
  *     static motorlink_st_master master;
- *     motorlink_st_action action;
+ *     motorlink_st_output output;
  *
  *     motorlink_st_master_init(&master, sizeof master, NULL);
  *     motorlink_st_master_get_register(&master, 1, MOTORLINK_ST_REG_SPEED_MEAS);
  *     do {
- *       motorlink_st_master_poll(&master, now_us(), &action);
- *       if (action.kind == MOTORLINK_ACTION_TRANSMIT) {
- *         send(action.bytes.data, action.bytes.size);
- *       } else if (action.kind == MOTORLINK_ACTION_WAIT) {
- *         size_t size = receive_until(action.until_us, buffer, sizeof buffer);
+ *       motorlink_st_master_poll(&master, now_us(), &output);
+ *       if (output.kind == MOTORLINK_OUTPUT_TRANSMIT) {
+ *         send(output.bytes.data, output.bytes.size);
+ *       } else if (output.kind == MOTORLINK_OUTPUT_WAIT) {
+ *         size_t size = receive_until(output.until_us, buffer, sizeof buffer);
  *         motorlink_st_master_receive(&master, now_us(), buffer, size);
  *       }
- *     } while (action.kind != MOTORLINK_ACTION_DONE);
- *     if (action.result == MOTORLINK_OK) { speed_rpm = action.value; }
+ *     } while (output.kind != MOTORLINK_OUTPUT_DONE);
+ *     if (output.result == MOTORLINK_OK) { speed_rpm = output.value; }
  *
  * What holds for every function:
  *
@@ -36,7 +36,7 @@
  * the heap, and which is opaque: `_init` begins an object there, whatever the storage held before.
  * There is nothing to release. A pointer is used during the call only, where its function does not
  * say that it is kept; pointers in one call do not overlap one another or an object's storage, where
- * the bytes are that an action or a reply points to: copy them to hand them in again.
+ * the bytes are that an output or a reply points to: copy them to hand them in again.
  *
  * Requests. A `motorlink_st_master_` function that takes a motor begins an exchange, which
  * `_poll` conducts: send what it says, hand in what comes, until it says done. It is not over
@@ -44,6 +44,12 @@
  * 0 for the drive's current motor (3.2). BAD_ARGUMENT: `motor` is over 7. BUSY: an exchange is under
  * way. The host of RMD motors has an exchange with each motor, all at once, and limits that the
  * caller may set; a master has none: what it is told is sent.
+ *
+ * Numbers with names. Registers, commands, error codes, states and the like have an enum each, and its
+ * name is the type in calls: one byte, with -fshort-enums and without, for C and for the library. In C it is
+ * `uint8_t`, from C23 on and in C++ the enum itself, so that C++ wants a cast for a plain number. A
+ * drive may send a number that the enum does not name: it is handed on as it is. What a caller passes
+ * is checked, whatever its type says. Sums of bits are plain integers.
  *
  * Time is in microseconds since any moment, as long as it is the same one for an object and time
  * does not run backwards.
@@ -80,8 +86,43 @@
 /** The same as text. */
 #define MOTORLINK_VERSION "0.1.0"
 
-/** Registers (table 3): `reg` in calls. A comment has access (D: for the DAC only), type and unit. */
-enum motorlink_st_register {
+/** How a drive behaves where the document and shipped firmware differ. */
+enum motorlink_st_profile
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+ {
+  MOTORLINK_ST_PROFILE_SPEC    = 0x00, /**< the document as written */
+  MOTORLINK_ST_PROFILE_MCSDK54 = 0x01  /**< what firmware of MCSDK 5.4 does on the wire */
+};
+#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum motorlink_st_profile motorlink_st_profile;
+#elif !defined(__cplusplus)
+typedef uint8_t motorlink_st_profile;
+#endif
+
+/** How a line is brought in step that was just opened, or on which an exchange failed. */
+enum motorlink_st_recovery
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+ {
+  MOTORLINK_ST_RECOVERY_NONE  = 0x00, /**< not by itself: the line counts as in step until it is lost, and `motorlink_st_master_trust_line` says that it is so again */
+  MOTORLINK_ST_RECOVERY_DRAIN = 0x01, /**< waits for silence, asks a question, goes on when it was answered */
+  MOTORLINK_ST_RECOVERY_PAD   = 0x02  /**< as DRAIN, behind bytes that complete a frame which a 5.x drive may still be waiting for */
+};
+#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum motorlink_st_recovery motorlink_st_recovery;
+#elif !defined(__cplusplus)
+typedef uint8_t motorlink_st_recovery;
+#endif
+
+/** Registers (table 3). A comment has access (D: for the DAC only), type and unit. */
+enum motorlink_st_reg
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+ {
   MOTORLINK_ST_REG_TARGET_MOTOR          = 0x00, /**< RW u8: Motor that motor number 0 addresses, counted from 0 */
   MOTORLINK_ST_REG_FLAGS                 = 0x01, /**< R  u32: Faults: low half occurred, high half present */
   MOTORLINK_ST_REG_STATUS                = 0x02, /**< R  u8: State of the state machine */
@@ -220,27 +261,45 @@ enum motorlink_st_register {
   MOTORLINK_ST_REG_POSITION_KI           = 0x87, /**< RW i16: Position regulator Ki (firmware only) */
   MOTORLINK_ST_REG_POSITION_KD           = 0x88  /**< RW i16: Position regulator Kd (firmware only) */
 };
+#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum motorlink_st_reg motorlink_st_reg;
+#elif !defined(__cplusplus)
+typedef uint8_t motorlink_st_reg;
+#endif
 
 /** Frame codes (table 1). */
-enum motorlink_st_frame {
-  MOTORLINK_ST_FRAME_SET_REG           = 0x01, /**< write a register (4.4) */
-  MOTORLINK_ST_FRAME_GET_REG           = 0x02, /**< read a register (4.5) */
-  MOTORLINK_ST_FRAME_EXECUTE_CMD       = 0x03, /**< execute a command (4.6) */
-  MOTORLINK_ST_FRAME_GET_BOARD_INFO    = 0x06, /**< read the SDK's version and name (4.7) */
-  MOTORLINK_ST_FRAME_SET_RAMP          = 0x07, /**< program a speed ramp (4.8) */
-  MOTORLINK_ST_FRAME_GET_REVUP_DATA    = 0x08, /**< read a rev-up phase (4.9) */
-  MOTORLINK_ST_FRAME_SET_REVUP_DATA    = 0x09, /**< write a rev-up phase (4.10) */
-  MOTORLINK_ST_FRAME_SET_CURRENT_REF   = 0x0A, /**< set the Iq and Id references (4.11) */
-  MOTORLINK_ST_FRAME_GET_MP_INFO       = 0x0B, /**< list the registers of motor profiler steps (profile MCSDK 5.4 only) */
-  MOTORLINK_ST_FRAME_GET_FW_VERSION    = 0x0C, /**< read the firmware's version string (4.12) */
-  MOTORLINK_ST_FRAME_GET_DATA_ELEMENT  = 0x0D, /**< read a data segment (profile SPEC only) */
-  MOTORLINK_ST_FRAME_SET_TORQUE_RAMP   = 0x0D, /**< program a torque ramp (profile MCSDK 5.4 only) */
-  MOTORLINK_ST_FRAME_CONFIG_DYN_STRUCT = 0x0E, /**< choose the registers of a data segment (profile SPEC only) */
-  MOTORLINK_ST_FRAME_SET_POSITION_CMD  = 0x12  /**< move to an angle in a given time (profile MCSDK 5.4 only) */
+enum motorlink_st_frame_code
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+ {
+  MOTORLINK_ST_FRAME_CODE_SET_REG           = 0x01, /**< write a register (4.4) */
+  MOTORLINK_ST_FRAME_CODE_GET_REG           = 0x02, /**< read a register (4.5) */
+  MOTORLINK_ST_FRAME_CODE_EXECUTE_CMD       = 0x03, /**< execute a command (4.6) */
+  MOTORLINK_ST_FRAME_CODE_GET_BOARD_INFO    = 0x06, /**< read the SDK's version and name (4.7) */
+  MOTORLINK_ST_FRAME_CODE_SET_RAMP          = 0x07, /**< program a speed ramp (4.8) */
+  MOTORLINK_ST_FRAME_CODE_GET_REVUP_DATA    = 0x08, /**< read a rev-up phase (4.9) */
+  MOTORLINK_ST_FRAME_CODE_SET_REVUP_DATA    = 0x09, /**< write a rev-up phase (4.10) */
+  MOTORLINK_ST_FRAME_CODE_SET_CURRENT_REF   = 0x0A, /**< set the Iq and Id references (4.11) */
+  MOTORLINK_ST_FRAME_CODE_GET_MP_INFO       = 0x0B, /**< list the registers of motor profiler steps (profile MCSDK 5.4 only) */
+  MOTORLINK_ST_FRAME_CODE_GET_FW_VERSION    = 0x0C, /**< read the firmware's version string (4.12) */
+  MOTORLINK_ST_FRAME_CODE_GET_DATA_ELEMENT  = 0x0D, /**< read a data segment (profile SPEC only) */
+  MOTORLINK_ST_FRAME_CODE_SET_TORQUE_RAMP   = 0x0D, /**< program a torque ramp (profile MCSDK 5.4 only) */
+  MOTORLINK_ST_FRAME_CODE_CONFIG_DYN_STRUCT = 0x0E, /**< choose the registers of a data segment (profile SPEC only) */
+  MOTORLINK_ST_FRAME_CODE_SET_POSITION_CMD  = 0x12  /**< move to an angle in a given time (profile MCSDK 5.4 only) */
 };
+#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum motorlink_st_frame_code motorlink_st_frame_code;
+#elif !defined(__cplusplus)
+typedef uint8_t motorlink_st_frame_code;
+#endif
 
 /** Commands (table 4). */
-enum motorlink_st_command {
+enum motorlink_st_command
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+ {
   MOTORLINK_ST_COMMAND_START_MOTOR   = 0x01, /**< start the motor; nothing happens when it runs or is in fault */
   MOTORLINK_ST_COMMAND_STOP_MOTOR    = 0x02, /**< stop the motor */
   MOTORLINK_ST_COMMAND_STOP_RAMP     = 0x03, /**< stop the ramp that is executing */
@@ -256,24 +315,42 @@ enum motorlink_st_command {
   MOTORLINK_ST_COMMAND_SC_START      = 0x0D, /**< start the motor profiler (mcsdk-5.4 only) */
   MOTORLINK_ST_COMMAND_SC_STOP       = 0x0E  /**< stop the motor profiler; acts as STOP_MOTOR (mcsdk-5.4 only) */
 };
+#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum motorlink_st_command motorlink_st_command;
+#elif !defined(__cplusplus)
+typedef uint8_t motorlink_st_command;
+#endif
 
 /** Why a drive refused (table 2). */
-enum motorlink_st_refusal {
-  MOTORLINK_ST_REFUSAL_NONE               = 0x00, /**< not an error; never found in a NACK */
-  MOTORLINK_ST_REFUSAL_BAD_FRAME_ID       = 0x01, /**< the drive does not know this frame code */
-  MOTORLINK_ST_REFUSAL_SET_READ_ONLY      = 0x02, /**< the register is read-only or does not exist */
-  MOTORLINK_ST_REFUSAL_GET_WRITE_ONLY     = 0x03, /**< the register cannot be read or does not exist */
-  MOTORLINK_ST_REFUSAL_WRONG_SET          = 0x05, /**< the value is not valid */
-  MOTORLINK_ST_REFUSAL_WRONG_CMD          = 0x07, /**< the command is unknown or not possible on this drive */
-  MOTORLINK_ST_REFUSAL_OVERRUN            = 0x08, /**< bytes came faster than the drive could take them */
-  MOTORLINK_ST_REFUSAL_TIMEOUT            = 0x09, /**< the drive did not receive the whole frame in time */
-  MOTORLINK_ST_REFUSAL_BAD_CRC            = 0x0A, /**< the checksum did not match what the drive received */
-  MOTORLINK_ST_REFUSAL_BAD_MOTOR_SELECTED = 0x0B, /**< the drive has no motor of this number */
-  MOTORLINK_ST_REFUSAL_MP_NOT_ENABLED     = 0x0C  /**< the drive is built without the motor profiler */
+enum motorlink_st_error_code
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+ {
+  MOTORLINK_ST_ERROR_CODE_NONE               = 0x00, /**< not an error; never found in a NACK */
+  MOTORLINK_ST_ERROR_CODE_BAD_FRAME_ID       = 0x01, /**< the drive does not know this frame code */
+  MOTORLINK_ST_ERROR_CODE_SET_READ_ONLY      = 0x02, /**< the register is read-only or does not exist */
+  MOTORLINK_ST_ERROR_CODE_GET_WRITE_ONLY     = 0x03, /**< the register cannot be read or does not exist */
+  MOTORLINK_ST_ERROR_CODE_WRONG_SET          = 0x05, /**< the value is not valid */
+  MOTORLINK_ST_ERROR_CODE_WRONG_CMD          = 0x07, /**< the command is unknown or not possible on this drive */
+  MOTORLINK_ST_ERROR_CODE_OVERRUN            = 0x08, /**< bytes came faster than the drive could take them */
+  MOTORLINK_ST_ERROR_CODE_TIMEOUT            = 0x09, /**< the drive did not receive the whole frame in time */
+  MOTORLINK_ST_ERROR_CODE_BAD_CRC            = 0x0A, /**< the checksum did not match what the drive received */
+  MOTORLINK_ST_ERROR_CODE_BAD_MOTOR_SELECTED = 0x0B, /**< the drive has no motor of this number */
+  MOTORLINK_ST_ERROR_CODE_MP_NOT_ENABLED     = 0x0C  /**< the drive is built without the motor profiler */
 };
+#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum motorlink_st_error_code motorlink_st_error_code;
+#elif !defined(__cplusplus)
+typedef uint8_t motorlink_st_error_code;
+#endif
 
 /** Values of register STATUS. */
-enum motorlink_st_status {
+enum motorlink_st_status
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+ {
   MOTORLINK_ST_STATUS_IDLE                  = 0x00, /**< at rest, ready to start */
   MOTORLINK_ST_STATUS_IDLE_ALIGNMENT        = 0x01, /**< about to align the encoder */
   MOTORLINK_ST_STATUS_ALIGNMENT             = 0x02, /**< aligning the encoder */
@@ -296,12 +373,26 @@ enum motorlink_st_status {
   MOTORLINK_ST_STATUS_SWITCH_OVER           = 0x13, /**< changing from rev-up to the observer */
   MOTORLINK_ST_STATUS_WAIT_STOP_MOTOR       = 0x14  /**< waiting for the rotor to stand still */
 };
+#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum motorlink_st_status motorlink_st_status;
+#elif !defined(__cplusplus)
+typedef uint8_t motorlink_st_status;
+#endif
 
 /** Values of register CONTROL_MODE. */
-enum motorlink_st_control_mode {
+enum motorlink_st_control_mode
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+ {
   MOTORLINK_ST_CONTROL_MODE_TORQUE = 0x00, /**< the Iq reference is commanded */
   MOTORLINK_ST_CONTROL_MODE_SPEED  = 0x01  /**< the speed reference is commanded */
 };
+#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum motorlink_st_control_mode motorlink_st_control_mode;
+#elif !defined(__cplusplus)
+typedef uint8_t motorlink_st_control_mode;
+#endif
 
 /** Bits of register FLAGS: occurred; 16 bits to the left: present. */
 enum motorlink_st_fault {
@@ -330,7 +421,11 @@ enum motorlink_st_feature {
 };
 
 /** Commands (chapter 2): the first byte of request and reply. */
-enum motorlink_rmd_code {
+enum motorlink_rmd_code
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+ {
   MOTORLINK_RMD_CODE_READ_PID                         = 0x30, /**< reads the gains in RAM */
   MOTORLINK_RMD_CODE_WRITE_PID_RAM                    = 0x31, /**< sets the gains until power-off */
   MOTORLINK_RMD_CODE_WRITE_PID_ROM                    = 0x32, /**< sets the gains for good; wears the ROM */
@@ -355,18 +450,32 @@ enum motorlink_rmd_code {
   MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION         = 0xA5, /**< turns to an angle within the turn, in a given direction */
   MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION_LIMITED = 0xA6  /**< turns to an angle within the turn, in a given direction, no faster than a limit */
 };
+#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum motorlink_rmd_code motorlink_rmd_code;
+#elif !defined(__cplusplus)
+typedef uint8_t motorlink_rmd_code;
+#endif
 
 /** Bits of the error state. */
-enum motorlink_rmd_fault {
-  MOTORLINK_RMD_FAULT_LOW_VOLTAGE      = 0x01, /**< low voltage protection */
-  MOTORLINK_RMD_FAULT_OVER_TEMPERATURE = 0x08  /**< over temperature protection */
+enum motorlink_rmd_error {
+  MOTORLINK_RMD_ERROR_LOW_VOLTAGE      = 0x01, /**< low voltage protection */
+  MOTORLINK_RMD_ERROR_OVER_TEMPERATURE = 0x08  /**< over temperature protection */
 };
 
 /** Which way to turn to an angle within the turn. */
-enum motorlink_rmd_spin {
-  MOTORLINK_RMD_SPIN_CLOCKWISE        = 0x00, /**< towards growing angles */
-  MOTORLINK_RMD_SPIN_COUNTERCLOCKWISE = 0x01  /**< towards falling angles */
+enum motorlink_rmd_spin_direction
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+ {
+  MOTORLINK_RMD_SPIN_DIRECTION_CLOCKWISE        = 0x00, /**< towards growing angles */
+  MOTORLINK_RMD_SPIN_DIRECTION_COUNTERCLOCKWISE = 0x01  /**< towards falling angles */
 };
+#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum motorlink_rmd_spin_direction motorlink_rmd_spin_direction;
+#elif !defined(__cplusplus)
+typedef uint8_t motorlink_rmd_spin_direction;
+#endif
 
 /** CAN identifiers. */
 enum motorlink_rmd_can_id {
@@ -491,7 +600,7 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_BUSY = 9,
   /**
-   * The drive refused; `refusal` tells why (ST).
+   * The drive refused; `error_code` tells why (ST).
    */
   MOTORLINK_ERROR_REFUSED = 20,
   /**
@@ -511,7 +620,7 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_DAMAGED = 24,
   /**
-   * The drive did not understand what it received; `refusal` tells why (ST).
+   * The drive did not understand what it received; `error_code` tells why (ST).
    */
   MOTORLINK_ERROR_NOT_UNDERSTOOD = 25,
   /**
@@ -565,7 +674,7 @@ typedef int32_t motorlink_error;
 /**
  * What the caller of a `poll` has to do next.
  */
-enum motorlink_action
+enum motorlink_output
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint8_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -573,21 +682,58 @@ enum motorlink_action
   /**
    * Hand in what comes, and poll again at `until_us` at the latest.
    */
-  MOTORLINK_ACTION_WAIT = 0,
+  MOTORLINK_OUTPUT_WAIT = 0,
   /**
    * Send, then poll again.
    */
-  MOTORLINK_ACTION_TRANSMIT = 1,
+  MOTORLINK_OUTPUT_TRANSMIT = 1,
   /**
    * An exchange is over; poll again.
    */
-  MOTORLINK_ACTION_DONE = 2,
+  MOTORLINK_OUTPUT_DONE = 2,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
-typedef enum motorlink_action motorlink_action;
+typedef enum motorlink_output motorlink_output;
 #else
-typedef uint8_t motorlink_action;
+typedef uint8_t motorlink_output;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What a motor does.
+ */
+enum motorlink_rmd_mode
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Without current.
+   */
+  MOTORLINK_RMD_MODE_OFF = 0,
+  /**
+   * Brought to a stand and kept there.
+   */
+  MOTORLINK_RMD_MODE_STOPPED = 1,
+  /**
+   * Holds `iq_16ma`.
+   */
+  MOTORLINK_RMD_MODE_TORQUE = 2,
+  /**
+   * Holds `speed_centidps`.
+   */
+  MOTORLINK_RMD_MODE_SPEED = 3,
+  /**
+   * Turns to `target_counts` and holds it.
+   */
+  MOTORLINK_RMD_MODE_POSITION = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum motorlink_rmd_mode motorlink_rmd_mode;
+#else
+typedef uint8_t motorlink_rmd_mode;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -625,98 +771,6 @@ enum motorlink_slcan_answer
 typedef enum motorlink_slcan_answer motorlink_slcan_answer;
 #else
 typedef uint8_t motorlink_slcan_answer;
-#endif // __STDC_VERSION__ >= 202311L
-#endif // __cplusplus
-
-/**
- * How a drive behaves where the document and shipped firmware differ.
- */
-enum motorlink_st_profile
-#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
-  : uint8_t
-#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
- {
-  /**
-   * The document as written.
-   */
-  MOTORLINK_ST_PROFILE_SPEC = 0,
-  /**
-   * What firmware of MCSDK 5.4 does on the wire.
-   */
-  MOTORLINK_ST_PROFILE_MCSDK54 = 1,
-};
-#ifndef __cplusplus
-#if __STDC_VERSION__ >= 202311L
-typedef enum motorlink_st_profile motorlink_st_profile;
-#else
-typedef uint8_t motorlink_st_profile;
-#endif // __STDC_VERSION__ >= 202311L
-#endif // __cplusplus
-
-/**
- * How a line is brought in step that was just opened, or on which an exchange failed.
- */
-enum motorlink_st_recovery
-#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
-  : uint8_t
-#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
- {
-  /**
-   * Not by itself: the line counts as in step until it is lost, and
-   * `motorlink_st_master_trust_line` says that it is so again.
-   */
-  MOTORLINK_ST_RECOVERY_NONE = 0,
-  /**
-   * Waits for silence, asks a question, goes on when it was answered.
-   */
-  MOTORLINK_ST_RECOVERY_DRAIN = 1,
-  /**
-   * As `DRAIN`, behind bytes that complete a frame which a 5.x drive may still be waiting for.
-   */
-  MOTORLINK_ST_RECOVERY_PAD = 2,
-};
-#ifndef __cplusplus
-#if __STDC_VERSION__ >= 202311L
-typedef enum motorlink_st_recovery motorlink_st_recovery;
-#else
-typedef uint8_t motorlink_st_recovery;
-#endif // __STDC_VERSION__ >= 202311L
-#endif // __cplusplus
-
-/**
- * What a motor does.
- */
-enum motorlink_rmd_mode
-#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
-  : uint8_t
-#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
- {
-  /**
-   * Without current.
-   */
-  MOTORLINK_RMD_MODE_OFF = 0,
-  /**
-   * Brought to a stand and kept there.
-   */
-  MOTORLINK_RMD_MODE_STOPPED = 1,
-  /**
-   * Holds `torque_16ma`.
-   */
-  MOTORLINK_RMD_MODE_TORQUE = 2,
-  /**
-   * Holds `speed_centidps`.
-   */
-  MOTORLINK_RMD_MODE_SPEED = 3,
-  /**
-   * Turns to `target_counts` and holds it.
-   */
-  MOTORLINK_RMD_MODE_POSITION = 4,
-};
-#ifndef __cplusplus
-#if __STDC_VERSION__ >= 202311L
-typedef enum motorlink_rmd_mode motorlink_rmd_mode;
-#else
-typedef uint8_t motorlink_rmd_mode;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -787,13 +841,13 @@ typedef struct motorlink_st_master_config {
    */
   uint32_t quiet_us;
   /**
-   * How the drive behaves: one of `motorlink_st_profile`.
+   * How the drive behaves.
    */
-  uint8_t profile;
+  motorlink_st_profile profile;
   /**
-   * How a lost line comes back: one of `motorlink_st_recovery`.
+   * How a lost line comes back.
    */
-  uint8_t recovery;
+  motorlink_st_recovery recovery;
 } motorlink_st_master_config;
 
 /**
@@ -824,7 +878,7 @@ typedef struct motorlink_bytes {
 /**
  * What to do next, or what became of the exchange.
  */
-typedef struct motorlink_st_action {
+typedef struct motorlink_st_output {
   /**
    * `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
    */
@@ -847,13 +901,13 @@ typedef struct motorlink_st_action {
   /**
    * What this is: `WAIT`, `TRANSMIT` or `DONE`.
    */
-  motorlink_action kind;
+  motorlink_output kind;
   /**
-   * `DONE` with `REFUSED` or `NOT_UNDERSTOOD`: one of `motorlink_st_refusal`, or a number that
-   * the document does not name.
+   * `DONE` with `REFUSED` or `NOT_UNDERSTOOD`: why, which may be a number that the document does
+   * not name.
    */
-  uint8_t refusal;
-} motorlink_st_action;
+  motorlink_st_error_code error_code;
+} motorlink_st_output;
 
 /**
  * A slave of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
@@ -904,7 +958,7 @@ typedef struct motorlink_st_version {
  * a reading: a row of docs/SPEC-NOTES.md, named in brackets. A drive that differs from readings
  * passes, and fails with `--readings strict`.
  */
-typedef struct motorlink_st_drive {
+typedef struct motorlink_st_motor_control {
   /**
    * Handed to each callback.
    */
@@ -931,9 +985,9 @@ typedef struct motorlink_st_drive {
    * was written to IQ_SPEEDMODE (S22). RAMP_FINAL_SPEED is the end of the last ramp (S26).
    * PFC_ENABLED is 0 or 1 (S50). Temperatures and power may be below 0 (S23).
    */
-  int32_t (*read)(void *context, uint8_t motor, uint8_t reg);
+  int32_t (*get_register)(void *context, uint8_t motor, motorlink_st_reg reg);
   /**
-   * Writes a register that may be written; gives 0, or why not: `MOTORLINK_ST_REFUSAL_*`,
+   * Writes a register that may be written; gives `MOTORLINK_ST_ERROR_CODE_NONE`, or why not:
    * WRONG_SET for a value that the register cannot take. NULL: WRONG_SET.
    *
    * Not called for TARGET_MOTOR, nor for a DAC channel with a register that it cannot show. Every
@@ -942,9 +996,12 @@ typedef struct motorlink_st_drive {
    * is the Id reference of speed mode (S22), so that FLUX_REF reads it. RAMP_FINAL_SPEED begins a
    * ramp of the last duration (S26). At rest nothing that is written starts the motor.
    */
-  uint8_t (*write)(void *context, uint8_t motor, uint8_t reg, int32_t value);
+  motorlink_st_error_code (*set_register)(void *context,
+                                          uint8_t motor,
+                                          motorlink_st_reg reg,
+                                          int32_t value);
   /**
-   * Executes a `MOTORLINK_ST_COMMAND_*`. What the state does not allow has no effect (4.6).
+   * Executes a command. What the state does not allow has no effect (4.6).
    * NULL: none has.
    *
    * In fault START_MOTOR and START_STOP do nothing. While a fault is present FAULT_ACK changes
@@ -953,42 +1010,48 @@ typedef struct motorlink_st_drive {
    * does nothing in RUN, and STATUS is IDLE when it is over (S53). Commands of a PFC come with
    * `MOTORLINK_ST_FEATURE_PFC` only.
    */
-  void (*execute)(void *context, uint8_t motor, uint8_t command);
+  void (*execute)(void *context, uint8_t motor, motorlink_st_command command);
   /**
    * Programs a speed ramp: at once in RUN, else when RUN is reached (4.8). 0 ms is a step.
    * NULL: without effect.
    */
-  void (*ramp)(void *context, uint8_t motor, int32_t speed_rpm, uint16_t duration_ms);
+  void (*set_ramp)(void *context, uint8_t motor, int32_t speed_rpm, uint16_t duration_ms);
   /**
    * Gives rev-up phase 0 to 4 (4.9); what is not set is 0. NULL: all is 0.
    */
-  void (*revup)(void *context, uint8_t motor, uint8_t phase, struct motorlink_st_revup_phase *data);
+  void (*get_revup_data)(void *context,
+                         uint8_t motor,
+                         uint8_t phase,
+                         struct motorlink_st_revup_phase *data);
   /**
    * Sets rev-up phase 0 to 4 (4.10). NULL: without effect.
    */
-  void (*set_revup)(void *context,
-                    uint8_t motor,
-                    uint8_t phase,
-                    const struct motorlink_st_revup_phase *data);
+  void (*set_revup_data)(void *context,
+                         uint8_t motor,
+                         uint8_t phase,
+                         const struct motorlink_st_revup_phase *data);
   /**
    * Sets the current references: at once in RUN, else when RUN is reached (4.11).
    * NULL: without effect.
    */
-  void (*current)(void *context, uint8_t motor, int16_t iq_s16a, int16_t id_s16a);
+  void (*set_current_reference)(void *context, uint8_t motor, int16_t iq_s16a, int16_t id_s16a);
   /**
    * Programs a torque ramp (profile MCSDK 5.4). NULL: without effect.
    */
-  void (*torque_ramp)(void *context, uint8_t motor, int32_t torque_s16a, uint16_t duration_ms);
+  void (*set_torque_ramp)(void *context, uint8_t motor, int32_t torque_s16a, uint16_t duration_ms);
   /**
    * Moves to an angle (profile MCSDK 5.4, with POSITION_CONTROL). NULL: without effect.
    */
-  void (*position)(void *context, uint8_t motor, float angle_rad, float duration_s);
+  void (*set_position)(void *context, uint8_t motor, float angle_rad, float duration_s);
   /**
    * Registers that a step of the motor profiler shows (profile MCSDK 5.4, with PROFILER): gives
    * how many there are and where, until the next call of a callback. NULL: none.
    */
-  uint8_t (*profiler_step)(void *context, uint8_t motor, uint8_t step, const uint8_t **registers);
-} motorlink_st_drive;
+  uint8_t (*profiler_step)(void *context,
+                           uint8_t motor,
+                           uint8_t step,
+                           const motorlink_st_reg **registers);
+} motorlink_st_motor_control;
 
 /**
  * The eight bytes of a request or a reply.
@@ -1043,7 +1106,7 @@ typedef struct motorlink_rmd_status {
    */
   int8_t temperature_celsius;
   /**
-   * Which protections are active: a sum of `MOTORLINK_RMD_FAULT_*`.
+   * Which protections are active: a sum of `MOTORLINK_RMD_ERROR_*`.
    */
   uint8_t errors;
 } motorlink_rmd_status;
@@ -1077,15 +1140,15 @@ typedef struct motorlink_rmd_phase_currents {
   /**
    * Phase A, 1/64 A a digit.
    */
-  int16_t a_digits;
+  int16_t phase_a_digits;
   /**
    * Phase B, 1/64 A a digit.
    */
-  int16_t b_digits;
+  int16_t phase_b_digits;
   /**
    * Phase C, 1/64 A a digit.
    */
-  int16_t c_digits;
+  int16_t phase_c_digits;
 } motorlink_rmd_phase_currents;
 
 /**
@@ -1106,7 +1169,7 @@ typedef struct motorlink_rmd_limits {
   /**
    * Greatest torque current of 0xA1 and 0x280, 0.016 A a digit, or `MOTORLINK_RMD_NO_LIMIT`.
    */
-  int32_t torque_16ma;
+  int32_t current_16ma;
   /**
    * Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_RMD_NO_LIMIT`. 0xA3 and 0xA5
    * carry no speed and are refused while this is set, as are 0xA4 and 0xA6 with 0. A torque
@@ -1148,7 +1211,7 @@ typedef struct motorlink_can_frame {
 /**
  * What to do next, or what became of an exchange.
  */
-typedef struct motorlink_rmd_action {
+typedef struct motorlink_rmd_output {
   /**
    * `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
    */
@@ -1168,12 +1231,12 @@ typedef struct motorlink_rmd_action {
   /**
    * What this is: `WAIT`, `TRANSMIT` or `DONE`.
    */
-  motorlink_action kind;
+  motorlink_output kind;
   /**
    * `DONE`: the motor, 1 to 32.
    */
   uint8_t motor;
-} motorlink_rmd_action;
+} motorlink_rmd_output;
 
 /**
  * An RMD drive, in storage of the caller's: static, on the stack or on the heap.
@@ -1223,7 +1286,7 @@ typedef struct motorlink_rmd_settings {
   /**
    * Gains of the three loops.
    */
-  struct motorlink_rmd_pid gains;
+  struct motorlink_rmd_pid pid;
 } motorlink_rmd_settings;
 
 /**
@@ -1245,15 +1308,15 @@ typedef struct motorlink_rmd_motion {
   /**
    * `TORQUE`: torque current, 0.016 A a digit, -2000 to 2000.
    */
-  int16_t torque_16ma;
+  int16_t iq_16ma;
   /**
    * `POSITION`: 1 where the drive's greatest angle holds, 0 for angles within the turn.
    */
   uint8_t within_max_angle;
   /**
-   * One of `motorlink_rmd_mode`.
+   * Which of them it is.
    */
-  uint8_t kind;
+  motorlink_rmd_mode kind;
 } motorlink_rmd_motion;
 
 /**
@@ -1286,7 +1349,7 @@ typedef struct motorlink_rmd_sense {
    */
   int8_t temperature_celsius;
   /**
-   * Faults that are present now, a sum of `MOTORLINK_RMD_FAULT_*`; the drive latches them.
+   * Faults that are present now, a sum of `MOTORLINK_RMD_ERROR_*`; the drive latches them.
    */
   uint8_t faults;
 } motorlink_rmd_sense;
@@ -1301,7 +1364,7 @@ typedef struct motorlink_rmd_sense {
  * a reading: a row of docs/SPEC-NOTES.md, named in brackets. A drive that differs from readings
  * passes, and fails with `--readings strict`.
  */
-typedef struct motorlink_rmd_motor {
+typedef struct motorlink_rmd_motor_control {
   /**
    * Handed to each callback.
    */
@@ -1332,7 +1395,7 @@ typedef struct motorlink_rmd_motor {
    * NULL: forgotten at power-off.
    */
   void (*save)(void *context, const struct motorlink_rmd_settings *rom);
-} motorlink_rmd_motor;
+} motorlink_rmd_motor_control;
 
 /**
  * The host's end of a serial line to a CAN adapter, in storage of the caller's.
@@ -1385,7 +1448,7 @@ const char *motorlink_version(void);
 const char *motorlink_error_text(int32_t error);
 
 /**
- * Reads the payload of an answer to `motorlink_st_master_board_info`.
+ * Reads the payload of an answer to `motorlink_st_master_get_board_info`.
  *
  * `BAD_ARGUMENT`: the payload is too short to be one.
  */
@@ -1394,7 +1457,7 @@ motorlink_error motorlink_st_decode_board_info(const uint8_t *payload,
                                                struct motorlink_st_board_info *info);
 
 /**
- * Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
+ * Reads the payload of an answer to `motorlink_st_master_get_firmware_version`. Texts that are not
  * UTF-8 are cut there.
  */
 motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
@@ -1402,24 +1465,24 @@ motorlink_error motorlink_st_decode_firmware_version(const uint8_t *payload,
                                                      struct motorlink_st_firmware_version *version);
 
 /**
- * Reads the payload of an answer to `motorlink_st_master_revup`.
+ * Reads the payload of an answer to `motorlink_st_master_get_revup_data`.
  *
  * `BAD_ARGUMENT`: the payload is too short to be one.
  */
-motorlink_error motorlink_st_decode_revup(const uint8_t *payload,
-                                          size_t size,
-                                          struct motorlink_st_revup_phase *phase);
+motorlink_error motorlink_st_decode_revup_data(const uint8_t *payload,
+                                               size_t size,
+                                               struct motorlink_st_revup_phase *phase);
 
 /**
- * Reads the payload of an answer to `motorlink_st_master_read_segment`: the values of the `count`
+ * Reads the payload of an answer to `motorlink_st_master_get_segment`: the values of the `count`
  * registers that the segment was configured with, in the same order, into as many `values`, each
- * as in `motorlink_st_action`.
+ * as in `motorlink_st_output`.
  *
  * `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are left alone.
  */
 motorlink_error motorlink_st_decode_segment(const uint8_t *payload,
                                             size_t size,
-                                            const uint8_t *registers,
+                                            const motorlink_st_reg *registers,
                                             size_t count,
                                             int32_t *values);
 
@@ -1453,7 +1516,7 @@ uint64_t motorlink_st_longest_transmission_us(uint32_t baud);
  */
 motorlink_error motorlink_st_master_poll(struct motorlink_st_master *master,
                                          uint64_t now_us,
-                                         struct motorlink_st_action *action);
+                                         struct motorlink_st_output *output);
 
 /**
  * Takes what came from the drive at `now_us`, in any pieces. `bytes` may not lie in the storage.
@@ -1498,7 +1561,7 @@ motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, 
  */
 motorlink_error motorlink_st_master_get_register(struct motorlink_st_master *master,
                                                  uint8_t motor,
-                                                 uint8_t reg);
+                                                 motorlink_st_reg reg);
 
 /**
  * Begins to write a register, with as many low bytes of `value` as it has; of a floating-point
@@ -1506,82 +1569,83 @@ motorlink_error motorlink_st_master_get_register(struct motorlink_st_master *mas
  */
 motorlink_error motorlink_st_master_set_register(struct motorlink_st_master *master,
                                                  uint8_t motor,
-                                                 uint8_t reg,
+                                                 motorlink_st_reg reg,
                                                  int32_t value);
 
 /**
- * Begins to have a command executed, one of `motorlink_st_command`. Any number is taken.
+ * Begins to have a command executed. Any number is taken.
  */
 motorlink_error motorlink_st_master_execute(struct motorlink_st_master *master,
                                             uint8_t motor,
-                                            uint8_t command);
+                                            motorlink_st_command command);
 
 /**
  * Begins to program a speed ramp (4.8): to `speed_rpm` in `duration_ms`; 0 ms is a step.
  */
-motorlink_error motorlink_st_master_ramp(struct motorlink_st_master *master,
-                                         uint8_t motor,
-                                         int32_t speed_rpm,
-                                         uint16_t duration_ms);
+motorlink_error motorlink_st_master_set_ramp(struct motorlink_st_master *master,
+                                             uint8_t motor,
+                                             int32_t speed_rpm,
+                                             uint16_t duration_ms);
 
 /**
  * Begins to set the references of Iq and Id (4.11), s16A digits.
  */
-motorlink_error motorlink_st_master_current(struct motorlink_st_master *master,
-                                            uint8_t motor,
-                                            int16_t iq_s16a,
-                                            int16_t id_s16a);
+motorlink_error motorlink_st_master_set_current_reference(struct motorlink_st_master *master,
+                                                          uint8_t motor,
+                                                          int16_t iq_s16a,
+                                                          int16_t id_s16a);
 
 /**
  * Begins to program a torque ramp (profile MCSDK 5.4): to `torque_s16a` in `duration_ms`; 0 ms is
  * a step.
  */
-motorlink_error motorlink_st_master_torque_ramp(struct motorlink_st_master *master,
-                                                uint8_t motor,
-                                                int32_t torque_s16a,
-                                                uint16_t duration_ms);
+motorlink_error motorlink_st_master_set_torque_ramp(struct motorlink_st_master *master,
+                                                    uint8_t motor,
+                                                    int32_t torque_s16a,
+                                                    uint16_t duration_ms);
 
 /**
  * Begins a move to `angle_rad` in `duration_s` (profile MCSDK 5.4).
  *
  * `BAD_ARGUMENT`: `motor` is over 7, or a value is not finite.
  */
-motorlink_error motorlink_st_master_move(struct motorlink_st_master *master,
-                                         uint8_t motor,
-                                         float angle_rad,
-                                         float duration_s);
+motorlink_error motorlink_st_master_set_position(struct motorlink_st_master *master,
+                                                 uint8_t motor,
+                                                 float angle_rad,
+                                                 float duration_s);
 
 /**
- * Begins to read rev-up phase 0 to 4 (4.9); `motorlink_st_decode_revup` reads the result.
+ * Begins to read rev-up phase 0 to 4 (4.9); `motorlink_st_decode_revup_data` reads the result.
  *
  * `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
  */
-motorlink_error motorlink_st_master_revup(struct motorlink_st_master *master,
-                                          uint8_t motor,
-                                          uint8_t phase);
+motorlink_error motorlink_st_master_get_revup_data(struct motorlink_st_master *master,
+                                                   uint8_t motor,
+                                                   uint8_t phase);
 
 /**
  * Begins to write rev-up phase 0 to 4 (4.10). `data` is copied.
  *
  * `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
  */
-motorlink_error motorlink_st_master_set_revup(struct motorlink_st_master *master,
-                                              uint8_t motor,
-                                              uint8_t phase,
-                                              const struct motorlink_st_revup_phase *data);
+motorlink_error motorlink_st_master_set_revup_data(struct motorlink_st_master *master,
+                                                   uint8_t motor,
+                                                   uint8_t phase,
+                                                   const struct motorlink_st_revup_phase *data);
 
 /**
  * Begins to read the SDK's version and name (4.7); `motorlink_st_decode_board_info` reads the
  * result.
  */
-motorlink_error motorlink_st_master_board_info(struct motorlink_st_master *master, uint8_t motor);
+motorlink_error motorlink_st_master_get_board_info(struct motorlink_st_master *master,
+                                                   uint8_t motor);
 
 /**
  * Begins to read the firmware's version (4.12); `motorlink_st_decode_firmware_version` reads the
  * result.
  */
-motorlink_error motorlink_st_master_firmware_version(struct motorlink_st_master *master,
-                                                     uint8_t motor);
+motorlink_error motorlink_st_master_get_firmware_version(struct motorlink_st_master *master,
+                                                         uint8_t motor);
 
 /**
  * Begins to choose the registers of a data segment (profile SPEC): `count` numbers, which are
@@ -1592,16 +1656,16 @@ motorlink_error motorlink_st_master_firmware_version(struct motorlink_st_master 
 motorlink_error motorlink_st_master_configure_segment(struct motorlink_st_master *master,
                                                       uint8_t motor,
                                                       uint8_t segment,
-                                                      const uint8_t *registers,
+                                                      const motorlink_st_reg *registers,
                                                       size_t count);
 
 /**
  * Begins to read a data segment (profile SPEC): the values of its registers, one behind the other,
  * little-endian, in the size that each has.
  */
-motorlink_error motorlink_st_master_read_segment(struct motorlink_st_master *master,
-                                                 uint8_t motor,
-                                                 uint8_t segment);
+motorlink_error motorlink_st_master_get_segment(struct motorlink_st_master *master,
+                                                uint8_t motor,
+                                                uint8_t segment);
 
 /**
  * Begins to ask which registers steps of the motor profiler show (profile MCSDK 5.4): `count`
@@ -1609,19 +1673,19 @@ motorlink_error motorlink_st_master_read_segment(struct motorlink_st_master *mas
  *
  * `TOO_LONG`: over 128 steps.
  */
-motorlink_error motorlink_st_master_profiler_info(struct motorlink_st_master *master,
-                                                  uint8_t motor,
-                                                  const uint8_t *steps,
-                                                  size_t count);
+motorlink_error motorlink_st_master_get_profiler_info(struct motorlink_st_master *master,
+                                                      uint8_t motor,
+                                                      const uint8_t *steps,
+                                                      size_t count);
 
 /**
- * Begins an exchange with any header (5 bits of `motorlink_st_frame`, 3 bits of motor) and any
- * payload of up to 128 bytes, which is copied.
+ * Begins an exchange with any frame code and any payload of up to 128 bytes, which is copied.
  *
- * `TOO_LONG`: over 128 bytes.
+ * `BAD_ARGUMENT`: `motor` is over 7, or `code` over 31. `TOO_LONG`: over 128 bytes.
  */
 motorlink_error motorlink_st_master_raw(struct motorlink_st_master *master,
-                                        uint8_t header,
+                                        uint8_t motor,
+                                        motorlink_st_frame_code code,
                                         const uint8_t *payload,
                                         size_t size);
 
@@ -1631,13 +1695,13 @@ motorlink_error motorlink_st_master_raw(struct motorlink_st_master *master,
  * `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
  * may be constant. Not from a callback of the same slave.
  *
- * `BAD_ARGUMENT`: `profile` is none of `motorlink_st_profile`, or `motors` is not 1 to 7.
+ * `BAD_ARGUMENT`: `profile` has no name, or `motors` is not 1 to 7.
  */
 motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
                                         size_t size,
-                                        uint8_t profile,
+                                        motorlink_st_profile profile,
                                         uint8_t motors,
-                                        const struct motorlink_st_drive *drive);
+                                        const struct motorlink_st_motor_control *drive);
 
 /**
  * Takes a byte that came at `now_us`. Where it completes a command the drive is called, and
@@ -1678,27 +1742,27 @@ motorlink_error motorlink_st_slave_overrun(struct motorlink_st_slave *slave,
  * The name of a register, UTF-8 without a NUL, constant: `printf("%.*s", (int)size, data)`. Empty
  * for a number that nobody names, as all names here.
  */
-struct motorlink_bytes motorlink_st_register_name(uint8_t reg);
+struct motorlink_bytes motorlink_st_reg_name(motorlink_st_reg reg);
 
 /**
  * The symbol of the unit of a register's value; empty where there is none.
  */
-struct motorlink_bytes motorlink_st_register_unit(uint8_t reg);
+struct motorlink_bytes motorlink_st_reg_unit(motorlink_st_reg reg);
 
 /**
- * The name of a `motorlink_st_refusal`.
+ * The name of an error code.
  */
-struct motorlink_bytes motorlink_st_refusal_name(uint8_t refusal);
+struct motorlink_bytes motorlink_st_error_code_name(motorlink_st_error_code error_code);
 
 /**
- * The name of a `motorlink_st_status`.
+ * The name of a state.
  */
-struct motorlink_bytes motorlink_st_status_name(uint8_t status);
+struct motorlink_bytes motorlink_st_status_name(motorlink_st_status status);
 
 /**
- * The name of a `motorlink_st_command`.
+ * The name of a command.
  */
-struct motorlink_bytes motorlink_st_command_name(uint8_t command);
+struct motorlink_bytes motorlink_st_command_name(motorlink_st_command command);
 
 /**
  * Request 0x30: reads the gains in RAM.
@@ -1768,12 +1832,12 @@ struct motorlink_rmd_data motorlink_rmd_run(void);
 /**
  * Request 0x31: sets the gains until power-off.
  */
-struct motorlink_rmd_data motorlink_rmd_write_pid_ram(struct motorlink_rmd_pid gains);
+struct motorlink_rmd_data motorlink_rmd_write_pid_ram(struct motorlink_rmd_pid pid);
 
 /**
  * Request 0x32: sets the gains for good. Wears the ROM.
  */
-struct motorlink_rmd_data motorlink_rmd_write_pid_rom(struct motorlink_rmd_pid gains);
+struct motorlink_rmd_data motorlink_rmd_write_pid_rom(struct motorlink_rmd_pid pid);
 
 /**
  * Request 0x34: sets the acceleration limit, °/s², until power-off.
@@ -1788,7 +1852,7 @@ struct motorlink_rmd_data motorlink_rmd_write_encoder_offset_rom(uint16_t offset
 /**
  * Request 0xA1: holds a torque current, 0.016 A a digit, -2000 to 2000.
  */
-struct motorlink_rmd_data motorlink_rmd_set_torque(int16_t torque_16ma);
+struct motorlink_rmd_data motorlink_rmd_set_torque(int16_t iq_16ma);
 
 /**
  * Request 0xA2: holds a speed, 0.01 °/s a digit, positive is clockwise.
@@ -1807,15 +1871,15 @@ struct motorlink_rmd_data motorlink_rmd_set_position_limited(int32_t angle_centi
                                                              uint16_t max_speed_dps);
 
 /**
- * Request 0xA5: turns to an angle within the turn, 0.01° a digit, 0 to 35999, in a direction of `motorlink_rmd_spin`.
+ * Request 0xA5: turns to an angle within the turn, 0.01° a digit, 0 to 35999.
  */
-struct motorlink_rmd_data motorlink_rmd_set_single_turn_position(uint8_t direction,
+struct motorlink_rmd_data motorlink_rmd_set_single_turn_position(motorlink_rmd_spin_direction direction,
                                                                  uint16_t angle_centidegrees);
 
 /**
  * Request 0xA6: as 0xA5, no faster than a limit, °/s.
  */
-struct motorlink_rmd_data motorlink_rmd_set_single_turn_position_limited(uint8_t direction,
+struct motorlink_rmd_data motorlink_rmd_set_single_turn_position_limited(motorlink_rmd_spin_direction direction,
                                                                          uint16_t angle_centidegrees,
                                                                          uint16_t max_speed_dps);
 
@@ -1871,7 +1935,7 @@ struct motorlink_rmd_phase_currents motorlink_rmd_decode_phase_currents(struct m
 uint16_t motorlink_rmd_encoder_centidegrees(uint16_t counts, uint8_t encoder_bits);
 
 /**
- * Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of quarantine time, no
+ * Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of quarantine, no
  * limits. `size` is `sizeof *host`. Former hosts may have asked the motors anything;
  * `motorlink_rmd_host_trust` says that they did not.
  */
@@ -1883,7 +1947,7 @@ motorlink_error motorlink_rmd_host_init(struct motorlink_rmd_host *host, size_t 
  */
 motorlink_error motorlink_rmd_host_set_times(struct motorlink_rmd_host *host,
                                              uint32_t timeout_us,
-                                             uint32_t guard_us);
+                                             uint32_t quarantine_us);
 
 /**
  * Sets what a motor may be told from the next request on.
@@ -1926,7 +1990,7 @@ motorlink_error motorlink_rmd_host_request(struct motorlink_rmd_host *host,
  */
 motorlink_error motorlink_rmd_host_set_torque4(struct motorlink_rmd_host *host,
                                                uint64_t now_us,
-                                               const int16_t *torques_16ma,
+                                               const int16_t *iq_16ma,
                                                uint8_t expect);
 
 /**
@@ -1939,7 +2003,7 @@ motorlink_error motorlink_rmd_host_retry(struct motorlink_rmd_host *host, uint64
  */
 motorlink_error motorlink_rmd_host_poll(struct motorlink_rmd_host *host,
                                         uint64_t now_us,
-                                        struct motorlink_rmd_action *action);
+                                        struct motorlink_rmd_output *output);
 
 /**
  * Takes a frame that came from the bus at `now_us`. Frames that belong to no exchange are dropped.
@@ -1992,7 +2056,7 @@ motorlink_error motorlink_rmd_drive_init(struct motorlink_rmd_drive *drive,
                                          size_t size,
                                          const struct motorlink_rmd_drive_config *config,
                                          const struct motorlink_rmd_settings *rom,
-                                         const struct motorlink_rmd_motor *motor);
+                                         const struct motorlink_rmd_motor_control *motor);
 
 /**
  * Starts, also after a power cycle: settings come from ROM, the motor is off, no error is latched
@@ -2031,7 +2095,7 @@ motorlink_error motorlink_rmd_drive_motion(struct motorlink_rmd_drive *drive,
                                            struct motorlink_rmd_motion *motion);
 
 /**
- * The latched errors, a sum of `MOTORLINK_RMD_FAULT_*`.
+ * The latched errors, a sum of `MOTORLINK_RMD_ERROR_*`.
  */
 motorlink_error motorlink_rmd_drive_errors(struct motorlink_rmd_drive *drive, uint8_t *errors);
 

@@ -22,7 +22,7 @@ impl From<&[u8]> for motorlink_bytes {
 /// What the caller of a `poll` has to do next.
 #[repr(u8)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum motorlink_action {
+pub enum motorlink_output {
     /// Hand in what comes, and poll again at `until_us` at the latest.
     Wait = 0,
     /// Send, then poll again.

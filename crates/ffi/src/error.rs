@@ -29,7 +29,7 @@ pub enum motorlink_error {
     /// An exchange is under way, with the drive (ST) or this motor (RMD).
     Busy = 9,
 
-    /// The drive refused; `refusal` tells why (ST).
+    /// The drive refused; `error_code` tells why (ST).
     Refused = 20,
     /// No reply in time. It is not known whether the drive did what was asked.
     Timeout = 21,
@@ -39,7 +39,7 @@ pub enum motorlink_error {
     NotAReply = 23,
     /// A reply is damaged (ST).
     Damaged = 24,
-    /// The drive did not understand what it received; `refusal` tells why (ST).
+    /// The drive did not understand what it received; `error_code` tells why (ST).
     NotUnderstood = 25,
     /// Two replies that differ came at once (ST).
     Ambiguous = 26,

@@ -21,6 +21,7 @@ extern crate std;
 mod bytes;
 mod error;
 mod frame;
+mod number;
 mod pointer;
 pub mod rmd;
 pub mod slcan;
@@ -29,7 +30,12 @@ mod storage;
 mod tag;
 mod version;
 
-pub use bytes::{MOTORLINK_NEVER, motorlink_action, motorlink_bytes};
+pub use bytes::{MOTORLINK_NEVER, motorlink_bytes, motorlink_output};
 pub use error::{MOTORLINK_OK, motorlink_error, motorlink_error_text};
 pub use frame::{MOTORLINK_NO_FRAME, motorlink_can_frame};
+pub use number::{
+    motorlink_rmd_spin_direction, motorlink_st_command, motorlink_st_error_code,
+    motorlink_st_frame_code, motorlink_st_profile, motorlink_st_recovery, motorlink_st_reg,
+    motorlink_st_status,
+};
 pub use version::motorlink_version;

@@ -93,7 +93,7 @@ struct StBench {
 }
 
 impl StBench {
-    fn new(profile: u8, drive: &motorlink_st_drive) -> Box<Self> {
+    fn new(profile: u8, drive: &motorlink_st_motor_control) -> Box<Self> {
         let mut bench = Box::new(StBench { master: zeroed(), slave: zeroed() });
         let config = motorlink_st_master_config { profile, ..motorlink_st_master_defaults() };
         let StBench { master, slave } = &mut *bench;
@@ -104,19 +104,19 @@ impl StBench {
     }
 
     /// Conducts the exchange that was begun: what became of it, and the payload.
-    fn done(&mut self, begun: Error) -> (motorlink_st_action, Vec<u8>) {
+    fn done(&mut self, begun: Error) -> (motorlink_st_output, Vec<u8>) {
         assert_eq!(begun, OK);
         let StBench { master, slave } = self;
-        let (mut action, mut reply): (motorlink_st_action, motorlink_bytes) = (zeroed(), zeroed());
+        let (mut output, mut reply): (motorlink_st_output, motorlink_bytes) = (zeroed(), zeroed());
         loop {
-            gives!(Ok, motorlink_st_master_poll(master, 0, &mut action));
-            match action.kind {
-                motorlink_action::Done => return (action, bytes(&action.bytes)),
-                motorlink_action::Wait => panic!("the slave did not answer"),
-                motorlink_action::Transmit => {}
+            gives!(Ok, motorlink_st_master_poll(master, 0, &mut output));
+            match output.kind {
+                motorlink_output::Done => return (output, bytes(&output.bytes)),
+                motorlink_output::Wait => panic!("the slave did not answer"),
+                motorlink_output::Transmit => {}
             }
-            let sent = bytes(&action.bytes);
-            gives!(Ok, motorlink_st_master_poll(master, 0, &mut action));
+            let sent = bytes(&output.bytes);
+            gives!(Ok, motorlink_st_master_poll(master, 0, &mut output));
             for byte in sent {
                 gives!(Ok, motorlink_st_slave_receive(slave, 0, byte, &mut reply));
                 gives!(Ok, motorlink_st_master_receive(master, 0, reply.data, reply.size));
@@ -131,15 +131,15 @@ impl StBench {
     /// the question.
     fn done_in_time(&mut self) -> (Error, Vec<u8>) {
         let StBench { master, slave } = self;
-        let (mut action, mut reply): (motorlink_st_action, motorlink_bytes) = (zeroed(), zeroed());
+        let (mut output, mut reply): (motorlink_st_output, motorlink_bytes) = (zeroed(), zeroed());
         let (mut now, mut headers) = (0, Vec::new());
         loop {
-            gives!(Ok, motorlink_st_master_poll(master, now, &mut action));
-            match action.kind {
-                motorlink_action::Done => return (action.result, headers),
-                motorlink_action::Wait => now = action.until_us,
-                motorlink_action::Transmit => {
-                    let sent = bytes(&action.bytes);
+            gives!(Ok, motorlink_st_master_poll(master, now, &mut output));
+            match output.kind {
+                motorlink_output::Done => return (output.result, headers),
+                motorlink_output::Wait => now = output.until_us,
+                motorlink_output::Transmit => {
+                    let sent = bytes(&output.bytes);
                     headers.push(sent[0]);
                     for byte in sent {
                         gives!(Ok, motorlink_st_slave_receive(slave, now, byte, &mut reply));
@@ -151,18 +151,18 @@ impl StBench {
     }
 }
 
-fn drive(context: &mut Fan) -> motorlink_st_drive {
-    let mut drive: motorlink_st_drive = zeroed();
+fn drive(context: &mut Fan) -> motorlink_st_motor_control {
+    let mut drive: motorlink_st_motor_control = zeroed();
     drive.context = std::ptr::from_mut(context).cast();
     drive.version.name = c"Fan".as_ptr();
     drive.version.major = 1;
     drive.features = Some(features);
-    drive.read = Some(read);
-    drive.write = Some(write);
+    drive.get_register = Some(read);
+    drive.set_register = Some(write);
     drive.execute = Some(execute);
-    drive.ramp = Some(ramp);
-    drive.revup = Some(revup);
-    drive.set_revup = Some(set_revup);
+    drive.set_ramp = Some(ramp);
+    drive.get_revup_data = Some(revup);
+    drive.set_revup_data = Some(set_revup);
     drive.profiler_step = Some(profiler_step);
     drive
 }
@@ -179,34 +179,34 @@ fn a_master_and_a_slave_understand_each_other() {
     let mut fan = Fan::default();
     let drive = drive(&mut fan);
     let mut bench = StBench::new(1, &drive);
-    assert_eq!(exchange!(bench, motorlink_st_master_ramp(1500, 100)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_set_ramp(1500, 100)).0.result, OK);
     assert_eq!(exchange!(bench, motorlink_st_master_get_register(0x1E)).0.value, 1500);
     assert_eq!(exchange!(bench, motorlink_st_master_execute(1)).0.result, OK);
     assert_eq!(exchange!(bench, motorlink_st_master_set_register(0x05, -2)).0.result, OK);
     let refused = exchange!(bench, motorlink_st_master_set_register(0x05, 13)).0;
-    assert_eq!((refused.result, refused.refusal), (Error::Refused, 0x05));
-    assert_eq!(exchange!(bench, motorlink_st_master_current(1, 2)).0.result, OK);
-    assert_eq!(exchange!(bench, motorlink_st_master_torque_ramp(1, 2)).0.result, OK);
-    assert_eq!(exchange!(bench, motorlink_st_master_move(1.0, 2.0)).0.result, OK);
+    assert_eq!((refused.result, refused.error_code), (Error::Refused, 0x05));
+    assert_eq!(exchange!(bench, motorlink_st_master_set_current_reference(1, 2)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_set_torque_ramp(1, 2)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_set_position(1.0, 2.0)).0.result, OK);
 
     let phase = motorlink_st_revup_phase { speed_rpm: 600, torque_s16a: -7, duration_ms: 9 };
-    assert_eq!(exchange!(bench, motorlink_st_master_set_revup(0, &phase)).0.result, OK);
-    let (_, payload) = exchange!(bench, motorlink_st_master_revup(0));
+    assert_eq!(exchange!(bench, motorlink_st_master_set_revup_data(0, &phase)).0.result, OK);
+    let (_, payload) = exchange!(bench, motorlink_st_master_get_revup_data(0));
     let mut read: motorlink_st_revup_phase = zeroed();
-    gives!(Ok, motorlink_st_decode_revup(payload.as_ptr(), payload.len(), &mut read));
+    gives!(Ok, motorlink_st_decode_revup_data(payload.as_ptr(), payload.len(), &mut read));
     assert_eq!(read, phase);
 
-    let (_, payload) = exchange!(bench, motorlink_st_master_board_info());
+    let (_, payload) = exchange!(bench, motorlink_st_master_get_board_info());
     let mut info: motorlink_st_board_info = zeroed();
     gives!(Ok, motorlink_st_decode_board_info(payload.as_ptr(), payload.len(), &mut info));
     assert_eq!((info.major, info.name[..4].to_vec()), (1, b"Fan\0".map(|b| b as _).to_vec()));
-    let (_, payload) = exchange!(bench, motorlink_st_master_firmware_version());
+    let (_, payload) = exchange!(bench, motorlink_st_master_get_firmware_version());
     let mut version: motorlink_st_firmware_version = zeroed();
     gives!(Ok, motorlink_st_decode_firmware_version(payload.as_ptr(), payload.len(), &mut version));
     assert_eq!(version.version[..5], b"Ver.1".map(|b| b as _));
 
     let steps = [0, 1];
-    let (_, payload) = exchange!(bench, motorlink_st_master_profiler_info(steps.as_ptr(), 2));
+    let (_, payload) = exchange!(bench, motorlink_st_master_get_profiler_info(steps.as_ptr(), 2));
     assert_eq!(payload, [0, 2, 0x66, 0x67]);
     assert_eq!(fan.commands, [1]);
 }
@@ -219,16 +219,16 @@ fn the_version_is_a_text_of_c() {
 
 #[test]
 fn a_drive_without_callbacks_answers() {
-    let nothing: motorlink_st_drive = zeroed();
+    let nothing: motorlink_st_motor_control = zeroed();
     let mut bench = StBench::new(0, &nothing);
     assert_eq!(exchange!(bench, motorlink_st_master_get_register(0x1E)).0.value, 0);
-    assert_eq!(exchange!(bench, motorlink_st_master_set_register(0x05, 1)).0.refusal, 0x05);
+    assert_eq!(exchange!(bench, motorlink_st_master_set_register(0x05, 1)).0.error_code, 0x05);
     assert_eq!(exchange!(bench, motorlink_st_master_execute(1)).0.result, OK);
-    assert_eq!(exchange!(bench, motorlink_st_master_ramp(1, 1)).0.result, OK);
+    assert_eq!(exchange!(bench, motorlink_st_master_set_ramp(1, 1)).0.result, OK);
     let registers = [0x02, 0x1E];
     let chosen = exchange!(bench, motorlink_st_master_configure_segment(0, registers.as_ptr(), 2));
     assert_eq!(chosen.0.result, OK);
-    assert_eq!(exchange!(bench, motorlink_st_master_read_segment(0)).1, [0; 5]);
+    assert_eq!(exchange!(bench, motorlink_st_master_get_segment(0)).1, [0; 5]);
 }
 
 #[test]
@@ -243,14 +243,14 @@ fn a_request_that_is_refused_leaves_the_one_under_way_alone() {
         motorlink_st_master_get_register(master, 1, 0x02),
         motorlink_st_master_set_register(master, 1, 0x05, 1),
         motorlink_st_master_execute(master, 1, 2),
-        motorlink_st_master_raw(master, 0, null(), 0),
+        motorlink_st_master_raw(master, 0, 1, null(), 0),
     );
     assert_eq!(bench.done(begun).0.value, 1500);
 }
 
 #[test]
 fn an_answer_that_comes_before_the_next_poll_recovers_the_line() {
-    let nothing: motorlink_st_drive = zeroed();
+    let nothing: motorlink_st_motor_control = zeroed();
     let mut bench = StBench::new(0, &nothing);
     let master: *mut motorlink_st_master = &mut bench.master;
     gives!(Ok, motorlink_st_master_lost(master), motorlink_st_master_get_register(master, 1, 2));
@@ -259,7 +259,7 @@ fn an_answer_that_comes_before_the_next_poll_recovers_the_line() {
 
 #[test]
 fn a_line_that_was_just_opened_is_brought_in_step_by_three_questions() {
-    let nothing: motorlink_st_drive = zeroed();
+    let nothing: motorlink_st_motor_control = zeroed();
     let mut bench = StBench::new(0, &nothing);
     let master: *mut motorlink_st_master = &mut bench.master;
     let mut lost = 0;
@@ -275,23 +275,23 @@ fn a_line_that_was_just_opened_is_brought_in_step_by_three_questions() {
 
 #[test]
 fn a_line_that_echoes_is_no_drive() {
-    let nothing: motorlink_st_drive = zeroed();
+    let nothing: motorlink_st_motor_control = zeroed();
     let mut bench = StBench::new(0, &nothing);
     let master: *mut motorlink_st_master = &mut bench.master;
     gives!(Ok, motorlink_st_master_lost(master), motorlink_st_master_execute(master, 1, 1));
-    let (mut action, mut now): (motorlink_st_action, u64) = (zeroed(), 0);
+    let (mut output, mut now): (motorlink_st_output, u64) = (zeroed(), 0);
     loop {
-        gives!(Ok, motorlink_st_master_poll(master, now, &mut action));
-        match action.kind {
-            motorlink_action::Done => break,
-            motorlink_action::Wait => now = action.until_us,
-            motorlink_action::Transmit => {
-                let sent = bytes(&action.bytes);
+        gives!(Ok, motorlink_st_master_poll(master, now, &mut output));
+        match output.kind {
+            motorlink_output::Done => break,
+            motorlink_output::Wait => now = output.until_us,
+            motorlink_output::Transmit => {
+                let sent = bytes(&output.bytes);
                 gives!(Ok, motorlink_st_master_receive(master, now, sent.as_ptr(), sent.len()));
             }
         }
     }
-    assert_eq!(action.result, Error::Echo);
+    assert_eq!(output.result, Error::Echo);
 }
 
 #[test]
@@ -308,17 +308,17 @@ fn a_name_that_is_too_long_is_cut_between_characters() {
 /// No register has three bytes, or none: that is no value, least of all 0.
 #[test]
 fn a_read_that_is_answered_with_no_value_says_so() {
-    let nothing: motorlink_st_drive = zeroed();
-    let mut action: motorlink_st_action = zeroed();
+    let nothing: motorlink_st_motor_control = zeroed();
+    let mut output: motorlink_st_output = zeroed();
     for reply in [&[0xF0, 0x00, 0xF0][..], &[0xF0, 0x03, 1, 2, 3, 0xF9]] {
         let mut bench = StBench::new(0, &nothing);
         let master = &mut bench.master;
         gives!(Ok, motorlink_st_master_get_register(master, 1, 0x01));
-        gives!(Ok, motorlink_st_master_poll(master, 0, &mut action));
+        gives!(Ok, motorlink_st_master_poll(master, 0, &mut output));
         gives!(Ok, motorlink_st_master_receive(master, 0, reply.as_ptr(), reply.len()));
-        gives!(Ok, motorlink_st_master_poll(master, 0, &mut action));
-        assert_eq!((action.kind, action.result), (motorlink_action::Done, Error::WrongReply));
-        assert_eq!(action.value, 0);
+        gives!(Ok, motorlink_st_master_poll(master, 0, &mut output));
+        assert_eq!((output.kind, output.result), (motorlink_output::Done, Error::WrongReply));
+        assert_eq!(output.value, 0);
     }
 }
 
@@ -329,12 +329,12 @@ fn callbacks_may_change_their_table() {
         7
     }
     extern "C" fn features_and_more(context: *mut c_void, _: u8) -> u16 {
-        unsafe { (*context.cast::<motorlink_st_drive>()).read = Some(other) };
+        unsafe { (*context.cast::<motorlink_st_motor_control>()).get_register = Some(other) };
         0
     }
-    let table: *mut motorlink_st_drive = Box::into_raw(Box::new(zeroed()));
+    let table: *mut motorlink_st_motor_control = Box::into_raw(Box::new(zeroed()));
     let features = Some(features_and_more as _);
-    unsafe { *table = motorlink_st_drive { context: table.cast(), features, ..zeroed() } };
+    unsafe { *table = motorlink_st_motor_control { context: table.cast(), features, ..zeroed() } };
     let mut slave: motorlink_st_slave = zeroed();
     let mut reply: motorlink_bytes = zeroed();
     gives!(Ok, motorlink_st_slave_init(&mut slave, size_of_val(&slave), 0, 1, table));
@@ -345,11 +345,11 @@ fn callbacks_may_change_their_table() {
     drop(unsafe { Box::from_raw(table) });
 
     extern "C" fn once(context: *mut c_void, _: *const motorlink_rmd_motion) {
-        unsafe { (*context.cast::<motorlink_rmd_motor>()).set_mode = None };
+        unsafe { (*context.cast::<motorlink_rmd_motor_control>()).set_mode = None };
     }
-    let table: *mut motorlink_rmd_motor = Box::into_raw(Box::new(zeroed()));
+    let table: *mut motorlink_rmd_motor_control = Box::into_raw(Box::new(zeroed()));
     let set_mode = Some(once as _);
-    unsafe { *table = motorlink_rmd_motor { context: table.cast(), set_mode, ..zeroed() } };
+    unsafe { *table = motorlink_rmd_motor_control { context: table.cast(), set_mode, ..zeroed() } };
     let config =
         motorlink_rmd_drive_config { shutdown_us: 0, id: 1, encoder_bits: 0, clear_reply_0x9b: 0 };
     let mut drive: motorlink_rmd_drive = zeroed();
@@ -381,15 +381,15 @@ fn a_slave_that_is_called_from_its_callback_is_in_use() {
 fn storage_that_is_not_one_is_refused() {
     let mut memory = [0u64; 400];
     let (size, at): (usize, *mut u64) = (size_of_val(&memory), memory.as_mut_ptr());
-    let mut action: motorlink_st_action = zeroed();
+    let mut output: motorlink_st_output = zeroed();
     let mut deadline = 0;
     gives!(
         Uninitialised,
-        motorlink_st_master_poll(at.cast(), 0, &mut action),
+        motorlink_st_master_poll(at.cast(), 0, &mut output),
         motorlink_rmd_host_cancel(at.cast(), 0, 1),
     );
-    gives!(NullPointer, motorlink_st_master_poll(null_mut(), 0, &mut action));
-    gives!(Misaligned, motorlink_st_master_poll(at.byte_add(1).cast(), 0, &mut action));
+    gives!(NullPointer, motorlink_st_master_poll(null_mut(), 0, &mut output));
+    gives!(Misaligned, motorlink_st_master_poll(at.byte_add(1).cast(), 0, &mut output));
     gives!(
         StorageTooSmall,
         motorlink_rmd_host_init(at.cast(), size_of::<motorlink_rmd_host>() - 1)
@@ -410,7 +410,7 @@ fn a_host_commands_a_drive_through_an_adapter() {
     extern "C" fn sense(_: *mut c_void, sense: *mut motorlink_rmd_sense) {
         unsafe { (*sense).temperature_celsius = 25 };
     }
-    let mut motor: motorlink_rmd_motor = zeroed();
+    let mut motor: motorlink_rmd_motor_control = zeroed();
     motor.sense = Some(sense);
     let config =
         motorlink_rmd_drive_config { shutdown_us: 0, id: 3, encoder_bits: 0, clear_reply_0x9b: 0 };
@@ -428,7 +428,7 @@ fn a_host_commands_a_drive_through_an_adapter() {
     );
     let (mut line, mut answer): (motorlink_slcan_line, motorlink_slcan_line) = (zeroed(), zeroed());
     let mut frame: motorlink_can_frame = zeroed();
-    let (mut action, mut said): (motorlink_rmd_action, _) =
+    let (mut output, mut said): (motorlink_rmd_output, _) =
         (zeroed(), motorlink_slcan_answer::None);
     gives!(Ok, motorlink_slcan_open(1_000_000, &mut line));
     for byte in &line.bytes[..line.size.into()] {
@@ -436,8 +436,8 @@ fn a_host_commands_a_drive_through_an_adapter() {
         assert_eq!(frame.id, MOTORLINK_NO_FRAME);
     }
     gives!(Ok, motorlink_rmd_host_request(&mut host, 0, 3, motorlink_rmd_set_torque(100)));
-    gives!(Ok, motorlink_rmd_host_poll(&mut host, 0, &mut action));
-    gives!(Ok, motorlink_slcan_encode(&action.frame, &mut line));
+    gives!(Ok, motorlink_rmd_host_poll(&mut host, 0, &mut output));
+    gives!(Ok, motorlink_slcan_encode(&output.frame, &mut line));
     let mut reply: motorlink_can_frame = zeroed();
     for byte in &line.bytes[..line.size.into()] {
         gives!(Ok, motorlink_slcan_device_receive(&mut adapter, *byte, &mut answer, &mut frame));
@@ -449,34 +449,34 @@ fn a_host_commands_a_drive_through_an_adapter() {
     }
     assert_eq!(said, motorlink_slcan_answer::Frame);
     gives!(Ok, motorlink_rmd_host_receive(&mut host, 0, &frame));
-    gives!(Ok, motorlink_rmd_host_poll(&mut host, 0, &mut action));
-    assert_eq!((action.kind, action.motor, action.result), (motorlink_action::Done, 3, OK));
-    assert_eq!(motorlink_rmd_decode_motion_status(action.reply).temperature_celsius, 25);
+    gives!(Ok, motorlink_rmd_host_poll(&mut host, 0, &mut output));
+    assert_eq!((output.kind, output.motor, output.result), (motorlink_output::Done, 3, OK));
+    assert_eq!(motorlink_rmd_decode_motion_status(output.reply).temperature_celsius, 25);
     let mut motion: motorlink_rmd_motion = zeroed();
     gives!(Ok, motorlink_rmd_drive_motion(&mut drive, &mut motion));
-    assert_eq!((motion.kind, motion.torque_16ma), (2, 100));
+    assert_eq!((motion.kind, motion.iq_16ma), (motorlink_rmd_mode::Torque, 100));
 }
 
 #[test]
 fn a_motor_is_asked_for_its_status_first_unless_it_is_trusted() {
     let mut host: motorlink_rmd_host = zeroed();
-    let mut action: motorlink_rmd_action = zeroed();
+    let mut output: motorlink_rmd_output = zeroed();
     let host: *mut motorlink_rmd_host = &mut host;
     gives!(Ok, motorlink_rmd_host_init(host, size_of::<motorlink_rmd_host>()));
     gives!(Ok, motorlink_rmd_host_trust(host, !(1 << 2)));
     for (motor, code) in [(1, 0xA1), (3, 0x9A), (32, 0xA1)] {
         gives!(Ok, motorlink_rmd_host_request(host, 0, motor, motorlink_rmd_set_torque(100)));
-        gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut action));
-        assert_eq!((action.kind, action.frame.data[0]), (motorlink_action::Transmit, code));
+        gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut output));
+        assert_eq!((output.kind, output.frame.data[0]), (motorlink_output::Transmit, code));
     }
     gives!(Ok, motorlink_rmd_host_reopened(host, 0));
     gives!(Ok, motorlink_rmd_host_request(host, 0, 1, motorlink_rmd_set_torque(100)));
-    gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut action));
-    assert_eq!((action.kind, action.frame.data[0]), (motorlink_action::Transmit, 0x9A));
+    gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut output));
+    assert_eq!((output.kind, output.frame.data[0]), (motorlink_output::Transmit, 0x9A));
     // The host's own frame comes back.
-    gives!(Ok, motorlink_rmd_host_receive(host, 0, &action.frame));
-    gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut action));
-    assert_eq!((action.kind, action.result), (motorlink_action::Done, Error::Echo));
+    gives!(Ok, motorlink_rmd_host_receive(host, 0, &output.frame));
+    gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut output));
+    assert_eq!((output.kind, output.result), (motorlink_output::Done, Error::Echo));
 }
 
 #[test]

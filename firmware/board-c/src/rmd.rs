@@ -20,7 +20,7 @@ unsafe fn motor<'a>(context: *mut c_void) -> &'a mut RmdMotor {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn plant_rmd_rom(rom: *mut motorlink_rmd_settings) {
     let Settings { gains, acceleration, encoder_offset } = Plant::rmd_rom();
-    let gains = motorlink_rmd_pid {
+    let pid = motorlink_rmd_pid {
         position_kp: gains.position_kp,
         position_ki: gains.position_ki,
         speed_kp: gains.speed_kp,
@@ -29,7 +29,7 @@ unsafe extern "C" fn plant_rmd_rom(rom: *mut motorlink_rmd_settings) {
         torque_ki: gains.torque_ki,
     };
     let settings =
-        motorlink_rmd_settings { acceleration_dps2: acceleration.0, encoder_offset, gains };
+        motorlink_rmd_settings { acceleration_dps2: acceleration.0, encoder_offset, pid };
     // SAFETY: the contract of the crate.
     unsafe { *rom = settings };
 }
@@ -38,21 +38,17 @@ unsafe extern "C" fn plant_rmd_rom(rom: *mut motorlink_rmd_settings) {
 unsafe extern "C" fn plant_rmd_set_mode(context: *mut c_void, motion: *const motorlink_rmd_motion) {
     // SAFETY: the contract of the crate.
     let (motor, motion) = unsafe { (motor(context), *motion) };
-    const TORQUE: u8 = mode::Torque as u8;
-    const SPEED: u8 = mode::Speed as u8;
-    const POSITION: u8 = mode::Position as u8;
-    const STOPPED: u8 = mode::Stopped as u8;
     motor.set_mode(match motion.kind {
-        TORQUE => Mode::Torque(IqCommand(motion.torque_16ma)),
-        SPEED => Mode::Speed(CentiDps(motion.speed_centidps)),
-        POSITION => Mode::Position {
+        mode::Torque => Mode::Torque(IqCommand(motion.iq_16ma)),
+        mode::Speed => Mode::Speed(CentiDps(motion.speed_centidps)),
+        mode::Position => Mode::Position {
             target: motion.target_counts,
             // -1 is no limit.
             max_speed: u16::try_from(motion.max_speed_dps).ok().map(SpeedLimit),
             within_max_angle: motion.within_max_angle != 0,
         },
-        STOPPED => Mode::Stopped,
-        _ => Mode::Off,
+        mode::Stopped => Mode::Stopped,
+        mode::Off => Mode::Off,
     });
 }
 
@@ -92,15 +88,15 @@ unsafe extern "C" fn plant_rmd_save(context: *mut c_void, rom: *const motorlink_
 }
 
 fn from_c(settings: &motorlink_rmd_settings) -> Settings {
-    let motorlink_rmd_settings { acceleration_dps2, encoder_offset, gains } = *settings;
+    let motorlink_rmd_settings { acceleration_dps2, encoder_offset, pid } = *settings;
     Settings {
         gains: Pid {
-            position_kp: gains.position_kp,
-            position_ki: gains.position_ki,
-            speed_kp: gains.speed_kp,
-            speed_ki: gains.speed_ki,
-            torque_kp: gains.torque_kp,
-            torque_ki: gains.torque_ki,
+            position_kp: pid.position_kp,
+            position_ki: pid.position_ki,
+            speed_kp: pid.speed_kp,
+            speed_ki: pid.speed_ki,
+            torque_kp: pid.torque_kp,
+            torque_ki: pid.torque_ki,
         },
         acceleration: DpsPerSecond(acceleration_dps2),
         encoder_offset,

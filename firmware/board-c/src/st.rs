@@ -31,14 +31,19 @@ unsafe extern "C" fn plant_st_features(context: *mut c_void, motor: u8) -> u16 {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn plant_st_read(context: *mut c_void, motor: u8, reg: u8) -> i32 {
+unsafe extern "C" fn plant_st_get_register(context: *mut c_void, motor: u8, reg: u8) -> i32 {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
     drive.read(motor, RegisterId(reg))
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn plant_st_write(context: *mut c_void, motor: u8, reg: u8, value: i32) -> u8 {
+unsafe extern "C" fn plant_st_set_register(
+    context: *mut c_void,
+    motor: u8,
+    reg: u8,
+    value: i32,
+) -> u8 {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
     drive.write(motor, RegisterId(reg), value).map_or_else(u8::from, |()| 0)
@@ -52,14 +57,14 @@ unsafe extern "C" fn plant_st_execute(context: *mut c_void, motor: u8, command: 
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn plant_st_ramp(context: *mut c_void, motor: u8, speed_rpm: i32, ms: u16) {
+unsafe extern "C" fn plant_st_set_ramp(context: *mut c_void, motor: u8, speed_rpm: i32, ms: u16) {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
     drive.ramp(motor, Ramp { speed_rpm, duration_ms: ms });
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn plant_st_revup(
+unsafe extern "C" fn plant_st_get_revup_data(
     context: *mut c_void,
     motor: u8,
     phase: u8,
@@ -73,7 +78,7 @@ unsafe extern "C" fn plant_st_revup(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn plant_st_set_revup(
+unsafe extern "C" fn plant_st_set_revup_data(
     context: *mut c_void,
     motor: u8,
     phase: u8,
@@ -87,14 +92,19 @@ unsafe extern "C" fn plant_st_set_revup(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn plant_st_current(context: *mut c_void, motor: u8, iq: i16, id: i16) {
+unsafe extern "C" fn plant_st_set_current_reference(
+    context: *mut c_void,
+    motor: u8,
+    iq: i16,
+    id: i16,
+) {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
     drive.current_reference(motor, CurrentReference { iq_s16a: iq, id_s16a: id });
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn plant_st_torque_ramp(
+unsafe extern "C" fn plant_st_set_torque_ramp(
     context: *mut c_void,
     motor: u8,
     torque_s16a: i32,
@@ -106,7 +116,7 @@ unsafe extern "C" fn plant_st_torque_ramp(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn plant_st_position(
+unsafe extern "C" fn plant_st_set_position(
     context: *mut c_void,
     motor: u8,
     angle_rad: f32,

@@ -35,17 +35,17 @@ pub extern "C" fn probe() -> ! {
         motorlink_st_master_get_register
         motorlink_st_master_set_register
         motorlink_st_master_execute
-        motorlink_st_master_ramp
-        motorlink_st_master_current
-        motorlink_st_master_torque_ramp
-        motorlink_st_master_move
-        motorlink_st_master_revup
-        motorlink_st_master_set_revup
-        motorlink_st_master_board_info
-        motorlink_st_master_firmware_version
+        motorlink_st_master_set_ramp
+        motorlink_st_master_set_current_reference
+        motorlink_st_master_set_torque_ramp
+        motorlink_st_master_set_position
+        motorlink_st_master_get_revup_data
+        motorlink_st_master_set_revup_data
+        motorlink_st_master_get_board_info
+        motorlink_st_master_get_firmware_version
         motorlink_st_master_configure_segment
-        motorlink_st_master_read_segment
-        motorlink_st_master_profiler_info
+        motorlink_st_master_get_segment
+        motorlink_st_master_get_profiler_info
         motorlink_st_master_raw
         motorlink_st_master_poll
         motorlink_st_master_receive
@@ -53,9 +53,9 @@ pub extern "C" fn probe() -> ! {
         motorlink_st_master_lost
         motorlink_st_longest_transmission_us
         motorlink_st_decode_segment
-        motorlink_st_register_name
-        motorlink_st_register_unit
-        motorlink_st_refusal_name
+        motorlink_st_reg_name
+        motorlink_st_reg_unit
+        motorlink_st_error_code_name
         motorlink_st_status_name
         motorlink_st_command_name
         motorlink_st_master_reopened
@@ -63,7 +63,7 @@ pub extern "C" fn probe() -> ! {
         motorlink_st_master_is_lost
         motorlink_st_decode_board_info
         motorlink_st_decode_firmware_version
-        motorlink_st_decode_revup
+        motorlink_st_decode_revup_data
         motorlink_st_slave_init
         motorlink_st_slave_receive
         motorlink_st_slave_poll

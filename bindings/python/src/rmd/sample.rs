@@ -94,9 +94,7 @@ pub(super) fn sample(
             Ok(())
         }
         Err(error) if skip && error.is_line_failure() => Ok(()),
-        Err(Error::Port(PortError::Overtaken { .. })) => {
-            Python::attach(&look)
-        }
+        Err(Error::Port(PortError::Overtaken { .. })) => Python::attach(&look),
         Err(error) => Err(Python::attach(|py| rmd_error(py, &error))),
     });
     (rows, outcome)

@@ -25,7 +25,7 @@ pub enum motorlink_rmd_mode {
     Off = 0,
     /// Brought to a stand and kept there.
     Stopped = 1,
-    /// Holds `torque_16ma`.
+    /// Holds `iq_16ma`.
     Torque = 2,
     /// Holds `speed_centidps`.
     Speed = 3,
@@ -44,11 +44,11 @@ pub struct motorlink_rmd_motion {
     /// `POSITION`: greatest speed on the way, °/s; -1 leaves it to the drive's own.
     pub max_speed_dps: i32,
     /// `TORQUE`: torque current, 0.016 A a digit, -2000 to 2000.
-    pub torque_16ma: i16,
+    pub iq_16ma: i16,
     /// `POSITION`: 1 where the drive's greatest angle holds, 0 for angles within the turn.
     pub within_max_angle: u8,
-    /// One of `motorlink_rmd_mode`.
-    pub kind: u8,
+    /// Which of them it is.
+    pub kind: motorlink_rmd_mode,
 }
 
 /// What the sensors read.
@@ -68,7 +68,7 @@ pub struct motorlink_rmd_sense {
     pub phase_digits: [i16; 3],
     /// Motor temperature, °C.
     pub temperature_celsius: i8,
-    /// Faults that are present now, a sum of `MOTORLINK_RMD_FAULT_*`; the drive latches them.
+    /// Faults that are present now, a sum of `MOTORLINK_RMD_ERROR_*`; the drive latches them.
     pub faults: u8,
 }
 
@@ -81,7 +81,7 @@ pub struct motorlink_rmd_settings {
     /// Encoder value that is zero, as it travels: at most 16 bits.
     pub encoder_offset: u16,
     /// Gains of the three loops.
-    pub gains: motorlink_rmd_pid,
+    pub pid: motorlink_rmd_pid,
 }
 
 /// What the vendor's tool or a switch sets, not the bus.
@@ -108,7 +108,7 @@ pub struct motorlink_rmd_drive_config {
 /// passes, and fails with `--readings strict`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
-pub struct motorlink_rmd_motor {
+pub struct motorlink_rmd_motor_control {
     /// Handed to each callback.
     pub context: *mut c_void,
     /// Does this from now on. NULL: without effect.
@@ -132,12 +132,12 @@ pub struct motorlink_rmd_motor {
     pub save: Option<extern "C" fn(context: *mut c_void, rom: *const motorlink_rmd_settings)>,
 }
 
-plain!(motorlink_rmd_settings, motorlink_rmd_drive_config, motorlink_rmd_motor);
+plain!(motorlink_rmd_settings, motorlink_rmd_drive_config, motorlink_rmd_motor_control);
 
 /// What the storage of a drive holds.
 pub(crate) struct State {
     drive: Drive,
-    motor: Kept<motorlink_rmd_motor>,
+    motor: Kept<motorlink_rmd_motor_control>,
 }
 
 storage!(motorlink_rmd_drive: State, tag::RMD_DRIVE);
@@ -148,15 +148,15 @@ impl From<Mode> for motorlink_rmd_motion {
             target_counts: 0,
             speed_centidps: 0,
             max_speed_dps: 0,
-            torque_16ma: 0,
+            iq_16ma: 0,
             within_max_angle: 0,
-            kind: 0,
+            kind: motorlink_rmd_mode::Off,
         };
         let kind = match mode {
             Mode::Off => motorlink_rmd_mode::Off,
             Mode::Stopped => motorlink_rmd_mode::Stopped,
             Mode::Torque(torque) => {
-                all.torque_16ma = torque.0;
+                all.iq_16ma = torque.0;
                 motorlink_rmd_mode::Torque
             }
             Mode::Speed(speed) => {
@@ -170,7 +170,7 @@ impl From<Mode> for motorlink_rmd_motion {
                 motorlink_rmd_mode::Position
             }
         };
-        motorlink_rmd_motion { kind: kind as u8, ..all }
+        motorlink_rmd_motion { kind, ..all }
     }
 }
 
@@ -179,7 +179,7 @@ impl From<&Settings> for motorlink_rmd_settings {
         motorlink_rmd_settings {
             acceleration_dps2: settings.acceleration.0,
             encoder_offset: settings.encoder_offset,
-            gains: settings.gains.into(),
+            pid: settings.gains.into(),
         }
     }
 }
@@ -187,14 +187,14 @@ impl From<&Settings> for motorlink_rmd_settings {
 impl From<motorlink_rmd_settings> for Settings {
     fn from(settings: motorlink_rmd_settings) -> Self {
         Settings {
-            gains: settings.gains.into(),
+            gains: settings.pid.into(),
             acceleration: DpsPerSecond(settings.acceleration_dps2),
             encoder_offset: settings.encoder_offset,
         }
     }
 }
 
-impl MotorControl for Kept<motorlink_rmd_motor> {
+impl MotorControl for Kept<motorlink_rmd_motor_control> {
     fn set_mode(&mut self, mode: Mode) {
         let motor = self.now();
         if let Some(call) = motor.set_mode {
@@ -257,7 +257,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_init(
     size: usize,
     config: *const motorlink_rmd_drive_config,
     rom: *const motorlink_rmd_settings,
-    motor: *const motorlink_rmd_motor,
+    motor: *const motorlink_rmd_motor_control,
 ) -> motorlink_error {
     promised!(drive, config, rom, motor);
     answer(|| {
@@ -363,7 +363,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_motion(
     })
 }
 
-/// The latched errors, a sum of `MOTORLINK_RMD_FAULT_*`.
+/// The latched errors, a sum of `MOTORLINK_RMD_ERROR_*`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_errors(
     drive: *mut motorlink_rmd_drive,

@@ -8,7 +8,7 @@ use motorlink_proto::units::{CentiDegrees, IqCommand, SpeedLimit};
 
 use super::message::motorlink_rmd_data;
 use super::motorlink_rmd_host;
-use crate::bytes::{MOTORLINK_NEVER, motorlink_action};
+use crate::bytes::{MOTORLINK_NEVER, motorlink_output};
 use crate::error::{answer, motorlink_error};
 use crate::frame::{NO_FRAME, motorlink_can_frame};
 use crate::pointer::{plain, promised, storage};
@@ -22,7 +22,7 @@ pub const MOTORLINK_RMD_NO_LIMIT: i32 = -1;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct motorlink_rmd_limits {
     /// Greatest torque current of 0xA1 and 0x280, 0.016 A a digit, or `MOTORLINK_RMD_NO_LIMIT`.
-    pub torque_16ma: i32,
+    pub current_16ma: i32,
     /// Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_RMD_NO_LIMIT`. 0xA3 and 0xA5
     /// carry no speed and are refused while this is set, as are 0xA4 and 0xA6 with 0. A torque
     /// command has no speed, and the motor turns as fast as its load allows.
@@ -34,7 +34,7 @@ pub struct motorlink_rmd_limits {
 /// What to do next, or what became of an exchange.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
-pub struct motorlink_rmd_action {
+pub struct motorlink_rmd_output {
     /// `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
     pub until_us: u64,
     /// `TRANSMIT`: the frame to send.
@@ -44,7 +44,7 @@ pub struct motorlink_rmd_action {
     /// `DONE`: what became of the exchange.
     pub result: motorlink_error,
     /// What this is: `WAIT`, `TRANSMIT` or `DONE`.
-    pub kind: motorlink_action,
+    pub kind: motorlink_output,
     /// `DONE`: the motor, 1 to 32.
     pub motor: u8,
 }
@@ -78,7 +78,7 @@ impl State {
     }
 }
 
-/// Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of quarantine time, no
+/// Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of quarantine, no
 /// limits. `size` is `sizeof *host`. Former hosts may have asked the motors anything;
 /// `motorlink_rmd_host_trust` says that they did not.
 #[unsafe(no_mangle)]
@@ -96,13 +96,13 @@ pub unsafe extern "C" fn motorlink_rmd_host_init(
 pub unsafe extern "C" fn motorlink_rmd_host_set_times(
     host: *mut motorlink_rmd_host,
     timeout_us: u32,
-    guard_us: u32,
+    quarantine_us: u32,
 ) -> motorlink_error {
     promised!(host);
     answer(|| {
         let mut state = host.enter()?;
         state.host.set_timeout(Micros(timeout_us.into()));
-        state.host.set_quarantine(Micros(guard_us.into()));
+        state.host.set_quarantine(Micros(quarantine_us.into()));
         Ok(())
     })
 }
@@ -131,7 +131,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_limits(
     answer(|| {
         let limits = limits.read()?;
         let limits = Limits {
-            current: limit(limits.torque_16ma)?.map(IqCommand),
+            current: limit(limits.current_16ma)?.map(IqCommand),
             speed: limit(limits.speed_dps)?.map(SpeedLimit),
             angle: limit(limits.angle_centidegrees)?.map(CentiDegrees),
         };
@@ -179,12 +179,12 @@ pub unsafe extern "C" fn motorlink_rmd_host_request(
 pub unsafe extern "C" fn motorlink_rmd_host_set_torque4(
     host: *mut motorlink_rmd_host,
     now_us: u64,
-    torques_16ma: *const i16,
+    iq_16ma: *const i16,
     expect: u8,
 ) -> motorlink_error {
-    promised!(host, torques_16ma);
+    promised!(host, iq_16ma);
     answer(|| {
-        let &[one, two, three, four] = torques_16ma.slice(4)? else {
+        let &[one, two, three, four] = iq_16ma.slice(4)? else {
             return Err(motorlink_error::BadArgument);
         };
         if expect > 0b1111 {
@@ -219,39 +219,39 @@ pub unsafe extern "C" fn motorlink_rmd_host_retry(
 pub unsafe extern "C" fn motorlink_rmd_host_poll(
     host: *mut motorlink_rmd_host,
     now_us: u64,
-    action: *mut motorlink_rmd_action,
+    output: *mut motorlink_rmd_output,
 ) -> motorlink_error {
-    promised!(host, action);
+    promised!(host, output);
     answer(|| {
-        let place = action.place()?;
-        let mut action = motorlink_rmd_action {
+        let place = output.place()?;
+        let mut output = motorlink_rmd_output {
             until_us: MOTORLINK_NEVER,
             frame: NO_FRAME,
             reply: motorlink_rmd_data { bytes: [0; 8] },
             result: motorlink_error::Ok,
-            kind: motorlink_action::Wait,
+            kind: motorlink_output::Wait,
             motor: 0,
         };
         match host.enter()?.host.poll(Instant(now_us)) {
-            Output::Wait(until) => action.until_us = until.map_or(MOTORLINK_NEVER, |at| at.0),
+            Output::Wait(until) => output.until_us = until.map_or(MOTORLINK_NEVER, |at| at.0),
             Output::Transmit(frame) => {
-                action.kind = motorlink_action::Transmit;
-                action.frame = frame.into();
+                output.kind = motorlink_output::Transmit;
+                output.frame = frame.into();
             }
             Output::Done { id, result } => {
-                action.kind = motorlink_action::Done;
-                action.motor = id.number();
+                output.kind = motorlink_output::Done;
+                output.motor = id.number();
                 match result {
-                    Ok(bytes) => action.reply = motorlink_rmd_data { bytes },
-                    Err(Failure::Foreign(_)) => action.result = motorlink_error::Foreign,
-                    Err(Failure::Altered) => action.result = motorlink_error::Altered,
-                    Err(Failure::Quarantined) => action.result = motorlink_error::Quarantined,
-                    Err(Failure::Echo) => action.result = motorlink_error::Echo,
-                    Err(_) => action.result = motorlink_error::Timeout,
+                    Ok(bytes) => output.reply = motorlink_rmd_data { bytes },
+                    Err(Failure::Foreign(_)) => output.result = motorlink_error::Foreign,
+                    Err(Failure::Altered) => output.result = motorlink_error::Altered,
+                    Err(Failure::Quarantined) => output.result = motorlink_error::Quarantined,
+                    Err(Failure::Echo) => output.result = motorlink_error::Echo,
+                    Err(_) => output.result = motorlink_error::Timeout,
                 }
             }
         }
-        place.set(action);
+        place.set(output);
         Ok(())
     })
 }

@@ -12,6 +12,8 @@ use motorlink_proto::units::{
     CentiDegrees, CentiDps, DpsPerSecond, IqCommand, SpeedLimit, TurnCentiDegrees,
 };
 
+use crate::number::motorlink_rmd_spin_direction;
+
 /// The eight bytes of a request or a reply.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +55,7 @@ pub struct motorlink_rmd_status {
     pub voltage_decivolts: u16,
     /// Motor temperature, °C.
     pub temperature_celsius: i8,
-    /// Which protections are active: a sum of `MOTORLINK_RMD_FAULT_*`.
+    /// Which protections are active: a sum of `MOTORLINK_RMD_ERROR_*`.
     pub errors: u8,
 }
 
@@ -76,11 +78,11 @@ pub struct motorlink_rmd_motion_status {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct motorlink_rmd_phase_currents {
     /// Phase A, 1/64 A a digit.
-    pub a_digits: i16,
+    pub phase_a_digits: i16,
     /// Phase B, 1/64 A a digit.
-    pub b_digits: i16,
+    pub phase_b_digits: i16,
     /// Phase C, 1/64 A a digit.
-    pub c_digits: i16,
+    pub phase_c_digits: i16,
 }
 
 impl From<Pid> for motorlink_rmd_pid {
@@ -188,14 +190,14 @@ pub extern "C" fn motorlink_rmd_run() -> motorlink_rmd_data {
 
 /// Request 0x31: sets the gains until power-off.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_write_pid_ram(gains: motorlink_rmd_pid) -> motorlink_rmd_data {
-    data(WritePidRam(gains.into()))
+pub extern "C" fn motorlink_rmd_write_pid_ram(pid: motorlink_rmd_pid) -> motorlink_rmd_data {
+    data(WritePidRam(pid.into()))
 }
 
 /// Request 0x32: sets the gains for good. Wears the ROM.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_write_pid_rom(gains: motorlink_rmd_pid) -> motorlink_rmd_data {
-    data(WritePidRom(gains.into()))
+pub extern "C" fn motorlink_rmd_write_pid_rom(pid: motorlink_rmd_pid) -> motorlink_rmd_data {
+    data(WritePidRom(pid.into()))
 }
 
 /// Request 0x34: sets the acceleration limit, °/s², until power-off.
@@ -214,8 +216,8 @@ pub extern "C" fn motorlink_rmd_write_encoder_offset_rom(offset: u16) -> motorli
 
 /// Request 0xA1: holds a torque current, 0.016 A a digit, -2000 to 2000.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_rmd_set_torque(torque_16ma: i16) -> motorlink_rmd_data {
-    data(SetTorque { iq: IqCommand(torque_16ma) })
+pub extern "C" fn motorlink_rmd_set_torque(iq_16ma: i16) -> motorlink_rmd_data {
+    data(SetTorque { iq: IqCommand(iq_16ma) })
 }
 
 /// Request 0xA2: holds a speed, 0.01 °/s a digit, positive is clockwise.
@@ -242,10 +244,10 @@ pub extern "C" fn motorlink_rmd_set_position_limited(
     })
 }
 
-/// Request 0xA5: turns to an angle within the turn, 0.01° a digit, 0 to 35999, in a direction of `motorlink_rmd_spin`.
+/// Request 0xA5: turns to an angle within the turn, 0.01° a digit, 0 to 35999.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_rmd_set_single_turn_position(
-    direction: u8,
+    direction: motorlink_rmd_spin_direction,
     angle_centidegrees: u16,
 ) -> motorlink_rmd_data {
     data(SetSingleTurnPosition {
@@ -257,7 +259,7 @@ pub extern "C" fn motorlink_rmd_set_single_turn_position(
 /// Request 0xA6: as 0xA5, no faster than a limit, °/s.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_rmd_set_single_turn_position_limited(
-    direction: u8,
+    direction: motorlink_rmd_spin_direction,
     angle_centidegrees: u16,
     max_speed_dps: u16,
 ) -> motorlink_rmd_data {
@@ -336,7 +338,11 @@ pub extern "C" fn motorlink_rmd_decode_phase_currents(
     reply: motorlink_rmd_data,
 ) -> motorlink_rmd_phase_currents {
     let PhaseCurrents { phase_a, phase_b, phase_c } = PhaseCurrents::decode(&reply.bytes);
-    motorlink_rmd_phase_currents { a_digits: phase_a.0, b_digits: phase_b.0, c_digits: phase_c.0 }
+    motorlink_rmd_phase_currents {
+        phase_a_digits: phase_a.0,
+        phase_b_digits: phase_b.0,
+        phase_c_digits: phase_c.0,
+    }
 }
 
 /// An encoder value of a reply as an angle, 0.01° a digit; `encoder_bits` is the encoder's width,

@@ -7,24 +7,11 @@ use motorlink_proto::st::{
 use motorlink_proto::time::{Instant, Micros};
 
 use super::motorlink_st_master;
-use super::profile::{motorlink_st_profile, profile};
-use crate::bytes::{MOTORLINK_NEVER, motorlink_action, motorlink_bytes};
+use crate::bytes::{MOTORLINK_NEVER, motorlink_bytes, motorlink_output};
 use crate::error::{answer, motorlink_error};
+use crate::number::{motorlink_st_error_code, motorlink_st_profile, motorlink_st_recovery, one_of};
 use crate::pointer::{plain, promised, storage};
 use crate::tag;
-
-/// How a line is brought in step that was just opened, or on which an exchange failed.
-#[repr(u8)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum motorlink_st_recovery {
-    /// Not by itself: the line counts as in step until it is lost, and
-    /// `motorlink_st_master_trust_line` says that it is so again.
-    None = 0,
-    /// Waits for silence, asks a question, goes on when it was answered.
-    Drain = 1,
-    /// As `DRAIN`, behind bytes that complete a frame which a 5.x drive may still be waiting for.
-    Pad = 2,
-}
 
 /// How a master behaves.
 #[repr(C)]
@@ -34,16 +21,16 @@ pub struct motorlink_st_master_config {
     pub timeout_us: u32,
     /// The silence after which nothing more is expected to come, µs.
     pub quiet_us: u32,
-    /// How the drive behaves: one of `motorlink_st_profile`.
-    pub profile: u8,
-    /// How a lost line comes back: one of `motorlink_st_recovery`.
-    pub recovery: u8,
+    /// How the drive behaves.
+    pub profile: motorlink_st_profile,
+    /// How a lost line comes back.
+    pub recovery: motorlink_st_recovery,
 }
 
 /// What to do next, or what became of the exchange.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
-pub struct motorlink_st_action {
+pub struct motorlink_st_output {
     /// `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
     pub until_us: u64,
     /// `TRANSMIT`: what to send. `DONE`: the payload of the reply. They belong to the master, until
@@ -56,10 +43,10 @@ pub struct motorlink_st_action {
     /// value. 0 for anything else.
     pub value: i32,
     /// What this is: `WAIT`, `TRANSMIT` or `DONE`.
-    pub kind: motorlink_action,
-    /// `DONE` with `REFUSED` or `NOT_UNDERSTOOD`: one of `motorlink_st_refusal`, or a number that
-    /// the document does not name.
-    pub refusal: u8,
+    pub kind: motorlink_output,
+    /// `DONE` with `REFUSED` or `NOT_UNDERSTOOD`: why, which may be a number that the document does
+    /// not name.
+    pub error_code: motorlink_st_error_code,
 }
 
 plain!(motorlink_st_master_config);
@@ -77,12 +64,12 @@ storage!(motorlink_st_master: State, tag::ST_MASTER);
 /// The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_st_master_defaults() -> motorlink_st_master_config {
-    let MasterConfig { timeout, quiet, .. } = MasterConfig::default();
+    let MasterConfig { timeout, quiet, profile, recovery } = MasterConfig::default();
     motorlink_st_master_config {
         timeout_us: timeout.0 as u32,
         quiet_us: quiet.0 as u32,
-        profile: motorlink_st_profile::Spec as u8,
-        recovery: motorlink_st_recovery::Drain as u8,
+        profile: profile as u8,
+        recovery: recovery as u8,
     }
 }
 
@@ -102,27 +89,15 @@ pub unsafe extern "C" fn motorlink_st_master_init(
     promised!(master, config);
     answer(|| {
         let config = config.read_optional()?.unwrap_or_else(|| motorlink_st_master_defaults());
-        let profile = self::profile(config.profile)?;
+        let profile = one_of(&Profile::ALL, config.profile)?;
         let config = MasterConfig {
             timeout: Micros(config.timeout_us.into()),
-            recovery: recovery(config.recovery)?,
+            recovery: one_of(&Recovery::ALL, config.recovery)?,
             quiet: Micros(config.quiet_us.into()),
             profile,
         };
         master.init(size, State { master: Master::new(config), profile, asked: None })
     })
-}
-
-fn recovery(number: u8) -> Result<Recovery, motorlink_error> {
-    const NONE: u8 = motorlink_st_recovery::None as u8;
-    const DRAIN: u8 = motorlink_st_recovery::Drain as u8;
-    const PAD: u8 = motorlink_st_recovery::Pad as u8;
-    match number {
-        NONE => Ok(Recovery::None),
-        DRAIN => Ok(Recovery::Drain),
-        PAD => Ok(Recovery::Pad),
-        _ => Err(motorlink_error::BadArgument),
-    }
 }
 
 /// How long the longest thing that a master sends takes at `baud`, µs. Where the port takes bytes
@@ -138,48 +113,48 @@ pub extern "C" fn motorlink_st_longest_transmission_us(baud: u32) -> u64 {
 pub unsafe extern "C" fn motorlink_st_master_poll(
     master: *mut motorlink_st_master,
     now_us: u64,
-    action: *mut motorlink_st_action,
+    output: *mut motorlink_st_output,
 ) -> motorlink_error {
-    promised!(master, action);
+    promised!(master, output);
     answer(|| {
-        let place = action.place()?;
+        let place = output.place()?;
         let mut state = master.enter()?;
         let (asked, profile) = (state.asked, state.profile);
-        let mut action = motorlink_st_action {
+        let mut output = motorlink_st_output {
             until_us: MOTORLINK_NEVER,
             bytes: (&[][..]).into(),
             result: motorlink_error::Ok,
             value: 0,
-            kind: motorlink_action::Wait,
-            refusal: 0,
+            kind: motorlink_output::Wait,
+            error_code: 0,
         };
         match state.master.poll(Instant(now_us)) {
-            Output::Wait(until) => action.until_us = until.map_or(MOTORLINK_NEVER, |at| at.0),
+            Output::Wait(until) => output.until_us = until.map_or(MOTORLINK_NEVER, |at| at.0),
             Output::Transmit(bytes) => {
-                action.kind = motorlink_action::Transmit;
-                action.bytes = bytes.into();
+                output.kind = motorlink_output::Transmit;
+                output.bytes = bytes.into();
             }
             Output::Done(result) => {
-                action.kind = motorlink_action::Done;
+                output.kind = motorlink_output::Done;
                 match result {
                     Ok(payload) => {
-                        action.bytes = payload.into();
+                        output.bytes = payload.into();
                         match asked.map(|register| register.decode(profile, payload)) {
-                            Some(Some(value)) => action.value = value,
-                            Some(None) => action.result = motorlink_error::WrongReply,
+                            Some(Some(value)) => output.value = value,
+                            Some(None) => output.result = motorlink_error::WrongReply,
                             None => {}
                         }
                     }
-                    Err(error) => (action.result, action.refusal) = failed(error),
+                    Err(error) => (output.result, output.error_code) = failed(error),
                 }
             }
         }
-        place.set(action);
+        place.set(output);
         Ok(())
     })
 }
 
-fn failed(error: ExchangeError) -> (motorlink_error, u8) {
+fn failed(error: ExchangeError) -> (motorlink_error, motorlink_st_error_code) {
     let failure = match error {
         ExchangeError::Refused(code) => return (motorlink_error::Refused, code.number()),
         ExchangeError::Failed(failure) => failure,

@@ -5,6 +5,7 @@ use core::ffi::c_char;
 use motorlink_proto::st::{BoardInfo, FirmwareVersion, Profile, RegisterId, RevupPhase};
 
 use crate::error::{answer, motorlink_error};
+use crate::number::motorlink_st_reg;
 use crate::pointer::{In, plain, promised};
 
 /// A phase of the rev-up (4.9).
@@ -72,7 +73,7 @@ fn terminated(text: &str) -> [c_char; MOTORLINK_ST_TEXT_SIZE] {
     out
 }
 
-/// Reads the payload of an answer to `motorlink_st_master_board_info`.
+/// Reads the payload of an answer to `motorlink_st_master_get_board_info`.
 ///
 /// `BAD_ARGUMENT`: the payload is too short to be one.
 #[unsafe(no_mangle)]
@@ -93,7 +94,7 @@ pub unsafe extern "C" fn motorlink_st_decode_board_info(
     })
 }
 
-/// Reads the payload of an answer to `motorlink_st_master_firmware_version`. Texts that are not
+/// Reads the payload of an answer to `motorlink_st_master_get_firmware_version`. Texts that are not
 /// UTF-8 are cut there.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_decode_firmware_version(
@@ -111,11 +112,11 @@ pub unsafe extern "C" fn motorlink_st_decode_firmware_version(
     })
 }
 
-/// Reads the payload of an answer to `motorlink_st_master_revup`.
+/// Reads the payload of an answer to `motorlink_st_master_get_revup_data`.
 ///
 /// `BAD_ARGUMENT`: the payload is too short to be one.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_decode_revup(
+pub unsafe extern "C" fn motorlink_st_decode_revup_data(
     payload: *const u8,
     size: usize,
     phase: *mut motorlink_st_revup_phase,
@@ -129,16 +130,16 @@ pub unsafe extern "C" fn motorlink_st_decode_revup(
     })
 }
 
-/// Reads the payload of an answer to `motorlink_st_master_read_segment`: the values of the `count`
+/// Reads the payload of an answer to `motorlink_st_master_get_segment`: the values of the `count`
 /// registers that the segment was configured with, in the same order, into as many `values`, each
-/// as in `motorlink_st_action`.
+/// as in `motorlink_st_output`.
 ///
 /// `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are left alone.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_decode_segment(
     payload: *const u8,
     size: usize,
-    registers: *const u8,
+    registers: *const motorlink_st_reg,
     count: usize,
     values: *mut i32,
 ) -> motorlink_error {

@@ -3,7 +3,6 @@
 pub mod master;
 pub mod message;
 pub mod names;
-pub mod profile;
 pub mod request;
 pub mod slave;
 

@@ -3,6 +3,9 @@
 use motorlink_proto::st::{Command, ErrorCode, RegisterId, Status};
 
 use crate::bytes::motorlink_bytes;
+use crate::number::{
+    motorlink_st_command, motorlink_st_error_code, motorlink_st_reg, motorlink_st_status,
+};
 
 fn text(text: Option<&'static str>) -> motorlink_bytes {
     text.unwrap_or_default().as_bytes().into()
@@ -11,30 +14,32 @@ fn text(text: Option<&'static str>) -> motorlink_bytes {
 /// The name of a register, UTF-8 without a NUL, constant: `printf("%.*s", (int)size, data)`. Empty
 /// for a number that nobody names, as all names here.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_st_register_name(reg: u8) -> motorlink_bytes {
+pub extern "C" fn motorlink_st_reg_name(reg: motorlink_st_reg) -> motorlink_bytes {
     text(RegisterId(reg).text().map(|text| text.name))
 }
 
 /// The symbol of the unit of a register's value; empty where there is none.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_st_register_unit(reg: u8) -> motorlink_bytes {
+pub extern "C" fn motorlink_st_reg_unit(reg: motorlink_st_reg) -> motorlink_bytes {
     text(RegisterId(reg).shape().map(|shape| shape.unit.symbol()))
 }
 
-/// The name of a `motorlink_st_refusal`.
+/// The name of an error code.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_st_refusal_name(refusal: u8) -> motorlink_bytes {
-    text(ErrorCode::from(refusal).name())
+pub extern "C" fn motorlink_st_error_code_name(
+    error_code: motorlink_st_error_code,
+) -> motorlink_bytes {
+    text(ErrorCode::from(error_code).name())
 }
 
-/// The name of a `motorlink_st_status`.
+/// The name of a state.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_st_status_name(status: u8) -> motorlink_bytes {
+pub extern "C" fn motorlink_st_status_name(status: motorlink_st_status) -> motorlink_bytes {
     text(Status::from(status).name())
 }
 
-/// The name of a `motorlink_st_command`.
+/// The name of a command.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_st_command_name(command: u8) -> motorlink_bytes {
+pub extern "C" fn motorlink_st_command_name(command: motorlink_st_command) -> motorlink_bytes {
     text(Command::from(command).name())
 }

@@ -1,14 +1,15 @@
 //! What a master asks: every function begins an exchange.
 
 use motorlink_proto::st::{
-    Command, CurrentReference, MotorNumber, PositionMove, REVUP_PHASES, Ramp, RegisterId, Request,
-    RequestError, TorqueRamp,
+    Command, CurrentReference, Frame, MotorNumber, PositionMove, REVUP_PHASES, Ramp, RegisterId,
+    Request, RequestError, TorqueRamp,
 };
 
 use super::master::State;
 use super::message::motorlink_st_revup_phase;
 use super::motorlink_st_master;
 use crate::error::{answer, motorlink_error};
+use crate::number::{motorlink_st_command, motorlink_st_frame_code, motorlink_st_reg};
 use crate::pointer::{Out, promised};
 
 /// Begins an exchange.
@@ -48,7 +49,7 @@ fn refused(error: RequestError) -> motorlink_error {
 pub unsafe extern "C" fn motorlink_st_master_get_register(
     master: *mut motorlink_st_master,
     motor: u8,
-    reg: u8,
+    reg: motorlink_st_reg,
 ) -> motorlink_error {
     promised!(master);
     answer(|| request(master, motor, &Request::GetRegister(RegisterId(reg))))
@@ -60,7 +61,7 @@ pub unsafe extern "C" fn motorlink_st_master_get_register(
 pub unsafe extern "C" fn motorlink_st_master_set_register(
     master: *mut motorlink_st_master,
     motor: u8,
-    reg: u8,
+    reg: motorlink_st_reg,
     value: i32,
 ) -> motorlink_error {
     promised!(master);
@@ -74,12 +75,12 @@ pub unsafe extern "C" fn motorlink_st_master_set_register(
     })
 }
 
-/// Begins to have a command executed, one of `motorlink_st_command`. Any number is taken.
+/// Begins to have a command executed. Any number is taken.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_execute(
     master: *mut motorlink_st_master,
     motor: u8,
-    command: u8,
+    command: motorlink_st_command,
 ) -> motorlink_error {
     promised!(master);
     answer(|| request(master, motor, &Request::ExecuteCommand(Command::from(command))))
@@ -87,7 +88,7 @@ pub unsafe extern "C" fn motorlink_st_master_execute(
 
 /// Begins to program a speed ramp (4.8): to `speed_rpm` in `duration_ms`; 0 ms is a step.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_ramp(
+pub unsafe extern "C" fn motorlink_st_master_set_ramp(
     master: *mut motorlink_st_master,
     motor: u8,
     speed_rpm: i32,
@@ -99,7 +100,7 @@ pub unsafe extern "C" fn motorlink_st_master_ramp(
 
 /// Begins to set the references of Iq and Id (4.11), s16A digits.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_current(
+pub unsafe extern "C" fn motorlink_st_master_set_current_reference(
     master: *mut motorlink_st_master,
     motor: u8,
     iq_s16a: i16,
@@ -113,7 +114,7 @@ pub unsafe extern "C" fn motorlink_st_master_current(
 /// Begins to program a torque ramp (profile MCSDK 5.4): to `torque_s16a` in `duration_ms`; 0 ms is
 /// a step.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_torque_ramp(
+pub unsafe extern "C" fn motorlink_st_master_set_torque_ramp(
     master: *mut motorlink_st_master,
     motor: u8,
     torque_s16a: i32,
@@ -129,7 +130,7 @@ pub unsafe extern "C" fn motorlink_st_master_torque_ramp(
 ///
 /// `BAD_ARGUMENT`: `motor` is over 7, or a value is not finite.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_move(
+pub unsafe extern "C" fn motorlink_st_master_set_position(
     master: *mut motorlink_st_master,
     motor: u8,
     angle_rad: f32,
@@ -144,11 +145,11 @@ pub unsafe extern "C" fn motorlink_st_master_move(
     })
 }
 
-/// Begins to read rev-up phase 0 to 4 (4.9); `motorlink_st_decode_revup` reads the result.
+/// Begins to read rev-up phase 0 to 4 (4.9); `motorlink_st_decode_revup_data` reads the result.
 ///
 /// `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_revup(
+pub unsafe extern "C" fn motorlink_st_master_get_revup_data(
     master: *mut motorlink_st_master,
     motor: u8,
     phase: u8,
@@ -165,7 +166,7 @@ fn check_phase(phase: u8) -> Result<u8, motorlink_error> {
 ///
 /// `BAD_ARGUMENT`: `motor` is over 7, or `phase` over 4.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_set_revup(
+pub unsafe extern "C" fn motorlink_st_master_set_revup_data(
     master: *mut motorlink_st_master,
     motor: u8,
     phase: u8,
@@ -181,7 +182,7 @@ pub unsafe extern "C" fn motorlink_st_master_set_revup(
 /// Begins to read the SDK's version and name (4.7); `motorlink_st_decode_board_info` reads the
 /// result.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_board_info(
+pub unsafe extern "C" fn motorlink_st_master_get_board_info(
     master: *mut motorlink_st_master,
     motor: u8,
 ) -> motorlink_error {
@@ -192,7 +193,7 @@ pub unsafe extern "C" fn motorlink_st_master_board_info(
 /// Begins to read the firmware's version (4.12); `motorlink_st_decode_firmware_version` reads the
 /// result.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_firmware_version(
+pub unsafe extern "C" fn motorlink_st_master_get_firmware_version(
     master: *mut motorlink_st_master,
     motor: u8,
 ) -> motorlink_error {
@@ -209,7 +210,7 @@ pub unsafe extern "C" fn motorlink_st_master_configure_segment(
     master: *mut motorlink_st_master,
     motor: u8,
     segment: u8,
-    registers: *const u8,
+    registers: *const motorlink_st_reg,
     count: usize,
 ) -> motorlink_error {
     promised!(master, registers);
@@ -222,7 +223,7 @@ pub unsafe extern "C" fn motorlink_st_master_configure_segment(
 /// Begins to read a data segment (profile SPEC): the values of its registers, one behind the other,
 /// little-endian, in the size that each has.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_read_segment(
+pub unsafe extern "C" fn motorlink_st_master_get_segment(
     master: *mut motorlink_st_master,
     motor: u8,
     segment: u8,
@@ -236,7 +237,7 @@ pub unsafe extern "C" fn motorlink_st_master_read_segment(
 ///
 /// `TOO_LONG`: over 128 steps.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn motorlink_st_master_profiler_info(
+pub unsafe extern "C" fn motorlink_st_master_get_profiler_info(
     master: *mut motorlink_st_master,
     motor: u8,
     steps: *const u8,
@@ -246,14 +247,14 @@ pub unsafe extern "C" fn motorlink_st_master_profiler_info(
     answer(|| request(master, motor, &Request::GetProfilerInfo(steps.slice(count)?)))
 }
 
-/// Begins an exchange with any header (5 bits of `motorlink_st_frame`, 3 bits of motor) and any
-/// payload of up to 128 bytes, which is copied.
+/// Begins an exchange with any frame code and any payload of up to 128 bytes, which is copied.
 ///
-/// `TOO_LONG`: over 128 bytes.
+/// `BAD_ARGUMENT`: `motor` is over 7, or `code` over 31. `TOO_LONG`: over 128 bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_raw(
     master: *mut motorlink_st_master,
-    header: u8,
+    motor: u8,
+    code: motorlink_st_frame_code,
     payload: *const u8,
     size: usize,
 ) -> motorlink_error {
@@ -261,6 +262,11 @@ pub unsafe extern "C" fn motorlink_st_master_raw(
     answer(|| {
         let payload = payload.slice(size)?;
         let mut state = master.enter()?;
+        check_motor(motor)?;
+        let header = Frame::header(code, motor);
+        if header & 0x1F != code {
+            return Err(motorlink_error::BadArgument);
+        }
         state.master.request_raw(header, payload).map_err(refused)?;
         state.asked = None;
         Ok(())

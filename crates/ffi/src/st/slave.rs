@@ -4,15 +4,17 @@ use core::ffi::{c_char, c_void};
 
 use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Feature, Features, MotorControl, MotorNumber,
-    PositionMove, Ramp, RegisterId, RevupPhase, Slave, TorqueRamp, Version,
+    PositionMove, Profile, Ramp, RegisterId, RevupPhase, Slave, TorqueRamp, Version,
 };
 use motorlink_proto::time::Instant;
 
 use super::message::motorlink_st_revup_phase;
 use super::motorlink_st_slave;
-use super::profile::profile;
 use crate::bytes::{MOTORLINK_NEVER, motorlink_bytes};
 use crate::error::{answer, motorlink_error};
+use crate::number::{
+    motorlink_st_command, motorlink_st_error_code, motorlink_st_profile, motorlink_st_reg, one_of,
+};
 use crate::pointer::{Kept, ascii, plain, promised, storage};
 use crate::tag;
 
@@ -44,7 +46,7 @@ pub struct motorlink_st_version {
 /// passes, and fails with `--readings strict`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
-pub struct motorlink_st_drive {
+pub struct motorlink_st_motor_control {
     /// Handed to each callback.
     pub context: *mut c_void,
     /// The firmware's version.
@@ -63,8 +65,9 @@ pub struct motorlink_st_drive {
     /// and SPEED_REF is 0; in RUN SPEED_REF follows the ramp (S48). In speed mode FLUX_REF reads what
     /// was written to IQ_SPEEDMODE (S22). RAMP_FINAL_SPEED is the end of the last ramp (S26).
     /// PFC_ENABLED is 0 or 1 (S50). Temperatures and power may be below 0 (S23).
-    pub read: Option<extern "C" fn(context: *mut c_void, motor: u8, reg: u8) -> i32>,
-    /// Writes a register that may be written; gives 0, or why not: `MOTORLINK_ST_REFUSAL_*`,
+    pub get_register:
+        Option<extern "C" fn(context: *mut c_void, motor: u8, reg: motorlink_st_reg) -> i32>,
+    /// Writes a register that may be written; gives `MOTORLINK_ST_ERROR_CODE_NONE`, or why not:
     /// WRONG_SET for a value that the register cannot take. NULL: WRONG_SET.
     ///
     /// Not called for TARGET_MOTOR, nor for a DAC channel with a register that it cannot show. Every
@@ -72,8 +75,15 @@ pub struct motorlink_st_drive {
     /// does, not what is kept. CONTROL_MODE from 2 on gives 0 and changes nothing (S15). IQ_SPEEDMODE
     /// is the Id reference of speed mode (S22), so that FLUX_REF reads it. RAMP_FINAL_SPEED begins a
     /// ramp of the last duration (S26). At rest nothing that is written starts the motor.
-    pub write: Option<extern "C" fn(context: *mut c_void, motor: u8, reg: u8, value: i32) -> u8>,
-    /// Executes a `MOTORLINK_ST_COMMAND_*`. What the state does not allow has no effect (4.6).
+    pub set_register: Option<
+        extern "C" fn(
+            context: *mut c_void,
+            motor: u8,
+            reg: motorlink_st_reg,
+            value: i32,
+        ) -> motorlink_st_error_code,
+    >,
+    /// Executes a command. What the state does not allow has no effect (4.6).
     /// NULL: none has.
     ///
     /// In fault START_MOTOR and START_STOP do nothing. While a fault is present FAULT_ACK changes
@@ -81,13 +91,14 @@ pub struct motorlink_st_drive {
     /// TORQUE_REF, FLUX_REF and what IQ_SPEEDMODE was written back to their defaults. ENCODER_ALIGN
     /// does nothing in RUN, and STATUS is IDLE when it is over (S53). Commands of a PFC come with
     /// `MOTORLINK_ST_FEATURE_PFC` only.
-    pub execute: Option<extern "C" fn(context: *mut c_void, motor: u8, command: u8)>,
+    pub execute:
+        Option<extern "C" fn(context: *mut c_void, motor: u8, command: motorlink_st_command)>,
     /// Programs a speed ramp: at once in RUN, else when RUN is reached (4.8). 0 ms is a step.
     /// NULL: without effect.
-    pub ramp:
+    pub set_ramp:
         Option<extern "C" fn(context: *mut c_void, motor: u8, speed_rpm: i32, duration_ms: u16)>,
     /// Gives rev-up phase 0 to 4 (4.9); what is not set is 0. NULL: all is 0.
-    pub revup: Option<
+    pub get_revup_data: Option<
         extern "C" fn(
             context: *mut c_void,
             motor: u8,
@@ -96,7 +107,7 @@ pub struct motorlink_st_drive {
         ),
     >,
     /// Sets rev-up phase 0 to 4 (4.10). NULL: without effect.
-    pub set_revup: Option<
+    pub set_revup_data: Option<
         extern "C" fn(
             context: *mut c_void,
             motor: u8,
@@ -106,31 +117,37 @@ pub struct motorlink_st_drive {
     >,
     /// Sets the current references: at once in RUN, else when RUN is reached (4.11).
     /// NULL: without effect.
-    pub current: Option<extern "C" fn(context: *mut c_void, motor: u8, iq_s16a: i16, id_s16a: i16)>,
+    pub set_current_reference:
+        Option<extern "C" fn(context: *mut c_void, motor: u8, iq_s16a: i16, id_s16a: i16)>,
     /// Programs a torque ramp (profile MCSDK 5.4). NULL: without effect.
-    pub torque_ramp:
+    pub set_torque_ramp:
         Option<extern "C" fn(context: *mut c_void, motor: u8, torque_s16a: i32, duration_ms: u16)>,
     /// Moves to an angle (profile MCSDK 5.4, with POSITION_CONTROL). NULL: without effect.
-    pub position:
+    pub set_position:
         Option<extern "C" fn(context: *mut c_void, motor: u8, angle_rad: f32, duration_s: f32)>,
     /// Registers that a step of the motor profiler shows (profile MCSDK 5.4, with PROFILER): gives
     /// how many there are and where, until the next call of a callback. NULL: none.
     pub profiler_step: Option<
-        extern "C" fn(context: *mut c_void, motor: u8, step: u8, registers: *mut *const u8) -> u8,
+        extern "C" fn(
+            context: *mut c_void,
+            motor: u8,
+            step: u8,
+            registers: *mut *const motorlink_st_reg,
+        ) -> u8,
     >,
 }
 
-plain!(motorlink_st_drive);
+plain!(motorlink_st_motor_control);
 
 /// What the storage of a slave holds.
 pub(crate) struct State {
     slave: Slave,
-    drive: Kept<motorlink_st_drive>,
+    drive: Kept<motorlink_st_motor_control>,
 }
 
 storage!(motorlink_st_slave: State, tag::ST_SLAVE);
 
-impl MotorControl for Kept<motorlink_st_drive> {
+impl MotorControl for Kept<motorlink_st_motor_control> {
     fn features(&self, motor: MotorNumber) -> Features {
         let drive = self.now();
         let bits = drive.features.map_or(0, |call| call(drive.context, motor.number()));
@@ -149,7 +166,7 @@ impl MotorControl for Kept<motorlink_st_drive> {
 
     fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         let drive = self.now();
-        drive.read.map_or(0, |call| call(drive.context, motor.number(), register.0))
+        drive.get_register.map_or(0, |call| call(drive.context, motor.number(), register.0))
     }
 
     fn write(
@@ -159,10 +176,10 @@ impl MotorControl for Kept<motorlink_st_drive> {
         value: i32,
     ) -> Result<(), ErrorCode> {
         let drive = self.now();
-        let call = drive.write.ok_or(ErrorCode::WrongSet)?;
+        let call = drive.set_register.ok_or(ErrorCode::WrongSet)?;
         match call(drive.context, motor.number(), register.0, value) {
             0 => Ok(()),
-            refusal => Err(refusal.into()),
+            error_code => Err(error_code.into()),
         }
     }
 
@@ -175,7 +192,7 @@ impl MotorControl for Kept<motorlink_st_drive> {
 
     fn ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
         let drive = self.now();
-        if let Some(call) = drive.ramp {
+        if let Some(call) = drive.set_ramp {
             call(drive.context, motor.number(), ramp.speed_rpm, ramp.duration_ms);
         }
     }
@@ -183,7 +200,7 @@ impl MotorControl for Kept<motorlink_st_drive> {
     fn revup(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
         let drive = self.now();
         let mut data = motorlink_st_revup_phase::from(RevupPhase::default());
-        if let Some(call) = drive.revup {
+        if let Some(call) = drive.get_revup_data {
             call(drive.context, motor.number(), phase, &raw mut data);
         }
         data.into()
@@ -191,28 +208,28 @@ impl MotorControl for Kept<motorlink_st_drive> {
 
     fn set_revup(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
         let drive = self.now();
-        if let Some(call) = drive.set_revup {
+        if let Some(call) = drive.set_revup_data {
             call(drive.context, motor.number(), phase, &motorlink_st_revup_phase::from(data));
         }
     }
 
     fn current_reference(&mut self, motor: MotorNumber, reference: CurrentReference) {
         let drive = self.now();
-        if let Some(call) = drive.current {
+        if let Some(call) = drive.set_current_reference {
             call(drive.context, motor.number(), reference.iq_s16a, reference.id_s16a);
         }
     }
 
     fn torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
         let drive = self.now();
-        if let Some(call) = drive.torque_ramp {
+        if let Some(call) = drive.set_torque_ramp {
             call(drive.context, motor.number(), ramp.torque_s16a, ramp.duration_ms);
         }
     }
 
     fn position(&mut self, motor: MotorNumber, target: PositionMove) {
         let drive = self.now();
-        if let Some(call) = drive.position {
+        if let Some(call) = drive.set_position {
             call(drive.context, motor.number(), target.angle_rad, target.duration_s);
         }
     }
@@ -233,19 +250,19 @@ impl MotorControl for Kept<motorlink_st_drive> {
 /// `size` is `sizeof *slave`. `drive` is kept: it has to live as long as the slave is used, and
 /// may be constant. Not from a callback of the same slave.
 ///
-/// `BAD_ARGUMENT`: `profile` is none of `motorlink_st_profile`, or `motors` is not 1 to 7.
+/// `BAD_ARGUMENT`: `profile` has no name, or `motors` is not 1 to 7.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_init(
     slave: *mut motorlink_st_slave,
     size: usize,
-    profile: u8,
+    profile: motorlink_st_profile,
     motors: u8,
-    drive: *const motorlink_st_drive,
+    drive: *const motorlink_st_motor_control,
 ) -> motorlink_error {
     promised!(slave, drive);
     answer(|| {
         let drive = drive.keep()?;
-        let profile = self::profile(profile)?;
+        let profile = one_of(&Profile::ALL, profile)?;
         let motors = MotorNumber::new(motors).ok_or(motorlink_error::BadArgument)?;
         slave.init(size, State { slave: Slave::new(profile, motors), drive })
     })

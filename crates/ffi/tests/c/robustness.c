@@ -9,8 +9,8 @@
 
 #define GIVES(error, call) CHECK((call) == MOTORLINK_ERROR_##error)
 
-static motorlink_st_drive no_drive;
-static motorlink_rmd_motor no_motor;
+static motorlink_st_motor_control no_drive;
+static motorlink_rmd_motor_control no_motor;
 
 /* Storage for any object, and a byte more. */
 static uint64_t memory[MOTORLINK_RMD_HOST_WORDS + 1];
@@ -36,7 +36,8 @@ static void wrong_storage(void) {
   rmd_drive((motorlink_rmd_drive *)memory, MOTORLINK_ERROR_WRONG_KIND);
   slcan_host((motorlink_slcan_host *)memory, MOTORLINK_ERROR_WRONG_KIND);
   slcan_device((motorlink_slcan_device *)memory, MOTORLINK_ERROR_WRONG_KIND);
-  OK(motorlink_st_slave_init((motorlink_st_slave *)memory, sizeof memory, 0, 1, &no_drive));
+  OK(motorlink_st_slave_init((motorlink_st_slave *)memory, sizeof memory,
+                             MOTORLINK_ST_PROFILE_SPEC, 1, &no_drive));
   st_master((motorlink_st_master *)memory, MOTORLINK_ERROR_WRONG_KIND);
   OK(motorlink_rmd_host_init((motorlink_rmd_host *)memory, sizeof memory));
   rmd_drive((motorlink_rmd_drive *)memory, MOTORLINK_ERROR_WRONG_KIND);
@@ -60,7 +61,8 @@ static void wrong_sizes(void) {
   subject = "too small";
   memset(memory, 0, sizeof memory);
   GIVES(STORAGE_TOO_SMALL, motorlink_st_master_init(&master, sizeof master - 1, NULL));
-  GIVES(STORAGE_TOO_SMALL, motorlink_st_slave_init(&slave, sizeof slave - 1, 0, 1, &no_drive));
+  GIVES(STORAGE_TOO_SMALL, motorlink_st_slave_init(&slave, sizeof slave - 1,
+                                                   MOTORLINK_ST_PROFILE_SPEC, 1, &no_drive));
   GIVES(STORAGE_TOO_SMALL, motorlink_rmd_host_init(host, sizeof *host - 1));
   GIVES(STORAGE_TOO_SMALL,
         motorlink_rmd_drive_init(&drive, sizeof drive - 1, &config, NULL, &no_motor));
@@ -86,6 +88,7 @@ static void wrong_pointers(void) {
   motorlink_st_firmware_version version;
   motorlink_st_revup_phase phase;
   const uint8_t bytes[8] = {0};
+  const motorlink_st_reg registers[1] = {MOTORLINK_ST_REG_TARGET_MOTOR};
   int32_t value;
 
   subject = "other pointers";
@@ -93,10 +96,10 @@ static void wrong_pointers(void) {
   GIVES(MISALIGNED, motorlink_st_master_init((motorlink_st_master *)(void *)odd, 1000, NULL));
   GIVES(MISALIGNED, motorlink_st_master_init(&master, sizeof master,
                                              (motorlink_st_master_config *)(void *)odd));
-  GIVES(NULL_POINTER, motorlink_st_slave_init(NULL, sizeof slave, 0, 1, &no_drive));
-  GIVES(NULL_POINTER, motorlink_st_slave_init(&slave, sizeof slave, 0, 1, NULL));
-  GIVES(MISALIGNED, motorlink_st_slave_init(&slave, sizeof slave, 0, 1,
-                                            (motorlink_st_drive *)(void *)odd));
+  GIVES(NULL_POINTER, motorlink_st_slave_init(NULL, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, 1, &no_drive));
+  GIVES(NULL_POINTER, motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, 1, NULL));
+  GIVES(MISALIGNED, motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, 1,
+                                            (motorlink_st_motor_control *)(void *)odd));
   GIVES(NULL_POINTER, motorlink_rmd_host_init(NULL, sizeof host));
   GIVES(NULL_POINTER, motorlink_rmd_drive_init(NULL, sizeof drive, &config, NULL, &no_motor));
   GIVES(NULL_POINTER, motorlink_rmd_drive_init(&drive, sizeof drive, NULL, NULL, &no_motor));
@@ -107,22 +110,22 @@ static void wrong_pointers(void) {
   GIVES(NULL_POINTER, motorlink_slcan_device_init(NULL, sizeof device));
 
   OK(motorlink_st_master_init(&master, sizeof master, NULL));
-  OK(motorlink_st_slave_init(&slave, sizeof slave, 0, 1, &no_drive));
+  OK(motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, 1, &no_drive));
   OK(motorlink_rmd_host_init(&host, sizeof host));
   OK(motorlink_rmd_drive_init(&drive, sizeof drive, &config, NULL, &no_motor));
   OK(motorlink_slcan_host_init(&adapter, sizeof adapter));
   OK(motorlink_slcan_device_init(&device, sizeof device));
 
-  GIVES(NULL_POINTER, motorlink_st_master_set_revup(&master, 1, 0, NULL));
+  GIVES(NULL_POINTER, motorlink_st_master_set_revup_data(&master, 1, 0, NULL));
   GIVES(NULL_POINTER, motorlink_st_master_configure_segment(&master, 1, 0, NULL, 1));
-  GIVES(NULL_POINTER, motorlink_st_master_profiler_info(&master, 1, NULL, 1));
-  GIVES(NULL_POINTER, motorlink_st_master_raw(&master, 0, NULL, 1));
+  GIVES(NULL_POINTER, motorlink_st_master_get_profiler_info(&master, 1, NULL, 1));
+  GIVES(NULL_POINTER, motorlink_st_master_raw(&master, 0, MOTORLINK_ST_FRAME_CODE_SET_REG, NULL, 1));
   GIVES(NULL_POINTER, motorlink_st_master_poll(&master, 0, NULL));
   GIVES(NULL_POINTER, motorlink_st_master_receive(&master, 0, NULL, 1));
   GIVES(NULL_POINTER, motorlink_st_master_is_lost(&master, NULL));
-  GIVES(MISALIGNED, motorlink_st_master_poll(&master, 0, (motorlink_st_action *)(void *)odd));
+  GIVES(MISALIGNED, motorlink_st_master_poll(&master, 0, (motorlink_st_output *)(void *)odd));
   OK(motorlink_st_master_receive(&master, 0, NULL, 0));
-  OK(motorlink_st_master_raw(&master, 0, NULL, 0));
+  OK(motorlink_st_master_raw(&master, 0, MOTORLINK_ST_FRAME_CODE_SET_REG, NULL, 0));
   GIVES(NULL_POINTER, motorlink_st_slave_receive(&slave, 0, 0, NULL));
   GIVES(NULL_POINTER, motorlink_st_slave_poll(&slave, 0, NULL));
   GIVES(NULL_POINTER, motorlink_st_slave_deadline(&slave, NULL));
@@ -131,12 +134,12 @@ static void wrong_pointers(void) {
   GIVES(NULL_POINTER, motorlink_st_decode_board_info(bytes, 8, NULL));
   GIVES(NULL_POINTER, motorlink_st_decode_firmware_version(NULL, 8, &version));
   GIVES(NULL_POINTER, motorlink_st_decode_firmware_version(bytes, 8, NULL));
-  GIVES(NULL_POINTER, motorlink_st_decode_revup(NULL, 8, &phase));
-  GIVES(NULL_POINTER, motorlink_st_decode_revup(bytes, 8, NULL));
-  GIVES(NULL_POINTER, motorlink_st_decode_segment(NULL, 1, bytes, 1, &value));
+  GIVES(NULL_POINTER, motorlink_st_decode_revup_data(NULL, 8, &phase));
+  GIVES(NULL_POINTER, motorlink_st_decode_revup_data(bytes, 8, NULL));
+  GIVES(NULL_POINTER, motorlink_st_decode_segment(NULL, 1, registers, 1, &value));
   GIVES(NULL_POINTER, motorlink_st_decode_segment(bytes, 1, NULL, 1, &value));
-  GIVES(NULL_POINTER, motorlink_st_decode_segment(bytes, 1, bytes, 1, NULL));
-  GIVES(MISALIGNED, motorlink_st_decode_segment(bytes, 1, bytes, 1, (int32_t *)(void *)odd));
+  GIVES(NULL_POINTER, motorlink_st_decode_segment(bytes, 1, registers, 1, NULL));
+  GIVES(MISALIGNED, motorlink_st_decode_segment(bytes, 1, registers, 1, (int32_t *)(void *)odd));
   OK(motorlink_st_decode_segment(NULL, 0, NULL, 0, NULL));
 
   GIVES(NULL_POINTER, motorlink_rmd_host_set_limits(&host, 1, NULL));
@@ -173,7 +176,10 @@ static void wrong_numbers(void) {
   static motorlink_st_slave slave;
   static motorlink_rmd_host host;
   static motorlink_rmd_drive drive;
-  const uint8_t bytes[130] = {0}, unnamed[1] = {255};
+  const uint8_t bytes[130] = {0};
+  const motorlink_rmd_spin_direction unnamed_direction = (motorlink_rmd_spin_direction)7;
+  const motorlink_st_reg unnamed[1] = {(motorlink_st_reg)255};
+  static const motorlink_st_reg registers[128] = {MOTORLINK_ST_REG_TARGET_MOTOR};
   int32_t value;
   const int16_t torques[4] = {0, 0, 0, 2001};
   const motorlink_st_revup_phase phase = {0, 0, 0};
@@ -185,46 +191,49 @@ static void wrong_numbers(void) {
   motorlink_st_board_info info;
   motorlink_st_revup_phase read;
   motorlink_slcan_line line;
-  motorlink_st_action action;
+  motorlink_st_output output;
 
   subject = "numbers";
+  CHECK(sizeof(motorlink_st_reg) == 1 && sizeof config.profile == 1 && sizeof output.error_code == 1);
   OK(motorlink_st_master_init(&master, sizeof master, NULL));
-  GIVES(BAD_ARGUMENT, motorlink_st_master_get_register(&master, 8, 0));
-  GIVES(BAD_ARGUMENT, motorlink_st_master_set_register(&master, 9, 0, 0));
-  GIVES(BAD_ARGUMENT, motorlink_st_master_execute(&master, 255, 1));
-  GIVES(BAD_ARGUMENT, motorlink_st_master_revup(&master, 1, 5));
-  GIVES(BAD_ARGUMENT, motorlink_st_master_set_revup(&master, 1, 255, &phase));
-  GIVES(BAD_ARGUMENT, motorlink_st_master_move(&master, 1, (float)HUGE_VAL, 1));
-  GIVES(BAD_ARGUMENT, motorlink_st_master_move(&master, 1, 1, (float)-HUGE_VAL));
-  GIVES(TOO_LONG, motorlink_st_master_raw(&master, 0, bytes, 129));
-  GIVES(TOO_LONG, motorlink_st_master_configure_segment(&master, 1, 0, bytes, 128));
-  GIVES(TOO_LONG, motorlink_st_master_profiler_info(&master, 1, bytes, 129));
-  GIVES(BAD_ARGUMENT, motorlink_st_master_raw(&master, 0, bytes, SIZE_MAX));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_get_register(&master, 8, MOTORLINK_ST_REG_STATUS));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_set_register(&master, 9, MOTORLINK_ST_REG_SPEED_KP, 0));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_execute(&master, 255, MOTORLINK_ST_COMMAND_STOP_MOTOR));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_get_revup_data(&master, 1, 5));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_set_revup_data(&master, 1, 255, &phase));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_set_position(&master, 1, (float)HUGE_VAL, 1));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_set_position(&master, 1, 1, (float)-HUGE_VAL));
+  GIVES(TOO_LONG, motorlink_st_master_raw(&master, 0, MOTORLINK_ST_FRAME_CODE_SET_REG, bytes, 129));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_raw(&master, 8, MOTORLINK_ST_FRAME_CODE_SET_REG, bytes, 1));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_raw(&master, 1, (motorlink_st_frame_code)32, bytes, 1));
+  GIVES(TOO_LONG, motorlink_st_master_configure_segment(&master, 1, 0, registers, 128));
+  GIVES(TOO_LONG, motorlink_st_master_get_profiler_info(&master, 1, bytes, 129));
+  GIVES(BAD_ARGUMENT, motorlink_st_master_raw(&master, 0, MOTORLINK_ST_FRAME_CODE_SET_REG, bytes, SIZE_MAX));
   GIVES(BAD_ARGUMENT, motorlink_st_master_receive(&master, 0, bytes, SIZE_MAX / 2 + 1));
   /* Nothing of this began an exchange. */
-  OK(motorlink_st_master_poll(&master, 0, &action));
-  CHECK(action.kind == MOTORLINK_ACTION_WAIT && action.until_us == MOTORLINK_NEVER);
-  OK(motorlink_st_master_board_info(&master, 7));
+  OK(motorlink_st_master_poll(&master, 0, &output));
+  CHECK(output.kind == MOTORLINK_OUTPUT_WAIT && output.until_us == MOTORLINK_NEVER);
+  OK(motorlink_st_master_get_board_info(&master, 7));
   GIVES(BUSY, motorlink_st_master_execute(&master, 1, MOTORLINK_ST_COMMAND_STOP_MOTOR));
-  GIVES(BUSY, motorlink_st_master_raw(&master, 0, bytes, 1));
-  config.profile = 2;
+  GIVES(BUSY, motorlink_st_master_raw(&master, 0, MOTORLINK_ST_FRAME_CODE_SET_REG, bytes, 1));
+  config.profile = (motorlink_st_profile)2;
   GIVES(BAD_ARGUMENT, motorlink_st_master_init(&master, sizeof master, &config));
   config.profile = MOTORLINK_ST_PROFILE_MCSDK54;
-  config.recovery = 3;
+  config.recovery = (motorlink_st_recovery)3;
   GIVES(BAD_ARGUMENT, motorlink_st_master_init(&master, sizeof master, &config));
-  GIVES(BAD_ARGUMENT, motorlink_st_slave_init(&slave, sizeof slave, 2, 1, &no_drive));
-  GIVES(BAD_ARGUMENT, motorlink_st_slave_init(&slave, sizeof slave, 0, 0, &no_drive));
-  GIVES(BAD_ARGUMENT, motorlink_st_slave_init(&slave, sizeof slave, 0, 8, &no_drive));
+  GIVES(BAD_ARGUMENT, motorlink_st_slave_init(&slave, sizeof slave, (motorlink_st_profile)2, 1, &no_drive));
+  GIVES(BAD_ARGUMENT, motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, 0, &no_drive));
+  GIVES(BAD_ARGUMENT, motorlink_st_slave_init(&slave, sizeof slave, MOTORLINK_ST_PROFILE_SPEC, 8, &no_drive));
   st_slave(&slave, MOTORLINK_ERROR_UNINITIALISED);
   GIVES(BAD_ARGUMENT, motorlink_st_decode_board_info(bytes, 2, &info));
-  GIVES(BAD_ARGUMENT, motorlink_st_decode_revup(bytes, 7, &read));
-  GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 2, bytes, 1, &value));
+  GIVES(BAD_ARGUMENT, motorlink_st_decode_revup_data(bytes, 7, &read));
+  GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 2, registers, 1, &value));
   GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 1, unnamed, 1, &value));
-  GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 8, bytes, SIZE_MAX, &value));
-  CHECK(motorlink_st_register_name(255).size == 0 && motorlink_st_register_name(255).data != NULL);
-  CHECK(named(motorlink_st_register_name(MOTORLINK_ST_REG_SPEED_MEAS), "SPEED_MEAS"));
-  CHECK(named(motorlink_st_register_unit(MOTORLINK_ST_REG_SPEED_MEAS), "rpm"));
-  CHECK(named(motorlink_st_refusal_name(MOTORLINK_ST_REFUSAL_WRONG_SET), "WRONG_SET"));
+  GIVES(BAD_ARGUMENT, motorlink_st_decode_segment(bytes, 8, registers, SIZE_MAX, &value));
+  CHECK(motorlink_st_reg_name(unnamed[0]).size == 0 && motorlink_st_reg_name(unnamed[0]).data != NULL);
+  CHECK(named(motorlink_st_reg_name(MOTORLINK_ST_REG_SPEED_MEAS), "SPEED_MEAS"));
+  CHECK(named(motorlink_st_reg_unit(MOTORLINK_ST_REG_SPEED_MEAS), "rpm"));
+  CHECK(named(motorlink_st_error_code_name(MOTORLINK_ST_ERROR_CODE_WRONG_SET), "WRONG_SET"));
   CHECK(named(motorlink_st_status_name(MOTORLINK_ST_STATUS_RUN), "RUN"));
   CHECK(named(motorlink_st_command_name(MOTORLINK_ST_COMMAND_FAULT_ACK), "FAULT_ACK"));
   CHECK(motorlink_st_longest_transmission_us(0) > motorlink_st_longest_transmission_us(115200));
@@ -236,12 +245,13 @@ static void wrong_numbers(void) {
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_torque4(&host, 0, torques, 0x10));
   GIVES(LIMIT, motorlink_rmd_host_set_torque4(&host, 0, torques, 0x0F));
   GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_set_torque(-2001)));
-  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1, motorlink_rmd_set_single_turn_position(7, 0)));
-  limits.torque_16ma = 32768;
+  GIVES(LIMIT, motorlink_rmd_host_request(&host, 0, 1,
+                                          motorlink_rmd_set_single_turn_position(unnamed_direction, 0)));
+  limits.current_16ma = 32768;
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 1, &limits));
-  limits.torque_16ma = -2;
+  limits.current_16ma = -2;
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 1, &limits));
-  limits.torque_16ma = MOTORLINK_RMD_NO_LIMIT;
+  limits.current_16ma = MOTORLINK_RMD_NO_LIMIT;
   limits.speed_dps = 65536;
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 1, &limits));
   limits.speed_dps = 100;
@@ -297,7 +307,7 @@ static uint16_t features(void *context, uint8_t motor) {
   return MOTORLINK_ST_FEATURE_PFC;
 }
 
-static int32_t read_register(void *context, uint8_t motor, uint8_t reg) {
+static int32_t read_register(void *context, uint8_t motor, motorlink_st_reg reg) {
   (void)context;
   (void)motor;
   (void)reg;
@@ -329,8 +339,8 @@ static void sense(void *context, motorlink_rmd_sense *sense_out) {
 }
 
 static void reentered(void) {
-  static motorlink_st_drive drive;
-  static motorlink_rmd_motor motor;
+  static motorlink_st_motor_control drive;
+  static motorlink_rmd_motor_control motor;
   const uint8_t get[4] = {0x22, 0x01, 0x02, 0x25};
   const uint8_t answered[4] = {0xF0, 0x01, 42, 0x1C};
   const motorlink_rmd_drive_config config = {0, 1, 0, 0};
@@ -340,8 +350,8 @@ static void reentered(void) {
 
   subject = "called from a callback";
   drive.features = features;
-  drive.read = read_register;
-  OK(motorlink_st_slave_init(&calling_slave, sizeof calling_slave, 0, 1, &drive));
+  drive.get_register = read_register;
+  OK(motorlink_st_slave_init(&calling_slave, sizeof calling_slave, MOTORLINK_ST_PROFILE_SPEC, 1, &drive));
   for (at = 0; at < sizeof get; at++) {
     OK(motorlink_st_slave_receive(&calling_slave, 0, get[at], &sent));
   }
@@ -364,16 +374,16 @@ static void reentered(void) {
 /* Objects are plain data: a copy is an object of its own. */
 static void copied(void) {
   motorlink_st_master one, two;
-  motorlink_st_action action;
+  motorlink_st_output output;
   subject = "copies";
   OK(motorlink_st_master_init(&one, sizeof one, NULL));
   OK(motorlink_st_master_trust_line(&one));
   two = one;
-  OK(motorlink_st_master_board_info(&one, 0));
-  OK(motorlink_st_master_poll(&two, 0, &action));
-  CHECK(action.kind == MOTORLINK_ACTION_WAIT);
-  OK(motorlink_st_master_poll(&one, 0, &action));
-  CHECK(action.kind == MOTORLINK_ACTION_TRANSMIT && action.bytes.size == 3);
+  OK(motorlink_st_master_get_board_info(&one, 0));
+  OK(motorlink_st_master_poll(&two, 0, &output));
+  CHECK(output.kind == MOTORLINK_OUTPUT_WAIT);
+  OK(motorlink_st_master_poll(&one, 0, &output));
+  CHECK(output.kind == MOTORLINK_OUTPUT_TRANSMIT && output.bytes.size == 3);
 }
 
 static void versions(void) {

@@ -19,7 +19,7 @@ static void sense(void *context, motorlink_rmd_sense *out) {
   *out = sensed;
 }
 
-static const motorlink_rmd_motor motor = {NULL, set_mode, NULL, sense, NULL};
+static const motorlink_rmd_motor_control motor = {NULL, set_mode, NULL, sense, NULL};
 
 static uint8_t command_of(const json_t *vector) {
   const char *command = text(vector, "command");
@@ -54,6 +54,10 @@ static motorlink_rmd_pid gains_of(const json_t *f) {
   return gains;
 }
 
+static motorlink_rmd_spin_direction direction_of(const json_t *f) {
+  return (motorlink_rmd_spin_direction)number(f, "direction");
+}
+
 /* The request that a vector's fields describe. */
 static motorlink_rmd_data request_of(uint8_t command, const json_t *f) {
   switch (command) {
@@ -83,11 +87,11 @@ static motorlink_rmd_data request_of(uint8_t command, const json_t *f) {
       return motorlink_rmd_set_position_limited((int32_t)number(f, "angle"),
                                             (uint16_t)number(f, "max_speed"));
     case MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION:
-      return motorlink_rmd_set_single_turn_position((uint8_t)number(f, "direction"),
+      return motorlink_rmd_set_single_turn_position(direction_of(f),
                                            (uint16_t)number(f, "angle"));
     default:
       CHECK(command == MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION_LIMITED);
-      return motorlink_rmd_set_single_turn_position_limited((uint8_t)number(f, "direction"),
+      return motorlink_rmd_set_single_turn_position_limited(direction_of(f),
                                                    (uint16_t)number(f, "angle"),
                                                    (uint16_t)number(f, "max_speed"));
   }
@@ -133,8 +137,9 @@ static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) 
     }
     case MOTORLINK_RMD_CODE_READ_PHASE_CURRENTS: {
       motorlink_rmd_phase_currents currents = motorlink_rmd_decode_phase_currents(reply);
-      CHECK(currents.a_digits == number(f, "phase_a") && currents.b_digits == number(f, "phase_b"));
-      CHECK(currents.c_digits == number(f, "phase_c"));
+      CHECK(currents.phase_a_digits == number(f, "phase_a"));
+      CHECK(currents.phase_b_digits == number(f, "phase_b"));
+      CHECK(currents.phase_c_digits == number(f, "phase_c"));
       break;
     }
     case MOTORLINK_RMD_CODE_OFF:
@@ -154,21 +159,21 @@ static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) 
 
 /* The document names 0 and 1: the host does not send another, and the drive does not turn. */
 static int unnamed_direction(const json_t *f) {
-  return has(f, "direction") && number(f, "direction") > MOTORLINK_RMD_SPIN_COUNTERCLOCKWISE;
+  return has(f, "direction") && number(f, "direction") > MOTORLINK_RMD_SPIN_DIRECTION_COUNTERCLOCKWISE;
 }
 
-static motorlink_rmd_action next(uint64_t now_us, uint8_t kind) {
-  motorlink_rmd_action action;
-  OK(motorlink_rmd_host_poll(&host, now_us, &action));
-  CHECK(action.kind == kind);
-  return action;
+static motorlink_rmd_output next(uint64_t now_us, uint8_t kind) {
+  motorlink_rmd_output output;
+  OK(motorlink_rmd_host_poll(&host, now_us, &output));
+  CHECK(output.kind == kind);
+  return output;
 }
 
 /* Four torques, or a request to one motor: the frame is that of the vector. */
 static void sent_by_the_host(const json_t *vector) {
   const json_t *f = member(vector, "fields");
   uint8_t command = command_of(vector);
-  motorlink_rmd_action action;
+  motorlink_rmd_output output;
   if (command == 0) {
     const int16_t torques[4] = {(int16_t)number(f, "iq_1"), (int16_t)number(f, "iq_2"),
                                 (int16_t)number(f, "iq_3"), (int16_t)number(f, "iq_4")};
@@ -182,9 +187,9 @@ static void sent_by_the_host(const json_t *vector) {
       return;
     }
   }
-  action = next(0, MOTORLINK_ACTION_TRANSMIT);
-  CHECK(action.frame.id == strtoul(text(vector, "id"), NULL, 16) && action.frame.size == 8);
-  CHECK(memcmp(action.frame.data, data_of(vector).bytes, 8) == 0);
+  output = next(0, MOTORLINK_OUTPUT_TRANSMIT);
+  CHECK(output.frame.id == strtoul(text(vector, "id"), NULL, 16) && output.frame.size == 8);
+  CHECK(memcmp(output.frame.data, data_of(vector).bytes, 8) == 0);
 }
 
 /* The reply of the vector ends an exchange with its motor. */
@@ -192,7 +197,7 @@ static void heard_by_the_host(const json_t *vector) {
   uint8_t command = command_of(vector), id = motor_of(vector);
   motorlink_rmd_data reply = data_of(vector), asked = motorlink_rmd_set_torque(0);
   motorlink_can_frame frame;
-  motorlink_rmd_action action;
+  motorlink_rmd_output output;
   switch (command) {
     case 0:
       break;
@@ -205,15 +210,15 @@ static void heard_by_the_host(const json_t *vector) {
       asked.bytes[0] = command;
   }
   OK(motorlink_rmd_host_request(&host, 0, id, asked));
-  next(0, MOTORLINK_ACTION_TRANSMIT);
+  next(0, MOTORLINK_OUTPUT_TRANSMIT);
   memset(&frame, 0, sizeof frame);
   frame.id = (uint32_t)MOTORLINK_RMD_MOTOR_BASE + id;
   frame.size = 8;
   memcpy(frame.data, reply.bytes, sizeof frame.data);
   OK(motorlink_rmd_host_receive(&host, 800, &frame));
-  action = next(800, MOTORLINK_ACTION_DONE);
-  CHECK(action.motor == id && action.result == MOTORLINK_OK && same(action.reply, reply));
-  decoded(command, action.reply, member(vector, "fields"));
+  output = next(800, MOTORLINK_OUTPUT_DONE);
+  CHECK(output.motor == id && output.result == MOTORLINK_OK && same(output.reply, reply));
+  decoded(command, output.reply, member(vector, "fields"));
 }
 
 static void power_on(const json_t *vector, uint8_t encoder_bits, const motorlink_rmd_settings *rom) {
@@ -252,10 +257,10 @@ static void carried_out(const json_t *vector) {
   }
   switch (command) {
     case 0:
-      CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.torque_16ma == number(f, "iq_1"));
+      CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.iq_16ma == number(f, "iq_1"));
       break;
     case MOTORLINK_RMD_CODE_SET_TORQUE:
-      CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.torque_16ma == number(f, "iq"));
+      CHECK(told.kind == MOTORLINK_RMD_MODE_TORQUE && told.iq_16ma == number(f, "iq"));
       break;
     case MOTORLINK_RMD_CODE_SET_SPEED:
       CHECK(told.kind == MOTORLINK_RMD_MODE_SPEED && told.speed_centidps == number(f, "speed"));
@@ -294,7 +299,7 @@ static int given_by_the_drive(const json_t *vector) {
   memset(&sensed, 0, sizeof sensed);
   switch (command) {
     case MOTORLINK_RMD_CODE_READ_PID:
-      rom.gains = gains_of(f);
+      rom.pid = gains_of(f);
       break;
     case MOTORLINK_RMD_CODE_READ_ACCELERATION:
       rom.acceleration_dps2 = (int32_t)number(f, "acceleration");

@@ -28,19 +28,20 @@ static uint16_t features(void *context, uint8_t motor) {
   return (uint16_t)(0xFFFF & ~MOTORLINK_ST_FEATURE_PROFILER);
 }
 
-static int32_t read_register(void *context, uint8_t motor, uint8_t reg) {
+static int32_t read_register(void *context, uint8_t motor, motorlink_st_reg reg) {
   (void)context;
   tell(motor, reg, 0, 0);
   return told.values[reg];
 }
 
-static uint8_t write_register(void *context, uint8_t motor, uint8_t reg, int32_t value) {
+static motorlink_st_error_code write_register(void *context, uint8_t motor, motorlink_st_reg reg,
+                                              int32_t value) {
   (void)context;
   tell(motor, reg, value, 0);
-  return MOTORLINK_ST_REFUSAL_NONE;
+  return MOTORLINK_ST_ERROR_CODE_NONE;
 }
 
-static void execute(void *context, uint8_t motor, uint8_t command) {
+static void execute(void *context, uint8_t motor, motorlink_st_command command) {
   (void)context;
   tell(motor, command, 0, 0);
 }
@@ -104,59 +105,64 @@ static motorlink_st_revup_phase phase_of(const json_t *fields) {
   return phase;
 }
 
+static motorlink_st_reg register_of(const json_t *f) {
+  return (motorlink_st_reg)number(f, "register");
+}
+
 /* Begins the exchange that a vector's fields describe. */
 static void begin(const char *code, uint8_t motor, const json_t *f) {
   if (strcmp(code, "SET_REG") == 0) {
     struct bytes value = hex(f, "value");
-    OK(motorlink_st_master_set_register(&master, motor, (uint8_t)number(f, "register"),
+    OK(motorlink_st_master_set_register(&master, motor, register_of(f),
                                         little_endian(value, 0, value.size)));
   } else if (strcmp(code, "GET_REG") == 0) {
-    OK(motorlink_st_master_get_register(&master, motor, (uint8_t)number(f, "register")));
+    OK(motorlink_st_master_get_register(&master, motor, register_of(f)));
   } else if (strcmp(code, "EXECUTE_CMD") == 0) {
-    OK(motorlink_st_master_execute(&master, motor, (uint8_t)number(f, "command")));
+    OK(motorlink_st_master_execute(&master, motor, (motorlink_st_command)number(f, "command")));
   } else if (strcmp(code, "GET_BOARD_INFO") == 0) {
-    OK(motorlink_st_master_board_info(&master, motor));
+    OK(motorlink_st_master_get_board_info(&master, motor));
   } else if (strcmp(code, "SET_RAMP") == 0) {
-    OK(motorlink_st_master_ramp(&master, motor, (int32_t)number(f, "speed"),
+    OK(motorlink_st_master_set_ramp(&master, motor, (int32_t)number(f, "speed"),
                                 (uint16_t)number(f, "duration")));
   } else if (strcmp(code, "GET_REVUP_DATA") == 0) {
-    OK(motorlink_st_master_revup(&master, motor, (uint8_t)number(f, "phase")));
+    OK(motorlink_st_master_get_revup_data(&master, motor, (uint8_t)number(f, "phase")));
   } else if (strcmp(code, "SET_REVUP_DATA") == 0) {
     motorlink_st_revup_phase phase = phase_of(f);
-    OK(motorlink_st_master_set_revup(&master, motor, (uint8_t)number(f, "phase"), &phase));
+    OK(motorlink_st_master_set_revup_data(&master, motor, (uint8_t)number(f, "phase"), &phase));
   } else if (strcmp(code, "SET_CURRENT_REF") == 0) {
-    OK(motorlink_st_master_current(&master, motor, (int16_t)number(f, "iq"),
+    OK(motorlink_st_master_set_current_reference(&master, motor, (int16_t)number(f, "iq"),
                                    (int16_t)number(f, "id")));
   } else if (strcmp(code, "GET_MP_INFO") == 0) {
     struct bytes steps = hex(f, "steps");
-    OK(motorlink_st_master_profiler_info(&master, motor, steps.data, steps.size));
+    OK(motorlink_st_master_get_profiler_info(&master, motor, steps.data, steps.size));
   } else if (strcmp(code, "GET_FW_VERSION") == 0) {
-    OK(motorlink_st_master_firmware_version(&master, motor));
+    OK(motorlink_st_master_get_firmware_version(&master, motor));
   } else if (strcmp(code, "GET_DATA_ELEMENT") == 0) {
-    OK(motorlink_st_master_read_segment(&master, motor, (uint8_t)number(f, "segment")));
+    OK(motorlink_st_master_get_segment(&master, motor, (uint8_t)number(f, "segment")));
   } else if (strcmp(code, "CONFIG_DYN_STRUCT") == 0) {
     struct bytes registers = hex(f, "registers");
     OK(motorlink_st_master_configure_segment(&master, motor, (uint8_t)number(f, "segment"),
-                                             registers.data, registers.size));
+                                             (const motorlink_st_reg *)(const void *)registers.data,
+                                             registers.size));
   } else if (strcmp(code, "SET_TORQUE_RAMP") == 0) {
-    OK(motorlink_st_master_torque_ramp(&master, motor, (int32_t)number(f, "torque"),
+    OK(motorlink_st_master_set_torque_ramp(&master, motor, (int32_t)number(f, "torque"),
                                        (uint16_t)number(f, "duration")));
   } else {
     CHECK(strcmp(code, "SET_POSITION_CMD") == 0);
-    OK(motorlink_st_master_move(&master, motor, (float)real(f, "angle"),
+    OK(motorlink_st_master_set_position(&master, motor, (float)real(f, "angle"),
                                 (float)real(f, "duration")));
   }
 }
 
 /* What the master makes of the reply is what the answer says. */
-static void answered(const char *code, const motorlink_st_action *done, const json_t *answer) {
+static void answered(const char *code, const motorlink_st_output *done, const json_t *answer) {
   const uint8_t *payload = done->bytes.data;
   size_t size = done->bytes.size;
   if (has(answer, "error")) {
-    int damage = done->refusal == MOTORLINK_ST_REFUSAL_BAD_CRC ||
-                 done->refusal == MOTORLINK_ST_REFUSAL_TIMEOUT ||
-                 done->refusal == MOTORLINK_ST_REFUSAL_OVERRUN;
-    CHECK(done->refusal == (uint8_t)number(answer, "error"));
+    int damage = done->error_code == MOTORLINK_ST_ERROR_CODE_BAD_CRC ||
+                 done->error_code == MOTORLINK_ST_ERROR_CODE_TIMEOUT ||
+                 done->error_code == MOTORLINK_ST_ERROR_CODE_OVERRUN;
+    CHECK(done->error_code == (uint8_t)number(answer, "error"));
     CHECK(done->result == (damage ? MOTORLINK_ERROR_NOT_UNDERSTOOD : MOTORLINK_ERROR_REFUSED));
     CHECK(size == 0);
     return;
@@ -179,10 +185,10 @@ static void answered(const char *code, const motorlink_st_action *done, const js
     CHECK(strcmp(version.version, text(answer, "version")) == 0);
   } else if (strcmp(code, "GET_REVUP_DATA") == 0) {
     motorlink_st_revup_phase phase, expected = phase_of(answer);
-    OK(motorlink_st_decode_revup(payload, size, &phase));
+    OK(motorlink_st_decode_revup_data(payload, size, &phase));
     CHECK(memcmp(&phase, &expected, sizeof phase) == 0);
   } else if (strcmp(code, "GET_DATA_ELEMENT") == 0) {
-    const uint8_t chosen[3] = {MOTORLINK_ST_REG_STATUS, MOTORLINK_ST_REG_SPEED_MEAS,
+    const motorlink_st_reg chosen[3] = {MOTORLINK_ST_REG_STATUS, MOTORLINK_ST_REG_SPEED_MEAS,
                                MOTORLINK_ST_REG_I_Q};
     struct bytes values = hex(answer, "values");
     int32_t read[3];
@@ -195,47 +201,52 @@ static void answered(const char *code, const motorlink_st_action *done, const js
   }
 }
 
+static motorlink_st_frame_code code_of(struct bytes frame) {
+  return (motorlink_st_frame_code)(frame.data[0] & 0x1F);
+}
+
 /* Request to bytes, bytes to answer. */
-static void through_the_master(const json_t *vector, uint8_t profile) {
+static void through_the_master(const json_t *vector, motorlink_st_profile profile) {
   motorlink_st_master_config config = motorlink_st_master_defaults();
   const char *code = text(vector, "code");
   struct bytes request = hex(vector, "request");
-  motorlink_st_action action;
+  motorlink_st_output output;
   int raw;
   config.profile = profile;
   for (raw = 0; raw < 2; raw++) {
     OK(motorlink_st_master_init(&master, sizeof master, &config));
     OK(motorlink_st_master_trust_line(&master));
     if (raw) {
-      OK(motorlink_st_master_raw(&master, request.data[0], request.data + 2, request.size - 3));
+      OK(motorlink_st_master_raw(&master, request.data[0] >> 5, code_of(request), request.data + 2,
+                                 request.size - 3));
     } else {
       begin(code, (uint8_t)number(vector, "motor"), member(vector, "fields"));
     }
-    OK(motorlink_st_master_poll(&master, 0, &action));
-    CHECK(action.kind == MOTORLINK_ACTION_TRANSMIT && same(action.bytes, request));
-    OK(motorlink_st_master_poll(&master, 0, &action));
-    CHECK(action.kind == MOTORLINK_ACTION_WAIT && action.until_us == config.timeout_us);
+    OK(motorlink_st_master_poll(&master, 0, &output));
+    CHECK(output.kind == MOTORLINK_OUTPUT_TRANSMIT && same(output.bytes, request));
+    OK(motorlink_st_master_poll(&master, 0, &output));
+    CHECK(output.kind == MOTORLINK_OUTPUT_WAIT && output.until_us == config.timeout_us);
     if (has(vector, "reply")) {
       struct bytes reply = hex(vector, "reply");
       OK(motorlink_st_master_receive(&master, 1000, reply.data, reply.size));
-      OK(motorlink_st_master_poll(&master, 1000, &action));
-      CHECK(action.kind == MOTORLINK_ACTION_DONE);
+      OK(motorlink_st_master_poll(&master, 1000, &output));
+      CHECK(output.kind == MOTORLINK_OUTPUT_DONE);
       if (raw) {
-        CHECK(has(member(vector, "answer"), "error") == (action.result != MOTORLINK_OK));
+        CHECK(has(member(vector, "answer"), "error") == (output.result != MOTORLINK_OK));
       } else {
-        answered(code, &action, member(vector, "answer"));
+        answered(code, &output, member(vector, "answer"));
       }
     }
   }
 }
 
 /* Shipped firmware keeps speeds in steps of 6 rpm. */
-static int32_t kept(uint8_t profile, int32_t speed_rpm) {
+static int32_t kept(motorlink_st_profile profile, int32_t speed_rpm) {
   return profile == MOTORLINK_ST_PROFILE_MCSDK54 ? speed_rpm / 6 * 6 : speed_rpm;
 }
 
 /* What the drive was told is what the fields say. */
-static void carried_out(const char *code, uint8_t profile, const json_t *f) {
+static void carried_out(const char *code, motorlink_st_profile profile, const json_t *f) {
   int32_t speed = has(f, "speed") ? kept(profile, (int32_t)number(f, "speed")) : 0;
   if (strcmp(code, "SET_REG") == 0) {
     struct bytes value = hex(f, "value");
@@ -319,7 +330,8 @@ static void prepare(const char *code, const json_t *vector) {
 }
 
 /* Bytes to callbacks, values to a reply; tells whether the reply could be compared. */
-static int through_the_slave(const json_t *vector, motorlink_st_slave *slave, uint8_t profile) {
+static int through_the_slave(const json_t *vector, motorlink_st_slave *slave,
+                             motorlink_st_profile profile) {
   const char *code = text(vector, "code");
   struct bytes request = hex(vector, "request");
   uint8_t motor = (uint8_t)number(vector, "motor");
@@ -343,13 +355,15 @@ static int through_the_slave(const json_t *vector, motorlink_st_slave *slave, ui
 }
 
 int main(int argc, char **argv) {
+  static const motorlink_st_profile profiles[2] = {MOTORLINK_ST_PROFILE_SPEC,
+                                                   MOTORLINK_ST_PROFILE_MCSDK54};
   static motorlink_st_slave slaves[2];
-  static motorlink_st_drive drive;
+  static motorlink_st_motor_control drive;
   json_t *vectors;
   const json_t *vector;
   size_t index;
   int count = 0, replies = 0;
-  uint8_t profile;
+  int at;
 
   CHECK(argc == 2);
   vectors = load(argv[1]);
@@ -358,26 +372,27 @@ int main(int argc, char **argv) {
   drive.version.minor = 4;
   drive.version.patch = 3;
   drive.features = features;
-  drive.read = read_register;
-  drive.write = write_register;
+  drive.get_register = read_register;
+  drive.set_register = write_register;
   drive.execute = execute;
-  drive.ramp = ramp;
-  drive.revup = revup;
-  drive.set_revup = set_revup;
-  drive.current = current;
-  drive.torque_ramp = torque_ramp;
-  drive.position = position;
-  for (profile = 0; profile < 2; profile++) {
-    OK(motorlink_st_slave_init(&slaves[profile], sizeof slaves[profile], profile, 7, &drive));
+  drive.set_ramp = ramp;
+  drive.get_revup_data = revup;
+  drive.set_revup_data = set_revup;
+  drive.set_current_reference = current;
+  drive.set_torque_ramp = torque_ramp;
+  drive.set_position = position;
+  for (at = 0; at < 2; at++) {
+    OK(motorlink_st_slave_init(&slaves[at], sizeof slaves[at], profiles[at], 7, &drive));
   }
   json_array_foreach(vectors, index, vector) {
     const char *spoken = text(vector, "profile");
     subject = text(vector, "name");
-    for (profile = 0; profile < 2; profile++) {
+    for (at = 0; at < 2; at++) {
+      const motorlink_st_profile profile = profiles[at];
       const char *other = profile == MOTORLINK_ST_PROFILE_SPEC ? "mcsdk-5.4" : "spec";
       if (strcmp(spoken, other) != 0) {
         through_the_master(vector, profile);
-        replies += through_the_slave(vector, &slaves[profile], profile);
+        replies += through_the_slave(vector, &slaves[at], profile);
       }
     }
     count++;

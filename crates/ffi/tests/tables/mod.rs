@@ -5,20 +5,64 @@ use std::fmt::Write;
 use motorlink_proto::rmd::{COMMANDS, Errors, MOTOR_BASE, SpinDirection, TORQUE4_ID};
 use motorlink_proto::st::register::{Access, Origin};
 use motorlink_proto::st::{
-    Command, ControlMode, ErrorCode, Feature, Flags, FrameCode, Profile, RegisterId, Status,
+    Command, ControlMode, ErrorCode, Feature, Flags, FrameCode, Profile, Recovery, RegisterId,
+    Status,
 };
+
+/// What the numbers of an enum are.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Values of a byte. The enum's name is its type.
+    Byte,
+    /// Bits of a sum, or constants.
+    Loose,
+}
+
+/// What each profile is, and each way of recovery, in the order of proto's lists.
+const PROFILES: [&str; Profile::ALL.len()] =
+    ["the document as written", "what firmware of MCSDK 5.4 does on the wire"];
+const RECOVERIES: [&str; Recovery::ALL.len()] = [
+    "not by itself: the line counts as in step until it is lost, and `motorlink_st_master_trust_line` says \
+     that it is so again",
+    "waits for silence, asks a question, goes on when it was answered",
+    "as DRAIN, behind bytes that complete a frame which a 5.x drive may still be waiting for",
+];
 
 pub fn text() -> String {
     let mut out = version();
-    group(
-        &mut out,
-        "motorlink_st_register",
-        "Registers (table 3): `reg` in calls. A comment has access (D: for the DAC only), type and unit.",
-        registers(),
-    );
     let plain = |prefix: &'static str, all: Vec<(u32, &'static str, String)>| {
         all.into_iter().map(move |(number, name, doc)| (format!("{prefix}_{name}"), number, doc))
     };
+    macro_rules! listed {
+        ($enum:ident, $docs:ident) => {
+            $enum::ALL.iter().zip($docs).map(|(one, doc)| {
+                let name = format!("{one:?}").to_uppercase();
+                let prefix = concat!("MOTORLINK_ST_", stringify!($enum)).to_uppercase();
+                (format!("{prefix}_{name}"), *one as u32, doc.to_owned())
+            })
+        };
+    }
+    group(
+        &mut out,
+        Kind::Byte,
+        "motorlink_st_profile",
+        "How a drive behaves where the document and shipped firmware differ.",
+        listed!(Profile, PROFILES),
+    );
+    group(
+        &mut out,
+        Kind::Byte,
+        "motorlink_st_recovery",
+        "How a line is brought in step that was just opened, or on which an exchange failed.",
+        listed!(Recovery, RECOVERIES),
+    );
+    group(
+        &mut out,
+        Kind::Byte,
+        "motorlink_st_reg",
+        "Registers (table 3). A comment has access (D: for the DAC only), type and unit.",
+        registers(),
+    );
     let frames = FrameCode::ALL.iter().map(|code| {
         let known = |profile| FrameCode::from_number(code.number(), profile) == Some(*code);
         let only = match (known(Profile::Spec), known(Profile::Mcsdk54)) {
@@ -30,9 +74,10 @@ pub fn text() -> String {
     });
     group(
         &mut out,
-        "motorlink_st_frame",
+        Kind::Byte,
+        "motorlink_st_frame_code",
         "Frame codes (table 1).",
-        plain("MOTORLINK_ST_FRAME", frames.collect()),
+        plain("MOTORLINK_ST_FRAME_CODE", frames.collect()),
     );
     macro_rules! named {
         ($enum:ident) => {
@@ -46,24 +91,28 @@ pub fn text() -> String {
     }
     group(
         &mut out,
+        Kind::Byte,
         "motorlink_st_command",
         "Commands (table 4).",
         plain("MOTORLINK_ST_COMMAND", named!(Command)),
     );
     group(
         &mut out,
-        "motorlink_st_refusal",
+        Kind::Byte,
+        "motorlink_st_error_code",
         "Why a drive refused (table 2).",
-        plain("MOTORLINK_ST_REFUSAL", named!(ErrorCode)),
+        plain("MOTORLINK_ST_ERROR_CODE", named!(ErrorCode)),
     );
     group(
         &mut out,
+        Kind::Byte,
         "motorlink_st_status",
         "Values of register STATUS.",
         plain("MOTORLINK_ST_STATUS", named!(Status)),
     );
     group(
         &mut out,
+        Kind::Byte,
         "motorlink_st_control_mode",
         "Values of register CONTROL_MODE.",
         plain("MOTORLINK_ST_CONTROL_MODE", named!(ControlMode)),
@@ -72,6 +121,7 @@ pub fn text() -> String {
         Flags::NAMES.iter().map(|(bit, name, doc)| (u32::from(*bit), *name, (*doc).to_owned()));
     group(
         &mut out,
+        Kind::Loose,
         "motorlink_st_fault",
         "Bits of register FLAGS: occurred; 16 bits to the left: present.",
         plain("MOTORLINK_ST_FAULT", faults.collect()),
@@ -85,7 +135,13 @@ pub fn text() -> String {
                 feature.name().to_owned(),
             )
         });
-    group(&mut out, "motorlink_st_feature", "What a motor's control may be built with.", features);
+    group(
+        &mut out,
+        Kind::Loose,
+        "motorlink_st_feature",
+        "What a motor's control may be built with.",
+        features,
+    );
     let codes = COMMANDS.iter().map(|row| {
         let name = screaming(&format!("{:?}", row.code));
         let rom = if row.rom { "; wears the ROM" } else { "" };
@@ -97,20 +153,31 @@ pub fn text() -> String {
     });
     group(
         &mut out,
+        Kind::Byte,
         "motorlink_rmd_code",
         "Commands (chapter 2): the first byte of request and reply.",
         codes,
     );
     let errors = Errors::NAMES.iter().map(|(bits, text)| {
         let name = text.trim_end_matches(" protection").replace(' ', "_").to_uppercase();
-        (format!("MOTORLINK_RMD_FAULT_{name}"), u32::from(bits.0), (*text).to_owned())
+        (format!("MOTORLINK_RMD_ERROR_{name}"), u32::from(bits.0), (*text).to_owned())
     });
-    group(&mut out, "motorlink_rmd_fault", "Bits of the error state.", errors);
+    group(&mut out, Kind::Loose, "motorlink_rmd_error", "Bits of the error state.", errors);
     let spins = SpinDirection::ALL.iter().map(|spin| {
         let name = spin.name().expect("named").to_uppercase();
-        (format!("MOTORLINK_RMD_SPIN_{name}"), u32::from(spin.number()), spin.doc().to_owned())
+        (
+            format!("MOTORLINK_RMD_SPIN_DIRECTION_{name}"),
+            u32::from(spin.number()),
+            spin.doc().to_owned(),
+        )
     });
-    group(&mut out, "motorlink_rmd_spin", "Which way to turn to an angle within the turn.", spins);
+    group(
+        &mut out,
+        Kind::Byte,
+        "motorlink_rmd_spin_direction",
+        "Which way to turn to an angle within the turn.",
+        spins,
+    );
     let ids = [
         (
             "MOTORLINK_RMD_MOTOR_BASE".to_owned(),
@@ -123,7 +190,7 @@ pub fn text() -> String {
             "torque currents for motors 1 to 4".to_owned(),
         ),
     ];
-    group(&mut out, "motorlink_rmd_can_id", "CAN identifiers.", ids.into_iter());
+    group(&mut out, Kind::Loose, "motorlink_rmd_can_id", "CAN identifiers.", ids.into_iter());
     out
 }
 
@@ -169,6 +236,7 @@ fn registers() -> impl Iterator<Item = (String, u32, String)> {
 
 fn group(
     out: &mut String,
+    kind: Kind,
     name: &str,
     doc: &str,
     rows: impl Iterator<Item = (String, u32, String)>,
@@ -176,14 +244,33 @@ fn group(
     let rows: Vec<_> = rows.collect();
     let wide = rows.iter().map(|(name, ..)| name.len()).max().unwrap_or(0);
     let digits = if rows.iter().any(|row| row.1 > 0xFF) { 4 } else { 2 };
-    writeln!(out, "/** {doc} */\nenum {name} {{").expect("a string");
+    let (size, ty) = match kind {
+        Kind::Byte => (SIZE, TYPE.replace("NAME", name)),
+        Kind::Loose => ("", String::new()),
+    };
+    writeln!(out, "/** {doc} */\nenum {name}{size} {{").expect("a string");
     for (index, (name, number, doc)) in rows.iter().enumerate() {
         let comma = if index + 1 < rows.len() { "," } else { " " };
         writeln!(out, "  {name:<wide$} = 0x{number:0digits$X}{comma} /**< {doc} */")
             .expect("a string");
     }
-    out.push_str("};\n\n");
+    writeln!(out, "}};\n{ty}").expect("a string");
 }
+
+/// Fixes the size of an enum, in the languages that can.
+const SIZE: &str = "
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint8_t
+#endif
+";
+
+/// The enum's name as a type, of the same size in every language.
+const TYPE: &str = "#if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
+typedef enum NAME NAME;
+#elif !defined(__cplusplus)
+typedef uint8_t NAME;
+#endif
+";
 
 /// `FluxWeakening` as `FLUX_WEAKENING`, `ReadStatus` as `READ_STATUS_1`.
 fn screaming(camel: &str) -> String {

@@ -23,6 +23,11 @@ pub enum Recovery {
     Pad,
 }
 
+impl Recovery {
+    /// Every way.
+    pub const ALL: [Recovery; 3] = [Recovery::None, Recovery::Drain, Recovery::Pad];
+}
+
 /// How a [`Master`](super::Master) behaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MasterConfig {
