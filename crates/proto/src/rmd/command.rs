@@ -258,7 +258,7 @@ commands! { $
         "Motor running command", "Motor running command",
         "resumes what the motor was doing before the stop";
     0xA1 set_torque SetTorque {
-        /// 0.016 A a digit, within ±[`IqCommand::MAX`].
+        /// 0.016 A a digit, -2000 to 2000.
         4 iq: IqCommand,
     } -> MotionStatus [moves] V1_62
         "Torque closed-loop command", "Torque current control command",

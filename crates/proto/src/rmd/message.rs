@@ -42,10 +42,10 @@ impl SetTorque4 {
 
 impl Payload for SetTorque4 {
     const FIELDS: &'static [Field] = &[
-        Field::new::<IqCommand>("iq_1", 0),
-        Field::new::<IqCommand>("iq_2", 2),
-        Field::new::<IqCommand>("iq_3", 4),
-        Field::new::<IqCommand>("iq_4", 6),
+        Field::new::<IqCommand>("iq_1", "For motor 1.", 0),
+        Field::new::<IqCommand>("iq_2", "For motor 2.", 2),
+        Field::new::<IqCommand>("iq_3", "For motor 3.", 4),
+        Field::new::<IqCommand>("iq_4", "For motor 4.", 6),
     ];
 
     fn pack(&self) -> u64 {

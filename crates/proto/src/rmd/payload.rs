@@ -32,6 +32,8 @@ pub trait Payload: Copy {
 pub struct Field {
     /// Name of the value, the same in every language.
     pub name: &'static str,
+    /// What the value is.
+    pub doc: &'static str,
     /// Index of its first byte: the n of DATA\[n\].
     pub offset: u8,
     /// How many bytes it has, 1 to 7.
@@ -78,10 +80,10 @@ impl Field {
         self.scale.value(self.raw(data))
     }
 
-    pub(super) const fn new<T: Wire>(name: &'static str, offset: u8) -> Self {
+    pub(super) const fn new<T: Wire>(name: &'static str, doc: &'static str, offset: u8) -> Self {
         let show: Show = |low, f| T::from_low(low).show(f);
         let (len, signed, scale, meaning) = (T::LEN, T::SIGNED, T::UNIT, T::MEANING);
-        Field { name, offset, len, signed, scale, meaning, show }
+        Field { name, doc: doc.trim_ascii(), offset, len, signed, scale, meaning, show }
     }
 }
 
@@ -155,17 +157,17 @@ macro_rules! payload {
         }
     };
     ($(#[$meta:meta])* pub struct $name:ident {
-        $( $(#[$field_meta:meta])* $offset:literal $field:ident: $type:ty, )+
+        $( $(#[doc = $doc:literal])+ $offset:literal $field:ident: $type:ty, )+
     }) => {
         $(#[$meta])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
         pub struct $name {
-            $( $(#[$field_meta])* pub $field: $type, )+
+            $( $(#[doc = $doc])+ pub $field: $type, )+
         }
 
         impl Payload for $name {
             const FIELDS: &'static [Field] =
-                &[$( Field::new::<$type>(stringify!($field), $offset), )+];
+                &[$( Field::new::<$type>(stringify!($field), concat!($($doc),+), $offset), )+];
             fn pack(&self) -> u64 {
                 0 $( | place(self.$field, $offset) )+
             }

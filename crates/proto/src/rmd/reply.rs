@@ -27,7 +27,7 @@ payload! {
 payload! {
     /// Acceleration limit (3, Read acceleration data command; docs/SPEC-NOTES.md R5).
     pub struct Acceleration {
-        /// 1 °/s² a digit.
+        /// 1 °/s² a digit; 0 is no limit.
         4 acceleration: DpsPerSecond,
     }
 }
@@ -71,7 +71,7 @@ payload! {
         1 temperature: Celsius,
         /// 0.1 V a digit.
         3 voltage: DeciVolts,
-        /// Which protections are active.
+        /// Which protections are active, a bit each.
         7 errors: Errors,
     }
 }
