@@ -39,7 +39,7 @@ RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
 
-.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header
+.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table
 .PHONY: install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
@@ -171,6 +171,9 @@ sizes: board-target ## flash and RAM on a Cortex-M4, into docs/SIZES.md
 
 docs: ## the tables of docs/CONFORMANCE.md
 	MOTORLINK_UPDATE_DOCS=1 $(CARGO) test -p motorlink-conformance --test document --locked
+
+python-table: ## the RMD commands of the Python package: _rmd_table.py
+	MOTORLINK_UPDATE_PYTHON=1 $(CARGO) test -p motorlink-python --test table --locked
 
 header: ## crates/ffi/include/motorlink.h
 	MOTORLINK_UPDATE_HEADER=1 $(CARGO) test -p motorlink-ffi --test header --locked

@@ -91,7 +91,7 @@ def blocking(path):
 
     def run(exchanges):
         for _ in range(exchanges):
-            motor.read("SPEED_MEAS")
+            motor.get("SPEED_MEAS")
 
     return run
 
@@ -142,7 +142,7 @@ def awaited(*paths):
 
     async def read(motor, exchanges):
         for _ in range(exchanges):
-            await motor.read("SPEED_MEAS")
+            await motor.get("SPEED_MEAS")
 
     async def all_of_them(exchanges):
         await asyncio.gather(*(read(motor, exchanges // len(motors)) for motor in motors))
@@ -163,7 +163,7 @@ class Memory:
 
 def without_a_line():
     """What an exchange costs but for the line, ns, least of some tries."""
-    request, drive = motorlink.st.Request.read("SPEED_MEAS"), PlainPython(Memory())
+    request, drive = motorlink.st.Request.get_register("SPEED_MEAS"), PlainPython(Memory())
 
     def ours():
         request.encode(1)

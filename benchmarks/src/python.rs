@@ -24,7 +24,7 @@ const GOALS: [(&str, f64); 3] = [
 
 /// Contestants as the script calls them, and what they are.
 const CONTESTANTS: [(&str, &str); 6] = [
-    ("motorlink", "motorlink, m.read"),
+    ("motorlink", "motorlink, m.get"),
     ("bytes only", "pyserial, bytes only"),
     ("plain python", "pyserial, framing and checks"),
     ("system calls", "os.write and os.read only"),

@@ -22,45 +22,45 @@ else:
 # %% An ST drive
 # `with` stops the motors that were started in it, however it is left: at its end, with an exception,
 # with Ctrl-C or SIGTERM.
-with motorlink.st.open(st_port) as bus:
-    print("drive   ", bus.info())
-    motor = bus.motor(1)
-    motor.ramp(1000, 0.5)  # rpm, within so many s
+with motorlink.st.open(st_port) as client:
+    print("drive   ", client.board_info())
+    motor = client.motor(1)
+    motor.set_ramp(1000, 0.5)  # rpm, within so many s
     motor.start()
     wait(3.0)
     print("status  ", motor.status())
 
     # Registers by name. Tab completion knows them all, and so does `motor.registers`.
-    print("speed   ", motor.read("SPEED_MEAS"), motor.registers.info("SPEED_MEAS").unit)
+    print("speed   ", motor.get("SPEED_MEAS"), motor.registers.info("SPEED_MEAS").unit)
     print("voltage ", motor.registers.BUS_VOLTAGE, "V")
     motor.registers.SPEED_KP = motor.registers.SPEED_KP + 10
 
     # A structured array: time and a column a register.
-    samples = bus.sample(["SPEED_MEAS", "TORQUE_MEAS"], rate=100, seconds=0.5)
+    samples = client.sample(["SPEED_MEAS", "TORQUE_MEAS"], rate=100, seconds=0.5)
     speed = samples["SPEED_MEAS"]
     print(f"samples  {len(samples)}: {speed.mean():.0f} rpm, from {speed.min():.0f} to {speed.max():.0f}")
 
     # %% What goes wrong
     # A drive that says no is told apart from a line that fails, and from a value that cannot be sent.
     try:
-        motor.write("SPEED_MEAS", 3)
-    except motorlink.Refused as refused:
+        motor.set("SPEED_MEAS", 3)
+    except motorlink.RefusedError as refused:
         print("refused ", refused.name)
     try:
-        motor.read("SPED_MEAS")
-    except motorlink.BadValue as bad:
+        motor.get("SPED_MEAS")
+    except motorlink.InvalidValueError as bad:
         print("bad     ", bad)
 
 # %% RMD motors
 # The angle is of the motor shaft, over all turns. Several exchanges overlap in a cycle.
-with motorlink.rmd.open(rmd_port) as bus:
-    print("motors  ", [found.id for found in bus.scan(range(1, 9))])
-    first = bus.motor(1)
-    first.move_to(90, max_speed=500)  # degrees, degrees per second
+with motorlink.rmd.open(rmd_port) as client:
+    print("motors  ", [found.id for found in client.scan(range(1, 9))])
+    first = client.motor(1)
+    first.set_position(90, max_speed_dps=500)  # degrees, degrees per second
     wait(1.0)
-    print(f"angle    {first.angle():.1f} degrees at {first.status().voltage_v} V")
-    answers = bus.cycle({1: motorlink.rmd.speed(100), 2: motorlink.rmd.torque(0.2)})
+    print(f"angle    {first.multi_turn_angle():.1f} degrees at {first.status().voltage_volts} V")
+    answers = client.cycle({1: motorlink.rmd.set_speed(100), 2: motorlink.rmd.set_torque(0.2)})
     for number, answer in answers.items():
         print(f"motor {number}  {answer}")
     wait(0.5)
-    print("speed   ", first.motion().speed_dps, "degrees per second")
+    print("speed   ", first.motion_status().speed_dps, "degrees per second")

@@ -35,18 +35,18 @@ def experiment(kp, ki):
     bench = sim.Bench(BENCH)
     motor = bench.st.motor(1)
     if kp:
-        motor.write("SPEED_KP", kp)
-        motor.write("SPEED_KI", ki)
-    motor.ramp(LOW, 0)
+        motor.set("SPEED_KP", kp)
+        motor.set("SPEED_KI", ki)
+    motor.set_ramp(LOW, 0)
     motor.start()
     bench.run(2.5)
     with bench.recording(["st1.speed_rpm", "st1.iq_amps"]) as recording:
         bench.run(STEP)
-        motor.ramp(HIGH, 0)
+        motor.set_ramp(HIGH, 0)
         bench.run(LOAD - STEP)
         bench.brake("st1", BRAKE)
         bench.run(SECONDS - LOAD)
-    return recording.data, motor.read("SPEED_KP"), motor.read("SPEED_KI")
+    return recording.data, motor.get("SPEED_KP"), motor.get("SPEED_KI")
 
 
 # %% What is good

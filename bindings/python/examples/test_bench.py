@@ -23,24 +23,24 @@ class Conveyor:
     """A conveyor belt on motor 1 of an ST drive."""
 
     def __init__(self, port):
-        self._bus = motorlink.st.open(port, speed_limit=3000)
-        self._motor = self._bus.motor(1)
+        self._client = motorlink.st.open(port, speed_limit_rpm=3000)
+        self._motor = self._client.motor(1)
 
     def run(self, rpm, patience=3.0):
         """Brings the belt to a speed; stops it and raises Jammed where it does not get there."""
-        self._motor.ramp(rpm, 0.5)
+        self._motor.set_ramp(rpm, 0.5)
         self._motor.start()
         deadline = time.monotonic() + patience
-        while abs(self._motor.read("SPEED_MEAS") - rpm) > 0.05 * rpm:
+        while abs(self._motor.get("SPEED_MEAS") - rpm) > 0.05 * rpm:
             if time.monotonic() > deadline:
                 self.stop()
-                raise Jammed(f"{self._motor.read('SPEED_MEAS')} rpm instead of {rpm}")
+                raise Jammed(f"{self._motor.get('SPEED_MEAS')} rpm instead of {rpm}")
             time.sleep(0.02)
 
     def recover(self):
         """Acknowledges what made the drive switch off; gives its name."""
-        names = self._motor.faults().occurred
-        self._motor.acknowledge_faults()
+        names = self._motor.flags().occurred
+        self._motor.fault_ack()
         return names
 
     def stop(self):
@@ -98,7 +98,7 @@ def test_it_recovers_after_a_fault(conveyor, motorlink_bench):
 
 
 def test_nobody_can_ask_for_too_much(conveyor, motorlink_bench):
-    with pytest.raises(motorlink.BadValue, match="3000 rpm"):
+    with pytest.raises(motorlink.InvalidValueError, match="3000 rpm"):
         conveyor.run(3500)
     assert motorlink_bench.truth("st1")["status"] == "IDLE"
 
@@ -112,7 +112,7 @@ def test_a_bad_line_does_not_keep_it_from_stopping(motorlink_bench):
         for _ in range(10):
             try:
                 return action()
-            except (motorlink.LineLost, motorlink.Timeout):
+            except (motorlink.LinkError, motorlink.ReplyTimeoutError):
                 failures += 1
         pytest.fail("the line never came back")
 

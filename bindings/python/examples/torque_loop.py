@@ -8,7 +8,7 @@ a thousand times a second. Then somebody pushes two of the motors.
 
 # %% The bench
 # Four motors, of which each turns a small flywheel. On virtual time the loop is exact, however slow the
-# computer is; on a real bus `bus` would be `motorlink.rmd.open("socketcan:can0")`.
+# computer is; on a real bus it would be `motorlink.rmd.open("socketcan:can0")`.
 import math
 import time
 
@@ -19,7 +19,7 @@ from motorlink import sim
 bench = sim.Bench(
     "\n".join(f"[[rmd.motor]]\nid = {n}\nplant.load.inertia = 1e-4" for n in (1, 2, 3, 4))
 )
-bus = bench.rmd
+client = bench.rmd
 RATE = 1000  # Hz
 SECONDS = 4.0
 STIFFNESS = 0.1  # A per degree
@@ -30,8 +30,8 @@ COUNTS = 2**14  # of the encoder in a turn
 # %% Angles
 # A reply tells the position within the turn. Over the turns it is followed by its smallest change,
 # which holds below half a turn from cycle to cycle: 180 000 degrees per second.
-angles = [bus.motor(n).angle() for n in (1, 2, 3, 4)]
-counts = [bus.motor(n).motion().encoder for n in (1, 2, 3, 4)]
+angles = [client.motor(n).multi_turn_angle() for n in (1, 2, 3, 4)]
+counts = [client.motor(n).motion_status().encoder for n in (1, 2, 3, 4)]
 
 
 def follow(motor, encoder):
@@ -56,7 +56,7 @@ lost = 0
 pushes = {1.5: ("rmd3", 0.1), 2.5: ("rmd3", 0.0), 2.0: ("rmd2", -0.05), 3.0: ("rmd2", 0.0)}
 deviations = []
 signals = [f"rmd{n}.output_degrees" for n in (1, 2, 3, 4)]
-with bus, bench.recording(signals, every=1 / RATE) as recording:
+with client, bench.recording(signals, every=1 / RATE) as recording:
     for cycle in range(int(SECONDS * RATE)):
         t = cycle / RATE
         if t in pushes:
@@ -68,7 +68,7 @@ with bus, bench.recording(signals, every=1 / RATE) as recording:
             spring = STIFFNESS * (targets[motor] - angles[motor])
             damper = DAMPING * (speed_targets[motor] - speeds[motor])
             torques.append(max(-LIMIT, min(LIMIT, spring + damper)))
-        for number, reply in bus.torque4(*torques).items():
+        for number, reply in client.set_torque4(torques).items():
             if isinstance(reply, Exception):
                 lost += 1
                 continue

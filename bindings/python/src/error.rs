@@ -14,12 +14,12 @@ use pyo3::types::{PyDict, PyType};
 #[derive(Debug, Clone, Copy)]
 enum Kind {
     Refused,
-    LineLost,
-    Timeout,
-    PortError,
-    BadValue,
+    Link,
+    ReplyTimeout,
+    Port,
+    InvalidValue,
     FullTurn,
-    NoSuchRegister,
+    UnknownRegister,
     Closed,
 }
 
@@ -35,14 +35,14 @@ impl Kind {
     fn class(self, py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
         static CLASSES: [PyOnceLock<Py<PyType>>; 8] = [const { PyOnceLock::new() }; 8];
         let name = match self {
-            Kind::Refused => "Refused",
-            Kind::LineLost => "LineLost",
-            Kind::Timeout => "Timeout",
-            Kind::PortError => "PortError",
-            Kind::BadValue => "BadValue",
-            Kind::FullTurn => "FullTurn",
-            Kind::NoSuchRegister => "NoSuchRegister",
-            Kind::Closed => "Closed",
+            Kind::Refused => "RefusedError",
+            Kind::Link => "LinkError",
+            Kind::ReplyTimeout => "ReplyTimeoutError",
+            Kind::Port => "PortError",
+            Kind::InvalidValue => "InvalidValueError",
+            Kind::FullTurn => "FullTurnError",
+            Kind::UnknownRegister => "UnknownRegisterError",
+            Kind::Closed => "ClosedError",
         };
         CLASSES[self as usize].import(py, "motorlink.errors", name)
     }
@@ -63,13 +63,13 @@ impl Kind {
 }
 
 /// A value that cannot be sent.
-pub(crate) fn bad_value(py: Python<'_>, message: impl Display) -> PyErr {
-    Kind::BadValue.raise(py, message, Facts::default())
+pub(crate) fn invalid_value(py: Python<'_>, message: impl Display) -> PyErr {
+    Kind::InvalidValue.raise(py, message, Facts::default())
 }
 
 /// A register that nobody knows.
-pub(crate) fn no_such_register(py: Python<'_>, message: impl Display) -> PyErr {
-    Kind::NoSuchRegister.raise(py, message, Facts::default())
+pub(crate) fn unknown_register(py: Python<'_>, message: impl Display) -> PyErr {
+    Kind::UnknownRegister.raise(py, message, Facts::default())
 }
 
 /// A bus that was closed.
@@ -97,25 +97,25 @@ pub(crate) fn st_error(py: Python<'_>, error: &st::Error) -> PyErr {
         }
         Error::Failed { port, motor, failure, .. } => {
             let kind = match failure {
-                Failure::Timeout => Kind::Timeout,
-                _ => Kind::LineLost,
+                Failure::Timeout => Kind::ReplyTimeout,
+                _ => Kind::Link,
             };
             (kind, Facts { port: Some(port), motor: named(motor.0), code: None })
         }
         Error::Reply { port, motor, .. } => {
-            (Kind::LineLost, Facts { port: Some(port), motor: named(motor.0), code: None })
+            (Kind::Link, Facts { port: Some(port), motor: named(motor.0), code: None })
         }
         Error::Unconfirmed { port, .. } => {
-            (Kind::LineLost, Facts { port: Some(port), ..Facts::default() })
+            (Kind::Link, Facts { port: Some(port), ..Facts::default() })
         }
         Error::Limit { motor, .. } => {
-            (Kind::BadValue, Facts { motor: named(motor.0), ..Facts::default() })
+            (Kind::InvalidValue, Facts { motor: named(motor.0), ..Facts::default() })
         }
         Error::Differs { motor, .. } => {
             (Kind::Refused, Facts { motor: Some(motor.number()), ..Facts::default() })
         }
         Error::Port(error) => return port_error(py, error),
-        _ => (Kind::BadValue, Facts::default()),
+        _ => (Kind::InvalidValue, Facts::default()),
     };
     kind.raise(py, error, facts)
 }
@@ -135,13 +135,13 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
         Error::Timeout { port, motor: id, .. }
         | Error::Adapter { port, motor: id, .. }
         | Error::Quarantined { port, motor: id }
-        | Error::Shared { port, motor: id } => (Kind::Timeout, facts(port, id)),
+        | Error::Shared { port, motor: id } => (Kind::ReplyTimeout, facts(port, id)),
         Error::Foreign { port, motor: id, .. }
         | Error::Altered { port, motor: id, .. }
         | Error::Unconfirmed { port, motor: id }
-        | Error::Echo { port, motor: id } => (Kind::LineLost, facts(port, id)),
+        | Error::Echo { port, motor: id } => (Kind::Link, facts(port, id)),
         Error::Twice(id) | Error::OutOfReach(id) | Error::Limit { motor: id, .. } => {
-            (Kind::BadValue, Facts { motor: Some(id.number()), ..Facts::default() })
+            (Kind::InvalidValue, Facts { motor: Some(id.number()), ..Facts::default() })
         }
         Error::FullTurn { motor: id, .. } => {
             let facts = Facts { motor: Some(id.number()), ..Facts::default() };
@@ -149,7 +149,7 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
             return Kind::FullTurn.raise(py, format_args!("{error}; {hint}"), facts);
         }
         Error::Port(error) => return port_error(py, error),
-        _ => (Kind::BadValue, Facts::default()),
+        _ => (Kind::InvalidValue, Facts::default()),
     };
     kind.raise(py, error, facts)
 }
@@ -158,7 +158,7 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
 /// and what another signal raises, goes on.
 pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
     let raised = match error {
-        PortError::WrongKind { .. } => return bad_value(py, error),
+        PortError::WrongKind { .. } => return invalid_value(py, error),
         PortError::Io { source, .. } => source.get_ref().and_then(|raised| raised.downcast_ref()),
         _ => None,
     };
@@ -166,7 +166,7 @@ pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
     match cause {
         Some(cause) if error.is_interruption() || !cause.is_instance_of::<PyException>(py) => cause,
         cause => {
-            let error = Kind::PortError.raise(py, error, Facts::default());
+            let error = Kind::Port.raise(py, error, Facts::default());
             error.set_cause(py, cause);
             error
         }

@@ -6,7 +6,7 @@
 
 mod can;
 mod error;
-mod machine;
+mod event;
 mod number;
 mod rmd;
 mod sampling;
@@ -23,16 +23,19 @@ use pyo3::prelude::*;
 mod _core {
     use std::ffi::OsString;
 
+    use motorlink_proto::time::Micros;
+    use motorlink_proto::units::{Quantity, TurnCentiDegrees};
+
     use super::*;
 
     #[pymodule_export]
     use super::can::CanPort;
     #[pymodule_export]
-    use super::machine::{RmdMachine, StMachine};
+    use super::event::{RmdEventClient, StEventClient};
     #[pymodule_export]
     use super::rmd::{
-        RmdBus, RmdOptions, RmdRequest, RmdSampling, rmd_decode, rmd_errors_text, rmd_motor,
-        rmd_quantities,
+        RmdClient, RmdOptions, RmdRequest, RmdSampling, rmd_decode, rmd_encode, rmd_errors_text,
+        rmd_full_turn_tolerance, rmd_motor, rmd_quantities,
     };
     #[pymodule_export]
     use super::sim::{SimBench, SimPort, SimRecording, SimServing, sim_presets, sim_run};
@@ -45,8 +48,19 @@ mod _core {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         motorlink_testbench::register();
-        module.add("ST_SEGMENTS", motorlink::st::SEGMENTS)?;
+        module.add("ST_SEGMENTS", motorlink_proto::st::SEGMENTS)?;
+        module.add("ST_TIMEOUT", seconds(motorlink_proto::st::TIMEOUT))?;
+        module.add("ST_ATTEMPTS", motorlink_proto::st::VERIFY_ATTEMPTS)?;
+        module.add("RMD_TIMEOUT", seconds(motorlink_proto::rmd::DEFAULT_TIMEOUT))?;
+        module.add("RMD_QUARANTINE", seconds(motorlink_proto::rmd::DEFAULT_QUARANTINE))?;
+        let tolerance = motorlink::rmd::FullTurn::TOLERANCE;
+        module.add("RMD_FULL_TURN_TOLERANCE", TurnCentiDegrees::UNIT.value(tolerance.digits()))?;
+        module.add("RMD_SCAN_WIDTH", motorlink::rmd::SCAN_WIDTH)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+
+    fn seconds(span: Micros) -> f64 {
+        span.0 as f64 / 1e6
     }
 
     /// The descriptors of ports that this process has open.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use motorlink_proto::units::{Quantity, inward};
 use pyo3::prelude::*;
 
-use crate::error::bad_value;
+use crate::error::invalid_value;
 
 /// The nearest digit to `value` in `unit`s, of which a digit has `scale`.
 pub(crate) fn digits<T: TryFrom<i64>>(
@@ -28,7 +28,7 @@ fn fitting<T: TryFrom<i64>>(
     unit: &str,
 ) -> PyResult<T> {
     digits.and_then(|digits| T::try_from(digits).ok()).ok_or_else(|| {
-        bad_value(
+        invalid_value(
             py,
             format_args!("{what} of {value} {unit} does not fit the frame; nothing was sent"),
         )
@@ -43,14 +43,14 @@ pub(crate) fn limit<T: TryFrom<i64>>(
     unit: &str,
 ) -> PyResult<T> {
     if value.is_nan() || value < 0.0 {
-        return Err(bad_value(py, format_args!("{value} {unit} is no limit: give 0 or more")));
+        return Err(invalid_value(py, format_args!("{value} {unit} is no limit: give 0 or more")));
     }
     fitting(py, "a limit", value, Some(inward(value, scale)), unit)
 }
 
 /// The quantity that a program wants, in its unit. What no frame of the protocol says is refused.
 pub(crate) fn wanted<Q: Quantity>(py: Python<'_>, value: f64) -> PyResult<Q> {
-    Q::wanted(value).map_err(|error| bad_value(py, format_args!("{error}; nothing was sent")))
+    Q::wanted(value).map_err(|error| invalid_value(py, format_args!("{error}; nothing was sent")))
 }
 
 /// A duration in s as the wire's ms.
@@ -63,8 +63,9 @@ pub(crate) fn span(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Duratio
     let day = Duration::from_secs(86_400);
     match Duration::try_from_secs_f64(seconds) {
         Ok(span) if !span.is_zero() && span <= day => Ok(span),
-        _ => {
-            Err(bad_value(py, format_args!("{what} of {seconds} s: give more than 0, up to a day")))
-        }
+        _ => Err(invalid_value(
+            py,
+            format_args!("{what} of {seconds} s: give more than 0, up to a day"),
+        )),
     }
 }

@@ -6,7 +6,7 @@ use motorlink::{Clock, LOOK};
 use motorlink_proto::time;
 use pyo3::prelude::*;
 
-use crate::error::bad_value;
+use crate::error::invalid_value;
 use crate::number::span;
 
 /// Rows beyond which something must be wrong with the arguments.
@@ -24,7 +24,7 @@ impl Plan {
         let period = span(py, "a time between samples", 1.0 / rate)?;
         let instants = (span(py, "a time", seconds)?.as_secs_f64() * rate + 1e-6).floor().max(1.0);
         if instants > MOST {
-            return Err(bad_value(py, format_args!("{instants} samples are too many at once")));
+            return Err(invalid_value(py, format_args!("{instants} samples are too many at once")));
         }
         Ok(Plan { period, instants: instants as u32 })
     }
@@ -104,7 +104,7 @@ impl Stepped {
     /// As [`Instants::after`], in s; a row begins where that is 0.
     pub(crate) fn after(&mut self, py: Python<'_>, since: f64) -> PyResult<Option<f64>> {
         let passed = Duration::try_from_secs_f64(since).map_err(|_| {
-            bad_value(py, format_args!("{since} s is no time since the first instant"))
+            invalid_value(py, format_args!("{since} s is no time since the first instant"))
         })?;
         self.time = since;
         Ok(self.instants.after(passed).map(|wait| wait.as_secs_f64()))

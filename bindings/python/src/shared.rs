@@ -29,14 +29,14 @@ impl Owner {
 
 /// What drives a line, and whose it is.
 pub(crate) struct Shared<T> {
-    line: RwLock<Line<T>>,
+    line: RwLock<ClientState<T>>,
     /// Threads with exchanges that may set something moving.
     under_way: UnderWay,
     port: String,
     owner: Owner,
 }
 
-enum Line<T> {
+enum ClientState<T> {
     Open(Arc<T>),
     /// What moves is being stopped.
     Closing(Arc<T>),
@@ -45,7 +45,7 @@ enum Line<T> {
 
 impl<T: Send + Sync> Shared<T> {
     pub(crate) fn new(line: T, port: String) -> Self {
-        let line = RwLock::new(Line::Open(Arc::new(line)));
+        let line = RwLock::new(ClientState::Open(Arc::new(line)));
         Shared { line, under_way: UnderWay::default(), port, owner: Owner::new() }
     }
 
@@ -73,15 +73,15 @@ impl<T: Send + Sync> Shared<T> {
         }
         // Unlocked before the exception is made: handlers of signals run there.
         let line = match &*self.line.read().unwrap_or_else(PoisonError::into_inner) {
-            Line::Open(line) => Some(Arc::clone(line)),
-            Line::Closing(_) | Line::Closed => None,
+            ClientState::Open(line) => Some(Arc::clone(line)),
+            ClientState::Closing(_) | ClientState::Closed => None,
         };
         line.ok_or_else(|| closed(py, &self.port))
     }
 
     /// Whether it was closed.
     pub(crate) fn is_closed(&self) -> bool {
-        !matches!(*self.line.read().unwrap_or_else(PoisonError::into_inner), Line::Open(_))
+        !matches!(*self.line.read().unwrap_or_else(PoisonError::into_inner), ClientState::Open(_))
     }
 
     /// Closes it: `stop` stops what moves, at once, and again when the exchanges of other threads are
@@ -108,7 +108,7 @@ impl<T: Send + Sync> Shared<T> {
                 }
                 stopped = stop(&line);
             }
-            *self.line.write().unwrap_or_else(PoisonError::into_inner) = Line::Closed;
+            *self.line.write().unwrap_or_else(PoisonError::into_inner) = ClientState::Closed;
             stopped
         })
     }
@@ -116,9 +116,9 @@ impl<T: Send + Sync> Shared<T> {
     /// The line, for who closes it.
     fn closing(&self) -> Option<Arc<T>> {
         let mut state = self.line.write().unwrap_or_else(PoisonError::into_inner);
-        let (Line::Open(line) | Line::Closing(line)) = &*state else { return None };
+        let (ClientState::Open(line) | ClientState::Closing(line)) = &*state else { return None };
         let line = Arc::clone(line);
-        *state = Line::Closing(Arc::clone(&line));
+        *state = ClientState::Closing(Arc::clone(&line));
         Some(line)
     }
 }

@@ -1,37 +1,44 @@
-//! The classes of `motorlink._values`, found when they are first needed.
+//! The classes of the Python files, found when they are first needed.
 
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::PyType;
+use pyo3::types::{PyModule, PyTuple, PyType};
 
 macro_rules! classes {
-    ($( $function:ident $name:literal; )+) => { $(
+    ($( $function:ident $module:ident $name:literal; )+) => { $(
         pub(crate) fn $function<'py>(
             py: Python<'py>,
             fields: impl PyCallArgs<'py>,
         ) -> PyResult<Py<PyAny>> {
             static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-            let class = CLASS.import(py, "motorlink._values", $name)?;
+            let class = CLASS.import(py, concat!("motorlink.", stringify!($module)), $name)?;
             Ok(class.call1(fields)?.unbind())
         }
     )+ };
 }
 
 classes! {
-    state "State";
-    control_mode "ControlMode";
-    faults "Faults";
-    info "Info";
-    firmware_version "FirmwareVersion";
-    revup_phase "RevupPhase";
-    register_info "RegisterInfo";
-    motion_status "MotionStatus";
-    motor_errors "MotorErrors";
-    motor_status "MotorStatus";
-    phase_currents "PhaseCurrents";
-    gains "Gains";
-    encoder "Encoder";
-    found "Found";
-    frame "Frame";
+    status _values "Status";
+    control_mode _values "ControlMode";
+    flags _values "Flags";
+    board_info _values "BoardInfo";
+    firmware_version _values "FirmwareVersion";
+    revup_phase _values "RevupPhase";
+    register_info _values "RegisterInfo";
+    errors _values "Errors";
+    scan_result _rmd "ScanResult";
+    frame _values "Frame";
+}
+
+/// A reply of an RMD motor with several values, in the class of its type.
+pub(crate) fn rmd_reply<'py>(
+    py: Python<'py>,
+    class: &str,
+    fields: Bound<'py, PyTuple>,
+) -> PyResult<Py<PyAny>> {
+    static TABLE: PyOnceLock<Py<PyModule>> = PyOnceLock::new();
+    let import = || PyModule::import(py, "motorlink._rmd_table").map(Bound::unbind);
+    let table = TABLE.get_or_try_init(py, import)?.bind(py);
+    Ok(table.getattr(class)?.call1(fields)?.unbind())
 }

@@ -49,14 +49,14 @@ def command() -> str:
 
 
 @pytest.fixture
-def st_bus() -> Iterator[motorlink.st.Bus]:
+def st_bus() -> Iterator[motorlink.st.Client]:
     """A bus with a simulated drive."""
     with motorlink.st.open("sim:") as bus:
         yield bus
 
 
 @pytest.fixture
-def rmd_bus() -> Iterator[motorlink.rmd.Bus]:
+def rmd_bus() -> Iterator[motorlink.rmd.Client]:
     """A bus with four simulated motors."""
     with motorlink.rmd.open("sim:", timeout=PATIENT) as bus:
         yield bus

@@ -104,10 +104,10 @@ def test_exchanges_with_different_motors_overlap(motors: Motors) -> None:
     async def main() -> None:
         async with aio.rmd.open(motors.port, timeout=5) as bus:
             motors.together = 8
-            answers = await asyncio.gather(*(bus.motor(id).motion() for id in range(1, 9)))
+            answers = await asyncio.gather(*(bus.motor(id).motion_status() for id in range(1, 9)))
             assert [answer.speed_dps for answer in answers] == list(range(1, 9))
             motors.together = 1
-            both = await asyncio.gather(bus.motor(3).motion(), bus.motor(3).motion())
+            both = await asyncio.gather(bus.motor(3).motion_status(), bus.motor(3).motion_status())
             assert [answer.speed_dps for answer in both] == [3, 3]
 
     asyncio.run(asyncio.wait_for(main(), 60))
@@ -116,16 +116,16 @@ def test_exchanges_with_different_motors_overlap(motors: Motors) -> None:
 def test_cycles_and_four_torques_tell_what_each_motor_answered(motors: Motors) -> None:
     async def main() -> None:
         async with aio.rmd.open(motors.port, timeout=PATIENT) as bus:
-            answers = await bus.cycle({2: rmd.speed(10), 20: rmd.read_motion(), 1: rmd.stop()})
+            answers = await bus.cycle({2: rmd.set_speed(10), 20: rmd.read_motion_status(), 1: rmd.stop()})
             assert answers[2].speed_dps == 2 and answers[1] is None
-            assert isinstance(answers[20], motorlink.Timeout) and answers[20].motor == 20
-            four = await bus.torque4(0.1, 0.2, 0.3, 0.4, expect=[4, 2])
-            assert [four[id] for id in (2, 4)] == [await bus.motor(id).motion() for id in (2, 4)]
+            assert isinstance(answers[20], motorlink.ReplyTimeoutError) and answers[20].motor == 20
+            four = await bus.set_torque4([0.1, 0.2, 0.3, 0.4], expect=[4, 2])
+            assert [four[id] for id in (2, 4)] == [await bus.motor(id).motion_status() for id in (2, 4)]
             assert len(four) == 2
-            with pytest.raises(motorlink.BadValue, match="beyond"):
-                await bus.torque4(0, 0, 0, 33)
-            with pytest.raises(motorlink.BadValue, match="motor 5"):
-                await bus.torque4(0, 0, 0, 0, expect=[5])
+            with pytest.raises(motorlink.InvalidValueError, match="beyond"):
+                await bus.set_torque4([0, 0, 0, 33])
+            with pytest.raises(motorlink.InvalidValueError, match="motor 5"):
+                await bus.set_torque4([0, 0, 0, 0], expect=[5])
             assert bus.moving == [1, 2, 3, 4], "the frame reached all four"
 
     asyncio.run(asyncio.wait_for(main(), 60))
@@ -133,12 +133,12 @@ def test_cycles_and_four_torques_tell_what_each_motor_answered(motors: Motors) -
 
 def test_a_late_reply_to_a_cancelled_exchange_is_nobody_elses(motors: Motors) -> None:
     async def main() -> None:
-        async with aio.rmd.open(motors.port, timeout=30, guard=2) as bus:
+        async with aio.rmd.open(motors.port, timeout=30, quarantine=2) as bus:
             motor = bus.motor(1)
-            await motor.motion()
+            await motor.motion_status()
             motors.heard.clear()
             motors.delay = lambda id: 0.02
-            exchange = asyncio.ensure_future(motor.motion())
+            exchange = asyncio.ensure_future(motor.motion_status())
             while (1, 0x9C) not in motors.heard:
                 assert not exchange.done(), exchange
                 await asyncio.sleep(0)
@@ -148,7 +148,7 @@ def test_a_late_reply_to_a_cancelled_exchange_is_nobody_elses(motors: Motors) ->
             motors.delay = lambda id: 0
             # The same command: only the wait for the late reply tells the two apart.
             before = len(motors.heard)
-            assert (await motor.motion()).speed_dps == 1
+            assert (await motor.motion_status()).speed_dps == 1
             assert motors.heard[before:] == [(1, 0x9C)], "it was asked once, after the late reply"
             # An Off does not wait.
             await motor.off()
@@ -162,11 +162,11 @@ def test_cancelled_exchanges_leave_nothing_behind_for_others(motors: Motors, see
     motors.delay = lambda id: rng.choice([0, 0.001, 0.004])
     answered = cancelled = 0
 
-    async def caller(bus: aio.rmd.Bus, choice: random.Random) -> None:
+    async def caller(bus: aio.rmd.Client, choice: random.Random) -> None:
         nonlocal answered, cancelled
         for _ in range(4):
             id = choice.randrange(1, 9)
-            task = asyncio.ensure_future(bus.motor(id).motion())
+            task = asyncio.ensure_future(bus.motor(id).motion_status())
             if choice.random() < 0.4:
                 await asyncio.sleep(choice.random() * 0.004)
                 task.cancel()
@@ -178,14 +178,14 @@ def test_cancelled_exchanges_leave_nothing_behind_for_others(motors: Motors, see
 
     async def main() -> None:
         before = os.listdir("/proc/self/fd")
-        bus = await aio.rmd.open(motors.port, timeout=10, guard=0.02)
+        bus = await aio.rmd.open(motors.port, timeout=10, quarantine=0.02)
         callers = [caller(bus, random.Random(rng.random())) for _ in range(8)]
         await asyncio.wait_for(asyncio.gather(*callers), 60)
-        answers = await bus.cycle({id: rmd.read_motion() for id in range(1, 9)})
+        answers = await bus.cycle({id: rmd.read_motion_status() for id in range(1, 9)})
         told = {
             id: answer.speed_dps
             for id, answer in answers.items()
-            if not isinstance(answer, motorlink.Timeout)
+            if not isinstance(answer, motorlink.ReplyTimeoutError)
         }
         assert all(id == speed for id, speed in told.items())
         await bus.close()
@@ -200,16 +200,16 @@ def test_a_port_that_went_away_is_lost_and_then_opened_again(motors: Motors) -> 
     async def main() -> None:
         async with aio.rmd.open(motors.port, timeout=5) as bus:
             motors.delay = lambda id: 5.0
-            waiting = [asyncio.ensure_future(bus.motor(id).motion()) for id in (1, 2)]
+            waiting = [asyncio.ensure_future(bus.motor(id).motion_status()) for id in (1, 2)]
             while len(motors.heard) < 2:
                 assert not any(task.done() for task in waiting), waiting
                 await asyncio.sleep(0.001)
             motors.hang_up()
             for task in waiting:
-                with pytest.raises(motorlink.LineLost):
+                with pytest.raises(motorlink.LinkError):
                     await asyncio.wait_for(task, 10)
             motors.delay = lambda id: 0.0
-            assert (await bus.motor(1).motion()).speed_dps == 1
+            assert (await bus.motor(1).motion_status()).speed_dps == 1
 
     asyncio.run(asyncio.wait_for(main(), 60))
 
@@ -220,9 +220,9 @@ def test_the_end_does_to_moving_motors_what_it_was_told(
 ) -> None:
     async def work() -> None:
         async with aio.rmd.open(motors.port, timeout=5, on_close=on_close) as bus:
-            await bus.motor(1).speed(10)
-            await bus.motor(2).torque(0.1)
-            await bus.motor(3).motion()
+            await bus.motor(1).set_speed(10)
+            await bus.motor(2).set_torque(0.1)
+            await bus.motor(3).motion_status()
             assert sorted(bus.moving) == [1, 2]
             await asyncio.sleep(3600)
 
@@ -253,11 +253,11 @@ def test_a_move_that_could_be_nearly_a_full_turn_is_refused(served: Served) -> N
     async def main() -> None:
         async with aio.rmd.open(served.can, timeout=2) as bus:
             motor = bus.motor(1)
-            angle = await motor.circle_angle()
-            with pytest.raises(motorlink.FullTurn):
-                await motor.turn_to(angle)
+            angle = await motor.single_turn_angle()
+            with pytest.raises(motorlink.FullTurnError):
+                await motor.set_single_turn_position(angle)
             assert bus.moving == []
-            await motor.turn_to(angle, full_turn=True)
+            await motor.set_single_turn_position(angle, full_turn=True)
             assert bus.moving == [1]
 
     asyncio.run(asyncio.wait_for(main(), 60))
@@ -267,15 +267,15 @@ def test_served_motors_turn_to_where_they_are_told(served: Served) -> None:
     async def main() -> None:
         async with aio.rmd.open(served.can, timeout=2) as bus:
             motor = bus.motor(2)
-            motor.set_limits(speed=400)
-            with pytest.raises(motorlink.BadValue, match="limit"):
-                await motor.move_to(45, max_speed=401)
-            await motor.move_to(45, max_speed=400)
-            while abs(await motor.angle() - 45) > 1:
+            motor.set_limits(speed_limit_dps=400)
+            with pytest.raises(motorlink.InvalidValueError, match="limit"):
+                await motor.set_position(45, max_speed_dps=401)
+            await motor.set_position(45, max_speed_dps=400)
+            while abs(await motor.multi_turn_angle() - 45) > 1:
                 await asyncio.sleep(0.01)
-            await motor.write_gains((await motor.gains())._replace(speed_kp=50))
-            assert (await motor.gains()).speed_kp == 50
-            with pytest.raises(motorlink.BadValue, match="rom=True"):
-                await motor.write_zero(rom=False)
+            await motor.write_pid_ram((await motor.pid())._replace(speed_kp=50))
+            assert (await motor.pid()).speed_kp == 50
+            with pytest.raises(motorlink.InvalidValueError, match="rom=True"):
+                await motor.raw(bytes([0x19]) + bytes(7))
 
     asyncio.run(asyncio.wait_for(main(), 60))

@@ -39,10 +39,10 @@ async def within(seconds: float, awaitable: Awaitable[T]) -> T:
     return await asyncio.wait_for(awaitable, seconds)
 
 
-async def asked(bus: aio.st.Bus, drive: Drive, choice: random.Random) -> None:
+async def asked(bus: aio.st.Client, drive: Drive, choice: random.Random) -> None:
     """One exchange with any motor, checked."""
     motor, (name, number) = choice.randrange(1, 8), choice.choice(sorted(REGISTERS.items()))
-    assert await bus.motor(motor).read(name) == value(drive.number, motor, number)
+    assert await bus.motor(motor).get(name) == value(drive.number, motor, number)
 
 
 def test_four_buses_with_many_tasks_each_give_everybody_their_own_answers(
@@ -52,7 +52,7 @@ def test_four_buses_with_many_tasks_each_give_everybody_their_own_answers(
     for drive in drives:
         drive.delay = functools.partial(random.Random(drive.number).choice, [0, 0, 0, 0.001])
 
-    async def caller(bus: aio.st.Bus, drive: Drive, seed: float) -> None:
+    async def caller(bus: aio.st.Client, drive: Drive, seed: float) -> None:
         choice = random.Random(seed)
         for _ in range(25):
             await asked(bus, drive, choice)
@@ -81,7 +81,7 @@ def test_cancelled_exchanges_leave_nothing_behind_for_others(
         drive.delay = lambda: rng.choice([0, 0.002, 0.008])
     cancelled = answered = 0
 
-    async def caller(bus: aio.st.Bus, drive: Drive, choice: random.Random) -> None:
+    async def caller(bus: aio.st.Client, drive: Drive, choice: random.Random) -> None:
         nonlocal cancelled, answered
         for _ in range(3):
             task = asyncio.ensure_future(asked(bus, drive, choice))
@@ -121,8 +121,8 @@ def test_a_task_that_is_cancelled_while_it_waits_for_its_turn_costs_nothing(driv
 
     async def main() -> None:
         async with aio.st.open(drive.path) as bus:
-            first = asyncio.ensure_future(bus.motor(1).read("SPEED_REF"))
-            others = [asyncio.ensure_future(bus.motor(n).read("SPEED_MEAS")) for n in (2, 3, 4)]
+            first = asyncio.ensure_future(bus.motor(1).get("SPEED_REF"))
+            others = [asyncio.ensure_future(bus.motor(n).get("SPEED_MEAS")) for n in (2, 3, 4)]
             await asyncio.sleep(0.005)
             others[1].cancel()
             assert await first == value(3, 1, REGISTERS["SPEED_REF"])
@@ -137,7 +137,7 @@ def test_exchanges_are_carried_out_in_the_order_in_which_they_were_asked_for(dri
     async def main() -> None:
         order: list[int] = []
 
-        async def start(bus: aio.st.Bus, motor: int) -> None:
+        async def start(bus: aio.st.Client, motor: int) -> None:
             await bus.motor(motor).start()
             order.append(motor)
 
@@ -156,10 +156,10 @@ def test_the_end_stops_what_was_started(drive: Drive) -> None:
                 await bus.motor(2).start()
                 await bus.motor(5).start()
                 await bus.motor(5).stop()
-                assert bus.started == [2]
+                assert bus.moving == [2]
                 raise ZeroDivisionError
-        with pytest.raises(motorlink.Closed):
-            await bus.info()
+        with pytest.raises(motorlink.ClosedError):
+            await bus.board_info()
 
     asyncio.run(within(60, main()))
     assert drive.executed == [(2, START), (5, START), (5, STOP), (2, STOP)]
@@ -172,7 +172,7 @@ def test_a_task_that_is_cancelled_again_and_again_still_stops_what_it_started(dr
             drive.delay = lambda: 0.05
             running.set()
             while True:
-                await bus.motor(1).read("SPEED_MEAS")
+                await bus.motor(1).get("SPEED_MEAS")
 
     async def main() -> None:
         running = asyncio.Event()
@@ -209,11 +209,11 @@ def test_close_ends_the_exchanges_of_others(drive: Drive) -> None:
     async def main() -> None:
         drive.delay = lambda: 0.5
         bus = await aio.st.open(drive.path)
-        waiting = [asyncio.ensure_future(bus.motor(n).read("SPEED_REF")) for n in (1, 2)]
+        waiting = [asyncio.ensure_future(bus.motor(n).get("SPEED_REF")) for n in (1, 2)]
         await asyncio.sleep(0.01)
         await bus.close()
         for task in waiting:
-            with pytest.raises(motorlink.Closed):
+            with pytest.raises(motorlink.ClosedError):
                 await task
         await bus.close()
 
@@ -234,18 +234,18 @@ def test_a_port_that_went_away_is_lost_and_then_opened_again(drive: Drive) -> No
         async with aio.st.open(drive.path) as bus:
             motor = bus.motor(1)
             drive.delay = lambda: 5.0
-            exchange = asyncio.ensure_future(motor.read("SPEED_REF"))
+            exchange = asyncio.ensure_future(motor.get("SPEED_REF"))
             await asyncio.sleep(0.01)
             drive.unplug()
-            with pytest.raises(motorlink.LineLost, match="hung up"):
+            with pytest.raises(motorlink.LinkError, match="hung up"):
                 await within(10, exchange)
             with pytest.raises(motorlink.PortError, match=str(drive.path)):
-                await motor.read("SPEED_REF")
+                await motor.get("SPEED_REF")
             drive.delay = lambda: 0.0
             drive.plug()
             while True:
                 try:
-                    assert await motor.read("SPEED_REF") == value(3, 1, REGISTERS["SPEED_REF"])
+                    assert await motor.get("SPEED_REF") == value(3, 1, REGISTERS["SPEED_REF"])
                     break
                 except motorlink.PortError:
                     await asyncio.sleep(0.01)
@@ -256,7 +256,7 @@ def test_a_port_that_went_away_is_lost_and_then_opened_again(drive: Drive) -> No
             drive.plug()
             while True:
                 try:
-                    await motor.read("SPEED_REF")
+                    await motor.get("SPEED_REF")
                     break
                 except motorlink.PortError:
                     await asyncio.sleep(0.01)
@@ -269,17 +269,17 @@ def test_a_port_that_went_away_is_lost_and_then_opened_again(drive: Drive) -> No
 def test_errors_are_those_of_the_blocking_api(drive: Drive) -> None:
     def blocking() -> list[str]:
         told = []
-        with motorlink.st.open(drive.path, speed_limit=100) as bus:
+        with motorlink.st.open(drive.path, speed_limit_rpm=100) as bus:
             for call in (
-                lambda: bus.motor(9).read("SPEED_REF"),
-                lambda: bus.motor(1).read("NO_SUCH"),
-                lambda: bus.motor(1).ramp(101, 1),
-                lambda: bus.motor(1).revup(9),
-                lambda: bus.motor(1).write("SPEED_KP", 1),
-                lambda: bus.motor(1).move_to(1, 1),
+                lambda: bus.motor(9).get("SPEED_REF"),
+                lambda: bus.motor(1).get("NO_SUCH"),
+                lambda: bus.motor(1).set_ramp(101, 1),
+                lambda: bus.motor(1).revup_data(9),
+                lambda: bus.motor(1).set("SPEED_KP", 1),
+                lambda: bus.motor(1).set_position(1, 1),
                 lambda: bus.motor(1).start(),
-                lambda: bus.exchange_raw(0x12, bytes(8)),
-                lambda: bus.exchange_raw(0x20),
+                lambda: bus.raw(0x12, bytes(8)),
+                lambda: bus.raw(0x20),
             ):
                 with pytest.raises(motorlink.MotorlinkError) as error:
                     call()
@@ -288,17 +288,17 @@ def test_errors_are_those_of_the_blocking_api(drive: Drive) -> None:
 
     async def awaited() -> list[str]:
         told = []
-        async with aio.st.open(drive.path, speed_limit=100) as bus:
+        async with aio.st.open(drive.path, speed_limit_rpm=100) as bus:
             for call in (
-                lambda: bus.motor(9).read("SPEED_REF"),
-                lambda: bus.motor(1).read("NO_SUCH"),
-                lambda: bus.motor(1).ramp(101, 1),
-                lambda: bus.motor(1).revup(9),
-                lambda: bus.motor(1).write("SPEED_KP", 1),
-                lambda: bus.motor(1).move_to(1, 1),
+                lambda: bus.motor(9).get("SPEED_REF"),
+                lambda: bus.motor(1).get("NO_SUCH"),
+                lambda: bus.motor(1).set_ramp(101, 1),
+                lambda: bus.motor(1).revup_data(9),
+                lambda: bus.motor(1).set("SPEED_KP", 1),
+                lambda: bus.motor(1).set_position(1, 1),
                 lambda: bus.motor(1).start(),
-                lambda: bus.exchange_raw(0x12, bytes(8)),
-                lambda: bus.exchange_raw(0x20),
+                lambda: bus.raw(0x12, bytes(8)),
+                lambda: bus.raw(0x20),
             ):
                 with pytest.raises(motorlink.MotorlinkError) as error:
                     await call()
@@ -310,30 +310,30 @@ def test_errors_are_those_of_the_blocking_api(drive: Drive) -> None:
 
 def test_a_start_needs_a_ramp_within_the_speed_limit() -> None:
     async def main() -> None:
-        async with aio.st.open("sim:", speed_limit=100) as bus:
+        async with aio.st.open("sim:", speed_limit_rpm=100) as bus:
             motor = bus.motor(1)
             for start in (
                 lambda: motor.start(),
                 lambda: motor.execute("START_STOP"),
-                lambda: bus.exchange_raw(0x03, b"\x01", motor=1),
+                lambda: bus.raw(0x03, b"\x01", motor=1),
             ):
-                with pytest.raises(motorlink.BadValue, match=r"first `ramp\(...\)`"):
+                with pytest.raises(motorlink.InvalidValueError, match=r"first `(set_)?ramp\(...\)`"):
                     await start()
-            assert bus.started == []
-            await motor.ramp(100, 0)
+            assert bus.moving == []
+            await motor.set_ramp(100, 0)
             await motor.start()
-            assert bus.started == [1]
+            assert bus.moving == [1]
 
     asyncio.run(within(60, main()))
 
 
 def test_a_bus_belongs_to_one_loop(drive: Drive) -> None:
-    async def opened() -> aio.st.Bus:
+    async def opened() -> aio.st.Client:
         return await aio.st.open("sim:")
 
     bus = asyncio.run(opened())
     with pytest.raises(RuntimeError, match="another event loop"):
-        asyncio.run(bus.info())
+        asyncio.run(bus.board_info())
 
 
 def test_an_opening_that_is_cancelled_leaves_the_port_free(drive: Drive) -> None:
@@ -346,7 +346,7 @@ def test_an_opening_that_is_cancelled_leaves_the_port_free(drive: Drive) -> None
         while True:
             try:
                 async with aio.st.open(drive.path) as bus:
-                    await bus.motor(1).read("SPEED_REF")
+                    await bus.motor(1).get("SPEED_REF")
                 return
             except motorlink.PortError:
                 await asyncio.sleep(0.001)
@@ -358,7 +358,7 @@ def test_the_simulated_drive_runs_beside_other_tasks() -> None:
     async def main() -> None:
         async with aio.st.open("sim:") as bus, aio.st.open("sim:") as other:
             motor = bus.motor(1)
-            await motor.ramp(1000, 0.1)
+            await motor.set_ramp(1000, 0.1)
             await motor.start()
 
             async def until_it_runs() -> None:
@@ -367,11 +367,11 @@ def test_the_simulated_drive_runs_beside_other_tasks() -> None:
 
             async def meanwhile() -> None:
                 while not running.done():
-                    assert await other.motor(1).read("SPEED_MEAS") == 0
+                    assert await other.motor(1).get("SPEED_MEAS") == 0
 
             running = asyncio.ensure_future(until_it_runs())
             await within(30, asyncio.gather(running, meanwhile()))
-            assert bus.started == [1] and not await motor.faults()
+            assert bus.moving == [1] and not await motor.flags()
 
     asyncio.run(within(60, main()))
 
@@ -380,13 +380,13 @@ def test_a_verified_write_is_that_of_the_blocking_api() -> None:
     async def main() -> None:
         async with aio.st.open("sim:") as bus:
             motor = bus.motor(1)
-            assert await motor.write_verified("SPEED_KP", 321) == 1
-            assert await motor.read("SPEED_KP") == 321
-            assert await motor.write_verified("SPEED_KP", -5) == 1
-            with pytest.raises(motorlink.BadValue, match="cannot be verified"):
-                await motor.write_verified("TORQUE_REF", 100)
-            with pytest.raises(motorlink.Refused):
-                await bus.motor(7).write_verified("SPEED_KP", 1)
+            assert await motor.set_verified("SPEED_KP", 321) == 1
+            assert await motor.get("SPEED_KP") == 321
+            assert await motor.set_verified("SPEED_KP", -5) == 1
+            with pytest.raises(motorlink.InvalidValueError, match="cannot be verified"):
+                await motor.set_verified("TORQUE_REF", 100)
+            with pytest.raises(motorlink.RefusedError):
+                await bus.motor(7).set_verified("SPEED_KP", 1)
 
     asyncio.run(within(60, main()))
 
@@ -397,9 +397,9 @@ def test_a_verified_write_is_repeated_and_says_what_it_found(drive: Drive) -> No
 
     async def main() -> None:
         async with aio.st.open(drive.path) as bus:
-            assert await bus.motor(1).write_verified("SPEED_KP", 7) == 2
-            with pytest.raises(motorlink.Refused, match="should be 7 and reads 6"):
-                await bus.motor(1).write_verified("SPEED_KP", 7)
+            assert await bus.motor(1).set_verified("SPEED_KP", 7) == 2
+            with pytest.raises(motorlink.RefusedError, match="should be 7 and reads 6"):
+                await bus.motor(1).set_verified("SPEED_KP", 7)
         assert next(answers, None) is None
 
     asyncio.run(within(60, main()))

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 BLOCKING_ONLY = {"confirm"}
 
 PAIRS = [
-    (st.Bus, aio.st.Bus),
+    (st.Client, aio.st.Client),
     (st.Motor, aio.st.Motor),
-    (rmd.Bus, aio.rmd.Bus),
+    (rmd.Client, aio.rmd.Client),
     (rmd.Motor, aio.rmd.Motor),
 ]
 
@@ -54,7 +54,7 @@ def test_both_apis_have_the_same_methods(blocking: type, awaited: type) -> None:
 def test_both_apis_open_with_the_same_arguments(blocking: Any, awaited: Any) -> None:
     ours, theirs = inspect.signature(blocking.open), inspect.signature(awaited.open)
     assert ours.parameters == theirs.parameters
-    assert (ours.return_annotation, theirs.return_annotation) == ("Bus", "Opening[Bus]")
+    assert (ours.return_annotation, theirs.return_annotation) == ("Client", "Opening[Client]")
     assert inspect.getdoc(blocking.open) == inspect.getdoc(awaited.open)
     assert (blocking.open.__name__, blocking.open.__module__) == ("open", blocking.__name__)
 
@@ -126,7 +126,7 @@ def test_a_method_that_a_subclass_replaces_stays_replaced() -> None:
 def test_a_read_cannot_be_assigned() -> None:
     with rmd.open("sim:") as bus:
         with pytest.raises(AttributeError, match="read-only"):
-            bus.motor(1).gains = bus.motor(1).gains()  # type: ignore[misc, assignment]
+            bus.motor(1).pid = bus.motor(1).pid()  # type: ignore[misc, assignment]
 
 
 def in_a_thread(method: Callable[[], object]) -> None:
@@ -138,8 +138,8 @@ def in_a_thread(method: Callable[[], object]) -> None:
 def test_a_read_without_brackets_is_no_value() -> None:
     """`while motor.status != "RUN":` would go on for ever, with the motor turning."""
     with st.open("sim:") as drive, rmd.open("sim:") as bus:
-        reads: list[Any] = [drive.motor(1).status, drive.motor(1).faults, drive.info]
-        reads += [bus.motor(1).angle, bus.motor(1).status, bus.motor(1).motion]
+        reads: list[Any] = [drive.motor(1).status, drive.motor(1).flags, drive.board_info]
+        reads += [bus.motor(1).multi_turn_angle, bus.motor(1).status, bus.motor(1).motion_status]
         for read in reads:
             for taken in (
                 lambda read: read == "RUN",
@@ -158,27 +158,27 @@ def test_a_read_without_brackets_is_no_value() -> None:
         assert drive.motor(1).status() != "RUN"
 
 
-def types_of_the_blocking_api(bus: st.Bus, motors: rmd.Bus) -> None:
+def types_of_the_blocking_api(bus: st.Client, motors: rmd.Client) -> None:
     """Read by mypy, never run."""
-    assert_type(st.open("sim:"), st.Bus)
+    assert_type(st.open("sim:"), st.Client)
     assert_type(bus.motor(1), st.Motor)
-    assert_type(bus.motor(1).bus, st.Bus)
-    assert_type(bus.motor(1).read("STATUS"), float)
-    assert_type(bus.motor(1).status(), st.State)
-    assert_type(motors.motor(1).gains(), rmd.Gains)
-    assert_type(motors.motor(1).speed(1), rmd.MotionStatus)
-    bus.motor(1).ramp("fast", 1)  # type: ignore[arg-type]
-    bus.motor(1).ramp(1)  # type: ignore[call-arg]
+    assert_type(bus.motor(1).client, st.Client)
+    assert_type(bus.motor(1).get("STATUS"), float)
+    assert_type(bus.motor(1).status(), st.Status)
+    assert_type(motors.motor(1).pid(), rmd.Pid)
+    assert_type(motors.motor(1).set_speed(1), rmd.MotionStatus)
+    bus.motor(1).set_ramp("fast", 1)  # type: ignore[arg-type]
+    bus.motor(1).set_ramp(1)  # type: ignore[call-arg]
     st.open("sim:", profil="spec")  # type: ignore[call-arg]
 
 
-async def types_of_asyncio(bus: aio.st.Bus, motors: aio.rmd.Bus) -> None:
+async def types_of_asyncio(bus: aio.st.Client, motors: aio.rmd.Client) -> None:
     """Read by mypy, never run."""
-    assert_type(await aio.st.open("sim:"), aio.st.Bus)
-    assert_type(bus.motor(1).bus, aio.st.Bus)
-    assert_type(await bus.motor(1).read("STATUS"), float)
-    assert_type(await motors.motor(1).gains(), rmd.Gains)
-    status: Coroutine[Any, Any, st.State] = bus.motor(1).status()
-    assert_type(await status, st.State)
+    assert_type(await aio.st.open("sim:"), aio.st.Client)
+    assert_type(bus.motor(1).client, aio.st.Client)
+    assert_type(await bus.motor(1).get("STATUS"), float)
+    assert_type(await motors.motor(1).pid(), rmd.Pid)
+    status: Coroutine[Any, Any, st.Status] = bus.motor(1).status()
+    assert_type(await status, st.Status)
     bus.motor(1).stop()  # type: ignore[unused-coroutine]
     aio.st.open(motorlink.sim.Bench())  # type: ignore[arg-type]

@@ -80,10 +80,10 @@ def bus(request: pytest.FixtureRequest) -> Iterator[can.BusABC]:
 
 def test_a_motor_on_a_bus_of_python_can_is_commanded(bus: can.BusABC, motor: Motor) -> None:
     with rmd.open(from_python_can(bus), timeout=2) as motors:
-        assert motors.motor(7).motion().speed_dps == 7
+        assert motors.motor(7).motion_status().speed_dps == 7
         # Answered with the very bytes of the request, as the bus's own echo would be.
         motors.motor(7).stop()
-        assert motors.cycle({7: rmd.speed(100)})[7].speed_dps == 7
+        assert motors.cycle({7: rmd.set_speed(100)})[7].speed_dps == 7
         assert motors.moving == [7]
         assert "python-can" in motors.port
     # First it is asked for its status twice, as another program may have asked it something.
@@ -92,7 +92,7 @@ def test_a_motor_on_a_bus_of_python_can_is_commanded(bus: can.BusABC, motor: Mot
 
 def test_an_echo_is_no_answer(bus: can.BusABC) -> None:
     with rmd.open(from_python_can(bus), timeout=0.05) as motors:
-        with pytest.raises(motorlink.Timeout, match="motor 3"):
+        with pytest.raises(motorlink.ReplyTimeoutError, match="motor 3"):
             motors.motor(3).stop()
 
 
@@ -100,9 +100,9 @@ def test_asyncio_commands_it_as_well(bus: can.BusABC, motor: Motor) -> None:
     async def main() -> None:
         async with aio.rmd.open(from_python_can(bus), timeout=2) as motors:
             one = motors.motor(7)
-            answers = await asyncio.gather(*(one.motion() for _ in range(20)))
+            answers = await asyncio.gather(*(one.motion_status() for _ in range(20)))
             assert all(answer.speed_dps == 7 for answer in answers)
-            await one.speed(100)
+            await one.set_speed(100)
 
     # Those that earlier tests left may end meanwhile.
     threads = set(threading.enumerate())
@@ -137,7 +137,7 @@ class Broken(can.bus.BusABC):
 
 
 def check(error: BaseException) -> None:
-    assert isinstance(error, motorlink.LineLost)
+    assert isinstance(error, motorlink.LinkError)
     assert "the adapter is gone" in str(error)
     assert isinstance(error.__cause__, can.CanOperationError)
 
@@ -145,12 +145,12 @@ def check(error: BaseException) -> None:
 def test_what_the_bus_raises_is_the_cause_of_a_lost_line() -> None:
     bus = Broken(1)
     with rmd.open(from_python_can(bus), timeout=5, on_close="nothing") as motors:
-        with pytest.raises(motorlink.LineLost) as lost:
-            motors.motor(1).motion()
+        with pytest.raises(motorlink.LinkError) as lost:
+            motors.motor(1).motion_status()
         check(lost.value)
         # The next request tries again and fails with the same error.
-        with pytest.raises(motorlink.LineLost) as lost:
-            motors.motor(1).motion()
+        with pytest.raises(motorlink.LinkError) as lost:
+            motors.motor(1).motion_status()
         check(lost.value)
     bus.shutdown()
 
@@ -185,32 +185,32 @@ def flaky(request: pytest.FixtureRequest) -> Iterator[Flaky]:
 def test_a_bus_that_failed_once_is_used_again(flaky: Flaky, motor: Motor) -> None:
     with rmd.open(from_python_can(flaky), timeout=2) as motors:
         one = motors.motor(7)
-        one.speed(100)
+        one.set_speed(100)
         for _ in range(5):
             flaky.fails_to_send = 1
-            with pytest.raises(motorlink.LineLost, match="no room"):
-                one.motion()
-            assert one.motion().speed_dps == 7
+            with pytest.raises(motorlink.LinkError, match="no room"):
+                one.motion_status()
+            assert one.motion_status().speed_dps == 7
             flaky.fails_to_receive = 1
             eventually(lambda: flaky.fails_to_receive == 0, "a failure while nothing is asked")
             # The failure does not keep the motor from being stopped. The error may be raised as late
             # as here.
-            with contextlib.suppress(motorlink.LineLost):
+            with contextlib.suppress(motorlink.LinkError):
                 one.stop()
             one.stop()
             assert motors.moving == []
-            one.speed(100)
+            one.set_speed(100)
     assert motor.heard[-1] == 0x81
 
 
 def test_stops_are_sent_where_nothing_can_be_received(flaky: Flaky, motor: Motor) -> None:
     with rmd.open(from_python_can(flaky), timeout=2, on_close="nothing") as motors:
-        motors.motor(7).speed(100)
+        motors.motor(7).set_speed(100)
         flaky.fails_to_receive = 1_000_000
         for stop, code in ((motors.motor(7).stop, 0x81), (motors.motor(7).off, 0x80)):
             for _ in range(3):
                 motor.heard.clear()
-                with pytest.raises(motorlink.LineLost, match="no room"):
+                with pytest.raises(motorlink.LinkError, match="no room"):
                     stop()
                 eventually(lambda: motor.heard == [code], "a frame that stops the motor")
 
@@ -219,20 +219,20 @@ def test_a_bus_that_failed_once_is_used_again_by_asyncio(flaky: Flaky, motor: Mo
     async def main() -> None:
         async with aio.rmd.open(from_python_can(flaky), timeout=2) as motors:
             one = motors.motor(7)
-            await one.speed(100)
+            await one.set_speed(100)
             for _ in range(5):
                 flaky.fails_to_send = 1
-                with pytest.raises(motorlink.LineLost, match="no room"):
-                    await one.motion()
-                assert (await one.motion()).speed_dps == 7
+                with pytest.raises(motorlink.LinkError, match="no room"):
+                    await one.motion_status()
+                assert (await one.motion_status()).speed_dps == 7
                 flaky.fails_to_receive = 1
                 while flaky.fails_to_receive:
                     await asyncio.sleep(0.005)
-                with contextlib.suppress(motorlink.LineLost):
+                with contextlib.suppress(motorlink.LinkError):
                     await one.stop()
                 await one.stop()
                 assert motors.moving == []
-                await one.speed(100)
+                await one.set_speed(100)
 
     asyncio.run(asyncio.wait_for(main(), 60))
     assert motor.heard[-1] == 0x81
@@ -246,14 +246,14 @@ with can.Bus("interrupted", interface="virtual") as line:
     try:
         with motorlink.rmd.open(motorlink.can.from_python_can(line), timeout=30.0) as bus:
             for _ in range(3):
-                bus.motor(7).speed(100)
+                bus.motor(7).set_speed(100)
                 try:
                     print("asks", flush=True)
-                    bus.motor(3).motion()
+                    bus.motor(3).motion_status()
                 except KeyboardInterrupt:
-                    print("interrupted", bus.motor(7).motion().speed_dps, flush=True)
+                    print("interrupted", bus.motor(7).motion_status().speed_dps, flush=True)
             print("asks", flush=True)
-            bus.motor(3).motion()
+            bus.motor(3).motion_status()
     finally:
         print(other.heard[-1] == 0x81, flush=True)
         other.end()
@@ -279,8 +279,8 @@ def test_ctrl_c_interrupts_a_wait_and_leaves_the_bus_open() -> None:
 def test_and_in_asyncio() -> None:
     async def main(bus: can.BusABC) -> None:
         async with aio.rmd.open(from_python_can(bus), timeout=5, on_close="nothing") as motors:
-            with pytest.raises(motorlink.LineLost) as lost:
-                await motors.motor(1).motion()
+            with pytest.raises(motorlink.LinkError) as lost:
+                await motors.motor(1).motion_status()
             check(lost.value)
 
     for frames in (0, 1):
@@ -293,8 +293,8 @@ def test_served_motors_through_python_cans_own_slcan(served: Served) -> None:
     path = served.can.partition(":")[2]
     with can.Bus(path, interface="slcan", bitrate=1_000_000, sleep_after_open=0) as bus:
         with rmd.open(from_python_can(bus), timeout=2) as motors:
-            motors.motor(1).speed(180)
-            while motors.motor(1).motion().speed_dps < 100:
+            motors.motor(1).set_speed(180)
+            while motors.motor(1).motion_status().speed_dps < 100:
                 pass
             assert [one.id for one in motors.scan([1, 2, 3, 4])] == [1, 2, 3, 4]
     assert served.motor("rmd", 1)["mode"] == "stopped"

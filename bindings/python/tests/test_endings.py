@@ -16,12 +16,12 @@ from conftest import Served, eventually
 from motorlink import rmd, sim, st
 
 
-def start(bus: st.Bus | rmd.Bus) -> None:
+def start(bus: st.Client | rmd.Client) -> None:
     """Sets a motor of a bench turning."""
-    if isinstance(bus, rmd.Bus):
-        bus.motor(1).speed(100)
+    if isinstance(bus, rmd.Client):
+        bus.motor(1).set_speed(100)
     else:
-        bus.motor(2).ramp(500, 0)
+        bus.motor(2).set_ramp(500, 0)
         bus.motor(2).start()
 
 
@@ -33,7 +33,7 @@ def is_turning(bench: sim.Bench, bus: str) -> bool:
 
 
 #: How a bus of each protocol is opened on a bench.
-OPEN: dict[str, Callable[[sim.Bench], st.Bus | rmd.Bus]] = {"st": st.open, "rmd": rmd.open}
+OPEN: dict[str, Callable[[sim.Bench], st.Client | rmd.Client]] = {"st": st.open, "rmd": rmd.open}
 
 
 @pytest.mark.parametrize("kind", OPEN)
@@ -43,8 +43,8 @@ def test_nothing_turns_that_was_started_while_the_bus_was_closed(kind: str) -> N
         bus = OPEN[kind](bench)
         going = threading.Event()
 
-        def use(bus: st.Bus | rmd.Bus = bus, going: threading.Event = going) -> None:
-            with pytest.raises(motorlink.Closed):
+        def use(bus: st.Client | rmd.Client = bus, going: threading.Event = going) -> None:
+            with pytest.raises(motorlink.ClosedError):
                 while True:
                     start(bus)
                     going.set()
@@ -73,7 +73,7 @@ def test_a_bus_that_is_forgotten_stops_its_motors(kind: str) -> None:
 def test_a_bus_that_is_to_leave_its_motors_alone_does_so_when_forgotten() -> None:
     bench = sim.Bench()
     bus = rmd.open(bench, on_close="nothing")
-    bus.motor(1).speed(100)
+    bus.motor(1).set_speed(100)
     del bus
     gc.collect()
     assert is_turning(bench, "rmd")
@@ -82,7 +82,7 @@ def test_a_bus_that_is_to_leave_its_motors_alone_does_so_when_forgotten() -> Non
 BLOCKING = """\
 import sys, motorlink
 bus = motorlink.rmd.open(sys.argv[1], timeout=2.0)
-bus.motor(1).speed(360)
+bus.motor(1).set_speed(360)
 print(bus.moving)
 """
 
@@ -90,7 +90,7 @@ ASYNC = """\
 import asyncio, sys, motorlink.aio
 async def main():
     bus = await motorlink.aio.rmd.open(sys.argv[1], timeout=2.0)
-    await bus.motor(1).speed(360)
+    await bus.motor(1).set_speed(360)
     print(bus.moving)
 asyncio.run(main())
 """
@@ -115,13 +115,13 @@ def test_a_program_that_ends_without_closing_stops_its_motors(served: Served, sc
 def test_a_forked_process_leaves_the_line_alone() -> None:
     bench = sim.Bench()
     with rmd.open(bench) as bus:
-        bus.motor(1).speed(100)
+        bus.motor(1).set_speed(100)
         child = os.fork()
         if child == 0:
             try:
                 try:
                     bus.motor(1).stop()
-                except motorlink.Closed as error:
+                except motorlink.ClosedError as error:
                     assert "another process" in str(error)
                     bus.close()
                     os._exit(7)
@@ -141,9 +141,9 @@ def test_a_signal_handler_may_close_a_bus_that_is_sampled(kind: str) -> None:
         "threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGTERM)).start()",
         "try:",
         "    bus.sample([what], rate=100, seconds=600)",
-        "except motorlink.Closed as error:",
+        "except motorlink.ClosedError as error:",
         "    print(len(error.samples) > 0)",
     ))
-    words = [sys.executable, "-c", script, kind, {"st": "SPEED_MEAS", "rmd": "iq_a"}[kind]]
+    words = [sys.executable, "-c", script, kind, {"st": "SPEED_MEAS", "rmd": "iq_amps"}[kind]]
     out = subprocess.run(words, capture_output=True, text=True, check=True, timeout=60).stdout
     assert out == "True\n"

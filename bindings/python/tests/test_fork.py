@@ -38,7 +38,7 @@ BEGIN = """
 BLOCKING = """
     bus = motorlink.st.open(sys.argv[1])
     motor = bus.motor(1)
-    motor.ramp(500, 0)
+    motor.set_ramp(500, 0)
     motor.start()
     print(fork(), flush=True)
     signal.pause()
@@ -48,7 +48,7 @@ ASYNC = """
     async def main():
         bus = await motorlink.aio.st.open(sys.argv[1])
         motor = bus.motor(1)
-        await motor.ramp(500, 0)
+        await motor.set_ramp(500, 0)
         await motor.start()
         print(fork(), flush=True)
         signal.pause()
@@ -124,7 +124,7 @@ def test_the_port_of_a_killed_parent_is_free(served: Served) -> None:
 CHILD_ENDS = """
     import gc, os, sys, motorlink
     bus = motorlink.rmd.open(sys.argv[1], timeout=2.0)
-    bus.motor(1).speed(100)
+    bus.motor(1).set_speed(100)
     for way in range(3):
         child = os.fork()
         if child == 0:
@@ -135,7 +135,7 @@ CHILD_ENDS = """
                 gc.collect()
             sys.exit(0)
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
-        print(bus.motor(1).motion().temperature_c > 0, bus.moving)
+        print(bus.motor(1).motion_status().temperature_celsius > 0, bus.moving)
     bus.close()
 """
 
@@ -154,12 +154,12 @@ ASYNC_CHILD = """
             child = os.fork()
             if child == 0:
                 try:
-                    bus.started
-                except motorlink.Closed as error:
+                    bus.moving
+                except motorlink.ClosedError as error:
                     print("another process" in str(error), flush=True)
                 os._exit(0)
             os.waitpid(child, 0)
-            print(bus.started, await bus.motor(1).read("SPEED_MEAS"))
+            print(bus.moving, await bus.motor(1).get("SPEED_MEAS"))
     asyncio.run(main())
 """
 

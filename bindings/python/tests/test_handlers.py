@@ -86,8 +86,8 @@ STOP_WHILE_DEAF = """
         motor.start()
         on_signal(motor.stop)
         signal_later(0.1)
-        waits(lambda: motor.read("SPEED_REF"))
-        print(bus.started)
+        waits(lambda: motor.get("SPEED_REF"))
+        print(bus.moving)
 """
 
 
@@ -106,11 +106,11 @@ def test_a_handler_stops_a_motor_while_an_answer_is_awaited(tmp_path: Path) -> N
 
 CLOSE_WHILE_SILENT = """
     bus = motorlink.st.open(sys.argv[1], timeout=0.2)
-    bus.motor(1).read("SPEED_MEAS")
+    bus.motor(1).get("SPEED_MEAS")
     def close():
         try:
             bus.close()
-        except motorlink.LineLost:
+        except motorlink.LinkError:
             print("may still be running", flush=True)
     on_signal(close)
     signal_later(0.1)
@@ -126,7 +126,7 @@ def test_a_handler_closes_a_bus_whose_drive_is_silent(tmp_path: Path) -> None:
         drive.answers = len(QUESTIONS) + 2
         try:
             said = ends(program(CLOSE_WHILE_SILENT, str(drive.path)))
-            assert said == ["may still be running", "PortError True", "Closed False"]
+            assert said == ["may still be running", "PortError True", "ClosedError False"]
             start, stop = frame(0x23, bytes([START])), frame(0x23, bytes([STOP]))
             _, _, behind = drive.heard.partition(start)
             assert behind.startswith(stop)
@@ -138,10 +138,10 @@ IDLE_HANDLER = """
     ran = []
     with motorlink.st.open(sys.argv[1], timeout=30.0) as bus:
         motor = bus.motor(1)
-        on_signal(lambda: ran.append(bus.started))
+        on_signal(lambda: ran.append(bus.moving))
         for _ in range(20):
             signal_later(0.01)
-            print(motor.read("SPEED_MEAS"), flush=True)
+            print(motor.get("SPEED_MEAS"), flush=True)
     assert len(ran) == 20, ran
 """
 
@@ -166,7 +166,7 @@ HANDLER_AT_RANDOM = """
     on_signal(stop)
     going = True
     def ask():
-        bus.motor(1).read("STATUS") if kind == "st" else bus.motor(1).motion()
+        bus.motor(1).get("STATUS") if kind == "st" else bus.motor(1).motion_status()
     with getattr(motorlink, kind).open(port, timeout=2.0) as bus:
         ask()
         thread = signals_until(lambda: not going)
@@ -175,7 +175,7 @@ HANDLER_AT_RANDOM = """
                 ask()
             except motorlink.PortError as error:
                 assert "given up" in str(error), error
-        data = bus.sample(["SPEED_MEAS" if kind == "st" else "iq_a"], rate=200, seconds=0.3)
+        data = bus.sample(["SPEED_MEAS" if kind == "st" else "iq_amps"], rate=200, seconds=0.3)
         going = False
         thread.join()
     print(len(data) > 0)
@@ -201,12 +201,12 @@ STOP_ON_PYTHON_CAN = """
                 done.append(True)
             on_signal(stop)
             # An exchange that brings the motor in step takes long: handlers would mostly meet each other.
-            motor.motion()
+            motor.motion_status()
             thread = signals_until(lambda: len(done) >= 10)
             while thread.is_alive():
                 try:
-                    motor.speed(100)
-                    motor.motion()
+                    motor.set_speed(100)
+                    motor.motion_status()
                 except motorlink.PortError as error:
                     assert "given up" in str(error), error
             print(0x81 in other.heard)
@@ -226,12 +226,12 @@ ASYNCIO = """
             motor = bus.motor(1)
             await motor.start()
             loop = asyncio.get_running_loop()
-            waiting = loop.create_task(motor.read("SPEED_REF"))
+            waiting = loop.create_task(motor.get("SPEED_REF"))
             loop.add_signal_handler(signal.SIGUSR1, waiting.cancel)
             signal_later(0.1)
             await asyncio.wait([waiting])
             await motor.stop()
-            print(waiting.cancelled(), bus.started)
+            print(waiting.cancelled(), bus.moving)
     asyncio.run(main())
 """
 
@@ -257,9 +257,9 @@ ASYNC_ON_PYTHON_CAN = """
             thread = signals_until(lambda: len(done) >= 50)
             while thread.is_alive():
                 # Sending and making an exception are what handlers may interrupt.
-                asks = [bus.motor(7 if n else 3).motion() for n in range(40)]
+                asks = [bus.motor(7 if n else 3).motion_status() for n in range(40)]
                 silent, *answers = await asyncio.gather(*asks, return_exceptions=True)
-                assert isinstance(silent, motorlink.Timeout), silent
+                assert isinstance(silent, motorlink.ReplyTimeoutError), silent
     with can.Bus("looped handlers", interface="virtual") as line:
         asyncio.run(main())
     other.end()
@@ -275,18 +275,18 @@ def test_a_handler_may_ask_a_bus_of_asyncio_whenever_it_comes() -> None:
 SECOND_SIGNAL = """
     with motorlink.st.open(sys.argv[1], timeout=30.0, on_close="nothing") as bus:
         motor = bus.motor(1)
-        motor.read("SPEED_MEAS")
+        motor.get("SPEED_MEAS")
         def stop():
             signal.signal(signal.SIGUSR1, lambda *_: None)
             signal_later(0.1)
             try:
-                motor.read("SPEED_REF")
+                motor.get("SPEED_REF")
             except KeyboardInterrupt:
                 print("interrupted", flush=True)
             motor.stop()
         on_signal(stop)
         signal_later(0.1)
-        waits(lambda: motor.read("SPEED_REF"))
+        waits(lambda: motor.get("SPEED_REF"))
 """
 
 

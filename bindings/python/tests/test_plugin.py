@@ -21,9 +21,9 @@ ARM = """
 
         def lift(self):
             motor = self.bus.motor(1)
-            motor.move_to(90, max_speed=720)
+            motor.set_position(90, max_speed_dps=720)
             deadline = time.monotonic() + 2
-            while abs(motor.angle() - 90) > 1:
+            while abs(motor.multi_turn_angle() - 90) > 1:
                 if time.monotonic() > deadline:
                     raise RuntimeError("the arm is stuck")
                 time.sleep(0.01)
@@ -82,7 +82,7 @@ def test_a_marker_says_what_the_bench_is(pytester: pytest.Pytester) -> None:
         @pytest.mark.motorlink("benches/one.toml", fault="drop=1")
         def test_a_file_and_faults(motorlink_bench):
             assert motorlink_bench.motors[-1] == "rmd9"
-            with pytest.raises(motorlink.Timeout):
+            with pytest.raises(motorlink.ReplyTimeoutError):
                 motorlink_bench.rmd.motor(9).status()
 
         @pytest.mark.motorlink("nowhere.toml")
@@ -92,7 +92,7 @@ def test_a_marker_says_what_the_bench_is(pytester: pytest.Pytester) -> None:
     )
     outcome = pytester.runpytest("--strict-markers")
     outcome.assert_outcomes(passed=4, errors=1)
-    outcome.stdout.fnmatch_lines(["*BadValue: cannot read*nowhere.toml*"])
+    outcome.stdout.fnmatch_lines(["*InvalidValueError: cannot read*nowhere.toml*"])
 
 
 def test_the_marker_is_told(pytester: pytest.Pytester) -> None:

@@ -27,7 +27,7 @@ BEGIN = """
     import asyncio, signal, sys, threading, time, motorlink
 
     def start(bus):
-        return bus.motor(1).start() if sys.argv[1] == "st" else bus.motor(1).speed(360)
+        return bus.motor(1).start() if sys.argv[1] == "st" else bus.motor(1).set_speed(360)
 
     def ready():
         print("ready", flush=True)
@@ -69,7 +69,7 @@ BUSY = """
     start(bus)
     ready()
     while True:
-        bus.motor(1).faults() if sys.argv[1] == "st" else bus.motor(1).motion()
+        bus.motor(1).flags() if sys.argv[1] == "st" else bus.motor(1).motion_status()
 """
 
 ASYNC = """
@@ -78,7 +78,7 @@ ASYNC = """
             await start(bus)
             ready()
             while True:
-                await (bus.motor(1).faults() if sys.argv[1] == "st" else bus.motor(1).motion())
+                await (bus.motor(1).flags() if sys.argv[1] == "st" else bus.motor(1).motion_status())
     asyncio.run(main())
 """
 
@@ -100,7 +100,7 @@ DEAF = """
     bus = motorlink.st.open(sys.argv[2], timeout=30.0)
     bus.motor(1).start()
     ready()
-    bus.motor(1).read("SPEED_REF")
+    bus.motor(1).get("SPEED_REF")
 """
 
 
@@ -121,7 +121,7 @@ CLOSING = """
     bus = motorlink.st.open(sys.argv[2], timeout=0.2)
     try:
         bus.motor(1).start()
-    except motorlink.Timeout:
+    except motorlink.ReplyTimeoutError:
         pass
     threading.Thread(target=bus.close).start()
     ready()
@@ -133,7 +133,7 @@ CLOSING_ASYNC = """
         bus = await motorlink.aio.st.open(sys.argv[2], timeout=0.2)
         try:
             await bus.motor(1).start()
-        except motorlink.Timeout:
+        except motorlink.ReplyTimeoutError:
             pass
         ready()
         await bus.close()
@@ -237,7 +237,7 @@ def test_the_default_action_is_back_when_the_last_bus_is_closed() -> None:
     for opened in (st.open("sim:", stop_on_signals=False), rmd.open("sim:", on_close="nothing")):
         with opened:
             assert handlers() == default
-    # Closed in another thread, which cannot restore it: the next one does.
+    # ClosedError in another thread, which cannot restore it: the next one does.
     bus = st.open("sim:")
     thread = threading.Thread(target=bus.close)
     thread.start()

@@ -54,8 +54,8 @@ def test_eight_threads_on_a_serial_line_get_their_own_answers(served: Served) ->
                 for n in range(ROUNDS):
                     # No other thread ever writes this value anywhere.
                     value = place * 1000 + n
-                    motor.write(register, value)
-                    assert motor.read(register) == value
+                    motor.set(register, value)
+                    assert motor.get(register) == value
 
             return run
 
@@ -70,9 +70,9 @@ def test_eight_threads_on_a_can_bus_get_their_own_answers(served: Served) -> Non
 
             def run() -> None:
                 for n in range(ROUNDS // 2):
-                    mine = rmd.Gains(id, n, id, n, id, n)
-                    motor.write_gains(mine)
-                    assert motor.gains() == mine
+                    mine = rmd.Pid(id, n, id, n, id, n)
+                    motor.write_pid_ram(mine)
+                    assert motor.pid() == mine
 
             return run
 
@@ -81,7 +81,7 @@ def test_eight_threads_on_a_can_bus_get_their_own_answers(served: Served) -> Non
 
             def run() -> None:
                 for n in range(ROUNDS // 2):
-                    motor.write_acceleration(id * 1000 + n)
+                    motor.write_acceleration_ram(id * 1000 + n)
                     assert motor.acceleration() == id * 1000 + n
 
             return run
@@ -105,8 +105,8 @@ def test_others_run_while_a_drive_is_waited_for() -> None:
             counter.start()
             eventually(lambda: rounds > 0, "a first round")
             before = rounds
-            with pytest.raises(motorlink.Timeout):
-                bus.motor(1).read("STATUS")
+            with pytest.raises(motorlink.ReplyTimeoutError):
+                bus.motor(1).get("STATUS")
             assert rounds - before > 50
     finally:
         done.set()
@@ -120,24 +120,24 @@ def test_closing_while_others_call_is_clean() -> None:
     motor = bus.motor(1)
 
     def use() -> None:
-        with pytest.raises(motorlink.Closed):
+        with pytest.raises(motorlink.ClosedError):
             while True:
-                motor.read("STATUS")
+                motor.get("STATUS")
 
     together([use, use, use, bus.close])
 
 
 def test_closing_ends_a_sampling_with_what_there_was() -> None:
-    for bus, what in ((st.open("sim:"), ["SPEED_MEAS"]), (rmd.open("sim:"), ["iq_a"])):
+    for bus, what in ((st.open("sim:"), ["SPEED_MEAS"]), (rmd.open("sim:"), ["iq_amps"])):
         going = threading.Event()
 
-        def sample(bus: st.Bus | rmd.Bus = bus, what: list[str] = what) -> None:
+        def sample(bus: st.Client | rmd.Client = bus, what: list[str] = what) -> None:
             going.set()
-            with pytest.raises(motorlink.Closed) as closed:
+            with pytest.raises(motorlink.ClosedError) as closed:
                 bus.sample(what, rate=100, seconds=600)
             assert closed.value.samples.dtype.names == ("t", *what)
 
-        def close(bus: st.Bus | rmd.Bus = bus) -> None:
+        def close(bus: st.Client | rmd.Client = bus) -> None:
             going.wait(10)
             bus.close()
 
@@ -159,7 +159,7 @@ SAMPLE = """
     print("ready", flush=True)
     with motorlink.st.open(sys.argv[1]) as bus:
         motor = bus.motor(1)
-        motor.ramp(1500, 0.1)
+        motor.set_ramp(1500, 0.1)
         motor.start()
         try:
             bus.sample(["SPEED_MEAS"], rate=100, seconds=600)
@@ -174,7 +174,7 @@ WAIT = """
         print("ready", flush=True)
         while True:
             try:
-                bus.motor(1).read("STATUS")
+                bus.motor(1).get("STATUS")
             except motorlink.MotorlinkError:
                 pass
 """
@@ -187,7 +187,7 @@ IMPATIENT = """
         motor.start()
         print("ready", flush=True)
         for wait in (
-            lambda: motor.read("SPEED_REF"),
+            lambda: motor.get("SPEED_REF"),
             lambda: bus.sample(["SPEED_REF"], rate=10, seconds=60, on_error="skip"),
         ):
             try:
@@ -196,9 +196,9 @@ IMPATIENT = """
             except KeyboardInterrupt:
                 print("interrupted", flush=True)
                 sys.stdin.readline()
-            print(motor.read("SPEED_MEAS"), flush=True)
+            print(motor.get("SPEED_MEAS"), flush=True)
         print("ready", flush=True)
-        motor.read("SPEED_REF")
+        motor.get("SPEED_REF")
 """
 
 

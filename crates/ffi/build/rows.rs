@@ -99,7 +99,6 @@ pub fn name_of(field: &Field) -> String {
     let Scale { digit, suffix, .. } = field.scale;
     let digit = match suffix {
         "" => return field.name.to_owned(),
-        "dps_per_second" => "dps2".to_owned(),
         _ if digit == 1.0 => suffix.to_owned(),
         _ if digit == 0.1 => format!("deci{suffix}"),
         _ if digit == 0.01 => format!("centi{suffix}"),

@@ -43,6 +43,9 @@ pub enum Unfit {
 impl core::fmt::Display for Unfit {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
+            Unfit::OutOfRange { value, least, most, unit: "" } => {
+                write!(f, "{value} is outside {least} to {most}")
+            }
             Unfit::OutOfRange { value, least, most, unit } if *least == -most => {
                 write!(f, "{value} {unit} is beyond ±{most} {unit}")
             }
@@ -267,7 +270,7 @@ unit!(
 );
 unit!(
     /// RMD acceleration of 0x33 and 0x34: 1 degree per second squared a digit.
-    DpsPerSecond(i32, 4), dps_per_second, from_dps_per_second, 1.0, "°/s²",
+    DpsPerSecond(i32, 4), dps2, from_dps2, 1.0, "°/s²",
     0, 0 => i32::MAX, NoLimitOfZero
 );
 unit!(

@@ -1,14 +1,14 @@
 """Motor drives from Python: ST's Motor Control Protocol and RMD over CAN.
 
 >>> import motorlink
->>> with motorlink.st.open("sim:") as bus:          # or "/dev/ttyACM0"
-...     motor = bus.motor(1)
-...     motor.ramp(1500, 1.0)                       # rpm, s
-...     motor.read("SPEED_MEAS")
+>>> with motorlink.st.open("sim:") as client:          # or "/dev/ttyACM0"
+...     motor = client.motor(1)
+...     motor.set_ramp(1500, 1.0)                       # rpm, s
+...     motor.get("SPEED_MEAS")
 0
 
 ``motorlink.st`` and ``motorlink.rmd`` are the two protocols, ``motorlink.sim`` is drives for a program
-without hardware. What goes wrong is a :class:`MotorlinkError`. Buses have no thread of their own, and
+without hardware. What goes wrong is a :class:`MotorlinkError`. Clients have no thread of their own, and
 may be shared between threads.
 """
 
@@ -18,14 +18,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 __all__ = [
-    "BadValue",
-    "Closed",
-    "FullTurn",
-    "LineLost",
+    "InvalidValueError",
+    "ClosedError",
+    "FullTurnError",
+    "LinkError",
     "MotorlinkError",
     "PortError",
-    "Refused",
-    "Timeout",
+    "RefusedError",
+    "ReplyTimeoutError",
     "__version__",
     "aio",
     "can",
@@ -41,14 +41,14 @@ if TYPE_CHECKING:
     from motorlink._core import __version__
     from motorlink._sampling import to_pandas
     from motorlink.errors import (
-        BadValue,
-        Closed,
-        FullTurn,
-        LineLost,
+        InvalidValueError,
+        ClosedError,
+        FullTurnError,
+        LinkError,
         MotorlinkError,
         PortError,
-        Refused,
-        Timeout,
+        RefusedError,
+        ReplyTimeoutError,
     )
 else:
     _FROM = {"__version__": "motorlink._core", "to_pandas": "motorlink._sampling"}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from motorlink import _core
 from motorlink._values import RegisterInfo
-from motorlink.errors import Refused
+from motorlink.errors import RefusedError
 
 if TYPE_CHECKING:
     from motorlink.st import Motor
@@ -18,17 +18,17 @@ class Registers(Mapping[str, float]):
     """The registers of one motor (Motor Control Protocol, table 3), by name.
 
     >>> import motorlink
-    >>> bus = motorlink.st.open("sim:")
-    >>> registers = bus.motor(1).registers
+    >>> client = motorlink.st.open("sim:")
+    >>> registers = client.motor(1).registers
     >>> registers["SPEED_KP"] = 1200             # writes; so does registers.SPEED_KP = 1200
     >>> registers.SPEED_KP                       # reads
     1200
     >>> registers.info("BUS_VOLTAGE").unit
     'V'
-    >>> bus.close()
+    >>> client.close()
 
-    Each access is one exchange with the drive, with the exceptions of ``Motor.read`` and
-    ``Motor.write``. Names complete in IPython and Jupyter: ``registers.<TAB>``, ``registers["<TAB>``.
+    Each access is one exchange with the drive, with the exceptions of ``Motor.get`` and
+    ``Motor.set``. Names complete in IPython and Jupyter: ``registers.<TAB>``, ``registers["<TAB>``.
     """
 
     __slots__ = ("_motor",)
@@ -39,20 +39,20 @@ class Registers(Mapping[str, float]):
         object.__setattr__(self, "_motor", motor)
 
     def __getitem__(self, name: str | int) -> float:
-        return self._motor.read(name)
+        return self._motor.get(name)
 
     def __setitem__(self, name: str | int, value: float | str) -> None:
-        self._motor.write(name, value)
+        self._motor.set(name, value)
 
     def __getattr__(self, name: str) -> float:
         if name not in self._names():
             raise AttributeError(f"there is no register {name!r}; `list(registers)` has their names")
-        return self._motor.read(name)
+        return self._motor.get(name)
 
     def __setattr__(self, name: str, value: float | str) -> None:
         if name not in self._names():
             raise AttributeError(f"there is no register {name!r}; `list(registers)` has their names")
-        self._motor.write(name, value)
+        self._motor.set(name, value)
 
     def __copy__(self) -> Registers:
         return Registers(self._motor)
@@ -84,11 +84,11 @@ class Registers(Mapping[str, float]):
     def info(self, name: str | int) -> RegisterInfo:
         """What a register is, from the table: unit, type, access, and what it needs. Asks nobody.
 
-        Raises ``NoSuchRegister``, a ``BadValue`` and a ``KeyError``, for one that nobody names.
+        Raises ``UnknownRegisterError``, a ``InvalidValueError`` and a ``KeyError``, for one that nobody names.
         """
         return RegisterNames(self._motor).info(name)
 
-    def read_all(self) -> dict[str, float]:
+    def get_all(self) -> dict[str, float]:
         """Every register that can be read and that this drive has, an exchange each."""
         values = {}
         for name in self:
@@ -96,25 +96,25 @@ class Registers(Mapping[str, float]):
                 continue
             try:
                 values[name] = self[name]
-            except Refused:
+            except RefusedError:
                 continue
         return values
 
     def _names(self) -> dict[str, None]:
-        return _names(self._motor.bus.profile)
+        return _names(self._motor.client.profile)
 
 
 class HasRegisters(Protocol):
     """A motor of either API."""
 
     @property
-    def bus(self) -> HasProfile: ...
+    def client(self) -> HasProfile: ...
     @property
     def full_scale_amps(self) -> float | None: ...
 
 
 class HasProfile(Protocol):
-    """A bus of either API."""
+    """A client of either API."""
 
     @property
     def profile(self) -> str: ...
@@ -125,8 +125,8 @@ class RegisterNames(Collection[str]):
 
     >>> import asyncio, motorlink
     >>> async def main() -> str:
-    ...     async with motorlink.aio.st.open("sim:") as bus:
-    ...         return bus.motor(1).registers.info("BUS_VOLTAGE").unit
+    ...     async with motorlink.aio.st.open("sim:") as client:
+    ...         return client.motor(1).registers.info("BUS_VOLTAGE").unit
     >>> asyncio.run(main())
     'V'
     """
@@ -139,19 +139,19 @@ class RegisterNames(Collection[str]):
     def info(self, name: str | int) -> RegisterInfo:
         """What a register is, from the table: unit, type, access, and what it needs.
 
-        Raises ``NoSuchRegister``, a ``BadValue`` and a ``KeyError``, for one that nobody names.
+        Raises ``UnknownRegisterError``, a ``InvalidValueError`` and a ``KeyError``, for one that nobody names.
         """
         motor = self._motor
-        return _core.st_register(name, motor.bus.profile, motor.full_scale_amps)
+        return _core.st_register(name, motor.client.profile, motor.full_scale_amps)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_names(self._motor.bus.profile))
+        return iter(_names(self._motor.client.profile))
 
     def __len__(self) -> int:
-        return len(_names(self._motor.bus.profile))
+        return len(_names(self._motor.client.profile))
 
     def __contains__(self, name: object) -> bool:
-        return name in _names(self._motor.bus.profile)
+        return name in _names(self._motor.client.profile)
 
     def __repr__(self) -> str:
         return f"<names of {len(self)} registers of {self._motor!r}>"

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from motorlink.errors import BadValue
+from motorlink.errors import InvalidValueError
 
 Name = TypeVar("Name")
 
@@ -25,7 +25,7 @@ def by_motor(
     Where motors are named, so is the motor of a value.
     """
     if isinstance(wanted, str):
-        raise BadValue(f"{wanted!r} is one name: give a list of names")
+        raise InvalidValueError(f"{wanted!r} is one name: give a list of names")
     if isinstance(wanted, Mapping):
         motors = [(number, list(some)) for number, some in wanted.items()]
         names = [f"{called(one)}_{number}" for number, some in motors for one in some]
@@ -38,17 +38,17 @@ def by_motor(
 def columns(names: Sequence[str]) -> list[str]:
     """The names of the values, each once."""
     if not names:
-        raise BadValue("name what to sample")
+        raise InvalidValueError("name what to sample")
     twice = {name for name in names if names.count(name) > 1}
     if twice:
-        raise BadValue(f"{', '.join(sorted(twice))}: named twice in one sample")
+        raise InvalidValueError(f"{', '.join(sorted(twice))}: named twice in one sample")
     return list(names)
 
 
 def skips(on_error: str) -> bool:
     """Whether a row that fails is left out."""
     if on_error not in ("raise", "skip"):
-        raise BadValue(f"on_error={on_error!r}: give 'raise' or 'skip'")
+        raise InvalidValueError(f"on_error={on_error!r}: give 'raise' or 'skip'")
     return on_error == "skip"
 
 
@@ -66,7 +66,7 @@ def array(
 
 
 def to_pandas(samples: Samples) -> Any:
-    """A ``pandas.DataFrame`` of what ``bus.sample`` gave, with the time in s as its index.
+    """A ``pandas.DataFrame`` of what ``client.sample`` gave, with the time in s as its index.
 
     Raises ``ImportError`` where pandas is not installed.
     """

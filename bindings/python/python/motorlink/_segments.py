@@ -1,4 +1,4 @@
-"""Who uses which data segment of a drive, as far as one bus knows."""
+"""Who uses which data segment of a drive, as far as one client knows."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from motorlink import _core
-from motorlink.errors import BadValue
+from motorlink.errors import InvalidValueError
 
 
 class Segments:
@@ -23,7 +23,7 @@ class Segments:
         """Keeps samplings away from a segment that a program is about to configure."""
         with self._lock:
             if segment in self._sampled:
-                raise BadValue(
+                raise InvalidValueError(
                     f"data segment {segment} is in use by `sample`; nothing was sent: take another one,"
                     " or configure it before, and `sample` takes another one"
                 )

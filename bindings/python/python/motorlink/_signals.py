@@ -10,7 +10,7 @@ from types import FrameType
 
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
-#: What stops the motors of each open bus.
+#: What stops the motors of each open client.
 _stops: dict[object, Callable[[], None]] = {}
 
 

@@ -1,4 +1,4 @@
-"""Buses and motors of ST's serial Motor Control Protocol, for both APIs."""
+"""Clients and motors of ST's serial Motor Control Protocol, for both APIs."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from motorlink import _core
 from motorlink._apis import Exchanges, both_apis, one
-from motorlink._bus import AnyBus
+from motorlink._client import AnyClient
 from motorlink._core import StRequest as Request
 from motorlink._sampling import Samples, array, by_motor, skips
 from motorlink._segments import Segments
-from motorlink._values import ControlMode, Faults, FirmwareVersion, Info, RevupPhase, State
-from motorlink.errors import BadValue
+from motorlink._values import BoardInfo, ControlMode, FirmwareVersion, Flags, RevupPhase, Status
+from motorlink.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 MotorT = TypeVar("MotorT", bound="StMotor[Any]")
 PortT = TypeVar("PortT")
-BusT = TypeVar("BusT", bound="StBus[Any, Any]")
+ClientT = TypeVar("ClientT", bound="StClient[Any, Any]")
 
 
-class StBus(AnyBus, Generic[MotorT, PortT]):
-    """The buses of both APIs."""
+class StClient(AnyClient, Generic[MotorT, PortT]):
+    """The clients of both APIs."""
 
     _ENDS: ClassVar[dict[str, dict[str, bool]]] = {"stop": {"stop": True}, "nothing": {"stop": False}}
     _Motor: type[MotorT]
     # Each API's exchanges, with the arguments of ``StClient``'s methods.
     _exchange: Any
     _exchange_raw: Any
-    _write_verified: Any
+    _set_verified: Any
     _sample: Any
 
     def __init__(
@@ -54,8 +54,8 @@ class StBus(AnyBus, Generic[MotorT, PortT]):
         port: PortT,
         *,
         profile: str = "spec",
-        timeout: float = 1.0,
-        speed_limit: float | None = None,
+        timeout: float = _core.ST_TIMEOUT,
+        speed_limit_rpm: float | None = None,
         current_limit: float | None = None,
         full_scale_amps: float | None = None,
         recovery: str = "drain",
@@ -64,7 +64,7 @@ class StBus(AnyBus, Generic[MotorT, PortT]):
     ) -> Callable[[], Exchanges[Self]]:
         """Opens a serial line with a drive. Nothing is sent.
 
-        For asyncio: ``async with open(...) as bus``, or ``await open(...)``.
+        For asyncio: ``async with open(...) as client``, or ``await open(...)``.
 
         ``port``
             ``/dev/ttyACM0``, ``serial:/dev/ttyUSB0?baud=115200``, ``tcp:HOST:PORT``, ``unix:PATH``,
@@ -74,13 +74,13 @@ class StBus(AnyBus, Generic[MotorT, PortT]):
             ``spec``: the document; ``mcsdk-5.4``: what shipped firmware really does.
         ``timeout``
             How long to wait for a reply, s (4.1 says 1 s).
-        ``speed_limit``, ``current_limit``
-            What no request may exceed in either direction, rpm, and A with ``full_scale_amps``, digits
+        ``speed_limit_rpm``, ``current_limit``
+            What no request may exceed in either direction; the current is A with ``full_scale_amps``, digits
             without; also not by writing registers or raw frames. Rounded towards 0 to what a frame can
-            say. With a speed limit a motor is started only after a ``ramp`` within it, and ``move_to`` is
+            say. With a speed limit a motor is started only after a ``set_ramp`` within it, and ``set_position`` is
             refused. The ramp no longer counts after a torque command, a write of CONTROL_MODE, a reset
             of the drive, or a lost line or port. A speed limit does not bound the speed under a torque
-            command (``current``, ``torque_ramp``), which is as fast as the load allows, nor the
+            command (``set_current_reference``, ``set_torque_ramp``), which is as fast as the load allows, nor the
             drive's own rev-up, alignment and motor profiler.
         ``full_scale_amps``
             The current of digit 32767, A, for every motor that is not given its own.
@@ -88,7 +88,7 @@ class StBus(AnyBus, Generic[MotorT, PortT]):
             How a lost line comes back before the next exchange: ``drain``; ``pad``, for 5.x drives that
             wait for the rest of a cut-off frame; ``none``.
         ``on_close``
-            ``stop``: the end of ``with``, and ``close()``, stop the motors that this bus started;
+            ``stop``: the end of ``with``, and ``close()``, stop the motors that this client started;
             ``nothing``: they run on.
         ``stop_on_signals``
             SIGTERM and SIGHUP do what ``close()`` does, and then end the program as they would have
@@ -102,7 +102,7 @@ class StBus(AnyBus, Generic[MotorT, PortT]):
             profile=profile,
             timeout=timeout,
             recovery=recovery,
-            speed_limit=speed_limit,
+            speed_limit_rpm=speed_limit_rpm,
             current_limit=current_limit,
             full_scale_amps=full_scale_amps,
         )
@@ -120,10 +120,10 @@ class StBus(AnyBus, Generic[MotorT, PortT]):
         return self._profile
 
     @property
-    def started(self) -> list[int]:
-        """Numbers of the motors that this bus started and did not stop."""
-        started: list[int] = self._core.started
-        return started
+    def moving(self) -> list[int]:
+        """Numbers of the motors that this client started and did not stop."""
+        moving: list[int] = self._core.moving
+        return moving
 
     def motor(self, number: int = 1, *, full_scale_amps: float | None = None) -> MotorT:
         """A motor of the drive, 1 to 7; 0 is whichever the drive has selected (TARGET_MOTOR)."""
@@ -132,27 +132,27 @@ class StBus(AnyBus, Generic[MotorT, PortT]):
         return self._Motor(self, number, full_scale_amps)
 
     @both_apis
-    def info(self) -> Exchanges[Info]:
+    def board_info(self) -> Exchanges[BoardInfo]:
         """Version and name of the SDK (4.7)."""
-        return one(self._exchange(0, Request.info()))
+        return one(self._exchange(0, Request.get_board_info()))
 
     @both_apis
     def firmware_version(self) -> Exchanges[FirmwareVersion]:
         """Name and version of the firmware (4.12)."""
-        return one(self._exchange(0, Request.firmware_version()))
+        return one(self._exchange(0, Request.get_firmware_version()))
 
     @both_apis
-    def perform(self, motor: int, request: Request) -> Exchanges[Any]:
-        """One exchange with a motor; gives what the request makes of the reply."""
+    def exchange(self, motor: int, request: Request) -> Exchanges[Any]:
+        """One exchange with a motor; gives what the reply says."""
         return one(self._exchange(motor, request))
 
     @both_apis
-    def exchange_raw(self, code: int, payload: bytes = b"", *, motor: int = 0) -> Exchanges[bytes]:
+    def raw(self, code: int, payload: bytes = b"", *, motor: int = 0) -> Exchanges[bytes]:
         """One exchange with any frame code, 0 to 0x1f, and payload; gives the payload of the answer.
 
         >>> import motorlink
-        >>> with motorlink.st.open("sim:") as bus:
-        ...     bus.exchange_raw(0x02, b"\\x1e", motor=1)       # GET_REG, SPEED_MEAS
+        >>> with motorlink.st.open("sim:") as client:
+        ...     client.raw(0x02, b"\\x1e", motor=1)       # GET_REG, SPEED_MEAS
         b'\\x00\\x00\\x00\\x00'
         """
         return one(self._exchange_raw(motor, code, payload))
@@ -171,8 +171,8 @@ class StBus(AnyBus, Generic[MotorT, PortT]):
         """Reads registers ``rate`` times a second for ``seconds``; gives a structured array.
 
         >>> import motorlink
-        >>> with motorlink.st.open("sim:") as bus:
-        ...     data = bus.sample(["SPEED_MEAS", "BUS_VOLTAGE"], rate=100, seconds=0.1)
+        >>> with motorlink.st.open("sim:") as client:
+        ...     data = client.sample(["SPEED_MEAS", "BUS_VOLTAGE"], rate=100, seconds=0.1)
         >>> data.dtype.names
         ('t', 'SPEED_MEAS', 'BUS_VOLTAGE')
 
@@ -182,7 +182,7 @@ class StBus(AnyBus, Generic[MotorT, PortT]):
 
         The registers of a row come in one exchange, of the same moment, where the drive has data
         segments (profile ``spec``); one a motor is used, from segment 3 down, of those that neither
-        ``configure_segment`` nor another ``sample`` of this bus has. Otherwise they are read one by
+        ``configure_segment`` nor another ``sample`` of this client has. Otherwise they are read one by
         one. ``{1: ["SPEED_MEAS"], 2: ["SPEED_MEAS"]}`` samples several motors; their
         fields are ``SPEED_MEAS_1`` and ``SPEED_MEAS_2``.
 
@@ -201,21 +201,21 @@ class StBus(AnyBus, Generic[MotorT, PortT]):
         return self._text(f", profile {self._profile}")
 
 
-class StMotor(Generic[BusT]):
+class StMotor(Generic[ClientT]):
     """The motors of both APIs."""
 
-    __slots__ = ("__weakref__", "_bus", "_full_scale_amps", "_number", "_reads")
+    __slots__ = ("__weakref__", "_client", "_full_scale_amps", "_number", "_reads")
 
-    def __init__(self, bus: BusT, number: int, full_scale_amps: float | None):
-        self._bus = bus
+    def __init__(self, client: ClientT, number: int, full_scale_amps: float | None):
+        self._client = client
         self._number = _core.st_motor(number)
         self._full_scale_amps = full_scale_amps
         self._reads: dict[tuple[str | int, bool], Request] = {}
 
     @property
-    def bus(self) -> BusT:
-        """The line."""
-        return self._bus
+    def client(self) -> ClientT:
+        """The client that it is of."""
+        return self._client
 
     @property
     def number(self) -> int:
@@ -227,164 +227,193 @@ class StMotor(Generic[BusT]):
         """The current of digit 32767, A; ``None`` while currents are digits."""
         return self._full_scale_amps
 
-    def _perform(self, request: Request) -> Exchanges[Any]:
-        given: Exchanges[Any] = self._bus._exchange(self._number, request)
+    def _exchange(self, request: Request) -> Exchanges[Any]:
+        given: Exchanges[Any] = self._client._exchange(self._number, request)
         return given
 
     @both_apis
-    def read(self, register: str | int, *, raw: bool = False) -> Exchanges[float]:
+    def get(self, register: str | int, *, raw: bool = False) -> Exchanges[float]:
         """Reads a register (4.5), in its unit, or in digits with ``raw=True``.
 
         An integer where a digit is one unit, else a float. States and flags are their numbers here;
-        :meth:`status` and :meth:`faults` have them in words.
+        :meth:`status` and :meth:`flags` have them in words.
         """
         request = self._reads.get((register, raw))
         if request is None:
-            request = Request.read(
+            request = Request.get_register(
                 register,
-                profile=self._bus.profile,
+                profile=self._client.profile,
                 raw=raw,
                 full_scale_amps=self._full_scale_amps,
             )
             self._reads[register, raw] = request
-        return self._perform(request)
+        return self._exchange(request)
 
     @both_apis
-    def write(self, register: str | int, value: float | str, *, raw: bool = False) -> Exchanges[None]:
+    def set(self, register: str | int, value: float | str, *, raw: bool = False) -> Exchanges[None]:
         """Writes a register (4.4), in its unit, or in digits with ``raw=True``.
 
         ``CONTROL_MODE`` takes ``TORQUE`` and ``SPEED``, ``DAC_OUT1`` and ``DAC_OUT2`` names of
-        registers. A value between two digits is a ``BadValue``; only currents in A are rounded.
+        registers. A value between two digits is a ``InvalidValueError``; only currents in A are rounded.
         """
-        return self._perform(self._write(register, value, raw))
+        return self._exchange(self._set(register, value, raw))
 
     @both_apis
-    def write_verified(
-        self, register: str | int, value: float | str, *, raw: bool = False, attempts: int = 3
+    def set_verified(
+        self, register: str | int, value: float | str, *, raw: bool = False, attempts: int = _core.ST_ATTEMPTS
     ) -> Exchanges[int]:
         """Writes a register, reads it back, and repeats both until it has the value.
 
         Gives the number of the attempt that did it. A checksum of 8 bits lets some damage
         through, which two exchanges seldom do.
 
-        Raises ``Refused`` (without a code) where the register has another value after the last
-        attempt, ``BadValue`` where it cannot be read back or where writing it moves the motor. What
+        Raises ``RefusedError`` (without a code) where the register has another value after the last
+        attempt, ``InvalidValueError`` where it cannot be read back or where writing it moves the motor. What
         another task writes to the register in between is found, and written over.
         """
-        request = self._write(register, value, raw)
-        return one(self._bus._write_verified(self._number, request, attempts))
+        request = self._set(register, value, raw)
+        return one(self._client._set_verified(self._number, request, attempts))
 
-    def _write(self, register: str | int, value: float | str, raw: bool) -> Request:
-        return Request.write(
+    def _set(self, register: str | int, value: float | str, raw: bool) -> Request:
+        return Request.set_register(
             register,
             value,
-            profile=self._bus.profile,
+            profile=self._client.profile,
             raw=raw,
             full_scale_amps=self._full_scale_amps,
         )
 
     @both_apis
-    def status(self) -> Exchanges[State]:
+    def status(self) -> Exchanges[Status]:
         """The state of its state machine, in words: ``IDLE``, ``RUN``, ``FAULT_NOW`` (STATUS)."""
-        return self._perform(Request.state())
+        return self._exchange(Request.status())
 
     @both_apis
-    def faults(self) -> Exchanges[Faults]:
+    def flags(self) -> Exchanges[Flags]:
         """Its faults (FLAGS); false when there are none."""
-        return self._perform(Request.faults())
+        return self._exchange(Request.flags())
 
     @both_apis
     def control_mode(self) -> Exchanges[ControlMode]:
         """``TORQUE`` or ``SPEED`` (CONTROL_MODE)."""
-        return self._perform(Request.control_mode())
+        return self._exchange(Request.control_mode())
 
     @both_apis
     def execute(self, command: str | int) -> Exchanges[None]:
-        """Executes a command by its name in table 4, such as ``PFC_ENABLE``, or its number (4.6).
+        """Executes a command by its name in table 4, such as ``RESET``, or its number (4.6).
 
         An acknowledge does not say that it had an effect: look at :meth:`status`.
         """
-        return self._perform(Request.execute(command))
+        return self._exchange(Request.execute_command(command))
 
     @both_apis
     def start(self) -> Exchanges[None]:
         """Starts the motor (4.6). With a fault pending the drive acknowledges and does nothing.
 
-        With a ``speed_limit``, call :meth:`ramp` before: the drive may have a target of its own.
+        With a ``speed_limit_rpm``, call :meth:`set_ramp` before: the drive may have a target of its own.
         """
-        return self._perform(Request.execute("START_MOTOR"))
+        return self._exchange(Request.execute_command("START_MOTOR"))
 
     @both_apis
     def stop(self) -> Exchanges[None]:
         """Stops the motor (4.6)."""
-        return self._perform(Request.execute("STOP_MOTOR"))
+        return self._exchange(Request.execute_command("STOP_MOTOR"))
 
     @both_apis
     def stop_ramp(self) -> Exchanges[None]:
         """Stops the ramp that is executing; the speed stays (4.6)."""
-        return self._perform(Request.execute("STOP_RAMP"))
+        return self._exchange(Request.execute_command("STOP_RAMP"))
 
     @both_apis
-    def acknowledge_faults(self) -> Exchanges[None]:
+    def fault_ack(self) -> Exchanges[None]:
         """Acknowledges faults whose cause is gone (4.6)."""
-        return self._perform(Request.execute("FAULT_ACK"))
+        return self._exchange(Request.execute_command("FAULT_ACK"))
 
     @both_apis
-    def align_encoder(self) -> Exchanges[None]:
+    def encoder_align(self) -> Exchanges[None]:
         """Aligns the encoder (4.6)."""
-        return self._perform(Request.execute("ENCODER_ALIGN"))
+        return self._exchange(Request.execute_command("ENCODER_ALIGN"))
 
     @both_apis
-    def ramp(self, speed: float, seconds: float) -> Exchanges[None]:
-        """Goes to ``speed``, rpm, within ``seconds``: at once in RUN, else when RUN is reached (4.8).
+    def start_stop(self) -> Exchanges[None]:
+        """Starts the motor if it stands, else stops it (4.6)."""
+        return self._exchange(Request.execute_command("START_STOP"))
+
+    @both_apis
+    def iqdref_clear(self) -> Exchanges[None]:
+        """Sets the current references back to what they were at power-on (4.6)."""
+        return self._exchange(Request.execute_command("IQDREF_CLEAR"))
+
+    @both_apis
+    def pfc_enable(self) -> Exchanges[None]:
+        """Switches the power factor correction on (4.6)."""
+        return self._exchange(Request.execute_command("PFC_ENABLE"))
+
+    @both_apis
+    def pfc_disable(self) -> Exchanges[None]:
+        """Switches the power factor correction off (4.6)."""
+        return self._exchange(Request.execute_command("PFC_DISABLE"))
+
+    @both_apis
+    def pfc_fault_ack(self) -> Exchanges[None]:
+        """Acknowledges faults of the power factor correction (4.6)."""
+        return self._exchange(Request.execute_command("PFC_FAULT_ACK"))
+
+    @both_apis
+    def set_ramp(self, speed_rpm: float, duration_s: float) -> Exchanges[None]:
+        """Goes to ``speed_rpm`` within ``duration_s``: at once in RUN, else when RUN is reached (4.8).
 
         Rounded to 1 rpm and 1 ms; a time is 0, a step, to 65.535 s.
         """
-        return self._perform(Request.ramp(speed, seconds))
+        return self._exchange(Request.set_ramp(speed_rpm, duration_s))
 
     @both_apis
-    def current(self, iq: float, id: float = 0.0) -> Exchanges[None]:
+    def set_current_reference(self, iq: float, id: float) -> Exchanges[None]:
         """Sets the current references (4.11); A with ``full_scale_amps``, else digits.
 
-        No ``speed_limit`` bounds the motor then.
+        No ``speed_limit_rpm`` bounds the motor then.
         """
-        return self._perform(Request.current(iq, id, full_scale_amps=self._full_scale_amps))
+        return self._exchange(Request.set_current_reference(iq, id, full_scale_amps=self._full_scale_amps))
 
     @both_apis
-    def torque_ramp(self, iq: float, seconds: float) -> Exchanges[None]:
-        """Goes to ``iq`` within ``seconds``; A with ``full_scale_amps``, else digits.
+    def set_torque_ramp(self, torque: float, duration_s: float) -> Exchanges[None]:
+        """Goes to ``torque``, an Iq, within ``duration_s``; A with ``full_scale_amps``, else digits.
 
         Of profile ``mcsdk-5.4``; for others the same bytes ask for something else. No
-        ``speed_limit`` bounds the motor then.
+        ``speed_limit_rpm`` bounds the motor then.
         """
         self._only("mcsdk-5.4", "torque ramps")
-        return self._perform(Request.torque_ramp(iq, seconds, full_scale_amps=self._full_scale_amps))
+        return self._exchange(Request.set_torque_ramp(torque, duration_s, full_scale_amps=self._full_scale_amps))
 
     @both_apis
-    def move_to(self, angle_rad: float, seconds: float) -> Exchanges[None]:
-        """Turns to ``angle_rad``, rad, within ``seconds``; profile ``mcsdk-5.4`` with position control.
+    def set_position(self, angle_rad: float, duration_s: float) -> Exchanges[None]:
+        """Turns to ``angle_rad`` within ``duration_s``; profile ``mcsdk-5.4`` with position control.
 
-        Refused while there is a ``speed_limit``: the command carries no speed.
+        Refused while there is a ``speed_limit_rpm``: the command carries no speed.
         """
         self._only("mcsdk-5.4", "moves")
-        return self._perform(Request.move_to(angle_rad, seconds))
+        return self._exchange(Request.set_position(angle_rad, duration_s))
 
     @both_apis
-    def revup(self, phase: int) -> Exchanges[RevupPhase]:
+    def revup_data(self, phase: int) -> Exchanges[RevupPhase]:
         """A phase of the rev-up, 0 to 4 (4.9)."""
-        request = Request.revup(phase, full_scale_amps=self._full_scale_amps)
-        return self._perform(request)
+        request = Request.get_revup_data(phase, full_scale_amps=self._full_scale_amps)
+        return self._exchange(request)
 
     @both_apis
-    def set_revup(self, phase: int, speed: float, current: float, seconds: float) -> Exchanges[None]:
+    def set_revup_data(
+        self, phase: int, speed_rpm: float, torque: float, duration_s: float
+    ) -> Exchanges[None]:
         """Sets a phase of the rev-up, 0 to 4 (4.10).
 
-        Speed, rpm, and Iq, A with ``full_scale_amps``, else digits, at the end of the phase; and how
-        long it is, s.
+        Speed and torque, an Iq, A with ``full_scale_amps``, else digits, at the end of the phase; and
+        how long it is.
         """
         full_scale_amps = self._full_scale_amps
-        return self._perform(
-            Request.set_revup(phase, speed, current, seconds, full_scale_amps=full_scale_amps)
+        return self._exchange(
+            Request.set_revup_data(
+                phase, speed_rpm, torque, duration_s, full_scale_amps=full_scale_amps
+            )
         )
 
     @both_apis
@@ -395,36 +424,36 @@ class StMotor(Generic[BusT]):
         """
         self._only("spec", "data segments")
         request = Request.configure_segment(segment, registers)
-        self._bus._segments.claim(segment)
-        yield self._perform(request)
-        self._bus._segments.chosen(segment, registers)
+        self._client._segments.claim(segment)
+        yield self._exchange(request)
+        self._client._segments.chosen(segment, registers)
 
     @both_apis
-    def read_segment(
+    def segment(
         self, segment: int, registers: Sequence[str | int] | None = None, *, raw: bool = False
     ) -> Exchanges[dict[str, float]]:
         """Reads a data segment in one exchange: the registers' values by name (profile ``spec``).
 
-        ``registers``: what it was configured with, unless it was by this bus.
+        ``registers``: what it was configured with, unless it was by this client.
         """
         self._only("spec", "data segments")
         if registers is None:
-            registers = self._bus._segments.registers(segment)
-        request = Request.read_segment(
+            registers = self._client._segments.registers(segment)
+        request = Request.get_segment(
             segment, registers, raw=raw, full_scale_amps=self._full_scale_amps
         )
-        return self._perform(request)
+        return self._exchange(request)
 
     def _only(self, profile: str, what: str) -> None:
-        """Refuses what another profile than that of the bus has."""
-        bus = self._bus
-        if bus.profile != profile:
-            raise BadValue(
-                f"{what} are of profile {profile}, and {bus.port} was opened with profile {bus.profile};"
+        """Refuses what another profile than that of the client has."""
+        client = self._client
+        if client.profile != profile:
+            raise InvalidValueError(
+                f"{what} are of profile {profile}, and {client.port} was opened with profile {client.profile};"
                 " nothing was sent",
-                port=bus.port,
+                port=client.port,
                 motor=self._number,
             )
 
     def __repr__(self) -> str:
-        return f"<{type(self).__module__}.Motor {self._number} on {self._bus.port}>"
+        return f"<{type(self).__module__}.Motor {self._number} on {self._client.port}>"

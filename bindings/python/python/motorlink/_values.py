@@ -31,7 +31,7 @@ class Word(str):
         return type(self), (str(self), self.number, self.doc)
 
 
-class State(Word):
+class Status(Word):
     """State of an ST drive's state machine: ``IDLE``, ``RUN``, ``FAULT_NOW`` (register STATUS)."""
 
 
@@ -39,7 +39,7 @@ class ControlMode(Word):
     """``TORQUE`` or ``SPEED``: what an ST drive follows (register CONTROL_MODE)."""
 
 
-class Faults(NamedTuple):
+class Flags(NamedTuple):
     """Faults of an ST drive (register FLAGS). False when there are none."""
 
     #: Faults since they were last acknowledged, by name: ``OVER_VOLT``.
@@ -56,7 +56,7 @@ class Faults(NamedTuple):
         return _core.st_flags_text(self.bits)
 
 
-class Info(NamedTuple):
+class BoardInfo(NamedTuple):
     """Version and name of the drive's SDK (Motor Control Protocol, 4.7)."""
 
     #: Major, minor, patch.
@@ -74,29 +74,17 @@ class FirmwareVersion(NamedTuple):
 class RevupPhase(NamedTuple):
     """A phase of the rev-up (Motor Control Protocol, 4.9).
 
-    ``current`` is Iq at the end of the phase: digits of the drive (s16A), or A for a motor with
+    ``torque`` is Iq at the end of the phase: digits of the drive (s16A), or A for a motor with
     ``full_scale_amps``.
     """
 
     #: Mechanical speed at the end of the phase.
     speed_rpm: int
-    current: float
+    torque: float
     duration_s: float
 
 
-class MotionStatus(NamedTuple):
-    """What an RMD motor says to 0x9C and to every command that moves it (3, Read motor status 2)."""
-
-    temperature_c: int
-    #: Torque current; positive is clockwise.
-    iq_a: float
-    #: Speed of the motor shaft; positive is clockwise.
-    speed_dps: int
-    #: Position within the turn, in counts of the encoder.
-    encoder: int
-
-
-class MotorErrors(NamedTuple):
+class Errors(NamedTuple):
     """Protections of an RMD motor that are active. False when there are none."""
 
     #: The document's words: ``low voltage protection``.
@@ -109,57 +97,6 @@ class MotorErrors(NamedTuple):
 
     def __str__(self) -> str:
         return _core.rmd_errors_text(self.bits)
-
-
-class MotorStatus(NamedTuple):
-    """What an RMD motor says to 0x9A and 0x9B (3, Read motor status 1 and error flag commands)."""
-
-    temperature_c: int
-    voltage_v: float
-    errors: MotorErrors
-
-
-class PhaseCurrents(NamedTuple):
-    """Phase currents of an RMD motor, A (3, Read motor status 3)."""
-
-    phase_a_a: float
-    phase_b_a: float
-    phase_c_a: float
-
-
-class Gains(NamedTuple):
-    """Gains of an RMD motor's three loops, 0 to 255 (3, Read PID parameter command)."""
-
-    position_kp: int
-    position_ki: int
-    speed_kp: int
-    speed_ki: int
-    torque_kp: int
-    torque_ki: int
-
-
-class Encoder(NamedTuple):
-    """What an RMD motor's encoder reads, in its counts (3, Read encoder data command)."""
-
-    #: ``raw`` minus ``offset``, within the turn.
-    position: int
-    raw: int
-    #: The zero point.
-    offset: int
-
-
-class Found(NamedTuple):
-    """What a scan found under a motor ID."""
-
-    id: int
-    #: ``motor`` of this protocol; ``foreign``: of a protocol that looks like it and is not driven;
-    #: ``echo``: the request itself came back (option ``echo=1`` of an slcan port drops such).
-    #: ``shared``: it answers another program or host, too.
-    kind: str
-    #: Of a motor.
-    status: MotorStatus | None
-    #: What a foreign motor speaks.
-    dialect: str | None
 
 
 class RegisterInfo(NamedTuple):
@@ -177,7 +114,7 @@ class RegisterInfo(NamedTuple):
     #: What it is, in a few words.
     doc: str
     #: What the drive must be built with.
-    needs: str
+    feature: str
     #: Whether a drive of this profile, so built, answers when it is read.
     readable: bool
     #: Whether a drive of this profile, so built, takes a value.

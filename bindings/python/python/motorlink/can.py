@@ -24,7 +24,7 @@ def from_python_can(bus: Any) -> CanPort:
     ...     with motorlink.rmd.open(port, timeout=0.01) as motors:
     ...         try:
     ...             motors.motor(1).status()
-    ...         except motorlink.Timeout as error:
+    ...         except motorlink.ReplyTimeoutError as error:
     ...             print("nobody is on this bus")
     nobody is on this bus
 
@@ -33,7 +33,7 @@ def from_python_can(bus: Any) -> CanPort:
     from it meanwhile, no ``can.Notifier`` either: what one receives the other misses. Until the bus of
     :func:`motorlink.rmd.open` is closed, one thread calls ``bus.recv`` and another one ``bus.send``.
 
-    Where the bus raises, the exchange fails (``LineLost``, with what was raised as its cause). The next
+    Where the bus raises, the exchange fails (``LinkError``, with what was raised as its cause). The next
     call uses the bus again. ``stop`` and ``off`` are sent even if receiving failed before. Ctrl-C is no
     failure: it ends the wait, and the bus stays open.
 

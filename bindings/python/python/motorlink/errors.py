@@ -1,7 +1,7 @@
 """What can go wrong. Every exception of this package is a :class:`MotorlinkError`.
 
-A drive that refuses is told apart from a line that fails: after :class:`Refused` the drive is as it
-was, after :class:`LineLost` and :class:`Timeout` nobody knows whether it did what was asked.
+A drive that refuses is told apart from a line that fails: after :class:`RefusedError` the drive is as it
+was, after :class:`LinkError` and :class:`ReplyTimeoutError` nobody knows whether it did what was asked.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 __all__ = [
-    "BadValue",
-    "Closed",
-    "FullTurn",
-    "LineLost",
+    "InvalidValueError",
+    "ClosedError",
+    "FullTurnError",
+    "LinkError",
     "MotorlinkError",
-    "NoSuchRegister",
+    "UnknownRegisterError",
     "PortError",
-    "Refused",
-    "Timeout",
+    "RefusedError",
+    "ReplyTimeoutError",
 ]
 
 
@@ -28,7 +28,7 @@ class MotorlinkError(Exception):
     port: str | None
     #: The motor; ``None`` where it is about none, or about whichever the drive has selected.
     motor: int | None
-    #: What was sampled before it happened, if it happened in ``bus.sample``.
+    #: What was sampled before it happened, if it happened in ``client.sample``.
     samples: Any
 
     def __init__(self, message: str = "", *, port: str | None = None, motor: int | None = None):
@@ -38,10 +38,10 @@ class MotorlinkError(Exception):
         self.samples = None
 
 
-class Refused(MotorlinkError):
+class RefusedError(MotorlinkError):
     """The drive understood and said no, or did not keep what it was told; the line works.
 
-    RMD motors never refuse: one that does not know a command is silent (:class:`Timeout`).
+    RMD motors never refuse: one that does not know a command is silent (:class:`ReplyTimeoutError`).
     """
 
     #: The drive's reason (Motor Control Protocol, table 2); ``None`` where it gave none.
@@ -63,38 +63,38 @@ class Refused(MotorlinkError):
         self.name = name
 
 
-class LineLost(MotorlinkError, ConnectionError):
+class LinkError(MotorlinkError, ConnectionError):
     """There is no answer to trust: damage, noise, a port that went away.
 
     Call again: the line is recovered first, so that a late reply is never taken for another's.
     """
 
 
-class Timeout(MotorlinkError, TimeoutError):
+class ReplyTimeoutError(MotorlinkError, TimeoutError):
     """No answer in time. What is not there, not powered or of another baud rate is silent, too."""
 
 
-class PortError(LineLost):
+class PortError(LinkError):
     """The port cannot be opened, or was closed by its far end."""
 
 
-class BadValue(MotorlinkError, ValueError):
+class InvalidValueError(MotorlinkError, ValueError):
     """A value that cannot be sent, or that a limit forbids; nothing was sent."""
 
 
-class FullTurn(BadValue):
+class FullTurnError(InvalidValueError):
     """A move within the turn of an RMD motor that could be nearly a full turn; it was not sent.
 
     The motor is at its target already, or just past it. Only its angle was read.
     """
 
 
-class NoSuchRegister(BadValue, KeyError):
+class UnknownRegisterError(InvalidValueError, KeyError):
     """A register name or number that nobody knows; nothing was sent."""
 
     # That of KeyError quotes the message.
     __str__ = Exception.__str__
 
 
-class Closed(MotorlinkError, ValueError):
-    """The bus was closed by this program; open it again."""
+class ClosedError(MotorlinkError, ValueError):
+    """The client was closed by this program; open it again."""

@@ -1,9 +1,9 @@
 """Drives that speak ST's serial Motor Control Protocol.
 
 >>> import motorlink
->>> with motorlink.st.open("sim:") as bus:       # or "/dev/ttyACM0"
-...     motor = bus.motor(1)
-...     motor.write("SPEED_KP", 1200)
+>>> with motorlink.st.open("sim:") as client:       # or "/dev/ttyACM0"
+...     motor = client.motor(1)
+...     motor.set("SPEED_KP", 1200)
 ...     motor.registers.SPEED_KP
 1200
 
@@ -12,20 +12,20 @@ until it is told what full scale is: ``full_scale_amps=17.5`` makes A of them.
 
 Every method of a motor is one exchange unless it says otherwise, and raises
 
-* ``Refused`` where the drive says no (table 2 of the document),
-* ``Timeout`` and ``LineLost`` where there is no answer to trust: nobody knows what the drive did,
-* ``BadValue`` where nothing was sent: no such motor, out of range, over a limit; of a register that
-  nobody knows, its subclass ``errors.NoSuchRegister``, which is a ``KeyError``, too,
-* ``Closed`` after ``bus.close()``.
+* ``RefusedError`` where the drive says no (table 2 of the document),
+* ``ReplyTimeoutError`` and ``LinkError`` where there is no answer to trust: nobody knows what the drive did,
+* ``InvalidValueError`` where nothing was sent: no such motor, out of range, over a limit; of a register that
+  nobody knows, its subclass ``errors.UnknownRegisterError``, which is a ``KeyError``, too,
+* ``ClosedError`` after ``client.close()``.
 
 Paragraphs in brackets are those of the document "Motor Control Protocol". Ctrl-C ends a wait for a
 silent drive at once; nobody knows then what the drive did, and the next exchange recovers the line
 first. ``stop()`` does not wait for that: it is sent at once, and again on the recovered line. While
 motors are being stopped at the end Ctrl-C has to wait.
 
-A signal handler may use the bus that the main thread waits for, such as ``motor.stop()`` or
-``bus.close()``. The exchange that it interrupted is given up then and raises ``PortError``. A handler
-that does not use the bus does not disturb the exchange. If another thread has an exchange under way,
+A signal handler may use the client that the main thread waits for, such as ``motor.stop()`` or
+``client.close()``. The exchange that it interrupted is given up then and raises ``PortError``. A handler
+that does not use the client does not disturb the exchange. If another thread has an exchange under way,
 the handler waits until that is over.
 """
 
@@ -34,39 +34,39 @@ from __future__ import annotations
 from typing import Any
 
 from motorlink._apis import Blocking
-from motorlink._bus import BlockingBus, Port, opens
-from motorlink._core import StClient
+from motorlink._client import BlockingClient, PortLike, opens
+from motorlink._core import StClient as Core
 from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
-from motorlink._st import StBus, StMotor
+from motorlink._st import StClient, StMotor
 from motorlink._values import (
+    BoardInfo,
     ControlMode,
-    Faults,
     FirmwareVersion,
-    Info,
+    Flags,
     RegisterInfo,
     RevupPhase,
-    State,
+    Status,
 )
 
 __all__ = [
-    "Bus",
+    "BoardInfo",
+    "Client",
     "ControlMode",
-    "Faults",
     "FirmwareVersion",
-    "Info",
+    "Flags",
     "Motor",
     "RegisterInfo",
     "Registers",
     "Request",
     "RevupPhase",
-    "State",
+    "Status",
     "open",
 ]
 
 
-class Motor(Blocking, StMotor["Bus"]):
-    """One motor of a drive; from :meth:`Bus.motor`."""
+class Motor(Blocking, StMotor["Client"]):
+    """One motor of a drive; from :meth:`Client.motor`."""
 
     __slots__ = ()
 
@@ -76,31 +76,31 @@ class Motor(Blocking, StMotor["Bus"]):
         return Registers(self)
 
 
-class Bus(BlockingBus, StBus[Motor, Port]):
+class Client(BlockingClient, StClient[Motor, PortLike]):
     """A serial line with a drive of up to seven motors; from :func:`open`.
 
     Threads may share it: one exchange at a time is on the line, and each caller gets its own answer.
     """
 
-    _core: StClient
-    _Core = StClient
+    _core: Core
+    _Core = Core
     _Motor = Motor
 
-    def __init__(self, core: StClient, **options: Any):
+    def __init__(self, core: Core, **options: Any):
         super().__init__(core, **options)
-        self._exchange, self._exchange_raw = core.perform, core.exchange_raw
-        self._write_verified, self._sample = core.write_verified, core.sample
+        self._exchange, self._exchange_raw = core.exchange, core.raw
+        self._set_verified, self._sample = core.set_verified, core.sample
 
     def confirm(self) -> None:
         """Makes sure that the replies so far went to their own requests, before you rely on what you read: one
-        exchange more. A reply that came twice or late is ``LineLost``: read again.
+        exchange more. A reply that came twice or late is ``LinkError``: read again.
 
         >>> import motorlink
-        >>> with motorlink.st.open("sim:") as bus:
-        ...     volts = bus.motor(1).read("BUS_VOLTAGE")
-        ...     bus.confirm()
+        >>> with motorlink.st.open("sim:") as client:
+        ...     volts = client.motor(1).get("BUS_VOLTAGE")
+        ...     client.confirm()
         """
         self._core.confirm()
 
 
-open = opens(Bus._open)
+open = opens(Client._open)

@@ -1,15 +1,15 @@
 //! The RMD protocol over CAN, V1.62.
 
-mod bus;
+mod client;
 mod options;
 mod quantity;
 mod request;
 mod sample;
 
-pub(crate) use bus::{RmdBus, finding, four_torques, motor_ids, not_stopped};
+pub(crate) use client::{RmdClient, four_currents, motor_ids, not_stopped, scan_result};
 pub(crate) use options::{RmdOptions, limits};
 pub(crate) use quantity::rmd_quantities;
-pub(crate) use request::{RmdRequest, motor_id};
+pub(crate) use request::{RmdRequest, motor_id, rmd_encode, rmd_full_turn_tolerance};
 pub(crate) use sample::RmdSampling;
 
 use motorlink_proto::can::CanFrame;
@@ -19,7 +19,7 @@ use motorlink_proto::rmd::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::error::bad_value;
+use crate::error::invalid_value;
 
 /// A motor's ID, 1 to 32.
 #[pyfunction]
@@ -38,13 +38,16 @@ pub(crate) fn rmd_decode(
 ) -> PyResult<Py<PyAny>> {
     let data = request::eight(py, data)?;
     let id = u16::try_from(can_id).ok().filter(|id| *id < 0x800);
-    let id = id.ok_or_else(|| bad_value(py, format_args!("{can_id:#x} has not 11 bits")))?;
+    let id = id.ok_or_else(|| invalid_value(py, format_args!("{can_id:#x} has not 11 bits")))?;
     let motor = MotorId::from_can_id(can_id);
     let code = Code::from(data[0]);
     let (name, fields): (_, &[Field]) = match (motor, code.info()) {
         (None, _) if id == TORQUE4_ID && !reply => (format!("{id:#x}"), SetTorque4::FIELDS),
         (None, _) => {
-            return Err(bad_value(py, format_args!("{id:#05x} is no identifier of this protocol")));
+            return Err(invalid_value(
+                py,
+                format_args!("{id:#05x} is no identifier of this protocol"),
+            ));
         }
         (Some(_), Some(row)) => (row.code.to_string(), if reply { row.reply } else { row.request }),
         (Some(_), None) => (code.to_string(), &[]),
@@ -53,7 +56,7 @@ pub(crate) fn rmd_decode(
     for field in fields {
         let raw = field.raw(&data);
         digits.set_item(field.name, raw)?;
-        values.set_item(quantity::named(field), field.scale.value(raw))?;
+        values.set_item(field.name_with_unit().to_string(), field.scale.value(raw))?;
     }
     let direction = if reply { Direction::DriveToHost } else { Direction::HostToDrive };
     let text = describe(CanFrame::new(id, data), direction).to_string();

@@ -13,20 +13,20 @@ pub(crate) struct RmdOptions(pub(crate) Options);
 impl RmdOptions {
     #[new]
     #[pyo3(signature = (
-        *, timeout, guard, current_limit_a, speed_limit_dps, angle_limit_deg,
+        *, timeout, quarantine, current_limit_amps, speed_limit_dps, angle_limit_degrees,
     ))]
     fn new(
         py: Python<'_>,
         timeout: f64,
-        guard: f64,
-        current_limit_a: Option<f64>,
+        quarantine: f64,
+        current_limit_amps: Option<f64>,
         speed_limit_dps: Option<f64>,
-        angle_limit_deg: Option<f64>,
+        angle_limit_degrees: Option<f64>,
     ) -> PyResult<Self> {
         Ok(RmdOptions(Options {
             timeout: span(py, "a timeout", timeout)?,
-            quarantine: span(py, "a quarantine time", guard)?,
-            limits: limits(py, current_limit_a, speed_limit_dps, angle_limit_deg)?,
+            quarantine: span(py, "a quarantine", quarantine)?,
+            limits: limits(py, current_limit_amps, speed_limit_dps, angle_limit_degrees)?,
             ..Options::default()
         }))
     }
@@ -35,14 +35,14 @@ impl RmdOptions {
 /// Limits in the units of the field. A limit is rounded towards 0.
 pub(crate) fn limits(
     py: Python<'_>,
-    current_a: Option<f64>,
-    speed_dps: Option<f64>,
-    angle_deg: Option<f64>,
+    current_limit_amps: Option<f64>,
+    speed_limit_dps: Option<f64>,
+    angle_limit_degrees: Option<f64>,
 ) -> PyResult<Limits> {
     let (ampere, degree) = (IqCommand::SCALE, CentiDegrees::SCALE);
-    let current = current_a.map(|amps| limit(py, amps, ampere, IqCommand::SYMBOL));
-    let speed = speed_dps.map(|dps| limit(py, dps, SpeedLimit::SCALE, SpeedLimit::SYMBOL));
-    let angle = angle_deg.map(|degrees| limit(py, degrees, degree, CentiDegrees::SYMBOL));
+    let current = current_limit_amps.map(|amps| limit(py, amps, ampere, IqCommand::SYMBOL));
+    let speed = speed_limit_dps.map(|dps| limit(py, dps, SpeedLimit::SCALE, SpeedLimit::SYMBOL));
+    let angle = angle_limit_degrees.map(|degrees| limit(py, degrees, degree, CentiDegrees::SYMBOL));
     Ok(Limits {
         current: current.transpose()?.map(IqCommand),
         speed: speed.transpose()?.map(SpeedLimit),

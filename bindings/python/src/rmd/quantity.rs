@@ -1,18 +1,11 @@
 //! What can be read of a motor, value by value, under names with units.
 
-use motorlink_proto::rmd::{Code, Field};
+use std::cmp::Reverse;
+
+use motorlink_proto::rmd::{COMMANDS, Code, CommandInfo, Field};
 use pyo3::prelude::*;
 
-use crate::error::bad_value;
-
-/// Reads whose values a program may sample, the one that tells most first.
-const READS: [Code; 5] = [
-    Code::ReadMotionStatus,
-    Code::ReadStatus,
-    Code::ReadPhaseCurrents,
-    Code::ReadMultiTurnAngle,
-    Code::ReadSingleTurnAngle,
-];
+use crate::error::invalid_value;
 
 /// A value of a reply.
 #[derive(Debug, Clone, Copy)]
@@ -21,34 +14,18 @@ pub(crate) struct Quantity {
     pub(crate) field: &'static Field,
 }
 
-/// The name of a value with its unit behind it: `speed_dps`.
-pub(crate) fn named(field: &Field) -> String {
-    let unit = match field.scale.symbol {
-        "°C" => "_c",
-        "V" => "_v",
-        "A" => "_a",
-        "°" => "_deg",
-        "°/s" => "_dps",
-        "°/s²" => "_dps2",
-        _ => "",
-    };
-    format!("{}{unit}", field.name)
-}
-
 impl Quantity {
-    /// Every quantity with its name. Of two with the same name the second has its command's.
+    /// Every quantity with its name, of the reads that tell most first.
     pub(crate) fn all() -> Vec<(String, Quantity)> {
+        let mut reads: Vec<_> = COMMANDS.iter().filter(|row| row.sampled).collect();
+        reads.sort_by_key(|row| Reverse(row.reply.len()));
         let mut all: Vec<(String, Quantity)> = Vec::new();
-        for code in READS {
-            for field in code.info().map_or(&[][..], |row| row.reply) {
-                let name = named(field);
-                let taken = |name: &str| all.iter().any(|(known, _)| known == name);
-                let name = match taken(&name) {
-                    false => name,
-                    true if code == Code::ReadSingleTurnAngle => format!("circle_{name}"),
-                    true => continue,
-                };
-                all.push((name, Quantity { code, field }));
+        for &row in &reads {
+            for field in row.reply {
+                let name = quantity_name(row, field, &reads);
+                if !all.iter().any(|(known, _)| *known == name) {
+                    all.push((name, Quantity { code: row.code, field }));
+                }
             }
         }
         all
@@ -59,8 +36,20 @@ impl Quantity {
         let found = Self::all().into_iter().find(|(known, _)| known == name);
         found.map(|(_, quantity)| quantity).ok_or_else(|| {
             let known = rmd_quantities().join(", ");
-            bad_value(py, format_args!("motors do not tell `{name}`; there are {known}"))
+            invalid_value(py, format_args!("motors do not tell `{name}`; there are {known}"))
         })
+    }
+}
+
+/// The field's name; the noun of its read where another read calls another quantity so.
+fn quantity_name(row: &CommandInfo, field: &Field, reads: &[&CommandInfo]) -> String {
+    let mut fields = reads.iter().flat_map(|read| read.reply);
+    let name = field.name_with_unit().to_string();
+    match row.stem.strip_prefix("read_") {
+        Some(noun) if fields.any(|it| it.name == field.name && it.scale != field.scale) => {
+            name.replacen(field.name, noun, 1)
+        }
+        _ => name,
     }
 }
 

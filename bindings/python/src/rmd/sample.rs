@@ -155,7 +155,8 @@ impl RmdSampling {
     /// The cycles of a row: requests by ID, answered with bytes.
     #[getter]
     fn cycles(&self) -> Vec<BTreeMap<u8, RmdRequest>> {
-        let named = |&(id, request): &(MotorId, [u8; 8])| (id.number(), RmdRequest::plain(request));
+        let named =
+            |&(id, request): &(MotorId, [u8; 8])| (id.number(), RmdRequest::for_bytes(request));
         self.questions.cycles.iter().map(|cycle| cycle.iter().map(named).collect()).collect()
     }
 

@@ -13,7 +13,7 @@ use pyo3::types::{PyByteArray, PyDict};
 use super::bytes;
 use super::port::SimPort;
 use super::serving::SimServing;
-use crate::error::bad_value;
+use crate::error::invalid_value;
 use crate::number::digits;
 
 /// How much time passes before the machine's is looked at.
@@ -47,7 +47,7 @@ impl SimBench {
             None => config,
         });
         let bench = config.and_then(|config| Bench::new(&config));
-        Ok(SimBench(Arc::new(bench.map_err(|error| bad_value(py, error))?)))
+        Ok(SimBench(Arc::new(bench.map_err(|error| invalid_value(py, error))?)))
     }
 
     /// The bench as a port, with faults.
@@ -81,7 +81,7 @@ impl SimBench {
     /// Executes a command that is written as JSON; gives the answer as JSON.
     fn execute(&self, py: Python<'_>, command: &str) -> PyResult<String> {
         let answer = Command::read(command).and_then(|command| self.0.execute(&command));
-        answer.map(|answer| answer.to_string()).map_err(|why| bad_value(py, why))
+        answer.map(|answer| answer.to_string()).map_err(|why| invalid_value(py, why))
     }
 
     /// Names and units of all signals, motor by motor.
@@ -111,7 +111,7 @@ impl SimBench {
         let signals: Vec<&str> = signals.iter().map(String::as_str).collect();
         let every = microseconds(py, "a distance of samples", every)?;
         let recording = py.detach(|| self.0.record(&signals, every));
-        let recording = recording.map_err(|why| bad_value(py, why))?;
+        let recording = recording.map_err(|why| invalid_value(py, why))?;
         let every = recording.every().0;
         Ok(SimRecording { recording: Mutex::new(Some(recording)), every })
     }
@@ -148,7 +148,7 @@ fn microseconds(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Micros> {
     const DAY: u64 = 86_400_000_000;
     let span = digits(py, what, seconds, 1e-6, "s").ok().filter(|span: &u64| *span <= DAY);
     span.map(Micros).ok_or_else(|| {
-        bad_value(py, format_args!("{what} of {seconds} s: give 0 to 86400 s, a day"))
+        invalid_value(py, format_args!("{what} of {seconds} s: give 0 to 86400 s, a day"))
     })
 }
 

@@ -14,14 +14,14 @@ use motorlink_testbench::preset;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
-use crate::error::bad_value;
+use crate::error::invalid_value;
 
 /// The presets as JSON, by name. Numbers have the fewest digits that say which is meant.
 #[pyfunction]
 pub(crate) fn sim_presets(py: Python<'_>) -> PyResult<String> {
     let presets = preset::ALL.iter().map(|(name, config)| {
         let plant = serde_json::to_string(&config());
-        Ok(format!("{name:?}:{}", plant.map_err(|error| bad_value(py, error))?))
+        Ok(format!("{name:?}:{}", plant.map_err(|error| invalid_value(py, error))?))
     });
     Ok(format!("{{{}}}", presets.collect::<PyResult<Vec<_>>>()?.join(",")))
 }

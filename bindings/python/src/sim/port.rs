@@ -8,7 +8,7 @@ use motorlink_link::fault::{FaultError, Faults};
 use motorlink_testbench::Bench;
 use pyo3::prelude::*;
 
-use crate::error::bad_value;
+use crate::error::invalid_value;
 
 /// What is opened.
 #[derive(FromPyObject)]
@@ -51,6 +51,6 @@ impl SimPort {
         usable: fn(Faults) -> Result<Faults, FaultError>,
     ) -> PyResult<Faults> {
         let faults = self.fault.as_ref().map(|text| text.parse().and_then(usable)).transpose();
-        Ok(faults.map_err(|error| bad_value(py, error))?.unwrap_or(Faults::NONE))
+        Ok(faults.map_err(|error| invalid_value(py, error))?.unwrap_or(Faults::NONE))
     }
 }

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::bytes;
-use crate::error::bad_value;
+use crate::error::invalid_value;
 
 /// How long signals wait: Ctrl-C is one.
 const LOOK: Duration = Duration::from_millis(20);
@@ -23,8 +23,8 @@ pub(crate) fn sim_run<'py>(
     path: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let scenario = match path {
-        Some(path) => Scenario::read(&path).map_err(|error| bad_value(py, error))?,
-        None => Scenario::parse(text, Path::new("")).map_err(|why| bad_value(py, why))?,
+        Some(path) => Scenario::read(&path).map_err(|error| invalid_value(py, error))?,
+        None => Scenario::parse(text, Path::new("")).map_err(|why| invalid_value(py, why))?,
     };
     let (title, about) = (scenario.title.clone(), scenario.about.clone());
     let (tell, mut told) = mpsc::channel();
@@ -34,9 +34,9 @@ pub(crate) fn sim_run<'py>(
         let heard;
         (heard, told) = py.detach(move || (told.recv_timeout(LOOK), told));
         match heard {
-            Ok(run) => break run.map_err(|error| bad_value(py, error))?,
+            Ok(run) => break run.map_err(|error| invalid_value(py, error))?,
             Err(RecvTimeoutError::Timeout) => py.check_signals()?,
-            Err(RecvTimeoutError::Disconnected) => return Err(bad_value(py, "the run failed")),
+            Err(RecvTimeoutError::Disconnected) => return Err(invalid_value(py, "the run failed")),
         }
     };
     let told = PyDict::new(py);

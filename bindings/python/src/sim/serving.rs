@@ -7,7 +7,7 @@ use motorlink_link::serve::Served;
 use motorlink_testbench::{Bench, Serving};
 use pyo3::prelude::*;
 
-use crate::error::{bad_value, port_error};
+use crate::error::{invalid_value, port_error};
 
 /// Ports on which a bench is served until it ends.
 #[pyclass(frozen, module = "motorlink._core")]
@@ -25,7 +25,7 @@ impl SimServing {
         rmd: Option<&str>,
     ) -> PyResult<Self> {
         let name = |text: Option<&str>| -> PyResult<Option<ServeName>> {
-            text.map(str::parse).transpose().map_err(|error| bad_value(py, error))
+            text.map(str::parse).transpose().map_err(|error| invalid_value(py, error))
         };
         let (st, rmd) = (name(st)?, name(rmd)?);
         let serving = py.detach(|| bench.serve(st, rmd)).map_err(|error| port_error(py, &error))?;

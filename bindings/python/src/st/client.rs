@@ -9,7 +9,7 @@ use pyo3::types::{PyByteArray, PyBytes, PyList};
 use super::options::StOptions;
 use super::request::{StRequest, motor_number};
 use super::sample::{self, Reading, sample};
-use crate::error::{bad_value, st_error};
+use crate::error::{invalid_value, st_error};
 use crate::sampling::Plan;
 use crate::shared::Shared;
 use crate::signals::Deafness;
@@ -32,7 +32,7 @@ impl StClient {
         let deafness = Deafness::default();
         let (client, port, clock) = match port {
             Port::Name(name) => {
-                let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
+                let name: PortName = name.parse().map_err(|error| invalid_value(py, error))?;
                 let client = py.detach(|| Client::open(&name, options));
                 let client = client.map_err(|error| st_error(py, &error))?;
                 let client = client.looking(deafness.look());
@@ -48,7 +48,7 @@ impl StClient {
     }
 
     /// One exchange; gives what the request makes of the reply.
-    fn perform(&self, py: Python<'_>, motor: i64, request: &StRequest) -> PyResult<Py<PyAny>> {
+    fn exchange(&self, py: Python<'_>, motor: i64, request: &StRequest) -> PyResult<Py<PyAny>> {
         let motor = motor_number(py, motor)?;
         let answer = self.client.exchange(py, |client| {
             client.exchange(motor, &request.request(), |payload| request.understand(payload))
@@ -58,7 +58,7 @@ impl StClient {
 
     /// Writes, reads back and repeats until the register has the value; gives the number of the
     /// attempt that did it.
-    fn write_verified(
+    fn set_verified(
         &self,
         py: Python<'_>,
         motor: i64,
@@ -79,7 +79,7 @@ impl StClient {
     }
 
     /// One exchange with any frame code and payload; gives the acknowledge's payload.
-    fn exchange_raw<'py>(
+    fn raw<'py>(
         &self,
         py: Python<'py>,
         motor: i64,
@@ -115,7 +115,7 @@ impl StClient {
 
     /// Motors that this client started and did not stop.
     #[getter]
-    fn started<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+    fn moving<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let client = self.client.get(py)?;
         let numbers: Vec<u8> = py.detach(|| client.started().map(MotorNumber::number).collect());
         PyList::new(py, numbers)
@@ -157,5 +157,5 @@ pub(crate) fn not_stopped(py: Python<'_>, stopped: Vec<Stopped>) -> Vec<(u8, PyE
 /// A frame code, 5 bits.
 pub(crate) fn frame_code(py: Python<'_>, code: i64) -> PyResult<u8> {
     let code = u8::try_from(code).ok().filter(|code| *code < 0x20);
-    code.ok_or_else(|| bad_value(py, "frame codes are 0 to 0x1f"))
+    code.ok_or_else(|| invalid_value(py, "frame codes are 0 to 0x1f"))
 }

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use super::reply::Reply;
-use crate::error::bad_value;
+use crate::error::invalid_value;
 
 /// The one frame that these bytes are.
 pub(super) fn parse<'a>(py: Python<'_>, frame: &'a [u8]) -> PyResult<Frame<'a>> {
@@ -14,16 +14,16 @@ pub(super) fn parse<'a>(py: Python<'_>, frame: &'a [u8]) -> PyResult<Frame<'a>> 
         Parse::Frame(parsed, size) if size == frame.len() => Ok(parsed),
         Parse::Frame(_, size) => {
             let more = frame.len() - size;
-            Err(bad_value(py, format_args!("the frame ends {more} bytes before its bytes do")))
+            Err(invalid_value(py, format_args!("the frame ends {more} bytes before its bytes do")))
         }
-        Parse::More => Err(bad_value(py, "the frame is not complete")),
-        Parse::Bad(why) => Err(bad_value(py, format_args!("this is no frame: {why:?}"))),
+        Parse::More => Err(invalid_value(py, "the frame is not complete")),
+        Parse::Bad(why) => Err(invalid_value(py, format_args!("this is no frame: {why:?}"))),
     }
 }
 
 /// The error of a request that does not fit a frame.
 pub(super) fn too_long(py: Python<'_>) -> PyErr {
-    bad_value(py, "the request does not fit a frame: a payload has at most 128 bytes")
+    invalid_value(py, "the request does not fit a frame: a payload has at most 128 bytes")
 }
 
 /// A request apart from its list of bytes, and that list.
@@ -55,7 +55,7 @@ pub(super) fn owned(request: Request<'_>) -> (Request<'static>, Vec<u8>) {
 pub(super) fn reply(request: Request<'_>) -> Reply {
     match request {
         Request::GetRegister(register) => Reply::Number { register, raw: true },
-        Request::GetBoardInfo => Reply::Info,
+        Request::GetBoardInfo => Reply::BoardInfo,
         Request::GetFirmwareVersion => Reply::FirmwareVersion,
         Request::GetRevupData(_) => Reply::Revup,
         Request::GetSegment(_) | Request::GetProfilerInfo(_) => Reply::Bytes,

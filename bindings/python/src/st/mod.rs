@@ -22,7 +22,7 @@ use motorlink::st::register::{Feature, Features, Writing};
 use motorlink::st::{Flags, RegisterId};
 use pyo3::prelude::*;
 
-use crate::error::no_such_register;
+use crate::error::unknown_register;
 use crate::values;
 use scale::register;
 
@@ -39,7 +39,7 @@ pub(crate) fn st_register(
     let register = register(name)?;
     let (Some(shape), Some(text)) = (register.shape(), register.text()) else {
         let id = register.0;
-        return Err(no_such_register(py, format_args!("nobody knows what register {id:#04x} is")));
+        return Err(unknown_register(py, format_args!("nobody knows what register {id:#04x} is")));
     };
     let built = Features::NONE.with(shape.feature);
     values::register_info(

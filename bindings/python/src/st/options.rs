@@ -4,7 +4,7 @@ use motorlink::st::{Limits, Options, Recovery};
 use pyo3::prelude::*;
 
 use super::scale::Scale;
-use crate::error::bad_value;
+use crate::error::invalid_value;
 use crate::number::{limit, span};
 
 /// What `open` was told, checked.
@@ -15,19 +15,19 @@ pub(crate) struct StOptions(pub(crate) Options);
 impl StOptions {
     #[new]
     #[pyo3(signature = (
-        *, profile, timeout, recovery, speed_limit, current_limit, full_scale_amps,
+        *, profile, timeout, recovery, speed_limit_rpm, current_limit, full_scale_amps,
     ))]
     fn new(
         py: Python<'_>,
         profile: &str,
         timeout: f64,
         recovery: &str,
-        speed_limit: Option<f64>,
+        speed_limit_rpm: Option<f64>,
         current_limit: Option<f64>,
         full_scale_amps: Option<f64>,
     ) -> PyResult<Self> {
         let scale = Scale::new(py, profile, full_scale_amps)?;
-        let limits = limits(py, scale, speed_limit, current_limit)?;
+        let limits = limits(py, scale, speed_limit_rpm, current_limit)?;
         let mut options = Options { profile: scale.profile, limits, ..Options::default() };
         options.timeout = span(py, "a timeout", timeout)?;
         options.recovery = match recovery {
@@ -36,7 +36,10 @@ impl StOptions {
             "none" => Recovery::None,
             other => {
                 let known = "there are `drain`, `pad` and `none`";
-                return Err(bad_value(py, format_args!("there is no recovery `{other}`; {known}")));
+                return Err(invalid_value(
+                    py,
+                    format_args!("there is no recovery `{other}`; {known}"),
+                ));
             }
         };
         Ok(StOptions(options))

@@ -3,10 +3,10 @@
 use motorlink::st::Profile;
 use pyo3::prelude::*;
 
-use crate::error::bad_value;
+use crate::error::invalid_value;
 
 /// The profile of this name.
 pub(super) fn named(py: Python<'_>, name: &str) -> PyResult<Profile> {
-    let unknown = |error| bad_value(py, format_args!("there is no profile `{name}`: {error}"));
+    let unknown = |error| invalid_value(py, format_args!("there is no profile `{name}`: {error}"));
     name.parse().map_err(unknown)
 }

@@ -16,10 +16,10 @@ use crate::values;
 pub(super) enum Reply {
     Nothing,
     Number { register: RegisterId, raw: bool },
-    State,
-    Faults,
+    Status,
+    Flags,
     ControlMode,
-    Info,
+    BoardInfo,
     FirmwareVersion,
     Revup,
     Segment { registers: Vec<RegisterId>, raw: bool },
@@ -30,7 +30,7 @@ pub(super) enum Reply {
 pub(crate) enum Answer {
     Nothing,
     Bits(i32),
-    Info([u8; 3], String),
+    BoardInfo([u8; 3], String),
     FirmwareVersion(String, String),
     Revup(RevupPhase),
     Values(Vec<i32>),
@@ -43,12 +43,12 @@ impl Reply {
         Some(match self {
             Reply::Nothing => Answer::Nothing,
             Reply::Number { register, .. } => Answer::Bits(register.decode(profile, payload)?),
-            Reply::State => Answer::Bits(RegisterId::STATUS.decode(profile, payload)?),
-            Reply::Faults => Answer::Bits(RegisterId::FLAGS.decode(profile, payload)?),
+            Reply::Status => Answer::Bits(RegisterId::STATUS.decode(profile, payload)?),
+            Reply::Flags => Answer::Bits(RegisterId::FLAGS.decode(profile, payload)?),
             Reply::ControlMode => Answer::Bits(RegisterId::CONTROL_MODE.decode(profile, payload)?),
-            Reply::Info => {
+            Reply::BoardInfo => {
                 let info = BoardInfo::decode(payload)?;
-                Answer::Info(info.version, info.name.to_owned())
+                Answer::BoardInfo(info.version, info.name.to_owned())
             }
             Reply::FirmwareVersion => {
                 let version = FirmwareVersion::decode(payload);
@@ -90,9 +90,9 @@ impl Reply {
             (Answer::Bits(bits), Reply::Number { register, raw }) => {
                 scale.value(py, *register, bits, *raw)
             }
-            (Answer::Bits(bits), Reply::State) => {
+            (Answer::Bits(bits), Reply::Status) => {
                 let state = Status::from(bits as u8);
-                values::state(py, (state.to_string(), state.number(), state.doc()))
+                values::status(py, (state.to_string(), state.number(), state.doc()))
             }
             (Answer::Bits(bits), Reply::ControlMode) => {
                 let mode = ControlMode::from(bits as u8);
@@ -101,10 +101,10 @@ impl Reply {
             (Answer::Bits(bits), _) => {
                 let flags = Flags(bits as u32);
                 let names = |bits| PyTuple::new(py, faults(bits));
-                values::faults(py, (names(flags.occurred())?, names(flags.present())?, flags.0))
+                values::flags(py, (names(flags.occurred())?, names(flags.present())?, flags.0))
             }
-            (Answer::Info(version, name), _) => {
-                values::info(py, (PyTuple::new(py, version)?, name))
+            (Answer::BoardInfo(version, name), _) => {
+                values::board_info(py, (PyTuple::new(py, version)?, name))
             }
             (Answer::FirmwareVersion(name, version), _) => {
                 values::firmware_version(py, (name, version))

@@ -10,7 +10,7 @@ use pyo3::types::{PyBytes, PyDict, PyString};
 use super::frame;
 use super::reply::{Answer, Reply};
 use super::scale::{Scale, register};
-use crate::error::{bad_value, refusal};
+use crate::error::{invalid_value, refusal};
 use crate::number::{digits, milliseconds};
 
 /// A request to an ST drive, in the units of the motor that it is made for.
@@ -93,7 +93,7 @@ impl StRequest {
     /// Reads a register (4.5).
     #[staticmethod]
     #[pyo3(signature = (register, *, profile = "spec", raw = false, full_scale_amps = None))]
-    fn read(
+    fn get_register(
         py: Python<'_>,
         #[pyo3(from_py_with = super::scale::register)] register: RegisterId,
         profile: &str,
@@ -106,7 +106,7 @@ impl StRequest {
     /// Writes a register (4.4).
     #[staticmethod]
     #[pyo3(signature = (register, value, *, profile = "spec", raw = false, full_scale_amps = None))]
-    fn write(
+    fn set_register(
         py: Python<'_>,
         #[pyo3(from_py_with = super::scale::register)] register: RegisterId,
         value: &Bound<'_, PyAny>,
@@ -124,7 +124,7 @@ impl StRequest {
 
     /// Writes any bytes to any register (4.4).
     #[staticmethod]
-    fn write_bytes(
+    fn set_register_bytes(
         py: Python<'_>,
         #[pyo3(from_py_with = super::scale::register)] register: RegisterId,
         value: Vec<u8>,
@@ -134,14 +134,14 @@ impl StRequest {
 
     /// Reads STATUS: the state in words.
     #[staticmethod]
-    fn state() -> Self {
-        Self::asked(Scale::plain(), Request::GetRegister(RegisterId::STATUS), Reply::State)
+    fn status() -> Self {
+        Self::asked(Scale::plain(), Request::GetRegister(RegisterId::STATUS), Reply::Status)
     }
 
     /// Reads FLAGS: the faults in words.
     #[staticmethod]
-    fn faults() -> Self {
-        Self::asked(Scale::plain(), Request::GetRegister(RegisterId::FLAGS), Reply::Faults)
+    fn flags() -> Self {
+        Self::asked(Scale::plain(), Request::GetRegister(RegisterId::FLAGS), Reply::Flags)
     }
 
     /// Reads CONTROL_MODE in words.
@@ -153,13 +153,13 @@ impl StRequest {
 
     /// Executes a command by name or number (4.6).
     #[staticmethod]
-    fn execute(py: Python<'_>, command: &Bound<'_, PyAny>) -> PyResult<Self> {
+    fn execute_command(py: Python<'_>, command: &Bound<'_, PyAny>) -> PyResult<Self> {
         let command = match command.cast::<PyString>() {
             Ok(name) => named_command(py, &name.to_cow()?)?,
             Err(_) => {
                 let number: i64 = command.extract()?;
                 Command::from(u8::try_from(number).map_err(|_| {
-                    bad_value(py, format_args!("commands are 0 to 255, not {number}"))
+                    invalid_value(py, format_args!("commands are 0 to 255, not {number}"))
                 })?)
             }
         };
@@ -168,19 +168,19 @@ impl StRequest {
 
     /// Version and name of the SDK (4.7).
     #[staticmethod]
-    fn info() -> Self {
-        Self::asked(Scale::plain(), Request::GetBoardInfo, Reply::Info)
+    fn get_board_info() -> Self {
+        Self::asked(Scale::plain(), Request::GetBoardInfo, Reply::BoardInfo)
     }
 
     /// Name and version of the firmware (4.12).
     #[staticmethod]
-    fn firmware_version() -> Self {
+    fn get_firmware_version() -> Self {
         Self::asked(Scale::plain(), Request::GetFirmwareVersion, Reply::FirmwareVersion)
     }
 
     /// Programs a speed ramp: rpm, s (4.8).
     #[staticmethod]
-    fn ramp(py: Python<'_>, speed_rpm: f64, duration_s: f64) -> PyResult<Self> {
+    fn set_ramp(py: Python<'_>, speed_rpm: f64, duration_s: f64) -> PyResult<Self> {
         let speed_rpm = rpm(py, speed_rpm)?;
         let ramp = Ramp { speed_rpm, duration_ms: milliseconds(py, duration_s)? };
         Ok(Self::told(Scale::plain(), Request::SetRamp(ramp)))
@@ -188,23 +188,28 @@ impl StRequest {
 
     /// Programs a torque ramp: Iq, s (profile `mcsdk-5.4`).
     #[staticmethod]
-    #[pyo3(signature = (iq, duration_s, *, full_scale_amps = None))]
-    fn torque_ramp(
+    #[pyo3(signature = (torque, duration_s, *, full_scale_amps = None))]
+    fn set_torque_ramp(
         py: Python<'_>,
-        iq: f64,
+        torque: f64,
         duration_s: f64,
         full_scale_amps: Option<f64>,
     ) -> PyResult<Self> {
         let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
-        let torque_s16a = scale.digits(py, iq)?;
+        let torque_s16a = scale.digits(py, torque)?;
         let ramp = TorqueRamp { torque_s16a, duration_ms: milliseconds(py, duration_s)? };
         Ok(Self::told(scale, Request::SetTorqueRamp(ramp)))
     }
 
     /// Sets the current references Iq and Id (4.11).
     #[staticmethod]
-    #[pyo3(signature = (iq, id = 0.0, *, full_scale_amps = None))]
-    fn current(py: Python<'_>, iq: f64, id: f64, full_scale_amps: Option<f64>) -> PyResult<Self> {
+    #[pyo3(signature = (iq, id, *, full_scale_amps = None))]
+    fn set_current_reference(
+        py: Python<'_>,
+        iq: f64,
+        id: f64,
+        full_scale_amps: Option<f64>,
+    ) -> PyResult<Self> {
         let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
         let (iq_s16a, id_s16a) = (scale.digits(py, iq)?, scale.digits(py, id)?);
         let request = Request::SetCurrentReference(CurrentReference { iq_s16a, id_s16a });
@@ -213,11 +218,11 @@ impl StRequest {
 
     /// Turns to an angle: rad, s (profile `mcsdk-5.4`).
     #[staticmethod]
-    fn move_to(py: Python<'_>, angle_rad: f64, duration_s: f64) -> PyResult<Self> {
+    fn set_position(py: Python<'_>, angle_rad: f64, duration_s: f64) -> PyResult<Self> {
         let (angle, duration) = (angle_rad as f32, duration_s as f32);
         if !angle.is_finite() || !duration.is_finite() || duration < 0.0 {
             let move_ = format!("{angle_rad} rad in {duration_s} s is no move; nothing was sent");
-            return Err(bad_value(py, move_));
+            return Err(invalid_value(py, move_));
         }
         let target = PositionMove { angle_rad: angle, duration_s: duration };
         Ok(Self::told(Scale::plain(), Request::SetPosition(target)))
@@ -226,7 +231,7 @@ impl StRequest {
     /// Reads a rev-up phase, 0 to 4 (4.9).
     #[staticmethod]
     #[pyo3(signature = (phase, *, full_scale_amps = None))]
-    fn revup(py: Python<'_>, phase: i64, full_scale_amps: Option<f64>) -> PyResult<Self> {
+    fn get_revup_data(py: Python<'_>, phase: i64, full_scale_amps: Option<f64>) -> PyResult<Self> {
         let scale = Scale::plain().with_full_scale(py, full_scale_amps)?;
         let phase = below(py, "rev-up phase", phase, REVUP_PHASES.into())?;
         Ok(Self::asked(scale, Request::GetRevupData(phase), Reply::Revup))
@@ -234,12 +239,12 @@ impl StRequest {
 
     /// Sets a rev-up phase, 0 to 4: rpm, Iq, s (4.10).
     #[staticmethod]
-    #[pyo3(signature = (phase, speed_rpm, current, duration_s, *, full_scale_amps = None))]
-    fn set_revup(
+    #[pyo3(signature = (phase, speed_rpm, torque, duration_s, *, full_scale_amps = None))]
+    fn set_revup_data(
         py: Python<'_>,
         phase: i64,
         speed_rpm: f64,
-        current: f64,
+        torque: f64,
         duration_s: f64,
         full_scale_amps: Option<f64>,
     ) -> PyResult<Self> {
@@ -247,7 +252,7 @@ impl StRequest {
         let phase = below(py, "rev-up phase", phase, REVUP_PHASES.into())?;
         let data = RevupPhase {
             speed_rpm: rpm(py, speed_rpm)?,
-            torque_s16a: scale.digits(py, current)?,
+            torque_s16a: scale.digits(py, torque)?,
             duration_ms: milliseconds(py, duration_s)?,
         };
         Ok(Self::told(scale, Request::SetRevupData(phase, data)))
@@ -268,7 +273,7 @@ impl StRequest {
     /// Reads a data segment that was configured with these registers (profile `spec`).
     #[staticmethod]
     #[pyo3(signature = (segment, registers, *, raw = false, full_scale_amps = None))]
-    fn read_segment(
+    fn get_segment(
         py: Python<'_>,
         segment: i64,
         registers: Vec<Bound<'_, PyAny>>,
@@ -283,7 +288,7 @@ impl StRequest {
 
     /// Lists the registers of motor profiler steps (profile `mcsdk-5.4`).
     #[staticmethod]
-    fn profiler_info(py: Python<'_>, steps: Vec<u8>) -> PyResult<Self> {
+    fn get_profiler_info(py: Python<'_>, steps: Vec<u8>) -> PyResult<Self> {
         let request = Self::asked(Scale::plain(), Request::GetProfilerInfo(&[]), Reply::Bytes);
         StRequest { bytes: steps, ..request }.fitting(py)
     }
@@ -296,7 +301,7 @@ impl StRequest {
         let parsed = frame::parse(py, frame)?;
         let request = parsed.request(scale.profile).map_err(|code| {
             let header = parsed.header;
-            bad_value(
+            invalid_value(
                 py,
                 format_args!("{header:#04x} begins no request that {profile} knows: {code}"),
             )
@@ -317,7 +322,7 @@ impl StRequest {
 
     /// What a reply frame says to this request.
     ///
-    /// Raises `Refused` for a negative acknowledge, `BadValue` for what is no reply to it.
+    /// Raises `RefusedError` for a negative acknowledge, `InvalidValueError` for what is no reply to it.
     fn decode_reply(&self, py: Python<'_>, frame: &[u8]) -> PyResult<Py<PyAny>> {
         let parsed = frame::parse(py, frame)?;
         let answer = match (parsed.header, parsed.payload) {
@@ -328,7 +333,7 @@ impl StRequest {
         let code = self.code();
         match answer {
             Some(answer) => self.value(py, answer),
-            None => Err(bad_value(py, format_args!("these bytes are no reply to {code}"))),
+            None => Err(invalid_value(py, format_args!("these bytes are no reply to {code}"))),
         }
     }
 
@@ -371,7 +376,7 @@ impl StRequest {
     /// The register and the bits of a write, which alone can be verified.
     pub(super) fn verifiable(&self, py: Python<'_>) -> PyResult<(RegisterId, i32)> {
         let Request::SetRegister { register, .. } = self.request else {
-            return Err(bad_value(py, "only a write can be verified"));
+            return Err(invalid_value(py, "only a write can be verified"));
         };
         let mut bits = [0; 4];
         bits.iter_mut().zip(&self.bytes).for_each(|(slot, byte)| *slot = *byte);
@@ -383,7 +388,7 @@ impl StRequest {
 pub(crate) fn motor_number(py: Python<'_>, motor: i64) -> PyResult<u8> {
     let number = u8::try_from(motor).ok().filter(|number| *number <= MotorNumber::MAX);
     number.ok_or_else(|| {
-        bad_value(py, format_args!("motor {motor} does not exist: motor numbers are 1 to 7"))
+        invalid_value(py, format_args!("motor {motor} does not exist: motor numbers are 1 to 7"))
     })
 }
 
@@ -392,7 +397,10 @@ fn named_command(py: Python<'_>, name: &str) -> PyResult<Command> {
         |command: &&Command| command.name().is_some_and(|known| known.eq_ignore_ascii_case(name));
     Command::ALL.iter().find(known).copied().ok_or_else(|| {
         let names: Vec<_> = Command::ALL.iter().filter_map(|command| command.name()).collect();
-        bad_value(py, format_args!("there is no command `{name}`; there are {}", names.join(", ")))
+        invalid_value(
+            py,
+            format_args!("there is no command `{name}`; there are {}", names.join(", ")),
+        )
     })
 }
 
@@ -403,19 +411,21 @@ fn rpm(py: Python<'_>, speed: f64) -> PyResult<i32> {
 fn below(py: Python<'_>, what: &str, number: i64, end: usize) -> PyResult<u8> {
     let fits = usize::try_from(number).is_ok_and(|number| number < end);
     let number = u8::try_from(number).ok().filter(|_| fits);
-    number.ok_or_else(|| bad_value(py, format_args!("{what}s are 0 to {}", end - 1)))
+    number.ok_or_else(|| invalid_value(py, format_args!("{what}s are 0 to {}", end - 1)))
 }
 
 /// Registers whose sizes are known.
 fn segment_registers(py: Python<'_>, names: &[Bound<'_, PyAny>]) -> PyResult<Vec<RegisterId>> {
     if names.is_empty() {
-        return Err(bad_value(py, "which registers was the data segment configured with?"));
+        return Err(invalid_value(py, "which registers was the data segment configured with?"));
     }
     let known = |name| {
         let found = register(name)?;
         match found.shape() {
             Some(_) => Ok(found),
-            None => Err(bad_value(py, format_args!("nobody knows the size of register {found}"))),
+            None => {
+                Err(invalid_value(py, format_args!("nobody knows the size of register {found}")))
+            }
         }
     };
     names.iter().map(known).collect()

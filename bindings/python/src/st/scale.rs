@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyString;
 
 use super::profile;
-use crate::error::{bad_value, no_such_register};
+use crate::error::{invalid_value, unknown_register};
 use crate::number::digits;
 
 /// Digits of a drive's full scale of current.
@@ -45,7 +45,7 @@ impl Scale {
         match full_scale_amps {
             Some(amps) if !(amps.is_finite() && amps > 0.0) => {
                 let why = "give the current of digit 32767, in A";
-                Err(bad_value(py, format_args!("{amps} A is no full scale: {why}")))
+                Err(invalid_value(py, format_args!("{amps} A is no full scale: {why}")))
             }
             amps => Ok(Scale { profile: self.profile, ampere: amps.map(|amps| amps / FULL_SCALE) }),
         }
@@ -122,7 +122,7 @@ impl Scale {
         } else {
             value.extract::<f64>()?.to_string()
         };
-        parse_value(register, &text, self.profile, raw).map_err(|error| bad_value(py, error))
+        parse_value(register, &text, self.profile, raw).map_err(|error| invalid_value(py, error))
     }
 
     fn is_whole(&self, register: RegisterId) -> bool {
@@ -142,10 +142,10 @@ fn is_current(register: RegisterId) -> bool {
 pub(crate) fn register(name: &Bound<'_, PyAny>) -> PyResult<RegisterId> {
     let py = name.py();
     if let Ok(text) = name.cast::<PyString>() {
-        return find_register(&text.to_cow()?).map_err(|error| no_such_register(py, error));
+        return find_register(&text.to_cow()?).map_err(|error| unknown_register(py, error));
     }
     let number: i64 = name.extract()?;
     u8::try_from(number).map(RegisterId).map_err(|_| {
-        no_such_register(py, format_args!("{number} is no register: numbers are 0 to 255"))
+        unknown_register(py, format_args!("{number} is no register: numbers are 0 to 255"))
     })
 }

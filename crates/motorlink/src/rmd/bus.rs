@@ -36,7 +36,7 @@ pub enum ScanResult {
 const BABBLE: time::Micros = time::Micros::from_millis(100);
 
 /// IDs that a scan asks at once.
-const SCAN_WIDTH: usize = 8;
+pub const SCAN_WIDTH: usize = 8;
 
 /// A CAN bus with RMD motors: shared by reference between threads.
 ///

@@ -20,13 +20,16 @@ pub enum FullTurn {
 }
 
 impl Default for FullTurn {
-    /// Refused, with a tolerance of 0.5°.
+    /// Refused, with [`FullTurn::TOLERANCE`].
     fn default() -> Self {
-        FullTurn::Refused { tolerance: TurnCentiDegrees(50) }
+        FullTurn::Refused { tolerance: Self::TOLERANCE }
     }
 }
 
 impl FullTurn {
+    /// How far past its target a motor is taken to be at it.
+    pub const TOLERANCE: TurnCentiDegrees = TurnCentiDegrees(50);
+
     /// Whether a motor that reads the angle `at` may be moved to `target`. Angles are within the turn,
     /// of the motor shaft, from the motor's zero; those of 360° and more are reduced to one turn.
     ///

@@ -25,7 +25,7 @@ mod session;
 pub use motorlink_proto::rmd::*;
 pub use motorlink_proto::units::*;
 
-pub use bus::{Client, ScanResult};
+pub use bus::{Client, SCAN_WIDTH, ScanResult};
 pub use error::Error;
 pub use event::EventClient;
 pub use full_turn::FullTurn;

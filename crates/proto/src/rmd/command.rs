@@ -81,8 +81,12 @@ pub struct CommandInfo {
     pub rom: bool,
     /// Whether the motor may turn after it.
     pub moves: bool,
+    /// Whether it reads what changes by itself, which programs read again and again.
+    pub sampled: bool,
     /// Values of the request.
     pub request: &'static [Field],
+    /// Name of the reply's type: several commands may have the same.
+    pub reply_name: &'static str,
     /// Values of the reply.
     pub reply: &'static [Field],
 }
@@ -97,7 +101,9 @@ impl CommandInfo {
             echo: false,
             rom: false,
             moves: false,
+            sampled: false,
             request: C::FIELDS,
+            reply_name: "",
             reply: C::Reply::FIELDS,
         }
     }
@@ -139,7 +145,7 @@ impl MotorSet {
 
 /// A row a command:
 ///
-/// `CODE stem Struct -> Reply [echo rom moves] VERSIONS "name in chapter 2", "heading in chapter 3",
+/// `CODE stem Struct -> Reply [echo rom moves sampled] VERSIONS "name in chapter 2", "heading in chapter 3",
 /// "what it does";`, with the fields of the request behind `Struct`, as [`payload!`] has them.
 macro_rules! commands {
     ($d:tt $(
@@ -175,6 +181,7 @@ macro_rules! commands {
         $( impl $name {
             const ROW: CommandInfo = CommandInfo {
                 versions: &[$( Version::$version, )+],
+                reply_name: stringify!($reply),
                 $( $flag: true, )*
                 ..CommandInfo::new::<$name>(Code::$name, stringify!($stem), $paragraph)
             };
@@ -228,13 +235,13 @@ commands! { $
         "Write current position to ROM as motor zero command",
         "Write current position to ROM as motor zero position command",
         "makes the current position the zero from the next power-on on";
-    0x92 read_multi_turn_angle ReadMultiTurnAngle -> MultiTurnAngle [] V1_62
+    0x92 read_multi_turn_angle ReadMultiTurnAngle -> MultiTurnAngle [sampled] V1_62
         "Read multi turns angle command", "Read multi turns angle command",
         "reads the angle over all turns";
-    0x94 read_single_turn_angle ReadSingleTurnAngle -> SingleTurnAngle [] V1_62
+    0x94 read_single_turn_angle ReadSingleTurnAngle -> SingleTurnAngle [sampled] V1_62
         "Read single circle angle command", "Read single circle angle command",
         "reads the angle within the turn";
-    0x9A read_status ReadStatus -> Status [] V1_62
+    0x9A read_status ReadStatus -> Status [sampled] V1_62
         "Read motor status 1 and error flag commands",
         "Read motor status 1 and error flag commands",
         "reads temperature, voltage and error flags";
@@ -242,10 +249,10 @@ commands! { $
     0x9B clear_errors ClearErrors -> Status [] V1_62
         "Clear motor error flag command", "Clear motor error flag command",
         "clears the error flags whose cause is gone";
-    0x9C read_motion_status ReadMotionStatus -> MotionStatus [] V1_62
+    0x9C read_motion_status ReadMotionStatus -> MotionStatus [sampled] V1_62
         "Read motor status 2", "Read motor status 2",
         "reads temperature, torque current, speed and encoder position";
-    0x9D read_phase_currents ReadPhaseCurrents -> PhaseCurrents [] V1_62
+    0x9D read_phase_currents ReadPhaseCurrents -> PhaseCurrents [sampled] V1_62
         "Read motor status 3", "Read motor status 3",
         "reads the three phase currents";
     0x80 off Off -> Off [echo] V1_62

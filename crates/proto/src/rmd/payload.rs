@@ -70,6 +70,11 @@ impl Field {
         if self.signed { (top as i64).wrapping_shr(down) } else { top.wrapping_shr(down) as i64 }
     }
 
+    /// The name with the unit behind it, for numbers that have none of their own: `speed_dps`.
+    pub fn name_with_unit(&self) -> impl fmt::Display + '_ {
+        Named(self)
+    }
+
     /// The value in words and physical units.
     pub fn shown<'a>(&'a self, data: &'a [u8; 8]) -> impl fmt::Display + 'a {
         Shown { field: self, data }
@@ -84,6 +89,18 @@ impl Field {
         let show: Show = |low, f| T::from_low(low).show(f);
         let (len, signed, scale, meaning) = (T::LEN, T::SIGNED, T::UNIT, T::MEANING);
         Field { name, doc: doc.trim_ascii(), offset, len, signed, scale, meaning, show }
+    }
+}
+
+struct Named<'a>(&'a Field);
+
+impl fmt::Display for Named<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Field { name, scale: Scale { suffix, .. }, .. } = self.0;
+        match *suffix {
+            "" => f.write_str(name),
+            unit => write!(f, "{name}_{unit}"),
+        }
     }
 }
 

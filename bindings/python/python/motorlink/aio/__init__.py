@@ -1,11 +1,11 @@
-"""The same buses for programs that use asyncio: every exchange is awaited.
+"""The same clients for programs that use asyncio: every exchange is awaited.
 
 >>> import asyncio, motorlink
 >>> async def main() -> float:
-...     async with motorlink.aio.st.open("sim:") as bus:       # or "/dev/ttyACM0"
-...         motor = bus.motor(1)
-...         await motor.ramp(1500, 1.0)                        # rpm, s
-...         return await motor.read("SPEED_MEAS")
+...     async with motorlink.aio.st.open("sim:") as client:       # or "/dev/ttyACM0"
+...         motor = client.motor(1)
+...         await motor.set_ramp(1500, 1.0)                        # rpm, s
+...         return await motor.get("SPEED_MEAS")
 >>> asyncio.run(main())
 0
 
@@ -19,10 +19,10 @@ may wait for long, happen in the loop's default executor.
 Any exchange may be cancelled, at any moment, by ``asyncio.timeout``, ``task.cancel()`` or the end of
 ``asyncio.run``. Nobody knows then whether the drive did what was asked; its reply, if it comes, is never
 taken for that to another request; and the next caller has its turn at once. The end of ``async with``
-stops the motors that the bus started also in a task that is being cancelled, before it lets the
+stops the motors that the client started also in a task that is being cancelled, before it lets the
 cancellation go on.
 
-A bus belongs to the event loop in which it was opened.
+A client belongs to the event loop in which it was opened.
 """
 
 from motorlink.aio import rmd, st

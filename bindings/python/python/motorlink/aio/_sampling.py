@@ -1,4 +1,4 @@
-"""Sampling in an event loop: the rows of ``bus.sample``, awaited."""
+"""Sampling in an event loop: the rows of ``client.sample``, awaited."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
-from motorlink.errors import LineLost, Timeout
+from motorlink.errors import LinkError, ReplyTimeoutError
 
 
 class Sampling(Protocol):
@@ -39,7 +39,7 @@ async def sampled(
                 continue
             try:
                 await row()
-            except (LineLost, Timeout):
+            except (LinkError, ReplyTimeoutError):
                 if not skip:
                     raise
     except BaseException as error:

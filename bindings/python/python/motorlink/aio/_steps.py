@@ -10,11 +10,11 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from motorlink._apis import Awaited, Exchanges, awaiting
-from motorlink._bus import AnyBus, open_described, report
-from motorlink.errors import Closed, MotorlinkError
+from motorlink._client import AnyClient, open_described, report
+from motorlink.errors import ClosedError, MotorlinkError
 
 Value = TypeVar("Value")
-Entered = TypeVar("Entered", bound="AwaitedBus")
+Entered = TypeVar("Entered", bound="AwaitedClient")
 
 if TYPE_CHECKING:
     from typing_extensions import ParamSpec, Self
@@ -79,10 +79,10 @@ class Steps:
             await asyncio.shield(opening)
         raise self.closed()
 
-    def closed(self) -> Closed:
+    def closed(self) -> ClosedError:
         """What calls end in from the close on."""
         port = self._machine.port
-        return Closed(f"{port} was closed by this program; open it again", port=port)
+        return ClosedError(f"{port} was closed by this program; open it again", port=port)
 
     def _opened(self, opening: asyncio.Future[None]) -> None:
         self._opening = None
@@ -160,8 +160,8 @@ class Steps:
         return closing.result(), cancelled
 
 
-class AwaitedBus(Awaited, AnyBus):
-    """What the buses of both protocols have in common."""
+class AwaitedClient(Awaited, AnyClient):
+    """What the clients of both protocols have in common."""
 
     _named = staticmethod(port_name)
 
@@ -219,18 +219,18 @@ class AwaitedBus(Awaited, AnyBus):
 
 
 class Opening(Generic[Entered]):
-    """A bus that is to be opened: ``async with`` it, or ``await`` it."""
+    """A client that is to be opened: ``async with`` it, or ``await`` it."""
 
     def __init__(self, open: Callable[[], Coroutine[Any, Any, Entered]]):
         self._open = open
-        self._bus: Entered | None = None
+        self._client: Entered | None = None
 
     def __await__(self) -> Generator[Any, None, Entered]:
         return self._open().__await__()
 
     async def __aenter__(self) -> Entered:
-        self._bus = await self._open()
-        return self._bus
+        self._client = await self._open()
+        return self._client
 
     async def __aexit__(
         self,
@@ -238,8 +238,8 @@ class Opening(Generic[Entered]):
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if self._bus is not None:
-            await self._bus.__aexit__(kind, error, traceback)
+        if self._client is not None:
+            await self._client.__aexit__(kind, error, traceback)
 
 
 def opens(
@@ -248,10 +248,10 @@ def opens(
     """The function ``open`` of a protocol."""
 
     def open(*arguments: Arguments.args, **named: Arguments.kwargs) -> Opening[Entered]:
-        bus = opening(*arguments, **named)
-        return Opening(lambda: awaiting(bus()))
+        client = opening(*arguments, **named)
+        return Opening(lambda: awaiting(client()))
 
-    return open_described(open, opening, "Opening[Bus]")
+    return open_described(open, opening, "Opening[Client]")
 
 
 def tell(answer: asyncio.Future[Any] | None, value: Any) -> None:

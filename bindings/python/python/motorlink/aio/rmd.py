@@ -2,10 +2,10 @@
 
 >>> import asyncio, motorlink
 >>> async def main() -> float:
-...     async with motorlink.aio.rmd.open("sim:") as bus:
-...         motor = bus.motor(1)
-...         await motor.move_to(90, max_speed=500)
-...         return (await motor.status()).voltage_v
+...     async with motorlink.aio.rmd.open("sim:") as client:
+...         motor = client.motor(1)
+...         await motor.set_position(90, max_speed_dps=500)
+...         return (await motor.status()).voltage_volts
 >>> asyncio.run(main())
 24.0
 """
@@ -20,43 +20,38 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any, Union
 
 from motorlink._apis import Awaited
-from motorlink._core import CanPort, RmdMachine, RmdSampling
-from motorlink._core import RmdRequest as Request
-from motorlink._rmd import RmdBus, RmdMotor
-from motorlink._values import Found
+from motorlink._core import RMD_SCAN_WIDTH, CanPort, RmdEventClient, RmdRequest, RmdSampling
+from motorlink._rmd import RmdClient, RmdMotor, ScanResult
 from motorlink.aio._sampling import sampled
-from motorlink.aio._steps import AwaitedBus, Opening, is_told, opens, tell
-from motorlink.errors import Closed, MotorlinkError, PortError
+from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
+from motorlink.errors import ClosedError, MotorlinkError, PortError
 
-__all__ = ["Bus", "Motor", "Opening", "open"]
-
-#: IDs that a scan asks at once.
-_SCAN_WIDTH = 8
+__all__ = ["Client", "Motor", "Opening", "open"]
 
 
-class Motor(Awaited, RmdMotor["Bus"]):
-    """One motor on the bus; from :meth:`Bus.motor`. See :class:`motorlink.rmd.Motor`."""
+class Motor(Awaited, RmdMotor["Client"]):
+    """One motor on the bus; from :meth:`Client.motor`. See :class:`motorlink.rmd.Motor`."""
 
     __slots__ = ()
 
 
-class Bus(AwaitedBus, RmdBus[Motor, Union[str, "os.PathLike[str]", CanPort]]):
+class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanPort]]):
     """A CAN bus with RMD motors; from :func:`open`.
 
     Tasks may share it. Exchanges with different motors overlap; a motor has one at a time, in the order
     in which they were asked for, and each task gets its own answer.
     """
 
-    _core: RmdMachine
-    _Core = RmdMachine
+    _core: RmdEventClient
+    _Core = RmdEventClient
     _Motor = Motor
 
-    def __init__(self, core: RmdMachine, **options: Any):
+    def __init__(self, core: RmdEventClient, **options: Any):
         super().__init__(core, **options)
         self._turns: dict[int, asyncio.Lock] = {}
         self._answers: dict[int, asyncio.Future[Any]] = {}
 
-    async def _exchange(self, motor: int, request: Request) -> Any:
+    async def _exchange(self, motor: int, request: RmdRequest) -> Any:
         async with self._turn(motor):
             await self._steps.ready()
             try:
@@ -68,23 +63,23 @@ class Bus(AwaitedBus, RmdBus[Motor, Union[str, "os.PathLike[str]", CanPort]]):
             finally:
                 self._forget([motor])
 
-    async def _cycle(self, requests: list[tuple[int, Request]]) -> Any:
+    async def _cycle(self, requests: list[tuple[int, RmdRequest]]) -> Any:
         asked = dict(requests)
         return await self._gather(asked, lambda id: self._core.ask(id, asked[id], patient=False))
 
-    async def _torque4(self, amps: tuple[float, float, float, float], expect: list[int]) -> Any:
+    async def _torque4(self, iq_amps: list[float], expect: list[int]) -> Any:
         async with self._all_turns({1, 2, 3, 4, *expect}):
             await self._steps.ready()
             try:
-                self._core.torque4(amps, expect)
+                self._core.set_torque4(iq_amps, expect)
                 return await self._answered(self._expect(expect))
             finally:
                 self._forget(expect)
 
     async def _scan(self, ids: list[int]) -> Any:
-        found: list[Found] = []
-        for begin in range(0, len(ids), _SCAN_WIDTH):
-            some = ids[begin : begin + _SCAN_WIDTH]
+        found: list[ScanResult] = []
+        for begin in range(0, len(ids), RMD_SCAN_WIDTH):
+            some = ids[begin : begin + RMD_SCAN_WIDTH]
             answers = await self._gather(some, self._core.look_for)
             for answer in answers.values():
                 if isinstance(answer, MotorlinkError):
@@ -162,7 +157,7 @@ class Bus(AwaitedBus, RmdBus[Motor, Union[str, "os.PathLike[str]", CanPort]]):
             await asyncio.wait(answers.values())
         outcomes = {id: answer.exception() or answer.result() for id, answer in answers.items()}
         for outcome in outcomes.values():
-            if isinstance(outcome, (PortError, Closed)):
+            if isinstance(outcome, (PortError, ClosedError)):
                 raise outcome
         return outcomes
 
@@ -188,4 +183,4 @@ class Bus(AwaitedBus, RmdBus[Motor, Union[str, "os.PathLike[str]", CanPort]]):
             tell(answer, error)
 
 
-open = opens(Bus._open)
+open = opens(Client._open)

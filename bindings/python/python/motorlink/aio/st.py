@@ -2,10 +2,10 @@
 
 >>> import asyncio, motorlink
 >>> async def main() -> float:
-...     async with motorlink.aio.st.open("sim:") as bus:
-...         motor = bus.motor(1)
-...         await motor.write("SPEED_KP", 1200)
-...         return await motor.read("SPEED_KP")
+...     async with motorlink.aio.st.open("sim:") as client:
+...         motor = client.motor(1)
+...         await motor.set("SPEED_KP", 1200)
+...         return await motor.get("SPEED_KP")
 >>> asyncio.run(main())
 1200
 """
@@ -18,19 +18,19 @@ from collections.abc import Callable
 from typing import Any, Union
 
 from motorlink._apis import Awaited
-from motorlink._core import StMachine, StSampling, StVerifiedWrite
+from motorlink._core import StEventClient, StSampling, StVerifiedWrite
 from motorlink._core import StRequest as Request
 from motorlink._registers import RegisterNames
-from motorlink._st import StBus, StMotor
+from motorlink._st import StClient, StMotor
 from motorlink.aio._sampling import sampled
-from motorlink.aio._steps import AwaitedBus, Opening, is_told, opens, tell
-from motorlink.errors import LineLost, MotorlinkError, Refused, Timeout
+from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
+from motorlink.errors import LinkError, MotorlinkError, RefusedError, ReplyTimeoutError
 
-__all__ = ["Bus", "Motor", "Opening", "open"]
+__all__ = ["Client", "Motor", "Opening", "open"]
 
 
-class Motor(Awaited, StMotor["Bus"]):
-    """One motor of a drive; from :meth:`Bus.motor`. See :class:`motorlink.st.Motor`."""
+class Motor(Awaited, StMotor["Client"]):
+    """One motor of a drive; from :meth:`Client.motor`. See :class:`motorlink.st.Motor`."""
 
     __slots__ = ()
 
@@ -40,18 +40,18 @@ class Motor(Awaited, StMotor["Bus"]):
         return RegisterNames(self)
 
 
-class Bus(AwaitedBus, StBus[Motor, Union[str, "os.PathLike[str]"]]):
+class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"]]):
     """A serial line with a drive of up to seven motors; from :func:`open`.
 
     Tasks may share it: one exchange at a time is on the line, in the order in which they were asked
     for, and each task gets its own answer.
     """
 
-    _core: StMachine
-    _Core = StMachine
+    _core: StEventClient
+    _Core = StEventClient
     _Motor = Motor
 
-    def __init__(self, core: StMachine, **options: Any):
+    def __init__(self, core: StEventClient, **options: Any):
         super().__init__(core, **options)
         self._turn = asyncio.Lock()
         self._answer: asyncio.Future[Any] | None = None
@@ -62,13 +62,13 @@ class Bus(AwaitedBus, StBus[Motor, Union[str, "os.PathLike[str]"]]):
     async def _exchange_raw(self, motor: int, code: int, payload: bytes) -> Any:
         return await self._carry_out(lambda: self._core.begin_raw(motor, code, payload))
 
-    async def _write_verified(self, motor: int, request: Request, attempts: int) -> Any:
+    async def _set_verified(self, motor: int, request: Request, attempts: int) -> Any:
         write = StVerifiedWrite(motor, request, attempts, self._profile)
         attempt = None
         while attempt is None:
             try:
                 told = await self._exchange(motor, write.request())
-            except (LineLost, Timeout) as error:
+            except (LinkError, ReplyTimeoutError) as error:
                 attempt = write.failed(error)
             else:
                 attempt = write.answered(told)
@@ -89,7 +89,7 @@ class Bus(AwaitedBus, StBus[Motor, Union[str, "os.PathLike[str]"]]):
             while (asked := sampling.request()) is not None:
                 try:
                     value = await self._exchange(*asked)
-                except Refused:
+                except RefusedError:
                     if not sampling.refused():
                         raise
                 else:
@@ -129,4 +129,4 @@ class Bus(AwaitedBus, StBus[Motor, Union[str, "os.PathLike[str]"]]):
         tell(self._answer, error)
 
 
-open = opens(Bus._open)
+open = opens(Client._open)

@@ -3,10 +3,10 @@
 >>> from motorlink import sim
 >>> bench = sim.Bench()
 >>> motor = bench.st.motor(2)                # a 24 V servo; motor 1 is a bigger one
->>> motor.ramp(1000, 0.2)                    # rpm, s
+>>> motor.set_ramp(1000, 0.2)                    # rpm, s
 >>> motor.start()
 >>> bench.run(3.0)                           # s of virtual time, over at once
->>> round(motor.read("SPEED_MEAS"), -1)      # rpm
+>>> round(motor.get("SPEED_MEAS"), -1)      # rpm
 1000
 >>> bench.brake("st2", 0.05)                 # Nm
 >>> bench.run(1.0)
@@ -21,16 +21,16 @@ Motors are called as their signals are: ``st2`` is motor 2 of the ST drive, ``rm
 ID 3. docs/SIMULATOR.md says what a configuration may contain, docs/SCENARIOS.md what signals there are.
 """
 
-from motorlink.sim._bench import Bench, Port
+from motorlink.sim._bench import Bench, BenchPort
 from motorlink.sim._recording import Recording
 from motorlink.sim._scenario import Expectation, Mark, Refusal, Run, presets, run
 from motorlink.sim._serving import Serving
 
 __all__ = [
     "Bench",
+    "BenchPort",
     "Expectation",
     "Mark",
-    "Port",
     "Recording",
     "Refusal",
     "Run",

@@ -9,9 +9,9 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 from motorlink import _core, rmd, st
-from motorlink._bus import Closing
+from motorlink._client import Closing
 from motorlink._sampling import Samples
-from motorlink.errors import BadValue
+from motorlink.errors import InvalidValueError
 from motorlink.sim._recording import Recording
 from motorlink.sim._serving import Serving
 from motorlink.sim._source import Source, text_or_path
@@ -28,7 +28,7 @@ class Bench(Closing):
     lines of this bench do, in the words of ``motorlink --fault``, such as ``"drop=1e-3,seed=7"``.
 
     A bench is a port: ``motorlink.st.open(bench)``, ``motorlink.rmd.open(bench, timeout=0.1)``.
-    Raises :class:`~motorlink.BadValue` where a configuration is impossible, with the place.
+    Raises :class:`~motorlink.InvalidValueError` where a configuration is impossible, with the place.
 
     >>> bench = Bench("[[st.motor]]\\npreset = 'drone'")
     >>> bench.motors
@@ -36,7 +36,7 @@ class Bench(Closing):
     >>> Bench({"st": {"motor": [{"preset": "big"}]}})
     Traceback (most recent call last):
         ...
-    motorlink.errors.BadValue: st.motor 1: the presets are mains, servo, shinano, drone, not "big"
+    motorlink.errors.InvalidValueError: st.motor 1: the presets are mains, servo, shinano, drone, not "big"
     """
 
     def __init__(
@@ -52,37 +52,37 @@ class Bench(Closing):
             text, path = text_or_path("" if config is None else config)
             self._core = _core.SimBench(toml=text, path=path, seed=seed)
         self._port = self._core.port(fault)
-        self._st: st.Bus | None = None
-        self._rmd: rmd.Bus | None = None
+        self._st: st.Client | None = None
+        self._rmd: rmd.Client | None = None
 
     @property
-    def st(self) -> st.Bus:
-        """The bus of the ST drive, open, with the drive's profile. For other options, ``st.open(bench, ...)``."""
+    def st(self) -> st.Client:
+        """A client of the ST drive, open, with the drive's profile. For other options, ``st.open(bench, ...)``."""
         if self._st is None or self._st._is_closed:
             self._st = st.open(self, profile=self._core.profile)
         return self._st
 
     @property
-    def rmd(self) -> rmd.Bus:
-        """The bus of the RMD motors, open. For other options, ``rmd.open(bench, ...)``."""
+    def rmd(self) -> rmd.Client:
+        """A client of the RMD motors, open. For other options, ``rmd.open(bench, ...)``."""
         if self._rmd is None or self._rmd._is_closed:
             self._rmd = rmd.open(self)
         return self._rmd
 
-    def port(self, *, fault: str | None) -> Port:
+    def port(self, *, fault: str | None) -> BenchPort:
         """The bench as a port with other faults than its own.
 
         >>> import motorlink
         >>> bench = Bench()
-        >>> bus = motorlink.st.open(bench.port(fault="drop=1,only=received"), timeout=30)
-        >>> bus.motor(1).status()                    # 30 s pass at once
+        >>> client = motorlink.st.open(bench.port(fault="drop=1,only=received"), timeout=30)
+        >>> client.motor(1).status()                    # 30 s pass at once
         Traceback (most recent call last):
             ...
-        motorlink.errors.Timeout: ...
+        motorlink.errors.ReplyTimeoutError: ...
         >>> bench.now
         30.0
         """
-        return Port(self._core.port(fault))
+        return BenchPort(self._core.port(fault))
 
     # Time
 
@@ -150,7 +150,7 @@ class Bench(Closing):
         >>> bench.inject("st1", "OVER_VOLT", hold=True)
         >>> bench.run(0.01)
         >>> bench.st.motor(1).status()
-        State('FAULT_NOW')
+        Status('FAULT_NOW')
         """
         self._do("fault", motor, fault=fault, hold=hold)
 
@@ -167,7 +167,7 @@ class Bench(Closing):
     def execute(self, command: Mapping[str, Any]) -> dict[str, Any]:
         """Executes a command of a bench (docs/SIMULATOR.md); its ports are ``st`` and ``rmd``.
 
-        Raises :class:`~motorlink.BadValue` where nothing was done.
+        Raises :class:`~motorlink.InvalidValueError` where nothing was done.
 
         >>> Bench().execute({"command": "supply", "port": "rmd", "motor": 2, "volts": 6.5})
         {'ok': True}
@@ -175,14 +175,14 @@ class Bench(Closing):
         try:
             text = json.dumps(dict(command), allow_nan=False)
         except (TypeError, ValueError) as error:
-            raise BadValue(f"not a command: {error} in {dict(command)}") from error
+            raise InvalidValueError(f"not a command: {error} in {dict(command)}") from error
         answer: dict[str, Any] = json.loads(self._core.execute(text))
         return answer
 
     def _do(self, command: str, motor: str, **members: Any) -> None:
         place = re.fullmatch(r"(st|rmd)(\d+)", motor)
         if place is None or motor not in self.motors:
-            raise BadValue(f"there is no motor {motor!r}; there are {', '.join(self.motors)}")
+            raise InvalidValueError(f"there is no motor {motor!r}; there are {', '.join(self.motors)}")
         port, number = place[1], int(place[2])
         told = {name: value for name, value in members.items() if value is not None}
         self.execute({"command": command, "port": port, "motor": number, **told})
@@ -209,7 +209,7 @@ class Bench(Closing):
         """
         truth = self._core.truth(motor)
         if not truth:
-            raise BadValue(f"there is no motor {motor!r}; there are {', '.join(self.motors)}")
+            raise InvalidValueError(f"there is no motor {motor!r}; there are {', '.join(self.motors)}")
         return truth
 
     def record(
@@ -221,7 +221,7 @@ class Bench(Closing):
         ``float64``. States, modes and faults are their numbers. ``motorlink.to_pandas`` takes it.
 
         >>> bench = Bench()
-        >>> bench.rmd.motor(1).speed(360)
+        >>> bench.rmd.motor(1).set_speed(360)
         MotionStatus(...)
         >>> data = bench.record(["rmd1.speed_dps"], seconds=0.5)
         >>> len(data), data.dtype.names
@@ -239,7 +239,7 @@ class Bench(Closing):
         >>> bench = Bench()
         >>> with bench.recording(["rmd1.speed_dps"], every=0.01) as recording:
         ...     for speed in (90, 180):
-        ...         status = bench.rmd.motor(1).speed(speed)
+        ...         status = bench.rmd.motor(1).set_speed(speed)
         ...         bench.run(0.5)
         >>> len(recording.data)
         101
@@ -262,9 +262,9 @@ class Bench(Closing):
         virtual again.
 
         >>> import motorlink
-        >>> with Bench().serve() as ports, motorlink.st.open(ports.st) as bus:
-        ...     bus.motor(1).status()
-        State('IDLE')
+        >>> with Bench().serve() as ports, motorlink.st.open(ports.st) as client:
+        ...     client.motor(1).status()
+        Status('IDLE')
         """
         return Serving(self._core, st, rmd)
 
@@ -284,7 +284,7 @@ class Bench(Closing):
         return f"<motorlink.sim.Bench {', '.join(self.motors)} at {self.now:g} s>"
 
 
-class Port:
+class BenchPort:
     """A bench as a port, from :meth:`Bench.port`."""
 
     def __init__(self, core: _core.SimPort):

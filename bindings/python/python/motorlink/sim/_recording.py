@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from motorlink import _core
-from motorlink._bus import Closing
+from motorlink._client import Closing
 from motorlink._sampling import Samples, columns
 
 

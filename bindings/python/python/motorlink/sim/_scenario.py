@@ -79,7 +79,7 @@ def run(scenario: Source) -> Run:
     """Plays a scenario (docs/SCENARIOS.md): TOML text, or the path of a file.
 
     A ``str`` with a ``[``, a ``=`` or a line break is text; files that it names are looked for in the working
-    directory. Raises :class:`~motorlink.BadValue` where it says what cannot be.
+    directory. Raises :class:`~motorlink.InvalidValueError` where it says what cannot be.
 
     >>> told = run('''
     ...     title = "A turn"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 
 from motorlink import _core
-from motorlink._bus import Closing
+from motorlink._client import Closing
 
 
 class Serving(Closing):

@@ -8,15 +8,15 @@ use pyo3::prelude::*;
 
 use super::{Driven, fileno, outcome, seconds};
 use crate::can::{CanPort, Threads};
-use crate::error::{bad_value, rmd_error};
+use crate::error::{invalid_value, rmd_error};
 use crate::rmd::{
-    RmdOptions, RmdRequest, finding, four_torques, limits, motor_id, motor_ids, not_stopped,
+    RmdOptions, RmdRequest, four_currents, limits, motor_id, motor_ids, not_stopped, scan_result,
 };
 
 /// A CAN bus, one exchange a motor at a time: `ask`, then `advance` when the descriptor is readable
 /// and when the time that it gave has passed.
 #[pyclass(frozen, module = "motorlink._core")]
-pub(crate) struct RmdMachine {
+pub(crate) struct RmdEventClient {
     driven: Driven<Motors>,
     /// Those of a bus of python-can.
     threads: Option<Threads>,
@@ -25,7 +25,7 @@ pub(crate) struct RmdMachine {
 struct Motors {
     bus: EventClient,
     /// What each motor was asked.
-    asked: [Asked; MotorId::COUNT],
+    asked: [ReplyKind; MotorId::COUNT],
 }
 
 /// What is opened: another program's bus, or a port by its name.
@@ -40,21 +40,21 @@ type Over = Vec<(u8, Py<PyAny>)>;
 
 /// What is made of a reply.
 #[derive(Clone)]
-enum Asked {
+enum ReplyKind {
     Value(RmdRequest),
     /// What there is under this ID.
-    Found,
+    ScanResult,
 }
 
-impl RmdMachine {
+impl RmdEventClient {
     fn new(bus: EventClient, port: String, threads: Option<Threads>) -> Self {
-        let motors = Motors { bus, asked: [const { Asked::Found }; MotorId::COUNT] };
-        RmdMachine { driven: Driven::new(motors, port), threads }
+        let motors = Motors { bus, asked: [const { ReplyKind::ScanResult }; MotorId::COUNT] };
+        RmdEventClient { driven: Driven::new(motors, port), threads }
     }
 }
 
 #[pymethods]
-impl RmdMachine {
+impl RmdEventClient {
     /// Opens a port, by its name or from another program's bus, which may wait. No motor is asked
     /// anything.
     #[staticmethod]
@@ -71,7 +71,7 @@ impl RmdMachine {
                 Ok(Self::new(bus, port.name().to_owned(), Some(threads)))
             }
             CanBus::Name(port) => {
-                let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
+                let name: PortName = port.parse().map_err(|error| invalid_value(py, error))?;
                 let bus = py.detach(|| EventClient::open(&name, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
                 Ok(Self::new(bus, name.to_string(), None))
@@ -104,7 +104,7 @@ impl RmdMachine {
         let begun = self.driven.step(py, |motors| {
             let data = request.data();
             if patient { motors.bus.ask(id, data) } else { motors.bus.request(id, data) }?;
-            motors.expect(id, Asked::Value(request.clone()));
+            motors.expect(id, ReplyKind::Value(request.clone()));
             Ok(())
         })?;
         begun.map_err(|error| rmd_error(py, &error))
@@ -115,7 +115,7 @@ impl RmdMachine {
         let id = motor_id(py, id)?;
         let begun = self.driven.step(py, |motors| {
             motors.bus.ask(id, ReadStatus.encode())?;
-            motors.expect(id, Asked::Found);
+            motors.expect(id, ReplyKind::ScanResult);
             Ok(())
         })?;
         begun.map_err(|error| rmd_error(py, &error))
@@ -123,12 +123,12 @@ impl RmdMachine {
 
     /// Begins exchanges with those of motors 1 to 4 that are expected to answer: torque currents, A,
     /// for all four, in one frame.
-    fn torque4(&self, py: Python<'_>, amps: [f64; 4], expect: Vec<i64>) -> PyResult<()> {
-        let (torques, expect) = (four_torques(py, amps)?, motor_ids(py, expect)?);
+    fn set_torque4(&self, py: Python<'_>, iq_amps: [f64; 4], expect: Vec<i64>) -> PyResult<()> {
+        let (torques, expect) = (four_currents(py, iq_amps)?, motor_ids(py, expect)?);
         let begun = self.driven.step(py, |motors| {
             motors.bus.set_torque4(torques, expect)?;
             for id in expect {
-                motors.expect(id, Asked::Value(RmdRequest::of(SetTorque::default())));
+                motors.expect(id, ReplyKind::Value(RmdRequest::of(SetTorque::default())));
             }
             Ok(())
         })?;
@@ -148,9 +148,9 @@ impl RmdMachine {
         let wait = wait.map_err(|error| rmd_error(py, &error))?;
         let value = |(id, asked, result)| {
             let value = match asked {
-                Asked::Found => ScanResult::of(id, result)
-                    .map_or_else(|| Ok(py.None()), |found| finding(py, found)),
-                Asked::Value(request) => result
+                ReplyKind::ScanResult => ScanResult::of(id, result)
+                    .map_or_else(|| Ok(py.None()), |found| scan_result(py, found)),
+                ReplyKind::Value(request) => result
                     .map_err(|error| rmd_error(py, &error))
                     .and_then(|reply| request.value(py, &reply)),
             };
@@ -172,12 +172,12 @@ impl RmdMachine {
         &self,
         py: Python<'_>,
         id: i64,
-        current_a: Option<f64>,
-        speed_dps: Option<f64>,
-        angle_deg: Option<f64>,
+        current_limit_amps: Option<f64>,
+        speed_limit_dps: Option<f64>,
+        angle_limit_degrees: Option<f64>,
     ) -> PyResult<()> {
         let id = motor_id(py, id)?;
-        let limits = limits(py, current_a, speed_dps, angle_deg)?;
+        let limits = limits(py, current_limit_amps, speed_limit_dps, angle_limit_degrees)?;
         self.driven.step(py, |motors| {
             motors.bus.set_limits(id, limits);
         })
@@ -213,7 +213,7 @@ impl RmdMachine {
 }
 
 impl Motors {
-    fn expect(&mut self, id: MotorId, asked: Asked) {
+    fn expect(&mut self, id: MotorId, asked: ReplyKind) {
         self.asked[id.index()] = asked;
     }
 }

@@ -8,17 +8,17 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use super::{Driven, fileno, outcome, seconds};
-use crate::error::{bad_value, st_error};
+use crate::error::{invalid_value, st_error};
 use crate::st::{Answer, StOptions, StRequest, frame_code, motor_number, not_stopped};
 
 /// A master on a serial line, one exchange at a time: `begin`, then `advance` when the descriptor is
 /// readable and when the time that it gave has passed, until it is done.
 #[pyclass(frozen, module = "motorlink._core")]
-pub(crate) struct StMachine {
-    driven: Driven<Line>,
+pub(crate) struct StEventClient {
+    driven: Driven<InFlight>,
 }
 
-struct Line {
+struct InFlight {
     client: EventClient,
     /// What was asked, while its exchange is under way; nothing where the reply is wanted as bytes.
     asked: Option<Py<StRequest>>,
@@ -36,15 +36,15 @@ fn understand(py: Python<'_>, asked: Option<&Py<StRequest>>, payload: &[u8]) -> 
 }
 
 #[pymethods]
-impl StMachine {
+impl StEventClient {
     /// Opens a port, which may wait. The drive is not asked anything.
     #[staticmethod]
     fn open(py: Python<'_>, port: &str, options: &StOptions) -> PyResult<Self> {
-        let name: PortName = port.parse().map_err(|error| bad_value(py, error))?;
+        let name: PortName = port.parse().map_err(|error| invalid_value(py, error))?;
         let client = py.detach(|| EventClient::open(&name, options.0));
         let client = client.map_err(|error| st_error(py, &error))?;
-        let line = Line { client, asked: None };
-        Ok(StMachine { driven: Driven::new(line, name.to_string()) })
+        let line = InFlight { client, asked: None };
+        Ok(StEventClient { driven: Driven::new(line, name.to_string()) })
     }
 
     /// Whether the port is open.
@@ -89,7 +89,7 @@ impl StMachine {
     /// Moves what can be moved at once. `(True, value)`, or the exception in its place, when the
     /// exchange is over; else `False` and after how many s to go on, `None` while none is under way.
     fn advance(&self, py: Python<'_>) -> PyResult<(bool, Option<Py<PyAny>>)> {
-        let progress = self.driven.step(py, |Line { client, asked }| {
+        let progress = self.driven.step(py, |InFlight { client, asked }| {
             let progress = client.advance(|payload| understand(py, asked.as_ref(), payload));
             if matches!(progress, Progress::Done(_)) {
                 *asked = None;
@@ -120,7 +120,7 @@ impl StMachine {
 
     /// Motors that were started and not stopped.
     #[getter]
-    fn started(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
+    fn moving(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
         self.driven
             .detached(py, |line| line.client.started().map(|motor| motor.number().into()).collect())
     }

@@ -1,4 +1,4 @@
-"""What buses of both protocols have in common: names of ports, and their end."""
+"""What clients of both protocols have in common: names of ports, and their end."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar, Union
 from motorlink import _core
 from motorlink._apis import Blocking, Exchanges, Function, both_apis, carried_out, described
 from motorlink._signals import before_signals
-from motorlink.errors import BadValue, LineLost, MotorlinkError
+from motorlink.errors import InvalidValueError, LinkError, MotorlinkError
 
 if TYPE_CHECKING:
     from typing_extensions import ParamSpec, Self
 
     Arguments = ParamSpec("Arguments")
 
-Opened = TypeVar("Opened", bound="AnyBus")
+Opened = TypeVar("Opened", bound="AnyClient")
 
 
 class HasPort(Protocol):
@@ -33,7 +33,7 @@ class HasPort(Protocol):
 def _leave_ports() -> None:
     """Takes the ports of its parent from a process that was forked, which would keep them open.
 
-    The buses own the numbers, so that these stay in use: for nothing.
+    The clients own the numbers, so that these stay in use: for nothing.
     """
     descriptors = _core.open_descriptors()
     if descriptors:
@@ -45,10 +45,10 @@ def _leave_ports() -> None:
 
 os.register_at_fork(after_in_child=_leave_ports)
 
-Port = Union[str, "os.PathLike[str]", HasPort]
+PortLike = Union[str, "os.PathLike[str]", HasPort]
 
 
-def opened(port: Port) -> str | _core.SimPort:
+def opened(port: PortLike) -> str | _core.SimPort:
     """What the extension opens: a name, or a port that has none."""
     if isinstance(port, (str, os.PathLike)):
         return os.fspath(port)
@@ -62,9 +62,9 @@ Close = Callable[[], "list[tuple[int, MotorlinkError]]"]
 
 
 def when_left_open(
-    bus: object, close: Close, port: str, *, stop_on_signals: bool
+    client: object, close: Close, port: str, *, stop_on_signals: bool
 ) -> Callable[[], None]:
-    """Closes a bus that was left open, when it is collected or the program that opened it ends.
+    """Closes a client that was left open, when it is collected or the program that opened it ends.
 
     With ``stop_on_signals`` SIGTERM and SIGHUP are such ends, until the result is called.
     """
@@ -78,7 +78,7 @@ def when_left_open(
                 release()
 
     release = before_signals(end) if stop_on_signals else lambda: None
-    weakref.finalize(bus, end)
+    weakref.finalize(client, end)
     return release
 
 
@@ -93,7 +93,7 @@ def report(failed: list[tuple[int, MotorlinkError]], port: str, *, in_flight: bo
     if in_flight:
         warnings.warn(motors, RuntimeWarning, stacklevel=4)
         return
-    raise LineLost(motors, port=port, motor=failed[0][0]) from failed[0][1]
+    raise LinkError(motors, port=port, motor=failed[0][0]) from failed[0][1]
 
 
 class Closing:
@@ -115,15 +115,15 @@ class Closing:
         self._end(in_flight=error is not None)
 
 
-class AnyBus:
-    """What the buses of both protocols and both APIs have in common: how they are opened, and how they end."""
+class AnyClient:
+    """What the clients of both protocols and both APIs have in common: how they are opened, and how they end."""
 
     #: What ``on_close`` may be, and how the client is closed then.
     _ENDS: ClassVar[dict[str, dict[str, bool]]]
     #: The client of the extension module, and its class.
     _core: Any
     _Core: ClassVar[Any]
-    # Each API's: what the extension opens, the exchange that opens it, and the one that ends the bus.
+    # Each API's: what the extension opens, the exchange that opens it, and the one that ends the client.
     _named: Any
     _opened: Any
     _end: Any
@@ -142,20 +142,20 @@ class AnyBus:
     def _opening(
         cls, core: Callable[[], Any], *, on_close: str, **options: Any
     ) -> Callable[[], Exchanges[Self]]:
-        """Opens a client and then its bus, when the result is called."""
+        """Opens a client of the extension and then the one of the API, when the result is called."""
         cls._ends(on_close)
 
-        def bus() -> Exchanges[Self]:
+        def client() -> Exchanges[Self]:
             opened = yield cls._opened(core)
             return cls(opened, on_close=on_close, **options)
 
-        return bus
+        return client
 
     @classmethod
     def _ends(cls, on_close: str) -> dict[str, bool]:
         if on_close not in cls._ENDS:
             known = ", ".join(map(repr, cls._ENDS))
-            raise BadValue(f"on_close={on_close!r}: give one of {known}")
+            raise InvalidValueError(f"on_close={on_close!r}: give one of {known}")
         return cls._ENDS[on_close]
 
     @property
@@ -165,25 +165,25 @@ class AnyBus:
 
     @both_apis
     def close(self) -> Exchanges[None]:
-        """Stops the motors that this bus set moving, as it was opened to; closes the port.
+        """Stops the motors that this client set moving, as it was opened to; closes the port.
 
-        Raises ``LineLost`` where a motor could not be stopped, which then may still be moving. The
+        Raises ``LinkError`` where a motor could not be stopped, which then may still be moving. The
         port is closed all the same. Exchanges of other threads that are under way are waited for, and
-        those of other tasks end in ``Closed``. A task that is cancelled meanwhile is cancelled when all
+        those of other tasks end in ``ClosedError``. A task that is cancelled meanwhile is cancelled when all
         is done.
 
-        A bus that nobody closed is closed when it is collected, or when the program ends. In a process
-        that was forked it is of no use (``Closed``), and its port is not open: that is the parent's.
+        A client that nobody closed is closed when it is collected, or when the program ends. In a process
+        that was forked it is of no use (``ClosedError``), and its port is not open: that is the parent's.
         """
         yield self._end(in_flight=False)
 
     def _text(self, more: str = "") -> str:
         closed = ", closed" if self._is_closed else ""
-        return f"<{type(self).__module__}.Bus {self.port}{more}{closed}>"
+        return f"<{type(self).__module__}.Client {self.port}{more}{closed}>"
 
 
-class BlockingBus(Closing, Blocking, AnyBus):
-    """What the blocking buses of both protocols have in common."""
+class BlockingClient(Closing, Blocking, AnyClient):
+    """What the blocking clients of both protocols have in common."""
 
     _named = staticmethod(opened)
 
@@ -210,7 +210,7 @@ def opens(
     def open(*arguments: Arguments.args, **named: Arguments.kwargs) -> Opened:
         return carried_out(opening(*arguments, **named)())
 
-    return open_described(open, opening, "Bus")
+    return open_described(open, opening, "Client")
 
 
 def open_described(open: Function, opening: Callable[..., object], returned: str) -> Function:

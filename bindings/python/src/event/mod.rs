@@ -3,8 +3,8 @@
 mod rmd;
 mod st;
 
-pub(crate) use rmd::RmdMachine;
-pub(crate) use st::StMachine;
+pub(crate) use rmd::RmdEventClient;
+pub(crate) use st::StEventClient;
 
 use std::os::fd::{AsRawFd, BorrowedFd};
 use std::sync::{Mutex, MutexGuard, PoisonError};

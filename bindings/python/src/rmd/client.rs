@@ -3,17 +3,18 @@
 use motorlink::Clock;
 use motorlink::port::PortName;
 use motorlink::rmd::{
-    Client, Error, IqCommand, MotorId, MotorSet, ScanResult, SetTorque4, StopAction, Stopped,
+    Client, Error, IqCommand, MotorId, MotorSet, SCAN_WIDTH, ScanResult, SetTorque4, StopAction,
+    Stopped,
 };
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict, PyList};
 
 use super::options::{RmdOptions, limits};
-use super::request::{RmdRequest, motion_status, motor_id, motor_status};
+use super::request::{RmdRequest, motor_id, said};
 use super::sample::{Questions, sample};
 use crate::can::{AnyPort, Threads};
-use crate::error::{bad_value, rmd_error};
+use crate::error::{invalid_value, rmd_error};
 use crate::number::wanted;
 use crate::sampling::Plan;
 use crate::shared::Shared;
@@ -21,12 +22,9 @@ use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
 use crate::values;
 
-/// IDs that are asked before signals are looked at.
-const SCAN_STEP: usize = 8;
-
 /// A CAN bus with RMD motors. Every call lets other Python threads run while it waits.
 #[pyclass(frozen, module = "motorlink._core")]
-pub(crate) struct RmdBus {
+pub(crate) struct RmdClient {
     bus: Shared<Client>,
     clock: Clock,
     deafness: Deafness,
@@ -35,7 +33,7 @@ pub(crate) struct RmdBus {
 }
 
 #[pymethods]
-impl RmdBus {
+impl RmdClient {
     /// Opens a port. No motor is asked anything.
     #[staticmethod]
     fn open(py: Python<'_>, port: AnyPort<'_>, options: &RmdOptions) -> PyResult<Self> {
@@ -44,7 +42,7 @@ impl RmdBus {
         let mut threads = None;
         let (bus, port) = match port {
             AnyPort::Other(Port::Name(name)) => {
-                let name: PortName = name.parse().map_err(|error| bad_value(py, error))?;
+                let name: PortName = name.parse().map_err(|error| invalid_value(py, error))?;
                 let bus = py.detach(|| Client::open(&name, options));
                 let bus = bus.map_err(|error| rmd_error(py, &error))?;
                 (bus.looking(deafness.look()), name.to_string())
@@ -63,11 +61,11 @@ impl RmdBus {
             }
         };
         let clock = bus.clock();
-        Ok(RmdBus { bus: Shared::new(bus, port), clock, deafness, threads })
+        Ok(RmdClient { bus: Shared::new(bus, port), clock, deafness, threads })
     }
 
     /// One exchange; gives what the request makes of the reply.
-    fn perform(&self, py: Python<'_>, id: i64, request: &RmdRequest) -> PyResult<Py<PyAny>> {
+    fn exchange(&self, py: Python<'_>, id: i64, request: &RmdRequest) -> PyResult<Py<PyAny>> {
         let (id, data) = (motor_id(py, id)?, request.data());
         let reply = self.bus.exchange(py, |bus| bus.raw(id, data))?;
         request.value(py, &reply.map_err(|error| rmd_error(py, &error))?)
@@ -108,19 +106,18 @@ impl RmdBus {
     }
 
     /// Torque currents, A, for motors 1 to 4 in one frame; gives what each of `expect` answers.
-    #[pyo3(signature = (amps, expect))]
-    fn torque4<'py>(
+    fn set_torque4<'py>(
         &self,
         py: Python<'py>,
-        amps: [f64; 4],
+        iq_amps: [f64; 4],
         expect: Vec<i64>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let (torques, expect) = (four_torques(py, amps)?, motor_ids(py, expect)?);
+        let (torques, expect) = (four_currents(py, iq_amps)?, motor_ids(py, expect)?);
         let replies = self.bus.exchange(py, |bus| bus.set_torque4(torques, expect))?;
         let by_id = PyDict::new(py);
         for (reply, id) in replies.map_err(|error| rmd_error(py, &error))?.into_iter().zip(1..) {
             match reply {
-                Some(Ok(status)) => by_id.set_item(id, motion_status(py, &status)?)?,
+                Some(Ok(status)) => by_id.set_item(id, said(py, "MotionStatus", &status)?)?,
                 Some(Err(error)) => by_id.set_item(id, rmd_error(py, &error))?,
                 None => {}
             }
@@ -134,12 +131,13 @@ impl RmdBus {
         let mut left = motor_ids(py, ids)?;
         let mut found = Vec::new();
         while !left.is_empty() {
-            let some: MotorSet = left.by_ref().take(SCAN_STEP).collect();
+            let some: MotorSet = left.by_ref().take(SCAN_WIDTH).collect();
+            // Signals are looked at in between.
             py.detach(|| bus.scan(some, |one| found.push(one), |_| {}))
                 .map_err(|error| rmd_error(py, &error))?;
             py.check_signals()?;
         }
-        found.into_iter().map(|one| finding(py, one)).collect()
+        found.into_iter().map(|one| scan_result(py, one)).collect()
     }
 
     /// Samples quantities of motors `(id, names)`. Gives rows of a time in s and the values, eight bytes
@@ -167,12 +165,12 @@ impl RmdBus {
         &self,
         py: Python<'_>,
         id: i64,
-        current_a: Option<f64>,
-        speed_dps: Option<f64>,
-        angle_deg: Option<f64>,
+        current_limit_amps: Option<f64>,
+        speed_limit_dps: Option<f64>,
+        angle_limit_degrees: Option<f64>,
     ) -> PyResult<()> {
         let (bus, id) = (self.bus.get(py)?, motor_id(py, id)?);
-        let limits = limits(py, current_a, speed_dps, angle_deg)?;
+        let limits = limits(py, current_limit_amps, speed_limit_dps, angle_limit_degrees)?;
         py.detach(|| bus.set_limits(id, limits));
         Ok(())
     }
@@ -223,7 +221,7 @@ pub(crate) fn not_stopped(py: Python<'_>, stopped: Vec<Stopped>) -> Vec<(u8, PyE
 }
 
 /// Torque currents of motors 1 to 4, A.
-pub(crate) fn four_torques(py: Python<'_>, amps: [f64; 4]) -> PyResult<SetTorque4> {
+pub(crate) fn four_currents(py: Python<'_>, amps: [f64; 4]) -> PyResult<SetTorque4> {
     let mut torques = [IqCommand(0); 4];
     for (slot, amps) in torques.iter_mut().zip(amps) {
         *slot = wanted(py, amps)?;
@@ -235,11 +233,11 @@ pub(crate) fn motor_ids(py: Python<'_>, ids: Vec<i64>) -> PyResult<MotorSet> {
     ids.into_iter().map(|id| motor_id(py, id)).collect()
 }
 
-pub(crate) fn finding(py: Python<'_>, found: ScanResult) -> PyResult<Py<PyAny>> {
+pub(crate) fn scan_result(py: Python<'_>, found: ScanResult) -> PyResult<Py<PyAny>> {
     let nothing = || py.None();
     let row = match found {
         ScanResult::Motor(id, status) => {
-            let status = motor_status(py, &status)?;
+            let status = said(py, "Status", &status)?;
             (id.number(), "motor", status, nothing())
         }
         ScanResult::Foreign(id, dialect) => {
@@ -249,5 +247,5 @@ pub(crate) fn finding(py: Python<'_>, found: ScanResult) -> PyResult<Py<PyAny>> 
         ScanResult::Echo(id) => (id.number(), "echo", nothing(), nothing()),
         ScanResult::Shared(id) => (id.number(), "shared", nothing(), nothing()),
     };
-    values::found(py, row)
+    values::scan_result(py, row)
 }

@@ -1,0 +1,235 @@
+//! `motorlink/_rmd_table.py` is what the table of RMD commands says.
+//!
+//! `MOTORLINK_UPDATE_PYTHON=1 cargo test -p motorlink-python --test table` writes it anew.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::{env, fs};
+
+use motorlink_proto::rmd::{COMMANDS, CommandInfo, Field, Meaning};
+use motorlink_proto::units::Rounding;
+
+const HEAD: &str = r#""""The commands of RMD V1.62, written by `make python-table` from the table of crates/proto."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from motorlink import _core
+from motorlink._apis import Exchanges, both_apis, one
+from motorlink._values import Errors
+"#;
+
+#[test]
+fn the_python_module_is_what_the_table_says() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/motorlink/_rmd_table.py");
+    let generated = module().expect("a String takes everything");
+    if env::var_os("MOTORLINK_UPDATE_PYTHON").is_some() {
+        fs::write(&path, &generated).expect("the module can be written");
+    }
+    let committed = fs::read_to_string(&path).unwrap_or_default();
+    assert!(committed == generated, "_rmd_table.py is old: `make python-table` writes it anew");
+}
+
+fn module() -> Result<String, std::fmt::Error> {
+    let mut out = String::from(HEAD);
+    let replies = replies();
+    let mut names: Vec<&str> = COMMANDS.iter().map(|row| row.stem).collect();
+    names.extend(replies.iter().map(|row| row.reply_name));
+    names.push("Request");
+    names.sort_unstable();
+    writeln!(out, "\n__all__ = [")?;
+    names.iter().try_for_each(|name| writeln!(out, "    {name:?},"))?;
+    writeln!(out, "]")?;
+    for &row in &replies {
+        reply(&mut out, row)?;
+    }
+    writeln!(out, "\n\nclass Request(_core.RmdRequest):")?;
+    writeln!(
+        out,
+        "    \"\"\"A request to an RMD motor: checked when it is made, and able to read its reply.\"\"\""
+    )?;
+    writeln!(out, "\n    __slots__ = ()")?;
+    for row in &COMMANDS {
+        request(&mut out, row)?;
+    }
+    writeln!(
+        out,
+        "\n\n# Requests for ``Client.cycle``, sent as they are: no move is checked for a full turn."
+    )?;
+    COMMANDS.iter().try_for_each(|row| writeln!(out, "{0} = Request.{0}", row.stem))?;
+    writeln!(out, "\n\nclass MotorCommands:")?;
+    writeln!(
+        out,
+        "    \"\"\"What a motor does by its ID, one exchange each, for both APIs.\"\"\""
+    )?;
+    writeln!(out, "\n    __slots__ = ()\n\n    _exchange: Any")?;
+    for row in COMMANDS.iter().filter(|row| !has_limited(row)) {
+        method(&mut out, row)?;
+    }
+    Ok(out)
+}
+
+/// A row for each reply that has several values.
+fn replies() -> Vec<&'static CommandInfo> {
+    let mut replies: Vec<&CommandInfo> = Vec::new();
+    for row in COMMANDS.iter().filter(|row| !row.echo && row.reply.len() > 1) {
+        if !replies.iter().any(|known| known.reply_name == row.reply_name) {
+            replies.push(row);
+        }
+    }
+    replies
+}
+
+/// Two commands are one method, written by hand: to a position, and no faster than a limit.
+fn has_limited(row: &CommandInfo) -> bool {
+    row.stem.ends_with("_limited")
+        || COMMANDS.iter().any(|other| other.stem.strip_suffix("_limited") == Some(row.stem))
+}
+
+fn reply(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
+    let name = row.reply_name;
+    let codes: Vec<_> = COMMANDS
+        .iter()
+        .filter(|other| other.reply_name == name)
+        .map(|other| format!("0x{:02X}", other.code.number()))
+        .collect();
+    writeln!(out, "\n\nclass {name}(NamedTuple):")?;
+    writeln!(out, "    \"\"\"Reply to {} ({}).\"\"\"\n", codes.join(", "), row.paragraph)?;
+    for field in row.reply {
+        if field.scale.suffix.is_empty() {
+            writeln!(out, "    {}: {}", field.name, kind(field))?;
+        } else {
+            writeln!(out, "    #: A digit is {} {}.", field.scale.digit, field.scale.symbol)?;
+            writeln!(out, "    {}: {}", field.name_with_unit(), kind(field))?;
+        }
+    }
+    Ok(())
+}
+
+/// The type of a field's value in Python.
+fn kind(field: &Field) -> &'static str {
+    match field.meaning {
+        Meaning::Bits(_) => "Errors",
+        Meaning::Words(_) => "str",
+        Meaning::Number if field.scale.decimals == 0 => "int",
+        Meaning::Number => "float",
+    }
+}
+
+/// The type of what a program gives for a field.
+fn argument(field: &Field) -> &'static str {
+    match field.meaning {
+        Meaning::Number if field.scale.suffix.is_empty() => "int",
+        Meaning::Number => "float",
+        Meaning::Words(_) | Meaning::Bits(_) => "str",
+    }
+}
+
+/// The arguments of a request. Several have to be named: their order in a frame is easily confused.
+fn arguments(row: &CommandInfo) -> String {
+    let each = row.request.iter();
+    let each: Vec<_> =
+        each.map(|field| format!("{}: {}", field.name_with_unit(), argument(field))).collect();
+    if each.len() > 1 { format!("*, {}", each.join(", ")) } else { each.concat() }
+}
+
+fn request(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
+    let code = row.code.number();
+    let values = row.request.iter().map(|field| format!(", {}", field.name_with_unit()));
+    let (stem, arguments) = (row.stem, arguments(row));
+    writeln!(out, "\n    @staticmethod")?;
+    if stem.len() + arguments.len() < 70 {
+        writeln!(out, "    def {stem}({arguments}) -> Request:")?;
+    } else {
+        let arguments = arguments.replace(", ", ",\n        ");
+        writeln!(out, "    def {stem}(\n        {arguments},\n    ) -> Request:")?;
+    }
+    documentation(out, row)?;
+    let call = format!("_core.rmd_encode(0x{code:02X}{})", values.collect::<String>());
+    if call.len() < 75 {
+        return writeln!(out, "        return Request({call})");
+    }
+    let call =
+        call.replace("encode(", "encode(\n                ").replace(", ", ",\n                ");
+    let call = call.strip_suffix(')').unwrap_or(&call);
+    writeln!(out, "        return Request(\n            {call},\n            )\n        )")
+}
+
+fn method(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
+    let name = row.stem.strip_prefix("read_").unwrap_or(row.stem);
+    let gives = match row.reply {
+        _ if row.echo => "None",
+        [] => "None",
+        [one] => kind(one),
+        _ => row.reply_name,
+    };
+    let object = replies().into_iter().find(|read| same(read.reply, row.request));
+    let (arguments, values) = match (object, row.request) {
+        (_, []) => (String::new(), String::new()),
+        (Some(read), _) => {
+            let noun = read.stem.strip_prefix("read_").unwrap_or(read.stem);
+            (format!(", {noun}: {}", read.reply_name), format!("**{noun}._asdict()"))
+        }
+        (None, [one]) => (format!(", {}", self::arguments(row)), one.name_with_unit().to_string()),
+        (None, several) => {
+            let each = several.iter().map(Field::name_with_unit);
+            let each: Vec<_> = each.map(|name| format!("{name}={name}")).collect();
+            (format!(", {}", self::arguments(row)), each.join(", "))
+        }
+    };
+    writeln!(out, "\n    @both_apis")?;
+    writeln!(out, "    def {name}(self{arguments}) -> Exchanges[{gives}]:")?;
+    documentation(out, row)?;
+    writeln!(out, "        return one(self._exchange(Request.{}({values})))", row.stem)
+}
+
+/// Whether a request carries what a reply says.
+fn same(reply: &[Field], request: &[Field]) -> bool {
+    reply.len() == request.len()
+        && reply
+            .iter()
+            .zip(request)
+            .all(|(one, other)| one.name == other.name && one.scale == other.scale)
+}
+
+fn documentation(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
+    let mut does = row.code.doc().to_owned();
+    does[..1].make_ascii_uppercase();
+    writeln!(out, "        \"\"\"{does}.\n")?;
+    writeln!(out, "        0x{:02X}: {}.", row.code.number(), row.paragraph)?;
+    for field in row.request.iter().filter(|field| is_narrow(field)) {
+        let (least, most) =
+            (field.scale.value(field.scale.least), field.scale.value(field.scale.most));
+        writeln!(out, "        ``{}`` is {least} to {most}.", field.name_with_unit())?;
+    }
+    for field in row.request {
+        if let Meaning::Words(words) = field.meaning {
+            let words: Vec<_> = words.iter().map(|(_, word)| format!("``{word}``")).collect();
+            writeln!(out, "        ``{}`` is {}.", field.name, words.join(" or "))?;
+        }
+    }
+    if let ([one], false) = (row.reply, row.echo) {
+        match one.scale.symbol {
+            "" => writeln!(out, "        Gives the {}.", one.name)?,
+            unit => writeln!(out, "        Gives the {}, {unit}.", one.name)?,
+        }
+    }
+    let both = row.request.iter().chain(row.reply);
+    if both.into_iter().any(|field| field.scale.rounding == Rounding::NoLimitOfZero) {
+        writeln!(out, "        0 means no limit.")?;
+    }
+    if row.rom {
+        writeln!(out, "        Wears the ROM.")?;
+    }
+    writeln!(out, "        \"\"\"")
+}
+
+/// Whether not every digit of the frame may be asked for.
+fn is_narrow(field: &Field) -> bool {
+    let bits = 8 * u32::from(field.len) - u32::from(field.signed);
+    let most = (1_i64 << bits) - 1;
+    let least = if field.signed { -most - 1 } else { 0 };
+    matches!(field.meaning, Meaning::Number)
+        && (field.scale.least > least || field.scale.most < most)
+}
