@@ -5,19 +5,15 @@ use std::net::TcpStream;
 use std::time::Duration;
 
 use motorlink_link::serve::ServeName;
-use motorlink_link::serve::{CanStation, MOST_CLIENTS, Server};
+use motorlink_link::serve::{MOST_CLIENTS, Server, Station};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 /// Listens, and says nothing.
 struct Silent;
 
-impl CanStation for Silent {
-    fn receive(&mut self, _: Instant, _: &CanFrame, _: &mut Vec<CanFrame>) {}
-    fn poll(&mut self, _: Instant, _: &mut Vec<CanFrame>) {}
-    fn deadline(&self) -> Option<Instant> {
-        None
-    }
+impl Station<CanFrame> for Silent {
+    fn receive(&mut self, _: Instant, _: &[CanFrame], _: &mut Vec<CanFrame>) {}
 }
 
 /// The most memory that this process ever had, KiB.

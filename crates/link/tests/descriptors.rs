@@ -6,19 +6,15 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use motorlink_link::serve::{ByteStation, Server};
+use motorlink_link::serve::{Server, Station};
 use motorlink_proto::time::Instant as Moment;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 struct Echo;
 
-impl ByteStation for Echo {
+impl Station<u8> for Echo {
     fn receive(&mut self, _: Moment, bytes: &[u8], reply: &mut Vec<u8>) {
         reply.extend_from_slice(bytes);
-    }
-    fn poll(&mut self, _: Moment, _: &mut Vec<u8>) {}
-    fn deadline(&self) -> Option<Moment> {
-        None
     }
 }
 

@@ -13,9 +13,9 @@ use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
 /// An ST drive on its line.
-pub(crate) type Station = StStation<Vec<StMotor>>;
+pub(crate) type StSide = StStation<Vec<StMotor>>;
 /// RMD motors on their bus.
-pub(crate) type Bus = RmdBus<Vec<RmdNode>>;
+pub(crate) type RmdSide = RmdBus<Vec<RmdNode>>;
 
 /// A serial line with an ST drive and a CAN bus with RMD motors. The default is one drive with two
 /// motors, and four motors with IDs 1 to 4.
@@ -145,7 +145,7 @@ impl BenchConfig {
     ///
     /// # Errors
     /// A motor that cannot be; never with what [`parse`](Self::parse) gave.
-    pub fn station(&self, now: Instant) -> Result<Station, ConfigError> {
+    pub fn station(&self, now: Instant) -> Result<StSide, ConfigError> {
         for (config, n) in self.st.0.iter().zip(1..) {
             config.check().map_err(impossible("st.motor", n))?;
         }
@@ -175,7 +175,7 @@ impl BenchConfig {
         &self,
         now: Instant,
         rom: impl Fn(&RmdConfig) -> Settings,
-    ) -> Result<Bus, ConfigError> {
+    ) -> Result<RmdSide, ConfigError> {
         for (config, n) in self.rmd.0.iter().zip(1..) {
             config.check().map_err(impossible("rmd.motor", n))?;
         }

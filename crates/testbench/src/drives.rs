@@ -8,15 +8,15 @@ use motorlink_sim::rmd::RmdConfig;
 
 use super::cast::Cast;
 use super::command::Command;
-use super::config::{Bus, ConfigError, Station};
+use super::config::{ConfigError, RmdSide, StSide};
 use super::signals::{rmd_values, st_values};
 use super::world;
 
 /// An ST drive on its line, RMD motors on their bus, or both.
 #[derive(Debug)]
 pub(super) struct Drives {
-    pub(super) st: Option<Station>,
-    pub(super) rmd: Option<Bus>,
+    pub(super) st: Option<StSide>,
+    pub(super) rmd: Option<RmdSide>,
 }
 
 impl Drives {

@@ -1,10 +1,9 @@
 //! Drives at the far end of a line.
 
-use motorlink_link::serve::{ByteStation, CanStation, StationLink};
+use motorlink_link::serve::{Station, StationLink};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
-use super::config::Station;
 use super::drives::Stage;
 
 /// A link to the ST drive of a stage.
@@ -15,7 +14,7 @@ pub(super) type SimCan = StationLink<RmdStage, CanFrame>;
 /// An ST drive at the far end of a line.
 pub(super) struct StStage(pub(super) Stage);
 
-impl ByteStation for StStage {
+impl Station<u8> for StStage {
     fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
         if let Some(station) = &mut self.0.at(now).drives.st {
             station.receive(now, bytes, |bytes| reply.extend_from_slice(bytes));
@@ -29,23 +28,19 @@ impl ByteStation for StStage {
     }
 
     fn deadline(&self) -> Option<Instant> {
-        self.0.last().drives.st.as_ref().and_then(Station::deadline)
+        self.0.last().drives.st.as_ref().and_then(|station| station.deadline())
     }
 }
 
 /// RMD motors on a bus.
 pub(super) struct RmdStage(pub(super) Stage);
 
-impl CanStation for RmdStage {
-    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+impl Station<CanFrame> for RmdStage {
+    fn receive(&mut self, now: Instant, received: &[CanFrame], replies: &mut Vec<CanFrame>) {
         if let Some(bus) = &mut self.0.at(now).drives.rmd {
-            bus.receive(now, frame, |reply| replies.push(reply));
+            for frame in received {
+                bus.receive(now, frame, |reply| replies.push(reply));
+            }
         }
-    }
-
-    fn poll(&mut self, _now: Instant, _replies: &mut Vec<CanFrame>) {}
-
-    fn deadline(&self) -> Option<Instant> {
-        None
     }
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use motorlink_link::port::PortError;
 use motorlink_link::serve::ServeName;
-use motorlink_link::serve::{CanStation, Server, Turn};
+use motorlink_link::serve::{Server, Station, Turn};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::MotorId;
 use motorlink_proto::time::Instant;
@@ -91,7 +91,7 @@ impl SimServer {
         let ids: Vec<u8> = bus.nodes().iter().map(|node| node.id().number()).collect();
         let stage = Stage::new(Drives { st: None, rmd: Some(bus) });
         let line = RmdStage(stage.clone());
-        let station: Box<dyn CanStation> = match &self.rom {
+        let station: Box<dyn Station<CanFrame>> = match &self.rom {
             None => Box::new(line),
             Some(folder) => {
                 let (folder, failure) = (Rc::clone(folder), Rc::clone(&self.failure));
@@ -183,11 +183,11 @@ impl BusRom {
     }
 }
 
-impl CanStation for StoredLine {
+impl Station<CanFrame> for StoredLine {
     /// A write to ROM is answered when it is on the disk.
-    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+    fn receive(&mut self, now: Instant, received: &[CanFrame], replies: &mut Vec<CanFrame>) {
         let before = replies.len();
-        self.line.receive(now, frame, replies);
+        self.line.receive(now, received, replies);
         let stage = self.line.0.last();
         let kept = stage.drives.rmd.as_ref().is_none_or(|bus| self.rom.keep(bus.nodes()));
         if !kept {

@@ -8,14 +8,14 @@ use motorlink_sim::rmd::RmdNode;
 use motorlink_sim::st::StMotor;
 
 use super::command::Command;
-use super::config::{Bus, Station};
+use super::config::{RmdSide, StSide};
 
 /// Faults of an RMD motor, with the names that commands have for them.
 pub(super) const RMD_FAULTS: [(Errors, &str); 2] =
     [(Errors::LOW_VOLTAGE, "LOW_VOLTAGE"), (Errors::OVER_TEMPERATURE, "OVER_TEMPERATURE")];
 
 /// Changes the world around an ST motor.
-pub(super) fn st(station: &mut Station, now: Instant, command: &Command) -> Result<(), String> {
+pub(super) fn st(station: &mut StSide, now: Instant, command: &Command) -> Result<(), String> {
     station.advance_to(now);
     match command {
         Command::PowerCycle { motor: Some(_), .. } => {
@@ -44,7 +44,7 @@ pub(super) fn st(station: &mut Station, now: Instant, command: &Command) -> Resu
 }
 
 /// Changes the world around RMD motors.
-pub(super) fn rmd(bus: &mut Bus, now: Instant, command: &Command) -> Result<(), String> {
+pub(super) fn rmd(bus: &mut RmdSide, now: Instant, command: &Command) -> Result<(), String> {
     bus.advance_to(now);
     match command {
         Command::PowerCycle { motor: Some(number), .. } => rmd_node(bus, *number)?.power_cycle(now),
@@ -101,14 +101,14 @@ fn named<'n, T>(
     })
 }
 
-fn st_motor(station: &mut Station, number: u8) -> Result<&mut StMotor, String> {
+fn st_motor(station: &mut StSide, number: u8) -> Result<&mut StMotor, String> {
     let count = station.drive().motors().len();
     MotorNumber::new(number)
         .and_then(|motor| station.drive_mut().motor_mut(motor))
         .ok_or_else(|| format!("there is no motor {number}: this drive has {count}"))
 }
 
-fn rmd_node(bus: &mut Bus, number: u8) -> Result<&mut RmdNode, String> {
+fn rmd_node(bus: &mut RmdSide, number: u8) -> Result<&mut RmdNode, String> {
     MotorId::new(number)
         .and_then(|id| bus.node_mut(id))
         .ok_or_else(|| format!("there is no motor {number} on this bus"))

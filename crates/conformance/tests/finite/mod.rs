@@ -3,7 +3,7 @@
 
 use motorlink::Clock;
 use motorlink::port::{ByteLink, CanLink, PortError};
-use motorlink_link::serve::{ByteStation, CanStation, StationLink};
+use motorlink_link::serve::{Station, StationLink};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
@@ -38,7 +38,7 @@ impl<S, T> Finite<S, T> {
     }
 }
 
-impl<S: ByteStation + Send> Finite<S, u8> {
+impl<S: Station<u8> + Send> Finite<S, u8> {
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.alive()?;
         self.link.write(bytes)
@@ -54,7 +54,7 @@ impl<S: ByteStation + Send> Finite<S, u8> {
     }
 }
 
-impl<S: CanStation + Send> Finite<S, CanFrame> {
+impl<S: Station<CanFrame> + Send> Finite<S, CanFrame> {
     pub fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         self.alive()?;
         CanLink::send(&mut self.link, frame)

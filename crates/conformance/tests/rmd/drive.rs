@@ -4,7 +4,7 @@
 use motorlink::port::CanLink;
 use motorlink_conformance::rmd::{Harness, Options, suite};
 use motorlink_conformance::{Case, Need, Report, Unavailable, World, run};
-use motorlink_link::serve::CanStation;
+use motorlink_link::serve;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::{Instant, Micros};
@@ -81,20 +81,16 @@ pub struct Station {
     pub fastest: f32,
 }
 
-impl CanStation for Station {
-    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+impl serve::Station<CanFrame> for Station {
+    fn receive(&mut self, now: Instant, received: &[CanFrame], replies: &mut Vec<CanFrame>) {
         self.motors.now = now;
-        replies.extend((self.behaviour)(&mut self.motors, Event::Frame(frame)));
+        for frame in received {
+            replies.extend((self.behaviour)(&mut self.motors, Event::Frame(frame)));
+        }
         let off = |node: &RmdNode| node.motor().truth().mode == Mode::Off;
         let speed = |node: &RmdNode| node.motor().truth().speed_dps.abs();
         self.fastest = self.motors.bus.nodes().iter().map(speed).fold(self.fastest, f32::max);
         self.energised |= !self.motors.bus.nodes().iter().all(off);
-    }
-
-    fn poll(&mut self, _now: Instant, _replies: &mut Vec<CanFrame>) {}
-
-    fn deadline(&self) -> Option<Instant> {
-        None
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use motorlink::Clock;
 use motorlink::port::{ByteLink, CanLink};
-use motorlink_link::serve::{ByteStation, CanStation, StationLink};
+use motorlink_link::serve::{Station, StationLink, Traffic};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
@@ -31,38 +31,24 @@ impl<S> Shared<S> {
     }
 }
 
-impl<S: ByteStation + Send + 'static> Shared<S> {
+impl<S: Station<u8> + Send + 'static> Shared<S> {
     pub fn line(&self) -> Box<dyn ByteLink> {
         Box::new(StationLink::<_, u8>::new(self.clone(), self.clock.clone()))
     }
 }
 
-impl<S: CanStation + Send + 'static> Shared<S> {
+impl<S: Station<CanFrame> + Send + 'static> Shared<S> {
     pub fn bus(&self) -> Box<dyn CanLink> {
         Box::new(StationLink::<_, CanFrame>::new(self.clone(), self.clock.clone()))
     }
 }
 
-impl<S: ByteStation> ByteStation for Shared<S> {
-    fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
-        self.station().receive(now, bytes, reply);
+impl<T: Traffic, S: Station<T>> Station<T> for Shared<S> {
+    fn receive(&mut self, now: Instant, received: &[T], replies: &mut Vec<T>) {
+        self.station().receive(now, received, replies);
     }
 
-    fn poll(&mut self, now: Instant, reply: &mut Vec<u8>) {
-        self.station().poll(now, reply);
-    }
-
-    fn deadline(&self) -> Option<Instant> {
-        self.station().deadline()
-    }
-}
-
-impl<S: CanStation> CanStation for Shared<S> {
-    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
-        self.station().receive(now, frame, replies);
-    }
-
-    fn poll(&mut self, now: Instant, replies: &mut Vec<CanFrame>) {
+    fn poll(&mut self, now: Instant, replies: &mut Vec<T>) {
         self.station().poll(now, replies);
     }
 

@@ -2,7 +2,7 @@
 
 use motorlink_conformance::st::{self, Harness, Options};
 use motorlink_conformance::{Need, Report, Unavailable, World, run};
-use motorlink_link::serve::ByteStation;
+use motorlink_link::serve::{self, Station as _};
 use motorlink_proto::st::register::Features;
 use motorlink_proto::st::{Flags, Frame, MotorNumber, Profile, RegisterId};
 use motorlink_proto::time::{Instant, Micros};
@@ -97,7 +97,7 @@ impl Peer {
     }
 }
 
-impl ByteStation for Peer {
+impl serve::Station<u8> for Peer {
     fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
         self.heard.extend(bytes);
         self.station.advance_to(now);

@@ -7,7 +7,7 @@ use motorlink::Clock;
 use motorlink::port::{ByteLink, PortError};
 use motorlink_conformance::st::{self, Harness, Options};
 use motorlink_conformance::{Need, Verdict, run};
-use motorlink_link::serve::ByteStation;
+use motorlink_link::serve::Station as _;
 use motorlink_proto::st::{MotorNumber, Profile};
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::st::MotorConfig;

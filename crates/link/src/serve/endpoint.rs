@@ -11,7 +11,7 @@ use rustix::event::{PollFd, PollFlags};
 use rustix::io::{Errno, read, write};
 
 use super::pty::{Pty, is_held};
-use super::station::{ByteStation, CanStation};
+use super::station::Station;
 use super::stranger::{Gate, HELD};
 use super::unix::UnixDoor;
 use crate::port::keep_alive;
@@ -31,9 +31,9 @@ enum Door {
     Unix(UnixDoor),
 }
 
-pub(super) enum Station {
-    Bytes(Box<dyn ByteStation>),
-    Can(Box<dyn CanStation>),
+pub(super) enum AnyStation {
+    Bytes(Box<dyn Station<u8>>),
+    Can(Box<dyn Station<CanFrame>>),
 }
 
 /// Room that all endpoints use in turn.
@@ -53,7 +53,7 @@ impl Default for Scratch {
 pub(super) struct Endpoint {
     door: Door,
     clients: Vec<Client>,
-    station: Station,
+    station: AnyStation,
     /// Until then nobody is let in.
     shut_until: Option<Instant>,
 }
@@ -71,19 +71,19 @@ struct Client {
 }
 
 impl Endpoint {
-    pub(super) fn on_pty(pty: Pty, line: OwnedFd, station: Station) -> Self {
+    pub(super) fn on_pty(pty: Pty, line: OwnedFd, station: AnyStation) -> Self {
         Self::new(Door::Pty(pty, Some(Client::new(line, Gate::open()))), station)
     }
 
-    pub(super) fn on_tcp(listener: TcpListener, station: Station) -> Self {
+    pub(super) fn on_tcp(listener: TcpListener, station: AnyStation) -> Self {
         Self::new(Door::Tcp(listener), station)
     }
 
-    pub(super) fn on_unix(door: UnixDoor, station: Station) -> Self {
+    pub(super) fn on_unix(door: UnixDoor, station: AnyStation) -> Self {
         Self::new(Door::Unix(door), station)
     }
 
-    fn new(door: Door, station: Station) -> Self {
+    fn new(door: Door, station: AnyStation) -> Self {
         Endpoint { door, clients: Vec::new(), station, shut_until: None }
     }
 
@@ -181,8 +181,8 @@ impl Endpoint {
             return self.station.stranger(now);
         };
         match &mut self.station {
-            Station::Bytes(station) => station.receive(now, bytes, &mut client.outgoing),
-            Station::Can(station) => {
+            AnyStation::Bytes(station) => station.receive(now, bytes, &mut client.outgoing),
+            AnyStation::Can(station) => {
                 for &byte in bytes {
                     let Client { adapter, outgoing, .. } = &mut self.clients[index];
                     let answer = |answer: &[u8]| outgoing.extend_from_slice(answer);
@@ -192,7 +192,7 @@ impl Endpoint {
                             client.deliver(now, &frame);
                         }
                     }
-                    station.receive(now, &frame, &mut scratch.frames);
+                    station.receive(now, &[frame], &mut scratch.frames);
                     deliver_all(now, &mut scratch.frames, &mut self.clients);
                 }
             }
@@ -201,12 +201,12 @@ impl Endpoint {
 
     fn poll(&mut self, now: Instant, frames: &mut Vec<CanFrame>) {
         match &mut self.station {
-            Station::Bytes(station) => {
+            AnyStation::Bytes(station) => {
                 let mut unheard = Vec::new();
                 let client = self.clients.first_mut();
                 station.poll(now, client.map_or(&mut unheard, |client| &mut client.outgoing));
             }
-            Station::Can(station) => {
+            AnyStation::Can(station) => {
                 station.poll(now, frames);
                 deliver_all(now, frames, &mut self.clients);
             }
@@ -246,40 +246,35 @@ impl Endpoint {
     }
 }
 
-impl Station {
-    fn came(&mut self, now: Instant, others: usize) -> bool {
-        match self {
-            Station::Bytes(station) => station.came(now, others),
-            Station::Can(station) => station.came(now, others),
+/// What both kinds of stations do.
+macro_rules! either {
+    ($self:ident, $station:ident => $does:expr) => {
+        match $self {
+            AnyStation::Bytes($station) => $does,
+            AnyStation::Can($station) => $does,
         }
+    };
+}
+
+impl AnyStation {
+    fn came(&mut self, now: Instant, others: usize) -> bool {
+        either!(self, station => station.came(now, others))
     }
 
     fn left(&mut self, now: Instant) {
-        match self {
-            Station::Bytes(station) => station.left(now),
-            Station::Can(station) => station.left(now),
-        }
+        either!(self, station => station.left(now));
     }
 
     fn wants(&self) -> bool {
-        match self {
-            Station::Bytes(station) => station.wants(),
-            Station::Can(station) => station.wants(),
-        }
+        either!(self, station => station.wants())
     }
 
     fn stranger(&mut self, now: Instant) {
-        match self {
-            Station::Bytes(station) => station.stranger(now),
-            Station::Can(station) => station.stranger(now),
-        }
+        either!(self, station => station.stranger(now));
     }
 
     fn deadline(&self) -> Option<Instant> {
-        match self {
-            Station::Bytes(station) => station.deadline(),
-            Station::Can(station) => station.deadline(),
-        }
+        either!(self, station => station.deadline())
     }
 }
 

@@ -4,9 +4,8 @@ use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
 use motorlink_proto::can::CanFrame;
-use motorlink_proto::time::Instant;
 
-use super::station::{ByteStation, CanStation};
+use super::station::{Station, Traffic};
 use crate::Clock;
 use crate::port::{ByteLink, CanLink, Evented, PortError};
 
@@ -25,24 +24,21 @@ impl<S, T> StationLink<S, T> {
     pub fn new(station: S, clock: Clock) -> Self {
         StationLink { station, clock, received: Vec::with_capacity(256) }
     }
+}
 
+impl<S: Station<T>, T: Traffic> StationLink<S, T> {
     /// Waits until the station has said something.
-    fn wait(
-        &mut self,
-        timeout: Option<Duration>,
-        deadline: fn(&S) -> Option<Instant>,
-        poll: fn(&mut S, Instant, &mut Vec<T>),
-    ) {
+    fn wait(&mut self, timeout: Option<Duration>) {
         let end = self.clock.end_of(timeout);
         loop {
-            let (now, due) = (self.clock.now(), deadline(&self.station));
+            let (now, due) = (self.clock.now(), self.station.deadline());
             if due.is_some_and(|due| due <= now) {
-                poll(&mut self.station, now, &mut self.received);
+                self.station.poll(now, &mut self.received);
             }
             if !self.received.is_empty() || end.is_some_and(|end| end <= now) {
                 return;
             }
-            match deadline(&self.station).into_iter().chain(end).min() {
+            match self.station.deadline().into_iter().chain(end).min() {
                 Some(next) => self.clock.wait(next),
                 None => std::thread::park(),
             }
@@ -50,14 +46,14 @@ impl<S, T> StationLink<S, T> {
     }
 }
 
-impl<S: ByteStation + Send> ByteLink for StationLink<S, u8> {
+impl<S: Station<u8> + Send> ByteLink for StationLink<S, u8> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.station.receive(self.clock.now(), bytes, &mut self.received);
         Ok(())
     }
 
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
-        self.wait(timeout, S::deadline, S::poll);
+        self.wait(timeout);
         let size = buffer.len().min(self.received.len());
         buffer[..size].copy_from_slice(&self.received[..size]);
         self.received.drain(..size);
@@ -73,14 +69,14 @@ impl<S: ByteStation + Send> ByteLink for StationLink<S, u8> {
     }
 }
 
-impl<S: CanStation + Send> CanLink for StationLink<S, CanFrame> {
+impl<S: Station<CanFrame> + Send> CanLink for StationLink<S, CanFrame> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
-        self.station.receive(self.clock.now(), frame, &mut self.received);
+        self.station.receive(self.clock.now(), &[*frame], &mut self.received);
         Ok(())
     }
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
-        self.wait(timeout, S::deadline, S::poll);
+        self.wait(timeout);
         Ok((!self.received.is_empty()).then(|| self.received.remove(0)))
     }
 

@@ -30,4 +30,4 @@ mod unix;
 pub use link::StationLink;
 pub use name::ServeName;
 pub use server::{Served, Server, Turn};
-pub use station::{ByteStation, CanStation, MOST_CLIENTS};
+pub use station::{MOST_CLIENTS, Station, Traffic};

@@ -6,7 +6,7 @@ use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::{Instant, Micros};
 use rustix::event::{PollFd, PollFlags};
 
-use super::station::CanStation;
+use super::station::Station;
 use crate::port::{CanLink, PortError, SocketCanLink};
 
 /// Frames that are taken from the bus in one turn; the other ports have their turn as well.
@@ -20,7 +20,7 @@ const AWAY: Micros = Micros::from_millis(100);
 
 pub(super) struct Node {
     interface: String,
-    station: Box<dyn CanStation>,
+    station: Box<dyn Station<CanFrame>>,
     /// Nothing while the interface is away.
     link: Option<SocketCanLink>,
     outgoing: VecDeque<CanFrame>,
@@ -34,7 +34,10 @@ pub(super) struct Node {
 
 impl Node {
     /// Opens a CAN interface, which must be up now.
-    pub(super) fn open(interface: &str, station: Box<dyn CanStation>) -> Result<Self, PortError> {
+    pub(super) fn open(
+        interface: &str,
+        station: Box<dyn Station<CanFrame>>,
+    ) -> Result<Self, PortError> {
         Ok(Node {
             interface: interface.to_owned(),
             station,
@@ -79,7 +82,7 @@ impl Node {
         for _ in 0..TURN {
             let Some(link) = &mut self.link else { return };
             match link.receive(Some(std::time::Duration::ZERO)) {
-                Ok(Some(frame)) => self.station.receive(now, &frame, &mut self.said),
+                Ok(Some(frame)) => self.station.receive(now, &[frame], &mut self.said),
                 Ok(None) => break,
                 Err(_) => self.lose(now),
             }

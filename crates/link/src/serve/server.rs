@@ -4,15 +4,16 @@ use std::net::{TcpListener, ToSocketAddrs};
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
+use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 
-use super::endpoint::{Endpoint, Scratch, Station};
+use super::endpoint::{AnyStation, Endpoint, Scratch};
 use super::name::ServeName;
 use super::node::Node;
 use super::pty::Pty;
-use super::station::{ByteStation, CanStation};
+use super::station::Station;
 use super::unix::UnixDoor;
 use crate::clock::Clock;
 use crate::port::{PortError, timespec, unbracketed};
@@ -69,25 +70,25 @@ impl Server {
     pub fn serve_bytes(
         &mut self,
         name: &ServeName,
-        station: Box<dyn ByteStation>,
+        station: Box<dyn Station<u8>>,
     ) -> Result<Served, PortError> {
-        self.serve(name, Station::Bytes(station))
+        self.serve(name, AnyStation::Bytes(station))
     }
 
     /// Serves a CAN bus with `station` on it: through slcan, or as a node on a CAN interface.
     pub fn serve_can(
         &mut self,
         name: &ServeName,
-        station: Box<dyn CanStation>,
+        station: Box<dyn Station<CanFrame>>,
     ) -> Result<Served, PortError> {
-        self.serve(name, Station::Can(station))
+        self.serve(name, AnyStation::Can(station))
     }
 
-    fn serve(&mut self, name: &ServeName, station: Station) -> Result<Served, PortError> {
+    fn serve(&mut self, name: &ServeName, station: AnyStation) -> Result<Served, PortError> {
         let mut port = name.to_string();
         let path = match (name, station) {
-            (ServeName::Pty(link), station @ Station::Bytes(_))
-            | (ServeName::SlcanPty(link), station @ Station::Can(_)) => {
+            (ServeName::Pty(link), station @ AnyStation::Bytes(_))
+            | (ServeName::SlcanPty(link), station @ AnyStation::Can(_)) => {
                 let (pty, master) = Pty::open(link)?;
                 let path = pty.path().display().to_string();
                 self.endpoints.push(Endpoint::on_pty(pty, master, station));
@@ -105,15 +106,15 @@ impl Server {
                 self.endpoints.push(Endpoint::on_unix(UnixDoor::open(path)?, station));
                 path.display().to_string()
             }
-            (ServeName::SocketCan(interface), Station::Can(station)) => {
+            (ServeName::SocketCan(interface), AnyStation::Can(station)) => {
                 self.nodes.push(Node::open(interface, station)?);
                 interface.clone()
             }
-            (_, Station::Bytes(_)) => {
+            (_, AnyStation::Bytes(_)) => {
                 let usable = "pty:PATH, unix-listen:PATH or tcp-listen:ADDR:PORT".to_owned();
                 return Err(PortError::WrongKind { port, wanted: "serial line", usable });
             }
-            (_, Station::Can(_)) => {
+            (_, AnyStation::Can(_)) => {
                 let usable = "slcan-pty:PATH, unix-listen:PATH, tcp-listen:ADDR:PORT or \
                     socketcan:INTERFACE"
                     .to_owned();

@@ -6,22 +6,40 @@ use motorlink_proto::time::Instant;
 /// The clients that a served CAN bus has at a time; one more is closed at once.
 pub const MOST_CLIENTS: usize = 64;
 
-/// What answers at the far end of a served serial line.
-pub trait ByteStation {
-    /// Takes received bytes; what is to be sent back is appended to `reply`.
-    fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>);
-    /// Called when the deadline has passed.
-    fn poll(&mut self, now: Instant, reply: &mut Vec<u8>);
-    /// When [`poll`](Self::poll) is to be called next, if at all.
-    fn deadline(&self) -> Option<Instant>;
+/// What moves on a port: bytes of a serial line, or frames of a CAN bus.
+pub trait Traffic: Copy {
+    /// Clients that are welcome at a time, unless a station says otherwise.
+    const MOST_CLIENTS: usize;
+}
 
-    /// Someone opens the line, which `others` have open already. Unless it returns true they are
-    /// closed at once, where the port can: on a pty it cannot.
-    fn came(&mut self, _now: Instant, others: usize) -> bool {
-        others == 0
+impl Traffic for u8 {
+    const MOST_CLIENTS: usize = 1;
+}
+
+impl Traffic for CanFrame {
+    const MOST_CLIENTS: usize = MOST_CLIENTS;
+}
+
+/// What answers at the far end of a served serial line, or sits on a served CAN bus.
+pub trait Station<T: Traffic> {
+    /// Takes what was received; what is to be sent is appended to `replies`.
+    fn receive(&mut self, now: Instant, received: &[T], replies: &mut Vec<T>);
+
+    /// Called when the deadline has passed.
+    fn poll(&mut self, _now: Instant, _replies: &mut Vec<T>) {}
+
+    /// When [`poll`](Self::poll) is to be called next, if at all.
+    fn deadline(&self) -> Option<Instant> {
+        None
     }
 
-    /// A client closed the line, or is gone.
+    /// Someone opens the port, which `others` have open already. Unless it returns true they are
+    /// closed at once, where the port can: on a pty it cannot.
+    fn came(&mut self, _now: Instant, others: usize) -> bool {
+        others < T::MOST_CLIENTS
+    }
+
+    /// A client closed the port, or is gone.
     fn left(&mut self, _now: Instant) {}
 
     /// Whether clients may send more now. While they may not, their bytes wait in the kernel, and
@@ -31,31 +49,5 @@ pub trait ByteStation {
     }
 
     /// A client that came spoke HTTP, TLS or STUN, and is closed.
-    fn stranger(&mut self, _now: Instant) {}
-}
-
-/// What sits on a served CAN bus.
-pub trait CanStation {
-    /// Takes a frame from the bus; what is to be sent is appended to `replies`.
-    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>);
-    /// Called when the deadline has passed.
-    fn poll(&mut self, now: Instant, replies: &mut Vec<CanFrame>);
-    /// When [`poll`](Self::poll) is to be called next, if at all.
-    fn deadline(&self) -> Option<Instant>;
-
-    /// As [`ByteStation::came`]. Unless the station says otherwise, [`MOST_CLIENTS`] are welcome.
-    fn came(&mut self, _now: Instant, others: usize) -> bool {
-        others < MOST_CLIENTS
-    }
-
-    /// As [`ByteStation::left`].
-    fn left(&mut self, _now: Instant) {}
-
-    /// As [`ByteStation::wants`].
-    fn wants(&self) -> bool {
-        true
-    }
-
-    /// As [`ByteStation::stranger`].
     fn stranger(&mut self, _now: Instant) {}
 }

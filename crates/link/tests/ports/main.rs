@@ -18,7 +18,7 @@ use motorlink_link::port::{
     ByteLink, CanLink, Direction, FdLink, PortError, PortName, SlcanLink, TapBytes, TapCan,
 };
 use motorlink_link::serve::ServeName;
-use motorlink_link::serve::{ByteStation, Server};
+use motorlink_link::serve::{Server, Station};
 use motorlink_link::slcan::Bitrate;
 use motorlink_proto::time::Instant;
 use running::{Echo, Late, Place, Running, reply_of, request};
@@ -111,7 +111,7 @@ struct Caller {
     line: Rc<RefCell<Option<File>>>,
 }
 
-impl ByteStation for Caller {
+impl Station<u8> for Caller {
     fn receive(&mut self, _: Instant, _: &[u8], _: &mut Vec<u8>) {}
     fn poll(&mut self, _: Instant, _: &mut Vec<u8>) {
         let mut line = OpenOptions::new().read(true).write(true).open(&self.pty).expect("opened");

@@ -13,20 +13,16 @@ use std::time::Duration;
 
 use motorlink_link::port::PortError;
 use motorlink_link::serve::ServeName;
-use motorlink_link::serve::{ByteStation, CanStation, Served, Server};
+use motorlink_link::serve::{Served, Server, Station};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 /// Answers each chunk with itself.
 pub(crate) struct Echo;
 
-impl ByteStation for Echo {
+impl Station<u8> for Echo {
     fn receive(&mut self, _: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
         reply.extend_from_slice(bytes);
-    }
-    fn poll(&mut self, _: Instant, _: &mut Vec<u8>) {}
-    fn deadline(&self) -> Option<Instant> {
-        None
     }
 }
 
@@ -34,7 +30,7 @@ impl ByteStation for Echo {
 #[derive(Default)]
 pub(crate) struct Late(Option<Instant>);
 
-impl ByteStation for Late {
+impl Station<u8> for Late {
     fn receive(&mut self, now: Instant, _: &[u8], _: &mut Vec<u8>) {
         self.0 = Some(Instant(now.0 + 1_000));
     }
@@ -50,15 +46,9 @@ impl ByteStation for Late {
 /// A motor that answers what is for it with a byte changed.
 pub(crate) struct Motor;
 
-impl CanStation for Motor {
-    fn receive(&mut self, _: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
-        if frame.id() == 0x141 {
-            replies.push(reply_of(frame));
-        }
-    }
-    fn poll(&mut self, _: Instant, _: &mut Vec<CanFrame>) {}
-    fn deadline(&self) -> Option<Instant> {
-        None
+impl Station<CanFrame> for Motor {
+    fn receive(&mut self, _: Instant, received: &[CanFrame], replies: &mut Vec<CanFrame>) {
+        replies.extend(received.iter().filter(|frame| frame.id() == 0x141).map(reply_of));
     }
 }
 

@@ -5,8 +5,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 
 use motorlink_link::port::PortError;
-use motorlink_link::serve::{ByteStation, CanStation};
-use motorlink_proto::can::CanFrame;
+use motorlink_link::serve::{Station, Traffic};
 use motorlink_proto::time::Instant;
 
 use super::event::Event;
@@ -78,8 +77,10 @@ impl<T> Place<T> {
     fn has_the_line(&self) -> bool {
         self.desk.borrow().client.as_deref() == Some(&*self.port.borrow())
     }
+}
 
-    fn take(&mut self, now: Instant, sent: impl IntoIterator<Item = T>) {
+impl<T: Traffic> Station<T> for Place<T> {
+    fn receive(&mut self, now: Instant, received: &[T], _: &mut Vec<T>) {
         let has_the_line = self.has_the_line();
         let mut desk = self.desk.borrow_mut();
         // Whoever was turned away on a pty has stayed, and may have the line when it is free.
@@ -87,21 +88,20 @@ impl<T> Place<T> {
             return;
         }
         desk.heard_at = now;
-        self.lane.borrow_mut().to_port.extend(sent);
+        self.lane.borrow_mut().to_port.extend(received);
+    }
+
+    fn poll(&mut self, _: Instant, replies: &mut Vec<T>) {
+        replies.extend(self.lane.borrow_mut().to_client.drain(..));
     }
 
     /// At once while there is something for the client.
-    fn due(&self) -> Option<Instant> {
+    fn deadline(&self) -> Option<Instant> {
         let is_waiting = self.has_the_line() && !self.lane.borrow().to_client.is_empty();
         is_waiting.then_some(Instant(0))
     }
 
-    /// No more than one reading of a client waits here: the rest stays where it can be dropped.
-    fn has_room(&self) -> bool {
-        !self.has_the_line() || self.lane.borrow().to_port.is_empty()
-    }
-
-    fn welcome(&mut self, now: Instant, others: usize) -> bool {
+    fn came(&mut self, now: Instant, others: usize) -> bool {
         let mut desk = self.desk.borrow_mut();
         let port = self.port.borrow();
         let is_welcome = others == 0 && desk.admit(now, &port);
@@ -113,75 +113,20 @@ impl<T> Place<T> {
         is_welcome
     }
 
-    fn see_off(&mut self) {
+    fn left(&mut self, _: Instant) {
         if self.has_the_line() {
             let mut desk = self.desk.borrow_mut();
             (desk.client, desk.has_left) = (None, true);
         }
     }
 
-    fn tell_of_browser(&mut self) {
+    /// No more than one reading of a client waits here: the rest stays where it can be dropped.
+    fn wants(&self) -> bool {
+        !self.has_the_line() || self.lane.borrow().to_port.is_empty()
+    }
+
+    fn stranger(&mut self, _: Instant) {
         let port = self.port.borrow().clone();
         self.desk.borrow_mut().events.push_back(Event::Browser { port });
-    }
-}
-
-impl ByteStation for Place<u8> {
-    fn receive(&mut self, now: Instant, bytes: &[u8], _: &mut Vec<u8>) {
-        self.take(now, bytes.iter().copied());
-    }
-
-    fn poll(&mut self, _: Instant, reply: &mut Vec<u8>) {
-        reply.extend(self.lane.borrow_mut().to_client.drain(..));
-    }
-
-    fn deadline(&self) -> Option<Instant> {
-        self.due()
-    }
-
-    fn came(&mut self, now: Instant, others: usize) -> bool {
-        self.welcome(now, others)
-    }
-
-    fn left(&mut self, _: Instant) {
-        self.see_off();
-    }
-
-    fn wants(&self) -> bool {
-        self.has_room()
-    }
-
-    fn stranger(&mut self, _: Instant) {
-        self.tell_of_browser();
-    }
-}
-
-impl CanStation for Place<CanFrame> {
-    fn receive(&mut self, now: Instant, frame: &CanFrame, _: &mut Vec<CanFrame>) {
-        self.take(now, [*frame]);
-    }
-
-    fn poll(&mut self, _: Instant, replies: &mut Vec<CanFrame>) {
-        replies.extend(self.lane.borrow_mut().to_client.drain(..));
-    }
-
-    fn deadline(&self) -> Option<Instant> {
-        self.due()
-    }
-
-    fn came(&mut self, now: Instant, others: usize) -> bool {
-        self.welcome(now, others)
-    }
-
-    fn left(&mut self, _: Instant) {
-        self.see_off();
-    }
-
-    fn wants(&self) -> bool {
-        self.has_room()
-    }
-
-    fn stranger(&mut self, _: Instant) {
-        self.tell_of_browser();
     }
 }

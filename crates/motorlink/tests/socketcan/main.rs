@@ -16,7 +16,7 @@ use motorlink::rmd::{
 };
 use motorlink::time::Instant;
 use motorlink::{BackOff, LinkState};
-use motorlink_link::serve::{CanStation, Server};
+use motorlink_link::serve::{Server, Station};
 use socketcan::{
     CanDataFrame, CanFdFrame, CanFdSocket, CanRemoteFrame, EmbeddedFrame, ExtendedId, Socket,
     SocketOptions, StandardId,
@@ -322,13 +322,9 @@ fn a_bus_that_takes_nothing_is_told() {
 /// A node that answers each frame with the same.
 struct Echo;
 
-impl CanStation for Echo {
-    fn receive(&mut self, _: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
-        replies.push(*frame);
-    }
-    fn poll(&mut self, _: Instant, _: &mut Vec<CanFrame>) {}
-    fn deadline(&self) -> Option<Instant> {
-        None
+impl Station<CanFrame> for Echo {
+    fn receive(&mut self, _: Instant, received: &[CanFrame], replies: &mut Vec<CanFrame>) {
+        replies.extend(received);
     }
 }
 

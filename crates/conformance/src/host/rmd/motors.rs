@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::marker;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use motorlink_link::serve::CanStation;
+use motorlink_link::serve::Station;
 use motorlink_proto::Hex;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
@@ -91,16 +91,18 @@ impl Motors {
     }
 }
 
-impl CanStation for Motors {
-    fn receive(&mut self, now: Instant, frame: &CanFrame, replies: &mut Vec<CanFrame>) {
+impl Station<CanFrame> for Motors {
+    fn receive(&mut self, now: Instant, received: &[CanFrame], replies: &mut Vec<CanFrame>) {
         let mut inner = self.inner();
-        inner.outbox.journal.heard(now, &show(frame));
-        if let Some((can_id, data)) = frame.eight_bytes() {
-            if let Some(id) = MotorId::from_can_id(can_id.into()) {
-                inner.request(now, id, frame, Code::from(data[0]));
-            } else if can_id == TORQUE4_ID {
-                for id in MotorSet::TORQUE4 {
-                    inner.request(now, id, frame, Code::SetTorque);
+        for frame in received {
+            inner.outbox.journal.heard(now, &show(frame));
+            if let Some((can_id, data)) = frame.eight_bytes() {
+                if let Some(id) = MotorId::from_can_id(can_id.into()) {
+                    inner.request(now, id, frame, Code::from(data[0]));
+                } else if can_id == TORQUE4_ID {
+                    for id in MotorSet::TORQUE4 {
+                        inner.request(now, id, frame, Code::SetTorque);
+                    }
                 }
             }
         }

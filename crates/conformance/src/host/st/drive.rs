@@ -3,7 +3,7 @@
 use std::marker;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use motorlink_link::serve::ByteStation;
+use motorlink_link::serve::Station;
 use motorlink_proto::Hex;
 use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Features, Frame, MotorNumber, Parse, Profile, Ramp,
@@ -80,7 +80,7 @@ impl Drive {
     }
 }
 
-impl ByteStation for Drive {
+impl Station<u8> for Drive {
     fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
         let mut inner = self.inner();
         for &byte in bytes {
