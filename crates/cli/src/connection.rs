@@ -6,7 +6,7 @@ use motorlink::st::Profile;
 use motorlink_link::fault::Faults;
 
 use crate::failure::Failure;
-use crate::output::Output;
+use crate::output::Printer;
 use crate::trace;
 
 #[derive(clap::Args)]
@@ -72,8 +72,8 @@ impl Connection {
     }
 
     /// Where results go.
-    pub fn output(&self) -> Output {
-        Output { json: self.json }
+    pub fn output(&self) -> Printer {
+        Printer { json: self.json }
     }
 }
 

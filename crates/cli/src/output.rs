@@ -16,12 +16,12 @@ static VOICES: OnceLock<(Voice, Voice)> = OnceLock::new();
 
 /// Where results go.
 #[derive(Debug, Clone, Copy)]
-pub struct Output {
+pub struct Printer {
     /// One JSON object a line instead of text.
     pub json: bool,
 }
 
-impl Output {
+impl Printer {
     /// Prints one result: `text` for people, or `object` as a line of JSON.
     pub fn result(self, text: impl std::fmt::Display, object: Value) -> Result<(), Failure> {
         if self.json { line(&object) } else { line(&text) }

@@ -5,7 +5,7 @@ use motorlink::port::Carries;
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::output::{Output, line};
+use crate::output::{Printer, line};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -22,7 +22,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
     }
     let width = ports.iter().map(|port| port.name.len()).max().unwrap_or(0);
     for port in &ports {
-        Output { json: args.json }.result(text(port, width), object(port))?;
+        Printer { json: args.json }.result(text(port, width), object(port))?;
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ mod finite;
 
 use finite::Finite;
 use motorlink::port::PortError;
-use motorlink_conformance::host::rmd::{Motors, Scenario, scenarios};
+use motorlink_conformance::host::rmd::{Scenario, ScriptedMotors, scenarios};
 use motorlink_conformance::host::{READINGS, Reading, Said, Task};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::can::CanFrame;
@@ -17,7 +17,7 @@ use motorlink_proto::rmd::{
 };
 use motorlink_proto::time::{Instant, Micros};
 
-type Bus = Finite<Motors, CanFrame>;
+type Bus = Finite<ScriptedMotors, CanFrame>;
 
 /// Values are compared as digits.
 const DIGIT: f64 = 1.0;

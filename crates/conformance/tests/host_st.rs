@@ -6,7 +6,7 @@ mod finite;
 
 use finite::Finite;
 use motorlink::port::PortError;
-use motorlink_conformance::host::st::{DIGIT, Drive, Scenario, scenarios};
+use motorlink_conformance::host::st::{DIGIT, Scenario, ScriptedDrive, scenarios};
 use motorlink_conformance::host::{READINGS, Reading, Said, Task};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::st::{
@@ -15,7 +15,7 @@ use motorlink_proto::st::{
 };
 use motorlink_proto::time::Micros;
 
-type Line = Finite<Drive, u8>;
+type Line = Finite<ScriptedDrive, u8>;
 
 const ASK: Request<'_> = Request::GetRegister(RegisterId::SPEED_MEAS);
 const START: Request<'_> = Request::ExecuteCommand(Command::StartMotor);

@@ -289,7 +289,7 @@ fn limits_hold_for_raw_frames_of_their_motor_only() {
     pair.host.set_limits(motor(1), limits);
     let raw = [0xA1, 0, 0, 0, 51, 0, 0, 0];
     let refused = pair.host.request(pair.now, motor(1), raw);
-    let exceeded = Exceeded::Current { asked: IqCommand(51), limit: IqCommand(50) };
+    let exceeded = Exceeded::Current { value: IqCommand(51), limit: IqCommand(50) };
     assert_eq!(refused, Err(RequestError::Limit { id: motor(1), exceeded }));
     assert_eq!(
         refused.unwrap_err().to_string(),

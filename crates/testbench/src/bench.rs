@@ -21,7 +21,7 @@ use serde_json::Value;
 use super::cast::Cast;
 use super::drives::{Drives, Recording, Stage};
 use super::line::{RmdStage, SimBytes, SimCan, StStage};
-use super::places::{Kind, Places};
+use super::places::{Kind, ServedDrives};
 use super::signals::{Signal, find_signal};
 use super::{BenchConfig, Command, ConfigError};
 
@@ -42,7 +42,7 @@ const FOLLOW: Duration = Duration::from_millis(20);
 pub struct Bench {
     clock: Clock,
     stage: Stage,
-    places: Places,
+    places: ServedDrives,
     signals: Vec<Signal>,
     profile: Profile,
 }
@@ -55,7 +55,7 @@ impl Bench {
     pub fn new(config: &BenchConfig) -> Result<Self, ConfigError> {
         let cast = Cast { config: config.clone(), st: true, rmd: true };
         let stage = Stage::new(Drives::new(&cast)?);
-        let mut places = Places::default();
+        let mut places = ServedDrives::default();
         places.add("st".to_owned(), Kind::St, stage.clone());
         places.add("rmd".to_owned(), Kind::Rmd, stage.clone());
         let (signals, profile) = (cast.signals(), config.profile);

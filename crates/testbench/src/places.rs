@@ -11,9 +11,9 @@ use super::drives::Stage;
 
 /// All drives of a bench.
 #[derive(Default)]
-pub(super) struct Places(Vec<Place>);
+pub(super) struct ServedDrives(Vec<ServedDrive>);
 
-pub(super) struct Place {
+pub(super) struct ServedDrive {
     pub(super) port: String,
     pub(super) kind: Kind,
     pub(super) stage: Stage,
@@ -25,19 +25,20 @@ pub(super) enum Kind {
     Rmd,
 }
 
-impl Places {
+impl ServedDrives {
     pub(super) fn add(&mut self, port: String, kind: Kind, stage: Stage) {
-        self.0.push(Place { port, kind, stage });
+        self.0.push(ServedDrive { port, kind, stage });
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Place> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &ServedDrive> {
         self.0.iter()
     }
 
     /// Executes a command `now`; gives the answer, or why nothing was done.
     pub(super) fn execute(&self, now: Instant, command: &Command) -> Result<Value, String> {
         if let Command::State { port } = command {
-            let wanted = |place: &&Place| port.as_ref().is_none_or(|port| *port == place.port);
+            let wanted =
+                |place: &&ServedDrive| port.as_ref().is_none_or(|port| *port == place.port);
             let states: Vec<Value> =
                 self.iter().filter(wanted).map(|place| place.state(now)).collect();
             if states.is_empty() {
@@ -55,7 +56,7 @@ impl Places {
         Ok(json!({ "ok": true }))
     }
 
-    fn find(&self, port: Option<&str>) -> Result<&Place, String> {
+    fn find(&self, port: Option<&str>) -> Result<&ServedDrive, String> {
         let found = match (port, &self.0[..]) {
             (None, [only]) => Some(only),
             (None, _) => None,
@@ -74,7 +75,7 @@ impl Places {
     }
 }
 
-impl Place {
+impl ServedDrive {
     fn state(&self, now: Instant) -> Value {
         let drives = &self.stage.at(now).drives;
         let st = drives.st.iter().filter(|_| self.kind == Kind::St);

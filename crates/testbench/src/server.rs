@@ -17,14 +17,14 @@ use serde_json::{Value, json};
 
 use super::drives::{Drives, Stage};
 use super::line::{RmdStage, StStage};
-use super::places::{Kind, Places};
+use super::places::{Kind, ServedDrives};
 use super::{BenchConfig, Command, ConfigError, RomError, RomFolder};
 
 /// Simulated drives, each on a served port of its own, advanced to real time.
 #[derive(Default)]
 pub struct SimServer {
     server: Server,
-    places: Places,
+    places: ServedDrives,
     rom: Option<Rc<RomFolder>>,
     /// A ROM that could not be written.
     failure: Rc<RefCell<Option<RomError>>>,

@@ -29,7 +29,7 @@ const IDLE: Micros = Micros(1_000);
 
 /// A frame of the host to a motor.
 #[derive(Clone, Copy, Default)]
-struct Asked {
+struct SentFrame {
     /// Counts what each motor was sent, from 1 on.
     number: u64,
     at: Instant,
@@ -40,13 +40,13 @@ struct Asked {
 }
 
 /// A frame of the host to each motor that it reaches.
-type Sent = [Asked; MOTORS];
+type Sent = [SentFrame; MOTORS];
 
 /// A frame of a drive.
 #[derive(Clone, Copy)]
 struct Reply {
     /// What it answers.
-    asked: Asked,
+    asked: SentFrame,
     /// Whether its request came twice, and this answers the second copy.
     again: bool,
 }
@@ -261,7 +261,7 @@ impl RmdRun {
     fn transmit(&mut self, frame: CanFrame) {
         let mut sent = Sent::default();
         for id in MotorSet::TORQUE4.filter(|id| reaches(*id, frame.id())) {
-            let Asked { number, moved, .. } = self.ends.last[id.index()];
+            let SentFrame { number, moved, .. } = self.ends.last[id.index()];
             let code = match frame.id() == u32::from(TORQUE4_ID) {
                 true => Code::SetTorque,
                 false => Code::from(frame.data()[0]),
@@ -270,7 +270,7 @@ impl RmdRun {
             let moves = code.info().is_some_and(|row| row.moves);
             let number = number + 1;
             let moved = if moves { number } else { moved };
-            sent[id.index()] = Asked { number, at: self.now, halts, moved };
+            sent[id.index()] = SentFrame { number, at: self.now, halts, moved };
             self.ends.last[id.index()] = sent[id.index()];
             self.tally.requests += 1;
         }

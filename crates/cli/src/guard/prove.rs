@@ -58,7 +58,7 @@ impl Protocol {
 
 impl Spin {
     pub fn run(self) -> Result<(), Failure> {
-        let drive = Drive::open(self.protocol, &self.port.parse()?, self.motor)?;
+        let drive = SpunMotor::open(self.protocol, &self.port.parse()?, self.motor)?;
         drive.turn(self.speed)?;
         let wanted = f64::from(self.speed) * TURNS;
         let give_up = Instant::now() + PATIENCE;
@@ -83,33 +83,33 @@ impl Spin {
 }
 
 /// A client of the motor that is turned.
-enum Drive {
+enum SpunMotor {
     St { client: Box<st::Client>, motor: u8 },
     Rmd { bus: Box<rmd::Client>, id: u8 },
 }
 
-impl Drive {
+impl SpunMotor {
     fn open(protocol: Protocol, port: &PortName, motor: u8) -> Result<Self, Failure> {
         Ok(match protocol {
             Protocol::St => {
                 let client = st::Client::open(port, st::Options::default())?;
-                Drive::St { client: Box::new(client), motor }
+                SpunMotor::St { client: Box::new(client), motor }
             }
             Protocol::Rmd => {
                 let options = rmd::Options { timeout: TIMEOUT, ..rmd::Options::default() };
-                Drive::Rmd { bus: Box::new(rmd::Client::open(port, options)?), id: motor }
+                SpunMotor::Rmd { bus: Box::new(rmd::Client::open(port, options)?), id: motor }
             }
         })
     }
 
     fn turn(&self, speed: i32) -> Result<(), Failure> {
         match self {
-            Drive::St { client, motor } => {
+            SpunMotor::St { client, motor } => {
                 let ramp = Request::SetRamp(Ramp { speed_rpm: speed, duration_ms: 500 });
                 client.exchange(*motor, &ramp, |_| Some(()))?;
                 client.motor(*motor)?.start()?;
             }
-            Drive::Rmd { bus, id } => {
+            SpunMotor::Rmd { bus, id } => {
                 bus.motor(*id)?.set_speed(CentiDps(speed.saturating_mul(100)))?;
             }
         }
@@ -118,8 +118,10 @@ impl Drive {
 
     fn speed(&self) -> Result<f64, Failure> {
         Ok(match self {
-            Drive::St { client, motor } => client.motor(*motor)?.get(register::SPEED_MEAS)?.into(),
-            Drive::Rmd { bus, id } => bus.motor(*id)?.motion_status()?.speed.dps(),
+            SpunMotor::St { client, motor } => {
+                client.motor(*motor)?.get(register::SPEED_MEAS)?.into()
+            }
+            SpunMotor::Rmd { bus, id } => bus.motor(*id)?.motion_status()?.speed.dps(),
         })
     }
 }
@@ -173,7 +175,7 @@ impl Proof {
 
     /// Waits until the motor stands still; gives the time from `since` until then, ms.
     fn at_rest(&self, since: Instant) -> Result<f64, Failure> {
-        let drive = Drive::open(self.protocol, &self.port, self.motor)?;
+        let drive = SpunMotor::open(self.protocol, &self.port, self.motor)?;
         let slow = (f64::from(self.speed).abs() * RESTS).max(1.0);
         loop {
             let speed = drive.speed()?;

@@ -7,13 +7,13 @@ use motorlink::rmd::{Client, Motor, Options};
 use super::args::MotorArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
-use crate::output::Output;
+use crate::output::Printer;
 
 /// An open bus, the motor that is meant, and how to show what it says.
 pub struct Session {
     pub bus: Client,
     pub id: u8,
-    pub output: Output,
+    pub output: Printer,
     pub raw: bool,
     pub write_rom: bool,
 }
@@ -29,7 +29,7 @@ pub fn connect(connection: &Connection, motor: &MotorArgs) -> Result<Session, Fa
 
 impl Session {
     /// Where results go, which come from replies to their own requests.
-    pub fn confirmed(&self) -> Result<Output, Failure> {
+    pub fn confirmed(&self) -> Result<Printer, Failure> {
         self.bus.confirm(self.motor()?.id())?;
         Ok(self.output)
     }

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use super::plot;
 use crate::failure::Failure;
-use crate::output::{Output, line, note};
+use crate::output::{Printer, line, note};
 
 /// Values of the final state in a line of text.
 const ON_A_LINE: usize = 5;
@@ -51,7 +51,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let picture = plot::draw(&scenario, &run).map_err(Failure::Line)?;
         write(path, |out| out.write_all(picture.as_bytes()))?;
     }
-    let output = Output { json: args.json };
+    let output = Printer { json: args.json };
     if output.json {
         line(&object(&scenario, &run, seconds))?;
     } else {

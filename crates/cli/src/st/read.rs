@@ -5,10 +5,10 @@ use serde_json::{Map, Value, json};
 
 use super::session::Session;
 use crate::failure::Failure;
-use crate::output::{Output, line};
+use crate::output::{Printer, line};
 use crate::repeat::{Repeat, repeated};
 
-pub fn registers(output: Output) -> Result<(), Failure> {
+pub fn registers(output: Printer) -> Result<(), Failure> {
     for id in RegisterId::all() {
         let (Some(shape), Some(text)) = (id.shape(), id.text()) else { continue };
         let origin = match shape.origin {

@@ -9,7 +9,7 @@ use serde_json::json;
 
 use crate::connection::Connection;
 use crate::failure::Failure;
-use crate::output::Output;
+use crate::output::Printer;
 
 pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result<(), Failure> {
     let port = connection.port()?;
@@ -60,7 +60,7 @@ pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result
 
 fn report(
     bar: &ProgressBar,
-    output: Output,
+    output: Printer,
     rate: u32,
     finding: &ScanResult,
 ) -> Result<(), Failure> {

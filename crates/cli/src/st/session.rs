@@ -7,13 +7,13 @@ use motorlink::st::{Client, Motor, Options, Profile, Recovery};
 use super::args::DriveArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
-use crate::output::Output;
+use crate::output::Printer;
 
 /// An open drive, and how to show what it says.
 pub struct Session {
     pub client: Client,
     pub motor: u8,
-    pub output: Output,
+    pub output: Printer,
     pub raw: bool,
 }
 
@@ -42,7 +42,7 @@ impl Session {
     }
 
     /// Where results go, which come from replies to their own requests.
-    pub fn confirmed(&self) -> Result<Output, Failure> {
+    pub fn confirmed(&self) -> Result<Printer, Failure> {
         self.client.confirm()?;
         Ok(self.output)
     }

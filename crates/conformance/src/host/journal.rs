@@ -62,7 +62,7 @@ impl Journal {
     }
 
     /// It asked something. Until a reply came, or for `patience`, it must not have.
-    pub(super) fn asked(
+    pub(super) fn record(
         &mut self,
         now: Instant,
         motor: u8,

@@ -9,7 +9,7 @@ use motorlink_proto::time::Instant;
 
 use super::pace::Pace;
 use super::port::Port;
-use super::station::{Desk, Lane, Place};
+use super::station::{Desk, GuardedPort, Lane};
 
 /// A port of links `L`, which carry `T`: bytes, or frames.
 pub(super) struct Held<L, T> {
@@ -26,8 +26,12 @@ impl<L: Evented + 'static, T> Held<L, T> {
     }
 
     /// A served port for the client.
-    pub(super) fn place(&self, desk: &Rc<RefCell<Desk>>, port: Rc<RefCell<String>>) -> Place<T> {
-        Place { desk: Rc::clone(desk), lane: Rc::clone(&self.lane), port }
+    pub(super) fn place(
+        &self,
+        desk: &Rc<RefCell<Desk>>,
+        port: Rc<RefCell<String>>,
+    ) -> GuardedPort<T> {
+        GuardedPort { desk: Rc::clone(desk), lane: Rc::clone(&self.lane), port }
     }
 
     /// How many bytes or frames the port takes now without a backlog.

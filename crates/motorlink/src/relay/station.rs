@@ -67,19 +67,19 @@ impl<T> Default for Lane<T> {
 }
 
 /// One served port.
-pub(super) struct Place<T> {
+pub(super) struct GuardedPort<T> {
     pub(super) desk: Rc<RefCell<Desk>>,
     pub(super) lane: Rc<RefCell<Lane<T>>>,
     pub(super) port: Rc<RefCell<String>>,
 }
 
-impl<T> Place<T> {
+impl<T> GuardedPort<T> {
     fn has_the_line(&self) -> bool {
         self.desk.borrow().client.as_deref() == Some(&*self.port.borrow())
     }
 }
 
-impl<T: Traffic> Station<T> for Place<T> {
+impl<T: Traffic> Station<T> for GuardedPort<T> {
     fn receive(&mut self, now: Instant, received: &[T], _: &mut Vec<T>) {
         let has_the_line = self.has_the_line();
         let mut desk = self.desk.borrow_mut();

@@ -14,7 +14,7 @@ use motorlink_proto::rmd::{
 };
 use motorlink_proto::time;
 
-use super::session::{Output, Session, ends_motion};
+use super::session::{Session, SessionOutput, ends_motion};
 use super::{Error, Options};
 use crate::turn::{Turn, Turns};
 
@@ -362,8 +362,10 @@ impl<L: CanLink> Driven<L> {
         loop {
             let now = self.port.now();
             let moved = match self.session.poll(now) {
-                Output::Transmit(frame) => self.port.link().and_then(|(link, _)| link.send(&frame)),
-                Output::Done(id, result) => {
+                SessionOutput::Transmit(frame) => {
+                    self.port.link().and_then(|(link, _)| link.send(&frame))
+                }
+                SessionOutput::Done(id, result) => {
                     let link = self.port.open_link();
                     each(
                         id,
@@ -374,8 +376,8 @@ impl<L: CanLink> Driven<L> {
                     );
                     Ok(())
                 }
-                Output::Wait(None) => return Ok(true),
-                Output::Wait(Some(until)) => {
+                SessionOutput::Wait(None) => return Ok(true),
+                SessionOutput::Wait(Some(until)) => {
                     let left =
                         pause.map(|pause| pause.saturating_duration_since(machine::Instant::now()));
                     if left == Some(Duration::ZERO) {

@@ -8,7 +8,7 @@ use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{Limits, MotorId, MotorSet, SetTorque4};
 
 use super::bus::Driven;
-use super::session::Output;
+use super::session::SessionOutput;
 use super::{Client, Error, Options};
 
 /// Frames that are taken from the bus in one step: the loop has others to serve.
@@ -155,11 +155,11 @@ impl EventClient {
         loop {
             let now = clock.now();
             match session.poll(now) {
-                Output::Transmit(frame) => link.send(&frame)?,
-                Output::Done(id, result) => {
+                SessionOutput::Transmit(frame) => link.send(&frame)?,
+                SessionOutput::Done(id, result) => {
                     each(id, result.map_err(|error| error.behind(link.as_ref())));
                 }
-                Output::Wait(until) => {
+                SessionOutput::Wait(until) => {
                     let came = match listens {
                         0 => None,
                         _ => link.receive(Some(Duration::ZERO))?,

@@ -27,7 +27,7 @@ pub(super) struct Session {
     /// How long an exchange may be put off.
     patience: Micros,
     /// What each motor was asked last.
-    asked: [PendingRequest; MotorId::COUNT],
+    pending: [PendingRequest; MotorId::COUNT],
     /// Motors whose quarantine an exchange outlasts.
     insisting: MotorSet,
     /// Those of them whose request cannot leave yet.
@@ -60,7 +60,7 @@ struct Held {
 
 /// What the caller has to do next.
 #[derive(Debug)]
-pub(super) enum Output {
+pub(super) enum SessionOutput {
     /// Send this frame, then poll again.
     Transmit(CanFrame),
     /// The exchange with a motor is over.
@@ -85,7 +85,7 @@ impl Session {
             host,
             moving: MotorSet::EMPTY,
             patience: SETTLE_LIMIT + times.into(),
-            asked: [nothing; MotorId::COUNT],
+            pending: [nothing; MotorId::COUNT],
             insisting: MotorSet::EMPTY,
             waiting: MotorSet::EMPTY,
             held: None,
@@ -132,7 +132,7 @@ impl Session {
 
     /// A question with another code than what a motor was asked last.
     pub(super) fn question(&self, id: MotorId) -> [u8; 8] {
-        question_behind(self.asked[id.index()].request[0])
+        question_behind(self.pending[id.index()].request[0])
     }
 
     /// Whether the motor's replies since the last confirmation went to their own requests.
@@ -163,7 +163,7 @@ impl Session {
         self.free(id, &request)?;
         let begun = self.host.request(now, id, request);
         begun.map_err(|refused| self.refused(refused))?;
-        self.asked[id.index()] = PendingRequest { request, until: now + self.patience };
+        self.pending[id.index()] = PendingRequest { request, until: now + self.patience };
         if self.host.is_unknown(id) {
             self.insisting.insert(id);
         }
@@ -183,7 +183,7 @@ impl Session {
             Err(refused) => return Err(self.refused(refused)),
         }
         self.insisting.insert(id);
-        self.asked[id.index()] = PendingRequest { request, until: now + self.patience };
+        self.pending[id.index()] = PendingRequest { request, until: now + self.patience };
         Ok(())
     }
 
@@ -206,7 +206,7 @@ impl Session {
         begun.map_err(|refused| self.refused(refused))?;
         let until = now + self.patience;
         for id in expect {
-            self.asked[id.index()] = PendingRequest { request: torque, until };
+            self.pending[id.index()] = PendingRequest { request: torque, until };
         }
         if expect.into_iter().any(|id| self.host.is_unknown(id)) {
             self.held = Some(Held { torques, expect, answered: MotorSet::EMPTY, until });
@@ -218,14 +218,14 @@ impl Session {
         self.host.receive(now, frame);
     }
 
-    pub(super) fn poll(&mut self, now: Instant) -> Output {
+    pub(super) fn poll(&mut self, now: Instant) -> SessionOutput {
         loop {
             let mut again = self.send_held(now);
             if let Some(id) = self.unsent.next() {
-                return Output::Done(id, Err(self.why_unsent(id)));
+                return SessionOutput::Done(id, Err(self.why_unsent(id)));
             }
             for id in self.waiting {
-                let PendingRequest { request, until } = self.asked[id.index()];
+                let PendingRequest { request, until } = self.pending[id.index()];
                 match self.host.request(now, id, request) {
                     Err(RequestError::Quarantined { until: free, .. }) if now < until => {
                         again = again.into_iter().chain([free]).min();
@@ -238,7 +238,7 @@ impl Session {
                                 RequestError::Quarantined { id, .. } => self.shared(id),
                                 refused => self.refused(refused),
                             };
-                            return Output::Done(id, Err(error));
+                            return SessionOutput::Done(id, Err(error));
                         }
                     }
                 }
@@ -246,10 +246,10 @@ impl Session {
             match self.host.poll(now) {
                 proto::Output::Transmit(frame) => {
                     self.moving = self.moving.union(MotorSet::moved_by(&frame));
-                    return Output::Transmit(frame);
+                    return SessionOutput::Transmit(frame);
                 }
                 proto::Output::Done { id, result: Err(proto::Failure::Quarantined) }
-                    if self.insisting.contains(id) && now < self.asked[id.index()].until =>
+                    if self.insisting.contains(id) && now < self.pending[id.index()].until =>
                 {
                     self.waiting.insert(id);
                 }
@@ -270,10 +270,10 @@ impl Session {
                         proto::Failure::Quarantined if is_outlasted => self.shared(id),
                         error => self.failed(id, error),
                     };
-                    return Output::Done(id, result.map_err(failed));
+                    return SessionOutput::Done(id, result.map_err(failed));
                 }
                 proto::Output::Wait(until) => {
-                    return Output::Wait(until.into_iter().chain(again).min());
+                    return SessionOutput::Wait(until.into_iter().chain(again).min());
                 }
             }
         }
@@ -289,7 +289,7 @@ impl Session {
         &mut self,
         id: MotorId,
         result: Result<[u8; 8], proto::Failure>,
-    ) -> Option<Output> {
+    ) -> Option<SessionOutput> {
         let held = self.held.as_mut()?;
         match result {
             Ok(_) | Err(proto::Failure::Quarantined) => {
@@ -302,7 +302,7 @@ impl Session {
                 if held.expect.is_empty() || matches!(error, proto::Failure::Foreign(_)) {
                     self.drop_held(None);
                 }
-                Some(Output::Done(id, Err(self.failed(id, error))))
+                Some(SessionOutput::Done(id, Err(self.failed(id, error))))
             }
         }
     }
@@ -390,7 +390,7 @@ impl Session {
 
     fn failed(&self, id: MotorId, error: proto::Failure) -> Error {
         let port = Arc::clone(&self.port);
-        let [code, ..] = self.asked[id.index()].request;
+        let [code, ..] = self.pending[id.index()].request;
         let code = Code::from(code);
         match error {
             proto::Failure::Altered => Error::Altered { port, motor: id, request: code },

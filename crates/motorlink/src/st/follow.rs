@@ -119,7 +119,7 @@ impl Follower {
             _ => return self.lose(),
         };
         let effect = Effect::of_frame(&frame);
-        let addressed = self.started.asked(frame.motor(), effect);
+        let addressed = self.started.request_sent(frame.motor(), effect);
         match (header, code) {
             (HEADER_ACK, _) if !self.out_of_step => {
                 if command(&frame) == Some(Command::PfcDisable) {

@@ -11,7 +11,7 @@ pub(super) struct Ramped(u8);
 impl Ramped {
     /// A request for `motor` leaves; `None` while that motor is not known. Unless the drive
     /// acknowledges a ramp, its setpoint may have changed or not.
-    pub(super) fn asked(&mut self, motor: Option<MotorNumber>, effect: Effect) {
+    pub(super) fn request_sent(&mut self, motor: Option<MotorNumber>, effect: Effect) {
         match effect {
             Effect::Ramps | Effect::Supersedes => self.0 &= !motor.map_or(u8::MAX, bit),
             Effect::Resets => self.forget(),

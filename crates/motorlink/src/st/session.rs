@@ -38,7 +38,7 @@ pub(super) struct Session {
     ramped: Ramped,
     /// What the line had been through when a request began.
     history: History,
-    asked: PendingRequest,
+    pending: PendingRequest,
     /// The size of the last acknowledge's payload, and how often the line had been lost when that was
     /// asked for.
     last_size: Option<usize>,
@@ -111,7 +111,7 @@ impl Session {
             started: Started::default(),
             ramped: Ramped::default(),
             history: History::default(),
-            asked,
+            pending: asked,
             last_size: None,
             losses: 0,
             turn: false,
@@ -230,9 +230,9 @@ impl Session {
             return Err(Error::TooLong(what.to_string()));
         }
         self.losses = self.master.counters().losses;
-        let addressed = self.started.asked(motor, effect);
-        self.ramped.asked(addressed, effect);
-        self.asked = PendingRequest { motor, addressed, effect, what };
+        let addressed = self.started.request_sent(motor, effect);
+        self.ramped.request_sent(addressed, effect);
+        self.pending = PendingRequest { motor, addressed, effect, what };
         Ok(())
     }
 
@@ -253,7 +253,7 @@ impl Session {
         &mut self,
         outcome: Result<(Option<T>, usize), proto::ExchangeError>,
     ) -> Result<T, Error> {
-        let PendingRequest { motor, addressed, effect, what } = self.asked;
+        let PendingRequest { motor, addressed, effect, what } = self.pending;
         self.last_size = outcome.as_ref().ok().map(|(_, size)| *size);
         let (port, target) = (Arc::clone(&self.port), Target(motor));
         match outcome {

@@ -80,7 +80,7 @@ pub(crate) struct Started {
 impl Started {
     /// A request for motor number `motor` leaves. Gives the motor that it addresses, where that is
     /// known, for [`acknowledged`](Self::acknowledged).
-    pub(super) fn asked(&mut self, motor: u8, effect: Effect) -> Option<MotorNumber> {
+    pub(super) fn request_sent(&mut self, motor: u8, effect: Effect) -> Option<MotorNumber> {
         if motor != 0 || matches!(effect, Effect::Retargets | Effect::Resets) {
             self.before_zero = None;
         }

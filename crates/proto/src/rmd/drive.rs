@@ -303,7 +303,7 @@ impl Drive {
             | Code::SetPositionLimited
             | Code::SetSingleTurnPosition
             | Code::SetSingleTurnPositionLimited => {
-                if let Some((mode, circle)) = self.asked(code, data, sense) {
+                if let Some((mode, circle)) = self.request_mode(code, data, sense) {
                     self.circle = circle;
                     self.go(mode, motor);
                 }
@@ -319,7 +319,7 @@ impl Drive {
     /// The mode that a motion command asks for, with the command when it is a single-turn one;
     /// `None` for one outside of the document's range, which is not carried out
     /// (docs/SPEC-NOTES.md R15).
-    fn asked(
+    fn request_mode(
         &self,
         code: Code,
         data: &[u8; 8],

@@ -35,14 +35,14 @@ pub enum Exceeded {
     /// More torque current than `limit`, which is at most [`IqCommand::MAX`] (docs/SPEC-NOTES.md R3).
     Current {
         /// Torque current of the frame.
-        asked: IqCommand,
+        value: IqCommand,
         /// The limit.
         limit: IqCommand,
     },
     /// More speed than `limit`.
     Speed {
         /// Speed of the frame.
-        asked: CentiDps,
+        value: CentiDps,
         /// The limit.
         limit: SpeedLimit,
     },
@@ -54,7 +54,7 @@ pub enum Exceeded {
     /// Further from zero than `limit`.
     Angle {
         /// Angle of the frame.
-        asked: CentiDegrees,
+        value: CentiDegrees,
         /// The limit.
         limit: CentiDegrees,
     },
@@ -107,38 +107,38 @@ impl Limits {
     ///
     /// # Errors
     /// [`Exceeded::Current`].
-    pub fn current(&self, asked: IqCommand) -> Result<(), Exceeded> {
+    pub fn current(&self, value: IqCommand) -> Result<(), Exceeded> {
         let limit = self.current.unwrap_or(IqCommand::MAX).min(IqCommand::MAX);
-        if i32::from(asked.0).abs() <= i32::from(limit.0) {
+        if i32::from(value.0).abs() <= i32::from(limit.0) {
             return Ok(());
         }
-        Err(Exceeded::Current { asked, limit })
+        Err(Exceeded::Current { value, limit })
     }
 
-    fn speed(&self, asked: CentiDps) -> Result<(), Exceeded> {
+    fn speed(&self, value: CentiDps) -> Result<(), Exceeded> {
         match self.speed {
-            Some(limit) if asked.0.unsigned_abs() > centi(limit).0.unsigned_abs() => {
-                Err(Exceeded::Speed { asked, limit })
+            Some(limit) if value.0.unsigned_abs() > centi(limit).0.unsigned_abs() => {
+                Err(Exceeded::Speed { value, limit })
             }
             _ => Ok(()),
         }
     }
 
-    fn max_speed(&self, asked: SpeedLimit) -> Result<(), Exceeded> {
-        if asked == SpeedLimit(0) {
+    fn max_speed(&self, value: SpeedLimit) -> Result<(), Exceeded> {
+        if value == SpeedLimit(0) {
             return self.no_speed();
         }
-        self.speed(centi(asked))
+        self.speed(centi(value))
     }
 
     fn no_speed(&self) -> Result<(), Exceeded> {
         self.speed.map_or(Ok(()), |limit| Err(Exceeded::NoSpeed { limit }))
     }
 
-    fn angle(&self, asked: CentiDegrees) -> Result<(), Exceeded> {
+    fn angle(&self, value: CentiDegrees) -> Result<(), Exceeded> {
         match self.angle {
-            Some(limit) if i64::from(asked.0).abs() > i64::from(limit.0) => {
-                Err(Exceeded::Angle { asked, limit })
+            Some(limit) if i64::from(value.0).abs() > i64::from(limit.0) => {
+                Err(Exceeded::Angle { value, limit })
             }
             _ => Ok(()),
         }
@@ -162,14 +162,14 @@ fn circle(angle: TurnCentiDegrees, direction: SpinDirection) -> Result<(), Excee
 impl fmt::Display for Exceeded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Exceeded::Current { asked, limit } => write!(
+            Exceeded::Current { value, limit } => write!(
                 f,
                 "torque current {:.3} A is beyond the limit of {:.3} A",
-                asked.amps(),
+                value.amps(),
                 limit.amps()
             ),
-            Exceeded::Speed { asked, limit } => {
-                write!(f, "speed {:.2} °/s is beyond the limit of {} °/s", asked.dps(), limit.0)
+            Exceeded::Speed { value, limit } => {
+                write!(f, "speed {:.2} °/s is beyond the limit of {} °/s", value.dps(), limit.0)
             }
             Exceeded::NoSpeed { limit } => write!(
                 f,
@@ -177,10 +177,10 @@ impl fmt::Display for Exceeded {
                  max speed of 1 °/s at least",
                 limit.0
             ),
-            Exceeded::Angle { asked, limit } => write!(
+            Exceeded::Angle { value, limit } => write!(
                 f,
                 "angle {:.2}° is beyond the limit of {:.2}°",
-                asked.degrees(),
+                value.degrees(),
                 limit.degrees()
             ),
             Exceeded::SingleTurnAngle(angle) => {
@@ -221,8 +221,8 @@ mod tests {
         assert_eq!(none.check(&torque(2000)), Ok(()));
         assert_eq!(none.check(&torque(-2000)), Ok(()));
         for digits in [2001, -2001, i16::MIN, i16::MAX] {
-            let (asked, limit) = (IqCommand(digits), IqCommand::MAX);
-            assert_eq!(none.check(&torque(digits)), Err(Exceeded::Current { asked, limit }));
+            let (value, limit) = (IqCommand(digits), IqCommand::MAX);
+            assert_eq!(none.check(&torque(digits)), Err(Exceeded::Current { value, limit }));
         }
     }
 

@@ -6,7 +6,7 @@ mod scenarios;
 /// How long a host waits for a reply unless it is said otherwise.
 pub use motorlink_proto::rmd::DEFAULT_TIMEOUT as TIMEOUT;
 
-pub use motors::{Motors, Scenario};
+pub use motors::{Scenario, ScriptedMotors};
 pub use scenarios::scenarios;
 
 /// What a digit of 0x92 is in what a host says: degrees.

@@ -51,7 +51,7 @@ pub(super) struct Turn {
 
 /// Four motors, IDs 1 to 4, and a script. Clones are the same motors.
 #[derive(Clone)]
-pub struct Motors(Arc<Mutex<Inner>>);
+pub struct ScriptedMotors(Arc<Mutex<Inner>>);
 
 struct Inner {
     script: Script,
@@ -67,10 +67,10 @@ const AT_ONCE: Micros = Micros(100);
 
 impl Scenario {
     /// The motors of this scenario, for a host that waits `timeout` for a reply.
-    pub fn motors(&self, timeout: Micros) -> Motors {
+    pub fn motors(&self, timeout: Micros) -> ScriptedMotors {
         let (asked, readings) = Default::default();
         let script = self.script.clone();
-        Motors(Arc::new(Mutex::new(Inner {
+        ScriptedMotors(Arc::new(Mutex::new(Inner {
             script,
             outbox: Outbox::new(),
             asked,
@@ -80,7 +80,7 @@ impl Scenario {
     }
 }
 
-impl Motors {
+impl ScriptedMotors {
     fn inner(&self) -> MutexGuard<'_, Inner> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -91,7 +91,7 @@ impl Motors {
     }
 }
 
-impl Station<CanFrame> for Motors {
+impl Station<CanFrame> for ScriptedMotors {
     fn receive(&mut self, now: Instant, received: &[CanFrame], replies: &mut Vec<CanFrame>) {
         let mut inner = self.inner();
         for frame in received {
@@ -123,7 +123,7 @@ impl Inner {
         if !MotorSet::TORQUE4.contains(id) {
             return;
         }
-        let exchange = self.asked(now, id, frame, code);
+        let exchange = self.record(now, id, frame, code);
         self.outbox.stir(now);
         let count = self.asked.entry((id, code.into())).or_default();
         let asked = *count;
@@ -134,8 +134,8 @@ impl Inner {
         self.outbox.schedule(now, exchange, sends);
     }
 
-    fn asked(&mut self, now: Instant, id: MotorId, frame: &CanFrame, code: Code) -> Exchange {
-        self.outbox.journal.asked(now, id.number(), code.into(), &show(frame), AT_ONCE)
+    fn record(&mut self, now: Instant, id: MotorId, frame: &CanFrame, code: Code) -> Exchange {
+        self.outbox.journal.record(now, id.number(), code.into(), &show(frame), AT_ONCE)
     }
 
     /// What a motor of the document answers, with a value of its own each time.

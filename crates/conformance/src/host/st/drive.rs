@@ -44,7 +44,7 @@ pub(super) struct Turn {
 
 /// A drive with one motor and a script. Clones are the same drive.
 #[derive(Clone)]
-pub struct Drive(Arc<Mutex<Inner>>);
+pub struct ScriptedDrive(Arc<Mutex<Inner>>);
 
 struct Inner {
     slave: Slave,
@@ -57,8 +57,8 @@ struct Inner {
 
 impl Scenario {
     /// The drive of this scenario, for a host that waits `timeout` for a reply.
-    pub fn drive(&self, timeout: Micros) -> Drive {
-        Drive(Arc::new(Mutex::new(Inner {
+    pub fn drive(&self, timeout: Micros) -> ScriptedDrive {
+        ScriptedDrive(Arc::new(Mutex::new(Inner {
             slave: Slave::new(Profile::Spec, MotorNumber::FIRST),
             engine: Engine::default(),
             incoming: Vec::new(),
@@ -69,7 +69,7 @@ impl Scenario {
     }
 }
 
-impl Drive {
+impl ScriptedDrive {
     fn inner(&self) -> MutexGuard<'_, Inner> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -80,7 +80,7 @@ impl Drive {
     }
 }
 
-impl Station<u8> for Drive {
+impl Station<u8> for ScriptedDrive {
     fn receive(&mut self, now: Instant, bytes: &[u8], reply: &mut Vec<u8>) {
         let mut inner = self.inner();
         for &byte in bytes {
@@ -118,7 +118,7 @@ impl Inner {
         let shown = Hex(&request).to_string();
         self.outbox.journal.heard(now, &shown);
         let motor = MotorNumber::FIRST.number();
-        let exchange = self.outbox.journal.asked(now, motor, 0, &shown, patience);
+        let exchange = self.outbox.journal.record(now, motor, 0, &shown, patience);
         let decoded = match Frame::parse(&request) {
             Parse::Frame(frame, _) => frame.request(Profile::Spec).ok(),
             Parse::More | Parse::Bad(_) => None,
