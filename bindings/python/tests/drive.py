@@ -46,6 +46,8 @@ class Drive:
         self.unanswered = 0
         #: After how many replies it falls silent.
         self.answers: int | None = None
+        #: Whether it sends each reply twice, the second time behind everything else.
+        self.twice = False
         self.heard = b""
         #: What was executed: motor and command.
         self.executed: list[tuple[int, int]] = []
@@ -89,7 +91,7 @@ class Drive:
                 reply = self._reply(request)
                 if self._ends(self.delay()):
                     return
-                os.write(self._line, reply)
+                os.write(self._line, reply * 2 if self.twice else reply)
 
     def _reply(self, request: bytes) -> bytes:
         motor, code, payload = request[0] >> 5, request[0] & 0x1F, request[2:-1]

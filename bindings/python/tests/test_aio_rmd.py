@@ -24,6 +24,8 @@ class Motors:
         self.delay = delay
         #: Replies wait until there are so many.
         self.together = 1
+        #: Whether each reply is sent twice.
+        self.twice = False
         self._replies: list[bytes] = []
         #: What came: ID and command.
         self.heard: list[tuple[int, int]] = []
@@ -69,6 +71,8 @@ class Motors:
             if code in (0x80, 0x81):
                 reply = data
             frame = b"t%03X8%s\r" % (0x140 + id, reply.hex().upper().encode())
+            if self.twice:
+                frame *= 2
             delay = self.delay(id)
             if delay:
                 timer = threading.Timer(delay, self._send, [client, frame])
@@ -109,6 +113,22 @@ def test_exchanges_with_different_motors_overlap(motors: Motors) -> None:
             motors.together = 1
             both = await asyncio.gather(bus.motor(3).motion_status(), bus.motor(3).motion_status())
             assert [answer.speed_dps for answer in both] == [3, 3]
+
+    asyncio.run(asyncio.wait_for(main(), 60))
+
+
+def test_a_reply_that_came_twice_is_not_confirmed(motors: Motors) -> None:
+    async def main() -> None:
+        async with aio.rmd.open(motors.port, timeout=PATIENT) as client:
+            await client.motor(1).motion_status()
+            await client.confirm(1)
+            motors.twice = True
+            await client.motor(1).motion_status()
+            motors.twice = False
+            with pytest.raises(motorlink.LinkError, match="motor 1"):
+                await client.confirm(1)
+            assert (await client.motor(1).motion_status()).speed_dps == 1
+            await asyncio.gather(client.confirm(1), client.motor(1).motion_status(), client.confirm(2))
 
     asyncio.run(asyncio.wait_for(main(), 60))
 

@@ -266,6 +266,23 @@ def test_a_port_that_went_away_is_lost_and_then_opened_again(drive: Drive) -> No
     assert beats > 10
 
 
+def test_a_reply_that_came_twice_is_not_confirmed(drive: Drive) -> None:
+    async def main() -> None:
+        async with aio.st.open(drive.path) as client:
+            motor = client.motor(1)
+            await motor.get("SPEED_REF")
+            await client.confirm()
+            drive.twice = True
+            await motor.get("SPEED_REF")
+            drive.twice = False
+            with pytest.raises(motorlink.LinkError, match="trust"):
+                await client.confirm()
+            assert await motor.get("SPEED_REF") == value(drive.number, 1, REGISTERS["SPEED_REF"])
+            await asyncio.gather(client.confirm(), motor.get("SPEED_REF"), client.confirm())
+
+    asyncio.run(within(60, main()))
+
+
 def test_errors_are_those_of_the_blocking_api(drive: Drive) -> None:
     def blocking() -> list[str]:
         told = []

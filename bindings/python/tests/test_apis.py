@@ -17,9 +17,6 @@ from motorlink._apis import Awaited, Blocking, Exchanges, both_apis
 if TYPE_CHECKING:
     from typing_extensions import assert_type
 
-#: What one API alone has.
-BLOCKING_ONLY = {"confirm"}
-
 PAIRS = [
     (st.Client, aio.st.Client),
     (st.Motor, aio.st.Motor),
@@ -37,7 +34,7 @@ def public(kind: type) -> dict[str, Any]:
 @pytest.mark.parametrize(("blocking", "awaited"), PAIRS)
 def test_both_apis_have_the_same_methods(blocking: type, awaited: type) -> None:
     ours, theirs = public(blocking), public(awaited)
-    assert set(ours) - BLOCKING_ONLY == set(theirs)
+    assert set(ours) == set(theirs)
     coroutines = 0
     for name, method in theirs.items():
         if not inspect.isfunction(method):

@@ -51,6 +51,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT]):
     _torque4: Any
     _scan: Any
     _sample: Any
+    _confirm: Any
 
     def __init__(self, core: Any, *, on_close: str = "stop", stop_on_signals: bool = True):
         super().__init__(core, on_close=on_close, stop_on_signals=stop_on_signals)
@@ -125,6 +126,18 @@ class RmdClient(AnyClient, Generic[MotorT, PortT]):
     def exchange(self, motor: int, request: Request) -> Exchanges[Any]:
         """One exchange with a motor; gives what the reply says."""
         return one(self._exchange(motor, request))
+
+    @both_apis
+    def confirm(self, motor: int = 1) -> Exchanges[None]:
+        """Makes sure that a motor's replies so far went to their own requests, before you rely on what you
+        read: one exchange more. A reply that nobody asked for is ``LinkError``: read again.
+
+        >>> import motorlink
+        >>> with motorlink.rmd.open("sim:") as client:
+        ...     angle = client.motor(1).multi_turn_angle()
+        ...     client.confirm(1)
+        """
+        return one(self._confirm(motor))
 
     @both_apis
     def cycle(self, requests: Mapping[int, Request]) -> Exchanges[dict[int, Any]]:

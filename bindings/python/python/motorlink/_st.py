@@ -33,6 +33,7 @@ class StClient(AnyClient, Generic[MotorT, PortT]):
     _exchange_raw: Any
     _set_verified: Any
     _sample: Any
+    _confirm: Any
 
     def __init__(
         self,
@@ -145,6 +146,18 @@ class StClient(AnyClient, Generic[MotorT, PortT]):
     def exchange(self, motor: int, request: Request) -> Exchanges[Any]:
         """One exchange with a motor; gives what the reply says."""
         return one(self._exchange(motor, request))
+
+    @both_apis
+    def confirm(self) -> Exchanges[None]:
+        """Makes sure that the replies so far went to their own requests, before you rely on what you read: one
+        exchange more. A reply that came twice or late is ``LinkError``: read again.
+
+        >>> import motorlink
+        >>> with motorlink.st.open("sim:") as client:
+        ...     volts = client.motor(1).get("BUS_VOLTAGE")
+        ...     client.confirm()
+        """
+        return one(self._confirm())
 
     @both_apis
     def raw(self, code: int, payload: bytes = b"", *, motor: int = 0) -> Exchanges[bytes]:

@@ -85,18 +85,7 @@ class Client(BlockingClient, RmdClient[Motor, "PortLike | CanPort"]):
     def __init__(self, core: Core, **options: Any):
         super().__init__(core, **options)
         self._exchange, self._cycle, self._torque4 = core.exchange, core.cycle, core.set_torque4
-        self._scan, self._sample = core.scan, core.sample
-
-    def confirm(self, motor: int = 1) -> None:
-        """Makes sure that a motor's replies so far went to their own requests, before you rely on what you read:
-        one exchange more. A reply that nobody asked for is ``LinkError``: read again.
-
-        >>> import motorlink
-        >>> with motorlink.rmd.open("sim:") as client:
-        ...     angle = client.motor(1).multi_turn_angle()
-        ...     client.confirm(1)
-        """
-        self._core.confirm(motor)
+        self._scan, self._sample, self._confirm = core.scan, core.sample, core.confirm
 
 
 open = opens(Client._open)

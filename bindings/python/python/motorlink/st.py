@@ -90,17 +90,7 @@ class Client(BlockingClient, StClient[Motor, PortLike]):
         super().__init__(core, **options)
         self._exchange, self._exchange_raw = core.exchange, core.raw
         self._set_verified, self._sample = core.set_verified, core.sample
-
-    def confirm(self) -> None:
-        """Makes sure that the replies so far went to their own requests, before you rely on what you read: one
-        exchange more. A reply that came twice or late is ``LinkError``: read again.
-
-        >>> import motorlink
-        >>> with motorlink.st.open("sim:") as client:
-        ...     volts = client.motor(1).get("BUS_VOLTAGE")
-        ...     client.confirm()
-        """
-        self._core.confirm()
+        self._confirm = core.confirm
 
 
 open = opens(Client._open)

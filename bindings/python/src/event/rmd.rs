@@ -110,6 +110,19 @@ impl RmdEventClient {
         begun.map_err(|error| rmd_error(py, &error))
     }
 
+    /// What to ask a motor for a confirmation.
+    fn question(&self, py: Python<'_>, id: i64) -> PyResult<RmdRequest> {
+        let id = motor_id(py, id)?;
+        self.driven.step(py, |motors| RmdRequest::for_bytes(motors.bus.question(id)))
+    }
+
+    /// Makes sure, behind the answer to `question`, that a motor's replies went to their own requests.
+    fn confirmed(&self, py: Python<'_>, id: i64) -> PyResult<()> {
+        let id = motor_id(py, id)?;
+        let confirmed = self.driven.step(py, |motors| motors.bus.confirmed(id))?;
+        confirmed.map_err(|error| rmd_error(py, &error))
+    }
+
     /// Begins to look for a motor under an ID; ends in what was found, `None` if nothing.
     fn look_for(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;

@@ -2,7 +2,7 @@
 
 use motorlink::LinkState;
 use motorlink::port::PortName;
-use motorlink::st::{EventClient, Progress};
+use motorlink::st::{Confirmation, EventClient, Progress};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -20,19 +20,42 @@ pub(crate) struct StEventClient {
 
 struct InFlight {
     client: EventClient,
-    /// What was asked, while its exchange is under way; nothing where the reply is wanted as bytes.
-    asked: Option<Py<StRequest>>,
+    asked: Asked,
+}
+
+/// What was asked, while its exchange is under way.
+enum Asked {
+    Request(Py<StRequest>),
+    /// For bytes, or nothing.
+    Raw,
+    Confirmation(Confirmation),
 }
 
 /// A reply that fits its request.
 enum Read {
     Answer(Py<StRequest>, Answer),
     Bytes(Vec<u8>),
+    Confirmed,
 }
 
-fn understand(py: Python<'_>, asked: Option<&Py<StRequest>>, payload: &[u8]) -> Option<Read> {
-    let Some(request) = asked else { return Some(Read::Bytes(payload.to_vec())) };
-    Some(Read::Answer(request.clone_ref(py), request.get().understand(payload)?))
+impl InFlight {
+    fn advance(&mut self, py: Python<'_>) -> Progress<Read> {
+        let InFlight { client, asked } = self;
+        let progress = match asked {
+            Asked::Request(request) => client.advance(|payload| {
+                Some(Read::Answer(request.clone_ref(py), request.get().understand(payload)?))
+            }),
+            Asked::Raw => client.advance(|payload| Some(Read::Bytes(payload.to_vec()))),
+            Asked::Confirmation(confirmation) => match client.advance_confirmation(confirmation) {
+                Progress::Done(result) => Progress::Done(result.map(|()| Read::Confirmed)),
+                Progress::Wait(wait) => Progress::Wait(wait),
+            },
+        };
+        if matches!(progress, Progress::Done(_)) {
+            *asked = Asked::Raw;
+        }
+        progress
+    }
 }
 
 #[pymethods]
@@ -43,7 +66,7 @@ impl StEventClient {
         let name: PortName = port.parse().map_err(|error| invalid_value(py, error))?;
         let client = py.detach(|| EventClient::open(&name, options.0));
         let client = client.map_err(|error| st_error(py, &error))?;
-        let line = InFlight { client, asked: None };
+        let line = InFlight { client, asked: Asked::Raw };
         Ok(StEventClient { driven: Driven::new(line, name.to_string()) })
     }
 
@@ -68,9 +91,9 @@ impl StEventClient {
     fn begin(&self, py: Python<'_>, motor: i64, request: Py<StRequest>) -> PyResult<()> {
         let motor = motor_number(py, motor)?;
         let begun = self.driven.step(py, |line| {
-            line.asked = None;
+            line.asked = Asked::Raw;
             line.client.begin(motor, &request.get().request())?;
-            line.asked = Some(request);
+            line.asked = Asked::Request(request);
             Ok(())
         })?;
         begun.map_err(|error| st_error(py, &error))
@@ -80,8 +103,18 @@ impl StEventClient {
     fn begin_raw(&self, py: Python<'_>, motor: i64, code: i64, payload: &[u8]) -> PyResult<()> {
         let (motor, code) = (motor_number(py, motor)?, frame_code(py, code)?);
         let begun = self.driven.step(py, |line| {
-            line.asked = None;
+            line.asked = Asked::Raw;
             line.client.begin_raw(motor, code, payload)
+        })?;
+        begun.map_err(|error| st_error(py, &error))
+    }
+
+    /// Begins to make sure that the replies so far went to their own requests; its value is `None`.
+    fn begin_confirmation(&self, py: Python<'_>) -> PyResult<()> {
+        let begun = self.driven.step(py, |line| {
+            line.asked = Asked::Raw;
+            line.asked = Asked::Confirmation(line.client.begin_confirmation()?);
+            Ok(())
         })?;
         begun.map_err(|error| st_error(py, &error))
     }
@@ -89,13 +122,7 @@ impl StEventClient {
     /// Moves what can be moved at once. `(True, value)`, or the exception in its place, when the
     /// exchange is over; else `False` and after how many s to go on, `None` while none is under way.
     fn advance(&self, py: Python<'_>) -> PyResult<(bool, Option<Py<PyAny>>)> {
-        let progress = self.driven.step(py, |InFlight { client, asked }| {
-            let progress = client.advance(|payload| understand(py, asked.as_ref(), payload));
-            if matches!(progress, Progress::Done(_)) {
-                *asked = None;
-            }
-            progress
-        })?;
+        let progress = self.driven.step(py, |line| line.advance(py))?;
         let result = match progress {
             Progress::Wait(wait) => {
                 let wait = seconds(wait).map(|wait| wait.into_py_any(py)).transpose()?;
@@ -106,6 +133,7 @@ impl StEventClient {
         let value = result.and_then(|reply| match reply {
             Read::Answer(request, answer) => request.get().value(py, answer),
             Read::Bytes(bytes) => PyBytes::new(py, &bytes).into_py_any(py),
+            Read::Confirmed => Ok(py.None()),
         });
         Ok((true, Some(outcome(py, value))))
     }
@@ -113,7 +141,7 @@ impl StEventClient {
     /// Gives up the exchange that is under way, if there is one.
     fn abandon(&self, py: Python<'_>) -> PyResult<()> {
         self.driven.step(py, |line| {
-            line.asked = None;
+            line.asked = Asked::Raw;
             line.client.abandon();
         })
     }

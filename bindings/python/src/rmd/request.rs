@@ -31,7 +31,7 @@ impl RmdRequest {
     }
 
     /// A command whose reply is wanted as bytes.
-    pub(super) fn for_bytes(data: [u8; 8]) -> Self {
+    pub(crate) fn for_bytes(data: [u8; 8]) -> Self {
         RmdRequest { data, raw: true }
     }
 

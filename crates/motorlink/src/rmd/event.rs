@@ -113,6 +113,21 @@ impl EventClient {
         self.driven.session.set_torque4(now, torques, expect)
     }
 
+    /// What to [`ask`](Self::ask) a motor for a confirmation, as [`Client::confirm`]: another code than the
+    /// last. [`confirmed`](Self::confirmed) says what came of it when that exchange is over.
+    pub fn question(&self, id: MotorId) -> [u8; 8] {
+        self.driven.session.question(id)
+    }
+
+    /// Whether the motor's replies went to their own requests, behind the answer to
+    /// [`question`](Self::question).
+    ///
+    /// # Errors
+    /// [`Error::Unconfirmed`].
+    pub fn confirmed(&mut self, id: MotorId) -> Result<(), Error> {
+        self.driven.session.confirmed(id)
+    }
+
     /// Gives up the exchange with a motor, if there is one. Its reply is not taken for another's.
     pub fn cancel(&mut self, id: MotorId) {
         let now = self.driven.port.now();

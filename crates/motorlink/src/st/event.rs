@@ -29,6 +29,16 @@ pub enum Progress<T> {
     Wait(Option<Duration>),
 }
 
+/// A confirmation that is under way.
+#[derive(Debug)]
+pub struct Confirmation {
+    /// How often the line had been lost before.
+    losses: u32,
+    /// Size of the answer.
+    size: usize,
+    is_repeated: bool,
+}
+
 impl EventClient {
     /// Opens a port, which may wait. So may [`reopen`](Self::reopen), and what begins an exchange while
     /// the port is closed; nothing else does.
@@ -91,6 +101,38 @@ impl EventClient {
     pub fn begin_raw(&mut self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
         let effect = self.driven.session.rules().check_raw(motor, code, payload)?;
         self.driven.begin_raw(motor, code, payload, effect)
+    }
+
+    /// Begins to make sure that the replies so far went to their own requests, as [`Client::confirm`];
+    /// [`advance_confirmation`](Self::advance_confirmation) goes on with it.
+    ///
+    /// # Errors
+    /// Those of [`begin`](Self::begin).
+    pub fn begin_confirmation(&mut self) -> Result<Confirmation, Error> {
+        let (losses, (question, size)) = self.driven.session.question();
+        self.begin(0, &question)?;
+        Ok(Confirmation { losses, size, is_repeated: false })
+    }
+
+    /// Moves a confirmation as far as [`advance`](Self::advance) does an exchange.
+    pub fn advance_confirmation(&mut self, confirmation: &mut Confirmation) -> Progress<()> {
+        loop {
+            let Confirmation { losses, size, is_repeated } = *confirmation;
+            match self.advance(|payload| (payload.len() == size).then_some(())) {
+                Progress::Done(Err(Error::Refused { .. })) if !is_repeated => {
+                    // The refusal may be that of the last request: another question has another answer.
+                    let (_, (question, size)) = self.driven.session.question();
+                    *confirmation = Confirmation { losses, size, is_repeated: true };
+                    if let Err(error) = self.begin(0, &question) {
+                        return Progress::Done(Err(error));
+                    }
+                }
+                Progress::Done(answer) => {
+                    return Progress::Done(self.driven.session.confirmed(losses, answer));
+                }
+                waits => return waits,
+            }
+        }
     }
 
     /// Moves what can be moved without waiting. `reply` reads the acknowledge's payload; `None` from

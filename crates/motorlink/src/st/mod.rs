@@ -36,7 +36,7 @@ pub use motorlink_proto::st::{
 
 pub use client::{BoardInfo, Client, FirmwareVersion};
 pub use error::Error;
-pub use event::{EventClient, Progress};
+pub use event::{Confirmation, EventClient, Progress};
 pub use guard::{StopOnDrop, Stopped};
 pub use limits::{LimitError, Limits};
 pub use motor::Motor;

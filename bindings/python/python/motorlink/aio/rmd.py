@@ -53,15 +53,24 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
 
     async def _exchange(self, motor: int, request: RmdRequest) -> Any:
         async with self._turn(motor):
-            await self._steps.ready()
-            try:
-                self._core.ask(motor, request)
-                answers = self._expect([motor])
-                self._steps.take()
-                await self._steps.turn()
-                return await answers[motor]
-            finally:
-                self._forget([motor])
+            return await self._asked(motor, request)
+
+    async def _confirm(self, motor: int) -> None:
+        async with self._turn(motor):
+            await self._asked(motor, self._core.question(motor))
+            self._core.confirmed(motor)
+
+    async def _asked(self, motor: int, request: RmdRequest) -> Any:
+        """One exchange, in the motor's turn."""
+        await self._steps.ready()
+        try:
+            self._core.ask(motor, request)
+            answers = self._expect([motor])
+            self._steps.take()
+            await self._steps.turn()
+            return await answers[motor]
+        finally:
+            self._forget([motor])
 
     async def _cycle(self, requests: list[tuple[int, RmdRequest]]) -> Any:
         asked = dict(requests)

@@ -62,6 +62,9 @@ class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"]]):
     async def _exchange_raw(self, motor: int, code: int, payload: bytes) -> Any:
         return await self._carry_out(lambda: self._core.begin_raw(motor, code, payload))
 
+    async def _confirm(self) -> None:
+        await self._carry_out(self._core.begin_confirmation)
+
     async def _set_verified(self, motor: int, request: Request, attempts: int) -> Any:
         write = StVerifiedWrite(motor, request, attempts, self._profile)
         attempt = None
