@@ -198,6 +198,7 @@ impl Objects {
         let config = motorlink_st_master_config {
             timeout_us: u32::from(one) << 12,
             quiet_us: u32::from(two) << 8,
+            baud: u32::from(two & 1) * 9600,
             profile: one & 3,
             recovery: two & 3,
         };
@@ -252,6 +253,7 @@ impl Objects {
         let (word, value) = (u16::from(one) << 5, i32::from(one) << 20);
         let phase =
             motorlink_st_revup_phase { speed_rpm: value, torque_s16a: -1, duration_ms: word };
+        let limits = motorlink_st_limits { speed_rpm: value, current_s16a: i32::from(one) - 2 };
         let mut lost = 0;
         // SAFETY: the caller's.
         unsafe {
@@ -281,6 +283,7 @@ impl Objects {
                 17 if one & 1 == 0 => motorlink_st_master_lost(master),
                 17 if one & 2 == 0 => motorlink_st_master_reopened(master),
                 17 => motorlink_st_master_trust_line(master),
+                18 if one & 1 == 0 => motorlink_st_master_set_limits(master, &limits),
                 18 => motorlink_st_master_is_lost(master, &mut lost),
                 19 | 20 => {
                     let heard = &self.heard.bytes;

@@ -151,8 +151,8 @@ int main(int argc, char **argv) {
   }
 
   limits.current_16ma = 100;
-  limits.speed_dps = MOTORLINK_RMD_NO_LIMIT;
-  limits.angle_centidegrees = MOTORLINK_RMD_NO_LIMIT;
+  limits.speed_dps = MOTORLINK_NO_LIMIT;
+  limits.angle_centidegrees = MOTORLINK_NO_LIMIT;
   check(fd, motorlink_rmd_host_set_limits(&host, 2, &limits));
   if (motorlink_rmd_host_request(&host, now_us(), 2, motorlink_rmd_set_torque(101)) !=
       MOTORLINK_ERROR_LIMIT) {

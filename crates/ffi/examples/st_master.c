@@ -70,6 +70,8 @@ int main(int argc, char **argv) {
   uint64_t give_up;
   motorlink_st_output output;
   motorlink_st_board_info info;
+  motorlink_st_master_config config = motorlink_st_master_defaults();
+  motorlink_st_limits limits;
   int fd;
 
   if (argc < 2) {
@@ -77,7 +79,12 @@ int main(int argc, char **argv) {
     return 2;
   }
   fd = open_line(argv[1]);
-  motorlink_st_master_init(&master, sizeof master, NULL);
+  config.baud = 115200; /* as open_line sets it */
+  motorlink_st_master_init(&master, sizeof master, &config);
+  /* Nothing faster is sent, and no start without a ramp before it. */
+  limits.speed_rpm = rpm < 0 ? -rpm : rpm;
+  limits.current_s16a = MOTORLINK_NO_LIMIT;
+  motorlink_st_master_set_limits(&master, &limits);
 
   output = done(fd, "board information", motorlink_st_master_get_board_info(&master, MOTOR));
   if (motorlink_st_decode_board_info(output.bytes.data, output.bytes.size, &info) != MOTORLINK_OK) {

@@ -42,8 +42,8 @@
  * `_poll` conducts: send what it says, hand in what comes, until it says done. It is not over
  * before that is polled, and until then every other request is BUSY. `motor` is 1 to 7, or
  * 0 for the drive's current motor (3.2). BAD_ARGUMENT: `motor` is over 7. BUSY: an exchange is under
- * way. The host of RMD motors has an exchange with each motor, all at once, and limits that the
- * caller may set; a master has none: what it is told is sent.
+ * way. The host of RMD motors has an exchange with each motor, all at once. LIMIT, of both: the request
+ * exceeds a limit that the caller set, for a master with `motorlink_st_master_set_limits`.
  *
  * Numbers with names. Registers, commands, error codes, states and the like have an enum each, and its
  * name is the type in calls: one byte, with -fshort-enums and without, for C and for the library. In C it is
@@ -496,6 +496,11 @@ enum motorlink_rmd_can_id {
 #define MOTORLINK_NEVER UINT64_MAX
 
 /**
+ * In limits: no limit.
+ */
+#define MOTORLINK_NO_LIMIT -1
+
+/**
  * Words of 8 bytes in a `motorlink_st_slave`.
  */
 #define MOTORLINK_ST_SLAVE_WORDS 38
@@ -503,7 +508,7 @@ enum motorlink_rmd_can_id {
 /**
  * Words of 8 bytes in a `motorlink_st_master`.
  */
-#define MOTORLINK_ST_MASTER_WORDS 31
+#define MOTORLINK_ST_MASTER_WORDS 35
 
 /**
  * Words of 8 bytes in a `motorlink_rmd_host`.
@@ -539,11 +544,6 @@ enum motorlink_rmd_can_id {
  * The `id` of no frame, which has no bytes either.
  */
 #define MOTORLINK_NO_FRAME UINT32_MAX
-
-/**
- * In `motorlink_rmd_limits`: no limit beyond the document's range.
- */
-#define MOTORLINK_RMD_NO_LIMIT -1
 
 /**
  * The longest line: a frame of 8 bytes with 29 bits of identifier and a timestamp.
@@ -645,7 +645,7 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_QUARANTINED = 40,
   /**
-   * A limit that the caller set, or the document's range, is exceeded; nothing was sent (RMD).
+   * A limit that the caller set, or the document's range, is exceeded; nothing was sent.
    */
   MOTORLINK_ERROR_LIMIT = 41,
   /**
@@ -841,6 +841,11 @@ typedef struct motorlink_st_master_config {
    */
   uint32_t quiet_us;
   /**
+   * Where the port takes bytes faster than the line carries them, as all ports of computers do: the
+   * line's baud rate. What recovery sends is then on the line before silence begins. 0 adds nothing.
+   */
+  uint32_t baud;
+  /**
    * How the drive behaves.
    */
   motorlink_st_profile profile;
@@ -860,6 +865,31 @@ typedef struct motorlink_st_master {
    */
   uint64_t opaque[MOTORLINK_ST_MASTER_WORDS];
 } motorlink_st_master;
+
+/**
+ * What no request may exceed, whatever function it comes from.
+ *
+ * While `speed_rpm` is set, a motor is started only after a speed ramp to it was acknowledged: else the
+ * drive goes to a speed of its own. The ramp may be `motorlink_st_master_set_ramp` or a write of
+ * RAMP_FINAL_SPEED. It no longer counts after a later ramp that was not acknowledged, after a torque
+ * command, a write of CONTROL_MODE or a RESET, and after the drive identified itself anew or the line
+ * was lost or opened again. Position commands carry no speed and are refused.
+ *
+ * A limit bounds what is asked for. `speed_rpm` does not bound a torque command (the motor turns as fast
+ * as its load allows), speeds of the drive's own (rev-up, alignment, motor profiler), what its
+ * regulator overshoots, a motor that was running before, nor a start after the drive was reset without
+ * a sign on the line.
+ */
+typedef struct motorlink_st_limits {
+  /**
+   * Highest speed in either direction, rpm, or `MOTORLINK_NO_LIMIT`.
+   */
+  int32_t speed_rpm;
+  /**
+   * Highest reference of Iq or Id in either direction, s16A digits, or `MOTORLINK_NO_LIMIT`.
+   */
+  int32_t current_s16a;
+} motorlink_st_limits;
 
 /**
  * Bytes that belong to an object: to be sent or copied before the next call for it.
@@ -1181,21 +1211,21 @@ typedef struct motorlink_rmd_host {
 } motorlink_rmd_host;
 
 /**
- * What a motor may be told, either way round.
+ * What a motor may be told beside the document's range, either way round.
  */
 typedef struct motorlink_rmd_limits {
   /**
-   * Greatest torque current of 0xA1 and 0x280, 0.016 A a digit, or `MOTORLINK_RMD_NO_LIMIT`.
+   * Greatest torque current of 0xA1 and 0x280, 0.016 A a digit, or `MOTORLINK_NO_LIMIT`.
    */
   int32_t current_16ma;
   /**
-   * Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_RMD_NO_LIMIT`. 0xA3 and 0xA5
+   * Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_NO_LIMIT`. 0xA3 and 0xA5
    * carry no speed and are refused while this is set, as are 0xA4 and 0xA6 with 0. A torque
    * command has no speed, and the motor turns as fast as its load allows.
    */
   int32_t speed_dps;
   /**
-   * Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit, or `MOTORLINK_RMD_NO_LIMIT`.
+   * Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit, or `MOTORLINK_NO_LIMIT`.
    */
   int32_t angle_centidegrees;
 } motorlink_rmd_limits;
@@ -1505,7 +1535,7 @@ motorlink_error motorlink_st_decode_segment(const uint8_t *payload,
                                             int32_t *values);
 
 /**
- * The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
+ * The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence, no baud rate.
  */
 struct motorlink_st_master_config motorlink_st_master_defaults(void);
 
@@ -1523,10 +1553,13 @@ motorlink_error motorlink_st_master_init(struct motorlink_st_master *master,
                                          const struct motorlink_st_master_config *config);
 
 /**
- * How long the longest thing that a master sends takes at `baud`, µs. Where the port takes bytes
- * faster than the line carries them, add this to `quiet_us`.
+ * Sets what no request may exceed from the next one on. Ramps that were acknowledged before do not
+ * count for a start any more.
+ *
+ * `BAD_ARGUMENT`: a limit is neither `MOTORLINK_NO_LIMIT` nor 0 and more, of currents 0 to 65535.
  */
-uint64_t motorlink_st_longest_transmission_us(uint32_t baud);
+motorlink_error motorlink_st_master_set_limits(struct motorlink_st_master *master,
+                                               const struct motorlink_st_limits *limits);
 
 /**
  * What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
@@ -1990,7 +2023,7 @@ motorlink_error motorlink_rmd_host_set_times(struct motorlink_rmd_host *host,
 /**
  * Sets what a motor may be told from the next request on.
  *
- * `BAD_ARGUMENT`: `motor` is not 1 to 32, or a limit is neither `MOTORLINK_RMD_NO_LIMIT` nor in
+ * `BAD_ARGUMENT`: `motor` is not 1 to 32, or a limit is neither `MOTORLINK_NO_LIMIT` nor in
  * the range of its kind: 0 to 32767, 0 to 65535, 0 and more.
  */
 motorlink_error motorlink_rmd_host_set_limits(struct motorlink_rmd_host *host,

@@ -3,6 +3,9 @@
 /// The moment of a `WAIT` that only a received byte or frame, or a new request, can end.
 pub const MOTORLINK_NEVER: u64 = u64::MAX;
 
+/// In limits: no limit.
+pub const MOTORLINK_NO_LIMIT: i32 = -1;
+
 /// Bytes that belong to an object: to be sent or copied before the next call for it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]

@@ -52,7 +52,7 @@ pub enum motorlink_error {
     /// The motor did not answer before, or was not asked before, and cannot be trusted yet. Nothing
     /// but a question was sent, unless it was an Off or a Stop. Ask again (RMD).
     Quarantined = 40,
-    /// A limit that the caller set, or the document's range, is exceeded; nothing was sent (RMD).
+    /// A limit that the caller set, or the document's range, is exceeded; nothing was sent.
     Limit = 41,
     /// No reply of this protocol, but one of RMD V3 or V4, or LK-Tech V2.36 (RMD).
     Foreign = 42,
@@ -91,7 +91,7 @@ impl motorlink_error {
             Self::Noise => c"the line does not fall silent",
             Self::WrongReply => c"the reply has no value of a register",
             Self::Quarantined => c"the motor cannot be trusted yet: ask again",
-            Self::Limit => c"beyond a limit of this motor",
+            Self::Limit => c"beyond a limit",
             Self::Foreign => c"the motor answers in another protocol",
             Self::Altered => c"the reply does not repeat the request",
             Self::Echo => c"what was sent came back",

@@ -30,7 +30,7 @@ mod storage;
 mod tag;
 mod version;
 
-pub use bytes::{MOTORLINK_NEVER, motorlink_bytes, motorlink_output};
+pub use bytes::{MOTORLINK_NEVER, MOTORLINK_NO_LIMIT, motorlink_bytes, motorlink_output};
 pub use error::{MOTORLINK_OK, motorlink_error, motorlink_error_text};
 pub use frame::{MOTORLINK_NO_FRAME, motorlink_can_frame};
 pub use number::{

@@ -3,7 +3,7 @@
 /// Words of 8 bytes in a `motorlink_st_slave`.
 pub const MOTORLINK_ST_SLAVE_WORDS: usize = 38;
 /// Words of 8 bytes in a `motorlink_st_master`.
-pub const MOTORLINK_ST_MASTER_WORDS: usize = 31;
+pub const MOTORLINK_ST_MASTER_WORDS: usize = 35;
 /// Words of 8 bytes in a `motorlink_rmd_host`.
 pub const MOTORLINK_RMD_HOST_WORDS: usize = 333;
 /// Words of 8 bytes in a `motorlink_rmd_drive`.

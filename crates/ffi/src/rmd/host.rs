@@ -11,23 +11,21 @@ use super::motorlink_rmd_host;
 use crate::bytes::{MOTORLINK_NEVER, motorlink_output};
 use crate::error::{answer, motorlink_error};
 use crate::frame::{NO_FRAME, motorlink_can_frame};
+use crate::number::limit;
 use crate::pointer::{plain, promised, storage};
 use crate::tag;
 
-/// In `motorlink_rmd_limits`: no limit beyond the document's range.
-pub const MOTORLINK_RMD_NO_LIMIT: i32 = -1;
-
-/// What a motor may be told, either way round.
+/// What a motor may be told beside the document's range, either way round.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct motorlink_rmd_limits {
-    /// Greatest torque current of 0xA1 and 0x280, 0.016 A a digit, or `MOTORLINK_RMD_NO_LIMIT`.
+    /// Greatest torque current of 0xA1 and 0x280, 0.016 A a digit, or `MOTORLINK_NO_LIMIT`.
     pub current_16ma: i32,
-    /// Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_RMD_NO_LIMIT`. 0xA3 and 0xA5
+    /// Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_NO_LIMIT`. 0xA3 and 0xA5
     /// carry no speed and are refused while this is set, as are 0xA4 and 0xA6 with 0. A torque
     /// command has no speed, and the motor turns as fast as its load allows.
     pub speed_dps: i32,
-    /// Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit, or `MOTORLINK_RMD_NO_LIMIT`.
+    /// Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit, or `MOTORLINK_NO_LIMIT`.
     pub angle_centidegrees: i32,
 }
 
@@ -109,7 +107,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_times(
 
 /// Sets what a motor may be told from the next request on.
 ///
-/// `BAD_ARGUMENT`: `motor` is not 1 to 32, or a limit is neither `MOTORLINK_RMD_NO_LIMIT` nor in
+/// `BAD_ARGUMENT`: `motor` is not 1 to 32, or a limit is neither `MOTORLINK_NO_LIMIT` nor in
 /// the range of its kind: 0 to 32767, 0 to 65535, 0 and more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_set_limits(
@@ -117,16 +115,6 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_limits(
     motor: u8,
     limits: *const motorlink_rmd_limits,
 ) -> motorlink_error {
-    fn limit<T: TryFrom<i32> + PartialOrd + Default>(
-        digits: i32,
-    ) -> Result<Option<T>, motorlink_error> {
-        if digits == MOTORLINK_RMD_NO_LIMIT {
-            return Ok(None);
-        }
-        let limit = T::try_from(digits).ok().filter(|limit| *limit >= T::default());
-        limit.map(Some).ok_or(motorlink_error::BadArgument)
-    }
-
     promised!(host, limits);
     answer(|| {
         let limits = limits.read()?;

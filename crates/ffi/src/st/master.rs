@@ -1,15 +1,17 @@
 //! The master's end: one exchange at a time.
 
 use motorlink_proto::st::{
-    ExchangeError, Failure, MAX_PAYLOAD, Master, MasterConfig, Output, Profile, Recovery,
-    RegisterId, SyncState,
+    Account, ExchangeError, Failure, Limits, MAX_PAYLOAD, Master, MasterConfig, Output, Profile,
+    Recovery, RegisterId, SyncState,
 };
 use motorlink_proto::time::{Instant, Micros};
 
 use super::motorlink_st_master;
 use crate::bytes::{MOTORLINK_NEVER, motorlink_bytes, motorlink_output};
 use crate::error::{answer, motorlink_error};
-use crate::number::{motorlink_st_error_code, motorlink_st_profile, motorlink_st_recovery, one_of};
+use crate::number::{
+    limit, motorlink_st_error_code, motorlink_st_profile, motorlink_st_recovery, one_of,
+};
 use crate::pointer::{plain, promised, storage};
 use crate::tag;
 
@@ -21,6 +23,9 @@ pub struct motorlink_st_master_config {
     pub timeout_us: u32,
     /// The silence after which nothing more is expected to come, µs.
     pub quiet_us: u32,
+    /// Where the port takes bytes faster than the line carries them, as all ports of computers do: the
+    /// line's baud rate. What recovery sends is then on the line before silence begins. 0 adds nothing.
+    pub baud: u32,
     /// How the drive behaves.
     pub profile: motorlink_st_profile,
     /// How a lost line comes back.
@@ -49,11 +54,33 @@ pub struct motorlink_st_output {
     pub error_code: motorlink_st_error_code,
 }
 
-plain!(motorlink_st_master_config);
+/// What no request may exceed, whatever function it comes from.
+///
+/// While `speed_rpm` is set, a motor is started only after a speed ramp to it was acknowledged: else the
+/// drive goes to a speed of its own. The ramp may be `motorlink_st_master_set_ramp` or a write of
+/// RAMP_FINAL_SPEED. It no longer counts after a later ramp that was not acknowledged, after a torque
+/// command, a write of CONTROL_MODE or a RESET, and after the drive identified itself anew or the line
+/// was lost or opened again. Position commands carry no speed and are refused.
+///
+/// A limit bounds what is asked for. `speed_rpm` does not bound a torque command (the motor turns as fast
+/// as its load allows), speeds of the drive's own (rev-up, alignment, motor profiler), what its
+/// regulator overshoots, a motor that was running before, nor a start after the drive was reset without
+/// a sign on the line.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct motorlink_st_limits {
+    /// Highest speed in either direction, rpm, or `MOTORLINK_NO_LIMIT`.
+    pub speed_rpm: i32,
+    /// Highest reference of Iq or Id in either direction, s16A digits, or `MOTORLINK_NO_LIMIT`.
+    pub current_s16a: i32,
+}
+
+plain!(motorlink_st_master_config, motorlink_st_limits);
 
 /// What the storage of a master holds.
 pub(crate) struct State {
     pub(super) master: Master,
+    pub(super) account: Account,
     pub(super) profile: Profile,
     /// The register whose value is asked for.
     pub(super) asked: Option<RegisterId>,
@@ -61,13 +88,14 @@ pub(crate) struct State {
 
 storage!(motorlink_st_master: State, tag::ST_MASTER);
 
-/// The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence.
+/// The defaults: profile SPEC, the document's timeout of 1 s, DRAIN, 50 ms of silence, no baud rate.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_st_master_defaults() -> motorlink_st_master_config {
     let MasterConfig { timeout, quiet, profile, recovery } = MasterConfig::default();
     motorlink_st_master_config {
         timeout_us: timeout.0 as u32,
         quiet_us: quiet.0 as u32,
+        baud: 0,
         profile: profile as u8,
         recovery: recovery as u8,
     }
@@ -90,21 +118,42 @@ pub unsafe extern "C" fn motorlink_st_master_init(
     answer(|| {
         let config = config.read_optional()?.unwrap_or_else(|| motorlink_st_master_defaults());
         let profile = one_of(&Profile::ALL, config.profile)?;
-        let config = MasterConfig {
+        let behaviour = MasterConfig {
             timeout: Micros(config.timeout_us.into()),
             recovery: one_of(&Recovery::ALL, config.recovery)?,
             quiet: Micros(config.quiet_us.into()),
             profile,
         };
-        master.init(size, State { master: Master::new(config), profile, asked: None })
+        let behaviour = match config.baud {
+            0 => behaviour,
+            baud => behaviour.at_baud(baud),
+        };
+        let state = State {
+            master: Master::new(behaviour),
+            account: Account::default(),
+            profile,
+            asked: None,
+        };
+        master.init(size, state)
     })
 }
 
-/// How long the longest thing that a master sends takes at `baud`, µs. Where the port takes bytes
-/// faster than the line carries them, add this to `quiet_us`.
+/// Sets what no request may exceed from the next one on. Ramps that were acknowledged before do not
+/// count for a start any more.
+///
+/// `BAD_ARGUMENT`: a limit is neither `MOTORLINK_NO_LIMIT` nor 0 and more, of currents 0 to 65535.
 #[unsafe(no_mangle)]
-pub extern "C" fn motorlink_st_longest_transmission_us(baud: u32) -> u64 {
-    Master::longest_transmission(baud).0
+pub unsafe extern "C" fn motorlink_st_master_set_limits(
+    master: *mut motorlink_st_master,
+    limits: *const motorlink_st_limits,
+) -> motorlink_error {
+    promised!(master, limits);
+    answer(|| {
+        let motorlink_st_limits { speed_rpm, current_s16a } = limits.read()?;
+        let (speed_rpm, current_s16a) = (limit(speed_rpm)?, limit(current_s16a)?);
+        master.enter()?.account.set_limits(Limits { speed_rpm, current_s16a });
+        Ok(())
+    })
 }
 
 /// What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
@@ -119,7 +168,7 @@ pub unsafe extern "C" fn motorlink_st_master_poll(
     answer(|| {
         let place = output.place()?;
         let mut state = master.enter()?;
-        let (asked, profile) = (state.asked, state.profile);
+        let State { master, account, profile, asked } = &mut *state;
         let mut output = motorlink_st_output {
             until_us: MOTORLINK_NEVER,
             bytes: (&[][..]).into(),
@@ -128,7 +177,7 @@ pub unsafe extern "C" fn motorlink_st_master_poll(
             kind: motorlink_output::Wait,
             error_code: 0,
         };
-        match state.master.poll(Instant(now_us)) {
+        match master.poll(Instant(now_us)) {
             Output::Wait(until) => output.until_us = until.map_or(MOTORLINK_NEVER, |at| at.0),
             Output::Transmit(bytes) => {
                 output.kind = motorlink_output::Transmit;
@@ -138,8 +187,9 @@ pub unsafe extern "C" fn motorlink_st_master_poll(
                 output.kind = motorlink_output::Done;
                 match result {
                     Ok(payload) => {
+                        account.acknowledged();
                         output.bytes = payload.into();
-                        match asked.map(|register| register.decode(profile, payload)) {
+                        match asked.map(|register| register.decode(*profile, payload)) {
                             Some(Some(value)) => output.value = value,
                             Some(None) => output.result = motorlink_error::WrongReply,
                             None => {}
@@ -224,7 +274,9 @@ pub unsafe extern "C" fn motorlink_st_master_reopened(
 ) -> motorlink_error {
     promised!(master);
     answer(|| {
-        master.enter()?.master.reopened();
+        let mut state = master.enter()?;
+        state.account.reopened();
+        state.master.reopened();
         Ok(())
     })
 }

@@ -1,8 +1,8 @@
 //! What a master asks: every function begins an exchange.
 
 use motorlink_proto::st::{
-    Command, CurrentReference, Frame, MotorNumber, PositionMove, REVUP_PHASES, Ramp, RegisterId,
-    Request, RequestError, TorqueRamp,
+    Command, CurrentReference, Frame, LimitError, MotorNumber, PositionMove, REVUP_PHASES, Ramp,
+    RegisterId, Request, RequestError, TorqueRamp,
 };
 
 use super::master::State;
@@ -25,7 +25,9 @@ fn request(
 /// Where all requests end. One that is refused changes nothing.
 fn begin(state: &mut State, motor: u8, request: &Request<'_>) -> Result<(), motorlink_error> {
     check_motor(motor)?;
+    let effect = state.account.check(state.master.counters(), motor, request).map_err(limited)?;
     state.master.request(motor, request).map_err(refused)?;
+    state.account.sent(motor, effect);
     state.asked = match request {
         Request::GetRegister(register) => Some(*register),
         _ => None,
@@ -35,6 +37,10 @@ fn begin(state: &mut State, motor: u8, request: &Request<'_>) -> Result<(), moto
 
 fn check_motor(motor: u8) -> Result<(), motorlink_error> {
     if motor <= MotorNumber::MAX { Ok(()) } else { Err(motorlink_error::BadArgument) }
+}
+
+fn limited(_: LimitError) -> motorlink_error {
+    motorlink_error::Limit
 }
 
 fn refused(error: RequestError) -> motorlink_error {
@@ -263,11 +269,14 @@ pub unsafe extern "C" fn motorlink_st_master_raw(
         let payload = payload.slice(size)?;
         let mut state = master.enter()?;
         check_motor(motor)?;
-        let header = Frame::header(code, motor);
-        if header & 0x1F != code {
+        let frame = Frame { header: Frame::header(code, motor), payload };
+        if frame.code() != code {
             return Err(motorlink_error::BadArgument);
         }
-        state.master.request_raw(header, payload).map_err(refused)?;
+        let counters = state.master.counters();
+        let effect = state.account.check_frame(counters, &frame).map_err(limited)?;
+        state.master.request_raw(frame.header, payload).map_err(refused)?;
+        state.account.sent_frame(&frame, effect);
         state.asked = None;
         Ok(())
     })

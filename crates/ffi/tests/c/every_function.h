@@ -21,8 +21,10 @@ static void st_master(motorlink_st_master *master, motorlink_error expected) {
   const motorlink_st_revup_phase phase = {0, 0, 0};
   const uint8_t bytes[4] = {1, 2, 3, 4};
   const motorlink_st_reg registers[1] = {MOTORLINK_ST_REG_STATUS};
+  const motorlink_st_limits limits = {MOTORLINK_NO_LIMIT, 1};
   motorlink_st_output output;
   uint8_t lost;
+  REFUSED(motorlink_st_master_set_limits(master, &limits));
   REFUSED(motorlink_st_master_get_register(master, 1, MOTORLINK_ST_REG_STATUS));
   REFUSED(motorlink_st_master_set_register(master, 1, MOTORLINK_ST_REG_SPEED_KP, 1));
   REFUSED(motorlink_st_master_execute(master, 1, MOTORLINK_ST_COMMAND_STOP_MOTOR));
@@ -59,7 +61,7 @@ static void st_slave(motorlink_st_slave *slave, motorlink_error expected) {
 }
 
 static void rmd_host(motorlink_rmd_host *host, motorlink_error expected) {
-  const motorlink_rmd_limits limits = {MOTORLINK_RMD_NO_LIMIT, 1, 1};
+  const motorlink_rmd_limits limits = {MOTORLINK_NO_LIMIT, 1, 1};
   const int16_t torques[4] = {0, 0, 0, 0};
   const motorlink_can_frame frame = frame_of(0x141, 8);
   motorlink_rmd_output output;

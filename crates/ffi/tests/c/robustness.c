@@ -123,6 +123,7 @@ static void wrong_pointers(void) {
   GIVES(NULL_POINTER, motorlink_st_master_poll(&master, 0, NULL));
   GIVES(NULL_POINTER, motorlink_st_master_receive(&master, 0, NULL, 1));
   GIVES(NULL_POINTER, motorlink_st_master_is_lost(&master, NULL));
+  GIVES(NULL_POINTER, motorlink_st_master_set_limits(&master, NULL));
   GIVES(MISALIGNED, motorlink_st_master_poll(&master, 0, (motorlink_st_output *)(void *)odd));
   OK(motorlink_st_master_receive(&master, 0, NULL, 0));
   OK(motorlink_st_master_raw(&master, 0, MOTORLINK_ST_FRAME_CODE_SET_REG, NULL, 0));
@@ -184,9 +185,10 @@ static void wrong_numbers(void) {
   const int16_t torques[4] = {0, 0, 0, 2001};
   const motorlink_st_revup_phase phase = {0, 0, 0};
   motorlink_st_master_config config = motorlink_st_master_defaults();
+  motorlink_st_limits st_limits = {0, 0};
   motorlink_rmd_drive_config drive_config = {0, 1, 0, 0};
-  motorlink_rmd_limits limits = {MOTORLINK_RMD_NO_LIMIT, MOTORLINK_RMD_NO_LIMIT,
-                                 MOTORLINK_RMD_NO_LIMIT};
+  motorlink_rmd_limits limits = {MOTORLINK_NO_LIMIT, MOTORLINK_NO_LIMIT,
+                                 MOTORLINK_NO_LIMIT};
   motorlink_can_frame frame, reply;
   motorlink_st_board_info info;
   motorlink_st_revup_phase read;
@@ -236,7 +238,25 @@ static void wrong_numbers(void) {
   CHECK(named(motorlink_st_error_code_name(MOTORLINK_ST_ERROR_CODE_WRONG_SET), "WRONG_SET"));
   CHECK(named(motorlink_st_status_name(MOTORLINK_ST_STATUS_RUN), "RUN"));
   CHECK(named(motorlink_st_command_name(MOTORLINK_ST_COMMAND_FAULT_ACK), "FAULT_ACK"));
-  CHECK(motorlink_st_longest_transmission_us(0) > motorlink_st_longest_transmission_us(115200));
+
+  config = motorlink_st_master_defaults();
+  OK(motorlink_st_master_init(&master, sizeof master, &config));
+  OK(motorlink_st_master_get_register(&master, 1, MOTORLINK_ST_REG_STATUS));
+  OK(motorlink_st_master_poll(&master, 0, &output));
+  CHECK(output.kind == MOTORLINK_OUTPUT_WAIT && output.until_us == config.quiet_us);
+  config.baud = 9600;
+  OK(motorlink_st_master_init(&master, sizeof master, &config));
+  OK(motorlink_st_master_get_register(&master, 1, MOTORLINK_ST_REG_STATUS));
+  OK(motorlink_st_master_poll(&master, 0, &output));
+  /* The longest frame and a byte, with 10 bits each. */
+  CHECK(output.kind == MOTORLINK_OUTPUT_WAIT && output.until_us == config.quiet_us + 137500U);
+  st_limits.speed_rpm = -2;
+  GIVES(BAD_ARGUMENT, motorlink_st_master_set_limits(&master, &st_limits));
+  st_limits.speed_rpm = INT32_MAX;
+  st_limits.current_s16a = 65536;
+  GIVES(BAD_ARGUMENT, motorlink_st_master_set_limits(&master, &st_limits));
+  st_limits.current_s16a = 65535;
+  OK(motorlink_st_master_set_limits(&master, &st_limits));
 
   OK(motorlink_rmd_host_init(&host, sizeof host));
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_request(&host, 0, 0, motorlink_rmd_off()));
@@ -251,7 +271,7 @@ static void wrong_numbers(void) {
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 1, &limits));
   limits.current_16ma = -2;
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 1, &limits));
-  limits.current_16ma = MOTORLINK_RMD_NO_LIMIT;
+  limits.current_16ma = MOTORLINK_NO_LIMIT;
   limits.speed_dps = 65536;
   GIVES(BAD_ARGUMENT, motorlink_rmd_host_set_limits(&host, 1, &limits));
   limits.speed_dps = 100;

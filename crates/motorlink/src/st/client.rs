@@ -13,9 +13,9 @@ use motorlink_proto::st::{Counters, MAX_FRAME, MotorNumber, Output, Profile, Req
 use motorlink_proto::time::{self, Instant};
 
 use super::session::{Rules, Session};
-use super::started::{Effect, Started};
 use super::{Error, Options};
 use crate::turn::{Turn, Turns};
+use proto::{Effect, Started};
 
 /// After a pause of this length whatever came unasked is taken note of before the next request: a
 /// byte or so at 115200 baud. In a shorter one hardly anything can come, and looking is a system call.
@@ -309,7 +309,7 @@ impl<L: ByteLink> Driven<L> {
 
     /// Begins an exchange with motor number `motor`.
     pub(super) fn begin(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
-        self.ready_for(Effect::of(Some(request)))?;
+        self.ready_for(Effect::of(request))?;
         self.session.request(motor, request)
     }
 

@@ -1,11 +1,9 @@
 //! Follows what somebody else's master says to a drive: which motors it may have started.
 
 use motorlink_proto::st::{
-    Command, ErrorCode, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Parse, Profile,
-    Request,
+    Command, Effect, ErrorCode, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Parse,
+    Profile, Request, Started,
 };
-
-use super::started::{Effect, Started};
 
 /// Reads along on a line, from the host's bytes and the drive's.
 ///

@@ -18,27 +18,23 @@ mod error;
 mod event;
 pub(crate) mod follow;
 mod guard;
-mod limits;
 mod motor;
 mod options;
-mod ramped;
 mod scan;
 mod session;
-mod started;
 mod transcript;
 
 pub use motorlink_proto::st::{
     Command, ControlMode, Counters, CurrentReference, ErrorCode, Failure, Feature, Features, Flags,
-    FrameCode, MasterConfig, MotorNumber, NoSuchProfile, PositionMove, Profile, REVUP_PHASES, Ramp,
-    Recovery, RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Slave, Status,
-    SyncState, TorqueRamp, VERIFY_ATTEMPTS, register,
+    FrameCode, LimitError, Limits, MasterConfig, MotorNumber, NoSuchProfile, PositionMove, Profile,
+    REVUP_PHASES, Ramp, Recovery, RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS,
+    Slave, Status, SyncState, TorqueRamp, VERIFY_ATTEMPTS, register,
 };
 
 pub use client::{BoardInfo, Client, FirmwareVersion};
 pub use error::Error;
 pub use event::{Confirmation, EventClient, Progress};
 pub use guard::{StopOnDrop, Stopped};
-pub use limits::{LimitError, Limits};
 pub use motor::Motor;
 pub use motorlink_proto::st::{Reading, UnknownRegister, ValueError, find_register, parse_value};
 pub use options::Options;

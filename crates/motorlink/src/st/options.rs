@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use motorlink_link::port::PortName;
 use motorlink_link::reopening::BackOff;
-use motorlink_proto::st::{Master, MasterConfig, Profile, Recovery};
+use motorlink_proto::st::{MasterConfig, Profile, Recovery};
 
 use super::Limits;
 
@@ -29,7 +29,7 @@ impl Options {
     /// What recovery sends has to be out of the port before silence can begin.
     pub(crate) fn on(mut self, port: &PortName) -> Self {
         if let Some(baud) = port.baud() {
-            self.quiet += Duration::from(Master::longest_transmission(baud));
+            self.quiet = self.config().at_baud(baud).quiet.into();
         }
         self
     }

@@ -6,14 +6,13 @@ use std::sync::Arc;
 use motorlink_link::port::PortError;
 use motorlink_proto::st as proto;
 use motorlink_proto::st::{
-    Command, Counters, Frame, FrameCode, MAX_FRAME, MAX_PAYLOAD, Master, MotorNumber, Output,
-    Profile, RegisterId, Request, RequestError, SyncState, question_behind,
+    Account, Command, Counters, Effect, Frame, FrameCode, MAX_FRAME, MAX_PAYLOAD, Master,
+    MotorNumber, Output, Profile, RegisterId, Request, RequestError, Started, SyncState,
+    question_behind,
 };
 use motorlink_proto::time::Instant;
 
 use super::error::{Target, advice, hint};
-use super::ramped::Ramped;
-use super::started::{Effect, Started};
 use super::{Error, LimitError, Limits, Options};
 
 /// What a request is held to before it leaves.
@@ -32,12 +31,7 @@ pub(super) struct Session {
     port: Arc<str>,
     rules: Rules,
     master: Master,
-    /// Motors that were started and not stopped.
-    started: Started,
-    /// Motors that a speed ramp was acknowledged for.
-    ramped: Ramped,
-    /// What the line had been through when a request began.
-    history: History,
+    account: Account,
     pending: PendingRequest,
     /// The size of the last acknowledge's payload, and how often the line had been lost when that was
     /// asked for.
@@ -52,16 +46,10 @@ pub(super) struct Session {
     is_retired: bool,
 }
 
-/// Losses of the line, and identifications that a drive sends when it was reset.
-type History = (u32, u32);
-
 /// The request under way.
 #[derive(Debug, Clone, Copy)]
 struct PendingRequest {
     motor: u8,
-    /// The motor that this addresses, where it is known.
-    addressed: Option<MotorNumber>,
-    effect: Effect,
     what: What,
 }
 
@@ -78,9 +66,7 @@ enum What {
 impl Rules {
     pub(super) fn check(&self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
         addressable(motor)?;
-        self.limits
-            .check(request)
-            .map_err(|why| Error::Limit { motor: Target(motor), exceeded: why })
+        self.limits.check(request).map_err(|why| limited(motor, why))
     }
 
     /// As [`check`](Self::check), for any frame, in every profile; gives its effect.
@@ -92,7 +78,7 @@ impl Rules {
         let frame = Frame { header: Frame::header(code, motor), payload };
         match self.limits.check_frame(&frame) {
             Ok(()) => Ok(Effect::of_frame(&frame)),
-            Err(why) => Err(Error::Limit { motor: Target(motor), exceeded: why }),
+            Err(why) => Err(limited(motor, why)),
         }
     }
 }
@@ -102,15 +88,13 @@ impl Session {
     pub(super) fn new(port: Arc<str>, options: &Options) -> Self {
         let rules = Rules { profile: options.profile, limits: options.limits };
         let what = What::Known(FrameCode::GetBoardInfo);
-        let asked = PendingRequest { motor: 0, addressed: None, effect: Effect::None, what };
+        let asked = PendingRequest { motor: 0, what };
         let master = Master::new(options.config());
         Session {
             port,
             rules,
             master,
-            started: Started::default(),
-            ramped: Ramped::default(),
-            history: History::default(),
+            account: Account::new(options.limits),
             pending: asked,
             last_size: None,
             losses: 0,
@@ -134,7 +118,7 @@ impl Session {
     }
 
     pub(super) fn started(&self) -> Started {
-        self.started
+        self.account.started()
     }
 
     /// Begins an exchange with motor number `motor`, where 0 is the drive's current motor.
@@ -142,11 +126,15 @@ impl Session {
     /// # Errors
     /// What the limits forbid; nothing is sent then.
     pub(super) fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), Error> {
-        self.rules.check(motor, request)?;
-        let effect = Effect::of(Some(request));
-        self.admit(motor, effect, |ahead| Frame::command(motor, request, ahead).map(<[u8]>::len))?;
+        addressable(motor)?;
+        self.check_retired(Effect::of(request))?;
+        let checked = self.account.check(self.master.counters(), motor, request);
+        let effect = checked.map_err(|why| limited(motor, why))?;
+        self.prepare(effect, |ahead| Frame::command(motor, request, ahead).map(<[u8]>::len));
         let begun = self.master.request(motor, request);
-        self.begun(begun, motor, effect, What::of(request))
+        self.begun(begun, motor, What::of(request))?;
+        self.account.sent(motor, effect);
+        Ok(())
     }
 
     /// Begins an exchange with any frame code and payload.
@@ -154,12 +142,15 @@ impl Session {
     /// # Errors
     /// Those of [`request`](Self::request).
     pub(super) fn raw(&mut self, motor: u8, code: u8, payload: &[u8]) -> Result<(), Error> {
-        let effect = self.rules.check_raw(motor, code, payload)?;
+        self.check_retired(self.rules.check_raw(motor, code, payload)?)?;
         let frame = Frame { header: Frame::header(code, motor), payload };
-        self.admit(motor, effect, |ahead| frame.encode(ahead).map(<[u8]>::len))?;
+        let checked = self.account.check_frame(self.master.counters(), &frame);
+        let effect = checked.map_err(|why| limited(motor, why))?;
+        self.prepare(effect, |ahead| frame.encode(ahead).map(<[u8]>::len));
         let begun = self.master.request_raw(frame.header, payload);
-        self.started.presume_within(frame.encode(&mut [0; MAX_FRAME]).unwrap_or(&[]));
-        self.begun(begun, motor, effect, What::Raw(code))
+        self.begun(begun, motor, What::Raw(code))?;
+        self.account.sent_frame(&frame, effect);
+        Ok(())
     }
 
     /// Sends nothing any more but what stops motors.
@@ -174,65 +165,32 @@ impl Session {
         }
     }
 
-    /// Whether a request may leave. On a lost line `encode` writes what stops a motor, which is sent before
-    /// the line has recovered and again afterwards. The reply to the first sending comes before the
-    /// recovery's own reply, so it never counts.
-    fn admit(
+    /// On a lost line `encode` writes what stops a motor, which is sent before the line has recovered and
+    /// again afterwards. The reply to the first sending comes before the recovery's own reply, so it
+    /// never counts.
+    fn prepare(
         &mut self,
-        motor: u8,
         effect: Effect,
         encode: impl FnOnce(&mut [u8; MAX_FRAME]) -> Option<usize>,
-    ) -> Result<(), Error> {
-        self.check_retired(effect)?;
-        self.check_start(motor, effect)?;
+    ) {
         self.ahead_size =
             match effect == Effect::Stops && self.master.sync_state() == SyncState::Lost {
                 true => encode(&mut self.ahead).unwrap_or(0),
                 false => 0,
             };
-        Ok(())
-    }
-
-    /// Whether the request may leave: under a speed limit no motor is started without a ramp.
-    fn check_start(&mut self, motor: u8, effect: Effect) -> Result<(), Error> {
-        let Counters { losses, identifications, .. } = self.master.counters();
-        if self.history != (losses, identifications) {
-            self.history = (losses, identifications);
-            self.forget_drive();
-        }
-        match self.rules.limits.speed_rpm {
-            Some(limit_rpm)
-                if effect == Effect::Starts && !self.ramped.has(self.started.addressed(motor)) =>
-            {
-                Err(Error::Limit {
-                    motor: Target(motor),
-                    exceeded: LimitError::NoRamp { limit_rpm },
-                })
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// The drive may be another one, or have been reset.
-    fn forget_drive(&mut self) {
-        self.ramped.forget();
-        self.started.forget_current();
     }
 
     fn begun(
         &mut self,
         begun: Result<(), RequestError>,
         motor: u8,
-        effect: Effect,
         what: What,
     ) -> Result<(), Error> {
         if begun.is_err() {
             return Err(Error::TooLong(what.to_string()));
         }
         self.losses = self.master.counters().losses;
-        let addressed = self.started.request_sent(motor, effect);
-        self.ramped.request_sent(addressed, effect);
-        self.pending = PendingRequest { motor, addressed, effect, what };
+        self.pending = PendingRequest { motor, what };
         Ok(())
     }
 
@@ -253,13 +211,12 @@ impl Session {
         &mut self,
         outcome: Result<(Option<T>, usize), proto::ExchangeError>,
     ) -> Result<T, Error> {
-        let PendingRequest { motor, addressed, effect, what } = self.pending;
+        let PendingRequest { motor, what } = self.pending;
         self.last_size = outcome.as_ref().ok().map(|(_, size)| *size);
         let (port, target) = (Arc::clone(&self.port), Target(motor));
         match outcome {
             Ok((Some(value), _)) => {
-                self.started.acknowledged(addressed, effect);
-                self.ramped.acknowledged(addressed, effect);
+                self.account.acknowledged();
                 Ok(value)
             }
             Ok((None, size)) => {
@@ -314,7 +271,7 @@ impl Session {
 
     /// Tells that the line was closed and opened again.
     pub(super) fn reopened(&mut self) {
-        self.forget_drive();
+        self.account.reopened();
         self.master.reopened();
     }
 
@@ -347,12 +304,12 @@ impl Session {
 
     /// The drive has no such motor, which may have been taken for started.
     pub(super) fn forget_motor(&mut self, motor: MotorNumber) {
-        self.started.forget_motor(motor);
+        self.account.forget_motor(motor);
     }
 
     /// Takes the line over from another master, which started these motors.
     pub(super) fn take_over(&mut self, started: Started) {
-        self.started = started;
+        self.account.take_over(started);
     }
 }
 
@@ -377,6 +334,10 @@ impl fmt::Display for What {
             What::Raw(code) => write!(f, "frame code {code:#04x}"),
         }
     }
+}
+
+fn limited(motor: u8, why: LimitError) -> Error {
+    Error::Limit { motor: Target(motor), exceeded: why }
 }
 
 /// Motor numbers have three bits.

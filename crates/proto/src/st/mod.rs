@@ -57,20 +57,24 @@
 //! assert_eq!((fan.rpm, &sent[..]), (1500, &[0xF0, 0x00, 0xF0][..]));
 //! ```
 
+mod account;
 mod code;
 mod command;
 mod drive;
 mod failure;
 mod frame;
+mod limits;
 mod master;
 pub mod message;
 mod payload;
 pub mod register;
 mod slave;
+mod started;
 #[cfg(feature = "std")]
 mod value;
 mod verified;
 
+pub use account::Account;
 pub use code::{
     Command, ControlMode, ErrorCode, Flags, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
     NoSuchProfile, Profile, Status,
@@ -78,6 +82,7 @@ pub use code::{
 pub use drive::{MotorControl, MotorNumber};
 pub use failure::{ExchangeError, Failure};
 pub use frame::{Bad, Frame, MAX_FRAME, MAX_PAYLOAD, OVERHEAD, Parse, checksum};
+pub use limits::{LimitError, Limits};
 pub use master::{
     Counters, Master, MasterConfig, Output, Recovery, RequestError, SyncState, TIMEOUT,
     question_behind,
@@ -88,6 +93,7 @@ pub use message::{
 };
 pub use register::{Feature, Features, RegisterId};
 pub use slave::{RECEPTION_TIMEOUT, SEGMENT_REGISTERS, SEGMENTS, Slave};
+pub use started::{Effect, Started};
 #[cfg(feature = "std")]
 pub use value::{Reading, UnknownRegister, ValueError, find_register, parse_value};
 pub use verified::{Unverified, VERIFY_ATTEMPTS, VerifiedWrite, Verifying};

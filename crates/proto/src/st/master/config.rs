@@ -1,5 +1,6 @@
 //! How a master behaves.
 
+use super::question;
 use crate::st::Profile;
 use crate::time::Micros;
 
@@ -42,6 +43,14 @@ pub struct MasterConfig {
 }
 
 impl MasterConfig {
+    /// For a port that takes bytes faster than a line of `baud` carries them, with 10 bits a byte:
+    /// silence begins when the longest thing that recovery sends is out of it.
+    pub const fn at_baud(self, baud: u32) -> Self {
+        let bits = question::PADDING.len() as u64 * 10;
+        let sent = bits * 1_000_000 / if baud == 0 { 1 } else { baud as u64 };
+        MasterConfig { quiet: Micros(self.quiet.0.saturating_add(sent)), ..self }
+    }
+
     /// The longest that an exchange can take, however the line behaves, beside the time in which the
     /// port takes what is sent: the reply's timeout on a line that is up. On a lost line there come
     /// before it silence, as long as may be waited for it, before and behind the questions, and the

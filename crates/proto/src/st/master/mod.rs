@@ -15,7 +15,7 @@ pub use question::question_behind;
 pub use resync::SyncState;
 
 use super::{ExchangeError, Failure, Frame, FrameCode, Profile, Request};
-use crate::time::{Instant, Micros};
+use crate::time::Instant;
 use exchange::{Exchange, Received};
 use resync::{Resync, Stage, Step, Summary};
 
@@ -94,13 +94,6 @@ impl Master {
             resync: Resync::new(matches!(config.recovery, Recovery::None)),
             counters: Counters { unasked_bytes: 0, identifications: 0, losses: 0 },
         }
-    }
-
-    /// How long the longest thing that a master sends takes at `baud`, with 10 bits a byte. A caller
-    /// whose port takes bytes faster than the line carries them adds this to [`MasterConfig::quiet`].
-    pub const fn longest_transmission(baud: u32) -> Micros {
-        let bits = question::PADDING.len() as u64 * 10;
-        Micros(bits * 1_000_000 / if baud == 0 { 1 } else { baud as u64 })
     }
 
     /// Whether the line can be used.

@@ -1,18 +1,19 @@
 //! Which motors were started and not stopped, as far as requests and replies tell.
 
-use motorlink_proto::st::{
-    Command, Frame, FrameCode, MotorNumber, Parse, Profile, RegisterId, Request,
-};
+use super::{Command, Frame, FrameCode, MotorNumber, Parse, Profile, RegisterId, Request};
 
 /// Every motor that a drive can have.
 const ALL: u8 = 0x7F;
 
 /// What a request does to the accounts of started motors and of their setpoints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Effect {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Effect {
+    /// Nothing that counts.
+    #[default]
     None,
     /// It may set a motor turning until it is stopped. An alignment ends by itself.
     Starts,
+    /// It stops a motor.
     Stops,
     /// Motor number 0 addresses another motor from now on.
     Retargets,
@@ -25,15 +26,16 @@ pub(super) enum Effect {
 }
 
 impl Effect {
-    pub(super) fn of(request: Option<&Request<'_>>) -> Self {
+    /// What a request does.
+    pub fn of(request: &Request<'_>) -> Self {
         match request {
-            Some(Request::ExecuteCommand(command)) => match command {
+            Request::ExecuteCommand(command) => match command {
                 Command::StartMotor | Command::StartStop | Command::ScStart => Effect::Starts,
                 Command::StopMotor | Command::ScStop => Effect::Stops,
                 Command::Reset => Effect::Resets,
                 _ => Effect::None,
             },
-            Some(Request::SetRegister { register, .. }) => match *register {
+            Request::SetRegister { register, .. } => match *register {
                 RegisterId::TARGET_MOTOR => Effect::Retargets,
                 RegisterId::RAMP_FINAL_SPEED => Effect::Ramps,
                 // A change of mode may bring a reference of the drive's own.
@@ -42,23 +44,22 @@ impl Effect {
                 }
                 _ => Effect::None,
             },
-            Some(Request::SetRamp(_)) => Effect::Ramps,
-            Some(
-                Request::SetCurrentReference(_)
-                | Request::SetTorqueRamp(_)
-                | Request::SetPosition(_),
-            ) => Effect::Supersedes,
+            Request::SetRamp(_) => Effect::Ramps,
+            Request::SetCurrentReference(_)
+            | Request::SetTorqueRamp(_)
+            | Request::SetPosition(_) => Effect::Supersedes,
             _ => Effect::None,
         }
     }
 
     /// What a raw frame does in the profile in which it does something.
-    pub(super) fn of_frame(frame: &Frame<'_>) -> Self {
+    pub fn of_frame(frame: &Frame<'_>) -> Self {
         let code = |profile| FrameCode::from_number(frame.code(), profile);
         let effects = Profile::ALL.map(|profile| match frame.request(profile) {
             // Shipped firmware takes an old byte for the command (docs/SPEC-NOTES.md S18).
             Err(_) if code(profile) == Some(FrameCode::ExecuteCmd) => Effect::Starts,
-            request => Effect::of(request.ok().as_ref()),
+            Ok(request) => Effect::of(&request),
+            Err(_) => Effect::None,
         });
         effects.into_iter().find(|effect| *effect != Effect::None).unwrap_or(Effect::None)
     }
@@ -67,7 +68,7 @@ impl Effect {
 /// A motor counts as started from the START on, whose reply may be lost, and until a STOP is
 /// acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Started {
+pub struct Started {
     /// Bit n: motor n + 1.
     motors: u8,
     /// What motor number 0 addresses; `None` while that is not known.
@@ -80,7 +81,7 @@ pub(crate) struct Started {
 impl Started {
     /// A request for motor number `motor` leaves. Gives the motor that it addresses, where that is
     /// known, for [`acknowledged`](Self::acknowledged).
-    pub(super) fn request_sent(&mut self, motor: u8, effect: Effect) -> Option<MotorNumber> {
+    pub fn request_sent(&mut self, motor: u8, effect: Effect) -> Option<MotorNumber> {
         if motor != 0 || matches!(effect, Effect::Retargets | Effect::Resets) {
             self.before_zero = None;
         }
@@ -98,8 +99,8 @@ impl Started {
         MotorNumber::new(motor).or(self.current)
     }
 
-    /// The request that was [`asked`](Self::asked) last was acknowledged.
-    pub(super) fn acknowledged(&mut self, addressed: Option<MotorNumber>, effect: Effect) {
+    /// The request that was [`sent`](Self::request_sent) last was acknowledged.
+    pub fn acknowledged(&mut self, addressed: Option<MotorNumber>, effect: Effect) {
         match effect {
             Effect::Retargets | Effect::Resets => return,
             Effect::Stops => {
@@ -115,7 +116,7 @@ impl Started {
 
     /// Takes motor number `motor` for started. For number 0 that is every motor: a drive whose supply
     /// failed for a moment has another current motor than before.
-    pub(super) fn presume(&mut self, motor: u8) {
+    pub fn presume(&mut self, motor: u8) {
         if let Some(motor) = MotorNumber::new(motor) {
             self.motors |= bit(motor);
         } else {
@@ -127,12 +128,14 @@ impl Started {
     /// Takes for started what a START in `bytes` addresses, wherever it stands: shipped firmware
     /// reads the payload of the longest frame as frames (docs/SPEC-NOTES.md S10).
     pub(super) fn presume_within(&mut self, bytes: &[u8]) {
-        for begin in 0..bytes.len() {
-            if let Parse::Frame(frame, _) = Frame::parse(&bytes[begin..])
+        let mut rest = bytes;
+        while let [_, behind @ ..] = rest {
+            if let Parse::Frame(frame, _) = Frame::parse(rest)
                 && Effect::of_frame(&frame) == Effect::Starts
             {
                 self.presume(frame.motor());
             }
+            rest = behind;
         }
     }
 
@@ -142,15 +145,17 @@ impl Started {
     }
 
     /// Says that the drive's current motor is not known.
-    pub(super) fn forget_current(&mut self) {
+    pub fn forget_current(&mut self) {
         (self.current, self.before_zero) = (None, None);
     }
 
-    pub(crate) fn is_empty(self) -> bool {
+    /// Whether no motor counts as started.
+    pub fn is_empty(self) -> bool {
         self.motors == 0
     }
 
-    pub(crate) fn motors(self) -> impl Iterator<Item = MotorNumber> {
+    /// The motors that count as started.
+    pub fn motors(self) -> impl Iterator<Item = MotorNumber> {
         (1..=MotorNumber::MAX)
             .filter_map(MotorNumber::new)
             .filter(move |motor| self.motors & bit(*motor) != 0)

@@ -1,6 +1,8 @@
 //! Limits that the caller sets; they are checked before a frame leaves.
 
-use motorlink_proto::st::{Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Request};
+use core::fmt;
+
+use super::{Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Request};
 
 /// What no request may exceed, whatever call or raw frame it comes from. `None` is unlimited.
 ///
@@ -13,8 +15,7 @@ use motorlink_proto::st::{Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Re
 /// A limit bounds what is asked for. `speed_rpm` does not bound:
 /// * a torque command: the motor then turns as fast as its load allows;
 /// * the rev-up of a drive without sensor, its alignment, and the motor profiler (SC_START), whose
-///   speeds are the drive's own. [`Motor::set_revup_data`](super::Motor::set_revup_data) sets the
-///   rev-up's;
+///   speeds are the drive's own. [`Request::SetRevupData`] sets the rev-up's;
 /// * what the drive's regulator overshoots, and a motor that was running before;
 /// * a start after the drive was reset without a sign on the line, as a power cycle between the ramp
 ///   and the start can be.
@@ -27,14 +28,10 @@ pub struct Limits {
 }
 
 /// A request that does not keep the limits; it was not sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LimitError {
     /// It exceeds a limit.
-    #[error(
-        "{value} {unit} is over the limit of {limit} {unit} that was set; nothing was sent; ask for \
-         {limit} {unit} at most"
-    )]
     Exceeded {
         /// What was asked for.
         value: i64,
@@ -44,40 +41,19 @@ pub enum LimitError {
         unit: &'static str,
     },
     /// It writes a part of a limited register, the rest of which is not known.
-    #[error(
-        "a part of {0} cannot be written while it is limited; nothing was sent; write the whole \
-         value"
-    )]
     Part(RegisterId),
     /// It is too short for the values that are limited; shipped firmware takes old bytes for the
     /// missing ones (docs/SPEC-NOTES.md S18).
-    #[error(
-        "the payload is too short for {}, whose values are limited; nothing was sent; send all of \
-         its bytes", .0.name()
-    )]
     Short(FrameCode),
     /// Its payload has 128 bytes, which shipped firmware reads as further frames
     /// (docs/SPEC-NOTES.md S10).
-    #[error(
-        "shipped firmware reads a payload of 128 bytes as further frames, which cannot be limited; \
-         nothing was sent; send 127 bytes at most"
-    )]
     Longest,
     /// A position command carries no speed.
-    #[error(
-        "a position command carries no speed to hold to the limit of {limit_rpm} rpm that was set; \
-         nothing was sent; use speed ramps, or set no speed limit"
-    )]
     Position {
         /// What the caller allows.
         limit_rpm: u32,
     },
     /// It starts a motor that may go to any speed.
-    #[error(
-        "a start goes to the drive's own speed unless a ramp within the limit of {limit_rpm} rpm was \
-         acknowledged before; nothing was sent; first `ramp(...)` within the limit, for this motor \
-         by its number"
-    )]
     NoRamp {
         /// What the caller allows.
         limit_rpm: u32,
@@ -85,7 +61,8 @@ pub enum LimitError {
 }
 
 impl Limits {
-    /// Whether `request` keeps the limits. Whether a start had its ramp is checked by the client.
+    /// Whether `request` keeps the limits. [`Account::check`](super::Account::check)
+    /// tells whether a start had its ramp.
     ///
     /// # Errors
     /// Why it does not.
@@ -105,10 +82,12 @@ impl Limits {
                 self.speed_rpm.map_or(Ok(()), |limit_rpm| Err(LimitError::Position { limit_rpm }))
             }
             Request::SetRegister { register, value } => {
-                self.size(value.len() + 1)?;
+                self.size(value.len().saturating_add(1))?;
                 self.write(register, value)
             }
-            Request::ConfigureSegment { registers, .. } => self.size(registers.len() + 1),
+            Request::ConfigureSegment { registers, .. } => {
+                self.size(registers.len().saturating_add(1))
+            }
             Request::GetProfilerInfo(steps) => self.size(steps.len()),
             _ => Ok(()),
         }
@@ -187,10 +166,50 @@ fn within(value: i32, limit: Option<u32>, unit: &'static str) -> Result<(), Limi
     }
 }
 
+impl fmt::Display for LimitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LimitError::Exceeded { value, limit, unit } => write!(
+                f,
+                "{value} {unit} is over the limit of {limit} {unit} that was set; nothing was sent; ask \
+                 for {limit} {unit} at most"
+            ),
+            LimitError::Part(register) => write!(
+                f,
+                "a part of {register} cannot be written while it is limited; nothing was sent; write the \
+                 whole value"
+            ),
+            LimitError::Short(code) => write!(
+                f,
+                "the payload is too short for {}, whose values are limited; nothing was sent; send all of \
+                 its bytes",
+                code.name()
+            ),
+            LimitError::Longest => f.write_str(
+                "shipped firmware reads a payload of 128 bytes as further frames, which cannot be \
+                 limited; nothing was sent; send 127 bytes at most",
+            ),
+            LimitError::Position { limit_rpm } => write!(
+                f,
+                "a position command carries no speed to hold to the limit of {limit_rpm} rpm that was \
+                 set; nothing was sent; use speed ramps, or set no speed limit"
+            ),
+            LimitError::NoRamp { limit_rpm } => write!(
+                f,
+                "a start goes to the drive's own speed unless a ramp within the limit of {limit_rpm} rpm \
+                 was acknowledged before; nothing was sent; first `ramp(...)` within the limit, for this \
+                 motor by its number"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for LimitError {}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use motorlink_proto::st::{CurrentReference, PositionMove, Ramp, TorqueRamp};
+    use crate::st::{CurrentReference, PositionMove, Ramp, TorqueRamp};
 
     const SPEED: Limits = Limits { speed_rpm: Some(1000), current_s16a: None };
     const CURRENT: Limits = Limits { speed_rpm: None, current_s16a: Some(500) };

@@ -1,0 +1,219 @@
+//! What a master may send, and what came of it.
+
+use super::started::bit;
+use super::{
+    Counters, Effect, Frame, LimitError, Limits, MAX_FRAME, MotorNumber, Request, Started,
+};
+
+/// The limits of a master's caller, the motors that it started, and those that go to a speed which it
+/// commanded.
+///
+/// [`check`](Self::check) or [`check_frame`](Self::check_frame) before a master takes a request,
+/// [`sent`](Self::sent) when it has, [`acknowledged`](Self::acknowledged) when the drive did it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Account {
+    limits: Limits,
+    started: Started,
+    /// Motors whose last setpoint is a speed ramp that was acknowledged. Bit n: motor n + 1.
+    ramped: u8,
+    /// Losses of the line and identifications, which a drive sends when it was reset, when a request
+    /// began.
+    history: (u32, u32),
+    /// What the request under way does, and to which motor, where that is known.
+    effect: Effect,
+    addressed: Option<MotorNumber>,
+}
+
+impl Account {
+    /// Nothing was sent yet.
+    pub fn new(limits: Limits) -> Self {
+        Account { limits, ..Account::default() }
+    }
+
+    /// Sets other limits from the next request on. Ramps count no longer: they kept the former ones.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.limits = limits;
+        self.ramped = 0;
+        self.effect = Effect::None;
+    }
+
+    /// The motors that were started and not stopped.
+    pub const fn started(&self) -> Started {
+        self.started
+    }
+
+    /// Takes these motors for started.
+    pub const fn take_over(&mut self, started: Started) {
+        self.started = started;
+    }
+
+    /// Whether a request for motor number `motor` may leave, on a line that has seen this; gives what
+    /// it does. Under a speed limit no motor is started without a ramp.
+    ///
+    /// # Errors
+    /// The limit that it does not keep.
+    pub fn check(
+        &mut self,
+        seen: Counters,
+        motor: u8,
+        request: &Request<'_>,
+    ) -> Result<Effect, LimitError> {
+        self.limits.check(request)?;
+        self.check_start(seen, motor, Effect::of(request))
+    }
+
+    /// As [`check`](Self::check), for any frame, in every profile.
+    ///
+    /// # Errors
+    /// The limit that it does not keep.
+    pub fn check_frame(&mut self, seen: Counters, frame: &Frame<'_>) -> Result<Effect, LimitError> {
+        self.limits.check_frame(frame)?;
+        self.check_start(seen, frame.motor(), Effect::of_frame(frame))
+    }
+
+    fn check_start(
+        &mut self,
+        seen: Counters,
+        motor: u8,
+        effect: Effect,
+    ) -> Result<Effect, LimitError> {
+        let history = (seen.losses, seen.identifications);
+        if self.history != history {
+            self.history = history;
+            self.reopened();
+        }
+        let has_ramp =
+            || self.started.addressed(motor).is_some_and(|motor| self.ramped & bit(motor) != 0);
+        match self.limits.speed_rpm {
+            Some(limit_rpm) if effect == Effect::Starts && !has_ramp() => {
+                Err(LimitError::NoRamp { limit_rpm })
+            }
+            _ => Ok(effect),
+        }
+    }
+
+    /// A master has taken the request for motor number `motor` that does this. Unless the drive
+    /// acknowledges a ramp, its setpoint may have changed or not.
+    pub fn sent(&mut self, motor: u8, effect: Effect) {
+        self.effect = effect;
+        self.addressed = self.started.request_sent(motor, effect);
+        match effect {
+            Effect::Ramps | Effect::Supersedes => {
+                self.ramped &= !self.addressed.map_or(u8::MAX, bit);
+            }
+            Effect::Resets => self.ramped = 0,
+            _ => {}
+        }
+    }
+
+    /// As [`sent`](Self::sent), for any frame.
+    pub fn sent_frame(&mut self, frame: &Frame<'_>, effect: Effect) {
+        self.started.presume_within(frame.encode(&mut [0; MAX_FRAME]).unwrap_or(&[]));
+        self.sent(frame.motor(), effect);
+    }
+
+    /// The request that was sent last was acknowledged.
+    pub fn acknowledged(&mut self) {
+        self.started.acknowledged(self.addressed, self.effect);
+        if self.effect == Effect::Ramps {
+            self.ramped |= self.addressed.map_or(0, bit);
+        }
+    }
+
+    /// The drive may be another one, or have been reset: its setpoints and its current motor are not
+    /// known.
+    pub fn reopened(&mut self) {
+        self.ramped = 0;
+        self.started.forget_current();
+    }
+
+    /// The drive has no such motor, which may have been taken for started.
+    pub fn forget_motor(&mut self, motor: MotorNumber) {
+        self.started.forget_motor(motor);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::st::{Command, CurrentReference, Ramp};
+
+    const LIMITS: Limits = Limits { speed_rpm: Some(1000), current_s16a: None };
+    const START: Request<'_> = Request::ExecuteCommand(Command::StartMotor);
+    const RAMP: Request<'_> = Request::SetRamp(Ramp { speed_rpm: 1000, duration_ms: 0 });
+    const NEW: Counters = Counters { unasked_bytes: 0, identifications: 0, losses: 0 };
+
+    fn done(account: &mut Account, motor: u8, request: &Request<'_>) {
+        let effect = account.check(NEW, motor, request).unwrap();
+        account.sent(motor, effect);
+        account.acknowledged();
+    }
+
+    fn starts(account: &mut Account, motor: u8) -> bool {
+        match account.check(NEW, motor, &START) {
+            Ok(effect) => effect == Effect::Starts,
+            Err(why) => {
+                assert_eq!(why, LimitError::NoRamp { limit_rpm: 1000 });
+                false
+            }
+        }
+    }
+
+    #[test]
+    fn a_start_needs_an_acknowledged_ramp_of_its_motor() {
+        let mut account = Account::new(LIMITS);
+        assert!(!starts(&mut account, 1));
+        done(&mut account, 1, &RAMP);
+        assert!(starts(&mut account, 1) && !starts(&mut account, 2));
+        // It addresses the motor of the last acknowledged request.
+        assert!(starts(&mut account, 0));
+        account.sent(1, Effect::Ramps);
+        assert!(!starts(&mut account, 1), "a ramp that is not acknowledged");
+        let torque = CurrentReference { iq_s16a: 1, id_s16a: 0 };
+        done(&mut account, 1, &RAMP);
+        done(&mut account, 1, &Request::SetCurrentReference(torque));
+        assert!(!starts(&mut account, 1));
+        done(&mut account, 1, &Request::ExecuteCommand(Command::StopMotor));
+        assert!(Account::default().check(NEW, 1, &START).is_ok());
+    }
+
+    #[test]
+    fn a_ramp_does_not_count_on_another_line_or_for_another_drive() {
+        for seen in [Counters { losses: 1, ..NEW }, Counters { identifications: 1, ..NEW }] {
+            let mut account = Account::new(LIMITS);
+            done(&mut account, 1, &RAMP);
+            assert!(account.check(seen, 1, &START).is_err());
+        }
+        let mut account = Account::new(LIMITS);
+        done(&mut account, 1, &RAMP);
+        account.reopened();
+        assert!(!starts(&mut account, 1));
+    }
+
+    #[test]
+    fn a_ramp_does_not_count_under_limits_that_were_set_later() {
+        let mut account = Account::new(Limits::default());
+        let fast = Request::SetRamp(Ramp { speed_rpm: 5000, duration_ms: 0 });
+        done(&mut account, 1, &fast);
+        account.set_limits(LIMITS);
+        assert!(!starts(&mut account, 1));
+
+        account.set_limits(Limits::default());
+        let effect = account.check(NEW, 1, &fast).unwrap();
+        account.sent(1, effect);
+        account.set_limits(LIMITS);
+        account.acknowledged();
+        assert!(!starts(&mut account, 1));
+    }
+
+    #[test]
+    fn a_start_counts_until_its_stop_is_acknowledged() {
+        let mut account = Account::default();
+        let motors = |account: &Account| account.started().motors().count();
+        account.sent(2, Effect::Starts);
+        account.sent(2, Effect::Stops);
+        assert_eq!(motors(&account), 1);
+        account.acknowledged();
+        assert_eq!(motors(&account), 0);
+    }
+}
