@@ -46,6 +46,14 @@ def children():
         process.communicate()
 
 
+def plain(line):
+    """The values of a line of JSON as numbers, or as names where they are bits."""
+    return {
+        name: value.get("names", value.get("value", value.get("digits")))
+        for name, value in line["values"].items()
+    }
+
+
 @dataclass
 class Outcome:
     """How a run of the program ended."""
@@ -65,10 +73,15 @@ class Outcome:
         (value,) = self.lines
         return value
 
+    @property
+    def values(self):
+        """The values of output that is one line of JSON."""
+        return plain(self.json)
+
     def ended(self, code):
         """Checks the exit code; gives the outcome back."""
         assert self.code == code, f"exit code {self.code}, not {code}\n{self.out}\n{self.err}"
-        assert (code == 0) == ("error:" not in self.err), self.err
+        assert (code == 0) == ("error:" not in self.err and '"exit":' not in self.err), self.err
         assert "panicked" not in self.err, self.err
         return self
 

@@ -8,8 +8,8 @@ from peers import device, noise, slcan_adapter
 from program import eventually
 
 PORTS = ["slcan", "slcan:tcp", "sim"]
-OK = {"ok": True}
 MOTION = {"temperature", "iq", "speed", "encoder"}
+ANGLES = {"multi_turn_angle", "single_turn_angle"}
 GAINS = ["position_kp", "position_ki", "speed_kp", "speed_ki", "torque_kp", "torque_ki"]
 SHIPPED_GAINS = "100 100 100 100 100 100"
 
@@ -34,9 +34,9 @@ on_every_port = pytest.mark.parametrize("rmd", PORTS, indirect=True)
 @on_every_port
 def test_scan_finds_the_motors(rmd):
     found = rmd("--json", "scan", 1, 2, 3, 4).ended(0).lines
-    assert [motor["id"] for motor in found] == [1, 2, 3, 4]
-    assert set(found[0]) == {"id", "protocol", "voltage", "temperature", "errors"}
-    assert found[0]["protocol"] == "V1.62"
+    assert [motor["motor"] for motor in found] == [1, 2, 3, 4]
+    assert set(found[0]["values"]) == {"voltage", "temperature", "errors"}
+    assert found[0]["dialect"] == "V1.62"
     assert "motor 1 " in rmd("scan", 1).ended(0).out
 
 
@@ -45,44 +45,44 @@ def test_scan_asks_all_32_ids(run, sim, tmp_path):
     config.write_text("[[rmd.motor]]\nid = 7\n[[rmd.motor]]\nid = 32\n")
     port = sim(config, st=()).port("slcan")
     found = on(run, port)("--json", "scan").ended(0).lines
-    assert [motor["id"] for motor in found] == [7, 32]
+    assert [motor["motor"] for motor in found] == [7, 32]
 
 
 @on_every_port
 def test_status_tells_everything_about_a_motor(rmd):
-    status = rmd("-i", 4, "--json", "status").ended(0).json
+    shown = rmd("-i", 4, "--json", "status").ended(0)
+    status = shown.values
     assert set(status) == MOTION | {
-        *("id", "voltage", "errors", "phase_a", "phase_b", "phase_c", "multi_turn_angle", "single_turn_angle")
+        *("voltage", "errors", "phase_a", "phase_b", "phase_c", "multi_turn_angle", "single_turn_angle")
     }
-    assert (status["id"], status["voltage"], status["errors"]) == (4, 24.0, [])
+    assert (shown.json["motor"], status["voltage"], status["errors"]) == (4, 24.0, [])
     assert "24.0 V" in rmd("-i", 4, "status").ended(0).out
 
 
 def test_raw_values_are_digits(rmd):
-    assert rmd("-i", 4, "--json", "--raw", "status").ended(0).json["voltage"] == 240
+    assert rmd("-i", 4, "--json", "--raw", "status").ended(0).values["voltage"] == 240
 
 
 @on_every_port
 def test_what_is_read_has_its_keys(rmd):
-    assert list(rmd("-i", 4, "--json", "pid").ended(0).json) == GAINS
-    assert set(rmd("-i", 4, "--json", "accel").ended(0).json) == {"acceleration"}
-    assert set(rmd("-i", 4, "--json", "encoder").ended(0).json) == {
-        *("position", "raw", "offset")
-    }
-    assert set(rmd("-i", 4, "--json", "angle").ended(0).json) == {"multi_turn_angle", "single_turn_angle"}
+    assert list(rmd("-i", 4, "--json", "pid").ended(0).values) == GAINS
+    assert set(rmd("-i", 4, "--json", "accel").ended(0).values) == {"acceleration"}
+    assert set(rmd("-i", 4, "--json", "encoder").ended(0).values) == {"position", "raw", "offset"}
+    assert set(rmd("-i", 4, "--json", "angle").ended(0).values) == ANGLES
     for command in ("pid", "accel", "encoder", "angle"):
         assert rmd("-i", 4, command).ended(0).out
 
 
 def test_angle_reads_again_and_again(rmd):
     readings = rmd("--json", "angle", "--every", "10ms", "--count", 4).ended(0).lines
-    assert [set(reading) for reading in readings] == [{"t", "multi_turn_angle", "single_turn_angle"}] * 4
+    assert [set(reading["values"]) for reading in readings] == [ANGLES] * 4
+    assert readings[0]["t"] < readings[-1]["t"]
 
 
 @on_every_port
 def test_raw_sends_eight_bytes(rmd):
     answer = rmd("-i", 4, "--json", "raw", "9a").ended(0).json
-    assert answer == {"ok": True, "data": "9a 19 00 f0 00 00 00 00"}
+    assert (answer["ok"], answer["data"]) == (True, "9a 19 00 f0 00 00 00 00")
     assert rmd("-i", 4, "raw", "9A", "1", "2").ended(0).out == "9a 19 00 f0 00 00 00 00\n"
 
 
@@ -101,7 +101,7 @@ def test_trace_shows_both_directions_on_stderr(rmd):
 @pytest.mark.parametrize("command", ["off", "stop", "run", f"pid {SHIPPED_GAINS}", "accel 9"])
 def test_what_is_done_is_said(rmd, command):
     assert rmd("-i", 2, *command.split()).ended(0).out.startswith("motor 2")
-    assert rmd("-i", 2, "--json", *command.split()).ended(0).json == OK
+    assert rmd("-i", 2, "--json", *command.split()).ended(0).json["ok"] is True
 
 
 @on_every_port
@@ -119,7 +119,7 @@ def test_what_is_done_is_said(rmd, command):
     ],
 )
 def test_a_motion_command_answers_with_what_the_motor_does(rmd, command):
-    assert set(rmd("-i", 3, "--json", *command.split()).ended(0).json) == MOTION
+    assert set(rmd("-i", 3, "--json", *command.split()).ended(0).values) == MOTION
     assert "°/s" in rmd("-i", 3, *command.split()).ended(0).out
     rmd("-i", 3, "off").ended(0)
 
@@ -147,7 +147,7 @@ def near(run, sim, tmp_path):
     config.write_text("[[rmd.motor]]\nid = 1\nplant.angle_degrees = 90.034\n")
     bus = sim(config, st=())
     command = on(run, bus.port("slcan"))
-    assert command("--json", "angle").ended(0).json["single_turn_angle"] == 90.02
+    assert command("--json", "angle").ended(0).values["single_turn_angle"] == 90.02
     return bus, command
 
 
@@ -200,8 +200,8 @@ def test_raw_frames_are_sent_as_they_are(near):
 @on_every_port
 def test_torque4_answers_for_each_motor(rmd):
     replies = rmd("--json", "torque4", 0, -0.1, 0.1, 0).ended(0).lines
-    assert [reply["id"] for reply in replies] == [1, 2, 3, 4]
-    assert set(replies[0]) == MOTION | {"id"}
+    assert [reply["motor"] for reply in replies] == [1, 2, 3, 4]
+    assert set(replies[0]["values"]) == MOTION
     assert len(rmd("torque4", 0, 0, 0, 0).ended(0).out.splitlines()) == 4
 
 
@@ -209,8 +209,8 @@ def test_torque4_answers_for_each_motor(rmd):
 def test_rom_is_written_only_on_an_explicit_word(rmd):
     for command in ("zero", "encoder --offset 5", "raw 19", "raw 32", "raw 91"):
         assert "--write-rom" in rmd(*command.split()).ended(2).err
-    assert set(rmd("--write-rom", "--json", "zero").ended(0).json) == {"ok", "offset"}
-    assert rmd("--write-rom", "--json", "encoder", "--offset", 5).ended(0).json["offset"] == 5
+    assert set(rmd("--write-rom", "--json", "zero").ended(0).values) == {"offset"}
+    assert rmd("--write-rom", "--json", "encoder", "--offset", 5).ended(0).values == {"offset": 5}
     assert rmd("--write-rom", "pid", *SHIPPED_GAINS.split()).ended(0)
     assert rmd("--write-rom", "encoder", "--offset", 0).ended(0)
 
@@ -237,12 +237,13 @@ def test_an_error_that_has_its_cause_stays_and_is_told(run, sim):
     bus = sim(st=())
     rmd = on(run, bus.port("slcan"))
     bus.do("supply", motor=1, volts=5.0)
-    eventually(lambda: bus.motor(1)["errors"] != "no error", "low voltage")
+    eventually(lambda: bus.motor(1)["errors"] == ["LOW_VOLTAGE"], "low voltage")
     refused = rmd("--json", "clear-error").ended(1)
-    assert refused.json["errors"] and "keeps its errors" in refused.err
+    assert refused.values["errors"] == ["LOW_VOLTAGE"] and "keeps its errors" in refused.err
+    assert refused.json["ok"] is False
     bus.do("supply", motor=1, volts=24.0)
     eventually(lambda: rmd("clear-error").code == 0, "the error is cleared")
-    assert rmd("--json", "clear-error").ended(0).json["errors"] == []
+    assert rmd("--json", "clear-error").ended(0).values["errors"] == []
 
 
 # What a person gets wrong.
@@ -300,7 +301,10 @@ def test_torque4_tells_what_answered_and_that_a_motor_did_not(run, sim, tmp_path
     config.write_text("[[rmd.motor]]\nid = 1\n[[rmd.motor]]\nid = 3\n")
     port = sim(config, st=()).port("slcan")
     partly = on(run, port)("--json", "torque4", 0, 0, 0, 0).ended(3)
-    assert [reply["id"] for reply in partly.lines] == [1, 3]
+    assert [(reply["motor"], reply["ok"]) for reply in partly.lines] == [
+        *((1, True), (2, False), (3, True), (4, False))
+    ]
+    assert partly.lines[1]["error"]["kind"] == "silent"
     assert "motor 2" in partly.err
 
 
@@ -352,7 +356,7 @@ def test_a_motor_that_speaks_v3_is_named_and_not_driven(run, tmp_path):
         assert "V3" in told and "0x241" in told
 
         found = on(run, port)("--json", "scan", 1).ended(0).json
-        assert found["id"] == 1 and "V3" in found["protocol"]
+        assert found["motor"] == 1 and "V3" in found["dialect"]
         scanned = on(run, port)("scan", 1).ended(0).out
         assert "it is not driven" in scanned
 
@@ -368,7 +372,7 @@ def test_a_loop_survives_a_bus_that_goes_and_comes_back(start, sim, kind):
     serve = {"slcan": "slcan-pty", "slcan:tcp": "tcp"}[kind]
     bus = sim(st=(), rmd=(serve,))
     loop = start(
-        *("rmd", "-p", bus.port(kind), "--timeout", 500, "--json", "angle", "--every", "50ms")
+        *("rmd", "-p", bus.port(kind), "--timeout", 500, "angle", "--every", "50ms")
     )
     loop.more_lines()
     bus.kill()
@@ -390,9 +394,8 @@ def test_error_bits_that_mean_nothing_are_no_errors(run, tmp_path):
 
     with device(tmp_path / "can0", slcan_adapter(motor)) as path:
         words = ("rmd", "-p", f"slcan:{path}", "--timeout", 500, "clear-error")
-        cleared = run(*words, "--json").ended(0).json
-        assert cleared["errors"] == []
+        assert run(*words, "--json").ended(0).values["errors"] == []
         assert "no error (bits 0xf6 mean nothing)" in run(*words).ended(0).out
         bits["state"] = "F7"
         kept = run(*words, "--json").ended(1)
-        assert kept.json["errors"] == ["low voltage protection"]
+        assert kept.values["errors"] == ["LOW_VOLTAGE"]

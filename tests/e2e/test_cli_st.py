@@ -9,7 +9,6 @@ from peers import device, noise
 from program import eventually
 
 PORTS = ["pty", "tcp", "sim"]
-OK = {"ok": True}
 
 
 @pytest.fixture
@@ -27,17 +26,15 @@ on_every_port = pytest.mark.parametrize("st", PORTS, indirect=True)
 
 @on_every_port
 def test_info_names_the_sdk_and_the_firmware(st):
-    assert st("--json", "info").ended(0).json == {
-        "sdk": "ST MC SDK",
-        "version": [5, 4, 4],
-        "firmware": "ST MC SDK Ver.5.4.4",
-    }
+    info = st("--json", "info").ended(0).json
+    assert info["board"] == {"name": "ST MC SDK", "version": [5, 4, 4]}
+    assert info["firmware"] == {"name": "ST MC SDK", "version": "Ver.5.4.4"}
     assert "5.4.4" in st("info").ended(0).out
 
 
 @on_every_port
 def test_status_has_a_value_and_its_unit_or_name(st):
-    status = st("--json", "status").ended(0).json
+    status = st("--json", "status").ended(0).json["values"]
     assert status["BUS_VOLTAGE"] == {"value": 325, "unit": "V"}
     assert set(status["STATUS"]) == {"value", "name"}
     assert "325 V" in st("status").ended(0).out
@@ -45,13 +42,13 @@ def test_status_has_a_value_and_its_unit_or_name(st):
 
 @on_every_port
 def test_get_reads_registers_by_name_and_by_number(st):
-    values = st("--json", "get", "MIN_APP_SPEED", "0x3F").ended(0).json
+    values = st("--json", "get", "MIN_APP_SPEED", "0x3F").ended(0).json["values"]
     assert values == {
         "MIN_APP_SPEED": {"value": 600, "unit": "rpm"},
         "MAX_APP_SPEED": {"value": 6000, "unit": "rpm"},
     }
     assert st("get", "min_app_speed").ended(0).out.split() == ["MIN_APP_SPEED", "600", "rpm"]
-    assert st("--json", "--raw", "get", "STATUS").ended(0).json["STATUS"] in range(21)
+    assert st("--json", "--raw", "get", "STATUS").ended(0).values["STATUS"] in range(21)
 
 
 def test_get_reads_again_and_again(st):
@@ -64,7 +61,7 @@ def test_get_reads_again_and_again(st):
 
 @on_every_port
 def test_segment_samples_registers_that_cannot_be_read_one_by_one(st):
-    sampled = st("--json", "segment", "MIN_APP_SPEED", "I_A", "I_B").ended(0).json
+    sampled = st("--json", "segment", "MIN_APP_SPEED", "I_A", "I_B").ended(0).values
     assert list(sampled) == ["MIN_APP_SPEED", "I_A", "I_B"]
     assert st("segment", "--number", 3, "I_A").ended(0).out.startswith("I_A")
 
@@ -73,7 +70,8 @@ def test_segment_samples_registers_that_cannot_be_read_one_by_one(st):
 def test_revup_shows_five_phases(st):
     phases = st("--json", "revup").ended(0).lines
     assert [phase["phase"] for phase in phases] == [0, 1, 2, 3, 4]
-    assert set(phases[0]) == {"phase", "speed_rpm", "torque_s16a", "duration_ms"}
+    assert phases[0]["values"]["speed"] == {"value": 0, "unit": "rpm"}
+    assert set(phases[0]["values"]) == {"speed", "torque", "duration"}
     assert len(st("revup").ended(0).out.splitlines()) == 5
 
 
@@ -87,13 +85,15 @@ def test_registers_lists_the_table_without_a_port(run):
 @pytest.mark.parametrize("st", ["pty", "tcp"], indirect=True)
 def test_scan_tells_at_which_rates_a_drive_answers(st):
     findings = st("--json", "scan", 115200, 9600).ended(0).lines
-    assert findings[0] == {"baud": 115200, "finding": "drive", "text": "ST MC SDK 5.4.4"}
+    assert (findings[0]["baud"], findings[0]["finding"]) == (115200, "drive")
+    assert findings[0]["text"] == "ST MC SDK 5.4.4"
     assert "115200 baud  ST MC SDK" in st("scan", 115200).ended(0).out
 
 
 @on_every_port
 def test_raw_sends_any_frame(st):
-    assert st("--json", "raw", "02", "40").ended(0).json == {"ok": True, "payload": "58 02 00 00"}
+    answer = st("--json", "raw", "02", "40").ended(0).json
+    assert (answer["ok"], answer["data"]) == (True, "58 02 00 00")
     assert st("raw", "0x02,0x40").ended(0).out == "ACK 58 02 00 00\n"
     assert st("raw", "0340").ended(1).err.count("WRONG_CMD") == 1
 
@@ -136,7 +136,7 @@ def test_trace_shows_both_directions_on_stderr(st):
 )
 def test_what_is_done_is_said(st, command):
     assert st(*command.split()).ended(0).out.startswith("motor 1")
-    assert st("--json", *command.split()).ended(0).json == OK
+    assert st("--json", *command.split()).ended(0).json["ok"] is True
 
 
 def test_mcsdk_commands_work_with_its_profile(run, sim, tmp_path):
@@ -147,8 +147,8 @@ def test_mcsdk_commands_work_with_its_profile(run, sim, tmp_path):
     def st(*arguments):
         return run("st", "-p", port, "--profile", "mcsdk-5.4", *arguments)
 
-    assert st("--json", "torque-ramp", 100, 50).ended(0).json == OK
-    assert st("--json", "move", 1.5, 0.5).ended(0).json == OK
+    assert st("--json", "torque-ramp", 100, 50).ended(0).json["ok"]
+    assert st("--json", "move", 1.5, 0.5).ended(0).json["ok"]
     assert st("move", -1.5, 0.5).ended(0).out.startswith("motor 1: move to -1.5 rad")
     assert st("info").ended(0).out.count("5.4.4") == 2
 
@@ -161,9 +161,9 @@ def test_a_motor_starts_turns_and_stops(run, sim):
 
     st("ramp", 900, 100).ended(0)
     started = st("--json", "start").ended(0).json
-    assert started["ok"] and started["STATUS"] != "IDLE"
+    assert started["ok"] and started["values"]["STATUS"]["name"] != "IDLE"
     eventually(lambda: drive.motor(2)["speed_rpm"] > 850, "motor 2 turns")
-    assert st("--json", "get", "STATUS").json["STATUS"]["name"] == "RUN"
+    assert st("--json", "get", "STATUS").json["values"]["STATUS"]["name"] == "RUN"
     st("start-stop").ended(0)
     eventually(lambda: drive.motor(2)["status"] == "IDLE", "motor 2 is idle")
     assert drive.motor(1)["status"] == "IDLE"
@@ -184,7 +184,7 @@ def test_a_fault_keeps_the_motor_from_starting_until_it_is_acknowledged(run, sim
 
     drive.do("fault", motor=1, fault="BREAK_IN", hold=False)
     eventually(lambda: drive.motor(1)["status"] == "FAULT_OVER", "the cause is gone")
-    assert st("--json", "fault-ack").ended(0).json == {"ok": True, "FLAGS": 0}
+    assert st("--json", "fault-ack").ended(0).values == {"FLAGS": 0}
     assert st("start").ended(0)
 
 
@@ -302,7 +302,7 @@ def test_a_device_that_is_unplugged_mid_exchange_is_told(run, tmp_path):
 
 def test_a_loop_survives_a_drive_that_goes_and_comes_back(start, sim):
     drive = sim(rmd=())
-    loop = start("st", "-p", drive.st, "--json", "get", "SPEED_MEAS", "--every", "50ms")
+    loop = start("st", "-p", drive.st, "get", "SPEED_MEAS", "--every", "50ms")
     loop.more_lines()
     drive.kill()
     loop.says("the line is lost")

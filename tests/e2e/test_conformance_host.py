@@ -178,7 +178,7 @@ def test_a_host_is_not_blamed_when_this_machine_is_too_busy(check, tmp_path):
     code, cases = check("st", *told)
     assert code == 3
     (case,) = cases.values()
-    assert case["verdict"] == "not run" and "too busy" in case["why"]
+    assert case["verdict"] == "not-run" and "too busy" in case["why"]
 
 
 def test_a_host_that_starts_the_motor_when_it_shall_read_has_failed(check, motorlink):

@@ -97,8 +97,8 @@ def test_without_a_guard_an_st_motor_spins_on(sim, client):
     runs(drives, 1)
     program.kill()
     program.wait()
-    began = drives.do("state")["time"]
-    eventually(lambda: drives.do("state")["time"] > began + 1, "a second passes")
+    began = drives.do("state")["t"]
+    eventually(lambda: drives.do("state")["t"] > began + 1, "a second passes")
     assert drives.motor(1)["status"] == "RUN"
 
 
@@ -184,14 +184,14 @@ def test_a_program_that_talks_is_not_silent_and_one_without_motors_may_be(sim, g
     process = guard(drives.st, "--silence", "1s")
     with Line(process.port) as line:
         assert line.ask(frame(header(EXECUTE, 1), [START]))[0] == ACK
-        began = drives.do("state")["time"]
-        while drives.do("state")["time"] < began + 2:
+        began = drives.do("state")["t"]
+        while drives.do("state")["t"] < began + 2:
             line.get(STATUS, motor=1)
         assert drives.motor(1)["status"] == "RUN"
         assert line.ask(frame(header(EXECUTE, 1), [STOP]))[0] == ACK
         rests(drives, 1)
-        began = drives.do("state")["time"]
-        eventually(lambda: drives.do("state")["time"] > began + 1.5, "silence")
+        began = drives.do("state")["t"]
+        eventually(lambda: drives.do("state")["t"] > began + 1.5, "silence")
     process.says("has left")
     assert not any("silent" in text for text in process.err), process.err
 
@@ -283,6 +283,6 @@ def test_an_rmd_motor_stops_by_its_shutdown_time_or_not_at_all(sim, tmp_path, sh
     if shutdown_ms:
         eventually(lambda: drives.motor(1)["mode"] == "off", "the motor is off")
     else:
-        began = drives.do("state")["time"]
-        eventually(lambda: drives.do("state")["time"] > began + 2, "two seconds pass")
+        began = drives.do("state")["t"]
+        eventually(lambda: drives.do("state")["t"] > began + 2, "two seconds pass")
         assert drives.motor(1)["mode"] == "speed"

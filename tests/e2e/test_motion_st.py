@@ -71,8 +71,8 @@ class Motor:
             if abs(speed - rpm) > 5:
                 since = None
             elif since is None:
-                since = state["time"]
-            return since is not None and state["time"] - since > 0.5
+                since = state["t"]
+            return since is not None and state["t"] - since > 0.5
 
         eventually(stays, f"{rpm} rpm")
 
@@ -111,7 +111,7 @@ class Motor:
     @property
     def time(self):
         """The drive's, s."""
-        return self.drives.do("state")["time"]
+        return self.drives.do("state")["t"]
 
 
 @pytest.fixture(name="motor", params=[MAINS, SERVO], ids=["mains", "servo"])

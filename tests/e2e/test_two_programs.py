@@ -13,7 +13,7 @@ import time
 import pytest
 
 from badline import BadLine, Fate, slcan_messages, st_messages
-from program import environment, eventually
+from program import environment, eventually, plain
 
 #: Pairs of each protocol.
 PAIRS = int(os.environ.get("PAIRS", "8"))
@@ -116,7 +116,7 @@ def test_st_programs_in_turn_read_their_own_values(pairs):
         names = st.chance.sample(list(GAINS), 4)
         code, out, _ = st.run("get", *names)
         expected = {name: GAINS[name] for name in names}
-        st.judge(fate, code, code or {name: read["value"] for name, read in json.loads(out).items()} == expected)
+        st.judge(fate, code, code or plain(json.loads(out)) == expected)
     assert not any(end == "WRONG" for _, end in st.counts), st.counts
     assert any(end == "right" for _, end in st.counts), "something comes through"
 
@@ -135,7 +135,7 @@ def test_rmd_programs_in_turn_read_their_own_values(pairs):
             rmd.judge(fate, code, OFF in rmd.line.requests[requests:])
             continue
         code, out, _ = rmd.run("--timeout", 1000, "pid")
-        rmd.judge(fate, code, code or set(json.loads(out).values()) == {value})
+        rmd.judge(fate, code, code or set(plain(json.loads(out)).values()) == {value})
     assert not any(end == "WRONG" for _, end in rmd.counts), rmd.counts
     assert any(end == "right" for _, end in rmd.counts), "something comes through"
 

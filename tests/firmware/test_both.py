@@ -73,18 +73,18 @@ def test_bursts_on_one_uart_and_on_both(board, capsys):
 
 def test_motors_of_both_kinds_turn_at_once(board, st, rmd, eventually, capsys):
     def speed():
-        return st("--json", "--raw", "get", "SPEED_MEAS").ended(0).json["SPEED_MEAS"]
+        return st("--json", "--raw", "get", "SPEED_MEAS").ended(0).values["SPEED_MEAS"]
 
     st("ramp", 1500, 500).ended(0)
     st("start").ended(0)
     for motor in (1, 2, 3, 4):
         rmd("-i", motor, "speed", 360).ended(0)
     eventually(lambda: abs(speed() - 1500) < 30, "1500 rpm")
-    first = rmd("-i", 1, "--json", "angle").ended(0).json["multi_turn_angle"]
+    first = rmd("-i", 1, "--json", "angle").ended(0).values["multi_turn_angle"]
     begun = time.monotonic()
     board.advance(2)
     took = time.monotonic() - begun
-    turned = rmd("-i", 1, "--json", "angle").ended(0).json["multi_turn_angle"] - first
+    turned = rmd("-i", 1, "--json", "angle").ended(0).values["multi_turn_angle"] - first
     # Each program waits for the guard time, 0.1 s, before it trusts a motor.
     assert abs(turned - 360 * (2 + 0.1)) < 4
     with capsys.disabled():

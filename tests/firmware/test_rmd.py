@@ -40,20 +40,20 @@ def host(board, on_board_time):
 
 def test_a_scan_finds_the_motors(rmd):
     found = rmd("--json", "scan", 1, 2, 3, 4, 5).ended(0).lines
-    assert [motor["id"] for motor in found] == [1, 2, 3, 4]
-    assert {motor["protocol"] for motor in found} == {"V1.62"}
+    assert [motor["motor"] for motor in found] == [1, 2, 3, 4]
+    assert {motor["dialect"] for motor in found} == {"V1.62"}
 
 
 def test_a_motor_moves_holds_a_torque_and_is_switched_off(rmd, eventually):
     def angle():
-        return rmd("-i", 2, "--json", "angle").ended(0).json["multi_turn_angle"]
+        return rmd("-i", 2, "--json", "angle").ended(0).values["multi_turn_angle"]
 
     rmd("-i", 2, "move", 90, "--max-speed", 500).ended(0)
     eventually(lambda: abs(angle() - 90) < 1, "90°")
     rmd("-i", 2, "torque", 0.3).ended(0)
     eventually(lambda: angle() > 180, "a motor that turns")
     rmd("-i", 2, "off").ended(0)
-    eventually(lambda: rmd("-i", 2, "--json", "status").ended(0).json["speed"] == 0, "rest")
+    eventually(lambda: rmd("-i", 2, "--json", "status").ended(0).values["speed"] == 0, "rest")
     torques = rmd("--json", "torque4", 0.0, 0.0, 0.0, 0.0).ended(0)
     assert len(torques.lines) == 4
 
@@ -74,7 +74,7 @@ def test_garbage_at_full_speed_leaves_the_drives_in_order(board, rmd):
                 assert time.monotonic() < deadline, "the adapter does not answer"
                 # Overruns may have taken the last question.
                 line.sendall(b"\rV\r")
-    assert rmd("-i", 1, "--json", "status").ended(0).json["voltage"] == 24.0
+    assert rmd("-i", 1, "--json", "status").ended(0).values["voltage"] == 24.0
 
 
 def test_hosts_come_and_go(board):

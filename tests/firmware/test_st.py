@@ -34,16 +34,16 @@ def spec(board, on_board_time):
 
 def test_info_status_and_registers_are_read(st):
     info = st("--json", "info").ended(0).json
-    assert (info["sdk"], info["version"]) == ("ST MC SDK", [5, 4, 4])
-    status = st("--json", "status").ended(0).json
+    assert info["board"] == {"name": "ST MC SDK", "version": [5, 4, 4]}
+    status = st("--json", "status").ended(0).json["values"]
     assert status["BUS_VOLTAGE"] == {"value": 325, "unit": "V"}
     assert len(st("--json", "revup").ended(0).lines) == 5
-    assert list(st("--json", "segment", "SPEED_MEAS", "I_A").ended(0).json) == ["SPEED_MEAS", "I_A"]
+    assert list(st("--json", "segment", "SPEED_MEAS", "I_A").ended(0).values) == ["SPEED_MEAS", "I_A"]
 
 
 def test_what_is_written_is_read_back_and_what_is_wrong_is_refused(st):
     st("set", "SPEED_KP", 1234).ended(0)
-    assert st("--json", "get", "SPEED_KP").ended(0).json["SPEED_KP"]["value"] == 1234
+    assert st("--json", "get", "SPEED_KP").ended(0).values["SPEED_KP"] == 1234
     refused = st("get", "0xEE").ended(1)
     assert "GET_WRITE_ONLY" in refused.err
     assert "BAD_MOTOR_SELECTED" in st("-m", 3, "status").ended(1).err
@@ -52,7 +52,7 @@ def test_what_is_written_is_read_back_and_what_is_wrong_is_refused(st):
 @pytest.mark.parametrize("motor", [1, 2])
 def test_a_motor_starts_reaches_its_speed_and_stops(st, eventually, motor):
     def value(register):
-        return st("-m", motor, "--json", "--raw", "get", register).ended(0).json[register]
+        return st("-m", motor, "--json", "--raw", "get", register).ended(0).values[register]
 
     st("-m", motor, "ramp", 1200, 500).ended(0)
     st("-m", motor, "start").ended(0)
@@ -66,7 +66,7 @@ def test_a_motor_starts_reaches_its_speed_and_stops(st, eventually, motor):
 
 def test_torque_turns_the_motor_with_an_encoder(st, eventually):
     def speed():
-        return st("-m", 2, "--json", "--raw", "get", "SPEED_MEAS").ended(0).json["SPEED_MEAS"]
+        return st("-m", 2, "--json", "--raw", "get", "SPEED_MEAS").ended(0).values["SPEED_MEAS"]
 
     st("-m", 2, "current", 600, 0).ended(0)
     st("-m", 2, "start").ended(0)
@@ -87,7 +87,7 @@ def test_a_rotor_that_does_not_follow_is_a_fault_until_it_is_acknowledged(st, sp
     st("fault-ack").ended(0)
 
     def status():
-        return st("--json", "status").ended(0).json["STATUS"]["name"]
+        return st("--json", "status").ended(0).json["values"]["STATUS"]["name"]
 
     eventually(lambda: status() == "IDLE", "IDLE")
 
@@ -130,4 +130,4 @@ def test_a_host_that_ends_in_a_step_leaves_the_clock_in_order(board, st):
     for _ in range(10):
         with board.clock() as clock:
             clock.line.sendall(bytes([MOST_TICKS]))
-        assert st("--json", "get", "STATUS").ended(0).json["STATUS"]["value"] == 0
+        assert st("--json", "get", "STATUS").ended(0).values["STATUS"] == 0

@@ -47,7 +47,7 @@ same() {
 serve() {
     motorlink sim --rmd "$1" >sim &
     running="$running $!"
-    await grep -q '"ids":\[1,2,3,4\]' sim
+    await grep -q '"motors":\[1,2,3,4\]' sim
 }
 
 receivers() {
@@ -203,12 +203,12 @@ scripted_motor() {
 check_cansend_answers_our_host() {
     port=socketcan:vcan0
     scripted_motor 33000000E8030000
-    same "$(rmd --id 5 accel --json)" '{"acceleration":1000}'
+    same "$(rmd --id 5 accel --json)" '*"values":{"acceleration":{"value":1000,*'
     same "$(cat asked)" '* vcan0 145#3300000000000000*'
     # The document prints this command's reply with the code of another.
     scripted_motor 9A1E0000F1000009
     said=$(rmd --id 5 clear-error --json)
-    same "$? $said" '1 {"temperature":30,"voltage":*'
+    same "$? $said" '1 {"ok":false,"motor":5,*"values":{"temperature":{"value":30,*'
     same "$(cat asked)" '* vcan0 145#9B00000000000000*'
 }
 
@@ -219,9 +219,9 @@ finds_four() {
 check_the_program_finds_and_asks_motors_across_two_cards() {
     port=socketcan:can0
     serve socketcan:can1
-    same "$(rmd scan 1 2 3 4 --json | grep -c '"protocol":"V1.62"')" 4
+    same "$(rmd scan 1 2 3 4 --json | grep -c '"dialect":"V1.62"')" 4
     await finds_four --timeout 100
-    same "$(rmd --id 3 status --json)" '{"id":3,"temperature":25,"voltage":24.0,"errors":\[\],*'
+    same "$(rmd --id 3 status --json)" '{"motor":3,*"temperature":{"value":25,"unit":"°C"},"voltage":{"value":24.0,"unit":"V"},*'
     motorlink rmd -p socketcan:can0 --id 9 status 2>silent && fail "motor 9 is not there"
     same "$? $(cat silent)" '*motor 9 does not answer 0x9a*'
 }

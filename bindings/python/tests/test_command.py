@@ -50,7 +50,7 @@ def test_json_comes_a_line_at_a_time_until_ctrl_c(command: str, served: Served) 
     words = [command, "st", "-p", served.st, "--json", "get", "STATUS", "--every", "20ms"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as loop:
         assert loop.stdout
-        assert json.loads(loop.stdout.readline())["STATUS"]["name"] == "IDLE"
+        assert json.loads(loop.stdout.readline())["values"]["STATUS"]["name"] == "IDLE"
         loop.send_signal(signal.SIGINT)
         loop.communicate(timeout=10)
         assert loop.returncode == 0

@@ -4,57 +4,185 @@ use motorlink::port::{NameError, PortError};
 use motorlink::relay::RelayError;
 use motorlink::{rmd, st};
 use motorlink_link::fault::FaultError;
+use serde_json::{Map, Value, json};
 
-/// Why, and with which exit code.
+/// Why the program ends early.
 #[derive(Debug)]
 pub enum Failure {
-    /// 1: the drive refused, or did not do it.
-    Refused(String),
-    /// 2: the command does not make sense.
-    Usage(String),
-    /// 3: the line failed.
-    Line(String),
-    /// 3: one motor does not answer, which says nothing about the line.
-    Silent(String),
-    /// 130: Ctrl-C.
+    /// It did not do what it was asked.
+    Failed(Box<Problem>),
+    /// Ctrl-C.
     Interrupted,
-    /// 0: whoever read the output has closed it.
+    /// The reader of the output has closed it.
     OutputClosed,
 }
 
-impl Failure {
-    /// The exit code, and the message for stderr if there is one.
-    pub fn into_parts(self) -> (u8, Option<String>) {
+/// What went wrong, and where.
+#[derive(Debug)]
+pub struct Problem {
+    pub kind: Kind,
+    message: String,
+    /// `port`, `motor`, `code` and `name`, where they are known.
+    facts: Map<String, Value>,
+}
+
+/// What kind of problem it is, which gives the exit code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The drive refused, or did not do it.
+    Refused,
+    /// The command does not make sense.
+    Usage,
+    /// The connection failed.
+    Link,
+    /// One motor does not answer, which says nothing about the connection.
+    Silent,
+}
+
+impl Kind {
+    fn exit_code(self) -> u8 {
         match self {
-            Failure::Refused(message) => (1, Some(message)),
-            Failure::Usage(message) => (2, Some(message)),
-            Failure::Line(message) | Failure::Silent(message) => (3, Some(message)),
-            Failure::Interrupted => (130, None),
-            Failure::OutputClosed => (0, None),
+            Kind::Refused => 1,
+            Kind::Usage => 2,
+            Kind::Link | Kind::Silent => 3,
         }
+    }
+
+    fn word(self) -> &'static str {
+        match self {
+            Kind::Refused => "refused",
+            Kind::Usage => "usage",
+            Kind::Link => "link",
+            Kind::Silent => "silent",
+        }
+    }
+}
+
+impl Failure {
+    pub fn refused(message: impl Into<String>) -> Self {
+        Problem::new(Kind::Refused, message).into()
+    }
+
+    pub fn usage(message: impl Into<String>) -> Self {
+        Problem::new(Kind::Usage, message).into()
+    }
+
+    pub fn link(message: impl Into<String>) -> Self {
+        Problem::new(Kind::Link, message).into()
+    }
+
+    /// The exit code.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Failure::Failed(problem) => problem.kind.exit_code(),
+            Failure::Interrupted => 130,
+            Failure::OutputClosed => 0,
+        }
+    }
+
+    /// With its port and, if a motor refused or is silent, the motor that was meant, unless it names
+    /// another.
+    pub fn about(mut self, port: &str, motor: u8) -> Self {
+        if let Failure::Failed(problem) = &mut self {
+            problem.fact("port", port);
+            if matches!(problem.kind, Kind::Refused | Kind::Silent) {
+                problem.motor(motor);
+            }
+        }
+        self
+    }
+
+    /// For programs: docs/JSON.md.
+    pub fn object(&self) -> Value {
+        match self {
+            Failure::Failed(problem) => problem.object(),
+            Failure::Interrupted | Failure::OutputClosed => Value::Null,
+        }
+    }
+}
+
+impl Problem {
+    fn new(kind: Kind, message: impl Into<String>) -> Self {
+        Problem { kind, message: message.into(), facts: Map::new() }
+    }
+
+    /// Adds what is not known yet.
+    fn fact(&mut self, name: &str, value: impl Into<Value>) {
+        self.facts.entry(name).or_insert_with(|| value.into());
+    }
+
+    /// Adds the motor; ST's 0 is the drive.
+    fn motor(&mut self, number: u8) {
+        if number != 0 {
+            self.fact("motor", number);
+        }
+    }
+
+    /// For people.
+    pub fn text(&self) -> &str {
+        &self.message
+    }
+
+    /// For programs: docs/JSON.md.
+    pub fn object(&self) -> Value {
+        let mut object = json!({ "kind": self.kind.word(), "message": self.message });
+        object.as_object_mut().expect("an object was made").extend(self.facts.clone());
+        object
+    }
+}
+
+impl From<Problem> for Failure {
+    fn from(problem: Problem) -> Self {
+        Failure::Failed(Box::new(problem))
     }
 }
 
 impl From<st::Error> for Failure {
     fn from(error: st::Error) -> Self {
         let message = error.to_string();
-        match error {
-            st::Error::Refused { .. } | st::Error::Differs { .. } => Failure::Refused(message),
-            st::Error::Port(error) => error.into(),
-            error if error.is_line_failure() => Failure::Line(message),
-            _ => Failure::Usage(message),
+        let kind = match &error {
+            st::Error::Refused { .. } | st::Error::Differs { .. } => Kind::Refused,
+            st::Error::Port(error) => return error.into(),
+            error if error.is_line_failure() => Kind::Link,
+            _ => Kind::Usage,
+        };
+        let mut problem = Problem::new(kind, message);
+        match &error {
+            st::Error::Refused { motor, code, .. } => {
+                problem.motor(motor.0);
+                problem.fact("code", u8::from(*code));
+                problem.fact("name", code.to_string());
+            }
+            st::Error::Failed { motor, .. } | st::Error::Reply { motor, .. } => {
+                problem.motor(motor.0);
+            }
+            _ => {}
         }
+        problem.into()
     }
 }
 
 impl From<rmd::Error> for Failure {
     fn from(error: rmd::Error) -> Self {
-        let message = error.to_string();
-        match &error {
-            rmd::Error::Port(error) => error.into(),
-            error if error.is_line_failure() => Failure::Silent(message),
-            _ => Failure::Usage(message),
+        use rmd::Error::*;
+        let kind = match &error {
+            Port(error) => return error.into(),
+            error if error.is_line_failure() => Kind::Silent,
+            _ => Kind::Usage,
+        };
+        let mut problem = Problem::new(kind, error.to_string());
+        if let Timeout { motor, .. }
+        | Adapter { motor, .. }
+        | Foreign { motor, .. }
+        | Altered { motor, .. }
+        | Quarantined { motor, .. }
+        | Shared { motor, .. }
+        | Unconfirmed { motor, .. }
+        | Echo { motor, .. } = &error
+        {
+            problem.motor(motor.number());
         }
+        problem.into()
     }
 }
 
@@ -67,33 +195,9 @@ impl From<PortError> for Failure {
 impl From<&PortError> for Failure {
     fn from(error: &PortError) -> Self {
         match error {
-            PortError::WrongKind { .. } => Failure::Usage(error.to_string()),
-            _ => Failure::Line(error.to_string()),
+            PortError::WrongKind { .. } => Failure::usage(error.to_string()),
+            _ => Failure::link(error.to_string()),
         }
-    }
-}
-
-impl From<NameError> for Failure {
-    fn from(error: NameError) -> Self {
-        Failure::Usage(error.to_string())
-    }
-}
-
-impl From<FaultError> for Failure {
-    fn from(error: FaultError) -> Self {
-        Failure::Usage(error.to_string())
-    }
-}
-
-impl From<st::UnknownRegister> for Failure {
-    fn from(error: st::UnknownRegister) -> Self {
-        Failure::Usage(error.to_string())
-    }
-}
-
-impl From<st::ValueError> for Failure {
-    fn from(error: st::ValueError) -> Self {
-        Failure::Usage(error.to_string())
     }
 }
 
@@ -101,7 +205,7 @@ impl From<RelayError> for Failure {
     fn from(error: RelayError) -> Self {
         match error {
             RelayError::Port(error) => error.into(),
-            other => Failure::Usage(other.to_string()),
+            other => Failure::usage(other.to_string()),
         }
     }
 }
@@ -110,7 +214,19 @@ impl From<std::io::Error> for Failure {
     fn from(error: std::io::Error) -> Self {
         match error.kind() {
             std::io::ErrorKind::BrokenPipe => Failure::OutputClosed,
-            _ => Failure::Line(error.to_string()),
+            _ => Failure::link(error.to_string()),
         }
     }
 }
+
+/// What no command that makes sense ends with.
+macro_rules! usage {
+    ($($error:ty),+) => { $(
+        impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Failure::usage(error.to_string())
+            }
+        }
+    )+ };
+}
+usage!(NameError, FaultError, st::UnknownRegister, st::ValueError);

@@ -8,6 +8,7 @@ mod failure;
 mod guard;
 mod help;
 mod interrupt;
+mod json;
 mod output;
 mod ports;
 mod repeat;
@@ -20,6 +21,8 @@ mod voice;
 use std::ffi::OsString;
 
 use clap::{CommandFactory, Parser, Subcommand};
+
+use crate::failure::Failure;
 
 /// Command, watch and simulate motor drives: ST's Motor Control Protocol over a serial line and the
 /// RMD protocol V1.62 over CAN.
@@ -68,8 +71,17 @@ enum Command {
 pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
     interrupt::install();
     motorlink_testbench::register();
-    let cli = match Cli::try_parse_from(words) {
+    let words: Vec<OsString> = words.into_iter().collect();
+    // What is behind `--` is another program's.
+    output::put_messages_in_json(
+        words.iter().take_while(|word| *word != "--").any(|word| word == "--json"),
+    );
+    let cli = match Cli::try_parse_from(&words) {
         Ok(cli) => cli,
+        Err(error) if error.exit_code() == 2 && output::has_json_messages() => {
+            let text = error.to_string();
+            return output::report(&Failure::usage(text.trim_start_matches("error: ").trim_end()));
+        }
         Err(error) => {
             // Help for a reader that is gone.
             let _ = error.print();
@@ -87,13 +99,13 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "motorlink", &mut script);
-            output::line(&String::from_utf8_lossy(&script).trim_end())
+            output::print_line(&String::from_utf8_lossy(&script).trim_end())
         }
         Command::Man { folder } => help::write_manual(Cli::command(), &folder),
     };
     let code = match result {
         Ok(()) => 0,
-        Err(failure) => output::report(failure),
+        Err(failure) => output::report(&failure),
     };
     output::finish();
     code

@@ -2,17 +2,22 @@
 
 use std::io::{Write, stderr, stdout};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use motorlink::Hex;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::failure::Failure;
+use crate::json::{Line, Row};
 use crate::voice::Voice;
 
 /// stdout and stderr of a program that must not wait for their readers.
 static VOICES: OnceLock<(Voice, Voice)> = OnceLock::new();
+
+/// Whether stderr has JSON, too.
+static JSON: AtomicBool = AtomicBool::new(false);
 
 /// Where results go.
 #[derive(Debug, Clone, Copy)]
@@ -23,34 +28,55 @@ pub struct Printer {
 
 impl Printer {
     /// Prints one result: `text` for people, or `object` as a line of JSON.
-    pub fn result(self, text: impl std::fmt::Display, object: Value) -> Result<(), Failure> {
-        if self.json { line(&object) } else { line(&text) }
+    pub fn result(
+        self,
+        text: impl std::fmt::Display,
+        object: impl Into<Value>,
+    ) -> Result<(), Failure> {
+        if self.json { print_line(&object.into()) } else { print_line(&text) }
     }
 
-    /// Prints named values: a row each, or one object of all.
-    pub fn rows(self, rows: &[(&str, String, Value)]) -> Result<(), Failure> {
+    /// Prints values: a row each, or `object` with all of them.
+    pub fn rows(self, object: Line, rows: &[Row]) -> Result<(), Failure> {
         if self.json {
-            let object: Map<String, Value> =
-                rows.iter().map(|(name, _, value)| ((*name).to_owned(), value.clone())).collect();
-            return line(&Value::Object(object));
+            return print_line(&Value::from(object.values(rows)));
         }
-        let width = rows.iter().map(|(name, ..)| name.chars().count()).max().unwrap_or(0);
-        for (name, text, _) in rows {
-            // Registers keep the document's names.
-            let name = if name.starts_with(char::is_uppercase) {
-                (*name).to_owned()
-            } else {
-                name.replace('_', " ")
-            };
-            line(&format!("{name:<width$}  {text}"))?;
+        let width = rows.iter().map(|row| row.name.chars().count()).max().unwrap_or(0);
+        for Row { name, text, .. } in rows {
+            print_line(&format!("{:<width$}  {text}", in_words(name)))?;
         }
         Ok(())
     }
 
-    /// Says that something without a result was done.
-    pub fn done(self, text: impl std::fmt::Display) -> Result<(), Failure> {
-        if self.json { line(&serde_json::json!({ "ok": true })) } else { line(&text) }
+    /// Prints values that were read `at` so many seconds, on one line; without a time as
+    /// [`rows`](Self::rows).
+    pub fn sample(self, object: Line, rows: &[Row], at: Option<f64>) -> Result<(), Failure> {
+        match at {
+            Some(at) if !self.json => {
+                let texts: Vec<String> = rows
+                    .iter()
+                    .map(|row| format!("{} {}", in_words(&row.name), row.text))
+                    .collect();
+                print_line(&format!("{at:>9.3} s  {}", texts.join("   ")))
+            }
+            _ => self.rows(object.at(at), rows),
+        }
     }
+}
+
+/// A value's name for people. Registers keep the document's names.
+pub fn in_words(name: &str) -> String {
+    if name.starts_with(char::is_uppercase) { name.to_owned() } else { name.replace('_', " ") }
+}
+
+/// From now on stderr has JSON, an object a line, or text.
+pub fn put_messages_in_json(json: bool) {
+    JSON.store(json, Ordering::Relaxed);
+}
+
+/// Whether stderr has JSON.
+pub fn has_json_messages() -> bool {
+    JSON.load(Ordering::Relaxed)
 }
 
 /// From now on nothing that is printed is waited for: motors depend on this program, or drives do.
@@ -78,6 +104,14 @@ pub fn finish() {
 
 /// Prints a line on stderr; it must not matter whether somebody reads it.
 pub fn note(text: impl std::fmt::Display) {
+    if has_json_messages() {
+        return print_message(&json!({ "note": console::strip_ansi_codes(&text.to_string()) }));
+    }
+    print_message(&text);
+}
+
+/// Prints a line on stderr as it is.
+pub fn print_message(text: &dyn std::fmt::Display) {
     match VOICES.get() {
         Some((_, messages)) => messages.say(text),
         None => drop(writeln!(stderr(), "{text}")),
@@ -85,16 +119,23 @@ pub fn note(text: impl std::fmt::Display) {
 }
 
 /// Says on stderr why the program fails; gives the exit code.
-pub fn report(failure: Failure) -> u8 {
-    let (code, message) = failure.into_parts();
-    if let Some(message) = message {
-        note(format!("{} {message}", console::style("error:").red().bold().for_stderr()));
+pub fn report(failure: &Failure) -> u8 {
+    let code = failure.exit_code();
+    match failure {
+        Failure::Failed(problem) if has_json_messages() => {
+            print_message(&json!({ "ok": false, "error": problem.object(), "exit": code }));
+        }
+        Failure::Failed(problem) => {
+            let mark = console::style("error:").red().bold().for_stderr();
+            print_message(&format!("{mark} {}", problem.text()));
+        }
+        Failure::Interrupted | Failure::OutputClosed => {}
     }
     code
 }
 
 /// Prints a line at once; a reader that is gone ends the program quietly.
-pub fn line(text: &dyn std::fmt::Display) -> Result<(), Failure> {
+pub fn print_line(text: &dyn std::fmt::Display) -> Result<(), Failure> {
     if let Some((results, _)) = VOICES.get() {
         results.say(text);
         return Ok(());
@@ -131,14 +172,14 @@ pub fn parse_hex(words: &[String]) -> Result<Vec<u8>, Failure> {
                 bytes.extend(digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]));
             }
             _ => {
-                return Err(Failure::Usage(format!(
+                return Err(Failure::usage(format!(
                     "`{word}` is not hexadecimal bytes; write them as `02 01 1e` or `02011e`"
                 )));
             }
         }
     }
     if bytes.is_empty() {
-        return Err(Failure::Usage("give the bytes, as in `02 01 1e`".to_owned()));
+        return Err(Failure::usage("give the bytes, as in `02 01 1e`"));
     }
     Ok(bytes)
 }

@@ -5,7 +5,7 @@ use motorlink::port::Carries;
 use serde_json::json;
 
 use crate::failure::Failure;
-use crate::output::{Printer, line};
+use crate::output::{Printer, print_line};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -17,8 +17,8 @@ pub struct Args {
 pub fn run(args: Args) -> Result<(), Failure> {
     let ports = list::ports();
     if ports.is_empty() && !args.json {
-        line(&"No serial device and no CAN interface is connected.")?;
-        return line(&"Without hardware: `motorlink demo`, or `-p sim:` with any command.");
+        print_line(&"No serial device and no CAN interface is connected.")?;
+        return print_line(&"Without hardware: `motorlink demo`, or `-p sim:` with any command.");
     }
     let width = ports.iter().map(|port| port.name.len()).max().unwrap_or(0);
     for port in &ports {
@@ -54,7 +54,7 @@ fn text(port: &PortInfo, width: usize) -> String {
 fn object(port: &PortInfo) -> serde_json::Value {
     json!({
         "port": port.name,
-        "kind": kind(port),
+        "kind": kind(port).to_lowercase(),
         "description": port.description,
         "stable_path": port.stable_path,
         "problem": port.problem,

@@ -7,7 +7,7 @@ use motorlink::port::Direction;
 use motorlink::rmd;
 use motorlink::st::{Profile, Transcript};
 
-use crate::output::{hex, note};
+use crate::output::{hex, print_message};
 
 /// Prints the bytes of a serial line, with what they mean.
 pub fn bytes(profile: Profile) -> impl FnMut(Direction, Duration, &[u8]) + Send {
@@ -15,7 +15,7 @@ pub fn bytes(profile: Profile) -> impl FnMut(Direction, Duration, &[u8]) + Send 
     move |direction, at, bytes| {
         let sent = direction == Direction::Sent;
         let meaning = transcript.note(sent, bytes);
-        note(format!(
+        print_message(&format!(
             "{:>10.6} {} {:<24} {meaning}",
             at.as_secs_f64(),
             arrow(direction),
@@ -33,7 +33,7 @@ pub fn frames() -> impl FnMut(Direction, Duration, &CanFrame) + Send {
         };
         let (id, data) = (frame.id(), hex(frame.data()));
         let meaning = rmd::describe(*frame, way);
-        note(format!(
+        print_message(&format!(
             "{:>10.6} {} {id:03x}#{data:<24} {meaning}",
             at.as_secs_f64(),
             arrow(direction)

@@ -110,7 +110,7 @@ impl Report {
 impl Outcome {
     fn to_json(&self) -> Value {
         let mut object = json!({
-            "name": self.name, "clauses": self.clauses, "verdict": self.verdict.word().to_lowercase(),
+            "name": self.name, "clauses": self.clauses, "verdict": self.verdict.word().to_lowercase().replace(' ', "-"),
         });
         match &self.verdict {
             Verdict::Passed | Verdict::Reading => {}

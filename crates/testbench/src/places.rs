@@ -1,6 +1,6 @@
 //! Drives by the ports at which they are, and the commands that reach them there.
 
-use motorlink_proto::rmd::Mode;
+use motorlink_proto::st::Flags;
 use motorlink_proto::time::Instant;
 use motorlink_sim::rmd::RmdNode;
 use motorlink_sim::st::StMotor;
@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::Command;
 use super::drives::Stage;
+use super::signals::{Names, mode_number};
 
 /// All drives of a bench.
 #[derive(Default)]
@@ -44,7 +45,7 @@ impl ServedDrives {
             if states.is_empty() {
                 return Err(self.which_port(port.as_deref()));
             }
-            return Ok(json!({ "ok": true, "time": now.0 as f64 / 1e6, "state": states }));
+            return Ok(json!({ "ok": true, "t": now.0 as f64 / 1e6, "state": states }));
         }
         command.check()?;
         let place = self.find(command.port())?;
@@ -93,7 +94,7 @@ fn st_state(motor: &StMotor, number: u8) -> Value {
     json!({
         "motor": number,
         "status": truth.status.to_string(),
-        "faults": truth.flags.to_string(),
+        "faults": { "occurred": names(truth.flags.occurred()), "present": names(truth.flags.present()) },
         "speed_rpm": truth.speed_rpm,
         "speed_reference_rpm": truth.speed_reference_rpm,
         "angle_degrees": plant.angle_degrees,
@@ -118,8 +119,8 @@ fn rmd_state(node: &RmdNode) -> Value {
     let plant = &truth.plant;
     json!({
         "motor": node.id().number(),
-        "mode": mode(truth.mode),
-        "errors": node.drive().errors().to_string(),
+        "mode": Names::Mode.name(mode_number(truth.mode)),
+        "errors": node.drive().errors().names().collect::<Value>(),
         "speed_dps": truth.speed_dps,
         "speed_reference_dps": truth.speed_reference_dps,
         "angle_degrees": plant.angle_degrees,
@@ -138,12 +139,6 @@ fn rmd_state(node: &RmdNode) -> Value {
     })
 }
 
-fn mode(mode: Mode) -> &'static str {
-    match mode {
-        Mode::Off => "off",
-        Mode::Stopped => "stopped",
-        Mode::Torque(_) => "torque",
-        Mode::Speed(_) => "speed",
-        Mode::Position { .. } => "position",
-    }
+fn names(faults: u16) -> Value {
+    Flags::names(faults).collect()
 }

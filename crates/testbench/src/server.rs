@@ -64,7 +64,7 @@ impl SimServer {
     ) -> Result<Value, ServeError> {
         let stage = Stage::new(Drives { st: Some(config.station(self.server.now())?), rmd: None });
         let served = self.server.serve_bytes(port, Box::new(StStage(stage.clone())))?;
-        let motors = config.st_motors();
+        let motors: Vec<usize> = (1..=config.st_motors()).collect();
         let profile = config.profile.name();
         let announcement = json!({
             "port": served.port, "protocol": "st", "path": served.path, "motors": motors,
@@ -101,8 +101,7 @@ impl SimServer {
         };
         let served = self.server.serve_can(port, station)?;
         let announcement = json!({
-            "port": served.port, "protocol": "rmd", "path": served.path, "motors": ids.len(),
-            "ids": ids,
+            "port": served.port, "protocol": "rmd", "path": served.path, "motors": ids,
         });
         self.places.add(served.port, Kind::Rmd, stage);
         Ok(announcement)
@@ -132,7 +131,7 @@ impl SimServer {
     pub fn obey(&mut self, line: &str) -> Value {
         match Command::read(line).and_then(|command| self.execute(&command)) {
             Ok(answer) => answer,
-            Err(why) => json!({ "ok": false, "error": why }),
+            Err(why) => json!({ "ok": false, "error": { "kind": "usage", "message": why } }),
         }
     }
 

@@ -5,8 +5,6 @@ use motorlink_proto::st::{Flags, Status};
 use motorlink_sim::rmd::RmdNode;
 use motorlink_sim::st::StMotor;
 
-use crate::world::RMD_FAULTS;
-
 /// A signal of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signal {
@@ -57,16 +55,11 @@ impl Names {
     pub fn name(self, value: u8) -> String {
         match self {
             Names::Status => Status::from(value).to_string(),
-            Names::Faults => {
-                let bits = Flags::NAMES.iter().map(|(bit, name, _)| (u32::from(*bit), *name));
-                names(bits, value)
-            }
+            Names::Faults => listed(Flags::names(value.into())),
             Names::Mode => MODES
                 .get(usize::from(value))
                 .map_or_else(|| value.to_string(), |name| (*name).to_owned()),
-            Names::Errors => {
-                names(RMD_FAULTS.iter().map(|(bit, name)| (u32::from(bit.0), *name)), value)
-            }
+            Names::Errors => listed(Errors(value).names()),
         }
     }
 }
@@ -243,16 +236,15 @@ pub(crate) fn rmd_values(node: &RmdNode) -> impl Iterator<Item = f64> {
     RMD.iter().map(move |row| row.value(&rmd))
 }
 
-fn names<'n>(known: impl Iterator<Item = (u32, &'n str)>, bits: u8) -> String {
-    let names: Vec<&str> =
-        known.filter(|(bit, _)| u32::from(bits) & bit != 0).map(|(_, name)| name).collect();
+fn listed<'n>(names: impl Iterator<Item = &'n str>) -> String {
+    let names: Vec<&str> = names.collect();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 /// Names of modes, by the number that a run shows for each.
 const MODES: [&str; 5] = ["off", "stopped", "torque", "speed", "position"];
 
-const fn mode_number(mode: Mode) -> u8 {
+pub(crate) const fn mode_number(mode: Mode) -> u8 {
     match mode {
         Mode::Off => 0,
         Mode::Stopped => 1,

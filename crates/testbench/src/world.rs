@@ -10,10 +10,6 @@ use motorlink_sim::st::StMotor;
 use super::command::Command;
 use super::config::{RmdSide, StSide};
 
-/// Faults of an RMD motor, with the names that commands have for them.
-pub(super) const RMD_FAULTS: [(Errors, &str); 2] =
-    [(Errors::LOW_VOLTAGE, "LOW_VOLTAGE"), (Errors::OVER_TEMPERATURE, "OVER_TEMPERATURE")];
-
 /// Changes the world around an ST motor.
 pub(super) fn st(station: &mut StSide, now: Instant, command: &Command) -> Result<(), String> {
     station.advance_to(now);
@@ -62,7 +58,7 @@ pub(super) fn rmd(bus: &mut RmdSide, now: Instant, command: &Command) -> Result<
             surround(rmd_node(bus, *motor)?.motor_mut().plant_mut(), command);
         }
         Command::Fault { motor, fault, hold, .. } => {
-            let errors = named(fault, RMD_FAULTS.into_iter())?;
+            let errors = named(fault, Errors::NAMES.iter().map(|(bit, name, _)| (*bit, *name)))?;
             let motor = rmd_node(bus, *motor)?.motor_mut();
             match hold {
                 None => motor.inject(errors),

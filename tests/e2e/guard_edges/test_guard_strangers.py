@@ -66,10 +66,9 @@ def test_the_body_behind_a_web_pages_request_does_not_reach_a_served_drive(sim, 
             except ConnectionError:
                 pass
     if protocol == "st":
-        state = run("st", "-p", drives.port("tcp"), "--json", "get", "STATUS").ended(0).json
-        assert state["STATUS"]["name"] == "IDLE"
+        assert run("st", "-p", drives.port("tcp"), "get", "STATUS").ended(0).out.split()[1] == "IDLE"
     else:
-        motion = run("rmd", "-p", drives.port("slcan:tcp"), "--json", "status").ended(0).json
+        motion = run("rmd", "-p", drives.port("slcan:tcp"), "--json", "status").ended(0).values
         assert (motion["speed"], motion["multi_turn_angle"]) == (0, 0)
 
 

@@ -219,7 +219,7 @@ fn spawn(args: &Host, words: &[String], served: &Served) -> Result<Child, Failur
         .stderr(Stdio::piped())
         .process_group(0)
         .spawn()
-        .map_err(|error| Failure::Usage(format!("cannot run `{program}`: {error}")))
+        .map_err(|error| Failure::usage(format!("cannot run `{program}`: {error}")))
 }
 
 /// Gathers what comes through a pipe until its end, or until it is too much.

@@ -22,6 +22,11 @@ use crate::interrupt;
 use crate::output;
 
 pub fn run(args: Args) -> Result<(), Failure> {
+    output::put_messages_in_json(match &args.command {
+        Command::St { run, .. } | Command::Rmd { run, .. } => run.results.json_to_stdout(),
+        Command::Host(args) => args.results.json_to_stdout(),
+        Command::Scenarios { .. } | Command::Clauses { .. } => false,
+    });
     match args.command {
         Command::St { port, run, motor, profile } => {
             let name = port.name()?;
@@ -45,13 +50,13 @@ pub fn run(args: Args) -> Result<(), Failure> {
         }
         Command::Host(args) => host::run(&args),
         Command::Scenarios { which: Which::St } => {
-            output::line(&scenario_table(&hosts::st::scenarios()).trim_end())
+            output::print_line(&scenario_table(&hosts::st::scenarios()).trim_end())
         }
         Command::Scenarios { which: Which::Rmd } => {
-            output::line(&scenario_table(&hosts::rmd::scenarios()).trim_end())
+            output::print_line(&scenario_table(&hosts::rmd::scenarios()).trim_end())
         }
-        Command::Clauses { which: Which::St } => output::line(&st::table().trim_end()),
-        Command::Clauses { which: Which::Rmd } => output::line(&rmd::table().trim_end()),
+        Command::Clauses { which: Which::St } => output::print_line(&st::table().trim_end()),
+        Command::Clauses { which: Which::Rmd } => output::print_line(&rmd::table().trim_end()),
     }
 }
 

@@ -20,7 +20,7 @@ impl Results {
     pub fn screen(&self, cases: usize) -> Result<Screen, Failure> {
         match &self.only {
             Some(only) if cases == 0 => {
-                Err(Failure::Usage(format!("no case has `{only}` in its name or its clauses")))
+                Err(Failure::usage(format!("no case has `{only}` in its name or its clauses")))
             }
             _ => Ok(Screen::new(cases, self.json_to_stdout(), self.verbose)),
         }
@@ -31,21 +31,21 @@ impl Results {
             write(path, &report.to_junit(name))?;
         }
         match &self.json {
-            Some(_) if self.json_to_stdout() => output::line(&report.to_json()),
+            Some(_) if self.json_to_stdout() => output::print_line(&report.to_json()),
             Some(path) => write(path, &format!("{:#}\n", report.to_json())),
             None => Ok(()),
         }
     }
 
     /// `--json` without a file.
-    fn json_to_stdout(&self) -> bool {
+    pub fn json_to_stdout(&self) -> bool {
         self.json.as_deref() == Some(Path::new("-"))
     }
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {
     let written = std::fs::File::create(path).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|error| Failure::Usage(format!("cannot write `{}`: {error}", path.display())))
+    written.map_err(|error| Failure::usage(format!("cannot write `{}`: {error}", path.display())))
 }
 
 /// `who` is what was tested.
@@ -55,12 +55,12 @@ pub fn verdict(report: &Report, who: &str) -> Result<(), Failure> {
     }
     match report.count("not run") {
         0 => Err(refused(report, who)),
-        count => Err(Failure::Line(format!("{count} cases were not run: {}", report.lost()))),
+        count => Err(Failure::link(format!("{count} cases were not run: {}", report.lost()))),
     }
 }
 
 pub fn refused(report: &Report, who: &str) -> Failure {
-    Failure::Refused(format!(
+    Failure::refused(format!(
         "{} of {} cases failed: {who} does not do what its document says",
         report.failed().count(),
         report.outcomes.len()

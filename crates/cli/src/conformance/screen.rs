@@ -51,7 +51,7 @@ fn row(outcome: &Outcome) -> Result<(), Failure> {
         Verdict::Skipped(_) => style(word).dim(),
         Verdict::Failed(_) | Verdict::NotRun(_) => style(word).red().bold(),
     };
-    output::line(&format!(
+    output::print_line(&format!(
         "{word:<8} {}  {}",
         outcome.name,
         style(outcome.clauses.join(" ")).dim()
@@ -62,16 +62,18 @@ fn row(outcome: &Outcome) -> Result<(), Failure> {
             found(finding)?;
             demands(outcome.clauses)
         }
-        Verdict::Skipped(why) | Verdict::NotRun(why) => output::line(&format!("           {why}")),
+        Verdict::Skipped(why) | Verdict::NotRun(why) => {
+            output::print_line(&format!("           {why}"))
+        }
     }
 }
 
 /// What was sent, expected and received, and the reading that demands it.
 fn found(Finding { sent, expected, received, reading }: &Finding) -> Result<(), Failure> {
     if let Some(Reading { row, text }) = reading {
-        output::line(&format!("           reading  {row}: {text}"))?;
+        output::print_line(&format!("           reading  {row}: {text}"))?;
     }
-    output::line(&format!(
+    output::print_line(&format!(
         "           sent     {sent}\n           expected {expected}\n           received {received}"
     ))
 }
@@ -91,16 +93,16 @@ fn readings(report: &Report) -> Result<(), Failure> {
     if rows.is_empty() {
         return Ok(());
     }
-    output::line(
+    output::print_line(
         &"Differences from our readings of what the document leaves open, which are no failures:",
     )?;
     for (Reading { row, text }, outcome, finding, count) in rows {
-        output::line(&format!("{:<8} {text}", style(row).yellow()))?;
+        output::print_line(&format!("{:<8} {text}", style(row).yellow()))?;
         let others = if count > 1 { format!(", and {} others", count - 1) } else { String::new() };
-        output::line(&format!("           case     {}{others}", outcome.name))?;
+        output::print_line(&format!("           case     {}{others}", outcome.name))?;
         found(&Finding { reading: None, ..finding.clone() })?;
     }
-    output::line(&"")
+    output::print_line(&"")
 }
 
 /// What the clauses of a case demand.
@@ -108,7 +110,7 @@ fn demands(clauses: &[&str]) -> Result<(), Failure> {
     for id in clauses {
         let mut all = st::CLAUSES.iter().chain(rmd::CLAUSES);
         if let Some(clause) = all.find(|clause| clause.id == *id) {
-            output::line(&format!("           {id:<10} {}", style(clause.text).dim()))?;
+            output::print_line(&format!("           {id:<10} {}", style(clause.text).dim()))?;
         }
     }
     Ok(())
@@ -137,7 +139,7 @@ fn paragraphs(report: &Report) -> Result<(), Failure> {
         }
     }
     table.sort_by_key(|(paragraph, _)| place(paragraph));
-    output::line(&format!(
+    output::print_line(&format!(
         "{:<10} {:>7} {:>7} {:>8} {:>8} {:>8}",
         "paragraph", "passed", "failed", "reading", "skipped", "not run"
     ))?;
@@ -164,7 +166,7 @@ fn counted(
         0 => style(failed),
         _ => style(failed).red().bold(),
     };
-    output::line(&format!(
+    output::print_line(&format!(
         "{name:<10} {passed:>7} {failed:>7} {reading:>8} {skipped:>8} {not_run:>8}"
     ))
 }
@@ -181,7 +183,7 @@ fn reasons(report: &Report) -> Result<(), Failure> {
         }
     }
     for (why, count) in reasons {
-        output::line(&format!("{count} skipped: {why}"))?;
+        output::print_line(&format!("{count} skipped: {why}"))?;
     }
     Ok(())
 }

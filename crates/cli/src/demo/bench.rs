@@ -88,7 +88,7 @@ impl Control {
         let answer: Value = serde_json::from_str(&line).unwrap_or(Value::Null);
         match answer.get("error") {
             None if !answer.is_null() => Ok(answer),
-            error => Err(Failure::Line(format!(
+            error => Err(Failure::link(format!(
                 "the simulated drives did not start or obey: {}",
                 error.unwrap_or(&Value::Null)
             ))),

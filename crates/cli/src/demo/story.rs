@@ -9,7 +9,7 @@ use super::bench::Drives;
 use super::screen::{Row, Screen};
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::output::line;
+use crate::output::print_line;
 
 /// How often the table is read.
 const TICK: Duration = Duration::from_millis(50);
@@ -206,7 +206,7 @@ impl<'a> Story<'a> {
         let begun = Instant::now();
         while !reached(self)? {
             if begun.elapsed() > PATIENCE {
-                return Err(Failure::Refused(format!("{what} was expected and did not happen")));
+                return Err(Failure::refused(format!("{what} was expected and did not happen")));
             }
             self.tick()?;
         }
@@ -281,6 +281,6 @@ fn near(motor: &st::Motor<'_>, rpm: i32) -> Result<bool, Failure> {
 
 impl Summary {
     pub fn print(&self) -> Result<(), Failure> {
-        self.lines.iter().try_for_each(|text| line(text))
+        self.lines.iter().try_for_each(|text| print_line(text))
     }
 }

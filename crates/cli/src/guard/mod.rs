@@ -136,7 +136,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
 fn guard_st(args: &StArgs) -> Result<(), Failure> {
     let port = args.port.name()?;
     if port.as_line().is_none() {
-        return Err(Failure::Usage(format!(
+        return Err(Failure::usage(format!(
             "`{port}` is a CAN bus, and an ST drive is on a serial line: for RMD motors use \
              `motorlink guard rmd -p {port}`"
         )));
@@ -187,7 +187,7 @@ fn serve(
     let served: Vec<Served> =
         names.iter().map(|name| relay.serve(name)).collect::<Result<_, _>>()?;
     for Served { port: name, path } in served {
-        output::line(&json!({
+        output::print_line(&json!({
             "port": name, "protocol": protocol, "path": path, "guards": port.to_string(),
         }))?;
     }
@@ -205,7 +205,7 @@ fn serve(
     let last = relay.end();
     let told = last.iter().try_for_each(|event| tell(event, json, &supervisor));
     if last.iter().any(words::leaves_something_turning) {
-        return Err(Failure::Line("motors may still turn: not all said that they stop".into()));
+        return Err(Failure::link("motors may still turn: not all said that they stop"));
     }
     outcome.and(told)
 }
@@ -214,5 +214,5 @@ fn tell(event: &Event, json: bool, supervisor: &Supervisor) -> Result<(), Failur
     let (text, object) = words::of(event);
     supervisor.status(&text);
     note(text);
-    if json { output::line(&object) } else { Ok(()) }
+    if json { output::print_line(&object) } else { Ok(()) }
 }

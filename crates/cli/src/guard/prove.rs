@@ -9,15 +9,16 @@ use std::time::{Duration, Instant};
 
 use motorlink::port::PortName;
 use motorlink::relay::{Event, Relay};
-use motorlink::rmd::{self, CentiDps};
-use motorlink::st::{self, Ramp, Request, register};
+use motorlink::rmd::{self, CentiDps, Dps};
+use motorlink::st::register::{self, Unit};
+use motorlink::st::{self, Ramp, Request};
 use motorlink_link::serve::ServeName;
-use serde_json::json;
 
 use super::words;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
-use crate::output::{line, note};
+use crate::json::{Line, Row};
+use crate::output::{Printer, note, print_line};
 
 /// How long a motor may take to turn, or to come to rest.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -50,8 +51,8 @@ impl Protocol {
     /// Of speeds.
     fn unit(self) -> &'static str {
         match self {
-            Protocol::St => "rpm",
-            Protocol::Rmd => "°/s",
+            Protocol::St => Unit::Rpm.symbol(),
+            Protocol::Rmd => Dps::SYMBOL,
         }
     }
 }
@@ -67,10 +68,10 @@ impl Spin {
             let speed = drive.speed()?;
             if !is_told && speed / wanted >= 1.0 {
                 is_told = true;
-                line(&speed)?;
+                print_line(&speed)?;
             }
             if !is_told && Instant::now() > give_up {
-                return Err(Failure::Refused(format!(
+                return Err(Failure::refused(format!(
                     "the motor turns at {speed} {unit} and was told {told} {unit}: does it have \
                      power, and is it free to turn?",
                     unit = self.protocol.unit(),
@@ -145,7 +146,7 @@ impl Proof {
 
     pub fn show(&self, mut relay: Relay, json: bool) -> Result<(), Failure> {
         if self.speed == 0 {
-            return Err(Failure::Usage("--spin 0 turns nothing: give a speed".into()));
+            return Err(Failure::usage("--spin 0 turns nothing: give a speed"));
         }
         let folder = Folder::new()?;
         let path = folder.0.join("line");
@@ -166,11 +167,13 @@ impl Proof {
             "motor {} acknowledged its stop after {stop:.0} ms and was seen at rest after {rest:.0} ms",
             self.motor
         );
-        let object = json!({
-            "proved": true, "motor": self.motor, "speed": reached, "unit": unit,
-            "stopped_after_ms": stop, "still_after_ms": rest,
-        });
-        if json { line(&object) } else { line(&text) }
+        let values = [
+            Row::quantity("speed", reached, 0, unit),
+            Row::quantity("stopped_after", stop, 3, Unit::Millisecond.symbol()),
+            Row::quantity("still_after", rest, 3, Unit::Millisecond.symbol()),
+        ];
+        let object = Line::about(&self.port.to_string(), Some(self.motor)).ok(true).values(&values);
+        Printer { json }.result(text, object)
     }
 
     /// Waits until the motor stands still; gives the time from `since` until then, ms.
@@ -183,7 +186,7 @@ impl Proof {
                 return Ok(since.elapsed().as_secs_f64() * 1e3);
             }
             if since.elapsed() > PATIENCE {
-                return Err(Failure::Refused(format!(
+                return Err(Failure::refused(format!(
                     "motor {} still turns at {speed} {} although it acknowledged its stop: does \
                      something drive it?",
                     self.motor,
@@ -206,7 +209,7 @@ fn stopped(relay: &mut Relay, since: Instant) -> Result<f64, Failure> {
             }
         }
     }
-    Err(Failure::Line("motors may still turn: the guard could not stop them".into()))
+    Err(Failure::link("motors may still turn: the guard could not stop them"))
 }
 
 /// The program that turns the motor, a process of its own.
@@ -250,8 +253,8 @@ impl Program {
                 Err(TryRecvError::Empty) if interrupted() => return Err(Failure::Interrupted),
                 Err(TryRecvError::Empty) => {}
                 Err(TryRecvError::Disconnected) => {
-                    return Err(Failure::Line(
-                        "the motor could not be turned: see above; nothing was proved".into(),
+                    return Err(Failure::link(
+                        "the motor could not be turned: see above; nothing was proved",
                     ));
                 }
             }

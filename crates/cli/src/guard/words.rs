@@ -3,6 +3,8 @@
 use motorlink::relay::{Event, Halt, Outcome, Part, Reason};
 use serde_json::{Value, json};
 
+use crate::failure::Failure;
+
 /// An event for people, and as JSON.
 pub fn of(event: &Event) -> (String, Value) {
     match event {
@@ -44,7 +46,7 @@ pub fn of(event: &Event) -> (String, Value) {
         ),
         Event::PortLost(error) => (
             format!("the drive's port is lost: {error}"),
-            json!({ "event": "port-lost", "error": error.to_string() }),
+            json!({ "event": "port-lost", "error": Failure::from(error).object() }),
         ),
         Event::PortBack => ("the drive's port is back".into(), json!({ "event": "port-back" })),
         Event::Stopped { reason, halts } => stopped(*reason, halts),
@@ -89,12 +91,10 @@ fn as_json(halt: &Halt) -> Value {
         Part::Motor(number) => json!({ "motor": number }),
         Part::Pfc => json!({ "pfc": true }),
     };
-    let (stopped, key, said) = match &halt.outcome {
-        Outcome::Stopped(state) => (true, "state", state),
-        Outcome::Unproven(state) => (false, "state", state),
-        Outcome::Failed(error) => (false, "error", error),
-    };
-    object["stopped"] = stopped.into();
-    object[key] = said.as_str().into();
+    object["stopped"] = halt.is_stopped().into();
+    match &halt.outcome {
+        Outcome::Stopped(state) | Outcome::Unproven(state) => object["state"] = json!(state),
+        Outcome::Failed(error) => object["error"] = Failure::link(error).object(),
+    }
     object
 }

@@ -1,77 +1,73 @@
 //! Commands that change something in a motor.
 
 use motorlink::rmd::{
-    Acceleration, Code, DpsPerSecond, Error, FullTurn, IqCommand, MotionStatus, MotorSet, Pid,
-    Quantity, SetTorque4, SpeedLimit, SpinDirection, TurnCentiDegrees,
+    Acceleration, Code, DpsPerSecond, EncoderOffset, Error, FullTurn, IqCommand, MotionStatus,
+    MotorSet, Pid, Quantity, SetTorque4, SpeedLimit, SpinDirection, TurnCentiDegrees,
 };
-use serde_json::{Map, Value, json};
 
 use super::args::{self, Act, Direction};
-use super::read::rows;
 use super::session::Session;
 use crate::failure::Failure;
-use crate::output::{hex, line, parse_hex};
+use crate::output::{hex, parse_hex};
 
 pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     let motor = session.motor()?;
     let id = motor.id();
-    let output = session.output;
     match act {
         Act::Pid { gains } => pid(session, &gains),
         Act::Accel { dps_per_second: None } => {
             let acceleration = motor.acceleration()?;
-            session.confirmed()?.rows(&rows(session, &Acceleration { acceleration }))
+            session.show(&Acceleration { acceleration })
         }
         Act::Accel { dps_per_second: Some(limit) } => {
             let limit: DpsPerSecond = wanted(session, limit)?;
             motor.write_acceleration_ram(limit)?;
-            output.done(format!("motor {id} accelerates with {limit} until power-off"))
+            session.done(format!("motor {id} accelerates with {limit} until power-off"))
         }
         Act::Encoder { offset } => encoder(session, offset),
         Act::Zero => {
             session.rom("setting the zero")?;
             let offset = motor.write_zero_rom()?;
-            output.result(
+            session.output.result(
                 format!("motor {id} has its zero here from the next power-on on (offset {offset})"),
-                json!({ "ok": true, "offset": offset }),
+                session.line(session.id).ok(true).values(&session.rows(&EncoderOffset { offset })),
             )
         }
         Act::Off => {
             motor.off()?;
-            output.done(format!("motor {id} is off"))
+            session.done(format!("motor {id} is off"))
         }
         Act::Stop => {
             motor.stop()?;
-            output.done(format!("motor {id} is stopped; `run` resumes"))
+            session.done(format!("motor {id} is stopped; `run` resumes"))
         }
         Act::Run => {
             motor.run()?;
-            output.done(format!("motor {id} resumes what `stop` stopped, if anything"))
+            session.done(format!("motor {id} resumes what `stop` stopped, if anything"))
         }
-        Act::Torque { amps } => {
-            output.rows(&rows(session, &motor.set_torque(wanted(session, amps)?)?))
-        }
-        Act::Speed { dps } => output.rows(&rows(session, &motor.set_speed(wanted(session, dps)?)?)),
+        Act::Torque { amps } => session.replied(&motor.set_torque(wanted(session, amps)?)?),
+        Act::Speed { dps } => session.replied(&motor.set_speed(wanted(session, dps)?)?),
         Act::Move { degrees, max_speed, direction: None, .. } => {
             let max_speed = max_speed.map(|speed| wanted(session, speed)).transpose()?;
-            let status = motor.set_position(wanted(session, degrees)?, max_speed)?;
-            output.rows(&rows(session, &status))
+            session.replied(&motor.set_position(wanted(session, degrees)?, max_speed)?)
         }
         Act::Move { degrees, max_speed, direction: Some(direction), full_turn } => {
             let max_speed = max_speed.map(|speed| wanted(session, speed)).transpose()?;
-            let status = turn(session, degrees, max_speed, direction, &full_turn)?;
-            output.rows(&rows(session, &status))
+            session.replied(&turn(session, degrees, max_speed, direction, &full_turn)?)
         }
         Act::ClearError => {
             let status = motor.clear_errors()?;
-            output.rows(&rows(session, &status))?;
             if status.errors.is_empty() {
-                return Ok(());
+                return session.replied(&status);
             }
-            Err(Failure::Refused(format!(
+            let failure = Failure::refused(format!(
                 "motor {id} keeps its errors, their cause is still there: {}",
                 status.errors
-            )))
+            ))
+            .about(&session.port, session.id);
+            let object = session.line(session.id).failed(&failure);
+            session.output.rows(object, &session.rows(&status))?;
+            Err(failure)
         }
         Act::Torque4 { amps } => set_torque4(session, &amps),
         Act::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
@@ -84,15 +80,12 @@ fn pid(session: &Session, gains: &[u8]) -> Result<(), Failure> {
         let gains = Pid { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki };
         if session.write_rom {
             motor.write_pid_rom(gains)?;
-            return session.output.done(format!("motor {} has these gains for good", motor.id()));
+            return session.done(format!("motor {} has these gains for good", motor.id()));
         }
         motor.write_pid_ram(gains)?;
-        return session
-            .output
-            .done(format!("motor {} has these gains until power-off", motor.id()));
+        return session.done(format!("motor {} has these gains until power-off", motor.id()));
     }
-    let gains = motor.pid()?;
-    session.confirmed()?.rows(&rows(session, &gains))
+    session.show(&motor.pid()?)
 }
 
 fn encoder(session: &Session, offset: Option<u16>) -> Result<(), Failure> {
@@ -101,16 +94,16 @@ fn encoder(session: &Session, offset: Option<u16>) -> Result<(), Failure> {
         session.rom("setting the encoder offset")?;
         let taken = motor.write_encoder_offset_rom(offset)?;
         if taken != offset {
-            return Err(Failure::Refused(format!(
+            return Err(Failure::refused(format!(
                 "motor {} took the offset {taken} instead of {offset}: its encoder is narrower",
                 motor.id()
             )));
         }
         let text = format!("motor {} has the encoder offset {taken}", motor.id());
-        return session.output.result(text, json!({ "ok": true, "offset": taken }));
+        let values = session.rows(&EncoderOffset { offset: taken });
+        return session.output.result(text, session.line(session.id).ok(true).values(&values));
     }
-    let encoder = motor.encoder()?;
-    session.confirmed()?.rows(&rows(session, &encoder))
+    session.show(&motor.encoder()?)
 }
 
 fn turn(
@@ -135,9 +128,9 @@ fn turn(
     session.motor()?.set_single_turn_position(angle, spin, max_speed, full_turn).map_err(|error| {
         match error {
             Error::FullTurn { past: TurnCentiDegrees(0), .. } => {
-                Failure::Usage(format!("{error}; `--full-turn` sends it all the same"))
+                Failure::usage(format!("{error}; `--full-turn` sends it all the same"))
             }
-            Error::FullTurn { .. } => Failure::Usage(format!(
+            Error::FullTurn { .. } => Failure::usage(format!(
                 "{error}; try `--direction {other}`, or `--full-turn` if it may be a full turn"
             )),
             error => error.into(),
@@ -153,46 +146,44 @@ fn set_torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
     let replies = session.bus.set_torque4(SetTorque4(torques), MotorSet::TORQUE4)?;
     let mut silent = None;
     for (reply, id) in replies.into_iter().zip(1..) {
+        let object = session.line(id);
         match reply {
             Some(Ok(status)) => {
-                let rows = rows(session, &status);
-                let values: Vec<&str> = rows.iter().map(|(_, text, _)| text.as_str()).collect();
-                let fields =
-                    rows.iter().map(|(name, _, value)| ((*name).to_owned(), value.clone()));
-                let object: Map<String, Value> =
-                    std::iter::once(("id".to_owned(), json!(id))).chain(fields).collect();
-                session
-                    .output
-                    .result(format!("motor {id}  {}", values.join("   ")), Value::Object(object))?;
+                let rows = session.rows(&status);
+                let texts: Vec<&str> = rows.iter().map(|row| row.text.as_str()).collect();
+                let text = format!("motor {id}  {}", texts.join("   "));
+                session.output.result(text, object.ok(true).values(&rows))?;
             }
             Some(Err(error)) => {
-                silent.get_or_insert(error);
+                let failure = Failure::from(error).about(&session.port, id);
+                if session.output.json {
+                    session.output.result("", object.failed(&failure))?;
+                }
+                silent.get_or_insert(failure);
             }
             None => {}
         }
     }
-    silent.map_or(Ok(()), |error| Err(error.into()))
+    silent.map_or(Ok(()), Err)
 }
 
 fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
     let mut request = [0; 8];
     let Some(room) = request.get_mut(..bytes.len()) else {
-        return Err(Failure::Usage(format!("a frame has 8 bytes, not {}", bytes.len())));
+        return Err(Failure::usage(format!("a frame has 8 bytes, not {}", bytes.len())));
     };
     room.copy_from_slice(bytes);
     if Code::from(request[0]).info().is_some_and(|row| row.rom) {
         session.rom(&format!("{:#04x}", request[0]))?;
     }
     let reply = session.bus.raw(session.motor()?.id(), request)?;
-    if session.output.json {
-        return session.output.result("", json!({ "ok": true, "data": hex(&reply) }));
-    }
-    line(&hex(&reply))
+    let data = hex(&reply);
+    session.output.result(&data, session.line(session.id).ok(true).with("data", &*data))
 }
 
 /// A value in the physical unit, or with --raw in digits. What no frame of the protocol says is
 /// refused, never cut.
 fn wanted<Q: Quantity>(session: &Session, value: f64) -> Result<Q, Failure> {
     let wanted = if session.raw { Q::wanted_digits(value) } else { Q::wanted(value) };
-    wanted.map_err(|error| Failure::Usage(format!("{error}; nothing was sent")))
+    wanted.map_err(|error| Failure::usage(format!("{error}; nothing was sent")))
 }

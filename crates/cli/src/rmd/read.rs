@@ -1,17 +1,15 @@
 //! Commands that read.
 
-use motorlink::rmd::{
-    Field, Meaning, MotorId, MotorSet, MultiTurnAngle, Payload, ScanResult, SingleTurnAngle,
-};
-use serde_json::{Value, json};
+use motorlink::rmd::{MotorId, MotorSet, MultiTurnAngle, ScanResult, SingleTurnAngle};
 
 use super::session::Session;
 use crate::failure::Failure;
-use crate::output::{line, progress};
+use crate::json::Row;
+use crate::output::progress;
 use crate::repeat::{Repeat, repeated};
 
-/// One value: name, text for people, value for programs.
-pub type Row = (&'static str, String, Value);
+/// The version of the protocol that is spoken here.
+const DRIVEN: &str = "V1.62";
 
 pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
     let wanted: MotorSet = ids.iter().copied().filter_map(MotorId::new).collect();
@@ -27,46 +25,41 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
         | ScanResult::Shared(id) => *id,
     });
     if found.iter().any(|found| matches!(found, ScanResult::Echo(_))) {
-        return Err(Failure::Line(
+        return Err(Failure::link(
             "what was sent came back: the adapter echoes, which looks like motors that answer; add \
-             echo=1 to the port, as in slcan:/dev/ttyACM0?echo=1"
-                .to_owned(),
+             echo=1 to the port, as in slcan:/dev/ttyACM0?echo=1",
         ));
     }
     for motor in &found {
         match motor {
-            ScanResult::Motor(id, status) => session.output.result(
-                format!(
-                    "motor {id:<2}  V1.62  {:>5.1} V  {:>3} °C  errors: {}",
-                    status.voltage.volts(),
-                    status.temperature.0,
-                    status.errors
-                ),
-                json!({
-                    "id": id.number(), "protocol": "V1.62",
-                    "voltage": rounded(status.voltage.volts(), 1),
-                    "temperature": status.temperature.0, "errors": status.errors.words().collect::<Value>(),
-                }),
-            )?,
+            ScanResult::Motor(id, status) => {
+                let rows = session.rows(status);
+                let texts: Vec<String> =
+                    rows.iter().map(|row| format!("{:>6}", row.text)).collect();
+                session.output.result(
+                    format!("motor {id:<2}  {DRIVEN}  {}", texts.join("  ")),
+                    session.line(id.number()).with("dialect", DRIVEN).values(&rows),
+                )?;
+            }
             ScanResult::Foreign(id, dialect) => session.output.result(
                 format!("motor {id:<2}  speaks {dialect}: it is not driven with this protocol"),
-                json!({ "id": id.number(), "protocol": dialect.to_string() }),
+                session.line(id.number()).with("dialect", dialect.to_string()),
             )?,
             ScanResult::Shared(id) => session.output.result(
                 format!("motor {id:<2}  answers another program or host, too"),
-                json!({ "id": id.number(), "shared": true }),
+                session.line(id.number()).with("shared", true),
             )?,
             ScanResult::Echo(_) => {}
         }
     }
     if let (true, Some(trouble)) = (found.is_empty(), session.bus.trouble()) {
-        return Err(Failure::Line(format!(
+        return Err(Failure::link(format!(
             "no motor answered, and the adapter may be the cause: {trouble}"
         )));
     }
     if found.is_empty() {
-        return Err(Failure::Line(
-            "no motor answered; is the supply on, the bus terminated, the bitrate 1 Mbit/s?".into(),
+        return Err(Failure::link(
+            "no motor answered; is the supply on, the bus terminated, the bitrate 1 Mbit/s?",
         ));
     }
     Ok(())
@@ -75,11 +68,10 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
 pub fn status(session: &Session, repeat: Repeat) -> Result<(), Failure> {
     show(session, repeat, |session| {
         let motor = session.motor()?;
-        let mut all = vec![("id", motor.id().to_string(), json!(motor.id().number()))];
-        all.extend(rows(session, &motor.status()?));
-        // The temperature stands there already.
-        all.extend(rows(session, &motor.motion_status()?).into_iter().skip(1));
-        all.extend(rows(session, &motor.phase_currents()?));
+        let mut all = session.rows(&motor.status()?);
+        // The temperature is there already.
+        all.extend(session.rows(&motor.motion_status()?).into_iter().skip(1));
+        all.extend(session.rows(&motor.phase_currents()?));
         all.extend(angles(session)?);
         Ok(all)
     })
@@ -94,67 +86,28 @@ fn show(
     repeat: Repeat,
     mut sample: impl FnMut(&Session) -> Result<Vec<Row>, Failure>,
 ) -> Result<(), Failure> {
+    let object = session.line(session.id);
     repeated(
         &session.bus.clock(),
         repeat,
+        session.output,
+        &object,
         || {
             let rows = sample(session)?;
-            session.confirmed()?;
+            session.confirm()?;
             Ok(rows)
         },
-        |rows, at| match at {
-            None => session.output.rows(rows),
-            Some(at) if session.output.json => {
-                let mut rows = rows.to_vec();
-                rows.insert(0, ("t", String::new(), json!(rounded(at, 6))));
-                session.output.rows(&rows)
-            }
-            Some(at) => {
-                let values: Vec<String> = rows
-                    .iter()
-                    .map(|(name, text, _)| format!("{} {text}", name.replace('_', " ")))
-                    .collect();
-                line(&format!("{at:>9.3} s  {}", values.join("   ")))
-            }
-        },
+        |rows, at| session.output.sample(object.clone(), rows, at),
     )
 }
 
 fn angles(session: &Session) -> Result<Vec<Row>, Failure> {
     let motor = session.motor()?;
-    let multi_turn = MultiTurnAngle { angle: motor.multi_turn_angle()? };
-    let single_turn = SingleTurnAngle { angle: motor.single_turn_angle()? };
-    let named =
-        |name, rows: Vec<Row>| rows.into_iter().map(move |(_, text, value)| (name, text, value));
-    let multi_turn = named("multi_turn_angle", rows(session, &multi_turn));
-    Ok(multi_turn.chain(named("single_turn_angle", rows(session, &single_turn))).collect())
-}
-
-/// The values of a message, as the command table has them.
-pub fn rows<P: Payload>(session: &Session, message: &P) -> Vec<Row> {
-    let data = message.encode_as(0);
-    P::FIELDS.iter().map(|field| row(session, field, &data)).collect()
-}
-
-fn row(session: &Session, field: &Field, data: &[u8; 8]) -> Row {
-    let digits = field.raw(data);
-    if session.raw {
-        return (field.name, digits.to_string(), json!(digits));
-    }
-    let value = match (field.meaning, field.scale.decimals) {
-        (Meaning::Bits(bits), _) => bits
-            .iter()
-            .filter(|(bit, _)| digits & i64::from(*bit) != 0)
-            .map(|(_, word)| *word)
-            .collect(),
-        (Meaning::Words(_), _) => json!(field.shown(data).to_string()),
-        (Meaning::Number, 0) => json!(digits),
-        (Meaning::Number, decimals) => json!(rounded(field.value(data), decimals)),
+    let multi_turn = session.rows(&MultiTurnAngle { angle: motor.multi_turn_angle()? });
+    let single_turn = session.rows(&SingleTurnAngle { angle: motor.single_turn_angle()? });
+    let named = |name: &'static str, rows: Vec<Row>| {
+        rows.into_iter().map(move |row| Row { name: name.to_owned(), ..row })
     };
-    (field.name, field.shown(data).to_string(), value)
-}
-
-fn rounded(value: f64, decimals: u8) -> f64 {
-    let scale = 10f64.powi(decimals.into());
-    (value * scale).round() / scale
+    let multi_turn = named("multi_turn_angle", multi_turn);
+    Ok(multi_turn.chain(named("single_turn_angle", single_turn)).collect())
 }

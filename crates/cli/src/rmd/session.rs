@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use motorlink::rmd::{Client, Motor, Options};
+use motorlink::port::PortName;
+use motorlink::rmd::{Client, Motor, Options, Payload};
 
 use super::args::MotorArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
+use crate::json::{self, Line, Row};
 use crate::output::Printer;
 
 /// An open bus, the motor that is meant, and how to show what it says.
@@ -16,22 +18,53 @@ pub struct Session {
     pub output: Printer,
     pub raw: bool,
     pub write_rom: bool,
+    pub port: String,
 }
 
-pub fn connect(connection: &Connection, motor: &MotorArgs) -> Result<Session, Failure> {
-    let port = connection.port()?;
+pub fn connect(
+    connection: &Connection,
+    motor: &MotorArgs,
+    port: &PortName,
+) -> Result<Session, Failure> {
     let timeout = Duration::from_millis(motor.timeout.into());
     let options = Options { timeout, ..Options::default() };
-    let bus = Client::open_wrapped(&port, connection.around_bus()?, options)?;
+    let bus = Client::open_wrapped(port, connection.around_bus()?, options)?;
     let (output, raw) = (connection.output(), connection.raw);
-    Ok(Session { bus, id: motor.id, output, raw, write_rom: motor.write_rom })
+    let (id, write_rom, port) = (motor.id, motor.write_rom, port.to_string());
+    Ok(Session { bus, id, output, raw, write_rom, port })
 }
 
 impl Session {
-    /// Where results go, which come from replies to their own requests.
-    pub fn confirmed(&self) -> Result<Printer, Failure> {
-        self.bus.confirm(self.motor()?.id())?;
-        Ok(self.output)
+    /// Makes sure that replies came to their own requests.
+    pub fn confirm(&self) -> Result<(), Failure> {
+        Ok(self.bus.confirm(self.motor()?.id())?)
+    }
+
+    /// What a result for programs begins with.
+    pub fn line(&self, id: u8) -> Line {
+        Line::about(&self.port, Some(id))
+    }
+
+    /// Says that it was done.
+    pub fn done(&self, text: impl std::fmt::Display) -> Result<(), Failure> {
+        self.output.result(text, self.line(self.id).ok(true))
+    }
+
+    /// Says that it was done, with the values of the reply.
+    pub fn replied<P: Payload>(&self, reply: &P) -> Result<(), Failure> {
+        self.output.rows(self.line(self.id).ok(true), &self.rows(reply))
+    }
+
+    /// Shows the values of a reply once it is confirmed.
+    pub fn show<P: Payload>(&self, reply: &P) -> Result<(), Failure> {
+        self.confirm()?;
+        self.output.rows(self.line(self.id), &self.rows(reply))
+    }
+
+    /// The values of a message, as the command table has them.
+    pub fn rows<P: Payload>(&self, message: &P) -> Vec<Row> {
+        let data = message.encode_as(0);
+        P::FIELDS.iter().map(|field| json::field(field, &data, self.raw)).collect()
     }
 
     pub fn motor(&self) -> Result<Motor<'_>, Failure> {
@@ -43,7 +76,7 @@ impl Session {
         if self.write_rom {
             return Ok(());
         }
-        Err(Failure::Usage(format!(
+        Err(Failure::usage(format!(
             "{what} writes to the motor's ROM, which wears; add --write-rom if that is meant"
         )))
     }

@@ -181,7 +181,7 @@ impl Lines {
 
 impl From<ConfigError> for Failure {
     fn from(error: ConfigError) -> Self {
-        Failure::Usage(error.to_string())
+        Failure::usage(error.to_string())
     }
 }
 
@@ -189,8 +189,8 @@ impl From<ServeError> for Failure {
     fn from(error: ServeError) -> Self {
         match error {
             ServeError::Port(error) => error.into(),
-            ServeError::Rom(error @ RomError::Io { .. }) => Failure::Line(error.to_string()),
-            other => Failure::Usage(other.to_string()),
+            ServeError::Rom(error @ RomError::Io { .. }) => Failure::link(error.to_string()),
+            other => Failure::usage(other.to_string()),
         }
     }
 }

@@ -4,7 +4,7 @@ use motorlink_testbench::preset;
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
-use crate::output::line;
+use crate::output::print_line;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -17,9 +17,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     for (name, config) in preset::ALL {
         let plant = shortest(&config())?;
         if args.json {
-            line(&json!({ "preset": name, "plant": plant }))?;
+            print_line(&json!({ "preset": name, "plant": plant }))?;
         } else {
-            line(&format!("# {name}"))?;
+            print_line(&format!("# {name}"))?;
             settings("plant", &plant)?;
         }
     }
@@ -30,7 +30,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 fn shortest(plant: &impl serde::Serialize) -> Result<Value, Failure> {
     let text = serde_json::to_string(plant);
     let value = text.and_then(|text| serde_json::from_str(&text));
-    value.map_err(|error| Failure::Line(format!("a preset cannot be written: {error}")))
+    value.map_err(|error| Failure::link(format!("a preset cannot be written: {error}")))
 }
 
 /// Prints each value as a line of TOML. What is not there has none.
@@ -40,6 +40,6 @@ fn settings(key: &str, value: &Value) -> Result<(), Failure> {
         Value::Object(members) => {
             members.iter().try_for_each(|(name, value)| settings(&format!("{key}.{name}"), value))
         }
-        value => line(&format!("{key} = {value}")),
+        value => print_line(&format!("{key} = {value}")),
     }
 }

@@ -5,12 +5,14 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use motorlink::st::register::Unit;
 use motorlink_testbench::scenario::{Kind, Run, Scenario, ScenarioError};
 use serde_json::{Map, Value, json};
 
 use super::plot;
 use crate::failure::Failure;
-use crate::output::{Printer, line, note};
+use crate::json;
+use crate::output::{Printer, note, print_line};
 
 /// Values of the final state in a line of text.
 const ON_A_LINE: usize = 5;
@@ -34,7 +36,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let scenario = Scenario::read(&args.scenario)?;
     if args.plot.is_some() && scenario.panels.is_empty() {
         let why = "there is nothing to plot: add a [[panel]] with signals";
-        return Err(Failure::Usage(format!("{}: {why}", args.scenario.display())));
+        return Err(Failure::usage(format!("{}: {why}", args.scenario.display())));
     }
     let began = Instant::now();
     let run = scenario.run()?;
@@ -48,19 +50,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         write(path, |out| run.write_csv(out))?;
     }
     if let Some(path) = &args.plot {
-        let picture = plot::draw(&scenario, &run).map_err(Failure::Line)?;
+        let picture = plot::draw(&scenario, &run).map_err(Failure::link)?;
         write(path, |out| out.write_all(picture.as_bytes()))?;
     }
     let output = Printer { json: args.json };
     if output.json {
-        line(&object(&scenario, &run, seconds))?;
+        print_line(&object(&scenario, &run, seconds))?;
     } else {
         text(&scenario, &run, seconds)?;
     }
     if run.as_expected() {
         return Ok(());
     }
-    Err(Failure::Refused(not_as_expected(&run)))
+    Err(Failure::refused(not_as_expected(&run)))
 }
 
 fn write(
@@ -72,13 +74,13 @@ fn write(
         content(&mut out)?;
         out.flush()
     });
-    written.map_err(|error| Failure::Line(format!("cannot write `{}`: {error}", path.display())))
+    written.map_err(|error| Failure::link(format!("cannot write `{}`: {error}", path.display())))
 }
 
 fn text(scenario: &Scenario, run: &Run, seconds: f64) -> Result<(), Failure> {
-    line(&scenario.title)?;
+    print_line(&scenario.title)?;
     let samples = run.times().count();
-    line(&format!(
+    print_line(&format!(
         "  simulated   {seconds} s, {samples} samples of {} signals",
         run.signals.len()
     ))?;
@@ -86,18 +88,18 @@ fn text(scenario: &Scenario, run: &Run, seconds: f64) -> Result<(), Failure> {
         let mut head = drive.as_str();
         for shown in signals.chunks(ON_A_LINE) {
             let shown: Vec<&str> = shown.iter().map(|(_, _, text)| text.as_str()).collect();
-            line(&format!("  {head:<10}  {}", shown.join(", ")))?;
+            print_line(&format!("  {head:<10}  {}", shown.join(", ")))?;
             head = "";
         }
     }
     for verdict in &run.verdicts {
         let mark = if verdict.holds { "holds" } else { "FAILS" };
         let (why, signal, found) = (&verdict.why, &verdict.signal, &verdict.found);
-        line(&format!("  {mark:<10}  {why}: {signal} {found}"))?;
+        print_line(&format!("  {mark:<10}  {why}: {signal} {found}"))?;
     }
     let holding = run.verdicts.iter().filter(|verdict| verdict.holds).count();
-    line(&format!("  expected    {holding} of {} expectations hold", run.verdicts.len()))?;
-    line(&format!("  state hash  {:016x}", run.state_hash))
+    print_line(&format!("  expected    {holding} of {} expectations hold", run.verdicts.len()))?;
+    print_line(&format!("  state hash  {:016x}", run.state_hash))
 }
 
 fn object(scenario: &Scenario, run: &Run, seconds: f64) -> Value {
@@ -122,10 +124,10 @@ fn object(scenario: &Scenario, run: &Run, seconds: f64) -> Value {
         })
         .collect();
     json!({
+        "ok": run.as_expected(),
         "title": scenario.title,
-        "seconds": seconds,
+        "duration": json::quantity(seconds, 6, Unit::Second.symbol()),
         "samples": run.times().count(),
-        "as_expected": run.as_expected(),
         "final": drives,
         "expectations": run.verdicts,
         "refusals": refusals,
@@ -173,6 +175,6 @@ fn not_as_expected(run: &Run) -> String {
 
 impl From<ScenarioError> for Failure {
     fn from(error: ScenarioError) -> Self {
-        Failure::Usage(error.to_string())
+        Failure::usage(error.to_string())
     }
 }

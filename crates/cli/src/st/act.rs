@@ -4,16 +4,17 @@ use std::time::Duration;
 
 use motorlink::st::{
     Command as Execute, CurrentReference, Flags, PositionMove, Profile, REVUP_PHASES, Ramp,
-    RevupPhase, Status, TorqueRamp, VERIFY_ATTEMPTS, find_register, parse_value,
+    RegisterId, RevupPhase, Status, TorqueRamp, VERIFY_ATTEMPTS, find_register, parse_value,
+    register::Unit,
 };
 use motorlink::time;
-use serde_json::json;
 
 use super::args::{Act, Pfc};
 use super::read::explain;
 use super::session::Session;
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::json::{self, Row};
 use crate::output::{hex, parse_hex};
 
 pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
@@ -35,7 +36,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         Act::Pfc { action: Pfc::FaultAck } => execute(session, Execute::PfcFaultAck),
         Act::Ramp { rpm, ms } => {
             motor.set_ramp(Ramp { speed_rpm: rpm, duration_ms: ms })?;
-            session.confirmed()?.done(format!(
+            session.done(format!(
                 "{}: ramp to {rpm} rpm in {ms} ms acknowledged; it executes while the motor runs",
                 motor.number()
             ))
@@ -43,23 +44,20 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         Act::TorqueRamp { iq, ms } => {
             session.wants(Profile::Mcsdk54, "torque ramps")?;
             motor.set_torque_ramp(TorqueRamp { torque_s16a: iq, duration_ms: ms })?;
-            session
-                .confirmed()?
-                .done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
+            session.done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
         }
         Act::Move { rad, seconds } => {
             session.wants(Profile::Mcsdk54, "moves")?;
             if !rad.is_finite() || !seconds.is_finite() || seconds < 0.0 {
-                return Err(Failure::Usage(format!("{rad} rad in {seconds} s is no move")));
+                return Err(Failure::usage(format!("{rad} rad in {seconds} s is no move")));
             }
             motor.set_position(PositionMove { angle_rad: rad, duration_s: seconds })?;
             session
-                .confirmed()?
                 .done(format!("{}: move to {rad} rad in {seconds} s acknowledged", motor.number()))
         }
         Act::Current { iq, id } => {
             motor.set_current_reference(CurrentReference { iq_s16a: iq, id_s16a: id })?;
-            session.confirmed()?.done(format!("{}: references Iq {iq}, Id {id}", motor.number()))
+            session.done(format!("{}: references Iq {iq}, Id {id}", motor.number()))
         }
         Act::Revup { phase: None, .. } => revup(session),
         Act::Revup { phase: Some(phase), rpm, torque, ms } => {
@@ -69,7 +67,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
                 duration_ms: ms.unwrap_or_default(),
             };
             motor.set_revup_data(phase, data)?;
-            session.confirmed()?.done(format!("{}: rev-up phase {phase} is set", motor.number()))
+            session.done(format!("{}: rev-up phase {phase} is set", motor.number()))
         }
         Act::Raw { bytes } => raw(session, &parse_hex(&bytes)?),
     }
@@ -78,7 +76,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
 fn execute(session: &Session, command: Execute) -> Result<(), Failure> {
     let motor = session.motor()?;
     motor.execute(command)?;
-    session.confirmed()?.done(format!("{}: {command} acknowledged", motor.number()))
+    session.done(format!("{}: {command} acknowledged", motor.number()))
 }
 
 /// A drive acknowledges a START that has no effect, so its state is read back.
@@ -89,21 +87,23 @@ fn start(session: &Session) -> Result<(), Failure> {
     match status {
         Status::FaultNow | Status::FaultOver => {
             let faults = explain(motor.flags()?);
-            Err(Failure::Refused(format!(
+            Err(Failure::refused(format!(
                 "{} did not start, it is in {status}: {faults}\nclear it with \
                  `motorlink st fault-ack` when the cause is gone",
                 motor.number()
             )))
         }
         Status::AnyStop | Status::Stop | Status::StopIdle | Status::WaitStopMotor => {
-            Err(Failure::Refused(format!(
+            Err(Failure::refused(format!(
                 "{} did not start, it is still stopping ({status}); start it when it is IDLE",
                 motor.number()
             )))
         }
         _ => {
             let text = format!("{} starts: {status}", motor.number());
-            session.confirmed()?.result(text, json!({ "ok": true, "STATUS": status.to_string() }))
+            let reading = session.reading(RegisterId::STATUS, u8::from(status).into());
+            let values = [json::register(&reading, String::new(), session.raw)];
+            session.confirmed()?.result(text, session.line().ok(true).values(&values))
         }
     }
 }
@@ -122,11 +122,13 @@ fn acknowledge(session: &Session) -> Result<(), Failure> {
         let faults = motor.flags()?;
         if faults == Flags::default() {
             let text = format!("{}: no faults", motor.number());
-            return session.confirmed()?.result(text, json!({ "ok": true, "FLAGS": 0 }));
+            let reading = session.reading(RegisterId::FLAGS, 0);
+            let values = [json::register(&reading, String::new(), session.raw)];
+            return session.confirmed()?.result(text, session.line().ok(true).values(&values));
         }
         if clock.now() > give_up || !interrupt::wait_by(&clock, Duration::from_millis(10)) {
             let why = explain(faults);
-            return Err(Failure::Refused(format!("{} keeps its faults: {why}", motor.number())));
+            return Err(Failure::refused(format!("{} keeps its faults: {why}", motor.number())));
         }
     }
 }
@@ -140,10 +142,11 @@ fn set(session: &Session, name: &str, text: &str, verify: Option<u8>) -> Result<
         let attempt = motor.set_raw_verified(register, bits, attempts)?;
         let again = if attempt == 1 { String::new() } else { format!(", at attempt {attempt}") };
         let text = format!("{}: {register} is written and reads back{again}", motor.number());
-        return session.output.result(text, json!({ "ok": true, "attempts": attempt }));
+        let object = session.line().ok(true).with("attempts", attempt);
+        return session.output.result(text, object);
     }
     motor.set_raw(register, bits, register.write_size(profile))?;
-    session.confirmed()?.done(format!("{}: {register} is written", motor.number()))
+    session.done(format!("{}: {register} is written", motor.number()))
 }
 
 fn revup(session: &Session) -> Result<(), Failure> {
@@ -153,18 +156,20 @@ fn revup(session: &Session) -> Result<(), Failure> {
         phases.push(motor.revup_data(phase)?);
         session.client.confirm()?;
     }
-    let output = session.output;
     for (phase, RevupPhase { speed_rpm, torque_s16a, duration_ms }) in
         phases.into_iter().enumerate()
     {
-        output.result(
-            format!(
-                "phase {phase}  {speed_rpm:>6} rpm  {torque_s16a:>6} s16A  {duration_ms:>5} ms"
-            ),
-            json!({
-                "phase": phase, "speed_rpm": speed_rpm, "torque_s16a": torque_s16a,
-                "duration_ms": duration_ms,
-            }),
+        let values = [
+            ("speed", speed_rpm, Unit::Rpm),
+            ("torque", torque_s16a.into(), Unit::S16A),
+            ("duration", duration_ms.into(), Unit::Millisecond),
+        ];
+        let rows = values
+            .map(|(name, value, unit)| Row::quantity(name, f64::from(value), 0, unit.symbol()));
+        let texts = rows.iter().map(|row| format!("  {:>11}", row.text));
+        session.output.result(
+            format!("phase {phase}{}", texts.collect::<String>()),
+            session.line().with("phase", phase).values(&rows),
         )?;
     }
     Ok(())
@@ -174,12 +179,12 @@ fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
     let (code, payload) = match bytes {
         [code @ 0..=0x1F, payload @ ..] => (*code, payload),
         _ => {
-            return Err(Failure::Usage(
-                "the first byte is the frame code, 00 to 1f; --motor adds the motor".to_owned(),
+            return Err(Failure::usage(
+                "the first byte is the frame code, 00 to 1f; --motor adds the motor",
             ));
         }
     };
     let reply = session.client.raw(session.motor, code, payload)?;
     let text = if reply.is_empty() { "ACK".to_owned() } else { format!("ACK {}", hex(&reply)) };
-    session.confirmed()?.result(text, json!({ "ok": true, "payload": hex(&reply) }))
+    session.confirmed()?.result(text, session.line().ok(true).with("data", hex(&reply)))
 }

@@ -9,9 +9,11 @@ mod session;
 use std::time::Duration;
 
 pub use args::Args;
-use args::{Command, Read};
+use args::{Command, DriveArgs, Read};
+use motorlink::port::PortName;
 use session::connect;
 
+use crate::connection::Connection;
 use crate::failure::Failure;
 
 /// How long a drive has to answer a question of a scan unless told otherwise, ms.
@@ -19,14 +21,28 @@ const SCAN_TIMEOUT: u32 = 200;
 
 pub fn run(args: Args) -> Result<(), Failure> {
     let Args { connection, drive, command } = args;
-    let connect = || connect(&connection, &drive);
+    let port = match command {
+        Command::Read(Read::Registers) => return read::registers(connection.output()),
+        _ => connection.port()?,
+    };
+    let done = run_at(&connection, &drive, &port, command);
+    done.map_err(|failure| failure.about(&port.to_string(), drive.motor))
+}
+
+fn run_at(
+    connection: &Connection,
+    drive: &DriveArgs,
+    port: &PortName,
+    command: Command,
+) -> Result<(), Failure> {
+    let connect = || connect(connection, drive, port);
     match command {
         Command::Act(act) => act::run(&connect()?, act),
         Command::Read(read) => match read {
             Read::Registers => read::registers(connection.output()),
             Read::Scan { rates } => {
                 let patience = drive.timeout.unwrap_or(SCAN_TIMEOUT);
-                scan::run(&connection, Duration::from_millis(patience.into()), &rates)
+                scan::run(connection, port, Duration::from_millis(patience.into()), &rates)
             }
             Read::Get { registers, repeat } => read::get(&connect()?, &registers, repeat),
             Read::Segment { number, registers, repeat } => {

@@ -1,11 +1,14 @@
 //! Commands that read.
 
-use motorlink::st::{Flags, Profile, Reading, RegisterId, Status, find_register, register};
-use serde_json::{Map, Value, json};
+use motorlink::st::{
+    FirmwareVersion, Flags, Profile, Reading, RegisterId, Status, find_register, register,
+};
+use serde_json::{Value, json};
 
 use super::session::Session;
 use crate::failure::Failure;
-use crate::output::{Printer, line};
+use crate::json::{self, Line, Row};
+use crate::output::Printer;
 use crate::repeat::{Repeat, repeated};
 
 pub fn registers(output: Printer) -> Result<(), Failure> {
@@ -26,7 +29,7 @@ pub fn registers(output: Printer) -> Result<(), Failure> {
             ),
             json!({
                 "id": id.0, "name": name, "type": ty, "mcsdk_type": mcsdk, "access": access, "unit": unit,
-                "needs": shape.feature.name(), "doc": text.doc,
+                "feature": shape.feature.name(), "doc": text.doc,
                 "profile": if origin.is_empty() { Value::Null } else { "mcsdk-5.4".into() },
             }),
         )?;
@@ -38,22 +41,19 @@ pub fn info(session: &Session) -> Result<(), Failure> {
     let info = session.client.board_info()?;
     session.client.confirm()?;
     let [major, minor, patch] = info.version;
-    let mut rows = vec![
-        ("sdk", info.name.clone(), json!(info.name)),
-        ("version", format!("{major}.{minor}.{patch}"), json!(info.version)),
-    ];
-    match session.client.firmware_version() {
-        Ok(firmware) => {
-            let text = format!("{} {}", firmware.name, firmware.version);
-            rows.push(("firmware", text.clone(), json!(text)));
+    let board = json!({ "name": info.name, "version": info.version });
+    let (text, firmware) = match session.client.firmware_version() {
+        Ok(FirmwareVersion { name, version }) => {
+            (format!("{name} {version}"), json!({ "name": name, "version": version }))
         }
         // Firmware 5.0 does not know the frame code.
-        Err(error) if error.is_refusal() => {
-            rows.push(("firmware", "does not tell its version".to_owned(), Value::Null));
-        }
+        Err(error) if error.is_refusal() => ("does not tell its version".to_owned(), Value::Null),
         Err(error) => return Err(error.into()),
-    }
-    session.confirmed()?.rows(&rows)
+    };
+    session.confirmed()?.result(
+        format!("board     {} {major}.{minor}.{patch}\nfirmware  {text}", info.name),
+        Line::about(&session.port, None).with("board", board).with("firmware", firmware),
+    )
 }
 
 /// The registers that `status` shows.
@@ -74,15 +74,17 @@ pub fn status(session: &Session) -> Result<(), Failure> {
     let mut rows = Vec::new();
     for register in STATUS {
         let reading = read(session, register)?;
-        let text = match register {
-            RegisterId::STATUS => format!("{reading}: {}", Status::from(reading.bits as u8).doc()),
-            RegisterId::FLAGS => explain(Flags(reading.bits as u32)),
-            _ => shown(session, &reading),
-        };
-        let name = register.text().map_or("", |text| text.name);
-        rows.push((name, text, value(session, &reading)));
+        let mut row = row(session, &reading);
+        match register {
+            RegisterId::STATUS => {
+                row.text = format!("{reading}: {}", Status::from(reading.bits as u8).doc());
+            }
+            RegisterId::FLAGS => row.text = explain(Flags(reading.bits as u32)),
+            _ => {}
+        }
+        rows.push(row);
     }
-    session.output.rows(&rows)
+    session.output.rows(session.line(), &rows)
 }
 
 /// Fault bits spelled out.
@@ -99,12 +101,9 @@ pub fn explain(flags: Flags) -> String {
 
 pub fn get(session: &Session, names: &[String], repeat: Repeat) -> Result<(), Failure> {
     let registers = find_all(names)?;
-    repeated(
-        &session.client.clock(),
-        repeat,
-        || registers.iter().map(|&register| read(session, register)).collect(),
-        |readings, at| print(session, readings, at),
-    )
+    show(session, repeat, || {
+        registers.iter().map(|&register| Ok(row(session, &read(session, register)?))).collect()
+    })
 }
 
 pub fn segment(
@@ -117,7 +116,7 @@ pub fn segment(
     let registers = find_all(names)?;
     let motor = session.motor()?;
     let mut configured = false;
-    let mut sample = || {
+    show(session, repeat, || {
         // A drive that was restarted has forgotten the segment.
         let mut values = vec![0; registers.len()];
         if !configured || motor.segment(number, &registers, &mut values).is_err() {
@@ -126,12 +125,19 @@ pub fn segment(
             configured = true;
         }
         session.client.confirm()?;
-        let profile = session.client.profile();
         let read = registers.iter().zip(values);
-        Ok(read.map(|(&register, bits)| Reading { register, bits, profile }).collect())
-    };
-    repeated(&session.client.clock(), repeat, &mut sample, |readings, at| {
-        print(session, readings, at)
+        Ok(read.map(|(&register, bits)| row(session, &session.reading(register, bits))).collect())
+    })
+}
+
+fn show(
+    session: &Session,
+    repeat: Repeat,
+    sample: impl FnMut() -> Result<Vec<Row>, Failure>,
+) -> Result<(), Failure> {
+    let (clock, output, object) = (session.client.clock(), session.output, session.line());
+    repeated(&clock, repeat, output, &object, sample, |rows, at| {
+        output.sample(object.clone(), rows, at)
     })
 }
 
@@ -142,52 +148,17 @@ fn find_all(names: &[String]) -> Result<Vec<RegisterId>, Failure> {
 fn read(session: &Session, register: RegisterId) -> Result<Reading, Failure> {
     let bits = session.motor()?.get_raw(register)?;
     session.client.confirm()?;
-    Ok(Reading { register, bits, profile: session.client.profile() })
+    Ok(session.reading(register, bits))
 }
 
-fn print(session: &Session, readings: &[Reading], at: Option<f64>) -> Result<(), Failure> {
-    if session.output.json {
-        let time = at.map(|at| ("t".to_owned(), json!((at * 1e6).round() / 1e6)));
-        let values = readings.iter().map(|r| (r.register.to_string(), value(session, r)));
-        let object: Map<String, Value> = time.into_iter().chain(values).collect();
-        return line(&Value::Object(object));
-    }
-    if let Some(at) = at {
-        let values: Vec<String> = readings
-            .iter()
-            .map(|reading| format!("{} {}", reading.register, shown(session, reading)))
-            .collect();
-        return line(&format!("{at:>9.3} s  {}", values.join("   ")));
-    }
-    let width = readings.iter().map(|r| r.register.to_string().len()).max().unwrap_or(0);
-    for reading in readings {
-        line(&format!("{:<width$}  {}", reading.register.to_string(), shown(session, reading)))?;
-    }
-    Ok(())
-}
-
-fn shown(session: &Session, reading: &Reading) -> String {
-    match (session.raw, reading.name()) {
+/// A register with its value as people read it.
+fn row(session: &Session, reading: &Reading) -> Row {
+    let text = match (session.raw, reading.name()) {
         (true, _) => reading.digits().to_string(),
         (false, Some(name)) if reading.register != RegisterId::TARGET_MOTOR => {
             format!("{name} ({:#x})", reading.digits())
         }
         _ => reading.to_string(),
-    }
-}
-
-fn value(session: &Session, reading: &Reading) -> Value {
-    if session.raw {
-        return json!(reading.digits());
-    }
-    match reading.name() {
-        Some(name) => json!({ "value": reading.digits(), "name": name }),
-        None => json!({ "value": number(reading), "unit": reading.unit() }),
-    }
-}
-
-/// An integer where the value is one, so that no `1500.0` is printed.
-fn number(reading: &Reading) -> Value {
-    let value = (reading.value() * 1e6).round() / 1e6;
-    if value.fract() == 0.0 { json!(value as i64) } else { json!(value) }
+    };
+    json::register(reading, text, session.raw)
 }

@@ -3,56 +3,57 @@
 use std::time::Duration;
 
 use indicatif::ProgressBar;
-use motorlink::port::PortError;
+use motorlink::port::{PortError, PortName};
 use motorlink::st::{BAUD_RATES, Error, ScanResult, scan_baud};
-use serde_json::json;
 
 use crate::connection::Connection;
 use crate::failure::Failure;
+use crate::json::Line;
 use crate::output::Printer;
 
-pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result<(), Failure> {
-    let port = connection.port()?;
+pub fn run(
+    connection: &Connection,
+    port: &PortName,
+    patience: Duration,
+    rates: &[u32],
+) -> Result<(), Failure> {
     if port.as_line().is_none() || port.is_in_process() {
-        return Err(Failure::Usage(format!("`{port}` has no baud rate to scan")));
+        return Err(Failure::usage(format!("`{port}` has no baud rate to scan")));
     }
     if connection.fault.is_some() {
-        return Err(Failure::Usage("a scan of baud rates takes no --fault".to_owned()));
+        return Err(Failure::usage("a scan of baud rates takes no --fault"));
     }
     let rates = if rates.is_empty() { &BAUD_RATES[..] } else { rates };
     let rates = if port.at_baud(rates[0]).is_some() { rates } else { &rates[..1] };
     let output = connection.output();
     let bar = crate::output::progress(rates.len());
-    let (mut found, mut echoes) = (false, false);
+    let (mut is_found, mut echoes) = (false, false);
     for &rate in rates {
         bar.set_message(format!("{rate} baud"));
-        let finding = scan_baud(&port, rate, patience);
+        let finding = scan_baud(port, rate, patience);
         bar.inc(1);
         if let Err(Error::Port(error @ PortError::BaudRefused { .. })) = &finding {
             bar.suspend(|| {
                 let text = format!("{rate:>8} baud  not possible on this port");
-                output.result(
-                    text,
-                    json!({ "baud": rate, "finding": "impossible", "text": error.to_string() }),
-                )
+                output.result(text, found(port, rate, "impossible", &error.to_string()))
             })?;
             continue;
         }
         let finding = finding?;
         echoes |= matches!(finding, ScanResult::Echo);
-        found |= matches!(finding, ScanResult::Drive(_) | ScanResult::Refuses(_));
-        report(&bar, output, rate, &finding)?;
+        is_found |= matches!(finding, ScanResult::Drive(_) | ScanResult::Refuses(_));
+        report(&bar, output, port, rate, &finding)?;
     }
     bar.finish_and_clear();
-    if found {
+    if is_found {
         return Ok(());
     }
     if echoes {
-        return Err(Failure::Line(format!(
+        return Err(Failure::link(format!(
             "no drive answered on {port}, and what is sent comes back: the adapter or the wiring echoes"
         )));
     }
-    Err(Failure::Line(format!(
+    Err(Failure::link(format!(
         "no drive answered on {port}; is it powered, are RX and TX crossed, does another program \
          hold the port?"
     )))
@@ -61,6 +62,7 @@ pub fn run(connection: &Connection, patience: Duration, rates: &[u32]) -> Result
 fn report(
     bar: &ProgressBar,
     output: Printer,
+    port: &PortName,
     rate: u32,
     finding: &ScanResult,
 ) -> Result<(), Failure> {
@@ -74,10 +76,11 @@ fn report(
         ScanResult::Echo => ("echo", "what is sent comes back".to_owned()),
         ScanResult::Silence => ("silence", "silence".to_owned()),
     };
-    bar.suspend(|| {
-        output.result(
-            format!("{rate:>8} baud  {text}"),
-            json!({ "baud": rate, "finding": word, "text": text }),
-        )
-    })
+    bar.suspend(|| output.result(format!("{rate:>8} baud  {text}"), found(port, rate, word, &text)))
+}
+
+/// What was found at a rate, for programs.
+fn found(port: &PortName, rate: u32, finding: &str, text: &str) -> Line {
+    let line = Line::about(&port.to_string(), None).with("baud", rate);
+    line.with("finding", finding).with("text", text)
 }

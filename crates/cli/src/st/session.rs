@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use motorlink::st::{Client, Motor, Options, Profile, Recovery};
+use motorlink::port::PortName;
+use motorlink::st::{Client, Motor, Options, Profile, Reading, Recovery, RegisterId};
 
 use super::args::DriveArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
+use crate::json::Line;
 use crate::output::Printer;
 
 /// An open drive, and how to show what it says.
@@ -15,17 +17,22 @@ pub struct Session {
     pub motor: u8,
     pub output: Printer,
     pub raw: bool,
+    pub port: String,
 }
 
-pub fn connect(connection: &Connection, drive: &DriveArgs) -> Result<Session, Failure> {
-    let port = connection.port()?;
+pub fn connect(
+    connection: &Connection,
+    drive: &DriveArgs,
+    port: &PortName,
+) -> Result<Session, Failure> {
     let defaults = Options::default();
     let timeout = drive.timeout.map_or(defaults.timeout, |ms| Duration::from_millis(ms.into()));
     let recovery = if drive.pad { Recovery::Pad } else { Recovery::Drain };
     let profile = drive.profile;
     let options = Options { profile, timeout, recovery, ..defaults };
-    let client = Client::open_wrapped(&port, connection.around_line(profile)?, options)?;
-    Ok(Session { client, motor: drive.motor, output: connection.output(), raw: connection.raw })
+    let client = Client::open_wrapped(port, connection.around_line(profile)?, options)?;
+    let (motor, output, raw) = (drive.motor, connection.output(), connection.raw);
+    Ok(Session { client, motor, output, raw, port: port.to_string() })
 }
 
 impl Session {
@@ -35,16 +42,31 @@ impl Session {
         if self.client.profile() == profile {
             return Ok(());
         }
-        Err(Failure::Usage(format!(
+        Err(Failure::usage(format!(
             "{what} exist in profile {0} only: add --profile {0} if that is what the drive speaks",
             profile.name()
         )))
+    }
+
+    /// What a result for programs about the motor begins with.
+    pub fn line(&self) -> Line {
+        Line::about(&self.port, Some(self.motor))
+    }
+
+    /// Says that it was done, once the acknowledgement is confirmed.
+    pub fn done(&self, text: impl std::fmt::Display) -> Result<(), Failure> {
+        self.confirmed()?.result(text, self.line().ok(true))
     }
 
     /// Where results go, which come from replies to their own requests.
     pub fn confirmed(&self) -> Result<Printer, Failure> {
         self.client.confirm()?;
         Ok(self.output)
+    }
+
+    /// A register's value as the drive has it.
+    pub fn reading(&self, register: RegisterId, bits: i32) -> Reading {
+        Reading { register, bits, profile: self.client.profile() }
     }
 
     pub fn motor(&self) -> Result<Motor<'_>, Failure> {

@@ -160,8 +160,7 @@ pub fn text() -> String {
         "Commands (chapter 2): the first byte of request and reply.",
         codes,
     );
-    let errors = Errors::NAMES.iter().map(|(bits, text)| {
-        let name = text.trim_end_matches(" protection").replace(' ', "_").to_uppercase();
+    let errors = Errors::NAMES.iter().map(|(bits, name, text)| {
         (format!("MOTORLINK_RMD_ERROR_{name}"), u32::from(bits.0), (*text).to_owned())
     });
     group(&mut out, Kind::Loose, "motorlink_rmd_error", "Bits of the error state.", errors);

@@ -54,7 +54,7 @@ pub enum Meaning {
     Number,
     /// One of these, by number.
     Words(&'static [(u8, &'static str)]),
-    /// Any of these, a bit each.
+    /// The names of these bits, any of which may be set.
     Bits(&'static [(u8, &'static str)]),
 }
 

@@ -111,10 +111,11 @@ macro_rules! error_bits {
             $( #[doc = concat!("Bit ", $bit, ": ", $text, ".")]
             pub const $name: Self = Errors(1 << $bit); )+
 
-            /// Each named bit with the document's words for it.
-            pub const NAMES: &'static [(Errors, &'static str)] = &[$( (Errors::$name, $text), )+];
+            /// Every named bit: bit, name, the document's words for it.
+            pub const NAMES: &'static [(Errors, &'static str, &'static str)] =
+                &[$( (Errors::$name, stringify!($name), $text), )+];
 
-            const BITS: &[(u8, &str)] = &[$( (1 << $bit, $text), )+];
+            const BITS: &[(u8, &str)] = &[$( (1 << $bit, stringify!($name)), )+];
             const VALID: u8 = $( 1 << $bit )|+;
         }
     };
@@ -128,9 +129,14 @@ impl Errors {
     /// No error.
     pub const NONE: Self = Errors(0);
 
+    /// The names of the bits that are set and have one.
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        Self::NAMES.iter().filter(move |(bit, ..)| self.contains(*bit)).map(|(_, name, _)| *name)
+    }
+
     /// The document's words for the protections that are active.
     pub fn words(self) -> impl Iterator<Item = &'static str> {
-        Self::NAMES.iter().filter(move |(bit, _)| self.contains(*bit)).map(|(_, words)| *words)
+        Self::NAMES.iter().filter(move |(bit, ..)| self.contains(*bit)).map(|(_, _, words)| *words)
     }
 
     /// Those whose meaning the document names.

@@ -241,6 +241,11 @@ impl Flags {
         Flags(occurred as u32 | (present as u32) << 16)
     }
 
+    /// The names of the faults in either half.
+    pub fn names(half: u16) -> impl Iterator<Item = &'static str> {
+        Self::NAMES.iter().filter(move |(bit, ..)| half & bit != 0).map(|(_, name, _)| *name)
+    }
+
     /// Faults since the last acknowledge, one bit each.
     pub const fn occurred(self) -> u16 {
         self.0 as u16

@@ -117,6 +117,13 @@ impl Reading {
         }
     }
 
+    /// Digits behind the point that tell every value; `None` for a float.
+    pub fn decimals(&self) -> Option<u8> {
+        let is_float = self.ty() == Some(Type::F32);
+        let is_scaled = scale(self.register, self.profile) != 1.0;
+        (!is_float).then_some(is_scaled.into())
+    }
+
     /// Symbol of the physical unit; empty when there is none.
     pub fn unit(&self) -> &'static str {
         unit(self.register)

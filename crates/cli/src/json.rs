@@ -1,0 +1,142 @@
+//! Results for programs: docs/JSON.md says what they look like. All values are made here.
+
+use motorlink::rmd::{Field, Meaning, Scale};
+use motorlink::st::{Flags, Reading, RegisterId};
+use serde_json::{Map, Value, json};
+
+use crate::failure::Failure;
+
+/// A named value: as text and as JSON.
+#[derive(Clone)]
+pub struct Row {
+    pub name: String,
+    pub text: String,
+    pub value: Value,
+}
+
+impl Row {
+    /// A value in a unit.
+    pub fn quantity(name: &str, value: f64, decimals: u8, unit: &str) -> Self {
+        let text = format!("{value:.*} {unit}", usize::from(decimals));
+        Row { name: name.to_owned(), text, value: quantity(value, decimals, unit) }
+    }
+}
+
+/// A line of results: one object.
+#[derive(Clone)]
+pub struct Line(Map<String, Value>);
+
+impl Line {
+    /// About a motor, or without one about what is at the port.
+    pub fn about(port: &str, motor: Option<u8>) -> Self {
+        let mut members = Map::new();
+        members.extend(motor.map(|motor| ("motor".to_owned(), motor.into())));
+        members.insert("port".to_owned(), port.into());
+        Line(members)
+    }
+
+    /// Begins with whether it was done.
+    pub fn ok(mut self, ok: bool) -> Self {
+        self.0.shift_insert(0, "ok".to_owned(), ok.into());
+        self
+    }
+
+    /// Begins with the seconds since the first sample, if it is one of several.
+    pub fn at(mut self, seconds: Option<f64>) -> Self {
+        if let Some(seconds) = seconds {
+            self.0.shift_insert(0, "t".to_owned(), number(seconds, 6));
+        }
+        self
+    }
+
+    pub fn with(mut self, name: &str, value: impl Into<Value>) -> Self {
+        self.0.insert(name.to_owned(), value.into());
+        self
+    }
+
+    pub fn values(self, rows: &[Row]) -> Self {
+        let values: Map<String, Value> =
+            rows.iter().map(|row| (row.name.clone(), row.value.clone())).collect();
+        self.with("values", values)
+    }
+
+    /// Says that it was not done, and why.
+    pub fn failed(self, failure: &Failure) -> Self {
+        self.ok(false).with("error", failure.object())
+    }
+}
+
+impl From<Line> for Value {
+    fn from(line: Line) -> Value {
+        Value::Object(line.0)
+    }
+}
+
+/// A field of a message, as the command table has it.
+pub fn field(field: &Field, data: &[u8; 8], raw: bool) -> Row {
+    let digits = field.raw(data);
+    let name = field.name.to_owned();
+    if raw {
+        return Row { name, text: digits.to_string(), value: json!({ "digits": digits }) };
+    }
+    let text = field.shown(data).to_string();
+    let value = match field.meaning {
+        Meaning::Bits(bits) => {
+            let set = bits.iter().filter(|(bit, _)| digits & i64::from(*bit) != 0);
+            json!({ "value": digits, "names": set.map(|(_, name)| *name).collect::<Value>() })
+        }
+        Meaning::Words(_) => json!({ "value": digits, "name": text }),
+        Meaning::Number => {
+            let Scale { decimals, symbol, .. } = field.scale;
+            quantity(field.value(data), decimals, symbol)
+        }
+    };
+    Row { name, text, value }
+}
+
+/// A register that was read, with `text` for people.
+pub fn register(reading: &Reading, text: String, raw: bool) -> Row {
+    let digits = reading.digits();
+    let value = match (reading.register, reading.name()) {
+        _ if raw => json!({ "digits": digits }),
+        (RegisterId::FLAGS, _) => {
+            let flags = Flags(reading.bits as u32);
+            let [occurred, present] = [flags.occurred(), flags.present()]
+                .map(|half| Flags::names(half).collect::<Value>());
+            json!({ "value": digits, "occurred": occurred, "present": present })
+        }
+        (_, Some(name)) => json!({ "value": digits, "name": name }),
+        (_, None) => match reading.decimals() {
+            Some(decimals) => quantity(reading.value(), decimals, reading.unit()),
+            None => measured(shortest(reading.value() as f32), reading.unit()),
+        },
+    };
+    Row { name: reading.register.to_string(), text, value }
+}
+
+/// A value with as many decimals as its digit has, and its unit unless that is empty.
+pub fn quantity(value: f64, decimals: u8, unit: &str) -> Value {
+    measured(number(value, decimals), unit)
+}
+
+fn measured(value: Value, unit: &str) -> Value {
+    if unit.is_empty() {
+        json!({ "value": value })
+    } else {
+        json!({ "value": value, "unit": unit })
+    }
+}
+
+/// An integer if there are no decimals.
+fn number(value: f64, decimals: u8) -> Value {
+    if decimals == 0 {
+        return json!(value.round() as i64);
+    }
+    let scale = 10f64.powi(decimals.into());
+    json!((value * scale).round() / scale)
+}
+
+/// The fewest digits that say which `f32` it is.
+fn shortest(value: f32) -> Value {
+    json!(value.to_string().parse::<f64>().ok())
+}

@@ -1,0 +1,229 @@
+"""Every line that `--json` prints follows docs/json.schema.json, on stdout and on stderr."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from peers import device
+from program import eventually
+
+DOCS = Path(__file__).parents[2] / "docs"
+SCHEMA = json.loads((DOCS / "json.schema.json").read_text())
+VALIDATOR = Draft202012Validator(SCHEMA)
+
+#: What reads or acts on a drive, as a person gives it.
+ST = [
+    *("info", "status", "registers", "get SPEED_MEAS FLAGS STATUS DAC_OUT1 0x3F", "segment SPEED_MEAS I_A"),
+    *("set SPEED_KP 3", "set SPEED_KP 3 --verify", "start", "stop", "start-stop", "stop-ramp", "ramp 100 100"),
+    *("revup", "revup 1 500 200 250", "current 100 -5", "fault-ack", "encoder-align", "iqdref-clear"),
+    *("pfc enable", "raw 02 40", "get SPEED_MEAS --every 5ms --count 2", "--raw get SPEED_MEAS FLAGS"),
+]
+#: What the other profile has.
+MCSDK = ["torque-ramp 100 50", "move 1.5 0.5", "get FLUXWK_BUS SC_RS", "status"]
+RMD = [
+    *("scan 1 2", "status", "angle", "angle --every 5ms --count 2", "--raw status", "pid", "pid 1 2 3 4 5 6"),
+    *("accel", "accel 9", "encoder", "encoder --offset 5 --write-rom", "zero --write-rom", "off", "stop", "run"),
+    *("torque 0.1", "speed 20", "move 10", "move 45.5 --direction cw --full-turn", "clear-error"),
+    *("torque4 0 0 0 0", "raw 9a"),
+]
+
+
+def check(text):
+    """Lines that follow the schema."""
+    lines = [json.loads(line) for line in text.splitlines()]
+    for line in lines:
+        VALIDATOR.validate(line)
+    return lines
+
+
+@pytest.fixture
+def checked(run):
+    """Runs the program with --json; gives stdout and stderr as objects."""
+
+    def checked(*words, code=0, **options):
+        done = run(*words, "--json", **options).ended(code)
+        return check(done.out), check(done.err)
+
+    return checked
+
+
+def subcommands(run, *words):
+    """The commands that the help of a command lists."""
+    commands = run(*words, "--help").ended(0).out.split("Commands:\n")[1].split("\n\n")[0]
+    return set(re.findall(r"^  ([a-z0-9-]+)", commands, re.M)) - {"help"}
+
+
+def word(command):
+    """The subcommand of a command with options before it."""
+    return next(word for word in command.split() if not word.startswith("-"))
+
+
+def test_the_schema_is_one_and_the_documents_lines_follow_it():
+    Draft202012Validator.check_schema(SCHEMA)
+    examples = re.findall(r"^    (\{.*\})$", (DOCS / "JSON.md").read_text(), re.M)
+    assert len(examples) > 10 and check("\n".join(examples))
+
+
+def test_every_subcommand_is_tested_here(run):
+    assert subcommands(run, "st") == {word(command) for command in [*ST, *MCSDK]} | {"scan"}
+    assert subcommands(run, "rmd") == {word(command) for command in RMD}
+    others = {"demo", "completions", "man"}
+    assert subcommands(run) == {"st", "rmd", "ports", "sim", "guard", "conformance"} | others
+
+
+@pytest.mark.parametrize("command", ST)
+def test_st_tells_what_was_done_or_read(checked, command):
+    out, err = checked("st", "-p", "sim:", *command.split())
+    assert out and not err
+    if command not in ("info", "registers"):
+        assert all((line["motor"], line["port"]) == (1, "sim:") for line in out)
+
+
+@pytest.mark.parametrize("command", MCSDK)
+def test_st_tells_what_the_other_profile_has(checked, tmp_path, command):
+    config = tmp_path / "servo.toml"
+    config.write_text('profile = "mcsdk-5.4"\n[[st.motor]]\npreset = "servo"\n')
+    port = ("-p", f"sim:{config}", "--profile", "mcsdk-5.4")
+    out, err = checked("st", *port, *command.split(), code=1 if "SC_RS" in command else 0)
+    assert bool(out) != bool(err)
+
+
+@pytest.mark.parametrize("command", RMD)
+def test_rmd_tells_what_was_done_or_read(checked, command):
+    out, err = checked("rmd", "-p", "sim:", "--timeout", 500, *command.split())
+    assert out and not err
+    assert all(line["motor"] in range(1, 5) and line["port"] == "sim:" for line in out)
+
+
+@pytest.mark.parametrize(
+    "words, code, error",
+    [
+        ("st -p sim: set STATUS 1", 1, {"kind": "refused", "motor": 1, "name": "SET_READ_ONLY", "code": 2}),
+        ("st -p sim: -m 5 status", 1, {"kind": "refused", "motor": 5, "name": "BAD_MOTOR_SELECTED"}),
+        ("st -p sim: get SPEED_MES", 2, {"kind": "usage", "port": "sim:"}),
+        ("st -p sim: move 1 1", 2, {"kind": "usage"}),
+        ("st info", 2, {"kind": "usage"}),
+        ("st -p sim: fly", 2, {"kind": "usage"}),
+        ("st -p sim: get", 2, {"kind": "usage"}),
+        ("st -p sim: scan", 2, {"kind": "usage"}),
+        ("st -p /dev/nothing-there info", 3, {"kind": "link", "port": "serial:/dev/nothing-there"}),
+        ("rmd -p sim: torque 33", 2, {"kind": "usage", "port": "sim:"}),
+        ("rmd -p sim: zero", 2, {"kind": "usage"}),
+        ("rmd -p sim: -i 9 status", 3, {"kind": "silent", "motor": 9}),
+        ("rmd -p sim: -i 9 angle", 3, {"kind": "silent", "motor": 9}),
+        ("rmd -p sim: scan 9", 3, {"kind": "link"}),
+        ("guard st -p sim:", 2, {"kind": "usage"}),
+        ("sim run /nothing-there.toml", 2, {"kind": "usage"}),
+        ("conformance st -p sim: --only no_such_case", 2, {"kind": "usage"}),
+    ],
+)
+def test_a_failure_is_an_object_on_stderr(checked, words, code, error):
+    out, err = checked(*words.split(), code=code)
+    assert not out
+    (line,) = err
+    assert (line["ok"], line["exit"]) == (False, code)
+    assert line["error"].items() >= error.items()
+
+
+def test_a_silent_drive_is_told(checked, tmp_path):
+    with device(tmp_path / "silent") as port:
+        for command in ("info", "status", "start", "revup", "raw 02 40"):
+            out, err = checked("st", "-p", port, "--timeout", 50, *command.split(), code=3)
+            assert not out and err[0]["error"]["kind"] == "link"
+            assert err[0]["error"]["port"] == f"serial:{port}"
+        out, _ = checked("st", "-p", port, "--timeout", 50, "scan", 115200, code=3)
+        assert [line["finding"] for line in out] == ["silence"]
+
+
+def test_a_scan_for_rates_tells_what_it_found(checked, drives):
+    out, _ = checked("st", "-p", drives.port("pty"), "scan", 115200)
+    assert out[0]["finding"] == "drive"
+
+
+def test_a_motor_that_is_silent_among_others_has_a_line(checked, tmp_path):
+    config = tmp_path / "bench.toml"
+    config.write_text("[[rmd.motor]]\nid = 1\n")
+    out, err = checked("rmd", "-p", f"sim:{config}", "torque4", 0, 0, 0, 0, code=3)
+    assert [(line["motor"], line["ok"]) for line in out] == [(1, True), (2, False), (3, False), (4, False)]
+    assert all(line["error"]["kind"] == "silent" for line in out[1:])
+    assert err[0]["error"]["motor"] == 2
+
+
+def test_an_error_that_stays_has_its_values(checked, tmp_path):
+    config = tmp_path / "bench.toml"
+    config.write_text("[[rmd.motor]]\nid = 1\nplant.supply.voltage = 5.0\n")
+    out, err = checked("rmd", "-p", f"sim:{config}", "clear-error", code=1)
+    assert out[0]["ok"] is False and out[0]["values"]["errors"]["names"] == ["LOW_VOLTAGE"]
+    assert err[0]["error"] == out[0]["error"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("st", "get", "SPEED_MEAS"), ("st", "segment", "SPEED_MEAS"), ("rmd", "angle"), ("rmd", "status")],
+)
+def test_an_outage_of_a_watch_is_in_its_stream_and_so_is_its_end(sim, start, words):
+    protocol, *command = words
+    served = {"st": ("pty",)} if protocol == "st" else {"rmd": ("slcan-pty",)}
+    drives = sim(**{"st": (), "rmd": (), **served})
+    port = drives.port("pty" if protocol == "st" else "slcan")
+    watch = start(protocol, "-p", port, "--timeout", 500, "--json", *command, "--every", "20ms")
+    watch.more_lines(2)
+    drives.kill()
+    watch.until(lambda: any('"outage"' in line for line in watch.out), "the outage")
+    sim(**{"st": (), "rmd": (), **served})
+    watch.until(lambda: any('"back"' in line for line in watch.out), "its end")
+    watch.more_lines(2)
+    watch.interrupt()
+    assert watch.wait() == 0
+    lines = check("\n".join(watch.out))
+    assert not watch.err
+    assert [line["event"] for line in lines if "event" in line] == ["outage", "back"]
+    assert [line["t"] for line in lines] == sorted(line["t"] for line in lines)
+    name = f"serial:{port}" if protocol == "st" else port
+    assert all((line["motor"], line["port"]) == (1, name) for line in lines)
+
+
+def test_a_guard_tells_what_happens(sim, start, run, tmp_path):
+    drives = sim(rmd=())
+    guard = start("guard", "st", "-p", drives.st, "--serve", f"pty:{tmp_path}/held", "--json")
+    guard.line(0)
+    run("st", "-p", tmp_path / "held", "start").ended(0)
+    guard.until(lambda: any('"stopped"' in line for line in guard.out), "the motor is stopped")
+    drives.kill()
+    guard.until(lambda: any('"port-lost"' in line for line in guard.out), "the port is lost")
+    guard.interrupt()
+    guard.wait()
+    assert check("\n".join(guard.out)) and check("\n".join(guard.err))
+
+
+def test_a_guard_tells_what_it_proved(sim, checked):
+    out, _ = checked("guard", "st", "-p", sim(rmd=()).st, "--prove", "--spin", 1200, within=60)
+    assert out[0]["ok"] and out[0]["values"]["speed"]["unit"] == "rpm"
+
+
+def test_simulated_drives_answer(sim):
+    drives = sim()
+    drives.command("supply", motor=99, volts=3)
+    drives.do("fault", port=drives.ports[0]["port"], motor=1, fault="BREAK_IN", hold=True)
+    eventually(lambda: drives.motor(1, drives.ports[0]["port"])["faults"]["present"], "the fault")
+    drives.say("garbage")
+    drives.do("state")
+    assert len(check("\n".join(drives.out))) >= 7
+
+
+def test_scenarios_presets_and_ports_are_told(checked):
+    for words in (("sim", "presets"), ("ports",)):
+        checked(*words)
+    shipped = DOCS.parent / "scenarios/position-moves.toml"
+    out, err = checked("sim", "run", shipped, within=120)
+    assert out[0]["ok"] and out[0]["duration"]["unit"] == "s"
+    assert "faster than real time" in err[0]["note"]
+
+
+@pytest.mark.parametrize("words", ["st -p sim: --only ST-4.5-01", "rmd -p sim: --only RMD-33"])
+def test_the_conformance_kit_reports(checked, words):
+    out, _ = checked("conformance", *words.split(), within=120)
+    assert out[0]["cases"]
