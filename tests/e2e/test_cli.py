@@ -98,7 +98,7 @@ def test_bash_takes_the_completions(run):
         text=True,
         timeout=10,
     )
-    assert done.stdout.split() == ["revup"], done.stderr
+    assert done.stdout.split() == ["revup-data", "revup"], done.stderr
 
 
 def test_the_manual_has_a_page_for_every_command(run, tmp_path):

@@ -66,10 +66,10 @@ def test_raw_values_are_digits(rmd):
 @on_every_port
 def test_what_is_read_has_its_keys(rmd):
     assert list(rmd("-i", 4, "--json", "pid").ended(0).values) == GAINS
-    assert set(rmd("-i", 4, "--json", "accel").ended(0).values) == {"acceleration"}
+    assert set(rmd("-i", 4, "--json", "acceleration").ended(0).values) == {"acceleration"}
     assert set(rmd("-i", 4, "--json", "encoder").ended(0).values) == {"position", "raw", "offset"}
     assert set(rmd("-i", 4, "--json", "angle").ended(0).values) == ANGLES
-    for command in ("pid", "accel", "encoder", "angle"):
+    for command in ("pid", "acceleration", "encoder", "angle"):
         assert rmd("-i", 4, command).ended(0).out
 
 
@@ -98,7 +98,7 @@ def test_trace_shows_both_directions_on_stderr(rmd):
 
 
 @on_every_port
-@pytest.mark.parametrize("command", ["off", "stop", "run", f"pid {SHIPPED_GAINS}", "accel 9"])
+@pytest.mark.parametrize("command", ["off", "stop", "run", f"pid {SHIPPED_GAINS}", "acceleration 9"])
 def test_what_is_done_is_said(rmd, command):
     assert rmd("-i", 2, *command.split()).ended(0).out.startswith("motor 2")
     assert rmd("-i", 2, "--json", *command.split()).ended(0).json["ok"] is True
@@ -112,10 +112,10 @@ def test_what_is_done_is_said(rmd, command):
         "torque -0.1",
         "speed 20",
         "speed -20.5",
-        "move 10",
-        "move -10.25 --max-speed 200",
-        "move 45.5 --direction cw --full-turn",
-        "move 359.99 --direction ccw --max-speed 100 --full-turn",
+        "position 10",
+        "position -10.25 --max-speed 200",
+        "single-turn-position 45.5 cw --full-turn",
+        "single-turn-position 359.99 ccw --max-speed 100 --full-turn",
     ],
 )
 def test_a_motion_command_answers_with_what_the_motor_does(rmd, command):
@@ -124,10 +124,10 @@ def test_a_motion_command_answers_with_what_the_motor_does(rmd, command):
     rmd("-i", 3, "off").ended(0)
 
 
-@pytest.mark.parametrize("direction", [(), ("--direction", "cw", "--full-turn")])
-def test_a_max_speed_never_rounds_up_and_is_never_0(rmd, direction):
+@pytest.mark.parametrize("move", [("position", 10), ("single-turn-position", 10, "cw", "--full-turn")])
+def test_a_max_speed_never_rounds_up_and_is_never_0(rmd, move):
     def most(value, *options):
-        return rmd("--trace", *options, "move", 10, *direction, f"--max-speed={value}")
+        return rmd("--trace", *options, *move, f"--max-speed={value}")
 
     for value, sent in (("1.999", "01 00"), ("360.999", "68 01")):
         data = next(line for line in most(value).ended(0).err.splitlines() if "-> 141#a" in line)
@@ -138,6 +138,11 @@ def test_a_max_speed_never_rounds_up_and_is_never_0(rmd, direction):
         assert "outside 1 to 65535 °/s; nothing was sent" in refused and "->" not in refused
     assert "outside 1 to 65535 digits" in most("0.9", "--raw").ended(2).err
     assert "outside 1 to" in most("65536").ended(2).err
+
+
+@pytest.mark.parametrize("command", ["move 10", "accel"])
+def test_short_words_are_taken(rmd, command):
+    assert rmd("-i", 2, *command.split()).ended(0).out
 
 
 @pytest.fixture
@@ -153,41 +158,42 @@ def near(run, sim, tmp_path):
 
 def test_a_move_that_could_be_nearly_a_full_turn_is_refused(near):
     bus, rmd = near
-    refused = rmd("--trace", "move", 90, "--direction", "cw").ended(2).err
+    refused = rmd("--trace", "single-turn-position", 90, "cw").ended(2).err
     assert "motor 1 is at 90.02°, 0.02° past 90.00° clockwise" in refused
-    assert "try `--direction ccw`, or `--full-turn`" in refused
+    assert "try `counterclockwise`, or `--full-turn`" in refused
     assert "-> 141#94" in refused and "-> 141#a" not in refused
     assert bus.motor(1)["mode"] == "off"
 
-    rmd("move", 90, "--direction", "ccw", "--max-speed", 100).ended(0)
+    rmd("single-turn-position", 90, "ccw", "--max-speed", 100).ended(0)
     eventually(lambda: abs(bus.motor(1)["angle_degrees"] - 90) < 0.022, "motor 1 is at 90°")
     rmd("off").ended(0)
     for direction in ("cw", "ccw"):
-        refused = rmd("move", 90.02, "--direction", direction, "--tolerance", 359.99).ended(2).err
+        refused = rmd("single-turn-position", 90.02, direction, "--tolerance", 359.99).ended(2).err
         assert "`--full-turn`" in refused
     assert abs(bus.motor(1)["angle_degrees"] - 90) < 0.03
 
 
 def test_a_full_turn_is_made_on_an_explicit_word(near):
     bus, rmd = near
-    sent = rmd("--trace", "move", 90, "--direction", "cw", "--full-turn").ended(0).err
+    sent = rmd("--trace", "single-turn-position", 90, "cw", "--full-turn").ended(0).err
     assert "-> 141#94" not in sent
     eventually(lambda: abs(bus.motor(1)["angle_degrees"] - 450) < 0.1, "motor 1 made a turn")
 
 
 def test_the_tolerance_of_a_full_turn_can_be_given(near):
     bus, rmd = near
-    move = ("move", 89.8, "--direction", "cw", "--max-speed", 3)
+    move = ("single-turn-position", 89.8, "cw", "--max-speed", 3)
     rmd(*move).ended(2)
     rmd(*move, "--tolerance", 0.3).ended(2)
     # In digits of 0.01°, as the angle.
-    rmd("--raw", "move", 8980, "--direction", "cw", "--max-speed", 3, "--tolerance", 22).ended(2)
+    rmd("--raw", "single-turn-position", 8980, "cw", "--max-speed", 3, "--tolerance", 22).ended(2)
     assert bus.motor(1)["mode"] == "off"
     rmd(*move, "--tolerance", 0.2).ended(0)
     assert bus.motor(1)["mode"] == "position"
     for words, told in (("--tolerance=-1", "outside 0 to"), ("--tolerance=nan", "outside 0 to")):
         assert told in rmd(*move, words).ended(2).err
-    assert "--direction" in rmd("move", 90, "--full-turn").ended(2).err
+    assert "--full-turn" in rmd("position", 90, "--full-turn").ended(2).err
+    assert "counterclockwise (ccw)" in rmd("single-turn-position", 90, "left").ended(2).err
     assert "cannot be used" in rmd(*move, "--full-turn", "--tolerance", 1).ended(2).err
 
 
@@ -207,12 +213,12 @@ def test_torque4_answers_for_each_motor(rmd):
 
 @on_every_port
 def test_rom_is_written_only_on_an_explicit_word(rmd):
-    for command in ("zero", "encoder --offset 5", "raw 19", "raw 32", "raw 91"):
+    for command in ("zero", "encoder-offset 5", "raw 19", "raw 32", "raw 91"):
         assert "--write-rom" in rmd(*command.split()).ended(2).err
     assert set(rmd("--write-rom", "--json", "zero").ended(0).values) == {"offset"}
-    assert rmd("--write-rom", "--json", "encoder", "--offset", 5).ended(0).values == {"offset": 5}
+    assert rmd("--write-rom", "--json", "encoder-offset", 5).ended(0).values == {"offset": 5}
     assert rmd("--write-rom", "pid", *SHIPPED_GAINS.split()).ended(0)
-    assert rmd("--write-rom", "encoder", "--offset", 0).ended(0)
+    assert rmd("--write-rom", "encoder-offset", 0).ended(0)
 
 
 def test_a_motor_turns_stops_and_resumes(run, sim):
@@ -227,7 +233,7 @@ def test_a_motor_turns_stops_and_resumes(run, sim):
     eventually(lambda: abs(bus.motor(1)["speed_dps"]) < 1, "motor 1 stands")
     rmd("run")
     eventually(lambda: bus.motor(1)["speed_dps"] > 350, "motor 1 turns again")
-    rmd("move", 45, "--direction", "cw", "--full-turn", "--max-speed", 1000)
+    rmd("single-turn-position", 45, "cw", "--full-turn", "--max-speed", 1000)
     eventually(lambda: abs(bus.motor(1)["angle_degrees"] % 360 - 45) < 0.5, "motor 1 is at 45°")
     rmd("off")
     assert bus.motor(1)["mode"] == "off"
@@ -238,12 +244,12 @@ def test_an_error_that_has_its_cause_stays_and_is_told(run, sim):
     rmd = on(run, bus.port("slcan"))
     bus.do("supply", motor=1, volts=5.0)
     eventually(lambda: bus.motor(1)["errors"] == ["LOW_VOLTAGE"], "low voltage")
-    refused = rmd("--json", "clear-error").ended(1)
+    refused = rmd("--json", "clear-errors").ended(1)
     assert refused.values["errors"] == ["LOW_VOLTAGE"] and "keeps its errors" in refused.err
     assert refused.json["ok"] is False
     bus.do("supply", motor=1, volts=24.0)
-    eventually(lambda: rmd("clear-error").code == 0, "the error is cleared")
-    assert rmd("--json", "clear-error").ended(0).values["errors"] == []
+    eventually(lambda: rmd("clear-errors").code == 0, "the error is cleared")
+    assert rmd("--json", "clear-errors").ended(0).values["errors"] == []
 
 
 # What a person gets wrong.
@@ -259,8 +265,8 @@ def test_a_motor_id_outside_1_to_32_is_a_usage_error(run, motor):
     [
         ("torque 33", "±32 A"),
         ("torque nan", "nothing was sent"),
-        ("move 360 --direction cw", "359.99"),
-        ("move -1 --direction cw", "nothing was sent"),
+        ("single-turn-position 360 cw", "359.99"),
+        ("single-turn-position -1 cw", "nothing was sent"),
         ("speed 1e9", "nothing was sent"),
         ("torque4 0 0 0 99", "±32 A"),
         ("pid 1 2", "6 values"),
@@ -393,7 +399,7 @@ def test_error_bits_that_mean_nothing_are_no_errors(run, tmp_path):
         return [f"t1418{frame[5:7]}1900F0000000{bits['state']}"]
 
     with device(tmp_path / "can0", slcan_adapter(motor)) as path:
-        words = ("rmd", "-p", f"slcan:{path}", "--timeout", 500, "clear-error")
+        words = ("rmd", "-p", f"slcan:{path}", "--timeout", 500, "clear-errors")
         assert run(*words, "--json").ended(0).values["errors"] == []
         assert "no error (bits 0xf6 mean nothing)" in run(*words).ended(0).out
         bits["state"] = "F7"

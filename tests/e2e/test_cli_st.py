@@ -63,12 +63,12 @@ def test_get_reads_again_and_again(st):
 def test_segment_samples_registers_that_cannot_be_read_one_by_one(st):
     sampled = st("--json", "segment", "MIN_APP_SPEED", "I_A", "I_B").ended(0).values
     assert list(sampled) == ["MIN_APP_SPEED", "I_A", "I_B"]
-    assert st("segment", "--number", 3, "I_A").ended(0).out.startswith("I_A")
+    assert st("segment", "--segment", 3, "I_A").ended(0).out.startswith("I_A")
 
 
 @on_every_port
 def test_revup_shows_five_phases(st):
-    phases = st("--json", "revup").ended(0).lines
+    phases = st("--json", "revup-data").ended(0).lines
     assert [phase["phase"] for phase in phases] == [0, 1, 2, 3, 4]
     assert phases[0]["values"]["speed"] == {"value": 0, "unit": "rpm"}
     assert set(phases[0]["values"]) == {"speed", "torque", "duration"}
@@ -123,7 +123,8 @@ def test_trace_shows_both_directions_on_stderr(st):
         "set CONTROL_MODE SPEED",
         "ramp 700 200",
         "ramp -700 200",
-        "revup 1 500 200 250",
+        "revup-data 1 500 200 250",
+        "current-reference 100 -5",
         "current 100 -5",
         "stop-ramp",
         "stop",
@@ -148,7 +149,7 @@ def test_mcsdk_commands_work_with_its_profile(run, sim, tmp_path):
         return run("st", "-p", port, "--profile", "mcsdk-5.4", *arguments)
 
     assert st("--json", "torque-ramp", 100, 50).ended(0).json["ok"]
-    assert st("--json", "move", 1.5, 0.5).ended(0).json["ok"]
+    assert st("--json", "position", 1.5, 0.5).ended(0).json["ok"]
     assert st("move", -1.5, 0.5).ended(0).out.startswith("motor 1: move to -1.5 rad")
     assert st("info").ended(0).out.count("5.4.4") == 2
 
@@ -201,7 +202,7 @@ def test_a_value_out_of_range_is_not_sent(st):
     assert "-32768 to 32767" in told.err and "->" not in told.err
     st("set", "SPEED_KP", "fast").ended(2)
     st("ramp", 1000, 65536).ended(2)
-    st("current", 40000, 0).ended(2)
+    st("current-reference", 40000, 0).ended(2)
 
 
 def test_the_drive_refuses_to_write_a_read_only_register(st):
@@ -349,7 +350,7 @@ def test_ctrl_c_ends_an_exchange_that_has_long_to_wait(start, tmp_path):
         assert waiting.wait(5) == 130
 
 
-@pytest.mark.parametrize("command", ["torque-ramp 100 50", "move 1.5 0.5"])
+@pytest.mark.parametrize("command", ["torque-ramp 100 50", "position 1.5 0.5"])
 def test_what_the_profile_lacks_is_not_sent(run, command):
     refused = run("st", "-p", "sim:", "--trace", *command.split()).ended(2)
     assert "--profile mcsdk-5.4" in refused.err and "->" not in refused.err

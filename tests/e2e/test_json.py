@@ -18,15 +18,15 @@ VALIDATOR = Draft202012Validator(SCHEMA)
 ST = [
     *("info", "status", "registers", "get SPEED_MEAS FLAGS STATUS DAC_OUT1 0x3F", "segment SPEED_MEAS I_A"),
     *("set SPEED_KP 3", "set SPEED_KP 3 --verify", "start", "stop", "start-stop", "stop-ramp", "ramp 100 100"),
-    *("revup", "revup 1 500 200 250", "current 100 -5", "fault-ack", "encoder-align", "iqdref-clear"),
+    *("revup-data", "revup-data 1 500 200 250", "current-reference 100 -5", "fault-ack", "encoder-align", "iqdref-clear"),
     *("pfc enable", "raw 02 40", "get SPEED_MEAS --every 5ms --count 2", "--raw get SPEED_MEAS FLAGS"),
 ]
 #: What the other profile has.
-MCSDK = ["torque-ramp 100 50", "move 1.5 0.5", "get FLUXWK_BUS SC_RS", "status"]
+MCSDK = ["torque-ramp 100 50", "position 1.5 0.5", "get FLUXWK_BUS SC_RS", "status"]
 RMD = [
     *("scan 1 2", "status", "angle", "angle --every 5ms --count 2", "--raw status", "pid", "pid 1 2 3 4 5 6"),
-    *("accel", "accel 9", "encoder", "encoder --offset 5 --write-rom", "zero --write-rom", "off", "stop", "run"),
-    *("torque 0.1", "speed 20", "move 10", "move 45.5 --direction cw --full-turn", "clear-error"),
+    *("acceleration", "acceleration 9", "encoder", "encoder-offset 5 --write-rom", "zero --write-rom", "off", "stop", "run"),
+    *("torque 0.1", "speed 20", "position 10", "single-turn-position 45.5 cw --full-turn", "clear-errors"),
     *("torque4 0 0 0 0", "raw 9a"),
 ]
 
@@ -104,7 +104,7 @@ def test_rmd_tells_what_was_done_or_read(checked, command):
         ("st -p sim: set STATUS 1", 1, {"kind": "refused", "motor": 1, "name": "SET_READ_ONLY", "code": 2}),
         ("st -p sim: -m 5 status", 1, {"kind": "refused", "motor": 5, "name": "BAD_MOTOR_SELECTED"}),
         ("st -p sim: get SPEED_MES", 2, {"kind": "usage", "port": "sim:"}),
-        ("st -p sim: move 1 1", 2, {"kind": "usage"}),
+        ("st -p sim: position 1 1", 2, {"kind": "usage"}),
         ("st info", 2, {"kind": "usage"}),
         ("st -p sim: fly", 2, {"kind": "usage"}),
         ("st -p sim: get", 2, {"kind": "usage"}),
@@ -130,7 +130,7 @@ def test_a_failure_is_an_object_on_stderr(checked, words, code, error):
 
 def test_a_silent_drive_is_told(checked, tmp_path):
     with device(tmp_path / "silent") as port:
-        for command in ("info", "status", "start", "revup", "raw 02 40"):
+        for command in ("info", "status", "start", "revup-data", "raw 02 40"):
             out, err = checked("st", "-p", port, "--timeout", 50, *command.split(), code=3)
             assert not out and err[0]["error"]["kind"] == "link"
             assert err[0]["error"]["port"] == f"serial:{port}"
@@ -155,7 +155,7 @@ def test_a_motor_that_is_silent_among_others_has_a_line(checked, tmp_path):
 def test_an_error_that_stays_has_its_values(checked, tmp_path):
     config = tmp_path / "bench.toml"
     config.write_text("[[rmd.motor]]\nid = 1\nplant.supply.voltage = 5.0\n")
-    out, err = checked("rmd", "-p", f"sim:{config}", "clear-error", code=1)
+    out, err = checked("rmd", "-p", f"sim:{config}", "clear-errors", code=1)
     assert out[0]["ok"] is False and out[0]["values"]["errors"]["names"] == ["LOW_VOLTAGE"]
     assert err[0]["error"] == out[0]["error"]
 

@@ -127,7 +127,7 @@ def test_a_load_comes_from_a_file_beside_the_scenario(run, write, tmp_path):
         at = 0
         rmd = 1
         send = "speed"
-        dps = 720
+        speed_dps = 720
         [[expect]]
         why = "four fifths of it in four fifths of the time"
         signal = "rmd1.load_newton_metres"
@@ -174,7 +174,7 @@ def test_events_stand_in_the_picture(run, write, tmp_path):
         ("[[event]]\nat = 2\nst = 1\nsend = 'start'", "event 1: at 2 s: the run lasts"),
         ("[[event]]\nat = nan\nst = 1\nsend = 'start'", "the run lasts"),
         ("[[event]]\nat = 0\nst = 3\nsend = 'start'", "these are: st1"),
-        ("[[event]]\nat = 0\nst = 1\nsend = 'start'\nrpm = 3", "rpm"),
+        ("[[event]]\nat = 0\nst = 1\nsend = 'start'\nspeed_rpm = 3", "speed_rpm"),
         ("[[event]]\nat = 0\nst = 1\nworld = 'load'\nnewton_metres = inf", "newton_metres"),
         ("[[event]]\nat = 0\nst = 1\nsend = 'set'\nregister = 'SPEED_MES'\nvalue = 1", "SPEED_MEAS"),
         ("[[expect]]\nwhy = ''\nsignal = 'st1.speed_rpm'\nat = 3\nmin = 0", "expect 1"),

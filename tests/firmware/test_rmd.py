@@ -48,7 +48,7 @@ def test_a_motor_moves_holds_a_torque_and_is_switched_off(rmd, eventually):
     def angle():
         return rmd("-i", 2, "--json", "angle").ended(0).values["multi_turn_angle"]
 
-    rmd("-i", 2, "move", 90, "--max-speed", 500).ended(0)
+    rmd("-i", 2, "position", 90, "--max-speed", 500).ended(0)
     eventually(lambda: abs(angle() - 90) < 1, "90°")
     rmd("-i", 2, "torque", 0.3).ended(0)
     eventually(lambda: angle() > 180, "a motor that turns")

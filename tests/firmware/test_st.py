@@ -37,7 +37,7 @@ def test_info_status_and_registers_are_read(st):
     assert info["board"] == {"name": "ST MC SDK", "version": [5, 4, 4]}
     status = st("--json", "status").ended(0).json["values"]
     assert status["BUS_VOLTAGE"] == {"value": 325, "unit": "V"}
-    assert len(st("--json", "revup").ended(0).lines) == 5
+    assert len(st("--json", "revup-data").ended(0).lines) == 5
     assert list(st("--json", "segment", "SPEED_MEAS", "I_A").ended(0).values) == ["SPEED_MEAS", "I_A"]
 
 
@@ -68,7 +68,7 @@ def test_torque_turns_the_motor_with_an_encoder(st, eventually):
     def speed():
         return st("-m", 2, "--json", "--raw", "get", "SPEED_MEAS").ended(0).values["SPEED_MEAS"]
 
-    st("-m", 2, "current", 600, 0).ended(0)
+    st("-m", 2, "current-reference", 600, 0).ended(0)
     st("-m", 2, "start").ended(0)
     eventually(lambda: speed() > 200, "a motor that turns")
     st("-m", 2, "stop").ended(0)

@@ -102,23 +102,23 @@ check_candump_sees_the_bytes_of_the_document() {
         rmd --id 2 pid
         rmd --id 2 pid 1 2 3 4 5 6
         rmd --id 2 pid 1 2 3 4 5 6 --write-rom
-        rmd --id 2 accel
-        rmd --id 2 accel 1000
+        rmd --id 2 acceleration
+        rmd --id 2 acceleration 1000
         rmd --id 2 encoder
-        rmd --id 2 encoder --offset 100 --write-rom
+        rmd --id 2 encoder-offset 100 --write-rom
         rmd --id 2 zero --write-rom
         rmd --id 2 angle
         rmd --id 2 status
-        rmd --id 2 clear-error
+        rmd --id 2 clear-errors
         rmd --id 2 torque 16
         rmd --id 2 torque -16
         rmd --id 2 speed -360
         rmd --id 2 stop
         rmd --id 2 run
-        rmd --id 2 move 90
-        rmd --id 2 move 90 --max-speed 500
-        rmd --id 2 move 180 --direction ccw --full-turn
-        rmd --id 2 move 180 --direction cw --max-speed 500 --full-turn
+        rmd --id 2 position 90
+        rmd --id 2 position 90 --max-speed 500
+        rmd --id 2 single-turn-position 180 ccw --full-turn
+        rmd --id 2 single-turn-position 180 cw --max-speed 500 --full-turn
         rmd --id 2 off
         rmd torque4 16 -16 0 8
         rmd --id 4 raw 9C
@@ -203,11 +203,11 @@ scripted_motor() {
 check_cansend_answers_our_host() {
     port=socketcan:vcan0
     scripted_motor 33000000E8030000
-    same "$(rmd --id 5 accel --json)" '*"values":{"acceleration":{"value":1000,*'
+    same "$(rmd --id 5 acceleration --json)" '*"values":{"acceleration":{"value":1000,*'
     same "$(cat asked)" '* vcan0 145#3300000000000000*'
     # The document prints this command's reply with the code of another.
     scripted_motor 9A1E0000F1000009
-    said=$(rmd --id 5 clear-error --json)
+    said=$(rmd --id 5 clear-errors --json)
     same "$? $said" '1 {"ok":false,"motor":5,*"values":{"temperature":{"value":30,*'
     same "$(cat asked)" '* vcan0 145#9B00000000000000*'
 }

@@ -304,7 +304,7 @@ def test_code_that_sleeps_sleeps_on_the_bench() -> None:
 RUN = "bench.run(86400)"
 SCENARIO = """motorlink.sim.run(
     "title = 'A day'; duration = 86400; sample_us = 10000000; [[rmd.motor]];"
-    "[[event]]; at = 0; rmd = 1; send = 'speed'; dps = 360".replace(";", "\\n")
+    "[[event]]; at = 0; rmd = 1; send = 'speed'; speed_dps = 360".replace(";", "\\n")
     )"""
 
 

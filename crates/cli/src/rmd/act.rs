@@ -5,7 +5,7 @@ use motorlink::rmd::{
     MotorSet, Pid, Quantity, SetTorque4, SpeedLimit, SpinDirection, TurnCentiDegrees,
 };
 
-use super::args::{self, Act, Direction};
+use super::args::{self, Act, MaxSpeed};
 use super::session::Session;
 use crate::failure::Failure;
 use crate::output::{hex, parse_hex};
@@ -15,16 +15,17 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     let id = motor.id();
     match act {
         Act::Pid { gains } => pid(session, &gains),
-        Act::Accel { dps_per_second: None } => {
+        Act::Acceleration { dps_per_second: None } => {
             let acceleration = motor.acceleration()?;
             session.show(&Acceleration { acceleration })
         }
-        Act::Accel { dps_per_second: Some(limit) } => {
+        Act::Acceleration { dps_per_second: Some(limit) } => {
             let limit: DpsPerSecond = wanted(session, limit)?;
             motor.write_acceleration_ram(limit)?;
             session.done(format!("motor {id} accelerates with {limit} until power-off"))
         }
-        Act::Encoder { offset } => encoder(session, offset),
+        Act::Encoder => session.show(&motor.encoder()?),
+        Act::EncoderOffset { offset } => encoder_offset(session, offset),
         Act::Zero => {
             session.rom("setting the zero")?;
             let offset = motor.write_zero_rom()?;
@@ -47,15 +48,15 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         }
         Act::Torque { amps } => session.replied(&motor.set_torque(wanted(session, amps)?)?),
         Act::Speed { dps } => session.replied(&motor.set_speed(wanted(session, dps)?)?),
-        Act::Move { degrees, max_speed, direction: None, .. } => {
-            let max_speed = max_speed.map(|speed| wanted(session, speed)).transpose()?;
+        Act::Position { degrees, most } => {
+            let max_speed = max_speed(session, &most)?;
             session.replied(&motor.set_position(wanted(session, degrees)?, max_speed)?)
         }
-        Act::Move { degrees, max_speed, direction: Some(direction), full_turn } => {
-            let max_speed = max_speed.map(|speed| wanted(session, speed)).transpose()?;
+        Act::SingleTurnPosition { degrees, direction, most, full_turn } => {
+            let max_speed = max_speed(session, &most)?;
             session.replied(&turn(session, degrees, max_speed, direction, &full_turn)?)
         }
-        Act::ClearError => {
+        Act::ClearErrors => {
             let status = motor.clear_errors()?;
             if status.errors.is_empty() {
                 return session.replied(&status);
@@ -88,36 +89,33 @@ fn pid(session: &Session, gains: &[u8]) -> Result<(), Failure> {
     session.show(&motor.pid()?)
 }
 
-fn encoder(session: &Session, offset: Option<u16>) -> Result<(), Failure> {
+fn encoder_offset(session: &Session, offset: u16) -> Result<(), Failure> {
+    session.rom("setting the encoder offset")?;
     let motor = session.motor()?;
-    if let Some(offset) = offset {
-        session.rom("setting the encoder offset")?;
-        let taken = motor.write_encoder_offset_rom(offset)?;
-        if taken != offset {
-            return Err(Failure::refused(format!(
-                "motor {} took the offset {taken} instead of {offset}: its encoder is narrower",
-                motor.id()
-            )));
-        }
-        let text = format!("motor {} has the encoder offset {taken}", motor.id());
-        let values = session.rows(&EncoderOffset { offset: taken });
-        return session.output.result(text, session.line(session.id).ok(true).values(&values));
+    let taken = motor.write_encoder_offset_rom(offset)?;
+    if taken != offset {
+        return Err(Failure::refused(format!(
+            "motor {} took the offset {taken} instead of {offset}: its encoder is narrower",
+            motor.id()
+        )));
     }
-    session.show(&motor.encoder()?)
+    let text = format!("motor {} has the encoder offset {taken}", motor.id());
+    let values = session.rows(&EncoderOffset { offset: taken });
+    session.output.result(text, session.line(session.id).ok(true).values(&values))
+}
+
+fn max_speed(session: &Session, most: &MaxSpeed) -> Result<Option<SpeedLimit>, Failure> {
+    most.max_speed.map(|speed| wanted(session, speed)).transpose()
 }
 
 fn turn(
     session: &Session,
     degrees: f64,
     max_speed: Option<SpeedLimit>,
-    direction: Direction,
+    direction: SpinDirection,
     full_turn: &args::FullTurn,
 ) -> Result<MotionStatus, Failure> {
     let angle = wanted(session, degrees)?;
-    let (spin, other) = match direction {
-        Direction::Cw => (SpinDirection::Clockwise, "ccw"),
-        Direction::Ccw => (SpinDirection::Counterclockwise, "cw"),
-    };
     let full_turn = match *full_turn {
         args::FullTurn { full_turn: true, .. } => FullTurn::Allowed,
         args::FullTurn { tolerance: None, .. } => FullTurn::default(),
@@ -125,16 +123,16 @@ fn turn(
             FullTurn::Refused { tolerance: wanted(session, degrees)? }
         }
     };
-    session.motor()?.set_single_turn_position(angle, spin, max_speed, full_turn).map_err(|error| {
-        match error {
-            Error::FullTurn { past: TurnCentiDegrees(0), .. } => {
-                Failure::usage(format!("{error}; `--full-turn` sends it all the same"))
-            }
-            Error::FullTurn { .. } => Failure::usage(format!(
-                "{error}; try `--direction {other}`, or `--full-turn` if it may be a full turn"
-            )),
-            error => error.into(),
+    let moved = session.motor()?.set_single_turn_position(angle, direction, max_speed, full_turn);
+    moved.map_err(|error| match error {
+        Error::FullTurn { past: TurnCentiDegrees(0), .. } => {
+            Failure::usage(format!("{error}; `--full-turn` sends it all the same"))
         }
+        Error::FullTurn { .. } => Failure::usage(format!(
+            "{error}; try `{}`, or `--full-turn` if it may be a full turn",
+            direction.opposite()
+        )),
+        error => error.into(),
     })
 }
 

@@ -1,6 +1,7 @@
 //! What `motorlink rmd` takes.
 
 use clap::Subcommand;
+use motorlink::rmd::SpinDirection;
 
 use crate::connection::Connection;
 use crate::repeat::Repeat;
@@ -71,16 +72,18 @@ pub enum Act {
         gains: Vec<u8>,
     },
     /// Show the acceleration limit, or set it until power-off
-    Accel {
+    #[command(visible_alias = "accel")]
+    Acceleration {
         /// °/s²; 0 is unlimited
         #[arg(allow_negative_numbers = true)]
         dps_per_second: Option<f64>,
     },
-    /// Show the encoder, or set its offset for good (needs --write-rom)
-    Encoder {
+    /// Show the encoder: position, original position and offset
+    Encoder,
+    /// Set the offset of the encoder for good (needs --write-rom)
+    EncoderOffset {
         /// The new offset
-        #[arg(long)]
-        offset: Option<u16>,
+        offset: u16,
     },
     /// Make the current position the zero from the next power-on on (needs --write-rom)
     Zero,
@@ -102,25 +105,33 @@ pub enum Act {
         #[arg(allow_negative_numbers = true)]
         dps: f64,
     },
-    /// Turn to an angle
-    ///
-    /// With --direction the motor is asked for its angle first (0x94). At its target, or just past it,
-    /// the move could be nearly a full turn: it is refused. Then try the other direction, or --full-turn.
-    Move {
-        /// Degrees over all turns, positive is clockwise; 0 to 359.99 with --direction
+    /// Turn to an angle over all turns
+    #[command(visible_alias = "move")]
+    Position {
+        /// Degrees, positive is clockwise
         #[arg(allow_negative_numbers = true)]
         degrees: f64,
-        /// No faster than this, °/s; 1 at least, rounded down to whole °/s
-        #[arg(long, value_name = "DPS")]
-        max_speed: Option<f64>,
-        /// Turn to an angle within the turn, this way round
-        #[arg(long, value_enum)]
-        direction: Option<Direction>,
+        #[command(flatten)]
+        most: MaxSpeed,
+    },
+    /// Turn to an angle within the turn, one way round
+    ///
+    /// The motor is asked for its angle first (0x94). At its target, or just past it, the move could be
+    /// nearly a full turn: it is refused. Then try the other direction, or --full-turn.
+    SingleTurnPosition {
+        /// Degrees, 0 to 359.99
+        #[arg(allow_negative_numbers = true)]
+        degrees: f64,
+        /// Which way round: clockwise or counterclockwise, cw or ccw for short
+        #[arg(value_parser = direction)]
+        direction: SpinDirection,
+        #[command(flatten)]
+        most: MaxSpeed,
         #[command(flatten)]
         full_turn: FullTurn,
     },
     /// Clear the errors whose cause is gone
-    ClearError,
+    ClearErrors,
     /// Hold torque currents of motors 1 to 4, sent in one frame
     Torque4 {
         /// A for motors 1, 2, 3 and 4
@@ -135,21 +146,25 @@ pub enum Act {
     },
 }
 
-/// What becomes of a move with a direction that could be nearly a full turn.
+/// How fast a move may be.
+#[derive(clap::Args)]
+pub struct MaxSpeed {
+    /// No faster than this, °/s; 1 at least, rounded down to whole °/s
+    #[arg(long, value_name = "DPS")]
+    pub max_speed: Option<f64>,
+}
+
+/// What becomes of a move that could be nearly a full turn.
 #[derive(clap::Args)]
 pub struct FullTurn {
     /// Move even if the motor is at the angle or just past it, which may be nearly a full turn
-    #[arg(long, requires = "direction")]
+    #[arg(long)]
     pub full_turn: bool,
     /// Up to how far past the angle the move is refused, degrees (default 0.5)
-    #[arg(long, value_name = "DEGREES", requires = "direction", conflicts_with = "full_turn")]
+    #[arg(long, value_name = "DEGREES", conflicts_with = "full_turn")]
     pub tolerance: Option<f64>,
 }
 
-#[derive(clap::ValueEnum, Clone, Copy)]
-pub enum Direction {
-    /// Clockwise
-    Cw,
-    /// Counterclockwise
-    Ccw,
+fn direction(word: &str) -> Result<SpinDirection, &'static str> {
+    SpinDirection::named(word).ok_or("give clockwise (cw) or counterclockwise (ccw)")
 }

@@ -46,21 +46,22 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             motor.set_torque_ramp(TorqueRamp { torque_s16a: iq, duration_ms: ms })?;
             session.done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
         }
-        Act::Move { rad, seconds } => {
+        Act::Position { rad, seconds } => {
             session.wants(Profile::Mcsdk54, "moves")?;
-            if !rad.is_finite() || !seconds.is_finite() || seconds < 0.0 {
-                return Err(Failure::usage(format!("{rad} rad in {seconds} s is no move")));
+            let position = PositionMove { angle_rad: rad, duration_s: seconds };
+            if !position.is_possible() {
+                return Err(Failure::usage(format!("{rad} rad in {seconds} s is not possible")));
             }
-            motor.set_position(PositionMove { angle_rad: rad, duration_s: seconds })?;
+            motor.set_position(position)?;
             session
                 .done(format!("{}: move to {rad} rad in {seconds} s acknowledged", motor.number()))
         }
-        Act::Current { iq, id } => {
+        Act::CurrentReference { iq, id } => {
             motor.set_current_reference(CurrentReference { iq_s16a: iq, id_s16a: id })?;
             session.done(format!("{}: references Iq {iq}, Id {id}", motor.number()))
         }
-        Act::Revup { phase: None, .. } => revup(session),
-        Act::Revup { phase: Some(phase), rpm, torque, ms } => {
+        Act::RevupData { phase: None, .. } => revup(session),
+        Act::RevupData { phase: Some(phase), rpm, torque, ms } => {
             let data = RevupPhase {
                 speed_rpm: rpm.unwrap_or_default(),
                 torque_s16a: torque.unwrap_or_default(),

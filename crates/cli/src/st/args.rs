@@ -64,7 +64,7 @@ pub enum Read {
     Segment {
         /// The segment of the drive to use, 0 to 3
         #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=3))]
-        number: u8,
+        segment: u8,
         /// Names or numbers, at most 32; those of access D too
         #[arg(required = true, value_name = "REGISTER")]
         registers: Vec<String>,
@@ -111,7 +111,8 @@ pub enum Act {
         ms: u16,
     },
     /// Show the rev-up phases, or set one
-    Revup {
+    #[command(visible_alias = "revup")]
+    RevupData {
         /// The phase to set, 0 to 4
         #[arg(requires = "rpm", value_parser = clap::value_parser!(u8).range(0..=4))]
         phase: Option<u8>,
@@ -125,7 +126,8 @@ pub enum Act {
         ms: Option<u16>,
     },
     /// Set the current references, s16A digits
-    Current {
+    #[command(visible_alias = "current")]
+    CurrentReference {
         /// Iq
         #[arg(allow_negative_numbers = true)]
         iq: i16,
@@ -142,7 +144,8 @@ pub enum Act {
         ms: u16,
     },
     /// Turn to an angle in a given time; profile mcsdk-5.4 with position control only
-    Move {
+    #[command(visible_alias = "move")]
+    Position {
         /// Angle, rad
         #[arg(allow_negative_numbers = true)]
         rad: f32,

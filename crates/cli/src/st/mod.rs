@@ -45,8 +45,8 @@ fn run_at(
                 scan::run(connection, port, Duration::from_millis(patience.into()), &rates)
             }
             Read::Get { registers, repeat } => read::get(&connect()?, &registers, repeat),
-            Read::Segment { number, registers, repeat } => {
-                read::segment(&connect()?, number, &registers, repeat)
+            Read::Segment { segment, registers, repeat } => {
+                read::segment(&connect()?, segment, &registers, repeat)
             }
             Read::Info => read::info(&connect()?),
             Read::Status => read::status(&connect()?),

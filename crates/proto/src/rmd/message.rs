@@ -13,6 +13,25 @@ named_numbers! {
 }
 byte!(SpinDirection, Meaning::Words(SpinDirection::NAMES));
 
+impl SpinDirection {
+    /// The direction of a word: its name, or `cw` and `ccw` for short.
+    pub fn named(word: &str) -> Option<Self> {
+        match word {
+            "clockwise" | "cw" => Some(SpinDirection::Clockwise),
+            "counterclockwise" | "ccw" => Some(SpinDirection::Counterclockwise),
+            _ => None,
+        }
+    }
+
+    /// The other way round.
+    pub const fn opposite(self) -> Self {
+        match self {
+            SpinDirection::Counterclockwise => SpinDirection::Clockwise,
+            _ => SpinDirection::Counterclockwise,
+        }
+    }
+}
+
 #[expect(clippy::derivable_impls, reason = "the enum comes from a macro")]
 impl Default for SpinDirection {
     fn default() -> Self {

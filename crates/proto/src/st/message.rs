@@ -54,6 +54,13 @@ pub struct PositionMove {
     pub duration_s: f32,
 }
 
+impl PositionMove {
+    /// Whether there is such a move: both are finite, and the duration is not negative.
+    pub fn is_possible(&self) -> bool {
+        self.angle_rad.is_finite() && self.duration_s.is_finite() && self.duration_s >= 0.0
+    }
+}
+
 /// A command message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Request<'a> {

@@ -224,7 +224,7 @@ mod tests {
             at = 0.25
             rmd = 3
             send = \"speed\"
-            dps = 90
+            speed_dps = 90
             [[event]]
             at = 0.5
             rmd = 3

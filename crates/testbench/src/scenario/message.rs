@@ -24,12 +24,12 @@ pub(super) enum StMessage {
     FaultAck {},
     EncoderAlign {},
     IqdrefClear {},
-    Ramp { rpm: i32, ms: u16 },
-    TorqueRamp { iq_s16a: i32, ms: u16 },
-    Current { iq_s16a: i16, id_s16a: i16 },
+    Ramp { speed_rpm: i32, duration_ms: u16 },
+    TorqueRamp { torque_s16a: i32, duration_ms: u16 },
+    CurrentReference { iq_s16a: i16, id_s16a: i16 },
     Set { register: String, value: toml::Value },
-    Revup { phase: u8, rpm: i32, iq_s16a: i16, ms: u16 },
-    Move { rad: f32, seconds: f32 },
+    RevupData { phase: u8, speed_rpm: i32, torque_s16a: i16, duration_ms: u16 },
+    Position { angle_rad: f32, duration_s: f32 },
     Pfc { action: PfcAction },
 }
 
@@ -48,19 +48,33 @@ pub(super) enum RmdMessage {
     Off {},
     Stop {},
     Run {},
-    ClearError {},
-    Torque { amps: f64 },
-    Speed { dps: f64 },
-    Move { degrees: f64, max_speed_dps: Option<f64>, direction: Option<Direction> },
-    Gains { gains: [u8; 6] },
-    Acceleration { dps2: f64 },
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum Direction {
-    Cw,
-    Ccw,
+    ClearErrors {},
+    Torque {
+        iq_amps: f64,
+    },
+    Speed {
+        speed_dps: f64,
+    },
+    Position {
+        angle_degrees: f64,
+        max_speed_dps: Option<f64>,
+    },
+    SingleTurnPosition {
+        angle_degrees: f64,
+        direction: String,
+        max_speed_dps: Option<f64>,
+    },
+    Pid {
+        position_kp: u8,
+        position_ki: u8,
+        speed_kp: u8,
+        speed_ki: u8,
+        torque_kp: u8,
+        torque_ki: u8,
+    },
+    Acceleration {
+        acceleration_dps2: f64,
+    },
 }
 
 impl StMessage {
@@ -84,27 +98,27 @@ impl StMessage {
             StMessage::Pfc { action: PfcAction::FaultAck } => {
                 Request::ExecuteCommand(Command::PfcFaultAck)
             }
-            StMessage::Ramp { rpm, ms } => {
-                Request::SetRamp(Ramp { speed_rpm: rpm, duration_ms: ms })
+            StMessage::Ramp { speed_rpm, duration_ms } => {
+                Request::SetRamp(Ramp { speed_rpm, duration_ms })
             }
-            StMessage::TorqueRamp { iq_s16a, ms } => {
-                Request::SetTorqueRamp(TorqueRamp { torque_s16a: iq_s16a, duration_ms: ms })
+            StMessage::TorqueRamp { torque_s16a, duration_ms } => {
+                Request::SetTorqueRamp(TorqueRamp { torque_s16a, duration_ms })
             }
-            StMessage::Current { iq_s16a, id_s16a } => {
+            StMessage::CurrentReference { iq_s16a, id_s16a } => {
                 Request::SetCurrentReference(CurrentReference { iq_s16a, id_s16a })
             }
-            StMessage::Revup { phase, .. } if phase >= REVUP_PHASES => {
+            StMessage::RevupData { phase, .. } if phase >= REVUP_PHASES => {
                 return Err(format!("phases of the rev-up are 0 to {}", REVUP_PHASES - 1));
             }
-            StMessage::Revup { phase, rpm, iq_s16a, ms } => {
-                let data = RevupPhase { speed_rpm: rpm, torque_s16a: iq_s16a, duration_ms: ms };
-                Request::SetRevupData(phase, data)
+            StMessage::RevupData { phase, speed_rpm, torque_s16a, duration_ms } => {
+                Request::SetRevupData(phase, RevupPhase { speed_rpm, torque_s16a, duration_ms })
             }
-            StMessage::Move { rad, seconds } if !rad.is_finite() || !seconds.is_finite() => {
-                return Err("a move has a finite angle and time".to_owned());
-            }
-            StMessage::Move { rad, seconds } => {
-                Request::SetPosition(PositionMove { angle_rad: rad, duration_s: seconds })
+            StMessage::Position { angle_rad, duration_s } => {
+                let position = PositionMove { angle_rad, duration_s };
+                if !position.is_possible() {
+                    return Err(format!("{angle_rad} rad in {duration_s} s is not possible"));
+                }
+                Request::SetPosition(position)
             }
             StMessage::Set { ref register, ref value } => {
                 let register = find_register(register).map_err(|error| error.to_string())?;
@@ -130,13 +144,21 @@ impl StMessage {
             StMessage::FaultAck {} => "fault ack".to_owned(),
             StMessage::EncoderAlign {} => "align encoder".to_owned(),
             StMessage::IqdrefClear {} => "clear Iqd ref".to_owned(),
-            StMessage::Ramp { rpm, ms: 0 } => format!("{rpm} rpm"),
-            StMessage::Ramp { rpm, ms } => format!("{rpm} rpm in {ms} ms"),
-            StMessage::TorqueRamp { iq_s16a, ms } => format!("Iq {iq_s16a} in {ms} ms"),
-            StMessage::Current { iq_s16a, id_s16a } => format!("Iq {iq_s16a}, Id {id_s16a}"),
+            StMessage::Ramp { speed_rpm, duration_ms: 0 } => format!("{speed_rpm} rpm"),
+            StMessage::Ramp { speed_rpm, duration_ms } => {
+                format!("{speed_rpm} rpm in {duration_ms} ms")
+            }
+            StMessage::TorqueRamp { torque_s16a, duration_ms } => {
+                format!("Iq {torque_s16a} in {duration_ms} ms")
+            }
+            StMessage::CurrentReference { iq_s16a, id_s16a } => {
+                format!("Iq {iq_s16a}, Id {id_s16a}")
+            }
             StMessage::Set { register, value } => format!("{register} {}", text(value)),
-            StMessage::Revup { phase, .. } => format!("rev-up phase {phase}"),
-            StMessage::Move { rad, seconds } => format!("{rad} rad in {seconds} s"),
+            StMessage::RevupData { phase, .. } => format!("rev-up phase {phase}"),
+            StMessage::Position { angle_rad, duration_s } => {
+                format!("{angle_rad} rad in {duration_s} s")
+            }
             StMessage::Pfc { action: PfcAction::Enable } => "PFC on".to_owned(),
             StMessage::Pfc { action: PfcAction::Disable } => "PFC off".to_owned(),
             StMessage::Pfc { action: PfcAction::FaultAck } => "PFC fault ack".to_owned(),
@@ -151,22 +173,19 @@ impl RmdMessage {
             RmdMessage::Off {} => Off.encode(),
             RmdMessage::Stop {} => Stop.encode(),
             RmdMessage::Run {} => Run.encode(),
-            RmdMessage::ClearError {} => ClearErrors.encode(),
-            RmdMessage::Torque { amps } => SetTorque { iq: wanted(amps)? }.encode(),
-            RmdMessage::Speed { dps } => SetSpeed { speed: wanted(dps)? }.encode(),
-            RmdMessage::Move { degrees, max_speed_dps, direction: None } => {
-                let angle = wanted(degrees)?;
+            RmdMessage::ClearErrors {} => ClearErrors.encode(),
+            RmdMessage::Torque { iq_amps } => SetTorque { iq: wanted(iq_amps)? }.encode(),
+            RmdMessage::Speed { speed_dps } => SetSpeed { speed: wanted(speed_dps)? }.encode(),
+            RmdMessage::Position { angle_degrees, max_speed_dps } => {
+                let angle = wanted(angle_degrees)?;
                 match max_speed_dps {
                     None => SetPosition { angle }.encode(),
                     Some(dps) => SetPositionLimited { max_speed: wanted(dps)?, angle }.encode(),
                 }
             }
-            RmdMessage::Move { degrees, max_speed_dps, direction: Some(direction) } => {
-                let direction = match direction {
-                    Direction::Cw => SpinDirection::Clockwise,
-                    Direction::Ccw => SpinDirection::Counterclockwise,
-                };
-                let angle = wanted(degrees)?;
+            RmdMessage::SingleTurnPosition { angle_degrees, ref direction, max_speed_dps } => {
+                let direction = turned(direction)?;
+                let angle = wanted(angle_degrees)?;
                 match max_speed_dps {
                     None => SetSingleTurnPosition { direction, angle }.encode(),
                     Some(dps) => {
@@ -175,20 +194,25 @@ impl RmdMessage {
                     }
                 }
             }
-            RmdMessage::Gains { gains } => {
-                let [position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki] = gains;
-                WritePidRam(Pid {
-                    position_kp,
-                    position_ki,
-                    speed_kp,
-                    speed_ki,
-                    torque_kp,
-                    torque_ki,
-                })
-                .encode()
-            }
-            RmdMessage::Acceleration { dps2 } => {
-                WriteAccelerationRam(Acceleration { acceleration: wanted(dps2)? }).encode()
+            RmdMessage::Pid {
+                position_kp,
+                position_ki,
+                speed_kp,
+                speed_ki,
+                torque_kp,
+                torque_ki,
+            } => WritePidRam(Pid {
+                position_kp,
+                position_ki,
+                speed_kp,
+                speed_ki,
+                torque_kp,
+                torque_ki,
+            })
+            .encode(),
+            RmdMessage::Acceleration { acceleration_dps2 } => {
+                WriteAccelerationRam(Acceleration { acceleration: wanted(acceleration_dps2)? })
+                    .encode()
             }
         };
         Ok(CanFrame::new(motor.can_id(), data))
@@ -200,20 +224,30 @@ impl RmdMessage {
             RmdMessage::Off {} => "off".to_owned(),
             RmdMessage::Stop {} => "stop".to_owned(),
             RmdMessage::Run {} => "run".to_owned(),
-            RmdMessage::ClearError {} => "clear error".to_owned(),
-            RmdMessage::Torque { amps } => format!("{amps} A"),
-            RmdMessage::Speed { dps } => format!("{dps} °/s"),
-            RmdMessage::Move { degrees, max_speed_dps, direction } => {
-                let way = match direction {
-                    None => "",
-                    Some(Direction::Cw) => " clockwise",
-                    Some(Direction::Ccw) => " counterclockwise",
-                };
-                let most = max_speed_dps.map_or(String::new(), |dps| format!(", max {dps} °/s"));
-                format!("to {degrees}°{way}{most}")
+            RmdMessage::ClearErrors {} => "clear error".to_owned(),
+            RmdMessage::Torque { iq_amps } => format!("{iq_amps} A"),
+            RmdMessage::Speed { speed_dps } => format!("{speed_dps} °/s"),
+            RmdMessage::Position { angle_degrees, max_speed_dps } => {
+                format!("to {angle_degrees}°{}", most(*max_speed_dps))
             }
-            RmdMessage::Gains { gains } => format!("gains {gains:?}"),
-            RmdMessage::Acceleration { dps2 } => format!("acceleration {dps2} °/s²"),
+            RmdMessage::SingleTurnPosition { angle_degrees, direction, max_speed_dps } => {
+                let way =
+                    turned(direction).map_or_else(|_| direction.clone(), |way| way.to_string());
+                format!("to {angle_degrees}° {way}{}", most(*max_speed_dps))
+            }
+            RmdMessage::Pid {
+                position_kp,
+                position_ki,
+                speed_kp,
+                speed_ki,
+                torque_kp,
+                torque_ki,
+            } => format!(
+                "PID {position_kp} {position_ki} {speed_kp} {speed_ki} {torque_kp} {torque_ki}"
+            ),
+            RmdMessage::Acceleration { acceleration_dps2 } => {
+                format!("acceleration {acceleration_dps2} °/s²")
+            }
         }
     }
 }
@@ -224,6 +258,17 @@ fn text(value: &toml::Value) -> String {
         toml::Value::String(text) => text.clone(),
         other => other.to_string(),
     }
+}
+
+/// A greatest speed in words.
+fn most(max_speed_dps: Option<f64>) -> String {
+    max_speed_dps.map_or(String::new(), |dps| format!(", max {dps} °/s"))
+}
+
+fn turned(direction: &str) -> Result<SpinDirection, String> {
+    let words = "`clockwise` (`cw`) or `counterclockwise` (`ccw`)";
+    SpinDirection::named(direction)
+        .ok_or_else(|| format!("direction is {words}, not `{direction}`"))
 }
 
 /// A physical value as the wire's integer. What no frame says is refused, never cut.
@@ -245,10 +290,13 @@ mod tests {
         message.encode(MotorId::new(2).unwrap())
     }
 
+    const GAINS: &str = "position_kp = 1\nposition_ki = 2\nspeed_kp = 3\nspeed_ki = 4\ntorque_kp = 5\n\
+                         torque_ki = 6";
+
     #[test]
     fn messages_are_the_bytes_of_the_documents() {
         assert_eq!(st("send = \"start\"").unwrap(), [0x23, 1, 1, 0x25]);
-        let ramp = st("send = \"ramp\"\nrpm = 1500\nms = 1000").unwrap();
+        let ramp = st("send = \"ramp\"\nspeed_rpm = 1500\nduration_ms = 1000").unwrap();
         assert_eq!(ramp, [0x27, 6, 0xDC, 5, 0, 0, 0xE8, 3, 0xFA]);
         // A register of two bytes, in its unit, and one whose values have names.
         let kp = st("send = \"set\"\nregister = \"SPEED_KP\"\nvalue = -2").unwrap();
@@ -256,13 +304,14 @@ mod tests {
         let mode = st("send = \"set\"\nregister = \"CONTROL_MODE\"\nvalue = \"SPEED\"").unwrap();
         assert_eq!(mode[..4], [0x21, 2, 3, 1]);
 
-        let frame = rmd("send = \"move\"\ndegrees = 90\nmax_speed_dps = 360").unwrap();
+        let frame = rmd("send = \"position\"\nangle_degrees = 90\nmax_speed_dps = 360").unwrap();
         assert_eq!(frame, CanFrame::new(0x142, [0xA4, 0, 0x68, 1, 0x28, 0x23, 0, 0]));
-        let frame = rmd("send = \"move\"\ndegrees = 90\ndirection = \"ccw\"").unwrap();
+        let frame = rmd("send = \"single-turn-position\"\nangle_degrees = 90\ndirection = \"ccw\"")
+            .unwrap();
         assert_eq!(frame, CanFrame::new(0x142, [0xA5, 1, 0, 0, 0x28, 0x23, 0, 0]));
-        let frame = rmd("send = \"gains\"\ngains = [1, 2, 3, 4, 5, 6]").unwrap();
+        let frame = rmd(&format!("send = \"pid\"\n{GAINS}")).unwrap();
         assert_eq!(frame, CanFrame::new(0x142, [0x31, 0, 1, 2, 3, 4, 5, 6]));
-        let frame = rmd("send = \"torque\"\namps = -32").unwrap();
+        let frame = rmd("send = \"torque\"\niq_amps = -32").unwrap();
         assert_eq!(frame, CanFrame::new(0x142, [0xA1, 0, 0, 0, 0x30, 0xF8, 0, 0]));
     }
 
@@ -270,16 +319,33 @@ mod tests {
     fn what_no_frame_can_say_is_refused() {
         assert!(st("send = \"fly\"").unwrap_err().contains("fly"));
         assert!(st("send = \"start\"\nrpm = 3").unwrap_err().contains("rpm"));
-        assert!(st("send = \"ramp\"\nrpm = 1500\nms = 70000").is_err());
-        assert!(st("send = \"revup\"\nphase = 5\nrpm = 0\niq_s16a = 0\nms = 0").is_err());
-        assert!(st("send = \"move\"\nrad = nan\nseconds = 1").is_err());
+        assert!(st("send = \"ramp\"\nspeed_rpm = 1500\nduration_ms = 70000").is_err());
+        assert!(
+            st("send = \"revup-data\"\nphase = 5\nspeed_rpm = 0\ntorque_s16a = 0\nduration_ms = 0")
+                .unwrap_err()
+                .contains("0 to 4")
+        );
+        assert!(
+            st("send = \"position\"\nangle_rad = nan\nduration_s = 1")
+                .unwrap_err()
+                .contains("NaN rad")
+        );
         let why = st("send = \"set\"\nregister = \"SPEED_KPP\"\nvalue = 3").unwrap_err();
         assert!(why.contains("SPEED_KP"), "{why}");
         assert!(st("send = \"set\"\nregister = \"SPEED_KP\"\nvalue = 40000").is_err());
-        assert!(rmd("send = \"torque\"\namps = 32.1").unwrap_err().contains("±32"));
-        assert!(rmd("send = \"speed\"\ndps = inf").is_err());
-        assert!(rmd("send = \"move\"\ndegrees = 360\ndirection = \"cw\"").is_err());
-        assert!(rmd("send = \"move\"\ndegrees = 1\nmax_speed_dps = -1").is_err());
-        assert!(rmd("send = \"gains\"\ngains = [1, 2, 3]").is_err());
+        assert!(rmd("send = \"torque\"\niq_amps = 32.1").unwrap_err().contains("±32"));
+        assert!(rmd("send = \"speed\"\nspeed_dps = inf").unwrap_err().contains("outside"));
+        let turn = |angle: f64, way: &str| {
+            let members = format!("angle_degrees = {angle}\ndirection = \"{way}\"");
+            rmd(&format!("send = \"single-turn-position\"\n{members}"))
+        };
+        assert_eq!(turn(359.99, "clockwise"), turn(359.99, "cw"));
+        assert!(turn(360.0, "cw").unwrap_err().contains("0 to 359.99"));
+        assert!(turn(1.0, "left").unwrap_err().contains("counterclockwise"));
+        let slow = "send = \"position\"\nangle_degrees = 1\nmax_speed_dps = 0.9";
+        assert!(rmd(slow).unwrap_err().contains("outside 1 to"));
+        let back = "send = \"acceleration\"\nacceleration_dps2 = -1";
+        assert!(rmd(back).unwrap_err().contains("outside 0 to"));
+        assert!(rmd("send = \"pid\"\nspeed_kp = 3").unwrap_err().contains("position_kp"));
     }
 }

@@ -82,7 +82,7 @@ mod tests {
         at = 0.2
         rmd = 1
         send = \"speed\"
-        dps = 90
+        speed_dps = 90
     ";
 
     #[test]
@@ -104,7 +104,10 @@ mod tests {
         assert_eq!(fine.state_hash, one.state_hash);
         let every: Vec<f64> = column(&fine, "rmd1.speed_dps").iter().copied().step_by(20).collect();
         assert_eq!(every, column(&one, "rmd1.speed_dps"));
-        assert_ne!(run(&SPEED.replace("dps = 90", "dps = 91")).state_hash, one.state_hash);
+        assert_ne!(
+            run(&SPEED.replace("speed_dps = 90", "speed_dps = 91")).state_hash,
+            one.state_hash
+        );
     }
 
     #[test]
@@ -134,7 +137,7 @@ mod tests {
             [[event]]
             at = 0.5
             rmd = 1
-            send = \"clear-error\"
+            send = \"clear-errors\"
         ";
         assert_eq!(run(text).refusals[0].reply.as_deref(), Some("errors"));
         assert!(run(&format!("{text}\nrefused = \"errors\"")).as_expected());
@@ -156,7 +159,7 @@ mod tests {
             at = 0
             rmd = 1
             send = \"speed\"
-            dps = 720
+            speed_dps = 720
         ";
         let run = Scenario::parse(text, &folder).unwrap().run().unwrap();
         let load = column(&run, "rmd1.load_newton_metres");

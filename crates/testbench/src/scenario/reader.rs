@@ -174,7 +174,7 @@ mod tests {
         assert!(why("at = 0.5\nsend = \"start\"").contains("event 1: at 0.5 s: say which motor"));
         assert!(why("at = 0.5\nst = 2\nsend = \"start\"").contains("these are: st1, rmd3"));
         assert!(why("at = 0.5\nst = 1").contains("`send` or `world`"));
-        assert!(why("at = 0.5\nst = 1\nsend = \"torque\"\namps = 3").contains("torque"));
+        assert!(why("at = 0.5\nst = 1\nsend = \"torque\"\niq_amps = 3").contains("torque"));
         assert!(why("at = 0.5\nst = 1\nsend = \"start\"\nlabl = \"\"").contains("labl"));
         assert!(why("at = 0.5\nst = 1\nworld = \"state\"").contains("signals"));
         assert!(why("at = 0.5\nst = 1\nworld = \"pause\"").contains("real time"));

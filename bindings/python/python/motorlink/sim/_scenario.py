@@ -88,8 +88,8 @@ def run(scenario: Source) -> Run:
     ...     [[event]]
     ...     at = 0.1
     ...     rmd = 1
-    ...     send = "move"
-    ...     degrees = 90
+    ...     send = "position"
+    ...     angle_degrees = 90
     ...     [[expect]]
     ...     why = "it arrives"
     ...     signal = "rmd1.angle_degrees"
