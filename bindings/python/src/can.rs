@@ -12,7 +12,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use motorlink::port::{CanLink, Evented, PortError};
+use motorlink::port::{CanLink, Evented, Link, PortError};
 use motorlink_proto::can::CanFrame;
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -88,9 +88,9 @@ pub(crate) struct Threads {
 
 impl Threads {
     /// What makes a link: the first one, and another one after each failure.
-    pub(crate) fn links(&self) -> impl FnMut() -> Link + Send + 'static {
+    pub(crate) fn links(&self) -> impl FnMut() -> PythonCanLink + Send + 'static {
         let hub = Arc::clone(&self.hub);
-        move || Link::new(Arc::clone(&hub))
+        move || PythonCanLink::new(Arc::clone(&hub))
     }
 
     /// Ends them, and waits for that. The owner may shut the bus down afterwards.
@@ -287,9 +287,9 @@ fn frame(message: &Bound<'_, PyAny>) -> PyResult<Option<CanFrame>> {
 }
 
 /// A bus in use, until it fails.
-pub(crate) struct Link(Arc<Hub>);
+pub(crate) struct PythonCanLink(Arc<Hub>);
 
-impl Link {
+impl PythonCanLink {
     fn new(hub: Arc<Hub>) -> Self {
         let mut state = hub.lock();
         state.link += 1;
@@ -300,11 +300,13 @@ impl Link {
             hub.changed.notify_all();
         }
         drop(state);
-        Link(hub)
+        PythonCanLink(hub)
     }
 }
 
-impl CanLink for Link {
+impl Link for PythonCanLink {}
+
+impl CanLink for PythonCanLink {
     /// What fails in sending is received.
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         self.0.lock().outbox.push_back(*frame);
@@ -335,7 +337,7 @@ impl CanLink for Link {
     }
 }
 
-impl Evented for Link {
+impl Evented for PythonCanLink {
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         Some(self.0.bell.as_fd())
     }

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::thread;
 
 use motorlink::can::CanFrame;
-use motorlink::port::CanLink;
 use motorlink::port::PortError;
+use motorlink::port::{CanLink, Link};
 use motorlink::rmd;
 use motorlink::st::{self, Error, Options};
 use rustix::process::{Pid, Signal, kill_process};
@@ -95,6 +95,12 @@ fn nothing_is_started_after_a_signal_has_stopped_the_motor() {
 /// A bus on which every request comes back.
 struct Echo(Option<CanFrame>);
 
+impl Link for Echo {
+    fn is_fresh(&self) -> bool {
+        true
+    }
+}
+
 impl CanLink for Echo {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         self.0 = Some(*frame);
@@ -103,10 +109,6 @@ impl CanLink for Echo {
 
     fn receive(&mut self, _: Option<std::time::Duration>) -> Result<Option<CanFrame>, PortError> {
         Ok(self.0.take())
-    }
-
-    fn is_fresh(&self) -> bool {
-        true
     }
 }
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use motorlink::LinkState;
 use motorlink::can::CanFrame;
-use motorlink::port::{ByteLink, CanLink, PortError};
+use motorlink::port::{ByteLink, CanLink, Link, PortError};
 use motorlink::rmd::{self};
 use motorlink::st::{self, Error, Options, register};
 use served::Served;
@@ -44,6 +44,8 @@ impl<L> Hasty<L> {
         Err(PortError::Io { port: "the wait".to_owned(), source: source.into() })
     }
 }
+
+impl<L: Send> Link for Hasty<L> {}
 
 impl<L: ByteLink> ByteLink for Hasty<L> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {

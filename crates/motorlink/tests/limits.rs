@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use motorlink::port::{ByteLink, PortError};
+use motorlink::port::{ByteLink, Link, PortError};
 use motorlink::st::{
     Client, Command, ControlMode, CurrentReference, Error, EventClient, Limits, Motor, Options,
     PositionMove, Profile, Progress, Ramp, RegisterId, Request, TorqueRamp, register,
@@ -241,6 +241,12 @@ impl Disturbed {
     }
 }
 
+impl Link for Disturbed {
+    fn clock(&self) -> Option<Clock> {
+        self.inner.clock()
+    }
+}
+
 impl ByteLink for Disturbed {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.look()?;
@@ -256,10 +262,6 @@ impl ByteLink for Disturbed {
         }
         let size = self.inner.read(buffer, timeout)?;
         if self.disturbance.lock().unwrap().deafens { Ok(0) } else { Ok(size) }
-    }
-
-    fn clock(&self) -> Option<Clock> {
-        self.inner.clock()
     }
 }
 

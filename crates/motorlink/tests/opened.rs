@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use motorlink::Clock;
 use motorlink::can::CanFrame;
-use motorlink::port::{ByteLink, CanLink, PortError, SlcanLink};
+use motorlink::port::{ByteLink, CanLink, Link, PortError, SlcanLink};
 use motorlink::rmd::{self, Error, IqCommand, MotorId, MotorSet, SetTorque4};
 use motorlink::slcan::Bitrate;
 use motorlink::st::{self, Failure, register};
@@ -40,6 +40,12 @@ impl Motors {
     fn sent(&self) -> Vec<(u64, u32, u8)> {
         let sent = self.sent.lock().unwrap();
         sent.iter().map(|(ms, frame)| (*ms, frame.id(), frame.data()[0])).collect()
+    }
+}
+
+impl Link for Motors {
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
     }
 }
 
@@ -88,10 +94,6 @@ impl CanLink for Motors {
         self.clock.wait(end);
         Ok(None)
     }
-
-    fn clock(&self) -> Option<Clock> {
-        Some(self.clock.clone())
-    }
 }
 
 #[test]
@@ -127,6 +129,12 @@ fn torques_for_four_motors_are_sent_when_all_are_in_step() {
 fn torques_for_four_motors_are_sent_to_those_that_answer() {
     /// Motor 3 is not there.
     struct Without3(Motors);
+    impl Link for Without3 {
+        fn clock(&self) -> Option<Clock> {
+            self.0.clock()
+        }
+    }
+
     impl CanLink for Without3 {
         fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
             if frame.id() == 0x143 {
@@ -136,9 +144,6 @@ fn torques_for_four_motors_are_sent_to_those_that_answer() {
         }
         fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
             self.0.receive(timeout)
-        }
-        fn clock(&self) -> Option<Clock> {
-            self.0.clock()
         }
     }
     let motors = Motors::new(false);
@@ -163,6 +168,12 @@ fn torques_for_a_motor_that_answers_somebody_else_are_an_error_for_each() {
 fn torques_for_motors_that_are_all_silent_are_not_sent() {
     /// Nobody is there.
     struct Nobody(Motors);
+    impl Link for Nobody {
+        fn clock(&self) -> Option<Clock> {
+            self.0.clock()
+        }
+    }
+
     impl CanLink for Nobody {
         fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
             assert_ne!(frame.id(), 0x280);
@@ -170,9 +181,6 @@ fn torques_for_motors_that_are_all_silent_are_not_sent() {
         }
         fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
             self.0.receive(timeout)
-        }
-        fn clock(&self) -> Option<Clock> {
-            self.0.clock()
         }
     }
     let bus =
@@ -229,6 +237,8 @@ struct Adapter {
     pending: VecDeque<u8>,
 }
 
+impl Link for Adapter {}
+
 impl ByteLink for Adapter {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         let Some(says) = self.says else { return Ok(()) };
@@ -278,6 +288,12 @@ struct Twice {
     is_talking: bool,
 }
 
+impl Link for Twice {
+    fn is_fresh(&self) -> bool {
+        true
+    }
+}
+
 impl ByteLink for Twice {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         let payload: &[u8] = match bytes[2] {
@@ -303,10 +319,6 @@ impl ByteLink for Twice {
         let reply = if is_waiting { self.replies.pop_front().unwrap_or_default() } else { vec![] };
         buffer[..reply.len()].copy_from_slice(&reply);
         Ok(reply.len())
-    }
-
-    fn is_fresh(&self) -> bool {
-        true
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::time::Duration as Span;
 
 use motorlink::Clock;
-use motorlink::port::{CanLink, PortError};
+use motorlink::port::{CanLink, Link, PortError};
 use motorlink_conformance::Need;
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::{Instant, Micros};
@@ -38,6 +38,12 @@ impl Adapter {
     }
 }
 
+impl Link for Adapter {
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
+    }
+}
+
 impl CanLink for Adapter {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         self.pass(self.clock.now() + OUT)?;
@@ -50,10 +56,6 @@ impl CanLink for Adapter {
         let due = self.received.front().map(|(due, _)| *due).filter(|due| *due <= until);
         self.pass(due.unwrap_or(until).max(self.clock.now()))?;
         Ok(due.and_then(|_| self.received.pop_front()).map(|(_, frame)| frame))
-    }
-
-    fn clock(&self) -> Option<Clock> {
-        Some(self.clock.clone())
     }
 }
 

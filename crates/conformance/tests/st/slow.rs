@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration as Span;
 
 use motorlink::Clock;
-use motorlink::port::{ByteLink, PortError};
+use motorlink::port::{ByteLink, Link, PortError};
 use motorlink_conformance::st::{self, Harness, Options};
 use motorlink_conformance::{Need, Verdict, run};
 use motorlink_link::serve::Station as _;
@@ -51,6 +51,12 @@ impl Uart {
     }
 }
 
+impl Link for Uart {
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
+    }
+}
+
 impl ByteLink for Uart {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         for &byte in bytes {
@@ -78,10 +84,6 @@ impl ByteLink for Uart {
             }
             self.step(until);
         }
-    }
-
-    fn clock(&self) -> Option<Clock> {
-        Some(self.clock.clone())
     }
 }
 

@@ -8,7 +8,7 @@ use motorlink_proto::can::CanFrame;
 
 use super::error::PortError;
 use super::event::Evented;
-use super::link::CanLink;
+use super::link::{CanLink, Link};
 use crate::clock::Clock;
 
 /// How many sent frames of one identifier wait for their echo. What is sent to one motor again and
@@ -58,6 +58,12 @@ impl<C: CanLink> EchoCanceller<C> {
     }
 }
 
+impl<C: CanLink> Link for EchoCanceller<C> {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.link)
+    }
+}
+
 impl<C: CanLink> CanLink for EchoCanceller<C> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         self.link.send(frame)?;
@@ -80,18 +86,6 @@ impl<C: CanLink> CanLink for EchoCanceller<C> {
                 other => return Ok(other),
             }
         }
-    }
-
-    fn clock(&self) -> Option<Clock> {
-        self.link.clock()
-    }
-
-    fn is_fresh(&self) -> bool {
-        self.link.is_fresh()
-    }
-
-    fn trouble(&self) -> Option<&'static str> {
-        self.link.trouble()
     }
 }
 
@@ -122,6 +116,12 @@ mod tests {
         EchoCanceller::new(Mirror { clock: Clock::standing(), frames: VecDeque::new(), copies })
     }
 
+    impl Link for Mirror {
+        fn clock(&self) -> Option<Clock> {
+            Some(self.clock.clone())
+        }
+    }
+
     impl CanLink for Mirror {
         fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
             self.frames.extend(std::iter::repeat_n(*frame, self.copies));
@@ -129,9 +129,6 @@ mod tests {
         }
         fn receive(&mut self, _: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
             Ok(self.frames.pop_front())
-        }
-        fn clock(&self) -> Option<Clock> {
-            Some(self.clock.clone())
         }
     }
 

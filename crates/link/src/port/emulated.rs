@@ -10,7 +10,7 @@ use motorlink_proto::time::{Instant, Micros};
 
 use super::error::PortError;
 use super::fd::FdLink;
-use super::link::ByteLink;
+use super::link::{ByteLink, Link};
 use crate::clock::Clock;
 use crate::clock::WeakClock;
 
@@ -142,6 +142,12 @@ impl EmulatedBytes {
     }
 }
 
+impl Link for EmulatedBytes {
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
+    }
+}
+
 impl ByteLink for EmulatedBytes {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.step_to(self.clock.now() + TICK)?;
@@ -176,10 +182,6 @@ impl ByteLink for EmulatedBytes {
             }
             self.step(end)?;
         }
-    }
-
-    fn clock(&self) -> Option<Clock> {
-        Some(self.clock.clone())
     }
 }
 

@@ -6,7 +6,7 @@ use motorlink_proto::can::{CanFrame, Identifiers};
 use motorlink_proto::time::Instant;
 
 use super::error::PortError;
-use super::link::{ByteLink, CanLink};
+use super::link::{ByteLink, CanLink, Link};
 use crate::clock::Clock;
 use crate::fault::{Faults, Lane, Unit, Way};
 
@@ -72,6 +72,12 @@ impl<C: CanLink> FaultCan<C> {
     }
 }
 
+impl<B: ByteLink> Link for FaultBytes<B> {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.link)
+    }
+}
+
 impl<B: ByteLink> ByteLink for FaultBytes<B> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         let now = self.lanes.now();
@@ -96,13 +102,11 @@ impl<B: ByteLink> ByteLink for FaultBytes<B> {
             }
         }
     }
+}
 
-    fn clock(&self) -> Option<Clock> {
-        self.link.clock()
-    }
-
-    fn is_fresh(&self) -> bool {
-        self.link.is_fresh()
+impl<C: CanLink> Link for FaultCan<C> {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.link)
     }
 }
 
@@ -128,18 +132,6 @@ impl<C: CanLink> CanLink for FaultCan<C> {
                 return Ok(frame);
             }
         }
-    }
-
-    fn clock(&self) -> Option<Clock> {
-        self.link.clock()
-    }
-
-    fn is_fresh(&self) -> bool {
-        self.link.is_fresh()
-    }
-
-    fn trouble(&self) -> Option<&'static str> {
-        self.link.trouble()
     }
 }
 
@@ -199,6 +191,8 @@ mod tests {
     fn idle(timeout: Option<Duration>) {
         std::thread::sleep(timeout.expect("nothing will ever come"));
     }
+
+    impl<T: Send> Link for Loopback<T> {}
 
     impl ByteLink for Loopback<u8> {
         fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {

@@ -12,7 +12,7 @@ use rustix::termios::{QueueSelector, tcflush};
 use super::deadline::Deadline;
 use super::descriptors::Listed;
 use super::error::PortError;
-use super::link::ByteLink;
+use super::link::{ByteLink, Link};
 
 /// How long the far end may take no byte at all before a write fails.
 pub(super) const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
@@ -46,6 +46,8 @@ impl FdLink {
 }
 
 /// A link that several hold: the descriptor is the kernel's to share.
+impl Link for Arc<FdLink> {}
+
 impl ByteLink for Arc<FdLink> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.put(bytes)
@@ -55,6 +57,8 @@ impl ByteLink for Arc<FdLink> {
         self.fetch(buffer, timeout)
     }
 }
+
+impl Link for FdLink {}
 
 impl ByteLink for FdLink {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {

@@ -33,7 +33,7 @@ pub use error::PortError;
 pub use event::{EventBytes, EventCan, Evented};
 pub use faulty::{FaultBytes, FaultCan};
 pub use fd::FdLink;
-pub use link::{ByteLink, CanLink};
+pub use link::{ByteLink, CanLink, Link};
 pub use name::{Given, NameError};
 pub use registry::{register, schemes};
 pub use scheme::{CanPort, Carries, Form, LinePort, Port, PortInfo, PortName, Scheme};

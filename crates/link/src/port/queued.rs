@@ -10,7 +10,7 @@ use rustix::io::Errno;
 use super::error::PortError;
 use super::event::Evented;
 use super::fd::{FdLink, WRITE_TIMEOUT};
-use super::link::{ByteLink, CanLink};
+use super::link::{ByteLink, CanLink, Link};
 use super::socketcan::SocketCanLink;
 
 /// A line on a descriptor with what it has not taken yet.
@@ -27,6 +27,8 @@ impl QueuedBytes {
         QueuedBytes { link, queue: Vec::new(), stuck: Instant::now() }
     }
 }
+
+impl Link for QueuedBytes {}
 
 impl ByteLink for QueuedBytes {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
@@ -83,6 +85,8 @@ impl QueuedCan {
         QueuedCan { link, queue: VecDeque::new(), stuck: Instant::now() }
     }
 }
+
+impl Link for QueuedCan {}
 
 impl CanLink for QueuedCan {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {

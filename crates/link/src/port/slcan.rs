@@ -10,7 +10,7 @@ use motorlink_slcan::{Answer, Bitrate, HostCodec, LONGEST_FRAME, encode};
 
 use super::error::PortError;
 use super::event::Evented;
-use super::link::{ByteLink, CanLink};
+use super::link::{ByteLink, CanLink, Link};
 use crate::clock::Clock;
 
 /// How long an adapter may take to answer a command while it is opened. Many never answer some of
@@ -128,6 +128,28 @@ impl<B: ByteLink> SlcanLink<B> {
     }
 }
 
+impl<B: ByteLink> Link for SlcanLink<B> {
+    fn clock(&self) -> Option<Clock> {
+        self.line.clock()
+    }
+
+    fn is_fresh(&self) -> bool {
+        self.line.is_fresh()
+    }
+
+    fn trouble(&self) -> Option<&'static str> {
+        match (self.is_heard, self.refused_in_a_row) {
+            (false, _) => Some(
+                "it has not answered anything: is it an slcan adapter, and its baud rate right?",
+            ),
+            (true, 0) => None,
+            (true, _) => Some(
+                "it refused the frame (BEL): are the wires, the bit rate and the termination right?",
+            ),
+        }
+    }
+}
+
 impl<B: ByteLink> CanLink for SlcanLink<B> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         self.line.write(encode(frame, &mut [0; LONGEST_FRAME]))
@@ -152,26 +174,6 @@ impl<B: ByteLink> CanLink for SlcanLink<B> {
                 None if self.fill(end)? => {}
                 None => return Ok(None),
             }
-        }
-    }
-
-    fn clock(&self) -> Option<Clock> {
-        self.line.clock()
-    }
-
-    fn is_fresh(&self) -> bool {
-        self.line.is_fresh()
-    }
-
-    fn trouble(&self) -> Option<&'static str> {
-        match (self.is_heard, self.refused_in_a_row) {
-            (false, _) => Some(
-                "it has not answered anything: is it an slcan adapter, and its baud rate right?",
-            ),
-            (true, 0) => None,
-            (true, _) => Some(
-                "it refused the frame (BEL): are the wires, the bit rate and the termination right?",
-            ),
         }
     }
 }

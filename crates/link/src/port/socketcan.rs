@@ -17,7 +17,7 @@ use super::descriptors::Listed;
 use super::error::PortError;
 use super::fd::wait;
 use super::interface::Interface;
-use super::link::CanLink;
+use super::link::{CanLink, Link};
 
 /// The error class of a controller that left the bus, in the mask of the kernel's error frames.
 const BUS_OFF: u32 = 0x40;
@@ -84,6 +84,8 @@ impl AsFd for SocketCanLink {
         self.socket.as_fd()
     }
 }
+
+impl Link for SocketCanLink {}
 
 impl CanLink for SocketCanLink {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {

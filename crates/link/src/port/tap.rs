@@ -6,7 +6,7 @@ use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
 use super::error::PortError;
-use super::link::{ByteLink, CanLink};
+use super::link::{ByteLink, CanLink, Link};
 use crate::clock::Clock;
 
 /// Which way data went, as the program sees it.
@@ -51,6 +51,12 @@ impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> TapCan<C, F> {
     }
 }
 
+impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> Link for TapBytes<B, F> {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.link)
+    }
+}
+
 impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> ByteLink for TapBytes<B, F> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         let at = self.time.elapsed();
@@ -66,13 +72,11 @@ impl<B: ByteLink, F: FnMut(Direction, Duration, &[u8]) + Send> ByteLink for TapB
         }
         Ok(len)
     }
+}
 
-    fn clock(&self) -> Option<Clock> {
-        self.link.clock()
-    }
-
-    fn is_fresh(&self) -> bool {
-        self.link.is_fresh()
+impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> Link for TapCan<C, F> {
+    fn within(&self) -> Option<&dyn Link> {
+        Some(&self.link)
     }
 }
 
@@ -90,18 +94,6 @@ impl<C: CanLink, F: FnMut(Direction, Duration, &CanFrame) + Send> CanLink for Ta
             (self.observer)(Direction::Received, self.time.elapsed(), frame);
         }
         Ok(frame)
-    }
-
-    fn clock(&self) -> Option<Clock> {
-        self.link.clock()
-    }
-
-    fn is_fresh(&self) -> bool {
-        self.link.is_fresh()
-    }
-
-    fn trouble(&self) -> Option<&'static str> {
-        self.link.trouble()
     }
 }
 

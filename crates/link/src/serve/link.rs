@@ -7,7 +7,7 @@ use motorlink_proto::can::CanFrame;
 
 use super::station::{Station, Traffic};
 use crate::Clock;
-use crate::port::{ByteLink, CanLink, Evented, PortError};
+use crate::port::{ByteLink, CanLink, Evented, Link, PortError};
 
 /// The link to a station in the process, without a port. Bytes (`T` is `u8`) and frames (`T` is
 /// [`CanFrame`]) take no time on it. The station is polled while something is waited for.
@@ -46,6 +46,16 @@ impl<S: Station<T>, T: Traffic> StationLink<S, T> {
     }
 }
 
+impl<S: Send, T: Send> Link for StationLink<S, T> {
+    fn clock(&self) -> Option<Clock> {
+        Some(self.clock.clone())
+    }
+
+    fn is_fresh(&self) -> bool {
+        true
+    }
+}
+
 impl<S: Station<u8> + Send> ByteLink for StationLink<S, u8> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.station.receive(self.clock.now(), bytes, &mut self.received);
@@ -59,14 +69,6 @@ impl<S: Station<u8> + Send> ByteLink for StationLink<S, u8> {
         self.received.drain(..size);
         Ok(size)
     }
-
-    fn clock(&self) -> Option<Clock> {
-        Some(self.clock.clone())
-    }
-
-    fn is_fresh(&self) -> bool {
-        true
-    }
 }
 
 impl<S: Station<CanFrame> + Send> CanLink for StationLink<S, CanFrame> {
@@ -78,14 +80,6 @@ impl<S: Station<CanFrame> + Send> CanLink for StationLink<S, CanFrame> {
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
         self.wait(timeout);
         Ok((!self.received.is_empty()).then(|| self.received.remove(0)))
-    }
-
-    fn clock(&self) -> Option<Clock> {
-        Some(self.clock.clone())
-    }
-
-    fn is_fresh(&self) -> bool {
-        true
     }
 }
 

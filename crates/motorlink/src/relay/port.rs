@@ -4,7 +4,7 @@ use std::os::fd::BorrowedFd;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use motorlink_link::port::{ByteLink, CanLink, Evented, PortError, PortName};
+use motorlink_link::port::{ByteLink, CanLink, Evented, Link, PortError, PortName};
 use motorlink_link::reopening::{BackOff, FULL, Opener, Reopening};
 use motorlink_link::serve::Server;
 use motorlink_proto::can::CanFrame;
@@ -87,6 +87,8 @@ impl<L: Evented + 'static> Port<L> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+impl<L: Link> Link for Port<L> {}
 
 impl<L: ByteLink + Evented + 'static> ByteLink for Port<L> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {

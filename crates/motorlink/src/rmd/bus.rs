@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::{self as machine, Duration};
 
 use motorlink_link::Clock;
-use motorlink_link::port::{CanLink, PortError, PortName};
+use motorlink_link::port::{CanLink, Link, PortError, PortName};
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{
     self as proto, Command, Counters, Dialect, Exchange, Limits, MotionStatus, MotorId, MotorSet,
@@ -298,7 +298,7 @@ impl<L: CanLink> Driven<L> {
     pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
         let port = port.by(|link| link.clock());
         let mut session = Session::new(port.name.clone(), options);
-        if port.open_link().is_some_and(CanLink::is_fresh) {
+        if port.open_link().is_some_and(Link::is_fresh) {
             session.trust();
         }
         Driven { port, session, exchanges: 0 }

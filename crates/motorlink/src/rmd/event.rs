@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use motorlink_link::port::{CanLink, EventCan, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
-use motorlink_proto::rmd::{Limits, MotorId, MotorSet, SetTorque4};
+use motorlink_proto::rmd::{Counters, Limits, MotorId, MotorSet, SetTorque4};
 
 use super::bus::Driven;
 use super::session::SessionOutput;
@@ -66,6 +66,16 @@ impl EventClient {
     /// where it has its answers at once.
     pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         self.driven.port.open_link().and_then(|link| link.descriptor())
+    }
+
+    /// Why frames may not get to the bus, as far as its adapter tells.
+    pub fn trouble(&self) -> Option<&'static str> {
+        self.driven.port.open_link().and_then(|link| link.trouble())
+    }
+
+    /// Frames that belonged to no exchange.
+    pub fn counters(&self) -> Counters {
+        self.driven.session.counters()
     }
 
     /// Motors that were given something to do and not switched off.

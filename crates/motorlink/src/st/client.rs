@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{self as machine, Duration};
 
 use motorlink_link::Clock;
-use motorlink_link::port::{ByteLink, PortError, PortName};
+use motorlink_link::port::{ByteLink, Link, PortError, PortName};
 use motorlink_link::printable;
 use motorlink_link::reopening::{LinkSign, LinkState, Opener, Reopening};
 use motorlink_proto::st as proto;
@@ -301,7 +301,7 @@ impl<L: ByteLink> Driven<L> {
     pub(super) fn new(port: Reopening<L>, options: &Options) -> Self {
         let port = port.by(|link| link.clock());
         let mut session = Session::new(port.name.clone(), options);
-        if port.open_link().is_some_and(ByteLink::is_fresh) {
+        if port.open_link().is_some_and(Link::is_fresh) {
             session.trust_line();
         }
         Driven { ended: port.now(), port, session, received: [0; 256], exchanges: 0 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use motorlink_link::port::{ByteLink, EventBytes, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
-use motorlink_proto::st::{MotorNumber, Output, Request};
+use motorlink_proto::st::{Counters, MotorNumber, Output, Profile, Request, SyncState};
 
 use super::client::Driven;
 use super::{Client, Error, Options};
@@ -78,6 +78,21 @@ impl EventClient {
     /// where it has its answers at once.
     pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         self.driven.port.open_link().and_then(|link| link.descriptor())
+    }
+
+    /// The profile that the drive is expected to follow.
+    pub fn profile(&self) -> Profile {
+        self.driven.session.rules().profile
+    }
+
+    /// Whether the last exchange ended in step.
+    pub fn sync_state(&self) -> SyncState {
+        self.driven.session.sync_state()
+    }
+
+    /// What came without being asked for.
+    pub fn counters(&self) -> Counters {
+        self.driven.session.counters()
     }
 
     /// Motors that this client started and did not stop.

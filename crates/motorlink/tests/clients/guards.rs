@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use motorlink::can::CanFrame;
-use motorlink::port::{ByteLink, CanLink, FdLink, PortError};
+use motorlink::port::{ByteLink, CanLink, FdLink, Link, PortError};
 use motorlink::rmd::{self, CentiDps, IqCommand, MotorId, StopAction};
 use motorlink::st::{self, Command, Request, Status};
 
@@ -86,6 +86,8 @@ fn a_motor_whose_start_was_not_answered_is_stopped_too() {
 
 /// A bus whose motors hear and are not heard.
 struct Deaf(Arc<Mutex<Vec<CanFrame>>>);
+
+impl Link for Deaf {}
 
 impl CanLink for Deaf {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {

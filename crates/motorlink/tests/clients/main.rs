@@ -12,7 +12,7 @@ use std::os::unix::net::UnixStream;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use motorlink::port::{ByteLink, FaultBytes, FdLink, PortError, SlcanLink};
+use motorlink::port::{ByteLink, FaultBytes, FdLink, Link, PortError, SlcanLink};
 use motorlink::rmd::{self, CentiDps, Code, MotorId, SpeedLimit};
 use motorlink::slcan::Bitrate;
 use motorlink::st::{self, Failure, Limits, Ramp, SyncState, register};
@@ -79,6 +79,8 @@ fn a_drives_name_does_not_command_a_terminal() {
 
 /// A port that never falls silent.
 struct Flood(&'static [u8]);
+
+impl Link for Flood {}
 
 impl ByteLink for Flood {
     fn write(&mut self, _: &[u8]) -> Result<(), PortError> {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use motorlink::can::CanFrame;
-use motorlink::port::{ByteLink, CanLink, PortError};
+use motorlink::port::{ByteLink, CanLink, Link, PortError};
 use motorlink::rmd::{self, MotorId};
 use motorlink::st::{self, register};
 
@@ -13,6 +13,8 @@ use crate::wire::Fresh;
 /// A motor whose reply to the first request comes when the second has been made.
 #[derive(Default)]
 struct Tardy(Vec<CanFrame>);
+
+impl Link for Tardy {}
 
 impl CanLink for Tardy {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
@@ -57,6 +59,8 @@ impl<T> Twice<T> {
         Box::new(Fresh(Twice { unread: VecDeque::new(), asked: 0 }))
     }
 }
+
+impl<T: Send> Link for Twice<T> {}
 
 impl CanLink for Twice<CanFrame> {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
@@ -116,6 +120,8 @@ fn a_copy_of_a_reply_that_comes_in_a_pause_is_not_the_answer_to_the_next_questio
 /// A motor that misses the first request; what else it is asked it repeats, with another last byte.
 #[derive(Default)]
 struct Absent(u32, Vec<CanFrame>);
+
+impl Link for Absent {}
 
 impl CanLink for Absent {
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {

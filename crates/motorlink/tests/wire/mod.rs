@@ -8,7 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use motorlink::can::CanFrame;
-use motorlink::port::{ByteLink, CanLink, Evented, FdLink, PortError};
+use motorlink::port::{ByteLink, CanLink, Evented, FdLink, Link, PortError};
 
 /// What a drive was sent, and what it will say.
 #[derive(Clone)]
@@ -60,6 +60,8 @@ impl<T: Clone + PartialEq> Wire<T> {
     }
 }
 
+impl<T: Send> Link for Wire<T> {}
+
 impl ByteLink for Wire<u8> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.hear(bytes);
@@ -87,6 +89,12 @@ impl CanLink for Wire<CanFrame> {
 /// A link whose drives owe no earlier host a reply.
 pub struct Fresh<L>(pub L);
 
+impl<L: Send> Link for Fresh<L> {
+    fn is_fresh(&self) -> bool {
+        true
+    }
+}
+
 impl<L: ByteLink> ByteLink for Fresh<L> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError> {
         self.0.write(bytes)
@@ -94,10 +102,6 @@ impl<L: ByteLink> ByteLink for Fresh<L> {
 
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError> {
         self.0.read(buffer, timeout)
-    }
-
-    fn is_fresh(&self) -> bool {
-        true
     }
 }
 
@@ -108,10 +112,6 @@ impl<L: CanLink> CanLink for Fresh<L> {
 
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError> {
         self.0.receive(timeout)
-    }
-
-    fn is_fresh(&self) -> bool {
-        true
     }
 }
 
