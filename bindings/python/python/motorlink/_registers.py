@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Collection, Iterator, Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from motorlink import _core
 from motorlink._values import RegisterInfo
 from motorlink.errors import RefusedError
-
-if TYPE_CHECKING:
-    from motorlink.st import Motor
 
 
 class Registers(Mapping[str, float]):
@@ -33,9 +30,9 @@ class Registers(Mapping[str, float]):
 
     __slots__ = ("_motor",)
 
-    _motor: Motor
+    _motor: BlockingMotor
 
-    def __init__(self, motor: Motor):
+    def __init__(self, motor: BlockingMotor):
         object.__setattr__(self, "_motor", motor)
 
     def __getitem__(self, name: str | int) -> float:
@@ -111,6 +108,13 @@ class HasRegisters(Protocol):
     def client(self) -> HasProfile: ...
     @property
     def full_scale_amps(self) -> float | None: ...
+
+
+class BlockingMotor(HasRegisters, Protocol):
+    """A motor of the blocking API."""
+
+    def get(self, register: str | int) -> float: ...
+    def set(self, register: str | int, value: float | str) -> None: ...
 
 
 class HasProfile(Protocol):
