@@ -117,7 +117,7 @@ def test_errors_are_named_and_cleared(served: Served) -> None:
         motor, port = bus.motor(3), f"slcan-pty:{served.can.removeprefix('slcan:')}"
         served.do("fault", port=port, motor=3, fault="OVER_TEMPERATURE")
         errors = eventually(lambda: motor.status().errors, "the error")
-        assert errors.names == ("over temperature protection",) and str(errors) == errors.names[0]
+        assert errors.names == ("OVER_TEMPERATURE",) and str(errors) == "over temperature protection"
         assert not motor.clear_errors().errors
 
 

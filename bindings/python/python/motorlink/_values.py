@@ -85,9 +85,12 @@ class RevupPhase(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Protections of an RMD motor that are active. False when there are none."""
+    """Protections of an RMD motor that are active. False when there are none.
 
-    #: The document's words: ``low voltage protection``.
+    As text it has the document's words: ``low voltage protection``.
+    """
+
+    #: ``LOW_VOLTAGE``, ``OVER_TEMPERATURE``.
     names: tuple[str, ...]
     #: The bits of the error byte, also those that mean nothing.
     bits: int

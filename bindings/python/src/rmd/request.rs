@@ -69,14 +69,14 @@ fn fields(py: Python<'_>, class: &str, fields: &[Field], data: &[u8; 8]) -> PyRe
     }
 }
 
-/// A value for Python: an integer where a digit is one unit, the document's words for bits.
+/// A value for Python: an integer where a digit is one unit, names for bits.
 fn value(py: Python<'_>, field: &Field, data: &[u8; 8]) -> PyResult<Py<PyAny>> {
     let digits = field.raw(data);
     match field.meaning {
         Meaning::Bits(bits) => {
             let active = bits.iter().filter(|(bit, _)| digits & i64::from(*bit) != 0);
-            let words: Vec<_> = active.map(|(_, words)| words).collect();
-            values::errors(py, (PyTuple::new(py, words)?, digits))
+            let names: Vec<_> = active.map(|(_, name)| name).collect();
+            values::errors(py, (PyTuple::new(py, names)?, digits))
         }
         Meaning::Words(_) | Meaning::Number if field.scale.decimals == 0 => digits.into_py_any(py),
         _ => field.scale.value(digits).into_py_any(py),
