@@ -105,7 +105,7 @@ impl Reading {
         match self.ty() {
             Some(Type::F32) => f64::from(f32::from_bits(self.bits as u32)),
             Some(Type::U32) => f64::from(self.bits as u32),
-            _ => f64::from(self.bits) * scale(self.register, self.profile),
+            _ => f64::from(self.bits) * unit(self.register).scale(self.profile),
         }
     }
 
@@ -120,25 +120,23 @@ impl Reading {
     /// Digits behind the point that tell every value; `None` for a float.
     pub fn decimals(&self) -> Option<u8> {
         let is_float = self.ty() == Some(Type::F32);
-        let is_scaled = scale(self.register, self.profile) != 1.0;
+        let is_scaled = unit(self.register).scale(self.profile) != 1.0;
         (!is_float).then_some(is_scaled.into())
     }
 
     /// Symbol of the physical unit; empty when there is none.
     pub fn unit(&self) -> &'static str {
-        unit(self.register)
+        unit(self.register).quantity()
     }
 
     /// The value in words, for registers whose values have names.
     pub fn name(&self) -> Option<String> {
-        match self.register {
-            RegisterId::STATUS => Some(Status::from(self.bits as u8).to_string()),
-            RegisterId::CONTROL_MODE => Some(ControlMode::from(self.bits as u8).to_string()),
-            RegisterId::FLAGS => Some(Flags(self.bits as u32).to_string()),
-            RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
-                Some(RegisterId(self.bits as u8).to_string())
-            }
-            RegisterId::TARGET_MOTOR => Some(format!("motor {}", i64::from(self.bits) + 1)),
+        match unit(self.register) {
+            Unit::Status => Some(Status::from(self.bits as u8).to_string()),
+            Unit::ControlMode => Some(ControlMode::from(self.bits as u8).to_string()),
+            Unit::Flags => Some(Flags(self.bits as u32).to_string()),
+            Unit::Register => Some(RegisterId(self.bits as u8).to_string()),
+            Unit::MotorIndex => Some(format!("motor {}", i64::from(self.bits) + 1)),
             _ => None,
         }
     }
@@ -182,7 +180,7 @@ pub fn parse_value(
             text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(not_a_value)?
         }
     };
-    let unit = match unit(register) {
+    let symbol = match unit(register).quantity() {
         "" => String::new(),
         unit => format!(" {unit}"),
     };
@@ -191,18 +189,18 @@ pub fn parse_value(
         let (least, most) = (f32::MIN.into(), f32::MAX.into());
         return match value as f32 {
             value if value.is_finite() => Ok(value.to_bits() as i32),
-            _ => Err(ValueError::OutOfRange { text, register, least, most, unit }),
+            _ => Err(ValueError::OutOfRange { text, register, least, most, unit: symbol }),
         };
     }
-    let scale = if raw { 1.0 } else { scale(register, profile) };
+    let scale = if raw { 1.0 } else { unit(register).scale(profile) };
     let digits = value / scale;
     let (least, most) = range(ty);
     if digits < least as f64 || digits > most as f64 {
         let (least, most) = (least as f64 * scale, most as f64 * scale);
-        return Err(ValueError::OutOfRange { text, register, least, most, unit });
+        return Err(ValueError::OutOfRange { text, register, least, most, unit: symbol });
     }
     if (digits - digits.round()).abs() > 1e-6 {
-        return Err(ValueError::Between { text, register, step: scale, unit });
+        return Err(ValueError::Between { text, register, step: scale, unit: symbol });
     }
     Ok(digits.round() as i64 as i32)
 }
@@ -220,22 +218,20 @@ fn range(ty: Option<Type>) -> (i64, i64) {
 }
 
 fn named_value(register: RegisterId, text: &str) -> Option<i32> {
-    match register {
-        RegisterId::CONTROL_MODE => ControlMode::ALL
+    match unit(register) {
+        Unit::ControlMode => ControlMode::ALL
             .iter()
             .find(|mode| mode.name().is_some_and(|name| name.eq_ignore_ascii_case(text)))
             .map(|&mode| u8::from(mode).into()),
-        RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
-            RegisterId::named(text).map(|shown| shown.0.into())
-        }
+        Unit::Register => RegisterId::named(text).map(|shown| shown.0.into()),
         _ => None,
     }
 }
 
 fn usable(register: RegisterId) -> String {
-    match register {
-        RegisterId::CONTROL_MODE => "TORQUE and SPEED are".to_owned(),
-        RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
+    match unit(register) {
+        Unit::ControlMode => "TORQUE and SPEED are".to_owned(),
+        Unit::Register => {
             let shown = RegisterId::all()
                 .filter(|id| id.shape().is_some_and(|shape| shape.access == Access::Dac));
             let names: Vec<String> = shown.map(|id| id.to_string()).collect();
@@ -245,20 +241,8 @@ fn usable(register: RegisterId) -> String {
     }
 }
 
-fn scale(register: RegisterId, profile: Profile) -> f64 {
-    match register.shape().map(|shape| shape.unit) {
-        Some(Unit::DeciHertz) => 0.1,
-        Some(Unit::Percent) if profile == Profile::Mcsdk54 => 0.1,
-        _ => 1.0,
-    }
-}
-
-fn unit(register: RegisterId) -> &'static str {
-    match register.shape().map(|shape| shape.unit) {
-        Some(Unit::DeciHertz) => "Hz",
-        Some(unit) => unit.symbol(),
-        None => "",
-    }
+fn unit(register: RegisterId) -> Unit {
+    register.shape().map_or(Unit::None, |shape| shape.unit)
 }
 
 #[cfg(test)]

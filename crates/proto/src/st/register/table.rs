@@ -80,10 +80,10 @@ macro_rules! optional_pair {
 }
 
 registers! {
-    0x00 TARGET_MOTOR: u8, None, ReadWrite, Core, Table3, "Motor that motor number 0 addresses, counted from 0";
-    0x01 FLAGS: u32, None, ReadOnly, Core, Table3, "Faults: low half occurred, high half present";
-    0x02 STATUS: u8, None, ReadOnly, Core, Table3, "State of the state machine";
-    0x03 CONTROL_MODE: u8, None, ReadWrite, Core, Table3, "Torque (0) or speed (1) control";
+    0x00 TARGET_MOTOR: u8, MotorIndex, ReadWrite, Core, Table3, "Motor that motor number 0 addresses, counted from 0";
+    0x01 FLAGS: u32, Flags, ReadOnly, Core, Table3, "Faults: low half occurred, high half present";
+    0x02 STATUS: u8, Status, ReadOnly, Core, Table3, "State of the state machine";
+    0x03 CONTROL_MODE: u8, ControlMode, ReadWrite, Core, Table3, "Torque (0) or speed (1) control";
     0x04 SPEED_REF: i32, Rpm, ReadOnly, Core, Table3, "Speed reference";
     0x05 SPEED_KP: i16, S16APerUnit, ReadWrite, Core, Table3, "Speed regulator Kp, numerator";
     0x06 SPEED_KI: i16, S16APerUnit, ReadWrite, Core, Table3, "Speed regulator Ki, numerator";
@@ -108,8 +108,8 @@ registers! {
     0x19 BUS_VOLTAGE: u16, Volt, ReadOnly, Core, Table3, "Bus voltage";
     0x1A HEATS_TEMP: u16 | i16, Celsius, ReadOnly, Core, Table3, "Heatsink temperature";
     0x1B MOTOR_POWER: u16 | i16, Watt, ReadOnly, Core, Table3, "Electrical power into the motor";
-    0x1C DAC_OUT1: u8, None, ReadWrite, Dac, Table3, "Register shown on DAC channel 1";
-    0x1D DAC_OUT2: u8, None, ReadWrite, Dac, Table3, "Register shown on DAC channel 2";
+    0x1C DAC_OUT1: u8, Register, ReadWrite, Dac, Table3, "Register shown on DAC channel 1";
+    0x1D DAC_OUT2: u8, Register, ReadWrite, Dac, Table3, "Register shown on DAC channel 2";
     0x1E SPEED_MEAS: i32, Rpm, ReadOnly, Core, Table3, "Mechanical speed, averaged";
     0x1F TORQUE_MEAS: i16, S16A, ReadOnly, Core, Table3, "Iq, measured";
     0x20 FLUX_MEAS: i16, S16A, ReadOnly, Core, Table3, "Id, measured";

@@ -1,9 +1,12 @@
-//! Units of registers' values.
+//! Units of registers' values, or the words that they stand for.
+
+use crate::st::Profile;
 
 macro_rules! units {
     ($( $name:ident $symbol:literal; )+) => {
         /// Unit of a register's value. The `s16` units are the drive's own digits: 32767 is full
-        /// scale of its current or voltage measurement, 65536 one electrical turn.
+        /// scale of its current or voltage measurement, 65536 one electrical turn. Behind them: what
+        /// has words in place of a unit.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[repr(u8)]
         #[allow(missing_docs)]
@@ -43,4 +46,29 @@ units! {
     Millisecond "ms";
     Second "s";
     Radian "rad";
+    // Values with words.
+    Status "";
+    Flags "";
+    ControlMode "";
+    Register "";
+    MotorIndex "";
+}
+
+impl Unit {
+    /// What a digit is worth in [`quantity`](Self::quantity).
+    pub fn scale(self, profile: Profile) -> f64 {
+        match self {
+            Unit::DeciHertz => 0.1,
+            Unit::Percent if profile == Profile::Mcsdk54 => 0.1,
+            _ => 1.0,
+        }
+    }
+
+    /// The symbol of the unit that people think in.
+    pub fn quantity(self) -> &'static str {
+        match self {
+            Unit::DeciHertz => Unit::Hertz.symbol(),
+            unit => unit.symbol(),
+        }
+    }
 }
