@@ -1,12 +1,12 @@
-//! How hard a guard tries.
+//! How hard the motors are stopped.
 
 use std::time::Duration;
 
 use motorlink_link::reopening::LinkState;
 
-/// How often a guard tries to stop a motor before it gives up.
+/// How often a motor is told to stop before that is given up.
 pub(crate) const STOP_ATTEMPTS: u32 = 4;
-/// The longest that a guard waits for a port to come back before it tries again.
+/// The longest wait for a port to come back before the next attempt.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Waits until a closed port may be opened again, though not for long; whether it is closed.

@@ -4,11 +4,11 @@
 //! use motorlink::rmd::{Client, Options, SpeedLimit, CentiDegrees};
 //!
 //! let client = Client::open(&"slcan:/dev/ttyACM0".parse()?, Options::default())?;
-//! let guard = client.stop_on_drop();       // stops what was set moving
+//! let stop = client.stop_on_drop();       // stops what was set moving
 //! let motor = client.motor(1)?;
 //! motor.set_position(CentiDegrees::from_degrees(90.0), Some(SpeedLimit(500)))?;
 //! println!("{} °/s", motor.motion_status()?.speed.dps());
-//! # drop(guard);
+//! # drop(stop);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -17,10 +17,10 @@ mod error;
 mod event;
 pub(crate) mod follow;
 mod full_turn;
-mod guard;
 mod motor;
 mod options;
 mod session;
+mod stop_on_drop;
 
 pub use motorlink_proto::rmd::*;
 pub use motorlink_proto::units::*;
@@ -29,6 +29,6 @@ pub use bus::{Client, SCAN_WIDTH, ScanResult};
 pub use error::Error;
 pub use event::EventClient;
 pub use full_turn::FullTurn;
-pub use guard::{StopAction, StopOnDrop, Stopped};
 pub use motor::Motor;
 pub use options::Options;
+pub use stop_on_drop::{StopAction, StopOnDrop, Stopped};

@@ -4,12 +4,12 @@
 //! use motorlink::st::{Client, Options, Ramp, register};
 //!
 //! let client = Client::open(&"/dev/ttyACM0".parse()?, Options::default())?;
-//! let guard = client.stop_on_drop();       // stops what was started when it goes out of scope
+//! let stop = client.stop_on_drop();       // stops what was started when it goes out of scope
 //! let motor = client.motor(1)?;
 //! motor.start()?;
 //! motor.set_ramp(Ramp { speed_rpm: 1500, duration_ms: 1000 })?;
 //! println!("{} rpm", motor.get(register::SPEED_MEAS)?);
-//! # drop(guard);
+//! # drop(stop);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -17,11 +17,11 @@ mod client;
 mod error;
 mod event;
 pub(crate) mod follow;
-mod guard;
 mod motor;
 mod options;
 mod scan;
 mod session;
+mod stop_on_drop;
 mod transcript;
 
 pub use motorlink_proto::st::{
@@ -34,9 +34,9 @@ pub use motorlink_proto::st::{
 pub use client::{BoardInfo, Client, FirmwareVersion};
 pub use error::Error;
 pub use event::{Confirmation, EventClient, Progress};
-pub use guard::{StopOnDrop, Stopped};
 pub use motor::Motor;
 pub use motorlink_proto::st::{Reading, UnknownRegister, ValueError, find_register, parse_value};
 pub use options::Options;
 pub use scan::{BAUD_RATES, ScanResult, scan_baud};
+pub use stop_on_drop::{StopOnDrop, Stopped};
 pub use transcript::Transcript;

@@ -61,7 +61,7 @@ impl Doubt {
     }
 
     /// The reply to a request with this code did not come in time.
-    pub(super) fn owes(&mut self, now: Instant, guard: Micros, code: u8) {
+    pub(super) fn owes(&mut self, now: Instant, quarantine: Micros, code: u8) {
         self.owed = match self.owed {
             Owed::Nothing => Owed::One(code),
             Owed::One(owed) | Owed::Several(owed) if owed == code => Owed::Several(code),
@@ -73,7 +73,7 @@ impl Doubt {
             Code::Stop => self.stop = true,
             _ => {}
         }
-        self.until = self.until.max(now + guard);
+        self.until = self.until.max(now + quarantine);
         self.heard = None;
     }
 
@@ -99,13 +99,13 @@ impl Doubt {
     pub(super) fn admit(
         &mut self,
         now: Instant,
-        guard: Micros,
+        quarantine: Micros,
         code: u8,
     ) -> Result<Admitted, Instant> {
         if self.owed == Owed::Nothing {
             return Ok(Admitted::Request);
         }
-        let silent = self.heard.map(|heard| heard + guard);
+        let silent = self.heard.map(|heard| heard + quarantine);
         if silent.is_some_and(|silent| now >= silent) {
             *self = Doubt::NONE;
             return Ok(Admitted::Request);
@@ -118,7 +118,7 @@ impl Doubt {
                     // Sent again and again it would never let the motor fall silent.
                     Some(silent) if again && now < self.until => Err(silent.min(self.until)),
                     _ => {
-                        self.until = now + guard + guard;
+                        self.until = now + quarantine + quarantine;
                         Ok(Admitted::Both)
                     }
                 };

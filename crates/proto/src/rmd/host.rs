@@ -7,7 +7,7 @@
 //!
 //! There is no sequence number and no error reply, so a reply is known by (ID, DATA\[0\]) and a
 //! motor has one exchange at a time. After a timeout the motor is in quarantine, so that a late reply
-//! cannot pass for that to the next request: nothing is sent until the late reply came or the guard
+//! cannot pass for that to the next request: nothing is sent until the late reply came or the quarantine
 //! time passed. If it did not come, the motor is asked for its status in place of the next request,
 //! which ends in [`Failure::Quarantined`] when the motor answers. That answer may be an old one too, so
 //! the motor then has to be silent for the quarantine time (docs/SPEC-NOTES.md R29). No exchange with
@@ -71,7 +71,7 @@ pub struct Host {
     /// No deadline in flight is before this moment.
     earliest: Instant,
     timeout: Micros,
-    guard: Micros,
+    quarantine: Micros,
     counters: Counters,
 }
 
@@ -101,7 +101,7 @@ impl Host {
             torque4: None,
             earliest: NEVER,
             timeout: DEFAULT_TIMEOUT,
-            guard: DEFAULT_QUARANTINE,
+            quarantine: DEFAULT_QUARANTINE,
             counters: Counters {
                 late: 0,
                 unasked: 0,
@@ -308,13 +308,13 @@ impl Host {
 
     /// Sets the quarantine: how long a motor is left alone from the next timeout on, and how long it
     /// has to be silent.
-    pub const fn set_quarantine(&mut self, guard: Micros) {
-        self.guard = guard;
+    pub const fn set_quarantine(&mut self, quarantine: Micros) {
+        self.quarantine = quarantine;
     }
 
     /// The quarantine time.
     pub const fn quarantine(&self) -> Micros {
-        self.guard
+        self.quarantine
     }
 
     /// What came and belonged to no exchange.
@@ -397,10 +397,10 @@ impl Host {
         if self.busy().contains(id) {
             return Err(RequestError::Busy(id));
         }
-        let guard = self.guard;
+        let quarantine = self.quarantine;
         let doubt = &mut self.slot(id).doubt;
         let was_trusted = doubt.is_none();
-        let admitted = doubt.admit(now, guard, data[0]);
+        let admitted = doubt.admit(now, quarantine, data[0]);
         if !was_trusted && admitted == Ok(Admitted::Request) {
             self.strays.remove(id);
         }
@@ -445,9 +445,9 @@ impl Host {
 
     /// The reply to what was sent may still come.
     fn owes(&mut self, now: Instant, id: MotorId) {
-        let guard = self.guard;
+        let quarantine = self.quarantine;
         let slot = self.slot(id);
-        slot.doubt.owes(now, guard, slot.data[0]);
+        slot.doubt.owes(now, quarantine, slot.data[0]);
     }
 
     fn slot(&mut self, id: MotorId) -> &mut Slot {

@@ -50,7 +50,7 @@ pub struct StopOnDrop<'a> {
     report: fn(&Stopped),
 }
 
-/// What a guard did to one motor.
+/// What a [`StopOnDrop`] did to one motor.
 #[derive(Debug)]
 pub struct Stopped {
     /// The motor.
