@@ -140,6 +140,12 @@ def test_a_max_speed_never_rounds_up_and_is_never_0(rmd, move):
     assert "outside 1 to" in most("65536").ended(2).err
 
 
+@pytest.mark.parametrize("number, sent", [("-1e-1", "fa ff"), ("-1.6E0", "9c ff"), ("-.1", "fa ff")])
+def test_a_negative_number_may_have_an_exponent(rmd, number, sent):
+    assert f"00 00 00 {sent}" in rmd("-i", 3, "--trace", "torque", number).ended(0).err
+    rmd("-i", 3, "off").ended(0)
+
+
 @pytest.mark.parametrize("command", ["move 10", "accel"])
 def test_short_words_are_taken(rmd, command):
     assert rmd("-i", 2, *command.split()).ended(0).out

@@ -29,6 +29,7 @@ RMD = [
     *("torque 0.1", "speed 20", "position 10", "single-turn-position 45.5 cw --full-turn", "clear-errors"),
     *("torque4 0 0 0 0", "raw 9a"),
 ]
+SCAN = "`motorlink rmd scan` lists the motors that answer"
 
 
 def check(text):
@@ -111,8 +112,9 @@ def test_rmd_tells_what_was_done_or_read(checked, command):
         ("st -p sim: scan", 2, {"kind": "usage"}),
         ("st -p /dev/nothing-there info", 3, {"kind": "link", "port": "serial:/dev/nothing-there"}),
         ("rmd -p sim: torque 33", 2, {"kind": "usage", "port": "sim:"}),
-        ("rmd -p sim: zero", 2, {"kind": "usage"}),
-        ("rmd -p sim: -i 9 status", 3, {"kind": "silent", "motor": 9}),
+        ("rmd -p sim: zero", 2, {"kind": "usage", "try": "add --write-rom if that is meant"}),
+        ("rmd -p sim: -i 9 status", 3, {"kind": "silent", "motor": 9, "try": SCAN}),
+        ("st -p foo: info", 2, {"kind": "usage"}),
         ("rmd -p sim: -i 9 angle", 3, {"kind": "silent", "motor": 9}),
         ("rmd -p sim: scan 9", 3, {"kind": "link"}),
         ("guard st -p sim:", 2, {"kind": "usage"}),

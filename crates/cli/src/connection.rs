@@ -82,9 +82,9 @@ impl Port {
     pub fn name(&self) -> Result<PortName, Failure> {
         match self.port.as_deref() {
             Some(name) if !name.is_empty() => Ok(name.parse()?),
-            _ => Err(Failure::usage(
-                "which port? give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is \
-                 connected, and `-p sim:` needs no hardware",
+            _ => Err(Failure::usage("which port?").trying(
+                "give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is connected, and \
+                 `-p sim:` needs no hardware",
             )),
         }
     }

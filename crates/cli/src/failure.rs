@@ -6,6 +6,8 @@ use motorlink::{rmd, st};
 use motorlink_link::fault::FaultError;
 use serde_json::{Map, Value, json};
 
+use crate::advice;
+
 /// Why the program ends early.
 #[derive(Debug)]
 pub enum Failure {
@@ -22,6 +24,8 @@ pub enum Failure {
 pub struct Problem {
     pub kind: Kind,
     message: String,
+    /// What to try.
+    advice: Option<String>,
     /// `port`, `motor`, `code` and `name`, where they are known.
     facts: Map<String, Value>,
 }
@@ -71,6 +75,14 @@ impl Failure {
         Problem::new(Kind::Link, message).into()
     }
 
+    /// With what to try.
+    pub fn trying(mut self, advice: impl Into<String>) -> Self {
+        if let Failure::Failed(problem) = &mut self {
+            problem.advice = Some(advice.into());
+        }
+        self
+    }
+
     /// The exit code.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -92,6 +104,14 @@ impl Failure {
         self
     }
 
+    /// For people: what happened, and what to try.
+    pub fn text(&self) -> String {
+        match self {
+            Failure::Failed(problem) => problem.text(),
+            Failure::Interrupted | Failure::OutputClosed => String::new(),
+        }
+    }
+
     /// For programs: docs/JSON.md.
     pub fn object(&self) -> Value {
         match self {
@@ -103,7 +123,7 @@ impl Failure {
 
 impl Problem {
     fn new(kind: Kind, message: impl Into<String>) -> Self {
-        Problem { kind, message: message.into(), facts: Map::new() }
+        Problem { kind, message: message.into(), advice: None, facts: Map::new() }
     }
 
     /// Adds what is not known yet.
@@ -118,15 +138,21 @@ impl Problem {
         }
     }
 
-    /// For people.
-    pub fn text(&self) -> &str {
-        &self.message
+    /// For people: what happened, and what to try.
+    pub fn text(&self) -> String {
+        let message = &self.message;
+        let joint = if message.ends_with('?') { "" } else { ";" };
+        self.advice
+            .as_ref()
+            .map_or_else(|| message.clone(), |advice| format!("{message}{joint} {advice}"))
     }
 
     /// For programs: docs/JSON.md.
     pub fn object(&self) -> Value {
         let mut object = json!({ "kind": self.kind.word(), "message": self.message });
-        object.as_object_mut().expect("an object was made").extend(self.facts.clone());
+        let members = object.as_object_mut().expect("an object was made");
+        members.extend(self.advice.as_ref().map(|advice| ("try".to_owned(), json!(advice))));
+        members.extend(self.facts.clone());
         object
     }
 }
@@ -147,6 +173,7 @@ impl From<st::Error> for Failure {
             _ => Kind::Usage,
         };
         let mut problem = Problem::new(kind, message);
+        problem.advice = advice::st(&error).map(str::to_owned);
         match &error {
             st::Error::Refused { motor, code, .. } => {
                 problem.motor(motor.0);
@@ -171,6 +198,7 @@ impl From<rmd::Error> for Failure {
             _ => Kind::Usage,
         };
         let mut problem = Problem::new(kind, error.to_string());
+        problem.advice = advice::rmd(&error).map(str::to_owned);
         if let Timeout { motor, .. }
         | Adapter { motor, .. }
         | Foreign { motor, .. }
@@ -194,10 +222,13 @@ impl From<PortError> for Failure {
 
 impl From<&PortError> for Failure {
     fn from(error: &PortError) -> Self {
-        match error {
-            PortError::WrongKind { .. } => Failure::usage(error.to_string()),
-            _ => Failure::link(error.to_string()),
-        }
+        let kind = match error {
+            PortError::WrongKind { .. } => Kind::Usage,
+            _ => Kind::Link,
+        };
+        let mut problem = Problem::new(kind, error.to_string());
+        problem.advice = advice::port(error).map(str::to_owned);
+        problem.into()
     }
 }
 
@@ -205,7 +236,11 @@ impl From<RelayError> for Failure {
     fn from(error: RelayError) -> Self {
         match error {
             RelayError::Port(error) => error.into(),
-            other => Failure::usage(other.to_string()),
+            other => {
+                let mut problem = Problem::new(Kind::Usage, other.to_string());
+                problem.advice = advice::relay(&other).map(str::to_owned);
+                problem.into()
+            }
         }
     }
 }
@@ -229,4 +264,10 @@ macro_rules! usage {
         }
     )+ };
 }
-usage!(NameError, FaultError, st::UnknownRegister, st::ValueError);
+usage!(NameError, FaultError, st::ValueError);
+
+impl From<st::UnknownRegister> for Failure {
+    fn from(error: st::UnknownRegister) -> Self {
+        Failure::usage(error.to_string()).trying(advice::LIST_REGISTERS)
+    }
+}

@@ -36,27 +36,36 @@ fn ports(carries: Carries) -> String {
 
 const ST_FAULTS: &str = "\
 MOTORLINK_PORT names the port where -p does not.
---fault damages what passes the port, both ways unless only=sent or only=received:
-  flip=RATE drop=RATE dup=RATE insert=RATE   a bit wrong, a byte lost, twice, or from nowhere
-  delay=5ms..30ms                            every write later by that much
-  pause=TIME@RATE cut=TIME@RATE              all of it late, or lost, for a while
-  flood=COUNT@RATE stuck0=TIME@RATE stuck1=TIME@RATE   garbage; only 0x00, or 0xFF
-  seed=N                                     the same seed, the same damage
-RATE is a chance a byte (flip: a bit). A damaged request may still pass for another one:
-rehearse on simulated drives, or with the motor free to turn.";
+--fault damages what passes the port, both ways unless only=sent or
+only=received:
+  flip=RATE drop=RATE dup=RATE insert=RATE
+                      a bit wrong, a byte lost, twice, or from nowhere
+  delay=5ms..30ms     every write later by that much
+  pause=TIME@RATE cut=TIME@RATE
+                      all of it late, or lost, for a while
+  flood=COUNT@RATE stuck0=TIME@RATE stuck1=TIME@RATE
+                      garbage; only 0x00, or 0xFF
+  seed=N              the same seed, the same damage
+RATE is a chance a byte (flip: a bit). A damaged request may still pass for
+another one: rehearse on simulated drives, or with the motor free to turn.";
 
 const RMD_FAULTS: &str = "\
-Behind slcan ports: baud=RATE for the adapter's own line, echo=1 if it sends back what it is sent,
-clock=HOST:PORT for the time of an emulated board.
+Behind slcan ports: baud=RATE for the adapter's own line, echo=1 if it sends
+back what it is sent, clock=HOST:PORT for the time of an emulated board.
 MOTORLINK_PORT names the port where -p does not.
---fault damages what passes the port, both ways unless only=sent or only=received:
-  flip=RATE drop=RATE dup=RATE insert=RATE   a bit wrong, a frame lost, twice, or from nowhere
-  delay=5ms..30ms                            every frame later by that much
-  pause=TIME@RATE cut=TIME@RATE              all of it late, or lost, for a while
-  flood=COUNT@RATE corrupt=RATE              foreign frames; a bit of the data wrong, unnoticed
-  seed=N                                     the same seed, the same damage
-RATE is a chance a frame (flip: a bit). A damaged request may still pass for another one (corrupt):
-rehearse on simulated drives, or with the motor free to turn.";
+--fault damages what passes the port, both ways unless only=sent or
+only=received:
+  flip=RATE drop=RATE dup=RATE insert=RATE
+                      a bit wrong, a frame lost, twice, or from nowhere
+  delay=5ms..30ms     every frame later by that much
+  pause=TIME@RATE cut=TIME@RATE
+                      all of it late, or lost, for a while
+  flood=COUNT@RATE corrupt=RATE
+                      foreign frames; a bit of the data wrong, unnoticed
+  seed=N              the same seed, the same damage
+RATE is a chance a frame (flip: a bit). A damaged request may still pass for
+another one (corrupt): rehearse on simulated drives, or with the motor free to
+turn.";
 
 /// Writes a manual page for the program and each of its commands.
 pub fn write_manual(command: Command, folder: &Path) -> Result<(), Failure> {

@@ -1,6 +1,7 @@
 //! `motorlink`: command, watch and simulate motor drives from the shell. A library so that another
 //! program can be the same command.
 
+mod advice;
 mod conformance;
 mod connection;
 mod demo;
@@ -71,12 +72,8 @@ enum Command {
 pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
     interrupt::install();
     motorlink_testbench::register();
-    let words: Vec<OsString> = words.into_iter().collect();
-    // What is behind `--` is another program's.
-    output::put_messages_in_json(
-        words.iter().take_while(|word| *word != "--").any(|word| word == "--json"),
-    );
-    let cli = match Cli::try_parse_from(&words) {
+    let words = own_words(words);
+    let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
         Err(error) if error.exit_code() == 2 && output::has_json_messages() => {
             let text = error.to_string();
@@ -109,4 +106,28 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
     };
     output::finish();
     code
+}
+
+/// The words of a command line. Numbers such as `-1e-3` and `-.5` are as clap reads them: `-0.001`,
+/// `-0.5`. What is behind `--` is another program's.
+fn own_words(words: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
+    let mut words: Vec<OsString> = words.into_iter().collect();
+    let own = words.iter().position(|word| word == "--").unwrap_or(words.len());
+    for word in &mut words[..own] {
+        if let Some(number) = word.to_str().and_then(negative_number) {
+            *word = number.to_string().into();
+        }
+    }
+    output::put_messages_in_json(words[..own].iter().any(|word| word == "--json"));
+    words
+}
+
+/// A negative number that clap takes for an option.
+fn negative_number(word: &str) -> Option<f64> {
+    let digits = word.strip_prefix('-')?;
+    let is_taken = match digits.chars().next()? {
+        '.' => true,
+        first => first.is_ascii_digit() && digits.contains(['e', 'E']),
+    };
+    is_taken.then(|| word.parse().ok()).flatten()
 }

@@ -56,7 +56,7 @@ impl SimPort {
     }
 
     fn refused(&self, error: &ConfigError) -> PortError {
-        PortError::Configuration { port: self.body(), why: error.to_string() }
+        PortError::Configuration { port: self.name(), why: error.to_string() }
     }
 
     fn open_st(&self) -> Result<SimBytes, PortError> {
@@ -103,7 +103,7 @@ impl LinePort for SimPort {
     }
 
     fn label(&self) -> String {
-        self.body()
+        self.name()
     }
 }
 

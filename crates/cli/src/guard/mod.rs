@@ -137,9 +137,9 @@ fn guard_st(args: &StArgs) -> Result<(), Failure> {
     let port = args.port.name()?;
     if port.as_line().is_none() {
         return Err(Failure::usage(format!(
-            "`{port}` is a CAN bus, and an ST drive is on a serial line: for RMD motors use \
-             `motorlink guard rmd -p {port}`"
-        )));
+            "`{port}` is a CAN bus, and an ST drive is on a serial line"
+        ))
+        .trying(format!("for RMD motors use `motorlink guard rmd -p {port}`")));
     }
     hold();
     let relay = Relay::st(&port, args.common.options())?;

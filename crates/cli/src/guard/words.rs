@@ -44,10 +44,11 @@ pub fn of(event: &Event) -> (String, Value) {
             ),
             json!({ "event": "unguarded", "motor": motor, "code": code }),
         ),
-        Event::PortLost(error) => (
-            format!("the drive's port is lost: {error}"),
-            json!({ "event": "port-lost", "error": Failure::from(error).object() }),
-        ),
+        Event::PortLost(error) => {
+            let failure = Failure::from(error);
+            let text = format!("the drive's port is lost: {}", failure.text());
+            (text, json!({ "event": "port-lost", "error": failure.object() }))
+        }
         Event::PortBack => ("the drive's port is back".into(), json!({ "event": "port-back" })),
         Event::Stopped { reason, halts } => stopped(*reason, halts),
         other => (format!("{other:?}"), json!({ "event": "other" })),

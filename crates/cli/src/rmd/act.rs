@@ -126,10 +126,10 @@ fn turn(
     let moved = session.motor()?.set_single_turn_position(angle, direction, max_speed, full_turn);
     moved.map_err(|error| match error {
         Error::FullTurn { past: TurnCentiDegrees(0), .. } => {
-            Failure::usage(format!("{error}; `--full-turn` sends it all the same"))
+            Failure::from(error).trying("`--full-turn` sends it all the same")
         }
-        Error::FullTurn { .. } => Failure::usage(format!(
-            "{error}; try `{}`, or `--full-turn` if it may be a full turn",
+        Error::FullTurn { .. } => Failure::from(error).trying(format!(
+            "try `{}`, or `--full-turn` if it may be a full turn",
             direction.opposite()
         )),
         error => error.into(),

@@ -26,9 +26,9 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
     });
     if found.iter().any(|found| matches!(found, ScanResult::Echo(_))) {
         return Err(Failure::link(
-            "what was sent came back: the adapter echoes, which looks like motors that answer; add \
-             echo=1 to the port, as in slcan:/dev/ttyACM0?echo=1",
-        ));
+            "what was sent came back: the adapter echoes, which looks like motors that answer",
+        )
+        .trying("add echo=1 to the port, as in slcan:/dev/ttyACM0?echo=1"));
     }
     for motor in &found {
         match motor {

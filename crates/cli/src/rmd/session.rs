@@ -76,8 +76,7 @@ impl Session {
         if self.write_rom {
             return Ok(());
         }
-        Err(Failure::usage(format!(
-            "{what} writes to the motor's ROM, which wears; add --write-rom if that is meant"
-        )))
+        Err(Failure::usage(format!("{what} writes to the motor's ROM, which wears"))
+            .trying("add --write-rom if that is meant"))
     }
 }

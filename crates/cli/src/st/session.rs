@@ -42,10 +42,9 @@ impl Session {
         if self.client.profile() == profile {
             return Ok(());
         }
-        Err(Failure::usage(format!(
-            "{what} exist in profile {0} only: add --profile {0} if that is what the drive speaks",
-            profile.name()
-        )))
+        let profile = profile.name();
+        Err(Failure::usage(format!("{what} exist in profile {profile} only"))
+            .trying(format!("add --profile {profile} if that is what the drive speaks")))
     }
 
     /// What a result for programs about the motor begins with.

@@ -15,7 +15,7 @@ use super::interface::up_hint;
 #[non_exhaustive]
 pub enum PortError {
     /// No device has this name.
-    #[error("there is no `{port}`: is it plugged in? `motorlink ports` lists what is there")]
+    #[error("there is no `{port}`: is it plugged in?")]
     NotFound {
         /// The port.
         port: String,
@@ -37,7 +37,7 @@ pub enum PortError {
         port: String,
     },
     /// The path is a directory, a plain file or a device of another kind.
-    #[error("`{port}` is not a serial device: `motorlink ports` lists those that are")]
+    #[error("`{port}` is not a serial device")]
     NotSerial {
         /// The port.
         port: String,
@@ -69,7 +69,7 @@ pub enum PortError {
         source: Arc<io::Error>,
     },
     /// The machine is there and nothing listens.
-    #[error("`{port}` refuses the connection: is the server started, on this TCP port?")]
+    #[error("`{port}` refuses the connection: does a server listen there?")]
     Refused {
         /// The port.
         port: String,
@@ -132,7 +132,7 @@ pub enum PortError {
     )]
     NoCan,
     /// No CAN interface has this name.
-    #[error("there is no CAN interface `{port}`: `motorlink ports` lists what is there")]
+    #[error("there is no CAN interface `{port}`")]
     NoSuchInterface {
         /// The interface.
         port: String,

@@ -57,12 +57,12 @@ impl<'a> Given<'a> {
 #[non_exhaustive]
 pub enum NameError {
     /// No form starts like this.
-    #[error("`{name}` names no port; did you mean `{nearest}`? {forms}")]
+    #[error("`{name}` names no port; {}{forms}", suggestion(.nearest.as_deref()))]
     UnknownForm {
         /// What was given.
         name: String,
-        /// The form that it is most like.
-        nearest: String,
+        /// What may have been meant.
+        nearest: Option<String>,
         /// The forms there are.
         forms: String,
     },
@@ -126,8 +126,12 @@ pub enum NameError {
     },
 }
 
-pub(crate) fn unknown_form(name: &str, nearest: String, forms: String) -> NameError {
+pub(crate) fn unknown_form(name: &str, nearest: Option<String>, forms: String) -> NameError {
     NameError::UnknownForm { name: name.to_owned(), nearest, forms }
+}
+
+fn suggestion(nearest: Option<&str>) -> String {
+    nearest.map_or_else(String::new, |nearest| format!("did you mean `{nearest}`? "))
 }
 
 pub(crate) fn present<'a>(

@@ -100,22 +100,23 @@ fn listed(
 }
 
 /// The port that someone who wrote `name` may have meant.
-fn nearest(name: &str, schemes: &[&'static dyn Scheme]) -> String {
+fn nearest(name: &str, schemes: &[&'static dyn Scheme]) -> Option<String> {
     let Some((scheme, rest)) = name.split_once(':') else {
-        return match name {
+        return (!name.is_empty()).then(|| match name {
             _ if schemes.iter().any(|scheme| scheme.name() == name) => format!("{name}:"),
             _ if name.contains("can") => format!("socketcan:{name}"),
             _ => format!("./{name}"),
-        };
+        });
     };
-    match scheme {
-        "can" | "socket" => format!("socketcan:{rest}"),
-        "sl" | "lawicel" | "slcand" | "slcan-pty" => format!("slcan:{rest}"),
-        "tcp-listen" => format!("tcp:{rest}"),
-        "unix-listen" => format!("unix:{rest}"),
-        _ if rest.parse::<u16>().is_ok() => format!("tcp:{name}"),
-        _ => format!("serial:{rest}"),
-    }
+    let meant = match scheme {
+        "can" | "socket" => "socketcan",
+        "sl" | "lawicel" | "slcand" | "slcan-pty" => "slcan",
+        "tcp-listen" => "tcp",
+        "unix-listen" => "unix",
+        _ if rest.parse::<u16>().is_ok() => return Some(format!("tcp:{name}")),
+        _ => "serial",
+    };
+    (!rest.is_empty()).then(|| format!("{meant}:{rest}"))
 }
 
 #[cfg(test)]

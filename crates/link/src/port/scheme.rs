@@ -88,6 +88,14 @@ pub trait Port: fmt::Debug + Send + Sync {
         Vec::new()
     }
 
+    /// The name as it would be written.
+    fn name(&self) -> String {
+        let (body, options) = (self.body(), self.options());
+        // A `?` in the body would begin the options if none followed it.
+        let has_end = !options.is_empty() || body.contains('?');
+        if has_end { format!("{body}?{}", options.join("&")) } else { body }
+    }
+
     /// The port as a serial line, if it is one.
     fn as_line(&self) -> Option<&dyn LinePort> {
         None
@@ -197,13 +205,7 @@ impl PortName {
 /// As it would be written: options that have their default are left out.
 impl fmt::Display for PortName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (body, options) = (self.body(), self.options());
-        f.write_str(&body)?;
-        // A `?` in the body would begin the options if none followed it.
-        if options.is_empty() && !body.contains('?') {
-            return Ok(());
-        }
-        write!(f, "?{}", options.join("&"))
+        f.write_str(&self.0.name())
     }
 }
 

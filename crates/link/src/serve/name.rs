@@ -54,7 +54,7 @@ impl FromStr for ServeName {
             return Ok(ServeName::SocketCan(interface.to_owned()));
         }
         let path = name.rsplit(':').next().filter(|path| !path.is_empty()).unwrap_or("./st0");
-        Err(unknown_form(name, format!("pty:{path}"), FORMS.to_owned()))
+        Err(unknown_form(name, Some(format!("pty:{path}")), FORMS.to_owned()))
     }
 }
 

@@ -45,10 +45,7 @@ pub enum RelayError {
     #[error(transparent)]
     Port(#[from] PortError),
     /// The drives are inside the process.
-    #[error(
-        "`{0}` names simulated drives inside this process, which end with it: serve them with \
-         `motorlink sim` and guard that port"
-    )]
+    #[error("`{0}` names simulated drives inside this process, which end with it")]
     Simulated(PortName),
 }
 

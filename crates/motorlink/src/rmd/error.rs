@@ -14,7 +14,7 @@ pub enum Error {
     /// No reply in time; it is not known whether the motor did what was asked.
     #[error(
         "{port}: motor {motor} does not answer {:#04x} ({request}); is it powered, is its ID right and the \
-         bitrate 1 Mbit/s? `motorlink rmd scan` lists the motors that answer",
+         bitrate 1 Mbit/s?",
         u8::from(*request)
     )]
     Timeout {

@@ -3,14 +3,9 @@
 use std::sync::Arc;
 
 use motorlink_link::port::PortError;
-use motorlink_proto::st::{ErrorCode, Failure, MotorNumber, Profile, RegisterId, Unverified};
+use motorlink_proto::st::{ErrorCode, Failure, MotorNumber, RegisterId, Unverified};
 
 use super::LimitError;
-
-const ACTS: &str =
-    "the drive acts on it and changes it by itself; write it plainly, then read STATUS";
-const NOT_READABLE: &str =
-    "it cannot be both written and read in this profile; `motorlink st registers` says what can";
 
 /// Why a call to a drive did not do what it says.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -93,7 +88,7 @@ pub enum Error {
         /// The register.
         register: RegisterId,
         /// Why, and what to do instead.
-        why: &'static str,
+        why: Unverifiable,
     },
     /// The port.
     #[error(transparent)]
@@ -112,6 +107,17 @@ pub enum Error {
     /// The request does not fit a frame; nothing was sent.
     #[error("{0} does not fit a frame: a payload has at most 128 bytes")]
     TooLong(String),
+}
+
+/// Why a write to a register cannot be verified.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Unverifiable {
+    /// The drive acts on the write and changes the value by itself.
+    #[error("the drive acts on it and changes it by itself; write it plainly, then read STATUS")]
+    Acts,
+    /// The register cannot be both written and read.
+    #[error("it cannot be both written and read in this profile")]
+    NotReadable,
 }
 
 /// The motor that a frame names; 0 is the drive's current one.
@@ -139,8 +145,10 @@ impl Error {
             Unverified::Differs { expected, read } => {
                 Ok(Error::Differs { register, expected, read, motor })
             }
-            Unverified::Acts => Ok(Error::NotVerifiable { register, why: ACTS }),
-            Unverified::NotReadable => Ok(Error::NotVerifiable { register, why: NOT_READABLE }),
+            Unverified::Acts => Ok(Error::NotVerifiable { register, why: Unverifiable::Acts }),
+            Unverified::NotReadable => {
+                Ok(Error::NotVerifiable { register, why: Unverifiable::NotReadable })
+            }
         }
     }
 
@@ -164,19 +172,10 @@ impl Error {
 /// What a person can do about a failure.
 pub(super) fn advice(failure: Failure) -> &'static str {
     match failure {
-        Failure::Timeout => {
-            "is the drive powered and the baud rate right? `motorlink st scan` tries the usual rates"
-        }
-        Failure::Header(_) | Failure::Damaged(_) => {
-            "a wrong baud rate looks like this; `motorlink st scan` tries the usual rates"
-        }
+        Failure::Timeout => "is the drive powered and the baud rate right?",
+        Failure::Header(_) | Failure::Damaged(_) => "a wrong baud rate looks like this",
         Failure::Incomplete { .. } => "the line lost bytes; try again",
-        Failure::Size { fits: Some(Profile::Mcsdk54), .. } => {
-            "if the drive speaks that, say so: --profile mcsdk-5.4"
-        }
-        Failure::Size { fits: Some(Profile::Spec), .. } => {
-            "if the drive speaks that, say so: --profile spec"
-        }
+        Failure::Size { fits: Some(_), .. } => "does the drive speak that?",
         Failure::Size { fits: None, .. } => {
             "the line is damaged, or this is another's reply; try again"
         }
@@ -197,7 +196,7 @@ pub(super) fn hint(code: ErrorCode) -> &'static str {
             "; firmware up to 5.3 also answers this when the value is -1, and shipped firmware when \
              the feature is not built in"
         }
-        ErrorCode::BadMotorSelected => "; --motor counts from 1",
+        ErrorCode::BadMotorSelected => "; motor numbers count from 1",
         _ => "",
     }
 }

@@ -32,7 +32,7 @@ pub use motorlink_proto::st::{
 };
 
 pub use client::{BoardInfo, Client, FirmwareVersion};
-pub use error::Error;
+pub use error::{Error, Unverifiable};
 pub use event::{Confirmation, EventClient, Progress};
 pub use motor::Motor;
 pub use motorlink_proto::st::{Reading, UnknownRegister, ValueError, find_register, parse_value};

@@ -20,7 +20,7 @@ pub struct Reading {
 
 /// A register name or number that nobody knows.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no register `{text}`; {}`motorlink st registers` lists them", suggestion(.nearest))]
+#[error("there is no register `{text}`{}", suggestion(.nearest))]
 pub struct UnknownRegister {
     /// What was asked for.
     pub text: String,
@@ -89,7 +89,7 @@ pub fn find_register(text: &str) -> Result<RegisterId, UnknownRegister> {
 }
 
 fn suggestion(nearest: &Option<&'static str>) -> String {
-    nearest.map(|name| format!("did you mean `{name}`? ")).unwrap_or_default()
+    nearest.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
 }
 
 fn number(text: &str) -> Option<i64> {

@@ -127,8 +127,7 @@ impl LinePort for TcpBytes {
     }
 
     fn label(&self) -> String {
-        let options = self.options().into_iter().map(|option| format!("?{option}"));
-        self.body() + &options.collect::<String>()
+        self.name()
     }
 }
 

@@ -71,6 +71,6 @@ impl LinePort for Socket {
     }
 
     fn label(&self) -> String {
-        self.body()
+        self.name()
     }
 }
