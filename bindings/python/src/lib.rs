@@ -25,6 +25,7 @@ mod _core {
 
     use motorlink_proto::time::Micros;
     use motorlink_proto::units::{Quantity, TurnCentiDegrees};
+    use pyo3::types::PyTuple;
 
     use super::*;
 
@@ -42,7 +43,7 @@ mod _core {
     #[pymodule_export]
     use super::st::{
         StClient, StOptions, StRequest, StSampling, StVerifiedWrite, st_flags_text, st_motor,
-        st_register, st_register_name, st_registers,
+        st_register, st_register_name, st_registers, st_scan_baud, st_scan_rates,
     };
 
     #[pymodule_init]
@@ -50,6 +51,8 @@ mod _core {
         motorlink_testbench::register();
         module.add("ST_SEGMENTS", motorlink_proto::st::SEGMENTS)?;
         module.add("ST_TIMEOUT", seconds(motorlink_proto::st::TIMEOUT))?;
+        module.add("ST_BAUD_RATES", PyTuple::new(module.py(), motorlink::st::BAUD_RATES)?)?;
+        module.add("ST_SCAN_TIMEOUT", motorlink::st::SCAN_TIMEOUT.as_secs_f64())?;
         module.add("ST_ATTEMPTS", motorlink_proto::st::VERIFY_ATTEMPTS)?;
         module.add("RMD_TIMEOUT", seconds(motorlink_proto::rmd::DEFAULT_TIMEOUT))?;
         module.add("RMD_QUARANTINE", seconds(motorlink_proto::rmd::DEFAULT_QUARANTINE))?;

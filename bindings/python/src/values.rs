@@ -28,6 +28,7 @@ classes! {
     register_info _values "RegisterInfo";
     errors _values "Errors";
     scan_result _rmd "ScanResult";
+    st_scan_result _scan "ScanResult";
     frame _values "Frame";
 }
 

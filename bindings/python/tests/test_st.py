@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import copy
 import os
 import pickle
@@ -12,9 +13,9 @@ from pathlib import Path
 import pytest
 
 import motorlink
-from conftest import Served, eventually
+from conftest import PATIENT, Served, eventually
 from drive import QUESTIONS, Drive
-from motorlink import st
+from motorlink import aio, st
 
 
 def test_what_is_written_is_read(st_bus: st.Client) -> None:
@@ -392,3 +393,19 @@ def test_registers_are_copied_without_asking_the_drive(st_bus: st.Client) -> Non
 def test_a_motor_that_cannot_exist_is_refused_at_once(st_bus: st.Client, number: int) -> None:
     with pytest.raises(motorlink.InvalidValueError, match="1 to 7"):
         st_bus.motor(number)
+
+
+def test_a_scan_tells_what_each_rate_was_answered_with(served: Served, tmp_path: Path) -> None:
+    found = st.scan(served.st, [115200, 9600], timeout=PATIENT)
+    assert [(one.baud, one.kind) for one in found] == [(115200, "drive"), (9600, "drive")]
+    assert found[0].board_info is not None and "ST MC SDK" in found[0].board_info.name
+    assert asyncio.run(aio.st.scan(served.st, [115200, 9600], timeout=PATIENT)) == found
+    silent = Drive(tmp_path / "silent", 0)
+    silent.answers = 0
+    try:
+        assert st.scan(silent.path, [9600], timeout=0.02) == [(9600, "silence", None)]
+    finally:
+        silent.unplug()
+    for port in ("sim:", "socketcan:can0"):
+        with pytest.raises(motorlink.InvalidValueError, match="no baud rate"):
+            st.scan(port)

@@ -5,8 +5,9 @@ from typing import Any, final
 
 from typing_extensions import Self, disjoint_base
 
-from motorlink._rmd import ScanResult
+from motorlink import _rmd
 from motorlink._rmd_table import MotionStatus
+from motorlink._scan import ScanResult
 from motorlink._values import Frame, RegisterInfo
 from motorlink.errors import MotorlinkError
 
@@ -26,6 +27,8 @@ __all__ = [
     "SimRecording",
     "SimServing",
     "ST_ATTEMPTS",
+    "ST_BAUD_RATES",
+    "ST_SCAN_TIMEOUT",
     "ST_SEGMENTS",
     "ST_TIMEOUT",
     "StClient",
@@ -50,6 +53,8 @@ __all__ = [
     "st_register",
     "st_register_name",
     "st_registers",
+    "st_scan_baud",
+    "st_scan_rates",
 ]
 
 __version__: str
@@ -63,6 +68,10 @@ RMD_SCAN_WIDTH: int
 RMD_TIMEOUT: float
 #: How often a verified write is tried.
 ST_ATTEMPTS: int
+#: The rates that drives are built with, the most frequent first.
+ST_BAUD_RATES: tuple[int, ...]
+#: How long a reply is awaited in a scan, s.
+ST_SCAN_TIMEOUT: float
 #: How many data segments a drive has.
 ST_SEGMENTS: int
 #: How long a reply is awaited, s.
@@ -76,6 +85,8 @@ def st_register(
 def st_motor(number: int) -> int: ...
 def st_register_name(name: str | int) -> str: ...
 def st_registers(profile: str = "spec") -> list[str]: ...
+def st_scan_baud(port: str, baud: int, timeout: float) -> ScanResult: ...
+def st_scan_rates(port: str, rates: Sequence[int]) -> list[int]: ...
 def st_flags_text(bits: int) -> str: ...
 def rmd_decode(can_id: int, data: bytes, *, reply: bool) -> Frame: ...
 def rmd_encode(code: int, *values: float | str) -> bytes: ...
@@ -253,7 +264,7 @@ class RmdClient:
     def set_torque4(
         self, iq_amps: Sequence[float], expect: Sequence[int]
     ) -> dict[int, MotionStatus | MotorlinkError]: ...
-    def scan(self, ids: Sequence[int]) -> list[ScanResult]: ...
+    def scan(self, ids: Sequence[int]) -> list[_rmd.ScanResult]: ...
     def sample(
         self,
         motors: Sequence[tuple[int, Sequence[str]]],

@@ -31,13 +31,16 @@ the handler waits until that is over.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from motorlink._apis import Blocking
+from motorlink import _core
+from motorlink._apis import Blocking, carried_out
 from motorlink._client import BlockingClient, PortLike, opens
 from motorlink._core import StClient as Core
 from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
+from motorlink._scan import Path, ScanResult, scanning
 from motorlink._st import StClient, StMotor
 from motorlink._values import (
     BoardInfo,
@@ -60,8 +63,10 @@ __all__ = [
     "Registers",
     "Request",
     "RevupPhase",
+    "ScanResult",
     "Status",
     "open",
+    "scan",
 ]
 
 
@@ -94,3 +99,20 @@ class Client(BlockingClient, StClient[Motor, PortLike]):
 
 
 open = opens(Client._open)
+
+
+def scan(
+    port: Path,
+    rates: Sequence[int] = _core.ST_BAUD_RATES,
+    *,
+    timeout: float = _core.ST_SCAN_TIMEOUT,
+) -> list[ScanResult]:
+    """Asks a drive for its board information at each baud rate; gives what each was answered with.
+
+    ``port`` is a serial line. ``timeout`` is how long to wait for each of two answers, s. A port without a
+    baud rate, such as ``tcp:``, is asked once. No motor is started or stopped.
+
+    Raises ``PortError`` where the port cannot be opened, and ``InvalidValueError`` for one that is not a
+    line or that ends with this process.
+    """
+    return carried_out(scanning(_core.st_scan_baud, port, rates, timeout))

@@ -8,6 +8,7 @@ mod reply;
 mod request;
 mod sample;
 mod scale;
+mod scan;
 mod verified;
 
 pub(crate) use client::{StClient, frame_code, not_stopped};
@@ -16,6 +17,7 @@ pub(crate) use reply::Answer;
 pub(crate) use request::{StRequest, motor_number};
 pub(crate) use sample::StSampling;
 pub(crate) use scale::Scale;
+pub(crate) use scan::{st_scan_baud, st_scan_rates};
 pub(crate) use verified::StVerifiedWrite;
 
 use motorlink::st::register::{Feature, Features, Writing};

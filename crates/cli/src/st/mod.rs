@@ -11,13 +11,11 @@ use std::time::Duration;
 pub use args::Args;
 use args::{Command, DriveArgs, Read};
 use motorlink::port::PortName;
+use motorlink::st::SCAN_TIMEOUT;
 use session::connect;
 
 use crate::connection::Connection;
 use crate::failure::Failure;
-
-/// How long a drive has to answer a question of a scan unless told otherwise, ms.
-const SCAN_TIMEOUT: u32 = 200;
 
 pub fn run(args: Args) -> Result<(), Failure> {
     let Args { connection, drive, command } = args;
@@ -41,8 +39,8 @@ fn run_at(
         Command::Read(read) => match read {
             Read::Registers => read::registers(connection.output()),
             Read::Scan { rates } => {
-                let patience = drive.timeout.unwrap_or(SCAN_TIMEOUT);
-                scan::run(connection, port, Duration::from_millis(patience.into()), &rates)
+                let told = drive.timeout.map(|ms| Duration::from_millis(ms.into()));
+                scan::run(connection, port, told.unwrap_or(SCAN_TIMEOUT), &rates)
             }
             Read::Get { registers, repeat } => read::get(&connect()?, &registers, repeat),
             Read::Segment { segment, registers, repeat } => {

@@ -37,6 +37,6 @@ pub use event::{Confirmation, EventClient, Progress};
 pub use motor::Motor;
 pub use motorlink_proto::st::{Reading, UnknownRegister, ValueError, find_register, parse_value};
 pub use options::Options;
-pub use scan::{BAUD_RATES, ScanResult, scan_baud};
+pub use scan::{BAUD_RATES, SCAN_TIMEOUT, ScanResult, scan_baud};
 pub use stop_on_drop::{StopOnDrop, Stopped};
 pub use transcript::Transcript;

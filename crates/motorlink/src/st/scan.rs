@@ -11,6 +11,9 @@ use super::{BoardInfo, Client, Error, Options};
 pub const BAUD_RATES: [u32; 9] =
     [115_200, 1_843_200, 921_600, 460_800, 230_400, 57_600, 38_400, 19_200, 9_600];
 
+/// How long a drive has to answer a question of a scan, unless the user says otherwise.
+pub const SCAN_TIMEOUT: Duration = Duration::from_millis(200);
+
 /// What a rate was answered with.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ScanResult {

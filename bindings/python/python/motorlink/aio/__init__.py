@@ -13,7 +13,7 @@ Methods, arguments, values and exceptions are those of ``motorlink.st`` and ``mo
 by the same code, and so are their descriptions; examples there are of the blocking API. Different here: a
 motor's ``registers`` are names and what they stand for, and a bench of ``motorlink.sim`` is not a
 port. No thread carries an exchange: the loop watches the
-port's descriptor. Only opening a port, and the end of ``async with``, which
+port's descriptor. Only opening a port, a scan, and the end of ``async with``, which
 may wait for long, happen in the loop's default executor.
 
 Any exchange may be cancelled, at any moment, by ``asyncio.timeout``, ``task.cancel()`` or the end of

@@ -14,19 +14,21 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Union
 
-from motorlink._apis import Awaited
+from motorlink import _core
+from motorlink._apis import Awaited, awaiting
 from motorlink._core import StEventClient, StSampling, StVerifiedWrite
 from motorlink._core import StRequest as Request
 from motorlink._registers import RegisterNames
+from motorlink._scan import Path, ScanResult, scanning
 from motorlink._st import StClient, StMotor
 from motorlink.aio._sampling import sampled
 from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
 from motorlink.errors import LinkError, MotorlinkError, RefusedError, ReplyTimeoutError
 
-__all__ = ["Client", "Motor", "Opening", "open"]
+__all__ = ["Client", "Motor", "Opening", "open", "scan"]
 
 
 class Motor(Awaited, StMotor["Client"]):
@@ -133,3 +135,18 @@ class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"]]):
 
 
 open = opens(Client._open)
+
+
+async def scan(
+    port: Path,
+    rates: Sequence[int] = _core.ST_BAUD_RATES,
+    *,
+    timeout: float = _core.ST_SCAN_TIMEOUT,
+) -> list[ScanResult]:
+    """:func:`motorlink.st.scan`, awaited; it happens in the loop's default executor."""
+    loop = asyncio.get_running_loop()
+
+    def ask(*arguments: Any) -> Any:
+        return loop.run_in_executor(None, _core.st_scan_baud, *arguments)
+
+    return await awaiting(scanning(ask, port, rates, timeout))
