@@ -34,7 +34,9 @@ impl Account {
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits = limits;
         self.ramped = 0;
-        self.effect = Effect::None;
+        if self.effect == Effect::Ramps {
+            self.effect = Effect::None;
+        }
     }
 
     /// The motors that were started and not stopped.
