@@ -65,7 +65,8 @@ def test_a_full_turn_and_its_tolerance_can_be_allowed() -> None:
         with pytest.raises(motorlink.FullTurnError):
             bus.motor(1).set_single_turn_position(80, tolerance_degrees=11)
         for nonsense in (-1, float("nan")):
-            with pytest.raises(motorlink.InvalidValueError, match="^tolerance_degrees: .* is outside 0 to 359.99 °; nothing was sent"):
+            refused = "^tolerance_degrees: .* is outside 0 to 359.99 °; nothing was sent"
+            with pytest.raises(motorlink.InvalidValueError, match=refused):
                 bus.motor(1).set_single_turn_position(80, tolerance_degrees=nonsense)
 
 
@@ -161,7 +162,8 @@ def test_a_scan_finds_the_motors(brief_bus: rmd.Client) -> None:
 
 
 def test_limits_hold() -> None:
-    with rmd.open("sim:", timeout=PATIENT, current_limit_amps=1.0, speed_limit_dps=360, angle_limit_degrees=90) as bus:
+    limits: dict[str, Any] = {"current_limit_amps": 1.0, "speed_limit_dps": 360, "angle_limit_degrees": 90}
+    with rmd.open("sim:", timeout=PATIENT, **limits) as bus:
         motor = bus.motor(1)
         motor.set_position(-90, max_speed_dps=360)
         # A digit is 0.016 A: 62 digits are within 1 A.

@@ -116,7 +116,7 @@ class Closing:
 
 
 class AnyClient:
-    """What the clients of both protocols and both APIs have in common: how they are opened, and how they end."""
+    """What the clients of both protocols and both APIs have in common: how they are opened and end."""
 
     #: What ``on_close`` may be, and how the client is closed then.
     _ENDS: ClassVar[dict[str, dict[str, bool]]]

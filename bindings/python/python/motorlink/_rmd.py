@@ -146,7 +146,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT]):
         >>> import motorlink
         >>> from motorlink import rmd
         >>> with rmd.open("sim:") as client:
-        ...     answers = client.cycle({1: rmd.set_speed(100), 2: rmd.set_torque(0.5), 9: rmd.read_motion_status()})
+        ...     answers = client.cycle({1: rmd.set_speed(100), 9: rmd.read_status()})
         >>> type(answers[1]).__name__, type(answers[9]).__name__
         ('MotionStatus', 'ReplyTimeoutError')
 

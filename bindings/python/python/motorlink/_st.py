@@ -76,13 +76,13 @@ class StClient(AnyClient, Generic[MotorT, PortT]):
         ``timeout``
             How long to wait for a reply, s (4.1 says 1 s).
         ``speed_limit_rpm``, ``current_limit``
-            What no request may exceed in either direction; the current is A with ``full_scale_amps``, digits
-            without; also not by writing registers or raw frames. Rounded towards 0 to what a frame can
-            say. With a speed limit a motor is started only after a ``set_ramp`` within it, and ``set_position`` is
-            refused. The ramp no longer counts after a torque command, a write of CONTROL_MODE, a reset
-            of the drive, or a lost line or port. A speed limit does not bound the speed under a torque
-            command (``set_current_reference``, ``set_torque_ramp``), which is as fast as the load allows, nor the
-            drive's own rev-up, alignment and motor profiler.
+            What no request may exceed in either direction; the current is A with ``full_scale_amps``,
+            digits without; also not by writing registers or raw frames. Rounded towards 0 to what a frame
+            can say. With a speed limit a motor is started only after a ``set_ramp`` within it, and
+            ``set_position`` is refused. The ramp no longer counts after a torque command, a write of
+            CONTROL_MODE, a reset of the drive, or a lost line or port. A speed limit does not bound the
+            speed under a torque command (``set_current_reference``, ``set_torque_ramp``), which is as fast
+            as the load allows, nor the drive's own rev-up, alignment and motor profiler.
         ``full_scale_amps``
             The current of digit 32767, A, for every motor that is not given its own.
         ``recovery``
@@ -396,7 +396,10 @@ class StMotor(Generic[ClientT]):
         ``speed_limit_rpm`` bounds the motor then.
         """
         self._only("mcsdk-5.4", "torque ramps")
-        return self._exchange(Request.set_torque_ramp(torque, duration_s, full_scale_amps=self._full_scale_amps))
+        full_scale_amps = self._full_scale_amps
+        return self._exchange(
+            Request.set_torque_ramp(torque, duration_s, full_scale_amps=full_scale_amps)
+        )
 
     @both_apis
     def set_position(self, angle_rad: float, duration_s: float) -> Exchanges[None]:

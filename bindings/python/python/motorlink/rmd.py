@@ -10,8 +10,8 @@
 Angles are °, speeds °/s, accelerations °/s², torque currents A, all of the motor shaft; positive is
 clockwise. Every method of a motor is one exchange and raises
 
-* ``ReplyTimeoutError`` where the motor does not answer; nobody knows then what it did. There is no refusal in
-  this protocol: a motor that does not know a command is silent, too,
+* ``ReplyTimeoutError`` where the motor does not answer; nobody knows then what it did. A motor of this
+  protocol cannot refuse: it is silent, too, when it does not know a command,
 * ``LinkError`` and ``PortError`` where the line fails, or the motor speaks another protocol,
 * ``InvalidValueError`` where nothing was sent: no such motor, out of range, over a limit,
 * ``ClosedError`` after ``client.close()``.
@@ -19,7 +19,9 @@ clockwise. Every method of a motor is one exchange and raises
 Ctrl-C and handlers of signals: as in :mod:`motorlink.st`. A motor that did not answer in time is waited
 for before it is told anything else; ``stop()`` and ``off()`` do not wait.
 
-Names in brackets are paragraphs of chapter 3 of the document, or codes of commands.
+A command is called alike as a method of a motor, as a :class:`Request`, and as a function of this module,
+which gives a request for :meth:`Client.cycle`; a method that reads is called without ``read_``. Each says
+its code and its paragraph in chapter 3 of the document.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ class Bench(Closing):
 
     @property
     def st(self) -> st.Client:
-        """A client of the ST drive, open, with the drive's profile. For other options, ``st.open(bench, ...)``."""
+        """A client of the ST drive, open, with its profile. For other options, ``st.open(bench, ...)``."""
         if self._st is None or self._st._is_closed:
             self._st = st.open(self, profile=self._core.profile)
         return self._st
