@@ -18,9 +18,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 __all__ = [
-    "InvalidValueError",
     "ClosedError",
     "FullTurnError",
+    "InvalidValueError",
     "LinkError",
     "MotorlinkError",
     "PortError",
@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from motorlink._core import __version__
     from motorlink._sampling import to_pandas
     from motorlink.errors import (
-        InvalidValueError,
         ClosedError,
         FullTurnError,
+        InvalidValueError,
         LinkError,
         MotorlinkError,
         PortError,

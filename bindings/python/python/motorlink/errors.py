@@ -9,15 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 __all__ = [
-    "InvalidValueError",
     "ClosedError",
     "FullTurnError",
+    "InvalidValueError",
     "LinkError",
     "MotorlinkError",
-    "UnknownRegisterError",
     "PortError",
     "RefusedError",
     "ReplyTimeoutError",
+    "UnknownRegisterError",
 ]
 
 
