@@ -15,6 +15,11 @@ pub struct Row {
 }
 
 impl Row {
+    /// A number without a unit.
+    pub fn plain(name: &str, value: i64) -> Self {
+        Row { name: name.to_owned(), text: value.to_string(), value: json!({ "value": value }) }
+    }
+
     /// A value in a unit.
     pub fn quantity(name: &str, value: f64, decimals: u8, unit: &str) -> Self {
         let text = format!("{value:.*} {unit}", usize::from(decimals));

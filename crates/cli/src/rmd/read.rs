@@ -68,7 +68,9 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
 pub fn status(session: &Session, repeat: Repeat) -> Result<(), Failure> {
     show(session, repeat, |session| {
         let motor = session.motor()?;
-        let mut all = session.rows(&motor.status()?);
+        // JSON names the motor outside of the values.
+        let id = (!session.output.json).then(|| Row::plain("motor", motor.id().number().into()));
+        let mut all: Vec<Row> = id.into_iter().chain(session.rows(&motor.status()?)).collect();
         // The temperature is there already.
         all.extend(session.rows(&motor.motion_status()?).into_iter().skip(1));
         all.extend(session.rows(&motor.phase_currents()?));
