@@ -53,7 +53,8 @@ pub fn repeated<T>(
                 left -= 1;
             }
             Err(Failure::Failed(problem)) if matches!(problem.kind, Kind::Link | Kind::Silent) => {
-                if outage.replace(problem.kind).is_none() {
+                if outage.is_none() {
+                    outage = Some(problem.kind);
                     let (text, retry) = (problem.text(), "trying again until Ctrl-C");
                     match output.json {
                         true => {
