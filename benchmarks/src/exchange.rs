@@ -110,10 +110,10 @@ impl MotorControl for Memory {
     fn version(&self) -> Version<'_> {
         Version { name: "memory", major: 0, minor: 0, patch: 0, pre_release: "" }
     }
-    fn read(&mut self, _: MotorNumber, register: RegisterId) -> i32 {
+    fn get_register(&mut self, _: MotorNumber, register: RegisterId) -> i32 {
         self.registers[usize::from(register.0)]
     }
-    fn write(
+    fn set_register(
         &mut self,
         _: MotorNumber,
         register: RegisterId,
@@ -123,14 +123,14 @@ impl MotorControl for Memory {
         Ok(())
     }
     fn execute(&mut self, _: MotorNumber, _: Command) {}
-    fn ramp(&mut self, _: MotorNumber, _: Ramp) {}
-    fn revup(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
+    fn set_ramp(&mut self, _: MotorNumber, _: Ramp) {}
+    fn get_revup_data(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
         RevupPhase::default()
     }
-    fn set_revup(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
-    fn current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
-    fn torque_ramp(&mut self, _: MotorNumber, _: TorqueRamp) {}
-    fn position(&mut self, _: MotorNumber, _: PositionMove) {}
+    fn set_revup_data(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
+    fn set_current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
+    fn set_torque_ramp(&mut self, _: MotorNumber, _: TorqueRamp) {}
+    fn set_position(&mut self, _: MotorNumber, _: PositionMove) {}
 }
 
 #[cfg(test)]

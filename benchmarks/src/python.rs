@@ -28,8 +28,8 @@ const CONTESTANTS: [(&str, &str); 6] = [
     ("bytes only", "pyserial, bytes only"),
     ("plain python", "pyserial, framing and checks"),
     ("system calls", "os.write and os.read only"),
-    ("asyncio", "motorlink.aio, one bus"),
-    ("asyncio, four", "motorlink.aio, four buses"),
+    ("asyncio", "motorlink.aio, one client"),
+    ("asyncio, four", "motorlink.aio, four clients"),
 ];
 
 pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {

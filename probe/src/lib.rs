@@ -47,29 +47,29 @@ impl MotorControl for Plant {
     fn version(&self) -> Version<'_> {
         black_box(Version { name: "probe", major: 1, minor: 2, patch: 3, pre_release: "RC1" })
     }
-    fn read(&mut self, _: MotorNumber, _: RegisterId) -> i32 {
+    fn get_register(&mut self, _: MotorNumber, _: RegisterId) -> i32 {
         unknown()
     }
-    fn write(&mut self, _: MotorNumber, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
+    fn set_register(&mut self, _: MotorNumber, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
         black_box(Ok(()))
     }
     fn execute(&mut self, _: MotorNumber, _: Command) {}
-    fn ramp(&mut self, _: MotorNumber, ramp: Ramp) {
+    fn set_ramp(&mut self, _: MotorNumber, ramp: Ramp) {
         black_box(ramp);
     }
-    fn revup(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
+    fn get_revup_data(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
         unknown()
     }
-    fn set_revup(&mut self, _: MotorNumber, _: u8, data: RevupPhase) {
+    fn set_revup_data(&mut self, _: MotorNumber, _: u8, data: RevupPhase) {
         black_box(data);
     }
-    fn current_reference(&mut self, _: MotorNumber, reference: CurrentReference) {
+    fn set_current_reference(&mut self, _: MotorNumber, reference: CurrentReference) {
         black_box(reference);
     }
-    fn torque_ramp(&mut self, _: MotorNumber, ramp: TorqueRamp) {
+    fn set_torque_ramp(&mut self, _: MotorNumber, ramp: TorqueRamp) {
         black_box(ramp);
     }
-    fn position(&mut self, _: MotorNumber, target: PositionMove) {
+    fn set_position(&mut self, _: MotorNumber, target: PositionMove) {
         black_box(target);
     }
     fn profiler_step(&self, _: MotorNumber, _: u8) -> &[u8] {

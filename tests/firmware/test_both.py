@@ -85,7 +85,7 @@ def test_motors_of_both_kinds_turn_at_once(board, st, rmd, eventually, capsys):
     board.advance(2)
     took = time.monotonic() - begun
     turned = rmd("-i", 1, "--json", "angle").ended(0).values["multi_turn_angle"] - first
-    # Each program waits for the guard time, 0.1 s, before it trusts a motor.
+    # Each program waits for the quarantine time, 0.1 s, before it trusts a motor.
     assert abs(turned - 360 * (2 + 0.1)) < 4
     with capsys.disabled():
         print(f"\n{board.language}: with five motors turning, time passes at {2 / took:.0%} of real time")

@@ -19,7 +19,7 @@ pub struct Modules(pub Vec<Module>);
 
 #[derive(Default)]
 pub struct Module {
-    /// Such as `crate::stmcp::master`.
+    /// Such as `crate::st::master`.
     pub name: String,
     pub file: PathBuf,
     pub parent: Option<Id>,

@@ -131,7 +131,7 @@ fn st(name: &'static str, mut config: MotorConfig, rpm: i32) -> Kernel {
     let mut station = StStation::new(Profile::Spec, drive);
     if rpm != 0 {
         let drive = station.drive_mut();
-        drive.ramp(MotorNumber::FIRST, Ramp { speed_rpm: rpm, duration_ms: 500 });
+        drive.set_ramp(MotorNumber::FIRST, Ramp { speed_rpm: rpm, duration_ms: 500 });
         drive.execute(MotorNumber::FIRST, Command::StartMotor);
     }
     station.advance_to(SETTLED);

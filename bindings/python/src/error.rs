@@ -72,13 +72,13 @@ pub(crate) fn unknown_register(py: Python<'_>, message: impl Display) -> PyErr {
     Kind::UnknownRegister.raise(py, message, Facts::default())
 }
 
-/// A bus that was closed.
+/// A client that was closed.
 pub(crate) fn closed(py: Python<'_>, port: &str) -> PyErr {
     let facts = Facts { port: Some(port), ..Facts::default() };
     Kind::Closed.raise(py, format_args!("{port} was closed by this program; open it again"), facts)
 }
 
-/// A bus of a process that this one was forked from.
+/// A client of a process that this one was forked from.
 pub(crate) fn elsewhere(py: Python<'_>, port: &str) -> PyErr {
     let facts = Facts { port: Some(port), ..Facts::default() };
     let why = "was opened by another process, which this one was forked from; open it in this one";
@@ -126,7 +126,7 @@ pub(crate) fn refusal(py: Python<'_>, code: ErrorCode) -> PyErr {
     Kind::Refused.raise(py, format_args!("the drive refused: {code} ({})", code.doc()), facts)
 }
 
-/// What an RMD bus says.
+/// What an RMD client says.
 pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
     use rmd::Error;
     let facts =

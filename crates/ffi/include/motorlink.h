@@ -433,7 +433,7 @@ enum motorlink_rmd_code
   MOTORLINK_RMD_CODE_WRITE_ACCELERATION_RAM           = 0x34, /**< sets the acceleration limit until power-off */
   MOTORLINK_RMD_CODE_READ_ENCODER                     = 0x90, /**< reads encoder position, original position and offset */
   MOTORLINK_RMD_CODE_WRITE_ENCODER_OFFSET_ROM         = 0x91, /**< sets the encoder offset, at once and for good; wears the ROM */
-  MOTORLINK_RMD_CODE_WRITE_ZERO_ROM                   = 0x19, /**< makes the current position the zero from the next power-on on; wears the ROM */
+  MOTORLINK_RMD_CODE_WRITE_ZERO_ROM                   = 0x19, /**< makes the current position the zero effective after the next power cycle; wears the ROM */
   MOTORLINK_RMD_CODE_READ_MULTI_TURN_ANGLE            = 0x92, /**< reads the angle over all turns */
   MOTORLINK_RMD_CODE_READ_SINGLE_TURN_ANGLE           = 0x94, /**< reads the angle within the turn */
   MOTORLINK_RMD_CODE_READ_STATUS                      = 0x9A, /**< reads temperature, voltage and error flags */
@@ -1861,7 +1861,7 @@ struct motorlink_rmd_data motorlink_rmd_read_encoder(void);
 struct motorlink_rmd_data motorlink_rmd_write_encoder_offset_rom(uint16_t offset);
 
 /**
- * Request 0x19: makes the current position the zero from the next power-on on. Wears the ROM.
+ * Request 0x19: makes the current position the zero effective after the next power cycle. Wears the ROM.
  */
 struct motorlink_rmd_data motorlink_rmd_write_zero_rom(void);
 

@@ -98,7 +98,7 @@ fn a_start_without_a_ramp_is_refused_and_nothing_is_sent() {
             let told = error.to_string();
             assert!(is_limited(&Err::<(), _>(error)), "{told}");
             assert!(told.starts_with("motor 1: ") && told.contains("nothing was sent"), "{told}");
-            assert!(told.contains("first `ramp(...)` within the limit"), "{told}");
+            assert!(told.contains("first set a ramp within the limit"), "{told}");
         }
         assert_eq!(bench.now(), time::Instant(0), "bytes take their time on the line");
         assert_eq!(client.started().count(), 0);

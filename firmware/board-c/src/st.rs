@@ -34,7 +34,7 @@ unsafe extern "C" fn plant_st_features(context: *mut c_void, motor: u8) -> u16 {
 unsafe extern "C" fn plant_st_get_register(context: *mut c_void, motor: u8, reg: u8) -> i32 {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
-    drive.read(motor, RegisterId(reg))
+    drive.get_register(motor, RegisterId(reg))
 }
 
 #[unsafe(no_mangle)]
@@ -46,7 +46,7 @@ unsafe extern "C" fn plant_st_set_register(
 ) -> u8 {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
-    drive.write(motor, RegisterId(reg), value).map_or_else(u8::from, |()| 0)
+    drive.set_register(motor, RegisterId(reg), value).map_or_else(u8::from, |()| 0)
 }
 
 #[unsafe(no_mangle)]
@@ -60,7 +60,7 @@ unsafe extern "C" fn plant_st_execute(context: *mut c_void, motor: u8, command: 
 unsafe extern "C" fn plant_st_set_ramp(context: *mut c_void, motor: u8, speed_rpm: i32, ms: u16) {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
-    drive.ramp(motor, Ramp { speed_rpm, duration_ms: ms });
+    drive.set_ramp(motor, Ramp { speed_rpm, duration_ms: ms });
 }
 
 #[unsafe(no_mangle)]
@@ -72,7 +72,7 @@ unsafe extern "C" fn plant_st_get_revup_data(
 ) {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
-    let RevupPhase { speed_rpm, torque_s16a, duration_ms } = drive.revup(motor, phase);
+    let RevupPhase { speed_rpm, torque_s16a, duration_ms } = drive.get_revup_data(motor, phase);
     // SAFETY: the contract of the crate.
     unsafe { *data = motorlink_st_revup_phase { speed_rpm, torque_s16a, duration_ms } };
 }
@@ -88,7 +88,7 @@ unsafe extern "C" fn plant_st_set_revup_data(
     let (drive, motor) = unsafe { drive(context, motor) };
     // SAFETY: the contract of the crate.
     let motorlink_st_revup_phase { speed_rpm, torque_s16a, duration_ms } = unsafe { *data };
-    drive.set_revup(motor, phase, RevupPhase { speed_rpm, torque_s16a, duration_ms });
+    drive.set_revup_data(motor, phase, RevupPhase { speed_rpm, torque_s16a, duration_ms });
 }
 
 #[unsafe(no_mangle)]
@@ -100,7 +100,7 @@ unsafe extern "C" fn plant_st_set_current_reference(
 ) {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
-    drive.current_reference(motor, CurrentReference { iq_s16a: iq, id_s16a: id });
+    drive.set_current_reference(motor, CurrentReference { iq_s16a: iq, id_s16a: id });
 }
 
 #[unsafe(no_mangle)]
@@ -112,7 +112,7 @@ unsafe extern "C" fn plant_st_set_torque_ramp(
 ) {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
-    drive.torque_ramp(motor, TorqueRamp { torque_s16a, duration_ms });
+    drive.set_torque_ramp(motor, TorqueRamp { torque_s16a, duration_ms });
 }
 
 #[unsafe(no_mangle)]
@@ -124,5 +124,5 @@ unsafe extern "C" fn plant_st_set_position(
 ) {
     // SAFETY: the contract of the crate.
     let (drive, motor) = unsafe { drive(context, motor) };
-    drive.position(motor, PositionMove { angle_rad, duration_s });
+    drive.set_position(motor, PositionMove { angle_rad, duration_s });
 }

@@ -40,10 +40,10 @@ impl MotorControl for Memory {
     fn version(&self) -> Version<'_> {
         Version { name: "ST MC SDK", major: 5, minor: 4, patch: 3, pre_release: "" }
     }
-    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
+    fn get_register(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         *self.slot(motor, register)
     }
-    fn write(
+    fn set_register(
         &mut self,
         motor: MotorNumber,
         register: RegisterId,
@@ -56,23 +56,23 @@ impl MotorControl for Memory {
     fn execute(&mut self, _: MotorNumber, _: Command) {
         self.acts += 1;
     }
-    fn ramp(&mut self, _: MotorNumber, _: Ramp) {
+    fn set_ramp(&mut self, _: MotorNumber, _: Ramp) {
         self.acts += 1;
     }
-    fn revup(&mut self, _: MotorNumber, phase: u8) -> RevupPhase {
+    fn get_revup_data(&mut self, _: MotorNumber, phase: u8) -> RevupPhase {
         self.revup[usize::from(phase)]
     }
-    fn set_revup(&mut self, _: MotorNumber, phase: u8, data: RevupPhase) {
+    fn set_revup_data(&mut self, _: MotorNumber, phase: u8, data: RevupPhase) {
         self.acts += 1;
         self.revup[usize::from(phase)] = data;
     }
-    fn current_reference(&mut self, _: MotorNumber, _: CurrentReference) {
+    fn set_current_reference(&mut self, _: MotorNumber, _: CurrentReference) {
         self.acts += 1;
     }
-    fn torque_ramp(&mut self, _: MotorNumber, _: TorqueRamp) {
+    fn set_torque_ramp(&mut self, _: MotorNumber, _: TorqueRamp) {
         self.acts += 1;
     }
-    fn position(&mut self, _: MotorNumber, _: PositionMove) {
+    fn set_position(&mut self, _: MotorNumber, _: PositionMove) {
         self.acts += 1;
     }
 }

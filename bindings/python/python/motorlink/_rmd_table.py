@@ -199,7 +199,7 @@ class Request(_core.RmdRequest):
 
     @staticmethod
     def write_zero_rom() -> Request:
-        """Makes the current position the zero from the next power-on on.
+        """Makes the current position the zero effective after the next power cycle.
 
         0x19: Write current position to ROM as motor zero position command.
         Gives the offset.
@@ -440,7 +440,7 @@ class MotorCommands:
 
     @both_apis
     def write_zero_rom(self) -> Exchanges[int]:
-        """Makes the current position the zero from the next power-on on.
+        """Makes the current position the zero effective after the next power cycle.
 
         0x19: Write current position to ROM as motor zero position command.
         Gives the offset.

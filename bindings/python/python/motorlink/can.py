@@ -30,7 +30,7 @@ def from_python_can(bus: Any) -> CanPort:
 
     ``bus`` stays the caller's: opened at 1 Mbit/s before, shut down afterwards, and in a process that
     was forked it is the caller who has to close it. Nothing else may receive
-    from it meanwhile, no ``can.Notifier`` either: what one receives the other misses. Until the bus of
+    from it meanwhile, no ``can.Notifier`` either: what one receives the other misses. Until the client of
     :func:`motorlink.rmd.open` is closed, one thread calls ``bus.recv`` and another one ``bus.send``.
 
     Where the bus raises, the exchange fails (``LinkError``, with what was raised as its cause). The next

@@ -13,7 +13,7 @@ until it is told what full scale is: ``full_scale_amps=17.5`` makes A of them.
 Every method of a motor is one exchange unless it says otherwise, and raises
 
 * ``RefusedError`` where the drive says no (table 2 of the document),
-* ``ReplyTimeoutError`` and ``LinkError`` where there is no answer to trust: nobody knows what the drive did,
+* ``ReplyTimeoutError`` and ``LinkError`` where there is no answer to trust: it is unknown whether the drive did it,
 * ``InvalidValueError`` where nothing was sent: no such motor, out of range, over a limit; of a register that
   nobody knows, its subclass ``errors.UnknownRegisterError``, which is a ``KeyError``, too,
 * ``ClosedError`` after ``client.close()``.

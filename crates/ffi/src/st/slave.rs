@@ -164,12 +164,12 @@ impl MotorControl for Kept<motorlink_st_motor_control> {
         Version { name, major, minor, patch, pre_release }
     }
 
-    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
+    fn get_register(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         let drive = self.now();
         drive.get_register.map_or(0, |call| call(drive.context, motor.number(), register.0))
     }
 
-    fn write(
+    fn set_register(
         &mut self,
         motor: MotorNumber,
         register: RegisterId,
@@ -190,14 +190,14 @@ impl MotorControl for Kept<motorlink_st_motor_control> {
         }
     }
 
-    fn ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
+    fn set_ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
         let drive = self.now();
         if let Some(call) = drive.set_ramp {
             call(drive.context, motor.number(), ramp.speed_rpm, ramp.duration_ms);
         }
     }
 
-    fn revup(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
+    fn get_revup_data(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
         let drive = self.now();
         let mut data = motorlink_st_revup_phase::from(RevupPhase::default());
         if let Some(call) = drive.get_revup_data {
@@ -206,28 +206,28 @@ impl MotorControl for Kept<motorlink_st_motor_control> {
         data.into()
     }
 
-    fn set_revup(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
+    fn set_revup_data(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
         let drive = self.now();
         if let Some(call) = drive.set_revup_data {
             call(drive.context, motor.number(), phase, &motorlink_st_revup_phase::from(data));
         }
     }
 
-    fn current_reference(&mut self, motor: MotorNumber, reference: CurrentReference) {
+    fn set_current_reference(&mut self, motor: MotorNumber, reference: CurrentReference) {
         let drive = self.now();
         if let Some(call) = drive.set_current_reference {
             call(drive.context, motor.number(), reference.iq_s16a, reference.id_s16a);
         }
     }
 
-    fn torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
+    fn set_torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
         let drive = self.now();
         if let Some(call) = drive.set_torque_ramp {
             call(drive.context, motor.number(), ramp.torque_s16a, ramp.duration_ms);
         }
     }
 
-    fn position(&mut self, motor: MotorNumber, target: PositionMove) {
+    fn set_position(&mut self, motor: MotorNumber, target: PositionMove) {
         let drive = self.now();
         if let Some(call) = drive.set_position {
             call(drive.context, motor.number(), target.angle_rad, target.duration_s);

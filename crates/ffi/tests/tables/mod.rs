@@ -273,7 +273,7 @@ typedef uint8_t NAME;
 #endif
 ";
 
-/// `FluxWeakening` as `FLUX_WEAKENING`, `ReadStatus` as `READ_STATUS_1`.
+/// `FluxWeakening` as `FLUX_WEAKENING`, `ReadStatus` as `READ_STATUS`.
 fn screaming(camel: &str) -> String {
     let mut out = String::new();
     for (index, letter) in camel.char_indices() {

@@ -7,7 +7,7 @@ use motorlink_link::port::{CanLink, EventCan, PortError, PortName};
 use motorlink_link::reopening::{FULL, LinkState, Opener, Reopening};
 use motorlink_proto::rmd::{Counters, Limits, MotorId, MotorSet, SetTorque4};
 
-use super::bus::Driven;
+use super::client::Driven;
 use super::session::SessionOutput;
 use super::{Client, Error, Options};
 

@@ -12,7 +12,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod bus;
+mod client;
 mod error;
 mod event;
 pub(crate) mod follow;
@@ -25,7 +25,7 @@ mod stop_on_drop;
 pub use motorlink_proto::rmd::*;
 pub use motorlink_proto::units::*;
 
-pub use bus::{Client, SCAN_WIDTH, ScanResult};
+pub use client::{Client, SCAN_WIDTH, ScanResult};
 pub use error::Error;
 pub use event::EventClient;
 pub use full_turn::FullTurn;

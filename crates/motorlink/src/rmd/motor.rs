@@ -87,7 +87,7 @@ impl Motor<'_> {
         self.ask(WriteEncoderOffsetRom(EncoderOffset { offset })).map(|reply| reply.offset)
     }
 
-    /// Makes the current position the zero from the next power-on on (0x19); gives the new offset.
+    /// Makes the current position the zero effective after the next power cycle (0x19); gives the new offset.
     /// Wears the ROM.
     pub fn write_zero_rom(&self) -> Result<u16, Error> {
         self.ask(WriteZeroRom).map(|reply| reply.offset)

@@ -234,7 +234,7 @@ commands! { $
     0x19 write_zero_rom WriteZeroRom -> EncoderOffset [rom] V1_62
         "Write current position to ROM as motor zero command",
         "Write current position to ROM as motor zero position command",
-        "makes the current position the zero from the next power-on on";
+        "makes the current position the zero effective after the next power cycle";
     0x92 read_multi_turn_angle ReadMultiTurnAngle -> MultiTurnAngle [sampled] V1_62
         "Read multi turns angle command", "Read multi turns angle command",
         "reads the angle over all turns";

@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
-    fn the_circle_angle_is_the_multi_turn_angle_modulo_a_turn() {
+    fn the_single_turn_angle_is_the_multi_turn_angle_modulo_a_turn() {
         for bits in widths() {
             for counts in (-3_000_000..3_000_000).step_by(9973) {
                 let multi = bits.multi_turn(counts).0.rem_euclid(36_000);

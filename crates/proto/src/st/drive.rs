@@ -51,11 +51,11 @@ pub trait MotorControl {
 
     /// The value of a register that exists with [`features`](Self::features). TARGET_MOTOR never
     /// comes here: the slave keeps it.
-    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32;
+    fn get_register(&mut self, motor: MotorNumber, register: RegisterId) -> i32;
 
     /// Writes a register that may be written. A value that the register cannot take is
     /// [`ErrorCode::WrongSet`].
-    fn write(
+    fn set_register(
         &mut self,
         motor: MotorNumber,
         register: RegisterId,
@@ -66,24 +66,24 @@ pub trait MotorControl {
     fn execute(&mut self, motor: MotorNumber, command: Command);
 
     /// Programs a speed ramp: at once in RUN, else when RUN is reached (4.8).
-    fn ramp(&mut self, motor: MotorNumber, ramp: Ramp);
+    fn set_ramp(&mut self, motor: MotorNumber, ramp: Ramp);
 
     /// The data of rev-up phase 0 to 4 (4.9).
-    fn revup(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase;
+    fn get_revup_data(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase;
 
     /// Sets the data of rev-up phase 0 to 4 (4.10).
-    fn set_revup(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase);
+    fn set_revup_data(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase);
 
     /// Sets the current references: at once in RUN, else when RUN is reached (4.11).
-    fn current_reference(&mut self, motor: MotorNumber, reference: CurrentReference);
+    fn set_current_reference(&mut self, motor: MotorNumber, reference: CurrentReference);
 
     /// Programs a torque ramp: at once in RUN, else when RUN is reached. Only profile `mcsdk-5.4`
     /// has it; unless it is implemented it is acknowledged without effect.
-    fn torque_ramp(&mut self, _motor: MotorNumber, _ramp: TorqueRamp) {}
+    fn set_torque_ramp(&mut self, _motor: MotorNumber, _ramp: TorqueRamp) {}
 
     /// Moves to an angle in a given time; only in profile `mcsdk-5.4`, for a motor with
     /// [`Feature::PositionControl`](super::Feature::PositionControl).
-    fn position(&mut self, _motor: MotorNumber, _target: PositionMove) {}
+    fn set_position(&mut self, _motor: MotorNumber, _target: PositionMove) {}
 
     /// Registers that a step of the motor profiler shows; only with
     /// [`Feature::Profiler`](super::Feature::Profiler).

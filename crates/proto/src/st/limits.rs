@@ -197,7 +197,7 @@ impl fmt::Display for LimitError {
             LimitError::NoRamp { limit_rpm } => write!(
                 f,
                 "a start goes to the drive's own speed unless a ramp within the limit of {limit_rpm} rpm \
-                 was acknowledged before; nothing was sent; first `ramp(...)` within the limit, for this \
+                 was acknowledged before; nothing was sent; first set a ramp within the limit, for this \
                  motor by its number"
             ),
         }

@@ -23,7 +23,7 @@
 //!         Version { name: "Fan", major: 1, minor: 0, patch: 0, pre_release: "" }
 //!     }
 //!     // Registers that this drive has nothing to say about read as 0.
-//!     fn read(&mut self, _: MotorNumber, register: RegisterId) -> i32 {
+//!     fn get_register(&mut self, _: MotorNumber, register: RegisterId) -> i32 {
 //!         match register {
 //!             RegisterId::STATUS if self.running => u8::from(Status::Run).into(),
 //!             RegisterId::STATUS => u8::from(Status::Idle).into(),
@@ -31,7 +31,7 @@
 //!             _ => 0,
 //!         }
 //!     }
-//!     fn write(&mut self, _: MotorNumber, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
+//!     fn set_register(&mut self, _: MotorNumber, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
 //!         Err(ErrorCode::WrongSet)
 //!     }
 //!     fn execute(&mut self, _: MotorNumber, command: Command) {
@@ -41,10 +41,10 @@
 //!             _ => {}
 //!         }
 //!     }
-//!     fn ramp(&mut self, _: MotorNumber, ramp: Ramp) { self.rpm = ramp.speed_rpm; }
-//!     fn revup(&mut self, _: MotorNumber, _: u8) -> RevupPhase { RevupPhase::default() }
-//!     fn set_revup(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
-//!     fn current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
+//!     fn set_ramp(&mut self, _: MotorNumber, ramp: Ramp) { self.rpm = ramp.speed_rpm; }
+//!     fn get_revup_data(&mut self, _: MotorNumber, _: u8) -> RevupPhase { RevupPhase::default() }
+//!     fn set_revup_data(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
+//!     fn set_current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
 //! }
 //!
 //! let mut fan = Fan { rpm: 0, running: false };

@@ -181,19 +181,21 @@ impl Slave {
             Request::GetFirmwareVersion => FirmwareVersion::encode(&drive.version(), &mut out),
             Request::SetRamp(mut ramp) => {
                 ramp.speed_rpm = speed(self.profile, ramp.speed_rpm);
-                drive.ramp(motor, ramp);
+                drive.set_ramp(motor, ramp);
             }
             Request::GetRevupData(phase) => {
                 let phase = revup_phase(phase)?;
-                let mut data = drive.revup(motor, phase);
+                let mut data = drive.get_revup_data(motor, phase);
                 data.speed_rpm = speed(self.profile, data.speed_rpm);
                 out.bytes(&data.to_bytes());
             }
             Request::SetRevupData(phase, mut data) => {
                 data.speed_rpm = speed(self.profile, data.speed_rpm);
-                drive.set_revup(motor, revup_phase(phase)?, data);
+                drive.set_revup_data(motor, revup_phase(phase)?, data);
             }
-            Request::SetCurrentReference(reference) => drive.current_reference(motor, reference),
+            Request::SetCurrentReference(reference) => {
+                drive.set_current_reference(motor, reference)
+            }
             Request::GetProfilerInfo(steps) => {
                 if !features.has(Feature::Profiler) {
                     return Err(ErrorCode::MpNotEnabled);
@@ -221,8 +223,8 @@ impl Slave {
                 let chosen = Segment::of(registers).filter(|_| registers.iter().all(fits));
                 *slot.ok_or(ErrorCode::WrongSet)? = chosen.ok_or(ErrorCode::WrongSet)?;
             }
-            Request::SetTorqueRamp(ramp) => drive.torque_ramp(motor, ramp),
-            Request::SetPosition(target) => drive.position(motor, target),
+            Request::SetTorqueRamp(ramp) => drive.set_torque_ramp(motor, ramp),
+            Request::SetPosition(target) => drive.set_position(motor, target),
         }
         out.finish().ok_or(ErrorCode::WrongSet)
     }
@@ -269,7 +271,7 @@ impl Slave {
             RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
                 let shown = RegisterId(bits as u8);
                 if shown.shape().is_some_and(|shape| shape.shows_on_dac(features)) {
-                    return drive.write(motor, register, bits);
+                    return drive.set_register(motor, register, bits);
                 }
                 // Firmware acknowledges what it cannot show; the document's slave says so.
                 match self.profile {
@@ -277,7 +279,7 @@ impl Slave {
                     Profile::Mcsdk54 => Ok(()),
                 }
             }
-            _ => drive.write(motor, register, to_drive(self.profile, shape, bits)),
+            _ => drive.set_register(motor, register, to_drive(self.profile, shape, bits)),
         }
     }
 
@@ -331,7 +333,7 @@ fn read(
     if register == RegisterId::TARGET_MOTOR {
         return i32::from(motor.number() - 1);
     }
-    let bits = drive.read(motor, register);
+    let bits = drive.get_register(motor, register);
     match (profile, shape.unit) {
         (Profile::Spec, Unit::Percent) => bits / 10,
         // Table 3 has no sign for some values that can be negative (SPEC-NOTES S23).

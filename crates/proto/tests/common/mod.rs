@@ -47,10 +47,10 @@ impl MotorControl for Memory {
     fn version(&self) -> Version<'_> {
         Version { name: "ST MC SDK", major: 5, minor: 4, patch: 3, pre_release: "" }
     }
-    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
+    fn get_register(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         self.value(motor.number(), register)
     }
-    fn write(
+    fn set_register(
         &mut self,
         motor: MotorNumber,
         register: RegisterId,
@@ -62,23 +62,23 @@ impl MotorControl for Memory {
     fn execute(&mut self, motor: MotorNumber, command: Command) {
         self.log.push(format!("{command} {}", motor.number()));
     }
-    fn ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
+    fn set_ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
         self.log.push(format!("ramp {} {} {}", motor.number(), ramp.speed_rpm, ramp.duration_ms));
     }
-    fn revup(&mut self, _: MotorNumber, phase: u8) -> RevupPhase {
+    fn get_revup_data(&mut self, _: MotorNumber, phase: u8) -> RevupPhase {
         self.revup[usize::from(phase)]
     }
-    fn set_revup(&mut self, _: MotorNumber, phase: u8, data: RevupPhase) {
+    fn set_revup_data(&mut self, _: MotorNumber, phase: u8, data: RevupPhase) {
         self.revup[usize::from(phase)] = data;
     }
-    fn current_reference(&mut self, motor: MotorNumber, r: CurrentReference) {
+    fn set_current_reference(&mut self, motor: MotorNumber, r: CurrentReference) {
         self.log.push(format!("current {} {} {}", motor.number(), r.iq_s16a, r.id_s16a));
     }
-    fn torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
+    fn set_torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
         let TorqueRamp { torque_s16a, duration_ms } = ramp;
         self.log.push(format!("torque ramp {} {torque_s16a} {duration_ms}", motor.number()));
     }
-    fn position(&mut self, motor: MotorNumber, target: PositionMove) {
+    fn set_position(&mut self, motor: MotorNumber, target: PositionMove) {
         let PositionMove { angle_rad, duration_s } = target;
         self.log.push(format!("position {} {angle_rad} {duration_s}", motor.number()));
     }

@@ -71,10 +71,10 @@ impl MotorControl for Plant {
     fn version(&self) -> Version<'_> {
         Version { name: "ST MC SDK", major: 5, minor: 4, patch: 3, pre_release: "RC2" }
     }
-    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
+    fn get_register(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         self.value(motor.number(), register.0)
     }
-    fn write(
+    fn set_register(
         &mut self,
         motor: MotorNumber,
         register: RegisterId,
@@ -85,22 +85,22 @@ impl MotorControl for Plant {
     fn execute(&mut self, motor: MotorNumber, command: Command) {
         self.note(motor.number(), ("command", command.number()));
     }
-    fn ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
+    fn set_ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
         self.note(motor.number(), ramp);
     }
-    fn revup(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
+    fn get_revup_data(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
         self.phase(motor.number(), phase)
     }
-    fn set_revup(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
+    fn set_revup_data(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
         self.set_phase(motor.number(), phase, data);
     }
-    fn current_reference(&mut self, motor: MotorNumber, reference: CurrentReference) {
+    fn set_current_reference(&mut self, motor: MotorNumber, reference: CurrentReference) {
         self.note(motor.number(), reference);
     }
-    fn torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
+    fn set_torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
         self.note(motor.number(), ramp);
     }
-    fn position(&mut self, motor: MotorNumber, target: PositionMove) {
+    fn set_position(&mut self, motor: MotorNumber, target: PositionMove) {
         self.note(motor.number(), target);
     }
     fn profiler_step(&self, _: MotorNumber, step: u8) -> &[u8] {

@@ -74,11 +74,11 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> MotorControl for StDrive<M> {
         Version { name: "ST MC SDK", major: 5, minor: 4, patch: 4, pre_release: "" }
     }
 
-    fn read(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
+    fn get_register(&mut self, motor: MotorNumber, register: RegisterId) -> i32 {
         self.motor(motor).read(register)
     }
 
-    fn write(
+    fn set_register(
         &mut self,
         motor: MotorNumber,
         register: RegisterId,
@@ -91,33 +91,33 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> MotorControl for StDrive<M> {
         self.motor(motor).execute(command);
     }
 
-    fn ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
+    fn set_ramp(&mut self, motor: MotorNumber, ramp: Ramp) {
         self.motor(motor).ramp(ramp);
     }
 
-    fn revup(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
+    fn get_revup_data(&mut self, motor: MotorNumber, phase: u8) -> RevupPhase {
         let phases = &self.motor(motor).firmware.revup;
         phases.get(usize::from(phase)).copied().unwrap_or_default()
     }
 
-    fn set_revup(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
+    fn set_revup_data(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase) {
         let phases = &mut self.motor(motor).firmware.revup;
         if let Some(slot) = phases.get_mut(usize::from(phase)) {
             *slot = data;
         }
     }
 
-    fn current_reference(&mut self, motor: MotorNumber, reference: CurrentReference) {
+    fn set_current_reference(&mut self, motor: MotorNumber, reference: CurrentReference) {
         self.motor(motor).currents(reference);
     }
 
-    fn torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
+    fn set_torque_ramp(&mut self, motor: MotorNumber, ramp: TorqueRamp) {
         let motor = self.motor(motor);
         let id = motor.flux_reference() as i16;
         motor.torque(ramp, id);
     }
 
-    fn position(&mut self, motor: MotorNumber, target: PositionMove) {
+    fn set_position(&mut self, motor: MotorNumber, target: PositionMove) {
         self.motor(motor).position(target);
     }
 }

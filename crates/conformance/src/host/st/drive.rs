@@ -169,7 +169,7 @@ impl motorlink_proto::st::MotorControl for Engine {
         Version { name: "Adversary", major: 1, minor: 0, patch: 0, pre_release: "" }
     }
 
-    fn read(&mut self, _: MotorNumber, register: RegisterId) -> i32 {
+    fn get_register(&mut self, _: MotorNumber, register: RegisterId) -> i32 {
         match register {
             RegisterId::SPEED_MEAS => {
                 self.readings += 1;
@@ -181,7 +181,7 @@ impl motorlink_proto::st::MotorControl for Engine {
         }
     }
 
-    fn write(&mut self, _: MotorNumber, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
+    fn set_register(&mut self, _: MotorNumber, _: RegisterId, _: i32) -> Result<(), ErrorCode> {
         Ok(())
     }
 
@@ -191,13 +191,13 @@ impl motorlink_proto::st::MotorControl for Engine {
         }
     }
 
-    fn ramp(&mut self, _: MotorNumber, _: Ramp) {}
+    fn set_ramp(&mut self, _: MotorNumber, _: Ramp) {}
 
-    fn revup(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
+    fn get_revup_data(&mut self, _: MotorNumber, _: u8) -> RevupPhase {
         RevupPhase::default()
     }
 
-    fn set_revup(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
+    fn set_revup_data(&mut self, _: MotorNumber, _: u8, _: RevupPhase) {}
 
-    fn current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
+    fn set_current_reference(&mut self, _: MotorNumber, _: CurrentReference) {}
 }
