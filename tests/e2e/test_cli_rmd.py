@@ -319,6 +319,10 @@ def test_torque4_tells_what_answered_and_that_a_motor_did_not(run, sim, tmp_path
     ]
     assert partly.lines[1]["error"]["kind"] == "silent"
     assert "motor 2" in partly.err
+    told = on(run, port)("torque4", 0, 0, 0, 0).ended(3)
+    assert [line.split()[1] for line in told.out.splitlines()] == ["1", "3"]
+    two, four = told.err.splitlines()
+    assert "motor 2 does not answer" in two and "motor 4 does not answer" in four
 
 
 def test_a_can_interface_that_is_absent_is_told(run):

@@ -40,6 +40,12 @@ def test_status_has_a_value_and_its_unit_or_name(st):
     assert "325 V" in st("status").ended(0).out
 
 
+def test_a_raw_status_has_digits_only(st):
+    rows = st("--raw", "status").ended(0).out.splitlines()
+    assert len(rows) == 10
+    assert all(row.split()[1].lstrip("-").isdigit() and len(row.split()) == 2 for row in rows), rows
+
+
 @on_every_port
 def test_get_reads_registers_by_name_and_by_number(st):
     values = st("--json", "get", "MIN_APP_SPEED", "0x3F").ended(0).json["values"]

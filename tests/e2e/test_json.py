@@ -2,13 +2,14 @@
 
 import json
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
 from jsonschema import Draft202012Validator
 
-from peers import device
-from program import eventually
+from peers import device, slcan_adapter
+from program import environment, eventually
 
 DOCS = Path(__file__).parents[2] / "docs"
 SCHEMA = json.loads((DOCS / "json.schema.json").read_text())
@@ -19,7 +20,7 @@ ST = [
     *("info", "status", "registers", "get SPEED_MEAS FLAGS STATUS DAC_OUT1 0x3F", "segment SPEED_MEAS I_A"),
     *("set SPEED_KP 3", "set SPEED_KP 3 --verify", "start", "stop", "start-stop", "stop-ramp", "ramp 100 100"),
     *("revup-data", "revup-data 1 500 200 250", "current-reference 100 -5", "fault-ack", "encoder-align", "iqdref-clear"),
-    *("pfc enable", "raw 02 40", "get SPEED_MEAS --every 5ms --count 2", "--raw get SPEED_MEAS FLAGS"),
+    *("pfc enable", "raw 02 40", "get SPEED_MEAS --every 5ms --count 2", "--raw get SPEED_MEAS FLAGS", "--raw revup-data"),
 ]
 #: What the other profile has.
 MCSDK = ["torque-ramp 100 50", "position 1.5 0.5", "get FLUXWK_BUS SC_RS", "status"]
@@ -130,6 +131,14 @@ def test_a_failure_is_an_object_on_stderr(checked, words, code, error):
     assert line["error"].items() >= error.items()
 
 
+def test_revup_data_has_digits(checked):
+    phases, _ = checked("st", "-p", "sim:", "--raw", "revup-data")
+    assert len(phases) == 5
+    for phase in phases:
+        assert list(phase["values"]) == ["speed", "torque", "duration"]
+        assert all(list(value) == ["digits"] for value in phase["values"].values())
+
+
 def test_a_silent_drive_is_told(checked, tmp_path):
     with device(tmp_path / "silent") as port:
         for command in ("info", "status", "start", "revup-data", "raw 02 40"):
@@ -138,6 +147,29 @@ def test_a_silent_drive_is_told(checked, tmp_path):
             assert err[0]["error"]["port"] == f"serial:{port}"
         out, _ = checked("st", "-p", port, "--timeout", 50, "scan", 115200, code=3)
         assert [line["finding"] for line in out] == ["silence"]
+
+
+@pytest.mark.parametrize(
+    "deliver, command",
+    [(lambda frame: [frame], "status"), (lambda frame: [frame[:-1] + "1"], "acceleration 9")],
+)
+def test_an_adapter_that_echoes_and_a_damaged_reply_are_no_silence(checked, tmp_path, deliver, command):
+    with device(tmp_path / "can", slcan_adapter(deliver)) as link:
+        _, err = checked("rmd", "-p", f"slcan:{link}", *command.split(), code=3)
+    error = err[0]["error"]
+    assert (error["kind"], error["motor"], error["port"]) == ("link", 1, f"slcan:{link}")
+
+
+@pytest.mark.parametrize("words", ["st -p sim: info", "rmd -p sim: status", "st registers"])
+def test_a_full_disk_is_not_the_ports_failure(motorlink, words):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [motorlink, *words.split(), "--json"],
+            **{"stdout": full, "stderr": subprocess.PIPE, "text": True, "env": environment()},
+        )
+    (line,) = check(done.stderr)
+    assert done.returncode == line["exit"] == 3
+    assert line["error"]["kind"] == "output" and "port" not in line["error"]
 
 
 def test_a_scan_for_rates_tells_what_it_found(checked, drives):

@@ -16,7 +16,7 @@ pub struct Connection {
     /// Print JSON, an object a line
     #[arg(long, global = true)]
     json: bool,
-    /// Take and print values as the digits that travel instead of physical units
+    /// Take and print values as raw protocol values instead of physical units
     #[arg(long, global = true)]
     pub raw: bool,
     /// Show every frame on stderr

@@ -39,8 +39,10 @@ pub enum Kind {
     Usage,
     /// The connection failed.
     Link,
-    /// One motor does not answer, which says nothing about the connection.
+    /// One motor does not answer, or answers something else, which says nothing about the connection.
     Silent,
+    /// The output cannot be written.
+    Output,
 }
 
 impl Kind {
@@ -48,7 +50,7 @@ impl Kind {
         match self {
             Kind::Refused => 1,
             Kind::Usage => 2,
-            Kind::Link | Kind::Silent => 3,
+            Kind::Link | Kind::Silent | Kind::Output => 3,
         }
     }
 
@@ -58,6 +60,7 @@ impl Kind {
             Kind::Usage => "usage",
             Kind::Link => "link",
             Kind::Silent => "silent",
+            Kind::Output => "output",
         }
     }
 }
@@ -73,6 +76,14 @@ impl Failure {
 
     pub fn link(message: impl Into<String>) -> Self {
         Problem::new(Kind::Link, message).into()
+    }
+
+    /// After stdout could not be written.
+    pub fn output(error: &std::io::Error) -> Self {
+        match error.kind() {
+            std::io::ErrorKind::BrokenPipe => Failure::OutputClosed,
+            _ => Problem::new(Kind::Output, format!("stdout cannot be written: {error}")).into(),
+        }
     }
 
     /// With what to try.
@@ -92,10 +103,12 @@ impl Failure {
         }
     }
 
-    /// With its port and, if a motor refused or is silent, the motor that was meant, unless it names
+    /// With its port, unless it is about the output, and, if a motor refused or is silent, the motor that was meant, unless it names
     /// another.
     pub fn about(mut self, port: &str, motor: u8) -> Self {
-        if let Failure::Failed(problem) = &mut self {
+        if let Failure::Failed(problem) = &mut self
+            && problem.kind != Kind::Output
+        {
             problem.fact("port", port);
             if matches!(problem.kind, Kind::Refused | Kind::Silent) {
                 problem.motor(motor);
@@ -194,6 +207,7 @@ impl From<rmd::Error> for Failure {
         use rmd::Error::*;
         let kind = match &error {
             Port(error) => return error.into(),
+            Echo { .. } | Altered { .. } => Kind::Link,
             error if error.is_line_failure() => Kind::Silent,
             _ => Kind::Usage,
         };

@@ -6,6 +6,7 @@ use clap::Command;
 use motorlink::port::{Carries, schemes};
 
 use crate::failure::Failure;
+use crate::output::print_line;
 
 /// Behind `motorlink --help`.
 pub const EXIT_CODES: &str = "\
@@ -71,6 +72,5 @@ turn.";
 pub fn write_manual(command: Command, folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)?;
     clap_mangen::generate_to(command, folder)?;
-    println!("{}", folder.join("motorlink.1").display());
-    Ok(())
+    print_line(&folder.join("motorlink.1").display())
 }

@@ -20,6 +20,12 @@ impl Row {
         Row { name: name.to_owned(), text: value.to_string(), value: json!({ "value": value }) }
     }
 
+    /// The integer on the wire.
+    pub fn digits(name: &str, digits: i64) -> Self {
+        let value = json!({ "digits": digits });
+        Row { name: name.to_owned(), text: digits.to_string(), value }
+    }
+
     /// A value in a unit.
     pub fn quantity(name: &str, value: f64, decimals: u8, unit: &str) -> Self {
         let text = format!("{value:.*} {unit}", usize::from(decimals));
@@ -80,9 +86,8 @@ impl From<Line> for Value {
 /// A field of a message, as the command table has it.
 pub fn field(field: &Field, data: &[u8; 8], raw: bool) -> Row {
     let digits = field.raw(data);
-    let name = field.name.to_owned();
     if raw {
-        return Row { name, text: digits.to_string(), value: json!({ "digits": digits }) };
+        return Row::digits(field.name, digits);
     }
     let text = field.shown(data).to_string();
     let value = match field.meaning {
@@ -96,7 +101,7 @@ pub fn field(field: &Field, data: &[u8; 8], raw: bool) -> Row {
             quantity(field.value(data), decimals, symbol)
         }
     };
-    Row { name, text, value }
+    Row { name: field.name.to_owned(), text, value }
 }
 
 /// A register that was read, with `text` for people.
@@ -132,16 +137,32 @@ fn measured(value: Value, unit: &str) -> Value {
     }
 }
 
-/// An integer if there are no decimals.
+/// The number that the text has; an integer if there are no decimals.
 fn number(value: f64, decimals: u8) -> Value {
-    if decimals == 0 {
-        return json!(value.round() as i64);
-    }
-    let scale = 10f64.powi(decimals.into());
-    json!((value * scale).round() / scale)
+    let text = format!("{value:.*}", usize::from(decimals));
+    let shown: f64 = text.parse().expect("a float reads back");
+    if decimals == 0 { json!(shown as i64) } else { json!(shown) }
 }
 
 /// The fewest digits that say which `f32` it is.
 fn shortest(value: f32) -> Value {
     json!(value.to_string().parse::<f64>().ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use motorlink::rmd::{Payload, PhaseCurrents};
+
+    use super::*;
+
+    #[test]
+    fn text_and_json_have_the_same_number() {
+        let [phase, ..] = PhaseCurrents::FIELDS else { panic!("there is no phase") };
+        for digits in i16::MIN..=i16::MAX {
+            let [low, high] = digits.to_le_bytes();
+            let row = field(phase, &[0x9D, 0, low, high, 0, 0, 0, 0], false);
+            let text = row.text.strip_suffix(" A").unwrap();
+            assert_eq!(text.parse().ok(), row.value["value"].as_f64(), "{digits}");
+        }
+    }
 }

@@ -141,9 +141,7 @@ pub fn print_line(text: &dyn std::fmt::Display) -> Result<(), Failure> {
         return Ok(());
     }
     let mut out = stdout().lock();
-    writeln!(out, "{text}")?;
-    out.flush()?;
-    Ok(())
+    writeln!(out, "{text}").and_then(|()| out.flush()).map_err(|error| Failure::output(&error))
 }
 
 /// A bar on stderr for a scan of `steps` steps; nothing where stderr is no terminal.

@@ -27,7 +27,8 @@ const SIGNAL_PERIOD: Duration = Duration::from_millis(50);
 #[command(
     args_conflicts_with_subcommands = true,
     after_help = "\
-Without `st` or `rmd` it guards an ST drive; options go behind that word.
+Without `st` or `rmd` it guards an ST drive; options go behind that word. `motorlink guard rmd --help` \
+has more options.
 
 ST's protocol has no watchdog: a drive that was told START_MOTOR turns until it is told STOP_MOTOR, \
 whatever became of the program that started it. An RMD motor goes on until its shutdown time, if the \
@@ -43,9 +44,9 @@ no effect, the guard's count.
 What it cannot do: stop a motor when the guard itself is killed with SIGKILL, when the cable to the \
 drive is cut, or when the machine stops. Whoever may get hurt needs an emergency stop in hardware.
 
-One JSON line a served port on stdout says that it can be opened; with --json, so is what happens. \
-What nobody reads is dropped. Every signal that asks for the end stops the motors and then ends it: \
-exit code 0, or 3 if a motor did not say that it stops. contrib/ has a unit for systemd."
+Prints one JSON line per port once it is ready; with --json, also one for each thing that happens. \
+Output that is not read is dropped. Every signal that asks for the end stops the motors and then ends \
+it: exit code 0, or 3 if a motor did not say that it stops. contrib/ has a unit for systemd."
 )]
 pub struct Args {
     #[command(subcommand)]

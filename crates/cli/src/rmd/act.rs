@@ -8,7 +8,7 @@ use motorlink::rmd::{
 use super::args::{self, Act, MaxSpeed};
 use super::session::Session;
 use crate::failure::Failure;
-use crate::output::{hex, parse_hex};
+use crate::output::{hex, parse_hex, report};
 
 pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     let motor = session.motor()?;
@@ -30,7 +30,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             session.rom("setting the zero")?;
             let offset = motor.write_zero_rom()?;
             session.output.result(
-                format!("motor {id} has its zero here from the next power-on on (offset {offset})"),
+                format!("motor {id} has its zero here (offset {offset}), effective after the next power cycle"),
                 session.line(session.id).ok(true).values(&session.rows(&EncoderOffset { offset })),
             )
         }
@@ -142,7 +142,7 @@ fn set_torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
         *slot = wanted(session, amps)?;
     }
     let replies = session.bus.set_torque4(SetTorque4(torques), MotorSet::TORQUE4)?;
-    let mut silent = None;
+    let mut failures = Vec::new();
     for (reply, id) in replies.into_iter().zip(1..) {
         let object = session.line(id);
         match reply {
@@ -157,12 +157,16 @@ fn set_torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
                 if session.output.json {
                     session.output.result("", object.failed(&failure))?;
                 }
-                silent.get_or_insert(failure);
+                failures.push(failure);
             }
             None => {}
         }
     }
-    silent.map_or(Ok(()), Err)
+    // A program has each in its results.
+    while !session.output.json && failures.len() > 1 {
+        report(&failures.remove(0));
+    }
+    failures.into_iter().next().map_or(Ok(()), Err)
 }
 
 fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {

@@ -75,17 +75,17 @@ pub enum Act {
     #[command(visible_alias = "accel")]
     Acceleration {
         /// °/s²; 0 is unlimited
-        #[arg(allow_negative_numbers = true)]
+        #[arg(allow_negative_numbers = true, value_name = "DPS2")]
         dps_per_second: Option<f64>,
     },
-    /// Show the encoder: position, original position and offset
+    /// Show the encoder: position, raw position and offset
     Encoder,
     /// Set the offset of the encoder for good (needs --write-rom)
     EncoderOffset {
         /// The new offset
         offset: u16,
     },
-    /// Make the current position the zero from the next power-on on (needs --write-rom)
+    /// Make the current position the zero, effective after the next power cycle (needs --write-rom)
     Zero,
     /// Switch the motor off and forget what it was doing
     Off,

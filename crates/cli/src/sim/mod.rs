@@ -30,7 +30,7 @@ const IDLE: Duration = Duration::from_millis(20);
 Ports that are served: pty:PATH (a serial line), slcan-pty:PATH (a CAN adapter), \
 unix-listen:PATH and tcp-listen:ADDRESS:PORT (either), socketcan:INTERFACE (the motors are nodes of that bus).
 Without --st and --rmd: --st pty:./st0 --rmd slcan-pty:./can0.
-One JSON line a port on stdout says that it can be opened. JSON commands on stdin change the world \
+Prints one JSON line per port once it is ready. JSON commands on stdin change the world \
 of the motors; docs/SIMULATOR.md lists them."
 )]
 pub struct Args {

@@ -165,8 +165,10 @@ fn revup(session: &Session) -> Result<(), Failure> {
             ("torque", torque_s16a.into(), Unit::S16A),
             ("duration", duration_ms.into(), Unit::Millisecond),
         ];
-        let rows = values
-            .map(|(name, value, unit)| Row::quantity(name, f64::from(value), 0, unit.symbol()));
+        let rows = values.map(|(name, value, unit)| match session.raw {
+            true => Row::digits(name, value.into()),
+            false => Row::quantity(name, value.into(), 0, unit.symbol()),
+        });
         let texts = rows.iter().map(|row| format!("  {:>11}", row.text));
         session.output.result(
             format!("phase {phase}{}", texts.collect::<String>()),

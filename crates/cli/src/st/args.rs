@@ -89,7 +89,7 @@ pub enum Act {
         /// A number in the register's unit, or a name (SPEED, I_ALPHA)
         #[arg(allow_negative_numbers = true)]
         value: String,
-        /// Read it back, and write it again if it differs, this many times at most (3 if not said)
+        /// Read it back, and write it again if it differs, this many times at most (default 3)
         #[arg(long, value_name = "ATTEMPTS", num_args = 0..=1, require_equals = true,
               value_parser = clap::value_parser!(u8).range(1..=100))]
         verify: Option<Option<u8>>,

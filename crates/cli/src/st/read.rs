@@ -76,6 +76,7 @@ pub fn status(session: &Session) -> Result<(), Failure> {
         let reading = read(session, register)?;
         let mut row = row(session, &reading);
         match register {
+            _ if session.raw => {}
             RegisterId::STATUS => {
                 row.text = format!("{reading}: {}", Status::from(reading.bits as u8).doc());
             }

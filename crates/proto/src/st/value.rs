@@ -152,11 +152,14 @@ impl std::fmt::Display for Reading {
         if let Some(name) = self.name() {
             return f.write_str(&name);
         }
-        let (value, unit) = (self.value(), self.unit());
-        // Scaled integers have one decimal; adding 0.0 keeps a float from printing as -0.
-        let tenths = (value * 10.0).round() / 10.0 + 0.0;
-        let value = if self.ty() == Some(Type::F32) { value } else { tenths };
-        write!(f, "{value}{}{unit}", if unit.is_empty() { "" } else { " " })
+        // Adding 0.0 keeps a zero from printing as -0.
+        match self.ty() {
+            Some(Type::F32) => write!(f, "{}", self.value() as f32 + 0.0)?,
+            // Scaled integers have one decimal.
+            _ => write!(f, "{}", (self.value() * 10.0).round() / 10.0 + 0.0)?,
+        }
+        let unit = self.unit();
+        write!(f, "{}{unit}", if unit.is_empty() { "" } else { " " })
     }
 }
 
@@ -263,7 +266,9 @@ mod tests {
         assert_eq!(shown(RegisterId::PFC_ACBUS_FREQ, 501, spec), "50.1 Hz");
         assert_eq!(shown(RegisterId::FLUXWK_BUS, 98, spec), "98 %");
         assert_eq!(shown(RegisterId::FLUXWK_BUS, 985, Profile::Mcsdk54), "98.5 %");
-        assert_eq!(shown(RegisterId::SC_RS, 0.25f32.to_bits() as i32, spec), "0.25 Ω");
+        for (ohms, text) in [(0.25f32, "0.25 Ω"), (0.35, "0.35 Ω"), (-0.0, "0 Ω")] {
+            assert_eq!(shown(RegisterId::SC_RS, ohms.to_bits() as i32, spec), text);
+        }
         assert_eq!(shown(RegisterId(0xC0), -1, spec), "-1");
     }
 
