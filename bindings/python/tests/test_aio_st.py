@@ -334,7 +334,7 @@ def test_a_start_needs_a_ramp_within_the_speed_limit() -> None:
                 lambda: motor.execute("START_STOP"),
                 lambda: bus.raw(0x03, b"\x01", motor=1),
             ):
-                with pytest.raises(motorlink.InvalidValueError, match=r"first `(set_)?ramp\(...\)`"):
+                with pytest.raises(motorlink.InvalidValueError, match="first set a ramp"):
                     await start()
             assert bus.moving == []
             await motor.set_ramp(100, 0)
