@@ -86,24 +86,22 @@ fn value(py: Python<'_>, field: &Field, data: &[u8; 8]) -> PyResult<Py<PyAny>> {
 /// The digits of what a program gives for a field.
 fn digits(field: &Field, value: &Bound<'_, PyAny>) -> PyResult<i64> {
     let py = value.py();
-    let name = field.name_with_unit();
+    let refused =
+        |why: String| invalid_value(py, format_args!("{}: {why}", field.name_with_unit()));
     if let Meaning::Words(words) = field.meaning {
         let given = value.cast::<PyString>()?.to_cow()?;
         let found = words.iter().find(|(_, word)| word.eq_ignore_ascii_case(&given));
         return found.map(|(number, _)| i64::from(*number)).ok_or_else(|| {
             let known: Vec<_> = words.iter().map(|(_, word)| *word).collect();
             let known = known.join(", ");
-            invalid_value(py, format_args!("{name}: there is no `{given}`; there are {known}"))
+            refused(format!("there is no `{given}`; there are {known}"))
         });
     }
     let value: f64 = value.extract()?;
     if field.scale.suffix.is_empty() && value.is_finite() && value.fract() != 0.0 {
-        return Err(invalid_value(py, format_args!("{name}: {value} is not a whole number")));
+        return Err(refused(format!("{value} is not a whole number")));
     }
-    field
-        .scale
-        .wanted(value)
-        .map_err(|why| invalid_value(py, format_args!("{name}: {why}; nothing was sent")))
+    field.scale.wanted(value).map_err(|why| refused(format!("{why}; nothing was sent")))
 }
 
 /// The eight bytes of the command `code` with these values, in the order of its fields.
