@@ -129,27 +129,24 @@ pub(crate) fn refusal(py: Python<'_>, code: ErrorCode) -> PyErr {
 /// What an RMD client says.
 pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
     use rmd::Error;
-    let facts =
-        |port, id: &rmd::MotorId| Facts { port: Some(port), motor: Some(id.number()), code: None };
+    let motor = error.motor().map(rmd::MotorId::number);
+    let facts = |port| Facts { port, motor, code: None };
     let (kind, facts) = match error {
-        Error::Timeout { port, motor: id, .. }
-        | Error::Adapter { port, motor: id, .. }
-        | Error::Quarantined { port, motor: id }
-        | Error::Shared { port, motor: id } => (Kind::ReplyTimeout, facts(port, id)),
-        Error::Foreign { port, motor: id, .. }
-        | Error::Altered { port, motor: id, .. }
-        | Error::Unconfirmed { port, motor: id }
-        | Error::Echo { port, motor: id } => (Kind::Link, facts(port, id)),
-        Error::Twice(id) | Error::OutOfReach(id) | Error::Limit { motor: id, .. } => {
-            (Kind::InvalidValue, Facts { motor: Some(id.number()), ..Facts::default() })
-        }
-        Error::FullTurn { motor: id, .. } => {
-            let facts = Facts { motor: Some(id.number()), ..Facts::default() };
+        Error::Timeout { port, .. }
+        | Error::Adapter { port, .. }
+        | Error::Quarantined { port, .. }
+        | Error::Shared { port, .. } => (Kind::ReplyTimeout, facts(Some(port))),
+        Error::Foreign { port, .. }
+        | Error::Altered { port, .. }
+        | Error::Unconfirmed { port, .. }
+        | Error::Echo { port, .. } => (Kind::Link, facts(Some(port))),
+        Error::FullTurn { .. } => {
+            let facts = facts(None);
             let hint = "full_turn=True sends it all the same";
             return Kind::FullTurn.raise(py, format_args!("{error}; {hint}"), facts);
         }
         Error::Port(error) => return port_error(py, error),
-        _ => (Kind::InvalidValue, Facts::default()),
+        _ => (Kind::InvalidValue, facts(None)),
     };
     kind.raise(py, error, facts)
 }

@@ -103,8 +103,8 @@ impl Failure {
         }
     }
 
-    /// With its port, unless it is about the output, and, if a motor refused or is silent, the motor that was meant, unless it names
-    /// another.
+    /// With its port, unless it is about the output. With the motor that was meant if a motor refused or
+    /// is silent, unless it names another.
     pub fn about(mut self, port: &str, motor: u8) -> Self {
         if let Failure::Failed(problem) = &mut self
             && problem.kind != Kind::Output
@@ -137,6 +137,11 @@ impl Failure {
 impl Problem {
     fn new(kind: Kind, message: impl Into<String>) -> Self {
         Problem { kind, message: message.into(), advice: None, facts: Map::new() }
+    }
+
+    /// What an error of the library is, with what to try.
+    fn of(kind: Kind, error: &impl std::fmt::Display, advice: Option<&str>) -> Self {
+        Problem { advice: advice.map(str::to_owned), ..Problem::new(kind, error.to_string()) }
     }
 
     /// Adds what is not known yet.
@@ -178,15 +183,13 @@ impl From<Problem> for Failure {
 
 impl From<st::Error> for Failure {
     fn from(error: st::Error) -> Self {
-        let message = error.to_string();
         let kind = match &error {
             st::Error::Refused { .. } | st::Error::Differs { .. } => Kind::Refused,
             st::Error::Port(error) => return error.into(),
             error if error.is_line_failure() => Kind::Link,
             _ => Kind::Usage,
         };
-        let mut problem = Problem::new(kind, message);
-        problem.advice = advice::st(&error).map(str::to_owned);
+        let mut problem = Problem::of(kind, &error, advice::st(&error));
         match &error {
             st::Error::Refused { motor, code, .. } => {
                 problem.motor(motor.0);
@@ -211,17 +214,8 @@ impl From<rmd::Error> for Failure {
             error if error.is_line_failure() => Kind::Silent,
             _ => Kind::Usage,
         };
-        let mut problem = Problem::new(kind, error.to_string());
-        problem.advice = advice::rmd(&error).map(str::to_owned);
-        if let Timeout { motor, .. }
-        | Adapter { motor, .. }
-        | Foreign { motor, .. }
-        | Altered { motor, .. }
-        | Quarantined { motor, .. }
-        | Shared { motor, .. }
-        | Unconfirmed { motor, .. }
-        | Echo { motor, .. } = &error
-        {
+        let mut problem = Problem::of(kind, &error, advice::rmd(&error));
+        if let Some(motor) = error.motor().filter(|_| kind != Kind::Usage) {
             problem.motor(motor.number());
         }
         problem.into()
@@ -240,9 +234,7 @@ impl From<&PortError> for Failure {
             PortError::WrongKind { .. } => Kind::Usage,
             _ => Kind::Link,
         };
-        let mut problem = Problem::new(kind, error.to_string());
-        problem.advice = advice::port(error).map(str::to_owned);
-        problem.into()
+        Problem::of(kind, error, advice::port(error)).into()
     }
 }
 
@@ -250,11 +242,7 @@ impl From<RelayError> for Failure {
     fn from(error: RelayError) -> Self {
         match error {
             RelayError::Port(error) => error.into(),
-            other => {
-                let mut problem = Problem::new(Kind::Usage, other.to_string());
-                problem.advice = advice::relay(&other).map(str::to_owned);
-                problem.into()
-            }
+            other => Problem::of(Kind::Usage, &other, advice::relay(&other)).into(),
         }
     }
 }

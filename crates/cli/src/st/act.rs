@@ -14,7 +14,7 @@ use super::read::explain;
 use super::session::Session;
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::json::{self, Row};
+use crate::json::Row;
 use crate::output::{hex, parse_hex};
 
 pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
@@ -102,9 +102,7 @@ fn start(session: &Session) -> Result<(), Failure> {
         }
         _ => {
             let text = format!("{} starts: {status}", motor.number());
-            let reading = session.reading(RegisterId::STATUS, u8::from(status).into());
-            let values = [json::register(&reading, String::new(), session.raw)];
-            session.confirmed()?.result(text, session.line().ok(true).values(&values))
+            session.done_with(text, RegisterId::STATUS, u8::from(status).into())
         }
     }
 }
@@ -123,9 +121,7 @@ fn acknowledge(session: &Session) -> Result<(), Failure> {
         let faults = motor.flags()?;
         if faults == Flags::default() {
             let text = format!("{}: no faults", motor.number());
-            let reading = session.reading(RegisterId::FLAGS, 0);
-            let values = [json::register(&reading, String::new(), session.raw)];
-            return session.confirmed()?.result(text, session.line().ok(true).values(&values));
+            return session.done_with(text, RegisterId::FLAGS, 0);
         }
         if clock.now() > give_up || !interrupt::wait_by(&clock, Duration::from_millis(10)) {
             let why = explain(faults);

@@ -8,7 +8,7 @@ use motorlink::st::{Client, Motor, Options, Profile, Reading, Recovery, Register
 use super::args::DriveArgs;
 use crate::connection::Connection;
 use crate::failure::Failure;
-use crate::json::Line;
+use crate::json::{self, Line};
 use crate::output::Printer;
 
 /// An open drive, and how to show what it says.
@@ -55,6 +55,12 @@ impl Session {
     /// Says that it was done, once the acknowledgement is confirmed.
     pub fn done(&self, text: impl std::fmt::Display) -> Result<(), Failure> {
         self.confirmed()?.result(text, self.line().ok(true))
+    }
+
+    /// As [`done`](Self::done), with what a register reads then.
+    pub fn done_with(&self, text: String, register: RegisterId, bits: i32) -> Result<(), Failure> {
+        let value = json::register(&self.reading(register, bits), String::new(), self.raw);
+        self.confirmed()?.result(text, self.line().ok(true).values(&[value]))
     }
 
     /// Where results go, which come from replies to their own requests.

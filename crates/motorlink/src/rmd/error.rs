@@ -161,6 +161,25 @@ impl Error {
         }
     }
 
+    /// The motor that it is about.
+    pub fn motor(&self) -> Option<MotorId> {
+        match self {
+            Error::Timeout { motor, .. }
+            | Error::Adapter { motor, .. }
+            | Error::Foreign { motor, .. }
+            | Error::Altered { motor, .. }
+            | Error::Quarantined { motor, .. }
+            | Error::Shared { motor, .. }
+            | Error::Unconfirmed { motor, .. }
+            | Error::Echo { motor, .. }
+            | Error::Twice(motor)
+            | Error::Limit { motor, .. }
+            | Error::FullTurn { motor, .. }
+            | Error::OutOfReach(motor) => Some(*motor),
+            Error::NoSuchMotor(_) | Error::Port(_) => None,
+        }
+    }
+
     /// Whether nothing can be said about the motor because it, or the line, was silent.
     pub fn is_line_failure(&self) -> bool {
         match self {
