@@ -124,6 +124,23 @@ def test_an_unknown_command_is_a_usage_error_with_the_nearest(run):
 
 
 @pytest.mark.parametrize(
+    "words",
+    [
+        "st -p sim: get STATUS --every 100",
+        "st -p sim: --timeout 100 get STATUS",
+        "rmd -p sim: angle --every 100",
+        "rmd -p sim: --timeout 100 angle",
+        "guard st -p sim: --silence 100",
+        "conformance host st --serve pty:./st0 --timeout 100 -- true",
+        "conformance host st --serve pty:./st0 --limit 100 -- true",
+    ],
+)
+def test_a_time_without_a_unit_is_refused_with_both_spellings(run, words):
+    told = run(*words.split()).ended(2).err
+    assert "the unit is missing: write 100ms or 100s" in told
+
+
+@pytest.mark.parametrize(
     "command",
     [
         "st -p sim: get STATUS --every 5ms",

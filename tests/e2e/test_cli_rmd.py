@@ -16,7 +16,7 @@ SHIPPED_GAINS = "100 100 100 100 100 100"
 
 def on(run, port):
     """Runs `motorlink rmd` on a port. A busy machine may take longer than the 50 ms that a bus does."""
-    return lambda *arguments: run("rmd", "-p", port, "--timeout", 500, *arguments)
+    return lambda *arguments: run("rmd", "-p", port, "--timeout", "500ms", *arguments)
 
 
 @pytest.fixture
@@ -349,7 +349,7 @@ def test_an_st_drive_is_not_an_slcan_adapter(run, drives):
 def test_a_silent_device_is_given_up_in_time(run, tmp_path):
     with device(tmp_path / "silent") as port:
         begun = time.monotonic()
-        run("rmd", "-p", f"slcan:{port}", "--timeout", 20, "status").ended(3)
+        run("rmd", "-p", f"slcan:{port}", "--timeout", "20ms", "status").ended(3)
         assert time.monotonic() - begun < 4
 
 
@@ -380,7 +380,7 @@ def test_a_motor_that_speaks_v3_is_named_and_not_driven(run, tmp_path):
 
 def test_an_adapter_that_echoes_its_own_frames_is_not_a_motor(run, tmp_path):
     with device(tmp_path / "can", slcan_adapter(lambda frame: [frame])) as link:
-        told = run("rmd", "-p", f"slcan:{link}?echo=1", "--timeout", 50, "off").ended(3).err
+        told = run("rmd", "-p", f"slcan:{link}?echo=1", "--timeout", "50ms", "off").ended(3).err
     assert "does not answer" in told
 
 
@@ -389,7 +389,7 @@ def test_a_loop_survives_a_bus_that_goes_and_comes_back(start, sim, kind):
     serve = {"slcan": "slcan-pty", "slcan:tcp": "tcp"}[kind]
     bus = sim(st=(), rmd=(serve,))
     loop = start(
-        *("rmd", "-p", bus.port(kind), "--timeout", 500, "angle", "--every", "50ms")
+        *("rmd", "-p", bus.port(kind), "--timeout", "500ms", "angle", "--every", "50ms")
     )
     loop.more_lines()
     bus.kill()
@@ -410,7 +410,7 @@ def test_error_bits_that_mean_nothing_are_no_errors(run, tmp_path):
         return [f"t1418{frame[5:7]}1900F0000000{bits['state']}"]
 
     with device(tmp_path / "can0", slcan_adapter(motor)) as path:
-        words = ("rmd", "-p", f"slcan:{path}", "--timeout", 500, "clear-errors")
+        words = ("rmd", "-p", f"slcan:{path}", "--timeout", "500ms", "clear-errors")
         assert run(*words, "--json").ended(0).values["errors"] == []
         assert "no error (bits 0xf6 mean nothing)" in run(*words).ended(0).out
         bits["state"] = "F7"

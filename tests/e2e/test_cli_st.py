@@ -270,7 +270,7 @@ def test_nobody_listening_is_told(run):
 def test_a_silent_device_is_given_up_in_time(run, tmp_path):
     with device(tmp_path / "silent") as port:
         begun = time.monotonic()
-        told = run("st", "-p", port, "--timeout", 100, "info").ended(3).err
+        told = run("st", "-p", port, "--timeout", "100ms", "info").ended(3).err
         assert time.monotonic() - begun < 4
     assert "no reply in time" in told and "motorlink st scan" in told
 
@@ -288,7 +288,7 @@ def test_scan_tells_silence_from_garbage(run, tmp_path):
 def test_garbage_is_told_and_ends_in_time(run, tmp_path, answer):
     with device(tmp_path / "noisy", answer) as port:
         begun = time.monotonic()
-        told = run("st", "-p", port, "--timeout", 200, "info").ended(3).err
+        told = run("st", "-p", port, "--timeout", "200ms", "info").ended(3).err
         assert time.monotonic() - begun < 5
     # Noise may begin as a reply does.
     said = ("motorlink st scan", "something else is sending", "the line lost bytes")
@@ -297,7 +297,7 @@ def test_garbage_is_told_and_ends_in_time(run, tmp_path, answer):
 
 def test_a_line_that_echoes_is_told(run, tmp_path):
     with device(tmp_path / "echo", lambda received: received) as port:
-        told = run("st", "-p", port, "--timeout", 200, "start").ended(3).err
+        told = run("st", "-p", port, "--timeout", "200ms", "start").ended(3).err
     assert "what is sent comes back" in told and "echoes" in told
 
 
@@ -336,7 +336,7 @@ def test_a_loop_survives_a_server_that_goes_and_comes_back(start, sim):
 
 def test_ctrl_c_ends_a_loop_on_a_silent_line(start, tmp_path):
     with device(tmp_path / "silent") as port:
-        loop = start("st", "-p", port, "--timeout", 200, "get", "STATUS", "--every", "50ms")
+        loop = start("st", "-p", port, "--timeout", "200ms", "get", "STATUS", "--every", "50ms")
         loop.says("the line is lost")
         loop.interrupt()
         assert loop.wait() == 0
@@ -350,7 +350,7 @@ def test_ctrl_c_ends_an_exchange_that_has_long_to_wait(start, tmp_path):
         return b""
 
     with device(tmp_path / "silent", listen) as port:
-        waiting = start("st", "-p", port, "--timeout", 60000, "info")
+        waiting = start("st", "-p", port, "--timeout", "60s", "info")
         assert asked.wait(10)
         waiting.interrupt()
         assert waiting.wait(5) == 130

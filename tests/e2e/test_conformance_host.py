@@ -51,16 +51,16 @@ def test_our_client_passes_every_scenario(check, motorlink):
 
 @pytest.mark.parametrize("only", ["late", "copy", "silence", "cut_off", "identification", "0x7f"])
 def test_our_client_reads_on_when_the_line_is_back(check, motorlink, only):
-    words = "st get SPEED_MEAS --every 20ms --count 4 --timeout 300".split()
+    words = "st get SPEED_MEAS --every 20ms --count 4 --timeout 300ms".split()
     code, cases = check("st", "--only", only, "--timeout", "300ms", "--", motorlink, *words)
     assert failed(cases) == {}
     assert code == 0
 
 
 def test_our_bus_passes_every_scenario_for_one_motor(check, motorlink):
-    angle = "rmd --timeout 400 angle --every 5ms --count 4"
+    angle = "rmd --timeout 400ms angle --every 5ms --count 4"
     echo = f"{motorlink} {angle} -p $MOTORLINK_PORT?echo=1"
-    off = f"{motorlink} rmd --timeout 400 off"
+    off = f"{motorlink} rmd --timeout 400ms off"
     told = ["--timeout", "400ms", "--field", 2, "--echo", echo, "--off", off]
     code, cases = check("rmd", *told, "--", motorlink, *angle.split())
     assert failed(cases) == {}
@@ -193,7 +193,7 @@ def test_a_host_that_invents_a_value_has_failed(check):
 
 def test_a_host_that_starts_the_motor_again_has_failed(check, motorlink):
     name = "a_start_without_an_answer_is_an_error_and_not_repeated"
-    start = f"{motorlink} st --timeout 100 start || {motorlink} st --timeout 100 start"
+    start = f"{motorlink} st --timeout 100ms start || {motorlink} st --timeout 100ms start"
     code, cases = check("st", "--only", name, "--start", start, "--", "true")
     assert code == 1
     assert "sent START_MOTOR 2 times" in cases[name]["received"]

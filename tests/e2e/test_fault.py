@@ -16,14 +16,14 @@ def test_what_is_late_still_comes(run, drives):
         late = run("st", "-p", drives.port(port), "--fault", "delay=60ms", "get", "STATUS").ended(0)
         assert time.monotonic() - began >= 0.12, "both ways"
         assert "STATUS" in late.out
-    late = run("rmd", "-p", drives.port("slcan"), "--timeout", 2000, "--fault", "delay=10ms", "angle").ended(0)
+    late = run("rmd", "-p", drives.port("slcan"), "--timeout", "2s", "--fault", "delay=10ms", "angle").ended(0)
     assert "angle" in late.out
 
 
 @pytest.mark.parametrize("fault", ["drop=1", "cut=5s@1", "drop=1,only=sent", "drop=1,only=received"])
 def test_a_line_that_loses_everything_has_failed(run, drives, fault):
     for port in ("pty", "sim"):
-        lost = run("st", "-p", drives.port(port), "--timeout", 100, "--fault", fault, "info").ended(3)
+        lost = run("st", "-p", drives.port(port), "--timeout", "100ms", "--fault", fault, "info").ended(3)
         assert "no reply in time" in lost.err
     assert "does not answer" in run(*RMD, "--fault", fault, "status").ended(3).err
 
@@ -47,7 +47,7 @@ def test_the_same_seed_does_the_same(run):
 def test_a_watch_goes_on_through_damage(run):
     fault = "drop=5e-2,seed=3"
     watch = run(
-        *ST, "--json", "--timeout", 30, "--fault", fault, "get", "BUS_VOLTAGE", "--every", "2ms",
+        *ST, "--json", "--timeout", "30ms", "--fault", fault, "get", "BUS_VOLTAGE", "--every", "2ms",
         "--count", 12,
     ).ended(0)
     assert {plain(line)["BUS_VOLTAGE"] for line in watch.lines if "values" in line} == {325}
@@ -87,10 +87,10 @@ def test_a_verified_write_reads_back(run, drives):
 
 
 def test_a_verified_write_is_repeated_where_the_line_loses_it(run):
-    fault = ("--timeout", 50, "--fault", "drop=5e-2,seed=4")
+    fault = ("--timeout", "50ms", "--fault", "drop=5e-2,seed=4")
     done = run(*ST, *fault, "--json", "set", "SPEED_KP", 700, "--verify=9").ended(0)
     assert done.json["attempts"] > 1
-    lost = run(*ST, "--timeout", 50, "--fault", "drop=1", "set", "SPEED_KP", 700, "--verify=2")
+    lost = run(*ST, "--timeout", "50ms", "--fault", "drop=1", "set", "SPEED_KP", 700, "--verify=2")
     assert "failed" in lost.ended(3).err
 
 

@@ -95,7 +95,7 @@ def test_st_tells_what_the_other_profile_has(checked, tmp_path, command):
 
 @pytest.mark.parametrize("command", RMD)
 def test_rmd_tells_what_was_done_or_read(checked, command):
-    out, err = checked("rmd", "-p", "sim:", "--timeout", 500, *command.split())
+    out, err = checked("rmd", "-p", "sim:", "--timeout", "500ms", *command.split())
     assert out and not err
     assert all(line["motor"] in range(1, 5) and line["port"] == "sim:" for line in out)
 
@@ -142,10 +142,10 @@ def test_revup_data_has_digits(checked):
 def test_a_silent_drive_is_told(checked, tmp_path):
     with device(tmp_path / "silent") as port:
         for command in ("info", "status", "start", "revup-data", "raw 02 40"):
-            out, err = checked("st", "-p", port, "--timeout", 50, *command.split(), code=3)
+            out, err = checked("st", "-p", port, "--timeout", "50ms", *command.split(), code=3)
             assert not out and err[0]["error"]["kind"] == "link"
             assert err[0]["error"]["port"] == f"serial:{port}"
-        out, _ = checked("st", "-p", port, "--timeout", 50, "scan", 115200, code=3)
+        out, _ = checked("st", "-p", port, "--timeout", "50ms", "scan", 115200, code=3)
         assert [line["finding"] for line in out] == ["silence"]
 
 
@@ -203,7 +203,7 @@ def test_an_outage_of_a_watch_is_in_its_stream_and_so_is_its_end(sim, start, wor
     served = {"st": ("pty",)} if protocol == "st" else {"rmd": ("slcan-pty",)}
     drives = sim(**{"st": (), "rmd": (), **served})
     port = drives.port("pty" if protocol == "st" else "slcan")
-    watch = start(protocol, "-p", port, "--timeout", 500, "--json", *command, "--every", "20ms")
+    watch = start(protocol, "-p", port, "--timeout", "500ms", "--json", *command, "--every", "20ms")
     watch.more_lines(2)
     drives.kill()
     watch.until(lambda: any('"outage"' in line for line in watch.out), "the outage")

@@ -64,7 +64,7 @@ class Pairs:
     def first(self, *commands):
         """A program of any kind, which may be killed."""
         arguments = self.chance.choice(commands)
-        timeout = self.chance.choice([40, 100, 1000])
+        timeout = self.chance.choice(["40ms", "100ms", "1s"])
         life = self.chance.uniform(0.01, 0.6) if self.chance.random() < 0.5 or "--every" in arguments else None
         self.run("--timeout", timeout, *arguments, life=life)
         time.sleep(self.chance.choice([0, 0, 0.05]))
@@ -131,10 +131,10 @@ def test_rmd_programs_in_turn_read_their_own_values(pairs):
         rmd.line.fate = bad
         rmd.first(["pid"], ["status"], ["off"], ["speed", 100])
         if rmd.chance.random() < 0.3:
-            code, _, (requests, _) = rmd.run("--timeout", 1000, "off")
+            code, _, (requests, _) = rmd.run("--timeout", "1s", "off")
             rmd.judge(fate, code, OFF in rmd.line.requests[requests:])
             continue
-        code, out, _ = rmd.run("--timeout", 1000, "pid")
+        code, out, _ = rmd.run("--timeout", "1s", "pid")
         rmd.judge(fate, code, code or set(plain(json.loads(out)).values()) == {value})
     assert not any(end == "WRONG" for _, end in rmd.counts), rmd.counts
     assert any(end == "right" for _, end in rmd.counts), "something comes through"

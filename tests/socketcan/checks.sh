@@ -82,7 +82,7 @@ has_grown() {
 }
 
 rmd() {
-    motorlink rmd -p "$port" --timeout 5000 "$@"
+    motorlink rmd -p "$port" --timeout 5s "$@"
 }
 
 # Without 0x9A and 0x9C, which bring a motor in step and confirm what was read; what stops a motor goes out first and again.
@@ -220,7 +220,7 @@ check_the_program_finds_and_asks_motors_across_two_cards() {
     port=socketcan:can0
     serve socketcan:can1
     same "$(rmd scan 1 2 3 4 --json | grep -c '"dialect":"V1.62"')" 4
-    await finds_four --timeout 100
+    await finds_four --timeout 100ms
     same "$(rmd --id 3 status --json)" '{"motor":3,*"temperature":{"value":25,"unit":"°C"},"voltage":{"value":24.0,"unit":"V"},*'
     motorlink rmd -p socketcan:can0 --id 9 status 2>silent && fail "motor 9 is not there"
     same "$? $(cat silent)" '*motor 9 does not answer 0x9a*'
@@ -228,7 +228,7 @@ check_the_program_finds_and_asks_motors_across_two_cards() {
 
 check_a_watch_goes_on_when_the_interface_is_back() {
     serve socketcan:can1
-    motorlink rmd -p socketcan:can0 --timeout 1000 angle --every 20ms >watch 2>watch.err &
+    motorlink rmd -p socketcan:can0 --timeout 1s angle --every 20ms >watch 2>watch.err &
     running="$running $!"
     await grep -q angle watch
     /sbin/ip link set can0 down
@@ -241,7 +241,7 @@ check_a_watch_goes_on_when_the_interface_is_back() {
 
 check_a_watch_tells_bus_off_and_goes_on() {
     serve socketcan:vcan0
-    motorlink rmd -p socketcan:vcan0 --timeout 1000 angle --every 20ms >watch 2>watch.err &
+    motorlink rmd -p socketcan:vcan0 --timeout 1s angle --every 20ms >watch 2>watch.err &
     running="$running $!"
     await grep -q angle watch
     # An error frame of the class bus-off, as a controller's driver sends it.
@@ -285,7 +285,7 @@ check_the_kernels_slcan_driver_works_with_the_simulated_adapter() {
     /sbin/ip link set slcan0 up
     port=socketcan:slcan0
     same "$(motorlink ports | grep $port)" 'socketcan:slcan0 * virtual or serial CAN * ready'
-    await finds_four 1 2 3 4 --timeout 5000
+    await finds_four 1 2 3 4 --timeout 5s
     rmd --id 2 speed 360 >/dev/null || fail "motor 2 does not answer"
     rmd --id 2 off
     /sbin/ip link set slcan0 down

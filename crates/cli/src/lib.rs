@@ -15,6 +15,7 @@ mod ports;
 mod repeat;
 mod rmd;
 mod sim;
+mod span;
 mod st;
 mod trace;
 mod voice;

@@ -3,7 +3,6 @@
 use std::io::{Write, stderr, stdout};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use motorlink::Hex;
@@ -182,24 +181,6 @@ pub fn parse_hex(words: &[String]) -> Result<Vec<u8>, Failure> {
     Ok(bytes)
 }
 
-/// The shortest and the longest interval that make sense.
-const SHORTEST: Duration = Duration::from_millis(1);
-const LONGEST: Duration = Duration::from_secs(86_400);
-
-/// Reads a time span such as `100ms`, `0.5s` or `2` (seconds).
-pub fn parse_span(text: &str) -> Result<Duration, String> {
-    let (number, unit) = match text.strip_suffix("ms") {
-        Some(number) => (number, 1e-3),
-        None => (text.strip_suffix('s').unwrap_or(text), 1.0),
-    };
-    let seconds = number.trim().parse::<f64>().map(|number| number * unit);
-    match seconds.map(Duration::try_from_secs_f64) {
-        Ok(Ok(span)) if (SHORTEST..=LONGEST).contains(&span) => Ok(span),
-        Ok(_) => Err("1ms to 86400s".to_owned()),
-        Err(_) => Err("write a time as 100ms or 0.5s".to_owned()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -217,17 +198,5 @@ mod tests {
         assert_eq!(bytes("2 1 1e:21"), expected);
         assert_eq!(bytes("021"), None);
         assert_eq!(bytes("xy"), None);
-    }
-
-    #[test]
-    fn spans_need_a_unit_that_exists() {
-        assert_eq!(parse_span("100ms"), Ok(Duration::from_millis(100)));
-        assert_eq!(parse_span("0.5s"), Ok(Duration::from_millis(500)));
-        assert_eq!(parse_span("2"), Ok(Duration::from_secs(2)));
-        assert!(parse_span("-1s").is_err());
-        assert!(parse_span("0").is_err());
-        assert!(parse_span("soon").is_err());
-        assert!(parse_span("1e19s").is_err());
-        assert!(parse_span("1e-9s").is_err());
     }
 }

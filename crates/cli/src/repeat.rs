@@ -8,7 +8,8 @@ use serde_json::Value;
 use crate::failure::{Failure, Kind};
 use crate::interrupt;
 use crate::json::Line;
-use crate::output::{Printer, note, parse_span, print_line};
+use crate::output::{Printer, note, print_line};
+use crate::span::parse_span;
 
 /// How often to read.
 #[derive(clap::Args, Clone, Copy)]

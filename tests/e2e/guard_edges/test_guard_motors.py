@@ -66,7 +66,7 @@ def test_what_other_nodes_command_is_reported(sim, start, client, run, tmp_path)
     process = start("guard", "rmd", "-p", port, "--serve", f"slcan-pty:{tmp_path}/held", "--json")
     process.line(0)
     program = client("rmd", f"{tmp_path}/held", "poll")
-    other = ("rmd", "-p", port, "--timeout", 500, "--id", 3)
+    other = ("rmd", "-p", port, "--timeout", "500ms", "--id", 3)
     run(*other, "status").ended(0)
     assert not any("another node" in text for text in process.err), process.err
     run(*other, "speed", 100).ended(0)

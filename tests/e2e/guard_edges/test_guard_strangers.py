@@ -105,7 +105,7 @@ def test_a_unix_socket_is_its_users_own_and_gone_at_the_end(bench, guard, client
     if protocol == "st":
         run("st", "-p", f"unix:{path}", "info").ended(0)
     else:
-        run("rmd", "-p", f"slcan:unix:{path}", "--timeout", 500, "status").ended(0)
+        run("rmd", "-p", f"slcan:unix:{path}", "--timeout", "500ms", "status").ended(0)
     program = client(protocol, process.port)
     turns(drives, protocol)
     second = run("st", "-p", f"unix:{path}", "info").ended(3)

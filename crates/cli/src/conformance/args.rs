@@ -9,7 +9,7 @@ use motorlink::st::{MotorNumber, Profile};
 use motorlink_link::serve::ServeName;
 
 use crate::connection::Port;
-use crate::output::parse_span;
+use crate::span::parse_span;
 
 /// Behind `motorlink conformance host --help`.
 const CONTRACT: &str = "\

@@ -16,7 +16,8 @@ use serde_json::json;
 use crate::connection::Port;
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
-use crate::output::{self, note, parse_span};
+use crate::output::{self, note};
+use crate::span::parse_span;
 use prove::{Proof, Spin};
 use supervisor::Supervisor;
 

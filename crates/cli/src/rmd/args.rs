@@ -1,10 +1,13 @@
 //! What `motorlink rmd` takes.
 
+use std::time::Duration;
+
 use clap::Subcommand;
 use motorlink::rmd::SpinDirection;
 
 use crate::connection::Connection;
 use crate::repeat::Repeat;
+use crate::span::span_up_to;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -23,10 +26,10 @@ pub struct MotorArgs {
     #[arg(short, long, default_value_t = 1, global = true,
           value_parser = clap::value_parser!(u8).range(1..=32))]
     pub id: u8,
-    /// How long to wait for a reply, ms
-    #[arg(long, default_value_t = 50, global = true, value_name = "MS",
-          value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub timeout: u32,
+    /// How long to wait for a reply, 1ms to 10s
+    #[arg(long, default_value = "50ms", global = true, value_name = "TIME",
+          value_parser = span_up_to(Duration::from_secs(10)))]
+    pub timeout: Duration,
     /// Allow commands that write to the motor's ROM, which wears
     #[arg(long, global = true)]
     pub write_rom: bool,

@@ -1,7 +1,5 @@
 //! What commands to a motor work on.
 
-use std::time::Duration;
-
 use motorlink::port::PortName;
 use motorlink::rmd::{Client, Motor, Options, Payload};
 
@@ -26,8 +24,7 @@ pub fn connect(
     motor: &MotorArgs,
     port: &PortName,
 ) -> Result<Session, Failure> {
-    let timeout = Duration::from_millis(motor.timeout.into());
-    let options = Options { timeout, ..Options::default() };
+    let options = Options { timeout: motor.timeout, ..Options::default() };
     let bus = Client::open_wrapped(port, connection.around_bus()?, options)?;
     let (output, raw) = (connection.output(), connection.raw);
     let (id, write_rom, port) = (motor.id, motor.write_rom, port.to_string());

@@ -1,10 +1,13 @@
 //! What `motorlink st` takes.
 
+use std::time::Duration;
+
 use clap::Subcommand;
 use motorlink::st::Profile;
 
 use crate::connection::Connection;
 use crate::repeat::Repeat;
+use crate::span::span_up_to;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -26,10 +29,10 @@ pub struct DriveArgs {
     /// What the drive speaks: the document as written, or what MCSDK 5.4 firmware does
     #[arg(long, default_value = "spec", global = true)]
     pub profile: Profile,
-    /// How long to wait for a reply, ms [default: 1000, in a scan 200]
-    #[arg(long, global = true, value_name = "MS",
-          value_parser = clap::value_parser!(u32).range(1..=60_000))]
-    pub timeout: Option<u32>,
+    /// How long to wait for a reply, 1ms to 60s [default: 1s, in a scan 200ms]
+    #[arg(long, global = true, value_name = "TIME",
+          value_parser = span_up_to(Duration::from_secs(60)))]
+    pub timeout: Option<Duration>,
     /// Free a 5.x drive that waits for the rest of a cut-off frame, when the line is lost
     #[arg(long, global = true)]
     pub pad: bool,

@@ -6,8 +6,6 @@ mod read;
 mod scan;
 mod session;
 
-use std::time::Duration;
-
 pub use args::Args;
 use args::{Command, DriveArgs, Read};
 use motorlink::port::PortName;
@@ -39,8 +37,7 @@ fn run_at(
         Command::Read(read) => match read {
             Read::Registers => read::registers(connection.output()),
             Read::Scan { rates } => {
-                let told = drive.timeout.map(|ms| Duration::from_millis(ms.into()));
-                scan::run(connection, port, told.unwrap_or(SCAN_TIMEOUT), &rates)
+                scan::run(connection, port, drive.timeout.unwrap_or(SCAN_TIMEOUT), &rates)
             }
             Read::Get { registers, repeat } => read::get(&connect()?, &registers, repeat),
             Read::Segment { segment, registers, repeat } => {

@@ -1,7 +1,5 @@
 //! What commands to a drive work on.
 
-use std::time::Duration;
-
 use motorlink::port::PortName;
 use motorlink::st::{Client, Motor, Options, Profile, Reading, Recovery, RegisterId};
 
@@ -26,7 +24,7 @@ pub fn connect(
     port: &PortName,
 ) -> Result<Session, Failure> {
     let defaults = Options::default();
-    let timeout = drive.timeout.map_or(defaults.timeout, |ms| Duration::from_millis(ms.into()));
+    let timeout = drive.timeout.unwrap_or(defaults.timeout);
     let recovery = if drive.pad { Recovery::Pad } else { Recovery::Drain };
     let profile = drive.profile;
     let options = Options { profile, timeout, recovery, ..defaults };
