@@ -16,9 +16,10 @@ DEBUG := $(or $(abspath $(CARGO_TARGET_DIR)),$(CURDIR)/target)/debug
 VENV := $(CURDIR)/.venv
 PYTHON_VENV := $(CURDIR)/.venv-python
 BENCH_VENV := $(CURDIR)/.venv-bench
+PAGES_VENV := $(CURDIR)/.venv-pages
 
 # Which tests of a part to run: arguments of cargo test for unit, fuzz-replay and miri; of pytest, in
-# the folder of the tests, for e2e, python and firmware-test.
+# the folder of the tests, for e2e, python, pages and firmware-test.
 T =
 # What `make check` leaves to `make test`: the tests of Rust that take seconds.
 QUICK := $(addprefix --skip=,mutants suite nothing_grows stood_still every_promise every_header)
@@ -31,7 +32,7 @@ PYTEST = $(VENV)/bin/python -m pytest $(PYTEST_FLAGS)
 PROGRAM = $(CARGO) build --workspace --all-features --bin motorlink --example machine --locked
 
 # The parts of `make test`, the longest first: two run at a time.
-ALL_PARTS := unit python e2e miri firmware-test lint ffi-test fuzz-replay test-socketcan probe determinism deny
+ALL_PARTS := unit python e2e miri firmware-test lint pages ffi-test fuzz-replay test-socketcan probe determinism deny
 PARTS = $(ALL_PARTS)
 # Those that wait for real time.
 TIMED := unit e2e python firmware-test ffi-test
@@ -100,6 +101,10 @@ lint: ## 2 min: format, clippy, rustdoc: no warning
 	$(CARGO) clippy --workspace --all-targets --all-features --locked -- -D warnings
 	cd fuzz && $(CARGO) fmt --check && $(CARGO) clippy --all-targets --locked $(FUZZ_TARGET) -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --all-features --no-deps --locked
+
+pages: $(PAGES_VENV)/ready ## 3 min: every code block of README and docs runs
+	$(PAGES_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
+	cd tests/pages && $(PAGES_VENV)/bin/python -m pytest $(PYTEST_FLAGS) $(T)
 
 # That the header is up to date is a test of unit.
 ffi-test: ## 2 min: the C face: sanitizers, valgrind, C against the program
@@ -211,7 +216,7 @@ fmt: ## formats the Rust code
 
 clean: ## removes all that was built or installed into this folder
 	$(CARGO) clean
-	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) probe/target fuzz/target firmware/target
+	rm -rf $(VENV) $(PYTHON_VENV) $(BENCH_VENV) $(PAGES_VENV) probe/target fuzz/target firmware/target
 
 # ---- What they need ----
 
@@ -225,7 +230,7 @@ nightly:
 # Before the parts, because sudo may ask for a password. A part says what is still missing.
 packages:
 	$(WHOLE)
-	-@$(if $(filter e2e python firmware-test,$(PARTS)),$(PYTHON) -m ensurepip --version >/dev/null 2>&1 || \
+	-@$(if $(filter e2e python pages firmware-test,$(PARTS)),$(PYTHON) -m ensurepip --version >/dev/null 2>&1 || \
 		tests/install python3-venv)
 	-@tests/install $(filter ffi-test firmware-test test-socketcan,$(PARTS))
 
@@ -234,8 +239,9 @@ board-target: toolchain
 
 $(VENV)/ready: tests/e2e/requirements.txt
 $(PYTHON_VENV)/ready: bindings/python/tests/requirements.txt
+$(PAGES_VENV)/ready: tests/pages/requirements.txt
 # Two parts may want one at once.
-$(VENV)/ready $(PYTHON_VENV)/ready:
+$(VENV)/ready $(PYTHON_VENV)/ready $(PAGES_VENV)/ready:
 	@mkdir -p target && flock target/$(notdir $(@D)).lock $(MAKE) --no-print-directory $(@D).venv FROM=$<
 %.venv:
 	@test $*/ready -nt $(FROM) || { \

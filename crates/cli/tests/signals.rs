@@ -1,4 +1,4 @@
-//! A program that stops its motors at a signal, as README.md shows.
+//! A program that stops its motors at a signal, as docs/RUST.md shows.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
