@@ -1,5 +1,6 @@
 """`motorlink sim --rom`: what was written to ROM outlives the process, however it ends."""
 
+import os
 import random
 import shutil
 import threading
@@ -114,7 +115,7 @@ def test_a_damaged_rom_is_told_and_left_alone(sim, run, tmp_path):
 def test_a_folder_of_rom_is_one_simulators(sim, run, tmp_path):
     sim("--rom", tmp_path / "rom")
     done = run("sim", "--rom", tmp_path / "rom", "--stdin").ended(2)
-    assert "another simulator's" in done.err
+    assert "another simulator uses the ROM" in done.err
 
 
 def test_what_cannot_be_kept_is_not_acknowledged(sim, tmp_path):
@@ -125,3 +126,41 @@ def test_what_cannot_be_kept_is_not_acknowledged(sim, tmp_path):
             assert motor.ask(WRITE_GAINS_TO_ROM, 0, *gains(5)) is not None
     assert drives.wait() == 3
     assert any("cannot keep ROM" in text for text in drives.err), drives.err
+
+
+@pytest.mark.parametrize("name", ["bus1-motor1.rom", "bus1-motor1.new", "lock"])
+@pytest.mark.parametrize("kind", ["link", "dangling", "fifo", "folder", "device"])
+def test_nothing_but_its_own_files_is_touched(run, tmp_path, name, kind):
+    """Refused at once, with the name; what a link leads to stays as it is."""
+    rom, precious = tmp_path / "rom", tmp_path / "precious"
+    rom.mkdir()
+    precious.write_text("precious")
+    place = rom / name
+    made = {
+        "link": lambda: place.symlink_to(precious),
+        "dangling": lambda: place.symlink_to(tmp_path / "nothing"),
+        "fifo": lambda: os.mkfifo(place),
+        "folder": place.mkdir,
+        "device": lambda: place.symlink_to("/dev/zero"),
+    }
+    made[kind]()
+    done = run("sim", "--rom", rom, "--rmd", f"slcan-pty:{tmp_path}/can", "--stdin").ended(2)
+    assert str(place) in done.err and "not changed" in done.err, done.err
+    assert precious.read_text() == "precious"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["precious", "rom"]
+    assert os.path.lexists(place)
+
+
+def test_a_folder_behind_a_link_is_refused(run, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "rom").symlink_to(tmp_path / "elsewhere")
+    done = run("sim", "--rom", tmp_path / "rom", "--stdin").ended(2)
+    assert "symbolic link" in done.err
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+
+
+def test_a_lock_file_of_another_program_is_left_alone(run, tmp_path):
+    (tmp_path / "lock").write_text("pid 4711")
+    done = run("sim", "--rom", tmp_path, "--stdin").ended(2)
+    assert str(tmp_path / "lock") in done.err
+    assert (tmp_path / "lock").read_text() == "pid 4711"

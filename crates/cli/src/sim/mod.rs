@@ -84,7 +84,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
     };
     let mut bench = SimServer::new();
     if let Some(folder) = &args.rom {
-        bench.keep_rom(RomFolder::open(folder).map_err(ServeError::from)?);
+        bench.keep_rom(RomFolder::open(folder)?);
     }
     let out = output::never_wait();
     serve(&mut bench, &config, &st, &rmd, out)?;
@@ -189,8 +189,23 @@ impl From<ServeError> for Failure {
     fn from(error: ServeError) -> Self {
         match error {
             ServeError::Port(error) => error.into(),
-            ServeError::Rom(error @ RomError::Io { .. }) => Failure::link(error.to_string()),
+            ServeError::Rom(error) => error.into(),
             other => Failure::usage(other.to_string()),
+        }
+    }
+}
+
+impl From<RomError> for Failure {
+    fn from(error: RomError) -> Self {
+        let text = error.to_string();
+        match error {
+            RomError::Taken { .. } => {
+                Failure::usage(text).trying("end that simulator, or choose another folder")
+            }
+            RomError::Unusable { .. } => Failure::usage(text).trying(
+                "move it away (a motor without a file gets a new ROM), or choose another folder",
+            ),
+            _ => Failure::link(text),
         }
     }
 }
