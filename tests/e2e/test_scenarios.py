@@ -2,6 +2,10 @@
 
 import csv
 import math
+import os
+import resource
+import signal
+import subprocess
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -195,3 +199,131 @@ def test_files_that_cannot_be_read_or_written_are_named(run, write, tmp_path):
     nothing = run("sim", "run", write(""), "--plot", tmp_path / "run.svg").ended(2)
     assert "[[panel]]" in nothing.err
     assert not (tmp_path / "run.svg").exists()
+
+
+# What is written, and what is left alone.
+
+PANEL = "[[panel]]\nsignals = ['st1.speed_rpm']"
+FAILING = PANEL + "\n[[expect]]\nwhy = 'it turns'\nsignal = 'st1.speed_rpm'\nmin = 3"
+
+
+@pytest.mark.parametrize("option", ["--csv", "--plot"])
+@pytest.mark.parametrize("way", ["itself", "path", "symlink", "hard link", "chain"])
+def test_a_scenario_is_never_overwritten(run, write, tmp_path, option, way):
+    scenario = write(PANEL)
+    other = tmp_path / "other"
+    match way:
+        case "itself":
+            other = scenario
+        case "path":
+            (tmp_path / "folder").mkdir()
+            other = tmp_path / "folder" / ".." / scenario.name
+        case "symlink":
+            other.symlink_to(scenario.name)
+        case "hard link":
+            other.hardlink_to(scenario)
+        case "chain":
+            (tmp_path / "between").symlink_to(scenario)
+            other.symlink_to("between")
+    before = scenario.read_bytes()
+    refused = run("sim", "run", scenario, option, other).ended(2)
+    assert str(other) in refused.err and "which is read" in refused.err
+    assert refused.out == "" and scenario.read_bytes() == before
+
+
+def test_a_load_profile_is_never_overwritten(run, write, tmp_path):
+    load = tmp_path / "pump.csv"
+    load.write_text("t_s,newton_metres\n0,0\n1,0.1\n")
+    scenario = write("[[load_profile]]\nst = 1\nfile = 'pump.csv'")
+    before = load.read_bytes()
+    assert "which is read" in run("sim", "run", scenario, "--csv", load).ended(2).err
+    assert load.read_bytes() == before
+
+
+@pytest.mark.parametrize("way", ["itself", "path", "symlink", "hard link", "dangling"])
+def test_an_output_is_never_overwritten_with_another(run, write, tmp_path, way):
+    csv_file, svg = tmp_path / "run", tmp_path / "link"
+    match way:
+        case "itself":
+            svg = csv_file
+        case "path":
+            (tmp_path / "folder").mkdir()
+            svg = tmp_path / "folder" / ".." / "run"
+        case "symlink":
+            csv_file.write_text("old")
+            svg.symlink_to("run")
+        case "hard link":
+            csv_file.write_text("old")
+            svg.hardlink_to(csv_file)
+        case "dangling":
+            svg.symlink_to("run")
+    files = ("--csv", csv_file, "--plot", svg)
+    assert "is the same file as" in run("sim", "run", write(PANEL), *files).ended(2).err
+    assert not csv_file.exists() or csv_file.read_text() == "old"
+
+
+def test_a_link_stays_a_link_and_a_mode_stays_a_mode(run, write, tmp_path):
+    real, link = tmp_path / "real.csv", tmp_path / "link.csv"
+    real.write_text("old")
+    real.chmod(0o640)
+    link.symlink_to("real.csv")
+    run("sim", "run", write(""), "--csv", link).ended(0)
+    assert link.is_symlink() and len(columns(real)["time_s"]) == 1001
+    assert real.stat().st_mode & 0o777 == 0o640
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link.csv", "real.csv", "scenario.toml"]
+
+
+def test_a_minus_is_stdout(run, write, tmp_path):
+    scenario = write(PANEL)
+    run("sim", "run", scenario, "--csv", tmp_path / "a.csv", "--plot", tmp_path / "a.svg").ended(0)
+    csv_out = run("sim", "run", scenario, "--csv", "-").ended(0)
+    assert csv_out.out == (tmp_path / "a.csv").read_text()
+    assert "state hash" in csv_out.err, "the report is on stderr then"
+    assert run("sim", "run", scenario, "--plot", "-").ended(0).out == (tmp_path / "a.svg").read_text()
+    both = run("sim", "run", scenario, "--csv", "-", "--plot", "-").ended(2)
+    assert "stdout" in both.err and both.out == ""
+    json_too = run("sim", "run", scenario, "--csv", "-", "--json").ended(2)
+    assert "stdout" in json_too.err and json_too.out == ""
+
+
+@pytest.mark.parametrize("option", ["--csv", "--plot"])
+def test_a_full_disk_keeps_the_exit_code_of_what_happened(run, write, option):
+    full = run("sim", "run", write(PANEL), option, "/dev/full").ended(3)
+    assert "cannot write `/dev/full`" in full.err and "state hash" in full.out
+    failed = run("sim", "run", write(FAILING), option, "/dev/full").ended(1)
+    assert "cannot write `/dev/full`" in failed.err and "it turns: st1.speed_rpm" in failed.err
+
+
+@pytest.mark.parametrize("options", [(), ("--json",), ("--csv", "-"), ("--plot", "-")])
+@pytest.mark.parametrize("out", ["full", "closed"])
+def test_a_stdout_that_fails_keeps_the_exit_code_of_what_happened(motorlink, write, options, out):
+    for text, full, closed in ((PANEL, 3, 0), (FAILING, 1, 1)):
+        if out == "full":
+            stdout = os.open("/dev/full", os.O_WRONLY)
+        else:
+            reader, stdout = os.pipe()
+            os.close(reader)
+        command = [motorlink, "sim", "run", write(text), *options]
+        done = subprocess.run(command, stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=60)
+        os.close(stdout)
+        assert done.returncode == (full if out == "full" else closed), done.stderr
+        if text is FAILING:
+            assert "it turns: st1.speed_rpm" in done.stderr and "stdout" in done.stderr
+        elif out == "full":
+            assert "stdout" in done.stderr
+
+
+def test_a_failed_write_keeps_the_old_output(motorlink, write, tmp_path):
+    """A file may have 1 KiB; more is an error, as on a full disk."""
+    old = tmp_path / "run.csv"
+    old.write_text("old")
+    command = [motorlink, "sim", "run", write(""), "--csv", old]
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024))
+
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, preexec_fn=limit)
+    assert done.returncode == 3 and "run.csv" in done.stderr, done.stderr
+    assert old.read_text() == "old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.csv", "scenario.toml"]

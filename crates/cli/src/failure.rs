@@ -86,6 +86,29 @@ impl Failure {
         }
     }
 
+    /// After a file could not be written.
+    pub fn file(path: &std::path::Path, error: &std::io::Error) -> Self {
+        let message = format!("cannot write `{}`: {error}", path.display());
+        Problem::new(Kind::Output, message).into()
+    }
+
+    /// Two failures of one command. Both are reported; the exit code is that of the first, except that
+    /// an interruption is never hidden.
+    pub fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Failure::Interrupted, _) | (_, Failure::Interrupted) => Failure::Interrupted,
+            (Failure::OutputClosed, other) => other,
+            (Failure::Failed(mut problem), other) => {
+                let text = match &other {
+                    Failure::Failed(other) => other.text(),
+                    _ => "stdout was closed before everything was written".to_owned(),
+                };
+                problem.message = format!("{}\n{text}", problem.message);
+                Failure::Failed(problem)
+            }
+        }
+    }
+
     /// With what to try.
     pub fn trying(mut self, advice: impl Into<String>) -> Self {
         if let Failure::Failed(problem) = &mut self {

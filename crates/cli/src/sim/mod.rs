@@ -1,5 +1,6 @@
 //! `motorlink sim`: serves simulated drives and obeys commands on stdin, or plays a scenario.
 
+mod outputs;
 mod plot;
 mod presets;
 mod run;
@@ -57,7 +58,7 @@ pub struct Args {
 
 #[derive(clap::Subcommand)]
 enum Command {
-    /// Play a scenario on virtual time: plot, CSV, and whether everything came as expected
+    /// Play a scenario on virtual time, check its expectations, write a plot or a CSV file
     Run(run::Args),
     /// The presets of motors and what they are
     Presets(presets::Args),

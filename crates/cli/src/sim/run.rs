@@ -1,7 +1,5 @@
 //! `motorlink sim run`: plays a scenario on virtual time.
 
-use std::fs;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -9,25 +7,26 @@ use motorlink::st::register::Unit;
 use motorlink_testbench::scenario::{Kind, Run, Scenario, ScenarioError};
 use serde_json::{Map, Value, json};
 
+use super::outputs::{self, Output};
 use super::plot;
 use crate::failure::Failure;
 use crate::json;
-use crate::output::{Printer, note, print_line};
+use crate::output::{note, print_line};
 
 /// Values of the final state in a line of text.
 const ON_A_LINE: usize = 5;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// The scenario, in TOML; docs/SCENARIOS.md says what it may contain
+    /// The scenario, a TOML file; docs/SCENARIOS.md describes it
     scenario: PathBuf,
-    /// Draw the panels of the scenario into this file
+    /// Draw the panels of the scenario into this file; `-` is stdout
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Write every signal into this file, a row a sample
+    /// Write all signals into this file, a row for each sample; `-` is stdout
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
-    /// One line of JSON instead of text
+    /// Print one line of JSON instead of text
     #[arg(long)]
     json: bool,
 }
@@ -38,6 +37,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let why = "there is nothing to plot: add a [[panel]] with signals";
         return Err(Failure::usage(format!("{}: {why}", args.scenario.display())));
     }
+    let inputs: Vec<&Path> =
+        std::iter::once(&args.scenario).chain(&scenario.files).map(|path| &**path).collect();
+    let outputs = [("--csv", args.csv.as_deref()), ("--plot", args.plot.as_deref())];
+    let outputs = outputs::resolve(&outputs, &inputs)?;
+    let [csv, plot] = &outputs[..] else { unreachable!("each output was resolved") };
+    let stdout_is_taken = outputs.contains(&Some(Output::Stdout));
+    if stdout_is_taken && args.json {
+        return Err(Failure::usage("`-` and --json both need stdout: write to a file"));
+    }
     let began = Instant::now();
     let run = scenario.run()?;
     let took = began.elapsed().as_secs_f64();
@@ -46,60 +54,55 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         "{seconds} s in {took:.3} s: {:.0} times faster than real time",
         seconds / took.max(1e-6)
     ));
-    if let Some(path) = &args.csv {
-        write(path, |out| run.write_csv(out))?;
-    }
-    if let Some(path) = &args.plot {
+    // Each output is tried, so that one that fails does not take the others away.
+    let report = match (args.json, stdout_is_taken) {
+        (true, _) => print_line(&object(&scenario, &run, seconds)),
+        (false, true) => {
+            text(&scenario, &run, seconds).iter().for_each(note);
+            Ok(())
+        }
+        (false, false) => {
+            text(&scenario, &run, seconds).iter().try_for_each(|line| print_line(line))
+        }
+    };
+    let csv = csv.as_ref().map_or(Ok(()), |out| out.write(|mut file| run.write_csv(&mut file)));
+    let plot = plot.as_ref().map_or(Ok(()), |out| {
         let picture = plot::draw(&scenario, &run).map_err(Failure::link)?;
-        write(path, |out| out.write_all(picture.as_bytes()))?;
-    }
-    let output = Printer { json: args.json };
-    if output.json {
-        print_line(&object(&scenario, &run, seconds))?;
-    } else {
-        text(&scenario, &run, seconds)?;
-    }
-    if run.as_expected() {
-        return Ok(());
-    }
-    Err(Failure::refused(not_as_expected(&run)))
-}
-
-fn write(
-    path: &Path,
-    content: impl FnOnce(&mut BufWriter<fs::File>) -> std::io::Result<()>,
-) -> Result<(), Failure> {
-    let written = fs::File::create(path).and_then(|file| {
-        let mut out = BufWriter::new(file);
-        content(&mut out)?;
-        out.flush()
+        out.write(|file| file.write_all(picture.as_bytes()))
     });
-    written.map_err(|error| Failure::link(format!("cannot write `{}`: {error}", path.display())))
+    let judged = match run.as_expected() {
+        true => Ok(()),
+        false => Err(Failure::refused(not_as_expected(&run))),
+    };
+    // What happened comes first: its exit code counts.
+    let failures = [judged, report, csv, plot].into_iter().filter_map(Result::err);
+    failures.reduce(Failure::and).map_or(Ok(()), Err)
 }
 
-fn text(scenario: &Scenario, run: &Run, seconds: f64) -> Result<(), Failure> {
-    print_line(&scenario.title)?;
+fn text(scenario: &Scenario, run: &Run, seconds: f64) -> Vec<String> {
+    let mut lines = vec![scenario.title.clone()];
     let samples = run.times().count();
-    print_line(&format!(
+    lines.push(format!(
         "  simulated   {seconds} s, {samples} samples of {} signals",
         run.signals.len()
-    ))?;
+    ));
     for Last { drive, signals } in last(run) {
         let mut head = drive.as_str();
         for shown in signals.chunks(ON_A_LINE) {
             let shown: Vec<&str> = shown.iter().map(|(_, _, text)| text.as_str()).collect();
-            print_line(&format!("  {head:<10}  {}", shown.join(", ")))?;
+            lines.push(format!("  {head:<10}  {}", shown.join(", ")));
             head = "";
         }
     }
     for verdict in &run.verdicts {
         let mark = if verdict.holds { "holds" } else { "FAILS" };
         let (why, signal, found) = (&verdict.why, &verdict.signal, &verdict.found);
-        print_line(&format!("  {mark:<10}  {why}: {signal} {found}"))?;
+        lines.push(format!("  {mark:<10}  {why}: {signal} {found}"));
     }
     let holding = run.verdicts.iter().filter(|verdict| verdict.holds).count();
-    print_line(&format!("  expected    {holding} of {} expectations hold", run.verdicts.len()))?;
-    print_line(&format!("  state hash  {:016x}", run.state_hash))
+    lines.push(format!("  expected    {holding} of {} expectations hold", run.verdicts.len()));
+    lines.push(format!("  state hash  {:016x}", run.state_hash));
+    lines
 }
 
 fn object(scenario: &Scenario, run: &Run, seconds: f64) -> Value {
@@ -170,7 +173,7 @@ fn not_as_expected(run: &Run) -> String {
     let failed =
         failed.map(|verdict| format!("{}: {} {}", verdict.why, verdict.signal, verdict.found));
     let all: Vec<String> = refusals.chain(failed).collect();
-    format!("it did not come as expected:\n  {}", all.join("\n  "))
+    format!("the run was not as expected:\n  {}", all.join("\n  "))
 }
 
 impl From<ScenarioError> for Failure {

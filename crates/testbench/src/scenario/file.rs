@@ -96,6 +96,8 @@ impl Scenario {
     pub fn parse(text: &str, folder: &Path) -> Result<Self, String> {
         let mut file: File = toml::from_str(text).map_err(|error| error.to_string())?;
         let (duration, sample) = times(file.duration, file.sample_us)?;
+        let files = file.load_profile.iter().filter_map(|load| load.get("file")?.as_str());
+        let files = files.map(|file| folder.join(file)).collect();
         let script = file.script(folder, duration)?;
         let signals = script.cast.signals();
         let count = duration.0 / sample.0 + 1;
@@ -111,7 +113,17 @@ impl Scenario {
             written.resolve(&signals, step, count as usize)
         })?;
         let (title, about) = (file.title, file.about);
-        Ok(Scenario { title, about, duration, sample, panels, script, signals, expectations })
+        Ok(Scenario {
+            title,
+            about,
+            duration,
+            sample,
+            files,
+            panels,
+            script,
+            signals,
+            expectations,
+        })
     }
 }
 

@@ -1,5 +1,7 @@
 //! A scenario, and playing it.
 
+use std::path::PathBuf;
+
 use motorlink_proto::time::Micros;
 
 use super::expect::Expectation;
@@ -19,6 +21,8 @@ pub struct Scenario {
     pub duration: Micros,
     /// From sample to sample.
     pub sample: Micros,
+    /// Files that it names, which were read: load profiles.
+    pub files: Vec<PathBuf>,
     /// What is plotted, from top to bottom.
     pub panels: Vec<Panel>,
     pub(super) script: Script,
