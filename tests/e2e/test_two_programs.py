@@ -157,4 +157,4 @@ def test_a_serial_line_that_echoes_is_named(run, pairs, arguments):
     st = pairs("st")
     st.line.fate = Fate(echo=True)
     echoed = run("st", "-p", st.line.port, *arguments).ended(3)
-    assert "comes back" in echoed.err and "baud" not in echoed.err
+    assert "the line echoes" in echoed.err and "baud" not in echoed.err

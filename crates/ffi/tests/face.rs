@@ -258,7 +258,7 @@ fn an_answer_that_comes_before_the_next_poll_recovers_the_line() {
 }
 
 #[test]
-fn a_line_that_was_just_opened_is_brought_in_step_by_three_questions() {
+fn three_questions_bring_a_just_opened_line_in_sync() {
     let nothing: motorlink_st_motor_control = zeroed();
     let mut bench = StBench::new(0, &nothing);
     let master: *mut motorlink_st_master = &mut bench.master;

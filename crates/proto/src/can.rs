@@ -81,14 +81,14 @@ impl CanFrame {
 /// The standard identifiers that a protocol uses on a bus.
 #[derive(Debug, Clone)]
 pub struct Identifiers {
-    /// Those that replies come with.
+    /// The identifiers of replies.
     pub replies: Range<u16>,
-    /// Whether one of them means something to a drive or a host.
+    /// Whether a drive or a host of the protocol uses this identifier.
     pub is_used: fn(u16) -> bool,
 }
 
 impl Default for Identifiers {
-    /// None: of a bus whose protocol is not known.
+    /// No identifiers: for a bus whose protocol is not known.
     fn default() -> Self {
         Identifiers { replies: 0..0, is_used: |_| false }
     }

@@ -1,8 +1,8 @@
-//! Bytes in text.
+//! Bytes as text.
 
 use core::fmt;
 
-/// Bytes as people write them: `02 01 1e 21`.
+/// Displays bytes as hexadecimal text: `02 01 1e 21`.
 ///
 /// ```
 /// assert_eq!(motorlink_proto::Hex(&[2, 0x1e]).to_string(), "02 1e");

@@ -1,11 +1,25 @@
 //! Two motor-drive protocols, both ends of each, without I/O.
 //!
-//! * [`st`]: ST's serial Motor Control Protocol as MCSDK 5.x drives speak it, master and slave.
-//! * [`rmd`]: the RMD motor control protocol over CAN, V1.62, host and drive, on frames of [`can`].
+//! Use this crate to write firmware, or a host with its own I/O. A program that talks to a drive
+//! through a port uses the crate `motorlink` instead.
 //!
-//! Nothing here reads a clock or touches a port. A caller hands in received bytes or frames together
-//! with the [`time::Instant`] at which they came, and takes out what is to be sent and how long to
-//! wait. The crate is `no_std`, allocates nothing, contains no `unsafe` and does not panic.
+//! | to | use |
+//! |---|---|
+//! | command an ST drive over a serial line | [`st::Master`], [`st::Request`] |
+//! | answer as an ST drive, in firmware | [`st::Slave`] and your [`st::MotorControl`] |
+//! | command RMD motors on a CAN bus | [`rmd::Host`], the request types such as [`rmd::SetSpeed`] |
+//! | answer as an RMD motor, in firmware | [`rmd::Drive`] and your [`rmd::MotorControl`] |
+//! | look up a register, a command or a unit | [`st::register`], [`rmd::COMMANDS`], [`units`] |
+//! | refuse dangerous requests | [`st::Limits`] with [`st::Account`], [`rmd::Limits`] |
+//! | print a frame | [`Hex`], [`rmd::describe`] |
+//!
+//! ST's protocol is the serial Motor Control Protocol of MCSDK 5.x drives. RMD is the RMD motor
+//! control protocol over CAN, V1.62; its frames are [`can::CanFrame`]s.
+//!
+//! The crate reads no clock and opens no port. The caller passes received bytes or frames, with the
+//! [`time::Instant`] of their arrival. The caller then polls: the answer is what to send, a result,
+//! or how long to wait. The crate is `no_std`, allocates nothing, contains no `unsafe` and does not
+//! panic.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]

@@ -1,7 +1,7 @@
-//! The macro behind every list of named numbers: each number is written once, and none is lost.
+//! The macro for all lists of named numbers. Each number is written once; unknown numbers are kept.
 
 /// Declares a set of named numbers: the enum, both conversions, the document's names and the list.
-/// A number without a name survives as `Unknown`.
+/// A number without a name becomes `Unknown`.
 macro_rules! named_numbers {
     (
         $(#[$meta:meta])*
@@ -13,7 +13,7 @@ macro_rules! named_numbers {
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum $name {
             $( #[doc = concat!("`", $text, "` (", stringify!($value), "): ", $doc)] $variant, )+
-            /// A number that the document does not name.
+            /// A number without a name in the document.
             Unknown($repr),
         }
 
@@ -24,7 +24,7 @@ macro_rules! named_numbers {
             /// Each number with the document's name for it.
             pub const NAMES: &'static [($repr, &'static str)] = &[$( ($value, $text), )+];
 
-            /// The document's name; `None` for a number that it does not name.
+            /// The document's name; `None` if it has none.
             pub const fn name(self) -> Option<&'static str> {
                 match self {
                     $( $name::$variant => Some($text), )+

@@ -1,4 +1,4 @@
-//! Time as an argument: microseconds since a moment that the caller chooses.
+//! Time as an argument: microseconds since an origin that the caller chooses.
 
 use core::ops::{Add, AddAssign};
 

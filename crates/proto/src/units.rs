@@ -1,41 +1,42 @@
-//! Wire integers with their unit in the type: a row each has scale, symbols and range. The integer is kept exactly; conversions to and from
-//! physical values round to the nearest digit and saturate at the ends of the integer.
+//! Integers on the wire, with their unit in the type. One row per type defines scale, symbols and
+//! range. The integer is kept exactly. Conversions to and from physical values round to the nearest
+//! digit and saturate at the limits of the integer.
 
-/// How far a value may be from a digit and still count as it, in digits: more than what division of
-/// binary fractions loses in 32 bits, far less than a digit.
+/// Tolerance of a value that should be a whole number of digits, in digits. It is more than the
+/// rounding errors of binary fractions in 32 bits, and far less than a digit.
 const TOLERANCE: f64 = 1e-6;
 
-/// The whole digits of `scale` in `value`, rounded towards 0: what a limit of `value` allows. As 0.3
-/// has 30 digits of 0.01 although binary fractions say 29.999…, what misses a digit by a millionth of
-/// one counts as that digit. Saturates, and NaN is 0.
+/// The number of whole digits of `scale` in `value`, rounded towards 0: the digits that a limit of
+/// `value` allows. 0.3 has 30 digits of 0.01, although binary fractions give 29.999…: a value
+/// within a millionth of a digit counts as that digit. Saturates; NaN gives 0.
 pub fn inward(value: f64, scale: f64) -> i64 {
     let digits = value / scale;
     let tolerance = if digits < 0.0 { -TOLERANCE } else { TOLERANCE };
     (digits + tolerance) as i64
 }
 
-/// A value that a message cannot carry, or that the protocol does not allow there.
+/// A value that a message cannot carry, or that the protocol does not allow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Unfit {
     /// Not a number, or outside the range.
     OutOfRange {
-        /// What was given.
+        /// The given value.
         value: f64,
-        /// The least that can be, in `unit`.
+        /// The minimum, in `unit`.
         least: f64,
-        /// The most that can be.
+        /// The maximum.
         most: f64,
-        /// Symbol of the unit; `digits` where digits were given.
+        /// Symbol of the unit; `digits` if digits were given.
         unit: &'static str,
     },
-    /// It would be sent as 0, which has a meaning of its own.
+    /// It would be sent as 0, which has a special meaning.
     BecomesZero {
-        /// What was given.
+        /// The given value.
         value: f64,
-        /// The least that is not 0, in `unit`.
+        /// The smallest value other than 0, in `unit`.
         digit: f64,
-        /// Symbol of the unit; `digits` where digits were given.
+        /// Symbol of the unit; `digits` if digits were given.
         unit: &'static str,
     },
 }
@@ -63,33 +64,33 @@ impl core::fmt::Display for Unfit {
 
 impl core::error::Error for Unfit {}
 
-/// How a value that somebody wants becomes a digit.
+/// How a requested value is rounded to a digit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rounding {
     /// The nearest digit.
     Nearest,
-    /// Towards 0, as [`inward`]: no digit exceeds the value.
+    /// Towards 0, like [`inward`]: the digit never exceeds the value.
     Inward,
-    /// The nearest digit, and 0 only of 0, which means no limit.
+    /// The nearest digit. Only 0 becomes 0, which means no limit.
     NoLimitOfZero,
 }
 
-/// What a digit is, and which there are.
+/// The unit and the range of digits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     /// One digit in the physical unit.
     pub digit: f64,
     /// Symbol of the physical unit; empty for a plain number.
     pub symbol: &'static str,
-    /// The unit in a name: `amps` of `iq_amps`; empty for a plain number.
+    /// The unit in a name, such as `amps` in `iq_amps`; empty for a number without unit.
     pub suffix: &'static str,
-    /// Digits behind the point that tell every value.
+    /// Number of decimal places that show every value exactly.
     pub decimals: u8,
-    /// The least digit that may be asked for.
+    /// The minimum of a request, in digits.
     pub least: i64,
-    /// The greatest digit that may be asked for.
+    /// The maximum of a request, in digits.
     pub most: i64,
-    /// How a wanted value becomes a digit.
+    /// How a requested value is rounded.
     pub rounding: Rounding,
 }
 
@@ -100,7 +101,7 @@ impl Scale {
         Scale { digit: 1.0, symbol, suffix: "", decimals: 0, least, most, rounding }
     }
 
-    /// The digits of a value in the physical unit that somebody wants; never cut.
+    /// Converts a requested value from the physical unit to digits. Never cuts the value.
     ///
     /// # Errors
     /// Not a number, or outside the range.
@@ -121,12 +122,13 @@ impl Scale {
         Err(Unfit::OutOfRange { value, least, most, unit })
     }
 
-    /// The same scale for who gives digits.
+    /// The same scale for values in digits.
     pub const fn raw(self) -> Self {
         Scale { digit: 1.0, symbol: "digits", decimals: 0, ..self }
     }
 
-    /// Digits in the physical unit: 239 of 0.1 are 23.9, and not 23.900000000000002.
+    /// Converts digits to the physical unit: 239 digits of 0.1 are 23.9, and not
+    /// 23.900000000000002.
     pub fn value(&self, digits: i64) -> f64 {
         let parts = nearest(self.digit.recip()) as f64;
         if parts > 1.0 && parts.recip() == self.digit {
@@ -136,40 +138,40 @@ impl Scale {
     }
 }
 
-/// A wire integer with a unit.
+/// An integer on the wire, with a unit.
 pub trait Quantity: Sized {
-    /// What a digit is, and which may be asked for.
+    /// The unit and the range of digits.
     const UNIT: Scale;
 
-    /// Its bytes on the wire.
+    /// Size on the wire, in bytes.
     const BYTES: u8;
     /// Whether it is two's complement.
     const SIGNED: bool;
 
-    /// The wire integer.
+    /// The integer on the wire.
     fn digits(self) -> i64;
 
-    /// The quantity of these digits, which are cut to what the integer holds.
+    /// The quantity with these digits, which are cut to the size of the integer.
     fn from_digits(digits: i64) -> Self;
 
-    /// The digit for a value in the physical unit that somebody wants; never cut.
+    /// Converts a requested value from the physical unit. Never cuts the value.
     ///
     /// # Errors
-    /// Not a number, or outside what may be asked for.
+    /// Not a number, or outside the range of requests.
     fn wanted(value: f64) -> Result<Self, Unfit> {
         Self::UNIT.wanted(value).map(Self::from_digits)
     }
 
-    /// As [`wanted`](Self::wanted), for who gives digits.
+    /// Like [`wanted`](Self::wanted), for a value in digits.
     ///
     /// # Errors
-    /// Not a number, or outside what may be asked for.
+    /// Not a number, or outside the range of requests.
     fn wanted_digits(digits: f64) -> Result<Self, Unfit> {
         Self::UNIT.raw().wanted(digits).map(Self::from_digits)
     }
 }
 
-/// The nearest whole number; saturates, and NaN is 0.
+/// The nearest whole number. Saturates; NaN gives 0.
 fn nearest(value: f64) -> i64 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i64
 }
@@ -191,7 +193,7 @@ macro_rules! unit {
             pub const SCALE: f64 = $digit;
             /// Symbol of the physical unit.
             pub const SYMBOL: &'static str = $symbol;
-            /// The greatest value that may be asked for.
+            /// The maximum of a request.
             pub const MAX: Self = $name($most);
 
             #[doc = concat!("The physical value in ", $symbol, ".")]
@@ -335,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn no_limit_comes_of_0_only() {
+    fn only_0_becomes_no_limit() {
         assert_eq!(DpsPerSecond::wanted(0.0), Ok(DpsPerSecond(0)));
         assert_eq!(DpsPerSecond::wanted(-0.0), Ok(DpsPerSecond(0)));
         assert_eq!(DpsPerSecond::wanted(0.5), Ok(DpsPerSecond(1)));
@@ -348,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn digits_are_shown_without_the_dust_of_binary_fractions() {
+    fn digits_are_shown_without_binary_rounding_errors() {
         assert_eq!(DeciVolts::UNIT.value(239), 23.9);
         assert_eq!(CentiDegrees::UNIT.value(-1), -0.01);
         assert_eq!(PhaseCurrent::UNIT.value(64), 1.0);

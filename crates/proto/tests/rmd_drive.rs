@@ -1,4 +1,4 @@
-//! What a drive answers, keeps and does.
+//! The replies, settings and modes of a drive.
 
 mod rmd_bench;
 
@@ -28,7 +28,7 @@ fn circle(direction: SpinDirection, degrees: f64) -> SetSingleTurnPosition {
 }
 
 fn position(mode: Mode) -> i64 {
-    let Mode::Position { target, .. } = mode else { panic!("{mode:?} is no position") };
+    let Mode::Position { target, .. } = mode else { panic!("{mode:?} is not a position") };
     target
 }
 
@@ -89,7 +89,7 @@ fn a_written_offset_holds_at_once_and_after_a_power_cycle() {
 }
 
 #[test]
-fn an_offset_beyond_the_encoder_is_cut_and_the_reply_says_so() {
+fn an_offset_beyond_the_encoder_is_cut_in_the_reply_too() {
     let mut node = Node::new(1);
     let offset = EncoderOffset { offset: 0xFFFF };
     assert_eq!(node.ask(WriteEncoderOffsetRom(offset)), EncoderOffset { offset: 0x3FFF });
@@ -110,7 +110,7 @@ fn a_new_zero_is_in_the_reply_and_holds_from_the_next_power_on() {
 }
 
 #[test]
-fn of_an_18_bit_encoder_the_upper_16_bits_travel_and_the_angle_has_them_all() {
+fn an_18_bit_encoder_sends_16_bits_and_an_exact_angle() {
     let mut node = Node::new(1);
     node.drive.config.encoder = EncoderBits::new(18).unwrap();
     node.motor.sense.encoder = 0x1_0003;
@@ -181,7 +181,7 @@ fn after_off_there_is_nothing_to_resume() {
     node.ask(Run);
     assert_eq!(node.motor.mode, Mode::Off);
     node.ask(Stop);
-    assert_eq!(node.motor.mode, Mode::Off, "what is off stays off");
+    assert_eq!(node.motor.mode, Mode::Off, "stop does not change off");
 }
 
 #[test]
@@ -211,11 +211,11 @@ fn position_targets_are_counted_from_the_zero_point() {
     let max_speed = SpeedLimit(0);
     node.ask(SetPositionLimited { angle: CentiDegrees(9_000), max_speed });
     let limited = turn_to(100 + 4_096, Some(max_speed));
-    assert_eq!(node.motor.mode, limited, "a greatest speed of 0 is taken at its word");
+    assert_eq!(node.motor.mode, limited, "a maximum speed of 0 is kept");
 }
 
 #[test]
-fn a_target_stays_in_its_place_when_the_zero_moves() {
+fn a_target_does_not_move_with_the_zero_point() {
     let mut node = Node::new(1);
     node.ask(SetPosition { angle: CentiDegrees(9_000) });
     node.ask(WriteEncoderOffsetRom(EncoderOffset { offset: 1_000 }));
@@ -223,7 +223,7 @@ fn a_target_stays_in_its_place_when_the_zero_moves() {
 }
 
 #[test]
-fn a_single_turn_command_turns_the_way_it_says() {
+fn a_single_turn_command_turns_in_its_direction() {
     let mut node = Node::new(1);
     node.motor.sense.encoder = 3 * 16_384 + 8_192;
     node.ask(circle(SpinDirection::Clockwise, 90.0));
@@ -231,7 +231,7 @@ fn a_single_turn_command_turns_the_way_it_says() {
     node.ask(circle(SpinDirection::Counterclockwise, 90.0));
     assert_eq!(position(node.motor.mode), 3 * 16_384 + 4_096);
     node.ask(circle(SpinDirection::Counterclockwise, 180.0));
-    assert_eq!(position(node.motor.mode), 3 * 16_384 + 8_192, "it is there already");
+    assert_eq!(position(node.motor.mode), 3 * 16_384 + 8_192, "the motor is already there");
 }
 
 #[test]
@@ -241,7 +241,7 @@ fn the_same_single_turn_command_again_does_not_start_another_turn() {
     node.ask(command);
     node.motor.sense.encoder = 4_097;
     node.ask(command);
-    assert_eq!(position(node.motor.mode), 4_096, "a count beyond is no reason for a turn");
+    assert_eq!(position(node.motor.mode), 4_096, "an overshoot of one count does not start a turn");
     let SetSingleTurnPosition { direction, angle } = command;
     let max_speed = SpeedLimit(7);
     node.ask(SetSingleTurnPositionLimited { direction, max_speed, angle });
@@ -251,7 +251,7 @@ fn the_same_single_turn_command_again_does_not_start_another_turn() {
     );
     node.ask(torque(0));
     node.ask(command);
-    assert_eq!(position(node.motor.mode), 4_096 + 16_384, "after something else it is a new one");
+    assert_eq!(position(node.motor.mode), 4_096 + 16_384, "after another command it is a new one");
 }
 
 #[test]
@@ -276,7 +276,7 @@ fn an_error_stays_until_it_is_cleared_after_its_cause_is_gone() {
     let mut node = Node::new(1);
     node.motor.sense.faults = Errors::LOW_VOLTAGE;
     assert_eq!(node.ask(ReadStatus).errors, Errors::LOW_VOLTAGE);
-    assert_eq!(node.ask(ClearErrors).errors, Errors::LOW_VOLTAGE, "the cause lasts");
+    assert_eq!(node.ask(ClearErrors).errors, Errors::LOW_VOLTAGE, "the cause is still present");
     node.motor.sense.faults = Errors::OVER_TEMPERATURE;
     assert_eq!(node.ask(ClearErrors).errors, Errors::OVER_TEMPERATURE, "only one cause is gone");
     node.motor.sense.faults = Errors::NONE;
@@ -298,7 +298,7 @@ fn while_an_error_is_latched_the_motor_is_off_and_motion_commands_are_only_answe
     assert_eq!(node.motor.mode, Mode::Off);
     node.ask(ClearErrors);
     node.ask(Run);
-    assert_eq!(node.motor.mode, Mode::Off, "protection forgot the command");
+    assert_eq!(node.motor.mode, Mode::Off, "the protection discarded the command");
     node.ask(torque(100));
     assert_eq!(node.motor.mode, Mode::Torque(IqCommand(100)));
 }
@@ -308,7 +308,7 @@ fn silence_for_the_shutdown_time_switches_the_motor_off() {
     let mut node = Node::new(1);
     assert_eq!(node.drive.deadline(), None);
     node.drive.config.shutdown = Some(Micros(1_000));
-    assert_eq!(node.drive.deadline(), None, "an idle motor has nothing to switch off");
+    assert_eq!(node.drive.deadline(), None, "an idle motor has no deadline");
     let send = |node: &mut Node, at, data| node.receive(Instant(at), &CanFrame::new(0x141, data));
     send(&mut node, 100, torque(5).encode());
     assert_eq!(node.drive.deadline(), Some(Instant(1_100)));
@@ -325,11 +325,11 @@ fn silence_for_the_shutdown_time_switches_the_motor_off() {
 
     send(&mut node, 2_000, torque(5).encode());
     send(&mut node, 3_000, Run.encode());
-    assert_eq!(node.motor.mode, Mode::Off, "also when nobody polled in between");
+    assert_eq!(node.motor.mode, Mode::Off, "also without a poll in between");
 }
 
 #[test]
-fn an_echo_repeats_what_came_down_to_stale_null_bytes() {
+fn an_echo_repeats_every_byte_including_null_bytes() {
     let mut node = Node::new(1);
     for code in COMMANDS.iter().filter(|row| row.echo).map(|row| u8::from(row.code)) {
         let data = [code, 0xDE, 0xAD, 0xBE, 0xEF, 0x55, 0xAA, 0x33];

@@ -7,10 +7,10 @@ use motorlink_proto::rmd::*;
 use motorlink_proto::time::Instant;
 use rmd_bench::{Node, motor, trusted_host};
 
-/// What the bytes are that are not varied.
+/// The values of the bytes that are not varied.
 const PATTERNS: [u8; 3] = [0x00, 0xFF, 0x5A];
 
-/// Every value of every byte behind the code, with the others of each pattern.
+/// Every value of every byte after the code, with the other bytes of each pattern.
 fn frames(code: u8) -> impl Iterator<Item = [u8; 8]> {
     PATTERNS.into_iter().flat_map(move |pattern| {
         (1..8).flat_map(move |place| {
@@ -59,7 +59,7 @@ fn every_frame_gets_the_reply_of_its_code_or_none() {
             }
 
             if code == 0x9A {
-                // A motor that answers is supplied.
+                // A motor that answers has a supply voltage.
                 reply[3] = 240;
             }
             if let Ok(()) = host.request(Instant(0), id, data) {
@@ -68,7 +68,7 @@ fn every_frame_gets_the_reply_of_its_code_or_none() {
                 host.receive(Instant(0), &CanFrame::new(id.can_id(), reply));
                 assert_eq!(host.poll(Instant(0)), Output::Done { id, result: Ok(reply) });
             } else {
-                assert!(row.moves, "only what moves a motor is refused: {data:02x?}");
+                assert!(row.moves, "only motion commands are refused: {data:02x?}");
             }
         }
     }
@@ -91,7 +91,7 @@ fn only_a_reply_with_the_code_of_the_request_is_taken() {
     }
 }
 
-/// Decoding and encoding keeps what the fields cover, in every byte.
+/// Decoding and encoding keeps the bytes that the fields cover.
 fn kept<P: Payload>(code: u8) {
     for data in frames(code) {
         let again = P::decode(&data).encode_as(Code::from(code));

@@ -29,9 +29,9 @@ fn a_cycle_over_many_motors_takes_as_long_as_one_exchange() {
     assert_eq!(*pair.host.counters(), Counters::default());
 }
 
-/// 0x31, 0x32, 0x34, 0x80, 0x81 and 0x88 are answered with the request (3).
+/// The reply to 0x31, 0x32, 0x34, 0x80, 0x81 and 0x88 is a copy of the request (3).
 #[test]
-fn an_echo_with_another_content_promises_nothing() {
+fn a_reply_that_differs_from_its_request_is_altered() {
     for row in COMMANDS.iter().filter(|row| row.code != Code::ClearErrors) {
         for byte in 1..8 {
             let (mut host, id) = (trusted_host(), motor(1));
@@ -43,7 +43,7 @@ fn an_echo_with_another_content_promises_nothing() {
             host.receive(Instant(500), &CanFrame::new(id.can_id(), reply));
             let result = if row.echo { Err(Failure::Altered) } else { Ok(reply) };
             assert_eq!(host.poll(Instant(500)), Output::Done { id, result }, "{}", row.paragraph);
-            // The motor's own reply may come yet.
+            // The motor's own reply may still come.
             let next = host.request(Instant(600), id, ReadMotionStatus.encode());
             let is_left_alone = matches!(next, Err(RequestError::Quarantined { .. }));
             assert_eq!(is_left_alone, row.echo, "{}", row.paragraph);
@@ -104,7 +104,7 @@ fn while_four_torques_wait_to_be_sent_their_motors_are_busy() {
 }
 
 #[test]
-fn an_unexpected_answer_to_four_torques_is_not_taken_for_another_exchange() {
+fn an_unexpected_reply_to_four_torques_is_not_matched_to_another_exchange() {
     let mut pair = Pair::new(&[1, 2]);
     pair.nodes[1].turnaround = Micros(2_000);
     for _ in 0..2 {
@@ -115,7 +115,7 @@ fn an_unexpected_answer_to_four_torques_is_not_taken_for_another_exchange() {
     assert!(matches!(pair.request(2, torque), Err(RequestError::Quarantined { .. })));
     pair.wait(Micros(5_000));
     assert_eq!(pair.host.counters().late, 2);
-    assert_eq!(pair.request(2, Off), Ok(()), "a motor can be switched off all the same");
+    assert_eq!(pair.request(2, Off), Ok(()), "off is still possible");
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn a_motor_has_one_exchange_at_a_time() {
 }
 
 #[test]
-fn the_time_for_a_reply_runs_from_the_moment_of_sending() {
+fn the_timeout_starts_when_the_request_is_sent() {
     let mut host = trusted_host();
     host.request(Instant(0), motor(1), ReadStatus.encode()).unwrap();
     let sent = Instant(1_000_000);
@@ -193,7 +193,7 @@ fn a_quarantine_ends_with_its_guard_time_when_no_reply_comes() {
 }
 
 #[test]
-fn off_passes_a_quarantine_and_the_late_reply_is_told_apart() {
+fn off_is_sent_during_a_quarantine_and_the_late_reply_is_not_matched() {
     let mut pair = Pair::new(&[1]);
     pair.nodes[0].turnaround = Micros::from_millis(60);
     pair.request(1, ReadMotionStatus).unwrap();
@@ -201,12 +201,12 @@ fn off_passes_a_quarantine_and_the_late_reply_is_told_apart() {
     pair.request(1, Off).unwrap();
     assert_eq!(pair.run(), [(motor(1), Err(Failure::Timeout))]);
     assert_eq!(pair.host.counters().late, 1);
-    assert!(pair.request(1, Off).is_err(), "its own late reply is awaited");
+    assert!(pair.request(1, Off).is_err(), "its own late reply is pending");
     assert_eq!(pair.request(1, Stop), Ok(()));
 }
 
 #[test]
-fn a_cancelled_exchange_makes_way_for_off_at_once() {
+fn off_can_be_sent_right_after_a_cancelled_exchange() {
     let mut pair = Pair::new(&[1]);
     pair.request(1, ReadMotionStatus).unwrap();
     assert!(matches!(pair.host.poll(pair.now), Output::Transmit(_)));
@@ -217,11 +217,15 @@ fn a_cancelled_exchange_makes_way_for_off_at_once() {
 
     pair.request(2, ReadMotionStatus).unwrap();
     pair.host.cancel(pair.now, motor(2));
-    assert_eq!(pair.request(2, ReadMotionStatus), Ok(()), "nothing was sent, nothing is owed");
+    assert_eq!(
+        pair.request(2, ReadMotionStatus),
+        Ok(()),
+        "nothing was sent, so no reply is pending"
+    );
 }
 
 #[test]
-fn cancelling_one_motor_holds_back_the_four_torques_that_would_reach_it() {
+fn cancelling_one_motor_cancels_the_four_torques_that_would_reach_it() {
     let mut pair = Pair::new(&[1, 2]);
     pair.host.set_torque4(pair.now, SetTorque4::default(), MotorSet::TORQUE4).unwrap();
     pair.host.cancel(pair.now, motor(5));
@@ -249,7 +253,7 @@ fn the_reply_to_clear_errors_may_have_either_code() {
 }
 
 #[test]
-fn frames_that_answer_nothing_are_counted_and_dropped() {
+fn frames_without_a_request_are_counted_and_dropped() {
     let mut host = trusted_host();
     host.request(Instant(0), motor(1), ReadStatus.encode()).unwrap();
     assert!(matches!(host.poll(Instant(0)), Output::Transmit(_)));
@@ -283,7 +287,7 @@ fn a_motor_of_another_protocol_is_named_when_the_exchange_fails() {
 }
 
 #[test]
-fn limits_hold_for_raw_frames_of_their_motor_only() {
+fn limits_apply_to_raw_frames_of_their_motor_only() {
     let mut pair = Pair::new(&[1, 2]);
     let limits = Limits { current: Some(IqCommand(50)), ..Limits::default() };
     pair.host.set_limits(motor(1), limits);
@@ -301,15 +305,15 @@ fn limits_hold_for_raw_frames_of_their_motor_only() {
 }
 
 #[test]
-fn a_code_that_nobody_knows_is_sent_and_answered_by_silence() {
+fn an_unknown_code_is_sent_and_times_out() {
     let mut pair = Pair::new(&[1]);
     pair.host.request(pair.now, motor(1), [0x60; 8]).unwrap();
     assert_eq!(pair.run(), [(motor(1), Err(Failure::Timeout))]);
     assert_eq!(pair.nodes[0].drive.ignored().unknown, 1);
 }
 
-/// A host that asks a motor again and again; replies carry the number of their request. From
-/// `stop` to `go_on` the motor stands still, and then it answers everything at once.
+/// A host that sends requests to a motor without pause. Replies carry the number of their request.
+/// From `stop` to `go_on` the motor stalls; then it sends all replies at once.
 struct Standstill {
     host: Host,
     now: Instant,
@@ -327,7 +331,7 @@ impl Standstill {
         Standstill { host, now, stop, go_on, coming: vec![], number: 0 }
     }
 
-    /// One exchange, which begins when the host takes the request. Its number and how it ended.
+    /// One exchange, from the accepted request on. Returns its number and its result.
     fn ask(&mut self, code: u8) -> (u32, Result<[u8; 8], Failure>) {
         self.number += 1;
         let [a, b, c, d] = self.number.to_le_bytes();
@@ -342,7 +346,7 @@ impl Standstill {
                 Output::Transmit(frame) => {
                     let due = self.now + Micros(800);
                     let still = (self.stop..self.go_on).contains(&due);
-                    // A motor that answers is supplied: what comes is no echo.
+                    // A motor that answers has a supply voltage, so the frame is not an echo.
                     let &[code, _, _, _, a, b, c, d] = frame.eight_bytes().unwrap().1;
                     let reply = CanFrame::new(0x141, [code, 25, 0, 240, a, b, c, d]);
                     self.coming.push((if still { self.go_on } else { due }, reply));
@@ -367,7 +371,7 @@ impl Standstill {
 
 #[test]
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
-fn a_motor_that_stands_still_and_then_answers_everything_at_once_confuses_nobody() {
+fn late_replies_after_a_stall_are_never_matched_to_a_newer_request() {
     for code in [0x9C, 0x9A] {
         for still in [60, 140, 160, 300, 1_000, 30_000] {
             let mut bench = Standstill::new(100, 100 + still);
@@ -385,7 +389,7 @@ fn a_motor_that_stands_still_and_then_answers_everything_at_once_confuses_nobody
                 }
                 bench.now += Micros::from_millis(7);
             }
-            assert!(failed > 0, "a motor that stands still does not answer");
+            assert!(failed > 0, "a stalled motor does not answer");
             let took = back.expect("the motor is back").since(bench.go_on);
             let stated = DEFAULT_QUARANTINE + DEFAULT_QUARANTINE + DEFAULT_TIMEOUT;
             assert!(took <= stated, "{} us to come back from {still} ms", took.0);
@@ -393,7 +397,7 @@ fn a_motor_that_stands_still_and_then_answers_everything_at_once_confuses_nobody
     }
 }
 
-/// A host whose request to motor 1 with this code was not answered, after its quarantine time.
+/// A host after the timeout and the quarantine time of a request with this code to motor 1.
 fn unanswered(code: u8) -> (Host, Instant) {
     let mut host = trusted_host();
     host.request(Instant(0), motor(1), [code, 0, 0, 0, 0, 0, 0, 0]).unwrap();
@@ -418,7 +422,7 @@ fn a_motor_that_did_not_answer_is_asked_for_its_status_and_then_has_to_be_silent
     let answered = Output::Done { id: motor(1), result: Err(Failure::Quarantined) };
     assert_eq!(host.poll(heard), answered);
 
-    // A late reply that is not the only one owed makes it longer.
+    // A late reply that is not the only pending one prolongs the quarantine.
     let again = |until| Err(RequestError::Quarantined { id: motor(1), until });
     assert_eq!(host.request(heard, motor(1), own), again(heard + DEFAULT_QUARANTINE));
     host.request(heard, motor(1), Off.encode()).unwrap();
@@ -446,7 +450,7 @@ fn a_motor_that_does_not_answer_the_question_is_left_alone_and_asked_again() {
         let until = now + DEFAULT_QUARANTINE;
         let refused = Err(RequestError::Quarantined { id: motor(1), until });
         assert_eq!(host.request(now, motor(1), SetSpeed::default().encode()), refused);
-        // Two kinds of replies are owed, and neither is that to Off.
+        // Two kinds of replies are pending. None of them is the reply to Off.
         for halt in [Off.encode(), Stop.encode()] {
             host.request(now, motor(1), halt).unwrap();
             host.cancel(now, motor(1));
@@ -456,7 +460,7 @@ fn a_motor_that_does_not_answer_the_question_is_left_alone_and_asked_again() {
 }
 
 #[test]
-fn a_motor_that_goes_on_talking_is_switched_off_all_the_same() {
+fn off_is_sent_to_a_motor_that_keeps_sending() {
     let (mut host, _) = unanswered(0x80);
     let mut now = Instant(0) + DEFAULT_TIMEOUT;
     let until = now + DEFAULT_QUARANTINE;

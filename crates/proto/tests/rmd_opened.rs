@@ -1,4 +1,4 @@
-//! Motors that may owe a former host replies, and adapters that echo (SPEC-NOTES R29).
+//! Motors with pending replies to a former host, and adapters that echo (SPEC-NOTES R29).
 
 mod rmd_bench;
 
@@ -61,7 +61,7 @@ fn an_off_that_was_answered_is_repeated_after_the_silence_that_its_acknowledge_n
     assert_eq!(pair.run(), [(motor(1), Err(Failure::Quarantined))]);
     let until = pair.now + DEFAULT_QUARANTINE;
     assert_eq!(pair.request(1, Off), Err(RequestError::Quarantined { id: motor(1), until }));
-    // The other one was not sent yet.
+    // A Stop was not sent yet.
     pair.request(1, Stop).unwrap();
     pair.run();
     pair.wait(DEFAULT_QUARANTINE);
@@ -100,7 +100,7 @@ fn off_goes_out_at_each_attempt_to_a_motor_that_is_silent() {
 }
 
 #[test]
-fn the_question_itself_is_no_answer_and_an_echo_is_named() {
+fn an_echoed_question_is_reported_as_an_echo() {
     for mut host in [Host::new(), trusted_host()] {
         host.request(Instant(0), motor(1), ReadStatus.encode()).unwrap();
         let Output::Transmit(frame) = host.poll(Instant(0)) else { panic!("it is sent") };
@@ -123,19 +123,19 @@ fn a_bus_that_is_opened_again_is_not_trusted() {
     assert_eq!(pair.run(), [(motor(1), Err(Failure::Quarantined))]);
 }
 
-/// A host, the replies to former ones that are under way, and a motor that answers late.
+/// A host, the pending replies to former hosts, and a motor that answers late.
 struct Late {
     host: Host,
     node: Node,
     now: Instant,
     delay: Micros,
     coming: Vec<(Instant, CanFrame)>,
-    /// Each reply comes twice, this much apart.
+    /// Each reply is received twice, with this delay between them.
     copy: Option<Micros>,
 }
 
 impl Late {
-    /// Asks until the request was carried out, or until `end`: then the host is gone.
+    /// Repeats the request until it was carried out, or until `end`, when the host exits.
     fn ask(&mut self, request: [u8; 8], end: Instant) -> Option<[u8; 8]> {
         let mut is_asked = false;
         while self.now < end {
@@ -175,8 +175,8 @@ impl Late {
     }
 }
 
-/// Hosts in turn, each gone in the middle of whatever it did: what it asks first, for how long it
-/// lives, the pause behind it.
+/// Hosts one after the other. Each has a first request, a lifetime, and a pause after it; it exits
+/// without finishing its exchange.
 fn in_turn(delay: u32, timeout: u32, copy: Option<u32>, turns: &[(usize, u32, u32)]) {
     let mut late = Late {
         host: Host::new(),
@@ -196,7 +196,7 @@ fn in_turn(delay: u32, timeout: u32, copy: Option<u32>, turns: &[(usize, u32, u3
     for (temperature, &(n, life, pause)) in (1..).zip(turns) {
         late.host = Host::new();
         late.host.set_timeout(Micros::from_millis(timeout));
-        // What the motor says tells which host asked.
+        // The temperature in a reply identifies the host of the request.
         late.node.motor.sense.temperature = Celsius(temperature);
         let end = late.now + Micros::from_millis(life);
         for n in n.. {
@@ -214,7 +214,7 @@ fn in_turn(delay: u32, timeout: u32, copy: Option<u32>, turns: &[(usize, u32, u3
 proptest! {
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
-    fn the_reply_to_a_former_host_is_not_taken_for_the_next_ones(
+    fn the_reply_to_a_former_host_is_not_matched_to_the_next_request(
         delay in 1u32..400,
         timeout in 20u32..500,
         turns in proptest::collection::vec((0usize..5, 1u32..900, 0u32..100), 2),
@@ -222,7 +222,7 @@ proptest! {
         in_turn(delay, timeout, None, &turns);
     }
 
-    /// Replies that are not later than the quarantine time, or come twice.
+    /// Replies are not later than the quarantine time, or are received twice.
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn hosts_in_turn_never_take_each_others_replies(

@@ -1,4 +1,4 @@
-//! What holds for any frames in any order.
+//! Properties of any frames in any order.
 
 mod rmd_bench;
 
@@ -91,7 +91,7 @@ proptest! {
 
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
-    fn no_frame_ends_an_exchange_but_the_reply_to_it(
+    fn only_its_own_reply_ends_an_exchange(
         asked in prop::collection::vec((1u8..=32, any::<u8>()), 1..8),
         frames in prop::collection::vec(any_frame(), 0..80),
     ) {
@@ -120,15 +120,15 @@ proptest! {
                     prop_assert!(came == code || (code, came) == (0x9B, 0x9A));
                 }
                 Output::Wait(until) => prop_assert_eq!(until.is_none(), open.is_empty()),
-                Output::Transmit(_) => prop_assert!(false, "nothing is left to send"),
+                Output::Transmit(_) => prop_assert!(false, "there is nothing to send"),
             }
         }
     }
 
-    /// Replies carry the number of their request; some take longer than the timeout.
+    /// Replies carry the number of their request. Some take longer than the timeout.
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
-    fn a_late_reply_is_never_taken_for_the_reply_to_another_exchange(
+    fn a_late_reply_never_ends_another_exchange(
         steps in prop::collection::vec((1u8..=4, 0u8..3, 1u64..140, any::<bool>(), 0u64..40), 1..150),
     ) {
         let mut host = trusted_host();
@@ -165,11 +165,11 @@ proptest! {
         }
     }
 
-    /// Replies carry the number of their request and keep their order; some are lost, and the motor
-    /// may stand still for any time and then answer everything at once.
+    /// Replies carry the number of their request and keep their order. Some are lost, and the motor
+    /// may stall for any time and then send all replies at once.
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
-    fn a_motor_that_stands_still_is_never_taken_for_one_that_answers(
+    fn replies_after_a_stall_are_never_matched_to_newer_requests(
         steps in prop::collection::vec((0u8..2, any::<bool>(), 0u64..40, 0u64..2_000), 1..60),
     ) {
         let mut host = trusted_host();
@@ -180,7 +180,7 @@ proptest! {
         let mut coming: Vec<(Instant, CanFrame)> = vec![];
         for (number, (code, lost, pause, stand)) in (1u8..).zip(steps) {
             let code = [0x9A, 0x9C][usize::from(code)];
-            // Most of the time the motor goes on.
+            // Most of the time the motor does not stall.
             if stand < 600 {
                 still = still.max(now + Micros(stand));
                 coming.iter_mut().for_each(|(at, _)| *at = still.max(*at));
@@ -196,7 +196,7 @@ proptest! {
                         }
                         Output::Transmit(_) => {}
                         Output::Done { result, .. } => {
-                            prop_assert!(asked, "an exchange that nobody began is over");
+                            prop_assert!(asked, "an exchange ended that was not started");
                             asked = false;
                             if let Ok(reply) = result {
                                 prop_assert_eq!(reply, request);

@@ -1,4 +1,4 @@
-//! The wire vectors, both ways.
+//! The wire vectors, in both directions.
 
 // An interpreter takes long to read JSON.
 #![cfg(not(miri))]
@@ -7,7 +7,7 @@ use motorlink_proto::rmd::*;
 use serde_json::Value;
 
 #[test]
-fn every_vector_reads_and_writes_as_its_fields_say() {
+fn every_vector_decodes_and_encodes_to_its_fields() {
     for vector in vectors() {
         let name = text(&vector, "name");
         let bytes = bytes(text(&vector, "bytes"));
@@ -47,7 +47,7 @@ fn every_command_has_a_vector_each_way() {
 }
 
 #[test]
-fn every_vector_stands_on_the_identifier_of_its_motor() {
+fn every_vector_has_the_identifier_of_its_motor() {
     for vector in vectors() {
         let id = hexadecimal(text(&vector, "id"));
         let torque4 = text(&vector, "command") == "torque4" && text(&vector, "dir") == "request";
@@ -92,7 +92,7 @@ fn recode(code: Option<Code>, request: bool, data: &[u8; 8]) -> [u8; 8] {
         ($($name:ident)+) => {
             match code {
                 $( Some(Code::$name) => typed::<$name>(request, data), )+
-                Some(Code::Unknown(code)) => panic!("{code:#04x} is no command"),
+                Some(Code::Unknown(code)) => panic!("{code:#04x} is not a command"),
                 None if request => SetTorque4::decode(data).encode(),
                 None => reply::<MotionStatus>(data),
             }

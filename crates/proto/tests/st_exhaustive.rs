@@ -1,4 +1,4 @@
-//! Every header with every length, both ways.
+//! Every header with every length, in both directions.
 
 mod model;
 
@@ -6,7 +6,7 @@ use model::{Twins, framed};
 use motorlink_proto::st::*;
 use motorlink_proto::time::Instant;
 
-/// Payloads that begin with what may be an id, a phase, a segment or a command.
+/// First bytes of payloads: a valid id, phase, segment or command in one of the messages.
 const FIRST: [u8; 4] = [0x00, 0x03, 0x1C, 0x5B];
 
 fn payload(first: u8, length: u8) -> Vec<u8> {
@@ -26,7 +26,7 @@ fn the_slave_answers_every_header_and_length_as_the_model_does() {
                     let dropped = profile == Profile::Mcsdk54 && length == 128;
                     assert!(dropped || matches!(reply[..], [HEADER_ACK | HEADER_NACK, ..]));
                     if dropped {
-                        // What follows was taken for frames; 131 bytes are more than any of them.
+                        // The slave reads the rest as frames. 131 bytes are more than any frame.
                         twins.overrun();
                     }
                 }
@@ -67,7 +67,7 @@ fn every_register_command_and_segment_does_as_the_model_does() {
 
 #[test]
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
-fn the_master_takes_every_header_and_length_for_what_it_is() {
+fn the_master_reads_every_header_and_length() {
     for header in 0..=255u8 {
         for length in 0..=255u8 {
             let mut master = Master::new(MasterConfig::default());

@@ -56,7 +56,7 @@ fn every_single_bit_flip_outside_the_length_is_refused() {
     }
 }
 
-/// The checksum, computed as paragraph 3.3 words it.
+/// The checksum, computed as paragraph 3.3 describes it.
 fn checksum_by_the_words(bytes: &[u8]) -> u8 {
     let accumulator: u32 = bytes.iter().map(|&byte| u32::from(byte)).sum();
     ((accumulator / 256 + accumulator % 256) % 256) as u8
@@ -126,7 +126,7 @@ proptest! {
         if let Ok(request) = (Frame { header, payload: &payload }).request(profile) {
             let bytes = Frame::command(motor, &request, &mut out).expect("it came from a frame").to_vec();
             let Parse::Frame(frame, _) = Frame::parse(&bytes) else { panic!("not a frame") };
-            // Bytes behind a message are ignored, those of a NaN compare unequal as numbers.
+            // Bytes after a message are ignored. NaNs compare unequal as numbers.
             prop_assert!(payload.starts_with(frame.payload));
             prop_assert_eq!(frame.header, header);
         }

@@ -1,4 +1,4 @@
-//! The master alone and joined with a slave, on a virtual clock.
+//! The master alone and with a slave, on a virtual clock.
 
 mod common;
 mod st_bench;
@@ -73,13 +73,13 @@ fn without_recovery_a_lost_line_sends_nothing_until_it_is_reopened() {
     assert_eq!(pair.exchange(0, STATUS), Err(ExchangeError::Failed(Failure::Timeout)));
     let sent = pair.sent.len();
     assert_eq!(pair.exchange(0, STATUS), Err(ExchangeError::Failed(Failure::Lost)));
-    assert_eq!(pair.sent.len(), sent, "nothing goes into a lost line");
+    assert_eq!(pair.sent.len(), sent, "nothing is sent on a lost line");
     pair.master.reopened();
     assert_eq!(pair.exchange(0, STATUS), Ok(vec![0]));
 }
 
 #[test]
-fn a_lost_line_comes_back_behind_silence_and_a_question() {
+fn a_lost_line_recovers_after_silence_and_a_question() {
     let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
     pair.cut = Some(0);
     pair.exchange(0, STATUS).unwrap_err();
@@ -92,7 +92,7 @@ fn a_lost_line_comes_back_behind_silence_and_a_question() {
 }
 
 #[test]
-fn recovery_asks_what_cannot_be_answered_with_the_lost_reply() {
+fn recovery_sends_a_question_that_the_lost_reply_cannot_answer() {
     let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
     for (lost, probe) in [
         (Request::GetBoardInfo, [0x08, 0x01, 0x00, 0x09].as_slice()),
@@ -104,7 +104,7 @@ fn recovery_asks_what_cannot_be_answered_with_the_lost_reply() {
         pair.exchange(0, lost).unwrap_err();
         pair.sent.clear();
         pair.exchange(0, STATUS).unwrap();
-        assert_eq!(pair.sent[0], probe, "behind a lost {lost:?}");
+        assert_eq!(pair.sent[0], probe, "after a lost {lost:?}");
     }
 }
 
@@ -119,7 +119,7 @@ fn the_longest_exchange_is_five_or_six_timeouts_and_the_silences() {
 }
 
 #[test]
-fn nothing_but_questions_go_into_a_line_that_does_not_answer() {
+fn only_questions_are_sent_on_a_line_that_does_not_answer() {
     let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
     pair.delay = Micros::from_millis(60_000);
     let start = Request::ExecuteCommand(Command::StartMotor);
@@ -127,7 +127,7 @@ fn nothing_but_questions_go_into_a_line_that_does_not_answer() {
     for _ in 0..3 {
         assert_eq!(pair.exchange(1, start), Err(ExchangeError::Failed(Failure::Lost)));
     }
-    assert!(pair.drive.log.is_empty(), "START_MOTOR must not wait in the line");
+    assert!(pair.drive.log.is_empty(), "no START_MOTOR was sent");
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn a_line_that_never_falls_silent_is_given_up() {
     let result = loop {
         match master.poll(now) {
             Output::Wait(_) => {}
-            Output::Transmit(bytes) => panic!("sent {bytes:02x?} into the noise"),
+            Output::Transmit(bytes) => panic!("sent {bytes:02x?} during noise"),
             Output::Done(result) => break result,
         }
         now += Micros::from_millis(10);
@@ -157,7 +157,7 @@ fn a_line_that_never_falls_silent_is_given_up() {
 
 #[test]
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
-fn padding_brings_back_shipped_firmware_from_every_cut() {
+fn padding_recovers_shipped_firmware_after_every_cut() {
     let write = Request::SetRegister { register: RegisterId::SPEED_KP, value: &[0x10, 0x00] };
     let start = Request::ExecuteCommand(Command::StartMotor);
     for (request, size) in [(STATUS, 4), (write, 6), (start, 4)] {
@@ -217,7 +217,7 @@ fn bytes_behind_a_reply_lose_the_line_but_not_the_reply() {
 }
 
 #[test]
-fn two_replies_that_differ_are_no_answer() {
+fn two_different_replies_are_not_an_answer() {
     let (mut first, mut second) = ([0; MAX_FRAME], [0; MAX_FRAME]);
     let ack = Frame { header: HEADER_ACK, payload: &[6] }.encode(&mut first).unwrap();
     let other = Frame { header: HEADER_ACK, payload: &[8] }.encode(&mut second).unwrap();
@@ -233,10 +233,10 @@ fn two_replies_that_differ_are_no_answer() {
     }
 }
 
-/// Flips one bit of the next request on its way, and asks twice.
+/// Flips one bit of the next request, then sends two requests.
 #[test]
 #[cfg_attr(miri, ignore = "an interpreter takes long")]
-fn no_bit_flip_of_a_request_puts_the_line_off_by_one() {
+fn no_bit_flip_of_a_request_shifts_replies_by_one() {
     let write = Request::SetRegister { register: RegisterId::TORQUE_KP, value: &[0x22, 0x11] };
     for (request, size) in [(STATUS, 4), (write, 6), (Request::GetBoardInfo, 3)] {
         for (bit, pause) in (0..size * 8).flat_map(|bit| [0, 30].map(|pause| (bit, pause))) {
@@ -261,7 +261,7 @@ fn no_bit_flip_of_a_request_puts_the_line_off_by_one() {
 proptest! {
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
-    fn a_late_reply_is_never_taken_for_another_exchanges(
+    fn a_late_reply_is_never_matched_to_another_exchange(
         delays in proptest::collection::vec(0u32..2_000, 1..40),
         pad in any::<bool>(),
     ) {
@@ -281,10 +281,10 @@ proptest! {
         }
     }
 
-    /// Also where requests are answered with what recovery's questions are answered with.
+    /// Includes requests whose replies look like those to recovery's questions.
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
-    fn a_late_reply_is_never_taken_for_another_kinds(
+    fn a_late_reply_is_never_matched_to_another_kind_of_request(
         steps in proptest::collection::vec((0u32..2_000, 0usize..5), 1..40),
         pad in any::<bool>(),
     ) {
@@ -313,7 +313,7 @@ proptest! {
 
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
-    fn a_drive_that_was_stopped_and_answers_everything_at_once_confuses_nobody(
+    fn late_replies_of_a_stalled_drive_are_never_matched_to_a_newer_request(
         stops in proptest::collection::vec(0u32..9_000, 1..10),
     ) {
         let mut pair = Pair::new(Profile::Spec, Recovery::Drain);
@@ -330,7 +330,7 @@ proptest! {
                     prop_assert_eq!(register.decode(Profile::Spec, &value), Some(i32::from(register.0)));
                 }
             }
-            prop_assert_eq!(pair.master.sync_state(), SyncState::InSync, "back within 20 tries");
+            prop_assert_eq!(pair.master.sync_state(), SyncState::InSync, "in sync within 20 tries");
         }
     }
 
@@ -342,7 +342,7 @@ proptest! {
     ) {
         let recovery = if pad { Recovery::Pad } else { Recovery::Drain };
         let mut master = master(recovery);
-        // Noise comes every 7 ms, so that each wait may end that much later.
+        // Noise is received every 7 ms, so each wait may end that much later.
         let late = Micros::from_millis(50);
         let bound = MasterConfig { recovery, ..MasterConfig::default() }.longest_exchange() + late;
         let mut chunks = chunks.into_iter();

@@ -10,11 +10,11 @@ const PROFILES: [Profile; 2] = [Profile::Spec, Profile::Mcsdk54];
 
 #[derive(Debug, Clone)]
 enum Step {
-    /// A frame with its right checksum.
+    /// A frame with a correct checksum.
     Frame(u8, Vec<u8>),
     /// Any bytes.
     Bytes(Vec<u8>),
-    /// Time passes, with a look at the slave where the flag is set.
+    /// Time passes. The slave is polled if the flag is set.
     Wait(u64, bool),
     Overrun,
 }

@@ -1,4 +1,4 @@
-//! A line that was just opened: what a former master left in it, and what echoes (SPEC-NOTES S16).
+//! A line that was just opened: pending replies to a former master, and echoes (SPEC-NOTES S16).
 
 mod common;
 mod st_bench;
@@ -25,7 +25,7 @@ fn pair(recovery: Recovery, delay: Micros) -> Pair {
 }
 
 #[test]
-fn a_line_that_was_just_opened_is_brought_in_step_by_three_questions() {
+fn three_questions_bring_a_just_opened_line_in_sync() {
     let mut pair = pair(Recovery::Drain, Micros::from_millis(3));
     pair.drive.set(2, RegisterId::STATUS, 6);
     assert_eq!(pair.exchange(2, STATUS), Ok(vec![6]));
@@ -37,7 +37,7 @@ fn a_line_that_was_just_opened_is_brought_in_step_by_three_questions() {
 }
 
 #[test]
-fn a_line_that_is_trusted_is_asked_at_once() {
+fn a_trusted_line_gets_the_request_at_once() {
     for master in [opened(Recovery::None), st_bench::master(Recovery::Drain)] {
         let mut pair = pair(Recovery::Drain, Micros(0));
         pair.master = master;
@@ -47,7 +47,7 @@ fn a_line_that_is_trusted_is_asked_at_once() {
 }
 
 #[test]
-fn a_line_that_is_opened_again_is_not_in_step() {
+fn a_reopened_line_is_not_in_sync() {
     let mut pair = pair(Recovery::Drain, Micros::from_millis(3));
     for _ in 0..2 {
         pair.sent.clear();
@@ -57,9 +57,9 @@ fn a_line_that_is_opened_again_is_not_in_step() {
     }
 }
 
-/// The case: 150 ms, a former master that waited for 100.
+/// A drive that answers after 150 ms, and a former master with a timeout of 100 ms.
 #[test]
-fn the_reply_to_a_former_master_is_not_taken_for_the_next_ones() {
+fn the_reply_to_a_former_master_is_not_matched_to_the_next_request() {
     for ms in [1, 20, 49, 51, 150, 400, 900, 1_900] {
         for former in [STATUS, Request::GetBoardInfo, Request::GetFirmwareVersion] {
             let mut pair = pair(Recovery::Drain, Micros::from_millis(ms));
@@ -91,9 +91,9 @@ fn no_command_waits_in_a_line_whose_drive_does_not_answer() {
     assert!(pair.drive.log.is_empty());
 }
 
-/// Of what is not known what it answers, it is waited for as long as it may be late.
+/// If the pending replies are unknown, the master waits for the longest possible delay.
 #[test]
-fn a_drive_that_refuses_the_question_is_taken_for_slow() {
+fn a_refused_question_counts_as_a_slow_answer() {
     let mut master = opened(Recovery::Drain);
     master.request(0, &STATUS).unwrap();
     assert_eq!(master.poll(Instant(0)), Output::Wait(Some(Instant(50 * MS))));
@@ -106,7 +106,7 @@ fn a_drive_that_refuses_the_question_is_taken_for_slow() {
 
 /// An adapter that echoes, a wire from TX to RX: with a drive behind it or without.
 #[test]
-fn an_echo_is_no_answer_and_is_named() {
+fn an_echo_is_not_an_answer_and_is_reported() {
     for (drive, cut) in [(false, 0), (false, 1), (true, 0), (true, 2)] {
         let mut master = opened(Recovery::Drain);
         master.request(1, &STATUS).unwrap();
@@ -136,7 +136,7 @@ fn an_echo_is_no_answer_and_is_named() {
 
 /// GET_BOARD_INFO of a drive with version 6.0.6 begins with the bytes of the question.
 #[test]
-fn an_answer_that_looks_like_the_question_is_no_echo() {
+fn an_answer_that_looks_like_the_question_is_not_an_echo() {
     let mut payload = [0; 32];
     payload[..3].copy_from_slice(&INFO);
     let mut frame = [0; MAX_FRAME];
@@ -150,9 +150,9 @@ fn an_answer_that_looks_like_the_question_is_no_echo() {
     assert_eq!(master.poll(Instant(51 * MS)), Output::Transmit(&GET_STATUS));
 }
 
-/// What a wrong baud rate looks like is said as on a line that is up.
+/// The failures of a wrong baud rate are the same as on a line in sync.
 #[test]
-fn what_comes_in_place_of_an_answer_is_named() {
+fn bytes_instead_of_an_answer_are_reported() {
     let cases = [
         (vec![0x55], Failure::Header(0x55)),
         (vec![0xF0, 0x90], Failure::Damaged(Bad::Length(0x90))),
@@ -177,7 +177,7 @@ fn what_comes_in_place_of_an_answer_is_named() {
 }
 
 proptest! {
-    /// A former master of any kind, gone in the middle of whatever it did.
+    /// A former master of any kind. It exits without finishing its exchange.
     #[test]
     #[cfg_attr(miri, ignore = "an interpreter takes long")]
     fn masters_in_turn_never_take_each_others_replies(

@@ -28,7 +28,11 @@ fn checks_come_in_order_checksum_motor_frame_code() {
     assert_eq!(bench.raw(0x7F, &[]), Err(ErrorCode::BadMotorSelected));
     assert_eq!(bench.raw(0x1F, &[]), Err(ErrorCode::BadFrameId));
     assert_eq!(bench.raw(0x5F, &[]), Err(ErrorCode::BadFrameId));
-    assert_eq!(bench.slave.current_motor().number(), 2, "the motor is selected before the code");
+    assert_eq!(
+        bench.slave.current_motor().number(),
+        2,
+        "the motor is selected before the code is checked"
+    );
 }
 
 #[test]
@@ -41,7 +45,7 @@ fn acknowledges_sent_as_commands_address_motor_7() {
 }
 
 #[test]
-fn a_motor_number_sticks_until_another_comes() {
+fn a_motor_number_stays_selected_until_another_is_addressed() {
     let mut bench = spec();
     bench.drive.set(1, RegisterId::STATUS, 6);
     bench.drive.set(2, RegisterId::STATUS, 10);
@@ -54,7 +58,7 @@ fn a_motor_number_sticks_until_another_comes() {
 }
 
 #[test]
-fn target_motor_counts_from_zero_and_refuses_what_is_not_there() {
+fn target_motor_counts_from_zero_and_refuses_missing_motors() {
     let mut bench = spec();
     let target = Request::GetRegister(RegisterId::TARGET_MOTOR);
     assert_eq!(bench.ask(0, target), Ok(vec![0]));
@@ -99,7 +103,7 @@ fn a_length_over_128_is_answered_with_timeout_after_25_ms_of_silence() {
         assert_eq!(bench.bytes(&[0x02, length]), []);
         for _ in 0..20 {
             bench.now += Micros::from_millis(20);
-            assert_eq!(bench.bytes(&GET_STATUS), [], "the slave is deaf until silence");
+            assert_eq!(bench.bytes(&GET_STATUS), [], "the slave drops all bytes until silence");
         }
         bench.now += Micros::from_millis(25);
         let reply = bench.slave.poll(bench.now).expect("a NACK is due").to_vec();
@@ -126,7 +130,7 @@ fn shipped_firmware_never_times_out_and_drops_a_length_over_127() {
 }
 
 #[test]
-fn a_line_that_is_stuck_at_0_says_frames_of_code_0() {
+fn a_line_stuck_at_0_sends_frames_of_code_0() {
     for mut bench in [spec(), mcsdk()] {
         assert_eq!(answer(&bench.bytes(&[0, 0, 0])), Err(ErrorCode::BadFrameId));
         assert!(bench.drive.registers.is_empty() && bench.drive.log.is_empty());
@@ -134,7 +138,7 @@ fn a_line_that_is_stuck_at_0_says_frames_of_code_0() {
 }
 
 #[test]
-fn an_overrun_drops_the_frame_and_says_so() {
+fn an_overrun_drops_the_frame_and_sends_a_nack() {
     let mut bench = spec();
     bench.bytes(&GET_STATUS[..2]);
     let reply = bench.slave.overrun().to_vec();
@@ -211,7 +215,7 @@ fn shipped_firmware_differs_from_table_3_in_sizes_and_access() {
         assert_eq!(bench.ask(0, set(RegisterId(id), &[0; 4])), Err(ErrorCode::SetReadOnly));
     }
     let c1 = RegisterId::OBSERVER_C1;
-    assert_eq!(bench.ask(0, set(c1, &[1, 0])), Err(ErrorCode::WrongSet), "4 bytes are wanted");
+    assert_eq!(bench.ask(0, set(c1, &[1, 0])), Err(ErrorCode::WrongSet), "4 bytes are required");
     assert_eq!(bench.ask(0, set(c1, &[0x34, 0x12, 0, 0])), Ok(vec![]));
     assert_eq!(bench.ask(0, Request::GetRegister(c1)), Ok(vec![0x34, 0x12]));
     assert_eq!(bench.ask(0, set(RegisterId::OBSERVER_CR_C1, &[0; 4])), Err(ErrorCode::SetReadOnly));
@@ -346,13 +350,17 @@ fn a_data_segment_samples_its_registers_in_one_exchange() {
     bench.drive.set(1, RegisterId::SPEED_MEAS, 1500);
     bench.drive.set(1, RegisterId::I_Q, -77);
     let choose = |registers| Request::ConfigureSegment { segment: 3, registers };
-    assert_eq!(bench.ask(1, Request::GetSegment(3)), Ok(vec![]), "empty until it is chosen");
+    assert_eq!(bench.ask(1, Request::GetSegment(3)), Ok(vec![]), "empty until it is configured");
     assert_eq!(bench.ask(1, choose(&[0x02, 0x1E, 0x27])), Ok(vec![]));
     let expected = vec![6, 0xDC, 0x05, 0, 0, 0xB3, 0xFF];
     assert_eq!(bench.ask(1, Request::GetSegment(3)), Ok(expected.clone()));
     for unfit in [&[0x02, 0x99][..], &[0x41], &[0x5C], &[0x02; 33]] {
         assert_eq!(bench.ask(1, choose(unfit)), Err(ErrorCode::WrongSet), "{unfit:?}");
-        assert_eq!(bench.ask(1, Request::GetSegment(3)), Ok(expected.clone()), "the old one stays");
+        assert_eq!(
+            bench.ask(1, Request::GetSegment(3)),
+            Ok(expected.clone()),
+            "the old segment stays"
+        );
     }
     assert_eq!(bench.ask(1, choose(&[0x1E; 32])), Ok(vec![]));
     assert_eq!(bench.ask(1, Request::GetSegment(3)).map(|values| values.len()), Ok(128));
@@ -373,7 +381,7 @@ fn codes_of_the_other_profile_are_unknown_or_mean_something_else() {
     assert_eq!(bench.drive.log, ["torque ramp 1 -2000 100", "position 1 1.5 0.25"]);
     bench.drive.features = Some(Features::NONE);
     assert_eq!(bench.ask(1, Request::SetPosition(target)), Err(ErrorCode::BadFrameId));
-    assert_eq!(bench.raw(0x12, &[]), Err(ErrorCode::BadFrameId), "whatever the payload");
+    assert_eq!(bench.raw(0x12, &[]), Err(ErrorCode::BadFrameId), "with any payload");
 }
 
 #[test]

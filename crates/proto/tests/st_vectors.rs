@@ -1,4 +1,4 @@
-//! `vectors/st.json`, each both ways.
+//! `vectors/st.json`, each in both directions.
 
 // An interpreter takes long to read JSON.
 #![cfg(not(miri))]

@@ -11,13 +11,13 @@ const KP: RegisterId = RegisterId::SPEED_KP;
 enum Trouble {
     /// The request does not reach the drive.
     Lost,
-    /// The reply does not come back.
+    /// The reply is lost.
     Unheard,
-    /// The drive takes another value.
+    /// The drive stores another value.
     Other(i32),
 }
 
-/// A verified write through a line with the given trouble, exchange by exchange.
+/// A verified write on a line with the given fault in each exchange.
 fn write(
     bench: &mut SlaveFixture,
     (register, value): (RegisterId, i32),
@@ -65,7 +65,7 @@ fn a_write_that_reads_back_is_done_in_two_exchanges() {
 }
 
 #[test]
-fn what_was_lost_is_repeated_and_what_was_done_is_not() {
+fn a_lost_write_is_repeated_and_an_executed_one_is_not() {
     let lost = Some(Trouble::Lost);
     let mut first = bench(Profile::Spec);
     assert_eq!(write(&mut first, (KP, 9), 3, &[lost]), (Ok(2), 4));
@@ -76,7 +76,7 @@ fn what_was_lost_is_repeated_and_what_was_done_is_not() {
 }
 
 #[test]
-fn a_value_that_went_wrong_on_the_way_is_put_right_or_told() {
+fn a_corrupted_value_is_corrected_or_reported() {
     let other = Some(Trouble::Other(5));
     let mut righted = bench(Profile::Spec);
     assert_eq!(write(&mut righted, (KP, 9), 3, &[other]), (Ok(2), 4));
@@ -97,7 +97,7 @@ fn a_drive_that_refuses_is_not_asked_again() {
 }
 
 #[test]
-fn what_the_profile_rounds_or_cuts_is_compared_as_it_reads_back() {
+fn a_value_that_the_profile_rounds_is_compared_with_its_rounded_value() {
     let mut bench = bench(Profile::Mcsdk54);
     for (register, value, kept) in [
         (RegisterId::SC_NOMINAL_SPEED, 1000, 996),
@@ -110,9 +110,9 @@ fn what_the_profile_rounds_or_cuts_is_compared_as_it_reads_back() {
     }
 }
 
-/// Every register that can be verified reads back what was written, and no other is touched.
+/// Every register that can be verified reads back the written value, and no other is written.
 #[test]
-fn every_register_is_verified_or_says_why_not() {
+fn every_register_is_verified_or_returns_the_reason() {
     for profile in [Profile::Spec, Profile::Mcsdk54] {
         let mut verified = 0;
         for id in 0..=255 {
@@ -135,7 +135,7 @@ fn every_register_is_verified_or_says_why_not() {
 }
 
 #[test]
-fn what_acts_on_the_motor_is_not_repeated() {
+fn a_write_that_acts_on_the_motor_is_not_repeated() {
     for register in [
         RegisterId::TARGET_MOTOR,
         RegisterId::CONTROL_MODE,

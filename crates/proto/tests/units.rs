@@ -1,9 +1,9 @@
-//! A limit in digits is never beyond the limit that was given.
+//! A limit in digits never exceeds the given limit.
 
 use motorlink_proto::units::{CentiDegrees, IqCommand, SpeedLimit, inward};
 use proptest::prelude::*;
 
-/// What a value may be off for being a binary fraction, in digits.
+/// Rounding errors of binary fractions, in digits.
 const TOLERANCE: f64 = 2e-6;
 
 fn any_scale() -> impl Strategy<Value = f64> {
@@ -35,7 +35,7 @@ proptest! {
 
     #[test]
     fn a_limit_in_decimals_keeps_all_of_its_digits(hundredths in 0i32..) {
-        // As people write it: 0.3, not 30 times 0.01.
+        // Decimal text, such as 0.3 instead of 30 times 0.01.
         let given: f64 = format!("{}.{:02}", hundredths / 100, hundredths % 100).parse().unwrap();
         prop_assert_eq!(inward(given, CentiDegrees::SCALE), i64::from(hundredths));
     }

@@ -3,10 +3,10 @@
 use crate::clause::Clause;
 
 /// Every command and reply with its fields, bytes to values and back.
-const VECTORS: &[&str] = &["every_vector_reads_and_writes_as_its_fields_say"];
+const VECTORS: &[&str] = &["every_vector_decodes_and_encodes_to_its_fields"];
 /// The same, and what stands between the fields of a request.
 const REQUESTS: &[&str] = &[
-    "every_vector_reads_and_writes_as_its_fields_say",
+    "every_vector_decodes_and_encodes_to_its_fields",
     "null_bytes_of_a_request_are_ignored_and_sent_as_zero",
 ];
 /// What stands between the fields of a reply.
@@ -20,7 +20,7 @@ const TOOL: &str = "depends on a setting of the vendor's tool, which the wire ca
 #[rustfmt::skip]
 pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-1-01", "A command to one motor and its reply both have the identifier 0x140 + ID.")
-        .host(&["every_vector_stands_on_the_identifier_of_its_motor"]),
+        .host(&["every_vector_has_the_identifier_of_its_motor"]),
     Clause::new("RMD-1-02", "IDs are 1 to 32.")
         .host(&["ids_are_1_to_32_and_keep_their_identifiers"])
         .untested("a drive cannot be given another ID through the bus"),
@@ -79,7 +79,7 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-2-23", "The command byte 0xA6 closes the position loop, command 4.")
         .host(LIST),
     Clause::new("RMD-2-24", "A command byte that the list does not have is no command: it has no effect and gets no reply (SPEC-NOTES R30).")
-        .host(&["a_code_that_nobody_knows_is_sent_and_answered_by_silence"]),
+        .host(&["an_unknown_code_is_sent_and_times_out"]),
 
     Clause::new("RMD-30-01", "The host asks for the gains with DATA[0] = 0x30 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
         .host(REQUESTS),
@@ -414,7 +414,7 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-280-03", "A digit is 16 mA, as in RMD-A1-02 and with the range of RMD-A1-03.")
         .host(&["four_torques_are_refused_as_a_whole"]),
     Clause::new("RMD-280-04", "It reaches motors 1 to 4 and no other.")
-        .host(&["an_unexpected_answer_to_four_torques_is_not_taken_for_another_exchange"]),
+        .host(&["an_unexpected_reply_to_four_torques_is_not_matched_to_another_exchange"]),
     Clause::new("RMD-280-05", "Each of them answers with a standard data frame of eight bytes on 0x140 + ID.")
         .host(&["four_torques_in_one_frame_reach_their_motors_and_all_answer"]),
     Clause::new("RMD-280-06", "They answer in the order of their IDs, the smallest first.")

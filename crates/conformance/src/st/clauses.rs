@@ -81,7 +81,7 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.1-04" "The reply comes before it is over; else the master raises an error."
         host [the_timer_starts_when_the_request_is_out_and_lasts_a_second];
     "ST-4.1-05" "After that the communication is closed; how it opens again is left open (S16)."
-        host [a_late_reply_is_never_taken_for_another_exchanges, without_recovery_a_lost_line_sends_nothing_until_it_is_reopened]
+        host [a_late_reply_is_never_matched_to_another_exchange, without_recovery_a_lost_line_sends_nothing_until_it_is_reopened]
         untested "demands something of a master";
     "ST-4.1-06" "A slave compares the checksum of what it received with the one that it received.";
     "ST-4.1-07" "Where they differ it answers BAD_CRC, and the exchange is over.";
@@ -118,7 +118,7 @@ pub static CLAUSES: &[Clause] = clauses! {
     "ST-4.3-09" "WRONG_SET (0x05): a value that is not valid.";
     "ST-4.3-10" "WRONG_CMD (0x07): an unknown command, which is not executed.";
     "ST-4.3-11" "OVERRUN (0x08): bytes came faster than they could be taken (S30)."
-        host [an_overrun_drops_the_frame_and_says_so]
+        host [an_overrun_drops_the_frame_and_sends_a_nack]
         untested "no bytes on a line make sure that a receiver loses some";
     "ST-4.3-12" "TIMEOUT (0x09): the frame was not whole in time.";
     "ST-4.3-13" "BAD_CRC (0x0A): the checksum was wrong.";

@@ -1,4 +1,4 @@
-//! The command table: the one place where a command's number and name stand.
+//! The command table. The number and the name of each command are defined only here.
 
 use super::message::SpinDirection;
 use super::motor::{MotorId, MotorSet, TORQUE4_ID};
@@ -7,11 +7,11 @@ use super::reply::*;
 use crate::can::CanFrame;
 use crate::units::{CentiDegrees, CentiDps, IqCommand, SpeedLimit, TurnCentiDegrees};
 
-/// A request with its code and the type of its reply. A reply is `C::Reply::decode(&data)`.
+/// A request with its code and the type of its reply. `C::Reply::decode(&data)` reads a reply.
 pub trait Command: Payload {
     /// DATA\[0\] of the request.
     const CODE: Code;
-    /// What the motor answers.
+    /// The reply of the motor.
     type Reply: Payload;
 
     /// The eight bytes of the request.
@@ -20,15 +20,15 @@ pub trait Command: Payload {
     }
 }
 
-/// What is sent to a motor, with how its reply is read: a command, or eight bytes as they are.
+/// Something to send to a motor, with the way to read its reply: a command, or eight raw bytes.
 pub trait Exchange {
-    /// What the reply says.
+    /// The decoded reply.
     type Reply;
 
     /// The eight bytes of the request.
     fn request(&self) -> [u8; 8];
 
-    /// What eight bytes say as the reply.
+    /// Decodes eight bytes as the reply.
     fn reply(data: &[u8; 8]) -> Self::Reply;
 }
 
@@ -69,7 +69,7 @@ pub enum Version {
 pub struct CommandInfo {
     /// The code, with the name of chapter 2 and a description.
     pub code: Code,
-    /// The name from which the names in all languages are derived: a verb and what it is about.
+    /// The name from which the names in all languages are derived: a verb and its object.
     pub stem: &'static str,
     /// The versions of the protocol that have it.
     pub versions: &'static [Version],
@@ -79,13 +79,13 @@ pub struct CommandInfo {
     pub echo: bool,
     /// Whether the drive writes to its ROM, which wears (docs/SPEC-NOTES.md R8, R9).
     pub rom: bool,
-    /// Whether the motor may turn after it.
+    /// Whether the motor may turn after this command.
     pub moves: bool,
-    /// Whether it reads what changes by itself, which programs read again and again.
+    /// Whether the values change without a command, so that programs read them periodically.
     pub sampled: bool,
     /// Values of the request.
     pub request: &'static [Field],
-    /// Name of the reply's type: several commands may have the same.
+    /// Name of the reply's type. Several commands may share one.
     pub reply_name: &'static str,
     /// Values of the reply.
     pub reply: &'static [Field],
@@ -115,13 +115,13 @@ impl Code {
         COMMANDS.iter().find(|row| row.code == self)
     }
 
-    /// Whether the motor is told to end its motion: Off or Stop.
+    /// Whether the command ends the motion: Off or Stop.
     pub const fn ends_motion(self) -> bool {
         matches!(self, Code::Off | Code::Stop)
     }
 
-    /// Whether a motor may turn after it. Of the codes that the document does not name, those beside
-    /// its motion commands (0xA0 to 0xAF) may: successors of this protocol have theirs there.
+    /// Whether a motor may turn after this command. Unnamed codes from 0xA0 to 0xAF count as motion
+    /// commands: successors of this protocol have motion commands there.
     pub fn may_move(self) -> bool {
         match self.info() {
             Some(row) => row.moves,
@@ -143,10 +143,10 @@ impl MotorSet {
     }
 }
 
-/// A row a command:
+/// One row per command:
 ///
-/// `CODE stem Struct -> Reply [echo rom moves sampled] VERSIONS "name in chapter 2", "heading in chapter 3",
-/// "what it does";`, with the fields of the request behind `Struct`, as [`payload!`] has them.
+/// `CODE stem Struct -> Reply [echo rom moves sampled] VERSIONS "name in chapter 2", "heading in
+/// chapter 3", "description";`. The fields of the request follow `Struct`, as in [`payload!`].
 macro_rules! commands {
     ($d:tt $(
         $(#[$meta:meta])*
@@ -162,8 +162,8 @@ macro_rules! commands {
         }
 
         impl Code {
-            /// Whether the reply repeats the request byte for byte. Firmware does not carry the table
-            /// for it.
+            /// Whether the reply repeats the request byte for byte. The same as
+            /// [`CommandInfo::echo`], for firmware that does not link the table.
             pub const fn is_repeated(self) -> bool {
                 match self {
                     $( Code::$name => $name::ROW.echo, )+
@@ -351,7 +351,7 @@ mod tests {
             assert_eq!(moved(frame), if moves { three } else { MotorSet::EMPTY }, "{code:#04x}");
         }
         assert_eq!(moved(CanFrame::new(TORQUE4_ID, [0; 8])), MotorSet::TORQUE4);
-        // Nothing that a motor ignores (chapter 1).
+        // Motors ignore these frames (chapter 1).
         assert_eq!(moved(CanFrame::new(0x140, [0xA2; 8])), MotorSet::EMPTY);
         assert_eq!(moved(CanFrame::data_frame(0x141, true, &[0xA2; 8])), MotorSet::EMPTY);
         assert_eq!(moved(CanFrame::data_frame(0x141, false, &[0xA2; 7])), MotorSet::EMPTY);

@@ -1,5 +1,5 @@
-//! Frames in words, for logs. A frame alone does not tell who sent it: request and reply share an
-//! identifier, and for some commands they are the same bit for bit.
+//! Frames as text, for logs. A frame alone does not show its sender: request and reply have the
+//! same identifier, and for some commands the same bytes.
 
 use super::command::Code;
 use super::message::SetTorque4;
@@ -8,7 +8,7 @@ use super::payload::{Field, Payload};
 use crate::can::CanFrame;
 use core::fmt;
 
-/// Who sent a frame.
+/// The direction of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Direction {
     /// A request.
@@ -24,7 +24,7 @@ pub struct Described {
     direction: Direction,
 }
 
-/// Describes a frame in words.
+/// Describes a frame as text.
 pub const fn describe(frame: CanFrame, direction: Direction) -> Described {
     Described { frame, direction }
 }
@@ -93,7 +93,7 @@ mod tests {
         describe(CanFrame::new(id, data), Direction::HostToDrive).to_string()
     }
 
-    fn came(id: u16, data: [u8; 8]) -> String {
+    fn received(id: u16, data: [u8; 8]) -> String {
         describe(CanFrame::new(id, data), Direction::DriveToHost).to_string()
     }
 
@@ -113,17 +113,17 @@ mod tests {
     #[test]
     fn the_same_bytes_read_as_a_reply_show_the_values_of_the_reply() {
         assert_eq!(
-            came(0x141, [0x9A, 0xFB, 0, 0xF0, 0x00, 0, 0, 0x08]),
+            received(0x141, [0x9A, 0xFB, 0, 0xF0, 0x00, 0, 0, 0x08]),
             "motor 1 < 0x9A Read motor status 1 and error flag commands: temperature -5 °C, \
              voltage 24.0 V, errors over temperature protection"
         );
         assert_eq!(
-            came(0x141, [0xA1, 0x19, 0, 0x08, 0x0A, 0, 0xFF, 0x3F]),
+            received(0x141, [0xA1, 0x19, 0, 0x08, 0x0A, 0, 0xFF, 0x3F]),
             "motor 1 < 0xA1 Torque closed-loop command: temperature 25 °C, iq 33.000 A, \
              speed 10 °/s, encoder 16383"
         );
         assert_eq!(
-            came(0x141, [0x92, 0x60, 0x73, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF]),
+            received(0x141, [0x92, 0x60, 0x73, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF]),
             "motor 1 < 0x92 Read multi turns angle command: angle -360.00 °"
         );
     }
@@ -138,18 +138,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_v1_62_is_named_as_such() {
+    fn frames_outside_v1_62_are_marked() {
         let data = [0x9A, 1, 2, 3, 4, 5, 6, 7];
-        assert_eq!(came(0x241, data), "reply of a V3/V4 motor, ID 1: 9A 01 02 03 04 05 06 07");
+        assert_eq!(received(0x241, data), "reply of a V3/V4 motor, ID 1: 9A 01 02 03 04 05 06 07");
         assert_eq!(
-            came(0x182, data),
+            received(0x182, data),
             "reply of a LK-Tech V2.36 motor, ID 2: 9A 01 02 03 04 05 06 07"
         );
         assert_eq!(
             sent(0x141, [0x60, 1, 2, 3, 4, 5, 6, 7]),
             "motor 1 > 0x60 not a command of V1.62: 60 01 02 03 04 05 06 07"
         );
-        assert!(came(0x7FF, data).starts_with("0x7ff: not a frame of this protocol"));
+        assert!(received(0x7FF, data).starts_with("0x7ff: not a frame of this protocol"));
         let short = CanFrame::data_frame(0x141, false, &[0x9A]);
         let text = describe(short, Direction::HostToDrive).to_string();
         assert_eq!(text, "0x141: not a standard data frame of 8 bytes");

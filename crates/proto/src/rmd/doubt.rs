@@ -1,39 +1,43 @@
 //! Whether a motor's next reply can be trusted.
 //!
-//! A reply carries a code and no number. When a motor or an adapter stands still and then answers
-//! everything at once, an old reply would pass for a new one. So a motor that owes a reply is left
-//! alone for the quarantine time and then asked for its status, and for nothing else, until the only
-//! reply that it owed came, or until it was heard and then silent for the quarantine time. A motor
-//! that was not asked before may owe a former host anything: it has to answer two questions first, and
-//! then to be silent.
+//! A reply carries a code and no sequence number. If a motor or an adapter stalls and then sends
+//! all replies at once, an old reply looks like a new one. So a motor with a pending late reply is
+//! left alone for the quarantine time. After that it is asked only for its status, until one of
+//! these is true:
+//!
+//! * the only pending reply was received;
+//! * the motor answered and was then silent for the quarantine time.
+//!
+//! A motor without any exchange so far may have pending replies to a former host. It has to answer
+//! two questions, and then be silent for the quarantine time.
 
 use super::command::Code;
 use crate::time::{Instant, Micros};
 
-/// What may still come from a motor.
+/// Which late replies a motor may still send.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Doubt {
-    owed: Owed,
-    /// Whether replies to Off and to Stop are among it.
+    pending: Pending,
+    /// Whether replies to Off and to Stop are pending.
     off: bool,
     stop: bool,
-    /// The quarantine time after the last reply that did not come. For [`Owed::Unknown`] also the end of the
-    /// wait for silence behind an Off or a Stop.
+    /// The end of the quarantine time after the last missing reply. For [`Pending::Unknown`] also
+    /// the end of the wait for silence after an Off or a Stop.
     until: Instant,
-    /// When the motor was last heard since then.
+    /// When the motor last sent a frame since then.
     heard: Option<Instant>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Owed {
+enum Pending {
     Nothing,
-    /// A reply with this code.
+    /// One reply with this code.
     One(u8),
     /// Replies with this code.
     Several(u8),
     /// Replies with different codes.
     Mixed,
-    /// Whatever a former host asked for.
+    /// Replies to any request of a former host.
     Unknown,
 }
 
@@ -42,31 +46,38 @@ enum Owed {
 pub(super) enum Admitted {
     Request,
     Question,
-    /// The request, and behind it the question: the reply to the request may be an older one's.
+    /// The request and then the question: the reply to the request may belong to an older request.
     Both,
 }
 
 impl Doubt {
-    pub(super) const NONE: Doubt =
-        Doubt { owed: Owed::Nothing, off: false, stop: false, until: Instant(0), heard: None };
-    pub(super) const UNKNOWN: Doubt = Doubt { owed: Owed::Unknown, ..Doubt::NONE };
+    pub(super) const NONE: Doubt = Doubt {
+        pending: Pending::Nothing,
+        off: false,
+        stop: false,
+        until: Instant(0),
+        heard: None,
+    };
+    pub(super) const UNKNOWN: Doubt = Doubt { pending: Pending::Unknown, ..Doubt::NONE };
 
     pub(super) const fn is_none(&self) -> bool {
-        matches!(self.owed, Owed::Nothing)
+        matches!(self.pending, Pending::Nothing)
     }
 
-    /// Whether the motor may owe a former host anything.
+    /// Whether replies to a former host may be pending.
     pub(super) const fn is_unknown(&self) -> bool {
-        matches!(self.owed, Owed::Unknown)
+        matches!(self.pending, Pending::Unknown)
     }
 
-    /// The reply to a request with this code did not come in time.
-    pub(super) fn owes(&mut self, now: Instant, quarantine: Micros, code: u8) {
-        self.owed = match self.owed {
-            Owed::Nothing => Owed::One(code),
-            Owed::One(owed) | Owed::Several(owed) if owed == code => Owed::Several(code),
-            Owed::Unknown => Owed::Unknown,
-            _ => Owed::Mixed,
+    /// Records that the reply to a request with this code did not come in time.
+    pub(super) fn missed(&mut self, now: Instant, quarantine: Micros, code: u8) {
+        self.pending = match self.pending {
+            Pending::Nothing => Pending::One(code),
+            Pending::One(pending) | Pending::Several(pending) if pending == code => {
+                Pending::Several(code)
+            }
+            Pending::Unknown => Pending::Unknown,
+            _ => Pending::Mixed,
         };
         match Code::from(code) {
             Code::Off => self.off = true,
@@ -77,32 +88,32 @@ impl Doubt {
         self.heard = None;
     }
 
-    /// The reply to an open exchange came.
+    /// Records the reply to an open exchange.
     pub(super) fn answered(&mut self, now: Instant) {
         self.heard = Some(now);
     }
 
-    /// A reply with this code came to no open exchange. Whether it is one that was owed.
-    pub(super) fn came(&mut self, now: Instant, code: u8) -> bool {
-        match self.owed {
-            Owed::One(owed) if answers(owed, code) => *self = Doubt::NONE,
-            Owed::Several(owed) if answers(owed, code) => self.heard = Some(now),
-            Owed::Mixed => self.heard = Some(now),
-            // Before the motor was asked this may be another host's frame.
-            Owed::Unknown if self.heard.is_some() => self.heard = Some(now),
+    /// Takes a reply with this code for which no exchange is open. Returns whether it was pending.
+    pub(super) fn late_reply(&mut self, now: Instant, code: u8) -> bool {
+        match self.pending {
+            Pending::One(pending) if answers(pending, code) => *self = Doubt::NONE,
+            Pending::Several(pending) if answers(pending, code) => self.heard = Some(now),
+            Pending::Mixed => self.heard = Some(now),
+            // Before the first answer of the motor, this may be another host's frame.
+            Pending::Unknown if self.heard.is_some() => self.heard = Some(now),
             _ => return false,
         }
         true
     }
 
-    /// What may be sent when a request with this code is made; or when to ask again.
+    /// What may be sent for a request with this code. An error is the time of the next attempt.
     pub(super) fn admit(
         &mut self,
         now: Instant,
         quarantine: Micros,
         code: u8,
     ) -> Result<Admitted, Instant> {
-        if self.owed == Owed::Nothing {
+        if self.pending == Pending::Nothing {
             return Ok(Admitted::Request);
         }
         let silent = self.heard.map(|heard| heard + quarantine);
@@ -115,7 +126,7 @@ impl Doubt {
                 let sent = if code == Code::Off { &mut self.off } else { &mut self.stop };
                 let again = core::mem::replace(sent, true);
                 return match silent {
-                    // Sent again and again it would never let the motor fall silent.
+                    // Repeated Offs and Stops would keep the motor from being silent.
                     Some(silent) if again && now < self.until => Err(silent.min(self.until)),
                     _ => {
                         self.until = now + quarantine + quarantine;
@@ -136,8 +147,8 @@ impl Doubt {
     }
 }
 
-/// Whether a reply with the code `came` answers a request with the code `asked`.
-pub(super) fn answers(asked: u8, came: u8) -> bool {
-    let (asked, came) = (Code::from(asked), Code::from(came));
-    asked == came || (asked == Code::ClearErrors && came == Code::ReadStatus)
+/// Whether a reply with the code `reply` answers a request with the code `request`.
+pub(super) fn answers(request: u8, reply: u8) -> bool {
+    let (request, reply) = (Code::from(request), Code::from(reply));
+    request == reply || (request == Code::ClearErrors && reply == Code::ReadStatus)
 }

@@ -1,4 +1,4 @@
-//! The drive: answers the host and tells the motor what to do, without I/O.
+//! The drive: answers the host and commands its motor, without I/O.
 
 use super::command::{
     Code, Command, SetPosition, SetPositionLimited, SetSingleTurnPosition, SetSpeed, SetTorque,
@@ -12,32 +12,32 @@ use crate::can::CanFrame;
 use crate::time::{Instant, Micros};
 use crate::units::*;
 
-/// What the drive needs of its motor: the power stage, its control loops and its sensors. Angles
-/// are encoder counts; the drive alone knows where zero is.
+/// The motor of a drive: the power stage, its control loops and its sensors. Angles are encoder
+/// counts; only the drive knows the zero point.
 pub trait MotorControl {
-    /// Does `mode` from now on. Called once for each command that asks for it.
+    /// Starts `mode`. Called once for each command that requests it.
     fn set_mode(&mut self, mode: Mode);
 
-    /// Uses these gains and this acceleration limit from now on.
+    /// Sets the gains and the acceleration limit.
     fn configure(&mut self, settings: &Settings);
 
-    /// What the sensors read now.
+    /// Reads the sensors.
     fn sense(&mut self) -> Sense;
 
-    /// Keeps the settings that [`Drive::new`] gets after a power cycle. Wears a real ROM.
+    /// Stores the settings in ROM. [`Drive::new`] gets them after a power cycle. Wears a real ROM.
     fn save(&mut self, rom: &Settings);
 }
 
-/// What the motor does.
+/// The motion of the motor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mode {
-    /// Without current (3, Motor off command).
+    /// No current (3, Motor off command).
     #[default]
     Off,
-    /// Brought to a stand and kept there (3, Motor stop command).
+    /// Braked to standstill and held there (3, Motor stop command).
     Stopped,
-    /// Holds a torque current within ±[`IqCommand::MAX`]; the drive's greatest torque current does
-    /// not limit it (3, Torque current control command).
+    /// Holds a torque current within ±[`IqCommand::MAX`]. The drive's own maximum torque current
+    /// does not limit it (3, Torque current control command).
     Torque(IqCommand),
     /// Holds a speed (3, Speed control command).
     Speed(CentiDps),
@@ -45,14 +45,14 @@ pub enum Mode {
     Position {
         /// Encoder counts as in [`Sense::encoder`].
         target: i64,
-        /// Greatest speed on the way; `None` leaves it to the drive's own.
+        /// Maximum speed during the move; `None` selects the drive's own maximum.
         max_speed: Option<SpeedLimit>,
-        /// Whether the drive's Max Angle holds: for commands 1 and 2, not for 3 and 4.
+        /// Whether the drive's Max Angle applies: for commands 1 and 2, not for 3 and 4.
         within_max_angle: bool,
     },
 }
 
-/// What the sensors read.
+/// Sensor values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Sense {
     /// Motor temperature.
@@ -63,38 +63,39 @@ pub struct Sense {
     pub iq: IqFeedback,
     /// Speed, positive is clockwise.
     pub speed: Dps,
-    /// Encoder counts in the encoder's own width, growing clockwise and counted on beyond each end
-    /// of the turn. Starts within the turn, 0 to 2^width - 1, at power-on.
+    /// Encoder counts in the encoder's own width. They grow clockwise and do not wrap at the ends
+    /// of the turn. At power-on they are within the turn: 0 to 2^width - 1.
     pub encoder: i64,
     /// Currents of the three phases.
     pub phase_currents: PhaseCurrents,
-    /// Faults that are present now; the drive latches them.
+    /// Faults that are present now. The drive latches them.
     pub faults: Errors,
 }
 
-/// What a host can set: once in RAM, which commands act on, and once in ROM, which power-on copies.
+/// The settings of a host. There are two copies: RAM, which commands use, and ROM, which power-on
+/// copies to RAM.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Settings {
     /// Gains of the three loops (0x30 to 0x32).
     pub gains: Pid,
-    /// Acceleration limit (0x33, 0x34), 1 °/s² a digit. No command writes it to ROM. 0 and less are
-    /// no limit, as in the vendor's tool.
+    /// Acceleration limit (0x33, 0x34), 1 °/s² a digit. No command writes it to ROM. 0 and negative
+    /// values mean no limit, as in the vendor's tool.
     pub acceleration: DpsPerSecond,
-    /// Encoder value that is zero (0x90, 0x91, 0x19), as it travels: at most 16 bits.
+    /// Encoder value of the zero point (0x90, 0x91, 0x19), as in the frame: at most 16 bits.
     pub encoder_offset: u16,
 }
 
-/// What the vendor's tool or a switch sets, not the bus.
+/// Configuration by the vendor's tool or by a switch. No command changes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DriveConfig {
-    /// The ID that the drive answers to.
+    /// The ID of the drive.
     pub id: MotorId,
     /// Width of the encoder (docs/SPEC-NOTES.md R6).
     pub encoder: EncoderBits,
-    /// Switches the motor off after this long without a command (docs/SPEC-NOTES.md R12).
+    /// Switches the motor off after this time without a command (docs/SPEC-NOTES.md R12).
     pub shutdown: Option<Micros>,
-    /// Answers 0x9B with 0x9B, as relatives do, and not with 0x9A as printed (3, Clear motor error
-    /// flag command; docs/SPEC-NOTES.md R1).
+    /// Answers 0x9B with 0x9B, as related drives do, instead of 0x9A as printed (3, Clear motor
+    /// error flag command; docs/SPEC-NOTES.md R1).
     pub clear_reply_0x9b: bool,
 }
 
@@ -106,7 +107,7 @@ impl DriveConfig {
     }
 }
 
-/// Frames for this drive that it did not answer; each count stays at its end.
+/// Counts frames for this drive that it did not answer. Each count saturates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Ignored {
     /// Not standard data frames of eight bytes (docs/SPEC-NOTES.md R11).
@@ -118,13 +119,13 @@ pub struct Ignored {
 /// The drive's side of the protocol, for one motor.
 #[derive(Debug, Clone)]
 pub struct Drive {
-    /// What the vendor's tool set; may change at any time.
+    /// The vendor's configuration. It may change at any time.
     pub config: DriveConfig,
     ram: Settings,
     rom: Settings,
     mode: Mode,
     stopped: bool,
-    /// The single-turn command behind `mode`.
+    /// The single-turn command from which `mode` was derived.
     circle: Option<SetSingleTurnPosition>,
     errors: Errors,
     last_command: Instant,
@@ -132,7 +133,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// A drive with what its ROM holds. Not running before [`power_on`](Self::power_on).
+    /// A drive with these ROM contents. It runs after [`power_on`](Self::power_on).
     pub fn new(config: DriveConfig, rom: Settings) -> Self {
         Drive {
             config,
@@ -147,16 +148,16 @@ impl Drive {
         }
     }
 
-    /// Starts, also after a power cycle: settings come from ROM, the motor is off, no error is
-    /// latched and nothing is left to resume.
+    /// Starts the drive, also after a power cycle: settings come from ROM, the motor is off, no
+    /// error is latched, and Run has no motion to resume.
     pub fn power_on(&mut self, now: Instant, motor: &mut impl MotorControl) {
         *self = Drive { last_command: now, ..Drive::new(self.config, self.rom) };
         motor.configure(&self.ram);
         motor.set_mode(Mode::Off);
     }
 
-    /// Takes a frame from the bus and returns the reply. Frames for others get none, nor do
-    /// unknown codes and frames that are not eight bytes of standard data.
+    /// Takes a frame from the bus and returns the reply. There is no reply to frames for other
+    /// motors, to unknown codes, and to frames other than standard data frames of eight bytes.
     pub fn receive(
         &mut self,
         now: Instant,
@@ -175,7 +176,7 @@ impl Drive {
         };
         let sense = self.watch(now, motor);
         let reply = if everyones {
-            // Carried out and answered as the single command (chapter 4).
+            // Executed and answered like the single-motor command (chapter 4).
             let torque = SetTorque4::decode(data).of(id)?;
             self.answer(&SetTorque { iq: torque }.encode(), &sense, motor)?
         } else {
@@ -185,19 +186,19 @@ impl Drive {
         Some(CanFrame::new(id.can_id(), reply))
     }
 
-    /// Latches faults and keeps the shutdown time. Call at [`deadline`](Self::deadline), and often
-    /// enough for a fault to switch the motor off in time.
+    /// Latches faults and checks the shutdown time. Call it at [`deadline`](Self::deadline), and
+    /// often enough to switch the motor off in time after a fault.
     pub fn poll(&mut self, now: Instant, motor: &mut impl MotorControl) {
         self.watch(now, motor);
     }
 
-    /// When the shutdown time will be over; `None` while the motor is off or has none.
+    /// End of the shutdown time; `None` while the motor is off or no shutdown time is set.
     pub fn deadline(&self) -> Option<Instant> {
         let shutdown = self.config.shutdown?;
         (self.mode != Mode::Off).then_some(self.last_command + shutdown)
     }
 
-    /// What the motor was last told to do.
+    /// The last commanded mode.
     pub const fn mode(&self) -> Mode {
         if self.stopped { Mode::Stopped } else { self.mode }
     }
@@ -207,12 +208,12 @@ impl Drive {
         self.errors
     }
 
-    /// The settings in RAM, which commands act on.
+    /// The settings in RAM, which commands use.
     pub const fn settings(&self) -> &Settings {
         &self.ram
     }
 
-    /// The settings in ROM, which the next power-on copies.
+    /// The settings in ROM, which the next power-on copies to RAM.
     pub const fn rom(&self) -> &Settings {
         &self.rom
     }
@@ -316,8 +317,8 @@ impl Drive {
         })
     }
 
-    /// The mode that a motion command asks for, with the command when it is a single-turn one;
-    /// `None` for one outside of the document's range, which is not carried out
+    /// The mode that a motion command requests, and the command if it is a single-turn command.
+    /// `None` if a value is outside the document's range: the drive ignores the command
     /// (docs/SPEC-NOTES.md R15).
     fn request_mode(
         &self,
@@ -341,7 +342,7 @@ impl Drive {
             _ => {
                 let command = SetSingleTurnPosition::decode(data);
                 let target = match self.mode {
-                    // The same command again does not start another turn (R16).
+                    // Repeating the command does not start another turn (R16).
                     Mode::Position { target, .. } if self.circle == Some(command) => target,
                     _ => self.circle_target(command, sense)?,
                 };
@@ -366,8 +367,8 @@ impl Drive {
         }
     }
 
-    /// Starts a mode, also out of a stop (docs/SPEC-NOTES.md R17); never while an error is latched
-    /// (R18).
+    /// Starts a mode, also when the motor is stopped (docs/SPEC-NOTES.md R17). Does nothing while
+    /// an error is latched (R18).
     fn go(&mut self, mode: Mode, motor: &mut impl MotorControl) {
         if !self.errors.is_empty() {
             return;
@@ -428,7 +429,7 @@ fn reached(id: MotorId) -> bool {
     MotorSet::TORQUE4.contains(id)
 }
 
-/// Held to the document's range (docs/SPEC-NOTES.md R3).
+/// Clamped to the document's range (docs/SPEC-NOTES.md R3).
 fn saturated(torque: IqCommand) -> IqCommand {
     let IqCommand(most) = IqCommand::MAX;
     IqCommand(torque.0.min(most).max(most.wrapping_neg()))

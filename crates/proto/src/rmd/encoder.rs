@@ -1,14 +1,15 @@
-//! Encoder counts and angles. All arithmetic with the zero point is here, so that encoder position,
-//! single-turn and multi-turn angle agree.
+//! Encoder counts and angles. Only this module computes with the zero point, so that encoder
+//! position, single-turn angle and multi-turn angle agree.
 
 use crate::units::{CentiDegrees, TurnCentiDegrees, WideCentiDegrees};
 
 /// Digits of 0.01° in a turn.
 pub const FULL_TURN: u16 = TurnCentiDegrees::MAX.0 + 1;
 
-/// Width of an encoder: 12 to 18 bits a turn (chapter 4, note), 14 as the document's frames say.
+/// Width of an encoder, 12 to 18 bits per turn (chapter 4, note). The default is 14, as in the
+/// document's frames.
 ///
-/// A frame has 16 bits for a position. Of a wider encoder the upper 16 travel
+/// A position has 16 bits in a frame. Of a wider encoder the frame carries the upper 16 bits
 /// (docs/SPEC-NOTES.md R6).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EncoderBits(u8);
@@ -29,38 +30,38 @@ impl EncoderBits {
         f64::from(counts) * 360.0 / f64::from(1u32.wrapping_shl(u32::from(self.0.min(16))))
     }
 
-    /// Cuts a value of a frame to what this encoder can read.
+    /// Limits a value from a frame to the range of this encoder.
     pub(super) fn cut(self, counts: u16) -> u16 {
         self.narrow(self.widen(counts))
     }
 
-    /// Counts over all turns as they travel: within the turn, at most 16 bits.
+    /// Multi-turn counts as a frame carries them: within the turn, at most 16 bits.
     pub(super) fn narrow(self, counts: i64) -> u16 {
         let unused = 16u32.saturating_sub(self.width());
         let wire = counts.wrapping_shr(self.dropped()) as u16;
         wire.wrapping_shl(unused).wrapping_shr(unused)
     }
 
-    /// Counts of the encoder from a value of a frame.
+    /// Encoder counts of a value from a frame.
     pub(super) fn widen(self, counts: u16) -> i64 {
         i64::from(counts).wrapping_shl(self.dropped())
     }
 
-    /// Counts from zero as an angle; the digit below.
+    /// Counts from zero as an angle, rounded down to a digit.
     pub(super) fn multi_turn(self, counts: i64) -> WideCentiDegrees {
         WideCentiDegrees(counts.wrapping_mul(i64::from(FULL_TURN)).wrapping_shr(self.width()))
     }
 
-    /// Counts from zero as an angle within the turn; the digit below.
+    /// Counts from zero as an angle within the turn, rounded down to a digit.
     pub(super) fn circle(self, counts: i64) -> TurnCentiDegrees {
         TurnCentiDegrees(self.multi_turn(self.within_turn(counts)).0 as u16)
     }
 
-    /// The nearest counts from zero to an angle.
+    /// The counts from zero that are nearest to an angle.
     pub(super) fn counts(self, angle: CentiDegrees) -> i64 {
         let turns = angle.0.div_euclid(i32::from(FULL_TURN));
         let rest = angle.0.rem_euclid(i32::from(FULL_TURN)) as u32;
-        // 36000 is 1125 << 5; this way 18 bits of encoder fit 32 bits of arithmetic.
+        // 36000 is 1125 << 5, so 18 bits of encoder fit into 32-bit arithmetic.
         let scaled = rest.wrapping_shl(self.width().saturating_sub(5));
         let within = scaled.wrapping_add(1125 / 2) / 1125;
         i64::from(turns).wrapping_shl(self.width()).wrapping_add(i64::from(within))
@@ -75,7 +76,7 @@ impl EncoderBits {
         u32::from(self.0)
     }
 
-    /// Low bits that do not travel.
+    /// Low bits that a frame does not carry.
     fn dropped(self) -> u32 {
         self.width().saturating_sub(16)
     }
@@ -135,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_wide_encoder_the_upper_16_bits_travel() {
+    fn a_wide_encoder_sends_its_upper_16_bits() {
         let wide = EncoderBits::new(18).unwrap();
         assert_eq!(wide.narrow(0x3FFFF), 0xFFFF);
         assert_eq!(wide.narrow(-1), 0xFFFF);

@@ -1,29 +1,40 @@
-//! The host: which replies belong to which requests, to many motors at once, without I/O.
+//! The host: sends requests to many motors and matches replies to requests, without I/O.
 //!
-//! Hand in requests with [`Host::request`], received frames with [`Host::receive`], and after either
-//! drain [`Host::poll`] until it says [`Output::Wait`]. A cycle over several motors is a request to
-//! each and one such loop: the exchanges overlap, and each frame costs the same however many are
-//! under way.
+//! Pass requests to [`Host::request`] and received frames to [`Host::receive`]. After each call,
+//! repeat [`Host::poll`] until it returns [`Output::Wait`]. For a cycle over several motors, make
+//! one request per motor and run one such loop: the exchanges overlap. The cost of a frame does not
+//! depend on the number of open exchanges.
 //!
-//! There is no sequence number and no error reply, so a reply is known by (ID, DATA\[0\]) and a
-//! motor has one exchange at a time. After a timeout the motor is in quarantine, so that a late reply
-//! cannot pass for that to the next request: nothing is sent until the late reply came or the quarantine
-//! time passed. If it did not come, the motor is asked for its status in place of the next request,
-//! which ends in [`Failure::Quarantined`] when the motor answers. That answer may be an old one too, so
-//! the motor then has to be silent for the quarantine time (docs/SPEC-NOTES.md R29). No exchange with
-//! a motor that was asked before takes longer than its timeout, and exchanges with other motors wait for
-//! none of this: who has to have a request carried out makes it again on [`Failure::Quarantined`], and at
-//! the time that [`RequestError::Quarantined`] tells.
+//! # Quarantine
 //!
-//! A motor that was not asked before may owe a former host replies: it is in quarantine, and is asked
-//! for its status at once, by two different questions, each of which has the exchange's timeout. Off
-//! and Stop go out before these; their exchange ends in [`Failure::Quarantined`] as well, because a reply
-//! to them may be an older one's.
+//! The protocol has no sequence numbers and no error replies. A reply is matched by (ID,
+//! DATA\[0\]), so a motor has one exchange at a time.
 //!
-//! Some requests and their replies are the same bit for bit (0x31, 0x32, 0x34, 0x80, 0x81, 0x88). A
-//! reply with another content is [`Failure::Altered`], and the motor is in quarantine. An adapter that
-//! echoes what it sends looks like a motor that answers these. The reply to the question for the status
-//! has a voltage: if the question itself comes back, the exchange ends in [`Failure::Echo`].
+//! After a timeout the motor is in quarantine. This keeps a late reply from being matched to the
+//! next request. Nothing is sent until the late reply was received or the quarantine time is over.
+//!
+//! If the late reply was not received, the host sends a status question instead of the next
+//! request. When the motor answers, that request ends with [`Failure::Quarantined`]. The answer may
+//! also be an old reply, so the motor must then be silent for the quarantine time
+//! (docs/SPEC-NOTES.md R29).
+//!
+//! After the first exchange with a motor, no exchange takes longer than its timeout. Exchanges with
+//! other motors are not delayed. If a request must be carried out, repeat it after
+//! [`Failure::Quarantined`], and at the time in [`RequestError::Quarantined`].
+//!
+//! A motor without any exchange so far may send replies to a former host. It starts in quarantine.
+//! The host asks it for its status at once, with two different questions; each has the timeout of
+//! the exchange. Off and Stop are sent before these questions. Their exchange also ends with
+//! [`Failure::Quarantined`], because a reply to them may belong to an older request.
+//!
+//! # Echoes
+//!
+//! Some requests and their replies have the same bytes (0x31, 0x32, 0x34, 0x80, 0x81, 0x88). A
+//! reply with other bytes is [`Failure::Altered`], and the motor is in quarantine.
+//!
+//! An adapter that echoes its own frames looks like a motor that answers these commands. The reply
+//! to a status question contains a voltage. If the question itself is received, the exchange ends
+//! with [`Failure::Echo`].
 
 use super::command::{Code, Command, ReadMotionStatus, ReadStatus, SetTorque};
 use super::doubt::{Admitted, Doubt, answers};
@@ -34,21 +45,21 @@ use super::outcome::{Counters, Failure, Output, RequestError};
 use crate::can::CanFrame;
 use crate::time::{Instant, Micros};
 
-/// How long a reply may take unless told otherwise: real motors answer in 0.3 to 2 ms, and a USB
-/// adapter may hold a frame for 16 ms.
+/// Default timeout of a reply. Real motors answer in 0.3 to 2 ms, and a USB adapter may delay a
+/// frame by 16 ms.
 pub const DEFAULT_TIMEOUT: Micros = Micros::from_millis(50);
-/// How long after a timeout a late reply is awaited, and how long a motor that did not answer has to
-/// be silent, unless told otherwise.
+/// Default quarantine time: how long the host waits for a late reply after a timeout, and how long
+/// such a motor must be silent.
 pub const DEFAULT_QUARANTINE: Micros = Micros::from_millis(100);
 
 #[derive(Debug, Clone, Copy)]
 struct Slot {
-    /// The request, and from its arrival on the reply.
+    /// The request; after its arrival the reply.
     data: [u8; 8],
     timeout: Micros,
     deadline: Instant,
-    /// What came instead of the reply to this request: nothing, so far.
-    instead: Failure,
+    /// The failure so far. A timeout means that nothing was received instead of the reply.
+    failure: Failure,
     doubt: Doubt,
     limits: Limits,
 }
@@ -57,18 +68,18 @@ struct Slot {
 #[derive(Debug, Clone)]
 pub struct Host {
     slots: [Slot; MotorId::COUNT],
-    /// The five stages of an exchange; a motor is in one of them at most.
+    /// The five stages of an exchange. A motor is in at most one of them.
     queued: MotorSet,
     queued_torque4: MotorSet,
     in_flight: MotorSet,
     replied: MotorSet,
     failed: MotorSet,
-    /// Motors that are asked for their status in place of what was requested.
+    /// Motors that get a status question instead of the request.
     questioned: MotorSet,
-    /// Motors that sent what answers no request since they were trusted.
+    /// Motors that sent a reply without a request since they were trusted.
     strays: MotorSet,
     torque4: Option<SetTorque4>,
-    /// No deadline in flight is before this moment.
+    /// No deadline in `in_flight` is before this moment.
     earliest: Instant,
     timeout: Micros,
     quarantine: Micros,
@@ -78,14 +89,14 @@ pub struct Host {
 const NEVER: Instant = Instant(u64::MAX);
 
 impl Host {
-    /// A host with the default times and no limits, on a bus on which former hosts may have asked the
-    /// motors anything; [`trust`](Self::trust) says that they did not.
+    /// A host with the default times and no limits. Former hosts may have sent requests on this
+    /// bus. If they did not, call [`trust`](Self::trust).
     pub const fn new() -> Self {
         const IDLE: Slot = Slot {
             data: [0; 8],
             timeout: DEFAULT_TIMEOUT,
             deadline: NEVER,
-            instead: Failure::Timeout,
+            failure: Failure::Timeout,
             doubt: Doubt::UNKNOWN,
             limits: Limits { current: None, speed: None, angle: None },
         };
@@ -114,15 +125,16 @@ impl Host {
     }
 
     /// Sends `data` to a motor and expects a reply with the same DATA\[0\] (0x9A or 0x9B to 0x9B,
-    /// docs/SPEC-NOTES.md R1). A typed request is `command.encode()`; codes that nobody knows are
-    /// taken as well.
+    /// docs/SPEC-NOTES.md R1). For a typed request, pass `command.encode()`. Unknown codes are
+    /// allowed.
     ///
-    /// A motor that did not answer before may be asked for its status instead; the exchange ends in
-    /// [`Failure::Quarantined`] then, or in a timeout.
+    /// A motor that did not answer before may get a status question instead. The exchange then ends
+    /// with [`Failure::Quarantined`] or a timeout.
     ///
     /// # Errors
-    /// [`RequestError`]; nothing is sent then. Off and Stop are taken and sent during a quarantine, unless
-    /// it is their own late reply that is awaited, for the quarantine time (docs/SPEC-NOTES.md R22).
+    /// [`RequestError`]; nothing is sent then. Off and Stop are sent during a quarantine, too. The
+    /// exception: while their own late reply is pending, they are refused for the quarantine time
+    /// (docs/SPEC-NOTES.md R22).
     pub fn request(
         &mut self,
         now: Instant,
@@ -132,7 +144,7 @@ impl Host {
         self.request_within(now, id, data, self.timeout)
     }
 
-    /// As [`request`](Self::request), with a timeout of its own.
+    /// Like [`request`](Self::request), with its own timeout.
     ///
     /// # Errors
     /// Those of [`request`](Self::request).
@@ -159,10 +171,10 @@ impl Host {
     /// Sends one frame with torque currents for motors 1 to 4 and expects a reply from each of
     /// `expect` (4, Multiple motor torque closed loop control commands).
     ///
-    /// The frame reaches all four. Those that are not expected to answer must have no exchange under
-    /// way either, and are in quarantine afterwards (docs/SPEC-NOTES.md R23). If one of `expect` did
-    /// not answer before, each is asked for its status instead, as by [`request`](Self::request), and
-    /// nothing else is sent.
+    /// The frame reaches all four motors. Motors that are not in `expect` must not have an open
+    /// exchange, and are in quarantine afterwards (docs/SPEC-NOTES.md R23). If one of `expect` did
+    /// not answer before, each of them gets a status question, as in [`request`](Self::request),
+    /// and nothing else is sent.
     ///
     /// # Errors
     /// [`RequestError`]; nothing is sent then.
@@ -231,29 +243,29 @@ impl Host {
             return Output::Done { id, result };
         }
         if let Some(id) = self.failed.next() {
-            let instead = self.slot(id).instead;
-            return Output::Done { id, result: Err(instead) };
+            let failure = self.slot(id).failure;
+            return Output::Done { id, result: Err(failure) };
         }
         Output::Wait((!self.in_flight.is_empty()).then_some(self.earliest))
     }
 
-    /// Gives up the exchange with a motor without a result, so that another request can be made: an
-    /// Off at once. A reply that is still to come is treated as after a timeout. A frame of
-    /// [`set_torque4`](Self::set_torque4) that still waits and would reach the motor is given up for all.
+    /// Cancels the exchange with a motor without a result. Another request, such as Off, can be
+    /// made at once. A reply that is still to come is treated as after a timeout. A queued frame of
+    /// [`set_torque4`](Self::set_torque4) that would reach the motor is cancelled for all motors.
     pub fn cancel(&mut self, now: Instant, id: MotorId) {
         if MotorSet::TORQUE4.contains(id) {
             self.torque4 = None;
             self.queued_torque4 = MotorSet::EMPTY;
         }
         if self.in_flight.contains(id) {
-            self.owes(now, id);
+            self.expect_late(now, id);
         }
         for stage in [&mut self.queued, &mut self.in_flight, &mut self.replied, &mut self.failed] {
             stage.remove(id);
         }
     }
 
-    /// Says that these motors owe no host a reply.
+    /// Declares that these motors have no pending reply to any host.
     pub fn trust(&mut self, ids: MotorSet) {
         for id in ids {
             self.slot(id).doubt = Doubt::NONE;
@@ -261,8 +273,8 @@ impl Host {
         }
     }
 
-    /// Tells that the bus was opened anew: what the motors may still answer is not known. Exchanges
-    /// under way are given up.
+    /// Declares that the port was opened again. The late replies of the motors are unknown, and
+    /// open exchanges are cancelled.
     pub fn reopened(&mut self, now: Instant) {
         for id in MotorSet::ALL {
             self.cancel(now, id);
@@ -270,44 +282,43 @@ impl Host {
         }
     }
 
-    /// Whether a motor sent what answers no request, since it was trusted or since this was asked last. A
-    /// reply that came twice shows so, at the latest by the reply to a request with another code.
+    /// Whether a motor sent a reply without a request, since it was trusted or since the last call.
+    /// A duplicate reply is detected at the latest by the reply to a request with another code.
     pub fn take_stray(&mut self, id: MotorId) -> bool {
         let is_stray = self.strays.contains(id);
         self.strays.remove(id);
         is_stray
     }
 
-    /// Whether a motor may owe a former host anything.
+    /// Whether a motor may have pending replies to a former host.
     pub fn is_unknown(&self, id: MotorId) -> bool {
         self.slots[id.index()].doubt.is_unknown()
     }
 
-    /// The motors with an exchange under way, those with an undrained result among them. While a
-    /// frame of [`set_torque4`](Self::set_torque4) waits to be sent these are all that it reaches.
+    /// The motors with an open exchange or with a result that was not yet polled. While a frame of
+    /// [`set_torque4`](Self::set_torque4) is queued, these are all four motors that it reaches.
     pub const fn busy(&self) -> MotorSet {
-        let asked = self.queued.union(self.queued_torque4).union(self.in_flight);
-        let busy = asked.union(self.replied).union(self.failed);
+        let unanswered = self.queued.union(self.queued_torque4).union(self.in_flight);
+        let busy = unanswered.union(self.replied).union(self.failed);
         if self.torque4.is_some() { busy.union(MotorSet::TORQUE4) } else { busy }
     }
 
-    /// What a motor may be told.
+    /// The limits of a motor.
     pub fn limits(&self, id: MotorId) -> Limits {
         self.slots[id.index()].limits
     }
 
-    /// Sets what a motor may be told from the next request on.
+    /// Sets the limits of a motor, effective from the next request.
     pub fn set_limits(&mut self, id: MotorId, limits: Limits) {
         self.slot(id).limits = limits;
     }
 
-    /// Sets how long a reply may take from the next request on.
+    /// Sets the timeout of replies, effective from the next request.
     pub const fn set_timeout(&mut self, timeout: Micros) {
         self.timeout = timeout;
     }
 
-    /// Sets the quarantine: how long a motor is left alone from the next timeout on, and how long it
-    /// has to be silent.
+    /// Sets the quarantine time, effective from the next timeout.
     pub const fn set_quarantine(&mut self, quarantine: Micros) {
         self.quarantine = quarantine;
     }
@@ -317,7 +328,7 @@ impl Host {
         self.quarantine
     }
 
-    /// What came and belonged to no exchange.
+    /// Counts of frames that belonged to no exchange.
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
@@ -329,7 +340,7 @@ impl Host {
             }
             for id in MotorSet::TORQUE4.without(self.queued_torque4) {
                 self.slot(id).data = SetTorque::default().encode();
-                self.owes(now, id);
+                self.expect_late(now, id);
             }
             self.queued_torque4 = MotorSet::EMPTY;
             return Some(CanFrame::new(TORQUE4_ID, torques.encode()));
@@ -349,16 +360,16 @@ impl Host {
                 _ => None,
             };
             if let Some(wrong) = wrong {
-                slot.instead = wrong;
+                slot.failure = wrong;
                 self.failed.insert(id);
-                self.owes(now, id);
+                self.expect_late(now, id);
                 return;
             }
             if self.questioned.contains(id)
                 && slot.doubt.is_unknown()
                 && Code::from(slot.data[0]) != Code::ReadMotionStatus
             {
-                // Two different questions: the reply to the first may be the reply to a former host.
+                // Two different questions: the reply to the first may belong to a former host.
                 slot.data = question_behind(slot.data[0]);
                 self.queued.insert(id);
                 return;
@@ -368,7 +379,7 @@ impl Host {
             self.replied.insert(id);
             return;
         }
-        let late = slot.doubt.came(now, data[0]);
+        let late = slot.doubt.late_reply(now, data[0]);
         if !late {
             self.strays.insert(id);
         }
@@ -381,10 +392,10 @@ impl Host {
             Dialect::LkTech => &mut self.counters.foreign_lk,
         });
         self.counters.last_foreign = Some((dialect, id));
-        let asked = self.in_flight.contains(id);
+        let is_open = self.in_flight.contains(id);
         let slot = self.slot(id);
-        if asked && slot.data[0] == data[0] {
-            slot.instead = Failure::Foreign(dialect);
+        if is_open && slot.data[0] == data[0] {
+            slot.failure = Failure::Foreign(dialect);
         }
     }
 
@@ -416,7 +427,7 @@ impl Host {
         let slot = self.slot(id);
         slot.data = data;
         slot.timeout = timeout;
-        slot.instead = Failure::Timeout;
+        slot.failure = Failure::Timeout;
         self.questioned.remove(id);
     }
 
@@ -439,15 +450,15 @@ impl Host {
             }
             self.in_flight.remove(id);
             self.failed.insert(id);
-            self.owes(now, id);
+            self.expect_late(now, id);
         }
     }
 
-    /// The reply to what was sent may still come.
-    fn owes(&mut self, now: Instant, id: MotorId) {
+    /// Records that the reply to the sent frame may come late.
+    fn expect_late(&mut self, now: Instant, id: MotorId) {
         let quarantine = self.quarantine;
         let slot = self.slot(id);
-        slot.doubt.owes(now, quarantine, slot.data[0]);
+        slot.doubt.missed(now, quarantine, slot.data[0]);
     }
 
     fn slot(&mut self, id: MotorId) -> &mut Slot {
@@ -455,9 +466,9 @@ impl Host {
     }
 }
 
-/// A question for the status that no reply to a request with the code `asked` can answer.
-pub fn question_behind(asked: u8) -> [u8; 8] {
-    match answers(asked, Code::ReadStatus.into()) {
+/// A status question whose reply has another code than the reply to `request`.
+pub fn question_behind(request: u8) -> [u8; 8] {
+    match answers(request, Code::ReadStatus.into()) {
         true => ReadMotionStatus.encode(),
         false => ReadStatus.encode(),
     }

@@ -1,5 +1,5 @@
-//! What the caller allows a motor to be told. Checked on the bytes that leave, so that a raw frame
-//! is held to it as well.
+//! Limits of what may be commanded to a motor. They are checked on the bytes of the frame, so they
+//! also apply to raw frames.
 
 use super::command::{
     Code, SetPosition, SetPositionLimited, SetSingleTurnPosition, SetSingleTurnPositionLimited,
@@ -11,24 +11,26 @@ use super::payload::Payload;
 use crate::units::{CentiDegrees, CentiDps, IqCommand, SpeedLimit, TurnCentiDegrees};
 use core::fmt;
 
-/// The most that may be commanded to a motor, either way round; `None` is no limit beyond the
-/// protocol's own ranges. A limit holds for what a frame carries: a torque command has no speed, so
-/// that the motor turns as fast as its load allows, whatever the limit of speed; the drive's own
-/// settings bound the current of a speed or position command. [`inward`](crate::units::inward)
-/// rounds a physical limit so that no digit exceeds it.
+/// The maximum values that may be commanded to a motor, in either direction. `None` means no limit
+/// other than the protocol's own ranges.
+///
+/// A limit applies to the values of a frame. A torque command contains no speed: the motor turns as
+/// fast as its load allows, whatever the speed limit. The current of a speed or position command is
+/// limited only by the drive's own settings. [`inward`](crate::units::inward) rounds a physical
+/// limit so that no digit exceeds it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Limits {
-    /// Greatest torque current of 0xA1 and 0x280, 0.016 A a digit.
+    /// Maximum torque current of 0xA1 and 0x280, 0.016 A a digit.
     pub current: Option<IqCommand>,
-    /// Greatest speed of 0xA2, 0xA4 and 0xA6, 1 °/s a digit. 0xA3 and 0xA5 carry no speed and are
-    /// refused while this is set, as are 0xA4 and 0xA6 with 0, which may mean any speed to a drive
-    /// (docs/SPEC-NOTES.md R13, R14).
+    /// Maximum speed of 0xA2, 0xA4 and 0xA6, 1 °/s a digit. With this limit set, 0xA3 and 0xA5 are
+    /// refused, because they contain no speed. 0xA4 and 0xA6 with speed 0 are refused, because a
+    /// drive may read 0 as any speed (docs/SPEC-NOTES.md R13, R14).
     pub speed: Option<SpeedLimit>,
-    /// Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit.
+    /// Maximum distance from zero in 0xA3 and 0xA4, 0.01° a digit.
     pub angle: Option<CentiDegrees>,
 }
 
-/// Why a frame may not leave.
+/// Why a frame was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Exceeded {
@@ -46,7 +48,7 @@ pub enum Exceeded {
         /// The limit.
         limit: SpeedLimit,
     },
-    /// The command carries no speed, so that `limit` cannot be kept.
+    /// The command contains no speed, so `limit` cannot be enforced.
     NoSpeed {
         /// The limit.
         limit: SpeedLimit,
@@ -62,13 +64,12 @@ pub enum Exceeded {
     SingleTurnAngle(TurnCentiDegrees),
     /// A direction that the document does not name (3, Position control command 3).
     Direction(SpinDirection),
-    /// A code beside the motion commands (0xA0 to 0xAF) that the document does not name, while there
-    /// is a limit: what its bytes mean is not known.
+    /// An unnamed code from 0xA0 to 0xAF while a limit is set. The meaning of its bytes is unknown.
     UnknownMotion(u8),
 }
 
 impl Limits {
-    /// Whether the bytes of a request may leave. Commands that do not move the motor always may.
+    /// Checks the bytes of a request. Commands that do not move the motor are always allowed.
     ///
     /// # Errors
     /// The limit that the frame exceeds.
@@ -103,7 +104,7 @@ impl Limits {
         }
     }
 
-    /// Whether a torque current may be commanded.
+    /// Checks a torque current.
     ///
     /// # Errors
     /// [`Exceeded::Current`].
@@ -188,8 +189,8 @@ impl fmt::Display for Exceeded {
             }
             Exceeded::UnknownMotion(code) => write!(
                 f,
-                "{code:#04x} may move the motor, and V1.62 does not say how: it is not sent while there is a \
-                 limit"
+                "{code:#04x} may move the motor, and V1.62 does not define it: it is not sent while a \
+                 limit is set"
             ),
             Exceeded::Direction(spin) => {
                 write!(f, "direction {spin} is neither 0 (clockwise) nor 1 (counterclockwise)")
@@ -233,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn each_limit_holds_both_ways_round() {
+    fn each_limit_applies_in_both_directions() {
         assert!(LIMITS.check(&torque(100)).is_ok());
         assert!(LIMITS.check(&torque(-101)).is_err());
         let speed = |digits| SetSpeed { speed: CentiDps(digits) }.encode();
@@ -285,8 +286,8 @@ mod tests {
     }
 
     #[test]
-    fn every_command_that_moves_a_motor_is_held_to_the_limits() {
-        // 0x88 carries nothing: it resumes what was allowed before.
+    fn every_motion_command_is_limited() {
+        // 0x88 carries no value: it resumes a motion that was allowed before.
         for row in COMMANDS.iter().filter(|row| row.moves && row.code != Code::Run) {
             let mut data = [0x7F; 8];
             data[0] = row.code.into();

@@ -1,4 +1,4 @@
-//! What requests carry beside the fields of the command table (chapters 3 and 4).
+//! Values of requests that are not in the command table (chapters 3 and 4).
 
 use super::motor::MotorId;
 use super::payload::{Field, Meaning, Payload, byte, place, take};
@@ -14,7 +14,7 @@ named_numbers! {
 byte!(SpinDirection, Meaning::Words(SpinDirection::NAMES));
 
 impl SpinDirection {
-    /// The direction of a word: its name, or `cw` and `ccw` for short.
+    /// The direction with this name; `cw` and `ccw` are short forms.
     pub fn named(word: &str) -> Option<Self> {
         match word {
             "clockwise" | "cw" => Some(SpinDirection::Clockwise),
@@ -23,7 +23,7 @@ impl SpinDirection {
         }
     }
 
-    /// The other way round.
+    /// The opposite direction.
     pub const fn opposite(self) -> Self {
         match self {
             SpinDirection::Counterclockwise => SpinDirection::Clockwise,
@@ -53,7 +53,7 @@ impl SetTorque4 {
         self.pack().to_le_bytes()
     }
 
-    /// The torque for a motor; `None` for those that the frame does not reach.
+    /// The torque current of a motor; `None` for motors that the frame does not reach.
     pub fn of(&self, id: MotorId) -> Option<IqCommand> {
         self.0.get(id.index()).copied()
     }

@@ -1,24 +1,28 @@
 //! The RMD motor control protocol over CAN, V1.62: host and drive.
 //!
-//! A bus has up to 32 motors. Request and reply of a motor have the same identifier, always eight
-//! bytes, and the same command code in the first (chapter 1); one frame more carries torque
-//! currents for motors 1 to 4 at once (chapter 4).
+//! A bus has up to 32 motors. The request and the reply of a motor have the same identifier, eight
+//! bytes, and the same command code in the first byte (chapter 1). One other frame carries torque
+//! currents for motors 1 to 4 (chapter 4).
 //!
-//! * [`Host`] sends requests to many motors and finds the reply to each.
-//! * [`Drive`] answers, and tells a [`MotorControl`] what to do.
-//! * [`COMMANDS`] is the list of commands with the place and unit of each value; there is a type
-//!   for each request and reply, which [`Command`] ties together.
-//! * [`describe`] puts a frame into words.
+//! | to | use |
+//! |---|---|
+//! | send requests to motors and match their replies | [`Host`] |
+//! | answer as a motor, in firmware or a simulator | [`Drive`] with your [`MotorControl`] |
+//! | build a request, read a reply | the types that implement [`Command`], such as [`SetSpeed`] |
+//! | command four torques in one frame | [`SetTorque4`], [`Host::set_torque4`] |
+//! | list all commands with their values and units | [`COMMANDS`] |
+//! | limit currents, speeds and angles | [`Limits`], [`Host::set_limits`] |
+//! | print a frame as text | [`describe`] |
 //!
-//! Where the document leaves something open, docs/SPEC-NOTES.md says how it is read here; comments
-//! cite its rows as R1, R2 and so on.
+//! docs/SPEC-NOTES.md explains how this crate reads unclear passages of the document. Comments
+//! refer to its rows as R1, R2 and so on.
 //!
 //! ```
 //! use motorlink_proto::{can::CanFrame, rmd::*, time::Instant, units::*};
 //!
 //! let motor = MotorId::new(1).unwrap();
 //! let mut host = Host::new();
-//! host.trust(MotorSet::ALL); // No other host spoke to these motors.
+//! host.trust(MotorSet::ALL); // No other host used this bus.
 //! let turn = SetPositionLimited { max_speed: SpeedLimit(360), angle: CentiDegrees::from_degrees(90.0) };
 //! host.request(Instant(0), motor, turn.encode())?;
 //! let Output::Transmit(frame) = host.poll(Instant(0)) else { unreachable!() };

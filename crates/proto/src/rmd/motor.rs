@@ -1,4 +1,4 @@
-//! Who speaks on the bus: motor ids, sets of them, and the identifiers that belong to them.
+//! Motor IDs, sets of them, and the CAN identifiers that belong to them.
 
 use core::fmt;
 
@@ -9,7 +9,7 @@ pub const MOTOR_BASE: u16 = 0x140;
 /// Identifier of the torque command to motors 1 to 4 (chapter 4).
 pub const TORQUE4_ID: u16 = 0x280;
 
-/// What the protocol uses of a bus, in each [`Dialect`].
+/// The identifiers that the protocol uses on a bus, in each [`Dialect`].
 pub const IDENTIFIERS: Identifiers = Identifiers {
     replies: MOTOR_BASE + 1..MOTOR_BASE + 1 + MotorId::COUNT as u16,
     is_used: |id| {
@@ -24,7 +24,7 @@ pub const IDENTIFIERS: Identifiers = Identifiers {
 pub struct MotorId(u8);
 
 impl MotorId {
-    /// How many IDs there are.
+    /// The number of IDs.
     pub const COUNT: usize = 32;
 
     /// `None` unless `id` is 1 to 32.
@@ -32,7 +32,7 @@ impl MotorId {
         if id >= 1 && id <= 32 { Some(MotorId(id)) } else { None }
     }
 
-    /// The motor whose frames have the identifier `can_id`, if it is one of [`MOTOR_BASE`].
+    /// The motor whose frames have the identifier `can_id`; `None` if there is none.
     pub fn from_can_id(can_id: u32) -> Option<Self> {
         Self::above(MOTOR_BASE, can_id)
     }
@@ -52,7 +52,7 @@ impl MotorId {
         Self::new(u8::try_from(id).ok()?)
     }
 
-    /// Place of this motor in a table of [`COUNT`](Self::COUNT), 0 to 31.
+    /// Index of this motor in a table of [`COUNT`](Self::COUNT) entries, 0 to 31.
     pub const fn index(self) -> usize {
         self.0.wrapping_sub(1) as usize & (Self::COUNT - 1)
     }
@@ -64,7 +64,7 @@ impl fmt::Display for MotorId {
     }
 }
 
-/// A set of motors; iterating yields the lowest ID first.
+/// A set of motors. Iteration starts with the lowest ID.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct MotorSet(u32);
 
@@ -73,15 +73,15 @@ impl MotorSet {
     pub const EMPTY: Self = MotorSet(0);
     /// Motors 1 to 4, which the frame [`TORQUE4_ID`] reaches (chapter 4).
     pub const TORQUE4: Self = MotorSet(0b1111);
-    /// Every ID there is.
+    /// All IDs.
     pub const ALL: Self = MotorSet(u32::MAX);
 
-    /// The set of these bits, bit 0 for motor 1.
+    /// The set with these bits: bit 0 is motor 1.
     pub const fn from_bits(bits: u32) -> Self {
         MotorSet(bits)
     }
 
-    /// A bit for each ID, bit 0 for motor 1.
+    /// One bit per ID: bit 0 is motor 1.
     pub const fn bits(self) -> u32 {
         self.0
     }
@@ -91,7 +91,7 @@ impl MotorSet {
         self.0 == 0
     }
 
-    /// How many motors the set has.
+    /// The number of motors in the set.
     pub const fn len(self) -> usize {
         self.0.count_ones() as usize
     }
@@ -106,12 +106,12 @@ impl MotorSet {
         self.0 |= Self::bit(id);
     }
 
-    /// Takes `id` out.
+    /// Removes `id`.
     pub const fn remove(&mut self, id: MotorId) {
         self.0 &= !Self::bit(id);
     }
 
-    /// The motors in either set.
+    /// The motors in at least one of the sets.
     pub const fn union(self, other: Self) -> Self {
         MotorSet(self.0 | other.0)
     }
@@ -131,12 +131,12 @@ impl MotorSet {
     }
 }
 
-/// Takes the lowest ID out of the set.
+/// Removes and returns the lowest ID.
 impl Iterator for MotorSet {
     type Item = MotorId;
 
     fn next(&mut self) -> Option<MotorId> {
-        // An empty set has 32 trailing zeros: ID 33, which is none.
+        // An empty set has 32 trailing zeros: ID 33, which does not exist.
         let lowest = MotorId::new(self.0.trailing_zeros() as u8 + 1)?;
         self.remove(lowest);
         Some(lowest)
@@ -157,7 +157,7 @@ impl From<MotorId> for MotorSet {
     }
 }
 
-/// A protocol that looks like this one and is not: its motors answer on another identifier.
+/// A similar, incompatible protocol: its motors reply on another identifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Dialect {
     /// RMD V3 and V4, replies on `0x240 + ID`.
@@ -167,7 +167,7 @@ pub enum Dialect {
 }
 
 impl Dialect {
-    /// The dialect and motor that reply with the identifier `can_id`.
+    /// The dialect and the motor of a reply with the identifier `can_id`.
     pub fn from_can_id(can_id: u32) -> Option<(Self, MotorId)> {
         [Dialect::V3, Dialect::LkTech].into_iter().find_map(|dialect| {
             MotorId::above(dialect.reply_base(), can_id).map(|id| (dialect, id))
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_set_gives_back_what_went_in_lowest_first() {
+    fn iterating_a_set_yields_its_ids_lowest_first() {
         let ids = [32, 1, 7].map(|id| MotorId::new(id).unwrap());
         let set: MotorSet = ids.into_iter().collect();
         assert_eq!(set.len(), 3);
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn foreign_replies_are_told_apart() {
+    fn foreign_replies_are_recognized() {
         let motor = |id| MotorId::new(id).unwrap();
         assert_eq!(Dialect::from_can_id(0x241), Some((Dialect::V3, motor(1))));
         assert_eq!(Dialect::from_can_id(0x1A0), Some((Dialect::LkTech, motor(32))));

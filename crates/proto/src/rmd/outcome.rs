@@ -1,4 +1,4 @@
-//! What a host tells its caller.
+//! Outputs, errors and counters of a host.
 
 use super::limits::Exceeded;
 use super::motor::{Dialect, MotorId};
@@ -6,19 +6,19 @@ use crate::can::CanFrame;
 use crate::time::Instant;
 use core::fmt;
 
-/// What [`Host::poll`](super::Host::poll) wants the caller to do.
+/// The next action of the caller of [`Host::poll`](super::Host::poll).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Output {
-    /// Send this frame; the time for its reply runs from now on.
+    /// Send this frame. The timeout of its reply starts now.
     Transmit(CanFrame),
     /// The exchange with a motor is over.
     Done {
         /// The motor.
         id: MotorId,
-        /// The eight bytes of its reply.
+        /// The eight bytes of its reply, or why there is none.
         result: Result<[u8; 8], Failure>,
     },
-    /// Nothing more to do until a frame comes or this moment, at which to poll again.
+    /// Wait for a frame. Poll again at this moment; `None` means no deadline.
     Wait(Option<Instant>),
 }
 
@@ -26,32 +26,33 @@ pub enum Output {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Failure {
-    /// No reply in time. An unknown command gets none either.
+    /// No reply in time. The motor also ignores unknown commands.
     Timeout,
-    /// No reply of this protocol, and a reply to the same command in another one.
+    /// No reply of this protocol was received, but a reply to the same command in another protocol.
     Foreign(Dialect),
-    /// The reply is not the request bit for bit, which the document says it is. What the motor did is
-    /// not known.
+    /// The reply differs from the request, although the document demands a copy. What the motor did
+    /// is unknown.
     Altered,
-    /// The motor was asked for its status instead, because it had not answered before or was not asked
-    /// anything yet, and it answered. Ask again; it is trusted when it was silent for the quarantine time.
-    /// Nothing else was sent, unless it was an Off or a Stop to a motor that was not asked yet.
+    /// The motor got a status question instead of the request, and answered it. This happens after
+    /// a timeout and before the first exchange. Repeat the request; the motor is trusted after it
+    /// was silent for the quarantine time. Nothing else was sent, except an Off or a Stop to a
+    /// motor without any exchange so far.
     Quarantined,
-    /// What was sent came back: an adapter echoes, or another host asks the same. It is not known what
-    /// the motor did.
+    /// The sent frame was received again: an adapter echoes, or another host sends the same
+    /// request. What the motor did is unknown.
     Echo,
 }
 
-/// Why a request was not taken.
+/// Why a request was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RequestError {
-    /// This motor's exchange is not over.
+    /// The motor has an open exchange.
     Busy(MotorId),
-    /// This motor may still answer an exchange that timed out.
+    /// A late reply of this motor may still come.
     Quarantined {
         /// The motor.
         id: MotorId,
-        /// When to ask again; a reply may make it sooner or later.
+        /// When to repeat the request. A reply of the motor may change this time.
         until: Instant,
     },
     /// The frame exceeds a limit of this motor.
@@ -65,12 +66,12 @@ pub enum RequestError {
     OutOfReach(MotorId),
 }
 
-/// Frames that belonged to no exchange; each count stays at its end.
+/// Counts frames that belonged to no exchange. Each count saturates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counters {
-    /// Replies that came to an exchange that was over.
+    /// Replies to an exchange that was over.
     pub late: u32,
-    /// Replies that nobody waited for.
+    /// Replies without a request.
     pub unasked: u32,
     /// Frames of a motor's identifier that are not standard data frames of eight bytes.
     pub malformed: u32,
@@ -90,14 +91,14 @@ impl fmt::Display for Failure {
                 write!(f, "the motor answers in {dialect}, not V1.62; use a host of that protocol")
             }
             Failure::Altered => f.write_str(
-                "the reply has another content than the request that it repeats; it is not known what \
+                "the reply differs from the request, which it must repeat; it is not known what \
                  the motor did",
             ),
             Failure::Quarantined => f.write_str(
-                "the motor was asked for its status first and answers; ask again after the quarantine time",
+                "the motor got a status question first and answered; repeat the request after the quarantine time",
             ),
             Failure::Echo => f.write_str(
-                "what was sent came back; the adapter echoes, or another host asks the same",
+                "the sent frame was received again; the adapter echoes, or another host sends the same request",
             ),
         }
     }
@@ -109,10 +110,13 @@ impl fmt::Display for RequestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             RequestError::Busy(id) => {
-                write!(f, "motor {id} has an exchange under way; wait for its result")
+                write!(f, "motor {id} has an open exchange; wait for its result")
             }
             RequestError::Quarantined { id, .. } => {
-                write!(f, "motor {id} may still answer late; try again after the quarantine time")
+                write!(
+                    f,
+                    "motor {id} may still send a late reply; try again after the quarantine time"
+                )
             }
             RequestError::Limit { id, exceeded } => write!(f, "motor {id}: {exceeded}"),
             RequestError::OutOfReach(id) => {

@@ -1,19 +1,19 @@
-//! Where each value stands in a frame: one row a field gives the struct, both directions and the
-//! table that decoders and generators read.
+//! The position of each value in a frame. One row per field defines the struct, both directions,
+//! and the table that decoders and generators read.
 
 use crate::units::{Quantity, Scale};
 use core::fmt;
 
-/// The eight bytes of one kind of frame, as values. Bytes that no field covers are ignored when
+/// The values in the eight bytes of one kind of frame. Bytes outside all fields are ignored when
 /// read and sent as 0 (docs/SPEC-NOTES.md R4).
 pub trait Payload: Copy {
-    /// Place, type and unit of each value.
+    /// Position, type and unit of each value.
     const FIELDS: &'static [Field];
 
-    /// The values at their places in a little-endian word; the rest is 0.
+    /// The values at their positions in a little-endian word. The other bits are 0.
     fn pack(&self) -> u64;
 
-    /// The values that stand in a little-endian word.
+    /// Reads the values from a little-endian word.
     fn unpack(word: u64) -> Self;
 
     /// The bytes of a frame with `code` in DATA\[0\].
@@ -21,28 +21,28 @@ pub trait Payload: Copy {
         (self.pack() | u64::from(code.into())).to_le_bytes()
     }
 
-    /// The values in the bytes of a frame, whatever its code.
+    /// Reads the values from the bytes of a frame with any code.
     fn decode(data: &[u8; 8]) -> Self {
         Self::unpack(u64::from_le_bytes(*data))
     }
 }
 
-/// One value in a frame: little-endian, whole bytes.
+/// One value in a frame: little-endian, in whole bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct Field {
     /// Name of the value, the same in every language.
     pub name: &'static str,
-    /// What the value is.
+    /// Description of the value.
     pub doc: &'static str,
     /// Index of its first byte: the n of DATA\[n\].
     pub offset: u8,
-    /// How many bytes it has, 1 to 7.
+    /// Number of bytes, 1 to 7.
     pub len: u8,
-    /// Whether it is two's complement.
+    /// Whether the value is two's complement.
     pub signed: bool,
-    /// What a digit is, and which may be asked for.
+    /// The unit of a digit, and the range that may be requested.
     pub scale: Scale,
-    /// What the digits mean where they are no quantity.
+    /// How to read the digits if they are not a quantity.
     pub meaning: Meaning,
     show: Show,
 }
@@ -50,11 +50,11 @@ pub struct Field {
 /// What the digits of a field mean.
 #[derive(Debug, Clone, Copy)]
 pub enum Meaning {
-    /// A quantity in the field's unit, or a plain number.
+    /// A quantity in the field's unit, or a number without unit.
     Number,
-    /// One of these, by number.
+    /// One of these names, by number.
     Words(&'static [(u8, &'static str)]),
-    /// The names of these bits, any of which may be set.
+    /// The names of these bits. Any of them may be set.
     Bits(&'static [(u8, &'static str)]),
 }
 
@@ -70,17 +70,17 @@ impl Field {
         if self.signed { (top as i64).wrapping_shr(down) } else { top.wrapping_shr(down) as i64 }
     }
 
-    /// The name with the unit behind it, for numbers that have none of their own: `speed_dps`.
+    /// The name followed by the unit, for numbers without a unit of their own: `speed_dps`.
     pub fn name_with_unit(&self) -> impl fmt::Display + '_ {
         Named(self)
     }
 
-    /// The value in words and physical units.
+    /// The value as text, with its name and physical unit.
     pub fn shown<'a>(&'a self, data: &'a [u8; 8]) -> impl fmt::Display + 'a {
         Shown { field: self, data }
     }
 
-    /// The value in its physical unit, or the plain number.
+    /// The value in its physical unit, or the number without unit.
     pub fn value(&self, data: &[u8; 8]) -> f64 {
         self.scale.value(self.raw(data))
     }
@@ -115,16 +115,16 @@ impl fmt::Display for Shown<'_> {
     }
 }
 
-/// A type whose digits stand in a frame.
+/// A type that a frame can carry.
 pub(super) trait Wire: Copy {
     const LEN: u8;
     const SIGNED: bool = false;
     const UNIT: Scale;
     const MEANING: Meaning = Meaning::Number;
 
-    /// The digits; bits above `LEN` bytes do not count.
+    /// The digits. Bits above `LEN` bytes are ignored.
     fn digits(self) -> u64;
-    /// From the low `LEN` bytes of `low`; the bits above them do not count.
+    /// The value of the low `LEN` bytes of `low`. Higher bits are ignored.
     fn from_low(low: u64) -> Self;
     fn show(self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
 }
@@ -140,8 +140,8 @@ pub(super) fn take<T: Wire>(word: u64, offset: u32) -> T {
     T::from_low(word.wrapping_shr(8 * offset))
 }
 
-/// Declares frames: `OFFSET name: Type` a field, a unit struct for a frame that only has a code, a
-/// tuple struct for one with the fields of another.
+/// Declares frames. A field is `OFFSET name: Type`. A frame that only has a code is a unit struct.
+/// A frame with the fields of another frame is a tuple struct.
 macro_rules! payload {
     ($(#[$meta:meta])* pub struct $name:ident) => {
         $(#[$meta])*
@@ -225,7 +225,7 @@ impl<Q: Quantity + Copy> Wire for Q {
     }
 
     fn from_low(low: u64) -> Self {
-        // Drops what is above the value and extends its sign.
+        // Drops the bits above the value and extends its sign.
         let above = 64 - 8 * u32::from(Q::BYTES);
         Q::from_digits((low.wrapping_shl(above) as i64).wrapping_shr(above))
     }

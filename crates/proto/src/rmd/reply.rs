@@ -1,4 +1,4 @@
-//! The replies, a type each (chapter 3).
+//! The types of the replies (chapter 3).
 
 use super::payload::{Field, Meaning, Payload, byte, payload, place, take};
 use crate::units::{
@@ -32,8 +32,8 @@ payload! {
     }
 }
 payload! {
-    /// What the encoder reads (3, Read encoder data command), in counts of its width, or of 16 bit
-    /// when it is wider (docs/SPEC-NOTES.md R6).
+    /// Encoder readings (3, Read encoder data command). They are counts of the encoder's width, or
+    /// of 16 bits if it is wider (docs/SPEC-NOTES.md R6).
     pub struct Encoder {
         /// `raw` minus `offset`, modulo one turn.
         2 position: u16,
@@ -100,8 +100,8 @@ payload! {
     }
 }
 
-/// The error state byte: a bit a protection (3, Read motor status 1 and error flag commands). Bits
-/// that the document calls invalid are kept and shown, and mean nothing.
+/// The error state byte: one bit per protection (3, Read motor status 1 and error flag commands).
+/// Bits that the document calls invalid are kept and shown. They have no meaning.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Errors(pub u8);
 
@@ -111,7 +111,7 @@ macro_rules! error_bits {
             $( #[doc = concat!("Bit ", $bit, ": ", $text, ".")]
             pub const $name: Self = Errors(1 << $bit); )+
 
-            /// Every named bit: bit, name, the document's words for it.
+            /// Every named bit: bit, name, description of the document.
             pub const NAMES: &'static [(Errors, &'static str, &'static str)] =
                 &[$( (Errors::$name, stringify!($name), $text), )+];
 
@@ -129,22 +129,22 @@ impl Errors {
     /// No error.
     pub const NONE: Self = Errors(0);
 
-    /// The names of the bits that are set and have one.
+    /// The names of the set bits. Bits without a name are omitted.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES.iter().filter(move |(bit, ..)| self.contains(*bit)).map(|(_, name, _)| *name)
     }
 
-    /// The document's words for the protections that are active.
+    /// The document's descriptions of the active protections.
     pub fn words(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES.iter().filter(move |(bit, ..)| self.contains(*bit)).map(|(_, _, words)| *words)
     }
 
-    /// Those whose meaning the document names.
+    /// The set bits that the document names.
     pub const fn active(self) -> Self {
         Errors(self.0 & Self::VALID)
     }
 
-    /// Whether no protection is active, whatever the bits that mean nothing are.
+    /// Whether no protection is active. Bits without a meaning are ignored.
     pub const fn is_empty(self) -> bool {
         self.active().0 == 0
     }
@@ -154,17 +154,17 @@ impl Errors {
         self.0 & other.0 == other.0
     }
 
-    /// The bits of either.
+    /// The bits of both sets.
     pub const fn union(self, other: Self) -> Self {
         Errors(self.0 | other.0)
     }
 
-    /// The bits that `other` does not have.
+    /// The bits that are not in `other`.
     pub const fn without(self, other: Self) -> Self {
         Errors(self.0 & !other.0)
     }
 
-    /// The bits that both have.
+    /// The bits that are in both sets.
     pub const fn intersection(self, other: Self) -> Self {
         Errors(self.0 & other.0)
     }

@@ -1,36 +1,38 @@
-//! What a master may send, and what came of it.
+//! Checks the requests of a master, and records their effects.
 
 use super::started::bit;
 use super::{
     Counters, Effect, Frame, LimitError, Limits, MAX_FRAME, MotorNumber, Request, Started,
 };
 
-/// The limits of a master's caller, the motors that it started, and those that go to a speed which it
-/// commanded.
+/// The limits of a master's caller, with the motors that it started and the motors that have a
+/// commanded speed.
 ///
-/// [`check`](Self::check) or [`check_frame`](Self::check_frame) before a master takes a request,
-/// [`sent`](Self::sent) when it has, [`acknowledged`](Self::acknowledged) when the drive did it.
+/// Call [`check`](Self::check) or [`check_frame`](Self::check_frame) before a master takes a request,
+/// [`sent`](Self::sent) after it took the request, and [`acknowledged`](Self::acknowledged) after the
+/// drive acknowledged it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Account {
     limits: Limits,
     started: Started,
-    /// Motors whose last setpoint is a speed ramp that was acknowledged. Bit n: motor n + 1.
+    /// Motors whose last setpoint is an acknowledged speed ramp. Bit n: motor n + 1.
     ramped: u8,
-    /// Losses of the line and identifications, which a drive sends when it was reset, when a request
-    /// began.
+    /// The numbers of line losses and of identifications at the start of the request. A drive sends
+    /// an identification after a reset.
     history: (u32, u32),
-    /// What the request under way does, and to which motor, where that is known.
+    /// The effect of the open request, and its motor, if known.
     effect: Effect,
     addressed: Option<MotorNumber>,
 }
 
 impl Account {
-    /// Nothing was sent yet.
+    /// An account before the first request.
     pub fn new(limits: Limits) -> Self {
         Account { limits, ..Account::default() }
     }
 
-    /// Sets other limits from the next request on. Ramps count no longer: they kept the former ones.
+    /// Sets limits, effective from the next request. Earlier ramps no longer count: they were
+    /// checked against the former limits.
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits = limits;
         self.ramped = 0;
@@ -44,16 +46,16 @@ impl Account {
         self.started
     }
 
-    /// Takes these motors for started.
+    /// Records these motors as started.
     pub const fn take_over(&mut self, started: Started) {
         self.started = started;
     }
 
-    /// Whether a request for motor number `motor` may leave, on a line that has seen this; gives what
-    /// it does. Under a speed limit no motor is started without a ramp.
+    /// Checks a request for motor number `motor`, with the current counters of the line. Returns
+    /// its effect. While a speed limit is set, a start without a ramp is refused.
     ///
     /// # Errors
-    /// The limit that it does not keep.
+    /// The limit that the request exceeds.
     pub fn check(
         &mut self,
         seen: Counters,
@@ -64,10 +66,10 @@ impl Account {
         self.check_start(seen, motor, Effect::of(request))
     }
 
-    /// As [`check`](Self::check), for any frame, in every profile.
+    /// Like [`check`](Self::check), for any frame, in every profile.
     ///
     /// # Errors
-    /// The limit that it does not keep.
+    /// The limit that the frame exceeds.
     pub fn check_frame(&mut self, seen: Counters, frame: &Frame<'_>) -> Result<Effect, LimitError> {
         self.limits.check_frame(frame)?;
         self.check_start(seen, frame.motor(), Effect::of_frame(frame))
@@ -94,8 +96,8 @@ impl Account {
         }
     }
 
-    /// A master has taken the request for motor number `motor` that does this. Unless the drive
-    /// acknowledges a ramp, its setpoint may have changed or not.
+    /// Records that a master took this request for motor number `motor`. Until the drive
+    /// acknowledges a ramp, its setpoint is unknown.
     pub fn sent(&mut self, motor: u8, effect: Effect) {
         self.effect = effect;
         self.addressed = self.started.request_sent(motor, effect);
@@ -108,13 +110,13 @@ impl Account {
         }
     }
 
-    /// As [`sent`](Self::sent), for any frame.
+    /// Like [`sent`](Self::sent), for any frame.
     pub fn sent_frame(&mut self, frame: &Frame<'_>, effect: Effect) {
         self.started.presume_within(frame.encode(&mut [0; MAX_FRAME]).unwrap_or(&[]));
         self.sent(frame.motor(), effect);
     }
 
-    /// The request that was sent last was acknowledged.
+    /// Records that the last sent request was acknowledged.
     pub fn acknowledged(&mut self) {
         self.started.acknowledged(self.addressed, self.effect);
         if self.effect == Effect::Ramps {
@@ -122,14 +124,14 @@ impl Account {
         }
     }
 
-    /// The drive may be another one, or have been reset: its setpoints and its current motor are not
-    /// known.
+    /// Records that the port was opened again. The drive may be another one, or may have been
+    /// reset: its setpoints and its current motor are unknown.
     pub fn reopened(&mut self) {
         self.ramped = 0;
         self.started.forget_current();
     }
 
-    /// The drive has no such motor, which may have been taken for started.
+    /// Records that the drive does not have this motor, which may have been recorded as started.
     pub fn forget_motor(&mut self, motor: MotorNumber) {
         self.started.forget_motor(motor);
     }
@@ -167,10 +169,10 @@ mod tests {
         assert!(!starts(&mut account, 1));
         done(&mut account, 1, &RAMP);
         assert!(starts(&mut account, 1) && !starts(&mut account, 2));
-        // It addresses the motor of the last acknowledged request.
+        // The start addresses the motor of the last acknowledged request.
         assert!(starts(&mut account, 0));
         account.sent(1, Effect::Ramps);
-        assert!(!starts(&mut account, 1), "a ramp that is not acknowledged");
+        assert!(!starts(&mut account, 1), "the ramp was not acknowledged");
         let torque = CurrentReference { iq_s16a: 1, id_s16a: 0 };
         done(&mut account, 1, &RAMP);
         done(&mut account, 1, &Request::SetCurrentReference(torque));

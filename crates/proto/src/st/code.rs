@@ -1,6 +1,7 @@
-//! The protocol's named numbers: frame codes, error codes, commands, states and flags.
+//! The named numbers of the protocol: frame codes, error codes, commands, states and flags.
 
-/// How a slave behaves, and what a master expects, where documents and shipped drives differ.
+/// The behaviour of a slave, and what a master expects. Profiles differ where the document and
+/// shipped drives differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Profile {
@@ -8,7 +9,7 @@ pub enum Profile {
     #[default]
     #[cfg_attr(feature = "serde", serde(rename = "spec"))]
     Spec,
-    /// What firmware of MCSDK 5.4 does on the wire.
+    /// What firmware of MCSDK 5.4 really sends and accepts.
     #[cfg_attr(feature = "serde", serde(rename = "mcsdk-5.4"))]
     Mcsdk54,
 }
@@ -17,7 +18,7 @@ impl Profile {
     /// Every profile.
     pub const ALL: [Profile; 2] = [Profile::Spec, Profile::Mcsdk54];
 
-    /// The profile that this is not.
+    /// The other profile.
     pub const fn other(self) -> Self {
         match self {
             Profile::Spec => Profile::Mcsdk54,
@@ -25,7 +26,7 @@ impl Profile {
         }
     }
 
-    /// The profile's name as the command line spells it.
+    /// The profile's name in the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Profile::Spec => "spec",
@@ -37,13 +38,13 @@ impl Profile {
 impl core::str::FromStr for Profile {
     type Err = NoSuchProfile;
 
-    /// The profile of this [`name`](Profile::name).
+    /// The profile with this [`name`](Profile::name).
     fn from_str(name: &str) -> Result<Self, NoSuchProfile> {
         Profile::ALL.into_iter().find(|profile| profile.name() == name).ok_or(NoSuchProfile)
     }
 }
 
-/// A name that no [`Profile`] has.
+/// The error for a name that no [`Profile`] has.
 ///
 /// ```
 /// use motorlink_proto::st::Profile;
@@ -64,18 +65,18 @@ impl core::fmt::Display for NoSuchProfile {
     }
 }
 
-/// Header of a positive acknowledge: the whole byte (4.2, SPEC-NOTES S1).
+/// Header of a positive acknowledge. The whole byte counts (4.2, SPEC-NOTES S1).
 pub const HEADER_ACK: u8 = 0xF0;
-/// Header of a negative acknowledge: the whole byte (4.3, SPEC-NOTES S1).
+/// Header of a negative acknowledge. The whole byte counts (4.3, SPEC-NOTES S1).
 pub const HEADER_NACK: u8 = 0xFF;
-/// Header of the identification that SDK 4.x sends unasked at start-up (SPEC-NOTES S9).
+/// Header of the identification that SDK 4.x sends at start-up without a request (SPEC-NOTES S9).
 pub const HEADER_ATR: u8 = 0xE0;
 
-/// Declares the frame codes with the profiles that know each.
+/// Declares the frame codes, each with the profiles that define it.
 macro_rules! frame_codes {
     ($( $value:literal $variant:ident $text:literal [$($profile:ident)+] $doc:literal; )+) => {
-        /// What a command frame asks for (table 1). One number may mean different things in
-        /// different profiles, so a number becomes a code only together with a [`Profile`].
+        /// The request type of a command frame (table 1). The same number can have different
+        /// meanings in different profiles, so a number becomes a code only with a [`Profile`].
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum FrameCode {
             $( #[doc = concat!("`", $text, "` (", stringify!($value), "): ", $doc)] $variant, )+
@@ -85,7 +86,7 @@ macro_rules! frame_codes {
             /// Every frame code, in the order of the table.
             pub const ALL: &'static [FrameCode] = &[$( FrameCode::$variant, )+];
 
-            /// The code that `number` means in `profile`, if it knows one.
+            /// The code of `number` in `profile`; `None` if the profile does not define it.
             pub const fn from_number(number: u8, profile: Profile) -> Option<Self> {
                 match (number, profile) {
                     $( ($value, $(Profile::$profile)|+) => Some(FrameCode::$variant), )+
@@ -103,7 +104,7 @@ macro_rules! frame_codes {
                 match self { $( FrameCode::$variant => $text, )+ }
             }
 
-            /// What the frame asks for, in a sentence.
+            /// What the frame requests, in a sentence.
             pub const fn doc(self) -> &'static str {
                 match self { $( FrameCode::$variant => $doc, )+ }
             }
@@ -146,7 +147,7 @@ named_numbers! {
 }
 
 impl ErrorCode {
-    /// Whether the drive did not understand what it received, which is a failure of the line.
+    /// Whether the drive did not understand the frame. This is a failure of the line.
     pub const fn is_damage(self) -> bool {
         matches!(self, ErrorCode::BadCrc | ErrorCode::Timeout | ErrorCode::Overrun)
     }
@@ -207,8 +208,8 @@ named_numbers! {
     }
 }
 
-/// Register FLAGS: faults that occurred since the last acknowledge in the low half, faults whose
-/// cause is present in the high half (SPEC-NOTES S14).
+/// Register FLAGS. The low half has the faults that occurred since the last acknowledge. The high
+/// half has the faults whose cause is present (SPEC-NOTES S14).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Flags(pub u32);
 
@@ -236,7 +237,7 @@ faults! {
 }
 
 impl Flags {
-    /// Flags from faults that `occurred` and faults `present` now.
+    /// Flags of faults that `occurred` and of faults that are `present`.
     pub const fn new(occurred: u16, present: u16) -> Self {
         Flags(occurred as u32 | (present as u32) << 16)
     }
@@ -258,7 +259,7 @@ impl Flags {
 }
 
 impl core::fmt::Display for Flags {
-    /// `none`, or the names of the faults; one whose cause is still there is marked `(present)`.
+    /// `none`, or the names of the faults. A fault whose cause is present is marked `(present)`.
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let all = self.occurred() | self.present();
         if all == 0 {

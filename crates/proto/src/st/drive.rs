@@ -1,11 +1,11 @@
-//! What a drive is to the protocol.
+//! The interface of a drive to the protocol.
 
 use super::{
     Command, CurrentReference, ErrorCode, Features, PositionMove, Ramp, RegisterId, RevupPhase,
     TorqueRamp, Version,
 };
 
-/// A motor of the drive: 1 is the first.
+/// The number of a motor of the drive. The first motor is 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MotorNumber(u8);
 
@@ -25,7 +25,7 @@ impl MotorNumber {
         self.0
     }
 
-    /// Position in an array of motors: 0 is the first.
+    /// Index in an array of motors. The first motor is 0.
     pub const fn index(self) -> usize {
         self.0.saturating_sub(1) as usize
     }
@@ -37,23 +37,23 @@ impl core::fmt::Display for MotorNumber {
     }
 }
 
-/// A drive behind a [`Slave`](super::Slave). The slave has checked the frame, the motor, the
-/// register's existence and access, and every size before it calls.
+/// The drive of a [`Slave`](super::Slave). Before each call, the slave has checked the frame, the
+/// motor, all sizes, and that the register exists and allows the access.
 ///
-/// Register values travel as 32 bits ([`register::Value`](super::register::Value)). FLUXWK_BUS and
-/// FLUXWK_BUS_MEAS are tenths of a percent here, whatever the profile.
+/// Register values have 32 bits ([`register::Value`](super::register::Value)). The unit of
+/// FLUXWK_BUS and FLUXWK_BUS_MEAS is 0.1 %, in every profile.
 pub trait MotorControl {
-    /// What this motor's control is built with.
+    /// The features of this motor's control.
     fn features(&self, motor: MotorNumber) -> Features;
 
     /// The firmware's version.
     fn version(&self) -> Version<'_>;
 
-    /// The value of a register that exists with [`features`](Self::features). TARGET_MOTOR never
-    /// comes here: the slave keeps it.
+    /// The value of a register that exists with these [`features`](Self::features). The slave
+    /// itself handles TARGET_MOTOR.
     fn get_register(&mut self, motor: MotorNumber, register: RegisterId) -> i32;
 
-    /// Writes a register that may be written. A value that the register cannot take is
+    /// Writes a writable register. If the register cannot have the value, return
     /// [`ErrorCode::WrongSet`].
     fn set_register(
         &mut self,
@@ -62,10 +62,10 @@ pub trait MotorControl {
         value: i32,
     ) -> Result<(), ErrorCode>;
 
-    /// Executes a command. What the state does not allow has no effect (4.6).
+    /// Executes a command. A command that the state does not allow has no effect (4.6).
     fn execute(&mut self, motor: MotorNumber, command: Command);
 
-    /// Programs a speed ramp: at once in RUN, else when RUN is reached (4.8).
+    /// Programs a speed ramp. It starts at once in RUN, otherwise when RUN is reached (4.8).
     fn set_ramp(&mut self, motor: MotorNumber, ramp: Ramp);
 
     /// The data of rev-up phase 0 to 4 (4.9).
@@ -74,18 +74,19 @@ pub trait MotorControl {
     /// Sets the data of rev-up phase 0 to 4 (4.10).
     fn set_revup_data(&mut self, motor: MotorNumber, phase: u8, data: RevupPhase);
 
-    /// Sets the current references: at once in RUN, else when RUN is reached (4.11).
+    /// Sets the current references. They apply at once in RUN, otherwise when RUN is reached
+    /// (4.11).
     fn set_current_reference(&mut self, motor: MotorNumber, reference: CurrentReference);
 
-    /// Programs a torque ramp: at once in RUN, else when RUN is reached. Only profile `mcsdk-5.4`
-    /// has it; unless it is implemented it is acknowledged without effect.
+    /// Programs a torque ramp. It starts at once in RUN, otherwise when RUN is reached. Only in
+    /// profile `mcsdk-5.4`. The default implementation has no effect; the request is acknowledged.
     fn set_torque_ramp(&mut self, _motor: MotorNumber, _ramp: TorqueRamp) {}
 
-    /// Moves to an angle in a given time; only in profile `mcsdk-5.4`, for a motor with
+    /// Moves to an angle in a given time. Only in profile `mcsdk-5.4`, for a motor with
     /// [`Feature::PositionControl`](super::Feature::PositionControl).
     fn set_position(&mut self, _motor: MotorNumber, _target: PositionMove) {}
 
-    /// Registers that a step of the motor profiler shows; only with
+    /// The registers of a step of the motor profiler. Only with
     /// [`Feature::Profiler`](super::Feature::Profiler).
     fn profiler_step(&self, _motor: MotorNumber, _step: u8) -> &[u8] {
         &[]

@@ -1,13 +1,14 @@
-//! Why an exchange did not end in a positive acknowledge.
+//! Errors of an exchange.
 
 use super::{Bad, ErrorCode, Profile};
 
-/// Why an exchange did not end in a positive acknowledge.
+/// Why an exchange did not end with a positive acknowledge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExchangeError {
-    /// The drive said no.
+    /// The drive refused the request.
     Refused(ErrorCode),
-    /// There is no answer to trust: it is not known whether the drive did what was asked.
+    /// There is no reply that can be trusted. It is unknown whether the drive carried out the
+    /// request.
     Failed(Failure),
 }
 
@@ -15,33 +16,33 @@ pub enum ExchangeError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Failure {
-    /// Nothing came in time: no reply to the request, or, on a line that was just opened, none to the
-    /// question that goes before it.
+    /// No reply in time. On a line that was just opened, also: no reply to the question before the
+    /// request.
     Timeout,
-    /// The beginning of a reply came, the rest did not come in time.
+    /// Only the beginning of a reply was received in time.
     Incomplete {
-        /// Bytes that came.
+        /// Number of received bytes.
         received: u8,
     },
-    /// A byte that begins no reply.
+    /// A received byte that is not the header of a reply.
     Header(u8),
-    /// A reply that is not a frame.
+    /// Bytes that are not a valid frame.
     Damaged(Bad),
-    /// A whole acknowledge, with a payload of another size than this request's has.
+    /// A complete acknowledge whose payload does not have the size for this request.
     Size {
-        /// Bytes of its payload.
+        /// Number of bytes in its payload.
         received: u8,
-        /// Another profile, whose size this is.
+        /// Another profile, in which the size is correct.
         fits: Option<Profile>,
     },
-    /// The drive did not understand what it received. This may not even have been this request, but a
-    /// stray byte from before (SPEC-NOTES S16).
+    /// The drive did not understand what it received. The cause may be an earlier stray byte
+    /// instead of this request (SPEC-NOTES S16).
     NotUnderstood(ErrorCode),
-    /// Two replies that differ came at once: nothing tells which of them is the answer.
+    /// Two different replies were received at once. It is unknown which one is the answer.
     Ambiguous,
-    /// The line was lost before; the drive did not answer a question, and nothing else was sent.
+    /// The line was lost earlier. The drive did not answer a question; the request was not sent.
     Lost,
-    /// The line was not in step and did not fall silent; nothing was sent.
+    /// The line was out of sync and never silent. Nothing was sent.
     Noise,
     /// An adapter or the wiring echoes. Only a question was sent.
     Echo,
@@ -63,27 +64,34 @@ impl core::fmt::Display for Failure {
             Failure::Incomplete { received } => {
                 write!(f, "the reply stopped after {received} bytes")
             }
-            Failure::Header(byte) => write!(f, "{byte:#04x} came where a reply begins"),
+            Failure::Header(byte) => {
+                write!(f, "received {byte:#04x}, which is not the header of a reply")
+            }
             Failure::Damaged(Bad::Length(length)) => {
-                write!(f, "the reply says that it has {length} bytes, over 128")
+                write!(f, "the reply's length byte is {length}; the maximum is 128")
             }
             Failure::Damaged(Bad::Checksum { expected, received }) => {
-                write!(f, "the reply's checksum is {received:#04x}, its bytes give {expected:#04x}")
+                write!(
+                    f,
+                    "the reply's checksum is {received:#04x}, but its bytes have {expected:#04x}"
+                )
             }
             Failure::Size { received, fits: None } => {
-                write!(f, "the reply has {received} bytes, as no reply to this request has")
+                write!(f, "the reply has {received} bytes, a wrong size for this request")
             }
             Failure::Size { received, fits: Some(profile) } => {
                 let name = profile.name();
-                write!(f, "the reply has {received} bytes, as in profile {name}")
+                write!(f, "the reply has {received} bytes, its size in profile {name}")
             }
             Failure::NotUnderstood(code) => {
                 write!(f, "the drive did not understand what it received ({code}: {})", code.doc())
             }
-            Failure::Ambiguous => f.write_str("two replies that differ came at once"),
+            Failure::Ambiguous => f.write_str("received two different replies at once"),
             Failure::Lost => f.write_str("the line is lost and the drive does not answer"),
-            Failure::Noise => f.write_str("the line does not fall silent"),
-            Failure::Echo => f.write_str("what is sent comes back"),
+            Failure::Noise => {
+                f.write_str("the line is never silent: bytes are received without a request")
+            }
+            Failure::Echo => f.write_str("the line echoes: each sent byte is received again"),
         }
     }
 }

@@ -1,25 +1,25 @@
 //! Frames: header, length, payload, checksum (chapter 3).
 
-/// The longest payload (chapter 3).
+/// Maximum size of a payload (chapter 3).
 pub const MAX_PAYLOAD: usize = 128;
-/// Bytes of a frame around its payload: header, length, checksum.
+/// Bytes of a frame without its payload: header, length, checksum.
 pub const OVERHEAD: usize = 3;
-/// The longest frame.
+/// Maximum size of a frame.
 pub const MAX_FRAME: usize = MAX_PAYLOAD + OVERHEAD;
 
-/// The checksum over header, length and payload (3.3): a 16-bit sum whose two bytes are added, of
-/// which the low byte counts.
+/// The checksum of header, length and payload (3.3): the two bytes of a 16-bit sum are added; the
+/// result is the low byte.
 pub fn checksum(bytes: &[u8]) -> u8 {
     fold(bytes.iter().fold(0u16, |sum, &byte| sum.wrapping_add(u16::from(byte))))
 }
 
-/// The checksum of bytes whose sum is known.
+/// The checksum of bytes with this sum.
 pub(super) fn fold(sum: u16) -> u8 {
     let [high, low] = sum.to_be_bytes();
     high.wrapping_add(low)
 }
 
-/// A frame whose checksum is right.
+/// A frame with a correct checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame<'a> {
     /// The first byte: frame code and motor, or a reply's [`HEADER_ACK`](super::HEADER_ACK) or
@@ -29,14 +29,14 @@ pub struct Frame<'a> {
     pub payload: &'a [u8],
 }
 
-/// What the bytes received so far are.
+/// The state of the bytes received so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parse<'a> {
-    /// The beginning of a frame.
+    /// The beginning of a frame; more bytes are needed.
     More,
     /// Not a frame.
     Bad(Bad),
-    /// A frame and how many bytes it took.
+    /// A frame, and its number of bytes.
     Frame(Frame<'a>, usize),
 }
 
@@ -47,9 +47,9 @@ pub enum Bad {
     Length(u8),
     /// The checksum does not match.
     Checksum {
-        /// The checksum of the bytes that came.
+        /// The checksum of the received bytes.
         expected: u8,
-        /// The checksum that came.
+        /// The received checksum.
         received: u8,
     },
 }
@@ -70,7 +70,7 @@ impl<'a> Frame<'a> {
         self.header >> 5
     }
 
-    /// Looks at the bytes received since the last frame.
+    /// Parses the bytes received since the last frame.
     pub fn parse(bytes: &'a [u8]) -> Parse<'a> {
         let [header, length, rest @ ..] = bytes else { return Parse::More };
         let size = usize::from(*length);
@@ -87,7 +87,7 @@ impl<'a> Frame<'a> {
         Parse::Frame(Frame { header: *header, payload }, size + OVERHEAD)
     }
 
-    /// Writes the frame into `out` and gives its bytes; `None` when the payload is over 128 bytes
+    /// Writes the frame into `out` and returns its bytes. `None` if the payload has over 128 bytes
     /// or `out` is too short.
     pub fn encode<'o>(&self, out: &'o mut [u8]) -> Option<&'o [u8]> {
         let size = self.payload.len();
@@ -99,12 +99,12 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Where the payload of the frame in `out` goes.
+/// The part of `out` for the payload.
 pub(super) fn room(out: &mut [u8]) -> Option<&mut [u8]> {
     out.get_mut(2..)
 }
 
-/// Completes the frame whose payload of `size` bytes is in its [`room`].
+/// Completes the frame with a payload of `size` bytes in its [`room`].
 pub(super) fn seal(out: &mut [u8], header: u8, size: usize) -> Option<&[u8]> {
     let frame = out.get_mut(..size.checked_add(OVERHEAD)?)?;
     let (check, body) = frame.split_last_mut()?;

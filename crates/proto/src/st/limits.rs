@@ -1,71 +1,75 @@
-//! Limits that the caller sets; they are checked before a frame leaves.
+//! Limits of the caller. They are checked before a frame is sent.
 
 use core::fmt;
 
 use super::{Frame, FrameCode, MAX_PAYLOAD, Profile, RegisterId, Request};
 
-/// What no request may exceed, whatever call or raw frame it comes from. `None` is unlimited.
+/// The limits of all requests, typed or raw. `None` means no limit.
 ///
-/// While `speed_rpm` is set, a motor is started only after a speed ramp to it was acknowledged, as
-/// the drive otherwise goes to a target of its own. The ramp may be SET_RAMP or a write of
-/// RAMP_FINAL_SPEED. It no longer counts after a later ramp that was not acknowledged, after a torque
-/// command, a write of CONTROL_MODE or a RESET, and after the drive identified itself anew, the line
-/// was lost or the port was opened again. Position commands carry no speed and are refused.
+/// While `speed_rpm` is set, a motor can be started only after the drive acknowledged a speed ramp
+/// for it. Without a ramp the drive goes to its own target speed. The ramp is a SET_RAMP or a write
+/// of RAMP_FINAL_SPEED. These events make the ramp invalid:
+/// * a later ramp that was not acknowledged;
+/// * a torque command, a write of CONTROL_MODE, or a RESET;
+/// * an identification of the drive, a lost line, or opening the port again.
 ///
-/// A limit bounds what is asked for. `speed_rpm` does not bound:
-/// * a torque command: the motor then turns as fast as its load allows;
-/// * the rev-up of a drive without sensor, its alignment, and the motor profiler (SC_START), whose
-///   speeds are the drive's own. [`Request::SetRevupData`] sets the rev-up's;
-/// * what the drive's regulator overshoots, and a motor that was running before;
-/// * a start after the drive was reset without a sign on the line, as a power cycle between the ramp
+/// Position commands contain no speed and are refused.
+///
+/// The limits apply to requested values. `speed_rpm` does not limit:
+/// * a torque command: the motor turns as fast as its load allows;
+/// * the rev-up and the alignment of a sensorless drive, and the motor profiler (SC_START): these
+///   speeds are the drive's own. [`Request::SetRevupData`] sets the speeds of the rev-up;
+/// * an overshoot of the drive's regulator, and a motor that was already running;
+/// * a start after a reset of the drive that is not visible on the line, such as a power cycle
+///   between the ramp and the start.
 ///   and the start can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Limits {
-    /// Highest speed in either direction, rpm.
+    /// Maximum speed in either direction, rpm.
     pub speed_rpm: Option<u32>,
-    /// Highest Iq or Id reference in either direction, s16A digits.
+    /// Maximum Iq or Id reference in either direction, s16A digits.
     pub current_s16a: Option<u16>,
 }
 
-/// A request that does not keep the limits; it was not sent.
+/// Why a request was refused; it was not sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LimitError {
-    /// It exceeds a limit.
+    /// A value exceeds its limit.
     Exceeded {
-        /// What was asked for.
+        /// The requested value.
         value: i64,
-        /// What the caller allows.
+        /// The limit.
         limit: i64,
         /// Unit of both.
         unit: &'static str,
     },
-    /// It writes a part of a limited register, the rest of which is not known.
+    /// A write to a part of a limited register. The other part is unknown.
     Part(RegisterId),
-    /// It is too short for the values that are limited; shipped firmware takes old bytes for the
+    /// The payload is too short for the limited values. Shipped firmware uses old bytes for the
     /// missing ones (docs/SPEC-NOTES.md S18).
     Short(FrameCode),
-    /// Its payload has 128 bytes, which shipped firmware reads as further frames
-    /// (docs/SPEC-NOTES.md S10).
+    /// The payload has 128 bytes. Shipped firmware reads it as several frames (docs/SPEC-NOTES.md
+    /// S10).
     Longest,
-    /// A position command carries no speed.
+    /// A position command contains no speed.
     Position {
-        /// What the caller allows.
+        /// The speed limit, rpm.
         limit_rpm: u32,
     },
-    /// It starts a motor that may go to any speed.
+    /// A start whose target speed is unknown.
     NoRamp {
-        /// What the caller allows.
+        /// The speed limit, rpm.
         limit_rpm: u32,
     },
 }
 
 impl Limits {
-    /// Whether `request` keeps the limits. [`Account::check`](super::Account::check)
-    /// tells whether a start had its ramp.
+    /// Checks `request`. [`Account::check`](super::Account::check) also checks the ramp before a
+    /// start.
     ///
     /// # Errors
-    /// Why it does not.
+    /// Why the request is refused.
     pub fn check(&self, request: &Request<'_>) -> Result<(), LimitError> {
         match *request {
             Request::SetRamp(ramp) => self.speed(ramp.speed_rpm),
@@ -93,10 +97,10 @@ impl Limits {
         }
     }
 
-    /// Whether a raw frame keeps the limits in every profile, as [`check`](Self::check).
+    /// Checks a raw frame in every profile, like [`check`](Self::check).
     ///
     /// # Errors
-    /// Why it does not.
+    /// Why the frame is refused.
     pub fn check_frame(&self, frame: &Frame<'_>) -> Result<(), LimitError> {
         self.size(frame.payload.len())?;
         Profile::ALL.into_iter().try_for_each(|profile| match frame.request(profile) {
@@ -146,7 +150,7 @@ impl Limits {
     }
 }
 
-/// The value that a drive takes from these bytes: it cuts what is too long.
+/// The value that a drive reads from these bytes: it ignores surplus bytes.
 fn whole(register: RegisterId, value: &[u8]) -> Result<i32, LimitError> {
     // Limited registers have the same type in both profiles.
     let profile = Profile::Spec;
@@ -181,8 +185,8 @@ impl fmt::Display for LimitError {
             ),
             LimitError::Short(code) => write!(
                 f,
-                "the payload is too short for {}, whose values are limited; nothing was sent; send all of \
-                 its bytes",
+                "the payload is too short for {}, whose values are limited; nothing was sent; send all \
+                 bytes of the message",
                 code.name()
             ),
             LimitError::Longest => f.write_str(
@@ -238,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_limited_is_not_refused() {
+    fn requests_without_a_limit_are_not_refused() {
         let part = |register| Request::SetRegister { register, value: &[0xFF] };
         for register in [RegisterId::TORQUE_REF, RegisterId::RAMP_FINAL_SPEED] {
             assert_eq!(Limits::default().check(&part(register)), Ok(()));
@@ -265,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_raw_frame_is_held_to_what_it_means_in_either_profile() {
+    fn a_raw_frame_is_checked_in_every_profile() {
         // A data segment in one profile, a torque ramp to 501 in the other.
         let ramp = [0xF5, 0x01, 0, 0, 0, 0];
         let exceeded = LimitError::Exceeded { value: 501, limit: 500, unit: "s16A" };
@@ -285,7 +289,7 @@ mod tests {
                 6..128 => assert_eq!(ramp, Err(exceeded), "{size} bytes"),
                 _ => assert_eq!(ramp, Err(LimitError::Longest)),
             }
-            // What the frame hides behind its length does not matter as long as it is one frame.
+            // The bytes after the length do not matter while they are one frame.
             let read = checked(SPEED, 0x02, &payload[..size]);
             assert_eq!(read.is_ok(), size < MAX_PAYLOAD, "{size} bytes");
         }
@@ -302,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn what_firmware_would_complete_from_old_bytes_is_refused() {
+    fn a_frame_that_firmware_would_complete_from_old_bytes_is_refused() {
         let short = |code: FrameCode| Err(LimitError::Short(code));
         let both = [SPEED, CURRENT];
         for (code, number, limited) in [

@@ -1,4 +1,5 @@
-//! Messages: what a payload says (chapter 4), both ways. A framing carries them: see `Frame::command`.
+//! Messages: the contents of payloads, in both directions (chapter 4). `Frame::command` puts a
+//! message into a frame.
 
 use super::payload::Payload;
 use super::register::{RegisterId, Shape};
@@ -48,14 +49,14 @@ pub struct RevupPhase {
 /// SET_POSITION_CMD (profile `mcsdk-5.4`, SPEC-NOTES S8).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PositionMove {
-    /// Where to, rad.
+    /// Target angle, rad.
     pub angle_rad: f32,
     /// Length of the move, s.
     pub duration_s: f32,
 }
 
 impl PositionMove {
-    /// Whether there is such a move: both are finite, and the duration is not negative.
+    /// Whether both values are finite and the duration is not negative.
     pub fn is_possible(&self) -> bool {
         self.angle_rad.is_finite() && self.duration_s.is_finite() && self.duration_s >= 0.0
     }
@@ -104,31 +105,31 @@ pub enum Request<'a> {
     SetPosition(PositionMove),
 }
 
-/// What a drive replied.
+/// A reply of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reply<'a> {
     /// The positive acknowledge (ACK), with its payload.
     Acknowledged(&'a [u8]),
-    /// The negative acknowledge (NACK), with its error code; one without is
+    /// The negative acknowledge (NACK), with its error code. A NACK without a code has
     /// [`ErrorCode::None`].
     Refused(ErrorCode),
-    /// An identification (ATR), which follows no request.
+    /// An identification (ATR). It follows no request.
     Identification,
 }
 
-/// How many bytes the payload of an acknowledge has.
+/// The size of an acknowledge's payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReplySize {
-    /// As many as this.
+    /// This number of bytes.
     Exactly(u8),
-    /// 1, 2 or 4: those of a register whose size is not known.
+    /// 1, 2 or 4 bytes: the register's size is unknown.
     Value,
-    /// The request does not tell.
+    /// Any size: the request does not determine it.
     Any,
 }
 
 impl ReplySize {
-    /// Whether `size` bytes are among it.
+    /// Whether a payload of `size` bytes is allowed.
     pub const fn takes(self, size: u8) -> bool {
         match self {
             ReplySize::Exactly(exactly) => size == exactly,
@@ -139,7 +140,7 @@ impl ReplySize {
 }
 
 impl<'a> Request<'a> {
-    /// The frame code that carries the message.
+    /// The frame code of the message.
     pub const fn code(&self) -> FrameCode {
         match self {
             Request::SetRegister { .. } => FrameCode::SetReg,
@@ -159,7 +160,7 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Writes the payload into `out` and gives its bytes; `None` when `out` is too short.
+    /// Writes the payload into `out` and returns its bytes; `None` if `out` is too short.
     /// [`Frame::command`](super::Frame::command) writes the whole frame.
     pub fn payload<'o>(&self, out: &'o mut [u8]) -> Option<&'o [u8]> {
         let mut payload = Payload::new(&mut *out);
@@ -192,8 +193,8 @@ impl<'a> Request<'a> {
         out.get(..size)
     }
 
-    /// Understands the message with this frame code as a slave of `profile` does. Bytes behind it are
-    /// ignored; a message that is too short is refused with the code given (SPEC-NOTES S18).
+    /// Decodes the message with this frame code as a slave of `profile` does. Surplus bytes are
+    /// ignored. A message that is too short is refused with the returned code (SPEC-NOTES S18).
     pub fn decode(profile: Profile, code: u8, payload: &'a [u8]) -> Result<Self, ErrorCode> {
         let code = FrameCode::from_number(code, profile).ok_or(ErrorCode::BadFrameId)?;
         let too_short = match code {
@@ -248,8 +249,8 @@ impl<'a> Request<'a> {
         })
     }
 
-    /// How many bytes the acknowledge of a drive of `profile` has behind its header (4.4 to 4.12, and
-    /// SPEC-NOTES S17).
+    /// The payload size of the acknowledge of a drive of `profile` (4.4 to 4.12, and SPEC-NOTES
+    /// S17).
     pub fn reply_size(&self, profile: Profile) -> ReplySize {
         match self {
             Request::GetRegister(register) => {
@@ -274,14 +275,14 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// Whether the message only asks; anything else changes something in the drive.
+    /// Whether the message is a read. Any other message changes something in the drive.
     pub const fn is_read(&self) -> bool {
         self.code().is_read()
     }
 }
 
 impl FrameCode {
-    /// Whether a frame of this code only asks; anything else changes something in the drive.
+    /// Whether a frame of this code is a read. Any other frame changes something in the drive.
     pub const fn is_read(self) -> bool {
         matches!(
             self,
@@ -307,7 +308,7 @@ impl RevupPhase {
         [s0, s1, s2, s3, t0, t1, d0, d1]
     }
 
-    /// The phase in a payload; `None` when it is too short.
+    /// Decodes a phase; `None` if the payload is too short.
     pub const fn decode(payload: &[u8]) -> Option<Self> {
         let &[s0, s1, s2, s3, t0, t1, d0, d1, ..] = payload else { return None };
         Some(RevupPhase {
@@ -318,10 +319,10 @@ impl RevupPhase {
     }
 }
 
-/// The firmware's version, as GET_BOARD_INFO (4.7) and GET_FW_VERSION (4.12) tell it.
+/// The firmware's version, for the replies to GET_BOARD_INFO (4.7) and GET_FW_VERSION (4.12).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Version<'a> {
-    /// Name of the SDK; cut where the reply's 32 bytes end.
+    /// Name of the SDK, cut at the end of the reply's 32 bytes.
     pub name: &'a str,
     /// Major version.
     pub major: u8,
@@ -333,21 +334,21 @@ pub struct Version<'a> {
     pub pre_release: &'a str,
 }
 
-/// Bytes of the replies to GET_BOARD_INFO and GET_FW_VERSION.
+/// Size of the replies to GET_BOARD_INFO and GET_FW_VERSION.
 const VERSION_SIZE: usize = 32;
 
 /// Reply to GET_BOARD_INFO (4.7).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BoardInfo<'a> {
-    /// Major, minor, patch. Shipped firmware sends ASCII digits; they are taken as such.
+    /// Major, minor, patch. Shipped firmware sends ASCII digits; they are converted to numbers.
     pub version: [u8; 3],
     /// Name of the SDK.
     pub name: &'a str,
 }
 
 impl<'a> BoardInfo<'a> {
-    /// The reply in a payload; `None` when it has no three version bytes. A name that is not UTF-8
-    /// is cut where it stops being so.
+    /// Decodes a payload; `None` if it has fewer than three version bytes. A name that is not UTF-8
+    /// is cut before the first invalid byte.
     pub fn decode(payload: &'a [u8]) -> Option<Self> {
         let &[a, b, c, ref name @ ..] = payload else { return None };
         let raw = [a, b, c];
@@ -355,7 +356,7 @@ impl<'a> BoardInfo<'a> {
         Some(BoardInfo { version, name: text(name) })
     }
 
-    /// The reply of a drive of `profile`: version bytes as integers, or as ASCII digits.
+    /// Encodes the reply of a drive of `profile`: version bytes as integers or as ASCII digits.
     pub(super) fn encode(profile: Profile, version: &Version<'_>, out: &mut Payload<'_>) {
         let digit = |n: u8| match profile {
             Profile::Spec => n,
@@ -371,12 +372,12 @@ impl<'a> BoardInfo<'a> {
 pub struct FirmwareVersion<'a> {
     /// Name of the firmware.
     pub name: &'a str,
-    /// What stands behind the tab (or the NUL that older firmware sends), such as `Ver.5.4.4`.
+    /// The text after the tab, such as `Ver.5.4.4`. Older firmware sends NUL instead of the tab.
     pub version: &'a str,
 }
 
 impl<'a> FirmwareVersion<'a> {
-    /// The reply in a payload; empty where it is not UTF-8.
+    /// Decodes a payload. A text that is not UTF-8 is empty.
     pub fn decode(payload: &'a [u8]) -> Self {
         let split = payload.iter().position(|&byte| byte == b'\t' || byte == 0);
         let (name, rest) = match split {
@@ -397,7 +398,7 @@ impl<'a> FirmwareVersion<'a> {
     }
 }
 
-/// The text before the first NUL, as far as it is UTF-8.
+/// The text before the first NUL, cut before the first byte that is not UTF-8.
 fn text(bytes: &[u8]) -> &str {
     let end = bytes.iter().position(|&byte| byte == 0);
     let bytes = end.and_then(|end| bytes.get(..end)).unwrap_or(bytes);

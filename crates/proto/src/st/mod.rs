@@ -1,15 +1,20 @@
 //! ST's serial Motor Control Protocol, both ends.
 //!
-//! Paragraph numbers are those of the document "Motor Control Protocol"; where it is silent or
-//! contradicts itself, `docs/SPEC-NOTES.md` has the reading (`S1`, `S2`, …).
+//! Paragraph numbers refer to the document "Motor Control Protocol". Where it is unclear or
+//! contradicts itself, `docs/SPEC-NOTES.md` explains how this crate reads it (`S1`, `S2`, …).
 //!
-//! * [`Frame`] turns bytes into header, payload and checksum and back (chapter 3).
-//! * [`Request`], [`Reply`] and the types of [`message`] are the messages, which know nothing of frames
-//!   (chapter 4). [`Frame::command`] puts a request into its frame.
-//! * [`register`] is table 3 as typed constants, [`RegisterId`] the same by number.
-//! * [`Master`] conducts one exchange at a time; [`Slave`] answers for a [`MotorControl`].
+//! | to | use |
+//! |---|---|
+//! | send requests and match their replies | [`Master`] with a [`Request`] |
+//! | answer as a drive, in firmware or a simulator | [`Slave`] with your [`MotorControl`] |
+//! | name a register with its type and access | the constants of [`register`], such as [`register::SPEED_MEAS`] |
+//! | look up a register by number | [`RegisterId`] |
+//! | limit speeds and currents | [`Limits`] with an [`Account`] |
+//! | write a register and read it back | [`VerifiedWrite`] |
+//! | convert between frames and bytes | [`Frame`] |
+//! | convert between messages and payloads | [`Request`], [`Reply`], the types of [`message`] |
 //!
-//! A drive with one motor and nothing but a speed, as firmware or a test would have it:
+//! Example: a drive with one motor that has only a speed, as in firmware or in a test.
 //!
 //! ```
 //! use motorlink_proto::st::*;
@@ -22,7 +27,7 @@
 //!     fn version(&self) -> Version<'_> {
 //!         Version { name: "Fan", major: 1, minor: 0, patch: 0, pre_release: "" }
 //!     }
-//!     // Registers that this drive has nothing to say about read as 0.
+//!     // All other registers read as 0.
 //!     fn get_register(&mut self, _: MotorNumber, register: RegisterId) -> i32 {
 //!         match register {
 //!             RegisterId::STATUS if self.running => u8::from(Status::Run).into(),
@@ -49,7 +54,7 @@
 //!
 //! let mut fan = Fan { rpm: 0, running: false };
 //! let mut slave = Slave::new(Profile::Spec, MotorNumber::FIRST);
-//! // For each byte of the UART: send what comes back. When `deadline` has passed: `poll`.
+//! // For each byte of the UART: send the returned reply. At `deadline`: call `poll`.
 //! let mut sent = Vec::new();
 //! for byte in [0x07, 0x06, 0xDC, 0x05, 0x00, 0x00, 0xE8, 0x03, 0xDA] {
 //!     sent.extend_from_slice(slave.receive(Instant(0), byte, &mut fan).unwrap_or(&[]));

@@ -1,6 +1,6 @@
 //! Writes payloads.
 
-/// Writes a payload into the room that a framing has for it. What does not fit makes `finish` fail.
+/// Writes a payload into its part of a frame. If it does not fit, `finish` returns `None`.
 pub(super) struct Payload<'o> {
     room: &'o mut [u8],
     len: usize,
@@ -11,7 +11,7 @@ impl<'o> Payload<'o> {
         Payload { room, len: 0 }
     }
 
-    // A call is smaller than what it does, and replies are short.
+    // A function call takes less flash than the inlined code, and replies are short.
     #[inline(never)]
     pub(super) fn byte(&mut self, byte: u8) -> &mut Self {
         if let Some(slot) = self.room.get_mut(self.len) {
@@ -46,7 +46,7 @@ impl<'o> Payload<'o> {
         self.byte(b'0' + number % 10)
     }
 
-    /// Text, cut and padded with NUL so that the payload ends, NUL-terminated, at `end`.
+    /// Text, cut and padded with NUL: the payload ends at `end`, NUL-terminated.
     pub(super) fn text(&mut self, text: &str, end: usize) {
         let most = end.saturating_sub(1).saturating_sub(self.len);
         self.bytes_up_to(text.as_bytes(), most);
@@ -55,7 +55,7 @@ impl<'o> Payload<'o> {
         }
     }
 
-    /// The payload's size; `None` when it did not fit.
+    /// The payload's size; `None` if it did not fit.
     pub(super) fn finish(self) -> Option<usize> {
         (self.len <= self.room.len()).then_some(self.len)
     }

@@ -1,4 +1,4 @@
-//! The slave: bytes in, replies out (4.1).
+//! The slave: takes bytes, returns replies (4.1).
 
 use super::payload::Payload;
 use super::register::{Shape, Type, Unit, Writing};
@@ -9,19 +9,19 @@ use super::{
 };
 use crate::time::{Instant, Micros};
 
-/// The time in which a whole command must have come (4.1).
+/// Reception timeout: the maximum time for a whole command (4.1).
 pub const RECEPTION_TIMEOUT: Micros = Micros::from_millis(25);
-/// Data segments that a slave keeps (profile `spec`, SPEC-NOTES S7).
+/// Number of data segments of a slave (profile `spec`, SPEC-NOTES S7).
 pub const SEGMENTS: usize = 4;
-/// The most registers in a data segment: their values always fit a reply.
+/// Maximum number of registers in a data segment. Their values always fit into a reply.
 pub const SEGMENT_REGISTERS: usize = 32;
 
-/// The slave's end of the protocol: collects a command, checks checksum, motor and frame code in
-/// this order (4.1), lets the [`MotorControl`] work, answers.
+/// The slave's side of the protocol. It collects a command, checks checksum, motor and frame code
+/// in this order (4.1), calls the [`MotorControl`], and replies.
 ///
-/// The caller hands in every byte with the time at which it came, calls [`poll`](Self::poll) at
-/// [`deadline`](Self::deadline), and sends each returned reply before it hands in the next byte:
-/// real slaves do not listen while they answer.
+/// The caller passes every byte with its time of arrival, and calls [`poll`](Self::poll) at
+/// [`deadline`](Self::deadline). It sends each returned reply before it passes the next byte: a
+/// real slave does not receive while it replies.
 #[derive(Debug, Clone)]
 pub struct Slave {
     profile: Profile,
@@ -30,8 +30,8 @@ pub struct Slave {
     /// The command so far, then the reply to it.
     buffer: [u8; MAX_FRAME],
     received: u8,
-    /// A length over 128 came: nothing is understood until the line was silent.
-    deaf: bool,
+    /// A length over 128 was received. All bytes are dropped until the line was silent.
+    skipping: bool,
     deadline: Option<Instant>,
     segments: [Segment; SEGMENTS],
 }
@@ -45,7 +45,7 @@ impl Slave {
             current: MotorNumber::FIRST,
             buffer: [0; MAX_FRAME],
             received: 0,
-            deaf: false,
+            skipping: false,
             deadline: None,
             segments: [Segment::EMPTY; SEGMENTS],
         }
@@ -61,18 +61,18 @@ impl Slave {
         self.current
     }
 
-    /// Whether a command is under way, the next byte being a part of it.
+    /// Whether a command was received in part. The next byte belongs to it.
     pub const fn is_receiving(&self) -> bool {
         self.received > 0
     }
 
-    /// When [`poll`](Self::poll) has to be called; `None` while no frame is under way, and always
-    /// in profile `mcsdk-5.4`, whose firmware never times out (SPEC-NOTES S11).
+    /// When to call [`poll`](Self::poll). `None` between frames, and always in profile `mcsdk-5.4`,
+    /// whose firmware has no reception timeout (SPEC-NOTES S11).
     pub const fn deadline(&self) -> Option<Instant> {
         self.deadline
     }
 
-    /// Gives the NACK TIMEOUT for a command that did not come whole in time (4.1).
+    /// Returns the NACK TIMEOUT for a command that was not complete in time (4.1).
     pub fn poll(&mut self, now: Instant) -> Option<&[u8]> {
         if self.deadline.is_none_or(|deadline| now < deadline) {
             return None;
@@ -81,8 +81,8 @@ impl Slave {
         Some(&TIMEOUT_REPLY)
     }
 
-    /// Takes a byte that came at `now`; gives the reply when it completes a command. A byte that
-    /// comes after the deadline begins a new command, behind the NACK that the old one is owed.
+    /// Takes a byte received at `now`. Returns the reply if the byte completes a command. A byte
+    /// after the deadline starts a new command; the NACK for the old command is returned first.
     pub fn receive(
         &mut self,
         now: Instant,
@@ -104,30 +104,30 @@ impl Slave {
         Some(self.reply(answer))
     }
 
-    /// Tells that the receiver lost bytes: drops the command under way and gives the NACK OVERRUN
+    /// Reports that the receiver lost bytes. Drops the current command and returns the NACK OVERRUN
     /// (table 2).
     pub fn overrun(&mut self) -> &[u8] {
         self.restart();
         self.reply(Err(ErrorCode::Overrun))
     }
 
-    /// Stores a byte; the command's size when it is complete.
+    /// Stores a byte. Returns the command's size when it is complete.
     fn take(&mut self, now: Instant, byte: u8) -> Option<usize> {
         let timed = self.profile == Profile::Spec;
-        if timed && (self.received == 0 || self.deaf) {
+        if timed && (self.received == 0 || self.skipping) {
             self.deadline = Some(now + RECEPTION_TIMEOUT);
         }
-        if self.deaf {
+        if self.skipping {
             return None;
         }
         *self.buffer.get_mut(usize::from(self.received))? = byte;
         self.received = self.received.saturating_add(1);
         let [_, length, ..] = self.buffer;
-        // Shipped firmware takes 127 bytes and looks for the next header at once.
+        // Shipped firmware accepts at most 127 bytes; it then expects the next header at once.
         let most = MAX_PAYLOAD - usize::from(!timed);
         if self.received == 2 && usize::from(length) > most {
             if timed {
-                self.deaf = true;
+                self.skipping = true;
                 self.deadline = Some(now + RECEPTION_TIMEOUT);
             } else {
                 self.received = 0;
@@ -140,12 +140,12 @@ impl Slave {
 
     fn restart(&mut self) {
         self.received = 0;
-        self.deaf = false;
+        self.skipping = false;
         self.deadline = None;
     }
 
-    /// Motor, frame code, work: in this order (4.1). Gives the size of the ACK's payload, which
-    /// then stands in the buffer.
+    /// Checks motor and frame code, then executes, in this order (4.1). Returns the size of the
+    /// ACK's payload, which is then in the buffer.
     fn process(
         &mut self,
         frame: &Frame<'_>,
@@ -229,15 +229,15 @@ impl Slave {
         out.finish().ok_or(ErrorCode::WrongSet)
     }
 
-    /// Makes a motor the current one, if it exists (3.2).
+    /// Makes a motor the current one; `None` if it does not exist (3.2).
     fn select(&mut self, number: u8) -> Option<()> {
         let motor = MotorNumber::new(number).filter(|motor| motor.number() <= self.motors)?;
         self.current = motor;
         Some(())
     }
 
-    /// SET_REG (4.4): a longer value is cut to the register's size; bytes that a shorter one does
-    /// not carry keep what the register had in profile `spec` and refuse it in `mcsdk-5.4`.
+    /// SET_REG (4.4). Surplus bytes are ignored. If the value is too short, profile `spec` keeps
+    /// the register's other bytes, and `mcsdk-5.4` refuses it.
     fn write(
         &mut self,
         motor: MotorNumber,
@@ -273,7 +273,8 @@ impl Slave {
                 if shown.shape().is_some_and(|shape| shape.shows_on_dac(features)) {
                     return drive.set_register(motor, register, bits);
                 }
-                // Firmware acknowledges what it cannot show; the document's slave says so.
+                // Firmware acknowledges registers that it cannot show; a slave of profile `spec`
+                // refuses them.
                 match self.profile {
                     Profile::Spec => Err(ErrorCode::WrongSet),
                     Profile::Mcsdk54 => Ok(()),
@@ -322,7 +323,7 @@ fn execute(
     Ok(())
 }
 
-/// A register's value as it goes on the wire.
+/// A register's value as it is sent.
 fn read(
     profile: Profile,
     motor: MotorNumber,
@@ -343,7 +344,7 @@ fn read(
     }
 }
 
-/// A value from the wire as the drive takes it.
+/// A received value as the drive gets it.
 fn to_drive(profile: Profile, shape: &Shape, bits: i32) -> i32 {
     match shape.unit {
         Unit::Rpm if shape.ty != Type::F32 => speed(profile, bits),
@@ -352,7 +353,7 @@ fn to_drive(profile: Profile, shape: &Shape, bits: i32) -> i32 {
     }
 }
 
-/// Shipped firmware keeps speeds in tenths of a hertz, 6 rpm each (SPEC-NOTES S12).
+/// Shipped firmware stores speeds in tenths of a hertz, 6 rpm each (SPEC-NOTES S12).
 pub(super) fn speed(profile: Profile, rpm: i32) -> i32 {
     match profile {
         Profile::Spec => rpm,
@@ -364,8 +365,8 @@ fn revup_phase(phase: u8) -> Result<u8, ErrorCode> {
     if phase < REVUP_PHASES { Ok(phase) } else { Err(ErrorCode::WrongSet) }
 }
 
-/// A NACK frame. Header and length carry once into the high byte, so the checksum is the code
-/// plus one.
+/// A NACK frame. The sum of header and length has one carry into the high byte, so the checksum is
+/// the code plus one.
 const fn nack(code: ErrorCode) -> [u8; 4] {
     let code = code.number();
     [HEADER_NACK, 1, code, code.wrapping_add(1)]

@@ -1,32 +1,32 @@
-//! Which motors were started and not stopped, as far as requests and replies tell.
+//! The motors that were started and not stopped, according to requests and replies.
 
 use super::{Command, Frame, FrameCode, MotorNumber, Parse, Profile, RegisterId, Request};
 
 /// Every motor that a drive can have.
 const ALL: u8 = 0x7F;
 
-/// What a request does to the accounts of started motors and of their setpoints.
+/// The effect of a request on started motors and on setpoints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Effect {
-    /// Nothing that counts.
+    /// No effect.
     #[default]
     None,
-    /// It may set a motor turning until it is stopped. An alignment ends by itself.
+    /// It may make a motor turn until a stop. An alignment ends by itself and does not count.
     Starts,
     /// It stops a motor.
     Stops,
-    /// Motor number 0 addresses another motor from now on.
+    /// Motor number 0 addresses another motor afterwards.
     Retargets,
-    /// It gives the speed that a start goes to.
+    /// It sets the target speed of a start.
     Ramps,
-    /// It may give a start something other than a speed ramp to do.
+    /// It may replace the speed ramp of a start by another setpoint.
     Supersedes,
     /// It may reset the drive.
     Resets,
 }
 
 impl Effect {
-    /// What a request does.
+    /// The effect of a request.
     pub fn of(request: &Request<'_>) -> Self {
         match request {
             Request::ExecuteCommand(command) => match command {
@@ -38,7 +38,7 @@ impl Effect {
             Request::SetRegister { register, .. } => match *register {
                 RegisterId::TARGET_MOTOR => Effect::Retargets,
                 RegisterId::RAMP_FINAL_SPEED => Effect::Ramps,
-                // A change of mode may bring a reference of the drive's own.
+                // A change of mode may activate the drive's own reference.
                 RegisterId::CONTROL_MODE | RegisterId::TORQUE_REF | RegisterId::FLUX_REF => {
                     Effect::Supersedes
                 }
@@ -52,11 +52,11 @@ impl Effect {
         }
     }
 
-    /// What a raw frame does in the profile in which it does something.
+    /// The effect of a raw frame, in the profile in which it has one.
     pub fn of_frame(frame: &Frame<'_>) -> Self {
         let code = |profile| FrameCode::from_number(frame.code(), profile);
         let effects = Profile::ALL.map(|profile| match frame.request(profile) {
-            // Shipped firmware takes an old byte for the command (docs/SPEC-NOTES.md S18).
+            // Shipped firmware reads an old byte as the command (docs/SPEC-NOTES.md S18).
             Err(_) if code(profile) == Some(FrameCode::ExecuteCmd) => Effect::Starts,
             Ok(request) => Effect::of(&request),
             Err(_) => Effect::None,
@@ -65,22 +65,22 @@ impl Effect {
     }
 }
 
-/// A motor counts as started from the START on, whose reply may be lost, and until a STOP is
-/// acknowledged.
+/// The started motors. A motor counts as started as soon as a START is sent, because the reply may
+/// be lost. It counts until a STOP is acknowledged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Started {
     /// Bit n: motor n + 1.
     motors: u8,
-    /// What motor number 0 addresses; `None` while that is not known.
+    /// The motor that motor number 0 addresses; `None` if unknown.
     current: Option<MotorNumber>,
-    /// The motors that counted as started before a START to motor number 0, while that still addresses
-    /// the same one.
+    /// The motors that counted as started before a START to motor number 0. `None` after motor
+    /// number 0 may address another motor.
     before_zero: Option<u8>,
 }
 
 impl Started {
-    /// A request for motor number `motor` leaves. Gives the motor that it addresses, where that is
-    /// known, for [`acknowledged`](Self::acknowledged).
+    /// Records a sent request for motor number `motor`. Returns the addressed motor, if known, for
+    /// [`acknowledged`](Self::acknowledged).
     pub fn request_sent(&mut self, motor: u8, effect: Effect) -> Option<MotorNumber> {
         if motor != 0 || matches!(effect, Effect::Retargets | Effect::Resets) {
             self.before_zero = None;
@@ -89,17 +89,17 @@ impl Started {
             self.presume(motor);
         }
         let addressed = self.addressed(motor);
-        // Unless the drive acknowledges, its current motor may have changed or not.
+        // Until the drive acknowledges, its current motor is unknown.
         self.current = None;
         addressed
     }
 
-    /// The motor that motor number `motor` addresses, where it is known.
+    /// The motor that motor number `motor` addresses, if known.
     pub(super) fn addressed(&self, motor: u8) -> Option<MotorNumber> {
         MotorNumber::new(motor).or(self.current)
     }
 
-    /// The request that was [`sent`](Self::request_sent) last was acknowledged.
+    /// Records that the last [`sent`](Self::request_sent) request was acknowledged.
     pub fn acknowledged(&mut self, addressed: Option<MotorNumber>, effect: Effect) {
         match effect {
             Effect::Retargets | Effect::Resets => return,
@@ -114,8 +114,8 @@ impl Started {
         self.current = addressed;
     }
 
-    /// Takes motor number `motor` for started. For number 0 that is every motor: a drive whose supply
-    /// failed for a moment has another current motor than before.
+    /// Records motor number `motor` as started. Number 0 means every motor: after a short supply
+    /// failure a drive has another current motor.
     pub fn presume(&mut self, motor: u8) {
         if let Some(motor) = MotorNumber::new(motor) {
             self.motors |= bit(motor);
@@ -125,7 +125,7 @@ impl Started {
         }
     }
 
-    /// Takes for started what a START in `bytes` addresses, wherever it stands: shipped firmware
+    /// Records the motors that a START anywhere in `bytes` addresses as started. Shipped firmware
     /// reads the payload of the longest frame as frames (docs/SPEC-NOTES.md S10).
     pub(super) fn presume_within(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
@@ -139,12 +139,12 @@ impl Started {
         }
     }
 
-    /// The drive has no such motor.
+    /// Records that the drive does not have this motor.
     pub(super) fn forget_motor(&mut self, motor: MotorNumber) {
         self.motors &= !bit(motor);
     }
 
-    /// Says that the drive's current motor is not known.
+    /// Records that the drive's current motor is unknown.
     pub fn forget_current(&mut self) {
         (self.current, self.before_zero) = (None, None);
     }

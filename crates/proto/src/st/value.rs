@@ -1,4 +1,4 @@
-//! Register values for people: physical units, names for states, and back.
+//! Register values as text: physical units and names, in both directions.
 
 use std::format;
 use std::string::{String, ToString};
@@ -7,7 +7,7 @@ use std::{borrow::ToOwned, vec::Vec};
 use super::register::{Access, Type, Unit};
 use super::{ControlMode, Flags, Profile, RegisterId, Status};
 
-/// A register's value as it was read, with the profile that gives it its scale.
+/// A register's value as it was read, with the profile that determines its scale.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reading {
     /// The register.
@@ -18,34 +18,34 @@ pub struct Reading {
     pub profile: Profile,
 }
 
-/// A register name or number that nobody knows.
+/// An unknown register name or number.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("there is no register `{text}`{}", suggestion(.nearest))]
 pub struct UnknownRegister {
-    /// What was asked for.
+    /// The given text.
     pub text: String,
-    /// The name that looks most like it, if one does.
+    /// The most similar name, if there is one.
     pub nearest: Option<&'static str>,
 }
 
-/// A value that a register cannot take; nothing was sent.
+/// A value that a register cannot have. Nothing was sent.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValueError {
-    /// Not a number, nor a name that this register knows.
-    #[error("`{text}` is no value for {register}; {usable}")]
+    /// Neither a number nor a name of this register's values.
+    #[error("`{text}` is not a value of {register}; {usable}")]
     NotAValue {
-        /// What was given.
+        /// The given text.
         text: String,
         /// The register.
         register: RegisterId,
-        /// What it takes.
+        /// The accepted values.
         usable: String,
     },
     /// Between two digits of the register.
     #[error("{text} falls between two values of {register}, which has steps of {step}{unit}")]
     Between {
-        /// What was given.
+        /// The given text.
         text: String,
         /// The register.
         register: RegisterId,
@@ -54,23 +54,23 @@ pub enum ValueError {
         /// A space and the unit, or nothing.
         unit: String,
     },
-    /// Outside what the register's type can hold.
+    /// Outside the range of the register's type.
     #[error("{text} does not fit {register}: it takes {least} to {most}{unit}")]
     OutOfRange {
-        /// What was given.
+        /// The given text.
         text: String,
         /// The register.
         register: RegisterId,
-        /// The least value, in the physical unit.
+        /// The minimum, in the physical unit.
         least: f64,
-        /// The greatest value, in the physical unit.
+        /// The maximum, in the physical unit.
         most: f64,
         /// A space and the unit, or nothing.
         unit: String,
     },
 }
 
-/// The register of a name, or of a number such as `0x1E`.
+/// The register with this name, or with this number such as `0x1E`.
 pub fn find_register(text: &str) -> Result<RegisterId, UnknownRegister> {
     if let Some(register) = RegisterId::named(text) {
         return Ok(register);
@@ -117,7 +117,7 @@ impl Reading {
         }
     }
 
-    /// Digits behind the point that tell every value; `None` for a float.
+    /// Number of decimal places that show every value exactly; `None` for a float.
     pub fn decimals(&self) -> Option<u8> {
         let is_float = self.ty() == Some(Type::F32);
         let is_scaled = unit(self.register).scale(self.profile) != 1.0;
@@ -129,7 +129,7 @@ impl Reading {
         unit(self.register).quantity()
     }
 
-    /// The value in words, for registers whose values have names.
+    /// The name of the value, for registers whose values have names.
     pub fn name(&self) -> Option<String> {
         match unit(self.register) {
             Unit::Status => Some(Status::from(self.bits as u8).to_string()),
@@ -163,8 +163,8 @@ impl std::fmt::Display for Reading {
     }
 }
 
-/// Reads a value that a person wrote, in the register's physical unit or, with `raw`, in digits;
-/// names are taken where values have them. Gives the bits to write.
+/// Parses a value in the register's physical unit or, with `raw`, in digits. Names are accepted for
+/// values with names. Returns the bits to write.
 pub fn parse_value(
     register: RegisterId,
     text: &str,
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_shown_can_be_written_back() {
+    fn a_shown_value_can_be_written_back() {
         let spec = Profile::Spec;
         let parse = |register, text: &str| parse_value(register, text, spec, false);
         assert_eq!(parse(RegisterId::SPEED_KP, "-32768"), Ok(-32768));
@@ -285,7 +285,7 @@ mod tests {
         let current = parse(RegisterId::SC_CURRENT, "1e39");
         assert!(matches!(current, Err(ValueError::OutOfRange { .. })), "{current:?}");
         assert_eq!(parse(RegisterId::SC_CURRENT, "0.25"), Ok(0.25f32.to_bits() as i32));
-        // Nobody knows the sign of an unnamed register.
+        // The sign of an unknown register is unknown.
         assert_eq!(parse(RegisterId(0xC0), "0xFFFFFFFF"), Ok(-1));
         assert_eq!(parse(RegisterId(0xC0), "-1"), Ok(-1));
         assert_eq!(parse(RegisterId::CONTROL_MODE, "speed"), Ok(1));

@@ -1,32 +1,33 @@
-//! A write that is read back: what one checksum of 8 bits lets through, two seldom do.
+//! Writes that are read back. An 8-bit checksum misses some errors; two exchanges rarely both miss.
 
 use super::register::{Type, Unit, Writing};
 use super::slave::speed;
 use super::{Features, Profile, RegisterId, Request};
 
-/// Attempts of a verified write unless told otherwise.
+/// Default number of attempts of a verified write.
 pub const VERIFY_ATTEMPTS: u8 = 3;
 
-/// Why a write is not, or cannot be, verified.
+/// Why a write was not verified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unverified<E> {
-    /// The register cannot be written and read back in this profile; nothing was sent.
+    /// The register cannot be written and read back in this profile. Nothing was sent.
     NotReadable,
-    /// Writing it makes the motor do something, and the drive changes it by itself: repeating the
-    /// write is not for a library to decide, and what is read back proves nothing. Nothing was sent.
+    /// Writing the register makes the motor act, and the drive changes the register itself. A
+    /// library must not repeat such a write, and reading it back proves nothing. Nothing was sent.
     Acts,
-    /// An exchange failed for good, or failed in the last attempt: nothing is known of the register.
+    /// An exchange failed finally, or failed in the last attempt. The value of the register is
+    /// unknown.
     Exchange(E),
     /// The register has another value after the last attempt.
     Differs {
-        /// What it should have.
+        /// The expected value.
         expected: i32,
-        /// What was read.
+        /// The value that was read.
         read: i32,
     },
 }
 
-/// A register, a value, and what the register reads back when the write was right.
+/// A register, a value, and the value that the register reads back after a correct write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct VerifiedWrite {
     register: RegisterId,
@@ -36,7 +37,8 @@ pub struct VerifiedWrite {
 }
 
 impl VerifiedWrite {
-    /// A write to a drive of `profile`. Of `value` the low bytes that the register has are written.
+    /// A write to a drive of `profile`. Only the low bytes of `value` that the register has are
+    /// written.
     ///
     /// # Errors
     /// [`Unverified::NotReadable`] and [`Unverified::Acts`].
@@ -65,11 +67,12 @@ impl VerifiedWrite {
     }
 
     /// Writes and reads back until the register has the value, at most `attempts` times (0 counts
-    /// as 1); gives the number of the attempt that did it.
+    /// as 1). Returns the number of the successful attempt.
     ///
-    /// `exchange` does one exchange: `None` is an acknowledge without a value. A write whose
-    /// acknowledge does not come is read back all the same: it may have been carried out. `is_final`
-    /// says which errors another attempt cannot change, such as a drive that refuses.
+    /// `exchange` performs one exchange; `None` is an acknowledge without a value. If a write is
+    /// not acknowledged, it may have been carried out, so the register is read back as well.
+    /// `is_final` returns whether another attempt cannot change an error; a refusal is such an
+    /// error.
     ///
     /// # Errors
     /// [`Unverified::Exchange`] and [`Unverified::Differs`].
@@ -88,14 +91,14 @@ impl VerifiedWrite {
         }
     }
 
-    /// The same without the line, for whoever carries out the exchanges.
+    /// The same without a callback: the caller performs the exchanges.
     pub fn begin(self, attempts: u8) -> Verifying {
         Verifying { write: self, attempts, attempt: 1, reading: false }
     }
 }
 
-/// A verified write under way: carry out [`request`](Self::request) and hand its outcome to
-/// [`step`](Self::step), until that gives the end. As [`VerifiedWrite::run`].
+/// A verified write in progress. Perform [`request`](Self::request) and pass the result to
+/// [`step`](Self::step), until that returns the outcome. See [`VerifiedWrite::run`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Verifying {
     write: VerifiedWrite,
@@ -105,7 +108,7 @@ pub struct Verifying {
 }
 
 impl Verifying {
-    /// What is to be asked now.
+    /// The next request.
     pub fn request(&self) -> Request<'_> {
         let VerifiedWrite { register, bytes, size, .. } = &self.write;
         if self.reading {
@@ -115,7 +118,7 @@ impl Verifying {
         Request::SetRegister { register: *register, value }
     }
 
-    /// The request was carried out, or failed; gives how it all ended, if it did.
+    /// Takes the result of the request. Returns the outcome if the write is finished.
     pub fn step<E>(
         &mut self,
         outcome: Result<Option<i32>, E>,
@@ -138,8 +141,8 @@ impl Verifying {
     }
 }
 
-/// Registers through which a drive is commanded: it acts on a write, changes them by itself, or
-/// addresses another motor from then on.
+/// Registers that command the drive: a write makes the motor act, the drive changes the register
+/// itself, or another motor is addressed afterwards.
 fn acts(register: RegisterId) -> bool {
     matches!(
         register,

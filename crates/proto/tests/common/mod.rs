@@ -1,4 +1,4 @@
-//! A drive that keeps what it is told, and a slave that is fed whole frames.
+//! A drive that stores the values of its commands, and a slave that receives whole frames.
 #![allow(dead_code)]
 
 use std::collections::HashMap;
@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use motorlink_proto::st::*;
 use motorlink_proto::time::Instant;
 
-/// Registers are plain memory; everything else is written down.
+/// Registers are plain memory. All other commands are logged.
 #[derive(Default)]
 pub struct Memory {
     pub features: Option<Features>,
@@ -24,7 +24,7 @@ impl Memory {
         Memory { features: Some(features), ..Memory::default() }
     }
 
-    /// Without the motor profiler and HFI, with everything else.
+    /// All features except the motor profiler and HFI.
     pub fn usual() -> Self {
         let without = [Feature::Profiler, Feature::Hfi];
         let wanted = Feature::ALL.iter().filter(|feature| !without.contains(feature));
@@ -87,7 +87,7 @@ impl MotorControl for Memory {
     }
 }
 
-/// A slave and its drive on a line where bytes take no time.
+/// A slave and its drive, on a line without transmission time.
 pub struct SlaveFixture {
     pub slave: Slave,
     pub drive: Memory,
@@ -100,7 +100,7 @@ impl SlaveFixture {
         SlaveFixture { slave, drive, now: Instant(0) }
     }
 
-    /// What the slave answers to bytes that come at once.
+    /// The slave's reply to bytes that are received at once.
     pub fn bytes(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut replies = Vec::new();
         for &byte in bytes {
@@ -109,7 +109,7 @@ impl SlaveFixture {
         replies
     }
 
-    /// The answer to a raw frame: an ACK's payload or a NACK's code.
+    /// The reply to a raw frame: an ACK's payload or a NACK's code.
     pub fn raw(&mut self, header: u8, payload: &[u8]) -> Result<Vec<u8>, ErrorCode> {
         let mut out = [0; MAX_FRAME];
         let frame = Frame { header, payload }.encode(&mut out).unwrap().to_vec();
@@ -123,7 +123,7 @@ impl SlaveFixture {
     }
 }
 
-/// Takes a reply apart; panics when it is not exactly one.
+/// Splits a reply. Panics unless it is exactly one frame.
 pub fn answer(bytes: &[u8]) -> Result<Vec<u8>, ErrorCode> {
     let Parse::Frame(frame, size) = Frame::parse(bytes) else { panic!("no reply: {bytes:02x?}") };
     assert_eq!(size, bytes.len(), "more than a reply: {bytes:02x?}");

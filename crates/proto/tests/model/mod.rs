@@ -1,6 +1,7 @@
-//! The slave once more, slow and obvious, written from the document (paragraphs in brackets) and
-//! docs/SPEC-NOTES.md (rows S), to compare the real one with byte for byte. The rows of table 3 come
-//! from the register table; everything else stands here a second time, numbers included.
+//! An independent, simple implementation of the slave, written from the document (paragraphs in
+//! brackets) and docs/SPEC-NOTES.md (rows S). Tests compare the real slave with it, byte for byte.
+//! The rows of table 3 come from the register table; everything else, including numbers, is written
+//! here again.
 #![allow(dead_code, reason = "each user has its part")]
 
 mod plant;
@@ -29,7 +30,7 @@ const MP_NOT_ENABLED: u8 = 0x0C;
 /// An ACK's payload or a NACK's code.
 type Answer = Result<Vec<u8>, u8>;
 
-/// The slave and its model, fed the same.
+/// The slave and its model, with the same input.
 pub struct Twins {
     slave: Slave,
     drive: Plant,
@@ -43,7 +44,7 @@ impl Twins {
         Twins { slave, drive: Plant::default(), model: Model::new(profile, motors), now: 0 }
     }
 
-    /// Bytes that come at once; gives all that is answered.
+    /// Passes bytes at once. Returns all replies.
     pub fn bytes(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut replies = Vec::new();
         for &byte in bytes {
@@ -56,7 +57,7 @@ impl Twins {
         replies
     }
 
-    /// A frame with its right checksum.
+    /// Passes a frame with a correct checksum.
     pub fn frame(&mut self, header: u8, payload: &[u8]) -> Vec<u8> {
         self.bytes(&framed(header, payload))
     }
@@ -93,7 +94,7 @@ pub fn framed(header: u8, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// 3.3, in its own words.
+/// The checksum of 3.3.
 fn checksum(bytes: &[u8]) -> u8 {
     let mut accumulator: u16 = 0;
     for byte in bytes {
@@ -111,10 +112,11 @@ struct Model {
     plant: Plant,
     /// The command so far.
     received: Vec<u8>,
-    /// When its first byte came; while deaf, when the last byte came. Microseconds.
+    /// When the first byte was received; after a bad length, when the last byte was received.
+    /// Microseconds.
     since: u64,
-    /// A length over 128 came (S10).
-    deaf: bool,
+    /// A length over 128 was received (S10).
+    skipping: bool,
     segments: [Vec<u8>; 4],
 }
 
@@ -127,7 +129,7 @@ impl Model {
             plant: Plant::default(),
             received: Vec::new(),
             since: 0,
-            deaf: false,
+            skipping: false,
             segments: Default::default(),
         }
     }
@@ -136,7 +138,7 @@ impl Model {
         self.profile == Profile::Spec
     }
 
-    /// 25 ms behind the first byte (S11), or of silence (S10); firmware never times out.
+    /// 25 ms after the first byte (S11), or of silence (S10). Firmware has no reception timeout.
     fn deadline(&self) -> Option<u64> {
         let waiting = self.spec() && !self.received.is_empty();
         waiting.then_some(self.since + 25_000)
@@ -155,22 +157,22 @@ impl Model {
 
     fn drop_command(&mut self, code: u8) -> Vec<u8> {
         self.received.clear();
-        self.deaf = false;
+        self.skipping = false;
         framed(0xFF, &[code])
     }
 
     fn receive(&mut self, now: u64, byte: u8) -> Option<Vec<u8>> {
-        let owed = self.poll(now); // S29
-        if self.received.is_empty() || self.deaf {
+        let nack = self.poll(now); // S29
+        if self.received.is_empty() || self.skipping {
             self.since = now;
         }
-        if self.deaf {
-            return owed;
+        if self.skipping {
+            return nack;
         }
         self.received.push(byte);
         if let [_, length] = self.received[..] {
             if self.spec() && length > 128 {
-                self.deaf = true;
+                self.skipping = true;
                 self.since = now;
             } else if !self.spec() && length > 127 {
                 self.received.clear();
@@ -186,7 +188,7 @@ impl Model {
                 Err(code) => framed(0xFF, &[code]),
             });
         }
-        owed
+        nack
     }
 
     /// Checksum, motor, frame code, in this order (4.1).
@@ -275,7 +277,7 @@ impl Model {
             if !matches!(row.access, Access::ReadWrite | Access::WriteOnly) {
                 return Err(SET_READ_ONLY);
             }
-            // S19: too much is cut, what is missing stays.
+            // Surplus bytes are cut; missing bytes keep their value (S19).
             let mut bytes = self.on_the_wire(id, row.ty(Profile::Spec).size());
             for (slot, byte) in bytes.iter_mut().zip(value) {
                 *slot = *byte;
@@ -439,14 +441,14 @@ fn everything() -> Features {
     Feature::ALL.iter().fold(Features::NONE, |set, &feature| set.with(feature))
 }
 
-/// Zeros to the 32 bytes that version replies have.
+/// Pads with zeros to the 32 bytes of version replies.
 fn padded(text: &[u8]) -> Vec<u8> {
     let mut reply = text.to_vec();
     reply.resize(32, 0);
     reply
 }
 
-/// Four bytes of a payload; a message that lacks them is refused (S18).
+/// Four bytes of a payload. A message without them is refused (S18).
 fn long(payload: &[u8], at: usize) -> Result<i32, u8> {
     let bytes = payload.get(at..at + 4).ok_or(WRONG_SET)?;
     Ok(i32::from_le_bytes(bytes.try_into().expect("four")))

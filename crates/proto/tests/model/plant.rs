@@ -1,10 +1,10 @@
-//! What the slave and its model command: registers that remember, and a list of all that was asked.
+//! The drive behind the slave and its model: registers that store values, and a log of all calls.
 
 use std::collections::BTreeMap;
 
 use motorlink_proto::st::*;
 
-/// A value that no register takes.
+/// A value that no register accepts.
 const UNFIT: i32 = 0x0000_00BD;
 
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -15,7 +15,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Motor 1 has everything, motor 2 nothing, motor 3 what usual firmware has.
+    /// Motor 1 has all features, motor 2 none, motor 3 those of usual firmware.
     pub fn has(motor: u8, feature: Feature) -> bool {
         let unusual = [Feature::Profiler, Feature::Hfi, Feature::PositionControl];
         match motor {
@@ -25,7 +25,7 @@ impl Plant {
         }
     }
 
-    /// What was written, or else bits that differ from register to register.
+    /// The written value; before a write, bits that differ from register to register.
     pub fn value(&self, motor: u8, id: u8) -> i32 {
         let pattern = u32::from(id).wrapping_mul(0x9E37_79B9) ^ u32::from(motor) << 11;
         let ty =

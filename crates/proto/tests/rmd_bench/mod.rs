@@ -10,14 +10,14 @@ pub fn motor(id: u8) -> MotorId {
     MotorId::new(id).expect("the test names an ID of 1 to 32")
 }
 
-/// The first host on a bus.
+/// A host on a bus without former hosts.
 pub fn trusted_host() -> Host {
     let mut host = Host::new();
     host.trust(MotorSet::ALL);
     host
 }
 
-/// A motor that remembers what it was told and senses what the test says.
+/// A motor that stores its commands. The test sets its sensor values.
 #[derive(Debug, Clone, Default)]
 pub struct TestMotor {
     pub sense: Sense,
@@ -88,7 +88,8 @@ impl Node {
 pub type Outcome = (MotorId, Result<[u8; 8], Failure>);
 
 /// A host and its drives. Fails the test on a request to a motor whose reply is still to come:
-/// both have the same identifier, and two nodes that send it at once is a bus error.
+/// request and reply have the same identifier, and two nodes that send it at once cause a bus
+/// error.
 pub struct Pair {
     pub now: Instant,
     pub host: Host,
@@ -130,7 +131,7 @@ impl Pair {
         }
     }
 
-    /// Lets time pass; what is on its way arrives.
+    /// Lets time pass. Frames in transit arrive.
     pub fn wait(&mut self, span: Micros) {
         let until = self.now + span;
         while self.now < until {

@@ -11,20 +11,20 @@ use super::common::Memory;
 pub const MS: u64 = 1_000;
 pub const STATUS: Request<'static> = Request::GetRegister(RegisterId::STATUS);
 
-/// The first master on a line.
+/// A master on a line without former masters.
 pub fn master(recovery: Recovery) -> Master {
     let mut master = Master::new(MasterConfig { recovery, ..MasterConfig::default() });
     master.trust_line();
     master
 }
 
-/// Master and slave on a line whose replies come late by `delay`, in order.
+/// Master and slave on a line that delays replies by `delay` and keeps their order.
 pub struct Pair {
     pub master: Master,
     pub slave: Slave,
     pub drive: Memory,
     pub now: Instant,
-    /// Replies under way: when they arrive and what they are.
+    /// Replies in transit: time of arrival and bytes.
     pub line: VecDeque<(Instant, Vec<u8>)>,
     pub delay: Micros,
     /// How many bytes of the next transmission reach the slave.
@@ -32,7 +32,7 @@ pub struct Pair {
     /// Which bit of the next transmission is flipped.
     pub flip: Option<usize>,
     pub sent: Vec<Vec<u8>>,
-    /// When the master is gone.
+    /// When the master exits.
     pub until: Option<Instant>,
 }
 
@@ -53,10 +53,10 @@ impl Pair {
     }
 
     pub fn exchange(&mut self, motor: u8, request: Request<'_>) -> Result<Vec<u8>, ExchangeError> {
-        self.attempt(motor, request).expect("the master lives on")
+        self.attempt(motor, request).expect("the master does not exit")
     }
 
-    /// `None`: the master is gone before the exchange was over.
+    /// `None` if the master exits before the end of the exchange.
     pub fn attempt(
         &mut self,
         motor: u8,
@@ -89,7 +89,7 @@ impl Pair {
         }
     }
 
-    /// Nothing is asked for a while.
+    /// Sends no request for a while.
     pub fn rest(&mut self, pause: Micros) {
         let end = self.now + pause;
         if let Some(deadline) = self.slave.deadline().filter(|deadline| *deadline <= end) {

@@ -126,7 +126,7 @@ pub fn scenarios() -> Vec<Scenario> {
             |turn| vec![right(turn), unasked()],
         ),
         scenario(
-            "two_replies_that_differ_are_no_answer",
+            "two_different_replies_are_not_an_answer",
             &[ONE_EXCHANGE, UNASKED_IS_NOTHING],
             "trusts neither of two ACKs that come at once",
             Demand::Truth,

@@ -5,21 +5,20 @@ use crate::st::{
     Reply, ReplySize, Request,
 };
 
-/// A request until it is sent, then what is received of the reply.
+/// The request until it is sent; then the received bytes of the reply.
 #[derive(Debug, Clone)]
 pub(super) struct Exchange {
     buffer: [u8; MAX_FRAME],
     filled: u8,
-    /// The size of the reply, in the profile of the drive and in the other.
+    /// The size of the reply, in the profile of the drive and in the other profile.
     sizes: [ReplySize; 2],
 }
 
-/// What was received.
+/// The received message.
 pub(super) enum Received {
-    /// An identification, which was skipped.
+    /// An identification; it was skipped.
     Identification,
-    /// The end of the exchange, and how many bytes there are behind the reply. The payload has this
-    /// many bytes.
+    /// The end of the exchange: the size of the payload, and the number of bytes after the reply.
     End(Result<u8, ExchangeError>, u8),
 }
 
@@ -27,7 +26,7 @@ impl Exchange {
     pub(super) const NONE: Exchange =
         Exchange { buffer: [0; MAX_FRAME], filled: 0, sizes: [ReplySize::Any; 2] };
 
-    /// Stores the frame to send; `None` when the request does not fit one.
+    /// Stores the frame to send; `None` if the request does not fit into a frame.
     pub(super) fn store(
         &mut self,
         motor: u8,
@@ -39,20 +38,20 @@ impl Exchange {
         Some(())
     }
 
-    /// Stores any frame to send; `None` when its payload is too long.
+    /// Stores any frame to send; `None` if its payload is too long.
     pub(super) fn store_raw(&mut self, frame: &Frame<'_>) -> Option<()> {
         self.filled = frame.encode(&mut self.buffer)?.len() as u8;
         self.sizes = [ReplySize::Any; 2];
         Some(())
     }
 
-    /// The frame to send; what is received from now on is the reply.
+    /// Returns the frame to send. Bytes received from now on belong to the reply.
     pub(super) fn send(&mut self) -> &[u8] {
         let size = usize::from(core::mem::take(&mut self.filled));
         self.buffer.get(..size).unwrap_or(&[])
     }
 
-    /// Stores what was received; returns how many bytes did not fit.
+    /// Stores received bytes. Returns the number of bytes that did not fit.
     pub(super) fn receive(&mut self, bytes: &[u8]) -> usize {
         let filled = usize::from(self.filled);
         let room = self.buffer.get_mut(filled..).unwrap_or(&mut []);
@@ -61,7 +60,7 @@ impl Exchange {
         bytes.len() - taken
     }
 
-    /// What the stored bytes are; `None` while the reply is incomplete.
+    /// Parses the stored bytes; `None` while the reply is incomplete.
     pub(super) fn next(&mut self, profile: Profile) -> Option<Received> {
         let received = self.buffer.get(..usize::from(self.filled))?;
         let header = *received.first()?;
@@ -80,7 +79,7 @@ impl Exchange {
                 }
                 let failure = match (reply, self.sizes) {
                     _ if contradicts(&frame, received.get(size..)?) => Failure::Ambiguous,
-                    // The drive did not understand the frame: it may take the rest of it for
+                    // The drive did not understand the frame. It may parse the rest of the frame as
                     // another one, and answer that too.
                     (Reply::Refused(code), _) if code.is_damage() => Failure::NotUnderstood(code),
                     (Reply::Refused(code), _) => {
@@ -101,7 +100,7 @@ impl Exchange {
         Some(Received::End(Err(ExchangeError::Failed(failure)), surplus))
     }
 
-    /// The failure when nothing more is received in time.
+    /// The failure if no more bytes are received in time.
     pub(super) const fn timeout(&self) -> Failure {
         match self.filled {
             0 => Failure::Timeout,
@@ -109,13 +108,13 @@ impl Exchange {
         }
     }
 
-    /// The payload of the reply, which has `size` bytes.
+    /// The payload of the reply, of `size` bytes.
     pub(super) fn payload(&self, size: u8) -> &[u8] {
         let [_, _, payload @ ..] = &self.buffer;
         payload.get(..usize::from(size)).unwrap_or(&[])
     }
 
-    /// Moves the `rest` bytes behind the first `size` to the front.
+    /// Moves the `rest` bytes after the first `size` bytes to the front.
     fn skip(&mut self, size: usize, rest: u8) {
         let mut rest_first = [0; MAX_FRAME];
         for (slot, byte) in rest_first.iter_mut().zip(self.buffer.iter().skip(size)) {
@@ -126,7 +125,7 @@ impl Exchange {
     }
 }
 
-/// Whether another reply stands behind a reply.
+/// Whether a different reply follows a reply.
 fn contradicts(reply: &Frame<'_>, behind: &[u8]) -> bool {
     matches!(Frame::parse(behind), Parse::Frame(other, _)
         if matches!(other.header, HEADER_ACK | HEADER_NACK) && other != *reply)

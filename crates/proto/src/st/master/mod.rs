@@ -1,8 +1,8 @@
-//! The master: one exchange at a time, and a line that is trusted only while it answers in step.
+//! The master: one exchange at a time, on a line that it uses only while replies match requests.
 //!
-//! An `Exchange` is one request and its reply as bytes. A `Resync` is the recovery of a lost line: silence,
-//! padding, a `Question`, whose answer a `Scan` finds. Only `exchange`, `question` and `scan` know how
-//! frames carry messages.
+//! An `Exchange` is one request and its reply, as bytes. A `Resync` is the recovery of a lost line:
+//! silence, padding, then a `Question`; a `Scan` finds its answer. Only `exchange`, `question` and
+//! `scan` know how frames carry messages.
 
 mod config;
 mod exchange;
@@ -19,42 +19,42 @@ use crate::time::Instant;
 use exchange::{Exchange, Received};
 use resync::{Resync, Stage, Step, Summary};
 
-/// What the caller has to do next.
+/// The next action of the caller.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Output<'a> {
     /// Send these bytes, then poll again.
     Transmit(&'a [u8]),
-    /// The exchange is over: the payload of the positive acknowledge, or why there is none.
+    /// The exchange is over. The payload of the positive acknowledge, or the error.
     Done(Result<&'a [u8], ExchangeError>),
-    /// Hand in what comes until then; `None` while no exchange is under way.
+    /// Pass received bytes until this time; `None` while there is no exchange.
     Wait(Option<Instant>),
 }
 
-/// What came without being asked for.
+/// Counts of received bytes without a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counters {
     /// Bytes that belonged to no exchange.
     pub unasked_bytes: u32,
-    /// Frames of identification (0xE0) that were skipped.
+    /// Skipped identification frames (0xE0).
     pub identifications: u32,
-    /// Times the line was lost.
+    /// How often the line was lost.
     pub losses: u32,
 }
 
-/// There is an exchange under way, or the request does not fit a frame.
+/// Why a request was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RequestError {
-    /// Poll until [`Output::Done`] first.
+    /// An exchange is open. Poll until [`Output::Done`] first.
     Busy,
-    /// The payload is over 128 bytes.
+    /// The payload has over 128 bytes.
     TooLong,
 }
 
-/// The master's end of the protocol.
+/// The master's side of the protocol.
 ///
-/// [`request`](Self::request), then [`poll`](Self::poll) until it says [`Output::Done`], handing in
-/// with [`receive`](Self::receive) what comes meanwhile. The timer of an exchange starts with the
-/// poll that follows the transmission (4.1).
+/// Call [`request`](Self::request), then [`poll`](Self::poll) until it returns [`Output::Done`].
+/// Meanwhile, pass received bytes to [`receive`](Self::receive). The timeout of an exchange starts
+/// at the poll after the transmission (4.1).
 #[derive(Debug, Clone)]
 pub struct Master {
     config: MasterConfig,
@@ -69,7 +69,7 @@ pub struct Master {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Idle,
-    /// The line is brought in step before the request is sent.
+    /// The line is recovered before the request is sent.
     Recovering(Stage),
     /// The request is to be sent.
     Send,
@@ -82,9 +82,9 @@ enum State {
 }
 
 impl Master {
-    /// A master on a line that was just opened. A former master may have left something in it: where
-    /// the line can be recovered it is brought in step before the first request (SPEC-NOTES S16),
-    /// unless the caller knows better and says so with [`trust_line`](Self::trust_line).
+    /// A master on a line that was just opened. A former master may have pending replies. Unless
+    /// recovery is off, the line is recovered before the first request (SPEC-NOTES S16). If there
+    /// was no former master, call [`trust_line`](Self::trust_line).
     pub const fn new(config: MasterConfig) -> Self {
         Master {
             config,
@@ -96,22 +96,22 @@ impl Master {
         }
     }
 
-    /// Whether the line can be used.
+    /// Whether the line is in sync.
     pub const fn sync_state(&self) -> SyncState {
         self.resync.line()
     }
 
-    /// What came without being asked for.
+    /// Counts of received bytes without a request.
     pub const fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// How the master behaves from the next request on.
+    /// The configuration, effective from the next request.
     pub const fn config_mut(&mut self) -> &mut MasterConfig {
         &mut self.config
     }
 
-    /// Begins an exchange: `request` for motor number `motor`, where 0 is the current motor (3.2).
+    /// Starts an exchange: `request` for motor number `motor`; 0 is the current motor (3.2).
     pub fn request(&mut self, motor: u8, request: &Request<'_>) -> Result<(), RequestError> {
         if self.state != State::Idle {
             return Err(RequestError::Busy);
@@ -122,14 +122,14 @@ impl Master {
         Ok(())
     }
 
-    /// Begins an exchange with any header and payload, known to the document or not.
+    /// Starts an exchange with any header and payload, also unknown ones.
     pub fn request_raw(&mut self, header: u8, payload: &[u8]) -> Result<(), RequestError> {
         if self.state != State::Idle {
             return Err(RequestError::Busy);
         }
         let frame = Frame { header, payload };
         self.exchange.store_raw(&frame).ok_or(RequestError::TooLong)?;
-        // What is only a question in one profile may act in the other.
+        // A read in one profile may be an action in the other.
         let codes = Profile::ALL.map(|p| FrameCode::from_number(frame.code(), p));
         let [known, other] = codes;
         let is_read = known.is_some_and(FrameCode::is_read) && other.is_none_or(FrameCode::is_read);
@@ -139,7 +139,7 @@ impl Master {
         Ok(())
     }
 
-    // Inlined into both kinds of request it takes more flash, as `lose` does.
+    // Inlining this into both kinds of request takes more flash, as for `lose`.
     #[inline(never)]
     fn begin(&mut self, request: Summary) {
         self.request = request;
@@ -150,14 +150,14 @@ impl Master {
         };
     }
 
-    /// Gives up the exchange under way. Its reply may still come, so the line is lost.
+    /// Cancels the open exchange. Its reply may still come, so the line is lost.
     pub fn abandon(&mut self) {
         if self.state != State::Idle {
             self.lost();
         }
     }
 
-    /// Tells that the line is out of step: something was sent or received beside the master.
+    /// Declares the line lost: bytes were sent or received without the master.
     pub fn lost(&mut self) {
         if let State::Recovering(stage) = self.state {
             self.resync.abandon(stage);
@@ -166,8 +166,8 @@ impl Master {
         self.state = State::Idle;
     }
 
-    /// Tells that the line was opened anew. What may still be answered is not known; without recovery
-    /// the caller vouches for there being nothing.
+    /// Declares that the port was opened again. Pending replies are unknown. Without recovery the
+    /// caller guarantees that there are none.
     pub fn reopened(&mut self) {
         match self.config.recovery {
             Recovery::None => self.resync.in_step(),
@@ -179,13 +179,13 @@ impl Master {
         self.state = State::Idle;
     }
 
-    /// Tells that nothing is left in the line from before: no drive has been asked anything on it.
+    /// Declares that there are no pending replies: no request was sent on this line before.
     pub fn trust_line(&mut self) {
         self.resync.in_step();
         self.state = State::Idle;
     }
 
-    /// What to do next. Poll again after each [`Output::Transmit`], and when a wait is over.
+    /// The next action. Poll again after each [`Output::Transmit`], and at the end of a wait.
     pub fn poll(&mut self, now: Instant) -> Output<'_> {
         match &mut self.state {
             State::Idle => Output::Wait(None),
@@ -224,7 +224,7 @@ impl Master {
         }
     }
 
-    /// Takes what came at `now`.
+    /// Takes bytes received at `now`.
     pub fn receive(&mut self, now: Instant, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
@@ -232,26 +232,26 @@ impl Master {
         match &mut self.state {
             State::Sent | State::Waiting { .. } => self.reply(bytes),
             State::Recovering(stage) => {
-                let unasked = self.resync.receive(stage, now, bytes, &self.config);
-                self.unasked(unasked);
+                let surplus = self.resync.receive(stage, now, bytes, &self.config);
+                self.count_unasked(surplus);
             }
             State::Idle | State::Send | State::Done(_) => {
-                self.unasked(bytes.len());
+                self.count_unasked(bytes.len());
                 self.lose();
             }
         }
     }
 
     fn reply(&mut self, bytes: &[u8]) {
-        let unasked = self.exchange.receive(bytes);
-        self.unasked(unasked);
+        let surplus = self.exchange.receive(bytes);
+        self.count_unasked(surplus);
         while let Some(received) = self.exchange.next(self.config.profile) {
             match received {
                 Received::Identification => {
                     self.counters.identifications = self.counters.identifications.wrapping_add(1);
                 }
                 Received::End(result, surplus) => {
-                    self.unasked(usize::from(surplus));
+                    self.count_unasked(usize::from(surplus));
                     if surplus > 0 || matches!(result, Err(ExchangeError::Failed(_))) {
                         self.lose();
                     }
@@ -269,7 +269,7 @@ impl Master {
         }
     }
 
-    fn unasked(&mut self, bytes: usize) {
+    fn count_unasked(&mut self, bytes: usize) {
         self.counters.unasked_bytes = self.counters.unasked_bytes.wrapping_add(bytes as u32);
     }
 }

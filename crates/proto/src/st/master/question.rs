@@ -1,5 +1,5 @@
-//! What recovery sends: padding, questions by which a line comes in step, and what comes instead of
-//! their answers.
+//! Sent frames of a recovery: padding and questions. Also the bytes received instead of their
+//! answers.
 
 use super::scan::{Scan, Scanned};
 use crate::st::{
@@ -7,18 +7,18 @@ use crate::st::{
     Request, RevupPhase,
 };
 
-/// The reply has 32 bytes, as that of GET_BOARD_INFO.
+/// A question with a reply of 32 bytes, like GET_BOARD_INFO.
 pub(super) const INFO: u8 = 1;
-/// The reply has 8 bytes, as that of GET_REVUP_DATA.
+/// A question with a reply of 8 bytes, like GET_REVUP_DATA.
 pub(super) const REVUP: u8 = 2;
-/// The reply has 1 byte, as that of GET_REG STATUS.
+/// A question with a reply of 1 byte, like GET_REG STATUS.
 pub(super) const STATUS: u8 = 4;
-/// The reply has 4 bytes, as that of GET_REG FLAGS.
+/// A question with a reply of 4 bytes, like GET_REG FLAGS.
 pub(super) const FLAGS: u8 = 8;
 
-/// A question behind an acknowledge of `size` bytes, or a refusal, and the size of its answer. It has
-/// another size, so that the answer shows whether replies and requests go together. `turn` changes with
-/// each question: the answer to the one before has another size, too.
+/// A question to send after an acknowledge of `size` bytes or a refusal, and the size of its
+/// answer. The two sizes differ, so the answer shows whether replies match requests. `turn`
+/// alternates from question to question; consecutive answers also have different sizes.
 pub const fn question_behind(size: Option<usize>, turn: bool) -> (Request<'static>, usize) {
     match (size, turn) {
         (Some(1 | 4), true) => (Request::GetBoardInfo, 32),
@@ -27,43 +27,43 @@ pub const fn question_behind(size: Option<usize>, turn: bool) -> (Request<'stati
     }
 }
 
-/// Completes any frame. 5.x firmware drops 0xFF 0xFF as header and length, so it is left in step or
-/// with one 0xFF as header: 0x00 0xFF is dropped by the one and a frame of motor 7, which has no
-/// meaning, to the other.
+/// Bytes that complete any frame. 5.x firmware drops 0xFF 0xFF as header and length. After them it
+/// is in sync, or has read one 0xFF as header. In the first case it drops 0x00 0xFF. In the second
+/// case it reads them as a frame for motor 7, which has no meaning.
 pub(super) static PADDING: [u8; MAX_FRAME + 1] = {
     let mut bytes = [0xFF; MAX_FRAME + 1];
     bytes[MAX_FRAME - 1] = 0x00;
     bytes
 };
 
-/// A question, and what came since it was asked.
+/// A question, and the bytes received since it was sent.
 #[derive(Debug, Clone)]
 pub(super) struct Question {
     kind: u8,
     frame: [u8; 4],
     size: u8,
-    /// How many bytes of the frame came back.
+    /// Number of received bytes that equal the sent frame.
     echoed: u8,
     scan: Scan,
-    /// Whether one frame came, which answers it, and nothing else.
+    /// Whether exactly one frame was received, the answer, and nothing else.
     is_alone: bool,
-    came: Came,
-    /// The first bytes that are no frame.
+    received: Replies,
+    /// The failure of the first bytes outside a frame.
     trouble: Option<Failure>,
 }
 
-/// Replies that came since a question was asked.
+/// Replies received since a question was sent.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Came {
-    /// Those that look like its answer.
+pub(super) struct Replies {
+    /// Replies that look like its answer.
     pub(super) answers: u8,
     pub(super) refusals: u8,
-    /// Positive ones that answer something else.
+    /// Positive replies to something else.
     pub(super) others: u8,
 }
 
 impl Question {
-    /// Before the first one.
+    /// The state before the first question.
     pub(super) const NONE: Question = Question {
         kind: INFO,
         frame: [0; 4],
@@ -71,11 +71,11 @@ impl Question {
         echoed: 0,
         scan: Scan::NONE,
         is_alone: true,
-        came: Came { answers: 0, refusals: 0, others: 0 },
+        received: Replies { answers: 0, refusals: 0, others: 0 },
         trouble: None,
     };
 
-    /// Asks; gives the frame.
+    /// Starts a question. Returns the frame to send.
     pub(super) fn ask(&mut self, kind: u8) -> &[u8] {
         *self = Question { kind, ..Question::NONE };
         let request = match kind {
@@ -89,7 +89,7 @@ impl Question {
         bytes
     }
 
-    /// A STOP_MOTOR, which goes before a question.
+    /// A STOP_MOTOR to send before a question.
     pub(super) fn stop(&mut self, motor: u8) -> &[u8] {
         let stop = Request::ExecuteCommand(Command::StopMotor);
         Frame::command(motor, &stop, &mut self.frame).unwrap_or(&[])
@@ -99,11 +99,11 @@ impl Question {
         self.kind
     }
 
-    /// Takes what came; gives the replies so far.
-    pub(super) fn hear(&mut self, bytes: &[u8]) -> Came {
+    /// Takes received bytes. Returns the replies so far.
+    pub(super) fn receive(&mut self, bytes: &[u8]) -> Replies {
         for &byte in bytes {
             let scanned = self.scan.take(byte);
-            // What belongs to a reply is no echo, whatever it looks like.
+            // Bytes of a reply are not an echo, even if they equal the sent bytes.
             if let (Scanned::Stray(_), false) = (&scanned, self.is_echo()) {
                 let is_next = |at: u8| self.frame.get(usize::from(at)) == Some(&byte);
                 self.echoed =
@@ -112,12 +112,12 @@ impl Question {
             match scanned {
                 Scanned::More | Scanned::Frame(HEADER_ATR, ..) => {}
                 Scanned::Frame(HEADER_NACK, 1, code) if !ErrorCode::from(code).is_damage() => {
-                    count(&mut self.came.refusals);
+                    count(&mut self.received.refusals);
                 }
                 Scanned::Frame(HEADER_ACK, length, _) if length == self.answer_size() => {
-                    count(&mut self.came.answers);
+                    count(&mut self.received.answers);
                 }
-                Scanned::Frame(HEADER_ACK, ..) => count(&mut self.came.others),
+                Scanned::Frame(HEADER_ACK, ..) => count(&mut self.received.others),
                 Scanned::Frame(..) => self.is_alone = false,
                 Scanned::Stray(failure) => {
                     self.is_alone = false;
@@ -125,21 +125,21 @@ impl Question {
                 }
             }
         }
-        self.came
+        self.received
     }
 
-    /// Whether the answer came, and nothing else.
+    /// Whether the answer was received, and nothing else.
     pub(super) const fn is_alone(&self) -> bool {
-        let Came { answers, refusals, others } = self.came;
+        let Replies { answers, refusals, others } = self.received;
         self.is_alone && answers == 1 && refusals == 0 && others == 0 && self.scan.taken() == 0
     }
 
-    /// Whether what came is what was sent.
+    /// Whether the received bytes equal the sent bytes.
     pub(super) const fn is_echo(&self) -> bool {
         self.echoed == self.size
     }
 
-    /// The reason if there is no answer.
+    /// The failure if there is no answer.
     pub(super) fn failure(&self) -> Failure {
         match self.scan.taken() {
             0 => self.trouble.unwrap_or(Failure::Timeout),

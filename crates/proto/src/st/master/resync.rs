@@ -1,34 +1,34 @@
-//! Recovery: brings a line in step that was just opened, or on which an exchange failed
-//! (SPEC-NOTES S16).
+//! Recovery: makes replies match requests again, on a line that was just opened or where an
+//! exchange failed (SPEC-NOTES S16).
 
 use super::config::{MasterConfig, Recovery, TIMEOUT};
 use super::question::{FLAGS, INFO, PADDING, Question, REVUP, STATUS};
 use crate::st::{Failure, FrameCode};
 use crate::time::Instant;
 
-/// Whether the line can be used.
+/// Whether the line is in sync.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SyncState {
-    /// The last exchange ended in step.
+    /// The last exchange ended in sync.
     InSync,
-    /// Just opened, or an exchange failed: the next one has to bring the line in step first.
+    /// The line was just opened, or an exchange failed. The next request first recovers the line.
     Lost,
 }
 
-/// What recovery has to know of a request.
+/// The facts about a request that a recovery needs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Summary {
     pub(super) motor: u8,
     pub(super) is_read: bool,
-    /// Questions whose reply looks like this request's.
+    /// Questions whose reply looks like the reply to this request.
     alike: u8,
 }
 
 impl Summary {
-    /// Before the first request.
+    /// The state before the first request.
     pub(super) const NONE: Summary = Summary { motor: 0, is_read: true, alike: 0 };
 
-    /// Of a request with this frame code, which may be unknown.
+    /// The summary of a request with this frame code; `None` is an unknown code.
     pub(super) fn new(motor: u8, code: Option<FrameCode>) -> Self {
         let alike = match code {
             Some(FrameCode::GetRevupData) => REVUP,
@@ -40,38 +40,38 @@ impl Summary {
     }
 }
 
-/// Whether the line is in step, and what may still be received if it is not.
+/// Whether the line is in sync, and otherwise which replies are pending.
 #[derive(Debug, Clone)]
 pub(super) struct Resync {
     line: SyncState,
-    /// The request when the line was lost.
+    /// The request during which the line was lost.
     lost: Summary,
-    /// Whether everything that may still be answered is known. It is not before the line was in step
-    /// once: a former master may have sent a request.
+    /// Whether all pending replies are known. They are unknown until the line was in sync once: a
+    /// former master may have sent a request.
     is_known: bool,
-    /// The last question, and those that may still be answered late.
+    /// The last question, and the questions that may still be answered late.
     question: Question,
     outstanding: u8,
 }
 
-/// How far a recovery is.
+/// The stage of a recovery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stage {
     /// Padding is to be sent.
     Pad,
-    /// Silence is to begin.
+    /// The wait for silence is to start.
     Settle(Then),
-    /// Silent at `until`, or noise at `limit`.
+    /// Silence is reached at `until`; at `limit` the recovery fails with noise.
     Quiet { until: Instant, limit: Instant, then: Then },
     /// A question is to be sent.
     Probe(u8),
     /// The question has been sent.
     Probed,
-    /// The answer is awaited.
-    Answer { asked: Instant },
+    /// Waits for the answer.
+    Answer { sent: Instant },
 }
 
-/// What follows a silence.
+/// The next step after a silence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Then {
     Stop,
@@ -80,7 +80,7 @@ pub(super) enum Then {
 }
 
 impl Stage {
-    /// The first one; `None` where the line is not recovered.
+    /// The first step; `None` without recovery.
     pub(super) const fn first(recovery: Recovery) -> Option<Self> {
         match recovery {
             Recovery::None => None,
@@ -94,20 +94,20 @@ impl Stage {
     }
 }
 
-/// What to do next in a recovery.
+/// The next action of a recovery.
 pub(super) enum Step<'a> {
     /// Send these bytes.
     Transmit(&'a [u8]),
-    /// Wait until then.
+    /// Wait until this time.
     Wait(Instant),
-    /// The line is in step.
+    /// The line is in sync.
     Done,
-    /// The line stays lost.
+    /// The line remains lost.
     Failed(Failure),
 }
 
 impl Resync {
-    /// A line that was just opened.
+    /// The state of a line that was just opened.
     pub(super) const fn new(is_trusted: bool) -> Self {
         Resync {
             line: if is_trusted { SyncState::InSync } else { SyncState::Lost },
@@ -122,15 +122,15 @@ impl Resync {
         self.line
     }
 
-    /// Nothing is left in the line.
+    /// Declares that there are no pending replies.
     pub(super) fn in_step(&mut self) {
         self.line = SyncState::InSync;
         self.is_known = true;
         self.outstanding = 0;
     }
 
-    /// The reply to `request` may still be received, or something else is out of step. Returns whether
-    /// the line was in step before.
+    /// Declares the line lost: the reply to `request` is pending, or bytes were lost. Returns
+    /// whether the line was in sync before.
     pub(super) fn lose(&mut self, request: Summary) -> bool {
         let was_up = self.line == SyncState::InSync;
         if was_up {
@@ -141,19 +141,19 @@ impl Resync {
         was_up
     }
 
-    /// It is not known what may still be received.
+    /// Declares that the pending replies are unknown.
     pub(super) fn forget(&mut self) {
         self.is_known = false;
     }
 
-    /// Gives up a recovery. Its question may still be answered.
+    /// Cancels a recovery. The reply to its question is pending.
     pub(super) fn abandon(&mut self, stage: Stage) {
         if let Stage::Probed | Stage::Answer { .. } = stage {
             self.outstanding |= self.question.kind();
         }
     }
 
-    /// What to do next.
+    /// The next action.
     pub(super) fn poll(
         &mut self,
         stage: &mut Stage,
@@ -186,12 +186,12 @@ impl Resync {
             }
             Stage::Probe(question) => self.probe(stage, question),
             Stage::Probed => {
-                *stage = Stage::Answer { asked: now };
+                *stage = Stage::Answer { sent: now };
                 Step::Wait(now + config.timeout)
             }
             Stage::Answer { .. } if self.question.is_echo() => Step::Failed(Failure::Echo),
-            Stage::Answer { asked } if now < asked + config.timeout => {
-                Step::Wait(asked + config.timeout)
+            Stage::Answer { sent } if now < sent + config.timeout => {
+                Step::Wait(sent + config.timeout)
             }
             Stage::Answer { .. } => {
                 self.outstanding |= self.question.kind();
@@ -203,7 +203,7 @@ impl Resync {
         }
     }
 
-    /// Takes what was received at `now`; returns how many bytes cannot be part of an answer.
+    /// Takes bytes received at `now`. Returns the number of bytes that cannot be part of an answer.
     pub(super) fn receive(
         &mut self,
         stage: &mut Stage,
@@ -211,9 +211,9 @@ impl Resync {
         bytes: &[u8],
         config: &MasterConfig,
     ) -> usize {
-        let asked = match *stage {
+        let sent = match *stage {
             Stage::Probed => now,
-            Stage::Answer { asked } => asked,
+            Stage::Answer { sent } => sent,
             Stage::Quiet { until, limit, then } => {
                 let until = until.max(now + config.quiet);
                 *stage = Stage::Quiet { until, limit, then };
@@ -221,12 +221,12 @@ impl Resync {
             }
             Stage::Pad | Stage::Settle(_) | Stage::Probe(_) => return bytes.len(),
         };
-        *stage = self.answer(now, asked, bytes, config).unwrap_or(Stage::Answer { asked });
+        *stage = self.answer(now, sent, bytes, config).unwrap_or(Stage::Answer { sent });
         0
     }
 
-    /// The question whose answer shows that the drive is in step again: one that is not
-    /// outstanding, if there is one.
+    /// The question whose answer shows that the line is in sync: if possible, one without a pending
+    /// reply.
     fn next_question(&self) -> u8 {
         match self.outstanding {
             outstanding if outstanding & INFO == 0 || !self.is_known => INFO,
@@ -241,40 +241,42 @@ impl Resync {
         Step::Transmit(self.question.ask(question))
     }
 
-    /// Looks for the reply to the question, which was sent when it was `asked`, among late ones;
-    /// returns what follows.
+    /// Looks for the reply to the question among late replies. The question was sent at `sent`.
+    /// Returns the next stage.
     ///
-    /// The next request is sent after a silence. Where something else that is answered alike may be
-    /// outstanding, this may be the reply to that: the silence lasts until the question's own reply
-    /// cannot come any more. On a line that was just opened anything may be outstanding, unless the
-    /// drive gives prompt answers to three different questions, and nothing else.
+    /// The next request is sent after a silence. If another request with a similar reply is
+    /// pending, the received reply may belong to that request. The silence then lasts until the
+    /// question's own reply can no longer come. On a line that was just opened, any reply may be
+    /// pending. The exception: the drive answers three different questions promptly and sends
+    /// nothing else.
     fn answer(
         &mut self,
         now: Instant,
-        asked: Instant,
+        sent: Instant,
         bytes: &[u8],
         config: &MasterConfig,
     ) -> Option<Stage> {
-        let came = self.question.hear(bytes);
-        let is_answered =
-            came.answers > 0 || came.refusals > 0 || (!self.is_known && came.others > 0);
+        let received = self.question.receive(bytes);
+        let is_answered = received.answers > 0
+            || received.refusals > 0
+            || (!self.is_known && received.others > 0);
         if !is_answered || self.question.is_echo() {
             return None;
         }
         let is_prompt =
-            self.question.is_alone() && self.outstanding == 0 && now < asked + config.quiet;
+            self.question.is_alone() && self.outstanding == 0 && now < sent + config.quiet;
         let is_own = match self.question.kind() {
-            kind if self.is_known => came.answers > 0 && self.outstanding & kind == 0,
+            kind if self.is_known => received.answers > 0 && self.outstanding & kind == 0,
             INFO if is_prompt => return Some(Stage::Probe(STATUS)),
             STATUS if is_prompt => return Some(Stage::Probe(FLAGS)),
             _ => is_prompt,
         };
         let patience = match self.is_known {
             true => config.timeout,
-            // A former master waited as long as the document says, at most.
+            // A former master waited at most for the document's timeout.
             false => config.timeout.min(TIMEOUT),
         };
-        let expired = asked + patience + patience;
+        let expired = sent + patience + patience;
         let until = if is_own { now } else { expired };
         Some(Stage::quiet(until.max(now + config.quiet), Then::Send, config))
     }

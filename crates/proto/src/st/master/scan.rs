@@ -1,33 +1,34 @@
-//! Finds reply frames in a stream of bytes.
+//! Finds reply frames in a stream of bytes, without storing them.
 
 use crate::st::{Bad, Failure, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_PAYLOAD, frame};
 
-/// Finds frames in a stream without keeping them.
+/// Finds the frames in a stream without storing them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scan {
     header: u8,
     length: u8,
-    /// Bytes of the frame so far.
+    /// Number of bytes of the current frame so far.
     taken: u8,
     sum: u16,
     /// The byte before the checksum.
     last: u8,
 }
 
-/// What a byte is to a [`Scan`].
+/// The meaning of a byte to a [`Scan`].
 pub(super) enum Scanned {
     /// A part of a frame.
     More,
-    /// The end of a frame: its header, its length, the last byte of its payload.
+    /// The last byte of a frame. The values are the header, the length and the last byte of the
+    /// payload.
     Frame(u8, u8, u8),
-    /// A part of none.
+    /// A byte outside all frames.
     Stray(Failure),
 }
 
 impl Scan {
     pub(super) const NONE: Scan = Scan { header: 0, length: 0, taken: 0, sum: 0, last: 0 };
 
-    /// Bytes of the frame that has begun.
+    /// Number of bytes of the current frame.
     pub(super) const fn taken(&self) -> u8 {
         self.taken
     }

@@ -1,8 +1,8 @@
-//! What a drive is built with.
+//! Features of a drive's firmware build.
 
 macro_rules! features {
     ($( $name:ident $text:literal; )+) => {
-        /// What a drive must be built with to have a register.
+        /// A build option. A drive has a register only if it is built with the register's feature.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[repr(u8)]
         pub enum Feature { $( #[doc = $text] $name, )+ }
@@ -11,7 +11,7 @@ macro_rules! features {
             /// Every feature.
             pub const ALL: &'static [Feature] = &[$( Feature::$name, )+];
 
-            /// The feature in words.
+            /// The description of the feature.
             pub const fn name(self) -> &'static str {
                 match self { $( Feature::$name => $text, )+ }
             }
@@ -38,10 +38,10 @@ features! {
 pub struct Features(u16);
 
 impl Features {
-    /// A drive without any option.
+    /// A drive without any optional feature.
     pub const NONE: Features = Features(1);
 
-    /// The set with one feature more.
+    /// The set with this feature added.
     pub const fn with(self, feature: Feature) -> Self {
         Features(self.0 | 1 << feature as u16)
     }

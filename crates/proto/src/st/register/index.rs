@@ -1,5 +1,5 @@
 //! Finds the row of a register's id. Ids may be sparse: the index has an entry for each run of
-//! consecutive ids, and is computed by the compiler.
+//! consecutive ids. The compiler computes it.
 
 /// Consecutive ids, whose rows are consecutive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,12 +14,12 @@ struct Run {
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Index<const RUNS: usize>([Run; RUNS]);
 
-/// How many runs these ids have. Fails unless they ascend.
+/// The number of runs in these ids. Fails unless the ids ascend.
 pub(super) const fn runs(ids: &[u16]) -> usize {
     let mut runs = 1;
     let mut row = 1;
     while row < ids.len() {
-        assert!(ids[row - 1] < ids[row], "a row is out of order, or there twice");
+        assert!(ids[row - 1] < ids[row], "a row is out of order, or its id is used twice");
         if ids[row - 1] + 1 < ids[row] {
             runs += 1;
         }
@@ -31,7 +31,7 @@ pub(super) const fn runs(ids: &[u16]) -> usize {
 impl<const RUNS: usize> Index<RUNS> {
     /// The index of rows with these ids.
     pub(super) const fn new(ids: &[u16]) -> Self {
-        assert!(RUNS == runs(ids), "the index has another size");
+        assert!(RUNS == runs(ids), "the index has a wrong size");
         let mut index = [Run { first: ids[0], count: 1, row: 0 }; RUNS];
         let mut run = 0;
         let mut row = 1;
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "out of order")]
-    fn an_id_that_is_there_twice_is_refused() {
+    fn a_duplicate_id_is_refused() {
         runs(&[1, 2, 2, 3]);
     }
 

@@ -1,4 +1,4 @@
-//! Looks registers up in the table.
+//! Looks up registers in the table.
 
 use super::feature::Features;
 use super::id::RegisterId;
@@ -8,18 +8,18 @@ use crate::st::Profile;
 use core::fmt;
 
 impl RegisterId {
-    /// The register of this name; case does not matter.
+    /// The register with this name; case-insensitive.
     pub fn named(name: &str) -> Option<Self> {
         let row = TEXTS.iter().position(|text| text.name.eq_ignore_ascii_case(name))?;
         IDS.get(row).copied()
     }
 
-    /// Type, unit, access and feature; `None` for an id that nobody names.
+    /// Type, unit, access and feature; `None` for an unknown id.
     pub fn shape(self) -> Option<&'static Shape> {
         SHAPES.get(self.row()?)
     }
 
-    /// Name and meaning; `None` for an id that nobody names.
+    /// Name and description; `None` for an unknown id.
     pub fn text(self) -> Option<&'static Text> {
         TEXTS.get(self.row()?)
     }
@@ -28,8 +28,8 @@ impl RegisterId {
         INDEX.row(u16::from(self.0))
     }
 
-    /// Bytes that a drive of `profile` takes for the value of a SET_REG: those of the type where it
-    /// takes none, 4 for an unnamed register.
+    /// The value size of a SET_REG that a drive of `profile` accepts. If it accepts none: the size
+    /// of the type, or 4 for an unknown register.
     pub fn write_size(self, profile: Profile) -> u8 {
         let Some(shape) = self.shape() else { return 4 };
         match shape.writing(profile, Features::NONE.with(shape.feature)) {
@@ -43,9 +43,9 @@ impl RegisterId {
         IDS.into_iter()
     }
 
-    /// The value in a reply. Its size is the reply's (SPEC-NOTES S17), its sign that of the type in
-    /// the drive's profile; an unknown register is taken as unsigned. `None` unless there are 1, 2 or
-    /// 4 bytes.
+    /// Decodes the value in a reply. The reply determines its size (SPEC-NOTES S17). The type in
+    /// the drive's profile determines its sign; an unknown register is unsigned. `None` unless the
+    /// payload has 1, 2 or 4 bytes.
     pub fn decode(self, profile: Profile, payload: &[u8]) -> Option<i32> {
         let signed = self.shape().is_some_and(|shape| shape.ty(profile).signed());
         match *payload {

@@ -1,11 +1,11 @@
-//! What the table says of a register.
+//! The columns of the register table.
 
 use super::feature::{Feature, Features};
 use super::unit::Unit;
 use super::value::Type;
 use crate::st::Profile;
 
-/// What table 3 lets a master do with a register.
+/// The access that table 3 allows to a master.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Access {
@@ -17,7 +17,7 @@ pub enum Access {
     WriteOnly,
     /// `D`: only as the value of DAC_OUT1 and DAC_OUT2, and in data segments (SPEC-NOTES S5).
     Dac,
-    /// Named by firmware, which neither reads nor writes it.
+    /// Firmware has a name for it, but allows neither read nor write.
     Never,
 }
 
@@ -42,7 +42,7 @@ impl Access {
     }
 }
 
-/// Where a row of the table comes from.
+/// The source of a row of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Origin {
@@ -52,40 +52,40 @@ pub enum Origin {
     Firmware,
 }
 
-/// What a slave has to know of a register; [`Text`] has the rest.
+/// The columns that a slave needs. [`Text`] has the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
-    /// Type of table 3, or of firmware where only that has the register. Registers that can be
-    /// written have it in both profiles.
+    /// Type of table 3; for registers that only firmware has, the type of firmware. Writable
+    /// registers have this type in both profiles.
     pub(in crate::st) ty: Type,
     /// Unit of the value.
     pub unit: Unit,
-    /// What table 3 allows.
+    /// The access of table 3.
     pub access: Access,
-    /// What the drive must be built with.
+    /// The feature that the drive must be built with.
     pub feature: Feature,
-    /// Whether table 3 has the row.
+    /// The source of the row.
     pub origin: Origin,
-    /// Bytes of shipped firmware's replies to GET_REG, in the low half those that it takes of a
-    /// SET_REG, and [`OTHER_SIGN`].
+    /// Sizes in shipped firmware, in bytes. High half: replies to GET_REG. Low half: values of
+    /// SET_REG. The top bit is [`OTHER_SIGN`].
     mcsdk: u8,
 }
 
-/// Bits of a SET_REG value that firmware names but always answers with WRONG_SET.
+/// In a row: the register has a name in firmware, but SET_REG is always refused with WRONG_SET.
 pub(super) const REFUSED: u8 = 8 * REFUSED_SIZE;
-/// The same in bytes; no value has so many.
+/// The same in bytes. No value has this size.
 const REFUSED_SIZE: u8 = 0xF;
-/// The bit of [`Shape`]'s byte for shipped firmware which says that its type has another sign.
+/// The bit in [`Shape`]'s byte of shipped firmware: the type has the other sign.
 const OTHER_SIGN: u8 = 0x80;
 
-/// What a slave does with a SET_REG for a register.
+/// How a slave handles a SET_REG of a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Writing {
-    /// Takes a value of this many bytes.
+    /// Accepts a value of this many bytes.
     Takes(u8),
-    /// Refuses: it cannot be written.
+    /// Refuses: the register cannot be written.
     ReadOnly,
-    /// Refuses: the drive is built without it, or never takes a value.
+    /// Refuses: the drive is built without the feature, or refuses all values.
     Refused,
 }
 
@@ -100,7 +100,10 @@ impl Shape {
             Some(bits) => bits,
             None => (if access.reads() { bits } else { 0 }, if access.writes() { bits } else { 0 }),
         };
-        assert!(ty as u8 == mcsdk_ty as u8 || set == 0, "what can be written has one type");
+        assert!(
+            ty as u8 == mcsdk_ty as u8 || set == 0,
+            "a writable register has one type in all profiles"
+        );
         let sign = if ty.signed() == mcsdk_ty.signed() { 0 } else { OTHER_SIGN };
         let mcsdk = sign | ((get / 8) << 4) | (set / 8);
         let shape = Shape { ty, unit, access, feature, origin, mcsdk };
@@ -108,7 +111,8 @@ impl Shape {
         shape
     }
 
-    /// Type of the value: that of table 3 in profile `spec`, that of shipped firmware in `mcsdk-5.4`.
+    /// Type of the value in `profile`: that of table 3 in `spec`, that of shipped firmware in
+    /// `mcsdk-5.4`.
     pub const fn ty(&self, profile: Profile) -> Type {
         match profile {
             Profile::Spec => self.ty,
@@ -123,7 +127,7 @@ impl Shape {
         }
     }
 
-    /// Bytes of the reply to a GET_REG from a drive with `features`; `None` where it refuses.
+    /// Size of the reply to a GET_REG from a drive with `features`, in bytes; `None` if it refuses.
     pub const fn read_size(&self, profile: Profile, features: Features) -> Option<u8> {
         let size = match profile {
             Profile::Spec if matches!(self.origin, Origin::Firmware) => 0,
@@ -134,7 +138,7 @@ impl Shape {
         if size == 0 || !features.has(self.feature) { None } else { Some(size) }
     }
 
-    /// What a drive with `features` does with a SET_REG.
+    /// How a drive with `features` handles a SET_REG.
     pub const fn writing(&self, profile: Profile, features: Features) -> Writing {
         let there = features.has(self.feature);
         match profile {
@@ -146,7 +150,7 @@ impl Shape {
                     Writing::ReadOnly
                 }
             }
-            // DAC_OUT1 and DAC_OUT2 are taken even by a build without DAC.
+            // A build without DAC accepts DAC_OUT1 and DAC_OUT2, too.
             Profile::Mcsdk54 => match self.mcsdk & 0xF {
                 0 => Writing::ReadOnly,
                 REFUSED_SIZE => Writing::Refused,
@@ -156,7 +160,7 @@ impl Shape {
         }
     }
 
-    /// Bytes of shipped firmware's reply to a GET_REG; 0 where it refuses.
+    /// Size of shipped firmware's reply to a GET_REG, in bytes; 0 if it refuses.
     const fn mcsdk_reads(&self) -> u8 {
         (self.mcsdk & !OTHER_SIGN) >> 4
     }
@@ -166,7 +170,7 @@ impl Shape {
         matches!(self.access, Access::Dac) && features.has(self.feature)
     }
 
-    /// Bytes of the register in a data segment; `None` where it may not be in one.
+    /// Size of the register in a data segment, in bytes; `None` if it is not allowed there.
     pub const fn segment_size(&self, features: Features) -> Option<u8> {
         if self.shows_on_dac(features) {
             return Some(self.ty.size());
@@ -175,11 +179,11 @@ impl Shape {
     }
 }
 
-/// The words of a register, apart from [`Shape`] so that firmware need not carry them.
+/// The texts of a register. They are separate from [`Shape`], so that firmware does not need them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Text {
     /// The document's name.
     pub name: &'static str,
-    /// What the register is, in a few words.
+    /// A short description of the register.
     pub doc: &'static str,
 }

@@ -1,8 +1,9 @@
-//! Table 3 row by row, and behind it the registers that only shipped firmware has.
+//! Table 3 row by row, followed by the registers that only shipped firmware has.
 //!
-//! A row: id, name, type, unit, access, feature that the drive must be built with, where the row
-//! comes from. `mcsdk-5.4` firmware has the type behind `|` where it differs, and where it differs from
-//! what the access says, the bits of its GET_REG reply and of its SET_REG value (0: not handled).
+//! The columns of a row: id, name, type, unit, access, feature that the drive must be built with,
+//! source. If firmware of `mcsdk-5.4` has another type, it follows after `|`. If its sizes differ
+//! from the access, `mcsdk(read, write)` has the bits of its GET_REG reply and of its SET_REG
+//! value; 0 means not handled.
 
 use super::feature::Feature;
 use super::id::RegisterId;
@@ -12,8 +13,8 @@ use super::typed::{Dac, Never, ReadOnly, ReadWrite, Register, WriteOnly};
 use super::unit::Unit;
 use super::value::Value;
 
-/// Declares the registers: typed constants, ids for matching, shapes and texts. Ids ascend and may be
-/// sparse; a row out of order does not compile.
+/// Declares the registers: typed constants, ids for matching, shapes and texts. Ids ascend and may
+/// be sparse. A row out of order does not compile.
 macro_rules! registers {
     ($(
         $id:literal $name:ident: $ty:ident $(| $mcsdk:ident)?, $unit:ident, $access:ident, $feature:ident,
@@ -43,12 +44,12 @@ macro_rules! registers {
             ), )+
         ];
 
-        /// The words of every register, in the order of the ids.
+        /// The texts of every register, in the order of the ids.
         pub static TEXTS: [Text; IDS.len()] = [$( Text { name: stringify!($name), doc: $doc }, )+];
     };
 }
 
-/// The Rust type that holds a register's value in either profile.
+/// The Rust type that can hold a register's value in both profiles.
 macro_rules! rust_type {
     ($ty:ident) => {
         $ty

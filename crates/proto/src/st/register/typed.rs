@@ -1,10 +1,10 @@
-//! Registers as constants with a type: their values and accesses are checked by the compiler.
+//! Registers as typed constants. The compiler checks their values and accesses.
 
 use super::id::RegisterId;
 use super::value::Value;
 use core::marker::PhantomData;
 
-/// A register with the type of its value and what may be done with it.
+/// A register with the type of its value and its access.
 #[derive(Debug)]
 pub struct Register<T, A> {
     id: RegisterId,
@@ -47,7 +47,7 @@ pub enum WriteOnly {}
 /// Access `D`.
 #[derive(Debug)]
 pub enum Dac {}
-/// Neither read nor written by anyone.
+/// Neither readable nor writable.
 #[derive(Debug)]
 pub enum Never {}
 

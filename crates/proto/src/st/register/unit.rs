@@ -1,19 +1,19 @@
-//! Units of registers' values, or the words that they stand for.
+//! Units of register values. Some values have names instead of a unit.
 
 use crate::st::Profile;
 
 macro_rules! units {
     ($( $name:ident $symbol:literal; )+) => {
         /// Unit of a register's value. The `s16` units are the drive's own digits: 32767 is full
-        /// scale of its current or voltage measurement, 65536 one electrical turn. Behind them: what
-        /// has words in place of a unit.
+        /// scale of its current or voltage measurement; 65536 is one electrical turn. The last
+        /// variants are values with names instead of a unit.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[repr(u8)]
         #[allow(missing_docs)]
         pub enum Unit { $( #[doc = concat!("`", $symbol, "`")] $name, )+ }
 
         impl Unit {
-            /// The symbol to print behind a value; empty when there is none.
+            /// The symbol to print after a value; empty if there is none.
             pub const fn symbol(self) -> &'static str {
                 match self { $( Unit::$name => $symbol, )+ }
             }
@@ -55,7 +55,7 @@ units! {
 }
 
 impl Unit {
-    /// What a digit is worth in [`quantity`](Self::quantity).
+    /// The value of a digit in [`quantity`](Self::quantity).
     pub fn scale(self, profile: Profile) -> f64 {
         match self {
             Unit::DeciHertz => 0.1,
@@ -64,7 +64,7 @@ impl Unit {
         }
     }
 
-    /// The symbol of the unit that people think in.
+    /// The symbol of the physical unit.
     pub fn quantity(self) -> &'static str {
         match self {
             Unit::DeciHertz => Unit::Hertz.symbol(),

@@ -1,4 +1,4 @@
-//! Types of registers' values.
+//! Types of register values.
 
 /// Type of a register's value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -28,7 +28,7 @@ impl Type {
         }
     }
 
-    /// The name that Rust and the table use: `i16`.
+    /// The name in Rust and in the table, such as `i16`.
     pub const fn name(self) -> &'static str {
         match self {
             Type::I8 => "i8",
@@ -41,7 +41,7 @@ impl Type {
         }
     }
 
-    /// Bytes on the wire: 1, 2 or 4.
+    /// Size on the wire: 1, 2 or 4 bytes.
     pub const fn size(self) -> u8 {
         match self {
             Type::I8 | Type::U8 => 1,
@@ -50,7 +50,7 @@ impl Type {
         }
     }
 
-    /// Keeps the low bytes that the type has, and its sign.
+    /// Cuts the value to the type's size and extends its sign.
     pub const fn fit(self, bits: i32) -> i32 {
         match self {
             Type::I8 => bits as i8 as i32,
@@ -61,20 +61,20 @@ impl Type {
         }
     }
 
-    /// Whether negative values exist.
+    /// Whether the type has negative values.
     pub const fn signed(self) -> bool {
         !matches!(self, Type::U8 | Type::U16 | Type::U32)
     }
 }
 
-/// A Rust type that a register's value may have. The 32 bits that all calls carry are the value's
-/// two's complement, or the IEEE 754 bits of an `f32`.
+/// A Rust type of a register's value. Functions pass register values as 32 bits: two's complement,
+/// or the IEEE 754 bits of an `f32`.
 pub trait Value: Copy {
     /// The table's type.
     const TYPE: Type;
-    /// From the 32 bits that the calls carry.
+    /// From the 32 bits of a function argument.
     fn from_bits(bits: i32) -> Self;
-    /// Into the 32 bits that the calls carry.
+    /// To the 32 bits of a function argument.
     fn bits(self) -> i32;
 }
 
