@@ -26,6 +26,8 @@ __all__ = [
     "PortError",
     "RefusedError",
     "ReplyTimeoutError",
+    "Sample",
+    "Sampling",
     "__version__",
     "aio",
     "can",
@@ -39,7 +41,7 @@ __all__ = [
 if TYPE_CHECKING:
     from motorlink import aio, can, errors, rmd, sim, st
     from motorlink._core import __version__
-    from motorlink._sampling import to_pandas
+    from motorlink._sampling import Sample, Sampling, to_pandas
     from motorlink.errors import (
         ClosedError,
         FullTurnError,
@@ -51,7 +53,8 @@ if TYPE_CHECKING:
         ReplyTimeoutError,
     )
 else:
-    _FROM = {"__version__": "motorlink._core", "to_pandas": "motorlink._sampling"}
+    _FROM = {"__version__": "motorlink._core"}
+    _FROM |= dict.fromkeys(("Sample", "Sampling", "to_pandas"), "motorlink._sampling")
 
     def __getattr__(name: str) -> Any:
         """A part, loaded when it is first used: the command and pytest's plugin need no NumPy."""

@@ -201,14 +201,8 @@ class StClient:
     def confirm(self) -> None: ...
     def raw(self, motor: int, code: int, payload: bytes) -> bytes: ...
     def sample(
-        self,
-        motors: Sequence[tuple[int, Sequence[str | int], float | None]],
-        segments: Sequence[int],
-        rate: float,
-        seconds: float,
-        raw: bool,
-        skip: bool,
-    ) -> tuple[bytearray, BaseException | None]: ...
+        self, sampling: StSampling, skip: bool, most: int | None
+    ) -> tuple[bytearray, int, BaseException | None]: ...
     @property
     def moving(self) -> list[int]: ...
     def close(self, *, stop: bool) -> list[tuple[int, MotorlinkError]]: ...
@@ -266,13 +260,8 @@ class RmdClient:
     ) -> dict[int, MotionStatus | MotorlinkError]: ...
     def scan(self, ids: Sequence[int]) -> list[_rmd.ScanResult]: ...
     def sample(
-        self,
-        motors: Sequence[tuple[int, Sequence[str]]],
-        rate: float,
-        seconds: float,
-        raw: bool,
-        skip: bool,
-    ) -> tuple[bytearray, BaseException | None]: ...
+        self, sampling: RmdSampling, skip: bool, most: int | None
+    ) -> tuple[bytearray, int, BaseException | None]: ...
     def set_limits(
         self,
         id: int,
@@ -364,7 +353,7 @@ class StEventClient:
 
 @final
 class StSampling:
-    """Sampling registers in an event loop: what is to be asked, one request after the other."""
+    """Rows of registers: what to ask, one request after the other."""
 
     def __new__(
         cls,
@@ -372,19 +361,19 @@ class StSampling:
         motors: Sequence[tuple[int, Sequence[str | int], float | None]],
         segments: Sequence[int],
         rate: float,
-        seconds: float,
+        seconds: float | None,
         raw: bool,
     ) -> StSampling: ...
-    def after(self, since: float) -> float | None: ...
+    def after(self, now: float) -> float | None: ...
     def request(self) -> tuple[int, StRequest] | None: ...
     def answered(self, value: Any) -> None: ...
     def refused(self) -> bool: ...
     def push(self) -> None: ...
-    def rows(self) -> bytearray: ...
+    def take(self) -> tuple[bytearray, int]: ...
 
 @final
 class StVerifiedWrite:
-    """A verified write in an event loop: what is to be asked, one request after the other."""
+    """A verified write in an event loop: what to ask, one request after the other."""
 
     def __new__(
         cls, motor: int, request: StRequest, attempts: int, profile: str
@@ -395,16 +384,20 @@ class StVerifiedWrite:
 
 @final
 class RmdSampling:
-    """Sampling motors in an event loop: what is to be asked, one cycle after the other."""
+    """Rows of quantities: what to ask, one cycle after the other."""
 
     def __new__(
-        cls, motors: Sequence[tuple[int, Sequence[str]]], rate: float, seconds: float, raw: bool
+        cls,
+        motors: Sequence[tuple[int, Sequence[str]]],
+        rate: float,
+        seconds: float | None,
+        raw: bool,
     ) -> RmdSampling: ...
-    def after(self, since: float) -> float | None: ...
+    def after(self, now: float) -> float | None: ...
     @property
     def cycles(self) -> list[dict[int, RmdRequest]]: ...
     def push(self, answers: Sequence[dict[int, bytes]]) -> None: ...
-    def rows(self) -> bytearray: ...
+    def take(self) -> tuple[bytearray, int]: ...
 
 @final
 class RmdEventClient:

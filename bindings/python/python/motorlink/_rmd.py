@@ -11,7 +11,7 @@ from motorlink._apis import Exchanges, both_apis, one
 from motorlink._client import AnyClient
 from motorlink._core import CanPort
 from motorlink._rmd_table import MotionStatus, MotorCommands, Request, Status
-from motorlink._sampling import Samples, array, by_motor, skips
+from motorlink._sampling import AnySampling, Samples, by_motor, skips
 from motorlink.errors import MotorlinkError
 
 if TYPE_CHECKING:
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 MotorT = TypeVar("MotorT", bound="RmdMotor[Any]")
 PortT = TypeVar("PortT")
-ClientT = TypeVar("ClientT", bound="RmdClient[Any, Any]")
+SamplingT = TypeVar("SamplingT", bound=AnySampling)
+ClientT = TypeVar("ClientT", bound="RmdClient[Any, Any, Any]")
 
 
 class ScanResult(NamedTuple):
@@ -36,7 +37,7 @@ class ScanResult(NamedTuple):
     dialect: str | None
 
 
-class RmdClient(AnyClient, Generic[MotorT, PortT]):
+class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
     """The clients of both APIs."""
 
     _ENDS: ClassVar[dict[str, dict[str, bool]]] = {
@@ -45,6 +46,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT]):
         "nothing": {"stop": False, "off": False},
     }
     _Motor: type[MotorT]
+    _Sampling: type[SamplingT]
     # Each API's exchanges, with the arguments of the methods of the extension's ``RmdClient``.
     _exchange: Any
     _cycle: Any
@@ -201,10 +203,54 @@ class RmdClient(AnyClient, Generic[MotorT, PortT]):
         ``on_error="skip"`` a motor that fails costs the row only. Ctrl-C ends it, with ``samples`` too; so
         does the cancellation of a task. Exchanges of other tasks have their turns in between.
         """
+        sampling: Any = self._sampling(quantities, rate, seconds, motor, raw, on_error)
+        return one(sampling._array())
+
+    def samples(
+        self,
+        quantities: Mapping[int, Sequence[str]] | Sequence[str],
+        *,
+        rate: float,
+        seconds: float | None = None,
+        motor: int = 1,
+        raw: bool = False,
+        on_error: str = "raise",
+    ) -> SamplingT:
+        """Reads what motors tell ``rate`` times a second, a row each time that the loop asks for one.
+
+        >>> import motorlink
+        >>> with motorlink.rmd.open("sim:") as client:
+        ...     for row in client.samples({1: ["speed_dps"], 2: ["speed_dps"]}, rate=100):
+        ...         print(row.t, row["speed_dps_1"], row["speed_dps_2"])
+        ...         break
+        0.0 0.0 0.0
+
+        For asyncio: ``async for row in client.samples(...)``. Arguments, names, units and instants are those
+        of :meth:`sample`; without ``seconds`` there is no end. A row is a ``dict``, a
+        :class:`motorlink.Sample`. No thread reads ahead: a row is read when the loop asks for it, so that
+        its values are new. A loop that is slower than ``rate`` gets fewer rows; ``row.skipped`` is the number
+        of instants before the row that have none.
+
+        ``break`` leaves motors as they are; the end of ``with`` stops those that this client started. So
+        does Ctrl-C, and an error, which is raised after the rows that were read before. After an error
+        there are no more rows: call ``samples`` again.
+        """
+        return self._sampling(quantities, rate, seconds, motor, raw, on_error)
+
+    def _sampling(
+        self,
+        quantities: Mapping[int, Sequence[str]] | Sequence[str],
+        rate: float,
+        seconds: float | None,
+        motor: int,
+        raw: bool,
+        on_error: str,
+    ) -> SamplingT:
         skip = skips(on_error)
         motors, names = by_motor(quantities, motor, str)
-        outcome = yield self._sample(motors, rate, seconds, raw, skip)
-        return array(outcome, names, raw=raw)
+        rows = _core.RmdSampling(motors, rate, seconds, raw)
+        take = functools.partial(self._sample, rows, skip)
+        return self._Sampling(self, take, names, raw=raw, release=lambda: None)
 
     def __repr__(self) -> str:
         return self._text()

@@ -1,14 +1,17 @@
-"""Samples as NumPy arrays, and what can be made of them."""
+"""Sampling: rows one after the other, and all of them as a NumPy array."""
 
 from __future__ import annotations
 
 import importlib
+import threading
+import weakref
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any, TypeVar, Union
 
 import numpy as np
 import numpy.typing as npt
 
+from motorlink._apis import Blocking, Exchanges, both_apis
 from motorlink.errors import InvalidValueError
 
 Name = TypeVar("Name")
@@ -52,17 +55,117 @@ def skips(on_error: str) -> bool:
     return on_error == "skip"
 
 
-def array(
-    outcome: tuple[bytearray, BaseException | None], names: Sequence[str], *, raw: bool
-) -> Samples:
-    """The rows as an array; raises what ended them early, with the array in its ``samples``."""
-    rows, error = outcome
-    kind = "i8" if raw else "f8"
-    samples = np.frombuffer(rows, dtype=[("t", "f8"), *((name, kind) for name in names)])
-    if error is not None:
-        error.samples = samples  # type: ignore[attr-defined]
-        raise error
-    return samples
+class Sample(dict[str, float]):
+    """One row of ``client.samples``: the values by name, and ``t``.
+
+    >>> import motorlink
+    >>> with motorlink.st.open("sim:") as client:
+    ...     row = next(client.samples(["BUS_VOLTAGE"], rate=100))
+    >>> row
+    {'t': 0.0, 'BUS_VOLTAGE': 325.0}
+    >>> row.t, row.skipped
+    (0.0, 0)
+    """
+
+    __slots__ = ("skipped",)
+
+    #: Instants without a row between the row before and this one: the program or the line was too
+    #: slow for them, or they failed with ``on_error="skip"``.
+    skipped: int
+
+    @property
+    def t(self) -> float:
+        """Time from the first instant to the first request of this row, s."""
+        return self["t"]
+
+
+#: An exchange: at most so many rows, or all. Gives their bytes, skipped instants, and the error.
+Take = Callable[[Union[int, None]], Any]
+
+
+class AnySampling:
+    """The samplings of both APIs."""
+
+    def __init__(
+        self,
+        client: object,
+        take: Take,
+        names: Sequence[str],
+        *,
+        raw: bool,
+        release: Callable[[], object],
+    ):
+        # Without this, `for row in open(port).samples(...)` would close the client at once.
+        self._client = client
+        kind = "i8" if raw else "f8"
+        self._columns = np.dtype([("t", "f8"), *((name, kind) for name in names)])
+        self._take = take
+        self._turn = threading.Lock()
+        self._ended = False
+        self._release = weakref.finalize(self, release)
+
+    def close(self) -> None:
+        """Ends the sampling. A row that another thread or task waits for is the last one."""
+        self._ended = True
+        self._release_when_idle()
+
+    @both_apis
+    def _array(self) -> Exchanges[Samples]:
+        """All rows."""
+        samples, _ = yield from self._taken(None)
+        self.close()
+        return samples
+
+    @both_apis
+    def _row(self) -> Exchanges[Sample | None]:
+        """The next row; ``None`` at the end."""
+        if self._ended:
+            return None
+        samples, skipped = yield from self._taken(1)
+        if not len(samples):
+            self.close()
+            return None
+        row = Sample(zip(samples.dtype.names or (), samples[0].item()))
+        row.skipped = skipped
+        return row
+
+    def _taken(self, most: int | None) -> Exchanges[tuple[Samples, int]]:
+        """New rows, and the instants that were skipped. Any error ends the sampling."""
+        if not self._turn.acquire(blocking=False):
+            raise RuntimeError("this sampling is in use by another thread, task or signal handler")
+        try:
+            rows, skipped, error = yield self._take(most)
+            samples = np.frombuffer(rows, dtype=self._columns)
+            if error is not None:
+                error.samples = samples
+                raise error
+        except BaseException:
+            self._ended = True
+            raise
+        finally:
+            self._turn.release()
+            if self._ended:
+                self._release_when_idle()
+        return samples, skipped
+
+    def _release_when_idle(self) -> None:
+        """Releases the data segments of the drive; not while a row is read from them."""
+        if self._turn.acquire(blocking=False):
+            self._release()
+            self._turn.release()
+
+
+class Sampling(Blocking, AnySampling):
+    """Rows that are read one after the other, from ``client.samples``: an iterator of :class:`Sample`."""
+
+    def __iter__(self) -> Sampling:
+        return self
+
+    def __next__(self) -> Sample:
+        row = self._row()
+        if row is None:
+            raise StopIteration
+        return row
 
 
 def to_pandas(samples: Samples) -> Any:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 
 from motorlink import _core
 from motorlink.errors import InvalidValueError
@@ -37,15 +36,15 @@ class Segments:
         """What a segment was configured with; nothing where that is not known."""
         return self._chosen.get(segment, [])
 
-    @contextmanager
-    def for_sampling(self, count: int) -> Iterator[list[int]]:
-        """Segments that nobody else uses meanwhile, as many as there are, the last one first."""
+    def for_sampling(self, count: int) -> tuple[list[int], Callable[[], None]]:
+        """Claims up to ``count`` free segments, the last one first; gives them and what releases them."""
         with self._lock:
             taken = self._sampled.union(self._chosen)
             free = [n for n in reversed(range(_core.ST_SEGMENTS)) if n not in taken][:count]
             self._sampled.update(free)
-        try:
-            yield free
-        finally:
+
+        def release() -> None:
             with self._lock:
                 self._sampled.difference_update(free)
+
+        return free, release

@@ -10,7 +10,7 @@ from motorlink import _core
 from motorlink._apis import Exchanges, both_apis, one
 from motorlink._client import AnyClient
 from motorlink._core import StRequest as Request
-from motorlink._sampling import Samples, array, by_motor, skips
+from motorlink._sampling import AnySampling, Samples, by_motor, skips
 from motorlink._segments import Segments
 from motorlink._values import BoardInfo, ControlMode, FirmwareVersion, Flags, RevupPhase, Status
 from motorlink.errors import InvalidValueError
@@ -20,14 +20,16 @@ if TYPE_CHECKING:
 
 MotorT = TypeVar("MotorT", bound="StMotor[Any]")
 PortT = TypeVar("PortT")
-ClientT = TypeVar("ClientT", bound="StClient[Any, Any]")
+SamplingT = TypeVar("SamplingT", bound=AnySampling)
+ClientT = TypeVar("ClientT", bound="StClient[Any, Any, Any]")
 
 
-class StClient(AnyClient, Generic[MotorT, PortT]):
+class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
     """The clients of both APIs."""
 
     _ENDS: ClassVar[dict[str, dict[str, bool]]] = {"stop": {"stop": True}, "nothing": {"stop": False}}
     _Motor: type[MotorT]
+    _Sampling: type[SamplingT]
     # Each API's exchanges, with the arguments of ``StClient``'s methods.
     _exchange: Any
     _exchange_raw: Any
@@ -203,12 +205,60 @@ class StClient(AnyClient, Generic[MotorT, PortT]):
         ``on_error="skip"`` a line that fails costs the row only. Ctrl-C ends it, with ``samples`` too; so
         does the cancellation of a task. Exchanges of other tasks have their turns in between.
         """
+        sampling: Any = self._sampling(registers, rate, seconds, motor, raw, on_error)
+        return one(sampling._array())
+
+    def samples(
+        self,
+        registers: Sequence[str | int] | Mapping[int, Sequence[str | int]],
+        *,
+        rate: float,
+        seconds: float | None = None,
+        motor: int = 1,
+        raw: bool = False,
+        on_error: str = "raise",
+    ) -> SamplingT:
+        """Reads registers ``rate`` times a second, a row each time that the loop asks for one.
+
+        >>> import motorlink
+        >>> with motorlink.st.open("sim:") as client:
+        ...     for row in client.samples(["SPEED_MEAS", "BUS_VOLTAGE"], rate=100):
+        ...         print(row.t, row["SPEED_MEAS"], row["BUS_VOLTAGE"])
+        ...         break
+        0.0 0.0 325.0
+
+        For asyncio: ``async for row in client.samples(...)``. Arguments, names, units and instants are those
+        of :meth:`sample`; without ``seconds`` there is no end. A row is a ``dict``, a
+        :class:`motorlink.Sample`. No thread reads ahead: a row is read when the loop asks for it, so that
+        its values are new. A loop that is slower than ``rate`` gets fewer rows; ``row.skipped`` is the number
+        of instants before the row that have none.
+
+        ``break`` leaves motors as they are; the end of ``with`` stops those that this client started. So
+        does Ctrl-C, and an error, which is raised after the rows that were read before. After an error
+        there are no more rows: call ``samples`` again.
+        """
+        return self._sampling(registers, rate, seconds, motor, raw, on_error)
+
+    def _sampling(
+        self,
+        registers: Sequence[str | int] | Mapping[int, Sequence[str | int]],
+        rate: float,
+        seconds: float | None,
+        motor: int,
+        raw: bool,
+        on_error: str,
+    ) -> SamplingT:
         skip = skips(on_error)
         wanted, names = by_motor(registers, motor, _core.st_register_name)
         motors = [(number, some, self._full_scale_amps) for number, some in wanted]
-        with self._segments.for_sampling(len(motors)) as segments:
-            outcome = yield self._sample(motors, segments, rate, seconds, raw, skip)
-        return array(outcome, names, raw=raw)
+        segments, release = self._segments.for_sampling(len(motors))
+        try:
+            rows = _core.StSampling(self._profile, motors, segments, rate, seconds, raw)
+            take = functools.partial(self._sample, rows, skip)
+            return self._Sampling(self, take, names, raw=raw, release=release)
+        except BaseException:
+            release()
+            raise
 
     def __repr__(self) -> str:
         return self._text(f", profile {self._profile}")

@@ -35,6 +35,7 @@ from motorlink._core import CanPort
 from motorlink._core import RmdClient as Core
 from motorlink._rmd import RmdClient, RmdMotor, ScanResult
 from motorlink._rmd_table import *
+from motorlink._sampling import Sampling
 from motorlink._values import Errors, Frame
 
 __all__ = [
@@ -73,7 +74,7 @@ class Motor(Blocking, RmdMotor["Client"]):
     __slots__ = ()
 
 
-class Client(BlockingClient, RmdClient[Motor, "PortLike | CanPort"]):
+class Client(BlockingClient, RmdClient[Motor, "PortLike | CanPort", Sampling]):
     """A CAN bus with RMD motors; from :func:`open`.
 
     Threads may share it: one exchange or cycle at a time is on the bus, and each caller gets its own
@@ -83,6 +84,7 @@ class Client(BlockingClient, RmdClient[Motor, "PortLike | CanPort"]):
     _core: Core
     _Core = Core
     _Motor = Motor
+    _Sampling = Sampling
 
     def __init__(self, core: Core, **options: Any):
         super().__init__(core, **options)

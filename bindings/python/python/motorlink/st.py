@@ -40,6 +40,7 @@ from motorlink._client import BlockingClient, PortLike, opens
 from motorlink._core import StClient as Core
 from motorlink._core import StRequest as Request
 from motorlink._registers import Registers
+from motorlink._sampling import Sampling
 from motorlink._scan import Path, ScanResult, scanning
 from motorlink._st import StClient, StMotor
 from motorlink._values import (
@@ -81,7 +82,7 @@ class Motor(Blocking, StMotor["Client"]):
         return Registers(self)
 
 
-class Client(BlockingClient, StClient[Motor, PortLike]):
+class Client(BlockingClient, StClient[Motor, PortLike, Sampling]):
     """A serial line with a drive of up to seven motors; from :func:`open`.
 
     Threads may share it: one exchange at a time is on the line, and each caller gets its own answer.
@@ -90,6 +91,7 @@ class Client(BlockingClient, StClient[Motor, PortLike]):
     _core: Core
     _Core = Core
     _Motor = Motor
+    _Sampling = Sampling
 
     def __init__(self, core: Core, **options: Any):
         super().__init__(core, **options)

@@ -12,11 +12,10 @@ use pyo3::types::{PyByteArray, PyDict, PyList};
 
 use super::options::{RmdOptions, limits};
 use super::request::{RmdRequest, motor_id, said};
-use super::sample::{Questions, sample};
+use super::sample::RmdSampling;
 use crate::can::{AnyPort, Threads};
 use crate::error::{invalid_value, rmd_error};
 use crate::number::wanted;
-use crate::sampling::Plan;
 use crate::shared::Shared;
 use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
@@ -140,24 +139,21 @@ impl RmdClient {
         found.into_iter().map(|one| scan_result(py, one)).collect()
     }
 
-    /// Samples quantities of motors `(id, names)`. Gives rows of a time in s and the values, eight bytes
-    /// each, and what ended it before its time.
+    /// Samples until the end, an error, or `most` rows. Returns the new rows, the instants that were
+    /// skipped, and the error.
     fn sample<'py>(
         &self,
         py: Python<'py>,
-        motors: Vec<(i64, Vec<String>)>,
-        rate: f64,
-        seconds: f64,
-        raw: bool,
+        sampling: &RmdSampling,
         skip: bool,
-    ) -> PyResult<(Bound<'py, PyByteArray>, Option<PyErr>)> {
+        most: Option<u64>,
+    ) -> PyResult<(Bound<'py, PyByteArray>, u64, Option<PyErr>)> {
         let bus = self.bus.get(py)?;
-        let plan = Plan::new(py, rate, seconds)?;
-        let questions = Questions::new(py, motors, raw)?;
         let look = |py: Python<'_>| self.bus.get(py).map(drop);
         let clock = &self.clock;
-        let (rows, outcome) = py.detach(|| sample(&bus, clock, look, plan, &questions, skip));
-        Ok((PyByteArray::new(py, &rows.0), outcome.err()))
+        let (taken, outcome) = py.detach(|| sampling.run(&bus, clock, look, skip, most));
+        let (rows, skipped) = taken.into_python(py);
+        Ok((rows, skipped, outcome.err()))
     }
 
     /// Sets what a motor may be told; `None` is no limit.

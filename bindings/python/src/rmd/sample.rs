@@ -13,7 +13,7 @@ use pyo3::types::PyByteArray;
 use super::quantity::Quantity;
 use super::request::{RmdRequest, motor_id};
 use crate::error::rmd_error;
-use crate::sampling::{Plan, Rows, Stepped, cell};
+use crate::sampling::{Plan, Rows, Taken, cell};
 
 /// The quantities of one motor.
 struct Lane {
@@ -22,7 +22,7 @@ struct Lane {
 }
 
 /// What is asked for a row, and what its values are among the answers.
-pub(super) struct Questions {
+struct Questions {
     lanes: Vec<Lane>,
     /// Each motor once a cycle, until every motor has been asked all of its questions.
     cycles: Vec<Vec<(MotorId, [u8; 8])>>,
@@ -34,7 +34,7 @@ type Replies = Vec<(MotorId, Code, [u8; 8])>;
 
 impl Questions {
     /// About the quantities of motors `(id, names)`.
-    pub(super) fn new(
+    fn new(
         py: Python<'_>,
         motors: Vec<(i64, Vec<String>)>,
         raw: bool,
@@ -76,30 +76,6 @@ impl Questions {
     }
 }
 
-/// Samples until the plan is done or something fails; gives what was sampled in either case. With
-/// `skip` a motor that fails to answer costs the row and nothing else; so does a signal's handler that
-/// uses the bus.
-pub(super) fn sample(
-    bus: &Client,
-    clock: &Clock,
-    look: impl Fn(Python<'_>) -> PyResult<()>,
-    plan: Plan,
-    questions: &Questions,
-    skip: bool,
-) -> (Rows, PyResult<()>) {
-    let mut rows = Rows::default();
-    let outcome = plan.run(clock, &look, |time| match replies(bus, questions) {
-        Ok(replies) => {
-            rows.push(time, &questions.values(&replies));
-            Ok(())
-        }
-        Err(error) if skip && error.is_line_failure() => Ok(()),
-        Err(Error::Port(PortError::Overtaken { .. })) => Python::attach(&look),
-        Err(error) => Err(Python::attach(|py| rmd_error(py, &error))),
-    });
-    (rows, outcome)
-}
-
 fn replies(bus: &Client, questions: &Questions) -> Result<Replies, Error> {
     let mut replies = Replies::new();
     for requests in &questions.cycles {
@@ -118,16 +94,40 @@ fn replies(bus: &Client, questions: &Questions) -> Result<Replies, Error> {
     Ok(replies)
 }
 
-/// Sampling motors in an event loop: what is to be asked, one cycle after the other.
+/// Rows of quantities: for a blocking client [`RmdSampling::run`]; for an event loop what to ask, one
+/// cycle after the other.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdSampling {
-    stepped: Mutex<Stepped>,
+    rows: Mutex<Rows>,
     questions: Questions,
 }
 
 impl RmdSampling {
-    fn lock(&self) -> MutexGuard<'_, Stepped> {
-        self.stepped.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Rows> {
+        self.rows.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Samples until the end, an error, or `most` rows; returns the new rows in each case. With `skip`
+    /// a motor that fails to answer costs only the row; so does a signal's handler that uses the bus.
+    pub(super) fn run(
+        &self,
+        bus: &Client,
+        clock: &Clock,
+        look: impl Fn(Python<'_>) -> PyResult<()>,
+        skip: bool,
+        most: Option<u64>,
+    ) -> (Taken, PyResult<()>) {
+        let mut rows = self.lock();
+        let outcome = rows.run(clock, &look, most, |rows| {
+            match replies(bus, &self.questions) {
+                Ok(replies) => rows.push(&self.questions.values(&replies)),
+                Err(error) if skip && error.is_line_failure() => {}
+                Err(Error::Port(PortError::Overtaken { .. })) => Python::attach(&look)?,
+                Err(error) => return Err(Python::attach(|py| rmd_error(py, &error))),
+            }
+            Ok(())
+        });
+        (rows.take(), outcome)
     }
 }
 
@@ -139,17 +139,16 @@ impl RmdSampling {
         py: Python<'_>,
         motors: Vec<(i64, Vec<String>)>,
         rate: f64,
-        seconds: f64,
+        seconds: Option<f64>,
         raw: bool,
     ) -> PyResult<Self> {
-        let stepped = Mutex::new(Stepped::new(Plan::new(py, rate, seconds)?));
-        Ok(RmdSampling { stepped, questions: Questions::new(py, motors, raw)? })
+        let rows = Mutex::new(Rows::new(Plan::new(py, rate, seconds)?));
+        Ok(RmdSampling { rows, questions: Questions::new(py, motors, raw)? })
     }
 
-    /// How long to wait for the next instant, so many s after the first one; 0 begins its row, and
-    /// `None` is the end.
-    fn after(&self, py: Python<'_>, since: f64) -> PyResult<Option<f64>> {
-        self.lock().after(py, since)
+    /// How long to wait at this time of the event loop, s; 0 begins a row, and `None` is the end.
+    fn after(&self, py: Python<'_>, now: f64) -> PyResult<Option<f64>> {
+        self.lock().after_seconds(py, now)
     }
 
     /// The cycles of a row: requests by ID, answered with bytes.
@@ -174,8 +173,8 @@ impl RmdSampling {
         Ok(())
     }
 
-    /// The rows: a time in s and the values, eight bytes each.
-    fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
-        PyByteArray::new(py, &self.lock().rows.0)
+    /// The new rows, a time in s and the values, eight bytes each; and the skipped instants.
+    fn take<'py>(&self, py: Python<'py>) -> (Bound<'py, PyByteArray>, u64) {
+        self.lock().take().into_python(py)
     }
 }

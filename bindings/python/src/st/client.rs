@@ -8,9 +8,8 @@ use pyo3::types::{PyByteArray, PyBytes, PyList};
 
 use super::options::StOptions;
 use super::request::{StRequest, motor_number};
-use super::sample::{self, Reading, sample};
+use super::sample::StSampling;
 use crate::error::{invalid_value, st_error};
-use crate::sampling::Plan;
 use crate::shared::Shared;
 use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
@@ -91,26 +90,21 @@ impl StClient {
         Ok(PyBytes::new(py, &reply.map_err(|error| st_error(py, &error))?))
     }
 
-    /// Samples registers of motors `(motor, registers, full_scale_amps)`, each in one of `segments`
-    /// where that can be done. Gives rows of a time in s and the values, eight bytes each, and what
-    /// ended it before its time.
+    /// Samples until the end, an error, or `most` rows. Returns the new rows, the instants that were
+    /// skipped, and the error.
     fn sample<'py>(
         &self,
         py: Python<'py>,
-        motors: Vec<sample::Motor<'py>>,
-        segments: Vec<u8>,
-        rate: f64,
-        seconds: f64,
-        raw: bool,
+        sampling: &StSampling,
         skip: bool,
-    ) -> PyResult<(Bound<'py, PyByteArray>, Option<PyErr>)> {
+        most: Option<u64>,
+    ) -> PyResult<(Bound<'py, PyByteArray>, u64, Option<PyErr>)> {
         let client = self.client.get(py)?;
-        let plan = Plan::new(py, rate, seconds)?;
-        let reading = Reading::new(py, client.profile(), motors, segments, raw)?;
         let look = |py: Python<'_>| self.client.get(py).map(drop);
         let clock = &self.clock;
-        let (rows, outcome) = py.detach(|| sample(&client, clock, look, plan, reading, skip));
-        Ok((PyByteArray::new(py, &rows.0), outcome.err()))
+        let (taken, outcome) = py.detach(|| sampling.run(&client, clock, look, skip, most));
+        let (rows, skipped) = taken.into_python(py);
+        Ok((rows, skipped, outcome.err()))
     }
 
     /// Motors that this client started and did not stop.

@@ -13,7 +13,7 @@ use super::profile;
 use super::request::{StRequest, motor_number};
 use super::scale::{Scale, register};
 use crate::error::st_error;
-use crate::sampling::{Plan, Rows, Stepped, cell};
+use crate::sampling::{Plan, Rows, Taken, cell};
 
 /// What a program samples of one motor: its number, registers, and its full scale of current, A.
 pub(super) type Motor<'py> = (i64, Vec<Bound<'py, PyAny>>, Option<f64>);
@@ -169,41 +169,42 @@ fn is_segment(profile: Profile, registers: &[RegisterId]) -> bool {
     possible && (registers.len() > 1 || registers.iter().any(only_there))
 }
 
-/// Samples until the plan is done or something fails; gives what was sampled in either case. With
-/// `skip` a line that fails costs the row and nothing else; so does a signal's handler that uses it.
-pub(super) fn sample(
-    client: &Client,
-    clock: &Clock,
-    look: impl Fn(Python<'_>) -> PyResult<()>,
-    plan: Plan,
-    mut reading: Reading,
-    skip: bool,
-) -> (Rows, PyResult<()>) {
-    let mut rows = Rows::default();
-    let raised = |error: Error| Python::attach(|py| st_error(py, &error));
-    if let Err(error) = reading.carry_out(client) {
-        return (rows, Err(raised(error)));
-    }
-    let outcome = plan.run(clock, &look, |time| {
-        reading.begin();
-        match reading.carry_out(client) {
-            Ok(()) => rows.push(time, &reading.values),
-            Err(error) if skip && error.is_line_failure() => {}
-            Err(Error::Port(PortError::Overtaken { .. })) => Python::attach(&look)?,
-            Err(error) => return Err(raised(error)),
-        }
-        Ok(())
-    });
-    (rows, outcome)
-}
-
-/// Sampling registers in an event loop: what is to be asked, one request after the other.
+/// Rows of registers: for a blocking client [`StSampling::run`]; for an event loop what to ask, one
+/// request after the other.
 #[pyclass(frozen, module = "motorlink._core")]
-pub(crate) struct StSampling(Mutex<(Stepped, Reading)>);
+pub(crate) struct StSampling(Mutex<(Rows, Reading)>);
 
 impl StSampling {
-    fn lock(&self) -> MutexGuard<'_, (Stepped, Reading)> {
+    fn lock(&self) -> MutexGuard<'_, (Rows, Reading)> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Samples until the end, an error, or `most` rows; returns the new rows in each case. With `skip`
+    /// a line that fails costs only the row; so does a signal's handler that uses it.
+    pub(super) fn run(
+        &self,
+        client: &Client,
+        clock: &Clock,
+        look: impl Fn(Python<'_>) -> PyResult<()>,
+        skip: bool,
+        most: Option<u64>,
+    ) -> (Taken, PyResult<()>) {
+        let (rows, reading) = &mut *self.lock();
+        let raised = |error: Error| Python::attach(|py| st_error(py, &error));
+        let prepared = reading.carry_out(client).map_err(raised);
+        let outcome = prepared.and_then(|()| {
+            rows.run(clock, &look, most, |rows| {
+                reading.begin();
+                match reading.carry_out(client) {
+                    Ok(()) => rows.push(&reading.values),
+                    Err(error) if skip && error.is_line_failure() => {}
+                    Err(Error::Port(PortError::Overtaken { .. })) => Python::attach(&look)?,
+                    Err(error) => return Err(raised(error)),
+                }
+                Ok(())
+            })
+        });
+        (rows.take(), outcome)
     }
 }
 
@@ -218,26 +219,25 @@ impl StSampling {
         motors: Vec<Motor<'_>>,
         segments: Vec<u8>,
         rate: f64,
-        seconds: f64,
+        seconds: Option<f64>,
         raw: bool,
     ) -> PyResult<Self> {
-        let stepped = Stepped::new(Plan::new(py, rate, seconds)?);
+        let rows = Rows::new(Plan::new(py, rate, seconds)?);
         let reading = Reading::new(py, profile::named(py, profile)?, motors, segments, raw)?;
-        Ok(StSampling(Mutex::new((stepped, reading))))
+        Ok(StSampling(Mutex::new((rows, reading))))
     }
 
-    /// How long to wait for the next instant, so many s after the first one; 0 begins its row, and
-    /// `None` is the end.
-    fn after(&self, py: Python<'_>, since: f64) -> PyResult<Option<f64>> {
-        let (stepped, reading) = &mut *self.lock();
-        let wait = stepped.after(py, since)?;
+    /// How long to wait at this time of the event loop, s; 0 begins a row, and `None` is the end.
+    fn after(&self, py: Python<'_>, now: f64) -> PyResult<Option<f64>> {
+        let (rows, reading) = &mut *self.lock();
+        let wait = rows.after_seconds(py, now)?;
         if wait == Some(0.0) {
             reading.begin();
         }
         Ok(wait)
     }
 
-    /// The next request and its motor, `None` when the row is whole.
+    /// The next request and its motor, `None` when the row is complete.
     fn request(&self) -> Option<(u8, StRequest)> {
         self.lock().1.request()
     }
@@ -258,19 +258,19 @@ impl StSampling {
         Ok(())
     }
 
-    /// The drive refused that request; whether the row goes on all the same.
+    /// The drive refused that request; returns whether the row continues.
     fn refused(&self) -> bool {
         self.lock().1.refused()
     }
 
     /// Ends the row.
     fn push(&self) {
-        let (stepped, reading) = &mut *self.lock();
-        stepped.push(&reading.values);
+        let (rows, reading) = &mut *self.lock();
+        rows.push(&reading.values);
     }
 
-    /// The rows: a time in s and the values, eight bytes each.
-    fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
-        PyByteArray::new(py, &self.lock().0.rows.0)
+    /// The new rows, a time in s and the values, eight bytes each; and the skipped instants.
+    fn take<'py>(&self, py: Python<'py>) -> (Bound<'py, PyByteArray>, u64) {
+        self.lock().0.take().into_python(py)
     }
 }

@@ -26,5 +26,6 @@ A client belongs to the event loop in which it was opened.
 """
 
 from motorlink.aio import rmd, st
+from motorlink.aio._sampling import Sampling
 
-__all__ = ["rmd", "st"]
+__all__ = ["Sampling", "rmd", "st"]

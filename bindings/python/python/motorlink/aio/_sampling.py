@@ -1,4 +1,4 @@
-"""Sampling in an event loop: the rows of ``client.sample``, awaited."""
+"""Sampling in an event loop."""
 
 from __future__ import annotations
 
@@ -6,42 +6,62 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
+from motorlink._apis import Awaited
+from motorlink._sampling import AnySampling, Sample
 from motorlink.errors import LinkError, ReplyTimeoutError
 
 
-class Sampling(Protocol):
-    """What samplings of both protocols have in common."""
+class Rows(Protocol):
+    """The rows of both protocols, of the extension module."""
 
-    def after(self, since: float) -> float | None: ...
-    def rows(self) -> bytearray: ...
+    def after(self, now: float) -> float | None: ...
+    def take(self) -> tuple[bytearray, int]: ...
 
 
 async def nothing() -> None:
-    """What is done before the first row where there is nothing to do."""
+    """The preparation of a sampling that needs none."""
 
 
 async def sampled(
-    sampling: Sampling,
+    rows: Rows,
     row: Callable[[], Awaitable[None]],
     *,
     skip: bool,
+    most: int | None,
     prepare: Callable[[], Awaitable[None]] = nothing,
-) -> tuple[bytearray, BaseException | None]:
-    """Takes a row at each instant; gives the rows, and what ended them early."""
+) -> tuple[bytearray, int, BaseException | None]:
+    """Reads a row at each instant; gives the new rows, the skipped instants, and the error."""
     loop = asyncio.get_running_loop()
     ended: BaseException | None = None
+    count = 0
     try:
         await prepare()
-        began = loop.time()
-        while (wait := sampling.after(loop.time() - began)) is not None:
+        while count != most and (wait := rows.after(loop.time())) is not None:
             if wait:
                 await asyncio.sleep(wait)
                 continue
             try:
                 await row()
+                count += 1
             except (LinkError, ReplyTimeoutError):
                 if not skip:
                     raise
     except BaseException as error:
         ended = error
-    return sampling.rows(), ended
+    return (*rows.take(), ended)
+
+
+class Sampling(Awaited, AnySampling):
+    """Rows that are read one after the other, from ``client.samples``: ``async for row in ...``.
+
+    Each row is a :class:`motorlink.Sample`.
+    """
+
+    def __aiter__(self) -> Sampling:
+        return self
+
+    async def __anext__(self) -> Sample:
+        row = await self._row()
+        if row is None:
+            raise StopAsyncIteration
+        return row

@@ -22,7 +22,7 @@ from typing import Any, Union
 from motorlink._apis import Awaited
 from motorlink._core import RMD_SCAN_WIDTH, CanPort, RmdEventClient, RmdRequest, RmdSampling
 from motorlink._rmd import RmdClient, RmdMotor, ScanResult
-from motorlink.aio._sampling import sampled
+from motorlink.aio._sampling import Sampling, sampled
 from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
 from motorlink.errors import ClosedError, MotorlinkError, PortError
 
@@ -35,7 +35,7 @@ class Motor(Awaited, RmdMotor["Client"]):
     __slots__ = ()
 
 
-class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanPort]]):
+class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanPort], Sampling]):
     """A CAN bus with RMD motors; from :func:`open`.
 
     Tasks may share it. Exchanges with different motors overlap; a motor has one at a time, in the order
@@ -45,6 +45,7 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
     _core: RmdEventClient
     _Core = RmdEventClient
     _Motor = Motor
+    _Sampling = Sampling
 
     def __init__(self, core: RmdEventClient, **options: Any):
         super().__init__(core, **options)
@@ -97,15 +98,7 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
                     found.append(answer)
         return found
 
-    async def _sample(
-        self,
-        motors: list[tuple[int, list[str]]],
-        rate: float,
-        seconds: float,
-        raw: bool,
-        skip: bool,
-    ) -> Any:
-        sampling = RmdSampling(motors, rate, seconds, raw)
+    async def _sample(self, sampling: RmdSampling, skip: bool, most: int | None) -> Any:
         cycles = sampling.cycles
 
         async def row() -> None:
@@ -117,7 +110,7 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
                         raise answer
             sampling.push(answers)
 
-        return await sampled(sampling, row, skip=skip)
+        return await sampled(sampling, row, skip=skip, most=most)
 
     async def _gather(self, ids: Iterable[int], ask: Callable[[int], None]) -> dict[int, Any]:
         """Asks each motor; gives what each answered or why it was not asked, by ID."""

@@ -24,7 +24,7 @@ from motorlink._core import StRequest as Request
 from motorlink._registers import RegisterNames
 from motorlink._scan import Path, ScanResult, scanning
 from motorlink._st import StClient, StMotor
-from motorlink.aio._sampling import sampled
+from motorlink.aio._sampling import Sampling, sampled
 from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
 from motorlink.errors import LinkError, MotorlinkError, RefusedError, ReplyTimeoutError
 
@@ -42,7 +42,7 @@ class Motor(Awaited, StMotor["Client"]):
         return RegisterNames(self)
 
 
-class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"]]):
+class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"], Sampling]):
     """A serial line with a drive of up to seven motors; from :func:`open`.
 
     Tasks may share it: one exchange at a time is on the line, in the order in which they were asked
@@ -52,6 +52,7 @@ class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"]]):
     _core: StEventClient
     _Core = StEventClient
     _Motor = Motor
+    _Sampling = Sampling
 
     def __init__(self, core: StEventClient, **options: Any):
         super().__init__(core, **options)
@@ -79,17 +80,7 @@ class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"]]):
                 attempt = write.answered(told)
         return attempt
 
-    async def _sample(
-        self,
-        motors: list[tuple[int, list[str | int], float | None]],
-        segments: list[int],
-        rate: float,
-        seconds: float,
-        raw: bool,
-        skip: bool,
-    ) -> Any:
-        sampling = StSampling(self._profile, motors, segments, rate, seconds, raw)
-
+    async def _sample(self, sampling: StSampling, skip: bool, most: int | None) -> Any:
         async def carry_out() -> None:
             while (asked := sampling.request()) is not None:
                 try:
@@ -104,7 +95,7 @@ class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"]]):
             await carry_out()
             sampling.push()
 
-        return await sampled(sampling, row, skip=skip, prepare=carry_out)
+        return await sampled(sampling, row, skip=skip, most=most, prepare=carry_out)
 
     async def _carry_out(self, begin: Callable[[], None]) -> Any:
         async with self._turn:
