@@ -144,15 +144,45 @@ def test_a_read_without_brackets_is_no_value() -> None:
                 lambda read: read in ("RUN", 1),
                 lambda read: not read,
                 lambda read: f"{read}",
+                lambda read: read > 1,
+                lambda read: 1 <= read,
+                lambda read: read + 1,
+                lambda read: 90 - read,
+                lambda read: read[0],
+                len,
+                abs,
+                round,
+                float,
+                int,
                 str,
             ):
                 with pytest.raises(TypeError, match="is a method: write"):
                     taken(read)
+            with pytest.raises(AttributeError, match="is a method: write `.*[(][)].speed_dps`"):
+                read.speed_dps
+            with pytest.raises(TypeError) as unhashable:
+                {read}
+            assert "_Uncalled" not in str(unhashable.value)
             assert callable(read) and read.__doc__ and read() is not None
             in_a_thread(read)
         drive.motor(1).start()
         in_a_thread(drive.motor(1).stop)
         assert drive.motor(1).status() != "RUN"
+
+
+def test_a_function_in_place_of_a_request_is_named() -> None:
+    with st.open("sim:") as drive, rmd.open("sim:") as bus:
+        cases: list[tuple[Callable[[], object], str]] = [
+            (lambda: bus.cycle({1: rmd.read_status}), "`read_status` is a function that was not"),  # type: ignore[dict-item]
+            (lambda: bus.cycle({1: bus.motor(1).status}), "`status` is a function that was not"),  # type: ignore[dict-item]
+            (lambda: bus.exchange(1, rmd.Request.off), "`off` is a function that was not"),  # type: ignore[arg-type]
+            (lambda: bus.exchange(1, b"\x9a"), "such as `rmd.read_status"),  # type: ignore[arg-type]
+            (lambda: drive.exchange(1, st.Request.status), "such as `Request.status"),  # type: ignore[arg-type]
+            (lambda: bus.motor(1).set_speed(bus.motor(2).status), "`status` is a method: write"),  # type: ignore[arg-type]
+        ]
+        for mistake, message in cases:
+            with pytest.raises(TypeError, match=message):
+                mistake()
 
 
 def types_of_the_blocking_api(bus: st.Client, motors: rmd.Client) -> None:

@@ -14,7 +14,7 @@ ARM = """
     import motorlink
 
     class Arm:
-        "A user's code: it opens a port, sleeps, and knows nothing of simulation."
+        "A user's code. It opens a port and sleeps, and has nothing of the simulation."
 
         def __init__(self, port):
             self.bus = motorlink.rmd.open(port, timeout=1)
@@ -85,21 +85,57 @@ def test_a_marker_says_what_the_bench_is(pytester: pytest.Pytester) -> None:
             with pytest.raises(motorlink.ReplyTimeoutError):
                 motorlink_bench.rmd.motor(9).status()
 
-        @pytest.mark.motorlink("nowhere.toml")
-        def test_a_file_that_is_not_there(motorlink_bench):
+        """
+    )
+    pytester.runpytest("--strict-markers").assert_outcomes(passed=4)
+
+
+def test_a_bench_that_cannot_be_built_says_why(pytester: pytest.Pytester) -> None:
+    pytester.makeini("[pytest]\nmotorlink_config = absent.toml")
+    pytester.makepyfile(
+        """
+        import pytest
+
+        def test_of_the_setting(motorlink_bench):
+            pass
+
+        @pytest.mark.motorlink("missing.toml")
+        def test_of_a_file(motorlink_bench):
+            pass
+
+        @pytest.mark.motorlink("[[st.motor]]\\npreset = 3")
+        def test_of_a_preset(motorlink_ports):
+            pass
+
+        @pytest.mark.motorlink(fault="explode=1")
+        def test_of_a_fault(motorlink_bench, motorlink_time):
+            pass
+
+        @pytest.mark.motorlink(sed=7)
+        def test_of_an_argument(motorlink_bench):
             pass
         """
     )
     outcome = pytester.runpytest("--strict-markers")
-    outcome.assert_outcomes(passed=4, errors=1)
-    outcome.stdout.fnmatch_lines(["*InvalidValueError: cannot read*nowhere.toml*"])
+    outcome.assert_outcomes(errors=5)
+    outcome.stdout.fnmatch_lines(
+        [
+            "the setting motorlink_config: cannot read*absent.toml*",
+            "the marker motorlink: cannot read*missing.toml*",
+            "the marker motorlink: st.motor 1: the presets are*",
+            "the marker motorlink: *explode*",
+            "the marker motorlink: *unexpected keyword argument 'sed'",
+        ]
+    )
+    assert "Traceback" not in outcome.stdout.str()
+    assert "AttributeError" not in outcome.stdout.str()
 
 
-def test_the_marker_is_told(pytester: pytest.Pytester) -> None:
+def test_pytest_lists_the_marker(pytester: pytest.Pytester) -> None:
     pytester.runpytest("--markers").stdout.fnmatch_lines(["@pytest.mark.motorlink(config*"])
 
 
-def test_who_does_not_use_it_does_not_load_it(pytester: pytest.Pytester) -> None:
+def test_other_tests_do_not_load_the_package(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         """
         import sys

@@ -172,7 +172,7 @@ def test_faults_temperatures_supplies_and_power_cycles() -> None:
         (lambda bench: bench.record(["st1.speed_rpm"], seconds=1, every=1e-6), "50 µs"),
         (lambda bench: bench.record(["st1.iq_amps"] * 2, seconds=1), "named twice"),
         (lambda bench: bench.record([], seconds=1), "name what"),
-        (lambda bench: motorlink.st.open(bench.port(fault="explode=1")), "explode"),
+        (lambda bench: bench.port(fault="explode=1"), "explode"),
     ],
 )
 def test_what_cannot_be_is_refused_and_nothing_happens(wrong: Any, message: str) -> None:
@@ -181,6 +181,50 @@ def test_what_cannot_be_is_refused_and_nothing_happens(wrong: Any, message: str)
     with pytest.raises(motorlink.InvalidValueError, match=message):
         wrong(bench)
     assert (bench.now, bench.state_hash) == (0.0, before)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"config": "[[st.motor]]\npreset = 3"}, "st.motor 1: the presets are"),
+        ({"config": "[[st.motor"}, "line 1, column 11"),
+        ({"config": "missing.toml"}, "cannot read `missing.toml`: No such file"),
+        ({"config": "/"}, "cannot read `/`: Is a directory"),
+        ({"config": {"st": object()}}, "not a configuration: .*object is not JSON"),
+        ({"config": {"st": float("nan")}}, "not a configuration: .*nan"),
+        ({"seed": -1}, "a seed of -1: give 0 to 4294967295"),
+        ({"fault": "explode=1"}, "explode"),
+    ],
+)
+def test_a_bench_that_cannot_be_built_says_why(arguments: Any, message: str) -> None:
+    with pytest.raises(motorlink.InvalidValueError, match=message):
+        with sim.Bench(**arguments):
+            pass
+
+
+def test_a_bench_is_of_text_a_path_or_a_dict() -> None:
+    with pytest.raises(TypeError, match="TOML text or the path of a file, not 5"):
+        sim.Bench(5)  # type: ignore[arg-type]
+
+
+def test_a_traceback_can_show_a_bench_that_was_not_built() -> None:
+    """pytest prints `self` of each function in a traceback."""
+    assert repr(sim.Bench.__new__(sim.Bench)) == "<motorlink.sim.Bench, not built>"
+
+
+@pytest.mark.parametrize(
+    ("ports", "kind", "message"),
+    [
+        ({"st": "pty:/missing/st0"}, motorlink.PortError, "`/missing/st0` failed: No such file"),
+        ({"rmd": "socketcan:nowhere0"}, motorlink.PortError, "no CAN interface `nowhere0`"),
+        ({"st": "carrier-pigeon"}, motorlink.InvalidValueError, "served ports are pty:PATH"),
+    ],
+)
+def test_a_port_that_cannot_be_created_says_which_and_why(
+    ports: Any, kind: type[Exception], message: str
+) -> None:
+    with sim.Bench() as bench, pytest.raises(kind, match=message):
+        bench.serve(**ports)
 
 
 def test_commands_are_those_of_the_program() -> None:

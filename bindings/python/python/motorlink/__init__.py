@@ -66,4 +66,4 @@ else:
         return getattr(part, name)
 
     def __dir__() -> list[str]:
-        return sorted({*globals(), *__all__})
+        return __all__

@@ -207,7 +207,7 @@ class _Reading:
 
 
 # Python compares a method with anything and finds that it differs: `while motor.status != "RUN":` would go
-# on for ever, and the motor turn. So a method that reads refuses what only its value can answer.
+# on for ever, and the motor would turn. So a method that reads refuses what only its value can answer.
 class _Uncalled:
     __slots__ = ("__func__", "__self__")
     __hash__ = None  # type: ignore[assignment]
@@ -224,7 +224,11 @@ class _Uncalled:
         return self.__func__.__doc__
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self.__func__, name)
+        # `inspect` and `functools` read these.
+        if name.startswith("__"):
+            return getattr(self.__func__, name)
+        method = self.__func__.__name__
+        raise AttributeError(f"`{method}` is a method: write `{method}().{name}`")
 
     def __repr__(self) -> str:
         return f"<method {self.__func__.__qualname__} of {self.__self__!r}>"
@@ -233,4 +237,20 @@ class _Uncalled:
         name = self.__func__.__name__
         raise TypeError(f"`{name}` is a method: write `{name}()` for what it reads")
 
-    __eq__ = __ne__ = __bool__ = __str__ = __format__ = _refuse
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __str__ = __format__ = _refuse
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _refuse
+    __float__ = __int__ = __index__ = __abs__ = __round__ = __neg__ = _refuse
+    __len__ = __getitem__ = __contains__ = _refuse
+
+
+# Errors of Python name the class: there it is what every other method is.
+_Uncalled.__name__ = _Uncalled.__qualname__ = "method"
+
+
+def check_request(request: object, kind: type, example: str) -> None:
+    """Refuses what is no request, with an example of one."""
+    if isinstance(request, kind):
+        return
+    name = getattr(request, "__name__", None)
+    found = f"`{name}` is a function that was not called" if name else f"{request!r} is none"
+    raise TypeError(f"give a request, such as `{example}`; {found}")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from motorlink import _core
-from motorlink._apis import Exchanges, both_apis, one
+from motorlink._apis import Exchanges, both_apis, check_request, one
 from motorlink._client import AnyClient
 from motorlink._core import CanPort
 from motorlink._rmd_table import MotionStatus, MotorCommands, Request, Status
@@ -127,6 +127,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
     @both_apis
     def exchange(self, motor: int, request: Request) -> Exchanges[Any]:
         """One exchange with a motor; gives what the reply says."""
+        check_request(request, Request, "rmd.read_status()")
         return one(self._exchange(motor, request))
 
     @both_apis
@@ -155,6 +156,8 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         What fails for one motor is its answer, an exception that is not raised; what fails for the
         line is raised.
         """
+        for request in requests.values():
+            check_request(request, Request, "rmd.read_status()")
         return one(self._cycle(list(requests.items())))
 
     @both_apis

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from motorlink import _core
-from motorlink._apis import Exchanges, both_apis, one
+from motorlink._apis import Exchanges, both_apis, check_request, one
 from motorlink._client import AnyClient
 from motorlink._core import StRequest as Request
 from motorlink._sampling import AnySampling, Samples, by_motor, skips
@@ -147,6 +147,7 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
     @both_apis
     def exchange(self, motor: int, request: Request) -> Exchanges[Any]:
         """One exchange with a motor; gives what the reply says."""
+        check_request(request, Request, "Request.status()")
         return one(self._exchange(motor, request))
 
     @both_apis

@@ -15,6 +15,10 @@ from motorlink._core import CanPort
 __all__ = ["CanPort", "from_python_can"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 def from_python_can(bus: Any) -> CanPort:
     """A port for :func:`motorlink.rmd.open` and :func:`motorlink.aio.rmd.open`.
 

@@ -21,6 +21,10 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 class MotorlinkError(Exception):
     """Something did not work; the message says what, where, and what to try."""
 

@@ -56,16 +56,21 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.fixture
 def motorlink_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
     """Simulated drives on virtual time, fresh for this test."""
+    from motorlink.errors import MotorlinkError
     from motorlink.sim import Bench
 
     marker = request.node.get_closest_marker("motorlink")
-    if marker is None:
-        inifile = request.config.inipath
-        folder = request.config.rootpath if inifile is None else inifile.parent
-        bench = Bench(_beside(folder, request.config.getini("motorlink_config")))
-    else:
-        config, *others = marker.args or (None,)
-        bench = Bench(_beside(request.path.parent, config), *others, **marker.kwargs)
+    try:
+        if marker is None:
+            inifile = request.config.inipath
+            folder = request.config.rootpath if inifile is None else inifile.parent
+            bench = Bench(_beside(folder, request.config.getini("motorlink_config")))
+        else:
+            config, *others = marker.args or (None,)
+            bench = Bench(_beside(request.path.parent, config), *others, **marker.kwargs)
+    except (MotorlinkError, TypeError) as error:
+        source = "the setting motorlink_config" if marker is None else "the marker motorlink"
+        pytest.fail(f"{source}: {error}", pytrace=False)
     with bench:
         yield bench
 

@@ -50,6 +50,10 @@ __all__ = [
 ]
 __all__ += _rmd_table.__all__
 
+
+def __dir__() -> list[str]:
+    return __all__
+
 #: What ``Client.sample`` can read.
 QUANTITIES: tuple[str, ...] = tuple(_core.rmd_quantities())
 

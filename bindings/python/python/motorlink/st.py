@@ -71,6 +71,10 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 class Motor(Blocking, StMotor["Client"]):
     """One motor of a drive; from :meth:`Client.motor`."""
 

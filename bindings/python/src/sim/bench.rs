@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant as Moment;
 
+use motorlink_link::fault::Faults;
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_testbench::scenario::Kind;
 use motorlink_testbench::{Bench, BenchConfig, Command, Recording};
@@ -35,8 +36,9 @@ impl SimBench {
         toml: &str,
         json: Option<&str>,
         path: Option<PathBuf>,
-        seed: Option<u32>,
+        seed: Option<i64>,
     ) -> PyResult<Self> {
+        let seed = seed.map(|seed| noise_seed(py, seed)).transpose()?;
         let config = match (json, path) {
             (Some(json), _) => BenchConfig::parse_json(json),
             (None, Some(path)) => BenchConfig::read(&path),
@@ -52,8 +54,9 @@ impl SimBench {
 
     /// The bench as a port, with faults.
     #[pyo3(signature = (fault = None))]
-    fn port(&self, fault: Option<String>) -> SimPort {
-        SimPort { bench: Arc::clone(&self.0), fault }
+    fn port(&self, py: Python<'_>, fault: Option<&str>) -> PyResult<SimPort> {
+        let faults = fault.map(str::parse).transpose().map_err(|error| invalid_value(py, error))?;
+        Ok(SimPort { bench: Arc::clone(&self.0), faults: faults.unwrap_or(Faults::NONE) })
     }
 
     /// What the ST drive speaks.
@@ -141,6 +144,13 @@ impl SimBench {
             self.0.run(left.min(SLICE));
         }
     }
+}
+
+/// The seed of a configuration.
+fn noise_seed(py: Python<'_>, seed: i64) -> PyResult<u32> {
+    u32::try_from(seed).map_err(|_| {
+        invalid_value(py, format_args!("a seed of {seed}: give 0 to {}, 32 bits", u32::MAX))
+    })
 }
 
 /// A time in s, up to a day.

@@ -23,7 +23,7 @@ pub(crate) enum Port<'py> {
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct SimPort {
     pub(super) bench: Arc<Bench>,
-    pub(super) fault: Option<String>,
+    pub(super) faults: Faults,
 }
 
 impl SimPort {
@@ -50,7 +50,6 @@ impl SimPort {
         py: Python<'_>,
         usable: fn(Faults) -> Result<Faults, FaultError>,
     ) -> PyResult<Faults> {
-        let faults = self.fault.as_ref().map(|text| text.parse().and_then(usable)).transpose();
-        Ok(faults.map_err(|error| invalid_value(py, error))?.unwrap_or(Faults::NONE))
+        usable(self.faults.clone()).map_err(|error| invalid_value(py, error))
     }
 }

@@ -29,3 +29,7 @@ from motorlink.aio import rmd, st
 from motorlink.aio._sampling import Sampling
 
 __all__ = ["Sampling", "rmd", "st"]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -29,6 +29,10 @@ from motorlink.errors import ClosedError, MotorlinkError, PortError
 __all__ = ["Client", "Motor", "Opening", "open"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 class Motor(Awaited, RmdMotor["Client"]):
     """One motor on the bus; from :meth:`Client.motor`. See :class:`motorlink.rmd.Motor`."""
 

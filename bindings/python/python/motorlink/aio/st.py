@@ -28,7 +28,11 @@ from motorlink.aio._sampling import Sampling, sampled
 from motorlink.aio._steps import AwaitedClient, Opening, is_told, opens, tell
 from motorlink.errors import LinkError, MotorlinkError, RefusedError, ReplyTimeoutError
 
-__all__ = ["Client", "Motor", "Opening", "open", "scan"]
+__all__ = ["Client", "Motor", "Opening", "RegisterNames", "open", "scan"]
+
+
+def __dir__() -> list[str]:
+    return __all__
 
 
 class Motor(Awaited, StMotor["Client"]):

@@ -14,7 +14,7 @@ from motorlink._sampling import Samples
 from motorlink.errors import InvalidValueError
 from motorlink.sim._recording import Recording
 from motorlink.sim._serving import Serving
-from motorlink.sim._source import Source, text_or_path
+from motorlink.sim._source import Source, as_json, text_or_path
 from motorlink.sim._time import patched_time
 
 
@@ -47,7 +47,8 @@ class Bench(Closing):
         fault: str | None = None,
     ):
         if isinstance(config, Mapping):
-            self._core = _core.SimBench(json=json.dumps(config), seed=seed)
+            json_text = as_json(config, "not a configuration")
+            self._core = _core.SimBench(json=json_text, seed=seed)
         else:
             text, path = text_or_path("" if config is None else config)
             self._core = _core.SimBench(toml=text, path=path, seed=seed)
@@ -172,10 +173,7 @@ class Bench(Closing):
         >>> Bench().execute({"command": "supply", "port": "rmd", "motor": 2, "volts": 6.5})
         {'ok': True}
         """
-        try:
-            text = json.dumps(dict(command), allow_nan=False)
-        except (TypeError, ValueError) as error:
-            raise InvalidValueError(f"not a command: {error} in {dict(command)}") from error
+        text = as_json(command, "not a command")
         answer: dict[str, Any] = json.loads(self._core.execute(text))
         return answer
 
@@ -281,6 +279,9 @@ class Bench(Closing):
                 self._rmd._end(in_flight=in_flight)
 
     def __repr__(self) -> str:
+        if not hasattr(self, "_core"):
+            # A traceback of pytest shows a bench that could not be built.
+            return "<motorlink.sim.Bench, not built>"
         return f"<motorlink.sim.Bench {', '.join(self.motors)} at {self.now:g} s>"
 
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
+from collections.abc import Mapping
 from typing import Any, Union
+
+from motorlink.errors import InvalidValueError
 
 Source = Union[str, "os.PathLike[str]"]
 
@@ -17,4 +21,16 @@ def is_path(source: Any) -> bool:
 
 def text_or_path(source: Source) -> tuple[str, str | None]:
     """TOML text, or the path of a file."""
-    return ("", os.fspath(source)) if is_path(source) else (str(source), None)
+    if is_path(source):
+        return "", os.fspath(source)
+    if isinstance(source, str):
+        return source, None
+    raise TypeError(f"give TOML text or the path of a file, not {source!r}")
+
+
+def as_json(members: Mapping[str, Any], what: str) -> str:
+    """A configuration or a command as JSON; ``what`` begins the error."""
+    try:
+        return json.dumps(dict(members), allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise InvalidValueError(f"{what}: {error} in {dict(members)}") from error
