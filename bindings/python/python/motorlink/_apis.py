@@ -248,7 +248,7 @@ _Uncalled.__name__ = _Uncalled.__qualname__ = "method"
 
 
 def check_request(request: object, kind: type, example: str) -> None:
-    """Refuses what is no request, with an example of one."""
+    """Raises for anything but a request; the error has an example of one."""
     if isinstance(request, kind):
         return
     name = getattr(request, "__name__", None)

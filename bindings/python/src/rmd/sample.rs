@@ -34,11 +34,7 @@ type Replies = Vec<(MotorId, Code, [u8; 8])>;
 
 impl Questions {
     /// About the quantities of motors `(id, names)`.
-    fn new(
-        py: Python<'_>,
-        motors: Vec<(i64, Vec<String>)>,
-        raw: bool,
-    ) -> PyResult<Self> {
+    fn new(py: Python<'_>, motors: Vec<(i64, Vec<String>)>, raw: bool) -> PyResult<Self> {
         let mut lanes = Vec::with_capacity(motors.len());
         for (id, names) in motors {
             let quantities: PyResult<_> =

@@ -50,6 +50,6 @@ impl SimPort {
         py: Python<'_>,
         usable: fn(Faults) -> Result<Faults, FaultError>,
     ) -> PyResult<Faults> {
-        usable(self.faults.clone()).map_err(|error| invalid_value(py, error))
+        usable(self.faults).map_err(|error| invalid_value(py, error))
     }
 }
