@@ -276,7 +276,7 @@ def test_a_motor_id_outside_1_to_32_is_a_usage_error(run, motor):
         ("single-turn-position -1 cw", "nothing was sent"),
         ("speed 1e9", "nothing was sent"),
         ("torque4 0 0 0 99", "±32 A"),
-        ("pid 1 2", "6 values"),
+        ("pid 1 2", "a motor has six"),
         ("pid 1 2 3 4 5 256", "256"),
         ("raw 1 2 3 4 5 6 7 8 9", "8 bytes"),
         ("raw zz", "not hexadecimal"),

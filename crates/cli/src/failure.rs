@@ -117,6 +117,14 @@ impl Failure {
         self
     }
 
+    /// With a fact before what happened.
+    pub fn with_fact(mut self, fact: impl std::fmt::Display) -> Self {
+        if let Failure::Failed(problem) = &mut self {
+            problem.message = format!("{fact}: {}", problem.message);
+        }
+        self
+    }
+
     /// The exit code.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -66,9 +66,14 @@ impl Line {
     }
 
     pub fn values(self, rows: &[Row]) -> Self {
+        self.with_values("values", rows)
+    }
+
+    /// Values under a name of their own.
+    pub fn with_values(self, name: &str, rows: &[Row]) -> Self {
         let values: Map<String, Value> =
             rows.iter().map(|row| (row.name.clone(), row.value.clone())).collect();
-        self.with("values", values)
+        self.with(name, values)
     }
 
     /// Says that it was not done, and why.

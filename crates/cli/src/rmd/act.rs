@@ -1,12 +1,13 @@
 //! Commands that change something in a motor.
 
 use motorlink::rmd::{
-    Acceleration, Code, DpsPerSecond, EncoderOffset, Error, FullTurn, IqCommand, MotionStatus,
-    MotorSet, Pid, Quantity, SetTorque4, SpeedLimit, SpinDirection, TurnCentiDegrees,
+    Code, EncoderOffset, Error, FullTurn, IqCommand, MotionStatus, MotorSet, SetTorque4,
+    SpeedLimit, SpinDirection, TurnCentiDegrees,
 };
 
 use super::args::{self, Act, MaxSpeed};
 use super::session::Session;
+use super::settings;
 use crate::failure::Failure;
 use crate::output::{hex, parse_hex, report};
 
@@ -14,18 +15,10 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     let motor = session.motor()?;
     let id = motor.id();
     match act {
-        Act::Pid { gains } => pid(session, &gains),
-        Act::Acceleration { dps_per_second: None } => {
-            let acceleration = motor.acceleration()?;
-            session.show(&Acceleration { acceleration })
-        }
-        Act::Acceleration { dps_per_second: Some(limit) } => {
-            let limit: DpsPerSecond = wanted(session, limit)?;
-            motor.write_acceleration_ram(limit)?;
-            session.done(format!("motor {id} accelerates with {limit} until power-off"))
-        }
+        Act::Pid { gains } => settings::pid(session, &gains),
+        Act::Acceleration { dps_per_second } => settings::acceleration(session, dps_per_second),
         Act::Encoder => session.show(&motor.encoder()?),
-        Act::EncoderOffset { offset } => encoder_offset(session, offset),
+        Act::EncoderOffset { offset } => settings::encoder_offset(session, offset),
         Act::Zero => {
             session.rom("setting the zero")?;
             let offset = motor.write_zero_rom()?;
@@ -46,11 +39,11 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             motor.run()?;
             session.done(format!("motor {id} resumes what `stop` stopped, if anything"))
         }
-        Act::Torque { amps } => session.replied(&motor.set_torque(wanted(session, amps)?)?),
-        Act::Speed { dps } => session.replied(&motor.set_speed(wanted(session, dps)?)?),
+        Act::Torque { amps } => session.replied(&motor.set_torque(session.wanted(amps)?)?),
+        Act::Speed { dps } => session.replied(&motor.set_speed(session.wanted(dps)?)?),
         Act::Position { degrees, most } => {
             let max_speed = max_speed(session, &most)?;
-            session.replied(&motor.set_position(wanted(session, degrees)?, max_speed)?)
+            session.replied(&motor.set_position(session.wanted(degrees)?, max_speed)?)
         }
         Act::SingleTurnPosition { degrees, direction, most, full_turn } => {
             let max_speed = max_speed(session, &most)?;
@@ -75,37 +68,8 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     }
 }
 
-fn pid(session: &Session, gains: &[u8]) -> Result<(), Failure> {
-    let motor = session.motor()?;
-    if let &[position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki] = gains {
-        let gains = Pid { position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki };
-        if session.write_rom {
-            motor.write_pid_rom(gains)?;
-            return session.done(format!("motor {} has these gains for good", motor.id()));
-        }
-        motor.write_pid_ram(gains)?;
-        return session.done(format!("motor {} has these gains until power-off", motor.id()));
-    }
-    session.show(&motor.pid()?)
-}
-
-fn encoder_offset(session: &Session, offset: u16) -> Result<(), Failure> {
-    session.rom("setting the encoder offset")?;
-    let motor = session.motor()?;
-    let taken = motor.write_encoder_offset_rom(offset)?;
-    if taken != offset {
-        return Err(Failure::refused(format!(
-            "motor {} took the offset {taken} instead of {offset}: its encoder is narrower",
-            motor.id()
-        )));
-    }
-    let text = format!("motor {} has the encoder offset {taken}", motor.id());
-    let values = session.rows(&EncoderOffset { offset: taken });
-    session.output.result(text, session.line(session.id).ok(true).values(&values))
-}
-
 fn max_speed(session: &Session, most: &MaxSpeed) -> Result<Option<SpeedLimit>, Failure> {
-    most.max_speed.map(|speed| wanted(session, speed)).transpose()
+    most.max_speed.map(|speed| session.wanted(speed)).transpose()
 }
 
 fn turn(
@@ -115,12 +79,12 @@ fn turn(
     direction: SpinDirection,
     full_turn: &args::FullTurn,
 ) -> Result<MotionStatus, Failure> {
-    let angle = wanted(session, degrees)?;
+    let angle = session.wanted(degrees)?;
     let full_turn = match *full_turn {
         args::FullTurn { full_turn: true, .. } => FullTurn::Allowed,
         args::FullTurn { tolerance: None, .. } => FullTurn::default(),
         args::FullTurn { tolerance: Some(degrees), .. } => {
-            FullTurn::Refused { tolerance: wanted(session, degrees)? }
+            FullTurn::Refused { tolerance: session.wanted(degrees)? }
         }
     };
     let moved = session.motor()?.set_single_turn_position(angle, direction, max_speed, full_turn);
@@ -139,7 +103,7 @@ fn turn(
 fn set_torque4(session: &Session, amps: &[f64]) -> Result<(), Failure> {
     let mut torques = [IqCommand(0); 4];
     for (slot, &amps) in torques.iter_mut().zip(amps) {
-        *slot = wanted(session, amps)?;
+        *slot = session.wanted(amps)?;
     }
     let replies = session.bus.set_torque4(SetTorque4(torques), MotorSet::TORQUE4)?;
     let mut failures = Vec::new();
@@ -181,11 +145,4 @@ fn raw(session: &Session, bytes: &[u8]) -> Result<(), Failure> {
     let reply = session.bus.raw(session.motor()?.id(), request)?;
     let data = hex(&reply);
     session.output.result(&data, session.line(session.id).ok(true).with("data", &*data))
-}
-
-/// A value in the physical unit, or with --raw in digits. What no frame of the protocol says is
-/// refused, never cut.
-fn wanted<Q: Quantity>(session: &Session, value: f64) -> Result<Q, Failure> {
-    let wanted = if session.raw { Q::wanted_digits(value) } else { Q::wanted(value) };
-    wanted.map_err(|error| Failure::usage(format!("{error}; nothing was sent")))
 }

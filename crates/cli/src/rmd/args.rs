@@ -68,11 +68,13 @@ pub enum Read {
 #[derive(Subcommand)]
 pub enum Act {
     /// Show the gains, or set them until power-off (for good with --write-rom)
+    ///
+    /// Gains are 0 to 255. A motor takes all six in one frame: to set one, the six are read, this one
+    /// is changed, and the six are written and read back.
     Pid {
-        /// Position Kp, Ki, speed Kp, Ki, torque Kp, Ki: all six to set them
-        #[arg(num_args = 6, value_names = ["POSITION_KP", "POSITION_KI", "SPEED_KP", "SPEED_KI",
-                                           "TORQUE_KP", "TORQUE_KI"])]
-        gains: Vec<u8>,
+        /// Gains to set, such as speed_kp=120; or all six as numbers, in the order that `pid` shows
+        #[arg(value_name = "NAME=GAIN", num_args = 0..=6)]
+        gains: Vec<String>,
     },
     /// Show the acceleration limit, or set it until power-off
     #[command(visible_alias = "accel")]

@@ -4,6 +4,7 @@ mod act;
 mod args;
 mod read;
 mod session;
+mod settings;
 
 pub use args::Args;
 use args::{Command, Read};

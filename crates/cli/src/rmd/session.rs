@@ -1,7 +1,7 @@
 //! What commands to a motor work on.
 
 use motorlink::port::PortName;
-use motorlink::rmd::{Client, Motor, Options, Payload};
+use motorlink::rmd::{Client, Motor, Options, Payload, Quantity};
 
 use super::args::MotorArgs;
 use crate::connection::Connection;
@@ -62,6 +62,13 @@ impl Session {
     pub fn rows<P: Payload>(&self, message: &P) -> Vec<Row> {
         let data = message.encode_as(0);
         P::FIELDS.iter().map(|field| json::field(field, &data, self.raw)).collect()
+    }
+
+    /// A value in the physical unit, or with --raw in digits. A value that no frame can carry is
+    /// refused, never cut.
+    pub fn wanted<Q: Quantity>(&self, value: f64) -> Result<Q, Failure> {
+        let wanted = if self.raw { Q::wanted_digits(value) } else { Q::wanted(value) };
+        wanted.map_err(|error| Failure::usage(format!("{error}; nothing was sent")))
     }
 
     pub fn motor(&self) -> Result<Motor<'_>, Failure> {

@@ -4,14 +4,14 @@ use std::time::Duration;
 
 use motorlink::st::{
     Command as Execute, CurrentReference, Flags, PositionMove, Profile, REVUP_PHASES, Ramp,
-    RegisterId, RevupPhase, Status, TorqueRamp, VERIFY_ATTEMPTS, find_register, parse_value,
-    register::Unit,
+    RegisterId, RevupPhase, Status, TorqueRamp, VERIFY_ATTEMPTS, register::Unit,
 };
 use motorlink::time;
 
 use super::args::{Act, Pfc};
 use super::read::explain;
 use super::session::Session;
+use super::set;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::json::Row;
@@ -22,7 +22,7 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
     match act {
         Act::Set { register, value, verify } => {
             let attempts = verify.map(|attempts| attempts.unwrap_or(VERIFY_ATTEMPTS));
-            set(session, &register, &value, attempts)
+            set::run(session, &register, &value, attempts)
         }
         Act::Start => start(session),
         Act::Stop => execute(session, Execute::StopMotor),
@@ -128,22 +128,6 @@ fn acknowledge(session: &Session) -> Result<(), Failure> {
             return Err(Failure::refused(format!("{} keeps its faults: {why}", motor.number())));
         }
     }
-}
-
-fn set(session: &Session, name: &str, text: &str, verify: Option<u8>) -> Result<(), Failure> {
-    let register = find_register(name)?;
-    let profile = session.client.profile();
-    let bits = parse_value(register, text, profile, session.raw)?;
-    let motor = session.motor()?;
-    if let Some(attempts) = verify {
-        let attempt = motor.set_raw_verified(register, bits, attempts)?;
-        let again = if attempt == 1 { String::new() } else { format!(", at attempt {attempt}") };
-        let text = format!("{}: {register} is written and reads back{again}", motor.number());
-        let object = session.line().ok(true).with("attempts", attempt);
-        return session.output.result(text, object);
-    }
-    motor.set_raw(register, bits, register.write_size(profile))?;
-    session.done(format!("{}: {register} is written", motor.number()))
 }
 
 fn revup(session: &Session) -> Result<(), Failure> {

@@ -5,6 +5,7 @@ mod args;
 mod read;
 mod scan;
 mod session;
+mod set;
 
 pub use args::Args;
 use args::{Command, DriveArgs, Read};

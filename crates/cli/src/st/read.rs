@@ -154,12 +154,5 @@ fn read(session: &Session, register: RegisterId) -> Result<Reading, Failure> {
 
 /// A register with its value as people read it.
 fn row(session: &Session, reading: &Reading) -> Row {
-    let text = match (session.raw, reading.name()) {
-        (true, _) => reading.digits().to_string(),
-        (false, Some(name)) if reading.register != RegisterId::TARGET_MOTOR => {
-            format!("{name} ({:#x})", reading.digits())
-        }
-        _ => reading.to_string(),
-    };
-    json::register(reading, text, session.raw)
+    json::register(reading, session.text(reading), session.raw)
 }

@@ -72,6 +72,17 @@ impl Session {
         Reading { register, bits, profile: self.client.profile() }
     }
 
+    /// A register's value as people read it.
+    pub fn text(&self, reading: &Reading) -> String {
+        match (self.raw, reading.name()) {
+            (true, _) => reading.digits().to_string(),
+            (false, Some(name)) if reading.register != RegisterId::TARGET_MOTOR => {
+                format!("{name} ({:#x})", reading.digits())
+            }
+            _ => reading.to_string(),
+        }
+    }
+
     pub fn motor(&self) -> Result<Motor<'_>, Failure> {
         Ok(self.client.motor(self.motor)?)
     }

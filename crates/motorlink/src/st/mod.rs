@@ -28,7 +28,7 @@ pub use motorlink_proto::st::{
     Command, ControlMode, Counters, CurrentReference, ErrorCode, Failure, Feature, Features, Flags,
     FrameCode, LimitError, Limits, MasterConfig, MotorNumber, NoSuchProfile, PositionMove, Profile,
     REVUP_PHASES, Ramp, Recovery, RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS,
-    Slave, Status, SyncState, TorqueRamp, VERIFY_ATTEMPTS, register,
+    Slave, Status, SyncState, TorqueRamp, Unverified, VERIFY_ATTEMPTS, VerifiedWrite, register,
 };
 
 pub use client::{BoardInfo, Client, FirmwareVersion};

@@ -66,6 +66,11 @@ impl VerifiedWrite {
         Ok(VerifiedWrite { register, bytes: value.to_le_bytes(), size, expected })
     }
 
+    /// What the register reads back when the write was right.
+    pub fn expected(&self) -> i32 {
+        self.expected
+    }
+
     /// Writes and reads back until the register has the value, at most `attempts` times (0 counts
     /// as 1). Returns the number of the successful attempt.
     ///

@@ -1,0 +1,137 @@
+//! `motorlink st set`: the value before and after.
+
+use std::convert::Infallible;
+
+use motorlink::st::register::Access;
+use motorlink::st::{
+    Error, Features, Profile, Reading, RegisterId, Unverified, VerifiedWrite, find_register,
+    parse_value,
+};
+
+use super::session::Session;
+use crate::failure::Failure;
+use crate::json::{self, Line};
+
+/// What could be read of a register.
+enum Look {
+    Value(Reading),
+    /// The reason why there is no value.
+    Unreadable(String),
+}
+
+pub fn run(session: &Session, name: &str, text: &str, attempts: Option<u8>) -> Result<(), Failure> {
+    let register = find_register(name)?;
+    let profile = session.client.profile();
+    let bits = parse_value(register, text, profile, session.raw)?;
+    let motor = session.motor()?;
+    let comparable = VerifiedWrite::new::<Infallible>(profile, register, bits);
+    if let (Some(attempts), Err(_)) = (attempts, comparable) {
+        // Refused by the library: nothing is sent.
+        motor.set_raw_verified(register, bits, attempts)?;
+    }
+    let before = look(session, register, attempts.unwrap_or(1))
+        .map_err(|failure| failure.with_fact(format!("{register} was not written")))?;
+    let (attempt, after) = match (attempts, &comparable) {
+        (Some(attempts), Ok(write)) => {
+            let attempt = motor.set_raw_verified(register, bits, attempts)?;
+            (Some(attempt), Look::Value(session.reading(register, write.expected())))
+        }
+        _ => {
+            motor.set_raw(register, bits, register.write_size(profile))?;
+            let after = look(session, register, 1).map_err(|failure| {
+                failure.with_fact(format!(
+                    "the drive acknowledged writing {register}, but it could not be read back"
+                ))
+            })?;
+            (None, after)
+        }
+    };
+    let output = session.confirmed()?;
+    if let (Ok(write), Look::Value(after)) = (comparable, &after)
+        && after.bits != write.expected()
+    {
+        let (expected, read) = (write.expected(), after.bits);
+        return Err(Error::Differs { motor: motor.number(), register, expected, read }.into());
+    }
+    let mut said = format!("{}: {}", motor.number(), words(session, register, &before, &after));
+    if let (Err(Unverified::Acts), Look::Value(after)) = (comparable, &after)
+        && after.bits != bits
+    {
+        let written = session.text(&session.reading(register, bits));
+        said +=
+            &format!("; {written} was written, and the drive may change this register by itself");
+    }
+    if let Some(attempt @ 2..) = attempt {
+        said += &format!(" (written {attempt} times)");
+    }
+    let mut object = session.line().ok(true);
+    object = with_look(object, session, "before", &before);
+    object = with_look(object, session, "values", &after);
+    if let Some(attempt) = attempt {
+        object = object.with("attempts", attempt);
+    }
+    output.result(said, object)
+}
+
+/// Reads the register, unless the table says that it cannot be read. A line that fails in each of
+/// `attempts` is an error.
+fn look(session: &Session, register: RegisterId, attempts: u8) -> Result<Look, Failure> {
+    if let Some(reason) = unreadable(register, session.client.profile()) {
+        return Ok(Look::Unreadable(reason));
+    }
+    let motor = session.motor()?;
+    let mut read = motor.get_raw(register);
+    for _ in 1..attempts {
+        if read.as_ref().is_err_and(Error::is_line_failure) {
+            read = motor.get_raw(register);
+        }
+    }
+    match read {
+        Ok(bits) => Ok(Look::Value(session.reading(register, bits))),
+        Err(Error::Refused { code, .. }) => {
+            Ok(Look::Unreadable(format!("the drive refuses to read it ({code})")))
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Why the table does not allow to read a register.
+fn unreadable(register: RegisterId, profile: Profile) -> Option<String> {
+    let shape = register.shape()?;
+    if shape.read_size(profile, Features::NONE.with(shape.feature)).is_some() {
+        return None;
+    }
+    Some(match shape.access {
+        Access::WriteOnly => "it is write-only".to_owned(),
+        _ => format!("profile {profile} cannot read it", profile = profile.name()),
+    })
+}
+
+fn words(session: &Session, register: RegisterId, before: &Look, after: &Look) -> String {
+    match (before, after) {
+        (Look::Value(before), Look::Value(after)) => {
+            let [before, after] = [before, after].map(|reading| session.text(reading));
+            format!("{register} was {before}, is {after}")
+        }
+        (Look::Unreadable(why), Look::Value(after)) => {
+            let after = session.text(after);
+            format!("{register} is {after}; its old value is unknown: {why}")
+        }
+        (Look::Value(before), Look::Unreadable(why)) => {
+            let before = session.text(before);
+            format!("{register} was {before} and is written; its new value is unknown: {why}")
+        }
+        (Look::Unreadable(why), Look::Unreadable(_)) => {
+            format!("{register} is written; its value is unknown: {why}")
+        }
+    }
+}
+
+fn with_look(object: Line, session: &Session, name: &str, look: &Look) -> Line {
+    match look {
+        Look::Value(reading) => {
+            object.with_values(name, &[json::register(reading, String::new(), session.raw)])
+        }
+        Look::Unreadable(_) => object,
+    }
+}
