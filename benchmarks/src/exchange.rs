@@ -36,8 +36,10 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     };
     let section = Section {
         title: "A GET_REG exchange, master and slave",
-        note: "SPEED_MEAS from request to value in user space, without I/O; the drive is memory, \
-               or simulated with 0.1 ms between exchanges, in which its motors turn."
+        note: "\
+- One operation: SPEED_MEAS from request to value, in user space, without I/O.
+- *memory*: the drive only stores registers.
+- *simulation*: the drive is simulated. Its motors turn for 0.1 ms between exchanges."
             .to_owned(),
         columns: vec!["drive", "ns, least", "median", "instructions"],
         rows,

@@ -6,6 +6,15 @@ use std::process::Command;
 
 use crate::report::Style;
 
+/// The first lines of docs/BENCHMARKS.md.
+const HEAD: &str = "\
+# Benchmarks
+
+This page is for users who need to know the cost of an exchange or of a simulated drive, and for
+contributors who make them faster. It has figures of one machine. Measure yours with `make bench`.
+The goals of the project are in the last table.
+";
+
 /// Prints the head of the report.
 pub fn describe(style: Style) {
     let options: Vec<String> = args().skip(1).collect();
@@ -19,7 +28,7 @@ pub fn describe(style: Style) {
     match style {
         Style::Plain => rows.iter().for_each(|(name, value)| println!("{name:<9}  {value}")),
         Style::Markdown => {
-            println!("# Benchmarks\n");
+            println!("{HEAD}");
             rows.iter().for_each(|(name, value)| println!("- {name}: `{value}`"));
         }
     }

@@ -82,13 +82,18 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     let section = Section {
         title: "Exchanges per second through Python",
         note: format!(
-            "GET_REG SPEED_MEAS on a pty whose far end answers at once, another process on the same \
-             core: {ROUNDS} rounds of {EXCHANGES} exchanges of each in turn. Rates are medians; the \
-             ratio is that of motorlink's rate to the row's in the same round. Processor time is that \
-             of the asking process, with its system calls; most of an exchange is the kernel's and the \
-             far end's, for everybody: the system calls alone are {:.2} times as fast as framing and \
-             checks in Python, which is the most that is to be had on this line. Without a line: a \
-             request encoded, a reply checked and decoded, the least of 15. {}.",
+            "\
+- One exchange: GET_REG SPEED_MEAS on a pty. The other end is a process on the same core. It replies
+  immediately.
+- {ROUNDS} rounds. Each round has {EXCHANGES} exchanges of each program, in turn.
+- Rates are medians. The ratio is the rate of motorlink divided by the rate of the row, in the same
+  round.
+- Processor time is that of the process that sends the requests, with its system calls.
+- The kernel and the other end take most of the time of an exchange, for every program.
+- The system calls alone are {:.2} times as fast as framing and checks in Python. No program can be
+  faster on this line.
+- *without a line*: a request is encoded, and a reply is checked and decoded. Minimum of 15.
+- Versions: {}.",
             most.median,
             versions.join(", ")
         ),

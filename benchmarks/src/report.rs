@@ -83,7 +83,7 @@ pub fn goals(goals: &[Goal]) -> Section {
     };
     Section {
         title: "Goals",
-        note: "What the project holds itself to.".to_owned(),
+        note: "The goals of this project.".to_owned(),
         columns: vec!["figure", "wanted", "measured", "goal"],
         rows: goals.iter().map(row).collect(),
     }

@@ -38,9 +38,11 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     let section = Section {
         title: "Cycles on a 1 Mbit/s CAN bus",
         note: format!(
-            "{CYCLES} cycles of the sans-IO host and simulated motors on virtual time; bits with \
-             stuffing and interframe space. The share is that of the time in which frames were on the \
-             wire, with motors that answer at once, and {} us later.",
+            "\
+- {CYCLES} cycles of the sans-IO host and simulated motors, on virtual time.
+- Bits include stuffing and interframe space.
+- The share is the part of the time in which frames were on the wire.
+- *at once*: motors reply immediately. *later*: motors reply after {} us.",
             TURNAROUND.as_micros()
         ),
         columns: vec!["cycle", "bits", "ceiling/s", "at once, /s", "share", "later, /s", "share"],

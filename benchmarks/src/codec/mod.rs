@@ -31,10 +31,11 @@ fn section(title: &'static str, kinds: Vec<Kind>, counter: Option<&Counter>) -> 
     }
     Ok(Section {
         title,
-        note:
-            "From the typed message to the frame's bytes and back, once. Times are the least and \
-               the median of 201 batches of 1000; instructions are callgrind's."
-                .to_owned(),
+        note: "\
+- One operation: from the typed message to the bytes of the frame, and back.
+- Times are the minimum and the median of 201 batches of 1000 operations.
+- Instructions are counted by callgrind."
+            .to_owned(),
         columns: vec![
             "message",
             "request ns, least",

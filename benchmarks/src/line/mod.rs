@@ -55,13 +55,15 @@ pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     let section = Section {
         title: "Exchanges per second through a line",
         note: format!(
-            "GET_REG SPEED_MEAS by the blocking client from a simulated drive in another thread, \
-             against a loop without a protocol that moves the same bytes with the same system \
-             calls, each a function as in libc. {ROUNDS} rounds of {EXCHANGES} exchanges of each in \
-             turn, all on one core, in each of {SITTINGS} processes. Rates are medians; the ratio is \
-             that of neighbouring rounds. The last column is the median ratio to a loop with inlined \
-             calls, for information: it has no return behind a switch between threads, which the \
-             processor would mispredict."
+            "\
+- *client*: the blocking client reads SPEED_MEAS (GET_REG) from a simulated drive in another thread.
+- *raw*: a loop without a protocol moves the same bytes with the same system calls. Each call is a
+  function, as in libc.
+- {ROUNDS} rounds of {EXCHANGES} exchanges of each in turn, all on one core, in each of {SITTINGS}
+  processes.
+- Rates are medians. The ratio is that of neighbouring rounds.
+- *inlined*: the median ratio to a loop with inlined calls, for information. This loop has no return
+  after a switch between threads. The processor would mispredict such a return."
         ),
         columns: vec!["line", "client/s", "raw/s", "ratio, median", "least", "most", "inlined"],
         rows,

@@ -23,16 +23,17 @@ const FASTER: f64 = 100.0;
 
 /// How the others are set up.
 const OTHERS: &str = "\
-The others run as fast as they can be made to (bench/peers.py): nothing is plotted or \
-rewarded that need not be, and no period has more than one voltage. gym-electric-motor is its \
-Cont-CC-PMSM-v0 without gymnasium's checks, with its default and fastest solver, one Euler step a \
-period; its own controllers need a package that draws diagrams, so that PI regulators of ours in \
-plain floats are its control. motulator is its Drive with stiff mechanics and its \
-CurrentVectorControl; it always integrates by SciPy, with RK23 here because its default RK45 is \
-slower, and with one midpoint step of ours in place of that, for what is left when its solver \
-costs next to nothing. Ours has, beside what theirs have, friction with stiction, cogging, iron \
-loss, heat, supply and dead time, current sensors with noise, an encoder, and as a drive all of its \
-firmware.";
+The other simulators run as fast as they can (benchmarks/peers.py). They plot nothing, compute no
+reward that is not required, and have one voltage in each period.
+
+- gym-electric-motor is its Cont-CC-PMSM-v0 without the checks of gymnasium. It uses its default and
+  fastest solver, with one Euler step in each period. Its own controllers need a package that draws
+  diagrams, so PI regulators of ours in plain floats control it.
+- motulator is its Drive with stiff mechanics and its CurrentVectorControl. It always integrates
+  with SciPy. RK23 is used here, because its default RK45 is slower. *midpoint* replaces the solver
+  with one midpoint step of ours. This shows the cost of the rest.
+- Our plant also has friction with stiction, cogging, iron loss, heat, supply and dead time, current
+  sensors with noise, and an encoder. Our drive also has its whole firmware.";
 
 pub fn measure() -> Result<(Vec<Section>, Vec<Goal>)> {
     let counter = Counter::find();
@@ -66,10 +67,12 @@ fn own(counter: Option<&Counter>) -> Result<(Section, Vec<Goal>)> {
     let section = Section {
         title: "A simulated drive",
         note: format!(
-            "A PWM period of 50 us of one motor: plant, power stage, sensing and the drive's \
-             software; the ST drive's regulators run in each period. Virtual seconds a second of \
-             one core's time, median of {ROUNDS} turns of {PERIODS} periods; then time and \
-             instructions a period."
+            "\
+- One operation: a PWM period of 50 us of one motor, with plant, power stage, sensing and the
+  software of the drive. The regulators of an ST drive run in each period.
+- *times real time*: virtual seconds in one second of one core, median of {ROUNDS} turns of {PERIODS}
+  periods.
+- The other columns are time and instructions of one period."
         ),
         columns: vec!["drive", "times real time", "ns, least", "median", "instructions"],
         rows,
@@ -106,11 +109,14 @@ fn beside_others() -> Result<(Section, Vec<Goal>)> {
         reached: ratio.map(|ratio| (format!("{ratio:.0}"), ratio >= FASTER)),
     });
     let section = Section {
-        title: "Beside other simulators",
+        title: "Comparison with other simulators",
         note: format!(
-            "Steps of 50 us a second of one core's time, in turns: ours, theirs, {ROUNDS} times; \
-             medians, and the median of the ratios of neighbouring turns. The same motor at the \
-             same speed and current for all; measured beside {found}.\n\n{OTHERS}"
+            "\
+- *steps/s*: steps of 50 us in one second of one core. *ours* is the simulation of this project.
+- The simulators run in turn, {ROUNDS} times. Rates are medians. The ratio is the median of neighbouring
+  turns.
+- The motor, its speed and its current are the same for all.
+- Compared with: {found}.\n\n{OTHERS}"
         ),
         columns: vec!["simulator", "steps/s", "ours", "steps/s", "ratio"],
         rows,
