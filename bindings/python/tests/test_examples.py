@@ -11,8 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from conftest import REPOSITORY
-
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
@@ -31,14 +29,6 @@ def run(folder: Path, *words: str) -> str:
     )
     assert done.returncode == 0, done.stdout
     return done.stdout
-
-
-def test_what_the_document_shows(tmp_path: Path) -> None:
-    text = (REPOSITORY / "docs" / "PYTHON-SIM.md").read_text()
-    script, tests = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
-    assert run(tmp_path, "-c", script).endswith(" RUN\n")
-    (tmp_path / "test_shown.py").write_text(tests)
-    assert "3 passed" in run(tmp_path, "-m", "pytest", "-q")
 
 
 def test_every_example_is_run_here() -> None:
