@@ -314,7 +314,7 @@ def test_without_python_can_it_says_what_to_install(monkeypatch: pytest.MonkeyPa
 
 
 def test_what_is_no_bus_is_told_apart() -> None:
-    with pytest.raises(TypeError, match="no bus of python-can"):
+    with pytest.raises(TypeError, match="not a bus of python-can"):
         from_python_can("can0")
     port = CanPort(None, None, "nothing")
     assert repr(port) == "<CanPort nothing>"

@@ -156,9 +156,9 @@ def test_faults_temperatures_supplies_and_power_cycles() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (lambda bench: bench.brake("st9", 1), "there are st1, st2, rmd1"),
-        (lambda bench: bench.brake("motor", 1), "there are st1, st2, rmd1"),
-        (lambda bench: bench.truth("st9"), "there are st1, st2, rmd1"),
+        (lambda bench: bench.brake("st9", 1), "the motors are st1, st2, rmd1"),
+        (lambda bench: bench.brake("motor", 1), "the motors are st1, st2, rmd1"),
+        (lambda bench: bench.truth("st9"), "the motors are st1, st2, rmd1"),
         (lambda bench: bench.brake("st1", -1), "0 to 1000"),
         (lambda bench: bench.brake("st1", float("nan")), "not a command: .*nan"),
         (lambda bench: bench.push("rmd1", float("-inf")), "not a command: .*inf"),
@@ -448,7 +448,7 @@ def test_a_port_that_cannot_be_served_leaves_virtual_time(tmp_path: Path) -> Non
 
 
 def test_what_is_no_port_is_refused() -> None:
-    with pytest.raises(TypeError, match="no port"):
+    with pytest.raises(TypeError, match="3 is not a port: give a name"):
         motorlink.st.open(3)  # type: ignore[arg-type]
 
 

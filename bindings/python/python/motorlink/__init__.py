@@ -1,4 +1,4 @@
-"""Motor drives from Python: ST's Motor Control Protocol and RMD over CAN.
+"""Command and read motor drives: ST's Motor Control Protocol and RMD over CAN.
 
 >>> import motorlink
 >>> with motorlink.st.open("sim:") as client:          # or "/dev/ttyACM0"
@@ -7,9 +7,20 @@
 ...     motor.get("SPEED_MEAS")
 0
 
-``motorlink.st`` and ``motorlink.rmd`` are the two protocols, ``motorlink.sim`` is drives for a program
-without hardware. What goes wrong is a :class:`MotorlinkError`. Clients have no thread of their own, and
-may be shared between threads.
+=====================  ===============================================================
+``motorlink.st``       ST drives on a serial line: ``open``, ``scan``, ``Client``, ``Motor``
+``motorlink.rmd``      RMD motors on a CAN bus: ``open``, ``Client``, ``Motor``, requests
+``motorlink.aio``      both protocols for asyncio: ``aio.st``, ``aio.rmd``
+``motorlink.can``      any bus of python-can as a port
+``motorlink.sim``      simulated drives in the process, for tests without hardware
+``motorlink.errors``   the exceptions; all are a ``MotorlinkError``
+=====================  ===============================================================
+
+``help(motorlink.st.Motor)`` lists the methods of an ST motor, with their units and errors. The end of
+``with`` stops the motors that the client started. Clients have no thread of their own. Threads may
+share a client.
+
+docs/PYTHON.md is the guide and the complete reference.
 """
 
 from __future__ import annotations

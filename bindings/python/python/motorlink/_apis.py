@@ -1,8 +1,8 @@
-"""Makes the blocking and the asyncio API from one definition of each method.
+"""Makes the blocking API and the asyncio API from one definition of each method.
 
-A definition returns what an exchange gave. A definition with several exchanges, or with something to do
-behind one, is a generator: it yields what each exchange gave, and is sent its value. In the blocking API an
-exchange gives its value; in asyncio's it gives something to await.
+A definition returns an exchange. A definition with several exchanges, or with work after one, is a
+generator: it yields an exchange and receives its value. In the blocking API an exchange is its value,
+in asyncio it is something to await.
 
 >>> class Shared:
 ...     @both_apis
@@ -36,7 +36,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 Value = TypeVar("Value")
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-#: What a definition is: exchanges, and the value that the method gives.
+#: A definition: its exchanges, and the value that the method returns.
 Exchanges = Generator[Any, Any, Value]
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     Arguments = ParamSpec("Arguments")
 
     class Method(Generic[Arguments, Value]):
-        """What a definition is to type checkers: one method for each API."""
+        """A definition as type checkers see it: one method for each API."""
 
         @overload
         def __get__(self, owner: Blocking, kind: Any) -> Callable[Arguments, Value]: ...
@@ -67,19 +67,19 @@ if TYPE_CHECKING:
 def both_apis(
     definition: Callable[Concatenate[Any, Arguments], Exchanges[Value]],
 ) -> Method[Arguments, Value]:
-    """Has each API make its own method of a definition."""
+    """Marks a definition: each API makes its own method of it."""
     definition._both_apis = True  # type: ignore[attr-defined]
     return definition  # type: ignore[return-value]
 
 
 def one(exchange: Any) -> Exchanges[Any]:
-    """What one exchange gave, for a definition to return."""
+    """The value of one exchange, for a definition to return."""
     given: Exchanges[Any] = exchange
     return given
 
 
 class Blocking:
-    """A class of the blocking API: its methods return when their exchanges are over."""
+    """A class of the blocking API: its methods return when their exchanges are complete."""
 
     __slots__ = ()
 
@@ -89,7 +89,7 @@ class Blocking:
 
 
 class Awaited:
-    """A class of asyncio's API: its methods are coroutines."""
+    """A class of the asyncio API: its methods are coroutines."""
 
     __slots__ = ()
 
@@ -101,7 +101,7 @@ class Awaited:
 def blocking(
     definition: Callable[Arguments, Exchanges[Value]],
 ) -> Callable[Arguments, Value]:
-    """A definition as a function that returns when its exchanges are over."""
+    """A definition as a function that returns when its exchanges are complete."""
     if not inspect.isgeneratorfunction(definition):
         copy: Callable[Arguments, Value] = _copy(definition)
         return described(copy, definition)
@@ -127,7 +127,7 @@ def awaited(
 
 
 def carried_out(exchanges: Exchanges[Value]) -> Value:
-    """What comes of exchanges that give values."""
+    """The result of a definition whose exchanges are values."""
     value = None
     try:
         while True:
@@ -138,7 +138,7 @@ def carried_out(exchanges: Exchanges[Value]) -> Value:
 
 
 async def awaiting(exchanges: Exchanges[Value]) -> Value:
-    """What comes of exchanges that give something to await."""
+    """The result of a definition whose exchanges are awaited."""
     try:
         exchange = next(exchanges)
         while True:
@@ -156,7 +156,7 @@ async def awaiting(exchanges: Exchanges[Value]) -> Value:
 def described(
     function: Function, definition: Callable[..., object], returned: str | None = None
 ) -> Function:
-    """The function with the name, the arguments and the text of its definition."""
+    """The function with the name, arguments and docstring of its definition."""
     signature = inspect.signature(definition)
     if returned is None:
         returned = str(signature.return_annotation).removeprefix("Exchanges[").removesuffix("]")
@@ -166,7 +166,7 @@ def described(
 
 
 def _copy(function: Any) -> Any:
-    """The same function again, to be given another description."""
+    """A copy of the function, which gets another description."""
     copy = FunctionType(
         function.__code__,
         function.__globals__,
@@ -179,7 +179,7 @@ def _copy(function: Any) -> Any:
 
 
 def _make(cls: type, api: Callable[[Callable[..., Exchanges[Any]]], object]) -> None:
-    """Replaces every definition that a class inherits with the method of its API."""
+    """Replaces each definition that a class inherits by the method of its API."""
     found: dict[str, Any] = {}
     for base in reversed(cls.__mro__):
         found.update(vars(base))
@@ -191,13 +191,13 @@ def _make(cls: type, api: Callable[[Callable[..., Exchanges[Any]]], object]) -> 
 
 
 def _reads(method: Callable[..., object]) -> bool:
-    """Whether a method takes nothing and gives something."""
+    """Whether a method has no arguments and returns a value."""
     signature = inspect.signature(method)
     return len(signature.parameters) == 1 and signature.return_annotation != "None"
 
 
 class _Reading:
-    """A method that reads. A program may forget its brackets: see `_Uncalled`."""
+    """A method that reads. :class:`_Uncalled` finds calls without brackets."""
 
     def __init__(self, method: Callable[..., object]) -> None:
         self._method = method
@@ -206,8 +206,8 @@ class _Reading:
         return self._method if owner is None else _Uncalled(self._method, owner)
 
 
-# Python compares a method with anything and finds that it differs: `while motor.status != "RUN":` would go
-# on for ever, and the motor would turn. So a method that reads refuses what only its value can answer.
+# Python compares a method with anything, and the result is "not equal". `while motor.status != "RUN":` would
+# never end, and the motor would turn. So a method that reads raises where only its value makes sense.
 class _Uncalled:
     __slots__ = ("__func__", "__self__")
     __hash__ = None  # type: ignore[assignment]
@@ -243,7 +243,7 @@ class _Uncalled:
     __len__ = __getitem__ = __contains__ = _refuse
 
 
-# Errors of Python name the class: there it is what every other method is.
+# Python's own errors contain the name of the class.
 _Uncalled.__name__ = _Uncalled.__qualname__ = "method"
 
 

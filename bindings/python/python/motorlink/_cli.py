@@ -7,8 +7,8 @@ from motorlink import _core
 
 
 def main() -> int:
-    """Does what the command line says; gives the exit code."""
-    # Python's own would raise KeyboardInterrupt once more when the command has ended in order.
+    """Executes the command line. Returns the exit code."""
+    # Python's handler would raise KeyboardInterrupt again after the command has ended.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     return _core.cli(["motorlink", *sys.argv[1:]])

@@ -1,4 +1,4 @@
-"""What clients of both protocols have in common: names of ports, and their end."""
+"""What the clients of both protocols have in common: port names and closing."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ Opened = TypeVar("Opened", bound="AnyClient")
 
 
 class HasPort(Protocol):
-    """What is a port without a name, such as a bench of ``motorlink.sim``."""
+    """A port without a name, such as a bench of ``motorlink.sim``."""
 
     @property
     def _port(self) -> _core.SimPort: ...
 
 
 def _leave_ports() -> None:
-    """Takes the ports of its parent from a process that was forked, which would keep them open.
+    """Closes the parent's ports in a forked process, which would keep them open.
 
-    The clients own the numbers, so that these stay in use: for nothing.
+    The parent's clients still own the descriptor numbers, so the numbers stay in use, for /dev/null.
     """
     descriptors = _core.open_descriptors()
     if descriptors:
@@ -49,24 +49,24 @@ PortLike = Union[str, "os.PathLike[str]", HasPort]
 
 
 def opened(port: PortLike) -> str | _core.SimPort:
-    """What the extension opens: a name, or a port that has none."""
+    """What the extension opens: a name, or a port without a name."""
     if isinstance(port, (str, os.PathLike)):
         return os.fspath(port)
     if not hasattr(port, "_port"):
-        raise TypeError(f"{port!r} is no port: give a name, a path or a bench")
+        raise TypeError(f"{port!r} is not a port: give a name, a path or a bench")
     return port._port
 
 
-#: Closes the port; gives the motors that could not be stopped before, and why.
+#: Closes the port. Returns the motors that could not be stopped, and why.
 Close = Callable[[], "list[tuple[int, MotorlinkError]]"]
 
 
 def when_left_open(
     client: object, close: Close, port: str, *, stop_on_signals: bool
 ) -> Callable[[], None]:
-    """Closes a client that was left open, when it is collected or the program that opened it ends.
+    """Closes a client that was left open, when it is garbage-collected or its program ends.
 
-    With ``stop_on_signals`` SIGTERM and SIGHUP are such ends, until the result is called.
+    With ``stop_on_signals`` SIGTERM and SIGHUP close it too, until the returned function is called.
     """
     owner = os.getpid()
 
@@ -83,9 +83,9 @@ def when_left_open(
 
 
 def report(failed: list[tuple[int, MotorlinkError]], port: str, *, in_flight: bool) -> None:
-    """Tells of motors that could not be stopped.
+    """Reports motors that could not be stopped.
 
-    That is an exception, or a warning while another exception is on its way, which must not be hidden.
+    It raises, or warns while another exception is raised, which would be hidden.
     """
     if not failed:
         return
@@ -97,10 +97,10 @@ def report(failed: list[tuple[int, MotorlinkError]], port: str, *, in_flight: bo
 
 
 class Closing:
-    """What the end of a ``with`` ends."""
+    """An object that the end of ``with`` closes."""
 
     def _end(self, *, in_flight: bool) -> Any:
-        """Ends it; ``in_flight``: while an exception is on its way."""
+        """Closes it. ``in_flight``: an exception is being raised."""
         raise NotImplementedError
 
     def __enter__(self) -> Self:
@@ -116,14 +116,14 @@ class Closing:
 
 
 class AnyClient:
-    """What the clients of both protocols and both APIs have in common: how they are opened and end."""
+    """What the clients of both protocols and both APIs have in common: opening and closing."""
 
-    #: What ``on_close`` may be, and how the client is closed then.
+    #: The values of ``on_close``, and the arguments for closing the client.
     _ENDS: ClassVar[dict[str, dict[str, bool]]]
     #: The client of the extension module, and its class.
     _core: Any
     _Core: ClassVar[Any]
-    # Each API's: what the extension opens, the exchange that opens it, and the one that ends the client.
+    # Of each API: what the extension opens, the exchange that opens it, and the one that closes it.
     _named: Any
     _opened: Any
     _end: Any
@@ -142,7 +142,7 @@ class AnyClient:
     def _opening(
         cls, core: Callable[[], Any], *, on_close: str, **options: Any
     ) -> Callable[[], Exchanges[Self]]:
-        """Opens a client of the extension and then the one of the API, when the result is called."""
+        """A function that opens a client of the extension, and then the client of the API."""
         cls._ends(on_close)
 
         def client() -> Exchanges[Self]:
@@ -165,15 +165,15 @@ class AnyClient:
 
     @both_apis
     def close(self) -> Exchanges[None]:
-        """Stops the motors that this client set moving, as it was opened to; closes the port.
+        """Stops the motors that this client started, as ``on_close`` of ``open`` says. Closes the port.
 
-        Raises ``LinkError`` where a motor could not be stopped, which then may still be moving. The
-        port is closed all the same. Exchanges of other threads that are under way are waited for, and
-        those of other tasks end in ``ClosedError``. A task that is cancelled meanwhile is cancelled when all
-        is done.
+        Exchanges of other threads are completed first. Exchanges of other tasks raise ``ClosedError``. If the
+        task is cancelled meanwhile, the cancellation continues after the close. A second call does nothing.
 
-        A client that nobody closed is closed when it is collected, or when the program ends. In a process
-        that was forked it is of no use (``ClosedError``), and its port is not open: that is the parent's.
+        A client that is left open is closed when it is garbage-collected, or when the program ends. In a
+        forked process a client of the parent raises ``ClosedError``: the port belongs to the parent.
+
+        Raises ``LinkError`` if a motor could not be stopped. The motor may still turn. The port is closed.
         """
         yield self._end(in_flight=False)
 
@@ -214,7 +214,7 @@ def opens(
 
 
 def open_described(open: Function, opening: Callable[..., object], returned: str) -> Function:
-    """The function ``open`` of a protocol and an API with its arguments and its text."""
+    """The function ``open`` of a protocol and an API with its arguments and docstring."""
     described(open, opening, returned)
     open.__name__ = open.__qualname__ = "open"
     open.__module__ = opening.__self__.__module__  # type: ignore[attr-defined]

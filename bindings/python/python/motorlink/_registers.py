@@ -12,7 +12,7 @@ from motorlink.errors import RefusedError
 
 
 class Registers(Mapping[str, float]):
-    """The registers of one motor (Motor Control Protocol, table 3), by name.
+    """The registers of one motor (table 3) as a mapping, by name.
 
     >>> import motorlink
     >>> client = motorlink.st.open("sim:")
@@ -24,8 +24,8 @@ class Registers(Mapping[str, float]):
     'V'
     >>> client.close()
 
-    Each access is one exchange with the drive, with the exceptions of ``Motor.get`` and
-    ``Motor.set``. Names complete in IPython and Jupyter: ``registers.<TAB>``, ``registers["<TAB>``.
+    Each access is one exchange with the drive. It raises as ``Motor.get`` and ``Motor.set`` do. IPython
+    and Jupyter complete the names: ``registers.<TAB>``, ``registers["<TAB>``.
     """
 
     __slots__ = ("_motor",)
@@ -43,12 +43,12 @@ class Registers(Mapping[str, float]):
 
     def __getattr__(self, name: str) -> float:
         if name not in self._names():
-            raise AttributeError(f"there is no register {name!r}; `list(registers)` has their names")
+            raise AttributeError(f"unknown register {name!r}: `list(registers)` lists the names")
         return self._motor.get(name)
 
     def __setattr__(self, name: str, value: float | str) -> None:
         if name not in self._names():
-            raise AttributeError(f"there is no register {name!r}; `list(registers)` has their names")
+            raise AttributeError(f"unknown register {name!r}: `list(registers)` lists the names")
         self._motor.set(name, value)
 
     def __copy__(self) -> Registers:
@@ -79,14 +79,14 @@ class Registers(Mapping[str, float]):
         return id(self)
 
     def info(self, name: str | int) -> RegisterInfo:
-        """What a register is, from the table: unit, type, access, and what it needs. Asks nobody.
+        """The register's unit, type, access and needs, from the table. Sends nothing.
 
-        Raises ``UnknownRegisterError``, a ``InvalidValueError`` and a ``KeyError``, for one that nobody names.
+        Raises ``UnknownRegisterError`` for an unknown name.
         """
         return RegisterNames(self._motor).info(name)
 
     def get_all(self) -> dict[str, float]:
-        """Every register that can be read and that this drive has, an exchange each."""
+        """Reads every register that the drive has. One exchange each."""
         values = {}
         for name in self:
             if not self.info(name).readable:
@@ -125,7 +125,7 @@ class HasProfile(Protocol):
 
 
 class RegisterNames(Collection[str]):
-    """The names of a motor's registers, in the order of their numbers (table 3). Asks nobody.
+    """The names of a motor's registers, in the order of their numbers (table 3). Sends nothing.
 
     >>> import asyncio, motorlink
     >>> async def main() -> str:
@@ -141,9 +141,9 @@ class RegisterNames(Collection[str]):
         self._motor = motor
 
     def info(self, name: str | int) -> RegisterInfo:
-        """What a register is, from the table: unit, type, access, and what it needs.
+        """The register's unit, type, access and needs, from the table.
 
-        Raises ``UnknownRegisterError``, a ``InvalidValueError`` and a ``KeyError``, for one that nobody names.
+        Raises ``UnknownRegisterError`` for an unknown name.
         """
         motor = self._motor
         return _core.st_register(name, motor.client.profile, motor.full_scale_amps)

@@ -24,21 +24,21 @@ ClientT = TypeVar("ClientT", bound="RmdClient[Any, Any, Any]")
 
 
 class ScanResult(NamedTuple):
-    """What a scan found under a motor ID."""
+    """The result of a scan for one motor ID."""
 
     id: int
-    #: ``motor`` of this protocol; ``foreign``: of a protocol that looks like it and is not driven;
-    #: ``echo``: the request itself came back (option ``echo=1`` of an slcan port drops such).
-    #: ``shared``: it answers another program or host, too.
+    #: ``motor``: a motor of this protocol. ``foreign``: a motor of a similar protocol, which is not
+    #: supported. ``echo``: the request came back (the option ``echo=1`` of an slcan port removes it).
+    #: ``shared``: the motor replies to another program or host, too.
     kind: str
-    #: Of a motor.
+    #: The status of a motor, otherwise ``None``.
     status: Status | None
-    #: What a foreign motor speaks.
+    #: The protocol of a foreign motor, otherwise ``None``.
     dialect: str | None
 
 
 class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
-    """The clients of both APIs."""
+    """What the clients of both APIs have in common."""
 
     _ENDS: ClassVar[dict[str, dict[str, bool]]] = {
         "stop": {"stop": True, "off": False},
@@ -47,7 +47,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
     }
     _Motor: type[MotorT]
     _Sampling: type[SamplingT]
-    # Each API's exchanges, with the arguments of the methods of the extension's ``RmdClient``.
+    # The exchanges of each API. Arguments are those of ``RmdClient`` of the extension.
     _exchange: Any
     _cycle: Any
     _torque4: Any
@@ -71,34 +71,36 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         on_close: str = "stop",
         stop_on_signals: bool = True,
     ) -> Callable[[], Exchanges[Self]]:
-        """Opens a CAN bus. Nothing is sent.
+        """Opens a CAN bus. Sends nothing.
 
         For asyncio: ``async with open(...) as client``, or ``await open(...)``.
 
         ``port``
-            ``socketcan:can0``, ``slcan:/dev/ttyACM0``, ``slcan:tcp:HOST:PORT``, ``sim:`` for simulated
-            motors inside the process, a bus of python-can (:func:`motorlink.can.from_python_can`), or,
-            not for asyncio, a bench of ``motorlink.sim``.
+            ``socketcan:can0``, ``slcan:/dev/ttyACM0``, ``slcan:tcp:HOST:PORT``, ``sim:`` for simulated motors
+            inside the process, or a bus of python-can (:func:`motorlink.can.from_python_can`). The blocking
+            API also takes a bench of ``motorlink.sim``.
         ``timeout``
-            How long to wait for a motor's reply, s.
+            Time to wait for a motor's reply, s.
         ``quarantine``
-            How long after a timeout a late reply is awaited before the motor is asked again, s.
+            Time after a timeout in which the motor gets no request, s: a late reply can still arrive.
         ``current_limit_amps``, ``speed_limit_dps``, ``angle_limit_degrees``
-            What no request to any motor may exceed in either direction, nor a raw frame; the angle is from
-            zero. Rounded towards 0 to what a frame can say: 1.0 A allows 0.992 A, as a digit is
-            0.016 A. With a speed limit a move needs ``max_speed_dps``. It does not bound the speed under a
-            torque command, which is as fast as the load allows. The angle is that of ``set_position``:
-            ``set_single_turn_position`` names none over all turns, and is not held back by it.
-        ``on_close``
-            What the end of ``with``, and ``close()``, do to motors that this client set moving: ``stop``
-            (0x81: they hold still), ``off`` (0x80), or ``nothing``.
-        ``stop_on_signals``
-            SIGTERM and SIGHUP do what ``close()`` does, and then end the program as they would have
-            without. Handlers are installed if this is called in the main thread, in place of the default
-            action only. The last ``close()`` restores it. ``False``: nothing is installed. For asyncio
-            the motors are stopped with the event loop at rest.
+            The most that a request to any motor may ask for, in both directions. They also hold for raw
+            frames. The angle limit counts from zero. They are rounded towards 0 to a value that a frame can
+            carry: 1.0 A becomes 0.992 A, as a digit is 0.016 A.
 
-        Raises ``PortError`` where the port cannot be opened.
+            With a speed limit, a move needs ``max_speed_dps``. The limit does not hold under a torque command,
+            where the load decides the speed. The angle limit holds for ``set_position``. It does not hold for
+            ``set_single_turn_position``, whose angle is within the turn.
+        ``on_close``
+            What the end of ``with`` and ``close()`` do with the motors that this client moved. ``stop``: they
+            hold still (0x81). ``off``: they are switched off (0x80). ``nothing``: they continue.
+        ``stop_on_signals``
+            SIGTERM and SIGHUP stop motors as ``close()`` does. Then they end the program as usual. The
+            handlers are installed if this is called in the main thread, and only over the default action.
+            The last ``close()`` removes them. ``False``: no handler is installed. In asyncio the event loop is
+            blocked while motors are stopped.
+
+        Raises ``PortError`` if the port cannot be opened, ``InvalidValueError`` for a wrong argument.
         """
         options = _core.RmdOptions(
             timeout=timeout,
@@ -116,24 +118,36 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
 
     @property
     def moving(self) -> list[int]:
-        """IDs of the motors that this client gave something to do and that did not stop since."""
+        """IDs of the motors that this client commanded and that did not stop since."""
         moving: list[int] = self._core.moving
         return moving
 
     def motor(self, id: int = 1) -> MotorT:
-        """A motor of the bus, ID 1 to 32."""
+        """A motor of the bus, ID 1 to 32.
+
+        Raises ``InvalidValueError`` for another ID.
+        """
         return self._Motor(self, id)
 
     @both_apis
     def exchange(self, motor: int, request: Request) -> Exchanges[Any]:
-        """One exchange with a motor; gives what the reply says."""
+        """Sends a request to a motor. Returns the value of the reply.
+
+        >>> import motorlink
+        >>> from motorlink import rmd
+        >>> with rmd.open("sim:") as client:
+        ...     client.exchange(1, rmd.read_single_turn_angle())
+        0.0
+        """
         check_request(request, Request, "rmd.read_status()")
         return one(self._exchange(motor, request))
 
     @both_apis
     def confirm(self, motor: int = 1) -> Exchanges[None]:
-        """Makes sure that a motor's replies so far went to their own requests, before you rely on what you
-        read: one exchange more. A reply that nobody asked for is ``LinkError``: read again.
+        """Checks with one more exchange that no late reply of a motor was taken for another reply. Call it
+        before you rely on values that you read.
+
+        Raises ``LinkError`` if there was a reply without a request: read again.
 
         >>> import motorlink
         >>> with motorlink.rmd.open("sim:") as client:
@@ -144,7 +158,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
 
     @both_apis
     def cycle(self, requests: Mapping[int, Request]) -> Exchanges[dict[int, Any]]:
-        """Asks many motors at once; the exchanges overlap. Gives what each answered, by ID.
+        """Sends a request to each of several motors at once. Returns the replies by motor ID.
 
         >>> import motorlink
         >>> from motorlink import rmd
@@ -153,8 +167,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         >>> type(answers[1]).__name__, type(answers[9]).__name__
         ('MotionStatus', 'ReplyTimeoutError')
 
-        What fails for one motor is its answer, an exception that is not raised; what fails for the
-        line is raised.
+        If one motor fails, its value is the exception, which is not raised. An error of the line is raised.
         """
         for request in requests.values():
             check_request(request, Request, "rmd.read_status()")
@@ -164,17 +177,20 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
     def set_torque4(
         self, iq_amps: Sequence[float], *, expect: Iterable[int] = (1, 2, 3, 4)
     ) -> Exchanges[dict[int, MotionStatus | MotorlinkError]]:
-        """Torque currents for motors 1 to 4, in this order, in one frame (chapter 4, 0x280).
+        """Sends torque currents to motors 1 to 4 in one frame (0x280, chapter 4). Returns the replies by ID.
 
-        Gives what each of the motors in ``expect`` answered; a motor that fails has an exception
-        there, which is not raised. Raises ``InvalidValueError`` beyond ±32 A or a limit; nothing is sent then.
+        ``iq_amps`` has four values. ``expect`` has the motors that must reply. If a motor fails, its value is
+        the exception, which is not raised.
+
+        Raises ``InvalidValueError`` beyond ±32 A or a limit; then nothing is sent.
         """
         return one(self._torque4(list(iq_amps), list(expect)))
 
     @both_apis
     def scan(self, ids: Iterable[int] = range(1, 33)) -> Exchanges[list[ScanResult]]:
-        """Asks every ID for its status; gives what answered, in the order of the answers; for asyncio, in
-        that of the IDs."""
+        """Asks each ID for its status. Returns the replies in the order of arrival; for asyncio in the order of
+        the IDs.
+        """
         return one(self._scan(list(ids)))
 
     @both_apis
@@ -188,7 +204,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         raw: bool = False,
         on_error: str = "raise",
     ) -> Exchanges[Samples]:
-        """Reads what motors tell ``rate`` times a second for ``seconds``; gives a structured array.
+        """Reads values of motors ``rate`` times a second for ``seconds``. Returns a NumPy structured array.
 
         >>> import motorlink
         >>> with motorlink.rmd.open("sim:") as client:
@@ -196,15 +212,17 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         >>> data.dtype.names
         ('t', 'iq_amps_1', 'speed_dps_1', 'iq_amps_2')
 
-        What there is: :data:`QUANTITIES`. A list of names samples ``motor``, and its fields have no
-        number behind them. ``t`` is the moment, s since the first instant, at which the row's first
-        requests left. Motors are asked in the same cycles; quantities of different commands take one
-        cycle each. Instants do not drift; one that the bus was too slow for is missing, and no row is
-        ever made up.
+        :data:`QUANTITIES` lists the names. A list of names samples ``motor``; its fields have no motor number.
+        ``t`` is the time from the first instant to the first requests of the row, s. The other fields are in
+        their units, or in digits with ``raw=True``. All motors are asked in the same cycle. Values of different
+        commands need one cycle each.
 
-        A row that fails raises, with what was sampled before in the exception's ``samples``; with
-        ``on_error="skip"`` a motor that fails costs the row only. Ctrl-C ends it, with ``samples`` too; so
-        does the cancellation of a task. Exchanges of other tasks have their turns in between.
+        Instants do not drift. If the bus is too slow for an instant, its row is missing: look at ``t``. No row
+        is invented.
+
+        A failed row raises. The exception has the rows that were read before in ``samples``. With
+        ``on_error="skip"`` a row without a motor's reply is left out. Ctrl-C and the cancellation of a task
+        end the sampling, also with ``samples``. In asyncio, exchanges of other tasks run between the rows.
         """
         sampling: Any = self._sampling(quantities, rate, seconds, motor, raw, on_error)
         return one(sampling._array())
@@ -219,7 +237,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         raw: bool = False,
         on_error: str = "raise",
     ) -> SamplingT:
-        """Reads what motors tell ``rate`` times a second, a row each time that the loop asks for one.
+        """Reads values of motors ``rate`` times a second and returns an iterator of rows.
 
         >>> import motorlink
         >>> with motorlink.rmd.open("sim:") as client:
@@ -229,14 +247,15 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         0.0 0.0 0.0
 
         For asyncio: ``async for row in client.samples(...)``. Arguments, names, units and instants are those
-        of :meth:`sample`; without ``seconds`` there is no end. A row is a ``dict``, a
-        :class:`motorlink.Sample`. No thread reads ahead: a row is read when the loop asks for it, so that
-        its values are new. A loop that is slower than ``rate`` gets fewer rows; ``row.skipped`` is the number
-        of instants before the row that have none.
+        of :meth:`sample`. Without ``seconds`` the iterator has no end. A row is a
+        :class:`motorlink.Sample`, a ``dict``.
 
-        ``break`` leaves motors as they are; the end of ``with`` stops those that this client started. So
-        does Ctrl-C, and an error, which is raised after the rows that were read before. After an error
-        there are no more rows: call ``samples`` again.
+        A row is read when the loop asks for it, so its values are new. If the loop is slower than ``rate``, it
+        gets fewer rows. ``row.skipped`` is the number of instants without a row before this row.
+
+        ``break`` ends the sampling and does not stop a motor. An error or Ctrl-C is raised in the loop, after
+        the rows that were read before. The end of ``with`` then stops the motors that this client moved.
+        After an error the iterator has no more rows: call ``samples`` again.
         """
         return self._sampling(quantities, rate, seconds, motor, raw, on_error)
 
@@ -260,7 +279,7 @@ class RmdClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
 
 
 class RmdMotor(MotorCommands, Generic[ClientT]):
-    """The motors of both APIs."""
+    """What the motors of both APIs have in common."""
 
     __slots__ = ("__weakref__", "_client", "_id")
 
@@ -270,7 +289,7 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
 
     @property
     def client(self) -> ClientT:
-        """The client that it is of."""
+        """The client of this motor."""
         return self._client
 
     @property
@@ -289,9 +308,9 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         speed_limit_dps: float | None = None,
         angle_limit_degrees: float | None = None,
     ) -> None:
-        """What this motor may be told from now on; ``None`` is no limit.
+        """Sets the limits of this motor. Sends nothing. ``None`` removes a limit.
 
-        All three at once, in place of those of :func:`open`, and rounded as they are.
+        They replace all three limits of :func:`open` for this motor. They are rounded in the same way.
         """
         self._client._core.set_limits(
             self._id, current_limit_amps, speed_limit_dps, angle_limit_degrees
@@ -301,10 +320,13 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
     def set_position(
         self, angle_degrees: float, max_speed_dps: float | None = None
     ) -> Exchanges[MotionStatus]:
-        """Turns to an angle over all turns, no faster than ``max_speed_dps``.
+        """Turns to an angle over all turns, ° (0xA3; with ``max_speed_dps`` 0xA4). Returns the motion before it.
 
-        ``max_speed_dps`` is 1 at least and is rounded down to whole °/s. Position control commands 1
-        and 2. Gives the motion as it was when the command came.
+        ``max_speed_dps`` is at least 1 and is rounded down to whole °/s.
+
+        >>> import motorlink
+        >>> with motorlink.rmd.open("sim:") as client:
+        ...     status = client.motor(1).set_position(90, max_speed_dps=500)
         """
         if max_speed_dps is None:
             return self._exchange(Request.set_position(angle_degrees))
@@ -322,13 +344,14 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
         full_turn: bool = False,
         tolerance_degrees: float = _core.RMD_FULL_TURN_TOLERANCE,
     ) -> Exchanges[MotionStatus]:
-        """Turns to an angle within the turn, 0 to 359.99 °, ``clockwise`` or ``counterclockwise``.
+        """Turns to an angle within the turn (0xA5; with ``max_speed_dps`` 0xA6). Returns the motion before it.
 
-        No faster than ``max_speed_dps``, 1 at least, rounded down. Position control commands 3 and 4.
+        ``angle_degrees`` is 0 to 359.99. ``direction`` is ``clockwise`` or ``counterclockwise``.
+        ``max_speed_dps`` is at least 1 and is rounded down to whole °/s.
 
-        The motor is asked for its angle first. At its target, or up to ``tolerance_degrees`` past it,
-        the move could be nearly a full turn: ``FullTurnError`` is raised, and the motor is not moved. It
-        is not asked with ``full_turn=True``.
+        The angle is read first. If the motor is at the target, or at most ``tolerance_degrees`` past it, the
+        move could be nearly a full turn. Then ``FullTurnError`` is raised and the motor does not move.
+        ``full_turn=True`` sends the move without this check.
 
         >>> import motorlink
         >>> with motorlink.rmd.open("sim:") as client:     # the motor is at 0 °
@@ -353,7 +376,10 @@ class RmdMotor(MotorCommands, Generic[ClientT]):
 
     @both_apis
     def raw(self, data: bytes, *, rom: bool = False) -> Exchanges[bytes]:
-        """One exchange with any eight bytes; ``rom=True`` allows those that wear the ROM."""
+        """Sends any eight bytes. Returns the eight bytes of the reply.
+
+        Raises ``InvalidValueError`` for bytes that write to the ROM, which wears. ``rom=True`` allows them.
+        """
         return self._exchange(Request.raw(data, rom=rom))
 
     def __repr__(self) -> str:

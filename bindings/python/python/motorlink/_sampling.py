@@ -16,16 +16,16 @@ from motorlink.errors import InvalidValueError
 
 Name = TypeVar("Name")
 
-#: A structured array: ``t`` in s since the first instant, and a field a value.
+#: A structured array: ``t`` in s since the first instant, and one field for each value.
 Samples = npt.NDArray[np.void]
 
 
 def by_motor(
     wanted: Mapping[int, Sequence[Name]] | Sequence[Name], motor: int, called: Callable[[Name], str]
 ) -> tuple[list[tuple[int, list[Name]]], list[str]]:
-    """What is wanted of each motor, and what the values are called, each once.
+    """The values to read of each motor, and their names in a row.
 
-    Where motors are named, so is the motor of a value.
+    The names have the motor's number if motors are named.
     """
     if isinstance(wanted, str):
         raise InvalidValueError(f"{wanted!r} is one name: give a list of names")
@@ -39,7 +39,7 @@ def by_motor(
 
 
 def columns(names: Sequence[str]) -> list[str]:
-    """The names of the values, each once."""
+    """The names of the values. Raises for a name that is there twice."""
     if not names:
         raise InvalidValueError("name what to sample")
     twice = {name for name in names if names.count(name) > 1}
@@ -79,7 +79,7 @@ class Sample(dict[str, float]):
         return self["t"]
 
 
-#: An exchange: at most so many rows, or all. Gives their bytes, skipped instants, and the error.
+#: An exchange that reads so many rows, or all. Returns their bytes, the skipped instants, the error.
 Take = Callable[[Union[int, None]], Any]
 
 
@@ -105,7 +105,7 @@ class AnySampling:
         self._release = weakref.finalize(self, release)
 
     def close(self) -> None:
-        """Ends the sampling. A row that another thread or task waits for is the last one."""
+        """Ends the sampling. If another thread or task waits for a row, that row is the last one."""
         self._ended = True
         self._release_when_idle()
 
@@ -156,7 +156,7 @@ class AnySampling:
 
 
 class Sampling(Blocking, AnySampling):
-    """Rows that are read one after the other, from ``client.samples``: an iterator of :class:`Sample`."""
+    """Rows of ``client.samples``, read one after the other: an iterator of :class:`Sample`."""
 
     def __iter__(self) -> Sampling:
         return self
@@ -169,9 +169,9 @@ class Sampling(Blocking, AnySampling):
 
 
 def to_pandas(samples: Samples) -> Any:
-    """A ``pandas.DataFrame`` of what ``client.sample`` gave, with the time in s as its index.
+    """A ``pandas.DataFrame`` of the array from ``client.sample``. Its index is the time in s.
 
-    Raises ``ImportError`` where pandas is not installed.
+    Raises ``ImportError`` if pandas is not installed.
     """
     try:
         pandas = importlib.import_module("pandas")

@@ -1,4 +1,4 @@
-"""Which baud rate does an ST drive speak? For both APIs."""
+"""Scans for the baud rate of an ST drive, for both APIs."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Path = Union[str, "os.PathLike[str]"]
 
 
 class ScanResult(NamedTuple):
-    """What a baud rate was answered with."""
+    """The result of a scan for one baud rate."""
 
     baud: int
-    #: ``drive``; ``refuses``: a drive that refuses GET_BOARD_INFO; ``garbage``: bytes that are not a
-    #: reply, so perhaps another rate; ``echo``: the question came back; ``silence``; ``impossible``: the
-    #: port cannot be set to the rate.
+    #: ``drive``: a drive replied. ``refuses``: a drive refused GET_BOARD_INFO. ``garbage``: bytes that
+    #: are not a reply, perhaps of another rate. ``echo``: the request came back. ``silence``: nothing
+    #: came. ``impossible``: the port cannot have this rate.
     kind: str
-    #: Of a drive.
+    #: The board information of a drive, otherwise ``None``.
     board_info: BoardInfo | None
 
 

@@ -1,4 +1,4 @@
-"""Who uses which data segment of a drive, as far as one client knows."""
+"""The data segments of a drive that a client uses."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from motorlink.errors import InvalidValueError
 
 
 class Segments:
-    """The data segments of a drive: those that a program chose registers for, and those of samplings."""
+    """The data segments of a drive: those that the program configured, and those of samplings."""
 
     def __init__(self) -> None:
-        # A signal handler may come in between.
+        # A signal handler may use the client meanwhile.
         self._lock = threading.RLock()
         self._chosen: dict[int, list[str | int]] = {}
         self._sampled: set[int] = set()
 
     def claim(self, segment: int) -> None:
-        """Keeps samplings away from a segment that a program is about to configure."""
+        """Reserves a segment for the program, which is about to configure it."""
         with self._lock:
             if segment in self._sampled:
                 raise InvalidValueError(
-                    f"data segment {segment} is in use by `sample`; nothing was sent: take another one,"
-                    " or configure it before, and `sample` takes another one"
+                    f"data segment {segment} is in use by a sampling; nothing was sent: use another"
+                    " segment, or configure this one before the sampling"
                 )
             self._chosen.setdefault(segment, [])
 
     def chosen(self, segment: int, registers: Sequence[str | int]) -> None:
-        """Remembers what a segment was configured with."""
+        """Remembers the registers of a configured segment."""
         self._chosen[segment] = list(registers)
 
     def registers(self, segment: int) -> list[str | int]:
-        """What a segment was configured with; nothing where that is not known."""
+        """The registers of a configured segment; empty if this client did not configure it."""
         return self._chosen.get(segment, [])
 
     def for_sampling(self, count: int) -> tuple[list[int], Callable[[], None]]:
-        """Claims up to ``count`` free segments, the last one first; gives them and what releases them."""
+        """Reserves up to ``count`` free segments, the last one first. Returns them, and a function that frees them."""
         with self._lock:
             taken = self._sampled.union(self._chosen)
             free = [n for n in reversed(range(_core.ST_SEGMENTS)) if n not in taken][:count]

@@ -15,9 +15,9 @@ _stops: dict[object, Callable[[], None]] = {}
 
 
 def before_signals(stop: Callable[[], None]) -> Callable[[], None]:
-    """Has ``stop`` called before SIGTERM or SIGHUP ends the program, until the result is called.
+    """Calls ``stop`` before SIGTERM or SIGHUP ends the program, until the returned function is called.
 
-    Only the main thread can install handlers, and only the default action is replaced.
+    Only the main thread can install handlers. Only the default action is replaced.
     """
     key = object()
     _stops[key] = stop
@@ -44,7 +44,7 @@ def _replace(
 def _stop_all(number: int, frame: FrameType | None) -> None:
     try:
         with ExitStack() as stack:
-            # Every one, whatever the others raise; the first that was opened comes first.
+            # All of them, also if one raises. The client that was opened first is stopped first.
             for stop in reversed(tuple(_stops.values())):
                 stack.callback(stop)
     finally:

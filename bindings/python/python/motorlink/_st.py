@@ -25,12 +25,12 @@ ClientT = TypeVar("ClientT", bound="StClient[Any, Any, Any]")
 
 
 class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
-    """The clients of both APIs."""
+    """What the clients of both APIs have in common."""
 
     _ENDS: ClassVar[dict[str, dict[str, bool]]] = {"stop": {"stop": True}, "nothing": {"stop": False}}
     _Motor: type[MotorT]
     _Sampling: type[SamplingT]
-    # Each API's exchanges, with the arguments of ``StClient``'s methods.
+    # The exchanges of each API. Arguments are those of ``StClient`` of the extension.
     _exchange: Any
     _exchange_raw: Any
     _set_verified: Any
@@ -65,41 +65,44 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         on_close: str = "stop",
         stop_on_signals: bool = True,
     ) -> Callable[[], Exchanges[Self]]:
-        """Opens a serial line with a drive. Nothing is sent.
+        """Opens the serial line of a drive. Sends nothing.
 
         For asyncio: ``async with open(...) as client``, or ``await open(...)``.
 
         ``port``
-            ``/dev/ttyACM0``, ``serial:/dev/ttyUSB0?baud=115200``, ``tcp:HOST:PORT``, ``unix:PATH``,
-            the path of a pty, ``sim:`` for a simulated drive inside the process, or, not for asyncio, a
+            ``/dev/ttyACM0``, ``serial:/dev/ttyUSB0?baud=115200``, ``tcp:HOST:PORT``, ``unix:PATH``, the path
+            of a pty, or ``sim:`` for a simulated drive inside the process. The blocking API also takes a
             bench of ``motorlink.sim``.
         ``profile``
-            ``spec``: the document; ``mcsdk-5.4``: what shipped firmware really does.
+            ``spec``: the drive follows the document. ``mcsdk-5.4``: the drive follows the firmware that ST
+            ships.
         ``timeout``
-            How long to wait for a reply, s (4.1 says 1 s).
+            Time to wait for a reply, s. The document has 1 s (4.1).
         ``speed_limit_rpm``, ``current_limit``
-            What no request may exceed in either direction; the current is A with ``full_scale_amps``,
-            digits without; also not by writing registers or raw frames. Rounded towards 0 to what a frame
-            can say. With a speed limit a motor is started only after a ``set_ramp`` within it, and
-            ``set_position`` is refused. The ramp no longer counts after a torque command, a write of
-            CONTROL_MODE, a reset of the drive, or a lost line or port. A speed limit does not bound the
-            speed under a torque command (``set_current_reference``, ``set_torque_ramp``), which is as fast
-            as the load allows, nor the drive's own rev-up, alignment and motor profiler.
-        ``full_scale_amps``
-            The current of digit 32767, A, for every motor that is not given its own.
-        ``recovery``
-            How a lost line comes back before the next exchange: ``drain``; ``pad``, for 5.x drives that
-            wait for the rest of a cut-off frame; ``none``.
-        ``on_close``
-            ``stop``: the end of ``with``, and ``close()``, stop the motors that this client started;
-            ``nothing``: they run on.
-        ``stop_on_signals``
-            SIGTERM and SIGHUP do what ``close()`` does, and then end the program as they would have
-            without. Handlers are installed if this is called in the main thread, in place of the default
-            action only. The last ``close()`` restores it. ``False``: nothing is installed. For asyncio
-            the motors are stopped with the event loop at rest.
+            The most that a request may ask for, in both directions. They also hold for register writes and
+            raw frames. The current is in A with ``full_scale_amps``, otherwise in digits. They are rounded
+            towards 0 to a value that a frame can carry.
 
-        Raises ``PortError`` where the port cannot be opened.
+            With a speed limit, a motor starts only after a ``set_ramp`` within the limit, and
+            ``set_position`` is refused. After a torque command, a write of CONTROL_MODE, a reset of the
+            drive, or a lost line or port, call ``set_ramp`` again. The limit does not hold under a torque
+            command (``set_current_reference``, ``set_torque_ramp``), where the load decides the speed. It does
+            not hold for the drive's rev-up, alignment and motor profiler.
+        ``full_scale_amps``
+            The current of digit 32767, A. A motor can have its own: :meth:`Client.motor`.
+        ``recovery``
+            How the line is resynchronised before the next exchange. ``drain``: wait for silence. ``pad``: send
+            padding first, for 5.x drives that wait for the rest of a cut-off frame. ``none``: do nothing.
+        ``on_close``
+            ``stop``: the end of ``with`` and ``close()`` stop the motors that this client started.
+            ``nothing``: the motors continue.
+        ``stop_on_signals``
+            SIGTERM and SIGHUP stop motors as ``close()`` does. Then they end the program as usual. The
+            handlers are installed if this is called in the main thread, and only over the default action.
+            The last ``close()`` removes them. ``False``: no handler is installed. In asyncio the event loop is
+            blocked while motors are stopped.
+
+        Raises ``PortError`` if the port cannot be opened, ``InvalidValueError`` for a wrong argument.
         """
         options = _core.StOptions(
             profile=profile,
@@ -119,7 +122,7 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
 
     @property
     def profile(self) -> str:
-        """``spec`` or ``mcsdk-5.4``."""
+        """The profile: ``spec`` or ``mcsdk-5.4``."""
         return self._profile
 
     @property
@@ -129,31 +132,45 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         return moving
 
     def motor(self, number: int = 1, *, full_scale_amps: float | None = None) -> MotorT:
-        """A motor of the drive, 1 to 7; 0 is whichever the drive has selected (TARGET_MOTOR)."""
+        """A motor of the drive, 1 to 7. Motor 0 is the one that the drive has selected (TARGET_MOTOR).
+
+        ``full_scale_amps`` is the current of digit 32767, A, if it differs from that of :func:`open`.
+
+        Raises ``InvalidValueError`` for another number.
+        """
         if full_scale_amps is None:
             full_scale_amps = self._full_scale_amps
         return self._Motor(self, number, full_scale_amps)
 
     @both_apis
     def board_info(self) -> Exchanges[BoardInfo]:
-        """Version and name of the SDK (4.7)."""
+        """Reads version and name of the SDK (0x06, 4.7)."""
         return one(self._exchange(0, Request.get_board_info()))
 
     @both_apis
     def firmware_version(self) -> Exchanges[FirmwareVersion]:
-        """Name and version of the firmware (4.12)."""
+        """Reads name and version of the firmware (0x0C, 4.12)."""
         return one(self._exchange(0, Request.get_firmware_version()))
 
     @both_apis
     def exchange(self, motor: int, request: Request) -> Exchanges[Any]:
-        """One exchange with a motor; gives what the reply says."""
+        """Sends a request to a motor. Returns the value of the reply.
+
+        >>> import motorlink
+        >>> from motorlink.st import Request
+        >>> with motorlink.st.open("sim:") as client:
+        ...     client.exchange(1, Request.get_register("BUS_VOLTAGE"))
+        325
+        """
         check_request(request, Request, "Request.status()")
         return one(self._exchange(motor, request))
 
     @both_apis
     def confirm(self) -> Exchanges[None]:
-        """Makes sure that the replies so far went to their own requests, before you rely on what you read: one
-        exchange more. A reply that came twice or late is ``LinkError``: read again.
+        """Checks with one more exchange that no late or repeated reply was taken for another reply. Call it
+        before you rely on values that you read.
+
+        Raises ``LinkError`` if a reply came twice or late: read again.
 
         >>> import motorlink
         >>> with motorlink.st.open("sim:") as client:
@@ -164,7 +181,7 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
 
     @both_apis
     def raw(self, code: int, payload: bytes = b"", *, motor: int = 0) -> Exchanges[bytes]:
-        """One exchange with any frame code, 0 to 0x1f, and payload; gives the payload of the answer.
+        """Sends any frame code, 0 to 0x1F, with any payload. Returns the payload of the reply.
 
         >>> import motorlink
         >>> with motorlink.st.open("sim:") as client:
@@ -184,7 +201,7 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         raw: bool = False,
         on_error: str = "raise",
     ) -> Exchanges[Samples]:
-        """Reads registers ``rate`` times a second for ``seconds``; gives a structured array.
+        """Reads registers ``rate`` times a second for ``seconds``. Returns a NumPy structured array.
 
         >>> import motorlink
         >>> with motorlink.st.open("sim:") as client:
@@ -192,19 +209,21 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         >>> data.dtype.names
         ('t', 'SPEED_MEAS', 'BUS_VOLTAGE')
 
-        ``t`` is the moment, s since the first instant, at which the row's first request left; the
-        other fields are in their units, or digits with ``raw=True``. Instants do not drift. One that
-        the line was too slow for is missing, and no row is ever made up: look at ``t``.
+        ``t`` is the time from the first instant to the first request of the row, s. The other fields are in
+        their units, or in digits with ``raw=True``. Instants do not drift. If the line is too slow for an
+        instant, its row is missing: look at ``t``. No row is invented.
 
-        The registers of a row come in one exchange, of the same moment, where the drive has data
-        segments (profile ``spec``); one a motor is used, from segment 3 down, of those that neither
-        ``configure_segment`` nor another ``sample`` of this client has. Otherwise they are read one by
-        one. ``{1: ["SPEED_MEAS"], 2: ["SPEED_MEAS"]}`` samples several motors; their
-        fields are ``SPEED_MEAS_1`` and ``SPEED_MEAS_2``.
+        A list samples ``motor``. ``{1: ["SPEED_MEAS"], 2: ["SPEED_MEAS"]}`` samples several motors; the fields
+        are ``SPEED_MEAS_1`` and ``SPEED_MEAS_2``.
 
-        A row that fails raises, with what was sampled before in the exception's ``samples``; with
-        ``on_error="skip"`` a line that fails costs the row only. Ctrl-C ends it, with ``samples`` too; so
-        does the cancellation of a task. Exchanges of other tasks have their turns in between.
+        With profile ``spec`` one exchange reads all registers of a motor at one moment, through a data
+        segment. Each motor needs one. The client takes free segments from number 3 down. It does not take
+        those that ``configure_segment`` or another sampling uses. Without a free segment it reads the
+        registers one after the other.
+
+        A failed row raises. The exception has the rows that were read before in ``samples``. With
+        ``on_error="skip"`` a row that the line lost is left out. Ctrl-C and the cancellation of a task end
+        the sampling, also with ``samples``. In asyncio, exchanges of other tasks run between the rows.
         """
         sampling: Any = self._sampling(registers, rate, seconds, motor, raw, on_error)
         return one(sampling._array())
@@ -219,7 +238,7 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         raw: bool = False,
         on_error: str = "raise",
     ) -> SamplingT:
-        """Reads registers ``rate`` times a second, a row each time that the loop asks for one.
+        """Reads registers ``rate`` times a second and returns an iterator of rows.
 
         >>> import motorlink
         >>> with motorlink.st.open("sim:") as client:
@@ -229,14 +248,15 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
         0.0 0.0 325.0
 
         For asyncio: ``async for row in client.samples(...)``. Arguments, names, units and instants are those
-        of :meth:`sample`; without ``seconds`` there is no end. A row is a ``dict``, a
-        :class:`motorlink.Sample`. No thread reads ahead: a row is read when the loop asks for it, so that
-        its values are new. A loop that is slower than ``rate`` gets fewer rows; ``row.skipped`` is the number
-        of instants before the row that have none.
+        of :meth:`sample`. Without ``seconds`` the iterator has no end. A row is a
+        :class:`motorlink.Sample`, a ``dict``.
 
-        ``break`` leaves motors as they are; the end of ``with`` stops those that this client started. So
-        does Ctrl-C, and an error, which is raised after the rows that were read before. After an error
-        there are no more rows: call ``samples`` again.
+        A row is read when the loop asks for it, so its values are new. If the loop is slower than ``rate``, it
+        gets fewer rows. ``row.skipped`` is the number of instants without a row before this row.
+
+        ``break`` ends the sampling and does not stop a motor. An error or Ctrl-C is raised in the loop, after
+        the rows that were read before. The end of ``with`` then stops the motors that this client started.
+        After an error the iterator has no more rows: call ``samples`` again.
         """
         return self._sampling(registers, rate, seconds, motor, raw, on_error)
 
@@ -266,7 +286,7 @@ class StClient(AnyClient, Generic[MotorT, PortT, SamplingT]):
 
 
 class StMotor(Generic[ClientT]):
-    """The motors of both APIs."""
+    """What the motors of both APIs have in common."""
 
     __slots__ = ("__weakref__", "_client", "_full_scale_amps", "_number", "_reads")
 
@@ -278,7 +298,7 @@ class StMotor(Generic[ClientT]):
 
     @property
     def client(self) -> ClientT:
-        """The client that it is of."""
+        """The client of this motor."""
         return self._client
 
     @property
@@ -288,7 +308,7 @@ class StMotor(Generic[ClientT]):
 
     @property
     def full_scale_amps(self) -> float | None:
-        """The current of digit 32767, A; ``None`` while currents are digits."""
+        """The current of digit 32767, A. ``None``: currents are in digits."""
         return self._full_scale_amps
 
     def _exchange(self, request: Request) -> Exchanges[Any]:
@@ -297,10 +317,17 @@ class StMotor(Generic[ClientT]):
 
     @both_apis
     def get(self, register: str | int, *, raw: bool = False) -> Exchanges[float]:
-        """Reads a register (4.5), in its unit, or in digits with ``raw=True``.
+        """Reads a register (0x02, 4.5) in its unit, or in digits with ``raw=True``.
 
-        An integer where a digit is one unit, else a float. States and flags are their numbers here;
-        :meth:`status` and :meth:`flags` have them in words.
+        Returns an integer if one digit is one unit, otherwise a float. States and flags are numbers here:
+        :meth:`status` and :meth:`flags` return them as text.
+
+        Raises ``RefusedError`` if the drive cannot read it, ``UnknownRegisterError`` for an unknown name.
+
+        >>> import motorlink
+        >>> with motorlink.st.open("sim:") as client:
+        ...     client.motor(1).get("BUS_VOLTAGE")       # V
+        325
         """
         request = self._reads.get((register, raw))
         if request is None:
@@ -315,10 +342,16 @@ class StMotor(Generic[ClientT]):
 
     @both_apis
     def set(self, register: str | int, value: float | str, *, raw: bool = False) -> Exchanges[None]:
-        """Writes a register (4.4), in its unit, or in digits with ``raw=True``.
+        """Writes a register (0x01, 4.4) in its unit, or in digits with ``raw=True``.
 
-        ``CONTROL_MODE`` takes ``TORQUE`` and ``SPEED``, ``DAC_OUT1`` and ``DAC_OUT2`` names of
-        registers. A value between two digits is a ``InvalidValueError``; only currents in A are rounded.
+        ``CONTROL_MODE`` takes ``TORQUE`` and ``SPEED``. ``DAC_OUT1`` and ``DAC_OUT2`` take names of registers.
+        A value between two digits raises ``InvalidValueError``; only currents in A are rounded.
+
+        Raises ``RefusedError`` if the drive does not take the value.
+
+        >>> import motorlink
+        >>> with motorlink.st.open("sim:") as client:
+        ...     client.motor(1).set("SPEED_KP", 1200)
         """
         return self._exchange(self._set(register, value, raw))
 
@@ -326,14 +359,14 @@ class StMotor(Generic[ClientT]):
     def set_verified(
         self, register: str | int, value: float | str, *, raw: bool = False, attempts: int = _core.ST_ATTEMPTS
     ) -> Exchanges[int]:
-        """Writes a register, reads it back, and repeats both until it has the value.
+        """Writes a register and reads it back, at most ``attempts`` times. Returns the number of attempts.
 
-        Gives the number of the attempt that did it. A checksum of 8 bits lets some damage
-        through, which two exchanges seldom do.
+        The checksum of a frame has 8 bits and does not detect all damage. The second exchange detects most of
+        the rest.
 
-        Raises ``RefusedError`` (without a code) where the register has another value after the last
-        attempt, ``InvalidValueError`` where it cannot be read back or where writing it moves the motor. What
-        another task writes to the register in between is found, and written over.
+        Raises ``RefusedError`` without a code if the register has another value after the last attempt,
+        ``InvalidValueError`` if the register cannot be read back or if writing it moves the motor. If another
+        task writes the register in between, that value is overwritten.
         """
         request = self._set(register, value, raw)
         return one(self._client._set_verified(self._number, request, attempts))
@@ -349,32 +382,32 @@ class StMotor(Generic[ClientT]):
 
     @both_apis
     def status(self) -> Exchanges[Status]:
-        """The state of its state machine, in words: ``IDLE``, ``RUN``, ``FAULT_NOW`` (STATUS)."""
+        """Reads the state of the drive's state machine: ``IDLE``, ``RUN``, ``FAULT_NOW`` (STATUS)."""
         return self._exchange(Request.status())
 
     @both_apis
     def flags(self) -> Exchanges[Flags]:
-        """Its faults (FLAGS); false when there are none."""
+        """Reads the faults (FLAGS). The value is false if there are none."""
         return self._exchange(Request.flags())
 
     @both_apis
     def control_mode(self) -> Exchanges[ControlMode]:
-        """``TORQUE`` or ``SPEED`` (CONTROL_MODE)."""
+        """Reads the control mode: ``TORQUE`` or ``SPEED`` (CONTROL_MODE)."""
         return self._exchange(Request.control_mode())
 
     @both_apis
     def execute(self, command: str | int) -> Exchanges[None]:
-        """Executes a command by its name in table 4, such as ``RESET``, or its number (4.6).
+        """Executes a command of table 4 by its name, such as ``RESET``, or by its number (0x03, 4.6).
 
-        An acknowledge does not say that it had an effect: look at :meth:`status`.
+        An acknowledge does not mean that the command had an effect: read :meth:`status`.
         """
         return self._exchange(Request.execute_command(command))
 
     @both_apis
     def start(self) -> Exchanges[None]:
-        """Starts the motor (4.6). With a fault pending the drive acknowledges and does nothing.
+        """Starts the motor (4.6). If a fault is pending, the drive acknowledges and does nothing.
 
-        With a ``speed_limit_rpm``, call :meth:`set_ramp` before: the drive may have a target of its own.
+        With a ``speed_limit_rpm``, call :meth:`set_ramp` first: the drive may keep an older target.
         """
         return self._exchange(Request.execute_command("START_MOTOR"))
 
@@ -385,12 +418,12 @@ class StMotor(Generic[ClientT]):
 
     @both_apis
     def stop_ramp(self) -> Exchanges[None]:
-        """Stops the ramp that is executing; the speed stays (4.6)."""
+        """Stops the current ramp (4.6). The motor keeps its speed."""
         return self._exchange(Request.execute_command("STOP_RAMP"))
 
     @both_apis
     def fault_ack(self) -> Exchanges[None]:
-        """Acknowledges faults whose cause is gone (4.6)."""
+        """Acknowledges faults that are over (4.6)."""
         return self._exchange(Request.execute_command("FAULT_ACK"))
 
     @both_apis
@@ -400,12 +433,12 @@ class StMotor(Generic[ClientT]):
 
     @both_apis
     def start_stop(self) -> Exchanges[None]:
-        """Starts the motor if it stands, else stops it (4.6)."""
+        """Starts the motor if it is stopped, otherwise stops it (4.6)."""
         return self._exchange(Request.execute_command("START_STOP"))
 
     @both_apis
     def iqdref_clear(self) -> Exchanges[None]:
-        """Sets the current references back to what they were at power-on (4.6)."""
+        """Resets the current references to their values at power-on (4.6)."""
         return self._exchange(Request.execute_command("IQDREF_CLEAR"))
 
     @both_apis
@@ -425,26 +458,31 @@ class StMotor(Generic[ClientT]):
 
     @both_apis
     def set_ramp(self, speed_rpm: float, duration_s: float) -> Exchanges[None]:
-        """Goes to ``speed_rpm`` within ``duration_s``: at once in RUN, else when RUN is reached (4.8).
+        """Ramps the speed to ``speed_rpm`` in ``duration_s`` (0x07, 4.8).
 
-        Rounded to 1 rpm and 1 ms; a time is 0, a step, to 65.535 s.
+        In RUN the ramp starts at once, otherwise when the motor reaches RUN. Values are rounded to 1 rpm and
+        1 ms. ``duration_s`` is 0, a step, to 65.535 s.
+
+        >>> import motorlink
+        >>> with motorlink.st.open("sim:") as client:
+        ...     client.motor(1).set_ramp(1500, 1.0)      # rpm, s
         """
         return self._exchange(Request.set_ramp(speed_rpm, duration_s))
 
     @both_apis
     def set_current_reference(self, iq: float, id: float) -> Exchanges[None]:
-        """Sets the current references (4.11); A with ``full_scale_amps``, else digits.
+        """Sets the current references Iq and Id (0x0A, 4.11), in A with ``full_scale_amps``, otherwise in digits.
 
-        No ``speed_limit_rpm`` bounds the motor then.
+        A ``speed_limit_rpm`` does not hold then.
         """
         return self._exchange(Request.set_current_reference(iq, id, full_scale_amps=self._full_scale_amps))
 
     @both_apis
     def set_torque_ramp(self, torque: float, duration_s: float) -> Exchanges[None]:
-        """Goes to ``torque``, an Iq, within ``duration_s``; A with ``full_scale_amps``, else digits.
+        """Ramps the torque current Iq to ``torque`` in ``duration_s`` (0x0D of profile ``mcsdk-5.4``).
 
-        Of profile ``mcsdk-5.4``; for others the same bytes ask for something else. No
-        ``speed_limit_rpm`` bounds the motor then.
+        ``torque`` is in A with ``full_scale_amps``, otherwise in digits. A ``speed_limit_rpm`` does not hold
+        then. Raises ``InvalidValueError`` with another profile, where these bytes are another command.
         """
         self._only("mcsdk-5.4", "torque ramps")
         full_scale_amps = self._full_scale_amps
@@ -454,16 +492,16 @@ class StMotor(Generic[ClientT]):
 
     @both_apis
     def set_position(self, angle_rad: float, duration_s: float) -> Exchanges[None]:
-        """Turns to ``angle_rad`` within ``duration_s``; profile ``mcsdk-5.4`` with position control.
+        """Turns to ``angle_rad`` in ``duration_s`` (0x12 of profile ``mcsdk-5.4``, with position control).
 
-        Refused while there is a ``speed_limit_rpm``: the command carries no speed.
+        Raises ``InvalidValueError`` if there is a ``speed_limit_rpm``: the command has no speed.
         """
         self._only("mcsdk-5.4", "moves")
         return self._exchange(Request.set_position(angle_rad, duration_s))
 
     @both_apis
     def revup_data(self, phase: int) -> Exchanges[RevupPhase]:
-        """A phase of the rev-up, 0 to 4 (4.9)."""
+        """Reads a phase of the rev-up, 0 to 4 (0x08, 4.9)."""
         request = Request.get_revup_data(phase, full_scale_amps=self._full_scale_amps)
         return self._exchange(request)
 
@@ -471,10 +509,10 @@ class StMotor(Generic[ClientT]):
     def set_revup_data(
         self, phase: int, speed_rpm: float, torque: float, duration_s: float
     ) -> Exchanges[None]:
-        """Sets a phase of the rev-up, 0 to 4 (4.10).
+        """Sets a phase of the rev-up, 0 to 4 (0x09, 4.10).
 
-        Speed and torque, an Iq, A with ``full_scale_amps``, else digits, at the end of the phase; and
-        how long it is.
+        ``speed_rpm`` and ``torque`` are the values at the end of the phase, ``duration_s`` is its length.
+        ``torque`` is Iq, in A with ``full_scale_amps``, otherwise in digits.
         """
         full_scale_amps = self._full_scale_amps
         return self._exchange(
@@ -485,9 +523,15 @@ class StMotor(Generic[ClientT]):
 
     @both_apis
     def configure_segment(self, segment: int, registers: Sequence[str | int]) -> Exchanges[None]:
-        """Chooses the registers, at most 32, of a data segment, 0 to 3 (profile ``spec``).
+        """Selects the registers of a data segment, 0 to 3 (0x0E, profile ``spec``). At most 32.
 
-        The drive keeps one set of segments for all of its motors, until it is powered off.
+        The drive has one set of segments for all its motors and keeps it until power-off.
+
+        >>> import motorlink
+        >>> with motorlink.st.open("sim:") as client:
+        ...     client.motor(1).configure_segment(0, ["SPEED_MEAS", "BUS_VOLTAGE"])
+        ...     client.motor(1).segment(0)
+        {'SPEED_MEAS': 0, 'BUS_VOLTAGE': 325}
         """
         self._only("spec", "data segments")
         request = Request.configure_segment(segment, registers)
@@ -499,9 +543,9 @@ class StMotor(Generic[ClientT]):
     def segment(
         self, segment: int, registers: Sequence[str | int] | None = None, *, raw: bool = False
     ) -> Exchanges[dict[str, float]]:
-        """Reads a data segment in one exchange: the registers' values by name (profile ``spec``).
+        """Reads a data segment (0x0D, profile ``spec``). Returns the values of its registers by name.
 
-        ``registers``: what it was configured with, unless it was by this client.
+        ``registers`` are those that it was configured with. Leave them out if this client configured it.
         """
         self._only("spec", "data segments")
         if registers is None:
@@ -512,12 +556,12 @@ class StMotor(Generic[ClientT]):
         return self._exchange(request)
 
     def _only(self, profile: str, what: str) -> None:
-        """Refuses what another profile than that of the client has."""
+        """Raises if the client has another profile."""
         client = self._client
         if client.profile != profile:
             raise InvalidValueError(
-                f"{what} are of profile {profile}, and {client.port} was opened with profile {client.profile};"
-                " nothing was sent",
+                f"{what} need profile {profile}, and {client.port} was opened with profile"
+                f" {client.profile}; nothing was sent",
                 port=client.port,
                 motor=self._number,
             )

@@ -1,4 +1,4 @@
-"""What drives answer. The unit of each number is the end of its name."""
+"""Values of replies. The end of a name is the unit."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from motorlink import _core
 
 
 class Word(str):
-    """A value that the protocol has a word for. It is that word: ``status == "RUN"``.
+    """A value that the protocol has a word for. It compares as that word: ``status == "RUN"``.
 
-    A number without a word survives as such: ``0x63``.
+    A number without a word is its hexadecimal text: ``0x63``.
     """
 
     #: The number on the wire.
     number: int
-    #: What it means, in a few words; empty for a number without a word.
+    #: A short description; empty for a number without a word.
     doc: str
 
     def __new__(cls, word: str, number: int = 0, doc: str = "") -> Word:
@@ -32,21 +32,21 @@ class Word(str):
 
 
 class Status(Word):
-    """State of an ST drive's state machine: ``IDLE``, ``RUN``, ``FAULT_NOW`` (register STATUS)."""
+    """State of an ST drive: ``IDLE``, ``RUN``, ``FAULT_NOW`` (register STATUS)."""
 
 
 class ControlMode(Word):
-    """``TORQUE`` or ``SPEED``: what an ST drive follows (register CONTROL_MODE)."""
+    """Control mode of an ST drive: ``TORQUE`` or ``SPEED`` (register CONTROL_MODE)."""
 
 
 class Flags(NamedTuple):
-    """Faults of an ST drive (register FLAGS). False when there are none."""
+    """Faults of an ST drive (register FLAGS). False if there are none."""
 
     #: Faults since they were last acknowledged, by name: ``OVER_VOLT``.
     occurred: tuple[str, ...]
-    #: Faults whose cause is still there.
+    #: Faults that are still present.
     present: tuple[str, ...]
-    #: The 32 bits of the register: occurred below, present above.
+    #: The 32 bits of the register: the lower half occurred, the upper half is present.
     bits: int
 
     def __bool__(self) -> bool:
@@ -57,7 +57,7 @@ class Flags(NamedTuple):
 
 
 class BoardInfo(NamedTuple):
-    """Version and name of the drive's SDK (Motor Control Protocol, 4.7)."""
+    """Version and name of the drive's SDK (4.7)."""
 
     #: Major, minor, patch.
     version: tuple[int, int, int]
@@ -65,34 +65,33 @@ class BoardInfo(NamedTuple):
 
 
 class FirmwareVersion(NamedTuple):
-    """Name and version of the drive's firmware (Motor Control Protocol, 4.12)."""
+    """Name and version of the drive's firmware (4.12)."""
 
     name: str
     version: str
 
 
 class RevupPhase(NamedTuple):
-    """A phase of the rev-up (Motor Control Protocol, 4.9).
+    """A phase of the rev-up (4.9).
 
-    ``torque`` is Iq at the end of the phase: digits of the drive (s16A), or A for a motor with
-    ``full_scale_amps``.
+    ``torque`` is Iq at the end of the phase, in A with ``full_scale_amps``, otherwise in digits.
     """
 
-    #: Mechanical speed at the end of the phase.
+    #: Mechanical speed at the end of the phase, rpm.
     speed_rpm: int
     torque: float
     duration_s: float
 
 
 class Errors(NamedTuple):
-    """Protections of an RMD motor that are active. False when there are none.
+    """Active protections of an RMD motor. False if there are none.
 
-    As text it has the document's words: ``low voltage protection``.
+    Its text has the document's words: ``low voltage protection``.
     """
 
     #: ``LOW_VOLTAGE``, ``OVER_TEMPERATURE``.
     names: tuple[str, ...]
-    #: The bits of the error byte, also those that mean nothing.
+    #: The bits of the error byte, also those without a meaning.
     bits: int
 
     def __bool__(self) -> bool:
@@ -103,31 +102,31 @@ class Errors(NamedTuple):
 
 
 class RegisterInfo(NamedTuple):
-    """A register of an ST drive (Motor Control Protocol, table 3)."""
+    """A register of an ST drive (table 3)."""
 
     #: The number on the wire.
     id: int
     name: str
-    #: Unit of the value as this motor reads it; empty when there is none.
+    #: Unit of the value of this motor; empty if there is none.
     unit: str
-    #: ``i16``, ``u32``, ``f32``.
+    #: The type on the wire: ``i16``, ``u32``, ``f32``.
     type: str
-    #: ``RW``, ``R``, ``W``; ``D``: only on the DAC and in data segments; ``-``: firmware names it only.
+    #: ``RW``, ``R``, ``W``. ``D``: only on the DAC and in data segments. ``-``: only named by firmware.
     access: str
-    #: What it is, in a few words.
+    #: A short description.
     doc: str
-    #: What the drive must be built with.
+    #: The feature that the drive must be built with; empty if none.
     feature: str
-    #: Whether a drive of this profile, so built, answers when it is read.
+    #: Whether a drive of this profile with the feature can read it.
     readable: bool
-    #: Whether a drive of this profile, so built, takes a value.
+    #: Whether a drive of this profile with the feature can write it.
     writable: bool
 
 
 class Frame(NamedTuple):
-    """An RMD frame in words, from ``motorlink.rmd.decode``."""
+    """An RMD frame as text and values, from :func:`motorlink.rmd.decode`."""
 
-    #: The motor; ``None`` for the frame 0x280 to motors 1 to 4.
+    #: The motor ID; ``None`` for the frame 0x280 to motors 1 to 4.
     motor: int | None
     #: The document's name of the command; ``0x280`` for the frame to four motors.
     name: str
@@ -135,5 +134,5 @@ class Frame(NamedTuple):
     values: dict[str, float]
     #: The values by name, in digits.
     digits: dict[str, int]
-    #: All of it as text.
+    #: The frame as text.
     text: str

@@ -1,8 +1,7 @@
 """Any bus of python-can as a port of :mod:`motorlink.rmd`.
 
-python-can is an optional extra, ``pip install "motorlink[can]"``. For Linux interfaces and slcan adapters the
-ports ``socketcan:`` and ``slcan:`` need none of it and are faster; this is for everything else that
-python-can knows.
+python-can is optional: ``pip install "motorlink[can]"``. The ports ``socketcan:`` and ``slcan:`` do not
+need it and are faster. Use this module for the other adapters that python-can supports.
 """
 
 from __future__ import annotations
@@ -29,19 +28,18 @@ def from_python_can(bus: Any) -> CanPort:
     ...         try:
     ...             motors.motor(1).status()
     ...         except motorlink.ReplyTimeoutError as error:
-    ...             print("nobody is on this bus")
-    nobody is on this bus
+    ...             print("no reply")
+    no reply
 
-    ``bus`` stays the caller's: opened at 1 Mbit/s before, shut down afterwards, and in a process that
-    was forked it is the caller who has to close it. Nothing else may receive
-    from it meanwhile, no ``can.Notifier`` either: what one receives the other misses. Until the client of
-    :func:`motorlink.rmd.open` is closed, one thread calls ``bus.recv`` and another one ``bus.send``.
+    Open ``bus`` at 1 Mbit/s before, and shut it down afterwards. Receive nothing else from it meanwhile,
+    also not with a ``can.Notifier``: frames would be lost. While the client is open, one thread calls
+    ``bus.recv`` and another one ``bus.send``. In a forked process, shut the bus down there too.
 
-    Where the bus raises, the exchange fails (``LinkError``, with what was raised as its cause). The next
-    call uses the bus again. ``stop`` and ``off`` are sent even if receiving failed before. Ctrl-C is no
-    failure: it ends the wait, and the bus stays open.
+    If the bus raises, the exchange raises ``LinkError`` with that exception as its cause. The next call
+    uses the bus again. ``stop`` and ``off`` are sent even if receiving failed before. Ctrl-C ends the wait,
+    and the bus stays open.
 
-    Raises ``ImportError`` where python-can is not installed.
+    Raises ``ImportError`` if python-can is not installed, ``TypeError`` for another object.
     """
     try:
         can = importlib.import_module("can")
@@ -50,5 +48,5 @@ def from_python_can(bus: Any) -> CanPort:
             'python-can is not installed: `pip install "motorlink[can]"`', name="can"
         ) from error
     if not isinstance(bus, can.BusABC):
-        raise TypeError(f"this is no bus of python-can: {bus!r}; open one with can.Bus(...)")
+        raise TypeError(f"{bus!r} is not a bus of python-can: open one with can.Bus(...)")
     return CanPort(bus, can.Message, f"python-can ({bus.channel_info})")

@@ -1,7 +1,7 @@
-"""What can go wrong. Every exception of this package is a :class:`MotorlinkError`.
+"""The exceptions of this package. Each is a :class:`MotorlinkError`.
 
-A drive that refuses is told apart from a line that fails: after :class:`RefusedError` the drive is as it
-was, after :class:`LinkError` and :class:`ReplyTimeoutError` nobody knows whether it did what was asked.
+After :class:`RefusedError` the drive has not executed the request. After :class:`LinkError` and
+:class:`ReplyTimeoutError` it is unknown whether the drive executed it.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ def __dir__() -> list[str]:
 
 
 class MotorlinkError(Exception):
-    """Something did not work; the message says what, where, and what to try."""
+    """The base of all exceptions. The message says what happened, where, and what to try."""
 
-    #: The port, as messages name it; ``None`` where there is none.
+    #: The port's name; ``None`` if the error has none.
     port: str | None
-    #: The motor; ``None`` where it is about none, or about whichever the drive has selected.
+    #: The motor's number; ``None`` if the error has none, or for the motor that the drive has selected.
     motor: int | None
-    #: What was sampled before it happened, if it happened in ``client.sample``.
+    #: The rows that ``client.sample`` read before the error, otherwise ``None``.
     samples: Any
 
     def __init__(self, message: str = "", *, port: str | None = None, motor: int | None = None):
@@ -43,14 +43,15 @@ class MotorlinkError(Exception):
 
 
 class RefusedError(MotorlinkError):
-    """The drive understood and said no, or did not keep what it was told; the line works.
+    """The drive refused the request, or did not keep a value. The line works.
 
-    RMD motors never refuse: one that does not know a command is silent (:class:`ReplyTimeoutError`).
+    RMD motors never refuse. A motor that does not know a command does not reply:
+    :class:`ReplyTimeoutError`.
     """
 
-    #: The drive's reason (Motor Control Protocol, table 2); ``None`` where it gave none.
+    #: The drive's error code (table 2); ``None`` if it sent none.
     code: int | None
-    #: The document's name for it, such as ``WRONG_SET``; ``None`` for a code without a name.
+    #: The document's name of the code, such as ``WRONG_SET``; ``None`` for a code without a name.
     name: str | None
 
     def __init__(
@@ -68,37 +69,37 @@ class RefusedError(MotorlinkError):
 
 
 class LinkError(MotorlinkError, ConnectionError):
-    """There is no answer to trust: damage, noise, a port that went away.
+    """The line failed: no valid reply arrived. Reasons are damage, noise, or a port that was unplugged.
 
-    Call again: the line is recovered first, so that a late reply is never taken for another's.
+    Try again: the next call resynchronises the line first, and never takes a late reply for its own.
     """
 
 
 class ReplyTimeoutError(MotorlinkError, TimeoutError):
-    """No answer in time. What is not there, not powered or of another baud rate is silent, too."""
+    """No reply within the timeout. The device may be absent, unpowered, or at another baud rate."""
 
 
 class PortError(LinkError):
-    """The port cannot be opened, or was closed by its far end."""
+    """The port cannot be opened, or its far end closed it."""
 
 
 class InvalidValueError(MotorlinkError, ValueError):
-    """A value that cannot be sent, or that a limit forbids; nothing was sent."""
+    """A value cannot be sent, or a limit forbids it. Nothing was sent."""
 
 
 class FullTurnError(InvalidValueError):
-    """A move within the turn of an RMD motor that could be nearly a full turn; it was not sent.
+    """A move within the turn of an RMD motor could be nearly a full turn. It was not sent.
 
-    The motor is at its target already, or just past it. Only its angle was read.
+    The motor is at its target, or just past it. Only its angle was read.
     """
 
 
 class UnknownRegisterError(InvalidValueError, KeyError):
-    """A register name or number that nobody knows; nothing was sent."""
+    """The name or number of a register is unknown. Nothing was sent."""
 
-    # That of KeyError quotes the message.
+    # KeyError would quote the message.
     __str__ = Exception.__str__
 
 
 class ClosedError(MotorlinkError, ValueError):
-    """The client was closed by this program; open it again."""
+    """This program closed the client. Open it again."""

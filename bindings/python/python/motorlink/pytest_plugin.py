@@ -1,4 +1,4 @@
-"""Fixtures for pytest: a user's own code against simulated drives. Installed with the package.
+"""Fixtures for pytest that test a program against simulated drives. Installed with the package.
 
 ::
 
@@ -11,21 +11,21 @@
         arm = Arm(motorlink_bench)                 # a bench is a port
         arm.lift()
         motorlink_bench.lock_rotor("st1")
-        motorlink_bench.run(2.0)                   # s; over at once
+        motorlink_bench.run(2.0)                   # s of virtual time
         assert motorlink_bench.truth("st1")["status"] == "IDLE"
 
 ``motorlink_bench``
-    A fresh :class:`motorlink.sim.Bench` on virtual time.
+    A new :class:`motorlink.sim.Bench` on virtual time.
 ``motorlink_time``
-    While the test runs, ``time.sleep`` and the clocks of ``time`` go by that bench
-    (:meth:`~motorlink.sim.Bench.patch_time`): for code that sleeps.
+    During the test ``time.sleep`` and the clocks of ``time`` use the time of that bench
+    (:meth:`~motorlink.sim.Bench.patch_time`), for programs that sleep.
 ``motorlink_ports``
-    That bench on ptys in ``tmp_path``, on real time, for code that opens ports by their names:
+    That bench on ptys in ``tmp_path``, on real time, for programs that open ports by name:
     :class:`motorlink.sim.Serving`, ``ports.st`` and ``ports.rmd``.
 
-The marker ``motorlink(config, *, seed, fault)`` has the arguments of the bench; the path of a file is
-relative to the test's. Tests without it have what ``motorlink_config`` in pytest's configuration says,
-relative to that file, and otherwise the default bench.
+The marker ``motorlink(config, *, seed, fault)`` has the arguments of the bench. The path of a file is
+relative to the test file. Without the marker the bench is that of the setting ``motorlink_config`` in
+pytest's configuration, relative to that file. Without this setting it is the default bench.
 """
 
 from __future__ import annotations
@@ -36,26 +36,26 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-# What they have is imported with the first fixture: most runs of pytest need none.
+# Imported by the first fixture, because most runs of pytest need none.
 if TYPE_CHECKING:
     from motorlink.sim import Bench, Serving
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Adds ``motorlink_config`` to pytest's configuration file."""
+    """Adds ``motorlink_config`` to pytest's configuration."""
     about = "configuration of motorlink_bench: a TOML file, or its text"
     parser.addini("motorlink_config", about, default="")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Registers the marker."""
-    about = "motorlink(config, *, seed, fault): what the test's motorlink_bench is"
+    about = "motorlink(config, *, seed, fault): the arguments of the test's motorlink_bench"
     config.addinivalue_line("markers", about)
 
 
 @pytest.fixture
 def motorlink_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    """Simulated drives on virtual time, fresh for this test."""
+    """Simulated drives on virtual time, new for each test."""
     from motorlink.errors import MotorlinkError
     from motorlink.sim import Bench
 
@@ -77,7 +77,7 @@ def motorlink_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
 
 @pytest.fixture
 def motorlink_time(motorlink_bench: Bench) -> Iterator[None]:
-    """``time.sleep`` and the clocks of ``time`` go by ``motorlink_bench``."""
+    """``time.sleep`` and the clocks of ``time`` use the time of ``motorlink_bench``."""
     with motorlink_bench.patch_time():
         yield
 
@@ -91,7 +91,7 @@ def motorlink_ports(motorlink_bench: Bench, tmp_path: Path) -> Iterator[Serving]
 
 
 def _beside(folder: Path, config: Any) -> Any:
-    """A path is relative to ``folder``; everything else is as it is."""
+    """A path relative to ``folder``; anything else unchanged."""
     from motorlink.sim._source import is_path
 
     return folder / config if is_path(config) else config

@@ -7,21 +7,22 @@
 ...     motor.status().voltage_volts
 24.0
 
-Angles are °, speeds °/s, accelerations °/s², torque currents A, all of the motor shaft; positive is
-clockwise. Every method of a motor is one exchange and raises
+Units are °, °/s, °/s² and A, all at the motor shaft. Positive is clockwise. Each method of a motor is one
+exchange and raises
 
-* ``ReplyTimeoutError`` where the motor does not answer; nobody knows then what it did. A motor of this
-  protocol cannot refuse: it is silent, too, when it does not know a command,
-* ``LinkError`` and ``PortError`` where the line fails, or the motor speaks another protocol,
-* ``InvalidValueError`` where nothing was sent: no such motor, out of range, over a limit,
+* ``ReplyTimeoutError`` if the motor does not reply. It is unknown whether it executed the request. A
+  motor that does not know a command does not reply either,
+* ``LinkError`` and ``PortError`` if the line fails, or if the motor speaks another protocol,
+* ``InvalidValueError`` if nothing was sent: an ID, a range or a limit,
 * ``ClosedError`` after ``client.close()``.
 
-Ctrl-C and handlers of signals: as in :mod:`motorlink.st`. A motor that did not answer in time is waited
-for before it is told anything else; ``stop()`` and ``off()`` do not wait.
+After a timeout the client waits for a late reply before the next request to this motor. ``stop()`` and
+``off()`` do not wait. For Ctrl-C and signal handlers see :mod:`motorlink.st`.
 
-A command is called alike as a method of a motor, as a :class:`Request`, and as a function of this module,
-which gives a request for :meth:`Client.cycle`; a method that reads is called without ``read_``. Each says
-its code and its paragraph in chapter 3 of the document.
+A command has the same name as a method of :class:`Motor`, of :class:`Request`, and as a function of
+this module. The last two make a request for :meth:`Client.cycle`. Methods of a motor that read have no
+``read_``: ``motor.status()`` is ``rmd.read_status()``. The docstring of each has the code and the
+paragraph in chapter 3 of the document.
 """
 
 from __future__ import annotations
@@ -54,12 +55,12 @@ __all__ += _rmd_table.__all__
 def __dir__() -> list[str]:
     return __all__
 
-#: What ``Client.sample`` can read.
+#: The names that ``Client.sample`` and ``Client.samples`` can read.
 QUANTITIES: tuple[str, ...] = tuple(_core.rmd_quantities())
 
 
 def decode(can_id: int, data: bytes, *, reply: bool) -> Frame:
-    """A frame in words and values. Request and reply look alike: say which it is.
+    """A frame as text and values. ``reply``: the motor sent it; requests and replies look alike.
 
     >>> frame = decode(0x141, bytes.fromhex("A100000064000000"), reply=False)
     >>> frame.values
@@ -67,22 +68,21 @@ def decode(can_id: int, data: bytes, *, reply: bool) -> Frame:
     >>> frame.text
     'motor 1 > 0xA1 Torque closed-loop command: iq 1.600 A'
 
-    Raises ``InvalidValueError`` for a frame that is none of this protocol.
+    Raises ``InvalidValueError`` for a frame of another protocol.
     """
     return _core.rmd_decode(can_id, data, reply=reply)
 
 
 class Motor(Blocking, RmdMotor["Client"]):
-    """One motor on the bus; from :meth:`Client.motor`."""
+    """One motor on the bus, from :meth:`Client.motor`."""
 
     __slots__ = ()
 
 
 class Client(BlockingClient, RmdClient[Motor, "PortLike | CanPort", Sampling]):
-    """A CAN bus with RMD motors; from :func:`open`.
+    """A CAN bus with RMD motors, from :func:`open`.
 
-    Threads may share it: one exchange or cycle at a time is on the bus, and each caller gets its own
-    answer.
+    Threads may share it. One exchange or cycle at a time is on the bus, and each thread gets its own reply.
     """
 
     _core: Core

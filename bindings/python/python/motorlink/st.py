@@ -7,26 +7,28 @@
 ...     motor.registers.SPEED_KP
 1200
 
-Speeds are rpm, times s. Currents are digits of the drive (s16A, of which 32767 is its full scale)
-until it is told what full scale is: ``full_scale_amps=17.5`` makes A of them.
+Speeds are in rpm, times in s. Currents are in digits of the drive (s16A; 32767 is its full scale). With
+``full_scale_amps=17.5`` they are in A.
 
-Every method of a motor is one exchange unless it says otherwise, and raises
+Each method of a motor is one exchange, unless its docstring says otherwise, and raises
 
-* ``RefusedError`` where the drive says no (table 2 of the document),
-* ``ReplyTimeoutError`` and ``LinkError`` where there is no answer to trust: it is unknown whether the drive did it,
-* ``InvalidValueError`` where nothing was sent: no such motor, out of range, over a limit; of a register that
-  nobody knows, its subclass ``errors.UnknownRegisterError``, which is a ``KeyError``, too,
+* ``RefusedError`` if the drive refuses (table 2 of the document),
+* ``ReplyTimeoutError`` and ``LinkError`` without a valid reply. It is unknown whether the drive
+  executed the request,
+* ``InvalidValueError`` if nothing was sent: a motor number, a range or a limit. For an unknown register
+  it is ``errors.UnknownRegisterError``, which is also a ``KeyError``,
 * ``ClosedError`` after ``client.close()``.
 
-Paragraphs in brackets are those of the document "Motor Control Protocol". Ctrl-C ends a wait for a
-silent drive at once; nobody knows then what the drive did, and the next exchange recovers the line
-first. ``stop()`` does not wait for that: it is sent at once, and again on the recovered line. While
-motors are being stopped at the end Ctrl-C has to wait.
+Numbers in brackets are paragraphs of the document "Motor Control Protocol".
 
-A signal handler may use the client that the main thread waits for, such as ``motor.stop()`` or
-``client.close()``. The exchange that it interrupted is given up then and raises ``PortError``. A handler
-that does not use the client does not disturb the exchange. If another thread has an exchange under way,
-the handler waits until that is over.
+Ctrl-C ends the wait for a reply at once. It is unknown whether the drive executed the request, and the
+next exchange resynchronises the line first. ``stop()`` is sent at once, and again after that. While
+motors are stopped at the end, Ctrl-C waits.
+
+A signal handler may use the client that the main thread waits for, for example ``motor.stop()`` or
+``client.close()``. The interrupted exchange then raises ``PortError``. A handler that does not use the
+client does not disturb the exchange. If another thread has an exchange under way, the handler waits for
+its end.
 """
 
 from __future__ import annotations
@@ -76,7 +78,7 @@ def __dir__() -> list[str]:
 
 
 class Motor(Blocking, StMotor["Client"]):
-    """One motor of a drive; from :meth:`Client.motor`."""
+    """One motor of a drive, from :meth:`Client.motor`."""
 
     __slots__ = ()
 
@@ -87,9 +89,9 @@ class Motor(Blocking, StMotor["Client"]):
 
 
 class Client(BlockingClient, StClient[Motor, PortLike, Sampling]):
-    """A serial line with a drive of up to seven motors; from :func:`open`.
+    """A serial line with a drive of up to seven motors, from :func:`open`.
 
-    Threads may share it: one exchange at a time is on the line, and each caller gets its own answer.
+    Threads may share it. One exchange at a time is on the line, and each thread gets its own reply.
     """
 
     _core: Core
@@ -113,12 +115,12 @@ def scan(
     *,
     timeout: float = _core.ST_SCAN_TIMEOUT,
 ) -> list[ScanResult]:
-    """Asks a drive for its board information at each baud rate; gives what each was answered with.
+    """Asks a drive for its board information at each baud rate. Returns one result for each rate.
 
-    ``port`` is a serial line. ``timeout`` is how long to wait for each of two answers, s. A port without a
-    baud rate, such as ``tcp:``, is asked once. No motor is started or stopped.
+    ``port`` is a serial line. ``timeout`` is the time to wait for each of two replies, s. A port without a
+    baud rate, such as ``tcp:``, is asked once. No motor starts or stops.
 
-    Raises ``PortError`` where the port cannot be opened, and ``InvalidValueError`` for one that is not a
-    line or that ends with this process.
+    Raises ``PortError`` if the port cannot be opened, ``InvalidValueError`` for a port that is not a serial
+    line, or that exists only in this process.
     """
     return carried_out(scanning(_core.st_scan_baud, port, rates, timeout))

@@ -1,4 +1,4 @@
-"""The same clients for programs that use asyncio: every exchange is awaited.
+"""The same clients for asyncio: every exchange is awaited.
 
 >>> import asyncio, motorlink
 >>> async def main() -> float:
@@ -9,18 +9,17 @@
 >>> asyncio.run(main())
 0
 
-Methods, arguments, values and exceptions are those of ``motorlink.st`` and ``motorlink.rmd``, checked
-by the same code, and so are their descriptions; examples there are of the blocking API. Different here: a
-motor's ``registers`` are names and what they stand for, and a bench of ``motorlink.sim`` is not a
-port. No thread carries an exchange: the loop watches the
-port's descriptor. Only opening a port, a scan, and the end of ``async with``, which
-may wait for long, happen in the loop's default executor.
+Methods, arguments, values, errors and docstrings are those of ``motorlink.st`` and ``motorlink.rmd``.
+The examples in the docstrings use the blocking API. Two things differ: the ``registers`` of a motor are
+names and facts only, and a bench of ``motorlink.sim`` is not a port.
 
-Any exchange may be cancelled, at any moment, by ``asyncio.timeout``, ``task.cancel()`` or the end of
-``asyncio.run``. Nobody knows then whether the drive did what was asked; its reply, if it comes, is never
-taken for that to another request; and the next caller has its turn at once. The end of ``async with``
-stops the motors that the client started also in a task that is being cancelled, before it lets the
-cancellation go on.
+The event loop watches the port's descriptor. Exchanges use no thread. Opening a port, a scan and the
+end of ``async with`` can take long: they run in the loop's default executor.
+
+An exchange can be cancelled at any moment: by ``asyncio.timeout``, by ``task.cancel()`` or by the end of
+``asyncio.run``. It is then unknown whether the drive executed the request. A late reply is never taken
+for the reply to another request, and the next caller does not wait. The end of ``async with`` stops the
+motors that the client started, also in a cancelled task. The cancellation continues after that.
 
 A client belongs to the event loop in which it was opened.
 """

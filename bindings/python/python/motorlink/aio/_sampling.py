@@ -30,7 +30,7 @@ async def sampled(
     most: int | None,
     prepare: Callable[[], Awaitable[None]] = nothing,
 ) -> tuple[bytearray, int, BaseException | None]:
-    """Reads a row at each instant; gives the new rows, the skipped instants, and the error."""
+    """Reads a row at each instant. Returns the new rows, the skipped instants and the error."""
     loop = asyncio.get_running_loop()
     ended: BaseException | None = None
     count = 0
@@ -52,7 +52,7 @@ async def sampled(
 
 
 class Sampling(Awaited, AnySampling):
-    """Rows that are read one after the other, from ``client.samples``: ``async for row in ...``.
+    """Rows of ``client.samples``, read one after the other: ``async for row in ...``.
 
     Each row is a :class:`motorlink.Sample`.
     """

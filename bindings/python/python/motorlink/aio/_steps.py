@@ -1,4 +1,4 @@
-"""Drives a machine of the extension module in an event loop."""
+"""Drives a client of the extension module in an event loop."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def port_name(port: str | os.PathLike[str]) -> str:
     if isinstance(port, (str, os.PathLike)):
         return os.fspath(port)
     raise TypeError(
-        f"{port!r} is no port for asyncio, which is on real time: give a name or a path; a bench of"
-        " motorlink.sim has some while it is served (bench.serve)"
+        f"{port!r} is not a port for asyncio, which uses real time: give a name or a path; `bench.serve`"
+        " of motorlink.sim gives a bench such names"
     )
 
 
 class Machine(Protocol):
-    """What the machines of both protocols have in common."""
+    """What the clients of both protocols have in common."""
 
     @property
     def is_open(self) -> bool: ...
@@ -44,9 +44,9 @@ class Machine(Protocol):
 
 
 class Steps:
-    """Takes a machine's steps when its port has something and when its time has come.
+    """Advances a client when its port has data and when its timer expires.
 
-    ``advance`` moves what can be moved at once, and gives after how many s to go on.
+    ``advance`` does what it can without waiting. It returns the time until the next step, s.
     """
 
     def __init__(self, machine: Machine, advance: Callable[[], float | None]):
@@ -60,11 +60,11 @@ class Steps:
         self.watch()
 
     def future(self) -> asyncio.Future[Value]:
-        """What an exchange ends in."""
+        """The future of an exchange."""
         return self._loop.create_future()
 
     async def ready(self) -> None:
-        """Opens the port if it went away; its back-off and its failure are raised."""
+        """Opens the port again if it was lost. Raises if that fails or is not due yet."""
         if asyncio.get_running_loop() is not self._loop:
             raise RuntimeError(f"{self._machine.port} belongs to another event loop")
         while not self.is_closed:
@@ -75,25 +75,25 @@ class Steps:
                 opening = self._loop.run_in_executor(None, self._machine.reopen)
                 opening.add_done_callback(self._opened)
                 self._opening = opening
-            # Others may wait for it as well.
+            # Other tasks may wait for it too.
             await asyncio.shield(opening)
         raise self.closed()
 
     def closed(self) -> ClosedError:
-        """What calls end in from the close on."""
+        """The error of calls after the close."""
         port = self._machine.port
         return ClosedError(f"{port} was closed by this program; open it again", port=port)
 
     def _opened(self, opening: asyncio.Future[None]) -> None:
         self._opening = None
-        # Who waited for it was told; perhaps nobody does any more.
+        # Tasks that wait get the exception. Without any, asyncio would report it as unused.
         if not opening.cancelled():
             opening.exception()
         if not self.is_closed:
             self.watch()
 
     def watch(self) -> None:
-        """Watches the descriptor that the machine has now, and none that it had."""
+        """Watches the client's current descriptor only."""
         descriptor = self._machine.fileno()
         if descriptor == self._watched:
             return
@@ -108,17 +108,17 @@ class Steps:
             self._watched = None
 
     async def turn(self) -> None:
-        """Lets others have their turn where a port answers without any waiting."""
+        """Lets other tasks run if the port replies without waiting."""
         if self._watched is None:
             await asyncio.sleep(0)
 
     def drop(self, give_up: Callable[[], None]) -> None:
-        """Gives an exchange up, unless its port is gone anyway."""
+        """Abandons an exchange, unless its port is closed."""
         if not self.is_closed and self._opening is None:
             give_up()
 
     def take(self) -> None:
-        """Takes the steps that can be taken now."""
+        """Takes the steps that are due."""
         if self.is_closed or self._opening is not None:
             return
         wait = self._advance()
@@ -128,7 +128,7 @@ class Steps:
             return
         due = self._loop.time() + wait
         if self._timer is not None:
-            # One that is early looks again; most exchanges need none of their own.
+            # An earlier timer checks again. So most exchanges need no timer of their own.
             if self._timer.when() <= due:
                 return
             self._timer.cancel()
@@ -141,9 +141,9 @@ class Steps:
     async def close(
         self, close: Callable[[], Value]
     ) -> tuple[Value, asyncio.CancelledError | None]:
-        """Takes no more steps, and has the machine closed, whatever cancels this task meanwhile.
+        """Takes no more steps and closes the client, also if this task is cancelled meanwhile.
 
-        Gives what ``close`` gave, and a cancellation that is to go on.
+        Returns the result of ``close``, and a cancellation that must continue.
         """
         self.is_closed = True
         self._unwatch()
@@ -171,7 +171,7 @@ class AwaitedClient(Awaited, AnyClient):
 
     @classmethod
     async def _opened(cls, core: Callable[[], Any]) -> Any:
-        """Opens in another thread; what comes when nobody waits for it any more is closed."""
+        """Opens in another thread. If the task is cancelled meanwhile, the opened client is closed."""
         loop = asyncio.get_running_loop()
         opening = loop.run_in_executor(None, core)
         try:
@@ -195,11 +195,11 @@ class AwaitedClient(Awaited, AnyClient):
             raise cancelled
 
     def _advance(self) -> float | None:
-        """Moves what can be moved at once; gives after how many s to go on."""
+        """Does what it can without waiting. Returns the time until the next step, s."""
         raise NotImplementedError
 
     def _fail(self, error: MotorlinkError) -> None:
-        """Ends the exchanges under way."""
+        """Ends the exchanges under way with an error."""
         raise NotImplementedError
 
     @property
@@ -219,7 +219,7 @@ class AwaitedClient(Awaited, AnyClient):
 
 
 class Opening(Generic[Entered]):
-    """A client that is to be opened: ``async with`` it, or ``await`` it."""
+    """A client to open: ``async with`` it, or ``await`` it."""
 
     def __init__(self, open: Callable[[], Coroutine[Any, Any, Entered]]):
         self._open = open
@@ -255,7 +255,7 @@ def opens(
 
 
 def tell(answer: asyncio.Future[Any] | None, value: Any) -> None:
-    """Ends an exchange, unless nobody waits for it any more: in an exception, or in a value."""
+    """Ends an exchange with a value or an exception, unless it is cancelled or complete."""
     if answer is None or answer.done():
         return
     if isinstance(value, BaseException):
@@ -265,7 +265,7 @@ def tell(answer: asyncio.Future[Any] | None, value: Any) -> None:
 
 
 def is_told(answer: asyncio.Future[Any]) -> bool:
-    """Whether an exchange came to its end, though perhaps nobody waits for that any more."""
+    """Whether an exchange is complete, also if its task was cancelled."""
     if not answer.done() or answer.cancelled():
         return False
     answer.exception()

@@ -1,4 +1,4 @@
-"""RMD motors on a CAN bus, protocol V1.62, for asyncio: :mod:`motorlink.rmd`, awaited.
+"""RMD motors on a CAN bus, protocol V1.62, for asyncio. See :mod:`motorlink.rmd`.
 
 >>> import asyncio, motorlink
 >>> async def main() -> float:
@@ -34,16 +34,16 @@ def __dir__() -> list[str]:
 
 
 class Motor(Awaited, RmdMotor["Client"]):
-    """One motor on the bus; from :meth:`Client.motor`. See :class:`motorlink.rmd.Motor`."""
+    """One motor on the bus, from :meth:`Client.motor`. See :class:`motorlink.rmd.Motor`."""
 
     __slots__ = ()
 
 
 class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanPort], Sampling]):
-    """A CAN bus with RMD motors; from :func:`open`.
+    """A CAN bus with RMD motors, from :func:`open`. See :class:`motorlink.rmd.Client`.
 
-    Tasks may share it. Exchanges with different motors overlap; a motor has one at a time, in the order
-    in which they were asked for, and each task gets its own answer.
+    Tasks may share it. Exchanges with different motors overlap. A motor has one exchange at a time, in the
+    order of the calls. Each task gets its own reply.
     """
 
     _core: RmdEventClient
@@ -66,7 +66,7 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
             self._core.confirmed(motor)
 
     async def _asked(self, motor: int, request: RmdRequest) -> Any:
-        """One exchange, in the motor's turn."""
+        """One exchange, during the motor's turn."""
         await self._steps.ready()
         try:
             self._core.ask(motor, request)
@@ -117,7 +117,7 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
         return await sampled(sampling, row, skip=skip, most=most)
 
     async def _gather(self, ids: Iterable[int], ask: Callable[[int], None]) -> dict[int, Any]:
-        """Asks each motor; gives what each answered or why it was not asked, by ID."""
+        """Asks each motor. Returns each reply, or why the motor was not asked, by ID."""
         motors = list(ids)
         async with self._all_turns(motors):
             await self._steps.ready()
@@ -145,7 +145,7 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
     @asynccontextmanager
     async def _all_turns(self, motors: Iterable[int]) -> AsyncIterator[None]:
         async with AsyncExitStack() as turns:
-            # Always in the same order, so that nobody waits for a motor in a circle.
+            # Always in the same order, which excludes a deadlock.
             for motor in sorted(set(motors)):
                 await turns.enter_async_context(self._turn(motor))
             yield
@@ -156,7 +156,7 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
         return answers
 
     async def _answered(self, answers: dict[int, asyncio.Future[Any]]) -> dict[int, Any]:
-        """Waits for all; a port that fails is raised, as it failed for every one."""
+        """Waits for all replies. A port that fails is raised, as it failed for all."""
         self._steps.take()
         await self._steps.turn()
         if answers:
@@ -168,7 +168,7 @@ class Client(AwaitedClient, RmdClient[Motor, Union[str, "os.PathLike[str]", CanP
         return outcomes
 
     def _forget(self, motors: list[int]) -> None:
-        """An exchange that is not over is given up: a late reply is not the next caller's."""
+        """Abandons exchanges that are not complete, so that a late reply is not taken for a newer one."""
         for id in motors:
             answer = self._answers.pop(id, None)
             if answer is not None and not is_told(answer):

@@ -1,4 +1,4 @@
-"""Drives that speak ST's serial Motor Control Protocol, for asyncio: :mod:`motorlink.st`, awaited.
+"""Drives that speak ST's serial Motor Control Protocol, for asyncio. See :mod:`motorlink.st`.
 
 >>> import asyncio, motorlink
 >>> async def main() -> float:
@@ -36,7 +36,7 @@ def __dir__() -> list[str]:
 
 
 class Motor(Awaited, StMotor["Client"]):
-    """One motor of a drive; from :meth:`Client.motor`. See :class:`motorlink.st.Motor`."""
+    """One motor of a drive, from :meth:`Client.motor`. See :class:`motorlink.st.Motor`."""
 
     __slots__ = ()
 
@@ -47,10 +47,10 @@ class Motor(Awaited, StMotor["Client"]):
 
 
 class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"], Sampling]):
-    """A serial line with a drive of up to seven motors; from :func:`open`.
+    """A serial line with a drive of up to seven motors, from :func:`open`. See :class:`motorlink.st.Client`.
 
-    Tasks may share it: one exchange at a time is on the line, in the order in which they were asked
-    for, and each task gets its own answer.
+    Tasks may share it. One exchange at a time is on the line, in the order of the calls. Each task gets its
+    own reply.
     """
 
     _core: StEventClient
@@ -113,7 +113,7 @@ class Client(AwaitedClient, StClient[Motor, Union[str, "os.PathLike[str]"], Samp
                 return await answer
             finally:
                 self._answer = None
-                # A late reply is not the next caller's.
+                # A late reply must not be taken for the next caller's.
                 if not is_told(answer):
                     self._steps.drop(self._core.abandon)
 
@@ -138,7 +138,7 @@ async def scan(
     *,
     timeout: float = _core.ST_SCAN_TIMEOUT,
 ) -> list[ScanResult]:
-    """:func:`motorlink.st.scan`, awaited; it happens in the loop's default executor."""
+    """:func:`motorlink.st.scan` for asyncio. It runs in the loop's default executor."""
     loop = asyncio.get_running_loop()
 
     def ask(*arguments: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Benches: simulated drives, their time and the world around them."""
+"""Benches: simulated drives, their time, their loads and their signals."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ from motorlink.sim._time import patched_time
 class Bench(Closing):
     """An ST drive on a serial line and RMD motors on a CAN bus, on virtual time.
 
-    ``config``: what there is. TOML text, the path of a TOML file (a ``str`` with a ``[``, a ``=`` or a
-    line break is text), or the same as a ``dict``. Without it there are two ST motors and RMD motors 1 to 4.
+    ``config``: TOML text, the path of a TOML file, or the same as a ``dict``. A ``str`` with a ``[``, a ``=``
+    or a line break is text. The default has two ST motors and RMD motors 1 to 4.
 
-    ``seed``: of the noise in the sensors; without it, as the configuration says. ``fault``: what the
-    lines of this bench do, in the words of ``motorlink --fault``, such as ``"drop=1e-3,seed=7"``.
+    ``seed``: the seed of the sensor noise; the default is that of the configuration. ``fault``: faults of the
+    lines of this bench, as in ``motorlink --fault``: ``"drop=1e-3,seed=7"``.
 
     A bench is a port: ``motorlink.st.open(bench)``, ``motorlink.rmd.open(bench, timeout=0.1)``.
-    Raises :class:`~motorlink.InvalidValueError` where a configuration is impossible, with the place.
+
+    Raises :class:`~motorlink.InvalidValueError` for a wrong configuration, with the place.
 
     >>> bench = Bench("[[st.motor]]\\npreset = 'drone'")
     >>> bench.motors
@@ -58,30 +59,32 @@ class Bench(Closing):
 
     @property
     def st(self) -> st.Client:
-        """A client of the ST drive, open, with its profile. For other options, ``st.open(bench, ...)``."""
+        """An open client of the ST drive, with its profile. For other options call ``st.open(bench, ...)``."""
         if self._st is None or self._st._is_closed:
             self._st = st.open(self, profile=self._core.profile)
         return self._st
 
     @property
     def rmd(self) -> rmd.Client:
-        """A client of the RMD motors, open. For other options, ``rmd.open(bench, ...)``."""
+        """An open client of the RMD motors. For other options call ``rmd.open(bench, ...)``."""
         if self._rmd is None or self._rmd._is_closed:
             self._rmd = rmd.open(self)
         return self._rmd
 
     def port(self, *, fault: str | None) -> BenchPort:
-        """The bench as a port with other faults than its own.
+        """The bench as a port with other faults.
 
         >>> import motorlink
         >>> bench = Bench()
         >>> client = motorlink.st.open(bench.port(fault="drop=1,only=received"), timeout=30)
-        >>> client.motor(1).status()                    # 30 s pass at once
+        >>> client.motor(1).status()                    # 30 s of virtual time
         Traceback (most recent call last):
             ...
         motorlink.errors.ReplyTimeoutError: ...
         >>> bench.now
         30.0
+
+        Raises :class:`~motorlink.InvalidValueError` for an unknown fault.
         """
         return BenchPort(self._core.port(fault))
 
@@ -89,21 +92,21 @@ class Bench(Closing):
 
     @property
     def now(self) -> float:
-        """Time since the drives were powered on, s."""
+        """Time since power-on of the drives, s."""
         return self._core.now
 
     def run(self, seconds: float) -> None:
-        """Lets time pass, s. Ctrl-C ends it.
+        """Advances the time by ``seconds``. Ctrl-C ends it.
 
-        While the bench is served it takes that long.
+        While the bench is served it takes ``seconds`` of real time.
         """
         self._core.run(seconds)
 
     def patch_time(self) -> AbstractContextManager[None]:
-        """Code of this thread that calls ``time.sleep`` lets time of the bench pass meanwhile.
+        """During the ``with``, ``time.sleep`` in this thread advances the time of the bench.
 
-        ``time.monotonic``, ``time.perf_counter``, ``time.time`` and their like in ns go by the bench, too. A
-        name that was imported before (``from time import sleep``) stays as it is.
+        ``time.monotonic``, ``time.perf_counter``, ``time.time`` and their variants in ns return the time of the
+        bench. A name that was imported before (``from time import sleep``) is not replaced.
 
         >>> import time
         >>> bench = Bench()
@@ -115,37 +118,37 @@ class Bench(Closing):
         """
         return patched_time(lambda: round(self.now * 1e6) * 1000, self.run)
 
-    # The world around the motors
+    # Loads, supply and faults
 
     @property
     def motors(self) -> tuple[str, ...]:
-        """What the motors are called."""
+        """The names of the motors."""
         return tuple(dict.fromkeys(name.partition(".")[0] for name, _ in self._core.signals))
 
     def brake(self, motor: str, newton_metres: float) -> None:
-        """Sets the braking torque of the load, Nm, 0 to 1000. It only ever slows down."""
+        """Sets the braking torque of the load, Nm, 0 to 1000. It only slows the motor down."""
         self._do("load", motor, newton_metres=newton_metres)
 
     def push(self, motor: str, newton_metres: float) -> None:
-        """Sets the torque with which something turns the output, Nm; negative backwards."""
+        """Sets an external torque at the output, Nm. Negative turns backwards."""
         self._do("push", motor, newton_metres=newton_metres)
 
     def supply(self, motor: str, volts: float) -> None:
-        """Sets the voltage of the source, V, 0 to 1000. The bus follows as its capacitor lets it."""
+        """Sets the voltage of the supply, V, 0 to 1000. The bus capacitor follows."""
         self._do("supply", motor, volts=volts)
 
     def temperature(self, motor: str, celsius: float | None) -> None:
-        """Makes the drive's sensor show a temperature, °C; ``None``: the motor's own again."""
+        """Overrides the drive's temperature sensor, °C. ``None`` removes the override."""
         self._do("temperature", motor, celsius=celsius)
 
     def lock_rotor(self, motor: str, locked: bool = True) -> None:
-        """Holds the rotor, or lets it go."""
+        """Locks the rotor, or releases it."""
         self._do("lock-rotor", motor, locked=locked)
 
     def inject(self, motor: str, fault: str, *, hold: bool | None = None) -> None:
-        """Lets a fault happen: ``"BREAK_IN"`` (ST), ``"LOW_VOLTAGE"`` (RMD).
+        """Injects a fault: ``"BREAK_IN"`` (ST), ``"LOW_VOLTAGE"`` (RMD).
 
-        It happens once; with ``hold=True`` its cause stays until ``hold=False``.
+        The fault happens once. With ``hold=True`` its cause stays until ``hold=False``.
 
         >>> bench = Bench()
         >>> bench.inject("st1", "OVER_VOLT", hold=True)
@@ -156,9 +159,9 @@ class Bench(Closing):
         self._do("fault", motor, fault=fault, hold=hold)
 
     def power_cycle(self, which: str) -> None:
-        """Takes the power away and gives it back: RAM, turns and faults are gone, ROM stays.
+        """Switches the supply off and on. RAM, turns and faults are lost, ROM is kept.
 
-        ``which``: ``"st"``, ``"rmd"``, or one RMD motor. An ST drive has one supply for its motors.
+        ``which``: ``"st"``, ``"rmd"``, or one RMD motor. The motors of an ST drive share one supply.
         """
         if which in ("st", "rmd"):
             self.execute({"command": "power-cycle", "port": which})
@@ -166,9 +169,9 @@ class Bench(Closing):
             self._do("power-cycle", which)
 
     def execute(self, command: Mapping[str, Any]) -> dict[str, Any]:
-        """Executes a command of a bench (docs/SIMULATOR.md); its ports are ``st`` and ``rmd``.
+        """Executes a command of a bench (docs/SIMULATOR.md). Its ports are ``st`` and ``rmd``.
 
-        Raises :class:`~motorlink.InvalidValueError` where nothing was done.
+        Raises :class:`~motorlink.InvalidValueError` for a command that cannot be executed.
 
         >>> Bench().execute({"command": "supply", "port": "rmd", "motor": 2, "volts": 6.5})
         {'ok': True}
@@ -180,16 +183,16 @@ class Bench(Closing):
     def _do(self, command: str, motor: str, **members: Any) -> None:
         place = re.fullmatch(r"(st|rmd)(\d+)", motor)
         if place is None or motor not in self.motors:
-            raise InvalidValueError(f"there is no motor {motor!r}; there are {', '.join(self.motors)}")
+            raise InvalidValueError(f"unknown motor {motor!r}: the motors are {', '.join(self.motors)}")
         port, number = place[1], int(place[2])
         told = {name: value for name, value in members.items() if value is not None}
         self.execute({"command": command, "port": port, "motor": number, **told})
 
-    # The truth
+    # Signals
 
     @property
     def signals(self) -> dict[str, str]:
-        """What can be looked at: the unit of each signal by its name; states and the like have none.
+        """The unit of each signal by its name. States have no unit.
 
         >>> Bench().signals["rmd3.angle_degrees"]
         '°'
@@ -197,7 +200,8 @@ class Bench(Closing):
         return dict(self._core.signals)
 
     def truth(self, motor: str) -> dict[str, Any]:
-        """What really happens in a motor now: its signals by their names, which end with the unit.
+        """The current signals of a motor by name. The end of a name is the unit. They come from the simulation
+        itself, not through the protocol.
 
         States, modes and faults are words.
 
@@ -207,16 +211,16 @@ class Bench(Closing):
         """
         truth = self._core.truth(motor)
         if not truth:
-            raise InvalidValueError(f"there is no motor {motor!r}; there are {', '.join(self.motors)}")
+            raise InvalidValueError(f"unknown motor {motor!r}: the motors are {', '.join(self.motors)}")
         return truth
 
     def record(
         self, signals: Sequence[str], *, seconds: float, every: float = 1e-3
     ) -> Samples:
-        """Lets time pass, s, and gives what happened, a row ``every`` s.
+        """Advances the time by ``seconds`` and records signals, one row each ``every`` s.
 
-        A structured array: ``t`` in s since the first row, the other fields are the signals as
-        ``float64``. States, modes and faults are their numbers. ``motorlink.to_pandas`` takes it.
+        Returns a NumPy structured array: ``t`` in s since the first row, and the signals as ``float64``. States,
+        modes and faults are numbers. ``motorlink.to_pandas`` takes it.
 
         >>> bench = Bench()
         >>> bench.rmd.motor(1).set_speed(360)
@@ -232,7 +236,7 @@ class Bench(Closing):
         return recording.data
 
     def recording(self, signals: Sequence[str], *, every: float = 1e-3) -> Recording:
-        """Writes signals down, a row ``every`` s, whatever lets time pass meanwhile.
+        """Records signals during the ``with``, one row each ``every`` s of the bench.
 
         >>> bench = Bench()
         >>> with bench.recording(["rmd1.speed_dps"], every=0.01) as recording:
@@ -246,18 +250,20 @@ class Bench(Closing):
 
     @property
     def state_hash(self) -> str:
-        """A fingerprint of the state of all drives: benches with the same did the same."""
+        """A hash of the state of all drives. Benches with the same hash had the same history."""
         return f"{self._core.state_hash:016x}"
 
     # Ports
 
     def serve(self, *, st: str | None = None, rmd: str | None = None) -> Serving:
-        """Serves the drives on ports of this machine, on real time: for programs that open ports.
+        """Serves the drives on ports of this machine, on real time, for programs that open ports by name.
 
-        ``st``: ``pty:PATH`` or ``tcp-listen:ADDRESS:PORT``; ``rmd``: ``slcan-pty:PATH``,
-        ``tcp-listen:ADDRESS:PORT`` or ``socketcan:INTERFACE``. Without either, both are ptys in a
-        temporary folder. A thread does it; the end of the ``with`` closes the ports, and time is
-        virtual again.
+        ``st``: ``pty:PATH`` or ``tcp-listen:ADDRESS:PORT``. ``rmd``: ``slcan-pty:PATH``,
+        ``tcp-listen:ADDRESS:PORT`` or ``socketcan:INTERFACE``. Without both, the ports are ptys in a temporary
+        folder. The end of the ``with`` closes the ports, and time is virtual again.
+
+        Raises :class:`~motorlink.PortError` if a port cannot be created,
+        :class:`~motorlink.InvalidValueError` for a name that is not a port.
 
         >>> import motorlink
         >>> with Bench().serve() as ports, motorlink.st.open(ports.st) as client:
@@ -267,7 +273,7 @@ class Bench(Closing):
         return Serving(self._core, st, rmd)
 
     def close(self) -> None:
-        """Closes :attr:`st` and :attr:`rmd`, which stops what they started."""
+        """Closes :attr:`st` and :attr:`rmd`, which stops the motors that they started."""
         self._end(in_flight=False)
 
     def _end(self, *, in_flight: bool) -> None:

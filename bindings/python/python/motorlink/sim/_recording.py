@@ -1,4 +1,4 @@
-"""What is written down of a bench."""
+"""Recordings of signals of a bench."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from motorlink._sampling import Samples, columns
 
 
 class Recording(Closing):
-    """What is written down of a bench until the end of its ``with``, from :meth:`Bench.recording`."""
+    """A recording of signals until the end of its ``with``, from :meth:`Bench.recording`."""
 
     def __init__(self, core: _core.SimBench, signals: Sequence[str], every: float):
         self._names = columns([signals] if isinstance(signals, str) else signals)
@@ -22,7 +22,7 @@ class Recording(Closing):
 
     @property
     def data(self) -> Samples:
-        """What was written down so far, as :meth:`Bench.record` gives it."""
+        """The rows so far, as :meth:`Bench.record` returns them."""
         self._raw += self._core.take()
         rows = np.frombuffer(self._raw, "f8").reshape(-1, len(self._names))
         times = self._core.every * np.arange(len(rows)) / 1e6
@@ -34,7 +34,7 @@ class Recording(Closing):
 
 
 def structured(names: list[str], times: Any, values: Any) -> Samples:
-    """A structured array of a time and a column a name."""
+    """A structured array of the time and one column for each name."""
     names = ["t", *names]
     samples: Samples = np.empty(len(times), [(name, "f8") for name in names])
     for name, column in zip(names, [times, *values]):

@@ -1,4 +1,4 @@
-"""Scenarios, and the motors that they start from."""
+"""Scenarios, and presets of motors."""
 
 from __future__ import annotations
 
@@ -15,71 +15,71 @@ from motorlink.sim._source import Source, text_or_path
 
 
 class Expectation(NamedTuple):
-    """What came of an expectation of a scenario."""
+    """The result of one expectation of a scenario."""
 
-    #: The expectation in words.
+    #: The expectation as text.
     why: str
     signal: str
     holds: bool
-    #: What was measured, when, and what was expected.
+    #: The measured value, its time, and the expected value, as text.
     found: str
 
 
 class Refusal(NamedTuple):
-    """A reply that was not as a scenario announced it."""
+    """A reply that differs from the one that the scenario expects."""
 
-    #: Moment, s.
+    #: The time, s.
     at: float
     motor: str
     event: str
-    #: What the drive said; ``None`` where it took what it was to refuse.
+    #: The drive's error; ``None`` if it accepted a request that the scenario expects it to refuse.
     reply: str | None
-    #: What was announced; ``None`` where nothing was.
+    #: The error that the scenario expects; ``None`` if it expects none.
     announced: str | None
-    #: All of it as text.
+    #: The refusal as text.
     text: str
 
 
 class Mark(NamedTuple):
     """An event of a scenario."""
 
-    #: Moment, s.
+    #: The time, s.
     at: float
     label: str
 
 
 @dataclass(frozen=True)
 class Run:
-    """What came of a scenario."""
+    """The result of a scenario."""
 
     title: str
     about: str | None
-    #: A row a sample: ``t`` in s, and every signal.
+    #: A NumPy structured array: ``t`` in s, and every signal.
     samples: Samples
-    #: The unit of each signal; states and the like have none.
+    #: The unit of each signal. States have no unit.
     units: dict[str, str]
     expectations: list[Expectation]
-    #: Replies that were not as announced.
+    #: Replies that differ from the expected ones.
     refusals: list[Refusal]
-    #: What happened when.
+    #: The events and their times.
     marks: list[Mark]
-    #: Whether everything was as expected.
+    #: Whether all expectations hold.
     as_expected: bool
-    #: A fingerprint of the state of all drives at the end: runs with the same did the same.
+    #: A hash of the state of all drives at the end. Runs with the same hash had the same history.
     state_hash: str
 
     @property
     def failures(self) -> list[str]:
-        """What was not as expected, a line each."""
+        """The expectations and replies that failed, one line each."""
         missed = [f"{one.why}: {one.signal} {one.found}" for one in self.expectations if not one.holds]
         return missed + [refusal.text for refusal in self.refusals]
 
 
 def run(scenario: Source) -> Run:
-    """Plays a scenario (docs/SCENARIOS.md): TOML text, or the path of a file.
+    """Runs a scenario (docs/SCENARIOS.md): TOML text, or the path of a file.
 
-    A ``str`` with a ``[``, a ``=`` or a line break is text; files that it names are looked for in the working
-    directory. Raises :class:`~motorlink.InvalidValueError` where it says what cannot be.
+    A ``str`` with a ``[``, a ``=`` or a line break is text. Paths in text are relative to the working
+    directory. Raises :class:`~motorlink.InvalidValueError` for a wrong scenario, with the place.
 
     >>> told = run('''
     ...     title = "A turn"
@@ -121,7 +121,7 @@ def run(scenario: Source) -> Run:
 
 
 def presets() -> dict[str, dict[str, Any]]:
-    """The motors that there are to start from, with every value of their plants.
+    """The presets of motors, with all values of their plants.
 
     >>> presets()["shinano"]["machine"]["pole_pairs"]
     2

@@ -9,14 +9,15 @@ from motorlink._client import Closing
 
 
 class Serving(Closing):
-    """Ports on which a bench is served until the end of its ``with``, from :meth:`Bench.serve`."""
+    """The ports of a served bench until the end of its ``with``, from :meth:`Bench.serve`."""
 
-    #: The ST drive for ``motorlink.st.open``; on a pty also for other programs. Empty: not served.
+    #: The port of the ST drive for ``motorlink.st.open``; empty if it is not served.
     st: str
-    #: The RMD motors for ``motorlink.rmd.open``. Empty: not served.
+    #: The port of the RMD motors for ``motorlink.rmd.open``; empty if they are not served.
     rmd: str
-    #: What other programs open: device, address or CAN interface.
+    #: The ST drive's device or address, for other programs.
     st_path: str
+    #: The RMD motors' device, address or CAN interface, for other programs.
     rmd_path: str
 
     def __init__(self, core: _core.SimBench, st: str | None, rmd: str | None):
@@ -34,7 +35,7 @@ class Serving(Closing):
         self.rmd, self.rmd_path = _opened(self._core.rmd, "slcan:")
 
     def close(self) -> None:
-        """Closes the ports. Again is no error."""
+        """Closes the ports. A second call does nothing."""
         try:
             self._core.end()
         finally:
@@ -49,7 +50,7 @@ class Serving(Closing):
 
 
 def _opened(served: tuple[str, str] | None, line: str) -> tuple[str, str]:
-    """The port that reaches what is served, and its path; ``line``: how it speaks on a serial line."""
+    """The name that opens a served port, and its path. ``line``: the scheme on a serial line."""
     if served is None:
         return "", ""
     port, path = served

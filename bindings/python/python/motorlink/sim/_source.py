@@ -14,7 +14,7 @@ Source = Union[str, "os.PathLike[str]"]
 
 
 def is_path(source: Any) -> bool:
-    """Whether a configuration or scenario is the path of a file, not the text itself."""
+    """Whether a configuration or scenario is the path of a file."""
     is_text = isinstance(source, str) and (not source or re.search(r"[=\[\n]", source))
     return isinstance(source, (str, os.PathLike)) and not is_text
 

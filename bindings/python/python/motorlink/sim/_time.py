@@ -11,7 +11,7 @@ from typing import Any
 
 @contextlib.contextmanager
 def patched_time(now_ns: Callable[[], int], sleep: Callable[[float], None]) -> Iterator[None]:
-    """``time.sleep`` and the clocks of ``time`` are these meanwhile, for this thread."""
+    """Replaces ``time.sleep`` and the clocks of ``time`` in this thread."""
     from unittest import mock
 
     mine = threading.get_ident()
