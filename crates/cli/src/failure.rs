@@ -4,6 +4,7 @@ use motorlink::port::{NameError, PortError};
 use motorlink::relay::RelayError;
 use motorlink::{rmd, st};
 use motorlink_link::fault::FaultError;
+use motorlink_link::{printable, printable_lines};
 use serde_json::{Map, Value, json};
 
 use crate::advice;
@@ -88,7 +89,7 @@ impl Failure {
 
     /// After a file could not be written.
     pub fn file(path: &std::path::Path, error: &std::io::Error) -> Self {
-        let message = format!("cannot write `{}`: {error}", path.display());
+        let message = format!("cannot write `{}`: {error}", printable(&path.display().to_string()));
         Problem::new(Kind::Output, message).into()
     }
 
@@ -112,7 +113,7 @@ impl Failure {
     /// With what to try.
     pub fn trying(mut self, advice: impl Into<String>) -> Self {
         if let Failure::Failed(problem) = &mut self {
-            problem.advice = Some(advice.into());
+            problem.advice = Some(printable_lines(&advice.into()));
         }
         self
     }
@@ -167,7 +168,7 @@ impl Failure {
 
 impl Problem {
     fn new(kind: Kind, message: impl Into<String>) -> Self {
-        Problem { kind, message: message.into(), advice: None, facts: Map::new() }
+        Problem { kind, message: printable_lines(&message.into()), advice: None, facts: Map::new() }
     }
 
     /// What an error of the library is, with what to try.

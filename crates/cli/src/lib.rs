@@ -17,12 +17,14 @@ mod rmd;
 mod sim;
 mod span;
 mod st;
+mod terminal;
 mod trace;
 mod voice;
 
 use std::ffi::OsString;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use motorlink_link::is_printable;
 
 use crate::failure::Failure;
 
@@ -74,11 +76,18 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
     interrupt::install();
     motorlink_testbench::register();
     let words = own_words(words);
+    let is_shown = |word: &OsString| word.to_string_lossy().chars().all(is_printable);
+    let has_control_characters = !words.iter().all(is_shown);
     let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
         Err(error) if error.exit_code() == 2 && output::has_json_messages() => {
             let text = error.to_string();
             return output::report(&Failure::usage(text.trim_start_matches("error: ").trim_end()));
+        }
+        Err(error) if error.exit_code() == 2 && has_control_characters => {
+            // A terminal obeys the words that the error quotes.
+            output::print_message(&error.render().to_string().trim_end());
+            return 2;
         }
         Err(error) => {
             // Help for a reader that is gone.

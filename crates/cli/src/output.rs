@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use crate::failure::Failure;
 use crate::json::{Line, Row};
+use crate::terminal::safe;
 use crate::voice::Voice;
 
 /// stdout and stderr of a program that must not wait for their readers.
@@ -113,7 +114,7 @@ pub fn note(text: impl std::fmt::Display) {
 pub fn print_message(text: &dyn std::fmt::Display) {
     match VOICES.get() {
         Some((_, messages)) => messages.say(text),
-        None => drop(writeln!(stderr(), "{text}")),
+        None => drop(writeln!(stderr(), "{}", safe(&text.to_string()))),
     }
 }
 
@@ -140,7 +141,10 @@ pub fn print_line(text: &dyn std::fmt::Display) -> Result<(), Failure> {
         return Ok(());
     }
     let mut out = stdout().lock();
-    writeln!(out, "{text}").and_then(|()| out.flush()).map_err(|error| Failure::output(&error))
+    let text = text.to_string();
+    writeln!(out, "{}", safe(&text))
+        .and_then(|()| out.flush())
+        .map_err(|error| Failure::output(&error))
 }
 
 /// A bar on stderr for a scan of `steps` steps; nothing where stderr is no terminal.

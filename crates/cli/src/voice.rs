@@ -12,6 +12,8 @@ use std::time::Duration;
 use rustix::process::getpgrp;
 use rustix::termios::{LocalModes, isatty, tcgetattr, tcgetpgrp};
 
+use crate::terminal::safe;
+
 /// Lines that wait to be written.
 const WAITING: usize = 256;
 /// How long the last lines may take.
@@ -48,7 +50,7 @@ impl Voice {
     /// Prints a line, unless too many wait already.
     pub fn say(&self, text: impl Display) {
         self.state.waiting.fetch_add(1, Ordering::SeqCst);
-        if self.words.try_send(Word::Line(text.to_string())).is_err() {
+        if self.words.try_send(Word::Line(safe(&text.to_string()).into_owned())).is_err() {
             self.state.waiting.fetch_sub(1, Ordering::SeqCst);
             self.state.dropped.fetch_add(1, Ordering::SeqCst);
         }

@@ -17,4 +17,4 @@ mod text;
 pub use clock::Clock;
 pub use motorlink_proto::{can, time};
 pub use motorlink_slcan as slcan;
-pub use text::printable;
+pub use text::{is_printable, printable, printable_lines};

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use motorlink_link::{printable, printable_lines};
 use motorlink_proto::rmd::Settings;
 use motorlink_proto::st::Profile;
 use motorlink_proto::time::Instant;
@@ -54,7 +55,7 @@ impl Default for RmdConfigs {
 #[non_exhaustive]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("cannot read `{}`: {error}", .path.display())]
+    #[error("cannot read `{}`: {error}", printable(&.path.display().to_string()))]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -62,7 +63,7 @@ pub enum ConfigError {
         error: std::io::Error,
     },
     /// Something is wrong in a file.
-    #[error("{}: {error}", .path.display())]
+    #[error("{}: {error}", printable(&.path.display().to_string()))]
     InFile {
         /// The file.
         path: PathBuf,
@@ -70,7 +71,7 @@ pub enum ConfigError {
         error: Box<ConfigError>,
     },
     /// The text is not what is expected.
-    #[error("{0}")]
+    #[error("{}", printable_lines(.0))]
     Text(String),
     /// A motor that cannot be.
     #[error("{0}")]
@@ -104,13 +105,15 @@ impl BenchConfig {
 
     /// Reads the text of a file. What it does not say is as in the default.
     pub fn parse(text: &str) -> Result<Self, ConfigError> {
-        Self::from_file(toml::from_str(text).map_err(|error| ConfigError::Text(error.to_string()))?)
+        Self::from_file(
+            toml::from_str(text).map_err(|error| ConfigError::Text(toml_error(&error)))?,
+        )
     }
 
     /// Reads the same as JSON: an object with the members that a file has.
     pub fn parse_json(text: &str) -> Result<Self, ConfigError> {
         let file = serde_json::from_str(text);
-        Self::from_file(file.map_err(|error| ConfigError::Text(error.to_string()))?)
+        Self::from_file(file.map_err(|error| ConfigError::Text(printable(&error.to_string())))?)
     }
 
     /// Reads a file's table.
@@ -190,6 +193,12 @@ impl BenchConfig {
     }
 }
 
+/// What is wrong in a file, and where, with the line as far as it can be shown.
+pub(super) fn toml_error(error: &toml::de::Error) -> String {
+    let message = error.message();
+    printable_lines(error.to_string().replace(message, &printable(message)).trim_end())
+}
+
 /// Says which motor has a value that cannot be.
 fn impossible(motor: &str, number: usize) -> impl Fn(OutOfRange) -> ConfigError {
     move |error| ConfigError::Impossible(format!("{motor} {number}: {error}"))
@@ -214,6 +223,7 @@ fn st_motor(mut table: Table, place: &str) -> Result<MotorConfig, ConfigError> {
             let known = MotorConfig::PRESETS.iter().find(|(known, _)| name.as_str() == Some(known));
             let Some((_, preset)) = known else {
                 let names = MotorConfig::PRESETS.map(|(name, _)| name).join(", ");
+                let name = printable(&name.to_string());
                 let why = format!("{place}: the presets are {names}, not {name}");
                 return Err(ConfigError::Text(why));
             };
@@ -230,6 +240,7 @@ fn rmd_motor(mut table: Table, place: &str) -> Result<RmdConfig, ConfigError> {
         Some(Value::String(name)) if name == "rmd-l-5005" => RmdConfig::default(),
         Some(Value::String(name)) if name == "rmd-x8" => RmdConfig::x8(),
         Some(other) => {
+            let other = printable(&other.to_string());
             let why =
                 format!("{place}: the presets are \"rmd-l-5005\" and \"rmd-x8\", not {other}");
             return Err(ConfigError::Text(why));
@@ -247,7 +258,7 @@ pub(super) fn overlay<T: serde::Serialize + DeserializeOwned>(
     let error = |error: &dyn std::fmt::Display| ConfigError::Text(format!("{place}: {error}"));
     let mut whole = Table::try_from(preset).map_err(|why| error(&why))?;
     merge(&mut whole, table);
-    whole.try_into().map_err(|why| error(&why))
+    whole.try_into().map_err(|why| error(&toml_error(&why).replace('\n', " ")))
 }
 
 fn merge(whole: &mut Table, over: Table) {

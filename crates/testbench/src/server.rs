@@ -7,6 +7,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use motorlink_link::port::PortError;
+use motorlink_link::printable;
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::{Server, Station, Turn};
 use motorlink_proto::can::CanFrame;
@@ -131,7 +132,9 @@ impl SimServer {
     pub fn obey(&mut self, line: &str) -> Value {
         match Command::read(line).and_then(|command| self.execute(&command)) {
             Ok(answer) => answer,
-            Err(why) => json!({ "ok": false, "error": { "kind": "usage", "message": why } }),
+            Err(why) => {
+                json!({ "ok": false, "error": { "kind": "usage", "message": printable(&why) } })
+            }
         }
     }
 

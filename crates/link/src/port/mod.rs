@@ -43,5 +43,5 @@ pub use socketcan::SocketCanLink;
 pub use tap::{Direction, TapBytes, TapCan};
 
 pub(crate) use fd::timespec;
-pub(crate) use name::{host_and_port, present, unknown_form};
+pub(crate) use name::{check_printable, host_and_port, present, unknown_form};
 pub(crate) use schemes::{MARKED_LINK, keep_alive, mark, unbracketed};

@@ -1,5 +1,7 @@
 //! What a port's name is made of.
 
+use crate::text::{is_printable, printable};
+
 /// A name as it was given, on its way through a scheme.
 #[derive(Debug)]
 pub struct Given<'a> {
@@ -65,6 +67,12 @@ pub enum NameError {
         nearest: Option<String>,
         /// The forms there are.
         forms: String,
+    },
+    /// It has characters that a terminal does not show as they are.
+    #[error("`{name}` is not a port name: it has control characters")]
+    Unprintable {
+        /// What was given, without these characters.
+        name: String,
     },
     /// A port of this form exists on other systems only.
     #[error("`{name}`: `{scheme}:` is there on {systems} only")]
@@ -132,6 +140,14 @@ pub(crate) fn unknown_form(name: &str, nearest: Option<String>, forms: String) -
 
 fn suggestion(nearest: Option<&str>) -> String {
     nearest.map_or_else(String::new, |nearest| format!("did you mean `{nearest}`? "))
+}
+
+/// Refuses a name that cannot be shown as it is.
+pub(crate) fn check_printable(name: &str) -> Result<(), NameError> {
+    match name.chars().all(is_printable) {
+        true => Ok(()),
+        false => Err(NameError::Unprintable { name: printable(name) }),
+    }
 }
 
 pub(crate) fn present<'a>(

@@ -6,7 +6,7 @@ use std::sync::{PoisonError, RwLock};
 use super::error::PortError;
 use super::event::{EventBytes, EventCan};
 use super::link::{ByteLink, CanLink};
-use super::name::{Given, NameError, unknown_form};
+use super::name::{Given, NameError, check_printable, unknown_form};
 use super::scheme::{CanPort, Carries, LinePort, PortName, Scheme, parse};
 use super::schemes::BUILT_IN;
 
@@ -30,6 +30,7 @@ impl FromStr for PortName {
     type Err = NameError;
 
     fn from_str(name: &str) -> Result<Self, NameError> {
+        check_printable(name)?;
         let schemes = schemes();
         let mut given = Given::new(name);
         let body = given.body;

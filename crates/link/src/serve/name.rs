@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use crate::port::{NameError, host_and_port, present, unknown_form};
+use crate::port::{NameError, check_printable, host_and_port, present, unknown_form};
 
 const FORMS: &str = "served ports are pty:PATH, slcan-pty:PATH, unix-listen:PATH, \
     tcp-listen:ADDR:PORT and socketcan:INTERFACE";
@@ -33,6 +33,7 @@ impl FromStr for ServeName {
     type Err = NameError;
 
     fn from_str(name: &str) -> Result<Self, NameError> {
+        check_printable(name)?;
         if let Some(path) = name.strip_prefix("pty:") {
             return Ok(ServeName::Pty(present(name, path, "a path", "pty:./st0")?.into()));
         }

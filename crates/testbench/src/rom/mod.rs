@@ -12,6 +12,7 @@ use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use motorlink_link::printable;
 use motorlink_proto::rmd::Settings;
 use motorlink_sim::rmd::RmdConfig;
 
@@ -34,7 +35,7 @@ pub struct RomFolder {
 #[non_exhaustive]
 pub enum RomError {
     /// The system refused an operation.
-    #[error("cannot keep ROM in `{}`: {error}", .path.display())]
+    #[error("cannot keep ROM in `{}`: {error}", printable(&.path.display().to_string()))]
     Io {
         /// The file or folder.
         path: PathBuf,
@@ -42,13 +43,13 @@ pub enum RomError {
         error: io::Error,
     },
     /// Another process uses the folder.
-    #[error("another simulator uses the ROM in `{}`", .path.display())]
+    #[error("another simulator uses the ROM in `{}`", printable(&.path.display().to_string()))]
     Taken {
         /// The folder.
         path: PathBuf,
     },
     /// The file is not one that this program wrote for this motor. It is not changed.
-    #[error("`{}` is not a usable ROM file: {why}; it was not changed", .path.display())]
+    #[error("`{}` is not a usable ROM file: {}; it was not changed", printable(&.path.display().to_string()), printable(.why))]
     Unusable {
         /// The file.
         path: PathBuf,

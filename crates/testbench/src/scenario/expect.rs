@@ -1,5 +1,6 @@
 //! What is expected of a run, and whether it came so.
 
+use motorlink_link::printable;
 use serde::Deserialize;
 
 use crate::signals::{Kind, Signal, find_signal, short};
@@ -81,7 +82,7 @@ impl Written {
         let signal = find_signal(&self.signal, signals)?;
         let named = matches!(signals[signal].kind, Kind::Named(_));
         let bounds = match (self.min, self.max, self.value, self.within, self.is) {
-            (None, None, None, None, Some(name)) if named => Bounds::Is(name),
+            (None, None, None, None, Some(name)) if named => Bounds::Is(printable(&name)),
             (None, None, None, None, Some(_)) => {
                 return Err(format!("{} has numbers: use min and max", self.signal));
             }
@@ -130,7 +131,8 @@ impl Written {
         if (last + 1).saturating_sub(first) < fewest {
             return Err("there are not enough samples in this span".to_owned());
         }
-        Ok(Expectation { why: self.why, signal, samples: [first, last], of: self.of, bounds })
+        let why = printable(&self.why);
+        Ok(Expectation { why, signal, samples: [first, last], of: self.of, bounds })
     }
 }
 

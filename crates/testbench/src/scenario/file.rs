@@ -3,6 +3,7 @@
 use std::mem::take;
 use std::path::{Path, PathBuf};
 
+use motorlink_link::{printable, printable_lines};
 use motorlink_proto::time::Micros;
 use serde::Deserialize;
 use toml::{Table, Value};
@@ -14,7 +15,7 @@ use super::reader::Reader;
 use super::script::Script;
 use crate::cast::{Cast, Target};
 use crate::command::Command;
-use crate::config::BenchConfig;
+use crate::config::{BenchConfig, toml_error};
 use crate::signals::{Kind, Signal, find_signal};
 
 /// Drives step on multiples of this, µs.
@@ -62,7 +63,7 @@ struct WrittenPanel {
 #[non_exhaustive]
 pub enum ScenarioError {
     /// A file cannot be read.
-    #[error("cannot read `{}`: {error}", .path.display())]
+    #[error("cannot read `{}`: {error}", printable(&.path.display().to_string()))]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -70,7 +71,7 @@ pub enum ScenarioError {
         error: std::io::Error,
     },
     /// The file says something that cannot be.
-    #[error("{}: {why}", .path.display())]
+    #[error("{}: {why}", printable(&.path.display().to_string()))]
     InFile {
         /// The file.
         path: PathBuf,
@@ -94,7 +95,11 @@ impl Scenario {
     /// # Errors
     /// What cannot be, and where.
     pub fn parse(text: &str, folder: &Path) -> Result<Self, String> {
-        let mut file: File = toml::from_str(text).map_err(|error| error.to_string())?;
+        let file: File = toml::from_str(text).map_err(|error| toml_error(&error))?;
+        Self::from_file(file, folder).map_err(|why| printable(&why))
+    }
+
+    fn from_file(mut file: File, folder: &Path) -> Result<Self, String> {
         let (duration, sample) = times(file.duration, file.sample_us)?;
         let files = file.load_profile.iter().filter_map(|load| load.get("file")?.as_str());
         let files = files.map(|file| folder.join(file)).collect();
@@ -112,7 +117,7 @@ impl Scenario {
         let expectations = numbered("expect", file.expect, |written| {
             written.resolve(&signals, step, count as usize)
         })?;
-        let (title, about) = (file.title, file.about);
+        let (title, about) = (printable(&file.title), file.about.as_deref().map(printable_lines));
         Ok(Scenario {
             title,
             about,
@@ -208,7 +213,9 @@ impl WrittenPanel {
             Some([low, high]) if (low..high).is_empty() || !(high - low).is_finite() => {
                 Err(format!("nothing is between {low} and {high}"))
             }
-            range => Ok(Panel { title: self.title, signals: found, range }),
+            range => {
+                Ok(Panel { title: self.title.as_deref().map(printable), signals: found, range })
+            }
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use motorlink_link::printable;
 use motorlink_proto::rmd::MotorId;
 use motorlink_proto::st::{ErrorCode, MotorNumber};
 use motorlink_proto::time::{Instant, Micros};
@@ -41,7 +42,8 @@ impl Reader<'_> {
         if let Some(refused) = &refused {
             announced(refused, &action).map_err(place)?;
         }
-        let label = label.unwrap_or_else(|| match self.targets {
+        let words = printable(&words);
+        let label = label.map(|label| printable(&label)).unwrap_or_else(|| match self.targets {
             [_] => words.clone(),
             _ => format!("{target} {words}"),
         });

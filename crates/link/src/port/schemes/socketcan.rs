@@ -11,6 +11,7 @@ use super::super::queued::QueuedCan;
 use super::super::scheme::{CanPort, Carries, Form, Port, PortInfo, PortName, Scheme};
 use super::super::socketcan::SocketCanLink;
 use super::super::system;
+use crate::text::printable;
 
 /// The kernel's hardware type of CAN interfaces.
 const ARPHRD_CAN: &str = "280";
@@ -95,7 +96,7 @@ fn listed(root: &Path, name: &str) -> Option<PortInfo> {
     let device = class.join("device");
     let soft = (!interface.needs_bitrate).then(|| "virtual or serial CAN".to_owned());
     Some(PortInfo {
-        name: format!("socketcan:{name}"),
+        name: printable(&format!("socketcan:{name}")),
         carries: Carries::Frames,
         description: system::description(&device).or(soft),
         stable_path: None,
