@@ -205,7 +205,7 @@ fn values() -> Vec<Vec<u8>> {
 /// What docs/SIMULATOR.md shows, and every member there is.
 fn configurations() -> Vec<Vec<u8>> {
     let page = text("docs/SIMULATOR.md");
-    let shown = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next());
+    let shown = page.split("```toml config\n").nth(1).and_then(|rest| rest.split("```").next());
     let st = [MotorConfig::default(), MotorConfig::servo()].map(|motor| members("st", &motor));
     let shown = shown.expect("the page shows a configuration").to_owned();
     [shown, members("rmd", &RmdConfig::default())].into_iter().chain(st).map(Into::into).collect()
