@@ -77,16 +77,16 @@ def test_a_naive_host_of_the_serial_protocol_is_caught(check):
     assert code == 1
     assert cases["every_reading_has_its_own_value"]["verdict"] == "passed"
     assert failed(cases).keys() >= {
-        "a_late_reply_is_not_the_next_ones",
-        "a_reply_that_comes_with_the_next_one_is_not_the_next_ones",
-        "a_second_copy_of_a_reply_is_not_the_next_ones",
+        "a_late_reply_is_not_matched_to_the_next_request",
+        "a_reply_together_with_the_next_one_is_not_matched_to_the_next_request",
+        "a_duplicate_reply_is_not_matched_to_the_next_request",
         "a_damaged_checksum_is_an_error",
         "a_damaged_value_is_an_error",
-        "a_header_that_is_neither_is_an_error",
-        "a_flood_of_acknowledges_is_nobodys",
+        "an_unknown_header_is_an_error",
+        "a_flood_of_acknowledges_is_dropped",
         "a_line_that_echoes_is_not_read_as_a_drive",
     }
-    copy = cases["a_second_copy_of_a_reply_is_not_the_next_ones"]
+    copy = cases["a_duplicate_reply_is_not_matched_to_the_next_request"]
     assert "twice" in copy["received"]
     assert "22 01 1e 41" in copy["sent"]
     assert any("drive f0 04" in line for line in copy["transcript"])
@@ -106,15 +106,15 @@ def test_a_naive_host_of_rmd_is_caught(check):
     assert code == 1
     assert cases["every_reading_has_its_own_value"]["verdict"] == "passed"
     assert failed(cases).keys() >= {
-        "a_late_reply_is_not_the_next_ones",
-        "a_second_copy_of_a_reply_is_not_the_next_ones",
+        "a_late_reply_is_not_matched_to_the_next_request",
+        "a_duplicate_reply_is_not_matched_to_the_next_request",
         "a_reply_to_another_command_is_not_the_answer",
         "a_reply_of_another_motor_is_not_the_answer",
-        "an_extended_frame_is_no_reply",
+        "an_extended_frame_is_not_a_reply",
         "a_motor_of_v3_is_not_understood",
         "a_motor_of_lk_tech_is_not_understood",
-        "frames_of_nobody_are_dropped",
-        "a_flood_of_other_frames_does_not_matter",
+        "frames_without_a_motor_identifier_are_dropped",
+        "a_flood_of_other_frames_is_dropped",
     }
 
 
@@ -129,7 +129,7 @@ def test_hosts_of_four_motors_are_told_apart(check):
     code, cases = cycle("naive_cycle.py")
     assert code == 1
     mixed = "replies_in_any_order_find_their_motors[a cycle]"
-    assert failed(cases).keys() >= {mixed, "frames_of_other_motors_do_not_matter[a cycle]"}
+    assert failed(cases).keys() >= {mixed, "frames_of_other_motors_are_dropped[a cycle]"}
     assert "of motor 1; motor 4 did" in cases[mixed]["received"]
 
 

@@ -71,7 +71,7 @@ def test_json_without_a_file_goes_to_stdout(check, sim):
 def test_with_leave_the_motor_turns_and_is_off_in_the_end(check, sim):
     drives = sim(st=())
     before = drives.motor(1)["angle_degrees"]
-    case = "run_resumes_what_a_stop_has_interrupted"  # It turns one way only.
+    case = "run_resumes_the_motion_that_a_stop_interrupted"  # It turns one way only.
     done = check(drives.can, "--only", case, "--spin", "--verbose").ended(0)
     assert case in done.out
     after = drives.motor(1)
@@ -80,7 +80,7 @@ def test_with_leave_the_motor_turns_and_is_off_in_the_end(check, sim):
 
 def test_ctrl_c_switches_the_motor_off(start, sim):
     drives = sim(st=())
-    case = "the_acceleration_limit_holds"
+    case = "the_acceleration_limit_applies"
     run = start("conformance", "rmd", "-p", f"slcan:{drives.can}", "--spin", "--only", case)
     eventually(lambda: drives.motor(1)["speed_dps"] > 10, "a motor that turns")
     run.interrupt()
@@ -198,16 +198,16 @@ def test_hooks_cycle_the_power_and_cause_faults(check, motorlink, tmp_path):
         os.close(commands)
     verdicts = {case["name"]: case["verdict"] for case in done.json["cases"]}
     for name in (
-        "gains_in_ram_are_lost_with_the_power",
-        "gains_in_rom_outlast_the_power",
+        "gains_in_ram_are_lost_at_power_off",
+        "gains_in_rom_are_kept_over_a_power_cycle",
         "a_new_zero_acts_from_power_on",
-        "an_error_stays_while_its_cause_lasts",
+        "an_error_stays_while_its_cause_is_present",
         "an_error_is_cleared_when_its_cause_is_gone",
     ):
         assert verdicts[name] == "passed"
 
 
 def test_a_hook_that_fails_is_told(check, sim):
-    case = "gains_in_ram_are_lost_with_the_power"
+    case = "gains_in_ram_are_lost_at_power_off"
     done = check(sim(st=()).can, "--only", case, "--power-cycle", "exit 4").ended(0)
     assert "--power-cycle: `exit 4` failed" in done.out

@@ -1,4 +1,4 @@
-//! Cases: what is done to a drive and what must come of it.
+//! Cases: tests of a drive.
 
 use std::borrow::Cow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -10,7 +10,7 @@ use crate::reading::Reading;
 use crate::report::{Outcome, Report, Verdict};
 use crate::world::Unavailable;
 
-/// What a case needs the user's leave or help for.
+/// What a case needs: the user's permission or help.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Need {
     /// The motor turns.
@@ -19,41 +19,42 @@ pub enum Need {
     Rom,
     /// The drive's power is cycled.
     PowerCycle,
-    /// A fault is caused from outside.
+    /// Something outside the drive causes a fault.
     Fault,
 }
 
-/// A test of one or a few clauses on a drive behind a harness `B`.
+/// A test of one or a few clauses on a drive. `B` is the harness.
 pub struct Case<B> {
-    /// What must hold, as a sentence in snake case; a subject may follow in brackets:
+    /// The demand, as a sentence in snake case. A subject may follow in brackets:
     /// `registers_read_in_their_size[SPEED_MEAS]`.
     pub name: Cow<'static, str>,
     /// Ids of the clauses that it tests.
     pub clauses: &'static [&'static str],
-    /// What it needs.
+    /// The permissions and help that it needs.
     pub needs: &'static [Need],
-    /// The reading that all of it demands; `None` where sentences of the document do.
+    /// The reading that demands the whole case; `None` if sentences of the document demand it.
     pub reading: Option<Reading>,
     /// The test.
     pub run: Run<B>,
 }
 
-/// What a case does.
+/// The function of a case.
 pub type Run<B> = Box<dyn Fn(&mut B) -> Result<(), Stop>>;
 
 /// Why a case did not pass.
 #[derive(Debug, thiserror::Error)]
 pub enum Stop {
-    /// The drive did something else.
+    /// The drive did not meet the demand.
     #[error("{0:?}")]
     Failed(Box<Finding>),
-    /// The case does not apply to this drive, or cannot be run; why.
+    /// The case does not apply to this drive, or cannot be run. The text is the reason.
     #[error("{0}")]
     Skipped(String),
-    /// The port failed: nothing is known about the drive.
+    /// The port failed. The result for the drive is unknown.
     #[error(transparent)]
     Port(#[from] PortError),
-    /// The drive cannot be tested any further, such as one that does not answer at all; why.
+    /// The drive cannot be tested further, for example because it does not answer. The text is the
+    /// reason.
     #[error("{0}")]
     Lost(String),
 }
@@ -64,9 +65,9 @@ impl From<Unavailable> for Stop {
     }
 }
 
-/// Says that what failed is demanded by a reading, not by a sentence.
+/// Marks a failure as demanded by a reading instead of a sentence.
 pub(crate) trait ReadAs {
-    /// The same with the reading, unless it has one.
+    /// Adds the reading, unless there is one already.
     fn read_as(self, reading: Reading) -> Self;
 }
 
@@ -87,10 +88,10 @@ impl<T> ReadAs for Result<T, Stop> {
 
 /// Differences from readings that do not end a case.
 #[derive(Debug, Default)]
-pub(crate) struct Beside(Vec<Finding>);
+pub(crate) struct Differences(Vec<Finding>);
 
-impl Beside {
-    /// Notes what failed, if anything, and lets the case go on.
+impl Differences {
+    /// Records a failure as a difference from `reading`, so that the case continues.
     pub(crate) fn note(&mut self, reading: Reading, result: Result<(), Stop>) -> Result<(), Stop> {
         match result.read_as(reading) {
             Err(Stop::Failed(finding)) => {
@@ -101,33 +102,33 @@ impl Beside {
         }
     }
 
-    /// What was noted; it is forgotten.
+    /// Returns and clears the recorded differences.
     pub(crate) fn take(&mut self) -> Vec<Finding> {
         std::mem::take(&mut self.0)
     }
 }
 
-/// A drive under test, as [`run`] sees it.
+/// A drive under test, as [`run`] uses it.
 pub trait Subject {
-    /// Brings drive and line to where a case may begin: the line silent and in step, the motor at
-    /// rest. Forgets the transcript.
+    /// Brings drive and line to the start state of a case: the line silent and in sync, the motor
+    /// at rest. Clears the transcript.
     fn begin(&mut self) -> Result<(), Stop>;
 
-    /// Undoes what the case wrote and started, whatever came of it.
+    /// Undoes the changes of the case, and stops what it started. Called also after a failure.
     fn restore(&mut self) -> Result<(), Stop>;
 
-    /// Whether the user allowed this.
+    /// Whether the user permitted this.
     fn allows(&self, need: Need) -> bool;
 
-    /// What passed the wire since [`begin`](Self::begin), a line each: `> 02 01 1e 21`.
+    /// The transfers since [`begin`](Self::begin), one line each: `> 02 01 1e 21`.
     fn transcript(&self) -> Vec<String>;
 
-    /// Differences from readings that did not end the case; they are forgotten.
+    /// Returns and clears the differences from readings that did not end the case.
     fn differences(&mut self) -> Vec<Finding>;
 }
 
 impl<B> Case<B> {
-    /// A case without a subject that needs nothing.
+    /// A case without a subject and without needs.
     pub fn new(
         name: impl Into<Cow<'static, str>>,
         clauses: &'static [&'static str],
@@ -136,19 +137,19 @@ impl<B> Case<B> {
         Case { name: name.into(), clauses, needs: &[], reading: None, run: Box::new(run) }
     }
 
-    /// The same with needs.
+    /// Adds needs.
     pub fn needs(self, needs: &'static [Need]) -> Self {
         Case { needs, ..self }
     }
 
-    /// The same, all of which a reading demands.
+    /// Marks the whole case as demanded by a reading.
     pub(crate) fn reading(self, reading: Reading) -> Self {
         Case { reading: Some(reading), ..self }
     }
 }
 
-/// Puts a drive through the cases; `progress` sees each outcome as it comes. When the port fails, or
-/// the drive is lost, the rest is not run, and the report says so.
+/// Runs the cases on a drive. `progress` gets each outcome at once. When the port fails or the
+/// drive is lost, the other cases are not run; the report has the reason.
 pub fn run<B: Subject>(
     cases: &[Case<B>],
     harness: &mut B,
@@ -176,20 +177,20 @@ pub fn run<B: Subject>(
     report
 }
 
-/// A case between `begin` and `restore`. A drive that cannot be restored fails the case, too: the
-/// user has to know. `dead` is told why nothing more can be run. Gives the differences from readings,
-/// the first of each.
+/// Runs a case between `begin` and `restore`. The case also fails if the drive cannot be restored,
+/// because the user has to know. `dead` gets the reason if no further case can run. Returns the
+/// differences from readings, the first of each reading.
 fn conduct<B: Subject>(
     case: &Case<B>,
     harness: &mut B,
     dead: &mut Option<String>,
 ) -> (Verdict, Vec<Finding>) {
     let begun = harness.begin().map_err(Stop::without_reading);
-    // What cannot be begun with has nothing to be restored.
+    // If `begin` failed, there is nothing to restore.
     let (mut outcome, mut restored) = match begun {
         Err(stop @ (Stop::Port(_) | Stop::Lost(_))) => (Err(stop), Ok(())),
         begun => {
-            // A fault of this kit must not leave a motor turning.
+            // A panic of this kit must not leave a motor turning.
             let ran = catch_unwind(AssertUnwindSafe(|| {
                 begun?;
                 let done = (case.run)(harness);
@@ -221,7 +222,7 @@ fn conduct<B: Subject>(
     (verdict, differences)
 }
 
-/// The difference from a reading that ended a case, which is then no failure.
+/// Takes the difference from a reading that ended a case. The case then counts as not failed.
 fn take_difference(result: &mut Result<(), Stop>) -> Option<Finding> {
     let finding = match result {
         Err(Stop::Failed(finding)) if finding.reading.is_some() => (**finding).clone(),
@@ -231,13 +232,13 @@ fn take_difference(result: &mut Result<(), Stop>) -> Option<Finding> {
     Some(finding)
 }
 
-/// What came of a case, and of restoring the drive.
+/// The verdict of a case and of restoring the drive.
 fn verdict(outcome: Result<(), Stop>, restored: Result<(), Stop>) -> Verdict {
     match (outcome, restored) {
         (Err(Stop::Failed(mut finding)), Err(Stop::Failed(left))) => {
             let Finding { sent, expected, received, .. } = *left;
             finding.received += &format!(
-                "; and it was not left as it was found: sent {sent}, expected {expected}, received \
+                "; and the drive was not restored: sent {sent}, expected {expected}, received \
                  {received}"
             );
             Verdict::Failed(finding)
@@ -255,7 +256,7 @@ fn verdict(outcome: Result<(), Stop>, restored: Result<(), Stop>) -> Verdict {
 }
 
 impl Stop {
-    /// The same, of which no reading is the reason.
+    /// The same without a reading as its reason.
     fn without_reading(mut self) -> Self {
         if let Stop::Failed(finding) = &mut self {
             finding.reading = None;
@@ -265,7 +266,7 @@ impl Stop {
 }
 
 impl Need {
-    /// What to say where it is not met.
+    /// The advice to the user if the need is not met.
     pub const fn unmet(self) -> &'static str {
         match self {
             Need::Spin => "turns the motor: run with --spin",
@@ -281,16 +282,16 @@ mod tests {
     use super::*;
     use crate::reading::{S5, S20};
 
-    /// A drive whose `begin` and `restore` end as they are told to.
+    /// A drive whose `begin` and `restore` return what the test chooses.
     #[derive(Default)]
-    struct Told {
+    struct Scripted {
         begin: Option<Stop>,
         restore: Option<Stop>,
         restored: u32,
-        beside: Beside,
+        differences: Differences,
     }
 
-    impl Subject for Told {
+    impl Subject for Scripted {
         fn begin(&mut self) -> Result<(), Stop> {
             self.begin.take().map_or(Ok(()), Err)
         }
@@ -309,7 +310,7 @@ mod tests {
         }
 
         fn differences(&mut self) -> Vec<Finding> {
-            self.beside.take()
+            self.differences.take()
         }
     }
 
@@ -323,11 +324,11 @@ mod tests {
         Stop::Lost("it is gone".to_owned())
     }
 
-    /// Runs two cases, of which the first ends as told; their verdicts.
-    fn verdicts(told: &mut Told, first: fn() -> Result<(), Stop>) -> [Verdict; 2] {
+    /// Runs two cases. The first is `first`. Returns their verdicts.
+    fn verdicts(drive: &mut Scripted, first: fn() -> Result<(), Stop>) -> [Verdict; 2] {
         let cases =
             [Case::new("first", &[], move |_| first()), Case::new("second", &[], |_| Ok(()))];
-        let report = run(&cases, told, |_| {});
+        let report = run(&cases, drive, |_| {});
         report
             .outcomes
             .into_iter()
@@ -338,73 +339,74 @@ mod tests {
     }
 
     #[test]
-    fn a_case_that_cannot_be_undone_fails_and_says_so() {
-        let mut told = Told { restore: Some(failed("to be undone")), ..Told::default() };
-        let [first, second] = verdicts(&mut told, || Ok(()));
+    fn a_case_that_cannot_be_undone_fails() {
+        let mut drive = Scripted { restore: Some(failed("to be undone")), ..Scripted::default() };
+        let [first, second] = verdicts(&mut drive, || Ok(()));
         assert!(matches!(first, Verdict::Failed(finding) if finding.expected.contains("undone")));
         assert_eq!(second, Verdict::Passed);
 
-        let mut told = Told { restore: Some(failed("to be undone")), ..Told::default() };
-        let [first, _] = verdicts(&mut told, || Err(failed("to hold")));
+        let mut drive = Scripted { restore: Some(failed("to be undone")), ..Scripted::default() };
+        let [first, _] = verdicts(&mut drive, || Err(failed("to hold")));
         let Verdict::Failed(finding) = first else { panic!("{first:?}") };
         assert_eq!(finding.expected, "expected to hold");
         assert!(
             finding
                 .received
-                .contains("not left as it was found: sent sent, expected expected to be undone")
+                .contains("the drive was not restored: sent sent, expected expected to be undone")
         );
     }
 
     #[test]
-    fn a_drive_that_is_lost_ends_the_run_and_keeps_what_was_found() {
-        let mut told = Told { restore: Some(lost()), ..Told::default() };
-        let [first, second] = verdicts(&mut told, || Err(failed("to hold")));
+    fn a_lost_drive_ends_the_run_and_keeps_earlier_findings() {
+        let mut drive = Scripted { restore: Some(lost()), ..Scripted::default() };
+        let [first, second] = verdicts(&mut drive, || Err(failed("to hold")));
         assert!(matches!(first, Verdict::Failed(_)), "{first:?}");
         assert_eq!(second, Verdict::NotRun("it is gone".to_owned()));
 
-        let mut told = Told::default();
-        let [first, second] = verdicts(&mut told, || Err(lost()));
+        let mut drive = Scripted::default();
+        let [first, second] = verdicts(&mut drive, || Err(lost()));
         assert_eq!([first, second], [(); 2].map(|()| Verdict::NotRun("it is gone".to_owned())));
-        assert_eq!(told.restored, 1, "what the case did is undone");
+        assert_eq!(drive.restored, 1, "what the case did is undone");
 
-        let mut told = Told { begin: Some(lost()), ..Told::default() };
-        verdicts(&mut told, || Ok(()));
-        assert_eq!(told.restored, 0, "nothing was done");
+        let mut drive = Scripted { begin: Some(lost()), ..Scripted::default() };
+        verdicts(&mut drive, || Ok(()));
+        assert_eq!(drive.restored, 0, "nothing was done");
     }
 
     #[test]
-    fn what_a_case_did_is_undone_when_it_panics() {
-        let mut told = Told::default();
-        let run = || verdicts(&mut told, || panic!("a fault of the case"));
+    fn a_case_is_undone_after_a_panic() {
+        let mut drive = Scripted::default();
+        let run = || verdicts(&mut drive, || panic!("a fault of the case"));
         assert!(catch_unwind(AssertUnwindSafe(run)).is_err());
-        assert_eq!(told.restored, 1);
+        assert_eq!(drive.restored, 1);
     }
 
     #[test]
-    fn what_is_not_allowed_is_skipped_with_what_to_do() {
-        let cases = [Case::new("rom", &[], |_: &mut Told| Ok(())).needs(&[Need::Spin, Need::Rom])];
-        let report = run(&cases, &mut Told::default(), |_| {});
+    fn a_case_without_permission_is_skipped_with_advice() {
+        let cases =
+            [Case::new("rom", &[], |_: &mut Scripted| Ok(())).needs(&[Need::Spin, Need::Rom])];
+        let report = run(&cases, &mut Scripted::default(), |_| {});
         let Verdict::Skipped(why) = &report.outcomes[0].verdict else { panic!("not skipped") };
         assert!(why.contains("--write-rom"), "{why}");
     }
 
     #[test]
-    fn a_difference_from_a_reading_is_no_failure_unless_readings_are_strict() {
+    fn a_difference_from_a_reading_fails_only_a_strict_report() {
         let cases = [
-            Case::new("ends", &[], |_: &mut Told| Err(failed("S20").read_as(S20))),
-            Case::new("goes on", &[], |told: &mut Told| {
-                told.beside.note(S20, Err(failed("first")))?;
-                told.beside.note(S20, Err(failed("second")))?;
-                told.beside.note(S5, Err(failed("third")))?;
+            Case::new("ends", &[], |_: &mut Scripted| Err(failed("S20").read_as(S20))),
+            Case::new("goes on", &[], |drive: &mut Scripted| {
+                drive.differences.note(S20, Err(failed("first")))?;
+                drive.differences.note(S20, Err(failed("second")))?;
+                drive.differences.note(S5, Err(failed("third")))?;
                 Err(Stop::Skipped("enough".to_owned()))
             }),
-            Case::new("all of it", &[], |_: &mut Told| Err(failed("S5"))).reading(S5),
-            Case::new("fails", &[], |told: &mut Told| {
-                told.beside.note(S5, Err(failed("beside")))?;
+            Case::new("all of it", &[], |_: &mut Scripted| Err(failed("S5"))).reading(S5),
+            Case::new("fails", &[], |drive: &mut Scripted| {
+                drive.differences.note(S5, Err(failed("beside")))?;
                 Err(failed("a sentence"))
             }),
         ];
-        let report = run(&cases, &mut Told::default(), |_| {});
+        let report = run(&cases, &mut Scripted::default(), |_| {});
         assert_eq!((report.count("reading"), report.failed().count()), (3, 1));
         assert_eq!(report.outcomes[1].differences.len(), 2, "the first of each reading");
         let clean = Report { outcomes: report.outcomes[..3].to_vec() };
@@ -416,9 +418,10 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_that_cannot_be_begun_with_fails_whatever_the_case_reads() {
-        let mut told = Told { begin: Some(failed("to begin").read_as(S5)), ..Told::default() };
-        let cases = [Case::new("reading", &[], |_: &mut Told| Ok(())).reading(S5)];
-        assert_eq!(run(&cases, &mut told, |_| {}).failed().count(), 1);
+    fn a_drive_that_cannot_be_started_fails_also_in_a_reading() {
+        let mut drive =
+            Scripted { begin: Some(failed("to begin").read_as(S5)), ..Scripted::default() };
+        let cases = [Case::new("reading", &[], |_: &mut Scripted| Ok(())).reading(S5)];
+        assert_eq!(run(&cases, &mut drive, |_| {}).failed().count(), 1);
     }
 }

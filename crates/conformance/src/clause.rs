@@ -1,16 +1,16 @@
-//! What a document demands.
+//! The demands of a document.
 
-/// A sentence of a document that demands something, in our words.
+/// A demand of a document, in our words.
 #[derive(Debug, Clone, Copy)]
 pub struct Clause {
-    /// `ST-4.1-07`: the document, the paragraph, a running number. In the CAN document the middle is
-    /// the command code, or a chapter number where no command is meant.
+    /// `ST-4.1-07`: the document, the paragraph, a number. In the CAN document the middle part is
+    /// the command code, or a chapter number if the clause is not about one command.
     pub id: &'static str,
-    /// What is demanded, of whom.
+    /// The demand, and whether it applies to a drive or a host.
     pub text: &'static str,
-    /// Tests that hold a host to it: names of this project's own tests.
+    /// Names of this project's own tests that check a host.
     pub host: &'static [&'static str],
-    /// Why no drive is tested against it; empty where one is.
+    /// Why no drive is tested; empty if drives are tested.
     pub untested: &'static str,
 }
 
@@ -20,17 +20,17 @@ impl Clause {
         Clause { id, text, host: &[], untested: "" }
     }
 
-    /// The same, with what tests it on a host.
+    /// Adds the tests of a host.
     pub const fn host(self, host: &'static [&'static str]) -> Self {
         Clause { host, ..self }
     }
 
-    /// The same, with why no drive can be tested against it.
+    /// Adds the reason why no drive can be tested.
     pub const fn untested(self, untested: &'static str) -> Self {
         Clause { untested, ..self }
     }
 
-    /// Where the document says it.
+    /// The paragraph of the document.
     pub fn paragraph(&self) -> &'static str {
         self.id.split('-').nth(1).unwrap_or(self.id)
     }

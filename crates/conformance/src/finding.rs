@@ -1,16 +1,16 @@
-//! What is wrong with a drive or a host.
+//! Failures of a drive or a host.
 
 use crate::reading::Reading;
 
-/// What a drive did instead of what it must do.
+/// The difference between a demand and what a drive did.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
-    /// What was sent, in bytes or frames.
+    /// The sent bytes or frames.
     pub sent: String,
-    /// What must come of it, in bytes and words.
+    /// The expected result, as bytes and text.
     pub expected: String,
-    /// What came.
+    /// The received bytes or frames.
     pub received: String,
-    /// The reading that demands it; `None` where a sentence of the document does.
+    /// The reading that demands it; `None` if a sentence of the document does.
     pub reading: Option<Reading>,
 }

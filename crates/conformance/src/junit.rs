@@ -7,8 +7,9 @@ use crate::reading::Reading;
 use crate::report::{Outcome, Report, Verdict};
 
 impl Report {
-    /// The report as JUnit XML, a test suite of this name. What did not run because the port failed
-    /// is an error there; what differs from a reading is skipped, with the type `reading`.
+    /// The report as JUnit XML: a test suite with this name. A case that did not run because the
+    /// port failed is an error there. A difference from a reading is skipped, with the type
+    /// `reading`.
     pub fn to_junit(&self, suite: &str) -> String {
         let mut cases = TestSuite::new(suite);
         cases.add_test_cases(self.outcomes.iter().map(test_case));

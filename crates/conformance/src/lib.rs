@@ -1,19 +1,24 @@
-//! A conformance kit for both protocols: what the documents demand, sentence by sentence, and what
-//! tests it.
+//! A conformance kit for both protocols: it tests drives and hosts against the documents.
 //!
-//! [`st::CLAUSES`] and [`rmd::CLAUSES`] are the sentences, each with an id. [`st::suite`] and
-//! [`rmd::suite`] are the cases that a drive is put through; each names the clauses it tests. A case
-//! speaks through a link, which is a real port or a simulated drive on virtual time, so the same
-//! cases test a drive on the bench and, in milliseconds, this kit itself. [`run`] runs them and gives
-//! a [`Report`].
+//! | to | use |
+//! |---|---|
+//! | test an ST drive | [`st::Harness`], [`st::suite`], [`run`] |
+//! | test an RMD motor | [`rmd::Harness`], [`rmd::suite`], [`run`] |
+//! | test a host with drives that misbehave | the scenarios of [`host`] |
+//! | list the demands of a document | [`st::CLAUSES`], [`rmd::CLAUSES`] |
+//! | permit motion, ROM writes, faults | [`Need`] in the harness's options, your [`World`] |
+//! | read and print results | [`Report`] |
 //!
-//! Where a document is silent or contradicts itself, a case demands our [`Reading`] of it. A drive that
-//! differs from one has not failed, unless the user wants it so: [`Report::strict`].
+//! A [`Clause`] is one demand of a document, with an id. A [`Case`] is one test of a drive; it
+//! names its clauses. A case uses a link: a real port, or a simulated drive on virtual time. So the
+//! same cases test a real drive and, in milliseconds, this kit itself.
 //!
-//! [`host`] is for the other end: drives that misbehave, and what a host makes of them.
+//! Where a document is unclear or contradicts itself, a case demands our [`Reading`] of it. A drive
+//! that differs from a reading has not failed, unless the caller asks for it with
+//! [`Report::strict`].
 //!
-//! A drive is left as it was found: cases restore what they write, and nothing that may turn a motor,
-//! wears a ROM or needs a hand at the power switch runs unless it is [`Need`]ed and allowed.
+//! Cases restore all settings that they write. A case that may turn a motor, wears a ROM or needs a
+//! power cycle declares the [`Need`]; it runs only if the user permits it.
 
 mod case;
 mod clause;

@@ -1,4 +1,5 @@
-//! docs/CONFORMANCE.md: every clause and what tests it. docs/HOST-CONFORMANCE.md: every scenario.
+//! Tables: every clause and its tests for docs/CONFORMANCE.md, every scenario for
+//! docs/HOST-CONFORMANCE.md.
 
 use std::fmt::Write;
 
@@ -7,8 +8,8 @@ use crate::clause::Clause;
 use crate::host::Scenario;
 use crate::reading::Reading;
 
-/// The table of `clauses` with the cases of `suite` that test each, and the reading that all of a
-/// case demands. Cases that differ in their subject only stand as one.
+/// The table of `clauses`, with the cases of `suite` that test each, and the reading that demands a
+/// whole case. Cases that differ only in their subject are merged.
 pub fn markdown<'a, B: 'a>(
     clauses: &[Clause],
     suite: impl Iterator<Item = &'a Case<B>> + Clone,
@@ -33,7 +34,7 @@ pub fn markdown<'a, B: 'a>(
     table
 }
 
-/// The table of what hosts are put through.
+/// The table of the scenarios for hosts.
 pub fn scenario_table<S>(scenarios: &[Scenario<S>]) -> String {
     let mut table = String::from("| scenario | a correct host | clauses |\n|---|---|---|\n");
     for Scenario { name, expected, clauses, .. } in scenarios {

@@ -1,7 +1,7 @@
-//! How the kit reads what the documents leave open: rows of docs/SPEC-NOTES.md that a case demands.
+//! The kit's readings: rows of docs/SPEC-NOTES.md that a case demands, where the document is
+//! unclear.
 
-/// A row of docs/SPEC-NOTES.md. A drive that differs from it may still do all that its document
-/// says.
+/// A row of docs/SPEC-NOTES.md. A drive that differs from it may still fulfil its document.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reading {
     /// The row's id.
@@ -16,7 +16,7 @@ macro_rules! readings {
             #[doc = $text]
             pub(crate) const $row: Reading = Reading { row: stringify!($row), text: $text };
         )+
-        /// Every reading that cases demand.
+        /// Every reading that a case demands.
         pub static READINGS: &[Reading] = &[$($row),+];
     };
 }
@@ -29,10 +29,10 @@ readings! {
     S11 "The 25 ms count from the first byte of the frame.";
     S13 "The version text is the name, a tab, \"Ver.\" and the numbers.";
     S14 "STATUS and FLAGS have the values of shipped firmware.";
-    S15 "CONTROL_MODE is 0 for torque and 1 for speed, and reads what was asked for last.";
+    S15 "CONTROL_MODE is 0 for torque and 1 for speed, and reads the last commanded mode.";
     S18 "A message that is too short is refused and has no effect.";
-    S19 "Bytes that a short value lacks keep what the register had.";
-    S20 "TARGET_MOTOR is the current motor, counted from 0; another is WRONG_SET.";
+    S19 "Bytes that a short value lacks keep their old value.";
+    S20 "TARGET_MOTOR is the current motor, counted from 0; a missing motor is WRONG_SET.";
     S22 "IQ_SPEEDMODE is the Id reference of speed mode.";
     S23 "Temperatures and power have a sign.";
     S24 "A rev-up phase over 4 is WRONG_SET.";
@@ -41,37 +41,37 @@ readings! {
     S28 "PFC_ACBUS_FREQ is in 0.1 Hz.";
     S29 "A byte after the 25 ms begins a new frame.";
     S34 "PFC_DISABLE disables a PFC that is enabled.";
-    S35 "Bytes behind a message are ignored.";
+    S35 "Bytes after a message are ignored.";
     S47 "The checksum is checked before the motor and the frame code; a damaged frame selects no motor.";
-    S48 "At rest references read what was asked for last and SPEED_REF is 0; in RUN SPEED_REF follows the ramp.";
+    S48 "At rest the references have their last commanded values and SPEED_REF is 0; in RUN SPEED_REF follows the ramp.";
     S49 "A register takes every value of its size.";
-    S50 "PFC_ENABLED is 0 or 1, and a PFC is there where its registers are.";
+    S50 "PFC_ENABLED is 0 or 1; a drive with the registers of a PFC has a PFC.";
     S51 "GET_BOARD_INFO and GET_FW_VERSION have the same version.";
     S52 "A motor with a sensor keeps rev-up data, too.";
-    S53 "ENCODER_ALIGN acts at rest only, shows in STATUS and ends at rest.";
-    S54 "The registers of a feature exist together, those of no feature always.";
+    S53 "ENCODER_ALIGN acts at rest only, is visible in STATUS and ends at rest.";
+    S54 "The registers of a feature exist together; registers without a feature always exist.";
 
-    R4 "NULL bytes of a request are not looked at, and echoed as they came.";
-    R8 "An offset written with 0x91 is in force at once and in ROM.";
+    R4 "NULL bytes of a request are ignored, and an echo repeats them.";
+    R8 "An offset written with 0x91 applies at once and is in ROM.";
     R9 "After 0x19 the old offset is read until power-on.";
     R11 "A frame of another form gets no reply.";
-    R13 "A greatest speed of 0 turns nothing.";
-    R15 "An angle over 35999 or a direction over 1 is answered and not carried out.";
-    R16 "The same single-turn command again starts no further turn.";
+    R13 "With a maximum speed of 0 the motor does not turn.";
+    R15 "An angle over 35999 or a direction over 1 is answered but not carried out.";
+    R16 "Repeating a single-turn command starts no further turn.";
     R17 "A motion command starts a motor that is stopped or off.";
     R18 "While an error is active the motor is off.";
     R19 "An offset beyond the encoder is cut to its width.";
     R20 "The multi-turn angle modulo 360° is the single-turn angle.";
-    R24 "An acceleration of 0 or less means no limit and reads back as written.";
+    R24 "An acceleration of 0 or a negative one means no limit and reads back as written.";
     R25 "0x88 without a stop changes nothing.";
-    R26 "A position that is held stays where it is when the offset changes.";
+    R26 "A held position does not move when the offset changes.";
     R30 "A command byte that chapter 2 does not list gets no reply.";
-    R31 "Single-turn angle and encoder are of the motor shaft.";
+    R31 "Single-turn angle and encoder refer to the motor shaft.";
     R37 "An acceleration of any size reads back as written.";
-    R38 "Phase currents sum to 0, and have about the size of the torque current.";
+    R38 "The sum of the phase currents is 0, and their size is about that of the torque current.";
     R39 "The acceleration of 0x34 is the Max Acceleration of the vendor's tool.";
-    R40 "A move is as fast as its greatest speed lets it be.";
+    R40 "A move reaches its maximum speed.";
     R36 "Positive speed and torque turn clockwise.";
-    R41 "Without position gains a motor does not go to a position.";
+    R41 "Without position gains a motor does not move to a position.";
     R42 "A frame to an ID outside 1 to 32 gets no reply.";
 }

@@ -1,44 +1,46 @@
-//! What came of a run.
+//! The result of a run.
 
 use serde_json::{Map, Value, json};
 
 use crate::finding::Finding;
 use crate::reading::Reading;
 
-/// What came of all cases.
+/// The results of all cases.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     /// In the order of the suite.
     pub outcomes: Vec<Outcome>,
 }
 
-/// What came of one case.
+/// The result of one case.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// The case.
     pub name: String,
     /// The clauses that it tests.
     pub clauses: &'static [&'static str],
-    /// What came of it.
+    /// The verdict.
     pub verdict: Verdict,
-    /// Differences from readings, one a reading.
+    /// Differences from readings, one per reading.
     pub differences: Vec<Finding>,
-    /// What passed the wire, where it failed or differs from a reading.
+    /// The transfers, if the case failed or differs from a reading.
     pub transcript: Vec<String>,
 }
 
-/// What came of a case.
+/// The verdict on one case.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
-    /// The drive does what the clauses demand.
+    /// The drive meets the demands of the clauses.
     Passed,
-    /// It does something else.
+    /// The drive does not meet a demand.
     Failed(Box<Finding>),
-    /// It does what sentences demand, and differs from our reading of what they leave open.
+    /// The drive meets the demands of the document, but differs from our reading of an unclear
+    /// sentence.
     Reading,
-    /// Not tried, and why.
+    /// Not run, with the reason.
     Skipped(String),
-    /// The port or the drive had failed before, or failed here; or this machine was too busy to judge.
+    /// Not run, or not finished: the port or the drive failed, or this machine was too busy. The
+    /// text is the reason.
     NotRun(String),
 }
 
@@ -56,25 +58,25 @@ impl Verdict {
 }
 
 impl Report {
-    /// Whether nothing failed and the port held. Differences from readings are no failures.
+    /// Whether no case failed and the port worked. Differences from readings are not failures.
     pub fn is_clean(&self) -> bool {
         let bad =
             |outcome: &Outcome| matches!(outcome.verdict, Verdict::Failed(_) | Verdict::NotRun(_));
         !self.outcomes.iter().any(bad)
     }
 
-    /// The same with differences from readings as failures.
+    /// Counts differences from readings as failures.
     pub fn strict(mut self) -> Self {
         for outcome in &mut self.outcomes {
-            let told = !outcome.differences.is_empty();
-            if told && matches!(outcome.verdict, Verdict::Reading | Verdict::NotRun(_)) {
+            let differs = !outcome.differences.is_empty();
+            if differs && matches!(outcome.verdict, Verdict::Reading | Verdict::NotRun(_)) {
                 outcome.verdict = Verdict::Failed(Box::new(outcome.differences.remove(0)));
             }
         }
         self
     }
 
-    /// How many cases ended with the verdict of this word.
+    /// The number of cases with this verdict.
     pub fn count(&self, word: &str) -> usize {
         self.outcomes.iter().filter(|outcome| outcome.verdict.word() == word).count()
     }
@@ -84,7 +86,7 @@ impl Report {
         self.outcomes.iter().filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)))
     }
 
-    /// Why the rest was not run; empty where everything was.
+    /// Why the other cases were not run; empty if all were run.
     pub fn lost(&self) -> &str {
         let lost = self.outcomes.iter().find_map(|outcome| match &outcome.verdict {
             Verdict::NotRun(why) => Some(why.as_str()),
@@ -123,8 +125,8 @@ impl Outcome {
         if !self.differences.is_empty() {
             object["differences"] = self.differences.iter().map(Finding::to_json).collect();
         }
-        let told = matches!(self.verdict, Verdict::Failed(_)) || !self.differences.is_empty();
-        if told {
+        let differs = matches!(self.verdict, Verdict::Failed(_)) || !self.differences.is_empty();
+        if differs {
             object["transcript"] = json!(self.transcript);
         }
         object

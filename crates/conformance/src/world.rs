@@ -1,29 +1,29 @@
-//! What is around a drive and cannot be reached through its wire.
+//! The environment of a drive, which its wire cannot reach.
 
-/// The world around the drive under test. Each method gives [`Unavailable`] unless it is
-/// implemented; the cases that need it are then skipped, and say so.
+/// The environment of the drive under test. The default of each method returns [`Unavailable`]; the
+/// cases that need it are then skipped, with this reason.
 pub trait World {
-    /// Takes the drive's power away and gives it back; returns when the drive can answer again.
+    /// Cycles the drive's power. Returns when the drive can answer again.
     fn power_cycle(&mut self) -> Result<(), Unavailable> {
         Err(Unavailable("the kit cannot cycle the drive's power".to_owned()))
     }
 
-    /// Makes a fault condition present (a low supply, a high temperature), or ends it.
+    /// Starts or ends a fault condition, such as a low supply or a high temperature.
     fn fault(&mut self, _present: bool) -> Result<(), Unavailable> {
         Err(Unavailable("the kit cannot cause a fault".to_owned()))
     }
 
-    /// Whether the user wants the run to end: the case at hand is then broken off, what it did is
-    /// undone, and the rest is not run.
+    /// Whether the user interrupts the run. The current case is then aborted, its changes are
+    /// undone, and the other cases are not run.
     fn interrupted(&self) -> bool {
         false
     }
 }
 
-/// Nobody is at the power switch.
+/// Power cycling and faults are unavailable.
 impl World for () {}
 
-/// Why something around the drive cannot be done, for people.
+/// Why an action on the environment failed, as text for the user.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Unavailable(pub String);

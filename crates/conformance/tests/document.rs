@@ -1,4 +1,5 @@
-//! docs/CONFORMANCE.md says what the kit has, and names tests that exist. `make docs` writes it.
+//! Checks that docs/CONFORMANCE.md has the tables of the kit and names existing tests. `make docs`
+//! writes the tables.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ fn with_block(text: &str, name: &str, table: &str) -> String {
 }
 
 #[test]
-fn the_document_has_every_clause_and_what_tests_it() {
+fn the_document_has_every_clause_and_its_tests() {
     let path = root().join("docs/CONFORMANCE.md");
     let text = fs::read_to_string(&path).expect("docs/CONFORMANCE.md");
     let wanted = with_block(&with_block(&text, "st", &st::table()), "rmd", &rmd::table());
@@ -48,7 +49,7 @@ fn functions(folder: &Path, found: &mut Vec<String>) {
 }
 
 #[test]
-fn what_is_said_to_hold_hosts_to_a_clause_exists() {
+fn every_named_test_of_a_host_exists() {
     let mut known = Vec::new();
     for folder in ["crates", "tests/e2e"] {
         functions(&root().join(folder), &mut known);

@@ -1,5 +1,5 @@
-//! Our blocking clients before adversarial drives, through real ports. All scenarios run at once:
-//! nearly all of their time is waiting.
+//! Our blocking clients with scripted drives, through real ports. All scenarios run in parallel:
+//! they mostly wait.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,20 +10,21 @@ use motorlink::port::PortName;
 use motorlink::rmd::{self, Error, IqCommand, MotorId, MotorSet, SetTorque4};
 use motorlink::st::{self, register};
 use motorlink_conformance::Verdict;
-use motorlink_conformance::host::{self, Demand, Journal, READINGS, Reading, Said, Task};
+use motorlink_conformance::host::{self, Demand, HostOutput, Journal, READINGS, Reading, Task};
 use motorlink_link::serve::Server;
 use motorlink_proto::rmd::{MultiTurnAngle, ReadMultiTurnAngle};
 
-/// Long against what a loaded machine adds, short for a test.
+/// Long compared with the delays of a loaded machine, and short enough for a test.
 const TIMEOUT: Duration = Duration::from_millis(500);
 
-/// Serves a drive of the making of `serve` while `host` is there; gives what it said and what passed.
+/// Serves a drive made by `serve` while `host` runs. Returns the output of the host and the
+/// journal.
 fn met(
     name: String,
     scheme: &str,
     serve: impl FnOnce(&mut Server, &str) -> Box<dyn Fn() -> Journal> + Send,
-    host: impl FnOnce(&str) -> Said,
-) -> (Said, Journal) {
+    host: impl FnOnce(&str) -> HostOutput,
+) -> (HostOutput, Journal) {
     let folder: PathBuf = env!("CARGO_TARGET_TMPDIR").into();
     let path = folder.join(format!("{name}-{}", std::process::id()));
     let path = path.to_str().expect("a path in UTF-8");
@@ -42,13 +43,13 @@ fn met(
             assert!(!drive.is_finished(), "the drive is served");
             thread::yield_now();
         }
-        let said = host(path);
+        let output = host(path);
         over.store(true, Ordering::SeqCst);
-        (said, drive.join().expect("the drive was served"))
+        (output, drive.join().expect("the drive was served"))
     })
 }
 
-/// Runs `play` for each number below `count`, all at once.
+/// Runs `play` for each number below `count`, in parallel.
 fn at_once(count: usize, play: impl Fn(usize) + Sync) {
     thread::scope(|scope| {
         let play = &play;
@@ -62,7 +63,7 @@ fn at_once(count: usize, play: impl Fn(usize) + Sync) {
 fn our_client_passes_every_scenario() {
     at_once(host::st::scenarios().len(), |number| {
         let scenario = host::st::scenarios().swap_remove(number);
-        let (said, journal) = met(
+        let (output, journal) = met(
             format!("st-{number}"),
             "pty",
             |server, name| {
@@ -72,38 +73,38 @@ fn our_client_passes_every_scenario() {
             },
             |path| ask_client(path, scenario.task),
         );
-        let outcome = scenario.judge(&journal, &said, host::st::DIGIT, None);
+        let outcome = scenario.judge(&journal, &output, host::st::DIGIT, None);
         assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:#?}");
         if scenario.demand == Demand::Everything {
-            assert!(!said.complained, "{outcome:#?}");
+            assert!(!output.reported_error, "{outcome:#?}");
         }
     });
 }
 
-fn ask_client(path: &str, task: Task) -> Said {
+fn ask_client(path: &str, task: Task) -> HostOutput {
     let options = st::Options { timeout: TIMEOUT, ..st::Options::default() };
     let client = st::Client::open(&path.parse().unwrap(), options).unwrap();
     let motor = client.motor(1).unwrap();
-    let mut said = Said::default();
+    let mut output = HostOutput::default();
     if task == Task::Start {
-        said.complained = motor.start().is_err();
+        output.reported_error = motor.start().is_err();
         assert_eq!(client.started().count(), 1, "it may have started");
-        return said;
+        return output;
     }
     for _ in 0..READINGS {
         match motor.get(register::SPEED_MEAS) {
-            Ok(rpm) => said.values.push(Reading { motor: 1, value: rpm.into() }),
-            Err(_) => said.complained = true,
+            Ok(rpm) => output.values.push(Reading { motor: 1, value: rpm.into() }),
+            Err(_) => output.reported_error = true,
         }
     }
-    said
+    output
 }
 
 #[test]
 fn our_bus_passes_every_scenario() {
     at_once(host::rmd::scenarios().len(), |number| {
         let scenario = host::rmd::scenarios().swap_remove(number);
-        let (said, journal) = met(
+        let (output, journal) = met(
             format!("rmd-{number}"),
             "slcan-pty",
             |server, name| {
@@ -113,12 +114,12 @@ fn our_bus_passes_every_scenario() {
             },
             |path| ask_bus(path, scenario.task),
         );
-        let outcome = scenario.judge(&journal, &said, 1.0, None);
+        let outcome = scenario.judge(&journal, &output, 1.0, None);
         assert_eq!(outcome.verdict, Verdict::Passed, "{outcome:#?}");
     });
 }
 
-fn ask_bus(path: &str, task: Task) -> Said {
+fn ask_bus(path: &str, task: Task) -> HostOutput {
     let echo = if task == Task::Echoed { "?echo=1" } else { "" };
     let port: PortName = format!("slcan:{path}{echo}").parse().unwrap();
     let guard = Duration::from_millis(300);
@@ -128,14 +129,14 @@ fn ask_bus(path: &str, task: Task) -> Said {
     );
     let bus = bus.unwrap();
     let motor = bus.motor(1).unwrap();
-    let mut said = Said::default();
+    let mut output = HostOutput::default();
     let mut note = |motor: MotorId, digits: Result<i64, Error>| match digits {
-        Ok(digits) => said.values.push(Reading { motor: motor.number(), value: digits as f64 }),
-        Err(_) => said.complained = true,
+        Ok(digits) => output.values.push(Reading { motor: motor.number(), value: digits as f64 }),
+        Err(_) => output.reported_error = true,
     };
     if task == Task::Off {
-        let complained = motor.off().is_err();
-        return Said { complained, ..Said::default() };
+        let reported_error = motor.off().is_err();
+        return HostOutput { reported_error, ..HostOutput::default() };
     }
     for _ in 0..READINGS {
         match task {
@@ -164,5 +165,5 @@ fn ask_bus(path: &str, task: Task) -> Said {
             Task::Start | Task::Off => unreachable!("no readings"),
         }
     }
-    said
+    output
 }

@@ -1,5 +1,5 @@
-//! RMD hosts before adversarial motors, on virtual time: ours passes, and each careless one is caught
-//! by the scenario that names its fault.
+//! RMD hosts with scripted motors, on virtual time. Our host passes. Each careless host is caught
+//! by the scenario of its fault.
 
 mod careless;
 mod finite;
@@ -7,7 +7,7 @@ mod finite;
 use finite::Finite;
 use motorlink::port::PortError;
 use motorlink_conformance::host::rmd::{Scenario, ScriptedMotors, scenarios};
-use motorlink_conformance::host::{READINGS, Reading, Said, Task};
+use motorlink_conformance::host::{HostOutput, READINGS, Reading, Task};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
@@ -22,14 +22,17 @@ type Bus = Finite<ScriptedMotors, CanFrame>;
 /// Values are compared as digits.
 const DIGIT: f64 = 1.0;
 
-fn play(scenario: &Scenario, host: impl Fn(&mut Bus, Task) -> Result<Said, PortError>) -> Outcome {
+fn play(
+    scenario: &Scenario,
+    host: impl Fn(&mut Bus, Task) -> Result<HostOutput, PortError>,
+) -> Outcome {
     let motors = scenario.motors(DEFAULT_TIMEOUT);
     let mut bus = Bus::new(motors.clone());
-    let said = host(&mut bus, scenario.task).unwrap_or_else(|error| Said {
+    let output = host(&mut bus, scenario.task).unwrap_or_else(|error| HostOutput {
         ended_badly: Some(format!("the host does not end: {error}")),
-        ..Said::default()
+        ..HostOutput::default()
     });
-    scenario.judge(&motors.journal(), &said, DIGIT, None)
+    scenario.judge(&motors.journal(), &output, DIGIT, None)
 }
 
 /// The digits of the value in a reply.
@@ -42,7 +45,7 @@ fn digits(request: Code, reply: &[u8; 8]) -> f64 {
     }
 }
 
-/// What a task asks in its turn of this number: requests to motors, all at once.
+/// The requests of a task in its turn with this index, all sent at once.
 fn requests(task: Task, turn: usize) -> Vec<(MotorId, [u8; 8])> {
     let angle = ReadMultiTurnAngle.encode();
     let first = MotorSet::TORQUE4.take(1);
@@ -66,20 +69,20 @@ fn turns(task: Task) -> usize {
     }
 }
 
-/// What a request to a motor, in the turn of this number, ended in.
+/// The result of a request: motor, index of the turn, value or failure.
 type Ended = (MotorId, usize, Result<f64, Failure>);
 
-/// Our host: what each request ended in, in the order in which it did.
+/// Our host. Returns the results of all requests, in the order of their end.
 fn results(bus: &mut Bus, task: Task) -> Result<Vec<Ended>, PortError> {
     let mut host = Host::new();
     let mut results = Vec::new();
     for turn in 0..turns(task) {
-        // A program does something else between two readings, and meanwhile hears what comes.
+        // Between two readings a program does something else. Frames are received meanwhile.
         let mut echoes = Vec::new();
         let pause = bus.now() + Micros::from_millis(1);
         hear(bus, &mut host, pause, &mut echoes)?;
         let mut requests = requests(task, turn);
-        // Again for motors that were asked for their status instead.
+        // Repeats the request for motors that got a status question instead.
         loop {
             for &(id, data) in &requests {
                 while let Err(RequestError::Quarantined { until, .. }) =
@@ -122,7 +125,7 @@ fn results(bus: &mut Bus, task: Task) -> Result<Vec<Ended>, PortError> {
     Ok(results)
 }
 
-/// Hands the host the next frame until then that it did not send itself.
+/// Passes the next frame until then to the host, except echoes.
 fn hear(
     bus: &mut Bus,
     host: &mut Host,
@@ -142,15 +145,15 @@ fn reading(id: MotorId, digits: f64) -> Reading {
     Reading { motor: id.number(), value: digits }
 }
 
-fn ours(bus: &mut Bus, task: Task) -> Result<Said, PortError> {
+fn ours(bus: &mut Bus, task: Task) -> Result<HostOutput, PortError> {
     let results = results(bus, task)?;
-    Ok(Said {
+    Ok(HostOutput {
         values: results
             .iter()
             .filter_map(|(id, _, result)| Some(reading(*id, result.ok()?)))
             .take(task.values())
             .collect(),
-        complained: results.iter().any(|(.., result)| result.is_err()),
+        reported_error: results.iter().any(|(.., result)| result.is_err()),
         ended_badly: None,
     })
 }
@@ -163,33 +166,33 @@ fn our_host_passes_every_scenario() {
     }
 }
 
-/// The motor, the turn, and how it failed.
+/// The motor, the index of the turn, and the failure.
 type Failed = (u8, usize, Failure);
 
-/// What fails for our host in each scenario where anything does.
+/// The failures of our host in each scenario that has any.
 const ENDS: &[(&str, &[Failed])] = &[
-    ("a_late_reply_is_not_the_next_ones", TIMEOUT),
+    ("a_late_reply_is_not_matched_to_the_next_request", TIMEOUT),
     // Angle, circle angle, angle: the second reading is in the third turn.
-    ("a_late_reply_is_not_that_of_another_command", &[(1, 2, Failure::Timeout)]),
+    ("a_late_reply_is_not_matched_to_another_command", &[(1, 2, Failure::Timeout)]),
     ("silence_is_an_error", TIMEOUT),
     ("a_reply_to_another_command_is_not_the_answer", TIMEOUT),
-    ("a_frame_of_seven_bytes_is_no_reply", TIMEOUT),
-    ("an_extended_frame_is_no_reply", TIMEOUT),
+    ("a_frame_of_seven_bytes_is_not_a_reply", TIMEOUT),
+    ("an_extended_frame_is_not_a_reply", TIMEOUT),
     ("a_motor_of_v3_is_not_understood", &[(1, 1, Failure::Foreign(Dialect::V3))]),
     ("a_motor_of_lk_tech_is_not_understood", &[(1, 1, Failure::Foreign(Dialect::LkTech))]),
-    ("an_off_with_another_content_is_no_acknowledge", &[(1, 0, Failure::Altered)]),
+    ("an_altered_off_is_not_an_acknowledge", &[(1, 0, Failure::Altered)]),
     ("an_off_without_an_answer_is_an_error", &[(1, 0, Failure::Timeout)]),
     ("errors_cleared_are_not_answered_with_anything_else", TIMEOUT),
-    ("a_silent_motor_does_not_cost_the_others_their_replies[a cycle]", SECOND),
-    ("a_silent_motor_does_not_cost_the_others_their_replies[0x280]", SECOND),
-    ("a_late_reply_is_not_the_next_cycles[a cycle]", SECOND),
-    ("a_late_reply_is_not_the_next_cycles[0x280]", SECOND),
+    ("a_silent_motor_does_not_affect_the_others[a cycle]", SECOND),
+    ("a_silent_motor_does_not_affect_the_others[0x280]", SECOND),
+    ("a_late_reply_is_not_matched_to_the_next_cycle[a cycle]", SECOND),
+    ("a_late_reply_is_not_matched_to_the_next_cycle[0x280]", SECOND),
 ];
 const TIMEOUT: &[Failed] = &[(1, 1, Failure::Timeout)];
 const SECOND: &[Failed] = &[(2, 1, Failure::Timeout)];
 
 #[test]
-fn our_host_loses_the_disturbed_reading_only_and_says_how() {
+fn our_host_loses_only_the_disturbed_reading_and_reports_the_failure() {
     for scenario in scenarios() {
         let mut bus = Bus::new(scenario.motors(DEFAULT_TIMEOUT));
         let results = results(&mut bus, scenario.task).unwrap();
@@ -203,7 +206,7 @@ fn our_host_loses_the_disturbed_reading_only_and_says_how() {
     }
 }
 
-/// What a careless host does that a careful one does not.
+/// Faults of careless hosts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fault {
     None,
@@ -231,12 +234,13 @@ enum Fault {
     TakesRepliesForEchoes,
 }
 
-/// A host as people write it: requests out, replies in. Without a fault it ends at the first error.
+/// A typical simple host: it sends requests and reads replies. Without a fault it ends at the first
+/// error.
 struct Simple<'a> {
     bus: &'a mut Bus,
     task: Task,
     fault: Fault,
-    said: Said,
+    output: HostOutput,
 }
 
 impl Simple<'_> {
@@ -244,7 +248,7 @@ impl Simple<'_> {
         self.fault == fault
     }
 
-    fn run(mut self) -> Result<Said, PortError> {
+    fn run(mut self) -> Result<HostOutput, PortError> {
         let mut again = 0;
         let mut turn = 0;
         while turn < turns(self.task) {
@@ -258,17 +262,17 @@ impl Simple<'_> {
                     turn -= 1;
                 }
                 Fault::SaysTheLastValueAgain => {
-                    self.said.values.extend(self.said.values.last().copied());
+                    self.output.values.extend(self.output.values.last().copied());
                 }
                 Fault::SaysNothingOfErrors => {}
-                Fault::GoesOnAfterATimeout => self.said.complained = true,
+                Fault::GoesOnAfterATimeout => self.output.reported_error = true,
                 _ => {
-                    self.said.complained = true;
+                    self.output.reported_error = true;
                     break;
                 }
             }
         }
-        Ok(self.said)
+        Ok(self.output)
     }
 
     /// Whether every motor answered.
@@ -318,7 +322,7 @@ impl Simple<'_> {
                     let is_off = repeats || self.has(Fault::TakesAnyEcho);
                     return Ok(is_off);
                 }
-                self.said.values.push(reading(id, digits(request[0].into(), &reply)));
+                self.output.values.push(reading(id, digits(request[0].into(), &reply)));
             }
         }
         Ok(requests.is_empty())
@@ -355,32 +359,33 @@ impl Simple<'_> {
 }
 
 fn failing(fault: Fault) -> Vec<String> {
-    let simple = |bus: &mut Bus, task| Simple { bus, task, fault, said: Said::default() }.run();
+    let simple =
+        |bus: &mut Bus, task| Simple { bus, task, fault, output: HostOutput::default() }.run();
     let outcomes = scenarios().into_iter().map(|scenario| play(&scenario, simple));
     let failed = outcomes.filter(|outcome| matches!(outcome.verdict, Verdict::Failed(_)));
     failed.map(|outcome| outcome.name).collect()
 }
 
-/// Each fault, and the scenario that names it.
+/// Each fault, and the scenario that finds it.
 const CAUGHT: &[(Fault, &str)] = &[
     (Fault::TakesAnyCode, "a_reply_to_another_command_is_not_the_answer"),
     (Fault::TakesAnyCode, "errors_cleared_are_not_answered_with_anything_else"),
     (Fault::TakesAnyMotor, "a_reply_of_another_motor_is_not_the_answer"),
-    (Fault::TakesAnyMotor, "frames_of_other_motors_do_not_matter[0x280]"),
-    (Fault::TakesAnyIdentifier, "frames_of_nobody_are_dropped"),
+    (Fault::TakesAnyMotor, "frames_of_other_motors_are_dropped[0x280]"),
+    (Fault::TakesAnyIdentifier, "frames_without_a_motor_identifier_are_dropped"),
     (Fault::TakesV3, "a_motor_of_v3_is_not_understood"),
     (Fault::TakesLkTech, "a_motor_of_lk_tech_is_not_understood"),
-    (Fault::TakesShortFrames, "a_frame_of_seven_bytes_is_no_reply"),
-    (Fault::TakesExtendedFrames, "an_extended_frame_is_no_reply"),
-    (Fault::TakesRemoteFrames, "a_remote_frame_is_no_reply"),
-    (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_the_next_ones"),
-    (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_the_next_cycles[a cycle]"),
-    (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_the_next_cycles[0x280]"),
-    (Fault::SendsAgainAfterATimeout, "a_late_reply_is_not_the_next_ones"),
-    (Fault::KeepsWhatCameBefore, "a_second_copy_of_a_reply_is_not_the_next_ones"),
-    (Fault::KeepsWhatCameBefore, "an_unasked_frame_of_the_motor_is_nobodys"),
-    (Fault::KeepsWhatCameBefore, "a_copy_of_a_reply_is_not_anothers[a cycle]"),
-    (Fault::WaitsForSilenceForEver, "a_flood_of_other_frames_does_not_matter"),
+    (Fault::TakesShortFrames, "a_frame_of_seven_bytes_is_not_a_reply"),
+    (Fault::TakesExtendedFrames, "an_extended_frame_is_not_a_reply"),
+    (Fault::TakesRemoteFrames, "a_remote_frame_is_not_a_reply"),
+    (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_matched_to_the_next_request"),
+    (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_matched_to_the_next_cycle[a cycle]"),
+    (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_matched_to_the_next_cycle[0x280]"),
+    (Fault::SendsAgainAfterATimeout, "a_late_reply_is_not_matched_to_the_next_request"),
+    (Fault::KeepsWhatCameBefore, "a_duplicate_reply_is_not_matched_to_the_next_request"),
+    (Fault::KeepsWhatCameBefore, "a_frame_without_a_request_is_dropped"),
+    (Fault::KeepsWhatCameBefore, "a_duplicate_reply_is_not_matched_to_another_request[a cycle]"),
+    (Fault::WaitsForSilenceForEver, "a_flood_of_other_frames_is_dropped"),
     (Fault::TakesEchoes, "an_echoing_adapter_is_not_a_motor"),
     (Fault::GivesUpEarly, "a_reply_is_awaited_for_the_whole_timeout"),
     (Fault::InsistsOn9A, "errors_cleared_are_answered_with_0x9b"),
@@ -390,7 +395,7 @@ const CAUGHT: &[(Fault, &str)] = &[
     (Fault::SaysTheLastValueAgain, "silence_is_an_error"),
     (Fault::SaysNothingOfErrors, "silence_is_an_error"),
     (Fault::SendsTwoAtOnce, "every_reading_has_its_own_value"),
-    (Fault::TakesAnyEcho, "an_off_with_another_content_is_no_acknowledge"),
+    (Fault::TakesAnyEcho, "an_altered_off_is_not_an_acknowledge"),
     (Fault::SaysNothingOfErrors, "an_off_without_an_answer_is_an_error"),
     (Fault::TakesRepliesForEchoes, "an_off_that_is_repeated_is_acknowledged"),
 ];
@@ -406,7 +411,7 @@ fn a_simple_host_that_ends_at_the_first_error_passes() {
 }
 
 #[test]
-fn every_scenario_catches_somebody() {
+fn every_scenario_catches_a_careless_host() {
     let names = scenarios().into_iter().map(|scenario| scenario.name.into_owned());
     careless::are_needed(names, CAUGHT, Fault::SendsTwoAtOnce, failing);
 }

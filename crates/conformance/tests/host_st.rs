@@ -1,5 +1,5 @@
-//! ST hosts before adversarial drives, on virtual time: ours passes, and each careless one is caught
-//! by the scenario that names its fault.
+//! ST hosts with scripted drives, on virtual time. Our host passes. Each careless host is caught by
+//! the scenario of its fault.
 
 mod careless;
 mod finite;
@@ -7,7 +7,7 @@ mod finite;
 use finite::Finite;
 use motorlink::port::PortError;
 use motorlink_conformance::host::st::{DIGIT, Scenario, ScriptedDrive, scenarios};
-use motorlink_conformance::host::{READINGS, Reading, Said, Task};
+use motorlink_conformance::host::{HostOutput, READINGS, Reading, Task};
 use motorlink_conformance::{Outcome, Verdict};
 use motorlink_proto::st::{
     Command, ExchangeError, Failure, Frame, HEADER_ACK, HEADER_ATR, HEADER_NACK, MAX_FRAME, Master,
@@ -20,17 +20,20 @@ type Line = Finite<ScriptedDrive, u8>;
 const ASK: Request<'_> = Request::GetRegister(RegisterId::SPEED_MEAS);
 const START: Request<'_> = Request::ExecuteCommand(Command::StartMotor);
 
-fn play(scenario: &Scenario, host: impl Fn(&mut Line, Task) -> Result<Said, PortError>) -> Outcome {
+fn play(
+    scenario: &Scenario,
+    host: impl Fn(&mut Line, Task) -> Result<HostOutput, PortError>,
+) -> Outcome {
     let drive = scenario.drive(TIMEOUT);
     let mut line = Line::new(drive.clone());
-    let said = host(&mut line, scenario.task).unwrap_or_else(|error| Said {
+    let output = host(&mut line, scenario.task).unwrap_or_else(|error| HostOutput {
         ended_badly: Some(format!("the host does not end: {error}")),
-        ..Said::default()
+        ..HostOutput::default()
     });
-    scenario.judge(&drive.journal(), &said, DIGIT, None)
+    scenario.judge(&drive.journal(), &output, DIGIT, None)
 }
 
-/// What an exchange of our master ends in.
+/// The result of an exchange of our master.
 fn exchange(
     master: &mut Master,
     line: &mut Line,
@@ -49,13 +52,13 @@ fn exchange(
     }
 }
 
-/// Every result of our master.
+/// All results of our master.
 fn results(line: &mut Line, task: Task) -> Result<Vec<Result<i32, String>>, PortError> {
     let mut master = Master::new(MasterConfig::default());
     let (request, count) = if task == Task::Start { (START, 1) } else { (ASK, READINGS) };
     let mut results = Vec::new();
     for _ in 0..count {
-        // A program does something else between two readings, and meanwhile hears what comes.
+        // Between two readings a program does something else. Bytes are received meanwhile.
         let pause = line.now() + Micros::from_millis(1);
         let unasked = line.receive(pause)?;
         master.receive(line.now(), &unasked);
@@ -83,14 +86,14 @@ fn reading(rpm: i32) -> Reading {
     Reading { motor: 1, value: rpm.into() }
 }
 
-fn ours(line: &mut Line, task: Task) -> Result<Said, PortError> {
+fn ours(line: &mut Line, task: Task) -> Result<HostOutput, PortError> {
     let results = results(line, task)?;
-    Ok(Said {
+    Ok(HostOutput {
         values: match task {
             Task::Start => Vec::new(),
             _ => results.iter().flatten().map(|&value| reading(value)).collect(),
         },
-        complained: results.iter().any(Result::is_err),
+        reported_error: results.iter().any(Result::is_err),
         ended_badly: None,
     })
 }
@@ -107,19 +110,19 @@ fn our_master_passes_every_scenario() {
     }
 }
 
-/// What the disturbed reading of our master must end in.
+/// The required result of our master's disturbed reading.
 const ENDS: &[(&str, &str)] = &[
     ("every_reading_has_its_own_value", "ok"),
     ("a_reply_is_awaited_for_a_second", "ok"),
     ("a_reply_that_comes_byte_by_byte_is_one_reply", "ok"),
-    ("a_reply_at_the_timeout_is_its_own_or_nobodys", "ok"),
-    ("a_late_reply_is_not_the_next_ones", "timeout"),
-    ("a_reply_that_comes_with_the_next_one_is_not_the_next_ones", "timeout"),
+    ("a_reply_at_the_timeout_is_matched_to_its_request_or_dropped", "ok"),
+    ("a_late_reply_is_not_matched_to_the_next_request", "timeout"),
+    ("a_reply_together_with_the_next_one_is_not_matched_to_the_next_request", "timeout"),
     ("the_rest_of_a_reply_that_comes_late_is_dropped", "incomplete"),
-    ("a_reply_that_is_cut_off_is_no_reply", "incomplete"),
+    ("a_reply_that_is_cut_off_is_not_a_reply", "incomplete"),
     ("silence_is_an_error", "timeout"),
-    ("a_second_copy_of_a_reply_is_not_the_next_ones", "ok"),
-    ("an_unasked_acknowledge_is_nobodys", "ambiguous"),
+    ("a_duplicate_reply_is_not_matched_to_the_next_request", "ok"),
+    ("an_acknowledge_without_a_request_is_dropped", "ambiguous"),
     ("two_different_replies_are_not_an_answer", "ambiguous"),
     ("a_damaged_checksum_is_an_error", "damaged"),
     ("a_damaged_value_is_an_error", "damaged"),
@@ -128,15 +131,15 @@ const ENDS: &[(&str, &str)] = &[
     ("a_value_of_five_bytes_is_an_error", "size 5"),
     ("a_value_of_another_size_is_read_or_refused", "size 2"),
     ("a_length_over_128_is_an_error", "damaged"),
-    ("motor_bits_in_a_reply_do_not_confuse", "header"),
-    ("a_header_that_is_neither_is_an_error", "header"),
+    ("motor_bits_in_a_reply_are_accepted_or_refused", "header"),
+    ("an_unknown_header_is_an_error", "header"),
     ("garbage_before_a_reply_is_not_read", "header"),
-    ("an_identification_is_no_reply", "ok"),
+    ("an_identification_is_not_a_reply", "ok"),
     ("a_reset_in_the_middle_of_a_reply_is_an_error", "damaged"),
     ("a_negative_acknowledge_without_a_code_is_an_error", "refused 0x00"),
-    ("the_second_answer_to_a_damaged_request_is_nobodys", "not understood 0x0a"),
+    ("the_second_answer_to_a_damaged_request_is_dropped", "not understood 0x0a"),
     ("a_drive_that_does_not_stop_to_send_is_an_error", "ok"),
-    ("a_flood_of_acknowledges_is_nobodys", "ambiguous"),
+    ("a_flood_of_acknowledges_is_dropped", "ambiguous"),
     ("a_negative_acknowledge_with_an_unknown_code_is_an_error[0x04]", "refused 0x04"),
     ("a_negative_acknowledge_with_an_unknown_code_is_an_error[0x06]", "refused 0x06"),
     ("a_negative_acknowledge_with_an_unknown_code_is_an_error[0x7f]", "refused 0x7f"),
@@ -144,15 +147,15 @@ const ENDS: &[(&str, &str)] = &[
     ("a_line_that_echoes_is_not_read_as_a_drive", "echo"),
 ];
 
-/// On these lines no reading succeeds any more.
+/// On these lines no later reading succeeds.
 const HOPELESS: [&str; 3] = [
     "a_drive_that_does_not_stop_to_send_is_an_error",
-    "a_flood_of_acknowledges_is_nobodys",
+    "a_flood_of_acknowledges_is_dropped",
     "a_line_that_echoes_is_not_read_as_a_drive",
 ];
 
 #[test]
-fn our_master_says_what_is_wrong_and_reads_on_as_soon_as_the_line_allows() {
+fn our_master_reports_the_failure_and_continues_after_recovery() {
     let readings = scenarios().into_iter().filter(|scenario| scenario.task == Task::Read);
     for scenario in readings {
         let name: &str = &scenario.name;
@@ -166,7 +169,7 @@ fn our_master_says_what_is_wrong_and_reads_on_as_soon_as_the_line_allows() {
     }
 }
 
-/// What a careless host does that a careful one does not.
+/// Faults of careless hosts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fault {
     None,
@@ -191,8 +194,8 @@ enum Fault {
     StartsTwice,
 }
 
-/// A host as people write it: one frame in, one frame out. Without a fault it ends at the first
-/// error, which is what the document asks for (4.1).
+/// A typical simple host: it sends a frame and reads a frame. Without a fault it ends at the first
+/// error, as the document demands (4.1).
 struct Simple<'a> {
     line: &'a mut Line,
     task: Task,
@@ -212,20 +215,20 @@ impl Simple<'_> {
         self.fault == fault
     }
 
-    fn run(&mut self) -> Result<Said, PortError> {
+    fn run(&mut self) -> Result<HostOutput, PortError> {
         let (request, count) = match self.task {
             Task::Start if self.has(Fault::StartsTwice) => (START, 2),
             Task::Start => (START, 1),
             _ => (ASK, READINGS),
         };
-        let mut said = Said::default();
+        let mut output = HostOutput::default();
         let mut left = count;
         while left > 0 {
             left -= 1;
             let goes_on = match self.exchange(&request)? {
                 Ending::Value(value) => {
                     if self.task != Task::Start {
-                        said.values.push(reading(value));
+                        output.values.push(reading(value));
                     }
                     continue;
                 }
@@ -243,15 +246,15 @@ impl Simple<'_> {
                 Ending::Damaged => false,
             };
             if self.has(Fault::SaysTheLastValueAgain) {
-                said.values.extend(said.values.last().copied());
+                output.values.extend(output.values.last().copied());
                 continue;
             }
-            said.complained = !self.has(Fault::SaysNothingOfErrors);
+            output.reported_error = !self.has(Fault::SaysNothingOfErrors);
             if !goes_on {
                 break;
             }
         }
-        Ok(said)
+        Ok(output)
     }
 
     fn exchange(&mut self, request: &Request<'_>) -> Result<Ending, PortError> {
@@ -331,7 +334,7 @@ impl Simple<'_> {
     }
 }
 
-fn simple(fault: Fault) -> impl Fn(&mut Line, Task) -> Result<Said, PortError> {
+fn simple(fault: Fault) -> impl Fn(&mut Line, Task) -> Result<HostOutput, PortError> {
     move |line, task| Simple { line, task, fault, received: Vec::new() }.run()
 }
 
@@ -341,24 +344,27 @@ fn failing(fault: Fault) -> Vec<String> {
     failed.map(|outcome| outcome.name).collect()
 }
 
-/// Each fault, and the scenario that names it.
+/// Each fault, and the scenario that finds it.
 const CAUGHT: &[(Fault, &str)] = &[
     (Fault::SkipsTheChecksum, "a_damaged_value_is_an_error"),
-    (Fault::TakesAnyHeader, "a_header_that_is_neither_is_an_error"),
+    (Fault::TakesAnyHeader, "an_unknown_header_is_an_error"),
     (Fault::TakesNackAsAck, "a_negative_acknowledge_with_an_unknown_code_is_an_error[0x04]"),
     (Fault::TakesNackAsAck, "a_start_that_is_refused_is_an_error"),
-    (Fault::TakesIdentificationAsReply, "an_identification_is_no_reply"),
+    (Fault::TakesIdentificationAsReply, "an_identification_is_not_a_reply"),
     (Fault::TakesAnySize, "a_value_of_three_bytes_is_an_error"),
     (Fault::TakesTheFirstOfTwo, "two_different_replies_are_not_an_answer"),
-    (Fault::KeepsWhatCameBefore, "a_second_copy_of_a_reply_is_not_the_next_ones"),
-    (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_the_next_ones"),
-    (Fault::WaitsALittleAfterATimeout, "a_reply_that_comes_with_the_next_one_is_not_the_next_ones"),
-    (Fault::GoesOnAfterARefusal, "the_second_answer_to_a_damaged_request_is_nobodys"),
-    (Fault::SendsAgainAfterATimeout, "a_late_reply_is_not_the_next_ones"),
+    (Fault::KeepsWhatCameBefore, "a_duplicate_reply_is_not_matched_to_the_next_request"),
+    (Fault::GoesOnAfterATimeout, "a_late_reply_is_not_matched_to_the_next_request"),
+    (
+        Fault::WaitsALittleAfterATimeout,
+        "a_reply_together_with_the_next_one_is_not_matched_to_the_next_request",
+    ),
+    (Fault::GoesOnAfterARefusal, "the_second_answer_to_a_damaged_request_is_dropped"),
+    (Fault::SendsAgainAfterATimeout, "a_late_reply_is_not_matched_to_the_next_request"),
     (Fault::SendsAgainAfterATimeout, "a_start_without_an_answer_is_an_error_and_not_repeated"),
     (Fault::SaysTheLastValueAgain, "silence_is_an_error"),
     (Fault::SaysNothingOfErrors, "silence_is_an_error"),
-    (Fault::WaitsForEver, "a_reply_that_is_cut_off_is_no_reply"),
+    (Fault::WaitsForEver, "a_reply_that_is_cut_off_is_not_a_reply"),
     (Fault::WaitsForSilenceForEver, "a_drive_that_does_not_stop_to_send_is_an_error"),
     (Fault::GivesUpEarly, "a_reply_is_awaited_for_a_second"),
     (Fault::SendsTwoAtOnce, "every_reading_has_its_own_value"),
@@ -377,7 +383,7 @@ fn a_simple_host_that_ends_at_the_first_error_passes() {
 }
 
 #[test]
-fn every_scenario_catches_somebody() {
+fn every_scenario_catches_a_careless_host() {
     let names = scenarios().into_iter().map(|scenario| scenario.name.into_owned());
     careless::are_needed(names, CAUGHT, Fault::SendsTwoAtOnce, failing);
 }

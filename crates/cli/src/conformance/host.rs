@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use motorlink::port::PortError;
-use motorlink_conformance::host::{Journal, Reading, Said, Scenario, Task, rmd, st};
+use motorlink_conformance::host::{HostOutput, Journal, Reading, Scenario, Task, rmd, st};
 use motorlink_conformance::{Outcome, Report, Verdict};
 use motorlink_link::serve::ServeName;
 use motorlink_link::serve::{Served, Server};
@@ -143,7 +143,7 @@ fn program(args: &Host, task: Task) -> Result<Vec<String>, &'static str> {
 
 /// What a program said, as it was and as it is understood.
 struct Heard {
-    said: Said,
+    said: HostOutput,
     out: String,
     err: String,
     /// The longest time for which the drive was not served.
@@ -242,7 +242,13 @@ fn end(child: &mut Child) -> Result<(), Failure> {
     Ok(())
 }
 
-fn understand(args: &Host, task: Task, ended: Option<ExitStatus>, out: &str, err: &str) -> Said {
+fn understand(
+    args: &Host,
+    task: Task,
+    ended: Option<ExitStatus>,
+    out: &str,
+    err: &str,
+) -> HostOutput {
     let ended_badly = match ended {
         None => Some(format!("the host did not end within {:?}", args.limit)),
         Some(status) => {
@@ -251,7 +257,7 @@ fn understand(args: &Host, task: Task, ended: Option<ExitStatus>, out: &str, err
     };
     let failed = ended.is_some_and(|status| !status.success());
     if task.values() == 0 {
-        return Said { values: Vec::new(), complained: failed, ended_badly };
+        return HostOutput { values: Vec::new(), reported_error: failed, ended_badly };
     }
     let lines = || out.lines().filter(|line| !line.trim().is_empty());
     let values: Vec<Reading> = lines()
@@ -260,8 +266,8 @@ fn understand(args: &Host, task: Task, ended: Option<ExitStatus>, out: &str, err
             Some(Reading { motor, value: value(line, args.field)? })
         })
         .collect();
-    let complained = failed || !err.trim().is_empty() || lines().count() > values.len();
-    Said { values, complained, ended_badly }
+    let reported_error = failed || !err.trim().is_empty() || lines().count() > values.len();
+    HostOutput { values, reported_error, ended_badly }
 }
 
 /// The value in a line: its last number, or that in its place.

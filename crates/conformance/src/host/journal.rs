@@ -1,39 +1,39 @@
-//! What passed between a host and an adversarial drive, and which of it was true.
+//! The record of the transfers between a host and a scripted drive, and which values were true.
 
 use motorlink_proto::time::{Instant, Micros};
 
 use super::script::{Claim, Send, When};
 
-/// Lines that a transcript keeps; a drive that never stops would fill memory.
+/// Maximum number of lines in a transcript. A drive that sends without end would fill memory.
 const TRANSCRIPT: usize = 120;
-/// Frames of the host that a finding shows.
+/// Number of the host's frames that a finding shows.
 const SENT: usize = 8;
 
-/// What passed between a host and an adversarial drive.
+/// The record of the transfers between a host and a scripted drive.
 #[derive(Debug, Clone, Default)]
 pub struct Journal {
-    /// A line a frame or chunk, with its time: what the host sent behind `host`, what the drive sent
-    /// behind `drive`.
+    /// One line per frame or chunk, with its time: `host` precedes data of the host, `drive`
+    /// precedes data of the drive.
     pub transcript: Vec<String>,
-    /// What the host did on the wire that it must not do.
+    /// Forbidden transfers of the host.
     pub violations: Vec<String>,
-    /// How often the host started the motor.
+    /// Number of the host's START_MOTORs.
     pub starts: usize,
     sent: Vec<String>,
     exchanges: Vec<JournalEntry>,
-    told: Vec<Told>,
+    values: Vec<SentValue>,
 }
 
-/// A value that went out.
+/// A value that the drive sent.
 #[derive(Debug, Clone)]
-pub(super) struct Told {
+pub(super) struct SentValue {
     pub motor: u8,
     pub value: i64,
-    /// Why it is not the answer to the request that it reached; `None` when it is.
+    /// Why the value does not answer the request of its exchange; `None` if it does.
     pub wrong: Option<String>,
 }
 
-/// An exchange: the motor, what its reply is known by, and its number on this line.
+/// An exchange: the motor, the key of its reply, and its number on this line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Exchange {
     pub motor: u8,
@@ -45,15 +45,16 @@ pub(super) struct Exchange {
 struct JournalEntry {
     exchange: Exchange,
     at: Instant,
-    /// Parts of the reply that are still to come.
-    owed: usize,
+    /// Number of parts of the reply that were not sent yet.
+    remaining: usize,
     answered: bool,
-    /// A reply to an earlier request came first: a host cannot tell which is which any more.
+    /// A reply to an earlier request was sent first. A host can no longer match replies to
+    /// requests.
     confused: bool,
 }
 
 impl Journal {
-    /// Something came from the host.
+    /// Records data from the host.
     pub(super) fn heard(&mut self, now: Instant, shown: &str) {
         self.note(now, "host ", shown);
         if self.sent.len() < SENT {
@@ -61,7 +62,8 @@ impl Journal {
         }
     }
 
-    /// It asked something. Until a reply came, or for `patience`, it must not have.
+    /// Records a request of the host. It is forbidden before the reply to the earlier one, or
+    /// before `patience` is over.
     pub(super) fn record(
         &mut self,
         now: Instant,
@@ -70,29 +72,29 @@ impl Journal {
         shown: &str,
         patience: Micros,
     ) -> Exchange {
-        let last = self.exchanges.iter().rev().find(|asked| asked.exchange.motor == motor);
+        let last = self.exchanges.iter().rev().find(|entry| entry.exchange.motor == motor);
         if let Some(last) = last
             && now.since(last.at) < patience
-            && (!last.answered || last.owed > 0)
+            && (!last.answered || last.remaining > 0)
         {
             self.violations.push(format!(
-                "sent {shown} {} ms after its request {}, to which the reply was still to come",
+                "sent {shown} {} ms after its request {}, before the reply to it",
                 now.since(last.at).as_micros() / 1_000,
                 last.exchange.number,
             ));
         }
         let exchange = Exchange { motor, code, number: self.exchanges.len() + 1 };
-        let (owed, answered, confused) = Default::default();
-        self.exchanges.push(JournalEntry { exchange, at: now, owed, answered, confused });
+        let (remaining, answered, confused) = Default::default();
+        self.exchanges.push(JournalEntry { exchange, at: now, remaining, answered, confused });
         exchange
     }
 
-    /// The drive will send a part of the reply.
+    /// Announces one more part of the reply.
     pub(super) fn promise(&mut self, exchange: Exchange) {
-        self.of(exchange).owed += 1;
+        self.of(exchange).remaining += 1;
     }
 
-    /// The drive sent something that it owed, or thought up, in this exchange.
+    /// Records a sent part of a reply, or other data, in this exchange.
     pub(super) fn delivered<D>(
         &mut self,
         now: Instant,
@@ -101,7 +103,7 @@ impl Journal {
         send: &Send<D>,
     ) {
         self.note(now, "drive", shown);
-        let last = self.exchanges.iter().rposition(|asked| asked.exchange.motor == exchange.motor);
+        let last = self.exchanges.iter().rposition(|entry| entry.exchange.motor == exchange.motor);
         let last = last.map(|index| &mut self.exchanges[index]);
         let late = last.as_ref().map(|last| last.exchange.number).filter(|n| *n != exchange.number);
         if let Some(last) = last
@@ -112,41 +114,41 @@ impl Journal {
             last.confused = true;
         }
         if let Some(claim) = send.claim {
-            self.told(exchange, claim, late);
+            self.record_value(exchange, claim, late);
         }
         if send.is_reply {
-            let asked = self.of(exchange);
-            asked.owed -= 1;
-            asked.answered = true;
+            let entry = self.of(exchange);
+            entry.remaining -= 1;
+            entry.answered = true;
         }
     }
 
-    fn told(&mut self, exchange: Exchange, claim: Claim, late: Option<usize>) {
+    fn record_value(&mut self, exchange: Exchange, claim: Claim, late: Option<usize>) {
         let Claim { value, lie } = claim;
         let number = exchange.number;
-        let asked = self.of(exchange);
+        let entry = self.of(exchange);
         let wrong = match (lie, late) {
             (Some(why), _) => Some(why.to_owned()),
             (None, Some(later)) => {
                 Some(format!("the reply to request {number} came after request {later}"))
             }
-            (None, None) if asked.confused => {
+            (None, None) if entry.confused => {
                 Some(format!("a reply to an earlier request came before that to request {number}"))
             }
             (None, None) => None,
         };
-        // The copy of a reply does not make the first one wrong.
-        if wrong.is_none() || !self.told.iter().any(|told| told.value == value) {
-            self.told.push(Told { motor: exchange.motor, value, wrong });
+        // A duplicate of a reply does not make the first one wrong.
+        if wrong.is_none() || !self.values.iter().any(|sent| sent.value == value) {
+            self.values.push(SentValue { motor: exchange.motor, value, wrong });
         }
     }
 
-    /// What the drive meant by a value; `None` when it never sent it.
-    pub(super) fn meaning(&self, is: impl Fn(i64) -> bool) -> Option<&Told> {
-        self.told.iter().rev().find(|told| is(told.value))
+    /// The meaning of a value; `None` if the drive never sent it.
+    pub(super) fn meaning(&self, is: impl Fn(i64) -> bool) -> Option<&SentValue> {
+        self.values.iter().rev().find(|sent| is(sent.value))
     }
 
-    /// What the host sent first.
+    /// The first frames of the host.
     pub(super) fn sent(&self) -> String {
         self.sent.join(" | ")
     }

@@ -1,4 +1,4 @@
-//! What a host said, held against what it was told.
+//! Compares the output of a host with the data that it received.
 
 use std::time::Duration;
 
@@ -8,14 +8,14 @@ use crate::report::{Outcome, Verdict};
 use super::journal::Journal;
 use super::scenario::{Demand, Scenario, Task};
 
-/// What a host said.
+/// The output of a host.
 #[derive(Debug, Clone, Default)]
-pub struct Said {
-    /// What it read, in the order in which it said it.
+pub struct HostOutput {
+    /// The values that it read, in the order of its output.
     pub values: Vec<Reading>,
-    /// Whether it said that something failed.
-    pub complained: bool,
-    /// That it crashed or did not come to an end.
+    /// Whether it reported a failure.
+    pub reported_error: bool,
+    /// Why it crashed or did not end.
     pub ended_badly: Option<String>,
 }
 
@@ -29,13 +29,13 @@ pub struct Reading {
 }
 
 impl<S> Scenario<S> {
-    /// What comes of it when the host said this. A digit on the wire is `digit` of what it says.
-    /// `late` is how much later than planned the drive was served, where that matters: then a host
-    /// may have given up rightly, and is judged only by what is wrong in any case.
+    /// The verdict on a host's output. The host's unit is `digit` digits on the wire. `late` is the
+    /// delay of the drive beyond its script, if it matters: the host may then have timed out
+    /// correctly, and only violations that do not depend on time count.
     pub fn judge(
         &self,
         journal: &Journal,
-        said: &Said,
+        output: &HostOutput,
         digit: f64,
         late: Option<Duration>,
     ) -> Outcome {
@@ -47,16 +47,17 @@ impl<S> Scenario<S> {
                 reading: None,
             }))
         };
-        // A host that sent nothing did not notice.
+        // A host that sent nothing did not notice the delay.
         let late = late.filter(|_| !journal.sent().is_empty());
-        let verdict = match (self.wrong(journal, said, digit), self.missing(journal, said), late) {
-            (Some(fault), ..) | (None, Some(fault), None) => failed(fault),
-            (None, Some(_), Some(late)) => Verdict::NotRun(format!(
-                "this machine is too busy to judge a host: the drive was served {} ms late",
-                late.as_millis()
-            )),
-            (None, None, _) => Verdict::Passed,
-        };
+        let verdict =
+            match (self.wrong(journal, output, digit), self.missing(journal, output), late) {
+                (Some(fault), ..) | (None, Some(fault), None) => failed(fault),
+                (None, Some(_), Some(late)) => Verdict::NotRun(format!(
+                    "this machine is too busy to test a host: the drive was delayed by {} ms",
+                    late.as_millis()
+                )),
+                (None, None, _) => Verdict::Passed,
+            };
         let transcript = match verdict {
             Verdict::Failed(_) => journal.transcript.clone(),
             _ => Vec::new(),
@@ -65,65 +66,67 @@ impl<S> Scenario<S> {
         Outcome { name, clauses: self.clauses, verdict, differences, transcript }
     }
 
-    /// Why it was not run.
+    /// The outcome of a scenario that was not run.
     pub fn skipped(&self, why: &str) -> Outcome {
         let verdict = Verdict::Skipped(why.to_owned());
         let (name, differences, transcript) = (self.name.to_string(), Vec::new(), Vec::new());
         Outcome { name, clauses: self.clauses, verdict, differences, transcript }
     }
 
-    /// What is wrong however late the drive was served.
-    fn wrong(&self, journal: &Journal, said: &Said, digit: f64) -> Option<String> {
+    /// Violations that do not depend on time.
+    fn wrong(&self, journal: &Journal, output: &HostOutput, digit: f64) -> Option<String> {
         let falsehood = |(index, reading): (usize, &Reading)| {
             let Reading { motor, value } = *reading;
-            let is = |told: i64| (told as f64 * digit - value).abs() < digit / 2.0;
-            let Some(told) = journal.meaning(is) else {
-                return Some(format!("the host said {value}, which no reply told it"));
+            let is = |sent: i64| (sent as f64 * digit - value).abs() < digit / 2.0;
+            let Some(sent) = journal.meaning(is) else {
+                return Some(format!("the host reported {value}, which was in no reply"));
             };
-            if let Some(why) = &told.wrong {
-                return Some(format!("the host said {value}, but {why}"));
+            if let Some(why) = &sent.wrong {
+                return Some(format!("the host reported {value}, but {why}"));
             }
-            if told.motor != motor {
-                let teller = told.motor;
-                return Some(format!("the host said {value} of motor {motor}; motor {teller} did"));
+            if sent.motor != motor {
+                let sender = sent.motor;
+                return Some(format!(
+                    "the host reported {value} for motor {motor}; it was sent by motor {sender}"
+                ));
             }
-            let again = said.values[..index].contains(reading);
-            again.then(|| format!("the host said {value} twice, which it was told once"))
+            let again = output.values[..index].contains(reading);
+            again.then(|| format!("the host reported {value} twice; it was sent once"))
         };
-        if let Some(fault) = said.values.iter().enumerate().find_map(falsehood) {
+        if let Some(fault) = output.values.iter().enumerate().find_map(falsehood) {
             return Some(fault);
         }
         if journal.starts > usize::from(self.task == Task::Start) {
             return Some(format!("the host sent START_MOTOR {} times", journal.starts));
         }
-        said.ended_badly.clone()
+        output.ended_badly.clone()
     }
 
-    /// What a late drive may explain.
-    fn missing(&self, journal: &Journal, said: &Said) -> Option<String> {
+    /// Violations that a late drive may have caused.
+    fn missing(&self, journal: &Journal, output: &HostOutput) -> Option<String> {
         if let Some(violation) = journal.violations.first() {
             return Some(format!("the host {violation}"));
         }
-        let count = said.values.len();
+        let count = output.values.len();
         let wanted = self.task.values();
         match self.demand {
             _ if self.task == Task::Start && journal.starts == 0 => {
                 Some("the host did not send START_MOTOR".to_owned())
             }
             Demand::Everything if count < wanted => {
-                Some(format!("the host said {count} values of {wanted}"))
+                Some(format!("the host reported {count} values of {wanted}"))
             }
-            Demand::Everything if said.complained && wanted == 0 => {
-                Some("the host said that it failed".to_owned())
+            Demand::Everything if output.reported_error && wanted == 0 => {
+                Some("the host reported a failure".to_owned())
             }
-            Demand::Error if !said.complained => {
-                Some("the host did not say that anything failed".to_owned())
+            Demand::Error if !output.reported_error => {
+                Some("the host did not report the failure".to_owned())
             }
-            Demand::Truth if count < wanted && !said.complained => {
-                Some(format!("the host said {count} values of {wanted} and nothing of an error"))
+            Demand::Truth if count < wanted && !output.reported_error => {
+                Some(format!("the host reported {count} values of {wanted} and no error"))
             }
             _ if journal.sent().is_empty() => {
-                Some("the host sent nothing, so that nothing was tested".to_owned())
+                Some("the host sent nothing, so nothing was tested".to_owned())
             }
             _ => None,
         }

@@ -1,12 +1,12 @@
-//! A host under test: adversarial drives that it is put in front of, and what a correct host makes of
-//! them.
+//! Tests of a host: scripted drives that misbehave, and the reaction of a correct host.
 //!
-//! A [`Scenario`] is a drive with a script ([`st::ScriptedDrive`], [`rmd::ScriptedMotors`]). It is a served station
-//! like any other, so it tests a host behind a pty as well as one in this process on virtual time. A
-//! host is asked to read a value a few times. Every reading has a value of its own, so what the host
-//! says afterwards tells which reply it took for which. The drive writes a [`Journal`] of what it
-//! sent truly, what falsely and what the host did on the wire; [`Scenario::judge`] holds what the host
-//! [`Said`] against it.
+//! A [`Scenario`] is a drive with a script ([`st::ScriptedDrive`], [`rmd::ScriptedMotors`]). It is
+//! a served station like any other, so it tests a host behind a pty, or a host in this process on
+//! virtual time. The host is asked to read a value a few times. Every reading has a unique value,
+//! so the host's output shows which reply it matched to which request. The drive records a
+//! [`Journal`]: the true and the false values that it sent, and the host's transfers.
+//! [`Scenario::judge`] compares the output of the host, [`HostOutput`], with the journal.
+//! [`HostOutput`] against it.
 
 mod journal;
 mod judge;
@@ -17,5 +17,5 @@ mod script;
 pub mod st;
 
 pub use journal::Journal;
-pub use judge::{Reading, Said};
+pub use judge::{HostOutput, Reading};
 pub use scenario::{Demand, READINGS, Scenario, Task};

@@ -1,4 +1,4 @@
-//! The queue between an adversarial drive and the host.
+//! The queue from a scripted drive to the host.
 
 use std::collections::BTreeMap;
 
@@ -7,16 +7,16 @@ use motorlink_proto::time::{Instant, Micros};
 use super::journal::{Exchange, Journal};
 use super::script::{Send, When};
 
-/// Between the replies to two requests: a drive that was late does not answer the next one at once.
+/// Time between the replies to two requests: after a late reply, the next one is not sent at once.
 const GAP: Micros = Micros::from_millis(2);
 
-/// What is on its way to the host.
+/// Data on the way to the host.
 pub(super) struct Outbox<D> {
     pub journal: Journal,
     queue: BTreeMap<(Instant, u64), (Exchange, Send<D>)>,
     held: Vec<(Exchange, Send<D>)>,
     queued: u64,
-    /// Until when each motor is busy with a reply, and with which.
+    /// Until when each motor is busy with a reply, and the exchange of this reply.
     busy: BTreeMap<u8, (Exchange, Instant)>,
 }
 
@@ -26,14 +26,14 @@ impl<D: Clone> Outbox<D> {
         Outbox { journal: Journal::default(), queue, held, queued: 0, busy }
     }
 
-    /// The host sent something: what waited for that goes out first.
+    /// The host sent data: parts that waited for it are sent first.
     pub fn stir(&mut self, now: Instant) {
         for (exchange, send) in std::mem::take(&mut self.held) {
             self.in_order(now, exchange, send);
         }
     }
 
-    /// Schedules what answers a request.
+    /// Schedules the reply to a request.
     pub fn schedule(&mut self, now: Instant, exchange: Exchange, sends: Vec<Send<D>>) {
         for send in sends {
             if send.is_reply {
@@ -63,7 +63,7 @@ impl<D: Clone> Outbox<D> {
         self.queue.insert((due, self.queued), (exchange, send));
     }
 
-    /// Gives `out` what is due.
+    /// Passes the data that are due to `out`.
     pub fn flush(&mut self, now: Instant, show: fn(&D) -> String, mut out: impl FnMut(D)) {
         while let Some(entry) = self.queue.first_entry()
             && entry.key().0 <= now

@@ -1,19 +1,19 @@
-//! What a host is put through.
+//! Scenarios.
 
 use std::borrow::Cow;
 
-/// How often a host is asked to read; the second reading is the one that is disturbed.
+/// Number of readings of a host. The second reading is disturbed.
 pub const READINGS: usize = 4;
 
-/// The number of the disturbed reading, counted from 0.
+/// Index of the disturbed reading, starting at 0.
 pub(super) const DISTURBED: usize = 1;
 
-/// What the host is asked to do.
+/// The task of the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Task {
     /// Read the speed (ST) or the multi-turn angle (RMD) of motor 1 [`READINGS`] times.
     Read,
-    /// The same behind an adapter that sends back what it is sent, which the host was told.
+    /// The same through an adapter that echoes the sent data. The host is informed of the echo.
     Echoed,
     /// Start motor 1 once (ST).
     Start,
@@ -30,7 +30,7 @@ pub enum Task {
 }
 
 impl Task {
-    /// How many values the host says when all goes well.
+    /// Number of values that the host reports without a disturbance.
     pub const fn values(self) -> usize {
         match self {
             Task::Start | Task::Off => 0,
@@ -41,28 +41,28 @@ impl Task {
     }
 }
 
-/// What a host must bring home.
+/// The required output of the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Demand {
-    /// Every reading: the disturbance is none of its business.
+    /// All readings: the disturbance must have no effect.
     Everything,
-    /// Nothing false. A reading may fail, if it says so, or be made again.
+    /// No false value. A reading may be repeated, or fail if the host reports the failure.
     Truth,
-    /// That it failed.
+    /// A reported failure.
     Error,
 }
 
-/// A drive that misbehaves, and what a correct host does about it.
+/// A drive that misbehaves, and the reaction of a correct host.
 pub struct Scenario<S> {
-    /// What must hold, as a sentence in snake case.
+    /// The demand, as a sentence in snake case.
     pub name: Cow<'static, str>,
-    /// Ids of the clauses that hold the host to it.
+    /// Ids of the clauses that it tests.
     pub clauses: &'static [&'static str],
-    /// What a correct host does.
+    /// The reaction of a correct host.
     pub expected: &'static str,
-    /// What the host is asked to do.
+    /// The task of the host.
     pub task: Task,
-    /// What it must bring home.
+    /// The required output.
     pub demand: Demand,
     pub(super) script: S,
 }

@@ -1,28 +1,28 @@
-//! What an adversarial drive sends, when, and what it means by it.
+//! The data of a scripted drive: what it sends, when, and which values they carry.
 
 use motorlink_proto::time::Micros;
 
-/// Something that a drive sends.
+/// Data that a drive sends.
 #[derive(Debug, Clone)]
 pub(super) struct Send<D> {
     pub when: When,
     pub data: D,
-    /// Whether it is part of the reply, of which no request may overtake the rest.
+    /// Whether it is part of a reply. No other reply is sent between the parts.
     pub is_reply: bool,
     pub claim: Option<Claim>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum When {
-    /// This long after the request, though not before what the motor still has to send.
+    /// This time after the request, but not before earlier data of the motor.
     After(Micros),
-    /// When the host sends something again.
+    /// When the host sends data again.
     NextRequest,
-    /// Again and again, for ever.
+    /// Periodically, without end.
     Every(Micros),
 }
 
-/// A value that a drive sends.
+/// A value in the sent data.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Claim {
     pub value: i64,
@@ -30,22 +30,22 @@ pub(super) struct Claim {
 }
 
 impl<D> Send<D> {
-    /// A reply, or a part of it, without a value.
+    /// A reply or a part of it, without a value.
     pub fn reply(data: D) -> Self {
         Send { when: When::After(Micros(0)), data, is_reply: true, claim: None }
     }
 
-    /// Something that belongs to no request.
+    /// Data that answer no request.
     pub fn stray(data: D) -> Self {
         Send { is_reply: false, ..Self::reply(data) }
     }
 
-    /// It carries this value, which answers the request while the exchange lasts.
+    /// Adds a value, which answers the request during the exchange.
     pub fn telling(self, value: i64) -> Self {
         Send { claim: Some(Claim { value, lie: None }), ..self }
     }
 
-    /// A host may take it for this value, which is wrong because of `why`.
+    /// Adds a value that a host may read. It is wrong; `why` is the reason.
     pub fn lying(self, value: i64, why: &'static str) -> Self {
         Send { claim: Some(Claim { value, lie: Some(why) }), ..self }
     }
@@ -63,7 +63,7 @@ impl<D> Send<D> {
     }
 }
 
-/// A part of a stated time.
+/// A fraction of a time.
 pub(super) fn share(time: Micros, numerator: u64, denominator: u64) -> Micros {
     Micros(time.as_micros() * numerator / denominator)
 }

@@ -2,21 +2,21 @@
 
 use crate::clause::Clause;
 
-/// Every command and reply with its fields, bytes to values and back.
+/// Every command and reply with its fields: bytes to values and back.
 const VECTORS: &[&str] = &["every_vector_decodes_and_encodes_to_its_fields"];
-/// The same, and what stands between the fields of a request.
+/// The same, and the bytes of a request between its fields.
 const REQUESTS: &[&str] = &[
     "every_vector_decodes_and_encodes_to_its_fields",
     "null_bytes_of_a_request_are_ignored_and_sent_as_zero",
 ];
-/// What stands between the fields of a reply.
+/// The bytes of a reply between its fields.
 const REPLIES: &[&str] = &["every_reply_keeps_its_values_and_leaves_null_bytes_zero"];
-/// The codes and what they do.
+/// The codes and their commands.
 const LIST: &[&str] = &["the_table_has_every_command_once"];
-/// Why what the vendor's tool sets is not tested.
+/// Why settings of the vendor's tool are not tested.
 const TOOL: &str = "depends on a setting of the vendor's tool, which the wire cannot read";
 
-/// Every sentence of the document that demands something, in its order.
+/// Every sentence of the document that contains a demand, in its order.
 #[rustfmt::skip]
 pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-1-01", "A command to one motor and its reply both have the identifier 0x140 + ID.")
@@ -30,7 +30,7 @@ pub static CLAUSES: &[Clause] = &[
         .host(VECTORS),
     Clause::new("RMD-1-05", "They have eight bytes.")
         .host(VECTORS),
-    Clause::new("RMD-1-06", "What is for another identifier, or has another form, is no command to this motor: it has no effect and gets no reply (SPEC-NOTES R11)."),
+    Clause::new("RMD-1-06", "A frame with another identifier or of another form is not a command to this motor: it has no effect and no reply (SPEC-NOTES R11)."),
 
     Clause::new("RMD-2-01", "The command byte 0x30 reads the gains.")
         .host(LIST),
@@ -78,10 +78,10 @@ pub static CLAUSES: &[Clause] = &[
         .host(LIST),
     Clause::new("RMD-2-23", "The command byte 0xA6 closes the position loop, command 4.")
         .host(LIST),
-    Clause::new("RMD-2-24", "A command byte that the list does not have is no command: it has no effect and gets no reply (SPEC-NOTES R30).")
+    Clause::new("RMD-2-24", "A command byte outside the list is not a command: it has no effect and no reply (SPEC-NOTES R30).")
         .host(&["an_unknown_code_is_sent_and_times_out"]),
 
-    Clause::new("RMD-30-01", "The host asks for the gains with DATA[0] = 0x30 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-30-01", "The host requests the gains with DATA[0] = 0x30 and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-30-02", "The motor answers with one frame, DATA[0] = 0x30.")
         .host(VECTORS),
@@ -97,18 +97,18 @@ pub static CLAUSES: &[Clause] = &[
 
     Clause::new("RMD-31-01", "The host writes gains with DATA[0] = 0x31, NULL in DATA[1] and the six gains in DATA[2] to DATA[7], in the order of 0x30.")
         .host(REQUESTS),
-    Clause::new("RMD-31-02", "The gains are in force from then on."),
-    Clause::new("RMD-31-03", "They are lost when the power is switched off."),
-    Clause::new("RMD-31-04", "The motor answers with one frame, the same that the host sent.")
+    Clause::new("RMD-31-02", "The gains apply at once."),
+    Clause::new("RMD-31-03", "They are lost at power-off."),
+    Clause::new("RMD-31-04", "The motor answers with one frame, a copy of the request.")
         .host(VECTORS),
 
-    Clause::new("RMD-32-01", "The host writes gains for good with DATA[0] = 0x32, NULL in DATA[1] and the six gains in DATA[2] to DATA[7], in the order of 0x30.")
+    Clause::new("RMD-32-01", "The host writes gains to ROM with DATA[0] = 0x32, NULL in DATA[1] and the six gains in DATA[2] to DATA[7], in the order of 0x30.")
         .host(REQUESTS),
-    Clause::new("RMD-32-02", "The gains hold when the power was switched off."),
-    Clause::new("RMD-32-03", "The motor answers with one frame, the same that the host sent.")
+    Clause::new("RMD-32-02", "The gains are kept over a power cycle."),
+    Clause::new("RMD-32-03", "The motor answers with one frame, a copy of the request.")
         .host(VECTORS),
 
-    Clause::new("RMD-33-01", "The host asks for the acceleration with DATA[0] = 0x33 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-33-01", "The host requests the acceleration with DATA[0] = 0x33 and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-33-02", "The motor answers with one frame, DATA[0] = 0x33.")
         .host(VECTORS),
@@ -119,13 +119,13 @@ pub static CLAUSES: &[Clause] = &[
 
     Clause::new("RMD-34-01", "The host writes the acceleration with DATA[0] = 0x34, NULL in DATA[1] to DATA[3] and the acceleration in DATA[4] to DATA[7], int32, low byte first (SPEC-NOTES R5).")
         .host(REQUESTS),
-    Clause::new("RMD-34-02", "The acceleration is in force from then on, 0 and less as no limit (SPEC-NOTES R24)."),
+    Clause::new("RMD-34-02", "The acceleration applies at once; 0 and negative values mean no limit (SPEC-NOTES R24)."),
     Clause::new("RMD-34-03", "One digit is 1 °/s²."),
-    Clause::new("RMD-34-04", "It is lost when the power is switched off."),
-    Clause::new("RMD-34-05", "The motor answers with one frame, the same that the host sent.")
+    Clause::new("RMD-34-04", "It is lost at power-off."),
+    Clause::new("RMD-34-05", "The motor answers with one frame, a copy of the request.")
         .host(VECTORS),
 
-    Clause::new("RMD-90-01", "The host asks for the encoder with DATA[0] = 0x90 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-90-01", "The host requests the encoder with DATA[0] = 0x90 and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-90-02", "The motor answers with one frame, DATA[0] = 0x90.")
         .host(VECTORS),
@@ -142,23 +142,23 @@ pub static CLAUSES: &[Clause] = &[
 
     Clause::new("RMD-91-01", "The host writes the offset with DATA[0] = 0x91, NULL in DATA[1] to DATA[5] and the offset in DATA[6] and DATA[7], uint16, low byte first.")
         .host(REQUESTS),
-    Clause::new("RMD-91-02", "The offset is in force from then on (SPEC-NOTES R8); a position that is held stays where it is (SPEC-NOTES R26)."),
-    Clause::new("RMD-91-03", "An offset is within the encoder's width; one beyond it is cut, and the reply says so (SPEC-NOTES R19)."),
+    Clause::new("RMD-91-02", "The offset applies at once (SPEC-NOTES R8); a held position does not move (SPEC-NOTES R26)."),
+    Clause::new("RMD-91-03", "An offset is within the encoder's width; a larger one is cut, and the reply has the cut value (SPEC-NOTES R19)."),
     Clause::new("RMD-91-04", "The motor answers with one frame, DATA[0] = 0x91.")
         .host(VECTORS),
     Clause::new("RMD-91-05", "DATA[1] to DATA[5] of the reply are 0.")
         .host(REPLIES),
     Clause::new("RMD-91-06", "DATA[6] and DATA[7] of the reply are the new offset, uint16, low byte first.")
         .host(VECTORS),
-    Clause::new("RMD-91-07", "The offset holds when the power was switched off (SPEC-NOTES R8)."),
+    Clause::new("RMD-91-07", "The offset is kept over a power cycle (SPEC-NOTES R8)."),
 
-    Clause::new("RMD-19-01", "The host makes the current position the zero with DATA[0] = 0x19 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-19-01", "The host makes the current position the zero with DATA[0] = 0x19 and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-19-02", "The new zero takes effect with the next power-on, and not before (SPEC-NOTES R9)."),
     Clause::new("RMD-19-03", "The new zero is the position at the moment of the command, and is in ROM."),
     Clause::new("RMD-19-04", "Each use wears the ROM, so it is not for frequent use.")
         .host(&["test_rom_is_written_only_on_an_explicit_word"])
-        .untested("a demand on whoever uses it; the wire does not tell how often a ROM was written"),
+        .untested("a demand on the user; the wire does not show how often a ROM was written"),
     Clause::new("RMD-19-05", "The motor answers with one frame, DATA[0] = 0x19.")
         .host(VECTORS),
     Clause::new("RMD-19-06", "DATA[1] to DATA[5] of the reply are 0.")
@@ -166,16 +166,16 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-19-07", "DATA[6] and DATA[7] of the reply are the new offset, uint16, low byte first.")
         .host(VECTORS),
 
-    Clause::new("RMD-92-01", "The host asks for the multi-turn angle with DATA[0] = 0x92 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-92-01", "The host requests the multi-turn angle with DATA[0] = 0x92 and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-92-02", "The motor answers with one frame, DATA[0] = 0x92.")
         .host(VECTORS),
-    Clause::new("RMD-92-03", "DATA[1] to DATA[7] of the reply are the low seven bytes of the angle, int64, low byte first, the sign with them (SPEC-NOTES R2).")
+    Clause::new("RMD-92-03", "DATA[1] to DATA[7] of the reply are the low seven bytes of the angle, int64, low byte first, sign included (SPEC-NOTES R2).")
         .host(&["a_multi_turn_angle_of_seven_bytes_has_its_sign_extended"]),
-    Clause::new("RMD-92-04", "The angle counts on over turns, clockwise up and counterclockwise down."),
+    Clause::new("RMD-92-04", "The angle counts over turns: clockwise up, counterclockwise down."),
     Clause::new("RMD-92-05", "One digit is 0.01°."),
 
-    Clause::new("RMD-94-01", "The host asks for the single-turn angle with DATA[0] = 0x94 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-94-01", "The host requests the single-turn angle with DATA[0] = 0x94 and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-94-02", "The motor answers with one frame, DATA[0] = 0x94.")
         .host(VECTORS),
@@ -184,30 +184,30 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-94-04", "DATA[6] and DATA[7] of the reply are the angle, uint16, low byte first, 0.01° a digit.")
         .host(VECTORS),
     Clause::new("RMD-94-05", "The angle is counted from the encoder's zero point."),
-    Clause::new("RMD-94-06", "It grows clockwise and is back at 0 after a turn: the multi-turn angle within the turn (SPEC-NOTES R20)."),
+    Clause::new("RMD-94-06", "It grows clockwise and is 0 again after a turn: the multi-turn angle within the turn (SPEC-NOTES R20)."),
 
-    Clause::new("RMD-80-01", "The host switches the motor off with DATA[0] = 0x80 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-80-01", "The host switches the motor off with DATA[0] = 0x80 and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-80-02", "The motor is off."),
-    Clause::new("RMD-80-03", "What it was doing and was told is forgotten: nothing is left to resume (SPEC-NOTES R7)."),
-    Clause::new("RMD-80-04", "The motor answers with one frame, the same that the host sent.")
+    Clause::new("RMD-80-03", "The motion and its command are discarded: there is nothing to resume (SPEC-NOTES R7)."),
+    Clause::new("RMD-80-04", "The motor answers with one frame, a copy of the request.")
         .host(VECTORS),
 
-    Clause::new("RMD-81-01", "The host stops the motor with DATA[0] = 0x81 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-81-01", "The host stops the motor with DATA[0] = 0x81 and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
-    Clause::new("RMD-81-02", "The motor comes to a stand."),
-    Clause::new("RMD-81-03", "What it was doing and was told is kept."),
-    Clause::new("RMD-81-04", "The motor answers with one frame, the same that the host sent.")
+    Clause::new("RMD-81-02", "The motor comes to a standstill."),
+    Clause::new("RMD-81-03", "The motion and its command are kept."),
+    Clause::new("RMD-81-04", "The motor answers with one frame, a copy of the request.")
         .host(VECTORS),
 
-    Clause::new("RMD-88-01", "The host lets the motor run with DATA[0] = 0x88 and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-88-01", "The host lets the motor run with DATA[0] = 0x88 and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
-    Clause::new("RMD-88-02", "After a stop the motor goes on with what it was doing (SPEC-NOTES R7)."),
-    Clause::new("RMD-88-03", "Without a stop nothing changes (SPEC-NOTES R25)."),
-    Clause::new("RMD-88-04", "The motor answers with one frame, the same that the host sent.")
+    Clause::new("RMD-88-02", "After a stop the motor resumes its motion (SPEC-NOTES R7)."),
+    Clause::new("RMD-88-03", "Without a stop 0x88 changes nothing (SPEC-NOTES R25)."),
+    Clause::new("RMD-88-04", "The motor answers with one frame, a copy of the request.")
         .host(VECTORS),
 
-    Clause::new("RMD-9A-01", "The host asks for status 1 with DATA[0] = 0x9A and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-9A-01", "The host requests status 1 with DATA[0] = 0x9A and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-9A-02", "The motor answers with one frame, DATA[0] = 0x9A.")
         .host(VECTORS),
@@ -220,18 +220,18 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-9A-06", "DATA[2], DATA[5] and DATA[6] of the reply are 0.")
         .host(REPLIES),
     Clause::new("RMD-9A-07", "Bit 0 of the error state is low voltage protection: set is active.")
-        .host(&["invalid_error_bits_are_shown_and_mean_nothing"]),
+        .host(&["invalid_error_bits_are_shown_and_ignored"]),
     Clause::new("RMD-9A-08", "Bit 3 of the error state is over temperature protection: set is active.")
-        .host(&["invalid_error_bits_are_shown_and_mean_nothing"]),
-    Clause::new("RMD-9A-09", "The other bits of the error state mean nothing.")
-        .host(&["invalid_error_bits_are_shown_and_mean_nothing"])
+        .host(&["invalid_error_bits_are_shown_and_ignored"]),
+    Clause::new("RMD-9A-09", "The other bits of the error state have no meaning.")
+        .host(&["invalid_error_bits_are_shown_and_ignored"])
         .untested("a bit without meaning can have either value"),
-    Clause::new("RMD-9A-10", "While a protection is active the motor is off, and motion commands are answered and not carried out (SPEC-NOTES R18)."),
+    Clause::new("RMD-9A-10", "While a protection is active the motor is off; motion commands are answered but not carried out (SPEC-NOTES R18)."),
 
-    Clause::new("RMD-9B-01", "The host clears the errors with DATA[0] = 0x9B and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-9B-01", "The host clears the errors with DATA[0] = 0x9B and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-9B-02", "The error state is cleared."),
-    Clause::new("RMD-9B-03", "The motor answers with one frame; DATA[0] is printed as 0x9A, and 0x9B is taken as well (SPEC-NOTES R1).")
+    Clause::new("RMD-9B-03", "The motor answers with one frame; DATA[0] is printed as 0x9A, and 0x9B is accepted as well (SPEC-NOTES R1).")
         .host(&["the_reply_to_clear_errors_may_have_either_code"]),
     Clause::new("RMD-9B-04", "DATA[1] of the reply is the motor temperature, int8, 1 °C a digit.")
         .host(VECTORS),
@@ -242,15 +242,15 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-9B-07", "DATA[2], DATA[5] and DATA[6] of the reply are 0.")
         .host(REPLIES),
     Clause::new("RMD-9B-08", "Bit 0 of the error state is low voltage protection: set is active.")
-        .host(&["invalid_error_bits_are_shown_and_mean_nothing"]),
+        .host(&["invalid_error_bits_are_shown_and_ignored"]),
     Clause::new("RMD-9B-09", "Bit 3 of the error state is over temperature protection: set is active.")
-        .host(&["invalid_error_bits_are_shown_and_mean_nothing"]),
-    Clause::new("RMD-9B-10", "The other bits of the error state mean nothing.")
-        .host(&["invalid_error_bits_are_shown_and_mean_nothing"])
+        .host(&["invalid_error_bits_are_shown_and_ignored"]),
+    Clause::new("RMD-9B-10", "The other bits of the error state have no meaning.")
+        .host(&["invalid_error_bits_are_shown_and_ignored"])
         .untested("a bit without meaning can have either value"),
-    Clause::new("RMD-9B-11", "A flag whose cause lasts cannot be cleared (SPEC-NOTES R10)."),
+    Clause::new("RMD-9B-11", "A flag whose cause is present cannot be cleared (SPEC-NOTES R10)."),
 
-    Clause::new("RMD-9C-01", "The host asks for status 2 with DATA[0] = 0x9C and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-9C-01", "The host requests status 2 with DATA[0] = 0x9C and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-9C-02", "The motor answers with one frame, DATA[0] = 0x9C.")
         .host(VECTORS),
@@ -263,7 +263,7 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-9C-06", "DATA[6] and DATA[7] of the reply are the encoder position, uint16, low byte first, within the encoder's width.")
         .host(VECTORS),
 
-    Clause::new("RMD-9D-01", "The host asks for status 3 with DATA[0] = 0x9D and NULL in every other byte; NULL is sent as 0 and not looked at (SPEC-NOTES R4).")
+    Clause::new("RMD-9D-01", "The host requests status 3 with DATA[0] = 0x9D and NULL in all other bytes; NULL is sent as 0 and ignored (SPEC-NOTES R4).")
         .host(REQUESTS),
     Clause::new("RMD-9D-02", "The motor answers with one frame, DATA[0] = 0x9D.")
         .host(VECTORS),
@@ -277,9 +277,9 @@ pub static CLAUSES: &[Clause] = &[
         .host(REQUESTS),
     Clause::new("RMD-A1-02", "A digit is 16 mA: 2000 digits for 32 A.")
         .host(VECTORS),
-    Clause::new("RMD-A1-03", "The range is ±2000 digits, and a drive holds what is beyond to it (SPEC-NOTES R3).")
+    Clause::new("RMD-A1-03", "The range is ±2000 digits; a drive clamps larger values to it (SPEC-NOTES R3).")
         .host(&["torque_beyond_the_range_of_the_document_is_refused_without_any_limit"])
-        .untested("would put 32 A into a motor whose rating is not known"),
+        .untested("would put 32 A into a motor with unknown rating"),
     Clause::new("RMD-A1-04", "Max Torque Current of the vendor's tool does not limit it.")
         .untested(TOOL),
     Clause::new("RMD-A1-05", "The motor answers with one frame, DATA[0] = 0xA1.")
@@ -299,7 +299,7 @@ pub static CLAUSES: &[Clause] = &[
         .host(VECTORS),
     Clause::new("RMD-A2-03", "Max Torque Current of the vendor's tool limits the torque current.")
         .untested(TOOL),
-    Clause::new("RMD-A2-04", "The acceleration limit holds."),
+    Clause::new("RMD-A2-04", "The acceleration limit applies."),
     Clause::new("RMD-A2-05", "The motor answers with one frame, DATA[0] = 0xA2.")
         .host(VECTORS),
     Clause::new("RMD-A2-06", "DATA[1] of the reply is the motor temperature, int8, 1 °C a digit.")
@@ -315,13 +315,13 @@ pub static CLAUSES: &[Clause] = &[
         .host(REQUESTS),
     Clause::new("RMD-A3-02", "One digit is 0.01°, counted as 0x92 does.")
         .host(VECTORS),
-    Clause::new("RMD-A3-03", "The motor turns the way that the difference between target and present angle says."),
+    Clause::new("RMD-A3-03", "The motor turns in the direction of the difference between target and present angle."),
     Clause::new("RMD-A3-04", "Max Angle of the vendor's tool limits the angle (SPEC-NOTES R27).")
         .untested(TOOL),
     Clause::new("RMD-A3-05", "Max Speed of the vendor's tool limits the speed.")
         .host(&["a_command_without_a_speed_is_refused_while_speed_is_limited"])
         .untested(TOOL),
-    Clause::new("RMD-A3-06", "The acceleration limit holds."),
+    Clause::new("RMD-A3-06", "The acceleration limit applies."),
     Clause::new("RMD-A3-07", "Max Torque Current of the vendor's tool limits the torque current.")
         .untested(TOOL),
     Clause::new("RMD-A3-08", "The motor answers with one frame, DATA[0] = 0xA3.")
@@ -335,15 +335,15 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-A3-12", "DATA[6] and DATA[7] of the reply are the encoder position, uint16, low byte first, within the encoder's width.")
         .host(VECTORS),
 
-    Clause::new("RMD-A4-01", "The host commands a multi-turn position with DATA[0] = 0xA4, NULL in DATA[1], a greatest speed in DATA[2] and DATA[3], uint16, and the angle in DATA[4] to DATA[7], int32, low byte first (SPEC-NOTES R5).")
+    Clause::new("RMD-A4-01", "The host commands a multi-turn position with DATA[0] = 0xA4, NULL in DATA[1], a maximum speed in DATA[2] and DATA[3], uint16, and the angle in DATA[4] to DATA[7], int32, low byte first (SPEC-NOTES R5).")
         .host(&["position_limited_is_laid_out_by_the_first_column"]),
     Clause::new("RMD-A4-02", "One digit of the angle is 0.01°, counted as 0x92 does.")
         .host(VECTORS),
-    Clause::new("RMD-A4-03", "The motor turns the way that the difference between target and present angle says."),
-    Clause::new("RMD-A4-04", "It turns no faster than the greatest speed says, 1 °/s a digit; with 0 it does not turn (SPEC-NOTES R13)."),
+    Clause::new("RMD-A4-03", "The motor turns in the direction of the difference between target and present angle."),
+    Clause::new("RMD-A4-04", "It does not exceed the maximum speed, 1 °/s a digit; with 0 it does not turn (SPEC-NOTES R13)."),
     Clause::new("RMD-A4-05", "Max Angle of the vendor's tool limits the angle (SPEC-NOTES R27).")
         .untested(TOOL),
-    Clause::new("RMD-A4-06", "The acceleration limit holds."),
+    Clause::new("RMD-A4-06", "The acceleration limit applies."),
     Clause::new("RMD-A4-07", "Max Torque Current of the vendor's tool limits the torque current.")
         .untested(TOOL),
     Clause::new("RMD-A4-08", "The motor answers with one frame, DATA[0] = 0xA4.")
@@ -359,17 +359,17 @@ pub static CLAUSES: &[Clause] = &[
 
     Clause::new("RMD-A5-01", "The host commands a single-turn position with DATA[0] = 0xA5, the direction in DATA[1] and the angle in DATA[4] and DATA[5], uint16, low byte first; the other bytes are NULL.")
         .host(REQUESTS),
-    Clause::new("RMD-A5-02", "One digit of the angle is 0.01°, counted as 0x94 does; the range is 0 to 35999, and what is beyond is answered and not carried out (SPEC-NOTES R15).")
+    Clause::new("RMD-A5-02", "One digit of the angle is 0.01°, counted as 0x94 does; the range is 0 to 35999, and a larger angle is answered but not carried out (SPEC-NOTES R15).")
         .host(&["a_single_turn_command_outside_the_range_of_the_document_is_refused"]),
     Clause::new("RMD-A5-03", "With direction 0x00 the motor turns clockwise.")
         .host(VECTORS),
-    Clause::new("RMD-A5-04", "With direction 0x01 the motor turns counterclockwise; any other is answered and not carried out (SPEC-NOTES R15).")
+    Clause::new("RMD-A5-04", "With direction 0x01 the motor turns counterclockwise; any other direction is answered but not carried out (SPEC-NOTES R15).")
         .host(VECTORS),
-    Clause::new("RMD-A5-05", "The same command again starts no further turn (SPEC-NOTES R16)."),
+    Clause::new("RMD-A5-05", "Repeating the command starts no further turn (SPEC-NOTES R16)."),
     Clause::new("RMD-A5-06", "Max Speed of the vendor's tool limits the speed.")
         .host(&["a_command_without_a_speed_is_refused_while_speed_is_limited"])
         .untested(TOOL),
-    Clause::new("RMD-A5-07", "The acceleration limit holds."),
+    Clause::new("RMD-A5-07", "The acceleration limit applies."),
     Clause::new("RMD-A5-08", "Max Torque Current of the vendor's tool limits the torque current.")
         .untested(TOOL),
     Clause::new("RMD-A5-09", "The motor answers with one frame, DATA[0] = 0xA5.")
@@ -383,17 +383,17 @@ pub static CLAUSES: &[Clause] = &[
     Clause::new("RMD-A5-13", "DATA[6] and DATA[7] of the reply are the encoder position, uint16, low byte first, within the encoder's width.")
         .host(VECTORS),
 
-    Clause::new("RMD-A6-01", "The host commands a single-turn position with DATA[0] = 0xA6, the direction in DATA[1], a greatest speed in DATA[2] and DATA[3], uint16, low byte first and the angle in DATA[4] and DATA[5], uint16, low byte first; the other bytes are NULL.")
+    Clause::new("RMD-A6-01", "The host commands a single-turn position with DATA[0] = 0xA6, the direction in DATA[1], a maximum speed in DATA[2] and DATA[3], uint16, low byte first and the angle in DATA[4] and DATA[5], uint16, low byte first; the other bytes are NULL.")
         .host(REQUESTS),
-    Clause::new("RMD-A6-02", "One digit of the angle is 0.01°, counted as 0x94 does; the range is 0 to 35999, and what is beyond is answered and not carried out (SPEC-NOTES R15).")
+    Clause::new("RMD-A6-02", "One digit of the angle is 0.01°, counted as 0x94 does; the range is 0 to 35999, and a larger angle is answered but not carried out (SPEC-NOTES R15).")
         .host(&["a_single_turn_command_outside_the_range_of_the_document_is_refused"]),
     Clause::new("RMD-A6-03", "With direction 0x00 the motor turns clockwise.")
         .host(VECTORS),
-    Clause::new("RMD-A6-04", "With direction 0x01 the motor turns counterclockwise; any other is answered and not carried out (SPEC-NOTES R15).")
+    Clause::new("RMD-A6-04", "With direction 0x01 the motor turns counterclockwise; any other direction is answered but not carried out (SPEC-NOTES R15).")
         .host(VECTORS),
-    Clause::new("RMD-A6-05", "The same command again starts no further turn (SPEC-NOTES R16)."),
-    Clause::new("RMD-A6-06", "It turns no faster than the greatest speed says, 1 °/s a digit."),
-    Clause::new("RMD-A6-07", "The acceleration limit holds."),
+    Clause::new("RMD-A6-05", "Repeating the command starts no further turn (SPEC-NOTES R16)."),
+    Clause::new("RMD-A6-06", "It does not exceed the maximum speed, 1 °/s a digit."),
+    Clause::new("RMD-A6-07", "The acceleration limit applies."),
     Clause::new("RMD-A6-08", "Max Torque Current of the vendor's tool limits the torque current.")
         .untested(TOOL),
     Clause::new("RMD-A6-09", "The motor answers with one frame, DATA[0] = 0xA6.")
@@ -419,8 +419,8 @@ pub static CLAUSES: &[Clause] = &[
         .host(&["four_torques_in_one_frame_reach_their_motors_and_all_answer"]),
     Clause::new("RMD-280-06", "They answer in the order of their IDs, the smallest first.")
         .host(&["four_torques_in_one_frame_reach_their_motors_and_all_answer"]),
-    Clause::new("RMD-280-07", "Each reply is as that to 0xA1.")
+    Clause::new("RMD-280-07", "Each reply has the form of the reply to 0xA1.")
         .host(&["four_torques_in_one_frame_reach_their_motors_and_all_answer"]),
-    Clause::new("RMD-280-08", "Encoders have 12 to 18 bits, and the range of their values with them; of more than 16 bits the upper 16 travel (SPEC-NOTES R6).")
+    Clause::new("RMD-280-08", "Encoders have 12 to 18 bits, which give the range of their values; of more than 16 bits the upper 16 are sent (SPEC-NOTES R6).")
         .host(&["there_are_seven_widths_and_14_is_the_default"]),
 ];

@@ -9,7 +9,7 @@ use super::harness::Harness;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{R4, R8, R9, R19, R20, R26, R31};
 
-/// What a rotor at rest may read apart from one reading to the next, degrees.
+/// Maximum difference between two readings of a rotor at rest, degrees.
 const JITTER: f64 = 0.5;
 
 pub(super) fn cases() -> Vec<Case<Harness>> {
@@ -85,7 +85,7 @@ fn readings() -> Vec<Case<Harness>> {
 fn offset() -> Vec<Case<Harness>> {
     vec![
         case(
-            "a_written_offset_is_in_force",
+            "a_written_offset_applies_at_once",
             &["RMD-91-02", "RMD-91-01", "RMD-91-04", "RMD-91-05", "RMD-91-06", "RMD-2-07"],
             |harness| {
                 let offset = harness.another_offset()?;
@@ -97,7 +97,7 @@ fn offset() -> Vec<Case<Harness>> {
             },
         )
         .needs(&[Need::Rom]),
-        case("null_bytes_of_an_offset_do_not_matter", &["RMD-91-05", "RMD-91-01"], |harness| {
+        case("null_bytes_of_an_offset_are_ignored", &["RMD-91-05", "RMD-91-01"], |harness| {
             let offset = harness.another_offset()?;
             let code = Code::WriteEncoderOffsetRom;
             let sent = filled(WriteEncoderOffsetRom(offset).encode(), code, 0xA5);
@@ -109,7 +109,7 @@ fn offset() -> Vec<Case<Harness>> {
         .reading(R4),
         case("an_offset_beyond_the_encoder_is_cut", &["RMD-91-03"], |harness| {
             if harness.turn() > i32::from(u16::MAX) {
-                return Err(Stop::Skipped("nothing is beyond an encoder of 16 bits".into()));
+                return Err(Stop::Skipped("an encoder of 16 bits accepts every value".into()));
             }
             harness.keep_offset()?;
             let EncoderOffset { offset } =
@@ -119,7 +119,7 @@ fn offset() -> Vec<Case<Harness>> {
         })
         .needs(&[Need::Rom])
         .reading(R19),
-        case("a_written_offset_outlasts_the_power", &["RMD-91-07"], |harness| {
+        case("a_written_offset_is_kept_over_a_power_cycle", &["RMD-91-07"], |harness| {
             let offset = harness.another_offset()?;
             harness.read(WriteEncoderOffsetRom(offset))?;
             harness.power_cycle()?;
@@ -127,7 +127,7 @@ fn offset() -> Vec<Case<Harness>> {
         })
         .needs(&[Need::Rom, Need::PowerCycle])
         .reading(R8),
-        case("a_position_that_is_held_stays_when_the_offset_moves", &["RMD-91-02"], |harness| {
+        case("a_held_position_does_not_move_with_the_offset", &["RMD-91-02"], |harness| {
             harness.gently()?;
             let angle = CentiDegrees(harness.angle_in_reach()?);
             harness.command(SetPositionLimited { max_speed: SpeedLimit(30), angle })?;
@@ -150,7 +150,7 @@ fn zero() -> Vec<Case<Harness>> {
             "a_new_zero_is_the_present_position",
             &["RMD-19-05", "RMD-19-03", "RMD-19-06", "RMD-19-07", "RMD-19-01", "RMD-2-08"],
             |harness| {
-                // Where the motor stands at its zero, the old offset would do as well.
+                // At the zero position the old offset would also fit.
                 let elsewhere = harness.another_offset()?;
                 harness.read(WriteEncoderOffsetRom(elsewhere))?;
                 let raw = harness.keep_offset()?.raw;
@@ -189,14 +189,14 @@ fn zero() -> Vec<Case<Harness>> {
     ]
 }
 
-/// A move to an angle just below zero, which has a sign to carry.
+/// Moves to an angle just below zero, which is negative.
 fn below_0(harness: &mut Harness) -> Result<(), Stop> {
     const NEAR: i64 = 36_000;
     const TARGET: i32 = -1_000;
     let angle = harness.angle()?;
     if angle.abs() > NEAR {
         return Err(Stop::Skipped(format!(
-            "the motor is at {}°: switch it off and on, which makes it forget its turns",
+            "the motor is at {}°: cycle its power to reset the number of turns",
             angle / 100
         )));
     }
@@ -208,7 +208,7 @@ fn below_0(harness: &mut Harness) -> Result<(), Stop> {
 }
 
 impl Harness {
-    /// Values in a turn of the encoder, as they travel.
+    /// Number of values in a turn of the encoder, as in a frame.
     pub(super) fn turn(&self) -> i32 {
         1 << self.options.encoder.bits().min(16)
     }
@@ -221,7 +221,7 @@ impl Harness {
         Ok(self.read(ReadEncoder)?.position)
     }
 
-    /// An offset that is not the present one, nor the present position; remembers the present one.
+    /// An offset other than the present one and the present position. Records the present offset.
     fn another_offset(&mut self) -> Result<EncoderOffset, Stop> {
         let turn = self.turn();
         let Encoder { raw, offset, .. } = self.keep_offset()?;
@@ -246,7 +246,7 @@ fn within_turn(harness: &Harness, values: &[u16]) -> Result<(), Stop> {
     harness.require(within, format!("values of 0 to {} with {bits} bits (--encoder)", turn - 1))
 }
 
-/// Two angles (degrees) that are the same within the turn.
+/// Two angles, in degrees, that are the same within the turn.
 fn near(harness: &Harness, one: f64, other: f64, expected: &str) -> Result<(), Stop> {
     let apart = (one - other + 180.0).rem_euclid(360.0) - 180.0;
     let words = format!("{expected}, {other:.2}° within {JITTER}°; not {one:.2}°");

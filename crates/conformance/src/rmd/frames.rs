@@ -1,4 +1,4 @@
-//! Identifiers, forms and command bytes (chapters 1 and 2), and what every command has in common.
+//! Identifiers, forms and command bytes (chapters 1 and 2), and the common rules of all commands.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Stop as Halt, *};
@@ -8,8 +8,8 @@ use super::harness::Harness;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{R4, R11, R30, R42};
 
-/// Commands that only ask: what tests that one reply comes, that its NULL bytes are 0, that those of
-/// the request do not matter.
+/// Commands that only read. The clauses: one reply is sent; its NULL bytes are 0; NULL bytes of the
+/// request are ignored.
 const QUESTIONS: [(Code, Clauses, Clauses, Clauses); 9] = [
     (Code::ReadPid, &["RMD-30-02", "RMD-2-01"], &["RMD-30-03"], &["RMD-30-01"]),
     (Code::ReadAcceleration, &["RMD-33-02", "RMD-2-04"], &["RMD-33-03"], &["RMD-33-01"]),
@@ -22,10 +22,11 @@ const QUESTIONS: [(Code, Clauses, Clauses, Clauses); 9] = [
     (Code::ReadPhaseCurrents, &["RMD-9D-02", "RMD-2-14"], &["RMD-9D-03"], &["RMD-9D-01"]),
 ];
 
-/// What a request is made of.
+/// Builds a request.
 type Request = fn(&mut Harness) -> Result<[u8; 8], Stop>;
 
-/// Commands whose reply is the request: a request that changes nothing, and what tests the echo.
+/// Commands whose reply is a copy of the request: a request without effect, and the clauses of the
+/// echo.
 const ECHOES: [(Code, Request, Clauses, &[Need]); 6] = [
     (
         Code::WritePidRam,
@@ -61,11 +62,11 @@ const ECHOES: [(Code, Request, Clauses, &[Need]); 6] = [
     ),
 ];
 
-/// What stands in NULL bytes that nobody looks at.
+/// Values of NULL bytes, which must be ignored.
 const STALE: [u8; 2] = [0xA5, 0xFF];
 
 /// Command bytes that neither this document nor a related protocol uses.
-fn nobodys() -> impl Iterator<Item = u8> {
+fn unused_codes() -> impl Iterator<Item = u8> {
     (0x00..=0x0F).chain(0x50..=0x5F).chain(0xD0..=0xFF)
 }
 
@@ -112,17 +113,20 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
             silent(harness, &[0, 33].map(|id| CanFrame::new(MOTOR_BASE + id, status)))
         })
         .reading(R42),
-        case("unknown_command_bytes_are_met_with_silence", &["RMD-2-24"], |harness| {
-            unknown(harness, nobodys().collect())
+        case("unknown_command_bytes_get_no_reply", &["RMD-2-24"], |harness| {
+            unknown(harness, unused_codes().collect())
         })
         .reading(R30),
-        case("command_bytes_of_related_protocols_are_met_with_silence", &["RMD-2-24"], |harness| {
+        case("command_bytes_of_related_protocols_get_no_reply", &["RMD-2-24"], |harness| {
             harness.keep_gains()?;
             harness.keep_acceleration()?;
             harness.may_move();
             let known = |code: &u8| Code::from(*code).info().is_some();
             let ours = (0..=u8::MAX).filter(|code| !known(code));
-            unknown(harness, ours.filter(|code| !nobodys().any(|free| free == *code)).collect())
+            unknown(
+                harness,
+                ours.filter(|code| !unused_codes().any(|free| free == *code)).collect(),
+            )
         })
         .needs(&[Need::Spin, Need::Rom])
         .reading(R30),
@@ -143,7 +147,7 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
                 },
             ));
         }
-        let name = subject("null_bytes_of_a_request_are_not_looked_at", code);
+        let name = subject("null_bytes_of_a_request_are_ignored", code);
         let ignored = case(name, null_request, move |harness| {
             question(harness, code)?;
             let plain = harness.ask(request(code))?;
@@ -185,25 +189,27 @@ pub(super) fn request(code: Code) -> [u8; 8] {
     [code.into(), 0, 0, 0, 0, 0, 0, 0]
 }
 
-/// Clearing errors is only a question while there are none.
+/// 0x9B only reads while there are no errors.
 fn question(harness: &mut Harness, code: Code) -> Result<(), Stop> {
     if code == Code::ClearErrors {
         let errors = harness.read(ReadStatus)?.errors;
         if !errors.is_empty() {
-            return Err(Stop::Skipped(format!("the motor has an error that would go: {errors}")));
+            return Err(Stop::Skipped(format!(
+                "the motor has an error that 0x9B would clear: {errors}"
+            )));
         }
     }
     Ok(())
 }
 
-/// The request with `stale` in the bytes that no value covers.
+/// The request with `stale` in the bytes without a value.
 pub(super) fn filled(mut data: [u8; 8], code: Code, stale: u8) -> [u8; 8] {
     let fields = code.info().map_or(&[][..], |row| row.request);
     nulls(fields).for_each(|byte| data[byte] = stale);
     data
 }
 
-/// Checks the bytes of a reply that no value covers.
+/// Checks the bytes of a reply without a value.
 pub(super) fn null_bytes_are_0(harness: &Harness, code: Code, reply: &[u8; 8]) -> Result<(), Stop> {
     let fields = code.info().map_or(&[][..], |row| row.reply);
     let wrong: Vec<_> = nulls(fields).filter(|byte| reply[*byte] != 0).collect();
@@ -211,7 +217,7 @@ pub(super) fn null_bytes_are_0(harness: &Harness, code: Code, reply: &[u8; 8]) -
     harness.require(wrong.is_empty(), bytes.join(", "))
 }
 
-/// Bytes behind the code that no field covers.
+/// Bytes after the code without a field.
 fn nulls(fields: &'static [Field]) -> impl Iterator<Item = usize> {
     let covered = |byte: usize| {
         fields.iter().any(|field| (field.offset..field.offset + field.len).contains(&(byte as u8)))
@@ -219,15 +225,15 @@ fn nulls(fields: &'static [Field]) -> impl Iterator<Item = usize> {
     (1..8).filter(move |byte| !covered(*byte))
 }
 
-/// Sends what the motor must not answer.
+/// Sends frames that the motor must not answer.
 fn silent(harness: &mut Harness, frames: &[CanFrame]) -> Result<(), Stop> {
     let answers = harness.answers(frames)?;
     harness.require(answers.is_empty(), "silence")?;
     harness.ask(ReadStatus.encode()).map(|_| ())
 }
 
-/// Sends command bytes that the motor must not know, a few at a time: a controller's mailboxes are
-/// few.
+/// Sends command bytes that must be unknown to the motor, a few at a time, because a controller has
+/// few mailboxes.
 fn unknown(harness: &mut Harness, codes: Vec<u8>) -> Result<(), Stop> {
     for codes in codes.chunks(8) {
         let frames = codes.iter().map(|&code| harness.frame([code, 0, 0, 0, 0, 0, 0, 0]));

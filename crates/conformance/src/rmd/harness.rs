@@ -1,4 +1,4 @@
-//! A motor on a CAN bus: what is said to it and what it says.
+//! The harness of a motor on a CAN bus: sends requests, receives and checks replies.
 
 use motorlink::Clock;
 use motorlink::port::CanLink;
@@ -8,52 +8,53 @@ use motorlink_proto::time::{Instant, Micros};
 
 use super::kept::Kept;
 use super::words::{lines, words};
-use crate::case::{Beside, Need, Stop};
+use crate::case::{Differences, Need, Stop};
 use crate::finding::Finding;
 use crate::reading::Reading;
 use crate::world::World;
 
-/// How a motor is tested.
+/// Options of a test.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The motor that is tested.
+    /// The motor under test.
     pub id: MotorId,
     /// The width of its encoder.
     pub encoder: EncoderBits,
-    /// What the user allowed.
+    /// The permissions of the user.
     pub allowed: Vec<Need>,
 }
 
 /// A motor on a bus.
 ///
-/// A motor that answers on the identifiers of another protocol is not spoken to any further.
+/// If the motor answers on the identifiers of another protocol, no more frames are sent to it.
 pub struct Harness {
     bus: Box<dyn CanLink>,
-    /// That of the bus.
+    /// The clock of the bus.
     clock: Clock,
     pub(super) world: Box<dyn World>,
     pub(super) options: Options,
     pub(super) kept: Kept,
-    pub(super) beside: Beside,
-    /// Whether a motor that is off takes motion commands after 0x88 only (SPEC-NOTES R17).
+    pub(super) differences: Differences,
+    /// Whether a motor that is off accepts motion commands only after 0x88 (SPEC-NOTES R17).
     pub(super) needs_run: bool,
-    /// What of another protocol was heard.
+    /// A reply of another protocol, if one was received.
     pub(super) foreign: Option<(Dialect, MotorId)>,
-    /// Whether the motor did not come to rest when it was switched off.
+    /// Whether the motor did not come to rest after it was switched off.
     pub(super) runaway: bool,
-    /// Whether the motor was heard at all.
+    /// Whether any frame of the motor was received.
     pub(super) heard: bool,
     transcript: Vec<(Direction, CanFrame)>,
     sent: Vec<CanFrame>,
     received: Vec<CanFrame>,
 }
 
-/// How long a reply is waited for. The document sets no limit, real motors take 2 ms, and a computer
-/// with other work may notice a reply much later.
+/// Timeout of a reply. The document has no limit; real motors take 2 ms, and a busy computer may
+/// receive a reply much later.
 pub(super) const PATIENCE: Micros = Micros::from_millis(1_000);
-/// Silence for this long means that nothing more comes: what a motor takes, and an adapter's delay.
+/// After silence of this length no more frames are expected: the time of a motor plus the delay of
+/// an adapter.
 pub(super) const SILENCE: Micros = Micros::from_millis(50);
-/// More than this many frames that nobody asked for, one behind the other, is no bus to test on.
+/// A bus with more consecutive frames without a request than this cannot be used for a test.
 const CROWD: usize = 1000;
 
 impl Harness {
@@ -65,7 +66,7 @@ impl Harness {
             world,
             options,
             kept: Kept::default(),
-            beside: Beside::default(),
+            differences: Differences::default(),
             needs_run: false,
             foreign: None,
             runaway: false,
@@ -76,24 +77,23 @@ impl Harness {
         }
     }
 
-    /// The motor that is tested.
+    /// The motor under test.
     pub(super) fn id(&self) -> MotorId {
         self.options.id
     }
 
-    /// A frame to the motor.
+    /// A frame for the motor.
     pub(super) fn frame(&self, data: [u8; 8]) -> CanFrame {
         CanFrame::new(self.id().can_id(), data)
     }
 
-    /// The reply to a request: the first frame that comes from the motor, in its form, with the
-    /// request's code.
+    /// The reply to a request: the first frame of the motor. Checks its form and its code.
     pub(super) fn ask(&mut self, request: [u8; 8]) -> Result<[u8; 8], Stop> {
         let data = self.ask_frame(&self.frame(request))?;
         self.answers_to(request, data)
     }
 
-    /// The same, and that nothing comes behind it.
+    /// Like `ask`, and checks that no second frame follows.
     pub(super) fn ask_once(&mut self, request: [u8; 8]) -> Result<[u8; 8], Stop> {
         let mut replies = self.replies(&[self.frame(request)])?;
         replies.retain(|frame| self.is_own(frame));
@@ -113,13 +113,13 @@ impl Harness {
         Ok(data)
     }
 
-    /// The data of a reply, which has to be a frame of the protocol.
+    /// The data of a reply. Checks that it is a frame of the protocol.
     pub(super) fn in_form(&self, reply: &CanFrame) -> Result<[u8; 8], Stop> {
         let usable = reply.eight_bytes().map(|(_, data)| *data);
         usable.ok_or_else(|| self.failed("a standard data frame of 8 bytes"))
     }
 
-    /// The reply to a frame, whatever its code.
+    /// The reply to a frame, with any code.
     pub(super) fn ask_frame(&mut self, frame: &CanFrame) -> Result<[u8; 8], Stop> {
         self.say(&[*frame])?;
         let until = self.clock.now() + PATIENCE;
@@ -133,17 +133,17 @@ impl Harness {
         self.in_form(&reply)
     }
 
-    /// The reply to a command, as values.
+    /// The decoded reply to a command.
     pub(super) fn read<C: Command>(&mut self, command: C) -> Result<C::Reply, Stop> {
         Ok(C::Reply::decode(&self.ask(command.encode())?))
     }
 
-    /// All that comes of frames which are sent one behind the other, until silence.
+    /// All frames received after `frames` were sent one after the other, until silence.
     pub(super) fn collect(&mut self, frames: &[CanFrame]) -> Result<Vec<CanFrame>, Stop> {
         self.collect_within(SILENCE, frames)
     }
 
-    /// The same of frames that have a reply, whose first one has [`PATIENCE`].
+    /// The same for frames with a reply. The first reply has the timeout [`PATIENCE`].
     pub(super) fn replies(&mut self, frames: &[CanFrame]) -> Result<Vec<CanFrame>, Stop> {
         self.collect_within(PATIENCE, frames)
     }
@@ -165,7 +165,7 @@ impl Harness {
         Ok(self.received.clone())
     }
 
-    /// All that the motor answers to frames.
+    /// All replies of the motor to frames.
     pub(super) fn answers(&mut self, frames: &[CanFrame]) -> Result<Vec<CanFrame>, Stop> {
         let mut frames = self.collect(frames)?;
         frames.retain(|frame| self.is_own(frame));
@@ -181,7 +181,7 @@ impl Harness {
         Ok(())
     }
 
-    /// Ends the run when the user wants it.
+    /// Ends the run if the user interrupts it.
     pub(super) fn go_on(&self) -> Result<(), Stop> {
         match self.world.interrupted() {
             true => Err(Stop::Lost("interrupted".to_owned())),
@@ -199,7 +199,7 @@ impl Harness {
         if held { Ok(()) } else { Err(self.failed(expected)) }
     }
 
-    /// The case has failed in what was said and heard last.
+    /// The failure of the case, with the last sent and received frames.
     pub(super) fn failed(&self, expected: impl Into<String>) -> Stop {
         Stop::Failed(Box::new(Finding {
             sent: lines(&self.sent, Direction::HostToDrive),
@@ -209,12 +209,12 @@ impl Harness {
         }))
     }
 
-    /// Notes what failed as a difference from a reading, and lets the case go on.
+    /// Records a failure as a difference from a reading, so that the case continues.
     pub(super) fn note(&mut self, reading: Reading, result: Result<(), Stop>) -> Result<(), Stop> {
-        self.beside.note(reading, result)
+        self.differences.note(reading, result)
     }
 
-    /// What was said and heard, a line a frame.
+    /// The sent and received frames, one line each.
     pub(super) fn lines(&self) -> Vec<String> {
         let line = |(direction, frame): &(Direction, CanFrame)| {
             let arrow = if *direction == Direction::HostToDrive { '>' } else { '<' };
@@ -223,14 +223,14 @@ impl Harness {
         self.transcript.iter().map(line).collect()
     }
 
-    /// Forgets what was said and heard.
+    /// Clears the sent and received frames.
     pub(super) fn forget(&mut self) {
         self.transcript.clear();
         self.sent.clear();
         self.received.clear();
     }
 
-    /// Waits until the bus is silent; what came was not asked for.
+    /// Waits until the bus is silent. The received frames are not replies.
     pub(super) fn settle(&mut self, span: Micros) -> Result<(), Stop> {
         for _ in 0..CROWD {
             if self.hear(self.clock.now() + span)?.is_none() {
@@ -238,12 +238,11 @@ impl Harness {
             }
         }
         Err(Stop::Lost(
-            "the bus is never silent: a motor can only be tested where nobody else speaks to it"
-                .to_owned(),
+            "the bus is never silent: disconnect other hosts before a motor is tested".to_owned(),
         ))
     }
 
-    /// Sends frames after what is waiting was taken.
+    /// Sends frames after the received ones were taken.
     fn say(&mut self, frames: &[CanFrame]) -> Result<(), Stop> {
         self.settle(Micros(0))?;
         self.sent.clear();
@@ -256,7 +255,7 @@ impl Harness {
         Ok(())
     }
 
-    /// Switches motors off that may hear although they do not answer, or others talk.
+    /// Switches off motors that may receive frames although they do not answer.
     pub(super) fn off_unheard(
         &mut self,
         motors: impl IntoIterator<Item = MotorId>,

@@ -1,9 +1,9 @@
-//! What is found of a motor and restored after a case.
+//! The settings of a motor that are restored after a case.
 
 use motorlink_proto::rmd::{MotorSet, Pid};
 use motorlink_proto::units::DpsPerSecond;
 
-/// What was found and is put back, where a case touched it.
+/// The original settings that a case changed.
 #[derive(Debug, Default)]
 pub(super) struct Kept {
     pub(super) gains: Option<Pid>,

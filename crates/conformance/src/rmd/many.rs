@@ -36,7 +36,7 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
             for reply in &replies {
                 let data = harness.in_form(reply)?;
                 harness.require(data[0] == 0xA1, "replies with DATA[0] = A1")?;
-                // Only this motor's encoder is known.
+                // Only the width of this motor's encoder is known.
                 if harness.is_own(reply) {
                     harness.plausible(&MotionStatus::decode(&data))?;
                 }
@@ -69,7 +69,7 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
             harness.require(answers.is_empty(), "silence")
         })
         .reading(R11),
-        case("a_motor_beyond_4_does_not_hear_them", &["RMD-280-04"], |harness| {
+        case("a_motor_beyond_4_ignores_four_torques", &["RMD-280-04"], |harness| {
             if MotorSet::TORQUE4.contains(harness.id()) {
                 return Err(Stop::Skipped("needs a motor with an ID beyond 4".to_owned()));
             }
@@ -87,7 +87,7 @@ fn frame(torques: [IqCommand; 4]) -> CanFrame {
     CanFrame::new(TORQUE4_ID, SetTorque4(torques).encode())
 }
 
-/// The frame has to reach the motor under test.
+/// Checks that the frame reaches the motor under test.
 fn reach(harness: &Harness) -> Result<(), Stop> {
     if MotorSet::TORQUE4.contains(harness.id()) {
         return Ok(());
@@ -95,8 +95,8 @@ fn reach(harness: &Harness) -> Result<(), Stop> {
     Err(Stop::Skipped("needs one of the motors 1 to 4".to_owned()))
 }
 
-/// The motors that the frame reaches, and what they answer to four times no torque. Each has to be
-/// at rest, and is switched off in the end.
+/// The motors that the frame reaches, and their replies to four torques of 0. Each motor must be at
+/// rest, and is switched off afterwards.
 fn ask_all(harness: &mut Harness) -> Result<(MotorSet, Vec<CanFrame>), Stop> {
     reach(harness)?;
     let status = ReadMotionStatus.encode();

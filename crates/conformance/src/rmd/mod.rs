@@ -1,16 +1,18 @@
 //! Motors that speak the RMD protocol V1.62.
 //!
-//! Nothing may turn the motor unless [`Need::Spin`](crate::Need::Spin) is allowed: neither 0x88 nor a
-//! motion command nor 0x280 is sent, not even with 0, for a motor under current may move. 0x80 and
-//! 0x81 are sent, to a motor that is at rest: one that holds a load without showing current is let go
-//! of. Moves are slow, from a few degrees to a turn, and end switched off.
+//! The motor must not turn unless [`Need::Spin`](crate::Need::Spin) is permitted. Without it, 0x88,
+//! motion commands and 0x280 are not sent, not even with value 0, because a motor under current may
+//! move. 0x80 and 0x81 are sent to a motor at rest. A motor that holds a load without showing
+//! current then releases it. Moves are slow, from a few degrees to a turn, and end with the motor
+//! off.
 //!
-//! Command bytes of related protocols, which a motor of this one must not know, are only sent where
-//! both [`Need::Spin`](crate::Need::Spin) and [`Need::Rom`](crate::Need::Rom) are allowed: firmware
-//! that does know them may move, or write.
+//! Command bytes of related protocols must be unknown to the motor. They are sent only if both
+//! [`Need::Spin`](crate::Need::Spin) and [`Need::Rom`](crate::Need::Rom) are permitted: firmware
+//! that knows them may move, or write its ROM.
 //!
-//! Gains in ROM cannot be read without a power cycle. Where none is at hand, those in RAM are taken
-//! for them: try [`Need::Rom`](crate::Need::Rom) on a motor that was just switched on.
+//! Gains in ROM cannot be read without a power cycle. If power cycling is unavailable, the gains in
+//! RAM are assumed to be the same: use [`Need::Rom`](crate::Need::Rom) on a motor that was just
+//! switched on.
 
 mod case;
 mod clauses;
@@ -36,7 +38,7 @@ use crate::markdown::markdown;
 pub use clauses::CLAUSES;
 pub use harness::{Harness, Options};
 
-/// What a motor is put through: first what leaves it alone, then whether it can be switched off.
+/// The cases of a motor: first those without effect on it, then whether it can be switched off.
 pub fn suite() -> Vec<Case<Harness>> {
     let topics = [
         frames::cases(),
@@ -53,7 +55,7 @@ pub fn suite() -> Vec<Case<Harness>> {
     topics.into_iter().flatten().collect()
 }
 
-/// Every clause and what tests it, as a Markdown table.
+/// Every clause and its tests, as a Markdown table.
 pub fn table() -> String {
     markdown(CLAUSES, suite().iter())
 }

@@ -1,4 +1,4 @@
-//! What all motion commands (0xA1 to 0xA6) have in common: their replies, and the acceleration
+//! The common rules of all motion commands (0xA1 to 0xA6): their replies, and the acceleration
 //! limit.
 
 use motorlink_proto::rmd::*;
@@ -11,7 +11,8 @@ use super::settings::accelerate;
 use crate::case::{Case, Need, Stop};
 use crate::reading::{R4, R39};
 
-/// The command, what tests its reply's code, the reply's values, and the NULL bytes of the request.
+/// The command, and the clauses of its reply's code, of the reply's values, and of the request's
+/// NULL bytes.
 const COMMANDS: [(Code, Clauses, Clauses, Clauses); 6] = [
     (
         Code::SetTorque,
@@ -51,7 +52,7 @@ const COMMANDS: [(Code, Clauses, Clauses, Clauses); 6] = [
     ),
 ];
 
-/// What the acceleration limit holds.
+/// Commands that the acceleration limit applies to.
 const LIMITED: [(Code, Clauses); 5] = [
     (Code::SetSpeed, &["RMD-A2-04", "RMD-34-03"]),
     (Code::SetPosition, &["RMD-A3-06", "RMD-34-03"]),
@@ -78,12 +79,12 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
             harness.plausible(&reply)?;
             same(harness, &reply, &before)
         }));
-        let name = subject("null_bytes_of_a_motion_command_do_not_matter", code);
+        let name = subject("null_bytes_of_a_motion_command_are_ignored", code);
         cases.push(
             case(name, request, move |harness| {
                 harness.gently()?;
                 let start = harness.angle()?;
-                // Little even for a motor that takes them for torque: 0x0101 is 4 A.
+                // The torque is small even for a motor that reads it as torque: 0x0101 is 4 A.
                 let request = filled(ahead(harness, code, 0)?, code, 0x01);
                 harness.ask(request)?;
                 let gone = harness.watch(500, |seen| (seen.angle - start).abs() > 1_500)?;
@@ -93,14 +94,14 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
         );
     }
     for (code, clauses) in LIMITED {
-        let name = subject("the_acceleration_limit_holds", code);
+        let name = subject("the_acceleration_limit_applies", code);
         cases.push(case(name, clauses, move |harness| limited(harness, code)).reading(R39));
     }
     cases.into_iter().map(|case| case.needs(&[Need::Spin])).collect()
 }
 
-/// The command that goes `degrees` further than the motor is; 0 is next to nothing, which for
-/// commands with a direction must not be nothing.
+/// The command that moves the motor by `degrees`. With 0 it moves a minimum, because some commands
+/// with a direction treat 0 as a turn.
 fn ahead(harness: &mut Harness, code: Code, degrees: i32) -> Result<[u8; 8], Stop> {
     let max_speed = SpeedLimit(180);
     let angle = CentiDegrees(harness.angle_in_reach()? + 100 * degrees);
@@ -118,7 +119,7 @@ fn ahead(harness: &mut Harness, code: Code, degrees: i32) -> Result<[u8; 8], Sto
     })
 }
 
-/// Two looks at a motor that is at rest.
+/// Two statuses of a motor at rest.
 fn same(harness: &Harness, one: &MotionStatus, other: &MotionStatus) -> Result<(), Stop> {
     let turned = one.encoder.wrapping_sub(other.encoder) as i16;
     let jitter = harness.turn() / 90;
@@ -129,17 +130,17 @@ fn same(harness: &Harness, one: &MotionStatus, other: &MotionStatus) -> Result<(
         && (apart <= jitter || apart >= harness.turn() - jitter);
     let MotionStatus { temperature, iq, speed, encoder } = other;
     let words = format!(
-        "about {temperature}, {:.1} A, {speed}, encoder {encoder}, as 0x9C had it",
+        "about {temperature}, {:.1} A, {speed}, encoder {encoder}, as in the reply to 0x9C",
         iq.amps()
     );
     harness.require(same, words)
 }
 
-/// Speeds up under a limit, and looks whether it is faster than the limit allows.
+/// Accelerates under a limit. Checks that the speed stays within the limit.
 fn limited(harness: &mut Harness, code: Code) -> Result<(), Stop> {
     /// °/s².
     const LIMIT: i32 = 100;
-    /// ms by which the clock may have begun too late.
+    /// Maximum delay of the clock's start, ms.
     const LATE: u64 = 50;
     harness.ready()?;
     accelerate(harness, LIMIT)?;

@@ -8,21 +8,21 @@ use super::harness::Harness;
 use crate::case::{Case, Need, Stop};
 use crate::reading::{R13, R15, R16, R40};
 
-/// How near a position is reached, 0.01°: friction keeps a loop without integral from the rest.
+/// Tolerance of a position, 0.01°: a loop without integral part stops early because of friction.
 const NEAR: i64 = 200;
-/// How far beyond its way a motor may turn, 0.01°.
+/// Maximum overshoot, 0.01°.
 const BEYOND: i64 = 1_000;
-/// Greatest speed of moves, °/s.
+/// Maximum speed of moves, °/s.
 const SLOW: SpeedLimit = SpeedLimit(90);
-/// Greatest speed of moves that take most of a turn, °/s.
+/// Maximum speed of moves of most of a turn, °/s.
 const LONG: SpeedLimit = SpeedLimit(180);
 const CLOCKWISE: SpinDirection = SpinDirection::Clockwise;
 const COUNTERCLOCKWISE: SpinDirection = SpinDirection::Counterclockwise;
 
-/// A single-turn command of either kind.
+/// Builds a single-turn command.
 type Turn = fn(SpinDirection, TurnCentiDegrees) -> [u8; 8];
 
-/// A multi-turn command of either kind.
+/// Builds a multi-turn command.
 type Move = fn(i32) -> [u8; 8];
 
 const MOVES: [(Code, Move, Clauses, Clauses); 2] = [
@@ -72,11 +72,11 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
     for (code, turn, clauses) in TURNS {
         cases.extend(single_turn(code, turn, clauses));
     }
-    cases.push(case("the_long_way_is_turned_when_it_is_told", &["RMD-A6-04"], |harness| {
+    cases.push(case("a_turn_takes_the_long_way_if_commanded", &["RMD-A6-04"], |harness| {
         let (_, turn, _) = TURNS[1];
         turns(harness, turn, COUNTERCLOCKWISE, 2_000, -34_000)
     }));
-    cases.push(case("the_greatest_speed_of_a_turn_holds", &["RMD-A6-06"], |harness| {
+    cases.push(case("the_maximum_speed_of_a_turn_applies", &["RMD-A6-06"], |harness| {
         harness.gently()?;
         let angle = harness.circle(9_000)?;
         let data =
@@ -104,18 +104,19 @@ fn multi_turn() -> Vec<Case<Harness>> {
             moves(harness, command(start), i64::from(start) + 20_000, -20_000)
         }));
     }
-    cases.push(case("the_greatest_speed_of_a_move_holds", &["RMD-A4-04"], |harness| {
+    cases.push(case("the_maximum_speed_of_a_move_applies", &["RMD-A4-04"], |harness| {
         harness.gently()?;
         let angle = CentiDegrees(harness.angle_in_reach()? + 9_000);
         no_faster(harness, SetPositionLimited { max_speed: SLOW, angle }.encode())
     }));
-    let zero = case("with_a_greatest_speed_of_0_nothing_turns", &["RMD-A4-04"], |harness| {
-        harness.gently()?;
-        let start = harness.angle()?;
-        let angle = CentiDegrees(harness.angle_in_reach()? + 2_000);
-        harness.command(SetPositionLimited { max_speed: SpeedLimit(0), angle })?;
-        stays(harness, start)
-    });
+    let zero =
+        case("with_a_maximum_speed_of_0_the_motor_does_not_turn", &["RMD-A4-04"], |harness| {
+            harness.gently()?;
+            let start = harness.angle()?;
+            let angle = CentiDegrees(harness.angle_in_reach()? + 2_000);
+            harness.command(SetPositionLimited { max_speed: SpeedLimit(0), angle })?;
+            stays(harness, start)
+        });
     cases.push(zero.reading(R13));
     cases
 }
@@ -129,7 +130,7 @@ fn single_turn(code: Code, turn: Turn, clauses: [Clauses; 5]) -> [Case<Harness>;
         case(subject("a_turn_goes_counterclockwise", code), counterclockwise, move |harness| {
             turns(harness, turn, COUNTERCLOCKWISE, -2_000, -2_000)
         }),
-        case(subject("the_same_turn_again_is_none", code), again, move |harness| {
+        case(subject("repeating_a_turn_starts_no_further_turn", code), again, move |harness| {
             harness.gently()?;
             let (start, angle) = (harness.angle()?, harness.circle(1_500)?);
             moves(harness, turn(CLOCKWISE, angle), start, 1_500)?;
@@ -152,7 +153,7 @@ fn single_turn(code: Code, turn: Turn, clauses: [Clauses; 5]) -> [Case<Harness>;
             },
         )
         .reading(R15),
-        case(subject("a_direction_that_is_none_is_not_carried_out", code), other, move |harness| {
+        case(subject("an_unknown_direction_is_not_carried_out", code), other, move |harness| {
             harness.gently()?;
             let start = harness.angle()?;
             let angle = harness.circle(2_000)?;
@@ -163,7 +164,7 @@ fn single_turn(code: Code, turn: Turn, clauses: [Clauses; 5]) -> [Case<Harness>;
     ]
 }
 
-/// A single-turn command to an angle that is `further` (0.01°) turns the motor by `by`.
+/// A single-turn command to an angle `further` (0.01°) away turns the motor by `by`.
 fn turns(
     harness: &mut Harness,
     turn: Turn,
@@ -176,7 +177,7 @@ fn turns(
     moves(harness, turn(way, angle), start, by)
 }
 
-/// The command turns the motor from `start` by `by` (0.01°) and no other way.
+/// Checks that the command turns the motor from `start` by `by` (0.01°), and in this direction.
 fn moves(harness: &mut Harness, command: [u8; 8], start: i64, by: i64) -> Result<(), Stop> {
     harness.ask(command)?;
     let target = start + by;
@@ -192,13 +193,13 @@ fn moves(harness: &mut Harness, command: [u8; 8], start: i64, by: i64) -> Result
     harness.require(reached && !astray, words)
 }
 
-/// The motor does not turn.
+/// Checks that the motor does not turn.
 fn stays(harness: &mut Harness, start: i64) -> Result<(), Stop> {
     let turned = harness.watch(500, |seen| (seen.angle - start).abs() > NEAR)?;
     harness.require(!turned, format!("no movement from {:.1}°", start as f64 / 100.0))
 }
 
-/// A move by 90° is no faster than it may be, and as fast.
+/// Checks that a move by 90° reaches its maximum speed and does not exceed it.
 fn no_faster(harness: &mut Harness, command: [u8; 8]) -> Result<(), Stop> {
     let most = SLOW.0 as i16;
     harness.ask(command)?;
@@ -214,7 +215,7 @@ fn no_faster(harness: &mut Harness, command: [u8; 8]) -> Result<(), Stop> {
 }
 
 impl Harness {
-    /// The single-turn angle `further` (0.01°) clockwise.
+    /// The single-turn angle that is `further` (0.01°) clockwise.
     fn circle(&mut self, further: i32) -> Result<TurnCentiDegrees, Stop> {
         let angle = i32::from(self.read(ReadSingleTurnAngle)?.angle.0) + further;
         Ok(TurnCentiDegrees(angle.rem_euclid(FULL_TURN.into()) as u16))

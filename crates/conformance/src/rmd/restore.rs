@@ -1,4 +1,4 @@
-//! Before and after a case: the motor at rest, and everything as it was found.
+//! Start and end of a case: the motor at rest, and all settings restored.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Stop as Halt, *};
@@ -12,19 +12,19 @@ use crate::finding::Finding;
 use crate::reading::R8;
 use crate::world::Unavailable;
 
-/// A motor this slow (°/s) is at rest.
+/// A motor below this speed (°/s) is at rest.
 const REST: u16 = 5;
-/// A motor with less torque current than this (digits: half an ampere) is at rest.
+/// A motor below this torque current (digits: half an ampere) is at rest.
 const CURRENTLESS: u16 = 31;
-/// A motor that has become faster by this (°/s) does not come to rest.
+/// A motor that accelerated by this speed (°/s) does not come to rest.
 const FASTER: u16 = 30;
-/// How often something is tried that puts back what was found.
+/// Number of attempts to restore a setting.
 const ATTEMPTS: u32 = 3;
-/// How long a motor may take to come to rest, ms.
+/// Timeout until the motor is at rest, ms.
 const COASTING: u64 = 10_000;
-/// What is around a motor changes more slowly than what is on its bus.
+/// The environment of a motor reacts more slowly than the bus.
 const CHANGE: Micros = Micros::from_millis(100);
-/// How long a motor may take until it answers when its power came back, ms.
+/// Timeout of the first answer after power-on, ms.
 const STARTING: u64 = 5_000;
 
 impl Subject for Harness {
@@ -32,12 +32,14 @@ impl Subject for Harness {
         self.go_on()?;
         if let Some((dialect, id)) = self.foreign {
             return Err(Stop::Lost(format!(
-                "motor {id} answers as {dialect} motors do: it does not speak V1.62 and is not driven"
+                "motor {id} answers as {dialect} motors do: it does not use V1.62 and is not commanded"
             )));
         }
         if self.runaway {
             let id = self.id();
-            return Err(Stop::Lost(format!("motor {id} cannot be switched off: it is not driven")));
+            return Err(Stop::Lost(format!(
+                "motor {id} cannot be switched off: it is not commanded"
+            )));
         }
         self.settle(Micros::from_millis(5))?;
         self.at_rest()?;
@@ -46,7 +48,7 @@ impl Subject for Harness {
     }
 
     fn restore(&mut self) -> Result<(), Stop> {
-        self.put_back()
+        self.restore_settings()
     }
 
     fn allows(&self, need: Need) -> bool {
@@ -58,13 +60,13 @@ impl Subject for Harness {
     }
 
     fn differences(&mut self) -> Vec<Finding> {
-        self.beside.take()
+        self.differences.take()
     }
 }
 
 impl Harness {
-    /// Waits until the motor is at rest. One that never is, is not tested: what turns it is not
-    /// this kit's to stop.
+    /// Waits until the motor is at rest. Otherwise it is not tested: the kit does not stop a motion
+    /// that it did not start.
     pub(super) fn at_rest(&mut self) -> Result<(), Stop> {
         let MotionStatus { speed, iq, .. } = match self.comes_to_rest()? {
             Ok(()) => return Ok(()),
@@ -77,12 +79,12 @@ impl Harness {
         )))
     }
 
-    /// Waits until the motor is at rest, or gives what it does instead.
+    /// Waits until the motor is at rest, or returns its status.
     fn comes_to_rest(&mut self) -> Result<Result<(), MotionStatus>, Stop> {
         let begun = self.millis();
         let mut slowest = u16::MAX;
         loop {
-            let status = self.status_of_somebody()?;
+            let status = self.status_if_present()?;
             let (speed, iq) = (status.speed.0.unsigned_abs(), status.iq.0.unsigned_abs());
             if speed <= REST && iq <= CURRENTLESS {
                 return Ok(Ok(()));
@@ -95,14 +97,14 @@ impl Harness {
         }
     }
 
-    /// Status 2, of a motor that may not be there.
-    fn status_of_somebody(&mut self) -> Result<MotionStatus, Stop> {
+    /// Status 2 of a motor that may be absent.
+    fn status_if_present(&mut self) -> Result<MotionStatus, Stop> {
         let status = self.read(ReadMotionStatus);
         if self.heard || self.foreign.is_some() || self.answers_at_all()? {
             return status;
         }
         Err(Stop::Lost(format!(
-            "motor {} does not answer; `motorlink rmd scan` tells who does",
+            "motor {} does not answer; `motorlink rmd scan` lists the motors that answer",
             self.id()
         )))
     }
@@ -112,22 +114,22 @@ impl Harness {
         Ok(replies.iter().any(|frame| self.is_own(frame)))
     }
 
-    /// The gains; remembers them.
+    /// Reads the gains, and records them.
     pub(super) fn keep_gains(&mut self) -> Result<Pid, Stop> {
         let gains = self.read(ReadPid)?;
         self.kept.gains.get_or_insert(gains);
         Ok(gains)
     }
 
-    /// The acceleration limit; remembers it.
+    /// Reads the acceleration limit, and records it.
     pub(super) fn keep_acceleration(&mut self) -> Result<DpsPerSecond, Stop> {
         let acceleration = self.read(ReadAcceleration)?.acceleration;
         self.kept.acceleration.get_or_insert(acceleration);
         Ok(acceleration)
     }
 
-    /// The gains in ROM, as far as they can be known: those that a power-on brings, or without one
-    /// those that are in force. Remembers them.
+    /// Reads the gains in ROM: after a power cycle if possible, otherwise the gains in RAM. Records
+    /// them.
     pub(super) fn keep_rom_gains(&mut self) -> Result<Pid, Stop> {
         self.keep_gains()?;
         if self.options.allowed.contains(&Need::PowerCycle) {
@@ -138,24 +140,24 @@ impl Harness {
         Ok(gains)
     }
 
-    /// What the encoder reads; remembers its offset.
+    /// Reads the encoder, and records its offset.
     pub(super) fn keep_offset(&mut self) -> Result<Encoder, Stop> {
         let encoder = self.read(ReadEncoder)?;
         self.kept.offset.get_or_insert(encoder.offset);
         Ok(encoder)
     }
 
-    /// From here on the motor may turn, and is switched off in the end.
+    /// Records that the motor may turn now. It is switched off at the end.
     pub(super) fn may_move(&mut self) {
         self.kept.moved = true;
     }
 
-    /// These motors may move, too.
+    /// Records that these motors may move, too.
     pub(super) fn may_move_too(&mut self, motors: MotorSet) {
         self.kept.others = self.kept.others.union(motors);
     }
 
-    /// Takes the motor's power away and gives it back.
+    /// Cycles the motor's power.
     pub(super) fn power_cycle(&mut self) -> Result<(), Stop> {
         self.keep_gains()?;
         self.keep_acceleration()?;
@@ -171,16 +173,16 @@ impl Harness {
         Ok(())
     }
 
-    /// Makes a fault condition present, or ends it.
+    /// Starts or ends a fault condition.
     pub(super) fn fault(&mut self, present: bool) -> Result<(), Stop> {
         self.kept.fault = true;
         self.world.fault(present)?;
         self.pause(CHANGE)
     }
 
-    /// Switches off what was moved, ends a fault, writes back what was written. Each is tried
-    /// whatever came of the others.
-    fn put_back(&mut self) -> Result<(), Stop> {
+    /// Switches off the moved motors, ends a fault, and restores settings. Each step runs even if
+    /// another one fails.
+    fn restore_settings(&mut self) -> Result<(), Stop> {
         let kept = std::mem::take(&mut self.kept);
         if self.foreign.is_some() {
             let own = kept.moved.then(|| self.id());
@@ -197,7 +199,7 @@ impl Harness {
         off.and(others).and(fault).and(rom).and(gains).and(acceleration)
     }
 
-    /// Tries a few times: a bus that is bad now and then must not leave a motor changed.
+    /// Tries a few times: an occasional error on the bus must not leave a motor changed.
     fn insist(&mut self, act: impl Fn(&mut Self) -> Result<(), Stop>) -> Result<(), Stop> {
         let mut done = act(self);
         for _ in 1..ATTEMPTS {
@@ -208,11 +210,11 @@ impl Harness {
         done
     }
 
-    /// Off, and then a look whether it is. A motor that goes on is told to stop instead, and is not
-    /// turned again.
+    /// Switches off, and checks it. If the motor keeps turning, sends a stop; it is not turned
+    /// again.
     fn switch_off(&mut self) -> Result<(), Stop> {
-        let told = self.insist(|harness| harness.ask(Off.encode()).map(|_| ()));
-        if told.is_err() {
+        let result = self.insist(|harness| harness.ask(Off.encode()).map(|_| ()));
+        if result.is_err() {
             self.off_unheard([self.id()])?;
         }
         if self.comes_to_rest()?.is_err() {
@@ -221,7 +223,7 @@ impl Harness {
             self.ask(Halt.encode())?;
             return Err(failed);
         }
-        told
+        result
     }
 
     fn switch_others_off(&mut self, motors: MotorSet) -> Result<(), Stop> {
@@ -229,16 +231,16 @@ impl Harness {
             return Ok(());
         }
         let off = motors.map(|motor| CanFrame::new(motor.can_id(), Off.encode()));
-        let told = self.replies(&off.collect::<Vec<_>>());
-        if told.is_err() {
+        let result = self.replies(&off.collect::<Vec<_>>());
+        if result.is_err() {
             self.off_unheard(motors)?;
         }
-        told.map(|_| ())
+        result.map(|_| ())
     }
 
     fn end_fault(&mut self) -> Result<(), Stop> {
         self.world.fault(false).map_err(|Unavailable(why)| {
-            self.failed(format!("the fault to be ended; end it by hand ({why})"))
+            self.failed(format!("the end of the fault; end it by hand ({why})"))
         })?;
         self.pause(CHANGE)?;
         self.read(ClearErrors).map(|_| ())

@@ -19,7 +19,7 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
                 gains_are(harness, gains)
             },
         ),
-        case("gains_in_ram_are_lost_with_the_power", &["RMD-31-03"], |harness| {
+        case("gains_in_ram_are_lost_at_power_off", &["RMD-31-03"], |harness| {
             harness.power_cycle()?;
             let rom = harness.keep_gains()?;
             write(harness, others(rom))?;
@@ -27,7 +27,7 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
             gains_are(harness, rom)
         })
         .needs(&[Need::PowerCycle]),
-        case("gains_in_rom_outlast_the_power", &["RMD-32-02", "RMD-32-01"], |harness| {
+        case("gains_in_rom_are_kept_over_a_power_cycle", &["RMD-32-02", "RMD-32-01"], |harness| {
             let gains = others(harness.keep_rom_gains()?);
             harness.ask(WritePidRom(gains).encode())?;
             harness.power_cycle()?;
@@ -49,7 +49,7 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
             accelerations_are_kept(harness, &[0, -1])
         })
         .reading(R24),
-        case("the_acceleration_is_lost_with_the_power", &["RMD-34-04"], |harness| {
+        case("the_acceleration_is_lost_at_power_off", &["RMD-34-04"], |harness| {
             harness.power_cycle()?;
             let rom = harness.keep_acceleration()?;
             accelerate(harness, rom.0 ^ 0x40)?;
@@ -60,7 +60,7 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
     ]
 }
 
-/// Six different gains, each another than it was.
+/// Six different gains. Each differs from the present one.
 fn others(gains: Pid) -> Pid {
     Pid {
         position_kp: gains.position_kp ^ 1,

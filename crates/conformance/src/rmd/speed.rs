@@ -1,4 +1,4 @@
-//! Speed (0xA2), and what gains act on it.
+//! Speed (0xA2), and the effect of gains.
 
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::Micros;
@@ -26,7 +26,7 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
             },
         ),
         case(
-            "the_multi_turn_angle_grows_as_the_speed_says",
+            "the_multi_turn_angle_grows_with_the_speed",
             &["RMD-92-04", "RMD-92-05", "RMD-9C-05"],
             |harness| {
                 for sign in [1, -1] {
@@ -61,19 +61,20 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
     .collect()
 }
 
-/// Gets the motor to 60 °/s, one way or the other.
+/// Runs the motor at 60 °/s in the direction of `sign`.
 pub(super) fn runs(harness: &mut Harness, sign: i16) -> Result<(), Stop> {
     harness.gently()?;
     harness.command(SetSpeed { speed: CentiDps(100 * i32::from(sign * SPEED)) })?;
     keeps_running(harness, sign)
 }
 
-/// The motor gets to 60 °/s and stays that fast.
+/// Checks that the motor reaches 60 °/s and keeps the speed.
 pub(super) fn keeps_running(harness: &mut Harness, sign: i16) -> Result<(), Stop> {
     let good = |speed: i16| (speed - sign * SPEED).abs() <= 8;
     let reached = harness.watch(4_000, |seen| good(seen.speed))?;
     harness.require(reached, format!("{} °/s within 4 s", sign * SPEED))?;
-    // A look may catch a motor where its cogging holds it; the mean of some is its speed.
+    // A single sample may show a motor that cogging stopped. The mean of several samples is its
+    // speed.
     const LOOKS: i32 = 20;
     let mut sum = 0;
     for _ in 0..LOOKS {

@@ -1,4 +1,4 @@
-//! Moves: slow ones, watched, and ended when they are not what was asked for.
+//! Slow moves. They are monitored, and ended when they differ from the command.
 
 use motorlink_proto::rmd::*;
 use motorlink_proto::time::Micros;
@@ -10,12 +10,12 @@ use crate::reading::R39;
 
 /// Acceleration limit under which cases turn the motor, °/s².
 pub(super) const GENTLE: i32 = 360;
-/// No move of this kit goes beyond this speed, °/s.
+/// Maximum speed of all moves of this kit, °/s.
 const FAST: u16 = 500;
-/// How often a move is looked at.
+/// Interval between two samples of a move.
 const EVERY: Micros = Micros::from_millis(10);
 
-/// What a look at a move has seen.
+/// A sample of a move.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seen {
     /// Torque current, digits.
@@ -24,18 +24,18 @@ pub(super) struct Seen {
     pub speed: i16,
     /// Multi-turn angle, 0.01°.
     pub angle: i64,
-    /// Since the watch began, ms; not less than it really was.
+    /// Time since the start, ms. Never less than the real time.
     pub millis: u64,
 }
 
 impl Harness {
-    /// Limits the acceleration, for the sake of whatever the motor is mounted to.
+    /// Limits the acceleration, to protect the mechanics of the motor.
     pub(super) fn gently(&mut self) -> Result<(), Stop> {
         self.ready()?;
         accelerate(self, GENTLE)
     }
 
-    /// Brings the motor to where it takes motion commands.
+    /// Brings the motor into a state in which it accepts motion commands.
     pub(super) fn ready(&mut self) -> Result<(), Stop> {
         self.may_move();
         if self.needs_run {
@@ -44,7 +44,7 @@ impl Harness {
         Ok(())
     }
 
-    /// A command that may turn the motor; checks its reply.
+    /// Sends a command that may turn the motor, and checks its reply.
     pub(super) fn command<C: Command<Reply = MotionStatus>>(
         &mut self,
         command: C,
@@ -60,7 +60,7 @@ impl Harness {
         Ok(self.read(ReadMultiTurnAngle)?.angle.0)
     }
 
-    /// The multi-turn angle where 32 bits of a position command reach it.
+    /// The multi-turn angle, if a position command with 32 bits can reach it.
     pub(super) fn angle_in_reach(&mut self) -> Result<i32, Stop> {
         const MARGIN: i32 = 100_000;
         let angle = i32::try_from(self.angle()?).unwrap_or(i32::MAX);
@@ -70,9 +70,9 @@ impl Harness {
         Err(Stop::Skipped("the motor has turned beyond what a position command reaches".to_owned()))
     }
 
-    /// Looks at the motor until `done`, at most for `ms`; whether it became so. A motor that turns
-    /// faster than any move of this kit is switched off, and the case is over: its acceleration is not
-    /// limited (SPEC-NOTES R39).
+    /// Samples the motor until `done` or for `ms`. Returns whether `done` became true. A motor that
+    /// exceeds the maximum speed of this kit is switched off, and the case ends: its acceleration
+    /// is not limited (SPEC-NOTES R39).
     pub(super) fn watch(
         &mut self,
         ms: u64,
@@ -100,8 +100,8 @@ impl Harness {
         }
     }
 
-    /// Lets the motor lose the speed that pulses of torque have left it, which on a real line are
-    /// not of one length, and lets what it shows of its speed follow.
+    /// Waits until the motor lost the speed that torque pulses gave it, and until its speed reading
+    /// followed. Pulses have different lengths on a real line.
     pub(super) fn slows_down(&mut self) -> Result<(), Stop> {
         const FOLLOWS: Micros = Micros::from_millis(100);
         const PATIENCE_MS: u64 = 2_000;
@@ -115,7 +115,7 @@ impl Harness {
         Ok(())
     }
 
-    /// Watches until the motor stands.
+    /// Samples until the motor is at a standstill.
     pub(super) fn comes_to_a_stand(&mut self, ms: u64) -> Result<bool, Stop> {
         self.watch(ms, |seen| seen.speed.abs() <= 5)
     }

@@ -8,28 +8,29 @@ use super::harness::Harness;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{R18, R38};
 
-/// What a motor that answers can be: colder and hotter ones do not.
+/// Plausible temperatures: motors at other temperatures do not answer.
 const TEMPERATURES: std::ops::RangeInclusive<i8> = -40..=127;
-/// What its supply can be, 0.1 V.
+/// Plausible supply voltages, 0.1 V.
 const VOLTAGES: std::ops::RangeInclusive<u16> = 50..=1000;
-/// What the supply may change from one reading to the next, 0.1 V.
+/// Maximum change of the supply between two readings, 0.1 V.
 const RIPPLE: u16 = 10;
-/// Currents of the three phases sum to 0 within this and a tenth of them, 1/64 A.
+/// Tolerance of the sum of the three phase currents, 1/64 A. A tenth of the currents is added.
 const SENSING: i32 = 32;
 
 pub(super) fn cases() -> Vec<Case<Harness>> {
     let mut cases = vec![
-        case("temperature_and_voltage_can_be", &["RMD-9A-03", "RMD-9A-04"], |harness| {
+        case("temperature_and_voltage_are_plausible", &["RMD-9A-03", "RMD-9A-04"], |harness| {
             let status = harness.read(ReadStatus)?;
             status_1_can_be(harness, status.temperature, status.voltage)
         }),
         case(
-            "the_reply_to_clear_is_that_to_status_1",
+            "the_reply_to_clear_errors_has_the_form_of_status_1",
             &["RMD-9B-04", "RMD-9B-05", "RMD-9B-06"],
             |harness| {
                 let before = harness.read(ReadStatus)?;
                 if !before.errors.is_empty() {
-                    let why = format!("the motor has an error that would go: {}", before.errors);
+                    let why =
+                        format!("the motor has an error that 0x9B would clear: {}", before.errors);
                     return Err(Stop::Skipped(why));
                 }
                 let status = harness.read(ClearErrors)?;
@@ -63,25 +64,26 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
 fn errors() -> Vec<Case<Harness>> {
     vec![
         case(
-            "a_fault_is_told_in_the_error_state",
+            "a_fault_is_shown_in_the_error_state",
             &["RMD-9A-05", "RMD-9A-07", "RMD-9A-08"],
             |harness| {
                 harness.fault(true)?;
                 let status = harness.read(ReadStatus)?;
-                let told = told(status.errors);
-                harness.require(told, "bit 0 (low voltage) or bit 3 (over temperature) in DATA[7]")
+                let flagged = is_set(status.errors);
+                harness
+                    .require(flagged, "bit 0 (low voltage) or bit 3 (over temperature) in DATA[7]")
             },
         )
         .needs(&[Need::Fault]),
         case(
-            "an_error_stays_while_its_cause_lasts",
+            "an_error_stays_while_its_cause_is_present",
             &["RMD-9B-11", "RMD-9B-06", "RMD-9B-08", "RMD-9B-09"],
             |harness| {
                 harness.fault(true)?;
                 let cleared = harness.read(ClearErrors)?.errors;
-                harness.require(told(cleared), "the flag still set, in the reply to 0x9B")?;
+                harness.require(is_set(cleared), "the flag still set, in the reply to 0x9B")?;
                 let after = harness.read(ReadStatus)?.errors;
-                harness.require(told(after), "the flag still set, in the reply to 0x9A")
+                harness.require(is_set(after), "the flag still set, in the reply to 0x9A")
             },
         )
         .needs(&[Need::Fault]),
@@ -93,9 +95,9 @@ fn errors() -> Vec<Case<Harness>> {
                 harness.read(ReadStatus)?;
                 harness.fault(false)?;
                 let cleared = harness.read(ClearErrors)?.errors;
-                harness.require(!told(cleared), "no flag, in the reply to 0x9B")?;
+                harness.require(!is_set(cleared), "no flag, in the reply to 0x9B")?;
                 let after = harness.read(ReadStatus)?.errors;
-                harness.require(!told(after), "no flag, in the reply to 0x9A")
+                harness.require(!is_set(after), "no flag, in the reply to 0x9A")
             },
         )
         .needs(&[Need::Fault]),
@@ -111,13 +113,12 @@ fn errors() -> Vec<Case<Harness>> {
     ]
 }
 
-/// Whether a flag that has a meaning is set. Which of the two it is depends on the fault that the
-/// user can cause.
-fn told(errors: Errors) -> bool {
+/// Whether a flag with a meaning is set. The fault that the user can cause determines which one.
+fn is_set(errors: Errors) -> bool {
     !errors.is_empty()
 }
 
-/// Phase currents, 1/64 A, that sum to zero.
+/// Phase currents, 1/64 A. Checks that their sum is about 0.
 pub(super) fn phases(harness: &mut Harness) -> Result<[i32; 3], Stop> {
     let PhaseCurrents { phase_a, phase_b, phase_c } = harness.read(ReadPhaseCurrents)?;
     let currents = [phase_a, phase_b, phase_c].map(|current| i32::from(current.0));
@@ -143,7 +144,7 @@ fn temperature_can_be(harness: &Harness, temperature: Celsius) -> Result<(), Sto
 }
 
 impl Harness {
-    /// A reply to 0x9C or to a motion command has values that can be.
+    /// Checks that a reply to 0x9C or to a motion command has plausible values.
     pub(super) fn plausible(&self, status: &MotionStatus) -> Result<(), Stop> {
         const MOST: u16 = 2048;
         let MotionStatus { temperature, iq, encoder, .. } = *status;

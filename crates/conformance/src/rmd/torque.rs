@@ -1,8 +1,8 @@
 //! Torque current (0xA1).
 //!
-//! Two things that the document says are not tested on a motor. That 2000 digits of a command are
-//! 32 A and 2048 of feedback 33 A makes 0.7 %, less than an unloaded motor's current can be read to.
-//! And what is beyond ±2000 would put 32 A into a motor whose rating nobody told.
+//! Two demands of the document are not tested. The scales of command (2000 digits for 32 A) and
+//! feedback (2048 digits for 33 A) differ by 0.7 %, less than the noise of an unloaded motor's
+//! current. A command beyond ±2000 would put 32 A into a motor with unknown rating.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
@@ -15,9 +15,9 @@ use super::status::phases;
 use crate::case::{Case, Need, Stop};
 use crate::reading::R38;
 
-/// One ampere of torque current, digits of a command: next to nothing for motors of this family.
+/// One ampere of torque current, in digits of a command. This is small for motors of this family.
 pub(super) const AMPERE: i16 = 62;
-/// The most that is tried to get a motor off its friction, digits.
+/// Maximum torque current to overcome friction, digits.
 const MOST: i16 = 2 * AMPERE;
 
 pub(super) fn cases() -> Vec<Case<Harness>> {
@@ -37,14 +37,14 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
             torque_is_an_ampere(harness, amps)
         }),
         case("phase_currents_have_64_digits_an_ampere", &["RMD-9D-05", "RMD-9D-04"], |harness| {
-            // Where the rotor stands each phase may happen to have no current.
+            // At some positions of the rotor a phase has no current.
             for _ in 0..4 {
                 harness.gently()?;
                 let angle = CentiDegrees(harness.angle_in_reach()? + 300);
                 harness.command(SetPositionLimited { max_speed: SpeedLimit(30), angle })?;
                 harness.watch(300, |_| false)?;
                 let amps = pulses(harness, one, amplitude)?;
-                // Relatives name the amplitude or the effective value of the same current.
+                // Related drives show the amplitude or the effective value of the same current.
                 let words = format!("phase currents of about 1 A under 1 A, not {amps:.2} A");
                 harness.require((0.6..1.6).contains(&amps), words)?;
             }
@@ -57,12 +57,12 @@ pub(super) fn cases() -> Vec<Case<Harness>> {
     .collect()
 }
 
-/// The request with this torque for the motor under test.
+/// The request with this torque current for the motor under test.
 fn one(harness: &Harness, torque: i16) -> CanFrame {
     harness.frame(SetTorque { iq: IqCommand(torque) }.encode())
 }
 
-/// Raises the torque until the motor turns; by how much it turned, 0.01°.
+/// Raises the torque until the motor turns. Returns the movement, 0.01°.
 fn break_away(harness: &mut Harness, sign: i16) -> Result<i64, Stop> {
     harness.ready()?;
     let start = harness.angle()?;
@@ -75,8 +75,9 @@ fn break_away(harness: &mut Harness, sign: i16) -> Result<i64, Stop> {
             turned.abs() > 100
         })?;
         if turns {
-            let told = digits < 10 || iq * sign > 0;
-            harness.require(told, format!("torque current with the sign of {}", sign * digits))?;
+            let agrees = digits < 10 || iq * sign > 0;
+            harness
+                .require(agrees, format!("torque current with the sign of {}", sign * digits))?;
             harness.ask(Off.encode())?;
             harness.comes_to_a_stand(5_000)?;
             return Ok(turned);
@@ -89,8 +90,8 @@ fn break_away(harness: &mut Harness, sign: i16) -> Result<i64, Stop> {
     Err(Stop::Skipped("the motor does not turn under 2 A: its load holds it".to_owned()))
 }
 
-/// Torque of an ampere this way and that way, so shortly that the motor hardly turns; the mean of
-/// what `look` gives meanwhile for one or the other sign.
+/// Applies a torque of an ampere in alternating directions, for so short a time that the motor
+/// hardly turns. Returns the mean of the samples for each sign.
 pub(super) fn pulses(
     harness: &mut Harness,
     request: impl Fn(&Harness, i16) -> CanFrame,
@@ -99,7 +100,7 @@ pub(super) fn pulses(
     const PULSES: i16 = 10;
     const SETTLES: Micros = Micros::from_millis(5);
     harness.ready()?;
-    // A motor that does not answer this is not left under torque for as long as that takes.
+    // If the motor does not answer this sample, it must not remain under torque during the timeout.
     look(harness, 1)?;
     let mut sum = 0.0;
     for sign in (0..PULSES).map(|n| if n % 2 == 0 { 1 } else { -1 }) {
@@ -113,7 +114,7 @@ pub(super) fn pulses(
     Ok(sum / f64::from(PULSES))
 }
 
-/// Torque current along a sign, A.
+/// Torque current in the direction of `sign`, A.
 pub(super) fn torque(harness: &mut Harness, sign: i16) -> Result<f64, Stop> {
     Ok(f64::from(sign) * harness.read(ReadMotionStatus)?.iq.amps())
 }

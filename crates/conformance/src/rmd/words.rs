@@ -1,4 +1,4 @@
-//! Frames as people read them.
+//! Frames as text.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Direction, describe};
@@ -17,7 +17,7 @@ pub(super) fn words(frame: &CanFrame, direction: Direction) -> String {
     format!("{text}  {}", describe(*frame, direction))
 }
 
-/// Some of several frames, the last ones, a line each.
+/// The last ones of several frames, one line each.
 pub(super) fn lines(frames: &[CanFrame], direction: Direction) -> String {
     const MOST: usize = 8;
     let shown = &frames[frames.len().saturating_sub(MOST)..];

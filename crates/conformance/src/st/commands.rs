@@ -84,7 +84,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     cases
 }
 
-/// Every id that table 4 lacks, but those that would start something in a drive that knows them.
+/// Every id outside table 4, except those that would start something in a drive that knows them.
 fn unknown(harness: &mut Harness, profile: Profile) -> Result<(), Stop> {
     for id in 0..=255 {
         let known = match Command::from(id) {
@@ -100,7 +100,7 @@ fn unknown(harness: &mut Harness, profile: Profile) -> Result<(), Stop> {
     Ok(())
 }
 
-/// The command has no effect on a motor at rest without a fault, and succeeds.
+/// Checks that the command succeeds and has no effect on a motor at rest without a fault.
 fn at_rest(harness: &mut Harness, command: Command) -> Result<(), Stop> {
     if command == Command::IqdrefClear {
         harness.keep_setpoints()?;
@@ -123,7 +123,7 @@ fn clear_references(harness: &mut Harness) -> Result<(), Stop> {
     harness.require(now == default, format!("ACK {default} s16A, the default"))
 }
 
-/// A PFC command without PFC is refused; with a PFC that is off it does nothing.
+/// A PFC command is refused without PFC. With a PFC that is off it has no effect.
 fn pfc_command(harness: &mut Harness, command: Command) -> Result<(), Stop> {
     if !harness.has(Feature::Pfc)? {
         return harness.refused(&Request::ExecuteCommand(command), ErrorCode::WrongCmd);
@@ -134,11 +134,11 @@ fn pfc_command(harness: &mut Harness, command: Command) -> Result<(), Stop> {
     harness.require(enabled == 0, "ACK 0: the PFC is off")
 }
 
-/// A drive may have the registers of a PFC and none configured (SPEC-NOTES S50).
+/// A drive may have the registers of a PFC but no configured PFC (SPEC-NOTES S50).
 fn succeeds(harness: &mut Harness, command: Command) -> Result<(), Stop> {
     let bytes = harness.encode(&Request::ExecuteCommand(command));
     let reply = harness.exchange(&bytes)?;
-    let expected = "f0 00 f0  ACK, for the registers of a PFC are there";
+    let expected = "f0 00 f0  ACK, because the drive has the registers of a PFC";
     harness.require(!reply.is_nack(ErrorCode::WrongCmd), expected).read_as(S50)?;
     harness.require(reply.header == HEADER_ACK && reply.payload.is_empty(), expected)
 }
@@ -146,7 +146,7 @@ fn succeeds(harness: &mut Harness, command: Command) -> Result<(), Stop> {
 fn off_or_skip(harness: &mut Harness) -> Result<(), Stop> {
     match harness.value(RegisterId::PFC_ENABLED)? {
         0 => Ok(()),
-        _ => Err(Stop::Skipped("the PFC is enabled, and is left so".to_owned())),
+        _ => Err(Stop::Skipped("the PFC is enabled, and remains enabled".to_owned())),
     }
 }
 
@@ -158,7 +158,7 @@ fn pfc_enable(harness: &mut Harness) -> Result<(), Stop> {
     succeeds(harness, Command::PfcEnable)?;
     harness.undo.push(Undo::Pfc);
     let enabled = harness.value(RegisterId::PFC_ENABLED)?;
-    // Once more: it is started already, and nothing happens.
+    // A second enable has no effect.
     let again = harness.encode(&Request::ExecuteCommand(Command::PfcEnable));
     let again = harness.exchange(&again)?;
     let still = harness.value(RegisterId::PFC_ENABLED)?;

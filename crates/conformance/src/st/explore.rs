@@ -1,4 +1,4 @@
-//! What is found out about a drive while it is tested: how many motors, which features.
+//! Finds the motors and the features of a drive during the test.
 
 use std::ops::RangeInclusive;
 
@@ -10,11 +10,11 @@ use motorlink_proto::st::{
 use super::harness::{Harness, frame};
 use crate::case::Stop;
 
-/// Greatest speed of a drive without MAX_APP_SPEED, rpm.
+/// Maximum speed for a drive without MAX_APP_SPEED, rpm.
 const MODERATE: i32 = 2_000;
 
 impl Harness {
-    /// How many motors the drive has: the last number before the first that it refuses.
+    /// The number of motors: the last number before the first refused one.
     pub(super) fn motors(&mut self) -> Result<u8, Stop> {
         if let Some(motors) = self.found.motors {
             return Ok(motors);
@@ -32,7 +32,7 @@ impl Harness {
         Ok(motors)
     }
 
-    /// A motor number that the drive has to refuse; a drive with seven motors has none.
+    /// A motor number that the drive must refuse. Skips the case if the drive has seven motors.
     pub(super) fn missing_motor(&mut self) -> Result<u8, Stop> {
         match self.motors()? {
             MotorNumber::MAX => Err(Stop::Skipped("the drive has seven motors".to_owned())),
@@ -40,7 +40,7 @@ impl Harness {
         }
     }
 
-    /// A motor beside the one under test.
+    /// A motor other than the one under test.
     pub(super) fn other_motor(&mut self) -> Result<u8, Stop> {
         let tested = self.options.motor.number();
         match self.motors()? {
@@ -49,8 +49,8 @@ impl Harness {
         }
     }
 
-    /// Whether the drive is built with a feature: whether it lets any register of it be read. One
-    /// whose registers cannot be read counts as missing.
+    /// Whether the drive is built with a feature: whether one of its registers can be read. A
+    /// feature without a readable register counts as missing.
     pub(super) fn has(&mut self, feature: Feature) -> Result<bool, Stop> {
         if let Some((_, there)) = self.found.features.iter().find(|(known, _)| *known == feature) {
             return Ok(*there);
@@ -69,8 +69,8 @@ impl Harness {
         Ok(there)
     }
 
-    /// Speeds that the motor can have, rpm, without their sign: those that the application says, or
-    /// moderate ones.
+    /// Possible speeds of the motor, rpm, without sign: the range of the application, or moderate
+    /// speeds.
     pub(super) fn speeds(&mut self) -> Result<RangeInclusive<i32>, Stop> {
         if let Some(speeds) = &self.found.speeds {
             return Ok(speeds.clone());
@@ -107,13 +107,13 @@ impl Harness {
         }
     }
 
-    /// Whether a drive that has the register's feature lets it be read.
+    /// Whether a drive with the register's feature allows reads of the register.
     pub(super) fn readable(&self, register: RegisterId) -> bool {
         read_size(register, self.profile()).is_some()
     }
 }
 
-/// The size of a register in a reply of a drive that has its feature; `None` where it refuses.
+/// The size of a register in a reply of a drive with its feature; `None` if it refuses.
 pub(super) fn read_size(register: RegisterId, profile: Profile) -> Option<u8> {
     let shape = register.shape()?;
     shape.read_size(profile, Features::NONE.with(shape.feature))

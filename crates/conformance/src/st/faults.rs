@@ -1,5 +1,5 @@
-//! Cases of 4.6 and of FLAGS with a fault that somebody causes. That a drive is in fault is known from
-//! STATUS and FLAGS, whose values the document does not list (SPEC-NOTES S14).
+//! Cases of 4.6 and of FLAGS with a fault that the user causes. STATUS and FLAGS show the fault;
+//! the document does not list their values (SPEC-NOTES S14).
 
 use motorlink_proto::st::{Command, Flags, Profile, RegisterId, Status};
 use motorlink_proto::time::Micros;
@@ -9,14 +9,14 @@ use super::restore::faulty;
 use crate::case::{Case, Need, Stop};
 use crate::reading::S14;
 
-/// How long a drive may take to see a fault, or that it is gone.
+/// Timeout until a drive detects a fault, or its end.
 const SEEN: Micros = Micros::from_millis(5_000);
-/// How long it is watched that a command has no effect.
+/// Duration of the check that a command has no effect.
 const WATCH: Micros = Micros::from_millis(100);
 
 pub(super) fn cases(_profile: Profile) -> Vec<Case<Harness>> {
     vec![
-        // First what ends every other.
+        // The first case acknowledges faults, which every other case needs.
         Case::new(
             "a_fault_that_is_over_is_acknowledged",
             &["ST-4.6-21", "ST-4.6-23", "ST-4.4-20"],
@@ -25,7 +25,7 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Harness>> {
                 harness.execute(Command::FaultAck)?;
                 let idle = harness.found.idle;
                 harness.wait_for(SEEN, |status| status == idle)?;
-                harness.require_idle("for the fault is acknowledged")?;
+                harness.require_idle("because the fault is acknowledged")?;
                 let flags = flags(harness)?;
                 harness.require(flags.0 == 0, "ACK 0: no faults")
             },
@@ -65,28 +65,28 @@ fn flags(harness: &mut Harness) -> Result<Flags, Stop> {
     Ok(Flags(harness.value(RegisterId::FLAGS)? as u32))
 }
 
-/// A fault whose cause is there.
+/// Causes a fault.
 fn present(harness: &mut Harness) -> Result<(), Stop> {
     harness.fault()?;
     let status = harness.wait_for(SEEN, |status| status == Status::FaultNow)?;
-    let told = status == Status::FaultNow;
-    harness.require_read(S14, told, "ACK 10: FAULT_NOW, for a fault was caused")
+    let is_fault = status == Status::FaultNow;
+    harness.require_read(S14, is_fault, "ACK 10: FAULT_NOW, because a fault was caused")
 }
 
-/// A fault whose cause is gone.
+/// Causes a fault, and ends its cause.
 fn over(harness: &mut Harness) -> Result<(), Stop> {
     present(harness)?;
     ends(harness)
 }
 
-/// The cause of the fault goes away.
+/// Ends the cause of the fault.
 fn ends(harness: &mut Harness) -> Result<(), Stop> {
     harness.world.fault(false)?;
     let status = harness.wait_for(SEEN, |status| status == Status::FaultOver)?;
     harness.require_read(
         S14,
         status == Status::FaultOver,
-        "ACK 11: FAULT_OVER, for its cause is gone",
+        "ACK 11: FAULT_OVER, because its cause is gone",
     )
 }
 
@@ -114,7 +114,7 @@ fn stays_in_fault(harness: &mut Harness, command: Command) -> Result<(), Stop> {
     harness.execute(command)?;
     harness.silence(WATCH)?;
     let measured = harness.value(RegisterId::SPEED_MEAS)?;
-    harness.require(measured.abs() <= 30, "ACK 0 rpm, for a motor in fault does not start")?;
+    harness.require(measured.abs() <= 30, "ACK 0 rpm, because a motor in fault does not start")?;
     let status = harness.status()?;
     let held = faulty(status) && status == before;
     harness.require(held, format!("ACK: {before}, as before"))

@@ -11,14 +11,14 @@ use super::harness::{Harness, frame};
 use crate::case::{Case, Stop};
 use crate::reading::{S1, S10, S47};
 
-/// How long it is watched that nothing comes.
+/// Duration of the check that no bytes come.
 const WATCH: Micros = Micros::from_millis(100);
-/// A register that keeps whatever it is given and exists in every drive.
+/// A register that stores every value and exists in every drive.
 const KEEPER: RegisterId = RegisterId::SPEED_KD;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     let mut cases = vec![
-        Case::new("nothing_comes_unasked", &["ST-2-01"], |harness: &mut Harness| {
+        Case::new("nothing_is_sent_without_a_command", &["ST-2-01"], |harness: &mut Harness| {
             harness.silence(WATCH)
         }),
         Case::new(
@@ -40,16 +40,16 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
             "an_error_reply_has_one_error_code",
             &["ST-4.3-04", "ST-4.3-05", "ST-4.3-02"],
             |harness: &mut Harness| {
-                // In form is what every reply is checked for; this is one on purpose.
+                // Every reply is checked for its form. This one is a NACK on purpose.
                 harness.refused(&Request::GetRegister(RegisterId(0xEE)), ErrorCode::GetWriteOnly)
             },
         ),
         Case::new(
-            "payloads_of_every_length_are_taken",
+            "payloads_of_every_length_are_accepted",
             &["ST-3-05", "ST-3.3-02", "ST-3.3-03"],
             move |harness: &mut Harness| lengths(harness, profile),
         ),
-        Case::new("checksums_that_carry_are_taken", &["ST-3.3-04", "ST-4.1-06"], carries),
+        Case::new("checksums_with_a_carry_are_accepted", &["ST-3.3-04", "ST-4.1-06"], carries),
         Case::new(
             "a_wrong_checksum_is_refused",
             &["ST-4.1-07", "ST-4.1-06", "ST-4.3-13"],
@@ -74,7 +74,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
         )
         .reading(S47),
         Case::new(
-            "acknowledges_are_no_commands",
+            "acknowledges_are_not_commands",
             &["ST-3.1-14", "ST-4.1-01"],
             acknowledges_as_commands,
         )
@@ -99,7 +99,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
                 format!("an_unknown_frame_code_is_refused[{code:#04x}]"),
                 &["ST-4.1-16", "ST-3.1-16", "ST-4.3-06", "ST-3-02"],
                 move |harness: &mut Harness| {
-                    // A drive of the other profile may know it.
+                    // A drive of the other profile may know the code.
                     harness.keep_setpoints()?;
                     let bytes = harness.frame(code, &[0xEE]);
                     harness.refused_bytes(&bytes, ErrorCode::BadFrameId)
@@ -133,7 +133,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     cases
 }
 
-/// The codes of table 1 with a layout in the document.
+/// The codes of table 1 whose layout is in the document.
 const KNOWN: [(FrameCode, &[&str]); 9] = [
     (FrameCode::SetReg, &["ST-3.1-01", "ST-4.4-01", "ST-4.4-02", "ST-4.1-17"]),
     (FrameCode::GetReg, &["ST-3.1-02", "ST-4.5-01", "ST-4.5-02", "ST-4.1-17"]),
@@ -146,7 +146,7 @@ const KNOWN: [(FrameCode, &[&str]); 9] = [
     (FrameCode::GetFwVersion, &["ST-3.1-09", "ST-4.12-01", "ST-4.12-02"]),
 ];
 
-/// A message of this code that the drive can carry out.
+/// A message with this code that the drive can carry out.
 fn known(harness: &mut Harness, code: FrameCode) -> Result<(), Stop> {
     let payload = match code {
         FrameCode::SetReg => [&[KEEPER.0], &*harness.keep(KEEPER)?].concat(),
@@ -175,7 +175,7 @@ fn once(harness: &mut Harness) -> Result<(), Stop> {
     harness.silence(WATCH)
 }
 
-/// Replies long and short whose sums carry or not; `reply` refuses a wrong checksum.
+/// Long and short replies, with and without a carry in the sum. `reply` checks the checksum.
 fn reply_checksums(harness: &mut Harness) -> Result<(), Stop> {
     harness.acknowledged(&Request::GetBoardInfo)?;
     harness.acknowledged(&Request::GetFirmwareVersion)?;
@@ -198,7 +198,7 @@ fn motor_bits(harness: &mut Harness) -> Result<(), Stop> {
     Ok(())
 }
 
-/// A value that is longer than its register is cut (4.4), so a write takes any length.
+/// A value longer than its register is cut (4.4), so a write can have any length.
 fn long_write(harness: &Harness, value: &[u8], length: usize, filler: u8) -> Vec<u8> {
     let mut payload = vec![KEEPER.0];
     payload.extend(value);
@@ -206,7 +206,7 @@ fn long_write(harness: &Harness, value: &[u8], length: usize, filler: u8) -> Vec
     harness.frame(FrameCode::SetReg.number(), &payload)
 }
 
-/// The longest payload that the line carries within the reception timeout.
+/// The longest payload that the line transmits within the reception timeout.
 fn longest(harness: &Harness, profile: Profile) -> usize {
     let most = MAX_PAYLOAD - usize::from(profile == Profile::Mcsdk54);
     most.min(harness.in_time().saturating_sub(OVERHEAD))
@@ -229,8 +229,8 @@ fn lengths(harness: &mut Harness, profile: Profile) -> Result<(), Stop> {
     Ok(())
 }
 
-/// With 256 fillers the sum takes every low byte and many high bytes: those whose halves add up to
-/// more than 255 are among them.
+/// With 256 fillers the sum has every low byte and many high bytes, including those whose sum has a
+/// carry.
 fn carries(harness: &mut Harness) -> Result<(), Stop> {
     let value = harness.keep(KEEPER)?;
     let longest = longest(harness, harness.profile()).min(24);
@@ -254,7 +254,7 @@ fn wrong_checksums(harness: &mut Harness) -> Result<(), Stop> {
         damage(&mut bytes, 1 << bit);
         harness.refused_bytes(&bytes, ErrorCode::BadCrc)?;
     }
-    // The low byte alone, without the high byte added to it, is wrong where the sum carries.
+    // The low byte alone, without the high byte, is wrong if the sum has a carry.
     let mut bytes = harness.frame(FrameCode::GetReg.number(), &[RegisterId::STATUS.0, 0xFF, 0xFF]);
     let last = bytes.len() - 1;
     bytes[last] = bytes[..last].iter().fold(0u8, |sum, &byte| sum.wrapping_add(byte));
@@ -272,7 +272,7 @@ fn not_processed(harness: &mut Harness) -> Result<(), Stop> {
 }
 
 fn acknowledges_as_commands(harness: &mut Harness) -> Result<(), Stop> {
-    // Their motor bits say 7 (SPEC-NOTES S1).
+    // Their motor bits are 7 (SPEC-NOTES S1).
     let code = match harness.motors()? {
         MotorNumber::MAX => ErrorCode::BadFrameId,
         _ => ErrorCode::BadMotorSelected,
@@ -292,7 +292,7 @@ fn byte_by_byte(harness: &mut Harness) -> Result<(), Stop> {
     harness.require(reply.header == HEADER_ACK, "ACK")
 }
 
-/// Whatever the frame code says: the motor comes first.
+/// With every frame code: the motor is checked first.
 fn every_header(harness: &mut Harness) -> Result<(), Stop> {
     let missing = harness.missing_motor()?;
     for motor in missing..=MotorNumber::MAX {
@@ -305,7 +305,7 @@ fn every_header(harness: &mut Harness) -> Result<(), Stop> {
     Ok(())
 }
 
-/// SPEC-NOTES S10: nothing is understood until 25 ms of silence, then one NACK TIMEOUT.
+/// SPEC-NOTES S10: all bytes are dropped until 25 ms of silence, then one NACK TIMEOUT is sent.
 fn too_long_in_spec(harness: &mut Harness) -> Result<(), Stop> {
     for length in [MAX_PAYLOAD as u8 + 1, 0xFF] {
         let mut bytes = vec![0x02, length];

@@ -1,4 +1,4 @@
-//! A drive on a serial line: exchanges, and what is wrong with them.
+//! The harness of a drive on a serial line: sends commands, receives and checks replies.
 
 use motorlink::Clock;
 use motorlink::port::ByteLink;
@@ -13,61 +13,61 @@ use motorlink_proto::time::{Instant, Micros};
 use super::found::Found;
 use super::safety;
 use super::undo::Undo;
-use crate::case::{Beside, Need, ReadAs, Stop};
+use crate::case::{Differences, Need, ReadAs, Stop};
 use crate::finding::Finding;
 use crate::reading::{Reading, S1, S49, S54};
 use crate::world::World;
 
-/// How a drive is tested.
+/// Options of a test.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// What the drive is held to.
+    /// The profile that the drive must follow.
     pub profile: Profile,
-    /// The motor that is tested.
+    /// The motor under test.
     pub motor: MotorNumber,
-    /// What the user allowed.
+    /// The permissions of the user.
     pub allowed: Vec<Need>,
-    /// How long a byte takes on the line; zero where that does not matter.
+    /// Transmission time of a byte; zero to ignore it.
     pub byte_time: Micros,
 }
 
 /// A drive behind a line.
 pub struct Harness {
     line: Box<dyn ByteLink>,
-    /// That of the line.
+    /// The clock of the line.
     pub(super) clock: Clock,
     pub(super) world: Box<dyn World>,
     pub(super) options: Options,
-    /// What was found out about the drive.
+    /// Known facts about the drive.
     pub(super) found: Found,
-    pub(super) beside: Beside,
-    /// What is to be undone after the case, the last first.
+    pub(super) differences: Differences,
+    /// Changes to undo after the case, in reverse order.
     pub(super) undo: Vec<Undo>,
     /// The current motor before the case.
     pub(super) current: Option<u8>,
-    /// Whether the drive may be in the middle of a frame, or have more to say.
+    /// Whether the drive may have received part of a frame, or may send more bytes.
     pub(super) out_of_step: bool,
-    /// Whether a reply did not come, and may come yet.
-    pub(super) owed: bool,
-    /// Whether the case is over, and what it did is being undone.
+    /// Whether a reply is missing and may come late.
+    pub(super) reply_pending: bool,
+    /// Whether the case is over and its changes are being undone.
     pub(super) restoring: bool,
-    /// Whether something was sent that may have started the motor.
+    /// Whether a sent frame may have started the motor.
     pub(super) moved: bool,
     transcript: Vec<String>,
     words: Transcript,
     sent: Vec<u8>,
     sent_at: Instant,
     received: Vec<u8>,
-    /// What came and is not taken for a reply yet.
+    /// Received bytes that are not part of a reply yet.
     pending: Vec<u8>,
 }
 
-/// A reply in form.
+/// A reply with a valid form.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Reply {
     pub(super) header: u8,
     pub(super) payload: Vec<u8>,
-    /// How long after the last byte was sent it was whole.
+    /// Time from the last sent byte to the complete reply.
     pub(super) delay: Micros,
 }
 
@@ -78,14 +78,14 @@ impl Reply {
     }
 }
 
-/// In this time a whole command must have come (4.1).
+/// The reception timeout of a whole command (4.1).
 pub(super) const RECEPTION: Micros = Micros::from_millis(25);
-/// How long a reply is waited for. A drive has one second (4.1); what comes later is told from what
-/// never comes.
+/// Maximum wait for a reply. A drive has one second (4.1); the longer wait distinguishes a late
+/// reply from a missing one.
 pub(super) const PATIENCE: Micros = Micros::from_millis(2_000);
-/// How long the rest of a reply is waited for once it has begun.
+/// Maximum wait for the rest of a reply after its beginning.
 const GRACE: Micros = Micros::from_millis(50);
-/// Lines of a transcript that are kept.
+/// Maximum number of lines in a transcript.
 const TRANSCRIPT: usize = 60;
 
 impl Harness {
@@ -94,18 +94,18 @@ impl Harness {
         let words = Transcript::new(options.profile);
         let clock = line.clock().unwrap_or_default();
         let sent_at = clock.now();
-        let (found, beside, undo, transcript, sent, received, pending) = Default::default();
+        let (found, differences, undo, transcript, sent, received, pending) = Default::default();
         Harness {
             line,
             clock,
             world,
             options,
             found,
-            beside,
+            differences,
             undo,
             current: None,
             out_of_step: true,
-            owed: false,
+            reply_pending: false,
             restoring: false,
             moved: false,
             transcript,
@@ -135,7 +135,7 @@ impl Harness {
         self.transcript.clear();
     }
 
-    /// Sends bytes as they are. Whatever came before and was not waited for fails the case.
+    /// Sends raw bytes. Fails the case if unexpected bytes were received before.
     pub(super) fn send(&mut self, bytes: &[u8]) -> Result<(), Stop> {
         self.silence(Micros(0))?;
         self.sent.clear();
@@ -162,7 +162,8 @@ impl Harness {
         Ok(())
     }
 
-    /// The next reply in form, if one comes within `patience` from the last byte sent.
+    /// The next reply with a valid form; `None` if none comes within `patience` of the last sent
+    /// byte.
     pub(super) fn reply(&mut self, patience: Micros) -> Result<Option<Reply>, Stop> {
         let mut until = self.sent_at + patience;
         loop {
@@ -186,7 +187,7 @@ impl Harness {
                 }
                 Parse::More => {}
             }
-            // The clock is looked at first, so that a busy host does not pass for a late drive.
+            // The clock is read first, so that a busy host is not mistaken for a late drive.
             let last = self.clock.now() >= until;
             let came = self.take(until)?;
             if came {
@@ -201,14 +202,14 @@ impl Harness {
         }
     }
 
-    /// What is demanded of every reply (4.2, 4.3). One whose motor bits are 0, as 3.2 says, passes for
-    /// what its frame code says (SPEC-NOTES S1).
+    /// Checks the form of a reply (4.2, 4.3). A reply whose motor bits are 0, as in 3.2, is
+    /// accepted by its frame code (SPEC-NOTES S1).
     fn in_form(&mut self, mut reply: Reply) -> Result<Reply, Stop> {
         let whole =
             [HEADER_ACK, HEADER_NACK].into_iter().find(|whole| whole & 0x1F == reply.header);
         if let Some(header) = whole {
             let differs = self.failed("a reply with header f0 (ACK) or ff (NACK)");
-            self.beside.note(S1, Err(differs))?;
+            self.differences.note(S1, Err(differs))?;
             reply.header = header;
         }
         match (reply.header, &*reply.payload) {
@@ -220,7 +221,7 @@ impl Harness {
         }
     }
 
-    /// The one reply to bytes. What the line cannot carry in time is not tried.
+    /// The only reply to bytes. Skips frames that the line cannot transmit in time.
     pub(super) fn exchange(&mut self, bytes: &[u8]) -> Result<Reply, Stop> {
         if bytes.len() > self.in_time() {
             return Err(Stop::Skipped(format!(
@@ -232,16 +233,16 @@ impl Harness {
         self.awaited()
     }
 
-    /// The one reply to what was sent.
+    /// The only reply to the sent bytes.
     pub(super) fn awaited(&mut self) -> Result<Reply, Stop> {
         let reply = self.reply(PATIENCE + self.on_the_line(MAX_FRAME))?;
         let Some(reply) = reply else {
-            (self.out_of_step, self.owed) = (true, true);
+            (self.out_of_step, self.reply_pending) = (true, true);
             return Err(self.failed("a reply"));
         };
         if !self.pending.is_empty() {
             self.give_up();
-            return Err(self.failed("one reply and nothing behind it"));
+            return Err(self.failed("one reply and nothing after it"));
         }
         Ok(reply)
     }
@@ -300,7 +301,7 @@ impl Harness {
         let bytes = self.encode(&Request::GetRegister(register));
         let reply = self.exchange(&bytes)?;
         let there = !reply.is_nack(ErrorCode::GetWriteOnly);
-        self.require(there, format!("ACK, for every drive like this has {register}"))
+        self.require(there, format!("ACK, because every drive of this build has {register}"))
             .read_as(S54)?;
         self.require(reply.header == HEADER_ACK, "ACK")?;
         Ok(reply.payload)
@@ -314,13 +315,13 @@ impl Harness {
             .ok_or_else(|| self.failed("ACK with 1, 2 or 4 bytes"))
     }
 
-    /// Writes a register in the size that the profile has for it.
+    /// Writes a register with the size of the profile.
     pub(super) fn set(&mut self, register: RegisterId, value: i32) -> Result<(), Stop> {
         let size = usize::from(register.write_size(self.profile()));
         self.set_bytes(register, &value.to_le_bytes()[..size])
     }
 
-    /// Writes bytes to a register that can be written.
+    /// Writes bytes to a writable register.
     pub(super) fn set_bytes(&mut self, register: RegisterId, value: &[u8]) -> Result<(), Stop> {
         let bytes = self.encode(&Request::SetRegister { register, value });
         let reply = self.exchange(&bytes)?;
@@ -329,12 +330,12 @@ impl Harness {
         self.require(reply.header == HEADER_ACK && reply.payload.is_empty(), empty_ack)
     }
 
-    /// Notes what failed as a difference from a reading, and lets the case go on.
+    /// Records a failure as a difference from a reading, so that the case continues.
     pub(super) fn note(&mut self, reading: Reading, result: Result<(), Stop>) -> Result<(), Stop> {
-        self.beside.note(reading, result)
+        self.differences.note(reading, result)
     }
 
-    /// What a motor at rest has in STATUS.
+    /// Whether this is the STATUS of a motor at rest.
     pub(super) fn is_idle(&self, status: Status) -> bool {
         status == self.found.idle
     }
@@ -365,13 +366,13 @@ impl Harness {
         Ok(Status::from(value as u8))
     }
 
-    /// Nothing comes for a time; zero only looks at what is there.
+    /// Checks that no bytes come for a time. Zero checks only the bytes received so far.
     pub(super) fn silence(&mut self, span: Micros) -> Result<(), Stop> {
         let until = self.clock.now() + span;
         loop {
             if self.take(until)? || !self.pending.is_empty() {
                 self.give_up();
-                return Err(self.failed("nothing that was not asked for"));
+                return Err(self.failed("no bytes without a command"));
             }
             if self.clock.now() >= until {
                 return Ok(());
@@ -379,8 +380,8 @@ impl Harness {
         }
     }
 
-    /// Waits until the line was silent for a time, whatever comes; a line that never falls silent
-    /// is not waited for for ever.
+    /// Drops bytes until the line was silent for a time. Has a time limit for a line that is never
+    /// silent.
     pub(super) fn drain(&mut self, span: Micros) -> Result<(), Stop> {
         let last = self.clock.now() + span + PATIENCE;
         let mut until = self.clock.now() + span;
@@ -398,7 +399,7 @@ impl Harness {
         if held { Ok(()) } else { Err(self.failed(expected)) }
     }
 
-    /// The last exchange, as what a drive did instead of what is expected.
+    /// The failure of the case, with the last exchange.
     pub(super) fn failed(&self, expected: impl Into<String>) -> Stop {
         let mut words = Transcript::new(self.profile());
         let said = |bytes: &[u8], words: String| match bytes {
@@ -410,7 +411,7 @@ impl Harness {
         Stop::Failed(Box::new(Finding { sent, expected: expected.into(), received, reading: None }))
     }
 
-    /// How many bytes the line carries within the reception timeout, with something to spare.
+    /// Number of bytes that the line transmits within the reception timeout, with a margin.
     pub(super) fn in_time(&self) -> usize {
         match (self.profile(), self.options.byte_time.as_micros()) {
             (Profile::Mcsdk54, _) | (_, 0) => usize::MAX,
@@ -418,12 +419,12 @@ impl Harness {
         }
     }
 
-    /// How long `bytes` take on the line.
+    /// Transmission time of `bytes` bytes.
     pub(super) fn on_the_line(&self, bytes: usize) -> Micros {
         Micros(self.options.byte_time.as_micros() * bytes as u64)
     }
 
-    /// Takes what comes until a moment; whether anything did.
+    /// Receives bytes until a moment. Returns whether any came.
     fn take(&mut self, until: Instant) -> Result<bool, Stop> {
         let mut buffer = [0; 256];
         let wait = until.since(self.clock.now()).into();
@@ -433,7 +434,7 @@ impl Harness {
         Ok(size > 0)
     }
 
-    /// Notes what is no reply; what comes next has to be waited for.
+    /// Records bytes that are not a reply. Later bytes must be waited for.
     fn give_up(&mut self) {
         let bytes = std::mem::take(&mut self.pending);
         if !bytes.is_empty() {
@@ -449,7 +450,7 @@ impl Harness {
     }
 }
 
-/// A frame, its checksum right.
+/// A frame with a correct checksum.
 pub(super) fn frame(header: u8, payload: &[u8]) -> Vec<u8> {
     let mut room = [0; MAX_FRAME];
     let bytes = Frame { header, payload }.encode(&mut room);

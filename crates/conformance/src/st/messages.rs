@@ -102,7 +102,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     cases
 }
 
-/// The text before the NUL, if there is one and the text is printable.
+/// The printable text before the NUL; `None` if there is no NUL or the text is not printable.
 fn terminated(bytes: &[u8]) -> Option<&str> {
     let end = bytes.iter().position(|&byte| byte == 0)?;
     let text = std::str::from_utf8(&bytes[..end]).ok()?;
@@ -110,21 +110,21 @@ fn terminated(bytes: &[u8]) -> Option<&str> {
     (printable && !text.is_empty()).then_some(text)
 }
 
-/// Major, minor and patch of the version string, which has to follow the scheme of 4.12.
+/// Major, minor and patch of the version string. Checks the scheme of 4.12.
 fn version(harness: &mut Harness) -> Result<[u32; 3], Stop> {
     let payload = harness.acknowledged(&Request::GetFirmwareVersion)?;
     let scheme = "NAME<tab>Ver.MAJOR.MINOR.PATCH, or that and -A, -B or -RC with a number from 1, \
                   MAJOR from 1";
     let text = terminated(&payload);
     let numbers = text.and_then(parse).ok_or_else(|| harness.failed(scheme))?;
-    // The scheme is printed with a mark too many between "Ver" and the numbers.
+    // The printed scheme has one point too many between "Ver" and the numbers.
     let to_the_letter = text.is_some_and(|text| text.contains(&format!("\tVer.{}.", numbers[0])));
     let held = harness.require(to_the_letter, scheme);
     harness.note(S13, held)?;
     Ok(numbers)
 }
 
-/// The numbers behind a name and a tab, with or without "Ver" and points before them.
+/// The numbers after a name and a tab. "Ver" and points before them are optional.
 fn parse(text: &str) -> Option<[u32; 3]> {
     let (name, version) = text.split_once('\t')?;
     let version = version.trim_start_matches("Ver").trim_start_matches('.').trim_start();
@@ -146,8 +146,8 @@ fn number(text: &str) -> Option<u32> {
     text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse().ok())?
 }
 
-/// As integers, or in shipped firmware as ASCII digits (SPEC-NOTES S13): the version that the
-/// version string has.
+/// The version as integers, or in shipped firmware as ASCII digits (SPEC-NOTES S13). It must equal
+/// the version string.
 fn board_version(harness: &mut Harness) -> Result<(), Stop> {
     let numbers = version(harness)?;
     let payload = harness.acknowledged(&Request::GetBoardInfo)?;
@@ -157,7 +157,7 @@ fn board_version(harness: &mut Harness) -> Result<(), Stop> {
     });
     let hint = match (harness.profile(), payload.get(..3)) {
         (Profile::Spec, Some(digits)) if digits.iter().all(u8::is_ascii_digit) => {
-            "; digits are what shipped firmware sends, which --profile mcsdk-5.4 is for"
+            "; shipped firmware sends digits; use --profile mcsdk-5.4 for it"
         }
         _ => "",
     };
@@ -170,7 +170,7 @@ fn board_version(harness: &mut Harness) -> Result<(), Stop> {
 
 fn ramp_at_rest(harness: &mut Harness) -> Result<(), Stop> {
     harness.keep_setpoints()?;
-    // The duration cannot be read back, so that a gentle one stays.
+    // The duration cannot be read back, so the last write is a slow ramp.
     for speed_rpm in [0x0640, -1_002, 70_002] {
         harness.done(&Request::SetRamp(Ramp { speed_rpm, duration_ms: 2_000 }))?;
         let now = harness.value(RegisterId::RAMP_FINAL_SPEED)?;
@@ -191,13 +191,14 @@ fn references_at_rest(harness: &mut Harness) -> Result<(), Stop> {
     nothing_started(harness)?;
     let measured = harness.value(RegisterId::TORQUE_MEAS)?;
     let little = measured.abs() < i32::from(IQ / 2);
-    harness.require(little, "ACK about 0 s16A, for no current flows at rest")
+    harness.require(little, "ACK about 0 s16A, because no current flows at rest")
 }
 
 fn nothing_started(harness: &mut Harness) -> Result<(), Stop> {
-    harness.require_idle("for nothing was started")?;
+    harness.require_idle("because nothing was started")?;
     let reference = harness.value(RegisterId::SPEED_REF)?;
-    let waits = harness.require(reference == 0, "ACK 0 rpm, for a ramp waits until the motor runs");
+    let waits =
+        harness.require(reference == 0, "ACK 0 rpm, because a ramp waits until the motor runs");
     harness.note(S48, waits)
 }
 
@@ -205,7 +206,7 @@ fn revup(harness: &mut Harness, phase: u8) -> Result<(), Stop> {
     harness.keep_revup(phase)?;
     let sensorless = harness.has(Feature::ObserverPll)? || harness.has(Feature::ObserverCordic)?;
     let samples = [
-        // More than 16 bits of speed; less than nothing.
+        // A speed of more than 16 bits, and negative values.
         RevupPhase { speed_rpm: 70_002, torque_s16a: 0x0123, duration_ms: 0x0234 },
         RevupPhase { speed_rpm: -798, torque_s16a: -0x0216, duration_ms: 0x8001 },
     ];
@@ -217,7 +218,7 @@ fn revup(harness: &mut Harness, phase: u8) -> Result<(), Stop> {
             harness.require(payload == bytes, format!("ACK {}, which was written", Hex(&bytes)));
         if sensorless { held? } else { held.read_as(S52)? }
     }
-    // The other phases are others.
+    // The other phases have other data.
     let data = samples[0];
     let other = (phase + 1) % REVUP_PHASES;
     let before = harness.acknowledged(&Request::GetRevupData(other))?;
@@ -226,7 +227,7 @@ fn revup(harness: &mut Harness, phase: u8) -> Result<(), Stop> {
     harness.require(now == before, format!("phase {other} as before: {}", Hex(&before)))
 }
 
-/// Data segments, whose layout is ours, for the document has lost its own (SPEC-NOTES S7).
+/// Data segments. The layout is ours, because the document does not contain it (SPEC-NOTES S7).
 fn segments() -> Vec<Case<Harness>> {
     vec![
         Case::new(
@@ -247,7 +248,7 @@ fn segments() -> Vec<Case<Harness>> {
             },
         ),
         Case::new(
-            "what_no_data_segment_can_hold_is_refused",
+            "invalid_registers_of_a_data_segment_are_refused",
             &["ST-3.1-11", "ST-4.3-09"],
             |harness: &mut Harness| {
                 empty_segment(harness)?;
@@ -279,12 +280,12 @@ fn segments() -> Vec<Case<Harness>> {
     ]
 }
 
-/// Segment 0, which has to be empty: what it holds cannot be read, so it could not be put back.
+/// Segment 0, which must be empty: its registers cannot be read, so it could not be restored.
 pub(super) fn empty_segment(harness: &mut Harness) -> Result<(), Stop> {
     let bytes = harness.encode(&Request::GetSegment(0));
     let reply = harness.exchange(&bytes)?;
     if reply.is_nack(ErrorCode::BadFrameId) {
-        let why = "the drive has no data segments, whose section the document has lost";
+        let why = "the drive has no data segments; the document does not describe them";
         return Err(Stop::Skipped(why.to_owned()));
     }
     harness.require(reply.header == HEADER_ACK, "ACK")?;
@@ -348,7 +349,7 @@ mod tests {
     fn the_version_scheme_has_a_name_a_tab_and_numbers() {
         assert_eq!(parse("ST MC SDK\tVer.5.4.4"), Some([5, 4, 4]));
         assert_eq!(parse("Fan\tVer.1.0.12-RC2"), Some([1, 0, 12]));
-        assert_eq!(parse("Fan\tVer..1.0.12"), Some([1, 0, 12]), "as it is printed");
+        assert_eq!(parse("Fan\tVer..1.0.12"), Some([1, 0, 12]), "as printed in the document");
         for wrong in [
             "ST MC SDK Ver.5.4.4",
             "\tVer.5.4.4",

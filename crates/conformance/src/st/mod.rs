@@ -28,8 +28,8 @@ pub use clauses::CLAUSES;
 pub use harness::{Harness, Options};
 pub use safety::may_start;
 
-/// What a drive of this profile is put through: from the frame to the message, then what turns the
-/// motor or needs help.
+/// The cases of a drive of this profile: from frames to messages, then cases that turn the motor or
+/// need help.
 pub fn suite(profile: Profile) -> Vec<Case<Harness>> {
     let topics = [
         frames::cases,
@@ -46,7 +46,7 @@ pub fn suite(profile: Profile) -> Vec<Case<Harness>> {
     topics.into_iter().flat_map(|cases| cases(profile)).collect()
 }
 
-/// Every clause and what tests it in either profile, as a Markdown table.
+/// Every clause and its tests in either profile, as a Markdown table.
 pub fn table() -> String {
     let suites = [Profile::Spec, Profile::Mcsdk54].map(suite);
     markdown(CLAUSES, suites.iter().flatten())

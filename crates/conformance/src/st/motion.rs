@@ -12,22 +12,22 @@ use super::restore::faulty;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{Reading, S14, S15, S22, S25, S26, S48, S53};
 
-/// How long a start may take, the alignment of an encoder included.
+/// Maximum duration of a start, including the alignment of an encoder.
 const START: Micros = Micros::from_millis(15_000);
-/// How long a speed may take to settle behind its ramp.
+/// Maximum time until a speed is steady after its ramp.
 const SETTLE: Micros = Micros::from_millis(5_000);
-/// Between two looks at a register.
+/// Interval between two samples of a register.
 const LOOK: Micros = Micros::from_millis(10);
-/// In how many looks on end a speed is what it shall be.
+/// Consecutive in-range samples required.
 const STEADY: u32 = 40;
-/// What the motor turns at where the drive does not tell what it was last told, rpm.
+/// Speed of the motor if the drive does not show its last commanded speed, rpm.
 const SPEED: i32 = 1_500;
 
 type Test = fn(&mut Harness) -> Result<(), Stop>;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     let tests: [(&'static str, &'static [&'static str], Test); 11] = [
-        // First what ends every other.
+        // The first case stops the motor, which every other case needs.
         ("a_stop_brings_the_motor_to_rest", &["ST-4.6-11", "ST-4.6-13"], stop),
         (
             "a_start_brings_the_motor_to_run_and_to_its_ramp",
@@ -39,10 +39,10 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
         ("a_ramp_in_run_is_executed_at_once", &["ST-4.8-03", "ST-4.8-09"], ramp_at_once),
         ("a_ramp_takes_its_duration", &["ST-4.8-08"], ramp_duration),
         ("a_negative_ramp_turns_backwards", &["ST-4.8-07", "ST-4.4-16"], backwards),
-        ("stop_ramp_holds_what_was_reached", &["ST-4.6-14", "ST-4.6-16"], stop_ramp),
+        ("stop_ramp_holds_the_present_speed", &["ST-4.6-14", "ST-4.6-16"], stop_ramp),
         ("stop_ramp_without_a_ramp_does_nothing", &["ST-4.6-15"], stop_no_ramp),
         ("a_ramp_in_torque_mode_changes_to_speed_mode", &["ST-4.8-05"], ramp_in_torque_mode),
-        ("encoder_align_at_rest_comes_back_to_rest", &["ST-4.6-24", "ST-4.6-26"], align),
+        ("encoder_align_at_rest_ends_at_rest", &["ST-4.6-24", "ST-4.6-26"], align),
     ];
     let readings: [(&'static str, &'static [&'static str], Test, Reading); 6] = [
         (
@@ -66,21 +66,23 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
         cases.push(
             Case::new("a_torque_ramp_takes_its_duration", &["ST-3.1-10"], torque_ramp).needs(SPIN),
         );
-        cases.push(Case::new("a_position_is_gone_to", &["ST-3.1-16"], position).needs(SPIN));
+        cases.push(
+            Case::new("a_position_move_reaches_its_target", &["ST-3.1-16"], position).needs(SPIN),
+        );
     }
     cases
 }
 
 const SPIN: &[Need] = &[Need::Spin];
 
-/// A speed that the user's drive is set to anyway, within what registers allow.
+/// The speed that the user's drive is set to, within the range of the registers.
 fn speed(harness: &mut Harness) -> Result<i32, Stop> {
-    let told = harness.value(RegisterId::RAMP_FINAL_SPEED)?.saturating_abs();
+    let commanded = harness.value(RegisterId::RAMP_FINAL_SPEED)?.saturating_abs();
     let most = *harness.speeds()?.end();
-    Ok(if (300..=5_000).contains(&told) { told } else { SPEED.min(most) } / 6 * 6)
+    Ok(if (300..=5_000).contains(&commanded) { commanded } else { SPEED.min(most) } / 6 * 6)
 }
 
-/// Programs a ramp and starts the motor; gives the speed when it is in RUN and at it.
+/// Programs a ramp and starts the motor. Returns the speed after the motor reached it in RUN.
 pub(super) fn run(harness: &mut Harness) -> Result<i32, Stop> {
     harness.keep_setpoints()?;
     let speed_rpm = speed(harness)?;
@@ -97,8 +99,8 @@ fn running(harness: &mut Harness) -> Result<(), Stop> {
     harness.require(status == run, format!("ACK {}: {run}, within 15 s", u8::from(run)))
 }
 
-/// Waits until the motor is in RUN and at a speed. A drive that gives RUN another number is known by
-/// the speed (SPEC-NOTES S14); from then on this is its RUN.
+/// Waits until the motor is in RUN and at a speed. If a drive has another number for RUN, the speed
+/// shows it (SPEC-NOTES S14); the kit then uses this number.
 fn comes_to(harness: &mut Harness, speed: i32) -> Result<(), Stop> {
     let until = harness.clock.now() + START;
     let mut stays = 0;
@@ -110,7 +112,7 @@ fn comes_to(harness: &mut Harness, speed: i32) -> Result<(), Stop> {
         let measured = harness.value(RegisterId::SPEED_MEAS)?;
         stays = if is_near(measured, speed) { stays + 1 } else { 0 };
         if stays == STEADY {
-            let differs = harness.failed("ACK 6: RUN, for the motor is at its speed");
+            let differs = harness.failed("ACK 6: RUN, because the motor is at its speed");
             harness.found.run = status;
             return harness.note(S14, Err(differs));
         }
@@ -126,7 +128,7 @@ fn is_near(measured: i32, speed: i32) -> bool {
     (measured - speed).abs() <= speed.abs() / 10 + 30
 }
 
-/// Waits until SPEED_MEAS is within a tenth of a speed, and stays there.
+/// Waits until SPEED_MEAS is within a tenth of a speed, and remains there.
 fn reaches(harness: &mut Harness, speed: i32) -> Result<(), Stop> {
     let until = harness.clock.now() + SETTLE;
     let mut stays = 0;
@@ -195,8 +197,8 @@ fn ramp_at_once(harness: &mut Harness) -> Result<(), Stop> {
     reaches(harness, speed_rpm)
 }
 
-/// SPEED_REF follows a straight line, and is there when the ramp is over (SPEC-NOTES S48); the motor has
-/// gone three quarters of the way when three quarters of the duration are over.
+/// SPEED_REF follows a straight line, and is at its end when the ramp is over (SPEC-NOTES S48).
+/// After three quarters of the duration the motor has three quarters of the speed change.
 fn ramp_duration(harness: &mut Harness) -> Result<(), Stop> {
     let from = run(harness)?;
     let (to, duration_ms) = (from * 4 / 5, 3_000);
@@ -249,7 +251,7 @@ fn stop_ramp(harness: &mut Harness) -> Result<(), Stop> {
     let held = holds_reference(harness, from, to);
     harness.note(S48, held)?;
     still_running(harness)?;
-    // The ramp would be over.
+    // The ramp would be over now.
     harness.silence(Micros::from_millis(1_500))?;
     let measured = harness.value(RegisterId::SPEED_MEAS)?;
     let short_of_it = (measured - to).abs() > (from - to) / 4;
@@ -274,8 +276,7 @@ fn stop_no_ramp(harness: &mut Harness) -> Result<(), Stop> {
     reaches(harness, speed)
 }
 
-/// The current that the motor needs to keep its speed: the mean of a few looks, rounded to what
-/// keeps it turning.
+/// The current that keeps the motor at its speed: the mean of a few samples, rounded up.
 fn keeping_current(harness: &mut Harness) -> Result<i16, Stop> {
     harness.silence(Micros::from_millis(500))?;
     let mut sum = 0;
@@ -286,7 +287,7 @@ fn keeping_current(harness: &mut Harness) -> Result<i16, Stop> {
     Ok((sum / 16).clamp(-32_000, 32_000) as i16)
 }
 
-/// Different currents for the two axes, so that one is not taken for the other.
+/// Different currents for the two axes, so that they cannot be confused.
 fn reference(iq_s16a: i16) -> CurrentReference {
     CurrentReference { iq_s16a, id_s16a: if iq_s16a == -60 { -90 } else { -60 } }
 }
@@ -304,7 +305,7 @@ fn references_at_once(harness: &mut Harness) -> Result<(), Stop> {
     let reference = reference(keeping_current(harness)?);
     harness.done(&Request::SetCurrentReference(reference))?;
     let outcome = references_are(harness, reference).and_then(|()| still_running(harness));
-    // Back under speed control, whatever came of it.
+    // Back to speed control, also after a failure.
     harness.done(&Request::SetRamp(Ramp { speed_rpm, duration_ms: 100 }))?;
     outcome
 }
@@ -314,7 +315,7 @@ fn references_deferred(harness: &mut Harness) -> Result<(), Stop> {
     let reference = reference(keeping_current(harness)?);
     harness.rest()?;
     harness.done(&Request::SetCurrentReference(reference))?;
-    harness.require_idle("for nothing was started")?;
+    harness.require_idle("because nothing was started")?;
     harness.execute(Command::StartMotor)?;
     running(harness)?;
     let outcome = references_are(harness, reference);
@@ -322,7 +323,7 @@ fn references_deferred(harness: &mut Harness) -> Result<(), Stop> {
     outcome
 }
 
-/// In torque mode, with the current that keeps the speed.
+/// Runs in torque mode, with the current that keeps the speed.
 fn torque_mode(harness: &mut Harness) -> Result<(), Stop> {
     harness.set(RegisterId::CONTROL_MODE, u8::from(ControlMode::Torque).into())?;
     mode_is(harness, ControlMode::Torque)
@@ -334,7 +335,7 @@ fn mode_is(harness: &mut Harness, mode: ControlMode) -> Result<(), Stop> {
     harness.require(held, format!("ACK {}: {mode}", u8::from(mode)))
 }
 
-/// What CONTROL_MODE reads is a reading (SPEC-NOTES S15); that the ramp is executed is not.
+/// The value of CONTROL_MODE is a reading (SPEC-NOTES S15). The execution of the ramp is not.
 fn ramp_in_torque_mode(harness: &mut Harness) -> Result<(), Stop> {
     let speed_rpm = run(harness)? * 4 / 5;
     let torque = torque_mode(harness);
@@ -369,8 +370,8 @@ fn speed_mode_id(harness: &mut Harness) -> Result<(), Stop> {
     still_running(harness)
 }
 
-/// With an encoder it goes through the states of an alignment, without nothing happens: what STATUS
-/// shows of it is a reading (SPEC-NOTES S53).
+/// With an encoder the drive passes through the states of an alignment. Without one nothing
+/// happens. The values of STATUS are a reading (SPEC-NOTES S53).
 fn align(harness: &mut Harness) -> Result<(), Stop> {
     harness.execute(Command::EncoderAlign)?;
     aligns(harness).read_as(S53)
@@ -405,7 +406,7 @@ fn align_in_run(harness: &mut Harness) -> Result<(), Stop> {
     reaches(harness, speed)
 }
 
-/// SPEC-NOTES S7: from what the motor needs to a little more, in a straight line.
+/// SPEC-NOTES S7: a straight line from the needed current to a little more.
 fn torque_ramp(harness: &mut Harness) -> Result<(), Stop> {
     let speed_rpm = run(harness)?;
     let from = i32::from(keeping_current(harness)?);
@@ -421,7 +422,7 @@ fn torque_ramp(harness: &mut Harness) -> Result<(), Stop> {
     outcome
 }
 
-/// SPEC-NOTES S8: half a turn on from where the motor is.
+/// SPEC-NOTES S8: half a turn from the present position.
 fn position(harness: &mut Harness) -> Result<(), Stop> {
     harness.need(Feature::PositionControl)?;
     harness.keep_setpoints()?;

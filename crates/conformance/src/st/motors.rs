@@ -46,7 +46,7 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Harness>> {
                 for motor in 1..=harness.motors()? {
                     harness.acknowledged_bytes(&question(motor))?;
                     current_is(harness, motor)?;
-                    // It stays the current one while number 0 is used.
+                    // The current motor does not change while number 0 is used.
                     harness.acknowledged_bytes(&question(0))?;
                     current_is(harness, motor)?;
                 }
@@ -54,7 +54,7 @@ pub(super) fn cases(_profile: Profile) -> Vec<Case<Harness>> {
             },
         ),
         Case::new(
-            "registers_of_the_addressed_motor_are_meant",
+            "a_write_changes_only_the_addressed_motor",
             &["ST-3.2-06", "ST-3-03"],
             own_registers,
         ),
@@ -197,13 +197,13 @@ fn question(motor: u8) -> Vec<u8> {
     frame(Frame::header(FrameCode::GetReg.number(), motor), &[RegisterId::STATUS.0])
 }
 
-/// GET_REG SPEED_KD of a motor: a register that keeps whatever it is given.
+/// GET_REG SPEED_KD of a motor: a register that stores every value.
 fn read_gain(motor: u8) -> Vec<u8> {
     frame(Frame::header(FrameCode::GetReg.number(), motor), &[RegisterId::SPEED_KD.0])
 }
 
-/// TARGET_MOTOR tells which motor is the current one (SPEC-NOTES S20); the document only lets it be
-/// told by what motor number 0 addresses.
+/// TARGET_MOTOR shows the current motor (SPEC-NOTES S20). According to the document alone, only the
+/// motor that number 0 addresses shows it.
 fn current_is(harness: &mut Harness, motor: u8) -> Result<(), Stop> {
     let reply = harness.exchange(&current_motor())?;
     let held = reply.header == HEADER_ACK && reply.payload == [motor - 1];
@@ -222,7 +222,7 @@ fn current_is(harness: &mut Harness, motor: u8) -> Result<(), Stop> {
     )
 }
 
-/// Gives the motor under test another gain than the others have.
+/// Gives the motor under test a gain that differs from the others.
 fn tell_apart(harness: &mut Harness) -> Result<(), Stop> {
     let tested = harness.options.motor.number();
     let mut taken = Vec::new();
@@ -236,7 +236,7 @@ fn tell_apart(harness: &mut Harness) -> Result<(), Stop> {
     harness.set_bytes(RegisterId::SPEED_KD, &value)
 }
 
-/// What is written to one motor is not read from another.
+/// Checks that a write to one motor does not change another.
 fn own_registers(harness: &mut Harness) -> Result<(), Stop> {
     let other = harness.other_motor()?;
     let before = harness.keep(RegisterId::SPEED_KD)?;

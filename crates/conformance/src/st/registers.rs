@@ -1,4 +1,4 @@
-//! Cases of 4.4 and 4.5 and of table 3, for every register: who reads it, who writes it.
+//! Cases of 4.4 and 4.5 and of table 3, for every register: reads and writes.
 
 use motorlink_proto::Hex;
 use motorlink_proto::st::register::{Access, Feature, Features, Writing};
@@ -11,13 +11,13 @@ use super::values;
 use crate::case::{Case, ReadAs, Stop};
 use crate::reading::{Reading, S5, S14, S15, S48, S49, S54};
 
-/// Ids for a DAC channel that no register of access D has.
+/// Ids that a DAC channel must refuse: no registers of access D.
 const NOT_FOR_DAC: [RegisterId; 2] = [RegisterId::STATUS, RegisterId(0xEE)];
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     let mut cases: Vec<Case<Harness>> = Vec::new();
     for register in RegisterId::all() {
-        // TARGET_MOTOR is the current motor, which has cases of its own.
+        // TARGET_MOTOR is the current motor, which has its own cases.
         let writes = register != RegisterId::TARGET_MOTOR;
         match read_size(register, profile) {
             Some(size) => cases.push(Case::new(
@@ -55,7 +55,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     }
     cases.extend([
         Case::new(
-            "registers_that_nobody_names_are_refused",
+            "unknown_registers_are_refused",
             &["ST-4.4-10", "ST-4.5-06", "ST-4.3-07", "ST-4.3-08"],
             unnamed,
         ),
@@ -101,7 +101,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     cases
 }
 
-/// What a write that is read back tests.
+/// The clauses of a write that is read back.
 fn takes_clauses(register: RegisterId) -> &'static [&'static str] {
     match register {
         RegisterId::TORQUE_REF | RegisterId::FLUX_REF => {
@@ -111,7 +111,7 @@ fn takes_clauses(register: RegisterId) -> &'static [&'static str] {
     }
 }
 
-/// Access D is not explained, so what it means for a master is a reading.
+/// The document does not explain access D, so its meaning for a master is a reading.
 fn read_by_access(register: RegisterId, case: Case<Harness>) -> Case<Harness> {
     match register.shape() {
         Some(shape) if shape.access == Access::Dac => case.reading(S5),
@@ -119,8 +119,8 @@ fn read_by_access(register: RegisterId, case: Case<Harness>) -> Case<Harness> {
     }
 }
 
-/// The reading by which a register gives back what is written to it while the motor is at rest, where
-/// more is needed than that it is written (4.4): its values are not listed, or a regulator sets it.
+/// The reading by which a register returns a written value while the motor is at rest; `None` if
+/// the write (4.4) is enough. Needed if its values are not listed, or if a regulator sets it.
 pub(super) fn kept_by(register: RegisterId) -> Option<Reading> {
     match register {
         RegisterId::CONTROL_MODE => Some(S15),
@@ -130,12 +130,12 @@ pub(super) fn kept_by(register: RegisterId) -> Option<Reading> {
     }
 }
 
-/// A speed that the motor cannot have may be limited (SPEC-NOTES S49).
+/// A drive may limit a speed that the motor cannot reach (SPEC-NOTES S49).
 fn speed_is_kept(harness: &mut Harness, rpm: i32, held: Result<(), Stop>) -> Result<(), Stop> {
     if harness.speeds()?.contains(&rpm.abs()) { held } else { harness.note(S49, held) }
 }
 
-/// What a drive that has a register's feature does with a write.
+/// How a drive with the register's feature handles a write.
 pub(super) fn writing(register: RegisterId, profile: Profile) -> Writing {
     let shape = register.shape();
     shape.map_or(Writing::ReadOnly, |shape| {
@@ -147,7 +147,7 @@ fn feature(register: RegisterId) -> Feature {
     register.shape().map_or(Feature::Core, |shape| shape.feature)
 }
 
-/// What a drive without a register's feature answers to a write (SPEC-NOTES S27).
+/// The reply of a drive without the register's feature to a write (SPEC-NOTES S27).
 fn missing(profile: Profile) -> ErrorCode {
     match profile {
         Profile::Spec => ErrorCode::SetReadOnly,
@@ -168,7 +168,7 @@ fn read(harness: &mut Harness, register: RegisterId, size: u8) -> Result<(), Sto
     harness.require(held, expected)
 }
 
-/// A write of the value that the register has, in case the drive takes it.
+/// Writes the present value, in case the drive accepts the write.
 fn write_what_is_there(harness: &mut Harness, register: RegisterId) -> Result<Vec<u8>, Stop> {
     let read = harness.encode(&Request::GetRegister(register));
     let there = harness.exchange(&read)?;
@@ -186,7 +186,7 @@ fn refuse(harness: &mut Harness, register: RegisterId, refusal: Writing) -> Resu
     let mut payload = write_what_is_there(harness, register)?;
     let bytes = harness.frame(FrameCode::SetReg.number(), &payload);
     harness.refused_bytes(&bytes, code)?;
-    // A value that a register of no danger would show.
+    // A changed value would be visible in a harmless register.
     if steady(register) && harness.readable(register) && harness.has(feature(register))? {
         let before = payload.split_off(1);
         payload.extend(before.iter().map(|byte| byte ^ 0x20));
@@ -198,7 +198,7 @@ fn refuse(harness: &mut Harness, register: RegisterId, refusal: Writing) -> Resu
     Ok(())
 }
 
-/// Whether a register that is only read stays what it is at rest.
+/// Whether a read-only register does not change at rest.
 fn steady(register: RegisterId) -> bool {
     matches!(
         register,
@@ -234,7 +234,7 @@ fn write(harness: &mut Harness, register: RegisterId, size: u8) -> Result<(), St
         return harness.need(feature);
     }
     if !harness.readable(register) {
-        // Written with what it has, as FLUX_REF shows (SPEC-NOTES S22).
+        // Written with its present value, as in FLUX_REF (SPEC-NOTES S22).
         harness.keep_setpoints()?;
         let value = harness.value(RegisterId::FLUX_REF)?;
         return harness.set(register, value);
@@ -252,9 +252,10 @@ fn write(harness: &mut Harness, register: RegisterId, size: u8) -> Result<(), St
             }
             None => given_back?,
         }
-        // What one write changes besides, such as the mode, is begun anew.
+        // A write may also change something else, such as the mode, so this is repeated for each
+        // value.
         if is_setpoint(register) {
-            harness.require_idle("for nothing was started")?;
+            harness.require_idle("because nothing was started")?;
         }
     }
     Ok(())
@@ -270,8 +271,8 @@ fn unnamed(harness: &mut Harness) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Values of physical things say in which order their bytes come; a value that was written and is
-/// read back does not.
+/// The values of physical quantities show the byte order. A value that is written and read back
+/// does not.
 fn endian(harness: &mut Harness) -> Result<(), Stop> {
     let plausible = [
         (RegisterId::HEATS_TEMP, -60..=200, "a temperature of -60 to 200 °C"),
@@ -307,7 +308,7 @@ fn signed(harness: &mut Harness) -> Result<(), Stop> {
     harness.require(now == [0xFE, 0xFF], "f0 02 fe ff f0  ACK -2")
 }
 
-/// 1002 rpm are 16.7 Hz exactly, so that firmware that keeps tenths of a hertz shows them, too.
+/// 1002 rpm are exactly 16.7 Hz, so firmware that stores tenths of a hertz also shows them.
 fn rpm(harness: &mut Harness) -> Result<(), Stop> {
     harness.keep_setpoints()?;
     for value in [1_002, 1_000, -605] {

@@ -1,4 +1,4 @@
-//! Before and after a case: the drive at rest and the line in step, and everything as it was found.
+//! Start and end of a case: the drive at rest, the line in sync, and all settings restored.
 
 use motorlink_proto::Hex;
 use motorlink_proto::st::{
@@ -14,13 +14,13 @@ use crate::finding::Finding;
 use crate::reading::S48;
 use crate::world::Unavailable;
 
-/// How long a line is silent before it counts as silent: four times the reception timeout.
+/// Silence of this length counts as a silent line: four times the reception timeout.
 const SILENCE: Micros = Micros::from_millis(100);
-/// How long a drive has to come to rest.
+/// Timeout until the drive is at rest.
 const REST: Micros = Micros::from_millis(30_000);
-/// How often a motor is told to stop that cannot be seen to.
+/// Number of STOP_MOTORs to a motor whose state cannot be read.
 const STOPS: u32 = 3;
-/// Between two looks at a register.
+/// Interval between two samples of a register.
 const LOOK: Micros = Micros::from_millis(10);
 
 impl Subject for Harness {
@@ -41,7 +41,7 @@ impl Subject for Harness {
         let status = self.wait_for(REST, settled)?;
         if !self.is_idle(status) && !self.rests_as(status)? {
             return Err(Stop::Lost(format!(
-                "the motor is not at rest: STATUS is {status}, and the kit begins in IDLE; stop the \
+                "the motor is not at rest: STATUS is {status}, and the test starts in IDLE; stop the \
                  motor and acknowledge faults first (`motorlink st stop`, `motorlink st fault-ack`)"
             )));
         }
@@ -51,17 +51,17 @@ impl Subject for Harness {
     fn restore(&mut self) -> Result<(), Stop> {
         self.restoring = true;
         let faulted = self.undo.iter().any(|undo| matches!(undo, Undo::Fault));
-        // What fails does not keep the rest from being put back.
+        // A failed step does not prevent the others.
         let mut outcome = Ok(());
         if faulted {
             outcome = self.world.fault(false).map_err(|Unavailable(why)| {
-                self.failed(format!("the fault to be ended; end it by hand ({why})"))
+                self.failed(format!("the end of the fault; end it by hand ({why})"))
             });
         }
         let may_turn = self.moved || faulted;
         let mut rests = self.end_at_rest(may_turn);
         if let Err(Stop::Failed(_)) = rests {
-            // Once more: a line that is bad now and then must not leave a motor turning.
+            // Repeats it: an occasional error on the line must not leave a motor turning.
             self.out_of_step = true;
             rests = self.end_at_rest(may_turn);
         }
@@ -69,17 +69,17 @@ impl Subject for Harness {
             self.stop_unheard()?;
         }
         outcome = outcome.and(rests?);
-        // What could not be reached so far is still there to be put back after the next case.
+        // Settings that could not be restored remain in the list for the end of the next case.
         for undo in std::mem::take(&mut self.undo).into_iter().rev() {
             let mut done = self.put_back(undo.clone());
             if done.is_err() {
-                // Once more: a line that is bad now and then must not leave a drive changed.
+                // Repeats it: an occasional error on the line must not leave a drive changed.
                 self.out_of_step = true;
                 done = self.synchronise().and_then(|()| self.put_back(undo));
             }
             outcome = outcome.and(done);
         }
-        outcome.and(self.put_back_current())
+        outcome.and(self.restore_current())
     }
 
     fn allows(&self, need: Need) -> bool {
@@ -91,12 +91,12 @@ impl Subject for Harness {
     }
 
     fn differences(&mut self) -> Vec<Finding> {
-        self.beside.take()
+        self.differences.take()
     }
 }
 
 impl Harness {
-    /// Remembers a register, to be put back; gives its bytes.
+    /// Records a register for restoring. Returns its bytes.
     pub(super) fn keep(&mut self, register: RegisterId) -> Result<Vec<u8>, Stop> {
         if is_setpoint(register) {
             self.keep_setpoints()?;
@@ -107,7 +107,7 @@ impl Harness {
         Ok(bytes)
     }
 
-    /// Remembers mode and references, to be put back. The next start goes to a speed afterwards.
+    /// Records mode and references for restoring. After that the next start goes to a speed.
     pub(super) fn keep_setpoints(&mut self) -> Result<(), Stop> {
         let mode = self.value(RegisterId::CONTROL_MODE)?;
         let speed = self.value(RegisterId::RAMP_FINAL_SPEED)?;
@@ -119,7 +119,7 @@ impl Harness {
         Ok(())
     }
 
-    /// Remembers a rev-up phase, to be put back; gives it.
+    /// Records a rev-up phase for restoring, and returns it.
     pub(super) fn keep_revup(&mut self, phase: u8) -> Result<RevupPhase, Stop> {
         let payload = self.acknowledged(&Request::GetRevupData(phase))?;
         let data = RevupPhase::decode(&payload);
@@ -128,19 +128,19 @@ impl Harness {
         Ok(data)
     }
 
-    /// Makes a fault condition present until the case is over.
+    /// Causes a fault condition until the end of the case.
     pub(super) fn fault(&mut self) -> Result<(), Stop> {
         self.undo.push(Undo::Fault);
         Ok(self.world.fault(true)?)
     }
 
-    /// Takes the drive's power away and gives it back; waits until it is ready.
+    /// Cycles the drive's power, and waits until it is ready.
     pub(super) fn power_cycle(&mut self) -> Result<(), Stop> {
         self.world.power_cycle()?;
         self.drain(SILENCE)
     }
 
-    /// Reads STATUS until it is as wanted, or the time is over; gives what it was last.
+    /// Reads STATUS until it is as wanted, or until the time is over. Returns its last value.
     pub(super) fn wait_for(
         &mut self,
         patience: Micros,
@@ -156,8 +156,8 @@ impl Harness {
         }
     }
 
-    /// Whether a drive that gives IDLE another number (SPEC-NOTES S14) is at rest: it has no fault
-    /// and does not turn. From then on this is its IDLE.
+    /// Whether a drive with another number for IDLE (SPEC-NOTES S14) is at rest: it has no fault
+    /// and does not turn. The kit then uses this number.
     fn rests_as(&mut self, status: Status) -> Result<bool, Stop> {
         let known = status == Status::Run || faulty(status) || self.found.idle != Status::Idle;
         if known || self.value(RegisterId::FLAGS)? != 0 || self.value(RegisterId::SPEED_MEAS)? != 0
@@ -183,42 +183,43 @@ impl Harness {
         Err(Stop::Lost(format!("the motor did not come to rest: STATUS is {status}")))
     }
 
-    /// Stops a motor that is not at rest. Gives what is wrong with its not being so, if nothing was
-    /// done that may have started it.
+    /// Stops a motor that is not at rest. Returns the failure if no sent frame could have started
+    /// it.
     fn end_at_rest(&mut self, may_turn: bool) -> Result<Result<(), Stop>, Stop> {
         self.synchronise()?;
         let status = self.status()?;
         if self.is_idle(status) {
             return Ok(Ok(()));
         }
-        let expected = "ACK 0: IDLE, for nothing was sent that starts a motor";
+        let expected = "ACK 0: IDLE, because no sent frame starts a motor";
         let allowed = self.require(may_turn, expected);
         self.rest()?;
         Ok(allowed)
     }
 
-    /// Tells a drive to stop the motor that may hear although it does not answer.
+    /// Sends STOP_MOTOR to a drive that may receive it although it does not answer.
     fn stop_unheard(&mut self) -> Result<(), Stop> {
         let stop = self.encode(&Request::ExecuteCommand(Command::StopMotor));
         for _ in 0..STOPS {
             self.drain(SILENCE)?;
             self.send_more(&stop)?;
         }
-        (self.out_of_step, self.owed) = (true, true);
+        (self.out_of_step, self.reply_pending) = (true, true);
         Ok(())
     }
 
-    /// Brings the line in step, if it may not be.
+    /// Brings the line in sync, if needed.
     fn synchronise(&mut self) -> Result<(), Stop> {
         if !self.out_of_step {
             return Ok(());
         }
-        // A reply that is late must not be taken for the next one's.
-        let owed = std::mem::take(&mut self.owed);
-        self.drain(if owed { PATIENCE } else { SILENCE })?;
+        // A late reply must not be matched to the next request.
+        let reply_pending = std::mem::take(&mut self.reply_pending);
+        self.drain(if reply_pending { PATIENCE } else { SILENCE })?;
         let mut answered = self.probe()?;
         if answered.is_none() {
-            // Completes whatever frame a drive without reception timeout waits for (SPEC-NOTES S16).
+            // Completes any frame that a drive without reception timeout waits for (SPEC-NOTES
+            // S16).
             let padding: Vec<u8> = [0xFF; 130].into_iter().chain([0x00, 0xFF]).collect();
             self.send(&padding)?;
             self.drain(SILENCE)?;
@@ -235,7 +236,7 @@ impl Harness {
         Ok(())
     }
 
-    /// Asks which motor is the current one, which changes nothing.
+    /// Reads the number of the current motor, which changes nothing.
     fn probe(&mut self) -> Result<Option<Reply>, Stop> {
         self.send(&current_motor())?;
         self.reply(PATIENCE)
@@ -248,7 +249,7 @@ impl Harness {
             Undo::Revup(phase, data) => {
                 self.done(&Request::SetRevupData(phase, data))?;
                 let now = self.acknowledged(&Request::GetRevupData(phase))?;
-                let left = format!("phase {phase} as it was found: {}", Hex(&data.to_bytes()));
+                let left = format!("phase {phase} restored to: {}", Hex(&data.to_bytes()));
                 self.require(now == data.to_bytes(), left)
             }
             Undo::Segment(segment) => {
@@ -263,7 +264,7 @@ impl Harness {
         let Some(value) = register.decode(self.profile(), bytes) else { return Ok(()) };
         self.set(register, value)?;
         let now = self.get(register)?;
-        self.require(now == bytes, format!("{register} as it was found: {}", Hex(bytes)))
+        self.require(now == bytes, format!("{register} restored to: {}", Hex(bytes)))
     }
 
     fn put_back_setpoints(&mut self, before: Setpoints) -> Result<(), Stop> {
@@ -285,13 +286,13 @@ impl Harness {
             others.into_iter().chain([(RegisterId::RAMP_FINAL_SPEED, before.speed)])
         {
             let held = self.value(register)? == value;
-            self.require(held, format!("{register} as it was found: {value}"))?;
+            self.require(held, format!("{register} restored to: {value}"))?;
         }
         Ok(())
     }
 
     /// Any frame makes its motor the current one.
-    fn put_back_current(&mut self) -> Result<(), Stop> {
+    fn restore_current(&mut self) -> Result<(), Stop> {
         let Some(index) = self.current else { return Ok(()) };
         let Some(motor) = MotorNumber::new(index.saturating_add(1)) else { return Ok(()) };
         let header = Frame::header(FrameCode::GetReg.number(), motor.number());
@@ -299,7 +300,7 @@ impl Harness {
     }
 }
 
-/// Whether writing a register changes what the next start does.
+/// Whether writing a register changes the effect of the next start.
 pub(super) fn is_setpoint(register: RegisterId) -> bool {
     matches!(
         register,

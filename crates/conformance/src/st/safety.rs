@@ -1,8 +1,8 @@
-//! What may start a motor.
+//! Bytes that may start a motor.
 
 use motorlink_proto::st::{Command, Frame, FrameCode, Parse};
 
-/// Commands after which something may turn or be under voltage.
+/// Commands after which a motor may turn or be under voltage.
 const STARTS: [Command; 5] = [
     Command::StartMotor,
     Command::StartStop,
@@ -11,8 +11,8 @@ const STARTS: [Command; 5] = [
     Command::PfcEnable,
 ];
 
-/// Whether a drive may take these bytes, from any byte on, for a command that starts something. The
-/// checksum of what begins with the first byte does not matter: a drive may not look at it.
+/// Whether a drive may read these bytes, from any byte on, as a command that starts something. The
+/// checksum of a frame at the first byte is ignored, because a drive may not check it.
 pub fn may_start(bytes: &[u8]) -> bool {
     let starts = |header: u8, payload: &[u8]| {
         let code = header & 0x1F;

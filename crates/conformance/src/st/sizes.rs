@@ -14,7 +14,7 @@ use crate::reading::{S18, S19};
 pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     let mut cases: Vec<Case<Harness>> = Vec::new();
     for register in RegisterId::all().filter(|&id| id != RegisterId::TARGET_MOTOR) {
-        // What cannot be read back does not show what was kept of a value.
+        // For a register that cannot be read, the stored part of a value is unknown.
         let readable = read_size(register, profile).is_some();
         let Writing::Takes(size) = writing(register, profile) else { continue };
         if !readable {
@@ -65,7 +65,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     cases
 }
 
-/// Messages with the bytes that they need at least, and how fewer are refused.
+/// Messages with their minimum size in bytes, and the refusal of shorter ones.
 const SHORT: [(FrameCode, usize, ErrorCode); 8] = [
     (FrameCode::SetReg, 1, ErrorCode::WrongSet),
     (FrameCode::GetReg, 1, ErrorCode::GetWriteOnly),
@@ -77,7 +77,8 @@ const SHORT: [(FrameCode, usize, ErrorCode); 8] = [
     (FrameCode::SetTorqueRamp, 6, ErrorCode::WrongSet),
 ];
 
-/// A register that is there and can be read back, kept; its value, and one to write.
+/// Reads and records a register that exists and can be read. Returns its bytes and a value to
+/// write.
 fn prepare(harness: &mut Harness, register: RegisterId) -> Result<(Vec<u8>, i32), Stop> {
     if let Some(shape) = register.shape() {
         harness.need(shape.feature)?;
@@ -108,13 +109,13 @@ fn shorter(harness: &mut Harness, register: RegisterId, size: usize) -> Result<(
     let (_, value) = prepare(harness, register)?;
     harness.set(register, value)?;
     for kept in 0..size {
-        // One bit of the low byte differs, so that speeds and shares stay what they can be.
+        // Changes one bit of the low byte, so that speeds and percentages remain valid.
         let mut bytes = value.to_le_bytes();
         if kept > 0 {
             bytes[0] ^= 0x04;
         }
         let taken = harness.done(&Request::SetRegister { register, value: &bytes[..kept] });
-        // Whether nothing at all is a value that is too short is a reading as well.
+        // Whether an empty value is a value that is too short is also a reading.
         if kept == 0 {
             harness.note(S19, taken)?;
         } else {
@@ -143,19 +144,19 @@ fn short_refused(harness: &mut Harness, register: RegisterId, size: usize) -> Re
     Ok(())
 }
 
-/// Fills the drive's receive buffer with bytes that are harmless in any message: stock firmware
-/// takes them for those that a short message does not carry (SPEC-NOTES S18).
+/// Fills the drive's receive buffer with bytes that are harmless in any message. Shipped firmware
+/// uses them for the missing bytes of a short message (SPEC-NOTES S18).
 fn prime(harness: &mut Harness) -> Result<(), Stop> {
     let bytes = harness.frame(0x1D, &[0xEE; 16]);
     harness.refused_bytes(&bytes, ErrorCode::BadFrameId)
 }
 
-/// A refusal; in profile `mcsdk-5.4` an ACK only means that the drive is stock firmware.
+/// Checks a refusal. In profile `mcsdk-5.4` an ACK shows shipped firmware.
 fn refused_or_old_bytes(harness: &mut Harness, bytes: &[u8], code: ErrorCode) -> Result<(), Stop> {
     let reply = harness.exchange(bytes)?;
     if harness.profile() == Profile::Mcsdk54 && reply.header == HEADER_ACK {
         return Err(Stop::Skipped(
-            "the drive takes old bytes for missing ones, as shipped firmware does".to_owned(),
+            "the drive uses old bytes for missing ones, like shipped firmware".to_owned(),
         ));
     }
     harness.require_nack(&reply, code)
@@ -176,13 +177,13 @@ fn too_short(
         prime(harness)?;
         let bytes = harness.frame(code.number(), &[0; 16][..size]);
         refused_or_old_bytes(harness, &bytes, refusal)?;
-        harness.require_idle("for nothing was started")?;
+        harness.require_idle("because nothing was started")?;
     }
     let now = setpoints(harness)?;
     harness.require(now == before, "mode and references as before the refused message")
 }
 
-/// What the messages that are too short would change.
+/// The settings that the short messages would change.
 fn setpoints(harness: &mut Harness) -> Result<Vec<Vec<u8>>, Stop> {
     let registers = [
         RegisterId::CONTROL_MODE,

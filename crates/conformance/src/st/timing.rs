@@ -1,4 +1,4 @@
-//! Cases of 4.1: how long a drive has for a reply, and a master for a frame.
+//! Cases of 4.1: timeouts of replies and of commands.
 
 use motorlink_proto::st::{ErrorCode, FrameCode, HEADER_ACK, Profile, RegisterId, Request};
 use motorlink_proto::time::Micros;
@@ -7,16 +7,16 @@ use super::harness::{Harness, RECEPTION, Reply};
 use crate::case::{Case, Stop};
 use crate::reading::{S11, S29};
 
-/// In this time a reply must have come (4.1).
+/// Timeout of a reply (4.1).
 const ANSWER: Micros = Micros::from_millis(1_000);
-/// How late after the reception timeout its NACK may come: for a drive that looks at its timer
-/// every few milliseconds, an adapter that keeps bytes back, and a host with other things to do.
+/// Maximum delay of the NACK after the reception timeout. It allows for a drive that polls its
+/// timer every few milliseconds, an adapter that delays bytes, and a busy host.
 const SLACK: Micros = Micros::from_millis(45);
-/// How much earlier than 25 ms a timer of another clock may be.
+/// Maximum difference between 25 ms of two clocks.
 const EARLY: Micros = Micros::from_millis(3);
-/// How long it is watched that nothing comes.
+/// Duration of the check that no bytes come.
 const WATCH: Micros = Micros::from_millis(100);
-/// How often what depends on this host's own timing is tried.
+/// Number of attempts of cases that depend on this host's timing.
 const TRIES: usize = 5;
 
 pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
@@ -34,18 +34,18 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
                 Case::new("the_timeout_is_answered_once", &["ST-4.1-08", "ST-2-03"], once),
                 Case::new("the_timeout_is_25_ms", &["ST-4.1-08"], on_time),
                 Case::new(
-                    "bytes_behind_a_timeout_begin_a_new_frame",
+                    "bytes_after_a_timeout_begin_a_new_frame",
                     &["ST-4.1-08", "ST-4.1-18"],
                     late_bytes,
                 )
                 .reading(S29),
-                Case::new("a_frame_within_25_ms_is_taken", &["ST-4.1-08"], in_time),
+                Case::new("a_frame_within_25_ms_is_accepted", &["ST-4.1-08"], in_time),
                 Case::new("the_timeout_counts_from_the_first_byte", &["ST-4.1-08"], trickle)
                     .reading(S11),
             ]);
         }
         Profile::Mcsdk54 => cases.push(Case::new(
-            "a_frame_may_take_as_long_as_it_likes",
+            "a_frame_may_take_any_time",
             &["ST-4.1-08"],
             |harness: &mut Harness| {
                 let bytes = harness.encode(&Request::GetRegister(RegisterId::STATUS));
@@ -55,8 +55,10 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
                     harness.send_more(&bytes[size..])?;
                     let reply = harness.reply(ANSWER)?;
                     let held = reply.is_some_and(|reply| reply.header == HEADER_ACK);
-                    harness
-                        .require(held, "ACK, for this firmware has no timeout (SPEC-NOTES S11)")?;
+                    harness.require(
+                        held,
+                        "ACK, because this firmware has no timeout (SPEC-NOTES S11)",
+                    )?;
                 }
                 Ok(())
             },
@@ -65,17 +67,17 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
     cases
 }
 
-/// Where a frame with a payload of 6 bytes may be cut.
+/// The positions where a frame with a payload of 6 bytes is cut.
 const CUTS: [(&str, usize); 5] = [
-    ("behind the header", 1),
-    ("behind the length", 2),
-    ("behind a byte of the payload", 3),
+    ("after the header", 1),
+    ("after the length", 2),
+    ("after a byte of the payload", 3),
     ("within the payload", 5),
     ("before the checksum", 8),
 ];
 
 fn in_a_second(harness: &mut Harness) -> Result<(), Stop> {
-    // The quickest of several: a host that is busy once is no slow drive.
+    // The shortest of several delays: a busy host must not count as a slow drive.
     let mut quickest = None;
     for _ in 0..3 {
         for request in [
@@ -96,7 +98,7 @@ fn in_a_second(harness: &mut Harness) -> Result<(), Stop> {
     Err(harness.failed(format!("a reply within 1 s, not after {delay} ms")))
 }
 
-/// A question that is longer than it need be, its beginning.
+/// The beginning of a read that is longer than necessary.
 fn beginning(harness: &Harness, size: usize) -> Vec<u8> {
     let payload = [RegisterId::STATUS.0, 0xEE, 0xEE, 0xEE, 0xEE, 0xEE];
     let mut bytes = harness.frame(FrameCode::GetReg.number(), &payload);
@@ -104,7 +106,7 @@ fn beginning(harness: &Harness, size: usize) -> Vec<u8> {
     bytes
 }
 
-/// Sends the beginning of a frame; the NACK TIMEOUT that must come of it.
+/// Sends the beginning of a frame. Returns the NACK TIMEOUT, which must follow.
 fn timed_out(harness: &mut Harness, size: usize) -> Result<Reply, Stop> {
     harness.out_of_step = true;
     let bytes = beginning(harness, size);
@@ -127,7 +129,7 @@ fn once(harness: &mut Harness) -> Result<(), Stop> {
 fn on_time(harness: &mut Harness) -> Result<(), Stop> {
     let mut outcome = Ok(());
     for _ in 0..TRIES {
-        // What this host does between two looks at its clock makes a drive look late, never early.
+        // A delay of this host makes a drive look late, never early.
         let began = harness.clock.now();
         let reply = timed_out(harness, 2)?;
         let took = harness.clock.now().since(began);
@@ -144,7 +146,7 @@ fn on_time(harness: &mut Harness) -> Result<(), Stop> {
     outcome
 }
 
-/// The rest of a frame that timed out is the beginning of another (SPEC-NOTES S29).
+/// The rest of a frame that timed out is the beginning of another frame (SPEC-NOTES S29).
 fn late_bytes(harness: &mut Harness) -> Result<(), Stop> {
     let bytes = harness.encode(&Request::GetRegister(RegisterId::STATUS));
     timed_out(harness, 2)?;
@@ -155,8 +157,8 @@ fn late_bytes(harness: &mut Harness) -> Result<(), Stop> {
     harness.status().map(drop)
 }
 
-/// Bytes that come one by one are timed from the first (SPEC-NOTES S11): the NACK comes while they
-/// still come.
+/// The reception timeout starts at the first byte (SPEC-NOTES S11): with bytes sent one by one, the
+/// NACK comes while bytes are still sent.
 fn trickle(harness: &mut Harness) -> Result<(), Stop> {
     let bytes = beginning(harness, 8);
     harness.out_of_step = true;
@@ -167,7 +169,7 @@ fn trickle(harness: &mut Harness) -> Result<(), Stop> {
         }
         harness.send_more(&[*byte])?;
     }
-    Err(harness.failed("NACK TIMEOUT 25 ms after the first byte, while others still come"))
+    Err(harness.failed("NACK TIMEOUT 25 ms after the first byte, while bytes are still sent"))
 }
 
 fn in_time(harness: &mut Harness) -> Result<(), Stop> {
@@ -187,7 +189,7 @@ fn in_time(harness: &mut Harness) -> Result<(), Stop> {
             return Ok(());
         }
         if took < Micros(RECEPTION.as_micros() * 9 / 10) {
-            outcome = Err(harness.failed("ACK, for the frame was whole after 15 ms"));
+            outcome = Err(harness.failed("ACK, because the frame was complete after 15 ms"));
         }
         harness.drain(WATCH)?;
     }

@@ -1,4 +1,4 @@
-//! Cases of table 3's units, of its synonyms and of the PFC's registers.
+//! Cases of the units and synonyms of table 3, and of the PFC's registers.
 
 use motorlink_proto::Hex;
 use motorlink_proto::st::register::Feature;
@@ -10,7 +10,7 @@ use super::motion;
 use crate::case::{Case, Need, ReadAs, Stop};
 use crate::reading::{S7, S23, S28};
 
-/// A register, its clause, its feature, the range of its values at rest, the range in words.
+/// A register, its clauses, its feature, the range of its values at rest, and the range as text.
 type Row =
     (RegisterId, &'static [&'static str], Feature, std::ops::RangeInclusive<i32>, &'static str);
 
@@ -23,7 +23,7 @@ const AT_REST: [Row; 6] = [
     (RegisterId::PFC_ACBUS_RMS, &["ST-4.4-36"], Feature::Pfc, 0..=1_000, "at most 1000 V"),
 ];
 
-/// Registers of table 3 with another name each.
+/// Registers of table 3 that have a second name.
 const SYNONYMS: [(RegisterId, RegisterId); 4] = [
     (RegisterId::I_Q, RegisterId::TORQUE_MEAS),
     (RegisterId::I_D, RegisterId::FLUX_MEAS),
@@ -42,7 +42,7 @@ pub(super) fn cases(profile: Profile) -> Vec<Case<Harness>> {
                     harness.need(feature)?;
                     let value = harness.value(register)?;
                     let held = harness.require(range.contains(&value), format!("ACK with {words}"));
-                    // Below zero is a value of a type that table 3 does not name.
+                    // The sign of a value below zero is a reading: table 3 gives the type no sign.
                     if value < 0 { held.read_as(S23) } else { held }
                 },
             )
@@ -87,7 +87,7 @@ fn shares(harness: &mut Harness) -> Result<(), Stop> {
     Ok(())
 }
 
-/// Mains of any country, or none.
+/// Mains frequency of any country, or none.
 fn mains(harness: &mut Harness) -> Result<(), Stop> {
     harness.need(Feature::Pfc)?;
     let frequency = harness.value(RegisterId::PFC_ACBUS_FREQ)?;
@@ -95,7 +95,7 @@ fn mains(harness: &mut Harness) -> Result<(), Stop> {
     harness.require(held, "ACK with 450 to 650, or 0 without mains")
 }
 
-/// What has two names has one value. Registers of access D are only read in a data segment.
+/// A register with two names has one value. Registers of access D are read only in a data segment.
 fn synonyms(harness: &mut Harness) -> Result<(), Stop> {
     empty_segment(harness)?;
     let registers: Vec<u8> = SYNONYMS.iter().flat_map(|(one, other)| [one.0, other.0]).collect();

@@ -3,7 +3,7 @@
 use motorlink_proto::st::register::{Type, Unit};
 use motorlink_proto::st::{Profile, RegisterId};
 
-/// Values that differ from what is there, that are harmless at rest and whose bytes differ.
+/// Values that differ from the present one, are harmless at rest, and have different bytes.
 pub(super) fn samples(profile: Profile, register: RegisterId, before: &[u8]) -> Vec<i32> {
     let before = register.decode(profile, before).unwrap_or(0);
     let Some(shape) = register.shape() else { return Vec::new() };
@@ -11,7 +11,8 @@ pub(super) fn samples(profile: Profile, register: RegisterId, before: &[u8]) -> 
         RegisterId::CONTROL_MODE => &[0, 1, 0],
         RegisterId::RAMP_FINAL_SPEED => &[0x0640 / 6 * 6, -1_002, 70_002],
         RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => &[0x25, 0x28],
-        // Near what it is: a bus that is under voltage is not to be told anything else.
+        // Near the present value: a drive whose bus is under voltage must not get another
+        // reference.
         RegisterId::PFC_DCBUS_REF => return vec![before + 1, before - 1],
         _ => match (shape.ty(profile), shape.unit) {
             (_, Unit::Percent) if profile == Profile::Spec => &[50, 91],
@@ -31,7 +32,7 @@ pub(super) fn samples(profile: Profile, register: RegisterId, before: &[u8]) -> 
     values.iter().map(kept).collect()
 }
 
-/// A speed as the drive shows it: shipped firmware keeps tenths of a hertz (SPEC-NOTES S12).
+/// A speed as the drive shows it: shipped firmware stores tenths of a hertz (SPEC-NOTES S12).
 pub(super) fn as_kept(profile: Profile, rpm: i32) -> i32 {
     match profile {
         Profile::Spec => rpm,

@@ -1,4 +1,4 @@
-//! Links whose time runs out: a host that would wait for ever gets an error.
+//! Links with a time limit: a host that would wait without end gets an error.
 #![allow(dead_code, reason = "a host has a line or a bus")]
 
 use motorlink::Clock;
@@ -7,7 +7,7 @@ use motorlink_link::serve::{Station, StationLink};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
-/// Longer than any correct host takes for a scenario.
+/// More time than any correct host needs for a scenario.
 const END: Instant = Instant(60_000_000);
 
 /// A link to a station on virtual time.
@@ -44,7 +44,7 @@ impl<S: Station<u8> + Send> Finite<S, u8> {
         self.link.write(bytes)
     }
 
-    /// What comes until a moment.
+    /// The bytes received until a moment.
     pub fn receive(&mut self, until: Instant) -> Result<Vec<u8>, PortError> {
         let mut buffer = [0; 1024];
         let wait = self.left(until);
@@ -60,7 +60,7 @@ impl<S: Station<CanFrame> + Send> Finite<S, CanFrame> {
         CanLink::send(&mut self.link, frame)
     }
 
-    /// The next frame that comes until a moment.
+    /// The next frame received until a moment.
     pub fn receive(&mut self, until: Instant) -> Result<Option<CanFrame>, PortError> {
         let wait = self.left(until);
         let received = CanLink::receive(&mut self.link, wait)?;

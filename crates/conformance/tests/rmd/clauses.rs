@@ -1,4 +1,4 @@
-//! The clauses and what tests them belong together.
+//! Checks that clauses and cases match.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
@@ -19,7 +19,7 @@ fn each_paragraph_of_the_document_has_clauses_that_are_numbered() {
 }
 
 #[test]
-fn every_clause_is_tested_or_says_why_not() {
+fn every_clause_is_tested_or_has_a_reason() {
     let suite = suite();
     for clause in CLAUSES {
         let tested = suite.iter().any(|case| case.clauses.contains(&clause.id));

@@ -1,5 +1,4 @@
-//! Motors that are in order pass however they are reached, whatever they drive, and with what real
-//! sensors add.
+//! Correct motors pass through any adapter, with any load, and with the noise of real sensors.
 
 use std::collections::VecDeque;
 use std::time::Duration as Span;
@@ -19,7 +18,7 @@ fn passes(tested: &Tested) {
     assert!(failed.is_empty() && tested.report.is_clean(), "{failed:#?}");
 }
 
-/// A USB adapter: frames wait for the next turn of the bus.
+/// A USB adapter: frames wait for the next transfer.
 struct Adapter {
     bus: Box<dyn CanLink>,
     clock: Clock,
@@ -96,9 +95,9 @@ fn a_motor_with_noisy_sensors_passes() {
     passes(&Setup { behaviour: noisy(), ..Setup::new(vec![motor(1)]) }.run());
 }
 
-/// A load that two amperes do not move is no fault of the motor.
+/// A load that two amperes do not move is not a fault of the motor.
 #[test]
-fn a_motor_that_its_load_holds_is_not_blamed_for_it_by_the_torque_case() {
+fn a_motor_blocked_by_its_load_does_not_fail_the_torque_case() {
     let mut config = motor(1);
     config.plant.load.brake = 8.0;
     let tested = Setup { allowed: &[Need::Spin], ..Setup::new(vec![config]) }.run();

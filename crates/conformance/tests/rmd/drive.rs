@@ -1,5 +1,5 @@
-//! Simulated motors on virtual time, the world around them, and what may be put between them and
-//! the bus.
+//! Simulated motors on virtual time, with their environment. A wrapper can change what they receive
+//! and send.
 
 use motorlink::port::CanLink;
 use motorlink_conformance::rmd::{Harness, Options, suite};
@@ -14,13 +14,13 @@ use crate::shared::Shared;
 
 pub const EVERYTHING: [Need; 4] = [Need::Spin, Need::Rom, Need::PowerCycle, Need::Fault];
 
-/// What happens to motors.
+/// An event that the motors handle.
 pub enum Event<'a> {
     Frame(&'a CanFrame),
     PowerOn,
 }
 
-/// What is done in place of what the motors do.
+/// Replaces the handling of events by the motors.
 pub type Behaviour = Box<dyn FnMut(&mut Motors, Event) -> Vec<CanFrame> + Send>;
 
 /// Motors on a bus.
@@ -31,7 +31,7 @@ pub struct Motors {
 }
 
 impl Motors {
-    /// What the motors do.
+    /// The normal handling by the motors.
     pub fn pass(&mut self, event: Event) -> Vec<CanFrame> {
         let mut replies = Vec::new();
         if let Event::Frame(frame) = event {
@@ -40,23 +40,23 @@ impl Motors {
         replies
     }
 
-    /// The data of the reply of the motor that is tested.
+    /// The data of the reply of the motor under test.
     pub fn ask(&mut self, data: [u8; 8]) -> [u8; 8] {
         self.try_ask(data).expect("a command that is answered")
     }
 
-    /// The same for what may not be a command.
+    /// The same for data that may be an unknown command.
     pub fn try_ask(&mut self, data: [u8; 8]) -> Option<[u8; 8]> {
         let replies = self.pass(Event::Frame(&CanFrame::new(self.first.can_id(), data)));
         replies.first().and_then(CanFrame::eight_bytes).map(|(_, data)| *data)
     }
 
-    /// The motor that is tested.
+    /// The ID of the motor under test.
     pub fn first_id(&self) -> MotorId {
         self.first
     }
 
-    /// The same, to change it.
+    /// The motor under test, mutable.
     pub fn first_mut(&mut self) -> &mut RmdNode {
         self.bus.node_mut(self.first).expect("it is there")
     }
@@ -70,14 +70,14 @@ impl Motors {
     }
 }
 
-/// Motors that may behave otherwise.
+/// Motors with a possibly changed behaviour.
 pub struct Station {
     pub motors: Motors,
     behaviour: Behaviour,
-    /// Whether a motor was ever under current, or told to move.
+    /// Whether a motor was ever under current, or got a motion command.
     pub energised: bool,
     pub powered_on: u32,
-    /// The greatest speed that a motor had when a frame came, °/s.
+    /// The maximum speed of a motor at the arrival of a frame, °/s.
     pub fastest: f32,
 }
 
@@ -96,7 +96,7 @@ impl serve::Station<CanFrame> for Station {
 
 pub type Wire = Shared<Station>;
 
-/// The hand at the power switch.
+/// The environment of the motors: power and faults.
 struct Around {
     bus: Wire,
     interrupted: Option<Instant>,
@@ -133,8 +133,8 @@ impl World for Around {
     }
 }
 
-/// A motor unlike a new one in all that can be told, so that nothing passes by chance. It turns
-/// a disc, as on a bench.
+/// A motor whose settings all differ from the defaults, so that no case passes by chance. Its load
+/// is a disc, as on a test bench.
 pub fn motor(id: u8) -> RmdConfig {
     let mut config = RmdConfig {
         gains: [101, 99, 102, 98, 103, 97],
@@ -148,7 +148,7 @@ pub fn motor(id: u8) -> RmdConfig {
     config
 }
 
-/// What came of the suite, and the motors afterwards.
+/// The report of the suite, and the motors afterwards.
 pub struct Tested {
     pub report: Report,
     bus: Wire,
@@ -159,22 +159,22 @@ impl Tested {
         look(&self.bus.station())
     }
 
-    /// The time that the run took, s.
+    /// Duration of the run, s.
     pub fn seconds(&self) -> u64 {
         self.bus.clock.now().0 / 1_000_000
     }
 }
 
-/// What is tested, and how: everything is allowed unless told otherwise.
+/// The motors and the options of a test. By default everything is permitted.
 pub struct Setup {
-    /// The motors on the bus; the first is tested.
+    /// The motors on the bus. The first one is tested.
     pub motors: Vec<RmdConfig>,
     pub allowed: &'static [Need],
     pub behaviour: Behaviour,
     pub suite: Vec<Case<Harness>>,
-    /// What is between the kit and the bus.
+    /// The link between the kit and the bus.
     pub port: fn(&Wire) -> Box<dyn CanLink>,
-    /// When the user has had enough.
+    /// When the user interrupts the run.
     pub interrupted: Option<Instant>,
 }
 
@@ -191,13 +191,13 @@ impl Setup {
         }
     }
 
-    /// Puts the first motor through the suite, readings and all.
+    /// Runs the suite on the first motor. Differences from readings are failures.
     pub fn run(self) -> Tested {
         let Tested { report, bus } = self.run_apart();
         Tested { report: report.strict(), bus }
     }
 
-    /// The same, what differs from a reading apart.
+    /// The same, but differences from readings are not failures.
     pub fn run_apart(self) -> Tested {
         let Setup { motors, allowed, behaviour, suite, port, interrupted } = self;
         let node = |config: &RmdConfig| {
@@ -212,14 +212,14 @@ impl Setup {
         let options = Options { id, encoder, allowed: allowed.to_vec() };
         let world = Box::new(Around { bus: bus.clone(), interrupted });
         let report = run(&suite, &mut Harness::new(port(&bus), world, options), |_| {});
-        // What was told last gets its time.
+        // Executes the last command.
         let now = bus.clock.now();
         bus.station().motors.bus.advance_to(now + Micros::from_millis(1_000));
         Tested { report, bus }
     }
 }
 
-/// What motors do.
+/// The unchanged behaviour.
 pub fn honest() -> Behaviour {
     Box::new(Motors::pass)
 }

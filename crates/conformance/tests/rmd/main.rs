@@ -1,4 +1,4 @@
-//! The kit for RMD motors, tested on simulated ones.
+//! Tests of the kit for RMD motors, with simulated motors.
 
 mod clauses;
 mod conditions;

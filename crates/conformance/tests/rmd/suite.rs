@@ -1,4 +1,4 @@
-//! Simulated motors pass, and are afterwards what they were.
+//! Simulated motors pass, and are restored.
 
 use motorlink_conformance::rmd::suite;
 use motorlink_conformance::{Report, Verdict};
@@ -8,21 +8,21 @@ use motorlink_proto::time::Instant;
 
 use crate::drive::{Behaviour, Event, Setup, Tested, motor};
 
-/// Names of the cases that ended so.
+/// Names of the cases with this verdict.
 fn names(report: &Report, verdict: &str) -> Vec<String> {
     let cases = report.outcomes.iter().filter(|outcome| outcome.verdict.word() == verdict);
     cases.map(|outcome| outcome.name.clone()).collect()
 }
 
 #[test]
-fn an_interrupted_run_leaves_the_motor_off_and_as_it_was() {
+fn an_interrupted_run_leaves_the_motor_off_and_restored() {
     let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
     let mut suite = suite();
     suite.retain(|case| {
         case.name == "a_speed_is_reached_either_way" || case.name == "status_2_can_be"
     });
     suite.reverse();
-    // By then the motor turns.
+    // At this time the motor turns.
     let interrupted = Some(Instant(300_000));
     let tested = Setup { suite, interrupted, ..Setup::new(vec![motor(1)]) }.run();
     assert!(tested.station(|station| station.fastest > 40.0));
@@ -30,11 +30,11 @@ fn an_interrupted_run_leaves_the_motor_off_and_as_it_was() {
     assert_eq!(settings(&tested), settings(&before));
 }
 
-/// What a bus does once the motor turns.
+/// A fault of the bus while the motor turns.
 type Wrong = fn(&CanFrame, Vec<CanFrame>) -> Vec<CanFrame>;
 
 #[test]
-fn a_motor_that_turns_is_switched_off_whatever_is_heard_on_its_bus() {
+fn a_turning_motor_is_switched_off_on_a_faulty_bus() {
     let cases: [(&str, Wrong); 3] = [
         ("nothing", |_, _| Vec::new()),
         ("a motor of another protocol", |frame, replies| {
@@ -67,7 +67,7 @@ fn a_motor_that_turns_is_switched_off_whatever_is_heard_on_its_bus() {
 }
 
 #[test]
-fn what_a_case_wrote_is_put_back_on_a_bus_that_loses_commands_now_and_then() {
+fn settings_are_restored_on_a_bus_that_loses_commands() {
     let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
     for every in [11, 13, 17] {
         let mut count = 0;
@@ -97,7 +97,7 @@ fn motors_of_every_encoder_width_pass() {
         passes(&tested);
         let beyond = ["an_offset_beyond_the_encoder_is_cut"];
         let alone =
-            ["four_torques_are_answered_lowest_id_first", "a_motor_beyond_4_does_not_hear_them"];
+            ["four_torques_are_answered_lowest_id_first", "a_motor_beyond_4_ignores_four_torques"];
         let skipped = names(&tested.report, "skipped");
         let width = if encoder_bits >= 16 { &beyond[..] } else { &[] };
         assert_eq!(skipped, [width, &alone[..]].concat(), "{encoder_bits} bits");
@@ -108,7 +108,7 @@ fn motors_of_every_encoder_width_pass() {
 fn one_of_four_motors_passes() {
     let tested = Setup::new([3, 1, 2, 4].map(motor).into()).run();
     passes(&tested);
-    assert_eq!(names(&tested.report, "skipped"), ["a_motor_beyond_4_does_not_hear_them"]);
+    assert_eq!(names(&tested.report, "skipped"), ["a_motor_beyond_4_ignores_four_torques"]);
 }
 
 #[test]
@@ -125,16 +125,16 @@ fn a_motor_with_another_id_passes() {
 }
 
 #[test]
-fn a_motor_is_afterwards_what_it_was() {
+fn a_motor_is_restored_after_the_run() {
     let before = Setup { allowed: &[], ..Setup::new(vec![motor(1)]) }.run();
     let after = Setup::new(vec![motor(1)]).run();
     assert_eq!(settings(&after), settings(&before));
     assert_eq!(settings(&after).2, Mode::Off);
     let writes = after.station(|station| station.motors.first().motor().rom_writes());
-    assert_eq!(writes, ROM_WRITES, "a case more or less that wears the ROM");
+    assert_eq!(writes, ROM_WRITES, "the number of ROM writes changed");
 }
 
-/// What a motor is, as far as anything can change it.
+/// All settings and states of a motor.
 pub fn settings(tested: &Tested) -> (Settings, Settings, Mode, Errors) {
     tested.station(|station| {
         let drive = station.motors.first().drive();
@@ -142,12 +142,12 @@ pub fn settings(tested: &Tested) -> (Settings, Settings, Mode, Errors) {
     })
 }
 
-/// Eleven cases write a ROM: most of them once, an echo and one about zero three times, two more about
-/// zero twice; and each puts back what was there.
+/// Eleven cases write a ROM: most of them once, an echo and one about zero three times, two more
+/// about zero twice. Each restores the ROM with one more write.
 const ROM_WRITES: u32 = (7 + 2 * 3 + 2 * 2) + 11;
 
 #[test]
-fn without_leave_nothing_is_energised_or_worn_and_it_is_over_soon() {
+fn without_permission_no_motor_is_energised_and_no_rom_is_written() {
     let tested = Setup { allowed: &[], ..Setup::new([1, 2, 3, 4].map(motor).into()) }.run();
     passes(&tested);
     tested.station(|station| {
@@ -162,6 +162,6 @@ fn without_leave_nothing_is_energised_or_worn_and_it_is_over_soon() {
     assert!(tested.seconds() < 15, "{} s on a bus without delays", tested.seconds());
     let needed =
         |name: &str| names(&tested.report, "skipped").iter().any(|skipped| skipped == name);
-    assert!(needed("a_speed_is_reached_either_way") && needed("a_written_offset_is_in_force"));
+    assert!(needed("a_speed_is_reached_either_way") && needed("a_written_offset_applies_at_once"));
     assert!(tested.report.count("passed") > 30);
 }

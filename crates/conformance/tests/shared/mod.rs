@@ -1,4 +1,4 @@
-//! A station on virtual time that a test looks at while the kit speaks to it.
+//! A station on virtual time. The test can inspect it while the kit uses it.
 #![allow(dead_code, reason = "no test needs all of it")]
 
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -9,7 +9,7 @@ use motorlink_link::serve::{Station, StationLink, Traffic};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
-/// Clones are the same station.
+/// Clones share the same station.
 pub struct Shared<S> {
     station: Arc<Mutex<S>>,
     pub clock: Clock,
@@ -27,7 +27,7 @@ impl<S> Shared<S> {
     }
 
     pub fn station(&self) -> MutexGuard<'_, S> {
-        self.station.lock().expect("nobody panicked with it")
+        self.station.lock().expect("no panic while it was locked")
     }
 }
 

@@ -1,4 +1,4 @@
-//! The clauses, the cases that name them, and the tests that they name belong together.
+//! Checks that the clauses, the cases that name them, and the named tests match.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,7 +14,7 @@ fn cases() -> BTreeMap<String, &'static [&'static str]> {
         .collect()
 }
 
-/// The paragraph as numbers, and the running number.
+/// The paragraph as numbers, and the number in the paragraph.
 fn place(id: &str) -> (Vec<u32>, u32) {
     let number = |text: &str| text.parse().unwrap_or_else(|_| panic!("{id} has no such form"));
     let parts: Vec<&str> = id.split('-').collect();
@@ -35,7 +35,7 @@ fn ids_count_without_a_gap_in_the_order_of_the_document() {
 }
 
 #[test]
-fn every_clause_is_tested_or_says_why_not() {
+fn every_clause_is_tested_or_has_a_reason() {
     let tested: BTreeSet<&str> = cases().into_values().flatten().copied().collect();
     for clause in st::CLAUSES {
         let on_a_drive = tested.contains(clause.id);

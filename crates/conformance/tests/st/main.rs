@@ -1,4 +1,4 @@
-//! The kit against simulated ST drives on virtual time: those that are right, and those that are not.
+//! Tests of the kit with simulated ST drives on virtual time, with and without deviations.
 
 mod clauses;
 mod mutants;

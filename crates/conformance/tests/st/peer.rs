@@ -1,4 +1,4 @@
-//! The drive under test: a simulated one on virtual time, as it is or with one deviation.
+//! The drive under test: a simulated drive on virtual time, unchanged or with one deviation.
 
 use motorlink_conformance::st::{self, Harness, Options};
 use motorlink_conformance::{Need, Report, Unavailable, World, run};
@@ -15,25 +15,25 @@ pub type Wire = Shared<Peer>;
 
 pub const ALL: [Need; 4] = [Need::Spin, Need::Rom, Need::PowerCycle, Need::Fault];
 
-/// Looks at bytes from the master and may change them, or answer them itself.
+/// Gets bytes of the master. It may change them, or return the reply itself.
 pub type Before = Box<dyn FnMut(&mut Station, Instant, &mut Vec<u8>) -> Option<Vec<u8>> + Send>;
-/// Looks at a reply, with the bytes it answers, and may change it.
+/// Gets a reply and the bytes that it answers. It may change the reply.
 pub type After = Box<dyn FnMut(&[u8], &mut Vec<u8>) + Send>;
 
-/// What a drive does otherwise than the simulated one.
+/// The deviations from the simulated drive.
 #[derive(Default)]
 pub struct Deviation {
-    /// Before the simulated drive.
+    /// Called before the simulated drive.
     pub before: Option<Before>,
-    /// Behind it.
+    /// Called after it.
     pub after: Option<After>,
-    /// How late a reply is.
+    /// The delay of a reply.
     pub late: Option<fn(&[u8]) -> Micros>,
-    /// Whether a frame that timed out is gone on with.
+    /// Whether bytes are appended to a frame that timed out.
     pub glue: bool,
-    /// Whether a power cycle leaves the slave alone.
+    /// Whether the slave keeps its state over a power cycle.
     pub remembers: bool,
-    /// What is said unasked, and how often.
+    /// Bytes that are sent periodically without a command, and the period.
     pub chatter: Option<(Micros, Vec<u8>)>,
 }
 
@@ -43,14 +43,14 @@ pub struct Peer {
     deviation: Deviation,
     /// Bytes since the last reply.
     request: Vec<u8>,
-    /// Bytes of a frame that timed out and is gone on with.
+    /// Bytes of a frame that timed out and is continued.
     old: Vec<u8>,
-    /// Replies, and when they leave.
+    /// Replies, and when they are sent.
     outbox: Vec<(Instant, Vec<u8>)>,
     next_chatter: Option<Instant>,
-    /// The fastest any motor ever turned, rpm.
+    /// The maximum speed of any motor, rpm.
     pub fastest: f32,
-    /// Everything that came from the master.
+    /// All bytes received from the master.
     pub heard: Vec<u8>,
 }
 
@@ -143,7 +143,7 @@ impl serve::Station<u8> for Peer {
     }
 }
 
-/// The power switch and the supply of the drive on the wire.
+/// The environment of the drive on the wire: power and supply voltage.
 struct Hands(Wire);
 
 impl World for Hands {
@@ -177,12 +177,12 @@ pub fn wire(peer: Peer) -> Wire {
     Shared::new(peer)
 }
 
-/// Puts the drive on a wire through the whole suite, readings and all.
+/// Runs the whole suite on the drive on a wire. Differences from readings are failures.
 pub fn test(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
     test_apart(wire, motor, allowed).strict()
 }
 
-/// The same, what differs from a reading apart.
+/// The same, but differences from readings are not failures.
 pub fn test_apart(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
     let profile = wire.station().station.profile();
     let motor = MotorNumber::new(motor).expect("1 to 7");
@@ -193,7 +193,7 @@ pub fn test_apart(wire: &Wire, motor: u8, allowed: &[Need]) -> Report {
     run(&st::suite(profile), &mut harness, |_| {})
 }
 
-/// The current motor, every register of a motor as it reads, and its rev-up phases.
+/// The current motor, the value of every register of a motor, and its rev-up phases.
 pub fn dump(wire: &Wire, motor: u8) -> Vec<(String, Vec<u8>)> {
     let profile = wire.station().station.profile();
     let mut all = Vec::new();
@@ -213,7 +213,7 @@ pub fn dump(wire: &Wire, motor: u8) -> Vec<(String, Vec<u8>)> {
     for phase in 0..5 {
         ask(format!("phase {phase}"), frame(Frame::header(0x08, motor), &[phase]));
     }
-    // Left as it was.
+    // Restores the current motor.
     ask("current motor".to_owned(), frame(Frame::header(0x02, current[2] + 1), &[0]));
     all
 }

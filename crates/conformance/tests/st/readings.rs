@@ -1,5 +1,5 @@
-//! Drives that do what the document says and read what it leaves open in another way: nothing fails,
-//! and each difference names its row of docs/SPEC-NOTES.md.
+//! Drives that meet the document but differ from our readings: no case fails, and each difference
+//! names its row of docs/SPEC-NOTES.md.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use crate::peer::{ALL, Deviation, Peer, frame, test_apart, wire};
 const SET: u8 = 0x01;
 const GET: u8 = 0x02;
 
-/// The rows that a drive differs from, and that nothing failed.
+/// The rows that a drive differs from. Checks that no case failed.
 fn rows(make: Deviation) -> BTreeSet<&'static str> {
     let report = test_apart(&wire(Peer::new(Profile::Spec, &MotorConfig::demo(), make)), 1, &ALL);
     let failed: Vec<_> = report.failed().collect();
@@ -30,7 +30,7 @@ fn differences(report: &Report) -> BTreeSet<&'static str> {
 }
 
 #[test]
-fn a_drive_that_is_right_differs_from_no_reading() {
+fn a_correct_drive_differs_from_no_reading() {
     assert!(rows(Deviation::default()).is_empty());
 }
 
@@ -44,7 +44,7 @@ fn replies_may_have_motor_bits_of_0() {
     assert_eq!(rows(make), BTreeSet::from(["S1"]));
 }
 
-/// Two numbers for at rest and in RUN that shipped firmware has for nothing.
+/// Uses two numbers for idle and RUN that shipped firmware does not use.
 #[test]
 fn states_may_have_other_numbers() {
     let make = gives(GET, |asked, value| {

@@ -1,4 +1,4 @@
-//! A slow line: bytes take their time both ways, and the suite knows.
+//! A slow line: bytes take time in both directions, and the suite knows their transmission time.
 
 use std::collections::VecDeque;
 use std::time::Duration as Span;
@@ -14,14 +14,14 @@ use motorlink_sim::st::MotorConfig;
 
 use crate::peer::{Deviation, Peer};
 
-/// A UART with a drive at its end. `send` returns at once, as a driver with a buffer does.
+/// A UART with a drive. `send` returns at once, like a driver with a buffer.
 struct Uart {
     peer: Peer,
     byte_time: Micros,
     clock: Clock,
-    /// Bytes on the way to the drive, and when each is there.
+    /// Bytes in transit to the drive, and their time of arrival.
     outward: VecDeque<(Instant, u8)>,
-    /// Bytes on the way back.
+    /// Bytes in transit from the drive.
     inward: VecDeque<(Instant, u8)>,
 }
 
@@ -33,7 +33,7 @@ impl Uart {
         }
     }
 
-    /// Lets time pass until the next thing happens, or until a moment.
+    /// Advances the time to the next event, or to a moment.
     fn step(&mut self, until: Instant) {
         let arrival = self.outward.front().map(|(at, _)| *at);
         let deadline = self.peer.deadline();
@@ -88,10 +88,10 @@ impl ByteLink for Uart {
 }
 
 #[test]
-fn a_slow_line_fails_nothing_and_skips_what_it_cannot_carry_in_time() {
+fn a_slow_line_skips_frames_that_take_too_long_and_fails_nothing() {
     let too_long: &[&str] = &[
-        "payloads_of_every_length_are_taken",
-        "what_no_data_segment_can_hold_is_refused",
+        "payloads_of_every_length_are_accepted",
+        "invalid_registers_of_a_data_segment_are_refused",
         "a_reply_may_have_128_bytes",
     ];
     let lines = [

@@ -1,4 +1,4 @@
-//! Drives that do what the document says pass, and are left as they were found.
+//! Drives that meet the document pass, and are restored.
 
 use std::collections::BTreeSet;
 
@@ -12,14 +12,14 @@ use crate::peer::{ALL, Deviation, Peer, Wire, dump, test, wire};
 
 const PROFILES: [Profile; 2] = [Profile::Spec, Profile::Mcsdk54];
 
-/// Reads differently after the motor has turned: physical things.
+/// Registers of physical quantities. They read differently after the motor turned.
 const PHYSICAL: [&str; 4] = ["HEATS_TEMP", "CURRENT_POSITION", "TARGET_POSITION", "MOVE_DURATION"];
 
 fn drive(profile: Profile, motors: &[MotorConfig]) -> Wire {
     wire(Peer::new(profile, motors, Deviation::default()))
 }
 
-/// Builds with every feature, with none, and what lies between.
+/// Builds with all features, with none, and with some.
 fn builds() -> Vec<Vec<MotorConfig>> {
     let bare = BuildConfig {
         observer_pll: false,
@@ -41,7 +41,7 @@ fn builds() -> Vec<Vec<MotorConfig>> {
     ]
 }
 
-/// A whole frame, for any motor, of a command that starts something.
+/// A complete frame, for any motor, with a command that starts something.
 fn is_start(bytes: &[u8]) -> bool {
     let [header, 1, command, check] = *bytes else { return false };
     let starts = [0x01, 0x06, 0x08, 0x0A, 0x0D].contains(&command);
@@ -50,17 +50,17 @@ fn is_start(bytes: &[u8]) -> bool {
 }
 
 #[test]
-fn what_may_start_a_motor_is_known() {
+fn bytes_that_may_start_a_motor_are_recognized() {
     assert!(may_start(&[0x23, 0x01, 0x01, 0x25]) && is_start(&[0x23, 0x01, 0x01, 0x25]));
-    assert!(may_start(&[0x23, 0x01, 0x06, 0x00]), "a drive may not look at the checksum");
+    assert!(may_start(&[0x23, 0x01, 0x06, 0x00]), "a drive may ignore the checksum");
     assert!(may_start(&[0x02, 0x03, 0x01, 0x01, 0x05]), "in the middle, motor 0");
-    assert!(may_start(&[0x03, 0x02, 0x0D, 0xEE, 0x00]), "with a byte too many");
+    assert!(may_start(&[0x03, 0x02, 0x0D, 0xEE, 0x00]), "with a surplus byte");
     assert!(!may_start(&[0x23, 0x01, 0x02, 0x26]), "STOP_MOTOR");
     assert!(!may_start(&[0x22, 0x01, 0x01, 0x24]), "GET_REG FLAGS");
     assert!(!may_start(&[0x03, 0x00, 0x03]) && !may_start(&[0x03]) && !may_start(&[]));
 }
 
-/// What went wrong, for whoever reads the failed test.
+/// The failures, as text for the failed test.
 fn not_clean(report: &Report) -> String {
     let bad = report
         .outcomes
@@ -73,7 +73,7 @@ fn not_clean(report: &Report) -> String {
     bad.take(5).map(text).collect()
 }
 
-/// Skipped cases by their reason, subjects left out.
+/// Skipped cases by their reason, without subjects.
 fn reasons(report: &Report) -> BTreeSet<(String, String)> {
     let reason = |outcome: &motorlink_conformance::Outcome| match &outcome.verdict {
         Verdict::Skipped(why) => {
@@ -86,7 +86,7 @@ fn reasons(report: &Report) -> BTreeSet<(String, String)> {
 }
 
 #[test]
-fn every_build_passes_in_both_profiles_and_is_left_as_it_was() {
+fn every_build_passes_in_both_profiles_and_is_restored() {
     for profile in PROFILES {
         for motors in builds() {
             for motor in [1, motors.len() as u8] {
@@ -105,7 +105,7 @@ fn every_build_passes_in_both_profiles_and_is_left_as_it_was() {
 }
 
 #[test]
-fn what_is_skipped_is_what_the_drive_cannot_show() {
+fn only_cases_that_the_drive_cannot_show_are_skipped() {
     let registers = [
         "a_register_is_read_in_its_size",
         "a_register_takes_a_value_and_gives_it_back",
@@ -118,7 +118,7 @@ fn what_is_skipped_is_what_the_drive_cannot_show() {
     let report = test(&drive(Profile::Spec, &MotorConfig::demo()), 1, &ALL);
     assert_eq!(reasons(&report), wanted);
 
-    // Between them the two motors have every feature but those that no simulated drive has.
+    // Together the two motors have every feature except those that no simulated drive has.
     for profile in PROFILES {
         let run = |motor| reasons(&test(&drive(profile, &MotorConfig::demo()), motor, &ALL));
         let both = &run(1) & &run(2);
@@ -134,7 +134,7 @@ fn what_is_skipped_is_what_the_drive_cannot_show() {
 }
 
 #[test]
-fn without_leave_the_motor_never_moves_and_nothing_that_could_start_it_is_sent() {
+fn without_permission_the_motor_never_moves_and_no_start_is_sent() {
     for profile in PROFILES {
         for motors in builds() {
             let wire = drive(profile, &motors);
@@ -152,7 +152,7 @@ fn without_leave_the_motor_never_moves_and_nothing_that_could_start_it_is_sent()
             {
                 let peer = wire.station();
                 assert_eq!(peer.fastest, 0.0, "the motor turned");
-                // The stream as a whole, as a drive that has lost step would see it.
+                // The stream as a whole, as a drive that is out of sync would read it.
                 let heard = &peer.heard;
                 assert!(!heard.is_empty());
                 assert!(!heard.windows(4).any(is_start), "a START was on the line");
@@ -163,7 +163,7 @@ fn without_leave_the_motor_never_moves_and_nothing_that_could_start_it_is_sent()
 }
 
 #[test]
-fn cases_that_need_leave_say_so() {
+fn skipped_cases_name_the_missing_permission() {
     let report = test(&drive(Profile::Spec, &MotorConfig::demo()), 1, &[]);
     let mut asked: Vec<&str> = Vec::new();
     for outcome in &report.outcomes {
@@ -195,7 +195,7 @@ fn a_motor_that_is_not_at_rest_is_not_tested() {
 }
 
 #[test]
-fn a_motor_that_the_drive_lacks_is_told() {
+fn a_missing_motor_is_reported() {
     let report = test(&drive(Profile::Spec, &MotorConfig::demo()), 3, &ALL);
     assert_eq!(report.count("not run"), report.outcomes.len());
     let Verdict::NotRun(why) = &report.outcomes[0].verdict else { unreachable!() };
@@ -219,8 +219,9 @@ fn a_drive_that_does_not_answer_is_given_up() {
 }
 
 #[test]
-fn what_a_case_wrote_is_put_back_after_a_line_that_was_bad_for_a_while() {
-    // Every 41st command is lost: cases fail in their middle, and the drive is as it was all the same.
+fn settings_are_restored_on_a_line_that_loses_commands() {
+    // Every 41st command is lost: cases fail in their middle, and the drive is restored
+    // nevertheless.
     let mut count = 0;
     let lossy = Deviation {
         before: Some(Box::new(move |_, _, bytes| {
@@ -240,7 +241,8 @@ fn what_a_case_wrote_is_put_back_after_a_line_that_was_bad_for_a_while() {
     assert_eq!(dump(&wire, 1), before);
 }
 
-/// A drive that goes wrong `after` so many replies, the first of them that to START_MOTOR.
+/// A drive whose replies are wrong after `after` replies. The first one is the reply to
+/// START_MOTOR.
 fn wrong_behind_a_start(after: u32, reply: impl Fn(u32, &mut Vec<u8>) + Send + 'static) -> Wire {
     let mut since: Option<u32> = None;
     let deviation = Deviation {
@@ -270,7 +272,7 @@ fn rests(wire: &Wire) -> bool {
 }
 
 #[test]
-fn a_motor_is_stopped_although_the_drive_says_nothing_any_more() {
+fn a_motor_is_stopped_if_the_drive_stops_answering() {
     for after in [1, 2, 3, 10] {
         let wire = wrong_behind_a_start(after, |_, reply| reply.clear());
         let report = test(&wire, 1, &ALL);
@@ -281,9 +283,9 @@ fn a_motor_is_stopped_although_the_drive_says_nothing_any_more() {
 }
 
 #[test]
-fn a_motor_is_stopped_and_the_run_goes_on_when_replies_are_lost() {
-    // The first in the case, the second while the case is undone: behind the question that brings the
-    // line in step are STATUS, STOP_MOTOR and STATUS again.
+fn a_motor_is_stopped_and_the_run_continues_when_replies_are_lost() {
+    // The first reply is lost during the case, the second while the case is undone. After the
+    // question that recovers the line these are STATUS, STOP_MOTOR and STATUS again.
     for second in 1..=5 {
         let lost = move |late, reply: &mut Vec<u8>| {
             if late == 0 || late == second {
@@ -300,11 +302,11 @@ fn a_motor_is_stopped_and_the_run_goes_on_when_replies_are_lost() {
 }
 
 #[test]
-fn a_pfc_that_a_case_enabled_is_disabled_although_the_case_stops_in_its_middle() {
+fn a_pfc_that_an_aborted_case_enabled_is_disabled() {
     let enable = [0x23, 0x01, 0x0A, 0x2E];
     let mut sent = 0;
     let deviation = Deviation {
-        // The case sends it twice; the reply to the second is lost.
+        // The case sends it twice. The reply to the second is lost.
         after: Some(Box::new(move |request, reply| {
             sent += u32::from(request == enable);
             if request == enable && sent == 2 {

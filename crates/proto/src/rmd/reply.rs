@@ -214,7 +214,7 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn invalid_error_bits_are_shown_and_mean_nothing() {
+    fn invalid_error_bits_are_shown_and_ignored() {
         assert_eq!(Errors::NONE.to_string(), "no error");
         for bits in 0..=u8::MAX {
             let errors = Errors(bits);

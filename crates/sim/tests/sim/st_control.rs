@@ -179,7 +179,7 @@ fn a_torque_ramp_is_linear() {
 }
 
 #[test]
-fn stop_ramp_holds_what_was_reached() {
+fn stop_ramp_holds_the_present_speed() {
     let mut line = NodeFixture::sensorless();
     line.ramp(1000, 0);
     line.run();

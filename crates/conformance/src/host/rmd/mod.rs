@@ -3,11 +3,11 @@
 mod motors;
 mod scenarios;
 
-/// How long a host waits for a reply unless it is said otherwise.
+/// Default timeout of the host.
 pub use motorlink_proto::rmd::DEFAULT_TIMEOUT as TIMEOUT;
 
 pub use motors::{Scenario, ScriptedMotors};
 pub use scenarios::scenarios;
 
-/// What a digit of 0x92 is in what a host says: degrees.
+/// The unit of a host's output, in degrees per digit of 0x92.
 pub const DIGIT: f64 = 0.01;

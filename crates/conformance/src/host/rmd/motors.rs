@@ -1,4 +1,4 @@
-//! Motors that answer as their script says.
+//! Motors that answer according to a script.
 
 use std::collections::BTreeMap;
 use std::marker;
@@ -25,7 +25,7 @@ pub type Scenario = crate::host::Scenario<Script>;
 
 pub(super) type Sends = Vec<Send<CanFrame>>;
 
-/// What the motors send for a request.
+/// What the motors send after a request.
 #[derive(Clone)]
 pub struct Script(Arc<dyn Fn(&Turn) -> Sends + marker::Send + Sync>);
 
@@ -35,21 +35,22 @@ impl Script {
     }
 }
 
-/// A request to one motor, and how a motor of the document answers it. 0x280 is one to each of four.
+/// A request to one motor, and the document's reply to it. 0x280 counts as one request to each of
+/// four motors.
 pub(super) struct Turn {
     pub id: MotorId,
     pub code: Code,
-    /// How often this motor was asked this before.
+    /// Number of earlier requests of this kind to this motor.
     pub asked: usize,
     pub request: CanFrame,
     pub reply: [u8; 8],
     /// The value in the reply, in digits.
     pub value: Option<i64>,
-    /// How long the host waits for a reply.
+    /// Timeout of the host.
     pub timeout: Micros,
 }
 
-/// Four motors, IDs 1 to 4, and a script. Clones are the same motors.
+/// Four motors with IDs 1 to 4, and a script. Clones share the same motors.
 #[derive(Clone)]
 pub struct ScriptedMotors(Arc<Mutex<Inner>>);
 
@@ -61,12 +62,12 @@ struct Inner {
     timeout: Micros,
 }
 
-/// Two requests to one motor within this time are in flight at once: no motor answers faster, and no
-/// host has given up by then.
+/// Two requests to one motor within this time are sent without waiting for a reply: no motor
+/// answers faster, and no host has a shorter timeout.
 const AT_ONCE: Micros = Micros(100);
 
 impl Scenario {
-    /// The motors of this scenario, for a host that waits `timeout` for a reply.
+    /// The motors of this scenario, for a host with this timeout.
     pub fn motors(&self, timeout: Micros) -> ScriptedMotors {
         let (asked, readings) = Default::default();
         let script = self.script.clone();
@@ -85,7 +86,7 @@ impl ScriptedMotors {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What passed so far.
+    /// The record so far.
     pub fn journal(&self) -> Journal {
         self.inner().outbox.journal.clone()
     }
@@ -138,7 +139,7 @@ impl Inner {
         self.outbox.journal.record(now, id.number(), code.into(), &show(frame), AT_ONCE)
     }
 
-    /// What a motor of the document answers, with a value of its own each time.
+    /// The document's reply, with a unique value each time.
     fn reply(&mut self, code: Code, request: &CanFrame) -> ([u8; 8], Option<i64>) {
         let Some(row) = code.info() else { return ([0; 8], None) };
         if let Some((_, echoed)) = request.eight_bytes()

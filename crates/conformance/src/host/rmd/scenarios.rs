@@ -1,4 +1,4 @@
-//! What RMD hosts are put through.
+//! The scenarios for RMD hosts.
 
 use std::marker;
 
@@ -15,61 +15,61 @@ const IDENTIFIERS: &str = "RMD-1-01";
 const DATA_FRAMES: &str = "RMD-1-03";
 const STANDARD_FRAMES: &str = "RMD-1-04";
 const EIGHT_BYTES: &str = "RMD-1-05";
-/// One frame, DATA[0] that of the request.
+/// One frame. Its DATA[0] is that of the request.
 const ANSWER: &str = "RMD-92-02";
 const CLEAR: &str = "RMD-9B-03";
 const FOUR: &str = "RMD-280-05";
-/// The reply to 0x80 is the request.
+/// The reply to 0x80 is a copy of the request.
 const OFF: &str = "RMD-80-04";
 
-/// An angle, in digits, that no motor has: what unasked frames tell.
+/// An angle, in digits, that no motor has. Frames without a request carry it.
 const UNASKED: u16 = 7_001;
 
-/// Everything that RMD hosts are put through.
+/// All scenarios for RMD hosts.
 pub fn scenarios() -> Vec<Scenario> {
     let mut all = reading();
     all.extend(many_motors());
     all
 }
 
-/// With one motor.
+/// Scenarios with one motor.
 fn reading() -> Vec<Scenario> {
     vec![
         read(
             "every_reading_has_its_own_value",
             &[IDENTIFIERS, ANSWER],
-            "sends one request, reads the reply and says its value, every time",
+            "sends one request, reads the reply and reports its value, every time",
             Demand::Everything,
             |turn| vec![right(turn)],
         ),
         read(
             "a_reply_is_awaited_for_the_whole_timeout",
             &[ANSWER],
-            "waits until the reply comes, 0.6 of its timeout later",
+            "waits for the reply, which comes after 0.6 of its timeout",
             Demand::Everything,
             |turn| vec![right(turn).after(share(turn.timeout, 3, 5))],
         ),
         read(
-            "a_reply_at_the_timeout_is_its_own_or_nobodys",
+            "a_reply_at_the_timeout_is_matched_to_its_request_or_dropped",
             &[ANSWER],
-            "takes the reply that comes when its time is over, or none; never for the next one's",
+            "accepts the reply at the end of its timeout, or no reply; never matches it to the next request",
             Demand::Truth,
             |turn| vec![right(turn).after(turn.timeout)],
         ),
         read(
-            "a_late_reply_is_not_the_next_ones",
+            "a_late_reply_is_not_matched_to_the_next_request",
             &[ANSWER],
-            "says that there was no reply, and leaves the motor alone until it came or cannot come \
-             any more",
+            "reports that there was no reply, and leaves the motor alone until it came or can no longer \
+             come",
             Demand::Truth,
             late,
         ),
         Scenario {
             task: Task::Alternate,
             ..read(
-                "a_late_reply_is_not_that_of_another_command",
+                "a_late_reply_is_not_matched_to_another_command",
                 &[ANSWER],
-                "says that there was no reply, and tells it from that to another command by DATA[0]",
+                "reports that there was no reply, and distinguishes it from the next one by DATA[0]",
                 Demand::Truth,
                 late,
             )
@@ -77,56 +77,56 @@ fn reading() -> Vec<Scenario> {
         read(
             "silence_is_an_error",
             &[ANSWER],
-            "says that there was no reply",
+            "reports that there was no reply",
             Demand::Truth,
             |_| Vec::new(),
         ),
         read(
-            "a_second_copy_of_a_reply_is_not_the_next_ones",
+            "a_duplicate_reply_is_not_matched_to_the_next_request",
             &[ANSWER],
-            "drops the copy that comes behind the reply, before it asks again",
+            "drops the duplicate after the reply, before the next request",
             Demand::Truth,
             |turn| vec![right(turn), Send::stray(frame(turn.id.can_id(), turn.reply))],
         ),
         read(
-            "an_unasked_frame_of_the_motor_is_nobodys",
+            "a_frame_without_a_request_is_dropped",
             &[ANSWER],
-            "drops the frame that comes behind the reply, before it asks again",
+            "drops the frame after the reply, before the next request",
             Demand::Truth,
             |turn| vec![right(turn), unasked(turn.id.can_id(), Code::ReadMultiTurnAngle)],
         ),
         read(
             "a_reply_to_another_command_is_not_the_answer",
             &[ANSWER],
-            "drops the frame, whose DATA[0] is another, and says that there was no reply",
+            "drops the frame, whose DATA[0] is wrong, and reports that there was no reply",
             Demand::Truth,
             |turn| vec![unasked(turn.id.can_id(), Code::ReadMotionStatus)],
         ),
         read(
             "a_reply_of_another_motor_is_not_the_answer",
             &[IDENTIFIERS],
-            "drops the frame, whose identifier is another motor's, and takes the reply behind it",
+            "drops the frame, whose identifier is another motor's, and accepts the reply after it",
             Demand::Everything,
             |turn| vec![unasked(turn.id.can_id() + 1, Code::ReadMultiTurnAngle), right(turn)],
         ),
         read(
-            "a_frame_of_seven_bytes_is_no_reply",
+            "a_frame_of_seven_bytes_is_not_a_reply",
             &[EIGHT_BYTES],
-            "drops the frame and says that there was no reply",
+            "drops the frame and reports that there was no reply",
             Demand::Truth,
             |turn| vec![shaped(turn, false, 7, "its frame had seven bytes")],
         ),
         read(
-            "an_extended_frame_is_no_reply",
+            "an_extended_frame_is_not_a_reply",
             &[STANDARD_FRAMES],
-            "drops the frame and says that there was no reply",
+            "drops the frame and reports that there was no reply",
             Demand::Truth,
             |turn| vec![shaped(turn, true, 8, "its frame had an extended identifier")],
         ),
         read(
-            "a_remote_frame_is_no_reply",
+            "a_remote_frame_is_not_a_reply",
             &[DATA_FRAMES],
-            "drops the frame and takes the reply behind it",
+            "drops the frame and accepts the reply after it",
             Demand::Everything,
             |turn| {
                 let remote = CanFrame::remote_frame(turn.id.can_id().into(), false, 8);
@@ -136,7 +136,7 @@ fn reading() -> Vec<Scenario> {
         read(
             "a_motor_of_v3_is_not_understood",
             &[IDENTIFIERS],
-            "says that there was no reply, or which protocol answers; replies on 0x240 + ID are not \
+            "reports that there was no reply, or the other protocol; replies on 0x240 + ID are not \
              V1.62",
             Demand::Truth,
             |turn| vec![foreign(turn, Dialect::V3)],
@@ -144,15 +144,15 @@ fn reading() -> Vec<Scenario> {
         read(
             "a_motor_of_lk_tech_is_not_understood",
             &[IDENTIFIERS],
-            "says that there was no reply, or which protocol answers; replies on 0x180 + ID are not \
+            "reports that there was no reply, or the other protocol; replies on 0x180 + ID are not \
              V1.62",
             Demand::Truth,
             |turn| vec![foreign(turn, Dialect::LkTech)],
         ),
         read(
-            "frames_of_nobody_are_dropped",
+            "frames_without_a_motor_identifier_are_dropped",
             &[IDENTIFIERS],
-            "drops what has no motor's identifier, and takes the reply behind it",
+            "drops frames without a motor's identifier, and accepts the reply after them",
             Demand::Everything,
             |turn| {
                 let nobody = [0x000, 0x140, 0x161, 0x280, 0x7FF];
@@ -161,9 +161,9 @@ fn reading() -> Vec<Scenario> {
             },
         ),
         read(
-            "a_flood_of_other_frames_does_not_matter",
+            "a_flood_of_other_frames_is_dropped",
             &[IDENTIFIERS],
-            "drops the frames of other motors, which come for ever, and finds its replies",
+            "drops the endless frames of other motors, and finds its replies",
             Demand::Everything,
             |turn| {
                 let other = unasked(turn.id.can_id() + 8, Code::ReadMultiTurnAngle);
@@ -173,20 +173,20 @@ fn reading() -> Vec<Scenario> {
         scenario(
             "an_echoing_adapter_is_not_a_motor",
             &[IDENTIFIERS, ANSWER],
-            "drops the copy of each frame that it sent, and takes the reply behind it",
+            "drops the echo of each sent frame, and accepts the reply after it",
             Task::Echoed,
             Demand::Everything,
             |turn| vec![Send::stray(turn.request), right(turn)],
         ),
         off(
             "an_off_that_is_repeated_is_acknowledged",
-            "sends 0x80 and says that the motor is off",
+            "sends 0x80 and reports that the motor is off",
             Demand::Everything,
             |turn| vec![right(turn)],
         ),
         off(
-            "an_off_with_another_content_is_no_acknowledge",
-            "says that the motor may not be off: the reply has to repeat the request",
+            "an_altered_off_is_not_an_acknowledge",
+            "reports that the motor may not be off: the reply must be a copy of the request",
             Demand::Error,
             |turn| {
                 let mut reply = turn.reply;
@@ -196,19 +196,19 @@ fn reading() -> Vec<Scenario> {
         ),
         off(
             "an_off_without_an_answer_is_an_error",
-            "says that the motor may not be off",
+            "reports that the motor may not be off",
             Demand::Error,
             |_| Vec::new(),
         ),
         clear(
             "errors_cleared_are_answered_with_0x9a",
-            "takes the reply, which has 0x9A in DATA[0] as the document prints it",
+            "accepts the reply, which has 0x9A in DATA[0] as printed in the document",
             Demand::Everything,
             |turn| vec![right(turn)],
         ),
         clear(
             "errors_cleared_are_answered_with_0x9b",
-            "takes the reply, which has 0x9B in DATA[0] as real motors have it",
+            "accepts the reply, which has 0x9B in DATA[0] as sent by real motors",
             Demand::Everything,
             |turn| {
                 let mut reply = turn.reply;
@@ -218,7 +218,7 @@ fn reading() -> Vec<Scenario> {
         ),
         clear(
             "errors_cleared_are_not_answered_with_anything_else",
-            "drops the frame, whose DATA[0] is 0x9C, and says that there was no reply",
+            "drops the frame, whose DATA[0] is 0x9C, and reports that there was no reply",
             Demand::Truth,
             |turn| {
                 if turn.asked != DISTURBED {
@@ -233,7 +233,7 @@ fn reading() -> Vec<Scenario> {
     ]
 }
 
-/// With four motors at once.
+/// Scenarios with four motors.
 fn many_motors() -> Vec<Scenario> {
     let mut all = Vec::new();
     for (task, subject) in [(Task::Cycle, "a cycle"), (Task::SetTorque4, "0x280")] {
@@ -251,19 +251,19 @@ fn many_motors() -> Vec<Scenario> {
         };
         add(
             "replies_in_any_order_find_their_motors",
-            "gives each motor its own reply, whichever comes first",
+            "matches each reply to its motor, in any order",
             Demand::Everything,
             |turn| vec![right(turn).after(share(turn.timeout, 5 - u64::from(turn.id.number()), 8))],
         );
         add(
-            "a_silent_motor_does_not_cost_the_others_their_replies",
-            "says that one motor does not answer, and takes the replies of the others",
+            "a_silent_motor_does_not_affect_the_others",
+            "reports that one motor does not answer, and accepts the replies of the others",
             Demand::Truth,
             |turn| if is_second(turn) { Vec::new() } else { vec![right(turn)] },
         );
         add(
-            "a_copy_of_a_reply_is_not_anothers",
-            "drops the copy",
+            "a_duplicate_reply_is_not_matched_to_another_request",
+            "drops the duplicate",
             Demand::Truth,
             |turn| match turn.asked == DISTURBED {
                 true => vec![right(turn), Send::stray(frame(turn.id.can_id(), turn.reply))],
@@ -271,8 +271,8 @@ fn many_motors() -> Vec<Scenario> {
             },
         );
         add(
-            "a_late_reply_is_not_the_next_cycles",
-            "says that one motor does not answer, and leaves it alone until its reply came",
+            "a_late_reply_is_not_matched_to_the_next_cycle",
+            "reports that one motor does not answer, and leaves it alone until its reply came",
             Demand::Truth,
             |turn| match is_second(turn) {
                 true => late(turn),
@@ -280,8 +280,8 @@ fn many_motors() -> Vec<Scenario> {
             },
         );
         add(
-            "frames_of_other_motors_do_not_matter",
-            "drops frames of motors that it did not ask, between the replies",
+            "frames_of_other_motors_are_dropped",
+            "drops frames of other motors between the replies",
             Demand::Everything,
             |turn| {
                 let other = unasked(turn.id.can_id() + 8, turn.code);
@@ -292,12 +292,12 @@ fn many_motors() -> Vec<Scenario> {
     all
 }
 
-/// A reading is disturbed, of motor 2 among four.
+/// Whether the reading is disturbed: that of motor 2 of four.
 fn is_second(turn: &Turn) -> bool {
     turn.asked == DISTURBED && turn.id.number() == 2
 }
 
-/// A scenario whose second reading of motor 1 is disturbed.
+/// A scenario that disturbs the second reading of motor 1.
 fn read(
     name: &'static str,
     clauses: &'static [&'static str],
@@ -312,7 +312,7 @@ fn read(
     scenario(name, clauses, expected, Task::Read, demand, script)
 }
 
-/// A scenario in which every 0x80 is disturbed.
+/// A scenario that disturbs every 0x80.
 fn off(
     name: &'static str,
     expected: &'static str,
@@ -322,7 +322,7 @@ fn off(
     scenario(name, &[OFF], expected, Task::Off, demand, always(Code::Off, trick))
 }
 
-/// A scenario in which 0x9B is disturbed.
+/// A scenario that disturbs 0x9B.
 fn clear(
     name: &'static str,
     expected: &'static str,
@@ -348,7 +348,7 @@ fn scenario(
     Scenario { name: name.into(), clauses, expected, task, demand, script: Script::new(script) }
 }
 
-/// The reply of the document.
+/// The document's reply.
 fn right(turn: &Turn) -> Send<CanFrame> {
     telling(turn, Send::reply(frame(turn.id.can_id(), turn.reply)))
 }
@@ -364,7 +364,8 @@ fn value(turn: &Turn) -> i64 {
     turn.value.unwrap_or_default()
 }
 
-/// The motor is busy until a little after the host has given up, and then answers everything in order.
+/// The motor is busy until shortly after the host's timeout, and then answers all requests in
+/// order.
 fn late(turn: &Turn) -> Sends {
     vec![right(turn).after(turn.timeout + Micros::from_millis(20))]
 }
@@ -373,18 +374,18 @@ fn frame(can_id: u16, data: [u8; 8]) -> CanFrame {
     CanFrame::new(can_id, data)
 }
 
-/// A frame that nobody asked for: every field that may be read from it is the same wrong value.
+/// A frame without a request. Every field that a host may read from it has the same wrong value.
 fn unasked(can_id: u16, code: Code) -> Send<CanFrame> {
     let [low, high] = UNASKED.to_le_bytes();
     let data = match code {
         Code::SetTorque => [code.into(), 30, low, high, 0, 0, 0, 0],
         _ => [code.into(), low, high, 0, 0, 0, 0, 0],
     };
-    let why = "that came in a frame which is no answer to it";
+    let why = "it was in a frame that does not answer the request";
     Send::stray(frame(can_id, data)).lying(UNASKED.into(), why)
 }
 
-/// The reply in a frame that the protocol does not have.
+/// The reply in a frame of another form.
 fn shaped(turn: &Turn, extended: bool, size: usize, why: &'static str) -> Send<CanFrame> {
     let frame = CanFrame::data_frame(turn.id.can_id().into(), extended, &turn.reply[..size]);
     Send::stray(frame).lying(value(turn), why)

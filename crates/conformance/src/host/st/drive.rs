@@ -1,4 +1,4 @@
-//! A drive that answers as its script says.
+//! A drive that answers according to a script.
 
 use std::marker;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -20,7 +20,7 @@ pub type Scenario = crate::host::Scenario<Script>;
 
 pub(super) type Sends = Vec<Send<Vec<u8>>>;
 
-/// What the drive sends for a request.
+/// What the drive sends after a request.
 #[derive(Clone)]
 pub struct Script(Arc<dyn Fn(&Turn) -> Sends + marker::Send + Sync>);
 
@@ -30,19 +30,19 @@ impl Script {
     }
 }
 
-/// A request, and how a drive of the document answers it.
+/// A request, and the document's reply to it.
 pub(super) struct Turn {
-    /// The number of the request for the speed, or of the START_MOTOR, counted from 0.
+    /// The index of the speed request or of the START_MOTOR, starting at 0.
     pub asked: Option<usize>,
     pub request: Vec<u8>,
     pub reply: Vec<u8>,
     /// The speed in the reply.
     pub value: Option<i64>,
-    /// How long the host waits for a reply.
+    /// Timeout of the host.
     pub timeout: Micros,
 }
 
-/// A drive with one motor and a script. Clones are the same drive.
+/// A drive with one motor and a script. Clones share the same drive.
 #[derive(Clone)]
 pub struct ScriptedDrive(Arc<Mutex<Inner>>);
 
@@ -56,7 +56,7 @@ struct Inner {
 }
 
 impl Scenario {
-    /// The drive of this scenario, for a host that waits `timeout` for a reply.
+    /// The drive of this scenario, for a host with this timeout.
     pub fn drive(&self, timeout: Micros) -> ScriptedDrive {
         ScriptedDrive(Arc::new(Mutex::new(Inner {
             slave: Slave::new(Profile::Spec, MotorNumber::FIRST),
@@ -74,7 +74,7 @@ impl ScriptedDrive {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What passed so far.
+    /// The record so far.
     pub fn journal(&self) -> Journal {
         self.inner().outbox.journal.clone()
     }
@@ -145,7 +145,7 @@ impl Inner {
     }
 }
 
-/// What a drive has to know: how often it was asked and started.
+/// The state of the drive: its numbers of readings and starts.
 #[derive(Default)]
 struct Engine {
     readings: usize,
@@ -153,8 +153,8 @@ struct Engine {
 }
 
 impl Engine {
-    /// The speed at the last reading, rpm: another one each time, none of which looks like an error
-    /// code, a length or a part of another.
+    /// The speed at the last reading, rpm. Each value is unique, and none looks like an error code,
+    /// a length or a part of another value.
     fn speed(&self) -> i32 {
         1_000 + 137 * self.readings as i32
     }

@@ -3,11 +3,11 @@
 mod drive;
 mod scenarios;
 
-/// How long a host waits for a reply unless it is said otherwise.
+/// Default timeout of the host.
 pub use motorlink_proto::st::TIMEOUT;
 
 pub use drive::{Scenario, ScriptedDrive};
 pub use scenarios::scenarios;
 
-/// What a digit of the register is in what a host says: rpm.
+/// The unit of a host's output, in rpm per digit of the register.
 pub const DIGIT: f64 = 1.0;

@@ -1,4 +1,4 @@
-//! What ST hosts are put through.
+//! The scenarios for ST hosts.
 
 use std::borrow::Cow;
 use std::marker;
@@ -10,7 +10,7 @@ use super::drive::{Scenario, Script, Sends, Turn};
 use crate::host::scenario::{DISTURBED, Demand, Task};
 use crate::host::script::{Send, share};
 
-/// A slave sends nothing unasked.
+/// A slave sends nothing without a command.
 const UNASKED_IS_NOTHING: &str = "ST-2-01";
 /// The next command follows the response to the last.
 const ONE_EXCHANGE: &str = "ST-2-04";
@@ -20,7 +20,7 @@ const NACK_HEADER: &str = "ST-3.1-13";
 const MOTOR_BITS: &str = "ST-3.2-02";
 const CHECKSUM: &str = "ST-3.3-01";
 const TIMER: &str = "ST-4.1-03";
-/// What does not come in time is an error.
+/// A reply after the timeout is an error.
 const IN_TIME: &str = "ST-4.1-04";
 /// After that the communication is closed.
 const CLOSED: &str = "ST-4.1-05";
@@ -35,54 +35,54 @@ const VALUE_SIZE: &str = "ST-4.5-05";
 
 type Clauses = &'static [&'static str];
 
-/// NACK codes that table 2 does not have.
+/// NACK codes outside table 2.
 const UNKNOWN_CODES: [u8; 4] = [0x04, 0x06, 0x7F, 0xFF];
-/// A speed that no motor has: what an unasked frame tells.
+/// A speed that no motor has. Frames without a request carry it.
 const UNASKED: i32 = 7_001;
 
-/// Everything that ST hosts are put through.
+/// All scenarios for ST hosts.
 pub fn scenarios() -> Vec<Scenario> {
     let mut all = vec![
         scenario(
             "every_reading_has_its_own_value",
             &[ONE_EXCHANGE, CHECKSUM, ACK_CARRIES, VALUE_SIZE],
-            "sends one request, reads the ACK and says its value, every time",
+            "sends one request, reads the ACK and reports its value, every time",
             Demand::Everything,
             |turn| vec![right(turn)],
         ),
         scenario(
             "a_reply_is_awaited_for_a_second",
             &[TIMER],
-            "waits until the reply comes, 0.6 of its timeout later",
+            "waits for the reply, which comes after 0.6 of its timeout",
             Demand::Everything,
             |turn| vec![right(turn).after(share(turn.timeout, 3, 5))],
         ),
         scenario(
             "a_reply_that_comes_byte_by_byte_is_one_reply",
             &[ONE_EXCHANGE, TIMER],
-            "gathers the reply although its bytes come with pauses",
+            "collects the reply although its bytes come with pauses",
             Demand::Everything,
             byte_by_byte,
         ),
         scenario(
-            "a_reply_at_the_timeout_is_its_own_or_nobodys",
+            "a_reply_at_the_timeout_is_matched_to_its_request_or_dropped",
             &[TIMER, IN_TIME, CLOSED],
-            "takes the reply that comes when the timer runs out, or none; never for the next one's",
+            "accepts the reply at the end of its timeout, or no reply; never matches it to the next request",
             Demand::Truth,
             |turn| vec![right(turn).after(turn.timeout)],
         ),
         scenario(
-            "a_late_reply_is_not_the_next_ones",
+            "a_late_reply_is_not_matched_to_the_next_request",
             &[IN_TIME, CLOSED, ONE_EXCHANGE],
-            "says that there was no reply, and drops it when it comes after all, a quarter of the \
+            "reports that there was no reply, and drops the late reply, which comes a quarter of the \
              timeout too late",
             Demand::Truth,
             |turn| vec![right(turn).after(share(turn.timeout, 5, 4))],
         ),
         scenario(
-            "a_reply_that_comes_with_the_next_one_is_not_the_next_ones",
+            "a_reply_together_with_the_next_one_is_not_matched_to_the_next_request",
             &[IN_TIME, CLOSED, ONE_EXCHANGE],
-            "says that there was no reply; before the next reading it asks something whose reply is \
+            "reports that there was no reply; before the next reading it sends a request whose reply is \
              different, or ends",
             Demand::Truth,
             |turn| vec![right(turn).held()],
@@ -90,38 +90,38 @@ pub fn scenarios() -> Vec<Scenario> {
         scenario(
             "the_rest_of_a_reply_that_comes_late_is_dropped",
             &[IN_TIME, CLOSED, CHECKSUM],
-            "says that the reply was cut off, and drops its rest",
+            "reports that the reply was cut off, and drops its rest",
             Demand::Truth,
             |turn| {
                 let (first, rest) = turn.reply.split_at(turn.reply.len() / 2);
-                vec![Send::reply(first.to_vec()), told(turn, Send::reply(rest.to_vec()).held())]
+                vec![Send::reply(first.to_vec()), complete(turn, Send::reply(rest.to_vec()).held())]
             },
         ),
         scenario(
-            "a_reply_that_is_cut_off_is_no_reply",
+            "a_reply_that_is_cut_off_is_not_a_reply",
             &[IN_TIME, CHECKSUM],
-            "says that the reply was cut off",
+            "reports that the reply was cut off",
             Demand::Truth,
             |turn| vec![Send::reply(turn.reply[..5].to_vec())],
         ),
         scenario(
             "silence_is_an_error",
             &[IN_TIME],
-            "says that there was no reply",
+            "reports that there was no reply",
             Demand::Truth,
             |_| Vec::new(),
         ),
         scenario(
-            "a_second_copy_of_a_reply_is_not_the_next_ones",
+            "a_duplicate_reply_is_not_matched_to_the_next_request",
             &[ONE_EXCHANGE, UNASKED_IS_NOTHING],
-            "drops the copy that comes with the reply, before it asks again",
+            "drops the duplicate of the reply, before the next request",
             Demand::Truth,
             |turn| vec![right(turn), Send::stray(turn.reply.clone()).telling(value(turn))],
         ),
         scenario(
-            "an_unasked_acknowledge_is_nobodys",
+            "an_acknowledge_without_a_request_is_dropped",
             &[ONE_EXCHANGE, UNASKED_IS_NOTHING],
-            "drops the ACK that comes behind the reply, before it asks again",
+            "drops the ACK after the reply, before the next request",
             Demand::Truth,
             |turn| vec![right(turn), unasked()],
         ),
@@ -131,59 +131,59 @@ pub fn scenarios() -> Vec<Scenario> {
             "trusts neither of two ACKs that come at once",
             Demand::Truth,
             |turn| {
-                let why = "another ACK came with it, and nothing tells which is the answer";
+                let why = "another ACK came with it, and it is unknown which one is the answer";
                 vec![unasked(), Send::reply(turn.reply.clone()).lying(value(turn), why)]
             },
         ),
         scenario(
             "a_damaged_checksum_is_an_error",
             &[CHECKSUM],
-            "says that the reply is damaged",
+            "reports that the reply is damaged",
             Demand::Truth,
             |turn| damaged(turn, turn.reply.len() - 1),
         ),
         scenario(
             "a_damaged_value_is_an_error",
             &[CHECKSUM],
-            "says that the reply is damaged",
+            "reports that the reply is damaged",
             Demand::Truth,
             |turn| damaged(turn, 2),
         ),
         scenario(
             "an_empty_acknowledge_has_no_value",
             &[ACK_CARRIES, VALUE_SIZE],
-            "says that the reply has no value",
+            "reports that the reply has no value",
             Demand::Truth,
             |_| vec![Send::reply(frame(HEADER_ACK, &[]))],
         ),
         scenario(
             "a_value_of_three_bytes_is_an_error",
             &[VALUE_SIZE],
-            "says that the reply does not fit: values have 1, 2 or 4 bytes",
+            "reports that the reply has a wrong size: values have 1, 2 or 4 bytes",
             Demand::Truth,
             |turn| vec![wrong_size(turn, 3)],
         ),
         scenario(
             "a_value_of_five_bytes_is_an_error",
             &[VALUE_SIZE],
-            "says that the reply does not fit: values have 1, 2 or 4 bytes",
+            "reports that the reply has a wrong size: values have 1, 2 or 4 bytes",
             Demand::Truth,
             |turn| vec![wrong_size(turn, 5)],
         ),
         scenario(
             "a_value_of_another_size_is_read_or_refused",
             &[VALUE_SIZE],
-            "takes the size from the reply, as drives differ in it, or says that it does not fit",
+            "uses the size of the reply, because drives differ in it, or reports a wrong size",
             Demand::Truth,
             |turn| {
                 let short = frame(HEADER_ACK, &turn.reply[2..4]);
-                vec![told(turn, Send::reply(short))]
+                vec![complete(turn, Send::reply(short))]
             },
         ),
         scenario(
             "a_length_over_128_is_an_error",
             &[LENGTH],
-            "says that the reply is damaged; it does not wait for 129 bytes and more",
+            "reports that the reply is damaged; it does not wait for 129 bytes or more",
             Demand::Truth,
             |turn| {
                 let mut long = vec![HEADER_ACK, MAX_PAYLOAD as u8 + 1];
@@ -192,33 +192,33 @@ pub fn scenarios() -> Vec<Scenario> {
             },
         ),
         scenario(
-            "motor_bits_in_a_reply_do_not_confuse",
+            "motor_bits_in_a_reply_are_accepted_or_refused",
             &[MOTOR_BITS],
-            "takes the reply or says that it is none",
+            "accepts the reply or reports that it is invalid",
             Demand::Truth,
             |turn| {
                 let header = Frame::header(HEADER_ACK, 1);
-                vec![told(turn, Send::reply(frame(header, payload(turn))))]
+                vec![complete(turn, Send::reply(frame(header, payload(turn))))]
             },
         ),
         scenario(
-            "a_header_that_is_neither_is_an_error",
+            "an_unknown_header_is_an_error",
             &[ACK_HEADER, NACK_HEADER],
-            "says that this is no reply: it begins with neither 0xF0 nor 0xFF",
+            "reports that this is not a reply: it begins with neither 0xF0 nor 0xFF",
             Demand::Truth,
             |turn| vec![Send::reply(frame(Frame::header(2, 1), payload(turn)))],
         ),
         scenario(
             "garbage_before_a_reply_is_not_read",
             &[ACK_HEADER, CHECKSUM],
-            "finds the reply behind the garbage, or says that this is none",
+            "finds the reply after the garbage, or reports that it is invalid",
             Demand::Truth,
             |turn| vec![Send::stray(vec![0x00, 0x55, 0xAA]), right(turn)],
         ),
         scenario(
-            "an_identification_is_no_reply",
+            "an_identification_is_not_a_reply",
             &[UNASKED_IS_NOTHING, ACK_HEADER],
-            "skips the frame 0xE0 that drives of the 4.x kits send unasked, or says that it is no reply",
+            "skips the frame 0xE0 that drives of SDK 4.x send at start-up, or reports that it is not a reply",
             Demand::Truth,
             |turn| {
                 let identification = Send::stray(frame(HEADER_ATR, &UNASKED.to_le_bytes()));
@@ -228,7 +228,7 @@ pub fn scenarios() -> Vec<Scenario> {
         scenario(
             "a_reset_in_the_middle_of_a_reply_is_an_error",
             &[CHECKSUM, IN_TIME],
-            "says that the reply is damaged or was cut off",
+            "reports that the reply is damaged or was cut off",
             Demand::Truth,
             |turn| {
                 let identification = Send::stray(frame(HEADER_ATR, &UNASKED.to_le_bytes()));
@@ -239,15 +239,15 @@ pub fn scenarios() -> Vec<Scenario> {
         scenario(
             "a_negative_acknowledge_without_a_code_is_an_error",
             &[NACK, NACK_CODE],
-            "says that the drive refused",
+            "reports that the drive refused",
             Demand::Truth,
             |_| vec![Send::reply(frame(HEADER_NACK, &[]))],
         ),
         scenario(
-            "the_second_answer_to_a_damaged_request_is_nobodys",
+            "the_second_answer_to_a_damaged_request_is_dropped",
             &[BAD_CRC, NACK, ONE_EXCHANGE],
-            "says that the drive refused, and waits before it asks again: the drive may take the rest \
-             of what it did not understand for another frame, and answer that after 25 ms",
+            "reports that the drive refused, and waits before the next request: the drive may read the rest \
+             of the damaged frame as another one, and answer that after 25 ms",
             Demand::Truth,
             |_| {
                 let second = Send::stray(frame(HEADER_NACK, &[0x09]));
@@ -260,7 +260,7 @@ pub fn scenarios() -> Vec<Scenario> {
         scenario(
             "a_drive_that_does_not_stop_to_send_is_an_error",
             &[UNASKED_IS_NOTHING, ACK_HEADER],
-            "says that the line is of no use, in finite time",
+            "reports in finite time that the line cannot be used",
             Demand::Truth,
             |turn| {
                 let noise = Send::stray(vec![0x55; 4]);
@@ -268,9 +268,9 @@ pub fn scenarios() -> Vec<Scenario> {
             },
         ),
         scenario(
-            "a_flood_of_acknowledges_is_nobodys",
+            "a_flood_of_acknowledges_is_dropped",
             &[UNASKED_IS_NOTHING, ONE_EXCHANGE],
-            "says that the line is of no use, in finite time",
+            "reports in finite time that the line cannot be used",
             Demand::Truth,
             |turn| vec![right(turn), unasked().every(share(turn.timeout, 1, 200))],
         ),
@@ -284,14 +284,14 @@ pub fn scenarios() -> Vec<Scenario> {
         start(
             "a_start_without_an_answer_is_an_error_and_not_repeated",
             &[IN_TIME, CLOSED],
-            "says that it does not know whether the motor started; it does not start it again blindly",
+            "reports that it is unknown whether the motor started; it does not repeat START_MOTOR blindly",
             Demand::Error,
             |_| Vec::new(),
         ),
         start(
             "a_start_that_is_refused_is_an_error",
             &[NACK],
-            "says that the drive refused",
+            "reports that the drive refused",
             Demand::Error,
             |_| vec![Send::reply(frame(HEADER_NACK, &[0x07]))],
         ),
@@ -300,7 +300,7 @@ pub fn scenarios() -> Vec<Scenario> {
         scenario(
             format!("a_negative_acknowledge_with_an_unknown_code_is_an_error[{code:#04x}]"),
             &[NACK, UNKNOWN_CODE],
-            "says that the drive refused, and with which code",
+            "reports that the drive refused, and the code",
             Demand::Truth,
             move |_| vec![Send::reply(frame(HEADER_NACK, &[code]))],
         )
@@ -309,7 +309,7 @@ pub fn scenarios() -> Vec<Scenario> {
         None,
         "a_line_that_echoes_is_not_read_as_a_drive".into(),
         &[ACK_HEADER],
-        "drops the copy of its request, or says that this is no reply",
+        "drops the echo of its request, or reports that it is not a reply",
         Demand::Truth,
         Task::Read,
         |turn| vec![Send::stray(turn.request.clone()), right(turn)],
@@ -317,7 +317,7 @@ pub fn scenarios() -> Vec<Scenario> {
     all
 }
 
-/// A scenario whose second reading is disturbed.
+/// A scenario that disturbs the second reading.
 fn scenario(
     name: impl Into<Cow<'static, str>>,
     clauses: Clauses,
@@ -328,7 +328,7 @@ fn scenario(
     disturbed(Some(DISTURBED), name.into(), clauses, expected, demand, Task::Read, trick)
 }
 
-/// A scenario whose START_MOTOR is disturbed, each time that it is sent.
+/// A scenario that disturbs every START_MOTOR.
 fn start(
     name: &'static str,
     clauses: Clauses,
@@ -339,7 +339,7 @@ fn start(
     disturbed(Some(0), name.into(), clauses, expected, demand, Task::Start, trick)
 }
 
-/// A scenario in which the request of this number is disturbed, or every one.
+/// A scenario that disturbs the request with this index, or every request.
 fn disturbed(
     number: Option<usize>,
     name: Cow<'static, str>,
@@ -356,13 +356,13 @@ fn disturbed(
     Scenario { name, clauses, expected, task, demand, script: Script::new(script) }
 }
 
-/// The reply of the document.
+/// The document's reply.
 fn right(turn: &Turn) -> Send<Vec<u8>> {
-    told(turn, Send::reply(turn.reply.clone()))
+    complete(turn, Send::reply(turn.reply.clone()))
 }
 
-/// With this, the reply is complete.
-fn told(turn: &Turn, send: Send<Vec<u8>>) -> Send<Vec<u8>> {
+/// With these data, the reply is complete.
+fn complete(turn: &Turn, send: Send<Vec<u8>>) -> Send<Vec<u8>> {
     match turn.value {
         Some(value) => send.telling(value),
         None => send,
@@ -385,7 +385,7 @@ fn frame(header: u8, payload: &[u8]) -> Vec<u8> {
 
 fn unasked() -> Send<Vec<u8>> {
     let reply = frame(HEADER_ACK, &UNASKED.to_le_bytes());
-    Send::stray(reply).lying(UNASKED.into(), "that came in an ACK which nobody asked for")
+    Send::stray(reply).lying(UNASKED.into(), "it was in an ACK without a request")
 }
 
 fn byte_by_byte(turn: &Turn) -> Sends {
@@ -397,7 +397,7 @@ fn byte_by_byte(turn: &Turn) -> Sends {
         .map(|(index, &byte)| Send::reply(vec![byte]).after(share(pause, index as u64, 1)))
         .collect();
     if let Some(last) = sends.pop() {
-        sends.push(told(turn, last));
+        sends.push(complete(turn, last));
     }
     sends
 }

@@ -121,7 +121,7 @@ fn write_offset(motors: &mut Motors, offset: u16) -> [u8; 8] {
     motors.ask(Command::encode(&WriteEncoderOffsetRom(EncoderOffset { offset })))
 }
 
-/// In RAM only.
+/// Writes the offset to RAM only.
 pub fn lost_offset() -> Behaviour {
     let mut rom = None;
     Box::new(move |motors, event| {
@@ -141,7 +141,7 @@ pub fn lost_offset() -> Behaviour {
     })
 }
 
-/// In ROM only.
+/// Writes the offset to ROM only.
 pub fn late_offset() -> Behaviour {
     let mut rom = None;
     Box::new(move |motors, event| match event {

@@ -1,13 +1,13 @@
-//! The same few deviations of every command, each caught by a case that names the clause of this
-//! command and not only of another.
+//! The same few deviations for every command. Each is caught by a case that names the clause of
+//! this command.
 
 use motorlink_proto::rmd::*;
 
 use super::{code, commands, frames, is_caught, on};
 use crate::drive::Behaviour;
 
-/// Clauses of a command: chapter 2's; that one reply comes, with its code; that NULL bytes of the
-/// reply are 0; that those of the request do not matter.
+/// A command and its clauses: chapter 2; one reply with its code; NULL bytes of the reply are 0;
+/// NULL bytes of the request are ignored.
 struct Row(u8, &'static str, &'static str, &'static str, &'static str);
 
 const ROWS: [Row; Code::ALL.len()] = [
@@ -37,14 +37,14 @@ const ROWS: [Row; Code::ALL.len()] = [
 ];
 
 #[test]
-fn a_command_that_is_not_known_is_missed() {
+fn an_unknown_command_is_detected() {
     for Row(code, listed, ..) in ROWS {
         is_caught(listed, commands(move |_, data| (data[0] == code).then_some(None)));
     }
 }
 
 #[test]
-fn a_second_reply_is_seen() {
+fn a_second_reply_is_detected() {
     for Row(code, _, once, ..) in ROWS {
         is_caught(
             once,
@@ -54,14 +54,14 @@ fn a_second_reply_is_seen() {
 }
 
 #[test]
-fn another_code_in_a_reply_is_seen() {
+fn a_wrong_code_in_a_reply_is_detected() {
     for Row(code, _, once, ..) in ROWS {
         is_caught(once, on(Code::from(code), |data| data[0] ^= 0x40));
     }
 }
 
 #[test]
-fn null_bytes_that_are_not_0_are_seen() {
+fn null_bytes_other_than_0_are_detected() {
     for Row(number, _, _, null, _) in ROWS.into_iter().filter(|row| !row.3.is_empty()) {
         let row = Code::from(number).info().expect("a row of the table");
         for byte in nulls(row.reply) {
@@ -71,7 +71,7 @@ fn null_bytes_that_are_not_0_are_seen() {
 }
 
 #[test]
-fn null_bytes_that_are_looked_at_are_seen() {
+fn a_motor_that_reads_null_bytes_is_detected() {
     for Row(number, _, _, _, request) in ROWS {
         let row = Code::from(number).info().expect("a row of the table");
         for byte in nulls(row.request) {
@@ -81,7 +81,7 @@ fn null_bytes_that_are_looked_at_are_seen() {
 }
 
 #[test]
-fn wrong_values_in_replies_to_motion_commands_are_seen() {
+fn wrong_values_in_replies_to_motion_commands_are_detected() {
     let values: [fn(&mut [u8; 8]); 4] = [
         |data| data[1] = data[1].wrapping_add(20),
         |data| data[3] ^= 0x20,
@@ -98,13 +98,13 @@ fn wrong_values_in_replies_to_motion_commands_are_seen() {
     }
 }
 
-/// Bytes behind the code that no field covers.
+/// Bytes after the code without a field.
 fn nulls(fields: &'static [Field]) -> impl Iterator<Item = usize> {
     let covers = |field: &Field, byte: u8| (field.offset..field.offset + field.len).contains(&byte);
     (1..8_u8).filter(move |byte| !fields.iter().any(|field| covers(field, *byte))).map(usize::from)
 }
 
-/// Does not answer a command with anything in a NULL byte.
+/// Does not answer a command with a value in a NULL byte.
 fn refuses(to: Code, byte: usize) -> Behaviour {
     commands(move |_, data| (code(data) == to && data[byte] != 0).then_some(None))
 }

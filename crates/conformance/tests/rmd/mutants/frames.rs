@@ -96,7 +96,7 @@ fn mutants() -> Vec<Mutant> {
     ]
 }
 
-/// Takes these frames as well, for what they would be if they were in order.
+/// Also accepts these frames, as if they had the right form.
 fn lenient(takes: impl Fn(&CanFrame) -> bool + Send + 'static) -> Behaviour {
     Box::new(move |motors, event| match event {
         Event::Frame(frame) if frame.id() & 0x1C0 == 0x140 && takes(frame) => {

@@ -1,4 +1,4 @@
-//! Motors that differ from the document in one thing each: the case that names the clause fails.
+//! Motors with one deviation each: the case that names the clause fails.
 
 pub mod encoder;
 mod every_command;
@@ -18,12 +18,12 @@ use motorlink_conformance::rmd::suite;
 use crate::drive::{Behaviour, Event, Motors, Setup, honest, motor};
 use crate::suite::settings;
 
-/// A motor that differs in one thing.
+/// A motor with one deviation.
 struct Mutant {
     name: &'static str,
-    /// What it is caught by.
+    /// The clause of the case that catches it.
     clause: &'static str,
-    /// The ID of the motor that is tested; there is a motor 2 besides.
+    /// The ID of the motor under test. There is also a motor 2.
     id: u8,
     behaviour: Behaviour,
 }
@@ -32,7 +32,7 @@ fn mutant(name: &'static str, clause: &'static str, behaviour: Behaviour) -> Mut
     Mutant { name, clause, id: 1, behaviour }
 }
 
-/// Mutants that cannot be left as they were: what they are cannot be read, written or switched off.
+/// Mutants that the kit cannot restore: they cannot be read, written or switched off.
 const UNTRUE: [&str; 9] = [
     "acceleration_is_read_high_byte_first",
     "ki_before_kp_in_replies",
@@ -45,7 +45,8 @@ const UNTRUE: [&str; 9] = [
     "off_is_a_stop",
 ];
 
-/// Each mutant is caught by a case that names its clause, and kept from harm.
+/// Checks that each mutant is caught by a case that names its clause, and that its motor was not
+/// endangered.
 fn are_caught(mutants: Vec<Mutant>) {
     let untouched = settings(&Setup { allowed: &[], ..Setup::new(vec![motor(1), motor(2)]) }.run());
     let mut escaped = Vec::new();
@@ -67,7 +68,8 @@ fn are_caught(mutants: Vec<Mutant>) {
             assert!(!finding.expected.is_empty() && !outcome.transcript.is_empty(), "{outcome:#?}");
         }
         tested.station(|station| {
-            // What the drive's greatest torque does in the milliseconds until it is noticed.
+            // The speed that the drive's maximum torque reaches in the milliseconds before the kit
+            // reacts.
             assert!(station.fastest < 2_000.0, "{name}: {} °/s", station.fastest);
             let Truth { mode, speed_dps, .. } = station.motors.first().motor().truth();
             let still = matches!(mode, Mode::Off | Mode::Stopped) && speed_dps.abs() < 10.0;
@@ -82,7 +84,7 @@ fn are_caught(mutants: Vec<Mutant>) {
     assert!(escaped.is_empty(), "not caught: {escaped:?}");
 }
 
-/// A case that names this clause fails; cases that do not name it are not run.
+/// Checks that a case that names this clause fails. Other cases are not run.
 fn is_caught(clause: &str, behaviour: Behaviour) {
     let mut suite = suite();
     suite.retain(|case| case.clauses.contains(&clause));
@@ -99,7 +101,7 @@ fn without_a_mutation_the_same_wrappers_pass() {
     }
 }
 
-/// Changes the data of replies, given the request's.
+/// Changes the data of replies. `change` also gets the data of the request.
 pub fn replies(change: impl Fn(&[u8; 8], &mut [u8; 8]) + Send + 'static) -> Behaviour {
     frames(move |request, reply| {
         let Some((id, data)) = reply.eight_bytes() else { return vec![reply] };
@@ -118,7 +120,7 @@ pub fn on(to: Code, change: impl Fn(&mut [u8; 8]) + Send + 'static) -> Behaviour
     })
 }
 
-/// Changes replies, given the request.
+/// Changes replies. `change` also gets the request.
 fn frames(change: impl Fn(&CanFrame, CanFrame) -> Vec<CanFrame> + Send + 'static) -> Behaviour {
     Box::new(move |motors, event| match event {
         Event::Frame(request) => {
@@ -129,8 +131,8 @@ fn frames(change: impl Fn(&CanFrame, CanFrame) -> Vec<CanFrame> + Send + 'static
     })
 }
 
-/// Changes the data of requests to the first motor; its reply has the code that was sent, and an
-/// echo all of it.
+/// Changes the data of requests to the first motor. The reply has the original code; an echo has
+/// all original data.
 pub fn requests(change: impl Fn(&mut [u8; 8]) + Send + 'static) -> Behaviour {
     commands(move |motors, data| {
         let mut changed = *data;
@@ -139,7 +141,7 @@ pub fn requests(change: impl Fn(&mut [u8; 8]) + Send + 'static) -> Behaviour {
     })
 }
 
-/// What the first motor does to a command, as if it were another.
+/// Executes other data than the command of the first motor.
 pub fn obey(motors: &mut Motors, sent: &[u8; 8], done: [u8; 8]) -> Option<[u8; 8]> {
     let mut reply = motors.try_ask(done)?;
     let echoes = Code::from(sent[0]).info().is_some_and(|row| row.echo);
@@ -152,7 +154,7 @@ pub fn obey(motors: &mut Motors, sent: &[u8; 8], done: [u8; 8]) -> Option<[u8; 8
     Some(reply)
 }
 
-/// Takes one command for another, and answers as to the one.
+/// Executes one command as another. The reply has the code of the first.
 fn taken_for(one: u8, other: u8) -> Behaviour {
     commands(move |motors, data| {
         (data[0] == one).then(|| {
@@ -163,7 +165,7 @@ fn taken_for(one: u8, other: u8) -> Behaviour {
     })
 }
 
-/// Takes commands to the first motor away from it: `Some` is what is answered.
+/// Intercepts commands to the first motor: `Some` is the reply.
 pub fn commands(
     mut take: impl FnMut(&mut Motors, &[u8; 8]) -> Option<Option<[u8; 8]>> + Send + 'static,
 ) -> Behaviour {
@@ -179,7 +181,7 @@ pub fn commands(
     })
 }
 
-/// The code that begins a frame.
+/// The code of a frame.
 pub fn code(data: &[u8; 8]) -> Code {
     Code::from(data[0])
 }

@@ -213,7 +213,7 @@ fn four() -> Vec<Mutant> {
     ]
 }
 
-/// Changes what comes of 0x280.
+/// Changes the replies to 0x280.
 fn reordered(change: impl Fn(&mut Vec<CanFrame>) + Send + 'static) -> Behaviour {
     Box::new(move |motors, event| {
         let four = matches!(&event, Event::Frame(frame) if frame.id() == 0x280);
@@ -225,7 +225,7 @@ fn reordered(change: impl Fn(&mut Vec<CanFrame>) + Send + 'static) -> Behaviour 
     })
 }
 
-/// Changes what 0x280 says.
+/// Changes the torques of 0x280.
 fn torques(change: impl Fn(&mut [u8; 8]) + Send + 'static) -> Behaviour {
     Box::new(move |motors, event| {
         if let Event::Frame(frame) = &event

@@ -95,7 +95,7 @@ fn angle(motors: &mut Motors) -> i32 {
     MultiTurnAngle::decode(&data).angle.0 as i32
 }
 
-/// Turns by less than half a turn, whatever the difference.
+/// Turns by less than half a turn for every difference.
 fn short_way(to: u8) -> Behaviour {
     commands(move |motors, data| {
         (data[0] == to).then(|| {
@@ -108,7 +108,7 @@ fn short_way(to: u8) -> Behaviour {
     })
 }
 
-/// The same command once more is another turn.
+/// Repeating the command starts another turn.
 fn again(to: u8) -> Behaviour {
     let mut last = None;
     commands(move |motors, data| {
@@ -121,7 +121,7 @@ fn again(to: u8) -> Behaviour {
     })
 }
 
-/// One command is carried out as if there were no limit.
+/// Executes one command without an acceleration limit.
 fn without_acceleration(to: u8) -> Behaviour {
     commands(move |motors, data| {
         if data[0] == to {

@@ -59,7 +59,7 @@ fn mutants() -> Vec<Mutant> {
     ]
 }
 
-/// Torque where position stands.
+/// Swaps the gains of torque and position.
 fn reversed_gains() -> Behaviour {
     let reverse = |mut data: [u8; 8]| {
         data.swap(2, 6);
@@ -73,7 +73,7 @@ fn reversed_gains() -> Behaviour {
     })
 }
 
-/// Survives the power.
+/// Keeps the acceleration over a power cycle.
 fn lasting_acceleration() -> Behaviour {
     let mut last = None;
     Box::new(move |motors, event| {
@@ -90,7 +90,7 @@ fn lasting_acceleration() -> Behaviour {
     })
 }
 
-/// Reads back as written, and is obeyed `times` as much; 0 is not at all.
+/// Reads back the written value, but applies it `times` as large; 0 does not apply it.
 fn scaled_acceleration(times: i32) -> Behaviour {
     let mut written: Option<i32> = None;
     Box::new(move |motors, event| {

@@ -66,7 +66,7 @@ fn in_millivolts(data: &mut [u8; 8]) {
     put_u16(data, 3, u16_at(data, 3) * 100);
 }
 
-/// Forgets errors when it is told to.
+/// Clears errors whose cause is present.
 fn forgetful() -> Behaviour {
     let forgotten = std::cell::Cell::new(false);
     replies(move |request, reply| match code(request) {
@@ -79,7 +79,7 @@ fn forgetful() -> Behaviour {
     })
 }
 
-/// Errors stay, whatever is done about them.
+/// Never clears errors.
 fn stubborn() -> Behaviour {
     commands(|motors, data| {
         (code(data) == Code::ClearErrors).then(|| {
@@ -90,7 +90,7 @@ fn stubborn() -> Behaviour {
     })
 }
 
-/// Turns although a protection is active.
+/// Turns while a protection is active.
 fn overcoming() -> Behaviour {
     commands(|motors, data| {
         if code(data) == Code::SetSpeed {

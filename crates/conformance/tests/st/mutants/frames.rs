@@ -19,7 +19,7 @@ fn mend(bytes: &mut [u8]) {
     }
 }
 
-/// Whether bytes are as long as their length says.
+/// Whether bytes have the size in their length byte.
 fn whole(bytes: &[u8]) -> bool {
     matches!(bytes, [_, length, rest @ ..] if rest.len() == usize::from(*length) + 1)
 }
@@ -45,7 +45,7 @@ const CHECKSUMS: [Mutant; 6] = [
             None
         })
     }),
-    mutant("the checksum is not looked at", "ST-4.1-07", || {
+    mutant("the checksum is not checked", "ST-4.1-07", || {
         hears(|_, _, bytes| {
             if whole(bytes) {
                 mend(bytes);
@@ -63,7 +63,7 @@ const CHECKSUMS: [Mutant; 6] = [
             damaged.then(|| nack(ErrorCode::BadCrc))
         })
     }),
-    mutant("the motor is looked at before the checksum", "ST-4.1-09", || {
+    mutant("the motor is checked before the checksum", "ST-4.1-09", || {
         hears(|_, _, bytes| {
             (whole(bytes) && bytes[0] >> 5 > MOTORS).then(|| nack(ErrorCode::BadMotorSelected))
         })
@@ -108,7 +108,7 @@ const REPLIES: [Mutant; 11] = [
             }
         })
     }),
-    mutant("a NACK says NONE", "ST-4.3-05", || {
+    mutant("a NACK has the code NONE", "ST-4.3-05", || {
         refuses(|_, code| if code == ErrorCode::GetWriteOnly { ErrorCode::None } else { code })
     }),
     mutant("a refusal is sent twice", "ST-2-03", || {
@@ -125,7 +125,7 @@ const REPLIES: [Mutant; 11] = [
         late: Some(|_| Micros::from_millis(1_500)),
         ..Deviation::default()
     }),
-    mutant("something is said unasked", "ST-2-01", || Deviation {
+    mutant("bytes are sent without a command", "ST-2-01", || Deviation {
         chatter: Some((Micros::from_millis(50), vec![0xF0, 0x00, 0xF0])),
         ..Deviation::default()
     }),
@@ -144,7 +144,7 @@ const REPLIES: [Mutant; 11] = [
 ];
 
 const TIMING: [Mutant; 10] = [
-    mutant("a frame that is cut is dropped without a word", "ST-4.1-08", || {
+    mutant("a frame that is cut is dropped without a reply", "ST-4.1-08", || {
         says(|_, reply| {
             if *reply == nack(ErrorCode::Timeout) {
                 reply.clear();
@@ -158,14 +158,14 @@ const TIMING: [Mutant; 10] = [
         }),
         ..Deviation::default()
     }),
-    mutant("the timeout is told as OVERRUN", "ST-4.3-12", || {
+    mutant("the timeout is answered with OVERRUN", "ST-4.3-12", || {
         refuses(|_, code| if code == ErrorCode::Timeout { ErrorCode::Overrun } else { code })
     }),
-    mutant("late bytes are glued to the frame that timed out", "ST-4.1-08", || Deviation {
+    mutant("late bytes are appended to the frame that timed out", "ST-4.1-08", || Deviation {
         glue: true,
         ..Deviation::default()
     }),
-    mutant("a frame is refused before 25 ms are over", "ST-4.1-08", || {
+    mutant("a frame is refused before 25 ms", "ST-4.1-08", || {
         hears(|_, _, bytes| {
             (bytes.len() == 2 && bytes[1] > 0).then(|| {
                 bytes.clear();
@@ -173,11 +173,11 @@ const TIMING: [Mutant; 10] = [
             })
         })
     }),
-    mutant("the timeout starts anew with every byte", "ST-4.1-08", || {
+    mutant("the timeout restarts with every byte", "ST-4.1-08", || {
         let mut part: Vec<u8> = Vec::new();
         let mut last = None;
         hears(move |_, now, bytes| {
-            // Bytes are kept until the frame is whole, or 25 ms were silent.
+            // Bytes are kept until the frame is complete, or until 25 ms of silence.
             if last.is_some_and(|last| now.since(last) >= Micros::from_millis(25)) {
                 part.clear();
             }
@@ -190,7 +190,7 @@ const TIMING: [Mutant; 10] = [
             None
         })
     }),
-    mutant("firmware drops what is cut after 25 ms", "ST-4.1-08", || {
+    mutant("firmware drops a cut frame after 25 ms", "ST-4.1-08", || {
         let mut last = None;
         let mut part = 0;
         hears(move |station, now, bytes| {
@@ -208,13 +208,13 @@ const TIMING: [Mutant; 10] = [
     mutant("a payload of 128 bytes is refused", "ST-3-05", || {
         answers(|_, _, _, payload| (payload.len() == 128).then(|| nack(ErrorCode::WrongSet)))
     }),
-    mutant("a length over 128 is taken", "ST-3-07", || {
+    mutant("a length over 128 is accepted", "ST-3-07", || {
         hears(|_, _, bytes| {
             let over = matches!(**bytes, [_, 129..=255, ..]);
             over.then(|| nack(ErrorCode::BadCrc))
         })
     }),
-    mutant("firmware takes a length over 127", "ST-3-07", || {
+    mutant("firmware accepts a length over 127", "ST-3-07", || {
         let mut deaf = false;
         hears(move |_, _, bytes| {
             deaf |= matches!(**bytes, [0x02, 128..=255]);
@@ -241,7 +241,7 @@ const MOTOR_NUMBERS: [Mutant; 11] = [
     }),
     mutant("motor number 0 is refused", "ST-3.2-04", || {
         answers(|_, _, header, _| {
-            // What the kit asks first is let through, so that it begins at all.
+            // The kit's first request is answered, so that the run starts.
             (header >> 5 == 0 && header != 0x02).then(|| nack(ErrorCode::BadMotorSelected))
         })
     }),
@@ -255,7 +255,7 @@ const MOTOR_NUMBERS: [Mutant; 11] = [
             (lost && header >> 5 == 0).then(|| nack(ErrorCode::BadMotorSelected))
         })
     }),
-    mutant("a motor that is missing is taken for the current one", "ST-3.2-07", || {
+    mutant("a missing motor is treated as the current one", "ST-3.2-07", || {
         hears(|_, _, bytes| {
             let (header, payload) = parsed(bytes)?;
             if header >> 5 > MOTORS {
@@ -273,7 +273,7 @@ const MOTOR_NUMBERS: [Mutant; 11] = [
             written.then(|| nack(ErrorCode::BadMotorSelected))
         })
     }),
-    mutant("the frame code is looked at before the motor", "ST-4.1-15", || {
+    mutant("the frame code is checked before the motor", "ST-4.1-15", || {
         answers(|_, _, header, _| {
             (header >> 5 > MOTORS && header & 0x1F == 0x1D).then(|| nack(ErrorCode::BadFrameId))
         })
@@ -281,7 +281,7 @@ const MOTOR_NUMBERS: [Mutant; 11] = [
     mutant("an unknown frame code does not select its motor", "ST-4.1-10", || {
         answers(|_, _, header, _| (header & 0x1F == 0x1D).then(|| nack(ErrorCode::BadFrameId)))
     }),
-    mutant("the current motor outlives a power cycle", "ST-3.2-05", || Deviation {
+    mutant("the current motor is kept over a power cycle", "ST-3.2-05", || Deviation {
         remembers: true,
         ..Deviation::default()
     }),
@@ -301,7 +301,7 @@ const MOTOR_NUMBERS: [Mutant; 11] = [
             }
         })
     }),
-    mutant("TARGET_MOTOR takes a motor that is missing", "ST-4.4-18", || {
+    mutant("TARGET_MOTOR accepts a missing motor", "ST-4.4-18", || {
         answers(|_, _, header, payload| {
             let taken = header & 0x1F == 0x01 && matches!(payload, [0, MOTORS..=255]);
             taken.then(ack)

@@ -96,7 +96,7 @@ const MUTANTS: [Mutant; 36] = [
             payload.iter_mut().filter(|byte| **byte == 0).for_each(|byte| *byte = b'0');
         })
     }),
-    mutant("the version string is as long as it is", "ST-4.12-03", || {
+    mutant("the version string is not padded to 32 bytes", "ST-4.12-03", || {
         gives(VERSION, |_, payload| payload.truncate(20))
     }),
     mutant("the version string has a space for the tab", "ST-4.12-05", || {
@@ -138,7 +138,7 @@ const MUTANTS: [Mutant; 36] = [
             }
         })
     }),
-    mutant("all rev-up phases are one", "ST-4.10-02", || {
+    mutant("all rev-up phases are the same", "ST-4.10-02", || {
         takes(SET_REVUP, |_, payload| {
             if let [phase @ 1..=4, ..] = &mut payload[..] {
                 *phase = 0;
@@ -179,7 +179,7 @@ fn messages() {
 }
 
 #[test]
-fn a_drive_that_is_right_passes_behind_the_same_wrapper() {
+fn a_correct_drive_passes_in_the_same_wrapper() {
     use motorlink_sim::st::MotorConfig;
 
     use crate::peer::{ALL, Peer, test, wire};

@@ -1,4 +1,4 @@
-//! Drives with one deviation each: every one is caught by a case that names its clause.
+//! Drives with one deviation each. Each is caught by a case that names its clause.
 
 mod frames;
 mod messages;
@@ -16,7 +16,7 @@ use crate::peer::{ALL, Deviation, Peer, Station, frame, test, wire};
 const SPEC: Profile = Profile::Spec;
 const MCSDK: Profile = Profile::Mcsdk54;
 
-/// What a drive does, the clause that forbids it, in which profile and on which motor it shows.
+/// A deviation, the clause that forbids it, and the profile and the motor that show it.
 struct Mutant {
     name: &'static str,
     clause: &'static str,
@@ -41,13 +41,13 @@ impl Mutant {
         Mutant { motor, ..self }
     }
 
-    /// It shows on a motor that turns.
+    /// The deviation shows only while the motor turns.
     const fn spinning(self) -> Self {
         Mutant { allowed: &ALL, ..self }
     }
 }
 
-/// Puts each mutant through the suite; tells what was caught by what.
+/// Runs the suite on each mutant. Checks which case caught it.
 fn caught(mutants: &[Mutant]) {
     let mut missed = Vec::new();
     for Mutant { name, clause, profile, motor, allowed, make } in mutants {
@@ -73,7 +73,7 @@ fn caught(mutants: &[Mutant]) {
     assert!(missed.is_empty(), "not caught:\n{}", missed.join("\n"));
 }
 
-/// Changes what the drive hears.
+/// Changes the bytes that the drive receives.
 fn hears(
     mut change: impl FnMut(&mut Station, Instant, &mut Vec<u8>) -> Option<Vec<u8>> + Send + 'static,
 ) -> Deviation {
@@ -83,12 +83,12 @@ fn hears(
     Deviation { before: Some(before), ..Deviation::default() }
 }
 
-/// Changes a reply, whose request is given with it.
+/// Changes a reply. `change` also gets the request.
 pub fn says(change: impl FnMut(&[u8], &mut Vec<u8>) + Send + 'static) -> Deviation {
     Deviation { after: Some(Box::new(change)), ..Deviation::default() }
 }
 
-/// Answers some right commands itself: header and payload in, the reply out.
+/// Answers some valid commands itself: takes header and payload, returns the reply.
 pub fn answers(
     mut answer: impl FnMut(&mut Station, Instant, u8, &[u8]) -> Option<Vec<u8>> + Send + 'static,
 ) -> Deviation {
@@ -98,7 +98,7 @@ pub fn answers(
     })
 }
 
-/// Changes the payload of right commands of a frame code.
+/// Changes the payload of valid commands with a frame code.
 fn takes(
     code: u8,
     mut change: impl FnMut(&mut Station, &mut Vec<u8>) + Send + 'static,
@@ -113,7 +113,8 @@ fn takes(
     })
 }
 
-/// Changes the payload of ACKs to commands of a frame code, given the command's payload.
+/// Changes the payload of ACKs to commands with a frame code. `change` also gets the command's
+/// payload.
 pub fn gives(code: u8, mut change: impl FnMut(&[u8], &mut Vec<u8>) + Send + 'static) -> Deviation {
     says(move |request, reply| {
         let (Some((header, asked)), Some((HEADER_ACK, mut payload))) =
@@ -128,7 +129,7 @@ pub fn gives(code: u8, mut change: impl FnMut(&[u8], &mut Vec<u8>) + Send + 'sta
     })
 }
 
-/// Changes the error code of NACKs, given the command.
+/// Changes the error code of NACKs. `change` also gets the command.
 fn refuses(mut change: impl FnMut(&[u8], ErrorCode) -> ErrorCode + Send + 'static) -> Deviation {
     says(move |request, reply| {
         if let Some((HEADER_NACK, payload)) = parsed(reply) {
@@ -145,7 +146,7 @@ pub fn nack(code: ErrorCode) -> Vec<u8> {
     frame(HEADER_NACK, &[code.number()])
 }
 
-/// Header and payload of bytes that are one whole frame.
+/// Header and payload of bytes that are one complete frame.
 pub fn parsed(bytes: &[u8]) -> Option<(u8, Vec<u8>)> {
     match Frame::parse(bytes) {
         Parse::Frame(frame, size) if size == bytes.len() => {

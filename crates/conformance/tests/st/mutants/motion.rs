@@ -1,4 +1,4 @@
-//! Deviations of a motor that turns, or has a fault.
+//! Deviations of a motor that turns or has a fault.
 
 use motorlink_proto::st::{Flags, MotorNumber, RegisterId, Status};
 
@@ -23,7 +23,7 @@ fn faulty(station: &Station) -> bool {
     matches!(status(station), Status::FaultNow | Status::FaultOver)
 }
 
-/// A command becomes another one while something holds.
+/// Replaces a command by another one while a condition is true.
 macro_rules! instead {
     ($command:literal, $other:literal, $holds:expr) => {
         || {
@@ -39,11 +39,11 @@ macro_rules! instead {
 const MUTANTS: [Mutant; 27] = [
     mutant("START_MOTOR does nothing", "ST-4.6-07", instead!(1, 3, |_: &Station| true)),
     mutant("START_MOTOR stops a motor that runs", "ST-4.6-08", instead!(1, 2, running)),
-    mutant("START_MOTOR acknowledges a fault and goes on", "ST-4.6-09", instead!(1, 7, faulty)),
+    mutant("START_MOTOR acknowledges a fault", "ST-4.6-09", instead!(1, 7, faulty)),
     mutant("STOP_MOTOR does nothing", "ST-4.6-11", instead!(2, 3, running)),
     mutant("STOP_RAMP stops the motor", "ST-4.6-14", instead!(3, 2, running)),
     mutant("STOP_RAMP does nothing", "ST-4.6-14", instead!(3, 9, running)),
-    mutant("STOP_RAMP begins a ramp of its own", "ST-4.6-15", || {
+    mutant("STOP_RAMP starts a ramp", "ST-4.6-15", || {
         hears(|station, now, bytes| {
             if running(station) && parsed(bytes) == Some((0x23, vec![3])) {
                 let ramp = frame(0x27, &[0x84, 0x03, 0, 0, 100, 0]);
@@ -79,7 +79,7 @@ const MUTANTS: [Mutant; 27] = [
         })
     }),
     mutant("PFC_ENABLE does nothing", "ST-4.6-29", instead!(0x0A, 3, |_: &Station| true)),
-    mutant("PFC_ENABLE switches off what is on", "ST-4.6-30", || {
+    mutant("PFC_ENABLE switches off an enabled PFC", "ST-4.6-30", || {
         let mut on = false;
         takes(EXECUTE, move |_, payload| match payload[..] {
             [0x0A] if on => *payload = vec![0x0B],
@@ -125,7 +125,7 @@ const MUTANTS: [Mutant; 27] = [
             }
         })
     }),
-    mutant("a ramp leaves torque mode as it is", "ST-4.8-05", || {
+    mutant("a ramp does not end torque mode", "ST-4.8-05", || {
         let mut torque = false;
         answers(move |station, _, header, payload| match (header & 0x1F, payload) {
             (SET, [3, mode]) => {
@@ -148,12 +148,12 @@ const MUTANTS: [Mutant; 27] = [
             (header & 0x1F == CURRENT_REF && running(station)).then(ack)
         })
     }),
-    mutant("current references at rest are forgotten", "ST-4.11-04", || {
+    mutant("current references at rest are discarded", "ST-4.11-04", || {
         answers(|station, _, header, _| {
             (header & 0x1F == CURRENT_REF && !running(station)).then(ack)
         })
     }),
-    mutant("STATUS is that of another numbering", "ST-4.4-20", || {
+    mutant("STATUS has other numbers", "ST-4.4-20", || {
         gives(GET, |asked, value| {
             if asked == [RegisterId::STATUS.0] && value[0] == u8::from(Status::FaultOver) {
                 value[0] = u8::from(Status::FaultNow);

@@ -8,7 +8,7 @@ use crate::peer::frame;
 const SET: u8 = 0x01;
 const GET: u8 = 0x02;
 
-/// Bytes that a register of table 3 has, for a value that is written.
+/// The size of a register of table 3, for a value to write.
 fn size(id: u8) -> usize {
     RegisterId(id).shape().map_or(4, |shape| usize::from(shape.ty(Profile::Spec).size()))
 }
@@ -145,7 +145,7 @@ const MUTANTS: [Mutant; 31] = [
         })
     })
     .of(MCSDK),
-    mutant("a write is acknowledged and forgotten", "ST-4.4-05", || {
+    mutant("a write is acknowledged and discarded", "ST-4.4-05", || {
         answers(|_, _, header, payload| {
             (header & 0x1F == SET && payload.first() == Some(&RegisterId::SPEED_KI.0)).then(ack)
         })
@@ -170,7 +170,7 @@ const MUTANTS: [Mutant; 31] = [
                 .then(|| nack(ErrorCode::WrongSet))
         })
     }),
-    mutant("a DAC channel takes any register", "ST-4.4-22", any_for_dac),
+    mutant("a DAC channel accepts any register", "ST-4.4-22", any_for_dac),
     mutant("speeds are tenths of a hertz", "ST-4.4-17", || {
         gives(GET, |asked, value| {
             if asked == [RegisterId::RAMP_FINAL_SPEED.0] {
@@ -218,7 +218,7 @@ const MUTANTS: [Mutant; 31] = [
     .spinning(),
 ];
 
-/// Every value for a DAC channel is acknowledged, as shipped firmware does.
+/// Acknowledges every value of a DAC channel, like shipped firmware.
 fn any_for_dac() -> crate::peer::Deviation {
     super::says(|request, reply| {
         if matches!(request, [_, _, 0x1C | 0x1D, ..]) && *reply == nack(ErrorCode::WrongSet) {

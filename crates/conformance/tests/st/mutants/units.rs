@@ -8,7 +8,7 @@ use crate::peer::Deviation;
 const GET: u8 = 0x02;
 const DATA_ELEMENT: u8 = 0x0D;
 
-/// A 16-bit register that reads another value.
+/// Changes the value read from a 16-bit register.
 fn reads(register: RegisterId, change: fn(i16) -> i16) -> Deviation {
     gives(GET, move |asked, value| {
         if asked == [register.0] && value.len() == 2 {
@@ -17,7 +17,7 @@ fn reads(register: RegisterId, change: fn(i16) -> i16) -> Deviation {
     })
 }
 
-/// Reads of one register give another.
+/// Swaps the reads of two registers.
 fn swapped(one: RegisterId, other: RegisterId) -> Deviation {
     super::takes(GET, move |_, payload| {
         for id in payload {
