@@ -7,6 +7,7 @@ import pytest
 
 from peers import device, noise
 from program import eventually
+from st_wire import ACK, frame, nack
 
 PORTS = ["pty", "tcp", "sim"]
 
@@ -62,7 +63,9 @@ def test_get_reads_again_and_again(st):
     assert len(readings) == 5
     times = [reading["t"] for reading in readings]
     assert times == sorted(times) and times[-1] >= 0.035
-    assert "600 rpm" in st("get", "MIN_APP_SPEED", "--every", "10ms", "--count", 1).ended(0).out
+    names, units, values = st("get", "MIN_APP_SPEED", "--every", "10ms", "--count", 1).ended(0).out.splitlines()
+    assert (names.split(), units.split()) == (["t", "MIN_APP_SPEED"], ["s", "rpm"])
+    assert values.split()[1] == "600"
 
 
 @on_every_port
@@ -85,7 +88,29 @@ def test_registers_lists_the_table_without_a_port(run):
     registers = {r["name"]: r for r in run("st", "--json", "registers").ended(0).lines}
     assert registers["SPEED_MEAS"]["id"] == 0x1E
     assert registers["SPEED_MEAS"]["access"] == "R"
-    assert "0x1e  SPEED_MEAS" in run("st", "registers").ended(0).out
+    told = run("st", "registers").ended(0).out
+    assert told.startswith("id    name ") and "0x1e  SPEED_MEAS" in told
+    assert "  D   in data segments and on DAC channels only" in told
+
+
+@pytest.mark.parametrize(
+    "words, names",
+    [
+        ("speed_kp", {"SPEED_KP", "SPEED_KP_DIV"}),
+        ("I_?", {"I_A", "I_B", "I_D", "I_Q"}),
+        ("--access w", {"IQ_SPEEDMODE"}),
+        ("--access D,W *ALPHA", {"I_ALPHA", "V_ALPHA", "OBS_I_ALPHA", "OBS_BEMF_ALPHA", "OBS_CR_I_ALPHA", "OBS_CR_BEMF_ALPHA"}),
+        ("--feature feed-forward FF_V?", {"FF_VQ", "FF_VD"}),
+        ("--access - RAMP", {"RAMP_DURATION"}),
+    ],
+)
+def test_registers_are_filtered_by_name_access_and_feature(run, words, names):
+    assert {r["name"] for r in run("st", "--json", "registers", *words.split()).ended(0).lines} == names
+
+
+def test_a_filter_that_no_register_passes_is_told(run):
+    assert "no register matches" in run("st", "registers", "zzz").ended(2).err
+    assert "possible values" in run("st", "registers", "--feature", "zzz").ended(2).err
 
 
 @pytest.mark.parametrize("st", ["pty", "tcp"], indirect=True)
@@ -217,7 +242,46 @@ def test_the_drive_refuses_to_write_a_read_only_register(st):
 
 
 def test_the_drive_refuses_to_read_a_register_of_access_d(st):
-    assert "GET_WRITE_ONLY" in st("get", "I_A").ended(1).err
+    told = st("get", "I_A").ended(1).err
+    assert "GET_WRITE_ONLY" in told and "use `st segment I_A`" in told
+
+
+def test_a_refused_register_does_not_take_the_values_of_the_others(st):
+    told = st("get", "MIN_APP_SPEED", "I_A", "SC_RS", "STATUS").ended(1)
+    assert [line.split()[0] for line in told.out.splitlines()] == ["MIN_APP_SPEED", "STATUS"]
+    assert "I_A has access D" in told.err and "add --profile mcsdk-5.4" in told.err
+    loop = st("get", "MIN_APP_SPEED", "I_A", "--every", "5ms", "--count", 3).ended(1)
+    assert [line.split()[1:] for line in loop.out.splitlines()[2:]] == 3 * [["600", "-"]]
+
+
+@pytest.mark.parametrize(
+    "profile, command, said",
+    [
+        ("spec", "get IQ_SPEEDMODE", "IQ_SPEEDMODE is write-only in the document; add --profile mcsdk-5.4"),
+        ("spec", "get SC_RS", "profile spec does not read SC_RS; add --profile mcsdk-5.4"),
+        ("spec", "set SPEED_MEAS 3", "SPEED_MEAS cannot be written, its access is R"),
+        ("spec", "set SC_PP 3", "profile spec has no register SC_PP; add --profile mcsdk-5.4"),
+        ("mcsdk-5.4", "get I_A", "`st set DAC_OUT1 I_A` shows it on channel 1"),
+        ("mcsdk-5.4", "get RAMP_DURATION", "neither reads nor writes it"),
+        ("mcsdk-5.4", "get SC_RS", "only in drives that are built with: motor profiler"),
+    ],
+)
+def test_a_refusal_says_what_the_table_knows_of_the_register(run, tmp_path, profile, command, said):
+    config = tmp_path / "bench.toml"
+    config.write_text(f'profile = "{profile}"\n')
+    words = ("-p", f"sim:{config}", "--profile", profile, *command.split())
+    assert said in run("st", *words).ended(1).err
+
+
+def test_an_unknown_code_of_a_refusal_has_no_empty_brackets(run, tmp_path):
+    def drive(received):
+        # GET_BOARD_INFO, then STATUS and FLAGS of a line that was just opened, are answered.
+        size = {0x06: 32, 0x02: {2: 1, 1: 4}.get(received[2])}[received[0] & 0x1F]
+        return frame(ACK, bytes(size)) if size else nack(0x63)
+
+    with device(tmp_path / "drive", drive) as port:
+        told = run("st", "-p", port, "get", "SPEED_MEAS").ended(1).err
+    assert "0x63 (no document names this number)" in told and "()" not in told
 
 
 def test_a_motor_that_the_drive_lacks_is_refused_and_one_beyond_7_not_even_sent(st):

@@ -118,6 +118,14 @@ impl Failure {
         self
     }
 
+    /// With other words for what happened.
+    pub fn saying(mut self, message: String) -> Self {
+        if let Failure::Failed(problem) = &mut self {
+            problem.message = message;
+        }
+        self
+    }
+
     /// With a fact before what happened.
     pub fn with_fact(mut self, fact: impl std::fmt::Display) -> Self {
         if let Failure::Failed(problem) = &mut self {

@@ -14,6 +14,38 @@ pub struct Row {
     pub value: Value,
 }
 
+/// What came of a value that was to be read.
+pub enum Cell {
+    Read(Row),
+    /// The drive refused to give the value of this name.
+    Refused(String, Failure),
+}
+
+impl Cell {
+    pub fn name(&self) -> &str {
+        match self {
+            Cell::Read(row) => &row.name,
+            Cell::Refused(name, _) => name,
+        }
+    }
+
+    /// The value, if it could be read.
+    pub fn row(&self) -> Option<&Row> {
+        match self {
+            Cell::Read(row) => Some(row),
+            Cell::Refused(..) => None,
+        }
+    }
+
+    /// Why it could not be read.
+    pub fn refusal(&self) -> Option<&Failure> {
+        match self {
+            Cell::Read(_) => None,
+            Cell::Refused(_, failure) => Some(failure),
+        }
+    }
+}
+
 impl Row {
     /// A number without a unit.
     pub fn plain(name: &str, value: i64) -> Self {
@@ -30,6 +62,25 @@ impl Row {
     pub fn quantity(name: &str, value: f64, decimals: u8, unit: &str) -> Self {
         let text = format!("{value:.*} {unit}", usize::from(decimals));
         Row { name: name.to_owned(), text, value: quantity(value, decimals, unit) }
+    }
+
+    /// The unit; empty where there is none.
+    pub fn unit(&self) -> &str {
+        self.value.get("unit").and_then(Value::as_str).unwrap_or_default()
+    }
+
+    /// The number alone: in the unit, or with --raw as it is on the wire.
+    pub fn number(&self) -> String {
+        let number = self.value.get("value").or_else(|| self.value.get("digits"));
+        number.filter(|number| !number.is_null()).map(Value::to_string).unwrap_or_default()
+    }
+
+    /// The text without its unit, and for values with names the names alone.
+    pub fn short(&self) -> &str {
+        match self.text.rsplit_once(" (0x") {
+            Some((names, _)) => names,
+            None => self.text.strip_suffix(self.unit()).unwrap_or(&self.text).trim_end(),
+        }
     }
 }
 
@@ -70,10 +121,20 @@ impl Line {
     }
 
     /// Values under a name of their own.
-    pub fn with_values(self, name: &str, rows: &[Row]) -> Self {
+    pub fn with_values<'a>(self, name: &str, rows: impl IntoIterator<Item = &'a Row>) -> Self {
         let values: Map<String, Value> =
-            rows.iter().map(|row| (row.name.clone(), row.value.clone())).collect();
+            rows.into_iter().map(|row| (row.name.clone(), row.value.clone())).collect();
         self.with(name, values)
+    }
+
+    /// The values that could be read, and the errors of the others.
+    pub fn cells(self, cells: &[Cell]) -> Self {
+        let line = self.with_values("values", cells.iter().filter_map(Cell::row));
+        let errors = cells
+            .iter()
+            .filter_map(|cell| Some((cell.name().to_owned(), cell.refusal()?.object())))
+            .collect::<Map<String, Value>>();
+        if errors.is_empty() { line } else { line.with("errors", errors) }
     }
 
     /// Says that it was not done, and why.

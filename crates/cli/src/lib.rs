@@ -2,6 +2,7 @@
 //! program can be the same command.
 
 mod advice;
+mod columns;
 mod conformance;
 mod connection;
 mod demo;
@@ -12,6 +13,7 @@ mod interrupt;
 mod json;
 mod output;
 mod ports;
+mod recording;
 mod repeat;
 mod rmd;
 mod sim;

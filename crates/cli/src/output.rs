@@ -9,7 +9,7 @@ use motorlink::Hex;
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
-use crate::json::{Line, Row};
+use crate::json::{Cell, Line, Row};
 use crate::terminal::safe;
 use crate::voice::Voice;
 
@@ -41,26 +41,41 @@ impl Printer {
         if self.json {
             return print_line(&Value::from(object.values(rows)));
         }
-        let width = rows.iter().map(|row| row.name.chars().count()).max().unwrap_or(0);
-        for Row { name, text, .. } in rows {
+        self.texts(rows.iter().map(|row| (&*row.name, &*row.text)))
+    }
+
+    /// Prints the values that could be read as [`rows`](Self::rows), and reports the others.
+    pub fn cells(self, object: Line, cells: Vec<Cell>) -> Result<(), Failure> {
+        let has_values = cells.iter().any(|cell| cell.row().is_some());
+        if self.json && has_values {
+            print_line(&Value::from(object.cells(&cells)))?;
+        } else if has_values {
+            let rows = cells.iter().filter_map(Cell::row);
+            self.texts(rows.map(|row| (&*row.name, &*row.text)))?;
+        }
+        let mut refusals: Vec<Failure> = cells
+            .into_iter()
+            .filter_map(|cell| match cell {
+                Cell::Refused(_, failure) => Some(failure),
+                Cell::Read(_) => None,
+            })
+            .collect();
+        // A program has each in its results.
+        while !self.json && refusals.len() > 1 {
+            report(&refusals.remove(0));
+        }
+        refusals.into_iter().next().map_or(Ok(()), Err)
+    }
+
+    fn texts<'a>(
+        self,
+        rows: impl Iterator<Item = (&'a str, &'a str)> + Clone,
+    ) -> Result<(), Failure> {
+        let width = rows.clone().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+        for (name, text) in rows {
             print_line(&format!("{:<width$}  {text}", in_words(name)))?;
         }
         Ok(())
-    }
-
-    /// Prints values that were read `at` so many seconds, on one line; without a time as
-    /// [`rows`](Self::rows).
-    pub fn sample(self, object: Line, rows: &[Row], at: Option<f64>) -> Result<(), Failure> {
-        match at {
-            Some(at) if !self.json => {
-                let texts: Vec<String> = rows
-                    .iter()
-                    .map(|row| format!("{} {}", in_words(&row.name), row.text))
-                    .collect();
-                print_line(&format!("{at:>9.3} s  {}", texts.join("   ")))
-            }
-            _ => self.rows(object.at(at), rows),
-        }
     }
 }
 

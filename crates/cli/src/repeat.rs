@@ -1,75 +1,74 @@
 //! Reading again and again, through losses of the line.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use motorlink::Clock;
 use serde_json::Value;
 
-use crate::failure::{Failure, Kind};
+use crate::columns::Columns;
+use crate::failure::{Failure, Kind, Problem};
 use crate::interrupt;
-use crate::json::Line;
+use crate::json::{Cell, Line};
 use crate::output::{Printer, note, print_line};
+use crate::recording::Recording;
 use crate::span::parse_span;
 
-/// How often to read.
-#[derive(clap::Args, Clone, Copy)]
+/// How often to read, and where the samples go.
+#[derive(clap::Args, Clone)]
 pub struct Repeat {
     /// Read again and again at this interval, such as 100ms, until Ctrl-C
     #[arg(long, value_name = "TIME", value_parser = parse_span)]
     pub every: Option<Duration>,
-    /// Stop after this many readings
+    /// Stop after this many samples
     #[arg(long, value_name = "N", requires = "every")]
-    pub count: Option<u64>,
+    count: Option<u64>,
+    /// Write the samples to this file, too, as comma-separated values; - writes them to stdout instead
+    #[arg(long, value_name = "FILE", requires = "every", value_hint = clap::ValueHint::FilePath)]
+    csv: Option<PathBuf>,
+    /// Overwrite the file of --csv if it exists
+    #[arg(long, requires = "csv")]
+    force: bool,
 }
 
-/// Prints samples once, or again and again with the seconds since the first: then a line that fails
-/// is waited for, and `object` says so to programs. `clock` is the port's.
-pub fn repeated<T>(
+/// Prints the values of one sample, or with --every of many with the seconds since the first. Then a
+/// line that fails is waited for, and results for programs begin with `object`. `clock` is the port's.
+pub fn repeated(
     clock: &Clock,
-    repeat: Repeat,
+    repeat: &Repeat,
     output: Printer,
     object: &Line,
-    mut sample: impl FnMut() -> Result<Vec<T>, Failure>,
-    print: impl Fn(&[T], Option<f64>) -> Result<(), Failure>,
+    mut sample: impl FnMut() -> Result<Vec<Cell>, Failure>,
 ) -> Result<(), Failure> {
-    let Some(every) = repeat.every else { return print(&sample()?, None) };
+    let Some(every) = repeat.every else { return output.cells(object.clone(), sample()?) };
+    let mut sink = Sink::new(repeat, output, object)?;
     let began = clock.now();
     interrupt::take_over();
     let mut outage = None;
     let mut left = repeat.count.unwrap_or(u64::MAX);
     let elapsed = || Duration::from(clock.now().since(began));
-    let event = |name: &str| object.clone().at(Some(elapsed().as_secs_f64())).with("event", name);
     let mut due = Duration::ZERO;
     while left > 0 && !interrupt::interrupted() {
         match sample() {
-            Ok(samples) => {
+            Ok(cells) if cells.iter().all(|cell| cell.row().is_none()) => {
+                return output.cells(object.clone(), cells);
+            }
+            Ok(cells) => {
                 if let Some(kind) = outage.take() {
-                    match output.json {
-                        true => print_line(&Value::from(event("back")))?,
-                        false if kind == Kind::Silent => note("it answers again"),
-                        false => note("the line is back"),
-                    }
+                    sink.back(elapsed(), kind)?;
                 }
-                print(&samples, Some(elapsed().as_secs_f64()))?;
+                sink.sample(elapsed(), cells)?;
                 left -= 1;
             }
             Err(Failure::Failed(problem)) if matches!(problem.kind, Kind::Link | Kind::Silent) => {
                 if outage.is_none() {
                     outage = Some(problem.kind);
-                    let (text, retry) = (problem.text(), "trying again until Ctrl-C");
-                    match output.json {
-                        true => {
-                            let event = event("outage").with("error", problem.object());
-                            print_line(&Value::from(event))?;
-                        }
-                        false if problem.kind == Kind::Silent => note(format!("{text}; {retry}")),
-                        false => note(format!("the line is lost: {text}; {retry}")),
-                    }
+                    sink.outage(elapsed(), &problem)?;
                 }
             }
             Err(other) => return Err(other),
         }
-        // A slow line skips readings rather than falling behind.
+        // A slow line skips samples rather than falling behind.
         let now = elapsed();
         while due <= now {
             due += every;
@@ -81,5 +80,114 @@ pub fn repeated<T>(
             interrupt::wait(due - now);
         }
     }
-    Ok(())
+    match sink.refusal {
+        Some(refusal) => Err(refusal),
+        None if repeat.count.is_some() && left > 0 => Err(Failure::Interrupted),
+        None => Ok(()),
+    }
+}
+
+/// Where the samples of a loop go.
+struct Sink<'a> {
+    output: Printer,
+    object: &'a Line,
+    columns: Columns,
+    recording: Option<Recording>,
+    /// Whether stdout has samples.
+    prints: bool,
+    /// The first value that the drive refused.
+    refusal: Option<Failure>,
+    /// Names of refused values that a note was printed for.
+    noted: Vec<String>,
+}
+
+impl<'a> Sink<'a> {
+    fn new(repeat: &Repeat, output: Printer, object: &'a Line) -> Result<Self, Failure> {
+        let create = |path: &PathBuf| Recording::create(path, repeat.force);
+        let recording = repeat.csv.as_ref().map(create).transpose()?;
+        let is_stdout = recording.as_ref().is_some_and(Recording::is_stdout);
+        if is_stdout && output.json {
+            return Err(Failure::usage("--json and --csv - both write to stdout")
+                .trying("leave one out, or give --csv a file"));
+        }
+        let (columns, prints) = (Columns::on_stdout(), !is_stdout);
+        Ok(Sink { output, object, columns, recording, prints, refusal: None, noted: Vec::new() })
+    }
+
+    fn sample(&mut self, elapsed: Duration, cells: Vec<Cell>) -> Result<(), Failure> {
+        let seconds = elapsed.as_secs_f64();
+        for (name, failure) in cells.iter().filter_map(|cell| Some((cell.name(), cell.refusal()?)))
+        {
+            if !self.output.json && !self.noted.iter().any(|noted| noted == name) {
+                note(failure.text());
+                self.noted.push(name.to_owned());
+            }
+        }
+        if let Some(recording) = &mut self.recording {
+            recording.sample(seconds, &cells)?;
+        }
+        self.print(|sink| match sink.output.json {
+            true => print_line(&Value::from(sink.object.clone().at(Some(seconds)).cells(&cells))),
+            false => sink.columns.print(seconds, &cells),
+        })?;
+        let refusals = cells.into_iter().filter_map(|cell| match cell {
+            Cell::Refused(_, failure) => Some(failure),
+            Cell::Read(_) => None,
+        });
+        self.refusal = self.refusal.take().or(refusals.into_iter().next());
+        Ok(())
+    }
+
+    fn outage(&mut self, elapsed: Duration, problem: &Problem) -> Result<(), Failure> {
+        if let Some(recording) = &mut self.recording {
+            recording.event(elapsed.as_secs_f64(), "outage")?;
+        }
+        let (text, retry) = (problem.text(), "trying again until Ctrl-C");
+        match (self.output.json, problem.kind) {
+            (true, _) => {
+                let event = self.event(elapsed, "outage").with("error", problem.object());
+                return self.print(|_| print_line(&Value::from(event)));
+            }
+            (false, Kind::Silent) => note(format!("{text}; {retry}")),
+            (false, _) => note(format!("the line is lost: {text}; {retry}")),
+        }
+        Ok(())
+    }
+
+    fn back(&mut self, elapsed: Duration, kind: Kind) -> Result<(), Failure> {
+        if let Some(recording) = &mut self.recording {
+            recording.event(elapsed.as_secs_f64(), "back")?;
+        }
+        self.columns.repeat_header();
+        match (self.output.json, kind) {
+            (true, _) => {
+                let event = self.event(elapsed, "back");
+                return self.print(|_| print_line(&Value::from(event)));
+            }
+            (false, Kind::Silent) => note("it answers again"),
+            (false, _) => note("the line is back"),
+        }
+        Ok(())
+    }
+
+    fn event(&self, elapsed: Duration, name: &str) -> Line {
+        self.object.clone().at(Some(elapsed.as_secs_f64())).with("event", name)
+    }
+
+    /// Prints on stdout. A recording goes on when the reader of stdout is gone.
+    fn print(
+        &mut self,
+        print: impl FnOnce(&mut Self) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        if !self.prints {
+            return Ok(());
+        }
+        match print(self) {
+            Err(Failure::OutputClosed) if self.recording.is_some() => {
+                self.prints = false;
+                Ok(())
+            }
+            done => done,
+        }
+    }
 }

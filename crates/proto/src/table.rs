@@ -40,11 +40,11 @@ macro_rules! named_numbers {
                 }
             }
 
-            /// What the value means, in a sentence; empty for an unnamed number.
+            /// What the value means, in a sentence.
             pub const fn doc(self) -> &'static str {
                 match self {
                     $( $name::$variant => $doc, )+
-                    $name::Unknown(_) => "",
+                    $name::Unknown(_) => "no document names this number",
                 }
             }
         }

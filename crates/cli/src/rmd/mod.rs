@@ -19,8 +19,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
     let done = session.and_then(|session| match command {
         Command::Act(act) => act::run(&session, act),
         Command::Read(Read::Scan { ids }) => read::scan(&session, ids),
-        Command::Read(Read::Status { repeat }) => read::status(&session, repeat),
-        Command::Read(Read::Angle { repeat }) => read::angle(&session, repeat),
+        Command::Read(Read::Status { repeat }) => read::status(&session, &repeat),
+        Command::Read(Read::Angle { repeat }) => read::angle(&session, &repeat),
     });
     done.map_err(|failure| failure.about(&port.to_string(), motor.id))
 }

@@ -5,6 +5,7 @@ use std::time::Duration;
 use clap::Subcommand;
 use motorlink::st::Profile;
 
+use super::registers::Filter;
 use crate::connection::Connection;
 use crate::repeat::Repeat;
 use crate::span::span_up_to;
@@ -53,8 +54,11 @@ pub enum Read {
     Info,
     /// Show state, faults, speed, current, voltage and temperature
     Status,
-    /// List the registers: id, name, type, unit, access
-    Registers,
+    /// List the registers: id, name, type, access, unit, meaning
+    Registers {
+        #[command(flatten)]
+        filter: Filter,
+    },
     /// Read registers
     Get {
         /// Names or numbers (0x1E)

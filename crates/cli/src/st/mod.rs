@@ -3,6 +3,8 @@
 mod act;
 mod args;
 mod read;
+mod refusal;
+mod registers;
 mod scan;
 mod session;
 mod set;
@@ -18,10 +20,10 @@ use crate::failure::Failure;
 
 pub fn run(args: Args) -> Result<(), Failure> {
     let Args { connection, drive, command } = args;
-    let port = match command {
-        Command::Read(Read::Registers) => return read::registers(connection.output()),
-        _ => connection.port()?,
-    };
+    if let Command::Read(Read::Registers { filter }) = &command {
+        return registers::list(connection.output(), filter);
+    }
+    let port = connection.port()?;
     let done = run_at(&connection, &drive, &port, command);
     done.map_err(|failure| failure.about(&port.to_string(), drive.motor))
 }
@@ -36,13 +38,13 @@ fn run_at(
     match command {
         Command::Act(act) => act::run(&connect()?, act),
         Command::Read(read) => match read {
-            Read::Registers => read::registers(connection.output()),
+            Read::Registers { filter } => registers::list(connection.output(), &filter),
             Read::Scan { rates } => {
                 scan::run(connection, port, drive.timeout.unwrap_or(SCAN_TIMEOUT), &rates)
             }
-            Read::Get { registers, repeat } => read::get(&connect()?, &registers, repeat),
+            Read::Get { registers, repeat } => read::get(&connect()?, &registers, &repeat),
             Read::Segment { segment, registers, repeat } => {
-                read::segment(&connect()?, segment, &registers, repeat)
+                read::segment(&connect()?, segment, &registers, &repeat)
             }
             Read::Info => read::info(&connect()?),
             Read::Status => read::status(&connect()?),

@@ -1,41 +1,13 @@
 //! Commands that read.
 
-use motorlink::st::{
-    FirmwareVersion, Flags, Profile, Reading, RegisterId, Status, find_register, register,
-};
+use motorlink::st::{FirmwareVersion, Flags, Profile, Reading, RegisterId, Status, find_register};
 use serde_json::{Value, json};
 
+use super::refusal;
 use super::session::Session;
 use crate::failure::Failure;
-use crate::json::{self, Line, Row};
-use crate::output::Printer;
+use crate::json::{self, Cell, Line, Row};
 use crate::repeat::{Repeat, repeated};
-
-pub fn registers(output: Printer) -> Result<(), Failure> {
-    for id in RegisterId::all() {
-        let (Some(shape), Some(text)) = (id.shape(), id.text()) else { continue };
-        let origin = match shape.origin {
-            register::Origin::Table3 => "",
-            register::Origin::Firmware => " (mcsdk-5.4)",
-        };
-        let unit = shape.unit.symbol();
-        let [ty, mcsdk] = [Profile::Spec, Profile::Mcsdk54].map(|profile| shape.ty(profile).name());
-        let differs = if ty == mcsdk { String::new() } else { format!(" (mcsdk-5.4: {mcsdk})") };
-        let (access, name) = (shape.access.name(), text.name);
-        output.result(
-            format!(
-                "{:#04x}  {name:<21} {ty:<3}  {access:<2}  {unit:<11} {}{origin}{differs}",
-                id.0, text.doc
-            ),
-            json!({
-                "id": id.0, "name": name, "type": ty, "mcsdk_type": mcsdk, "access": access, "unit": unit,
-                "feature": shape.feature.name(), "doc": text.doc,
-                "profile": if origin.is_empty() { Value::Null } else { "mcsdk-5.4".into() },
-            }),
-        )?;
-    }
-    Ok(())
-}
 
 pub fn info(session: &Session) -> Result<(), Failure> {
     let info = session.client.board_info()?;
@@ -71,21 +43,20 @@ const STATUS: [RegisterId; 10] = [
 ];
 
 pub fn status(session: &Session) -> Result<(), Failure> {
-    let mut rows = Vec::new();
-    for register in STATUS {
-        let reading = read(session, register)?;
-        let mut row = row(session, &reading);
+    let mut cells = read_all(session, &STATUS)?;
+    for (register, cell) in STATUS.into_iter().zip(&mut cells) {
+        let Cell::Read(row) = cell else { continue };
+        let Some(bits) = row.value["value"].as_i64() else { continue };
         match register {
-            _ if session.raw => {}
             RegisterId::STATUS => {
-                row.text = format!("{reading}: {}", Status::from(reading.bits as u8).doc());
+                let status = Status::from(bits as u8);
+                row.text = format!("{status}: {}", status.doc());
             }
-            RegisterId::FLAGS => row.text = explain(Flags(reading.bits as u32)),
+            RegisterId::FLAGS => row.text = explain(Flags(bits as u32)),
             _ => {}
         }
-        rows.push(row);
     }
-    session.output.rows(session.line(), &rows)
+    session.output.cells(session.line(), cells)
 }
 
 /// Fault bits spelled out.
@@ -100,18 +71,16 @@ pub fn explain(flags: Flags) -> String {
     text
 }
 
-pub fn get(session: &Session, names: &[String], repeat: Repeat) -> Result<(), Failure> {
+pub fn get(session: &Session, names: &[String], repeat: &Repeat) -> Result<(), Failure> {
     let registers = find_all(names)?;
-    show(session, repeat, || {
-        registers.iter().map(|&register| Ok(row(session, &read(session, register)?))).collect()
-    })
+    show(session, repeat, || read_all(session, &registers))
 }
 
 pub fn segment(
     session: &Session,
     number: u8,
     names: &[String],
-    repeat: Repeat,
+    repeat: &Repeat,
 ) -> Result<(), Failure> {
     session.wants(Profile::Spec, "data segments")?;
     let registers = find_all(names)?;
@@ -127,29 +96,39 @@ pub fn segment(
         }
         session.client.confirm()?;
         let read = registers.iter().zip(values);
-        Ok(read.map(|(&register, bits)| row(session, &session.reading(register, bits))).collect())
+        let row = |(&register, bits)| Cell::Read(row(session, &session.reading(register, bits)));
+        Ok(read.map(row).collect())
     })
 }
 
 fn show(
     session: &Session,
-    repeat: Repeat,
-    sample: impl FnMut() -> Result<Vec<Row>, Failure>,
+    repeat: &Repeat,
+    sample: impl FnMut() -> Result<Vec<Cell>, Failure>,
 ) -> Result<(), Failure> {
-    let (clock, output, object) = (session.client.clock(), session.output, session.line());
-    repeated(&clock, repeat, output, &object, sample, |rows, at| {
-        output.sample(object.clone(), rows, at)
-    })
+    repeated(&session.client.clock(), repeat, session.output, &session.line(), sample)
 }
 
 fn find_all(names: &[String]) -> Result<Vec<RegisterId>, Failure> {
     names.iter().map(|name| find_register(name).map_err(Failure::from)).collect()
 }
 
-fn read(session: &Session, register: RegisterId) -> Result<Reading, Failure> {
-    let bits = session.motor()?.get_raw(register)?;
+/// Reads registers. One that the drive refuses to read does not take the values of the others.
+fn read_all(session: &Session, registers: &[RegisterId]) -> Result<Vec<Cell>, Failure> {
+    let motor = session.motor()?;
+    let cells = registers
+        .iter()
+        .map(|&register| match motor.get_raw(register) {
+            Ok(bits) => Ok(Cell::Read(row(session, &session.reading(register, bits)))),
+            Err(error) if refusal::is_about_register(&error) => {
+                let failure = refusal::of_read(error, register, session.client.profile());
+                Ok(Cell::Refused(register.to_string(), session.about(failure)))
+            }
+            Err(error) => Err(error.into()),
+        })
+        .collect::<Result<_, Failure>>()?;
     session.client.confirm()?;
-    Ok(session.reading(register, bits))
+    Ok(cells)
 }
 
 /// A register with its value as people read it.

@@ -45,6 +45,11 @@ impl Session {
             .trying(format!("add --profile {profile} if that is what the drive speaks")))
     }
 
+    /// A failure with the port and the motor.
+    pub fn about(&self, failure: Failure) -> Failure {
+        failure.about(&self.port, self.motor)
+    }
+
     /// What a result for programs about the motor begins with.
     pub fn line(&self) -> Line {
         Line::about(&self.port, Some(self.motor))

@@ -2,12 +2,11 @@
 
 use std::convert::Infallible;
 
-use motorlink::st::register::Access;
 use motorlink::st::{
-    Error, Features, Profile, Reading, RegisterId, Unverified, VerifiedWrite, find_register,
-    parse_value,
+    Error, Reading, RegisterId, Unverified, VerifiedWrite, find_register, parse_value,
 };
 
+use super::refusal;
 use super::session::Session;
 use crate::failure::Failure;
 use crate::json::{self, Line};
@@ -37,7 +36,11 @@ pub fn run(session: &Session, name: &str, text: &str, attempts: Option<u8>) -> R
             (Some(attempt), Look::Value(session.reading(register, write.expected())))
         }
         _ => {
-            motor.set_raw(register, bits, register.write_size(profile))?;
+            let done = motor.set_raw(register, bits, register.write_size(profile));
+            done.map_err(|error| match refusal::is_about_register(&error) {
+                true => refusal::of_write(error, register, profile),
+                false => error.into(),
+            })?;
             let after = look(session, register, 1).map_err(|failure| {
                 failure.with_fact(format!(
                     "the drive acknowledged writing {register}, but it could not be read back"
@@ -76,8 +79,8 @@ pub fn run(session: &Session, name: &str, text: &str, attempts: Option<u8>) -> R
 /// Reads the register, unless the table says that it cannot be read. A line that fails in each of
 /// `attempts` is an error.
 fn look(session: &Session, register: RegisterId, attempts: u8) -> Result<Look, Failure> {
-    if let Some(reason) = unreadable(register, session.client.profile()) {
-        return Ok(Look::Unreadable(reason));
+    if let Some(known) = refusal::unreadable(register, session.client.profile()) {
+        return Ok(Look::Unreadable(known.fact));
     }
     let motor = session.motor()?;
     let mut read = motor.get_raw(register);
@@ -93,18 +96,6 @@ fn look(session: &Session, register: RegisterId, attempts: u8) -> Result<Look, F
         }
         Err(error) => Err(error.into()),
     }
-}
-
-/// Why the table does not allow to read a register.
-fn unreadable(register: RegisterId, profile: Profile) -> Option<String> {
-    let shape = register.shape()?;
-    if shape.read_size(profile, Features::NONE.with(shape.feature)).is_some() {
-        return None;
-    }
-    Some(match shape.access {
-        Access::WriteOnly => "it is write-only".to_owned(),
-        _ => format!("profile {profile} cannot read it", profile = profile.name()),
-    })
 }
 
 fn words(session: &Session, register: RegisterId, before: &Look, after: &Look) -> String {

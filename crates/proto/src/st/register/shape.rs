@@ -22,6 +22,21 @@ pub enum Access {
 }
 
 impl Access {
+    /// Every access.
+    pub const ALL: [Access; 5] =
+        [Access::ReadWrite, Access::ReadOnly, Access::WriteOnly, Access::Dac, Access::Never];
+
+    /// What the letters mean.
+    pub const fn doc(self) -> &'static str {
+        match self {
+            Access::ReadWrite => "read and write",
+            Access::ReadOnly => "read only",
+            Access::WriteOnly => "write only",
+            Access::Dac => "in data segments and on DAC channels only",
+            Access::Never => "named by firmware, neither read nor written",
+        }
+    }
+
     /// The letters of table 3; `-` for [`Access::Never`].
     pub const fn name(self) -> &'static str {
         match self {

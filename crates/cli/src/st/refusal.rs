@@ -1,0 +1,110 @@
+//! Refusals of registers, with what the table knows of them.
+
+use motorlink::st::register::{Access, Origin, Writing};
+use motorlink::st::{Error, ErrorCode, Feature, Features, Profile, RegisterId};
+
+use crate::failure::Failure;
+
+/// What the table knows of a register that cannot be read or written, and what to try.
+pub struct Known {
+    pub fact: String,
+    pub advice: Option<String>,
+}
+
+/// Whether an error says something of the register, and nothing of the motor or the line.
+pub fn is_about_register(error: &Error) -> bool {
+    matches!(error, Error::Refused { code, .. } if *code != ErrorCode::BadMotorSelected)
+}
+
+/// A refusal to read a register.
+pub fn of_read(error: Error, register: RegisterId, profile: Profile) -> Failure {
+    explained(error, unreadable(register, profile).or_else(|| built_without(register)))
+}
+
+/// A refusal to write a register.
+pub fn of_write(error: Error, register: RegisterId, profile: Profile) -> Failure {
+    explained(error, unwritable(register, profile).or_else(|| built_without(register)))
+}
+
+fn explained(error: Error, known: Option<Known>) -> Failure {
+    let (Error::Refused { port, motor, request, code, .. }, Some(Known { fact, advice })) =
+        (&error, known)
+    else {
+        return error.into();
+    };
+    let message = format!("{port}: {motor} refused {request}: {code}: {fact}");
+    let failure = Failure::from(error).saying(message);
+    advice.into_iter().fold(failure, Failure::trying)
+}
+
+/// Why no drive of this profile can read the register; `None` if one can, or if the register is unknown.
+pub fn unreadable(register: RegisterId, profile: Profile) -> Option<Known> {
+    let shape = register.shape()?;
+    let features = Features::NONE.with(shape.feature);
+    let is_readable = |profile| shape.read_size(profile, features).is_some();
+    if is_readable(profile) {
+        return None;
+    }
+    let other = other(profile);
+    match (shape.access, profile) {
+        (Access::Dac, Profile::Spec) => Some(Known {
+            fact: format!("{register} has access D, it is read in data segments only"),
+            advice: Some(format!("use `st segment {register}`")),
+        }),
+        (Access::Dac, Profile::Mcsdk54) => Some(Known {
+            fact: format!("{register} has access D, this profile shows it on a DAC channel only"),
+            advice: Some(format!("`st set DAC_OUT1 {register}` shows it on channel 1")),
+        }),
+        (Access::Never, _) => Some(Known {
+            fact: format!("firmware names {register}, and neither reads nor writes it"),
+            advice: None,
+        }),
+        _ if is_readable(other) => Some(Known {
+            fact: match shape.access {
+                Access::WriteOnly => format!("{register} is write-only in the document"),
+                _ => format!("profile {} does not read {register}", profile.name()),
+            },
+            advice: Some(advice_profile(other)),
+        }),
+        _ => Some(Known { fact: format!("{register} is write-only"), advice: None }),
+    }
+}
+
+/// Why no drive of this profile can write the register; `None` as above.
+fn unwritable(register: RegisterId, profile: Profile) -> Option<Known> {
+    let shape = register.shape()?;
+    let is_writable = |profile| {
+        matches!(shape.writing(profile, Features::NONE.with(shape.feature)), Writing::Takes(_))
+    };
+    let other = other(profile);
+    if is_writable(profile) {
+        return None;
+    }
+    let fact = match (shape.access, shape.origin) {
+        (_, Origin::Firmware) if is_writable(other) => {
+            format!("profile {} has no register {register}", profile.name())
+        }
+        _ => format!("{register} cannot be written, its access is {}", shape.access.name()),
+    };
+    Some(Known { fact, advice: is_writable(other).then(|| advice_profile(other)) })
+}
+
+/// A drive has the register only if it was built for it.
+fn built_without(register: RegisterId) -> Option<Known> {
+    let feature = register.shape()?.feature;
+    (feature != Feature::Core).then(|| Known {
+        fact: format!("{register} exists only in drives that are built with: {}", feature.name()),
+        advice: None,
+    })
+}
+
+fn other(profile: Profile) -> Profile {
+    match profile {
+        Profile::Spec => Profile::Mcsdk54,
+        Profile::Mcsdk54 => Profile::Spec,
+    }
+}
+
+fn advice_profile(profile: Profile) -> String {
+    format!("add --profile {} if that is what the drive speaks", profile.name())
+}

@@ -1,0 +1,116 @@
+"""`--every` with `--csv`: docs/CSV.md."""
+
+import csv
+import os
+import subprocess
+
+import pytest
+
+from program import environment
+
+
+def read(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_file_has_a_row_a_sample_with_units_and_the_table_stays_on_stdout(run, tmp_path):
+    path = tmp_path / "run.csv"
+    words = ("get", "SPEED_MEAS", "STATUS", "FLAGS", "--every", "5ms", "--count", 4, "--csv", path)
+    table = run("st", "-p", "sim:", *words).ended(0).out
+    rows = read(path)
+    assert list(rows[0]) == ["t [s]", "SPEED_MEAS [rpm]", "STATUS", "FLAGS", "event"]
+    assert len(rows) == 4 and len(table.splitlines()) == 6
+    assert [(row["SPEED_MEAS [rpm]"], row["STATUS"], row["event"]) for row in rows] == 4 * [("0", "0", "")]
+    times = [float(row["t [s]"]) for row in rows]
+    assert times == sorted(times) and times[-1] >= 0.014
+
+
+def test_rmd_values_have_their_units_and_raw_values_none(run, tmp_path):
+    run("rmd", "-p", "sim:", "angle", "--every", "5ms", "--count", 1, "--csv", tmp_path / "a").ended(0)
+    assert list(read(tmp_path / "a")[0]) == ["t [s]", "multi_turn_angle [°]", "single_turn_angle [°]", "event"]
+    words = ("--raw", "status", "--every", "5ms", "--count", 1, "--csv", "-")
+    header, row = csv.reader(run("rmd", "-p", "sim:", *words).ended(0).out.splitlines())
+    assert header[1:4] == ["temperature", "voltage", "errors"] and header[-1] == "event"
+    assert all(value.lstrip("-").isdigit() for value in row[1:-1])
+
+
+def test_a_refused_value_is_empty(run, tmp_path):
+    words = ("get", "I_A", "STATUS", "--every", "5ms", "--count", 2, "--csv", tmp_path / "a")
+    run("st", "-p", "sim:", *words).ended(1)
+    assert [(row["I_A"], row["STATUS"]) for row in read(tmp_path / "a")] == 2 * [("", "0")]
+
+
+def test_a_file_that_exists_is_overwritten_with_force_only(run, tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("precious")
+    words = ("st", "-p", "sim:", "get", "STATUS", "--every", "5ms", "--count", 1, "--csv", path)
+    told = run(*words).ended(2).err
+    assert "exists already" in told and "--force" in told and path.read_text() == "precious"
+    run(*words, "--force").ended(0)
+    assert len(read(path)) == 1
+
+
+def test_a_folder_and_a_missing_folder_are_told(run, tmp_path):
+    words = ("st", "-p", "sim:", "get", "STATUS", "--every", "5ms", "--count", 1, "--force", "--csv")
+    for path in (tmp_path, tmp_path / "none" / "run.csv"):
+        assert f"cannot write `{path}`" in run(*words, path).ended(3).err
+
+
+def test_csv_and_json_do_not_share_stdout(run):
+    words = ("get", "STATUS", "--every", "5ms", "--csv", "-", "--json")
+    assert "both write to stdout" in run("st", "-p", "sim:", *words).ended(2).err
+
+
+@pytest.mark.parametrize("csv_to", ["/dev/full", "-"])
+def test_a_full_disk_ends_a_recording_with_3(motorlink, csv_to):
+    words = ["st", "-p", "sim:", "get", "STATUS", "--every", "5ms", "--csv", csv_to]
+    with open("/dev/full" if csv_to == "-" else os.devnull, "w") as out:
+        done = subprocess.run(
+            [motorlink, *words], stdout=out, stderr=subprocess.PIPE, text=True, timeout=20, env=environment()
+        )
+    assert done.returncode == 3 and "No space left" in done.stderr, done.stderr
+
+
+def test_a_recording_goes_on_when_the_reader_of_stdout_is_gone(motorlink, tmp_path):
+    path = tmp_path / "run.csv"
+    command = f"{motorlink} st -p sim: get STATUS --every 2ms --count 300 --csv {path} | head -n 3 >/dev/null"
+    piped = subprocess.run(
+        ["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"],
+        capture_output=True, text=True, timeout=30, env=environment(),
+    )
+    assert (piped.returncode, piped.stderr) == (0, "")
+    assert len(read(path)) == 300
+
+
+def test_ctrl_c_leaves_whole_rows_and_tells_a_count_that_was_not_reached(start, tmp_path):
+    for count, code in (((), 0), (("--count", 100_000), 130)):
+        path = tmp_path / f"{code}.csv"
+        watch = start("st", "-p", "sim:", "get", "STATUS", "--every", "5ms", *count, "--csv", path)
+        watch.more_lines(4)
+        watch.interrupt()
+        assert watch.wait() == code
+        assert path.read_text().endswith("\n") and len(read(path)) >= 2
+
+
+@pytest.mark.parametrize("protocol, words", [("st", "get SPEED_MEAS"), ("rmd", "angle")])
+def test_an_outage_is_in_the_file_and_the_header_comes_again(sim, start, tmp_path, protocol, words):
+    served = {"st": ("pty",)} if protocol == "st" else {"rmd": ("slcan-pty",)}
+    drives = sim(**{"st": (), "rmd": (), **served})
+    port = drives.port("pty" if protocol == "st" else "slcan")
+    path = tmp_path / "run.csv"
+    every = ("--every", "20ms", "--csv", path)
+    watch = start(protocol, "-p", port, "--timeout", "500ms", *words.split(), *every)
+    watch.more_lines(4)
+    drives.kill()
+    watch.until(lambda: any("trying again until Ctrl-C" in line for line in watch.err), "the outage")
+    sim(**{"st": (), "rmd": (), **served})
+    watch.until(lambda: sum(line.split()[:1] == ["t"] for line in watch.out) == 2, "the header again")
+    watch.more_lines(2)
+    watch.interrupt()
+    assert watch.wait() == 0
+    rows = read(path)
+    assert [row["event"] for row in rows if row["event"]] == ["outage", "back"]
+    first = list(rows[0])[1]
+    assert all((row[first] == "") == bool(row["event"]) for row in rows)
+    assert [float(row["t [s]"]) for row in rows] == sorted(float(row["t [s]"]) for row in rows)
