@@ -362,7 +362,7 @@ def test_garbage_is_told_and_ends_in_time(run, tmp_path, answer):
 def test_a_line_that_echoes_is_told(run, tmp_path):
     with device(tmp_path / "echo", lambda received: received) as port:
         told = run("st", "-p", port, "--timeout", "200ms", "start").ended(3).err
-    assert "what is sent comes back" in told and "echoes" in told
+    assert "is received again" in told and "echoes" in told
 
 
 def test_a_device_that_is_unplugged_mid_exchange_is_told(run, tmp_path):
