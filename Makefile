@@ -40,7 +40,7 @@ RUNS ?= 5
 LOAD ?= 4
 SECONDS ?= 60
 
-.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table
+.PHONY: help demo test check flakes $(ALL_PARTS) wheel fuzz soak bench bench-python reliability sizes docs header python-table python-docs
 .PHONY: install-c pictures semver oldest fmt clean toolchain nightly packages board-target
 
 help: ## this list
@@ -179,6 +179,10 @@ docs: ## the tables of docs/CONFORMANCE.md
 
 python-table: ## the RMD commands of the Python package: _rmd_table.py
 	MOTORLINK_UPDATE_PYTHON=1 $(CARGO) test -p motorlink-python --test table --locked
+
+python-docs: $(PYTHON_VENV)/ready ## the reference in docs/PYTHON.md
+	$(PYTHON_VENV)/bin/python -m pip install --quiet --config-settings build-args=--profile=dev .
+	$(PYTHON_VENV)/bin/python bindings/python/tests/reference.py
 
 header: ## crates/ffi/include/motorlink.h
 	MOTORLINK_UPDATE_HEADER=1 $(CARGO) test -p motorlink-ffi --test header --locked

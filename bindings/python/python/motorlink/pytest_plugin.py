@@ -36,6 +36,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+__all__ = ["motorlink_bench", "motorlink_ports", "motorlink_time"]
+
 # Imported by the first fixture, because most runs of pytest need none.
 if TYPE_CHECKING:
     from motorlink.sim import Bench, Serving
