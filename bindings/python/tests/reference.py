@@ -73,9 +73,16 @@ def stub() -> dict[str, dict[str, ast.FunctionDef]]:
     }
 
 
+def stubs(owner: type | None) -> dict[str, ast.FunctionDef]:
+    """The functions of a class of the extension module; empty for another class."""
+    if owner is None or owner.__module__ != _core.__name__:
+        return {}
+    return stub()[owner.__name__]
+
+
 def signature(function: Any, owner: type | None) -> str:
     """The arguments and the result of a function."""
-    typed = stub().get(owner.__name__, {}).get(function.__name__) if owner else None
+    typed = stubs(owner).get(function.__name__)
     if typed is not None and typed.returns is not None:
         arguments = re.sub(r"^(self|cls)(, )?", "", ast.unparse(typed.args)).replace("'", '"')
         arguments = re.sub(r"(: [^,=]+)=", r"\1 = ", arguments)
@@ -97,7 +104,7 @@ def signature(function: Any, owner: type | None) -> str:
 
 def returned(attribute: Any, name: str, owner: type) -> str:
     """The type of an attribute."""
-    typed = stub().get(owner.__name__, {}).get(name)
+    typed = stubs(owner).get(name)
     if typed is not None and typed.returns is not None:
         return types(f": {ast.unparse(typed.returns)}")
     return types(f": {inspect.signature(attribute.fget).return_annotation}")
@@ -191,7 +198,7 @@ def members(kind: type) -> Iterator[str]:
     for owner in reversed(kind.__mro__):
         if owner.__module__.startswith("motorlink"):
             # The order of the members of extension classes differs from process to process.
-            names = stub().get(owner.__name__) or vars(owner)
+            names = stubs(owner) or vars(owner)
             found.update(dict.fromkeys([*names, *dict(fields(owner))], owner))
     known = {name: text for owner in kind.__mro__ for name, text in fields(owner)}
     plain = BLOCKING.get(kind)
