@@ -9,8 +9,8 @@ $(error make does not work in a folder with spaces in its path: $(CURDIR))
 endif
 # For Miri and the fuzzers. Raise it in a commit of its own; rust-toolchain.toml pins stable.
 NIGHTLY := nightly-2026-05-20
-# What boards have: a Cortex-M4.
-TARGET := thumbv7em-none-eabihf
+# The boards of the tests have a Cortex-M4.
+BOARD := thumbv7em-none-eabihf
 DEBUG := $(or $(abspath $(CARGO_TARGET_DIR)),$(CURDIR)/target)/debug
 
 VENV := $(CURDIR)/.venv
@@ -117,12 +117,19 @@ fuzz-replay: ## 1 min: fuzz targets with their seeds and old findings
 test-socketcan: ## 2 min: the port socketcan: in a CAN kernel in QEMU
 	CARGO="$(CARGO)" tests/socketcan/run.sh || [ $$? -eq 77 ]
 
-SIZES = $(PYTHON) sizes.py $(or $(CARGO_TARGET_DIR),target)/$(TARGET)/release
+SIZES = $(PYTHON) sizes.py $(or $(CARGO_TARGET_DIR),target)/$(BOARD)/release $(DEBUG)/../bare-metal/prefix
+C_FOR_BOARDS := gcc-arm-none-eabi libnewlib-arm-none-eabi
+INSTALL_BARE_METAL = CARGO="$(CARGO)" crates/ffi/packaging/install $(DEBUG)/../bare-metal/prefix "" $(BOARD) >/dev/null
+BARE_METAL := --target $(BOARD) --target-dir $(DEBUG)/../bare-metal
 probe: board-target ## 1 min: the protocols on a Cortex-M4: no panic, flash, RAM
 	cd probe && $(CARGO) fmt --check && $(CARGO) clippy --release --locked -- -D warnings
-	cd probe && $(CARGO) build --release --locked && $(SIZES) --check
+	cd probe && $(CARGO) build --release --locked
+	-@tests/install $(C_FOR_BOARDS)
+	! command -v arm-none-eabi-ar >/dev/null || $(INSTALL_BARE_METAL)
+	cd probe && $(SIZES) --check
 	cd firmware && $(CARGO) fmt --check && $(CARGO) clippy --release --locked -- -D warnings
-	$(CARGO) build -p motorlink-embedded -p motorlink-sim --target $(TARGET) --locked
+	cd crates/ffi/bare-metal && $(CARGO) fmt --check && $(CARGO) clippy --release --locked $(BARE_METAL) -- -D warnings
+	$(CARGO) build -p motorlink-embedded -p motorlink-sim --target $(BOARD) --locked
 
 FINGERPRINT = $(CARGO) run --quiet --locked -p motorlink-sim --example fingerprint
 PLAIN := --target-dir target/plain --config profile.dev.package.motorlink-sim.opt-level=0
@@ -169,7 +176,9 @@ $(BENCH_VENV)/ready: benchmarks/requirements.txt
 	{ $(PYTHON) -m venv $(BENCH_VENV) && $(BENCH_VENV)/bin/python -m pip install --quiet -r $< && touch $@; } || \
 		echo "THE OTHER SIMULATORS ARE NOT MEASURED: they cannot be installed into $(BENCH_VENV)" >&2
 
-sizes: board-target ## flash and RAM on a Cortex-M4, into docs/SIZES.md
+sizes: board-target ## flash and RAM on a Cortex-M4, from C and Rust: docs/SIZES.md
+	tests/install $(C_FOR_BOARDS)
+	$(INSTALL_BARE_METAL)
 	cd probe && $(CARGO) build --release --locked && $(SIZES) > ../docs/SIZES.md
 
 # ---- What is written by a command ----
@@ -195,8 +204,10 @@ pictures: ## docs/pictures: the scenarios are played and drawn
 	done
 
 PREFIX ?= /usr/local
-install-c: ## C header and libraries: PREFIX=/usr/local DESTDIR=
-	CARGO="$(CARGO)" crates/ffi/packaging/install $(PREFIX) $(DESTDIR)
+# A microcontroller, for example thumbv7em-none-eabihf.
+TARGET =
+install-c: toolchain ## C header and libraries: PREFIX=/usr/local DESTDIR= TARGET=
+	CARGO="$(CARGO)" crates/ffi/packaging/install "$(PREFIX)" "$(DESTDIR)" $(TARGET)
 
 wheel: $(PYTHON_VENV)/ready ## the Python package as a wheel, in target/wheels
 	$(PYTHON_VENV)/bin/python -m maturin build --quiet --release --out target/wheels
@@ -216,7 +227,7 @@ semver: ## the public interface against the last release
 		-p motorlink-proto -p motorlink-sim -p motorlink --all-features
 
 fmt: ## formats the Rust code
-	for workspace in . fuzz probe firmware; do (cd $$workspace && $(CARGO) fmt --all) || exit; done
+	for workspace in . fuzz probe firmware crates/ffi/bare-metal; do (cd $$workspace && $(CARGO) fmt --all) || exit; done
 
 clean: ## removes all that was built or installed into this folder
 	$(CARGO) clean
@@ -239,7 +250,7 @@ packages:
 	-@tests/install $(filter ffi-test firmware-test test-socketcan,$(PARTS))
 
 board-target: toolchain
-	@rustup target list --installed | grep -qx $(TARGET) || rustup target add $(TARGET)
+	@rustup target list --installed | grep -qx $(BOARD) || rustup target add $(BOARD)
 
 $(VENV)/ready: tests/e2e/requirements.txt
 $(PYTHON_VENV)/ready: bindings/python/tests/requirements.txt

@@ -1,6 +1,6 @@
 """Boards in QEMU, in Rust and in C. `make firmware-test` builds them and does all of it.
 
-MOTORLINK_FIRMWARE is the folder with board-rust.elf and board-c.elf. A test gets a board that has
+MOTORLINK_FIRMWARE is the folder with the programs that firmware/build.sh makes. A test gets a board that has
 just been switched on, and the program and the hosts of tests/e2e. Deadlines and motors go by the
 board's time, which passes as the program and the tests say: a machine under load is slow, and the
 results are the same.
@@ -32,18 +32,20 @@ _end_to_end = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(_end_to_end)
 motorlink, run, start = _end_to_end.motorlink, _end_to_end.run, _end_to_end.start
 
-def elf(language):
-    path = Path(os.environ["MOTORLINK_FIRMWARE"]) / f"board-{language}.elf"
+
+
+def elf(program):
+    path = Path(os.environ["MOTORLINK_FIRMWARE"]) / f"{program}.elf"
     assert path.exists(), f"{path} is not built: `firmware/build.sh`"
     return path
 
 
 class Board:
-    """A board in QEMU with its UARTs on TCP ports of this machine, which QEMU chooses. Its time stands
-    still from the first use of the clock port on, except while somebody steps it."""
+    """A board in QEMU with its UARTs on TCP ports of this machine, which QEMU chooses. After the
+    first use of the clock port its time advances only by steps."""
 
-    def __init__(self, language, *machine):
-        """`machine` are further options of QEMU."""
+    def __init__(self, language, *machine, program=None):
+        """`machine` are further options of QEMU; `program` one without a clock port, in real time."""
         self.language = language
         uarts = []
         for name in ("st", "rmd", "clock"):
@@ -51,7 +53,7 @@ class Board:
             options = "host=127.0.0.1,port=0,server=on,wait=off,nodelay=on"
             uarts += ["-chardev", f"socket,id={name},{options}", "-serial", f"chardev:{name}"]
         self.process = subprocess.Popen(
-            ["qemu-system-arm", "-M", "netduinoplus2", "-kernel", str(elf(language)), "-S"]
+            ["qemu-system-arm", "-M", "netduinoplus2", "-kernel", str(elf(program or f"board-{language}")), "-S"]
             + ["-display", "none", "-monitor", "none", "-qmp", "stdio", *uarts, *machine],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -67,7 +69,8 @@ class Board:
                 for name in ("st", "rmd", "clock")
             )
             self._do("cont")
-            self.clock().close()
+            if program is None:
+                self.clock().close()
         except BaseException:
             self.end()
             raise

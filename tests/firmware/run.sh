@@ -1,11 +1,11 @@
 #!/bin/sh
-# Builds both boards, boots them in QEMU and runs tests/firmware against them. Ends with 77 where the
+# Builds the boards and the C library for microcontrollers, boots them in QEMU and runs tests/firmware against them. Ends with 77 where the
 # packages cannot be installed. MOTORLINK_BIN is the built program, PYTEST how to run pytest, SUDO what
 # makes a command root's.
 set -eu
 tests=$(cd "$(dirname "$0")" && pwd)
 repository=$tests/../..
-target=thumbv7em-none-eabihf
+targets="thumbv6m-none-eabi thumbv7m-none-eabi thumbv7em-none-eabi thumbv7em-none-eabihf riscv32imac-unknown-none-elf"
 
 unavailable() {
     echo "SKIPPED: the firmware on an emulated board: $1" >&2
@@ -14,8 +14,8 @@ unavailable() {
 
 "$repository/tests/install" firmware-test ||
     unavailable "packages are missing; as root: tests/install firmware-test"
-rustup target list --installed | grep -qx $target || rustup target add $target >&2 ||
-    unavailable "rustup cannot add the target $target"
+# shellcheck disable=SC2086
+rustup target add $targets >&2 || unavailable "rustup cannot add the targets $targets"
 
 cd "$repository"
 firmware/build.sh

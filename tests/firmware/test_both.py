@@ -52,7 +52,7 @@ def rates(board, *hosts):
 
     threads = [threading.Thread(target=measure, args=[host]) for host in hosts]
     with board.clock() as clock:
-        # From the first step on the board's time is no longer real time.
+        # After the first step the board's time advances only by steps.
         clock.step(1)
         for thread in threads:
             thread.start()

@@ -121,7 +121,7 @@ def test_hosts_come_and_go(board):
         with Line(board.url(board.st)) as line:
             assert line.get(0x03) == 1
             line.send(frame(GET_REG, [0x03])[:2])
-            # What this host leaves behind is answered while nobody listens.
+            # The board answers this after the host has left.
             line.port.advance(0.0249)
         board.advance(0.001)
 

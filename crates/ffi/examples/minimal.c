@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /* The speed of an ST drive's motor 1: minimal /dev/ttyACM0 */
-#define _POSIX_C_SOURCE 200809L
 #include "posix.h"
 
 #include <motorlink.h>

@@ -1,7 +1,11 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
-/* What the examples need of a POSIX system: a raw serial line, a clock, waiting. */
+/* What the examples need of a POSIX system: a raw serial line, a clock, waiting. Include it first. */
 #ifndef MOTORLINK_EXAMPLE_POSIX_H
 #define MOTORLINK_EXAMPLE_POSIX_H
+
+#if !defined(_POSIX_C_SOURCE) && !defined(_XOPEN_SOURCE)
+#define _POSIX_C_SOURCE 200809L
+#endif
 
 #include <errno.h>
 #include <fcntl.h>

@@ -2,67 +2,15 @@
 /*
  * An RMD motor behind an slcan adapter on a pty: rmd_drive
  *
- * Prints the path that a host opens, and serves it until stdin ends. The motor has ID 1, follows
- * every command without inertia, and forgets its ROM. Ends with 0.
+ * Prints the path that a host opens, and serves it until stdin ends. The motor is the one of motor.h,
+ * with ID 1. Exits with 0.
  */
 #define _XOPEN_SOURCE 700
 #include "posix.h"
 
 #include <motorlink.h>
 
-enum { COUNTS = 1 << 14, OWN_SPEED_DPS = 360 };
-
-struct motor {
-  motorlink_rmd_motion motion;
-  uint64_t seen_us;
-  /* In millionths of a count, so that slow is not still. */
-  int64_t position;
-  int16_t speed_dps;
-};
-
-static int64_t counts_of(int64_t dps, uint64_t us) {
-  return dps * COUNTS / 360 * (int64_t)us;
-}
-
-/* Moves the motor to where it is now. */
-static void turn(struct motor *motor) {
-  const motorlink_rmd_motion *motion = &motor->motion;
-  uint64_t now = now_us(), passed = now - motor->seen_us;
-  int64_t dps = 0, target = motion->target_counts * 1000000;
-  motor->seen_us = now;
-  if (motion->kind == MOTORLINK_RMD_MODE_SPEED) {
-    dps = motion->speed_centidps / 100;
-  } else if (motion->kind == MOTORLINK_RMD_MODE_POSITION) {
-    int64_t most = motion->max_speed_dps >= 0 ? motion->max_speed_dps : OWN_SPEED_DPS;
-    int64_t way = target - motor->position, reach = counts_of(most, passed);
-    if (way <= reach && way >= -reach) {
-      motor->position = target;
-    } else {
-      dps = way > 0 ? most : -most;
-    }
-  }
-  motor->position += counts_of(dps, passed);
-  motor->speed_dps = (int16_t)(dps > 2000 ? 2000 : dps < -2000 ? -2000 : dps);
-}
-
-static void set_mode(void *context, const motorlink_rmd_motion *motion) {
-  struct motor *motor = (struct motor *)context;
-  turn(motor);
-  motor->motion = *motion;
-}
-
-static void sense(void *context, motorlink_rmd_sense *out) {
-  struct motor *motor = (struct motor *)context;
-  turn(motor);
-  out->encoder_counts = motor->position / 1000000;
-  out->speed_dps = motor->speed_dps;
-  out->voltage_decivolts = 240;
-  out->temperature_celsius = 25;
-  if (motor->motion.kind == MOTORLINK_RMD_MODE_TORQUE) {
-    /* 0.016 A a digit became 33/2048 A a digit. */
-    out->iq_digits = (int16_t)((int32_t)motor->motion.iq_16ma * 2048 * 16 / 33000);
-  }
-}
+#include "motor.h"
 
 static motorlink_slcan_device adapter;
 static motorlink_rmd_drive drive;
@@ -102,12 +50,9 @@ int main(void) {
   /* The other end stays open, so that hosts may come and go. */
   kept = open_line(ptsname(fd));
 
-  callbacks.context = &motor;
-  callbacks.set_mode = set_mode;
-  callbacks.sense = sense;
+  callbacks = motor_control(&motor);
   memset(&config, 0, sizeof config);
   config.id = 1;
-  motor.seen_us = now_us();
   check(motorlink_slcan_device_init(&adapter, sizeof adapter));
   check(motorlink_rmd_drive_init(&drive, sizeof drive, &config, NULL, &callbacks));
   check(motorlink_rmd_drive_power_on(&drive, now_us()));

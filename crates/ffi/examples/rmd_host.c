@@ -9,7 +9,6 @@
  * What an earlier program asked a motor may still be answered: the first exchange with each motor
  * ends in QUARANTINED, and it is asked again when it was silent for the quarantine time.
  */
-#define _POSIX_C_SOURCE 200809L
 #include "posix.h"
 
 #include <motorlink.h>

@@ -6,7 +6,6 @@
  * turns so fast, and stops it, also after a failure. Ends with 0, with 1 where the drive refused,
  * with 3 where the line failed.
  */
-#define _POSIX_C_SOURCE 200809L
 #include "posix.h"
 
 #include <motorlink.h>

@@ -7,8 +7,10 @@
  * host and drive; and slcan, with which a serial line carries CAN frames. C99 and C++11.
  * Paragraph numbers in brackets are those of the protocols' documents.
  *
- * Nothing here reads a clock, touches a port, allocates or prints. A caller hands in received bytes
- * or frames with the time at which they came, and polls for what to do: send, wait until, done.
+ * The library reads no clock, opens no port, allocates nothing and prints nothing. Hand in received
+ * bytes or frames with the time of their arrival, and poll for what to do: send, wait, or take the
+ * result. The manual with examples, C.md, and the pages that this header cites are installed in
+ * share/doc/motorlink.
  *
  *     static motorlink_st_master master;
  *     motorlink_st_output output;
@@ -26,50 +28,52 @@
  *     } while (output.kind != MOTORLINK_OUTPUT_DONE);
  *     if (output.result == MOTORLINK_OK) { speed_rpm = output.value; }
  *
- * What holds for every function:
+ * For every function:
  *
- * Version. MOTORLINK_VERSION and its numbers are those of this header, for `#if`. Before 1.0 another
- * minor version is another interface. Where header and library may differ, compare:
+ * Version. MOTORLINK_VERSION and its numbers are those of this header, for `#if`. Before 1.0 each
+ * minor version is another interface. To compare header and library at run time:
  * `strcmp(motorlink_version(), MOTORLINK_VERSION) == 0`.
  *
- * Ownership. The caller owns the storage of every object, which may be static, on the stack or on
- * the heap, and which is opaque: `_init` begins an object there, whatever the storage held before.
- * There is nothing to release. A pointer is used during the call only, where its function does not
- * say that it is kept; pointers in one call do not overlap one another or an object's storage, where
- * the bytes are that an output or a reply points to: copy them to hand them in again.
+ * Ownership. The caller owns the storage of every object: static, on the stack or on the heap. It is
+ * opaque. `_init` begins an object there, whatever the storage held before. There is nothing to
+ * release. A function uses a pointer during the call only, unless its description says that the
+ * pointer is kept. Pointers in one call must not overlap one another or an object's storage. The bytes
+ * that an output or a reply points to are in that storage: copy them before you hand them in again.
  *
- * Requests. A `motorlink_st_master_` function that takes a motor begins an exchange, which
- * `_poll` conducts: send what it says, hand in what comes, until it says done. It is not over
- * before that is polled, and until then every other request is BUSY. `motor` is 1 to 7, or
- * 0 for the drive's current motor (3.2). BAD_ARGUMENT: `motor` is over 7. BUSY: an exchange is under
- * way. The host of RMD motors has an exchange with each motor, all at once. LIMIT, of both: the request
- * exceeds a limit that the caller set, for a master with `motorlink_st_master_set_limits`.
+ * Requests. A `motorlink_st_master_` function that takes a motor begins an exchange. `_poll`
+ * conducts it: send what it gives, hand in what arrives, until it gives DONE. Until then every other
+ * request is BUSY. `motor` is 1 to 7, or 0 for the drive's current motor (3.2). BAD_ARGUMENT: `motor`
+ * is over 7. BUSY: an exchange is under way. The host of RMD motors has an exchange with each motor,
+ * all at the same time. LIMIT, of both: the request exceeds a limit that the caller set, for a master
+ * with `motorlink_st_master_set_limits`.
  *
- * Numbers with names. Registers, commands, error codes, states and the like have an enum each, and its
- * name is the type in calls: one byte, with -fshort-enums and without, for C and for the library. In C it is
- * `uint8_t`, from C23 on and in C++ the enum itself, so that C++ wants a cast for a plain number. A
- * drive may send a number that the enum does not name: it is handed on as it is. What a caller passes
- * is checked, whatever its type says. Sums of bits are plain integers.
+ * Numbers with names. Registers, commands, error codes, states and the like have an enum each. Its name
+ * is the type in calls. The type has one byte, with -fshort-enums and without. In C it is `uint8_t`; from
+ * C23 on and in C++ it is the enum itself, so that C++ needs a cast for a plain number. A drive may send
+ * a number without a name: it is handed on unchanged. Numbers from the caller are checked. Sums of
+ * bits are plain integers.
  *
- * Time is in microseconds since any moment, as long as it is the same one for an object and time
- * does not run backwards.
+ * Time is in microseconds since any moment. Use the same clock for all calls of an object. Time must
+ * not run backwards.
  *
- * Errors. A function gives MOTORLINK_OK or another `motorlink_error`, which says that nothing was
- * done. Besides those that a function names it may be NULL_POINTER, MISALIGNED and, where it takes
- * an object, UNINITIALISED, WRONG_KIND and IN_USE. `_init` may give STORAGE_TOO_SMALL.
+ * Errors. A function returns MOTORLINK_OK, or another `motorlink_error`: then it has done nothing.
+ * Any function may return NULL_POINTER and MISALIGNED, and, if it takes an object, UNINITIALISED,
+ * WRONG_KIND and IN_USE. `_init` may return STORAGE_TOO_SMALL. Each function names its other errors.
  *
- * Reentrancy. Calls for different objects have nothing to do with each other; there are no globals.
- * A call for an object that is in a call already (from one of its callbacks, from an interrupt,
- * from another thread) gives IN_USE and does nothing; on a processor without compare-and-exchange,
- * such as a Cortex-M0, that holds for callbacks and interrupts only. `_init` alone cannot know, and
- * must not be called then.
+ * Reentrancy. Calls for different objects are independent; there are no globals. A call for an object
+ * that is in a call already (from one of its callbacks, from an interrupt, from another thread)
+ * returns IN_USE and does nothing. On a processor without compare-and-exchange, such as a Cortex-M0,
+ * this holds for callbacks and interrupts only. `_init` cannot detect it and must not be called then.
  *
- * Callbacks return: they do not leave by longjmp or by a C++ exception. Their table may be changed,
- * also by them.
+ * Callbacks must return: not leave by longjmp or by a C++ exception. The program may change the table
+ * of callbacks at any time, also in a callback.
  *
- * Cost. Every call ends after a number of steps that depends on the bytes that were handed in and
- * on the callbacks. On a Cortex-M4 it needs less than 1 KiB of stack beside them; only
- * motorlink_rmd_host_init needs 6 KiB. What is not called is not linked.
+ * Panic. There is none: no check inside the library can fail. The library for microcontrollers is
+ * installed only if its code refers to no panic handler.
+ *
+ * Cost. The number of steps of a call depends only on the bytes that were handed in and on the callbacks.
+ * On a Cortex-M4 a call needs less than 1 KiB of stack beside its callbacks; only
+ * motorlink_rmd_host_init needs 6 KiB. Functions that are not called are not linked.
  */
 
 
@@ -101,15 +105,15 @@ typedef enum motorlink_st_profile motorlink_st_profile;
 typedef uint8_t motorlink_st_profile;
 #endif
 
-/** How a line is brought in step that was just opened, or on which an exchange failed. */
+/** How a master recovers a line after it was opened, or after a failed exchange. */
 enum motorlink_st_recovery
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint8_t
 #endif
  {
-  MOTORLINK_ST_RECOVERY_NONE  = 0x00, /**< not by itself: the line counts as in step until it is lost, and `motorlink_st_master_trust_line` says that it is so again */
-  MOTORLINK_ST_RECOVERY_DRAIN = 0x01, /**< waits for silence, asks a question, goes on when it was answered */
-  MOTORLINK_ST_RECOVERY_PAD   = 0x02  /**< as DRAIN, behind bytes that complete a frame which a 5.x drive may still be waiting for */
+  MOTORLINK_ST_RECOVERY_NONE  = 0x00, /**< no recovery: the line is in step at first, and after a failure out of step until `motorlink_st_master_trust_line` is called */
+  MOTORLINK_ST_RECOVERY_DRAIN = 0x01, /**< waits for silence, asks a question, continues after the answer */
+  MOTORLINK_ST_RECOVERY_PAD   = 0x02  /**< sends bytes that complete a frame for which a 5.x drive may still wait, then as DRAIN */
 };
 #if !defined(__cplusplus) && __STDC_VERSION__ >= 202311L
 typedef enum motorlink_st_recovery motorlink_st_recovery;
@@ -486,12 +490,12 @@ enum motorlink_rmd_can_id {
 
 
 /**
- * Success, as all functions give it.
+ * Success.
  */
 #define MOTORLINK_OK 0
 
 /**
- * The moment of a `WAIT` that only a received byte or frame, or a new request, can end.
+ * The moment of a `WAIT` without a deadline: a received byte or frame, or a new request, ends it.
  */
 #define MOTORLINK_NEVER UINT64_MAX
 
@@ -531,7 +535,7 @@ enum motorlink_rmd_can_id {
 #define MOTORLINK_SLCAN_DEVICE_WORDS 7
 
 /**
- * Bytes for a text of a reply with its NUL.
+ * Bytes for a text of a reply, with its NUL.
  */
 #define MOTORLINK_ST_TEXT_SIZE 33
 
@@ -541,7 +545,7 @@ enum motorlink_rmd_can_id {
 #define MOTORLINK_ST_MAX_PAYLOAD 128
 
 /**
- * The `id` of no frame, which has no bytes either.
+ * The `id` if a call returns no frame.
  */
 #define MOTORLINK_NO_FRAME UINT32_MAX
 
@@ -551,7 +555,7 @@ enum motorlink_rmd_can_id {
 #define MOTORLINK_SLCAN_LINE_SIZE 31
 
 /**
- * What became of a call, or of an exchange. 0 is success.
+ * The result of a call, or of an exchange. 0 is success.
  */
 enum motorlink_error
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -563,19 +567,19 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_OK = 0,
   /**
-   * A pointer that is needed is NULL.
+   * A required pointer is NULL.
    */
   MOTORLINK_ERROR_NULL_POINTER = 1,
   /**
-   * A pointer is not aligned as its type demands.
+   * A pointer is not aligned for its type.
    */
   MOTORLINK_ERROR_MISALIGNED = 2,
   /**
-   * The storage is smaller than this library needs: it was declared with another header.
+   * The storage is smaller than this library needs: header and library are of different versions.
    */
   MOTORLINK_ERROR_STORAGE_TOO_SMALL = 3,
   /**
-   * The storage was never initialised, or something wrote over it.
+   * The storage was never initialised, or was overwritten.
    */
   MOTORLINK_ERROR_UNINITIALISED = 4,
   /**
@@ -604,7 +608,7 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_REFUSED = 20,
   /**
-   * No reply in time. It is not known whether the drive did what was asked.
+   * No reply in time. It is not known whether the drive executed the request.
    */
   MOTORLINK_ERROR_TIMEOUT = 21,
   /**
@@ -612,7 +616,7 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_INCOMPLETE = 22,
   /**
-   * A byte came that begins no reply (ST).
+   * A received byte does not begin a reply (ST).
    */
   MOTORLINK_ERROR_NOT_A_REPLY = 23,
   /**
@@ -624,24 +628,25 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_NOT_UNDERSTOOD = 25,
   /**
-   * Two replies that differ came at once (ST).
+   * Two different replies arrived at once (ST).
    */
   MOTORLINK_ERROR_AMBIGUOUS = 26,
   /**
-   * The line was lost before, and the drive does not answer a question; nothing else was sent (ST).
+   * The line was out of step before, and the drive does not answer a test question. The request was
+   * not sent (ST).
    */
   MOTORLINK_ERROR_LOST = 27,
   /**
-   * The line is not in step and does not fall silent; nothing was sent (ST).
+   * The line was out of step before, and bytes keep arriving. Nothing was sent (ST).
    */
   MOTORLINK_ERROR_NOISE = 28,
   /**
-   * The drive acknowledged, with something that is no value of a register (ST).
+   * The drive acknowledged, but the reply does not contain a value of the register (ST).
    */
   MOTORLINK_ERROR_WRONG_REPLY = 29,
   /**
-   * The motor did not answer before, or was not asked before, and cannot be trusted yet. Nothing
-   * but a question was sent, unless it was an Off or a Stop. Ask again (RMD).
+   * A late reply of this motor may still come: the last request had no reply, or this is the first
+   * request to the motor. Only a read was sent, unless the request was Off or Stop. Ask again (RMD).
    */
   MOTORLINK_ERROR_QUARANTINED = 40,
   /**
@@ -649,17 +654,17 @@ enum motorlink_error
    */
   MOTORLINK_ERROR_LIMIT = 41,
   /**
-   * No reply of this protocol, but one of RMD V3 or V4, or LK-Tech V2.36 (RMD).
+   * The reply is of another protocol: RMD V3 or V4, or LK-Tech V2.36 (RMD).
    */
   MOTORLINK_ERROR_FOREIGN = 42,
   /**
-   * The reply has another content than the request that it has to repeat. It is not known what the
-   * motor did (RMD).
+   * The reply should repeat the request and differs from it. It is not known what the motor did
+   * (RMD).
    */
   MOTORLINK_ERROR_ALTERED = 43,
   /**
-   * What was sent came back: an adapter or the wiring echoes, or another host asks the same. Only a
-   * question was sent to a drive (ST); what the motor did is not known (RMD).
+   * The frame that was sent was received: an adapter or the wiring echoes, or another host sends the
+   * same. Only a read was sent to a drive (ST). It is not known what the motor did (RMD).
    */
   MOTORLINK_ERROR_ECHO = 44,
 };
@@ -680,7 +685,7 @@ enum motorlink_output
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * Hand in what comes, and poll again at `until_us` at the latest.
+   * Hand in what arrives, and poll again at `until_us` at the latest.
    */
   MOTORLINK_OUTPUT_WAIT = 0,
   /**
@@ -709,11 +714,11 @@ enum motorlink_rmd_mode
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * Without current.
+   * No current.
    */
   MOTORLINK_RMD_MODE_OFF = 0,
   /**
-   * Brought to a stand and kept there.
+   * Brakes to a standstill and stays there.
    */
   MOTORLINK_RMD_MODE_STOPPED = 1,
   /**
@@ -738,7 +743,7 @@ typedef uint8_t motorlink_rmd_mode;
 #endif // __cplusplus
 
 /**
- * What an adapter said.
+ * What an adapter has sent.
  */
 enum motorlink_slcan_answer
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -837,12 +842,12 @@ typedef struct motorlink_st_master_config {
    */
   uint32_t timeout_us;
   /**
-   * The silence after which nothing more is expected to come, µs.
+   * The line counts as silent after this time without a byte, µs.
    */
   uint32_t quiet_us;
   /**
-   * Where the port takes bytes faster than the line carries them, as all ports of computers do: the
-   * line's baud rate. What recovery sends is then on the line before silence begins. 0 adds nothing.
+   * The line's baud rate, for ports that take bytes faster than the line sends them, as ports of computers
+   * do. The silence of a recovery then begins when its bytes have left the port. 0: not known.
    */
   uint32_t baud;
   /**
@@ -850,24 +855,24 @@ typedef struct motorlink_st_master_config {
    */
   motorlink_st_profile profile;
   /**
-   * How a lost line comes back.
+   * How the master recovers a line that is out of step.
    */
   motorlink_st_recovery recovery;
 } motorlink_st_master_config;
 
 /**
- * A master of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
- * Opaque; may be moved and copied while no call for it is under way.
+ * A master of ST's Motor Control Protocol, in storage of the caller: static, on the stack or on the heap.
+ * Opaque. It may be moved and copied while no call for it is under way.
  */
 typedef struct motorlink_st_master {
   /**
-   * Nobody's business.
+   * Private; do not access.
    */
   uint64_t opaque[MOTORLINK_ST_MASTER_WORDS];
 } motorlink_st_master;
 
 /**
- * What no request may exceed, whatever function it comes from.
+ * Limits of requests. They hold for every function.
  *
  * While `speed_rpm` is set, a motor is started only after a speed ramp to it was acknowledged: else the
  * drive goes to a speed of its own. The ramp may be `motorlink_st_master_set_ramp` or a write of
@@ -875,7 +880,7 @@ typedef struct motorlink_st_master {
  * command, a write of CONTROL_MODE or a RESET, and after the drive identified itself anew or the line
  * was lost or opened again. Position commands carry no speed and are refused.
  *
- * A limit bounds what is asked for. `speed_rpm` does not bound a torque command (the motor turns as fast
+ * A limit bounds requests. `speed_rpm` does not bound a torque command (the motor turns as fast
  * as its load allows), speeds of the drive's own (rev-up, alignment, motor profiler), what its
  * regulator overshoots, a motor that was running before, nor a start after the drive was reset without
  * a sign on the line.
@@ -892,11 +897,11 @@ typedef struct motorlink_st_limits {
 } motorlink_st_limits;
 
 /**
- * Bytes that belong to an object: to be sent or copied before the next call for it.
+ * Bytes that belong to an object: send or copy them before the next call for it.
  */
 typedef struct motorlink_bytes {
   /**
-   * The first byte; never NULL, also when there is none.
+   * The first byte. Never NULL, even if `size` is 0.
    */
   const uint8_t *data;
   /**
@@ -906,11 +911,11 @@ typedef struct motorlink_bytes {
 } motorlink_bytes;
 
 /**
- * What to do next, or what became of the exchange.
+ * What to do next, or the result of the exchange.
  */
 typedef struct motorlink_st_output {
   /**
-   * `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
+   * `WAIT`: the latest moment for the next poll, `MOTORLINK_NEVER` outside of an exchange.
    */
   uint64_t until_us;
   /**
@@ -919,7 +924,7 @@ typedef struct motorlink_st_output {
    */
   struct motorlink_bytes bytes;
   /**
-   * `DONE`: whether the drive did what was asked, and why not.
+   * `DONE`: whether the drive executed the request, or why not.
    */
   motorlink_error result;
   /**
@@ -940,12 +945,12 @@ typedef struct motorlink_st_output {
 } motorlink_st_output;
 
 /**
- * A slave of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
- * Opaque; may be moved and copied while no call for it is under way.
+ * A slave of ST's Motor Control Protocol, in storage of the caller: static, on the stack or on the heap.
+ * Opaque. It may be moved and copied while no call for it is under way.
  */
 typedef struct motorlink_st_slave {
   /**
-   * Nobody's business.
+   * Private; do not access.
    */
   uint64_t opaque[MOTORLINK_ST_SLAVE_WORDS];
 } motorlink_st_slave;
@@ -956,11 +961,11 @@ typedef struct motorlink_st_slave {
 typedef struct motorlink_st_version {
   /**
    * Name of the SDK, ASCII, NUL-terminated; the replies have room for 28 and 15 bytes of it.
-   * NULL is no name.
+   * NULL: no name.
    */
   const char *name;
   /**
-   * Type and number of a pre-release, such as "RC2", ASCII, NUL-terminated. NULL is a release.
+   * Type and number of a pre-release, such as "RC2", ASCII, NUL-terminated. NULL: a release.
    */
   const char *pre_release;
   /**
@@ -978,14 +983,14 @@ typedef struct motorlink_st_version {
 } motorlink_st_version;
 
 /**
- * A drive behind a slave: what it is and what it does. The slave has checked the frame, the
- * motor, the register's existence and access, and every size before it calls.
+ * The drive behind a slave. The slave has checked the frame, the motor, the register's existence and
+ * access, and every size before it calls.
  *
  * Every callback may be NULL. It is called from within `motorlink_st_slave_receive`, and may not
  * call for the same slave: such calls give `IN_USE`. `motor` is 1 to 7, and exists.
  *
  * `motorlink conformance st` checks such a drive. What it asks of a callback beyond the document is
- * a reading: a row of docs/SPEC-NOTES.md, named in brackets. A drive that differs from readings
+ * a reading: a row of SPEC-NOTES.md, named in brackets. A drive that differs from readings
  * passes, and fails with `--readings strict`.
  */
 typedef struct motorlink_st_motor_control {
@@ -1200,18 +1205,18 @@ typedef struct motorlink_rmd_phase_currents {
 } motorlink_rmd_phase_currents;
 
 /**
- * The host of a bus with RMD motors, in storage of the caller's: static, on the stack or on the heap.
- * Opaque; may be moved and copied while no call for it is under way.
+ * The host of a bus with RMD motors, in storage of the caller: static, on the stack or on the heap.
+ * Opaque. It may be moved and copied while no call for it is under way.
  */
 typedef struct motorlink_rmd_host {
   /**
-   * Nobody's business.
+   * Private; do not access.
    */
   uint64_t opaque[MOTORLINK_RMD_HOST_WORDS];
 } motorlink_rmd_host;
 
 /**
- * What a motor may be told beside the document's range, either way round.
+ * Limits of requests to a motor, in addition to the document's ranges. Each holds in both directions.
  */
 typedef struct motorlink_rmd_limits {
   /**
@@ -1220,8 +1225,8 @@ typedef struct motorlink_rmd_limits {
   int32_t current_16ma;
   /**
    * Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_NO_LIMIT`. 0xA3 and 0xA5
-   * carry no speed and are refused while this is set, as are 0xA4 and 0xA6 with 0. A torque
-   * command has no speed, and the motor turns as fast as its load allows.
+   * carry no speed and are refused while this is set, as are 0xA4 and 0xA6 with 0. It does not
+   * limit torque commands: the motor turns as fast as its load allows.
    */
   int32_t speed_dps;
   /**
@@ -1239,7 +1244,7 @@ typedef struct motorlink_can_frame {
    */
   uint32_t id;
   /**
-   * 1 where the identifier has 29 bits.
+   * 1 if the identifier has 29 bits.
    */
   uint8_t extended;
   /**
@@ -1251,17 +1256,17 @@ typedef struct motorlink_can_frame {
    */
   uint8_t size;
   /**
-   * The bytes; of these `size` count.
+   * The bytes, of which the first `size` are used.
    */
   uint8_t data[8];
 } motorlink_can_frame;
 
 /**
- * What to do next, or what became of an exchange.
+ * What to do next, or the result of an exchange.
  */
 typedef struct motorlink_rmd_output {
   /**
-   * `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
+   * `WAIT`: the latest moment for the next poll, `MOTORLINK_NEVER` outside of an exchange.
    */
   uint64_t until_us;
   /**
@@ -1273,7 +1278,7 @@ typedef struct motorlink_rmd_output {
    */
   struct motorlink_rmd_data reply;
   /**
-   * `DONE`: what became of the exchange.
+   * `DONE`: the result of the exchange.
    */
   motorlink_error result;
   /**
@@ -1287,18 +1292,18 @@ typedef struct motorlink_rmd_output {
 } motorlink_rmd_output;
 
 /**
- * An RMD drive, in storage of the caller's: static, on the stack or on the heap.
- * Opaque; may be moved and copied while no call for it is under way.
+ * An RMD drive, in storage of the caller: static, on the stack or on the heap.
+ * Opaque. It may be moved and copied while no call for it is under way.
  */
 typedef struct motorlink_rmd_drive {
   /**
-   * Nobody's business.
+   * Private; do not access.
    */
   uint64_t opaque[MOTORLINK_RMD_DRIVE_WORDS];
 } motorlink_rmd_drive;
 
 /**
- * What the vendor's tool or a switch sets, not the bus.
+ * Settings of the vendor's tool or of a switch, which no command changes.
  */
 typedef struct motorlink_rmd_drive_config {
   /**
@@ -1314,21 +1319,22 @@ typedef struct motorlink_rmd_drive_config {
    */
   uint8_t encoder_bits;
   /**
-   * 1 answers 0x9B with 0x9B, as relatives do, 0 with 0x9A as printed (docs/SPEC-NOTES.md R1).
+   * The code of the reply to 0x9B: 1 for 0x9B, as in related protocols, 0 for 0x9A, as in the document
+   * (SPEC-NOTES.md R1).
    */
   uint8_t clear_reply_0x9b;
 } motorlink_rmd_drive_config;
 
 /**
- * What a host can set: once in RAM, which commands act on, and once in ROM, which power-on copies.
+ * What a host can set. Commands use the copy in RAM; power-on copies ROM to RAM.
  */
 typedef struct motorlink_rmd_settings {
   /**
-   * Acceleration limit, °/s²; 0 and less are no limit.
+   * Acceleration limit, °/s²; 0 or less: not limited.
    */
   int32_t acceleration_dps2;
   /**
-   * Encoder value that is zero, as it travels: at most 16 bits.
+   * Encoder value of the zero position, as in frames: at most 16 bits.
    */
   uint16_t encoder_offset;
   /**
@@ -1338,7 +1344,7 @@ typedef struct motorlink_rmd_settings {
 } motorlink_rmd_settings;
 
 /**
- * What a motor does, with the values that belong to it; the others are 0.
+ * What a motor does. Values that its kind does not use are 0.
  */
 typedef struct motorlink_rmd_motion {
   /**
@@ -1350,7 +1356,7 @@ typedef struct motorlink_rmd_motion {
    */
   int32_t speed_centidps;
   /**
-   * `POSITION`: greatest speed on the way, °/s; -1 leaves it to the drive's own.
+   * `POSITION`: highest speed of the move, °/s; -1: the drive's own.
    */
   int32_t max_speed_dps;
   /**
@@ -1358,11 +1364,11 @@ typedef struct motorlink_rmd_motion {
    */
   int16_t iq_16ma;
   /**
-   * `POSITION`: 1 where the drive's greatest angle holds, 0 for angles within the turn.
+   * `POSITION`: 1 if the drive's greatest angle limits the move, 0 for moves within the turn.
    */
   uint8_t within_max_angle;
   /**
-   * Which of them it is.
+   * Which kind it is.
    */
   motorlink_rmd_mode kind;
 } motorlink_rmd_motion;
@@ -1372,8 +1378,8 @@ typedef struct motorlink_rmd_motion {
  */
 typedef struct motorlink_rmd_sense {
   /**
-   * Encoder counts in the encoder's own width, growing clockwise and counted on beyond each end
-   * of the turn. Starts within the turn at power-on.
+   * Encoder counts, in the encoder's own resolution. They grow clockwise and continue beyond a
+   * turn. Within a turn at power-on.
    */
   int64_t encoder_counts;
   /**
@@ -1409,7 +1415,7 @@ typedef struct motorlink_rmd_sense {
  * and `_poll`, and may not call for the same drive: such calls give `IN_USE`.
  *
  * `motorlink conformance rmd` checks such a drive. What it asks of a callback beyond the document is
- * a reading: a row of docs/SPEC-NOTES.md, named in brackets. A drive that differs from readings
+ * a reading: a row of SPEC-NOTES.md, named in brackets. A drive that differs from readings
  * passes, and fails with `--readings strict`.
  */
 typedef struct motorlink_rmd_motor_control {
@@ -1432,7 +1438,7 @@ typedef struct motorlink_rmd_motor_control {
    */
   void (*configure)(void *context, const struct motorlink_rmd_settings *settings);
   /**
-   * Tells what the sensors read; what is not set is 0. NULL: all is 0.
+   * Reads the sensors. Values that are not set are 0. NULL: all values are 0.
    *
    * Phase currents sum to 0 and have about the size of the torque current (R38). Within 5 ms of a
    * torque command the torque current is as commanded.
@@ -1446,35 +1452,35 @@ typedef struct motorlink_rmd_motor_control {
 } motorlink_rmd_motor_control;
 
 /**
- * The host's end of a serial line to a CAN adapter, in storage of the caller's.
+ * The host's end of a serial line to a CAN adapter, in storage of the caller.
  */
 typedef struct motorlink_slcan_host {
   /**
-   * Nobody's business.
+   * Private; do not access.
    */
   uint64_t opaque[MOTORLINK_SLCAN_HOST_WORDS];
 } motorlink_slcan_host;
 
 /**
- * What is to be sent on the serial line.
+ * Characters to send on the serial line.
  */
 typedef struct motorlink_slcan_line {
   /**
-   * The characters; of these `size` count.
+   * The characters, of which the first `size` are used.
    */
   uint8_t bytes[MOTORLINK_SLCAN_LINE_SIZE];
   /**
-   * How many there are; 0 where there is nothing to send.
+   * The number of characters; 0: nothing to send.
    */
   uint8_t size;
 } motorlink_slcan_line;
 
 /**
- * The adapter's end of such a line, in storage of the caller's.
+ * The adapter's end of a serial line to a CAN adapter, in storage of the caller.
  */
 typedef struct motorlink_slcan_device {
   /**
-   * Nobody's business.
+   * Private; do not access.
    */
   uint64_t opaque[MOTORLINK_SLCAN_DEVICE_WORDS];
 } motorlink_slcan_device;
@@ -1490,8 +1496,8 @@ extern "C" {
 const char *motorlink_version(void);
 
 /**
- * The error in words, in English, without a full stop. Never NULL; any number is taken. The text
- * is constant. A program that does not call this does not carry the texts.
+ * A sentence for an error, in English, without a full stop. Never NULL, for any number. The text is
+ * constant. A program that does not call this function does not contain the texts.
  */
 const char *motorlink_error_text(int32_t error);
 
@@ -1526,7 +1532,7 @@ motorlink_error motorlink_st_decode_revup_data(const uint8_t *payload,
  * registers that the segment was configured with, in the same order, into as many `values`, each
  * as in `motorlink_st_output`.
  *
- * `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are left alone.
+ * `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are unchanged.
  */
 motorlink_error motorlink_st_decode_segment(const uint8_t *payload,
                                             size_t size,
@@ -1540,9 +1546,9 @@ motorlink_error motorlink_st_decode_segment(const uint8_t *payload,
 struct motorlink_st_master_config motorlink_st_master_defaults(void);
 
 /**
- * Begins a master on a line that was just opened, whatever the storage held before. What a former
- * master asked may still be answered: where the line can be recovered the first request follows
- * behind silence, three questions and silence again; `motorlink_st_master_trust_line` skips that.
+ * Begins a master on a line that was just opened, whatever the storage held before. Replies to an
+ * earlier master may still come. With recovery DRAIN or PAD, the master therefore waits for silence, asks
+ * three questions and waits again before the first request. `motorlink_st_master_trust_line` skips that.
  *
  * `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
  *
@@ -1553,8 +1559,8 @@ motorlink_error motorlink_st_master_init(struct motorlink_st_master *master,
                                          const struct motorlink_st_master_config *config);
 
 /**
- * Sets what no request may exceed from the next one on. Ramps that were acknowledged before do not
- * count for a start any more.
+ * Sets the limits. Effective from the next request. Ramps that were acknowledged before no longer allow
+ * a start.
  *
  * `BAD_ARGUMENT`: a limit is neither `MOTORLINK_NO_LIMIT` nor 0 and more, of currents 0 to 65535.
  */
@@ -1562,15 +1568,15 @@ motorlink_error motorlink_st_master_set_limits(struct motorlink_st_master *maste
                                                const struct motorlink_st_limits *limits);
 
 /**
- * What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
- * `DONE`; after `WAIT` when something came or the time is over.
+ * Gives what to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
+ * `DONE`; after `WAIT` when bytes have arrived or the time is over.
  */
 motorlink_error motorlink_st_master_poll(struct motorlink_st_master *master,
                                          uint64_t now_us,
                                          struct motorlink_st_output *output);
 
 /**
- * Takes what came from the drive at `now_us`, in any pieces. `bytes` may not lie in the storage.
+ * Takes bytes that came from the drive at `now_us`, in any pieces. `bytes` must not be in the storage.
  */
 motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
                                             uint64_t now_us,
@@ -1578,37 +1584,37 @@ motorlink_error motorlink_st_master_receive(struct motorlink_st_master *master,
                                             size_t size);
 
 /**
- * Gives up the exchange under way. Its reply may still come, so the line is lost.
+ * Cancels the exchange under way. Its reply may still come, so the line is out of step.
  */
 motorlink_error motorlink_st_master_abandon(struct motorlink_st_master *master);
 
 /**
- * Tells that the line is out of step: something was sent or received beside the master. An
- * exchange under way ends without a result.
+ * Marks the line as out of step: something else has sent or received on it. An exchange under way ends
+ * without a result.
  */
 motorlink_error motorlink_st_master_lost(struct motorlink_st_master *master);
 
 /**
- * Tells that the line was opened anew. What may still be answered is not known, as after
- * `motorlink_st_master_init`; with recovery NONE the caller vouches for there being nothing. An
- * exchange under way ends without a result.
+ * Call it after the line was opened again. Late replies may still come, as after
+ * `motorlink_st_master_init`; with recovery NONE the caller guarantees that none come. An exchange under
+ * way ends without a result.
  */
 motorlink_error motorlink_st_master_reopened(struct motorlink_st_master *master);
 
 /**
- * Tells that nothing is left in the line from before: no drive has been asked anything on it. An
- * exchange under way ends without a result.
+ * Marks the line as in step: no late reply can come, because nothing was asked on it. An exchange under
+ * way ends without a result.
  */
 motorlink_error motorlink_st_master_trust_line(struct motorlink_st_master *master);
 
 /**
- * Sets `lost` to 1 where the line was just opened or an exchange failed, and the next one has to
- * bring it in step first, and to 0 where the last one ended in step.
+ * Sets `lost` to 1 if the line is out of step: it was just opened, or an exchange failed. The next
+ * request then recovers it first. Sets `lost` to 0 otherwise.
  */
 motorlink_error motorlink_st_master_is_lost(struct motorlink_st_master *master, uint8_t *lost);
 
 /**
- * Begins to read a register; `value` of the result is its value. Any number is taken.
+ * Begins to read a register; `value` of the result is its value. Any number is allowed.
  */
 motorlink_error motorlink_st_master_get_register(struct motorlink_st_master *master,
                                                  uint8_t motor,
@@ -1616,7 +1622,7 @@ motorlink_error motorlink_st_master_get_register(struct motorlink_st_master *mas
 
 /**
  * Begins to write a register, with as many low bytes of `value` as it has; of a floating-point
- * register `value` is the bits. Any number is taken.
+ * register `value` is the bits. Any number is allowed.
  */
 motorlink_error motorlink_st_master_set_register(struct motorlink_st_master *master,
                                                  uint8_t motor,
@@ -1624,7 +1630,7 @@ motorlink_error motorlink_st_master_set_register(struct motorlink_st_master *mas
                                                  int32_t value);
 
 /**
- * Begins to have a command executed. Any number is taken.
+ * Begins to execute a command. Any number is allowed.
  */
 motorlink_error motorlink_st_master_execute(struct motorlink_st_master *master,
                                             uint8_t motor,
@@ -1711,8 +1717,8 @@ motorlink_error motorlink_st_master_configure_segment(struct motorlink_st_master
                                                       size_t count);
 
 /**
- * Begins to read a data segment (profile SPEC): the values of its registers, one behind the other,
- * little-endian, in the size that each has.
+ * Begins to read a data segment (profile SPEC): the values of its registers in their order,
+ * little-endian, each in its own size.
  */
 motorlink_error motorlink_st_master_get_segment(struct motorlink_st_master *master,
                                                 uint8_t motor,
@@ -1755,8 +1761,8 @@ motorlink_error motorlink_st_slave_init(struct motorlink_st_slave *slave,
                                         const struct motorlink_st_motor_control *drive);
 
 /**
- * Takes a byte that came at `now_us`. Where it completes a command the drive is called, and
- * `reply` is what to send before the next byte is handed in; else `reply` has no bytes.
+ * Takes a byte that came at `now_us`. If it completes a command, the drive is called, and `reply` is what to
+ * send before the next byte is handed in. Otherwise `reply` has no bytes.
  *
  * The bytes belong to the slave, until the next call for it. A byte costs some instructions, a
  * complete command a checksum over it and the callbacks.
@@ -1767,36 +1773,35 @@ motorlink_error motorlink_st_slave_receive(struct motorlink_st_slave *slave,
                                            struct motorlink_bytes *reply);
 
 /**
- * Call at the deadline: gives the refusal that a command is owed which did not come whole in time
- * (4.1), and no bytes when there is none. The bytes belong to the slave, until the next call for
- * it.
+ * Call it at the deadline. Gives the error reply to a command that did not arrive completely in time
+ * (4.1), or no bytes. The bytes belong to the slave, until the next call for it.
  */
 motorlink_error motorlink_st_slave_poll(struct motorlink_st_slave *slave,
                                         uint64_t now_us,
                                         struct motorlink_bytes *reply);
 
 /**
- * When `motorlink_st_slave_poll` has to be called; `MOTORLINK_NEVER` while no command is under
- * way, and always in profile MCSDK 5.4, whose firmware never times out.
+ * Gives the moment at which `motorlink_st_slave_poll` must be called; `MOTORLINK_NEVER` if no command is
+ * under way, and always in profile MCSDK 5.4, whose firmware has no timeout.
  */
 motorlink_error motorlink_st_slave_deadline(struct motorlink_st_slave *slave,
                                             uint64_t *deadline_us);
 
 /**
- * Tells that the receiver lost bytes (overrun, framing, noise): drops the command under way and
- * gives the refusal to send. The bytes belong to the slave, until the next call for it.
+ * Call it after the receiver lost bytes (overrun, framing error, noise). Drops the command under way and
+ * gives the error reply to send. The bytes belong to the slave, until the next call for it.
  */
 motorlink_error motorlink_st_slave_overrun(struct motorlink_st_slave *slave,
                                            struct motorlink_bytes *reply);
 
 /**
  * The name of a register, UTF-8 without a NUL, constant: `printf("%.*s", (int)size, data)`. Empty
- * for a number that nobody names, as all names here.
+ * for a number without a name. This holds for all names here.
  */
 struct motorlink_bytes motorlink_st_reg_name(motorlink_st_reg reg);
 
 /**
- * The symbol of the unit of a register's value; empty where there is none.
+ * The symbol of the unit of a register's value; empty if it has none.
  */
 struct motorlink_bytes motorlink_st_reg_unit(motorlink_st_reg reg);
 
@@ -2007,21 +2012,21 @@ uint16_t motorlink_rmd_decode_encoder_offset(struct motorlink_rmd_data reply);
 
 /**
  * Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of quarantine, no
- * limits. `size` is `sizeof *host`. Former hosts may have asked the motors anything;
- * `motorlink_rmd_host_trust` says that they did not.
+ * limits. `size` is `sizeof *host`. Replies to an earlier host may still come: the first request to
+ * each motor is `QUARANTINED`, unless `motorlink_rmd_host_trust` was called.
  */
 motorlink_error motorlink_rmd_host_init(struct motorlink_rmd_host *host, size_t size);
 
 /**
- * Sets how long a reply may take, and how long after a timeout a late one is awaited, from the
- * next request on.
+ * Sets how long a reply may take, and how long after a timeout a late reply may still come. Effective
+ * from the next request.
  */
 motorlink_error motorlink_rmd_host_set_times(struct motorlink_rmd_host *host,
                                              uint32_t timeout_us,
                                              uint32_t quarantine_us);
 
 /**
- * Sets what a motor may be told from the next request on.
+ * Sets the limits of a motor. Effective from the next request.
  *
  * `BAD_ARGUMENT`: `motor` is not 1 to 32, or a limit is neither `MOTORLINK_NO_LIMIT` nor in
  * the range of its kind: 0 to 32767, 0 to 65535, 0 and more.
@@ -2148,30 +2153,30 @@ motorlink_error motorlink_rmd_drive_receive(struct motorlink_rmd_drive *drive,
                                             struct motorlink_can_frame *reply);
 
 /**
- * Latches faults and keeps the shutdown time. Call at the deadline, and often enough for a fault
- * to switch the motor off in time.
+ * Latches faults, and switches the motor off after a fault or the shutdown time. Call it at the
+ * deadline, and as often as a fault needs it.
  */
 motorlink_error motorlink_rmd_drive_poll(struct motorlink_rmd_drive *drive, uint64_t now_us);
 
 /**
- * When the shutdown time will be over; `MOTORLINK_NEVER` while the motor is off or has none.
+ * Gives the end of the shutdown time; `MOTORLINK_NEVER` if the motor is off or has no shutdown time.
  */
 motorlink_error motorlink_rmd_drive_deadline(struct motorlink_rmd_drive *drive,
                                              uint64_t *deadline_us);
 
 /**
- * What the motor was last told to do.
+ * Gives what the motor does.
  */
 motorlink_error motorlink_rmd_drive_motion(struct motorlink_rmd_drive *drive,
                                            struct motorlink_rmd_motion *motion);
 
 /**
- * The latched errors, a sum of `MOTORLINK_RMD_ERROR_*`.
+ * Gives the latched errors, a sum of `MOTORLINK_RMD_ERROR_*`.
  */
 motorlink_error motorlink_rmd_drive_errors(struct motorlink_rmd_drive *drive, uint8_t *errors);
 
 /**
- * The settings in RAM, which commands act on.
+ * Gives the settings in RAM, which commands use.
  */
 motorlink_error motorlink_rmd_drive_settings(struct motorlink_rmd_drive *drive,
                                              struct motorlink_rmd_settings *settings);
@@ -2182,8 +2187,8 @@ motorlink_error motorlink_rmd_drive_settings(struct motorlink_rmd_drive *drive,
 motorlink_error motorlink_slcan_host_init(struct motorlink_slcan_host *host, size_t size);
 
 /**
- * Takes a byte from the adapter; tells what it completes, and the frame where it is one. A line
- * that is no answer is left out.
+ * Takes a byte from the adapter. `kind` is what the byte completes, `frame` the frame if it completes
+ * one. Lines that are no answer are ignored.
  */
 motorlink_error motorlink_slcan_host_receive(struct motorlink_slcan_host *host,
                                              uint8_t byte,
@@ -2191,15 +2196,15 @@ motorlink_error motorlink_slcan_host_receive(struct motorlink_slcan_host *host,
                                              struct motorlink_can_frame *frame);
 
 /**
- * Gives what opens an adapter's channel: an end of what it was told before, close, bitrate, open.
- * It answers each of the four, or some of them, or none; motors have 1 000 000 bit/s.
+ * Gives the lines that open an adapter's channel: end of an earlier line, close, bitrate, open. The
+ * adapter answers each of the four, some, or none. RMD motors have 1 000 000 bit/s.
  *
  * `BAD_ARGUMENT`: slcan has no such bitrate (10, 20, 50, 100, 125, 250, 500, 800 or 1000 kbit/s).
  */
 motorlink_error motorlink_slcan_open(uint32_t bits_per_second, struct motorlink_slcan_line *line);
 
 /**
- * Gives the line that has an adapter send a frame.
+ * Gives the line that makes an adapter send a frame.
  *
  * `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
  */
@@ -2212,8 +2217,8 @@ motorlink_error motorlink_slcan_encode(const struct motorlink_can_frame *frame,
 motorlink_error motorlink_slcan_device_init(struct motorlink_slcan_device *device, size_t size);
 
 /**
- * Takes a byte from the host. `line` is the answer to send, if any; `frame` is what the host sends
- * to the bus, its id is `MOTORLINK_NO_FRAME` where there is none.
+ * Takes a byte from the host. `line` is the answer to send, if any. `frame` is the frame that the host
+ * sends to the bus; its id is `MOTORLINK_NO_FRAME` if there is none.
  */
 motorlink_error motorlink_slcan_device_receive(struct motorlink_slcan_device *device,
                                                uint8_t byte,
@@ -2221,8 +2226,8 @@ motorlink_error motorlink_slcan_device_receive(struct motorlink_slcan_device *de
                                                struct motorlink_can_frame *frame);
 
 /**
- * Gives the line for a frame that comes from the bus at `now_us`; nothing where the host has not
- * opened the channel.
+ * Gives the line for a frame that came from the bus at `now_us`; an empty one if the host has not opened
+ * the channel.
  *
  * `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
  */

@@ -1,16 +1,16 @@
-//! What both protocols tell a C caller.
+//! Types that both protocols use.
 
-/// The moment of a `WAIT` that only a received byte or frame, or a new request, can end.
+/// The moment of a `WAIT` without a deadline: a received byte or frame, or a new request, ends it.
 pub const MOTORLINK_NEVER: u64 = u64::MAX;
 
 /// In limits: no limit.
 pub const MOTORLINK_NO_LIMIT: i32 = -1;
 
-/// Bytes that belong to an object: to be sent or copied before the next call for it.
+/// Bytes that belong to an object: send or copy them before the next call for it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_bytes {
-    /// The first byte; never NULL, also when there is none.
+    /// The first byte. Never NULL, even if `size` is 0.
     pub data: *const u8,
     /// How many bytes there are.
     pub size: usize,
@@ -26,7 +26,7 @@ impl From<&[u8]> for motorlink_bytes {
 #[repr(u8)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum motorlink_output {
-    /// Hand in what comes, and poll again at `until_us` at the latest.
+    /// Hand in what arrives, and poll again at `until_us` at the latest.
     Wait = 0,
     /// Send, then poll again.
     Transmit = 1,

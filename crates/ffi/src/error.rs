@@ -1,21 +1,21 @@
-//! The one list of errors: of calls, and of exchanges.
+//! The errors of calls and of exchanges.
 
 use core::ffi::{CStr, c_char};
 
-/// What became of a call, or of an exchange. 0 is success.
+/// The result of a call, or of an exchange. 0 is success.
 #[repr(i32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum motorlink_error {
     /// Done.
     Ok = 0,
 
-    /// A pointer that is needed is NULL.
+    /// A required pointer is NULL.
     NullPointer = 1,
-    /// A pointer is not aligned as its type demands.
+    /// A pointer is not aligned for its type.
     Misaligned = 2,
-    /// The storage is smaller than this library needs: it was declared with another header.
+    /// The storage is smaller than this library needs: header and library are of different versions.
     StorageTooSmall = 3,
-    /// The storage was never initialised, or something wrote over it.
+    /// The storage was never initialised, or was overwritten.
     Uninitialised = 4,
     /// The storage belongs to an object of another kind.
     WrongKind = 5,
@@ -31,40 +31,41 @@ pub enum motorlink_error {
 
     /// The drive refused; `error_code` tells why (ST).
     Refused = 20,
-    /// No reply in time. It is not known whether the drive did what was asked.
+    /// No reply in time. It is not known whether the drive executed the request.
     Timeout = 21,
     /// A reply began and stopped (ST).
     Incomplete = 22,
-    /// A byte came that begins no reply (ST).
+    /// A received byte does not begin a reply (ST).
     NotAReply = 23,
     /// A reply is damaged (ST).
     Damaged = 24,
     /// The drive did not understand what it received; `error_code` tells why (ST).
     NotUnderstood = 25,
-    /// Two replies that differ came at once (ST).
+    /// Two different replies arrived at once (ST).
     Ambiguous = 26,
-    /// The line was lost before, and the drive does not answer a question; nothing else was sent (ST).
+    /// The line was out of step before, and the drive does not answer a test question. The request was
+    /// not sent (ST).
     Lost = 27,
-    /// The line is not in step and does not fall silent; nothing was sent (ST).
+    /// The line was out of step before, and bytes keep arriving. Nothing was sent (ST).
     Noise = 28,
-    /// The drive acknowledged, with something that is no value of a register (ST).
+    /// The drive acknowledged, but the reply does not contain a value of the register (ST).
     WrongReply = 29,
-    /// The motor did not answer before, or was not asked before, and cannot be trusted yet. Nothing
-    /// but a question was sent, unless it was an Off or a Stop. Ask again (RMD).
+    /// A late reply of this motor may still come: the last request had no reply, or this is the first
+    /// request to the motor. Only a read was sent, unless the request was Off or Stop. Ask again (RMD).
     Quarantined = 40,
     /// A limit that the caller set, or the document's range, is exceeded; nothing was sent.
     Limit = 41,
-    /// No reply of this protocol, but one of RMD V3 or V4, or LK-Tech V2.36 (RMD).
+    /// The reply is of another protocol: RMD V3 or V4, or LK-Tech V2.36 (RMD).
     Foreign = 42,
-    /// The reply has another content than the request that it has to repeat. It is not known what the
-    /// motor did (RMD).
+    /// The reply should repeat the request and differs from it. It is not known what the motor did
+    /// (RMD).
     Altered = 43,
-    /// What was sent came back: an adapter or the wiring echoes, or another host asks the same. Only a
-    /// question was sent to a drive (ST); what the motor did is not known (RMD).
+    /// The frame that was sent was received: an adapter or the wiring echoes, or another host sends the
+    /// same. Only a read was sent to a drive (ST). It is not known what the motor did (RMD).
     Echo = 44,
 }
 
-/// Success, as all functions give it.
+/// Success.
 pub const MOTORLINK_OK: i32 = 0;
 
 impl motorlink_error {
@@ -127,8 +128,8 @@ impl motorlink_error {
     ];
 }
 
-/// The error in words, in English, without a full stop. Never NULL; any number is taken. The text
-/// is constant. A program that does not call this does not carry the texts.
+/// A sentence for an error, in English, without a full stop. Never NULL, for any number. The text is
+/// constant. A program that does not call this function does not contain the texts.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_error_text(error: i32) -> *const c_char {
     let known = motorlink_error::ALL.iter().find(|known| **known as i32 == error);

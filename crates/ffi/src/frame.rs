@@ -5,7 +5,7 @@ use motorlink_proto::can::CanFrame;
 use crate::error::motorlink_error;
 use crate::pointer::plain;
 
-/// The `id` of no frame, which has no bytes either.
+/// The `id` if a call returns no frame.
 pub const MOTORLINK_NO_FRAME: u32 = u32::MAX;
 
 /// A classic CAN frame of any kind.
@@ -14,13 +14,13 @@ pub const MOTORLINK_NO_FRAME: u32 = u32::MAX;
 pub struct motorlink_can_frame {
     /// The identifier: 11 bits, or 29.
     pub id: u32,
-    /// 1 where the identifier has 29 bits.
+    /// 1 if the identifier has 29 bits.
     pub extended: u8,
     /// 1 for a remote transmission request.
     pub remote: u8,
     /// The length code, 0 to 8.
     pub size: u8,
-    /// The bytes; of these `size` count.
+    /// The bytes, of which the first `size` are used.
     pub data: [u8; 8],
 }
 

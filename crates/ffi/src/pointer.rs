@@ -1,4 +1,4 @@
-//! The only place with `unsafe`: what C hands in becomes Rust's here, and is safe from then on.
+//! The only file with `unsafe`: it converts pointers of C to safe types of Rust.
 
 use core::marker::PhantomData;
 use core::mem::{MaybeUninit, size_of};
@@ -29,7 +29,7 @@ impl<T> Copy for In<T> {}
 pub(crate) trait Promise {
     type Promised;
 
-    /// Takes the caller at the word.
+    /// Relies on the caller's promise.
     ///
     /// # Safety
     /// What the crate's documentation demands of a pointer holds as long as the result is used.
@@ -104,7 +104,7 @@ impl<T: Plain> In<T> {
         if self.0.is_null() { Ok(None) } else { self.read().map(Some) }
     }
 
-    /// What stays there as long as the promise holds.
+    /// The value there, for as long as the promise holds.
     pub(crate) fn keep(self) -> Result<Kept<T>> {
         check(self.0)?;
         Ok(Kept(self.0))
@@ -143,7 +143,7 @@ pub(crate) fn ascii<'a>(text: In<u8>, most: usize) -> &'a str {
     unsafe { str::from_utf8_unchecked(bytes) }
 }
 
-/// What a caller leaves in place as long as an object is used, and may change.
+/// What a caller keeps in place as long as an object is used. The caller may change its content.
 pub(crate) struct Kept<T>(*const T);
 
 impl<T: Plain> Kept<T> {
@@ -189,15 +189,15 @@ impl<T> OutParam<T> {
 /// What C declares as an opaque array is a tag and a state to us.
 ///
 /// # Safety
-/// `Stored<State>` is no larger and no more aligned than the type.
+/// Size and alignment of `Stored<State>` are at most those of the type.
 pub(crate) unsafe trait Storage {
     type State;
     /// Not that of another kind, nor its complement.
     const TAG: u32;
 }
 
-/// The tag tells whether there is a state, of which kind, and whether a call for it is under way:
-/// then it is complemented.
+/// The tag is that of the state's kind, and its complement during a call. Any other value: not
+/// initialised.
 #[repr(C)]
 pub(crate) struct Stored<S> {
     tag: AtomicU32,
@@ -267,8 +267,8 @@ fn take(tag: &AtomicU32, idle: u32) -> core::result::Result<(), u32> {
     tag.compare_exchange(idle, !idle, Ordering::Acquire, Ordering::Relaxed).map(drop)
 }
 
-/// Complements the tag if it is `idle`, and gives it if it is not. Without an exchange of the
-/// processor's: an interrupt in between is over before this goes on.
+/// Complements the tag if it is `idle`, and gives it if it is not. For processors without
+/// compare-and-exchange: an interrupt between load and store ends before the store.
 #[cfg(not(target_has_atomic = "32"))]
 fn take(tag: &AtomicU32, idle: u32) -> core::result::Result<(), u32> {
     let found = tag.load(Ordering::Acquire);
@@ -289,14 +289,14 @@ pub(crate) struct Entered<'a, K: Storage> {
 impl<K: Storage> Deref for Entered<'_, K> {
     type Target = K::State;
     fn deref(&self) -> &K::State {
-        // SAFETY: the tag told that there is a state, and that nobody else uses it.
+        // SAFETY: the tag says that there is a state and that no other call uses it.
         unsafe { &(*self.stored).state }
     }
 }
 
 impl<K: Storage> DerefMut for Entered<'_, K> {
     fn deref_mut(&mut self) -> &mut K::State {
-        // SAFETY: the tag told that there is a state, and that nobody else uses it.
+        // SAFETY: the tag says that there is a state and that no other call uses it.
         unsafe { &mut (*self.stored).state }
     }
 }

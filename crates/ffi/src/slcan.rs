@@ -17,17 +17,17 @@ storage!(motorlink_slcan_device: Device, tag::SLCAN_DEVICE);
 pub const MOTORLINK_SLCAN_LINE_SIZE: usize = 31;
 const _: () = assert!(MOTORLINK_SLCAN_LINE_SIZE == LONGEST_FRAME + 4);
 
-/// What is to be sent on the serial line.
+/// Characters to send on the serial line.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct motorlink_slcan_line {
-    /// The characters; of these `size` count.
+    /// The characters, of which the first `size` are used.
     pub bytes: [u8; MOTORLINK_SLCAN_LINE_SIZE],
-    /// How many there are; 0 where there is nothing to send.
+    /// The number of characters; 0: nothing to send.
     pub size: u8,
 }
 
-/// What an adapter said.
+/// What an adapter has sent.
 #[repr(u8)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum motorlink_slcan_answer {
@@ -66,8 +66,8 @@ pub unsafe extern "C" fn motorlink_slcan_host_init(
     answer(|| host.init(size, AnswerParser::default()))
 }
 
-/// Takes a byte from the adapter; tells what it completes, and the frame where it is one. A line
-/// that is no answer is left out.
+/// Takes a byte from the adapter. `kind` is what the byte completes, `frame` the frame if it completes
+/// one. Lines that are no answer are ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_slcan_host_receive(
     host: *mut motorlink_slcan_host,
@@ -94,8 +94,8 @@ pub unsafe extern "C" fn motorlink_slcan_host_receive(
     })
 }
 
-/// Gives what opens an adapter's channel: an end of what it was told before, close, bitrate, open.
-/// It answers each of the four, or some of them, or none; motors have 1 000 000 bit/s.
+/// Gives the lines that open an adapter's channel: end of an earlier line, close, bitrate, open. The
+/// adapter answers each of the four, some, or none. RMD motors have 1 000 000 bit/s.
 ///
 /// `BAD_ARGUMENT`: slcan has no such bitrate (10, 20, 50, 100, 125, 250, 500, 800 or 1000 kbit/s).
 #[unsafe(no_mangle)]
@@ -116,7 +116,7 @@ pub unsafe extern "C" fn motorlink_slcan_open(
     })
 }
 
-/// Gives the line that has an adapter send a frame.
+/// Gives the line that makes an adapter send a frame.
 ///
 /// `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
 #[unsafe(no_mangle)]
@@ -145,8 +145,8 @@ pub unsafe extern "C" fn motorlink_slcan_device_init(
     answer(|| device.init(size, Device::default()))
 }
 
-/// Takes a byte from the host. `line` is the answer to send, if any; `frame` is what the host sends
-/// to the bus, its id is `MOTORLINK_NO_FRAME` where there is none.
+/// Takes a byte from the host. `line` is the answer to send, if any. `frame` is the frame that the host
+/// sends to the bus; its id is `MOTORLINK_NO_FRAME` if there is none.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_slcan_device_receive(
     device: *mut motorlink_slcan_device,
@@ -165,8 +165,8 @@ pub unsafe extern "C" fn motorlink_slcan_device_receive(
     })
 }
 
-/// Gives the line for a frame that comes from the bus at `now_us`; nothing where the host has not
-/// opened the channel.
+/// Gives the line for a frame that came from the bus at `now_us`; an empty one if the host has not opened
+/// the channel.
 ///
 /// `BAD_ARGUMENT`: no CAN frame has such a size or identifier.
 #[unsafe(no_mangle)]

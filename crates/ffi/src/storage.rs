@@ -1,4 +1,4 @@
-//! The objects' storage. Its sizes are the same on every target: those of the largest.
+//! The objects' storage. Its sizes are the same on every target: the largest that one needs.
 
 /// Words of 8 bytes in a `motorlink_st_slave`.
 pub const MOTORLINK_ST_SLAVE_WORDS: usize = 38;
@@ -14,55 +14,55 @@ pub const MOTORLINK_SLCAN_HOST_WORDS: usize = 7;
 /// Words of 8 bytes in a `motorlink_slcan_device`.
 pub const MOTORLINK_SLCAN_DEVICE_WORDS: usize = 7;
 
-/// A slave of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
-/// Opaque; may be moved and copied while no call for it is under way.
+/// A slave of ST's Motor Control Protocol, in storage of the caller: static, on the stack or on the heap.
+/// Opaque. It may be moved and copied while no call for it is under way.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_st_slave {
-    /// Nobody's business.
+    /// Private; do not access.
     pub opaque: [u64; MOTORLINK_ST_SLAVE_WORDS],
 }
 
-/// A master of ST's Motor Control Protocol, in storage of the caller's: static, on the stack or on the heap.
-/// Opaque; may be moved and copied while no call for it is under way.
+/// A master of ST's Motor Control Protocol, in storage of the caller: static, on the stack or on the heap.
+/// Opaque. It may be moved and copied while no call for it is under way.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_st_master {
-    /// Nobody's business.
+    /// Private; do not access.
     pub opaque: [u64; MOTORLINK_ST_MASTER_WORDS],
 }
 
-/// The host of a bus with RMD motors, in storage of the caller's: static, on the stack or on the heap.
-/// Opaque; may be moved and copied while no call for it is under way.
+/// The host of a bus with RMD motors, in storage of the caller: static, on the stack or on the heap.
+/// Opaque. It may be moved and copied while no call for it is under way.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_rmd_host {
-    /// Nobody's business.
+    /// Private; do not access.
     pub opaque: [u64; MOTORLINK_RMD_HOST_WORDS],
 }
 
-/// An RMD drive, in storage of the caller's: static, on the stack or on the heap.
-/// Opaque; may be moved and copied while no call for it is under way.
+/// An RMD drive, in storage of the caller: static, on the stack or on the heap.
+/// Opaque. It may be moved and copied while no call for it is under way.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_rmd_drive {
-    /// Nobody's business.
+    /// Private; do not access.
     pub opaque: [u64; MOTORLINK_RMD_DRIVE_WORDS],
 }
 
-/// The host's end of a serial line to a CAN adapter, in storage of the caller's.
+/// The host's end of a serial line to a CAN adapter, in storage of the caller.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_slcan_host {
-    /// Nobody's business.
+    /// Private; do not access.
     pub opaque: [u64; MOTORLINK_SLCAN_HOST_WORDS],
 }
 
-/// The adapter's end of such a line, in storage of the caller's.
+/// The adapter's end of a serial line to a CAN adapter, in storage of the caller.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_slcan_device {
-    /// Nobody's business.
+    /// Private; do not access.
     pub opaque: [u64; MOTORLINK_SLCAN_DEVICE_WORDS],
 }
 

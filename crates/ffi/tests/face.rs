@@ -1,4 +1,4 @@
-//! The C face as C calls it: both ends joined, and what no caller should do. Miri watches.
+//! Calls the C face as C does: both ends connected, and wrong calls. Also runs in Miri.
 #![allow(clippy::undocumented_unsafe_blocks, reason = "every call here is one of C's")]
 
 use std::ffi::c_void;
@@ -103,7 +103,7 @@ impl StBench {
         bench
     }
 
-    /// Conducts the exchange that was begun: what became of it, and the payload.
+    /// Conducts the exchange that was begun; gives its result and the payload.
     fn done(&mut self, begun: Error) -> (motorlink_st_output, Vec<u8>) {
         assert_eq!(begun, OK);
         let StBench { master, slave } = self;
@@ -124,8 +124,8 @@ impl StBench {
         }
     }
 
-    /// Brings the line in step and conducts the exchange that was begun: what became of it, and the
-    /// headers of what was sent.
+    /// Brings the line in step and conducts the exchange that was begun; gives its result and the
+    /// headers of the frames that were sent.
     ///
     /// A loop that hands in what came before it polls may have the answer before the poll that follows
     /// the question.
@@ -305,7 +305,7 @@ fn a_name_that_is_too_long_is_cut_between_characters() {
     assert_eq!(info.name.map(|letter| letter as u8), expected);
 }
 
-/// No register has three bytes, or none: that is no value, least of all 0.
+/// A reply with three bytes, or none, is an error and never the value 0.
 #[test]
 fn a_read_that_is_answered_with_no_value_says_so() {
     let nothing: motorlink_st_motor_control = zeroed();
@@ -322,7 +322,7 @@ fn a_read_that_is_answered_with_no_value_says_so() {
     }
 }
 
-/// Not forbidden, so it has to go well: a callback may change the table that it is called from.
+/// A callback may change the table that it is called from.
 #[test]
 fn callbacks_may_change_their_table() {
     extern "C" fn other(_: *mut c_void, _: u8, _: u8) -> i32 {
@@ -473,7 +473,7 @@ fn a_motor_is_asked_for_its_status_first_unless_it_is_trusted() {
     gives!(Ok, motorlink_rmd_host_request(host, 0, 1, motorlink_rmd_set_torque(100)));
     gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut output));
     assert_eq!((output.kind, output.frame.data[0]), (motorlink_output::Transmit, 0x9A));
-    // The host's own frame comes back.
+    // The host receives its own frame.
     gives!(Ok, motorlink_rmd_host_receive(host, 0, &output.frame));
     gives!(Ok, motorlink_rmd_host_poll(host, 0, &mut output));
     assert_eq!((output.kind, output.result), (motorlink_output::Done, Error::Echo));

@@ -47,14 +47,8 @@ struct Step {
     done: u8,
 }
 
-/// The timer's time until a byte comes on the clock port; from then on time stands still except
-/// while a command of that port advances it.
-///
-/// A command is a byte, and its answer is two. 1 to 254 advances by so many ticks, but no further
-/// than the first tick at whose end bytes have moved on the other ports since the last answer; the
-/// answer is the number of ticks. 0 asks for the number of bytes that the other ports have taken
-/// since the last answer. The second byte is the number of bytes that they have sent since then.
-/// 255 is answered with 255 twice: what comes before that answers a former host.
+/// The timer's time until a byte comes on the clock port. After that, time advances only by commands of
+/// this port; firmware/README.md has their list.
 pub struct Clock<R> {
     timer: Timer,
     port: Uart<R>,

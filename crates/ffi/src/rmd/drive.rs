@@ -21,9 +21,9 @@ use crate::tag;
 #[repr(u8)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum motorlink_rmd_mode {
-    /// Without current.
+    /// No current.
     Off = 0,
-    /// Brought to a stand and kept there.
+    /// Brakes to a standstill and stays there.
     Stopped = 1,
     /// Holds `iq_16ma`.
     Torque = 2,
@@ -33,7 +33,7 @@ pub enum motorlink_rmd_mode {
     Position = 4,
 }
 
-/// What a motor does, with the values that belong to it; the others are 0.
+/// What a motor does. Values that its kind does not use are 0.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct motorlink_rmd_motion {
@@ -41,13 +41,13 @@ pub struct motorlink_rmd_motion {
     pub target_counts: i64,
     /// `SPEED`: 0.01 °/s a digit, positive is clockwise.
     pub speed_centidps: i32,
-    /// `POSITION`: greatest speed on the way, °/s; -1 leaves it to the drive's own.
+    /// `POSITION`: highest speed of the move, °/s; -1: the drive's own.
     pub max_speed_dps: i32,
     /// `TORQUE`: torque current, 0.016 A a digit, -2000 to 2000.
     pub iq_16ma: i16,
-    /// `POSITION`: 1 where the drive's greatest angle holds, 0 for angles within the turn.
+    /// `POSITION`: 1 if the drive's greatest angle limits the move, 0 for moves within the turn.
     pub within_max_angle: u8,
-    /// Which of them it is.
+    /// Which kind it is.
     pub kind: motorlink_rmd_mode,
 }
 
@@ -55,8 +55,8 @@ pub struct motorlink_rmd_motion {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct motorlink_rmd_sense {
-    /// Encoder counts in the encoder's own width, growing clockwise and counted on beyond each end
-    /// of the turn. Starts within the turn at power-on.
+    /// Encoder counts, in the encoder's own resolution. They grow clockwise and continue beyond a
+    /// turn. Within a turn at power-on.
     pub encoder_counts: i64,
     /// Torque current, 33/2048 A a digit.
     pub iq_digits: i16,
@@ -72,19 +72,19 @@ pub struct motorlink_rmd_sense {
     pub faults: u8,
 }
 
-/// What a host can set: once in RAM, which commands act on, and once in ROM, which power-on copies.
+/// What a host can set. Commands use the copy in RAM; power-on copies ROM to RAM.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct motorlink_rmd_settings {
-    /// Acceleration limit, °/s²; 0 and less are no limit.
+    /// Acceleration limit, °/s²; 0 or less: not limited.
     pub acceleration_dps2: i32,
-    /// Encoder value that is zero, as it travels: at most 16 bits.
+    /// Encoder value of the zero position, as in frames: at most 16 bits.
     pub encoder_offset: u16,
     /// Gains of the three loops.
     pub pid: motorlink_rmd_pid,
 }
 
-/// What the vendor's tool or a switch sets, not the bus.
+/// Settings of the vendor's tool or of a switch, which no command changes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_rmd_drive_config {
@@ -94,7 +94,8 @@ pub struct motorlink_rmd_drive_config {
     pub id: u8,
     /// Width of the encoder, 12 to 18 bits; 0 is the document's 14.
     pub encoder_bits: u8,
-    /// 1 answers 0x9B with 0x9B, as relatives do, 0 with 0x9A as printed (docs/SPEC-NOTES.md R1).
+    /// The code of the reply to 0x9B: 1 for 0x9B, as in related protocols, 0 for 0x9A, as in the document
+    /// (SPEC-NOTES.md R1).
     pub clear_reply_0x9b: u8,
 }
 
@@ -104,7 +105,7 @@ pub struct motorlink_rmd_drive_config {
 /// and `_poll`, and may not call for the same drive: such calls give `IN_USE`.
 ///
 /// `motorlink conformance rmd` checks such a drive. What it asks of a callback beyond the document is
-/// a reading: a row of docs/SPEC-NOTES.md, named in brackets. A drive that differs from readings
+/// a reading: a row of SPEC-NOTES.md, named in brackets. A drive that differs from readings
 /// passes, and fails with `--readings strict`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -122,7 +123,7 @@ pub struct motorlink_rmd_motor_control {
     /// position gains the motor does not go to a position (R41).
     pub configure:
         Option<extern "C" fn(context: *mut c_void, settings: *const motorlink_rmd_settings)>,
-    /// Tells what the sensors read; what is not set is 0. NULL: all is 0.
+    /// Reads the sensors. Values that are not set are 0. NULL: all values are 0.
     ///
     /// Phase currents sum to 0 and have about the size of the torque current (R38). Within 5 ms of a
     /// torque command the torque current is as commanded.
@@ -318,8 +319,8 @@ pub unsafe extern "C" fn motorlink_rmd_drive_receive(
     })
 }
 
-/// Latches faults and keeps the shutdown time. Call at the deadline, and often enough for a fault
-/// to switch the motor off in time.
+/// Latches faults, and switches the motor off after a fault or the shutdown time. Call it at the
+/// deadline, and as often as a fault needs it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_poll(
     drive: *mut motorlink_rmd_drive,
@@ -334,7 +335,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_poll(
     })
 }
 
-/// When the shutdown time will be over; `MOTORLINK_NEVER` while the motor is off or has none.
+/// Gives the end of the shutdown time; `MOTORLINK_NEVER` if the motor is off or has no shutdown time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_deadline(
     drive: *mut motorlink_rmd_drive,
@@ -349,7 +350,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_deadline(
     })
 }
 
-/// What the motor was last told to do.
+/// Gives what the motor does.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_motion(
     drive: *mut motorlink_rmd_drive,
@@ -363,7 +364,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_motion(
     })
 }
 
-/// The latched errors, a sum of `MOTORLINK_RMD_ERROR_*`.
+/// Gives the latched errors, a sum of `MOTORLINK_RMD_ERROR_*`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_errors(
     drive: *mut motorlink_rmd_drive,
@@ -377,7 +378,7 @@ pub unsafe extern "C" fn motorlink_rmd_drive_errors(
     })
 }
 
-/// The settings in RAM, which commands act on.
+/// Gives the settings in RAM, which commands use.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_drive_settings(
     drive: *mut motorlink_rmd_drive,

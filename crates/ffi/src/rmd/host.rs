@@ -15,31 +15,31 @@ use crate::number::limit;
 use crate::pointer::{plain, promised, storage};
 use crate::tag;
 
-/// What a motor may be told beside the document's range, either way round.
+/// Limits of requests to a motor, in addition to the document's ranges. Each holds in both directions.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct motorlink_rmd_limits {
     /// Greatest torque current of 0xA1 and 0x280, 0.016 A a digit, or `MOTORLINK_NO_LIMIT`.
     pub current_16ma: i32,
     /// Greatest speed of 0xA2, 0xA4 and 0xA6, °/s, or `MOTORLINK_NO_LIMIT`. 0xA3 and 0xA5
-    /// carry no speed and are refused while this is set, as are 0xA4 and 0xA6 with 0. A torque
-    /// command has no speed, and the motor turns as fast as its load allows.
+    /// carry no speed and are refused while this is set, as are 0xA4 and 0xA6 with 0. It does not
+    /// limit torque commands: the motor turns as fast as its load allows.
     pub speed_dps: i32,
     /// Greatest distance from zero in 0xA3 and 0xA4, 0.01° a digit, or `MOTORLINK_NO_LIMIT`.
     pub angle_centidegrees: i32,
 }
 
-/// What to do next, or what became of an exchange.
+/// What to do next, or the result of an exchange.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_rmd_output {
-    /// `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
+    /// `WAIT`: the latest moment for the next poll, `MOTORLINK_NEVER` outside of an exchange.
     pub until_us: u64,
     /// `TRANSMIT`: the frame to send.
     pub frame: motorlink_can_frame,
     /// `DONE`: the motor's reply, for the `motorlink_rmd_decode_*` functions.
     pub reply: motorlink_rmd_data,
-    /// `DONE`: what became of the exchange.
+    /// `DONE`: the result of the exchange.
     pub result: motorlink_error,
     /// What this is: `WAIT`, `TRANSMIT` or `DONE`.
     pub kind: motorlink_output,
@@ -77,8 +77,8 @@ impl State {
 }
 
 /// Begins a host, whatever the storage held before: 50 ms for a reply, 100 ms of quarantine, no
-/// limits. `size` is `sizeof *host`. Former hosts may have asked the motors anything;
-/// `motorlink_rmd_host_trust` says that they did not.
+/// limits. `size` is `sizeof *host`. Replies to an earlier host may still come: the first request to
+/// each motor is `QUARANTINED`, unless `motorlink_rmd_host_trust` was called.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_init(
     host: *mut motorlink_rmd_host,
@@ -88,8 +88,8 @@ pub unsafe extern "C" fn motorlink_rmd_host_init(
     answer(|| host.init(size, State { host: Host::new(), retry: Instant(0) }))
 }
 
-/// Sets how long a reply may take, and how long after a timeout a late one is awaited, from the
-/// next request on.
+/// Sets how long a reply may take, and how long after a timeout a late reply may still come. Effective
+/// from the next request.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_rmd_host_set_times(
     host: *mut motorlink_rmd_host,
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn motorlink_rmd_host_set_times(
     })
 }
 
-/// Sets what a motor may be told from the next request on.
+/// Sets the limits of a motor. Effective from the next request.
 ///
 /// `BAD_ARGUMENT`: `motor` is not 1 to 32, or a limit is neither `MOTORLINK_NO_LIMIT` nor in
 /// the range of its kind: 0 to 32767, 0 to 65535, 0 and more.

@@ -21,27 +21,27 @@ use crate::tag;
 pub struct motorlink_st_master_config {
     /// How long to wait for a reply, µs.
     pub timeout_us: u32,
-    /// The silence after which nothing more is expected to come, µs.
+    /// The line counts as silent after this time without a byte, µs.
     pub quiet_us: u32,
-    /// Where the port takes bytes faster than the line carries them, as all ports of computers do: the
-    /// line's baud rate. What recovery sends is then on the line before silence begins. 0 adds nothing.
+    /// The line's baud rate, for ports that take bytes faster than the line sends them, as ports of computers
+    /// do. The silence of a recovery then begins when its bytes have left the port. 0: not known.
     pub baud: u32,
     /// How the drive behaves.
     pub profile: motorlink_st_profile,
-    /// How a lost line comes back.
+    /// How the master recovers a line that is out of step.
     pub recovery: motorlink_st_recovery,
 }
 
-/// What to do next, or what became of the exchange.
+/// What to do next, or the result of the exchange.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_st_output {
-    /// `WAIT`: the latest moment for the next poll; `MOTORLINK_NEVER` while there is no exchange.
+    /// `WAIT`: the latest moment for the next poll, `MOTORLINK_NEVER` outside of an exchange.
     pub until_us: u64,
     /// `TRANSMIT`: what to send. `DONE`: the payload of the reply. They belong to the master, until
     /// the next call for it.
     pub bytes: motorlink_bytes,
-    /// `DONE`: whether the drive did what was asked, and why not.
+    /// `DONE`: whether the drive executed the request, or why not.
     pub result: motorlink_error,
     /// `DONE` of a register read: the register's value, the sign extended as its type has it; the
     /// bits of a floating-point register; of a register of type u32 the cast to `uint32_t` is the
@@ -54,7 +54,7 @@ pub struct motorlink_st_output {
     pub error_code: motorlink_st_error_code,
 }
 
-/// What no request may exceed, whatever function it comes from.
+/// Limits of requests. They hold for every function.
 ///
 /// While `speed_rpm` is set, a motor is started only after a speed ramp to it was acknowledged: else the
 /// drive goes to a speed of its own. The ramp may be `motorlink_st_master_set_ramp` or a write of
@@ -62,7 +62,7 @@ pub struct motorlink_st_output {
 /// command, a write of CONTROL_MODE or a RESET, and after the drive identified itself anew or the line
 /// was lost or opened again. Position commands carry no speed and are refused.
 ///
-/// A limit bounds what is asked for. `speed_rpm` does not bound a torque command (the motor turns as fast
+/// A limit bounds requests. `speed_rpm` does not bound a torque command (the motor turns as fast
 /// as its load allows), speeds of the drive's own (rev-up, alignment, motor profiler), what its
 /// regulator overshoots, a motor that was running before, nor a start after the drive was reset without
 /// a sign on the line.
@@ -101,9 +101,9 @@ pub extern "C" fn motorlink_st_master_defaults() -> motorlink_st_master_config {
     }
 }
 
-/// Begins a master on a line that was just opened, whatever the storage held before. What a former
-/// master asked may still be answered: where the line can be recovered the first request follows
-/// behind silence, three questions and silence again; `motorlink_st_master_trust_line` skips that.
+/// Begins a master on a line that was just opened, whatever the storage held before. Replies to an
+/// earlier master may still come. With recovery DRAIN or PAD, the master therefore waits for silence, asks
+/// three questions and waits again before the first request. `motorlink_st_master_trust_line` skips that.
 ///
 /// `size` is `sizeof *master`. `config` is copied; NULL: the defaults.
 ///
@@ -138,8 +138,8 @@ pub unsafe extern "C" fn motorlink_st_master_init(
     })
 }
 
-/// Sets what no request may exceed from the next one on. Ramps that were acknowledged before do not
-/// count for a start any more.
+/// Sets the limits. Effective from the next request. Ramps that were acknowledged before no longer allow
+/// a start.
 ///
 /// `BAD_ARGUMENT`: a limit is neither `MOTORLINK_NO_LIMIT` nor 0 and more, of currents 0 to 65535.
 #[unsafe(no_mangle)]
@@ -156,8 +156,8 @@ pub unsafe extern "C" fn motorlink_st_master_set_limits(
     })
 }
 
-/// What to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
-/// `DONE`; after `WAIT` when something came or the time is over.
+/// Gives what to do next. Poll again after each `TRANSMIT` (when the bytes are with the port) and each
+/// `DONE`; after `WAIT` when bytes have arrived or the time is over.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_poll(
     master: *mut motorlink_st_master,
@@ -224,7 +224,7 @@ fn failed(error: ExchangeError) -> (motorlink_error, motorlink_st_error_code) {
     (result, 0)
 }
 
-/// Takes what came from the drive at `now_us`, in any pieces. `bytes` may not lie in the storage.
+/// Takes bytes that came from the drive at `now_us`, in any pieces. `bytes` must not be in the storage.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_receive(
     master: *mut motorlink_st_master,
@@ -240,7 +240,7 @@ pub unsafe extern "C" fn motorlink_st_master_receive(
     })
 }
 
-/// Gives up the exchange under way. Its reply may still come, so the line is lost.
+/// Cancels the exchange under way. Its reply may still come, so the line is out of step.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_abandon(
     master: *mut motorlink_st_master,
@@ -252,8 +252,8 @@ pub unsafe extern "C" fn motorlink_st_master_abandon(
     })
 }
 
-/// Tells that the line is out of step: something was sent or received beside the master. An
-/// exchange under way ends without a result.
+/// Marks the line as out of step: something else has sent or received on it. An exchange under way ends
+/// without a result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_lost(
     master: *mut motorlink_st_master,
@@ -265,9 +265,9 @@ pub unsafe extern "C" fn motorlink_st_master_lost(
     })
 }
 
-/// Tells that the line was opened anew. What may still be answered is not known, as after
-/// `motorlink_st_master_init`; with recovery NONE the caller vouches for there being nothing. An
-/// exchange under way ends without a result.
+/// Call it after the line was opened again. Late replies may still come, as after
+/// `motorlink_st_master_init`; with recovery NONE the caller guarantees that none come. An exchange under
+/// way ends without a result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_reopened(
     master: *mut motorlink_st_master,
@@ -281,8 +281,8 @@ pub unsafe extern "C" fn motorlink_st_master_reopened(
     })
 }
 
-/// Tells that nothing is left in the line from before: no drive has been asked anything on it. An
-/// exchange under way ends without a result.
+/// Marks the line as in step: no late reply can come, because nothing was asked on it. An exchange under
+/// way ends without a result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_trust_line(
     master: *mut motorlink_st_master,
@@ -294,8 +294,8 @@ pub unsafe extern "C" fn motorlink_st_master_trust_line(
     })
 }
 
-/// Sets `lost` to 1 where the line was just opened or an exchange failed, and the next one has to
-/// bring it in step first, and to 0 where the last one ended in step.
+/// Sets `lost` to 1 if the line is out of step: it was just opened, or an exchange failed. The next
+/// request then recovers it first. Sets `lost` to 0 otherwise.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_is_lost(
     master: *mut motorlink_st_master,

@@ -1,4 +1,4 @@
-//! What messages carry, as C has it.
+//! Contents of messages, as structs of C.
 
 use core::ffi::c_char;
 
@@ -20,7 +20,7 @@ pub struct motorlink_st_revup_phase {
     pub duration_ms: u16,
 }
 
-/// Bytes for a text of a reply with its NUL.
+/// Bytes for a text of a reply, with its NUL.
 pub const MOTORLINK_ST_TEXT_SIZE: usize = 33;
 
 /// The answer to a board information request (4.7).
@@ -63,7 +63,7 @@ impl From<motorlink_st_revup_phase> for RevupPhase {
     }
 }
 
-/// A text with a NUL behind it, without the characters that there is no room for.
+/// The text with a NUL at its end, cut where the room ends.
 fn terminated(text: &str) -> [c_char; MOTORLINK_ST_TEXT_SIZE] {
     let mut out = [0; MOTORLINK_ST_TEXT_SIZE];
     let end = (0..MOTORLINK_ST_TEXT_SIZE).rev().find(|&end| text.is_char_boundary(end));
@@ -134,7 +134,7 @@ pub unsafe extern "C" fn motorlink_st_decode_revup_data(
 /// registers that the segment was configured with, in the same order, into as many `values`, each
 /// as in `motorlink_st_output`.
 ///
-/// `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are left alone.
+/// `BAD_ARGUMENT`: the payload has not the size of these registers; `values` are unchanged.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_decode_segment(
     payload: *const u8,

@@ -12,13 +12,13 @@ fn text(text: Option<&'static str>) -> motorlink_bytes {
 }
 
 /// The name of a register, UTF-8 without a NUL, constant: `printf("%.*s", (int)size, data)`. Empty
-/// for a number that nobody names, as all names here.
+/// for a number without a name. This holds for all names here.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_st_reg_name(reg: motorlink_st_reg) -> motorlink_bytes {
     text(RegisterId(reg).text().map(|text| text.name))
 }
 
-/// The symbol of the unit of a register's value; empty where there is none.
+/// The symbol of the unit of a register's value; empty if it has none.
 #[unsafe(no_mangle)]
 pub extern "C" fn motorlink_st_reg_unit(reg: motorlink_st_reg) -> motorlink_bytes {
     text(RegisterId(reg).shape().map(|shape| shape.unit.symbol()))

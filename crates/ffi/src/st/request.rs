@@ -1,4 +1,4 @@
-//! What a master asks: every function begins an exchange.
+//! Requests of a master: every function begins an exchange.
 
 use motorlink_proto::st::{
     Command, CurrentReference, Frame, LimitError, MotorNumber, PositionMove, REVUP_PHASES, Ramp,
@@ -22,7 +22,7 @@ fn request(
     begin(&mut state, motor, request)
 }
 
-/// Where all requests end. One that is refused changes nothing.
+/// Begins any request. A refused request changes nothing.
 fn begin(state: &mut State, motor: u8, request: &Request<'_>) -> Result<(), motorlink_error> {
     check_motor(motor)?;
     let effect = state.account.check(state.master.counters(), motor, request).map_err(limited)?;
@@ -50,7 +50,7 @@ fn refused(error: RequestError) -> motorlink_error {
     }
 }
 
-/// Begins to read a register; `value` of the result is its value. Any number is taken.
+/// Begins to read a register; `value` of the result is its value. Any number is allowed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_get_register(
     master: *mut motorlink_st_master,
@@ -62,7 +62,7 @@ pub unsafe extern "C" fn motorlink_st_master_get_register(
 }
 
 /// Begins to write a register, with as many low bytes of `value` as it has; of a floating-point
-/// register `value` is the bits. Any number is taken.
+/// register `value` is the bits. Any number is allowed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_set_register(
     master: *mut motorlink_st_master,
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn motorlink_st_master_set_register(
     })
 }
 
-/// Begins to have a command executed. Any number is taken.
+/// Begins to execute a command. Any number is allowed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_execute(
     master: *mut motorlink_st_master,
@@ -226,8 +226,8 @@ pub unsafe extern "C" fn motorlink_st_master_configure_segment(
     })
 }
 
-/// Begins to read a data segment (profile SPEC): the values of its registers, one behind the other,
-/// little-endian, in the size that each has.
+/// Begins to read a data segment (profile SPEC): the values of its registers in their order,
+/// little-endian, each in its own size.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_master_get_segment(
     master: *mut motorlink_st_master,

@@ -1,4 +1,4 @@
-//! The slave's end: bytes in, replies out, a table of callbacks in between.
+//! The slave: takes bytes, calls a table of callbacks, gives replies.
 
 use core::ffi::{c_char, c_void};
 
@@ -23,9 +23,9 @@ use crate::tag;
 #[derive(Debug, Clone, Copy)]
 pub struct motorlink_st_version {
     /// Name of the SDK, ASCII, NUL-terminated; the replies have room for 28 and 15 bytes of it.
-    /// NULL is no name.
+    /// NULL: no name.
     pub name: *const c_char,
-    /// Type and number of a pre-release, such as "RC2", ASCII, NUL-terminated. NULL is a release.
+    /// Type and number of a pre-release, such as "RC2", ASCII, NUL-terminated. NULL: a release.
     pub pre_release: *const c_char,
     /// Major version.
     pub major: u8,
@@ -35,14 +35,14 @@ pub struct motorlink_st_version {
     pub patch: u8,
 }
 
-/// A drive behind a slave: what it is and what it does. The slave has checked the frame, the
-/// motor, the register's existence and access, and every size before it calls.
+/// The drive behind a slave. The slave has checked the frame, the motor, the register's existence and
+/// access, and every size before it calls.
 ///
 /// Every callback may be NULL. It is called from within `motorlink_st_slave_receive`, and may not
 /// call for the same slave: such calls give `IN_USE`. `motor` is 1 to 7, and exists.
 ///
 /// `motorlink conformance st` checks such a drive. What it asks of a callback beyond the document is
-/// a reading: a row of docs/SPEC-NOTES.md, named in brackets. A drive that differs from readings
+/// a reading: a row of SPEC-NOTES.md, named in brackets. A drive that differs from readings
 /// passes, and fails with `--readings strict`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -268,8 +268,8 @@ pub unsafe extern "C" fn motorlink_st_slave_init(
     })
 }
 
-/// Takes a byte that came at `now_us`. Where it completes a command the drive is called, and
-/// `reply` is what to send before the next byte is handed in; else `reply` has no bytes.
+/// Takes a byte that came at `now_us`. If it completes a command, the drive is called, and `reply` is what to
+/// send before the next byte is handed in. Otherwise `reply` has no bytes.
 ///
 /// The bytes belong to the slave, until the next call for it. A byte costs some instructions, a
 /// complete command a checksum over it and the callbacks.
@@ -291,9 +291,8 @@ pub unsafe extern "C" fn motorlink_st_slave_receive(
     })
 }
 
-/// Call at the deadline: gives the refusal that a command is owed which did not come whole in time
-/// (4.1), and no bytes when there is none. The bytes belong to the slave, until the next call for
-/// it.
+/// Call it at the deadline. Gives the error reply to a command that did not arrive completely in time
+/// (4.1), or no bytes. The bytes belong to the slave, until the next call for it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_poll(
     slave: *mut motorlink_st_slave,
@@ -309,8 +308,8 @@ pub unsafe extern "C" fn motorlink_st_slave_poll(
     })
 }
 
-/// When `motorlink_st_slave_poll` has to be called; `MOTORLINK_NEVER` while no command is under
-/// way, and always in profile MCSDK 5.4, whose firmware never times out.
+/// Gives the moment at which `motorlink_st_slave_poll` must be called; `MOTORLINK_NEVER` if no command is
+/// under way, and always in profile MCSDK 5.4, whose firmware has no timeout.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_deadline(
     slave: *mut motorlink_st_slave,
@@ -325,8 +324,8 @@ pub unsafe extern "C" fn motorlink_st_slave_deadline(
     })
 }
 
-/// Tells that the receiver lost bytes (overrun, framing, noise): drops the command under way and
-/// gives the refusal to send. The bytes belong to the slave, until the next call for it.
+/// Call it after the receiver lost bytes (overrun, framing error, noise). Drops the command under way and
+/// gives the error reply to send. The bytes belong to the slave, until the next call for it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn motorlink_st_slave_overrun(
     slave: *mut motorlink_st_slave,

@@ -1,4 +1,4 @@
-//! The protocols' numbers as C, from proto's tables.
+//! Generates the enums and constants of C from proto's tables.
 
 pub mod commands;
 
@@ -24,10 +24,10 @@ enum Kind {
 const PROFILES: [&str; Profile::ALL.len()] =
     ["the document as written", "what firmware of MCSDK 5.4 does on the wire"];
 const RECOVERIES: [&str; Recovery::ALL.len()] = [
-    "not by itself: the line counts as in step until it is lost, and `motorlink_st_master_trust_line` says \
-     that it is so again",
-    "waits for silence, asks a question, goes on when it was answered",
-    "as DRAIN, behind bytes that complete a frame which a 5.x drive may still be waiting for",
+    "no recovery: the line is in step at first, and after a failure out of step until \
+     `motorlink_st_master_trust_line` is called",
+    "waits for silence, asks a question, continues after the answer",
+    "sends bytes that complete a frame for which a 5.x drive may still wait, then as DRAIN",
 ];
 
 pub fn text() -> String {
@@ -55,7 +55,7 @@ pub fn text() -> String {
         &mut out,
         Kind::Byte,
         "motorlink_st_recovery",
-        "How a line is brought in step that was just opened, or on which an exchange failed.",
+        "How a master recovers a line after it was opened, or after a failed exchange.",
         listed!(Recovery, RECOVERIES),
     );
     group(

@@ -256,7 +256,7 @@ impl<'a> Request<'a> {
             Request::GetRegister(register) => {
                 let shape = register.shape();
                 let read =
-                    |shape: &Shape| shape.read_size(profile, Features::NONE.with(shape.feature));
+                    |shape: Shape| shape.read_size(profile, Features::NONE.with(shape.feature));
                 shape.and_then(read).map_or(ReplySize::Value, ReplySize::Exactly)
             }
             Request::GetRevupData(_) => ReplySize::Exactly(RevupPhase::SIZE as u8),

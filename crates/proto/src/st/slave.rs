@@ -169,10 +169,9 @@ impl Slave {
                 return Ok(0);
             }
             Request::GetRegister(register) => {
-                let shape = register.shape().ok_or(ErrorCode::GetWriteOnly)?;
-                let size = shape.read_size(self.profile, features);
+                let size = register.read_size(self.profile, features);
                 let size = size.ok_or(ErrorCode::GetWriteOnly)?;
-                out.value(read(self.profile, motor, register, shape, drive), size);
+                out.value(read(self.profile, motor, register, drive), size);
             }
             Request::ExecuteCommand(command) => {
                 execute(self.profile, motor, command, features, drive)?
@@ -208,18 +207,13 @@ impl Slave {
             Request::GetSegment(segment) => {
                 let segment = self.segments.get(usize::from(segment)).ok_or(ErrorCode::WrongSet)?;
                 for register in segment.registers() {
-                    let shape = register.shape().ok_or(ErrorCode::GetWriteOnly)?;
-                    let size = shape.segment_size(features).ok_or(ErrorCode::GetWriteOnly)?;
-                    out.value(read(self.profile, motor, register, shape, drive), size);
+                    let size = register.segment_size(features).ok_or(ErrorCode::GetWriteOnly)?;
+                    out.value(read(self.profile, motor, register, drive), size);
                 }
             }
             Request::ConfigureSegment { segment, registers } => {
                 let slot = self.segments.get_mut(usize::from(segment));
-                let fits = |&id: &u8| {
-                    RegisterId(id)
-                        .shape()
-                        .is_some_and(|shape| shape.segment_size(features).is_some())
-                };
+                let fits = |&id: &u8| RegisterId(id).segment_size(features).is_some();
                 let chosen = Segment::of(registers).filter(|_| registers.iter().all(fits));
                 *slot.ok_or(ErrorCode::WrongSet)? = chosen.ok_or(ErrorCode::WrongSet)?;
             }
@@ -257,7 +251,7 @@ impl Slave {
             if self.profile == Profile::Mcsdk54 {
                 return Err(ErrorCode::WrongSet);
             }
-            bytes = read(self.profile, motor, register, shape, drive).to_le_bytes();
+            bytes = read(self.profile, motor, register, drive).to_le_bytes();
         }
         for (slot, byte) in bytes.iter_mut().zip(value.iter().take(size)) {
             *slot = *byte;
@@ -269,8 +263,7 @@ impl Slave {
                 self.select(number).ok_or(ErrorCode::WrongSet)
             }
             RegisterId::DAC_OUT1 | RegisterId::DAC_OUT2 => {
-                let shown = RegisterId(bits as u8);
-                if shown.shape().is_some_and(|shape| shape.shows_on_dac(features)) {
+                if RegisterId(bits as u8).shows_on_dac(features) {
                     return drive.set_register(motor, register, bits);
                 }
                 // Firmware acknowledges registers that it cannot show; a slave of profile `spec`
@@ -280,7 +273,7 @@ impl Slave {
                     Profile::Mcsdk54 => Ok(()),
                 }
             }
-            _ => drive.set_register(motor, register, to_drive(self.profile, shape, bits)),
+            _ => drive.set_register(motor, register, to_drive(self.profile, &shape, bits)),
         }
     }
 
@@ -328,13 +321,13 @@ fn read(
     profile: Profile,
     motor: MotorNumber,
     register: RegisterId,
-    shape: &Shape,
     drive: &mut impl MotorControl,
 ) -> i32 {
     if register == RegisterId::TARGET_MOTOR {
         return i32::from(motor.number() - 1);
     }
     let bits = drive.get_register(motor, register);
+    let Some(shape) = register.shape() else { return bits };
     match (profile, shape.unit) {
         (Profile::Spec, Unit::Percent) => bits / 10,
         // Table 3 has no sign for some values that can be negative (SPEC-NOTES S23).

@@ -228,7 +228,7 @@ impl Model {
     }
 
     /// The row of a register that exists in this profile and build.
-    fn row(&self, id: u8) -> Option<&'static Shape> {
+    fn row(&self, id: u8) -> Option<Shape> {
         let row = RegisterId(id).shape()?;
         let known = !self.spec() || row.origin == Origin::Table3;
         (known && self.has(row.feature)).then_some(row)

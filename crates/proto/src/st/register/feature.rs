@@ -15,6 +15,14 @@ macro_rules! features {
             pub const fn name(self) -> &'static str {
                 match self { $( Feature::$name => $text, )+ }
             }
+
+            /// The feature with this discriminant.
+            pub(super) const fn from_number(number: u8) -> Self {
+                match number {
+                    $( n if n == Feature::$name as u8 => Feature::$name, )+
+                    _ => Feature::Core,
+                }
+            }
         }
     };
 }

@@ -15,8 +15,25 @@ impl RegisterId {
     }
 
     /// Type, unit, access and feature; `None` for an unknown id.
-    pub fn shape(self) -> Option<&'static Shape> {
-        SHAPES.get(self.row()?)
+    pub fn shape(self) -> Option<Shape> {
+        SHAPES.get(self.row()?).map(|packed| packed.shape())
+    }
+
+    // For slaves: a call of one of these is smaller than a shape by value.
+
+    #[inline(never)]
+    pub(in crate::st) fn read_size(self, profile: Profile, features: Features) -> Option<u8> {
+        self.shape()?.read_size(profile, features)
+    }
+
+    #[inline(never)]
+    pub(in crate::st) fn segment_size(self, features: Features) -> Option<u8> {
+        self.shape()?.segment_size(features)
+    }
+
+    #[inline(never)]
+    pub(in crate::st) fn shows_on_dac(self, features: Features) -> bool {
+        self.shape().is_some_and(|shape| shape.shows_on_dac(features))
     }
 
     /// Name and description; `None` for an unknown id.

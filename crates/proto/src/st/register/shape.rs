@@ -48,6 +48,17 @@ impl Access {
         }
     }
 
+    /// The access with this discriminant.
+    const fn from_number(number: u8) -> Self {
+        match number {
+            n if n == Access::ReadWrite as u8 => Access::ReadWrite,
+            n if n == Access::ReadOnly as u8 => Access::ReadOnly,
+            n if n == Access::WriteOnly as u8 => Access::WriteOnly,
+            n if n == Access::Dac as u8 => Access::Dac,
+            _ => Access::Never,
+        }
+    }
+
     const fn reads(self) -> bool {
         matches!(self, Access::ReadWrite | Access::ReadOnly)
     }
@@ -84,6 +95,35 @@ pub struct Shape {
     /// Sizes in shipped firmware, in bytes. High half: replies to GET_REG. Low half: values of
     /// SET_REG. The top bit is [`OTHER_SIGN`].
     mcsdk: u8,
+}
+
+/// A [`Shape`] in 24 bits, as the table holds it: firmware carries all rows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Packed([u8; 3]);
+
+impl Packed {
+    pub(super) const fn new(shape: Shape) -> Self {
+        let Shape { ty, unit, access, feature, origin, mcsdk } = shape;
+        let first = unit as u8 | (ty as u8) << 5;
+        let packed =
+            Packed([first, access as u8 | (feature as u8) << 3 | (origin as u8) << 7, mcsdk]);
+        let back = packed.shape();
+        assert!(back.unit as u8 == unit as u8 && back.ty as u8 == ty as u8, "too many to pack");
+        assert!(back.access as u8 == access as u8 && back.feature as u8 == feature as u8);
+        packed
+    }
+
+    pub(super) const fn shape(self) -> Shape {
+        let Packed([first, second, mcsdk]) = self;
+        Shape {
+            ty: Type::from_number(first >> 5),
+            unit: Unit::from_number(first & 0x1F),
+            access: Access::from_number(second & 7),
+            feature: Feature::from_number(second >> 3 & 0xF),
+            origin: if second >> 7 == 0 { Origin::Table3 } else { Origin::Firmware },
+            mcsdk,
+        }
+    }
 }
 
 /// In a row: the register has a name in firmware, but SET_REG is always refused with WRONG_SET.

@@ -8,7 +8,7 @@
 use super::feature::Feature;
 use super::id::RegisterId;
 use super::index::{Index, runs};
-use super::shape::{Access, Origin, REFUSED, Shape, Text};
+use super::shape::{Access, Origin, Packed, REFUSED, Shape, Text};
 use super::typed::{Dac, Never, ReadOnly, ReadWrite, Register, WriteOnly};
 use super::unit::Unit;
 use super::value::Value;
@@ -35,13 +35,13 @@ macro_rules! registers {
         pub(super) const INDEX: Index<{ runs(&[$($id),+]) }> = Index::new(&[$($id),+]);
 
         /// Every register, in the order of the ids.
-        pub static SHAPES: [Shape; IDS.len()] = [
-            $( Shape::new(
+        pub(super) static SHAPES: [Packed; IDS.len()] = [
+            $( Packed::new(Shape::new(
                 (<$ty as Value>::TYPE, Unit::$unit, Access::$access, Feature::$feature,
                  Origin::$origin),
                 <mcsdk_type!($ty $($mcsdk)?) as Value>::TYPE,
                 optional_pair!($($get, $set)?),
-            ), )+
+            )), )+
         ];
 
         /// The texts of every register, in the order of the ids.

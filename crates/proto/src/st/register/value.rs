@@ -16,6 +16,19 @@ pub enum Type {
 }
 
 impl Type {
+    /// The type with this discriminant.
+    pub(super) const fn from_number(number: u8) -> Self {
+        match number {
+            n if n == Type::I8 as u8 => Type::I8,
+            n if n == Type::U8 as u8 => Type::U8,
+            n if n == Type::I16 as u8 => Type::I16,
+            n if n == Type::U16 as u8 => Type::U16,
+            n if n == Type::I32 as u8 => Type::I32,
+            n if n == Type::U32 as u8 => Type::U32,
+            _ => Type::F32,
+        }
+    }
+
     /// The integer type of this size and sign.
     pub(super) const fn integer(size: u8, signed: bool) -> Self {
         match (size, signed) {

@@ -35,7 +35,7 @@ void reset_handler(void)
 
 static void tick_handler(void) {}
 
-/* A fault, or an interrupt that nobody asked for: the board falls silent. */
+/* A fault, or an unexpected interrupt: the board stops. */
 static void stuck_handler(void)
 {
     for (;;) {
