@@ -110,7 +110,7 @@ def document(folder, prefix):
     rust = in_rust(folder)
     compiler = version("rustc").split(" (")[0]
     c_compiler = f"{c_sizes.COMPILER} {version(c_sizes.COMPILER).rsplit(maxsplit=2)[-2]}"
-    print(TEXT.format(compiler=compiler, c_compiler=c_compiler, bare=rust["empty"][0]))
+    print(TEXT.format(compiler=compiler, c_compiler=c_compiler))
     print("| from C | flash | of it libgcc | RAM | limit, flash / RAM |\n|---|---:|---:|---:|---|")
     for name, (flash, others, ram) in in_c(prefix).items():
         print(f"| {PROGRAMS[name]} | {flash} | {others} | {ram} | {limits(c_sizes.LIMITS, name)} |")
@@ -122,35 +122,36 @@ def document(folder, prefix):
 TEXT = """\
 # Flash and RAM on a microcontroller
 
-For firmware authors: what a part of Motorlink adds to a program. `make sizes` writes this page. All numbers
-are bytes of linked programs for a Cortex-M4 with FPU (thumbv7em-none-eabihf). `make probe` fails where a
-limit is exceeded.
+For firmware authors: what a part of Motorlink adds to a program. `make sizes` writes this page. All
+numbers are bytes of linked programs for a Cortex-M4 with FPU (thumbv7em-none-eabihf). `make probe`
+fails where a limit is exceeded.
 
 ## From C
 
-The library that `make install-c TARGET=thumbv7em-none-eabihf` installs ({compiler}, `opt-level = "z"`),
-linked by {c_compiler} with `-Os -Wl,--gc-sections` to the programs of [probe/c](../probe/c). They make every call
-of a drive, or the usual calls of a host.
+The library that `make install-c TARGET=thumbv7em-none-eabihf` installs ({compiler},
+`opt-level = "z"`), linked by {c_compiler} with `-Os -Wl,--gc-sections` to the
+programs of [probe/c](../probe/c). They make every call of a drive, or the usual calls of a host.
 
-- Flash is all code and constants that the linker takes from libraries: from Motorlink's with its memory
-  functions, and from the compiler's libgcc. The program's own code and callbacks are not in it.
+- Flash is all code and constants that the linker takes from libraries: from Motorlink's with its
+  memory functions, and from the compiler's libgcc. The program's own code and callbacks are not in
+  it.
 - RAM is the object that the program declares. The stack is not in it: see "Cost" in motorlink.h.
 
-The aim is less than 4096 bytes of flash for an ST slave and less than 3072 for an RMD drive, with everything in
-it. Neither is reached. In Rust the same drives need less, because the compiler inlines the callbacks; C
-adds the calls through a table, the checks of pointers, and the conversions of structs.
+The aim is less than 4096 bytes of flash for an ST slave and less than 3072 for an RMD drive, with
+everything in it. Neither is reached. In Rust the same drives need less, because the compiler inlines
+the callbacks. C adds calls through a table, checks of pointers, and conversions of structs.
 """
 
 RUST_TEXT = """
 ## From Rust
 
-Programs that make every call that firmware makes ([probe](../probe)), with `opt-level = "s"`, fat LTO and
-`panic = "abort"`.
+Programs that make every call that firmware makes ([probe](../probe)), with `opt-level = "s"`, fat
+LTO and `panic = "abort"`.
 
-- Flash is code and constants, with the register table but without names and texts, and with what a call of
-  the probe's own drive takes, less the {bare} bytes of an empty program.
-- Memory functions are the compiler's for copying and clearing (`__aeabi_memcpy` and its kin). A program in
-  Rust has them once, whatever else is in it. They are not in the flash beside them.
+- Flash is code and constants, with the register table but without names and texts, and with what a
+  call of the probe's own drive takes, less the {bare} bytes of an empty program.
+- Memory functions are the compiler's for copying and clearing (`__aeabi_memcpy` and its kin). A
+  program in Rust has them once, whatever else is in it. They are not in the flash beside them.
 - RAM is the state of the machines, in statics. The stack is not in it.
 
 | from Rust | flash | memory functions | RAM | limit, flash / RAM |
