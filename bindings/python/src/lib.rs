@@ -72,10 +72,10 @@ mod _core {
         motorlink::port::open_descriptors().collect()
     }
 
-    /// The command line, the program's name first; gives the exit code. It takes over the process's
-    /// signals.
+    /// The command line, the program's name first; gives the exit code. `program` starts the command
+    /// in a process of its own. It takes over the process's signals.
     #[pyfunction]
-    fn cli(py: Python<'_>, words: Vec<OsString>) -> u8 {
-        py.detach(|| motorlink_cli::run(words))
+    fn cli(py: Python<'_>, program: Vec<OsString>, words: Vec<OsString>) -> u8 {
+        py.detach(|| motorlink_cli::run(&program, words))
     }
 }

@@ -73,3 +73,12 @@ def test_a_reader_that_is_gone_is_no_error(command: str, served: Served) -> None
         loop.stdout.close()
         assert loop.wait(10) == 0
         assert loop.stderr.read() == ""
+
+
+def test_a_guard_proves_itself_by_a_process_of_this_interpreter(
+    command: str, served: Served
+) -> None:
+    done = run(command, "guard", "rmd", "-p", served.can, "--prove", "--spin", "100", "--json")
+    assert done.returncode == 0, done.stderr
+    values = json.loads(done.stdout.splitlines()[-1])["values"]
+    assert values["speed"]["value"] == pytest.approx(100, abs=20)

@@ -70,11 +70,12 @@ enum Command {
 }
 
 /// Does what a command line says, the program's name first, and gives the exit code: 0 done, 1 the
-/// drive refused, 2 usage, 3 the line failed, 130 interrupted.
+/// drive refused, 2 usage, 3 the line failed, 130 interrupted. `program` starts this command in a
+/// process of its own.
 ///
 /// It takes the process over as the command does: SIGINT, SIGTERM and SIGHUP are its own from now on,
 /// and end the process where nothing has to be tidied up.
-pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
+pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u8 {
     interrupt::install();
     motorlink_testbench::register();
     let words = own_words(words);
@@ -100,7 +101,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> u8 {
     let result = match cli.command {
         Command::Demo(args) => demo::run(args),
         Command::Sim(args) => sim::run(args),
-        Command::Guard(args) => guard::run(args),
+        Command::Guard(args) => guard::run(args, program),
         Command::Ports(args) => ports::run(args),
         Command::St(args) => st::run(args),
         Command::Rmd(args) => rmd::run(args),

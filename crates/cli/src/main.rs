@@ -1,5 +1,6 @@
 //! The program `motorlink`.
 
 fn main() -> std::process::ExitCode {
-    motorlink_cli::run(std::env::args_os()).into()
+    let program = std::env::current_exe().unwrap_or_else(|_| "motorlink".into());
+    motorlink_cli::run(&[program.into()], std::env::args_os()).into()
 }

@@ -11,4 +11,5 @@ def main() -> int:
     # Python's handler would raise KeyboardInterrupt again after the command has ended.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-    return _core.cli(["motorlink", *sys.argv[1:]])
+    program = [sys.executable, "-m", "motorlink"]
+    return _core.cli(program, ["motorlink", *sys.argv[1:]])

@@ -4,6 +4,7 @@ mod prove;
 mod supervisor;
 mod words;
 
+use std::ffi::OsString;
 use std::time::Duration;
 
 use motorlink::port::PortName;
@@ -126,16 +127,16 @@ struct Common {
     spin: Option<i32>,
 }
 
-pub fn run(args: Args) -> Result<(), Failure> {
+pub fn run(args: Args, program: &[OsString]) -> Result<(), Failure> {
     match args.command {
-        None => guard_st(&args.st),
-        Some(Command::St(args)) => guard_st(&args),
-        Some(Command::Rmd(args)) => guard_rmd(&args),
+        None => guard_st(&args.st, program),
+        Some(Command::St(args)) => guard_st(&args, program),
+        Some(Command::Rmd(args)) => guard_rmd(&args, program),
         Some(Command::Spin(spin)) => spin.run(),
     }
 }
 
-fn guard_st(args: &StArgs) -> Result<(), Failure> {
+fn guard_st(args: &StArgs, program: &[OsString]) -> Result<(), Failure> {
     let port = args.port.name()?;
     if port.as_line().is_none() {
         return Err(Failure::usage(format!(
@@ -146,12 +147,12 @@ fn guard_st(args: &StArgs) -> Result<(), Failure> {
     hold();
     let relay = Relay::st(&port, args.common.options())?;
     match args.common.spin {
-        Some(speed) => Proof::st(port, args.motor, speed).show(relay, args.common.json),
+        Some(speed) => Proof::st(port, args.motor, speed).show(program, relay, args.common.json),
         None => serve(relay, "st", &port, &args.serve, args.common.json),
     }
 }
 
-fn guard_rmd(args: &RmdArgs) -> Result<(), Failure> {
+fn guard_rmd(args: &RmdArgs, program: &[OsString]) -> Result<(), Failure> {
     let port = args.port.name()?;
     let on_loss = match args.on_loss {
         OnLoss::Off => StopAction::Off,
@@ -160,7 +161,7 @@ fn guard_rmd(args: &RmdArgs) -> Result<(), Failure> {
     hold();
     let relay = Relay::rmd(&port, on_loss, args.common.options())?;
     match args.common.spin {
-        Some(speed) => Proof::rmd(port, args.id, speed).show(relay, args.common.json),
+        Some(speed) => Proof::rmd(port, args.id, speed).show(program, relay, args.common.json),
         None => serve(relay, "rmd", &port, &args.serve, args.common.json),
     }
 }

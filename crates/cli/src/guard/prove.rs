@@ -1,5 +1,6 @@
 //! `motorlink guard --prove`: a motor, a program that dies, and the time until nothing turns.
 
+use std::ffi::OsString;
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
@@ -144,14 +145,14 @@ impl Proof {
         Proof { protocol: Protocol::Rmd, port, motor: id, speed }
     }
 
-    pub fn show(&self, mut relay: Relay, json: bool) -> Result<(), Failure> {
+    pub fn show(&self, program: &[OsString], mut relay: Relay, json: bool) -> Result<(), Failure> {
         if self.speed == 0 {
             return Err(Failure::usage("--spin 0 turns nothing: give a speed"));
         }
         let folder = Folder::new()?;
         let path = folder.0.join("line");
         relay.serve(&format!("unix-listen:{}", path.display()).parse::<ServeName>()?)?;
-        let mut program = Program::start(self, &path)?;
+        let mut program = Program::start(program, self, &path)?;
         let reached = program.turning(&mut relay)?;
         let unit = self.protocol.unit();
         note(format!(
@@ -219,18 +220,14 @@ struct Program {
 }
 
 impl Program {
-    fn start(proof: &Proof, path: &Path) -> Result<Self, Failure> {
+    fn start(program: &[OsString], proof: &Proof, path: &Path) -> Result<Self, Failure> {
         let (protocol, port) = match proof.protocol {
             Protocol::St => ("st", format!("unix:{}", path.display())),
             Protocol::Rmd => ("rmd", format!("slcan:unix:{}", path.display())),
         };
-        let program = std::env::current_exe()?;
-        let mut command = Command::new(&program);
-        // The Python package runs this in the interpreter.
-        if program.file_name().is_some_and(|name| name.to_string_lossy().starts_with("python")) {
-            command.args(["-m", "motorlink"]);
-        }
-        command.args(["guard", "spin", protocol, &port]);
+        let (name, words) = program.split_first().expect("a program has a name");
+        let mut command = Command::new(name);
+        command.args(words).args(["guard", "spin", protocol, &port]);
         command.args([proof.motor.to_string(), proof.speed.to_string()]);
         let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn()?;
         let (say, said) = channel();
