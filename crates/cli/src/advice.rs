@@ -30,6 +30,18 @@ pub fn rmd(error: &rmd::Error) -> Option<&'static str> {
     match error {
         rmd::Error::Port(error) => port(error),
         rmd::Error::Timeout { .. } => Some("`motorlink rmd scan` lists the motors that answer"),
+        rmd::Error::NotArrived { why, .. } => match why {
+            rmd::NotArrived::Protection { .. } => {
+                Some("remove the cause, then `motorlink rmd clear-errors`")
+            }
+            rmd::NotArrived::TimedOut { is_still: false, .. } => {
+                Some("try a longer --wait-timeout")
+            }
+            rmd::NotArrived::TimedOut { .. } | rmd::NotArrived::Stalled { .. } => {
+                Some("is the shaft blocked, or --wait-tolerance too small?")
+            }
+            _ => None,
+        },
         _ => None,
     }
 }
@@ -49,6 +61,19 @@ pub fn st(error: &st::Error) -> Option<&'static str> {
         st::Error::Refused { code: ErrorCode::BadMotorSelected, .. } => {
             Some("give another --motor")
         }
+        st::Error::NotArrived { why, .. } => match why {
+            st::NotArrived::Faults { .. } => {
+                Some("remove the cause, then `motorlink st fault-ack`")
+            }
+            st::NotArrived::NotRunning { .. } => {
+                Some("start the motor first: `motorlink st start`")
+            }
+            st::NotArrived::TimedOut { is_still: false, .. } => Some("try a longer --wait-timeout"),
+            st::NotArrived::TimedOut { .. } | st::NotArrived::Stalled { .. } => {
+                Some("is the shaft blocked, or --wait-tolerance too small?")
+            }
+            _ => None,
+        },
         st::Error::NotVerifiable { why: Unverifiable::NotReadable, .. } => {
             Some("`motorlink st registers` says what can")
         }

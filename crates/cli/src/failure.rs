@@ -134,6 +134,14 @@ impl Failure {
         self
     }
 
+    /// With a fact behind what happened.
+    pub fn then(mut self, fact: impl std::fmt::Display) -> Self {
+        if let Failure::Failed(problem) = &mut self {
+            problem.message = format!("{}; {fact}", problem.message);
+        }
+        self
+    }
+
     /// The exit code.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -224,7 +232,9 @@ impl From<Problem> for Failure {
 impl From<st::Error> for Failure {
     fn from(error: st::Error) -> Self {
         let kind = match &error {
-            st::Error::Refused { .. } | st::Error::Differs { .. } => Kind::Refused,
+            st::Error::Refused { .. }
+            | st::Error::Differs { .. }
+            | st::Error::NotArrived { .. } => Kind::Refused,
             st::Error::Port(error) => return error.into(),
             error if error.is_line_failure() => Kind::Link,
             _ => Kind::Usage,
@@ -236,6 +246,7 @@ impl From<st::Error> for Failure {
                 problem.fact("code", u8::from(*code));
                 problem.fact("name", code.to_string());
             }
+            st::Error::NotArrived { motor, .. } => problem.motor(motor.number()),
             st::Error::Failed { motor, .. } | st::Error::Reply { motor, .. } => {
                 problem.motor(motor.0);
             }
@@ -251,6 +262,7 @@ impl From<rmd::Error> for Failure {
         let kind = match &error {
             Port(error) => return error.into(),
             Echo { .. } | Altered { .. } => Kind::Link,
+            NotArrived { .. } => Kind::Refused,
             error if error.is_line_failure() => Kind::Silent,
             _ => Kind::Usage,
         };

@@ -20,6 +20,14 @@ pub fn span_up_to(
     }
 }
 
+/// Reads a distance: a number that is not negative.
+pub fn parse_distance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(distance) if distance.is_finite() && distance >= 0.0 => Ok(distance),
+        _ => Err("give a number, 0 or more".to_owned()),
+    }
+}
+
 fn seconds(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let (number, scale) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {

@@ -12,6 +12,7 @@
 //! | look up a register, a command or a unit | [`st::register`], [`rmd::COMMANDS`], [`units`] |
 //! | refuse dangerous requests | [`st::Limits`] with [`st::Account`], [`rmd::Limits`] |
 //! | print a frame | [`Hex`], [`rmd::describe`] |
+//! | wait until a move has arrived | [`rmd::ArrivalWatch`], [`st::ArrivalWatch`] |
 //!
 //! ST's protocol is the serial Motor Control Protocol of MCSDK 5.x drives. RMD is the RMD motor
 //! control protocol over CAN, V1.62; its frames are [`can::CanFrame`]s.
@@ -29,6 +30,7 @@ extern crate std;
 
 #[macro_use]
 mod table;
+pub mod arrival;
 pub mod can;
 mod hex;
 pub mod rmd;

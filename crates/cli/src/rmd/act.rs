@@ -2,10 +2,11 @@
 
 use motorlink::rmd::{
     Code, EncoderOffset, Error, FullTurn, IqCommand, MotionStatus, MotorSet, SetTorque4,
-    SpeedLimit, SpinDirection, TurnCentiDegrees,
+    SpeedLimit, SpinDirection, Target, TurnCentiDegrees,
 };
 
 use super::args::{self, Act, MaxSpeed};
+use super::arrival;
 use super::session::Session;
 use super::settings;
 use crate::failure::Failure;
@@ -41,13 +42,15 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
         }
         Act::Torque { amps } => session.replied(&motor.set_torque(session.wanted(amps)?)?),
         Act::Speed { dps } => session.replied(&motor.set_speed(session.wanted(dps)?)?),
-        Act::Position { degrees, most } => {
-            let max_speed = max_speed(session, &most)?;
-            session.replied(&motor.set_position(session.wanted(degrees)?, max_speed)?)
+        Act::Position { degrees, most, wait } => {
+            let (angle, max_speed) = (session.wanted(degrees)?, max_speed(session, &most)?);
+            let command = || Ok(motor.set_position(angle, max_speed)?);
+            arrival::command(session, command, Target::MultiTurn(angle), max_speed, &wait)
         }
-        Act::SingleTurnPosition { degrees, direction, most, full_turn } => {
-            let max_speed = max_speed(session, &most)?;
-            session.replied(&turn(session, degrees, max_speed, direction, &full_turn)?)
+        Act::SingleTurnPosition { degrees, direction, most, full_turn, wait } => {
+            let (angle, max_speed) = (session.wanted(degrees)?, max_speed(session, &most)?);
+            let command = || turn(session, angle, max_speed, direction, &full_turn);
+            arrival::command(session, command, Target::SingleTurn(angle), max_speed, &wait)
         }
         Act::ClearErrors => {
             let status = motor.clear_errors()?;
@@ -74,12 +77,11 @@ fn max_speed(session: &Session, most: &MaxSpeed) -> Result<Option<SpeedLimit>, F
 
 fn turn(
     session: &Session,
-    degrees: f64,
+    angle: TurnCentiDegrees,
     max_speed: Option<SpeedLimit>,
     direction: SpinDirection,
     full_turn: &args::FullTurn,
 ) -> Result<MotionStatus, Failure> {
-    let angle = session.wanted(degrees)?;
     let full_turn = match *full_turn {
         args::FullTurn { full_turn: true, .. } => FullTurn::Allowed,
         args::FullTurn { tolerance: None, .. } => FullTurn::default(),

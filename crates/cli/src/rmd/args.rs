@@ -7,7 +7,7 @@ use motorlink::rmd::SpinDirection;
 
 use crate::connection::Connection;
 use crate::repeat::Repeat;
-use crate::span::span_up_to;
+use crate::span::{parse_distance, parse_span, span_up_to};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -118,6 +118,8 @@ pub enum Act {
         degrees: f64,
         #[command(flatten)]
         most: MaxSpeed,
+        #[command(flatten)]
+        wait: Wait,
     },
     /// Turn to an angle within the turn, one way round
     ///
@@ -134,6 +136,8 @@ pub enum Act {
         most: MaxSpeed,
         #[command(flatten)]
         full_turn: FullTurn,
+        #[command(flatten)]
+        wait: Wait,
     },
     /// Clear the errors whose cause is gone
     ClearErrors,
@@ -168,6 +172,27 @@ pub struct FullTurn {
     /// Up to how far past the angle the move is refused, degrees (default 0.5)
     #[arg(long, value_name = "DEGREES", conflicts_with = "full_turn")]
     pub tolerance: Option<f64>,
+}
+
+/// Whether to wait for the end of a move.
+#[derive(clap::Args)]
+pub struct Wait {
+    /// Return when the motor has arrived and is still; stop it after Ctrl-C or if it does not arrive
+    ///
+    /// Without --wait the command returns when the motor has confirmed it, and the motor turns on. With
+    /// --wait the angle is read until it is within the tolerance and does not change for 0.25 s. After a
+    /// timeout, an error of the motor, a lost line or Ctrl-C the motor is stopped (0x81). After kill -9
+    /// the motor completes the move.
+    #[arg(long)]
+    pub wait: bool,
+    /// How far from the target the motor may be to have arrived, degrees (default 0.1)
+    ///
+    /// The default is more than one count of the coarsest encoder (12 bits, 0.088°).
+    #[arg(long, value_name = "DEGREES", requires = "wait", value_parser = parse_distance)]
+    pub wait_tolerance: Option<f64>,
+    /// How long to wait (default: twice the time at --max-speed and 10s; 60s without --max-speed)
+    #[arg(long, value_name = "TIME", requires = "wait", value_parser = parse_span)]
+    pub wait_timeout: Option<Duration>,
 }
 
 fn direction(word: &str) -> Result<SpinDirection, &'static str> {

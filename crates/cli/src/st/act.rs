@@ -9,6 +9,7 @@ use motorlink::st::{
 use motorlink::time;
 
 use super::args::{Act, Pfc};
+use super::arrival;
 use super::read::explain;
 use super::session::Session;
 use super::set;
@@ -46,11 +47,14 @@ pub fn run(session: &Session, act: Act) -> Result<(), Failure> {
             motor.set_torque_ramp(TorqueRamp { torque_s16a: iq, duration_ms: ms })?;
             session.done(format!("{}: ramp to Iq {iq} in {ms} ms acknowledged", motor.number()))
         }
-        Act::Position { rad, seconds } => {
+        Act::Position { rad, seconds, wait } => {
             session.wants(Profile::Mcsdk54, "moves")?;
             let position = PositionMove { angle_rad: rad, duration_s: seconds };
             if !position.is_possible() {
                 return Err(Failure::usage(format!("{rad} rad in {seconds} s is not possible")));
+            }
+            if wait.wait {
+                return arrival::move_and_wait(session, position, &wait);
             }
             motor.set_position(position)?;
             session

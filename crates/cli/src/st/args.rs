@@ -8,7 +8,7 @@ use motorlink::st::Profile;
 use super::registers::Filter;
 use crate::connection::Connection;
 use crate::repeat::Repeat;
-use crate::span::span_up_to;
+use crate::span::{parse_distance, parse_span, span_up_to};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -158,6 +158,8 @@ pub enum Act {
         rad: f32,
         /// Length of the move, s
         seconds: f32,
+        #[command(flatten)]
+        wait: Wait,
     },
     /// Acknowledge faults whose cause is gone
     FaultAck,
@@ -177,6 +179,26 @@ pub enum Act {
         #[arg(required = true, value_name = "HEX")]
         bytes: Vec<String>,
     },
+}
+
+/// Whether to wait for the end of a move.
+#[derive(clap::Args)]
+pub struct Wait {
+    /// Return when the motor has arrived and is still; stop it after Ctrl-C or if it does not arrive
+    ///
+    /// Without --wait the command returns when the drive has acknowledged it, and the motor turns on.
+    /// With --wait the motor has to be in RUN or on its way there. Its position is read until it is
+    /// within the tolerance and does not change for 0.25 s, after the length of the move. After a
+    /// timeout, a fault, a lost line or Ctrl-C the motor is stopped (STOP_MOTOR): it no longer holds a
+    /// load. After kill -9 the motor completes the move.
+    #[arg(long)]
+    pub wait: bool,
+    /// How far from the target the motor may be to have arrived, rad (default 0.01)
+    #[arg(long, value_name = "RAD", requires = "wait", value_parser = parse_distance)]
+    pub wait_tolerance: Option<f64>,
+    /// How long to wait (default: the length of the move and 10s)
+    #[arg(long, value_name = "TIME", requires = "wait", value_parser = parse_span)]
+    pub wait_timeout: Option<Duration>,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy)]

@@ -2,6 +2,7 @@
 
 mod act;
 mod args;
+mod arrival;
 mod read;
 mod refusal;
 mod registers;

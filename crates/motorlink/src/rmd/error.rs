@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use motorlink_link::port::{CanLink, PortError};
-use motorlink_proto::rmd::{Code, Dialect, Exceeded, MotorId, SpinDirection};
+use motorlink_proto::rmd::{Code, Dialect, Exceeded, MotorId, NotArrived, SpinDirection};
 use motorlink_proto::units::TurnCentiDegrees;
 
 /// Why a call to a motor did not do what it says. This protocol has no refusal: a motor that does
@@ -139,6 +139,14 @@ pub enum Error {
         /// Which way round.
         direction: SpinDirection,
     },
+    /// A motor did not arrive at its target. It is not stopped.
+    #[error("motor {motor} did not arrive: {why}")]
+    NotArrived {
+        /// The motor.
+        motor: MotorId,
+        /// Why.
+        why: NotArrived,
+    },
     /// There is no such motor; nothing was sent.
     #[error("motor {0} does not exist: motor IDs are 1 to 32")]
     NoSuchMotor(u8),
@@ -175,6 +183,7 @@ impl Error {
             | Error::Twice(motor)
             | Error::Limit { motor, .. }
             | Error::FullTurn { motor, .. }
+            | Error::NotArrived { motor, .. }
             | Error::OutOfReach(motor) => Some(*motor),
             Error::NoSuchMotor(_) | Error::Port(_) => None,
         }

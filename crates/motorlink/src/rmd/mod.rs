@@ -12,6 +12,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod arrival;
 mod client;
 mod error;
 mod event;
@@ -25,6 +26,7 @@ mod stop_on_drop;
 pub use motorlink_proto::rmd::*;
 pub use motorlink_proto::units::*;
 
+pub use arrival::{ArrivalOptions, ArrivalProgress};
 pub use client::{Client, SCAN_WIDTH, ScanResult};
 pub use error::Error;
 pub use event::EventClient;

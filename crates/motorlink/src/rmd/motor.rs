@@ -21,6 +21,10 @@ impl Client {
 }
 
 impl Motor<'_> {
+    pub(super) fn bus(&self) -> &Client {
+        self.bus
+    }
+
     /// The motor's ID.
     pub fn id(&self) -> MotorId {
         self.id

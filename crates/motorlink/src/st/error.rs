@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use motorlink_link::port::PortError;
-use motorlink_proto::st::{ErrorCode, Failure, MotorNumber, RegisterId, Unverified};
+use motorlink_proto::st::{ErrorCode, Failure, MotorNumber, NotArrived, RegisterId, Unverified};
 
 use super::LimitError;
 
@@ -100,6 +100,14 @@ pub enum Error {
         motor: Target,
         /// Which limit, and what to do.
         exceeded: LimitError,
+    },
+    /// A motor did not arrive at its target. It is not stopped.
+    #[error("{motor} did not arrive: {why}")]
+    NotArrived {
+        /// The motor.
+        motor: MotorNumber,
+        /// Why.
+        why: NotArrived,
     },
     /// There is no such motor number; nothing was sent.
     #[error("motor {0} does not exist: motor numbers are 1 to 7")]

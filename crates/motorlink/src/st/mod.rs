@@ -13,6 +13,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod arrival;
 mod client;
 mod error;
 mod event;
@@ -25,12 +26,14 @@ mod stop_on_drop;
 mod transcript;
 
 pub use motorlink_proto::st::{
-    Command, ControlMode, Counters, CurrentReference, ErrorCode, Failure, Feature, Features, Flags,
-    FrameCode, LimitError, Limits, MasterConfig, MotorNumber, NoSuchProfile, PositionMove, Profile,
-    REVUP_PHASES, Ramp, Recovery, RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS,
-    Slave, Status, SyncState, TorqueRamp, Unverified, VERIFY_ATTEMPTS, VerifiedWrite, register,
+    ARRIVAL_TOLERANCE_RAD, ArrivalWatch, Command, ControlMode, Counters, CurrentReference,
+    ErrorCode, Failure, Feature, Features, Flags, FrameCode, LimitError, Limits, MasterConfig,
+    MotorNumber, NoSuchProfile, NotArrived, PositionMove, Profile, REVUP_PHASES, Ramp, Recovery,
+    RegisterId, Request, RevupPhase, SEGMENT_REGISTERS, SEGMENTS, Slave, Status, SyncState,
+    TorqueRamp, Unverified, VERIFY_ATTEMPTS, VerifiedWrite, register,
 };
 
+pub use arrival::{ArrivalOptions, ArrivalProgress};
 pub use client::{BoardInfo, Client, FirmwareVersion};
 pub use error::{Error, Unverifiable};
 pub use event::{Confirmation, EventClient, Progress};

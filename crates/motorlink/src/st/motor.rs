@@ -35,6 +35,10 @@ macro_rules! commands {
 }
 
 impl Motor<'_> {
+    pub(super) fn client(&self) -> &Client {
+        self.client
+    }
+
     /// The motor's number.
     pub fn number(&self) -> MotorNumber {
         self.motor

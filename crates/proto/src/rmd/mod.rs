@@ -12,6 +12,7 @@
 //! | command four torques in one frame | [`SetTorque4`], [`Host::set_torque4`] |
 //! | list all commands with their values and units | [`COMMANDS`] |
 //! | limit currents, speeds and angles | [`Limits`], [`Host::set_limits`] |
+//! | wait until a move has arrived | [`ArrivalWatch`] |
 //! | print a frame as text | [`describe`] |
 //!
 //! docs/SPEC-NOTES.md explains how this crate reads unclear passages of the document. Comments
@@ -36,6 +37,7 @@
 //! # Ok::<(), RequestError>(())
 //! ```
 
+mod arrival;
 mod command;
 mod describe;
 mod doubt;
@@ -49,6 +51,9 @@ mod outcome;
 mod payload;
 mod reply;
 
+pub use arrival::{
+    ARRIVAL_TIMEOUT, ARRIVAL_TOLERANCE, ArrivalStep, ArrivalWatch, NotArrived, Target,
+};
 pub use command::*;
 pub use describe::{Described, Direction, describe};
 pub use drive::{Drive, DriveConfig, Ignored, Mode, MotorControl, Sense, Settings};

@@ -63,6 +63,7 @@
 //! ```
 
 mod account;
+mod arrival;
 mod code;
 mod command;
 mod drive;
@@ -80,6 +81,9 @@ mod value;
 mod verified;
 
 pub use account::Account;
+pub use arrival::{
+    ARRIVAL_SPARE_TIME, ARRIVAL_TOLERANCE_RAD, ArrivalStep, ArrivalWatch, NotArrived,
+};
 pub use code::{
     Command, ControlMode, ErrorCode, Flags, FrameCode, HEADER_ACK, HEADER_ATR, HEADER_NACK,
     NoSuchProfile, Profile, Status,

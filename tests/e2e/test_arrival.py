@@ -1,0 +1,139 @@
+"""Moves with `--wait`: they end when the motor has arrived, and stop it otherwise."""
+
+import signal
+
+import pytest
+
+from program import eventually
+
+FAST = ["--max-speed", 720]
+FAR = ["position", 72000, *FAST, "--wait"]
+
+
+@pytest.fixture(name="bench")
+def on_a_bus(sim):
+    return sim(st=())
+
+
+@pytest.fixture(name="rmd")
+def on_its_port(run, bench):
+    port = bench.port("slcan")
+    return lambda *words: run("rmd", "-p", port, "--timeout", "500ms", *words)
+
+
+def angle(rmd):
+    return rmd("--json", "angle").ended(0).values["multi_turn_angle"]
+
+
+def is_still(rmd):
+    return angle(rmd) == pytest.approx(angle(rmd), abs=0.05)
+
+
+@pytest.mark.parametrize("degrees", [90, -33.3, 0.3])
+def test_a_move_returns_when_the_motor_is_there(rmd, degrees):
+    rmd("position", degrees, *FAST, "--wait").ended(0)
+    assert angle(rmd) == pytest.approx(degrees, abs=0.15)
+    assert is_still(rmd)
+
+
+def test_a_move_within_the_turn_returns_when_the_motor_is_there(rmd):
+    rmd("single-turn-position", 350, "ccw", *FAST, "--wait").ended(0)
+    assert angle(rmd) == pytest.approx(-10, abs=0.15)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_stops_the_motor(start, bench, rmd, number):
+    waiting = start("rmd", "-p", bench.port("slcan"), "--trace", *FAR)
+    waiting.says("0x92")
+    for _ in range(2):
+        waiting.process.send_signal(number)
+    assert waiting.wait() == 130
+    waiting.says("motor 1 was stopped")
+    assert angle(rmd) < 70_000
+    assert is_still(rmd)
+
+
+def test_a_motor_that_needs_longer_is_stopped(rmd):
+    done = rmd(*FAR, "--wait-timeout", "500ms").ended(1)
+    assert "the time is over and the motor is moving" in done.err
+    assert "motor 1 was stopped" in done.err
+    assert is_still(rmd)
+
+
+def test_a_motor_that_is_held_is_stopped(bench, rmd):
+    bench.do("lock-rotor", motor=1, locked=True)
+    done = rmd("position", 90, *FAST, "--wait").ended(1)
+    assert "the motor stopped before its target, 90.00° from its target" in done.err
+
+
+def test_an_error_of_the_motor_ends_the_wait(start, bench):
+    waiting = start("rmd", "-p", bench.port("slcan"), "--trace", *FAR)
+    waiting.says("0x92")
+    bench.do("fault", motor=1, fault="LOW_VOLTAGE")
+    assert waiting.wait() == 1
+    waiting.says("the motor reports low voltage protection")
+
+
+def test_drives_that_are_killed_end_the_wait(start, bench):
+    waiting = start("rmd", "-p", bench.port("slcan"), "--trace", *FAR)
+    waiting.says("0x92")
+    bench.kill()
+    assert waiting.wait() == 3
+    waiting.says("may still be turning")
+
+
+def test_frozen_drives_end_the_wait(start, bench):
+    waiting = start("rmd", "-p", bench.port("slcan"), "--trace", *FAR)
+    waiting.says("0x92")
+    bench.process.send_signal(signal.SIGSTOP)
+    assert waiting.wait() == 3
+    waiting.says("may still be turning")
+    bench.process.send_signal(signal.SIGCONT)
+
+
+@pytest.mark.parametrize("fault", ["drop=0.02", "dup=0.05", "delay=5ms..30ms", "flip=1e-4"])
+def test_a_bad_line_makes_no_false_arrival(rmd, fault):
+    done = rmd("--fault", f"{fault},seed=2", "position", 360, *FAST, "--wait")
+    if done.code == 0:
+        assert angle(rmd) == pytest.approx(360, abs=0.15)
+    assert is_still(rmd)
+
+
+def test_waits_take_no_negative_tolerance_and_need_wait(rmd):
+    assert "0 or more" in rmd(*FAR, "--wait-tolerance=-1").ended(2).err
+    assert "--wait" in rmd("position", 90, "--wait-timeout", "1s").ended(2).err
+
+
+@pytest.fixture(name="servo")
+def on_a_line(run, sim, tmp_path):
+    config = tmp_path / "servo.toml"
+    config.write_text('profile = "mcsdk-5.4"\n[[st.motor]]\npreset = "servo"\n')
+    port = sim(config, rmd=()).port("pty")
+    words = ("st", "-p", port, "--profile", "mcsdk-5.4")
+    return words, lambda *more: run(*words, *more)
+
+
+def test_an_st_move_returns_when_the_motor_is_there(servo):
+    _, st = servo
+    st("start").ended(0)
+    st("position", 3, 0.5, "--wait").ended(0)
+    position = st("--json", "get", "CURRENT_POSITION").ended(0).values["CURRENT_POSITION"]
+    assert position == pytest.approx(3, abs=0.01)
+
+
+def test_an_st_motor_that_is_not_running_is_sent_no_move(servo):
+    _, st = servo
+    done = st("--trace", "position", 3, 0.5, "--wait").ended(1)
+    assert "the motor is in IDLE, not in RUN" in done.err
+    assert "SET_POSITION_CMD" not in done.err
+
+
+def test_a_signal_stops_an_st_motor(servo, start):
+    words, st = servo
+    st("start").ended(0)
+    waiting = start(*words, "--trace", "position", 300, 60, "--wait")
+    waiting.says("CURRENT_POSITION")
+    waiting.interrupt()
+    assert waiting.wait() == 130
+    state = lambda: st("--json", "get", "STATUS").ended(0).values["STATUS"]
+    eventually(lambda: state() == 0, "IDLE")
