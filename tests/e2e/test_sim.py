@@ -130,7 +130,7 @@ def test_what_is_no_link_to_a_pty_is_not_overwritten(run, tmp_path, kind):
     else:
         path.symlink_to(tmp_path / "precious")
     told = run("sim", "--stdin", "--st", f"pty:{path}").ended(3).err
-    assert "is no link to a pty" in told
+    assert "is not a link to a pty" in told
     assert path.is_dir() or path.read_text() == "kept"
 
 

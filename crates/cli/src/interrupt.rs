@@ -103,7 +103,7 @@ pub fn interrupted() -> bool {
 
 /// As [`wait`], by a port's clock, which may be virtual.
 pub fn wait_by(clock: &Clock, time: Duration) -> bool {
-    if !clock.stands() {
+    if !clock.is_virtual() {
         return wait(time);
     }
     clock.wait(clock.now() + time.into());

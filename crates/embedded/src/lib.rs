@@ -1,14 +1,20 @@
-//! Motorlink's protocols on the ports of real boards.
+//! Motorlink's protocols on the peripherals of real boards.
 //!
-//! * [`st`]: ST's Motor Control Protocol on a UART that has the traits of [`embedded_io`].
-//! * [`rmd`]: RMD on a CAN controller that has those of [`embedded_can::nb`].
-//! * [`slcan`]: such a controller made of a UART that speaks slcan.
+//! | to | use |
+//! |---|---|
+//! | answer as an ST drive on a UART | [`st::SlavePort`] |
+//! | command an ST drive through a UART | [`st::MasterPort`] |
+//! | answer as RMD motors on a CAN controller | [`rmd::DrivePort`] |
+//! | command RMD motors through a CAN controller | [`rmd::HostPort`] |
+//! | use a UART as a CAN controller, with the slcan protocol | [`slcan::Adapter`] |
 //!
-//! A port moves bytes or frames between a peripheral and a machine of [`motorlink_proto`], and
-//! nothing else: no clock, no interrupt, no allocation, no `unsafe`, no panic. Its `poll` takes the
-//! time, does a bounded amount of work (so that a line full of garbage does not keep a board from
-//! its other duties), and says when to be called again if nothing is received before. A board calls
-//! it from its main loop, behind an interrupt that wakes it for each byte or frame:
+//! A UART needs the traits of [`embedded_io`], a CAN controller those of [`embedded_can::nb`].
+//!
+//! A port moves bytes or frames between a peripheral and a state machine of [`motorlink_proto`]. It
+//! has no clock, no interrupt, no allocation, no `unsafe` and no panic. `poll` gets the time, does
+//! a bounded amount of work even on a line full of garbage, and returns when to call it again if
+//! nothing is received before. A board calls it from its main loop, after an interrupt that wakes
+//! it for each byte or frame:
 //!
 //! ```
 //! use motorlink_embedded::st::SlavePort;
@@ -21,7 +27,7 @@
 //! {
 //!     let mut port = SlavePort::new(uart, Slave::new(Profile::Spec, MotorNumber::FIRST));
 //!     loop {
-//!         // A receiver that overran has been answered for; there is nothing more to do.
+//!         // The NACK for an overrun was sent already, so the error needs no handling.
 //!         let next = port.poll(now(), drive).unwrap_or_default();
 //!         sleep(next);
 //!     }

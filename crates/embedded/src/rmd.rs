@@ -6,18 +6,18 @@ use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{DEFAULT_TIMEOUT, Drive, Failure, Host, MotorControl, MotorId, Output};
 use motorlink_proto::time::Instant;
 
-/// The end of one or more drives that share a CAN controller, each with its own ID.
+/// One or more drives on a CAN controller, each with its own ID.
 #[derive(Debug)]
 pub struct DrivePort<C: Can, const N: usize> {
     can: C,
     drives: [Drive; N],
-    /// Replies that the controller has not taken yet.
+    /// Replies that the controller has not accepted yet.
     replies: [Option<C::Frame>; N],
 }
 
 impl<C: Can, const N: usize> DrivePort<C, N> {
-    /// Puts drives on a controller, in the order of their IDs, in which replies to the torque frame
-    /// are due (chapter 4).
+    /// Puts drives on a controller, sorted by ID: this is the order of the replies to the torque
+    /// frame (chapter 4).
     pub const fn new(can: C, drives: [Drive; N]) -> Self {
         DrivePort { can, drives, replies: [const { None }; N] }
     }
@@ -29,16 +29,17 @@ impl<C: Can, const N: usize> DrivePort<C, N> {
         }
     }
 
-    /// Latches faults and keeps the shutdown times, whatever the bus does; takes a frame, lets the
-    /// motors work, answers.
-    /// Returns when to be called again at the latest: `now` when there may be more to do at once,
-    /// `None` when there is nothing to wait for but frames. For a fault to switch its motor off in
-    /// time, call at least each millisecond.
+    /// Latches faults and checks the shutdown times, also while the bus fails; takes a frame, calls
+    /// the motors, replies.
     ///
-    /// While the controller does not take the replies, no further frame is read from it.
+    /// Returns when to call it again at the latest: `now` if there may be more to do at once,
+    /// `None` to wait only for frames. Call it at least each millisecond, so that a fault switches
+    /// its motor off in time.
+    ///
+    /// While the controller does not accept the replies, no further frame is read from it.
     ///
     /// # Errors
-    /// Those of the controller, bus-off among them. The port goes on with the next call.
+    /// Errors of the controller, including bus-off. The next call continues.
     pub fn poll(
         &mut self,
         now: Instant,
@@ -65,8 +66,8 @@ impl<C: Can, const N: usize> DrivePort<C, N> {
         Ok(if waits { Some(now) } else { deadline })
     }
 
-    /// Hands the replies to the controller; whether it took them all. A frame that it gives back for
-    /// one that is more urgent waits in its place.
+    /// Passes the replies to the controller. Returns whether it accepted all. A frame that the
+    /// controller returns in exchange for a more urgent one is kept for later.
     fn transmit(&mut self) -> Result<bool, C::Error> {
         for slot in &mut self.replies {
             while let Some(frame) = slot {
@@ -82,18 +83,18 @@ impl<C: Can, const N: usize> DrivePort<C, N> {
         &self.drives
     }
 
-    /// The drives, to change what the vendor's tool sets.
+    /// The drives, to change their vendor's configuration.
     pub const fn drives_mut(&mut self) -> &mut [Drive; N] {
         &mut self.drives
     }
 
-    /// The controller, to configure it and to bring it back from bus-off.
+    /// The controller, for configuration and for recovery from bus-off.
     pub const fn can_mut(&mut self) -> &mut C {
         &mut self.can
     }
 }
 
-/// What [`HostPort::poll`] tells.
+/// The result of [`HostPort::poll`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Event {
     /// The exchange with a motor is over.
@@ -103,16 +104,17 @@ pub enum Event {
         /// The eight bytes of its reply.
         result: Result<[u8; 8], Failure>,
     },
-    /// Nothing yet. Call again when a frame comes, or then; `None` while no exchange is under way.
+    /// No result yet. Call again when a frame comes, or at this time; `None` without an open
+    /// exchange.
     Wait(Option<Instant>),
 }
 
-/// The end on a CAN controller that commands motors.
+/// A host on a CAN controller.
 #[derive(Debug)]
 pub struct HostPort<C: Can> {
     can: C,
     host: Host,
-    /// A frame that the controller has not taken yet, and when it is too late for it.
+    /// A frame that the controller has not accepted yet, and its deadline.
     waiting: Option<(C::Frame, Instant)>,
 }
 
@@ -122,12 +124,12 @@ impl<C: Can> HostPort<C> {
         HostPort { can, host, waiting: None }
     }
 
-    /// Takes a frame and sends what is due. A frame that the controller does not take within
-    /// [`DEFAULT_TIMEOUT`], because nobody acknowledges or the bus is off, is dropped, and its
-    /// exchange times out.
+    /// Takes a frame and sends frames that are due. A frame that the controller does not accept
+    /// within [`DEFAULT_TIMEOUT`] is dropped, and its exchange times out. This happens without an
+    /// acknowledging node, or on a bus that is off.
     ///
     /// # Errors
-    /// Those of the controller. The exchanges go on, and end at their timeouts.
+    /// Errors of the controller. The exchanges continue, and end at their timeouts.
     pub fn poll(&mut self, now: Instant) -> Result<Event, C::Error> {
         let received = ready(self.can.receive())?;
         if let Some(frame) = &received {
@@ -147,7 +149,7 @@ impl<C: Can> HostPort<C> {
         })
     }
 
-    /// Hands the waiting frame to the controller; whether none waits any more.
+    /// Passes the queued frame to the controller. Returns whether the queue is empty.
     fn transmit(&mut self, now: Instant) -> Result<bool, C::Error> {
         while let Some((frame, until)) = &self.waiting {
             if now >= *until {
@@ -160,20 +162,20 @@ impl<C: Can> HostPort<C> {
         Ok(true)
     }
 
-    /// The host, to make requests and to set limits. A new host's first exchange with each motor ends
-    /// in [`Failure::Quarantined`]: it is made again when the motor was silent for the quarantine time.
-    /// [`Host::trust`] skips that on a board that starts with its motors.
+    /// The host, for requests and limits. The first exchange of a new host with each motor ends
+    /// with [`Failure::Quarantined`]: repeat it after the motor was silent for the quarantine time.
+    /// If the board starts together with its motors, call [`Host::trust`] to avoid this.
     pub const fn host_mut(&mut self) -> &mut Host {
         &mut self.host
     }
 
-    /// The controller, to configure it and to bring it back from bus-off.
+    /// The controller, for configuration and for recovery from bus-off.
     pub const fn can_mut(&mut self) -> &mut C {
         &mut self.can
     }
 }
 
-/// The result of a call that is over; `None` for one that would have to wait.
+/// The result of a completed call; `None` if the call would block.
 fn ready<T, E>(result: nb::Result<T, E>) -> Result<Option<T>, E> {
     match result {
         Ok(value) => Ok(Some(value)),
@@ -182,7 +184,7 @@ fn ready<T, E>(result: nb::Result<T, E>) -> Result<Option<T>, E> {
     }
 }
 
-/// A controller's frame as the protocol sees it.
+/// A controller's frame as a frame of the protocol.
 pub fn from_can(frame: &impl Frame) -> CanFrame {
     let (id, extended) = raw(frame.id());
     if frame.is_remote_frame() {
@@ -192,7 +194,7 @@ pub fn from_can(frame: &impl Frame) -> CanFrame {
     }
 }
 
-/// A frame of the protocol as a controller takes it; `None` where the controller has no such frames.
+/// A frame of the protocol as a controller's frame; `None` if the controller has no such frames.
 pub fn to_can<F: Frame>(frame: &CanFrame) -> Option<F> {
     if frame.is_remote() {
         F::new_remote(id(frame), usize::from(frame.len()))
@@ -210,7 +212,7 @@ pub(crate) fn raw(id: Id) -> (u32, bool) {
 }
 
 pub(crate) fn id(frame: &CanFrame) -> Id {
-    // A CanFrame's identifier always has as many bits as it may have.
+    // A CanFrame's identifier always has a valid number of bits.
     if frame.is_extended() {
         Id::Extended(ExtendedId::new(frame.id()).unwrap_or(ExtendedId::MAX))
     } else {

@@ -1,5 +1,5 @@
-//! A UART that speaks slcan as a CAN controller, for boards without one, and for boards that are
-//! themselves a CAN adapter.
+//! A UART with the slcan protocol as a CAN controller. For boards without a controller, and for
+//! boards that are CAN adapters themselves.
 
 use embedded_can::nb::Can;
 use embedded_can::{ErrorKind, Id};
@@ -10,11 +10,11 @@ use motorlink_slcan::Device;
 
 use crate::rmd::{self, raw};
 
-/// Bytes that a call of [`receive`](Can::receive) looks at before it says that there is no frame.
+/// Maximum number of bytes that one call of [`receive`](Can::receive) reads.
 const MOST: usize = 32;
 
-/// The adapter's end of slcan on a UART: what its host sends is received, what is transmitted goes
-/// to its host, once that has opened the channel.
+/// The adapter's end of slcan on a UART. Frames from its host are received; transmitted frames go
+/// to its host, after the host opened the channel.
 #[derive(Debug)]
 pub struct Adapter<U> {
     uart: U,
@@ -60,20 +60,20 @@ impl<U: Read + Write + ReadReady> Can for Adapter<U> {
     type Frame = Frame;
     type Error = Error<U::Error>;
 
-    /// Blocks until the UART has taken the frame's line. While the channel is closed frames go
-    /// nowhere, as on a bus to which nobody listens.
+    /// Blocks until the UART has accepted the frame's line. While the channel is closed, frames are
+    /// dropped.
     fn transmit(&mut self, frame: &Frame) -> nb::Result<Option<Frame>, Self::Error> {
         let mut sent = Ok(());
         self.device.deliver(self.now, &frame.0, |line| sent = self.uart.write_all(line));
         sent.map(|()| None).map_err(|error| nb::Error::Other(Error(error)))
     }
 
-    /// A line in which the UART lost bytes is refused when it ends.
+    /// A line with bytes lost by the UART is refused at its end.
     fn receive(&mut self) -> nb::Result<Frame, Self::Error> {
         match self.next() {
             Ok(frame) => frame.map(Frame).ok_or(nb::Error::WouldBlock),
             Err(error) => {
-                // A byte that is in no line.
+                // A byte that is not valid in any line.
                 self.device.receive(0, |_| {});
                 Err(nb::Error::Other(Error(error)))
             }

@@ -1,17 +1,17 @@
 //! ST's Motor Control Protocol on a UART.
 //!
-//! Reading never blocks: a port reads only what [`ReadReady`] says is there. Writing blocks until
-//! the UART has taken the bytes, as `embedded_io` has it; a UART with a buffer of 131 bytes takes the
+//! Reading never blocks: a port reads only when [`ReadReady`] is true. Writing blocks until the
+//! UART has accepted the bytes, as in `embedded_io`. A UART with a buffer of 131 bytes accepts the
 //! longest frame at once.
 
 use embedded_io::{Read, ReadReady, Write};
 use motorlink_proto::st::{ExchangeError, Master, MotorControl, Output, Slave};
 use motorlink_proto::time::Instant;
 
-/// Bytes that are read at once.
+/// Number of bytes per read.
 const CHUNK: usize = 32;
 
-/// A drive's end on a UART.
+/// A slave on a UART.
 #[derive(Debug)]
 pub struct SlavePort<U> {
     uart: U,
@@ -24,14 +24,14 @@ impl<U: Read + Write + ReadReady> SlavePort<U> {
         SlavePort { uart, slave }
     }
 
-    /// Takes what has come, at most 32 bytes, lets `drive` work, answers; gives the NACK TIMEOUT for
-    /// a command that did not come whole. Returns when to be called again at the latest: `now` when
-    /// more has come already, `None` when there is nothing to wait for but bytes.
+    /// Reads at most 32 received bytes, calls `drive`, replies. Sends the NACK TIMEOUT for a
+    /// command that was not complete in time. Returns when to call it again at the latest: `now` if
+    /// more bytes were received already, `None` to wait only for bytes.
     ///
     /// # Errors
-    /// Those of the UART. One in reading means that bytes were lost (overrun, framing, noise): the
-    /// command under way is dropped and answered with the NACK OVERRUN (table 2) before the error is
-    /// returned, and the port goes on with the next call.
+    /// Errors of the UART. A read error means lost bytes (overrun, framing, noise): the current
+    /// command is dropped and answered with the NACK OVERRUN (table 2), then the error is returned.
+    /// The next call continues.
     pub fn poll(
         &mut self,
         now: Instant,
@@ -57,7 +57,7 @@ impl<U: Read + Write + ReadReady> SlavePort<U> {
         Ok(if self.uart.read_ready()? { Some(now) } else { self.slave.deadline() })
     }
 
-    /// The slave: its profile, the motor that it talks for.
+    /// The slave, with its profile and its current motor.
     pub const fn slave(&self) -> &Slave {
         &self.slave
     }
@@ -68,39 +68,41 @@ impl<U: Read + Write + ReadReady> SlavePort<U> {
     }
 }
 
-/// What [`MasterPort::poll`] tells.
+/// The result of [`MasterPort::poll`].
 #[derive(Debug, PartialEq, Eq)]
 pub enum Event<'a> {
-    /// The exchange is over: the payload of the positive acknowledge, or why there is none.
+    /// The exchange is over: the payload of the positive acknowledge, or the error.
     Done(Result<&'a [u8], ExchangeError>),
-    /// Nothing yet. Call again when a byte comes, or then; `None` while no exchange is under way.
+    /// No result yet. Call again when a byte comes, or at this time; `None` without an open
+    /// exchange.
     Wait(Option<Instant>),
 }
 
-/// The end on a UART that commands a drive.
+/// A master on a UART.
 #[derive(Debug)]
 pub struct MasterPort<U> {
     uart: U,
     master: Master,
-    /// Something was sent since the last call.
+    /// Whether bytes were sent since the last call.
     sent: bool,
 }
 
 impl<U: Read + Write + ReadReady> MasterPort<U> {
-    /// Puts `master` on a UART. A new master brings the line in step before its first request, which
-    /// takes two silences; [`Master::trust_line`] skips that on a board that starts with its drive.
+    /// Puts `master` on a UART. A new master recovers the line before its first request, which
+    /// takes two silences. If the board starts together with its drive, call [`Master::trust_line`]
+    /// to avoid this.
     pub const fn new(uart: U, master: Master) -> Self {
         MasterPort { uart, master, sent: false }
     }
 
-    /// Takes what has come, at most 32 bytes, and sends what is due.
+    /// Reads at most 32 received bytes, and sends bytes that are due.
     ///
     /// # Errors
-    /// Those of the UART. The exchange goes on: where a reply's bytes were lost it ends at its
+    /// Errors of the UART. The exchange continues. If bytes of its reply were lost, it ends at its
     /// timeout, and the line recovers before the next one.
     pub fn poll(&mut self, now: Instant) -> Result<Event<'_>, U::Error> {
         if core::mem::take(&mut self.sent) {
-            // The reply's time runs from here on.
+            // The timeout of the reply starts here.
             self.master.poll(now);
         }
         let mut chunk = [0; CHUNK];
@@ -120,19 +122,19 @@ impl<U: Read + Write + ReadReady> MasterPort<U> {
         }
     }
 
-    /// The master, to begin exchanges.
+    /// The master, to start exchanges.
     pub const fn master_mut(&mut self) -> &mut Master {
         &mut self.master
     }
 
-    /// The UART, to configure it. One that was set to another baud rate or connected to another drive
-    /// calls for [`Master::reopened`].
+    /// The UART, for configuration. After a change of the baud rate or of the connected drive, call
+    /// [`Master::reopened`].
     pub const fn uart_mut(&mut self) -> &mut U {
         &mut self.uart
     }
 }
 
-/// What has come, as far as it fits; nothing when nothing has.
+/// Received bytes that fit into the buffer; empty if there are none.
 fn read_some<'a, U: Read + ReadReady>(
     uart: &mut U,
     room: &'a mut [u8; CHUNK],

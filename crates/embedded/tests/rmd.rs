@@ -48,12 +48,12 @@ impl embedded_can::Frame for Frame {
 
 type Queue = Rc<RefCell<VecDeque<Frame>>>;
 
-/// A controller with one mailbox to send from.
+/// A controller with one transmit mailbox.
 struct Controller {
     received: Queue,
     other: Queue,
     mailbox: Option<Frame>,
-    /// Nobody acknowledges: what is in the mailbox stays there.
+    /// No node acknowledges: the frame in the mailbox stays there.
     stuck: bool,
     failing: Option<ErrorKind>,
 }
@@ -114,7 +114,7 @@ impl Pair {
         bench
     }
 
-    /// With a bus on which a former host may have asked something.
+    /// On a bus where former hosts may have sent requests.
     fn opened() -> Self {
         let (ours, theirs) = bus();
         let configs = [1, 2].map(RmdConfig::with_id);
@@ -135,7 +135,7 @@ impl Pair {
         asked.expect("the motor is trusted");
     }
 
-    /// Both ends, and the bus between them, until no exchange is under way.
+    /// Runs both ends and the bus until no exchange is open.
     fn run(&mut self) -> Vec<(MotorId, Result<[u8; 8], Failure>)> {
         let mut results = Vec::new();
         loop {
@@ -168,7 +168,7 @@ fn a_host_behind_one_controller_commands_drives_behind_another() {
 }
 
 #[test]
-fn motors_that_were_not_asked_before_are_trusted_after_a_silence() {
+fn new_motors_are_trusted_after_a_silence() {
     let mut bench = Pair::opened();
     for number in [1, 2] {
         bench.ask(number, &SetSpeed { speed: CentiDps(36_000) });
@@ -206,7 +206,7 @@ fn a_frame_that_is_displaced_is_sent_later() {
 }
 
 #[test]
-fn an_exchange_that_the_bus_does_not_take_times_out() {
+fn a_frame_that_the_bus_does_not_accept_times_out() {
     let mut bench = Pair::new();
     bench.host.can_mut().stuck = true;
     bench.ask(1, &ReadStatus);
@@ -219,7 +219,7 @@ fn an_exchange_that_the_bus_does_not_take_times_out() {
 }
 
 #[test]
-fn drives_whose_replies_are_not_taken_read_no_further_frames() {
+fn drives_with_queued_replies_read_no_further_frames() {
     let mut bench = Pair::new();
     bench.drives.can_mut().stuck = true;
     let ask = |bench: &mut Pair, number: u8| {
@@ -261,7 +261,7 @@ fn the_shutdown_time_runs_on_a_bus_that_fails() {
 }
 
 #[test]
-fn frames_of_every_kind_cross_both_ways() {
+fn frames_of_every_kind_are_transmitted_in_both_directions() {
     let extended = Id::Extended(ExtendedId::new(0x1ABC_DEF0).expect("29 bits"));
     let standard = Id::Standard(StandardId::new(0x7FF).expect("11 bits"));
     for frame in [

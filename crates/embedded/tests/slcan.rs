@@ -46,7 +46,7 @@ impl Pair {
 }
 
 #[test]
-fn a_host_opens_the_channel_and_asks_the_drive() {
+fn a_host_opens_the_channel_and_gets_a_reply() {
     let mut bench = Pair::new();
     bench.say("t14189C00000000000000\r");
     bench.serve().unwrap();
@@ -61,7 +61,7 @@ fn a_host_opens_the_channel_and_asks_the_drive() {
 }
 
 #[test]
-fn a_line_in_which_bytes_were_lost_is_refused_and_the_next_is_understood() {
+fn a_line_with_lost_bytes_is_refused_and_the_next_is_read() {
     let mut bench = Pair::new();
     bench.say("O\rt14188");
     bench.serve().unwrap();
@@ -74,7 +74,7 @@ fn a_line_in_which_bytes_were_lost_is_refused_and_the_next_is_understood() {
 }
 
 #[test]
-fn its_frames_are_those_of_the_protocol() {
+fn frames_are_converted_from_and_to_the_protocol() {
     for frame in [
         CanFrame::new(0x141, [1, 2, 3, 4, 5, 6, 7, 8]),
         CanFrame::data_frame(0x1ABC_DEF0, true, &[1, 2, 3]),

@@ -26,7 +26,7 @@ impl Pair {
         bench
     }
 
-    /// With a line on which a former master may have asked something.
+    /// On a line where a former master may have sent requests.
     fn opened() -> Self {
         let (ours, theirs) = line();
         let drive = StDrive::demo(Instant(0));
@@ -49,7 +49,7 @@ impl Pair {
         }
     }
 
-    /// Both ends until the exchange is over; time passes where both wait.
+    /// Runs both ends until the exchange is over. Time advances when both wait.
     fn exchange(&mut self) -> Result<Vec<u8>, ExchangeError> {
         loop {
             let served = self.serve();
@@ -68,7 +68,7 @@ impl Pair {
         self.exchange()
     }
 
-    /// What the slave has sent, taken off the line.
+    /// Takes the bytes that the slave has sent.
     fn sent(&mut self) -> Vec<u8> {
         let mut sent = self.master.uart_mut().received.borrow_mut();
         sent.drain(..).map(|byte| byte.expect("a byte")).collect()
@@ -84,11 +84,11 @@ fn a_master_behind_one_uart_commands_a_drive_behind_another() {
     assert_eq!(bench.ask(Request::GetBoardInfo).map(|info| info.len()), Ok(32));
     let unknown = bench.ask(Request::GetRegister(RegisterId(0xEE)));
     assert_eq!(unknown, Err(ExchangeError::Refused(ErrorCode::GetWriteOnly)));
-    assert_eq!(bench.now, Instant(0), "nothing had to be waited for");
+    assert_eq!(bench.now, Instant(0), "no wait was needed");
 }
 
 #[test]
-fn a_line_that_was_just_opened_costs_two_silences() {
+fn a_just_opened_line_needs_two_silences() {
     let mut bench = Pair::opened();
     assert_eq!(bench.ask(Request::GetBoardInfo).map(|info| info.len()), Ok(32));
     let quiet = MasterConfig::default().quiet;
@@ -96,9 +96,9 @@ fn a_line_that_was_just_opened_costs_two_silences() {
 }
 
 #[test]
-fn a_command_that_does_not_come_whole_is_answered_when_its_time_is_over() {
+fn an_incomplete_command_is_answered_after_its_timeout() {
     let mut bench = Pair::new();
-    assert_eq!(bench.serve(), None, "an idle line waits for bytes alone");
+    assert_eq!(bench.serve(), None, "an idle line waits only for bytes");
     bench.master.uart_mut().write_all(&[0x22, 0x01]).unwrap();
     let deadline = bench.serve().expect("a command is under way");
     assert_eq!(deadline, Instant(25_000));
@@ -109,7 +109,7 @@ fn a_command_that_does_not_come_whole_is_answered_when_its_time_is_over() {
 }
 
 #[test]
-fn lost_bytes_are_answered_with_overrun_and_the_next_command_is_understood() {
+fn lost_bytes_are_answered_with_overrun_and_the_next_command_is_executed() {
     let mut bench = Pair::new();
     bench.master.uart_mut().write_all(&[0x22, 0x01]).unwrap();
     bench.serve();
@@ -128,7 +128,7 @@ fn a_call_does_a_bounded_amount_of_work_on_a_line_full_of_garbage() {
 }
 
 #[test]
-fn a_drive_that_is_silent_costs_the_timeout_and_the_line_recovers() {
+fn a_silent_drive_times_out_and_the_line_recovers() {
     let mut bench = Pair::new();
     bench.master.master_mut().request(1, &Request::GetBoardInfo).unwrap();
     let Ok(Event::Wait(Some(_))) = bench.master.poll(bench.now) else { panic!("sent") };
@@ -139,7 +139,7 @@ fn a_drive_that_is_silent_costs_the_timeout_and_the_line_recovers() {
 }
 
 #[test]
-fn bytes_of_a_reply_that_are_lost_end_the_exchange_and_not_the_port() {
+fn lost_bytes_of_a_reply_end_the_exchange_but_not_the_port() {
     let mut bench = Pair::new();
     bench.master.master_mut().request(1, &Request::GetBoardInfo).unwrap();
     bench.master.poll(bench.now).expect("sent");
@@ -147,6 +147,6 @@ fn bytes_of_a_reply_that_are_lost_end_the_exchange_and_not_the_port() {
     assert_eq!(bench.master.poll(bench.now), Err(ErrorKind::Other));
     bench.serve();
     bench.master.uart_mut().received.borrow_mut().drain(..10);
-    assert!(bench.exchange().is_err(), "half a reply is none");
+    assert!(bench.exchange().is_err(), "a partial reply is not a reply");
     assert_eq!(bench.ask(Request::GetBoardInfo).map(|info| info.len()), Ok(32));
 }

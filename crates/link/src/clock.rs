@@ -1,21 +1,21 @@
-//! Time that follows the machine's, or stands still until somebody waits.
+//! A clock that follows the machine's clock, or a virtual one that advances only during waits.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration as Span, Instant as Moment};
 
 use motorlink_proto::time::{Instant, Micros};
 
-/// A clock that begins at 0 when it is made. Clones of it are the same clock.
+/// A clock that starts at 0. Clones share the same clock.
 ///
-/// A running clock follows the machine's. One that stands is virtual time: it moves to the end of
-/// whatever is waited for, and the wait is over at once.
+/// A running clock follows the machine's clock. A virtual clock advances immediately to the end of
+/// each wait.
 #[derive(Debug, Clone)]
 pub struct Clock(Arc<Mutex<Pace>>);
 
 #[derive(Debug, Clone, Copy)]
 enum Pace {
     Running { since: Moment, from: Instant },
-    Standing(Instant),
+    Virtual(Instant),
 }
 
 impl Default for Clock {
@@ -25,42 +25,42 @@ impl Default for Clock {
 }
 
 impl Clock {
-    /// A clock that runs.
+    /// A clock that follows the machine's clock.
     pub fn running() -> Self {
         let pace = Pace::Running { since: Moment::now(), from: Instant(0) };
         Clock(Arc::new(Mutex::new(pace)))
     }
 
-    /// A clock that stands still.
-    pub fn standing() -> Self {
-        Clock(Arc::new(Mutex::new(Pace::Standing(Instant(0)))))
+    /// A virtual clock.
+    pub fn virtual_time() -> Self {
+        Clock(Arc::new(Mutex::new(Pace::Virtual(Instant(0)))))
     }
 
-    /// The time that it shows.
+    /// The current time.
     pub fn now(&self) -> Instant {
         self.lock().now()
     }
 
-    /// Whether it stands still.
-    pub fn stands(&self) -> bool {
-        matches!(*self.lock(), Pace::Standing(_))
+    /// Whether the clock is virtual, or held.
+    pub fn is_virtual(&self) -> bool {
+        matches!(*self.lock(), Pace::Virtual(_))
     }
 
-    /// Lets it stand still, or run on, from the time that it shows.
+    /// Holds the clock at its current time, or lets it run from there.
     pub fn hold(&self, held: bool) {
         let mut pace = self.lock();
         *pace = match (held, *pace) {
-            (true, running @ Pace::Running { .. }) => Pace::Standing(running.now()),
-            (false, Pace::Standing(from)) => Pace::Running { since: Moment::now(), from },
+            (true, running @ Pace::Running { .. }) => Pace::Virtual(running.now()),
+            (false, Pace::Virtual(from)) => Pace::Running { since: Moment::now(), from },
             (_, same) => same,
         };
     }
 
-    /// Returns when it shows `until`: sleeps, or moves it there.
+    /// Waits until `until`. A virtual clock advances to it at once.
     pub fn wait(&self, until: Instant) {
         let left = {
             let mut pace = self.lock();
-            if let Pace::Standing(now) = &mut *pace {
+            if let Pace::Virtual(now) = &mut *pace {
                 *now = until.max(*now);
                 return;
             }
@@ -69,12 +69,12 @@ impl Clock {
         std::thread::sleep(left.into());
     }
 
-    /// The end of a wait that begins now; `None` is without limit.
+    /// The end of a wait that starts now; `None` means no limit.
     pub(crate) fn end_of(&self, timeout: Option<Span>) -> Option<Instant> {
         timeout.map(|timeout| self.now() + timeout.into())
     }
 
-    /// What is left until [`end_of`](Self::end_of) a wait: `None` is without limit, zero is over.
+    /// The time left of a wait: `None` means no limit, zero means it is over.
     pub(crate) fn left(&self, end: Option<Instant>) -> Option<Span> {
         end.map(|end| end.since(self.now()).into())
     }
@@ -88,7 +88,7 @@ impl Clock {
     }
 }
 
-/// A clock as long as somebody else has it.
+/// A reference to a clock that does not keep it alive.
 #[derive(Debug)]
 pub(crate) struct WeakClock(Weak<Mutex<Pace>>);
 
@@ -102,7 +102,7 @@ impl Pace {
     fn now(self) -> Instant {
         match self {
             Pace::Running { since, from } => from + Micros::from(since.elapsed()),
-            Pace::Standing(now) => now,
+            Pace::Virtual(now) => now,
         }
     }
 }
@@ -112,17 +112,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_clock_that_stands_moves_to_the_end_of_a_wait_and_never_back() {
-        let clock = Clock::standing();
+    fn a_virtual_clock_advances_to_the_end_of_a_wait() {
+        let clock = Clock::virtual_time();
         let same = clock.clone();
         clock.wait(Instant(3_600_000_000));
         clock.wait(Instant(1));
         assert_eq!(same.now(), Instant(3_600_000_000));
-        assert!(same.stands());
+        assert!(same.is_virtual());
     }
 
     #[test]
-    fn a_clock_goes_on_from_where_it_was_held() {
+    fn a_clock_continues_from_where_it_was_held() {
         let clock = Clock::running();
         clock.wait(Instant(1_000));
         clock.hold(true);
@@ -134,6 +134,6 @@ mod tests {
         clock.hold(false);
         clock.wait(Instant(60_001_000));
         assert!(clock.now() >= Instant(60_001_000));
-        assert!(!clock.stands());
+        assert!(!clock.is_virtual());
     }
 }

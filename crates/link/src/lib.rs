@@ -1,9 +1,17 @@
-//! Lines that carry bytes or CAN frames: opened by name, served to others, lost and opened again.
+//! Serial lines and CAN buses: opened by name, served to other programs, reopened after a failure.
 //!
-//! [`port`] opens serial lines and CAN buses; a [`Scheme`](port::Scheme) is one kind of them.
-//! [`serve`] is the other side of a line, for drives; [`list`] says what this machine has; [`fault`]
-//! makes a line misbehave; [`reopening`] keeps one that may go away. No protocol of a drive is
-//! known here.
+//! | to | use |
+//! |---|---|
+//! | open a serial line or a CAN bus by name | [`port::PortName`] |
+//! | add a kind of port | [`port::Scheme`], [`port::register`] |
+//! | list the ports of this machine | [`list::ports`] |
+//! | serve a simulated drive on a pty, a socket or a CAN interface | [`serve::Server`] |
+//! | reopen a port after a failure, with back-off | [`reopening::Reopening`] |
+//! | inject faults into a line | [`fault::Faults`], [`port::FaultBytes`], [`port::FaultCan`] |
+//! | observe the traffic of a port | [`port::TapBytes`], [`port::TapCan`] |
+//! | run on virtual time | [`clock::Clock`] |
+//!
+//! This crate knows no protocol of a drive.
 #![forbid(unsafe_code)]
 
 mod clock;

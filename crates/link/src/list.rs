@@ -1,4 +1,4 @@
-//! What ports a machine has, and what could be wrong with them.
+//! The ports of this machine, and their problems.
 
 use std::path::Path;
 
@@ -6,8 +6,8 @@ use crate::port::schemes;
 
 pub use crate::port::PortInfo;
 
-/// The ports of this machine that a scheme can find, by name. No port is opened: that would reset
-/// some boards.
+/// The ports of this machine that a scheme can find, sorted by name. No port is opened, because
+/// that would reset some boards.
 pub fn ports() -> Vec<PortInfo> {
     ports_below(Path::new("/"))
 }

@@ -1,4 +1,4 @@
-//! A port that may go away and come back: explicit state, back-off with a cap, one clock.
+//! A port that is reopened after a failure: explicit state, capped back-off, one clock.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -8,22 +8,22 @@ use motorlink_proto::time::Instant as Moment;
 use crate::clock::Clock;
 use crate::port::PortError;
 
-/// Opens the port, again and again if it must.
+/// Opens the port. May be called repeatedly.
 pub type Opener<L> = Box<dyn FnMut() -> Result<L, PortError> + Send>;
 
-/// What a port is at the moment.
+/// The state of a port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinkState {
     /// Open.
     Open,
-    /// Closed; the next call opens it, unless it comes before `retry_in` has passed.
+    /// Closed. The next call opens it, unless `retry_in` has not passed.
     Closed {
-        /// What is left of the back-off.
+        /// The rest of the back-off.
         retry_in: Duration,
     },
 }
 
-/// A [`LinkState`] to look at while the port itself is in use, or being opened.
+/// Shows the [`LinkState`] while the port itself is in use or being opened.
 #[derive(Clone)]
 pub struct LinkSign(Arc<Mutex<Shown>>);
 
@@ -34,7 +34,7 @@ enum Shown {
 }
 
 impl LinkSign {
-    /// What the port is now.
+    /// The current state of the port.
     pub fn state(&self) -> LinkState {
         match *self.0.lock().unwrap_or_else(PoisonError::into_inner) {
             Shown::Open => LinkState::Open,
@@ -50,15 +50,15 @@ impl LinkSign {
     }
 }
 
-/// How soon a port that does not take everything at once is offered the rest.
+/// Retry interval of a port that did not accept all data.
 pub const FULL: Duration = Duration::from_millis(1);
 
-/// How long to wait between attempts to open a port that went away.
+/// Back-off: the waits between attempts to reopen a port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BackOff {
-    /// Wait after the first failed attempt; it doubles with each further one.
+    /// Wait after the first failed attempt. It doubles after each further one.
     pub first: Duration,
-    /// The longest wait.
+    /// Maximum wait.
     pub cap: Duration,
 }
 
@@ -69,33 +69,33 @@ impl Default for BackOff {
     }
 }
 
-/// A link with the means to open it anew.
+/// A link that can be reopened.
 pub struct Reopening<L> {
-    /// What messages call the port.
+    /// The name of the port in messages.
     pub name: Arc<str>,
     link: Option<L>,
     open: Option<Opener<L>>,
     back_off: BackOff,
     wait: Duration,
     not_before: Instant,
-    /// What the last attempt said.
+    /// The error of the last attempt.
     trouble: String,
     clock: Clock,
     sign: LinkSign,
 }
 
 impl<L> Reopening<L> {
-    /// Opens the port; the first attempt has to succeed.
+    /// Opens the port. The first attempt must succeed.
     pub fn open(name: &str, mut open: Opener<L>, back_off: BackOff) -> Result<Self, PortError> {
         let link = open()?;
         Ok(Reopening { open: Some(open), back_off, ..Self::over(name, link) })
     }
 
-    /// A link that is not opened again when it closes.
+    /// A link that is not reopened after it closes.
     pub fn over(name: &str, link: L) -> Self {
         let now = Instant::now();
         Reopening {
-            // `sim:` before a colon reads badly.
+            // Removes the colon of `sim:`, because messages add their own.
             name: name.trim_end_matches(':').into(),
             link: Some(link),
             open: None,
@@ -108,7 +108,7 @@ impl<L> Reopening<L> {
         }
     }
 
-    /// Goes by the clock of the link, if it has one, which those that take its place share.
+    /// Uses the clock of the link, if it has one. Reopened links share it.
     pub fn by(mut self, clock: impl FnOnce(&L) -> Option<Clock>) -> Self {
         if let Some(clock) = self.link.as_ref().and_then(clock) {
             self.clock = clock;
@@ -116,32 +116,32 @@ impl<L> Reopening<L> {
         self
     }
 
-    /// The clock that the port goes by.
+    /// The clock of the port.
     pub fn clock(&self) -> Clock {
         self.clock.clone()
     }
 
-    /// The time for the sans-IO machines.
+    /// The time for the sans-IO state machines.
     pub fn now(&self) -> Moment {
         self.clock.now()
     }
 
-    /// Shows whether the port is open, from now on.
+    /// A view of the port's state.
     pub fn sign(&self) -> LinkSign {
         self.sign.clone()
     }
 
-    /// The link if it is open.
+    /// The link, if it is open.
     pub fn open_link(&self) -> Option<&L> {
         self.link.as_ref()
     }
 
-    /// The link if it is open, to use.
+    /// The link, if it is open, mutable.
     pub fn open_link_mut(&mut self) -> Option<&mut L> {
         self.link.as_mut()
     }
 
-    /// The open link, and whether this call had to open it.
+    /// The open link, and whether this call opened it.
     pub fn link(&mut self) -> Result<(&mut L, bool), PortError> {
         let mut reopened = false;
         if self.link.is_none() {
@@ -169,7 +169,7 @@ impl<L> Reopening<L> {
         Ok((link.ok_or_else(|| PortError::Closed { port: name.to_string() })?, reopened))
     }
 
-    /// Closes the link; the next call may open it at once.
+    /// Closes the link. The next call may open it at once.
     pub fn close(&mut self) {
         self.link = None;
         self.closed_until(Instant::now());
@@ -188,7 +188,7 @@ impl<L> Reopening<L> {
 }
 
 impl<L: 'static> Reopening<L> {
-    /// The same port with its links in another form.
+    /// The same port, with another type of link.
     pub fn map<M: 'static>(self, form: fn(L) -> M) -> Reopening<M> {
         let Reopening { name, link, open, back_off, wait, not_before, trouble, clock, sign } = self;
         let link = link.map(form);
@@ -202,7 +202,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn until_the_next_attempt_the_last_one_is_told() {
+    fn until_the_next_attempt_the_last_error_is_returned() {
         let mut attempts = 0;
         let open: Opener<()> = Box::new(move || {
             attempts += 1;

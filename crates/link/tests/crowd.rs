@@ -1,4 +1,4 @@
-//! Many clients that write as fast as they can to one served CAN bus.
+//! Many clients that send at full speed to one served CAN bus.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -9,14 +9,14 @@ use motorlink_link::serve::{MOST_CLIENTS, Server, Station};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
-/// Listens, and says nothing.
+/// Receives, and sends nothing.
 struct Silent;
 
 impl Station<CanFrame> for Silent {
     fn receive(&mut self, _: Instant, _: &[CanFrame], _: &mut Vec<CanFrame>) {}
 }
 
-/// The most memory that this process ever had, KiB.
+/// Peak memory of this process, KiB.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").expect("this system tells");
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).expect("a peak");
@@ -24,7 +24,7 @@ fn peak() -> u64 {
 }
 
 #[test]
-fn a_crowd_that_floods_a_bus_takes_little_memory_and_has_a_bound() {
+fn many_clients_that_flood_a_bus_use_little_memory() {
     let name: ServeName = "tcp-listen:127.0.0.1:0".parse().expect("a name");
     let mut server = Server::new();
     let address = server.serve_can(&name, Box::new(Silent)).expect("served").path;
@@ -42,7 +42,7 @@ fn a_crowd_that_floods_a_bus_takes_little_memory_and_has_a_bound() {
 
     let flood = [&b"O\r"[..], &b"t14189C00000000000000\r".repeat(1000)].concat();
     for client in &mut crowd {
-        // What the kernel does not take, and those who were closed, do not matter.
+        // Bytes that the kernel does not accept, and closed clients, do not matter.
         let _ = client.write(&flood);
     }
     let before = peak();

@@ -1,5 +1,5 @@
-//! A served port when the process has no descriptors left. A process of its own: the limit holds for
-//! all of it.
+//! A served port while the process has no free descriptors. It is its own process, because the
+//! limit applies to the whole process.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -19,7 +19,7 @@ impl Station<u8> for Echo {
 }
 
 #[test]
-fn without_descriptors_a_newcomer_waits_and_the_server_does_not_spin() {
+fn without_free_descriptors_a_client_waits_and_the_server_does_not_spin() {
     let mut server = Server::new();
     let name = "tcp-listen:127.0.0.1:0".parse().expect("a name");
     let served = server.serve_bytes(&name, Box::new(Echo)).expect("served");

@@ -53,7 +53,7 @@ fn a_stop_from_within_a_wait_is_sent_at_once_and_the_wait_ends() {
     in_time(move || {
         let error = client.get().unwrap().motor(1).unwrap().start().expect_err("it was given up");
         assert!(matches!(error, st::Error::Port(PortError::Overtaken { .. })), "{error}");
-        assert!(error.to_string().contains("nobody knows what the drive did"), "{error}");
+        assert!(error.to_string().contains("what the drive did is unknown"), "{error}");
         assert!(!error.is_line_failure());
     });
     assert_eq!(sent.sent(), [START, STOP].concat());

@@ -28,7 +28,7 @@ struct Motors {
 
 impl Motors {
     fn new(is_shared: bool) -> Self {
-        let clock = Clock::standing();
+        let clock = Clock::virtual_time();
         Motors { clock, sent: Arc::default(), coming: Arc::default(), is_shared, twice: None }
     }
 

@@ -1,4 +1,4 @@
-//! The adapter's end of slcan: what a host asks for.
+//! The adapter's end of slcan.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
@@ -7,13 +7,13 @@ use super::{
     BEL, Bitrate, CR, LONGEST_FRAME, LONGEST_LINE, TextLine, Writer, decode, encode, is_hex,
 };
 
-/// Timestamps count milliseconds and start again after a minute.
+/// Timestamps count milliseconds and restart after a minute.
 const TIMESTAMP_PERIOD_MS: u64 = 60_000;
 
-/// A CAN adapter as a host sees it.
+/// A CAN adapter.
 ///
-/// It takes every bitrate (nothing here depends on it) and lets every frame through: acceptance
-/// codes and masks are taken and have no effect.
+/// It accepts every bitrate, because nothing here depends on it, and passes every frame: acceptance
+/// codes and masks are accepted without effect.
 #[derive(Debug, Default)]
 pub struct Device {
     line: TextLine,
@@ -30,8 +30,8 @@ enum Channel {
 }
 
 impl Device {
-    /// Takes a byte from the host. The answer to a line goes to `reply` in one piece; a frame that
-    /// the host sends to the bus is returned.
+    /// Takes a byte from the host. `reply` gets the whole answer to a line. Returns a frame that
+    /// the host sends to the bus.
     pub fn receive(&mut self, byte: u8, reply: impl FnOnce(&[u8])) -> Option<CanFrame> {
         match byte {
             CR => {}
@@ -50,12 +50,12 @@ impl Device {
         frame
     }
 
-    /// Drops a line that its host began and did not end, so that the next host does not end it.
+    /// Drops an incomplete line of its host, so that the next host does not complete it.
     pub fn forget_line(&mut self) {
         self.line = TextLine::default();
     }
 
-    /// Does what `line` says; nothing when it is refused.
+    /// Executes `line`; `None` if it is refused.
     fn obey(&mut self, line: &[u8]) -> Option<Outcome> {
         let Some((&command, arguments)) = line.split_first() else { return Some(Outcome::DONE) };
         let closed = self.channel == Channel::Closed;
@@ -67,7 +67,7 @@ impl Device {
                 return sendable.then_some(Outcome { answer, frame: Some(frame) });
             }
             (b'C', []) => self.channel = Channel::Closed,
-            // Some hosts open twice and expect no complaint.
+            // Some hosts open the channel twice and expect no refusal.
             (b'O', []) => self.channel = Channel::Open,
             (b'L', []) => self.channel = Channel::ListenOnly,
             (b'S', &[digit]) if closed => {
@@ -85,7 +85,7 @@ impl Device {
         Some(Outcome::DONE)
     }
 
-    /// Hands a frame from the bus to `reply` as a line, when the host has opened the channel.
+    /// Passes a frame from the bus to `reply` as a line, if the host has opened the channel.
     pub fn deliver(&self, now: Instant, frame: &CanFrame, reply: impl FnOnce(&[u8])) {
         if self.channel == Channel::Closed {
             return;
@@ -104,7 +104,7 @@ impl Device {
     }
 }
 
-/// A line that is obeyed: what is said, CR included, and the frame for the bus.
+/// An executed line: the answer with its CR, and the frame for the bus.
 struct Outcome {
     answer: &'static [u8],
     frame: Option<CanFrame>,

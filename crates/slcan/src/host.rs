@@ -1,26 +1,26 @@
-//! The host's end of slcan: what an adapter says.
+//! The host's end of slcan.
 
 use motorlink_proto::can::CanFrame;
 
 use super::{BEL, CR, TextLine, decode, is_hex};
 
-/// Bytes of one read that wait to be looked at: some twenty frames.
+/// Size of the receive buffer: about twenty frames.
 const BUFFERED: usize = 512;
 
-/// One thing that an adapter said.
+/// An answer of an adapter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
-    /// A frame came from the bus.
+    /// A frame from the bus.
     Frame(CanFrame),
-    /// A command or a frame was taken.
+    /// A command or a frame was accepted.
     Done,
     /// A command or a frame was refused.
     Refused,
-    /// The answer to a question about version, serial number or status.
+    /// The version, the serial number or the status.
     Info,
 }
 
-/// Takes an adapter's bytes apart, one at a time. A line that is no answer is counted and left out.
+/// Parses an adapter's bytes one at a time. Invalid lines are counted and skipped.
 #[derive(Debug, Default)]
 pub struct AnswerParser {
     line: TextLine,
@@ -28,7 +28,7 @@ pub struct AnswerParser {
 }
 
 impl AnswerParser {
-    /// Takes a byte; gives the answer that it completes.
+    /// Takes a byte. Returns the answer that it completes.
     pub fn receive(&mut self, byte: u8) -> Option<Answer> {
         match byte {
             CR => {
@@ -50,21 +50,21 @@ impl AnswerParser {
         }
     }
 
-    /// How many lines were no answer.
+    /// Number of invalid lines.
     pub fn garbage(&self) -> u64 {
         self.garbage
     }
 
-    /// Whether a line has begun and not ended.
+    /// Whether a line is incomplete.
     pub fn is_mid_line(&self) -> bool {
         !self.line.is_empty()
     }
 }
 
-/// An [`AnswerParser`] with room for what a port reads at once.
+/// An [`AnswerParser`] with a receive buffer.
 ///
-/// Bytes go in through [`spare`](Self::spare) and [`filled`](Self::filled), so that a port reads
-/// straight into the codec.
+/// Bytes are put in with [`spare`](Self::spare) and [`filled`](Self::filled), so a port reads
+/// directly into the codec.
 #[derive(Debug)]
 pub struct HostCodec {
     buffer: [u8; BUFFERED],
@@ -80,7 +80,7 @@ impl Default for HostCodec {
 }
 
 impl HostCodec {
-    /// Room for received bytes; all of it once [`answer`](Self::answer) has returned `None`.
+    /// The free part of the buffer; all of it after [`answer`](Self::answer) returned `None`.
     pub fn spare(&mut self) -> &mut [u8] {
         if self.start == self.end {
             (self.start, self.end) = (0, 0);
@@ -88,12 +88,12 @@ impl HostCodec {
         self.buffer.get_mut(self.end..).unwrap_or(&mut [])
     }
 
-    /// Says that `len` bytes were put into the room.
+    /// Declares that `len` bytes were put into the buffer.
     pub fn filled(&mut self, len: usize) {
         self.end = BUFFERED.min(self.end.saturating_add(len));
     }
 
-    /// The next answer, or `None` when more bytes are needed.
+    /// The next answer; `None` if more bytes are needed.
     pub fn answer(&mut self) -> Option<Answer> {
         while self.start < self.end {
             let byte = *self.buffer.get(self.start)?;
@@ -105,12 +105,12 @@ impl HostCodec {
         None
     }
 
-    /// How many lines were no answer.
+    /// Number of invalid lines.
     pub fn garbage(&self) -> u64 {
         self.parser.garbage()
     }
 
-    /// Whether a line has begun and not ended.
+    /// Whether a line is incomplete.
     pub fn is_mid_line(&self) -> bool {
         self.parser.is_mid_line()
     }

@@ -1,12 +1,20 @@
-//! slcan: CAN frames as lines of text, as serial CAN adapters speak it. Both ends, without I/O.
+//! slcan, the text protocol of serial CAN adapters: CAN frames as lines of text. Both ends, without
+//! I/O.
 //!
-//! A line ends in CR. `t1418...` is a standard data frame, `T` an extended one, `r` and `R` ask for
-//! one; an identifier has 3 or 8 hexadecimal digits, then come the length and the bytes. The other
-//! lines are commands of the host. An adapter answers with CR, with `z` or `Z` and CR after a
-//! frame, or with BEL when it refuses.
+//! | to | use |
+//! |---|---|
+//! | be an adapter, or a drive with slcan | [`Device`] |
+//! | use an adapter as a host | [`HostCodec`], or [`AnswerParser`] byte by byte |
+//! | write a frame as a line | [`encode`] |
+//! | choose a bitrate | [`Bitrate`] |
+//!
+//! A line ends with CR. `t1418...` is a standard data frame, `T` an extended one; `r` and `R` are
+//! remote frames. An identifier has 3 or 8 hexadecimal digits; the length and the bytes follow. The
+//! other lines are commands of the host. An adapter answers with CR, with `z` or `Z` and CR after a
+//! frame, or with BEL to refuse.
 //!
 //! The crate is `no_std`, allocates nothing, contains no `unsafe` and does not panic. A drive that
-//! speaks slcan itself, without an adapter:
+//! uses slcan itself, without an adapter:
 //!
 //! ```
 //! use motorlink_proto::{can::CanFrame, time::Instant};
@@ -36,14 +44,14 @@ use motorlink_proto::can::CanFrame;
 
 /// Ends each line.
 const CR: u8 = 0x0D;
-/// An adapter's no.
+/// The refusal of an adapter.
 const BEL: u8 = 0x07;
 /// The longest line: `T`, 8 digits of identifier, length, 16 of data, 4 of a timestamp.
 const LONGEST_LINE: usize = 30;
 /// The longest line that a host sends for a frame, with its CR.
 pub const LONGEST_FRAME: usize = LONGEST_LINE - 4 + 1;
 
-/// A bitrate of the CAN bus that slcan can ask for, S0 to S8.
+/// A bitrate of the CAN bus that slcan supports, S0 to S8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Bitrate {
     digit: u8,
@@ -54,7 +62,7 @@ impl Bitrate {
     /// 1 Mbit/s, the bitrate of RMD motors.
     pub const DEFAULT: Bitrate = Bitrate::ALL[8];
 
-    /// All of them, at the index that is in their command.
+    /// All bitrates. The index is the digit in the command.
     pub const ALL: [Bitrate; 9] = [
         Bitrate { digit: b'0', bits_per_second: 10_000 },
         Bitrate { digit: b'1', bits_per_second: 20_000 },
@@ -67,7 +75,7 @@ impl Bitrate {
         Bitrate { digit: b'8', bits_per_second: 1_000_000 },
     ];
 
-    /// The bitrate with this number of bits per second, when slcan has it.
+    /// The bitrate with this number of bits per second; `None` if slcan does not support it.
     pub fn from_bits_per_second(rate: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.bits_per_second == rate)
     }
@@ -88,7 +96,7 @@ impl Bitrate {
     }
 }
 
-/// Writes the line of `frame` into `buffer` and returns it, CR included.
+/// Writes the line of `frame` into `buffer` and returns it with its CR.
 pub fn encode<'a>(frame: &CanFrame, buffer: &'a mut [u8; LONGEST_FRAME]) -> &'a [u8] {
     let (kind, digits) = match (frame.is_extended(), frame.is_remote()) {
         (false, false) => (b't', 3),
@@ -131,12 +139,12 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// The lowest four bits as a digit.
+/// The lowest four bits as a hexadecimal digit.
 fn hex_digit(value: u32) -> u8 {
     b"0123456789ABCDEF"[(value & 0xF) as usize]
 }
 
-/// The frame of a line without its CR, and what follows it in the line.
+/// The frame of a line without its CR, and the rest of the line.
 fn decode(line: &[u8]) -> Option<(CanFrame, &[u8])> {
     let (&kind, rest) = line.split_first()?;
     let (extended, remote, digits, highest) = match kind {
@@ -164,7 +172,7 @@ fn decode(line: &[u8]) -> Option<(CanFrame, &[u8])> {
     Some((CanFrame::data_frame(id, extended, data), rest))
 }
 
-/// The value of the first `digits` digits (at most 8), and what follows them.
+/// The value of the first `digits` digits (at most 8), and the rest of the text.
 fn hex(text: &[u8], digits: usize) -> Option<(u32, &[u8])> {
     let (number, rest) = text.split_at_checked(digits)?;
     let value = number
@@ -178,7 +186,7 @@ fn is_hex(text: &[u8], digits: usize) -> bool {
     hex(text, digits).is_some_and(|(_, rest)| rest.is_empty())
 }
 
-/// A line that is being received. One that is too long is remembered as such and not kept.
+/// A line that is being received. A line that is too long is marked and not stored.
 #[derive(Debug, Default)]
 struct TextLine {
     bytes: [u8; LONGEST_LINE],
@@ -197,7 +205,7 @@ impl TextLine {
         self.len == 0
     }
 
-    /// Ends the line: its bytes, or nothing when it was too long.
+    /// Ends the line. Returns its bytes; `None` if it was too long.
     fn take(&mut self) -> Option<&[u8]> {
         self.bytes.get(..core::mem::take(&mut self.len))
     }

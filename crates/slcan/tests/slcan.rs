@@ -1,4 +1,4 @@
-//! Both ends of slcan: against the lines of the field notes, against garbage, against each other.
+//! Both ends of slcan, with recorded lines, with garbage, and with each other.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
@@ -37,7 +37,7 @@ fn status_request() -> CanFrame {
 }
 
 #[test]
-fn frames_are_written_as_the_field_notes_have_them() {
+fn frames_are_written_like_recorded_ones() {
     for (frame, line) in [
         (status_request(), "t14189C00000000000000\r"),
         (CanFrame::data_frame(0x7FF, false, &[]), "t7FF0\r"),
@@ -53,7 +53,7 @@ fn frames_are_written_as_the_field_notes_have_them() {
 }
 
 #[test]
-fn the_host_understands_all_that_an_adapter_says() {
+fn the_host_parses_every_answer_of_an_adapter() {
     let mut codec = HostCodec::default();
     assert_eq!(
         answers(&mut codec, b"\rz\rZ\r\x07V1013\rNA123\rF00\r\r\nt12311A1234\r"),
@@ -138,7 +138,7 @@ fn the_device_answers_a_host_that_opens_drives_and_closes() {
 }
 
 #[test]
-fn the_device_passes_frames_both_ways_while_it_is_open() {
+fn the_device_passes_frames_in_both_directions_while_it_is_open() {
     let mut device = Device::default();
     let mut heard = Vec::new();
     deliver(&device, 0, &status_request(), &mut heard);
@@ -156,7 +156,7 @@ fn the_device_passes_frames_both_ways_while_it_is_open() {
 
 proptest! {
     #[test]
-    fn a_frame_crosses_from_device_to_host_and_back(
+    fn a_frame_is_transmitted_from_device_to_host_and_back(
         id: u32, extended: bool, remote: bool, bytes in prop::collection::vec(any::<u8>(), 0..=8),
     ) {
         let frame = if remote {
@@ -173,7 +173,7 @@ proptest! {
     }
 
     #[test]
-    fn after_any_garbage_the_second_line_is_understood(
+    fn after_any_garbage_the_second_line_is_parsed(
         garbage in prop::collection::vec(any::<u8>(), 0..700),
     ) {
         let mut codec = HostCodec::default();

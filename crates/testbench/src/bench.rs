@@ -59,7 +59,7 @@ impl Bench {
         places.add("st".to_owned(), Kind::St, stage.clone());
         places.add("rmd".to_owned(), Kind::Rmd, stage.clone());
         let (signals, profile) = (cast.signals(), config.profile);
-        Ok(Bench { clock: Clock::standing(), stage, places, signals, profile })
+        Ok(Bench { clock: Clock::virtual_time(), stage, places, signals, profile })
     }
 
     /// What the ST drive speaks.
@@ -141,7 +141,7 @@ impl Bench {
         st: Option<ServeName>,
         rmd: Option<ServeName>,
     ) -> Result<Serving, PortError> {
-        if !self.clock.stands() {
+        if !self.clock.is_virtual() {
             let port = st.or(rmd).map(|port| port.to_string()).unwrap_or_default();
             let why = "this bench is served already: end that first".to_owned();
             return Err(PortError::Configuration { port, why });

@@ -18,7 +18,7 @@ pub struct Finite<S, T> {
 
 impl<S, T> Finite<S, T> {
     pub fn new(station: S) -> Self {
-        let clock = Clock::standing();
+        let clock = Clock::virtual_time();
         Finite { link: StationLink::new(station, clock.clone()), clock }
     }
 

@@ -23,7 +23,7 @@ impl<S> Clone for Shared<S> {
 
 impl<S> Shared<S> {
     pub fn new(station: S) -> Self {
-        Shared { station: Arc::new(Mutex::new(station)), clock: Clock::standing() }
+        Shared { station: Arc::new(Mutex::new(station)), clock: Clock::virtual_time() }
     }
 
     pub fn station(&self) -> MutexGuard<'_, S> {

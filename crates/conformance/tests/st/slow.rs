@@ -103,7 +103,7 @@ fn a_slow_line_skips_frames_that_take_too_long_and_fails_nothing() {
         let byte_time = Micros(10_000_000 / baud);
         let peer = Peer::new(profile, &MotorConfig::demo(), Deviation::default());
         let (outward, inward) = Default::default();
-        let uart = Uart { peer, byte_time, clock: Clock::standing(), outward, inward };
+        let uart = Uart { peer, byte_time, clock: Clock::virtual_time(), outward, inward };
         let allowed = vec![Need::Spin];
         let options = Options { profile, motor: MotorNumber::FIRST, allowed, byte_time };
         let mut harness = Harness::new(Box::new(uart), Box::new(()), options);

@@ -1,4 +1,4 @@
-//! UARTs at both ends of a line on which bytes take no time.
+//! UARTs at both ends of a line without transmission time.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -6,10 +6,10 @@ use std::rc::Rc;
 
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
 
-/// What a UART has received: bytes, or that some were lost.
+/// The receive queue of a UART: bytes, or the loss of bytes.
 pub type Received = Rc<RefCell<VecDeque<Result<u8, ErrorKind>>>>;
 
-/// One end of a line on which bytes take no time.
+/// One end of a line without transmission time.
 pub struct Uart {
     pub received: Received,
     pub other: Received,
@@ -33,7 +33,7 @@ impl ReadReady for Uart {
 impl Read for Uart {
     fn read(&mut self, room: &mut [u8]) -> Result<usize, ErrorKind> {
         let mut received = self.received.borrow_mut();
-        assert!(!received.is_empty(), "a board would stand still here");
+        assert!(!received.is_empty(), "a read without data would block a board");
         if let Some(&Err(error)) = received.front() {
             received.pop_front();
             return Err(error);
@@ -49,7 +49,7 @@ impl Read for Uart {
 
 impl Write for Uart {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
-        // Like a FIFO: a few at a time.
+        // Like a FIFO, it accepts a few bytes at a time.
         let taken = &bytes[..bytes.len().min(7)];
         self.other.borrow_mut().extend(taken.iter().map(|&byte| Ok(byte)));
         Ok(taken.len())

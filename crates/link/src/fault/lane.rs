@@ -7,11 +7,11 @@ use motorlink_proto::time::{Instant, Micros};
 
 use super::{Faults, Span, Struck, Unit, Way};
 
-/// Bytes of a stuck or flooded line come at least this far apart: as at 115200 baud.
+/// Minimum interval between bytes of a stuck or flooded line: that of 115200 baud.
 const NOISE_PACE: Micros = Micros(87);
 
-/// One direction of a line: units in with the time at which they are sent, units out with the time
-/// at which they arrive.
+/// One direction of a line. Units are put in with their time of sending, and taken out with their
+/// time of arrival.
 #[derive(Debug, Clone)]
 pub struct Lane<T: Unit> {
     way: Way,
@@ -29,21 +29,21 @@ pub struct Lane<T: Unit> {
     stuck0: Happening<Span>,
     stuck1: Happening<Span>,
     flood: Happening<u32>,
-    /// When the sender has put out what it was given.
+    /// When the sender has transmitted all units.
     free: Instant,
-    /// Nothing arrives before this moment.
+    /// No unit arrives before this time.
     held: Instant,
-    /// What is sent before this moment is lost.
+    /// Units sent before this time are lost.
     dead: Instant,
-    /// What is on its way, the earliest first.
+    /// Units in transit, the earliest first.
     coming: VecDeque<(Instant, T)>,
-    /// What a stuck line says, when next, and until when.
+    /// The unit on a stuck line, the time of the next one, and the end of this state.
     stuck: Option<(T, Instant, Instant)>,
 }
 
 impl<T: Unit> Lane<T> {
-    /// A lane for one way, on which a unit takes `pace`; zero where something else sets the pace.
-    /// Noise spares the `protocol` on it.
+    /// A lane in one direction. A unit takes `pace` to transmit; zero if the link limits the pace
+    /// itself. Noise avoids valid commands of `protocol`.
     pub fn new(faults: &Faults, way: Way, pace: Micros, protocol: T::Protocol) -> Self {
         let mut rng = Rng::with_seed(faults.seed);
         if way == Way::Received {
@@ -76,7 +76,7 @@ impl<T: Unit> Lane<T> {
         }
     }
 
-    /// Sends units at `now`, or as soon as those before them are out.
+    /// Sends units at `now`, or as soon as the earlier ones have been transmitted.
     pub fn push(&mut self, now: Instant, units: impl IntoIterator<Item = T>) {
         let delay = drawn(self.delay, &mut self.rng);
         self.free = self.free.max(now);
@@ -96,7 +96,7 @@ impl<T: Unit> Lane<T> {
         }
     }
 
-    /// When the next unit arrives; `None` while nothing is on its way.
+    /// When the next unit arrives; `None` if no unit is in transit.
     pub fn due(&self) -> Option<Instant> {
         let coming = self.coming.front().map(|(due, _)| *due);
         let stuck = self.stuck.map(|(_, next, _)| next);
@@ -115,12 +115,12 @@ impl<T: Unit> Lane<T> {
         Some(unit)
     }
 
-    /// When everything that was pushed will be out.
+    /// When all units have been transmitted.
     pub fn free(&self) -> Instant {
         self.free
     }
 
-    /// What lasts may begin with a unit that is sent at `at`.
+    /// Starts faults with a duration, by chance, for a unit sent at `at`.
     fn begin(&mut self, at: Instant) {
         if at < self.dead {
             return;
@@ -150,7 +150,7 @@ impl<T: Unit> Lane<T> {
         }
     }
 
-    /// When the last unit arrives that is on its way.
+    /// When the last unit in transit arrives.
     fn last(&self) -> Instant {
         self.coming.back().map_or(Instant(0), |(due, _)| *due)
     }
@@ -183,7 +183,7 @@ impl<T: Unit> Lane<T> {
         }
     }
 
-    /// Puts a unit where its time and its order say, at least `gap` behind the one before it.
+    /// Inserts a unit by its time and order, at least `gap` after the one before it.
     fn arrive(&mut self, due: Instant, unit: T, gap: Micros) {
         let before = self.coming.iter().rev().find(|(_, other)| other.order() == unit.order());
         let due = before.map_or(due, |(last, _)| due.max(*last + gap));
@@ -192,18 +192,18 @@ impl<T: Unit> Lane<T> {
     }
 }
 
-/// Something of a rate, and how long or how much of it there is.
+/// A fault with a rate, and its duration or number of units.
 #[derive(Debug, Clone)]
 struct Happening<T>(Chance, T);
 
-/// Hits by chance: how many trials the next hit is away. Rare hits cost next to nothing.
+/// Random hits: the number of trials until the next hit. Rare hits have almost no cost.
 #[derive(Debug, Clone)]
 struct Chance {
     rate: f64,
     away: u64,
 }
 
-/// No hit ever.
+/// No further hit.
 const NEVER: u64 = u64::MAX;
 
 impl Chance {
@@ -216,7 +216,7 @@ impl Chance {
         self.within(1, rng).is_some()
     }
 
-    /// The first of the next `trials` that hits; those behind it have not been tried then.
+    /// The first of the next `trials` that hits. The trials after it are not counted.
     fn within(&mut self, trials: u32, rng: &mut Rng) -> Option<u32> {
         if self.away >= u64::from(trials) {
             if self.away != NEVER {
@@ -230,12 +230,12 @@ impl Chance {
     }
 }
 
-/// Trials without a hit before the next one, which are geometrically distributed.
+/// Number of trials before the next hit, geometrically distributed.
 fn gap(rate: f64, rng: &mut Rng) -> u64 {
     if rate <= 0.0 {
         return NEVER;
     }
-    // 1 - f64() is above zero. At a rate of 1 this is -0.
+    // 1 - f64() is greater than zero. At a rate of 1 the result is -0.
     ((1.0 - rng.f64()).ln() / (-rate).ln_1p()) as u64
 }
 
@@ -252,7 +252,7 @@ mod tests {
         Lane::new(&faults.parse().unwrap(), Way::Sent, Micros(pace), T::Protocol::default())
     }
 
-    /// Everything that comes of `units` that are pushed at 0, with its time.
+    /// All units that arrive if `units` are pushed at 0, with their times.
     fn outcome<T: Unit>(lane: &mut Lane<T>, units: impl IntoIterator<Item = T>) -> Vec<(u64, T)> {
         lane.push(Instant(0), units);
         let mut came = Vec::new();
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_without_faults_carries_everything_at_its_pace() {
+    fn a_line_without_faults_transmits_everything_at_its_pace() {
         let mut lane = Lane::new(&Faults::NONE, Way::Sent, Micros(87), ());
         assert_eq!(outcome(&mut lane, [1u8, 2, 3]), [(87, 1), (174, 2), (261, 3)]);
         assert_eq!(lane.free(), Instant(261));
@@ -286,13 +286,13 @@ mod tests {
         assert_ne!(run(7, Way::Sent), run(7, Way::Received), "the ways do not suffer alike");
     }
 
-    /// Hits of a chance of `rate` in `trials`, within five standard deviations.
+    /// Whether the number of hits of `rate` in `trials` is within five standard deviations.
     fn near(hits: usize, trials: f64, rate: f64) -> bool {
         (hits as f64 - trials * rate).abs() < 5.0 * (trials * rate).sqrt()
     }
 
     #[test]
-    fn faults_happen_as_often_as_their_rates_say() {
+    fn faults_happen_at_their_rates() {
         const N: usize = 100_000;
         let flipped: u32 = outcome(&mut lane("flip=1e-3", 0), bytes(N))
             .iter()
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pause_keeps_everything_and_a_cut_nothing() {
+    fn a_pause_loses_nothing_and_a_cut_everything() {
         let paused = outcome(&mut lane("pause=30ms@1", 87), [1u8, 2]);
         assert_eq!(paused, [(30_000, 1), (30_087, 2)]);
         let mut lane = lane("cut=30ms@1", 0);
@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stuck_line_carries_one_byte_for_its_time() {
+    fn a_stuck_line_repeats_one_byte_for_its_time() {
         let came = outcome(&mut lane("stuck0=10ms@1", 87), [1u8, 2]);
         assert!(came.iter().all(|(due, byte)| *byte == 0 && *due < 10_000));
         assert_eq!(came.len(), 10_000 / 87);
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_comes_at_the_pace_of_the_line_before_what_began_it() {
+    fn a_flood_arrives_at_the_pace_of_the_line_before_its_unit() {
         let came = outcome(&mut lane("flood=100@1", 0), [0x55u8]);
         assert_eq!(came.len(), 101);
         assert_eq!(came[100], (100 * NOISE_PACE.0, 0x55));

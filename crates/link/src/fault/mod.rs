@@ -1,9 +1,9 @@
-//! A line that misbehaves as it is told, to rehearse what a program does about it.
+//! Faults on a line, to test how a program handles them.
 //!
-//! [`Faults`] says what goes wrong, in a text that a command line takes too; a [`Lane`] does it to
-//! one direction of a line, on whatever clock its caller keeps. The same faults and the same calls
-//! give the same damage. [`FaultBytes`](crate::port::FaultBytes) and
-//! [`FaultCan`](crate::port::FaultCan) put lanes around a port.
+//! [`Faults`] describes the faults; it is also parsed from text, for the command line. A [`Lane`]
+//! applies them to one direction of a line, with the caller's clock. The same faults and the same
+//! calls give the same damage. [`FaultBytes`](crate::port::FaultBytes) and
+//! [`FaultCan`](crate::port::FaultCan) wrap a port in lanes.
 //!
 //! ```
 //! use motorlink_link::fault::{Faults, Lane, Way};
@@ -12,7 +12,7 @@
 //! let faults: Faults = "drop=1,delay=5ms,only=received".parse()?;
 //! let mut sent = Lane::new(&faults, Way::Sent, Micros(87), ());
 //! sent.push(Instant(0), [0x22, 0x01]);
-//! assert_eq!(sent.due(), Some(Instant(87)));      // only what is received suffers
+//! assert_eq!(sent.due(), Some(Instant(87)));      // only received units are delayed
 //! assert_eq!(sent.pop(Instant(87)), Some(0x22));
 //! # Ok::<(), motorlink_link::fault::FaultError>(())
 //! ```

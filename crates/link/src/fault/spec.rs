@@ -1,60 +1,60 @@
-//! What goes wrong, as a value and as text.
+//! The description of faults, as a value and as text.
 
 use std::fmt;
 use std::str::FromStr;
 
 use motorlink_proto::time::Micros;
 
-/// What goes wrong on a line. Rates are chances from 0 to 1; a unit is a byte of a serial line or a
-/// frame of a CAN bus.
+/// The faults of a line. Rates are probabilities from 0 to 1. A unit is a byte of a serial line or
+/// a frame of a CAN bus.
 ///
-/// As text, the faults that there are, such as `flip=1e-4,drop=1e-3,delay=5ms..30ms,seed=7`:
+/// As text, a list of faults such as `flip=1e-4,drop=1e-3,delay=5ms..30ms,seed=7`:
 ///
-/// | key | value | what happens |
+/// | key | value | effect |
 /// |---|---|---|
-/// | `flip` | rate a bit | the bit arrives wrong; on CAN the frame is lost, or arrives twice where the bit is the last one |
-/// | `corrupt` | rate a bit | CAN only: a bit of a frame's data arrives wrong, as behind an slcan adapter without checksum |
+/// | `flip` | rate a bit | the bit is inverted; on CAN the frame is lost, or arrives twice if the bit is the last one |
+/// | `corrupt` | rate a bit | CAN only: a bit of a frame's data is inverted, as with an slcan adapter without checksum |
 /// | `drop` | rate a unit | the unit is lost |
 /// | `dup` | rate a unit | it arrives twice |
-/// | `insert` | rate a unit | a unit that nobody sent arrives before it |
-/// | `delay` | time, or from..to | each write or frame arrives that much later |
-/// | `pause` | time`@`rate | nothing moves for a while from this unit on; then all of it arrives |
-/// | `cut` | time`@`rate | everything is lost for a while |
-/// | `flood` | count`@`rate | that many units that nobody sent |
-/// | `stuck0`, `stuck1` | time`@`rate | serial only: the line carries nothing but 0x00, or 0xFF, for a while |
-/// | `only` | `sent` or `received` | the other direction is left alone |
+/// | `insert` | rate a unit | an extra random unit arrives before it |
+/// | `delay` | time, or from..to | each write or frame arrives later by this time |
+/// | `pause` | time`@`rate | transmission stops for this time; then all units arrive |
+/// | `cut` | time`@`rate | all units are lost for this time |
+/// | `flood` | count`@`rate | this number of extra random units arrives |
+/// | `stuck0`, `stuck1` | time`@`rate | serial only: the line carries only 0x00, or 0xFF, for this time |
+/// | `only` | `sent` or `received` | the other direction has no faults |
 /// | `seed` | number | the same seed gives the same damage |
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Faults {
-    /// Chance of each bit to arrive wrong.
+    /// Probability of each bit to be inverted.
     pub flip: f64,
-    /// Chance of each bit of a CAN frame's data to arrive wrong without anybody noticing.
+    /// Probability of each bit of a CAN frame's data to be inverted without detection.
     pub corrupt: f64,
-    /// Chance of each unit to be lost.
+    /// Probability of each unit to be lost.
     pub drop: f64,
-    /// Chance of each unit to arrive twice.
+    /// Probability of each unit to arrive twice.
     pub duplicate: f64,
-    /// Chance of each unit to come behind one that nobody sent.
+    /// Probability of each unit to follow an extra random unit.
     pub insert: f64,
-    /// How much later each write or frame arrives.
+    /// Delay of each write or frame.
     pub delay: Span,
-    /// Halts, behind which everything arrives.
+    /// Stops after which all units arrive.
     pub pause: Spell,
-    /// Halts, during which everything is lost.
+    /// Stops during which all units are lost.
     pub cut: Spell,
-    /// Bursts that nobody sent.
+    /// Bursts of extra random units.
     pub flood: Flood,
     /// Times during which a serial line carries only 0x00.
     pub stuck0: Spell,
     /// Times during which a serial line carries only 0xFF.
     pub stuck1: Spell,
-    /// The only direction that suffers; `None` is both.
+    /// The only direction with faults; `None` means both.
     pub only: Option<Way>,
-    /// Seed of what happens by chance.
+    /// Seed of the random faults.
     pub seed: u64,
 }
 
-/// A time from `least` to `most`, any of them equally likely.
+/// A time from `least` to `most`, uniformly distributed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Span {
     /// The shortest.
@@ -63,25 +63,25 @@ pub struct Span {
     pub most: Micros,
 }
 
-/// Something that begins by chance and lasts.
+/// A fault that starts by chance and has a duration.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spell {
-    /// Chance of each unit to begin it.
+    /// Probability of each unit to start it.
     pub rate: f64,
-    /// How long it lasts.
+    /// Its duration.
     pub length: Span,
 }
 
-/// Units that nobody sent, many of them.
+/// A burst of extra random units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Flood {
-    /// Chance of each unit to begin it.
+    /// Probability of each unit to start it.
     pub rate: f64,
-    /// How many units come.
+    /// Number of units.
     pub count: u32,
 }
 
-/// A direction, as the program sees it.
+/// A direction, from the program's point of view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Way {
     /// From the program to the drive.
@@ -90,43 +90,43 @@ pub enum Way {
     Received,
 }
 
-/// Why a text is no [`Faults`].
+/// Why a text does not describe [`Faults`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FaultError {
-    /// Nothing is to go wrong.
+    /// No fault is given.
     #[error("no fault is named; write it like flip=1e-4,delay=5ms..30ms; there are {KEYS}")]
     Empty,
-    /// No fault is called that.
+    /// No fault has this name.
     #[error("there is no fault `{key}`; there are {KEYS}")]
     Unknown {
-        /// What was given.
+        /// The given name.
         key: String,
     },
-    /// A fault is named twice.
+    /// A fault is given twice.
     #[error("`{key}` is given twice")]
     Twice {
         /// The fault.
         key: String,
     },
-    /// A value that the fault cannot have.
+    /// A value that is invalid for the fault.
     #[error("{key} cannot be `{value}`; use {usable}")]
     Value {
         /// The fault.
         key: &'static str,
-        /// What was given.
+        /// The given value.
         value: String,
-        /// What it takes.
+        /// The valid values.
         usable: &'static str,
     },
-    /// A fault that this kind of line cannot have.
+    /// A fault that does not exist on this kind of line.
     #[error("`{key}` cannot happen on a {line}; use {instead}")]
     NotHere {
         /// The fault.
         key: &'static str,
         /// The kind of line.
         line: &'static str,
-        /// What comes near it.
+        /// The most similar fault of this line.
         instead: &'static str,
     },
 }
@@ -141,7 +141,7 @@ const LONGEST: Micros = Micros(3_600_000_000);
 const MOST: u32 = 10_000;
 
 impl Faults {
-    /// A line on which nothing goes wrong.
+    /// No faults.
     pub const NONE: Self = {
         let never = Span { least: Micros(0), most: Micros(0) };
         let spell = Spell { rate: 0.0, length: never };
@@ -162,7 +162,7 @@ impl Faults {
         }
     };
 
-    /// The faults, if a serial line can have them; it ignores others.
+    /// Checks the faults for a serial line.
     ///
     /// # Errors
     /// [`FaultError::NotHere`].
@@ -174,7 +174,7 @@ impl Faults {
         Ok(self)
     }
 
-    /// The faults, if a CAN bus can have them; a stuck bus is a [`cut`](Self::cut).
+    /// Checks the faults for a CAN bus. A stuck bus is a [`cut`](Self::cut).
     ///
     /// # Errors
     /// [`FaultError::NotHere`].
@@ -247,7 +247,7 @@ impl FromStr for Faults {
     }
 }
 
-/// As it is written; what does not happen is left out.
+/// The faults as text. Faults with rate 0 are omitted.
 impl fmt::Display for Faults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut parts = Vec::new();
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_reads_back() {
+    fn faults_as_text_are_parsed_back() {
         let text = "flip=1e-4,corrupt=1e-6,drop=1e-3,dup=5e-1,insert=1e0,delay=5ms..30ms,\
                     pause=1500us@1e-3,cut=500ms@1e-3,stuck0=10ms..2s@1e-4,stuck1=0ms..1s@1e-5,\
                     flood=200@1e-3,only=sent,seed=7";
@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_says_what_would() {
+    fn an_invalid_fault_is_refused_with_the_valid_ones() {
         for text in ["", ",", "seed=7", "only=sent,seed=1"] {
             assert_eq!(read(text), Err(FaultError::Empty), "{text}");
         }

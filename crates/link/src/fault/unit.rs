@@ -1,4 +1,4 @@
-//! What a line carries: bytes or CAN frames, and how each takes damage.
+//! The units of a line, bytes or CAN frames, and how faults change them.
 
 use std::fmt::Debug;
 
@@ -7,10 +7,10 @@ use motorlink_proto::can::{CanFrame, Identifiers};
 
 use super::spec::Way;
 
-/// What becomes of a unit with a wrong bit.
+/// The effect of an inverted bit on a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Struck<T> {
-    /// It arrives like this.
+    /// The changed unit arrives.
     Changed(T),
     /// It does not arrive.
     Lost,
@@ -18,11 +18,11 @@ pub enum Struck<T> {
     Twice,
 }
 
-/// The least that travels: a byte of a serial line, a frame of a CAN bus.
+/// The smallest unit of a transmission: a byte of a serial line, a frame of a CAN bus.
 pub trait Unit: Copy {
-    /// Bits that can arrive wrong.
+    /// Number of bits that can be inverted.
     const BITS: u32;
-    /// Bits that can be corrupted without anybody noticing.
+    /// Number of bits that can be inverted without detection.
     const DATA_BITS: u32;
 
     /// The unit with bit `bit` of [`BITS`](Self::BITS) wrong.
@@ -31,18 +31,18 @@ pub trait Unit: Copy {
     /// The unit with bit `bit` of [`DATA_BITS`](Self::DATA_BITS) changed.
     fn corrupted(self, bit: u32) -> Self;
 
-    /// Its second copy, where it arrives twice.
+    /// The second copy of a unit that arrives twice.
     fn copied(self) -> Self {
         self
     }
 
-    /// What noise has to know of the protocol on the line.
+    /// The protocol of the line, which noise avoids.
     type Protocol: Clone + Debug;
 
-    /// A unit that nobody sent.
+    /// A random unit.
     fn noise(way: Way, protocol: &Self::Protocol, rng: &mut Rng) -> Self;
 
-    /// What comes from a line that is stuck at 0 or 1; `None` where nothing does.
+    /// The unit on a line that is stuck at 0 or 1; `None` if nothing arrives.
     fn stuck(high: bool) -> Option<Self>;
 
     /// Units with the same number keep their order.
@@ -75,8 +75,8 @@ impl Unit for u8 {
     }
 }
 
-/// Bits of a standard frame with eight bytes of data, without stuff bits: 44 up to and including
-/// the CRC's fields around 64 of data.
+/// Number of bits of a standard frame with eight bytes of data, without stuff bits: 64 data bits,
+/// and 44 up to and including the CRC's fields.
 const FRAME_BITS: u32 = 108;
 
 impl Unit for CanFrame {
@@ -84,9 +84,9 @@ impl Unit for CanFrame {
     const DATA_BITS: u32 = 64;
     type Protocol = Identifiers;
 
-    /// The CRC finds a wrong bit and nobody takes the frame; sending it again, as a controller does
-    /// unless told not to, would only make it later. The receiver of a frame whose very last bit is
-    /// wrong has taken it already while its sender sends it again.
+    /// The CRC detects an inverted bit, and no node accepts the frame. A controller usually sends
+    /// it again, which is only a delay. If the very last bit is inverted, the receiver has accepted
+    /// the frame already, and the sender sends it again.
     fn struck(self, bit: u32) -> Struck<Self> {
         if bit == FRAME_BITS - 1 { Struck::Twice } else { Struck::Lost }
     }
@@ -99,8 +99,8 @@ impl Unit for CanFrame {
         CanFrame::data_frame(self.id(), self.is_extended(), &data[..given.len()])
     }
 
-    /// To the drives: a frame that is none of their protocol's, so that none of them moves. To the
-    /// program: such a frame or a reply that it did not ask for.
+    /// To the drives: a frame outside their protocol, so that no motor moves. To the program: such
+    /// a frame, or a reply without a request.
     fn noise(way: Way, protocol: &Identifiers, rng: &mut Rng) -> Self {
         let data = rng.u64(..).to_le_bytes();
         if way == Way::Received && !protocol.replies.is_empty() && rng.bool() {
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn noise_never_speaks_to_a_drive() {
+    fn noise_is_never_a_command_to_a_drive() {
         let is_used = |id| (0x141..=0x160).contains(&id) || id == 0x280;
         let protocol = Identifiers { replies: 0x141..0x161, is_used };
         let mut rng = Rng::with_seed(1);
@@ -139,7 +139,7 @@ mod tests {
             let is_reply = !frame.is_extended() && protocol.replies.contains(&(frame.id() as u16));
             replies += usize::from(is_reply);
         }
-        assert!(replies > 5_000, "the program does get replies that it did not ask for");
+        assert!(replies > 5_000, "the program also gets replies without a request");
     }
 
     #[test]

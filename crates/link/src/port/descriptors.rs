@@ -8,8 +8,8 @@ const NONE: RawFd = -1;
 
 static FIRST: Block = Block::new();
 
-/// A list that only grows. Reading it takes no lock, which a thread that is not there in the child may
-/// have held at the fork.
+/// A list that only grows. Reading it takes no lock: in the child of a fork, the thread that held
+/// the lock may not exist.
 struct Block {
     places: [AtomicI32; 64],
     next: OnceLock<Box<Block>>,
@@ -29,7 +29,7 @@ impl Block {
     }
 }
 
-/// A descriptor that is listed as open. Drop it before the descriptor is closed.
+/// An entry for an open descriptor. Drop it before the descriptor is closed.
 #[derive(Debug)]
 pub(super) struct Listed(&'static AtomicI32);
 
@@ -45,14 +45,14 @@ impl Drop for Listed {
     }
 }
 
-/// The descriptors of the links that this process has open: serial lines, TCP connections and CAN
+/// The descriptors of the open links of this process: serial lines, TCP connections and CAN
 /// sockets.
 ///
-/// A fork has them, too, and with them keeps the lines of its parent open and locked after the parent
-/// has ended. A child that lives on replaces each one, by `dup2` of `/dev/null`. Closing them is not
-/// enough: links own their numbers.
+/// A forked child inherits them. It keeps its parent's lines open and locked, even after the parent
+/// has ended. A child that continues must replace each one, by `dup2` of `/dev/null`. Closing is
+/// not enough, because links own their descriptor numbers.
 ///
-/// Takes no lock, so that it may be called in a child of a program with threads.
+/// Takes no lock, so that it can be called in the child of a program with threads.
 pub fn open_descriptors() -> impl Iterator<Item = RawFd> {
     let blocks = std::iter::successors(Some(&FIRST), |block| block.next.get().map(Box::as_ref));
     let numbers = blocks.flat_map(|block| &block.places).map(|fd| fd.load(Ordering::SeqCst));

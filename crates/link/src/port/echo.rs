@@ -1,4 +1,4 @@
-//! For adapters that send back what they transmit.
+//! Support for adapters that echo sent frames.
 
 use std::collections::VecDeque;
 use std::os::fd::BorrowedFd;
@@ -11,23 +11,25 @@ use super::event::Evented;
 use super::link::{CanLink, Link};
 use crate::clock::Clock;
 
-/// How many sent frames of one identifier wait for their echo. What is sent to one motor again and
-/// again does not push out the STOP to another.
+/// Maximum number of expected echoes per identifier. So repeated frames to one motor do not remove
+/// the expected echo of a STOP to another.
 const PER_ID: usize = 32;
-/// How many wait in all: those of as many identifiers as a full bus of motors has.
+/// Maximum number of expected echoes: for all identifiers of a bus with the maximum number of
+/// motors.
 const WAITING: usize = PER_ID * 33;
 
-/// Leaves out the first received frame that is identical to each sent one.
+/// Removes the first received frame that is identical to each sent one.
 ///
-/// RMD motors answer some requests with the same frame, so an adapter's echo looks like a motor. An
-/// echo may take any time: an adapter, a network or this process may have been busy. Echoes come in
-/// the order of sending, so one that a later echo of the same identifier overtakes was lost. Until
-/// then a motor's reply may be taken for it. Its request ends with a timeout.
+/// RMD motors answer some requests with the same frame, so an adapter's echo looks like a reply. An
+/// echo may take any time, because an adapter, a network or this process may be busy. Echoes arrive
+/// in the order of sending. If a later echo of the same identifier arrives first, the earlier one
+/// was lost. Until then a motor's reply may be removed as the missing echo; its request ends with a
+/// timeout.
 #[derive(Debug)]
 pub struct EchoCanceller<C> {
     link: C,
     clock: Clock,
-    /// Oldest first.
+    /// The oldest first.
     expected: VecDeque<CanFrame>,
 }
 
@@ -46,8 +48,8 @@ impl<C: CanLink> EchoCanceller<C> {
         &mut self.link
     }
 
-    /// Strikes `frame` off the expected echoes, and those to the same motor before it. Those to other
-    /// motors stay: this may be a late reply.
+    /// Removes `frame` from the expected echoes, with earlier ones of the same identifier. Those of
+    /// other identifiers remain, because this may be a late reply.
     fn is_echo(&mut self, frame: &CanFrame) -> bool {
         let Some(place) = self.expected.iter().position(|expected| expected == frame) else {
             return false;
@@ -105,7 +107,7 @@ mod tests {
 
     use super::*;
 
-    /// A bus on which every sent frame comes back, twice when a motor echoes it too.
+    /// A bus that returns every sent frame, or two copies if a motor echoes it too.
     struct Mirror {
         clock: Clock,
         frames: VecDeque<CanFrame>,
@@ -113,7 +115,7 @@ mod tests {
     }
 
     fn mirror(copies: usize) -> EchoCanceller<Mirror> {
-        EchoCanceller::new(Mirror { clock: Clock::standing(), frames: VecDeque::new(), copies })
+        EchoCanceller::new(Mirror { clock: Clock::virtual_time(), frames: VecDeque::new(), copies })
     }
 
     impl Link for Mirror {
@@ -137,7 +139,7 @@ mod tests {
     const NOW: Option<Duration> = Some(Duration::ZERO);
 
     #[test]
-    fn the_echo_goes_and_the_equal_reply_stays() -> Result<(), PortError> {
+    fn the_echo_is_removed_and_an_equal_reply_is_kept() -> Result<(), PortError> {
         let mut silent = mirror(1);
         silent.send(&RUN)?;
         assert_eq!(silent.receive(NOW)?, None);
@@ -151,9 +153,10 @@ mod tests {
         Ok(())
     }
 
-    /// The adapter, the network or this process was busy. Taken for a reply it would be an angle of 0.
+    /// The adapter, the network or this process was busy. As a reply, the echo would be an angle of
+    /// 0.
     #[test]
-    fn a_late_echo_is_no_reply() -> Result<(), PortError> {
+    fn a_late_echo_is_not_a_reply() -> Result<(), PortError> {
         let mut bus = mirror(1);
         bus.send(&ANGLE)?;
         bus.link().clock.wait(Instant(3_600_000_000));
@@ -161,10 +164,9 @@ mod tests {
         Ok(())
     }
 
-    /// The line delivers nothing during a cycle and repeated STOPs, then everything.
+    /// The line delivers nothing during a cycle and repeated STOPs, and then everything.
     #[test]
-    fn what_is_repeated_for_one_motor_does_not_push_out_the_echo_for_another()
-    -> Result<(), PortError> {
+    fn repeated_frames_to_one_motor_keep_the_expected_echo_of_another() -> Result<(), PortError> {
         let mut bus = mirror(1);
         for _ in 0..4 {
             for id in 0x141..=0x160 {
@@ -181,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_reply_does_not_strike_off_an_echo_to_another_motor() -> Result<(), PortError> {
+    fn a_late_reply_does_not_remove_the_echo_of_another_motor() -> Result<(), PortError> {
         let stop = CanFrame::new(0x142, [0x81, 0, 0, 0, 0, 0, 0, 0]);
         let mut bus = mirror(0);
         bus.send(&ANGLE)?;
@@ -193,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_echo_costs_at_most_one_reply() -> Result<(), PortError> {
+    fn a_lost_echo_removes_at_most_one_reply() -> Result<(), PortError> {
         let mut bus = mirror(0);
         bus.send(&ANGLE)?;
         bus.link_mut().copies = 2;

@@ -1,7 +1,7 @@
-//! Lines to emulated boards whose time their host steps.
+//! Lines to emulated boards whose time their host advances.
 //!
-//! A slow emulator is then slow for both ends: no deadline passes at one end while the other cannot
-//! run. firmware/README.md describes the clock port.
+//! A slow emulator is slow for both ends: no deadline passes at one end while the other cannot run.
+//! firmware/README.md describes the clock port.
 
 use std::sync::{Mutex, PoisonError};
 use std::time;
@@ -14,44 +14,44 @@ use super::link::{ByteLink, Link};
 use crate::clock::Clock;
 use crate::clock::WeakClock;
 
-/// How far a board's time advances by one.
+/// One step of a board's time.
 const TICK: Micros = Micros(100);
-/// The most ticks that one command asks for.
+/// Maximum number of ticks per command.
 const MOST_TICKS: u64 = 254;
-/// The command that asks how many bytes the board has taken.
+/// The command that requests the number of bytes that the board has received.
 const COUNT: u8 = 0;
-/// The command that a new host begins with, and both bytes of its answer; no other answer has this byte.
+/// The first command of a new host, and both bytes of its answer. No other answer has this byte.
 const SYNC: u8 = 255;
-/// How long bytes that the board has sent may take to arrive, in the machine's time. Those of the
-/// board's other line never do.
+/// Timeout of bytes that the board has sent, in the machine's time. Bytes of the board's other line
+/// never arrive here.
 const ARRIVAL: time::Duration = time::Duration::from_secs(1);
-/// How long after an unanswered [`SYNC`] the next one is sent, in the machine's time.
+/// Interval between [`SYNC`]s that are not answered, in the machine's time.
 const ASK_AGAIN: time::Duration = time::Duration::from_millis(100);
-/// How many bytes are sent before the board has taken them: it counts up to 254.
+/// Maximum number of bytes that the board has not confirmed: it counts up to 254.
 const CHUNK: usize = 128;
 
-/// A [`ByteLink`] on the time of an emulated board, which passes only while somebody waits.
+/// A [`ByteLink`] on the time of an emulated board. The time advances only during waits.
 ///
-/// Bytes are with the board before time goes on, and a write takes a tick, so that a client which
-/// asks without pause sees time pass, too.
+/// The board receives all bytes before its time advances. A write takes a tick, so time also passes
+/// for a client that sends requests without a pause.
 #[derive(Debug)]
 pub(super) struct EmulatedBytes {
     data: FdLink,
     board: FdLink,
     clock: Clock,
-    /// Which moment the board has reached, on `clock`.
+    /// The board's time, on `clock`.
     reached: Instant,
-    /// How many bytes the board has sent that were not read yet.
+    /// Number of bytes that the board has sent and that were not read yet.
     due: usize,
-    /// How long the emulator may take to answer, in the machine's time.
+    /// Timeout of the emulator's answers, in the machine's time.
     patience: time::Duration,
     /// The clock port, for messages.
     name: String,
 }
 
 impl EmulatedBytes {
-    /// The line `data` of the board whose clock port is `board`. `name` is the clock port in messages
-    /// and what tells this board from others.
+    /// The line `data` of the board whose clock port is `board`. `name` is the clock port in
+    /// messages, and identifies the board.
     pub(super) fn new(data: FdLink, board: FdLink, name: String) -> Result<Self, PortError> {
         Self::patient(data, board, name, time::Duration::from_secs(10))
     }
@@ -69,8 +69,8 @@ impl EmulatedBytes {
         Ok(line)
     }
 
-    /// Drops what the board still answers to a former host. Asks again while the board does not listen
-    /// yet.
+    /// Drops pending answers of the board to a former host. Repeats the command until the board is
+    /// ready.
     fn synchronise(&mut self) -> Result<(), PortError> {
         let began = time::Instant::now();
         let mut byte = [0];
@@ -85,7 +85,7 @@ impl EmulatedBytes {
         Err(self.stopped())
     }
 
-    /// Sends a command to the clock port; gives the answer.
+    /// Sends a command to the clock port. Returns the answer.
     fn ask(&mut self, command: u8) -> Result<u8, PortError> {
         self.board.write(&[command])?;
         let mut answer = self.answer()?;
@@ -109,7 +109,7 @@ impl EmulatedBytes {
         PortError::ClockStopped { port: self.name.clone(), after: self.patience }
     }
 
-    /// Lets the board's time advance towards `end`. It stops early when bytes move.
+    /// Advances the board's time towards `end`. Stops early when bytes are transferred.
     fn step(&mut self, end: Instant) -> Result<(), PortError> {
         let ticks = end.since(self.reached).0.div_ceil(TICK.0).min(MOST_TICKS) as u8;
         let done = self.ask(ticks)?;
@@ -125,7 +125,7 @@ impl EmulatedBytes {
         Ok(())
     }
 
-    /// Waits until the board has taken `count` bytes. Its time does not advance.
+    /// Waits until the board has received `count` bytes. Its time does not advance.
     fn delivered(&mut self, count: usize) -> Result<(), PortError> {
         let mut left = count;
         let mut last = time::Instant::now();
@@ -168,7 +168,7 @@ impl ByteLink for EmulatedBytes {
         }
         let now = self.clock.now();
         let end = timeout.map_or(Instant(u64::MAX), |timeout| {
-            // A part of a microsecond is one.
+            // Part of a microsecond counts as one.
             let part = u64::from(!timeout.subsec_nanos().is_multiple_of(1000));
             now + timeout.into() + Micros(part)
         });
@@ -185,15 +185,14 @@ impl ByteLink for EmulatedBytes {
     }
 }
 
-/// The clock of the board `name`. A line that is opened again goes on with the clock that its clients
-/// know.
+/// The clock of the board `name`. A reopened line continues with the clock of its clients.
 fn clock_of(name: &str) -> Clock {
     static CLOCKS: Mutex<Vec<(String, WeakClock)>> = Mutex::new(Vec::new());
     let mut clocks = CLOCKS.lock().unwrap_or_else(PoisonError::into_inner);
     clocks.retain(|(_, clock)| clock.upgrade().is_some());
     let known = clocks.iter().find(|(known, _)| known == name);
     known.and_then(|(_, clock)| clock.upgrade()).unwrap_or_else(|| {
-        let clock = Clock::standing();
+        let clock = Clock::virtual_time();
         clocks.push((name.to_owned(), clock.downgrade()));
         clock
     })
@@ -219,8 +218,8 @@ mod tests {
         (near, far)
     }
 
-    /// What a board does: each byte that it takes is answered with the next one, `delay` ticks later.
-    /// Gives the ticks that passed before the clock port was closed.
+    /// A board that answers each received byte with the next value, `delay` ticks later. Returns
+    /// the number of ticks until the clock port was closed.
     fn board(mut clock: TcpStream, mut data: TcpStream, delay: u64) -> JoinHandle<u64> {
         data.set_nonblocking(true).unwrap();
         std::thread::spawn(move || {
@@ -228,7 +227,7 @@ mod tests {
             let (mut moved, mut sent) = (0, 0);
             let mut command = [0];
             while clock.read_exact(&mut command).is_ok() {
-                // A byte a command, as in QEMU.
+                // One byte per command, as in QEMU.
                 let mut byte = [0];
                 if data.read(&mut byte).is_ok_and(|size| size > 0) {
                     due.push_back((now + delay, byte[0].wrapping_add(1)));
@@ -253,7 +252,7 @@ mod tests {
                 }
                 moved = 0;
                 clock.write_all(&[answer, sent]).unwrap();
-                // Connections do not deliver in the order of each other.
+                // The order between two connections is not defined.
                 if sent > 0 {
                     std::thread::sleep(5 * MS);
                     data.write_all(&late).unwrap();
@@ -283,9 +282,9 @@ mod tests {
     }
 
     #[test]
-    fn what_a_former_host_left_is_dropped() {
+    fn pending_answers_to_a_former_host_are_dropped() {
         let ((data, far_data), (clock, mut far_clock)) = (pair(), pair());
-        // It was ended in a step, or in the middle of an answer.
+        // The former host exited during a step, or in the middle of an answer.
         far_clock.write_all(&[7, 250, 3]).unwrap();
         let board = board(far_clock, far_data, 250);
         let data = FdLink::new(data, "data").unwrap();
@@ -299,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wait_takes_the_boards_time_and_not_the_machines() {
+    fn a_wait_uses_the_boards_time_and_not_the_machines() {
         let (mut line, board) = line(0);
         let began = time::Instant::now();
         assert_eq!(line.read(&mut [0; 8], Some(60_000 * MS)).unwrap(), 0);
@@ -310,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_has_the_time_at_which_the_board_sent_it() {
+    fn received_bytes_have_the_time_of_their_sending() {
         let (mut line, _board) = line(250);
         line.write(&[7, 8]).unwrap();
         assert_eq!(line.clock.now(), Instant(100), "a write takes a tick");
@@ -334,7 +333,7 @@ mod tests {
         assert_eq!(wait(1), Instant(100));
         assert_eq!(wait(100_000), Instant(200));
         assert_eq!(wait(100_001), Instant(400));
-        assert_eq!(line.read(&mut [], None).unwrap(), 0, "there is no room");
+        assert_eq!(line.read(&mut [], None).unwrap(), 0, "the buffer is empty");
     }
 
     #[test]
@@ -358,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_opened_again_goes_on_with_its_clock() {
+    fn a_reopened_line_continues_with_its_clock() {
         let (mut first, _board) = line(0);
         first.read(&mut [0], Some(MS)).unwrap();
         let (clock, name) = (first.clock().unwrap(), first.name.clone());

@@ -1,4 +1,4 @@
-//! What goes wrong with a port, told to a person.
+//! Errors of ports, with texts for the user.
 
 use std::io;
 use std::os::unix::fs::MetadataExt;
@@ -10,7 +10,7 @@ use rustix::io::Errno;
 
 use super::interface::up_hint;
 
-/// Why a port could not be opened or does not carry on.
+/// Why a port could not be opened, or failed.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum PortError {
@@ -25,7 +25,7 @@ pub enum PortError {
     PermissionDenied {
         /// The port.
         port: String,
-        /// The group that may open it, when the system names one.
+        /// The group that may open it, if the system knows one.
         group: Option<String>,
     },
     /// Another program holds the port.
@@ -47,42 +47,42 @@ pub enum PortError {
     BaudRefused {
         /// The port.
         port: String,
-        /// The baud rate that was asked for.
+        /// The requested baud rate.
         baud: u32,
     },
-    /// The port is of the other kind: a serial line where CAN is needed, or the reverse.
+    /// The port is of the other kind: a serial line instead of CAN, or the reverse.
     #[error("`{port}` cannot be used as a {wanted}: use {usable}")]
     WrongKind {
         /// The port.
         port: String,
-        /// What was needed of it.
+        /// The required kind.
         wanted: &'static str,
         /// The forms that can be used instead.
         usable: String,
     },
-    /// No machine has this name.
+    /// The host name is unknown.
     #[error("cannot find the host of `{port}`: check its name and the network ({source})")]
     UnknownHost {
         /// The port.
         port: String,
-        /// What the resolver said.
+        /// The resolver's error.
         source: Arc<io::Error>,
     },
-    /// The machine is there and nothing listens.
+    /// The host exists, but no server listens.
     #[error("`{port}` refuses the connection: does a server listen there?")]
     Refused {
         /// The port.
         port: String,
     },
-    /// No answer came from the machine.
+    /// The host did not answer.
     #[error("`{port}` cannot be reached: check the address and the network ({source})")]
     Unreachable {
         /// The port.
         port: String,
-        /// What the system said.
+        /// The system's error.
         source: Arc<io::Error>,
     },
-    /// The far end hung up, or the adapter was unplugged.
+    /// The peer closed the connection, or the adapter was unplugged.
     #[error(
         "`{port}` was closed: the far end hung up or was unplugged; open it again when it is back"
     )]
@@ -90,20 +90,20 @@ pub enum PortError {
         /// The port.
         port: String,
     },
-    /// The port could not be opened again, and the next attempt is not due yet.
+    /// The port could not be opened again, and the next attempt is later.
     #[error("{why}")]
     Away {
         /// The port.
         port: String,
-        /// What the last attempt said.
+        /// The error of the last attempt.
         why: String,
     },
-    /// The port takes no bytes or frames any more.
+    /// The port does not accept bytes or frames.
     #[error("`{port}` takes no more data: {hint}")]
     Stalled {
         /// The port.
         port: String,
-        /// What to look at.
+        /// What to check.
         hint: &'static str,
     },
     /// The clock port of an emulated board does not answer.
@@ -114,19 +114,19 @@ pub enum PortError {
     ClockStopped {
         /// The clock port.
         port: String,
-        /// How long an answer was awaited.
+        /// The timeout of the answer.
         after: Duration,
     },
-    /// The time of this port is that of an emulated board, and its user needs the machine's.
+    /// The port runs on the time of an emulated board, but its user needs the machine's time.
     #[error(
-        "`{port}` goes by the time of an emulated board, and event loops and guards go by the \
-         machine's: leave out `clock=`, or use a blocking client"
+        "`{port}` runs on the time of an emulated board, and event loops and guards need the \
+         machine's time: leave out `clock=`, or use a blocking client"
     )]
     Emulated {
         /// The port.
         port: String,
     },
-    /// This kernel has no CAN at all.
+    /// This kernel has no CAN support.
     #[error(
         "this kernel has no CAN support: load it with `sudo modprobe can-raw`, or use an slcan adapter"
     )]
@@ -137,12 +137,12 @@ pub enum PortError {
         /// The interface.
         port: String,
     },
-    /// The CAN interface exists and is not up.
+    /// The CAN interface exists, but is not up.
     #[error("CAN interface `{port}` is down: {hint}")]
     InterfaceDown {
         /// The interface.
         port: String,
-        /// How it is brought up.
+        /// How to bring it up.
         hint: String,
     },
     /// The CAN controller left the bus after too many errors.
@@ -154,7 +154,7 @@ pub enum PortError {
         /// The interface.
         port: String,
     },
-    /// What answers does not speak slcan.
+    /// The device does not use slcan.
     #[error(
         "`{port}` does not answer like an slcan adapter ({reason}): is this the right device and baud rate?"
     )]
@@ -164,17 +164,17 @@ pub enum PortError {
         /// What it did instead.
         reason: &'static str,
     },
-    /// The slcan adapter will not run at this bitrate.
+    /// The slcan adapter refuses this bitrate.
     #[error(
         "the adapter on `{port}` refuses {bitrate} bit/s: unplug it and plug it in again, or ask for another bitrate"
     )]
     BitrateRefused {
         /// The port.
         port: String,
-        /// The bitrate that was asked for.
+        /// The requested bitrate.
         bitrate: u32,
     },
-    /// The slcan adapter takes no frames any more.
+    /// The slcan adapter refuses frames.
     #[error(
         "the adapter on `{port}` refuses frames: was it reset, or is no other node on the bus? its \
          channel is opened again with the next call"
@@ -183,48 +183,48 @@ pub enum PortError {
         /// The port.
         port: String,
     },
-    /// What configures the port is not taken.
+    /// The configuration of the port is invalid.
     #[error("`{port}`: {why}")]
     Configuration {
         /// The port.
         port: String,
-        /// What is wrong with it.
+        /// The error in it.
         why: String,
     },
-    /// A served port would replace something that no server left behind.
-    #[error("`{port}` exists and is no {wanted}: remove it or choose another path")]
+    /// A served port would replace a file that no server created.
+    #[error("`{port}` exists and is not a {wanted}: remove it or choose another path")]
     PathTaken {
         /// The path.
         port: String,
-        /// What may be replaced.
+        /// The kind of file that may be replaced.
         wanted: &'static str,
     },
-    /// The link to a served pty was left behind by a server that was killed, and the pty that it
-    /// points to is another program's by now.
+    /// The link to a served pty is left over from a killed server. The pty that it points to now
+    /// belongs to another program.
     #[error(
-        "`{port}` is stale: the server that made it is gone, and its pty belongs to another program \
-         by now. Nothing was sent; start the server again"
+        "`{port}` is stale: the server that made it is gone, and its pty now belongs to another \
+         program. Nothing was sent; start the server again"
     )]
     Stale {
         /// The link.
         port: String,
     },
-    /// The link of a served pty is another server's.
+    /// The link of a served pty belongs to another server.
     #[error("`{port}` is served already: end that server or choose another path")]
     PathServed {
         /// The path.
         port: String,
     },
-    /// The address to listen on is taken.
+    /// The listening address is in use.
     #[error("`{port}` is taken by another program: choose another TCP port, or 0 for any free one")]
     AddressInUse {
         /// The port.
         port: String,
     },
-    /// The thread that waited for an exchange used the port from within, as a signal's handler does.
+    /// The thread that waited for an exchange used the port again, for example in a signal handler.
     #[error(
-        "`{port}`: an exchange was given up for another one of the same thread, such as a signal \
-         handler's; nobody knows what the drive did"
+        "`{port}`: another call of the same thread, such as one in a signal handler, aborted this \
+         exchange; what the drive did is unknown"
     )]
     Overtaken {
         /// The port.
@@ -236,7 +236,7 @@ pub enum PortError {
         /// The port.
         port: String,
     },
-    /// Anything else that the system says.
+    /// Any other error of the system.
     #[error("`{port}` failed: {source}")]
     Io {
         /// The port.
@@ -247,7 +247,7 @@ pub enum PortError {
 }
 
 impl PortError {
-    /// Whether a link ended a wait because its caller wants to do something else. The port stays open,
+    /// Whether a wait was ended because the caller wants to do something else. The port stays open,
     /// and the exchange is abandoned.
     pub fn is_interruption(&self) -> bool {
         match self {
@@ -257,7 +257,7 @@ impl PortError {
         }
     }
 
-    /// What an error means for a port that is open.
+    /// The meaning of an error of an open port.
     pub(crate) fn in_use(port: &str, error: impl Into<io::Error>) -> Self {
         let source = error.into();
         let port = port.to_owned();
@@ -285,7 +285,7 @@ impl PortError {
         PortError::InterfaceDown { hint: up_hint(&port, Path::new("/sys")), port }
     }
 
-    /// What an error means when the device at `path` is being opened.
+    /// The meaning of an error while the device at `path` is opened.
     pub(crate) fn at_open(path: &Path, error: impl Into<io::Error>) -> Self {
         let source = error.into();
         let port = path.display().to_string();
@@ -301,7 +301,7 @@ impl PortError {
     }
 }
 
-/// What a person does to be allowed to open a device that `group` owns.
+/// How to get permission to open a device that `group` owns.
 pub(super) fn permission_hint(group: Option<&str>) -> String {
     match group {
         Some("root") | None => {
@@ -339,13 +339,13 @@ mod tests {
             "no permission to open `/dev/ttyACM0`: join the group: \
              sudo usermod -aG dialout $USER, then log in again"
         );
-        // Only the kernel's root group may be named where nobody should join it.
+        // For the group root the hint names a udev rule: nobody should join this group.
         assert!(permission_hint(Some("root")).contains("udev"));
         assert_eq!(owning_group(Path::new("/dev/null"), Path::new("/")).as_deref(), Some("root"));
     }
 
     #[test]
-    fn a_lost_line_is_told_from_other_failures() {
+    fn a_lost_line_is_distinguished_from_other_failures() {
         for errno in [Errno::IO, Errno::NODEV, Errno::CONNRESET, Errno::PIPE] {
             assert!(matches!(PortError::in_use("p", errno), PortError::Closed { .. }), "{errno}");
         }

@@ -1,22 +1,22 @@
-//! Ports for event loops, which must never wait inside one.
+//! Ports for event loops, which must not block.
 
 use std::os::fd::BorrowedFd;
 
 use super::error::PortError;
 use super::link::{ByteLink, CanLink};
 
-/// What an event loop needs of a port beside reads that wait for nothing, which is what a timeout of
-/// zero asks for.
+/// The functions of a port that an event loop needs. Reads that do not block are reads with a
+/// timeout of zero.
 pub trait Evented {
-    /// What is readable when there is something to receive. A port without one has its answer as
-    /// soon as it was asked.
+    /// The descriptor that becomes readable when there are received data. A port without one has
+    /// its answer at once.
     fn descriptor(&self) -> Option<BorrowedFd<'_>>;
 
-    /// Sends what the port did not take at once; whether some of it is left still.
+    /// Sends queued data that the port did not accept at once. Returns whether some are still
+    /// queued.
     fn flush(&mut self) -> Result<bool, PortError>;
 
-    /// Drops what was written and has not left, where that can be done: the end of it may be a part
-    /// of a request.
+    /// Drops written data that were not sent yet, if possible. Their end may be part of a request.
     fn discard(&mut self) -> Result<(), PortError> {
         Ok(())
     }
@@ -36,11 +36,11 @@ impl<E: Evented + ?Sized> Evented for Box<E> {
     }
 }
 
-/// A byte line whose writes wait for nothing: what the port does not take at once is kept for
+/// A byte line with non-blocking writes. Bytes that the port does not accept at once are queued for
 /// [`Evented::flush`], and for the next read or write.
 pub trait EventBytes: ByteLink + Evented {}
 
-/// A CAN bus whose sendings wait for nothing, as the writes of [`EventBytes`] do.
+/// A CAN bus with non-blocking sends, like the writes of [`EventBytes`].
 pub trait EventCan: CanLink + Evented {}
 
 impl<T: ByteLink + Evented> EventBytes for T {}

@@ -1,4 +1,4 @@
-//! Ports that misbehave: a program's handling of errors, rehearsed on any port.
+//! Ports with faults, to test a program's error handling on any port.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use crate::fault::{Faults, Lane, Unit, Way};
 
 /// A byte line with faults in both directions.
 ///
-/// There is no thread: what is late in either direction moves while the program reads or writes.
+/// It has no thread: delayed data move while the program reads or writes.
 #[derive(Debug)]
 pub struct FaultBytes<B> {
     link: B,
@@ -27,12 +27,13 @@ pub struct FaultCan<C> {
 }
 
 impl<B: ByteLink> FaultBytes<B> {
-    /// Wraps `link`. [`Faults::on_serial`] finds what has no meaning here.
+    /// Wraps `link`. [`Faults::on_serial`] checks the faults.
     pub fn new(link: B, faults: &Faults) -> Self {
         Self::paced(link, faults, Duration::ZERO)
     }
 
-    /// Wraps a `link` that has no pace of its own: a byte takes so long, in either direction.
+    /// Wraps a `link` without a pace of its own. `byte` is the transmission time of a byte in each
+    /// direction.
     pub fn paced(link: B, faults: &Faults, byte: Duration) -> Self {
         FaultBytes { lanes: Lanes::new(faults, byte, (), link.clock()), link }
     }
@@ -51,14 +52,14 @@ impl<B: ByteLink> FaultBytes<B> {
 }
 
 impl<C: CanLink> FaultCan<C> {
-    /// Wraps `link`. [`Faults::on_can`] finds what has no meaning here.
-    /// Noise spares the drives that use `identifiers`.
+    /// Wraps `link`. [`Faults::on_can`] checks the faults. Noise avoids frames to the drives that
+    /// use `identifiers`.
     pub fn new(link: C, faults: &Faults, identifiers: Identifiers) -> Self {
         Self::paced(link, faults, identifiers, Duration::ZERO)
     }
 
-    /// Wraps a `link` that has no pace of its own: a frame takes so long, and both directions share
-    /// the bus.
+    /// Wraps a `link` without a pace of its own. `frame` is the transmission time of a frame; both
+    /// directions share the bus.
     pub fn paced(link: C, faults: &Faults, identifiers: Identifiers, frame: Duration) -> Self {
         FaultCan { lanes: Lanes::new(faults, frame, identifiers, link.clock()), link }
     }
@@ -140,7 +141,7 @@ fn fill(buffer: &mut [u8], mut next: impl FnMut() -> Option<u8>) -> usize {
     slots.map_while(|slot| next().map(|byte| *slot = byte)).count()
 }
 
-/// Both directions, and the clock they go by.
+/// Both directions, and their clock.
 #[derive(Debug)]
 struct Lanes<T: Unit> {
     clock: Clock,
@@ -159,12 +160,12 @@ impl<T: Unit> Lanes<T> {
         self.clock.now()
     }
 
-    /// The end of a wait that begins now.
+    /// The end of a wait that starts now.
     fn deadline(&self, timeout: Option<Duration>) -> Option<Instant> {
         timeout.map(|timeout| self.now() + timeout.into())
     }
 
-    /// How long to wait for the port: not beyond the deadline nor past what is due meanwhile.
+    /// Maximum wait for the port: until the deadline, or until the next unit is due.
     fn patience(&self, deadline: Option<Instant>) -> Option<Duration> {
         let first = [self.sent.due(), self.received.due(), deadline].into_iter().flatten().min();
         first.map(|first| first.since(self.now()).into())
@@ -178,7 +179,7 @@ mod tests {
 
     use super::*;
 
-    /// Sends back what it is sent, at once.
+    /// Returns sent data at once.
     struct Loopback<T>(VecDeque<T>);
 
     impl<T> Loopback<T> {
@@ -187,9 +188,9 @@ mod tests {
         }
     }
 
-    /// A port waits when it has nothing.
+    /// Waits like an idle port.
     fn idle(timeout: Option<Duration>) {
-        std::thread::sleep(timeout.expect("nothing will ever come"));
+        std::thread::sleep(timeout.expect("no data will come"));
     }
 
     impl<T: Send> Link for Loopback<T> {}
@@ -231,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_are_late_both_ways_arrive_in_one_read() {
+    fn bytes_delayed_in_both_directions_arrive_in_one_read() {
         let mut port = bytes("delay=5ms");
         let began = Moment::now();
         port.write(&[1, 2, 3]).unwrap();
@@ -242,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_read_ends_at_its_timeout_and_what_is_late_comes_with_the_next() {
+    fn a_read_ends_at_its_timeout_and_late_bytes_come_with_the_next() {
         let mut port = bytes("delay=1s,only=received");
         port.write(&[1]).unwrap();
         let mut buffer = [0; 8];

@@ -14,20 +14,20 @@ use super::descriptors::Listed;
 use super::error::PortError;
 use super::link::{ByteLink, Link};
 
-/// How long the far end may take no byte at all before a write fails.
+/// Timeout of a write while the peer accepts no byte.
 pub(super) const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A [`ByteLink`] on a file descriptor.
 #[derive(Debug)]
 pub struct FdLink {
-    /// Before the descriptor: fields are dropped in order.
+    /// Declared before the descriptor, because fields are dropped in order.
     _listed: Listed,
     fd: OwnedFd,
     port: String,
 }
 
 impl FdLink {
-    /// Makes a link of an open descriptor, which becomes non-blocking. `port` is for messages.
+    /// Makes a link from an open descriptor, which becomes non-blocking. `port` is for messages.
     pub fn new(fd: impl Into<OwnedFd>, port: impl Into<String>) -> Result<Self, PortError> {
         let (fd, port) = (fd.into(), port.into());
         fcntl_getfl(&fd)
@@ -45,7 +45,7 @@ impl FdLink {
     }
 }
 
-/// A link that several hold: the descriptor is the kernel's to share.
+/// A link with several owners: the kernel shares the descriptor.
 impl Link for Arc<FdLink> {}
 
 impl ByteLink for Arc<FdLink> {
@@ -91,7 +91,7 @@ impl FdLink {
         Ok(())
     }
 
-    /// Writes as many of `bytes` as are taken at once.
+    /// Writes the part of `bytes` that the kernel accepts at once. Returns its size.
     pub(super) fn offer(&self, bytes: &[u8]) -> Result<usize, PortError> {
         loop {
             return match write(&self.fd, bytes) {
@@ -103,7 +103,7 @@ impl FdLink {
         }
     }
 
-    /// Drops what was written and has not left. A socket has no such thing.
+    /// Drops written bytes that were not sent yet. This is not possible on a socket.
     pub(super) fn discard(&self) -> Result<(), PortError> {
         match tcflush(&self.fd, QueueSelector::OFlush) {
             Ok(()) | Err(Errno::NOTTY | Errno::OPNOTSUPP) => Ok(()),
@@ -111,7 +111,7 @@ impl FdLink {
         }
     }
 
-    /// The far end takes nothing.
+    /// The error if the peer accepts no bytes.
     pub(super) fn stalled(&self) -> PortError {
         PortError::Stalled {
             port: self.port.clone(),
@@ -136,7 +136,7 @@ impl FdLink {
     }
 }
 
-/// Waits for `event`, an error or a hang-up on `fd`; false when the time is over.
+/// Waits for `event`, an error or a hang-up on `fd`. Returns false after the timeout.
 pub(super) fn wait(
     fd: BorrowedFd<'_>,
     event: PollFlags,
@@ -152,7 +152,7 @@ pub(super) fn wait(
     }
 }
 
-/// `span` as the kernel takes it; a span beyond its range is cut to half a million years.
+/// `span` for the kernel. A span beyond its range is cut to half a million years.
 pub(crate) fn timespec(span: Duration) -> Timespec {
     Timespec::try_from(span.min(Duration::from_secs(1 << 44))).unwrap_or_default()
 }

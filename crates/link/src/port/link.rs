@@ -7,26 +7,26 @@ use motorlink_proto::can::CanFrame;
 use super::error::PortError;
 use crate::clock::Clock;
 
-/// What serial lines and CAN buses have in common. A wrapper says what is [within](Self::within), and has
-/// the rest from there.
+/// The common functions of serial lines and CAN buses. A wrapper implements
+/// [`within`](Self::within); the other functions then forward to the wrapped link.
 pub trait Link: Send {
     /// The link that this one wraps.
     fn within(&self) -> Option<&dyn Link> {
         None
     }
 
-    /// The clock that its waits go by, where that is not the machine's.
+    /// The clock of its waits; `None` means the machine's clock.
     fn clock(&self) -> Option<Clock> {
         self.within()?.clock()
     }
 
-    /// Whether nothing that a former user of the port asked can be answered on it, because the drives
-    /// came with it.
+    /// Whether there are no pending replies to a former user of the port, because the drives were
+    /// started with it.
     fn is_fresh(&self) -> bool {
         self.within().is_some_and(Link::is_fresh)
     }
 
-    /// Why what is sent may not get to the drives, as far as an adapter tells.
+    /// Why sent data may not reach the drives, if an adapter reported it.
     fn trouble(&self) -> Option<&'static str> {
         self.within()?.trouble()
     }
@@ -51,20 +51,20 @@ pub trait ByteLink: Link {
     /// Writes all of `bytes`, with one system call where the kernel takes them at once.
     fn write(&mut self, bytes: &[u8]) -> Result<(), PortError>;
 
-    /// Reads what is there, waiting at most `timeout` (`None`: without limit) for the first byte.
-    /// `Ok(0)` means that nothing came in time. A signal does not end the wait: who wants to look
-    /// at a flag now and then passes a short `timeout`, or wraps the link in one that does so and
-    /// gives up with [`PortError::Io`] of the kind `Interrupted`.
+    /// Reads received bytes. Waits at most `timeout` for the first byte (`None` means no limit).
+    /// `Ok(0)` means that no byte came in time. A signal does not end the wait. To check a flag
+    /// periodically, pass a short `timeout`, or wrap the link in one that returns [`PortError::Io`]
+    /// of the kind `Interrupted`.
     fn read(&mut self, buffer: &mut [u8], timeout: Option<Duration>) -> Result<usize, PortError>;
 }
 
 /// A CAN bus.
 pub trait CanLink: Link {
-    /// Hands `frame` to the bus.
+    /// Sends `frame` on the bus.
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError>;
 
-    /// The next frame from the bus, waiting at most `timeout` (`None`: without limit). Frames that
-    /// this link sent are not among them.
+    /// The next frame from the bus. Waits at most `timeout` (`None` means no limit). Frames sent by
+    /// this link are not returned.
     fn receive(&mut self, timeout: Option<Duration>) -> Result<Option<CanFrame>, PortError>;
 }
 

@@ -1,11 +1,11 @@
 //! Ports: a serial line or a CAN bus, opened by name.
 //!
-//! [`PortName::open_bytes`] and [`PortName::open_can`] give a [`ByteLink`] or a [`CanLink`]. Links
-//! start no thread, allocate nothing in an exchange, and make one system call to send, one to wait
-//! and one to receive.
+//! [`PortName::open_bytes`] and [`PortName::open_can`] open a [`ByteLink`] or a [`CanLink`]. Links
+//! start no thread, allocate nothing during an exchange, and make one system call each to send, to
+//! wait and to receive.
 //!
-//! A [`Scheme`] is one kind of port: how its names are written, what they open, what of it this
-//! machine has. Those of this crate are always there; [`register`] adds those of others.
+//! A [`Scheme`] is one kind of port: the syntax of its names, how to open them, and the ports of
+//! this machine. The schemes of this crate are built in; [`register`] adds others.
 
 mod deadline;
 mod descriptors;

@@ -1,13 +1,13 @@
-//! What a port's name is made of.
+//! The parts of a port's name.
 
 use crate::text::{is_printable, printable};
 
-/// A name as it was given, on its way through a scheme.
+/// A given name while a scheme parses it.
 #[derive(Debug)]
 pub struct Given<'a> {
-    /// All of it, for messages.
+    /// The whole name, for messages.
     pub name: &'a str,
-    /// What stands before the options, which follow the last `?`, so that a path may contain one.
+    /// The part before the options. The options follow the last `?`, so a path may contain a `?`.
     pub body: &'a str,
     options: Vec<(&'a str, &'a str)>,
 }
@@ -26,7 +26,7 @@ impl<'a> Given<'a> {
         Some(self.options.remove(place).1)
     }
 
-    /// Refuses options that nobody took; `known` are those there are.
+    /// Refuses options that were not taken. `known` are the valid options.
     pub fn refuse_others(&self, known: &[&str]) -> Result<(), NameError> {
         let Some((key, _)) = self.options.first() else { return Ok(()) };
         if known.contains(key) {
@@ -37,7 +37,7 @@ impl<'a> Given<'a> {
         Err(NameError::UnknownOption { name: self.name.to_owned(), key: (*key).to_owned(), known })
     }
 
-    /// A part that must not be empty; `example` shows how a name has it.
+    /// Checks that a part is not empty. `example` is a valid name for the error.
     pub fn present<'p>(
         &self,
         part: &'p str,
@@ -47,25 +47,25 @@ impl<'a> Given<'a> {
         present(self.name, part, what, example)
     }
 
-    /// What to say about an option whose value cannot be.
+    /// The error for an option with an invalid value.
     pub fn bad_option(&self, key: &'static str, value: &str, usable: String) -> NameError {
         let (name, value) = (self.name.to_owned(), value.to_owned());
         NameError::BadOption { name, key, value, usable }
     }
 }
 
-/// Why a string names no port.
+/// Why a string is not the name of a port.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NameError {
-    /// No form starts like this.
-    #[error("`{name}` names no port; {}{forms}", suggestion(.nearest.as_deref()))]
+    /// No form has this beginning.
+    #[error("`{name}` is not the name of a port; {}{forms}", suggestion(.nearest.as_deref()))]
     UnknownForm {
-        /// What was given.
+        /// The given name.
         name: String,
-        /// What may have been meant.
+        /// A similar valid name.
         nearest: Option<String>,
-        /// The forms there are.
+        /// The valid forms.
         forms: String,
     },
     /// It has characters that a terminal does not show as they are.
@@ -74,10 +74,10 @@ pub enum NameError {
         /// What was given, without these characters.
         name: String,
     },
-    /// A port of this form exists on other systems only.
-    #[error("`{name}`: `{scheme}:` is there on {systems} only")]
+    /// The form exists on other systems only.
+    #[error("`{name}`: `{scheme}:` exists on {systems} only")]
     OtherSystem {
-        /// What was given.
+        /// The given name.
         name: String,
         /// Its scheme.
         scheme: &'static str,
@@ -87,49 +87,49 @@ pub enum NameError {
     /// The part after the scheme is missing.
     #[error("`{name}` lacks {what}; write it like {example}")]
     Incomplete {
-        /// What was given.
+        /// The given name.
         name: String,
         /// What is missing.
         what: &'static str,
-        /// How it is done.
+        /// A valid name.
         example: &'static str,
     },
-    /// What stands behind `slcan:` is a port without bytes.
+    /// The part after `slcan:` is not a port for bytes.
     #[error("`{name}`: there is no serial line at `{behind}` for the adapter")]
     NoLineBehind {
-        /// What was given.
+        /// The given name.
         name: String,
-        /// The part behind the scheme.
+        /// The part after the scheme.
         behind: String,
     },
     /// An option that this form does not have.
-    #[error("`{name}` has the unknown option `{key}`; there is {known}")]
+    #[error("`{name}` has the unknown option `{key}`; valid options: {known}")]
     UnknownOption {
-        /// What was given.
+        /// The given name.
         name: String,
         /// The option.
         key: String,
-        /// The options there are.
+        /// The valid options.
         known: String,
     },
     /// An option that is given twice.
     #[error("`{name}` has the option `{key}` twice")]
     OptionTwice {
-        /// What was given.
+        /// The given name.
         name: String,
         /// The option.
         key: String,
     },
-    /// An option with a value that it cannot have.
+    /// An option with an invalid value.
     #[error("`{name}`: {key} cannot be `{value}`; use {usable}")]
     BadOption {
-        /// What was given.
+        /// The given name.
         name: String,
         /// The option.
         key: &'static str,
         /// Its value.
         value: String,
-        /// The values it can have.
+        /// The valid values.
         usable: String,
     },
 }

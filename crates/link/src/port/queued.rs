@@ -1,4 +1,4 @@
-//! Links that keep what their port does not take at once.
+//! Links with a queue for data that their port does not accept at once.
 
 use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd};
@@ -13,12 +13,12 @@ use super::fd::{FdLink, WRITE_TIMEOUT};
 use super::link::{ByteLink, CanLink, Link};
 use super::socketcan::SocketCanLink;
 
-/// A line on a descriptor with what it has not taken yet.
+/// A line on a descriptor, with its queue.
 #[derive(Debug)]
 pub(super) struct QueuedBytes {
     link: FdLink,
     queue: Vec<u8>,
-    /// Since when the far end has taken nothing.
+    /// Since when the peer has accepted nothing.
     stuck: Instant,
 }
 
@@ -71,12 +71,12 @@ impl Evented for QueuedBytes {
     }
 }
 
-/// A CAN interface with the frames that it had no room for.
+/// A CAN interface, with its queue of frames.
 #[derive(Debug)]
 pub(super) struct QueuedCan {
     link: SocketCanLink,
     queue: VecDeque<CanFrame>,
-    /// Since when the interface has taken nothing.
+    /// Since when the interface has accepted nothing.
     stuck: Instant,
 }
 
@@ -131,12 +131,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_the_far_end_does_not_take_at_once_follows_in_order() {
+    fn queued_bytes_follow_in_order() {
         let (near, mut far) = UnixStream::pair().unwrap();
         let mut line = QueuedBytes::new(FdLink::new(near, "pair").unwrap());
         let sent: Vec<u8> = (0..1_000_000_u32).map(|n| (n % 251) as u8).collect();
         sent.chunks(1000).for_each(|chunk| line.write(chunk).unwrap());
-        assert!(line.flush().unwrap(), "a socket takes no megabyte at once");
+        assert!(line.flush().unwrap(), "a socket does not accept a megabyte at once");
         let mut received = vec![0; sent.len()];
         let mut filled = 0;
         while filled < received.len() {

@@ -1,4 +1,4 @@
-//! The schemes there are, and the ports that their names open.
+//! The known schemes, and the ports that their names open.
 
 use std::str::FromStr;
 use std::sync::{PoisonError, RwLock};
@@ -12,15 +12,15 @@ use super::schemes::BUILT_IN;
 
 static REGISTERED: RwLock<Vec<&'static dyn Scheme>> = RwLock::new(Vec::new());
 
-/// Makes a scheme known to this process. One of the same name is replaced, so that it does no harm
-/// to register one twice.
+/// Registers a scheme in this process. It replaces a scheme of the same name, so it can be
+/// registered twice.
 pub fn register(scheme: &'static dyn Scheme) {
     let mut registered = REGISTERED.write().unwrap_or_else(PoisonError::into_inner);
     registered.retain(|other| other.name() != scheme.name());
     registered.push(scheme);
 }
 
-/// The schemes there are.
+/// The known schemes.
 pub fn schemes() -> Vec<&'static dyn Scheme> {
     let registered = REGISTERED.read().unwrap_or_else(PoisonError::into_inner);
     BUILT_IN.iter().chain(registered.iter()).copied().collect()
@@ -87,7 +87,7 @@ impl PortName {
     }
 }
 
-/// The forms of all schemes that carry what is wanted.
+/// The forms of all schemes that carry `wanted`.
 fn listed(
     schemes: &[&'static dyn Scheme],
     is_wanted: impl Fn(Carries) -> bool,
@@ -100,7 +100,7 @@ fn listed(
     if texts.is_empty() { end.to_owned() } else { format!("{} {last} {end}", texts.join(", ")) }
 }
 
-/// The port that someone who wrote `name` may have meant.
+/// The port whose name is most similar to `name`.
 fn nearest(name: &str, schemes: &[&'static dyn Scheme]) -> Option<String> {
     let Some((scheme, rest)) = name.split_once(':') else {
         return (!name.is_empty()).then(|| match name {

@@ -1,4 +1,4 @@
-//! What a kind of port is, and the name of one port.
+//! A kind of port, and the name of a port.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -9,27 +9,27 @@ use super::event::{EventBytes, EventCan};
 use super::link::{ByteLink, CanLink};
 use super::name::{Given, NameError};
 
-/// One kind of port: how its names are written and what they mean. All that is known of the kind
-/// is said here; [`register`](super::register) makes it known to every program part.
+/// One kind of port: the syntax and the meaning of its names. Everything about the kind is defined
+/// in its implementation. [`register`](super::register) makes it known to the whole program.
 pub trait Scheme: Sync {
-    /// What stands before the colon.
+    /// The part before the colon.
     fn name(&self) -> &'static str;
 
-    /// How its names are written, for help and errors.
+    /// The forms of its names, for help and errors.
     fn forms(&self) -> &'static [Form];
 
-    /// Whether it takes a name without a scheme, such as `/dev/ttyACM0`.
+    /// Whether it accepts a name without a scheme, such as `/dev/ttyACM0`.
     fn is_bare(&self, _name: &str) -> bool {
         false
     }
 
-    /// The systems that have it, as Rust calls them; empty: every one.
+    /// The systems that support it, by Rust's names; empty means all.
     fn systems(&self) -> &'static [&'static str] {
         &[]
     }
 
-    /// The port of a name; `rest` is what stands between the colon and the options, which follow the
-    /// last `?` and are taken from `given`. `all` is there for a scheme whose ports lie behind those of others.
+    /// Parses a name. `rest` is the part between the colon and the options. The options follow the
+    /// last `?`; take them from `given`. `all` is for a scheme whose ports wrap those of others.
     fn parse(
         &self,
         rest: &str,
@@ -42,19 +42,19 @@ pub trait Scheme: Sync {
         &[]
     }
 
-    /// What of its kind this machine has; `root` is where its file system begins. Nothing is
-    /// opened: that would reset some boards.
+    /// The ports of this kind on this machine. `root` is the root of its file system. No port is
+    /// opened, because that would reset some boards.
     fn list(&self, _root: &Path) -> Vec<PortInfo> {
         Vec::new()
     }
 }
 
-/// One way to write the names of a scheme.
+/// One form of the names of a scheme.
 #[derive(Debug, Clone, Copy)]
 pub struct Form {
-    /// The name, with capitals for what a user puts there.
+    /// The name, with capitals for the parts that a user replaces.
     pub text: &'static str,
-    /// What it is.
+    /// A description.
     pub help: &'static str,
     /// What its ports carry.
     pub carries: Carries,
@@ -63,45 +63,45 @@ pub struct Form {
 /// What a port carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Carries {
-    /// Bytes: it is a serial line.
+    /// Bytes: a serial line.
     Bytes,
-    /// CAN frames: it is a bus.
+    /// CAN frames: a bus.
     Frames,
     /// Either.
     Both,
 }
 
 impl Carries {
-    /// Whether a port that carries this serves who needs `wanted`.
+    /// Whether a port that carries this can be used for `wanted`.
     pub fn serves(self, wanted: Carries) -> bool {
         self == wanted || self == Carries::Both
     }
 }
 
-/// One port, which its scheme has parsed.
+/// A parsed port.
 pub trait Port: fmt::Debug + Send + Sync {
     /// The name without its options.
     fn body(&self) -> String;
 
-    /// The options that are not the default, as they are written.
+    /// The options that differ from the default, as text.
     fn options(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// The name as it would be written.
+    /// The whole name.
     fn name(&self) -> String {
         let (body, options) = (self.body(), self.options());
-        // A `?` in the body would begin the options if none followed it.
+        // Without another `?`, a `?` in the body would start the options.
         let has_end = !options.is_empty() || body.contains('?');
         if has_end { format!("{body}?{}", options.join("&")) } else { body }
     }
 
-    /// The port as a serial line, if it is one.
+    /// The port as a serial line; `None` if it is not one.
     fn as_line(&self) -> Option<&dyn LinePort> {
         None
     }
 
-    /// The port as a CAN bus, if it is one.
+    /// The port as a CAN bus; `None` if it is not one.
     fn as_can(&self) -> Option<&dyn CanPort> {
         None
     }
@@ -114,22 +114,22 @@ pub trait Port: fmt::Debug + Send + Sync {
 
 /// A port that carries bytes.
 pub trait LinePort {
-    /// Opens it, whatever its time is.
+    /// Opens the port, on any clock.
     fn open(&self) -> Result<Box<dyn ByteLink>, PortError>;
 
-    /// Opens it for an event loop, whose time is the machine's.
+    /// Opens the port for an event loop, on the machine's clock.
     fn open_event(&self) -> Result<Box<dyn EventBytes>, PortError>;
 
-    /// What messages call it.
+    /// The name of the port in messages.
     fn label(&self) -> String;
 
-    /// Its baud rate, where it has one.
+    /// The baud rate; `None` if the port has none.
     fn baud(&self) -> Option<u32> {
         None
     }
 
-    /// The same port at another baud rate: close the open one before it is opened. `None` where
-    /// there is no baud rate.
+    /// The same port at another baud rate; `None` if the port has none. Close the open one before
+    /// this is opened.
     fn at_baud(&self, _baud: u32) -> Option<PortName> {
         None
     }
@@ -137,13 +137,13 @@ pub trait LinePort {
 
 /// A port that carries CAN frames.
 pub trait CanPort {
-    /// Opens it, whatever its time is.
+    /// Opens the port, on any clock.
     fn open(&self) -> Result<Box<dyn CanLink>, PortError>;
 
-    /// Opens it for an event loop, whose time is the machine's.
+    /// Opens the port for an event loop, on the machine's clock.
     fn open_event(&self) -> Result<Box<dyn EventCan>, PortError>;
 
-    /// Whether it takes frames no faster than the bus carries them. Others swallow more.
+    /// Whether it accepts frames no faster than the bus transmits them. Other ports buffer more.
     fn is_paced(&self) -> bool {
         false
     }
@@ -202,14 +202,14 @@ impl PortName {
     }
 }
 
-/// As it would be written: options that have their default are left out.
+/// The whole name. Options with their default value are omitted.
 impl fmt::Display for PortName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0.name())
     }
 }
 
-/// Ports are the same if they are written the same.
+/// Two ports are equal if their names are equal.
 impl PartialEq for PortName {
     fn eq(&self, other: &Self) -> bool {
         self.to_string() == other.to_string()
@@ -223,18 +223,17 @@ impl Eq for PortName {}
 pub struct PortInfo {
     /// The port's name, as every command takes it.
     pub name: String,
-    /// What it carries.
+    /// Bytes or frames.
     pub carries: Carries,
     /// Manufacturer and product, or the kernel driver.
     pub description: Option<String>,
-    /// A second path that stays the same when devices are plugged in in another order.
+    /// A second path that does not depend on the order in which devices are plugged in.
     pub stable_path: Option<PathBuf>,
-    /// Why it cannot be used at once, and what to do.
+    /// Why it cannot be used now, and what to do.
     pub problem: Option<String>,
 }
 
-/// The scheme that `body` begins with, or the one that takes it without, and the port that it names
-/// there.
+/// Parses `body` with the scheme at its beginning, or with the scheme that accepts it without one.
 pub(super) fn parse(
     body: &str,
     given: &mut Given<'_>,

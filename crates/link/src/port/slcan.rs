@@ -1,4 +1,4 @@
-//! CAN adapters that speak slcan over a byte line.
+//! CAN adapters with slcan on a byte line.
 
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
@@ -13,32 +13,32 @@ use super::event::Evented;
 use super::link::{ByteLink, CanLink, Link};
 use crate::clock::Clock;
 
-/// How long an adapter may take to answer a command while it is opened. Many never answer some of
-/// them, so silence is no failure.
+/// Timeout of an adapter's answers while its channel is opened. Many adapters never answer some
+/// commands, so silence is not a failure.
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(60);
-/// How long after the end of a wait an adapter may go on sending what is not waited for.
+/// How long an adapter may continue to send after the end of a wait.
 const BABBLE: Duration = Duration::from_millis(100);
 
-/// Refusals without anything else between them that are more than a full queue.
+/// More consecutive refusals than this are not caused by a full queue.
 const REFUSALS: u32 = 2;
 
 /// A [`CanLink`] through an slcan adapter. The channel is closed when the link is dropped.
 ///
-/// An adapter's refusal of a single frame does not end the line: the frame's sender
-/// notices that no motor answered. One that refuses frame after frame has lost its channel, as after
-/// a reset, and is an error, so that it is opened anew.
+/// A single refused frame does not end the link: its sender sees that no motor answered. An adapter
+/// that refuses frame after frame has lost its channel, for example after a reset. This is an
+/// error, so that the link is reopened.
 #[derive(Debug)]
 pub struct SlcanLink<B: ByteLink> {
     line: B,
     clock: Clock,
     codec: HostCodec,
     refused_in_a_row: u32,
-    /// Whether the adapter ever said anything.
+    /// Whether the adapter ever answered.
     is_heard: bool,
     port: String,
 }
 
-/// What came back for the commands of one step.
+/// The answers to the commands of one step.
 #[derive(Default)]
 struct Answers {
     done: u32,
@@ -50,8 +50,8 @@ struct Answers {
 impl<B: ByteLink> SlcanLink<B> {
     /// Opens the CAN channel of the adapter on `line` at `bitrate`. `port` is for messages.
     ///
-    /// The commands are `C`, `S` and `O`, after an empty line that ends whatever the adapter had
-    /// received of a former host.
+    /// The commands are `C`, `S` and `O`. An empty line before them ends an incomplete line of a
+    /// former host.
     pub fn open(line: B, port: impl Into<String>, bitrate: Bitrate) -> Result<Self, PortError> {
         let port = port.into();
         let (codec, clock) = (HostCodec::default(), line.clock().unwrap_or_default());
@@ -63,7 +63,8 @@ impl<B: ByteLink> SlcanLink<B> {
             is_heard: false,
             port: port.clone(),
         };
-        // A channel that was open still talks here, and may refuse the empty line.
+        // With an open channel the adapter still sends frames here, and it may refuse the empty
+        // line.
         let close = link.command(b"\rC\r", 2)?;
         let select = link.command(&bitrate.command(), 1)?;
         let open = link.command(b"O\r", 1)?;
@@ -86,7 +87,7 @@ impl<B: ByteLink> SlcanLink<B> {
         Ok(link)
     }
 
-    /// Sends `command` and gathers answers until `expected` of them came or none comes any more.
+    /// Sends `command` and collects answers until there are `expected` ones, or until the timeout.
     fn command(&mut self, command: &[u8], expected: u32) -> Result<Answers, PortError> {
         let before = self.codec.garbage();
         self.line.write(command)?;
@@ -102,13 +103,14 @@ impl<B: ByteLink> SlcanLink<B> {
                 None => break,
             }
         }
-        // On a busy bus the time may end in the middle of a frame.
+        // On a busy bus the timeout may be in the middle of a frame.
         let cut = self.codec.is_mid_line() && !answers.frames;
         answers.garbage = self.codec.garbage() > before || cut;
         Ok(answers)
     }
 
-    /// Reads more bytes into the codec; false when none came in time, or when they do not end.
+    /// Reads more bytes into the codec. Returns false after the timeout, or if the bytes do not
+    /// end.
     fn fill(&mut self, end: Option<Instant>) -> Result<bool, PortError> {
         if end.is_some_and(|end| self.clock.now().since(end) > BABBLE.into()) {
             return Ok(false);
@@ -180,7 +182,7 @@ impl<B: ByteLink> CanLink for SlcanLink<B> {
 
 impl<B: ByteLink> Drop for SlcanLink<B> {
     fn drop(&mut self) {
-        // The line may be gone already; then there is nobody to tell.
+        // The line may be closed already, so the error is ignored.
         let _ = self.line.write(b"C\r");
     }
 }

@@ -19,18 +19,18 @@ use super::fd::wait;
 use super::interface::Interface;
 use super::link::{CanLink, Link};
 
-/// The error class of a controller that left the bus, in the mask of the kernel's error frames.
+/// The error class of a controller that is bus-off, in the mask of the kernel's error frames.
 const BUS_OFF: u32 = 0x40;
-/// How long an interface may take no frame at all before a sending fails.
+/// Timeout of a send while the interface accepts no frame.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
-/// The kernel does not tell when an interface's queue has room again.
+/// Polling interval: the kernel does not report when an interface's queue has space.
 const ASK_AGAIN: Duration = Duration::from_micros(200);
 
-/// A [`CanLink`] on a CAN interface. Other programs on the same interface see the frames that it
-/// sends; it does not see them itself.
+/// A [`CanLink`] on a CAN interface. Other programs on the same interface receive its sent frames;
+/// it does not receive them itself.
 #[derive(Debug)]
 pub struct SocketCanLink {
-    /// Before the descriptor: fields are dropped in order.
+    /// Declared before the descriptor, because fields are dropped in order.
     _listed: Listed,
     socket: CanSocket,
     interface: String,
@@ -54,14 +54,14 @@ impl SocketCanLink {
         })?;
         match Interface::read(interface, Path::new("/sys")) {
             Some(Interface { is_up: false, .. }) => return Err(PortError::interface_down(port)),
-            // It would take frames and drop them.
+            // A bus-off interface would accept frames and drop them.
             Some(Interface { is_bus_off: true, .. }) => return Err(PortError::BusOff { port }),
             _ => {}
         }
         Ok(SocketCanLink { _listed: Listed::new(socket.as_fd()), socket, interface: port })
     }
 
-    /// Hands `frame` to the bus if the interface has room for it now.
+    /// Sends `frame` if the interface's queue has space now.
     pub(crate) fn offer(&mut self, frame: &CanFrame) -> Result<bool, PortError> {
         let frame = to_kernel(frame);
         loop {
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interface_that_is_not_there_is_named() {
+    fn a_missing_interface_is_reported() {
         let error = SocketCanLink::open("nocan9").expect_err("there is none");
         assert!(matches!(error, PortError::NoSuchInterface { .. } | PortError::NoCan), "{error:?}");
     }

@@ -1,19 +1,19 @@
-//! What the kernel says about devices.
+//! The kernel's data on devices.
 
 use std::fs;
 use std::path::Path;
 
 use crate::text::printable;
 
-/// From a tty up to its USB device there are at most this many directories.
+/// Maximum number of directories from a tty up to its USB device.
 const USB_DEPTH: usize = 4;
 
-/// Manufacturer and product of a device, or the driver that it has.
+/// Manufacturer and product of a device, or its driver.
 pub(super) fn description(device: &Path) -> Option<String> {
     usb_strings(device).or_else(|| driver(device))
 }
 
-/// Manufacturer and product of the USB device that `device` is a part of.
+/// Manufacturer and product of the USB device that contains `device`.
 fn usb_strings(device: &Path) -> Option<String> {
     let device = device.canonicalize().ok()?;
     let usb = device.ancestors().take(USB_DEPTH).find(|dir| dir.join("idVendor").exists())?;
@@ -31,7 +31,7 @@ fn driver(device: &Path) -> Option<String> {
     Some(driver.file_name()?.to_string_lossy().into_owned())
 }
 
-/// The names in a directory, sorted; none when there is no such directory.
+/// The sorted names in a directory; empty if there is no such directory.
 pub(super) fn names_in(directory: &Path) -> Vec<String> {
     let mut names: Vec<_> = fs::read_dir(directory)
         .into_iter()
@@ -42,7 +42,7 @@ pub(super) fn names_in(directory: &Path) -> Vec<String> {
     names
 }
 
-/// The text of a file, as a terminal may show it; nothing when there is none.
+/// The text of a file, safe for a terminal; `None` if there is none.
 pub(super) fn read(file: &Path) -> Option<String> {
     let text = fs::read_to_string(file).ok()?;
     Some(printable(text.trim())).filter(|text| !text.is_empty())

@@ -1,4 +1,4 @@
-//! Taps: whoever wants to see what passes a port.
+//! Taps: observers of a port's traffic.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use super::error::PortError;
 use super::link::{ByteLink, CanLink, Link};
 use crate::clock::Clock;
 
-/// Which way data went, as the program sees it.
+/// A direction, from the program's point of view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Direction {
     /// From the program to the port.
@@ -18,10 +18,10 @@ pub enum Direction {
     Received,
 }
 
-/// Shows an observer every chunk that passes a byte line.
+/// Passes every chunk of a byte line to an observer.
 ///
-/// The observer gets the direction, the time since the tap was made, and the bytes; what it is
-/// shown as sent was taken by the port.
+/// The observer gets the direction, the time since the tap was made, and the bytes. Sent bytes are
+/// passed after the port accepted them.
 #[derive(Debug)]
 pub struct TapBytes<B, F> {
     link: B,
@@ -29,7 +29,7 @@ pub struct TapBytes<B, F> {
     time: Stopwatch,
 }
 
-/// Shows an observer every frame that passes a CAN port, as [`TapBytes`] does for bytes.
+/// Passes every frame of a CAN port to an observer, like [`TapBytes`] for bytes.
 #[derive(Debug)]
 pub struct TapCan<C, F> {
     link: C,

@@ -1,4 +1,4 @@
-//! One served port: its door, its clients and its station.
+//! One served port: its listener, its clients and its station.
 
 use std::io::ErrorKind::{ConnectionAborted, Interrupted, WouldBlock};
 use std::net::TcpListener;
@@ -10,25 +10,26 @@ use motorlink_slcan::Device;
 use rustix::event::{PollFd, PollFlags};
 use rustix::io::{Errno, read, write};
 
+use super::browser::{Gate, HELD};
 use super::pty::{Pty, is_held};
 use super::station::Station;
-use super::stranger::{Gate, HELD};
-use super::unix::UnixDoor;
+use super::unix::UnixServer;
 use crate::port::keep_alive;
 
-/// Bytes that are taken at once from the clients of a CAN bus together, or from the one of a line.
+/// Maximum number of bytes per turn, from all clients of a CAN bus together, or from the client of
+/// a line.
 const CHUNK: usize = 4096;
 
-/// How long the door stays shut when a newcomer cannot be let in for want of descriptors.
+/// Back-off after `accept` fails because there are no free descriptors.
 const PAUSE: Micros = Micros::from_millis(100);
 
-/// Where clients come from.
-enum Door {
-    /// The one client is whoever holds the pty; its line waits here while nobody does.
+/// The source of clients.
+enum Listener {
+    /// The one client is the program that has the pty open. Otherwise its line is stored here.
     Pty(Pty, Option<Client>),
     /// Each connection is a client.
     Tcp(TcpListener),
-    Unix(UnixDoor),
+    Unix(UnixServer),
 }
 
 pub(super) enum AnyStation {
@@ -36,11 +37,11 @@ pub(super) enum AnyStation {
     Can(Box<dyn Station<CanFrame>>),
 }
 
-/// Room that all endpoints use in turn.
+/// Buffers shared by all endpoints.
 pub(super) struct Scratch {
     chunk: [u8; HELD + CHUNK],
     frames: Vec<CanFrame>,
-    /// Bytes that clients did not read in time.
+    /// Number of bytes that clients did not read in time.
     pub(super) dropped: u64,
 }
 
@@ -51,85 +52,86 @@ impl Default for Scratch {
 }
 
 pub(super) struct Endpoint {
-    door: Door,
+    listener: Listener,
     clients: Vec<Client>,
     station: AnyStation,
-    /// Until then nobody is let in.
-    shut_until: Option<Instant>,
+    /// No client is accepted before this time.
+    paused_until: Option<Instant>,
 }
 
 struct Client {
     line: OwnedFd,
-    /// Its adapter; idle on a serial line.
+    /// Its slcan adapter; unused on a serial line.
     adapter: Device,
-    /// What its first bytes have to pass.
+    /// The check of its first bytes.
     gate: Gate,
     outgoing: Vec<u8>,
     is_gone: bool,
-    /// It left bytes that nobody read.
+    /// Whether it left unread bytes.
     left_bytes: bool,
 }
 
 impl Endpoint {
     pub(super) fn on_pty(pty: Pty, line: OwnedFd, station: AnyStation) -> Self {
-        Self::new(Door::Pty(pty, Some(Client::new(line, Gate::open()))), station)
+        Self::new(Listener::Pty(pty, Some(Client::new(line, Gate::open()))), station)
     }
 
     pub(super) fn on_tcp(listener: TcpListener, station: AnyStation) -> Self {
-        Self::new(Door::Tcp(listener), station)
+        Self::new(Listener::Tcp(listener), station)
     }
 
-    pub(super) fn on_unix(door: UnixDoor, station: AnyStation) -> Self {
-        Self::new(Door::Unix(door), station)
+    pub(super) fn on_unix(server: UnixServer, station: AnyStation) -> Self {
+        Self::new(Listener::Unix(server), station)
     }
 
-    fn new(door: Door, station: AnyStation) -> Self {
-        Endpoint { door, clients: Vec::new(), station, shut_until: None }
+    fn new(listener: Listener, station: AnyStation) -> Self {
+        Endpoint { listener, clients: Vec::new(), station, paused_until: None }
     }
 
-    /// Appends what is to be polled: the clients, then the door. The door is
-    /// looked at last: when a client's bytes are seen, its coming is seen as well.
+    /// Appends the descriptors to poll: the clients, then the listener. The listener is last, so
+    /// that a client's connection is seen no later than its bytes.
     pub(super) fn watch<'a>(&'a self, fds: &mut Vec<PollFd<'a>>) {
-        // That a client is gone is told in any case.
-        let listen = if self.station.wants() { PollFlags::IN } else { PollFlags::RDHUP };
+        // A disconnection is always reported.
+        let listen = if self.station.accepts_input() { PollFlags::IN } else { PollFlags::RDHUP };
         fds.extend(self.clients.iter().map(|client| PollFd::new(&client.line, listen)));
-        let coming = if self.shut_until.is_some() { PollFlags::empty() } else { PollFlags::IN };
-        fds.push(match &self.door {
-            Door::Pty(pty, _) => PollFd::new(pty.comings(), coming),
-            Door::Tcp(listener) => PollFd::new(listener, coming),
-            Door::Unix(door) => PollFd::new(door.listener(), coming),
+        let coming = if self.paused_until.is_some() { PollFlags::empty() } else { PollFlags::IN };
+        fds.push(match &self.listener {
+            Listener::Pty(pty, _) => PollFd::new(pty.openings(), coming),
+            Listener::Tcp(listener) => PollFd::new(listener, coming),
+            Listener::Unix(server) => PollFd::new(server.listener(), coming),
         });
     }
 
-    /// How many descriptors [`watch`](Self::watch) appends.
+    /// Number of descriptors that [`watch`](Self::watch) appends.
     pub(super) fn watched(&self) -> usize {
         self.clients.len() + 1
     }
 
-    /// When something is to be done without being asked.
+    /// When the endpoint has something to do without an event.
     pub(super) fn deadline(&self) -> Option<Instant> {
-        self.shut_until.into_iter().chain(self.station.deadline()).min()
+        self.paused_until.into_iter().chain(self.station.deadline()).min()
     }
 
-    /// Does what is due. `ready` says what the watched descriptors have.
+    /// Handles events and deadlines. `ready` has the events of the watched descriptors.
     pub(super) fn serve(&mut self, now: Instant, ready: &[PollFlags], scratch: &mut Scratch) {
-        let door_is_ready = ready.last().is_some_and(|events| !events.is_empty());
-        if door_is_ready && let Door::Pty(pty, _) = &self.door {
-            pty.forget_comings();
+        let listener_is_ready = ready.last().is_some_and(|events| !events.is_empty());
+        if listener_is_ready && let Listener::Pty(pty, _) = &self.listener {
+            pty.clear_openings();
         }
         for (index, events) in ready.iter().take(self.clients.len()).enumerate() {
-            // Before someone new is let in, all that the others did is seen, and who left.
-            if self.station.wants() && (!events.is_empty() || door_is_ready) {
+            // Before a client is accepted, the data and the disconnections of the others are
+            // handled.
+            if self.station.accepts_input() && (!events.is_empty() || listener_is_ready) {
                 self.receive(now, index, scratch);
             } else if events.intersects(PollFlags::HUP | PollFlags::RDHUP | PollFlags::ERR) {
                 let client = &mut self.clients[index];
                 (client.is_gone, client.left_bytes) = (true, true);
             }
         }
-        self.see_off(now);
-        let reopens = self.shut_until.take_if(|until| *until <= now).is_some();
+        self.remove_disconnected(now);
+        let reopens = self.paused_until.take_if(|until| *until <= now).is_some();
         let known = self.clients.len();
-        if door_is_ready || reopens || self.is_taken_unseen() {
+        if listener_is_ready || reopens || self.was_opened_unseen() {
             self.admit(now);
         }
         for newcomer in known..self.clients.len() {
@@ -143,11 +145,11 @@ impl Endpoint {
         }
     }
 
-    /// Lets go of the clients that left.
-    fn see_off(&mut self, now: Instant) {
+    /// Removes disconnected clients.
+    fn remove_disconnected(&mut self, now: Instant) {
         for mut client in self.clients.extract_if(.., |client| client.is_gone) {
-            self.station.left(now);
-            if let Door::Pty(pty, waiting) = &mut self.door {
+            self.station.client_disconnected(now);
+            if let Listener::Pty(pty, waiting) = &mut self.listener {
                 pty.forget_client(client.left_bytes);
                 client.adapter.forget_line();
                 (client.is_gone, client.left_bytes) = (false, false);
@@ -156,13 +158,14 @@ impl Endpoint {
         }
     }
 
-    /// Whether someone opened the pty while its events were being dropped.
-    fn is_taken_unseen(&self) -> bool {
-        matches!(&self.door, Door::Pty(_, Some(line)) if is_held(&line.line))
+    /// Whether a program opened the pty while its events were being dropped.
+    fn was_opened_unseen(&self) -> bool {
+        matches!(&self.listener, Listener::Pty(_, Some(line)) if is_held(&line.line))
     }
 
     fn receive(&mut self, now: Instant, index: usize, scratch: &mut Scratch) {
-        // Each frame goes to all others: what is taken in a turn must not grow with their number.
+        // Each frame goes to all other clients, so the amount per turn must not grow with their
+        // number.
         let most = (CHUNK / self.clients.len()).max(1);
         let client = &mut self.clients[index];
         if client.is_gone {
@@ -178,7 +181,7 @@ impl Endpoint {
         };
         let Some(bytes) = client.gate.pass(&mut scratch.chunk[..HELD + len]) else {
             client.is_gone = true;
-            return self.station.stranger(now);
+            return self.station.browser_detected(now);
         };
         match &mut self.station {
             AnyStation::Bytes(station) => station.receive(now, bytes, &mut client.outgoing),
@@ -213,40 +216,41 @@ impl Endpoint {
         }
     }
 
-    /// Lets in who waits longest at the door, where the station takes them. Only one a turn: one
-    /// who comes in meanwhile may follow a client that is not yet seen to have left.
+    /// Accepts the client that waits longest, if the station allows it. Only one per turn: a second
+    /// one may follow a client whose disconnection was not handled yet.
     fn admit(&mut self, now: Instant) {
         let others = self.clients.len();
-        let came = match &mut self.door {
-            // Whoever is not welcome on a pty cannot be closed: the station hears them all the same.
-            Door::Pty(_, waiting) => {
-                self.station.came(now, others);
+        let accepted = match &mut self.listener {
+            // A pty cannot be closed for an unwanted client: the station gets its bytes
+            // nevertheless.
+            Listener::Pty(_, waiting) => {
+                self.station.client_connected(now, others);
                 self.clients.extend(waiting.take());
                 return;
             }
-            Door::Tcp(listener) => listener.accept().map(|(stream, _)| {
+            Listener::Tcp(listener) => listener.accept().map(|(stream, _)| {
                 let usable = stream.set_nonblocking(true).and_then(|()| stream.set_nodelay(true));
                 keep_alive(&stream);
                 usable.is_ok().then(|| Client::new(stream.into(), Gate::held()))
             }),
-            Door::Unix(door) => door.listener().accept().map(|(stream, _)| {
+            Listener::Unix(server) => server.listener().accept().map(|(stream, _)| {
                 let usable = stream.set_nonblocking(true);
                 usable.is_ok().then(|| Client::new(stream.into(), Gate::open()))
             }),
         };
-        match came {
+        match accepted {
             Ok(client) => {
-                let welcome = client.filter(|_| self.station.came(now, others));
+                let welcome = client.filter(|_| self.station.client_connected(now, others));
                 self.clients.extend(welcome);
             }
             Err(error) if matches!(error.kind(), WouldBlock | Interrupted | ConnectionAborted) => {}
-            // It still waits there, and would wake every turn.
-            Err(_) => self.shut_until = Some(now + PAUSE),
+            // The connection still waits there, and would wake every turn.
+            Err(_) => self.paused_until = Some(now + PAUSE),
         }
     }
 }
 
-/// What both kinds of stations do.
+/// The common functions of both kinds of stations.
 macro_rules! either {
     ($self:ident, $station:ident => $does:expr) => {
         match $self {
@@ -257,20 +261,20 @@ macro_rules! either {
 }
 
 impl AnyStation {
-    fn came(&mut self, now: Instant, others: usize) -> bool {
-        either!(self, station => station.came(now, others))
+    fn client_connected(&mut self, now: Instant, others: usize) -> bool {
+        either!(self, station => station.client_connected(now, others))
     }
 
-    fn left(&mut self, now: Instant) {
-        either!(self, station => station.left(now));
+    fn client_disconnected(&mut self, now: Instant) {
+        either!(self, station => station.client_disconnected(now));
     }
 
-    fn wants(&self) -> bool {
-        either!(self, station => station.wants())
+    fn accepts_input(&self) -> bool {
+        either!(self, station => station.accepts_input())
     }
 
-    fn stranger(&mut self, now: Instant) {
-        either!(self, station => station.stranger(now));
+    fn browser_detected(&mut self, now: Instant) {
+        either!(self, station => station.browser_detected(now));
     }
 
     fn deadline(&self) -> Option<Instant> {
@@ -297,14 +301,14 @@ impl Client {
         self.adapter.deliver(now, frame, |line| self.outgoing.extend_from_slice(line));
     }
 
-    /// Writes what the line takes at once and returns how many bytes it did not take.
+    /// Writes the bytes that the line accepts at once. Returns the number of the others.
     fn flush(&mut self) -> u64 {
         let mut rest = self.outgoing.as_slice();
         while !rest.is_empty() {
             match write(&self.line, rest) {
                 Ok(written) => rest = &rest[written..],
                 Err(Errno::INTR) => {}
-                // Full, or gone; the next read tells which.
+                // The line is full or closed. The next read shows which.
                 Err(_) => break,
             }
         }

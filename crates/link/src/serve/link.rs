@@ -1,4 +1,4 @@
-//! Links to stations in the process.
+//! Links to stations in this process.
 
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
@@ -9,25 +9,25 @@ use super::station::{Station, Traffic};
 use crate::Clock;
 use crate::port::{ByteLink, CanLink, Evented, Link, PortError};
 
-/// The link to a station in the process, without a port. Bytes (`T` is `u8`) and frames (`T` is
-/// [`CanFrame`]) take no time on it. The station is polled while something is waited for.
+/// The link to a station in this process, without a port. Bytes (`T` is `u8`) and frames (`T` is
+/// [`CanFrame`]) have no transmission time. Waits poll the station.
 #[derive(Debug)]
 pub struct StationLink<S, T> {
     station: S,
     clock: Clock,
-    /// What was not read yet.
+    /// Received data that were not read yet.
     received: Vec<T>,
 }
 
 impl<S, T> StationLink<S, T> {
-    /// A link to `station` that goes by `clock`.
+    /// A link to `station` on `clock`.
     pub fn new(station: S, clock: Clock) -> Self {
         StationLink { station, clock, received: Vec::with_capacity(256) }
     }
 }
 
 impl<S: Station<T>, T: Traffic> StationLink<S, T> {
-    /// Waits until the station has said something.
+    /// Waits until the station has sent something.
     fn wait(&mut self, timeout: Option<Duration>) {
         let end = self.clock.end_of(timeout);
         loop {
@@ -83,7 +83,7 @@ impl<S: Station<CanFrame> + Send> CanLink for StationLink<S, CanFrame> {
     }
 }
 
-/// An event loop has nothing to wait for.
+/// The station answers at once, so an event loop needs no descriptor.
 impl<S: Send, T: Send> Evented for StationLink<S, T> {
     fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         None

@@ -1,4 +1,4 @@
-//! The one string that names a served port, everywhere.
+//! The name of a served port.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -16,14 +16,14 @@ pub enum ServeName {
     Pty(PathBuf),
     /// `slcan-pty:PATH`: a CAN adapter that speaks slcan on a pty.
     SlcanPty(PathBuf),
-    /// `tcp-listen:ADDR:PORT`: the same behind a TCP server; port 0 takes any free one.
+    /// `tcp-listen:ADDR:PORT`: the same on a TCP server; port 0 selects any free one.
     TcpListen {
         /// The address to listen on.
         host: String,
         /// The TCP port.
         port: u16,
     },
-    /// `unix-listen:PATH`: the same behind a Unix socket, for the user who serves it.
+    /// `unix-listen:PATH`: the same on a Unix socket, for the user who serves it.
     UnixListen(PathBuf),
     /// `socketcan:can1`: a CAN interface of this machine, for a bus of motors.
     SocketCan(String),
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_that_is_wrong_says_how_it_is_right() {
+    fn a_wrong_name_is_refused_with_a_valid_form() {
         for (name, says) in [
             ("st0", "did you mean `pty:st0`?"),
             ("can0", "tcp-listen:ADDR:PORT and socketcan:INTERFACE"),
@@ -101,7 +101,7 @@ mod tests {
         }
 
         #[test]
-        fn any_text_is_taken_or_refused(text in "\\PC{0,40}") {
+        fn any_text_is_parsed_or_refused(text in "\\PC{0,40}") {
             let _ = text.parse::<ServeName>().map_err(|error| error.to_string());
         }
     }

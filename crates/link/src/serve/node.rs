@@ -1,4 +1,4 @@
-//! A CAN interface of the kernel as a served port: the station is one more node of its bus.
+//! A CAN interface of the kernel as a served port. The station is a node of its bus.
 
 use std::collections::VecDeque;
 
@@ -9,31 +9,31 @@ use rustix::event::{PollFd, PollFlags};
 use super::station::Station;
 use crate::port::{CanLink, PortError, SocketCanLink};
 
-/// Frames that are taken from the bus in one turn; the other ports have their turn as well.
+/// Maximum number of frames per turn, so that the other ports are served as well.
 const TURN: usize = 64;
-/// How soon an interface that has no room is offered the frame again.
+/// Retry interval of an interface without queue space.
 const FULL: Micros = Micros::from_millis(1);
-/// A frame that could not be sent by then is stale; it does not come out of the blue later.
+/// A frame that could not be sent within this time is dropped.
 const STALE: Micros = Micros::from_millis(100);
-/// How soon an interface that is away is looked for again.
+/// Retry interval of an interface that is down or missing.
 const AWAY: Micros = Micros::from_millis(100);
 
 pub(super) struct Node {
     interface: String,
     station: Box<dyn Station<CanFrame>>,
-    /// Nothing while the interface is away.
+    /// `None` while the interface is down or missing.
     link: Option<SocketCanLink>,
     outgoing: VecDeque<CanFrame>,
-    /// Since when the interface has had no room.
+    /// Since when the interface has had no queue space.
     full_since: Option<Instant>,
-    /// When an interface that is away or full is tried again.
+    /// Next attempt with an interface that is down or full.
     retry: Option<Instant>,
-    /// Room for what the station says.
+    /// Buffer for the station's replies.
     said: Vec<CanFrame>,
 }
 
 impl Node {
-    /// Opens a CAN interface, which must be up now.
+    /// Opens a CAN interface, which must be up.
     pub(super) fn open(
         interface: &str,
         station: Box<dyn Station<CanFrame>>,
@@ -49,7 +49,7 @@ impl Node {
         })
     }
 
-    /// What is to be polled, if anything: nothing is taken while replies wait for room.
+    /// The descriptor to poll; `None` while replies wait for queue space.
     pub(super) fn watch(&self) -> Option<PollFd<'_>> {
         let link = self.link.as_ref().filter(|_| self.outgoing.is_empty())?;
         Some(PollFd::new(link, PollFlags::IN))
@@ -59,8 +59,8 @@ impl Node {
         self.station.deadline().into_iter().chain(self.retry).min()
     }
 
-    /// Does what is due; returns how many bytes the bus did not take. `ready` says whether there is
-    /// something on what is watched.
+    /// Handles events and deadlines. Returns the number of bytes that the bus did not accept.
+    /// `ready` is whether the watched descriptor has an event.
     pub(super) fn serve(&mut self, now: Instant, ready: bool) -> u64 {
         if self.retry.is_some_and(|retry| retry <= now) {
             self.retry = None;
@@ -109,7 +109,7 @@ impl Node {
         self.outgoing.drain(..).map(|frame| frame.data().len() as u64).sum()
     }
 
-    /// Lets go of the interface, which is down, gone or bus-off.
+    /// Closes the interface, which is down, removed or bus-off.
     fn lose(&mut self, now: Instant) {
         self.link = None;
         self.retry = Some(now + AWAY);

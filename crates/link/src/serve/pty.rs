@@ -1,4 +1,4 @@
-//! Ptys that stand for serial devices.
+//! Ptys that emulate serial devices.
 
 use std::ffi::OsStr;
 use std::fs::Metadata;
@@ -18,16 +18,16 @@ use rustix::termios::{
 
 use crate::port::{MARKED_LINK, PortError, mark};
 
-/// A pty for one client after the other. The client's side is not kept open here, so that the
-/// kernel tells when the last one has closed it: the server's side then reads an error.
+/// A pty for one client after the other. The client's side is not kept open here, so the kernel
+/// reports when the last client has closed it: reading the server's side then fails.
 pub(super) struct Pty {
     path: PathBuf,
     link: PathBuf,
-    comings: OwnedFd,
+    openings: OwnedFd,
 }
 
 impl Pty {
-    /// Makes a pty with `link` pointing to it, and returns the server's side as well.
+    /// Makes a pty and a `link` to it. Also returns the server's side.
     pub(super) fn open(link: &Path) -> Result<(Self, OwnedFd), PortError> {
         let failed = |source: io::Error| PortError::Io {
             port: link.display().to_string(),
@@ -35,10 +35,10 @@ impl Pty {
         };
         clear_link(link)?;
         let (path, master) = open_pair().map_err(|errno| failed(errno.into()))?;
-        let comings = watch_comings(&path).map_err(|errno| failed(errno.into()))?;
+        let openings = watch_comings(&path).map_err(|errno| failed(errno.into()))?;
         symlink(&path, link).map_err(failed)?;
         mark(&master, link).map_err(failed)?;
-        Ok((Pty { path, link: link.to_owned(), comings }, master))
+        Ok((Pty { path, link: link.to_owned(), openings }, master))
     }
 
     /// The device that a client opens.
@@ -46,33 +46,34 @@ impl Pty {
         &self.path
     }
 
-    /// Becomes readable when a client opens the pty.
-    pub(super) fn comings(&self) -> &OwnedFd {
-        &self.comings
+    /// The descriptor that becomes readable when a client opens the pty.
+    pub(super) fn openings(&self) -> &OwnedFd {
+        &self.openings
     }
 
-    /// Drops what the client that left did not read, and what it `left_bytes` of for the server, and
-    /// sets the line up anew: it may have left it stopped (Ctrl-S), or echoing. Never while one is
-    /// there: a reply to the first request may be among it.
+    /// Drops the bytes that the last client did not read, and the bytes that it left for the server
+    /// (`left_bytes`). Configures the line again, because the client may have left it stopped
+    /// (Ctrl-S) or echoing. Must not be called while a client has it open: the bytes may include
+    /// the reply to its first request.
     pub(super) fn forget_client(&self, left_bytes: bool) {
         let queues = if left_bytes { QueueSelector::IOFlush } else { QueueSelector::IFlush };
-        // It cannot fail on a pty; if it did, the next client would see old bytes.
+        // This cannot fail on a pty. If it did, the next client would read old bytes.
         let _ = open_client_side(&self.path).and_then(|client_side| {
             tcflow(&client_side, Action::OOn)?;
             set_up(&client_side)?;
             tcflush(&client_side, queues)
         });
-        self.forget_comings();
+        self.clear_openings();
     }
 
-    /// Takes note that [`comings`](Self::comings) was seen.
-    pub(super) fn forget_comings(&self) {
+    /// Clears the events of [`openings`](Self::openings).
+    pub(super) fn clear_openings(&self) {
         let mut events = [0; 1024];
-        while rustix::io::read(&self.comings, &mut events).is_ok_and(|len| len > 0) {}
+        while rustix::io::read(&self.openings, &mut events).is_ok_and(|len| len > 0) {}
     }
 }
 
-/// Whether a client holds the pty whose server's side this is.
+/// Whether a client has opened the pty of this server's side.
 pub(super) fn is_held(master: &OwnedFd) -> bool {
     let mut fds = [PollFd::new(master, PollFlags::empty())];
     poll(&mut fds, Some(&Timespec::default())).is_ok() && !fds[0].revents().contains(PollFlags::HUP)
@@ -94,9 +95,9 @@ fn open_pair() -> rustix::io::Result<(PathBuf, OwnedFd)> {
     fcntl_setfl(&master, OFlags::NONBLOCK)?;
     let name = ptsname(&master, Vec::new())?;
     let number = Path::new(OsStr::from_bytes(name.as_bytes())).file_name().unwrap_or_default();
-    // Spelled so that a link to it is known for a server's.
+    // Written so that a link to it is recognized as a server's link.
     let path = Path::new(MARKED_LINK).join(number);
-    // The mode outlives this descriptor.
+    // The mode remains after this descriptor is closed.
     set_up(&open_client_side(&path)?)?;
     Ok((path, master))
 }
@@ -112,13 +113,13 @@ fn open_client_side(path: &Path) -> rustix::io::Result<OwnedFd> {
 }
 
 fn watch_comings(path: &Path) -> rustix::io::Result<OwnedFd> {
-    let comings = inotify::init(inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC)?;
-    inotify::add_watch(&comings, path, WatchFlags::OPEN)?;
-    Ok(comings)
+    let openings = inotify::init(inotify::CreateFlags::NONBLOCK | inotify::CreateFlags::CLOEXEC)?;
+    inotify::add_watch(&openings, path, WatchFlags::OPEN)?;
+    Ok(openings)
 }
 
-/// Removes a link that a server left behind, whose pty is gone; anything else at `link`, a link to
-/// something else that is not there included, stays and is an error.
+/// Removes a link of a former server whose pty is gone. Anything else at `link` is an error and
+/// remains, including a link to another missing file.
 fn clear_link(link: &Path) -> Result<(), PortError> {
     let port = link.display().to_string();
     let is_ours = match std::fs::read_link(link) {
@@ -130,18 +131,18 @@ fn clear_link(link: &Path) -> Result<(), PortError> {
         }
         Ok(_) => false,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        // Not a link at all.
+        // Not a link.
         Err(error) if error.kind() == io::ErrorKind::InvalidInput => false,
         Err(source) => return Err(PortError::Io { port, source: source.into() }),
     };
     if !is_ours {
-        return Err(PortError::PathTaken { port, wanted: "link to a pty that a server left" });
+        return Err(PortError::PathTaken { port, wanted: "link to a pty made by a server" });
     }
     std::fs::remove_file(link).map_err(|source| PortError::Io { port, source: source.into() })
 }
 
-/// Whether the pty that `link` points to is a later one that got the number of the link's own, whose
-/// server was killed. A pty is made before its link, and its ctime stays unless its mode is changed.
+/// Whether the pty that `link` points to is a later one with the same number, because its server
+/// was killed. A pty is made before its link, and its ctime changes only with its mode.
 fn is_older_than_its_pty(link: &Path) -> bool {
     let made = |metadata: Metadata| (metadata.ctime(), metadata.ctime_nsec());
     match (link.symlink_metadata(), link.metadata()) {

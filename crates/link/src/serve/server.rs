@@ -14,23 +14,23 @@ use super::name::ServeName;
 use super::node::Node;
 use super::pty::Pty;
 use super::station::Station;
-use super::unix::UnixDoor;
+use super::unix::UnixServer;
 use crate::clock::Clock;
 use crate::port::{PortError, timespec, unbracketed};
 
 /// A port that can be opened now.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Served {
-    /// The port as it was asked for, with the TCP port in use where any was asked for.
+    /// The port as requested. If any free TCP port was requested, the port in use.
     pub port: String,
-    /// Where it is: the pty, or the address with the TCP port in use.
+    /// The pty, or the address with the TCP port in use.
     pub path: String,
 }
 
-/// What a turn of the server has seen besides its ports.
+/// Events of a turn other than those of ports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turn {
-    /// Whether the extra descriptor has something to read, its end included.
+    /// Whether the extra descriptor is readable, or at its end.
     pub extra_is_ready: bool,
 }
 
@@ -50,12 +50,12 @@ impl Default for Server {
 }
 
 impl Server {
-    /// A server without ports, whose time begins now.
+    /// A server without ports. Its time starts now.
     pub fn new() -> Self {
         Self::by(Clock::running())
     }
 
-    /// A server without ports, whose time is that of `clock`.
+    /// A server without ports, on `clock`.
     pub fn by(clock: Clock) -> Self {
         Server {
             clock,
@@ -66,7 +66,7 @@ impl Server {
         }
     }
 
-    /// Serves a serial line with `station` at its far end.
+    /// Serves a serial line with `station`.
     pub fn serve_bytes(
         &mut self,
         name: &ServeName,
@@ -75,7 +75,7 @@ impl Server {
         self.serve(name, AnyStation::Bytes(station))
     }
 
-    /// Serves a CAN bus with `station` on it: through slcan, or as a node on a CAN interface.
+    /// Serves a CAN bus with `station`: through slcan, or as a node of a CAN interface.
     pub fn serve_can(
         &mut self,
         name: &ServeName,
@@ -103,7 +103,7 @@ impl Server {
                 path
             }
             (ServeName::UnixListen(path), station) => {
-                self.endpoints.push(Endpoint::on_unix(UnixDoor::open(path)?, station));
+                self.endpoints.push(Endpoint::on_unix(UnixServer::open(path)?, station));
                 path.display().to_string()
             }
             (ServeName::SocketCan(interface), AnyStation::Can(station)) => {
@@ -129,18 +129,19 @@ impl Server {
         self.clock.now()
     }
 
-    /// Lets time stand still, or go on. Stations are served meanwhile, all at that one moment.
+    /// Stops the clock, or lets it run. While it is stopped, stations are still served, at the same
+    /// time.
     pub fn hold(&mut self, held: bool) {
         self.clock.hold(held);
     }
 
-    /// How many bytes were dropped because a client or a CAN bus did not take them.
+    /// Number of bytes dropped because a client or a CAN bus did not accept them.
     pub fn dropped(&self) -> u64 {
         self.scratch.dropped
     }
 
-    /// Waits until something is to be done, at most for `max_wait`, and does it. A signal ends the
-    /// wait. `extra` is a descriptor to watch as well, such as standard input.
+    /// Waits for events, at most for `max_wait`, and handles them. A signal ends the wait. `extra`
+    /// is another descriptor to watch, such as standard input.
     pub fn turn(
         &mut self,
         max_wait: Duration,
@@ -177,9 +178,9 @@ impl Server {
         Ok(Turn { extra_is_ready: ready.iter().any(|events| !events.is_empty()) })
     }
 
-    /// The time to the first deadline of a station.
+    /// The time until the first deadline of a station.
     fn wait_time(&self, max_wait: Duration) -> Duration {
-        if self.clock.stands() {
+        if self.clock.is_virtual() {
             return max_wait;
         }
         let endpoints = self.endpoints.iter().filter_map(Endpoint::deadline);
@@ -188,7 +189,7 @@ impl Server {
     }
 }
 
-/// Listens at `host`; returns the address in use as well.
+/// Listens at `host`. Also returns the address in use.
 fn listen(host: &str, tcp_port: u16, port: &str) -> Result<(TcpListener, String), PortError> {
     let addresses = (unbracketed(host), tcp_port).to_socket_addrs().map_err(|source| {
         PortError::UnknownHost { port: port.to_owned(), source: source.into() }

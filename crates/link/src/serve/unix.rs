@@ -1,4 +1,4 @@
-//! Unix sockets as served ports: the file system says who may connect.
+//! Unix sockets as served ports. The file system controls who may connect.
 
 use std::io;
 use std::os::fd::OwnedFd;
@@ -14,19 +14,19 @@ use rustix::net::{
 
 use crate::port::PortError;
 
-/// How many newcomers may wait at the door.
+/// Maximum number of connections that wait to be accepted.
 const BACKLOG: i32 = 64;
 
-/// A listening Unix socket that only its user may connect to.
-pub(super) struct UnixDoor {
+/// A listening Unix socket. Only its user may connect.
+pub(super) struct UnixServer {
     listener: UnixListener,
     path: PathBuf,
-    /// The socket's own file, so that another's in its place is not removed.
+    /// The inode of the socket's file, so that another file at its path is not removed.
     inode: u64,
 }
 
-impl UnixDoor {
-    /// Listens at `path`. A socket that a killed server left behind there is replaced.
+impl UnixServer {
+    /// Listens at `path`. Replaces the socket of a killed server.
     pub(super) fn open(path: &Path) -> Result<Self, PortError> {
         let port = path.display().to_string();
         clear(path)?;
@@ -34,7 +34,7 @@ impl UnixDoor {
             |source: io::Error| PortError::Io { port: port.clone(), source: source.into() };
         let fd = listening(path).map_err(failed)?;
         let inode = path.symlink_metadata().map_err(failed)?.ino();
-        Ok(UnixDoor { listener: fd.into(), path: path.to_owned(), inode })
+        Ok(UnixServer { listener: fd.into(), path: path.to_owned(), inode })
     }
 
     pub(super) fn listener(&self) -> &UnixListener {
@@ -42,7 +42,7 @@ impl UnixDoor {
     }
 }
 
-impl Drop for UnixDoor {
+impl Drop for UnixServer {
     fn drop(&mut self) {
         if self.path.symlink_metadata().is_ok_and(|file| file.ino() == self.inode) {
             let _ = std::fs::remove_file(&self.path);
@@ -50,7 +50,7 @@ impl Drop for UnixDoor {
     }
 }
 
-/// Nobody can connect before the socket listens, and by then its mode is set.
+/// The mode is set before the socket listens, so no other user can connect.
 fn listening(path: &Path) -> io::Result<OwnedFd> {
     let fd = socket()?;
     bind(&fd, &SocketAddrUnix::new(path)?)?;
@@ -59,7 +59,7 @@ fn listening(path: &Path) -> io::Result<OwnedFd> {
     Ok(fd)
 }
 
-/// Removes a socket that nobody listens at; anything else at `path` stays and is an error.
+/// Removes a socket without a listener. Anything else at `path` is an error and remains.
 fn clear(path: &Path) -> Result<(), PortError> {
     let port = path.display().to_string();
     match path.symlink_metadata() {

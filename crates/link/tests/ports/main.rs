@@ -26,9 +26,9 @@ use rustix::pty::{OpenptFlags, openpt, ptsname};
 
 type Outcome = Result<(), Box<dyn Error>>;
 
-/// Longer than anything here takes.
+/// Timeout of all waits here.
 const PATIENCE: Option<Duration> = Some(Duration::from_secs(5));
-/// Long enough for something that must not come.
+/// Long enough to see that nothing comes.
 const BRIEFLY: Option<Duration> = Some(Duration::from_millis(30));
 
 fn open_line(name: &str) -> Result<Box<dyn ByteLink>, Box<dyn Error>> {
@@ -61,7 +61,7 @@ fn gather(link: &mut dyn ByteLink, len: usize) -> Result<Vec<u8>, PortError> {
 }
 
 #[test]
-fn a_pty_carries_every_byte_both_ways_for_one_client_after_the_other() -> Outcome {
+fn a_pty_transmits_every_byte_for_one_client_after_the_other() -> Outcome {
     let place = Place::new("pty");
     let server = Running::bytes(&place.as_port("pty"))?;
     assert_eq!(server.served.port, place.as_port("pty"));
@@ -85,7 +85,7 @@ fn bytes_that_one_client_left_unread_are_not_shown_to_the_next() -> Outcome {
     let name: ServeName = place.as_port("pty").parse()?;
     let mut server = Server::new();
     server.serve_bytes(&name, Box::new(Echo))?;
-    // A program that sets nothing and discards nothing, unlike ours.
+    // A program that neither configures the line nor drops bytes.
     let plain = || OpenOptions::new().read(true).write(true).open(&place.0);
     let mut seen = [0; 3];
     for words in [b"new", b"two"] {
@@ -105,7 +105,7 @@ fn bytes_that_one_client_left_unread_are_not_shown_to_the_next() -> Outcome {
     Ok(())
 }
 
-/// Opens a pty and asks, once, while the server is at work.
+/// A client that opens a pty and sends one request during a turn of the server.
 struct Caller {
     pty: PathBuf,
     line: Rc<RefCell<Option<File>>>,
@@ -124,7 +124,7 @@ impl Station<u8> for Caller {
 }
 
 #[test]
-fn a_client_that_comes_while_the_server_is_at_work_gets_its_reply() -> Outcome {
+fn a_client_that_connects_during_a_turn_gets_its_reply() -> Outcome {
     let (calling, called) = (Place::new("calling"), Place::new("called"));
     let mut server = Server::new();
     let line = Rc::new(RefCell::new(None));
@@ -163,13 +163,13 @@ fn a_link_is_replaced_and_a_file_is_not() -> Outcome {
 
     fs::write(&place.0, "precious")?;
     let error = Running::bytes(&place.as_port("pty")).err().ok_or("a file was replaced")?;
-    assert!(error.to_string().contains("is no link to a pty"), "{error}");
+    assert!(error.to_string().contains("is not a link to a pty"), "{error}");
     assert_eq!(fs::read_to_string(&place.0)?, "precious");
     Ok(())
 }
 
 #[test]
-fn a_link_of_a_killed_server_is_replaced_when_its_number_is_anothers() -> Outcome {
+fn a_link_of_a_killed_server_is_replaced_when_its_pty_number_is_reused() -> Outcome {
     let place = Place::new("reused");
     let pty = || openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY);
     let name = loop {
@@ -177,12 +177,12 @@ fn a_link_of_a_killed_server_is_replaced_when_its_number_is_anothers() -> Outcom
         let name = PathBuf::from(ptsname(&former, Vec::new())?.to_str()?);
         symlink(&name, &place.0)?;
         drop(former);
-        // The clock of file systems has to have gone on.
+        // The clock of the file system must have advanced.
         std::thread::sleep(Duration::from_millis(50));
         if !name.exists() {
             break name;
         }
-        // Another program took the number too soon to be told from the former owner.
+        // If another program got the number too soon, the owners cannot be distinguished.
         std::fs::remove_file(&place.0)?;
     };
     let mut others = vec![pty()?];
@@ -224,7 +224,7 @@ fn a_tcp_line_has_one_client_and_takes_the_next_when_it_left() -> Outcome {
 }
 
 #[test]
-fn a_client_that_does_not_read_holds_up_nobody() -> Outcome {
+fn a_client_that_does_not_read_does_not_delay_others() -> Outcome {
     let place = Place::new("flood");
     let name: ServeName = place.as_port("pty").parse()?;
     let mut server = Server::new();
@@ -268,13 +268,13 @@ fn slcan_over_tcp_is_one_bus_for_all_clients() -> Outcome {
 }
 
 #[test]
-fn what_is_no_slcan_adapter_is_told() -> Outcome {
-    // An echo, such as a modem or a console.
+fn a_device_that_is_not_an_slcan_adapter_is_reported() -> Outcome {
+    // An echo, as from a modem or a console.
     let server = Running::bytes("tcp-listen:127.0.0.1:0")?;
     let error = open_can(&format!("slcan:tcp:{}", server.served.path)).err().ok_or("opened")?;
     assert!(error.to_string().contains("does not answer like an slcan adapter"), "{error}");
 
-    // Silence may be an adapter; bytes that never end a line and BEL are none.
+    // An adapter may be silent. Bytes without a line end, and BEL, are not from an adapter.
     for (answer, is_adapter) in [(&b""[..], true), (b"\r\r\r\r", true), (b"\x07\x07\r\r", true)] {
         assert_eq!(answer_opening(answer)?.is_ok(), is_adapter, "{answer:?}");
     }
@@ -287,7 +287,7 @@ fn what_is_no_slcan_adapter_is_told() -> Outcome {
     Ok(())
 }
 
-/// Opens an adapter that has said all it will say.
+/// Opens an adapter that has already sent all its answers.
 fn answer_opening(answer: &[u8]) -> Result<Result<SlcanLink<FdLink>, PortError>, Box<dyn Error>> {
     let (mut adapter, ours) = UnixStream::pair()?;
     adapter.write_all(answer)?;
@@ -333,7 +333,7 @@ fn a_tap_sees_what_passes_in_both_directions() -> Outcome {
 }
 
 #[test]
-fn a_port_that_cannot_be_opened_says_why() -> Outcome {
+fn a_port_that_cannot_be_opened_reports_the_reason() -> Outcome {
     let closed = TcpListener::bind("127.0.0.1:0")?.local_addr()?;
     for (name, says) in [
         ("/dev/ttyNONE0", "there is no `/dev/ttyNONE0`: is it plugged in?"),

@@ -1,4 +1,4 @@
-//! Servers in threads, and what they serve.
+//! Servers in threads, and their stations.
 
 use std::error::Error;
 use std::fs;
@@ -17,7 +17,7 @@ use motorlink_link::serve::{Served, Server, Station};
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
 
-/// Answers each chunk with itself.
+/// Returns each chunk.
 pub(crate) struct Echo;
 
 impl Station<u8> for Echo {
@@ -26,7 +26,7 @@ impl Station<u8> for Echo {
     }
 }
 
-/// Sends a byte a millisecond after each chunk.
+/// Sends a byte one millisecond after each chunk.
 #[derive(Default)]
 pub(crate) struct Late(Option<Instant>);
 
@@ -43,7 +43,7 @@ impl Station<u8> for Late {
     }
 }
 
-/// A motor that answers what is for it with a byte changed.
+/// A motor that answers its frames with one byte changed.
 pub(crate) struct Motor;
 
 impl Station<CanFrame> for Motor {
@@ -63,7 +63,7 @@ pub(crate) fn request(number: u8) -> CanFrame {
     CanFrame::new(0x141, [0x9C, number, 0, 0, 0, 0, 0, 0])
 }
 
-/// A server in a thread of its own, which ends when this is dropped.
+/// A server in its own thread. Dropping this ends it.
 pub(crate) struct Running {
     pub(crate) served: Served,
     stop: Arc<AtomicBool>,
@@ -112,7 +112,7 @@ impl Drop for Running {
     }
 }
 
-/// A path of its own for each test, removed at the end.
+/// A path for one test, removed at the end.
 pub(crate) struct Place(pub(crate) PathBuf);
 
 impl Place {

@@ -101,7 +101,7 @@ impl<T: Traffic> Station<T> for GuardedPort<T> {
         is_waiting.then_some(Instant(0))
     }
 
-    fn came(&mut self, now: Instant, others: usize) -> bool {
+    fn client_connected(&mut self, now: Instant, others: usize) -> bool {
         let mut desk = self.desk.borrow_mut();
         let port = self.port.borrow();
         let is_welcome = others == 0 && desk.admit(now, &port);
@@ -113,7 +113,7 @@ impl<T: Traffic> Station<T> for GuardedPort<T> {
         is_welcome
     }
 
-    fn left(&mut self, _: Instant) {
+    fn client_disconnected(&mut self, _: Instant) {
         if self.has_the_line() {
             let mut desk = self.desk.borrow_mut();
             (desk.client, desk.has_left) = (None, true);
@@ -121,11 +121,11 @@ impl<T: Traffic> Station<T> for GuardedPort<T> {
     }
 
     /// No more than one reading of a client waits here: the rest stays where it can be dropped.
-    fn wants(&self) -> bool {
+    fn accepts_input(&self) -> bool {
         !self.has_the_line() || self.lane.borrow().to_port.is_empty()
     }
 
-    fn stranger(&mut self, _: Instant) {
+    fn browser_detected(&mut self, _: Instant) {
         let port = self.port.borrow().clone();
         self.desk.borrow_mut().events.push_back(Event::Browser { port });
     }

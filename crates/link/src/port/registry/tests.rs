@@ -10,13 +10,13 @@ fn port(name: &str) -> PortName {
 
 fn refusal(name: &str) -> String {
     match name.parse::<PortName>() {
-        Ok(port) => panic!("{name} was taken for {port:?}"),
+        Ok(port) => panic!("{name} was parsed as {port:?}"),
         Err(error) => error.to_string(),
     }
 }
 
 #[test]
-fn every_form_has_one_spelling_without_what_is_the_default() {
+fn every_form_has_one_spelling_without_defaults() {
     for (given, spelled) in [
         ("/dev/ttyACM0", "serial:/dev/ttyACM0"),
         ("ttyUSB1?baud=9600", "serial:/dev/ttyUSB1?baud=9600"),
@@ -47,7 +47,7 @@ fn every_form_has_one_spelling_without_what_is_the_default() {
 }
 
 #[test]
-fn a_name_that_is_wrong_says_how_it_is_right() {
+fn a_wrong_name_is_refused_with_a_valid_form() {
     for (name, says) in [
         ("can0", "did you mean `socketcan:can0`?"),
         ("can:can0", "did you mean `socketcan:can0`?"),
@@ -55,11 +55,11 @@ fn a_name_that_is_wrong_says_how_it_is_right() {
         ("192.168.1.5:4000", "did you mean `tcp:192.168.1.5:4000`?"),
         ("pty:./st0", "did you mean `serial:./st0`?"),
         ("st0", "did you mean `./st0`?"),
-        ("", "`` names no port; ports are /dev/ttyACM0"),
-        ("foo:", "`foo:` names no port; ports are /dev/ttyACM0"),
+        ("", "`` is not the name of a port; ports are /dev/ttyACM0"),
+        ("foo:", "`foo:` is not the name of a port; ports are /dev/ttyACM0"),
         ("serial:", "lacks a device"),
         ("unix:", "lacks a path"),
-        ("unix:./drive?baud=9600", "unknown option `baud`; there is none"),
+        ("unix:./drive?baud=9600", "unknown option `baud`; valid options: none"),
         ("socketcan:", "lacks an interface"),
         ("tcp:host", "lacks a TCP port"),
         ("tcp::4000", "lacks a host"),
@@ -68,15 +68,15 @@ fn a_name_that_is_wrong_says_how_it_is_right() {
         ("tcp:host:0", "the port cannot be `0`"),
         ("/dev/ttyACM0?baud=fast", "baud cannot be `fast`"),
         ("/dev/ttyACM0?baud=0", "baud cannot be `0`"),
-        ("/dev/ttyACM0?boud=9600", "unknown option `boud`; there is baud"),
+        ("/dev/ttyACM0?boud=9600", "unknown option `boud`; valid options: baud"),
         ("tcp:host:1?baud=9600", "unknown option `baud`"),
         ("/dev/ttyACM0?baud=9600&baud=19200", "has the option `baud` twice"),
         ("slcan:/dev/ttyACM0?echo=1&bitrate=500000&echo=1", "has the option `echo` twice"),
         ("tcp:host:1?clock=5003", "lacks a TCP port; write it like tcp:127.0.0.1:4000?clock="),
         ("tcp:host:1?clock=", "lacks a TCP port"),
         ("tcp:host:1?clock=host:0", "the port cannot be `0`"),
-        ("/dev/ttyACM0?clock=host:1", "unknown option `clock`; there is baud"),
-        ("slcan:/dev/ttyACM0?clock=host:1", "unknown option `clock`; there is bitrate, echo"),
+        ("/dev/ttyACM0?clock=host:1", "unknown option `clock`; valid options: baud"),
+        ("slcan:/dev/ttyACM0?clock=host:1", "unknown option `clock`; valid options: bitrate, echo"),
         ("slcan:/dev/ttyACM0?bitrate=123", "bitrate cannot be `123`; use 10000, 20000"),
         ("slcan:/dev/ttyACM0?echo=yes", "echo cannot be `yes`"),
     ] {
@@ -119,7 +119,7 @@ proptest! {
     }
 
     #[test]
-    fn any_text_is_taken_or_refused(text in "\\PC{0,40}") {
+    fn any_text_is_parsed_or_refused(text in "\\PC{0,40}") {
         let _ = text.parse::<PortName>().map_err(|error| error.to_string());
     }
 }
@@ -163,7 +163,7 @@ impl Scheme for Elsewhere {
 }
 
 #[test]
-fn a_scheme_of_another_crate_is_one_like_ours() {
+fn a_scheme_of_another_crate_works_like_a_built_in_one() {
     let unregistered = refusal("elsewhere:x");
     assert!(unregistered.contains("registered no schemes of other crates"), "{unregistered}");
 
@@ -174,11 +174,11 @@ fn a_scheme_of_another_crate_is_one_like_ours() {
     register(&ON_PLAN9);
     assert_eq!(schemes().iter().filter(|scheme| scheme.name() == "elsewhere").count(), 1);
     assert_eq!(port("elsewhere:x").to_string(), "elsewhere:x");
-    assert!(refusal("elsewhere:x?fast=1").ends_with("unknown option `fast`; there is none"));
-    assert!(refusal("plan9:x").ends_with("`plan9:` is there on plan9 only"));
+    assert!(refusal("elsewhere:x?fast=1").ends_with("unknown option `fast`; valid options: none"));
+    assert!(refusal("plan9:x").ends_with("`plan9:` exists on plan9 only"));
     assert!(refusal("elsewhere").contains("did you mean `elsewhere:`?"));
     assert!(refusal("slcan:elsewhere:x").contains("no serial line at `elsewhere:x`"));
     assert!(refusal("nowhere").contains("and elsewhere:NAME"));
-    let error = port("elsewhere:x").open_can().err().expect("it carries nothing").to_string();
+    let error = port("elsewhere:x").open_can().err().expect("it is not a CAN bus").to_string();
     assert!(error.starts_with("`elsewhere:x` cannot be used as a CAN bus: use slcan:"), "{error}");
 }

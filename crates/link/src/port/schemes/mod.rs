@@ -1,4 +1,4 @@
-//! The schemes of this crate: a file and a line each.
+//! The schemes of this crate: one file and one line per scheme.
 
 mod serial;
 mod slcan;

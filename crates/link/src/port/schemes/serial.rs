@@ -1,8 +1,8 @@
-//! UARTs, and ptys that stand for them.
+//! UARTs, and ptys that emulate them.
 //!
-//! Eight data bits, no parity, one stop bit, no flow control. An FTDI adapter holds back received
-//! bytes for 16 ms as delivered; its timer is set to 1 ms where this user may. `ASYNC_LOW_LATENCY`
-//! would do the same for some other drivers and is not set: it can only be reached through an
+//! Eight data bits, no parity, one stop bit, no flow control. The default latency timer of an FTDI
+//! adapter delays received bytes by 16 ms; it is set to 1 ms if this user has permission.
+//! `ASYNC_LOW_LATENCY` would do the same for some other drivers. It is not set, because it needs an
 //! unsafe call.
 
 use std::os::fd::{AsFd, OwnedFd};
@@ -26,7 +26,7 @@ use super::super::queued::QueuedBytes;
 use super::super::scheme::{Carries, Form, LinePort, Port, PortInfo, PortName, Scheme};
 use super::super::system;
 
-/// The baud rate of a serial line whose name gives none.
+/// Default baud rate of a serial line.
 pub const DEFAULT_BAUD: u32 = 115_200;
 
 /// `serial:/dev/ttyACM0?baud=115200`, or the bare path of a device.
@@ -73,7 +73,7 @@ impl Scheme for Serial {
     }
 }
 
-/// A UART, or a pty that stands for one.
+/// A UART, or a pty that emulates one.
 #[derive(Debug, Clone)]
 pub(super) struct Device {
     path: PathBuf,
@@ -81,7 +81,7 @@ pub(super) struct Device {
 }
 
 impl Device {
-    /// The device at `path`; a lone `ttyACM0` is the one in `/dev`.
+    /// The device at `path`. `ttyACM0` without a directory is in `/dev`.
     pub(super) fn at(path: &str) -> Self {
         let is_lone = path.starts_with("tty") && !path.contains('/');
         let path = if is_lone { Path::new("/dev").join(path) } else { PathBuf::from(path) };
@@ -136,7 +136,7 @@ impl LinePort for Device {
     }
 }
 
-/// Opens the device at `path`, for this process alone.
+/// Opens the device at `path` exclusively.
 fn open(path: &Path, baud: u32) -> Result<FdLink, PortError> {
     let device = path.canonicalize().map_err(|error| PortError::at_open(path, error))?;
     let fd = open_device(&device).map_err(|errno| PortError::at_open(path, errno))?;
@@ -146,7 +146,7 @@ fn open(path: &Path, baud: u32) -> Result<FdLink, PortError> {
     claim(&fd, &device).map_err(|errno| PortError::at_open(path, errno))?;
     let actual = configure(&fd, baud).map_err(|errno| PortError::at_open(path, errno))?;
     let port = path.display().to_string();
-    // A divider rarely hits the rate exactly; a UART bears 2 % on each side.
+    // A divider rarely gives the exact rate; a UART tolerates 2 % on each side.
     if actual.abs_diff(baud) > baud / 25 {
         return Err(PortError::BaudRefused { port, baud });
     }
@@ -155,27 +155,27 @@ fn open(path: &Path, baud: u32) -> Result<FdLink, PortError> {
 }
 
 fn open_device(device: &Path) -> Result<OwnedFd, Errno> {
-    // Without NONBLOCK, opening would wait for a modem's carrier.
+    // Without NONBLOCK, open would wait for a modem's carrier.
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
     open_fd(device, flags, Mode::empty())
 }
 
-/// Keeps others out.
+/// Locks the device against other programs.
 fn claim(fd: &OwnedFd, device: &Path) -> Result<(), Errno> {
     flock(fd, FlockOperation::NonBlockingLockExclusive)?;
-    // The lock keeps out programs that lock too; a real device can keep out all others. Not a pty:
-    // whoever serves it holds it open, and the mark would outlive us.
+    // The lock excludes programs that lock too. On a real device, exclusive mode excludes all
+    // others. Not on a pty: its server keeps it open, so the mode would remain after this process.
     if !device.starts_with("/dev/pts") {
         ioctl_tiocexcl(fd)?;
     }
     Ok(())
 }
 
-/// What there is to say of a tty.
+/// The data of a tty for a list of ports.
 fn listed(root: &Path, name: &str) -> Option<PortInfo> {
     let class = root.join("sys/class/tty").join(name);
     let device = class.join("device");
-    // A console has no device; the kernel's spare UARTs have type 0.
+    // A console has no device. The kernel's unused UARTs have type 0.
     if !device.exists() || system::read(&class.join("type")).as_deref() == Some("0") {
         return None;
     }
@@ -206,19 +206,19 @@ fn stable_path(root: &Path, name: &str) -> Option<PathBuf> {
     Some(Path::new("/dev/serial/by-id").join(link))
 }
 
-/// How the target of a link to a pty begins when a server of ours made the link. The kernel takes it
-/// as it takes `/dev/pts/`; no other program writes it so.
+/// The beginning of the target of a link to a pty, if a server of ours made the link. For the
+/// kernel it is the same as `/dev/pts/`. No other program writes it this way.
 pub(crate) const MARKED_LINK: &str = "/dev/pts/./";
 
-/// Marks the pty of a server as the one that `link` was made for: in the two sizes of its window that
-/// nothing uses. A later pty that gets the same number does not have them.
+/// Marks the pty of a server as the one that `link` was made for. The mark is stored in two unused
+/// sizes of the terminal's window. A later pty with the same number does not have it.
 pub(crate) fn mark(pty: impl AsFd, link: &Path) -> std::io::Result<()> {
     let mut size = tcgetwinsize(&pty)?;
     (size.ws_xpixel, size.ws_ypixel) = mark_of(link.symlink_metadata()?.ino());
     Ok(tcsetwinsize(&pty, size)?)
 }
 
-/// Whether a server of ours made the link that `path` is or leads to, for another pty than this.
+/// Whether `path` is, or leads to, a link that a server of ours made for another pty.
 fn is_stale(path: &Path, pty: &OwnedFd) -> bool {
     let Some(inode) = marked_link(path) else { return false };
     !tcgetwinsize(pty).is_ok_and(|size| (size.ws_xpixel, size.ws_ypixel) == mark_of(inode))
@@ -227,7 +227,7 @@ fn is_stale(path: &Path, pty: &OwnedFd) -> bool {
 /// The inode of the link of a server of ours, if `path` is one or leads to one.
 fn marked_link(path: &Path) -> Option<u64> {
     let mut link = PathBuf::from(path);
-    // A loop cannot be opened in the first place.
+    // A path with a loop cannot be opened, so this ends.
     loop {
         let target = std::fs::read_link(&link).ok()?;
         if target.as_os_str().as_bytes().starts_with(MARKED_LINK.as_bytes()) {
@@ -237,13 +237,13 @@ fn marked_link(path: &Path) -> Option<u64> {
     }
 }
 
-/// Never what an unmarked pty has, which is zero.
+/// Never zero, which is the value of an unmarked pty.
 fn mark_of(inode: u64) -> (u16, u16) {
     let mixed = inode.wrapping_mul(0x9E37_79B9_7F4A_7C15);
     ((mixed >> 48) as u16 | 1, (mixed >> 32) as u16)
 }
 
-/// Sets the line up, drops what came before, and returns the baud rate that the driver took.
+/// Configures the line, drops earlier bytes, and returns the baud rate that the driver set.
 fn configure(fd: &OwnedFd, baud: u32) -> Result<u32, Errno> {
     let mut settings = tcgetattr(fd)?;
     settings.make_raw();
@@ -255,7 +255,7 @@ fn configure(fd: &OwnedFd, baud: u32) -> Result<u32, Errno> {
     Ok(tcgetattr(fd)?.output_speed())
 }
 
-/// Best effort: only FTDI adapters have this file, and only some systems let users write it.
+/// Best effort: only FTDI adapters have this file, and only some systems allow users to write it.
 fn shorten_latency(device: &Path) {
     if let Some(name) = device.file_name() {
         let timer = Path::new("/sys/class/tty").join(name).join("device/latency_timer");

@@ -1,4 +1,4 @@
-//! CAN adapters that speak slcan behind any serial line.
+//! CAN adapters with slcan on any serial line.
 
 use motorlink_slcan::Bitrate;
 
@@ -72,13 +72,13 @@ fn bitrates() -> String {
     Bitrate::ALL.map(|rate| rate.bits_per_second().to_string()).join(", ")
 }
 
-/// An adapter and the bus behind it.
+/// An adapter and its bus.
 #[derive(Debug)]
 struct Adapter {
-    /// Where the adapter is attached.
+    /// The port of the adapter.
     line: PortName,
     bitrate: Bitrate,
-    /// Whether the adapter sends back what it transmits.
+    /// Whether the adapter echoes sent frames.
     echo: bool,
 }
 
@@ -92,7 +92,7 @@ impl Adapter {
 impl Port for Adapter {
     fn body(&self) -> String {
         let line = self.line.body();
-        // What stands before a colon would be taken for a scheme.
+        // The part before a colon would be parsed as a scheme.
         let is_plain = |path: &&str| path.starts_with(['/', '.']) || !path.contains(':');
         let bare = line.strip_prefix("serial:").filter(is_plain);
         format!("slcan:{}", bare.unwrap_or(&line))

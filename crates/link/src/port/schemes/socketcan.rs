@@ -77,7 +77,7 @@ impl CanPort for CanInterface {
     }
 }
 
-/// What there is to say of a network interface.
+/// The data of a network interface for a list of ports.
 fn listed(root: &Path, name: &str) -> Option<PortInfo> {
     let class = root.join("sys/class/net").join(name);
     if system::read(&class.join("type"))? != ARPHRD_CAN {

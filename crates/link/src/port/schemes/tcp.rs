@@ -16,11 +16,11 @@ use super::super::queued::QueuedBytes;
 use super::super::scheme::{Carries, Form, LinePort, Port, PortName, Scheme};
 
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
-/// After so long without a word a machine is asked whether it is there, so many times.
+/// Keep-alive: idle time before the first probe, interval between probes, and number of probes.
 const PROBE_PERIOD: Duration = Duration::from_secs(1);
 const PROBES: u32 = 4;
 
-/// `tcp:HOST:PORT`, also on the time of an emulated board.
+/// `tcp:HOST:PORT`, optionally on the time of an emulated board.
 pub(super) struct Tcp;
 
 impl Scheme for Tcp {
@@ -61,10 +61,10 @@ impl Scheme for Tcp {
     }
 }
 
-/// A host and a TCP port of it.
+/// A host and a TCP port.
 #[derive(Debug)]
 struct TcpAddress {
-    /// Name or address; an IPv6 address stands in brackets.
+    /// Name or address. An IPv6 address is in brackets.
     host: String,
     port: u16,
 }
@@ -89,7 +89,7 @@ impl fmt::Display for TcpAddress {
 #[derive(Debug)]
 struct TcpBytes {
     address: TcpAddress,
-    /// The clock port of the emulated board behind it, whose time is then the line's.
+    /// The clock port of the emulated board. The line then runs on the board's time.
     clock: Option<TcpAddress>,
 }
 
@@ -112,7 +112,7 @@ impl LinePort for TcpBytes {
         let Some(clock) = &self.clock else {
             return Ok(Box::new(connect(&self.address, self.label())?));
         };
-        // The clock first: who has that has the board.
+        // The clock port is connected first: its owner controls the board.
         let name = format!("clock={clock}");
         let board = connect(clock, name.clone())?;
         let data = connect(&self.address, self.label())?;
@@ -131,7 +131,7 @@ impl LinePort for TcpBytes {
     }
 }
 
-/// Connects to the first address of the host that takes the connection. `port` is for messages.
+/// Connects to the first address of the host that accepts. `port` is for messages.
 fn connect(address: &TcpAddress, port: String) -> Result<FdLink, PortError> {
     let addresses = match (unbracketed(&address.host), address.port).to_socket_addrs() {
         Ok(addresses) => addresses,
@@ -154,8 +154,8 @@ fn connect(address: &TcpAddress, port: String) -> Result<FdLink, PortError> {
     })
 }
 
-/// Lets the kernel notice that the machine at the other end is gone, both while data is under way and
-/// while nothing is. Where the system lacks these options it notices later.
+/// Lets the kernel detect that the peer is gone, with and without data in transit. On systems
+/// without these options it detects this later.
 pub(crate) fn keep_alive(stream: &TcpStream) {
     let _ = sockopt::set_socket_keepalive(stream, true)
         .and_then(|()| sockopt::set_tcp_keepidle(stream, PROBE_PERIOD))
@@ -166,7 +166,7 @@ pub(crate) fn keep_alive(stream: &TcpStream) {
         });
 }
 
-/// The address without the brackets that set an IPv6 address apart in a port's name.
+/// The address without the brackets of an IPv6 address.
 pub(crate) fn unbracketed(host: &str) -> &str {
     host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(host)
 }
