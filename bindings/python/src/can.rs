@@ -1,8 +1,7 @@
 //! A bus of python-can as a port.
 //!
-//! The bus is Python code. Where that ran in the thread that waits for an exchange, handlers of
-//! signals would run there as well, with the port in the hands of the exchange. So one thread receives
-//! and one sends.
+//! The bus is Python code. In the thread that waits for an exchange it would also run signal
+//! handlers, while the exchange holds the port. So one thread receives and another one sends.
 
 use std::collections::VecDeque;
 use std::io::{Error, Read, Write};
@@ -21,11 +20,11 @@ use pyo3::types::{PyBytes, PyDict};
 use crate::shared::Owner;
 use crate::sim::Port;
 
-/// How long a bus may take no frame at all before a sending fails.
+/// Time after which a bus that accepts no frame makes a send fail.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
-/// The longest wait in `recv`, after which the reader looks whether it has to end.
+/// Longest wait in `recv`. After it the reader checks whether it has to end.
 const TURN: Duration = Duration::from_millis(100);
-/// How long a bus may go on giving what it received before it was opened.
+/// Time in which a bus may return frames that it received before it was opened.
 const BABBLE: Duration = Duration::from_millis(100);
 
 /// A bus of python-can, for `motorlink.rmd.open` and `motorlink.aio.rmd.open`.
@@ -34,7 +33,7 @@ pub(crate) struct CanPort {
     bus: Arc<PythonCan>,
 }
 
-/// What is opened as a CAN bus.
+/// A port that can be opened as a CAN bus.
 #[derive(FromPyObject)]
 pub(crate) enum AnyPort<'py> {
     Can(Py<CanPort>),
@@ -43,13 +42,13 @@ pub(crate) enum AnyPort<'py> {
 
 #[pymethods]
 impl CanPort {
-    /// `bus`: what receives and sends; `message`: the class of its messages.
+    /// `bus` receives and sends; `message` is the class of its messages.
     #[new]
     fn new(bus: Py<PyAny>, message: Py<PyAny>, name: String) -> Self {
         CanPort { bus: Arc::new(PythonCan { bus, message, name }) }
     }
 
-    /// What messages call it.
+    /// The name in messages.
     #[getter]
     pub(crate) fn name(&self) -> &str {
         &self.bus.name
@@ -87,13 +86,13 @@ pub(crate) struct Threads {
 }
 
 impl Threads {
-    /// What makes a link: the first one, and another one after each failure.
+    /// What opens a link: the first one, and another one after each failure.
     pub(crate) fn links(&self) -> impl FnMut() -> PythonCanLink + Send + 'static {
         let hub = Arc::clone(&self.hub);
         move || PythonCanLink::new(Arc::clone(&hub))
     }
 
-    /// Ends them, and waits for that. The owner may shut the bus down afterwards.
+    /// Ends the threads and waits for their end. After it the owner may shut the bus down.
     pub(crate) fn end(&self) {
         if self.owner.is_here() {
             self.hub.end();
@@ -112,19 +111,19 @@ impl Drop for Threads {
     }
 }
 
-/// What the threads of a bus share with its link.
+/// State that the threads of a bus share with its link.
 struct Hub {
     bus: Arc<PythonCan>,
     state: Mutex<State>,
     changed: Condvar,
-    /// Readable when something was received.
+    /// Readable if something was received.
     bell: UnixStream,
     ringer: UnixStream,
 }
 
 #[derive(Default)]
 struct State {
-    /// The number of the link in use. What fails for an earlier one does not count.
+    /// Number of the link in use. Failures of earlier links are ignored.
     link: u64,
     reader: Reader,
     inbox: VecDeque<Result<CanFrame, PortError>>,
@@ -132,10 +131,10 @@ struct State {
     is_ended: bool,
 }
 
-/// What the thread that receives does.
+/// State of the receiving thread.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 enum Reader {
-    /// Nothing before the next frame is sent: the bus failed.
+    /// The bus failed. It is idle until the next frame is sent.
     #[default]
     Paused,
     /// Drops what the bus received before. Nothing is sent meanwhile.
@@ -162,7 +161,7 @@ impl Hub {
         self.changed.notify_all();
     }
 
-    /// Receives, until the end.
+    /// Receives until the end.
     fn read(&self) {
         loop {
             let state = self.wait(self.lock(), |state| state.reader != Reader::Paused);
@@ -196,7 +195,7 @@ impl Hub {
         Ok(None)
     }
 
-    /// Sends, until the end.
+    /// Sends until the end.
     fn write(&self) {
         loop {
             let ready =
@@ -219,7 +218,7 @@ impl Hub {
     }
 
     fn ring(&self) {
-        // A bell that takes no more rings already.
+        // If the pipe is full, the reader is woken up already.
         let _ = (&self.ringer).write(&[0]);
         self.changed.notify_all();
     }
@@ -250,7 +249,7 @@ impl PythonCan {
         sent.map_err(|error| self.failed(error))
     }
 
-    /// The next frame, if one comes in time.
+    /// The next frame, if one arrives in time.
     fn receive(&self, timeout: Duration) -> Result<Option<CanFrame>, PortError> {
         let came = Python::attach(|py| {
             let recv = intern!(py, "recv");
@@ -265,8 +264,8 @@ impl PythonCan {
     }
 }
 
-/// A message of python-can; nothing where it is no frame of another node: what this bus sent itself,
-/// an error of the controller, CAN FD.
+/// The frame of a message of python-can. `None` for frames that this bus sent itself, for errors of
+/// the controller, and for CAN FD.
 fn frame(message: &Bound<'_, PyAny>) -> PyResult<Option<CanFrame>> {
     let py = message.py();
     let is = |name| message.getattr(name)?.is_truthy();
@@ -307,7 +306,7 @@ impl PythonCanLink {
 impl Link for PythonCanLink {}
 
 impl CanLink for PythonCanLink {
-    /// What fails in sending is received.
+    /// A failure to send is returned by the next receive.
     fn send(&mut self, frame: &CanFrame) -> Result<(), PortError> {
         self.0.lock().outbox.push_back(*frame);
         self.0.changed.notify_all();
@@ -325,7 +324,7 @@ impl CanLink for PythonCanLink {
             if state.is_ended {
                 return Err(PortError::Closed { port: hub.bus.name.clone() });
             }
-            // From here on it rings for what comes.
+            // From now on each received frame wakes the reader.
             while (&hub.bell).read(&mut [0; 64]).is_ok_and(|size| size == 64) {}
             let left = end.map(|end| end.saturating_duration_since(Instant::now()));
             if left == Some(Duration::ZERO) {

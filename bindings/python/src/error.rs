@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
 
-/// Which exception.
+/// The exception.
 #[derive(Debug, Clone, Copy)]
 enum Kind {
     Refused,
@@ -23,7 +23,7 @@ enum Kind {
     Closed,
 }
 
-/// What an exception tells beside its message.
+/// The attributes of an exception.
 #[derive(Default)]
 struct Facts<'a> {
     port: Option<&'a str>,
@@ -67,28 +67,28 @@ pub(crate) fn invalid_value(py: Python<'_>, message: impl Display) -> PyErr {
     Kind::InvalidValue.raise(py, message, Facts::default())
 }
 
-/// A register that nobody knows.
+/// An unknown register.
 pub(crate) fn unknown_register(py: Python<'_>, message: impl Display) -> PyErr {
     Kind::UnknownRegister.raise(py, message, Facts::default())
 }
 
-/// A client that was closed.
+/// A closed client.
 pub(crate) fn closed(py: Python<'_>, port: &str) -> PyErr {
     let facts = Facts { port: Some(port), ..Facts::default() };
     Kind::Closed.raise(py, format_args!("{port} was closed by this program; open it again"), facts)
 }
 
-/// A client of a process that this one was forked from.
+/// A client of the parent process, in a forked process.
 pub(crate) fn elsewhere(py: Python<'_>, port: &str) -> PyErr {
     let facts = Facts { port: Some(port), ..Facts::default() };
     let why = "was opened by another process, which this one was forked from; open it in this one";
     Kind::Closed.raise(py, format_args!("{port} {why}"), facts)
 }
 
-/// What an ST client says.
+/// An error of an ST client.
 pub(crate) fn st_error(py: Python<'_>, error: &st::Error) -> PyErr {
     use st::Error;
-    // Motor number 0 is whichever the drive has selected.
+    // Motor number 0 is the motor that the drive has selected.
     let named = |number: u8| Some(number).filter(|number| *number != 0);
     let (kind, facts) = match error {
         Error::Refused { port, motor, code, .. } => {
@@ -120,13 +120,13 @@ pub(crate) fn st_error(py: Python<'_>, error: &st::Error) -> PyErr {
     kind.raise(py, error, facts)
 }
 
-/// What a drive's negative acknowledge says, without a port it came from.
+/// A negative acknowledge without a port.
 pub(crate) fn refusal(py: Python<'_>, code: ErrorCode) -> PyErr {
     let facts = Facts { code: Some(code), ..Facts::default() };
     Kind::Refused.raise(py, format_args!("the drive refused: {code} ({})", code.doc()), facts)
 }
 
-/// What an RMD client says.
+/// An error of an RMD client.
 pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
     use rmd::Error;
     let motor = error.motor().map(rmd::MotorId::number);
@@ -142,7 +142,7 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
         | Error::Echo { port, .. } => (Kind::Link, facts(Some(port))),
         Error::FullTurn { .. } => {
             let facts = facts(None);
-            let hint = "full_turn=True sends it all the same";
+            let hint = "full_turn=True sends it anyway";
             return Kind::FullTurn.raise(py, format_args!("{error}; {hint}"), facts);
         }
         Error::Port(error) => return port_error(py, error),
@@ -151,8 +151,8 @@ pub(crate) fn rmd_error(py: Python<'_>, error: &rmd::Error) -> PyErr {
     kind.raise(py, error, facts)
 }
 
-/// What a port says. What Python code raised in it is the cause; a KeyboardInterrupt,
-/// and what another signal raises, goes on.
+/// An error of a port. An exception of Python code in the port is its cause. KeyboardInterrupt and
+/// exceptions of other signal handlers are raised unchanged.
 pub(crate) fn port_error(py: Python<'_>, error: &PortError) -> PyErr {
     let raised = match error {
         PortError::WrongKind { .. } => return invalid_value(py, error),

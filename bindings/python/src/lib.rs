@@ -1,8 +1,8 @@
-//! `motorlink._core`: what the Python package `motorlink` is made of.
+//! `motorlink._core`: the extension module of the Python package `motorlink`.
 //!
 //! Requests are objects that check their arguments and read their replies ([`st::StRequest`],
-//! [`rmd::RmdRequest`]); clients, blocking or not, carry them. Everything typed and documented for
-//! people is in the Python files on top.
+//! [`rmd::RmdRequest`]). Clients, blocking or not, send them. The typed and documented classes for
+//! users are in the Python files.
 
 mod can;
 mod error;
@@ -72,8 +72,8 @@ mod _core {
         motorlink::port::open_descriptors().collect()
     }
 
-    /// The command line, the program's name first; gives the exit code. `program` starts the command
-    /// in a process of its own. It takes over the process's signals.
+    /// The command line; `words` begin with the program's name. Returns the exit code. `program` starts
+    /// the command in another process. The command installs its own signal handlers.
     #[pyfunction]
     fn cli(py: Python<'_>, program: Vec<OsString>, words: Vec<OsString>) -> u8 {
         py.detach(|| motorlink_cli::run(&program, words))

@@ -1,4 +1,4 @@
-//! Physical values into the integers of the wire. What does not fit is refused, never cut.
+//! Physical values as integers of the wire. A value that does not fit is refused, never clipped.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 use crate::error::invalid_value;
 
-/// The nearest digit to `value` in `unit`s, of which a digit has `scale`.
+/// The digit nearest to `value`; a digit is `scale` `unit`s.
 pub(crate) fn digits<T: TryFrom<i64>>(
     py: Python<'_>,
     what: &str,
@@ -19,7 +19,7 @@ pub(crate) fn digits<T: TryFrom<i64>>(
     fitting(py, what, value, nearest, unit)
 }
 
-/// The digits of `value`, if there are any and the frame has room for them.
+/// The digits, if the value has some and they fit the field.
 fn fitting<T: TryFrom<i64>>(
     py: Python<'_>,
     what: &str,
@@ -35,7 +35,7 @@ fn fitting<T: TryFrom<i64>>(
     })
 }
 
-/// A limit, which no value may exceed; rounded towards 0, so that no digit does.
+/// A limit in digits. It is rounded towards 0, so that no digit exceeds it.
 pub(crate) fn limit<T: TryFrom<i64>>(
     py: Python<'_>,
     value: f64,
@@ -43,22 +43,25 @@ pub(crate) fn limit<T: TryFrom<i64>>(
     unit: &str,
 ) -> PyResult<T> {
     if value.is_nan() || value < 0.0 {
-        return Err(invalid_value(py, format_args!("{value} {unit} is no limit: give 0 or more")));
+        return Err(invalid_value(
+            py,
+            format_args!("{value} {unit} is not a limit: give 0 or more"),
+        ));
     }
     fitting(py, "a limit", value, Some(inward(value, scale)), unit)
 }
 
-/// The quantity that a program wants, in its unit. What no frame of the protocol says is refused.
+/// A quantity in its unit. Refused if no frame can carry it.
 pub(crate) fn wanted<Q: Quantity>(py: Python<'_>, value: f64) -> PyResult<Q> {
     Q::wanted(value).map_err(|error| invalid_value(py, format_args!("{error}; nothing was sent")))
 }
 
-/// A duration in s as the wire's ms.
+/// A duration in s as ms.
 pub(crate) fn milliseconds(py: Python<'_>, seconds: f64) -> PyResult<u16> {
     digits(py, "a duration", seconds, 1e-3, "s")
 }
 
-/// A time in s that a program waits for; more than 0, up to a day.
+/// A wait in s: more than 0, at most a day.
 pub(crate) fn span(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Duration> {
     let day = Duration::from_secs(86_400);
     match Duration::try_from_secs_f64(seconds) {

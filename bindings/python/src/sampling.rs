@@ -87,7 +87,7 @@ impl Rows {
     /// As [`after`](Self::after) for an event loop, in s.
     pub(crate) fn after_seconds(&mut self, py: Python<'_>, now: f64) -> PyResult<Option<f64>> {
         let now = Duration::try_from_secs_f64(now)
-            .map_err(|_| invalid_value(py, format_args!("a clock cannot show {now} s")))?;
+            .map_err(|_| invalid_value(py, format_args!("{now} s is not a time of a clock")))?;
         Ok(self.after(now).map(|wait| wait.as_secs_f64()))
     }
 

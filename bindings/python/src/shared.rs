@@ -8,11 +8,11 @@ use pyo3::prelude::*;
 
 use crate::error::{closed, elsewhere};
 
-/// How soon a close notices that the last exchange is over.
+/// Time until a close notices that the last exchange is complete.
 const TURN: Duration = Duration::from_millis(1);
 
-/// The process that made it. A fork has the memory of its parent, but none of its other threads: a lock
-/// that one of them held is never released.
+/// The process that opened the bus. A forked process has a copy of its parent's memory and none of
+/// its other threads: a lock that such a thread held is never released.
 pub(crate) struct Owner(u32);
 
 impl Owner {
@@ -21,16 +21,16 @@ impl Owner {
         Owner(std::process::id())
     }
 
-    /// Whether that is this process.
+    /// Whether this is that process.
     pub(crate) fn is_here(&self) -> bool {
         self.0 == std::process::id()
     }
 }
 
-/// What drives a line, and whose it is.
+/// A client and its owner.
 pub(crate) struct Shared<T> {
     line: RwLock<ClientState<T>>,
-    /// Threads with exchanges that may set something moving.
+    /// Threads with exchanges that may start a motor.
     under_way: UnderWay,
     port: String,
     owner: Owner,
@@ -38,7 +38,7 @@ pub(crate) struct Shared<T> {
 
 enum ClientState<T> {
     Open(Arc<T>),
-    /// What moves is being stopped.
+    /// Motors are being stopped.
     Closing(Arc<T>),
     Closed,
 }
@@ -54,24 +54,24 @@ impl<T: Send + Sync> Shared<T> {
         &self.port
     }
 
-    /// An exchange, while other Python threads run; an error once it was closed.
+    /// One exchange, while other Python threads run. An error after the close.
     pub(crate) fn exchange<R: Send>(
         &self,
         py: Python<'_>,
         act: impl FnOnce(&T) -> R + Send,
     ) -> PyResult<R> {
-        // Counted before it is known that the line is open: a close has either closed it, or waits.
+        // Counted before the check: a close has closed the client by now, or waits for this thread.
         let _entered = self.under_way.enter();
         let line = self.get(py)?;
         Ok(py.detach(|| act(&line)))
     }
 
-    /// The line, for what sets nothing moving; an error once it was closed.
+    /// The client, for calls that start no motor. An error after the close.
     pub(crate) fn get(&self, py: Python<'_>) -> PyResult<Arc<T>> {
         if !self.owner.is_here() {
             return Err(elsewhere(py, &self.port));
         }
-        // Unlocked before the exception is made: handlers of signals run there.
+        // Unlocked before the exception is created, because signal handlers can run there.
         let line = match &*self.line.read().unwrap_or_else(PoisonError::into_inner) {
             ClientState::Open(line) => Some(Arc::clone(line)),
             ClientState::Closing(_) | ClientState::Closed => None,
@@ -79,17 +79,18 @@ impl<T: Send + Sync> Shared<T> {
         line.ok_or_else(|| closed(py, &self.port))
     }
 
-    /// Whether it was closed.
+    /// Whether it is closed.
     pub(crate) fn is_closed(&self) -> bool {
         !matches!(*self.line.read().unwrap_or_else(PoisonError::into_inner), ClientState::Open(_))
     }
 
-    /// Closes it: `stop` stops what moves, at once, and again when the exchanges of other threads are
-    /// over, which may have set something moving. If this thread has one under way, this is a signal's
-    /// handler, and `stop` has to give that exchange up. Gives what the last `stop` gave.
+    /// Closes the client. `stop` stops the motors at once, and again after the exchanges of other
+    /// threads, which may have started one. If this thread has an exchange under way, this is a
+    /// signal handler, and `stop` must abandon that exchange. Returns the result of the last
+    /// `stop`.
     ///
-    /// While another thread closes it, this one stops what moves as well. Once it is closed, or in a
-    /// process that did not open it, does nothing.
+    /// If another thread closes it at the same time, both stop the motors. After the close, and in
+    /// a process that did not open it, this does nothing.
     pub(crate) fn close<R: Send>(
         &self,
         py: Python<'_>,
@@ -113,7 +114,7 @@ impl<T: Send + Sync> Shared<T> {
         })
     }
 
-    /// The line, for who closes it.
+    /// The client, for the thread that closes it.
     fn closing(&self) -> Option<Arc<T>> {
         let mut state = self.line.write().unwrap_or_else(PoisonError::into_inner);
         let (ClientState::Open(line) | ClientState::Closing(line)) = &*state else { return None };
@@ -123,12 +124,12 @@ impl<T: Send + Sync> Shared<T> {
     }
 }
 
-/// The threads in a bus, one entry an exchange.
+/// The threads with exchanges, one entry for each exchange.
 #[derive(Default)]
 struct UnderWay(Mutex<Vec<ThreadId>>);
 
 impl UnderWay {
-    /// This thread has an exchange until that is dropped.
+    /// This thread has an exchange until the result is dropped.
     fn enter(&self) -> Entered<'_> {
         self.with(|threads| threads.push(thread::current().id()));
         Entered(self)

@@ -1,4 +1,4 @@
-//! Signals while a bus waits: their Python handlers run, and may use the bus.
+//! Signals during a wait: their Python handlers run, and may use the bus.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use pyo3::prelude::*;
 
-/// Whether the waits of a bus are deaf to signals.
+/// Whether the waits of a bus ignore signals.
 #[derive(Clone, Default)]
 pub(crate) struct Deafness(Arc<AtomicBool>);
 
 impl Deafness {
-    /// Does what no signal may keep from being done. Signals are obeyed afterwards.
+    /// Does something that no signal may interrupt. Handlers run afterwards.
     pub(crate) fn during<T>(&self, act: impl FnOnce() -> T) -> T {
         self.0.store(true, Ordering::Relaxed);
         let done = act();
@@ -19,8 +19,8 @@ impl Deafness {
         done
     }
 
-    /// What a bus that waits calls: runs the handlers of signals that came, in the main thread. What
-    /// one raises ends the wait.
+    /// What a waiting bus calls: it runs the handlers of pending signals in the main thread. If a
+    /// handler raises, the wait ends.
     pub(crate) fn look(
         &self,
     ) -> impl Fn() -> Result<(), Box<dyn Error + Send + Sync>> + Send + Sync + 'static {

@@ -1,4 +1,4 @@
-//! The classes of the Python files, found when they are first needed.
+//! Classes of the Python files, imported at their first use.
 
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
@@ -32,7 +32,7 @@ classes! {
     frame _values "Frame";
 }
 
-/// A reply of an RMD motor with several values, in the class of its type.
+/// A reply of an RMD motor with several values, as an object of its class.
 pub(crate) fn rmd_reply<'py>(
     py: Python<'py>,
     class: &str,

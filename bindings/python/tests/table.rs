@@ -1,6 +1,6 @@
-//! `motorlink/_rmd_table.py` is what the table of RMD commands says.
+//! Compares `motorlink/_rmd_table.py` with the table of RMD commands.
 //!
-//! `MOTORLINK_UPDATE_PYTHON=1 cargo test -p motorlink-python --test table` writes it anew.
+//! `MOTORLINK_UPDATE_PYTHON=1 cargo test -p motorlink-python --test table` writes it.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -21,14 +21,14 @@ from motorlink._values import Errors
 "#;
 
 #[test]
-fn the_python_module_is_what_the_table_says() {
+fn the_python_module_matches_the_table() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/motorlink/_rmd_table.py");
     let generated = module().expect("a String takes everything");
     if env::var_os("MOTORLINK_UPDATE_PYTHON").is_some() {
         fs::write(&path, &generated).expect("the module can be written");
     }
     let committed = fs::read_to_string(&path).unwrap_or_default();
-    assert!(committed == generated, "_rmd_table.py is old: `make python-table` writes it anew");
+    assert!(committed == generated, "_rmd_table.py is old: `make python-table` updates it");
 }
 
 fn module() -> Result<String, std::fmt::Error> {
@@ -47,22 +47,16 @@ fn module() -> Result<String, std::fmt::Error> {
     writeln!(out, "\n\nclass Request(_core.RmdRequest):")?;
     writeln!(
         out,
-        "    \"\"\"A request to an RMD motor: checked when it is made, and able to read its reply.\"\"\""
+        "    \"\"\"A request to an RMD motor. It checks its arguments and reads its reply.\"\"\""
     )?;
     writeln!(out, "\n    __slots__ = ()")?;
     for row in &COMMANDS {
         request(&mut out, row)?;
     }
-    writeln!(
-        out,
-        "\n\n# Requests for ``Client.cycle``, sent as they are: no move is checked for a full turn."
-    )?;
+    writeln!(out, "\n\n# Requests for ``Client.cycle``, without the check for a full turn.")?;
     COMMANDS.iter().try_for_each(|row| writeln!(out, "{0} = Request.{0}", row.stem))?;
     writeln!(out, "\n\nclass MotorCommands:")?;
-    writeln!(
-        out,
-        "    \"\"\"What a motor does by its ID, one exchange each, for both APIs.\"\"\""
-    )?;
+    writeln!(out, "    \"\"\"The commands of a motor, one exchange each, for both APIs.\"\"\"")?;
     writeln!(out, "\n    __slots__ = ()\n\n    _exchange: Any")?;
     for row in COMMANDS.iter().filter(|row| !has_limited(row)) {
         method(&mut out, row)?;
@@ -81,7 +75,7 @@ fn replies() -> Vec<&'static CommandInfo> {
     replies
 }
 
-/// Two commands are one method, written by hand: to a position, and no faster than a limit.
+/// A command and its variant with a limit are one method, which is written by hand.
 fn has_limited(row: &CommandInfo) -> bool {
     row.stem.ends_with("_limited")
         || COMMANDS.iter().any(|other| other.stem.strip_suffix("_limited") == Some(row.stem))
@@ -117,7 +111,7 @@ fn kind(field: &Field) -> &'static str {
     }
 }
 
-/// The type of what a program gives for a field.
+/// The type of the argument for a field.
 fn argument(field: &Field) -> &'static str {
     match field.meaning {
         Meaning::Number if field.scale.suffix.is_empty() => "int",
@@ -126,7 +120,7 @@ fn argument(field: &Field) -> &'static str {
     }
 }
 
-/// The arguments of a request. Several have to be named: their order in a frame is easily confused.
+/// The arguments of a request. Several are keyword arguments, because their order is easily confused.
 fn arguments(row: &CommandInfo) -> String {
     let each = row.request.iter();
     let each: Vec<_> =
@@ -184,7 +178,7 @@ fn method(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
     writeln!(out, "        return one(self._exchange(Request.{}({values})))", row.stem)
 }
 
-/// Whether a request carries what a reply says.
+/// Whether a request has the fields of a reply.
 fn same(reply: &[Field], request: &[Field]) -> bool {
     reply.len() == request.len()
         && reply
@@ -225,7 +219,7 @@ fn documentation(out: &mut String, row: &CommandInfo) -> std::fmt::Result {
     writeln!(out, "        \"\"\"")
 }
 
-/// Whether not every digit of the frame may be asked for.
+/// Whether the range is smaller than that of the field in the frame.
 fn is_narrow(field: &Field) -> bool {
     let bits = 8 * u32::from(field.len) - u32::from(field.signed);
     let most = (1_i64 << bits) - 1;

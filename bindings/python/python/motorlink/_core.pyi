@@ -1,4 +1,4 @@
-"""The extension module. What people use is in ``motorlink.st`` and ``motorlink.rmd``."""
+"""The extension module. Its users are ``motorlink.st`` and ``motorlink.rmd``."""
 
 from collections.abc import Sequence
 from typing import Any, final
@@ -96,7 +96,7 @@ def rmd_motor(id: int) -> int: ...
 def rmd_quantities() -> list[str]: ...
 @final
 class StRequest:
-    """A request to an ST drive: checked when it is made, and able to read its reply."""
+    """A request to an ST drive. It checks its arguments and reads its reply."""
 
     @staticmethod
     def get_register(
@@ -177,7 +177,7 @@ class StRequest:
 
 @final
 class StOptions:
-    """What a line with an ST drive is opened with, checked when it is made."""
+    """The checked options of a line with an ST drive."""
 
     def __new__(
         cls,
@@ -213,7 +213,7 @@ class StClient:
 
 @disjoint_base
 class RmdRequest:
-    """A request to an RMD motor: checked when it is made, and able to read its reply."""
+    """A request to an RMD motor. It checks its arguments and reads its reply."""
 
     def __new__(cls, data: bytes, *, raw: bool = False) -> Self: ...
     @classmethod
@@ -234,7 +234,7 @@ class RmdRequest:
 
 @final
 class RmdOptions:
-    """What a CAN bus with RMD motors is opened with, checked when it is made."""
+    """The checked options of a CAN bus with RMD motors."""
 
     def __new__(
         cls,
@@ -310,7 +310,7 @@ class SimPort:
 
 @final
 class SimRecording:
-    """Signals that are written down while time passes."""
+    """Signals that are recorded while time advances."""
 
     @property
     def every(self) -> int: ...

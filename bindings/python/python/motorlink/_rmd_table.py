@@ -94,7 +94,7 @@ class PhaseCurrents(NamedTuple):
 
 
 class Request(_core.RmdRequest):
-    """A request to an RMD motor: checked when it is made, and able to read its reply."""
+    """A request to an RMD motor. It checks its arguments and reads its reply."""
 
     __slots__ = ()
 
@@ -342,7 +342,7 @@ class Request(_core.RmdRequest):
         return Request(_core.rmd_encode(0xA6, direction, max_speed_dps, angle_degrees))
 
 
-# Requests for ``Client.cycle``, sent as they are: no move is checked for a full turn.
+# Requests for ``Client.cycle``, without the check for a full turn.
 read_pid = Request.read_pid
 write_pid_ram = Request.write_pid_ram
 write_pid_rom = Request.write_pid_rom
@@ -369,7 +369,7 @@ set_single_turn_position_limited = Request.set_single_turn_position_limited
 
 
 class MotorCommands:
-    """What a motor does by its ID, one exchange each, for both APIs."""
+    """The commands of a motor, one exchange each, for both APIs."""
 
     __slots__ = ()
 

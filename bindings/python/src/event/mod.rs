@@ -1,4 +1,4 @@
-//! Clients for event loops: they are driven in steps, none of which waits.
+//! Clients for event loops: they advance in steps that do not wait.
 
 mod rmd;
 mod st;
@@ -16,8 +16,8 @@ use pyo3::prelude::*;
 use crate::error::{closed, elsewhere};
 use crate::shared::Owner;
 
-/// What a machine drives, until it is closed. Only its opening and closing wait, and they may do so
-/// in another thread; everything else belongs to the thread of the event loop.
+/// A client until it is closed. Only opening and closing may wait, and may run in another thread.
+/// All else runs in the thread of the event loop.
 struct Driven<T> {
     state: Mutex<Option<T>>,
     port: String,
@@ -35,8 +35,8 @@ impl<T: Send> Driven<T> {
         }
     }
 
-    /// A step, which does not wait. No Python code may run in it: handlers of signals would run there,
-    /// too, and could not close what the step has locked.
+    /// A step, which does not wait. It must not run Python code: a signal handler could run there
+    /// and could not close what the step has locked.
     fn step<R>(&self, py: Python<'_>, step: impl FnOnce(&mut T) -> R) -> PyResult<R> {
         self.check_owner(py)?;
         let done = match self.state.try_lock() {
@@ -49,7 +49,7 @@ impl<T: Send> Driven<T> {
         done.ok_or_else(|| closed(py, &self.port))
     }
 
-    /// What may wait, while other Python threads run.
+    /// A call that may wait, while other Python threads run.
     fn detached<R: Send>(
         &self,
         py: Python<'_>,
@@ -60,8 +60,8 @@ impl<T: Send> Driven<T> {
         done.ok_or_else(|| closed(py, &self.port))
     }
 
-    /// Ends it, while other Python threads run. Nothing the second time, though not before the first
-    /// is over, nor in another process.
+    /// Closes it, while other Python threads run. A second call waits for the first one and does
+    /// nothing. In another process it does nothing.
     fn close<R: Send>(&self, py: Python<'_>, end: impl FnOnce(T) -> Vec<R> + Send) -> Vec<R> {
         if !self.owner.is_here() {
             return Vec::new();
@@ -82,7 +82,7 @@ impl<T: Send> Driven<T> {
     }
 }
 
-/// A descriptor as Python knows it; `None` where there is nothing to watch.
+/// A descriptor as a Python integer; `None` without one.
 fn fileno(descriptor: Option<BorrowedFd<'_>>) -> Option<i32> {
     descriptor.map(|fd| fd.as_raw_fd())
 }

@@ -13,36 +13,36 @@ use crate::rmd::{
     RmdOptions, RmdRequest, four_currents, limits, motor_id, motor_ids, not_stopped, scan_result,
 };
 
-/// A CAN bus, one exchange a motor at a time: `ask`, then `advance` when the descriptor is readable
-/// and when the time that it gave has passed.
+/// A CAN bus with one exchange per motor at a time. Call `ask`. Then call `advance` when the
+/// descriptor is readable and when the returned time has passed.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdEventClient {
     driven: Driven<Motors>,
-    /// Those of a bus of python-can.
+    /// The threads of a bus of python-can.
     threads: Option<Threads>,
 }
 
 struct Motors {
     bus: EventClient,
-    /// What each motor was asked.
+    /// The request of each motor.
     asked: [ReplyKind; MotorId::COUNT],
 }
 
-/// What is opened: another program's bus, or a port by its name.
+/// What is opened: a bus of python-can, or a port by its name.
 #[derive(FromPyObject)]
 enum CanBus {
     Port(Py<CanPort>),
     Name(String),
 }
 
-/// Exchanges that are over: ID, and the value or the exception in its place.
+/// Completed exchanges: ID, and the value or the exception.
 type Over = Vec<(u8, Py<PyAny>)>;
 
-/// What is made of a reply.
+/// The kind of value that a reply becomes.
 #[derive(Clone)]
 enum ReplyKind {
     Value(RmdRequest),
-    /// What there is under this ID.
+    /// The result of a scan for this ID.
     ScanResult,
 }
 
@@ -55,8 +55,7 @@ impl RmdEventClient {
 
 #[pymethods]
 impl RmdEventClient {
-    /// Opens a port, by its name or from another program's bus, which may wait. No motor is asked
-    /// anything.
+    /// Opens a port by its name, or a bus of python-can. This may wait. Sends nothing.
     #[staticmethod]
     fn open(py: Python<'_>, port: CanBus, options: &RmdOptions) -> PyResult<Self> {
         let options = options.0;
@@ -85,19 +84,19 @@ impl RmdEventClient {
         self.driven.step(py, |motors| motors.bus.link_state() == LinkState::Open)
     }
 
-    /// Opens the port if it is closed and its back-off is over, which may wait.
+    /// Opens the port if it is closed and its back-off is over. This may wait.
     fn reopen(&self, py: Python<'_>) -> PyResult<()> {
         let opened = self.driven.detached(py, |motors| motors.bus.reopen())?;
         opened.map_err(|error| rmd_error(py, &error))
     }
 
-    /// The descriptor to watch; `None` where there is none.
+    /// The descriptor to watch; `None` without one.
     fn fileno(&self, py: Python<'_>) -> PyResult<Option<i32>> {
         self.driven.step(py, |motors| fileno(motors.bus.descriptor()))
     }
 
-    /// Begins an exchange with a motor that has none under way. One in quarantine is waited for if
-    /// `patient`, and an error if not.
+    /// Begins an exchange with a motor that has none under way. If the motor is in quarantine, it
+    /// waits if `patient`, and is an error otherwise.
     #[pyo3(signature = (id, request, *, patient = true))]
     fn ask(&self, py: Python<'_>, id: i64, request: &RmdRequest, patient: bool) -> PyResult<()> {
         let id = motor_id(py, id)?;
@@ -110,20 +109,20 @@ impl RmdEventClient {
         begun.map_err(|error| rmd_error(py, &error))
     }
 
-    /// What to ask a motor for a confirmation.
+    /// The request that confirms a motor's replies.
     fn question(&self, py: Python<'_>, id: i64) -> PyResult<RmdRequest> {
         let id = motor_id(py, id)?;
         self.driven.step(py, |motors| RmdRequest::for_bytes(motors.bus.question(id)))
     }
 
-    /// Makes sure, behind the answer to `question`, that a motor's replies went to their own requests.
+    /// Checks, after the reply to `question`, that a motor's replies matched their requests.
     fn confirmed(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
         let confirmed = self.driven.step(py, |motors| motors.bus.confirmed(id))?;
         confirmed.map_err(|error| rmd_error(py, &error))
     }
 
-    /// Begins to look for a motor under an ID; ends in what was found, `None` if nothing.
+    /// Begins the scan for one ID. Its value is the result, `None` if nothing replies.
     fn look_for(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
         let begun = self.driven.step(py, |motors| {
@@ -134,8 +133,8 @@ impl RmdEventClient {
         begun.map_err(|error| rmd_error(py, &error))
     }
 
-    /// Begins exchanges with those of motors 1 to 4 that are expected to answer: torque currents, A,
-    /// for all four, in one frame.
+    /// Begins exchanges with the motors 1 to 4 that must reply: torque currents for all four in one
+    /// frame, A.
     fn set_torque4(&self, py: Python<'_>, iq_amps: [f64; 4], expect: Vec<i64>) -> PyResult<()> {
         let (torques, expect) = (four_currents(py, iq_amps)?, motor_ids(py, expect)?);
         let begun = self.driven.step(py, |motors| {
@@ -148,8 +147,8 @@ impl RmdEventClient {
         begun.map_err(|error| rmd_error(py, &error))
     }
 
-    /// Moves what can be moved at once. Gives after how many s to go on, `None` while no exchange is
-    /// under way, and the exchanges that are over: ID, and the value or the exception in its place.
+    /// Does what it can without waiting. Returns the time until the next step in s, `None` without
+    /// an exchange, and the completed exchanges: ID, and the value or the exception.
     fn advance(&self, py: Python<'_>) -> PyResult<(Option<f64>, Over)> {
         let (wait, over) = self.driven.step(py, |Motors { bus, asked }| {
             let mut over = Vec::new();
@@ -172,7 +171,7 @@ impl RmdEventClient {
         Ok((seconds(wait), over.into_iter().map(value).collect()))
     }
 
-    /// Gives up the exchange with a motor, if there is one.
+    /// Abandons the exchange with a motor, if there is one.
     fn cancel(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
         self.driven.step(py, |motors| {
@@ -180,7 +179,7 @@ impl RmdEventClient {
         })
     }
 
-    /// Sets what a motor may be told; `None` is no limit.
+    /// Sets the limits of a motor; `None` is no limit.
     fn set_limits(
         &self,
         py: Python<'_>,
@@ -196,15 +195,15 @@ impl RmdEventClient {
         })
     }
 
-    /// Motors that were given something to do and neither stopped nor switched off.
+    /// Motors that were commanded and neither stopped nor switched off.
     #[getter]
     fn moving(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
         self.driven
             .detached(py, |motors| motors.bus.moving().map(|id| id.number().into()).collect())
     }
 
-    /// Closes the port, which may wait; `stop` stops what is moving before, or switches it `off`,
-    /// and gives the motors that did not acknowledge it, and why. Again is no error.
+    /// Closes the port, which may wait. `stop` first stops the moving motors, `off` switches them
+    /// off. Returns the motors that did not acknowledge it, and why. A second call does nothing.
     #[pyo3(signature = (*, stop, off))]
     fn close(&self, py: Python<'_>, stop: bool, off: bool) -> Vec<(u8, PyErr)> {
         let action = if off { StopAction::Off } else { StopAction::Stop };

@@ -11,8 +11,8 @@ use super::{Driven, fileno, outcome, seconds};
 use crate::error::{invalid_value, st_error};
 use crate::st::{Answer, StOptions, StRequest, frame_code, motor_number, not_stopped};
 
-/// A master on a serial line, one exchange at a time: `begin`, then `advance` when the descriptor is
-/// readable and when the time that it gave has passed, until it is done.
+/// A master on a serial line with one exchange at a time. Call `begin`. Then call `advance` when
+/// the descriptor is readable and when the returned time has passed, until it is done.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct StEventClient {
     driven: Driven<InFlight>,
@@ -23,10 +23,10 @@ struct InFlight {
     asked: Asked,
 }
 
-/// What was asked, while its exchange is under way.
+/// The request of the exchange under way.
 enum Asked {
     Request(Py<StRequest>),
-    /// For bytes, or nothing.
+    /// A request for bytes, or for nothing.
     Raw,
     Confirmation(Confirmation),
 }
@@ -60,7 +60,7 @@ impl InFlight {
 
 #[pymethods]
 impl StEventClient {
-    /// Opens a port, which may wait. The drive is not asked anything.
+    /// Opens a port, which may wait. Sends nothing.
     #[staticmethod]
     fn open(py: Python<'_>, port: &str, options: &StOptions) -> PyResult<Self> {
         let name: PortName = port.parse().map_err(|error| invalid_value(py, error))?;
@@ -76,18 +76,18 @@ impl StEventClient {
         self.driven.step(py, |line| line.client.link_state() == LinkState::Open)
     }
 
-    /// Opens the port if it is closed and its back-off is over, which may wait.
+    /// Opens the port if it is closed and its back-off is over. This may wait.
     fn reopen(&self, py: Python<'_>) -> PyResult<()> {
         let opened = self.driven.detached(py, |line| line.client.reopen())?;
         opened.map_err(|error| st_error(py, &error))
     }
 
-    /// The descriptor to watch; `None` where there is none.
+    /// The descriptor to watch; `None` without one.
     fn fileno(&self, py: Python<'_>) -> PyResult<Option<i32>> {
         self.driven.step(py, |line| fileno(line.client.descriptor()))
     }
 
-    /// Begins an exchange; one that is under way is abandoned.
+    /// Begins an exchange. An exchange under way is abandoned.
     fn begin(&self, py: Python<'_>, motor: i64, request: Py<StRequest>) -> PyResult<()> {
         let motor = motor_number(py, motor)?;
         let begun = self.driven.step(py, |line| {
@@ -109,7 +109,7 @@ impl StEventClient {
         begun.map_err(|error| st_error(py, &error))
     }
 
-    /// Begins to make sure that the replies so far went to their own requests; its value is `None`.
+    /// Begins a check that the replies matched their requests; its value is `None`.
     fn begin_confirmation(&self, py: Python<'_>) -> PyResult<()> {
         let begun = self.driven.step(py, |line| {
             line.asked = Asked::Raw;
@@ -119,8 +119,9 @@ impl StEventClient {
         begun.map_err(|error| st_error(py, &error))
     }
 
-    /// Moves what can be moved at once. `(True, value)`, or the exception in its place, when the
-    /// exchange is over; else `False` and after how many s to go on, `None` while none is under way.
+    /// Does what it can without waiting. Returns `(True, value)` or `(True, exception)` for a
+    /// completed exchange. Otherwise returns `False` and the time until the next step in s, `None`
+    /// without an exchange.
     fn advance(&self, py: Python<'_>) -> PyResult<(bool, Option<Py<PyAny>>)> {
         let progress = self.driven.step(py, |line| line.advance(py))?;
         let result = match progress {
@@ -138,7 +139,7 @@ impl StEventClient {
         Ok((true, Some(outcome(py, value))))
     }
 
-    /// Gives up the exchange that is under way, if there is one.
+    /// Abandons the exchange under way, if there is one.
     fn abandon(&self, py: Python<'_>) -> PyResult<()> {
         self.driven.step(py, |line| {
             line.asked = Asked::Raw;
@@ -153,8 +154,8 @@ impl StEventClient {
             .detached(py, |line| line.client.started().map(|motor| motor.number().into()).collect())
     }
 
-    /// Closes the port, which may wait; `stop` stops what was started before, and gives the motors
-    /// that did not acknowledge it, and why. Again is no error.
+    /// Closes the port, which may wait. `stop` first stops the started motors. Returns the motors
+    /// that did not acknowledge it, and why. A second call does nothing.
     #[pyo3(signature = (*, stop))]
     fn close(&self, py: Python<'_>, stop: bool) -> Vec<(u8, PyErr)> {
         let stopped = self.driven.close(py, |line| {

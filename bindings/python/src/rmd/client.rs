@@ -1,4 +1,4 @@
-//! A CAN bus with RMD motors, for threads that may wait.
+//! A CAN bus with RMD motors, blocking.
 
 use motorlink::Clock;
 use motorlink::port::PortName;
@@ -21,19 +21,19 @@ use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
 use crate::values;
 
-/// A CAN bus with RMD motors. Every call lets other Python threads run while it waits.
+/// A CAN bus with RMD motors. Each call lets other Python threads run while it waits.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdClient {
     bus: Shared<Client>,
     clock: Clock,
     deafness: Deafness,
-    /// Those of a bus of python-can.
+    /// The threads of a bus of python-can.
     threads: Option<Threads>,
 }
 
 #[pymethods]
 impl RmdClient {
-    /// Opens a port. No motor is asked anything.
+    /// Opens a port. Sends nothing.
     #[staticmethod]
     fn open(py: Python<'_>, port: AnyPort<'_>, options: &RmdOptions) -> PyResult<Self> {
         let options = options.0;
@@ -63,20 +63,20 @@ impl RmdClient {
         Ok(RmdClient { bus: Shared::new(bus, port), clock, deafness, threads })
     }
 
-    /// One exchange; gives what the request makes of the reply.
+    /// One exchange. Returns the value of the reply.
     fn exchange(&self, py: Python<'_>, id: i64, request: &RmdRequest) -> PyResult<Py<PyAny>> {
         let (id, data) = (motor_id(py, id)?, request.data());
         let reply = self.bus.exchange(py, |bus| bus.raw(id, data))?;
         request.value(py, &reply.map_err(|error| rmd_error(py, &error))?)
     }
 
-    /// Makes sure that a motor's replies so far went to their own requests.
+    /// Checks that a motor's replies matched their requests.
     fn confirm(&self, py: Python<'_>, id: i64) -> PyResult<()> {
         let id = motor_id(py, id)?;
         self.bus.exchange(py, |bus| bus.confirm(id))?.map_err(|error| rmd_error(py, &error))
     }
 
-    /// Exchanges that overlap, one a motor; gives the value, or the exception, by ID.
+    /// Overlapping exchanges, one per motor. Returns the value or the exception, by ID.
     fn cycle<'py>(
         &self,
         py: Python<'py>,
@@ -104,7 +104,7 @@ impl RmdClient {
         Ok(by_id)
     }
 
-    /// Torque currents, A, for motors 1 to 4 in one frame; gives what each of `expect` answers.
+    /// Torque currents for motors 1 to 4 in one frame, A. Returns the replies of `expect`.
     fn set_torque4<'py>(
         &self,
         py: Python<'py>,
@@ -124,14 +124,14 @@ impl RmdClient {
         Ok(by_id)
     }
 
-    /// Asks every ID for its status; gives what answered.
+    /// Asks each ID for its status. Returns the replies.
     fn scan(&self, py: Python<'_>, ids: Vec<i64>) -> PyResult<Vec<Py<PyAny>>> {
         let bus = self.bus.get(py)?;
         let mut left = motor_ids(py, ids)?;
         let mut found = Vec::new();
         while !left.is_empty() {
             let some: MotorSet = left.by_ref().take(SCAN_WIDTH).collect();
-            // Signals are looked at in between.
+            // Signal handlers run between the parts.
             py.detach(|| bus.scan(some, |one| found.push(one), |_| {}))
                 .map_err(|error| rmd_error(py, &error))?;
             py.check_signals()?;
@@ -156,7 +156,7 @@ impl RmdClient {
         Ok((rows, skipped, outcome.err()))
     }
 
-    /// Sets what a motor may be told; `None` is no limit.
+    /// Sets the limits of a motor; `None` is no limit.
     fn set_limits(
         &self,
         py: Python<'_>,
@@ -171,7 +171,7 @@ impl RmdClient {
         Ok(())
     }
 
-    /// Motors that were given something to do and neither stopped nor switched off.
+    /// Motors that were commanded and neither stopped nor switched off.
     #[getter]
     fn moving<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let bus = self.bus.get(py)?;
@@ -179,9 +179,9 @@ impl RmdClient {
         PyList::new(py, numbers)
     }
 
-    /// Closes the port, when exchanges that are under way are over; `stop` stops what is moving
-    /// before, or switches it `off`, and gives the motors that did not acknowledge it, and why.
-    /// Again is no error.
+    /// Closes the port after the exchanges under way. `stop` first stops the moving motors, `off`
+    /// switches them off. Returns the motors that did not acknowledge it, and why. A second call
+    /// does nothing.
     #[pyo3(signature = (*, stop, off))]
     fn close(&self, py: Python<'_>, stop: bool, off: bool) -> Vec<(u8, PyErr)> {
         let action = if off { StopAction::Off } else { StopAction::Stop };
@@ -195,7 +195,7 @@ impl RmdClient {
         not_stopped(py, stopped)
     }
 
-    /// Whether it was closed.
+    /// Whether it is closed.
     #[getter]
     fn is_closed(&self) -> bool {
         self.bus.is_closed()
@@ -208,7 +208,7 @@ impl RmdClient {
     }
 }
 
-/// The motors that may still be moving, and why.
+/// The motors that may still move, and why.
 pub(crate) fn not_stopped(py: Python<'_>, stopped: Vec<Stopped>) -> Vec<(u8, PyErr)> {
     let failed = stopped
         .into_iter()

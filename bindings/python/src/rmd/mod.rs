@@ -21,13 +21,13 @@ use pyo3::types::PyDict;
 
 use crate::error::invalid_value;
 
-/// A motor's ID, 1 to 32.
+/// The motor ID, if it is 1 to 32.
 #[pyfunction]
 pub(crate) fn rmd_motor(py: Python<'_>, id: i64) -> PyResult<u8> {
     Ok(motor_id(py, id)?.number())
 }
 
-/// A frame in words and values. `reply`: the motor sent it; the frame does not tell.
+/// A frame as text and values. `reply`: the motor sent it. The frame does not show this.
 #[pyfunction]
 #[pyo3(signature = (can_id, data, *, reply))]
 pub(crate) fn rmd_decode(
@@ -38,7 +38,8 @@ pub(crate) fn rmd_decode(
 ) -> PyResult<Py<PyAny>> {
     let data = request::eight(py, data)?;
     let id = u16::try_from(can_id).ok().filter(|id| *id < 0x800);
-    let id = id.ok_or_else(|| invalid_value(py, format_args!("{can_id:#x} has not 11 bits")))?;
+    let id =
+        id.ok_or_else(|| invalid_value(py, format_args!("{can_id:#x} has more than 11 bits")))?;
     let motor = MotorId::from_can_id(can_id);
     let code = Code::from(data[0]);
     let (name, fields): (_, &[Field]) = match (motor, code.info()) {
@@ -46,7 +47,7 @@ pub(crate) fn rmd_decode(
         (None, _) => {
             return Err(invalid_value(
                 py,
-                format_args!("{id:#05x} is no identifier of this protocol"),
+                format_args!("{id:#05x} is not an identifier of this protocol"),
             ));
         }
         (Some(_), Some(row)) => (row.code.to_string(), if reply { row.reply } else { row.request }),

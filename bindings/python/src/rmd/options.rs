@@ -1,11 +1,11 @@
-//! How a CAN bus with RMD motors is opened: for threads that may wait and for event loops.
+//! Options of a CAN bus with RMD motors, for blocking clients and for event loops.
 
 use motorlink::rmd::{CentiDegrees, IqCommand, Limits, Options, SpeedLimit};
 use pyo3::prelude::*;
 
 use crate::number::{limit, span};
 
-/// What `open` was told, checked.
+/// The checked arguments of `open`.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdOptions(pub(crate) Options);
 
@@ -32,7 +32,7 @@ impl RmdOptions {
     }
 }
 
-/// Limits in the units of the field. A limit is rounded towards 0.
+/// Limits in the units of the fields. A limit is rounded towards 0.
 pub(crate) fn limits(
     py: Python<'_>,
     current_limit_amps: Option<f64>,

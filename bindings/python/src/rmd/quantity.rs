@@ -1,4 +1,4 @@
-//! What can be read of a motor, value by value, under names with units.
+//! The values that can be sampled, under names with units.
 
 use std::cmp::Reverse;
 
@@ -15,7 +15,7 @@ pub(crate) struct Quantity {
 }
 
 impl Quantity {
-    /// Every quantity with its name, of the reads that tell most first.
+    /// Every quantity with its name. Reads with the most values come first.
     pub(crate) fn all() -> Vec<(String, Quantity)> {
         let mut reads: Vec<_> = COMMANDS.iter().filter(|row| row.sampled).collect();
         reads.sort_by_key(|row| Reverse(row.reply.len()));
@@ -36,12 +36,12 @@ impl Quantity {
         let found = Self::all().into_iter().find(|(known, _)| known == name);
         found.map(|(_, quantity)| quantity).ok_or_else(|| {
             let known = rmd_quantities().join(", ");
-            invalid_value(py, format_args!("motors do not tell `{name}`; there are {known}"))
+            invalid_value(py, format_args!("unknown quantity `{name}`: the quantities are {known}"))
         })
     }
 }
 
-/// The field's name; the noun of its read where another read calls another quantity so.
+/// The field's name. If another read has the same name, it is the noun of the read.
 fn quantity_name(row: &CommandInfo, field: &Field, reads: &[&CommandInfo]) -> String {
     let mut fields = reads.iter().flat_map(|read| read.reply);
     let name = field.name_with_unit().to_string();
@@ -53,7 +53,7 @@ fn quantity_name(row: &CommandInfo, field: &Field, reads: &[&CommandInfo]) -> St
     }
 }
 
-/// Names of what can be sampled.
+/// The names that can be sampled.
 #[pyfunction]
 pub(crate) fn rmd_quantities() -> Vec<String> {
     Quantity::all().into_iter().map(|(name, _)| name).collect()

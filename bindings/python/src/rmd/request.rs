@@ -1,5 +1,5 @@
-//! One request to an RMD motor: checked when it is made, and able to read its reply. The table of
-//! commands says what there is; `tests/table.rs` writes a constructor in Python for each row.
+//! One request to an RMD motor: it checks its arguments and reads its reply. `tests/table.rs`
+//! writes a constructor in Python for each row of the command table.
 
 use motorlink::rmd::FullTurn;
 use motorlink_proto::Hex;
@@ -20,7 +20,7 @@ use crate::values;
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct RmdRequest {
     data: [u8; 8],
-    /// Whether the reply is wanted as bytes.
+    /// Whether the reply is returned as bytes.
     raw: bool,
 }
 
@@ -30,7 +30,7 @@ impl RmdRequest {
         RmdRequest { data: command.encode(), raw: false }
     }
 
-    /// A command whose reply is wanted as bytes.
+    /// A command whose reply is returned as bytes.
     pub(crate) fn for_bytes(data: [u8; 8]) -> Self {
         RmdRequest { data, raw: true }
     }
@@ -44,7 +44,7 @@ impl RmdRequest {
         Code::from(self.data[0]).info()
     }
 
-    /// The reply for Python: nothing where it repeats the request, else its values.
+    /// The reply for Python: `None` if it repeats the request, otherwise its values.
     pub(crate) fn value(&self, py: Python<'_>, reply: &[u8; 8]) -> PyResult<Py<PyAny>> {
         match self.row().filter(|_| !self.raw) {
             Some(row) if row.echo => Ok(py.None()),
@@ -59,7 +59,7 @@ pub(crate) fn said<P: Payload>(py: Python<'_>, name: &str, reply: &P) -> PyResul
     fields(py, name, P::FIELDS, &reply.encode_as(0))
 }
 
-/// One value as it is, several in the class of this name.
+/// A single value; several values in the class of this name.
 fn fields(py: Python<'_>, class: &str, fields: &[Field], data: &[u8; 8]) -> PyResult<Py<PyAny>> {
     let values: PyResult<Vec<_>> = fields.iter().map(|field| value(py, field, data)).collect();
     match values?.as_slice() {
@@ -69,7 +69,7 @@ fn fields(py: Python<'_>, class: &str, fields: &[Field], data: &[u8; 8]) -> PyRe
     }
 }
 
-/// A value for Python: an integer where a digit is one unit, names for bits.
+/// A value for Python: an integer if one digit is one unit, names for bits.
 fn value(py: Python<'_>, field: &Field, data: &[u8; 8]) -> PyResult<Py<PyAny>> {
     let digits = field.raw(data);
     match field.meaning {
@@ -83,7 +83,7 @@ fn value(py: Python<'_>, field: &Field, data: &[u8; 8]) -> PyResult<Py<PyAny>> {
     }
 }
 
-/// The digits of what a program gives for a field.
+/// The digits of an argument for a field.
 fn digits(field: &Field, value: &Bound<'_, PyAny>) -> PyResult<i64> {
     let py = value.py();
     let refused =
@@ -94,7 +94,7 @@ fn digits(field: &Field, value: &Bound<'_, PyAny>) -> PyResult<i64> {
         return found.map(|(number, _)| i64::from(*number)).ok_or_else(|| {
             let known: Vec<_> = words.iter().map(|(_, word)| *word).collect();
             let known = known.join(", ");
-            refused(format!("there is no `{given}`; there are {known}"))
+            refused(format!("unknown value `{given}`: the values are {known}"))
         });
     }
     let value: f64 = value.extract()?;
@@ -123,7 +123,7 @@ pub(crate) fn rmd_encode<'py>(
     Ok(PyBytes::new(py, &data))
 }
 
-/// The tolerance of the check for a full turn, ° past the target.
+/// Checks the tolerance of the full-turn check, ° past the target.
 #[pyfunction]
 pub(crate) fn rmd_full_turn_tolerance(py: Python<'_>, tolerance_degrees: f64) -> PyResult<()> {
     tolerance(py, tolerance_degrees).map(drop)
@@ -137,19 +137,20 @@ fn tolerance(py: Python<'_>, degrees: f64) -> PyResult<TurnCentiDegrees> {
 
 #[pymethods]
 impl RmdRequest {
-    /// Of eight bytes. `raw`: the reply is wanted as bytes, too.
+    /// A request of eight bytes. `raw`: the reply is returned as bytes.
     #[new]
     #[pyo3(signature = (data, *, raw = false))]
     fn new(py: Python<'_>, data: &[u8], raw: bool) -> PyResult<Self> {
         let request = RmdRequest { data: eight(py, data)?, raw };
         if !raw && request.row().is_none() {
             let code = request.code();
-            return Err(invalid_value(py, format_args!("{code:#04x} is no command of V1.62")));
+            return Err(invalid_value(py, format_args!("{code:#04x} is not a command of V1.62")));
         }
         Ok(request)
     }
 
-    /// Eight bytes as they are, answered with eight bytes. `rom` allows those that wear the ROM.
+    /// A request of any eight bytes. Its reply is eight bytes. `rom` allows those that wear the
+    /// ROM.
     #[classmethod]
     #[pyo3(signature = (data, *, rom = false))]
     fn raw<'py>(cls: &Bound<'py, PyType>, data: &[u8], rom: bool) -> PyResult<Bound<'py, PyAny>> {
@@ -157,7 +158,8 @@ impl RmdRequest {
         let request = Self::new(py, data, true)?;
         if request.is_rom() && !rom {
             let code = request.code();
-            let why = format!("{code:#04x} writes to the motor's ROM, which wears: say rom=True");
+            let why =
+                format!("{code:#04x} writes to the motor's ROM, which wears: rom=True allows it");
             return Err(invalid_value(py, why));
         }
         let named = PyDict::new(py);
@@ -165,14 +167,14 @@ impl RmdRequest {
         cls.call((data,), Some(&named))
     }
 
-    /// The request in eight bytes.
+    /// A request from its eight bytes.
     #[classmethod]
     fn decode<'py>(cls: &Bound<'py, PyType>, data: &[u8]) -> PyResult<Bound<'py, PyAny>> {
         cls.call1((data,))
     }
 
-    /// Refuses this move within the turn for a motor at `angle_degrees`, from where it could be nearly a
-    /// full turn.
+    /// Raises `FullTurnError` if this move within the turn could be nearly a full turn, for a motor
+    /// at `angle_degrees`.
     fn check_full_turn(
         &self,
         py: Python<'_>,
@@ -192,24 +194,24 @@ impl RmdRequest {
         PyBytes::new(py, &self.data)
     }
 
-    /// What eight bytes say as the reply to this request.
+    /// The value of a reply of eight bytes to this request.
     fn decode_reply(&self, py: Python<'_>, data: &[u8]) -> PyResult<Py<PyAny>> {
         self.value(py, &eight(py, data)?)
     }
 
-    /// DATA[0]: what is asked for.
+    /// The command code, DATA[0].
     #[getter]
     fn code(&self) -> u8 {
         self.data[0]
     }
 
-    /// The command's name in all languages: `set_speed`; `None` for a code that V1.62 does not name.
+    /// The command's name in all languages: `set_speed`. `None` for a code without a name in V1.62.
     #[getter]
     fn stem(&self) -> Option<&'static str> {
         self.row().map(|row| row.stem)
     }
 
-    /// Whether the motor writes to its ROM, which wears.
+    /// Whether the command writes to the motor's ROM, which wears.
     #[getter]
     fn is_rom(&self) -> bool {
         self.row().is_some_and(|row| row.rom)

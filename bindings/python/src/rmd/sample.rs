@@ -1,4 +1,4 @@
-//! Sampling what motors tell, all of them in the same cycles.
+//! Sampling values of motors, all of them in the same cycles.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -21,19 +21,19 @@ struct Lane {
     quantities: Vec<Quantity>,
 }
 
-/// What is asked for a row, and what its values are among the answers.
+/// The requests of a row, and its values in the replies.
 struct Questions {
     lanes: Vec<Lane>,
-    /// Each motor once a cycle, until every motor has been asked all of its questions.
+    /// One request per motor in each cycle, until all requests are sent.
     cycles: Vec<Vec<(MotorId, [u8; 8])>>,
     raw: bool,
 }
 
-/// Answers of a row: who, to what, and the reply.
+/// The replies of a row: motor, command, reply.
 type Replies = Vec<(MotorId, Code, [u8; 8])>;
 
 impl Questions {
-    /// About the quantities of motors `(id, names)`.
+    /// The requests for the quantities of motors `(id, names)`.
     fn new(py: Python<'_>, motors: Vec<(i64, Vec<String>)>, raw: bool) -> PyResult<Self> {
         let mut lanes = Vec::with_capacity(motors.len());
         for (id, names) in motors {
@@ -51,7 +51,7 @@ impl Questions {
             }
             cycles.resize_with(cycles.len().max(codes.len()), Vec::new);
             for (cycle, code) in cycles.iter_mut().zip(codes) {
-                // A read has nothing but its code.
+                // The request of a read is its code.
                 cycle.push((lane.id, [code.number(), 0, 0, 0, 0, 0, 0, 0]));
             }
         }
@@ -63,7 +63,7 @@ impl Questions {
         for lane in &self.lanes {
             for Quantity { code, field } in &lane.quantities {
                 let reply = replies.iter().find(|(id, of, _)| *id == lane.id && of == code);
-                // Every request was answered, or the row has failed before.
+                // Each request has a reply, otherwise the row has failed.
                 let digits = reply.map_or(0, |(.., reply)| field.raw(reply));
                 values.push(cell(self.raw, digits, field.scale.value(digits)));
             }
@@ -90,8 +90,8 @@ fn replies(bus: &Client, questions: &Questions) -> Result<Replies, Error> {
     Ok(replies)
 }
 
-/// Rows of quantities: for a blocking client [`RmdSampling::run`]; for an event loop what to ask, one
-/// cycle after the other.
+/// Rows of quantities. A blocking client calls [`RmdSampling::run`]. An event loop sends one cycle
+/// after the other.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct RmdSampling {
     rows: Mutex<Rows>,
@@ -103,8 +103,9 @@ impl RmdSampling {
         self.rows.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Samples until the end, an error, or `most` rows; returns the new rows in each case. With `skip`
-    /// a motor that fails to answer costs only the row; so does a signal's handler that uses the bus.
+    /// Samples until the end, an error, or `most` rows. Returns the new rows in each case. With
+    /// `skip` a motor that does not reply costs only the row. So does a signal handler that uses
+    /// the bus.
     pub(super) fn run(
         &self,
         bus: &Client,
@@ -142,12 +143,12 @@ impl RmdSampling {
         Ok(RmdSampling { rows, questions: Questions::new(py, motors, raw)? })
     }
 
-    /// How long to wait at this time of the event loop, s; 0 begins a row, and `None` is the end.
+    /// The wait at this time of the event loop, s. 0 begins a row, `None` is the end.
     fn after(&self, py: Python<'_>, now: f64) -> PyResult<Option<f64>> {
         self.lock().after_seconds(py, now)
     }
 
-    /// The cycles of a row: requests by ID, answered with bytes.
+    /// The cycles of a row: requests by ID. Their replies are bytes.
     #[getter]
     fn cycles(&self) -> Vec<BTreeMap<u8, RmdRequest>> {
         let named =
@@ -155,7 +156,7 @@ impl RmdSampling {
         self.questions.cycles.iter().map(|cycle| cycle.iter().map(named).collect()).collect()
     }
 
-    /// Ends the row with the answers of its cycles.
+    /// Ends the row with the replies of its cycles.
     fn push(&self, py: Python<'_>, answers: Vec<BTreeMap<i64, [u8; 8]>>) -> PyResult<()> {
         let mut replies = Replies::new();
         for (cycle, answers) in self.questions.cycles.iter().zip(answers) {
@@ -169,7 +170,7 @@ impl RmdSampling {
         Ok(())
     }
 
-    /// The new rows, a time in s and the values, eight bytes each; and the skipped instants.
+    /// The new rows, each a time in s and values of eight bytes, and the skipped instants.
     fn take<'py>(&self, py: Python<'py>) -> (Bound<'py, PyByteArray>, u64) {
         self.lock().take().into_python(py)
     }

@@ -17,12 +17,12 @@ use super::serving::SimServing;
 use crate::error::invalid_value;
 use crate::number::digits;
 
-/// How much time passes before the machine's is looked at.
+/// Step of virtual time between checks of the real time.
 const SLICE: Micros = Micros::from_millis(20);
-/// How long signals wait: Ctrl-C is one.
+/// Longest delay of a signal, such as Ctrl-C.
 const LOOK: std::time::Duration = std::time::Duration::from_millis(20);
 
-/// An ST drive and a bus of RMD motors, whose time passes when it is waited for.
+/// An ST drive and a bus of RMD motors. Their time advances while it is waited for.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct SimBench(Arc<Bench>);
 
@@ -59,7 +59,7 @@ impl SimBench {
         Ok(SimPort { bench: Arc::clone(&self.0), faults: faults.unwrap_or(Faults::NONE) })
     }
 
-    /// What the ST drive speaks.
+    /// The profile of the ST drive.
     #[getter]
     fn profile(&self) -> &'static str {
         self.0.profile().name()
@@ -71,7 +71,7 @@ impl SimBench {
         self.0.now().0 as f64 / 1e6
     }
 
-    /// Lets time pass, s; a signal ends it.
+    /// Advances the time, s. A signal ends it.
     fn run(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let span = microseconds(py, "a time", seconds)?;
         let end = self.0.now() + span;
@@ -81,7 +81,7 @@ impl SimBench {
         Ok(())
     }
 
-    /// Executes a command that is written as JSON; gives the answer as JSON.
+    /// Executes a command in JSON. Returns the reply in JSON.
     fn execute(&self, py: Python<'_>, command: &str) -> PyResult<String> {
         let answer = Command::read(command).and_then(|command| self.0.execute(&command));
         answer.map(|answer| answer.to_string()).map_err(|why| invalid_value(py, why))
@@ -94,7 +94,7 @@ impl SimBench {
         signals.map(|signal| (signal.name.as_str(), signal.kind.unit())).collect()
     }
 
-    /// The values of a motor's signals, with names where values have some.
+    /// The values of a motor's signals, as words where they have some.
     fn truth<'py>(&self, py: Python<'py>, motor: &str) -> PyResult<Bound<'py, PyDict>> {
         let truth = PyDict::new(py);
         for (signal, value) in self.0.signals().iter().zip(py.detach(|| self.0.values())) {
@@ -109,17 +109,17 @@ impl SimBench {
         Ok(truth)
     }
 
-    /// Writes signals down from now on, every so many s.
+    /// Records signals from now on, once every `every` s.
     fn record(&self, py: Python<'_>, signals: Vec<String>, every: f64) -> PyResult<SimRecording> {
         let signals: Vec<&str> = signals.iter().map(String::as_str).collect();
-        let every = microseconds(py, "a distance of samples", every)?;
+        let every = microseconds(py, "a sample period", every)?;
         let recording = py.detach(|| self.0.record(&signals, every));
         let recording = recording.map_err(|why| invalid_value(py, why))?;
         let every = recording.every().0;
         Ok(SimRecording { recording: Mutex::new(Some(recording)), every })
     }
 
-    /// A fingerprint of the state of all drives.
+    /// A hash of the state of all drives.
     #[getter]
     fn state_hash(&self, py: Python<'_>) -> u64 {
         py.detach(|| self.0.state_hash())
@@ -133,7 +133,7 @@ impl SimBench {
 }
 
 impl SimBench {
-    /// Lets time pass until `end`, though not for longer than signals wait; whether some is left.
+    /// Advances the time to `end`, at most for the delay of signals. Returns whether some is left.
     fn advance(&self, end: Instant) -> bool {
         let began = Moment::now();
         loop {
@@ -162,24 +162,24 @@ fn microseconds(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Micros> {
     })
 }
 
-/// Signals that are written down while time passes.
+/// Signals that are recorded while time advances.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct SimRecording {
     recording: Mutex<Option<Recording>>,
-    /// From sample to sample, µs.
+    /// From row to row, µs.
     #[pyo3(get)]
     every: u64,
 }
 
 #[pymethods]
 impl SimRecording {
-    /// What was written since the last call, as `float64` in the machine's order: sample by sample.
+    /// The values since the last call as `float64` in native byte order, row by row.
     fn take<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
         let rows = py.detach(|| self.lock().as_ref().map(Recording::take));
         bytes(py, rows.as_deref().unwrap_or(&[]))
     }
 
-    /// Ends it. Again is no error.
+    /// Ends it. A second call does nothing.
     fn end(&self) {
         drop(self.lock().take());
     }

@@ -16,7 +16,7 @@ use pyo3::types::PyByteArray;
 
 use crate::error::invalid_value;
 
-/// The presets as JSON, by name. Numbers have the fewest digits that say which is meant.
+/// The presets as JSON, by name. Numbers have the fewest digits that identify them.
 #[pyfunction]
 pub(crate) fn sim_presets(py: Python<'_>) -> PyResult<String> {
     let presets = preset::ALL.iter().map(|(name, config)| {
@@ -26,7 +26,7 @@ pub(crate) fn sim_presets(py: Python<'_>) -> PyResult<String> {
     Ok(format!("{{{}}}", presets.collect::<PyResult<Vec<_>>>()?.join(",")))
 }
 
-/// Numbers as `float64` in the machine's order, for NumPy to take without a copy.
+/// Numbers as `float64` in native byte order, which NumPy takes without a copy.
 fn bytes<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyByteArray> {
     let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
     PyByteArray::new(py, &bytes)

@@ -10,12 +10,12 @@ use pyo3::prelude::*;
 
 use crate::error::invalid_value;
 
-/// What is opened.
+/// A port to open.
 #[derive(FromPyObject)]
 pub(crate) enum Port<'py> {
     /// A port by its name.
     Name(String),
-    /// One of a bench.
+    /// A port of a bench.
     Sim(PyRef<'py, SimPort>),
 }
 
@@ -27,7 +27,7 @@ pub(crate) struct SimPort {
 }
 
 impl SimPort {
-    /// What messages call it.
+    /// The name in messages.
     pub(crate) const NAME: &'static str = "the bench";
 
     /// A serial line to the ST drive.
@@ -40,7 +40,7 @@ impl SimPort {
         Ok(self.bench.can(&self.faults(py, Faults::on_can)?))
     }
 
-    /// The time that passes on it.
+    /// Its time.
     pub(crate) fn clock(&self) -> Clock {
         self.bench.clock().clone()
     }

@@ -1,4 +1,4 @@
-//! Playing a scenario.
+//! Runs of scenarios.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -11,10 +11,10 @@ use pyo3::types::PyDict;
 use super::bytes;
 use crate::error::invalid_value;
 
-/// How long signals wait: Ctrl-C is one.
+/// Longest delay of a signal, such as Ctrl-C.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Plays a scenario, from its text or from a file, to its end; gives what came of it.
+/// Runs a scenario, from its text or from a file. Returns the result.
 #[pyfunction]
 #[pyo3(signature = (text, path = None))]
 pub(crate) fn sim_run<'py>(
@@ -28,7 +28,7 @@ pub(crate) fn sim_run<'py>(
     };
     let (title, about) = (scenario.title.clone(), scenario.about.clone());
     let (tell, mut told) = mpsc::channel();
-    // After a signal nobody waits for what it tells.
+    // After a signal the result is not used.
     std::thread::spawn(move || drop(tell.send(scenario.run())));
     let run = loop {
         let heard;

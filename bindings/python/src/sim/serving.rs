@@ -37,19 +37,19 @@ impl SimServing {
 
 #[pymethods]
 impl SimServing {
-    /// The ST drive's port as it is served, and its path or address.
+    /// The name of the ST drive's port, and its path or address.
     #[getter]
     fn st(&self) -> Option<(String, String)> {
         self.st.clone()
     }
 
-    /// The RMD motors' port as it is served, and its path or address.
+    /// The name of the RMD motors' port, and its path or address.
     #[getter]
     fn rmd(&self) -> Option<(String, String)> {
         self.rmd.clone()
     }
 
-    /// Closes the ports. Again is no error.
+    /// Closes the ports. A second call does nothing.
     fn end(&self, py: Python<'_>) -> PyResult<()> {
         let serving = self.serving.lock().unwrap_or_else(PoisonError::into_inner).take();
         let ended = serving.map_or(Ok(()), |serving| py.detach(|| serving.end()));

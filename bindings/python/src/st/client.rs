@@ -1,4 +1,4 @@
-//! A serial line with an ST drive, for threads that may wait.
+//! A serial line with an ST drive, blocking.
 
 use motorlink::Clock;
 use motorlink::port::PortName;
@@ -14,7 +14,7 @@ use crate::shared::Shared;
 use crate::signals::Deafness;
 use crate::sim::{Port, SimPort};
 
-/// A master on a serial line. Every call lets other Python threads run while it waits.
+/// A master on a serial line. Each call lets other Python threads run while it waits.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct StClient {
     client: Shared<Client>,
@@ -24,7 +24,7 @@ pub(crate) struct StClient {
 
 #[pymethods]
 impl StClient {
-    /// Opens a port. The drive is not asked anything.
+    /// Opens a port. Sends nothing.
     #[staticmethod]
     fn open(py: Python<'_>, port: Port<'_>, options: &StOptions) -> PyResult<Self> {
         let options = options.0;
@@ -46,7 +46,7 @@ impl StClient {
         Ok(StClient { client: Shared::new(client, port), clock, deafness })
     }
 
-    /// One exchange; gives what the request makes of the reply.
+    /// One exchange. Returns the value of the reply.
     fn exchange(&self, py: Python<'_>, motor: i64, request: &StRequest) -> PyResult<Py<PyAny>> {
         let motor = motor_number(py, motor)?;
         let answer = self.client.exchange(py, |client| {
@@ -55,8 +55,7 @@ impl StClient {
         request.value(py, answer.map_err(|error| st_error(py, &error))?)
     }
 
-    /// Writes, reads back and repeats until the register has the value; gives the number of the
-    /// attempt that did it.
+    /// Writes a register and reads it back until it has the value. Returns the number of attempts.
     fn set_verified(
         &self,
         py: Python<'_>,
@@ -72,12 +71,12 @@ impl StClient {
         written.map_err(|error| st_error(py, &error))
     }
 
-    /// Makes sure that the replies so far went to their own requests.
+    /// Checks that the replies so far matched their requests.
     fn confirm(&self, py: Python<'_>) -> PyResult<()> {
         self.client.exchange(py, |client| client.confirm())?.map_err(|error| st_error(py, &error))
     }
 
-    /// One exchange with any frame code and payload; gives the acknowledge's payload.
+    /// One exchange with any frame code and payload. Returns the payload of the reply.
     fn raw<'py>(
         &self,
         py: Python<'py>,
@@ -115,8 +114,8 @@ impl StClient {
         PyList::new(py, numbers)
     }
 
-    /// Closes the port, when exchanges that are under way are over; `stop` stops what was started
-    /// before, and gives the motors that did not acknowledge it, and why. Again is no error.
+    /// Closes the port after the exchanges under way. `stop` first stops the started motors.
+    /// Returns the motors that did not acknowledge it, and why. A second call does nothing.
     #[pyo3(signature = (*, stop))]
     fn close(&self, py: Python<'_>, stop: bool) -> Vec<(u8, PyErr)> {
         let halt = |client: &Client| {
@@ -127,7 +126,7 @@ impl StClient {
         not_stopped(py, self.client.close(py, halt))
     }
 
-    /// Whether it was closed.
+    /// Whether it is closed.
     #[getter]
     fn is_closed(&self) -> bool {
         self.client.is_closed()
@@ -140,7 +139,7 @@ impl StClient {
     }
 }
 
-/// The motors that may still be running, and why.
+/// The motors that may still turn, and why.
 pub(crate) fn not_stopped(py: Python<'_>, stopped: Vec<Stopped>) -> Vec<(u8, PyErr)> {
     let failed = stopped
         .into_iter()

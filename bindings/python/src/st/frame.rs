@@ -1,4 +1,4 @@
-//! Requests that come as frames, and what they carry by name.
+//! Requests from frames, and their values by name.
 
 use motorlink_proto::st::{Frame, Parse, Request};
 use pyo3::IntoPyObjectExt;
@@ -8,7 +8,7 @@ use pyo3::types::{PyBytes, PyDict};
 use super::reply::Reply;
 use crate::error::invalid_value;
 
-/// The one frame that these bytes are.
+/// The single frame in these bytes.
 pub(super) fn parse<'a>(py: Python<'_>, frame: &'a [u8]) -> PyResult<Frame<'a>> {
     match Frame::parse(frame) {
         Parse::Frame(parsed, size) if size == frame.len() => Ok(parsed),
@@ -17,7 +17,9 @@ pub(super) fn parse<'a>(py: Python<'_>, frame: &'a [u8]) -> PyResult<Frame<'a>> 
             Err(invalid_value(py, format_args!("the frame ends {more} bytes before its bytes do")))
         }
         Parse::More => Err(invalid_value(py, "the frame is not complete")),
-        Parse::Bad(why) => Err(invalid_value(py, format_args!("this is no frame: {why:?}"))),
+        Parse::Bad(why) => {
+            Err(invalid_value(py, format_args!("these bytes are not a frame: {why:?}")))
+        }
     }
 }
 
@@ -26,7 +28,7 @@ pub(super) fn too_long(py: Python<'_>) -> PyErr {
     invalid_value(py, "the request does not fit a frame: a payload has at most 128 bytes")
 }
 
-/// A request apart from its list of bytes, and that list.
+/// A request without its list of bytes, and that list.
 pub(super) fn owned(request: Request<'_>) -> (Request<'static>, Vec<u8>) {
     let (request, bytes): (Request<'static>, &[u8]) = match request {
         Request::SetRegister { register, value } => {
@@ -51,7 +53,7 @@ pub(super) fn owned(request: Request<'_>) -> (Request<'static>, Vec<u8>) {
     (request, bytes.to_vec())
 }
 
-/// What a request from a frame is answered with; its numbers are digits.
+/// What the reply to a request from a frame becomes. Its numbers are digits.
 pub(super) fn reply(request: Request<'_>) -> Reply {
     match request {
         Request::GetRegister(register) => Reply::Number { register, raw: true },
@@ -63,7 +65,7 @@ pub(super) fn reply(request: Request<'_>) -> Reply {
     }
 }
 
-/// The values of a request as they travel, by name.
+/// The raw protocol values of a request, by name.
 pub(super) fn fields<'py>(py: Python<'py>, request: Request<'_>) -> PyResult<Bound<'py, PyDict>> {
     let fields = PyDict::new(py);
     let set = |name: &str, value: Py<PyAny>| fields.set_item(name, value);

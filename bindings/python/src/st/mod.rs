@@ -28,7 +28,7 @@ use crate::error::unknown_register;
 use crate::values;
 use scale::register;
 
-/// A register by name or number, with the unit that a motor of this full scale has it in.
+/// A register by name or number, with its unit for a motor of this full scale.
 #[pyfunction]
 #[pyo3(signature = (name, profile = "spec", full_scale_amps = None))]
 pub(crate) fn st_register(
@@ -41,7 +41,7 @@ pub(crate) fn st_register(
     let register = register(name)?;
     let (Some(shape), Some(text)) = (register.shape(), register.text()) else {
         let id = register.0;
-        return Err(unknown_register(py, format_args!("nobody knows what register {id:#04x} is")));
+        return Err(unknown_register(py, format_args!("register {id:#04x} is unknown")));
     };
     let built = Features::NONE.with(shape.feature);
     values::register_info(
@@ -66,7 +66,7 @@ pub(crate) fn st_motor(py: Python<'_>, number: i64) -> PyResult<u8> {
     motor_number(py, number)
 }
 
-/// The name of a register, or its number in hexadecimal where it has none.
+/// The name of a register, or its hexadecimal number if it has none.
 #[pyfunction]
 pub(crate) fn st_register_name(#[pyo3(from_py_with = register)] name: RegisterId) -> String {
     name.to_string()

@@ -1,4 +1,4 @@
-//! How a line with an ST drive is opened: for threads that may wait and for event loops.
+//! Options of a line with an ST drive, for blocking clients and for event loops.
 
 use motorlink::st::{Limits, Options, Recovery};
 use pyo3::prelude::*;
@@ -7,7 +7,7 @@ use super::scale::Scale;
 use crate::error::invalid_value;
 use crate::number::{limit, span};
 
-/// What `open` was told, checked.
+/// The checked arguments of `open`.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct StOptions(pub(crate) Options);
 
@@ -35,19 +35,15 @@ impl StOptions {
             "pad" => Recovery::Pad,
             "none" => Recovery::None,
             other => {
-                let known = "there are `drain`, `pad` and `none`";
-                return Err(invalid_value(
-                    py,
-                    format_args!("there is no recovery `{other}`; {known}"),
-                ));
+                let known = "give `drain`, `pad` or `none`";
+                return Err(invalid_value(py, format_args!("unknown recovery `{other}`: {known}")));
             }
         };
         Ok(StOptions(options))
     }
 }
 
-/// Limits in rpm and in the unit that the scale gives currents. A limit is rounded
-/// towards 0.
+/// Limits in rpm and in the unit of currents. A limit is rounded towards 0.
 fn limits(
     py: Python<'_>,
     scale: Scale,

@@ -7,6 +7,6 @@ use crate::error::invalid_value;
 
 /// The profile of this name.
 pub(super) fn named(py: Python<'_>, name: &str) -> PyResult<Profile> {
-    let unknown = |error| invalid_value(py, format_args!("there is no profile `{name}`: {error}"));
+    let unknown = |error| invalid_value(py, format_args!("unknown profile `{name}`: {error}"));
     name.parse().map_err(unknown)
 }

@@ -1,4 +1,4 @@
-//! Reading the reply to a request, in two steps: the first needs no interpreter.
+//! Reads the reply to a request in two steps. The first one needs no interpreter.
 
 use motorlink_proto::st::{
     BoardInfo, ControlMode, FirmwareVersion, Flags, Profile, RegisterId, RevupPhase, Status,
@@ -11,7 +11,7 @@ use super::scale::Scale;
 use crate::sampling::cell;
 use crate::values;
 
-/// What the payload of the acknowledge is.
+/// What the payload of the acknowledge becomes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Reply {
     Nothing,
@@ -26,7 +26,7 @@ pub(super) enum Reply {
     Bytes,
 }
 
-/// A reply that fits its request; made where no interpreter is at hand.
+/// A reply that fits its request, made without an interpreter.
 pub(crate) enum Answer {
     Nothing,
     Bits(i32),
@@ -38,7 +38,7 @@ pub(crate) enum Answer {
 }
 
 impl Reply {
-    /// Reads the payload of a positive acknowledge; `None` where it answers something else.
+    /// Reads the payload of a positive acknowledge; `None` if it does not fit the request.
     pub(super) fn understand(&self, profile: Profile, payload: &[u8]) -> Option<Answer> {
         Some(match self {
             Reply::Nothing => Answer::Nothing,
@@ -60,7 +60,7 @@ impl Reply {
         })
     }
 
-    /// The numbers of an answer as a sample has them; `None` where it has others.
+    /// The numbers of a reply as a sample has them; `None` if it has others.
     pub(super) fn cells(&self, scale: &Scale, answer: Answer) -> Option<Vec<[u8; 8]>> {
         let cell = |raw, register, bits| {
             cell(raw, scale.raw(register, bits), scale.physical(register, bits))
@@ -78,7 +78,7 @@ impl Reply {
         }
     }
 
-    /// The answer for Python.
+    /// The value for Python.
     pub(super) fn value(
         &self,
         py: Python<'_>,
@@ -128,7 +128,7 @@ impl Reply {
     }
 }
 
-/// Values of the registers of a segment; `None` where the payload is not theirs.
+/// Values of the registers of a segment; `None` if the payload has another size.
 pub(super) fn segment(registers: &[RegisterId], mut payload: &[u8]) -> Option<Vec<i32>> {
     let next = |register: &RegisterId| {
         let size = usize::from(register.shape()?.ty(Profile::Spec).size());
@@ -139,7 +139,7 @@ pub(super) fn segment(registers: &[RegisterId], mut payload: &[u8]) -> Option<Ve
     registers.iter().map(next).collect()
 }
 
-/// Names of the faults in one half of FLAGS; the number of a bit that has none.
+/// Names of the faults in one half of FLAGS; the number for a bit without a name.
 fn faults(half: u16) -> Vec<String> {
     let bits = (0..16).map(|n| 1u16 << n).filter(|bit| half & bit != 0);
     let name = |bit| Flags::NAMES.iter().find(|(known, ..)| *known == bit).map(|row| row.1);

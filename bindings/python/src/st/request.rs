@@ -1,4 +1,4 @@
-//! One request to an ST drive: checked when it is made, and able to read its reply.
+//! One request to an ST drive: it checks its arguments and reads its reply.
 
 use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Frame, HEADER_ACK, HEADER_NACK, MAX_FRAME, MotorNumber,
@@ -13,13 +13,14 @@ use super::scale::{Scale, register};
 use crate::error::{invalid_value, refusal};
 use crate::number::{digits, milliseconds};
 
-/// A request to an ST drive, in the units of the motor that it is made for.
+/// A request to an ST drive, in the units of one motor. It checks its arguments and reads its
+/// reply.
 #[pyclass(frozen, eq, module = "motorlink._core")]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StRequest {
-    /// The request, apart from its list of bytes.
+    /// The request without its list of bytes.
     request: Request<'static>,
-    /// The list of bytes of requests that have one.
+    /// The list of bytes, for requests that have one.
     bytes: Vec<u8>,
     scale: Scale,
     reply: Reply,
@@ -34,7 +35,7 @@ impl StRequest {
         StRequest { reply, ..Self::told(scale, request) }
     }
 
-    /// The request for a client or a machine.
+    /// The request for a client.
     pub(crate) fn request(&self) -> Request<'_> {
         match self.request {
             Request::SetRegister { register, .. } => {
@@ -48,7 +49,7 @@ impl StRequest {
         }
     }
 
-    /// Reads the payload of a positive acknowledge; `None` where it answers something else.
+    /// Reads the payload of a positive acknowledge; `None` if it does not fit the request.
     pub(crate) fn understand(&self, payload: &[u8]) -> Option<Answer> {
         self.reply.understand(self.scale.profile, payload)
     }
@@ -64,7 +65,7 @@ impl StRequest {
         StRequest { bytes: value.to_vec(), ..Self::told(Scale::plain(), request) }
     }
 
-    /// Chooses the registers of a data segment.
+    /// Selects the registers of a data segment.
     pub(super) fn choosing(segment: u8, registers: &[RegisterId]) -> Self {
         let request = Request::ConfigureSegment { segment, registers: &[] };
         let bytes = registers.iter().map(|register| register.0).collect();
@@ -77,12 +78,12 @@ impl StRequest {
         Self::asked(scale, Request::GetSegment(segment), reply)
     }
 
-    /// The numbers of an answer as a sample has them.
+    /// The numbers of a reply as a sample has them.
     pub(super) fn cells(&self, answer: Answer) -> Option<Vec<[u8; 8]>> {
         self.reply.cells(&self.scale, answer)
     }
 
-    /// The answer for Python.
+    /// The value for Python.
     pub(crate) fn value(&self, py: Python<'_>, answer: Answer) -> PyResult<Py<PyAny>> {
         self.reply.value(py, &self.scale, answer)
     }
@@ -90,7 +91,7 @@ impl StRequest {
 
 #[pymethods]
 impl StRequest {
-    /// Reads a register (4.5).
+    /// Reads a register (0x02, 4.5).
     #[staticmethod]
     #[pyo3(signature = (register, *, profile = "spec", raw = false, full_scale_amps = None))]
     fn get_register(
@@ -103,7 +104,7 @@ impl StRequest {
         Ok(Self::reading(Scale::new(py, profile, full_scale_amps)?, register, raw))
     }
 
-    /// Writes a register (4.4).
+    /// Writes a register (0x01, 4.4).
     #[staticmethod]
     #[pyo3(signature = (register, value, *, profile = "spec", raw = false, full_scale_amps = None))]
     fn set_register(
@@ -122,7 +123,7 @@ impl StRequest {
         Ok(StRequest { bytes, ..Self::told(scale, request) })
     }
 
-    /// Writes any bytes to any register (4.4).
+    /// Writes any bytes to any register (0x01, 4.4).
     #[staticmethod]
     fn set_register_bytes(
         py: Python<'_>,
@@ -132,26 +133,26 @@ impl StRequest {
         Self::writing(register, &value).fitting(py)
     }
 
-    /// Reads STATUS: the state in words.
+    /// Reads the register STATUS. The value is a `Status`.
     #[staticmethod]
     fn status() -> Self {
         Self::asked(Scale::plain(), Request::GetRegister(RegisterId::STATUS), Reply::Status)
     }
 
-    /// Reads FLAGS: the faults in words.
+    /// Reads the register FLAGS. The value is a `Flags`.
     #[staticmethod]
     fn flags() -> Self {
         Self::asked(Scale::plain(), Request::GetRegister(RegisterId::FLAGS), Reply::Flags)
     }
 
-    /// Reads CONTROL_MODE in words.
+    /// Reads the register CONTROL_MODE. The value is a `ControlMode`.
     #[staticmethod]
     fn control_mode() -> Self {
         let request = Request::GetRegister(RegisterId::CONTROL_MODE);
         Self::asked(Scale::plain(), request, Reply::ControlMode)
     }
 
-    /// Executes a command by name or number (4.6).
+    /// Executes a command by name or number (0x03, 4.6).
     #[staticmethod]
     fn execute_command(py: Python<'_>, command: &Bound<'_, PyAny>) -> PyResult<Self> {
         let command = match command.cast::<PyString>() {
@@ -166,19 +167,19 @@ impl StRequest {
         Ok(Self::told(Scale::plain(), Request::ExecuteCommand(command)))
     }
 
-    /// Version and name of the SDK (4.7).
+    /// Reads version and name of the SDK (0x06, 4.7).
     #[staticmethod]
     fn get_board_info() -> Self {
         Self::asked(Scale::plain(), Request::GetBoardInfo, Reply::BoardInfo)
     }
 
-    /// Name and version of the firmware (4.12).
+    /// Reads name and version of the firmware (0x0C, 4.12).
     #[staticmethod]
     fn get_firmware_version() -> Self {
         Self::asked(Scale::plain(), Request::GetFirmwareVersion, Reply::FirmwareVersion)
     }
 
-    /// Programs a speed ramp: rpm, s (4.8).
+    /// Programs a speed ramp: rpm, s (0x07, 4.8).
     #[staticmethod]
     fn set_ramp(py: Python<'_>, speed_rpm: f64, duration_s: f64) -> PyResult<Self> {
         let speed_rpm = rpm(py, speed_rpm)?;
@@ -186,7 +187,7 @@ impl StRequest {
         Ok(Self::told(Scale::plain(), Request::SetRamp(ramp)))
     }
 
-    /// Programs a torque ramp: Iq, s (profile `mcsdk-5.4`).
+    /// Programs a torque ramp: Iq, s (0x0D of profile `mcsdk-5.4`).
     #[staticmethod]
     #[pyo3(signature = (torque, duration_s, *, full_scale_amps = None))]
     fn set_torque_ramp(
@@ -201,7 +202,7 @@ impl StRequest {
         Ok(Self::told(scale, Request::SetTorqueRamp(ramp)))
     }
 
-    /// Sets the current references Iq and Id (4.11).
+    /// Sets the current references Iq and Id (0x0A, 4.11).
     #[staticmethod]
     #[pyo3(signature = (iq, id, *, full_scale_amps = None))]
     fn set_current_reference(
@@ -216,19 +217,20 @@ impl StRequest {
         Ok(Self::told(scale, request))
     }
 
-    /// Turns to an angle: rad, s (profile `mcsdk-5.4`).
+    /// Turns to an angle: rad, s (0x12 of profile `mcsdk-5.4`).
     #[staticmethod]
     fn set_position(py: Python<'_>, angle_rad: f64, duration_s: f64) -> PyResult<Self> {
         let (angle, duration) = (angle_rad as f32, duration_s as f32);
         if !angle.is_finite() || !duration.is_finite() || duration < 0.0 {
-            let move_ = format!("{angle_rad} rad in {duration_s} s is no move; nothing was sent");
+            let move_ =
+                format!("{angle_rad} rad in {duration_s} s is not a move; nothing was sent");
             return Err(invalid_value(py, move_));
         }
         let target = PositionMove { angle_rad: angle, duration_s: duration };
         Ok(Self::told(Scale::plain(), Request::SetPosition(target)))
     }
 
-    /// Reads a rev-up phase, 0 to 4 (4.9).
+    /// Reads a rev-up phase, 0 to 4 (0x08, 4.9).
     #[staticmethod]
     #[pyo3(signature = (phase, *, full_scale_amps = None))]
     fn get_revup_data(py: Python<'_>, phase: i64, full_scale_amps: Option<f64>) -> PyResult<Self> {
@@ -237,7 +239,7 @@ impl StRequest {
         Ok(Self::asked(scale, Request::GetRevupData(phase), Reply::Revup))
     }
 
-    /// Sets a rev-up phase, 0 to 4: rpm, Iq, s (4.10).
+    /// Sets a rev-up phase, 0 to 4: rpm, Iq, s (0x09, 4.10).
     #[staticmethod]
     #[pyo3(signature = (phase, speed_rpm, torque, duration_s, *, full_scale_amps = None))]
     fn set_revup_data(
@@ -258,7 +260,7 @@ impl StRequest {
         Ok(Self::told(scale, Request::SetRevupData(phase, data)))
     }
 
-    /// Chooses the registers of a data segment, 0 to 3 (profile `spec`). A drive takes up to 32.
+    /// Selects the registers of a data segment, 0 to 3, at most 32 (0x0E, profile `spec`).
     #[staticmethod]
     fn configure_segment(
         py: Python<'_>,
@@ -270,7 +272,7 @@ impl StRequest {
         Self::choosing(segment, &registers?).fitting(py)
     }
 
-    /// Reads a data segment that was configured with these registers (profile `spec`).
+    /// Reads a data segment that was configured with these registers (0x0D, profile `spec`).
     #[staticmethod]
     #[pyo3(signature = (segment, registers, *, raw = false, full_scale_amps = None))]
     fn get_segment(
@@ -286,14 +288,14 @@ impl StRequest {
         Ok(Self::sampling(scale, segment, &registers, raw))
     }
 
-    /// Lists the registers of motor profiler steps (profile `mcsdk-5.4`).
+    /// Lists the registers of motor profiler steps (0x0B of profile `mcsdk-5.4`).
     #[staticmethod]
     fn get_profiler_info(py: Python<'_>, steps: Vec<u8>) -> PyResult<Self> {
         let request = Self::asked(Scale::plain(), Request::GetProfilerInfo(&[]), Reply::Bytes);
         StRequest { bytes: steps, ..request }.fitting(py)
     }
 
-    /// The request in a frame, and the motor that it is for.
+    /// The motor and the request of a frame.
     #[staticmethod]
     #[pyo3(signature = (frame, *, profile = "spec"))]
     fn decode(py: Python<'_>, frame: &[u8], profile: &str) -> PyResult<(u8, Self)> {
@@ -303,13 +305,13 @@ impl StRequest {
             let header = parsed.header;
             invalid_value(
                 py,
-                format_args!("{header:#04x} begins no request that {profile} knows: {code}"),
+                format_args!("{header:#04x} does not begin a request of profile {profile}: {code}"),
             )
         })?;
         Ok((parsed.motor(), Self::decoded(scale, request)))
     }
 
-    /// The frame for a motor, 1 to 7; 0 is the one that the drive has selected.
+    /// The frame for a motor, 1 to 7. Motor 0 is the one that the drive has selected.
     #[pyo3(signature = (motor = 0))]
     fn encode<'py>(&self, py: Python<'py>, motor: i64) -> PyResult<Bound<'py, PyBytes>> {
         let motor = motor_number(py, motor)?;
@@ -320,9 +322,9 @@ impl StRequest {
         }
     }
 
-    /// What a reply frame says to this request.
+    /// The value of a reply frame to this request.
     ///
-    /// Raises `RefusedError` for a negative acknowledge, `InvalidValueError` for what is no reply to it.
+    /// Raises `RefusedError` for a negative acknowledge, `InvalidValueError` for another frame.
     fn decode_reply(&self, py: Python<'_>, frame: &[u8]) -> PyResult<Py<PyAny>> {
         let parsed = frame::parse(py, frame)?;
         let answer = match (parsed.header, parsed.payload) {
@@ -333,7 +335,7 @@ impl StRequest {
         let code = self.code();
         match answer {
             Some(answer) => self.value(py, answer),
-            None => Err(invalid_value(py, format_args!("these bytes are no reply to {code}"))),
+            None => Err(invalid_value(py, format_args!("these bytes are not a reply to {code}"))),
         }
     }
 
@@ -343,13 +345,13 @@ impl StRequest {
         self.request.code().name()
     }
 
-    /// Whether it only asks; anything else changes something in the drive.
+    /// Whether the request only reads. Other requests change something in the drive.
     #[getter]
     fn is_read(&self) -> bool {
         self.request.is_read()
     }
 
-    /// The values of the request as they travel, by name.
+    /// The raw protocol values of the request, by name.
     #[getter]
     fn fields<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         frame::fields(py, self.request())
@@ -361,7 +363,7 @@ impl StRequest {
 }
 
 impl StRequest {
-    /// What a decoded request is answered with; its numbers are digits.
+    /// What the reply to a decoded request becomes. Its numbers are digits.
     fn decoded(scale: Scale, request: Request<'_>) -> Self {
         let (request, bytes) = frame::owned(request);
         StRequest { bytes, ..Self::asked(scale, request, frame::reply(request)) }
@@ -373,7 +375,7 @@ impl StRequest {
         if fits { Ok(self) } else { Err(frame::too_long(py)) }
     }
 
-    /// The register and the bits of a write, which alone can be verified.
+    /// The register and the bits of a write. Other requests cannot be verified.
     pub(super) fn verifiable(&self, py: Python<'_>) -> PyResult<(RegisterId, i32)> {
         let Request::SetRegister { register, .. } = self.request else {
             return Err(invalid_value(py, "only a write can be verified"));
@@ -399,7 +401,7 @@ fn named_command(py: Python<'_>, name: &str) -> PyResult<Command> {
         let names: Vec<_> = Command::ALL.iter().filter_map(|command| command.name()).collect();
         invalid_value(
             py,
-            format_args!("there is no command `{name}`; there are {}", names.join(", ")),
+            format_args!("unknown command `{name}`: the commands are {}", names.join(", ")),
         )
     })
 }
@@ -417,15 +419,16 @@ fn below(py: Python<'_>, what: &str, number: i64, end: usize) -> PyResult<u8> {
 /// Registers whose sizes are known.
 fn segment_registers(py: Python<'_>, names: &[Bound<'_, PyAny>]) -> PyResult<Vec<RegisterId>> {
     if names.is_empty() {
-        return Err(invalid_value(py, "which registers was the data segment configured with?"));
+        return Err(invalid_value(
+            py,
+            "the registers of this data segment are unknown: give `registers`",
+        ));
     }
     let known = |name| {
         let found = register(name)?;
         match found.shape() {
             Some(_) => Ok(found),
-            None => {
-                Err(invalid_value(py, format_args!("nobody knows the size of register {found}")))
-            }
+            None => Err(invalid_value(py, format_args!("the size of register {found} is unknown"))),
         }
     };
     names.iter().map(known).collect()

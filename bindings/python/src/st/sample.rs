@@ -1,4 +1,4 @@
-//! Sampling registers: in data segments where the drive has them, else one by one.
+//! Sampling registers: through data segments if the drive has them, otherwise one by one.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -15,7 +15,7 @@ use super::scale::{Scale, register};
 use crate::error::st_error;
 use crate::sampling::{Plan, Rows, Taken, cell};
 
-/// What a program samples of one motor: its number, registers, and its full scale of current, A.
+/// What is sampled of one motor: number, registers, full scale of current in A.
 pub(super) type Motor<'py> = (i64, Vec<Bound<'py, PyAny>>, Option<f64>);
 
 /// The registers of one motor.
@@ -23,26 +23,26 @@ struct Lane {
     motor: u8,
     registers: Vec<RegisterId>,
     scale: Scale,
-    /// The data segment that has them.
+    /// The data segment that has the registers.
     segment: Option<u8>,
 }
 
-/// Where a row is.
+/// The state of a row.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum At {
     /// Before the first row: the lane's segment is configured.
     Preparing(usize),
-    /// A lane's segment is read; it was configured anew, or not.
+    /// A lane's segment is read. The flag: it was configured again.
     Segment(usize, bool),
-    /// A lane's segment is configured anew, as the drive did not know it.
+    /// A lane's segment is configured again, because the drive lost it.
     Configuring(usize),
     /// A register of a lane is read.
     Single(usize, usize),
     Whole,
 }
 
-/// Rows without the line: [`request`](Self::request), then [`answered`](Self::answered) or
-/// [`refused`](Self::refused), until there is no request.
+/// Rows without the line. Call [`request`](Self::request), then [`answered`](Self::answered) or
+/// [`refused`](Self::refused), until there are no more requests.
 pub(super) struct Reading {
     lanes: Vec<Lane>,
     raw: bool,
@@ -51,7 +51,7 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    /// Chooses how to read. Each of `segments` may be configured for one motor.
+    /// Plans the reads. Each of `segments` may be configured for one motor.
     pub(super) fn new(
         py: Python<'_>,
         profile: Profile,
@@ -79,7 +79,7 @@ impl Reading {
         self.at = self.lane(0);
     }
 
-    /// What the row, or what is done before the first one, goes on with.
+    /// The next request of the row, or of the preparation before the first row.
     fn request(&self) -> Option<(u8, StRequest)> {
         let (lane, configures) = match self.at {
             At::Preparing(lane) | At::Configuring(lane) => (lane, true),
@@ -96,7 +96,7 @@ impl Reading {
         Some((*motor, request))
     }
 
-    /// The request was acknowledged, with these values.
+    /// The request was acknowledged with these values.
     fn answered(&mut self, values: impl IntoIterator<Item = [u8; 8]>) {
         self.values.extend(values);
         self.at = match self.at {
@@ -110,9 +110,8 @@ impl Reading {
         };
     }
 
-    /// The drive refused the request; whether it goes on all the same: with one register after the
-    /// other where the drive has no segments, with a segment configured anew where the drive was
-    /// restarted and has forgotten it.
+    /// The drive refused the request. Returns whether the row continues: register by register if
+    /// the drive has no segments, with a segment configured again if the drive was restarted.
     fn refused(&mut self) -> bool {
         self.at = match self.at {
             At::Preparing(lane) => {
@@ -129,7 +128,7 @@ impl Reading {
         true
     }
 
-    /// Before the first row, from this lane on.
+    /// The next lane to prepare, from this one.
     fn preparing(&self, from: usize) -> At {
         let next = (from..self.lanes.len()).find(|lane| self.lanes[*lane].segment.is_some());
         next.map_or(At::Whole, At::Preparing)
@@ -145,7 +144,7 @@ impl Reading {
         }
     }
 
-    /// Carries out what there is to do, with these exchanges.
+    /// Sends the requests and takes their replies.
     fn carry_out(&mut self, client: &Client) -> Result<(), Error> {
         while let Some((motor, request)) = self.request() {
             let read = |payload: &[u8]| request.cells(request.understand(payload)?);
@@ -159,7 +158,7 @@ impl Reading {
     }
 }
 
-/// Whether these registers are worth a segment, and can have one.
+/// Whether these registers need a segment, and can have one.
 fn is_segment(profile: Profile, registers: &[RegisterId]) -> bool {
     let only_there =
         |register: &RegisterId| register.shape().is_some_and(|shape| shape.access == Access::Dac);
@@ -169,8 +168,8 @@ fn is_segment(profile: Profile, registers: &[RegisterId]) -> bool {
     possible && (registers.len() > 1 || registers.iter().any(only_there))
 }
 
-/// Rows of registers: for a blocking client [`StSampling::run`]; for an event loop what to ask, one
-/// request after the other.
+/// Rows of registers. A blocking client calls [`StSampling::run`]. An event loop sends one request
+/// after the other.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct StSampling(Mutex<(Rows, Reading)>);
 
@@ -179,8 +178,8 @@ impl StSampling {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Samples until the end, an error, or `most` rows; returns the new rows in each case. With `skip`
-    /// a line that fails costs only the row; so does a signal's handler that uses it.
+    /// Samples until the end, an error, or `most` rows. Returns the new rows in each case. With
+    /// `skip` a line that fails costs only the row. So does a signal handler that uses it.
     pub(super) fn run(
         &self,
         client: &Client,
@@ -210,8 +209,8 @@ impl StSampling {
 
 #[pymethods]
 impl StSampling {
-    /// Registers of motors `(motor, registers, full_scale_amps)`, each in one of `segments` where that
-    /// can be done.
+    /// Registers of motors `(motor, registers, full_scale_amps)`, each motor in one of `segments`
+    /// if possible.
     #[new]
     fn new(
         py: Python<'_>,
@@ -227,7 +226,7 @@ impl StSampling {
         Ok(StSampling(Mutex::new((rows, reading))))
     }
 
-    /// How long to wait at this time of the event loop, s; 0 begins a row, and `None` is the end.
+    /// The wait at this time of the event loop, s. 0 begins a row, `None` is the end.
     fn after(&self, py: Python<'_>, now: f64) -> PyResult<Option<f64>> {
         let (rows, reading) = &mut *self.lock();
         let wait = rows.after_seconds(py, now)?;
@@ -237,7 +236,7 @@ impl StSampling {
         Ok(wait)
     }
 
-    /// The next request and its motor, `None` when the row is complete.
+    /// The next request and its motor; `None` if the row is complete.
     fn request(&self) -> Option<(u8, StRequest)> {
         self.lock().1.request()
     }
@@ -269,7 +268,7 @@ impl StSampling {
         rows.push(&reading.values);
     }
 
-    /// The new rows, a time in s and the values, eight bytes each; and the skipped instants.
+    /// The new rows, each a time in s and values of eight bytes, and the skipped instants.
     fn take<'py>(&self, py: Python<'py>) -> (Bound<'py, PyByteArray>, u64) {
         self.lock().0.take().into_python(py)
     }

@@ -1,4 +1,4 @@
-//! Register values between the wire and the units of the field.
+//! Register values between digits and units.
 
 use motorlink::st::register::{Type, Unit};
 use motorlink::st::{Profile, Reading, RegisterId, find_register, parse_value};
@@ -13,11 +13,11 @@ use crate::number::digits;
 /// Digits of a drive's full scale of current.
 const FULL_SCALE: f64 = 32767.0;
 
-/// What the digits of a motor's registers are worth.
+/// The value of a digit of a motor's registers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scale {
     pub(crate) profile: Profile,
-    /// One s16A digit, A; `None` while nobody has told, and currents are digits.
+    /// One s16A digit, A; `None` if the full scale is unknown. Currents are in digits then.
     ampere: Option<f64>,
 }
 
@@ -31,7 +31,7 @@ impl Scale {
         Scale { profile, ampere: None }.with_full_scale(py, full_scale_amps)
     }
 
-    /// Of a request on which neither the profile nor a full scale has a bearing.
+    /// For a request that neither profile nor full scale affects.
     pub(crate) fn plain() -> Self {
         Scale { profile: Profile::default(), ampere: None }
     }
@@ -45,7 +45,7 @@ impl Scale {
         match full_scale_amps {
             Some(amps) if !(amps.is_finite() && amps > 0.0) => {
                 let why = "give the current of digit 32767, in A";
-                Err(invalid_value(py, format_args!("{amps} A is no full scale: {why}")))
+                Err(invalid_value(py, format_args!("{amps} A is not a full scale: {why}")))
             }
             amps => Ok(Scale { profile: self.profile, ampere: amps.map(|amps| amps / FULL_SCALE) }),
         }
@@ -75,7 +75,7 @@ impl Scale {
         if is_current(register) { self.current().1 } else { self.reading(register, 0).unit() }
     }
 
-    /// What was read, in [`unit`](Self::unit)s.
+    /// A read value, in [`unit`](Self::unit)s.
     pub(crate) fn physical(&self, register: RegisterId, bits: i32) -> f64 {
         match self.ampere {
             Some(ampere) if is_current(register) => f64::from(bits) * ampere,
@@ -83,12 +83,12 @@ impl Scale {
         }
     }
 
-    /// What was read as an integer; the bits of a float.
+    /// A read value as an integer; the bits of a float.
     pub(crate) fn raw(&self, register: RegisterId, bits: i32) -> i64 {
         self.reading(register, bits).digits()
     }
 
-    /// What was read, for Python: an integer where a digit is one unit.
+    /// A read value for Python: an integer if one digit is one unit.
     pub(crate) fn value(
         &self,
         py: Python<'_>,
@@ -104,7 +104,7 @@ impl Scale {
         value.into_py_any(py)
     }
 
-    /// The bits of a value that a program gives: a number, or a name where values have names.
+    /// The bits of an argument: a number, or a name where values have names.
     pub(crate) fn bits(
         &self,
         register: RegisterId,
@@ -146,6 +146,6 @@ pub(crate) fn register(name: &Bound<'_, PyAny>) -> PyResult<RegisterId> {
     }
     let number: i64 = name.extract()?;
     u8::try_from(number).map(RegisterId).map_err(|_| {
-        unknown_register(py, format_args!("{number} is no register: numbers are 0 to 255"))
+        unknown_register(py, format_args!("{number} is not a register: numbers are 0 to 255"))
     })
 }

@@ -1,4 +1,4 @@
-//! Which baud rate does a drive speak?
+//! Scans for the baud rate of a drive.
 
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ fn line(py: Python<'_>, name: &str) -> PyResult<PortName> {
     Ok(port)
 }
 
-/// Those of the rates that are to be asked: one where the port has none to set.
+/// The rates to ask at: one for a port without a baud rate.
 #[pyfunction]
 pub(crate) fn st_scan_rates(py: Python<'_>, port: &str, mut rates: Vec<u32>) -> PyResult<Vec<u32>> {
     let port = line(py, port)?;
@@ -29,7 +29,7 @@ pub(crate) fn st_scan_rates(py: Python<'_>, port: &str, mut rates: Vec<u32>) -> 
     Ok(rates)
 }
 
-/// Asks at one rate; waits `timeout` s for each of two answers.
+/// Asks at one rate. Waits `timeout` s for each of two replies.
 #[pyfunction]
 pub(crate) fn st_scan_baud(
     py: Python<'_>,

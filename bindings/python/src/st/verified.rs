@@ -11,7 +11,7 @@ use super::request::{StRequest, motor_number};
 use super::scale::Scale;
 use crate::error::st_error;
 
-/// A verified write: what is to be asked, one request after the other.
+/// A verified write: what to ask, one request after the other.
 #[pyclass(frozen, module = "motorlink._core")]
 pub(crate) struct StVerifiedWrite {
     motor: MotorNumber,
@@ -21,7 +21,7 @@ pub(crate) struct StVerifiedWrite {
 
 #[pymethods]
 impl StVerifiedWrite {
-    /// Of the write `request`, at most `attempts` times.
+    /// For the write `request`, at most `attempts` times.
     #[new]
     fn new(
         py: Python<'_>,
@@ -48,13 +48,13 @@ impl StVerifiedWrite {
         }
     }
 
-    /// Takes what that request gave; gives the number of the attempt that did it, when it is done.
+    /// Takes the value of that request. Returns the number of attempts when it is done.
     fn answered(&self, py: Python<'_>, digits: Option<i64>) -> PyResult<Option<u8>> {
-        // The low half has the register's bits, whatever their sign.
+        // The low half has the register's bits, also for negative values.
         self.step(py, Ok(digits.map(|digits| digits as i32)))
     }
 
-    /// Takes what that request failed with, which is raised when no attempt is left.
+    /// Takes the error of that request. It is raised after the last attempt.
     fn failed(&self, error: Bound<'_, PyAny>) -> PyResult<Option<u8>> {
         self.step(error.py(), Err(PyErr::from_value(error.clone())))
     }
