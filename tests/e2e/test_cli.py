@@ -119,8 +119,8 @@ def test_help_tells_the_exit_codes_and_every_command_has_help(run):
 
 
 def test_an_unknown_command_is_a_usage_error_with_the_nearest(run):
-    told = run("st", "rampp").ended(2).err
-    assert "'ramp'" in told
+    told = run("st", "statuss").ended(2).err
+    assert "'status'" in told
 
 
 @pytest.mark.parametrize(

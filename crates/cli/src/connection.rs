@@ -6,10 +6,12 @@ use motorlink::st::Profile;
 use motorlink_link::fault::Faults;
 
 use crate::failure::Failure;
+use crate::help;
 use crate::output::Printer;
 use crate::trace;
 
 #[derive(clap::Args)]
+#[command(next_help_heading = help::GLOBAL)]
 pub struct Connection {
     #[command(flatten)]
     port: Port,
@@ -22,7 +24,8 @@ pub struct Connection {
     /// Show every frame on stderr
     #[arg(long, global = true)]
     trace: bool,
-    /// Damage what passes the port, to rehearse errors: flip=1e-4,delay=5ms..30ms; see below
+    /// Damage the data on the port, to rehearse errors: flip=1e-4,delay=5ms..30ms; `motorlink st
+    /// --help` and `motorlink rmd --help` list all faults
     #[arg(long, global = true, value_name = "SPEC")]
     pub fault: Option<Faults>,
 }
@@ -31,7 +34,7 @@ pub struct Connection {
 #[derive(clap::Args)]
 pub struct Port {
     /// The port: /dev/ttyACM0, tcp:HOST:PORT, slcan:DEVICE, socketcan:can0, sim: and more
-    #[arg(short, long, env = "MOTORLINK_PORT", global = true)]
+    #[arg(short, long, env = "MOTORLINK_PORT", global = true, value_hint = clap::ValueHint::AnyPath)]
     port: Option<String>,
 }
 

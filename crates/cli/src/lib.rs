@@ -9,6 +9,7 @@ mod demo;
 mod failure;
 mod guard;
 mod help;
+mod hint;
 mod interrupt;
 mod json;
 mod output;
@@ -25,7 +26,7 @@ mod voice;
 
 use std::ffi::OsString;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use motorlink_link::is_printable;
 
 use crate::failure::Failure;
@@ -64,7 +65,8 @@ enum Command {
     },
     /// Write the manual pages into a folder
     Man {
-        /// The folder; it is made if it is not there
+        /// The folder; it is created if it does not exist
+        #[arg(value_hint = clap::ValueHint::DirPath)]
         folder: std::path::PathBuf,
     },
 }
@@ -81,7 +83,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
     let words = own_words(words);
     let is_shown = |word: &OsString| word.to_string_lossy().chars().all(is_printable);
     let has_control_characters = !words.iter().all(is_shown);
-    let cli = match Cli::try_parse_from(words) {
+    let cli = match parse(words) {
         Ok(cli) => cli,
         Err(error) if error.exit_code() == 2 && output::has_json_messages() => {
             let text = error.to_string();
@@ -108,10 +110,10 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
         Command::Conformance(args) => conformance::run(args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "motorlink", &mut script);
+            clap_complete::generate(shell, &mut command(), "motorlink", &mut script);
             output::print_line(&String::from_utf8_lossy(&script).trim_end())
         }
-        Command::Man { folder } => help::write_manual(Cli::command(), &folder),
+        Command::Man { folder } => help::write_manual(command(), &folder),
     };
     let code = match result {
         Ok(()) => 0,
@@ -119,6 +121,17 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
     };
     output::finish();
     code
+}
+
+/// The command line, with its help.
+fn command() -> clap::Command {
+    help::with_examples(Cli::command())
+}
+
+fn parse(words: Vec<OsString>) -> Result<Cli, clap::Error> {
+    let mut command = command();
+    let matches = command.try_get_matches_from_mut(words).map_err(help::without_motion)?;
+    Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 
 /// The words of a command line. Numbers such as `-1e-3` and `-.5` are as clap reads them: `-0.001`,

@@ -9,6 +9,7 @@ use motorlink::st::{MotorNumber, Profile};
 use motorlink_link::serve::ServeName;
 
 use crate::connection::Port;
+use crate::hint;
 use crate::span::parse_span;
 
 /// Behind `motorlink conformance host --help`.
@@ -50,7 +51,7 @@ pub enum Command {
         #[arg(short, long, default_value = "1", value_parser = parse_motor)]
         motor: MotorNumber,
         /// What the drive is held to: the document as written, or what MCSDK 5.4 firmware does
-        #[arg(long, default_value = "spec")]
+        #[arg(long, default_value = "spec", value_parser = hint::profile())]
         profile: Profile,
     },
     /// Check a motor that speaks the RMD protocol V1.62
@@ -141,7 +142,7 @@ pub struct Results {
     #[arg(short, long)]
     pub verbose: bool,
     /// Write the results as JUnit XML
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     pub junit: Option<PathBuf>,
     /// Write the results as JSON; without a file, to stdout instead of the table
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]

@@ -8,6 +8,7 @@ use motorlink::rmd::SpinDirection;
 use crate::connection::Connection;
 use crate::repeat::Repeat;
 use crate::span::{parse_distance, parse_span, span_up_to};
+use crate::{help, hint};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -21,10 +22,11 @@ pub struct Args {
 
 /// Which motor, and how to speak to it.
 #[derive(clap::Args)]
+#[command(next_help_heading = help::GLOBAL)]
 pub struct MotorArgs {
     /// The motor's ID, 1 to 32
-    #[arg(short, long, default_value_t = 1, global = true,
-          value_parser = clap::value_parser!(u8).range(1..=32))]
+    #[arg(short, long, default_value_t = 1, global = true, value_parser = hint::id(),
+          hide_possible_values = true)]
     pub id: u8,
     /// How long to wait for a reply, 1ms to 10s
     #[arg(long, default_value = "50ms", global = true, value_name = "TIME",
@@ -49,7 +51,7 @@ pub enum Read {
     /// Find the motors that answer
     Scan {
         /// IDs to ask instead of 1 to 32
-        #[arg(value_name = "ID", value_parser = clap::value_parser!(u8).range(1..=32))]
+        #[arg(value_name = "ID", value_parser = hint::id(), hide_possible_values = true)]
         ids: Vec<u8>,
     },
     /// Show temperature, voltage, errors, speed, torque current, phase currents, angles
@@ -73,7 +75,8 @@ pub enum Act {
     /// is changed, and the six are written and read back.
     Pid {
         /// Gains to set, such as speed_kp=120; or all six as numbers, in the order that `pid` shows
-        #[arg(value_name = "NAME=GAIN", num_args = 0..=6)]
+        #[arg(value_name = "NAME=GAIN", num_args = 0..=6, value_parser = hint::gain(),
+              hide_possible_values = true)]
         gains: Vec<String>,
     },
     /// Show the acceleration limit, or set it until power-off
@@ -130,7 +133,7 @@ pub enum Act {
         #[arg(allow_negative_numbers = true)]
         degrees: f64,
         /// Which way round: clockwise or counterclockwise, cw or ccw for short
-        #[arg(value_parser = direction)]
+        #[arg(value_parser = hint::direction(), hide_possible_values = true)]
         direction: SpinDirection,
         #[command(flatten)]
         most: MaxSpeed,
@@ -193,8 +196,4 @@ pub struct Wait {
     /// How long to wait (default: twice the time at --max-speed and 10s; 60s without --max-speed)
     #[arg(long, value_name = "TIME", requires = "wait", value_parser = parse_span)]
     pub wait_timeout: Option<Duration>,
-}
-
-fn direction(word: &str) -> Result<SpinDirection, &'static str> {
-    SpinDirection::named(word).ok_or("give clockwise (cw) or counterclockwise (ccw)")
 }

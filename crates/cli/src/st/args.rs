@@ -9,6 +9,7 @@ use super::registers::Filter;
 use crate::connection::Connection;
 use crate::repeat::Repeat;
 use crate::span::{parse_distance, parse_span, span_up_to};
+use crate::{help, hint};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -22,13 +23,14 @@ pub struct Args {
 
 /// Which drive, and how to speak to it.
 #[derive(clap::Args)]
+#[command(next_help_heading = help::GLOBAL)]
 pub struct DriveArgs {
     /// The motor, 1 to 7
-    #[arg(short, long, default_value_t = 1, global = true,
-          value_parser = clap::value_parser!(u8).range(1..=7))]
+    #[arg(short, long, default_value_t = 1, global = true, value_parser = hint::motor(),
+          hide_possible_values = true)]
     pub motor: u8,
     /// What the drive speaks: the document as written, or what MCSDK 5.4 firmware does
-    #[arg(long, default_value = "spec", global = true)]
+    #[arg(long, default_value = "spec", global = true, value_parser = hint::profile())]
     pub profile: Profile,
     /// How long to wait for a reply, 1ms to 60s [default: 1s, in a scan 200ms]
     #[arg(long, global = true, value_name = "TIME",
@@ -62,7 +64,8 @@ pub enum Read {
     /// Read registers
     Get {
         /// Names or numbers (0x1E)
-        #[arg(required = true, value_name = "REGISTER")]
+        #[arg(required = true, value_name = "REGISTER", value_parser = hint::register(),
+              hide_possible_values = true)]
         registers: Vec<String>,
         #[command(flatten)]
         repeat: Repeat,
@@ -73,7 +76,8 @@ pub enum Read {
         #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=3))]
         segment: u8,
         /// Names or numbers, at most 32; those of access D too
-        #[arg(required = true, value_name = "REGISTER")]
+        #[arg(required = true, value_name = "REGISTER", value_parser = hint::register(),
+              hide_possible_values = true)]
         registers: Vec<String>,
         #[command(flatten)]
         repeat: Repeat,
@@ -92,6 +96,7 @@ pub enum Act {
     /// Write a register
     Set {
         /// Name or number
+        #[arg(value_parser = hint::register(), hide_possible_values = true)]
         register: String,
         /// A number in the register's unit, or a name (SPEED, I_ALPHA)
         #[arg(allow_negative_numbers = true)]

@@ -45,7 +45,7 @@ pub fn unreadable(register: RegisterId, profile: Profile) -> Option<Known> {
     if is_readable(profile) {
         return None;
     }
-    let other = other(profile);
+    let other = profile.other();
     match (shape.access, profile) {
         (Access::Dac, Profile::Spec) => Some(Known {
             fact: format!("{register} has access D, it is read in data segments only"),
@@ -76,7 +76,7 @@ fn unwritable(register: RegisterId, profile: Profile) -> Option<Known> {
     let is_writable = |profile| {
         matches!(shape.writing(profile, Features::NONE.with(shape.feature)), Writing::Takes(_))
     };
-    let other = other(profile);
+    let other = profile.other();
     if is_writable(profile) {
         return None;
     }
@@ -96,13 +96,6 @@ fn built_without(register: RegisterId) -> Option<Known> {
         fact: format!("{register} exists only in drives that are built with: {}", feature.name()),
         advice: None,
     })
-}
-
-fn other(profile: Profile) -> Profile {
-    match profile {
-        Profile::Spec => Profile::Mcsdk54,
-        Profile::Mcsdk54 => Profile::Spec,
-    }
 }
 
 fn advice_profile(profile: Profile) -> String {

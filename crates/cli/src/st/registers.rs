@@ -7,13 +7,14 @@ use motorlink::st::{Feature, Profile, RegisterId};
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
+use crate::hint;
 use crate::output::{Printer, print_line};
 
 /// Which registers.
 #[derive(clap::Args)]
 pub struct Filter {
     /// Only registers with this in their name; * and ? match any text and any letter
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME", value_parser = hint::register(), hide_possible_values = true)]
     names: Vec<String>,
     /// Only registers of this access, or of several, such as R,RW
     #[arg(long, value_name = "ACCESS", value_delimiter = ',', ignore_case = true, value_parser = accesses(),

@@ -1,0 +1,142 @@
+//! Examples of every command. The tests run each of them on simulated drives.
+
+/// What an example begins with.
+pub const PROGRAM: &str = "motorlink ";
+
+/// The examples of a command, such as `st get`.
+pub fn of(path: &str) -> impl Iterator<Item = &'static str> {
+    EXAMPLES.iter().filter(move |(own, _)| *own == path).map(|(_, example)| *example)
+}
+
+/// A command and a command line of it.
+const EXAMPLES: &[(&str, &str)] = &[
+    ("", "sim --st pty:./st0 --rmd slcan-pty:./can0"),
+    ("", "st -p ./st0 status"),
+    ("", "rmd -p slcan:./can0 scan"),
+    ("demo", "demo"),
+    ("sim", "sim --st pty:./st0 --rmd slcan-pty:./can0"),
+    ("sim run", "sim run scenarios/position-moves.toml --csv run.csv"),
+    ("sim presets", "sim presets"),
+    ("guard", "guard st -p ./st0 --serve pty:./drive"),
+    ("guard st", "guard st -p ./st0 --serve pty:./drive"),
+    ("guard st", "guard st -p ./st0 --serve pty:./drive --silence 2s"),
+    ("guard rmd", "guard rmd -p slcan:./can0 --serve slcan-pty:./bus"),
+    ("guard rmd", "guard rmd -p slcan:./can0 --prove --spin 100"),
+    ("ports", "ports"),
+    ("ports", "ports --json"),
+    ("st", "st -p ./st0 info"),
+    ("st", "st -p ./st0 get SPEED_MEAS FLAGS"),
+    ("st info", "st -p ./st0 info"),
+    ("st status", "st -p ./st0 status"),
+    ("st status", "st -p ./st0 --motor 2 status --json"),
+    ("st registers", "st registers"),
+    ("st registers", "st registers '*_KP' --access RW"),
+    ("st registers", "st registers --feature pfc"),
+    ("st get", "st -p ./st0 get SPEED_MEAS BUS_VOLTAGE 0x1f"),
+    ("st get", "st -p ./st0 get SPEED_MEAS --every 100ms"),
+    ("st get", "st -p ./st0 get SPEED_MEAS --every 10ms --count 9 --csv run.csv"),
+    ("st segment", "st -p ./st0 segment I_A I_B SPEED_MEAS"),
+    ("st segment", "st -p ./st0 segment I_A I_B --every 10ms --count 9 --csv -"),
+    ("st scan", "st -p ./st0 scan"),
+    ("st scan", "st -p ./st0 scan 115200 9600"),
+    ("st set", "st -p ./st0 set SPEED_KP 800"),
+    ("st set", "st -p ./st0 set SPEED_KP 800 --verify"),
+    ("st set", "st -p ./st0 set DAC_OUT1 I_ALPHA"),
+    ("st start", "st -p ./st0 start"),
+    ("st stop", "st -p ./st0 stop"),
+    ("st start-stop", "st -p ./st0 start-stop"),
+    ("st stop-ramp", "st -p ./st0 stop-ramp"),
+    ("st ramp", "st -p ./st0 ramp 1500 1000"),
+    ("st ramp", "st -p ./st0 ramp -1500 2000"),
+    ("st revup-data", "st -p ./st0 revup-data"),
+    ("st revup-data", "st -p ./st0 revup-data 1 500 200 250"),
+    ("st current-reference", "st -p ./st0 current-reference 1000 0"),
+    ("st torque-ramp", "st -p ./st0 --profile mcsdk-5.4 torque-ramp 1000 500"),
+    ("st position", "st -p ./st0 --profile mcsdk-5.4 position 1.57 2"),
+    ("st fault-ack", "st -p ./st0 fault-ack"),
+    ("st encoder-align", "st -p ./st0 encoder-align"),
+    ("st iqdref-clear", "st -p ./st0 iqdref-clear"),
+    ("st pfc", "st -p ./st0 pfc enable"),
+    ("st raw", "st -p ./st0 raw 02 1e"),
+    ("rmd", "rmd -p slcan:./can0 scan"),
+    ("rmd", "rmd -p slcan:./can0 --id 2 status"),
+    ("rmd scan", "rmd -p slcan:./can0 scan"),
+    ("rmd scan", "rmd -p slcan:./can0 scan 1 2"),
+    ("rmd status", "rmd -p slcan:./can0 --id 2 status"),
+    ("rmd status", "rmd -p slcan:./can0 status --every 100ms"),
+    ("rmd angle", "rmd -p slcan:./can0 angle"),
+    ("rmd angle", "rmd -p slcan:./can0 angle --every 10ms --count 9 --csv run.csv"),
+    ("rmd pid", "rmd -p slcan:./can0 pid"),
+    ("rmd pid", "rmd -p slcan:./can0 pid speed_kp=120 speed_ki=20"),
+    ("rmd pid", "rmd -p slcan:./can0 pid 100 100 120 20 100 100 --write-rom"),
+    ("rmd acceleration", "rmd -p slcan:./can0 acceleration"),
+    ("rmd acceleration", "rmd -p slcan:./can0 acceleration 2000"),
+    ("rmd encoder", "rmd -p slcan:./can0 encoder"),
+    ("rmd encoder-offset", "rmd -p slcan:./can0 encoder-offset 1024 --write-rom"),
+    ("rmd zero", "rmd -p slcan:./can0 zero --write-rom"),
+    ("rmd off", "rmd -p slcan:./can0 off"),
+    ("rmd stop", "rmd -p slcan:./can0 stop"),
+    ("rmd run", "rmd -p slcan:./can0 run"),
+    ("rmd torque", "rmd -p slcan:./can0 torque 0.5"),
+    ("rmd speed", "rmd -p slcan:./can0 speed 360"),
+    ("rmd position", "rmd -p slcan:./can0 position 90 --max-speed 360"),
+    ("rmd single-turn-position", "rmd -p slcan:./can0 single-turn-position 90 cw"),
+    ("rmd clear-errors", "rmd -p slcan:./can0 clear-errors"),
+    ("rmd torque4", "rmd -p slcan:./can0 torque4 0.1 0.1 0 0"),
+    ("rmd raw", "rmd -p slcan:./can0 raw 9a"),
+    ("conformance st", "conformance st -p ./st0 --only ST-4.5"),
+    ("conformance rmd", "conformance rmd -p slcan:./can0 --only RMD-33"),
+    (
+        "conformance host",
+        "conformance host st --serve pty:./st1 --only late -- \\\n    motorlink st get SPEED_MEAS --every 20ms --count 4",
+    ),
+    ("conformance scenarios", "conformance scenarios st"),
+    ("conformance clauses", "conformance clauses rmd"),
+    ("completions", "completions bash > motorlink.bash"),
+    ("man", "man ./manual"),
+];
+
+#[cfg(test)]
+mod tests {
+    use clap::Command;
+
+    use super::*;
+
+    /// The paths of the commands that do something.
+    fn leaves(command: &Command, path: &str, found: &mut Vec<String>) {
+        let commands = command.get_subcommands().filter(|command| !command.is_hide_set());
+        let mut is_leaf = true;
+        for command in commands.filter(|command| command.get_name() != "help") {
+            is_leaf = false;
+            leaves(command, format!("{path} {}", command.get_name()).trim_start(), found);
+        }
+        if is_leaf {
+            found.push(path.to_owned());
+        }
+    }
+
+    #[test]
+    fn every_command_has_an_example_of_its_own() {
+        let mut paths = Vec::new();
+        leaves(&crate::command(), "", &mut paths);
+        assert!(paths.len() > 40);
+        for path in &paths {
+            assert!(of(path).next().is_some(), "`motorlink {path}` has no example in its help");
+        }
+        for (path, example) in EXAMPLES {
+            let mut words = example.split_whitespace();
+            let is_named = path.split(' ').filter(|word| !word.is_empty());
+            assert!(
+                is_named.clone().all(|word| words.any(|other| other == word)),
+                "{path}: {example}"
+            );
+        }
+    }
+
+    #[test]
+    fn examples_fit_80_columns_in_help_and_in_a_manual_page() {
+        for line in EXAMPLES.iter().flat_map(|(_, example)| example.lines()) {
+            assert!(PROGRAM.len() + line.chars().count() <= 74, "{line}");
+        }
+    }
+}

@@ -1,0 +1,165 @@
+"""Help: its examples run, its suggestions turn no motor, its pages keep their tables, shells complete."""
+
+import os
+import re
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from program import environment
+
+ROOT = Path(__file__).parents[2]
+#: What a bare `motorlink` needs: position control and the other features of a servo.
+SERVO = 'profile = "mcsdk-5.4"\n[[st.motor]]\npreset = "servo"\n'
+
+
+#: What turns a motor, lets it turn, or wears it.
+MOVING = {
+    *("start", "start-stop", "ramp", "torque-ramp", "current-reference", "current", "position", "move", "set", "raw"),
+    *("encoder-align", "torque", "torque4", "speed", "single-turn-position", "run", "zero", "encoder-offset"),
+    *("--full-turn", "--spin", "--prove", "--write-rom", "--start", "--max-speed", "--power-cycle", "--fault-on"),
+}
+
+
+def helps(run, *path):
+    """The help of a command and of all its subcommands, by path."""
+    text = run(*path, "--help").ended(0).out
+    yield path, text
+    table = re.search(r"^Commands:\n((?:  .*\n)+)", text, re.MULTILINE)
+    for name in re.findall(r"^  ([a-z0-9-]+)", table[1] if table else "", re.MULTILINE):
+        if name != "help":
+            yield from helps(run, *path, name)
+
+
+def examples(text):
+    """The command lines under `Examples:`."""
+    block = re.search(r"^Examples:\n((?:  .*\n)+)", text, re.MULTILINE)
+    return [line.strip() for line in block[1].replace("\\\n", "").splitlines()] if block else []
+
+
+def runs_until_ctrl_c(example):
+    """Whether an example has no end of its own."""
+    serves = " guard " in example and "--prove" not in example or "motorlink sim --" in example
+    return serves or "--every" in example and "--count" not in example
+
+
+@pytest.mark.parametrize("command", ["st", "rmd", "guard", "sim", "conformance", ""])
+def test_every_example_of_every_help_runs(run, sim, motorlink, tmp_path, command):
+    # The program itself, and commands without subcommands.
+    pages = helps(run, command) if command else [
+        page for page in helps(run) if page[0][:1] in ((), ("ports",), ("completions",), ("man",))
+    ]
+    lines = {line: None for _, text in pages for line in examples(text)}
+    assert len(lines) >= 3
+    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
+    (tmp_path / "servo.toml").write_text(SERVO)
+    path = f"{Path(motorlink).resolve().parent}:{os.environ['PATH']}"
+    for line in lines:
+        config = ["servo.toml"] if "mcsdk-5.4" in line else []
+        served = subprocess.Popen(
+            [Path(motorlink).resolve(), "sim", *config, "--stdin", "--st", "pty:./st0", "--rmd", "slcan-pty:./can0"],
+            cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment(),
+        ) if "motorlink sim" not in line else None
+        try:
+            if served:
+                assert all(served.stdout.readline() for _ in range(2))
+            ended = ended_example(line, tmp_path, path)
+            assert ended.returncode == 0, f"{line}\n{ended.stdout}\n{ended.stderr}"
+        finally:
+            if served:
+                served.communicate("")
+        for made in ("run.csv", "run.svg", "motorlink.bash"):
+            (tmp_path / made).unlink(missing_ok=True)
+
+
+def ended_example(line, folder, path):
+    """Runs a command line; one without an end gets Ctrl-C after its first line of output."""
+    process = subprocess.Popen(
+        ["bash", "-c", f"exec {line}"], cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, env=environment({"PATH": path}),
+    )
+    try:
+        out = ""
+        if runs_until_ctrl_c(line):
+            out = process.stdout.readline()
+            process.send_signal(signal.SIGINT)
+        rest, err = process.communicate(timeout=60)
+        return subprocess.CompletedProcess(line, process.returncode, out + rest, err)
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize("command", ["st get", "st set", "rmd off", "rmd speed", "rmd status"])
+def test_options_of_a_command_come_before_those_of_every_command(run, command):
+    text = run(*command.split(), "--help").ended(0).out
+    own, every = text.split("Options of every command:\n")
+    assert "--port" in every and "--json" in every and "--port" not in own.partition("Options:")[2]
+    assert not {"--every", "--csv", "--verify"} & set(re.findall(r"--[a-z]+", every.partition("Examples:")[0]))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "rmd set-id 2", "rmd speedd 3", "rmd torqe 3", "rmd runn", "rmd positon 3", "rmd rawr 9a", "rmd mov 3",
+        "st startt", "st rampp 3 3", "st sett", "st encoder-aling", "st torqe-ramp 3 3", "st curent 3 3", "st positio 3 3",
+        "rmd off --max-speed 3", "rmd single-turn-position 3 cw --full-turns", "rmd --write-ro zero",
+        "conformance st --spinn", "guard st --prov", "conformance host --star x",
+    ],
+)
+@pytest.mark.parametrize("json", [(), ("--json",)])
+def test_no_suggestion_turns_a_motor(run, words, json):
+    told = run(*words.split(), *json).ended(2).err
+    # Words that were typed are repeated.
+    suggested = set(re.findall(r"[a-z0-9-]+", told)) - set(words.split())
+    assert not suggested & MOVING, told
+
+
+@pytest.mark.parametrize(
+    "words, suggested",
+    [
+        ("st statu", "status"), ("st gett SPEED_MEAS", "get"), ("rmd scn", "scan"), ("rmd stopp", "stop"), ("rmd of", "off"),
+        ("st -p sim: get STATUS --evry 5ms", "--every"), ("portss", "ports"), ("st --jsn info", "--json"),
+    ],
+)
+def test_suggestions_that_turn_no_motor_are_kept(run, words, suggested):
+    assert f"'{suggested}'" in run(*words.split()).ended(2).err
+
+
+@pytest.mark.parametrize(
+    "typed, completed",
+    [
+        ("st get SPEED_M", {"SPEED_MEAS"}),
+        ("st segment I_A", {"I_A", "I_ALPHA"}),
+        ("st set BUS_", {"BUS_VOLTAGE"}),
+        ("st --profile m", {"mcsdk-5.4"}),
+        ("rmd pid speed", {"speed_kp=", "speed_ki="}),
+        ("rmd --id 3", {"3", "30", "31", "32"}),
+        ("rmd single-turn-position 90 co", {"counterclockwise"}),
+        ("st registers --feature pf", {"pfc"}),
+    ],
+)
+def test_bash_completes_registers_profiles_gains_and_ids(run, typed, completed):
+    script = run("completions", "bash").ended(0).out
+    words = ["motorlink", *typed.split()]
+    ask = f"COMP_WORDS=({' '.join(words)}) COMP_CWORD={len(words) - 1}; _motorlink motorlink {words[-1]} {words[-2]}"
+    done = subprocess.run(
+        ["bash"], input=f'{script}\n{ask}; echo "${{COMPREPLY[@]}}"\n', capture_output=True, text=True, timeout=10
+    )
+    assert set(done.stdout.split()) == completed, done.stderr
+
+
+def test_manual_pages_keep_their_tables(run, tmp_path):
+    run("man", tmp_path).ended(0)
+    for page in tmp_path.iterdir():
+        shown = subprocess.run(
+            ["groff", "-man", "-Tutf8", "-P-c", "-P-b", "-P-o", "-P-u", "-rLL=80n", "-K", "utf8", "-ww", page],
+            capture_output=True, text=True, check=True,
+        )
+        assert shown.stderr == "", page
+        assert all(len(line) <= 80 for line in shown.stdout.splitlines()), page
+        if page.name == "motorlink-st.1":
+            assert re.search(r"^ +sim: {10,}simulated drives inside this process$", shown.stdout, re.MULTILINE)
+            assert re.search(r"^ +motorlink st -p \./st0 info$", shown.stdout, re.MULTILINE)
