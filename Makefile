@@ -196,8 +196,9 @@ python-docs: $(PYTHON_VENV)/ready ## the reference in docs/PYTHON.md
 header: ## crates/ffi/include/motorlink.h
 	MOTORLINK_UPDATE_HEADER=1 $(CARGO) test -p motorlink-ffi --test header --locked
 
-pictures: ## docs/pictures: the scenarios are played and drawn
+pictures: ## plays and draws scenarios (docs/pictures) and the demo (docs/demo.svg)
 	mkdir -p docs/pictures
+	$(CARGO) run --release --locked --quiet -p motorlink-cli -- demo --picture docs/demo.svg
 	@for scenario in scenarios/*.toml; do \
 		$(CARGO) run --release --locked --quiet -p motorlink-cli -- \
 			sim run $$scenario --plot docs/pictures/$$(basename $$scenario .toml).svg || exit; \

@@ -9,6 +9,7 @@ import struct
 import subprocess
 import termios
 import time
+from xml.etree import ElementTree
 
 import pytest
 
@@ -31,13 +32,34 @@ def test_the_demo_tells_its_story_in_lines_and_ends_by_itself(run, tmp_path):
     assert list(tmp_path.iterdir()) == [], "nothing is left behind"
 
 
-def test_the_demo_draws_a_table_on_a_terminal_and_ends_by_itself(motorlink):
-    screen, code = on_a_terminal([motorlink, "demo"], DEMO_ENDS_WITHIN)
+@pytest.mark.parametrize("columns", [80, 50, 20])
+def test_the_demo_draws_a_table_on_a_terminal_and_ends_by_itself(motorlink, columns):
+    screen, code = on_a_terminal([motorlink, "demo"], DEMO_ENDS_WITHIN, columns)
     assert code == 0
-    assert re.search(r"motor +state +speed +current +temp +voltage", screen)
+    drawn = screen.partition("What you saw:")[0]
+    lines = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", drawn).splitlines()
+    assert max(map(len, lines)) <= columns, "nothing is cut by the terminal"
+    if columns == 80:
+        assert re.search(r"motor +state +speed +current +temp +voltage", screen)
+        assert any(re.search(r"ST 1 +RUN +-?\d+ rpm +-?\d+ s16A +\d+ °C +\d+ V$", line) for line in lines)
+        assert any(re.search(r"ST 1 +FAULT_OVER BREAK_IN +-?\d+ rpm", line) for line in lines)
+    if columns == 50:
+        assert any(re.search(r"ST 1 +RUN +-?\d+ rpm$", line) for line in lines)
     assert "\x1b[" in screen, "the table is drawn in place"
     assert "What you saw:" in screen
     assert screen.rfind("\x1b[?25h") > screen.rfind("\x1b[?25l"), "the cursor is shown again"
+
+
+@pytest.mark.parametrize("variables", [{"TERM": "dumb"}, {"TERM": ""}, {"NO_COLOR": "1"}])
+def test_the_demo_prints_plain_lines_where_a_terminal_cannot_or_shall_not_draw(motorlink, variables):
+    screen, code = on_a_terminal([motorlink, "demo"], DEMO_ENDS_WITHIN, variables=variables)
+    assert code == 0 and "\x1b" not in screen and "What you saw:" in screen
+
+
+def test_the_demo_draws_its_screen_during_the_fault(run, tmp_path):
+    run("demo", "--picture", tmp_path / "demo.svg", within=DEMO_ENDS_WITHIN).ended(0)
+    texts = [text.text for text in ElementTree.parse(tmp_path / "demo.svg").getroot().iter()]
+    assert any("FAULT_OVER BREAK_IN" in text for text in texts if text), texts
 
 
 def test_ctrl_c_during_the_demo_stops_the_motors(start, tmp_path):
@@ -50,11 +72,12 @@ def test_ctrl_c_during_the_demo_stops_the_motors(start, tmp_path):
     assert list(tmp_path.iterdir()) == [], "nothing is left behind"
 
 
-def on_a_terminal(arguments, within):
-    """Runs a program on a terminal of 100 columns; gives what it drew and its exit code."""
+def on_a_terminal(arguments, within, columns=100, variables=()):
+    """Runs a program on a terminal; gives what it drew and its exit code."""
     ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 100, 0, 0))
-    variables = environment({"TERM": "xterm-256color"})
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
+    inherited = {key: value for key, value in environment().items() if key != "NO_COLOR"}
+    variables = {**inherited, "TERM": "xterm-256color", **dict(variables)}
     process = subprocess.Popen(
         arguments, stdin=theirs, stdout=theirs, stderr=theirs, env=variables, start_new_session=True
     )

@@ -15,6 +15,7 @@ REPOSITORY = Path(__file__).parents[2]
 SHIPPED = sorted((REPOSITORY / "scenarios").glob("*.toml"))
 PICTURES = REPOSITORY / "docs" / "pictures"
 SVG = "{http://www.w3.org/2000/svg}"
+EVENT = "#A3ACB6"
 
 
 @pytest.fixture
@@ -78,6 +79,46 @@ def test_a_shipped_scenario_comes_as_expected_and_always_the_same(run, tmp_path,
     assert {kind: path.read_bytes() for kind, path in files.items()} == before
     picture = PICTURES / f"{scenario.stem}.svg"
     assert picture.read_bytes() == before["svg"], f"`make pictures` draws {picture.name} anew"
+
+
+def shapes(path):
+    """Texts, opaque rectangles and lines of events of a picture in the order in which they are drawn:
+    kind, left, top, right, bottom."""
+    for shape in ElementTree.parse(path).getroot():
+        kind = shape.tag.removeprefix(SVG)
+        if kind == "text":
+            size, text = float(shape.get("font-size")), (shape.text or "").strip()
+            wide, x, y = 0.5 * size * len(text), float(shape.get("x")), float(shape.get("y"))
+            x -= {"start": 0, "middle": wide / 2, "end": wide}[shape.get("text-anchor")]
+            # The part of letters that is certainly black.
+            yield "text", x, y - size / 5, x + wide, y + size / 5, text
+        elif kind == "rect" and shape.get("opacity") == "1" and shape.get("fill") != "none":
+            x, y = float(shape.get("x")), float(shape.get("y"))
+            yield "rect", x, y, x + float(shape.get("width")), y + float(shape.get("height")), ""
+        elif kind == "polyline" and shape.get("stroke") == EVENT:
+            points = [tuple(map(float, point.split(","))) for point in shape.get("points").split()]
+            (left, top), (right, bottom) = min(points), max(points)
+            if left == right:
+                yield "line", left, top, right, bottom, ""
+
+
+@pytest.mark.parametrize("picture", sorted(PICTURES.glob("*.svg")), ids=lambda path: path.stem)
+def test_no_line_of_an_event_crosses_a_text(picture):
+    drawn = list(shapes(picture))
+    lines = [(n, shape) for n, shape in enumerate(drawn) if shape[0] == "line"]
+    assert lines and len(drawn) > 20
+    for n, (kind, left, top, right, bottom, text) in enumerate(drawn):
+        if kind != "text":
+            continue
+        for k, (_, x, high, _, low, _) in lines:
+            if not (left < x < right and high < bottom and top < low):
+                continue
+            hidden = [
+                shape
+                for shape in drawn[k + 1 : n]
+                if shape[0] == "rect" and shape[1] < x < shape[3] and shape[2] < top and bottom < shape[4]
+            ]
+            assert k < n and hidden, f"a line crosses `{text}`"
 
 
 # What is told.

@@ -13,6 +13,7 @@ mod hint;
 mod interrupt;
 mod json;
 mod output;
+mod palette;
 mod ports;
 mod recording;
 mod repeat;

@@ -1,8 +1,13 @@
 //! `motorlink demo`: simulated drives of both kinds, driven through real ports.
 
 mod bench;
+mod line;
+mod picture;
 mod screen;
 mod story;
+mod table;
+
+use std::path::PathBuf;
 
 use motorlink::{rmd, st};
 
@@ -13,12 +18,20 @@ use story::Story;
 use crate::failure::Failure;
 use crate::interrupt::{self, interrupted};
 use crate::output::note;
+use crate::sim::outputs;
+
+/// What the picture says to those who cannot see it.
+const TITLE: &str =
+    "motorlink demo: a table of two ST and four RMD motors; ST motor 1 has a fault, over-current";
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Print plain lines even on a terminal
+    /// Print plain lines even on a terminal (also with TERM=dumb or NO_COLOR)
     #[arg(long)]
     plain: bool,
+    /// Draw the screen during the fault into this file; `make pictures` does
+    #[arg(long, value_name = "FILE.svg", hide = true)]
+    picture: Option<PathBuf>,
 }
 
 pub fn run(args: Args) -> Result<(), Failure> {
@@ -42,17 +55,24 @@ pub fn run(args: Args) -> Result<(), Failure> {
         Ok(()) => note(format!("RMD motor {} is off", stopped.id)),
         Err(error) => note(format!("RMD motor {} may still turn: {error}", stopped.id)),
     });
-    let mut screen = Screen::new(args.plain);
+    let picture = outputs::resolve(&[("--picture", args.picture.as_deref())], &[])?;
+    // A picture has 80 columns, as plain lines have.
+    let mut screen = Screen::new(args.plain || args.picture.is_some());
     screen.title(&[
-        "Two ST motors on a serial line and four RMD motors on a CAN bus, all simulated.",
-        "This program talks to them as to real drives, through these ports:",
-        &format!("  {}", drives.st),
-        &format!("  {}", drives.rmd),
+        "Two ST motors and four RMD motors, all simulated, on two ports of this machine:",
+        &format!("  {}  a serial line: the ST drive", drives.st),
+        &format!("  {}  a CAN adapter: the RMD motors", drives.rmd),
+        "The demo holds both ports until it ends. `motorlink sim` gives you your own.",
     ]);
     let mut story = Story::new(&drives, &st, &bus, &mut screen);
     let told = story.tell();
     let summary = story.summary();
+    let drawn = story.into_picture();
     screen.end();
+    if let (Some(Some(file)), Some(lines)) = (picture.first(), drawn) {
+        let svg = picture::draw(TITLE, &lines);
+        file.write(|out| out.write_all(svg.as_bytes()))?;
+    }
     match told {
         Err(Failure::Interrupted) => Err(Failure::Interrupted),
         Err(_) if interrupted() => Err(Failure::Interrupted),

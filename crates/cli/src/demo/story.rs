@@ -3,10 +3,12 @@
 use std::time::{Duration, Instant};
 
 use motorlink::rmd::{self, CentiDegrees, CentiDps, IqCommand, MotorId, SetTorque4, SpeedLimit};
-use motorlink::st::{self, Ramp, Status, register};
+use motorlink::st::{self, Flags, Ramp, Status, register};
 
 use super::bench::Drives;
-use super::screen::{Row, Screen};
+use super::line::Line;
+use super::screen::Screen;
+use super::table::Row;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::print_line;
@@ -26,6 +28,8 @@ pub struct Story<'a> {
     exchanges: u64,
     exchanging: Duration,
     done: Vec<String>,
+    /// The screen during the fault.
+    picture: Option<Vec<Line>>,
 }
 
 /// What the demo has shown.
@@ -50,7 +54,13 @@ impl<'a> Story<'a> {
             exchanges: 0,
             exchanging: Duration::ZERO,
             done: Vec::new(),
+            picture: None,
         }
+    }
+
+    /// The screen during the fault, if it came so far.
+    pub fn into_picture(self) -> Option<Vec<Line>> {
+        self.picture
     }
 
     pub fn tell(&mut self) -> Result<(), Failure> {
@@ -146,8 +156,7 @@ impl<'a> Story<'a> {
     }
 
     fn position(&mut self) -> Result<(), Failure> {
-        self.screen
-            .say("RMD motor 1 turns to 810°, no faster than 500 °/s; the others switch off.");
+        self.screen.say("RMD motor 1 turns to 810° at 500 °/s or less; the others switch off.");
         let motor = self.bus.motor(1)?;
         for id in 2..=4 {
             self.bus.motor(id)?.off()?;
@@ -165,15 +174,18 @@ impl<'a> Story<'a> {
     }
 
     fn break_and_mend(&mut self) -> Result<(), Failure> {
-        self.screen.say("A fault: over-current in ST motor 1. Its drive stops it at once.");
+        self.screen.say("An over-current is simulated in ST motor 1. Its drive switches it off.");
         let motor = self.st.motor(1)?;
         self.drives.st_fault(1, "BREAK_IN")?;
         self.until("ST motor 1 is in fault", |_| {
             Ok(matches!(motor.status()?, Status::FaultNow | Status::FaultOver))
         })?;
         let faults = motor.flags()?;
+        self.screen.say(&format!("ST motor 1 reports {}.", in_words(faults)));
         self.watch(Duration::from_millis(500))?;
-        self.screen.say(&format!("Its FLAGS say {faults}. FAULT_ACK, and it starts again."));
+        self.screen.say("The program waits for standstill, sends FAULT_ACK and restarts it.");
+        self.tick()?;
+        self.picture = Some(self.screen.picture(&self.rows));
         self.until("ST motor 1 stands still", |_| Ok(motor.get(register::SPEED_MEAS)?.abs() < 30))?;
         motor.fault_ack()?;
         self.until("ST motor 1 is idle", |_| Ok(motor.status()? == Status::Idle))?;
@@ -242,11 +254,12 @@ impl<'a> Story<'a> {
     fn rmd_row(&self, id: u8) -> Result<Row, Failure> {
         let motor = self.bus.motor(id)?;
         let (state, motion) = (motor.status()?, motor.motion_status()?);
-        let turning = motion.speed.0 != 0 || motion.iq.0 != 0;
-        let status = match (state.errors.is_empty(), turning) {
-            (false, _) => state.errors.to_string(),
-            (true, true) => "turning".to_owned(),
-            (true, false) => "at rest".to_owned(),
+        let turning = motion.speed.0 != 0;
+        let status = match (state.errors.is_empty(), turning, motion.iq.0 != 0) {
+            (false, ..) => state.errors.to_string(),
+            (true, true, _) => "turning".to_owned(),
+            (true, false, true) => "holding".to_owned(),
+            (true, false, false) => "at rest".to_owned(),
         };
         Ok(Row {
             motor: format!("RMD {id}"),
@@ -255,24 +268,35 @@ impl<'a> Story<'a> {
             current: format!("{:.2} A", motion.iq.amps()),
             temperature: format!("{} °C", state.temperature.0),
             voltage: format!("{:.1} V", state.voltage.volts()),
-            alarm: !state.errors.is_empty(),
+            is_turning: turning,
+            is_fault: !state.errors.is_empty(),
         })
     }
 }
 
 fn st_row(motor: &st::Motor<'_>) -> Result<Row, Failure> {
     let (status, faults) = (motor.status()?, motor.flags()?);
-    let alarm = faults.occurred() != 0;
-    let state = if alarm { format!("{status} {faults}") } else { status.to_string() };
+    let names: Vec<&str> = Flags::names(faults.occurred()).collect();
+    let state = format!("{status} {}", names.join(" "));
     Ok(Row {
         motor: format!("ST {}", motor.number().number()),
-        state,
+        state: state.trim_end().to_owned(),
         speed: format!("{} rpm", motor.get(register::SPEED_MEAS)?),
         current: format!("{} s16A", motor.get(register::TORQUE_MEAS)?),
         temperature: format!("{} °C", motor.get(register::HEATS_TEMP)?),
         voltage: format!("{} V", motor.get(register::BUS_VOLTAGE)?),
-        alarm,
+        is_turning: status == Status::Run,
+        is_fault: faults.occurred() != 0,
     })
+}
+
+/// Faults by their names, with what they mean.
+fn in_words(faults: Flags) -> String {
+    let all = faults.occurred() | faults.present();
+    let known = Flags::NAMES.iter().filter(|(bit, ..)| all & bit != 0);
+    let words: Vec<String> =
+        known.map(|(_, name, meaning)| format!("{name} in FLAGS: {meaning}")).collect();
+    words.join(", ")
 }
 
 fn near(motor: &st::Motor<'_>, rpm: i32) -> Result<bool, Failure> {

@@ -1,6 +1,6 @@
 //! `motorlink sim`: serves simulated drives and obeys commands on stdin, or plays a scenario.
 
-mod outputs;
+pub mod outputs;
 mod plot;
 mod presets;
 mod run;
