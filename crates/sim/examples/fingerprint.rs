@@ -1,5 +1,5 @@
-//! Prints a fingerprint of all that two simulated drives said and are, moment by moment. `make
-//! determinism` compares what it prints from builds with and without optimisation.
+//! Prints a fingerprint of all replies and states of two simulated drives, moment by moment. `make
+//! determinism` compares the output of builds with and without optimisation.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{Command as _, ReadPhaseCurrents, SetPosition, SetSpeed};

@@ -1,5 +1,5 @@
-//! A machine alone on an ideal voltage source, for comparison with an independent solution of its
-//! equations (tests/e2e/test_reference.py): reads an experiment as JSON, prints CSV.
+//! A machine on an ideal voltage source, without a drive. tests/e2e/test_reference.py compares it
+//! with an independent solution of its equations. Reads an experiment as JSON, prints CSV.
 
 use std::io::{self, Write};
 
@@ -18,9 +18,9 @@ struct Experiment {
     load: LoadConfig,
     /// Vd and Vq, V.
     voltage: [f32; 2],
-    /// rad/s, at the beginning.
+    /// Speed at the start, rad/s.
     speed: f32,
-    /// rad, at the beginning.
+    /// Angle at the start, rad.
     angle: f32,
     locked: bool,
     steps: u32,

@@ -1,5 +1,4 @@
-//! Binary angles: 2^32 a turn, so that they wrap by themselves and stay exact however far a rotor
-//! turns.
+//! Binary angles: 2^32 a turn. They wrap automatically, and are exact over any number of turns.
 
 use core::f32::consts::TAU;
 
@@ -22,8 +21,8 @@ pub fn position(radians: f32) -> i64 {
 
 /// Sine and cosine of an angle of 2^32 a turn, within 1e-7.
 ///
-/// The angle is taken to the nearest quarter turn, which whole numbers do exactly; what is left, at
-/// most π/4, goes into the Taylor series.
+/// The angle is split exactly into quarter turns and a rest of at most π/4. The Taylor series is
+/// computed for the rest.
 pub fn sin_cos(angle: u32) -> (f32, f32) {
     const EIGHTH: u32 = 1 << 29;
     let quarter = angle.wrapping_add(EIGHTH) >> 30;
@@ -32,8 +31,8 @@ pub fn sin_cos(angle: u32) -> (f32, f32) {
     let sin =
         x + x * z * (-1.0 / 6.0 + z * (1.0 / 120.0 + z * (-1.0 / 5040.0 + z * (1.0 / 362_880.0))));
     let cos = 1.0 + z * (-0.5 + z * (1.0 / 24.0 + z * (-1.0 / 720.0 + z * (1.0 / 40_320.0))));
-    // Without branches, which nobody can foretell: each quarter exchanges both, every other one
-    // changes a sign.
+    // Without branches, which the processor could not predict: each quarter swaps both values, and
+    // every other one changes a sign.
     let (sin, cos) = if quarter & 1 == 0 { (sin, cos) } else { (cos, sin) };
     let sign = |quarter: u32| (quarter & 2) << 30;
     (
@@ -42,9 +41,9 @@ pub fn sin_cos(angle: u32) -> (f32, f32) {
     )
 }
 
-/// Sine of an angle of 2^32 a turn, within 2e-7, for less than with the cosine.
+/// Sine of an angle of 2^32 a turn, within 2e-7. Faster than [`sin_cos`].
 ///
-/// The half turn behind is folded onto the one ahead; that goes into the Taylor series.
+/// The backward half turn is folded onto the forward one, for the Taylor series.
 pub fn sin(angle: u32) -> f32 {
     const QUARTER: u32 = 1 << 30;
     let behind = angle.wrapping_add(QUARTER) >> 31 != 0;

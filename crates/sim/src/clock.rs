@@ -2,7 +2,7 @@
 
 use motorlink_proto::time::{Instant, Micros};
 
-/// Counts the steps that a moment completes.
+/// Counts the steps up to a moment.
 #[derive(Debug, Clone)]
 pub(crate) struct Clock {
     step: Micros,
@@ -14,7 +14,7 @@ impl Clock {
         Clock { step, last: start }
     }
 
-    /// The ends of the steps that are over at `now` and were not given before.
+    /// The ends of the steps that are over at `now` and were not returned before.
     pub(crate) fn steps_until(&mut self, now: Instant) -> impl Iterator<Item = Instant> + use<> {
         let (start, step) = (self.last, self.step);
         let count = now.since(start).0 / step.0;

@@ -2,7 +2,7 @@
 
 use crate::vector::Vector;
 
-/// Gains of a PID regulator, as they act in a step.
+/// Gains of a PID regulator, per step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Gains {
     /// Output per error.
@@ -20,7 +20,7 @@ impl Gains {
         Gains { kp: gain(0), ki: gain(1), kd: gain(2) }
     }
 
-    /// Ki over Kp, at most 1: the share of what was cut off that an integral gives back in a step.
+    /// Ki over Kp, at most 1: the fraction of the cut that the integral compensates per step.
     fn tracking(&self) -> f32 {
         if self.kp.abs() > self.ki.abs() { (self.ki / self.kp).abs() } else { 1.0 }
     }
@@ -32,9 +32,9 @@ impl Gains {
 /// u = Kp e + I + Kd (e − e'),   I = I' + Ki e
 /// ```
 ///
-/// Output and integral end at the limits, and the integral does not grow while the output is beyond
-/// the limit on that side (conditional integration; see K. J. Åström and T. Hägglund, *PID
-/// Controllers: Theory, Design and Tuning*, on windup).
+/// Output and integral are limited. The integral does not grow while the output exceeds the limit
+/// on that side (conditional integration; see K. J. Åström and T. Hägglund, *PID Controllers:
+/// Theory, Design and Tuning*, on windup).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Regulator {
     integral: f32,
@@ -42,7 +42,7 @@ pub struct Regulator {
 }
 
 impl Regulator {
-    /// A regulator whose output begins at `output`.
+    /// A regulator with this initial output.
     pub const fn starting_at(output: f32) -> Self {
         Regulator { integral: output, last_error: 0.0 }
     }
@@ -64,28 +64,28 @@ impl Regulator {
         self.last_error = error;
         let integral = self.integral + gains.ki * error;
         let output = direct + integral;
-        // Without branches, which errors around zero would make hard to foretell.
+        // Without branches, which would be hard to predict for errors around zero.
         let windup = ((output > most) & (error > 0.0)) | ((output < least) & (error < 0.0));
         let kept = within(integral, least, most);
         self.integral = if windup { self.integral } else { kept };
         within(direct + kept, least, most)
     }
 
-    /// Tells the regulator by how much its output was cut (what acted minus what it gave), so that
-    /// the integral follows what acts (back-calculation).
+    /// Passes the cut of the output (actual output minus computed output) to the regulator, so that
+    /// the integral follows the actual output (back-calculation).
     pub fn give_back(&mut self, cut: f32, gains: &Gains) {
         self.integral += cut * gains.tracking();
     }
 }
 
-/// `value` held between two others; unlike `clamp` it takes any.
+/// `value` limited to a range. Unlike `clamp` it accepts any limits.
 #[inline]
 pub fn within(value: f32, least: f32, most: f32) -> f32 {
     value.max(least).min(most)
 }
 
-/// A voltage within a circle of radius `most`: d, which holds the flux, goes first, up to
-/// `flux_share` of it, and q gets what is left.
+/// Limits a voltage to a circle of radius `most`. d, which controls the flux, has priority up to
+/// `flux_share` of the radius; q gets the rest.
 #[inline]
 pub fn limit_to_circle(voltage: Vector, most: f32, flux_share: f32) -> Vector {
     if voltage.square() <= most * most {
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_cut_off_is_given_back() {
+    fn the_integral_compensates_the_cut() {
         let gains = Gains { kp: 2.0, ki: 0.5, kd: 0.0 };
         let mut regulator = Regulator::starting_at(8.0);
         regulator.give_back(-4.0, &gains);
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_given_back_is_a_number_whatever_the_gains() {
+    fn the_compensated_integral_is_finite_for_any_gains() {
         for (kp, ki) in [(0.0, 0.0), (0.0, -1.0), (-1.0, 0.5), (1.0, -1e6), (-1e-6, -1.0)] {
             let gains = Gains { kp, ki, kd: 0.0 };
             let mut regulator = Regulator::starting_at(8.0);
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn the_circle_keeps_d_and_takes_from_q() {
+    fn the_circle_limits_q_before_d() {
         let inside = Vector::new(3.0, 4.0);
         assert_eq!(limit_to_circle(inside, 5.0, 0.95), inside);
         let cut = limit_to_circle(Vector::new(-3.0, 9.0), 5.0, 0.95);

@@ -1,9 +1,9 @@
-//! A fingerprint of everything that a state holds.
+//! A fingerprint of a whole state.
 
 use core::fmt::{Debug, Write};
 
-/// Hashes a value's `Debug` form with 64-bit FNV-1a. That form has every field, and prints a float
-/// with all digits that tell it from others, so two states with the same hash are the same.
+/// Hashes a value's `Debug` form with 64-bit FNV-1a. That form contains every field, and floats
+/// with all significant digits, so different states have different hashes except by chance.
 pub fn fingerprint(value: &impl Debug) -> u64 {
     struct Fnv(u64);
     impl Write for Fnv {

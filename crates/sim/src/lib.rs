@@ -1,17 +1,19 @@
 //! Simulated drives that answer both protocols, on virtual time.
 //!
-//! * [`st::StStation`] is a drive of one to seven motors behind ST's Motor Control Protocol: bytes
-//!   in, bytes out.
-//! * [`rmd::RmdBus`] is a CAN bus with RMD motors: frames in, frames out.
-//! * [`plant`] is what both drives run on: a motor in the dq frame with what hangs on its shaft, its
-//!   supply, its power stage, its sensors and its heat. [`preset`] has motors that exist.
+//! | to | use |
+//! |---|---|
+//! | simulate an ST drive with one to seven motors: bytes in, bytes out | [`st::StStation`] |
+//! | simulate a CAN bus with RMD motors: frames in, frames out | [`rmd::RmdBus`] |
+//! | simulate a motor with its mechanics, supply, power stage, sensors and heat | [`plant::Plant`] |
+//! | choose the values of a real motor | [`preset`] |
+//! | change load, supply or temperature, lock the rotor | `plant_mut` of [`st::StMotor`] and [`rmd::RmdMotor`] |
+//! | inject faults, read the true state | `inject` and `truth` of the same |
+//! | compare two states | [`hash::fingerprint`] |
 //!
-//! Time is an argument: each drive advances in steps of fixed length to the
-//! [`Instant`](motorlink_proto::time::Instant) that it is given. It reads no clock, and noise only
-//! depends on a seed and the step, so the same commands at the same times give the same bytes and the
-//! same [fingerprint](hash::fingerprint), however finely time is cut. Beside the protocol each motor
-//! has its plant, to change the world around it (supply, load, locked rotor, temperature), faults to
-//! inject, and a snapshot of what is really going on.
+//! Time is an argument: each drive advances in steps of fixed length to the given
+//! [`Instant`](motorlink_proto::time::Instant). It reads no clock, and noise depends only on a seed
+//! and the step. So the same commands at the same times give the same bytes and the same
+//! [fingerprint](hash::fingerprint), for any division of the time.
 //!
 //! # Conventions
 //!
@@ -20,11 +22,11 @@
 //!   power goes from the supply into the motor and from the motor into the load.
 //! * Phase quantities are amplitudes: the Clarke transform keeps them (alpha is phase A). So torque is
 //!   `1.5 p (ψ iq + (Ld − Lq) id iq)`, back-EMF is `p ψ ω`, power is `1.5 (vd id + vq iq)`.
-//! * The d axis is the magnet's, q is a quarter of an electrical turn ahead; at the electrical angle 0
-//!   the d axis is on phase A's.
+//! * The d axis is that of the magnet; q is a quarter of an electrical turn ahead. At the electrical
+//!   angle 0 the d axis is on phase A's axis.
 //! * Angles are binary where they are exact ([`angle`]): 2^32 a turn, over all turns in an `i64`.
-//! * The greatest phase voltage is the bus voltage over the square root of three.
-//! * What is in front of a gear is of the rotor, unless it says output or load.
+//! * The maximum phase voltage is the bus voltage over the square root of three.
+//! * Values in front of a gear refer to the rotor, unless their name says output or load.
 //!
 //! ```
 //! use motorlink_proto::{st::{Command, Frame, Profile, Request}, time::Instant};

@@ -1,22 +1,23 @@
-//! Motors that exist, with where their values come from.
+//! Real motors, with the sources of their values.
 //!
-//! A value marked P is the maker's, M was measured by somebody else, D follows from one of these, E
-//! is an estimate because nobody publishes it. Resistance and inductance are those of a phase (half
-//! of what is measured between two terminals), flux linkage is the amplitude in a phase.
+//! The source of a value: P is published by the maker, M was measured by others, D is derived from
+//! one of these, E is an estimate. Resistance and inductance are those of a phase, half of the
+//! value between two terminals. Flux linkage is the amplitude in a phase.
 //!
-//! All `phase_to_phase` are E: at worst a phase of a stalled motor is 1.5 times as far above the housing
-//! as the winding's mean, which fits makers who allow 80 % of the current at standstill.
+//! All `phase_to_phase` are E. In the worst case a phase of a stalled motor is 1.5 times as far
+//! above the housing as the winding's mean. This agrees with makers who allow 80 % of the current
+//! at standstill.
 
 use crate::plant::{
     ChopperConfig, EncoderConfig, GearConfig, HeatConfig, HeatSensor, InverterConfig, LoadConfig,
     MachineConfig, PlantConfig, SensingConfig, SupplyConfig,
 };
 
-/// Temperature coefficient of the remanence of NdFeB magnets, 1/K: makers say -0.11 to -0.12 % for the
-/// usual grades.
+/// Temperature coefficient of the remanence of NdFeB magnets, 1/K. Makers state -0.11 to -0.12 %
+/// for the usual grades.
 const NEODYMIUM: f32 = -0.0011;
 
-/// A preset: its name in files, and what it is.
+/// A preset: its name in files, and its configuration.
 pub type Preset = (&'static str, fn() -> PlantConfig);
 
 /// Every preset: those of [ST drives](crate::st::MotorConfig::PRESETS), then RMD motors.
@@ -29,7 +30,7 @@ pub const ALL: [Preset; 6] = [
     ("rmd-x8", rmd_x8),
 ];
 
-/// The preset of a name.
+/// The preset with this name.
 pub fn named(name: &str) -> Option<PlantConfig> {
     ALL.iter().find(|(known, _)| *known == name).map(|(_, config)| config())
 }
@@ -86,7 +87,7 @@ pub fn drone() -> PlantConfig {
     }
 }
 
-/// The 24 V motor of ST's kits, Shinano LA052-080E3NL1. Nobody publishes a whole sheet.
+/// The 24 V motor of ST's kits, Shinano LA052-080E3NL1. There is no complete public data sheet.
 ///
 /// | value | | from |
 /// |---|---|---|
@@ -132,7 +133,7 @@ pub fn shinano() -> PlantConfig {
     }
 }
 
-/// The [24 V motor](shinano) with a brake chopper: what the drive `servo` runs on.
+/// The [24 V motor](shinano) with a brake chopper, for the drive `servo`.
 pub fn servo() -> PlantConfig {
     let chopper = ChopperConfig { resistance: 5.0, on_voltage: 30.0, off_voltage: 29.0 };
     let supply = SupplyConfig { chopper: Some(chopper), ..SupplyConfig::default() };

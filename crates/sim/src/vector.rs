@@ -1,4 +1,4 @@
-//! Vectors of two-phase quantities, and the frames that they are seen from.
+//! Vectors of two-phase quantities, and their frames.
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -6,10 +6,10 @@ use crate::angle::{DIGIT, sin_cos};
 
 /// Half the square root of three.
 pub(crate) const HALF_SQRT_3: f32 = 0.866_025_4;
-/// One over the square root of three: the greatest phase voltage per bus voltage.
+/// One over the square root of three: the maximum phase voltage per bus voltage.
 pub(crate) const INVERSE_SQRT_3: f32 = 0.577_350_26;
 
-/// Two parts at a right angle: alpha and beta in the stator's frame, d and q in the rotor's.
+/// Two perpendicular components: alpha and beta in the stator's frame, d and q in the rotor's.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Vector {
     /// Alpha, along phase A; or d, along the magnet.
@@ -19,10 +19,10 @@ pub struct Vector {
 }
 
 impl Vector {
-    /// Nothing.
+    /// The zero vector.
     pub const ZERO: Vector = Vector::new(0.0, 0.0);
 
-    /// A vector of these parts.
+    /// A vector with these components.
     pub const fn new(x: f32, y: f32) -> Self {
         Vector { x, y }
     }
@@ -34,9 +34,8 @@ impl Vector {
     }
 
     /// The angle, 2^32 a turn, within 1e-5 rad; 0 for the zero vector.
-    ///
-    /// An eighth of a turn is left after folding; on it a polynomial stands for the arctangent
-    /// (Abramowitz and Stegun, *Handbook of Mathematical Functions*, 4.4.49).
+    /// The angle is folded to an eighth of a turn, for which a polynomial approximates the
+    /// arctangent (Abramowitz and Stegun, *Handbook of Mathematical Functions*, 4.4.49).
     pub fn angle(self) -> u32 {
         const QUARTER: f32 = (1 << 30) as f32;
         let (x, y) = (self.x.abs(), self.y.abs());
@@ -54,14 +53,14 @@ impl Vector {
         if self.y < 0.0 { ahead.wrapping_neg() } else { ahead }
     }
 
-    /// Turned forward by the angle of the unit vector `frame`: from the rotor's frame into the
-    /// stator's (inverse Park transform).
+    /// The vector rotated forwards by the angle of the unit vector `frame`: from the rotor's frame
+    /// to the stator's (inverse Park transform).
     pub fn turned(self, frame: Vector) -> Self {
         Vector { x: self.x * frame.x - self.y * frame.y, y: self.x * frame.y + self.y * frame.x }
     }
 
-    /// As it is seen from the frame of the unit vector `frame`: from the stator's frame into the
-    /// rotor's (Park transform).
+    /// The vector in the frame of the unit vector `frame`: from the stator's frame to the rotor's
+    /// (Park transform).
     pub fn seen_from(self, frame: Vector) -> Self {
         self.turned(Vector { y: -frame.y, ..frame })
     }
@@ -77,12 +76,12 @@ impl Vector {
         [self.x, half + side, half - side]
     }
 
-    /// Each part times a factor of its own.
+    /// Each component times its own factor.
     pub fn scaled(self, factors: Vector) -> Self {
         Vector { x: self.x * factors.x, y: self.y * factors.y }
     }
 
-    /// Each component and a share of it.
+    /// Each component plus a fraction of it.
     pub fn grown(self, shares: Vector) -> Self {
         self + self.scaled(shares)
     }

@@ -1,10 +1,10 @@
-//! Where energy came from and where it went.
+//! The account of energy.
 
-/// Energies since the beginning, J. Nothing is lost:
+/// Energies since the start, J. They balance:
 /// `source = supply + board + chopper + switching + copper + iron + friction + gear + load + stored`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy {
-    /// Out of the source, and of what feeds the bus beside it.
+    /// From the source, and from a second feed of the bus.
     pub source: f64,
     /// Heat of the source's resistance.
     pub supply: f64,
@@ -12,7 +12,7 @@ pub struct Energy {
     pub board: f64,
     /// Heat of the brake resistor.
     pub chopper: f64,
-    /// Through the motor's terminals; part of what follows.
+    /// Through the motor's terminals; part of the following energies.
     pub electrical: f64,
     /// Heat of windings and closed switches.
     pub copper: f64,
@@ -24,7 +24,7 @@ pub struct Energy {
     pub friction: f64,
     /// Heat of the gear.
     pub gear: f64,
-    /// Into what the output drives.
+    /// Into the driven load.
     pub load: f64,
     /// Gained by capacitor, windings, rotor, springs and weights.
     pub stored: f64,
@@ -48,13 +48,13 @@ pub struct Losses {
 }
 
 impl Energy {
-    /// All that was lost or given away.
+    /// The sum of all losses and outputs.
     pub fn spent(&self) -> f64 {
         let bus = self.supply + self.board + self.chopper + self.switching;
         bus + self.copper + self.iron + self.friction + self.gear + self.load
     }
 
-    /// What the account does not explain, as a share of all that was turned over.
+    /// The error of the balance, relative to the total energy.
     pub fn imbalance(&self) -> f64 {
         let heat = self.spent() - self.load;
         let turned_over = self.source.abs() + heat + self.load.abs() + self.stored.abs();

@@ -1,4 +1,4 @@
-//! Bodies that losses heat: the winding and the inverter, and the housing between them and the air.
+//! Thermal bodies: the winding and the inverter, and the housing between them and the air.
 //!
 //! ```text
 //! Cw dTw/dt = P_copper − (Tw − Th)/Rwh
@@ -6,8 +6,8 @@
 //! Ch dTh/dt = P_other + (Tw − Th)/Rwh + (Ti − Th)/Rih − (Th − Ta)/Rha
 //! ```
 //!
-//! Each phase is a third of the winding. What it has above the winding's mean follows what it gets
-//! beyond a third of the heat:
+//! Each phase is a third of the winding. Its temperature above the winding's mean follows its heat
+//! above a third of the total:
 //!
 //! ```text
 //! Cw/3 dTk/dt = P_k − P_copper/3 − Tk (1/(3 Rwh) + 3/Rpp)
@@ -44,7 +44,7 @@ pub struct HeatConfig {
     pub sensor: HeatSensor,
 }
 
-/// Where a drive feels the temperature.
+/// Where a drive measures the temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(
     feature = "serde",
@@ -77,11 +77,11 @@ impl Default for HeatConfig {
     }
 }
 
-/// Heat that bodies get in a step, J.
+/// Heat of the bodies in a step, J.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gained {
     pub(super) winding: f32,
-    /// Shares of the phases in the winding's.
+    /// Shares of the phases in the winding's heat.
     pub(super) shares: [f32; 3],
     pub(super) inverter: f32,
     pub(super) housing: f32,
@@ -91,13 +91,14 @@ pub(super) struct Gained {
 #[derive(Debug, Clone)]
 pub(super) struct Heat {
     config: HeatConfig,
-    /// °C, in more digits than the rest: what a large body warms up by in a step is little beside it.
+    /// °C, with more digits than the others: the rise of a large body in a step is small compared
+    /// with its temperature.
     winding: f64,
     housing: f64,
     inverter: f64,
-    /// What the phases have above the winding's mean, K.
+    /// Temperatures of the phases above the winding's mean, K.
     apart: [f32; 3],
-    /// What the sensor shows in place of the truth, °C.
+    /// The forced reading of the sensor, °C.
     forced: Option<f32>,
 }
 
@@ -133,7 +134,7 @@ impl Heat {
         self.apart.map(|apart| self.winding() + apart)
     }
 
-    /// What the sensor shows, °C.
+    /// The reading of the sensor, °C.
     pub(super) fn sensed(&self) -> f32 {
         self.forced.unwrap_or(match self.config.sensor {
             HeatSensor::Winding => self.winding(),
@@ -146,7 +147,7 @@ impl Heat {
         self.forced = temperature;
     }
 
-    /// Lets heat act over `dt` (s).
+    /// Applies heat for `dt` (s).
     pub(super) fn step(&mut self, dt: f32, heat: &Gained) {
         let Gained { winding, shares, inverter, housing } = *heat;
         let HeatConfig { ambient, winding_to_housing, housing_to_air, .. } = self.config;
@@ -171,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_large_body_warms_up_too_and_comes_to_where_it_gives_away_what_it_gets() {
+    fn a_large_body_warms_up_to_its_equilibrium() {
         let config = HeatConfig {
             ambient: 40.0,
             winding_capacity: 100.0,

@@ -14,7 +14,7 @@
 
 use crate::vector::{INVERSE_SQRT_3, Vector};
 
-/// What the power stage is.
+/// The configuration of the power stage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -28,7 +28,7 @@ pub struct InverterConfig {
     pub ripple_current: f32,
     /// Resistance of a closed switch, Ω.
     pub on_resistance: f32,
-    /// Rise and fall time of a switch together, ns: what its switching losses come from.
+    /// Sum of the rise and fall time of a switch, ns: the cause of its switching losses.
     pub switching_time_ns: f32,
 }
 
@@ -43,10 +43,10 @@ impl Default for InverterConfig {
     }
 }
 
-/// What the drive's firmware tells the power stage for a period.
+/// The command of the drive's firmware to the power stage, for one period.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Bridge {
-    /// All switches open. Current that still flows goes through the diodes.
+    /// All switches open. Remaining current flows through the diodes.
     #[default]
     Off,
     /// A voltage in the stator's frame, as a share of the bus voltage. A circle of radius 1/√3 fits
@@ -54,7 +54,7 @@ pub enum Bridge {
     Drive(Vector),
 }
 
-/// From commands to voltages.
+/// Converts commands to voltages.
 #[derive(Debug, Clone)]
 pub(super) struct Modulator {
     /// Dead time as a share of the period.
@@ -74,13 +74,13 @@ impl Modulator {
         }
     }
 
-    /// Current that switching takes from the bus with these currents of the phases, A.
+    /// Current that switching takes from the bus, with these phase currents, A.
     pub(super) fn switching(&self, phases: [f32; 3]) -> f32 {
         let [a, b, c] = phases;
         self.switching * (a.abs() + b.abs() + c.abs())
     }
 
-    /// Voltage per bus voltage that comes out of a command, with this current (A) flowing out.
+    /// The output voltage per bus voltage for a command, with this output current (A).
     pub(super) fn modulate(&self, command: Vector, current: Vector) -> Vector {
         let circle = INVERSE_SQRT_3 * INVERSE_SQRT_3;
         let wanted = if command.square() <= circle { command } else { within_hexagon(command) };
@@ -90,7 +90,7 @@ impl Modulator {
     }
 }
 
-/// What comes out of a command that may be too great.
+/// The output for a command that may be too large.
 fn within_hexagon(command: Vector) -> Vector {
     let [a, b, c] = command.phases();
     let centre = 0.5 - 0.5 * (a.max(b).max(c) + a.min(b).min(c));
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fits_into_the_hexagon_comes_out() {
+    fn a_voltage_within_the_hexagon_is_unchanged() {
         for angle in (0..64).map(|step| step << 26) {
             let command = Vector::unit(angle) * (INVERSE_SQRT_3 - 1e-6);
             assert!((ideal(command) - command).length() < 1e-6);
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_ends_at_the_hexagon() {
+    fn a_voltage_beyond_the_hexagon_is_limited_to_it() {
         // Two thirds of the bus voltage at a corner, 1/√3 in the middle of a side.
         let corner = ideal(Vector::new(5.0, 0.0));
         assert!((corner - Vector::new(2.0 / 3.0, 0.0)).length() < 1e-6, "{corner:?}");
@@ -132,7 +132,7 @@ mod tests {
         let modulator = Modulator::new(&config, 50e-6);
         let current = Vector::new(2.0, 0.0);
         let lost = modulator.modulate(Vector::ZERO, current);
-        // Phase A gives, B and C take: 4/3 of a leg's loss along A.
+        // Phase A supplies current, B and C take it: 4/3 of a leg's loss along A.
         assert!((lost - Vector::new(-0.01 * 4.0 / 3.0, 0.0)).length() < 1e-6, "{lost:?}");
         let small = modulator.modulate(Vector::ZERO, current * 0.01);
         assert!(small.length() < 0.5 * lost.length());

@@ -1,4 +1,4 @@
-//! What hangs on the output shaft.
+//! The load on the output shaft.
 
 use crate::angle::{TURN, radians};
 use crate::plant::GearConfig;
@@ -6,8 +6,8 @@ use crate::plant::GearConfig;
 /// Acceleration of gravity, m/s².
 const GRAVITY: f32 = 9.806_65;
 
-/// What hangs on the output shaft; all of it acts at once. It opposes motion towards growing angles
-/// with
+/// The load on the output shaft. All parts act together. The torque against motion towards growing
+/// angles is
 ///
 /// ```text
 /// T = torque + viscous ω + fan |ω| ω + stiffness (θ − centre) + m g l sin θ + stops + brake sign ω
@@ -19,7 +19,7 @@ const GRAVITY: f32 = 9.806_65;
     serde(default, deny_unknown_fields)
 )]
 pub struct LoadConfig {
-    /// Torque against the motion whatever the speed, Nm. It holds a shaft at rest.
+    /// Torque against the motion at any speed, Nm. It holds a shaft at rest.
     pub brake: f32,
     /// Torque against growing angles, Nm; a negative one turns the shaft forwards.
     pub torque: f32,
@@ -33,7 +33,7 @@ pub struct LoadConfig {
     pub spring: SpringConfig,
     /// A weight on an arm, hanging at 0; its inertia counts too.
     pub pendulum: PendulumConfig,
-    /// Ends of the way, if there are any.
+    /// End stops, if there are any.
     pub stops: Option<StopsConfig>,
 }
 
@@ -47,7 +47,7 @@ pub struct LoadConfig {
 pub struct SpringConfig {
     /// Torque per angle, Nm/rad.
     pub stiffness: f32,
-    /// Angle at which it pulls nowhere, °.
+    /// Angle of the rest position, °.
     pub centre_degrees: f32,
 }
 
@@ -65,7 +65,7 @@ pub struct PendulumConfig {
     pub length: f32,
 }
 
-/// Elastic ends of the way.
+/// Elastic end stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -77,9 +77,9 @@ pub struct StopsConfig {
     pub low_degrees: f32,
     /// Highest free angle, °.
     pub high_degrees: f32,
-    /// Torque per angle beyond, Nm/rad.
+    /// Torque per angle beyond a stop, Nm/rad.
     pub stiffness: f32,
-    /// Torque per speed beyond, against the motion, Nm s/rad.
+    /// Torque per speed beyond a stop, against the motion, Nm s/rad.
     pub damping: f32,
 }
 
@@ -96,9 +96,9 @@ pub(super) struct Load {
 /// Torques of a load at the output against growing angles, Nm, without the brake.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Torques {
-    /// What is the same at each position, and takes or gives energy for good.
+    /// The part that does not depend on the position; its energy is not stored.
     pub(super) constant: f32,
-    /// What springs and weights give back.
+    /// The part of springs and weights; its energy is stored.
     pub(super) kept: f32,
     /// Torque against the motion per speed, Nm s/rad.
     pub(super) damping: f32,
@@ -107,7 +107,7 @@ pub(super) struct Torques {
 }
 
 impl Torques {
-    /// All of them together.
+    /// The sum of all torques.
     pub(super) fn total(&self) -> f32 {
         self.constant + self.kept + self.damping * self.speed
     }
@@ -166,7 +166,7 @@ impl Load {
         self.config.brake * self.step_down
     }
 
-    /// Energy that springs and weights hold, J.
+    /// Energy stored in springs and weights, J.
     pub(super) fn potential(&self, position: i64) -> f32 {
         if !self.positional {
             return 0.0;
@@ -181,7 +181,7 @@ impl Load {
 
     /// Angle of the output, rad.
     fn angle(&self, position: i64) -> f32 {
-        // Whole turns of the rotor apart, so that many of them cost no digits.
+        // Whole turns of the rotor are separate, so that many turns do not reduce the precision.
         let turns = position.div_euclid(TURN) as f32;
         let rest = radians(position.rem_euclid(TURN));
         (turns * core::f32::consts::TAU + rest) * self.step_down

@@ -1,4 +1,4 @@
-//! A motor with its supply, its power stage and its sensors: what a drive's firmware runs on.
+//! A motor with its supply, power stage and sensors: the hardware below a drive's firmware.
 //!
 //! [`Plant::step`] is one period of the pulse width modulation. The firmware reads
 //! [`sample`](Plant::sample), [`counts`](Plant::counts) and the bus voltage, and gives the power
@@ -32,7 +32,7 @@ use supply::{Currents, Supply};
 use crate::angle;
 use crate::vector::{INVERSE_SQRT_3, Vector};
 
-/// What a plant is built from.
+/// The configuration of a plant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -42,17 +42,17 @@ use crate::vector::{INVERSE_SQRT_3, Vector};
 pub struct PlantConfig {
     /// Period of the pulse width modulation and of the current control, µs.
     pub period_us: u16,
-    /// What the noise is drawn from.
+    /// Seed of the noise.
     pub seed: u32,
-    /// Angle of the rotor at the beginning, °.
+    /// Initial angle of the rotor, °.
     pub angle_degrees: f32,
     /// The motor.
     pub machine: MachineConfig,
-    /// What it drives.
+    /// Its load.
     pub load: LoadConfig,
-    /// How it warms up.
+    /// Its thermal model.
     pub heat: HeatConfig,
-    /// What feeds it.
+    /// Its supply.
     pub supply: SupplyConfig,
     /// The power stage.
     pub inverter: InverterConfig,
@@ -62,7 +62,7 @@ pub struct PlantConfig {
     pub encoder: EncoderConfig,
 }
 
-/// What is really going on.
+/// The true state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlantTruth {
     /// Speed of the rotor, rad/s.
@@ -81,8 +81,9 @@ pub struct PlantTruth {
     pub vd: f32,
     /// The same of the q axis, V.
     pub vq: f32,
-    /// Voltage that the firmware commanded for the last period, in the rotor's frame in its middle,
-    /// V: before the hexagon, the dead time and the drop of the switches. 0 while they are open.
+    /// The firmware's voltage command for the last period, in the rotor's frame in the middle of
+    /// the period, V. Without the limits of the hexagon, the dead time and the drop of the
+    /// switches. 0 while the switches are open.
     pub vd_command: f32,
     /// The same of the q axis, V.
     pub vq_command: f32,
@@ -96,7 +97,7 @@ pub struct PlantTruth {
     pub supply_current: f32,
     /// Whether the brake resistor is on.
     pub chopping: bool,
-    /// What becomes heat.
+    /// Losses.
     pub losses: Losses,
     /// Temperature of the winding, mean of its phases, °C.
     pub winding_temperature: f32,
@@ -106,14 +107,14 @@ pub struct PlantTruth {
     pub housing_temperature: f32,
     /// Temperature of the inverter's switches, °C.
     pub inverter_temperature: f32,
-    /// Whether the rotor is held.
+    /// Whether the rotor is locked.
     pub locked: bool,
 }
 
-/// What the diodes do while all switches are open: current begins to flow where the back-EMF between
-/// two terminals is above the bus; then they put the bus, of which the six-step fundamental is 2/π,
-/// against the current that there will be at the end of the step. Gives the voltage, if current
-/// flows, and whether it ends in this step.
+/// The effect of the diodes while all switches are open. Current starts to flow when the back-EMF
+/// between two terminals is above the bus voltage. The diodes then apply the bus voltage, whose
+/// six-step fundamental is 2/π, against the current at the end of the step. Returns the voltage, if
+/// current flows, and whether the current ends in this step.
 fn through_diodes(machine: &Machine, period: f32, bus: f32) -> (Option<Feed>, bool) {
     const SIX_STEP: f32 = core::f32::consts::FRAC_2_PI;
     let MachineConfig { inductance_d, inductance_q, .. } = *machine.config();
@@ -131,7 +132,7 @@ fn through_diodes(machine: &Machine, period: f32, bus: f32) -> (Option<Feed>, bo
     (Some(Feed::Rotor(if ends { ending } else { ending * (most / length) })), ends)
 }
 
-/// Time between two steps of the heat, µs.
+/// Interval between two steps of the thermal model, µs.
 const SLOW_US: u32 = 1000;
 
 /// A motor with its supply, its power stage and its sensors.
@@ -145,16 +146,16 @@ pub struct Plant {
     machine: Machine,
     supply: Supply,
     heat: Heat,
-    /// What the power stage does in the coming step.
+    /// The command for the next step.
     pending: Bridge,
-    /// What was commanded for the last step, in the stator's frame, V.
+    /// The command of the last step, in the stator's frame, V.
     commanded: Vector,
-    /// Current of a second feed into the bus, and current that the board takes, A.
+    /// Current of a second feed into the bus, and current of the board, A.
     fed: f32,
     board: f32,
-    /// What the encoder shows where the rotor's position is 0, 2^32 a turn.
+    /// The encoder's reading at the rotor's position 0, 2^32 a turn.
     encoder_zero: i64,
-    /// Steps since the beginning.
+    /// Steps since the start.
     count: u32,
     /// Time since the last slow step, µs.
     since_slow: u32,
@@ -166,12 +167,12 @@ pub struct Plant {
     switching: f32,
     energy: Energy,
     losses: Losses,
-    /// Stored energy at the beginning, J.
+    /// Stored energy at the start, J.
     initial: f64,
 }
 
 impl Plant {
-    /// A motor at rest with its bus charged.
+    /// A motor at rest with a charged bus.
     pub fn new(config: PlantConfig) -> Self {
         let start = angle::position(config.angle_degrees.to_radians());
         let period = f32::from(config.period_us) * 1e-6;
@@ -205,7 +206,7 @@ impl Plant {
         plant
     }
 
-    /// What the plant is built from; the load and the source may have changed since.
+    /// The configuration. Load and source may have changed since.
     pub const fn config(&self) -> &PlantConfig {
         &self.config
     }
@@ -220,8 +221,8 @@ impl Plant {
         self.period
     }
 
-    /// Lets one period pass, with what was commanded at its beginning, and takes the command for
-    /// the next one.
+    /// Executes one period with the command given at its start, and takes the command for the next
+    /// one.
     #[inline]
     pub fn step(&mut self, next: Bridge) {
         let bridge = core::mem::replace(&mut self.pending, next);
@@ -269,13 +270,13 @@ impl Plant {
         self.feed_bus(taken + switching);
     }
 
-    /// A step of the bus, of which the bridge takes a current, A.
+    /// A step of the bus. `bridge` is the bridge's current, A.
     fn feed_bus(&mut self, bridge: f32) {
         let currents = Currents { bridge, board: self.board, fed: self.fed };
         self.supply.step(self.period, currents, &mut self.bus);
     }
 
-    /// What happens once a millisecond: heat, and the account of energy.
+    /// The tasks of each millisecond: heat, and the account of energy.
     fn warm_up(&mut self) {
         let dt = self.since_slow as f32 * 1e-6;
         self.since_slow = 0;
@@ -308,7 +309,7 @@ impl Plant {
         if sum > 0.0 { squares.map(|square| square / sum) } else { [1.0 / 3.0; 3] }
     }
 
-    /// The account with what came since it was written, but for what is stored.
+    /// The account with the energies since its last update, without the stored energy.
     fn accounted(&self) -> Energy {
         Energy {
             source: self.energy.source + f64::from(self.bus.source),
@@ -333,14 +334,14 @@ impl Plant {
     }
 }
 
-/// What the firmware does and sees.
+/// The interface of the firmware.
 impl Plant {
-    /// Opens all switches now, and not only after the period for which there is a command.
+    /// Opens all switches now, instead of at the end of the period.
     pub const fn open_bridge(&mut self) {
         self.pending = Bridge::Off;
     }
 
-    /// The phase currents as the converter shows them.
+    /// The converter's readings of the phase currents.
     pub fn sample(&self) -> Sample {
         self.sensor.sample(self.machine.current(), self.count)
     }
@@ -350,7 +351,7 @@ impl Plant {
         self.machine.position().wrapping_add(self.encoder_zero) >> self.finer_bits()
     }
 
-    /// Bits of a position that are finer than the encoder.
+    /// Number of position bits below the encoder's resolution.
     pub fn finer_bits(&self) -> u32 {
         angle::TURN.trailing_zeros() - u32::from(self.config.encoder.bits)
     }
@@ -360,23 +361,23 @@ impl Plant {
         self.supply.voltage()
     }
 
-    /// What the temperature sensor shows, °C.
+    /// The temperature sensor's reading, °C.
     pub fn temperature(&self) -> f32 {
         self.heat.sensed()
     }
 
-    /// Feeds a current (A) into the bus beside the source, in every step until it is changed.
+    /// Sets a current (A) of a second feed into the bus, for all later steps.
     pub fn feed(&mut self, current: f32) {
         self.fed = current;
     }
 
-    /// Takes a current (A) from the bus for the board, in every step until it is changed.
+    /// Sets the board's current from the bus (A), for all later steps.
     pub fn draw(&mut self, current: f32) {
         self.board = current;
     }
 }
 
-/// The world around the motor.
+/// The environment of the motor.
 impl Plant {
     /// Sets the voltage of the source, V.
     pub fn set_source(&mut self, voltage: f32) {
@@ -388,7 +389,7 @@ impl Plant {
         self.supply.config()
     }
 
-    /// Changes what hangs on the output. It comes with the energy that it holds there.
+    /// Changes the load. The energy stored in it is set accordingly.
     pub fn change_load(&mut self, change: impl FnOnce(&mut LoadConfig)) {
         let before = self.stored();
         let mut load = *self.machine.load();
@@ -397,17 +398,17 @@ impl Plant {
         self.initial += self.stored() - before;
     }
 
-    /// Holds the rotor where it is, or lets it go.
+    /// Locks or releases the rotor.
     pub const fn lock(&mut self, locked: bool) {
         self.machine.lock(locked);
     }
 
-    /// Makes the temperature sensor show this, °C, or the truth again.
+    /// Forces the temperature sensor's reading, °C; `None` ends this.
     pub const fn force_temperature(&mut self, temperature: Option<f32>) {
         self.heat.force(temperature);
     }
 
-    /// What is really going on.
+    /// The true state.
     pub fn truth(&self) -> PlantTruth {
         let current = self.machine.rotor_current();
         let (voltage, command) =
@@ -439,7 +440,7 @@ impl Plant {
         }
     }
 
-    /// The account of energy up to now.
+    /// The account of energy until now.
     pub fn energy(&self) -> Energy {
         Energy { stored: self.stored() - self.initial, ..self.accounted() }
     }

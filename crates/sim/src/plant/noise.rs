@@ -1,4 +1,4 @@
-//! Noise that only depends on a seed and a number, so that nothing has to be drawn in order.
+//! Noise that depends only on a seed and a counter, so it can be computed in any order.
 
 /// Two independent numbers with mean 0 and standard deviation 1, by the sum of two uniform ones
 /// each (triangular, within ±2.45).

@@ -1,19 +1,19 @@
-//! What no plant can be.
+//! The valid ranges of a plant's configuration.
 
 use core::fmt;
 
 use super::PlantConfig;
 
-/// A value of a configuration that is outside what it can be.
+/// A value of a configuration outside its valid range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutOfRange {
-    /// The field, as it is written in a file.
+    /// The field, as written in a file.
     pub name: &'static str,
     /// Its value.
     pub value: f32,
-    /// The least that it can be.
+    /// The minimum.
     pub least: f32,
-    /// The most that it can be.
+    /// The maximum.
     pub most: f32,
 }
 
@@ -26,10 +26,10 @@ impl fmt::Display for OutOfRange {
 
 impl core::error::Error for OutOfRange {}
 
-/// A field with its value and the least and most that it can be.
+/// A field with its value, minimum and maximum.
 pub(crate) type Range = (&'static str, f32, f32, f32);
 
-/// The first of some ranges that a value is not in; NaN is in none.
+/// The first value outside its range. NaN is outside every range.
 pub(crate) fn check(ranges: impl IntoIterator<Item = Range>) -> Result<(), OutOfRange> {
     let odd = ranges.into_iter().find(|(_, value, least, most)| !(least..=most).contains(&value));
     match odd {
@@ -39,7 +39,7 @@ pub(crate) fn check(ranges: impl IntoIterator<Item = Range>) -> Result<(), OutOf
 }
 
 impl PlantConfig {
-    /// Refuses what cannot be simulated: nothing else makes a number that is none.
+    /// Refuses a configuration that cannot be simulated. No other input can cause NaN.
     pub fn check(&self) -> Result<(), OutOfRange> {
         const SMALL: f32 = 1e-9;
         let PlantConfig { machine, load, heat, supply, inverter, sensing, encoder, .. } = self;
@@ -123,7 +123,7 @@ impl PlantConfig {
                 ("plant.load.stops.damping", stops.damping, 0.0, 1e3),
             ])?;
         }
-        // What swings faster than this is not followed from step to step.
+        // Oscillations faster than this cannot be simulated with this step.
         let period = f32::from(self.period_us) * 1e-6;
         let weight = load.pendulum.mass * load.pendulum.length;
         let behind = load.inertia + weight * load.pendulum.length;

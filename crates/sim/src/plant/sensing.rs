@@ -1,4 +1,4 @@
-//! What the drive sees: phase currents, the encoder.
+//! The sensors of the drive: phase currents and encoder.
 
 use super::noise;
 use crate::vector::Vector;
@@ -13,13 +13,13 @@ use crate::vector::Vector;
 pub struct SensingConfig {
     /// Current of 32767 digits (s16A), A.
     pub full_scale: f32,
-    /// What phases A and B show without current, A.
+    /// Offset of phases A and B without current, A.
     pub offset: [f32; 2],
-    /// Share by which phases A and B show too much.
+    /// Relative gain error of phases A and B.
     pub gain_error: [f32; 2],
     /// Standard deviation of the noise, A.
     pub noise: f32,
-    /// Width of the converter, 10 to 16 bits; its digits are the upper ones of the 16.
+    /// Resolution of the converter, 10 to 16 bits: the upper bits of 16.
     pub bits: u8,
 }
 
@@ -53,7 +53,7 @@ pub(super) struct Sensor {
     /// Offsets of phases A and B, and deviation of the noise, in such steps.
     offset: [f32; 2],
     noise: f32,
-    /// Bits that the converter does not have.
+    /// Number of bits that the converter lacks.
     coarse: u32,
 }
 
@@ -99,7 +99,7 @@ impl Sensor {
 pub struct EncoderConfig {
     /// Width, 12 to 18 bits a turn.
     pub bits: u8,
-    /// What the encoder shows where the rotor's position is 0, °.
+    /// The encoder's reading at the rotor's position 0, °.
     pub offset_degrees: f32,
 }
 

@@ -1,12 +1,13 @@
-//! The supply: a source behind a resistance, the bus capacitor, a brake chopper.
+//! The supply: a source with a resistance, the bus capacitor, a brake chopper.
 //!
 //! ```text
 //! C dV/dt = (V0 − V)/R + I_in − I_bridge − I_board − (chopper closed) V/R_brake
 //! ```
 //!
-//! A step is a trapezoid, which is stable for any R C and keeps account of energy exactly.
+//! The integration uses the trapezoidal rule. It is stable for any R C, and its energies balance
+//! exactly.
 
-/// What feeds the power stage.
+/// The configuration of the supply.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -20,14 +21,14 @@ pub struct SupplyConfig {
     pub resistance: f32,
     /// Capacitor on the bus, F.
     pub capacitance: f32,
-    /// Whether the source takes current back, as a battery does. A rectifier or a bench supply does
-    /// not: regeneration then raises the bus.
+    /// Whether the source accepts current, as a battery does. A rectifier or a bench supply does
+    /// not: regeneration then raises the bus voltage.
     pub takes_back: bool,
     /// A brake chopper, if there is one.
     pub chopper: Option<ChopperConfig>,
 }
 
-/// A resistor that is switched on when the bus is too high.
+/// A resistor that is switched on when the bus voltage is too high.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -55,10 +56,10 @@ impl Default for SupplyConfig {
     }
 }
 
-/// Where energy came from and went in a step, J.
+/// The energies of a step, J.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Flow {
-    /// Out of the source and what feeds beside it.
+    /// From the source and a second feed.
     pub(super) source: f32,
     /// Heat of the source's resistance.
     pub(super) lost: f32,
@@ -71,7 +72,7 @@ pub(super) struct Flow {
 /// Currents of the bus in a step, other than those of the source and the brake resistor, A.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Currents {
-    /// Into the bridge; negative when it gives.
+    /// Into the bridge; negative out of it.
     pub(super) bridge: f32,
     /// Into the board.
     pub(super) board: f32,
@@ -79,8 +80,8 @@ pub(super) struct Currents {
     pub(super) fed: f32,
 }
 
-/// Current that a board of a power (W) takes from a bus (V), A. Below the voltage that its converter
-/// needs it is less and less.
+/// Current of a board with a power (W) from a bus (V), A. Below the minimum voltage of its
+/// converter it falls with the voltage.
 pub(crate) fn board_current(power: f32, bus: f32) -> f32 {
     const NEEDED: f32 = 5.0;
     let most = bus.max(NEEDED);
@@ -91,7 +92,7 @@ pub(crate) fn board_current(power: f32, bus: f32) -> f32 {
 #[derive(Debug, Clone)]
 pub(super) struct Supply {
     config: SupplyConfig,
-    /// How far the bus is below the source, V: a small number keeps its digits.
+    /// Bus voltage below the source voltage, V: a small number keeps its precision.
     sag: f32,
     chopping: bool,
     /// Current out of the source in the last step, A.
@@ -143,7 +144,7 @@ impl Supply {
         0.5 * self.config.capacitance * self.voltage() * self.voltage()
     }
 
-    /// Whether nothing changes as long as nothing is taken and nothing fed.
+    /// Whether the state remains unchanged while no current flows.
     pub(super) fn rests(&self) -> bool {
         const NEAR: f32 = 1e-5;
         let SupplyConfig { voltage: source, takes_back, chopper, .. } = self.config;
@@ -152,7 +153,7 @@ impl Supply {
         !self.chopping && quiet && (kept || self.sag.abs() <= NEAR * source)
     }
 
-    /// Lets currents flow for `dt` (s); adds where energy went.
+    /// Applies currents for `dt` (s). Adds the energies to `flow`.
     pub(super) fn step(&mut self, dt: f32, currents: Currents, flow: &mut Flow) {
         let Currents { bridge, board, fed } = currents;
         let SupplyConfig { voltage: source, takes_back, chopper, .. } = self.config;
@@ -170,7 +171,8 @@ impl Supply {
         let connected = takes_back || pulled >= 0.0;
         let conductance = if connected { self.conductance } else { 0.0 };
         let share = 1.0 / (1.0 + gain * (conductance + brake));
-        // The bridge takes power: what it took at the begin of the step is less where the bus rose.
+        // The bridge takes constant power: its current falls if the bus voltage rose since the
+        // start of the step.
         let ratio = (self.voltage() / (source - pulled * share).max(1e-3)).clamp(0.5, 2.0);
         let middle = (pulled + gain * bridge * (ratio - 1.0)) * share;
         let middle = middle.min(source);

@@ -6,8 +6,8 @@ use motorlink_proto::time::Instant;
 
 use super::{RmdConfig, RmdNode};
 
-/// A CAN bus with RMD motors, kept in an array or a vector. A motor only speaks when it is asked,
-/// so there is nothing to poll: time that passed meanwhile is made up for.
+/// A CAN bus with RMD motors, stored in an array or a vector. A motor sends only replies, so there
+/// is no polling: each call first simulates the elapsed time.
 #[derive(Debug, Clone)]
 pub struct RmdBus<N> {
     nodes: N,
@@ -24,15 +24,15 @@ impl RmdBus<[RmdNode; 4]> {
 }
 
 impl<N: AsRef<[RmdNode]> + AsMut<[RmdNode]>> RmdBus<N> {
-    /// A bus with these motors; `None` when two have the same ID.
+    /// A bus with these motors; `None` if two have the same ID.
     pub fn new(mut nodes: N) -> Option<Self> {
         nodes.as_mut().sort_unstable_by_key(RmdNode::id);
         let distinct = nodes.as_ref().is_sorted_by(|one, next| one.id() < next.id());
         distinct.then(|| RmdBus { nodes })
     }
 
-    /// Takes a frame from the bus at `now` and hands the replies to `reply`: the lowest ID first,
-    /// which is how arbitration orders them.
+    /// Takes a frame from the bus at `now` and passes the replies to `reply`. The lowest ID is
+    /// first, as ordered by arbitration.
     pub fn receive(&mut self, now: Instant, frame: &CanFrame, mut reply: impl FnMut(CanFrame)) {
         self.advance_to(now);
         for node in self.nodes.as_mut() {
@@ -42,7 +42,7 @@ impl<N: AsRef<[RmdNode]> + AsMut<[RmdNode]>> RmdBus<N> {
         }
     }
 
-    /// Lets time pass until `now`.
+    /// Simulates until `now`.
     pub fn advance_to(&mut self, now: Instant) {
         self.nodes.as_mut().iter_mut().for_each(|node| node.advance_to(now));
     }
@@ -57,7 +57,7 @@ impl<N: AsRef<[RmdNode]> + AsMut<[RmdNode]>> RmdBus<N> {
         self.nodes.as_ref().iter().find(|node| node.id() == id)
     }
 
-    /// A motor by its ID, to change the world around it or to cycle its power.
+    /// A motor by its ID, to change its environment or to cycle its power.
     pub fn node_mut(&mut self, id: MotorId) -> Option<&mut RmdNode> {
         self.nodes.as_mut().iter_mut().find(|node| node.id() == id)
     }

@@ -1,45 +1,46 @@
-//! The loops for position and speed, which give the torque loop its reference.
+//! The loops for position and speed, whose output is the reference of the torque loop.
 
 use motorlink_proto::rmd::Pid;
 
 use crate::control::{self, Regulator, within};
 use crate::plant::MachineConfig;
 
-/// A byte of gain that leaves a loop as it is tuned.
+/// The gain byte that keeps a loop's default tuning.
 const AS_SHIPPED: f32 = 100.0;
-/// Kp of the position loop as shipped, 1/s.
+/// Default Kp of the position loop, 1/s.
 const POSITION_KP: f32 = 20.0;
-/// Ki of the position loop as shipped, 1/s².
+/// Default Ki of the position loop, 1/s².
 const POSITION_KI: f32 = 2.0;
 /// Position error within which the position loop integrates, rad.
 const POSITION_INTEGRAL_RANGE: f32 = 0.02;
-/// Bandwidth of the speed loop as shipped, rad/s.
+/// Default bandwidth of the speed loop, rad/s.
 const SPEED_BANDWIDTH: f32 = 300.0;
-/// Ki over Kp of the speed loop as shipped, 1/s.
+/// Default Ki over Kp of the speed loop, 1/s.
 const SPEED_KI_PER_KP: f32 = 50.0;
 
-/// What a byte of gain multiplies its loop's gain by.
+/// The factor of a gain byte for its loop's gain.
 pub(super) fn factor(byte: u8) -> f32 {
     f32::from(byte) / AS_SHIPPED
 }
 
-/// What the speed loop has to do.
+/// The task of the speed loop.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Task {
     /// Reach a speed (rad/s) with an acceleration (rad/s²).
     Reach { speed: f32, acceleration: f32 },
-    /// Close a distance (rad), no faster than `top` (rad/s) and with an acceleration (rad/s²).
+    /// Move by a distance (rad), no faster than `top` (rad/s) and with an acceleration (rad/s²).
     Close { distance: f32, top: f32, acceleration: f32 },
 }
 
-/// Gains in SI units, by the bytes and the machine.
+/// Gains in SI units, from the bytes and the machine.
 #[derive(Debug, Clone, Default)]
 struct Tuning {
     position_kp: f32,
     position_ki: f32,
     /// A s/rad, A s/rad a step.
     speed: control::Gains,
-    /// A s²/rad; a Kp below the shipped one feeds less forward, a greater one not more.
+    /// A s²/rad. A Kp below the default reduces the feed-forward; a greater one does not increase
+    /// it.
     feed_forward: f32,
 }
 
@@ -50,9 +51,9 @@ pub(super) struct Cascade {
     dt: f32,
     /// Speed reference, rad/s.
     reference: f32,
-    /// The reference as the speed's low pass shows it, rad/s.
+    /// The reference after the speed's low pass, rad/s.
     expected: f32,
-    /// Share of a new speed in that low pass.
+    /// Weight of a new speed in that low pass.
     new: f32,
     /// rad s.
     position_integral: f32,
@@ -60,8 +61,8 @@ pub(super) struct Cascade {
 }
 
 impl Cascade {
-    /// Loops that take a step every `dt` (s), with a speed that went through a low pass of which
-    /// `new` is the share of the new value.
+    /// Loops with a step every `dt` (s). `new` is the weight of a new value in the speed's low
+    /// pass.
     pub(super) fn new(dt: f32, new: f32) -> Self {
         Cascade {
             tuning: Tuning::default(),
@@ -116,7 +117,7 @@ impl Cascade {
         }
         let accelerating = self.tuning.feed_forward * (self.reference - last) / self.dt;
         let forward = within(accelerating, -most, most);
-        // The encoder shows what was between the last step and this one.
+        // The encoder shows the mean speed between the last step and this one.
         self.expected += (last - self.expected) * self.new;
         let error = self.expected - speed;
         forward + self.speed.step(error, &self.tuning.speed, -most - forward, most - forward)
@@ -128,7 +129,8 @@ impl Cascade {
         self.reference += within(speed - self.reference, -most, most);
     }
 
-    /// Speed from which the rest of the way can be braked; near the end in proportion to it.
+    /// Maximum speed from which the motor can brake within the distance; near the end in proportion
+    /// to it.
     fn position_loop(&mut self, distance: f32, acceleration: f32) -> f32 {
         let Tuning { position_kp, position_ki, .. } = self.tuning;
         if distance.abs() < POSITION_INTEGRAL_RANGE {

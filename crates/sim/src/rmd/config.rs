@@ -1,4 +1,4 @@
-//! What a motor and its drive are built from.
+//! The configuration of a motor and its drive.
 
 use motorlink_proto::rmd::{DriveConfig, EncoderBits, MotorId, Pid, Settings};
 use motorlink_proto::time::Micros;
@@ -8,8 +8,8 @@ use crate::plant::range::check;
 use crate::plant::{OutOfRange, PlantConfig};
 use crate::preset;
 
-/// A motor with its drive: what the vendor's tool sets, what the ROM holds when new, and the
-/// machine with its supply and sensors.
+/// A motor with its drive: the vendor's configuration, the contents of a new ROM, and the machine
+/// with its supply and sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -19,27 +19,27 @@ use crate::preset;
 pub struct RmdConfig {
     /// The ID on the bus, 1 to 32.
     pub id: u8,
-    /// Switches the motor off after this long without a command, ms; 0 is never.
+    /// Shutdown time: switches the motor off after this time without a command, ms; 0 disables it.
     pub shutdown_ms: u32,
-    /// Answers 0x9B with 0x9B and not with 0x9A as printed.
+    /// Answers 0x9B with 0x9B instead of 0x9A as printed.
     pub clear_reply_0x9b: bool,
     /// Gains in a new ROM, in the order of 0x30: Kp and Ki of position, speed and torque.
     pub gains: [u8; 6],
-    /// Acceleration limit in a new ROM, °/s²; 0 is none.
+    /// Acceleration limit in a new ROM, °/s²; 0 means no limit.
     pub acceleration_dps2: i32,
-    /// Encoder value that is zero, in a new ROM.
+    /// Encoder value of the zero point in a new ROM.
     pub encoder_offset: u16,
-    /// Max Torque Current, A; 0 is none.
+    /// Max Torque Current, A; 0 means no limit.
     pub max_torque_current: f32,
-    /// Max Speed, °/s; 0 is none.
+    /// Max Speed, °/s; 0 means no limit.
     pub max_speed_dps: f32,
-    /// Max Angle, °, to either side of zero; 0 is none.
+    /// Max Angle, °, in both directions from zero; 0 means no limit.
     pub max_angle_degrees: f32,
     /// Low voltage protection below this supply, V.
     pub protect_voltage: f32,
     /// Over temperature protection above this temperature, °C.
     pub protect_temperature: f32,
-    /// What the drive's electronics take from the bus, W.
+    /// Power of the drive's electronics from the bus, W.
     pub standby_power: f32,
     /// The machine, its load, supply, power stage and sensors.
     pub plant: PlantConfig,
@@ -72,7 +72,7 @@ impl RmdConfig {
         RmdConfig { id, ..RmdConfig::default() }
     }
 
-    /// What a bench without configuration has: four default motors with IDs 1 to 4.
+    /// The default bench: four default motors with IDs 1 to 4.
     pub fn demo() -> [Self; 4] {
         [1, 2, 3, 4].map(Self::with_id)
     }
@@ -82,7 +82,7 @@ impl RmdConfig {
         RmdConfig { max_torque_current: 10.0, plant: preset::rmd_x8(), ..RmdConfig::default() }
     }
 
-    /// Refuses what cannot be a motor.
+    /// Refuses an impossible configuration.
     pub fn check(&self) -> Result<(), OutOfRange> {
         self.plant.check()?;
         check([
@@ -96,7 +96,7 @@ impl RmdConfig {
         ])
     }
 
-    /// What the drive needs; `None` unless ID and encoder are in their ranges.
+    /// The drive's part; `None` if the ID or the encoder is out of range.
     pub(super) fn drive(&self) -> Option<DriveConfig> {
         let shutdown = Micros::from_millis(self.shutdown_ms);
         Some(DriveConfig {
@@ -107,7 +107,7 @@ impl RmdConfig {
         })
     }
 
-    /// What the ROM holds when new.
+    /// The contents of a new ROM.
     pub fn factory_rom(&self) -> Settings {
         let [position_kp, position_ki, speed_kp, speed_ki, torque_kp, torque_ki] = self.gains;
         Settings {
@@ -118,7 +118,7 @@ impl RmdConfig {
     }
 }
 
-/// A limit of which 0 and less is none.
+/// A limit; 0 and negative values mean no limit.
 pub(super) fn limit(value: f32) -> Option<f32> {
     (value > 0.0).then_some(value)
 }

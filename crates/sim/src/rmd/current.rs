@@ -1,9 +1,9 @@
-//! The torque loop: each period a voltage from the phase currents and the encoder.
+//! The torque loop: each period it computes a voltage from the phase currents and the encoder.
 //!
-//! Currents are seen from the rotor, where a PI regulator each holds Id at 0 and Iq at its
-//! reference; what the rotor's speed induces is fed forward. The voltage acts a period after the
-//! sample and stands still for a period, so it is given for where the rotor is one and a half
-//! periods later.
+//! Currents are transformed to the rotor's frame. One PI regulator holds Id at 0, another Iq at its
+//! reference. The back-EMF is fed forward. The voltage acts one period after the sample and is
+//! constant for one period, so it is computed for the rotor's position one and a half periods
+//! later.
 
 use core::f32::consts::TAU;
 
@@ -15,24 +15,25 @@ use crate::control::{self, Regulator, limit_to_circle};
 use crate::plant::{Bridge, MachineConfig, Plant, PlantConfig};
 use crate::vector::{INVERSE_SQRT_3, Vector};
 
-/// Share of a step of the current that a period does as shipped: the most without overshoot when
-/// the voltage comes a period late.
+/// Fraction of a current step that one period performs by default: the maximum without overshoot
+/// for a voltage that is one period late.
 const SHARE: f32 = 0.25;
-/// Share of the voltage that may go into holding the flux current.
+/// Maximum share of the voltage for the flux current.
 const FLUX_SHARE: f32 = 0.95;
 
 #[derive(Debug, Clone)]
 pub(super) struct CurrentLoop {
-    /// What is known of the machine.
+    /// Known values of the machine.
     pole_pairs: u32,
     flux_linkage: f32,
     inductance: Vector,
-    /// Gains as shipped.
+    /// Default gains.
     shipped: control::Gains,
     gains: control::Gains,
     /// Current of a digit of a sample, A.
     digit: f32,
-    /// From the encoder's reading to the middle of its count, less where its zero is; 2^32 a turn.
+    /// Correction from the encoder's reading to the middle of its count, minus its zero point; 2^32
+    /// a turn.
     correction: u32,
     finer_bits: u32,
     /// Electrical angle in one and a half periods, 2^32 a turn, per electrical speed, s/rad.
@@ -45,9 +46,9 @@ pub(super) struct CurrentLoop {
     reference: f32,
     /// Electrical speed, rad/s.
     speed: f32,
-    /// How far the rotor turns until the voltage acts, 2^32 a turn.
+    /// Rotation of the rotor until the voltage acts, 2^32 a turn.
     advance: u32,
-    /// Greatest voltage, V, and one over the bus voltage.
+    /// Maximum voltage, V, and one over the bus voltage.
     most: f32,
     share: f32,
 }
@@ -64,7 +65,7 @@ impl CurrentLoop {
             inductance: Vector::new(inductance_d, inductance_q),
             shipped: control::Gains {
                 kp: SHARE * inductance_d.min(inductance_q) / plant.period(),
-                // So the regulator's zero cancels the winding's lag.
+                // The regulator's zero then cancels the winding's lag.
                 ki: SHARE * machine.resistance,
                 kd: 0.0,
             },
@@ -92,7 +93,7 @@ impl CurrentLoop {
         };
     }
 
-    /// Forgets what the regulators hold.
+    /// Resets the regulators.
     pub(super) fn reset(&mut self) {
         (self.d, self.q) = (Regulator::default(), Regulator::default());
         (self.mean, self.reference) = (Vector::ZERO, 0.0);
@@ -112,10 +113,10 @@ impl CurrentLoop {
         self.mean.y
     }
 
-    /// What the power stage has to do in the next period.
+    /// The command of the power stage for the next period.
     #[inline]
     pub(super) fn step(&mut self, plant: &Plant) -> Bridge {
-        /// Share of a sample in the mean.
+        /// Weight of a sample in the mean.
         const NEW: f32 = 0.1;
         let turned = ((plant.counts() << self.finer_bits) as u32).wrapping_add(self.correction);
         let angle = turned.wrapping_mul(self.pole_pairs);

@@ -15,11 +15,11 @@ use crate::vector::INVERSE_SQRT_3;
 
 /// Time between two steps of the loops for speed and position, µs.
 const LOOP_US: u16 = 250;
-/// Torque current that the power stage can make, A.
+/// Maximum torque current of the power stage, A.
 const GREATEST_CURRENT: f32 = 33.0;
-/// Share of the greatest acceleration with which a move is planned.
+/// Fraction of the maximum acceleration that a move is planned with.
 const PLANNED: f32 = 0.5;
-/// Share of the speed at which the back-EMF takes up the supply that references may reach.
+/// Maximum reference, as a fraction of the speed at which the back-EMF equals the supply voltage.
 const REACHABLE: f32 = 0.9;
 
 /// An RMD motor behind its drive's protocol.
@@ -30,26 +30,27 @@ pub struct RmdMotor {
     current: CurrentLoop,
     cascade: Cascade,
     speedometer: Speedometer,
-    /// Periods between two steps of the loops for speed and position, and how many of them are over.
+    /// Periods between two steps of the loops for speed and position, and the number of elapsed
+    /// ones.
     periods: u16,
     over: u16,
-    /// Faults that something outside holds.
+    /// Faults that are held from outside.
     held: Errors,
-    /// Faults that are there until the drive has looked.
+    /// Faults that last until the drive has read them.
     injected: Errors,
     mode: Mode,
     settings: Settings,
     rom_writes: u32,
-    /// Counts where the encoder's turn began at power-on.
+    /// Counts at the start of the encoder's turn at power-on.
     origin: i64,
 }
 
-/// What is really going on in a motor.
+/// The true state of a motor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// The machine and what surrounds it.
+    /// The machine and its environment.
     pub plant: PlantTruth,
-    /// What the motor does.
+    /// The mode.
     pub mode: Mode,
     /// Faults that are present.
     pub faults: Errors,
@@ -57,14 +58,14 @@ pub struct Truth {
     pub speed_dps: f32,
     /// Speed reference of the rotor, °/s.
     pub speed_reference_dps: f32,
-    /// What the temperature sensor shows, °C.
+    /// The temperature sensor's reading, °C.
     pub temperature: f32,
 }
 
-/// The world around the motor.
+/// The environment of the motor.
 impl RmdMotor {
-    /// A motor without a drive, for one whose [`Drive`](motorlink_proto::rmd::Drive) is elsewhere;
-    /// refused where [`RmdConfig::check`] refuses the configuration.
+    /// A motor without a drive, for use with a separate [`Drive`](motorlink_proto::rmd::Drive). The
+    /// error is that of [`RmdConfig::check`].
     pub fn new(config: RmdConfig) -> Result<Self, OutOfRange> {
         config.check()?;
         let plant = Plant::new(config.plant);
@@ -90,13 +91,13 @@ impl RmdMotor {
         Ok(motor)
     }
 
-    /// Starts to count turns anew, as an encoder does that only knows its place in the turn.
+    /// Resets the turn counter, as an encoder that only knows its position in the turn.
     pub fn power_on(&mut self) {
         let turn = 1 << self.config.plant.encoder.bits;
         self.origin = self.plant.counts() & -turn;
     }
 
-    /// What the motor and its drive are built from.
+    /// The configuration of the motor and its drive.
     pub const fn config(&self) -> &RmdConfig {
         &self.config
     }
@@ -106,32 +107,32 @@ impl RmdMotor {
         &self.plant
     }
 
-    /// The same, to change the supply, the load and the temperature.
+    /// The same, mutable, to change the supply, the load and the temperature.
     pub const fn plant_mut(&mut self) -> &mut Plant {
         &mut self.plant
     }
 
-    /// How often the ROM was written: what to keep on disk has changed when this has.
+    /// Number of ROM writes. If it changed, the stored ROM must be saved.
     pub const fn rom_writes(&self) -> u32 {
         self.rom_writes
     }
 
-    /// Lets faults happen once.
+    /// Injects faults that happen once.
     pub const fn inject(&mut self, faults: Errors) {
         self.injected = self.injected.union(faults);
     }
 
-    /// Keeps these faults present from outside, beside those that are kept already.
+    /// Holds these faults, in addition to those already held.
     pub const fn hold_faults(&mut self, faults: Errors) {
         self.held = self.held.union(faults);
     }
 
-    /// Ends that for these faults.
+    /// Releases these held faults.
     pub const fn release_faults(&mut self, faults: Errors) {
         self.held = self.held.without(faults);
     }
 
-    /// What is really going on.
+    /// The true state.
     pub fn truth(&self) -> Truth {
         Truth {
             plant: self.plant.truth(),
@@ -144,10 +145,10 @@ impl RmdMotor {
     }
 }
 
-/// What happens by itself.
+/// The simulation.
 impl RmdMotor {
-    /// A period of the plant's configuration; whether the loops for speed and position took a step.
-    /// [`RmdNode`](super::RmdNode) does this by itself.
+    /// Executes one period of the plant. Returns whether the loops for speed and position took a
+    /// step. [`RmdNode`](super::RmdNode) calls this itself.
     pub fn step(&mut self) -> bool {
         let bridge = match self.mode {
             Mode::Off => Bridge::Off,
@@ -223,7 +224,7 @@ impl RmdMotor {
         own.map_or(most, |own| own.min(most))
     }
 
-    /// A position command held within Max Angle.
+    /// A position command limited to Max Angle.
     fn within_max_angle(&self, target: i64) -> i64 {
         let Some(most) = limit(self.config.max_angle_degrees) else { return target };
         let most = angle::position(most.to_radians()) >> self.plant.finer_bits();
@@ -271,7 +272,7 @@ impl MotorControl for RmdMotor {
         let digit = self.config.plant.sensing.full_scale / 32767.0;
         let amps = |sample: i16| PhaseCurrent::from_amps((f32::from(sample) * digit).into());
         let (phase_a, phase_b) = (amps(sample.a), amps(sample.b));
-        // Two sensors; the third current is what makes the sum zero.
+        // There are two sensors; the third current makes the sum zero.
         let phase_c = PhaseCurrent(phase_a.0.saturating_add(phase_b.0).saturating_neg());
         let iq = if self.mode == Mode::Off { 0.0 } else { self.current.iq() };
         let faults = self.faults();

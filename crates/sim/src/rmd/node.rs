@@ -7,7 +7,7 @@ use motorlink_proto::time::{Instant, Micros};
 use super::{RmdConfig, RmdMotor};
 use crate::clock::Clock;
 
-/// An RMD motor with the drive that answers for it.
+/// An RMD motor with its drive.
 #[derive(Debug, Clone)]
 pub struct RmdNode {
     drive: Drive,
@@ -16,7 +16,7 @@ pub struct RmdNode {
 }
 
 impl RmdNode {
-    /// A motor that is powered on `now` with this ROM; `None` where [`RmdConfig::check`] refuses
+    /// A motor that is powered on at `now` with this ROM; `None` if [`RmdConfig::check`] refuses
     /// the configuration. A new ROM is [`RmdConfig::factory_rom`].
     pub fn new(now: Instant, config: RmdConfig, rom: Settings) -> Option<Self> {
         let motor = RmdMotor::new(config).ok()?;
@@ -28,7 +28,7 @@ impl RmdNode {
         Some(node)
     }
 
-    /// The ID that the motor answers to.
+    /// The ID of the motor.
     pub const fn id(&self) -> MotorId {
         self.drive.config.id
     }
@@ -38,24 +38,24 @@ impl RmdNode {
         &self.drive
     }
 
-    /// The motor, to look at.
+    /// The motor.
     pub const fn motor(&self) -> &RmdMotor {
         &self.motor
     }
 
-    /// The motor, to change the world around it.
+    /// The motor, to change its environment.
     pub const fn motor_mut(&mut self) -> &mut RmdMotor {
         &mut self.motor
     }
 
-    /// Takes the drive's power away and gives it back: settings come from ROM, turns are forgotten,
-    /// the motor is off. The rotor keeps its motion, the world what was set.
+    /// Cycles the drive's power: settings come from ROM, the turn counter is reset, the motor is
+    /// off. The rotor's motion and the environment do not change.
     pub fn power_cycle(&mut self, now: Instant) {
         self.motor.power_on();
         self.drive.power_on(now, &mut self.motor);
     }
 
-    /// Lets time pass until `now`.
+    /// Simulates until `now`.
     pub(super) fn advance_to(&mut self, now: Instant) {
         for end in self.clock.steps_until(now) {
             if self.motor.step() {

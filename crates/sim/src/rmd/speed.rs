@@ -1,4 +1,4 @@
-//! Speed from an encoder: the difference of two readings, which is whole counts, through a low pass.
+//! Speed from an encoder: the difference of two readings, in whole counts, through a low pass.
 
 use core::f32::consts::TAU;
 
@@ -8,7 +8,7 @@ use crate::plant::Plant;
 const CORNER: f32 = 1000.0;
 /// Corner of the low pass of the speed that hosts read, rad/s.
 const SHOWN_CORNER: f32 = 50.0;
-/// What is no speed any more, rad/s.
+/// Speeds below this are 0, rad/s.
 const NOTHING: f32 = 1e-3;
 
 #[derive(Debug, Clone)]
@@ -17,7 +17,7 @@ pub(super) struct Speedometer {
     last: i64,
     /// Speed of a count per reading, rad/s.
     count: f32,
-    /// Share of a new speed in the filtered ones.
+    /// Weight of a new speed in the filtered ones.
     new: f32,
     shown_new: f32,
     speed: f32,
@@ -25,7 +25,7 @@ pub(super) struct Speedometer {
 }
 
 impl Speedometer {
-    /// For a plant that is read every `dt` (s).
+    /// For a plant that is sampled every `dt` (s).
     pub(super) fn new(plant: &Plant, dt: f32) -> Self {
         Speedometer {
             last: plant.counts(),
@@ -50,7 +50,7 @@ impl Speedometer {
         self.shown += (now - self.shown) * self.shown_new;
     }
 
-    /// Share of a new speed in the low pass of [`speed`](Self::speed).
+    /// Weight of a new speed in the low pass of [`speed`](Self::speed).
     pub(super) fn new_share(&self) -> f32 {
         self.new
     }

@@ -1,4 +1,4 @@
-//! What a motor and its drive are built from.
+//! The configuration of a motor and its drive.
 
 use motorlink_proto::st::register::{Feature, Features};
 use motorlink_proto::st::{REVUP_PHASES, RevupPhase};
@@ -8,8 +8,8 @@ use super::scale::{Scale, s16};
 use crate::plant::{OutOfRange, PlantConfig, range};
 use crate::preset;
 
-/// A motor with its drive. The default is a mains-fed motor without sensor, with everything that
-/// such a build can have; [`servo`](Self::servo) is its counterpart.
+/// A motor with its drive. The default is a mains-fed motor without position sensor, with all
+/// features of such a build. [`servo`](Self::servo) has the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -17,31 +17,30 @@ use crate::preset;
     serde(default, deny_unknown_fields)
 )]
 pub struct MotorConfig {
-    /// The motor and what surrounds it. The firmware knows its values, as it would from the
-    /// design, and takes the voltage of its source as the nominal bus voltage; with PFC that is the
-    /// mains' peak.
+    /// The motor and its environment. The firmware knows these values, as from the design. The
+    /// nominal bus voltage is that of its source; with PFC it is the mains' peak.
     pub plant: PlantConfig,
-    /// What the firmware is built with.
+    /// The firmware's build options.
     pub build: BuildConfig,
     /// Faults.
     pub thresholds: ThresholdConfig,
-    /// Lengths of states.
+    /// Durations of states.
     pub durations: DurationConfig,
     /// Registers at power-on.
     pub registers: Registers,
     /// The rev-up table at power-on.
     pub revup: [RevupConfig; REVUP_PHASES as usize],
-    /// Greatest current of the motor, amplitude, A.
+    /// Maximum current of the motor, amplitude, A.
     pub rated_current: f32,
-    /// Greatest current that the PFC takes from the mains, effective, A.
+    /// Maximum current of the PFC from the mains, effective, A.
     pub pfc_current: f32,
     /// Current that aligns the rotor, A.
     pub alignment_current: f32,
-    /// What the board takes from the bus for itself, W.
+    /// Power of the board from the bus, W.
     pub standby_power: f32,
-    /// Speed to go to when a motor starts before any command, rpm.
+    /// Target speed of a start before any command, rpm.
     pub target_speed_rpm: i32,
-    /// How long the ramp to it takes, ms.
+    /// Duration of the ramp to it, ms.
     pub target_duration_ms: u16,
 }
 
@@ -51,11 +50,11 @@ impl Default for MotorConfig {
     }
 }
 
-/// A drive: its name in files, and what it is.
+/// A drive: its name in files, and its configuration.
 pub type MotorPreset = (&'static str, fn() -> MotorConfig);
 
 impl MotorConfig {
-    /// Every drive that has a name, the default first.
+    /// All named drives. The first one is the default.
     pub const PRESETS: [MotorPreset; 4] = [
         ("mains", MotorConfig::mains),
         ("servo", MotorConfig::servo),
@@ -63,8 +62,8 @@ impl MotorConfig {
         ("drone", MotorConfig::drone),
     ];
 
-    /// A 325 V [servo motor](preset::mains) without sensor; observer with PLL, flux weakening,
-    /// feed-forward, PFC, DAC, and a brake chopper.
+    /// A 325 V [servo motor](preset::mains) without position sensor; observer with PLL, flux
+    /// weakening, feed-forward, PFC, DAC, and a brake chopper.
     pub fn mains() -> Self {
         let plant = preset::mains();
         MotorConfig {
@@ -83,8 +82,8 @@ impl MotorConfig {
         }
     }
 
-    /// The 24 V [motor of ST's kits](preset::shinano) without sensor; observer with PLL, flux
-    /// weakening, feed-forward and DAC.
+    /// The 24 V [motor of ST's kits](preset::shinano) without position sensor; observer with PLL,
+    /// flux weakening, feed-forward and DAC.
     pub fn shinano() -> Self {
         let plant = preset::shinano();
         MotorConfig {
@@ -112,8 +111,8 @@ impl MotorConfig {
         }
     }
 
-    /// The motor of [`shinano`](Self::shinano) with an encoder, CORDIC observer and position
-    /// control, and a brake chopper; without what else the default has.
+    /// The motor of [`shinano`](Self::shinano) with an encoder, CORDIC observer, position control
+    /// and a brake chopper, without the other features of the default.
     pub fn servo() -> Self {
         let shinano = MotorConfig::shinano();
         MotorConfig {
@@ -159,13 +158,12 @@ impl MotorConfig {
         }
     }
 
-    /// What a bench without configuration has: two motors between which every feature is there once
-    /// and missing once.
+    /// The default bench: two motors. Each feature is present in one and missing in the other.
     pub fn demo() -> [Self; 2] {
         [Self::mains(), Self::servo()]
     }
 
-    /// Refuses what cannot be simulated.
+    /// Refuses a configuration that cannot be simulated.
     pub fn check(&self) -> Result<(), OutOfRange> {
         const ANY: f32 = 1e6;
         self.plant.check()?;
@@ -185,7 +183,7 @@ impl MotorConfig {
         range::check(self.revup.iter().map(|phase| ("revup.current", phase.current, -1e3, 1e3)))
     }
 
-    /// The rev-up table as it travels.
+    /// The rev-up table in wire units.
     pub(super) fn revup_phases(&self, scale: &Scale) -> [RevupPhase; REVUP_PHASES as usize] {
         self.revup.map(|phase| RevupPhase {
             speed_rpm: phase.speed_rpm,
@@ -195,8 +193,8 @@ impl MotorConfig {
     }
 }
 
-/// A rev-up that pulls the rotor to the field in `phase_ms`, speeds up to `speed_rpm` in twice that
-/// time, and stays there for 100 ms.
+/// A rev-up that aligns the rotor in `phase_ms`, accelerates to `speed_rpm` in twice that time, and
+/// stays at this speed for 100 ms.
 const fn revup(current: f32, speed_rpm: i32, phase_ms: u16) -> [RevupConfig; 5] {
     const fn phase(speed_rpm: i32, current: f32, duration_ms: u16) -> RevupConfig {
         RevupConfig { speed_rpm, current, duration_ms }
@@ -210,7 +208,7 @@ const fn revup(current: f32, speed_rpm: i32, phase_ms: u16) -> [RevupConfig; 5] 
     ]
 }
 
-/// What the firmware is built with; registers that need something else do not exist.
+/// The firmware's build options. Registers of missing features do not exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -222,7 +220,7 @@ pub struct BuildConfig {
     pub observer_pll: bool,
     /// State observer with CORDIC.
     pub observer_cordic: bool,
-    /// Encoder or Hall sensors; without, the motor revs up.
+    /// Encoder or Hall sensors. Without them the motor revs up.
     pub position_sensor: bool,
     /// Flux weakening.
     pub flux_weakening: bool,
@@ -252,7 +250,7 @@ impl Default for BuildConfig {
 }
 
 impl BuildConfig {
-    /// The same as the slave wants it.
+    /// The same as a set for the slave.
     pub fn features(&self) -> Features {
         [
             (self.observer_pll, Feature::ObserverPll),
@@ -270,7 +268,7 @@ impl BuildConfig {
     }
 }
 
-/// When a fault is present.
+/// Thresholds of faults.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -284,9 +282,9 @@ pub struct ThresholdConfig {
     pub under_voltage: f32,
     /// OVER_TEMP above this heatsink temperature, °C.
     pub over_temperature: f32,
-    /// How far the heatsink must cool below it for the fault to go, K.
+    /// Hysteresis: the fault ends when the heatsink is this much below the threshold, K.
     pub temperature_hysteresis: f32,
-    /// BREAK_IN when a phase's current is beyond this, A: a comparator that switches the bridge off.
+    /// BREAK_IN when a phase's current exceeds this, A: a comparator switches the bridge off.
     pub over_current: f32,
 }
 
@@ -302,7 +300,7 @@ impl Default for ThresholdConfig {
     }
 }
 
-/// How long the states last, ms. One that is not here lasts one or as long as its cause.
+/// Durations of states, ms. Other states last one millisecond, or as long as their cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",

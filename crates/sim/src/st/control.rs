@@ -1,4 +1,4 @@
-//! References and regulators: from what was commanded to an Iq reference.
+//! References and regulators: from a command to an Iq reference.
 
 use motorlink_proto::st::{ControlMode, CurrentReference, PositionMove, Ramp, TorqueRamp};
 
@@ -12,7 +12,7 @@ const DT: f32 = 1e-3;
 /// Divisor of the position regulator's gains.
 const POSITION_DIVISOR: f32 = 16.0;
 
-/// What a command asks for in RUN.
+/// The task of a command in RUN.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Task {
     Speed,
@@ -20,20 +20,20 @@ enum Task {
     Position,
 }
 
-/// What the regulators need to know of the motor.
+/// The measured values that the regulators need.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Feedback {
     pub(super) speed_rpm: f32,
-    /// From the aligned zero, 2^32 a turn.
+    /// Position from the aligned zero, 2^32 a turn.
     pub(super) position: i64,
-    /// Greatest Iq now, s16A.
+    /// Maximum Iq now, s16A.
     pub(super) most_iq: f32,
 }
 
 #[derive(Debug, Clone)]
 pub(super) struct Control {
     mode: ControlMode,
-    /// What was commanded last; a start does it again, with the values below.
+    /// The last command. A start executes it again, with the values below.
     task: Task,
     ramp: Ramp,
     torque_ramp: TorqueRamp,
@@ -79,7 +79,7 @@ impl Control {
         (self.task, self.target) = (Task::Position, target);
     }
 
-    /// Begins to do what was commanded last.
+    /// Starts to execute the last command.
     pub(super) fn execute(&mut self, max_speed: i32, position: i64) {
         self.path = None;
         match self.task {
@@ -127,7 +127,7 @@ impl Control {
         iq
     }
 
-    /// Follows what something else does, so that taking over is smooth: speed in rpm, Iq in s16A.
+    /// Follows another controller, for a smooth takeover: speed in rpm, Iq in s16A.
     pub(super) fn follow(&mut self, speed_rpm: f32, iq: f32) {
         self.iq.set(iq);
         self.preset(speed_rpm, iq);
@@ -138,8 +138,8 @@ impl Control {
         self.regulator = Regulator::starting_at(iq);
     }
 
-    /// Writes CONTROL_MODE: what the motor does now goes on in the other mode. A value that is no
-    /// mode is ignored.
+    /// Writes CONTROL_MODE: the present motion continues in the other mode. An unknown mode is
+    /// ignored.
     pub(super) fn set_mode(&mut self, mode: ControlMode) {
         let task = match (mode, self.task) {
             (ControlMode::Torque, _) => Task::Torque,
@@ -154,7 +154,7 @@ impl Control {
         self.stop_ramp();
     }
 
-    /// The mode that was asked for last, by whatever command.
+    /// The mode of the last command, whatever the command.
     pub(super) fn requested_mode(&self) -> ControlMode {
         match self.task {
             Task::Torque => ControlMode::Torque,
@@ -189,7 +189,7 @@ impl Control {
         (self.task == Task::Torque).then_some(currents)
     }
 
-    /// Whether the motor shall turn backwards.
+    /// Whether the commanded direction is backwards.
     pub(super) fn backwards(&self) -> bool {
         match self.task {
             Task::Speed => self.ramp.speed_rpm < 0,
@@ -198,18 +198,18 @@ impl Control {
         }
     }
 
-    /// The position move under way.
+    /// The current position move.
     pub(super) fn path(&self) -> Option<&Path> {
         self.path.as_ref()
     }
 }
 
-/// A torque ramp that is over at once.
+/// A torque ramp without duration.
 pub(super) fn step_to(torque_s16a: i32) -> TorqueRamp {
     TorqueRamp { torque_s16a, duration_ms: 0 }
 }
 
-/// A value that goes to another in a straight line, a step a millisecond.
+/// A value that moves to another in a straight line, one step per millisecond.
 #[derive(Debug, Clone, Copy, Default)]
 struct Slope {
     value: f32,
@@ -242,7 +242,7 @@ impl Slope {
     }
 }
 
-/// A move to a position that begins and ends at rest, without a jerk.
+/// A move to a position that starts and ends at rest, without a jerk.
 #[derive(Debug, Clone)]
 pub(super) struct Path {
     start: i64,
@@ -287,7 +287,7 @@ impl Path {
         angle::radians(length) * rate + correction / POSITION_DIVISOR
     }
 
-    /// Share of the way that should be done by now, and its growth per second.
+    /// Planned fraction of the way now, and its change per second.
     fn progress(&self) -> (f32, f32) {
         let t = self.elapsed / self.duration;
         if t < 1.0 {

@@ -1,4 +1,4 @@
-//! The drive: motors behind one slave.
+//! The drive: the motors of one slave.
 
 use motorlink_proto::st::{
     Command, CurrentReference, ErrorCode, Features, MotorControl, MotorNumber, PositionMove, Ramp,
@@ -8,7 +8,7 @@ use motorlink_proto::time::{Instant, Micros};
 
 use super::{MotorConfig, StMotor};
 
-/// An ST drive with its motors, kept in an array or a vector.
+/// An ST drive with its motors, stored in an array or a vector.
 #[derive(Debug, Clone)]
 pub struct StDrive<M> {
     motors: M,
@@ -24,14 +24,14 @@ impl StDrive<[StMotor; 2]> {
 }
 
 impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
-    /// A drive that is powered on `now`; `None` unless it has 1 to 7 motors.
+    /// A drive that is powered on at `now`; `None` unless it has 1 to 7 motors.
     pub fn new(now: Instant, motors: M) -> Option<Self> {
         let count = motors.as_ref().len();
         let fits = (1..=usize::from(MotorNumber::MAX)).contains(&count);
         fits.then(|| StDrive { motors, now })
     }
 
-    /// The last motor, whose number is how many there are.
+    /// The last motor. Its number is the number of motors.
     pub fn last(&self) -> MotorNumber {
         let count = self.motors.as_ref().len();
         u8::try_from(count).ok().and_then(MotorNumber::new).expect("a drive has 1 to 7 motors")
@@ -42,19 +42,19 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StDrive<M> {
         &self.motors
     }
 
-    /// A motor, to change the world around it; `None` when the drive has none of this number.
+    /// A motor, to change its environment; `None` if the drive does not have this number.
     pub fn motor_mut(&mut self, motor: MotorNumber) -> Option<&mut StMotor> {
         self.motors.as_mut().get_mut(motor.index())
     }
 
-    /// Lets time pass until `now`.
+    /// Simulates until `now`.
     pub fn advance_to(&mut self, now: Instant) {
         let passed = now.since(self.now).0;
         self.now += Micros(passed);
         self.motors.as_mut().iter_mut().for_each(|motor| motor.advance(passed));
     }
 
-    /// Takes the drive's power away and gives it back; see [`StMotor::power_cycle`].
+    /// Cycles the drive's power; see [`StMotor::power_cycle`].
     pub fn power_cycle(&mut self) {
         self.motors.as_mut().iter_mut().for_each(StMotor::power_cycle);
     }

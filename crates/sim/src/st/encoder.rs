@@ -1,4 +1,5 @@
-//! Speed from an encoder: a tracking filter, since the difference of two readings is whole counts.
+//! Speed from an encoder: a tracking filter, because the difference of two readings is in whole
+//! counts.
 //!
 //! An α-β filter (see E. Brookner, *Tracking and Kalman Filtering Made Easy*) with both poles at
 //! `e^(−ω T)`: `α = 1 − p²`, `β = (1 − p)²`.
@@ -9,9 +10,9 @@ use crate::angle;
 const DT: f32 = 1e-3;
 /// Both poles: 600 rad/s.
 const POLE: f32 = 0.548_811_6;
-/// Share of an error that the position takes.
+/// Weight of an error in the position.
 const ALPHA: f32 = 1.0 - POLE * POLE;
-/// Share of an error that the speed takes.
+/// Weight of an error in the speed.
 const BETA: f32 = (1.0 - POLE) * (1.0 - POLE);
 
 #[derive(Debug, Clone, Default)]

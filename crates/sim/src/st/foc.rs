@@ -7,8 +7,9 @@
 //! ```
 //!
 //! (W. Leonhard, *Control of Electrical Drives*.) The voltage acts in the period after the one that
-//! has just begun, so it is turned to where the rotor is in the middle of that one, one and a half
-//! periods on. What the dead time takes is added, by the direction of the currents that shall flow.
+//! has just started. So it is rotated to the rotor's position in the middle of that period, one and
+//! a half periods later. The voltage lost in the dead time is added, by the direction of the
+//! current references.
 
 use super::Registers;
 use super::scale::{FULL, Scale, divisor};
@@ -16,7 +17,7 @@ use crate::control::{Gains, Regulator, limit_to_circle};
 use crate::plant::{Bridge, PlantConfig};
 use crate::vector::{INVERSE_SQRT_3, Vector};
 
-/// Share of the voltage that the d axis may take before q.
+/// Maximum share of the voltage for the d axis, before q.
 const FLUX_SHARE: f32 = 0.95;
 
 #[derive(Debug, Clone)]
@@ -33,9 +34,9 @@ pub(super) struct Foc {
     cross_d: f32,
     cross_q: f32,
     back_emf: f32,
-    /// s16V of the nominal bus per s16V of the present one.
+    /// s16V of the nominal bus per s16V of the present bus.
     bus: f32,
-    /// How far the rotor turns in one and a half periods.
+    /// Rotation of the rotor in one and a half periods.
     ahead: Vector,
     /// References: d and q, s16A.
     pub(super) reference: Vector,
@@ -45,11 +46,11 @@ pub(super) struct Foc {
     pub(super) current: Vector,
     /// d and q, s16V.
     pub(super) voltage: Vector,
-    /// Regulators' part of it.
+    /// The part of the regulators.
     pub(super) regulated: Vector,
-    /// d and q before the circle, s16V: what flux weakening looks at.
+    /// d and q before the circle limit, s16V: the input of flux weakening.
     pub(super) wish: Vector,
-    /// What was given to the bridge last, in the stator's frame, s16V.
+    /// The last command to the bridge, in the stator's frame, s16V.
     pub(super) stator_voltage: Vector,
 }
 
@@ -77,14 +78,14 @@ impl Foc {
         }
     }
 
-    /// Begins without current and voltage.
+    /// Starts without current and voltage.
     pub(super) fn begin(&mut self) {
         (self.d, self.q) = (Regulator::default(), Regulator::default());
         self.reference = Vector::ZERO;
         self.stop();
     }
 
-    /// Nothing flows any more, as far as the firmware measures it.
+    /// Sets the measured currents to 0.
     pub(super) fn stop(&mut self) {
         self.stator_current = Vector::ZERO;
         self.current = Vector::ZERO;
@@ -94,7 +95,7 @@ impl Foc {
         self.stator_voltage = Vector::ZERO;
     }
 
-    /// Takes the gains of the registers.
+    /// Loads the gains from the registers.
     pub(super) fn tune(&mut self, registers: &Registers) {
         let divisors = [divisor::CURRENT_KP, divisor::CURRENT_KI, divisor::CURRENT_KP];
         let Registers { torque_kp, torque_ki, torque_kd, .. } = *registers;
@@ -103,14 +104,14 @@ impl Foc {
         self.d_gains = Gains::new([flux_kp, flux_ki, flux_kd], divisors);
     }
 
-    /// Takes what changes slowly: the bus per nominal bus, and the electrical turn of a period,
-    /// 2^32 a turn.
+    /// Updates the slowly changing values: the bus voltage per nominal bus voltage, and the
+    /// electrical rotation per period, 2^32 a turn.
     pub(super) fn adapt(&mut self, bus: f32, step: i32) {
         self.bus = bus;
         self.ahead = Vector::unit(step.wrapping_add(step / 2) as u32);
     }
 
-    /// Takes the constants of the feed-forward at a speed, s16speed, or none.
+    /// Updates the feed-forward for a speed, s16speed; `None` disables it.
     pub(super) fn feed_forward(&mut self, registers: Option<&Registers>, speed: f32) {
         let Some(registers) = registers else {
             (self.cross_d, self.cross_q, self.back_emf) = (0.0, 0.0, 0.0);
@@ -123,7 +124,7 @@ impl Foc {
         self.cross_q = speed * registers.ff_1q as f32 * (1.0 / 32768.0);
         self.back_emf = speed * registers.ff_2 as f32;
         if before == Vector::ZERO {
-            // It begins: the regulators did all of it until now.
+            // At its start the regulators have produced all of the voltage so far.
             let forward = self.forward();
             self.d.set_integral(self.d.integral() - forward.x);
             self.q.set_integral(self.q.integral() - forward.y);
@@ -137,8 +138,8 @@ impl Foc {
         Vector::new(self.cross_d * iq, self.cross_q * id + self.back_emf)
     }
 
-    /// The frame in which the references and regulators live turns by `turn` at once; what they do
-    /// to the motor stays.
+    /// Rotates the frame of the references and regulators by `turn` at once. Their effect on the
+    /// motor does not change.
     pub(super) fn change_frame(&mut self, turn: Vector) {
         self.reference = self.reference.seen_from(turn);
         let integral = Vector::new(self.d.integral(), self.q.integral()).seen_from(turn);
@@ -146,13 +147,13 @@ impl Foc {
         self.q.set_integral(integral.y);
     }
 
-    /// The voltage that acts in the period that begins, s16V of the nominal bus.
+    /// The voltage of the period that starts, s16V of the nominal bus.
     #[inline]
     pub(super) fn acting(&self) -> Vector {
         self.stator_voltage * self.bus
     }
 
-    /// A period, with the rotor in `frame` at its beginning.
+    /// Executes a period. `frame` is the rotor's frame at its start.
     #[inline]
     pub(super) fn step(&mut self, measured: Vector, frame: Vector) -> Bridge {
         self.stator_current = measured;

@@ -1,4 +1,4 @@
-//! A drive with ST's Motor Control Protocol: one to seven motors behind one serial line.
+//! A drive with ST's Motor Control Protocol: one to seven motors on one serial line.
 //!
 //! The drive's firmware runs on the [plant](crate::plant): currents, observers and the over-current
 //! comparator each period of the pulse width modulation, everything else each millisecond.

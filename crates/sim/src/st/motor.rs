@@ -24,19 +24,19 @@ const SLOW_US: u32 = 1000;
 pub struct StMotor {
     pub(super) config: MotorConfig,
     pub(super) plant: Plant,
-    /// Faults that something outside holds.
+    /// Faults that are held from outside.
     pub(super) held: u16,
     pub(super) firmware: Firmware,
-    /// Time that has passed but makes no whole period, µs.
+    /// Elapsed time of less than a period, µs.
     pub(super) rest_us: u64,
 }
 
-/// Where the frame of the current control comes from.
+/// The source of the current control's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Frame {
-    /// Nowhere: the bridge is off.
+    /// None: the bridge is off.
     Off,
-    /// Forced, whatever the rotor does.
+    /// A forced frame, independent of the rotor.
     Forced,
     /// The encoder.
     Encoder,
@@ -44,13 +44,13 @@ pub(super) enum Frame {
     Observed,
 }
 
-/// What a power cycle sets back.
+/// The state that a power cycle resets.
 #[derive(Debug, Clone)]
 pub(super) struct Firmware {
     pub(super) status: Status,
     /// Steps in this state, ms.
     pub(super) elapsed: u32,
-    /// Faults that happened since the last step.
+    /// Faults since the last step.
     pub(super) events: u16,
     pub(super) occurred: u16,
     pub(super) present: u16,
@@ -64,10 +64,10 @@ pub(super) struct Firmware {
     pub(super) cordic: Option<Observer>,
     pub(super) tracker: Tracker,
     pub(super) frame: Frame,
-    /// Electrical angle of the forced frame, 2^32 a turn, and its turn in a period.
+    /// Electrical angle of the forced frame, 2^32 a turn, and its change per period.
     pub(super) forced: u32,
     pub(super) forced_step: i32,
-    /// Samples of both currents without current: their sums, how many, and what came of them.
+    /// Samples of both currents without current: sums, number, and the resulting offsets.
     pub(super) offset_sum: Vector,
     pub(super) offset_count: u32,
     pub(super) offset: Vector,
@@ -78,9 +78,9 @@ pub(super) struct Firmware {
     pub(super) weakening: Regulator,
     pub(super) aligned: bool,
     pub(super) starting: bool,
-    /// Position of the encoder that the alignment made zero, 2^32 a turn.
+    /// Encoder position of the aligned zero, 2^32 a turn.
     pub(super) zero: i64,
-    /// How long the rotor has been stuck, and seen or not seen by the observer, ms.
+    /// Time for which the rotor was stuck, and was or was not detected by the observer, ms.
     pub(super) stalled: u32,
     pub(super) seen: u32,
     pub(super) unseen: u32,
@@ -93,7 +93,7 @@ impl Firmware {
         let limiter = config.durations.inrush_ms > 0;
         let build = &config.build;
         let observer = |tracking| Observer::new(tracking, &config.plant, &scale);
-        // A build without sensor has an observer, whether or not its registers exist.
+        // A build without position sensor has an observer, even if its registers do not exist.
         let pll = build.observer_pll || !(build.observer_cordic || build.position_sensor);
         Firmware {
             status: if limiter { Status::IclWait } else { Status::Idle },
@@ -129,7 +129,7 @@ impl Firmware {
         }
     }
 
-    /// Goes to a state, and gives the bridge what it does there.
+    /// Enters a state, and sets the bridge accordingly.
     pub(super) fn enter(&mut self, status: Status, sensor: bool) {
         self.status = status;
         self.elapsed = 0;
@@ -151,7 +151,7 @@ impl Firmware {
         }
     }
 
-    /// Begins to drive currents.
+    /// Starts the current control.
     fn begin(&mut self) {
         self.foc.begin();
         self.weakening = Regulator::default();
@@ -163,13 +163,13 @@ impl Firmware {
         }
     }
 
-    /// The observer that the drive runs on.
+    /// The observer that the drive uses.
     pub(super) fn observer(&self) -> Option<&Observer> {
         self.pll.as_ref().or(self.cordic.as_ref())
     }
 }
 
-/// What the host commands.
+/// The host's commands.
 impl StMotor {
     pub(super) fn execute(&mut self, command: Command) {
         let status = self.firmware.status;
@@ -229,7 +229,7 @@ impl StMotor {
         self.torque(step_to(iq_s16a.into()), id_s16a);
     }
 
-    /// An angle that is no number is not gone to.
+    /// An angle that is NaN or infinite is ignored.
     pub(super) fn position(&mut self, target: PositionMove) {
         if target.angle_rad.is_finite() {
             self.firmware.control.command_position(target);
@@ -245,9 +245,9 @@ impl StMotor {
     }
 }
 
-/// What happens by itself, each period.
+/// The simulation of a period.
 impl StMotor {
-    /// Lets time pass, µs.
+    /// Simulates for a time, µs.
     pub(super) fn advance(&mut self, us: u64) {
         let period = u64::from(self.config.plant.period_us);
         self.rest_us += us;
@@ -280,7 +280,7 @@ impl StMotor {
         }
     }
 
-    /// Takes samples of no current while the sensors are calibrated.
+    /// Samples the currents without current while the sensors are calibrated.
     fn sample_offsets(&mut self) {
         let firmware = &mut self.firmware;
         if matches!(firmware.status, Status::OffsetCalib | Status::AlignOffsetCalib) {
@@ -317,7 +317,7 @@ impl StMotor {
         firmware.foc.step(current, rotor)
     }
 
-    /// The comparator: switches the bridge off when a phase's current is too high.
+    /// The comparator: switches the bridge off if a phase's current is too high.
     #[inline]
     fn compare_currents(&mut self) {
         let most = self.config.thresholds.over_current;

@@ -35,25 +35,25 @@ use crate::control::within;
 use crate::plant::PlantConfig;
 use crate::vector::Vector;
 
-/// Share of the way to a new value that the speed goes in a millisecond.
+/// Weight of a new value in the speed, per millisecond.
 const SMOOTHING: f32 = 0.3;
-/// Share of a new square in the mean of squares.
+/// Weight of a new square in the mean of squares.
 const MEMORY: f32 = 1.0 / 16.0;
-/// Greatest variation of the speed from one millisecond to the next, as a share of it.
+/// Maximum variation of the speed from one millisecond to the next, relative.
 const VARIATION: f32 = 0.1;
-/// How far the back-EMF's square may be from what is expected, as a share of it.
+/// Maximum difference of the back-EMF's square from the expected value, relative.
 const TOLERANCE: f32 = 0.6;
-/// How much of the back-EMF the current's error may show to be missed, as a share.
+/// Maximum fraction of the back-EMF that the current's error shows as missed.
 const MISSED: f32 = 0.4;
-/// Greatest square of a voltage that is kept, so that a mean with it is a number, s16V².
+/// Upper limit of a voltage's square, so that means do not overflow, s16V².
 const MOST_MISSED: f32 = 1e12;
 /// 2^32 a turn per s16degree.
 const FINER: f32 = 65536.0;
 
-/// The fastest turn in a period that is believed: a quarter, 2^32 a turn. More is not a rotor.
+/// Maximum plausible rotation per period: a quarter turn, 2^32 a turn.
 const FASTEST: f32 = (1u32 << 30) as f32;
 
-/// How the rotor is found in the back-EMF.
+/// How the rotor is detected in the back-EMF.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Tracking {
     Pll,
@@ -63,7 +63,7 @@ pub(super) enum Tracking {
 #[derive(Debug, Clone)]
 pub(super) struct Observer {
     tracking: Tracking,
-    // What the firmware knows of the motor, in digits.
+    // The firmware's model of the motor, in digits.
     /// a.
     decay: f32,
     /// b.
@@ -84,17 +84,17 @@ pub(super) struct Observer {
     emf: Vector,
     /// î − i.
     error: Vector,
-    /// Mean square of what of the back-EMF that error shows to be missed, s16V.
+    /// Mean square of the missed back-EMF, from that error, s16V.
     missed: f32,
     /// φ, 2^32 a turn.
     angle: u32,
-    /// d axis in the middle of the last period, as long as it is found.
+    /// d axis in the middle of the last period, while the rotor is detected.
     rotor: Vector,
     /// Σ Ki ε, 2^32 a turn a period.
     integral: f32,
-    /// How far φ went since the last millisecond, 2^32 a turn.
+    /// Change of φ since the last millisecond, 2^32 a turn.
     way: f32,
-    /// The turn of a period, and half of it.
+    /// The rotation per period, and half of it.
     turn: Vector,
     half: Vector,
     sign: f32,
@@ -139,7 +139,7 @@ impl Observer {
         }
     }
 
-    /// Forgets everything, to begin with a rotor that is to turn forwards or backwards.
+    /// Resets the observer, for a rotor that will turn forwards or backwards.
     pub(super) fn begin(&mut self, backwards: bool) {
         self.current = Vector::ZERO;
         self.emf = Vector::ZERO;
@@ -151,7 +151,7 @@ impl Observer {
         self.half = self.turn;
     }
 
-    /// Takes the gains of the registers: C1, C2, PLL Kp and Ki.
+    /// Loads the gains from the registers: C1, C2, PLL Kp and Ki.
     pub(super) fn tune(&mut self, c1: i32, c2: i32, kp: i32, ki: i32) {
         const fn share(divisor: i32) -> f32 {
             1.0 / divisor as f32
@@ -162,8 +162,8 @@ impl Observer {
         self.ki = ki as f32 * (FINER * share(divisor::PLL_KI));
     }
 
-    /// A period: the current at its beginning and the voltage that acts in it, in digits of the
-    /// nominal bus.
+    /// Executes a period: the current at its start and the voltage in it, in digits of the nominal
+    /// bus.
     #[inline]
     pub(super) fn step(&mut self, measured: Vector, voltage: Vector) {
         let error = self.current - measured;
@@ -193,7 +193,7 @@ impl Observer {
         }
     }
 
-    /// The rotor's frame at the beginning of the period that was stepped last.
+    /// The rotor's frame at the start of the last period.
     #[inline]
     pub(super) fn frame(&self) -> Vector {
         let middle = match self.tracking {
@@ -203,7 +203,7 @@ impl Observer {
         middle.seen_from(self.half)
     }
 
-    /// A millisecond: the speed. `sign` is the motion's, where it is known from elsewhere.
+    /// Executes a millisecond: computes the speed. `sign` is the direction of motion, if known.
     pub(super) fn measure(&mut self, sign: Option<f32>) {
         self.current = bounded(self.current);
         let steps = core::mem::take(&mut self.way) * self.period;
@@ -211,7 +211,7 @@ impl Observer {
         self.speed += (speed - self.speed) * SMOOTHING;
         let change = speed - core::mem::replace(&mut self.last_speed, speed);
         self.variance += (change * change - self.variance) * MEMORY;
-        // What a back-EMF that is wrong by one makes of the current in the long run.
+        // The effect of an error of 1 in the back-EMF on the current, in the steady state.
         let sensitivity = (1.0 - self.decay - self.c1) / self.gain;
         let missed = (self.error.square() * sensitivity * sensitivity).min(MOST_MISSED);
         self.missed += (missed - self.missed) * MEMORY;
@@ -225,7 +225,7 @@ impl Observer {
         self.half = Vector::unit((step / 2) as u32);
     }
 
-    /// Whether the rotor is seen.
+    /// Whether the rotor is detected.
     pub(super) fn sees(&self) -> bool {
         let most = VARIATION * self.speed;
         let (expected, observed) = (self.expected_level(), self.observed_level());
@@ -254,7 +254,7 @@ impl Observer {
         self.emf
     }
 
-    /// Square of the back-EMF that the observed speed makes, s16V².
+    /// Square of the expected back-EMF at the observed speed, s16V².
     pub(super) fn expected_level(&self) -> f32 {
         let amplitude = self.back_emf * self.speed;
         amplitude * amplitude / 32768.0
@@ -266,7 +266,8 @@ impl Observer {
     }
 }
 
-/// Within ±4 full scales: an observer with wrong gains runs away, its numbers do not.
+/// Limits a vector to ±4 full scales: an observer with wrong gains diverges, but its numbers remain
+/// finite.
 fn bounded(vector: Vector) -> Vector {
     const MOST: f32 = 4.0 * FULL;
     Vector::new(vector.x.clamp(-MOST, MOST), vector.y.clamp(-MOST, MOST))

@@ -30,7 +30,7 @@ const VOLTAGE_BANDWIDTH: f32 = TAU * 10.0;
 /// Time between two steps of the voltage loop, s.
 const SLOW: f32 = 1e-3;
 
-/// Values of PFC_STATUS. The document does not list them; these are ours.
+/// Values of PFC_STATUS. The document does not list them; they are our own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum PfcState {
@@ -43,29 +43,29 @@ pub enum PfcState {
     Run = 2,
     /// The cause of a fault is present.
     FaultNow = 3,
-    /// A fault's cause is gone; it waits to be acknowledged.
+    /// The cause of a fault is gone; the fault is not acknowledged yet.
     FaultOver = 4,
 }
 
-/// Bits of PFC_FAULTS. The document does not list them; these are ours.
+/// Bits of PFC_FAULTS. The document does not list them; they are our own.
 pub mod fault {
-    /// The mains are below seven tenths of what they should be.
+    /// The mains are below seven tenths of their nominal voltage.
     pub const MAINS_LOW: u16 = 0x01;
-    /// The mains' peak is above the bus voltage to keep.
+    /// The mains' peak is above the reference of the bus voltage.
     pub const MAINS_HIGH: u16 = 0x02;
-    /// The stage's current is half as much again as its greatest.
+    /// The stage's current is 1.5 times its maximum.
     pub const OVER_CURRENT: u16 = 0x04;
-    /// The bus is 15 % above what it is to be.
+    /// The bus voltage is 15 % above its reference.
     pub const BUS_HIGH: u16 = 0x08;
 }
 
-/// Gains of both loops, as they act in a step, in digits.
+/// Gains of both loops per step, in digits.
 pub(super) struct PfcGains {
     pub(super) current: Gains,
     pub(super) voltage: Gains,
 }
 
-/// Gains for a board: see the [rules](super::tuning).
+/// The default gains of a board: see the [rules](super::tuning).
 pub(super) fn gains(plant: &PlantConfig, scale: &Scale) -> PfcGains {
     let period = f32::from(plant.period_us) * 1e-6;
     let kp = scale.resistance(CURRENT_BANDWIDTH * INDUCTANCE);
@@ -86,7 +86,7 @@ fn effective(peak: f32) -> f32 {
 pub(super) struct Pfc {
     state: PfcState,
     scale: Scale,
-    /// Digits of greatest current.
+    /// The maximum current, in digits.
     most: f32,
     /// Length of a period, s.
     period: f32,
@@ -174,8 +174,8 @@ impl Pfc {
         self.regulate(mains, bus, registers);
     }
 
-    /// One millisecond of the voltage loop; the reference rises from the mains' peak during the
-    /// start-up.
+    /// Executes one millisecond of the voltage loop. During the start-up the reference rises from
+    /// the mains' peak.
     fn regulate(&mut self, mains: f32, bus: f32, registers: &Registers) {
         if !self.enabled() {
             return;
@@ -228,7 +228,7 @@ impl Pfc {
         self.state
     }
 
-    /// PFC_FAULTS: only a stage that runs, or stopped for it, has faults.
+    /// PFC_FAULTS. Only a stage that runs, or that stopped because of a fault, has faults.
     pub(super) fn faults(&self) -> Flags {
         let faulty = self.state == PfcState::FaultNow;
         Flags::new(self.occurred, if faulty { self.present } else { 0 })

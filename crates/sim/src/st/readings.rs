@@ -1,4 +1,4 @@
-//! Registers: what a host reads and writes.
+//! Reads and writes of registers by a host.
 
 use motorlink_proto::st::register::Value;
 use motorlink_proto::st::{
@@ -20,7 +20,7 @@ fn whole(value: f32) -> i32 {
 }
 
 impl StMotor {
-    /// The value of a register, also of one that this build does not have.
+    /// The value of a register, also of one that does not exist in this build.
     pub fn read(&self, register: RegisterId) -> i32 {
         use RegisterId as R;
         let firmware = &self.firmware;
@@ -59,7 +59,7 @@ impl StMotor {
         }
     }
 
-    /// Signals of the current loop, mostly of access D; 0 for what a motor without them has.
+    /// Signals of the current loop, mostly of access D; 0 if the motor does not have them.
     fn signal(&self, register: RegisterId) -> i32 {
         use RegisterId as R;
         let firmware = &self.firmware;
@@ -94,11 +94,11 @@ impl StMotor {
         }
     }
 
-    /// What an observer shows: nothing of a motor that is not driven.
+    /// The values of an observer; 0 while the motor is not driven.
     fn observed(&self, register: RegisterId, observer: Option<&Observer>) -> i32 {
         use RegisterId as R;
         let Some(observer) = observer.filter(|_| self.powered()) else { return 0 };
-        // s16V are those of the present bus.
+        // s16V refers to the present bus voltage.
         let share = self.bus_share();
         match register {
             R::OBS_EL_ANGLE | R::OBS_CR_EL_ANGLE => observer.degrees(),
@@ -117,7 +117,7 @@ impl StMotor {
         }
     }
 
-    /// The electrical angle that the drive measures or, without a sensor, works with; s16degree.
+    /// The electrical angle that the drive measures or, without a sensor, estimates; s16degree.
     fn electrical_angle(&self) -> i32 {
         let pairs = i64::from(self.config.plant.machine.pole_pairs);
         let angle = match (self.firmware.frame, self.firmware.observer()) {
@@ -130,7 +130,7 @@ impl StMotor {
         i32::from((angle >> 16) as i16)
     }
 
-    /// Writes a register that may be written.
+    /// Writes a writable register.
     pub(super) fn write(&mut self, register: RegisterId, value: i32) -> Result<(), ErrorCode> {
         let present = CurrentReference {
             iq_s16a: self.torque_reference() as i16,
@@ -158,13 +158,13 @@ impl StMotor {
         Ok(())
     }
 
-    /// What a DAC channel, 1 or 2, shows: the value of the register that was chosen.
+    /// The output of DAC channel 1 or 2: the value of the selected register.
     pub fn dac(&self, channel: u8) -> i32 {
         let chosen = if channel == 2 { RegisterId::DAC_OUT2 } else { RegisterId::DAC_OUT1 };
         self.read(RegisterId(self.read(chosen) as u8))
     }
 
-    /// Iq reference, s16A: before a start what it will be.
+    /// Iq reference, s16A. Before a start: the reference of the start.
     fn torque_reference(&self) -> i32 {
         let control = &self.firmware.control;
         if self.running() {

@@ -1,14 +1,15 @@
-//! Registers that keep what they are given.
+//! Registers that store a written value.
 //!
-//! Gains begin as the machine needs them ([`Registers::tuned`]); the table says what the others are.
+//! The initial gains are derived from the machine ([`Registers::tuned`]); the table has the other
+//! initial values.
 
 use motorlink_proto::st::RegisterId;
 
-/// Declares the registers: id, field, value at power-on without a motor, what it is.
+/// Declares the registers: id, field, value at power-on without a motor, description.
 macro_rules! stored {
     ($( $id:ident $field:ident = $default:expr, $doc:literal; )+) => {
-        /// Registers that keep what they are given, in the units of the wire. A value that is wider
-        /// than its register loses the upper bytes on the wire.
+        /// Registers that store a written value, in wire units. On the wire, a value that is too
+        /// large for its register loses its upper bytes.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         #[cfg_attr(
             feature = "serde",
@@ -18,10 +19,10 @@ macro_rules! stored {
         pub struct Registers { $( #[doc = $doc] pub $field: i32, )+ }
 
         impl Registers {
-            /// Registers before a motor is known: no gain acts.
+            /// Registers without a motor: all gains are 0.
             pub(super) const BARE: Registers = Registers { $( $field: $default, )+ };
 
-            /// The value of a register; `None` when it is not kept here.
+            /// The value of a register; `None` if it is not stored here.
             pub(super) const fn get(&self, register: RegisterId) -> Option<i32> {
                 match register {
                     $( RegisterId::$id => Some(self.$field), )+
@@ -29,7 +30,7 @@ macro_rules! stored {
                 }
             }
 
-            /// Where a register is kept.
+            /// The storage of a register.
             pub(super) const fn slot(&mut self, register: RegisterId) -> Option<&mut i32> {
                 match register {
                     $( RegisterId::$id => Some(&mut self.$field), )+

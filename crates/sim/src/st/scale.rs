@@ -1,4 +1,4 @@
-//! Between SI units and the digits of the wire.
+//! Conversion between SI units and digits on the wire.
 
 use core::f32::consts::TAU;
 
@@ -11,7 +11,7 @@ pub(super) const FULL: f32 = 32767.0;
 pub(super) const SPEED: f32 = TAU / 10.0;
 /// The same in rpm.
 pub(super) const RPM_PER_DIGIT: f32 = 6.0;
-/// Turns rad/s into rpm.
+/// Converts rad/s to rpm.
 pub(super) const RPM: f32 = 60.0 / TAU;
 
 /// Digits per unit. Voltages are those of the nominal bus, of which 32767 is 1/√3.
@@ -51,8 +51,8 @@ pub(super) fn s16(digits: f32) -> i32 {
     i32::from(libm::roundf(digits) as i16)
 }
 
-/// What the numerators of gains are divided by. The document has registers for those of the speed
-/// regulator only.
+/// Divisors of the gains' numerators. The document has registers only for those of the speed
+/// regulator.
 pub(super) mod divisor {
     /// TORQUE_KP, FLUX_KP, TORQUE_KD and FLUX_KD.
     pub const CURRENT_KP: i32 = 1024;

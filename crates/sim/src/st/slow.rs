@@ -1,4 +1,4 @@
-//! What the firmware does each millisecond: faults, states, references.
+//! The firmware's tasks of each millisecond: faults, states, references.
 
 use core::f32::consts::TAU;
 
@@ -13,19 +13,19 @@ use crate::control::{Gains, within};
 use crate::plant::board_current;
 use crate::vector::Vector;
 
-/// Speed below which the rotor stands, rpm.
+/// Speed below which the rotor is at a standstill, rpm.
 const STANDING: f32 = 1.0;
-/// How long a rotor with encoder may be stuck in RUN, ms.
+/// Maximum time that a rotor with encoder may be stuck in RUN, ms.
 const STALL: u32 = 500;
-/// How long the observer must see the rotor before it takes over, ms.
+/// Time that the observer must detect the rotor before it takes over, ms.
 const SEEN: u32 = 20;
-/// How long the observer may miss the rotor in RUN, ms.
+/// Maximum time without detection by the observer in RUN, ms.
 const UNSEEN: u32 = 30;
-/// How far the observed speed may be from the forced one, as a share of it.
+/// Maximum difference of the observed speed from the forced one, relative.
 const SLIP: f32 = 0.15;
-/// Damping of the rotor's swing while it is aligned, with an encoder to see it.
+/// Damping of the rotor's oscillation during the alignment with an encoder.
 const ALIGNMENT_DAMPING: f32 = 0.7;
-/// Share of a new value in the mean power.
+/// Weight of a new value in the mean power.
 const POWER_SMOOTHING: f32 = 0.05;
 
 impl StMotor {
@@ -64,7 +64,7 @@ impl StMotor {
         *power = if driven { *power + (watts - *power) * POWER_SMOOTHING } else { 0.0 };
     }
 
-    /// The direction of the motion, where an observer is not left to itself.
+    /// The direction of motion, if it is known without the observer.
     fn known_sign(&self) -> Option<f32> {
         let firmware = &self.firmware;
         if self.config.build.position_sensor {
@@ -74,7 +74,7 @@ impl StMotor {
         forced.then(|| if firmware.control.backwards() { -1.0 } else { 1.0 })
     }
 
-    /// Looks for the causes of faults; a new one switches the motor off.
+    /// Checks for causes of faults. A new one switches the motor off.
     fn watch(&mut self) {
         let limits = self.config.thresholds;
         let (voltage, temperature) = (self.plant.bus_voltage(), self.plant.temperature());
@@ -99,7 +99,7 @@ impl StMotor {
         }
     }
 
-    /// Whether the rotor is not where the firmware believes.
+    /// Whether the rotor differs from the firmware's estimate.
     fn feedback_lost(&mut self) -> bool {
         let running = self.running();
         let speed = self.speed_rpm().abs();
@@ -117,7 +117,7 @@ impl StMotor {
         running && (speed > 1.2 * most || lost)
     }
 
-    /// Whether the rotor stands although it is pushed, and is not to hold a position.
+    /// Whether the rotor is at a standstill under current, without a position to hold.
     fn stuck(&self, speed: f32) -> bool {
         let least = self.firmware.registers.min_app_speed as f32;
         let current = self.firmware.foc.current.y.abs() / self.firmware.scale.ampere;
@@ -153,7 +153,7 @@ impl StMotor {
                     self.firmware.events |= Flags::START_UP;
                     return;
                 }
-                // The observer's frame takes over, and with it the vector of the forced current.
+                // The observer's frame takes over, with the vector of the forced current.
                 let observed =
                     self.firmware.observer().map_or(Vector::ZERO, |observer| observer.frame());
                 let forced = Vector::unit(self.firmware.forced);
@@ -165,14 +165,14 @@ impl StMotor {
         self.obey();
     }
 
-    /// Speed (rpm) and current (s16A) that the rev-up forces now.
+    /// Speed (rpm) and current (s16A) of the rev-up now.
     fn forced(&self) -> (f32, f32) {
         let (speed, current) = state::revup(&self.firmware.revup, self.firmware.elapsed);
         let sign = if self.firmware.control.backwards() { -1.0 } else { 1.0 };
         (sign * speed, sign * current)
     }
 
-    /// References of the current control, and what it needs to know.
+    /// Updates the references and the parameters of the current control.
     fn steer(&mut self) {
         if self.firmware.frame == Frame::Off {
             self.firmware.control.follow(0.0, 0.0);
@@ -208,7 +208,7 @@ impl StMotor {
         }
     }
 
-    /// Electrical turn in a period at a speed in rad/s, 2^32 a turn.
+    /// Electrical rotation per period at a speed in rad/s, 2^32 a turn.
     fn electrical_step(&self, speed: f32) -> i32 {
         let pairs = f32::from(self.config.plant.machine.pole_pairs);
         (speed * pairs * self.plant.period() * (TURN as f32 / TAU)) as i32
@@ -227,8 +227,8 @@ impl StMotor {
         self.firmware.seen = if found { self.firmware.seen + 1 } else { 0 };
     }
 
-    /// In the first half of its first phase the field makes a quarter turn more, so that no rotor
-    /// stays where it is not pulled to either side; in a period, 2^32 a turn.
+    /// In the first half of the first phase the field rotates a quarter turn more, so that no rotor
+    /// remains at the point without torque. Per period, 2^32 a turn.
     fn approach(&self, current: f32) -> i32 {
         let half = u32::from(self.firmware.revup[0].duration_ms) / 2;
         if self.firmware.elapsed > half {
@@ -238,8 +238,8 @@ impl StMotor {
         (0.25 * TURN as f32 / periods).copysign(current) as i32
     }
 
-    /// A current in one direction, which turns there from a quarter turn before, so that no rotor
-    /// stays where it is not pulled to either side; against the rotor's swing it gives way.
+    /// A current in one direction. It starts a quarter turn before it, so that no rotor remains at
+    /// the point without torque. It yields to the rotor's oscillation to damp it.
     fn align(&mut self) {
         let total = f32::from(self.config.durations.alignment_ms.max(1));
         let done = self.firmware.elapsed as f32 / total;
@@ -258,7 +258,7 @@ impl StMotor {
         self.firmware.control.follow(0.0, 0.0);
     }
 
-    /// The flux current of the rev-up goes, what turns the rotor stays.
+    /// The flux current of the rev-up ends; the torque current remains.
     fn switch_over(&mut self) {
         let total = u32::from(self.config.durations.switch_over_ms);
         let left = total.saturating_sub(self.firmware.elapsed);
@@ -295,7 +295,7 @@ impl StMotor {
         self.firmware.weakening.step(error, &gains, -rated, 0.0)
     }
 
-    /// What feeds the bus beside its source, and what the board takes.
+    /// The second feed of the bus, and the board's current.
     fn supply(&mut self) {
         let (source, bus) = (self.plant.supply().voltage, self.plant.bus_voltage());
         if self.config.build.pfc {
@@ -308,7 +308,7 @@ impl StMotor {
         self.plant.draw(board_current(self.config.standby_power, bus));
     }
 
-    /// Bus voltage per nominal bus voltage; at least a twentieth, so that it can be divided by.
+    /// Bus voltage per nominal bus voltage; at least a twentieth, to avoid a division by zero.
     pub(super) fn bus_share(&self) -> f32 {
         (self.plant.bus_voltage() / self.firmware.scale.nominal).max(0.05)
     }

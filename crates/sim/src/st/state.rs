@@ -1,17 +1,17 @@
-//! The state machine: which state follows which, and when.
+//! The state machine: the next state, and when it is entered.
 
 use motorlink_proto::st::{RevupPhase, Status};
 
 use super::config::DurationConfig;
 
-/// What the state machine looks at.
+/// The inputs of the state machine.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Situation<'a> {
     /// Milliseconds in this state, 1 or more.
     pub(super) elapsed: u32,
     pub(super) durations: &'a DurationConfig,
     pub(super) revup: &'a [RevupPhase],
-    /// Whether the build has a position sensor, and that sensor is not aligned.
+    /// Whether the build has a position sensor that is not aligned.
     pub(super) sensor: bool,
     pub(super) unaligned: bool,
     /// Whether the alignment is part of a start.
@@ -21,7 +21,7 @@ pub(super) struct Situation<'a> {
     pub(super) faulty: bool,
 }
 
-/// The state to go to now; `None` to stay.
+/// The next state; `None` to remain in this one.
 pub(super) fn next(status: Status, now: &Situation<'_>) -> Option<Status> {
     let over = |duration: u16| now.elapsed >= u32::from(duration);
     let durations = now.durations;
@@ -55,7 +55,7 @@ pub(super) fn next(status: Status, now: &Situation<'_>) -> Option<Status> {
     done.then_some(next)
 }
 
-/// Whether a stop changes anything in this state: on the way to RUN or to alignment, or there.
+/// Whether a stop has an effect in this state: in RUN and alignment, and in the states before them.
 pub(super) fn stoppable(status: Status) -> bool {
     use Status::*;
     let starting = matches!(status, IdleStart | ChargeBootCap | OffsetCalib | Clear | Start);
@@ -71,8 +71,8 @@ fn revup_duration(phases: &[RevupPhase]) -> u32 {
     phases.iter().map(|phase| u32::from(phase.duration_ms)).sum()
 }
 
-/// Speed (rpm) and current (s16A) that the rev-up forces after `elapsed` ms: straight lines from
-/// phase to phase, from rest and without current.
+/// Speed (rpm) and current (s16A) of the rev-up after `elapsed` ms: straight lines from phase to
+/// phase, from 0.
 pub(super) fn revup(phases: &[RevupPhase], elapsed: u32) -> (f32, f32) {
     let (mut speed, mut current, mut begin) = (0.0, 0.0, 0);
     for phase in phases {

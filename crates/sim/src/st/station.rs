@@ -5,7 +5,7 @@ use motorlink_proto::time::Instant;
 
 use super::{StDrive, StMotor};
 
-/// A slave and the drive behind it: bytes in, bytes out.
+/// A slave and its drive: bytes in, bytes out.
 #[derive(Debug, Clone)]
 pub struct StStation<M> {
     slave: Slave,
@@ -13,12 +13,12 @@ pub struct StStation<M> {
 }
 
 impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StStation<M> {
-    /// Puts a slave of `profile` before the drive.
+    /// Connects a slave of `profile` to the drive.
     pub fn new(profile: Profile, drive: StDrive<M>) -> Self {
         StStation { slave: Slave::new(profile, drive.last()), drive }
     }
 
-    /// Takes bytes that came at `now` and hands each reply to `reply`.
+    /// Takes bytes received at `now` and passes each reply to `reply`.
     pub fn receive(&mut self, now: Instant, bytes: &[u8], mut reply: impl FnMut(&[u8])) {
         self.drive.advance_to(now);
         for &byte in bytes {
@@ -28,8 +28,8 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StStation<M> {
         }
     }
 
-    /// Lets time pass until `now` and hands over what a command owes that did not come whole. Call
-    /// it at [`deadline`](Self::deadline).
+    /// Simulates until `now`, and passes on the NACK for a command that was not complete in time.
+    /// Call it at [`deadline`](Self::deadline).
     pub fn poll(&mut self, now: Instant, mut reply: impl FnMut(&[u8])) {
         self.drive.advance_to(now);
         if let Some(bytes) = self.slave.poll(now) {
@@ -37,12 +37,12 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StStation<M> {
         }
     }
 
-    /// When [`poll`](Self::poll) has to be called; `None` while no command is under way.
+    /// When to call [`poll`](Self::poll); `None` between commands.
     pub fn deadline(&self) -> Option<Instant> {
         self.slave.deadline()
     }
 
-    /// Lets time pass until `now` without a word on the line.
+    /// Simulates until `now` without traffic on the line.
     pub fn advance_to(&mut self, now: Instant) {
         self.drive.advance_to(now);
     }
@@ -52,17 +52,17 @@ impl<M: AsRef<[StMotor]> + AsMut<[StMotor]>> StStation<M> {
         self.slave.profile()
     }
 
-    /// The drive, to look at.
+    /// The drive.
     pub const fn drive(&self) -> &StDrive<M> {
         &self.drive
     }
 
-    /// The drive, to change the world around it.
+    /// The drive, to change its environment.
     pub const fn drive_mut(&mut self) -> &mut StDrive<M> {
         &mut self.drive
     }
 
-    /// Takes the power of slave and drive away and gives it back; see [`StMotor::power_cycle`].
+    /// Cycles the power of slave and drive; see [`StMotor::power_cycle`].
     pub fn power_cycle(&mut self) {
         self.slave = Slave::new(self.slave.profile(), self.drive.last());
         self.drive.power_cycle();

@@ -1,4 +1,4 @@
-//! Gains from a machine's values: what a motor runs on before anybody tunes it.
+//! Default gains from a machine's values.
 //!
 //! | loop | rule | from |
 //! |---|---|---|
@@ -21,7 +21,7 @@ use crate::plant::PlantConfig;
 const CURRENT_SHARE: f32 = 0.05;
 /// Lag of the measured speed, s.
 const SPEED_LAG: f32 = 3.3e-3;
-/// Distance of the speed loop's bandwidth from its delays.
+/// Ratio of the speed loop's delays to its bandwidth.
 const SYMMETRY: f32 = 3.0;
 /// Logarithm of the observer's poles, a period.
 const OBSERVER_POLE: f32 = -0.5;
@@ -33,7 +33,7 @@ const WEAKENING: f32 = 100.0;
 const SLOW: f32 = 1e-3;
 
 impl Registers {
-    /// Registers with gains for a motor and the board that drives it.
+    /// Registers with gains for a motor and its board.
     pub fn tuned(plant: &PlantConfig) -> Self {
         let scale = Scale::new(plant);
         let machine = &plant.machine;
@@ -104,7 +104,7 @@ impl Default for Registers {
     }
 }
 
-/// The numerator of a gain, as far as its register reaches.
+/// The numerator of a gain, limited to the range of its register.
 fn gain(value: f32, divisor: i32) -> i32 {
     whole(value * divisor as f32).clamp(i16::MIN.into(), i16::MAX.into())
 }

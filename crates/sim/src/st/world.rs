@@ -1,4 +1,4 @@
-//! The world around a motor.
+//! The environment of a motor.
 
 use motorlink_proto::st::{Flags, Status};
 
@@ -7,10 +7,10 @@ use super::motor::{Firmware, StMotor};
 use super::scale::RPM;
 use crate::plant::{Plant, PlantTruth};
 
-/// What is really going on in a motor.
+/// The true state of a motor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Truth {
-    /// The motor and what surrounds it.
+    /// The motor and its environment.
     pub plant: PlantTruth,
     /// State of the firmware.
     pub status: Status,
@@ -24,55 +24,55 @@ pub struct Truth {
     pub iq_reference: f32,
     /// Reference of the flux current, A.
     pub id_reference: f32,
-    /// What the temperature sensor shows, °C.
+    /// The temperature sensor's reading, °C.
     pub temperature: f32,
 }
 
 impl StMotor {
-    /// A motor at rest, its drive just powered on.
+    /// A motor at rest. Its drive was just powered on.
     pub fn new(config: MotorConfig) -> Self {
         let plant = Plant::new(config.plant);
         let firmware = Firmware::new(&config, &plant);
         StMotor { plant, held: 0, firmware, rest_us: 0, config }
     }
 
-    /// What the motor and its drive are built from.
+    /// The configuration of the motor and its drive.
     pub const fn config(&self) -> &MotorConfig {
         &self.config
     }
 
-    /// Takes the drive's power away and gives it back: registers, references and faults are as
-    /// built. The rotor keeps its motion, the world what was set.
+    /// Cycles the drive's power: registers, references and faults are reset. The rotor's motion and
+    /// the environment do not change.
     pub fn power_cycle(&mut self) {
         self.firmware = Firmware::new(&self.config, &self.plant);
     }
 
-    /// The motor and what surrounds it.
+    /// The motor and its environment.
     pub const fn plant(&self) -> &Plant {
         &self.plant
     }
 
-    /// The motor and what surrounds it, to change its supply, load and temperature.
+    /// The motor and its environment, to change supply, load and temperature.
     pub const fn plant_mut(&mut self) -> &mut Plant {
         &mut self.plant
     }
 
-    /// Lets faults happen once: bits such as [`Flags::BREAK_IN`].
+    /// Injects faults that happen once: bits such as [`Flags::BREAK_IN`].
     pub const fn inject(&mut self, faults: u16) {
         self.firmware.events |= faults;
     }
 
-    /// Keeps these faults present from outside, beside those that are kept already.
+    /// Holds these faults, in addition to those already held.
     pub const fn hold_faults(&mut self, faults: u16) {
         self.held |= faults;
     }
 
-    /// Ends that for these faults.
+    /// Releases these held faults.
     pub const fn release_faults(&mut self, faults: u16) {
         self.held &= !faults;
     }
 
-    /// What is really going on.
+    /// The true state.
     pub fn truth(&self) -> Truth {
         let plant = self.plant.truth();
         let amperes = 1.0 / self.firmware.scale.ampere;

@@ -136,7 +136,7 @@ fn a_winding_that_is_faster_than_a_step_is_followed() {
     assert!((machine.rotor_current().x - 1.0).abs() < 1e-3, "{:?}", machine.rotor_current());
 }
 
-/// A winding that forgets a quarter of its current in a step.
+/// A winding that loses a quarter of its current in a step.
 fn quick() -> MachineConfig {
     preset::drone().machine
 }
@@ -184,7 +184,7 @@ fn a_short_circuits_currents_are_those_of_park() {
 
 #[test]
 fn voltages_at_the_windings_are_those_of_the_currents_and_commands_are_told_apart() {
-    // Turned from outside at 250 rad/s, 1000 rad/s electrical: 2.9° a period.
+    // Rotated from outside at 250 rad/s, 1000 rad/s electrical: 2.9° per period.
     let inverter = InverterConfig { on_resistance: 0.2, ..plain().inverter };
     let machine = MachineConfig { inertia: 1.0, ..plain().machine };
     let load = LoadConfig { torque: -1e3, ..LoadConfig::default() };
@@ -194,7 +194,8 @@ fn voltages_at_the_windings_are_those_of_the_currents_and_commands_are_told_apar
     }
     plant.change_load(|load| load.torque = 0.0);
     let MachineConfig { resistance, inductance_d, inductance_q, flux_linkage, .. } = machine;
-    // It acts a period late and is held for one: for where the rotor is in its middle.
+    // The voltage acts one period late and is constant for one period: it refers to the rotor's
+    // position in the middle of that period.
     for _ in 0..4000 {
         let ahead = 1.5 * 50e-6 * 4.0 * plant.machine().speed();
         let angle = angle::position(ahead) as u32;

@@ -1,4 +1,4 @@
-//! Nothing is lost: what the source gave is heat, work, or still there.
+//! The energies balance: the source's energy becomes heat, work or stored energy.
 
 use motorlink_sim::plant::{
     Bridge, ChopperConfig, GearConfig, InverterConfig, LoadConfig, MachineConfig, PendulumConfig,
@@ -9,7 +9,7 @@ use motorlink_sim::vector::Vector;
 
 use crate::plain;
 
-/// A motor with everything that takes energy.
+/// A motor with all parts that take energy.
 fn everything() -> PlantConfig {
     PlantConfig {
         machine: MachineConfig {
@@ -61,13 +61,13 @@ fn assert_balanced(plant: &Plant) {
 }
 
 #[test]
-fn what_goes_in_comes_out_or_stays() {
+fn the_energies_balance() {
     let mut plant = Plant::new(everything());
     drive(&mut plant, 0.2);
     assert_balanced(&plant);
     let energy = plant.energy();
     let parts = [energy.supply, energy.copper, energy.iron, energy.friction, energy.gear];
-    assert!(parts.iter().all(|part| *part > 1e-3), "each takes its part: {energy:?}");
+    assert!(parts.iter().all(|part| *part > 1e-3), "each part is greater than 0: {energy:?}");
     assert!(energy.load > 0.1, "{energy:?}");
 }
 
@@ -89,7 +89,7 @@ fn the_balance_holds_for_springs_weights_and_stops() {
 }
 
 #[test]
-fn the_balance_holds_when_the_world_changes() {
+fn the_energies_balance_when_the_environment_changes() {
     let mut plant = Plant::new(everything());
     drive(&mut plant, 0.2);
     for _ in 0..8000 {

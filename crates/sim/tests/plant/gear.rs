@@ -1,4 +1,4 @@
-//! What a gear takes of all that it transmits, the acceleration of the load included.
+//! The losses of a gear in all transmitted power, including the acceleration of the load.
 
 use motorlink_sim::plant::{Feed, Flow, GearConfig, LoadConfig, Machine, MachineConfig};
 use motorlink_sim::preset;
@@ -20,11 +20,11 @@ fn actuator(efficiency: f32, back_efficiency: Option<f32>) -> MachineConfig {
     }
 }
 
-/// A machine whose torque current is what a test wants.
+/// A machine with a chosen torque current.
 struct Driven {
     machine: Machine,
     flow: Flow,
-    /// What the last step added to the speed, rad/s.
+    /// Change of the speed in the last step, rad/s.
     change: f32,
 }
 
@@ -35,7 +35,7 @@ impl Driven {
         Driven { machine, flow: Flow::default(), change: 0.0 }
     }
 
-    /// Lets a torque current flow for a step, against the back-EMF in its middle.
+    /// Executes a step with a torque current, against the back-EMF in its middle.
     fn step(&mut self, iq: f32) {
         let MachineConfig { pole_pairs, flux_linkage, inductance_q, .. } = *self.machine.config();
         let before = self.machine.speed();
@@ -46,7 +46,7 @@ impl Driven {
         self.change = self.machine.speed() - before;
     }
 
-    /// Mean acceleration over 20 ms, when the current has settled, rad/s².
+    /// Mean acceleration over 20 ms with a steady current, rad/s².
     fn acceleration(mut self, iq: f32) -> f32 {
         (0..200).for_each(|_| self.step(iq));
         let before = self.machine.speed();
@@ -61,7 +61,7 @@ fn assert_near(found: f32, expected: f32, share: f32) {
 }
 
 #[test]
-fn a_gear_takes_its_share_of_what_accelerates_the_load() {
+fn a_gear_loses_power_that_accelerates_the_load() {
     // 4 A are 0.8568 Nm; 0.1 kg m² behind 9:1 are 1.2346e-3 kg m² at the rotor.
     let load = LoadConfig { inertia: 0.1, ..LoadConfig::default() };
     for (efficiency, expected) in [
@@ -83,7 +83,7 @@ fn a_load_that_brakes_drives_the_gear_back() {
     for (back_efficiency, expected) in [
         // -0.8568 / (2.6e-4 + η' 1.2346e-3)
         (Some(0.5), -976.65),
-        // A self-locking gear: the rotor stops as if nothing hung on it.
+        // A self-locking gear: the rotor stops as without a load.
         (Some(0.0), -3295.4),
         // 2 - 1/0.8 = 0.75
         (None, -722.47),
@@ -101,10 +101,10 @@ fn a_load_torque_costs_more_forwards_and_helps_less_backwards() {
     };
     // Against the motion, 4.5 Nm / 9: (0.8568 - 0.5 / 0.8) / (2.6e-4 + 1.2346e-3 / 0.8)
     assert_near(gear(4.5), 128.55, 2e-4);
-    // It pulls a load of 0.1 kg m² less fast than that would fall: τ > 0.
+    // The motor drives a load of 0.1 kg m² more slowly than the load would fall: τ > 0.
     // (0.8568 + 0.5 / 0.8) / (2.6e-4 + 1.2346e-3 / 0.8)
     assert_near(gear(-4.5), 821.76, 2e-4);
-    // It pushes the rotor: (0.8568 + 0.7 · 5) / (2.6e-4 + 0.7 · 1.2346e-3)
+    // The load drives the rotor: (0.8568 + 0.7 · 5) / (2.6e-4 + 0.7 · 1.2346e-3)
     assert_near(gear(-45.0), 3875.5, 2e-4);
 }
 
@@ -116,13 +116,13 @@ fn a_self_locking_gear_holds_its_load_and_others_hold_less() {
         (0..400).for_each(|_| machine.step(Feed::Stator(Vector::ZERO), &mut Flow::default()));
         machine.speed() != 0.0
     };
-    assert!(!moves(0.4, None, 9.0), "2 - 1/0.4 is less than nothing");
+    assert!(!moves(0.4, None, 9.0), "2 - 1/0.4 is negative");
     assert!(!moves(0.9, Some(0.0), -9.0));
     assert!(moves(0.9, Some(0.1), -9.0) && moves(0.9, None, 9.0));
 }
 
 #[test]
-fn what_breaks_loose_through_a_gear_is_what_it_passes_on() {
+fn a_load_breaks_loose_with_the_torque_that_the_gear_transmits() {
     let stiction = MachineConfig { stiction: 0.05, ..actuator(0.8, Some(0.5)) };
     let moves = |load: LoadConfig| {
         let mut machine = Machine::new(stiction, load, DT);
@@ -135,9 +135,9 @@ fn what_breaks_loose_through_a_gear_is_what_it_passes_on() {
     assert!(!pulled(1.89, 1.0) && pulled(1.91, 1.0));
 }
 
-/// A current that pulls to and fro, so that power turns round in the gear many times.
+/// A current of alternating sign, so that the power in the gear changes its direction many times.
 #[test]
-fn powers_add_up_and_nothing_chatters_where_power_turns_round() {
+fn powers_balance_without_chatter_when_the_power_reverses() {
     let load = LoadConfig { inertia: 0.02, viscous: 0.02, brake: 0.3, ..LoadConfig::default() };
     let config =
         MachineConfig { coulomb_friction: 0.02, stiction: 0.03, ..actuator(0.7, Some(0.5)) };

@@ -1,4 +1,4 @@
-//! The motor with what surrounds it, against what physics says.
+//! Tests of the plant against physics.
 
 mod electrical;
 mod energy;
@@ -12,7 +12,7 @@ use motorlink_sim::plant::{
     SensingConfig, SupplyConfig,
 };
 
-/// A motor without friction, cogging and iron loss, on a supply that gives what it is asked.
+/// A motor without friction, cogging and iron losses, on an ideal supply.
 pub fn plain() -> PlantConfig {
     PlantConfig {
         period_us: 50,

@@ -53,7 +53,7 @@ fn a_flywheel_gains_speed_however_slowly() {
         let mut flywheel = Machine::new(machine, load, 50e-6);
         flywheel.place(0, 300.0);
         for _ in 0..20_000 {
-            // The voltage that lets no current flow.
+            // The voltage at which no current flows.
             let emf = flywheel.speed() * machine.back_emf_constant();
             flywheel.step(Feed::Rotor(Vector::new(0.0, emf)), &mut Flow::default());
         }
@@ -105,7 +105,7 @@ fn a_fan_and_a_viscous_load_settle_where_they_take_up_the_torque() {
     assert!((plant.machine().speed() - 90.0).abs() < 0.05, "{}", plant.machine().speed());
 }
 
-/// Seconds of a swing, by the times at which the angle crosses `centre` upwards.
+/// Period of an oscillation, s, from the times at which the angle crosses `centre` upwards.
 fn swing(plant: &mut Plant, centre: f64) -> f64 {
     let mut crossings = Vec::new();
     let mut last = output_radians(plant);
@@ -215,7 +215,7 @@ fn a_load_that_damps_more_than_a_step_can_does_not_burst() {
 }
 
 #[test]
-fn a_push_that_no_bearing_stands_ends_in_numbers() {
+fn an_extreme_torque_gives_finite_numbers() {
     let machine = preset::drone().machine;
     for fan in [0.0, 592.0] {
         let load = LoadConfig { torque: -1000.0, fan, ..LoadConfig::default() };

@@ -1,4 +1,4 @@
-//! The presets are possible, and refused when they are not.
+//! The presets are valid, and invalid values are refused.
 
 use motorlink_sim::plant::{MachineConfig, PlantConfig, SupplyConfig};
 use motorlink_sim::preset;
@@ -6,7 +6,7 @@ use motorlink_sim::rmd::RmdConfig;
 use motorlink_sim::st::MotorConfig;
 
 #[test]
-fn every_preset_can_be() {
+fn every_preset_is_valid() {
     for (name, config) in preset::ALL {
         config().check().unwrap_or_else(|odd| panic!("{name}: {odd}"));
     }
@@ -24,7 +24,7 @@ fn every_drive_that_has_a_name_has_the_plant_of_that_name() {
 }
 
 #[test]
-fn what_cannot_be_is_named() {
+fn an_invalid_value_is_reported() {
     let supply = SupplyConfig { voltage: f32::NAN, ..SupplyConfig::default() };
     let odd = PlantConfig { supply, ..preset::shinano() }.check().unwrap_err();
     assert_eq!(odd.to_string(), "plant.supply.voltage is 0 to 1000, not NaN");

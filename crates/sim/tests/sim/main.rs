@@ -1,4 +1,4 @@
-//! Simulated drives through the wire, on virtual time.
+//! Tests of simulated drives through their protocol, on virtual time.
 
 mod rmd_bench;
 mod rmd_motion;

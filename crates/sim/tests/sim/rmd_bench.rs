@@ -1,4 +1,4 @@
-//! RMD motors on a bus, spoken to in frames.
+//! RMD motors on a bus, with requests as frames.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
@@ -15,7 +15,7 @@ pub fn with_bits(bits: u8) -> RmdConfig {
 pub struct NodeFixture {
     pub bus: RmdBus<Vec<RmdNode>>,
     pub now: Instant,
-    /// Every frame that was sent back.
+    /// All replies.
     pub log: Vec<CanFrame>,
 }
 
@@ -39,7 +39,7 @@ impl NodeFixture {
         self.bus.advance_to(self.now);
     }
 
-    /// Sends a frame; the replies.
+    /// Sends a frame. Returns the replies.
     pub fn send(&mut self, frame: &CanFrame) -> Vec<CanFrame> {
         let mut replies = Vec::new();
         self.bus.receive(self.now, frame, |frame| replies.push(frame));
@@ -47,7 +47,7 @@ impl NodeFixture {
         replies
     }
 
-    /// Commands motor 1; the data of its reply.
+    /// Sends a command to motor 1. Returns the data of its reply.
     pub fn raw(&mut self, data: [u8; 8]) -> [u8; 8] {
         let replies = self.send(&CanFrame::new(0x141, data));
         let [reply] = replies[..] else { panic!("{} replies", replies.len()) };
@@ -65,7 +65,7 @@ impl NodeFixture {
         self.bus.node_mut(one).expect("motor 1 is there")
     }
 
-    /// Motor 1, to change the world around it.
+    /// Motor 1, to change its environment.
     pub fn world(&mut self) -> &mut RmdMotor {
         self.node().motor_mut()
     }

@@ -178,7 +178,7 @@ fn a_move_is_a_trapezoid_that_never_goes_back() {
                 let way = truth.plant.angle_degrees * angle.signum();
                 assert!(way >= last - 0.01, "from {last}° back to {way}°");
                 let speed = truth.speed_dps * angle.signum() as f32;
-                // Cogging and what sticks at the beginning make 50 °/s.
+                // Cogging and stiction at the start cause 50 °/s.
                 assert!(speed < 450.0, "{speed} °/s");
                 let change = (speed - last_speed).abs() - 50.0;
                 assert!(change < limit * 0.01, "{change} °/s in 10 ms");
@@ -238,7 +238,7 @@ fn the_drives_own_limits_hold_a_position_command() {
 }
 
 #[test]
-fn a_single_turn_position_is_reached_in_the_direction_that_is_told() {
+fn a_single_turn_position_is_reached_in_the_commanded_direction() {
     let mut bench = NodeFixture::one();
     let circle = |degrees, direction| SetSingleTurnPosition {
         direction,
@@ -263,7 +263,7 @@ fn a_single_turn_position_is_reached_in_the_direction_that_is_told() {
     assert!((bench.ask(ReadSingleTurnAngle).angle.degrees() - 50.0).abs() < 0.1);
 }
 
-/// How a motor with these gains has followed a command after `ms`.
+/// The response of a motor with these gains to a command, after `ms`.
 fn follow(gains: Pid, ms: u32, command: impl FnOnce(&mut NodeFixture)) -> (f64, f32, f32) {
     let mut bench = NodeFixture::one();
     bench.ask(WritePidRam(gains));
@@ -323,7 +323,7 @@ fn each_gain_acts() {
 }
 
 #[test]
-fn stop_brings_the_rotor_to_a_stand_and_off_lets_it_coast() {
+fn stop_brakes_the_rotor_and_off_lets_it_coast() {
     let coasting = |stop: bool| {
         let mut bench = NodeFixture::new([RmdConfig::x8()]);
         bench.ask(speed(3000.0));

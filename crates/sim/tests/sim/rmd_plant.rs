@@ -1,4 +1,4 @@
-//! What surrounds a motor, and gains that do not suit it.
+//! The environment of a motor, and unsuitable gains.
 
 use motorlink_proto::rmd::*;
 use motorlink_proto::units::*;
@@ -16,7 +16,7 @@ fn accelerate(bench: &mut NodeFixture, dps2: i32) {
     bench.ask(WriteAccelerationRam(Acceleration { acceleration: DpsPerSecond(dps2) }));
 }
 
-/// The two bodies of the heat model, by themselves: when the winding is at `limit` under a
+/// Independent computation of the thermal model: the time until the winding is at `limit` under a
 /// constant current amplitude, s.
 fn predicted(config: &RmdConfig, current: f64, limit: f64) -> f64 {
     let HeatConfig { ambient, winding_to_housing, housing_to_air, .. } = config.plant.heat;
@@ -39,7 +39,7 @@ fn predicted(config: &RmdConfig, current: f64, limit: f64) -> f64 {
 }
 
 #[test]
-fn a_motor_is_switched_off_when_the_heat_model_says() {
+fn a_motor_is_switched_off_at_the_time_of_the_heat_model() {
     for (config, amps) in [(RmdConfig::default(), 4.0), (RmdConfig::x8(), 25.0)] {
         let mut bench = NodeFixture::new([config]);
         bench.world().plant_mut().lock(true);
@@ -68,7 +68,7 @@ fn a_stalled_motor_pushes_with_its_limit_until_it_is_too_hot() {
 }
 
 #[test]
-fn braking_raises_the_bus_where_nothing_takes_it_and_a_chopper_holds_it() {
+fn braking_raises_the_bus_unless_a_chopper_limits_it() {
     let braked = |chopper| {
         let mut config = RmdConfig::x8();
         config.plant.supply.chopper = chopper;
@@ -185,7 +185,7 @@ fn torque_is_the_same_wherever_the_encoders_zero_is() {
     }
 }
 
-/// Time to nine tenths of a speed, ms, and how far Iq and speed then go up and down, A and °/s.
+/// Time to nine tenths of a speed, ms, and the remaining oscillation of Iq and speed, A and °/s.
 fn step(config: RmdConfig, gains: Pid) -> (u32, f32, f32) {
     let mut bench = NodeFixture::new([config]);
     bench.ask(WritePidRam(gains));

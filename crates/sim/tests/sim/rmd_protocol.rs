@@ -1,4 +1,4 @@
-//! What lasts, what is forgotten and what is refused.
+//! Persistent, volatile and refused settings.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::*;
@@ -41,7 +41,7 @@ fn a_zero_position_takes_effect_with_the_next_power_on() {
 }
 
 #[test]
-fn turns_are_counted_until_the_power_goes() {
+fn turns_are_counted_until_power_off() {
     let mut bench = NodeFixture::one();
     bench.ask(SetPosition { angle: CentiDegrees::from_degrees(-2000.0) });
     bench.wait(3000);
@@ -51,7 +51,7 @@ fn turns_are_counted_until_the_power_goes() {
 }
 
 #[test]
-fn stop_and_run_resume_what_off_forgets() {
+fn stop_and_run_resume_a_motion_and_off_discards_it() {
     let mut bench = NodeFixture::one();
     bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
     bench.wait(300);
@@ -68,7 +68,7 @@ fn stop_and_run_resume_what_off_forgets() {
 }
 
 #[test]
-fn protections_switch_off_and_stay_while_the_cause_lasts() {
+fn protections_switch_off_and_remain_while_the_cause_is_present() {
     let mut bench = NodeFixture::one();
     bench.ask(SetSpeed { speed: CentiDps::from_dps(500.0) });
     bench.wait(300);
@@ -146,7 +146,7 @@ fn four_torques_are_answered_lowest_id_first() {
 }
 
 #[test]
-fn what_is_not_for_a_motor_gets_no_reply() {
+fn frames_for_other_motors_get_no_reply() {
     let mut bench = NodeFixture::one();
     assert!(bench.send(&CanFrame::new(0x142, ReadStatus.encode())).is_empty());
     assert!(bench.send(&CanFrame::new(0x141, [0x77; 8])).is_empty());

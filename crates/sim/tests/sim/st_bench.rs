@@ -1,4 +1,4 @@
-//! An ST drive on a serial line, spoken to in frames.
+//! An ST drive on a serial line, with requests as frames.
 
 use motorlink_proto::st::register::{Register, Value};
 use motorlink_proto::st::{
@@ -15,7 +15,7 @@ pub type Nack = u8;
 pub struct NodeFixture {
     pub station: StStation<Vec<StMotor>>,
     pub now: Instant,
-    /// Everything that was sent back.
+    /// All replies.
     pub log: Vec<u8>,
 }
 
@@ -46,7 +46,8 @@ impl NodeFixture {
         self.station.advance_to(self.now);
     }
 
-    /// Sends a request to a motor (0 is the current one); the ACK's payload, or the NACK's code.
+    /// Sends a request to a motor (0 is the current one). Returns the ACK's payload, or the NACK's
+    /// code.
     pub fn ask(&mut self, motor: u8, request: Request<'_>) -> Result<Vec<u8>, Nack> {
         let mut frame = [0; MAX_FRAME];
         let frame = Frame::command(motor, &request, &mut frame).expect("the request fits");
@@ -95,7 +96,7 @@ impl NodeFixture {
         }
     }
 
-    /// Gives each phase of the rev-up this current, A.
+    /// Sets the current of each phase of the rev-up, A.
     pub fn set_revup_current(&mut self, current: f32) {
         let full = self.world().config().plant.sensing.full_scale;
         let torque_s16a = (current / full * 32767.0) as i16;
@@ -116,7 +117,7 @@ impl NodeFixture {
         self.until(Status::Run, 5000);
     }
 
-    /// Waits until a state; how long it took in ms.
+    /// Waits for a state. Returns the waiting time in ms.
     pub fn until(&mut self, status: Status, most_ms: u32) -> u32 {
         for waited in 0..=most_ms {
             if self.status() == status {
@@ -127,8 +128,7 @@ impl NodeFixture {
         panic!("{} instead of {status} after {most_ms} ms", self.status());
     }
 
-    /// The states that follow the present one until one comes that stays for a second, with how
-    /// long each lasted in ms.
+    /// The states after the present one, until one lasts for a second, with their durations in ms.
     pub fn states(&mut self) -> Vec<(Status, u32)> {
         let mut states: Vec<(Status, u32)> = vec![(self.status(), 0)];
         loop {
@@ -144,8 +144,8 @@ impl NodeFixture {
         }
     }
 
-    /// Mean of a register of the current motor over 50 readings, one a millisecond: what is
-    /// measured has noise.
+    /// Mean of a register of the current motor over 50 readings, one per millisecond, because
+    /// measured values have noise.
     pub fn mean<T: Value + Into<f64>, A: register::Readable>(
         &mut self,
         register: Register<T, A>,
@@ -169,12 +169,12 @@ impl NodeFixture {
         self.mean_of(|line| line.truth().speed_rpm.into())
     }
 
-    /// Motor 1, to change the world around it.
+    /// Motor 1, to change its environment.
     pub fn world(&mut self) -> &mut StMotor {
         self.station.drive_mut().motor_mut(MotorNumber::FIRST).expect("motor 1 exists")
     }
 
-    /// What surrounds motor 1.
+    /// The environment of motor 1.
     pub fn plant(&mut self) -> &mut Plant {
         self.world().plant_mut()
     }

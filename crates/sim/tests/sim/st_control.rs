@@ -88,7 +88,7 @@ fn a_ramp_in_torque_mode_goes_on_from_the_present_speed() {
 }
 
 #[test]
-fn control_mode_reads_the_mode_that_was_asked_for_last() {
+fn control_mode_reads_the_last_commanded_mode() {
     for profile in Profile::ALL {
         let mut line = NodeFixture::demo(profile);
         // At rest, where nothing of it is applied yet.
@@ -105,7 +105,7 @@ fn control_mode_reads_the_mode_that_was_asked_for_last() {
 }
 
 #[test]
-fn writing_the_control_mode_keeps_what_the_motor_does() {
+fn writing_the_control_mode_keeps_the_motion() {
     let mut line = NodeFixture::sensorless();
     line.run();
     line.wait(2500);
@@ -321,7 +321,7 @@ fn the_position_gain_changes_how_a_step_is_followed() {
 }
 
 #[test]
-fn an_angle_that_is_no_number_is_not_gone_to() {
+fn an_angle_that_is_not_finite_is_ignored() {
     let mut line = NodeFixture::servo();
     line.run();
     for angle_rad in [f32::NAN, f32::INFINITY] {

@@ -1,4 +1,4 @@
-//! Faults: what causes them, how they latch, how they go.
+//! Faults: causes, latching and acknowledgement.
 
 use motorlink_proto::st::{
     Command, CurrentReference, Flags, Profile, Request, Status, register::*,
@@ -15,7 +15,7 @@ fn running() -> NodeFixture {
 }
 
 #[test]
-fn a_fault_is_now_while_its_cause_is_there_and_over_until_acknowledged() {
+fn a_fault_is_now_while_its_cause_is_present_and_over_until_acknowledged() {
     let mut line = running();
     line.plant().set_source(450.0);
     line.until(Status::FaultNow, 2);
@@ -211,7 +211,7 @@ fn a_pfc_whose_gains_run_away_switches_itself_off() {
 }
 
 #[test]
-fn a_pfc_that_is_told_too_much_trips_the_motor() {
+fn a_pfc_reference_that_is_too_high_trips_the_motor() {
     let mut line = running();
     line.set(PFC_DCBUS_REF, 440);
     line.execute(Command::PfcEnable);

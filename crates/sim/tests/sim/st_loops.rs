@@ -1,4 +1,4 @@
-//! Closed loops of the ST drive on every motor that it is delivered with.
+//! Closed loops of the ST drive, on every preset motor.
 
 use motorlink_proto::st::{
     Command, CurrentReference, Flags, Profile, Request, RevupPhase, Status, register::*,
@@ -113,7 +113,7 @@ fn a_load_step_is_recovered() {
 #[test]
 fn torque_is_what_was_commanded_within_2_percent() {
     for (name, mut config, speed) in motors() {
-        // Where the rotor and the encoder's zero are is found by the alignment.
+        // The alignment finds the positions of the rotor and of the encoder's zero.
         config.plant.angle_degrees = 123.0;
         config.plant.encoder.offset_degrees = 77.0;
         let mut line = turning(config, speed);
@@ -134,7 +134,7 @@ fn torque_is_what_was_commanded_within_2_percent() {
     }
 }
 
-/// Speed at which the back-EMF alone takes the whole voltage, rpm.
+/// Speed at which the back-EMF equals the maximum voltage, rpm.
 fn base_speed(config: &MotorConfig) -> f64 {
     let voltage = config.plant.supply.voltage / 3f32.sqrt();
     f64::from(voltage / config.plant.machine.back_emf_constant() * 60.0 / std::f32::consts::TAU)
@@ -250,7 +250,7 @@ fn a_stop_beyond_base_speed_charges_the_bus_through_the_diodes() {
 }
 
 #[test]
-fn over_temperature_comes_when_the_heat_model_says() {
+fn over_temperature_occurs_at_the_time_of_the_heat_model() {
     let mut config = MotorConfig::servo();
     config.plant.heat.sensor = HeatSensor::Winding;
     config.thresholds.over_temperature = 33.0;
@@ -362,7 +362,7 @@ fn observer_gains_decide_whether_the_rotor_is_seen() {
             run.set(OBSERVER_C2, badly.registers.observer_c2 as i16);
             run.set(PLL_KP, badly.registers.pll_kp as i16);
             run.set(PLL_KI, badly.registers.pll_ki as i16);
-            // Where the speed stays as it is even a bad observer may follow.
+            // At a constant speed even a badly tuned observer may follow.
             run.ramp((0.7 * speed) as i32, 300);
             run.wait(1000);
             assert_ne!(run.status(), Status::Run, "{name}: {what}, in RUN");

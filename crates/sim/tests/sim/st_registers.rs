@@ -1,5 +1,4 @@
-//! Every register of the table, in both profiles, on a motor that has its feature and one that has
-//! not.
+//! Every register of the table, in both profiles, on a motor with its feature and on one without.
 
 use motorlink_proto::st::register::{Features, Type, Writing};
 use motorlink_proto::st::{Command, ErrorCode, Profile, RegisterId, Request, register::*};
@@ -72,7 +71,7 @@ fn every_register_that_can_be_written_keeps_its_value() {
 }
 
 #[test]
-fn the_stages_of_the_revup_are_counted_whatever_it_does() {
+fn the_stages_of_the_revup_are_counted_in_every_state() {
     let mut line = NodeFixture::sensorless();
     let stages = line.get(RUC_STAGE_NBR);
     for phase in 0..stages {
@@ -96,7 +95,7 @@ fn commands_for_a_pfc_need_one() {
     }
 }
 
-/// Registers at one instant, as a data segment gives them: those of access D too.
+/// Registers at one instant, from a data segment, including those of access D.
 fn sample<const N: usize>(line: &mut NodeFixture, registers: [RegisterId; N]) -> [i32; N] {
     let ids = registers.map(|id| id.0);
     line.ask(0, Request::ConfigureSegment { segment: 0, registers: &ids }).unwrap();

@@ -1,4 +1,4 @@
-//! The state machine: which states, in which order, for how long.
+//! The state machine: states, their order and their durations.
 
 use motorlink_proto::st::{Command, Profile, Status, register};
 use motorlink_sim::st::{DurationConfig, MotorConfig};
@@ -7,7 +7,7 @@ use crate::st_bench::NodeFixture;
 
 use Status::*;
 
-/// The states on the way, without the last, which stays.
+/// The states before the final one.
 fn on_the_way(line: &mut NodeFixture) -> Vec<(Status, u32)> {
     let mut states = line.states();
     states.pop();

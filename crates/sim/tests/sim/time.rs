@@ -1,4 +1,4 @@
-//! The same commands at the same times give the same bytes, however finely time is cut.
+//! The same commands at the same times give the same bytes, for any division of the time.
 
 use motorlink_proto::rmd::{
     Command as _, ReadEncoder, ReadMotionStatus, ReadPhaseCurrents, SetPosition, SetSpeed,
@@ -12,7 +12,7 @@ use motorlink_sim::st::{StDrive, StStation};
 
 use crate::{rmd_bench, st_bench};
 
-/// Lets `us` pass in pieces of at most `piece`.
+/// Simulates `us` in pieces of at most `piece`.
 fn cut(now: &mut Instant, us: u64, piece: u64, mut advance: impl FnMut(Instant)) {
     let end = *now + Micros(us);
     while *now < end {
@@ -21,7 +21,7 @@ fn cut(now: &mut Instant, us: u64, piece: u64, mut advance: impl FnMut(Instant))
     }
 }
 
-/// Everything that two ST motors send in a run, and where they are at its end.
+/// All bytes that two ST motors send in a run, and their final state.
 fn st_run(piece: u64) -> (Vec<u8>, u64) {
     let mut line = st_bench::NodeFixture::demo(Profile::Mcsdk54);
     for motor in [1, 2] {
@@ -41,7 +41,7 @@ fn st_run(piece: u64) -> (Vec<u8>, u64) {
     (line.log, hash::fingerprint(line.station.drive()))
 }
 
-/// Every frame that two RMD motors send in a run, and where motor 1 is at its end.
+/// All frames that two RMD motors send in a run, and the final state of motor 1.
 fn rmd_run(piece: u64) -> (Vec<Vec<u8>>, String) {
     let short = RmdConfig { shutdown_ms: 90, ..RmdConfig::with_id(2) };
     let mut bench = rmd_bench::NodeFixture::new([RmdConfig::default(), short]);
@@ -78,7 +78,7 @@ fn an_rmd_bus_is_deterministic() {
 }
 
 #[test]
-fn a_cut_off_command_is_owed_a_nack_after_25_ms() {
+fn a_cut_off_command_gets_a_nack_after_25_ms() {
     let mut station = StStation::new(Profile::Spec, StDrive::demo(Instant(0)));
     station.receive(Instant(1000), &[0x02, 0x01], |_| panic!("nothing to answer yet"));
     assert_eq!(station.deadline(), Some(Instant(26_000)));

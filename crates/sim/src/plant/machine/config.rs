@@ -1,7 +1,7 @@
-//! What a machine is.
+//! The configuration of a machine.
 
-/// What a machine is. A machine's values belong together: start from a
-/// [preset](crate::preset), not from nothing.
+/// The configuration of a machine. The values of a machine depend on each other: start from a
+/// [preset](crate::preset).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -25,11 +25,11 @@ pub struct MachineConfig {
     pub inertia: f32,
     /// Friction that grows with speed, Nm s/rad.
     pub viscous_friction: f32,
-    /// Friction of a turning rotor that does not, Nm.
+    /// Friction that does not depend on speed, for a turning rotor, Nm.
     pub coulomb_friction: f32,
-    /// Friction that holds a rotor at rest, Nm; no less than the Coulomb friction.
+    /// Maximum friction of a rotor at rest, Nm; at least the Coulomb friction.
     pub stiction: f32,
-    /// Speed at which half of the difference between both is gone, rad/s.
+    /// Speed at which half of the difference between both is lost, rad/s.
     pub stribeck_speed: f32,
     /// Amplitude of the cogging torque, Nm.
     pub cogging_torque: f32,
@@ -53,10 +53,10 @@ pub struct MachineConfig {
 pub struct GearConfig {
     /// Turns of the rotor for a turn of the output; 1 without a gear.
     pub ratio: f32,
-    /// Share of the power that gets through while the motor drives the load.
+    /// Fraction of the power that is transmitted while the motor drives the load.
     pub efficiency: f32,
-    /// Share that gets through while the load drives the motor; 0 locks itself. Without it
-    /// 2 − 1/`efficiency`, and no less than 0: a gear that loses the same torque both ways.
+    /// Fraction that is transmitted while the load drives the motor; 0 is self-locking. Default: 2
+    /// − 1/`efficiency`, at least 0; this gear loses the same torque in both directions.
     pub back_efficiency: Option<f32>,
 }
 
@@ -67,7 +67,7 @@ impl Default for GearConfig {
 }
 
 impl GearConfig {
-    /// Share of the power that gets through while the load drives the motor.
+    /// Fraction of the power that is transmitted while the load drives the motor.
     pub(super) fn back_efficiency(&self) -> f32 {
         self.back_efficiency.unwrap_or((2.0 - 1.0 / self.efficiency).max(0.0))
     }

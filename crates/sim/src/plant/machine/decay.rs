@@ -1,19 +1,19 @@
-//! What the resistance takes away of the windings' flux linkage.
+//! The decay of the windings' flux linkage through the resistance.
 
 use crate::vector::Vector;
 
-/// What the resistance does in a step.
+/// The effect of the resistance in a step.
 #[derive(Debug, Clone)]
 pub(super) struct Decay {
-    /// What the axes have in common: its rate, 1/s, what is gone of a flux linkage after half a step,
-    /// and the time for which a voltage that stands still acts in it, s.
+    /// The common part of the axes: the rate, 1/s, the lost fraction of a flux linkage after half a
+    /// step, and the effective time of a constant voltage in it, s.
     pub(super) rate: f32,
     pub(super) gone: f32,
     pub(super) drive: f32,
-    /// What they differ in: what a sixth and what two sixths of a step add, as a share.
+    /// The difference of the axes: what a sixth and what two sixths of a step add, relative.
     pub(super) outer: Vector,
     pub(super) inner: Vector,
-    /// Whether they differ at all.
+    /// Whether the axes differ.
     pub(super) salient: bool,
 }
 

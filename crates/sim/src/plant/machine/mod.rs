@@ -65,28 +65,28 @@ use shaft::Shaft;
 /// Growth of copper's resistance from 25 °C, 1/K: it would be nothing at -234.5 °C.
 const COPPER: f32 = 1.0 / 259.5;
 
-/// Greatest growth of the resistance: copper boils at 2560 °C.
+/// Upper limit of the resistance's growth: copper boils at 2560 °C.
 const VAPOUR: f32 = 10.0;
 
-/// Bounds of what is left of a magnet's flux: it is not followed up to where it has none.
+/// Lower limit of a magnet's remaining flux.
 const LEAST_MAGNET: f32 = 0.1;
 const MOST_MAGNET: f32 = 2.0;
 
-/// What the windings are fed with for a step.
+/// The voltage at the windings in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Feed {
-    /// A voltage that stands still in the stator's frame, V.
+    /// A voltage that is constant in the stator's frame, V.
     Stator(Vector),
-    /// A voltage that turns with the rotor, V: d and q.
+    /// A voltage that is constant in the rotor's frame, V: d and q.
     Rotor(Vector),
 }
 
-/// Where the energy of a step went, J.
+/// The energies of a step, J.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Flow {
     /// Into the terminals.
     pub electrical: f32,
-    /// Heat of the windings and of what is in series with them.
+    /// Heat of the windings and of the resistance in series with them.
     pub copper: f32,
     /// Viscous and dry friction of the rotor.
     pub friction: f32,
@@ -94,11 +94,11 @@ pub struct Flow {
     pub iron: f32,
     /// Loss of the gear.
     pub gear: f32,
-    /// Into what the output drives, without what its springs and weights keep.
+    /// Into the load, without the energy stored in springs and weights.
     pub load: f32,
 }
 
-/// A motor with what hangs on its shaft, integrated in steps of one length.
+/// A motor with its load, integrated with a fixed step.
 #[derive(Debug, Clone)]
 pub struct Machine {
     config: MachineConfig,
@@ -106,7 +106,7 @@ pub struct Machine {
     locked: bool,
     /// Length of a step, s.
     period: f32,
-    /// Phase resistance now, Ω, and what is in series with it.
+    /// Phase resistance now, Ω, and the resistance in series with it.
     resistance: f32,
     series: f32,
     /// Flux linkage of the magnet now, Wb.
@@ -123,16 +123,16 @@ pub struct Machine {
     flux: Vector,
     /// Current in the stator's frame, A.
     current: Vector,
-    /// Where the rotor is: its electrical angle as a unit vector, turned along step by step and
-    /// taken from the position every [`EXACT`] steps.
+    /// Position of the rotor: its electrical angle as a unit vector. It is rotated step by step,
+    /// and computed from the position every [`EXACT`] steps.
     frame: Vector,
     count: u8,
-    /// rad/s.
+    /// Speed, rad/s.
     speed: f32,
-    /// What the last step added to the speed, rad/s, and what rounding left out of it.
+    /// Change of the speed in the last step, rad/s, and its rounding error.
     change: f32,
     rest: f32,
-    /// 2^32 a turn.
+    /// Position, 2^32 a turn.
     position: i64,
     /// Electromagnetic torque, mean of the last step, Nm.
     torque: f32,
@@ -171,41 +171,41 @@ impl Machine {
         }
     }
 
-    /// Puts the rotor at a position (2^32 a turn) with a speed (rad/s).
+    /// Sets the rotor's position (2^32 a turn) and speed (rad/s).
     pub fn place(&mut self, position: i64, speed: f32) {
         (self.position, self.speed) = (position, speed);
         (self.change, self.rest) = (0.0, 0.0);
         self.frame = Vector::unit(self.electrical_angle());
     }
 
-    /// Puts a resistance (Ω) in series with each phase.
+    /// Sets a resistance (Ω) in series with each phase.
     pub fn set_series(&mut self, resistance: f32) {
         self.series = resistance;
         self.decay = Decay::new(self.period, self.resistance + self.series, self.inverse);
     }
 
-    /// What the machine is.
+    /// The configuration.
     pub const fn config(&self) -> &MachineConfig {
         &self.config
     }
 
-    /// What hangs on the output.
+    /// The load.
     pub const fn load(&self) -> &LoadConfig {
         self.load.config()
     }
 
-    /// Hangs something else on the output.
+    /// Replaces the load.
     pub fn set_load(&mut self, load: LoadConfig) {
         self.load = Load::new(load, self.config.gear);
         self.shaft = Shaft::new(&self.config, &self.load, self.period);
     }
 
-    /// Holds the rotor where it is, or lets it go.
+    /// Locks or releases the rotor.
     pub const fn lock(&mut self, locked: bool) {
         self.locked = locked;
     }
 
-    /// Whether the rotor is held.
+    /// Whether the rotor is locked.
     pub const fn locked(&self) -> bool {
         self.locked
     }
@@ -245,13 +245,13 @@ impl Machine {
         self.poles * self.speed * self.magnet
     }
 
-    /// Voltage at the windings in the rotor's frame, mean of the last step, V: Vd and Vq, behind what is
-    /// in series with them.
+    /// Voltage at the windings in the rotor's frame, mean of the last step, V: Vd and Vq, without
+    /// the voltage of the resistance in series.
     pub const fn voltage(&self) -> Vector {
         self.voltage
     }
 
-    /// A vector of the stator's frame as the rotor saw it in the middle of the last step.
+    /// A vector of the stator's frame in the rotor's frame in the middle of the last step.
     pub fn seen_in_last_step(&self, vector: Vector) -> Vector {
         let way = 0.5 * self.period * (self.speed - 0.5 * self.change);
         let middle = self.position.wrapping_sub(angle::position(way));
@@ -281,7 +281,7 @@ impl Machine {
 
     /// Sets the temperatures of windings and magnet, °C.
     pub fn set_temperatures(&mut self, windings: f32, magnet: f32) {
-        /// Change of the resistance that is not worth a new exponential.
+        /// Smallest change of the resistance for which the exponential is computed again.
         const SAME: f32 = 1e-5;
         let left = 1.0 + self.config.magnet_coefficient * (magnet - 25.0);
         self.magnet = self.config.flux_linkage * within(left, LEAST_MAGNET, MOST_MAGNET);
@@ -299,7 +299,7 @@ impl Machine {
         0.75 * (self.config.inductance_d * id * id + self.config.inductance_q * iq * iq)
     }
 
-    /// Energy of what turns, and of what springs, weights and the cogging torque hold, J.
+    /// Kinetic energy, and the energy of springs, weights and the cogging torque, J.
     pub fn mechanical_energy(&self) -> f32 {
         let MachineConfig { cogging_torque, cogging_periods, .. } = self.config;
         let periods = f32::from(cogging_periods.max(1));
@@ -310,12 +310,12 @@ impl Machine {
             + cogging
     }
 
-    /// Where a position is in a period of the cogging, 2^32 a period.
+    /// Phase of the cogging at a position, 2^32 a period.
     fn cogging_angle(&self, position: i64) -> u32 {
         (position as u32).wrapping_mul(self.config.cogging_periods.into())
     }
 
-    /// Stops the current, as open terminals do.
+    /// Sets the current to 0, as with open terminals.
     pub(super) fn open(&mut self) {
         (self.flux, self.current, self.torque) = (Vector::ZERO, Vector::ZERO, 0.0);
     }

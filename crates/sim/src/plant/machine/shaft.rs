@@ -1,64 +1,65 @@
-//! What turns: the rotor, and what it drives through the gear.
+//! The rotor, and the load that it drives through the gear.
 
 use super::MachineConfig;
 use crate::plant::load::Load;
 
-/// What a step needs of all that turns.
+/// The values of rotor and load for a step.
 #[derive(Debug, Clone)]
 pub(super) struct Shaft {
     /// Inertia of the rotor and of the load, at the rotor, kg m².
     pub(super) inertia: f32,
-    /// That of the load alone, per length of a step, Nm s/rad.
+    /// That of the load alone, divided by the length of a step, Nm s/rad.
     behind: f32,
     /// Friction of the rotor that grows with speed, Nm s/rad.
     viscous: f32,
-    /// A gear without loss, and one that power goes through forwards and backwards.
+    /// A gear without loss, one with power transmitted forwards, and one with power transmitted
+    /// backwards.
     ideal: Passage,
     forward: Passage,
     backward: Passage,
-    /// Whether the gear loses anything.
+    /// Whether the gear has losses.
     lossy: bool,
 }
 
-/// What a gear makes of torques while power goes through it one way.
+/// The effect of a gear on torques, for one direction of the power.
 #[derive(Debug, Clone, Copy)]
 struct Passage {
     /// Torque at the rotor per torque at the output times the ratio: 1/η forwards, η' backwards.
     share: f32,
-    /// Speed per torque of a step, with the inertia that the rotor feels, rad/s/Nm.
+    /// Speed change per torque in a step, with the effective inertia at the rotor, rad/s/Nm.
     gain: f32,
 }
 
 /// Torques of a step at the rotor, Nm.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Torques {
-    /// What turns the rotor.
+    /// The torque that turns the rotor.
     pub(super) rotor: f32,
-    /// What brakes the rotor whatever its speed.
+    /// The torque that brakes the rotor at any speed.
     pub(super) dry: f32,
-    /// What the load has against growing angles.
+    /// The torque of the load against growing angles.
     pub(super) load: f32,
-    /// What brakes the load whatever its speed.
+    /// The torque that brakes the load at any speed.
     pub(super) brake: f32,
-    /// What brakes the load per speed, Nm s/rad.
+    /// The braking torque of the load per speed, Nm s/rad.
     pub(super) damping: f32,
 }
 
-/// What torques do in a step.
+/// The effect of torques in a step.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Change {
     /// Change of the speed, rad/s.
     pub(super) speed: f32,
     /// Direction of the motion: 1 or -1.
     pub(super) direction: f32,
-    /// Share of the dry torques that is needed: less than 1 in the step in which they stop the rotor.
+    /// Used fraction of the dry torques: less than 1 in the step in which they stop the rotor.
     pub(super) dry_share: f32,
-    /// Torque at the rotor that the gear loses, Nm.
+    /// Torque at the rotor lost in the gear, Nm.
     pub(super) lost: f32,
 }
 
 impl Torques {
-    /// The same, seen by a rotor that turns in `direction`.
+    /// The same torques for a rotor that turns in `direction`.
     fn along(&self, direction: f32) -> Self {
         Torques { rotor: direction * self.rotor, load: direction * self.load, ..*self }
     }
@@ -80,7 +81,7 @@ impl Shaft {
         }
     }
 
-    /// Whether a rotor at rest stays there.
+    /// Whether a rotor at rest remains at rest.
     pub(super) fn rests(&self, torques: &Torques) -> bool {
         [1.0, -1.0].into_iter().all(|direction| {
             let Torques { rotor, dry, load, brake, .. } = torques.along(direction);
@@ -89,10 +90,10 @@ impl Shaft {
         })
     }
 
-    /// What torques do to a rotor with a speed, rad/s; `rest` is added to the change.
+    /// The effect of torques on a rotor with a speed, rad/s. `rest` is added to the change.
     ///
-    /// The direction is that of a rotor without dry torques and losses, which never turn it back.
-    /// The gear is passed the way that agrees with the torque that it then transmits.
+    /// The direction is that of a rotor without dry torques and losses, because these never reverse
+    /// it. The direction of the power agrees with the torque that the gear then transmits.
     #[inline]
     pub(super) fn change(&self, speed: f32, rest: f32, torques: &Torques) -> Change {
         let frictionless = Torques { dry: 0.0, brake: 0.0, ..*torques };
@@ -124,14 +125,15 @@ impl Shaft {
         Change { speed: direction * change, direction, dry_share, lost: dry_share * lost }
     }
 
-    /// Share of the dry torques and of the gear's loss that takes away a speed in a step.
+    /// Fraction of the dry torques and of the gear's loss that stops a speed in a step.
     fn needed(&self, speed: f32, lost: f32, torques: &Torques) -> f32 {
         let dry = torques.dry + torques.brake + lost;
         let slower = self.ideal.gain * (self.viscous + torques.damping);
         if dry > 0.0 { speed * (1.0 + slower) / (self.ideal.gain * dry) } else { 0.0 }
     }
 
-    /// Change of a speed by torques on both sides of the gear; what grows with speed is implicit.
+    /// Change of a speed by torques on both sides of the gear. Torques that grow with speed are
+    /// implicit.
     #[inline]
     fn pushed(&self, passage: &Passage, speed: f32, torques: &Torques) -> f32 {
         let Torques { rotor, dry, load, brake, damping } = *torques;
@@ -140,14 +142,14 @@ impl Shaft {
         (gained - slower * speed) / (1.0 + slower)
     }
 
-    /// Torque that the gear has to transmit, without its loss, when a speed changes.
+    /// Torque that the gear must transmit for a change of speed, without its loss.
     #[inline]
     fn passed(&self, speed: f32, change: f32, torques: &Torques) -> f32 {
         let Torques { load, brake, damping, .. } = *torques;
         self.behind * change + load + brake + damping * (speed + change)
     }
 
-    /// How a torque passes the gear that acts against the motion or, when it is negative, with it.
+    /// The gear's effect for a transmitted torque: positive against the motion, negative with it.
     fn passage(&self, passed: f32) -> &Passage {
         if passed > 0.0 { &self.forward } else { &self.backward }
     }

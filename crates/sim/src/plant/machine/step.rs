@@ -7,17 +7,17 @@ use crate::control::within;
 use crate::plant::{Feed, load};
 use crate::vector::Vector;
 
-/// Steps after which rounding has done nothing to the rotor's frame yet.
+/// Number of steps in which rounding does not affect the rotor's frame.
 const EXACT: u8 = 32;
 
-/// Up to which what a step missed of the electrical angle does not stretch the frame, rad.
+/// Maximum correction of the electrical angle that does not stretch the frame, rad.
 const NEAR: f32 = 0.01;
 
-/// Speed at which any rotor has burst, rad/s: beyond, numbers lose their digits.
+/// Speed limit, rad/s: any real rotor would burst, and larger numbers lose precision.
 const FASTEST: f32 = 1e5;
 
 impl Machine {
-    /// Whether nothing changes as long as no current flows.
+    /// Whether the state remains unchanged while no current flows.
     pub(in crate::plant) fn rests(&self) -> bool {
         if self.speed != 0.0 || self.flux != Vector::ZERO || self.voltage != Vector::ZERO {
             return false;
@@ -26,7 +26,7 @@ impl Machine {
         self.locked || self.shaft.rests(&self.torques(self.position, 0.0, &load, 0.0))
     }
 
-    /// Lets a step pass with open terminals.
+    /// Executes a step with open terminals.
     pub(in crate::plant) fn coast(&mut self, flow: &mut Flow) {
         self.open();
         let half = self.half();
@@ -35,13 +35,13 @@ impl Machine {
         self.voltage = Vector::new(0.0, self.back_emf_amplitude());
     }
 
-    /// Lets a voltage act for a step; adds where energy went.
+    /// Executes a step with a voltage. Adds the energies to `flow`.
     #[inline]
     pub fn step(&mut self, feed: Feed, flow: &mut Flow) {
         let half = self.half();
         let end = self.frame.turned(half.turn).turned(half.turn);
         let emf = Vector::new(0.0, half.electrical * self.magnet);
-        // The voltage as the rotor sees it, what of it is constant there, and what is not.
+        // The voltage in the rotor's frame: its constant part, and the rest.
         let (v1, v2, v3, constant, still) = match feed {
             Feed::Stator(v) => {
                 let v1 = v.seen_from(self.frame);
@@ -52,7 +52,8 @@ impl Machine {
         };
         let gone = self.gone(&half);
         let driven = constant.turned(self.response(&half, gone));
-        // What is added is small, and summed first: so the flux linkage keeps its digits.
+        // The added terms are small and are summed first, which keeps the precision of the flux
+        // linkage.
         let f1 = self.flux;
         let f2 = self.apart(f1, self.decay.outer);
         let f2 = f2 + (driven + v2 * still - f2.turned(gone));
@@ -80,15 +81,15 @@ impl Machine {
         self.advance(half, end, flow);
     }
 
-    /// What half a step takes away of a flux linkage as it turns back and dies away.
+    /// The part of a flux linkage that half a step removes by rotation and decay.
     #[inline]
     fn gone(&self, half: &Half) -> Vector {
         let left = 1.0 - self.decay.gone;
         Vector::new(self.decay.gone + left * half.fallen, left * half.turn.y)
     }
 
-    /// For how long a constant voltage of the rotor's frame acts in half a step, s: a complex number,
-    /// because what it did first has turned back since.
+    /// The effective time of a constant voltage of the rotor's frame in half a step, s. It is
+    /// complex, because the earlier effect has rotated back.
     #[inline]
     fn response(&self, half: &Half, gone: Vector) -> Vector {
         if half.electrical == 0.0 {
@@ -98,13 +99,13 @@ impl Machine {
         gone.seen_from(rate) * (1.0 / rate.square())
     }
 
-    /// A flux linkage after what the axes differ in has acted.
+    /// A flux linkage after the effect of the difference of the axes.
     #[inline]
     fn apart(&self, flux: Vector, shares: Vector) -> Vector {
         if self.decay.salient { flux.grown(shares) } else { flux }
     }
 
-    /// The first half of a step, by the speed and its last change.
+    /// The first half of a step, from the speed and its last change.
     #[inline]
     fn half(&self) -> Half {
         let speed = self.speed + 0.5 * self.change;
@@ -114,12 +115,12 @@ impl Machine {
         Half { position, speed, electrical: self.poles * speed, way, turn, fallen }
     }
 
-    /// Moves the rotor on, which was foreseen to come to `end`, with the torques of friction and load
-    /// as in the middle of the step.
+    /// Moves the rotor, whose predicted position is `end`, with the torques of friction and load in
+    /// the middle of the step.
     #[inline]
     fn advance(&mut self, half: Half, end: Vector, flow: &mut Flow) {
         if self.locked {
-            // What holds the rotor takes its energy.
+            // The lock absorbs the rotor's energy.
             flow.load += 0.5 * self.shaft.inertia * self.speed * self.speed;
             (self.speed, self.change, self.rest) = (0.0, 0.0, 0.0);
             return;
@@ -128,7 +129,8 @@ impl Machine {
         let last = self.speed;
         let load = self.load.at(half.position, half.speed);
         let torques = self.torques(half.position, half.speed, &load, self.torque);
-        // A flywheel's speed changes by less than its last digits: what they leave out is kept.
+        // The change of a flywheel's speed is below the precision of the speed, so the rounding
+        // error is kept.
         let change = self.shaft.change(last, self.rest, &torques);
         self.speed = within(last + change.speed, -FASTEST, FASTEST);
         self.change = self.speed - last;
@@ -144,7 +146,7 @@ impl Machine {
             end + Vector::new(-end.y, end.x) * missed
         };
 
-        // Each torque times the way is the kinetic energy's change, to the last digit.
+        // The sum of each torque times the angle is exactly the change of the kinetic energy.
         let ahead = change.direction * way;
         let dry_way = change.dry_share * ahead;
         let slowed = self.speed * way;
@@ -175,7 +177,7 @@ impl Machine {
         -self.config.cogging_torque * angle::sin(self.cogging_angle(position))
     }
 
-    /// Torque that brakes the rotor whatever its direction, at a speed, Nm.
+    /// Torque that brakes the rotor in each direction, at a speed, Nm.
     fn dry(&self, speed: f32) -> f32 {
         let MachineConfig { coulomb_friction, stiction, iron_hysteresis, .. } = self.config;
         let relative = speed * self.inverse_stribeck;
@@ -186,22 +188,22 @@ impl Machine {
 
 /// The first half of a step.
 struct Half {
-    /// Where it ends.
+    /// The position at its end.
     position: i64,
     /// Speed at its end, of the rotor and electrical, rad/s.
     speed: f32,
     electrical: f32,
-    /// Angle that the rotor turns in it, rad, as an electrical unit vector, and what that lacks of 1
-    /// along the first axis.
+    /// The rotor's rotation in it, rad; as an electrical unit vector, with the difference of the
+    /// first component to 1.
     way: f32,
     turn: Vector,
     fallen: f32,
 }
 
-/// The unit vector of an angle in rad, which is small but for odd motors, and one less its cosine.
+/// The unit vector of an angle in rad, usually small, and 1 minus its cosine.
 #[inline]
 fn small(x: f32) -> (Vector, f32) {
-    /// Up to which the series are exact enough, rad.
+    /// Up to this angle the series are precise enough, rad.
     const SMALL: f32 = 0.5;
     if x.abs() > SMALL {
         return great(x);
