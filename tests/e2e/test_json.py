@@ -113,7 +113,7 @@ def test_rmd_tells_what_was_done_or_read(checked, command):
         ("st -p sim: scan", 2, {"kind": "usage"}),
         ("st -p /dev/nothing-there info", 3, {"kind": "link", "port": "serial:/dev/nothing-there"}),
         ("rmd -p sim: torque 33", 2, {"kind": "usage", "port": "sim:"}),
-        ("rmd -p sim: zero", 2, {"kind": "usage", "try": "add --write-rom if that is meant"}),
+        ("rmd -p sim: zero", 2, {"kind": "usage", "try": "add --write-rom to allow it"}),
         ("rmd -p sim: -i 9 status", 3, {"kind": "silent", "motor": 9, "try": SCAN}),
         ("st -p foo: info", 2, {"kind": "usage"}),
         ("rmd -p sim: -i 9 angle", 3, {"kind": "silent", "motor": 9}),

@@ -126,7 +126,7 @@ def test_pid_sets_one_gain_and_leaves_the_others(rmd):
         ("speed=3", "the gains are position_kp, position_ki, speed_kp"),
         ("speed_kp=256", "a whole number from 0 to 255"),
         ("speed_kp=", "a whole number from 0 to 255"),
-        ("speed_kp=1 2", "there is no gain `2`"),
+        ("speed_kp=1 2", "a motor has no gain `2`"),
         ("1 2 3 4 5 x", "a whole number from 0 to 255"),
     ],
 )

@@ -1,4 +1,4 @@
-//! What to try after an error of the library: which command, which option.
+//! Advice after errors of the library: a command or an option to try.
 
 use motorlink::port::PortError;
 use motorlink::relay::RelayError;
@@ -53,9 +53,11 @@ pub fn st(error: &st::Error) -> Option<&'static str> {
         st::Error::Failed { failure, .. } => match failure {
             Failure::Timeout | Failure::Header(_) | Failure::Damaged(_) => Some(TRY_RATES),
             Failure::Size { fits: Some(Profile::Mcsdk54), .. } => {
-                Some("say so: --profile mcsdk-5.4")
+                Some("if the drive has MCSDK firmware, add --profile mcsdk-5.4")
             }
-            Failure::Size { fits: Some(Profile::Spec), .. } => Some("say so: --profile spec"),
+            Failure::Size { fits: Some(Profile::Spec), .. } => {
+                Some("if the drive follows the document, add --profile spec")
+            }
             _ => None,
         },
         st::Error::Refused { code: ErrorCode::BadMotorSelected, .. } => {

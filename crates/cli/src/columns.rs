@@ -1,7 +1,7 @@
-//! Samples as a table: a header with names and units, and a line a sample.
+//! Samples as a table: a header with names and units, and one line per sample.
 //!
-//! A table that is wider than the terminal is folded: its columns go to several lines of a sample, and
-//! those of the header likewise. Where stdout is no terminal a sample is always one line.
+//! A table that is wider than the terminal is folded: each sample takes several lines, and the header
+//! too. If stdout is not a terminal, each sample is one line.
 
 use std::ops::Range;
 
@@ -11,12 +11,12 @@ use crate::failure::Failure;
 use crate::json::Cell;
 use crate::output::{in_words, print_line};
 
-/// Space for a number, at least.
+/// The minimum width of a number.
 const NARROWEST: usize = 7;
-/// Space for the seconds since the first sample.
+/// The width of the time.
 const TIME: usize = 10;
 const GAP: &str = "  ";
-/// What stands in place of a value that could not be read.
+/// The text of a value that the drive refused to give.
 const NO_VALUE: &str = "-";
 
 /// A table that grows with time.

@@ -1,4 +1,4 @@
-//! What every command that opens a port takes.
+//! Options of every command that opens a port.
 
 use motorlink::port::{ByteLink, CanLink, FaultBytes, FaultCan, PortName, TapBytes, TapCan};
 use motorlink::rmd::IDENTIFIERS;
@@ -15,10 +15,10 @@ use crate::trace;
 pub struct Connection {
     #[command(flatten)]
     port: Port,
-    /// Print JSON, an object a line
+    /// Print JSON, one object per line
     #[arg(long, global = true)]
     json: bool,
-    /// Take and print values as raw protocol values instead of physical units
+    /// Read and print raw protocol values instead of physical units
     #[arg(long, global = true)]
     pub raw: bool,
     /// Show every frame on stderr
@@ -44,8 +44,7 @@ impl Connection {
         self.port.name()
     }
 
-    /// What goes around a serial line each time it is opened. A line that is opened again suffers
-    /// other damage, as one that is used on would.
+    /// Wraps a serial line each time it is opened, for --trace and --fault. Each opening has other damage.
     pub fn around_line(
         &self,
         profile: Profile,
@@ -85,7 +84,7 @@ impl Port {
     pub fn name(&self) -> Result<PortName, Failure> {
         match self.port.as_deref() {
             Some(name) if !name.is_empty() => Ok(name.parse()?),
-            _ => Err(Failure::usage("which port?").trying(
+            _ => Err(Failure::usage("the port is missing").trying(
                 "give -p PORT or set MOTORLINK_PORT; `motorlink ports` lists what is connected, and \
                  `-p sim:` needs no hardware",
             )),

@@ -1,4 +1,4 @@
-//! How the program ends when it did not do what it was asked.
+//! Failures: kinds, exit codes, messages.
 
 use motorlink::port::{NameError, PortError};
 use motorlink::relay::RelayError;

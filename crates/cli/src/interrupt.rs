@@ -1,7 +1,7 @@
-//! Signals that ask for the end. A one-shot command ends at once and leaves the motor as told;
-//! whatever holds a line open takes the signals over, ends in order and stops its motors.
+//! Signals that end the program. A command that is one exchange ends at once, and the motor keeps its
+//! state. A command that keeps a line open handles the signals, stops its motors and ends.
 //!
-//! A signal that is ignored when the program starts stays ignored, as `nohup` means it.
+//! A signal that is ignored when the program starts stays ignored, as with `nohup`.
 
 use std::ops::RangeInclusive;
 use std::process::exit;
@@ -18,12 +18,12 @@ use crate::output::note;
 /// Exit code of a program that a signal ended.
 const INTERRUPTED_CODE: i32 = 130;
 
-/// Ctrl-C, what supervisors send, and a terminal that is closed.
+/// Sent by Ctrl-C, by supervisors, and when a terminal is closed.
 const ENDING: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
-/// Others that end a program which does not handle them, beside those that tell of a defect in it.
+/// Other signals that end a program by default, except those for crashes.
 const KILLING: [i32; 9] =
     [SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGXCPU, SIGXFSZ];
-/// So do Linux's SIGSTKFLT and SIGPWR, and its real-time signals.
+/// Those of Linux: SIGSTKFLT, SIGPWR and the real-time signals.
 const LINUX: [RangeInclusive<i32>; 3] = [16..=16, 30..=30, 34..=64];
 /// Those that suspend one.
 const SUSPENDING: [i32; 3] = [SIGTSTP, SIGTTIN, SIGTTOU];
@@ -35,7 +35,7 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static LOCK: Mutex<()> = Mutex::new(());
 static WAKE: Condvar = Condvar::new();
 
-/// Handles the signals: they end the process at once until someone takes over.
+/// Handles the signals. They end the process at once until [`take_over`].
 pub fn install() {
     let listening = Signals::new(obeyed(&ENDING)).and_then(|mut signals| {
         let handle = signals.handle();
@@ -50,14 +50,14 @@ pub fn install() {
     }
 }
 
-/// From now on the caller looks at [`interrupted`] and ends in order. A second signal ends the process
-/// at once.
+/// From now on the caller polls [`interrupted`] and ends in order. A second signal ends the process at
+/// once.
 pub fn take_over() {
     TAKEN_OVER.store(true, Ordering::SeqCst);
 }
 
-/// As [`take_over`], for what motors depend on: every signal that would end the process asks for its
-/// end in order, however many come, and none suspends it.
+/// As [`take_over`], if motors depend on this process: all signals that would end it are handled, a second
+/// signal does not end it at once, and no signal suspends it.
 pub fn hold() {
     HOLDS.store(true, Ordering::SeqCst);
     take_over();

@@ -1,4 +1,4 @@
-//! Results for programs: docs/JSON.md says what they look like. All values are made here.
+//! Results for programs, as docs/JSON.md describes them. All values are made here.
 
 use motorlink::rmd::{Field, Meaning, Scale};
 use motorlink::st::{Flags, Reading, RegisterId};
@@ -14,7 +14,7 @@ pub struct Row {
     pub value: Value,
 }
 
-/// What came of a value that was to be read.
+/// The result of reading one value.
 pub enum Cell {
     Read(Row),
     /// The drive refused to give the value of this name.
@@ -137,7 +137,7 @@ impl Line {
         if errors.is_empty() { line } else { line.with("errors", errors) }
     }
 
-    /// Says that it was not done, and why.
+    /// With `"ok": false` and the error.
     pub fn failed(self, failure: &Failure) -> Self {
         self.ok(false).with("error", failure.object())
     }

@@ -43,21 +43,21 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Drive simulated motors of both kinds through real ports, and show what happens
+    /// Show simulated motors of both kinds, driven through real ports
     Demo(demo::Args),
     /// Serve simulated drives on ports of this machine
     Sim(sim::Args),
-    /// Hold the line of a drive for a program, and stop its motors when the program is gone
+    /// Stand between a program and a drive, and stop the motors when the program ends or fails
     Guard(guard::Args),
-    /// List serial devices and CAN interfaces, and what could be wrong with them
+    /// List serial devices and CAN interfaces, with their problems
     Ports(ports::Args),
-    /// Talk to a drive that speaks ST's Motor Control Protocol
+    /// Command and read a drive that speaks ST's Motor Control Protocol
     #[command(after_help = help::st_ports())]
     St(st::Args),
-    /// Talk to RMD motors on a CAN bus
+    /// Command and read RMD motors on a CAN bus
     #[command(after_help = help::rmd_ports())]
     Rmd(rmd::Args),
-    /// Check a drive against the document it claims to follow, sentence by sentence
+    /// Check a drive, or your own program, against the documents of the protocols
     Conformance(conformance::Args),
     /// Print completions for a shell
     Completions {
@@ -72,7 +72,7 @@ enum Command {
     },
 }
 
-/// Does what a command line says, the program's name first, and gives the exit code: 0 done, 1 the
+/// Runs a command line, which begins with the program's name. Returns the exit code: 0 done, 1 the
 /// drive refused, 2 usage, 3 the line failed, 130 interrupted. `program` starts this command in a
 /// process of its own.
 ///
@@ -96,7 +96,7 @@ pub fn run(program: &[OsString], words: impl IntoIterator<Item = OsString>) -> u
             return 2;
         }
         Err(error) => {
-            // Help for a reader that is gone.
+            // The reader of the help may have closed it.
             let _ = error.print();
             return error.exit_code().try_into().unwrap_or(2);
         }
@@ -135,8 +135,8 @@ fn parse(words: Vec<OsString>) -> Result<Cli, clap::Error> {
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 
-/// The words of a command line. Numbers such as `-1e-3` and `-.5` are as clap reads them: `-0.001`,
-/// `-0.5`. What is behind `--` is another program's.
+/// The words of a command line. clap takes numbers such as `-1e-3` and `-.5` for options, so they become
+/// `-0.001` and `-0.5`. Words behind `--` belong to another program.
 fn own_words(words: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
     let mut words: Vec<OsString> = words.into_iter().collect();
     let own = words.iter().position(|word| word == "--").unwrap_or(words.len());

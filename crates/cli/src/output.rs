@@ -1,4 +1,4 @@
-//! What people and programs read: aligned rows, or a JSON object a line.
+//! Output: aligned rows for people, or one JSON object per line for programs.
 
 use std::io::{Write, stderr, stdout};
 use std::sync::OnceLock;
@@ -13,7 +13,7 @@ use crate::json::{Cell, Line, Row};
 use crate::terminal::safe;
 use crate::voice::Voice;
 
-/// stdout and stderr of a program that must not wait for their readers.
+/// stdout and stderr, if the program must not wait for their readers.
 static VOICES: OnceLock<(Voice, Voice)> = OnceLock::new();
 
 /// Whether stderr has JSON, too.
@@ -60,7 +60,7 @@ impl Printer {
                 Cell::Read(_) => None,
             })
             .collect();
-        // A program has each in its results.
+        // In JSON each refusal is in the result.
         while !self.json && refusals.len() > 1 {
             report(&refusals.remove(0));
         }
@@ -94,22 +94,22 @@ pub fn has_json_messages() -> bool {
     JSON.load(Ordering::Relaxed)
 }
 
-/// From now on nothing that is printed is waited for: motors depend on this program, or drives do.
-/// Gives stdout.
+/// From now on printing does not block, because motors or drives depend on this program. Returns stdout.
 pub fn never_wait() -> &'static Voice {
     let (results, _) = VOICES.get_or_init(|| {
-        let messages = |lines| format!("{lines} lines were dropped here: nobody read them");
+        let messages =
+            |lines| format!("{lines} lines were dropped here, because they were not read in time");
         (Voice::new(stdout(), missed), Voice::new(stderr(), messages))
     });
     results
 }
 
-/// Stands where `lines` JSON lines were dropped.
+/// The JSON line in place of `lines` dropped lines.
 pub fn missed(lines: u64) -> String {
     json!({ "event": "dropped", "lines": lines }).to_string()
 }
 
-/// Gives what was printed a moment to be read, at the end of a program that waits for nothing.
+/// Waits a moment until all output is written, after [`never_wait`].
 pub fn finish() {
     if let Some((results, messages)) = VOICES.get() {
         messages.finish();
@@ -117,7 +117,7 @@ pub fn finish() {
     }
 }
 
-/// Prints a line on stderr; it must not matter whether somebody reads it.
+/// Prints a note on stderr.
 pub fn note(text: impl std::fmt::Display) {
     if has_json_messages() {
         return print_message(&json!({ "note": console::strip_ansi_codes(&text.to_string()) }));
@@ -133,7 +133,7 @@ pub fn print_message(text: &dyn std::fmt::Display) {
     }
 }
 
-/// Says on stderr why the program fails; gives the exit code.
+/// Prints a failure on stderr; returns the exit code.
 pub fn report(failure: &Failure) -> u8 {
     let code = failure.exit_code();
     match failure {
@@ -162,7 +162,7 @@ pub fn print_line(text: &dyn std::fmt::Display) -> Result<(), Failure> {
         .map_err(|error| Failure::output(&error))
 }
 
-/// A bar on stderr for a scan of `steps` steps; nothing where stderr is no terminal.
+/// A progress bar on stderr for a scan of `steps` steps, if stderr is a terminal.
 pub fn progress(steps: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64);
     let style = ProgressStyle::with_template("{spinner} {bar:24} {pos}/{len} {msg}");

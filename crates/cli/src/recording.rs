@@ -48,7 +48,7 @@ impl Recording {
         matches!(self.out, Out::Stdout)
     }
 
-    /// Writes a sample; nothing of it stays in a buffer.
+    /// Writes a sample without a buffer.
     pub fn sample(&mut self, seconds: f64, cells: &[Cell]) -> Result<(), Failure> {
         if self.columns.is_none() {
             self.columns = Some(cells.len());
@@ -67,7 +67,7 @@ impl Recording {
         self.write(&format!("{seconds:.6},{},", numbers.join(",")))
     }
 
-    /// Writes that something happened, in a line without values.
+    /// Writes a row with an event and without values.
     pub fn event(&mut self, seconds: f64, event: &'static str) -> Result<(), Failure> {
         match self.columns {
             Some(columns) => self.write(&format!("{seconds:.6}{},{event}", ",".repeat(columns))),

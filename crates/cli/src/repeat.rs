@@ -1,4 +1,4 @@
-//! Reading again and again, through losses of the line.
+//! Loops of samples, which continue after an outage of the line.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -17,13 +17,13 @@ use crate::span::parse_span;
 /// How often to read, and where the samples go.
 #[derive(clap::Args, Clone)]
 pub struct Repeat {
-    /// Read again and again at this interval, such as 100ms, until Ctrl-C
+    /// Repeat at this interval, such as 100ms, until Ctrl-C
     #[arg(long, value_name = "TIME", value_parser = parse_span)]
     pub every: Option<Duration>,
     /// Stop after this many samples
     #[arg(long, value_name = "N", requires = "every")]
     count: Option<u64>,
-    /// Write the samples to this file, too, as comma-separated values; - writes them to stdout instead
+    /// Also write the samples to this file, as comma-separated values; - is stdout, without the table
     #[arg(long, value_name = "FILE", requires = "every", value_hint = clap::ValueHint::FilePath)]
     csv: Option<PathBuf>,
     /// Overwrite the file of --csv if it exists
@@ -31,8 +31,8 @@ pub struct Repeat {
     force: bool,
 }
 
-/// Prints the values of one sample, or with --every of many with the seconds since the first. Then a
-/// line that fails is waited for, and results for programs begin with `object`. `clock` is the port's.
+/// Prints one sample, or with --every many samples with their time. In a loop, a failed line is tried again
+/// until it works. JSON results begin with `object`. `clock` is that of the port.
 pub fn repeated(
     clock: &Clock,
     repeat: &Repeat,
@@ -68,7 +68,7 @@ pub fn repeated(
             }
             Err(other) => return Err(other),
         }
-        // A slow line skips samples rather than falling behind.
+        // If the line is slow, samples are skipped.
         let now = elapsed();
         while due <= now {
             due += every;
@@ -76,7 +76,7 @@ pub fn repeated(
         if left > 0 && outage.is_none() {
             interrupt::wait_by(clock, due - now);
         } else if left > 0 {
-            // The clock of a port that is lost may be virtual, and its return takes real time.
+            // The clock of a lost port may be virtual, but the port returns in real time.
             interrupt::wait(due - now);
         }
     }
@@ -174,7 +174,7 @@ impl<'a> Sink<'a> {
         self.object.clone().at(Some(elapsed.as_secs_f64())).with("event", name)
     }
 
-    /// Prints on stdout. A recording goes on when the reader of stdout is gone.
+    /// Prints on stdout. If stdout is closed, a recording continues.
     fn print(
         &mut self,
         print: impl FnOnce(&mut Self) -> Result<(), Failure>,

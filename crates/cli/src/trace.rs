@@ -1,4 +1,4 @@
-//! `--trace`: every frame in both directions on stderr, in bytes and in words.
+//! `--trace`: prints every frame on stderr, as bytes and with its meaning.
 
 use std::time::Duration;
 

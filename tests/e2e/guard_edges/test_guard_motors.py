@@ -114,7 +114,7 @@ def test_a_guard_proves_that_it_stops_a_motor(bench, run, protocol):
         (["rmd", "-p", "/dev/ttyACM0"], "use slcan:"),
         (["st", "-p", "sim:"], "end with it"),
         (["rmd", "-p", "sim:"], "end with it"),
-        (["rmd"], "which port?"),
+        (["rmd"], "the port is missing"),
     ],
 )
 def test_what_cannot_be_guarded_is_told(run, words, says):

@@ -14,19 +14,19 @@ use crate::span::parse_span;
 
 /// Behind `motorlink conformance host --help`.
 const CONTRACT: &str = "\
-Your program is run once for each scenario, before a drive that misbehaves in its own way. It opens \
-the port once, reads a value 4 times and prints each on a line of its own. Where a reading fails it \
-prints something without a number, on stdout or stderr, or ends with another exit code than 0; it \
-may go on or end.
+Your program runs once for each scenario, with a drive that has one fault. It opens the port once, \
+reads a value 4 times and prints each value on its own line. If a reading fails, it prints a line \
+without a number, on stdout or stderr, or ends with an exit code other than 0. After a failed reading \
+it may continue or end.
   st   SPEED_MEAS (0x1E) of motor 1, in rpm
   rmd  the multi-turn angle (0x92) of motor 1, in degrees
-{port} in its arguments becomes the port as motorlink names it, {path} the device or HOST:PORT; \
-MOTORLINK_PORT and MOTORLINK_PATH are the same. Each reading has a value of its own, so what your \
-program prints tells which reply it took for which request.
-With --start, --off, --echo and --cycle other commands are run as well. Those of --start and --off \
-end with 0 only when the drive acknowledged it.
+In its arguments {port} is replaced with the name of the port for motorlink, and {path} with the \
+device or HOST:PORT. The environment variables MOTORLINK_PORT and MOTORLINK_PATH have the same values. \
+Each reply has a different value. So the output shows which reply your program used for which request.
+--start, --off, --echo and --cycle add commands. The commands of --start and --off must end with 0 \
+only if the drive acknowledged them.
   motorlink conformance host st --serve pty:./st0 -- python3 my_host.py {path}
-docs/HOST-CONFORMANCE.md has an example in Python and what each scenario expects.";
+docs/HOST-CONFORMANCE.md has an example in Python and describes each scenario.";
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -38,9 +38,9 @@ pub struct Args {
 pub enum Command {
     /// Check a drive that speaks ST's Motor Control Protocol
     ///
-    /// The motor has to be idle and without a fault, and nobody else may speak to the drive. Without
-    /// --spin nothing is sent that may start it; what is written is put back. The duration of the
-    /// last ramp cannot be read, so 2 s stay.
+    /// The motor must be idle and without faults. No other program may use the drive. Without --spin no
+    /// command is sent that may start the motor. Written values are restored, except the duration of the
+    /// last ramp: it cannot be read, and is 2 s afterwards.
     #[command(after_help = EXIT_CODES)]
     St {
         #[command(flatten)]
@@ -50,21 +50,21 @@ pub enum Command {
         /// The motor, 1 to 7
         #[arg(short, long, default_value = "1", value_parser = parse_motor)]
         motor: MotorNumber,
-        /// What the drive is held to: the document as written, or what MCSDK 5.4 firmware does
+        /// Protocol variant: spec is the document, mcsdk-5.4 is shipped firmware
         #[arg(long, default_value = "spec", value_parser = hint::profile())]
         profile: Profile,
     },
     /// Check a motor that speaks the RMD protocol V1.62
     ///
-    /// The motor has to be at rest. Even without --spin it is told to be off (0x80) and to stop
-    /// (0x81): one that holds a load lets go of it. Nobody else may speak to it meanwhile.
+    /// The motor must be at rest. No other program may use it. Even without --spin it gets the commands
+    /// off (0x80) and stop (0x81): if it holds a load, the load may fall.
     #[command(after_help = EXIT_CODES)]
     Rmd {
         #[command(flatten)]
         port: Port,
         #[command(flatten)]
         run: Run,
-        /// Allow cases that write the motor's ROM, which wears
+        /// Allow cases that write the ROM of the motor. Each write wears the ROM
         #[arg(long)]
         write_rom: bool,
         /// The motor's ID, 1 to 32
@@ -74,17 +74,17 @@ pub enum Command {
         #[arg(long, default_value = "14", value_parser = parse_encoder)]
         encoder: EncoderBits,
     },
-    /// Check a host: serve a drive that misbehaves and see what your program makes of it
+    /// Check your own program: serve drives with faults, and check how the program handles them
     #[command(after_help = CONTRACT)]
     Host(Host),
-    /// Print every scenario that a host is put through, as a Markdown table
+    /// Print the scenarios of `conformance host`, as a Markdown table
     Scenarios {
-        /// Of which protocol
+        /// The protocol
         which: Which,
     },
-    /// Print every clause and what tests it, as a Markdown table
+    /// Print every clause and its tests, as a Markdown table
     Clauses {
-        /// Of which document
+        /// The document
         which: Which,
     },
 }
@@ -104,9 +104,9 @@ pub enum Readings {
 
 /// Behind `motorlink conformance st --help` and `rmd --help`.
 pub const EXIT_CODES: &str = "\
-Exit codes: 0 no case failed, 1 a case failed, 2 the command does not make sense, 3 cases were not
-run because the line or the drive failed, 130 interrupted. A difference from a reading is no failure
-unless --readings strict is given.";
+Exit codes: 0 no case failed, 1 a case failed, 2 the command line is invalid, 3 cases
+were not run because the line or the drive failed, 130 Ctrl-C. A difference from a
+reading is a failure only with --readings strict.";
 
 /// What may be done to the drive, and where the results go.
 #[derive(clap::Args)]
@@ -117,15 +117,16 @@ pub struct Run {
     /// A shell command that cycles the drive's power and returns when the drive is back
     #[arg(long, value_name = "COMMAND")]
     pub power_cycle: Option<String>,
-    /// A shell command that makes a fault condition present, such as a low supply
+    /// A shell command that causes a fault, such as a low supply voltage
     #[arg(long, value_name = "COMMAND", requires = "fault_off")]
     pub fault_on: Option<String>,
-    /// A shell command that ends it
+    /// A shell command that ends this fault
     #[arg(long, value_name = "COMMAND", requires = "fault_on")]
     pub fault_off: Option<String>,
-    /// Whether a drive that differs from our reading of what the document leaves open has failed
+    /// How to treat differences from our reading of sentences that are open in the document
     ///
-    /// Apart: it has not; the difference is listed with its row of docs/SPEC-NOTES.md. Strict: it has.
+    /// apart: the case passes, and the difference is listed with its row of docs/SPEC-NOTES.md. strict: the
+    /// case fails.
     #[arg(long, value_name = "HOW", default_value = "apart")]
     pub readings: Readings,
     #[command(flatten)]
@@ -135,16 +136,16 @@ pub struct Run {
 /// What is run and shown, and where the results go.
 #[derive(clap::Args)]
 pub struct Results {
-    /// Only cases with this in their name or in a clause they test, such as ST-4.5
+    /// Run only cases with this text in their name or in a clause, such as ST-4.5
     #[arg(long, value_name = "TEXT")]
     pub only: Option<String>,
-    /// Show every case, not only those that did not pass
+    /// Show all cases, also those that passed
     #[arg(short, long)]
     pub verbose: bool,
     /// Write the results as JUnit XML
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     pub junit: Option<PathBuf>,
-    /// Write the results as JSON; without a file, to stdout instead of the table
+    /// Write the results as JSON; without a file, to stdout in place of the table
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
     pub json: Option<PathBuf>,
 }
@@ -152,31 +153,31 @@ pub struct Results {
 /// A host under test.
 #[derive(clap::Args)]
 pub struct Host {
-    /// Which protocol it speaks
+    /// The protocol of your program
     pub which: Which,
-    /// Where the drive is served: pty:PATH or tcp-listen:ADDR:PORT for ST, slcan-pty:PATH or
+    /// Serve the drive at this port: pty:PATH or tcp-listen:ADDR:PORT for ST, slcan-pty:PATH or
     /// tcp-listen:ADDR:PORT for RMD
     #[arg(long, value_name = "PORT")]
     pub serve: ServeName,
     /// How long your program waits for a reply [default: 1s for ST, 50ms for RMD]
     #[arg(long, value_name = "TIME", value_parser = parse_span)]
     pub timeout: Option<Duration>,
-    /// How long a run of your program may take; then it is ended
+    /// Time limit for one run of your program; then it is killed
     #[arg(long, value_name = "TIME", value_parser = parse_span, default_value = "20s")]
     pub limit: Duration,
-    /// Which number of a line is the value, counted from 1 [default: the last]
+    /// Which number of an output line is the value, counted from 1 [default: the last]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     pub field: Option<u8>,
-    /// A shell command that starts motor 1 of an ST drive once
+    /// A shell command that starts motor 1 of the ST drive
     #[arg(long, value_name = "COMMAND")]
     pub start: Option<String>,
-    /// A shell command that switches RMD motor 1 off once
+    /// A shell command that switches RMD motor 1 off
     #[arg(long, value_name = "COMMAND")]
     pub off: Option<String>,
-    /// A shell command that reads as COMMAND does, from an RMD adapter that echoes what it is sent
+    /// A shell command that reads like your program, from an adapter that echoes each frame
     #[arg(long, value_name = "COMMAND")]
     pub echo: Option<String>,
-    /// A shell command that reads the angles of RMD motors 1 to 4 at once, four times, and prints each
+    /// A shell command that reads the angles of RMD motors 1 to 4 together, four times, and prints each
     /// on a line that begins with the ID
     #[arg(long, value_name = "COMMAND")]
     pub cycle: Option<String>,
@@ -189,12 +190,12 @@ pub struct Host {
 
 fn parse_motor(text: &str) -> Result<MotorNumber, String> {
     let motor = text.parse().ok().and_then(MotorNumber::new);
-    motor.ok_or_else(|| "motors have the numbers 1 to 7".to_owned())
+    motor.ok_or_else(|| "motor numbers are 1 to 7".to_owned())
 }
 
 fn parse_id(text: &str) -> Result<MotorId, String> {
     let id = text.parse().ok().and_then(MotorId::new);
-    id.ok_or_else(|| "motors have the IDs 1 to 32".to_owned())
+    id.ok_or_else(|| "motor IDs are 1 to 32".to_owned())
 }
 
 fn parse_encoder(text: &str) -> Result<EncoderBits, String> {

@@ -27,7 +27,7 @@ const TRIES: usize = 5;
 const PUNCTUAL: u32 = 8;
 /// How long what a program said may take to come when it has ended.
 const LAST_WORDS: Duration = Duration::from_secs(1);
-/// Bytes that a program may say; then nobody reads it any more.
+/// How many bytes of the output of a program are kept.
 const WORDS: u64 = 1 << 20;
 /// Lines of it that a report quotes.
 const QUOTED: usize = 50;
@@ -68,7 +68,7 @@ pub fn run(args: &Host) -> Result<(), Failure> {
     }
 }
 
-/// Tells what passed a served drive.
+/// Returns the journal of a served drive.
 type Tell = Box<dyn Fn() -> Journal>;
 
 fn conduct<S>(

@@ -26,7 +26,7 @@ impl Screen {
         self.bar.inc(1);
     }
 
-    /// Prints what came of it.
+    /// Prints the results.
     pub fn summary(&self, report: &Report) -> Result<(), Failure> {
         self.bar.finish_and_clear();
         if self.quiet {

@@ -29,26 +29,25 @@ const SIGNAL_PERIOD: Duration = Duration::from_millis(50);
 #[command(
     args_conflicts_with_subcommands = true,
     after_help = "\
-Without `st` or `rmd` it guards an ST drive; options go behind that word. `motorlink guard rmd --help` \
-has more options.
+`motorlink guard` without `st` or `rmd` guards an ST drive. Write options behind `st` or `rmd`.
 
-ST's protocol has no watchdog: a drive that was told START_MOTOR turns until it is told STOP_MOTOR, \
-whatever became of the program that started it. An RMD motor goes on until its shutdown time, if the \
-vendor's tool has set one. A guard is a process of its own between that program and the drive. It \
-passes everything on as it is and notes which motors are set turning. When the program closes its \
-line, crashes or is killed, the guard stops those motors, says so, and waits for the next program. So \
-a one-shot `motorlink st start` through a guard is stopped as soon as it ends.
+Why: ST's protocol has no watchdog. After START_MOTOR a drive turns until STOP_MOTOR, even if the \
+program that started it is dead. An RMD motor turns until its shutdown time, if the vendor's tool has \
+set one. A guard is a separate process between your program and the drive. It passes all data on \
+unchanged, and records which motors were started. When your program closes the port, crashes or is \
+killed, the guard stops these motors, prints this, and waits for the next program. Therefore a motor \
+started by a single `motorlink st start` through a guard stops when this command ends.
 
-One program at a time: over TCP and Unix sockets a second one is closed at once; on a pty one that \
-locks its port, as motorlink does, is told that it is in use. Baud rates and bitrates of programs have \
-no effect, the guard's count.
+One program at a time: over TCP and Unix sockets a second connection is closed at once. On a pty a \
+second program that locks its port, as motorlink does, gets an error. The baud rate or bitrate of a \
+program has no effect; the rate of the guard is used.
 
-What it cannot do: stop a motor when the guard itself is killed with SIGKILL, when the cable to the \
-drive is cut, or when the machine stops. Whoever may get hurt needs an emergency stop in hardware.
+Limits: a guard cannot stop a motor if the guard is killed with SIGKILL, if the cable to the drive is \
+cut, or if the computer stops. If people can be hurt, use an emergency stop in hardware.
 
-Prints one JSON line per port once it is ready; with --json, also one for each thing that happens. \
-Output that is not read is dropped. Every signal that asks for the end stops the motors and then ends \
-it: exit code 0, or 3 if a motor did not say that it stops. contrib/ has a unit for systemd."
+Output: one JSON line per port when it is ready; with --json also one line per event. Lines that are \
+not read in time are dropped. SIGINT, SIGTERM and the other signals that end a program stop the motors \
+first. Exit code 0, or 3 if a motor did not confirm that it stops. contrib/ has a systemd unit."
 )]
 pub struct Args {
     #[command(subcommand)]
@@ -72,11 +71,11 @@ enum Command {
 struct StArgs {
     #[command(flatten)]
     port: Port,
-    /// Serve the line here: pty:PATH, unix-listen:PATH or tcp-listen:ADDRESS:PORT; may be given several
-    /// times
+    /// Serve the line at this port: pty:PATH, unix-listen:PATH or tcp-listen:ADDRESS:PORT; may be
+    /// repeated
     #[arg(long, value_name = "PORT", default_value = "pty:./drive")]
     serve: Vec<String>,
-    /// The motor of --prove
+    /// The motor for --prove
     #[arg(long, value_name = "N", default_value_t = 1, requires = "prove",
         value_parser = clap::value_parser!(u8).range(1..=7))]
     motor: u8,
@@ -88,15 +87,15 @@ struct StArgs {
 struct RmdArgs {
     #[command(flatten)]
     port: Port,
-    /// Serve slcan here: slcan-pty:PATH, unix-listen:PATH or tcp-listen:ADDRESS:PORT; may be given
-    /// several times
+    /// Serve slcan at this port: slcan-pty:PATH, unix-listen:PATH or tcp-listen:ADDRESS:PORT; may be
+    /// repeated
     #[arg(long, value_name = "PORT", default_value = "slcan-pty:./bus")]
     serve: Vec<String>,
-    /// What is done to motors whose program is gone: off (0x80) lets go, so that a load drops; stop
-    /// (0x81) holds still
+    /// How motors are stopped when the program ends: stop (0x81) holds them; off (0x80) lets them turn
+    /// freely, so a load may fall
     #[arg(long, value_name = "ACTION", default_value = "stop")]
     on_loss: OnLoss,
-    /// The motor of --prove
+    /// The motor for --prove
     #[arg(long, value_name = "ID", default_value_t = 1, requires = "prove",
         value_parser = clap::value_parser!(u8).range(1..=32))]
     id: u8,
@@ -112,17 +111,17 @@ enum OnLoss {
 
 #[derive(clap::Args)]
 struct Common {
-    /// Stop the motors, too, when the program is there and sends nothing for so long, such as 2s
+    /// Also stop the motors when the program sends nothing for this time, such as 2s
     #[arg(long, value_name = "TIME", value_parser = parse_span)]
     silence: Option<Duration>,
-    /// Print what happens as JSON, an object a line
+    /// Print events as JSON, one object per line
     #[arg(long)]
     json: bool,
-    /// Turn a motor, kill the program that did so, and show how long it takes until the motor stands
-    /// still; then end
+    /// Test the guard: turn a motor, kill the program that turns it, and measure the time until the
+    /// motor stands still
     #[arg(long, requires = "spin", conflicts_with = "serve")]
     prove: bool,
-    /// How fast --prove turns the motor: rpm (ST), or °/s (RMD)
+    /// Speed for --prove: rpm (ST) or °/s (RMD)
     #[arg(long, value_name = "SPEED", requires = "prove", allow_negative_numbers = true)]
     spin: Option<i32>,
 }
@@ -140,7 +139,7 @@ fn guard_st(args: &StArgs, program: &[OsString]) -> Result<(), Failure> {
     let port = args.port.name()?;
     if port.as_line().is_none() {
         return Err(Failure::usage(format!(
-            "`{port}` is a CAN bus, and an ST drive is on a serial line"
+            "`{port}` is a CAN bus, but an ST drive needs a serial line"
         ))
         .trying(format!("for RMD motors use `motorlink guard rmd -p {port}`")));
     }

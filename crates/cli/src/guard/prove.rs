@@ -177,7 +177,7 @@ impl Proof {
         Printer { json }.result(text, object)
     }
 
-    /// Waits until the motor stands still; gives the time from `since` until then, ms.
+    /// Waits until the motor is at rest; returns the time since `since`, ms.
     fn at_rest(&self, since: Instant) -> Result<f64, Failure> {
         let drive = SpunMotor::open(self.protocol, &self.port, self.motor)?;
         let slow = (f64::from(self.speed).abs() * RESTS).max(1.0);

@@ -9,7 +9,7 @@ use sd_notify::NotifyState;
 /// Messages that may wait.
 const WAITING: usize = 8;
 
-/// systemd, if it started this process and asked to be told.
+/// systemd, if it started this process and set NOTIFY_SOCKET.
 pub struct Supervisor {
     news: SyncSender<News>,
     /// How often it wants to hear that the guard is alive, and when it next does.

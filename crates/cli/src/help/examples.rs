@@ -80,6 +80,7 @@ const EXAMPLES: &[(&str, &str)] = &[
     ("rmd torque", "rmd -p slcan:./can0 torque 0.5"),
     ("rmd speed", "rmd -p slcan:./can0 speed 360"),
     ("rmd position", "rmd -p slcan:./can0 position 90 --max-speed 360"),
+    ("rmd position", "rmd -p slcan:./can0 position 90 --max-speed 360 --wait"),
     ("rmd single-turn-position", "rmd -p slcan:./can0 single-turn-position 90 cw"),
     ("rmd clear-errors", "rmd -p slcan:./can0 clear-errors"),
     ("rmd torque4", "rmd -p slcan:./can0 torque4 0.1 0.1 0 0"),

@@ -32,7 +32,7 @@ pub struct MotorArgs {
     #[arg(long, default_value = "50ms", global = true, value_name = "TIME",
           value_parser = span_up_to(Duration::from_secs(10)))]
     pub timeout: Duration,
-    /// Allow commands that write to the motor's ROM, which wears
+    /// Allow writes to the ROM of the motor. Each write wears the ROM
     #[arg(long, global = true)]
     pub write_rom: bool,
 }
@@ -50,11 +50,11 @@ pub enum Command {
 pub enum Read {
     /// Find the motors that answer
     Scan {
-        /// IDs to ask instead of 1 to 32
+        /// IDs to try instead of 1 to 32
         #[arg(value_name = "ID", value_parser = hint::id(), hide_possible_values = true)]
         ids: Vec<u8>,
     },
-    /// Show temperature, voltage, errors, speed, torque current, phase currents, angles
+    /// Show temperature, voltage, errors, speed, currents and angles
     Status {
         #[command(flatten)]
         repeat: Repeat,
@@ -69,12 +69,12 @@ pub enum Read {
 /// Commands that change something, and any frame.
 #[derive(Subcommand)]
 pub enum Act {
-    /// Show the gains, or set them until power-off (for good with --write-rom)
+    /// Show the gains, or set them until power-off (permanently with --write-rom)
     ///
-    /// Gains are 0 to 255. A motor takes all six in one frame: to set one, the six are read, this one
-    /// is changed, and the six are written and read back.
+    /// A gain is a whole number from 0 to 255. The old and the new gains are printed. One frame has all
+    /// six gains. To set one, motorlink reads the six, changes one, writes the six and reads them again.
     Pid {
-        /// Gains to set, such as speed_kp=120; or all six as numbers, in the order that `pid` shows
+        /// Gains to set, such as speed_kp=120; or six numbers, in the order of the output of `pid`
         #[arg(value_name = "NAME=GAIN", num_args = 0..=6, value_parser = hint::gain(),
               hide_possible_values = true)]
         gains: Vec<String>,
@@ -88,35 +88,35 @@ pub enum Act {
     },
     /// Show the encoder: position, raw position and offset
     Encoder,
-    /// Set the offset of the encoder for good (needs --write-rom)
+    /// Set the offset of the encoder permanently (needs --write-rom)
     EncoderOffset {
-        /// The new offset
+        /// The new offset, in encoder counts
         offset: u16,
     },
-    /// Make the current position the zero, effective after the next power cycle (needs --write-rom)
+    /// Set the zero to the current position, effective after the next power cycle (needs --write-rom)
     Zero,
-    /// Switch the motor off and forget what it was doing
+    /// Switch the motor off: it turns freely, and a load may fall
     Off,
-    /// Stop the motor and remember what it was doing
+    /// Stop the motor and hold it; `run` resumes the last command
     Stop,
-    /// Resume what `stop` stopped
+    /// Resume the command that `stop` stopped
     Run,
-    /// Hold a torque current
+    /// Turn with a constant torque current
     Torque {
-        /// A, within ±32
+        /// Torque current, -32 A to 32 A
         #[arg(allow_negative_numbers = true)]
         amps: f64,
     },
-    /// Hold a speed
+    /// Turn at a constant speed
     Speed {
-        /// °/s, positive is clockwise
+        /// Speed, °/s; positive is clockwise
         #[arg(allow_negative_numbers = true)]
         dps: f64,
     },
-    /// Turn to an angle over all turns
+    /// Turn to a multi-turn angle
     #[command(visible_alias = "move")]
     Position {
-        /// Degrees, positive is clockwise
+        /// Angle, degrees; positive is clockwise
         #[arg(allow_negative_numbers = true)]
         degrees: f64,
         #[command(flatten)]
@@ -124,15 +124,15 @@ pub enum Act {
         #[command(flatten)]
         wait: Wait,
     },
-    /// Turn to an angle within the turn, one way round
+    /// Turn to an angle within one turn, in one direction
     ///
-    /// The motor is asked for its angle first (0x94). At its target, or just past it, the move could be
-    /// nearly a full turn: it is refused. Then try the other direction, or --full-turn.
+    /// motorlink reads the angle first (0x94). If the motor is at the target or just past it, the move
+    /// could be nearly a full turn, and is refused. Then try the other direction, or --full-turn.
     SingleTurnPosition {
-        /// Degrees, 0 to 359.99
+        /// Angle, 0 to 359.99 degrees
         #[arg(allow_negative_numbers = true)]
         degrees: f64,
-        /// Which way round: clockwise or counterclockwise, cw or ccw for short
+        /// Direction: clockwise (cw) or counterclockwise (ccw)
         #[arg(value_parser = hint::direction(), hide_possible_values = true)]
         direction: SpinDirection,
         #[command(flatten)]
@@ -142,17 +142,17 @@ pub enum Act {
         #[command(flatten)]
         wait: Wait,
     },
-    /// Clear the errors whose cause is gone
+    /// Clear errors. An error stays if its cause is present
     ClearErrors,
-    /// Hold torque currents of motors 1 to 4, sent in one frame
+    /// Set the torque currents of motors 1 to 4 with one frame
     Torque4 {
-        /// A for motors 1, 2, 3 and 4
+        /// Torque currents of motors 1, 2, 3 and 4, A
         #[arg(num_args = 4, required = true, allow_negative_numbers = true, value_name = "AMPS")]
         amps: Vec<f64>,
     },
     /// Send any eight bytes
     Raw {
-        /// Bytes in hexadecimal; zeros are added up to eight
+        /// Bytes in hexadecimal; missing bytes are 00
         #[arg(required = true, value_name = "HEX")]
         bytes: Vec<String>,
     },
@@ -161,7 +161,7 @@ pub enum Act {
 /// How fast a move may be.
 #[derive(clap::Args)]
 pub struct MaxSpeed {
-    /// No faster than this, °/s; 1 at least, rounded down to whole °/s
+    /// Maximum speed, °/s; at least 1, rounded down to a whole number
     #[arg(long, value_name = "DPS")]
     pub max_speed: Option<f64>,
 }
@@ -169,10 +169,10 @@ pub struct MaxSpeed {
 /// What becomes of a move that could be nearly a full turn.
 #[derive(clap::Args)]
 pub struct FullTurn {
-    /// Move even if the motor is at the angle or just past it, which may be nearly a full turn
+    /// Allow the move even if it may be nearly a full turn
     #[arg(long)]
     pub full_turn: bool,
-    /// Up to how far past the angle the move is refused, degrees (default 0.5)
+    /// A move is refused if the motor is up to this far past the angle, degrees (default 0.5)
     #[arg(long, value_name = "DEGREES", conflicts_with = "full_turn")]
     pub tolerance: Option<f64>,
 }

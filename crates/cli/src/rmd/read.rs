@@ -8,7 +8,7 @@ use crate::json::{Cell, Row};
 use crate::output::progress;
 use crate::repeat::{Repeat, repeated};
 
-/// The version of the protocol that is spoken here.
+/// The version of the protocol.
 const DRIVEN: &str = "V1.62";
 
 pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
@@ -26,7 +26,7 @@ pub fn scan(session: &Session, ids: Vec<u8>) -> Result<(), Failure> {
     });
     if found.iter().any(|found| matches!(found, ScanResult::Echo(_))) {
         return Err(Failure::link(
-            "what was sent came back: the adapter echoes, which looks like motors that answer",
+            "each sent frame is received again: the adapter echoes, which looks like motors that answer",
         )
         .trying("add echo=1 to the port, as in slcan:/dev/ttyACM0?echo=1"));
     }
@@ -72,7 +72,7 @@ pub fn status(session: &Session, repeat: &Repeat) -> Result<(), Failure> {
         let names_motor = !session.output.json && repeat.every.is_none();
         let id = names_motor.then(|| Row::plain("motor", motor.id().number().into()));
         let mut all: Vec<Row> = id.into_iter().chain(session.rows(&motor.status()?)).collect();
-        // The temperature is there already.
+        // Both replies have the temperature.
         all.extend(session.rows(&motor.motion_status()?).into_iter().skip(1));
         all.extend(session.rows(&motor.phase_currents()?));
         all.extend(angles(session)?);

@@ -1,4 +1,4 @@
-//! What commands to a motor work on.
+//! An open bus, for all commands.
 
 use motorlink::port::PortName;
 use motorlink::rmd::{Client, Motor, Options, Payload, Quantity};
@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::json::{self, Line, Row};
 use crate::output::Printer;
 
-/// An open bus, the motor that is meant, and how to show what it says.
+/// An open bus, the selected motor, and how its values are shown.
 pub struct Session {
     pub bus: Client,
     pub id: u8,
@@ -37,17 +37,17 @@ impl Session {
         Ok(self.bus.confirm(self.motor()?.id())?)
     }
 
-    /// What a result for programs begins with.
+    /// The first members of a JSON result.
     pub fn line(&self, id: u8) -> Line {
         Line::about(&self.port, Some(id))
     }
 
-    /// Says that it was done.
+    /// Prints the result.
     pub fn done(&self, text: impl std::fmt::Display) -> Result<(), Failure> {
         self.output.result(text, self.line(self.id).ok(true))
     }
 
-    /// Says that it was done, with the values of the reply.
+    /// Prints the result, with the values of the reply.
     pub fn replied<P: Payload>(&self, reply: &P) -> Result<(), Failure> {
         self.output.rows(self.line(self.id).ok(true), &self.rows(reply))
     }
@@ -75,12 +75,12 @@ impl Session {
         Ok(self.bus.motor(self.id)?)
     }
 
-    /// What wears the ROM needs the explicit word.
+    /// A write to the ROM needs --write-rom.
     pub fn rom(&self, what: &str) -> Result<(), Failure> {
         if self.write_rom {
             return Ok(());
         }
         Err(Failure::usage(format!("{what} writes to the motor's ROM, which wears"))
-            .trying("add --write-rom if that is meant"))
+            .trying("add --write-rom to allow it"))
     }
 }

@@ -78,8 +78,8 @@ fn changed<P: Payload + PartialEq>(
             differences.join(", ")
         ))
         .trying(
-            "either the motor does not take these values, or another program changed them in \
-             between; read them again",
+            "either the motor does not take these values, or another program changed them; read them \
+             again",
         )
         .about(&session.port, id);
         if session.output.json {
@@ -105,12 +105,12 @@ fn pairs(before: &[Row], after: &[Row]) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// The value before could not be read, so that nothing was written.
+/// The old value could not be read, so nothing was written.
 fn unwritten(error: Error, what: &str) -> Failure {
     Failure::from(error).with_fact(format!("{what} not written"))
 }
 
-/// The write was answered, and the value behind it could not be read.
+/// The write was confirmed, but the new value could not be read.
 fn unread(error: Error, what: &str) -> Failure {
     let fact = format!("the motor confirmed the write, but {what} could not be read back");
     Failure::from(error).with_fact(fact)
@@ -162,7 +162,7 @@ fn named_gain(word: &str) -> Result<(usize, u8), Failure> {
     let index = Pid::FIELDS.iter().position(|field| field.name == plain);
     let Some(index) = index else {
         let names: Vec<&str> = Pid::FIELDS.iter().map(|field| field.name).collect();
-        return Err(Failure::usage(format!("there is no gain `{name}`"))
+        return Err(Failure::usage(format!("a motor has no gain `{name}`"))
             .trying(format!("the gains are {}", names.join(", "))));
     };
     Ok((index, gain(value)?))
@@ -170,7 +170,7 @@ fn named_gain(word: &str) -> Result<(usize, u8), Failure> {
 
 fn gain(word: &str) -> Result<u8, Failure> {
     word.parse().map_err(|_| {
-        Failure::usage(format!("`{word}` is no gain: a gain is a whole number from 0 to 255"))
+        Failure::usage(format!("`{word}` is not a gain: a gain is a whole number from 0 to 255"))
             .trying(format!("write it as {}", example()))
     })
 }

@@ -29,14 +29,14 @@ pub struct DriveArgs {
     #[arg(short, long, default_value_t = 1, global = true, value_parser = hint::motor(),
           hide_possible_values = true)]
     pub motor: u8,
-    /// What the drive speaks: the document as written, or what MCSDK 5.4 firmware does
+    /// Protocol variant: spec is the document, mcsdk-5.4 is shipped firmware
     #[arg(long, default_value = "spec", global = true, value_parser = hint::profile())]
     pub profile: Profile,
     /// How long to wait for a reply, 1ms to 60s [default: 1s, in a scan 200ms]
     #[arg(long, global = true, value_name = "TIME",
           value_parser = span_up_to(Duration::from_secs(60)))]
     pub timeout: Option<Duration>,
-    /// Free a 5.x drive that waits for the rest of a cut-off frame, when the line is lost
+    /// After an error, send padding bytes to a 5.x drive that waits for the rest of a frame
     #[arg(long, global = true)]
     pub pad: bool,
 }
@@ -52,7 +52,7 @@ pub enum Command {
 /// Commands that change nothing.
 #[derive(Subcommand)]
 pub enum Read {
-    /// Show name and version of the drive's SDK and firmware
+    /// Show the name and version of the SDK and the firmware
     Info,
     /// Show state, faults, speed, current, voltage and temperature
     Status,
@@ -70,19 +70,19 @@ pub enum Read {
         #[command(flatten)]
         repeat: Repeat,
     },
-    /// Sample registers at one instant, in one exchange; profile spec only
+    /// Read registers at one instant, in one exchange; profile spec only
     Segment {
         /// The segment of the drive to use, 0 to 3
         #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=3))]
         segment: u8,
-        /// Names or numbers, at most 32; those of access D too
+        /// Names or numbers, at most 32; also registers of access D
         #[arg(required = true, value_name = "REGISTER", value_parser = hint::register(),
               hide_possible_values = true)]
         registers: Vec<String>,
         #[command(flatten)]
         repeat: Repeat,
     },
-    /// Try the usual baud rates and tell silence, garbage and refusal apart
+    /// Try the usual baud rates, and show for each whether a drive answers
     Scan {
         /// Rates to try instead of the usual ones
         #[arg(value_name = "RATE")]
@@ -93,7 +93,7 @@ pub enum Read {
 /// Commands that change something, and any frame.
 #[derive(Subcommand)]
 pub enum Act {
-    /// Write a register
+    /// Write a register, and show its old and new value
     Set {
         /// Name or number
         #[arg(value_parser = hint::register(), hide_possible_values = true)]
@@ -101,7 +101,7 @@ pub enum Act {
         /// A number in the register's unit, or a name (SPEED, I_ALPHA)
         #[arg(allow_negative_numbers = true)]
         value: String,
-        /// Read it back, and write it again if it differs, this many times at most (default 3)
+        /// Repeat the write until the register has the value, at most this many times (default 3)
         #[arg(long, value_name = "ATTEMPTS", num_args = 0..=1, require_equals = true,
               value_parser = clap::value_parser!(u8).range(1..=100))]
         verify: Option<Option<u8>>,
@@ -110,16 +110,16 @@ pub enum Act {
     Start,
     /// Stop the motor
     Stop,
-    /// Start an idle motor, stop a spinning one
+    /// Start an idle motor, or stop a running motor
     StartStop,
-    /// Stop the ramp that is executing
+    /// Stop the current ramp
     StopRamp,
-    /// Go to a speed
+    /// Change the speed to a value in a given time
     Ramp {
         /// Speed at the end, rpm
         #[arg(allow_negative_numbers = true)]
         rpm: i32,
-        /// Length of the ramp, ms
+        /// Duration of the ramp, ms
         ms: u16,
     },
     /// Show the rev-up phases, or set one
@@ -128,13 +128,13 @@ pub enum Act {
         /// The phase to set, 0 to 4
         #[arg(requires = "rpm", value_parser = clap::value_parser!(u8).range(0..=4))]
         phase: Option<u8>,
-        /// Speed at its end, rpm
+        /// Speed at the end of the phase, rpm
         #[arg(requires = "torque", allow_negative_numbers = true)]
         rpm: Option<i32>,
-        /// Iq at its end, s16A digits
+        /// Iq at the end of the phase, s16A digits
         #[arg(requires = "ms", allow_negative_numbers = true)]
         torque: Option<i16>,
-        /// Its length, ms
+        /// Duration of the phase, ms
         ms: Option<u16>,
     },
     /// Set the current references, s16A digits
@@ -147,12 +147,12 @@ pub enum Act {
         #[arg(allow_negative_numbers = true)]
         id: i16,
     },
-    /// Go to a torque (Iq); profile mcsdk-5.4 only
+    /// Change the torque current (Iq) in a given time; profile mcsdk-5.4 only
     TorqueRamp {
         /// Iq at the end, s16A digits
         #[arg(allow_negative_numbers = true)]
         iq: i32,
-        /// Length of the ramp, ms
+        /// Duration of the ramp, ms
         ms: u16,
     },
     /// Turn to an angle in a given time; profile mcsdk-5.4 with position control only
@@ -161,26 +161,26 @@ pub enum Act {
         /// Angle, rad
         #[arg(allow_negative_numbers = true)]
         rad: f32,
-        /// Length of the move, s
+        /// Duration of the move, s
         seconds: f32,
         #[command(flatten)]
         wait: Wait,
     },
-    /// Acknowledge faults whose cause is gone
+    /// Acknowledge faults. A fault stays if its cause is present
     FaultAck,
     /// Align the encoder
     EncoderAlign,
-    /// Set the current references to their defaults
+    /// Set the current references (Iq, Id) to their defaults
     IqdrefClear,
-    /// Switch the power factor correction, or acknowledge its faults
+    /// Switch the power factor correction on or off, or acknowledge its faults
     Pfc {
-        /// What to do
+        /// Action
         #[arg(value_enum)]
         action: Pfc,
     },
-    /// Send any frame: its code, then its payload
+    /// Send any frame
     Raw {
-        /// Bytes in hexadecimal; header, length and checksum are added
+        /// Frame code and payload in hexadecimal; header, length and checksum are added
         #[arg(required = true, value_name = "HEX")]
         bytes: Vec<String>,
     },

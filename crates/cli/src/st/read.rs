@@ -19,7 +19,7 @@ pub fn info(session: &Session) -> Result<(), Failure> {
             (format!("{name} {version}"), json!({ "name": name, "version": version }))
         }
         // Firmware 5.0 does not know the frame code.
-        Err(error) if error.is_refusal() => ("does not tell its version".to_owned(), Value::Null),
+        Err(error) if error.is_refusal() => ("has no version".to_owned(), Value::Null),
         Err(error) => return Err(error.into()),
     };
     session.confirmed()?.result(
@@ -113,7 +113,7 @@ fn find_all(names: &[String]) -> Result<Vec<RegisterId>, Failure> {
     names.iter().map(|name| find_register(name).map_err(Failure::from)).collect()
 }
 
-/// Reads registers. One that the drive refuses to read does not take the values of the others.
+/// Reads registers. If the drive refuses one, the others are read all the same.
 fn read_all(session: &Session, registers: &[RegisterId]) -> Result<Vec<Cell>, Failure> {
     let motor = session.motor()?;
     let cells = registers

@@ -1,17 +1,17 @@
-//! Refusals of registers, with what the table knows of them.
+//! Refusals of registers, explained with the table of registers.
 
 use motorlink::st::register::{Access, Origin, Writing};
 use motorlink::st::{Error, ErrorCode, Feature, Features, Profile, RegisterId};
 
 use crate::failure::Failure;
 
-/// What the table knows of a register that cannot be read or written, and what to try.
+/// Why a register cannot be read or written, and what to try.
 pub struct Known {
     pub fact: String,
     pub advice: Option<String>,
 }
 
-/// Whether an error says something of the register, and nothing of the motor or the line.
+/// Whether an error is about the register, not about the motor or the line.
 pub fn is_about_register(error: &Error) -> bool {
     matches!(error, Error::Refused { code, .. } if *code != ErrorCode::BadMotorSelected)
 }
@@ -99,5 +99,5 @@ fn built_without(register: RegisterId) -> Option<Known> {
 }
 
 fn advice_profile(profile: Profile) -> String {
-    format!("add --profile {} if that is what the drive speaks", profile.name())
+    format!("add --profile {} if the drive speaks it", profile.name())
 }

@@ -50,7 +50,7 @@ pub fn run(
     }
     if echoes {
         return Err(Failure::link(format!(
-            "no drive answered on {port}, and what is sent comes back: the adapter or the wiring echoes"
+            "no drive answered on {port}, and each sent byte is received again: the adapter or the wiring echoes"
         )));
     }
     Err(Failure::link(format!(
@@ -72,8 +72,10 @@ fn report(
             ("drive", format!("{} {major}.{minor}.{patch}", info.name))
         }
         ScanResult::Refuses(code) => ("refuses", format!("a drive that answers {code}")),
-        ScanResult::Garbage => ("garbage", "bytes that are no reply: another rate?".to_owned()),
-        ScanResult::Echo => ("echo", "what is sent comes back".to_owned()),
+        ScanResult::Garbage => {
+            ("garbage", "bytes that are no reply: is it another rate?".to_owned())
+        }
+        ScanResult::Echo => ("echo", "each sent byte is received again".to_owned()),
         ScanResult::Silence => ("silence", "silence".to_owned()),
     };
     bar.suspend(|| output.result(format!("{rate:>8} baud  {text}"), found(port, rate, word, &text)))

@@ -1,4 +1,4 @@
-//! What commands to a drive work on.
+//! An open drive, for all commands.
 
 use motorlink::port::PortName;
 use motorlink::st::{Client, Motor, Options, Profile, Reading, Recovery, RegisterId};
@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::json::{self, Line};
 use crate::output::Printer;
 
-/// An open drive, and how to show what it says.
+/// An open drive, and how its values are shown.
 pub struct Session {
     pub client: Client,
     pub motor: u8,
@@ -34,15 +34,14 @@ pub fn connect(
 }
 
 impl Session {
-    /// What only one profile has is not sent to a drive of the other, where it may mean something
-    /// else.
+    /// Refuses a request that only one profile has. In the other profile it may have another meaning.
     pub fn wants(&self, profile: Profile, what: &str) -> Result<(), Failure> {
         if self.client.profile() == profile {
             return Ok(());
         }
         let profile = profile.name();
         Err(Failure::usage(format!("{what} exist in profile {profile} only"))
-            .trying(format!("add --profile {profile} if that is what the drive speaks")))
+            .trying(format!("add --profile {profile} if the drive speaks it")))
     }
 
     /// A failure with the port and the motor.
@@ -50,23 +49,23 @@ impl Session {
         failure.about(&self.port, self.motor)
     }
 
-    /// What a result for programs about the motor begins with.
+    /// The first members of a JSON result.
     pub fn line(&self) -> Line {
         Line::about(&self.port, Some(self.motor))
     }
 
-    /// Says that it was done, once the acknowledgement is confirmed.
+    /// Prints the result, after the acknowledgement is confirmed.
     pub fn done(&self, text: impl std::fmt::Display) -> Result<(), Failure> {
         self.confirmed()?.result(text, self.line().ok(true))
     }
 
-    /// As [`done`](Self::done), with what a register reads then.
+    /// As [`done`](Self::done), with the new value of a register.
     pub fn done_with(&self, text: String, register: RegisterId, bits: i32) -> Result<(), Failure> {
         let value = json::register(&self.reading(register, bits), String::new(), self.raw);
         self.confirmed()?.result(text, self.line().ok(true).values(&[value]))
     }
 
-    /// Where results go, which come from replies to their own requests.
+    /// Where results go, after a check that replies belong to their requests.
     pub fn confirmed(&self) -> Result<Printer, Failure> {
         self.client.confirm()?;
         Ok(self.output)

@@ -11,10 +11,10 @@ use super::session::Session;
 use crate::failure::Failure;
 use crate::json::{self, Line};
 
-/// What could be read of a register.
+/// The result of reading a register.
 enum Look {
     Value(Reading),
-    /// The reason why there is no value.
+    /// Why there is no value.
     Unreadable(String),
 }
 
