@@ -3,11 +3,11 @@
     python first_steps.py                                   # simulated; needs nothing
     python first_steps.py /dev/ttyACM0 slcan:/dev/ttyACM1   # motors will turn!
 
-The cells (`# %%`) can be run one by one in an editor that knows them.
+Editors that support cells (`# %%`) can run them one by one.
 """
 
 # %% Ports
-# A bench has simulated drives on virtual time: nothing sleeps, and it can be opened like a port.
+# A bench has simulated drives on virtual time: nothing sleeps. A program opens it like a port.
 import sys
 import time
 
@@ -20,28 +20,27 @@ else:
     st_port, rmd_port, wait = bench, bench, bench.run
 
 # %% An ST drive
-# `with` stops the motors that were started in it, however it is left: at its end, with an exception,
-# with Ctrl-C or SIGTERM.
+# The end of `with` stops the motors that were started in it. So do an exception, Ctrl-C and SIGTERM.
 with motorlink.st.open(st_port) as client:
     print("drive   ", client.board_info())
     motor = client.motor(1)
-    motor.set_ramp(1000, 0.5)  # rpm, within so many s
+    motor.set_ramp(1000, 0.5)  # rpm, s
     motor.start()
     wait(3.0)
     print("status  ", motor.status())
 
-    # Registers by name. Tab completion knows them all, and so does `motor.registers`.
+    # Registers by name. Tab completes the names after `motor.registers.`.
     print("speed   ", motor.get("SPEED_MEAS"), motor.registers.info("SPEED_MEAS").unit)
     print("voltage ", motor.registers.BUS_VOLTAGE, "V")
     motor.registers.SPEED_KP = motor.registers.SPEED_KP + 10
 
-    # A structured array: time and a column a register.
+    # A structured array: the time, and one column for each register.
     samples = client.sample(["SPEED_MEAS", "TORQUE_MEAS"], rate=100, seconds=0.5)
     speed = samples["SPEED_MEAS"]
     print(f"samples  {len(samples)}: {speed.mean():.0f} rpm, from {speed.min():.0f} to {speed.max():.0f}")
 
-    # %% What goes wrong
-    # A drive that says no is told apart from a line that fails, and from a value that cannot be sent.
+    # %% Errors
+    # A refusal of the drive, a failed line and a value that cannot be sent are different exceptions.
     try:
         motor.set("SPEED_MEAS", 3)
     except motorlink.RefusedError as refused:
@@ -52,7 +51,7 @@ with motorlink.st.open(st_port) as client:
         print("bad     ", bad)
 
 # %% RMD motors
-# The angle is of the motor shaft, over all turns. Several exchanges overlap in a cycle.
+# Angles are those of the motor shaft, over all turns. The exchanges of a cycle overlap.
 with motorlink.rmd.open(rmd_port) as client:
     print("motors  ", [found.id for found in client.scan(range(1, 9))])
     first = client.motor(1)

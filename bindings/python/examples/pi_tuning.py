@@ -23,14 +23,14 @@ plant.load.inertia = 2e-5      # kg m²
 LOW, HIGH = 1000, 1500  # rpm
 BRAKE = 0.1  # Nm
 DEAD = 0.1  # s before the step
-STEP, LOAD = DEAD, 0.5  # s: when the speed steps, and when the brake grips
+STEP, LOAD = DEAD, 0.5  # s: the times of the speed step and of the brake
 SECONDS = 0.9
 
 
 # %% One experiment
-# The gains are written, the motor runs at the low speed, and then the speed steps and a brake grips. A
-# recording takes the truth down meanwhile, whoever lets time pass. A fresh bench each time: every
-# experiment begins in the same state, and ends within some milliseconds of real time.
+# Write the gains, run the motor at the low speed, step the speed, and brake. A recording has the real
+# signals of the motor. Each experiment has a new bench, so it begins in the same state. It takes some
+# milliseconds of real time.
 def experiment(kp, ki):
     bench = sim.Bench(BENCH)
     motor = bench.st.motor(1)
@@ -49,9 +49,9 @@ def experiment(kp, ki):
     return recording.data, motor.get("SPEED_KP"), motor.get("SPEED_KI")
 
 
-# %% What is good
-# The mean error after the step and under the brake; an overshoot of more than 5 % of the step costs,
-# and so does a current that is restless.
+# %% The cost
+# The mean error after the step and under the brake. An overshoot of more than 5 % of the step adds to
+# the cost. So does a current ripple.
 def judge(data):
     t, speed, iq = data["t"], data["st1.speed_rpm"], data["st1.iq_amps"]
     wanted = np.where(t < STEP, LOW, HIGH)
@@ -71,8 +71,8 @@ def cost(figures):
 
 
 # %% The search
-# From the gains of the drive, up or down by a factor, as long as that makes it better; then with smaller
-# factors.
+# Begin with the gains of the drive. Multiply or divide them by a factor as long as the cost decreases.
+# Continue with smaller factors.
 def search(kp, ki):
     tried = {}
 

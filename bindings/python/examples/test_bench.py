@@ -1,13 +1,13 @@
-"""A test bench with pytest: a robot's own code against simulated drives, in milliseconds.
+"""A test bench with pytest: it tests a robot's code against simulated drives in milliseconds.
 
     pytest test_bench.py
 
-The fixtures come with the package. `motorlink_bench` is a fresh bench for each test, on virtual time;
-the marker says what it is; `motorlink_time` makes `time.sleep` of the code under test pass on it.
+The package has the fixtures. `motorlink_bench` is a new bench on virtual time for each test. The marker
+has its configuration. `motorlink_time` makes `time.sleep` advance the time of the bench.
 """
 
 # %% The code under test
-# It knows nothing of simulation: it opens the port that it is given, sleeps, and looks at the clock.
+# It has no part of the simulation. It opens a port, sleeps, and reads the clock.
 import time
 
 import pytest
@@ -16,7 +16,7 @@ import motorlink
 
 
 class Jammed(Exception):
-    """The conveyor does not move as it was told."""
+    """The conveyor does not reach its speed."""
 
 
 class Conveyor:
@@ -27,7 +27,7 @@ class Conveyor:
         self._motor = self._client.motor(1)
 
     def run(self, rpm, patience=3.0):
-        """Brings the belt to a speed; stops it and raises Jammed where it does not get there."""
+        """Brings the belt to a speed. If it does not reach it, stops it and raises Jammed."""
         self._motor.set_ramp(rpm, 0.5)
         self._motor.start()
         deadline = time.monotonic() + patience
@@ -38,7 +38,7 @@ class Conveyor:
             time.sleep(0.02)
 
     def recover(self):
-        """Acknowledges what made the drive switch off; gives its name."""
+        """Acknowledges the faults of the drive. Returns their names."""
         names = self._motor.flags().occurred
         self._motor.fault_ack()
         return names
@@ -49,7 +49,7 @@ class Conveyor:
 
 
 # %% The bench
-# A flywheel stands for the belt. Everything that a configuration can say is in docs/SIMULATOR.md.
+# A flywheel replaces the belt. docs/SIMULATOR.md describes the configuration.
 pytestmark = [
     pytest.mark.motorlink("[[st.motor]]\npreset = 'servo'\nplant.load.inertia = 2e-5"),
     pytest.mark.usefixtures("motorlink_time"),
@@ -62,8 +62,8 @@ def conveyor(motorlink_bench):
     return Conveyor(motorlink_bench)
 
 
-# %% What shall be
-def test_it_comes_to_its_speed(conveyor, motorlink_bench):
+# %% Normal operation
+def test_it_reaches_its_speed(conveyor, motorlink_bench):
     conveyor.run(1500)
     motorlink_bench.run(1.0)
     assert motorlink_bench.truth("st1")["speed_rpm"] == pytest.approx(1500, rel=0.02)
@@ -78,14 +78,14 @@ def test_it_holds_its_speed_under_a_load(conveyor, motorlink_bench):
     assert speed[data["t"] > 0.5] == pytest.approx(1500, rel=0.03)
 
 
-# %% What may go wrong
-def test_it_notices_that_it_is_jammed_and_no_current_flows_on(conveyor, motorlink_bench):
+# %% Faults
+def test_it_detects_a_jam_and_switches_the_current_off(conveyor, motorlink_bench):
     motorlink_bench.lock_rotor("st1")
     with pytest.raises(Jammed):
         conveyor.run(1500)
     motorlink_bench.run(0.5)
     truth = motorlink_bench.truth("st1")
-    assert truth["faults"] == "SPEED_FDBK"  # the drive saw it, too
+    assert truth["faults"] == "SPEED_FDBK"  # the drive detects it too
     assert abs(truth["iq_amps"]) < 0.01
 
 
@@ -97,13 +97,13 @@ def test_it_recovers_after_a_fault(conveyor, motorlink_bench):
     conveyor.run(1000)
 
 
-def test_nobody_can_ask_for_too_much(conveyor, motorlink_bench):
+def test_a_speed_over_the_limit_is_refused(conveyor, motorlink_bench):
     with pytest.raises(motorlink.InvalidValueError, match="3000 rpm"):
         conveyor.run(3500)
     assert motorlink_bench.truth("st1")["status"] == "IDLE"
 
 
-def test_a_bad_line_does_not_keep_it_from_stopping(motorlink_bench):
+def test_it_stops_on_a_bad_line(motorlink_bench):
     conveyor = Conveyor(motorlink_bench.port(fault="drop=5e-3,seed=5"))
     failures = 0
 
@@ -114,7 +114,7 @@ def test_a_bad_line_does_not_keep_it_from_stopping(motorlink_bench):
                 return action()
             except (motorlink.LinkError, motorlink.ReplyTimeoutError):
                 failures += 1
-        pytest.fail("the line never came back")
+        pytest.fail("all attempts failed")
 
     for rpm in range(500, 1500, 100):
         insist(lambda: conveyor.run(rpm))

@@ -3,12 +3,12 @@
     python torque_loop.py
 
 The computer closes the loop: one frame sends four torques, four replies bring speeds and positions,
-a thousand times a second. Then somebody pushes two of the motors.
+a thousand times a second. Then two of the motors are pushed.
 """
 
 # %% The bench
-# Four motors, of which each turns a small flywheel. On virtual time the loop is exact, however slow the
-# computer is; on a real bus it would be `motorlink.rmd.open("socketcan:can0")`.
+# Four motors with a small flywheel each. On virtual time the loop is exact, also on a slow computer.
+# On a real bus, open `motorlink.rmd.open("socketcan:can0")`.
 import math
 import time
 
@@ -28,8 +28,8 @@ LIMIT = 3.0  # A
 COUNTS = 2**14  # of the encoder in a turn
 
 # %% Angles
-# A reply tells the position within the turn. Over the turns it is followed by its smallest change,
-# which holds below half a turn from cycle to cycle: 180 000 degrees per second.
+# A reply has the position within the turn. The angle over all turns is the sum of its smallest changes.
+# This is correct below half a turn per cycle: 180 000 degrees per second.
 angles = [client.motor(n).multi_turn_angle() for n in (1, 2, 3, 4)]
 counts = [client.motor(n).motion_status().encoder for n in (1, 2, 3, 4)]
 
@@ -40,7 +40,7 @@ def follow(motor, encoder):
     angles[motor] += change * 360 / COUNTS
 
 
-# %% Where they shall be
+# %% Target positions
 # Motors 1 and 2 swing, against each other; 3 and 4 stay.
 def wanted(t):
     """Angles in degrees, and speeds in degrees per second."""
@@ -74,7 +74,7 @@ with client, bench.recording(signals, every=1 / RATE) as recording:
                 continue
             follow(number - 1, reply.encoder)
             speeds[number - 1] = reply.speed_dps
-        # What is left of the period.
+        # The rest of the period.
         bench.run(max(0.0, bench_began + (cycle + 1) / RATE - bench.now))
 
 # %% The figures
@@ -90,7 +90,7 @@ for name, span in (("undisturbed", t < 1.5), ("pushed", (t >= 1.5) & (t < 3)), (
     told = "  ".join(f"{degrees:6.2f}" for degrees in rms)
     print(f"{name:12} deviation of motors 1 to 4, rms: {told}  degrees")
 
-# What the loop believed against what really happened.
+# The angles of the loop and the real angles.
 truth = np.array([recording.data[name] for name in signals]).T[:cycles]
 believed = deviations + np.array([wanted(moment)[0] for moment in t])
 lag = np.abs(truth - believed).max()

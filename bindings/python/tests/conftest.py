@@ -18,19 +18,19 @@ import motorlink
 
 REPOSITORY = Path(__file__).parents[3]
 
-#: For a motor that is there, on a machine that has other things to do, s.
+#: Timeout for a motor that is present, on a busy machine, s.
 PATIENT = 2.0
 
-# Programs that a shell started in the background ignore Ctrl-C, and so would those that tests start.
+# A program that a shell started in the background ignores Ctrl-C. Its child processes would too.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-# So it is with `nohup` and SIGHUP.
+# The same holds for `nohup` and SIGHUP.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 T = TypeVar("T")
 
 
 def eventually(condition: Callable[[], T], what: str, within: float = 10) -> T:
-    """Waits until `condition` gives something true, and gives that."""
+    """Waits until `condition` returns a true value. Returns it."""
     deadline = time.monotonic() + within
     while True:
         value = condition()
@@ -42,9 +42,9 @@ def eventually(condition: Callable[[], T], what: str, within: float = 10) -> T:
 
 @pytest.fixture(scope="session")
 def command() -> str:
-    """The command `motorlink` that pip installed beside this interpreter."""
+    """The command `motorlink` that pip installed for this interpreter."""
     path = Path(sysconfig.get_path("scripts")) / "motorlink"
-    assert os.access(path, os.X_OK), f"{path} is not there: is the package installed?"
+    assert os.access(path, os.X_OK), f"{path} is missing: is the package installed?"
     return str(path)
 
 
@@ -63,7 +63,7 @@ def rmd_bus() -> Iterator[motorlink.rmd.Client]:
 
 
 class Served:
-    """Simulated drives on ptys, and what is really going on in them."""
+    """Simulated drives on ptys, and their real state."""
 
     def __init__(self, command: str, folder: Path, *words: str):
         self.st, self.can = f"{folder}/st0", f"slcan:{folder}/can0"
@@ -82,7 +82,7 @@ class Served:
         return line
 
     def do(self, command: str, **fields: object) -> dict[str, Any]:
-        """A command that the simulator obeys."""
+        """Executes a command of the simulator."""
         assert self._process.stdin
         self._process.stdin.write(json.dumps({"command": command, **fields}) + "\n")
         self._process.stdin.flush()
@@ -91,7 +91,7 @@ class Served:
         return answer
 
     def motor(self, protocol: str, number: int) -> dict[str, object]:
-        """The truth about a motor."""
+        """The real state of a motor."""
         port = next(str(p["port"]) for p in self.ports if p["protocol"] == protocol)
         (bench,) = self.do("state", port=port)["state"]
         motors: list[dict[str, object]] = bench["motors"]

@@ -1,4 +1,4 @@
-"""A drive on a pty that says of each reply whose it is, as slow as a test wants it."""
+"""A drive on a pty whose replies show their request, with a delay that the test chooses."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ REGISTERS = {"SPEED_REF": 0x04, "SPEED_MEAS": 0x1E, "RAMP_FINAL_SPEED": 0x5B}
 SET_REG, GET_REG, EXECUTE, BOARD_INFO, REVUP = 0x01, 0x02, 0x03, 0x06, 0x08
 START, STOP = 0x01, 0x02
 
-#: Sizes of the registers that are asked for first on a line that was just opened: FLAGS and STATUS.
+#: Sizes of the registers that a client reads first on a new line: FLAGS and STATUS.
 QUESTIONS = {0x01: 4, 0x02: 1}
 
 
 def value(drive: int, motor: int, register: int) -> int:
-    """What a drive says of a register: no two say the same."""
+    """The value of a drive's register. No two are equal."""
     return drive << 20 | motor << 12 | register
 
 
@@ -33,28 +33,28 @@ def frame(header: int, payload: bytes) -> bytes:
 
 
 class Drive:
-    """Answers at a path, one request after the other, each after ``delay()`` s."""
+    """Replies on a pty at a path, to one request after the other, each after ``delay()`` s."""
 
     def __init__(self, path: Path, number: int, delay: Callable[[], float] = lambda: 0.0):
         self.path = path
         self.number = number
         self.delay = delay
-        #: What any register reads, in 16 bits, where writes are acknowledged.
+        #: The value of every register, 16 bits, if writes are acknowledged.
         self.reads: Callable[[int], int] | None = None
-        #: A register that is never answered, and how often it was asked for.
+        #: A register without a reply, and how often it was read.
         self.is_deaf_to: int | None = None
         self.unanswered = 0
-        #: After how many replies it falls silent.
+        #: The number of replies after which it is silent.
         self.answers: int | None = None
-        #: Whether it sends each reply twice, the second time behind everything else.
+        #: Whether it sends each reply twice, the second one after all others.
         self.twice = False
         self.heard = b""
-        #: What was executed: motor and command.
+        #: The executed commands: motor and command.
         self.executed: list[tuple[int, int]] = []
         self.plug()
 
     def plug(self) -> None:
-        """Is there."""
+        """Creates the port."""
         self._line, self._other = pty.openpty()
         tty.setraw(self._other)
         self._end, self._ended = os.pipe()
@@ -63,7 +63,7 @@ class Drive:
         self.path.symlink_to(os.ttyname(self._other))
 
     def unplug(self) -> None:
-        """Is gone, with what it did not answer yet."""
+        """Removes the port. Pending requests get no reply."""
         self.path.unlink()
         os.close(self._ended)
         self._thread.join()

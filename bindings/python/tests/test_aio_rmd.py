@@ -1,4 +1,4 @@
-"""asyncio on a CAN bus: exchanges that overlap, motors whose replies are late, what moves at the end."""
+"""asyncio on a CAN bus: overlapping exchanges, late replies, and moving motors at the end."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from motorlink import aio, rmd
 
 
 class Motors:
-    """An slcan adapter over TCP with motors whose speed is their ID, slow as a test wants it."""
+    """An slcan adapter over TCP. The speed of a motor is its ID. The test chooses the delay of replies."""
 
     def __init__(self, delay: Callable[[int], float] = lambda id: 0.0):
         self.delay = delay
-        #: Replies wait until there are so many.
+        #: Replies are sent when there are so many.
         self.together = 1
         #: Whether each reply is sent twice.
         self.twice = False
         self._replies: list[bytes] = []
-        #: What came: ID and command.
+        #: The received requests: ID and command.
         self.heard: list[tuple[int, int]] = []
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = f"slcan:tcp:127.0.0.1:{self._listener.getsockname()[1]}"
@@ -42,7 +42,7 @@ class Motors:
                 return
             self._clients.append(client)
             line = b""
-            # Who hung up is not there any more.
+            # The client has closed the connection.
             with contextlib.suppress(OSError):
                 while received := client.recv(4096):
                     line += received
@@ -133,7 +133,7 @@ def test_a_reply_that_came_twice_is_not_confirmed(motors: Motors) -> None:
     asyncio.run(asyncio.wait_for(main(), 60))
 
 
-def test_cycles_and_four_torques_tell_what_each_motor_answered(motors: Motors) -> None:
+def test_cycles_and_four_torques_return_the_reply_of_each_motor(motors: Motors) -> None:
     async def main() -> None:
         async with aio.rmd.open(motors.port, timeout=PATIENT) as bus:
             answers = await bus.cycle({2: rmd.set_speed(10), 20: rmd.read_motion_status(), 1: rmd.stop()})
@@ -151,7 +151,7 @@ def test_cycles_and_four_torques_tell_what_each_motor_answered(motors: Motors) -
     asyncio.run(asyncio.wait_for(main(), 60))
 
 
-def test_a_late_reply_to_a_cancelled_exchange_is_nobody_elses(motors: Motors) -> None:
+def test_a_late_reply_to_a_cancelled_exchange_is_dropped(motors: Motors) -> None:
     async def main() -> None:
         async with aio.rmd.open(motors.port, timeout=30, quarantine=2) as bus:
             motor = bus.motor(1)
@@ -166,7 +166,7 @@ def test_a_late_reply_to_a_cancelled_exchange_is_nobody_elses(motors: Motors) ->
             with pytest.raises(asyncio.CancelledError):
                 await exchange
             motors.delay = lambda id: 0
-            # The same command: only the wait for the late reply tells the two apart.
+            # The command is the same. Only the wait for the late reply separates the two.
             before = len(motors.heard)
             assert (await motor.motion_status()).speed_dps == 1
             assert motors.heard[before:] == [(1, 0x9C)], "it was asked once, after the late reply"
@@ -177,7 +177,7 @@ def test_a_late_reply_to_a_cancelled_exchange_is_nobody_elses(motors: Motors) ->
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_cancelled_exchanges_leave_nothing_behind_for_others(motors: Motors, seed: int) -> None:
+def test_cancelled_exchanges_do_not_affect_others(motors: Motors, seed: int) -> None:
     rng = random.Random(seed)
     motors.delay = lambda id: rng.choice([0, 0.001, 0.004])
     answered = cancelled = 0
@@ -216,7 +216,7 @@ def test_cancelled_exchanges_leave_nothing_behind_for_others(motors: Motors, see
     assert answered and cancelled
 
 
-def test_a_port_that_went_away_is_lost_and_then_opened_again(motors: Motors) -> None:
+def test_a_lost_port_is_opened_again(motors: Motors) -> None:
     async def main() -> None:
         async with aio.rmd.open(motors.port, timeout=5) as bus:
             motors.delay = lambda id: 5.0
@@ -235,7 +235,7 @@ def test_a_port_that_went_away_is_lost_and_then_opened_again(motors: Motors) -> 
 
 
 @pytest.mark.parametrize("on_close, code", [("stop", 0x81), ("off", 0x80), ("nothing", None)])
-def test_the_end_does_to_moving_motors_what_it_was_told(
+def test_the_end_treats_moving_motors_as_on_close_says(
     motors: Motors, on_close: str, code: int | None
 ) -> None:
     async def work() -> None:
@@ -260,7 +260,7 @@ def test_the_end_does_to_moving_motors_what_it_was_told(
     assert sorted(told) == ([] if code is None else [(1, code), (2, code)])
 
 
-def test_a_scan_finds_what_is_there(motors: Motors) -> None:
+def test_a_scan_finds_the_motors(motors: Motors) -> None:
     async def main() -> None:
         async with aio.rmd.open(motors.port, timeout=PATIENT) as bus:
             found = await bus.scan(range(6, 13))
@@ -283,7 +283,7 @@ def test_a_move_that_could_be_nearly_a_full_turn_is_refused(served: Served) -> N
     asyncio.run(asyncio.wait_for(main(), 60))
 
 
-def test_served_motors_turn_to_where_they_are_told(served: Served) -> None:
+def test_served_motors_turn_to_their_target(served: Served) -> None:
     async def main() -> None:
         async with aio.rmd.open(served.can, timeout=2) as bus:
             motor = bus.motor(2)

@@ -1,4 +1,4 @@
-"""asyncio on serial lines: the right answers to the right callers, whatever is cancelled."""
+"""asyncio on serial lines: each caller gets its own reply, also after cancellations."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Exchange = Awaitable[float]
 
 @pytest.fixture
 def drives(tmp_path: Path) -> Iterator[list[Drive]]:
-    """Four drives that can be told apart."""
+    """Four drives with different values."""
     drives = [Drive(tmp_path / f"st{number}", number) for number in range(4)]
     yield drives
     for drive in drives:
@@ -45,7 +45,7 @@ async def asked(bus: aio.st.Client, drive: Drive, choice: random.Random) -> None
     assert await bus.motor(motor).get(name) == value(drive.number, motor, number)
 
 
-def test_four_buses_with_many_tasks_each_give_everybody_their_own_answers(
+def test_each_task_on_four_lines_gets_its_own_replies(
     drives: list[Drive],
 ) -> None:
     seeds = random.Random(1)
@@ -72,10 +72,10 @@ def test_four_buses_with_many_tasks_each_give_everybody_their_own_answers(
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_cancelled_exchanges_leave_nothing_behind_for_others(
+def test_cancelled_exchanges_do_not_affect_others(
     drives: list[Drive], seed: int
 ) -> None:
-    """Replies come up to 8 ms late; tasks give up at any moment up to 6 ms."""
+    """Replies have a delay of up to 8 ms. Tasks are cancelled after up to 6 ms."""
     rng = random.Random(seed)
     for drive in drives:
         drive.delay = lambda: rng.choice([0, 0.002, 0.008])
@@ -116,7 +116,7 @@ def test_cancelled_exchanges_leave_nothing_behind_for_others(
     assert cancelled and answered
 
 
-def test_a_task_that_is_cancelled_while_it_waits_for_its_turn_costs_nothing(drive: Drive) -> None:
+def test_cancelling_a_task_that_waits_for_its_turn_sends_nothing(drive: Drive) -> None:
     drive.delay = lambda: 0.02
 
     async def main() -> None:
@@ -133,7 +133,7 @@ def test_a_task_that_is_cancelled_while_it_waits_for_its_turn_costs_nothing(driv
     asyncio.run(within(60, main()))
 
 
-def test_exchanges_are_carried_out_in_the_order_in_which_they_were_asked_for(drive: Drive) -> None:
+def test_exchanges_run_in_the_order_of_the_calls(drive: Drive) -> None:
     async def main() -> None:
         order: list[int] = []
 
@@ -149,7 +149,7 @@ def test_exchanges_are_carried_out_in_the_order_in_which_they_were_asked_for(dri
     asyncio.run(within(60, main()))
 
 
-def test_the_end_stops_what_was_started(drive: Drive) -> None:
+def test_the_end_stops_started_motors(drive: Drive) -> None:
     async def main() -> None:
         with pytest.raises(ZeroDivisionError):
             async with aio.st.open(drive.path) as bus:
@@ -165,7 +165,7 @@ def test_the_end_stops_what_was_started(drive: Drive) -> None:
     assert drive.executed == [(2, START), (5, START), (5, STOP), (2, STOP)]
 
 
-def test_a_task_that_is_cancelled_again_and_again_still_stops_what_it_started(drive: Drive) -> None:
+def test_a_task_that_is_cancelled_repeatedly_still_stops_its_motor(drive: Drive) -> None:
     async def work(running: asyncio.Event) -> None:
         async with aio.st.open(drive.path) as bus:
             await bus.motor(1).start()
@@ -182,14 +182,14 @@ def test_a_task_that_is_cancelled_again_and_again_still_stops_what_it_started(dr
             task.cancel()
             await asyncio.sleep(0.01)
         assert task.cancelled()
-        # Where an exchange was given up, the motor is told before the line has recovered, too.
+        # After an abandoned exchange the stop is also sent before the line is resynchronised.
         first, *stops = drive.executed
         assert first == (1, START) and set(stops) == {(1, STOP)}
 
     asyncio.run(within(60, main()))
 
 
-def test_the_end_of_the_loop_still_stops_what_a_task_started(drive: Drive) -> None:
+def test_the_end_of_the_loop_still_stops_the_motor_of_a_task(drive: Drive) -> None:
     async def work(running: asyncio.Event) -> None:
         async with aio.st.open(drive.path) as bus:
             await bus.motor(1).start()
@@ -220,7 +220,7 @@ def test_close_ends_the_exchanges_of_others(drive: Drive) -> None:
     asyncio.run(within(60, main()))
 
 
-def test_a_port_that_went_away_is_lost_and_then_opened_again(drive: Drive) -> None:
+def test_a_lost_port_is_opened_again(drive: Drive) -> None:
     beats = 0
 
     async def heart() -> None:
@@ -249,7 +249,7 @@ def test_a_port_that_went_away_is_lost_and_then_opened_again(drive: Drive) -> No
                     break
                 except motorlink.PortError:
                     await asyncio.sleep(0.01)
-            # Noticed also while nobody asks for anything.
+            # The loss is also detected without an exchange.
             drive.unplug()
             while bus._core.is_open:
                 await asyncio.sleep(0.001)
@@ -266,7 +266,7 @@ def test_a_port_that_went_away_is_lost_and_then_opened_again(drive: Drive) -> No
     assert beats > 10
 
 
-def test_a_reply_that_came_twice_is_not_confirmed(drive: Drive) -> None:
+def test_a_repeated_reply_is_not_confirmed(drive: Drive) -> None:
     async def main() -> None:
         async with aio.st.open(drive.path) as client:
             motor = client.motor(1)
@@ -353,7 +353,7 @@ def test_a_bus_belongs_to_one_loop(drive: Drive) -> None:
         asyncio.run(bus.board_info())
 
 
-def test_an_opening_that_is_cancelled_leaves_the_port_free(drive: Drive) -> None:
+def test_a_cancelled_open_leaves_the_port_free(drive: Drive) -> None:
     async def main() -> None:
         opening = asyncio.ensure_future(aio.st.open(drive.path)._open())
         await asyncio.sleep(0)
@@ -393,7 +393,7 @@ def test_the_simulated_drive_runs_beside_other_tasks() -> None:
     asyncio.run(within(60, main()))
 
 
-def test_a_verified_write_is_that_of_the_blocking_api() -> None:
+def test_a_verified_write_is_the_same_as_in_the_blocking_api() -> None:
     async def main() -> None:
         async with aio.st.open("sim:") as bus:
             motor = bus.motor(1)
@@ -408,7 +408,7 @@ def test_a_verified_write_is_that_of_the_blocking_api() -> None:
     asyncio.run(within(60, main()))
 
 
-def test_a_verified_write_is_repeated_and_says_what_it_found(drive: Drive) -> None:
+def test_a_verified_write_is_repeated_and_reports_the_value(drive: Drive) -> None:
     answers = iter([6, 7, 6, 6, 6])
     drive.reads = lambda register: next(answers)
 

@@ -1,4 +1,4 @@
-"""The blocking and the asyncio API are one: the same methods, arguments and texts, and each its types."""
+"""The blocking and the asyncio API have the same methods, arguments and docstrings, and their own types."""
 
 from __future__ import annotations
 
@@ -57,14 +57,14 @@ def test_both_apis_open_with_the_same_arguments(blocking: Any, awaited: Any) -> 
 
 
 class Shared:
-    """A definition whose exchanges fail, and its remedy."""
+    """A definition that handles errors of its exchanges."""
 
     def __init__(self) -> None:
         self.tried = 0
 
     @both_apis
     def stubborn(self, fails: int) -> Exchanges[str]:
-        """Tries until it does not fail."""
+        """Tries until an exchange succeeds."""
         while True:
             try:
                 answer: str = yield self.exchange(fails)
@@ -92,7 +92,7 @@ class AwaitedOne(Awaited, Shared):
         return "done"
 
 
-def test_a_definition_can_handle_what_an_exchange_raises() -> None:
+def test_a_definition_can_handle_errors_of_an_exchange() -> None:
     assert BlockingOne().stubborn(3) == "done"
     assert asyncio.run(AwaitedOne().stubborn(3)) == "done"
 
@@ -108,7 +108,7 @@ def test_cancellation_ends_a_definition() -> None:
     asyncio.run(main())
 
 
-def test_a_method_that_a_subclass_replaces_stays_replaced() -> None:
+def test_a_method_of_a_subclass_is_kept() -> None:
     class Quiet(BlockingOne):
         def stubborn(self, fails: int) -> str:
             return "replaced"
@@ -132,8 +132,8 @@ def in_a_thread(method: Callable[[], object]) -> None:
     thread.join()
 
 
-def test_a_read_without_brackets_is_no_value() -> None:
-    """`while motor.status != "RUN":` would go on for ever, with the motor turning."""
+def test_a_read_without_brackets_raises() -> None:
+    """`while motor.status != "RUN":` would never end, and the motor would turn."""
     with st.open("sim:") as drive, rmd.open("sim:") as bus:
         reads: list[Any] = [drive.motor(1).status, drive.motor(1).flags, drive.board_info]
         reads += [bus.motor(1).multi_turn_angle, bus.motor(1).status, bus.motor(1).motion_status]
@@ -186,7 +186,7 @@ def test_a_function_in_place_of_a_request_is_named() -> None:
 
 
 def types_of_the_blocking_api(bus: st.Client, motors: rmd.Client) -> None:
-    """Read by mypy, never run."""
+    """Checked by mypy, not run."""
     assert_type(st.open("sim:"), st.Client)
     assert_type(bus.motor(1), st.Motor)
     assert_type(bus.motor(1).client, st.Client)
@@ -200,7 +200,7 @@ def types_of_the_blocking_api(bus: st.Client, motors: rmd.Client) -> None:
 
 
 async def types_of_asyncio(bus: aio.st.Client, motors: aio.rmd.Client) -> None:
-    """Read by mypy, never run."""
+    """Checked by mypy, not run."""
     assert_type(await aio.st.open("sim:"), aio.st.Client)
     assert_type(bus.motor(1).client, aio.st.Client)
     assert_type(await bus.motor(1).get("STATUS"), float)

@@ -24,7 +24,7 @@ from motorlink.can import CanPort, from_python_can
 
 
 class Motor(threading.Thread):
-    """A motor on a virtual bus that answers with its ID as its speed, and with much else."""
+    """A motor on a virtual bus. It replies with its ID as its speed, and sends other frames."""
 
     def __init__(self, channel: str, id: int):
         super().__init__(daemon=True)
@@ -41,7 +41,7 @@ class Motor(threading.Thread):
                 continue
             self.heard.append(message.data[0])
             reply = bytes([message.data[0], 25, 0, 0]) + self.id.to_bytes(2, "little") + bytes(2)
-            # None of these is the motor's reply.
+            # None of these frames is the reply.
             wrong = bytes([message.data[0]]) + bytes(7)
             for strange in (
                 can.Message(arbitration_id=0x140 + self.id, data=wrong, is_extended_id=True),
@@ -72,7 +72,7 @@ def motor(request: pytest.FixtureRequest) -> Iterator[Motor]:
 
 @pytest.fixture
 def bus(request: pytest.FixtureRequest) -> Iterator[can.BusABC]:
-    """The host's end, which also hears what it sends itself."""
+    """The host's bus, which also receives its own frames."""
     bus = can.Bus(request.node.name, interface="virtual", receive_own_messages=True)
     yield bus
     bus.shutdown()
@@ -81,22 +81,22 @@ def bus(request: pytest.FixtureRequest) -> Iterator[can.BusABC]:
 def test_a_motor_on_a_bus_of_python_can_is_commanded(bus: can.BusABC, motor: Motor) -> None:
     with rmd.open(from_python_can(bus), timeout=2) as motors:
         assert motors.motor(7).motion_status().speed_dps == 7
-        # Answered with the very bytes of the request, as the bus's own echo would be.
+        # The reply has the bytes of the request, like an echo of the bus.
         motors.motor(7).stop()
         assert motors.cycle({7: rmd.set_speed(100)})[7].speed_dps == 7
         assert motors.moving == [7]
         assert "python-can" in motors.port
-    # First it is asked for its status twice, as another program may have asked it something.
+    # The client first reads the status twice, because another program may have sent a request.
     assert motor.heard == [0x9A, 0x9C] + [0x9C, 0x81, 0xA2, 0x81]
 
 
-def test_an_echo_is_no_answer(bus: can.BusABC) -> None:
+def test_an_echo_is_not_a_reply(bus: can.BusABC) -> None:
     with rmd.open(from_python_can(bus), timeout=0.05) as motors:
         with pytest.raises(motorlink.ReplyTimeoutError, match="motor 3"):
             motors.motor(3).stop()
 
 
-def test_asyncio_commands_it_as_well(bus: can.BusABC, motor: Motor) -> None:
+def test_asyncio_commands_it_too(bus: can.BusABC, motor: Motor) -> None:
     async def main() -> None:
         async with aio.rmd.open(from_python_can(bus), timeout=2) as motors:
             one = motors.motor(7)
@@ -104,12 +104,12 @@ def test_asyncio_commands_it_as_well(bus: can.BusABC, motor: Motor) -> None:
             assert all(answer.speed_dps == 7 for answer in answers)
             await one.set_speed(100)
 
-    # Those that earlier tests left may end meanwhile.
+    # Threads of earlier tests may end meanwhile.
     threads = set(threading.enumerate())
     asyncio.run(asyncio.wait_for(main(), 60))
     assert motor.heard[-1] == 0x81
     assert set(threading.enumerate()) <= threads
-    # Nobody receives from it any more.
+    # No thread receives from it any more.
     motor.bus.send(can.Message(arbitration_id=0x123, is_extended_id=False))
     message = bus.recv(5)
     while message is not None and message.arbitration_id != 0x123:
@@ -118,7 +118,7 @@ def test_asyncio_commands_it_as_well(bus: can.BusABC, motor: Motor) -> None:
 
 
 class Broken(can.bus.BusABC):
-    """A bus whose adapter is pulled out after some frames."""
+    """A bus whose adapter is unplugged after some frames."""
 
     def __init__(self, frames: int):
         super().__init__(channel="broken")
@@ -142,7 +142,7 @@ def check(error: BaseException) -> None:
     assert isinstance(error.__cause__, can.CanOperationError)
 
 
-def test_what_the_bus_raises_is_the_cause_of_a_lost_line() -> None:
+def test_an_exception_of_the_bus_is_the_cause_of_a_lost_line() -> None:
     bus = Broken(1)
     with rmd.open(from_python_can(bus), timeout=5, on_close="nothing") as motors:
         with pytest.raises(motorlink.LinkError) as lost:
@@ -156,7 +156,7 @@ def test_what_the_bus_raises_is_the_cause_of_a_lost_line() -> None:
 
 
 class Flaky(VirtualBus):
-    """A bus that fails now and then."""
+    """A bus that fails sometimes."""
 
     def __init__(self, channel: str):
         self.fails_to_send = self.fails_to_receive = 0
@@ -193,8 +193,7 @@ def test_a_bus_that_failed_once_is_used_again(flaky: Flaky, motor: Motor) -> Non
             assert one.motion_status().speed_dps == 7
             flaky.fails_to_receive = 1
             eventually(lambda: flaky.fails_to_receive == 0, "a failure while nothing is asked")
-            # The failure does not keep the motor from being stopped. The error may be raised as late
-            # as here.
+            # The motor is stopped in spite of the failure. The error may be raised only here.
             with contextlib.suppress(motorlink.LinkError):
                 one.stop()
             one.stop()
@@ -203,7 +202,7 @@ def test_a_bus_that_failed_once_is_used_again(flaky: Flaky, motor: Motor) -> Non
     assert motor.heard[-1] == 0x81
 
 
-def test_stops_are_sent_where_nothing_can_be_received(flaky: Flaky, motor: Motor) -> None:
+def test_stops_are_sent_if_receiving_fails(flaky: Flaky, motor: Motor) -> None:
     with rmd.open(from_python_can(flaky), timeout=2, on_close="nothing") as motors:
         motors.motor(7).set_speed(100)
         flaky.fails_to_receive = 1_000_000
@@ -276,7 +275,7 @@ def test_ctrl_c_interrupts_a_wait_and_leaves_the_bus_open() -> None:
             program.kill()
 
 
-def test_and_in_asyncio() -> None:
+def test_ctrl_c_interrupts_a_wait_in_asyncio() -> None:
     async def main(bus: can.BusABC) -> None:
         async with aio.rmd.open(from_python_can(bus), timeout=5, on_close="nothing") as motors:
             with pytest.raises(motorlink.LinkError) as lost:
@@ -300,7 +299,7 @@ def test_served_motors_through_python_cans_own_slcan(served: Served) -> None:
     assert served.motor("rmd", 1)["mode"] == "stopped"
 
 
-def test_without_python_can_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_python_can_the_error_names_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     real = builtins.__import__
 
     def missing(name: str, *rest: Any) -> Any:
@@ -313,7 +312,7 @@ def test_without_python_can_it_says_what_to_install(monkeypatch: pytest.MonkeyPa
         from_python_can(object())
 
 
-def test_what_is_no_bus_is_told_apart() -> None:
+def test_another_object_is_refused() -> None:
     with pytest.raises(TypeError, match="not a bus of python-can"):
         from_python_can("can0")
     port = CanPort(None, None, "nothing")

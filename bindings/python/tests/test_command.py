@@ -1,4 +1,4 @@
-"""The command `motorlink` that pip installs: what the program of that name does."""
+"""The command `motorlink` that pip installs is the same program."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def test_it_has_the_exit_codes_of_the_program(command: str, code: int, words: li
     assert bool(done.stdout) == (code == 0)
 
 
-def test_it_is_a_module_too(command: str) -> None:
+def test_it_is_also_a_module(command: str) -> None:
     done = run(sys.executable, "-m", "motorlink", "--version")
     assert done.stdout == run(command, "--version").stdout == f"motorlink {motorlink.__version__}\n"
 
 
-def test_json_comes_a_line_at_a_time_until_ctrl_c(command: str, served: Served) -> None:
+def test_json_is_written_line_by_line_until_ctrl_c(command: str, served: Served) -> None:
     words = [command, "st", "-p", served.st, "--json", "get", "STATUS", "--every", "20ms"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as loop:
         assert loop.stdout
@@ -66,7 +66,7 @@ def test_ctrl_c_ends_a_wait_at_once(command: str, tmp_path: Path) -> None:
     assert not (tmp_path / "st0").is_symlink(), "nothing is left behind"
 
 
-def test_a_reader_that_is_gone_is_no_error(command: str, served: Served) -> None:
+def test_a_closed_pipe_is_not_an_error(command: str, served: Served) -> None:
     words = [command, "st", "-p", served.st, "get", "STATUS", "--every", "5ms"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as loop:
         assert loop.stdout and loop.stderr and loop.stdout.readline()

@@ -1,4 +1,4 @@
-"""Motors stop however a bus ends: closed under threads, forgotten, in a program that ends, after a fork."""
+"""Motors stop at each end of a client: close, garbage collection, end of the program, fork."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def is_turning(bench: sim.Bench, bus: str) -> bool:
     return bench.truth("st2")["status"] not in ("IDLE", "STOP", "STOP_IDLE")
 
 
-#: How a bus of each protocol is opened on a bench.
+#: Opens a client of each protocol on a bench.
 OPEN: dict[str, Callable[[sim.Bench], st.Client | rmd.Client]] = {"st": st.open, "rmd": rmd.open}
 
 
 @pytest.mark.parametrize("kind", OPEN)
-def test_nothing_turns_that_was_started_while_the_bus_was_closed(kind: str) -> None:
+def test_a_motor_started_during_the_close_does_not_turn(kind: str) -> None:
     for _ in range(30):
         bench = sim.Bench()
         bus = OPEN[kind](bench)
@@ -60,7 +60,7 @@ def test_nothing_turns_that_was_started_while_the_bus_was_closed(kind: str) -> N
 
 
 @pytest.mark.parametrize("kind", OPEN)
-def test_a_bus_that_is_forgotten_stops_its_motors(kind: str) -> None:
+def test_a_client_that_is_garbage_collected_stops_its_motors(kind: str) -> None:
     bench = sim.Bench()
     bus = OPEN[kind](bench)
     start(bus)
@@ -70,7 +70,7 @@ def test_a_bus_that_is_forgotten_stops_its_motors(kind: str) -> None:
     assert not is_turning(bench, kind)
 
 
-def test_a_bus_that_is_to_leave_its_motors_alone_does_so_when_forgotten() -> None:
+def test_on_close_nothing_also_holds_for_garbage_collection() -> None:
     bench = sim.Bench()
     bus = rmd.open(bench, on_close="nothing")
     bus.motor(1).set_speed(100)
@@ -132,7 +132,7 @@ def test_a_forked_process_leaves_the_line_alone() -> None:
 
 
 @pytest.mark.parametrize("kind", OPEN)
-def test_a_signal_handler_may_close_a_bus_that_is_sampled(kind: str) -> None:
+def test_a_signal_handler_may_close_a_client_that_samples(kind: str) -> None:
     script = "\n".join((
         "import os, signal, sys, threading, time, motorlink",
         "kind, what = sys.argv[1:]",

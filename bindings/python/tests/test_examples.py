@@ -1,4 +1,4 @@
-"""The examples run as they are: without hardware, without a screen, to the end."""
+"""The examples run unchanged, without hardware and without a screen."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 def run(folder: Path, *words: str) -> str:
-    """What an example prints."""
+    """The output of an example."""
     environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
     done = subprocess.run(
         [sys.executable, *words],
@@ -31,7 +31,7 @@ def run(folder: Path, *words: str) -> str:
     return done.stdout
 
 
-def test_every_example_is_run_here() -> None:
+def test_every_example_has_a_test() -> None:
     known = {"first_steps.py", "pi_tuning.py", "torque_loop.py", "test_bench.py"}
     assert {path.name for path in EXAMPLES.glob("*.py")} == known
     for path in EXAMPLES.glob("*.py"):
@@ -60,7 +60,7 @@ def test_pi_tuning_finds_better_gains_and_draws_them(tmp_path: Path, picture: st
     assert len(drawn) > 10_000
 
 
-def test_pi_tuning_does_without_matplotlib(tmp_path: Path) -> None:
+def test_pi_tuning_works_without_matplotlib(tmp_path: Path) -> None:
     (tmp_path / "matplotlib.py").write_text("raise ImportError('not here')")
     (tmp_path / "run.py").write_text(
         f"import runpy, sys; sys.path.insert(0, '.'); runpy.run_path({str(EXAMPLES / 'pi_tuning.py')!r})"

@@ -1,4 +1,4 @@
-"""Processes that were forked: the parent's ports are the parent's alone."""
+"""Forked processes: the ports of the parent belong to the parent only."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BEGIN = """
         if child == 0:
             os.write(alive, b"x")
             signal.pause()
-        # A busy machine may not have run the child yet: until then it has the ports of its parent.
+        # On a busy machine the child may not have run yet. Until then it has the ports of its parent.
         os.read(ready, 1)
         return child
 """
@@ -77,7 +77,7 @@ def guard(command: str, served: Served, tmp_path: Path) -> Iterator[Guard]:
 
 
 class Family:
-    """A program whose child lives on after it was killed."""
+    """A program whose child still runs after the program was killed."""
 
     def __init__(self, script: str, port: str, way: str):
         words = [sys.executable, "-c", textwrap.dedent(BEGIN) + textwrap.dedent(script), port, way]
@@ -94,7 +94,7 @@ class Family:
 
     def __exit__(self, *_: object) -> None:
         self.kill_parent()
-        # It was there all the time.
+        # It was running all the time.
         os.kill(self.child, signal.SIGKILL)
         assert self.parent.stdout
         self.parent.stdout.close()
@@ -141,7 +141,7 @@ CHILD_ENDS = """
 
 
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_child_that_ends_leaves_the_parents_adapter_alone(served: Served) -> None:
+def test_the_end_of_a_child_does_not_affect_the_adapter_of_the_parent(served: Served) -> None:
     words = [sys.executable, "-c", textwrap.dedent(CHILD_ENDS), served.can]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert done.stdout.splitlines() == ["True [1]"] * 3, done.stderr
@@ -164,7 +164,7 @@ ASYNC_CHILD = """
 """
 
 
-def test_a_bus_of_asyncio_is_of_no_use_in_a_child(served: Served) -> None:
+def test_a_client_of_asyncio_is_closed_in_a_child(served: Served) -> None:
     words = [sys.executable, "-c", textwrap.dedent(ASYNC_CHILD), served.st]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert done.stdout.splitlines() == ["True", "[] 0"], done.stderr

@@ -1,4 +1,4 @@
-"""Handlers of signals that use the bus which the interrupted code waits for."""
+"""Signal handlers that use the client which the interrupted code waits for."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ import pytest
 from conftest import Served, eventually
 from drive import QUESTIONS, REGISTERS, START, STOP, Drive, frame
 
-#: How often what once hung in most runs, but not in all, is tried.
+#: Repetitions of a case that once hung in most runs.
 RUNS = 20
 
-#: How long a program may take that waits for nothing, s.
+#: Time limit of a program that waits for nothing, s.
 PATIENT = 60
 
 BEGIN = """
     import os, random, signal, sys, threading, time, motorlink
 
-    #: Handlers under way, one within the other.
+    #: Nested handlers under way.
     within = [0]
 
     def on_signal(act):
@@ -39,8 +39,8 @@ BEGIN = """
         threading.Timer(wait, os.kill, (os.getpid(), signal.SIGUSR1)).start()
 
     def signals_until(done):
-        # From another thread, at random instants, also into handlers: three deep at most, as a busy
-        # machine would never come out of them.
+        # From another thread, at random instants, also during handlers. At most three are nested,
+        # because a busy machine would never leave them.
         def shoot():
             while not done():
                 time.sleep(random.uniform(0.0, 0.02))
@@ -55,7 +55,7 @@ BEGIN = """
             wait()
             print("went on", flush=True)
         except motorlink.MotorlinkError as error:
-            print(type(error).__name__, "given up" in str(error), flush=True)
+            print(type(error).__name__, "aborted this exchange" in str(error), flush=True)
 """
 
 
@@ -69,7 +69,7 @@ def program(script: str, *arguments: str) -> subprocess.Popen[str]:
 
 
 def ends(process: subprocess.Popen[str]) -> list[str]:
-    """What a program says until it ends, which it has to."""
+    """The output of a program up to its end. A program that does not end fails the test."""
     try:
         out, err = process.communicate(timeout=PATIENT)
     except subprocess.TimeoutExpired:
@@ -91,14 +91,14 @@ STOP_WHILE_DEAF = """
 """
 
 
-def test_a_handler_stops_a_motor_while_an_answer_is_awaited(tmp_path: Path) -> None:
+def test_a_handler_stops_a_motor_during_a_wait_for_a_reply(tmp_path: Path) -> None:
     drive = Drive(tmp_path / "st0", 3)
     drive.is_deaf_to = REGISTERS["SPEED_REF"]
     try:
         for _ in range(RUNS):
             drive.executed.clear()
             assert ends(program(STOP_WHILE_DEAF, str(drive.path))) == ["PortError True", "[]"]
-            # At once, and again when the line has recovered.
+            # At once, and again when the line is resynchronised.
             assert drive.executed == [(1, START), (1, STOP), (1, STOP)]
     finally:
         drive.unplug()
@@ -122,7 +122,7 @@ CLOSE_WHILE_SILENT = """
 def test_a_handler_closes_a_bus_whose_drive_is_silent(tmp_path: Path) -> None:
     for _ in range(4):
         drive = Drive(tmp_path / "st0", 3)
-        # What is asked first on a line that was just opened, and one reading.
+        # The first requests on a new line, and one read.
         drive.answers = len(QUESTIONS) + 2
         try:
             said = ends(program(CLOSE_WHILE_SILENT, str(drive.path)))
@@ -147,7 +147,7 @@ IDLE_HANDLER = """
 
 
 def test_a_handler_that_sends_nothing_does_not_disturb_an_exchange(tmp_path: Path) -> None:
-    # A late answer to the questions of an opened line would cost two timeouts.
+    # A late reply to the first requests on a new line would cost two timeouts.
     prompt = iter([0.0] * (1 + len(QUESTIONS)))
     drive = Drive(tmp_path / "st0", 3, delay=lambda: next(prompt, 0.12))
     try:
@@ -161,11 +161,11 @@ HANDLER_AT_RANDOM = """
     kind, port = sys.argv[1:]
     done = []
     def stop():
-        # A handler within this one gives its exchange up, also while `sample` runs.
+        # A nested handler abandons the exchange of this one, also during `sample`.
         try:
             bus.motor(1).stop()
         except motorlink.PortError as error:
-            assert "given up" in str(error), error
+            assert "aborted this exchange" in str(error), error
         done.append(True)
     on_signal(stop)
     going = True
@@ -178,7 +178,7 @@ HANDLER_AT_RANDOM = """
             try:
                 ask()
             except motorlink.PortError as error:
-                assert "given up" in str(error), error
+                assert "aborted this exchange" in str(error), error
         data = bus.sample(["SPEED_MEAS" if kind == "st" else "iq_amps"], rate=200, seconds=0.3)
         going = False
         thread.join()
@@ -187,7 +187,7 @@ HANDLER_AT_RANDOM = """
 
 
 @pytest.mark.parametrize("kind", ["st", "rmd"])
-def test_handlers_stop_motors_whenever_they_come(served: Served, kind: str) -> None:
+def test_handlers_stop_motors_at_any_instant(served: Served, kind: str) -> None:
     port = served.st if kind == "st" else served.can
     assert ends(program(HANDLER_AT_RANDOM, kind, port)) == ["True"]
 
@@ -204,7 +204,7 @@ STOP_ON_PYTHON_CAN = """
                 motor.stop()
                 done.append(True)
             on_signal(stop)
-            # An exchange that brings the motor in step takes long: handlers would mostly meet each other.
+            # The first exchange with a motor takes long, and most handlers would run during it.
             motor.motion_status()
             thread = signals_until(lambda: len(done) >= 10)
             while thread.is_alive():
@@ -212,7 +212,7 @@ STOP_ON_PYTHON_CAN = """
                     motor.set_speed(100)
                     motor.motion_status()
                 except motorlink.PortError as error:
-                    assert "given up" in str(error), error
+                    assert "aborted this exchange" in str(error), error
             print(0x81 in other.heard)
     other.end()
 """

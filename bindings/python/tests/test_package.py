@@ -1,4 +1,4 @@
-"""The package as a whole: the examples in its texts, and that there are texts."""
+"""The docstrings of the package, and the examples in them."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ import motorlink
 
 
 def modules() -> list[str]:
-    """Every module of the package, but for the one that runs when it is imported."""
+    """Every module of the package except `__main__`, which runs at import."""
     found = pkgutil.walk_packages(motorlink.__path__, "motorlink.")
     names = [module.name for module in found if not module.name.endswith("__main__")]
     return ["motorlink", *names]
 
 
 @pytest.mark.parametrize("name", modules())
-def test_the_examples_do_what_they_show(name: str) -> None:
+def test_the_examples_in_docstrings_run(name: str) -> None:
     module = importlib.import_module(name)
     done = doctest.testmod(module, optionflags=doctest.ELLIPSIS)
     assert done.failed == 0
 
 
 def public(module: ModuleType) -> list[tuple[str, object]]:
-    """What a module offers."""
+    """The public names of a module."""
     return [(name, getattr(module, name)) for name in module.__all__]
 
 
@@ -45,7 +45,7 @@ def public(module: ModuleType) -> list[tuple[str, object]]:
         motorlink.aio.rmd,
     ],
 )
-def test_everything_public_says_what_it_is(module: ModuleType) -> None:
+def test_every_public_name_has_a_docstring(module: ModuleType) -> None:
     for name, thing in public(module):
         if not (inspect.isclass(thing) or inspect.isroutine(thing)):
             continue

@@ -1,4 +1,4 @@
-"""The pytest plugin, from the outside: as a user's tests find it when the package is installed."""
+"""The pytest plugin as the tests of a user see it."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_a_users_code_is_tested_on_virtual_time(pytester: pytest.Pytester) -> No
     pytester.runpytest("--strict-markers").assert_outcomes(passed=4)
 
 
-def test_a_marker_says_what_the_bench_is(pytester: pytest.Pytester) -> None:
+def test_a_marker_configures_the_bench(pytester: pytest.Pytester) -> None:
     pytester.mkdir("benches").joinpath("one.toml").write_text("[[rmd.motor]]\nid = 9")
     pytester.makeini("[pytest]\nmotorlink_config = benches/one.toml")
     pytester.makepyfile(

@@ -70,7 +70,7 @@ def test_a_full_turn_and_its_tolerance_can_be_allowed() -> None:
                 bus.motor(1).set_single_turn_position(80, tolerance_degrees=nonsense)
 
 
-def test_speed_and_torque_do_what_they_say(rmd_bus: rmd.Client) -> None:
+def test_speed_and_torque_turn_the_motor(rmd_bus: rmd.Client) -> None:
     motor = rmd_bus.motor(2)
     motor.set_speed(-360)
     eventually(lambda: abs(motor.motion_status().speed_dps + 360) < 20, "-360 °/s")
@@ -96,7 +96,7 @@ def test_gains_and_acceleration_are_kept(rmd_bus: rmd.Client) -> None:
     assert motor.pid() == gains
 
 
-def test_rom_is_written_with_an_explicit_word_only(served: Served) -> None:
+def test_raw_bytes_write_the_rom_only_with_rom_true(served: Served) -> None:
     with rmd.open(served.can, timeout=PATIENT) as bus:
         motor = bus.motor(1)
 
@@ -124,12 +124,12 @@ def test_errors_are_named_and_cleared(served: Served) -> None:
 
 @pytest.fixture
 def brief_bus() -> Iterator[rmd.Client]:
-    """A bus on virtual time, on which a timeout costs none."""
+    """A client on virtual time, where a timeout takes no real time."""
     with rmd.open(sim.Bench(), timeout=0.3) as bus:
         yield bus
 
 
-def test_a_cycle_gives_each_motor_its_own_answer(brief_bus: rmd.Client) -> None:
+def test_a_cycle_returns_the_reply_of_each_motor(brief_bus: rmd.Client) -> None:
     answers = brief_bus.cycle(
         {4: rmd.read_status(), 2: rmd.set_torque(0.1), 9: rmd.read_motion_status(), 1: rmd.off()}
     )
@@ -200,7 +200,7 @@ def test_limits_and_max_speeds_round_towards_0() -> None:
         for beyond in calls:
             with pytest.raises(motorlink.InvalidValueError, match="limit"):
                 beyond()
-    # 0.3 has 30 digits of 0.01, whatever binary fractions say.
+    # 0.3 is 30 digits of 0.01, although binary fractions are not exact.
     with rmd.open("sim:", timeout=PATIENT, angle_limit_degrees=0.3, current_limit_amps=0.48) as bus:
         bus.motor(1).set_position(0.3)
         bus.motor(1).set_torque(0.48)
@@ -232,7 +232,7 @@ def test_a_max_speed_never_rounds_up() -> None:
         rmd.set_position_limited(angle_degrees=1, max_speed_dps=65536)
 
 
-def test_nonsense_is_refused_before_it_is_sent(rmd_bus: rmd.Client) -> None:
+def test_invalid_values_are_refused_before_they_are_sent(rmd_bus: rmd.Client) -> None:
     motor = rmd_bus.motor(1)
     for nonsense in (
         lambda: motor.set_torque(float("nan")),
@@ -258,7 +258,7 @@ def test_nonsense_is_refused_before_it_is_sent(rmd_bus: rmd.Client) -> None:
     assert rmd_bus.moving == []
 
 
-def test_a_motor_that_is_not_there_is_a_timeout(brief_bus: rmd.Client) -> None:
+def test_an_absent_motor_is_a_timeout(brief_bus: rmd.Client) -> None:
     with pytest.raises(motorlink.ReplyTimeoutError) as silent:
         _ = brief_bus.motor(20).multi_turn_angle()
     assert silent.value.motor == 20 and "0x92" in str(silent.value)
@@ -269,7 +269,7 @@ def test_raw_bytes(rmd_bus: rmd.Client) -> None:
     assert reply[0] == 0x9A and rmd.decode(0x141, reply, reply=True).values["voltage_volts"] == 24.0
 
 
-def test_the_end_of_with_stops_what_moves(served: Served) -> None:
+def test_the_end_of_with_stops_moving_motors(served: Served) -> None:
     def mode(motor: int) -> object:
         return served.motor("rmd", motor)["mode"]
 
@@ -287,7 +287,7 @@ def test_the_end_of_with_stops_what_moves(served: Served) -> None:
     assert mode(1) == "speed"
 
 
-def test_a_motor_that_cannot_be_stopped_is_not_passed_over(served: Served) -> None:
+def test_a_motor_that_cannot_be_stopped_raises(served: Served) -> None:
     bus = rmd.open(served.can, timeout=PATIENT)
     bus.motor(2).set_speed(100)
     served.end()
@@ -296,7 +296,7 @@ def test_a_motor_that_cannot_be_stopped_is_not_passed_over(served: Served) -> No
     assert lost.value.motor == 2 and "closed" in repr(bus)
 
 
-def test_after_its_end_a_bus_says_that_it_is_closed(tmp_path: Path) -> None:
+def test_a_closed_client_raises(tmp_path: Path) -> None:
     bus = rmd.open("sim:")
     assert repr(bus) == "<motorlink.rmd.Client sim:>"
     bus.close()

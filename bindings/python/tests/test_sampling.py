@@ -1,4 +1,4 @@
-"""Sampling: the right columns, honest instants, and ends that lose nothing."""
+"""`client.sample`: its columns, its instants, and its rows after an error."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_registers_are_sampled_in_their_units(st_bus: st.Client) -> None:
     data["t"][0] = 0  # The array is the caller's.
 
 
-def test_instants_do_not_drift_and_none_is_made_up(st_bus: st.Client) -> None:
+def test_instants_do_not_drift_and_no_row_is_invented(st_bus: st.Client) -> None:
     t = st_bus.sample(["SPEED_MEAS"], rate=100, seconds=0.5)["t"]
     instants = np.floor(t * 100 + 1e-6).astype(int)
     assert np.all(np.diff(instants) >= 1), "a row an instant at most"
@@ -35,18 +35,18 @@ def test_instants_do_not_drift_and_none_is_made_up(st_bus: st.Client) -> None:
     assert np.all(t * 100 - instants < 1)
 
 
-def test_a_line_that_is_too_slow_leaves_instants_out(served: Served) -> None:
+def test_a_slow_line_skips_instants(served: Served) -> None:
     with st.open(served.st) as bus:
         data = bus.sample(["SPEED_MEAS"], rate=1_000_000, seconds=0.3)
     assert 1 <= len(data) < 300_000
     assert np.all(np.diff(data["t"]) > 0)
 
 
-def test_segments_and_single_reads_tell_the_same(tmp_path: Any) -> None:
+def test_segments_and_single_reads_have_the_same_values(tmp_path: Any) -> None:
     config = tmp_path / "bench.toml"
     config.write_text('profile = "mcsdk-5.4"\n')
     names = ["BUS_VOLTAGE", "SPEED_KP"]
-    # The bus takes the drive for one with segments, which this drive refuses.
+    # The client uses segments, which this drive refuses.
     with st.open(f"sim:{config}") as single, st.open("sim:") as many:
         for bus in (single, many):
             bus.motor(1).set("SPEED_KP", 77)
@@ -86,7 +86,7 @@ def test_currents_are_amperes_where_full_scale_is_known() -> None:
     assert data["TORQUE_REF"] == pytest.approx(1.5)
 
 
-def test_what_motors_tell_is_sampled_in_cycles(rmd_bus: rmd.Client) -> None:
+def test_values_of_motors_are_sampled_in_cycles(rmd_bus: rmd.Client) -> None:
     motor = rmd_bus.motor(1)
     motor.set_speed(500)
     eventually(lambda: motor.motion_status().speed_dps > 400, "400 °/s")
@@ -103,12 +103,12 @@ def test_what_motors_tell_is_sampled_in_cycles(rmd_bus: rmd.Client) -> None:
     assert every["voltage_volts"][0] == pytest.approx(240, abs=10)
 
 
-def test_quantities_are_fields_of_what_is_answered() -> None:
+def test_quantities_are_fields_of_replies() -> None:
     fields = {*rmd.MotionStatus._fields, *rmd.Status._fields, *rmd.PhaseCurrents._fields}
     assert {*fields, "multi_turn_angle_degrees", "single_turn_angle_degrees"} <= set(rmd.QUANTITIES)
 
 
-def test_an_error_ends_it_with_what_there_was(served: Served) -> None:
+def test_an_error_has_the_rows_before_it(served: Served) -> None:
     with st.open(served.st, timeout=0.05, on_close="nothing") as bus:
         bus.motor(1).get("STATUS")
         cut = threading.Timer(0.2, served.end)
@@ -121,7 +121,7 @@ def test_an_error_ends_it_with_what_there_was(served: Served) -> None:
     assert ended.value.samples.dtype.names == ("t", "SPEED_MEAS", "STATUS")
 
 
-def test_a_motor_that_is_silent_can_be_passed_over() -> None:
+def test_a_silent_motor_can_be_skipped() -> None:
     with rmd.open(sim.Bench(), timeout=0.2, quarantine=0.01) as bus:
         asked = {1: ["iq_amps"], 9: ["iq_amps"]}
         with pytest.raises(motorlink.ReplyTimeoutError) as silent:
@@ -131,7 +131,7 @@ def test_a_motor_that_is_silent_can_be_passed_over() -> None:
         assert len(bus.sample({1: ["iq_amps"]}, rate=50, seconds=0.3)) > 0
 
 
-def test_nonsense_is_refused(st_bus: st.Client, rmd_bus: rmd.Client) -> None:
+def test_invalid_arguments_are_refused(st_bus: st.Client, rmd_bus: rmd.Client) -> None:
     cases: list[Callable[[], object]] = [
         lambda: st_bus.sample([], rate=10, seconds=1),
         lambda: st_bus.sample(["STATUS"], rate=0, seconds=1),
@@ -153,7 +153,7 @@ def test_nonsense_is_refused(st_bus: st.Client, rmd_bus: rmd.Client) -> None:
         st_bus.sample({7: ["STATUS"]}, rate=10, seconds=1)
 
 
-def test_without_pandas_it_says_so(st_bus: st.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pandas_the_error_names_the_package(st_bus: st.Client, monkeypatch: pytest.MonkeyPatch) -> None:
     data = st_bus.sample(["STATUS"], rate=100, seconds=0.3)
     plain = importlib.import_module
 
@@ -168,7 +168,7 @@ def test_without_pandas_it_says_so(st_bus: st.Client, monkeypatch: pytest.Monkey
 
 
 class Frame:
-    """What `to_pandas` needs of pandas."""
+    """The part of pandas that `to_pandas` uses."""
 
     def __init__(self, columns: dict[str, Any]):
         self.columns, self.index = columns, ""
@@ -193,7 +193,7 @@ def test_with_pandas_the_time_is_the_index(
     assert list(frame.columns) == ["t", "STATUS", "SPEED_MEAS"] and frame.index == "t"
 
 
-def test_a_sample_leaves_the_segments_of_others_alone(st_bus: st.Client) -> None:
+def test_samplings_do_not_use_the_segments_of_others(st_bus: st.Client) -> None:
     motor = st_bus.motor(1)
     motor.configure_segment(3, ["SPEED_KP", "SPEED_KI"])
     here = motor.segment(3)
@@ -238,7 +238,7 @@ def test_asyncio_samples_without_segments_where_the_drive_has_none(tmp_path: Any
     config.write_text('profile = "mcsdk-5.4"\n')
 
     async def main() -> None:
-        # The bus takes the drive for one with segments, which this drive refuses.
+        # The client uses segments, which this drive refuses.
         async with aio.st.open(f"sim:{config}") as bus:
             await bus.motor(1).set("SPEED_KP", 77)
             data = await bus.sample(["BUS_VOLTAGE", "SPEED_KP"], rate=100, seconds=0.2)
@@ -247,7 +247,7 @@ def test_asyncio_samples_without_segments_where_the_drive_has_none(tmp_path: Any
     asyncio.run(main())
 
 
-def test_others_have_their_turn_while_a_task_samples_and_a_cancelled_one_has_its_samples() -> None:
+def test_exchanges_of_other_tasks_run_during_a_sampling() -> None:
     async def main() -> None:
         async with aio.st.open("sim:") as bus, aio.rmd.open("sim:", timeout=30) as motors:
             names = ["SPEED_MEAS", "SPEED_REF"]
@@ -272,7 +272,7 @@ def test_others_have_their_turn_while_a_task_samples_and_a_cancelled_one_has_its
     asyncio.run(main())
 
 
-def test_a_cancelled_sample_has_what_there_was() -> None:
+def test_a_cancelled_sample_has_its_rows() -> None:
     async def main() -> None:
         async with aio.st.open("sim:") as bus:
             task = asyncio.ensure_future(bus.sample(["SPEED_MEAS"], rate=100, seconds=60))
@@ -289,7 +289,7 @@ def test_a_cancelled_sample_has_what_there_was() -> None:
     asyncio.run(main())
 
 
-def test_asyncio_passes_over_a_motor_that_is_silent() -> None:
+def test_asyncio_skips_a_silent_motor() -> None:
     async def main() -> None:
         async with aio.rmd.open("sim:", timeout=0.2, quarantine=0.01) as bus:
             asked = {1: ["iq_amps"], 9: ["iq_amps"]}
@@ -303,7 +303,7 @@ def test_asyncio_passes_over_a_motor_that_is_silent() -> None:
     asyncio.run(main())
 
 
-def test_asyncio_refuses_nonsense() -> None:
+def test_asyncio_refuses_invalid_arguments() -> None:
     async def main() -> None:
         async with aio.st.open("sim:") as bus:
             for names, rate in (([], 10), (["STATUS"], 0), (["STATUS", "status"], 10), (["STATE"], 10)):
@@ -328,6 +328,6 @@ def test_names_of_registers_in_asyncio() -> None:
     asyncio.run(main())
 
 
-def test_one_name_is_no_list_of_letters(st_bus: st.Client) -> None:
+def test_one_name_is_not_taken_for_a_list(st_bus: st.Client) -> None:
     with pytest.raises(motorlink.InvalidValueError, match="list of names"):
         st_bus.sample("SPEED_MEAS", rate=10, seconds=0.1)

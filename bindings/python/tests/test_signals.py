@@ -1,4 +1,4 @@
-"""SIGTERM and SIGHUP stop what a program started, and end it as they would have without."""
+"""SIGTERM and SIGHUP stop the motors of a program, and then end it as usual."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ BEGIN = """
 
 @contextmanager
 def program(script: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A Python program that said that it is ready; killed at the end if it is still there."""
+    """A Python program that is ready. It is killed at the end if it still runs."""
     words = [sys.executable, "-c", textwrap.dedent(BEGIN) + textwrap.dedent(script), *arguments]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
@@ -104,7 +104,7 @@ DEAF = """
 """
 
 
-def test_a_signal_stops_the_motor_of_a_drive_that_is_waited_for(tmp_path: Path) -> None:
+def test_a_signal_stops_a_motor_during_a_wait_for_a_reply(tmp_path: Path) -> None:
     drive = Drive(tmp_path / "st0", 3)
     drive.is_deaf_to = REGISTERS["SPEED_REF"]
     try:
@@ -181,7 +181,7 @@ OPTED_OUT = """
 
 
 @pytest.mark.parametrize("script", [OTHER_THREAD, OPTED_OUT], ids=["other thread", "opted out"])
-def test_what_no_handler_covers_is_left_turning(served: Served, script: str) -> None:
+def test_a_motor_without_a_handler_continues(served: Served, script: str) -> None:
     with program(script, "st", served.st) as running:
         eventually(lambda: served.motor("st", 1)["status"] == "RUN", "a motor in RUN")
         running.send_signal(signal.SIGTERM)
@@ -204,7 +204,7 @@ BOTH_THREADS = """
 """
 
 
-def test_a_bus_of_another_thread_is_covered_by_one_of_the_main_thread(served: Served) -> None:
+def test_handlers_of_the_main_thread_stop_motors_of_other_threads(served: Served) -> None:
     with program(BOTH_THREADS, "st", served.st) as running:
         eventually(lambda: served.motor("st", 1)["status"] == "RUN", "a motor in RUN")
         running.send_signal(signal.SIGTERM)
@@ -225,7 +225,7 @@ def default() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("default")
-def test_the_default_action_is_back_when_the_last_bus_is_closed() -> None:
+def test_the_last_close_restores_the_default_action() -> None:
     default = [signal.SIG_DFL, signal.SIG_DFL]
     with st.open("sim:"):
         replaced = handlers()
@@ -237,7 +237,7 @@ def test_the_default_action_is_back_when_the_last_bus_is_closed() -> None:
     for opened in (st.open("sim:", stop_on_signals=False), rmd.open("sim:", on_close="nothing")):
         with opened:
             assert handlers() == default
-    # ClosedError in another thread, which cannot restore it: the next one does.
+    # The close in another thread cannot restore it. The next close does.
     bus = st.open("sim:")
     thread = threading.Thread(target=bus.close)
     thread.start()
@@ -248,7 +248,7 @@ def test_the_default_action_is_back_when_the_last_bus_is_closed() -> None:
 
 
 @pytest.mark.usefixtures("default")
-def test_asyncio_restores_it_too() -> None:
+def test_asyncio_restores_the_default_action_too() -> None:
     async def main() -> None:
         async with aio.st.open("sim:"), aio.rmd.open("sim:"):
             assert signal.SIG_DFL not in handlers()
@@ -258,7 +258,7 @@ def test_asyncio_restores_it_too() -> None:
 
 
 @pytest.mark.usefixtures("default")
-def test_other_handlers_are_left_alone() -> None:
+def test_other_handlers_are_kept() -> None:
     def own(number: int, frame: FrameType | None) -> None: ...
 
     signal.signal(signal.SIGTERM, own)

@@ -1,4 +1,4 @@
-"""Benches on virtual time: that time passes as it says, the same each time, and that the world acts."""
+"""Benches: virtual time, the same results each time, loads, faults and ports."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def started(bench: sim.Bench, rpm: float = 1000) -> motorlink.st.Motor:
     return motor
 
 
-def test_time_passes_only_when_it_is_waited_for() -> None:
+def test_time_advances_only_during_a_wait() -> None:
     bench = sim.Bench()
     assert bench.now == 0.0
     assert repr(bench) == "<motorlink.sim.Bench st1, st2, rmd1, rmd2, rmd3, rmd4 at 0 s>"
@@ -46,7 +46,7 @@ def test_time_passes_only_when_it_is_waited_for() -> None:
             bench.run(seconds)
 
 
-def test_a_minute_of_timeouts_takes_less_than_that() -> None:
+def test_a_minute_of_timeouts_takes_less_real_time() -> None:
     bench = sim.Bench()
     began = time.monotonic()
     with motorlink.st.open(bench.port(fault="drop=1"), timeout=10, on_close="nothing") as bus:
@@ -57,7 +57,7 @@ def test_a_minute_of_timeouts_takes_less_than_that() -> None:
     assert time.monotonic() - began < bench.now / 2
 
 
-def test_the_same_program_gives_the_same_run_and_another_seed_another() -> None:
+def test_the_same_program_and_seed_give_the_same_run() -> None:
     def run(seed: int, fault: str) -> tuple[list[Any], bytes, str]:
         bench = sim.Bench(SERVO, seed=seed, fault=fault)
         told: list[Any] = []
@@ -99,7 +99,7 @@ def test_configurations_are_text_a_file_or_a_dict(tmp_path: Path) -> None:
         sim.Bench(file)
 
 
-def test_the_bus_of_a_bench_speaks_as_its_drive_does() -> None:
+def test_the_client_of_a_bench_has_the_profile_of_its_drive() -> None:
     assert sim.Bench().st.profile == "spec"
     bus = sim.Bench("profile = 'mcsdk-5.4'").st
     assert bus.profile == "mcsdk-5.4"
@@ -175,7 +175,7 @@ def test_faults_temperatures_supplies_and_power_cycles() -> None:
         (lambda bench: bench.port(fault="explode=1"), "explode"),
     ],
 )
-def test_what_cannot_be_is_refused_and_nothing_happens(wrong: Any, message: str) -> None:
+def test_invalid_calls_are_refused_and_change_nothing(wrong: Any, message: str) -> None:
     bench = sim.Bench()
     before = bench.state_hash
     with pytest.raises(motorlink.InvalidValueError, match=message):
@@ -244,7 +244,7 @@ def test_truth_has_the_signals_with_their_units() -> None:
     assert truth["bus_volts"] == pytest.approx(325, abs=1)
 
 
-def test_a_recording_is_the_same_whoever_lets_time_pass() -> None:
+def test_a_recording_is_independent_of_what_advances_the_time() -> None:
     def data(through_the_line: bool) -> Any:
         bench = sim.Bench(SERVO)
         bench.rmd.motor(1).set_speed(360)
@@ -265,7 +265,7 @@ def test_a_recording_is_the_same_whoever_lets_time_pass() -> None:
     assert one["rmd1.angle_degrees"][-1] > 100
 
 
-def test_a_recording_can_be_looked_at_while_it_grows_and_ends() -> None:
+def test_a_recording_can_be_read_before_its_end() -> None:
     bench = sim.Bench()
     with bench.recording(["rmd1.angle_degrees"], every=0.1) as recording:
         bench.run(0.25)
@@ -288,7 +288,7 @@ def test_registers_are_sampled_on_virtual_time() -> None:
     assert samples["SPEED_MEAS"].mean() == pytest.approx(1000, abs=20)
 
 
-def test_an_instant_between_two_microseconds_comes() -> None:
+def test_an_instant_between_two_microseconds_is_reached() -> None:
     bench = sim.Bench()
     samples = bench.rmd.sample(["speed_dps"], rate=3, seconds=2)
     np.testing.assert_allclose(samples["t"], np.arange(6) / 3, atol=2e-6)
@@ -304,7 +304,7 @@ def test_the_end_of_a_bench_stops_its_motors() -> None:
     assert bench.st.motor(1).status() == "IDLE"  # another bus
 
 
-def test_a_motor_that_cannot_be_stopped_does_not_hide_why_a_bench_ended() -> None:
+def test_a_motor_that_cannot_be_stopped_does_not_hide_an_exception() -> None:
     with pytest.warns(RuntimeWarning, match="motor 1 may still be running"):
         with pytest.raises(ZeroDivisionError):
             with sim.Bench(SERVO, fault="drop=1,only=received") as bench:
@@ -313,13 +313,13 @@ def test_a_motor_that_cannot_be_stopped_does_not_hide_why_a_bench_ended() -> Non
                 with pytest.raises(motorlink.ReplyTimeoutError):
                     bench.rmd.motor(1).set_speed(90)
                 raise ZeroDivisionError
-    # Nobody heard an answer; the motors heard what they were told.
+    # All replies were lost. The motors received their requests.
     bench.run(5.0)
     assert bench.truth("st1")["status"] == "IDLE"
     assert bench.truth("rmd1")["mode"] == "stopped"
 
 
-def test_code_that_sleeps_sleeps_on_the_bench() -> None:
+def test_time_sleep_advances_the_time_of_the_bench() -> None:
     bench = sim.Bench()
     elsewhere: list[float] = []
 
@@ -353,7 +353,7 @@ SCENARIO = """motorlink.sim.run(
 
 
 @pytest.mark.parametrize("long", [RUN, SCENARIO], ids=["run", "scenario"])
-def test_ctrl_c_ends_what_takes_long(long: str) -> None:
+def test_ctrl_c_ends_long_calls(long: str) -> None:
     code = f"""
 import motorlink
 bench = motorlink.sim.Bench()
@@ -375,7 +375,7 @@ except KeyboardInterrupt:
     assert (out, err) == ("interrupted True True\n", "")
 
 
-def test_other_threads_run_while_time_passes() -> None:
+def test_other_threads_run_while_time_advances() -> None:
     bench = sim.Bench(SERVO)
     started(bench)
     over = threading.Event()
@@ -397,7 +397,7 @@ def test_other_threads_run_while_time_passes() -> None:
         thread.join()
 
 
-def test_served_on_ptys_the_drives_go_on_in_real_time(tmp_path: Path) -> None:
+def test_drives_served_on_ptys_run_in_real_time(tmp_path: Path) -> None:
     bench = sim.Bench()
     bench.run(10.0)
     ports = {"st": f"pty:{tmp_path}/st0", "rmd": f"slcan-pty:{tmp_path}/can0"}
@@ -441,13 +441,13 @@ def test_served_without_a_name_or_over_tcp() -> None:
 def test_a_port_that_cannot_be_served_leaves_virtual_time(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     bench = sim.Bench()
-    with pytest.raises(motorlink.PortError, match="no link to a pty"):
+    with pytest.raises(motorlink.PortError, match="not a link to a pty"):
         bench.serve(st=f"pty:{tmp_path}/file")
     bench.run(1.0)
     assert bench.now == 1.0
 
 
-def test_what_is_no_port_is_refused() -> None:
+def test_an_object_that_is_not_a_port_is_refused() -> None:
     with pytest.raises(TypeError, match="3 is not a port: give a name"):
         motorlink.st.open(3)  # type: ignore[arg-type]
 
@@ -462,7 +462,7 @@ def test_the_scenarios_that_ship_run_as_expected(path: Path) -> None:
     assert sim.run(str(path)).state_hash == run.state_hash
 
 
-def test_what_was_not_expected_is_told() -> None:
+def test_failed_expectations_are_reported() -> None:
     run = sim.run(
         """
         title = "A refusal"

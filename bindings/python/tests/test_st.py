@@ -18,7 +18,7 @@ from drive import QUESTIONS, Drive
 from motorlink import aio, st
 
 
-def test_what_is_written_is_read(st_bus: st.Client) -> None:
+def test_a_written_value_is_read(st_bus: st.Client) -> None:
     motor = st_bus.motor(1)
     motor.set("SPEED_KP", 1234)
     assert motor.get("SPEED_KP") == 1234
@@ -43,7 +43,7 @@ def test_a_motor_runs_and_stops(st_bus: st.Client) -> None:
     eventually(lambda: motor.status() == "IDLE", "IDLE")
 
 
-def test_words_keep_their_numbers_and_survive_a_trip(st_bus: st.Client) -> None:
+def test_words_keep_their_numbers_when_pickled(st_bus: st.Client) -> None:
     state = st_bus.motor(1).status()
     assert isinstance(state, st.Status) and isinstance(state, str)
     assert (str(state), state.number) == ("IDLE", 0)
@@ -115,7 +115,7 @@ def test_currents_are_amperes_where_full_scale_is_known(st_bus: st.Client) -> No
             st_bus.motor(1, full_scale_amps=nonsense).get("TORQUE_REF")
 
 
-def test_a_refusal_says_who_and_why(st_bus: st.Client) -> None:
+def test_a_refusal_names_motor_and_reason(st_bus: st.Client) -> None:
     with pytest.raises(motorlink.RefusedError) as refused:
         st_bus.motor(1).get("I_A")
     error = refused.value
@@ -142,7 +142,7 @@ def test_a_value_that_does_not_fit_is_not_sent(st_bus: st.Client, value: float |
     assert motor.get("SPEED_KP") == before
 
 
-def test_nonsense_is_refused_before_it_is_sent(st_bus: st.Client) -> None:
+def test_invalid_values_are_refused_before_they_are_sent(st_bus: st.Client) -> None:
     motor = st_bus.motor(1)
     for nonsense in (
         lambda: motor.set_ramp(1e12, 1),
@@ -177,13 +177,13 @@ def test_nonsense_is_refused_before_it_is_sent(st_bus: st.Client) -> None:
         motor.set_ramp("fast", 1)  # type: ignore[arg-type]
 
 
-def test_a_port_that_is_not_there_says_so(tmp_path: Path) -> None:
+def test_a_missing_port_is_named(tmp_path: Path) -> None:
     with pytest.raises(motorlink.PortError, match="is it plugged in") as error:
         st.open(tmp_path / "nothing")
     assert isinstance(error.value, motorlink.LinkError)
 
 
-def test_limits_hold_for_every_way_to_say_it() -> None:
+def test_limits_hold_for_every_request() -> None:
     with st.open("sim:", speed_limit_rpm=1000, current_limit=1.0, full_scale_amps=32.767) as bus:
         motor = bus.motor(1)
         motor.set_ramp(-1000, 0)
@@ -245,7 +245,7 @@ def test_a_motor_never_turns_faster_than_its_speed_limit(profile: str) -> None:
 
 
 def test_a_limit_of_current_rounds_towards_0() -> None:
-    # A digit is 0.01 A, then 0.3 A: 1.0 A are 3 digits, of which the fourth is beyond.
+    # A digit is 0.01 A, then 0.3 A: 3 digits are within 1.0 A, and 4 are not.
     for full_scale, limit, most in ((327.67, 0.3, 0.3), (9830.1, 1.0, 0.9), (9830.1, 0.29, 0.0)):
         with st.open("sim:", current_limit=limit, full_scale_amps=full_scale) as bus:
             motor = bus.motor(1)
@@ -297,7 +297,7 @@ def test_raw_frames(st_bus: st.Client) -> None:
     assert st_bus.firmware_version().version.startswith("Ver.")
 
 
-def test_after_its_end_a_bus_says_that_it_is_closed() -> None:
+def test_a_closed_client_raises() -> None:
     bus = st.open("sim:")
     motor = bus.motor(1)
     bus.close()
@@ -308,14 +308,14 @@ def test_after_its_end_a_bus_says_that_it_is_closed() -> None:
     assert "closed" in repr(bus)
 
 
-def test_objects_say_what_they_are(st_bus: st.Client) -> None:
+def test_objects_have_a_repr(st_bus: st.Client) -> None:
     assert repr(st_bus) == "<motorlink.st.Client sim:, profile spec>"
     assert repr(st_bus.motor(2)) == "<motorlink.st.Motor 2 on sim:>"
     assert "registers of <motorlink.st.Motor 2" in repr(st_bus.motor(2).registers)
     assert "GET_REG" in repr(st.Request.get_register("STATUS"))
 
 
-def test_the_end_of_with_stops_what_was_started(served: Served) -> None:
+def test_the_end_of_with_stops_started_motors(served: Served) -> None:
     with pytest.raises(ZeroDivisionError), st.open(served.st) as bus:
         motor = bus.motor(1)
         motor.set_ramp(1500, 0.1)
@@ -330,7 +330,7 @@ def test_the_end_of_with_stops_what_was_started(served: Served) -> None:
         bus.motor(1).stop()
 
 
-def test_a_motor_that_cannot_be_stopped_is_not_passed_over(served: Served) -> None:
+def test_a_motor_that_cannot_be_stopped_raises(served: Served) -> None:
     bus = st.open(served.st, timeout=0.05)
     bus.motor(1).start()
     served.end()
@@ -340,7 +340,7 @@ def test_a_motor_that_cannot_be_stopped_is_not_passed_over(served: Served) -> No
     assert "closed" in repr(bus)
 
 
-def test_nor_does_it_hide_what_went_wrong_before(served: Served) -> None:
+def test_a_motor_that_cannot_be_stopped_does_not_hide_an_exception(served: Served) -> None:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         with pytest.raises(ZeroDivisionError), st.open(served.st, timeout=0.05) as bus:
@@ -363,9 +363,9 @@ def test_a_silent_drive_is_a_timeout() -> None:
         os.close(theirs)
 
 
-def test_a_drive_that_falls_silent_is_a_timeout_and_then_a_lost_line(tmp_path: Path) -> None:
+def test_a_drive_that_stops_replying_is_a_timeout_and_then_a_lost_line(tmp_path: Path) -> None:
     drive = Drive(tmp_path / "st0", 3)
-    # What is asked first on a line that was just opened, and one reading.
+    # The first requests on a new line, and one read.
     drive.answers = len(QUESTIONS) + 2
     try:
         with st.open(str(drive.path), timeout=0.3) as bus:
@@ -378,13 +378,13 @@ def test_a_drive_that_falls_silent_is_a_timeout_and_then_a_lost_line(tmp_path: P
         drive.unplug()
 
 
-def test_a_command_that_does_not_exist_is_a_bad_value(st_bus: st.Client) -> None:
+def test_an_unknown_command_is_an_invalid_value(st_bus: st.Client) -> None:
     for number in (256, -1):
         with pytest.raises(motorlink.InvalidValueError, match="0 to 255"):
             st_bus.motor(1).execute(number)
 
 
-def test_registers_are_copied_without_asking_the_drive(st_bus: st.Client) -> None:
+def test_copying_registers_sends_nothing(st_bus: st.Client) -> None:
     registers = st_bus.motor(1).registers
     assert copy.copy(registers)["SPEED_KP"] == registers["SPEED_KP"]
 
@@ -395,7 +395,7 @@ def test_a_motor_that_cannot_exist_is_refused_at_once(st_bus: st.Client, number:
         st_bus.motor(number)
 
 
-def test_a_scan_tells_what_each_rate_was_answered_with(served: Served, tmp_path: Path) -> None:
+def test_a_scan_has_a_result_for_each_rate(served: Served, tmp_path: Path) -> None:
     found = st.scan(served.st, [115200, 9600], timeout=PATIENT)
     assert [(one.baud, one.kind) for one in found] == [(115200, "drive"), (9600, "drive")]
     assert found[0].board_info is not None and "ST MC SDK" in found[0].board_info.name

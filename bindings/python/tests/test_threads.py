@@ -1,4 +1,4 @@
-"""Threads on one bus, the interpreter's lock, and Ctrl-C."""
+"""Threads that share a client, the interpreter's lock, and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ROUNDS = 150
 
 
 def together(jobs: Sequence[Callable[[], None]]) -> None:
-    """Runs a thread a job; raises what any of them raised."""
+    """Runs each job in a thread. Raises the first exception of the threads."""
     failed: list[BaseException] = []
     begin = threading.Barrier(len(jobs))
 
@@ -52,7 +52,7 @@ def test_eight_threads_on_a_serial_line_get_their_own_answers(served: Served) ->
 
             def run() -> None:
                 for n in range(ROUNDS):
-                    # No other thread ever writes this value anywhere.
+                    # No other thread writes this value.
                     value = place * 1000 + n
                     motor.set(register, value)
                     assert motor.get(register) == value
@@ -89,7 +89,7 @@ def test_eight_threads_on_a_can_bus_get_their_own_answers(served: Served) -> Non
         together([make(id) for make in (gains, acceleration) for id in (1, 2, 3, 4)])
 
 
-def test_others_run_while_a_drive_is_waited_for() -> None:
+def test_other_threads_run_during_a_wait_for_a_reply() -> None:
     ours, theirs = os.openpty()
     done = threading.Event()
     rounds = 0
@@ -115,7 +115,7 @@ def test_others_run_while_a_drive_is_waited_for() -> None:
         os.close(theirs)
 
 
-def test_closing_while_others_call_is_clean() -> None:
+def test_closing_during_calls_of_other_threads() -> None:
     bus = st.open("sim:")
     motor = bus.motor(1)
 
@@ -127,7 +127,7 @@ def test_closing_while_others_call_is_clean() -> None:
     together([use, use, use, bus.close])
 
 
-def test_closing_ends_a_sampling_with_what_there_was() -> None:
+def test_closing_ends_a_sampling_with_its_rows() -> None:
     for bus, what in ((st.open("sim:"), ["SPEED_MEAS"]), (rmd.open("sim:"), ["iq_amps"])):
         going = threading.Event()
 
@@ -145,7 +145,7 @@ def test_closing_ends_a_sampling_with_what_there_was() -> None:
 
 
 def python(script: str, *arguments: str) -> subprocess.Popen[str]:
-    """A Python program that says `ready`, and then waits for Ctrl-C."""
+    """A Python program that prints `ready` and then waits for Ctrl-C."""
     words = [sys.executable, "-c", textwrap.dedent(script), *arguments]
     process = subprocess.Popen(
         words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -222,7 +222,7 @@ def test_ctrl_c_ends_a_wait_for_a_drive_and_the_next_exchange_is_right(tmp_path:
             program.send_signal(signal.SIGINT)
             _, err = program.communicate(timeout=10)
             assert "KeyboardInterrupt" in err and program.returncode in (130, -signal.SIGINT)
-        # Once unheard, before the line has recovered, and once with an answer.
+        # Once without a reply, before the line is resynchronised, and once with one.
         assert drive.executed[0] == (1, START) and set(drive.executed[1:]) == {(1, STOP)}
     finally:
         drive.unplug()
@@ -238,7 +238,7 @@ def test_ctrl_c_ends_a_long_sampling_and_stops_the_motor(served: Served) -> None
     eventually(lambda: served.motor("st", 1)["status"] == "IDLE", "a motor at rest")
 
 
-def test_ctrl_c_ends_a_program_that_a_drive_keeps_waiting() -> None:
+def test_ctrl_c_ends_a_program_that_waits_for_a_drive() -> None:
     ours, theirs = os.openpty()
     try:
         with python(WAIT, os.ttyname(theirs)) as program:

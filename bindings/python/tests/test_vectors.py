@@ -1,4 +1,4 @@
-"""The wire vectors of both protocols, through the package: requests both ways, replies into values."""
+"""The wire vectors of both protocols: requests are encoded and decoded, replies become values."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def profiles(vector: Vector) -> list[str]:
 
 
 def st_request(vector: Vector) -> st.Request:
-    """The request that a vector's fields describe, as a program would ask for it."""
+    """The request of a vector's fields, made as in a program."""
     fields = vector["fields"]
     make: dict[str, Callable[[], st.Request]] = {
         "SET_REG": lambda: st.Request.set_register_bytes(
@@ -83,7 +83,7 @@ ST_FIELDS = {
 
 
 def st_fields(vector: Vector) -> dict[str, object]:
-    """The fields as `Request.fields` has them."""
+    """The fields under the names of `Request.fields`."""
     fields: dict[str, object] = {}
     for name, value in vector["fields"].items():
         if name == "command_name":
@@ -143,7 +143,7 @@ def test_an_st_reply_decodes_to_its_fields(vector: Vector) -> None:
 
 
 def rmd_request(frame: rmd.Frame, stem: str) -> rmd.Request:
-    """The request that does what a frame says, as a program would ask for it."""
+    """The request of a frame, made as in a program."""
     values: dict[str, float | str] = dict(frame.values)
     if "direction" in values:
         values["direction"] = "counterclockwise" if values["direction"] else "clockwise"
@@ -165,7 +165,7 @@ def test_an_rmd_request_encodes_to_its_bytes_and_decodes_from_them(vector: Vecto
     decoded = rmd.Request.decode(data)
     assert (decoded.code, decoded.encode()) == (code, data)
     assert decoded.stem is not None
-    # What the document does not allow is read, and never made; nor is a max speed of 0.
+    # Values that the document does not allow can be decoded, and not made. So can a max speed of 0.
     if (
         abs(frame.digits.get("iq", 0)) > 2000
         or (code in (0xA5, 0xA6) and frame.digits["angle"] >= 36000)
@@ -177,9 +177,9 @@ def test_an_rmd_request_encodes_to_its_bytes_and_decodes_from_them(vector: Vecto
         assert rmd_request(frame, decoded.stem) == decoded
 
 
-#: The commands that the package has; 0x280 is none of a motor's.
+#: The commands of a motor. 0x280 is a command for four motors.
 COMMANDS = [name for name in vars(rmd.Request) if not name.startswith("_")]
-#: Commands whose reply repeats them.
+#: Commands whose reply repeats the request.
 ECHOED = {"write_pid_ram", "write_pid_rom", "write_acceleration_ram", "off", "stop", "run"}
 #: A digit of the values that are not in whole units.
 SCALES = {"iq_amps": 33 / 2048, "voltage_volts": 0.1, "angle_degrees": 0.01}
@@ -202,7 +202,7 @@ def test_an_rmd_reply_decodes_to_its_fields(vector: Vector) -> None:
     if "errors" in values:
         errors = values.pop("errors")
         assert errors.bits == fields["errors"]
-        # The other bits mean nothing.
+        # The other bits have no meaning.
         assert len(errors.names) == bin(fields["errors"] & 0x09).count("1")
         assert bool(errors) == bool(fields["errors"] & 0x09)
     assert list(frame.values)[: len(values)] == list(values)
@@ -212,7 +212,7 @@ def test_an_rmd_reply_decodes_to_its_fields(vector: Vector) -> None:
         assert value == frame.values[name]
 
 
-def test_every_kind_of_vector_was_there() -> None:
+def test_every_kind_of_vector_was_tested() -> None:
     assert len({vector["code"] for vector in ST}) == 14
     for direction in ("request", "reply"):
         assert len({v["command"] for v in RMD if v["dir"] == direction}) == len(COMMANDS) + 1
