@@ -132,14 +132,14 @@ def test_a_failed_expectation_says_by_how_much_and_when(run, write):
         between = [0.25, 1.0]
         min = 300
         [[expect]]
-        why = "nobody starts it"
+        why = "it stays at rest"
         signal = "st1.status"
         is = "IDLE"
     """)
     text = run("sim", "run", scenario).ended(1)
     found = "0 rpm at 0.25 s, 300 rpm outside at least 300 rpm"
     assert f"it turns by itself: st1.speed_rpm {found}" in text.err
-    assert "1 of 2 expectations hold" in text.out and "nobody starts it" not in text.err
+    assert "1 of 2 expectations hold" in text.out and "it stays at rest" not in text.err
     told = run("sim", "run", scenario, "--json").ended(1).json
     assert [one["holds"] for one in told["expectations"]] == [False, True]
     assert told["expectations"][0]["found"] == found
@@ -218,7 +218,7 @@ def test_events_stand_in_the_picture(run, write, tmp_path):
         ("[[panel]]\nsignals = ['st1.sped_rpm']", "did you mean `st1.speed_rpm`"),
         ("[[event]]\nat = 2\nst = 1\nsend = 'start'", "event 1: at 2 s: the run lasts"),
         ("[[event]]\nat = nan\nst = 1\nsend = 'start'", "the run lasts"),
-        ("[[event]]\nat = 0\nst = 3\nsend = 'start'", "these are: st1"),
+        ("[[event]]\nat = 0\nst = 3\nsend = 'start'", "the motors are: st1"),
         ("[[event]]\nat = 0\nst = 1\nsend = 'start'\nspeed_rpm = 3", "speed_rpm"),
         ("[[event]]\nat = 0\nst = 1\nworld = 'load'\nnewton_metres = inf", "newton_metres"),
         ("[[event]]\nat = 0\nst = 1\nsend = 'set'\nregister = 'SPEED_MES'\nvalue = 1", "SPEED_MEAS"),

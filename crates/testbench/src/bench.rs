@@ -31,14 +31,14 @@ const BYTE: Duration = Duration::from_micros(87);
 const FRAME: Duration = Duration::from_micros(125);
 /// Drives step at multiples of this.
 const STEP: time::Micros = time::Micros(50);
-/// How often drives on served ports follow the time, if nobody asks them anything.
+/// How often drives on served ports are advanced while no request comes.
 const FOLLOW: Duration = Duration::from_millis(20);
 
-/// An ST drive and a bus of RMD motors in the process, on virtual time: it passes when a client
-/// waits, when bytes are on a line, and in [`run`](Self::run). Nobody sleeps, and the same calls give
-/// the same answers, as long as they come from one thread.
+/// An ST drive and a bus of RMD motors in the process, on virtual time: it advances when a client
+/// waits, while bytes are transmitted, and in [`run`](Self::run). No thread sleeps. The same calls from
+/// one thread give the same answers.
 ///
-/// [`serve`](Self::serve) lets time run for a while, with the same drives on ports.
+/// [`serve`](Self::serve) runs the same drives in real time, on ports.
 pub struct Bench {
     clock: Clock,
     stage: Stage,
@@ -62,7 +62,7 @@ impl Bench {
         Ok(Bench { clock: Clock::virtual_time(), stage, places, signals, profile })
     }
 
-    /// What the ST drive speaks.
+    /// Protocol profile of the ST drive.
     pub fn profile(&self) -> Profile {
         self.profile
     }
@@ -89,22 +89,25 @@ impl Bench {
         Box::new(FaultCan::paced(link, faults, IDENTIFIERS, FRAME))
     }
 
-    /// Lets time pass. While ports are served it takes as long.
+    /// Advances the time. While ports are served, this waits in real time.
     pub fn run(&self, span: time::Micros) {
         self.clock.wait(self.now() + span);
         drop(self.stage.at(self.now()));
     }
 
-    /// Executes a command of a bench, whose ports are `st` and `rmd`; gives the answer, or why nothing
-    /// was done.
+    /// Executes a command of a bench, whose ports are `st` and `rmd`, and returns the answer.
+    ///
+    /// # Errors
+    /// Why the command was not executed.
     pub fn execute(&self, command: &Command) -> Result<Value, String> {
         if let Command::Pause {} | Command::Resume {} = command {
-            return Err("virtual time stands still by itself".to_owned());
+            return Err("virtual time does not run by itself: `pause` and `resume` have no effect"
+                .to_owned());
         }
         self.places.execute(self.now(), command)
     }
 
-    /// What can be looked at, motor by motor.
+    /// The signals, motor by motor.
     pub fn signals(&self) -> &[Signal] {
         &self.signals
     }
@@ -119,20 +122,23 @@ impl Bench {
         hash::fingerprint(&self.stage.at(self.now()).drives)
     }
 
-    /// Writes signals down from now on, at a distance of 50 µs at least.
+    /// Records signals from now on, every 50 µs at most.
     ///
     /// # Errors
-    /// Why that cannot be.
+    /// A signal does not exist, or the interval is too short.
     pub fn record(&self, signals: &[&str], every: time::Micros) -> Result<Recording, String> {
         if every < STEP {
-            return Err(format!("drives step every {} µs: nothing is seen more often", STEP.0));
+            return Err(format!(
+                "drives step every {} µs: choose an interval of at least that",
+                STEP.0
+            ));
         }
         let columns = signals.iter().map(|name| find_signal(name, &self.signals));
         Ok(self.stage.record(&self.clock, columns.collect::<Result<_, _>>()?, every))
     }
 
-    /// Serves the drives on ports, in a thread. Time runs until what this gives is dropped; links of
-    /// this bench wait as long then.
+    /// Serves the drives on ports, in a thread. Time is real time until the result is dropped. Links of
+    /// this bench wait in real time meanwhile.
     ///
     /// # Errors
     /// A port that cannot be served, or a bench that is served already.
@@ -143,13 +149,13 @@ impl Bench {
     ) -> Result<Serving, PortError> {
         if !self.clock.is_virtual() {
             let port = st.or(rmd).map(|port| port.to_string()).unwrap_or_default();
-            let why = "this bench is served already: end that first".to_owned();
+            let why = "this bench is already served: end that first".to_owned();
             return Err(PortError::Configuration { port, why });
         }
         let (stop, stopped) = UnixStream::pair().map_err(failed)?;
         let (tell, told) = mpsc::channel();
         let (clock, stage) = (self.clock.clone(), self.stage.clone());
-        // A server stays in its thread, so that its ports are opened there.
+        // A server cannot change threads: its ports are opened in its own.
         let serve = move || {
             let mut server = Server::by(clock);
             let open = || {
@@ -187,7 +193,7 @@ pub struct Serving {
     st: Option<Served>,
     rmd: Option<Served>,
     clock: Clock,
-    /// What the thread watches for its end, and the thread.
+    /// End of a socket pair that stops the thread when it is closed, and the thread.
     running: Option<(UnixStream, JoinHandle<Result<(), PortError>>)>,
 }
 
@@ -202,10 +208,10 @@ impl Serving {
         self.rmd.as_ref()
     }
 
-    /// Closes the ports; time stands still again.
+    /// Closes the ports. Time is virtual again.
     ///
     /// # Errors
-    /// What kept the ports from being served to the end.
+    /// The error that ended the server early.
     pub fn end(mut self) -> Result<(), PortError> {
         self.close()
     }
@@ -221,7 +227,7 @@ impl Serving {
 
 impl Drop for Serving {
     fn drop(&mut self) {
-        // What failed was seen by the clients.
+        // The clients have seen the failure.
         let _ = self.close();
     }
 }

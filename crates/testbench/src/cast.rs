@@ -1,4 +1,4 @@
-//! Which drives there are, and what can be looked at of them.
+//! The drives of a bench, and their signals.
 
 use motorlink_proto::rmd::MotorId;
 use motorlink_proto::st::MotorNumber;
@@ -6,7 +6,7 @@ use motorlink_proto::st::MotorNumber;
 use crate::config::BenchConfig;
 use crate::signals::{RMD, ST, Signal};
 
-/// The drives that are there.
+/// The drives of a bench.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Cast {
     pub(crate) config: BenchConfig,
@@ -27,7 +27,7 @@ impl Cast {
         st.filter(|_| self.st).chain(rmd.filter(|_| self.rmd)).collect()
     }
 
-    /// What can be looked at.
+    /// The signals of all motors.
     pub(crate) fn signals(&self) -> Vec<Signal> {
         let of = |target: Target| -> Vec<Signal> {
             let name = target.to_string();

@@ -1,4 +1,4 @@
-//! What can be done to a bench: a JSON object a line, answered with one (docs/SIMULATOR.md).
+//! Commands to a bench: one JSON object per line, answered with one (docs/SIMULATOR.md).
 
 use serde::Deserialize;
 
@@ -6,11 +6,11 @@ use serde::Deserialize;
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "command", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Command {
-    /// Takes the power of a drive away and gives it back.
+    /// Switches the power of a drive off and on.
     PowerCycle {
-        /// The served port; where there is one, it need not be named.
+        /// The served port; optional if there is only one.
         port: Option<String>,
-        /// The RMD motor; all of the bus without it. An ST drive has one supply.
+        /// The RMD motor; without it, all motors of the bus. An ST drive has one supply.
         motor: Option<u8>,
     },
     /// Sets the supply: an ST motor's bus voltage or an RMD motor's supply.
@@ -22,7 +22,7 @@ pub enum Command {
         /// V.
         volts: f32,
     },
-    /// Makes a motor show a temperature; without one, its own again.
+    /// Overrides the measured temperature of a motor; without a value, ends that.
     Temperature {
         /// The served port.
         port: Option<String>,
@@ -40,25 +40,25 @@ pub enum Command {
         /// Nm.
         newton_metres: f32,
     },
-    /// Sets the torque with which something turns the output.
+    /// Sets an external torque at the output.
     Push {
         /// The served port.
         port: Option<String>,
         /// The motor.
         motor: u8,
-        /// Nm; negative backwards.
+        /// Nm; a negative one turns backwards.
         newton_metres: f32,
     },
-    /// Holds the rotor, or lets it go.
+    /// Locks or releases the rotor.
     LockRotor {
         /// The served port.
         port: Option<String>,
         /// The motor.
         motor: u8,
-        /// Whether it is held.
+        /// Whether it is locked.
         locked: bool,
     },
-    /// Lets a fault happen: once, or kept present until it is sent with `hold` false.
+    /// Triggers a fault: once, or present until the command is sent with `hold` false.
     Fault {
         /// The served port.
         port: Option<String>,
@@ -66,25 +66,25 @@ pub enum Command {
         motor: u8,
         /// ST: a name such as `BREAK_IN`. RMD: `LOW_VOLTAGE` or `OVER_TEMPERATURE`.
         fault: String,
-        /// True keeps it present, false lets it go; without it the fault happens once.
+        /// True: the fault stays present. False: it ends. Absent: it happens once.
         hold: Option<bool>,
     },
-    /// Lets the time of all drives stand still; they answer meanwhile.
+    /// Stops the time of all drives. They still answer.
     Pause {},
-    /// Lets it go on.
+    /// Continues after [`Pause`](Self::Pause).
     Resume {},
-    /// Tells what is really going on in every motor.
+    /// Reads the true state of every motor.
     State {
-        /// The served port; all of them without it.
+        /// The served port; without it, all ports.
         port: Option<String>,
     },
 }
 
 impl Command {
-    /// Reads a command that is written as JSON.
+    /// Reads a command from JSON.
     ///
     /// # Errors
-    /// Why it is none.
+    /// The text is not a command.
     pub fn read(text: &str) -> Result<Self, String> {
         serde_json::from_str(text).map_err(|error| format!("not a command: {error}"))
     }
@@ -104,7 +104,7 @@ impl Command {
         }
     }
 
-    /// Whether its values can be.
+    /// Checks the ranges of its values.
     pub(super) fn check(&self) -> Result<(), String> {
         let (name, value, range) = match *self {
             Command::Supply { volts, .. } => ("volts", volts, 0.0..=1000.0),

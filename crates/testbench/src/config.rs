@@ -1,4 +1,4 @@
-//! What a bench of simulated drives has, from a TOML file.
+//! The drives of a bench, from a TOML file.
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ pub(crate) type RmdSide = RmdBus<Vec<RmdNode>>;
 /// motors, and four motors with IDs 1 to 4.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BenchConfig {
-    /// What the ST drive speaks.
+    /// Protocol profile of the ST drive.
     pub profile: Profile,
     /// The ST drive's motors.
     pub st: StConfigs,
@@ -50,7 +50,7 @@ impl Default for RmdConfigs {
     }
 }
 
-/// Why a configuration is not taken.
+/// Why a configuration is refused.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfigError {
@@ -70,10 +70,10 @@ pub enum ConfigError {
         /// What is wrong.
         error: Box<ConfigError>,
     },
-    /// The text is not what is expected.
+    /// The text is not a configuration.
     #[error("{}", printable_lines(.0))]
     Text(String),
-    /// A motor that cannot be.
+    /// A motor has impossible values.
     #[error("{0}")]
     Impossible(String),
 }
@@ -103,7 +103,7 @@ impl BenchConfig {
             .map_err(|error| ConfigError::InFile { path: path.to_owned(), error: Box::new(error) })
     }
 
-    /// Reads the text of a file. What it does not say is as in the default.
+    /// Reads the text of a file. Missing parts have their defaults.
     pub fn parse(text: &str) -> Result<Self, ConfigError> {
         Self::from_file(
             toml::from_str(text).map_err(|error| ConfigError::Text(toml_error(&error)))?,
@@ -134,7 +134,7 @@ impl BenchConfig {
         Ok(config)
     }
 
-    /// The same with other noise: that of `seed` for the first motor, of the next number for the next.
+    /// Sets the seeds of the noise: `seed` for the first motor, `seed + 1` for the next.
     pub fn seeded(mut self, seed: u32) -> Self {
         let st = self.st.0.iter_mut().map(|motor| &mut motor.plant.seed);
         let rmd = self.rmd.0.iter_mut().map(|motor| &mut motor.plant.seed);
@@ -147,7 +147,7 @@ impl BenchConfig {
     /// The ST drive, powered on `now`, to be advanced by the caller.
     ///
     /// # Errors
-    /// A motor that cannot be; never with what [`parse`](Self::parse) gave.
+    /// Impossible values; never of a configuration that [`parse`](Self::parse) returned.
     pub fn station(&self, now: Instant) -> Result<StSide, ConfigError> {
         for (config, n) in self.st.0.iter().zip(1..) {
             config.check().map_err(impossible("st.motor", n))?;
@@ -169,8 +169,8 @@ impl BenchConfig {
         &self.rmd.0
     }
 
-    /// The CAN bus, powered on `now`, to be advanced by the caller; `rom` says what each motor's ROM
-    /// holds.
+    /// The CAN bus, powered on `now`, to be advanced by the caller. `rom` returns the content of each
+    /// motor's ROM.
     ///
     /// # Errors
     /// As [`station`](Self::station).
@@ -193,18 +193,18 @@ impl BenchConfig {
     }
 }
 
-/// What is wrong in a file, and where, with the line as far as it can be shown.
+/// An error of a TOML file with its place, on several lines.
 pub(super) fn toml_error(error: &toml::de::Error) -> String {
     let message = error.message();
     printable_lines(error.to_string().replace(message, &printable(message)).trim_end())
 }
 
-/// Says which motor has a value that cannot be.
+/// Adds the motor to an error.
 fn impossible(motor: &str, number: usize) -> impl Fn(OutOfRange) -> ConfigError {
     move |error| ConfigError::Impossible(format!("{motor} {number}: {error}"))
 }
 
-/// The motors of a section, if the file has it; `read` is told each one's place.
+/// The motors of a section, if the file has it. `read` gets the table and the place of each motor.
 fn motors<T>(
     section: Option<Motors>,
     name: &str,
@@ -215,7 +215,7 @@ fn motors<T>(
     tables.map(|(table, n)| read(table, &format!("{name} {n}"))).collect::<Result<_, _>>().map(Some)
 }
 
-/// An ST motor: its preset with what the table says on top.
+/// An ST motor: its preset, changed by the values of the table.
 fn st_motor(mut table: Table, place: &str) -> Result<MotorConfig, ConfigError> {
     let preset = match table.remove("preset") {
         None => MotorConfig::default(),
@@ -233,7 +233,7 @@ fn st_motor(mut table: Table, place: &str) -> Result<MotorConfig, ConfigError> {
     overlay(preset, table, place)
 }
 
-/// An RMD motor: its preset (`rmd-l-5005` or `rmd-x8`) with what the table says on top.
+/// An RMD motor: its preset (`rmd-l-5005` or `rmd-x8`), changed by the values of the table.
 fn rmd_motor(mut table: Table, place: &str) -> Result<RmdConfig, ConfigError> {
     let preset = match table.remove("preset") {
         None => RmdConfig::default(),

@@ -1,4 +1,4 @@
-//! Simulated drives, and what is written down of them while time passes.
+//! Simulated drives, and recordings of their signals.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -44,30 +44,30 @@ impl Drives {
         st.flat_map(st_values).chain(rmd.flat_map(rmd_values))
     }
 
-    /// Changes the world around the ST drive.
+    /// Executes a command on the ST drive's surroundings.
     pub(super) fn change_st(&mut self, now: Instant, command: &Command) -> Result<(), String> {
         let station = self.st.as_mut().ok_or("there is no ST drive")?;
         world::st(station, now, command)
     }
 
-    /// Changes the world around the RMD motors.
+    /// Executes a command on the RMD motors' surroundings.
     pub(super) fn change_rmd(&mut self, now: Instant, command: &Command) -> Result<(), String> {
         let bus = self.rmd.as_mut().ok_or("there are no RMD motors")?;
         world::rmd(bus, now, command)
     }
 }
 
-/// Drives at which ports, commands and observers meet.
+/// Drives that are shared by ports, commands and recordings.
 #[derive(Clone)]
 pub(super) struct Stage(Arc<Mutex<Observed>>);
 
-/// Drives with those who write down what they do.
+/// Drives with the recordings of their signals.
 pub(super) struct Observed {
     pub(super) drives: Drives,
     sheets: Vec<Sheet>,
 }
 
-/// What one observer writes down.
+/// One recording.
 struct Sheet {
     key: u64,
     /// Places of the signals.
@@ -89,12 +89,12 @@ impl Stage {
         observed
     }
 
-    /// The drives as they were last.
+    /// The drives at the time of the last access.
     pub(super) fn last(&self) -> MutexGuard<'_, Observed> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Begins to write the signals at `columns` down, the first time now.
+    /// Starts to record the signals at `columns`. The first sample is taken now.
     pub(super) fn record(&self, clock: &Clock, columns: Vec<usize>, every: Micros) -> Recording {
         let now = clock.now();
         let mut observed = self.at(now);
@@ -120,8 +120,7 @@ impl Observed {
     }
 }
 
-/// Signals of a world that are written down at equal distances while time passes, until this is
-/// dropped.
+/// Signals that are recorded at a fixed interval until this is dropped.
 pub struct Recording {
     stage: Stage,
     clock: Clock,
@@ -136,13 +135,13 @@ impl Recording {
         self.began
     }
 
-    /// From sample to sample.
+    /// The interval between samples.
     pub fn every(&self) -> Micros {
         self.every
     }
 
-    /// The samples that were taken since the last call: the signals of one moment side by side. A
-    /// sample is the state before what happens at its moment.
+    /// The samples since the last call, row by row: all signals of one moment, then those of the next. A
+    /// sample is the state before the events of its moment.
     pub fn take(&self) -> Vec<f64> {
         let mut observed = self.stage.at(self.clock.now());
         let sheet = observed.sheets.iter_mut().find(|sheet| sheet.key == self.key);

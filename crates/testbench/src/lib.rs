@@ -1,9 +1,11 @@
 //! Simulated drives behind ports: inside the process as `sim:`, or served to other programs.
 //!
-//! [`BenchConfig`] says what there is; [`SimServer`] serves the drives, which [`SimServer::obey`]
-//! lets a person or a test do things to that no protocol can: take power away, heat, load, break.
-//! [`Bench`] is drives for the clients of this process, on virtual time. [`scenario`] plays
-//! what is written down. After [`register`], `sim:` is a port like others.
+//! - [`BenchConfig`] describes the drives.
+//! - [`SimServer`] serves them on ports in real time. [`SimServer::obey`] executes commands that no
+//!   protocol has: switch the power off, heat, load, trigger a fault.
+//! - [`Bench`] has drives for the clients of this process, on virtual time.
+//! - [`scenario`] plays scenarios from text files.
+//! - [`register`] adds the port `sim:`.
 #![forbid(unsafe_code)]
 
 mod bench;

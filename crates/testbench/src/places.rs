@@ -1,4 +1,4 @@
-//! Drives by the ports at which they are, and the commands that reach them there.
+//! Drives by their ports, and the commands for them.
 
 use motorlink_proto::st::Flags;
 use motorlink_proto::time::Instant;
@@ -35,7 +35,7 @@ impl ServedDrives {
         self.0.iter()
     }
 
-    /// Executes a command `now`; gives the answer, or why nothing was done.
+    /// Executes a command `now`. Returns the answer, or why the command was not executed.
     pub(super) fn execute(&self, now: Instant, command: &Command) -> Result<Value, String> {
         if let Command::State { port } = command {
             let wanted =
@@ -70,8 +70,8 @@ impl ServedDrives {
         let ports: Vec<&str> = self.iter().map(|place| place.port.as_str()).collect();
         let ports = ports.join(", ");
         match asked {
-            Some(port) => format!("`{port}` is not served; these are: {ports}"),
-            None => format!("which port? these are served: {ports}"),
+            Some(port) => format!("`{port}` is not served; served ports: {ports}"),
+            None => format!("the command needs a `port`; served ports: {ports}"),
         }
     }
 }

@@ -14,7 +14,7 @@ use super::config::{BenchConfig, ConfigError};
 use super::drives::{Drives, Stage};
 use super::line::{RmdStage, SimBytes, SimCan, StStage};
 
-/// Makes `sim:` a port that every client of this process can open.
+/// Registers the port `sim:` in this process.
 pub fn register() {
     port::register(&Sim);
 }
@@ -46,7 +46,7 @@ impl Scheme for Sim {
     }
 }
 
-/// Simulated drives, as a file says or as they are by default.
+/// Simulated drives, from a file or the default ones.
 #[derive(Debug)]
 struct SimPort(Option<PathBuf>);
 

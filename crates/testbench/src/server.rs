@@ -1,4 +1,4 @@
-//! Drives on served ports, and the world around them.
+//! Drives on served ports.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -47,7 +47,7 @@ pub enum ServeError {
 }
 
 impl SimServer {
-    /// A bench without drives, whose time begins now.
+    /// A server without drives. Its time begins now.
     pub fn new() -> Self {
         Self::default()
     }
@@ -57,7 +57,7 @@ impl SimServer {
         self.rom = Some(Rc::new(folder));
     }
 
-    /// Powers an ST drive on and serves it; gives what the port is, for programs to read.
+    /// Powers an ST drive on and serves it. Returns the announcement of the port, a JSON object.
     pub fn serve_st(
         &mut self,
         port: &ServeName,
@@ -75,7 +75,7 @@ impl SimServer {
         Ok(announcement)
     }
 
-    /// Powers RMD motors on and serves their bus; gives what the port is, for programs to read.
+    /// Powers RMD motors on and serves their bus. Returns the announcement of the port, a JSON object.
     pub fn serve_rmd(
         &mut self,
         port: &ServeName,
@@ -108,7 +108,7 @@ impl SimServer {
         Ok(announcement)
     }
 
-    /// Serves the ports once; waits at most `most` for something to do. `extra` is waited for too.
+    /// Serves the ports once. Waits at most `most` for a request, or for `extra` to be readable.
     ///
     /// # Errors
     /// A ROM that could not be written to its folder. The write is not acknowledged to the host.
@@ -128,7 +128,7 @@ impl SimServer {
         Ok(turn)
     }
 
-    /// Obeys a command written as JSON; gives the answer, one line of JSON.
+    /// Executes a command written as JSON. Returns the answer, a JSON object.
     pub fn obey(&mut self, line: &str) -> Value {
         match Command::read(line).and_then(|command| self.execute(&command)) {
             Ok(answer) => answer,
@@ -138,7 +138,7 @@ impl SimServer {
         }
     }
 
-    /// Executes a command; gives the answer, or why nothing was done.
+    /// Executes a command. Returns the answer, or why the command was not executed.
     pub fn execute(&mut self, command: &Command) -> Result<Value, String> {
         if let Command::Pause {} | Command::Resume {} = command {
             self.server.hold(matches!(command, Command::Pause {}));
@@ -157,15 +157,15 @@ struct StoredLine {
 /// The ROM of a bus on disk.
 struct BusRom {
     folder: Rc<RomFolder>,
-    /// Which bus of the bench, from 1.
+    /// Number of the bus, from 1.
     number: usize,
-    /// How often each motor's ROM had been written when it was brought to the disk.
+    /// Number of ROM writes of each motor at the last store.
     seen: HashMap<MotorId, u32>,
     failure: Rc<RefCell<Option<RomError>>>,
 }
 
 impl BusRom {
-    /// Brings what was written to the disk; false when that failed.
+    /// Stores changed ROMs on the disk. Returns false if that failed.
     fn keep(&mut self, nodes: &[RmdNode]) -> bool {
         for node in nodes {
             let writes = node.motor().rom_writes();
@@ -186,7 +186,7 @@ impl BusRom {
 }
 
 impl Station<CanFrame> for StoredLine {
-    /// A write to ROM is answered when it is on the disk.
+    /// A write to ROM is answered after it is on the disk.
     fn receive(&mut self, now: Instant, received: &[CanFrame], replies: &mut Vec<CanFrame>) {
         let before = replies.len();
         self.line.receive(now, received, replies);

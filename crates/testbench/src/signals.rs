@@ -1,4 +1,4 @@
-//! What can be looked at: a row a signal.
+//! Signals of simulated drives: one row each.
 
 use motorlink_proto::rmd::{Errors, Mode};
 use motorlink_proto::st::{Flags, Status};
@@ -10,7 +10,7 @@ use motorlink_sim::st::StMotor;
 pub struct Signal {
     /// Drive, motor and quantity with its unit: `st1.speed_rpm`.
     pub name: String,
-    /// What its values are.
+    /// Kind of its values.
     pub kind: Kind,
 }
 
@@ -23,7 +23,7 @@ impl Signal {
     }
 }
 
-/// What the values of a signal are.
+/// Kind of a signal's values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// Numbers with a unit, which the name ends with.
@@ -44,7 +44,7 @@ pub enum Names {
     Status,
     /// Faults of an ST motor, a bit each: either half of register FLAGS.
     Faults,
-    /// What an RMD motor does: off, stopped, torque, speed, position.
+    /// Mode of an RMD motor: off, stopped, torque, speed, position.
     Mode,
     /// The error byte of an RMD motor, a bit each.
     Errors,
@@ -82,7 +82,7 @@ impl Kind {
     }
 }
 
-/// A number with as many digits as people read.
+/// A number with a few significant digits.
 pub fn short(value: f64) -> String {
     let decimals = match value.abs() {
         1000.0.. => 0,
@@ -97,7 +97,7 @@ pub fn short(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Endings of names that say a unit: ending, quantity, symbol. The first that fits counts.
+/// Units by the endings of names: ending, quantity, symbol. The first match counts.
 const UNITS: &[(&str, &str, &str)] = &[
     ("_newton_metres", "Torque", "Nm"),
     ("_degrees", "Angle", "°"),
@@ -134,8 +134,8 @@ impl<T> Row<T> {
     }
 }
 
-/// Declares a table of signals of a type: `name = what it is of the truth`, with `[names]` where its
-/// values have some.
+/// Declares a table of signals of a type: `name = value of the truth`, with `[names]` where its
+/// values have names.
 macro_rules! signals {
     ($table:ident, $of:ty, |$truth:ident| { $($name:ident $([$names:expr])? = $value:expr;)+ }) => {
         pub(crate) static $table: &[Row<$of>] = &[$( Row {
@@ -183,7 +183,7 @@ signals!(ST, motorlink_sim::st::Truth, |truth| {
     faults[Names::Faults] = (truth.flags.occurred() | truth.flags.present()) as u8;
 });
 
-/// An RMD motor and the errors that its drive remembers.
+/// State of an RMD motor, and the errors stored in its drive.
 pub(crate) struct Rmd {
     truth: motorlink_sim::rmd::Truth,
     errors: Errors,
@@ -260,7 +260,7 @@ pub(crate) fn find_signal(name: &str, signals: &[Signal]) -> Result<usize, Strin
         let likeness = |signal: &&Signal| strsim::jaro_winkler(name, &signal.name);
         let nearest = signals.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
         let nearest = nearest.map_or("", |signal| &signal.name);
-        format!("there is no signal `{name}`; did you mean `{nearest}`?")
+        format!("unknown signal `{name}`; did you mean `{nearest}`?")
     })
 }
 

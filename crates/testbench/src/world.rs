@@ -1,4 +1,4 @@
-//! What commands do to the world around simulated drives.
+//! Commands that change the surroundings of simulated drives: supply, load, temperature, faults.
 
 use motorlink_proto::rmd::{Errors, MotorId};
 use motorlink_proto::st::{Flags, MotorNumber};
@@ -10,12 +10,12 @@ use motorlink_sim::st::StMotor;
 use super::command::Command;
 use super::config::{RmdSide, StSide};
 
-/// Changes the world around an ST motor.
+/// Executes a command on an ST motor's surroundings.
 pub(super) fn st(station: &mut StSide, now: Instant, command: &Command) -> Result<(), String> {
     station.advance_to(now);
     match command {
         Command::PowerCycle { motor: Some(_), .. } => {
-            return Err("an ST drive has one supply: leave the motor out".to_owned());
+            return Err("an ST drive has one supply for all motors: leave `motor` out".to_owned());
         }
         Command::PowerCycle { motor: None, .. } => station.power_cycle(),
         Command::Supply { motor, .. }
@@ -39,7 +39,7 @@ pub(super) fn st(station: &mut StSide, now: Instant, command: &Command) -> Resul
     Ok(())
 }
 
-/// Changes the world around RMD motors.
+/// Executes a command on an RMD motor's surroundings.
 pub(super) fn rmd(bus: &mut RmdSide, now: Instant, command: &Command) -> Result<(), String> {
     bus.advance_to(now);
     match command {
@@ -71,7 +71,7 @@ pub(super) fn rmd(bus: &mut RmdSide, now: Instant, command: &Command) -> Result<
     Ok(())
 }
 
-/// Changes what surrounds a motor, whatever drives it.
+/// The commands that are the same for both kinds of motor.
 fn surround(plant: &mut Plant, command: &Command) {
     match *command {
         Command::Supply { volts, .. } => plant.set_source(volts),
@@ -85,7 +85,7 @@ fn surround(plant: &mut Plant, command: &Command) {
     }
 }
 
-/// The fault of a name, among those that a drive knows.
+/// Finds a fault by its name.
 fn named<'n, T>(
     fault: &str,
     known: impl Iterator<Item = (T, &'n str)> + Clone,
@@ -93,7 +93,7 @@ fn named<'n, T>(
     let names = known.clone().map(|(_, name)| name);
     let mut found = known.filter(|(_, name)| name.eq_ignore_ascii_case(fault));
     found.next().map(|(fault, _)| fault).ok_or_else(|| {
-        format!("there is no fault `{fault}`: {}", names.collect::<Vec<_>>().join(", "))
+        format!("unknown fault `{fault}`; the faults are {}", names.collect::<Vec<_>>().join(", "))
     })
 }
 
@@ -101,11 +101,11 @@ fn st_motor(station: &mut StSide, number: u8) -> Result<&mut StMotor, String> {
     let count = station.drive().motors().len();
     MotorNumber::new(number)
         .and_then(|motor| station.drive_mut().motor_mut(motor))
-        .ok_or_else(|| format!("there is no motor {number}: this drive has {count}"))
+        .ok_or_else(|| format!("motor {number} does not exist; the drive has {count}"))
 }
 
 fn rmd_node(bus: &mut RmdSide, number: u8) -> Result<&mut RmdNode, String> {
     MotorId::new(number)
         .and_then(|id| bus.node_mut(id))
-        .ok_or_else(|| format!("there is no motor {number} on this bus"))
+        .ok_or_else(|| format!("motor {number} is not on this bus"))
 }

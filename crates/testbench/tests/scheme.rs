@@ -7,7 +7,7 @@ use motorlink_testbench::register;
 
 #[test]
 fn simulated_drives_are_a_port_after_they_are_registered() {
-    let refusal = "sim:".parse::<PortName>().expect_err("nobody registered it").to_string();
+    let refusal = "sim:".parse::<PortName>().expect_err("the scheme is not registered").to_string();
     assert!(refusal.contains("`sim:` of motorlink-testbench"), "{refusal}");
 
     register();

@@ -33,7 +33,7 @@ struct Control {
 }
 
 impl Drives {
-    /// Starts them; when this returns their ports can be opened.
+    /// Starts the drives. Their ports can be opened when this returns.
     pub fn start() -> Result<Self, Failure> {
         let folder = std::env::temp_dir().join(format!("motorlink-demo-{}", std::process::id()));
         std::fs::create_dir_all(&folder)?;
@@ -43,7 +43,7 @@ impl Drives {
         let ports = served.clone();
         let thread = std::thread::spawn(move || {
             if let Err(failure) = serve(&ports, &theirs) {
-                // The reader of the announcements tells the rest.
+                // The thread that reads the announcements reports it.
                 let _ = writeln!(&theirs, "{}", json!({ "error": format!("{failure:?}") }));
             }
         });
@@ -62,7 +62,7 @@ impl Drives {
         })
     }
 
-    /// Lets a fault of an ST motor happen, as `motorlink sim` obeys it on stdin.
+    /// Triggers a fault of an ST motor with a command of `motorlink sim`.
     pub fn st_fault(&self, motor: u8, fault: &str) -> Result<(), Failure> {
         let command = json!({
             "command": "fault", "port": self.served[0], "motor": motor, "fault": fault,
@@ -77,7 +77,7 @@ fn serve([st, rmd]: &[String; 2], stream: &UnixStream) -> Result<(), Failure> {
     let mut bench = SimServer::new();
     let out = Voice::new(stream.try_clone()?, missed);
     sim::serve(&mut bench, &drives(), from_ref(st), from_ref(rmd), &out)?;
-    // A signal ends the demo first, which still has to stop its motors.
+    // A signal must not end the drives before the demo has stopped its motors.
     sim::obey(&mut bench, stream, &out, |end| end)
 }
 
@@ -89,7 +89,7 @@ impl Control {
         match answer.get("error") {
             None if !answer.is_null() => Ok(answer),
             error => Err(Failure::link(format!(
-                "the simulated drives did not start or obey: {}",
+                "the simulated drives did not start, or refused a command: {}",
                 error.unwrap_or(&Value::Null)
             ))),
         }
@@ -99,7 +99,7 @@ impl Control {
 impl Drop for Drives {
     fn drop(&mut self) {
         let control = self.control.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
-        // The end of its input ends the thread, which takes its links away.
+        // The thread ends when its input ends, and removes its links.
         let _ = control.commands.shutdown(Shutdown::Write);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -108,9 +108,9 @@ impl Drop for Drives {
     }
 }
 
-/// The default drives, with a paddle in water on each RMD motor: bare they are too quick to watch.
+/// The default drives. RMD motors have viscous friction: without it they are too fast to watch.
 fn drives() -> BenchConfig {
     let motor = |id| format!("[[rmd.motor]]\nid = {id}\nplant.load.viscous = 1.5e-3\n");
     let text: String = (1..=4).map(motor).collect();
-    BenchConfig::parse(&text).expect("the demo's own drives can be")
+    BenchConfig::parse(&text).expect("the configuration of the demo is valid")
 }

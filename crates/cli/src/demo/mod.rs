@@ -20,7 +20,7 @@ use crate::interrupt::{self, interrupted};
 use crate::output::note;
 use crate::sim::outputs;
 
-/// What the picture says to those who cannot see it.
+/// Title of the picture, for screen readers.
 const TITLE: &str =
     "motorlink demo: a table of two ST and four RMD motors; ST motor 1 has a fault, over-current";
 
@@ -41,12 +41,12 @@ pub fn run(args: Args) -> Result<(), Failure> {
     let bus = rmd::Client::open(
         &drives.rmd.parse()?,
         rmd::Options {
-            // A loaded machine may hold the simulator up for longer than a motor would take.
+            // On a busy machine the simulator may answer later than a motor would.
             timeout: std::time::Duration::from_millis(500),
             ..rmd::Options::default()
         },
     )?;
-    // Whatever happens below, these stop the motors.
+    // These stop the motors however the demo ends.
     let _st_guard = st.stop_on_drop().reporting(|stopped| match &stopped.result {
         Ok(()) => note(format!("ST {} is stopped", stopped.motor)),
         Err(error) => note(format!("ST {} may still turn: {error}", stopped.motor)),

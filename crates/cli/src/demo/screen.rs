@@ -108,7 +108,7 @@ impl Screen {
         }
     }
 
-    /// A reader that is gone is noticed by the summary.
+    /// A closed stdout is reported when the summary is printed.
     fn write(&self, line: &Line) {
         let text = line.parts().map(|(ink, text)| match self.is_live {
             true => style(ink).apply_to(text).to_string(),

@@ -1,4 +1,4 @@
-//! What the demo does, step by step, reading everything back through the ports.
+//! The steps of the demo. All values are read through the ports.
 
 use std::time::{Duration, Instant};
 
@@ -15,7 +15,7 @@ use crate::output::print_line;
 
 /// How often the table is read.
 const TICK: Duration = Duration::from_millis(50);
-/// When a step that is not reached is given up.
+/// Timeout of a step.
 const PATIENCE: Duration = Duration::from_secs(6);
 
 pub struct Story<'a> {
@@ -32,7 +32,7 @@ pub struct Story<'a> {
     picture: Option<Vec<Line>>,
 }
 
-/// What the demo has shown.
+/// Summary at the end of the demo.
 pub struct Summary {
     lines: Vec<String>,
 }
@@ -58,7 +58,7 @@ impl<'a> Story<'a> {
         }
     }
 
-    /// The screen during the fault, if it came so far.
+    /// The screen during the fault, if the demo got there.
     pub fn into_picture(self) -> Option<Vec<Line>> {
         self.picture
     }
@@ -123,7 +123,7 @@ impl<'a> Story<'a> {
         second.start()?;
         self.until("ST motor 2 reaches 1000 rpm", |_| near(&second, 1000))?;
         self.done
-            .push("two ST motors started through all their states and held their speed".into());
+            .push("two ST motors went through all states of a start and held their speed".into());
         Ok(())
     }
 
@@ -132,7 +132,7 @@ impl<'a> Story<'a> {
         let motor = self.st.motor(2)?;
         motor.set_ramp(Ramp { speed_rpm: -1000, duration_ms: 1000 })?;
         self.until("ST motor 2 reaches -1000 rpm", |_| near(&motor, -1000))?;
-        self.done.push("one of them reversed".into());
+        self.done.push("one of them reversed its direction".into());
         Ok(())
     }
 
@@ -169,7 +169,7 @@ impl<'a> Story<'a> {
             reached = motor.multi_turn_angle()?.degrees();
             Ok((reached - target.degrees()).abs() < 0.05 && motor.motion_status()?.speed.0 == 0)
         })?;
-        self.done.push(format!("an RMD motor went to {reached:.2}° and stayed there"));
+        self.done.push(format!("an RMD motor moved to {reached:.2}° and held its position"));
         Ok(())
     }
 
@@ -192,8 +192,9 @@ impl<'a> Story<'a> {
         motor.set_ramp(Ramp { speed_rpm: 1200, duration_ms: 500 })?;
         motor.start()?;
         self.until("ST motor 1 reaches 1200 rpm", |_| near(&motor, 1200))?;
-        self.done
-            .push(format!("a fault ({faults}) latched, was acknowledged, and the motor ran again"));
+        self.done.push(format!(
+            "a fault ({faults}) was latched and acknowledged, and the motor ran again"
+        ));
         Ok(())
     }
 
@@ -209,7 +210,7 @@ impl<'a> Story<'a> {
         })
     }
 
-    /// Shows the table until `reached` says so.
+    /// Shows the table until `reached` returns true.
     fn until(
         &mut self,
         what: &str,
@@ -218,7 +219,7 @@ impl<'a> Story<'a> {
         let begun = Instant::now();
         while !reached(self)? {
             if begun.elapsed() > PATIENCE {
-                return Err(Failure::refused(format!("{what} was expected and did not happen")));
+                return Err(Failure::refused(format!("timeout: {what} was expected")));
             }
             self.tick()?;
         }

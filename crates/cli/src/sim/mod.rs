@@ -1,4 +1,4 @@
-//! `motorlink sim`: serves simulated drives and obeys commands on stdin, or plays a scenario.
+//! `motorlink sim`: serves simulated drives and executes commands from stdin, or plays a scenario.
 
 pub mod outputs;
 mod plot;
@@ -21,7 +21,7 @@ use crate::interrupt::{self, interrupted};
 use crate::output;
 use crate::voice::Voice;
 
-/// How long the simulated time may fall behind while nobody talks.
+/// Interval at which drives are advanced while no request comes.
 const IDLE: Duration = Duration::from_millis(20);
 
 #[derive(clap::Args)]
@@ -35,21 +35,21 @@ Prints one JSON line per port once it is ready. JSON commands on stdin change th
 of the motors; docs/SIMULATOR.md lists them."
 )]
 pub struct Args {
-    /// What the drives are, in TOML; without it an ST drive with two motors and RMD motors 1 to 4
+    /// The drives, a TOML file (default: an ST drive with two motors, and RMD motors 1 to 4)
     config: Option<PathBuf>,
-    /// Serve an ST drive here; may be given several times, for a drive each
+    /// Serve an ST drive on this port; repeat for several drives
     #[arg(long, value_name = "PORT")]
     st: Vec<String>,
-    /// Serve a bus of RMD motors here; may be given several times, for a bus each
+    /// Serve a bus of RMD motors on this port; repeat for several buses
     #[arg(long, value_name = "PORT")]
     rmd: Vec<String>,
-    /// What the ST drive speaks, instead of what the configuration says
+    /// Protocol profile of the ST drive, instead of the configuration's
     #[arg(long)]
     profile: Option<Profile>,
-    /// Keep the ROM of RMD motors in this folder; without it their ROM ends with the process
+    /// Keep the ROM of RMD motors in this folder; without it their ROM is lost at the end
     #[arg(long, value_name = "DIR")]
     rom: Option<PathBuf>,
-    /// End when stdin does
+    /// End when stdin ends
     #[arg(long)]
     stdin: bool,
     #[command(subcommand)]
@@ -60,7 +60,7 @@ pub struct Args {
 enum Command {
     /// Play a scenario on virtual time, check its expectations, write a plot or a CSV file
     Run(run::Args),
-    /// The presets of motors and what they are
+    /// Print the presets of motors with all values
     Presets(presets::Args),
 }
 
@@ -92,7 +92,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
     obey(&mut bench, std::io::stdin(), out, |end| interrupted() || end && args.stdin)
 }
 
-/// Serves the ports and says so on `out`, a JSON line each.
+/// Serves the ports and prints one JSON line per port on `out`.
 pub fn serve(
     bench: &mut SimServer,
     config: &BenchConfig,
@@ -109,9 +109,9 @@ pub fn serve(
     Ok(())
 }
 
-/// Serves until `ended` says so, which is told whether `input` has ended. Each line of `input` is a
-/// command and is answered with a line on `out`; while nobody reads the answers, no command is taken
-/// and the drives go on.
+/// Serves until `ended` returns true; its argument is whether `input` has ended. Each line of `input` is
+/// a command, answered with a line on `out`. While the answers are not read, no command is read either,
+/// and the drives are still served.
 pub fn obey(
     bench: &mut SimServer,
     mut input: impl Read + AsFd,
@@ -134,19 +134,19 @@ pub fn obey(
     Ok(())
 }
 
-/// A process in the background is stopped when it reads its terminal.
+/// The system suspends a background process that reads its terminal.
 fn may_read(input: &impl AsFd) -> bool {
     !isatty(input) || tcgetpgrp(input).is_ok_and(|group| group == getpgrp())
 }
 
-/// Whole lines from something that gives bytes when it has them.
+/// Splits input into lines as it arrives.
 #[derive(Default)]
 struct Lines {
     bytes: Vec<u8>,
     ended: bool,
 }
 
-/// The longest command; a longer line is answered as what it is, no command.
+/// The longest command; a longer line is answered with an error.
 const LONGEST: usize = 64 * 1024;
 
 impl Lines {

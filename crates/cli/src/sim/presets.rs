@@ -1,4 +1,4 @@
-//! `motorlink sim presets`: the motors that are there to start from, with every value.
+//! `motorlink sim presets`: the presets of motors, with all values.
 
 use motorlink_testbench::preset;
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use crate::output::print_line;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// A line of JSON a preset instead of the lines of a configuration
+    /// Print one line of JSON per preset instead of lines of TOML
     #[arg(long)]
     json: bool,
 }
@@ -26,14 +26,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// As JSON, with the fewest digits that say which `f32` is meant; `to_value` would widen to `f64`.
+/// As JSON, with the fewest digits that give the same `f32`; `to_value` would widen it to `f64`.
 fn shortest(plant: &impl serde::Serialize) -> Result<Value, Failure> {
     let text = serde_json::to_string(plant);
     let value = text.and_then(|text| serde_json::from_str(&text));
     value.map_err(|error| Failure::link(format!("a preset cannot be written: {error}")))
 }
 
-/// Prints each value as a line of TOML. What is not there has none.
+/// Prints each value as a line of TOML. Absent values are left out.
 fn settings(key: &str, value: &Value) -> Result<(), Failure> {
     match value {
         Value::Null => Ok(()),

@@ -34,7 +34,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let scenario = Scenario::read(&args.scenario)?;
     if args.plot.is_some() && scenario.panels.is_empty() {
-        let why = "there is nothing to plot: add a [[panel]] with signals";
+        let why = "the scenario has no panels to plot: add a [[panel]] with signals";
         return Err(Failure::usage(format!("{}: {why}", args.scenario.display())));
     }
     let inputs: Vec<&Path> =
@@ -54,7 +54,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         "{seconds} s in {took:.3} s: {:.0} times faster than real time",
         seconds / took.max(1e-6)
     ));
-    // Each output is tried, so that one that fails does not take the others away.
+    // All outputs are written, even if one of them fails.
     let report = match (args.json, stdout_is_taken) {
         (true, _) => print_line(&object(&scenario, &run, seconds)),
         (false, true) => {
@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         true => Ok(()),
         false => Err(Failure::refused(not_as_expected(&run))),
     };
-    // What happened comes first: its exit code counts.
+    // The result of the run comes first: its exit code counts.
     let failures = [judged, report, csv, plot].into_iter().filter_map(Result::err);
     failures.reduce(Failure::and).map_or(Ok(()), Err)
 }

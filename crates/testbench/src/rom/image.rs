@@ -5,7 +5,7 @@ use motorlink_proto::units::DpsPerSecond;
 use motorlink_sim::rmd::RmdConfig;
 use serde::{Deserialize, Serialize};
 
-/// What the first member of a file says.
+/// The value of `format` in each file.
 const FORMAT: &str = "RMD ROM 1";
 
 /// The first line of a file; the second is its CRC-32.
@@ -37,7 +37,7 @@ impl Image {
     /// More bytes than any file has.
     pub(super) const LONGEST: u64 = 4096;
 
-    /// Whether a file that was not written to its end can begin so.
+    /// Whether an incomplete ROM file can begin with these bytes.
     pub(super) fn is_beginning(bytes: &[u8]) -> bool {
         let head = format!("{{\"format\":\"{FORMAT}\"");
         let common = bytes.len().min(head.len());
@@ -45,7 +45,7 @@ impl Image {
     }
 
     pub(super) fn to_bytes(&self) -> Vec<u8> {
-        // Numbers and a text without surprises always become JSON.
+        // Numbers and this text can always be written as JSON.
         let line = serde_json::to_string(self).unwrap_or_default();
         format!("{line}\n{:08x}\n", crc32fast::hash(line.as_bytes())).into_bytes()
     }
@@ -63,14 +63,14 @@ impl Image {
         }
     }
 
-    /// Refuses another motor's.
+    /// Refuses the image of another motor.
     pub(super) fn check(self, motor: &RmdConfig) -> Result<Self, String> {
         let own = (motor.id, motor.plant.encoder.bits);
         if (self.id, self.encoder_bits) == own {
             return Ok(self);
         }
         Err(format!(
-            "it is that of motor {} with an encoder of {} bits, not of motor {} with {}",
+            "it belongs to motor {} with an encoder of {} bits, not of motor {} with {}",
             self.id, self.encoder_bits, own.0, own.1
         ))
     }

@@ -12,7 +12,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 #[test]
-fn what_is_stored_is_loaded_and_the_old_stays_until_then() {
+fn a_rom_keeps_its_old_content_until_the_new_one_is_stored() {
     let path = folder("rom-store");
     let rom = RomFolder::open(&path).unwrap();
     let motor = RmdConfig::with_id(7);
@@ -35,7 +35,7 @@ fn what_is_stored_is_loaded_and_the_old_stays_until_then() {
 }
 
 #[test]
-fn torn_damaged_and_foreign_files_are_refused_and_left_alone() {
+fn damaged_and_foreign_files_are_refused_and_not_changed() {
     let path = folder("rom-damage");
     let rom = RomFolder::open(&path).unwrap();
     let motor = RmdConfig::with_id(1);
@@ -63,12 +63,12 @@ fn torn_damaged_and_foreign_files_are_refused_and_left_alone() {
     assert!(refused(b"precious").contains("its end is missing"));
     let other = RmdConfig::with_id(2);
     let others = Image::new(&other, &other.factory_rom()).to_bytes();
-    assert!(refused(&others).contains("that of motor 2"));
+    assert!(refused(&others).contains("belongs to motor 2"));
     fs::remove_dir_all(&path).unwrap();
 }
 
 #[test]
-fn a_folder_has_one_owner() {
+fn a_folder_is_used_by_one_process() {
     let path = folder("rom-owner");
     let rom = RomFolder::open(&path).unwrap();
     assert!(matches!(RomFolder::open(&path), Err(RomError::Taken { .. })));

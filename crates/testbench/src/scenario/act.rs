@@ -1,4 +1,4 @@
-//! What events do to the drives of a scenario.
+//! Executes the events of a scenario.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{ClearErrors, Command as _, Payload, Status};
@@ -11,10 +11,10 @@ use crate::command::Command;
 use crate::drives::Drives;
 
 impl Drives {
-    /// Does what an event says. Gives how a drive refused it, if it did.
+    /// Executes an event. Returns how the drive refused it, `None` if it did not.
     ///
     /// # Errors
-    /// A command to the world that has no sense.
+    /// An impossible command to the surroundings.
     pub(super) fn act(
         &mut self,
         now: Instant,
@@ -28,7 +28,7 @@ impl Drives {
         }
     }
 
-    /// Changes the world around a motor.
+    /// Executes a command on a motor's surroundings.
     pub(super) fn change(
         &mut self,
         now: Instant,
@@ -65,7 +65,7 @@ impl Drives {
     }
 }
 
-/// How a drive refuses that says nothing.
+/// Refusal: no reply.
 pub(super) const SILENT: &str = "silent";
-/// How an RMD motor refuses that keeps errors which it was to clear.
+/// Refusal of `clear-errors` by an RMD motor: errors remain.
 pub(super) const ERRORS: &str = "errors";

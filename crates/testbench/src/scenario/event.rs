@@ -1,4 +1,4 @@
-//! What happens in a scenario.
+//! Events of a scenario.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::time::Instant;
@@ -6,21 +6,21 @@ use motorlink_proto::time::Instant;
 use crate::cast::Target;
 use crate::command::Command;
 
-/// Something that happens to a motor, or that it is told.
+/// A message to a motor, or a change of its surroundings.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Event {
     pub(super) at: Instant,
     pub(super) target: Target,
     pub(super) action: Action,
-    /// What happens, in a few words.
+    /// Short description.
     pub(super) words: String,
-    /// What the plot says; nothing when empty.
+    /// Label in the plot; none if empty.
     pub(super) label: String,
     /// How the drive is expected to refuse it.
     pub(super) refused: Option<String>,
 }
 
-/// What happens.
+/// The action of an event.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Action {
     Bytes(Vec<u8>),

@@ -1,4 +1,4 @@
-//! What is expected of a run, and whether it came so.
+//! Expectations of a run, and their check.
 
 use motorlink_link::printable;
 use serde::Deserialize;
@@ -39,7 +39,7 @@ enum Of {
     Slope,
 }
 
-/// With what it is compared.
+/// The expected values.
 #[derive(Debug, Clone, PartialEq)]
 enum Bounds {
     Range { min: f64, max: f64 },
@@ -58,14 +58,14 @@ pub(super) struct Expectation {
     bounds: Bounds,
 }
 
-/// What came of an expectation.
+/// Result of an expectation.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Verdict {
-    /// The expectation in words.
+    /// Text of the expectation.
     pub why: String,
     /// The signal.
     pub signal: String,
-    /// Whether it came so.
+    /// Whether it holds.
     pub holds: bool,
     /// What was measured, when, and what was expected.
     pub found: String,
@@ -100,7 +100,7 @@ impl Written {
                 return Err(format!("{} has names: use `is`", self.signal));
             }
             Bounds::Range { min, max } if (min..=max).is_empty() => {
-                return Err(format!("nothing is between {min} and {max}"));
+                return Err(format!("the range {min} to {max} is empty"));
             }
             Bounds::Is(_) if !matches!(self.of, Of::Every | Of::Some) => {
                 return Err("`is` goes with `of` every or some".to_owned());
@@ -115,7 +115,7 @@ impl Written {
             }
             Err(format!("{moment} s is not within the run, which lasts from 0 to {end} s"))
         };
-        // A moment that is a sample but for the rounding of its decimals is that sample.
+        // Tolerance for rounded decimals, in samples.
         const SLACK: f64 = 1e-6;
         let samples = match (self.at, self.between) {
             (None, None) => [0, last],
@@ -129,7 +129,7 @@ impl Written {
         let [first, last] = samples.map(|n| n.min(last));
         let fewest = if self.of == Of::Slope { 2 } else { 1 };
         if (last + 1).saturating_sub(first) < fewest {
-            return Err("there are not enough samples in this span".to_owned());
+            return Err("the span has too few samples".to_owned());
         }
         let why = printable(&self.why);
         Ok(Expectation { why, signal, samples: [first, last], of: self.of, bounds })
@@ -177,7 +177,7 @@ impl Expectation {
         step: f64,
     ) -> (bool, String) {
         let unit = signal.kind.unit();
-        // How far a value is outside; what is no number is infinitely far.
+        // How far a value is outside; infinite for NaN.
         let outside = |value: f64| match value {
             value if value < min => min - value,
             value if value <= max => 0.0,
@@ -202,7 +202,7 @@ impl Expectation {
                 (worst(&mut std::iter::once(mean)), false, unit.to_owned())
             }
             Of::Swing => {
-                // Unlike min and max, these keep what is no number.
+                // Unlike min and max, these keep NaN.
                 let least = samples.iter().copied().reduce(|a, b| if a < b { a } else { b });
                 let most = samples.iter().copied().reduce(|a, b| if a > b { a } else { b });
                 let swing = most.zip(least).map(|(most, least)| most - least);
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_compared_and_the_worst_is_told() {
+    fn numbers_are_compared_and_the_worst_is_reported() {
         holds("speed between = [0.3, 0.5]\nmin = 3\nmax = 6", true, "3 to 5 rpm");
         let found = "6 rpm at 0.6 s, 1 rpm outside 3 to 5 rpm";
         holds("speed between = [0.3, 0.6]\nmin = 3\nmax = 5", false, found);
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_never_as_expected() {
+    fn nan_never_meets_an_expectation() {
         let signals = [Signal {
             name: "st1.speed_rpm".to_owned(),
             kind: Kind::Number { quantity: "Speed", unit: "rpm" },
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_checked_is_refused() {
+    fn invalid_expectations_are_refused() {
         let why = |text: &str| {
             let text = text.replace("speed", "signal = \"st1.speed_rpm\"\n");
             check(&text.replace("status", "signal = \"st1.status\"\n")).unwrap_err()
@@ -341,9 +341,9 @@ mod tests {
         assert!(why("speed between = [0.1, 0.4]\nat = 0.2\nmin = 3").contains("not both"));
         assert!(why("speed min = 3\nvalue = 4\nwithin = 1").contains("`within`"));
         assert!(why("speed value = 4").contains("`within`"));
-        assert!(why("speed min = 3\nmax = 2").contains("nothing is between"));
-        assert!(why("speed max = nan").contains("nothing is between"));
-        assert!(why("speed value = 4\nwithin = -1").contains("nothing is between"));
+        assert!(why("speed min = 3\nmax = 2").contains("is empty"));
+        assert!(why("speed max = nan").contains("is empty"));
+        assert!(why("speed value = 4\nwithin = -1").contains("is empty"));
         assert!(why("speed is = \"RUN\"").contains("numbers"));
         assert!(why("status min = 1").contains("names"));
         assert!(why("status of = \"mean\"\nis = \"RUN\"").contains("every or some"));

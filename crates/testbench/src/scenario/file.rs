@@ -1,4 +1,4 @@
-//! A scenario from its text.
+//! Reads a scenario from a file.
 
 use std::mem::take;
 use std::path::{Path, PathBuf};
@@ -58,7 +58,7 @@ struct WrittenPanel {
     range: Option<[f64; 2]>,
 }
 
-/// Why a scenario is not played.
+/// Why a scenario is refused.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScenarioError {
@@ -70,7 +70,7 @@ pub enum ScenarioError {
         /// Why.
         error: std::io::Error,
     },
-    /// The file says something that cannot be.
+    /// The file is invalid.
     #[error("{}: {why}", printable(&.path.display().to_string()))]
     InFile {
         /// The file.
@@ -81,7 +81,7 @@ pub enum ScenarioError {
 }
 
 impl Scenario {
-    /// Reads a file; the files that it names are looked for beside it.
+    /// Reads a file. Paths in it are relative to its folder.
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
         let text = std::fs::read_to_string(path)
             .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
@@ -90,10 +90,10 @@ impl Scenario {
             .map_err(|why| ScenarioError::InFile { path: path.to_owned(), why })
     }
 
-    /// Reads the text of a file that stands in `folder`.
+    /// Reads the text of a file in `folder`.
     ///
     /// # Errors
-    /// What cannot be, and where.
+    /// What is invalid, and where.
     pub fn parse(text: &str, folder: &Path) -> Result<Self, String> {
         let file: File = toml::from_str(text).map_err(|error| toml_error(&error))?;
         Self::from_file(file, folder).map_err(|why| printable(&why))
@@ -133,11 +133,11 @@ impl Scenario {
 }
 
 impl File {
-    /// Drives and what happens to them.
+    /// The drives and their events.
     fn script(&mut self, folder: &Path, duration: Micros) -> Result<Script, String> {
         let (st, rmd) = (self.st.is_some(), self.rmd.is_some());
         if !st && !rmd {
-            return Err("there is no motor: add [[st.motor]] or [[rmd.motor]]".to_owned());
+            return Err("the scenario has no motor: add [[st.motor]] or [[rmd.motor]]".to_owned());
         }
         let sections =
             [("profile", self.profile.take()), ("st", self.st.take()), ("rmd", self.rmd.take())];
@@ -177,17 +177,17 @@ fn times(duration: f64, sample_us: u64) -> Result<(Micros, Micros), String> {
     }
     let micros = (duration * 1e6).round() as u64;
     if micros == 0 {
-        return Err(format!("duration is {duration} s: nothing can happen in no time"));
+        return Err(format!("duration is {duration} s: it must be greater than 0"));
     }
     if !micros.is_multiple_of(sample_us) {
         return Err(format!(
-            "duration {duration} s is no whole number of samples of {sample_us} µs"
+            "duration {duration} s is not a multiple of the sample time, {sample_us} µs"
         ));
     }
     Ok((Micros(micros), Micros(sample_us)))
 }
 
-/// Reads each table of a list; says which one is wrong.
+/// Reads each table of a list. An error has the number of its table.
 fn numbered<T, U>(
     name: &str,
     list: Vec<T>,
@@ -206,12 +206,12 @@ impl WrittenPanel {
         let Some(first) = kinds.first() else { return Err("it has no signals".to_owned()) };
         let named = |kind: &Kind| matches!(kind, Kind::Named(_));
         if kinds.iter().any(|kind| kind.unit() != first.unit() || named(kind) != named(first)) {
-            return Err("its signals have different units: make it several panels".to_owned());
+            return Err("its signals have different units: use several panels".to_owned());
         }
         match self.range {
             Some(_) if named(first) => Err("names have no range".to_owned()),
             Some([low, high]) if (low..high).is_empty() || !(high - low).is_finite() => {
-                Err(format!("nothing is between {low} and {high}"))
+                Err(format!("the range {low} to {high} is empty"))
             }
             range => {
                 Ok(Panel { title: self.title.as_deref().map(printable), signals: found, range })
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn events_come_in_the_order_of_their_time_and_then_of_the_file() {
+    fn events_are_sorted_by_time_and_then_by_their_order_in_the_file() {
         let text = "
             [[event]]
             at = 0.5
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn times_that_cannot_be_are_refused() {
+    fn invalid_times_are_refused() {
         let why = |duration: &str, sample: &str| {
             let text =
                 format!("title = \"\"\nduration = {duration}\nsample_us = {sample}\n{SERVO}");
@@ -267,8 +267,8 @@ mod tests {
         };
         assert!(why("1", "0").contains("multiple of 50"));
         assert!(why("1", "75").contains("multiple of 50"));
-        assert!(why("1.0005", "1000").contains("whole number"));
-        assert!(why("0", "1000").contains("in no time"));
+        assert!(why("1.0005", "1000").contains("not a multiple of the sample time"));
+        assert!(why("0", "1000").contains("greater than 0"));
         assert!(why("-1", "1000").contains("duration"));
         assert!(why("nan", "1000").contains("duration"));
         assert!(why("inf", "1000").contains("duration"));
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_or_impossible_is_refused_with_its_place() {
+    fn errors_name_their_place() {
         let why = |text: &str| parse(text).unwrap_err();
         assert!(why("[[panels]]").contains("panels"));
         let nothing = Scenario::parse(HEAD, Path::new("")).unwrap_err();
@@ -288,7 +288,7 @@ mod tests {
         let kinds = "[[panel]]\nsignals = [\"st1.speed_rpm\", \"st1.status\"]";
         assert!(why(kinds).contains("different units"));
         let range = "[[panel]]\nsignals = [\"st1.speed_rpm\"]\nrange = [1, nan]";
-        assert!(why(range).contains("panel 1: nothing is between"));
+        assert!(why(range).contains("panel 1: the range"));
         let expect = "[[expect]]\nwhy = \"\"\nsignal = \"st1.speed_rpm\"\nat = 2\nmin = 0";
         assert!(why(expect).contains("expect 1: 2 s is not within the run"));
         assert!(why("[[load_profile]]\nst = 1\nfile = \"a.csv\"").contains("/nowhere/a.csv"));

@@ -1,4 +1,4 @@
-//! What a scenario sends: messages in words, and the bytes and frames that they become.
+//! Messages of a scenario, and their bytes and frames.
 
 use motorlink_proto::can::CanFrame;
 use motorlink_proto::rmd::{
@@ -260,7 +260,7 @@ fn text(value: &toml::Value) -> String {
     }
 }
 
-/// A greatest speed in words.
+/// Text of a speed limit.
 fn most(max_speed_dps: Option<f64>) -> String {
     max_speed_dps.map_or(String::new(), |dps| format!(", max {dps} °/s"))
 }
@@ -271,7 +271,7 @@ fn turned(direction: &str) -> Result<SpinDirection, String> {
         .ok_or_else(|| format!("direction is {words}, not `{direction}`"))
 }
 
-/// A physical value as the wire's integer. What no frame says is refused, never cut.
+/// A physical value as the protocol's integer. A value out of range is an error, never clipped.
 fn wanted<Q: Quantity>(value: f64) -> Result<Q, String> {
     Q::wanted(value).map_err(|error| error.to_string())
 }
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_frame_can_say_is_refused() {
+    fn values_out_of_range_are_refused() {
         assert!(st("send = \"fly\"").unwrap_err().contains("fly"));
         assert!(st("send = \"start\"\nrpm = 3").unwrap_err().contains("rpm"));
         assert!(st("send = \"ramp\"\nspeed_rpm = 1500\nduration_ms = 70000").is_err());

@@ -1,5 +1,5 @@
-//! Scenarios: what drives are told, what happens to them and what is expected of them, in a text
-//! file that is played on virtual time (docs/SCENARIOS.md).
+//! Scenarios: text files with drives, messages, disturbances and expectations, which are played on
+//! virtual time (docs/SCENARIOS.md).
 
 mod act;
 mod event;

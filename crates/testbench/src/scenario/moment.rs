@@ -2,7 +2,7 @@
 
 use motorlink_proto::time::{Instant, Micros};
 
-/// A moment of a run that lasts so long, from s.
+/// A moment of a run of this duration, from s.
 pub(super) fn moment(at: f64, duration: Micros) -> Result<Instant, String> {
     let end = seconds(Instant(duration.0));
     if !(0.0..=end).contains(&at) {

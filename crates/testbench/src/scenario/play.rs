@@ -13,17 +13,17 @@ use crate::signals::Signal;
 /// A scenario that can be played.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
-    /// What it is called.
+    /// Title, for the report and the plot.
     pub title: String,
-    /// What a reader should look at.
+    /// Description, for readers.
     pub about: Option<String>,
     /// Length of the run, a whole number of samples.
     pub duration: Micros,
-    /// From sample to sample.
+    /// The interval between samples.
     pub sample: Micros,
-    /// Files that it names, which were read: load profiles.
+    /// The load profiles that were read.
     pub files: Vec<PathBuf>,
-    /// What is plotted, from top to bottom.
+    /// Panels of the plot, from top to bottom.
     pub panels: Vec<Panel>,
     pub(super) script: Script,
     pub(super) signals: Vec<Signal>,
@@ -33,11 +33,11 @@ pub struct Scenario {
 /// A part of the plot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// What stands above it.
+    /// Its title.
     pub title: Option<String>,
     /// Places of its signals in [`Run::signals`]; all have the same unit, or all have names.
     pub signals: Vec<usize>,
-    /// The least and greatest value that are shown; by default everything is.
+    /// Range of the axis; by default that of the samples.
     pub range: Option<[f64; 2]>,
 }
 
@@ -45,7 +45,7 @@ impl Scenario {
     /// Plays it from power-on to its end.
     ///
     /// # Errors
-    /// Drives that cannot be; never those of a scenario that was read.
+    /// Impossible drives; never those of a scenario that was read.
     pub fn run(&self) -> Result<Run, ConfigError> {
         let Played { columns, marks, refusals, state_hash } =
             self.script.play(self.duration, self.sample)?;
@@ -90,7 +90,7 @@ mod tests {
     ";
 
     #[test]
-    fn a_row_is_the_state_before_what_happens_at_its_moment() {
+    fn a_sample_is_the_state_before_the_events_of_its_moment() {
         let text = format!("{SPEED}\n[[event]]\nat = 1\nrmd = 1\nsend = \"off\"");
         let run = run(&text);
         let mode = column(&run, "rmd1.mode");
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_scenario_gives_the_same_run_however_often_it_is_sampled() {
+    fn runs_are_repeatable_and_do_not_depend_on_the_sample_time() {
         let one = run(SPEED);
         assert_eq!(one, run(SPEED));
         let fine = run(&format!("sample_us = 50\n{SPEED}"));
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_counts_unless_it_is_announced_and_so_does_an_announced_one_that_does_not_come() {
+    fn unannounced_refusals_and_missing_refusals_fail_the_run() {
         let set =
             "[[st.motor]]\n[[event]]\nat = 0.5\nst = 1\nsend = \"set\"\nvalue = 3\nregister = ";
         let refused = run(&format!("{set}\"SPEED_MEAS\""));
@@ -126,11 +126,11 @@ mod tests {
         assert!(run(&format!("{set}\"SPEED_MEAS\"\nrefused = \"SET_READ_ONLY\"")).as_expected());
         assert!(!run(&format!("{set}\"SPEED_MEAS\"\nrefused = \"WRONG_SET\"")).as_expected());
         let taken = run(&format!("{set}\"SPEED_KP\"\nrefused = \"SET_READ_ONLY\""));
-        assert!(taken.refusals[0].to_string().starts_with("at 0.5 s st1 took `SPEED_KP 3`"));
+        assert!(taken.refusals[0].to_string().starts_with("at 0.5 s st1 accepted `SPEED_KP 3`"));
     }
 
     #[test]
-    fn an_error_that_stays_when_it_is_cleared_is_a_refusal() {
+    fn a_remaining_error_is_a_refusal_of_clear_errors() {
         let text = "
             [[rmd.motor]]
             [[event]]
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_load_profile_is_the_load() {
+    fn a_load_profile_sets_the_load() {
         let folder = std::env::temp_dir().join(format!("motorlink-load-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         std::fs::write(folder.join("load.csv"), "t_s,newton_metres\n0,0\n1,0.1\n").unwrap();
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_load_opposes_forward_motion_wherever_it_is_written() {
+    fn a_positive_load_opposes_forward_motion() {
         let turned = |text: &str| {
             let run = run(text);
             let load = column(&run, "rmd1.load_newton_metres");
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_of_the_csv_is_a_sample_with_digits_enough_to_get_it_back() {
+    fn csv_values_have_enough_digits_to_be_read_back_exactly() {
         let run = run(SPEED);
         let mut csv = Vec::new();
         run.write_csv(&mut csv).unwrap();

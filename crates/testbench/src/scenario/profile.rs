@@ -5,7 +5,7 @@ use motorlink_proto::time::Instant;
 /// The header of a file.
 const HEADER: &str = "t_s,newton_metres";
 
-/// A torque that is linear between points, and constant before the first and behind the last.
+/// A torque that is linear between points, and constant before the first and after the last.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LoadProfile {
     /// Moments in s, each later than the one before, with the torque in Nm; at least one.
@@ -34,7 +34,7 @@ impl LoadProfile {
             points.push((t, torque));
         }
         if points.is_empty() {
-            return Err("there is no point in it".to_owned());
+            return Err("it has no points".to_owned());
         }
         Ok(LoadProfile { points })
     }
@@ -71,11 +71,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_profile_is_refused_with_its_line() {
+    fn errors_name_their_line() {
         let why = |text: &str| LoadProfile::parse(text).unwrap_err();
         assert!(why("").contains("t_s,newton_metres"));
         assert!(why("time,torque\n0,1").contains("t_s,newton_metres"));
-        assert!(why("t_s,newton_metres\n").contains("no point"));
+        assert!(why("t_s,newton_metres\n").contains("no points"));
         assert!(why("t_s,newton_metres\n0,1\n0,2").contains("line 3"));
         assert!(why("t_s,newton_metres\n0;1").contains("line 2"));
         assert!(why("t_s,newton_metres\n0,nan").contains("line 2"));

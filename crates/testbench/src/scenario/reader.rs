@@ -18,7 +18,7 @@ use crate::cast::{Cast, Target};
 use crate::command::Command;
 use crate::drives::Drives;
 
-/// What events are read against.
+/// Context for reading events.
 pub(super) struct Reader<'a> {
     pub(super) cast: &'a Cast,
     pub(super) targets: &'a [Target],
@@ -56,11 +56,11 @@ impl Reader<'_> {
         let target = match (st, rmd) {
             (Some(number), None) => MotorNumber::new(number).map(Target::St),
             (None, Some(id)) => MotorId::new(id).map(Target::Rmd),
-            _ => return Err("say which motor: `st = 1`, or `rmd = 1`".to_owned()),
+            _ => return Err("name the motor: `st = 1` or `rmd = 1`".to_owned()),
         };
         target.filter(|target| self.targets.contains(target)).ok_or_else(|| {
             let names: Vec<String> = self.targets.iter().map(Target::to_string).collect();
-            format!("there is no such motor; these are: {}", names.join(", "))
+            format!("unknown motor; the motors are: {}", names.join(", "))
         })
     }
 
@@ -69,7 +69,7 @@ impl Reader<'_> {
         match (world, table.contains_key("send")) {
             (None, true) => {}
             (Some(word), false) => return world_event(target, word, table),
-            _ => return Err("say either `send` or `world`".to_owned()),
+            _ => return Err("use either `send` or `world`".to_owned()),
         }
         Ok(match target {
             Target::St(motor) => {
@@ -103,17 +103,17 @@ impl Reader<'_> {
     }
 }
 
-/// Refuses the announcement of what no drive replies.
+/// Refuses an announced refusal that no drive sends.
 fn announced(refused: &str, action: &Action) -> Result<(), String> {
     let known: Vec<&str> = match action {
-        Action::World(_) => return Err("only messages are refused".to_owned()),
+        Action::World(_) => return Err("only a message can be refused".to_owned()),
         Action::Bytes(_) => ErrorCode::ALL.iter().filter_map(|code| code.name()).collect(),
         Action::Frame(_) => vec![SILENT, ERRORS],
     };
     if known.contains(&refused) {
         return Ok(());
     }
-    Err(format!("nothing is refused with `{refused}`, but with {}", known.join(", ")))
+    Err(format!("unknown refusal `{refused}`; possible are {}", known.join(", ")))
 }
 
 fn world_event(target: Target, word: String, mut table: Table) -> Result<(Action, String), String> {
@@ -121,10 +121,10 @@ fn world_event(target: Target, word: String, mut table: Table) -> Result<(Action
         return Err(format!("unknown key `{key}`"));
     }
     if word == "state" {
-        return Err("`state` changes nothing; look at signals".to_owned());
+        return Err("`state` is not an event: use signals".to_owned());
     }
     if ["pause", "resume"].contains(&word.as_str()) {
-        return Err(format!("`{word}` is for drives in real time"));
+        return Err(format!("`{word}` works on drives in real time only"));
     }
     let values: Vec<String> = table.values().map(ToString::to_string).collect();
     let words = format!("{word} {}", values.join(" ").replace('"', ""));
@@ -164,7 +164,7 @@ mod tests {
     use crate::scenario::Scenario;
 
     #[test]
-    fn what_no_event_can_be_is_refused_with_its_time() {
+    fn errors_of_events_name_their_time() {
         let why = |text: &str| {
             let motors = "[[st.motor]]\n[[rmd.motor]]\nid = 3";
             let text = format!("title = \"\"\nduration = 1\n{motors}\n[[event]]\n{text}");
@@ -173,8 +173,8 @@ mod tests {
         assert!(why("st = 1\nsend = \"start\"").contains("event 1: it needs a time"));
         assert!(why("at = 1.1\nst = 1\nsend = \"start\"").contains("lasts from 0 to 1 s"));
         assert!(why("at = nan\nst = 1\nsend = \"start\"").contains("lasts from 0 to 1 s"));
-        assert!(why("at = 0.5\nsend = \"start\"").contains("event 1: at 0.5 s: say which motor"));
-        assert!(why("at = 0.5\nst = 2\nsend = \"start\"").contains("these are: st1, rmd3"));
+        assert!(why("at = 0.5\nsend = \"start\"").contains("event 1: at 0.5 s: name the motor"));
+        assert!(why("at = 0.5\nst = 2\nsend = \"start\"").contains("the motors are: st1, rmd3"));
         assert!(why("at = 0.5\nst = 1").contains("`send` or `world`"));
         assert!(why("at = 0.5\nst = 1\nsend = \"torque\"\niq_amps = 3").contains("torque"));
         assert!(why("at = 0.5\nst = 1\nsend = \"start\"\nlabl = \"\"").contains("labl"));
@@ -184,7 +184,7 @@ mod tests {
         let load = "at = 0.5\nst = 1\nworld = \"load\"\nnewton_metres = ";
         assert!(why(&format!("{load}nan")).contains("newton_metres is"));
         assert!(why(&format!("{load}1\nport = \"x\"")).contains("port"));
-        assert!(why(&format!("{load}1\nrefused = \"x\"")).contains("only messages"));
+        assert!(why(&format!("{load}1\nrefused = \"x\"")).contains("only a message"));
         let start = "at = 0.5\nst = 1\nsend = \"start\"\nrefused = \"RATHER_NOT\"";
         assert!(why(start).contains("WRONG_CMD"));
         assert!(why("at = 0.5\nrmd = 3\nsend = \"off\"\nrefused = \"NO\"").contains("silent"));

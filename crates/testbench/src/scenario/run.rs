@@ -1,4 +1,4 @@
-//! What came of a scenario.
+//! The result of a scenario.
 
 use std::io::{self, Write};
 
@@ -8,20 +8,20 @@ use super::expect::Verdict;
 use super::moment::seconds;
 use crate::signals::Signal;
 
-/// What came of a scenario.
+/// The result of a scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// What was sampled.
+    /// The signals.
     pub signals: Vec<Signal>,
     /// The samples of each signal; the first is at time 0.
     pub columns: Vec<Vec<f64>>,
-    /// From sample to sample.
+    /// The interval between samples.
     pub sample: Micros,
-    /// What happened when.
+    /// The events, in the order of time.
     pub marks: Vec<Mark>,
-    /// Replies that were not as announced, in the order of time.
+    /// Refusals that differ from the announced ones, in the order of time.
     pub refusals: Vec<Refusal>,
-    /// What came of the expectations, in the order of the file.
+    /// Results of the expectations, in the order of the file.
     pub verdicts: Vec<Verdict>,
     /// FNV-1a over the state of all drives at the end.
     pub state_hash: u64,
@@ -32,22 +32,22 @@ pub struct Run {
 pub struct Mark {
     /// Moment, s.
     pub at: f64,
-    /// What happened, in a few words.
+    /// Short description.
     pub label: String,
 }
 
-/// A reply that was not as the scenario announced it.
+/// A refusal that the scenario does not announce, or an announced one that is missing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refusal {
     /// Moment, s.
     pub at: f64,
     /// The motor: `st1`.
     pub motor: String,
-    /// The event in words.
+    /// Description of the event.
     pub event: String,
-    /// What the drive said: a code, `silent`, `errors`; `None` where it took what it was to refuse.
+    /// The refusal: a code, `silent`, `errors`; `None` if the drive accepted the message.
     pub reply: Option<String>,
-    /// What was announced.
+    /// The announced refusal.
     pub announced: Option<String>,
 }
 
@@ -56,7 +56,7 @@ impl std::fmt::Display for Refusal {
         write!(f, "at {} s {} ", self.at, self.motor)?;
         match &self.reply {
             Some(reply) => write!(f, "refused `{}` with {reply}", self.event)?,
-            None => write!(f, "took `{}`", self.event)?,
+            None => write!(f, "accepted `{}`", self.event)?,
         }
         match &self.announced {
             Some(announced) => write!(f, "; the scenario announces `refused = \"{announced}\"`"),
@@ -65,7 +65,7 @@ impl std::fmt::Display for Refusal {
     }
 }
 
-/// What came of a run before it is judged.
+/// A run before its expectations are checked.
 pub(super) struct Played {
     pub(super) columns: Vec<Vec<f64>>,
     pub(super) marks: Vec<Mark>,
@@ -85,7 +85,7 @@ impl Run {
         (0..rows).map(|n| seconds(Instant(n * self.sample.0)))
     }
 
-    /// Writes all samples as CSV: `time_s` and the signals, a row a sample.
+    /// Writes all samples as CSV: `time_s` and the signals, one row per sample.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
         write!(out, "time_s")?;
         for signal in &self.signals {
@@ -96,7 +96,7 @@ impl Run {
             write!(out, "{time}")?;
             for column in &self.columns {
                 let value = column[row];
-                // The shortest digits that give the same number back, as narrow as it was.
+                // The fewest digits that give the same number, as f32 if it is one.
                 match value as f32 {
                     narrow if f64::from(narrow) == value => write!(out, ",{narrow:?}")?,
                     _ => write!(out, ",{value:?}")?,

@@ -1,4 +1,4 @@
-//! What drives are told and what happens to them, in the order of time.
+//! Plays the events of a scenario in the order of time.
 
 use motorlink_proto::time::{Instant, Micros};
 use motorlink_sim::hash;
@@ -11,10 +11,10 @@ use crate::cast::{Cast, Target};
 use crate::config::ConfigError;
 use crate::drives::Drives;
 
-/// How often a load that changes all the time is set.
+/// Interval at which a load profile is applied.
 const LOAD_STEP: Micros = Micros(50);
 
-/// Drives with their script.
+/// Drives with their events.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Script {
     pub(super) cast: Cast,
@@ -24,7 +24,7 @@ pub(super) struct Script {
 }
 
 impl Script {
-    /// Powers the drives on and lets everything happen.
+    /// Powers the drives on and plays all events.
     pub(super) fn play(&self, duration: Micros, sample: Micros) -> Result<Played, ConfigError> {
         let mut drives = Drives::new(&self.cast)?;
         let end = Instant(duration.0);
@@ -67,7 +67,7 @@ impl Script {
 }
 
 impl Event {
-    /// That the drive replied so, which was not announced.
+    /// The reply of the drive as an unexpected refusal.
     fn refusal(&self, reply: Option<String>) -> Refusal {
         Refusal {
             at: seconds(self.at),
