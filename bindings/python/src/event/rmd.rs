@@ -179,7 +179,7 @@ impl RmdEventClient {
         })
     }
 
-    /// Sets the limits of a motor; `None` is no limit.
+    /// Sets the limits of a motor. `None` removes a limit.
     fn set_limits(
         &self,
         py: Python<'_>,

@@ -156,7 +156,7 @@ impl RmdClient {
         Ok((rows, skipped, outcome.err()))
     }
 
-    /// Sets the limits of a motor; `None` is no limit.
+    /// Sets the limits of a motor. `None` removes a limit.
     fn set_limits(
         &self,
         py: Python<'_>,
